@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "precompute/mesh/surface_mesh.h"
+
+namespace carillon::precompute {
+
+/// A face of the boundary, counter-clockwise seen from outside: three corners, then (quadratic
+/// only, else -1) the mid-side nodes between corners 0-1, 1-2 and 2-0.
+struct BoundaryFace {
+  std::array<int32_t, 6> nodes;
+  /// The triangle of the surface as given on which this face lies.
+  int32_t given_triangle;
+};
+
+/// A mesh of tetrahedra of 4 or 10 nodes.
+struct TetMesh {
+  std::vector<Point> nodes;  ///< metres
+  int nodes_per_element = 4;
+  /// Element e has nodes elements[e * nodes_per_element ...]: four corners of positive signed
+  /// volume, then the mid-side nodes of edges 0-1, 1-2, 2-0, 0-3, 1-3, 2-3.
+  std::vector<int32_t> elements;
+  std::vector<BoundaryFace> boundary;
+
+  size_t element_count() const { return elements.size() / static_cast<size_t>(nodes_per_element); }
+};
+
+}  // namespace carillon::precompute

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "proto/error_reason.h"
+
+#include <algorithm>
+#include <string>
+
+#include "absl/strings/ascii.h"
+#include "absl/strings/cord.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/strip.h"
+
+namespace carillon {
+namespace {
+
+constexpr absl::string_view kFigurePrefix = "carillon.figure/";
+
+bool IsReason(absl::string_view text) {
+  return !text.empty() && std::ranges::all_of(text, [](unsigned char c) {
+    return absl::ascii_isupper(c) || absl::ascii_isdigit(c) || c == '_';
+  });
+}
+
+}  // namespace
+
+absl::Status Refusal(absl::StatusCode code, absl::string_view reason, absl::string_view message) {
+  return absl::Status(code, absl::StrCat(reason, ": ", message));
+}
+
+void AddFigure(absl::Status& status, absl::string_view name, absl::string_view value) {
+  status.SetPayload(absl::StrCat(kFigurePrefix, name), absl::Cord(value));
+}
+
+v1::ErrorInfo ToErrorInfo(const absl::Status& status) {
+  v1::ErrorInfo error;
+  const absl::string_view message = status.message();
+  const size_t colon = message.find(": ");
+  if (colon != absl::string_view::npos && IsReason(message.substr(0, colon))) {
+    error.set_reason(std::string(message.substr(0, colon)));
+    error.set_message(std::string(message.substr(colon + 2)));
+  } else {
+    error.set_reason("INTERNAL");
+    error.set_message(std::string(message));
+  }
+  status.ForEachPayload([&](absl::string_view url, const absl::Cord& value) {
+    if (absl::ConsumePrefix(&url, kFigurePrefix)) {
+      (*error.mutable_metadata())[std::string(url)] = std::string(value);
+    }
+  });
+  return error;
+}
+
+absl::Status FromErrorInfo(absl::StatusCode code, const v1::ErrorInfo& error) {
+  absl::Status status = Refusal(code, error.reason(), error.message());
+  for (const auto& [name, value] : error.metadata()) AddFigure(status, name, value);
+  return status;
+}
+
+}  // namespace carillon

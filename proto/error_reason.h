@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "absl/status/status.h"
+#include "absl/strings/string_view.h"
+#include "carillon/v1/error.pb.h"
+
+namespace carillon {
+
+/// A refusal: `code` with the message "REASON: message". Every absl::Status that can reach a user
+/// is made so; the reasons are listed in proto/README.md.
+absl::Status Refusal(absl::StatusCode code, absl::string_view reason, absl::string_view message);
+
+/// Adds a figure that belongs to the reason, for programs ("first_mode_hz" = "31.5").
+void AddFigure(absl::Status& status, absl::string_view name, absl::string_view value);
+
+/// Reason, message and figures of a status; a status without a reason gets "INTERNAL".
+v1::ErrorInfo ToErrorInfo(const absl::Status& status);
+
+/// The status that ToErrorInfo would turn into `error`.
+absl::Status FromErrorInfo(absl::StatusCode code, const v1::ErrorInfo& error);
+
+}  // namespace carillon

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "proto/material_catalogue.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <set>
+
+namespace carillon {
+namespace {
+
+using ::testing::HasSubstr;
+
+TEST(MaterialCatalogue, EveryEntryIsCompleteSourcedAndNamedOnce) {
+  std::set<std::string> names;
+  for (const v1::CatalogueMaterial& entry : Materials().materials()) {
+    EXPECT_TRUE(ResolveMaterial(entry.material()).ok()) << entry.name();
+    EXPECT_TRUE(entry.material().has_poisson_ratio()) << entry.name();
+    EXPECT_FALSE(entry.source().empty()) << entry.name();
+    EXPECT_TRUE(names.insert(entry.name()).second) << entry.name();
+  }
+  EXPECT_TRUE(names.contains("chime_aluminum"));
+}
+
+TEST(ResolveMaterial, PutsGivenFiguresOverThePreset) {
+  v1::Material material;
+  material.set_preset("chime_aluminum");
+  material.set_alpha2_per_s(3);
+  const absl::StatusOr<v1::Material> resolved = ResolveMaterial(material);
+  ASSERT_TRUE(resolved.ok()) << resolved.status();
+  EXPECT_EQ(resolved->alpha2_per_s(), 3);
+  EXPECT_EQ(resolved->density_kg_per_m3(), 2700);
+  EXPECT_TRUE(resolved->preset().empty());
+}
+
+TEST(ResolveMaterial, UnknownPresetListsTheKnownOnes) {
+  v1::Material material;
+  material.set_preset("unobtainium");
+  const absl::StatusOr<v1::Material> resolved = ResolveMaterial(material);
+  EXPECT_THAT(resolved.status().ToString(), HasSubstr("UNKNOWN_MATERIAL: "));
+  EXPECT_THAT(resolved.status().ToString(), HasSubstr("chime_aluminum"));
+}
+
+TEST(ResolveMaterial, RefusesFiguresOutOfRangeByName) {
+  v1::Material material;
+  material.set_preset("chime_aluminum");
+  material.set_young_pa(-1);
+  EXPECT_THAT(ResolveMaterial(material).status().ToString(), HasSubstr("young_pa is -1"));
+  material.set_young_pa(7e10);
+  material.set_poisson_ratio(0.5);
+  EXPECT_THAT(ResolveMaterial(material).status().ToString(), HasSubstr("poisson_ratio is 0.5"));
+}
+
+}  // namespace
+}  // namespace carillon
