@@ -1,0 +1,25 @@
+# shellcheck shell=bash
+# SPDX-License-Identifier: Apache-2.0
+#
+# Sourced by the scripts of deploy/ with $root set: what they all need to run anywhere, in a chroot
+# without a home or a locale too.
+
+root=${root:?}
+export LC_ALL=C.UTF-8
+if [[ -z ${HOME:-} || ! -w $HOME ]]; then
+  export HOME=$root/build/home
+  mkdir -p "$HOME"
+fi
+
+# Checkouts in different folders share compiled objects.
+export CCACHE_BASEDIR=${CCACHE_BASEDIR-$root} CCACHE_NOHASHDIR=1
+
+# Caches that outlive a checkout.
+export CARILLON_CACHE=${XDG_CACHE_HOME:-$HOME/.cache}/carillon
+
+case $(uname -m) in
+  aarch64) buf_package=buf-linux-aarch64 ;;
+  *) buf_package=buf-linux-x64 ;;
+esac
+buf_lock=$(sha256sum "$root/deploy/buf/package-lock.json" | cut -c 1-16)
+export CARILLON_BUF=$CARILLON_CACHE/buf-$buf_lock/node_modules/@bufbuild/$buf_package/bin/buf

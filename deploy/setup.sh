@@ -1,0 +1,53 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+#
+# Installs what is missing of deploy/packages.txt, from Debian as this machine's apt is set up, and
+# buf, from the npm registry. Calls neither when nothing is missing.
+set -euo pipefail
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+# shellcheck source=deploy/environment.sh
+source "$root/deploy/environment.sh"
+
+missing_packages() {
+  local -A installed=()
+  local name
+  while read -r name; do installed[$name]=1; done < <(
+    dpkg-query -W -f '${db:Status-Abbrev} ${Package}\n' 2>/dev/null | sed -n 's/^.i  *//p')
+  while read -r name; do
+    [[ -n ${installed[$name]:-} ]] || printf '%s\n' "$name"
+  done < <(sed -e 's/#.*//' -e '/^ *$/d' "$root/deploy/packages.txt")
+  # Any npm will do, and others than Debian's bring it inside their nodejs.
+  [[ -x $CARILLON_BUF ]] || command -v npm >/dev/null || printf 'npm\n'
+}
+
+as_root() {
+  if [[ $(id -u) -eq 0 ]]; then
+    "$@"
+  elif command -v sudo >/dev/null; then
+    sudo "$@"
+  else
+    printf 'setup: not root and without sudo; as root, run:\n  %s\n' "$*" >&2
+    return 1
+  fi
+}
+
+install_packages() {
+  printf 'setup: installing %s\n' "$*"
+  local -a apt=(env DEBIAN_FRONTEND=noninteractive LC_ALL=C.UTF-8 apt-get -q -y
+    -o Acquire::Retries=3 -o DPkg::Lock::Timeout=600 -o Dpkg::Use-Pty=0)
+  as_root "${apt[@]}" update || printf 'setup: apt-get update failed; trying what is known\n' >&2
+  as_root "${apt[@]}" install --no-install-recommends "$@" </dev/null
+}
+
+install_buf() {
+  printf 'setup: installing buf\n'
+  local folder=${CARILLON_BUF%/node_modules/*}
+  mkdir -p "$folder"
+  cp "$root"/deploy/buf/package{,-lock}.json "$folder"
+  # npm ci checks the digests in the lock file.
+  (cd "$folder" && npm ci --ignore-scripts --no-audit --no-fund --loglevel=error </dev/null)
+}
+
+mapfile -t missing < <(missing_packages)
+if ((${#missing[@]})); then install_packages "${missing[@]}"; fi
+[[ -x $CARILLON_BUF ]] || install_buf
