@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -16,6 +17,14 @@ struct BoundaryFace {
   /// The triangle of the surface as given on which this face lies.
   int32_t given_triangle;
 };
+
+/// Corners of the edges of a tetrahedron, in the order of their mid-side nodes.
+inline constexpr std::array<std::array<int, 2>, 6> kTetEdges = {
+    {{0, 1}, {1, 2}, {2, 0}, {0, 3}, {1, 3}, {2, 3}}};
+
+/// Corners of the faces of a tetrahedron of positive volume, counter-clockwise seen from outside.
+inline constexpr std::array<std::array<int, 3>, 4> kTetFaces = {
+    {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}}};
 
 /// A mesh of tetrahedra of 4 or 10 nodes.
 struct TetMesh {

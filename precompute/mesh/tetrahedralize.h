@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <optional>
+
+#include "absl/status/statusor.h"
+#include "precompute/mesh/surface_mesh.h"
+#include "precompute/mesh/tet_mesh.h"
+
+namespace carillon::precompute {
+
+struct MeshingSettings {
+  /// Keep the vertices of the surface and add none on it; unset: decided from the surface.
+  std::optional<bool> keep_surface;
+  /// About how many corner nodes the mesh should have; zero: decided from the surface.
+  int target_node_count = 0;
+  /// 4 or 10. Mid-side nodes lie on straight edges.
+  int nodes_per_element = 10;
+};
+
+/// Fills a surface that CheckSurface accepted with tetrahedra; cavities stay empty. Each face of
+/// the mesh's boundary names the given triangle it lies on. Not thread-safe: while the mesher runs,
+/// standard output is silenced.
+///
+/// Errors: MESH_TETRAHEDRALIZATION_FAILED, MESH_TOO_LARGE. The mesher may also crash the process.
+absl::StatusOr<TetMesh> Tetrahedralize(const SurfaceMesh& surface, const MeshingSettings& settings);
+
+}  // namespace carillon::precompute

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "precompute/mesh/boundary.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <set>
+
+#include "precompute/mesh/sounding_surface.h"
+#include "tests/precompute/test_meshes.h"
+
+namespace carillon::precompute {
+namespace {
+
+using ::testing::HasSubstr;
+
+const Point& At(const TetMesh& mesh, int32_t node) { return mesh.nodes[static_cast<size_t>(node)]; }
+
+double SignedVolume(const Point& a, const Point& b, const Point& c) {
+  return (a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) +
+          a[2] * (b[0] * c[1] - b[1] * c[0])) /
+         6;
+}
+
+double EnclosedVolume(const TetMesh& mesh, const SoundingSurface& surface) {
+  double volume = 0;
+  for (const auto& t : surface.triangles) {
+    const auto corner = [&](size_t i) {
+      return At(mesh, surface.nodes[static_cast<size_t>(t[i])]);
+    };
+    volume += SignedVolume(corner(0), corner(1), corner(2));
+  }
+  return volume;
+}
+
+TEST(Boundary, OfABoxHasTwoTrianglesACellFace) {
+  EXPECT_EQ(MakeTetBox({1, 2, 3}, {2, 3, 4}, 4).boundary.size(), 2U * 2U * (6U + 12U + 8U));
+}
+
+TEST(Boundary, IsOrientedOutward) {
+  const TetMesh mesh = MakeTetBox({1, 2, 3}, {2, 3, 4}, 4);
+  const SurfaceMesh surface = BoundarySurface(mesh);
+  double volume = 0;
+  for (const auto& t : surface.triangles) {
+    volume += SignedVolume(surface.vertices[static_cast<size_t>(t[0])],
+                           surface.vertices[static_cast<size_t>(t[1])],
+                           surface.vertices[static_cast<size_t>(t[2])]);
+  }
+  EXPECT_NEAR(volume, 6, 1e-12);  // rounding
+}
+
+TEST(Boundary, FoundAgainOnAQuadraticMeshNamesTheSameMidsideNodes) {
+  const TetMesh made = MakeTetBox({1, 1, 1}, {2, 2, 2}, 10);
+  TetMesh found = made;
+  ASSERT_TRUE(FindBoundary(found).ok());
+  ASSERT_EQ(found.boundary.size(), made.boundary.size());
+  for (size_t i = 0; i < made.boundary.size(); ++i) {
+    EXPECT_EQ(found.boundary[i].nodes, made.boundary[i].nodes);
+  }
+}
+
+TEST(Boundary, OfATetrahedronGivenThreeTimesIsRefused) {
+  TetMesh mesh = MakeTetBox({1, 1, 1}, {1, 1, 1}, 4);
+  const std::vector<int32_t> first(mesh.elements.begin(), mesh.elements.begin() + 4);
+  for (int copy = 0; copy < 2; ++copy) {
+    mesh.elements.insert(mesh.elements.end(), first.begin(), first.end());
+  }
+  EXPECT_THAT(FindBoundary(mesh).ToString(), HasSubstr("MESH_NOT_MANIFOLD"));
+}
+
+TEST(MidsideNodes, LieInTheMiddleOfTheirEdgesAndAreShared) {
+  const TetMesh mesh = MakeTetBox({1, 1, 1}, {2, 2, 2}, 10);
+  // Euler: a box of 2 x 2 x 2 cells of six tetrahedra has 27 nodes, 48 tetrahedra and 48 faces
+  // on its boundary, so 98 edges.
+  EXPECT_EQ(mesh.nodes.size(), 27U + 98U);
+  for (size_t e = 0; e < mesh.elements.size(); e += 10) {
+    for (size_t edge = 0; edge < 6; ++edge) {
+      const Point& p = At(mesh, mesh.elements[e + static_cast<size_t>(kTetEdges[edge][0])]);
+      const Point& q = At(mesh, mesh.elements[e + static_cast<size_t>(kTetEdges[edge][1])]);
+      const Point& m = At(mesh, mesh.elements[e + 4 + edge]);
+      for (size_t x = 0; x < 3; ++x) EXPECT_DOUBLE_EQ(m[x], (p[x] + q[x]) / 2);
+    }
+  }
+}
+
+TEST(SoundingSurface, EnclosesTheVolumeOfTheTube) {
+  const Tube tube{.around = 16, .along = 20};
+  const double inner = tube.outer_radius_m - tube.wall_m;
+  const double volume = std::numbers::pi * tube.length_m *
+                        (tube.outer_radius_m * tube.outer_radius_m - inner * inner);
+  for (const int nodes_per_element : {4, 10}) {
+    const TetMesh mesh = MakeTetTube(tube, nodes_per_element);
+    EXPECT_NEAR(EnclosedVolume(mesh, MakeSoundingSurface(mesh)), volume, 1e-12 * volume);
+  }
+}
+
+TEST(SoundingSurface, SplitsSixNodeFacesInFourOnTheSameGivenTriangle) {
+  const TetMesh linear = MakeTetBox({1, 1, 1}, {2, 2, 2}, 4);
+  const TetMesh quadratic = MakeTetBox({1, 1, 1}, {2, 2, 2}, 10);
+  const SoundingSurface coarse = MakeSoundingSurface(linear);
+  const SoundingSurface fine = MakeSoundingSurface(quadratic);
+  ASSERT_EQ(coarse.triangles.size(), 48U);
+  ASSERT_EQ(fine.triangles.size(), 4 * 48U);
+  for (size_t t = 0; t < fine.triangles.size(); ++t) {
+    EXPECT_EQ(fine.given_triangle[t], coarse.given_triangle[t / 4]);
+  }
+}
+
+TEST(SoundingSurface, HasTheBoundaryNodesOnceAndNoNodeInside) {
+  const TetMesh mesh = MakeTetBox({1, 1, 1}, {3, 3, 3}, 10);
+  const SoundingSurface surface = MakeSoundingSurface(mesh);
+  const std::set<int32_t> nodes(surface.nodes.begin(), surface.nodes.end());
+  EXPECT_EQ(nodes.size(), surface.nodes.size());
+  for (size_t n = 0; n < mesh.nodes.size(); ++n) {
+    const bool outside =
+        std::ranges::any_of(mesh.nodes[n], [](double x) { return x == 0 || x == 1; });
+    EXPECT_EQ(nodes.contains(static_cast<int32_t>(n)), outside) << "node " << n;
+  }
+}
+
+}  // namespace
+}  // namespace carillon::precompute
