@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+#include "carillon/v1/audio_service.pb.h"
+#include "carillon/v1/contact_service.pb.h"
+#include "carillon/v1/decomposition_service.pb.h"
+#include "carillon/v1/modal_model_service.pb.h"
+#include "carillon/v1/scene_service.pb.h"
+#include "client_sdk/cpp/audio.h"
+#include "client_sdk/cpp/contact_stream.h"
+#include "client_sdk/cpp/contact_trace.h"
+
+namespace carillon::client {
+
+/// The daemon, seen from outside: one method for each call of the contract, described there
+/// (proto/carillon/v1/*_service.proto).
+///
+/// Every error is a refusal "REASON: message" with its figures (proto/error_reason.h takes it
+/// apart): those the daemon gives, and SERVER_UNAVAILABLE where none answers. Every method may be
+/// called from every thread.
+class Client {
+ public:
+  /// `server` is "unix:PATH" or "HOST:PORT". Connects at the first call, and again when the daemon
+  /// comes back.
+  explicit Client(std::string server);
+  Client(Client&&) noexcept;
+  Client& operator=(Client&&) noexcept;
+  ~Client();
+
+  /// Stores a mesh file; returns its digest for CreateModalModel.
+  absl::StatusOr<std::string> UploadMesh(absl::string_view bytes) const;
+  absl::StatusOr<v1::Job> CreateModalModel(const v1::CreateModalModelRequest& request) const;
+  absl::StatusOr<v1::ModalModelSummary> GetModalModel(const std::string& name) const;
+  /// All of them, newest first, without their eigenvalues.
+  absl::StatusOr<std::vector<v1::ModalModelSummary>> ListModalModels() const;
+  absl::Status DeleteModalModel(const std::string& name) const;
+  absl::StatusOr<std::vector<v1::CatalogueMaterial>> ListMaterials() const;
+
+  absl::StatusOr<v1::Job> GetJob(const std::string& name) const;
+  absl::StatusOr<v1::Job> CancelJob(const std::string& name) const;
+  /// Follows a job to its end. `on_change`, if any, gets its state at once and after every change.
+  /// Returns the job once it has succeeded; where it failed, its error; CANCELLED (JOB_CANCELLED).
+  absl::StatusOr<v1::Job> WatchJob(const std::string& name,
+                                   const std::function<void(const v1::Job&)>& on_change) const;
+
+  /// Returns "scenes/{id}".
+  absl::StatusOr<std::string> CreateScene() const;
+  absl::Status DeleteScene(const std::string& name) const;
+  absl::StatusOr<v1::SoundingObject> AddObject(const v1::AddObjectRequest& request) const;
+  absl::StatusOr<v1::SoundingObject> UpdateObject(const v1::UpdateObjectRequest& request) const;
+  absl::Status RemoveObject(const std::string& name) const;
+
+  /// Opens a contact stream and waits for the daemon's first answer.
+  absl::StatusOr<std::unique_ptr<ContactStream>> StreamContacts(
+      const v1::ContactStreamStart& start) const;
+
+  /// Hears what the mixer renders until `on_block` returns false (then OK) or the daemon ends it.
+  absl::Status Listen(const AudioCallback& on_block) const;
+  /// Renders what `trace` still holds, as fast as the daemon can. `on_block` returning false:
+  /// CANCELLED (RENDERING_STOPPED).
+  absl::StatusOr<v1::RenderSummary> Render(const v1::RenderSettings& settings,
+                                           ContactTraceReader& trace,
+                                           const AudioCallback& on_block) const;
+  absl::StatusOr<v1::GetMixerResponse> GetMixer() const;
+
+ private:
+  struct Stubs;
+  std::unique_ptr<Stubs> stubs_;
+};
+
+}  // namespace carillon::client

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "proto/server_address.h"
+
+#include <unistd.h>
+
+#include <cstdlib>
+#include <string_view>
+
+namespace carillon {
+namespace {
+
+std::string_view Environment(const char* name) {
+  const char* value = std::getenv(name);
+  return value == nullptr ? std::string_view() : std::string_view(value);
+}
+
+}  // namespace
+
+std::string DefaultServerAddress() {
+  if (const std::string_view server = Environment("CARILLON_SERVER"); !server.empty()) {
+    return std::string(server);
+  }
+  const std::string_view runtime = Environment("XDG_RUNTIME_DIR");
+  const std::string folder = runtime.empty() ? "/tmp/carillon-" + std::to_string(getuid())
+                                             : std::string(runtime) + "/carillon";
+  return "unix:" + folder + "/carillond.sock";
+}
+
+}  // namespace carillon
