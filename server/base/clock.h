@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+
+namespace carillon {
+
+/// Time, passed in, so that what depends on it can be tested. Safe from every thread.
+class Clock {
+ public:
+  virtual ~Clock() = default;
+
+  /// Monotonic; for durations and deadlines.
+  virtual std::chrono::nanoseconds Monotonic() const noexcept = 0;
+
+  /// Milliseconds since 1970-01-01 UTC; for people.
+  virtual int64_t UnixMs() const noexcept = 0;
+};
+
+/// The machine's clocks.
+class SystemClock final : public Clock {
+ public:
+  std::chrono::nanoseconds Monotonic() const noexcept override {
+    return std::chrono::steady_clock::now().time_since_epoch();
+  }
+  int64_t UnixMs() const noexcept override {
+    return std::chrono::duration_cast<std::chrono::milliseconds>(
+               std::chrono::system_clock::now().time_since_epoch())
+        .count();
+  }
+};
+
+}  // namespace carillon

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "carillon/v1/modal_model_service.pb.h"
+
+namespace carillon {
+
+/// A request with every default filled in: material resolved to its figures, Poisson's ratio (from
+/// the material where the settings leave it zero) rounded to 1e-4, element, mass matrix, metres per
+/// unit, size and band.
+/// Errors: InvalidArgument (INVALID_SETTINGS, UNKNOWN_MATERIAL, INVALID_MATERIAL,
+/// MESH_FORMAT_UNKNOWN).
+absl::StatusOr<v1::CreateModalModelRequest> ResolveRequest(
+    const v1::CreateModalModelRequest& request);
+
+/// What names the modal model of a resolved request: its text form, one "key value" a line, in this
+/// order. Two requests have the same model exactly if they have the same text; the hints (material,
+/// size, frequencies) and the label are not part of it.
+///
+///     carillon-decomposition 1
+///     mesh <SHA-256 of the mesh file>
+///     format <obj|ply|stl|off|msh>
+///     poisson_1e-4 <Poisson's ratio in units of 1e-4, an integer>
+///     element <linear|quadratic>
+///     mass <lumped|consistent>
+///     metres_per_unit <shortest decimal that reads back as the same double>
+///     keep_surface <auto|yes|no>
+///     target_node_count <integer; 0: decided from the surface>
+std::string CanonicalText(const v1::CreateModalModelRequest& resolved);
+
+/// SHA-256 of CanonicalText.
+std::string RequestDigest(const v1::CreateModalModelRequest& resolved);
+
+/// Eigenvalue, for unit material and size, up to which modes are wanted:
+/// Lambda = (2 pi f)^2 rho s^2 / E, with f the maximal frequency, from the scaling laws of
+/// modal_model.proto.
+double WantedEigenvalue(const v1::CreateModalModelRequest& resolved);
+
+}  // namespace carillon

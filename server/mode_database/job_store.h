@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "carillon/v1/decomposition.pb.h"
+
+namespace carillon {
+
+class Database;
+
+/// A decomposition job as it is stored.
+struct JobRecord {
+  std::string digest;   ///< the modal model's
+  std::string request;  ///< what was asked for; bytes whose meaning belongs to the caller
+  std::string label;
+  v1::JobState state = v1::JOB_STATE_QUEUED;
+  v1::ErrorInfo error;      ///< while `state` is JOB_STATE_FAILED
+  bool remembered = false;  ///< the failure would come again: it is not tried again
+  int64_t created_unix_ms = 0;
+};
+
+struct JobPage {
+  std::vector<JobRecord> jobs;
+  std::string next_page_token;  ///< empty: this was the last page
+};
+
+/// Decomposition jobs by digest: the intent that outlives the daemon. Safe from every thread.
+class JobStore {
+ public:
+  explicit JobStore(Database& database) : database_(&database) {}
+
+  /// Writes a job, durably; replaces one of the same digest.
+  absl::Status Put(const JobRecord& job);
+
+  absl::StatusOr<std::optional<JobRecord>> Find(const std::string& digest);
+
+  /// Queued and running jobs, oldest first.
+  absl::StatusOr<std::vector<JobRecord>> Unfinished();
+
+  /// Newest first. `page_size` 0: 100; at most 1000. Errors: InvalidArgument (INVALID_PAGE).
+  absl::StatusOr<JobPage> List(int page_size, const std::string& page_token);
+
+  /// Deleting a job that is not there is no error.
+  absl::Status Delete(const std::string& digest);
+
+ private:
+  Database* database_;
+};
+
+}  // namespace carillon

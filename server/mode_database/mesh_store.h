@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "server/base/sha256.h"
+
+namespace carillon {
+
+class Database;
+
+struct StoredMesh {
+  std::string digest;  ///< SHA-256 of the bytes
+  uint64_t byte_count = 0;
+};
+
+/// A mesh file that arrives in pieces. It waits in a nameless file beside the database, so that
+/// neither memory nor a transaction is held by a slow sender. One thread at a time.
+class MeshUpload {
+ public:
+  MeshUpload(MeshUpload&&) noexcept;
+  MeshUpload& operator=(MeshUpload&&) noexcept;
+  ~MeshUpload();
+
+  /// The next bytes. Errors: ResourceExhausted (MESH_TOO_LARGE: over 256 MiB in all).
+  absl::Status Append(std::string_view bytes);
+
+  /// Stores the mesh, durably, unless it is stored already. Call once, last.
+  /// Errors: InvalidArgument (MESH_EMPTY).
+  absl::StatusOr<StoredMesh> Finish();
+
+ private:
+  friend class MeshStore;
+  MeshUpload(Database& database, int file) : database_(&database), file_(file) {}
+
+  Database* database_;
+  int file_;
+  Sha256 digest_;
+  uint64_t byte_count_ = 0;
+};
+
+/// Mesh files, as bytes, under their SHA-256. Safe from every thread.
+class MeshStore {
+ public:
+  static constexpr uint64_t kMaxByteCount = 256ULL << 20;
+
+  explicit MeshStore(Database& database) : database_(&database) {}
+
+  absl::StatusOr<MeshUpload> Begin();
+
+  /// Stores a whole mesh at once.
+  absl::StatusOr<StoredMesh> Put(std::string_view bytes);
+
+  /// Errors: NotFound (MESH_NOT_FOUND).
+  absl::StatusOr<StoredMesh> Find(const std::string& digest);
+
+  /// Writes the mesh to a new file that only its owner may read.
+  /// Errors: NotFound (MESH_NOT_FOUND), DataLoss (MESH_CORRUPT: its bytes no longer have its
+  /// digest).
+  absl::Status WriteFile(const std::string& digest, const std::filesystem::path& file);
+
+ private:
+  Database* database_;
+};
+
+}  // namespace carillon
