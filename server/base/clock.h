@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <thread>
 
 namespace carillon {
 
@@ -16,6 +17,11 @@ class Clock {
 
   /// Milliseconds since 1970-01-01 UTC; for people.
   virtual int64_t UnixMs() const noexcept = 0;
+
+  /// Returns once Monotonic() has reached `time`.
+  virtual void SleepUntil(std::chrono::nanoseconds time) {
+    std::this_thread::sleep_for(time - Monotonic());
+  }
 };
 
 /// The machine's clocks.

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "server/audio_device/copy_ring.h"
+
+namespace carillon {
+
+/// Some consecutive rendered frames.
+struct RenderedBlock {
+  /// Number of the first since the mixer began.
+  uint64_t first_frame = 0;
+  std::vector<float> samples;
+};
+
+/// Gives every listener what the mixer renders. The render thread only copies into a ring
+/// (Publish); another thread takes the blocks out (Deliver) into a bounded queue for each listener,
+/// and one that does not read fast enough loses whole blocks.
+class BlockBroadcast {
+ public:
+  /// At most so many listen at once.
+  static constexpr size_t kMaxListenerCount = 32;
+
+  /// One that listens. Destroy it before the broadcast, and not from within `wake`.
+  class Listener {
+   public:
+    ~Listener();
+    Listener(const Listener&) = delete;
+    Listener& operator=(const Listener&) = delete;
+
+    /// The next block, or null when none waits. Any thread.
+    std::shared_ptr<const RenderedBlock> TryTake();
+
+    /// Frames lost so far.
+    uint64_t lost_frame_count() const;
+
+   private:
+    friend class BlockBroadcast;
+    Listener(BlockBroadcast& broadcast, std::function<void()> wake);
+    void Offer(const std::shared_ptr<const RenderedBlock>& block, size_t queue_limit);
+
+    BlockBroadcast& broadcast_;
+    const std::function<void()> wake_;
+    mutable std::mutex mutex_;
+    std::deque<std::shared_ptr<const RenderedBlock>> queue_;
+    uint64_t lost_frame_count_ = 0;
+    /// The frame that comes next when nothing is lost; unset before the first block.
+    std::optional<uint64_t> next_frame_;
+  };
+
+  /// Blocks of `block_frame_count`; ring and queues hold `queue_block_count` of them.
+  BlockBroadcast(uint32_t block_frame_count, size_t queue_block_count);
+
+  /// Render thread: passes on a block, or, where Deliver has not kept up, leaves it out.
+  void Publish(uint64_t first_frame, std::span<const float> block) noexcept;
+
+  /// Housekeeping thread: hands out what was published since.
+  void Deliver();
+
+  /// A listener, from the next block on. `wake` is called by Deliver after blocks have come and
+  /// must not block. Errors: ResourceExhausted (TOO_MANY_LISTENERS).
+  absl::StatusOr<std::unique_ptr<Listener>> Subscribe(std::function<void()> wake);
+
+ private:
+  void Remove(Listener* listener);
+  std::shared_ptr<const RenderedBlock> TryTakePublished();
+
+  const uint32_t block_frame_count_;
+  const size_t queue_block_count_;
+  CopyRing<float> samples_;
+  CopyRing<uint64_t> first_frames_;
+  std::mutex mutex_;
+  std::vector<Listener*> listeners_;
+};
+
+}  // namespace carillon

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/audio_device/clocked_device.h"
+
+#include <utility>
+
+namespace carillon {
+
+ClockedDevice::ClockedDevice(std::string description, const DeviceFormat& format, Clock& clock,
+                             Sink sink)
+    : description_(std::move(description)),
+      format_(format),
+      clock_(clock),
+      sink_(std::move(sink)) {}
+
+ClockedDevice::~ClockedDevice() { Stop(); }
+
+absl::Status ClockedDevice::Start(FrameSource& source) {
+  source_ = &source;
+  stopping_ = false;
+  thread_ = std::thread([this] { Run(); });
+  return absl::OkStatus();
+}
+
+void ClockedDevice::Stop() {
+  stopping_ = true;
+  if (thread_.joinable()) thread_.join();
+}
+
+void ClockedDevice::Run() {
+  std::vector<float> block(format_.block_frame_count);
+  const std::chrono::nanoseconds start = clock_.Monotonic();
+  // Due times are counted from the start, not from the last block: rounding does not add up.
+  for (uint64_t frames = block.size(); !stopping_; frames += block.size()) {
+    source_->Pull(block);
+    if (sink_ && !sink_(block)) {
+      alive_ = false;
+      return;
+    }
+    clock_.SleepUntil(start +
+                      std::chrono::nanoseconds(frames * 1'000'000'000 / format_.sample_rate_hz));
+  }
+}
+
+}  // namespace carillon

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <atomic>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+namespace carillon {
+
+/// Plain values (frames, numbers) from one thread to one other, copied in runs, without locks.
+template <typename T>
+class CopyRing {
+ public:
+  /// `capacity` values fit.
+  explicit CopyRing(size_t capacity) : values_(capacity) {}
+
+  size_t capacity() const { return values_.size(); }
+
+  /// Producer: how many values may be pushed.
+  size_t free_count() const {
+    return capacity() -
+           (written_.load(std::memory_order_relaxed) - read_.load(std::memory_order_acquire));
+  }
+
+  /// Producer: appends all of `values`, of which there may be at most free_count().
+  void Push(std::span<const T> values) noexcept {
+    const size_t written = written_.load(std::memory_order_relaxed);
+    const size_t begin = written % capacity();
+    const size_t first = std::min(values.size(), capacity() - begin);
+    std::copy_n(values.data(), first, values_.data() + begin);
+    std::copy_n(values.data() + first, values.size() - first, values_.data());
+    written_.store(written + values.size(), std::memory_order_release);
+  }
+
+  /// Consumer: moves up to values.size() values to the front of `values`; returns how many.
+  size_t Pop(std::span<T> values) noexcept {
+    const size_t read = read_.load(std::memory_order_relaxed);
+    const size_t count = std::min(values.size(), written_.load(std::memory_order_acquire) - read);
+    const size_t begin = read % capacity();
+    const size_t first = std::min(count, capacity() - begin);
+    std::copy_n(values_.data() + begin, first, values.data());
+    std::copy_n(values_.data(), count - first, values.data() + first);
+    read_.store(read + count, std::memory_order_release);
+    return count;
+  }
+
+ private:
+  std::vector<T> values_;
+  alignas(64) std::atomic<size_t> written_{0};
+  alignas(64) std::atomic<size_t> read_{0};
+};
+
+}  // namespace carillon

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/audio_device/look_ahead.h"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+#include "server/audio_device/realtime_priority.h"
+
+namespace carillon {
+
+LookAhead::LookAhead(const DeviceFormat& format, uint32_t block_count, RenderBlock render,
+                     Clock& clock)
+    : format_(format),
+      block_count_(block_count),
+      render_(std::move(render)),
+      clock_(clock),
+      ring_(static_cast<size_t>(block_count) * format.block_frame_count),
+      block_(format.block_frame_count) {}
+
+LookAhead::~LookAhead() { Stop(); }
+
+absl::Status LookAhead::Start() {
+  stopping_ = false;
+  for (uint32_t block = 0; block < block_count_; ++block) RenderOne();
+  thread_ = std::thread([this] { Run(); });
+  return MakeRealtime(thread_);
+}
+
+void LookAhead::Stop() {
+  stopping_ = true;
+  if (thread_.joinable()) thread_.join();
+}
+
+void LookAhead::Pull(std::span<float> frames) noexcept {
+  const size_t ready = ring_.Pop(frames);
+  if (ready == frames.size()) return;
+  std::ranges::fill(frames.subspan(ready), 0.0F);
+  xrun_count_.fetch_add(1, std::memory_order_relaxed);
+  lost_frame_count_.fetch_add(frames.size() - ready, std::memory_order_relaxed);
+}
+
+double LookAhead::latency_s() const {
+  return static_cast<double>(ring_.capacity()) / format_.sample_rate_hz;
+}
+
+void LookAhead::Run() {
+  const auto half_block =
+      std::chrono::nanoseconds(500'000'000ULL * format_.block_frame_count / format_.sample_rate_hz);
+  while (!stopping_) {
+    while (ring_.free_count() >= block_.size() && !stopping_) RenderOne();
+    clock_.SleepUntil(clock_.Monotonic() + half_block);
+  }
+}
+
+void LookAhead::RenderOne() {
+  const std::chrono::nanoseconds start = clock_.Monotonic();
+  render_(block_);
+  const std::chrono::duration<double> taken = clock_.Monotonic() - start;
+  ring_.Push(block_);
+  const double block_s = static_cast<double>(block_.size()) / format_.sample_rate_hz;
+  const double old_load = load();
+  load_.store(old_load + block_s * (taken.count() / block_s - old_load), std::memory_order_relaxed);
+}
+
+}  // namespace carillon

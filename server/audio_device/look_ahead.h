@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <thread>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "server/audio_device/audio_device.h"
+#include "server/audio_device/copy_ring.h"
+#include "server/base/clock.h"
+
+namespace carillon {
+
+/// Renders ahead of the device on a thread of its own, so that the device only copies: a ring of
+/// `block_count` blocks stands between them, which is also the latency it adds.
+///
+/// The thread looks for room in the ring twice a block instead of being woken: waking it would be a
+/// system call in the device's callback.
+class LookAhead final : public FrameSource {
+ public:
+  /// Fills one block; called from the render thread only, and real-time safe.
+  using RenderBlock = std::function<void(std::span<float>)>;
+
+  /// `clock` must outlive this.
+  LookAhead(const DeviceFormat& format, uint32_t block_count, RenderBlock render, Clock& clock);
+  ~LookAhead() override;
+  LookAhead(const LookAhead&) = delete;
+  LookAhead& operator=(const LookAhead&) = delete;
+
+  /// Fills the ring, then starts the thread. Not OK where the system did not grant the thread
+  /// real-time priority; it runs all the same.
+  absl::Status Start();
+
+  /// Joins the thread.
+  void Stop();
+
+  void Pull(std::span<float> frames) noexcept override;
+
+  /// What the ring adds between renderer and device.
+  double latency_s() const;
+
+  /// Pulls that found too little in the ring.
+  uint64_t xrun_count() const { return xrun_count_.load(std::memory_order_relaxed); }
+
+  /// Frames of silence given in their place.
+  uint64_t lost_frame_count() const { return lost_frame_count_.load(std::memory_order_relaxed); }
+
+  /// Part of real time that rendering takes, smoothed over about a second: 1 is the limit.
+  double load() const { return load_.load(std::memory_order_relaxed); }
+
+ private:
+  void Run();
+  void RenderOne();
+
+  const DeviceFormat format_;
+  const uint32_t block_count_;
+  const RenderBlock render_;
+  Clock& clock_;
+  CopyRing<float> ring_;
+  std::vector<float> block_;
+  std::atomic<uint64_t> xrun_count_{0};
+  std::atomic<uint64_t> lost_frame_count_{0};
+  std::atomic<double> load_{0};
+  std::atomic<bool> stopping_{false};
+  std::thread thread_;
+};
+
+}  // namespace carillon

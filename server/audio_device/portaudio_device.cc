@@ -1,0 +1,239 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/audio_device/portaudio_device.h"
+
+#include <fcntl.h>
+#include <portaudio.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/ascii.h"
+#include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
+#include "proto/error_reason.h"
+
+namespace carillon {
+namespace {
+
+/// PulseAudio behind ALSA drops out below this.
+constexpr double kMinAlsaLatency_s = 0.020;
+constexpr int kMaxChannelCount = 2;
+
+/// Sends file descriptor 2 to nowhere while it lives: ALSA and JACK print about a hundred lines
+/// there on a machine without a sound card, whatever PortAudio is told.
+class StderrSilence {
+ public:
+  StderrSilence() : saved_(fcntl(STDERR_FILENO, F_DUPFD_CLOEXEC, 3)) {
+    const int nowhere = open("/dev/null", O_WRONLY | O_CLOEXEC);
+    if (nowhere >= 0) {
+      dup2(nowhere, STDERR_FILENO);
+      close(nowhere);
+    }
+  }
+  ~StderrSilence() {
+    if (saved_ < 0) return;
+    dup2(saved_, STDERR_FILENO);
+    close(saved_);
+  }
+  StderrSilence(const StderrSilence&) = delete;
+  StderrSilence& operator=(const StderrSilence&) = delete;
+
+ private:
+  int saved_;
+};
+
+absl::Status Failed(absl::string_view what, PaError error) {
+  return Refusal(absl::StatusCode::kUnavailable, "AUDIO_DEVICE_FAILED",
+                 absl::StrCat(what, ": ", Pa_GetErrorText(error)));
+}
+
+/// "JACK Audio Connection Kit: system".
+std::string FullName(PaDeviceIndex index) {
+  const PaDeviceInfo* device = Pa_GetDeviceInfo(index);
+  return absl::StrCat(Pa_GetHostApiInfo(device->hostApi)->name, ": ", device->name);
+}
+
+std::vector<PaDeviceIndex> OutputDevices() {
+  std::vector<PaDeviceIndex> outputs;
+  for (PaDeviceIndex index = 0; index < Pa_GetDeviceCount(); ++index) {
+    if (Pa_GetDeviceInfo(index)->maxOutputChannels > 0) outputs.push_back(index);
+  }
+  return outputs;
+}
+
+absl::StatusOr<PaDeviceIndex> FindDevice(absl::string_view name) {
+  const std::vector<PaDeviceIndex> outputs = OutputDevices();
+  if (outputs.empty()) {
+    return Refusal(
+        absl::StatusCode::kNotFound, "AUDIO_DEVICE_NOT_FOUND",
+        "there is no sound device on this machine; Listen and the file device still work");
+  }
+  if (name.empty()) {
+    const PaDeviceIndex preferred = Pa_GetDefaultOutputDevice();
+    return preferred != paNoDevice ? preferred : outputs.front();
+  }
+  std::string known;
+  for (const PaDeviceIndex index : outputs) {
+    const std::string full_name = FullName(index);
+    if (absl::StrContains(absl::AsciiStrToLower(full_name), absl::AsciiStrToLower(name))) {
+      return index;
+    }
+    absl::StrAppend(&known, known.empty() ? "" : ", ", "\"", full_name, "\"");
+  }
+  return Refusal(absl::StatusCode::kNotFound, "AUDIO_DEVICE_NOT_FOUND",
+                 absl::StrCat("no sound device's name contains \"", name, "\"; there is ", known));
+}
+
+/// Initialised for as long as it lives; PortAudio counts nested use.
+class Library {
+ public:
+  Library() : error_(Pa_Initialize()) {}
+  ~Library() {
+    if (error_ == paNoError) Pa_Terminate();
+  }
+  Library(const Library&) = delete;
+  Library& operator=(const Library&) = delete;
+  PaError error() const { return error_; }
+
+ private:
+  PaError error_;
+};
+
+class PortAudioDevice final : public AudioDevice {
+ public:
+  explicit PortAudioDevice(const DeviceFormat& format) : format_(format) {}
+  ~PortAudioDevice() override { Stop(); }
+
+  absl::Status Open(absl::string_view name) {
+    const StderrSilence silence;
+    library_ = std::make_unique<Library>();
+    if (library_->error() != paNoError) return Failed("PortAudio", library_->error());
+    absl::StatusOr<PaDeviceIndex> device = FindDevice(name);
+    if (!device.ok()) return device.status();
+    name_ = FullName(*device);
+    return OpenStream(*device);
+  }
+
+  absl::Status Start(FrameSource& source) override {
+    source_ = &source;
+    last_callback_s_ = 0;
+    if (const PaError error = Pa_StartStream(stream_); error != paNoError) {
+      return Failed(name_, error);
+    }
+    started_ = true;
+    return absl::OkStatus();
+  }
+
+  void Stop() override {
+    if (stream_ == nullptr) return;
+    const StderrSilence silence;
+    Pa_AbortStream(stream_);
+    Pa_CloseStream(stream_);
+    stream_ = nullptr;
+    started_ = false;
+  }
+
+  std::string description() const override { return absl::StrCat("portaudio: ", name_); }
+  double latency_s() const override { return latency_s_; }
+  bool alive() const override { return !started_ || !finished_.load(std::memory_order_relaxed); }
+  uint64_t xrun_count() const override { return xrun_count_.load(std::memory_order_relaxed); }
+  uint64_t lost_frame_count() const override {
+    return lost_frame_count_.load(std::memory_order_relaxed);
+  }
+
+ private:
+  absl::Status OpenStream(PaDeviceIndex index) {
+    const PaDeviceInfo* device = Pa_GetDeviceInfo(index);
+    const bool alsa = Pa_GetHostApiInfo(device->hostApi)->type == paALSA;
+    channel_count_ = std::min(kMaxChannelCount, device->maxOutputChannels);
+    const PaStreamParameters parameters{
+        .device = index,
+        .channelCount = channel_count_,
+        .sampleFormat = paFloat32,
+        .suggestedLatency =
+            std::max(device->defaultLowOutputLatency, alsa ? kMinAlsaLatency_s : 0.0),
+        .hostApiSpecificStreamInfo = nullptr};
+    const PaError error =
+        Pa_OpenStream(&stream_, nullptr, &parameters, format_.sample_rate_hz,
+                      format_.block_frame_count, paClipOff | paDitherOff, &Callback, this);
+    if (error != paNoError) {
+      stream_ = nullptr;
+      return Failed(absl::StrCat(name_, " at ", format_.sample_rate_hz, " Hz"), error);
+    }
+    Pa_SetStreamFinishedCallback(stream_, &Finished);
+    latency_s_ = Pa_GetStreamInfo(stream_)->outputLatency;
+    return absl::OkStatus();
+  }
+
+  static int Callback(const void*, void* output, unsigned long frame_count,
+                      const PaStreamCallbackTimeInfo* time, PaStreamCallbackFlags flags,
+                      void* self) {
+    auto* device = static_cast<PortAudioDevice*>(self);
+    device->CountLoss(time->currentTime, frame_count, (flags & paOutputUnderflow) != 0);
+    device->Fill({static_cast<float*>(output), frame_count * device->channel_count()});
+    return paContinue;
+  }
+
+  static void Finished(void* self) {
+    static_cast<PortAudioDevice*>(self)->finished_.store(true, std::memory_order_relaxed);
+  }
+
+  size_t channel_count() const { return static_cast<size_t>(channel_count_); }
+
+  /// The same sound on every channel: pulled into the front of `samples`, spread from the back.
+  void Fill(std::span<float> samples) noexcept {
+    const size_t frame_count = samples.size() / channel_count();
+    source_->Pull(samples.first(frame_count));
+    for (size_t frame = frame_count; frame-- > 0;) {
+      const float sample = samples[frame];
+      for (size_t channel = 0; channel < channel_count(); ++channel) {
+        samples[frame * channel_count() + channel] = sample;
+      }
+    }
+  }
+
+  /// PortAudio tells of an underrun once, in the next callback, and not how long it was: the time
+  /// since the last callback, less the block it asked for, was silence.
+  void CountLoss(double now_s, size_t frame_count, bool underflow) noexcept {
+    if (underflow && last_callback_s_ > 0) {
+      xrun_count_.fetch_add(1, std::memory_order_relaxed);
+      const double gap =
+          (now_s - last_callback_s_) * format_.sample_rate_hz - static_cast<double>(frame_count);
+      if (gap > 0) {
+        lost_frame_count_.fetch_add(static_cast<uint64_t>(gap), std::memory_order_relaxed);
+      }
+    }
+    last_callback_s_ = now_s;
+  }
+
+  const DeviceFormat format_;
+  std::unique_ptr<Library> library_;
+  PaStream* stream_ = nullptr;
+  FrameSource* source_ = nullptr;
+  std::string name_;
+  int channel_count_ = 1;
+  double latency_s_ = 0;
+  double last_callback_s_ = 0;
+  bool started_ = false;
+  std::atomic<bool> finished_{false};
+  std::atomic<uint64_t> xrun_count_{0};
+  std::atomic<uint64_t> lost_frame_count_{0};
+};
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<AudioDevice>> OpenPortAudioDevice(absl::string_view name,
+                                                                 const DeviceFormat& format) {
+  auto device = std::make_unique<PortAudioDevice>(format);
+  if (absl::Status status = device->Open(name); !status.ok()) return status;
+  return device;
+}
+
+}  // namespace carillon

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+#include "server/audio_device/audio_device.h"
+
+namespace carillon {
+
+/// A sound card, through PortAudio (ALSA, JACK, PulseAudio's ALSA plug-in).
+///
+/// `name`: part of the name of the device wanted, in any case ("jack", "pulse"); empty: the
+/// system's default. Each pull has exactly `format.block_frame_count` frames. Errors: NotFound
+/// (AUDIO_DEVICE_NOT_FOUND: the message lists the devices there are), Unavailable
+/// (AUDIO_DEVICE_FAILED). What the sound libraries print while they look for devices is swallowed:
+/// it says nothing that the status does not.
+absl::StatusOr<std::unique_ptr<AudioDevice>> OpenPortAudioDevice(absl::string_view name,
+                                                                 const DeviceFormat& format);
+
+}  // namespace carillon

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/audio_device/wav_writer.h"
+
+#include <sndfile.h>
+
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "proto/error_reason.h"
+
+namespace carillon {
+namespace {
+
+SNDFILE* Cast(void* file) { return static_cast<SNDFILE*>(file); }
+
+}  // namespace
+
+void WavWriter::CloseFile::operator()(void* file) const { sf_close(Cast(file)); }
+
+WavWriter::WavWriter(File file, std::string path)
+    : file_(std::move(file)), path_(std::move(path)) {}
+
+absl::StatusOr<WavWriter> WavWriter::Make(const std::string& path, uint32_t sample_rate_hz) {
+  SF_INFO info{};
+  info.samplerate = static_cast<int>(sample_rate_hz);
+  info.channels = 1;
+  info.format = SF_FORMAT_RF64 | SF_FORMAT_FLOAT;
+  File file(sf_open(path.c_str(), SFM_WRITE, &info));
+  if (file == nullptr) {
+    return Refusal(absl::StatusCode::kFailedPrecondition, "AUDIO_FILE_FAILED",
+                   absl::StrCat("cannot write \"", path, "\": ", sf_strerror(nullptr),
+                                "; name a file in a folder that exists and may be written"));
+  }
+  sf_command(Cast(file.get()), SFC_RF64_AUTO_DOWNGRADE, nullptr, SF_TRUE);
+  sf_command(Cast(file.get()), SFC_SET_UPDATE_HEADER_AUTO, nullptr, SF_TRUE);
+  return WavWriter(std::move(file), path);
+}
+
+absl::Status WavWriter::Write(std::span<const float> frames) {
+  const auto count = static_cast<sf_count_t>(frames.size());
+  if (sf_writef_float(Cast(file_.get()), frames.data(), count) == count) return absl::OkStatus();
+  return Refusal(
+      absl::StatusCode::kDataLoss, "AUDIO_FILE_FAILED",
+      absl::StrCat("cannot write on to \"", path_, "\": ", sf_strerror(Cast(file_.get()))));
+}
+
+}  // namespace carillon

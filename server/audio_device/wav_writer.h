@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "absl/status/statusor.h"
+
+namespace carillon {
+
+/// Writes a mono WAV file of float32 samples (WAVE_FORMAT_EXTENSIBLE; RF64 past 4 GiB). The header
+/// is kept true while the file grows, so that a file whose writer was killed can be read up to
+/// there.
+class WavWriter {
+ public:
+  /// Truncates or creates `path`. Errors: FailedPrecondition (AUDIO_FILE_FAILED).
+  static absl::StatusOr<WavWriter> Make(const std::string& path, uint32_t sample_rate_hz);
+
+  /// Appends frames. Errors: DataLoss (AUDIO_FILE_FAILED), for instance because the disk is full.
+  absl::Status Write(std::span<const float> frames);
+
+ private:
+  struct CloseFile {
+    void operator()(void* file) const;
+  };
+  using File = std::unique_ptr<void, CloseFile>;
+
+  WavWriter(File file, std::string path);
+
+  File file_;
+  std::string path_;
+};
+
+}  // namespace carillon

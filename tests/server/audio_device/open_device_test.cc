@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/audio_device/open_device.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sndfile.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <latch>
+#include <vector>
+
+#include "tests/server/audio_device/manual_clock.h"
+
+namespace carillon {
+namespace {
+
+constexpr DeviceFormat kFormat{.sample_rate_hz = 44100, .block_frame_count = 64};
+
+class OneOverN final : public FrameSource {
+ public:
+  void Pull(std::span<float> frames) noexcept override {
+    for (float& frame : frames) frame = 1.0F / static_cast<float>(++count_);
+    if (count_ == 100 * kFormat.block_frame_count) enough.count_down();
+  }
+  std::latch enough{1};
+
+ private:
+  uint32_t count_ = 0;
+};
+
+struct Wav {
+  SF_INFO info{};
+  std::vector<float> samples;
+};
+
+Wav ReadWav(const std::string& path) {
+  Wav wav;
+  SNDFILE* file = sf_open(path.c_str(), SFM_READ, &wav.info);
+  EXPECT_NE(file, nullptr) << sf_strerror(nullptr);
+  wav.samples.resize(static_cast<size_t>(wav.info.frames));
+  sf_readf_float(file, wav.samples.data(), wav.info.frames);
+  sf_close(file);
+  return wav;
+}
+
+std::string TemporaryPath(const char* name) {
+  return (std::filesystem::path(testing::TempDir()) / name).string();
+}
+
+TEST(OpenDevice, FileDeviceWritesTheSamplesBitForBit) {
+  const std::string path = TemporaryPath("carillon_file_device.wav");
+  ManualClock clock;
+  OneOverN source;
+  {
+    absl::StatusOr<OpenedDevice> opened = OpenDevice("file:" + path, kFormat, clock);
+    ASSERT_TRUE(opened.ok()) << opened.status();
+    EXPECT_EQ(opened->device->description(), "file: " + path);
+    ASSERT_TRUE(opened->device->Start(source).ok());
+    source.enough.wait();
+    opened->device->Stop();
+  }
+  const Wav wav = ReadWav(path);
+  std::filesystem::remove(path);
+  EXPECT_EQ(wav.info.samplerate, 44100);
+  EXPECT_EQ(wav.info.channels, 1);
+  EXPECT_EQ(wav.info.format, SF_FORMAT_WAVEX | SF_FORMAT_FLOAT);
+  ASSERT_GE(wav.samples.size(), 100 * kFormat.block_frame_count);
+  for (size_t i = 0; i < wav.samples.size(); ++i) {
+    ASSERT_EQ(wav.samples[i], 1.0F / static_cast<float>(i + 1));
+  }
+}
+
+TEST(OpenDevice, RefusesAFileThatCannotBeWritten) {
+  ManualClock clock;
+  const absl::Status status =
+      OpenDevice("file:/nonexistent/folder/out.wav", kFormat, clock).status();
+  EXPECT_THAT(status.ToString(), testing::HasSubstr("AUDIO_FILE_FAILED: "));
+}
+
+TEST(OpenDevice, RefusesWhatNamesNoDevice) {
+  ManualClock clock;
+  for (const char* specification : {"", "speaker", "file:", "nullish"}) {
+    const absl::Status status = OpenDevice(specification, kFormat, clock).status();
+    EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument) << specification;
+    EXPECT_THAT(status.ToString(), testing::HasSubstr("INVALID_AUDIO_DEVICE: "));
+  }
+}
+
+TEST(OpenDevice, RefusesASoundCardThatIsNotThereAndPrintsNothing) {
+  ManualClock clock;
+  testing::internal::CaptureStderr();
+  const absl::Status status = OpenDevice("portaudio:no such sound card", kFormat, clock).status();
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+  EXPECT_EQ(status.code(), absl::StatusCode::kNotFound);
+  EXPECT_THAT(status.ToString(), testing::HasSubstr("AUDIO_DEVICE_NOT_FOUND: "));
+}
+
+TEST(OpenDevice, AutoIsEitherASoundCardOrNullWithAReason) {
+  ManualClock clock;
+  absl::StatusOr<OpenedDevice> opened = OpenDevice("auto", kFormat, clock);
+  ASSERT_TRUE(opened.ok()) << opened.status();
+  EXPECT_EQ(opened->device->description() == "null", !opened->message.empty());
+}
+
+}  // namespace
+}  // namespace carillon
