@@ -1,0 +1,66 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: Apache-2.0
+"""Lints proto/ with buf, and checks it for changes that would break clients in the field.
+
+It is compared with how it was at the newest release (a tag v*), or, before the first, with how it was
+before the newest commit that touched it. Without that history only the lint is done.
+"""
+
+import io
+import os
+import pathlib
+import subprocess
+import tarfile
+import tempfile
+
+import project
+
+CONTRACT = "proto/carillon"
+
+
+def buf(root, *arguments):
+    with tempfile.TemporaryDirectory() as cache:
+        result = subprocess.run([os.environ["CARILLON_BUF"], *arguments], cwd=root,
+                                env=os.environ | {"BUF_CACHE_DIR": cache},
+                                stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+                                check=False)
+    lines = result.stdout.splitlines()
+    return lines or ["buf failed without a word"] if result.returncode else []
+
+
+def git(root, *arguments):
+    """What git prints, as bytes; None where it fails. The checkout may belong to somebody else."""
+    command = ["git", "-c", f"safe.directory={root}", "-C", str(root), *arguments]
+    result = subprocess.run(command, capture_output=True, check=False)
+    return result.stdout if result.returncode == 0 else None
+
+
+def baseline(root):
+    """The commit to compare with; None where there is none."""
+    if not (root / ".git").exists():
+        return None
+    if tag := git(root, "describe", "--tags", "--abbrev=0", "--match", "v*"):
+        return tag.decode().strip()
+    newest = (git(root, "rev-list", "--max-count=1", "HEAD", "--", CONTRACT) or b"").decode().strip()
+    before = git(root, "rev-parse", "--verify", "--quiet", f"{newest}^") if newest else None
+    return before.decode().strip() if before else None
+
+
+def breaking(root):
+    commit = baseline(root)
+    archive = git(root, "archive", commit, "proto") if commit else None
+    if not archive:
+        print("no earlier state of the contract to compare with: only linted")
+        return []
+    with tempfile.TemporaryDirectory() as folder:
+        with tarfile.open(fileobj=io.BytesIO(archive)) as tar:
+            tar.extractall(folder)
+        return buf(root, "breaking", "proto", "--against", str(pathlib.Path(folder) / "proto"))
+
+
+def check(root):
+    return buf(root, "lint", "proto") + breaking(root)
+
+
+if __name__ == "__main__":
+    project.run(check)
