@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <boost/lockfree/spsc_queue.hpp>
+#include <cstddef>
+
+namespace carillon {
+
+/// A bounded queue from one producer thread to one consumer thread, which neither locks nor
+/// allocates after construction. `T` is a plain struct.
+template <typename T>
+class SpscRing {
+ public:
+  explicit SpscRing(size_t capacity) : queue_(capacity) {}
+
+  /// Producer only. False: the ring is full and `value` was not taken.
+  bool TryPush(const T& value) noexcept { return queue_.push(value); }
+
+  /// Consumer only. False: the ring is empty and `value` is untouched.
+  bool TryPop(T& value) noexcept { return queue_.pop(value); }
+
+  /// Consumer only.
+  bool empty() const noexcept { return queue_.read_available() == 0; }
+
+ private:
+  boost::lockfree::spsc_queue<T> queue_;
+};
+
+}  // namespace carillon

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "absl/status/statusor.h"
+#include "server/excitation/contact.h"
+
+namespace carillon {
+
+/// The surfaces of one body: the sounding surface (#V vertices in metres, #T triangles, and for
+/// each the triangle of the given surface on which it lies), and the surface as given. They must
+/// outlive the locator.
+struct LocatorSurfaces {
+  std::span<const std::array<float, 3>> vertices;
+  std::span<const std::array<uint32_t, 3>> triangles;
+  std::span<const uint32_t> given_triangle;
+  std::span<const std::array<float, 3>> given_vertices;
+  std::span<const std::array<uint32_t, 3>> given_triangles;
+};
+
+/// A point of the sounding surface.
+struct LocatedPoint {
+  uint32_t triangle = 0;
+  std::array<uint32_t, 3> vertices{};
+  std::array<double, 3> weights{};  ///< barycentric
+  double distance_m = 0;            ///< from the point asked for
+};
+
+/// Finds where on the sounding surface a contact acts. Queries may run on any threads at once, but
+/// not on one that renders.
+class SurfaceLocator {
+ public:
+  /// INVALID_ARGUMENT (SURFACE_MALFORMED): no triangle, or an index out of range.
+  static absl::StatusOr<std::unique_ptr<SurfaceLocator>> Make(const LocatorSurfaces& surfaces);
+  ~SurfaceLocator();
+
+  /// The point of the sounding surface nearest to `point`, which is in the model's frame and size,
+  /// metres. INVALID_ARGUMENT (POINT_NOT_FINITE).
+  absl::StatusOr<LocatedPoint> Nearest(const Point& point) const;
+
+  /// The point of the sounding surface at a point of a given triangle; triangles that lie on that
+  /// given triangle are preferred. INVALID_ARGUMENT (TRIANGLE_OUT_OF_RANGE, INVALID_WEIGHTS).
+  absl::StatusOr<LocatedPoint> OnGivenTriangle(const SurfacePoint& point) const;
+
+ private:
+  struct Index;
+  explicit SurfaceLocator(std::unique_ptr<Index> index);
+  std::unique_ptr<Index> index_;
+};
+
+}  // namespace carillon

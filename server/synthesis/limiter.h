@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+namespace carillon {
+
+/// Keeps samples within +-1. It follows the peaks of the signal, e(n) = max(|x(n)|, release
+/// e(n-1)), and above the threshold T = 10^(-3/20) applies the gain f(e)/e with
+///
+///   f(e) = T + (1 - T) u/(1 + u),  u = (e - T)/(1 - T)
+///
+/// whose slope is one at T and whose limit is one. Below T the samples pass bit for bit. No delay;
+/// the gain recovers with a time constant of 0.1 s. A sample that is not finite becomes zero.
+class Limiter {
+ public:
+  explicit Limiter(double sample_rate_hz);
+
+  /// Limits `block` in place; returns the number of frames it changed.
+  uint64_t Apply(std::span<float> block) noexcept;
+
+ private:
+  float release_;
+  float envelope_ = 0;
+};
+
+}  // namespace carillon

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/synthesis/sounding_modes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace carillon {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+constexpr double kLn1000 = 6.907755278982137;  // 60 dB as a ratio of amplitudes
+constexpr double kIntegrationTimeS = 0.2;
+
+/// The amplitude response of A-weighting, IEC 61672-1, but for its constant.
+double AWeight(double frequency_hz) {
+  const double f2 = frequency_hz * frequency_hz;
+  return f2 * f2 /
+         ((f2 + 20.6 * 20.6) * std::sqrt((f2 + 107.7 * 107.7) * (f2 + 737.9 * 737.9)) *
+          (f2 + 12194.0 * 12194.0));
+}
+
+/// Energy, up to a constant, of a mode's sound after a unit modal impulse.
+double Audibility(const SoundingMode& mode) {
+  const double amplitude =
+      mode.coupling / mode.damped_rad_per_s * AWeight(mode.damped_rad_per_s / (2 * kPi));
+  const double decay = -2 * mode.decay_rate_per_s;
+  const double duration_s =
+      decay > 0 ? -std::expm1(-decay * kIntegrationTimeS) / decay : kIntegrationTimeS;
+  return amplitude * amplitude * duration_s;
+}
+
+bool Sounds(double natural_hz, double eigenvalue, double sigma, double nyquist_hz,
+            const SoundingBand& band) {
+  return natural_hz >= band.lowest_hz && natural_hz <= band.highest_hz && natural_hz < nyquist_hz &&
+         sigma * sigma < eigenvalue && -sigma * band.shortest_t60_s <= kLn1000;
+}
+
+void KeepMostAudible(std::vector<SoundingMode>& modes, size_t most) {
+  if (modes.size() <= most) return;
+  std::ranges::nth_element(modes, modes.begin() + static_cast<ptrdiff_t>(most),
+                           std::ranges::greater(), Audibility);
+  modes.resize(most);
+  std::ranges::sort(modes, {}, &SoundingMode::column);
+}
+
+bool Degenerate(const SoundingMode& a, const SoundingMode& b, double tolerance) {
+  const auto [less, more] = std::minmax(a.coupling, b.coupling);
+  return b.natural_frequency_hz - a.natural_frequency_hz <= tolerance * a.natural_frequency_hz &&
+         more < 2 * less;
+}
+
+void PairDegenerate(std::vector<SoundingMode>& modes, double tolerance) {
+  for (size_t i = 0; i + 1 < modes.size(); ++i) {
+    SoundingMode &first = modes[i], &second = modes[i + 1];
+    if (!Degenerate(first, second, tolerance)) continue;
+    first.coupling = second.coupling = (first.coupling + second.coupling) / 2;
+    second.output_phase_rad = kPi / 2;
+    ++i;
+  }
+}
+
+}  // namespace
+
+double NaturalFrequencyHz(double eigenvalue, const SoundingMaterial& material) {
+  return std::sqrt(eigenvalue * material.young_pa / material.density_kg_per_m3) /
+         (2 * kPi * material.size);
+}
+
+SoundingModes SelectSoundingModes(std::span<const double> eigenvalues,
+                                  std::span<const double> couplings,
+                                  const SoundingMaterial& material, double sample_rate_hz,
+                                  const SoundingBand& band) {
+  SoundingModes sounding;
+  sounding.shape_scale = 1 / std::sqrt(material.density_kg_per_m3 * std::pow(material.size, 3));
+  const double coupling_scale =
+      std::sqrt(material.young_pa / material.size) / material.density_kg_per_m3;
+  for (size_t m = 0; m < eigenvalues.size(); ++m) {
+    const double natural_hz = NaturalFrequencyHz(eigenvalues[m], material);
+    const double eigenvalue = std::pow(2 * kPi * natural_hz, 2);
+    const double sigma = -(material.alpha1_s * eigenvalue + material.alpha2_per_s) / 2;
+    if (!Sounds(natural_hz, eigenvalue, sigma, sample_rate_hz / 2, band)) continue;
+    sounding.modes.push_back({.column = static_cast<uint32_t>(m),
+                              .natural_frequency_hz = natural_hz,
+                              .damped_rad_per_s = std::sqrt(eigenvalue - sigma * sigma),
+                              .decay_rate_per_s = sigma,
+                              .coupling = couplings[m] * coupling_scale});
+  }
+  PairDegenerate(sounding.modes, band.pair_tolerance);
+  KeepMostAudible(sounding.modes, band.most_modes);
+  return sounding;
+}
+
+}  // namespace carillon

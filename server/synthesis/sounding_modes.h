@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace carillon {
+
+/// What turns a modal model of unit Young's modulus, density and size into a sounding object.
+struct SoundingMaterial {
+  double young_pa = 0;
+  double density_kg_per_m3 = 0;
+  double alpha1_s = 0;  ///< D = alpha1 K + alpha2 M
+  double alpha2_per_s = 0;
+  double size = 1;  ///< relative to the model's
+};
+
+/// Which modes may sound.
+struct SoundingBand {
+  double lowest_hz = 20;      ///< natural frequency
+  double highest_hz = 20000;  ///< natural frequency; Nyquist bounds it further
+  double shortest_t60_s = 0.002;
+  /// Where more modes qualify, the most audible are kept; see SelectSoundingModes.
+  size_t most_modes = 800;
+  /// Neighbours whose natural frequencies differ by no more than this, relatively, and whose
+  /// couplings differ by less than a factor of two, count as a degenerate pair. Finite-element
+  /// meshes split true pairs by up to about 1e-3.
+  double pair_tolerance = 2e-3;
+};
+
+/// One mode of a body of a given material and size.
+struct SoundingMode {
+  uint32_t column = 0;  ///< in the modal model
+  double natural_frequency_hz = 0;
+  double damped_rad_per_s = 0;  ///< omega_d
+  double decay_rate_per_s = 0;  ///< sigma, not above zero
+  double coupling = 0;          ///< c_m, m^2 kg^(-1/2) s^(-1)
+  /// Zero, or pi/2 for the second of a degenerate pair: phase by which it leads a sine.
+  double output_phase_rad = 0;
+};
+
+/// The modes with which a body sounds.
+struct SoundingModes {
+  std::vector<SoundingMode> modes;  ///< ascending column
+  double shape_scale = 1;           ///< phi = shape_scale * phi of the model
+};
+
+/// sqrt(Lambda E / (rho s^2)) / (2 pi), Hz, of an `eigenvalue` of the model.
+double NaturalFrequencyHz(double eigenvalue, const SoundingMaterial& material);
+
+/// Applies material and size to a model's eigenvalues and couplings (each #m, ascending), and
+/// selects the modes that sound (design: physics.md 2 and 3; the paper, 3.4):
+///
+///   Lambda' = Lambda E/(rho s^2),  sigma = -(alpha1 Lambda' + alpha2)/2,
+///   omega_d = sqrt(Lambda' - sigma^2),  c' = c E^(1/2) rho^(-1) s^(-1/2)
+///
+/// with natural frequency in the band and below Nyquist, sigma^2 < Lambda', and T60 long enough.
+/// The two modes of a degenerate pair share their mean coupling and get a quarter period of
+/// difference in phase, so that loudness does not depend on where around the body it is struck.
+/// Where more than `most_modes` qualify, those are kept whose sound after a unit modal impulse has
+/// the most A-weighted energy in its first 0.2 s (about the ear's integration time).
+SoundingModes SelectSoundingModes(std::span<const double> eigenvalues,
+                                  std::span<const double> couplings,
+                                  const SoundingMaterial& material, double sample_rate_hz,
+                                  const SoundingBand& band = {});
+
+}  // namespace carillon
