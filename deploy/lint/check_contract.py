@@ -19,6 +19,8 @@ CONTRACT = "proto/carillon"
 
 
 def buf(root, *arguments):
+    if "CARILLON_BUF" not in os.environ:
+        return ["CARILLON_BUF is not set: start this through deploy/test.sh, which installs buf"]
     with tempfile.TemporaryDirectory() as cache:
         result = subprocess.run([os.environ["CARILLON_BUF"], *arguments], cwd=root,
                                 env=os.environ | {"BUF_CACHE_DIR": cache},

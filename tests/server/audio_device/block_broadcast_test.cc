@@ -29,8 +29,8 @@ class BlockBroadcastTest : public testing::Test {
   static std::vector<uint64_t> TakeAll(BlockBroadcast::Listener& listener) {
     std::vector<uint64_t> first_frames;
     while (const auto block = listener.TryTake()) {
-      EXPECT_EQ(block->samples,
-                std::vector<float>(kBlock, static_cast<float>(block->first_frame / kBlock)));
+      const uint64_t number = block->first_frame / kBlock;
+      EXPECT_EQ(block->samples, std::vector<float>(kBlock, static_cast<float>(number)));
       first_frames.push_back(block->first_frame);
     }
     return first_frames;

@@ -1,0 +1,99 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: Apache-2.0
+"""Runs clang-tidy on every source file that has changed since it last passed.
+
+A file has changed if its text, that of a header of ours that it includes, directly or not, its compile
+command or .clang-tidy has. What passed is remembered in $CARILLON_CACHE, for all checkouts alike.
+
+Usage: check_tidy.py BUILD_FOLDER [ROOT]
+"""
+
+import concurrent.futures
+import hashlib
+import json
+import os
+import pathlib
+import re
+import subprocess
+import sys
+
+import project
+
+INCLUDE = re.compile(r'^\s*#\s*include\s*"([^"]+)"', re.M)
+DEFAULT_CACHE = pathlib.Path.home() / ".cache/carillon"
+
+
+class Reader:
+    """Texts of files, each read once."""
+
+    def __init__(self, root):
+        self.root = root
+        self.texts = {}
+
+    def text(self, name):
+        if name not in self.texts:
+            path = self.root / name
+            self.texts[name] = path.read_text() if path.is_file() else None
+        return self.texts[name]
+
+    def with_headers(self, name):
+        """`name` and the headers of ours that it includes, sorted; the contract stands for the code
+        generated from it."""
+        seen, queue = set(), [name]
+        while queue:
+            one = queue.pop()
+            if one.startswith("carillon/v1/"):
+                one = "proto/" + re.sub(r"(\.grpc)?\.pb\.h$", ".proto", one)
+            if one not in seen and (text := self.text(one)) is not None:
+                seen.add(one)
+                queue += INCLUDE.findall(text)
+        return sorted(seen)
+
+
+def digest_of(reader, name, entry, version):
+    digest = hashlib.sha256((version + reader.text(".clang-tidy")).encode())
+    arguments = entry.get("command") or " ".join(entry["arguments"])
+    digest.update(arguments.replace(str(reader.root), "").encode())
+    for one in reader.with_headers(name):
+        digest.update(f"\0{one}\0{reader.text(one)}".encode())
+    return digest.hexdigest()
+
+
+def entries(root, build):
+    """(name, entry of the compilation database) of each source file of ours."""
+    for entry in json.loads((build / "compile_commands.json").read_text()):
+        path = pathlib.Path(entry["directory"], entry["file"]).resolve()
+        if path.is_relative_to(root) and not path.is_relative_to(build):
+            yield str(path.relative_to(root)), entry
+
+
+def tidy(root, build, name):
+    result = subprocess.run(
+        ["clang-tidy", "--quiet", "-p", str(build), f"--header-filter=^{re.escape(str(root))}/"
+         f"({'|'.join(project.TOP_FOLDERS)})/", name],
+        cwd=root, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, check=False)
+    if result.returncode == 0:
+        return None
+    return result.stdout.replace(f"{root}/", "") or f"{name}: clang-tidy failed without a word"
+
+
+def check(root, build):
+    reader = Reader(root)
+    cache = pathlib.Path(os.environ.get("CARILLON_CACHE", DEFAULT_CACHE)) / "clang-tidy"
+    cache.mkdir(parents=True, exist_ok=True)
+    version = subprocess.run(["clang-tidy", "--version"], capture_output=True, text=True, check=True)
+    passed = {name: cache / digest_of(reader, name, entry, version.stdout)
+              for name, entry in entries(root, build)}
+    changed = [name for name, mark in passed.items() if not mark.exists()]
+    print(f"{len(changed)} of {len(passed)} files to check")
+    with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
+        for name, problem in zip(changed, pool.map(lambda one: tidy(root, build, one), changed)):
+            if problem:
+                yield problem
+            else:
+                passed[name].touch()
+
+
+if __name__ == "__main__":
+    build_folder = pathlib.Path(sys.argv.pop(1)).resolve()
+    project.run(lambda root: check(root, build_folder))
