@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <Eigen/SparseCore>
+
+#include "precompute/fem/element.h"
+#include "precompute/fem/material.h"
+#include "precompute/mesh/tet_mesh.h"
+
+namespace carillon::precompute {
+
+/// Stiffness and mass of a body; unknown 3 i + a is component a of node i's displacement.
+struct SystemMatrices {
+  using Sparse = Eigen::SparseMatrix<double>;
+
+  /// #U by #U, N/m, symmetric: the lower triangle only.
+  Sparse K;
+  /// #U by #U, kg, symmetric positive definite: the lower triangle only. Components do not mix.
+  Sparse M;
+
+  Eigen::Index unknown_count() const { return K.rows(); }
+};
+
+/// Assembles the matrices of a free body; the elements' order is that of the mesh (4 or 10 nodes).
+/// Every element must have positive volume.
+SystemMatrices Assemble(const TetMesh& mesh, const ElasticConstants& elastic,
+                        double density_kg_per_m3, MassSharing sharing);
+
+/// Volume of the mesh, m^3.
+double VolumeM3(const TetMesh& mesh);
+
+}  // namespace carillon::precompute

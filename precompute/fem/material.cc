@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "precompute/fem/material.h"
+
+namespace carillon::precompute {
+
+LameConstants ToLame(const ElasticConstants& elastic) {
+  const auto [young, nu] = elastic;
+  return {.lambda_pa = young * nu / ((1 + nu) * (1 - 2 * nu)), .mu_pa = young / (2 * (1 + nu))};
+}
+
+ElasticConstants FromLame(const LameConstants& lame) {
+  const auto [lambda, mu] = lame;
+  return {.young_pa = mu * (3 * lambda + 2 * mu) / (lambda + mu),
+          .poisson_ratio = lambda / (2 * (lambda + mu))};
+}
+
+}  // namespace carillon::precompute

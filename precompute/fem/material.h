@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+namespace carillon::precompute {
+
+/// Lamé's constants of an isotropic material.
+struct LameConstants {
+  double lambda_pa;
+  double mu_pa;
+};
+
+/// Young's modulus (> 0) and Poisson's ratio (in (-1, 0.5)) of an isotropic material.
+struct ElasticConstants {
+  double young_pa;
+  double poisson_ratio;
+};
+
+/// lambda = E nu / ((1 + nu)(1 - 2 nu)), mu = E / (2 (1 + nu)).
+LameConstants ToLame(const ElasticConstants& elastic);
+
+/// E = mu (3 lambda + 2 mu) / (lambda + mu), nu = lambda / (2 (lambda + mu)): the inverse of
+/// ToLame.
+ElasticConstants FromLame(const LameConstants& lame);
+
+}  // namespace carillon::precompute

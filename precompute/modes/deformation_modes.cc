@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "precompute/modes/deformation_modes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "absl/strings/str_cat.h"
+#include "precompute/modes/dense_eigensolver.h"
+#include "precompute/modes/inertia.h"
+#include "precompute/modes/node_ordering.h"
+#include "precompute/modes/rigid_body.h"
+#include "precompute/modes/sparse_eigensolver.h"
+#include "proto/error_reason.h"
+
+namespace carillon::precompute {
+namespace {
+
+constexpr int kRigidModeCount = 6;
+
+/// Tries to find as many modes as were counted, each with more room for those missed.
+constexpr int kMaxAttempts = 3;
+
+/// Below this part of the limit, and within rounding of the stiffest node, a mode bends nothing.
+constexpr double kFreeMotion = 1e-9;
+constexpr double kRounding = 1e-12;
+
+absl::Status VerificationFailed(const std::string& what) {
+  return Refusal(absl::StatusCode::kInternal, "VERIFICATION_FAILED",
+                 absl::StrCat(what, "; no model was made; another number of nodes may do"));
+}
+
+Modes Columns(const Modes& modes, const std::vector<Eigen::Index>& which) {
+  return {.eigenvalues = modes.eigenvalues(which), .shapes = modes.shapes(Eigen::all, which)};
+}
+
+/// Makes the largest component of each shape positive, so that a mesh gives one answer.
+void FixSigns(Eigen::MatrixXd& shapes) {
+  for (Eigen::Index m = 0; m < shapes.cols(); ++m) {
+    Eigen::Index largest = 0;
+    shapes.col(m).cwiseAbs().maxCoeff(&largest);
+    if (shapes(largest, m) < 0) shapes.col(m) *= -1;
+  }
+}
+
+/// One solution: counts, solves and verifies.
+class Solution {
+ public:
+  Solution(const SystemMatrices& system, const std::vector<Point>& nodes, const SolveWatch& watch)
+      : system_(system),
+        watch_(watch),
+        order_(OrderUnknowns(system)),
+        rigid_(RigidBodyModes(nodes, system)) {}
+
+  absl::StatusOr<int> CountBelow(double limit) const {
+    watch_(SolveStage::kFactor, 0);
+    const absl::StatusOr<int> count = CountEigenvaluesBelow(system_, limit, order_);
+    if (!count.ok()) return count;
+    if (*count < kRigidModeCount) {
+      return VerificationFailed(absl::StrCat("only ", *count,
+                                             " of the six rigid-body modes lie below "
+                                             "the limit"));
+    }
+    if (*count - kRigidModeCount > kMaxModeCount) {
+      return Refusal(absl::StatusCode::kInvalidArgument, "TOO_MANY_MODES",
+                     absl::StrCat(*count - kRigidModeCount,
+                                  " modes lie below the top of the band; the "
+                                  "limit is ",
+                                  kMaxModeCount, "; lower the band's upper frequency"));
+    }
+    return count;
+  }
+
+  absl::StatusOr<Modes> SolveLowest(int count, double limit) const {
+    const ModeRequest request{
+        .count = static_cast<int>(std::min<Eigen::Index>(count, system_.unknown_count())),
+        .eigenvalue_limit = limit};
+    return MakeSolver(request.count)->Solve(system_, request, [this](double done) {
+      watch_(SolveStage::kSolve, done);
+    });
+  }
+
+  /// Splits rigid-body modes off, checks everything but completeness.
+  absl::StatusOr<DeformationModes> Verify(const Modes& all, double limit) const {
+    watch_(SolveStage::kVerify, 0);
+    DeformationModes result;
+    result.verification.max_orthogonality_error = OrthogonalityError(system_, all.shapes);
+    std::vector<Eigen::Index> kept;
+    const Eigen::MatrixXd in_rigid =
+        rigid_.transpose() * (system_.M.selfadjointView<Eigen::Lower>() * all.shapes);
+    for (Eigen::Index m = 0; m < all.shapes.cols(); ++m) {
+      if (in_rigid.col(m).squaredNorm() < 0.5) kept.push_back(m);
+    }
+    result.verification.rigid_mode_count =
+        static_cast<int>(all.shapes.cols()) - static_cast<int>(kept.size());
+    const Eigen::Index free_motions = (all.eigenvalues.array() < FreeMotionBound(limit)).count();
+    if (free_motions > kRigidModeCount) return SeveralPieces(free_motions);
+    result.modes = Columns(all, kept);
+    FixSigns(result.modes.shapes);
+    result.residuals = Residuals(system_, result.modes);
+    if (!kept.empty()) {
+      result.lowest_eigenvalue = result.modes.eigenvalues[0];
+      result.verification.max_residual = result.residuals.maxCoeff();
+    }
+    if (absl::Status status = Check(result.verification); !status.ok()) return status;
+    return result;
+  }
+
+ private:
+  std::unique_ptr<Eigensolver> MakeSolver(int count) const {
+    if (PrefersDense(system_.unknown_count(), count)) return std::make_unique<DenseEigensolver>();
+    return std::make_unique<SparseEigensolver>(order_);
+  }
+
+  double FreeMotionBound(double limit) const {
+    const double stiffest =
+        (system_.K.diagonal().array() / system_.M.diagonal().array()).maxCoeff();
+    return std::min(kFreeMotion * limit, kRounding * stiffest);
+  }
+
+  static absl::Status SeveralPieces(Eigen::Index free_motions) {
+    return Refusal(
+        absl::StatusCode::kInvalidArgument, "BODY_IN_SEVERAL_PIECES",
+        absl::StrCat("the body can move in ", free_motions,
+                     " ways without bending, a body "
+                     "in one piece in six: parts of it are separate, or hang together by an "
+                     "edge or a point only; join them, or make each a body of its own"));
+  }
+
+  static absl::Status Check(const Verification& proof) {
+    if (proof.rigid_mode_count != kRigidModeCount) {
+      return VerificationFailed(
+          absl::StrCat(proof.rigid_mode_count, " rigid-body modes were found, not six"));
+    }
+    if (!(proof.max_residual <= kMaxResidual)) {
+      return VerificationFailed(absl::StrCat("a mode has the relative residual ",
+                                             proof.max_residual, ", above ", kMaxResidual));
+    }
+    if (!(proof.max_orthogonality_error <= kMaxOrthogonalityError)) {
+      return VerificationFailed(absl::StrCat("two modes are orthogonal only to ",
+                                             proof.max_orthogonality_error, ", not to ",
+                                             kMaxOrthogonalityError));
+    }
+    return absl::OkStatus();
+  }
+
+  const SystemMatrices& system_;
+  const SolveWatch& watch_;
+  std::vector<int> order_;
+  Eigen::MatrixXd rigid_;
+};
+
+/// No mode lies below the limit: says where the lowest one is.
+absl::StatusOr<DeformationModes> FindLowest(const Solution& solution, double limit) {
+  double above = limit;
+  int count = kRigidModeCount;
+  while (count == kRigidModeCount) {
+    above *= 16;
+    const absl::StatusOr<int> counted = solution.CountBelow(above);
+    if (!counted.ok()) return counted.status();
+    count = *counted;
+  }
+  const absl::StatusOr<Modes> lowest = solution.SolveLowest(kRigidModeCount + 1, above);
+  if (!lowest.ok()) return lowest.status();
+  absl::StatusOr<DeformationModes> result = solution.Verify(*lowest, above);
+  if (!result.ok()) return result;
+  result->modes = {};
+  result->residuals.resize(0);
+  result->complete_to_eigenvalue = limit;
+  return result;
+}
+
+/// Those of `modes` that lie below `limit`.
+Modes Below(const Modes& modes, double limit) {
+  const Eigen::Index count = (modes.eigenvalues.array() < limit).count();
+  return {.eigenvalues = modes.eigenvalues.head(count), .shapes = modes.shapes.leftCols(count)};
+}
+
+}  // namespace
+
+absl::StatusOr<DeformationModes> SolveDeformationModes(const SystemMatrices& system,
+                                                       const std::vector<Point>& nodes,
+                                                       double eigenvalue_limit,
+                                                       const SolveWatch& watch) {
+  const Solution solution(system, nodes, watch);
+  for (int attempt = 0; attempt < kMaxAttempts; ++attempt) {
+    const double limit = eigenvalue_limit * (1 + 1e-4 * attempt);
+    const absl::StatusOr<int> count = solution.CountBelow(limit);
+    if (!count.ok()) return count.status();
+    if (*count == kRigidModeCount) return FindLowest(solution, limit);
+    const absl::StatusOr<Modes> all = solution.SolveLowest(*count + 4 * attempt, limit);
+    if (!all.ok()) return all.status();
+    const Modes below = Below(*all, limit);
+    if (below.eigenvalues.size() != *count) continue;
+    absl::StatusOr<DeformationModes> result = solution.Verify(below, limit);
+    if (!result.ok()) return result;
+    result->verification.sturm_count = *count;
+    result->verification.sturm_eigenvalue = limit;
+    result->complete_to_eigenvalue = limit;
+    return result;
+  }
+  return VerificationFailed("not all modes that were counted below the limit could be found");
+}
+
+bool PrefersDense(Eigen::Index unknown_count, int mode_count) {
+  return unknown_count <= 600 || 5 * static_cast<Eigen::Index>(mode_count) > unknown_count;
+}
+
+}  // namespace carillon::precompute

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "precompute/mesh/surface_mesh.h"
+#include "precompute/modes/eigensolver.h"
+#include "precompute/modes/verification.h"
+
+namespace carillon::precompute {
+
+/// Every deformation mode of a free body below an eigenvalue, verified; its six rigid-body modes
+/// are left to the simulator.
+struct DeformationModes {
+  Modes modes;
+  Eigen::VectorXd residuals;  ///< relative, of each mode
+  Verification verification;
+  double complete_to_eigenvalue = 0;
+  /// The lowest deformation mode, whether below the limit or not.
+  double lowest_eigenvalue = 0;
+};
+
+/// More modes than this are refused: as many never sound at once, and their shapes fill gigabytes.
+inline constexpr int kMaxModeCount = 5000;
+
+/// What a solution is at; factoring and verifying may come twice.
+enum class SolveStage { kFactor, kSolve, kVerify };
+
+/// Told of every stage and of the part of it that is done, 0 to 1.
+using SolveWatch = std::function<void(SolveStage, double)>;
+
+/// Finds all deformation modes below `eigenvalue_limit`. Their number is counted first, by inertia,
+/// so that the solver knows when it has them all; where the limit agrees with an eigenvalue to
+/// nearly all digits it is raised by a hair.
+///
+/// `nodes`: positions, in the order of the unknowns.
+/// Errors: BODY_IN_SEVERAL_PIECES, TOO_MANY_MODES, OUT_OF_MEMORY, MESH_TOO_LARGE,
+/// VERIFICATION_FAILED.
+absl::StatusOr<DeformationModes> SolveDeformationModes(const SystemMatrices& system,
+                                                       const std::vector<Point>& nodes,
+                                                       double eigenvalue_limit,
+                                                       const SolveWatch& watch);
+
+/// True where the dense solver is the faster one, by measurement.
+bool PrefersDense(Eigen::Index unknown_count, int mode_count);
+
+}  // namespace carillon::precompute

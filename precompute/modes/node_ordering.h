@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <vector>
+
+#include "precompute/fem/assembly.h"
+
+namespace carillon::precompute {
+
+/// Pivot order of the unknowns that keeps factors sparse: element k is the unknown eliminated k-th.
+/// Nested dissection of the graph of nodes, a third the size of that of the unknowns, whose three
+/// components then follow one another.
+std::vector<int> OrderUnknowns(const SystemMatrices& system);
+
+}  // namespace carillon::precompute

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include "precompute/modes/eigensolver.h"
+
+namespace carillon::precompute {
+
+/// The proof that goes with a set of deformation modes.
+struct Verification {
+  /// Largest |K phi - Lambda M phi| / |Lambda M phi|, Euclidean.
+  double max_residual = 0;
+  /// Largest |phi_i^T M phi_j - delta_ij|, rigid-body modes included.
+  double max_orthogonality_error = 0;
+  int rigid_mode_count = 0;
+  /// Eigenvalues below sturm_eigenvalue by inertia: rigid_mode_count plus the modes kept.
+  int sturm_count = 0;
+  double sturm_eigenvalue = 0;
+};
+
+/// Residuals above this are no solution. It leaves room for rounding on fine meshes, whose
+/// stiffness is 1e9 times that of their lowest mode; the error of an eigenvalue is its square.
+inline constexpr double kMaxResidual = 1e-5;
+inline constexpr double kMaxOrthogonalityError = 1e-7;
+
+/// |K phi - Lambda M phi| / |Lambda M phi| of each mode, none of them rigid.
+Eigen::VectorXd Residuals(const SystemMatrices& system, const Modes& modes);
+
+/// Largest |phi_i^T M phi_j - delta_ij|.
+double OrthogonalityError(const SystemMatrices& system, const Eigen::MatrixXd& shapes);
+
+}  // namespace carillon::precompute
