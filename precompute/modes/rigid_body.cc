@@ -2,6 +2,7 @@
 #include "precompute/modes/rigid_body.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Geometry>
 
 namespace carillon::precompute {
 
