@@ -20,8 +20,7 @@
 
 namespace carillon::client {
 
-/// The daemon, seen from outside: one method for each call of the contract, described there
-/// (proto/carillon/v1/*_service.proto).
+/// The daemon, seen from outside: its calls, as proto/carillon/v1/*_service.proto describes them.
 ///
 /// Every error is a refusal "REASON: message" with its figures (proto/error_reason.h takes it
 /// apart): those the daemon gives, and SERVER_UNAVAILABLE where none answers. Every method may be
@@ -45,6 +44,8 @@ class Client {
   absl::StatusOr<std::vector<v1::CatalogueMaterial>> ListMaterials() const;
 
   absl::StatusOr<v1::Job> GetJob(const std::string& name) const;
+  /// All of them, newest first.
+  absl::StatusOr<std::vector<v1::Job>> ListJobs() const;
   absl::StatusOr<v1::Job> CancelJob(const std::string& name) const;
   /// Follows a job to its end. `on_change`, if any, gets its state at once and after every change.
   /// Returns the job once it has succeeded; where it failed, its error; CANCELLED (JOB_CANCELLED).

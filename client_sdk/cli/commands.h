@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+
+#include "absl/status/status.h"
+#include "client_sdk/cli/material_figures.h"
+#include "client_sdk/cli/stop_signal.h"
+#include "client_sdk/cpp/client.h"
+
+namespace carillon::cli {
+
+/// What `carillon model create` asks for.
+struct CreateModelOptions {
+  std::string file;
+  std::string format;  ///< empty: the file name's suffix
+  MaterialFigures material;
+  std::string label;  ///< empty: the file name without its suffix
+  std::string unit = "m";
+  std::string element = "quadratic";
+  std::string mass = "consistent";
+  double size = 1;
+  double min_frequency_hz = 20;
+  double max_frequency_hz = 20000;
+  std::optional<bool> keep_surface;
+  uint32_t target_node_count = 0;
+  bool wait = false;
+};
+
+/// What `carillon strike` strikes, and how.
+struct StrikeOptions {
+  std::string model;
+  MaterialFigures material;
+  std::array<double, 3> point_m = {};
+  std::array<double, 3> impulse_newton_seconds = {};
+  double duration_s = 0;
+  double size = 1;
+  double gain = 1;
+  std::optional<double> seconds;  ///< absent: until the longest mode is 60 dB down, 30 s at most
+};
+
+/// Where `carillon listen` puts what it hears.
+struct ListenOptions {
+  std::string out;                ///< empty: raw samples to stdout
+  std::optional<double> seconds;  ///< absent: until the program is stopped
+};
+
+/// What `carillon render` renders.
+struct RenderOptions {
+  std::string trace;
+  std::string out;
+  uint32_t sample_rate_hz = 48000;
+  double tail_s = 0;
+};
+
+/// The commands. Each prints its result to stdout (as JSON where `json`) and returns its error.
+absl::Status ShowStatus(const client::Client& daemon, const std::string& server, bool json);
+absl::Status CreateModel(const client::Client& daemon, const CreateModelOptions& options,
+                         bool json);
+absl::Status ListModels(const client::Client& daemon, bool json);
+/// With the frequencies of `material`, where one is given.
+absl::Status ShowModel(const client::Client& daemon, const std::string& model,
+                       const MaterialFigures& material, bool json);
+absl::Status DeleteModel(const client::Client& daemon, const std::string& model);
+absl::Status WatchJob(const client::Client& daemon, const std::string& job, bool json);
+absl::Status Strike(const client::Client& daemon, const StrikeOptions& options,
+                    const StopSignal& stop, bool json);
+absl::Status Listen(const client::Client& daemon, const ListenOptions& options,
+                    const StopSignal& stop);
+absl::Status Render(const client::Client& daemon, const RenderOptions& options, bool json);
+
+}  // namespace carillon::cli

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cstdio>
+#include <optional>
+#include <utility>
+
+#include "absl/strings/str_format.h"
+#include "client_sdk/cli/commands.h"
+#include "client_sdk/cli/output.h"
+#include "client_sdk/cli/wave_file.h"
+
+namespace carillon::cli {
+namespace {
+
+/// Takes blocks until so many seconds are heard, somebody stops it, or nobody takes them.
+class Recorder {
+ public:
+  Recorder(const ListenOptions& options, const StopSignal& stop) : options_(options), stop_(stop) {}
+
+  bool Take(const client::AudioBlock& block) {
+    if (frame_count_ == 0) Begin(block);
+    const size_t frames = Wanted(block);
+    if (status_.ok()) Put(block.samples.first(frames * block.channel_count));
+    frame_count_ += frames;
+    lost_frame_count_ = block.lost_frame_count;
+    return status_.ok() && !reader_gone_ && frames * block.channel_count == block.samples.size() &&
+           !stop_.ArrivesWithin(0);
+  }
+
+  const absl::Status& status() const { return status_; }
+  uint64_t lost_frame_count() const { return lost_frame_count_; }
+
+ private:
+  void Begin(const client::AudioBlock& block) {
+    if (options_.out.empty()) {
+      absl::FPrintF(stderr, "raw samples: float, little endian, %d Hz, %d channels\n",
+                    block.sample_rate_hz, block.channel_count);
+      return;
+    }
+    auto file = WaveFile::Create(options_.out, block.sample_rate_hz, block.channel_count);
+    status_ = file.status();
+    if (file.ok()) file_ = *std::move(file);
+  }
+
+  size_t Wanted(const client::AudioBlock& block) const {
+    const size_t frames = block.samples.size() / block.channel_count;
+    if (!options_.seconds) return frames;
+    const auto limit = static_cast<uint64_t>(*options_.seconds * block.sample_rate_hz);
+    return std::min<uint64_t>(frames, limit - frame_count_);
+  }
+
+  void Put(std::span<const float> samples) {
+    if (file_) {
+      status_ = file_->Write(samples);
+    } else {
+      reader_gone_ =
+          std::fwrite(samples.data(), sizeof(float), samples.size(), stdout) != samples.size();
+    }
+  }
+
+  const ListenOptions& options_;
+  const StopSignal& stop_;
+  absl::Status status_;
+  std::optional<WaveFile> file_;
+  uint64_t frame_count_ = 0;
+  uint64_t lost_frame_count_ = 0;
+  bool reader_gone_ = false;
+};
+
+}  // namespace
+
+absl::Status Listen(const client::Client& daemon, const ListenOptions& options,
+                    const StopSignal& stop) {
+  // A pipe whose reader has gone is an ordinary end.
+  std::signal(SIGPIPE, SIG_IGN);
+  Recorder recorder(options, stop);
+  const absl::Status heard =
+      daemon.Listen([&](const client::AudioBlock& block) { return recorder.Take(block); });
+  if (recorder.lost_frame_count() > 0) {
+    absl::FPrintF(stderr, "%d frames lost on the way\n", recorder.lost_frame_count());
+  }
+  return recorder.status().ok() ? heard : recorder.status();
+}
+
+}  // namespace carillon::cli

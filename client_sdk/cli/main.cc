@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The command line of `carillon`.
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <string>
+
+#include "client_sdk/cli/commands.h"
+#include "client_sdk/cli/output.h"
+#include "proto/server_address.h"
+
+namespace carillon::cli {
+namespace {
+
+/// What all commands share: where the daemon is, how to print, and the one command chosen.
+struct Program {
+  std::string server = DefaultServerAddress();
+  bool json = false;
+  std::function<absl::Status()> command;
+
+  client::Client Daemon() const { return client::Client(server); }
+};
+
+template <class T>
+void AddFigure(CLI::App& app, const std::string& name, std::optional<T>& target,
+               const std::string& description) {
+  app.add_option(name, target, description)->group("Material");
+}
+
+void AddMaterial(CLI::App& app, MaterialFigures& material) {
+  app.add_option("--material", material.preset, "a named material; figures given override its own")
+      ->group("Material");
+  AddFigure(app, "--young", material.young_pa, "Young's modulus, Pa");
+  AddFigure(app, "--poisson", material.poisson_ratio, "Poisson's ratio");
+  AddFigure(app, "--lame-lambda", material.lame_lambda_pa, "Lame's first constant, Pa");
+  AddFigure(app, "--lame-mu", material.lame_mu_pa, "Lame's second constant, Pa");
+  AddFigure(app, "--density", material.density_kg_per_m3, "density, kg/m^3");
+  AddFigure(app, "--alpha1", material.alpha1_s, "damping proportional to stiffness, s");
+  AddFigure(app, "--alpha2", material.alpha2_per_s, "damping proportional to mass, 1/s");
+}
+
+void AddStatus(CLI::App& app, Program& program) {
+  app.add_subcommand("status", "say what the daemon plays on and what it does")->callback([&] {
+    program.command = [&] { return ShowStatus(program.Daemon(), program.server, program.json); };
+  });
+}
+
+/// "LO:HI" into two frequencies.
+CLI::Validator Band(CreateModelOptions& options) {
+  return CLI::Validator(
+      [&options](std::string& text) -> std::string {
+        const size_t colon = text.find(':');
+        const bool parsed =
+            colon != std::string::npos &&
+            CLI::detail::lexical_cast(text.substr(0, colon), options.min_frequency_hz) &&
+            CLI::detail::lexical_cast(text.substr(colon + 1), options.max_frequency_hz);
+        return parsed ? std::string() : text + " is not two frequencies LO:HI";
+      },
+      "LO:HI");
+}
+
+void AddModelCreate(CLI::App& app, Program& program) {
+  auto options = std::make_shared<CreateModelOptions>();
+  auto band = std::make_shared<std::string>("20:20000");
+  CLI::App& create = *app.add_subcommand("create", "compute the modal model of a mesh file");
+  create.add_option("file", options->file, "surface (OBJ, PLY, STL, OFF) or tetrahedra (MSH)")
+      ->required();
+  create.add_option("--format", options->format, "obj, ply, stl, off or msh [the file's suffix]");
+  create.add_option("--label", options->label, "name for people [the file's name]");
+  create.add_option("--unit", options->unit, "length unit of the file")
+      ->check(CLI::IsMember({"m", "mm", "cm", "in"}))
+      ->capture_default_str();
+  create.add_option("--element", options->element, "order of the element")
+      ->check(CLI::IsMember({"linear", "quadratic"}))
+      ->capture_default_str();
+  create.add_option("--mass", options->mass, "mass matrix")
+      ->check(CLI::IsMember({"lumped", "consistent"}))
+      ->capture_default_str();
+  create.add_option("--size", options->size,
+                    "size it is meant to sound with, relative to the file");
+  create.add_option("--band", *band, "frequencies wanted, Hz")
+      ->check(Band(*options))
+      ->capture_default_str();
+  create.add_flag("--keep-surface,!--refine-surface", options->keep_surface,
+                  "add no vertices on the surface, or do [decided from the surface]");
+  create.add_option("--nodes", options->target_node_count, "about so many corner nodes");
+  create.add_flag("--wait", options->wait, "show the progress and end with the job");
+  AddMaterial(create, options->material);
+  create.callback([&program, options, band] {
+    program.command = [&program, options] {
+      return CreateModel(program.Daemon(), *options, program.json);
+    };
+  });
+}
+
+void AddModelShow(CLI::App& app, Program& program) {
+  auto model = std::make_shared<std::string>();
+  auto material = std::make_shared<MaterialFigures>();
+  CLI::App& show = *app.add_subcommand("show", "show a model; with a material, its frequencies");
+  show.add_option("model", *model, "name, label, or first digits of the digest")->required();
+  AddMaterial(show, *material);
+  show.callback([&program, model, material] {
+    program.command = [&program, model, material] {
+      return ShowModel(program.Daemon(), *model, *material, program.json);
+    };
+  });
+}
+
+void AddModelDelete(CLI::App& app, Program& program) {
+  auto model = std::make_shared<std::string>();
+  CLI::App& command = *app.add_subcommand("delete", "delete a model");
+  command.add_option("model", *model, "name, label, or first digits of the digest")->required();
+  command.callback([&program, model] {
+    program.command = [&program, model] { return DeleteModel(program.Daemon(), *model); };
+  });
+}
+
+void AddModel(CLI::App& app, Program& program) {
+  CLI::App& model = *app.add_subcommand("model", "modal models")->require_subcommand(1);
+  AddModelCreate(model, program);
+  model.add_subcommand("list", "list the models, newest first")->callback([&program] {
+    program.command = [&program] { return ListModels(program.Daemon(), program.json); };
+  });
+  AddModelShow(model, program);
+  AddModelDelete(model, program);
+}
+
+void AddJob(CLI::App& app, Program& program) {
+  auto name = std::make_shared<std::string>();
+  CLI::App& job = *app.add_subcommand("job", "decomposition jobs")->require_subcommand(1);
+  CLI::App& watch = *job.add_subcommand("watch", "follow a job to its end");
+  watch.add_option("job", *name, "name, label, or first digits of the digest")->required();
+  watch.callback([&program, name] {
+    program.command = [&program, name] { return WatchJob(program.Daemon(), *name, program.json); };
+  });
+}
+
+void AddStrike(CLI::App& app, Program& program) {
+  auto options = std::make_shared<StrikeOptions>();
+  CLI::App& strike = *app.add_subcommand("strike", "strike a model once and let it ring");
+  strike.add_option("model", options->model, "name, label, or first digits of the digest")
+      ->required();
+  strike.add_option("--point", options->point_m, "where: x,y,z in the object's frame, m")
+      ->delimiter(',')
+      ->required();
+  strike.add_option("--impulse", options->impulse_newton_seconds, "how hard: x,y,z, N s")
+      ->delimiter(',')
+      ->required();
+  strike.add_option("--duration", options->duration_s, "how long the contact lasts, s");
+  strike.add_option("--size", options->size, "size relative to the model's");
+  strike.add_option("--gain", options->gain, "linear gain");
+  strike.add_option("--seconds", options->seconds,
+                    "how long to let it ring [until it is 60 dB down]");
+  AddMaterial(strike, options->material);
+  strike.callback([&program, options] {
+    program.command = [&program, options] {
+      const StopSignal stop;
+      return Strike(program.Daemon(), *options, stop, program.json);
+    };
+  });
+}
+
+void AddListen(CLI::App& app, Program& program) {
+  auto options = std::make_shared<ListenOptions>();
+  CLI::App& listen = *app.add_subcommand("listen", "hear what the daemon plays");
+  listen.add_option("--out", options->out, "WAV file [raw 32-bit float samples to stdout]");
+  listen.add_option("--seconds", options->seconds, "how long [until stopped]")
+      ->check(CLI::NonNegativeNumber);
+  listen.callback([&program, options] {
+    program.command = [&program, options] {
+      const StopSignal stop;
+      return Listen(program.Daemon(), *options, stop);
+    };
+  });
+}
+
+void AddRender(CLI::App& app, Program& program) {
+  auto options = std::make_shared<RenderOptions>();
+  CLI::App& render = *app.add_subcommand("render", "render a contact trace to a WAV file");
+  render.add_option("trace", options->trace, "contact trace (.contacts)")->required();
+  render.add_option("--out", options->out, "WAV file")->required();
+  render.add_option("--sample-rate", options->sample_rate_hz, "frames a second")
+      ->capture_default_str();
+  render.add_option("--tail", options->tail_s,
+                    "seconds after the last contact [until it is silent]");
+  render.callback([&program, options] {
+    program.command = [&program, options] {
+      return Render(program.Daemon(), *options, program.json);
+    };
+  });
+}
+
+int Main(int argc, char** argv) {
+  Program program;
+  CLI::App app("Makes rigid-body simulations audible: talks to the daemon carillond.", "carillon");
+  app.add_option("--server", program.server, "unix:PATH or HOST:PORT [$CARILLON_SERVER]")
+      ->capture_default_str();
+  app.add_flag("--json", program.json, "print results as JSON");
+  app.require_subcommand(1)->fallthrough();
+  app.footer(
+      "Exits with 0 when done, 1 when refused (stderr says why), 2 when called wrongly, 3 "
+      "when no daemon answers.");
+  AddStatus(app, program);
+  AddModel(app, program);
+  AddJob(app, program);
+  AddStrike(app, program);
+  AddListen(app, program);
+  AddRender(app, program);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? kDone : kUsage;
+  }
+  return Report(program.command());
+}
+
+}  // namespace
+}  // namespace carillon::cli
+
+int main(int argc, char** argv) { return carillon::cli::Main(argc, argv); }

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "carillon/v1/material.pb.h"
+
+namespace carillon::cli {
+
+/// A material as the command line gives it: a name, figures over it, or figures alone.
+struct MaterialFigures {
+  std::string preset;
+  std::optional<double> young_pa;
+  std::optional<double> poisson_ratio;
+  std::optional<double> lame_lambda_pa;
+  std::optional<double> lame_mu_pa;
+  std::optional<double> density_kg_per_m3;
+  std::optional<double> alpha1_s;
+  std::optional<double> alpha2_per_s;
+};
+
+/// The contract's form. Lamé's constants become E = mu (3 lambda + 2 mu)/(lambda + mu) and
+/// nu = lambda/(2 (lambda + mu)). Errors: InvalidArgument (INVALID_MATERIAL): one Lamé constant
+/// alone, or beside Young's modulus or Poisson's ratio.
+absl::StatusOr<v1::Material> ToMaterial(const MaterialFigures& figures);
+
+}  // namespace carillon::cli

@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <numbers>
+#include <utility>
+
+#include "absl/strings/ascii.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "absl/strings/strip.h"
+#include "client_sdk/cli/commands.h"
+#include "client_sdk/cli/find_model.h"
+#include "client_sdk/cli/job_progress.h"
+#include "client_sdk/cli/output.h"
+#include "proto/error_reason.h"
+#include "proto/material_catalogue.h"
+
+namespace carillon::cli {
+namespace {
+
+/// Metres in one unit of the mesh file; the command line allows no other unit.
+double MetresPerUnit(const std::string& unit) {
+  if (unit == "mm") return 1e-3;
+  if (unit == "cm") return 1e-2;
+  if (unit == "in") return 0.0254;
+  return 1;
+}
+
+absl::StatusOr<std::string> ReadMesh(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::string bytes;
+  if (file && !std::filesystem::is_directory(path)) {
+    bytes.assign(std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>());
+    if (!file.bad()) return bytes;
+  }
+  const bool directory = std::filesystem::is_directory(path);
+  return Refusal(absl::StatusCode::kNotFound, "MESH_FILE_NOT_READABLE",
+                 absl::StrCat(path, ": ", std::strerror(directory ? EISDIR : errno),
+                              "; check the file's name"));
+}
+
+std::string Format(const CreateModelOptions& options) {
+  if (!options.format.empty()) return options.format;
+  const std::string suffix = std::filesystem::path(options.file).extension();
+  return absl::AsciiStrToLower(absl::StripPrefix(suffix, "."));
+}
+
+v1::DecompositionSettings Settings(const CreateModelOptions& options) {
+  v1::DecompositionSettings settings;
+  settings.set_element(options.element == "linear" ? v1::ELEMENT_LINEAR : v1::ELEMENT_QUADRATIC);
+  settings.set_mass_matrix(options.mass == "lumped" ? v1::MASS_MATRIX_LUMPED
+                                                    : v1::MASS_MATRIX_CONSISTENT);
+  settings.set_metres_per_unit(MetresPerUnit(options.unit));
+  if (options.keep_surface) settings.mutable_mesh()->set_keep_surface(*options.keep_surface);
+  settings.mutable_mesh()->set_target_node_count(options.target_node_count);
+  return settings;
+}
+
+absl::StatusOr<v1::CreateModalModelRequest> MakeRequest(const CreateModelOptions& options,
+                                                        std::string mesh_digest) {
+  auto material = ToMaterial(options.material);
+  if (!material.ok()) return material.status();
+  v1::CreateModalModelRequest request;
+  request.set_mesh_digest(std::move(mesh_digest));
+  request.set_mesh_format(Format(options));
+  *request.mutable_settings() = Settings(options);
+  *request.mutable_material() = *std::move(material);
+  request.set_size(options.size);
+  request.set_min_frequency_hz(options.min_frequency_hz);
+  request.set_max_frequency_hz(options.max_frequency_hz);
+  request.set_label(options.label.empty() ? std::filesystem::path(options.file).stem().string()
+                                          : options.label);
+  return request;
+}
+
+const char* ElementName(v1::Element element) {
+  return element == v1::ELEMENT_LINEAR ? "linear" : "quadratic";
+}
+
+void PrintSummary(const v1::ModalModelSummary& model) {
+  const v1::ModalModelHeader& header = model.header();
+  const v1::Verification& proof = header.verification();
+  absl::PrintF("%s\n", model.name());
+  absl::PrintF("label      %s\n", model.label());
+  absl::PrintF("modes      %d, with %d rigid; Sturm count %d\n", header.mode_count(),
+               proof.rigid_mode_count(), proof.sturm_count());
+  absl::PrintF("mesh       %d nodes, %d %s tetrahedra, volume %.6g m^3\n", header.node_count(),
+               header.element_count(), ElementName(header.settings().element()),
+               header.volume_m3());
+  absl::PrintF("poisson    %.4f\n", header.settings().poisson_ratio());
+  absl::PrintF("residual   %.2g at most, orthogonality %.2g\n", proof.max_residual(),
+               proof.max_orthogonality_error());
+  absl::PrintF("stored     %d bytes by %s\n", model.stored_bytes(), header.solver());
+  for (const std::string& warning : header.warnings()) absl::PrintF("warning    %s\n", warning);
+}
+
+/// The modes as `material` makes them: Lambda = eigenvalue E/rho, sigma = (alpha1 Lambda +
+/// alpha2)/2.
+void PrintModes(const v1::ModalModelSummary& model, const v1::Material& material) {
+  absl::PrintF("\n%5s %14s %14s %12s %9s\n", "mode", "natural Hz", "damped Hz", "decay 1/s",
+               "T60 s");
+  for (int i = 0; i < model.eigenvalues_size(); ++i) {
+    const double lambda = model.eigenvalues(i) * material.young_pa() / material.density_kg_per_m3();
+    const double sigma = (material.alpha1_s() * lambda + material.alpha2_per_s()) / 2;
+    const double damped = std::sqrt(std::fmax(0, lambda - sigma * sigma));
+    absl::PrintF("%5d %14.3f %14.3f %12.4f %9.3f\n", i + 1,
+                 std::sqrt(lambda) / (2 * std::numbers::pi), damped / (2 * std::numbers::pi),
+                 -sigma, std::log(1000) / sigma);
+  }
+}
+
+}  // namespace
+
+absl::Status CreateModel(const client::Client& daemon, const CreateModelOptions& options,
+                         bool json) {
+  const auto bytes = ReadMesh(options.file);
+  if (!bytes.ok()) return bytes.status();
+  auto digest = daemon.UploadMesh(*bytes);
+  if (!digest.ok()) return digest.status();
+  const auto request = MakeRequest(options, *std::move(digest));
+  if (!request.ok()) return request.status();
+  auto job = daemon.CreateModalModel(*request);
+  if (job.ok() && options.wait) job = WatchWithProgress(daemon, job->name());
+  if (!job.ok()) return job.status();
+  if (json) {
+    PrintJson(*job);
+  } else {
+    absl::PrintF("%s\n", job->modal_model());
+  }
+  return absl::OkStatus();
+}
+
+absl::Status ListModels(const client::Client& daemon, bool json) {
+  const auto models = daemon.ListModalModels();
+  if (!models.ok()) return models.status();
+  if (json) {
+    v1::ListModalModelsResponse list;
+    for (const auto& model : *models) *list.add_modal_models() = model;
+    PrintJson(list);
+    return absl::OkStatus();
+  }
+  for (const auto& model : *models) {
+    const absl::string_view digest = absl::StripPrefix(model.name(), "modalModels/");
+    absl::PrintF("%s  %4d modes  %7d nodes  %-9s  %s\n", digest.substr(0, 12),
+                 model.header().mode_count(), model.header().node_count(),
+                 ElementName(model.header().settings().element()), model.label());
+  }
+  return absl::OkStatus();
+}
+
+absl::Status ShowModel(const client::Client& daemon, const std::string& text,
+                       const MaterialFigures& figures, bool json) {
+  const auto name = FindModel(daemon, text);
+  if (!name.ok()) return name.status();
+  const auto model = daemon.GetModalModel(*name);
+  if (!model.ok()) return model.status();
+  if (json) {
+    PrintJson(*model);
+    return absl::OkStatus();
+  }
+  const auto given = ToMaterial(figures);
+  if (!given.ok()) return given.status();
+  const bool has_material = !given->preset().empty() || given->has_young_pa();
+  const auto material = has_material ? ResolveMaterial(*given) : *given;
+  if (!material.ok()) return material.status();
+  PrintSummary(*model);
+  if (has_material) PrintModes(*model, *material);
+  return absl::OkStatus();
+}
+
+absl::Status DeleteModel(const client::Client& daemon, const std::string& text) {
+  const auto name = FindModel(daemon, text);
+  if (!name.ok()) return name.status();
+  return daemon.DeleteModalModel(*name);
+}
+
+absl::Status WatchJob(const client::Client& daemon, const std::string& text, bool json) {
+  const auto name = FindJob(daemon, text);
+  if (!name.ok()) return name.status();
+  const auto job = WatchWithProgress(daemon, *name);
+  if (!job.ok()) return job.status();
+  if (json) {
+    PrintJson(*job);
+  } else {
+    absl::PrintF("%s\n", job->modal_model());
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace carillon::cli

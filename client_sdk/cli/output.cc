@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client_sdk/cli/output.h"
+
+#include <google/protobuf/util/json_util.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "absl/strings/str_format.h"
+#include "proto/error_reason.h"
+
+namespace carillon::cli {
+
+int Report(const absl::Status& status) {
+  if (status.ok()) return kDone;
+  const v1::ErrorInfo error = ToErrorInfo(status);
+  std::string message = error.message();
+  std::ranges::replace(message, '\n', ' ');
+  absl::FPrintF(stderr, "carillon: %s: %s\n", error.reason(), message);
+  return error.reason() == "SERVER_UNAVAILABLE" ? kNoServer : kRefused;
+}
+
+void PrintJson(const google::protobuf::Message& message) {
+  google::protobuf::util::JsonPrintOptions options;
+  options.preserve_proto_field_names = true;
+  options.always_print_primitive_fields = true;
+  std::string json;
+  // Our messages hold no Any and no timestamp, so nothing in them can fail to print.
+  (void)google::protobuf::util::MessageToJsonString(message, &json, options);
+  absl::PrintF("%s\n", json);
+}
+
+std::string Decibels(double amplitude) {
+  if (amplitude <= 0) return "silence";
+  return absl::StrFormat("%.1f dBFS", 20 * std::log10(amplitude));
+}
+
+}  // namespace carillon::cli

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "absl/strings/str_format.h"
+#include "client_sdk/cli/commands.h"
+#include "client_sdk/cli/find_model.h"
+#include "client_sdk/cli/output.h"
+#include "proto/error_reason.h"
+
+namespace carillon::cli {
+namespace {
+
+constexpr double kLongestSound = 30;  // seconds
+constexpr double kStep = 0.001;       // seconds; there is one step only
+
+/// Until the mode that decays slowest, the lowest, is 60 dB down: with omega its natural angular
+/// frequency, sigma = (alpha1 omega^2 + alpha2)/2 and T60 = ln(1000)/sigma.
+double SoundingSeconds(const v1::SoundingObject& object) {
+  const double omega = 2 * std::numbers::pi * object.lowest_frequency_hz();
+  const double sigma =
+      (object.material().alpha1_s() * omega * omega + object.material().alpha2_per_s()) / 2;
+  return std::min(kLongestSound, std::log(1000) / sigma);
+}
+
+void Set(v1::Vec3& vector, const std::array<double, 3>& components) {
+  vector.set_x(components[0]);
+  vector.set_y(components[1]);
+  vector.set_z(components[2]);
+}
+
+absl::StatusOr<v1::SoundingObject> AddObject(const client::Client& daemon, const std::string& scene,
+                                             const StrikeOptions& options) {
+  const auto model = FindModel(daemon, options.model);
+  if (!model.ok()) return model.status();
+  const auto material = ToMaterial(options.material);
+  if (!material.ok()) return material.status();
+  v1::AddObjectRequest request;
+  request.set_scene(scene);
+  request.set_modal_model(*model);
+  *request.mutable_material() = *material;
+  request.set_size(options.size);
+  request.set_gain(options.gain);
+  return daemon.AddObject(request);
+}
+
+/// The strike is sent with no delay: it sounds on arrival.
+absl::Status SendImpulse(const client::Client& daemon, const std::string& scene, uint32_t handle,
+                         const StrikeOptions& options) {
+  v1::ContactStreamStart start;
+  start.set_scene(scene);
+  start.set_step_s(kStep);
+  start.set_scheduling_delay_s(0);
+  const auto stream = daemon.StreamContacts(start);
+  if (!stream.ok()) return stream.status();
+  v1::ContactStep step;
+  v1::Impulse& impulse = *step.add_impulses();
+  impulse.set_object(handle);
+  Set(*impulse.mutable_point_m(), options.point_m);
+  Set(*impulse.mutable_impulse_newton_seconds(), options.impulse_newton_seconds);
+  impulse.set_duration_s(options.duration_s);
+  if (const absl::Status sent = (*stream)->Send(std::move(step)); !sent.ok()) return sent;
+  const auto report = (*stream)->Finish();
+  if (!report.ok()) return report.status();
+  if (report->rejected_count() == 0) return absl::OkStatus();
+  return FromErrorInfo(absl::StatusCode::kInvalidArgument, report->last_rejection());
+}
+
+absl::Status StrikeIn(const client::Client& daemon, const std::string& scene,
+                      const StrikeOptions& options, const StopSignal& stop, bool json) {
+  const auto object = AddObject(daemon, scene, options);
+  if (!object.ok()) return object.status();
+  const absl::Status struck = SendImpulse(daemon, scene, object->handle(), options);
+  if (!struck.ok()) return struck;
+  if (json) {
+    PrintJson(*object);
+  } else {
+    absl::PrintF("%d modes sound, %.2f to %.2f Hz\n", object->sounding_mode_count(),
+                 object->lowest_frequency_hz(), object->highest_frequency_hz());
+  }
+  std::fflush(stdout);
+  (void)stop.ArrivesWithin(options.seconds.value_or(SoundingSeconds(*object)));
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::Status Strike(const client::Client& daemon, const StrikeOptions& options,
+                    const StopSignal& stop, bool json) {
+  const auto scene = daemon.CreateScene();
+  if (!scene.ok()) return scene.status();
+  const absl::Status struck = StrikeIn(daemon, *scene, options, stop, json);
+  const absl::Status deleted = daemon.DeleteScene(*scene);
+  return struck.ok() ? deleted : struck;
+}
+
+}  // namespace carillon::cli

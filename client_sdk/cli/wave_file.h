@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <span>
+#include <string>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "client_sdk/cpp/audio.h"
+
+namespace carillon::cli {
+
+/// A WAV file of 24-bit samples that grows block by block.
+class WaveFile {
+ public:
+  /// Errors: Unavailable (AUDIO_FILE_NOT_WRITABLE).
+  static absl::StatusOr<WaveFile> Create(const std::string& path, uint32_t sample_rate_hz,
+                                         uint32_t channel_count);
+  WaveFile(WaveFile&&) noexcept;
+  WaveFile& operator=(WaveFile&&) noexcept;
+  /// Completes the file.
+  ~WaveFile();
+
+  /// Appends interleaved samples. Errors: Unavailable (AUDIO_FILE_NOT_WRITABLE).
+  absl::Status Write(std::span<const float> samples);
+
+ private:
+  struct Sound;
+  explicit WaveFile(std::unique_ptr<Sound> sound);
+
+  std::unique_ptr<Sound> sound_;
+};
+
+}  // namespace carillon::cli

@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The calls of Client that stream.
+#include <grpcpp/client_context.h>
+
+#include <bit>
+#include <cstring>
+#include <optional>
+#include <thread>
+#include <utility>
+
+#include "client_sdk/cpp/client.h"
+#include "client_sdk/cpp/rpc_status.h"
+#include "client_sdk/cpp/stubs.h"
+#include "proto/error_reason.h"
+
+namespace carillon::client {
+namespace {
+
+/// What the contract allows in one message.
+constexpr size_t kUploadPieceBytes = 1 << 20;
+
+static_assert(std::endian::native == std::endian::little, "samples come in little endian");
+
+/// The samples of `block`, copied to floats.
+class BlockReader {
+ public:
+  void SetFormat(const v1::AudioFormat& format) {
+    block_.sample_rate_hz = format.sample_rate_hz();
+    block_.channel_count = format.channel_count();
+  }
+
+  const AudioBlock& Read(const v1::AudioBlock& message, uint64_t lost_frame_count) {
+    samples_.resize(message.samples().size() / sizeof(float));
+    std::memcpy(samples_.data(), message.samples().data(), samples_.size() * sizeof(float));
+    block_.first_frame = message.first_frame();
+    block_.lost_frame_count = lost_frame_count;
+    block_.samples = samples_;
+    return block_;
+  }
+
+ private:
+  std::vector<float> samples_;
+  AudioBlock block_;
+};
+
+using RenderCall = grpc::ClientReaderWriter<v1::RenderRequest, v1::RenderResponse>;
+
+/// Sends settings and trace; an error of the trace cancels the call.
+absl::Status SendTrace(const v1::RenderSettings& settings, ContactTraceReader& trace,
+                       grpc::ClientContext& context, RenderCall& call) {
+  v1::RenderRequest request;
+  *request.mutable_settings() = settings;
+  bool sent = call.Write(request);
+  *request.mutable_record()->mutable_header() = trace.header();
+  sent = sent && call.Write(request);
+  while (sent) {
+    absl::StatusOr<std::optional<v1::ContactTraceRecord>> record = trace.Next();
+    if (!record.ok()) {
+      context.TryCancel();
+      return record.status();
+    }
+    if (!*record) break;
+    *request.mutable_record() = std::move(**record);
+    sent = call.Write(request);
+  }
+  call.WritesDone();
+  return absl::OkStatus();
+}
+
+struct Rendering {
+  std::optional<v1::RenderSummary> summary;
+  bool stopped = false;
+};
+
+Rendering ReceiveSound(const AudioCallback& on_block, grpc::ClientContext& context,
+                       RenderCall& call) {
+  Rendering rendering;
+  BlockReader reader;
+  v1::RenderResponse response;
+  while (call.Read(&response)) {
+    if (response.has_format()) reader.SetFormat(response.format());
+    if (response.has_summary()) rendering.summary = response.summary();
+    if (response.has_block() && !rendering.stopped && !on_block(reader.Read(response.block(), 0))) {
+      rendering.stopped = true;
+      context.TryCancel();
+    }
+  }
+  return rendering;
+}
+
+}  // namespace
+
+absl::StatusOr<std::string> Client::UploadMesh(absl::string_view bytes) const {
+  grpc::ClientContext context;
+  v1::UploadMeshResponse response;
+  const auto writer = stubs_->models.UploadMesh(&context, &response);
+  v1::UploadMeshRequest request;
+  for (size_t sent = 0; sent < bytes.size(); sent += kUploadPieceBytes) {
+    request.set_data(std::string(bytes.substr(sent, kUploadPieceBytes)));
+    if (!writer->Write(request)) break;  // Finish tells why
+  }
+  writer->WritesDone();
+  const absl::Status status = FromRpc(writer->Finish(), stubs_->server);
+  if (!status.ok()) return status;
+  return response.mesh_digest();
+}
+
+absl::StatusOr<v1::Job> Client::WatchJob(
+    const std::string& name, const std::function<void(const v1::Job&)>& on_change) const {
+  grpc::ClientContext context;
+  v1::WatchJobRequest request;
+  request.set_name(name);
+  const auto reader = stubs_->decompositions.WatchJob(&context, request);
+  v1::WatchJobResponse response;
+  while (reader->Read(&response)) {
+    if (on_change) on_change(response.job());
+  }
+  const absl::Status status = FromRpc(reader->Finish(), stubs_->server);
+  if (!status.ok()) return status;
+  const v1::Job& job = response.job();
+  if (job.state() == v1::JOB_STATE_FAILED) {
+    return FromErrorInfo(absl::StatusCode::kFailedPrecondition, job.error());
+  }
+  if (job.state() == v1::JOB_STATE_CANCELLED) {
+    return Refusal(absl::StatusCode::kCancelled, "JOB_CANCELLED",
+                   "somebody cancelled the decomposition; ask for the model again");
+  }
+  return job;
+}
+
+absl::Status Client::Listen(const AudioCallback& on_block) const {
+  grpc::ClientContext context;
+  const auto stream = stubs_->audio.Listen(&context, v1::ListenRequest());
+  BlockReader reader;
+  v1::ListenResponse response;
+  bool stopped = false;
+  while (!stopped && stream->Read(&response)) {
+    if (response.has_format()) reader.SetFormat(response.format());
+    if (!response.has_block()) continue;
+    stopped = !on_block(reader.Read(response.block(), response.lost_frame_count()));
+  }
+  if (stopped) context.TryCancel();
+  const grpc::Status status = stream->Finish();
+  return stopped ? absl::OkStatus() : FromRpc(status, stubs_->server);
+}
+
+absl::StatusOr<v1::RenderSummary> Client::Render(const v1::RenderSettings& settings,
+                                                 ContactTraceReader& trace,
+                                                 const AudioCallback& on_block) const {
+  grpc::ClientContext context;
+  const auto call = stubs_->audio.Render(&context);
+  // Two threads, because the daemon may send sound before it has the whole trace.
+  absl::Status sent;
+  std::jthread sender([&] { sent = SendTrace(settings, trace, context, *call); });
+  const Rendering rendering = ReceiveSound(on_block, context, *call);
+  sender.join();
+  const grpc::Status status = call->Finish();
+  if (!sent.ok()) return sent;
+  if (rendering.stopped) {
+    return Refusal(absl::StatusCode::kCancelled, "RENDERING_STOPPED",
+                   "the receiver of the sound wanted no more");
+  }
+  if (!status.ok()) return FromRpc(status, stubs_->server);
+  if (!rendering.summary) return absl::DataLossError("the daemon ended without a summary");
+  return *rendering.summary;
+}
+
+}  // namespace carillon::client

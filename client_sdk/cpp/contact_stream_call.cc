@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client_sdk/cpp/contact_stream_call.h"
+
+#include <grpcpp/client_context.h>
+#include <grpcpp/support/client_callback.h>
+
+#include <deque>
+#include <optional>
+#include <utility>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/synchronization/mutex.h"
+#include "client_sdk/cpp/rpc_status.h"
+#include "proto/error_reason.h"
+
+namespace carillon::client {
+namespace {
+
+/// The call, driven by gRPC's reactions.
+///
+/// At most one write is under way, the front of `queue_`; the next starts when it is done. A hold
+/// keeps gRPC from ending the call between writes that Send starts; it is given back once, when no
+/// further write may come. The answers' read is always under way until the daemon ends the stream.
+class ContactStreamCall final
+    : public ContactStream,
+      public grpc::ClientBidiReactor<v1::StreamContactsRequest, v1::StreamContactsResponse> {
+ public:
+  explicit ContactStreamCall(std::string server) : server_(std::move(server)) {}
+
+  ~ContactStreamCall() override {
+    context_.TryCancel();
+    absl::MutexLock lock(&mutex_);
+    if (started_) mutex_.Await(absl::Condition(this, &ContactStreamCall::Done));
+  }
+
+  absl::Status Open(v1::ContactService::Stub& stub, const v1::ContactStreamStart& start) {
+    stub.async()->StreamContacts(&context_, this);
+    {
+      absl::MutexLock lock(&mutex_);
+      started_ = true;
+      AddHold();
+      StartRead(&answer_);
+      *queue_.emplace_back().mutable_start() = start;
+      StartWrite(&queue_.front());
+    }
+    StartCall();
+    absl::MutexLock lock(&mutex_);
+    mutex_.Await(absl::Condition(this, &ContactStreamCall::AnsweredOrDone));
+    return answered_ ? absl::OkStatus() : EndedLocked();
+  }
+
+  absl::Status Send(v1::ContactStep step) override {
+    absl::MutexLock lock(&mutex_);
+    if (!holding_) {
+      mutex_.Await(absl::Condition(this, &ContactStreamCall::Done));
+      return EndedLocked();
+    }
+    if (queue_.size() >= kMaxQueuedSteps) {
+      return Refusal(absl::StatusCode::kResourceExhausted, "CONTACT_QUEUE_FULL",
+                     "the network takes fewer steps than the simulation sends; this step is lost: "
+                     "send fewer, or nearer to the daemon");
+    }
+    *queue_.emplace_back().mutable_step() = std::move(step);
+    if (queue_.size() == 1) StartWrite(&queue_.front());
+    return absl::OkStatus();
+  }
+
+  v1::StreamContactsResponse Report() const override {
+    absl::MutexLock lock(&mutex_);
+    return report_;
+  }
+
+  absl::StatusOr<v1::StreamContactsResponse> Finish() override {
+    absl::MutexLock lock(&mutex_);
+    finishing_ = true;
+    if (holding_ && queue_.empty()) EndWritesLocked();
+    mutex_.Await(absl::Condition(this, &ContactStreamCall::Done));
+    if (!status_->ok()) return *status_;
+    return report_;
+  }
+
+ private:
+  void OnWriteDone(bool ok) override {
+    absl::MutexLock lock(&mutex_);
+    queue_.pop_front();
+    if (!holding_) return;
+    if (!ok) {
+      ReleaseHoldLocked();
+    } else if (!queue_.empty()) {
+      StartWrite(&queue_.front());
+    } else if (finishing_) {
+      EndWritesLocked();
+    }
+  }
+
+  void OnReadDone(bool ok) override {
+    absl::MutexLock lock(&mutex_);
+    if (!ok) {
+      ReleaseHoldLocked();
+      return;
+    }
+    report_ = std::move(answer_);
+    answered_ = true;
+    StartRead(&answer_);
+  }
+
+  void OnDone(const grpc::Status& status) override {
+    const absl::Status result = FromRpc(status, server_);
+    absl::MutexLock lock(&mutex_);
+    status_ = result;
+  }
+
+  void EndWritesLocked() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+    StartWritesDone();
+    ReleaseHoldLocked();
+  }
+
+  void ReleaseHoldLocked() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+    if (std::exchange(holding_, false)) RemoveHold();
+  }
+
+  absl::Status EndedLocked() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+    if (!status_->ok()) return *status_;
+    return Refusal(absl::StatusCode::kFailedPrecondition, "CONTACT_STREAM_ENDED",
+                   "the stream has been finished; open another");
+  }
+
+  bool Done() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) { return status_.has_value(); }
+  bool AnsweredOrDone() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) { return answered_ || Done(); }
+
+  const std::string server_;
+  grpc::ClientContext context_;
+  v1::StreamContactsResponse answer_;  ///< belongs to the read under way
+  mutable absl::Mutex mutex_;
+  std::deque<v1::StreamContactsRequest> queue_ ABSL_GUARDED_BY(mutex_);
+  v1::StreamContactsResponse report_ ABSL_GUARDED_BY(mutex_);
+  std::optional<absl::Status> status_ ABSL_GUARDED_BY(mutex_);
+  bool started_ ABSL_GUARDED_BY(mutex_) = false;
+  bool holding_ ABSL_GUARDED_BY(mutex_) = true;
+  bool answered_ ABSL_GUARDED_BY(mutex_) = false;
+  bool finishing_ ABSL_GUARDED_BY(mutex_) = false;
+};
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<ContactStream>> OpenContactStream(
+    v1::ContactService::Stub& stub, const std::string& server,
+    const v1::ContactStreamStart& start) {
+  auto call = std::make_unique<ContactStreamCall>(server);
+  if (const absl::Status status = call->Open(stub, start); !status.ok()) return status;
+  return call;
+}
+
+}  // namespace carillon::client

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "carillon/v1/contact_service.grpc.pb.h"
+#include "client_sdk/cpp/contact_stream.h"
+
+namespace carillon::client {
+
+/// Opens StreamContacts on `stub` and waits for the first answer; `server` is for messages.
+absl::StatusOr<std::unique_ptr<ContactStream>> OpenContactStream(
+    v1::ContactService::Stub& stub, const std::string& server, const v1::ContactStreamStart& start);
+
+}  // namespace carillon::client

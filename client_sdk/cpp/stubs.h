@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <grpcpp/channel.h>
+
+#include <memory>
+#include <string>
+
+#include "carillon/v1/audio_service.grpc.pb.h"
+#include "carillon/v1/contact_service.grpc.pb.h"
+#include "carillon/v1/decomposition_service.grpc.pb.h"
+#include "carillon/v1/modal_model_service.grpc.pb.h"
+#include "carillon/v1/scene_service.grpc.pb.h"
+#include "client_sdk/cpp/client.h"
+
+namespace carillon::client {
+
+/// What a client holds: one stub for each service, all on one channel.
+struct Client::Stubs {
+  Stubs(std::string address, const std::shared_ptr<grpc::Channel>& channel)
+      : server(std::move(address)),
+        models(channel),
+        decompositions(channel),
+        scenes(channel),
+        contacts(channel),
+        audio(channel) {}
+
+  std::string server;
+  v1::ModalModelService::Stub models;
+  v1::DecompositionService::Stub decompositions;
+  v1::SceneService::Stub scenes;
+  v1::ContactService::Stub contacts;
+  v1::AudioService::Stub audio;
+};
+
+}  // namespace carillon::client
