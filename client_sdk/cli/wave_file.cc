@@ -31,7 +31,8 @@ absl::StatusOr<WaveFile> WaveFile::Create(const std::string& path, uint32_t samp
                                           uint32_t channel_count) {
   SndfileHandle file(path, SFM_WRITE, SF_FORMAT_WAV | SF_FORMAT_PCM_24,
                      static_cast<int>(channel_count), static_cast<int>(sample_rate_hz));
-  if (!file) return NotWritable(path, file.strError());
+  // Its conversion to bool says nothing about the file.
+  if (file.error() != SF_ERR_NO_ERROR) return NotWritable(path, file.strError());
   return WaveFile(std::make_unique<Sound>(Sound{path, std::move(file)}));
 }
 

@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client_sdk/cpp/contact_trace.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <vector>
+
+namespace carillon::client {
+namespace {
+
+using testing::HasSubstr;
+
+/// A file of its own for each test, removed at its end.
+class ContactTrace : public testing::Test {
+ protected:
+  ~ContactTrace() override { std::filesystem::remove(path_); }
+
+  void WriteExample() {
+    v1::ContactTraceHeader header;
+    header.set_simulator("test");
+    header.set_step_s(0.01);
+    auto writer = ContactTraceWriter::Create(path_, header);
+    ASSERT_TRUE(writer.ok()) << writer.status();
+    v1::ContactTraceObject object;
+    object.set_handle(7);
+    object.set_modal_model("modalModels/abc");
+    writer->Write(object);
+    v1::ContactStep step;
+    step.set_time_s(0.25);
+    // More than 127 bytes, so that its length takes two.
+    for (int i = 0; i < 20; ++i) step.add_impulses()->set_object(7);
+    writer->Write(step);
+    ASSERT_TRUE(writer->Close().ok());
+  }
+
+  std::string Bytes() const {
+    std::ifstream file(path_, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+
+  void Overwrite(const std::string& bytes) const {
+    std::ofstream(path_, std::ios::binary) << bytes;
+  }
+
+  /// The status that reading to the end gives.
+  absl::Status ReadAll() const {
+    auto reader = ContactTraceReader::Open(path_);
+    if (!reader.ok()) return reader.status();
+    while (true) {
+      const auto record = reader->Next();
+      if (!record.ok()) return record.status();
+      if (!*record) return absl::OkStatus();
+    }
+  }
+
+  const std::string path_ = testing::TempDir() +
+                            testing::UnitTest::GetInstance()->current_test_info()->name() +
+                            ".contacts";
+};
+
+TEST_F(ContactTrace, ReadsBackWhatWasWritten) {
+  WriteExample();
+  auto reader = ContactTraceReader::Open(path_);
+  ASSERT_TRUE(reader.ok()) << reader.status();
+  EXPECT_EQ(reader->header().simulator(), "test");
+  EXPECT_EQ(reader->header().format_version(), 1);
+  const auto object = reader->Next();
+  ASSERT_TRUE(object.ok() && *object);
+  EXPECT_EQ((*object)->object().handle(), 7);
+  const auto step = reader->Next();
+  ASSERT_TRUE(step.ok() && *step);
+  EXPECT_EQ((*step)->step().time_s(), 0.25);
+  EXPECT_EQ((*step)->step().impulses_size(), 20);
+  const auto end = reader->Next();
+  ASSERT_TRUE(end.ok());
+  EXPECT_FALSE(*end);
+}
+
+TEST_F(ContactTrace, IsMalformedWhereverItIsCutOffWithinARecord) {
+  WriteExample();
+  const std::string whole = Bytes();
+  int whole_records = 0;
+  for (size_t length = 0; length < whole.size(); ++length) {
+    Overwrite(whole.substr(0, length));
+    const absl::Status status = ReadAll();
+    if (status.ok()) {
+      ++whole_records;
+    } else {
+      EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
+      EXPECT_THAT(status.ToString(), HasSubstr("TRACE_MALFORMED: "));
+      EXPECT_THAT(status.ToString(), HasSubstr(path_));
+    }
+  }
+  // Cut between records the file is a shorter trace: after the header, and after the object.
+  EXPECT_EQ(whole_records, 2);
+}
+
+TEST_F(ContactTrace, RefusesFilesOfOtherKinds) {
+  const std::vector<std::string> foreign = {"", "v 0 0 0\nv 1 0 0\nf 1 2 3\n",
+                                            std::string(100, '\0'), std::string(100, '\xff'),
+                                            "RIFF\x24\x00\x00\x00WAVEfmt "};
+  for (const std::string& bytes : foreign) {
+    Overwrite(bytes);
+    EXPECT_THAT(ReadAll().ToString(), HasSubstr("TRACE_MALFORMED: ")) << bytes;
+  }
+}
+
+TEST_F(ContactTrace, RefusesAFormatFromTheFuture) {
+  v1::ContactTraceRecord record;
+  record.mutable_header()->set_format_version(2);
+  const std::string bytes = record.SerializeAsString();
+  Overwrite(std::string(1, static_cast<char>(bytes.size())) + bytes);
+  EXPECT_THAT(ReadAll().ToString(), HasSubstr("TRACE_TOO_NEW: "));
+}
+
+TEST_F(ContactTrace, SaysWhereNoFileIs) {
+  EXPECT_THAT(ReadAll().ToString(), HasSubstr("TRACE_NOT_FOUND: "));
+  EXPECT_THAT(ContactTraceWriter::Create("/proc/no/such/folder", {}).status().ToString(),
+              HasSubstr("TRACE_NOT_WRITABLE: "));
+}
+
+TEST_F(ContactTrace, SaysThatTheDiskIsFull) {
+  auto writer = ContactTraceWriter::Create("/dev/full", {});
+  ASSERT_TRUE(writer.ok()) << writer.status();
+  EXPECT_THAT(writer->Close().ToString(), HasSubstr("TRACE_NOT_WRITABLE: "));
+}
+
+}  // namespace
+}  // namespace carillon::client

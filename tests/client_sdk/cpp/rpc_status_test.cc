@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client_sdk/cpp/rpc_status.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "carillon/v1/error.pb.h"
+#include "proto/error_reason.h"
+
+namespace carillon::client {
+namespace {
+
+using testing::HasSubstr;
+
+TEST(RpcStatus, CarriesReasonMessageAndFiguresOfTheRichStatus) {
+  v1::ErrorInfo error;
+  error.set_reason("MESH_NOT_CLOSED");
+  error.set_message("the surface has 12 open edges; close it");
+  (*error.mutable_metadata())["edge_count"] = "12";
+  v1::StatusDetails details;
+  details.add_details()->PackFrom(error);
+  const absl::Status status = FromRpc(
+      grpc::Status(grpc::StatusCode::INVALID_ARGUMENT, "anything", details.SerializeAsString()),
+      "unix:/x");
+  EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
+  const v1::ErrorInfo received = ToErrorInfo(status);
+  EXPECT_EQ(received.reason(), "MESH_NOT_CLOSED");
+  EXPECT_EQ(received.message(), "the surface has 12 open edges; close it");
+  EXPECT_EQ(received.metadata().at("edge_count"), "12");
+}
+
+TEST(RpcStatus, ReadsDetailsPackedByOtherToolsAsPlainMessage) {
+  // Another tool's detail within the rich status is passed over.
+  v1::StatusDetails details;
+  details.add_details()->set_type_url("type.googleapis.com/google.rpc.Help");
+  const absl::Status status = FromRpc(
+      grpc::Status(grpc::StatusCode::NOT_FOUND, "JOB_NOT_FOUND: no", details.SerializeAsString()),
+      "unix:/x");
+  EXPECT_EQ(ToErrorInfo(status).reason(), "JOB_NOT_FOUND");
+}
+
+TEST(RpcStatus, NamesTheServerThatDoesNotAnswer) {
+  const absl::Status status =
+      FromRpc(grpc::Status(grpc::StatusCode::UNAVAILABLE, "refused"), "unix:/run/c.sock");
+  EXPECT_THAT(status.ToString(), HasSubstr("SERVER_UNAVAILABLE: "));
+  EXPECT_THAT(status.ToString(), HasSubstr("unix:/run/c.sock"));
+}
+
+TEST(RpcStatus, IsOkWhereTheCallWas) { EXPECT_TRUE(FromRpc(grpc::Status::OK, "x").ok()); }
+
+}  // namespace
+}  // namespace carillon::client
