@@ -16,11 +16,11 @@ class Database;
 
 /// A decomposition job as it is stored.
 struct JobRecord {
-  std::string digest;   ///< the modal model's
-  std::string request;  ///< what was asked for; bytes whose meaning belongs to the caller
-  std::string label;
+  std::string digest{};   ///< the modal model's
+  std::string request{};  ///< what was asked for; bytes whose meaning belongs to the caller
+  std::string label{};
   v1::JobState state = v1::JOB_STATE_QUEUED;
-  v1::ErrorInfo error;      ///< while `state` is JOB_STATE_FAILED
+  v1::ErrorInfo error{};    ///< while `state` is JOB_STATE_FAILED
   bool remembered = false;  ///< the failure would come again: it is not tried again
   int64_t created_unix_ms = 0;
 };

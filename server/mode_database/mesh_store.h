@@ -3,13 +3,14 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "server/base/sha256.h"
+#include "server/mode_database/spool_file.h"
 
 namespace carillon {
 
@@ -24,10 +25,6 @@ struct StoredMesh {
 /// neither memory nor a transaction is held by a slow sender. One thread at a time.
 class MeshUpload {
  public:
-  MeshUpload(MeshUpload&&) noexcept;
-  MeshUpload& operator=(MeshUpload&&) noexcept;
-  ~MeshUpload();
-
   /// The next bytes. Errors: ResourceExhausted (MESH_TOO_LARGE: over 256 MiB in all).
   absl::Status Append(std::string_view bytes);
 
@@ -37,10 +34,10 @@ class MeshUpload {
 
  private:
   friend class MeshStore;
-  MeshUpload(Database& database, int file) : database_(&database), file_(file) {}
+  MeshUpload(Database& database, SpoolFile file) : database_(&database), file_(std::move(file)) {}
 
   Database* database_;
-  int file_;
+  SpoolFile file_;
   Sha256 digest_;
   uint64_t byte_count_ = 0;
 };

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/base/thread_annotations.h"
@@ -23,9 +24,9 @@ class Database;
 
 /// A modal model without its arrays.
 struct ModelSummary {
-  std::string digest;
-  std::string label;  ///< given when it was first stored
-  v1::ModalModelHeader header;
+  std::string digest{};
+  std::string label{};  ///< given when it was first stored
+  v1::ModalModelHeader header{};
   uint64_t stored_bytes = 0;  ///< of its arrays
   int64_t created_unix_ms = 0;
 };
@@ -70,10 +71,13 @@ class ModelExport {
 
  private:
   friend class ModelStore;
-  ModelExport(Database& database, int64_t revision) : database_(&database), revision_(revision) {}
+  ModelExport(Database& database, std::string digest)
+      : database_(&database), digest_(std::move(digest)) {}
 
   Database* database_;
-  int64_t revision_;
+  std::string digest_;
+  int64_t revision_ = 0;
+  v1::ModalModelHeader header_;
   bool header_sent_ = false;
   int64_t next_chunk_ = 0;
   int64_t chunk_count_ = 0;

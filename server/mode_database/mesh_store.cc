@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/mode_database/mesh_store.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <optional>
+#include <system_error>
+
+#include "absl/strings/str_cat.h"
+#include "proto/error_reason.h"
+#include "server/mode_database/database.h"
+
+namespace carillon {
+namespace {
+
+constexpr size_t kChunkBytes = 1 << 20;
+
+absl::StatusOr<std::optional<StoredMesh>> Select(SqliteConnection& connection,
+                                                 const std::string& digest) {
+  std::optional<StoredMesh> mesh;
+  const absl::Status status = connection.Query(
+      "SELECT byte_count FROM meshes WHERE digest = ?", {digest}, [&](const SqlRow& row) {
+        mesh = StoredMesh{digest, static_cast<uint64_t>(row.Int(0))};
+        return absl::OkStatus();
+      });
+  if (!status.ok()) return status;
+  return mesh;
+}
+
+absl::Status Insert(SqliteConnection& connection, const StoredMesh& mesh, SpoolFile& file) {
+  const auto known = Select(connection, mesh.digest);
+  if (!known.ok() || known->has_value()) return known.status();
+  absl::Status status = connection.Run("INSERT INTO meshes (digest, byte_count) VALUES (?, ?)",
+                                       {mesh.digest, static_cast<int64_t>(mesh.byte_count)});
+  if (status.ok()) status = file.Rewind();
+  for (uint64_t offset = 0; status.ok() && offset < mesh.byte_count; offset += kChunkBytes) {
+    const absl::StatusOr<std::string> bytes = file.Read(kChunkBytes);
+    if (!bytes.ok()) return bytes.status();
+    status = connection.Run("INSERT INTO mesh_chunks (digest, byte_offset, data) VALUES (?, ?, ?)",
+                            {mesh.digest, static_cast<int64_t>(offset), SqlBlob{*bytes}});
+  }
+  return status;
+}
+
+absl::Status NotFound(const std::string& digest) {
+  return Refusal(absl::StatusCode::kNotFound, "MESH_NOT_FOUND",
+                 absl::StrCat("no mesh has the digest ", digest, ": upload it first"));
+}
+
+absl::Status CannotWrite(const std::filesystem::path& file) {
+  const std::string why = std::generic_category().message(errno);
+  return Refusal(absl::StatusCode::kResourceExhausted, "DATABASE_FULL",
+                 absl::StrCat("the mesh file ", file.string(), " cannot be written (", why,
+                              "): free space there"));
+}
+
+/// A new file that only its owner may read.
+class NewFile {
+ public:
+  explicit NewFile(const std::filesystem::path& path)
+      : path_(path),
+        descriptor_(open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600)) {}
+  NewFile(const NewFile&) = delete;
+  NewFile& operator=(const NewFile&) = delete;
+  ~NewFile() {
+    if (descriptor_ >= 0) close(descriptor_);
+  }
+
+  bool is_open() const { return descriptor_ >= 0; }
+
+  absl::Status Append(std::string_view bytes) {
+    while (!bytes.empty()) {
+      const ssize_t written = write(descriptor_, bytes.data(), bytes.size());
+      if (written < 0 && errno == EINTR) continue;
+      if (written < 0) return CannotWrite(path_);
+      bytes.remove_prefix(static_cast<size_t>(written));
+    }
+    return absl::OkStatus();
+  }
+
+ private:
+  const std::filesystem::path& path_;
+  int descriptor_;
+};
+
+}  // namespace
+
+absl::Status MeshUpload::Append(std::string_view bytes) {
+  if (bytes.size() > MeshStore::kMaxByteCount - byte_count_) {
+    return Refusal(absl::StatusCode::kResourceExhausted, "MESH_TOO_LARGE",
+                   absl::StrCat("the mesh file has more than ", MeshStore::kMaxByteCount >> 20U,
+                                " MiB: give a coarser surface, or a binary format"));
+  }
+  byte_count_ += bytes.size();
+  digest_.Update(bytes);
+  return file_.Append(bytes);
+}
+
+absl::StatusOr<StoredMesh> MeshUpload::Finish() {
+  if (byte_count_ == 0) {
+    return Refusal(absl::StatusCode::kInvalidArgument, "MESH_EMPTY",
+                   "the mesh file has no bytes: send its content");
+  }
+  const StoredMesh mesh{digest_.Finish(), byte_count_};
+  const absl::Status status = database_->Write(
+      [&](SqliteConnection& connection) { return Insert(connection, mesh, file_); });
+  if (!status.ok()) return status;
+  return mesh;
+}
+
+absl::StatusOr<MeshUpload> MeshStore::Begin() {
+  absl::StatusOr<SpoolFile> file = SpoolFile::Make(database_->folder());
+  if (!file.ok()) return file.status();
+  return MeshUpload(*database_, *std::move(file));
+}
+
+absl::StatusOr<StoredMesh> MeshStore::Put(std::string_view bytes) {
+  absl::StatusOr<MeshUpload> upload = Begin();
+  if (!upload.ok()) return upload.status();
+  const absl::Status status = upload->Append(bytes);
+  if (!status.ok()) return status;
+  return upload->Finish();
+}
+
+absl::StatusOr<StoredMesh> MeshStore::Find(const std::string& digest) {
+  std::optional<StoredMesh> mesh;
+  const absl::Status status = database_->Read([&](SqliteConnection& connection) {
+    auto found = Select(connection, digest);
+    if (found.ok()) mesh = *std::move(found);
+    return found.status();
+  });
+  if (!status.ok()) return status;
+  if (!mesh.has_value()) return NotFound(digest);
+  return *mesh;
+}
+
+absl::Status MeshStore::WriteFile(const std::string& digest, const std::filesystem::path& file) {
+  const absl::StatusOr<StoredMesh> mesh = Find(digest);
+  if (!mesh.ok()) return mesh.status();
+  NewFile out(file);
+  if (!out.is_open()) return CannotWrite(file);
+  Sha256 sha;
+  const absl::Status status = database_->Read([&](SqliteConnection& connection) {
+    return connection.Query("SELECT data FROM mesh_chunks WHERE digest = ? ORDER BY byte_offset",
+                            {digest}, [&](const SqlRow& row) {
+                              sha.Update(row.Blob(0));
+                              return out.Append(row.Blob(0));
+                            });
+  });
+  if (!status.ok()) return status;
+  if (sha.Finish() != digest) {
+    return Refusal(absl::StatusCode::kDataLoss, "MESH_CORRUPT",
+                   absl::StrCat("the stored mesh ", digest,
+                                " has changed on the disk: upload it again "
+                                "under a fresh database, and check the disk"));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace carillon

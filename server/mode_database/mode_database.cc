@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/mode_database/mode_database.h"
+
+#include <utility>
+
+#include "server/mode_database/database.h"
+
+namespace carillon {
+
+absl::StatusOr<std::unique_ptr<ModeDatabase>> ModeDatabase::Open(const std::filesystem::path& file,
+                                                                 const Clock& clock) {
+  absl::StatusOr<std::unique_ptr<Database>> database = Database::Open(file);
+  if (!database.ok()) return database.status();
+  return std::unique_ptr<ModeDatabase>(new ModeDatabase(*std::move(database), clock));
+}
+
+ModeDatabase::ModeDatabase(std::unique_ptr<Database> database, const Clock& clock)
+    : database_(std::move(database)),
+      meshes_(*database_),
+      models_(*database_, clock),
+      jobs_(*database_) {}
+
+ModeDatabase::~ModeDatabase() = default;
+
+}  // namespace carillon

@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/mode_database/model_checker.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <string>
+
+#include "absl/strings/str_cat.h"
+#include "proto/error_reason.h"
+#include "server/base/xxh3.h"
+
+namespace carillon {
+namespace {
+
+constexpr size_t kMaxChunkBytes = 1 << 20;
+constexpr uint64_t kMaxDimension = 1ULL << 32;
+constexpr uint64_t kMaxArrayBytes = 1ULL << 40;
+
+// An array of format version 1. Each dimension is a letter of modal_model.proto, or '3'.
+struct ArraySpec {
+  const char* name;
+  v1::ElementType type;
+  const char* shape;
+  char index_bound;  // for indices: what they count, else 0
+};
+
+constexpr std::array kArrays = {
+    ArraySpec{"eigenvalues", v1::ELEMENT_TYPE_FLOAT64, "m", 0},
+    ArraySpec{"residuals", v1::ELEMENT_TYPE_FLOAT64, "m", 0},
+    ArraySpec{"couplings", v1::ELEMENT_TYPE_FLOAT64, "m", 0},
+    ArraySpec{"vertices", v1::ELEMENT_TYPE_FLOAT32, "V3", 0},
+    ArraySpec{"triangles", v1::ELEMENT_TYPE_UINT32, "T3", 'V'},
+    ArraySpec{"given_triangle", v1::ELEMENT_TYPE_UINT32, "T", 'H'},
+    ArraySpec{"given_vertices", v1::ELEMENT_TYPE_FLOAT32, "G3", 0},
+    ArraySpec{"given_triangles", v1::ELEMENT_TYPE_UINT32, "H3", 'G'},
+    ArraySpec{"shapes", v1::ELEMENT_TYPE_FLOAT32, "V3m", 0},
+};
+
+const ArraySpec* FindSpec(const std::string& name) {
+  const auto spec = std::ranges::find_if(kArrays, [&](const auto& s) { return s.name == name; });
+  return spec == kArrays.end() ? nullptr : &*spec;
+}
+
+uint64_t ElementBytes(v1::ElementType type) {
+  switch (type) {
+    case v1::ELEMENT_TYPE_FLOAT32:
+    case v1::ELEMENT_TYPE_UINT32:
+      return 4;
+    case v1::ELEMENT_TYPE_FLOAT64:
+      return 8;
+    default:
+      return 0;
+  }
+}
+
+absl::Status Malformed(absl::string_view what) {
+  return Refusal(absl::StatusCode::kInvalidArgument, "MODAL_MODEL_MALFORMED",
+                 absl::StrCat("the stored model is not of format version 1: ", what,
+                              "; write it anew with carillon-precompute or by an export"));
+}
+
+template <typename T, typename Test>
+bool AllOf(const std::string& data, Test test) {
+  for (size_t at = 0; at < data.size(); at += sizeof(T)) {
+    T value;
+    std::memcpy(&value, data.data() + at, sizeof value);
+    if (!test(value)) return false;
+  }
+  return true;
+}
+
+bool NumbersAreFinite(v1::ElementType type, const std::string& data) {
+  if (type == v1::ELEMENT_TYPE_FLOAT32) {
+    return AllOf<float>(data, [](float x) { return std::isfinite(x); });
+  }
+  return type != v1::ELEMENT_TYPE_FLOAT64 ||
+         AllOf<double>(data, [](double x) { return std::isfinite(x); });
+}
+
+}  // namespace
+
+absl::Status ModelChecker::Check(const v1::ModalModelRecord& record) {
+  if (record.has_header() && !has_header_) return CheckHeader(record.header());
+  if (record.has_chunk() && has_header_) return CheckChunk(record.chunk());
+  return Malformed(has_header_ ? "a record after the header is not a chunk"
+                               : "its first record is not a header");
+}
+
+absl::Status ModelChecker::CheckHeader(const v1::ModalModelHeader& header) {
+  if (header.format_version() != 1) {
+    return Malformed(absl::StrCat("it has format version ", header.format_version()));
+  }
+  const double poisson = header.settings().poisson_ratio();
+  if (!(poisson > -1 && poisson < 0.5)) {
+    return Malformed(absl::StrCat("its Poisson's ratio is ", poisson));
+  }
+  if (!std::isfinite(header.complete_to_eigenvalue())) {
+    return Malformed("complete_to_eigenvalue is not finite");
+  }
+  dimensions_['3'] = 3;
+  dimensions_['m'] = header.mode_count();
+  for (const v1::ArrayDescriptor& array : header.arrays()) {
+    const absl::Status status = CheckArray(array);
+    if (!status.ok()) return status;
+  }
+  for (const ArraySpec& spec : kArrays) {
+    const auto named = [&](const v1::ArrayDescriptor& array) { return array.name() == spec.name; };
+    if (std::ranges::count_if(header.arrays(), named) != 1) {
+      return Malformed(absl::StrCat("it needs one array \"", spec.name, "\""));
+    }
+  }
+  header_ = header;
+  has_header_ = true;
+  return absl::OkStatus();
+}
+
+absl::Status ModelChecker::CheckArray(const v1::ArrayDescriptor& array) {
+  uint64_t byte_count = ElementBytes(array.type());
+  bool fits = byte_count > 0 && !array.shape().empty();
+  for (const uint64_t size : array.shape()) {
+    fits = fits && size > 0 && size <= kMaxDimension && byte_count <= kMaxArrayBytes / size;
+    byte_count *= fits ? size : 1;
+  }
+  if (!fits) {
+    return Malformed(absl::StrCat("array \"", array.name(), "\" has no type, no size or too much"));
+  }
+  byte_counts_.push_back(byte_count);
+  return CheckShape(array);
+}
+
+absl::Status ModelChecker::CheckShape(const v1::ArrayDescriptor& array) {
+  const ArraySpec* spec = FindSpec(array.name());
+  if (spec == nullptr) return absl::OkStatus();  // of a later minor version: kept, not read
+  const std::string letters = spec->shape;
+  bool agrees =
+      array.type() == spec->type && letters.size() == static_cast<size_t>(array.shape_size());
+  for (int i = 0; agrees && i < array.shape_size(); ++i) {
+    const auto [known, is_new] =
+        dimensions_.emplace(letters[static_cast<size_t>(i)], array.shape(i));
+    agrees = known->second == array.shape(i);
+  }
+  if (agrees) return absl::OkStatus();
+  return Malformed(
+      absl::StrCat("type or shape of array \"", array.name(), "\" disagrees with the others"));
+}
+
+absl::Status ModelChecker::CheckChunk(const v1::ModalModelChunk& chunk) {
+  if (array_ == header_.arrays_size()) return Malformed("a chunk follows the last array");
+  const v1::ArrayDescriptor& array = header_.arrays(array_);
+  const std::string& data = chunk.data();
+  if (chunk.array() != static_cast<uint32_t>(array_) || chunk.offset() != offset_) {
+    return Malformed(absl::StrCat("a chunk is missing or out of order: byte ", offset_,
+                                  " of array \"", array.name(), "\" should follow"));
+  }
+  if (data.empty() || data.size() > kMaxChunkBytes ||
+      data.size() % ElementBytes(array.type()) != 0 ||
+      data.size() > byte_counts_[static_cast<size_t>(array_)] - offset_) {
+    return Malformed(absl::StrCat("a chunk of array \"", array.name(), "\" has a wrong size, ",
+                                  data.size(), " bytes"));
+  }
+  if (Xxh3(data) != chunk.xxh3()) {
+    return Refusal(absl::StatusCode::kDataLoss, "MODAL_MODEL_CORRUPT",
+                   absl::StrCat("the hash of array \"", array.name(), "\" at byte ", offset_,
+                                " is wrong, so its bytes have changed since they were computed: "
+                                "decompose the mesh again, or import the model from a copy"));
+  }
+  const absl::Status status = CheckNumbers(array, data);
+  if (!status.ok()) return status;
+  offset_ += data.size();
+  if (offset_ == byte_counts_[static_cast<size_t>(array_)]) {
+    ++array_;
+    offset_ = 0;
+  }
+  return absl::OkStatus();
+}
+
+absl::Status ModelChecker::CheckNumbers(const v1::ArrayDescriptor& array, const std::string& data) {
+  const ArraySpec* spec = FindSpec(array.name());
+  if (spec == nullptr) return absl::OkStatus();
+  bool good = NumbersAreFinite(array.type(), data);
+  if (spec->index_bound != 0) {
+    const uint64_t bound = dimensions_.at(spec->index_bound);
+    good = AllOf<uint32_t>(data, [&](uint32_t index) { return index < bound; });
+  }
+  if (array.name() == "eigenvalues") {
+    good = good && AllOf<double>(data, [&](double value) {
+             const bool ascends = value > 0 && value >= last_eigenvalue_;
+             last_eigenvalue_ = value;
+             return ascends;
+           });
+  }
+  if (good) return absl::OkStatus();
+  return Malformed(
+      absl::StrCat("array \"", array.name(),
+                   "\" has a number that is not finite, out of range or out of order"));
+}
+
+absl::Status ModelChecker::Finish() const {
+  if (!has_header_) return Malformed("it is empty");
+  if (array_ == header_.arrays_size()) return absl::OkStatus();
+  return Malformed(absl::StrCat("it ends at byte ", offset_, " of array \"",
+                                header_.arrays(array_).name(), "\""));
+}
+
+uint64_t ModelChecker::array_bytes() const {
+  uint64_t sum = 0;
+  for (const uint64_t byte_count : byte_counts_) sum += byte_count;
+  return sum;
+}
+
+}  // namespace carillon

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "carillon/v1/modal_model.pb.h"
+
+namespace carillon {
+
+/// Checks a stored model record by record: hashes, the order and completeness of the chunks, that
+/// the arrays of format version 1 are there with consistent shapes, that numbers are finite,
+/// eigenvalues positive and ascending, and indices in range. What passes cannot hurt a reader.
+class ModelChecker {
+ public:
+  /// Errors: InvalidArgument (MODAL_MODEL_MALFORMED), DataLoss (MODAL_MODEL_CORRUPT: a hash is
+  /// wrong). After an error the checker is of no further use.
+  absl::Status Check(const v1::ModalModelRecord& record);
+
+  /// Whether every byte of every array has come. Errors: InvalidArgument (MODAL_MODEL_MALFORMED).
+  absl::Status Finish() const;
+
+  const v1::ModalModelHeader& header() const { return header_; }
+
+  /// Bytes of all arrays.
+  uint64_t array_bytes() const;
+
+ private:
+  absl::Status CheckHeader(const v1::ModalModelHeader& header);
+  absl::Status CheckArray(const v1::ArrayDescriptor& array);
+  absl::Status CheckShape(const v1::ArrayDescriptor& array);
+  absl::Status CheckChunk(const v1::ModalModelChunk& chunk);
+  absl::Status CheckNumbers(const v1::ArrayDescriptor& array, const std::string& data);
+
+  bool has_header_ = false;
+  v1::ModalModelHeader header_;
+  std::vector<uint64_t> byte_counts_;    ///< of each array
+  std::map<char, uint64_t> dimensions_;  ///< 'V', 'T', 'm', 'G', 'H' of modal_model.proto
+  int array_ = 0;                        ///< whose chunks come now
+  uint64_t offset_ = 0;                  ///< of the next chunk
+  double last_eigenvalue_ = 0;
+};
+
+}  // namespace carillon

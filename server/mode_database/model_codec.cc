@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/mode_database/model_codec.h"
+
+#include <fcntl.h>
+#include <google/protobuf/io/coded_stream.h>
+#include <google/protobuf/io/zero_copy_stream_impl.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "proto/error_reason.h"
+#include "server/base/xxh3.h"
+
+namespace carillon {
+namespace {
+
+constexpr size_t kMaxChunkBytes = 1 << 20;
+constexpr uint32_t kMaxRecordBytes = 2 << 20;  // a chunk, or a header with many warnings
+
+absl::Status Truncated() {
+  return Refusal(
+      absl::StatusCode::kInvalidArgument, "MODAL_MODEL_MALFORMED",
+      "the file is not a sequence of modal model records, or is cut short: copy it again");
+}
+
+// Where an array of the stored form lies in the model in memory: for the writing and the reading of
+// all arrays by one table.
+struct Field {
+  const char* name;
+  v1::ElementType type;
+  std::vector<uint64_t> shape;
+  std::string_view bytes;
+};
+
+template <typename T>
+std::string_view Bytes(const std::vector<T>& values) {
+  return {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T)};
+}
+
+std::array<Field, 9> Fields(const ModalModel& model, const std::vector<double>& residuals) {
+  const uint64_t m = model.eigenvalues.size();
+  const uint64_t v = model.vertices.size();
+  const uint64_t t = model.triangles.size();
+  const uint64_t g = model.given_vertices.size();
+  const uint64_t h = model.given_triangles.size();
+  return {{{"eigenvalues", v1::ELEMENT_TYPE_FLOAT64, {m}, Bytes(model.eigenvalues)},
+           {"residuals", v1::ELEMENT_TYPE_FLOAT64, {m}, Bytes(residuals)},
+           {"couplings", v1::ELEMENT_TYPE_FLOAT64, {m}, Bytes(model.couplings)},
+           {"vertices", v1::ELEMENT_TYPE_FLOAT32, {v, 3}, Bytes(model.vertices)},
+           {"triangles", v1::ELEMENT_TYPE_UINT32, {t, 3}, Bytes(model.triangles)},
+           {"given_triangle", v1::ELEMENT_TYPE_UINT32, {t}, Bytes(model.given_triangle)},
+           {"given_vertices", v1::ELEMENT_TYPE_FLOAT32, {g, 3}, Bytes(model.given_vertices)},
+           {"given_triangles", v1::ELEMENT_TYPE_UINT32, {h, 3}, Bytes(model.given_triangles)},
+           {"shapes", v1::ELEMENT_TYPE_FLOAT32, {v, 3, m}, Bytes(model.shapes)}}};
+}
+
+template <typename T>
+char* Resize(std::vector<T>& values, uint64_t count) {
+  values.resize(count);
+  return reinterpret_cast<char*>(values.data());
+}
+
+// Where the bytes of an array go; the first dimension of all but "shapes" is its count of elements.
+char* Destination(ModalModel& model, const v1::ArrayDescriptor& array) {
+  const uint64_t count = array.shape(0);
+  if (array.name() == "eigenvalues") return Resize(model.eigenvalues, count);
+  if (array.name() == "couplings") return Resize(model.couplings, count);
+  if (array.name() == "vertices") return Resize(model.vertices, count);
+  if (array.name() == "triangles") return Resize(model.triangles, count);
+  if (array.name() == "given_triangle") return Resize(model.given_triangle, count);
+  if (array.name() == "given_vertices") return Resize(model.given_vertices, count);
+  if (array.name() == "given_triangles") return Resize(model.given_triangles, count);
+  if (array.name() == "shapes") return Resize(model.shapes, count * 3 * array.shape(2));
+  return nullptr;
+}
+
+v1::ModalModelRecord HeaderRecord(const std::array<Field, 9>& fields, v1::ModalModelHeader header) {
+  header.clear_arrays();
+  for (const Field& field : fields) {
+    v1::ArrayDescriptor& array = *header.add_arrays();
+    array.set_name(field.name);
+    array.set_type(field.type);
+    array.mutable_shape()->Assign(field.shape.begin(), field.shape.end());
+  }
+  v1::ModalModelRecord record;
+  *record.mutable_header() = std::move(header);
+  return record;
+}
+
+}  // namespace
+
+struct ModelFileReader::State {
+  explicit State(int descriptor) : stream(descriptor) {}
+  google::protobuf::io::FileInputStream stream;
+};
+
+ModelFileReader::ModelFileReader(int descriptor) : state_(std::make_unique<State>(descriptor)) {}
+ModelFileReader::ModelFileReader(ModelFileReader&&) noexcept = default;
+ModelFileReader& ModelFileReader::operator=(ModelFileReader&&) noexcept = default;
+ModelFileReader::~ModelFileReader() = default;
+
+absl::StatusOr<ModelFileReader> ModelFileReader::Open(const std::filesystem::path& file) {
+  const int descriptor = open(file.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor < 0) {
+    const std::string why = std::generic_category().message(errno);
+    return Refusal(
+        absl::StatusCode::kNotFound, "FILE_NOT_FOUND",
+        absl::StrCat(file.string(), " cannot be read (", why, "): see its name and rights"));
+  }
+  ModelFileReader reader(descriptor);
+  reader.state_->stream.SetCloseOnDelete(true);
+  return reader;
+}
+
+absl::StatusOr<std::optional<v1::ModalModelRecord>> ModelFileReader::Next() {
+  google::protobuf::io::CodedInputStream in(&state_->stream);
+  uint32_t byte_count = 0;
+  if (!in.ReadVarint32(&byte_count)) {
+    if (in.CurrentPosition() == 0 && state_->stream.GetErrno() == 0) return std::nullopt;
+    return Truncated();
+  }
+  if (byte_count > kMaxRecordBytes) return Truncated();
+  const auto limit = in.PushLimit(static_cast<int>(byte_count));
+  v1::ModalModelRecord record;
+  if (!record.MergeFromCodedStream(&in) || !in.ConsumedEntireMessage() ||
+      in.BytesUntilLimit() != 0) {
+    return Truncated();
+  }
+  in.PopLimit(limit);
+  return record;
+}
+
+std::string Delimited(const v1::ModalModelRecord& record) {
+  std::string bytes;
+  google::protobuf::io::StringOutputStream stream(&bytes);
+  google::protobuf::io::CodedOutputStream out(&stream);
+  out.WriteVarint32(static_cast<uint32_t>(record.ByteSizeLong()));
+  record.SerializeWithCachedSizes(&out);
+  out.Trim();
+  return bytes;
+}
+
+absl::Status ModelDecoder::Append(const v1::ModalModelRecord& record) {
+  const absl::Status status = checker_.Check(record);
+  if (!status.ok()) return status;
+  if (record.has_header()) {
+    MakeRoom(record.header());
+  } else if (char* destination = destinations_[record.chunk().array()]; destination != nullptr) {
+    const std::string& data = record.chunk().data();
+    std::memcpy(destination + record.chunk().offset(), data.data(), data.size());
+  }
+  return absl::OkStatus();
+}
+
+void ModelDecoder::MakeRoom(const v1::ModalModelHeader& header) {
+  model_.poisson_ratio = header.settings().poisson_ratio();
+  model_.complete_to_eigenvalue = header.complete_to_eigenvalue();
+  for (const v1::ArrayDescriptor& array : header.arrays()) {
+    destinations_.push_back(Destination(model_, array));
+  }
+}
+
+absl::StatusOr<ModalModel> ModelDecoder::Finish(const std::string& digest) {
+  const absl::Status status = checker_.Finish();
+  if (!status.ok()) return status;
+  model_.digest = digest;
+  return std::move(model_);
+}
+
+absl::Status EncodeModel(const ModalModel& model, v1::ModalModelHeader header,
+                         const std::vector<double>& residuals,
+                         absl::FunctionRef<absl::Status(const v1::ModalModelRecord&)> sink) {
+  header.set_mode_count(static_cast<uint32_t>(model.mode_count()));
+  const std::array<Field, 9> fields = Fields(model, residuals);
+  absl::Status status = sink(HeaderRecord(fields, std::move(header)));
+  for (size_t i = 0; status.ok() && i < fields.size(); ++i) {
+    const std::string_view bytes = fields[i].bytes;
+    for (size_t offset = 0; status.ok() && offset < bytes.size(); offset += kMaxChunkBytes) {
+      const std::string_view data = bytes.substr(offset, kMaxChunkBytes);
+      v1::ModalModelRecord record;
+      v1::ModalModelChunk& chunk = *record.mutable_chunk();
+      chunk.set_array(static_cast<uint32_t>(i));
+      chunk.set_offset(offset);
+      chunk.set_data(data.data(), data.size());
+      chunk.set_xxh3(Xxh3(data));
+      status = sink(record);
+    }
+  }
+  return status;
+}
+
+absl::StatusOr<ModalModel> ReadModelFile(const std::filesystem::path& file,
+                                         const std::string& digest) {
+  absl::StatusOr<ModelFileReader> reader = ModelFileReader::Open(file);
+  if (!reader.ok()) return reader.status();
+  ModelDecoder decoder;
+  while (true) {
+    const auto record = reader->Next();
+    if (!record.ok()) return record.status();
+    if (!record->has_value()) return decoder.Finish(digest);
+    const absl::Status status = decoder.Append(**record);
+    if (!status.ok()) return status;
+  }
+}
+
+}  // namespace carillon

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "carillon/v1/modal_model.pb.h"
+#include "server/mode_database/modal_model.h"
+#include "server/mode_database/model_checker.h"
+
+namespace carillon {
+
+/// The stored form of a modal model (proto/carillon/v1/modal_model.proto) in and out of memory.
+
+/// Records of a file in protobuf's delimited form, one by one. One thread at a time.
+class ModelFileReader {
+ public:
+  /// Errors: NotFound (FILE_NOT_FOUND).
+  static absl::StatusOr<ModelFileReader> Open(const std::filesystem::path& file);
+
+  /// Reads on from where `descriptor` stands, which stays the caller's.
+  explicit ModelFileReader(int descriptor);
+  ModelFileReader(ModelFileReader&&) noexcept;
+  ModelFileReader& operator=(ModelFileReader&&) noexcept;
+  ~ModelFileReader();
+
+  /// The next record; nullopt at the end. Errors: InvalidArgument (MODAL_MODEL_MALFORMED).
+  absl::StatusOr<std::optional<v1::ModalModelRecord>> Next();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+/// One record as it stands in a file: its length as a varint, then its bytes.
+std::string Delimited(const v1::ModalModelRecord& record);
+
+/// Makes the model in memory from its records, checking each.
+class ModelDecoder {
+ public:
+  /// Errors: as ModelChecker::Check.
+  absl::Status Append(const v1::ModalModelRecord& record);
+
+  /// Call once, last. Errors: as ModelChecker::Finish.
+  absl::StatusOr<ModalModel> Finish(const std::string& digest);
+
+  const v1::ModalModelHeader& header() const { return checker_.header(); }
+
+ private:
+  void MakeRoom(const v1::ModalModelHeader& header);
+
+  ModelChecker checker_;
+  ModalModel model_;
+  std::vector<char*> destinations_;  // of each array's first byte; null: not held in memory
+};
+
+/// Hands the records of `model` to `sink` in order and stops at its first error, which is returned.
+/// `header` gives what the model itself does not hold; its arrays and mode count are filled in.
+/// `residuals` (#m) stand beside the eigenvalues.
+absl::Status EncodeModel(const ModalModel& model, v1::ModalModelHeader header,
+                         const std::vector<double>& residuals,
+                         absl::FunctionRef<absl::Status(const v1::ModalModelRecord&)> sink);
+
+/// The model of a file. Errors: NotFound (FILE_NOT_FOUND), InvalidArgument (MODAL_MODEL_MALFORMED),
+/// DataLoss (MODAL_MODEL_CORRUPT).
+absl::StatusOr<ModalModel> ReadModelFile(const std::filesystem::path& file,
+                                         const std::string& digest);
+
+}  // namespace carillon

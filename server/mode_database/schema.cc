@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/mode_database/schema.h"
+
+#include <array>
+
+#include "absl/strings/str_cat.h"
+#include "proto/error_reason.h"
+
+namespace carillon {
+namespace {
+
+// Element v - 1 leads from version v - 1 to v. What has shipped is never edited, only followed.
+//
+// Every hash is an XXH3 whose 64 bits are read as a signed integer. Blobs come last in their rows,
+// so that the columns before them are read without them. A model that is replaced gets a new
+// revision.
+constexpr std::array kMigrations = {R"sql(
+  CREATE TABLE meshes (
+    digest TEXT PRIMARY KEY,
+    byte_count INTEGER NOT NULL
+  ) STRICT;
+  CREATE TABLE mesh_chunks (
+    digest TEXT NOT NULL REFERENCES meshes ON DELETE CASCADE,
+    byte_offset INTEGER NOT NULL,
+    data BLOB NOT NULL,
+    PRIMARY KEY (digest, byte_offset)
+  ) STRICT;
+  CREATE TABLE models (
+    revision INTEGER PRIMARY KEY AUTOINCREMENT,
+    digest TEXT NOT NULL UNIQUE,
+    label TEXT NOT NULL,
+    stored_bytes INTEGER NOT NULL,
+    created_unix_ms INTEGER NOT NULL,
+    header_xxh3 INTEGER NOT NULL,
+    header BLOB NOT NULL
+  ) STRICT;
+  CREATE TABLE model_chunks (
+    revision INTEGER NOT NULL REFERENCES models ON DELETE CASCADE,
+    number INTEGER NOT NULL,
+    array INTEGER NOT NULL,
+    byte_offset INTEGER NOT NULL,
+    xxh3 INTEGER NOT NULL,
+    data BLOB NOT NULL,
+    PRIMARY KEY (revision, number)
+  ) STRICT;
+  CREATE TABLE jobs (
+    number INTEGER PRIMARY KEY AUTOINCREMENT,
+    digest TEXT NOT NULL UNIQUE,
+    label TEXT NOT NULL,
+    state INTEGER NOT NULL,
+    remembered INTEGER NOT NULL,
+    created_unix_ms INTEGER NOT NULL,
+    error BLOB NOT NULL,
+    request BLOB NOT NULL
+  ) STRICT;
+  CREATE INDEX jobs_by_state ON jobs (state);
+)sql"};
+
+absl::StatusOr<int64_t> Version(SqliteConnection& connection) {
+  int64_t version = 0;
+  const absl::Status status = connection.Query("PRAGMA user_version", {}, [&](const SqlRow& row) {
+    version = row.Int(0);
+    return absl::OkStatus();
+  });
+  if (!status.ok()) return status;
+  return version;
+}
+
+}  // namespace
+
+absl::Status Migrate(SqliteConnection& connection) {
+  const absl::StatusOr<int64_t> version = Version(connection);
+  if (!version.ok()) return version.status();
+  constexpr auto kNewest = static_cast<int64_t>(kMigrations.size());
+  if (*version > kNewest) {
+    return Refusal(absl::StatusCode::kFailedPrecondition, "SCHEMA_TOO_NEW",
+                   absl::StrCat("the database has schema version ", *version,
+                                ", this program knows versions up to ", kNewest,
+                                ": install the newer Carillon, or name another folder"));
+  }
+  for (int64_t v = *version; v < kNewest; ++v) {
+    absl::Status status = connection.RunScript(kMigrations[static_cast<size_t>(v)]);
+    if (status.ok()) {
+      status = connection.RunScript(absl::StrCat("PRAGMA user_version = ", v + 1).c_str());
+    }
+    if (!status.ok()) return status;
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace carillon

@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/mode_database/sqlite_connection.h"
+
+#include <SQLiteCpp/SQLiteCpp.h>
+#include <sqlite3.h>
+
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "proto/error_reason.h"
+
+namespace carillon {
+namespace {
+
+constexpr int kBusyTimeoutMs = 10'000;
+
+absl::Status ToStatus(const SQLite::Exception& error) {
+  const absl::string_view what = error.what();
+  switch (error.getErrorCode() & 0xff) {
+    case SQLITE_BUSY:
+    case SQLITE_LOCKED:
+      return Refusal(absl::StatusCode::kUnavailable, "DATABASE_BUSY",
+                     absl::StrCat("another process holds the database (", what,
+                                  "): end it, or give this daemon a folder of its own"));
+    case SQLITE_FULL:
+      return Refusal(absl::StatusCode::kResourceExhausted, "DATABASE_FULL",
+                     absl::StrCat("no space is left for the database (", what,
+                                  "): free some, or delete models"));
+    case SQLITE_CORRUPT:
+    case SQLITE_NOTADB:
+      return Refusal(absl::StatusCode::kDataLoss, "DATABASE_CORRUPT",
+                     absl::StrCat("the database file is damaged (", what,
+                                  "): restore it from a copy, or move it away to start anew"));
+    default:
+      return Refusal(absl::StatusCode::kInternal, "DATABASE_ERROR", absl::StrCat("SQLite: ", what));
+  }
+}
+
+// Where the library's exceptions stop.
+template <typename Body>
+absl::Status Guarded(Body body) {
+  try {
+    return body();
+  } catch (const SQLite::Exception& error) {
+    return ToStatus(error);
+  }
+}
+
+void Bind(SQLite::Statement& statement, std::initializer_list<SqlParameter> parameters) {
+  int index = 0;
+  for (const SqlParameter& parameter : parameters) {
+    ++index;
+    if (const auto* number = std::get_if<int64_t>(&parameter)) {
+      statement.bind(index, *number);
+    } else if (const auto* text = std::get_if<std::string_view>(&parameter)) {
+      statement.bind(index, std::string(*text));
+    } else {
+      // An empty view may have no address, which SQLite would take for NULL.
+      const std::string_view bytes = std::get<SqlBlob>(parameter).bytes;
+      statement.bindNoCopy(index, bytes.empty() ? "" : bytes.data(),
+                           static_cast<int>(bytes.size()));
+    }
+  }
+}
+
+class Row final : public SqlRow {
+ public:
+  explicit Row(SQLite::Statement& statement) : statement_(statement) {}
+  int64_t Int(int column) const override { return statement_.getColumn(column).getInt64(); }
+  std::string Text(int column) const override { return statement_.getColumn(column).getString(); }
+  std::string_view Blob(int column) const override {
+    const SQLite::Column blob = statement_.getColumn(column);
+    return {static_cast<const char*>(blob.getBlob()), static_cast<size_t>(blob.getBytes())};
+  }
+
+ private:
+  SQLite::Statement& statement_;
+};
+
+}  // namespace
+
+struct SqliteConnection::State {
+  explicit State(const std::string& file)
+      : database(file, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, kBusyTimeoutMs) {}
+  SQLite::Database database;
+};
+
+SqliteConnection::SqliteConnection(std::unique_ptr<State> state) : state_(std::move(state)) {}
+SqliteConnection::~SqliteConnection() = default;
+
+absl::StatusOr<std::unique_ptr<SqliteConnection>> SqliteConnection::Open(
+    const std::filesystem::path& file) {
+  std::unique_ptr<State> state;
+  const absl::Status status = Guarded([&] {
+    state = std::make_unique<State>(file.string());
+    return absl::OkStatus();
+  });
+  if (!status.ok()) return status;
+  return std::unique_ptr<SqliteConnection>(new SqliteConnection(std::move(state)));
+}
+
+absl::Status SqliteConnection::Run(const char* sql,
+                                   std::initializer_list<SqlParameter> parameters) {
+  return Guarded([&] {
+    SQLite::Statement statement(state_->database, sql);
+    Bind(statement, parameters);
+    statement.exec();
+    return absl::OkStatus();
+  });
+}
+
+absl::Status SqliteConnection::RunScript(const char* sql) {
+  return Guarded([&] {
+    state_->database.exec(sql);
+    return absl::OkStatus();
+  });
+}
+
+absl::Status SqliteConnection::Query(const char* sql,
+                                     std::initializer_list<SqlParameter> parameters,
+                                     absl::FunctionRef<absl::Status(const SqlRow&)> on_row) {
+  return Guarded([&] {
+    SQLite::Statement statement(state_->database, sql);
+    Bind(statement, parameters);
+    while (statement.executeStep()) {
+      const absl::Status status = on_row(Row(statement));
+      if (!status.ok()) return status;
+    }
+    return absl::OkStatus();
+  });
+}
+
+int64_t SqliteConnection::changed_row_count() const { return state_->database.getChanges(); }
+
+int64_t SqliteConnection::last_row_id() const { return state_->database.getLastInsertRowid(); }
+
+}  // namespace carillon

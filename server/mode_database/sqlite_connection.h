@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <initializer_list>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <variant>
+
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+namespace carillon {
+
+/// Bytes, where a plain string would be stored as text.
+struct SqlBlob {
+  std::string_view bytes;
+};
+
+using SqlParameter = std::variant<int64_t, std::string_view, SqlBlob>;
+
+/// The row that a query stands at. Columns count from 0.
+class SqlRow {
+ public:
+  virtual ~SqlRow() = default;
+  virtual int64_t Int(int column) const = 0;
+  virtual std::string Text(int column) const = 0;
+  /// Valid until the next row.
+  virtual std::string_view Blob(int column) const = 0;
+};
+
+/// One connection to a SQLite file; one thread at a time. Every call can fail with Unavailable
+/// (DATABASE_BUSY), ResourceExhausted (DATABASE_FULL: no space left), DataLoss (DATABASE_CORRUPT)
+/// or Internal (DATABASE_ERROR).
+class SqliteConnection {
+ public:
+  /// Opens the file, made if it is not there; waits up to 10 s where it is locked.
+  static absl::StatusOr<std::unique_ptr<SqliteConnection>> Open(const std::filesystem::path& file);
+  ~SqliteConnection();
+
+  /// Runs one statement that gives no rows.
+  absl::Status Run(const char* sql, std::initializer_list<SqlParameter> parameters = {});
+
+  /// Runs statements without parameters, separated by semicolons.
+  absl::Status RunScript(const char* sql);
+
+  /// Runs one query, calls `on_row` for each row and stops at its first error, which is returned.
+  absl::Status Query(const char* sql, std::initializer_list<SqlParameter> parameters,
+                     absl::FunctionRef<absl::Status(const SqlRow&)> on_row);
+
+  /// Rows that the last statement changed.
+  int64_t changed_row_count() const;
+
+  /// Key of the row inserted last.
+  int64_t last_row_id() const;
+
+ private:
+  struct State;
+  explicit SqliteConnection(std::unique_ptr<State> state);
+
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace carillon

@@ -1,0 +1,311 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/mode_database/mode_database.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <thread>
+
+#include "server/base/sha256.h"
+#include "tests/server/mode_database/sample_model.h"
+
+namespace carillon {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+class ModeDatabaseTest : public ::testing::Test {
+ protected:
+  ModeDatabaseTest() { Reopen(); }
+
+  void Reopen() {
+    database_.reset();
+    auto opened = ModeDatabase::Open(file_, clock_);
+    ASSERT_TRUE(opened.ok()) << opened.status();
+    database_ = *std::move(opened);
+  }
+
+  absl::Status Put(const std::string& digest, const ModalModel& model,
+                   const std::string& label = "") {
+    WriteRecords(folder_ / "model", SampleRecords(model));
+    return database_->models().PutFile(digest, label, folder_ / "model").status();
+  }
+
+  static std::string Export(ModeDatabase& database, const std::string& digest) {
+    auto records = database.models().Export(digest);
+    EXPECT_TRUE(records.ok()) << records.status();
+    std::string bytes;
+    while (true) {
+      const auto record = records->Next();
+      EXPECT_TRUE(record.ok()) << record.status();
+      if (!record.ok() || !record->has_value()) return bytes;
+      bytes += Delimited(**record);
+    }
+  }
+
+  // Flips one bit of the database file, in the first place that holds `bytes`.
+  void FlipABitWithin(std::string_view bytes) {
+    database_.reset();  // all of the log goes into the file
+    std::string content = ReadBytes(file_);
+    const size_t at = content.find(bytes);
+    ASSERT_NE(at, std::string::npos);
+    content[at] ^= 1;
+    WriteBytes(file_, content);
+    Reopen();
+  }
+
+  TemporaryFolder folder_;
+  std::filesystem::path file_ = folder_ / "carillon.db";
+  SystemClock clock_;
+  std::unique_ptr<ModeDatabase> database_;
+  const std::string a_ = Sha256Hex("a");
+  const std::string b_ = Sha256Hex("b");
+};
+
+TEST_F(ModeDatabaseTest, AStoredModelIsFoundAfterReopening) {
+  const ModalModel model = SampleModel(100, 1000);
+  ASSERT_TRUE(Put(a_, model, "bell").ok());
+  Reopen();
+  const auto found = database_->models().Find(a_);
+  ASSERT_TRUE(found.ok()) << found.status();
+  EXPECT_EQ((*found)->eigenvalues, model.eigenvalues);
+  EXPECT_EQ((*found)->shapes, model.shapes);
+  const auto summary = database_->models().Summary(a_);
+  ASSERT_TRUE(summary.ok()) << summary.status();
+  EXPECT_EQ(summary->label, "bell");
+  EXPECT_EQ(summary->header.solver(), "sample 1.0");
+  EXPECT_EQ(summary->header.mode_count(), 100U);
+  EXPECT_GT(summary->stored_bytes, model.shapes.size() * sizeof(float));
+}
+
+TEST_F(ModeDatabaseTest, WhatWasAcknowledgedIsInACopyTakenWithoutClosing) {
+  ASSERT_TRUE(Put(a_, SampleModel(100, 1000)).ok());
+  const auto mesh = database_->meshes().Put("solid");
+  ASSERT_TRUE(mesh.ok());
+  ASSERT_TRUE(database_->jobs().Put({.digest = b_, .request = "intent"}).ok());
+  // What a killed process leaves: the file and its log, nothing flushed or tidied.
+  const std::filesystem::path copy = folder_ / "copy.db";
+  std::filesystem::copy_file(file_, copy);
+  std::filesystem::copy_file(file_.string() + "-wal", copy.string() + "-wal");
+  const auto survivor = ModeDatabase::Open(copy, clock_);
+  ASSERT_TRUE(survivor.ok()) << survivor.status();
+  EXPECT_TRUE((*survivor)->models().Find(a_).ok());
+  EXPECT_TRUE((*survivor)->meshes().Find(mesh->digest).ok());
+  const auto job = (*survivor)->jobs().Find(b_);
+  ASSERT_TRUE(job.ok() && job->has_value());
+  EXPECT_EQ((*job)->request, "intent");
+}
+
+TEST_F(ModeDatabaseTest, ExportAndImportGiveIdenticalBytes) {
+  ASSERT_TRUE(Put(a_, SampleModel(100, 1000)).ok());
+  const std::string bytes = Export(*database_, a_);
+  EXPECT_EQ(bytes, ReadBytes(folder_ / "model"));
+
+  const auto other = ModeDatabase::Open(folder_ / "other.db", clock_);
+  ASSERT_TRUE(other.ok()) << other.status();
+  auto import = (*other)->models().Import(a_, "copy");
+  ASSERT_TRUE(import.ok()) << import.status();
+  for (const auto& record : SampleRecords(SampleModel(100, 1000))) {
+    ASSERT_TRUE(import->Append(record).ok());
+  }
+  const auto summary = import->Finish();
+  ASSERT_TRUE(summary.ok()) << summary.status();
+  EXPECT_EQ(summary->label, "copy");
+  EXPECT_EQ(Export(**other, a_), bytes);
+}
+
+TEST_F(ModeDatabaseTest, AnImportThatEndsEarlyLeavesNothing) {
+  auto import = database_->models().Import(a_, "");
+  ASSERT_TRUE(import.ok());
+  const auto records = SampleRecords(SampleModel(2, 4));
+  for (size_t i = 0; i + 1 < records.size(); ++i) ASSERT_TRUE(import->Append(records[i]).ok());
+  EXPECT_THAT(import->Finish().status().ToString(), HasSubstr("MODAL_MODEL_MALFORMED"));
+  EXPECT_THAT(database_->models().Find(a_).status().ToString(), HasSubstr("MODAL_MODEL_NOT_FOUND"));
+}
+
+TEST_F(ModeDatabaseTest, ARefusedFileLeavesTheOldRevision) {
+  ASSERT_TRUE(Put(a_, SampleModel(2, 4)).ok());
+  auto records = SampleRecords(SampleModel(3, 4));
+  (*records.back().mutable_chunk()->mutable_data())[0] ^= 1;
+  WriteRecords(folder_ / "bad", records);
+  EXPECT_THAT(database_->models().PutFile(a_, "", folder_ / "bad").status().ToString(),
+              HasSubstr("MODAL_MODEL_CORRUPT"));
+  const auto found = database_->models().Find(a_);
+  ASSERT_TRUE(found.ok()) << found.status();
+  EXPECT_EQ((*found)->mode_count(), 2U);
+}
+
+TEST_F(ModeDatabaseTest, AFlippedBitInAnArrayIsFoundWhenTheModelIsRead) {
+  ModalModel model = SampleModel(3, 4);
+  model.couplings = {1.234567890123, 2.345678901234, 3.456789012345};
+  ASSERT_TRUE(Put(a_, model).ok());
+  FlipABitWithin({reinterpret_cast<const char*>(model.couplings.data()), 24});
+  const auto found = database_->models().Find(a_);
+  EXPECT_EQ(found.status().code(), absl::StatusCode::kDataLoss);
+  EXPECT_THAT(found.status().ToString(), HasSubstr("MODAL_MODEL_CORRUPT"));
+  auto records = database_->models().Export(a_);
+  ASSERT_TRUE(records.ok()) << records.status();
+  absl::Status status;
+  for (int i = 0; status.ok() && i < 10; ++i) status = records->Next().status();
+  EXPECT_EQ(status.code(), absl::StatusCode::kDataLoss);
+}
+
+TEST_F(ModeDatabaseTest, AFlippedBitInAHeaderIsFoundWhenTheModelIsRead) {
+  ASSERT_TRUE(Put(a_, SampleModel(3, 4)).ok());
+  FlipABitWithin("sample 1.0");
+  EXPECT_EQ(database_->models().Find(a_).status().code(), absl::StatusCode::kDataLoss);
+  EXPECT_EQ(database_->models().Summary(a_).status().code(), absl::StatusCode::kDataLoss);
+}
+
+TEST_F(ModeDatabaseTest, AFlippedBitInAMeshIsFoundWhenItIsWrittenOut) {
+  const auto mesh = database_->meshes().Put("solid of revolution");
+  ASSERT_TRUE(mesh.ok());
+  FlipABitWithin("solid of revolution");
+  EXPECT_THAT(database_->meshes().WriteFile(mesh->digest, folder_ / "mesh").ToString(),
+              HasSubstr("MESH_CORRUPT"));
+}
+
+TEST_F(ModeDatabaseTest, ANewerSchemaIsRefused) {
+  database_.reset();
+  std::string content = ReadBytes(file_);
+  content[63] = 99;  // the last byte of user_version in SQLite's file header
+  WriteBytes(file_, content);
+  const auto opened = ModeDatabase::Open(file_, clock_);
+  EXPECT_EQ(opened.status().code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_THAT(opened.status().ToString(), HasSubstr("SCHEMA_TOO_NEW: the database has schema "
+                                                    "version 99"));
+}
+
+TEST_F(ModeDatabaseTest, AFileThatIsNoDatabaseIsRefused) {
+  WriteBytes(folder_ / "text", std::string(5000, 'x'));
+  EXPECT_THAT(ModeDatabase::Open(folder_ / "text", clock_).status().ToString(),
+              HasSubstr("DATABASE_CORRUPT"));
+  EXPECT_THAT(ModeDatabase::Open(folder_.path(), clock_).status().ToString(),
+              HasSubstr("DATABASE_UNUSABLE"));
+}
+
+TEST_F(ModeDatabaseTest, AModelIsInMemoryOnceHoweverManyAskAtATime) {
+  ASSERT_TRUE(Put(a_, SampleModel(10, 100)).ok());
+  std::vector<std::shared_ptr<const ModalModel>> found(8);
+  std::vector<std::thread> threads;
+  for (auto& model : found) {
+    threads.emplace_back([&] { model = database_->models().Find(a_).value(); });
+  }
+  for (std::thread& thread : threads) thread.join();
+  for (const auto& model : found) EXPECT_EQ(model, found.front());
+}
+
+TEST_F(ModeDatabaseTest, AReplacedModelIsReadAnewAndKeepsItsLabel) {
+  ASSERT_TRUE(Put(a_, SampleModel(2, 4), "first").ok());
+  const auto old = database_->models().Find(a_);
+  ASSERT_TRUE(Put(a_, SampleModel(3, 4), "second").ok());
+  EXPECT_EQ(database_->models().Find(a_).value()->mode_count(), 3U);
+  EXPECT_EQ((*old)->mode_count(), 2U);
+  EXPECT_EQ(database_->models().Summary(a_)->label, "first");
+}
+
+TEST_F(ModeDatabaseTest, AnExportOfAReplacedModelSaysSo) {
+  ASSERT_TRUE(Put(a_, SampleModel(2, 4)).ok());
+  auto records = database_->models().Export(a_);
+  ASSERT_TRUE(records.ok());
+  ASSERT_TRUE(records->Next().ok());
+  ASSERT_TRUE(Put(a_, SampleModel(3, 4)).ok());
+  EXPECT_THAT(records->Next().status().ToString(), HasSubstr("MODAL_MODEL_REPLACED"));
+}
+
+TEST_F(ModeDatabaseTest, DeletingAModelDeletesItsJob) {
+  ASSERT_TRUE(Put(a_, SampleModel(2, 4)).ok());
+  ASSERT_TRUE(database_->jobs().Put({.digest = a_}).ok());
+  ASSERT_TRUE(database_->models().Delete(a_).ok());
+  EXPECT_THAT(database_->models().Find(a_).status().ToString(), HasSubstr("MODAL_MODEL_NOT_FOUND"));
+  EXPECT_FALSE(database_->jobs().Find(a_)->has_value());
+  EXPECT_THAT(database_->models().Delete(a_).ToString(), HasSubstr("MODAL_MODEL_NOT_FOUND"));
+}
+
+TEST_F(ModeDatabaseTest, PagesListEveryModelOnceNewestFirst) {
+  std::vector<std::string> newest_first;
+  for (int i = 0; i < 5; ++i) {
+    newest_first.insert(newest_first.begin(), Sha256Hex(std::to_string(i)));
+    ASSERT_TRUE(Put(newest_first.front(), SampleModel(1, 4)).ok());
+  }
+  std::vector<std::string> listed;
+  std::string token;
+  do {
+    const auto page = database_->models().List(2, token);
+    ASSERT_TRUE(page.ok()) << page.status();
+    EXPECT_LE(page->models.size(), 2U);
+    for (const ModelSummary& model : page->models) listed.push_back(model.digest);
+    token = page->next_page_token;
+  } while (!token.empty());
+  EXPECT_EQ(listed, newest_first);
+  EXPECT_THAT(database_->models().List(2, "x").status().ToString(), HasSubstr("INVALID_PAGE"));
+}
+
+TEST_F(ModeDatabaseTest, OnlyADigestNamesAModel) {
+  WriteRecords(folder_ / "model", SampleRecords(SampleModel(1, 4)));
+  EXPECT_THAT(database_->models().PutFile("../x", "", folder_ / "model").status().ToString(),
+              HasSubstr("INVALID_NAME"));
+  EXPECT_THAT(database_->models().Import("x", "").status().ToString(), HasSubstr("INVALID_NAME"));
+}
+
+TEST_F(ModeDatabaseTest, AMeshSentInPiecesComesBackWhole) {
+  std::string bytes;
+  for (int i = 0; i < 600'000; ++i) bytes += "v 1 ";
+  auto upload = database_->meshes().Begin();
+  ASSERT_TRUE(upload.ok()) << upload.status();
+  for (size_t at = 0; at < bytes.size(); at += 100'001) {
+    ASSERT_TRUE(upload->Append(std::string_view(bytes).substr(at, 100'001)).ok());
+  }
+  const auto mesh = upload->Finish();
+  ASSERT_TRUE(mesh.ok()) << mesh.status();
+  EXPECT_EQ(mesh->digest, Sha256Hex(bytes));
+  EXPECT_EQ(mesh->byte_count, bytes.size());
+  ASSERT_TRUE(database_->meshes().WriteFile(mesh->digest, folder_ / "mesh").ok());
+  EXPECT_EQ(ReadBytes(folder_ / "mesh"), bytes);
+  EXPECT_EQ(std::filesystem::status(folder_ / "mesh").permissions(),
+            std::filesystem::perms::owner_read | std::filesystem::perms::owner_write);
+  EXPECT_TRUE(database_->meshes().Put(bytes).ok()) << "twice is no error";
+}
+
+TEST_F(ModeDatabaseTest, AnEmptyOrUnknownOrTooLargeMeshIsRefused) {
+  EXPECT_THAT(database_->meshes().Put("").status().ToString(), HasSubstr("MESH_EMPTY"));
+  EXPECT_THAT(database_->meshes().Find(a_).status().ToString(), HasSubstr("MESH_NOT_FOUND"));
+  auto upload = database_->meshes().Begin();
+  ASSERT_TRUE(upload.ok());
+  // The view is longer than what it views, and is refused before it is read.
+  const std::string_view too_long("x", MeshStore::kMaxByteCount + 1);
+  EXPECT_THAT(upload->Append(too_long).ToString(), HasSubstr("MESH_TOO_LARGE"));
+}
+
+TEST_F(ModeDatabaseTest, UnfinishedJobsComeBackInTheOrderTheyWereAskedFor) {
+  v1::ErrorInfo error;
+  error.set_reason("MESH_NOT_CLOSED");
+  const std::string c = Sha256Hex("c");
+  auto& jobs = database_->jobs();
+  ASSERT_TRUE(jobs.Put({.digest = b_, .state = v1::JOB_STATE_QUEUED}).ok());
+  ASSERT_TRUE(jobs.Put({.digest = a_, .state = v1::JOB_STATE_QUEUED}).ok());
+  ASSERT_TRUE(jobs.Put({.digest = b_, .state = v1::JOB_STATE_RUNNING}).ok());
+  ASSERT_TRUE(
+      jobs.Put({.digest = c, .state = v1::JOB_STATE_FAILED, .error = error, .remembered = true})
+          .ok());
+  Reopen();
+  std::vector<std::string> digests;
+  const auto unfinished = database_->jobs().Unfinished();
+  ASSERT_TRUE(unfinished.ok()) << unfinished.status();
+  for (const JobRecord& job : *unfinished) digests.push_back(job.digest);
+  EXPECT_THAT(digests, ElementsAre(b_, a_));
+  const auto failed = database_->jobs().Find(c);
+  ASSERT_TRUE(failed.ok() && failed->has_value());
+  EXPECT_TRUE((*failed)->remembered);
+  EXPECT_EQ((*failed)->error.reason(), "MESH_NOT_CLOSED");
+  const auto page = database_->jobs().List(2, "");
+  ASSERT_TRUE(page.ok());
+  ASSERT_EQ(page->jobs.size(), 2U);
+  EXPECT_EQ(page->jobs[0].digest, c);
+  EXPECT_EQ(database_->jobs().List(2, page->next_page_token)->jobs[0].digest, b_);
+}
+
+}  // namespace
+}  // namespace carillon
