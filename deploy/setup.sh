@@ -46,6 +46,11 @@ install_buf() {
   cp "$root"/deploy/buf/package{,-lock}.json "$folder"
   # npm ci checks the digests in the lock file.
   (cd "$folder" && npm ci --ignore-scripts --no-audit --no-fund --loglevel=error </dev/null)
+  # Each platform's buf is optional to npm, so it does not mind when none could be had.
+  [[ -x $CARILLON_BUF ]] || {
+    printf 'setup: npm could not get buf; "npm ping" tells whether it reaches its registry\n' >&2
+    return 1
+  }
 }
 
 mapfile -t missing < <(missing_packages)
