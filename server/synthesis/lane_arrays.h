@@ -8,11 +8,18 @@
 
 namespace carillon {
 
+/// The widest vector of floats that any SIMD target uses; arrays over modes are padded to it.
+inline constexpr size_t kMostLanes = 16;
+
+/// Samples that the kernel renders from one float state: q, q^2, q^3 give the samples between, q^4
+/// the next state.
+inline constexpr size_t kTileFrames = 4;
+
 /// A zeroed array aligned for the widest vector.
 template <typename T>
 class LaneArray {
  public:
-  explicit LaneArray(size_t size = 0)
+  explicit LaneArray(size_t size)
       : values_(static_cast<T*>(::operator new(size * sizeof(T), kAlignment))) {
     std::uninitialized_fill_n(values_.get(), size, T{});
   }
@@ -28,24 +35,40 @@ class LaneArray {
   std::unique_ptr<T[], Delete> values_;
 };
 
-/// The figures of a bank's modes, one lane each. First the modes in the order of their columns,
+/// The figures of a bank's modes, one lane each: first the modes in the order of their columns,
 /// then the companions, then silent lanes up to a whole vector.
 struct LaneArrays {
-  explicit LaneArrays(size_t lane_count, size_t column_count);
+  /// `lane_count` is a multiple of kMostLanes; `column_count` columns are projected.
+  LaneArrays(size_t lane_count, size_t column_count);
 
-  // State: double between blocks, float within.
-  LaneArray<double> re, im;
-  LaneArray<float> newborn_re, newborn_im;  // of what was struck in this block
-  // q and q^N for a block of N frames.
-  LaneArray<float> step_re, step_im;
+  /// Where power k + 1 of lane's q is, real part; its imaginary part is kMostLanes further.
+  static size_t PowerIndex(size_t lane, size_t k) {
+    return (lane / kMostLanes * kTileFrames + k) * 2 * kMostLanes + lane % kMostLanes;
+  }
+
+  /// Zeroes the state at the start of the block of `lane_count` lanes from `first_lane` on.
+  void Silence(size_t first_lane, size_t lane_count) noexcept;
+
+  /// q, q^2, q^3, q^4: for each kMostLanes lanes together, see PowerIndex.
+  LaneArray<float> powers;
+  /// q^N for a block of N frames.
   LaneArray<double> block_re, block_im;
-  // From modal impulse to state: -i exp(i phase) c / omega_d with all scales.
+  /// The state at the start of the block, and the same in single precision.
+  LaneArray<double> re, im;
+  LaneArray<float> start_re, start_im;
+  /// The state of what was struck in this block.
+  LaneArray<float> newborn_re, newborn_im;
+
+  /// From modal impulse to state: -i exp(i phase) c / omega_d with all scales.
   LaneArray<float> gain_re, gain_im;
-  // Per frame of lead: sigma and omega_d over the sample rate. Per tau^2: real and imaginary part
-  // of s^2/2.
-  LaneArray<float> lead_re, lead_im, tau_re, tau_im;
-  LaneArray<uint32_t> column;  // within the range of columns projected
-  // Of the strike under way: modal impulses by column, additions to the state by lane.
+  /// Logarithm of q, for each frame of lead.
+  LaneArray<float> lead_re, lead_im;
+  /// s^2/2 of the Gaussian contact, for each second squared of tau^2.
+  LaneArray<float> tau_re, tau_im;
+  /// Where among the projected columns.
+  LaneArray<uint32_t> column;
+
+  /// Of the strike under way: modal impulses by column, additions to the state by lane.
   LaneArray<float> modal_impulse, added_re, added_im;
 };
 

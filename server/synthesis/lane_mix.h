@@ -3,16 +3,14 @@
 
 #include <array>
 #include <cstddef>
-#include <cstdlib>
-#include <memory>
 #include <span>
+
+#include "server/synthesis/lane_arrays.h"
 
 namespace carillon {
 
-/// The widest vector of floats that any SIMD target uses; arrays over modes are padded to it.
-inline constexpr size_t kMostLanes = 16;
-
-/// Blocks are no longer than this: float coefficients drift away from the double state within one.
+/// Blocks are no longer than this: single-precision coefficients drift from the double state within
+/// a block.
 inline constexpr size_t kMostBlockFrames = 256;
 
 /// One block of sound, still split into the lanes of a vector: all banks add to it, and the lanes
@@ -21,8 +19,10 @@ class LaneMix {
  public:
   /// Silences the first `frame_count` frames.
   void Clear(size_t frame_count) noexcept;
-  /// Sums the lanes into `block`.
+
+  /// Writes the sum of each frame's lanes into `block`.
   void Reduce(std::span<float> block) const noexcept;
+
   /// Frame n is lanes()[n * kMostLanes] and the kMostLanes - 1 floats after it.
   float* lanes() noexcept { return lanes_.data(); }
 

@@ -5,16 +5,19 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <span>
 #include <vector>
 
+#include "absl/base/thread_annotations.h"
 #include "absl/status/statusor.h"
+#include "absl/synchronization/mutex.h"
 #include "server/base/spsc_ring.h"
 #include "server/synthesis/lane_mix.h"
 #include "server/synthesis/limiter.h"
 #include "server/synthesis/oscillator_bank.h"
+#include "server/synthesis/pending_strikes.h"
 #include "server/synthesis/strike.h"
+#include "server/synthesis/strike_stream.h"
 
 namespace carillon {
 
@@ -22,53 +25,30 @@ namespace carillon {
 struct MixerSettings {
   double sample_rate_hz = 48000;
   size_t block_frame_count = 128;  ///< at most kMostBlockFrames
-  size_t most_banks = 8192;        ///< those that ring out included
+  size_t most_banks = 8192;        ///< those that ring out or fade included
   size_t most_streams = 1024;
   size_t most_pending_strikes = 65536;   ///< waiting for their time
   size_t most_strikes_per_block = 1024;  ///< further ones sound in the next block
 };
 
-/// What a mixer has counted since it was made.
+/// What a mixer has counted since it was made, and what it renders now.
 struct MixerStatistics {
   uint64_t frame_count = 0;          ///< rendered
   uint64_t accepted_count = 0;       ///< strikes that came in time
   uint64_t late_count = 0;           ///< strikes that came too late and sounded at once
-  uint64_t dropped_count = 0;        ///< strikes lost: queue full, no such bank, or not finite
-  uint64_t postponed_count = 0;      ///< strikes put off by a block because there were too many
+  uint64_t dropped_count = 0;        ///< strikes lost: no such bank, too many, or not finite
+  uint64_t postponed_count = 0;      ///< strikes put off because a block had too many
   uint64_t reset_bank_count = 0;     ///< banks silenced because their state was not finite
   uint64_t limited_frame_count = 0;  ///< frames in which the limiter worked
-  uint64_t bank_count = 0;
-  uint64_t active_mode_count = 0;
-};
-
-/// Carries the strikes of one contact stream to the mixer. One thread at a time. When it is
-/// destroyed, what was pushed still sounds.
-class StrikeStream {
- public:
-  ~StrikeStream();
-  StrikeStream(const StrikeStream&) = delete;
-  StrikeStream& operator=(const StrikeStream&) = delete;
-
-  /// False: the queue to the mixer is full and the strike is lost (counted as dropped).
-  bool TryPush(const Strike& strike) noexcept;
-
-  /// Of this stream: strikes taken in time, late, lost. Settled a block after the push.
-  uint64_t accepted_count() const noexcept;
-  uint64_t late_count() const noexcept;
-  uint64_t dropped_count() const noexcept;
-
- private:
-  friend class Mixer;
-  struct Shared;
-  explicit StrikeStream(std::shared_ptr<Shared> shared);
-  std::shared_ptr<Shared> shared_;
+  uint64_t bank_count = 0;           ///< on the mixer
+  uint64_t active_mode_count = 0;    ///< ringing
 };
 
 /// Renders all sounding objects into one stream of samples.
 ///
 /// Threads: one at a time calls Render; any may call the rest. Nothing under Render allocates,
-/// locks, logs, throws or calls the system. What is struck at the same frames sounds bit for bit
-/// the same on one SIMD target, however many blocks a call of Render covers.
+/// locks, logs, throws or calls the system. The same strikes sound bit for bit the same on one SIMD
+/// target, however many blocks one call of Render covers.
 class Mixer {
  public:
   explicit Mixer(const MixerSettings& settings = {});
@@ -76,10 +56,10 @@ class Mixer {
   Mixer(const Mixer&) = delete;
   Mixer& operator=(const Mixer&) = delete;
 
-  /// Renders the next frames, mono, within +-1. `block` holds whole blocks of block_frame_count.
-  void Render(std::span<float> block) noexcept;
+  /// Renders the next frames, mono, within +-1. `frames` holds whole blocks of block_frame_count.
+  void Render(std::span<float> frames) noexcept;
 
-  /// Puts a bank on the mixer; it can be struck when the call returns. The bank was made with this
+  /// Puts a bank on the mixer; it can be struck when the call returns. The bank was made for this
   /// mixer's sample rate and block. RESOURCE_EXHAUSTED (TOO_MANY_OBJECTS).
   absl::StatusOr<BankId> Add(std::unique_ptr<OscillatorBank> bank);
 
@@ -90,6 +70,7 @@ class Mixer {
   /// Takes a bank off after a fade of 10 ms; strikes on their way to it are lost.
   void FadeOut(BankId bank);
 
+  /// A new stream of strikes, of which `capacity` may wait to be taken.
   /// RESOURCE_EXHAUSTED (TOO_MANY_STREAMS).
   absl::StatusOr<std::unique_ptr<StrikeStream>> OpenStream(size_t capacity = 4096);
 
@@ -97,8 +78,9 @@ class Mixer {
   void CollectGarbage();
 
   /// Number of the next frame to be rendered.
-  uint64_t frame() const noexcept { return frame_.load(std::memory_order_acquire); }
+  uint64_t frame() const noexcept { return statistics_.frame_count.load(); }
 
+  /// Each figure is right by itself; together they may straddle a block.
   MixerStatistics statistics() const noexcept;
 
   /// The largest sample before the limiter since the last call.
@@ -107,9 +89,81 @@ class Mixer {
   const MixerSettings& settings() const { return settings_; }
 
  private:
-  MixerSettings settings_;
-  std::atomic<uint64_t> frame_{0};
+  /// From the controlling threads to the rendering one.
+  struct Command {
+    enum class Kind { kAddBank, kLetRingOut, kFadeOut, kAddStream } kind;
+    BankId id{};
+    OscillatorBank* bank = nullptr;
+    StrikeQueue* queue = nullptr;
+  };
+  /// Back: a bank's slot, or a stream's queue, that Render holds no longer.
+  struct Retired {
+    BankId id{};
+    StrikeQueue* queue = nullptr;
+  };
+  /// A place for a bank as the rendering thread sees it.
+  struct Slot {
+    OscillatorBank* bank = nullptr;
+    uint32_t generation = 0;
+    uint32_t pending_count = 0;  // strikes that wait for their time
+    bool sounding = false;       // is in sounding_
+    bool leaving = false;        // goes when it is silent
+    bool fading = false;
+    float fade_gain = 1;
+  };
+  /// A place for a bank as the controlling threads see it.
+  struct OwnedBank {
+    std::unique_ptr<OscillatorBank> bank;
+    uint32_t generation = 0;
+    bool leaving = false;
+    bool fading = false;
+  };
+  struct Counters {
+    std::atomic<uint64_t> frame_count{0};
+    std::atomic<uint64_t> accepted_count{0}, late_count{0}, dropped_count{0}, postponed_count{0};
+    std::atomic<uint64_t> reset_bank_count{0}, limited_frame_count{0};
+    std::atomic<uint64_t> bank_count{0}, active_mode_count{0};
+  };
+
+  OwnedBank* Find(BankId id) ABSL_EXCLUSIVE_LOCKS_REQUIRED(control_mutex_);
+  void Send(const Command& command) ABSL_EXCLUSIVE_LOCKS_REQUIRED(control_mutex_);
+
+  // The rest is the rendering thread's.
+  void RenderBlock(std::span<float> block) noexcept;
+  void ObeyCommands() noexcept;
+  void Obey(const Command& command) noexcept;
+  void TakeStrikes() noexcept;
+  void Take(const Strike& strike, StrikeQueue& queue) noexcept;
+  void StrikeDueBanks() noexcept;
+  void StrikeBank(const PendingStrike& strike) noexcept;
+  void RenderBanks() noexcept;
+  void RenderBank(Slot& slot, LaneMix& mix) noexcept;
+  void RenderFadingBanks(std::span<float> block) noexcept;
+  void RetireSilentBanks() noexcept;
+  void RetireIfDone(uint32_t slot_index) noexcept;
+  void SendBack(const Retired& retired) noexcept;
+  void NotePeak(std::span<const float> block) noexcept;
+  Slot* FindSlot(BankId id) noexcept;
+
+  const MixerSettings settings_;
+  Counters statistics_;
   std::atomic<float> peak_{0};
+
+  absl::Mutex control_mutex_;
+  std::vector<OwnedBank> owned_ ABSL_GUARDED_BY(control_mutex_);
+  std::vector<uint32_t> free_slots_ ABSL_GUARDED_BY(control_mutex_);
+  std::vector<std::shared_ptr<StrikeQueue>> queues_ ABSL_GUARDED_BY(control_mutex_);
+  SpscRing<Command> commands_;  // produced under control_mutex_
+  SpscRing<Retired> retired_;   // consumed under control_mutex_
+
+  const float fade_step_;
+  uint64_t block_start_ = 0;
+  std::vector<Slot> slots_;
+  std::vector<uint32_t> sounding_;  // slots whose banks are not silent, in order of their awakening
+  std::vector<StrikeQueue*> open_queues_;
+  PendingStrikes pending_;
+  LaneMix mix_, fading_mix_;
+  Limiter limiter_;
 };
 
 }  // namespace carillon

@@ -35,7 +35,8 @@ struct OscillatorBankSettings {
 ///
 /// A strike adds -i c_m g_m / omega_m exp(i phase_m) exp(s_m^2 tau^2 / 2) to Z_m at its time, with
 /// g_m = sum_v w_v phi_m(v) . J and s_m = sigma_m + i omega_m; the last factor is the Gaussian
-/// contact, exact once the contact is over, and bounded by one where sigma^2 > omega^2.
+/// contact, exact once the contact is over (where sigma^2 > omega^2, exp(-|s_m|^2 tau^2 / 2)
+/// instead).
 ///
 /// Within a block the state is float, SIMD across modes; between blocks it is kept in double, which
 /// holds the error below -100 dB. Modes that fall below -140 dB of full scale fall asleep.
@@ -75,7 +76,6 @@ class OscillatorBank {
 
   ShapeTable shapes_;
   size_t block_frame_count_;
-  double sample_rate_hz_;
   size_t mode_count_;
   size_t lane_count_;  // modes and companions, padded to whole vectors
   size_t first_column_ = 0;

@@ -50,11 +50,19 @@ bool Degenerate(const SoundingMode& a, const SoundingMode& b, double tolerance) 
          more < 2 * less;
 }
 
+void ShareMean(SoundingMode& first, SoundingMode& second) {
+  for (double SoundingMode::*figure :
+       {&SoundingMode::natural_frequency_hz, &SoundingMode::damped_rad_per_s,
+        &SoundingMode::decay_rate_per_s, &SoundingMode::coupling}) {
+    first.*figure = second.*figure = (first.*figure + second.*figure) / 2;
+  }
+}
+
 void PairDegenerate(std::vector<SoundingMode>& modes, double tolerance) {
   for (size_t i = 0; i + 1 < modes.size(); ++i) {
     SoundingMode &first = modes[i], &second = modes[i + 1];
     if (!Degenerate(first, second, tolerance)) continue;
-    first.coupling = second.coupling = (first.coupling + second.coupling) / 2;
+    ShareMean(first, second);
     second.output_phase_rad = kPi / 2;
     ++i;
   }

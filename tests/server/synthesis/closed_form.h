@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <cstddef>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "server/synthesis/level.h"
+#include "server/synthesis/mixer.h"
+#include "server/synthesis/oscillator_bank.h"
+#include "server/synthesis/sounding_modes.h"
+
+namespace carillon {
+
+inline constexpr double kTestSampleRateHz = 48000;
+
+/// A body of one triangle whose shapes are given by the tests: values[(vertex*3 + axis)*m + mode].
+inline ShapeTable MakeShapes(std::vector<float> values, size_t mode_count) {
+  const size_t vertex_count = values.size() / (3 * mode_count);
+  auto owner = std::make_shared<const std::vector<float>>(std::move(values));
+  return {.values = std::shared_ptr<const float>(owner, owner->data()),
+          .vertex_count = vertex_count,
+          .mode_count = mode_count};
+}
+
+/// Every mode moves by `shape` along x at vertices 0 to 2, and not along y and z.
+inline ShapeTable MakeUniformShapes(size_t mode_count, float shape = 1) {
+  std::vector<float> values(9 * mode_count, 0.0F);
+  for (size_t vertex = 0; vertex < 3; ++vertex) {
+    std::fill_n(values.begin() + static_cast<ptrdiff_t>(3 * vertex * mode_count), mode_count,
+                shape);
+  }
+  return MakeShapes(std::move(values), mode_count);
+}
+
+/// A unit impulse along x in the middle of the triangle.
+inline Excitation MakeUnitExcitation() {
+  return {.vertices = {0, 1, 2},
+          .weights = {1.0F / 3, 1.0F / 3, 1.0F / 3},
+          .impulse_newton_seconds = {1, 0, 0}};
+}
+
+inline SoundingMode MakeMode(uint32_t column, double frequency_hz, double decay_rate_per_s,
+                             double coupling = 1) {
+  return {.column = column,
+          .natural_frequency_hz = frequency_hz,
+          .damped_rad_per_s = 2 * std::numbers::pi * frequency_hz,
+          .decay_rate_per_s = decay_rate_per_s,
+          .coupling = coupling};
+}
+
+/// What one mode sounds like `time_s` after an impulse with modal impulse `g` (physics.md 3), in
+/// samples, with the Gaussian contact's factor and, for the second of a pair, its companion.
+inline double ClosedForm(const SoundingMode& mode, double g, double time_s, double tau_s = 0) {
+  if (time_s < 0) return 0;
+  using Complex = std::complex<double>;
+  const Complex s(mode.decay_rate_per_s, mode.damped_rad_per_s);
+  const Complex contact = std::exp(s * s * tau_s * tau_s / 2.0);
+  const Complex phase = std::polar(1.0, mode.output_phase_rad);
+  Complex ringing = std::exp(s * time_s);
+  if (mode.output_phase_rad != 0) ringing -= std::exp((s - mode.damped_rad_per_s) * time_s);
+  const double z = g / mode.damped_rad_per_s * (contact * phase * ringing).imag();
+  return kSamplesPerVolumeVelocity * mode.coupling * z;
+}
+
+/// Renders a bank by itself, without mixer or limiter.
+inline std::vector<float> Ring(OscillatorBank& bank, const Excitation& excitation,
+                               size_t frame_count, size_t offset = 0, float lead_frames = 0,
+                               size_t block_frame_count = 128) {
+  std::vector<float> sound(frame_count / block_frame_count * block_frame_count);
+  LaneMix mix;
+  for (size_t start = 0; start < sound.size(); start += block_frame_count) {
+    mix.Clear(block_frame_count);
+    if (start == 0) bank.Strike(excitation, offset, lead_frames, mix);
+    bank.RenderAdd(mix);
+    mix.Reduce(std::span(sound).subspan(start, block_frame_count));
+  }
+  return sound;
+}
+
+/// Root of the mean square.
+inline double Rms(std::span<const float> sound) {
+  double sum = 0;
+  for (const float x : sound) sum += double{x} * x;
+  return std::sqrt(sum / static_cast<double>(sound.size()));
+}
+
+}  // namespace carillon
