@@ -29,34 +29,44 @@ double NormalImpulse(const btPersistentManifold& manifold) {
   return sum;
 }
 
+std::pair<const btCollisionObject*, const btCollisionObject*> PairOf(
+    const btPersistentManifold& manifold) {
+  return {manifold.getBody0(), manifold.getBody1()};
+}
+
 }  // namespace
 
 bool BulletStrikes::IsHeard(const btPersistentManifold& manifold) const {
   return handles_.contains(manifold.getBody0()) || handles_.contains(manifold.getBody1());
 }
 
+double BulletStrikes::HeardShare(const Touch& now, const Touch& before) const {
+  const double impulse = now.impulse_newton_seconds;
+  const bool fresh = now.substep_count <= settings_.fresh_substeps;
+  if (!fresh && impulse < settings_.min_rise * before.impulse_newton_seconds) return 0;
+  const double heard = fresh ? impulse : impulse - before.impulse_newton_seconds;
+  return heard < settings_.min_impulse_newton_seconds ? 0 : heard / impulse;
+}
+
 void BulletStrikes::Read(btDispatcher& dispatcher, double time_offset_s, v1::ContactStep& step) {
   // A pair may have several manifolds, and its contact points hop: the pair's sum is what is
   // steady.
-  std::map<Pair, double> impulses;
+  std::map<Pair, Touch> touches;
   for (int i = 0; i < dispatcher.getNumManifolds(); ++i) {
     const btPersistentManifold& manifold = *dispatcher.getManifoldByIndexInternal(i);
-    if (!IsHeard(manifold)) continue;
-    impulses[{manifold.getBody0(), manifold.getBody1()}] += NormalImpulse(manifold);
+    const double impulse = NormalImpulse(manifold);
+    if (!IsHeard(manifold) || impulse <= 0) continue;
+    touches[PairOf(manifold)].impulse_newton_seconds += impulse;
   }
+  for (auto& [pair, touch] : touches) touch.substep_count = touches_[pair].substep_count + 1;
   for (int i = 0; i < dispatcher.getNumManifolds(); ++i) {
     const btPersistentManifold& manifold = *dispatcher.getManifoldByIndexInternal(i);
-    if (!IsHeard(manifold)) continue;
-    const Pair pair(manifold.getBody0(), manifold.getBody1());
-    const double now = impulses[pair];
-    const auto found = last_impulses_.find(pair);
-    const double before = found == last_impulses_.end() ? 0 : found->second;
-    if (now - before < settings_.min_impulse_newton_seconds || now < settings_.min_rise * before) {
-      continue;
-    }
-    ReadPair(manifold, (now - before) / now, time_offset_s, step);
+    const auto touch = touches.find(PairOf(manifold));
+    if (touch == touches.end()) continue;
+    const double share = HeardShare(touch->second, touches_[touch->first]);
+    if (share > 0) ReadPair(manifold, share, time_offset_s, step);
   }
-  last_impulses_ = std::move(impulses);
+  touches_ = std::move(touches);
 }
 
 void BulletStrikes::ReadPair(const btPersistentManifold& manifold, double share,

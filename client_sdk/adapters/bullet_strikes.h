@@ -15,14 +15,16 @@ namespace carillon::adapters {
 /// Reads out of a Bullet world what strikes its sounding bodies.
 ///
 /// Bullet reports the load of a resting contact as an impulse in every substep; played as strikes
-/// that would be a drone. A pair of bodies is therefore heard only in a substep in which its summed
-/// impulse has risen: above `min_impulse_newton_seconds` and above `min_rise` times that of the
-/// substep before. A new contact rises from nothing. What is sent is the rise.
+/// that would be a drone. Of a pair of bodies this is heard: all impulses of its first
+/// `fresh_substeps` of touch, over which Bullet spreads a collision, and after these only a rise
+/// above `min_rise` times the substep before. Less than `min_impulse_newton_seconds` is not heard.
+/// A substep without an impulse ends the touch: when a body bounces, each landing is fresh.
 class BulletStrikes {
  public:
   struct Settings {
     double min_impulse_newton_seconds = 1e-4;
     double min_rise = 1.5;
+    int fresh_substeps = 3;
     /// How long a contact of two bodies lasts, seconds, given its impulse in N s.
     std::function<double(const btCollisionObject&, const btCollisionObject&, double)> duration_s;
   };
@@ -39,6 +41,14 @@ class BulletStrikes {
  private:
   using Pair = std::pair<const btCollisionObject*, const btCollisionObject*>;
 
+  /// The normal impulse of a pair in one substep, and for how many substeps it has touched.
+  struct Touch {
+    double impulse_newton_seconds = 0;
+    int substep_count = 0;
+  };
+
+  /// The part of a pair's impulse that is heard, 0 to 1.
+  double HeardShare(const Touch& now, const Touch& before) const;
   void ReadPair(const btPersistentManifold& manifold, double share, double time_offset_s,
                 v1::ContactStep& step) const;
   void Append(const btCollisionObject& body, const btVector3& local_point, const btVector3& impulse,
@@ -47,8 +57,8 @@ class BulletStrikes {
 
   Settings settings_;
   std::map<const btCollisionObject*, uint32_t> handles_;
-  /// Summed normal impulse of each touching pair in the substep before, N s.
-  std::map<Pair, double> last_impulses_;
+  /// The pairs that touched in the substep before.
+  std::map<Pair, Touch> touches_;
 };
 
 }  // namespace carillon::adapters

@@ -10,7 +10,7 @@
 namespace carillon::wind_chimes {
 namespace {
 
-constexpr double kMeanSpeed_m_per_s = 4;
+constexpr double kMeanSpeed_m_per_s = 3;
 constexpr double kRise_s = 1.5;
 constexpr double kFall_s = 3;
 constexpr double kWander_rad = 2.5;

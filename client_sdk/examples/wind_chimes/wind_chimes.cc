@@ -24,10 +24,9 @@ constexpr double kCircleRadius_m = 0.062;
 constexpr double kTubeCentre_z_m = -0.40;
 constexpr double kNodeFromEnd = 0.224;
 
-// A wooden disc between them, a little below their middles, so that modes without a motion of the
+// A wooden ball between them, a little below their middles, so that modes without a motion of the
 // middle sound too; below it the sail that catches the wind.
-constexpr double kClapperRadius_m = 0.035;
-constexpr double kClapperThickness_m = 0.02;
+constexpr double kClapperRadius_m = 0.030;
 constexpr double kClapper_z_m = -0.44;
 constexpr double kClapperMass_kg = 0.050;
 constexpr double kSail_z_m = -0.75;
@@ -38,9 +37,9 @@ constexpr double kThreadMass_kg = 0.002;
 constexpr double kAir_kg_per_m3 = 1.2;
 constexpr double kDrag = 1.2;  // coefficient of a flat plate
 
-// Of a maple edge, across the grain, on an aluminum tube.
+// Of maple, across the grain, on aluminum.
 constexpr double kContactModulus_pa = 1.4e9;
-constexpr double kContactRadius_m = 0.0092;
+constexpr double kContactRadius_m = 1 / (1 / kClapperRadius_m + 1 / kOuterRadius_m);
 constexpr double kTubeRestitution = 0.9;
 constexpr double kClapperRestitution = 0.65;  // Bullet takes the product
 
@@ -188,10 +187,8 @@ class WindChimes::World {
 
   void HangClapper() {
     const btVector3 top(0, 0, 0), middle(0, 0, kClapper_z_m), bottom(0, 0, kSail_z_m);
-    auto disc = std::make_unique<btCylinderShapeZ>(
-        btVector3(kClapperRadius_m, kClapperRadius_m, kClapperThickness_m / 2));
-    disc->setMargin(0.001);
-    btRigidBody& clapper = AddSolid(std::move(disc), kClapperMass_kg, middle, true);
+    btRigidBody& clapper =
+        AddSolid(std::make_unique<btSphereShape>(kClapperRadius_m), kClapperMass_kg, middle, true);
     clapper.setRestitution(kClapperRestitution);
     sail_ = &AddSolid(std::make_unique<btBoxShape>(btVector3(kSailSide_m, 0.001, kSailSide_m) / 2),
                       kSailMass_kg, bottom, false);
