@@ -11,7 +11,7 @@ namespace carillon::precompute {
 
 struct MeshingSettings {
   /// Keep the vertices of the surface and add none on it; unset: decided from the surface.
-  std::optional<bool> keep_surface;
+  std::optional<bool> keep_surface = std::nullopt;
   /// About how many corner nodes the mesh should have; zero: decided from the surface.
   int target_node_count = 0;
   /// 4 or 10. Mid-side nodes lie on straight edges.
@@ -19,10 +19,10 @@ struct MeshingSettings {
 };
 
 /// Fills a surface that CheckSurface accepted with tetrahedra; cavities stay empty. Each face of
-/// the mesh's boundary names the given triangle it lies on. Not thread-safe: while the mesher runs,
-/// standard output is silenced.
+/// the mesh's boundary names the given triangle it lies on. The mesher runs in a child process, so
+/// that input it crashes on is refused like any other.
 ///
-/// Errors: MESH_TETRAHEDRALIZATION_FAILED, MESH_TOO_LARGE. The mesher may also crash the process.
+/// Errors: MESH_TETRAHEDRALIZATION_FAILED, MESH_TOO_LARGE, OUT_OF_MEMORY.
 absl::StatusOr<TetMesh> Tetrahedralize(const SurfaceMesh& surface, const MeshingSettings& settings);
 
 }  // namespace carillon::precompute

@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "precompute/mesh/fill_with_tetgen.h"
+
+#include <tetgen.h>
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstring>
+#include <span>
+#include <string>
+
+#include "absl/container/flat_hash_map.h"
+#include "absl/status/status.h"
+#include "absl/strings/str_cat.h"
+#include "precompute/mesh/boundary.h"
+#include "precompute/mesh/run_in_child.h"
+#include "proto/error_reason.h"
+
+namespace carillon::precompute {
+namespace {
+
+constexpr int kTetgenOutOfMemory = 1;  // what terminatetetgen throws
+
+absl::Status Failed(absl::string_view what) {
+  return Refusal(absl::StatusCode::kInvalidArgument, "MESH_TETRAHEDRALIZATION_FAILED",
+                 absl::StrCat("the surface could not be filled with tetrahedra: ", what,
+                              ". Repair parts of it that touch or nearly touch, and long thin "
+                              "triangles, or give a mesh of tetrahedra (Gmsh, MSH 2.2)"));
+}
+
+/// What TetGen made, as it comes from the child.
+struct Filling {
+  int error = 0;
+  std::vector<double> coordinates;       // three a node
+  std::vector<int32_t> corners;          // four a tetrahedron
+  std::vector<int32_t> face_corners;     // three a face
+  std::vector<int32_t> given_triangles;  // one a face
+};
+
+template <typename T>
+void Append(std::string& bytes, std::span<const T> values) {
+  const size_t count = values.size();
+  bytes.append(reinterpret_cast<const char*>(&count), sizeof count);
+  bytes.append(reinterpret_cast<const char*>(values.data()), values.size_bytes());
+}
+
+template <typename T>
+std::vector<T> Take(const char*& bytes) {
+  size_t count = 0;
+  std::memcpy(&count, bytes, sizeof count);
+  std::vector<T> values(count);
+  std::memcpy(values.data(), bytes + sizeof count, count * sizeof(T));
+  bytes += sizeof count + count * sizeof(T);
+  return values;
+}
+
+void DescribeSurface(const RefinedSurface& surface, tetgenio& in) {
+  const auto& [vertices, triangles] = surface.surface;
+  in.numberofpoints = static_cast<int>(vertices.size());
+  in.pointlist = new double[vertices.size() * 3];
+  std::memcpy(in.pointlist, vertices.data(), vertices.size() * sizeof(Point));
+  in.numberoffacets = static_cast<int>(triangles.size());
+  in.facetlist = new tetgenio::facet[triangles.size()];
+  in.facetmarkerlist = new int[triangles.size()];
+  for (size_t t = 0; t < triangles.size(); ++t) {
+    tetgenio::facet& facet = in.facetlist[t];
+    tetgenio::init(&facet);
+    facet.numberofpolygons = 1;
+    facet.polygonlist = new tetgenio::polygon[1];
+    facet.polygonlist[0].numberofvertices = 3;
+    facet.polygonlist[0].vertexlist = new int[3];
+    std::ranges::copy(triangles[t], facet.polygonlist[0].vertexlist);
+    in.facetmarkerlist[t] = surface.given_triangle[t] + 1;  // zero means no marker
+  }
+}
+
+void DescribeCavities(const std::vector<Point>& cavities, tetgenio& in) {
+  if (cavities.empty()) return;
+  in.numberofholes = static_cast<int>(cavities.size());
+  in.holelist = new double[cavities.size() * 3];
+  std::memcpy(in.holelist, cavities.data(), cavities.size() * sizeof(Point));
+}
+
+/// Runs in the child.
+std::string RunTetgen(const FillRequest& request) {
+  tetgenio in, out;
+  DescribeSurface(request.surface, in);
+  DescribeCavities(request.cavities, in);
+  // Piecewise linear complex, quality, volume bound, indices from zero, quiet; keep the surface.
+  std::string switches = request.keep_surface ? "pqazQY" : "pqazQ";
+  tetgenbehavior behavior;
+  behavior.parse_commandline(switches.data());
+  behavior.fixedvolume = 1;
+  behavior.maxvolume = request.max_volume;
+  behavior.steinerleft = request.max_added_nodes;
+  int error = 0;
+  try {
+    tetrahedralize(&behavior, &in, &out);
+  } catch (int code) {
+    error = code;
+  }
+  std::string bytes;
+  Append<int>(bytes, {&error, 1});
+  Append<double>(bytes, {out.pointlist, static_cast<size_t>(out.numberofpoints) * 3});
+  Append<int32_t>(bytes, {out.tetrahedronlist, static_cast<size_t>(out.numberoftetrahedra) * 4});
+  Append<int32_t>(bytes, {out.trifacelist, static_cast<size_t>(out.numberoftrifaces) * 3});
+  Append<int32_t>(bytes, {out.trifacemarkerlist, static_cast<size_t>(out.numberoftrifaces)});
+  return bytes;
+}
+
+Filling Parse(const std::string& bytes) {
+  const char* next = bytes.data();
+  Filling filling;
+  filling.error = Take<int>(next)[0];
+  filling.coordinates = Take<double>(next);
+  filling.corners = Take<int32_t>(next);
+  filling.face_corners = Take<int32_t>(next);
+  filling.given_triangles = Take<int32_t>(next);
+  return filling;
+}
+
+absl::Status NameGivenTriangles(const Filling& filling, TetMesh& mesh) {
+  using Corners = std::array<int32_t, 3>;
+  absl::flat_hash_map<Corners, int32_t> given_triangle_of_face;
+  for (size_t f = 0; f < filling.given_triangles.size(); ++f) {
+    const int32_t* c = &filling.face_corners[3 * f];
+    Corners corners{c[0], c[1], c[2]};
+    std::ranges::sort(corners);
+    given_triangle_of_face[corners] = filling.given_triangles[f] - 1;
+  }
+  for (BoundaryFace& face : mesh.boundary) {
+    Corners corners{face.nodes[0], face.nodes[1], face.nodes[2]};
+    std::ranges::sort(corners);
+    const auto found = given_triangle_of_face.find(corners);
+    if (found == given_triangle_of_face.end() || found->second < 0) {
+      return Failed("a face of its boundary lies on no triangle");
+    }
+    face.given_triangle = found->second;
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<TetMesh> MakeMesh(const Filling& filling) {
+  if (filling.error == kTetgenOutOfMemory) {
+    return Refusal(absl::StatusCode::kResourceExhausted, "OUT_OF_MEMORY",
+                   "filling the surface took more memory than allowed: give a coarser surface");
+  }
+  if (filling.error != 0) return Failed(absl::StrCat("TetGen reports error ", filling.error));
+  if (filling.corners.empty()) return Failed("nothing is inside");
+  TetMesh mesh;
+  mesh.nodes.resize(filling.coordinates.size() / 3);
+  std::memcpy(mesh.nodes.data(), filling.coordinates.data(),
+              filling.coordinates.size() * sizeof(double));
+  mesh.elements = filling.corners;
+  if (absl::Status status = FindBoundary(mesh); !status.ok()) return status;
+  if (absl::Status status = NameGivenTriangles(filling, mesh); !status.ok()) return status;
+  return mesh;
+}
+
+}  // namespace
+
+absl::StatusOr<TetMesh> FillWithTetgen(const FillRequest& request) {
+  const absl::StatusOr<std::string> bytes = RunInChild([&] { return RunTetgen(request); });
+  if (!bytes.ok()) return Failed(absl::StrCat("TetGen was ", bytes.status().message()));
+  return MakeMesh(Parse(*bytes));
+}
+
+}  // namespace carillon::precompute

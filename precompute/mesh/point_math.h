@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+
+#include "precompute/mesh/surface_mesh.h"
+
+namespace carillon::precompute {
+
+inline Point Difference(const Point& a, const Point& b) {
+  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
+
+inline double Dot(const Point& a, const Point& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+inline Point Cross(const Point& a, const Point& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+
+inline double Norm(const Point& a) { return std::hypot(a[0], a[1], a[2]); }
+
+inline double Distance(const Point& a, const Point& b) { return Norm(Difference(a, b)); }
+
+/// Signed volume of the tetrahedron a, b, c, d: positive where a, b, c turn counter-clockwise seen
+/// from the side away from d.
+inline double TetVolume(const Point& a, const Point& b, const Point& c, const Point& d) {
+  return Dot(Cross(Difference(b, a), Difference(c, a)), Difference(d, a)) / 6;
+}
+
+/// The three corners of triangle `t`.
+inline std::array<Point, 3> CornersOf(const SurfaceMesh& surface, size_t t) {
+  const auto& triangle = surface.triangles[t];
+  return {surface.vertices[static_cast<size_t>(triangle[0])],
+          surface.vertices[static_cast<size_t>(triangle[1])],
+          surface.vertices[static_cast<size_t>(triangle[2])]};
+}
+
+/// Twice the area times the unit normal of a triangle.
+inline Point AreaNormal(const std::array<Point, 3>& corner) {
+  return Cross(Difference(corner[1], corner[0]), Difference(corner[2], corner[0]));
+}
+
+}  // namespace carillon::precompute

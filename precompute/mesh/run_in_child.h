@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "absl/status/statusor.h"
+
+namespace carillon::precompute {
+
+/// Runs `work` in a forked child, silent on standard output and error, and returns its bytes. A
+/// crash in `work` ends the child only. The child dies with the calling thread.
+///
+/// Errors: Aborted, with how the child died; Internal if no child could be made.
+absl::StatusOr<std::string> RunInChild(const std::function<std::string()>& work);
+
+}  // namespace carillon::precompute

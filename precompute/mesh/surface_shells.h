@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "precompute/mesh/surface_mesh.h"
+
+namespace carillon::precompute {
+
+/// Whether two corners are the same vertex. Such a triangle closes no gap and opens none: it keeps
+/// its place in the surface and is otherwise passed over.
+bool IsCollapsed(const std::array<int32_t, 3>& triangle);
+
+/// Triangles that hang together by their edges.
+struct Shell {
+  std::vector<int32_t> triangles;
+  /// m^3; negative where the triangles turn clockwise seen from outside. Meaningless if open.
+  double volume_m3;
+};
+
+/// The shells of a surface, the one of greatest volume first.
+std::vector<Shell> FindShells(const SurfaceMesh& surface);
+
+/// How often a closed shell wraps around `point`: 0 outside, 1 inside (-1 where it is inside out).
+/// Van Oosterom and Strackee, The solid angle of a plane triangle, IEEE Trans. Biomed. Eng. 1983.
+double WindingNumber(const SurfaceMesh& surface, const Shell& shell, const Point& point);
+
+/// A point inside a closed shell that does not cross itself.
+Point PointInside(const SurfaceMesh& surface, const Shell& shell);
+
+}  // namespace carillon::precompute
