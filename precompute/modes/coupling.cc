@@ -8,13 +8,12 @@
 namespace carillon::precompute {
 
 double IntegralOfAbsolute(double area, double f0, double f1, double f2) {
-  // Makes f0 the corner whose sign is alone.
-  if (std::signbit(f0) == std::signbit(f1)) std::swap(f0, f2);
-  if (std::signbit(f0) == std::signbit(f1)) std::swap(f0, f1);
-  const double whole = area * (f0 + f1 + f2) / 3;
-  if (std::signbit(f0) == std::signbit(f1) || std::signbit(f0) == std::signbit(f2) || f0 == 0) {
-    return std::abs(whole);
+  // Makes f0 the corner whose sign is alone, if any.
+  if (std::signbit(f1) != std::signbit(f2)) {
+    std::swap(f0, std::signbit(f0) == std::signbit(f1) ? f2 : f1);
   }
+  const double whole = area * (f0 + f1 + f2) / 3;
+  if (std::signbit(f0) == std::signbit(f1) || f0 == 0) return std::abs(whole);
   // The line f = 0 cuts off the corner: a triangle with these parts of its two edges.
   const double cut = area * (f0 / (f0 - f1)) * (f0 / (f0 - f2)) * f0 / 3;
   return std::abs(whole - cut) + std::abs(cut);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "precompute/modes/modal_model.h"
 
+#include <utility>
+
 #include "precompute/mesh/sounding_surface.h"
 #include "precompute/modes/coupling.h"
 
@@ -37,7 +39,9 @@ ModalModel MakeModalModel(const TetMesh& mesh, const SurfaceMesh& given,
                    .element_count = static_cast<int>(mesh.element_count()),
                    .volume_m3 = VolumeM3(mesh),
                    .complete_to_eigenvalue = solution.complete_to_eigenvalue,
+                   .lowest_eigenvalue = solution.lowest_eigenvalue,
                    .verification = solution.verification,
+                   .warnings = {},
                    .eigenvalues = ToVector(solution.modes.eigenvalues),
                    .residuals = ToVector(solution.residuals),
                    .couplings = ToVector(Couplings(mesh, surface, solution.modes)),

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "precompute/mesh/surface_mesh.h"
@@ -17,7 +18,11 @@ struct ModalModel {
   int element_count = 0;
   double volume_m3 = 0;
   double complete_to_eigenvalue = 0;
+  /// The lowest deformation mode of the body, held or (where it is the first beyond) not.
+  double lowest_eigenvalue = 0;
   Verification verification;
+  /// What the user should know though it stopped nothing.
+  std::vector<std::string> warnings;
 
   std::vector<double> eigenvalues;  ///< #modes, ascending, 1/s^2
   std::vector<double> residuals;    ///< #modes, relative

@@ -1,0 +1,229 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "precompute/command_line.h"
+
+#include <CLI/CLI.hpp>
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+#include <map>
+
+#include "absl/strings/ascii.h"
+#include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_split.h"
+#include "proto/error_reason.h"
+#include "proto/material_catalogue.h"
+
+namespace carillon::precompute {
+namespace {
+
+/// The options as written, before they are made sense of.
+struct Options {
+  std::string input, output, format, material, matrices_folder;
+  std::string element = "quadratic", mass = "consistent", unit = "m", band = "20:20000";
+  std::optional<double> young_pa, poisson_ratio, density_kg_per_m3, alpha1_s, alpha2_per_s;
+  std::optional<double> lambda_pa, mu_pa;
+  double size = 1;
+  bool keep_surface = false, refine_surface = false, json = false;
+  int node_count = 0, event_descriptor = -1, thread_count = 0;
+};
+
+absl::Status Invalid(absl::string_view message) {
+  return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS", message);
+}
+
+void AddMaterialOptions(CLI::App& app, Options& options) {
+  const std::string group = "Material";
+  app.add_option("--material", options.material, "A preset; the figures below override it")
+      ->group(group);
+  app.add_option("--young", options.young_pa, "Young's modulus, Pa")->group(group);
+  app.add_option("--poisson", options.poisson_ratio, "Poisson's ratio, above -1 and below 0.5")
+      ->group(group);
+  app.add_option("--lame-lambda", options.lambda_pa, "Lame's first constant, Pa, with --lame-mu")
+      ->group(group);
+  app.add_option("--lame-mu", options.mu_pa, "Shear modulus, Pa, with --lame-lambda")->group(group);
+  app.add_option("--density", options.density_kg_per_m3, "Density, kg/m^3")->group(group);
+  app.add_option("--alpha1", options.alpha1_s, "Damping in proportion to stiffness, s")
+      ->group(group);
+  app.add_option("--alpha2", options.alpha2_per_s, "Damping in proportion to mass, 1/s")
+      ->group(group);
+}
+
+void AddMeshOptions(CLI::App& app, Options& options) {
+  const std::string group = "Mesh";
+  app.add_option("--format", options.format, "obj, ply, stl, off or msh (default: by the suffix)")
+      ->group(group);
+  app.add_option("--unit", options.unit, "Unit of the file's coordinates")
+      ->check(CLI::IsMember({"m", "mm", "cm", "in"}))
+      ->capture_default_str()
+      ->group(group);
+  app.add_flag("--keep-surface", options.keep_surface, "Add no vertices on the surface")
+      ->group(group);
+  app.add_flag("--refine-surface", options.refine_surface, "Add vertices on the surface as needed")
+      ->excludes("--keep-surface")
+      ->group(group);
+  app.add_option("--nodes", options.node_count,
+                 "About how many corner nodes (default: by the surface)")
+      ->check(CLI::NonNegativeNumber)
+      ->group(group);
+  app.add_option("--element", options.element, "Order of the elements")
+      ->check(CLI::IsMember({"linear", "quadratic"}))
+      ->capture_default_str()
+      ->group(group);
+  app.add_option("--mass", options.mass, "Mass matrix")
+      ->check(CLI::IsMember({"lumped", "consistent"}))
+      ->capture_default_str()
+      ->group(group);
+}
+
+void AddOptions(CLI::App& app, Options& options) {
+  app.add_option("IN", options.input, "Mesh file: a closed surface, or tetrahedra (msh)")
+      ->required();
+  app.add_option("--out", options.output, "Where to write the modal model")->required();
+  AddMaterialOptions(app, options);
+  AddMeshOptions(app, options);
+  app.add_option("--size", options.size, "Size that the body will have, relative to the mesh")
+      ->capture_default_str();
+  app.add_option("--band", options.band,
+                 "LO:HI in Hz: all modes up to natural HI are computed, one must lie in the band")
+      ->capture_default_str();
+  app.add_option("--matrices", options.matrices_folder,
+                 "Folder for K.mtx and M.mtx (Matrix Market, SI, nodes in the file's order, three "
+                 "unknowns a node)");
+  app.add_flag("--json", options.json, "Print one JSON object");
+  app.add_option("--threads", options.thread_count, "Threads (default: one a processor)")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--events-fd", options.event_descriptor,
+                 "Open descriptor for carillon.v1.WorkerEvent messages")
+      ->check(CLI::NonNegativeNumber);
+}
+
+/// Young's modulus and Poisson's ratio, from either pair of constants.
+absl::Status SetElasticity(const Options& options, v1::Material& material) {
+  if (options.lambda_pa.has_value() != options.mu_pa.has_value()) {
+    return Invalid("--lame-lambda and --lame-mu belong together; give both");
+  }
+  if (options.lambda_pa && (options.young_pa || options.poisson_ratio)) {
+    return Invalid(
+        "--lame-lambda and --lame-mu say the same as --young and --poisson; give one pair");
+  }
+  if (options.lambda_pa) {
+    const ElasticConstants elastic =
+        FromLame({.lambda_pa = *options.lambda_pa, .mu_pa = *options.mu_pa});
+    material.set_young_pa(elastic.young_pa);
+    material.set_poisson_ratio(elastic.poisson_ratio);
+  }
+  if (options.young_pa) material.set_young_pa(*options.young_pa);
+  if (options.poisson_ratio) material.set_poisson_ratio(*options.poisson_ratio);
+  return absl::OkStatus();
+}
+
+/// The material with every figure present; damping that nobody gave is none.
+absl::StatusOr<v1::Material> MakeMaterial(const Options& options) {
+  v1::Material material;
+  material.set_preset(options.material);
+  if (absl::Status status = SetElasticity(options, material); !status.ok()) return status;
+  if (options.density_kg_per_m3) material.set_density_kg_per_m3(*options.density_kg_per_m3);
+  if (options.alpha1_s || options.material.empty()) {
+    material.set_alpha1_s(options.alpha1_s.value_or(0));
+  }
+  if (options.alpha2_per_s || options.material.empty()) {
+    material.set_alpha2_per_s(options.alpha2_per_s.value_or(0));
+  }
+  if (options.material.empty() && !(material.has_young_pa() && material.has_poisson_ratio() &&
+                                    material.has_density_kg_per_m3())) {
+    return Invalid(
+        "no material: give --material NAME, or --young, --poisson (or --lame-lambda, "
+        "--lame-mu) and --density");
+  }
+  return ResolveMaterial(material);
+}
+
+absl::Status SetBand(const std::string& band, IntendedUse& use) {
+  const std::vector<std::string> ends = absl::StrSplit(band, ':');
+  const bool two_numbers = ends.size() == 2 && absl::SimpleAtod(ends[0], &use.low_hz) &&
+                           absl::SimpleAtod(ends[1], &use.high_hz);
+  if (two_numbers && use.low_hz >= 0 && use.low_hz < use.high_hz && std::isfinite(use.high_hz)) {
+    return absl::OkStatus();
+  }
+  return Invalid(absl::StrCat("--band is \"", band,
+                              "\"; it must be two frequencies in Hz, the lower "
+                              "first, such as 20:20000"));
+}
+
+absl::StatusOr<IntendedUse> MakeUse(const Options& options, const v1::Material& material) {
+  if (!(options.size > 0) || !std::isfinite(options.size)) {
+    return Invalid(absl::StrCat("--size is ", options.size, "; it must be above zero"));
+  }
+  IntendedUse use{.young_pa = material.young_pa(),
+                  .density_kg_per_m3 = material.density_kg_per_m3(),
+                  .alpha1_s = material.alpha1_s(),
+                  .alpha2_per_s = material.alpha2_per_s(),
+                  .size = options.size};
+  if (absl::Status status = SetBand(options.band, use); !status.ok()) return status;
+  return use;
+}
+
+MeshFile MakeMeshFile(const Options& options) {
+  const std::map<std::string, double> metres = {
+      {"m", 1}, {"cm", 0.01}, {"mm", 0.001}, {"in", 0.0254}};
+  std::string format = options.format;
+  if (format.empty()) {
+    format = std::filesystem::path(options.input).extension().string();
+    if (!format.empty()) format.erase(0, 1);
+  }
+  return {.path = options.input,
+          .format = absl::AsciiStrToLower(format),
+          .metres_per_unit = metres.at(options.unit)};
+}
+
+absl::StatusOr<CommandLine> MakeCommandLine(const Options& options) {
+  const absl::StatusOr<v1::Material> material = MakeMaterial(options);
+  if (!material.ok()) return material.status();
+  const absl::StatusOr<IntendedUse> use = MakeUse(options, *material);
+  if (!use.ok()) return use.status();
+  CommandLine result{
+      .mesh = MakeMeshFile(options),
+      .output = options.output,
+      .settings = {.poisson_ratio = material->poisson_ratio(),
+                   .mass =
+                       options.mass == "lumped" ? MassSharing::kLumped : MassSharing::kConsistent,
+                   .meshing = {.keep_surface = {},
+                               .target_node_count = options.node_count,
+                               .nodes_per_element = options.element == "linear" ? 4 : 10},
+                   .use = *use,
+                   .matrices_folder = options.matrices_folder},
+      .json = options.json,
+      .event_descriptor = options.event_descriptor,
+      .thread_count = options.thread_count,
+      .message = {}};
+  if (options.keep_surface) result.settings.meshing.keep_surface = true;
+  if (options.refine_surface) result.settings.meshing.keep_surface = false;
+  return result;
+}
+
+}  // namespace
+
+absl::StatusOr<CommandLine> ParseCommandLine(int argc, const char* const* argv) {
+  CLI::App app("Computes the vibration modes of a body from its surface or tetrahedra.",
+               "carillon-precompute");
+  app.set_version_flag("--version", CARILLON_VERSION);
+  Options options;
+  AddOptions(app, options);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::CallForHelp&) {
+    CommandLine help;
+    help.message = app.help();
+    return help;
+  } catch (const CLI::CallForVersion&) {
+    CommandLine version;
+    version.message = absl::StrCat(CARILLON_VERSION, "\n");
+    return version;
+  } catch (const CLI::Error& error) {
+    return Invalid(absl::StrCat(error.what(), "; carillon-precompute --help lists the options"));
+  }
+  return MakeCommandLine(options);
+}
+
+}  // namespace carillon::precompute

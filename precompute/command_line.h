@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "precompute/decompose.h"
+
+namespace carillon::precompute {
+
+/// What a user asked carillon-precompute for.
+struct CommandLine {
+  MeshFile mesh;
+  std::string output;
+  DecompositionSettings settings;
+  bool json = false;
+  int event_descriptor = -1;  ///< below zero: none
+  int thread_count = 0;       ///< zero: one for each processor
+  /// Help or version to be printed instead of anything else.
+  std::optional<std::string> message;
+};
+
+/// Errors: INVALID_SETTINGS (options that are unknown, malformed, missing or contradict each
+/// other), UNKNOWN_MATERIAL, INVALID_MATERIAL.
+absl::StatusOr<CommandLine> ParseCommandLine(int argc, const char* const* argv);
+
+}  // namespace carillon::precompute

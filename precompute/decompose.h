@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "precompute/decomposition_observer.h"
+#include "precompute/fem/element.h"
+#include "precompute/intended_use.h"
+#include "precompute/mesh/tetrahedralize.h"
+#include "precompute/modes/modal_model.h"
+
+namespace carillon::precompute {
+
+/// A mesh file: a surface or tetrahedra, see ReadMesh.
+struct MeshFile {
+  std::string path;
+  std::string format;
+  double metres_per_unit = 1;
+};
+
+struct DecompositionSettings {
+  double poisson_ratio = 0;
+  MassSharing mass = MassSharing::kConsistent;
+  /// How to fill a surface; its nodes_per_element holds for tetrahedra given, too.
+  MeshingSettings meshing;
+  IntendedUse use;
+  /// Where to write K.mtx and M.mtx, SI, for the material of `use`; empty: nowhere.
+  std::string matrices_folder;
+};
+
+/// From a mesh file to the modal model of the body, with every deformation mode up to the top of
+/// the band that `settings.use` names.
+///
+/// Errors: those of ReadMesh, CheckSurface, Tetrahedralize and SolveDeformationModes;
+/// NO_MODE_IN_BAND with the figure first_mode_hz; INVALID_SETTINGS (linear elements asked of a mesh
+/// of ten-node ones); OUTPUT_NOT_WRITABLE. The mesher may also crash the process.
+absl::StatusOr<ModalModel> Decompose(const MeshFile& file, const DecompositionSettings& settings,
+                                     DecompositionObserver& observer);
+
+}  // namespace carillon::precompute

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <string>
+
+#include "absl/status/status.h"
+#include "precompute/intended_use.h"
+#include "precompute/modes/modal_model.h"
+#include "precompute/progress_reporter.h"
+
+namespace carillon::precompute {
+
+/// The object that --json prints: nodes, elements, unknowns, peak_memory_bytes, phases, warnings,
+/// and of the modes held those in the band of `use`.
+std::string JsonReport(const ModalModel& model, const IntendedUse& use,
+                       const ProgressReporter& reporter);
+
+/// The object that --json prints of a refusal: error, with reason, message and figures.
+std::string JsonError(const absl::Status& status);
+
+}  // namespace carillon::precompute

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include <algorithm>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <string_view>
+
+#include "precompute/command_line.h"
+#include "precompute/json_report.h"
+#include "precompute/modal_model_codec.h"
+#include "precompute/modes/thread_count.h"
+#include "precompute/progress_bar.h"
+#include "precompute/progress_reporter.h"
+#include "precompute/sha256.h"
+#include "precompute/worker_events.h"
+#include "proto/error_reason.h"
+
+namespace carillon::precompute {
+namespace {
+
+constexpr std::chrono::milliseconds kProgressInterval(250);
+
+absl::StatusOr<ModalModel> DecomposeAndWrite(const CommandLine& asked, ProgressReporter& reporter) {
+  const absl::StatusOr<std::string> digest = Sha256OfFile(asked.mesh.path);
+  if (!digest.ok()) return digest.status();
+  absl::StatusOr<ModalModel> model = Decompose(asked.mesh, asked.settings, reporter);
+  if (!model.ok()) return model;
+  const ModelOrigin origin{.mesh_digest = *digest, .settings = ToProto(asked.mesh, asked.settings)};
+  if (absl::Status status = WriteModalModel(asked.output, *model, origin); !status.ok()) {
+    return status;
+  }
+  reporter.OnProgress(Phase::kWrite, 1);
+  return model;
+}
+
+void PrintSummary(const ModalModel& model, const CommandLine& asked) {
+  const IntendedUse& use = asked.settings.use;
+  std::printf("%zu modes from %.2f to %.2f Hz, %d nodes, written to %s\n", model.eigenvalues.size(),
+              use.FrequencyHz(model.eigenvalues.front()), use.FrequencyHz(model.eigenvalues.back()),
+              model.node_count, asked.output.c_str());
+  for (const std::string& warning : model.warnings) {
+    std::fprintf(stderr, "warning: %s\n", warning.c_str());
+  }
+}
+
+int Refuse(const absl::Status& status, bool json, const WorkerEvents& events) {
+  const v1::ErrorInfo error = ToErrorInfo(status);
+  std::fprintf(stderr, "carillon-precompute: %s: %s\n", error.reason().c_str(),
+               error.message().c_str());
+  if (json) std::puts(JsonError(status).c_str());
+  events.SendError(status);
+  return EXIT_FAILURE;
+}
+
+int Run(const CommandLine& asked) {
+  SetThreadCount(asked.thread_count);
+  const WorkerEvents events(asked.event_descriptor);
+  absl::StatusOr<ModalModel> model = absl::UnknownError("not computed");
+  {
+    const ProgressBar bar;
+    ProgressReporter reporter(
+        [&](const ProgressState& state) {
+          events.SendProgress(state);
+          bar.Draw(state);
+        },
+        kProgressInterval);
+    model = DecomposeAndWrite(asked, reporter);
+    reporter.Stop();
+    if (model.ok() && asked.json) {
+      std::puts(JsonReport(*model, asked.settings.use, reporter).c_str());
+    }
+  }
+  if (!model.ok()) return Refuse(model.status(), asked.json, events);
+  if (!asked.json) PrintSummary(*model, asked);
+  return EXIT_SUCCESS;
+}
+
+int Main(int argc, char** argv) {
+  std::signal(SIGPIPE, SIG_IGN);
+  const absl::StatusOr<CommandLine> asked = ParseCommandLine(argc, argv);
+  if (!asked.ok()) {
+    // The options could not be read, so --json is looked for by itself.
+    const bool json =
+        std::any_of(argv, argv + argc, [](std::string_view a) { return a == "--json"; });
+    return Refuse(asked.status(), json, WorkerEvents(-1));
+  }
+  if (asked->message) {
+    std::fputs(asked->message->c_str(), stdout);
+    return EXIT_SUCCESS;
+  }
+  return Run(*asked);
+}
+
+}  // namespace
+}  // namespace carillon::precompute
+
+int main(int argc, char** argv) { return carillon::precompute::Main(argc, argv); }

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <string_view>
+
+#include "precompute/decomposition_observer.h"
+
+namespace carillon::precompute {
+
+/// The name that users see: "read", "mesh", ...
+std::string_view PhaseName(Phase phase);
+
+/// Adds up how long each phase took.
+class PhaseClock {
+ public:
+  struct Times {
+    double seconds = 0;      ///< by the wall clock
+    double cpu_seconds = 0;  ///< of this process and its children that have ended
+  };
+
+  PhaseClock() : last_(Now()) {}
+
+  /// Ends the phase under way and begins `phase`.
+  void Enter(Phase phase);
+  /// Ends the phase under way.
+  void Stop();
+  const Times& Of(Phase phase) const { return times_[static_cast<size_t>(phase)]; }
+
+ private:
+  static Times Now();
+
+  std::array<Times, kPhaseCount> times_;
+  Phase phase_ = Phase::kRead;
+  Times last_;
+};
+
+}  // namespace carillon::precompute

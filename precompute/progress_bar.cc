@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "precompute/progress_bar.h"
+
+#include <unistd.h>
+
+#include <cstdio>
+#include <string>
+
+namespace carillon::precompute {
+namespace {
+
+constexpr size_t kWidth = 30;
+constexpr char kEraseLine[] = "\r\x1b[K";
+
+}  // namespace
+
+ProgressBar::ProgressBar() : on_terminal_(isatty(STDERR_FILENO) == 1) {}
+
+ProgressBar::~ProgressBar() {
+  if (on_terminal_) std::fputs(kEraseLine, stderr);
+}
+
+void ProgressBar::Draw(const ProgressState& state) const {
+  if (!on_terminal_) return;
+  const auto done = static_cast<size_t>(state.fraction * kWidth);
+  const std::string bar = std::string(done, '#') + std::string(kWidth - done, '.');
+  std::fprintf(stderr, "%s[%s] %3.0f %% %s", kEraseLine, bar.c_str(), 100 * state.fraction,
+               std::string(PhaseName(state.phase)).c_str());
+  if (state.node_count > 0) std::fprintf(stderr, ", %zu nodes", state.node_count);
+  if (state.mode_count > 0) std::fprintf(stderr, ", %zu modes", state.mode_count);
+  std::fflush(stderr);
+}
+
+}  // namespace carillon::precompute

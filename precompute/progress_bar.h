@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include "precompute/progress_reporter.h"
+
+namespace carillon::precompute {
+
+/// One line on standard error, drawn over and over, where that is a terminal; otherwise nothing.
+class ProgressBar {
+ public:
+  ProgressBar();
+  /// Leaves the terminal as if nothing had been drawn.
+  ~ProgressBar();
+  ProgressBar(const ProgressBar&) = delete;
+  ProgressBar& operator=(const ProgressBar&) = delete;
+
+  void Draw(const ProgressState& state) const;
+
+ private:
+  bool on_terminal_;
+};
+
+}  // namespace carillon::precompute

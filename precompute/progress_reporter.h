@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstddef>
+#include <functional>
+#include <mutex>
+#include <thread>
+
+#include "precompute/decomposition_observer.h"
+#include "precompute/phase_clock.h"
+
+namespace carillon::precompute {
+
+/// How far a decomposition is.
+struct ProgressState {
+  Phase phase = Phase::kRead;
+  double fraction = 0;  ///< of the whole work, estimated; never goes back
+  size_t node_count = 0;
+  size_t element_count = 0;
+  size_t mode_count = 0;
+};
+
+/// Keeps the state of a decomposition and shows it at a steady rate from a thread of its own, so
+/// that a long factorization is known to live.
+class ProgressReporter : public DecompositionObserver {
+ public:
+  /// `show` is called in the reporter's thread only, every `interval` and once at the end.
+  ProgressReporter(std::function<void(const ProgressState&)> show,
+                   std::chrono::milliseconds interval);
+  ~ProgressReporter() override;
+
+  void OnProgress(Phase phase, double fraction) override;
+  void OnMesh(size_t node_count, size_t element_count) override;
+  void OnModes(size_t mode_count) override;
+
+  /// Shows the last state and ends the thread.
+  void Stop();
+
+  ProgressState state() const;
+  /// Only after Stop.
+  const PhaseClock& clock() const { return clock_; }
+
+ private:
+  void Run();
+
+  std::function<void(const ProgressState&)> show_;
+  std::chrono::milliseconds interval_;
+  mutable std::mutex mutex_;
+  std::condition_variable wake_;
+  ProgressState state_;
+  bool stopping_ = false;
+  PhaseClock clock_;
+  std::thread thread_;
+};
+
+}  // namespace carillon::precompute

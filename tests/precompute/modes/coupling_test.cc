@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "precompute/modes/coupling.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "precompute/modes/deformation_modes.h"
+#include "tests/precompute/test_meshes.h"
+
+namespace carillon::precompute {
+namespace {
+
+/// The integral by the middle points of n^2 equal parts of the triangle.
+double Sampled(double area, double f0, double f1, double f2, int n) {
+  double sum = 0;
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j < 2 * (n - i) - 1; ++j) {
+      const double row = (i + (j % 2 == 0 ? 1.0 : 2.0) / 3) / n;
+      const double column = (j / 2 + (j % 2 == 0 ? 1.0 : 2.0) / 3) / n;
+      sum += std::abs(f0 * (1 - row - column) + f1 * row + f2 * column);
+    }
+  }
+  return area * sum / (n * n);
+}
+
+TEST(IntegralOfAbsolute, AgreesWithSamplingWhereverTheSignChanges) {
+  for (const double f0 : {-2.0, -0.5, 0.0, 1.0}) {
+    for (const double f1 : {-1.0, 0.0, 0.3, 2.0}) {
+      for (const double f2 : {-0.7, 0.0, 0.1, 3.0}) {
+        EXPECT_NEAR(IntegralOfAbsolute(1.5, f0, f1, f2), Sampled(1.5, f0, f1, f2, 200), 1e-4)
+            << f0 << " " << f1 << " " << f2;
+      }
+    }
+  }
+}
+
+/// One made-up mode: displacement f(position) at each node, eigenvalue 4.
+template <typename F>
+double CouplingOf(const TetMesh& mesh, F f) {
+  Modes modes{.eigenvalues = Eigen::VectorXd::Constant(1, 4.0),
+              .shapes = Eigen::MatrixXd(3 * static_cast<Eigen::Index>(mesh.nodes.size()), 1)};
+  for (size_t i = 0; i < mesh.nodes.size(); ++i) {
+    modes.shapes.block<3, 1>(3 * static_cast<Eigen::Index>(i), 0) = f(mesh.nodes[i]);
+  }
+  return Couplings(mesh, MakeSoundingSurface(mesh), modes)[0];
+}
+
+// On a box of 1 x 0.6 x 0.3, u = (2x - 1, 0, 0) moves two faces of 0.18 m^2 by 1 along their
+// normals: twice omega = 2 times that.
+TEST(Couplings, AreFrequencyTimesTheAreaMoved) {
+  for (const int nodes : {4, 10}) {
+    const TetMesh mesh = MakeTetBox({1, 0.6, 0.3}, {3, 2, 2}, nodes);
+    EXPECT_NEAR(
+        CouplingOf(mesh, [](const Point& p) { return Eigen::Vector3d(2 * p[0] - 1, 0, 0); }),
+        2 * 2 * 0.18, 1e-12);
+  }
+}
+
+// u = (0, 0, x - 0.5) moves air to and fro: the signed integral is zero, the coupling is not.
+TEST(Couplings, CountBothSignsOfABendingMode) {
+  const TetMesh mesh = MakeTetBox({1, 0.6, 0.3}, {3, 2, 2}, 4);
+  EXPECT_NEAR(CouplingOf(mesh, [](const Point& p) { return Eigen::Vector3d(0, 0, p[0] - 0.5); }),
+              2 * 2 * 0.6 * 0.25, 1e-12);
+}
+
+TEST(Couplings, OfABodyDoNotDependOnTheMesh) {
+  const auto first_coupling = [](const std::array<int, 3>& cells) {
+    const TetMesh mesh = MakeTetBox({1, 0.15, 0.1}, cells, 10);
+    const SystemMatrices system =
+        Assemble(mesh, {.young_pa = 1, .poisson_ratio = 0.3}, 1, MassSharing::kConsistent);
+    const absl::StatusOr<DeformationModes> solution =
+        SolveDeformationModes(system, mesh.nodes, 1.5, [](SolveStage, double) {});
+    EXPECT_TRUE(solution.ok()) << solution.status();
+    return Couplings(mesh, MakeSoundingSurface(mesh), solution->modes)[0];
+  };
+  // The coarse mesh has a third of the nodes; a sum over nodes would triple.
+  EXPECT_NEAR(first_coupling({10, 2, 2}) / first_coupling({24, 3, 2}), 1, 0.01);
+}
+
+}  // namespace
+}  // namespace carillon::precompute

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "precompute/modes/deformation_modes.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "precompute/modes/dense_eigensolver.h"
+#include "tests/precompute/test_meshes.h"
+
+namespace carillon::precompute {
+namespace {
+
+using ::testing::HasSubstr;
+
+const SolveWatch kSilent = [](SolveStage, double) {};
+
+SystemMatrices AssembleUnit(const TetMesh& mesh) {
+  return Assemble(mesh, {.young_pa = 1, .poisson_ratio = 0.3}, 1, MassSharing::kConsistent);
+}
+
+absl::StatusOr<DeformationModes> Solve(const TetMesh& mesh, double limit) {
+  return SolveDeformationModes(AssembleUnit(mesh), mesh.nodes, limit, kSilent);
+}
+
+/// All eigenvalues, rigid-body modes included.
+Eigen::VectorXd AllEigenvalues(const TetMesh& mesh) {
+  const SystemMatrices system = AssembleUnit(mesh);
+  const auto count = static_cast<int>(system.unknown_count());
+  return DenseEigensolver()
+      .Solve(system, {.count = count, .eigenvalue_limit = 0}, [](double) {})
+      ->eigenvalues;
+}
+
+/// A box, and the same box again, joined to it along the edge where x and y are largest.
+TetMesh TwoBoxesOnAnEdge(const Point& size, const std::array<int, 3>& cells) {
+  TetMesh whole = MakeTetBox(size, cells, 4);
+  const TetMesh part = MakeTetBox(size, cells, 4);
+  std::vector<int32_t> new_index;
+  for (const Point& p : part.nodes) {
+    const Point moved{p[0] + size[0], p[1] + size[1], p[2]};
+    int32_t index = -1;
+    for (size_t i = 0; i < part.nodes.size(); ++i) {
+      const Point& q = part.nodes[i];
+      if (std::abs(q[0] - moved[0]) + std::abs(q[1] - moved[1]) + std::abs(q[2] - moved[2]) <
+          1e-9) {
+        index = static_cast<int32_t>(i);
+      }
+    }
+    if (index < 0) {
+      index = static_cast<int32_t>(whole.nodes.size());
+      whole.nodes.push_back(moved);
+    }
+    new_index.push_back(index);
+  }
+  for (const int32_t node : part.elements) {
+    whole.elements.push_back(new_index[static_cast<size_t>(node)]);
+  }
+  return whole;
+}
+
+struct DeformationModesTest : ::testing::TestWithParam<std::array<int, 3>> {
+  TetMesh mesh = MakeTetBox({1, 0.6, 0.3}, GetParam(), 4);
+};
+
+TEST_P(DeformationModesTest, AreAllThoseBelowTheLimit) {
+  const Eigen::VectorXd eigenvalues = AllEigenvalues(mesh);
+  const double limit = (eigenvalues[25] + eigenvalues[26]) / 2;
+  const absl::StatusOr<DeformationModes> result = Solve(mesh, limit);
+  ASSERT_TRUE(result.ok()) << result.status();
+  ASSERT_EQ(result->modes.eigenvalues.size(), 20);
+  for (Eigen::Index m = 0; m < 20; ++m) {
+    EXPECT_NEAR(result->modes.eigenvalues[m] / eigenvalues[m + 6], 1, 1e-9);
+  }
+  EXPECT_EQ(result->lowest_eigenvalue, result->modes.eigenvalues[0]);
+}
+
+TEST_P(DeformationModesTest, ProofCountsRigidBodyModesAndModesKept) {
+  const absl::StatusOr<DeformationModes> result = Solve(mesh, 15);
+  ASSERT_TRUE(result.ok()) << result.status();
+  const Verification& proof = result->verification;
+  EXPECT_EQ(proof.rigid_mode_count, 6);
+  EXPECT_EQ(proof.sturm_count, 6 + result->modes.eigenvalues.size());
+  EXPECT_GT(proof.sturm_eigenvalue, result->modes.eigenvalues.tail(1)[0]);
+  EXPECT_GE(result->complete_to_eigenvalue, 15);
+  EXPECT_EQ(proof.max_residual, result->residuals.maxCoeff());
+  EXPECT_LE(proof.max_residual, kMaxResidual);
+}
+
+// A limit that agrees with an eigenvalue to the last digit is raised until the count is certain.
+TEST_P(DeformationModesTest, LimitMayCoincideWithAnEigenvalue) {
+  const absl::StatusOr<DeformationModes> result = Solve(mesh, AllEigenvalues(mesh)[12]);
+  ASSERT_TRUE(result.ok()) << result.status();
+  EXPECT_THAT(result->modes.eigenvalues.size(), ::testing::AnyOf(6, 7));
+  EXPECT_EQ(result->verification.sturm_count, 6 + result->modes.eigenvalues.size());
+}
+
+TEST_P(DeformationModesTest, LowestModeAboveTheLimitIsTold) {
+  const double lowest = AllEigenvalues(mesh)[6];
+  const absl::StatusOr<DeformationModes> result = Solve(mesh, lowest / 1e4);
+  ASSERT_TRUE(result.ok()) << result.status();
+  EXPECT_EQ(result->modes.eigenvalues.size(), 0);
+  EXPECT_NEAR(result->lowest_eigenvalue / lowest, 1, 1e-9);
+}
+
+TEST_P(DeformationModesTest, BodyInTwoPiecesIsRefused) {
+  TetMesh twice = mesh;
+  const auto offset = static_cast<int32_t>(mesh.nodes.size());
+  for (const Point& p : mesh.nodes) twice.nodes.push_back({p[0] + 5, p[1], p[2]});
+  for (const int32_t node : mesh.elements) twice.elements.push_back(node + offset);
+  EXPECT_THAT(Solve(twice, 3).status().ToString(),
+              HasSubstr("BODY_IN_SEVERAL_PIECES: the body can move in 12 ways without bending"));
+}
+
+TEST_P(DeformationModesTest, PiecesThatHangTogetherByAnEdgeAreRefused) {
+  EXPECT_THAT(Solve(TwoBoxesOnAnEdge({1, 0.6, 0.3}, GetParam()), 3).status().ToString(),
+              HasSubstr("BODY_IN_SEVERAL_PIECES: the body can move in 7 ways without bending"));
+}
+
+// The first is solved dense, the second sparse.
+INSTANTIATE_TEST_SUITE_P(Cells, DeformationModesTest,
+                         ::testing::Values(std::array{4, 3, 2}, std::array{9, 6, 3}));
+
+TEST(PrefersDense, WhereAFifthOfAllModesIsWanted) {
+  EXPECT_TRUE(PrefersDense(3000, 601));
+  EXPECT_FALSE(PrefersDense(30000, 601));
+}
+
+TEST(DeformationModes, MoreThanTheStatedLimitAreRefused) {
+  EXPECT_THAT(Solve(MakeTetBox({1, 1, 1}, {12, 12, 12}, 4), 1e9).status().ToString(),
+              HasSubstr("TOO_MANY_MODES: 6585 modes lie below the top of the band"));
+}
+
+}  // namespace
+}  // namespace carillon::precompute
