@@ -39,7 +39,7 @@ class SurfaceLocator {
   ~SurfaceLocator();
 
   /// The point of the sounding surface nearest to `point`, which is in the model's frame and size,
-  /// metres. INVALID_ARGUMENT (POINT_NOT_FINITE).
+  /// metres. INVALID_ARGUMENT (POINT_NOT_FINITE, POINT_TOO_FAR).
   absl::StatusOr<LocatedPoint> Nearest(const Point& point) const;
 
   /// The point of the sounding surface at a point of a given triangle; triangles that lie on that

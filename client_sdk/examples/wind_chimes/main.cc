@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Wind chimes in a rigid-body simulation, heard through Carillon: what a simulator has to do.
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "client_sdk/cpp/client.h"
+#include "client_sdk/examples/wind_chimes/tubes.h"
+#include "client_sdk/examples/wind_chimes/wind_chimes.h"
+#include "proto/error_reason.h"
+#include "proto/server_address.h"
+
+namespace carillon::wind_chimes {
+namespace {
+
+constexpr char kMaterial[] = "chime_aluminum";
+
+struct PlayOptions {
+  std::string server = DefaultServerAddress();
+  std::vector<std::string> models;
+  double seconds = 20;
+  uint64_t seed = 1;
+  double gain = 1;
+  std::string trace;
+  bool offline = false;
+};
+
+absl::Status WriteMeshes(const std::string& folder) {
+  for (const Tube& tube : kTubes) {
+    const auto path = std::filesystem::path(folder) / absl::StrCat(tube.note, ".obj");
+    std::ofstream file(path);
+    WriteTubeMesh(tube, file);
+    file.close();
+    if (!file) {
+      return Refusal(absl::StatusCode::kUnavailable, "MESH_FILE_NOT_WRITABLE",
+                     absl::StrCat(path.string(), " cannot be written; choose another folder"));
+    }
+  }
+  return absl::OkStatus();
+}
+
+/// The daemon's side of the simulation: a scene of six chimes that is gone when this is.
+class LiveScene {
+ public:
+  static absl::StatusOr<std::unique_ptr<LiveScene>> Open(const PlayOptions& options) {
+    std::unique_ptr<LiveScene> live(new LiveScene(options.server));
+    const absl::Status opened = live->Fill(options);
+    if (!opened.ok()) return opened;
+    return live;
+  }
+
+  ~LiveScene() {
+    stream_.reset();
+    if (!scene_.empty()) (void)client_.DeleteScene(scene_);
+  }
+
+  absl::Status Send(const v1::ContactStep& step) { return stream_->Send(step); }
+  absl::StatusOr<v1::StreamContactsResponse> Finish() { return stream_->Finish(); }
+
+ private:
+  explicit LiveScene(const std::string& server) : client_(server) {}
+
+  absl::Status Fill(const PlayOptions& options) {
+    auto scene = client_.CreateScene();
+    if (!scene.ok()) return scene.status();
+    scene_ = *scene;
+    for (size_t i = 0; i < options.models.size(); ++i) {
+      v1::AddObjectRequest request;
+      request.set_scene(scene_);
+      request.set_modal_model(options.models[i]);
+      request.mutable_material()->set_preset(kMaterial);
+      request.set_gain(options.gain);
+      request.set_handle(static_cast<uint32_t>(i + 1));
+      if (const auto added = client_.AddObject(request); !added.ok()) return added.status();
+    }
+    v1::ContactStreamStart start;
+    start.set_scene(scene_);
+    start.set_step_s(WindChimes::kStep_s);
+    auto stream = client_.StreamContacts(start);
+    if (!stream.ok()) return stream.status();
+    stream_ = *std::move(stream);
+    return absl::OkStatus();
+  }
+
+  client::Client client_;
+  std::string scene_;
+  std::unique_ptr<client::ContactStream> stream_;
+};
+
+absl::StatusOr<client::ContactTraceWriter> BeginTrace(const PlayOptions& options) {
+  v1::ContactTraceHeader header;
+  header.set_simulator("carillon-wind-chimes");
+  header.set_step_s(WindChimes::kStep_s);
+  auto trace = client::ContactTraceWriter::Create(options.trace, header);
+  if (!trace.ok()) return trace;
+  for (size_t i = 0; i < options.models.size(); ++i) {
+    v1::ContactTraceObject object;
+    object.set_handle(static_cast<uint32_t>(i + 1));
+    object.set_modal_model(options.models[i]);
+    object.mutable_material()->set_preset(kMaterial);
+    object.set_gain(options.gain);
+    object.set_label(kTubes[i].note);
+    trace->Write(object);
+  }
+  return trace;
+}
+
+void PrintReport(const v1::StreamContactsResponse& report) {
+  absl::PrintF("the daemon played %d, %d late, %d lost, %d refused; delay %.1f ms\n",
+               report.accepted_count(), report.late_count(), report.dropped_count(),
+               report.rejected_count(),
+               (report.scheduling_delay_s() + report.output_latency_s()) * 1e3);
+  if (report.rejected_count() > 0) {
+    absl::PrintF("refused: %s\n", report.last_rejection().message());
+  }
+}
+
+absl::Status Play(const PlayOptions& options) {
+  std::unique_ptr<LiveScene> live;
+  if (!options.offline) {
+    auto opened = LiveScene::Open(options);
+    if (!opened.ok()) return opened.status();
+    live = *std::move(opened);
+  }
+  std::optional<client::ContactTraceWriter> trace;
+  if (!options.trace.empty()) {
+    auto begun = BeginTrace(options);
+    if (!begun.ok()) return begun.status();
+    trace = *std::move(begun);
+  }
+
+  WindChimes chimes(options.seed);
+  int strike_count = 0;
+  const auto start = std::chrono::steady_clock::now();
+  const int step_count = static_cast<int>(options.seconds / WindChimes::kStep_s);
+  for (int i = 0; i < step_count; ++i) {
+    const v1::ContactStep step = chimes.Step();
+    strike_count += step.impulses_size();
+    if (trace && step.impulses_size() > 0) trace->Write(step);
+    if (!live) continue;
+    // The simulation is ahead of its own time by what this step took; real time is kept here.
+    std::this_thread::sleep_until(start + i * std::chrono::duration<double>(WindChimes::kStep_s));
+    if (const absl::Status sent = live->Send(step); !sent.ok()) return sent;
+  }
+  absl::PrintF("%d strikes in %.1f s\n", strike_count, options.seconds);
+
+  if (trace) {
+    if (const absl::Status closed = trace->Close(); !closed.ok()) return closed;
+  }
+  if (!live) return absl::OkStatus();
+  const auto report = live->Finish();
+  if (report.ok()) PrintReport(*report);
+  return report.status();
+}
+
+int Report(const absl::Status& status) {
+  if (status.ok()) return 0;
+  const v1::ErrorInfo error = ToErrorInfo(status);
+  absl::FPrintF(stderr, "carillon-wind-chimes: %s: %s\n", error.reason(), error.message());
+  return 1;
+}
+
+int Main(int argc, char** argv) {
+  CLI::App app("Wind chimes in a rigid-body simulation, heard through Carillon.");
+  app.require_subcommand(1);
+
+  std::string folder;
+  CLI::App& meshes = *app.add_subcommand("meshes", "write the six tubes as OBJ, named after notes");
+  meshes.add_option("folder", folder, "where to")->required()->check(CLI::ExistingDirectory);
+
+  PlayOptions options;
+  CLI::App& play = *app.add_subcommand("play", "simulate, and send each contact as it happens");
+  play.add_option("models", options.models, "modal models of the tubes, longest first")
+      ->required()
+      ->expected(static_cast<int>(kTubes.size()));
+  play.add_option("--server", options.server, "unix:PATH or HOST:PORT")->capture_default_str();
+  play.add_option("--seconds", options.seconds, "how long")->capture_default_str();
+  play.add_option("--seed", options.seed, "of the wind")->capture_default_str();
+  play.add_option("--gain", options.gain, "linear gain of every chime")->capture_default_str();
+  play.add_option("--trace", options.trace, "record the contacts to this file");
+  play.add_flag("--offline", options.offline, "record only, as fast as possible, with no daemon");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  return Report(meshes.parsed() ? WriteMeshes(folder) : Play(options));
+}
+
+}  // namespace
+}  // namespace carillon::wind_chimes
+
+int main(int argc, char** argv) { return carillon::wind_chimes::Main(argc, argv); }

@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/excitation/surface_locator.h"
+
+#include <embree3/rtcore.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <optional>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "proto/error_reason.h"
+#include "server/excitation/closest_point.h"
+
+namespace carillon {
+namespace {
+
+absl::Status Malformed(absl::string_view message) {
+  return Refusal(absl::StatusCode::kInvalidArgument, "SURFACE_MALFORMED", message);
+}
+
+absl::Status CheckTriangles(absl::string_view name,
+                            std::span<const std::array<uint32_t, 3>> triangles,
+                            size_t vertex_count) {
+  if (triangles.empty()) {
+    return Malformed(absl::StrCat("the ", name, " has no triangle: compute the model again"));
+  }
+  for (size_t t = 0; t < triangles.size(); ++t) {
+    const uint32_t largest = *std::ranges::max_element(triangles[t]);
+    if (largest < vertex_count) continue;
+    return Malformed(absl::StrCat("triangle ", t, " of the ", name, " names vertex ", largest,
+                                  " of ", vertex_count, ": compute the model again"));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status Check(const LocatorSurfaces& surfaces) {
+  absl::Status status =
+      CheckTriangles("sounding surface", surfaces.triangles, surfaces.vertices.size());
+  status.Update(
+      CheckTriangles("surface as given", surfaces.given_triangles, surfaces.given_vertices.size()));
+  if (status.ok() && surfaces.given_triangle.size() != surfaces.triangles.size()) {
+    return Malformed(absl::StrCat(surfaces.given_triangle.size(), " given triangles are named for ",
+                                  surfaces.triangles.size(),
+                                  " triangles of the sounding surface: compute the model again"));
+  }
+  return status;
+}
+
+Point ToPoint(const std::array<float, 3>& vertex) { return {vertex[0], vertex[1], vertex[2]}; }
+
+std::array<Point, 3> Corners(std::span<const std::array<float, 3>> vertices,
+                             const std::array<uint32_t, 3>& triangle) {
+  return {ToPoint(vertices[triangle[0]]), ToPoint(vertices[triangle[1]]),
+          ToPoint(vertices[triangle[2]])};
+}
+
+Point Interpolate(const std::array<Point, 3>& corners, const std::array<double, 3>& weights) {
+  Point point{};
+  for (size_t axis = 0; axis < 3; ++axis) {
+    for (size_t i = 0; i < 3; ++i) point[axis] += weights[i] * corners[i][axis];
+  }
+  return point;
+}
+
+/// What Embree hands to the callback for each triangle near enough.
+struct Search {
+  const LocatorSurfaces& surfaces;
+  const Point& point;
+  std::optional<uint32_t> given_triangle;  // only triangles that lie on it
+  uint32_t triangle = 0;
+  ClosestPoint closest{.squared_distance_m2 = std::numeric_limits<double>::infinity()};
+};
+
+bool VisitTriangle(RTCPointQueryFunctionArguments* arguments) {
+  Search& search = *static_cast<Search*>(arguments->userPtr);
+  const uint32_t t = arguments->primID;
+  if (search.given_triangle && search.surfaces.given_triangle[t] != *search.given_triangle) {
+    return false;
+  }
+  const ClosestPoint closest = FindClosestPoint(
+      Corners(search.surfaces.vertices, search.surfaces.triangles[t]), search.point);
+  if (!(closest.squared_distance_m2 < search.closest.squared_distance_m2)) return false;
+  search.triangle = t;
+  search.closest = closest;
+  const auto radius = static_cast<float>(std::sqrt(closest.squared_distance_m2));
+  arguments->query->radius = std::nextafter(radius, std::numeric_limits<float>::infinity());
+  return true;
+}
+
+template <typename T>
+void CopyToBuffer(RTCGeometry geometry, RTCBufferType type, RTCFormat format,
+                  std::span<const T> values) {
+  void* buffer = rtcSetNewGeometryBuffer(geometry, type, 0, format, sizeof(T), values.size());
+  if (buffer != nullptr) std::memcpy(buffer, values.data(), values.size_bytes());
+}
+
+}  // namespace
+
+/// Embree's objects, and the surfaces they were made from.
+struct SurfaceLocator::Index {
+  explicit Index(const LocatorSurfaces& of)
+      // Its builder would start a thread on each core, beside the audio.
+      : surfaces(of), device(rtcNewDevice("threads=1,user_threads=1")), scene(rtcNewScene(device)) {
+    rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
+    const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
+    CopyToBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT3, surfaces.vertices);
+    CopyToBuffer(geometry, RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3, surfaces.triangles);
+    rtcSetGeometryPointQueryFunction(geometry, VisitTriangle);
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometry(scene, geometry);
+    rtcReleaseGeometry(geometry);
+    rtcCommitScene(scene);
+  }
+  ~Index() {
+    rtcReleaseScene(scene);
+    rtcReleaseDevice(device);
+  }
+  Index(const Index&) = delete;
+  Index& operator=(const Index&) = delete;
+
+  /// False: no triangle lies on the given one.
+  bool Run(Search& search) const {
+    RTCPointQuery query{.x = static_cast<float>(search.point[0]),
+                        .y = static_cast<float>(search.point[1]),
+                        .z = static_cast<float>(search.point[2]),
+                        .time = 0,
+                        .radius = std::numeric_limits<float>::infinity()};
+    RTCPointQueryContext context;
+    rtcInitPointQueryContext(&context);
+    rtcPointQuery(scene, &query, &context, nullptr, &search);
+    return std::isfinite(search.closest.squared_distance_m2);
+  }
+
+  LocatedPoint Describe(const Search& search) const {
+    return {.triangle = search.triangle,
+            .vertices = surfaces.triangles[search.triangle],
+            .weights = search.closest.weights,
+            .distance_m = std::sqrt(search.closest.squared_distance_m2)};
+  }
+
+  LocatorSurfaces surfaces;
+  RTCDevice device;
+  RTCScene scene;
+};
+
+SurfaceLocator::SurfaceLocator(std::unique_ptr<Index> index) : index_(std::move(index)) {}
+
+SurfaceLocator::~SurfaceLocator() = default;
+
+absl::StatusOr<std::unique_ptr<SurfaceLocator>> SurfaceLocator::Make(
+    const LocatorSurfaces& surfaces) {
+  if (const absl::Status status = Check(surfaces); !status.ok()) return status;
+  auto index = std::make_unique<Index>(surfaces);
+  if (const RTCError error = rtcGetDeviceError(index->device); error != RTC_ERROR_NONE) {
+    return absl::InternalError(absl::StrCat("INTERNAL: the index of ", surfaces.triangles.size(),
+                                            " triangles could not be built, Embree error ",
+                                            static_cast<int>(error)));
+  }
+  return std::unique_ptr<SurfaceLocator>(new SurfaceLocator(std::move(index)));
+}
+
+absl::StatusOr<LocatedPoint> SurfaceLocator::Nearest(const Point& point) const {
+  if (const absl::Status status = ValidatePoint(point); !status.ok()) return status;
+  Search search{.surfaces = index_->surfaces, .point = point, .given_triangle = std::nullopt};
+  if (index_->Run(search)) return index_->Describe(search);
+  return Refusal(
+      absl::StatusCode::kInvalidArgument, "POINT_TOO_FAR",
+      "the point of contact is too far away to tell what is nearest to it: send metres in "
+      "the object's frame");
+}
+
+absl::StatusOr<LocatedPoint> SurfaceLocator::OnGivenTriangle(const SurfacePoint& at) const {
+  if (const absl::Status status = ValidateWeights(at.weights); !status.ok()) return status;
+  const LocatorSurfaces& surfaces = index_->surfaces;
+  if (at.triangle >= surfaces.given_triangles.size()) {
+    return Refusal(
+        absl::StatusCode::kInvalidArgument, "TRIANGLE_OUT_OF_RANGE",
+        absl::StrCat("triangle ", at.triangle, " of a surface of ", surfaces.given_triangles.size(),
+                     ": triangles count from zero, in the order of the mesh file"));
+  }
+  const Point point = Interpolate(
+      Corners(surfaces.given_vertices, surfaces.given_triangles[at.triangle]), at.weights);
+  Search search{.surfaces = surfaces, .point = point, .given_triangle = at.triangle};
+  if (index_->Run(search)) return index_->Describe(search);
+  return Nearest(point);  // repairs may have left nothing of that triangle
+}
+
+}  // namespace carillon

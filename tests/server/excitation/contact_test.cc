@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/excitation/contact.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+namespace carillon {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+ContactImpulse MakeContact() {
+  return {.location = Point{0.1, 0.2, 0.3}, .impulse_newton_seconds = {0, 0, -0.02}};
+}
+
+TEST(Contact, AnOrdinaryOneIsValid) {
+  EXPECT_TRUE(Validate(MakeContact()).ok());
+  ContactImpulse contact = MakeContact();
+  contact.location = SurfacePoint{.triangle = 7, .weights = {0.25, 0.5, 0.25}};
+  contact.duration_s = kLongestContactS;
+  EXPECT_TRUE(Validate(contact).ok());
+}
+
+TEST(Contact, AnImpulseMustBeFinite) {
+  for (const double bad : {kNan, kInfinity, -kInfinity}) {
+    ContactImpulse contact = MakeContact();
+    contact.impulse_newton_seconds[1] = bad;
+    EXPECT_THAT(Validate(contact).ToString(), HasSubstr("IMPULSE_NOT_FINITE"));
+  }
+}
+
+TEST(Contact, ItsPointMustBeFinite) {
+  ContactImpulse contact = MakeContact();
+  contact.location = Point{0, kNan, 0};
+  EXPECT_THAT(Validate(contact).ToString(), HasSubstr("POINT_NOT_FINITE"));
+}
+
+TEST(Contact, ItsDurationLiesFromZeroToATenthOfASecond) {
+  for (const double bad : {-1e-9, 0.1001, kNan, kInfinity}) {
+    ContactImpulse contact = MakeContact();
+    contact.duration_s = bad;
+    EXPECT_THAT(Validate(contact).ToString(), HasSubstr("INVALID_DURATION")) << bad;
+  }
+}
+
+TEST(Contact, BarycentricWeightsAreNotNegativeAndSumToOne) {
+  for (const std::array<double, 3>& bad :
+       {std::array{0.5, 0.6, -0.1}, std::array{0.3, 0.3, 0.3}, std::array{kNan, 0.5, 0.5}}) {
+    EXPECT_THAT(ValidateWeights(bad).ToString(), HasSubstr("INVALID_WEIGHTS"));
+  }
+  EXPECT_TRUE(ValidateWeights({float{1} / 3, float{1} / 3, 1 - 2 * (float{1} / 3)}).ok());
+}
+
+TEST(Contact, TheGaussianIsAQuarterOfTheDuration) { EXPECT_EQ(GaussianTauS(0.004), 0.001); }
+
+}  // namespace
+}  // namespace carillon
