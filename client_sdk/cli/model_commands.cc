@@ -38,7 +38,7 @@ absl::StatusOr<std::string> ReadMesh(const std::string& path) {
     if (!file.bad()) return bytes;
   }
   const bool directory = std::filesystem::is_directory(path);
-  return Refusal(absl::StatusCode::kNotFound, "MESH_FILE_NOT_READABLE",
+  return Refusal(absl::StatusCode::kNotFound, "FILE_NOT_FOUND",
                  absl::StrCat(path, ": ", std::strerror(directory ? EISDIR : errno),
                               "; check the file's name"));
 }

@@ -11,7 +11,7 @@ namespace carillon::cli {
 namespace {
 
 absl::Status NotWritable(const std::string& path, const char* why) {
-  return Refusal(absl::StatusCode::kUnavailable, "AUDIO_FILE_NOT_WRITABLE",
+  return Refusal(absl::StatusCode::kInternal, "OUTPUT_NOT_WRITABLE",
                  absl::StrCat(path, ": ", why, "; choose another file"));
 }
 

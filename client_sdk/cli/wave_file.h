@@ -14,7 +14,7 @@ namespace carillon::cli {
 /// A WAV file of 24-bit samples that grows block by block.
 class WaveFile {
  public:
-  /// Errors: Unavailable (AUDIO_FILE_NOT_WRITABLE).
+  /// Errors: Internal (OUTPUT_NOT_WRITABLE).
   static absl::StatusOr<WaveFile> Create(const std::string& path, uint32_t sample_rate_hz,
                                          uint32_t channel_count);
   WaveFile(WaveFile&&) noexcept;
@@ -22,7 +22,7 @@ class WaveFile {
   /// Completes the file.
   ~WaveFile();
 
-  /// Appends interleaved samples. Errors: Unavailable (AUDIO_FILE_NOT_WRITABLE).
+  /// Appends interleaved samples. Errors: Internal (OUTPUT_NOT_WRITABLE).
   absl::Status Write(std::span<const float> samples);
 
  private:

@@ -40,7 +40,7 @@ absl::StatusOr<ContactTraceWriter> ContactTraceWriter::Create(const std::string&
                                                               v1::ContactTraceHeader header) {
   std::ofstream file(path, std::ios::binary | std::ios::trunc);
   if (!file) {
-    return Refusal(absl::StatusCode::kUnavailable, "TRACE_NOT_WRITABLE",
+    return Refusal(absl::StatusCode::kInternal, "OUTPUT_NOT_WRITABLE",
                    absl::StrCat(path, ": ", std::strerror(errno), "; choose another file"));
   }
   ContactTraceWriter writer(path, std::move(file));
@@ -71,7 +71,7 @@ absl::Status ContactTraceWriter::Close() {
   file_.close();
   if (file_) return absl::OkStatus();
   return Refusal(
-      absl::StatusCode::kUnavailable, "TRACE_NOT_WRITABLE",
+      absl::StatusCode::kInternal, "OUTPUT_NOT_WRITABLE",
       absl::StrCat(path_, ": a write failed, the trace is incomplete; is the disk full?"));
 }
 
@@ -81,7 +81,7 @@ ContactTraceReader::ContactTraceReader(std::string path, std::ifstream file)
 absl::StatusOr<ContactTraceReader> ContactTraceReader::Open(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   if (!file) {
-    return Refusal(absl::StatusCode::kNotFound, "TRACE_NOT_FOUND",
+    return Refusal(absl::StatusCode::kNotFound, "FILE_NOT_FOUND",
                    absl::StrCat(path, ": ", std::strerror(errno), "; check the file's name"));
   }
   ContactTraceReader reader(path, std::move(file));

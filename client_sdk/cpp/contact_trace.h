@@ -15,7 +15,7 @@ namespace carillon::client {
 class ContactTraceWriter {
  public:
   /// Begins the file with `header`, whose format_version it fills in.
-  /// Errors: Unavailable (TRACE_NOT_WRITABLE).
+  /// Errors: Internal (OUTPUT_NOT_WRITABLE).
   static absl::StatusOr<ContactTraceWriter> Create(const std::string& path,
                                                    v1::ContactTraceHeader header);
 
@@ -24,7 +24,7 @@ class ContactTraceWriter {
   void Write(const v1::ContactTraceObject& object);
   void Write(const v1::ContactStep& step);
 
-  /// Errors: Unavailable (TRACE_NOT_WRITABLE): a write failed since the beginning.
+  /// Errors: Internal (OUTPUT_NOT_WRITABLE): a write failed since the beginning.
   absl::Status Close();
 
  private:
@@ -38,7 +38,7 @@ class ContactTraceWriter {
 /// Reads a contact trace file record by record.
 class ContactTraceReader {
  public:
-  /// Reads the header. Errors: NotFound (TRACE_NOT_FOUND); InvalidArgument (TRACE_MALFORMED): it is
+  /// Reads the header. Errors: NotFound (FILE_NOT_FOUND); InvalidArgument (TRACE_MALFORMED): it is
   /// no contact trace; Unimplemented (TRACE_TOO_NEW).
   static absl::StatusOr<ContactTraceReader> Open(const std::string& path);
 

@@ -42,7 +42,7 @@ absl::Status WriteMeshes(const std::string& folder) {
     WriteTubeMesh(tube, file);
     file.close();
     if (!file) {
-      return Refusal(absl::StatusCode::kUnavailable, "MESH_FILE_NOT_WRITABLE",
+      return Refusal(absl::StatusCode::kInternal, "OUTPUT_NOT_WRITABLE",
                      absl::StrCat(path.string(), " cannot be written; choose another folder"));
     }
   }

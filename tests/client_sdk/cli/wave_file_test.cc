@@ -36,7 +36,7 @@ TEST(WaveFile, HoldsEverySampleWithin24Bits) {
 
 TEST(WaveFile, SaysWhyItCannotBeWritten) {
   EXPECT_THAT(WaveFile::Create("/proc/no/such.wav", 48000, 2).status().ToString(),
-              testing::HasSubstr("AUDIO_FILE_NOT_WRITABLE: /proc/no/such.wav"));
+              testing::HasSubstr("OUTPUT_NOT_WRITABLE: /proc/no/such.wav"));
 }
 
 }  // namespace

@@ -118,15 +118,15 @@ TEST_F(ContactTrace, RefusesAFormatFromTheFuture) {
 }
 
 TEST_F(ContactTrace, SaysWhereNoFileIs) {
-  EXPECT_THAT(ReadAll().ToString(), HasSubstr("TRACE_NOT_FOUND: "));
+  EXPECT_THAT(ReadAll().ToString(), HasSubstr("FILE_NOT_FOUND: "));
   EXPECT_THAT(ContactTraceWriter::Create("/proc/no/such/folder", {}).status().ToString(),
-              HasSubstr("TRACE_NOT_WRITABLE: "));
+              HasSubstr("OUTPUT_NOT_WRITABLE: "));
 }
 
 TEST_F(ContactTrace, SaysThatTheDiskIsFull) {
   auto writer = ContactTraceWriter::Create("/dev/full", {});
   ASSERT_TRUE(writer.ok()) << writer.status();
-  EXPECT_THAT(writer->Close().ToString(), HasSubstr("TRACE_NOT_WRITABLE: "));
+  EXPECT_THAT(writer->Close().ToString(), HasSubstr("OUTPUT_NOT_WRITABLE: "));
 }
 
 }  // namespace
