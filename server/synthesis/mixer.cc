@@ -36,7 +36,8 @@ void Mixer::RenderBlock(std::span<float> block) noexcept {
   RenderBanks();
   mix_.Reduce(block);
   RenderFadingBanks(block);
-  RetireSilentBanks();
+  DismissSilentBanks();
+  RetireLeavingBanks();
   NotePeak(block);
   Count(statistics_.limited_frame_count, limiter_.Apply(block));
   block_start_ += block.size();
@@ -54,9 +55,9 @@ void Mixer::Obey(const Command& command) noexcept {
     slots_[command.id.slot] = {.bank = command.bank, .generation = command.id.generation};
     Count(statistics_.bank_count);
   } else if (Slot* slot = FindSlot(command.id)) {  // it may have rung out before it was to fade
+    if (!slot->leaving) leaving_.push_back(command.id.slot);
     slot->leaving = true;
     slot->fading |= command.kind == Command::Kind::kFadeOut;
-    RetireIfDone(command.id.slot);
   }
 }
 
@@ -71,10 +72,12 @@ void Mixer::TakeStrikes() noexcept {
   const size_t count = open_queues_.size();
   const size_t first = count == 0 ? 0 : block_start_ / settings_.block_frame_count % count;
   size_t budget = settings_.most_strikes_per_block;
+  all_strikes_taken_ = true;
   for (size_t i = 0; i < count; ++i) {
     StrikeQueue& queue = *open_queues_[(first + i) % count];
     for (Strike strike; budget > 0 && queue.ring.TryPop(strike); --budget) Take(strike, queue);
   }
+  if (budget == 0) all_strikes_taken_ = false;
   // Asked in this order, a queue that is closed and empty stays empty.
   std::erase_if(open_queues_, [this](StrikeQueue* queue) {
     const bool done = queue->closed.load(std::memory_order_acquire) && queue->ring.empty();
@@ -85,7 +88,10 @@ void Mixer::TakeStrikes() noexcept {
 
 void Mixer::Take(const Strike& strike, StrikeQueue& queue) noexcept {
   // A bank may have been added, and struck, since the commands of this block were obeyed.
-  if (FindSlot(strike.bank) == nullptr) ObeyCommands();
+  if (FindSlot(strike.bank) == nullptr) {
+    ObeyCommands();
+    all_strikes_taken_ = false;
+  }
   Slot* slot = FindSlot(strike.bank);
   const bool between = strike.fraction > 0;
   PendingStrike pending{.sample = strike.frame + (between ? 1 : 0),
@@ -123,8 +129,7 @@ void Mixer::StrikeBank(const PendingStrike& strike) noexcept {
   Count(statistics_.postponed_count, postponed ? 1 : 0);
   const size_t offset = postponed ? 0 : static_cast<size_t>(strike.sample - block_start_);
   if (!slot->bank->Strike(strike.excitation, offset, strike.lead_frames, mix_)) {
-    Count(statistics_.dropped_count);
-    return RetireIfDone(strike.bank.slot);
+    return Count(statistics_.dropped_count);
   }
   if (!slot->sounding) sounding_.push_back(strike.bank.slot);
   slot->sounding = true;
@@ -159,22 +164,24 @@ void Mixer::RenderFadingBanks(std::span<float> block) noexcept {
   }
 }
 
-void Mixer::RetireSilentBanks() noexcept {
+void Mixer::DismissSilentBanks() noexcept {
   std::erase_if(sounding_, [this](uint32_t index) {
     Slot& slot = slots_[index];
     slot.sounding = !slot.bank->silent() && slot.fade_gain > 0;
-    if (slot.sounding) return false;
-    RetireIfDone(index);
-    return true;
+    return !slot.sounding;
   });
 }
 
-void Mixer::RetireIfDone(uint32_t index) noexcept {
-  Slot& slot = slots_[index];
-  if (!slot.leaving || slot.sounding || (slot.pending_count > 0 && !slot.fading)) return;
-  SendBack({.id = {.slot = index, .generation = slot.generation}});
-  slot.bank = nullptr;
-  statistics_.bank_count.fetch_sub(1, std::memory_order_relaxed);
+void Mixer::RetireLeavingBanks() noexcept {
+  std::erase_if(leaving_, [this](uint32_t index) {
+    Slot& slot = slots_[index];
+    const bool awaited = !slot.fading && (slot.pending_count > 0 || !all_strikes_taken_);
+    if (slot.sounding || awaited) return false;
+    SendBack({.id = {.slot = index, .generation = slot.generation}});
+    slot.bank = nullptr;
+    statistics_.bank_count.fetch_sub(1, std::memory_order_relaxed);
+    return true;
+  });
 }
 
 void Mixer::SendBack(const Retired& retired) noexcept {

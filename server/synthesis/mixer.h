@@ -107,7 +107,7 @@ class Mixer {
     uint32_t generation = 0;
     uint32_t pending_count = 0;  // strikes that wait for their time
     bool sounding = false;       // is in sounding_
-    bool leaving = false;        // goes when it is silent
+    bool leaving = false;        // is in leaving_
     bool fading = false;
     float fade_gain = 1;
   };
@@ -139,8 +139,8 @@ class Mixer {
   void RenderBanks() noexcept;
   void RenderBank(Slot& slot, LaneMix& mix) noexcept;
   void RenderFadingBanks(std::span<float> block) noexcept;
-  void RetireSilentBanks() noexcept;
-  void RetireIfDone(uint32_t slot_index) noexcept;
+  void DismissSilentBanks() noexcept;
+  void RetireLeavingBanks() noexcept;
   void SendBack(const Retired& retired) noexcept;
   void NotePeak(std::span<const float> block) noexcept;
   Slot* FindSlot(BankId id) noexcept;
@@ -160,7 +160,11 @@ class Mixer {
   uint64_t block_start_ = 0;
   std::vector<Slot> slots_;
   std::vector<uint32_t> sounding_;  // slots whose banks are not silent, in order of their awakening
+  std::vector<uint32_t> leaving_;   // slots to be retired when they are silent
   std::vector<StrikeQueue*> open_queues_;
+  // All that was pushed before the commands of this block were given: a bank let ring out may be
+  // retired, for no strike is on its way to it.
+  bool all_strikes_taken_ = true;
   PendingStrikes pending_;
   LaneMix mix_, fading_mix_;
   Limiter limiter_;

@@ -29,6 +29,7 @@ Mixer::Mixer(const MixerSettings& settings)
     free_slots_.push_back(static_cast<uint32_t>(slot));
   }
   sounding_.reserve(settings.most_banks);
+  leaving_.reserve(settings.most_banks);
   open_queues_.reserve(settings.most_streams);
 }
 

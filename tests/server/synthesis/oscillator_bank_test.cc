@@ -34,8 +34,8 @@ double SumOfModes(const SoundingModes& sounding, double g, double time_s, double
   return sum;
 }
 
-/// Largest deviation from the closed form over its largest value, decibels; of long sounds every 13th
-/// sample is compared.
+/// Largest deviation from the closed form over its largest value, decibels; of long sounds every
+/// 13th sample is compared.
 double ErrorDb(const std::vector<float>& sound, const SoundingModes& sounding, double g,
                double strike_frame, double tau_s = 0) {
   double error = 0, peak = 0;

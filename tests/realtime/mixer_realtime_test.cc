@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include "server/synthesis/mixer.h"
+#include "tests/realtime/forbidden_calls.h"
+#include "tests/server/synthesis/closed_form.h"
+
+namespace carillon {
+namespace {
+
+std::unique_ptr<OscillatorBank> MakeBank(double decay_rate_per_s) {
+  SoundingModes sounding;
+  for (uint32_t m = 0; m < 40; ++m) {
+    sounding.modes.push_back(MakeMode(m, 200 + 150 * m, decay_rate_per_s));
+  }
+  sounding.modes[3].output_phase_rad = std::numbers::pi / 2;
+  return std::make_unique<OscillatorBank>(sounding, MakeUniformShapes(40),
+                                          OscillatorBankSettings{});
+}
+
+TEST(MixerRealtime, TheWatchSeesMallocFreeAndLocks) {
+  if (!kForbiddenCallsAreSeen) GTEST_SKIP() << "sanitizers replace these functions";
+  const ForbiddenCalls calls;
+  void* volatile memory = ::operator new(8);
+  EXPECT_EQ(calls.count(), 1u);
+  ::operator delete(memory);
+  EXPECT_EQ(calls.count(), 2u);
+  static std::mutex mutex;
+  mutex.lock();
+  mutex.unlock();
+  EXPECT_EQ(calls.count(), 3u);
+}
+
+TEST(MixerRealtime, RenderNeitherAllocatesNorFreesNorLocks) {
+  if (!kForbiddenCallsAreSeen) GTEST_SKIP() << "sanitizers replace these functions";
+  Mixer mixer({.most_banks = 64, .most_streams = 2, .most_pending_strikes = 100});
+  std::vector<float> block(128);
+  std::vector<BankId> banks;
+  auto stream = mixer.OpenStream(256).value();
+  for (int i = 0; i < 300; ++i) {
+    if (i % 5 == 0 && i < 250) banks.push_back(mixer.Add(MakeBank(-300)).value());
+    Excitation excitation = MakeUnitExcitation();
+    excitation.tau_s = 1e-4F;
+    if (i % 7 == 0) excitation.impulse_newton_seconds[0] = std::numeric_limits<float>::quiet_NaN();
+    // In time, between samples, late, and, while the heap is full, too many.
+    for (uint64_t k = 0; k < 8; ++k) {
+      stream->TryPush({.bank = banks[(static_cast<size_t>(i) + k) % banks.size()],
+                       .frame = k == 0 ? 0 : mixer.frame() + 300 * k,
+                       .fraction = 0.5F,
+                       .excitation = excitation});
+    }
+    if (i % 11 == 0) mixer.LetRingOut(banks[static_cast<size_t>(i) % banks.size()]);
+    if (i % 13 == 0) mixer.FadeOut(banks[static_cast<size_t>(i) % banks.size()]);
+    if (i == 290) stream.reset();
+    {
+      const ForbiddenCalls calls;
+      mixer.Render(block);
+      ASSERT_EQ(calls.count(), 0u) << "block " << i;
+    }
+    if (i == 290) break;
+  }
+  const MixerStatistics statistics = mixer.statistics();
+  EXPECT_GT(statistics.accepted_count, 0u);
+  EXPECT_GT(statistics.late_count, 0u);
+  EXPECT_GT(statistics.dropped_count, 0u);
+}
+
+TEST(MixerRealtime, ControlStrikesHousekeepingAndRenderingRunAtOnce) {
+  Mixer mixer({.most_banks = 16});
+  std::atomic<bool> done{false};
+  std::thread render([&] {
+    std::vector<float> block(256);
+    while (!done) {
+      mixer.Render(block);
+      for (const float x : block) ASSERT_LE(std::abs(x), 1.0F);
+    }
+  });
+  std::thread housekeeping([&] {
+    while (!done) {
+      mixer.CollectGarbage();
+      mixer.TakePeak();
+      mixer.statistics();
+    }
+  });
+  std::vector<std::thread> clients;
+  for (int client = 0; client < 2; ++client) {
+    clients.emplace_back([&mixer] {
+      const auto stream = mixer.OpenStream(64).value();
+      for (int object = 0; object < 30;) {
+        const auto bank = mixer.Add(MakeBank(-2000));
+        if (!bank.ok()) continue;  // until the garbage has been collected
+        for (uint64_t i = 0; i < 50; ++i) {
+          stream->TryPush(
+              {.bank = *bank, .frame = mixer.frame() + 10 * i, .excitation = MakeUnitExcitation()});
+        }
+        ++object % 2 == 0 ? mixer.LetRingOut(*bank) : mixer.FadeOut(*bank);
+      }
+    });
+  }
+  for (std::thread& client : clients) client.join();
+  done = true;
+  render.join();
+  housekeeping.join();
+  // All that was to leave has left once what rings has rung out: 60 blocks of 256 frames.
+  std::vector<float> rest(60 * 256);
+  mixer.Render(rest);
+  mixer.CollectGarbage();
+  EXPECT_EQ(mixer.statistics().bank_count, 0u);
+  EXPECT_GT(mixer.statistics().accepted_count + mixer.statistics().late_count, 0u);
+}
+
+}  // namespace
+}  // namespace carillon

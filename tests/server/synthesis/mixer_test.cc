@@ -1,0 +1,263 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/synthesis/mixer.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "tests/server/synthesis/closed_form.h"
+
+namespace carillon {
+namespace {
+
+using testing::Each;
+using testing::HasSubstr;
+
+constexpr double kDt = 1 / kTestSampleRateHz;
+
+/// A mixer with one bank of one mode, and a stream to strike it.
+class MixerTest : public testing::Test {
+ protected:
+  static constexpr double kSigma = -30;
+
+  std::unique_ptr<OscillatorBank> MakeBank(double coupling = 20) {
+    return std::make_unique<OscillatorBank>(
+        SoundingModes{.modes = {MakeMode(0, 440, kSigma, coupling)}}, MakeUniformShapes(1),
+        OscillatorBankSettings{});
+  }
+
+  void Strike(BankId bank, uint64_t frame, float fraction = 0, float impulse = 1) {
+    Excitation excitation = MakeUnitExcitation();
+    excitation.impulse_newton_seconds[0] = impulse;
+    stream_->TryPush(
+        {.bank = bank, .frame = frame, .fraction = fraction, .excitation = excitation});
+  }
+
+  std::vector<float> Render(size_t block_count) {
+    std::vector<float> frames(128 * block_count);
+    mixer_.Render(frames);
+    return frames;
+  }
+
+  /// What one strike of the bank sounds like.
+  static double Right(size_t n, double strike_frame, double coupling = 20) {
+    return ClosedForm(MakeMode(0, 440, kSigma, coupling), 1,
+                      (static_cast<double>(n) - strike_frame) * kDt);
+  }
+
+  Mixer mixer_;
+  BankId bank_ = mixer_.Add(MakeBank()).value();
+  std::unique_ptr<StrikeStream> stream_ = mixer_.OpenStream(8).value();
+};
+
+TEST_F(MixerTest, IsSilentUntilStruck) { EXPECT_THAT(Render(4), Each(0.0F)); }
+
+TEST_F(MixerTest, AStrikeSoundsFromItsFrameOn) {
+  Strike(bank_, 300, 0.25F);
+  const auto frames = Render(20);
+  for (size_t n = 0; n < frames.size(); ++n) EXPECT_NEAR(frames[n], Right(n, 300.25), 1e-6) << n;
+  EXPECT_EQ(stream_->accepted_count(), 1u);
+  EXPECT_EQ(stream_->late_count(), 0u);
+}
+
+TEST_F(MixerTest, AStrikeBetweenTheLastSampleOfABlockAndTheNextBelongsToTheNext) {
+  Strike(bank_, 127, 0.5F);
+  const auto frames = Render(2);
+  for (size_t n = 0; n < frames.size(); ++n) EXPECT_NEAR(frames[n], Right(n, 127.5), 1e-6) << n;
+}
+
+TEST_F(MixerTest, StrikesSoundInOrderOfTimeWhateverTheirOrderOfArrival) {
+  Strike(bank_, 500);
+  Strike(bank_, 20, 0.5F);
+  Strike(bank_, 100);
+  const auto frames = Render(10);
+  for (size_t n = 0; n < frames.size(); ++n) {
+    EXPECT_NEAR(frames[n], Right(n, 500) + Right(n, 20.5) + Right(n, 100), 1e-6) << n;
+  }
+}
+
+TEST_F(MixerTest, ALateStrikeSoundsAtOnceAndIsCounted) {
+  Render(3);
+  Strike(bank_, 10);
+  const auto frames = Render(3);
+  for (size_t n = 0; n < frames.size(); ++n) EXPECT_NEAR(frames[n], Right(n, 0), 1e-6) << n;
+  EXPECT_EQ(stream_->late_count(), 1u);
+  EXPECT_EQ(mixer_.statistics().late_count, 1u);
+  EXPECT_EQ(mixer_.statistics().accepted_count, 0u);
+}
+
+TEST_F(MixerTest, AFullQueueDropsAndCounts) {
+  for (int i = 0; i < 20; ++i) Strike(bank_, 0);
+  Render(1);
+  EXPECT_EQ(stream_->dropped_count(), 12u);
+  EXPECT_EQ(stream_->accepted_count(), 8u);
+}
+
+TEST_F(MixerTest, AStrikeOfAnUnknownBankIsDropped) {
+  Strike({}, 0);
+  Strike({.slot = bank_.slot, .generation = bank_.generation + 1}, 0);
+  EXPECT_THAT(Render(1), Each(0.0F));
+  EXPECT_EQ(stream_->dropped_count(), 2u);
+}
+
+TEST_F(MixerTest, BanksAreSummed) {
+  const BankId other = mixer_.Add(MakeBank(7)).value();
+  Strike(bank_, 5);
+  Strike(other, 200);
+  const auto frames = Render(4);
+  for (size_t n = 0; n < frames.size(); ++n) {
+    EXPECT_NEAR(frames[n], Right(n, 5) + Right(n, 200, 7), 1e-6) << n;
+  }
+}
+
+TEST_F(MixerTest, OneCallOverManyBlocksGivesTheBitsOfManyCalls) {
+  Mixer other;
+  const BankId bank = other.Add(MakeBank()).value();
+  const auto stream = other.OpenStream(8).value();
+  for (const uint64_t frame : {3, 130, 131, 1000}) {
+    Strike(bank_, frame, 0.3F);
+    stream->TryPush(
+        {.bank = bank, .frame = frame, .fraction = 0.3F, .excitation = MakeUnitExcitation()});
+  }
+  std::vector<float> whole(128 * 16), parts;
+  other.Render(whole);
+  for (int i = 0; i < 16; ++i) {
+    const auto part = Render(1);
+    parts.insert(parts.end(), part.begin(), part.end());
+  }
+  EXPECT_EQ(whole, parts);
+}
+
+TEST_F(MixerTest, ABankLetRingOutSoundsToItsEndAndIsThenFreed) {
+  Strike(bank_, 0);
+  Strike(bank_, 6000);  // on its way when the bank is let ring out
+  Render(1);
+  mixer_.LetRingOut(bank_);
+  const auto frames = Render(60);
+  for (size_t n = 0; n < frames.size(); ++n) {
+    EXPECT_NEAR(frames[n], Right(n + 128, 0) + Right(n + 128, 6000), 1e-6) << n;
+  }
+  EXPECT_EQ(mixer_.statistics().bank_count, 1u);
+  Render(500);  // -140 dB at -30 1/s: 0.54 s, 202 blocks
+  EXPECT_EQ(mixer_.statistics().bank_count, 0u);
+  mixer_.CollectGarbage();
+  Strike(bank_, 0);
+  Render(1);
+  EXPECT_EQ(stream_->dropped_count(), 1u);
+}
+
+TEST_F(MixerTest, AStrikePushedJustBeforeItsBankIsLetRingOutStillSounds) {
+  Strike(bank_, 10);
+  mixer_.LetRingOut(bank_);
+  const auto frames = Render(2);
+  for (size_t n = 0; n < frames.size(); ++n) EXPECT_NEAR(frames[n], Right(n, 10), 1e-6) << n;
+}
+
+TEST_F(MixerTest, ABankFadedOutIsSilentAfterTenMillisecondsWithoutAJump) {
+  Strike(bank_, 0);
+  Strike(bank_, 300);  // lost: it fades
+  Render(2);
+  mixer_.FadeOut(bank_);
+  const auto frames = Render(6);
+  for (size_t n = 0; n < frames.size(); ++n) {
+    const double gain = std::max(0.0, 1 - static_cast<double>(n + 1) / 480);
+    // The ramp is a sum of 480 rounded steps.
+    EXPECT_NEAR(frames[n], gain * Right(n + 256, 0), 1e-5) << n;
+  }
+  EXPECT_EQ(mixer_.statistics().bank_count, 0u);
+  EXPECT_EQ(mixer_.statistics().dropped_count, 1u);
+}
+
+TEST_F(MixerTest, AFreedSlotServesAnotherBankUnderAnotherName) {
+  Mixer mixer({.most_banks = 1});
+  const BankId first = mixer.Add(MakeBank()).value();
+  EXPECT_THAT(mixer.Add(MakeBank()).status().ToString(), HasSubstr("TOO_MANY_OBJECTS"));
+  mixer.FadeOut(first);
+  mixer.FadeOut(first);
+  mixer.LetRingOut(first);
+  std::vector<float> block(128);
+  mixer.Render(block);
+  mixer.CollectGarbage();
+  const auto second = mixer.Add(MakeBank());
+  ASSERT_TRUE(second.ok());
+  EXPECT_NE(*second, first);
+  mixer.FadeOut(first);  // the old name means nothing any more
+  mixer.Render(block);
+  EXPECT_EQ(mixer.statistics().bank_count, 1u);
+}
+
+TEST_F(MixerTest, AClosedStreamMakesRoomForAnotherAndWhatItPushedStillSounds) {
+  Mixer mixer({.most_streams = 1});
+  const BankId bank = mixer.Add(MakeBank()).value();
+  auto stream = mixer.OpenStream().value();
+  EXPECT_THAT(mixer.OpenStream().status().ToString(), HasSubstr("TOO_MANY_STREAMS"));
+  stream->TryPush({.bank = bank, .excitation = MakeUnitExcitation()});
+  stream.reset();
+  std::vector<float> block(128);
+  mixer.Render(block);
+  mixer.CollectGarbage();
+  EXPECT_NEAR(block[100], Right(100, 0), 1e-6);
+  EXPECT_TRUE(mixer.OpenStream().ok());
+}
+
+TEST_F(MixerTest, TooManyStrikesForOneBlockAreSpreadOverTheNextAndCounted) {
+  Mixer mixer({.most_strikes_per_block = 4});
+  const BankId bank = mixer.Add(MakeBank(2)).value();
+  const auto stream = mixer.OpenStream().value();
+  for (int i = 0; i < 12; ++i) {
+    stream->TryPush({.bank = bank, .frame = 600, .excitation = MakeUnitExcitation()});
+  }
+  std::vector<float> frames(128 * 10);
+  mixer.Render(frames);
+  EXPECT_EQ(mixer.statistics().accepted_count, 12u);
+  EXPECT_EQ(mixer.statistics().postponed_count, 8u);
+  // At once, at the start of the next block, and at that of the one after.
+  for (size_t n = 600; n < frames.size(); ++n) {
+    EXPECT_NEAR(frames[n], 4 * (Right(n, 600, 2) + Right(n, 640, 2) + Right(n, 768, 2)), 1e-5) << n;
+  }
+}
+
+TEST_F(MixerTest, WhatIsNotFiniteNeverLeaves) {
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+  const BankId broken = mixer_.Add(MakeBank(std::numeric_limits<double>::quiet_NaN())).value();
+  Strike(bank_, 0);
+  Strike(bank_, 50, 0, kNan);
+  Strike(bank_, 60, 0, std::numeric_limits<float>::infinity());
+  Strike(broken, 70);
+  const auto frames = Render(4);
+  for (size_t n = 0; n < frames.size(); ++n) EXPECT_NEAR(frames[n], Right(n, 0), 1e-6) << n;
+  EXPECT_EQ(mixer_.statistics().dropped_count, 3u);
+}
+
+TEST_F(MixerTest, ABankWhoseStateRunsAwayIsResetAndCounted) {
+  // A mode that grows, which no material gives.
+  const BankId bank =
+      mixer_
+          .Add(std::make_unique<OscillatorBank>(SoundingModes{.modes = {MakeMode(0, 440, 40000)}},
+                                                MakeUniformShapes(1), OscillatorBankSettings{}))
+          .value();
+  Strike(bank, 0);
+  for (const float x : Render(3)) EXPECT_LE(std::abs(x), 1.0F);
+  EXPECT_EQ(mixer_.statistics().reset_bank_count, 1u);
+  EXPECT_EQ(mixer_.statistics().active_mode_count, 0u);
+}
+
+TEST_F(MixerTest, TellsFramesPeakAndWhatTheLimiterDid) {
+  Strike(bank_, 0, 0, 100);
+  const auto frames = Render(2);
+  double peak = 0;
+  for (size_t n = 0; n < 256; ++n) peak = std::max(peak, std::abs(100 * Right(n, 0)));
+  EXPECT_GT(peak, 1);
+  EXPECT_NEAR(mixer_.TakePeak(), peak, 1e-5 * peak);
+  EXPECT_EQ(mixer_.TakePeak(), 0);
+  EXPECT_GT(mixer_.statistics().limited_frame_count, 0u);
+  EXPECT_EQ(mixer_.statistics().active_mode_count, 1u);
+  EXPECT_EQ(mixer_.frame(), 256u);
+  for (const float x : frames) EXPECT_LE(std::abs(x), 1.0F);
+}
+
+}  // namespace
+}  // namespace carillon
