@@ -17,6 +17,8 @@
 
 namespace carillon {
 
+class QueueCore;
+
 /// Ends a watch when it is destroyed: afterwards its function neither runs nor will run. May be
 /// destroyed within that function; the destroyer must hold no lock that the function takes.
 class JobWatch {
@@ -70,10 +72,9 @@ class DecompositionQueue {
   absl::Status DeleteModel(const std::string& digest);
 
  private:
-  class Core;
-  explicit DecompositionQueue(std::shared_ptr<Core> core);
+  explicit DecompositionQueue(std::shared_ptr<QueueCore> core);
 
-  std::shared_ptr<Core> core_;
+  std::shared_ptr<QueueCore> core_;
 };
 
 }  // namespace carillon

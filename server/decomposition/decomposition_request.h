@@ -12,7 +12,7 @@ namespace carillon {
 /// the material where the settings leave it zero) rounded to 1e-4, element, mass matrix, metres per
 /// unit, size and band.
 /// Errors: InvalidArgument (INVALID_SETTINGS, UNKNOWN_MATERIAL, INVALID_MATERIAL,
-/// MESH_FORMAT_UNKNOWN).
+/// MESH_FORMAT_UNKNOWN), NotFound (MESH_NOT_FOUND: mesh_digest is no digest).
 absl::StatusOr<v1::CreateModalModelRequest> ResolveRequest(
     const v1::CreateModalModelRequest& request);
 
@@ -34,9 +34,11 @@ std::string CanonicalText(const v1::CreateModalModelRequest& resolved);
 /// SHA-256 of CanonicalText.
 std::string RequestDigest(const v1::CreateModalModelRequest& resolved);
 
-/// Eigenvalue, for unit material and size, up to which modes are wanted:
-/// Lambda = (2 pi f)^2 rho s^2 / E, with f the maximal frequency, from the scaling laws of
-/// modal_model.proto.
+/// The eigenvalue, for unit material and size, of a natural frequency with the material and size of
+/// the hints: Lambda = (2 pi f)^2 rho s^2 / E, the scaling law of modal_model.proto.
+double UnitEigenvalue(const v1::CreateModalModelRequest& resolved, double frequency_hz);
+
+/// Eigenvalue up to which modes are wanted: that of the maximal frequency.
 double WantedEigenvalue(const v1::CreateModalModelRequest& resolved);
 
 }  // namespace carillon

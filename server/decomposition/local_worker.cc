@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/decomposition/local_worker.h"
+
+#include <signal.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <system_error>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "proto/error_reason.h"
+#include "server/decomposition/worker_command.h"
+
+namespace carillon {
+namespace {
+
+using std::chrono::nanoseconds;
+
+constexpr size_t kReadBytes =
+    256 << 10;  // at a time, so that one flooding worker does not hold all
+constexpr size_t kLogBytes = 4 << 10;
+// Far more than one event a second needs; a worker that writes more is out of its mind.
+constexpr uint64_t kFreeEventBytes = 1 << 20;
+constexpr uint64_t kEventBytesPerS = 64 << 10;
+
+v1::ErrorInfo Error(absl::string_view reason, absl::string_view message) {
+  return ToErrorInfo(Refusal(absl::StatusCode::kInternal, reason, message));
+}
+
+int64_t Seconds(nanoseconds time) {
+  return std::chrono::duration_cast<std::chrono::seconds>(time).count();
+}
+
+// The worker refuses, but another attempt may well succeed.
+bool MaySucceedNextTime(const std::string& reason) {
+  constexpr std::array kReasons = {"INTERNAL", "OUTPUT_NOT_WRITABLE", "MESH_FILE_NOT_READABLE"};
+  return std::ranges::find(kReasons, reason) != kReasons.end();
+}
+
+v1::ErrorInfo OutOfMemory(absl::string_view what) {
+  return Error(
+      "OUT_OF_MEMORY",
+      absl::StrCat("the decomposition ", what,
+                   ": ask for fewer nodes or a lower maximal frequency, or give the daemon "
+                   "more memory"));
+}
+
+// The log is any bytes; a message is text on one line.
+std::string LogSentence(std::string log) {
+  if (log.empty()) return "";
+  std::ranges::replace_if(
+      log, [](char c) { return c < ' ' || c > '~'; }, ' ');
+  return absl::StrCat("; its last words: ", log);
+}
+
+}  // namespace
+
+ScratchFolder::~ScratchFolder() {
+  if (path_.empty()) return;  // moved from
+  std::error_code ignored;    // what stays is removed when the daemon starts next
+  std::filesystem::remove_all(path_, ignored);
+}
+
+absl::StatusOr<LocalWorker> LocalWorker::Start(DecompositionTask task,
+                                               const std::filesystem::path& path,
+                                               const std::filesystem::path& program,
+                                               int thread_count, nanoseconds now) {
+  std::error_code error;
+  std::filesystem::remove_all(path, error);
+  if (!std::filesystem::create_directory(path, error)) {
+    return Refusal(absl::StatusCode::kFailedPrecondition, "DATABASE_UNUSABLE",
+                   absl::StrCat("the folder ", path.string(), " cannot be made (", error.message(),
+                                "): see that this user may write there"));
+  }
+  ScratchFolder folder(path);
+  const WorkerPlace place{program, folder / "mesh", folder / "model", thread_count};
+  if (const absl::Status status = task.write_mesh(place.mesh_file); !status.ok()) return status;
+  absl::StatusOr<ChildProcess> process = ChildProcess::Spawn(WorkerCommand(task.request, place));
+  if (!process.ok()) return process.status();
+  return LocalWorker(std::move(task), std::move(folder), *std::move(process), now);
+}
+
+void LocalWorker::Read(nanoseconds now) {
+  const std::string bytes = process_.ReadEvents(kReadBytes);
+  event_byte_count_ += bytes.size();
+  const absl::Status status =
+      events_.Feed(bytes, [&](const v1::WorkerEvent& event) { OnEvent(event, now); });
+  const auto seconds = static_cast<uint64_t>(Seconds(now - started_));
+  if (!status.ok()) {
+    Kill(Verdict::kCrashed, ToErrorInfo(status));
+  } else if (event_byte_count_ > kFreeEventBytes + seconds * kEventBytesPerS) {
+    Kill(Verdict::kCrashed, Error("WORKER_GARBAGE",
+                                  "the decomposing process floods its event pipe: this is a fault "
+                                  "in it; report it with the mesh"));
+  }
+  log_ += process_.ReadErrors(kReadBytes);
+  if (log_.size() > kLogBytes) log_.erase(0, log_.size() - kLogBytes);
+}
+
+void LocalWorker::OnEvent(const v1::WorkerEvent& event, nanoseconds now) {
+  last_event_ = now;
+  if (event.has_error()) {
+    reported_ = event.error();
+  } else {
+    OnProgress(event.progress());
+  }
+}
+
+void LocalWorker::OnProgress(v1::Progress progress) {
+  if (std::isfinite(progress.fraction())) {
+    fraction_ = std::max(fraction_, std::min(progress.fraction(), 1.0));
+  }
+  progress.set_fraction(fraction_);
+  task_.on_progress(progress);
+}
+
+void LocalWorker::Enforce(const WorkerLimits& limits, nanoseconds now) {
+  if (process_.ResidentBytes() > limits.memory_bytes) {
+    Kill(Verdict::kOutOfMemory,
+         OutOfMemory(absl::StrCat("took more than its ", limits.memory_bytes >> 20U, " MiB")));
+  } else if (now - started_ > limits.time) {
+    Kill(
+        Verdict::kTimeout,
+        Error("TIMEOUT", absl::StrCat("the decomposition took more than its ", Seconds(limits.time),
+                                      " s: ask for fewer nodes or a lower maximal frequency, or "
+                                      "give it more time")));
+  } else if (now - last_event_ > limits.stall) {
+    Kill(Verdict::kStalled,
+         Error("WORKER_STALLED", absl::StrCat("the decomposing process gave no sign of life for ",
+                                              Seconds(limits.stall),
+                                              " s: try again; if it stalls again, report it with "
+                                              "the mesh")));
+  }
+}
+
+void LocalWorker::Kill(Verdict verdict, v1::ErrorInfo error) {
+  if (killed_.has_value()) return;
+  killed_ = Outcome{verdict, std::move(error), {}};
+  process_.Kill();
+}
+
+std::optional<Outcome> LocalWorker::TakeOutcome(nanoseconds now) {
+  const std::optional<ProcessEnd> end = process_.Reap();
+  if (!end.has_value()) return std::nullopt;
+  Read(now);  // its last words
+  return Judge(*end);
+}
+
+Outcome LocalWorker::Judge(const ProcessEnd& end) const {
+  if (killed_.has_value()) return *killed_;
+  const bool success = end.exited && end.status == 0 && !reported_.has_value();
+  if (!success) return JudgeFailure(end);
+  return {Verdict::kOk, {}, folder_ / "model"};
+}
+
+Outcome LocalWorker::JudgeFailure(const ProcessEnd& end) const {
+  if (!end.exited && end.status == SIGKILL) {
+    // Not by us: this is what the kernel does when memory runs out.
+    return {Verdict::kOutOfMemory, OutOfMemory("was killed by the system"), {}};
+  }
+  if (end.exited && reported_.has_value()) {
+    Verdict verdict = Verdict::kBadInput;
+    if (reported_->reason() == "OUT_OF_MEMORY") verdict = Verdict::kOutOfMemory;
+    if (MaySucceedNextTime(reported_->reason())) verdict = Verdict::kCrashed;
+    return {verdict, *reported_, {}};
+  }
+  return {Verdict::kCrashed,
+          Error("WORKER_CRASHED",
+                absl::StrCat("the decomposing process ended by ",
+                             end.exited ? "exit status " : "signal ", end.status, LogSentence(log_),
+                             ": check the mesh for faults such as crossing or doubled triangles")),
+          {}};
+}
+
+}  // namespace carillon

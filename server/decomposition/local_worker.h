@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "absl/status/statusor.h"
+#include "carillon/v1/decomposition.pb.h"
+#include "server/decomposition/child_process.h"
+#include "server/decomposition/executor.h"
+#include "server/decomposition/worker_events.h"
+
+namespace carillon {
+
+/// Removes a folder with all that is in it when it goes out of scope.
+class ScratchFolder {
+ public:
+  explicit ScratchFolder(std::filesystem::path path) : path_(std::move(path)) {}
+  ScratchFolder(ScratchFolder&& other) noexcept { path_.swap(other.path_); }
+  ScratchFolder& operator=(ScratchFolder&&) = delete;
+  ~ScratchFolder();
+
+  std::filesystem::path operator/(const char* name) const { return path_ / name; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+/// What a worker may use before it is killed.
+struct WorkerLimits {
+  uint64_t memory_bytes = 0;
+  std::chrono::nanoseconds time{};
+  std::chrono::nanoseconds stall{};
+};
+
+/// One running decomposition: its process, what it has said, and the verdict over it. Its
+/// destruction kills what still runs and removes the folder. One thread.
+class LocalWorker {
+ public:
+  /// Makes `folder`, brings the mesh there and starts the program.
+  /// Errors: those of write_mesh and ChildProcess::Spawn, FailedPrecondition (DATABASE_UNUSABLE).
+  static absl::StatusOr<LocalWorker> Start(DecompositionTask task,
+                                           const std::filesystem::path& folder,
+                                           const std::filesystem::path& program, int thread_count,
+                                           std::chrono::nanoseconds now);
+  const DecompositionTask& task() const { return task_; }
+  const ChildProcess& process() const { return process_; }
+
+  /// Takes in what the process has written; an event counts as a sign of life at `now`.
+  void Read(std::chrono::nanoseconds now);
+
+  /// Kills the process where it has used up a limit.
+  void Enforce(const WorkerLimits& limits, std::chrono::nanoseconds now);
+
+  void Cancel() { Kill(Verdict::kCancelled, {}); }
+
+  /// The outcome, once the process has ended.
+  std::optional<Outcome> TakeOutcome(std::chrono::nanoseconds now);
+
+ private:
+  LocalWorker(DecompositionTask task, ScratchFolder folder, ChildProcess process,
+              std::chrono::nanoseconds now)
+      : task_(std::move(task)),
+        folder_(std::move(folder)),
+        process_(std::move(process)),
+        started_(now),
+        last_event_(now) {}
+
+  void OnEvent(const v1::WorkerEvent& event, std::chrono::nanoseconds now);
+  void OnProgress(v1::Progress progress);
+  void Kill(Verdict verdict, v1::ErrorInfo error);
+  Outcome Judge(const ProcessEnd& end) const;
+  Outcome JudgeFailure(const ProcessEnd& end) const;
+
+  DecompositionTask task_;
+  ScratchFolder folder_;  // before the process, so that it goes after it
+  ChildProcess process_;
+  std::chrono::nanoseconds started_;
+  std::chrono::nanoseconds last_event_;
+  WorkerEventReader events_;
+  uint64_t event_byte_count_ = 0;
+  std::string log_;  // the end of what it wrote to its standard error
+  double fraction_ = 0;
+  std::optional<v1::ErrorInfo> reported_;  // by the worker itself
+  std::optional<Outcome> killed_;          // by us, and why
+};
+
+}  // namespace carillon

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <utility>
+#include <vector>
+
+#include "carillon/v1/decomposition.pb.h"
+
+namespace carillon {
+
+/// Somebody who is told of a job's changes: in order, one call at a time, none after Close.
+class Watcher {
+ public:
+  explicit Watcher(std::function<void(const v1::Job&)> on_change)
+      : on_change_(std::move(on_change)) {}
+
+  /// Tells it of `job`, unless something newer has been told. Versions count from 1.
+  void Tell(const v1::Job& job, uint64_t version) {
+    const std::lock_guard lock(mutex_);
+    if (closed_ || version <= told_) return;
+    told_ = version;
+    on_change_(job);
+  }
+
+  /// Returns when no call runs and none will.
+  void Close() {
+    const std::lock_guard lock(mutex_);
+    closed_ = true;
+  }
+
+ private:
+  // Recursive: a watch may be ended within its own call.
+  std::recursive_mutex mutex_;
+  bool closed_ = false;
+  uint64_t told_ = 0;
+  std::function<void(const v1::Job&)> on_change_;
+};
+
+/// A change to be told once no lock is held.
+struct Notice {
+  std::vector<std::shared_ptr<Watcher>> watchers;
+  v1::Job job;
+  uint64_t version = 0;
+
+  void Tell() const {
+    for (const auto& watcher : watchers) watcher->Tell(job, version);
+  }
+};
+
+}  // namespace carillon

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "carillon/v1/modal_model_service.pb.h"
+
+namespace carillon {
+
+/// Where one decomposition reads and writes, and how many threads it may use.
+struct WorkerPlace {
+  std::filesystem::path program;
+  std::filesystem::path mesh_file;
+  std::filesystem::path model_file;
+  int thread_count = 1;
+};
+
+/// The command line of carillon-precompute for a resolved request; it reports to descriptor 3.
+std::vector<std::string> WorkerCommand(const v1::CreateModalModelRequest& resolved,
+                                       const WorkerPlace& place);
+
+}  // namespace carillon
