@@ -16,6 +16,11 @@ if(CARILLON_SANITIZE)
   add_compile_options(-fsanitize=${CARILLON_SANITIZE} -fno-omit-frame-pointer
                       -fno-sanitize-recover=all)
   add_link_options(-fsanitize=${CARILLON_SANITIZE})
+  if(CARILLON_SANITIZE MATCHES address)
+    add_library(carillon_keep_modules OBJECT
+                ${PROJECT_SOURCE_DIR}/deploy/sanitizers/keep_modules.cc)
+    link_libraries($<$<STREQUAL:$<TARGET_PROPERTY:TYPE>,EXECUTABLE>:$<TARGET_OBJECTS:carillon_keep_modules>>)
+  endif()
 endif()
 
 # Our own code only: generated protobuf code is compiled without them.
