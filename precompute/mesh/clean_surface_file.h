@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <string>
+
+#include "absl/status/statusor.h"
+
+namespace carillon::precompute {
+
+/// Refuses what assimp would silently clamp, repair or read past the end of, and returns the file
+/// with only what belongs to the surface (assimp groups the faces of an OBJ file by its objects,
+/// and knows no comments in OFF).
+///
+/// `format`: "obj", "off", "ply" or "stl" (returned as it is: assimp hides nothing there).
+/// Errors: MESH_UNREADABLE, MESH_NOT_FINITE, MESH_INDEX_OUT_OF_RANGE, each with the line;
+/// MESH_EMPTY.
+absl::StatusOr<std::string> CleanSurfaceFile(std::string bytes, const std::string& format);
+
+/// One format each.
+absl::StatusOr<std::string> CleanObj(const std::string& bytes);
+absl::StatusOr<std::string> CleanOff(const std::string& bytes);
+absl::Status CheckPly(const std::string& bytes);
+
+}  // namespace carillon::precompute

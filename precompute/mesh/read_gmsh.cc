@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "precompute/mesh/read_gmsh.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "absl/container/flat_hash_map.h"
+#include "absl/status/status.h"
+#include "absl/strings/str_cat.h"
+#include "precompute/mesh/boundary.h"
+#include "precompute/mesh/gmsh_file.h"
+#include "precompute/mesh/point_math.h"
+#include "proto/error_reason.h"
+
+namespace carillon::precompute {
+namespace {
+
+absl::Status Refuse(absl::string_view reason, absl::string_view message) {
+  return Refusal(absl::StatusCode::kInvalidArgument, reason, message);
+}
+
+absl::Status CheckFinite(const GmshFile& file) {
+  for (size_t n = 0; n < file.nodes.size(); ++n) {
+    const Point& p = file.nodes[n];
+    if (std::ranges::all_of(p, [](double x) { return std::isfinite(x); })) continue;
+    return Refuse("MESH_NOT_FINITE",
+                  absl::StrCat("node ", file.node_numbers[n], " lies at (", p[0], ", ", p[1], ", ",
+                               p[2], "): give it finite coordinates"));
+  }
+  return absl::OkStatus();
+}
+
+/// Elements by index into `file.nodes`.
+absl::StatusOr<std::vector<int32_t>> FindNodes(const GmshFile& file) {
+  absl::flat_hash_map<int32_t, int32_t> node_of_number;
+  for (size_t n = 0; n < file.node_numbers.size(); ++n) {
+    node_of_number[file.node_numbers[n]] = static_cast<int32_t>(n);
+  }
+  std::vector<int32_t> elements;
+  elements.reserve(file.elements.size());
+  for (const int32_t number : file.elements) {
+    const auto found = node_of_number.find(number);
+    if (found == node_of_number.end()) {
+      return Refuse("MESH_INDEX_OUT_OF_RANGE",
+                    absl::StrCat("tetrahedron ",
+                                 elements.size() / static_cast<size_t>(file.nodes_per_element),
+                                 " (counted from zero) names node ", number,
+                                 ", which the file does not have: export the mesh again"));
+    }
+    elements.push_back(found->second);
+  }
+  return elements;
+}
+
+/// Leaves out the nodes that no element has.
+void DropUnusedNodes(TetMesh& mesh) {
+  std::vector<int32_t> new_index(mesh.nodes.size(), -1);
+  for (const int32_t node : mesh.elements) new_index[static_cast<size_t>(node)] = 0;
+  std::vector<Point> used;
+  for (size_t n = 0; n < mesh.nodes.size(); ++n) {
+    if (new_index[n] < 0) continue;
+    new_index[n] = static_cast<int32_t>(used.size());
+    used.push_back(mesh.nodes[n]);
+  }
+  for (int32_t& node : mesh.elements) node = new_index[static_cast<size_t>(node)];
+  mesh.nodes = std::move(used);
+}
+
+/// Swaps corners 0 and 1, and with them their mid-side nodes.
+void TurnRound(int32_t* element, int nodes_per_element) {
+  std::swap(element[0], element[1]);
+  if (nodes_per_element == 4) return;
+  std::swap(element[5], element[6]);
+  std::swap(element[7], element[8]);
+}
+
+/// Volume of a tetrahedron, as a part of the cube over its longest edge, below which it is flat.
+constexpr double kMinVolumePart = 1e-12;
+
+absl::Status OrientElements(TetMesh& mesh) {
+  const auto stride = static_cast<size_t>(mesh.nodes_per_element);
+  for (size_t e = 0; e < mesh.element_count(); ++e) {
+    int32_t* element = &mesh.elements[e * stride];
+    // Gmsh puts the last two mid-side nodes on the edges 2-3 and 1-3.
+    if (stride == 10) std::swap(element[8], element[9]);
+    const auto at = [&](int i) { return mesh.nodes[static_cast<size_t>(element[i])]; };
+    const double volume = TetVolume(at(0), at(1), at(2), at(3));
+    double longest = 0;
+    for (const auto& [i, j] : kTetEdges) longest = std::max(longest, Distance(at(i), at(j)));
+    if (std::abs(volume) <= kMinVolumePart * longest * longest * longest) {
+      return Refuse(
+          "MESH_ZERO_VOLUME",
+          absl::StrCat("tetrahedron ", e, " (counted from zero) near (", at(0)[0], ", ", at(0)[1],
+                       ", ", at(0)[2], ") is flat: let the mesher optimise the mesh"));
+    }
+    if (volume < 0) TurnRound(element, mesh.nodes_per_element);
+  }
+  return absl::OkStatus();
+}
+
+/// In another order of the nodes a mid-side node would be a whole edge away from its place.
+absl::Status CheckMidsideNodes(const TetMesh& mesh) {
+  if (mesh.nodes_per_element != 10) return absl::OkStatus();
+  for (size_t e = 0; e < mesh.element_count(); ++e) {
+    const auto at = [&](size_t i) {
+      return mesh.nodes[static_cast<size_t>(mesh.elements[e * 10 + i])];
+    };
+    for (size_t edge = 0; edge < kTetEdges.size(); ++edge) {
+      const Point a = at(static_cast<size_t>(kTetEdges[edge][0]));
+      const Point b = at(static_cast<size_t>(kTetEdges[edge][1]));
+      const Point middle = {(a[0] + b[0]) / 2, (a[1] + b[1]) / 2, (a[2] + b[2]) / 2};
+      if (Distance(at(4 + edge), middle) < Distance(a, b) / 4) continue;
+      return Refuse("MESH_MIDSIDE_NODE_MISPLACED",
+                    absl::StrCat("tetrahedron ", e,
+                                 " (counted from zero) has a mid-side node more "
+                                 "than a quarter of its edge from the middle, near (",
+                                 middle[0], ", ", middle[1], ", ", middle[2],
+                                 "): write the nodes in Gmsh's order, or curve elements less"));
+    }
+  }
+  return absl::OkStatus();
+}
+
+/// Every element must be reached from the first through faces.
+absl::Status CheckOnePiece(const TetMesh& mesh) {
+  using Corners = std::array<int32_t, 3>;
+  const auto face_of = [&](size_t e, size_t face) {
+    Corners corners;
+    for (size_t i = 0; i < 3; ++i) {
+      corners[i] = mesh.elements[e * static_cast<size_t>(mesh.nodes_per_element) +
+                                 static_cast<size_t>(kTetFaces[face][i])];
+    }
+    std::ranges::sort(corners);
+    return corners;
+  };
+  absl::flat_hash_map<Corners, std::array<size_t, 2>> elements_of_face;
+  for (size_t e = 0; e < mesh.element_count(); ++e) {
+    for (size_t face = 0; face < 4; ++face) {
+      elements_of_face.try_emplace(face_of(e, face), std::array{e, e}).first->second[1] = e;
+    }
+  }
+  std::vector<bool> reached(mesh.element_count());
+  std::vector<size_t> next = {0};
+  reached[0] = true;
+  size_t count = 0;
+  while (!next.empty()) {
+    const size_t e = next.back();
+    next.pop_back();
+    ++count;
+    for (size_t face = 0; face < 4; ++face) {
+      for (const size_t neighbour : elements_of_face.at(face_of(e, face))) {
+        if (reached[neighbour]) continue;
+        reached[neighbour] = true;
+        next.push_back(neighbour);
+      }
+    }
+  }
+  if (count == mesh.element_count()) return absl::OkStatus();
+  return Refuse(
+      "MESH_SEVERAL_PIECES",
+      absl::StrCat("only ", count, " of ", mesh.element_count(),
+                   " tetrahedra hang together by their faces: join the pieces (merge nodes "
+                   "at the same place), or submit each as a mesh of its own"));
+}
+
+}  // namespace
+
+absl::StatusOr<TetMesh> ReadGmsh(const std::string& bytes) {
+  absl::StatusOr<GmshFile> file = ParseGmsh(bytes);
+  if (!file.ok()) return file.status();
+  if (absl::Status status = CheckFinite(*file); !status.ok()) return status;
+  if (file->elements.empty()) {
+    return Refuse("MESH_EMPTY",
+                  "the file has no tetrahedra: mesh the volume (\"gmsh -3\"), or give the surface "
+                  "as OBJ, PLY, STL or OFF");
+  }
+  absl::StatusOr<std::vector<int32_t>> elements = FindNodes(*file);
+  if (!elements.ok()) return elements.status();
+  TetMesh mesh{std::move(file->nodes), file->nodes_per_element, *std::move(elements), {}};
+  DropUnusedNodes(mesh);
+  if (absl::Status status = OrientElements(mesh); !status.ok()) return status;
+  for (const auto check : {CheckMidsideNodes, CheckOnePiece}) {
+    if (absl::Status status = check(mesh); !status.ok()) return status;
+  }
+  if (absl::Status status = FindBoundary(mesh); !status.ok()) return status;
+  return mesh;
+}
+
+}  // namespace carillon::precompute

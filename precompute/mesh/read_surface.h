@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "precompute/mesh/surface_mesh.h"
+
+namespace carillon::precompute {
+
+/// Reads a surface from the bytes of a file, in the file's unit. Coordinates have the 24 bits of
+/// assimp's numbers.
+///
+/// `format`: "obj", "ply", "stl" or "off".
+/// Errors: MESH_EMPTY, MESH_UNREADABLE, MESH_NOT_FINITE, MESH_INDEX_OUT_OF_RANGE.
+absl::StatusOr<SurfaceMesh> ReadSurface(std::string bytes, const std::string& format);
+
+}  // namespace carillon::precompute

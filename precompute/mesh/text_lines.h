@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <type_traits>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/strings/str_cat.h"
+#include "proto/error_reason.h"
+
+namespace carillon::precompute {
+
+/// The lines of a text file, one after the other, split into words.
+class TextLines {
+ public:
+  explicit TextLines(const std::string& bytes) : rest_(bytes) {}
+
+  /// The next line as it is; false at the end.
+  bool Next(std::string_view& line) {
+    if (rest_.empty()) return false;
+    const size_t end = std::min(rest_.find('\n'), rest_.size());
+    line = rest_.substr(0, end);
+    if (line.ends_with('\r')) line.remove_suffix(1);
+    rest_.remove_prefix(std::min(end + 1, rest_.size()));
+    ++number_;
+    return true;
+  }
+
+  /// The words of the next line that has any before a '#'; empty at the end.
+  std::vector<std::string_view> NextWords() {
+    std::string_view line;
+    while (Next(line)) {
+      std::vector<std::string_view> words = Words(line.substr(0, line.find('#')));
+      if (!words.empty()) return words;
+    }
+    return {};
+  }
+
+  static std::vector<std::string_view> Words(std::string_view line) {
+    std::vector<std::string_view> words;
+    for (size_t begin = line.find_first_not_of(kBlanks); begin != line.npos;) {
+      const size_t end = std::min(line.find_first_of(kBlanks, begin), line.size());
+      words.push_back(line.substr(begin, end - begin));
+      begin = line.find_first_not_of(kBlanks, end);
+    }
+    return words;
+  }
+
+  /// Of the line returned last, from 1.
+  int number() const { return number_; }
+
+  /// What follows the line returned last.
+  std::string_view rest() const { return rest_; }
+  void Skip(size_t bytes) { rest_.remove_prefix(bytes); }
+
+  absl::Status Unreadable(absl::string_view what) const {
+    return Refusal(absl::StatusCode::kInvalidArgument, "MESH_UNREADABLE",
+                   absl::StrCat("line ", number_, ": ", what,
+                                ": export the mesh again, or name its right format"));
+  }
+
+ private:
+  static constexpr std::string_view kBlanks = " \t\r\v\f";
+  std::string_view rest_;
+  int number_ = 0;
+};
+
+/// The number that `word` is, as a whole ("1e-3", "-inf"); nothing if it is none.
+template <typename T>
+std::optional<T> ToNumber(std::string_view word) {
+  if (word.starts_with('+')) word.remove_prefix(1);
+  T value{};
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+  if (error == std::errc::result_out_of_range) {
+    if constexpr (std::is_floating_point_v<T>) return HUGE_VAL;
+  }
+  if (error != std::errc() || end != word.data() + word.size()) return std::nullopt;
+  return value;
+}
+
+}  // namespace carillon::precompute

@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "tests/precompute/mesh/mesh_files.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "absl/strings/str_join.h"
+
+namespace carillon::precompute {
+namespace {
+
+constexpr int kFirstNodeNumber = 11;
+
+std::string Coordinates(const Point& p) {
+  return absl::StrFormat("%.9g %.9g %.9g", p[0], p[1], p[2]);
+}
+
+template <typename T>
+void Append(std::string& bytes, T value) {
+  bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
+}
+
+const Point& Corner(const SurfaceMesh& surface, const std::array<int32_t, 3>& triangle, size_t i) {
+  return surface.vertices[static_cast<size_t>(triangle[i])];
+}
+
+std::string PlyHeader(const SurfaceMesh& surface, const std::string& format) {
+  return absl::StrCat(
+      "ply\nformat ", format, " 1.0\ncomment of a test\nelement vertex ", surface.vertices.size(),
+      "\nproperty float x\nproperty float y\nproperty float z\nelement face ",
+      surface.triangles.size(), "\nproperty list uchar int vertex_indices\nend_header\n");
+}
+
+/// Node numbers of an element in Gmsh's order.
+std::vector<int32_t> GmshNodes(const TetMesh& mesh, size_t e) {
+  const auto stride = static_cast<size_t>(mesh.nodes_per_element);
+  std::vector<int32_t> nodes(&mesh.elements[e * stride], &mesh.elements[e * stride] + stride);
+  if (stride == 10) std::swap(nodes[8], nodes[9]);
+  for (int32_t& node : nodes) node += kFirstNodeNumber;
+  return nodes;
+}
+
+int GmshType(const TetMesh& mesh) { return mesh.nodes_per_element == 10 ? 11 : 4; }
+
+}  // namespace
+
+std::string ToObj(const SurfaceMesh& surface) {
+  std::string text = "# of a test\n";
+  for (const Point& p : surface.vertices) absl::StrAppend(&text, "v ", Coordinates(p), "\n");
+  for (const auto& [a, b, c] : surface.triangles) {
+    absl::StrAppend(&text, "f ", a + 1, " ", b + 1, " ", c + 1, "\n");
+  }
+  return text;
+}
+
+std::string ToOff(const SurfaceMesh& surface) {
+  std::string text = absl::StrCat("OFF\n# of a test\n", surface.vertices.size(), " ",
+                                  surface.triangles.size(), " 0\n");
+  for (const Point& p : surface.vertices) absl::StrAppend(&text, Coordinates(p), "\n");
+  for (const auto& triangle : surface.triangles) {
+    absl::StrAppend(&text, "3 ", absl::StrJoin(triangle, " "), "\n");
+  }
+  return text;
+}
+
+std::string ToTextPly(const SurfaceMesh& surface) {
+  std::string text = PlyHeader(surface, "ascii");
+  for (const Point& p : surface.vertices) absl::StrAppend(&text, Coordinates(p), "\n");
+  for (const auto& triangle : surface.triangles) {
+    absl::StrAppend(&text, "3 ", absl::StrJoin(triangle, " "), "\n");
+  }
+  return text;
+}
+
+std::string ToBinaryPly(const SurfaceMesh& surface) {
+  std::string bytes = PlyHeader(surface, "binary_little_endian");
+  for (const Point& p : surface.vertices) {
+    for (const double x : p) Append(bytes, static_cast<float>(x));
+  }
+  for (const auto& triangle : surface.triangles) {
+    Append(bytes, uint8_t{3});
+    for (const int32_t v : triangle) Append(bytes, v);
+  }
+  return bytes;
+}
+
+std::string ToTextStl(const SurfaceMesh& surface) {
+  std::string text = "solid test\n";
+  for (const auto& triangle : surface.triangles) {
+    absl::StrAppend(&text, "facet normal 0 0 0\nouter loop\n");
+    for (size_t i = 0; i < 3; ++i) {
+      absl::StrAppend(&text, "vertex ", Coordinates(Corner(surface, triangle, i)), "\n");
+    }
+    absl::StrAppend(&text, "endloop\nendfacet\n");
+  }
+  return text + "endsolid test\n";
+}
+
+std::string ToBinaryStl(const SurfaceMesh& surface) {
+  std::string bytes(80, '\0');
+  Append(bytes, static_cast<uint32_t>(surface.triangles.size()));
+  for (const auto& triangle : surface.triangles) {
+    for (int i = 0; i < 3; ++i) Append(bytes, 0.0F);  // normal
+    for (size_t i = 0; i < 3; ++i) {
+      for (const double x : Corner(surface, triangle, i)) Append(bytes, static_cast<float>(x));
+    }
+    Append(bytes, uint16_t{0});
+  }
+  return bytes;
+}
+
+std::string ToTextGmsh(const TetMesh& mesh) {
+  std::string text = absl::StrCat(
+      "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n1\n"
+      "3 7 \"body\"\n$EndPhysicalNames\n$Nodes\n",
+      mesh.nodes.size(), "\n");
+  for (size_t n = 0; n < mesh.nodes.size(); ++n) {
+    const Point& p = mesh.nodes[n];
+    absl::StrAppendFormat(&text, "%d %.17g %.17g %.17g\n", static_cast<int>(n) + kFirstNodeNumber,
+                          p[0], p[1], p[2]);
+  }
+  absl::StrAppend(&text, "$EndNodes\n$Elements\n", mesh.boundary.size() + mesh.element_count(),
+                  "\n");
+  int number = 1;
+  for (const BoundaryFace& face : mesh.boundary) {
+    absl::StrAppend(&text, number++, " 2 2 5 6 ", face.nodes[0] + kFirstNodeNumber, " ",
+                    face.nodes[1] + kFirstNodeNumber, " ", face.nodes[2] + kFirstNodeNumber, "\n");
+  }
+  for (size_t e = 0; e < mesh.element_count(); ++e) {
+    absl::StrAppend(&text, number++, " ", GmshType(mesh), " 2 7 1 ",
+                    absl::StrJoin(GmshNodes(mesh, e), " "), "\n");
+  }
+  return text + "$EndElements\n";
+}
+
+std::string ToBinaryGmsh(const TetMesh& mesh) {
+  std::string bytes = "$MeshFormat\n2.2 1 8\n";
+  Append(bytes, int32_t{1});
+  absl::StrAppend(&bytes, "\n$EndMeshFormat\n$Nodes\n", mesh.nodes.size(), "\n");
+  for (size_t n = 0; n < mesh.nodes.size(); ++n) {
+    Append(bytes, static_cast<int32_t>(n) + kFirstNodeNumber);
+    for (const double x : mesh.nodes[n]) Append(bytes, x);
+  }
+  absl::StrAppend(&bytes, "\n$EndNodes\n$Elements\n", mesh.boundary.size() + mesh.element_count(),
+                  "\n");
+  int32_t number = 1;
+  for (const int32_t figure : {2, static_cast<int32_t>(mesh.boundary.size()), 2})
+    Append(bytes, figure);
+  for (const BoundaryFace& face : mesh.boundary) {
+    for (const int32_t figure : {number++, 5, 6}) Append(bytes, figure);
+    for (size_t i = 0; i < 3; ++i) Append(bytes, face.nodes[i] + kFirstNodeNumber);
+  }
+  const auto count = static_cast<int32_t>(mesh.element_count());
+  for (const int32_t figure : {GmshType(mesh), count, 2}) Append(bytes, figure);
+  for (size_t e = 0; e < mesh.element_count(); ++e) {
+    for (const int32_t figure : {number++, 7, 1}) Append(bytes, figure);
+    for (const int32_t node : GmshNodes(mesh, e)) Append(bytes, node);
+  }
+  return bytes + "\n$EndElements\n";
+}
+
+}  // namespace carillon::precompute

@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "precompute/mesh/read_gmsh.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+#include "tests/precompute/mesh/mesh_files.h"
+#include "tests/precompute/mesh/read_mesh_fixture.h"
+#include "tests/precompute/test_meshes.h"
+
+namespace carillon::precompute {
+namespace {
+
+using ::testing::HasSubstr;
+
+using ReadGmshTest = ReadMeshTest;
+
+TetMesh Box(int nodes_per_element) {
+  return MakeTetBox({1, 0.5, 0.25}, {3, 2, 1}, nodes_per_element);
+}
+
+void ExpectSame(const TetMesh& read, const TetMesh& written) {
+  EXPECT_EQ(read.nodes, written.nodes);
+  EXPECT_EQ(read.nodes_per_element, written.nodes_per_element);
+  EXPECT_EQ(read.elements, written.elements);
+  ASSERT_EQ(read.boundary.size(), written.boundary.size());
+  for (size_t f = 0; f < read.boundary.size(); ++f) {
+    EXPECT_EQ(read.boundary[f].nodes, written.boundary[f].nodes);
+    EXPECT_EQ(read.boundary[f].given_triangle, static_cast<int32_t>(f));
+  }
+}
+
+std::string Header() { return "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n"; }
+
+/// One tetrahedron whose fourth node has the coordinates `fourth`.
+std::string OneTet(const std::string& fourth, const std::string& element) {
+  return Header() + "$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 " + fourth +
+         "\n$EndNodes\n$Elements\n1\n" + element + "\n$EndElements\n";
+}
+
+TEST_F(ReadGmshTest, GivesTheMeshThatWasWritten) {
+  for (const int nodes_per_element : {4, 10}) {
+    const TetMesh box = Box(nodes_per_element);
+    ExpectSame(ReadTetsOf(ToTextGmsh(box)), box);
+    ExpectSame(ReadTetsOf(ToBinaryGmsh(box)), box);
+  }
+}
+
+TEST_F(ReadGmshTest, LengthsAreInMetres) {
+  const absl::StatusOr<Mesh> read = Read(ToTextGmsh(Box(4)), "msh", 0.5);
+  ASSERT_TRUE(read.ok());
+  EXPECT_EQ(std::get<TetMesh>(*read).nodes.back(), (Point{0.5, 0.25, 0.125}));
+}
+
+TEST_F(ReadGmshTest, TurnsMirroredTetrahedraRound) {
+  for (const int nodes_per_element : {4, 10}) {
+    const TetMesh box = Box(nodes_per_element);
+    TetMesh mirrored = box;
+    for (size_t e = 0; e < box.elements.size(); e += static_cast<size_t>(nodes_per_element)) {
+      int32_t* n = &mirrored.elements[e];
+      std::swap(n[0], n[1]);
+      if (nodes_per_element == 10) {
+        std::swap(n[5], n[6]);
+        std::swap(n[7], n[8]);
+      }
+    }
+    ExpectSame(ReadTetsOf(ToTextGmsh(mirrored)), box);
+  }
+}
+
+TEST_F(ReadGmshTest, PassesOverNodesThatNoTetrahedronHas) {
+  const TetMesh box = Box(4);
+  TetMesh padded = box;
+  padded.nodes.insert(padded.nodes.begin(), {9, 9, 9});
+  for (int32_t& node : padded.elements) ++node;
+  for (BoundaryFace& face : padded.boundary) {
+    for (int32_t& node : face.nodes) ++node;
+  }
+  ExpectSame(ReadTetsOf(ToTextGmsh(padded)), box);
+}
+
+TEST_F(ReadGmshTest, AnotherVersionIsRefused) {
+  EXPECT_THAT(
+      Refused("$MeshFormat\n4.1 0 8\n$EndMeshFormat\n", "msh"),
+      HasSubstr("MESH_UNREADABLE: the file cannot be read as Gmsh MSH 2.2: its version is 4.1"));
+}
+
+TEST_F(ReadGmshTest, AFileWithoutTetrahedraIsRefused) {
+  EXPECT_THAT(Refused(OneTet("0 0 1", "1 2 0 1 2 3"), "msh"), HasSubstr("MESH_EMPTY: "));
+}
+
+TEST_F(ReadGmshTest, ANodeThatIsNotThereIsRefused) {
+  EXPECT_THAT(Refused(OneTet("0 0 1", "1 4 2 0 0 1 2 3 5"), "msh"),
+              HasSubstr("MESH_INDEX_OUT_OF_RANGE: tetrahedron 0 (counted from zero) names node 5"));
+}
+
+TEST_F(ReadGmshTest, ACoordinateThatIsNotFiniteIsRefused) {
+  for (const char* z : {"nan", "inf", "-inf", "1e999"}) {
+    EXPECT_THAT(Refused(OneTet(std::string("0 0 ") + z, "1 4 2 0 0 1 2 3 4"), "msh"),
+                HasSubstr("MESH_NOT_FINITE: node 4"))
+        << z;
+  }
+}
+
+TEST_F(ReadGmshTest, AFlatTetrahedronIsRefused) {
+  EXPECT_THAT(Refused(OneTet("0.5 0.25 0", "1 4 0 1 2 3 4"), "msh"),
+              HasSubstr("MESH_ZERO_VOLUME: tetrahedron 0"));
+}
+
+TEST_F(ReadGmshTest, OtherElementsAreRefused) {
+  EXPECT_THAT(Refused(OneTet("0 0 1", "1 5 0 1 2 3 4 1 2 3 4"), "msh"),
+              HasSubstr("MESH_ELEMENT_UNSUPPORTED: the file has an element of Gmsh's type 5"));
+}
+
+TEST_F(ReadGmshTest, TetrahedraOfBothKindsAreRefused) {
+  std::string text = ToTextGmsh(Box(10));
+  text.replace(text.rfind("$EndElements"), 12, "999 4 0 11 12 13 14\n$EndElements");
+  const size_t count = text.find("$Elements\n") + 10;
+  const size_t end = text.find('\n', count);
+  text.replace(count, end - count, std::to_string(std::stoi(text.substr(count)) + 1));
+  EXPECT_THAT(Refused(text, "msh"),
+              HasSubstr("MESH_ELEMENT_UNSUPPORTED: the file has tetrahedra of 4"));
+}
+
+TEST_F(ReadGmshTest, MidsideNodesInAnotherOrderAreRefused) {
+  TetMesh box = Box(10);
+  for (size_t e = 0; e < box.elements.size(); e += 10) {
+    std::swap(box.elements[e + 8], box.elements[e + 9]);
+  }
+  EXPECT_THAT(Refused(ToTextGmsh(box), "msh"), HasSubstr("MESH_MIDSIDE_NODE_MISPLACED: "));
+}
+
+TEST_F(ReadGmshTest, PiecesThatDoNotHangTogetherAreRefused) {
+  TetMesh two = Box(4);
+  const TetMesh other = Box(4);
+  const auto offset = static_cast<int32_t>(two.nodes.size());
+  for (Point p : other.nodes) two.nodes.push_back({p[0] + 5, p[1], p[2]});
+  for (const int32_t node : other.elements) two.elements.push_back(node + offset);
+  EXPECT_THAT(Refused(ToTextGmsh(two), "msh"),
+              HasSubstr("MESH_SEVERAL_PIECES: only 36 of 72 tetrahedra"));
+}
+
+TEST_F(ReadGmshTest, AFileThatEndsEarlyIsRefused) {
+  for (const std::string& file : {ToTextGmsh(Box(4)), ToBinaryGmsh(Box(4))}) {
+    for (const size_t part : {3U, 5U, 40U}) {
+      EXPECT_THAT(Refused(file.substr(0, file.size() - file.size() / part), "msh"),
+                  HasSubstr("MESH_UNREADABLE: "));
+    }
+  }
+}
+
+TEST_F(ReadGmshTest, AMeshOverTheLimitIsRefused) {
+  const std::string nodes(9 * 2'000'001, '\n');
+  EXPECT_THAT(Refused(Header() + "$Nodes\n2000001\n" + nodes, "msh"),
+              HasSubstr("RESOURCE_EXHAUSTED: MESH_TOO_LARGE: the mesh has 2000001 nodes"));
+}
+
+}  // namespace
+}  // namespace carillon::precompute

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <variant>
+
+#include "precompute/mesh/read_mesh.h"
+
+namespace carillon::precompute {
+
+/// Writes a mesh file and reads it.
+class ReadMeshTest : public testing::Test {
+ protected:
+  absl::StatusOr<Mesh> Read(const std::string& bytes, const std::string& format,
+                            double metres_per_unit = 1) const {
+    std::ofstream(path_, std::ios::binary) << bytes;
+    absl::StatusOr<Mesh> mesh = ReadMesh(path_, format, metres_per_unit);
+    std::filesystem::remove(path_);
+    return mesh;
+  }
+
+  SurfaceMesh ReadSurfaceOf(const std::string& bytes, const std::string& format) const {
+    const absl::StatusOr<Mesh> mesh = Read(bytes, format);
+    EXPECT_TRUE(mesh.ok()) << mesh.status();
+    return mesh.ok() ? std::get<SurfaceMesh>(*mesh) : SurfaceMesh{};
+  }
+
+  TetMesh ReadTetsOf(const std::string& bytes) const {
+    const absl::StatusOr<Mesh> mesh = Read(bytes, "msh");
+    EXPECT_TRUE(mesh.ok()) << mesh.status();
+    return mesh.ok() ? std::get<TetMesh>(*mesh) : TetMesh{};
+  }
+
+  std::string Refused(const std::string& bytes, const std::string& format) const {
+    return Read(bytes, format).status().ToString();
+  }
+
+ private:
+  // Tests run side by side, each in a process of its own.
+  std::string path_ = testing::TempDir() + "mesh_of_" +
+                      testing::UnitTest::GetInstance()->current_test_info()->name();
+};
+
+}  // namespace carillon::precompute
