@@ -3,9 +3,9 @@
 
 #include <fcntl.h>
 #include <signal.h>
-#include <sys/pidfd.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -112,7 +112,8 @@ absl::StatusOr<ChildProcess> ChildProcess::Spawn(const std::vector<std::string>&
   if (pid < 0) return NotStarted();
   if (pid == 0) RunInChild(parent, arguments.data(), events.write_end, errors.write_end);
   setpgid(pid, pid);  // as the child does: whichever comes first
-  const int process = pidfd_open(pid, 0);
+  // By number: the header of glibc 2.36 cannot be used from C++.
+  const int process = static_cast<int>(syscall(SYS_pidfd_open, pid, 0));
   ChildProcess child(pid, process, std::exchange(events.read_end, -1),
                      std::exchange(errors.read_end, -1));
   if (process < 0) return NotStarted();

@@ -78,8 +78,8 @@ absl::Status QueueCore::TakeUp() {
   absl::MutexLock lock(&mutex_);
   for (JobRecord record : *records) {
     auto request = ParseRequest(record);
-    absl::StatusOr<bool> satisfied = request.status();
-    if (request.ok()) satisfied = IsSatisfied(std::nullopt, record.digest, *request);
+    const absl::StatusOr<bool> satisfied =
+        request.ok() ? IsSatisfied(std::nullopt, record.digest, *request) : request.status();
     if (satisfied.ok() && !*satisfied) {
       Enqueue(std::move(record), *std::move(request));
       continue;

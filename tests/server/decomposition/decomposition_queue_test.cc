@@ -1,0 +1,423 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/decomposition/decomposition_queue.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <set>
+#include <thread>
+#include <vector>
+
+#include "absl/strings/match.h"
+#include "absl/synchronization/mutex.h"
+#include "server/base/sha256.h"
+#include "server/decomposition/decomposition_request.h"
+#include "server/decomposition/local_executor.h"
+#include "tests/server/decomposition/scripted_worker.h"
+
+namespace carillon {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+constexpr absl::Duration kDeadline = absl::Seconds(60);
+
+std::string DigestOf(const v1::Job& job) { return job.name().substr(5); }
+
+/// What a watch was told, for waiting.
+class Diary {
+ public:
+  void Write(const v1::Job& job) {
+    absl::MutexLock lock(&mutex_);
+    if (states_.empty() || states_.back() != job.state()) states_.push_back(job.state());
+    last_ = job;
+  }
+
+  v1::Job Await(v1::JobState state) {
+    absl::MutexLock lock(&mutex_);
+    const auto reached = [&]() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+      return last_.state() == state;
+    };
+    EXPECT_TRUE(mutex_.AwaitWithTimeout(absl::Condition(&reached), kDeadline)) << state;
+    return last_;
+  }
+
+  v1::Job AwaitEnd() {
+    absl::MutexLock lock(&mutex_);
+    const auto ended = [&]() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+      return last_.state() >= v1::JOB_STATE_SUCCEEDED;
+    };
+    EXPECT_TRUE(mutex_.AwaitWithTimeout(absl::Condition(&ended), kDeadline));
+    return last_;
+  }
+
+  std::vector<v1::JobState> states() {
+    absl::MutexLock lock(&mutex_);
+    return states_;
+  }
+
+ private:
+  absl::Mutex mutex_;
+  std::vector<v1::JobState> states_ ABSL_GUARDED_BY(mutex_);
+  v1::Job last_ ABSL_GUARDED_BY(mutex_);
+};
+
+// Every run of a script appends a line to "runs". The models in the folder are complete up to what
+// SampleRequest wants with a maximal frequency of 10 kHz ("model10") and of 20 kHz ("model20").
+constexpr char kCount[] = "echo $band >>\"$here/runs\"\n";
+constexpr char kSucceed[] =
+    "case $band in *:20000) cp \"$here/model20\" \"$out\";; *) cp \"$here/model10\" \"$out\";; "
+    "esac";
+constexpr char kWaitAtGate[] = "read line <\"$here/gate\"\n";
+
+class DecompositionQueueTest : public ::testing::Test {
+ protected:
+  DecompositionQueueTest() {
+    Open("carillon.db");
+    mesh_ = database_->meshes().Put("solid")->digest;
+    WriteModel("model10", 10'000);
+    WriteModel("model20", 20'000);
+  }
+
+  void WriteModel(const std::string& name, double frequency_hz) {
+    ModalModel model = SampleModel(3, 4);
+    model.complete_to_eigenvalue =
+        UnitEigenvalue(*ResolveRequest(SampleRequest(mesh_)), frequency_hz);
+    WriteRecords(folder_ / name, SampleRecords(model));
+  }
+
+  void Open(const std::string& name) {
+    queue_.reset();
+    database_.reset();
+    auto database = ModeDatabase::Open(folder_ / name, clock_);
+    ASSERT_TRUE(database.ok()) << database.status();
+    database_ = *std::move(database);
+  }
+
+  void MakeQueue(const std::string& script) {
+    queue_.reset();
+    LocalExecutorOptions options;
+    options.program = WriteWorkerScript(folder_.path(), script);
+    options.directory = folder_ / "running";
+    options.worker_count = 1;
+    auto executor = MakeLocalExecutor(options, clock_);
+    ASSERT_TRUE(executor.ok()) << executor.status();
+    auto queue = DecompositionQueue::Make(*database_, *std::move(executor), clock_);
+    ASSERT_TRUE(queue.ok()) << queue.status();
+    queue_ = *std::move(queue);
+  }
+
+  v1::CreateModalModelRequest Request(double max_frequency_hz, uint32_t node_count = 0) {
+    v1::CreateModalModelRequest request = SampleRequest(mesh_);
+    request.set_max_frequency_hz(max_frequency_hz);
+    request.mutable_settings()->mutable_mesh()->set_target_node_count(node_count);
+    return request;
+  }
+
+  v1::Job Submit(const v1::CreateModalModelRequest& request) {
+    const auto job = queue_->Submit(request);
+    EXPECT_TRUE(job.ok()) << job.status();
+    return job.ok() ? *job : v1::Job();
+  }
+
+  std::unique_ptr<JobWatch> Watch(const v1::Job& job, Diary& diary) {
+    auto watch = queue_->Watch(DigestOf(job), [&diary](const v1::Job& now) { diary.Write(now); });
+    EXPECT_TRUE(watch.ok()) << watch.status();
+    return watch.ok() ? *std::move(watch) : nullptr;
+  }
+
+  v1::Job SubmitAndAwaitEnd(const v1::CreateModalModelRequest& request) {
+    Diary diary;
+    const auto watch = Watch(Submit(request), diary);
+    return diary.AwaitEnd();
+  }
+
+  size_t RunCount() {
+    const std::string runs = ReadBytes(folder_ / "runs");
+    return static_cast<size_t>(std::ranges::count(runs, '\n'));
+  }
+
+  TemporaryFolder folder_;
+  SystemClock clock_;
+  std::string mesh_;
+  std::unique_ptr<ModeDatabase> database_;
+  std::unique_ptr<DecompositionQueue> queue_;
+};
+
+TEST_F(DecompositionQueueTest, FiftySubmitsAtATimeComputeOnce) {
+  MakeQueue(absl::StrCat(kCount, kSucceed));
+  std::vector<v1::Job> jobs(50);
+  std::vector<std::thread> threads;
+  for (v1::Job& job : jobs) threads.emplace_back([&] { job = SubmitAndAwaitEnd(Request(20'000)); });
+  for (std::thread& thread : threads) thread.join();
+  for (const v1::Job& job : jobs) {
+    EXPECT_EQ(job.name(), jobs.front().name());
+    EXPECT_EQ(job.state(), v1::JOB_STATE_SUCCEEDED);
+  }
+  EXPECT_EQ(RunCount(), 1U);
+  EXPECT_TRUE(database_->models().Find(DigestOf(jobs.front())).ok());
+}
+
+TEST_F(DecompositionQueueTest, AKnownModelSucceedsAtOnceAfterARestart) {
+  MakeQueue(kSucceed);
+  const v1::Job done = SubmitAndAwaitEnd(Request(20'000));
+  Open("carillon.db");
+  MakeQueue("exit 1");
+  EXPECT_EQ(Submit(Request(20'000)).state(), v1::JOB_STATE_SUCCEEDED);
+  EXPECT_EQ(Submit(Request(5'000)).name(), done.name());
+}
+
+TEST_F(DecompositionQueueTest, AModelThatIsNotCompleteFarEnoughIsComputedAgain) {
+  MakeQueue(absl::StrCat(kCount, kSucceed));
+  const v1::Job first = SubmitAndAwaitEnd(Request(10'000));
+  const auto before = database_->models().Find(DigestOf(first));
+  const v1::Job second = SubmitAndAwaitEnd(Request(20'000));
+  EXPECT_EQ(second.name(), first.name());
+  EXPECT_EQ(second.state(), v1::JOB_STATE_SUCCEEDED);
+  EXPECT_EQ(RunCount(), 2U);
+  const auto after = database_->models().Find(DigestOf(first));
+  EXPECT_GT((*after)->complete_to_eigenvalue, (*before)->complete_to_eigenvalue);
+}
+
+TEST_F(DecompositionQueueTest, AModelThatGoesNoFartherIsNotComputedForEver) {
+  MakeQueue(absl::StrCat(kCount, "cp \"$here/model10\" \"$out\""));
+  SubmitAndAwaitEnd(Request(20'000));
+  EXPECT_EQ(Submit(Request(20'000)).state(), v1::JOB_STATE_SUCCEEDED);
+  EXPECT_EQ(RunCount(), 1U);
+}
+
+TEST_F(DecompositionQueueTest, ARunningJobIsExtendedByAFartherRequest) {
+  const Gate gate(folder_ / "gate");
+  MakeQueue(absl::StrCat(kCount, kWaitAtGate, kSucceed));
+  Diary diary;
+  const auto watch = Watch(Submit(Request(10'000)), diary);
+  diary.Await(v1::JOB_STATE_RUNNING);
+  EXPECT_EQ(Submit(Request(20'000)).state(), v1::JOB_STATE_RUNNING);
+  gate.Open();
+  gate.Open();
+  const v1::Job job = diary.AwaitEnd();
+  EXPECT_EQ(job.state(), v1::JOB_STATE_SUCCEEDED);
+  EXPECT_EQ(RunCount(), 2U);
+  EXPECT_GE((*database_->models().Find(DigestOf(job)))->complete_to_eigenvalue,
+            WantedEigenvalue(*ResolveRequest(Request(20'000))) * (1 - 1e-9));
+}
+
+TEST_F(DecompositionQueueTest, ARefusalIsRememberedAcrossARestart) {
+  WriteBytes(folder_ / "events", ErrorBytes("MESH_NOT_CLOSED"));
+  MakeQueue(absl::StrCat(kCount, "cat \"$here/events\" >&3; exit 1"));
+  EXPECT_EQ(SubmitAndAwaitEnd(Request(10'000)).error().reason(), "MESH_NOT_CLOSED");
+  Open("carillon.db");
+  MakeQueue(absl::StrCat(kCount, kSucceed));
+  const v1::Job job = Submit(Request(20'000));
+  EXPECT_EQ(job.state(), v1::JOB_STATE_FAILED);
+  EXPECT_EQ(job.error().reason(), "MESH_NOT_CLOSED");
+  EXPECT_EQ(RunCount(), 1U);
+}
+
+TEST_F(DecompositionQueueTest, ABodyWithoutModesInTheBandIsTriedAgainInAnotherBand) {
+  WriteBytes(folder_ / "events", ErrorBytes("NO_MODE_IN_BAND"));
+  MakeQueue(absl::StrCat(kCount, "case $band in *:20000) cp \"$here/model20\" \"$out\";; ",
+                         "*) cat \"$here/events\" >&3; exit 1;; esac"));
+  EXPECT_EQ(SubmitAndAwaitEnd(Request(10'000)).error().reason(), "NO_MODE_IN_BAND");
+  EXPECT_EQ(Submit(Request(10'000)).state(), v1::JOB_STATE_FAILED);
+  EXPECT_EQ(RunCount(), 1U);
+  EXPECT_EQ(SubmitAndAwaitEnd(Request(20'000)).state(), v1::JOB_STATE_SUCCEEDED);
+  EXPECT_EQ(RunCount(), 2U);
+}
+
+TEST_F(DecompositionQueueTest, ACrashIsTriedAgainWhenAskedAgain) {
+  MakeQueue(absl::StrCat(kCount, "if [ -e \"$here/crashed\" ]; then ", kSucceed,
+                         "; else touch \"$here/crashed\"; kill -SEGV $$; fi"));
+  const v1::Job crashed = SubmitAndAwaitEnd(Request(20'000));
+  EXPECT_EQ(crashed.state(), v1::JOB_STATE_FAILED);
+  EXPECT_EQ(crashed.error().reason(), "WORKER_CRASHED");
+  EXPECT_EQ(SubmitAndAwaitEnd(Request(20'000)).state(), v1::JOB_STATE_SUCCEEDED);
+}
+
+TEST_F(DecompositionQueueTest, AModelThatBreaksTheRulesIsAFailureAndNotStored) {
+  MakeQueue("echo 'no model' >\"$out\"");
+  const v1::Job job = SubmitAndAwaitEnd(Request(20'000));
+  EXPECT_EQ(job.state(), v1::JOB_STATE_FAILED);
+  EXPECT_EQ(job.error().reason(), "MODAL_MODEL_MALFORMED");
+  EXPECT_FALSE(database_->models().Find(DigestOf(job)).ok());
+}
+
+TEST_F(DecompositionQueueTest, QueuedAndRunningJobsGoOnAfterTheDaemonWasKilled) {
+  const Gate gate(folder_ / "gate");
+  MakeQueue(absl::StrCat(kWaitAtGate, kSucceed));
+  Diary diary;
+  const v1::Job running = Submit(Request(20'000, 1));
+  const auto watch = Watch(running, diary);
+  diary.Await(v1::JOB_STATE_RUNNING);
+  const v1::Job queued = Submit(Request(20'000, 2));
+  EXPECT_EQ(queued.state(), v1::JOB_STATE_QUEUED);
+  // What kill -9 leaves: the database and its log as they are at this moment.
+  std::filesystem::copy_file(folder_ / "carillon.db", folder_ / "copy.db");
+  std::filesystem::copy_file(folder_ / "carillon.db-wal", folder_ / "copy.db-wal");
+  Open("copy.db");
+  MakeQueue(kSucceed);
+  for (const v1::Job& job : {running, queued}) {
+    Diary again;
+    const auto watch_again = Watch(job, again);
+    EXPECT_EQ(again.AwaitEnd().state(), v1::JOB_STATE_SUCCEEDED);
+    EXPECT_TRUE(database_->models().Find(DigestOf(job)).ok());
+  }
+}
+
+TEST_F(DecompositionQueueTest, AJobWhoseModelWasStoredJustBeforeTheEndIsNotRunAgain) {
+  const auto request = ResolveRequest(Request(20'000));
+  const std::string digest = RequestDigest(*request);
+  ASSERT_TRUE(
+      database_->jobs().Put({.digest = digest, .request = request->SerializeAsString()}).ok());
+  ASSERT_TRUE(database_->models().PutFile(digest, "", folder_ / "model20").ok());
+  MakeQueue(kCount);
+  EXPECT_EQ(queue_->Get(digest)->state(), v1::JOB_STATE_SUCCEEDED);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "runs"));
+}
+
+TEST_F(DecompositionQueueTest, CancelEndsAQueuedJobAtOnceAndARunningOneSoon) {
+  const Gate gate(folder_ / "gate");
+  MakeQueue(absl::StrCat(kWaitAtGate, kSucceed));
+  Diary first;
+  const v1::Job running = Submit(Request(20'000, 1));
+  const auto watch = Watch(running, first);
+  first.Await(v1::JOB_STATE_RUNNING);
+  const v1::Job queued = Submit(Request(20'000, 2));
+  EXPECT_EQ(queue_->Cancel(DigestOf(queued))->state(), v1::JOB_STATE_CANCELLED);
+  EXPECT_TRUE(queue_->Cancel(DigestOf(running)).ok());
+  EXPECT_EQ(first.AwaitEnd().state(), v1::JOB_STATE_CANCELLED);
+  EXPECT_EQ(queue_->Cancel(DigestOf(running))->state(), v1::JOB_STATE_CANCELLED);
+  Open("carillon.db");
+  MakeQueue(kSucceed);
+  EXPECT_EQ(queue_->Get(DigestOf(running))->state(), v1::JOB_STATE_CANCELLED);
+  EXPECT_EQ(SubmitAndAwaitEnd(Request(20'000, 1)).state(), v1::JOB_STATE_SUCCEEDED);
+}
+
+TEST_F(DecompositionQueueTest, ASubmitAfterACancelIsServedEvenIfTheWorkerStillDies) {
+  const Gate gate(folder_ / "gate");
+  const NamedPipe started(folder_ / "started");
+  // The first run waits for ever, the second does not.
+  MakeQueue(absl::StrCat("[ -e \"$here/ran\" ] || { touch \"$here/ran\"; echo >\"$here/started\"; ",
+                         kWaitAtGate, "}\n", kSucceed));
+  const v1::Job job = Submit(Request(20'000));
+  ASSERT_TRUE(started.GetsAByte());
+  EXPECT_TRUE(queue_->Cancel(DigestOf(job)).ok());
+  Diary again;
+  const auto watch_again = Watch(Submit(Request(20'000)), again);
+  EXPECT_EQ(again.AwaitEnd().state(), v1::JOB_STATE_SUCCEEDED);
+}
+
+TEST_F(DecompositionQueueTest, DeletingAModelEndsItsExtension) {
+  const Gate gate(folder_ / "gate");
+  MakeQueue(absl::StrCat(kWaitAtGate, kSucceed));
+  gate.Open();
+  const std::string digest = DigestOf(SubmitAndAwaitEnd(Request(10'000)));
+  Diary diary;
+  const auto watch = Watch(Submit(Request(20'000)), diary);
+  diary.Await(v1::JOB_STATE_RUNNING);
+  EXPECT_TRUE(queue_->DeleteModel(digest).ok());
+  EXPECT_EQ(diary.AwaitEnd().state(), v1::JOB_STATE_CANCELLED);
+  EXPECT_THAT(queue_->Get(digest).status().ToString(), HasSubstr("JOB_NOT_FOUND"));
+  EXPECT_FALSE(database_->models().Find(digest).ok());
+  EXPECT_THAT(queue_->DeleteModel(digest).ToString(), HasSubstr("MODAL_MODEL_NOT_FOUND"));
+}
+
+TEST_F(DecompositionQueueTest, AWatchTellsEveryStateAndProgressThenEnds) {
+  const Gate gate(folder_ / "gate");
+  WriteBytes(folder_ / "events", ProgressBytes(0.75));
+  MakeQueue(absl::StrCat(kWaitAtGate, "cat \"$here/events\" >&3\n", kSucceed));
+  Submit(Request(20'000, 1));
+  const v1::Job job = Submit(Request(20'000, 2));
+  Diary diary;
+  absl::Mutex mutex;
+  double fraction = 0;
+  const auto watch = queue_->Watch(DigestOf(job), [&](const v1::Job& now) {
+    diary.Write(now);
+    absl::MutexLock lock(&mutex);
+    fraction = std::max(fraction, now.progress().fraction());
+  });
+  gate.Open();
+  gate.Open();
+  diary.AwaitEnd();
+  EXPECT_THAT(diary.states(),
+              ElementsAre(v1::JOB_STATE_QUEUED, v1::JOB_STATE_RUNNING, v1::JOB_STATE_SUCCEEDED));
+  absl::MutexLock lock(&mutex);
+  EXPECT_EQ(fraction, 0.75);
+}
+
+TEST_F(DecompositionQueueTest, AWatchMayEndItselfAndIsNotCalledAgain) {
+  const Gate gate(folder_ / "gate");
+  MakeQueue(absl::StrCat(kWaitAtGate, kSucceed));
+  const v1::Job job = Submit(Request(20'000));
+  absl::Mutex mutex;
+  std::unique_ptr<JobWatch> watch;
+  bool ended = false;
+  int calls_after_end = 0;
+  auto made = queue_->Watch(DigestOf(job), [&](const v1::Job&) {
+    absl::MutexLock lock(&mutex);
+    if (ended) ++calls_after_end;
+    if (watch != nullptr) ended = true;
+    watch.reset();
+  });
+  {
+    absl::MutexLock lock(&mutex);
+    if (!ended) watch = *std::move(made);
+  }
+  Diary diary;
+  const auto other = Watch(job, diary);
+  gate.Open();
+  diary.AwaitEnd();
+  absl::MutexLock lock(&mutex);
+  EXPECT_EQ(calls_after_end, 0);
+}
+
+TEST_F(DecompositionQueueTest, AWatchOfAnEndedJobTellsItsEndAtOnce) {
+  MakeQueue(kSucceed);
+  const v1::Job job = SubmitAndAwaitEnd(Request(20'000));
+  Diary diary;
+  const auto watch = Watch(job, diary);
+  EXPECT_THAT(diary.states(), ElementsAre(v1::JOB_STATE_SUCCEEDED));
+}
+
+TEST_F(DecompositionQueueTest, ListsJobsNewestFirstAsTheyStandNow) {
+  const Gate gate(folder_ / "gate");
+  MakeQueue(absl::StrCat(kWaitAtGate, kSucceed));
+  const v1::Job first = Submit(Request(20'000, 1));
+  Diary diary;
+  const auto watch = Watch(first, diary);
+  diary.Await(v1::JOB_STATE_RUNNING);
+  const v1::Job second = Submit(Request(20'000, 2));
+  const auto page = queue_->List(0, "");
+  ASSERT_TRUE(page.ok()) << page.status();
+  ASSERT_EQ(page->jobs.size(), 2U);
+  EXPECT_EQ(page->jobs[0].name(), second.name());
+  EXPECT_EQ(page->jobs[0].state(), v1::JOB_STATE_QUEUED);
+  EXPECT_EQ(page->jobs[1].state(), v1::JOB_STATE_RUNNING);
+}
+
+TEST_F(DecompositionQueueTest, RefusesMoreThanItCanRemember) {
+  const Gate gate(folder_ / "gate");
+  MakeQueue(kWaitAtGate);
+  // One runs, the others wait.
+  for (uint32_t i = 0; i <= DecompositionQueue::kMaxQueuedCount; ++i) {
+    ASSERT_TRUE(queue_->Submit(Request(20'000, 1 + i)).ok());
+  }
+  const auto refused = queue_->Submit(Request(20'000, 5'000));
+  EXPECT_TRUE(absl::IsResourceExhausted(refused.status()));
+  EXPECT_THAT(refused.status().ToString(), HasSubstr("QUEUE_FULL"));
+}
+
+TEST_F(DecompositionQueueTest, RefusesAMeshThatWasNeverUploaded) {
+  MakeQueue(kSucceed);
+  EXPECT_THAT(queue_->Submit(SampleRequest(Sha256Hex("other"))).status().ToString(),
+              HasSubstr("MESH_NOT_FOUND"));
+  EXPECT_THAT(queue_->Get(Sha256Hex("other")).status().ToString(), HasSubstr("JOB_NOT_FOUND"));
+  EXPECT_THAT(queue_->Cancel("x").status().ToString(), HasSubstr("JOB_NOT_FOUND"));
+  EXPECT_THAT(queue_->Watch("x", [](const v1::Job&) {}).status().ToString(),
+              HasSubstr("JOB_NOT_FOUND"));
+}
+
+}  // namespace
+}  // namespace carillon

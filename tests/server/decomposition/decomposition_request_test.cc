@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/decomposition/decomposition_request.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <numbers>
+#include <set>
+
+#include "server/base/sha256.h"
+
+namespace carillon {
+namespace {
+
+using ::testing::HasSubstr;
+using Request = v1::CreateModalModelRequest;
+
+Request Aluminum() {
+  Request request;
+  request.set_mesh_digest(Sha256Hex("mesh"));
+  request.set_mesh_format("obj");
+  request.mutable_material()->set_preset("chime_aluminum");
+  return request;
+}
+
+std::string Digest(const Request& request) {
+  const auto resolved = ResolveRequest(request);
+  EXPECT_TRUE(resolved.ok()) << resolved.status();
+  return resolved.ok() ? RequestDigest(*resolved) : "";
+}
+
+TEST(DecompositionRequest, TheCanonicalTextIsTheDocumentedOne) {
+  Request request = Aluminum();
+  request.mutable_settings()->set_poisson_ratio(0.33);
+  request.mutable_settings()->set_metres_per_unit(0.001);
+  request.mutable_settings()->mutable_mesh()->set_keep_surface(true);
+  EXPECT_EQ(CanonicalText(*ResolveRequest(request)),
+            "carillon-decomposition 1\n"
+            "mesh " +
+                Sha256Hex("mesh") +
+                "\n"
+                "format obj\n"
+                "poisson_1e-4 3300\n"
+                "element quadratic\n"
+                "mass consistent\n"
+                "metres_per_unit 0.001\n"
+                "keep_surface yes\n"
+                "target_node_count 0\n");
+}
+
+TEST(DecompositionRequest, WhatIsLeftOutMeansTheDefault) {
+  Request given = Aluminum();
+  v1::DecompositionSettings& settings = *given.mutable_settings();
+  settings.set_poisson_ratio(ResolveRequest(Aluminum())->material().poisson_ratio());
+  settings.set_element(v1::ELEMENT_QUADRATIC);
+  settings.set_mass_matrix(v1::MASS_MATRIX_CONSISTENT);
+  settings.set_metres_per_unit(1);
+  EXPECT_EQ(Digest(given), Digest(Aluminum()));
+}
+
+TEST(DecompositionRequest, PoissonsRatioIsRoundedToOneInTenThousand) {
+  const auto digest = [](double poisson) {
+    Request request = Aluminum();
+    request.mutable_settings()->set_poisson_ratio(poisson);
+    return Digest(request);
+  };
+  EXPECT_EQ(digest(0.33), digest(0.330049));
+  EXPECT_NE(digest(0.33), digest(0.330051));
+  EXPECT_NE(digest(0.33), digest(-0.33));
+}
+
+TEST(DecompositionRequest, HintsAndLabelAreNoPartOfTheName) {
+  Request request = Aluminum();
+  request.mutable_settings()->set_poisson_ratio(0.3);
+  const std::string digest = Digest(request);
+  request.mutable_material()->set_young_pa(1e9);
+  request.set_size(3);
+  request.set_min_frequency_hz(50);
+  request.set_max_frequency_hz(5000);
+  request.set_label("bell");
+  EXPECT_EQ(Digest(request), digest);
+}
+
+TEST(DecompositionRequest, EverySettingIsPartOfTheName) {
+  const std::vector<std::function<void(Request&)>> changes = {
+      [](Request&) {},
+      [](Request& r) { r.set_mesh_digest(Sha256Hex("other")); },
+      [](Request& r) { r.set_mesh_format("ply"); },
+      [](Request& r) { r.mutable_settings()->set_poisson_ratio(0.1); },
+      [](Request& r) { r.mutable_settings()->set_element(v1::ELEMENT_LINEAR); },
+      [](Request& r) { r.mutable_settings()->set_mass_matrix(v1::MASS_MATRIX_LUMPED); },
+      [](Request& r) { r.mutable_settings()->set_metres_per_unit(0.0254); },
+      [](Request& r) { r.mutable_settings()->mutable_mesh()->set_keep_surface(true); },
+      [](Request& r) { r.mutable_settings()->mutable_mesh()->set_keep_surface(false); },
+      [](Request& r) { r.mutable_settings()->mutable_mesh()->set_target_node_count(500); }};
+  std::set<std::string> digests;
+  for (const auto& change : changes) {
+    Request request = Aluminum();
+    change(request);
+    digests.insert(Digest(request));
+  }
+  EXPECT_EQ(digests.size(), changes.size());
+}
+
+// A mode at the wanted eigenvalue, scaled to the material and size as modal_model.proto says,
+// sounds at the maximal frequency.
+TEST(DecompositionRequest, TheWantedEigenvalueScalesToTheMaximalFrequency) {
+  Request request = Aluminum();
+  request.set_size(2.5);
+  request.set_max_frequency_hz(12'345);
+  const auto resolved = ResolveRequest(request);
+  ASSERT_TRUE(resolved.ok()) << resolved.status();
+  const v1::Material& material = resolved->material();
+  const double scaled = WantedEigenvalue(*resolved) * material.young_pa() /
+                        (material.density_kg_per_m3() * 2.5 * 2.5);
+  // Rounding only.
+  EXPECT_NEAR(std::sqrt(scaled) / (2 * std::numbers::pi), 12'345, 1e-9);
+}
+
+TEST(DecompositionRequest, RefusesWhatCannotBeComputed) {
+  const auto refusal = [](const std::function<void(Request&)>& change) {
+    Request request = Aluminum();
+    change(request);
+    return ResolveRequest(request).status().ToString();
+  };
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THAT(refusal([](Request& r) { r.set_mesh_format("step"); }),
+              HasSubstr("MESH_FORMAT_UNKNOWN"));
+  EXPECT_THAT(refusal([](Request& r) { r.set_mesh_digest("x\nformat obj"); }),
+              HasSubstr("MESH_NOT_FOUND"));
+  EXPECT_THAT(refusal([](Request& r) { r.mutable_material()->set_preset("cheese"); }),
+              HasSubstr("UNKNOWN_MATERIAL"));
+  EXPECT_THAT(refusal([](Request& r) { r.clear_material(); }), HasSubstr("INVALID_MATERIAL"));
+  EXPECT_THAT(refusal([](Request& r) { r.mutable_settings()->set_poisson_ratio(0.49999); }),
+              HasSubstr("INVALID_SETTINGS"));
+  EXPECT_THAT(refusal([](Request& r) { r.mutable_settings()->set_metres_per_unit(kNan); }),
+              HasSubstr("INVALID_SETTINGS"));
+  EXPECT_THAT(refusal([](Request& r) { r.set_size(-1); }), HasSubstr("INVALID_SETTINGS"));
+  EXPECT_THAT(refusal([](Request& r) { r.set_max_frequency_hz(10); }),
+              HasSubstr("INVALID_SETTINGS"));
+  EXPECT_THAT(refusal([](Request& r) { r.set_label(std::string(201, 'x')); }),
+              HasSubstr("INVALID_SETTINGS"));
+}
+
+}  // namespace
+}  // namespace carillon

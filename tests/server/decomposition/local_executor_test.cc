@@ -1,0 +1,242 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/decomposition/local_executor.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+
+#include <future>
+#include <limits>
+
+#include "absl/synchronization/notification.h"
+#include "server/base/sha256.h"
+#include "server/decomposition/decomposition_request.h"
+#include "tests/server/decomposition/scripted_worker.h"
+
+namespace carillon {
+namespace {
+
+using std::chrono::milliseconds;
+using ::testing::HasSubstr;
+
+constexpr absl::Duration kDeadline = absl::Seconds(30);
+
+/// One task, and what became of it.
+struct TaskRun {
+  absl::Notification progressed;
+  absl::Notification ended;
+  std::vector<double> fractions;
+  Outcome outcome;
+  std::string model;  // content of the model file
+};
+
+class LocalExecutorTest : public ::testing::Test {
+ protected:
+  void MakeExecutor(const std::string& script) {
+    options_.program = WriteWorkerScript(folder_.path(), script);
+    options_.directory = folder_ / "running";
+    auto executor = MakeLocalExecutor(options_, clock_);
+    ASSERT_TRUE(executor.ok()) << executor.status();
+    executor_ = *std::move(executor);
+  }
+
+  void Start(TaskRun& run) {
+    executor_->Start({.digest = digest_,
+                      .request = *ResolveRequest(SampleRequest(Sha256Hex("solid"))),
+                      .write_mesh =
+                          [](const std::filesystem::path& file) {
+                            WriteBytes(file, "solid");
+                            return absl::OkStatus();
+                          },
+                      .on_progress =
+                          [&run](const v1::Progress& progress) {
+                            run.fractions.push_back(progress.fraction());
+                            if (run.fractions.size() == 1) run.progressed.Notify();
+                          },
+                      .on_end =
+                          [&run](const Outcome& outcome) {
+                            run.outcome = outcome;
+                            if (outcome.verdict == Verdict::kOk)
+                              run.model = ReadBytes(outcome.model_file);
+                            run.ended.Notify();
+                          }});
+  }
+
+  Outcome RunScript(const std::string& script) {
+    MakeExecutor(script);
+    Start(run_);
+    EXPECT_TRUE(run_.ended.WaitForNotificationWithTimeout(kDeadline));
+    return run_.outcome;
+  }
+
+  void WriteEvents(const std::string& bytes) { WriteBytes(folder_ / "events", bytes); }
+
+  TemporaryFolder folder_;
+  SystemClock clock_;
+  LocalExecutorOptions options_;
+  const std::string digest_ = Sha256Hex("task");
+  TaskRun run_;
+  std::unique_ptr<Executor> executor_;
+};
+
+TEST_F(LocalExecutorTest, HandsOverWhatTheWorkerMadeOfTheMesh) {
+  const Outcome outcome = RunScript("tr a-z A-Z <\"$mesh\" >\"$out\"");
+  EXPECT_EQ(outcome.verdict, Verdict::kOk) << outcome.error.message();
+  EXPECT_EQ(run_.model, "SOLID");
+}
+
+TEST_F(LocalExecutorTest, RunsTheWorkerNicedAndNoisyStreamsHarmless) {
+  const Outcome outcome =
+      RunScript("nice >\"$out\"; cat; head -c 1000000 /dev/zero; head -c 1000000 /dev/zero >&2");
+  EXPECT_EQ(outcome.verdict, Verdict::kOk) << outcome.error.message();
+  EXPECT_EQ(run_.model, "10\n");
+}
+
+TEST_F(LocalExecutorTest, KeepsAndRevealsNothingOfAMesh) {
+  std::filesystem::create_directory(folder_ / "running");
+  WriteBytes(folder_ / "running/left-over", "of a daemon that was killed");
+  RunScript("stat -c %a \"$here/running\" >\"$out\"");
+  EXPECT_EQ(run_.model, "700\n");
+  executor_.reset();
+  EXPECT_TRUE(std::filesystem::is_empty(folder_ / "running"));
+}
+
+TEST_F(LocalExecutorTest, PassesProgressOnAndNeverLetsItGoBack) {
+  WriteEvents(ProgressBytes(0.5) + ProgressBytes(0.25) + ProgressBytes(-1) +
+              ProgressBytes(std::numeric_limits<double>::quiet_NaN()) + ProgressBytes(7));
+  EXPECT_EQ(RunScript("cat \"$here/events\" >&3").verdict, Verdict::kOk);
+  EXPECT_THAT(run_.fractions, ::testing::ElementsAre(0.5, 0.5, 0.5, 0.5, 1));
+}
+
+TEST_F(LocalExecutorTest, TellsARefusalFromOtherEnds) {
+  WriteEvents(ErrorBytes("MESH_NOT_CLOSED"));
+  const Outcome outcome = RunScript("cat \"$here/events\" >&3; exit 2");
+  EXPECT_EQ(outcome.verdict, Verdict::kBadInput);
+  EXPECT_EQ(outcome.error.reason(), "MESH_NOT_CLOSED");
+}
+
+TEST_F(LocalExecutorTest, AWorkerThatReportsTooLittleMemoryRanOutOfMemory) {
+  WriteEvents(ErrorBytes("OUT_OF_MEMORY"));
+  EXPECT_EQ(RunScript("cat \"$here/events\" >&3; exit 2").verdict, Verdict::kOutOfMemory);
+}
+
+TEST_F(LocalExecutorTest, AWorkerThatCannotWriteIsNoRefusal) {
+  WriteEvents(ErrorBytes("OUTPUT_NOT_WRITABLE"));
+  EXPECT_EQ(RunScript("cat \"$here/events\" >&3; exit 2").verdict, Verdict::kCrashed);
+}
+
+TEST_F(LocalExecutorTest, ACrashIsReportedWithTheLastWords) {
+  const Outcome outcome = RunScript("echo 'segment 7 is \xff bad' >&2; kill -SEGV $$");
+  EXPECT_EQ(outcome.verdict, Verdict::kCrashed);
+  EXPECT_EQ(outcome.error.reason(), "WORKER_CRASHED");
+  EXPECT_THAT(outcome.error.message(), HasSubstr("signal 11"));
+  EXPECT_THAT(outcome.error.message(), HasSubstr("segment 7 is   bad"));
+}
+
+TEST_F(LocalExecutorTest, AnExitStatusWithoutAReasonIsACrash) {
+  const Outcome outcome = RunScript("exit 3");
+  EXPECT_EQ(outcome.verdict, Verdict::kCrashed);
+  EXPECT_THAT(outcome.error.message(), HasSubstr("exit status 3"));
+}
+
+TEST_F(LocalExecutorTest, AKillThatIsNotOursIsTakenForTheKernelsMemoryKiller) {
+  EXPECT_EQ(RunScript("kill -KILL $$").verdict, Verdict::kOutOfMemory);
+}
+
+TEST_F(LocalExecutorTest, KillsAWorkerThatTakesTooMuchMemory) {
+  options_.memory_limit_bytes = 100 << 20;
+  // Doubled until it is killed.
+  const Outcome outcome = RunScript("x=0123456789abcdef; while :; do x=$x$x; done");
+  EXPECT_EQ(outcome.verdict, Verdict::kOutOfMemory);
+  EXPECT_THAT(outcome.error.message(), HasSubstr("100 MiB"));
+}
+
+TEST_F(LocalExecutorTest, KillsAWorkerWithoutSignsOfLifeAndItsChildren) {
+  const NamedPipe life(folder_ / "life");
+  options_.stall_limit = milliseconds(1000);
+  const Outcome outcome = RunScript("exec 4>\"$here/life\"; sleep 1000 & wait");
+  EXPECT_EQ(outcome.verdict, Verdict::kStalled);
+  EXPECT_EQ(outcome.error.reason(), "WORKER_STALLED");
+  EXPECT_TRUE(life.LosesItsWriters());
+}
+
+TEST_F(LocalExecutorTest, KillsAWorkerThatLivesButNeverEnds) {
+  WriteEvents(ProgressBytes(0.5));
+  options_.time_limit = milliseconds(300);
+  EXPECT_EQ(RunScript("while :; do cat \"$here/events\" >&3; sleep 0.05; done").verdict,
+            Verdict::kTimeout);
+}
+
+TEST_F(LocalExecutorTest, KillsAWorkerThatWritesGarbage) {
+  const Outcome outcome = RunScript(R"(printf '\377\377\377\377\377\377' >&3; sleep 1000)");
+  EXPECT_EQ(outcome.verdict, Verdict::kCrashed);
+  EXPECT_EQ(outcome.error.reason(), "WORKER_GARBAGE");
+}
+
+TEST_F(LocalExecutorTest, KillsAWorkerThatFloodsItsPipe) {
+  std::string events;
+  for (int i = 0; i < 10'000; ++i) events += ProgressBytes(0.5);
+  WriteEvents(events);
+  const Outcome outcome = RunScript("while :; do cat \"$here/events\" >&3; done");
+  EXPECT_EQ(outcome.verdict, Verdict::kCrashed);
+  EXPECT_EQ(outcome.error.reason(), "WORKER_GARBAGE");
+}
+
+TEST_F(LocalExecutorTest, CancelsARunningWorker) {
+  WriteEvents(ProgressBytes(0.5));
+  MakeExecutor("cat \"$here/events\" >&3; sleep 1000");
+  Start(run_);
+  ASSERT_TRUE(run_.progressed.WaitForNotificationWithTimeout(kDeadline));
+  executor_->Cancel(digest_);
+  ASSERT_TRUE(run_.ended.WaitForNotificationWithTimeout(kDeadline));
+  EXPECT_EQ(run_.outcome.verdict, Verdict::kCancelled);
+}
+
+TEST_F(LocalExecutorTest, AMeshThatCannotBeBroughtEndsTheTask) {
+  MakeExecutor("true");
+  std::promise<Outcome> ended;
+  executor_->Start(
+      {.digest = digest_,
+       .request = {},
+       .write_mesh = [](const auto&) { return absl::DataLossError("MESH_CORRUPT: x"); },
+       .on_progress = [](const v1::Progress&) {},
+       .on_end = [&](const Outcome& outcome) { ended.set_value(outcome); }});
+  EXPECT_EQ(ended.get_future().get().error.reason(), "MESH_CORRUPT");
+}
+
+TEST_F(LocalExecutorTest, ItsDestructionKillsWhatRunsWithoutAWord) {
+  const NamedPipe life(folder_ / "life");
+  WriteEvents(ProgressBytes(0.5));
+  MakeExecutor("exec 4>\"$here/life\"; cat \"$here/events\" >&3; exec sleep 1000");
+  Start(run_);
+  ASSERT_TRUE(run_.progressed.WaitForNotificationWithTimeout(kDeadline));
+  executor_.reset();
+  EXPECT_TRUE(life.LosesItsWriters());
+  EXPECT_FALSE(run_.ended.HasBeenNotified());
+}
+
+TEST_F(LocalExecutorTest, WorkersDieWithTheDaemonHoweverItDies) {
+  const NamedPipe life(folder_ / "life");
+  const NamedPipe started(folder_ / "started");
+  const pid_t daemon = fork();
+  if (daemon == 0) {
+    MakeExecutor("exec 4>\"$here/life\"; echo >\"$here/started\"; exec sleep 1000");
+    Start(run_);
+    pause();
+  }
+  ASSERT_TRUE(started.GetsAByte());
+  kill(daemon, SIGKILL);
+  ASSERT_EQ(waitpid(daemon, nullptr, 0), daemon);
+  EXPECT_TRUE(life.LosesItsWriters());
+}
+
+TEST_F(LocalExecutorTest, AProgramThatCannotBeExecutedIsRefused) {
+  options_.program = folder_ / "missing";
+  options_.directory = folder_ / "running";
+  EXPECT_THAT(MakeLocalExecutor(options_, clock_).status().ToString(),
+              HasSubstr("WORKER_NOT_FOUND"));
+}
+
+}  // namespace
+}  // namespace carillon
