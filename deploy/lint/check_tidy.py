@@ -87,11 +87,12 @@ def check(root, build):
     changed = [name for name, mark in passed.items() if not mark.exists()]
     print(f"{len(changed)} of {len(passed)} files to check")
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
-        for name, problem in zip(changed, pool.map(lambda one: tidy(root, build, one), changed)):
-            if problem:
+        running = {pool.submit(tidy, root, build, name): name for name in changed}
+        for done in concurrent.futures.as_completed(running):
+            if problem := done.result():
                 yield problem
             else:
-                passed[name].touch()
+                passed[running[done]].touch()
 
 
 if __name__ == "__main__":

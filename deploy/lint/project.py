@@ -34,7 +34,8 @@ def is_script(path, interpreter):
 def run(check):
     """Calls check(root) for the root given on the command line, and exits 1 if it finds anything."""
     root = pathlib.Path(sys.argv[1]).resolve() if len(sys.argv) > 1 else ROOT
-    problems = list(check(root))
-    print(*problems, sep="\n")
-    print(f"{len(problems)} problems")
-    sys.exit(1 if problems else 0)
+    count = 0
+    for count, problem in enumerate(check(root), start=1):
+        print(problem, flush=True)
+    print(f"{count} problems")
+    sys.exit(1 if count else 0)
