@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 #include <numeric>
 #include <utility>
@@ -27,6 +28,8 @@ constexpr double kEdgesAlongBody = 20;
 constexpr double kEdgesPerThickness = 8;
 constexpr double kMinElements = 1'500;
 constexpr double kMaxElements = 12'000;
+constexpr size_t kMaxTriangles = 20'000;  // about 60,000 nodes with mid-sides in a thin wall
+constexpr double kCoarsening = 1.2;
 
 constexpr double kLongestToMeanEdge = 1.4;    // where edges above the longest are halved
 constexpr double kVolumeOfRegular = 0.11785;  // of a tetrahedron with edges of length 1
@@ -156,11 +159,24 @@ class Filler {
         extent_(Measure(surface_, shells_)) {}
 
   absl::StatusOr<TetMesh> Fill() const {
-    if (settings_.target_node_count == 0) return FillWithEdge(AutomaticEdge(extent_));
-    return FillToTarget();
+    if (settings_.target_node_count != 0) return FillToTarget();
+    return FillWithEdge(CoarserOnNarrowTriangles(AutomaticEdge(extent_)));
   }
 
  private:
+  /// Narrow triangles are cut into many more than their area suggests: then longer edges must do,
+  /// up to those that still let the body bend.
+  double CoarserOnNarrowTriangles(double edge) const {
+    const auto count = [&](double longest) {
+      return RefineSurface(surface_, longest).surface.triangles.size();
+    };
+    while (edge * kCoarsening <= 1 / kEdgesAlongBody &&
+           count(edge * kLongestToMeanEdge) > std::max(kMaxTriangles, surface_.triangles.size())) {
+      edge *= kCoarsening;
+    }
+    return edge;
+  }
+
   /// First as many elements as nodes are wanted, times four; then, as the count of nodes goes with
   /// a power of the edge between two (on the surface) and three (inside), corrected.
   absl::StatusOr<TetMesh> FillToTarget() const {

@@ -130,6 +130,10 @@ TEST(Tetrahedralize, StaysSmallOnAThinPlate) {
   EXPECT_LT(Fill(MakeBoxSurface({1, 1, 0.001}), {}).nodes.size(), 60'000U);
 }
 
+TEST(Tetrahedralize, StaysSmallOnATubeOfLongNarrowStrips) {
+  EXPECT_LT(Fill(MakeTubeSurface({.around = 64, .along = 1}), {}).nodes.size(), 60'000U);
+}
+
 TEST(Tetrahedralize, DoesNotDependOnSizeOrPlace) {
   const TetMesh metres = Fill(MakeBoxSurface({1, 0.5, 0.25}), {});
   SurfaceMesh far_away;
