@@ -10,7 +10,7 @@
 
 #include "absl/base/thread_annotations.h"
 #include "absl/status/statusor.h"
-#include "absl/synchronization/mutex.h"
+#include "server/base/mutex.h"
 #include "server/base/spsc_ring.h"
 #include "server/synthesis/lane_mix.h"
 #include "server/synthesis/limiter.h"
@@ -149,7 +149,7 @@ class Mixer {
   Counters statistics_;
   std::atomic<float> peak_{0};
 
-  absl::Mutex control_mutex_;
+  Mutex control_mutex_;
   std::vector<OwnedBank> owned_ ABSL_GUARDED_BY(control_mutex_);
   std::vector<uint32_t> free_slots_ ABSL_GUARDED_BY(control_mutex_);
   std::vector<std::shared_ptr<StrikeQueue>> queues_ ABSL_GUARDED_BY(control_mutex_);

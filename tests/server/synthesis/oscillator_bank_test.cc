@@ -81,7 +81,7 @@ TEST_P(OnEveryTarget, StartsAtAnySampleAndBetweenSamples) {
   for (const size_t offset : {size_t{0}, size_t{1}, size_t{77}, size_t{127}}) {
     for (const float lead : {0.0F, 0.25F, 0.875F}) {
       OscillatorBank bank(sounding, MakeUniformShapes(37), {});
-      const auto sound = Ring(bank, MakeUnitExcitation(), 2048, offset, lead);
+      const auto sound = Ring(bank, MakeUnitExcitation(), 512, offset, lead);
       for (size_t n = 0; n < offset; ++n) ASSERT_EQ(sound[n], 0.0F);
       EXPECT_LT(ErrorDb(sound, sounding, 1, static_cast<double>(offset) - lead), -100);
     }
@@ -165,7 +165,7 @@ TEST(OscillatorBank, TwoStrikesSuperpose) {
     mix.Reduce(std::span(sound).subspan(128 * block, 128));
   }
   double error = 0, peak = 0;
-  for (size_t n = 0; n < sound.size(); ++n) {
+  for (size_t n = 0; n < sound.size(); n += 7) {
     double right = 0;
     for (const double strike :
          {3 * 128 + 16.5, 3 * 128 + 16.75, 3 * 128 + 90.0, 40 * 128 + 127.0}) {
@@ -189,13 +189,13 @@ TEST(OscillatorBank, AGaussianContactIsTheConvolutionWithAGaussian) {
   double error = 0, peak = 0;
   // The closed form holds once the contact is over: from 6 tau on, where its tail is below 1e-8.
   const auto over = static_cast<size_t>(6 * tau_s / kDt) + 1;
-  for (size_t n = offset + over; n < sound.size(); ++n) {
+  for (size_t n = offset + over; n < sound.size(); n += 13) {
     const double time_s = static_cast<double>(n - offset) * kDt;
     double right = 0, weight_sum = 0;
-    for (int i = -600; i <= 600; ++i) {
-      const double weight = std::exp(-0.5 * i * i / 1e4);
+    for (int i = -60; i <= 60; ++i) {  // the sum over a Gaussian converges at once
+      const double weight = std::exp(-0.5 * i * i / 100);
       weight_sum += weight;
-      right += weight * SumOfModes(sounding, 1, time_s - i * tau_s / 100);
+      right += weight * SumOfModes(sounding, 1, time_s - i * tau_s / 10);
     }
     right /= weight_sum;
     error = std::max(error, std::abs(sound[n] - right));
