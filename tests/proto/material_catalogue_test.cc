@@ -4,7 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <numbers>
 #include <set>
+#include <string>
 
 namespace carillon {
 namespace {
@@ -20,6 +22,23 @@ TEST(MaterialCatalogue, EveryEntryIsCompleteSourcedAndNamedOnce) {
     EXPECT_TRUE(names.insert(entry.name()).second) << entry.name();
   }
   EXPECT_TRUE(names.contains("chime_aluminum"));
+}
+
+// Rayleigh damping has the loss factor alpha1 w + alpha2 / w at the angular frequency w.
+TEST(MaterialCatalogue, DampingIsThatOfTheLossFactorStated) {
+  constexpr double kAngular = 2 * std::numbers::pi * 1000;
+  int stated = 0;
+  for (const v1::CatalogueMaterial& entry : Materials().materials()) {
+    const size_t at = entry.source().find("loss factor ");
+    if (at == std::string::npos) continue;
+    ++stated;
+    const double loss_factor = std::stod(entry.source().substr(at + 12));
+    const v1::Material& material = entry.material();
+    EXPECT_NEAR(material.alpha1_s() * kAngular + material.alpha2_per_s() / kAngular, loss_factor,
+                1e-3 * loss_factor)  // figures have four digits
+        << entry.name();
+  }
+  EXPECT_GE(stated, 10);
 }
 
 TEST(ResolveMaterial, PutsGivenFiguresOverThePreset) {
