@@ -36,12 +36,14 @@ Modes Columns(const Modes& modes, const std::vector<Eigen::Index>& which) {
   return {.eigenvalues = modes.eigenvalues(which), .shapes = modes.shapes(Eigen::all, which)};
 }
 
-/// Makes the largest component of each shape positive, so that a mesh gives one answer.
+/// Makes the first of the large components of each shape positive, so that a mesh gives one answer;
+/// in a symmetric body several are largest but for rounding.
 void FixSigns(Eigen::MatrixXd& shapes) {
   for (Eigen::Index m = 0; m < shapes.cols(); ++m) {
-    Eigen::Index largest = 0;
-    shapes.col(m).cwiseAbs().maxCoeff(&largest);
-    if (shapes(largest, m) < 0) shapes.col(m) *= -1;
+    const double large = 0.99 * shapes.col(m).cwiseAbs().maxCoeff();
+    const auto first = std::ranges::find_if(
+        shapes.col(m), [large](double component) { return std::abs(component) >= large; });
+    if (*first < 0) shapes.col(m) *= -1;
   }
 }
 

@@ -22,7 +22,7 @@ std::vector<double> Etas() {
   const double radius = std::cbrt(VolumeM3(*mesh) * 3 / (4 * std::numbers::pi));
   const double shear_speed = std::sqrt(ToLame(kElastic).mu_pa);
   std::vector<double> etas;
-  for (const double hz : FrequenciesHz(ModesOf(*mesh, kElastic, 1, 0.32))) {
+  for (const double hz : FrequenciesHz(ModesOf(*mesh, kElastic, 1, 0.285))) {
     etas.push_back(2 * std::numbers::pi * hz * radius / shear_speed);
   }
   return etas;
@@ -32,10 +32,9 @@ std::vector<double> Etas() {
 // meshed ball is not round to 1 % of its radius.
 TEST(Sphere, TenLowestModesAreThoseOfLamb) {
   const std::vector<double> etas = Etas();
-  ASSERT_GE(etas.size(), 10u);
+  ASSERT_EQ(etas.size(), 10u);  // the next lies above the limit
   for (size_t m = 0; m < 5; ++m) EXPECT_NEAR(etas[m] / LowestTorsionalEta(), 1, 0.01) << m;
   for (size_t m = 5; m < 10; ++m) EXPECT_NEAR(etas[m] / LowestSpheroidalEta(0.25), 1, 0.01) << m;
-  if (etas.size() > 10) EXPECT_GT(etas[10] / LowestSpheroidalEta(0.25), 1.1);
 }
 
 // Tabulated by Lamb and many after him for a Poisson's ratio of 1/4: 0.7961 pi and 0.8403 pi.
