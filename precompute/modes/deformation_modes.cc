@@ -40,10 +40,11 @@ Modes Columns(const Modes& modes, const std::vector<Eigen::Index>& which) {
 /// in a symmetric body several are largest but for rounding.
 void FixSigns(Eigen::MatrixXd& shapes) {
   for (Eigen::Index m = 0; m < shapes.cols(); ++m) {
-    const double large = 0.99 * shapes.col(m).cwiseAbs().maxCoeff();
-    const auto first = std::ranges::find_if(
-        shapes.col(m), [large](double component) { return std::abs(component) >= large; });
-    if (*first < 0) shapes.col(m) *= -1;
+    auto shape = shapes.col(m);
+    const double large = 0.99 * shape.cwiseAbs().maxCoeff();
+    const auto first =
+        std::ranges::find_if(shape, [large](double x) { return std::abs(x) >= large; });
+    if (*first < 0) shape *= -1;
   }
 }
 
