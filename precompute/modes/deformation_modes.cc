@@ -8,11 +8,10 @@
 #include <string>
 
 #include "absl/strings/str_cat.h"
+#include "precompute/modes/block_lanczos_eigensolver.h"
 #include "precompute/modes/dense_eigensolver.h"
-#include "precompute/modes/inertia.h"
-#include "precompute/modes/node_ordering.h"
+#include "precompute/modes/multifrontal_inertia.h"
 #include "precompute/modes/rigid_body.h"
-#include "precompute/modes/sparse_eigensolver.h"
 #include "proto/error_reason.h"
 
 namespace carillon::precompute {
@@ -51,15 +50,18 @@ void FixSigns(Eigen::MatrixXd& shapes) {
 /// One solution: counts, solves and verifies.
 class Solution {
  public:
-  Solution(const SystemMatrices& system, const std::vector<Point>& nodes, const SolveWatch& watch)
+  Solution(const SystemMatrices& system, OrderedSystem ordered, const std::vector<Point>& nodes,
+           const SolveWatch& watch)
       : system_(system),
         watch_(watch),
-        order_(OrderUnknowns(system)),
+        ordered_(std::move(ordered)),
         rigid_(RigidBodyModes(nodes, system)) {}
 
   absl::StatusOr<int> CountBelow(double limit) const {
     watch_(SolveStage::kFactor, 0);
-    const absl::StatusOr<int> count = CountEigenvaluesBelow(system_, limit, order_);
+    const absl::StatusOr<int> count =
+        CountEigenvaluesBelow(ordered_.fronts, ordered_.matrix, limit,
+                              [this](double done) { watch_(SolveStage::kFactor, done); });
     if (!count.ok()) return count;
     if (*count < kRigidModeCount) {
       return VerificationFailed(absl::StrCat("only ", *count,
@@ -114,7 +116,7 @@ class Solution {
  private:
   std::unique_ptr<Eigensolver> MakeSolver(int count) const {
     if (PrefersDense(system_.unknown_count(), count)) return std::make_unique<DenseEigensolver>();
-    return std::make_unique<SparseEigensolver>(order_);
+    return std::make_unique<BlockLanczosEigensolver>(ordered_, rigid_);
   }
 
   double FreeMotionBound(double limit) const {
@@ -151,7 +153,7 @@ class Solution {
 
   const SystemMatrices& system_;
   const SolveWatch& watch_;
-  std::vector<int> order_;
+  OrderedSystem ordered_;
   Eigen::MatrixXd rigid_;
 };
 
@@ -187,7 +189,9 @@ absl::StatusOr<DeformationModes> SolveDeformationModes(const SystemMatrices& sys
                                                        const std::vector<Point>& nodes,
                                                        double eigenvalue_limit,
                                                        const SolveWatch& watch) {
-  const Solution solution(system, nodes, watch);
+  absl::StatusOr<OrderedSystem> ordered = OrderedSystem::Make(system);
+  if (!ordered.ok()) return ordered.status();
+  const Solution solution(system, *std::move(ordered), nodes, watch);
   for (int attempt = 0; attempt < kMaxAttempts; ++attempt) {
     const double limit = eigenvalue_limit * (1 + 1e-4 * attempt);
     const absl::StatusOr<int> count = solution.CountBelow(limit);

@@ -1,0 +1,299 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "precompute/modes/block_kernels.h"
+
+#include <algorithm>
+#include <type_traits>
+
+#include "precompute/modes/node_matrix.h"
+
+// The kernels keep arrays of vectors in registers, which scalable vectors do not allow.
+#define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "precompute/modes/block_kernels.cc"
+#include <hwy/foreach_target.h>  // must come before highway.h
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace carillon::precompute::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+template <typename Real>
+using Lanes = hn::CappedTag<Real, kBlockWidth>;
+
+/// Right-hand sides in two vectors, as many as registers allow for six rows.
+template <typename Real>
+constexpr int Chunk() {
+  const int lanes = static_cast<int>(HWY_MAX_BYTES / sizeof(Real));
+  return lanes >= kBlockWidth ? kBlockWidth : 2 * lanes;
+}
+
+template <typename Real>
+HWY_INLINE void Forward(const Real* HWY_RESTRICT tile, int column_count, const Real* HWY_RESTRICT y,
+                        Real* const x[2]) {
+  const Lanes<Real> d;
+  using V = hn::Vec<Lanes<Real>>;
+  constexpr int kLanes = HWY_MAX_BYTES / sizeof(Real) >= kBlockWidth
+                             ? kBlockWidth
+                             : static_cast<int>(HWY_MAX_BYTES / sizeof(Real));
+  constexpr int kVectors = Chunk<Real>() / kLanes;
+  for (int c = 0; c < kBlockWidth; c += Chunk<Real>()) {
+    V sum[kTileRows][kVectors];
+    for (auto& row : sum) {
+      for (V& v : row) v = hn::Zero(d);
+    }
+    const Real* HWY_RESTRICT l = tile;
+    const Real* HWY_RESTRICT yi = y + c;
+    for (int i = 0; i < column_count; ++i, l += kTileRows, yi += kBlockWidth) {
+      V yv[kVectors];
+      for (int v = 0; v < kVectors; ++v) yv[v] = hn::LoadU(d, yi + v * kLanes);
+      for (int r = 0; r < kTileRows; ++r) {
+        const V lr = hn::Set(d, l[r]);
+        for (int v = 0; v < kVectors; ++v) sum[r][v] = hn::MulAdd(lr, yv[v], sum[r][v]);
+      }
+    }
+    for (int r = 0; r < kTileRows; ++r) {
+      Real* out = x[r / 3] + r % 3 * kBlockWidth + c;
+      for (int v = 0; v < kVectors; ++v) {
+        hn::StoreU(hn::Sub(hn::LoadU(d, out + v * kLanes), sum[r][v]), d, out + v * kLanes);
+      }
+    }
+  }
+}
+
+template <typename Real>
+HWY_INLINE void Backward(const Real* HWY_RESTRICT tile, int column_count, Real* HWY_RESTRICT y,
+                         const Real* const x[2]) {
+  const Lanes<Real> d;
+  using V = hn::Vec<Lanes<Real>>;
+  constexpr int kLanes = HWY_MAX_BYTES / sizeof(Real) >= kBlockWidth
+                             ? kBlockWidth
+                             : static_cast<int>(HWY_MAX_BYTES / sizeof(Real));
+  constexpr int kVectors = Chunk<Real>() / kLanes;
+  for (int c = 0; c < kBlockWidth; c += Chunk<Real>()) {
+    V xv[kTileRows][kVectors];
+    for (int r = 0; r < kTileRows; ++r) {
+      for (int v = 0; v < kVectors; ++v) {
+        xv[r][v] = hn::LoadU(d, x[r / 3] + r % 3 * kBlockWidth + c + v * kLanes);
+      }
+    }
+    const Real* HWY_RESTRICT l = tile;
+    Real* HWY_RESTRICT yi = y + c;
+    for (int i = 0; i < column_count; ++i, l += kTileRows, yi += kBlockWidth) {
+      for (int v = 0; v < kVectors; ++v) {
+        // Two chains of three, because each multiply-add waits for the one before.
+        V even = hn::LoadU(d, yi + v * kLanes);
+        V odd = hn::Mul(hn::Set(d, l[1]), xv[1][v]);
+        even = hn::NegMulAdd(hn::Set(d, l[0]), xv[0][v], even);
+        odd = hn::MulAdd(hn::Set(d, l[3]), xv[3][v], odd);
+        even = hn::NegMulAdd(hn::Set(d, l[2]), xv[2][v], even);
+        odd = hn::MulAdd(hn::Set(d, l[5]), xv[5][v], odd);
+        even = hn::NegMulAdd(hn::Set(d, l[4]), xv[4][v], even);
+        hn::StoreU(hn::Sub(even, odd), d, yi + v * kLanes);
+      }
+    }
+  }
+}
+
+void ForwardDouble(const double* tile, int n, const double* y, double* const x[2]) {
+  Forward<double>(tile, n, y, x);
+}
+void ForwardFloat(const float* tile, int n, const float* y, float* const x[2]) {
+  Forward<float>(tile, n, y, x);
+}
+void BackwardDouble(const double* tile, int n, double* y, const double* const x[2]) {
+  Backward<double>(tile, n, y, x);
+}
+void BackwardFloat(const float* tile, int n, float* y, const float* const x[2]) {
+  Backward<float>(tile, n, y, x);
+}
+
+void MultiplyColumn(const double* HWY_RESTRICT blocks, const int32_t* HWY_RESTRICT rows, int count,
+                    int j, const double* HWY_RESTRICT x, double* HWY_RESTRICT y) {
+  const Lanes<double> d;
+  using V = hn::Vec<Lanes<double>>;
+  const int lanes = static_cast<int>(hn::Lanes(d));
+  constexpr int kNode = 3 * kBlockWidth;
+  const double* xj = x + static_cast<size_t>(j) * kNode;
+  double* yj = y + static_cast<size_t>(j) * kNode;
+  for (int c = 0; c < kBlockWidth; c += lanes) {
+    const V x0 = hn::LoadU(d, xj + c);
+    const V x1 = hn::LoadU(d, xj + kBlockWidth + c);
+    const V x2 = hn::LoadU(d, xj + 2 * kBlockWidth + c);
+    V y0 = hn::LoadU(d, yj + c);
+    V y1 = hn::LoadU(d, yj + kBlockWidth + c);
+    V y2 = hn::LoadU(d, yj + 2 * kBlockWidth + c);
+    const auto row = [&](const double* b) {
+      return hn::MulAdd(hn::Set(d, b[0]), x0,
+                        hn::MulAdd(hn::Set(d, b[1]), x1, hn::Mul(hn::Set(d, b[2]), x2)));
+    };
+    y0 = hn::Add(y0, row(blocks));
+    y1 = hn::Add(y1, row(blocks + 3));
+    y2 = hn::Add(y2, row(blocks + 6));
+    for (int e = 1; e < count; ++e) {
+      const double* b = blocks + static_cast<size_t>(e) * 9;
+      const double* xi = x + static_cast<size_t>(rows[e]) * kNode + c;
+      double* yi = y + static_cast<size_t>(rows[e]) * kNode + c;
+      for (int a = 0; a < 3; ++a) {
+        double* out = yi + a * kBlockWidth;
+        hn::StoreU(hn::Add(hn::LoadU(d, out), row(b + 3 * a)), d, out);
+        const V xa = hn::LoadU(d, xi + a * kBlockWidth);
+        y0 = hn::MulAdd(hn::Set(d, b[3 * a]), xa, y0);
+        y1 = hn::MulAdd(hn::Set(d, b[3 * a + 1]), xa, y1);
+        y2 = hn::MulAdd(hn::Set(d, b[3 * a + 2]), xa, y2);
+      }
+    }
+    hn::StoreU(y0, d, yj + c);
+    hn::StoreU(y1, d, yj + kBlockWidth + c);
+    hn::StoreU(y2, d, yj + 2 * kBlockWidth + c);
+  }
+}
+
+void MultiplyColumnScalar(const double* HWY_RESTRICT m, const int32_t* HWY_RESTRICT rows, int count,
+                          int j, const double* HWY_RESTRICT x, double* HWY_RESTRICT y) {
+  const Lanes<double> d;
+  using V = hn::Vec<Lanes<double>>;
+  const int lanes = static_cast<int>(hn::Lanes(d));
+  constexpr int kNode = 3 * kBlockWidth;
+  for (int c = 0; c < kNode; c += lanes) {
+    const V xj = hn::LoadU(d, x + static_cast<size_t>(j) * kNode + c);
+    double* out_j = y + static_cast<size_t>(j) * kNode + c;
+    V yj = hn::MulAdd(hn::Set(d, m[0]), xj, hn::LoadU(d, out_j));
+    for (int e = 1; e < count; ++e) {
+      const size_t at = static_cast<size_t>(rows[e]) * kNode + static_cast<size_t>(c);
+      const V me = hn::Set(d, m[e]);
+      hn::StoreU(hn::MulAdd(me, xj, hn::LoadU(d, y + at)), d, y + at);
+      yj = hn::MulAdd(me, hn::LoadU(d, x + at), yj);
+    }
+    hn::StoreU(yj, d, out_j);
+  }
+}
+
+void Dot(const double* HWY_RESTRICT a, const double* HWY_RESTRICT b, int64_t rows,
+         double* HWY_RESTRICT product) {
+  const Lanes<double> d;
+  using V = hn::Vec<Lanes<double>>;
+  constexpr int kLanes = static_cast<int>(HWY_MAX_BYTES / sizeof(double));
+  constexpr int kVectors = Chunk<double>() / kLanes;
+  constexpr int kRows = kVectors == 2 && HWY_MAX_BYTES == 64 ? 8 : 4;
+  for (int first = 0; first < kBlockWidth; first += kRows) {
+    for (int c = 0; c < kBlockWidth; c += Chunk<double>()) {
+      V sum[kRows][kVectors];
+      for (auto& row : sum) {
+        for (V& v : row) v = hn::Zero(d);
+      }
+      const double* HWY_RESTRICT ai = a + first;
+      const double* HWY_RESTRICT bi = b + c;
+      for (int64_t i = 0; i < rows; ++i, ai += kBlockWidth, bi += kBlockWidth) {
+        for (int v = 0; v < kVectors; ++v) {
+          const V bv = hn::LoadU(d, bi + v * kLanes);
+          for (int r = 0; r < kRows; ++r) sum[r][v] = hn::MulAdd(hn::Set(d, ai[r]), bv, sum[r][v]);
+        }
+      }
+      for (int r = 0; r < kRows; ++r) {
+        double* out = product + (first + r) * kBlockWidth + c;
+        for (int v = 0; v < kVectors; ++v) {
+          hn::StoreU(hn::Add(hn::LoadU(d, out + v * kLanes), sum[r][v]), d, out + v * kLanes);
+        }
+      }
+    }
+  }
+}
+
+void SubtractTimes(const double* HWY_RESTRICT q, const double* HWY_RESTRICT h, int64_t rows,
+                   double* HWY_RESTRICT x) {
+  const Lanes<double> d;
+  using V = hn::Vec<Lanes<double>>;
+  constexpr int kLanes = static_cast<int>(HWY_MAX_BYTES / sizeof(double));
+  constexpr int kVectors = Chunk<double>() / kLanes;
+  constexpr int kRows = 4;
+  int64_t i = 0;
+  const auto rows_at = [&](auto count) {
+    constexpr int kCount = decltype(count)::value;
+    for (int c = 0; c < kBlockWidth; c += Chunk<double>()) {
+      V sum[kCount][kVectors];
+      double* out = x + i * kBlockWidth + c;
+      for (int r = 0; r < kCount; ++r) {
+        for (int v = 0; v < kVectors; ++v) {
+          sum[r][v] = hn::LoadU(d, out + r * kBlockWidth + v * kLanes);
+        }
+      }
+      for (int k = 0; k < kBlockWidth; ++k) {
+        for (int v = 0; v < kVectors; ++v) {
+          const V hv = hn::LoadU(d, h + k * kBlockWidth + c + v * kLanes);
+          for (int r = 0; r < kCount; ++r) {
+            sum[r][v] = hn::NegMulAdd(hn::Set(d, q[(i + r) * kBlockWidth + k]), hv, sum[r][v]);
+          }
+        }
+      }
+      for (int r = 0; r < kCount; ++r) {
+        for (int v = 0; v < kVectors; ++v) {
+          hn::StoreU(sum[r][v], d, out + r * kBlockWidth + v * kLanes);
+        }
+      }
+    }
+  };
+  for (; i + kRows <= rows; i += kRows) rows_at(std::integral_constant<int, kRows>{});
+  for (; i < rows; ++i) rows_at(std::integral_constant<int, 1>{});
+}
+
+}  // namespace carillon::precompute::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace carillon::precompute {
+
+HWY_EXPORT(ForwardDouble);
+HWY_EXPORT(ForwardFloat);
+HWY_EXPORT(BackwardDouble);
+HWY_EXPORT(BackwardFloat);
+HWY_EXPORT(MultiplyColumn);
+HWY_EXPORT(MultiplyColumnScalar);
+HWY_EXPORT(Dot);
+HWY_EXPORT(SubtractTimes);
+
+template <>
+void TileForward<double>(const double* tile, int column_count, const double* y,
+                         double* const x[2]) {
+  HWY_DYNAMIC_DISPATCH(ForwardDouble)(tile, column_count, y, x);
+}
+template <>
+void TileForward<float>(const float* tile, int column_count, const float* y, float* const x[2]) {
+  HWY_DYNAMIC_DISPATCH(ForwardFloat)(tile, column_count, y, x);
+}
+template <>
+void TileBackward<double>(const double* tile, int column_count, double* y,
+                          const double* const x[2]) {
+  HWY_DYNAMIC_DISPATCH(BackwardDouble)(tile, column_count, y, x);
+}
+template <>
+void TileBackward<float>(const float* tile, int column_count, float* y, const float* const x[2]) {
+  HWY_DYNAMIC_DISPATCH(BackwardFloat)(tile, column_count, y, x);
+}
+
+void ColumnMultiply(const double* blocks, const int32_t* rows, int count, int j, const double* x,
+                    double* y) {
+  HWY_DYNAMIC_DISPATCH(MultiplyColumn)(blocks, rows, count, j, x, y);
+}
+
+void ColumnMultiplyScalar(const double* m, const int32_t* rows, int count, int j, const double* x,
+                          double* y) {
+  HWY_DYNAMIC_DISPATCH(MultiplyColumnScalar)(m, rows, count, j, x, y);
+}
+
+void BlockDot(const double* a, const double* b, int64_t rows, double* product) {
+  // In stretches that stay in the first-level cache while the product is made piece by piece.
+  constexpr int64_t kStretch = 64;
+  std::fill(product, product + kBlockWidth * kBlockWidth, 0.0);
+  for (int64_t i = 0; i < rows; i += kStretch) {
+    HWY_DYNAMIC_DISPATCH(Dot)
+    (a + i * kBlockWidth, b + i * kBlockWidth, std::min(kStretch, rows - i), product);
+  }
+}
+
+void BlockSubtractTimes(const double* q, const double* h, int64_t rows, double* x) {
+  HWY_DYNAMIC_DISPATCH(SubtractTimes)(q, h, rows, x);
+}
+
+}  // namespace carillon::precompute
+#endif

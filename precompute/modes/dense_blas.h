@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <cblas.h>
+#include <lapacke.h>
+
+namespace carillon::precompute::blas {
+
+// The few dense kernels of a front, for both precisions. Column-major throughout.
+
+/// A = L L^T, lower. Returns whether A was positive definite.
+inline bool Cholesky(int n, double* A, int ld) {
+  return LAPACKE_dpotrf_work(LAPACK_COL_MAJOR, 'L', n, A, ld) == 0;
+}
+inline bool Cholesky(int n, float* A, int ld) {
+  return LAPACKE_spotrf_work(LAPACK_COL_MAJOR, 'L', n, A, ld) == 0;
+}
+
+/// B = B L^-T, B rows by n.
+inline void SolveRight(int rows, int n, const double* L, int ldl, double* B, int ldb, bool unit) {
+  cblas_dtrsm(CblasColMajor, CblasRight, CblasLower, CblasTrans, unit ? CblasUnit : CblasNonUnit,
+              rows, n, 1.0, L, ldl, B, ldb);
+}
+inline void SolveRight(int rows, int n, const float* L, int ldl, float* B, int ldb, bool unit) {
+  cblas_strsm(CblasColMajor, CblasRight, CblasLower, CblasTrans, unit ? CblasUnit : CblasNonUnit,
+              rows, n, 1.0F, L, ldl, B, ldb);
+}
+
+/// C -= A A^T, lower, A n by k.
+inline void SubtractSquare(int n, int k, const double* A, int lda, double* C, int ldc) {
+  cblas_dsyrk(CblasColMajor, CblasLower, CblasNoTrans, n, k, -1.0, A, lda, 1.0, C, ldc);
+}
+inline void SubtractSquare(int n, int k, const float* A, int lda, float* C, int ldc) {
+  cblas_ssyrk(CblasColMajor, CblasLower, CblasNoTrans, n, k, -1.0F, A, lda, 1.0F, C, ldc);
+}
+
+/// C -= A B^T, A m by k, B n by k.
+inline void SubtractProduct(int m, int n, int k, const double* A, int lda, const double* B, int ldb,
+                            double* C, int ldc) {
+  cblas_dgemm(CblasColMajor, CblasNoTrans, CblasTrans, m, n, k, -1.0, A, lda, B, ldb, 1.0, C, ldc);
+}
+
+}  // namespace carillon::precompute::blas

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "precompute/modes/front_walk.h"
+#include "precompute/modes/frontal_structure.h"
+#include "precompute/modes/node_matrix.h"
+
+namespace carillon::precompute {
+
+/// L L^T = K - shift M by the multifrontal method (Duff and Reid 1983), for solves of kBlockWidth
+/// right-hand sides at once. The panels of L are packed in tiles that one kernel streams through.
+template <typename Real>
+class MultifrontalCholesky {
+ public:
+  /// Errors: VERIFICATION_FAILED where K - shift M is not positive definite.
+  static absl::StatusOr<MultifrontalCholesky> Factorize(const FrontalStructure& fronts,
+                                                        const NodeMatrix& A, double shift,
+                                                        const PartDone& progress);
+
+  /// Overwrites x, (3 #nodes + 3) by kBlockWidth, row-major, in elimination order, by its solution.
+  /// The last three rows are scratch.
+  void Solve(Real* x) const;
+
+  size_t stored_bytes() const { return tiles_.size() * sizeof(Real); }
+
+ private:
+  const FrontalStructure* fronts_ = nullptr;
+  std::vector<Real> tiles_;
+  std::vector<size_t> tile_start_;  ///< #supernodes + 1, into tiles_
+};
+
+}  // namespace carillon::precompute

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include "absl/status/statusor.h"
+#include "precompute/modes/front_walk.h"
+#include "precompute/modes/frontal_structure.h"
+#include "precompute/modes/node_matrix.h"
+
+namespace carillon::precompute {
+
+/// The number of negative eigenvalues of K - shift M, which is the number of eigenvalues of
+/// K x = Lambda M x below `shift` (Sylvester's law of inertia), by an L D L^T without pivoting.
+/// Errors: VERIFICATION_FAILED where a pivot is too small to trust its sign (the shift lies on an
+/// eigenvalue: move it).
+absl::StatusOr<int> CountEigenvaluesBelow(const FrontalStructure& fronts, const NodeMatrix& A,
+                                          double shift, const PartDone& progress);
+
+}  // namespace carillon::precompute
