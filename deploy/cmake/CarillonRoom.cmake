@@ -35,6 +35,9 @@ function(carillon_test name)
   if(NOT ROOM_TIMEOUT)
     set(ROOM_TIMEOUT 120)
   endif()
+  if(CARILLON_SANITIZE)
+    math(EXPR ROOM_TIMEOUT "${ROOM_TIMEOUT} * 10")
+  endif()
   # Discovery when ctest runs, not when building: programs that need their environment can be built
   # anywhere.
   gtest_discover_tests(${target} TEST_PREFIX "${name}." DISCOVERY_MODE PRE_TEST

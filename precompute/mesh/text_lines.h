@@ -46,7 +46,7 @@ class TextLines {
 
   static std::vector<std::string_view> Words(std::string_view line) {
     std::vector<std::string_view> words;
-    for (size_t begin = line.find_first_not_of(kBlanks); begin != line.npos;) {
+    for (size_t begin = line.find_first_not_of(kBlanks); begin != std::string_view::npos;) {
       const size_t end = std::min(line.find_first_of(kBlanks, begin), line.size());
       words.push_back(line.substr(begin, end - begin));
       begin = line.find_first_not_of(kBlanks, end);
