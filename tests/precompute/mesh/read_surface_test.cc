@@ -72,7 +72,8 @@ TEST_F(ReadSurfaceTest, ObjKeepsItsOrderThroughObjectsGroupsAndMaterials) {
   const SurfaceMesh box = MakeBoxSurface({1, 1, 1});
   std::string text = ToObj(box);
   int face = 0;
-  for (size_t at = text.find("\nf "); at != text.npos; at = text.find("\nf ", at + 4), ++face) {
+  for (size_t at = text.find("\nf "); at != std::string::npos;
+       at = text.find("\nf ", at + 4), ++face) {
     const std::string group =
         absl::StrCat("\no part", face % 3, "\ng side", face % 2, "\nusemtl paint", face % 4);
     text.insert(at, group);

@@ -166,7 +166,7 @@ TEST(Tetrahedralize, RefusesAMeshOverTheLimit) {
 }
 
 TEST(RunInChild, ReturnsTheBytesOfTheChild) {
-  const std::string bytes(3'000'000, 'x');
+  std::string bytes(3'000'000, 'x');
   EXPECT_EQ(RunInChild([&] { return bytes; }).value(), bytes);
 }
 
