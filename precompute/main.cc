@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
+#include <unistd.h>
+
 #include <algorithm>
 #include <chrono>
 #include <csignal>
@@ -9,7 +11,7 @@
 #include "precompute/command_line.h"
 #include "precompute/json_report.h"
 #include "precompute/modal_model_codec.h"
-#include "precompute/modes/thread_count.h"
+#include "precompute/modes/openblas.h"
 #include "precompute/progress_bar.h"
 #include "precompute/progress_reporter.h"
 #include "precompute/sha256.h"
@@ -76,7 +78,15 @@ int Run(const CommandLine& asked) {
   return EXIT_SUCCESS;
 }
 
+/// Starts over with the environment that makes OpenBLAS fast; goes on as it is where that fails.
+void RestartWithFastBlas(char** argv) {
+  const char* core = BetterOpenBlasCore();
+  if (core == nullptr || setenv("OPENBLAS_CORETYPE", core, 0) != 0) return;
+  execv("/proc/self/exe", argv);
+}
+
 int Main(int argc, char** argv) {
+  RestartWithFastBlas(argv);
   std::signal(SIGPIPE, SIG_IGN);
   const absl::StatusOr<CommandLine> asked = ParseCommandLine(argc, argv);
   if (!asked.ok()) {

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "precompute/modes/openblas.h"
+
+#include <cblas.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <string_view>
+#include <thread>
+
+namespace carillon::precompute {
+
+void SetThreadCount(int count) {
+  const int processors = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  openblas_set_num_threads(count > 0 ? count : processors);
+}
+
+const char* BetterOpenBlasCore() {
+#if defined(__x86_64__)
+  if (std::getenv("OPENBLAS_CORETYPE") != nullptr) return nullptr;
+  const std::string_view chosen = openblas_get_corename();
+  if (chosen != "Prescott" && chosen != "Core2" && chosen != "Generic") return nullptr;
+  if (__builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512bw")) return "SkylakeX";
+  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return "Haswell";
+#endif
+  return nullptr;
+}
+
+}  // namespace carillon::precompute
