@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/scene/contact_stream.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "proto/error_reason.h"
+#include "server/scene/frame_time.h"
+
+namespace carillon {
+namespace {
+
+constexpr double kNetworkJitterS = 0.005;
+constexpr double kLongestDelayS = 10;
+/// Impulses between two blocks of the mixer.
+constexpr size_t kQueueCapacity = 16384;
+
+absl::Status InvalidStream(absl::string_view message) {
+  return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_STREAM", message);
+}
+
+absl::StatusOr<double> SchedulingDelay(const ContactStreamSettings& settings, const Mixer& mixer) {
+  if (!(settings.step_s > 0 && settings.step_s <= 1)) {
+    return InvalidStream(absl::StrCat("step_s is ", settings.step_s,
+                                      "; say the simulator's step, above 0 and at most 1 s"));
+  }
+  const double block_s =
+      static_cast<double>(mixer.settings().block_frame_count) / mixer.settings().sample_rate_hz;
+  const double delay_s =
+      settings.scheduling_delay_s.value_or(settings.step_s + block_s + kNetworkJitterS);
+  if (!(delay_s >= 0 && delay_s <= kLongestDelayS)) {
+    return InvalidStream(
+        absl::StrCat("scheduling_delay_s is ", delay_s, "; it must be 0 to ", kLongestDelayS));
+  }
+  return delay_s;
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<ContactStream>> ContactStream::Make(
+    std::shared_ptr<const Scene> scene, Mixer& mixer, const ContactStreamSettings& settings) {
+  const absl::StatusOr<double> delay_s = SchedulingDelay(settings, mixer);
+  if (!delay_s.ok()) return delay_s.status();
+  absl::StatusOr<std::unique_ptr<StrikeStream>> strikes = mixer.OpenStream(kQueueCapacity);
+  if (!strikes.ok()) return strikes.status();
+  return std::unique_ptr<ContactStream>(
+      new ContactStream(std::move(scene), mixer, *delay_s, *std::move(strikes)));
+}
+
+ContactStream::ContactStream(std::shared_ptr<const Scene> scene, Mixer& mixer,
+                             double scheduling_delay_s, std::unique_ptr<StrikeStream> strikes)
+    : scene_(std::move(scene)),
+      mixer_(mixer),
+      scheduling_delay_s_(scheduling_delay_s),
+      strikes_(std::move(strikes)) {}
+
+absl::Status ContactStream::BeginStep(double time_s) {
+  if (!std::isfinite(time_s)) {
+    return InvalidStream(absl::StrCat("time_s of step ", step_count_, " is ", time_s));
+  }
+  if (!first_time_s_) {
+    first_time_s_ = time_s;
+    first_frame_ = mixer_.frame();
+  } else if (time_s < time_s_) {
+    return InvalidStream(absl::StrCat("time goes back from ", time_s_, " s to ", time_s,
+                                      " s at step ", step_count_,
+                                      "; open another stream for another run"));
+  }
+  time_s_ = time_s;
+  ++step_count_;
+  return absl::OkStatus();
+}
+
+void ContactStream::Strike(const ObjectImpulse& impulse) {
+  if (absl::Status status = TryStrike(impulse); !status.ok()) Reject(1, std::move(status));
+}
+
+void ContactStream::Reject(uint64_t count, absl::Status reason) {
+  rejected_count_ += count;
+  last_rejection_ = std::move(reason);
+}
+
+absl::Status ContactStream::TryStrike(const ObjectImpulse& impulse) {
+  const absl::StatusOr<double> frame = FrameAt(time_s_ + impulse.time_offset_s);
+  if (!frame.ok()) return frame.status();
+  return scene_->Use(impulse.handle, [&](const SoundingObject& object) -> absl::Status {
+    absl::StatusOr<Excitation> excitation = LocateImpulse(object, impulse.impulse);
+    if (!excitation.ok()) return excitation.status();
+    carillon::Strike strike{.bank = object.bank, .excitation = *excitation};
+    SetFrame(strike, *frame);
+    ++pushed_count_;
+    strikes_->TryPush(strike);  // a full queue is counted by the mixer
+    return absl::OkStatus();
+  });
+}
+
+absl::StatusOr<double> ContactStream::FrameAt(double time_s) const {
+  if (!(time_s >= time_s_)) {
+    return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_TIME_OFFSET",
+                   absl::StrCat("the impulse lies ", time_s - time_s_,
+                                " s after its step; it must be zero or more"));
+  }
+  const double rate = mixer_.settings().sample_rate_hz;
+  const double frame =
+      static_cast<double>(first_frame_) + (time_s - *first_time_s_ + scheduling_delay_s_) * rate;
+  const double ahead_s = (frame - static_cast<double>(mixer_.frame())) / rate;
+  if (ahead_s > kMaxAheadS + scheduling_delay_s_) {
+    return Refusal(absl::StatusCode::kInvalidArgument, "TIME_TOO_FAR_AHEAD",
+                   absl::StrCat("the impulse is due in ", ahead_s, " s, over ", kMaxAheadS,
+                                " s ahead; send steps as they happen, or render a trace offline"));
+  }
+  return frame;
+}
+
+ContactCounts ContactStream::counts() const {
+  return {.step_count = step_count_,
+          .accepted_count = strikes_->accepted_count(),
+          .late_count = strikes_->late_count(),
+          .dropped_count = strikes_->dropped_count(),
+          .rejected_count = rejected_count_};
+}
+
+bool ContactStream::settled() const {
+  const ContactCounts now = counts();
+  return now.accepted_count + now.late_count + now.dropped_count >= pushed_count_;
+}
+
+}  // namespace carillon

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/scene/offline_renderer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "proto/error_reason.h"
+#include "server/scene/frame_time.h"
+#include "server/synthesis/flush_denormals.h"
+
+namespace carillon {
+namespace {
+
+constexpr uint32_t kLowestRateHz = 8000;
+constexpr uint32_t kHighestRateHz = 192000;
+constexpr double kLongestTailS = 120;
+constexpr double kLongestOpenTailS = 60;
+/// -80 dB of full scale.
+constexpr float kQuiet = 1e-4F;
+/// So long must it stay quiet: two close modes beat, and are silent together for a while.
+constexpr double kQuietS = 0.25;
+constexpr size_t kQueueCapacity = 65536;
+
+MixerSettings SettingsOf(const OfflineSettings& settings) {
+  // Nothing waits here, so a block takes however many strikes fall into it.
+  return {.sample_rate_hz = static_cast<double>(settings.sample_rate_hz),
+          .block_frame_count = OfflineRenderer::kBlockFrameCount,
+          .most_streams = 1,
+          .most_pending_strikes = kQueueCapacity,
+          .most_strikes_per_block = kQueueCapacity};
+}
+
+bool Earlier(const Strike& a, const Strike& b) {
+  return std::pair(a.frame, a.fraction) < std::pair(b.frame, b.fraction);
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<OfflineRenderer>> OfflineRenderer::Make(
+    const OfflineSettings& settings, BodyCache& bodies) {
+  if (settings.sample_rate_hz < kLowestRateHz || settings.sample_rate_hz > kHighestRateHz) {
+    return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
+                   absl::StrCat("sample_rate_hz is ", settings.sample_rate_hz, "; it must be ",
+                                kLowestRateHz, " to ", kHighestRateHz));
+  }
+  if (!(settings.tail_s >= 0 && settings.tail_s <= kLongestTailS)) {
+    return Refusal(
+        absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
+        absl::StrCat("tail_s is ", settings.tail_s, "; it must be 0 to ", kLongestTailS));
+  }
+  std::unique_ptr<OfflineRenderer> renderer(new OfflineRenderer(settings, bodies));
+  absl::StatusOr<std::unique_ptr<StrikeStream>> stream =
+      renderer->mixer_.OpenStream(kQueueCapacity);
+  if (!stream.ok()) return stream.status();
+  renderer->stream_ = *std::move(stream);
+  return renderer;
+}
+
+OfflineRenderer::OfflineRenderer(const OfflineSettings& settings, BodyCache& bodies)
+    : settings_(settings), bodies_(bodies), mixer_(SettingsOf(settings)) {}
+
+absl::Status OfflineRenderer::AddObject(uint32_t handle, std::shared_ptr<const ModalModel> model,
+                                        const ObjectProperties& properties) {
+  if (objects_.contains(handle)) {
+    return Refusal(absl::StatusCode::kAlreadyExists, "OBJECT_EXISTS",
+                   absl::StrCat("the trace has two objects ", handle));
+  }
+  absl::StatusOr<std::shared_ptr<const SoundingBody>> body = bodies_.Get(std::move(model));
+  if (!body.ok()) return body.status();
+  absl::StatusOr<SoundingObject> object = MakeSoundingObject(*std::move(body), properties, mixer_);
+  if (!object.ok()) return object.status();
+  objects_.emplace(handle, *std::move(object));
+  return absl::OkStatus();
+}
+
+void OfflineRenderer::Strike(double time_s, const ObjectImpulse& impulse) {
+  if (!TryStrike(time_s, impulse).ok()) Reject(1);
+}
+
+absl::Status OfflineRenderer::TryStrike(double time_s, const ObjectImpulse& impulse) {
+  const double due_s = time_s + impulse.time_offset_s;
+  const auto found = objects_.find(impulse.handle);
+  if (found == objects_.end() ||
+      !(impulse.time_offset_s >= 0 && due_s >= 0 && due_s <= kMaxTimeS)) {
+    return absl::InvalidArgumentError("no such object, or no such time");
+  }
+  absl::StatusOr<Excitation> excitation = LocateImpulse(found->second, impulse.impulse);
+  if (!excitation.ok()) return excitation.status();
+  carillon::Strike strike{.bank = found->second.bank, .excitation = *excitation};
+  SetFrame(strike, due_s * settings_.sample_rate_hz);
+  strikes_.push_back(strike);
+  return absl::OkStatus();
+}
+
+size_t OfflineRenderer::Render(std::span<float> frames) {
+  if (!begun_) std::ranges::stable_sort(strikes_, Earlier);
+  begun_ = true;
+  const FlushDenormals flush;
+  size_t count = 0;
+  while (!ended_ && count + kBlockFrameCount <= frames.size()) {
+    count += RenderBlock(frames.subspan(count, kBlockFrameCount));
+  }
+  return count;
+}
+
+size_t OfflineRenderer::RenderBlock(std::span<float> block) {
+  PushStrikesBefore(mixer_.frame() + block.size());
+  mixer_.Render(block);
+  mixer_.CollectGarbage();
+  size_t count = block.size();
+  if (pushed_count_ == strikes_.size()) {
+    const uint64_t last = strikes_.empty() ? 0 : strikes_.back().frame;
+    const double tail_s = settings_.tail_s > 0 ? settings_.tail_s : kLongestOpenTailS;
+    const uint64_t end = last + static_cast<uint64_t>(std::ceil(tail_s * settings_.sample_rate_hz));
+    const uint64_t begin = mixer_.frame() - block.size();
+    count = static_cast<size_t>(std::min<uint64_t>(count, end - std::min(begin, end)));
+    ended_ = mixer_.frame() >= end || TailEnded(block);
+  }
+  const MixerStatistics statistics = mixer_.statistics();
+  summary_.frame_count += count;
+  summary_.accepted_count = statistics.accepted_count + statistics.late_count;
+  summary_.limited_frame_count = statistics.limited_frame_count;
+  summary_.peak = std::max(summary_.peak, mixer_.TakePeak());
+  return count;
+}
+
+void OfflineRenderer::PushStrikesBefore(uint64_t frame) {
+  while (pushed_count_ < strikes_.size() && strikes_[pushed_count_].frame < frame) {
+    if (!stream_->TryPush(strikes_[pushed_count_])) Reject(1);
+    ++pushed_count_;
+  }
+}
+
+bool OfflineRenderer::TailEnded(std::span<const float> block) {
+  const bool quiet = std::ranges::all_of(block, [](float x) { return std::abs(x) < kQuiet; });
+  quiet_frame_count_ = quiet ? quiet_frame_count_ + block.size() : 0;
+  return settings_.tail_s == 0 &&
+         static_cast<double>(quiet_frame_count_) >= kQuietS * settings_.sample_rate_hz;
+}
+
+}  // namespace carillon

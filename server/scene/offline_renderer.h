@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "server/scene/contact_stream.h"
+#include "server/scene/sounding_body.h"
+#include "server/scene/sounding_object.h"
+#include "server/synthesis/mixer.h"
+
+namespace carillon {
+
+/// How to render offline.
+struct OfflineSettings {
+  uint32_t sample_rate_hz = 48000;
+  /// How long to go on after the last impulse; zero: until all is below -80 dB of full scale, at
+  /// most 60 s.
+  double tail_s = 0;
+};
+
+/// What has been rendered.
+struct OfflineSummary {
+  uint64_t frame_count = 0;
+  uint64_t accepted_count = 0;
+  uint64_t rejected_count = 0;
+  double peak = 0;  ///< before the limiter
+  uint64_t limited_frame_count = 0;
+};
+
+/// Renders a recorded simulation on a virtual clock with a mixer of its own, as fast as it can and
+/// bit for bit the same each time: frame 0 is simulation time zero, and nothing comes late. Objects
+/// first, then the impulses, then Render until it is done. One thread at a time.
+class OfflineRenderer {
+ public:
+  /// Frames that Render makes at a time.
+  static constexpr size_t kBlockFrameCount = 128;
+  /// Impulses later than this are rejected.
+  static constexpr double kMaxTimeS = 86400;
+
+  /// `bodies` must outlive the renderer. Errors: InvalidArgument (INVALID_SETTINGS).
+  static absl::StatusOr<std::unique_ptr<OfflineRenderer>> Make(const OfflineSettings& settings,
+                                                               BodyCache& bodies);
+
+  /// Errors: AlreadyExists (OBJECT_EXISTS), and those of MakeSoundingObject.
+  absl::Status AddObject(uint32_t handle, std::shared_ptr<const ModalModel> model,
+                         const ObjectProperties& properties);
+
+  /// An impulse of the step at simulation time `time_s`. Where it cannot be used it is counted as
+  /// rejected.
+  void Strike(double time_s, const ObjectImpulse& impulse);
+
+  /// Counts `count` impulses that could not be used.
+  void Reject(uint64_t count) { summary_.rejected_count += count; }
+
+  /// Renders the next frames, up to `frames.size()`, a multiple of kBlockFrameCount; returns how
+  /// many, zero after the end.
+  size_t Render(std::span<float> frames);
+
+  /// True for everything rendered so far.
+  const OfflineSummary& summary() const { return summary_; }
+
+ private:
+  OfflineRenderer(const OfflineSettings& settings, BodyCache& bodies);
+
+  absl::Status TryStrike(double time_s, const ObjectImpulse& impulse);
+  void PushStrikesBefore(uint64_t frame);
+  size_t RenderBlock(std::span<float> block);
+  bool TailEnded(std::span<const float> block);
+
+  const OfflineSettings settings_;
+  BodyCache& bodies_;
+  Mixer mixer_;
+  std::unique_ptr<StrikeStream> stream_;
+  std::map<uint32_t, SoundingObject> objects_;
+  std::vector<carillon::Strike> strikes_;  // in order of time once rendering has begun
+  size_t pushed_count_ = 0;
+  uint64_t quiet_frame_count_ = 0;
+  bool begun_ = false;
+  bool ended_ = false;
+  OfflineSummary summary_;
+};
+
+}  // namespace carillon

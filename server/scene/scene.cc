@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/scene/scene.h"
+
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "proto/error_reason.h"
+
+namespace carillon {
+namespace {
+
+absl::Status ObjectExists(uint64_t scene, uint32_t handle) {
+  return Refusal(absl::StatusCode::kAlreadyExists, "OBJECT_EXISTS",
+                 absl::StrCat("scenes/", scene, " has an object ", handle,
+                              " already; choose another handle, or 0 to have one chosen"));
+}
+
+}  // namespace
+
+absl::Status Scene::Use(uint32_t handle,
+                        absl::FunctionRef<absl::Status(const SoundingObject&)> use) const {
+  const absl::ReaderMutexLock lock(&mutex_);
+  const auto found = Locate(handle);
+  return found.ok() ? use((*found)->second) : found.status();
+}
+
+absl::StatusOr<SoundingObject> Scene::Find(uint32_t handle) const {
+  const absl::ReaderMutexLock lock(&mutex_);
+  const auto found = Locate(handle);
+  if (!found.ok()) return found.status();
+  return (*found)->second;
+}
+
+absl::StatusOr<uint32_t> Scene::ChooseHandle(uint32_t handle) const {
+  const absl::ReaderMutexLock lock(&mutex_);
+  if (handle != 0) {
+    if (objects_.contains(handle)) return ObjectExists(id_, handle);
+    return handle;
+  }
+  uint32_t free = 1;
+  for (const auto& [taken, object] : objects_) {
+    if (taken != free) break;
+    ++free;
+  }
+  return free;
+}
+
+absl::Status Scene::Insert(uint32_t handle, SoundingObject object) {
+  const absl::MutexLock lock(&mutex_);
+  if (closed_) return SceneNotFound();
+  if (!objects_.emplace(handle, std::move(object)).second) return ObjectExists(id_, handle);
+  return absl::OkStatus();
+}
+
+absl::StatusOr<SoundingObject> Scene::Replace(uint32_t handle, SoundingObject object) {
+  const absl::MutexLock lock(&mutex_);
+  if (const auto found = Locate(handle); !found.ok()) return found.status();
+  return std::exchange(objects_[handle], std::move(object));
+}
+
+absl::StatusOr<SoundingObject> Scene::Remove(uint32_t handle) {
+  const absl::MutexLock lock(&mutex_);
+  const auto found = Locate(handle);
+  if (!found.ok()) return found.status();
+  return std::move(objects_.extract(*found).mapped());
+}
+
+std::map<uint32_t, SoundingObject> Scene::Close() {
+  const absl::MutexLock lock(&mutex_);
+  closed_ = true;
+  return std::exchange(objects_, {});
+}
+
+absl::StatusOr<std::map<uint32_t, SoundingObject>::const_iterator> Scene::Locate(
+    uint32_t handle) const {
+  if (closed_) return SceneNotFound();
+  const auto found = objects_.find(handle);
+  if (found != objects_.end()) return found;
+  return Refusal(absl::StatusCode::kNotFound, "OBJECT_NOT_FOUND",
+                 absl::StrCat("scenes/", id_, " has no object ", handle,
+                              "; add it first with SceneService.AddObject"));
+}
+
+absl::Status Scene::SceneNotFound() const {
+  return Refusal(absl::StatusCode::kNotFound, "SCENE_NOT_FOUND",
+                 absl::StrCat("scenes/", id_, " has been deleted; make another"));
+}
+
+}  // namespace carillon

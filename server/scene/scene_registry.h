@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/status/statusor.h"
+#include "absl/synchronization/mutex.h"
+#include "server/scene/contact_stream.h"
+#include "server/scene/scene.h"
+#include "server/scene/sounding_body.h"
+
+namespace carillon {
+
+/// An object with the handle that names it in contacts.
+struct PlacedObject {
+  uint32_t handle = 0;
+  SoundingObject object;
+};
+
+/// What changes in an object; the rest stays.
+struct ObjectChange {
+  /// Without its size.
+  std::optional<SoundingMaterial> material;
+  std::optional<double> poisson_ratio;  ///< of that material
+  std::optional<double> size;
+  std::optional<double> gain;
+};
+
+/// All scenes of the daemon, on one mixer. Safe from every thread.
+class SceneRegistry {
+ public:
+  static constexpr size_t kMaxSceneCount = 64;
+  static constexpr size_t kMaxObjectCount = 4096;
+
+  /// `mixer` must outlive the registry.
+  explicit SceneRegistry(Mixer& mixer) : mixer_(mixer) {}
+
+  /// A new scene's id. Errors: ResourceExhausted (TOO_MANY_SCENES).
+  absl::StatusOr<uint64_t> CreateScene();
+
+  /// Fades out the scene's objects. Errors: NotFound (SCENE_NOT_FOUND).
+  absl::Status DeleteScene(uint64_t scene);
+
+  /// Makes an object; a `handle` of zero: one is chosen. Errors: NotFound (SCENE_NOT_FOUND),
+  /// AlreadyExists (OBJECT_EXISTS), ResourceExhausted (TOO_MANY_OBJECTS), and those of
+  /// MakeSoundingObject.
+  absl::StatusOr<PlacedObject> AddObject(uint64_t scene, uint32_t handle,
+                                         std::shared_ptr<const ModalModel> model,
+                                         const ObjectProperties& properties);
+
+  /// A new bank takes the strikes from now on; the old one rings out. Errors: NotFound
+  /// (SCENE_NOT_FOUND, OBJECT_NOT_FOUND), and those of MakeSoundingObject.
+  absl::StatusOr<PlacedObject> UpdateObject(uint64_t scene, uint32_t handle,
+                                            const ObjectChange& change);
+
+  /// Fades the object out. Errors: NotFound (SCENE_NOT_FOUND, OBJECT_NOT_FOUND).
+  absl::Status RemoveObject(uint64_t scene, uint32_t handle);
+
+  /// Errors: NotFound (SCENE_NOT_FOUND), InvalidArgument (INVALID_STREAM), ResourceExhausted
+  /// (TOO_MANY_STREAMS).
+  absl::StatusOr<std::unique_ptr<ContactStream>> OpenContactStream(
+      uint64_t scene, const ContactStreamSettings& settings);
+
+  /// In all scenes.
+  size_t object_count() const;
+
+ private:
+  absl::StatusOr<std::shared_ptr<Scene>> FindScene(uint64_t scene) const;
+
+  Mixer& mixer_;
+  BodyCache bodies_;
+  /// Held while objects come, change and go, so that limits are exact and two changes of one object
+  /// do not undo each other. Contacts do not take it.
+  absl::Mutex change_mutex_;
+  mutable absl::Mutex mutex_ ABSL_ACQUIRED_AFTER(change_mutex_);
+  std::map<uint64_t, std::shared_ptr<Scene>> scenes_ ABSL_GUARDED_BY(mutex_);
+  uint64_t next_scene_ ABSL_GUARDED_BY(mutex_) = 1;
+  size_t object_count_ ABSL_GUARDED_BY(mutex_) = 0;
+};
+
+}  // namespace carillon

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/scene/sounding_body.h"
+
+#include <utility>
+
+namespace carillon {
+namespace {
+
+absl::StatusOr<std::shared_ptr<const SoundingBody>> MakeBody(
+    std::shared_ptr<const ModalModel> model) {
+  absl::StatusOr<std::unique_ptr<SurfaceLocator>> locator =
+      SurfaceLocator::Make({.vertices = model->vertices,
+                            .triangles = model->triangles,
+                            .given_triangle = model->given_triangle,
+                            .given_vertices = model->given_vertices,
+                            .given_triangles = model->given_triangles});
+  if (!locator.ok()) return locator.status();
+  return std::make_shared<const SoundingBody>(
+      SoundingBody{.model = std::move(model), .locator = *std::move(locator)});
+}
+
+}  // namespace
+
+absl::StatusOr<std::shared_ptr<const SoundingBody>> BodyCache::Get(
+    std::shared_ptr<const ModalModel> model) {
+  const absl::MutexLock lock(&mutex_);
+  if (const auto found = bodies_.find(model.get()); found != bodies_.end()) {
+    if (std::shared_ptr<const SoundingBody> body = found->second.lock()) return body;
+  }
+  std::erase_if(bodies_, [](const auto& entry) { return entry.second.expired(); });
+  const ModalModel* key = model.get();
+  absl::StatusOr<std::shared_ptr<const SoundingBody>> body = MakeBody(std::move(model));
+  if (body.ok()) bodies_[key] = *body;
+  return body;
+}
+
+}  // namespace carillon

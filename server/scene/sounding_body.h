@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <map>
+#include <memory>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/status/statusor.h"
+#include "absl/synchronization/mutex.h"
+#include "server/excitation/surface_locator.h"
+#include "server/mode_database/modal_model.h"
+
+namespace carillon {
+
+/// A modal model and the index that finds points on its surface; shared by all objects of that
+/// shape.
+struct SoundingBody {
+  std::shared_ptr<const ModalModel> model;
+  std::unique_ptr<const SurfaceLocator> locator;
+};
+
+/// Makes the body of a model once, for as long as anybody holds it. Safe from every thread.
+class BodyCache {
+ public:
+  /// Errors: InvalidArgument (SURFACE_MALFORMED).
+  absl::StatusOr<std::shared_ptr<const SoundingBody>> Get(std::shared_ptr<const ModalModel> model);
+
+ private:
+  absl::Mutex mutex_;
+  std::map<const ModalModel*, std::weak_ptr<const SoundingBody>> bodies_ ABSL_GUARDED_BY(mutex_);
+};
+
+}  // namespace carillon

@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/scene/sounding_object.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "proto/error_reason.h"
+
+namespace carillon {
+namespace {
+
+constexpr double kSmallestSize = 0.001;
+constexpr double kLargestSize = 1000;
+constexpr double kLargestGain = 1000;
+/// What a model's Poisson's ratio is rounded to, with room for the rounding of the sum.
+constexpr double kPoissonTolerance = 1.0001e-4;
+
+absl::Status OutOfRange(absl::string_view what, double value, double least, double most) {
+  return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_OBJECT",
+                 absl::StrCat(what, " is ", value, "; it must be ", least, " to ", most));
+}
+
+absl::Status Check(const ModalModel& model, const ObjectProperties& properties) {
+  const double size = properties.material.size;
+  if (!(size >= kSmallestSize && size <= kLargestSize)) {
+    return OutOfRange("size", size, kSmallestSize, kLargestSize);
+  }
+  if (!(properties.gain >= 0 && properties.gain <= kLargestGain)) {
+    return OutOfRange("gain", properties.gain, 0, kLargestGain);
+  }
+  const double wanted = properties.poisson_ratio.value_or(model.poisson_ratio);
+  if (std::abs(wanted - model.poisson_ratio) <= kPoissonTolerance) return absl::OkStatus();
+  absl::Status status = Refusal(
+      absl::StatusCode::kFailedPrecondition, "POISSON_RATIO_DIFFERS",
+      absl::StrCat(
+          "the material's Poisson's ratio is ", wanted, " but the modal model was computed for ",
+          model.poisson_ratio,
+          "; create a modal model with the material's, or set poisson_ratio to the model's"));
+  AddFigure(status, "model_poisson_ratio", absl::StrCat(model.poisson_ratio));
+  return status;
+}
+
+absl::Status NoModeInBand(const ModalModel& model, const SoundingMaterial& material,
+                          const SoundingBand& band) {
+  if (model.eigenvalues.empty()) {
+    return Refusal(absl::StatusCode::kFailedPrecondition, "NO_MODE_IN_BAND",
+                   "the modal model holds no mode");
+  }
+  const double first_hz = NaturalFrequencyHz(model.eigenvalues.front(), material);
+  const double last_hz = NaturalFrequencyHz(model.eigenvalues.back(), material);
+  absl::Status status = Refusal(
+      absl::StatusCode::kFailedPrecondition, "NO_MODE_IN_BAND",
+      absl::StrCat("with this material and size the model's ", model.mode_count(), " modes lie at ",
+                   first_hz, " to ", last_hz, " Hz, and none lies within ", band.lowest_hz, " to ",
+                   band.highest_hz, " Hz and rings for ", band.shortest_t60_s * 1000,
+                   " ms; change size, stiffness or damping"));
+  AddFigure(status, "first_mode_hz", absl::StrCat(first_hz));
+  return status;
+}
+
+/// The frequency up to which the model is complete, unless that is the top of the band.
+std::optional<double> CompleteTo(const ModalModel& model, const SoundingMaterial& material,
+                                 double top_hz) {
+  const double complete_hz = NaturalFrequencyHz(model.complete_to_eigenvalue, material);
+  // The limit asked for and this one are the same number along two ways of computing it.
+  constexpr double kRounding = 1e-6;
+  if (complete_hz >= top_hz * (1 - kRounding)) return std::nullopt;
+  return complete_hz;
+}
+
+}  // namespace
+
+absl::StatusOr<SoundingObject> MakeSoundingObject(std::shared_ptr<const SoundingBody> body,
+                                                  const ObjectProperties& properties,
+                                                  Mixer& mixer) {
+  const ModalModel& model = *body->model;
+  if (absl::Status status = Check(model, properties); !status.ok()) return status;
+  const SoundingBand band;
+  const MixerSettings& settings = mixer.settings();
+  const SoundingModes sounding = SelectSoundingModes(
+      model.eigenvalues, model.couplings, properties.material, settings.sample_rate_hz, band);
+  if (sounding.modes.empty()) return NoModeInBand(model, properties.material, band);
+  const ShapeTable shapes{.values = {body->model, model.shapes.data()},
+                          .vertex_count = model.vertices.size(),
+                          .mode_count = model.mode_count()};
+  absl::StatusOr<BankId> bank = mixer.Add(std::make_unique<OscillatorBank>(
+      sounding, shapes,
+      OscillatorBankSettings{.sample_rate_hz = settings.sample_rate_hz,
+                             .block_frame_count = settings.block_frame_count,
+                             .gain = properties.gain}));
+  if (!bank.ok()) return bank.status();
+  const double top_hz = std::min(band.highest_hz, settings.sample_rate_hz / 2);
+  return SoundingObject{.body = std::move(body),
+                        .properties = properties,
+                        .mode_count = static_cast<uint32_t>(sounding.modes.size()),
+                        .lowest_frequency_hz = sounding.modes.front().natural_frequency_hz,
+                        .highest_frequency_hz = sounding.modes.back().natural_frequency_hz,
+                        .complete_to_hz = CompleteTo(model, properties.material, top_hz),
+                        .bank = *bank};
+}
+
+absl::StatusOr<Excitation> LocateImpulse(const SoundingObject& object,
+                                         const ContactImpulse& impulse) {
+  if (absl::Status status = Validate(impulse); !status.ok()) return status;
+  const SurfaceLocator& locator = *object.body->locator;
+  absl::StatusOr<LocatedPoint> located = absl::UnknownError("");
+  if (const auto* on_surface = std::get_if<SurfacePoint>(&impulse.location)) {
+    located = locator.OnGivenTriangle(*on_surface);
+  } else {
+    Point point = std::get<Point>(impulse.location);
+    for (double& coordinate : point) coordinate /= object.properties.material.size;
+    located = locator.Nearest(point);
+  }
+  if (!located.ok()) return located.status();
+  Excitation excitation{.vertices = located->vertices,
+                        .tau_s = static_cast<float>(GaussianTauS(impulse.duration_s))};
+  std::ranges::transform(located->weights, excitation.weights.begin(),
+                         [](double weight) { return static_cast<float>(weight); });
+  std::ranges::transform(impulse.impulse_newton_seconds, excitation.impulse_newton_seconds.begin(),
+                         [](double component) { return static_cast<float>(component); });
+  return excitation;
+}
+
+}  // namespace carillon

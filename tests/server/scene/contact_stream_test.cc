@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/scene/contact_stream.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "server/scene/scene_registry.h"
+#include "tests/server/scene/small_model.h"
+
+namespace carillon {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr size_t kBlock = 64;
+constexpr double kRate = 48000;
+
+class ContactStreamTest : public testing::Test {
+ protected:
+  ContactStreamTest() {
+    EXPECT_TRUE(scenes_.AddObject(scene_, 1, SmallModel(), SmallProperties()).ok());
+  }
+
+  std::unique_ptr<ContactStream> Open(double scheduling_delay_s) {
+    return *scenes_.OpenContactStream(scene_,
+                                      {.step_s = 0.01, .scheduling_delay_s = scheduling_delay_s});
+  }
+
+  std::vector<float> Render(size_t frame_count) {
+    std::vector<float> sound((frame_count + kBlock - 1) / kBlock * kBlock);
+    mixer_.Render(sound);
+    return sound;
+  }
+
+  /// Number of the first frame that is not silent, counted from the start of `sound`.
+  static size_t Onset(const std::vector<float>& sound) {
+    return static_cast<size_t>(std::ranges::find_if(sound, [](float x) { return x != 0; }) -
+                               sound.begin());
+  }
+
+  Mixer mixer_{MixerSettings{.sample_rate_hz = kRate, .block_frame_count = kBlock}};
+  SceneRegistry scenes_{mixer_};
+  uint64_t scene_ = *scenes_.CreateScene();
+};
+
+TEST_F(ContactStreamTest, AContactSoundsAtTheFirstStepsArrivalPlusItsTimePlusTheDelay) {
+  Render(640);  // the first step arrives at frame 640
+  const auto stream = Open(0.02);
+  ASSERT_TRUE(stream->BeginStep(100.0).ok());  // this simulation starts at 100 s
+  ASSERT_TRUE(stream->BeginStep(100.5).ok());
+  stream->Strike(SmallImpulse(1, 1, 0.25));
+  const double expected = (0.5 + 0.25 + 0.02) * kRate;
+  EXPECT_EQ(Onset(Render(40000)), expected + 1);  // sin(0) is silent
+}
+
+TEST_F(ContactStreamTest, AnImpulseBetweenTwoFramesIsFirstHeardAtTheLater) {
+  const auto stream = Open(0.02);
+  ASSERT_TRUE(stream->BeginStep(0).ok());
+  stream->Strike(SmallImpulse(1, 1, 0.5 / kRate));
+  EXPECT_EQ(Onset(Render(4800)), 0.02 * kRate + 1);
+}
+
+TEST_F(ContactStreamTest, WhatComesTooLateSoundsAtOnceAndIsCounted) {
+  const auto stream = Open(0.01);
+  ASSERT_TRUE(stream->BeginStep(0).ok());
+  Render(4800);  // 0.1 s pass, but the simulator comes to 0.05 s only
+  ASSERT_TRUE(stream->BeginStep(0.05).ok());
+  stream->Strike(SmallImpulse(1));
+  stream->Strike(SmallImpulse(1, 1, 1));
+  EXPECT_LE(Onset(Render(kBlock)), 1U);
+  EXPECT_EQ(stream->counts().late_count, 1U);
+  EXPECT_EQ(stream->counts().accepted_count, 1U);
+}
+
+TEST_F(ContactStreamTest, TheDelayIsOneStepOneBlockAndFiveMillisecondsUnlessGiven) {
+  const auto stream = *scenes_.OpenContactStream(scene_, {.step_s = 1.0 / 60});
+  EXPECT_DOUBLE_EQ(stream->scheduling_delay_s(), 1.0 / 60 + kBlock / kRate + 0.005);
+  EXPECT_EQ(Open(0)->scheduling_delay_s(), 0);
+}
+
+TEST_F(ContactStreamTest, AFullQueueDropsAndCounts) {
+  const auto stream = Open(0.01);
+  ASSERT_TRUE(stream->BeginStep(0).ok());
+  constexpr uint64_t kCount = 20000;
+  for (uint64_t i = 0; i < kCount; ++i) stream->Strike(SmallImpulse(1, 1e-6));
+  EXPECT_FALSE(stream->settled());
+  Render(100 * kBlock);  // the mixer takes a bounded number of strikes a block
+  const ContactCounts counts = stream->counts();
+  EXPECT_GT(counts.dropped_count, 0U);
+  EXPECT_GT(counts.accepted_count, 0U);
+  EXPECT_LT(counts.dropped_count, kCount / 2);
+  EXPECT_EQ(counts.accepted_count + counts.late_count + counts.dropped_count, kCount);
+  EXPECT_TRUE(stream->settled());
+}
+
+TEST_F(ContactStreamTest, AnImpulseThatCannotBeUsedIsRejectedWithItsReasonAndTheRestSounds) {
+  const auto stream = Open(0.01);
+  ASSERT_TRUE(stream->BeginStep(0).ok());
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  ObjectImpulse off_surface = SmallImpulse(1);
+  off_surface.impulse.location = SurfacePoint{.triangle = 4};
+  ObjectImpulse nowhere = SmallImpulse(1);
+  nowhere.impulse.location = Point{nan, 0, 0};
+  ObjectImpulse endless = SmallImpulse(1);
+  endless.impulse.duration_s = 0.2;
+  const std::vector<std::pair<ObjectImpulse, const char*>> cases = {
+      {SmallImpulse(9), "OBJECT_NOT_FOUND: "},
+      {SmallImpulse(1, nan), "IMPULSE_NOT_FINITE: "},
+      {off_surface, "TRIANGLE_OUT_OF_RANGE: "},
+      {nowhere, "POINT_NOT_FINITE: "},
+      {endless, "INVALID_DURATION: "},
+      {SmallImpulse(1, 1, -0.001), "INVALID_TIME_OFFSET: "},
+      {SmallImpulse(1, 1, nan), "INVALID_TIME_OFFSET: "},
+      {SmallImpulse(1, 1, 61), "TIME_TOO_FAR_AHEAD: "},
+  };
+  for (const auto& [impulse, reason] : cases) {
+    stream->Strike(impulse);
+    EXPECT_THAT(stream->last_rejection().ToString(), HasSubstr(reason));
+  }
+  stream->Strike(SmallImpulse(1));
+  EXPECT_LT(Onset(Render(4800)), 4800U);
+  EXPECT_EQ(stream->counts().rejected_count, cases.size());
+  EXPECT_EQ(stream->counts().accepted_count, 1U);
+}
+
+TEST_F(ContactStreamTest, OutlivesItsScene) {
+  const auto stream = Open(0.01);
+  ASSERT_TRUE(stream->BeginStep(0).ok());
+  ASSERT_TRUE(scenes_.DeleteScene(scene_).ok());
+  stream->Strike(SmallImpulse(1));
+  EXPECT_THAT(stream->last_rejection().ToString(), HasSubstr("SCENE_NOT_FOUND: "));
+}
+
+TEST_F(ContactStreamTest, RefusesATimeThatGoesBackOrIsNone) {
+  const auto stream = Open(0.01);
+  ASSERT_TRUE(stream->BeginStep(1).ok());
+  ASSERT_TRUE(stream->BeginStep(1).ok());
+  for (const double time_s : {0.5, std::nan(""), std::numeric_limits<double>::infinity()}) {
+    const absl::Status status = stream->BeginStep(time_s);
+    EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
+    EXPECT_THAT(status.ToString(), HasSubstr("INVALID_STREAM: "));
+  }
+  EXPECT_EQ(stream->counts().step_count, 2U);
+}
+
+TEST_F(ContactStreamTest, RefusesAStepOrADelayOutOfRange) {
+  for (const ContactStreamSettings& settings :
+       std::vector<ContactStreamSettings>{{.step_s = 0},
+                                          {.step_s = 1.1},
+                                          {.step_s = std::nan("")},
+                                          {.step_s = 0.01, .scheduling_delay_s = -0.1},
+                                          {.step_s = 0.01, .scheduling_delay_s = 10.1}}) {
+    EXPECT_THAT(scenes_.OpenContactStream(scene_, settings).status().ToString(),
+                HasSubstr("INVALID_STREAM: "));
+  }
+}
+
+}  // namespace
+}  // namespace carillon

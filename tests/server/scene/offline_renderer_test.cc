@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/scene/offline_renderer.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "server/scene/scene_registry.h"
+#include "tests/server/scene/small_model.h"
+
+namespace carillon {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr uint32_t kRate = 48000;
+
+/// Strikes at times that are no multiple of a block, some at the same time, not all in order within
+/// their step.
+void StrikeAll(auto&& strike) {
+  for (int step = 0; step < 20; ++step) {
+    const double time_s = 0.0137 * step;
+    strike(time_s, SmallImpulse(1, 0.3 + 0.01 * step, 0.005));
+    strike(time_s, SmallImpulse(2, -0.2));
+    strike(time_s, SmallImpulse(1, 0.1, 0.0001));
+  }
+}
+
+class OfflineRendererTest : public testing::Test {
+ protected:
+  std::unique_ptr<OfflineRenderer> Make(double tail_s = 0) {
+    auto renderer = *OfflineRenderer::Make({.sample_rate_hz = kRate, .tail_s = tail_s}, bodies_);
+    ObjectProperties larger = SmallProperties();
+    larger.material.size = 1.7;
+    EXPECT_TRUE(renderer->AddObject(1, model_, SmallProperties()).ok());
+    EXPECT_TRUE(renderer->AddObject(2, model_, larger).ok());
+    return renderer;
+  }
+
+  static std::vector<float> RenderAll(OfflineRenderer& renderer, size_t blocks_at_a_time) {
+    std::vector<float> sound;
+    std::vector<float> frames(blocks_at_a_time * OfflineRenderer::kBlockFrameCount);
+    while (const size_t count = renderer.Render(frames)) {
+      sound.insert(sound.end(), frames.begin(), frames.begin() + static_cast<ptrdiff_t>(count));
+    }
+    EXPECT_EQ(renderer.summary().frame_count, sound.size());
+    return sound;
+  }
+
+  BodyCache bodies_;
+  std::shared_ptr<const ModalModel> model_ = SmallModel();
+};
+
+TEST_F(OfflineRendererTest, IsBitForBitTheSameHoweverOftenAndInWhateverPieces) {
+  std::vector<std::vector<float>> sounds;
+  for (const size_t blocks_at_a_time : {1, 1, 7, 64}) {
+    const auto renderer = Make();
+    StrikeAll(
+        [&](double time_s, const ObjectImpulse& impulse) { renderer->Strike(time_s, impulse); });
+    sounds.push_back(RenderAll(*renderer, blocks_at_a_time));
+  }
+  EXPECT_GT(sounds[0].size(), kRate / 2);
+  for (const std::vector<float>& sound : sounds) EXPECT_EQ(sound, sounds[0]);
+}
+
+TEST_F(OfflineRendererTest, IsBitForBitWhatTheLiveMixerRenders) {
+  Mixer mixer({.sample_rate_hz = kRate, .block_frame_count = OfflineRenderer::kBlockFrameCount});
+  SceneRegistry scenes(mixer);
+  const uint64_t scene = *scenes.CreateScene();
+  ObjectProperties larger = SmallProperties();
+  larger.material.size = 1.7;
+  ASSERT_TRUE(scenes.AddObject(scene, 1, model_, SmallProperties()).ok());
+  ASSERT_TRUE(scenes.AddObject(scene, 2, model_, larger).ok());
+  const auto stream = *scenes.OpenContactStream(scene, {.step_s = 0.0137, .scheduling_delay_s = 0});
+  const auto renderer = Make(0.5);
+  StrikeAll([&](double time_s, const ObjectImpulse& impulse) {
+    renderer->Strike(time_s, impulse);
+    ASSERT_TRUE(stream->BeginStep(time_s).ok());
+    stream->Strike(impulse);
+  });
+  const std::vector<float> offline = RenderAll(*renderer, 8);
+  std::vector<float> live((offline.size() + 127) / 128 * 128);
+  mixer.Render(live);
+  live.resize(offline.size());
+  EXPECT_EQ(stream->counts().late_count, 0U);
+  EXPECT_EQ(offline, live);
+}
+
+TEST_F(OfflineRendererTest, FrameZeroIsSimulationTimeZero) {
+  const auto renderer = Make();
+  renderer->Strike(0.125, SmallImpulse(1));
+  const std::vector<float> sound = RenderAll(*renderer, 8);
+  const auto onset = std::ranges::find_if(sound, [](float x) { return x != 0; });
+  EXPECT_EQ(onset - sound.begin(), 0.125 * kRate + 1);  // sin(0) is silent
+}
+
+TEST_F(OfflineRendererTest, EndsOnceAllIsBelowMinus80Db) {
+  const auto renderer = Make();
+  renderer->Strike(0, SmallImpulse(1));
+  const std::vector<float> sound = RenderAll(*renderer, 8);
+  const auto loud = [](float x) { return std::abs(x) >= 1e-4F; };
+  const auto last_loud = std::ranges::find_if(sound.rbegin(), sound.rend(), loud);
+  const auto quiet_frame_count = last_loud - sound.rbegin();
+  ASSERT_NE(last_loud, sound.rend());
+  EXPECT_GE(quiet_frame_count, kRate / 4);            // it listens for that long
+  EXPECT_LT(quiet_frame_count, kRate / 4 + 2 * 128);  // and not for longer
+  EXPECT_FALSE(loud(sound.back()));
+}
+
+TEST_F(OfflineRendererTest, ATailThatIsGivenIsKeptToTheFrame) {
+  const auto renderer = Make(0.1);
+  renderer->Strike(0.05, SmallImpulse(1));
+  EXPECT_EQ(RenderAll(*renderer, 8).size(), 0.15 * kRate);
+}
+
+TEST_F(OfflineRendererTest, CountsWhatSoundedAndWhatCouldNotBeUsed) {
+  const auto renderer = Make();
+  renderer->Strike(0, SmallImpulse(1));
+  renderer->Strike(0, SmallImpulse(7));                // no such object
+  renderer->Strike(0, SmallImpulse(1, std::nan("")));  // no number
+  renderer->Strike(-1, SmallImpulse(1));               // before the beginning
+  const std::vector<float> sound = RenderAll(*renderer, 8);
+  EXPECT_EQ(renderer->summary().accepted_count, 1U);
+  EXPECT_EQ(renderer->summary().rejected_count, 3U);
+  float peak = 0;
+  for (const float sample : sound) peak = std::max(peak, std::abs(sample));
+  EXPECT_EQ(renderer->summary().peak, peak);  // the limiter did not work
+  EXPECT_EQ(renderer->summary().limited_frame_count, 0U);
+}
+
+TEST_F(OfflineRendererTest, TakesMoreImpulsesAtOnceThanTheLiveMixer) {
+  const auto renderer = Make();
+  for (int i = 0; i < 5000; ++i) renderer->Strike(0.001, SmallImpulse(1, 1e-4));
+  RenderAll(*renderer, 8);
+  EXPECT_EQ(renderer->summary().accepted_count, 5000U);
+  EXPECT_EQ(renderer->summary().rejected_count, 0U);
+}
+
+TEST_F(OfflineRendererTest, RefusesSettingsOutOfRange) {
+  for (const OfflineSettings& settings : std::vector<OfflineSettings>{
+           {.sample_rate_hz = 7999}, {.sample_rate_hz = 192001}, {.tail_s = -1}, {.tail_s = 121}}) {
+    EXPECT_THAT(OfflineRenderer::Make(settings, bodies_).status().ToString(),
+                HasSubstr("INVALID_SETTINGS: "));
+  }
+}
+
+TEST_F(OfflineRendererTest, RefusesTwoObjectsOfOneHandle) {
+  EXPECT_THAT(Make()->AddObject(1, model_, SmallProperties()).ToString(),
+              HasSubstr("OBJECT_EXISTS: "));
+}
+
+}  // namespace
+}  // namespace carillon

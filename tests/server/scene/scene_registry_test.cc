@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/scene/scene_registry.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "proto/error_reason.h"
+#include "tests/server/scene/small_model.h"
+
+namespace carillon {
+namespace {
+
+using testing::Each;
+using testing::HasSubstr;
+
+constexpr size_t kBlock = 128;
+
+/// A mixer with one scene, and what it renders.
+class Stage {
+ public:
+  uint32_t Add(const ObjectProperties& properties = SmallProperties()) {
+    return scenes.AddObject(scene, 0, SmallModel(), properties)->handle;
+  }
+
+  void Strike(uint32_t handle) {
+    const auto stream = *scenes.OpenContactStream(scene, {.step_s = 0.01, .scheduling_delay_s = 0});
+    ASSERT_TRUE(stream->BeginStep(0).ok());
+    stream->Strike(SmallImpulse(handle));
+    ASSERT_EQ(stream->counts().rejected_count, 0U);
+  }
+
+  std::vector<float> Render(size_t block_count) {
+    std::vector<float> sound(block_count * kBlock);
+    mixer.Render(sound);
+    return sound;
+  }
+
+  Mixer mixer{MixerSettings{.sample_rate_hz = 48000, .block_frame_count = kBlock}};
+  SceneRegistry scenes{mixer};
+  uint64_t scene = *scenes.CreateScene();
+};
+
+double Peak(const std::vector<float>& sound) {
+  return std::abs(
+      *std::ranges::max_element(sound, [](float a, float b) { return std::abs(a) < std::abs(b); }));
+}
+
+TEST(SceneRegistry, AnObjectStatesTheModesWithWhichItSounds) {
+  Stage stage;
+  const PlacedObject placed =
+      *stage.scenes.AddObject(stage.scene, 0, SmallModel(), SmallProperties());
+  EXPECT_EQ(placed.object.mode_count, 3U);
+  EXPECT_NEAR(placed.object.lowest_frequency_hz, 440, 1e-9);
+  EXPECT_NEAR(placed.object.highest_frequency_hz, 5000, 1e-9);
+  EXPECT_EQ(placed.object.complete_to_hz, std::nullopt);
+}
+
+TEST(SceneRegistry, AnObjectThatSoundsDullerThanItsBodySaysUpToWhere) {
+  Stage stage;
+  ObjectProperties properties = SmallProperties();
+  properties.material.young_pa /= 16;  // a quarter of every frequency: complete to 12.5 kHz
+  const PlacedObject placed = *stage.scenes.AddObject(stage.scene, 0, SmallModel(), properties);
+  ASSERT_TRUE(placed.object.complete_to_hz.has_value());
+  EXPECT_NEAR(*placed.object.complete_to_hz, 12500, 1e-6);
+}
+
+TEST(SceneRegistry, RefusesABodyWithNoModeInTheBandAndNamesItsFirst) {
+  Stage stage;
+  ObjectProperties properties = SmallProperties();
+  properties.material.size = 0.01;  // 100 times every frequency
+  const absl::Status status =
+      stage.scenes.AddObject(stage.scene, 0, SmallModel(), properties).status();
+  EXPECT_EQ(status.code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_THAT(status.ToString(), HasSubstr("NO_MODE_IN_BAND: "));
+  EXPECT_NEAR(std::stod(ToErrorInfo(status).metadata().at("first_mode_hz")), 44000, 1);
+}
+
+TEST(SceneRegistry, RefusesAnotherPoissonRatio) {
+  Stage stage;
+  ObjectProperties properties = SmallProperties();
+  properties.poisson_ratio = 0.3302;
+  const absl::Status status =
+      stage.scenes.AddObject(stage.scene, 0, SmallModel(), properties).status();
+  EXPECT_EQ(status.code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_THAT(status.ToString(), HasSubstr("POISSON_RATIO_DIFFERS: "));
+  properties.poisson_ratio = 0.3301;  // the tolerance the contract states
+  EXPECT_TRUE(stage.scenes.AddObject(stage.scene, 0, SmallModel(), properties).ok());
+}
+
+TEST(SceneRegistry, RefusesSizesAndGainsOutOfRange) {
+  Stage stage;
+  const double nan = std::nan("");
+  for (const auto& [size, gain] : std::vector<std::pair<double, double>>{
+           {-1, 1}, {1001, 1}, {nan, 1}, {1, -0.1}, {1, 1001}, {1, nan}}) {
+    ObjectProperties properties = SmallProperties();
+    properties.material.size = size;
+    properties.gain = gain;
+    const absl::Status status =
+        stage.scenes.AddObject(stage.scene, 0, SmallModel(), properties).status();
+    EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument) << size << " " << gain;
+    EXPECT_THAT(status.ToString(), HasSubstr("INVALID_OBJECT: "));
+  }
+}
+
+TEST(SceneRegistry, HandlesAreTheClientsOrTheLowestThatIsFree) {
+  Stage stage;
+  EXPECT_EQ(stage.Add(), 1U);
+  EXPECT_EQ(stage.scenes.AddObject(stage.scene, 2, SmallModel(), SmallProperties())->handle, 2U);
+  EXPECT_EQ(stage.Add(), 3U);
+  const absl::Status taken =
+      stage.scenes.AddObject(stage.scene, 2, SmallModel(), SmallProperties()).status();
+  EXPECT_EQ(taken.code(), absl::StatusCode::kAlreadyExists);
+  EXPECT_THAT(taken.ToString(), HasSubstr("OBJECT_EXISTS: "));
+  ASSERT_TRUE(stage.scenes.RemoveObject(stage.scene, 1).ok());
+  EXPECT_EQ(stage.Add(), 1U);
+}
+
+TEST(SceneRegistry, WhatIsNotThereIsNotFound) {
+  Stage stage;
+  const auto expect = [](const absl::Status& status, const char* reason) {
+    EXPECT_EQ(status.code(), absl::StatusCode::kNotFound);
+    EXPECT_THAT(status.ToString(), HasSubstr(reason));
+  };
+  expect(stage.scenes.DeleteScene(999), "SCENE_NOT_FOUND: ");
+  expect(stage.scenes.AddObject(999, 0, SmallModel(), SmallProperties()).status(),
+         "SCENE_NOT_FOUND: ");
+  expect(stage.scenes.OpenContactStream(999, {.step_s = 0.01}).status(), "SCENE_NOT_FOUND: ");
+  expect(stage.scenes.RemoveObject(stage.scene, 7), "OBJECT_NOT_FOUND: ");
+  expect(stage.scenes.UpdateObject(stage.scene, 7, {}).status(), "OBJECT_NOT_FOUND: ");
+}
+
+TEST(SceneRegistry, TheNumberOfScenesIsLimited) {
+  Stage stage;
+  for (size_t i = 1; i < SceneRegistry::kMaxSceneCount; ++i) {
+    ASSERT_TRUE(stage.scenes.CreateScene().ok());
+  }
+  const absl::Status status = stage.scenes.CreateScene().status();
+  EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_THAT(status.ToString(), HasSubstr("TOO_MANY_SCENES: "));
+  ASSERT_TRUE(stage.scenes.DeleteScene(stage.scene).ok());
+  EXPECT_TRUE(stage.scenes.CreateScene().ok());
+}
+
+TEST(SceneRegistry, TheNumberOfObjectsIsLimitedOverAllScenes) {
+  Stage stage;
+  const uint64_t other = *stage.scenes.CreateScene();
+  const auto model = SmallModel();
+  for (size_t i = 0; i < SceneRegistry::kMaxObjectCount; ++i) {
+    const uint64_t scene = i % 2 == 0 ? stage.scene : other;
+    ASSERT_TRUE(stage.scenes.AddObject(scene, 0, model, SmallProperties()).ok());
+  }
+  const absl::Status status = stage.scenes.AddObject(other, 0, model, SmallProperties()).status();
+  EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_THAT(status.ToString(), HasSubstr("TOO_MANY_OBJECTS: "));
+  ASSERT_TRUE(stage.scenes.DeleteScene(stage.scene).ok());
+  EXPECT_EQ(stage.scenes.object_count(), SceneRegistry::kMaxObjectCount / 2);
+  EXPECT_TRUE(stage.scenes.AddObject(other, 0, model, SmallProperties()).ok());
+}
+
+TEST(SceneRegistry, AfterAnUpdateWhatRangGoesOnAndWhatIsStruckSoundsTheNewWay) {
+  Stage stage;
+  Stage untouched;
+  const uint32_t handle = stage.Add();
+  untouched.Strike(untouched.Add());
+  stage.Strike(handle);
+  ASSERT_EQ(stage.Render(4), untouched.Render(4));
+  ObjectChange mute;
+  mute.gain = 0;
+  EXPECT_EQ(stage.scenes.UpdateObject(stage.scene, handle, mute)->object.properties.gain, 0);
+  stage.Strike(handle);  // with no gain: adds nothing
+  const std::vector<float> sound = stage.Render(20);
+  EXPECT_EQ(sound, untouched.Render(20));
+  EXPECT_GT(Peak(sound), 1e-3);
+}
+
+TEST(SceneRegistry, AnUpdateKeepsWhatItDoesNotName) {
+  Stage stage;
+  const uint32_t handle = stage.Add();
+  ObjectChange change;
+  change.size = 2;
+  ASSERT_TRUE(stage.scenes.UpdateObject(stage.scene, handle, change).ok());
+  change = {};
+  change.material = SmallProperties().material;
+  change.material->young_pa *= 4;
+  const PlacedObject placed = *stage.scenes.UpdateObject(stage.scene, handle, change);
+  EXPECT_EQ(placed.object.properties.material.size, 2);
+  EXPECT_NEAR(placed.object.lowest_frequency_hz, 440, 1e-9);  // twice as large, four times as stiff
+  EXPECT_EQ(stage.scenes.object_count(), 1U);
+}
+
+TEST(SceneRegistry, ARemovedObjectFadesOut) {
+  Stage stage;
+  const uint32_t handle = stage.Add();
+  stage.Strike(handle);
+  stage.Render(4);
+  ASSERT_TRUE(stage.scenes.RemoveObject(stage.scene, handle).ok());
+  EXPECT_GT(Peak(stage.Render(1)), 1e-4);  // no click: it does not stop at once
+  stage.Render(8);                         // over 10 ms
+  EXPECT_THAT(stage.Render(4), Each(0.0F));
+  EXPECT_EQ(stage.scenes.object_count(), 0U);
+}
+
+TEST(SceneRegistry, DeletingASceneSilencesIt) {
+  Stage stage;
+  stage.Strike(stage.Add());
+  stage.Render(4);
+  ASSERT_TRUE(stage.scenes.DeleteScene(stage.scene).ok());
+  stage.Render(9);
+  EXPECT_THAT(stage.Render(4), Each(0.0F));
+}
+
+TEST(SoundingObject, APointIsInMetresOfTheObjectAsLargeAsItIs) {
+  Stage stage;
+  ObjectProperties properties = SmallProperties();
+  properties.material.size = 3;
+  const PlacedObject placed = *stage.scenes.AddObject(stage.scene, 0, SmallModel(), properties);
+  ContactImpulse impulse = SmallImpulse(1).impulse;
+  impulse.location = Point{0, 0.15, 0};  // half way up an edge of 0.3 m, from vertex 0 to vertex 2
+  const Excitation excitation = *LocateImpulse(placed.object, impulse);
+  for (size_t corner = 0; corner < 3; ++corner) {
+    const uint32_t vertex = excitation.vertices[corner];
+    EXPECT_NEAR(excitation.weights[corner], vertex == 0 || vertex == 2 ? 0.5 : 0, 1e-6);
+  }
+}
+
+}  // namespace
+}  // namespace carillon
