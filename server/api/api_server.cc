@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/api/api_server.h"
+
+#include <grpcpp/ext/proto_server_reflection_plugin.h>
+#include <grpcpp/grpcpp.h>
+#include <grpcpp/health_check_service_interface.h>
+
+#include <chrono>
+#include <deque>
+#include <fstream>
+#include <iterator>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "proto/error_reason.h"
+#include "server/api/audio_service.h"
+#include "server/api/contact_service.h"
+#include "server/api/decomposition_service.h"
+#include "server/api/listen_address.h"
+#include "server/api/modal_model_service.h"
+#include "server/api/scene_service.h"
+#include "server/api/work_pool.h"
+
+namespace carillon {
+namespace {
+
+constexpr int kCallThreadCount = 4;
+/// Rendering offline stands back behind everything that is heard now.
+constexpr int kRenderThreadCount = 2;
+constexpr int kRenderNiceness = 10;
+constexpr std::chrono::milliseconds kGracePeriod(500);
+
+absl::Status Unready(absl::string_view reason, absl::string_view message) {
+  return Refusal(absl::StatusCode::kFailedPrecondition, reason, message);
+}
+
+absl::StatusOr<std::string> ReadFile(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::string content{std::istreambuf_iterator<char>(file), {}};
+  if (!file || content.empty()) {
+    return Unready("TLS_UNUSABLE", absl::StrCat("cannot read \"", path, "\""));
+  }
+  return content;
+}
+
+absl::StatusOr<std::shared_ptr<grpc::ServerCredentials>> TcpCredentials(
+    const ApiSettings& settings) {
+  if (settings.tls_certificate_file.empty() && settings.tls_key_file.empty()) {
+    return grpc::InsecureServerCredentials();
+  }
+  absl::StatusOr<std::string> certificate = ReadFile(settings.tls_certificate_file);
+  if (!certificate.ok()) return certificate.status();
+  absl::StatusOr<std::string> key = ReadFile(settings.tls_key_file);
+  if (!key.ok()) return key.status();
+  grpc::SslServerCredentialsOptions options;
+  options.pem_key_cert_pairs.push_back({*std::move(key), *std::move(certificate)});
+  return grpc::SslServerCredentials(options);
+}
+
+absl::StatusOr<std::deque<ListenAddress>> ParseAddresses(const ApiSettings& settings) {
+  const bool tls = !settings.tls_certificate_file.empty();
+  std::deque<ListenAddress> addresses;
+  for (const std::string& text : settings.addresses) {
+    absl::StatusOr<ListenAddress> address = ParseListenAddress(text);
+    if (!address.ok()) return address.status();
+    if (!address->is_local() && !tls) {
+      return Unready("TLS_REQUIRED",
+                     absl::StrCat(text,
+                                  " can be reached from the network, and everybody there could use "
+                                  "the daemon; give --tls-certificate and --tls-key, or listen on "
+                                  "127.0.0.1 or a Unix socket"));
+    }
+    addresses.push_back(*std::move(address));
+  }
+  return addresses;
+}
+
+}  // namespace
+
+struct ApiServer::State {
+  State(const ApiSettings& settings, const ServedRooms& rooms)
+      : models(rooms.database, rooms.decompositions, call_pool),
+        decompositions(rooms.decompositions, call_pool),
+        scenes(rooms.scenes, rooms.database, call_pool),
+        contacts({.scenes = rooms.scenes,
+                  .output = rooms.output,
+                  .clock = rooms.clock,
+                  .pool = call_pool}),
+        audio(settings.version, rooms.output, rooms.scenes, rooms.database, render_pool) {}
+
+  absl::Status Listen(const ApiSettings& settings);
+
+  WorkPool call_pool{kCallThreadCount};
+  WorkPool render_pool{kRenderThreadCount, kRenderNiceness};
+  ModalModelService models;
+  DecompositionService decompositions;
+  SceneService scenes;
+  ContactService contacts;
+  AudioService audio;
+  std::unique_ptr<grpc::Server> server;
+  std::vector<std::string> addresses;
+};
+
+absl::Status ApiServer::State::Listen(const ApiSettings& settings) {
+  absl::StatusOr<std::deque<ListenAddress>> parsed = ParseAddresses(settings);
+  if (!parsed.ok()) return parsed.status();
+  const absl::StatusOr<std::shared_ptr<grpc::ServerCredentials>> tcp_credentials =
+      TcpCredentials(settings);
+  if (!tcp_credentials.ok()) return tcp_credentials.status();
+  grpc::ServerBuilder builder;
+  // Otherwise a second daemon would share the port, and each would get half of the calls.
+  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
+  for (ListenAddress& address : *parsed) {
+    if (address.is_unix()) {
+      if (absl::Status status = PrepareSocket(address.socket_path); !status.ok()) return status;
+      builder.AddListeningPort(address.ToString(), grpc::InsecureServerCredentials());
+    } else {
+      builder.AddListeningPort(address.ToString(), *tcp_credentials, &address.port);
+    }
+  }
+  for (grpc::Service* service : std::initializer_list<grpc::Service*>{&models, &decompositions,
+                                                                      &scenes, &contacts, &audio}) {
+    builder.RegisterService(service);
+  }
+  server = builder.BuildAndStart();
+  if (!server) {
+    return Unready("LISTEN_FAILED",
+                   "cannot listen: an address is in use, not this machine's, or the TLS files do "
+                   "not belong together; see the line before");
+  }
+  for (const ListenAddress& address : *parsed) addresses.push_back(address.ToString());
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::unique_ptr<ApiServer>> ApiServer::Start(const ApiSettings& settings,
+                                                            const ServedRooms& rooms) {
+  grpc::EnableDefaultHealthCheckService(true);
+  grpc::reflection::InitProtoReflectionServerBuilderPlugin();
+  auto state = std::make_unique<State>(settings, rooms);
+  if (absl::Status status = state->Listen(settings); !status.ok()) return status;
+  return std::unique_ptr<ApiServer>(new ApiServer(std::move(state)));
+}
+
+ApiServer::ApiServer(std::unique_ptr<State> state) : state_(std::move(state)) {}
+
+ApiServer::~ApiServer() {
+  state_->server->Shutdown(std::chrono::system_clock::now() + kGracePeriod);
+  state_->server->Wait();
+}
+
+const std::vector<std::string>& ApiServer::addresses() const { return state_->addresses; }
+
+}  // namespace carillon

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <string>
+
+#include "carillon/v1/audio_service.grpc.pb.h"
+#include "server/api/live_output.h"
+#include "server/api/work_pool.h"
+#include "server/mode_database/mode_database.h"
+#include "server/scene/scene_registry.h"
+#include "server/scene/sounding_body.h"
+
+namespace carillon {
+
+/// carillon.v1.AudioService. What it is given must outlive it.
+class AudioService final : public v1::AudioService::CallbackService {
+ public:
+  /// `render_pool`: for rendering offline.
+  AudioService(std::string version, LiveOutput& output, const SceneRegistry& scenes,
+               ModeDatabase& database, WorkPool& render_pool)
+      : version_(std::move(version)),
+        output_(output),
+        scenes_(scenes),
+        database_(database),
+        render_pool_(render_pool) {}
+
+  grpc::ServerWriteReactor<v1::ListenResponse>* Listen(grpc::CallbackServerContext* context,
+                                                       const v1::ListenRequest* request) override;
+  grpc::ServerBidiReactor<v1::RenderRequest, v1::RenderResponse>* Render(
+      grpc::CallbackServerContext* context) override;
+  grpc::ServerUnaryReactor* GetMixer(grpc::CallbackServerContext* context,
+                                     const v1::GetMixerRequest* request,
+                                     v1::GetMixerResponse* response) override;
+
+ private:
+  const std::string version_;
+  LiveOutput& output_;
+  const SceneRegistry& scenes_;
+  ModeDatabase& database_;
+  WorkPool& render_pool_;
+  BodyCache render_bodies_;
+  std::atomic<int> rendering_count_{0};
+};
+
+}  // namespace carillon

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "carillon/v1/contact_service.grpc.pb.h"
+#include "server/api/live_output.h"
+#include "server/api/work_pool.h"
+#include "server/base/clock.h"
+#include "server/scene/scene_registry.h"
+
+namespace carillon {
+
+/// What a contact stream needs of the daemon.
+struct ContactContext {
+  SceneRegistry& scenes;
+  LiveOutput& output;
+  Clock& clock;
+  WorkPool& pool;
+};
+
+/// carillon.v1.ContactService. What it is given must outlive it.
+class ContactService final : public v1::ContactService::CallbackService {
+ public:
+  explicit ContactService(const ContactContext& daemon) : daemon_(daemon) {}
+
+  grpc::ServerBidiReactor<v1::StreamContactsRequest, v1::StreamContactsResponse>* StreamContacts(
+      grpc::CallbackServerContext* context) override;
+
+ private:
+  const ContactContext daemon_;
+};
+
+}  // namespace carillon

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "carillon/v1/decomposition_service.grpc.pb.h"
+#include "server/api/work_pool.h"
+#include "server/decomposition/decomposition_queue.h"
+
+namespace carillon {
+
+/// carillon.v1.DecompositionService. What it is given must outlive it.
+class DecompositionService final : public v1::DecompositionService::CallbackService {
+ public:
+  DecompositionService(DecompositionQueue& queue, WorkPool& pool) : queue_(queue), pool_(pool) {}
+
+  grpc::ServerUnaryReactor* GetJob(grpc::CallbackServerContext* context,
+                                   const v1::GetJobRequest* request,
+                                   v1::GetJobResponse* response) override;
+  grpc::ServerUnaryReactor* ListJobs(grpc::CallbackServerContext* context,
+                                     const v1::ListJobsRequest* request,
+                                     v1::ListJobsResponse* response) override;
+  grpc::ServerUnaryReactor* CancelJob(grpc::CallbackServerContext* context,
+                                      const v1::CancelJobRequest* request,
+                                      v1::CancelJobResponse* response) override;
+  grpc::ServerWriteReactor<v1::WatchJobResponse>* WatchJob(
+      grpc::CallbackServerContext* context, const v1::WatchJobRequest* request) override;
+
+ private:
+  DecompositionQueue& queue_;
+  WorkPool& pool_;
+};
+
+}  // namespace carillon

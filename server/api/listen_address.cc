@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/api/listen_address.h"
+
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <system_error>
+
+#include "absl/strings/match.h"
+#include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/strip.h"
+#include "proto/error_reason.h"
+
+namespace carillon {
+namespace {
+
+absl::Status InvalidAddress(absl::string_view text) {
+  return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_ADDRESS",
+                 absl::StrCat("\"", text,
+                              "\" is no address; say unix:PATH, HOST:PORT or [HOST]:PORT, with a "
+                              "path of at most 107 bytes"));
+}
+
+absl::StatusOr<ListenAddress> ParseTcp(absl::string_view text) {
+  const size_t colon = text.rfind(':');
+  if (colon == absl::string_view::npos) return InvalidAddress(text);
+  absl::string_view host = text.substr(0, colon);
+  ListenAddress address;
+  const bool has_port = absl::SimpleAtoi(text.substr(colon + 1), &address.port);
+  const bool bracketed = absl::ConsumePrefix(&host, "[") && absl::ConsumeSuffix(&host, "]");
+  const bool has_host = !host.empty() && (bracketed || !absl::StrContains(host, ':'));
+  if (!has_port || address.port < 0 || address.port > 65535 || !has_host) {
+    return InvalidAddress(text);
+  }
+  address.host = std::string(host);
+  return address;
+}
+
+/// Whether somebody answers at the socket.
+bool IsServed(const std::string& path) {
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  std::strncpy(address.sun_path, path.c_str(), sizeof(address.sun_path) - 1);
+  const int probe = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  const bool served =
+      connect(probe, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0;
+  close(probe);
+  return served;
+}
+
+}  // namespace
+
+bool ListenAddress::is_local() const {
+  return is_unix() || host == "localhost" || host == "::1" || absl::StartsWith(host, "127.");
+}
+
+std::string ListenAddress::ToString() const {
+  if (is_unix()) return absl::StrCat("unix:", socket_path);
+  const bool bracket = absl::StrContains(host, ':');
+  return bracket ? absl::StrCat("[", host, "]:", port) : absl::StrCat(host, ":", port);
+}
+
+absl::StatusOr<ListenAddress> ParseListenAddress(absl::string_view text) {
+  absl::string_view path = text;
+  if (!absl::ConsumePrefix(&path, "unix:")) return ParseTcp(text);
+  absl::ConsumePrefix(&path, "//");
+  if (path.empty() || path.size() >= sizeof(sockaddr_un::sun_path)) return InvalidAddress(text);
+  ListenAddress address;
+  address.socket_path = std::string(path);
+  return address;
+}
+
+absl::Status PrepareSocket(const std::string& path) {
+  const std::filesystem::path folder = std::filesystem::absolute(path).parent_path();
+  std::error_code error;
+  std::filesystem::create_directories(folder.parent_path(), error);
+  if (mkdir(folder.c_str(), 0700) != 0 && errno != EEXIST) {
+    return Refusal(absl::StatusCode::kFailedPrecondition, "LISTEN_FAILED",
+                   absl::StrCat("cannot make the folder \"", folder.string(),
+                                "\": ", std::generic_category().message(errno)));
+  }
+  if (IsServed(path)) {
+    return Refusal(absl::StatusCode::kFailedPrecondition, "ADDRESS_IN_USE",
+                   absl::StrCat("a daemon serves unix:", path,
+                                " already; stop it or choose another --listen"));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace carillon

@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/api/live_output.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "server/synthesis/flush_denormals.h"
+
+namespace carillon {
+namespace {
+
+constexpr std::chrono::milliseconds kHousekeepingPeriod(5);
+/// A peak is noted so often, and remembered for so long.
+constexpr std::chrono::milliseconds kPeakPeriod(50);
+constexpr std::chrono::seconds kPeakMemory(1);
+
+size_t BlocksPerSecond(const DeviceFormat& format) {
+  return format.sample_rate_hz / format.block_frame_count + 1;
+}
+
+MixerSettings MixerSettingsOf(const DeviceFormat& format) {
+  return {.sample_rate_hz = static_cast<double>(format.sample_rate_hz),
+          .block_frame_count = format.block_frame_count};
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<LiveOutput>> LiveOutput::Start(const OutputSettings& settings,
+                                                              Clock& clock, Log log) {
+  std::unique_ptr<LiveOutput> output(new LiveOutput(settings, clock, std::move(log)));
+  if (absl::Status status = output->Open(); !status.ok()) return status;
+  return output;
+}
+
+LiveOutput::LiveOutput(const OutputSettings& settings, Clock& clock, Log log)
+    : settings_(settings),
+      clock_(clock),
+      log_(std::move(log)),
+      mixer_(MixerSettingsOf(settings.format)),
+      broadcast_(settings.format.block_frame_count, BlocksPerSecond(settings.format)),
+      look_ahead_(
+          settings.format, settings.look_ahead_block_count,
+          [this](std::span<float> block) { RenderBlock(block); }, clock) {}
+
+LiveOutput::~LiveOutput() {
+  stopping_ = true;
+  if (housekeeper_.joinable()) housekeeper_.join();
+  const absl::MutexLock lock(&mutex_);
+  if (output_.device) output_.device->Stop();
+  look_ahead_.Stop();
+}
+
+absl::Status LiveOutput::Open() {
+  const absl::MutexLock lock(&mutex_);
+  absl::StatusOr<OpenedDevice> opened = OpenDevice(settings_.device, settings_.format, clock_);
+  if (!opened.ok()) return opened.status();
+  output_ = *std::move(opened);
+  if (absl::Status status = look_ahead_.Start(); !status.ok()) log_(std::string(status.message()));
+  if (absl::Status status = output_.device->Start(look_ahead_); !status.ok()) return status;
+  housekeeper_ = std::thread([this] { KeepHouse(); });
+  return absl::OkStatus();
+}
+
+void LiveOutput::RenderBlock(std::span<float> block) {
+  const FlushDenormals flush;
+  const uint64_t first_frame = mixer_.frame();
+  mixer_.Render(block);
+  broadcast_.Publish(first_frame, block);
+}
+
+OutputState LiveOutput::state() const {
+  OutputState state;
+  state.load = look_ahead_.load();
+  state.mixer = mixer_.statistics();
+  const absl::MutexLock lock(&mutex_);
+  const AudioDevice& device = *output_.device;
+  state.device = device.description();
+  state.device_message = output_.message;
+  state.latency_s = look_ahead_.latency_s() + device.latency_s();
+  state.xrun_count = look_ahead_.xrun_count() + earlier_xrun_count_ + device.xrun_count();
+  state.lost_frame_count =
+      look_ahead_.lost_frame_count() + earlier_lost_frame_count_ + device.lost_frame_count();
+  for (const Peak& peak : peaks_) state.peak = std::max(state.peak, peak.value);
+  return state;
+}
+
+void LiveOutput::KeepHouse() {
+  std::chrono::nanoseconds peak_due = clock_.Monotonic();
+  while (!stopping_) {
+    broadcast_.Deliver();
+    mixer_.CollectGarbage();
+    ReplaceDeadDevice();
+    if (clock_.Monotonic() >= peak_due) {
+      NotePeak();
+      peak_due += kPeakPeriod;
+    }
+    clock_.SleepUntil(clock_.Monotonic() + kHousekeepingPeriod);
+  }
+}
+
+void LiveOutput::NotePeak() {
+  const std::chrono::nanoseconds now = clock_.Monotonic();
+  const absl::MutexLock lock(&mutex_);
+  peaks_.push_back({.time = now, .value = mixer_.TakePeak()});
+  while (peaks_.front().time < now - kPeakMemory) peaks_.pop_front();
+}
+
+void LiveOutput::ReplaceDeadDevice() {
+  const absl::MutexLock lock(&mutex_);
+  if (output_.device->alive()) return;
+  const std::string dead = output_.device->description();
+  output_.device->Stop();
+  earlier_xrun_count_ += output_.device->xrun_count();
+  earlier_lost_frame_count_ += output_.device->lost_frame_count();
+  // The null device opens and starts whatever has happened.
+  output_.device = std::move(OpenDevice("null", settings_.format, clock_)->device);
+  output_.message =
+      absl::StrCat(dead, " stopped by itself; nothing sounds until the daemon restarts");
+  output_.device->Start(look_ahead_).IgnoreError();
+  log_(output_.message);
+}
+
+}  // namespace carillon

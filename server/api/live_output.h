@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/status/statusor.h"
+#include "absl/synchronization/mutex.h"
+#include "server/audio_device/block_broadcast.h"
+#include "server/audio_device/look_ahead.h"
+#include "server/audio_device/open_device.h"
+#include "server/base/clock.h"
+#include "server/synthesis/mixer.h"
+
+namespace carillon {
+
+/// How the daemon plays.
+struct OutputSettings {
+  DeviceFormat format;
+  /// Blocks rendered ahead of the device.
+  uint32_t look_ahead_block_count = 8;
+  /// As OpenDevice takes it.
+  std::string device = "auto";
+};
+
+/// What can be told about the output at a moment.
+struct OutputState {
+  std::string device;
+  std::string device_message;
+  double latency_s = 0;  ///< from the mixer to the ear as far as known
+  double load = 0;
+  uint64_t xrun_count = 0;
+  uint64_t lost_frame_count = 0;
+  double peak = 0;  ///< of the last second
+  MixerStatistics mixer;
+};
+
+/// The mixer, made audible: rendered ahead of a device, heard by listeners, and looked after by a
+/// housekeeping thread. Safe from every thread.
+class LiveOutput {
+ public:
+  /// Takes lines for people.
+  using Log = std::function<void(const std::string&)>;
+
+  /// Opens the device and begins to play. `clock` must outlive the output.
+  /// Errors: those of OpenDevice and of the device's Start.
+  static absl::StatusOr<std::unique_ptr<LiveOutput>> Start(const OutputSettings& settings,
+                                                           Clock& clock, Log log);
+  ~LiveOutput();
+  LiveOutput(const LiveOutput&) = delete;
+  LiveOutput& operator=(const LiveOutput&) = delete;
+
+  Mixer& mixer() { return mixer_; }
+  BlockBroadcast& broadcast() { return broadcast_; }
+  const DeviceFormat& format() const { return settings_.format; }
+  OutputState state() const;
+
+ private:
+  LiveOutput(const OutputSettings& settings, Clock& clock, Log log);
+
+  absl::Status Open();
+  void RenderBlock(std::span<float> block);
+  void KeepHouse();
+  void NotePeak();
+  void ReplaceDeadDevice();
+
+  const OutputSettings settings_;
+  Clock& clock_;
+  const Log log_;
+  Mixer mixer_;
+  BlockBroadcast broadcast_;
+  LookAhead look_ahead_;
+  mutable absl::Mutex mutex_;
+  OpenedDevice output_ ABSL_GUARDED_BY(mutex_);
+  /// Of devices that died.
+  uint64_t earlier_xrun_count_ ABSL_GUARDED_BY(mutex_) = 0;
+  uint64_t earlier_lost_frame_count_ ABSL_GUARDED_BY(mutex_) = 0;
+  struct Peak {
+    std::chrono::nanoseconds time;
+    double value;
+  };
+  std::deque<Peak> peaks_ ABSL_GUARDED_BY(mutex_);
+  std::atomic<bool> stopping_{false};
+  std::thread housekeeper_;
+};
+
+}  // namespace carillon

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/api/modal_model_service.h"
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "proto/material_catalogue.h"
+#include "server/api/model_transfer.h"
+#include "server/api/resource_name.h"
+#include "server/api/unary_call.h"
+
+namespace carillon {
+
+grpc::ServerReadReactor<v1::UploadMeshRequest>* ModalModelService::UploadMesh(
+    grpc::CallbackServerContext* context, v1::UploadMeshResponse* response) {
+  return MakeUpload(*context, *response, database_.meshes(), pool_);
+}
+
+grpc::ServerUnaryReactor* ModalModelService::CreateModalModel(
+    grpc::CallbackServerContext* context, const v1::CreateModalModelRequest* request,
+    v1::CreateModalModelResponse* response) {
+  return Answer(context, pool_, [this, request, response] {
+    absl::StatusOr<v1::Job> job = queue_.Submit(*request);
+    if (job.ok()) *response->mutable_job() = *std::move(job);
+    return job.status();
+  });
+}
+
+grpc::ServerUnaryReactor* ModalModelService::GetModalModel(grpc::CallbackServerContext* context,
+                                                           const v1::GetModalModelRequest* request,
+                                                           v1::GetModalModelResponse* response) {
+  return Answer(context, pool_, [this, request, response] { return Get(*request, *response); });
+}
+
+grpc::ServerUnaryReactor* ModalModelService::ListModalModels(
+    grpc::CallbackServerContext* context, const v1::ListModalModelsRequest* request,
+    v1::ListModalModelsResponse* response) {
+  return Answer(context, pool_, [this, request, response] { return List(*request, *response); });
+}
+
+grpc::ServerUnaryReactor* ModalModelService::DeleteModalModel(
+    grpc::CallbackServerContext* context, const v1::DeleteModalModelRequest* request,
+    v1::DeleteModalModelResponse*) {
+  return Answer(context, pool_, [this, request] {
+    const absl::StatusOr<std::string> digest = ParseModelName(request->name());
+    return digest.ok() ? queue_.DeleteModel(*digest) : digest.status();
+  });
+}
+
+grpc::ServerReadReactor<v1::ImportModalModelRequest>* ModalModelService::ImportModalModel(
+    grpc::CallbackServerContext* context, v1::ImportModalModelResponse* response) {
+  return MakeImport(*context, *response, database_.models(), pool_);
+}
+
+grpc::ServerWriteReactor<v1::ExportModalModelResponse>* ModalModelService::ExportModalModel(
+    grpc::CallbackServerContext*, const v1::ExportModalModelRequest* request) {
+  return MakeExport(*request, database_.models(), pool_);
+}
+
+grpc::ServerUnaryReactor* ModalModelService::ListMaterials(grpc::CallbackServerContext* context,
+                                                           const v1::ListMaterialsRequest*,
+                                                           v1::ListMaterialsResponse* response) {
+  return Answer(context, pool_, [response] {
+    *response->mutable_materials() = Materials().materials();
+    return absl::OkStatus();
+  });
+}
+
+absl::Status ModalModelService::Get(const v1::GetModalModelRequest& request,
+                                    v1::GetModalModelResponse& response) {
+  const absl::StatusOr<std::string> digest = ParseModelName(request.name());
+  if (!digest.ok()) return digest.status();
+  const absl::StatusOr<ModelSummary> summary = database_.models().Summary(*digest);
+  if (!summary.ok()) return summary.status();
+  const absl::StatusOr<std::vector<double>> eigenvalues = database_.models().Eigenvalues(*digest);
+  if (!eigenvalues.ok()) return eigenvalues.status();
+  *response.mutable_modal_model() = ToProto(*summary);
+  response.mutable_modal_model()->mutable_eigenvalues()->Add(eigenvalues->begin(),
+                                                             eigenvalues->end());
+  return absl::OkStatus();
+}
+
+absl::Status ModalModelService::List(const v1::ListModalModelsRequest& request,
+                                     v1::ListModalModelsResponse& response) {
+  const absl::StatusOr<ModelPage> page =
+      database_.models().List(request.page_size(), request.page_token());
+  if (!page.ok()) return page.status();
+  for (const ModelSummary& summary : page->models) *response.add_modal_models() = ToProto(summary);
+  response.set_next_page_token(page->next_page_token);
+  return absl::OkStatus();
+}
+
+}  // namespace carillon

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "carillon/v1/modal_model_service.grpc.pb.h"
+#include "server/api/work_pool.h"
+#include "server/decomposition/decomposition_queue.h"
+#include "server/mode_database/mode_database.h"
+
+namespace carillon {
+
+/// carillon.v1.ModalModelService. What it is given must outlive it.
+class ModalModelService final : public v1::ModalModelService::CallbackService {
+ public:
+  ModalModelService(ModeDatabase& database, DecompositionQueue& queue, WorkPool& pool)
+      : database_(database), queue_(queue), pool_(pool) {}
+
+  grpc::ServerReadReactor<v1::UploadMeshRequest>* UploadMesh(
+      grpc::CallbackServerContext* context, v1::UploadMeshResponse* response) override;
+  grpc::ServerUnaryReactor* CreateModalModel(grpc::CallbackServerContext* context,
+                                             const v1::CreateModalModelRequest* request,
+                                             v1::CreateModalModelResponse* response) override;
+  grpc::ServerUnaryReactor* GetModalModel(grpc::CallbackServerContext* context,
+                                          const v1::GetModalModelRequest* request,
+                                          v1::GetModalModelResponse* response) override;
+  grpc::ServerUnaryReactor* ListModalModels(grpc::CallbackServerContext* context,
+                                            const v1::ListModalModelsRequest* request,
+                                            v1::ListModalModelsResponse* response) override;
+  grpc::ServerUnaryReactor* DeleteModalModel(grpc::CallbackServerContext* context,
+                                             const v1::DeleteModalModelRequest* request,
+                                             v1::DeleteModalModelResponse* response) override;
+  grpc::ServerReadReactor<v1::ImportModalModelRequest>* ImportModalModel(
+      grpc::CallbackServerContext* context, v1::ImportModalModelResponse* response) override;
+  grpc::ServerWriteReactor<v1::ExportModalModelResponse>* ExportModalModel(
+      grpc::CallbackServerContext* context, const v1::ExportModalModelRequest* request) override;
+  grpc::ServerUnaryReactor* ListMaterials(grpc::CallbackServerContext* context,
+                                          const v1::ListMaterialsRequest* request,
+                                          v1::ListMaterialsResponse* response) override;
+
+ private:
+  absl::Status Get(const v1::GetModalModelRequest& request, v1::GetModalModelResponse& response);
+  absl::Status List(const v1::ListModalModelsRequest& request,
+                    v1::ListModalModelsResponse& response);
+
+  ModeDatabase& database_;
+  DecompositionQueue& queue_;
+  WorkPool& pool_;
+};
+
+}  // namespace carillon

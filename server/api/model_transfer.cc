@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/api/model_transfer.h"
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "absl/strings/strip.h"
+#include "proto/error_reason.h"
+#include "server/api/resource_name.h"
+#include "server/api/status_conversion.h"
+
+namespace carillon {
+namespace {
+
+/// Reads requests into `Sink` one after the other; each is taken on a thread of the pool, since it
+/// goes to disk. `Sink` has Status Append(const Request&) and Status Finish(Response&).
+template <typename Request, typename Response, typename Sink>
+class ReadReactor final : public grpc::ServerReadReactor<Request> {
+ public:
+  ReadReactor(grpc::CallbackServerContext& context, Response& response, Sink sink, WorkPool& pool)
+      : context_(context), response_(response), sink_(std::move(sink)), pool_(pool) {
+    this->StartRead(&request_);
+  }
+
+  void OnReadDone(bool ok) override {
+    pool_.Run([this, ok] { Take(ok); });
+  }
+
+  void OnDone() override { delete this; }
+
+ private:
+  void Take(bool ok) {
+    if (context_.IsCancelled()) return this->Finish(grpc::Status::CANCELLED);
+    const absl::Status status = ok ? sink_.Append(request_) : sink_.Finish(response_);
+    if (!ok || !status.ok()) return this->Finish(ToGrpcStatus(status));
+    this->StartRead(&request_);
+  }
+
+  grpc::CallbackServerContext& context_;
+  Response& response_;
+  Sink sink_;
+  WorkPool& pool_;
+  Request request_;
+};
+
+class MeshSink {
+ public:
+  explicit MeshSink(MeshStore& meshes) : meshes_(&meshes) {}
+
+  absl::Status Append(const v1::UploadMeshRequest& request) {
+    if (absl::Status status = Begin(); !status.ok()) return status;
+    return upload_->Append(request.data());
+  }
+
+  absl::Status Finish(v1::UploadMeshResponse& response) {
+    if (absl::Status status = Begin(); !status.ok()) return status;
+    const absl::StatusOr<StoredMesh> mesh = upload_->Finish();
+    if (!mesh.ok()) return mesh.status();
+    response.set_mesh_digest(mesh->digest);
+    response.set_byte_count(mesh->byte_count);
+    return absl::OkStatus();
+  }
+
+ private:
+  absl::Status Begin() {
+    if (upload_) return absl::OkStatus();
+    absl::StatusOr<MeshUpload> upload = meshes_->Begin();
+    if (upload.ok()) upload_ = *std::move(upload);
+    return upload.status();
+  }
+
+  MeshStore* meshes_;
+  std::optional<MeshUpload> upload_;
+};
+
+class ModelSink {
+ public:
+  explicit ModelSink(ModelStore& models) : models_(&models) {}
+
+  absl::Status Append(const v1::ImportModalModelRequest& request) {
+    if (absl::Status status = Begin(request); !status.ok()) return status;
+    return import_->Append(request.record());
+  }
+
+  absl::Status Finish(v1::ImportModalModelResponse& response) {
+    if (!import_) {
+      return Refusal(absl::StatusCode::kInvalidArgument, "MODAL_MODEL_MALFORMED",
+                     "no record was sent; send the header, then every chunk");
+    }
+    const absl::StatusOr<ModelSummary> summary = import_->Finish();
+    if (summary.ok()) *response.mutable_modal_model() = ToProto(*summary);
+    return summary.status();
+  }
+
+ private:
+  absl::Status Begin(const v1::ImportModalModelRequest& first) {
+    if (import_) return absl::OkStatus();
+    absl::string_view digest = first.name();
+    absl::ConsumePrefix(&digest, "modalModels/");
+    absl::StatusOr<ModelImport> import = models_->Import(std::string(digest), first.label());
+    if (import.ok()) import_ = *std::move(import);
+    return import.status();
+  }
+
+  ModelStore* models_;
+  std::optional<ModelImport> import_;
+};
+
+/// Sends one record after the other, each read on a thread of the pool once the last has gone.
+class ExportReactor final : public grpc::ServerWriteReactor<v1::ExportModalModelResponse> {
+ public:
+  ExportReactor(std::string name, ModelStore& models, WorkPool& pool)
+      : name_(std::move(name)), models_(models), pool_(pool) {
+    pool_.Run([this] { Begin(); });
+  }
+
+  void OnWriteDone(bool ok) override {
+    if (!ok) return Finish(grpc::Status::CANCELLED);
+    pool_.Run([this] { SendNext(); });
+  }
+
+  void OnDone() override { delete this; }
+
+ private:
+  void Begin() {
+    const absl::StatusOr<std::string> digest = ParseModelName(name_);
+    if (!digest.ok()) return Finish(ToGrpcStatus(digest.status()));
+    absl::StatusOr<ModelExport> begun = models_.Export(*digest);
+    if (!begun.ok()) return Finish(ToGrpcStatus(begun.status()));
+    export_ = *std::move(begun);
+    SendNext();
+  }
+
+  void SendNext() {
+    absl::StatusOr<std::optional<v1::ModalModelRecord>> record = export_->Next();
+    if (!record.ok()) return Finish(ToGrpcStatus(record.status()));
+    if (!record->has_value()) return Finish(grpc::Status::OK);
+    *response_.mutable_record() = **std::move(record);
+    StartWrite(&response_);
+  }
+
+  const std::string name_;
+  ModelStore& models_;
+  WorkPool& pool_;
+  std::optional<ModelExport> export_;
+  v1::ExportModalModelResponse response_;
+};
+
+}  // namespace
+
+grpc::ServerReadReactor<v1::UploadMeshRequest>* MakeUpload(grpc::CallbackServerContext& context,
+                                                           v1::UploadMeshResponse& response,
+                                                           MeshStore& meshes, WorkPool& pool) {
+  return new ReadReactor<v1::UploadMeshRequest, v1::UploadMeshResponse, MeshSink>(
+      context, response, MeshSink(meshes), pool);
+}
+
+grpc::ServerReadReactor<v1::ImportModalModelRequest>* MakeImport(
+    grpc::CallbackServerContext& context, v1::ImportModalModelResponse& response,
+    ModelStore& models, WorkPool& pool) {
+  return new ReadReactor<v1::ImportModalModelRequest, v1::ImportModalModelResponse, ModelSink>(
+      context, response, ModelSink(models), pool);
+}
+
+grpc::ServerWriteReactor<v1::ExportModalModelResponse>* MakeExport(
+    const v1::ExportModalModelRequest& request, ModelStore& models, WorkPool& pool) {
+  return new ExportReactor(request.name(), models, pool);
+}
+
+v1::ModalModelSummary ToProto(const ModelSummary& summary) {
+  v1::ModalModelSummary proto;
+  proto.set_name(ModelName(summary.digest));
+  proto.set_label(summary.label);
+  *proto.mutable_header() = summary.header;
+  proto.set_stored_bytes(summary.stored_bytes);
+  proto.set_created_unix_ms(summary.created_unix_ms);
+  return proto;
+}
+
+}  // namespace carillon

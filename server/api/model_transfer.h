@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <grpcpp/grpcpp.h>
+
+#include "absl/status/statusor.h"
+#include "carillon/v1/modal_model_service.pb.h"
+#include "server/api/work_pool.h"
+#include "server/mode_database/mode_database.h"
+
+namespace carillon {
+
+/// The streams of ModalModelService. Each deletes itself when its call is done; the database and
+/// the pool must outlive the call.
+
+grpc::ServerReadReactor<v1::UploadMeshRequest>* MakeUpload(grpc::CallbackServerContext& context,
+                                                           v1::UploadMeshResponse& response,
+                                                           MeshStore& meshes, WorkPool& pool);
+
+grpc::ServerReadReactor<v1::ImportModalModelRequest>* MakeImport(
+    grpc::CallbackServerContext& context, v1::ImportModalModelResponse& response,
+    ModelStore& models, WorkPool& pool);
+
+grpc::ServerWriteReactor<v1::ExportModalModelResponse>* MakeExport(
+    const v1::ExportModalModelRequest& request, ModelStore& models, WorkPool& pool);
+
+v1::ModalModelSummary ToProto(const ModelSummary& summary);
+
+}  // namespace carillon

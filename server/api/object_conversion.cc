@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/api/object_conversion.h"
+
+#include "proto/material_catalogue.h"
+#include "server/api/resource_name.h"
+
+namespace carillon {
+namespace {
+
+SoundingMaterial ToSoundingMaterial(const v1::Material& resolved, double size) {
+  return {.young_pa = resolved.young_pa(),
+          .density_kg_per_m3 = resolved.density_kg_per_m3(),
+          .alpha1_s = resolved.alpha1_s(),
+          .alpha2_per_s = resolved.alpha2_per_s(),
+          .size = size};
+}
+
+std::optional<double> PoissonRatio(const v1::Material& resolved) {
+  if (!resolved.has_poisson_ratio()) return std::nullopt;
+  return resolved.poisson_ratio();
+}
+
+v1::Material ToProto(const ObjectProperties& properties, double model_poisson_ratio) {
+  v1::Material material;
+  material.set_young_pa(properties.material.young_pa);
+  material.set_poisson_ratio(properties.poisson_ratio.value_or(model_poisson_ratio));
+  material.set_density_kg_per_m3(properties.material.density_kg_per_m3);
+  material.set_alpha1_s(properties.material.alpha1_s);
+  material.set_alpha2_per_s(properties.material.alpha2_per_s);
+  return material;
+}
+
+}  // namespace
+
+absl::StatusOr<ObjectProperties> ToObjectProperties(const v1::Material& material, double size,
+                                                    std::optional<double> gain) {
+  const absl::StatusOr<v1::Material> resolved = ResolveMaterial(material);
+  if (!resolved.ok()) return resolved.status();
+  return ObjectProperties{.material = ToSoundingMaterial(*resolved, size == 0 ? 1 : size),
+                          .poisson_ratio = PoissonRatio(*resolved),
+                          .gain = gain.value_or(1)};
+}
+
+absl::StatusOr<ObjectChange> ToObjectChange(const v1::UpdateObjectRequest& request) {
+  ObjectChange change;
+  if (request.has_material()) {
+    const absl::StatusOr<v1::Material> resolved = ResolveMaterial(request.material());
+    if (!resolved.ok()) return resolved.status();
+    change.material = ToSoundingMaterial(*resolved, 1);
+    change.poisson_ratio = PoissonRatio(*resolved);
+  }
+  if (request.has_size()) change.size = request.size();
+  if (request.has_gain()) change.gain = request.gain();
+  return change;
+}
+
+v1::SoundingObject ToProto(uint64_t scene, const PlacedObject& placed) {
+  const SoundingObject& object = placed.object;
+  v1::SoundingObject proto;
+  proto.set_name(ObjectNameString(scene, placed.handle));
+  proto.set_handle(placed.handle);
+  proto.set_modal_model(ModelName(object.body->model->digest));
+  *proto.mutable_material() = ToProto(object.properties, object.body->model->poisson_ratio);
+  proto.set_size(object.properties.material.size);
+  proto.set_gain(object.properties.gain);
+  proto.set_sounding_mode_count(object.mode_count);
+  proto.set_lowest_frequency_hz(object.lowest_frequency_hz);
+  proto.set_highest_frequency_hz(object.highest_frequency_hz);
+  if (object.complete_to_hz) proto.set_complete_to_hz(*object.complete_to_hz);
+  return proto;
+}
+
+}  // namespace carillon

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "carillon/v1/scene_service.grpc.pb.h"
+#include "server/api/work_pool.h"
+#include "server/mode_database/mode_database.h"
+#include "server/scene/scene_registry.h"
+
+namespace carillon {
+
+/// carillon.v1.SceneService. What it is given must outlive it.
+class SceneService final : public v1::SceneService::CallbackService {
+ public:
+  SceneService(SceneRegistry& scenes, ModeDatabase& database, WorkPool& pool)
+      : scenes_(scenes), database_(database), pool_(pool) {}
+
+  grpc::ServerUnaryReactor* CreateScene(grpc::CallbackServerContext* context,
+                                        const v1::CreateSceneRequest* request,
+                                        v1::CreateSceneResponse* response) override;
+  grpc::ServerUnaryReactor* DeleteScene(grpc::CallbackServerContext* context,
+                                        const v1::DeleteSceneRequest* request,
+                                        v1::DeleteSceneResponse* response) override;
+  grpc::ServerUnaryReactor* AddObject(grpc::CallbackServerContext* context,
+                                      const v1::AddObjectRequest* request,
+                                      v1::AddObjectResponse* response) override;
+  grpc::ServerUnaryReactor* UpdateObject(grpc::CallbackServerContext* context,
+                                         const v1::UpdateObjectRequest* request,
+                                         v1::UpdateObjectResponse* response) override;
+  grpc::ServerUnaryReactor* RemoveObject(grpc::CallbackServerContext* context,
+                                         const v1::RemoveObjectRequest* request,
+                                         v1::RemoveObjectResponse* response) override;
+
+ private:
+  absl::Status Add(const v1::AddObjectRequest& request, v1::AddObjectResponse& response);
+  absl::Status Update(const v1::UpdateObjectRequest& request, v1::UpdateObjectResponse& response);
+
+  SceneRegistry& scenes_;
+  ModeDatabase& database_;
+  WorkPool& pool_;
+};
+
+}  // namespace carillon

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "absl/status/statusor.h"
+#include "carillon/v1/audio_service.pb.h"
+#include "server/mode_database/model_store.h"
+#include "server/scene/offline_renderer.h"
+
+namespace carillon {
+
+/// Makes a renderer from the requests of one Render call.
+class TraceReader {
+ public:
+  static constexpr uint64_t kMaxImpulseCount = 4'000'000;
+
+  TraceReader(ModelStore& models, BodyCache& bodies) : models_(models), bodies_(bodies) {}
+
+  /// Errors: InvalidArgument (TRACE_MALFORMED, and those of the objects' materials),
+  /// ResourceExhausted (TRACE_TOO_LARGE), NotFound (MODAL_MODEL_NOT_FOUND), and those of
+  /// OfflineRenderer.
+  absl::Status Take(const v1::RenderRequest& request);
+
+  /// Once all is read: the renderer. Errors: InvalidArgument (TRACE_MALFORMED: nothing was sent).
+  absl::StatusOr<std::unique_ptr<OfflineRenderer>> Finish();
+
+  uint32_t sample_rate_hz() const { return sample_rate_hz_; }
+
+ private:
+  absl::Status TakeSettings(const v1::RenderSettings& settings);
+  absl::Status TakeRecord(const v1::ContactTraceRecord& record);
+  absl::Status TakeHeader(const v1::ContactTraceHeader& header);
+  absl::Status TakeObject(const v1::ContactTraceObject& object);
+  absl::Status TakeStep(const v1::ContactStep& step);
+
+  ModelStore& models_;
+  BodyCache& bodies_;
+  std::unique_ptr<OfflineRenderer> renderer_;
+  uint32_t sample_rate_hz_ = 48000;
+  bool has_header_ = false;
+  double time_s_ = 0;
+  uint64_t impulse_count_ = 0;
+};
+
+}  // namespace carillon

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <grpcpp/grpcpp.h>
+
+#include <utility>
+
+#include "server/api/status_conversion.h"
+#include "server/api/work_pool.h"
+
+namespace carillon {
+
+/// Answers a call with one request and one response: `work()` fills in the response on a thread of
+/// the pool and returns an absl::Status. gRPC keeps request and response until the call is
+/// finished.
+template <typename Work>
+grpc::ServerUnaryReactor* Answer(grpc::CallbackServerContext* context, WorkPool& pool, Work work) {
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  pool.Run([reactor, work = std::move(work)] { reactor->Finish(ToGrpcStatus(work())); });
+  return reactor;
+}
+
+}  // namespace carillon
