@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// carillond: puts the rooms of the daemon together.
+
+#include <signal.h>
+#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/spdlog.h>
+#include <systemd/sd-daemon.h>
+
+#include <iostream>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "absl/status/status.h"
+#include "server/api/api_server.h"
+#include "server/api/live_output.h"
+#include "server/base/clock.h"
+#include "server/data_directory.h"
+#include "server/decomposition/decomposition_queue.h"
+#include "server/decomposition/local_executor.h"
+#include "server/mode_database/mode_database.h"
+#include "server/options.h"
+#include "server/scene/scene_registry.h"
+
+namespace carillon {
+namespace {
+
+constexpr char kVersion[] = CARILLON_VERSION;
+
+/// One line a message, on stderr; stdout is for what programs read.
+void SetUpLog() {
+  spdlog::set_default_logger(spdlog::stderr_logger_mt("carillond"));
+  spdlog::set_pattern("%Y-%m-%dT%H:%M:%S.%e%z %l: %v");
+  spdlog::flush_on(spdlog::level::info);
+}
+
+/// The signals that end the daemon; blocked in every thread, so that only WaitForStop sees them.
+sigset_t BlockStopSignals() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGINT);
+  sigaddset(&signals, SIGTERM);
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  signal(SIGPIPE, SIG_IGN);
+  return signals;
+}
+
+void WaitForStop(const sigset_t& signals) {
+  int received = 0;
+  sigwait(&signals, &received);
+  spdlog::info("stopping on {}", received == SIGINT ? "SIGINT" : "SIGTERM");
+}
+
+void AnnounceReady(const ApiServer& server) {
+  for (const std::string& address : server.addresses()) {
+    std::cout << "listening on " << address << std::endl;
+  }
+  sd_notify(0, "READY=1");
+}
+
+void LogOutput(const LiveOutput& output) {
+  const OutputState state = output.state();
+  if (!state.device_message.empty()) spdlog::warn("no sound: {}", state.device_message);
+  spdlog::info("plays on {} at {} Hz, {:.1f} ms from mixer to ear", state.device,
+               output.format().sample_rate_hz, state.latency_s * 1000);
+}
+
+absl::StatusOr<std::unique_ptr<DecompositionQueue>> MakeQueue(const Options& options,
+                                                              const DataDirectory& directory,
+                                                              ModeDatabase& database,
+                                                              const Clock& clock) {
+  LocalExecutorOptions executor_options;
+  executor_options.program = options.precompute_program;
+  executor_options.directory = directory.work_directory();
+  executor_options.worker_count = options.worker_count;
+  absl::StatusOr<std::unique_ptr<Executor>> executor = MakeLocalExecutor(executor_options, clock);
+  if (!executor.ok()) return executor.status();
+  return DecompositionQueue::Make(database, *std::move(executor), clock);
+}
+
+OutputSettings OutputSettingsOf(const Options& options) {
+  return {.format = {.sample_rate_hz = options.sample_rate_hz,
+                     .block_frame_count = options.block_frame_count},
+          .look_ahead_block_count = options.look_ahead_block_count,
+          .device = options.audio_device};
+}
+
+ApiSettings ApiSettingsOf(const Options& options) {
+  return {.addresses = options.addresses,
+          .tls_certificate_file = options.tls_certificate_file,
+          .tls_key_file = options.tls_key_file,
+          .version = kVersion};
+}
+
+/// Runs until a signal comes. Rooms are made in the order in which they need each other, and go in
+/// the reverse.
+absl::Status Run(const Options& options) {
+  const sigset_t stop_signals = BlockStopSignals();
+  SystemClock clock;
+  const absl::StatusOr<DataDirectory> directory = DataDirectory::Open(options.data_directory);
+  if (!directory.ok()) return directory.status();
+  const absl::StatusOr<std::unique_ptr<ModeDatabase>> database =
+      ModeDatabase::Open(directory->database_file(), clock);
+  if (!database.ok()) return database.status();
+  const absl::StatusOr<std::unique_ptr<DecompositionQueue>> decompositions =
+      MakeQueue(options, *directory, **database, clock);
+  if (!decompositions.ok()) return decompositions.status();
+  const absl::StatusOr<std::unique_ptr<LiveOutput>> output = LiveOutput::Start(
+      OutputSettingsOf(options), clock, [](const std::string& line) { spdlog::warn("{}", line); });
+  if (!output.ok()) return output.status();
+  SceneRegistry scenes((*output)->mixer());
+  const absl::StatusOr<std::unique_ptr<ApiServer>> server =
+      ApiServer::Start(ApiSettingsOf(options), {.database = **database,
+                                                .decompositions = **decompositions,
+                                                .scenes = scenes,
+                                                .output = **output,
+                                                .clock = clock});
+  if (!server.ok()) return server.status();
+  LogOutput(**output);
+  AnnounceReady(**server);
+  WaitForStop(stop_signals);
+  sd_notify(0, "STOPPING=1");
+  return absl::OkStatus();
+}
+
+int Main(int argc, const char* const* argv) {
+  SetUpLog();
+  const absl::StatusOr<CommandLine> command = ReadCommandLine(argc, argv, kVersion);
+  if (command.ok() && !command->run) return command->exit_status;
+  const absl::Status status = command.ok() ? Run(command->options) : command.status();
+  if (status.ok()) return 0;
+  spdlog::error("{}", std::string(status.message()));
+  return 1;
+}
+
+}  // namespace
+}  // namespace carillon
+
+int main(int argc, char** argv) { return carillon::Main(argc, argv); }

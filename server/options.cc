@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/options.h"
+
+#include <toml++/toml.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdlib>
+#include <filesystem>
+
+#include "absl/strings/str_cat.h"
+#include "proto/error_reason.h"
+#include "proto/server_address.h"
+
+namespace carillon {
+namespace {
+
+absl::Status InvalidConfiguration(absl::string_view message) {
+  return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_CONFIGURATION", message);
+}
+
+std::string Environment(const char* name) {
+  const char* value = std::getenv(name);
+  return value == nullptr ? "" : value;
+}
+
+/// $STATE_DIRECTORY as systemd sets it, else as the XDG base directories have it.
+std::string DefaultDataDirectory() {
+  if (const std::string state = Environment("STATE_DIRECTORY"); !state.empty()) return state;
+  if (const std::string xdg = Environment("XDG_STATE_HOME"); !xdg.empty()) return xdg + "/carillon";
+  return Environment("HOME") + "/.local/state/carillon";
+}
+
+std::string DefaultAddress() {
+  const std::string runtime = Environment("RUNTIME_DIRECTORY");
+  return runtime.empty() ? DefaultServerAddress() : "unix:" + runtime + "/carillond.sock";
+}
+
+std::string DefaultPrecompute() {
+  return std::filesystem::read_symlink("/proc/self/exe").replace_filename("carillon-precompute");
+}
+
+Options Defaults() {
+  Options options;
+  options.data_directory = DefaultDataDirectory();
+  options.addresses = {DefaultAddress()};
+  options.precompute_program = DefaultPrecompute();
+  return options;
+}
+
+/// One value of the configuration file into `target`.
+template <typename T>
+absl::Status ReadValue(const std::string& key, const toml::node& node, T& target) {
+  if (const auto value = node.value<T>()) {
+    target = *value;
+    return absl::OkStatus();
+  }
+  return InvalidConfiguration(absl::StrCat(key, " has a value of the wrong type or size"));
+}
+
+absl::Status ReadAddresses(const toml::node& node, std::vector<std::string>& addresses) {
+  addresses.clear();
+  const toml::array* array = node.as_array();
+  if (array == nullptr) return ReadValue("listen", node, addresses.emplace_back());
+  for (const toml::node& element : *array) {
+    if (absl::Status status = ReadValue("listen", element, addresses.emplace_back());
+        !status.ok()) {
+      return status;
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::Status ReadKey(const std::string& key, const toml::node& node, Options& options) {
+  if (key == "data_dir") return ReadValue(key, node, options.data_directory);
+  if (key == "listen") return ReadAddresses(node, options.addresses);
+  if (key == "audio_device") return ReadValue(key, node, options.audio_device);
+  if (key == "sample_rate") return ReadValue(key, node, options.sample_rate_hz);
+  if (key == "block_frames") return ReadValue(key, node, options.block_frame_count);
+  if (key == "look_ahead_blocks") return ReadValue(key, node, options.look_ahead_block_count);
+  if (key == "workers") return ReadValue(key, node, options.worker_count);
+  if (key == "precompute") return ReadValue(key, node, options.precompute_program);
+  if (key == "tls_certificate") return ReadValue(key, node, options.tls_certificate_file);
+  if (key == "tls_key") return ReadValue(key, node, options.tls_key_file);
+  return InvalidConfiguration(absl::StrCat("there is no setting \"", key,
+                                           "\"; settings are named as the flags, with _ for -"));
+}
+
+absl::Status ReadFile(const std::string& path, Options& options) {
+  try {
+    const toml::table table = toml::parse_file(path);
+    for (const auto& [key, node] : table) {
+      if (absl::Status status = ReadKey(std::string(key.str()), node, options); !status.ok()) {
+        return status;
+      }
+    }
+  } catch (const toml::parse_error& error) {
+    return InvalidConfiguration(
+        absl::StrCat(path, " line ", error.source().begin.line, ": ",
+                     absl::string_view(error.description().data(), error.description().size())));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CheckRange(absl::string_view what, int64_t value, int64_t least, int64_t most) {
+  if (value >= least && value <= most) return absl::OkStatus();
+  return InvalidConfiguration(
+      absl::StrCat(what, " is ", value, "; it must be ", least, " to ", most));
+}
+
+absl::Status Check(const Options& options) {
+  for (const absl::Status& status :
+       {CheckRange("--sample-rate", options.sample_rate_hz, 8000, 192000),
+        CheckRange("--block-frames", options.block_frame_count, 16, 256),
+        CheckRange("--look-ahead-blocks", options.look_ahead_block_count, 2, 64),
+        CheckRange("--workers", options.worker_count, 0, 1024)}) {
+    if (!status.ok()) return status;
+  }
+  if (options.addresses.empty()) return InvalidConfiguration("--listen names no address");
+  if (options.tls_certificate_file.empty() != options.tls_key_file.empty()) {
+    return InvalidConfiguration("--tls-certificate and --tls-key belong together");
+  }
+  return absl::OkStatus();
+}
+
+void AddFlags(CLI::App& app, Options& options) {
+  app.add_option("--data-dir", options.data_directory, "folder of the database")
+      ->capture_default_str();
+  app.add_option("--listen", options.addresses,
+                 "unix:PATH or HOST:PORT (0: a free one); repeatable")
+      ->take_all()
+      ->capture_default_str();
+  app.add_option("--audio-device", options.audio_device,
+                 "auto, portaudio[:NAME], null or file:PATH")
+      ->capture_default_str();
+  app.add_option("--sample-rate", options.sample_rate_hz, "frames a second")->capture_default_str();
+  app.add_option("--block-frames", options.block_frame_count, "frames rendered at a time")
+      ->capture_default_str();
+  app.add_option("--look-ahead-blocks", options.look_ahead_block_count,
+                 "blocks rendered ahead of the device")
+      ->capture_default_str();
+  app.add_option("--workers", options.worker_count,
+                 "decompositions at a time; 0: half of the processors")
+      ->capture_default_str();
+  app.add_option("--precompute", options.precompute_program, "the program that decomposes")
+      ->capture_default_str();
+  app.add_option("--tls-certificate", options.tls_certificate_file, "PEM file, for TCP");
+  app.add_option("--tls-key", options.tls_key_file, "PEM file, for TCP");
+}
+
+/// Parses into `options`. Nothing where the program is to run; else its exit status.
+std::optional<int> ParseFlags(int argc, const char* const* argv, const std::string& version,
+                              std::string& configuration, Options& options) {
+  CLI::App app("Makes rigid-body simulations audible.", "carillond");
+  app.set_version_flag("--version", "carillond " + version);
+  app.add_option("--config", configuration, "TOML file; its keys are the flags, with _ for -");
+  AddFlags(app, options);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error);
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+absl::StatusOr<CommandLine> ReadCommandLine(int argc, const char* const* argv,
+                                            const std::string& version) {
+  CommandLine command{.options = Defaults()};
+  std::string configuration;
+  // Once for the name of the file, and once more over what the file says.
+  for (const bool with_file : {false, true}) {
+    if (with_file) {
+      if (configuration.empty()) break;
+      command.options = Defaults();
+      if (absl::Status status = ReadFile(configuration, command.options); !status.ok()) {
+        return status;
+      }
+    }
+    if (const auto exit_status = ParseFlags(argc, argv, version, configuration, command.options)) {
+      command.exit_status = *exit_status;
+      return command;
+    }
+  }
+  if (absl::Status status = Check(command.options); !status.ok()) return status;
+  command.run = true;
+  return command;
+}
+
+}  // namespace carillon
