@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 namespace carillon {
@@ -44,10 +45,11 @@ void KeepMostAudible(std::vector<SoundingMode>& modes, size_t most) {
   std::ranges::sort(modes, {}, &SoundingMode::column);
 }
 
-bool Degenerate(const SoundingMode& a, const SoundingMode& b, double tolerance) {
+/// How far two neighbours differ in frequency, relatively; infinite where they are no pair.
+double Split(const SoundingMode& a, const SoundingMode& b, double tolerance) {
   const auto [less, more] = std::minmax(a.coupling, b.coupling);
-  return b.natural_frequency_hz - a.natural_frequency_hz <= tolerance * a.natural_frequency_hz &&
-         more < 2 * less;
+  const double split = b.natural_frequency_hz / a.natural_frequency_hz - 1;
+  return split <= tolerance && more < 2 * less ? split : std::numeric_limits<double>::infinity();
 }
 
 void ShareMean(SoundingMode& first, SoundingMode& second) {
@@ -58,13 +60,21 @@ void ShareMean(SoundingMode& first, SoundingMode& second) {
   }
 }
 
+/// Pairs the closest neighbours first: an ovalling mode of a tube may lie between two pairs.
 void PairDegenerate(std::vector<SoundingMode>& modes, double tolerance) {
-  for (size_t i = 0; i + 1 < modes.size(); ++i) {
-    SoundingMode &first = modes[i], &second = modes[i + 1];
-    if (!Degenerate(first, second, tolerance)) continue;
-    ShareMean(first, second);
-    second.output_phase_rad = kPi / 2;
-    ++i;
+  std::vector<SoundingMode*> single;
+  for (SoundingMode& mode : modes) single.push_back(&mode);
+  while (single.size() > 1) {
+    std::vector<double> splits;
+    for (size_t i = 0; i + 1 < single.size(); ++i) {
+      splits.push_back(Split(*single[i], *single[i + 1], tolerance));
+    }
+    const auto closest = std::ranges::min_element(splits);
+    if (std::isinf(*closest)) return;
+    const auto first = single.begin() + (closest - splits.begin());
+    ShareMean(**first, **(first + 1));
+    (*(first + 1))->output_phase_rad = kPi / 2;
+    single.erase(first, first + 2);
   }
 }
 

@@ -157,6 +157,16 @@ TEST(SoundingModes, TheTwoOfADegeneratePairShareAllButAQuarterPeriod) {
   EXPECT_EQ(modes[2].output_phase_rad, 0);
 }
 
+TEST(SoundingModes, TheClosestNeighboursArePairedFirst) {
+  // Two bending modes between two of a looser pair.
+  const auto eigenvalues = EigenvaluesFor({4659.02, 4660.440, 4660.442, 4663.04}, kChime);
+  const auto modes = Select(eigenvalues, kChime).modes;
+  EXPECT_EQ(modes[1].damped_rad_per_s, modes[2].damped_rad_per_s);
+  EXPECT_NEAR(modes[2].output_phase_rad, kPi / 2, 1e-15);
+  EXPECT_EQ(modes[0].damped_rad_per_s, modes[3].damped_rad_per_s);
+  EXPECT_NEAR(modes[3].output_phase_rad, kPi / 2, 1e-15);
+}
+
 TEST(SoundingModes, NeighboursThatRadiateDifferentlyAreNoPair) {
   // A torsional mode that happens to lie beside a bending one.
   const auto eigenvalues = EigenvaluesFor({587.0, 587.1}, kChime);
