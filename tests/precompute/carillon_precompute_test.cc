@@ -1,0 +1,302 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+//
+// The program as users run it: a process, its options, its output and its exit status.
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <google/protobuf/io/zero_copy_stream_impl.h>
+#include <google/protobuf/util/delimited_message_util.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+#include <xxhash.h>
+
+#include <Eigen/Eigenvalues>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "carillon/v1/decomposition.pb.h"
+#include "carillon/v1/modal_model.pb.h"
+#include "tests/precompute/test_meshes.h"
+
+namespace carillon::precompute {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using Json = nlohmann::json;
+
+constexpr char kSteel[] = " --young 210e9 --poisson 0.3 --density 7850";
+
+/// A bar of 100 x 20 x 12 mm, written in millimetres.
+void WriteBar(const std::string& path) {
+  const SurfaceMesh box = MakeBoxSurface({100, 20, 12});
+  std::ofstream file(path);
+  for (const auto& [x, y, z] : box.vertices) file << "v " << x << " " << y << " " << z << "\n";
+  for (const auto& [a, b, c] : box.triangles) {
+    file << "f " << a + 1 << " " << b + 1 << " " << c + 1 << "\n";
+  }
+}
+
+struct CarillonPrecomputeTest : ::testing::Test {
+  struct Result {
+    int exit_status;
+    std::string output;
+  };
+
+  CarillonPrecomputeTest() {
+    std::filesystem::create_directories(folder);
+    WriteBar(bar);
+  }
+  ~CarillonPrecomputeTest() override { std::filesystem::remove_all(folder); }
+
+  /// What the program prints to standard output, given these options.
+  Result Run(const std::string& options) const {
+    const std::string command =
+        std::string(CARILLON_PRECOMPUTE) + " " + options + " --threads 1 2> " + folder + "/stderr";
+    std::FILE* pipe = popen(command.c_str(), "r");
+    Result result{.exit_status = -1, .output = {}};
+    std::array<char, 4096> buffer;
+    while (const size_t count = std::fread(buffer.data(), 1, buffer.size(), pipe)) {
+      result.output.append(buffer.data(), count);
+    }
+    result.exit_status = WEXITSTATUS(pclose(pipe));
+    return result;
+  }
+
+  /// Decomposes the bar: linear and small.
+  Result RunBar(const std::string& options) const {
+    return Run(bar + " --out " + model + " --unit mm --element linear --nodes 100 --json " +
+               options);
+  }
+
+  /// The reason of a refusal, checked to be given in every way.
+  std::string ReasonOf(const Result& result) const {
+    EXPECT_NE(result.exit_status, 0);
+    EXPECT_FALSE(std::filesystem::exists(model));
+    const Json error = Json::parse(result.output).at("error");
+    EXPECT_FALSE(error.at("message").get<std::string>().empty());
+    std::ifstream file(folder + "/stderr");
+    const std::string on_stderr((std::istreambuf_iterator<char>(file)), {});
+    EXPECT_THAT(on_stderr, HasSubstr(error.at("reason").get<std::string>()));
+    return error.at("reason");
+  }
+
+  std::string folder = ::testing::TempDir() + "/carillon_precompute_" + std::to_string(getpid());
+  std::string bar = folder + "/bar.obj";
+  std::string model = folder + "/bar.modes";
+};
+
+std::vector<v1::ModalModelRecord> ReadRecords(const std::string& path) {
+  const int descriptor = open(path.c_str(), O_RDONLY);
+  google::protobuf::io::FileInputStream file(descriptor);
+  std::vector<v1::ModalModelRecord> records;
+  v1::ModalModelRecord record;
+  while (google::protobuf::util::ParseDelimitedFromZeroCopyStream(&record, &file, nullptr)) {
+    records.push_back(record);
+  }
+  close(descriptor);
+  return records;
+}
+
+TEST_F(CarillonPrecomputeTest, JsonHasEveryKey) {
+  const Result result = RunBar(std::string(kSteel) + " --alpha1 1e-6 --alpha2 3");
+  ASSERT_EQ(result.exit_status, 0) << result.output;
+  const Json report = Json::parse(result.output);
+  EXPECT_EQ(report.at("unknowns"), 3 * report.at("nodes").get<int>());
+  EXPECT_GT(report.at("elements"), 0);
+  EXPECT_GT(report.at("peak_memory_bytes"), 1 << 20);
+  std::vector<std::string> names;
+  for (const Json& phase : report.at("phases")) {
+    names.push_back(phase.at("name"));
+    EXPECT_GE(phase.at("seconds"), 0);
+    EXPECT_GE(phase.at("cpu_seconds"), 0);
+  }
+  EXPECT_THAT(names, ElementsAre("read", "mesh", "assemble", "factor", "solve", "verify", "write"));
+  ASSERT_FALSE(report.at("modes").empty());
+  for (const Json& mode : report.at("modes")) {
+    const double omega = 2 * std::numbers::pi * mode.at("frequency_hz").get<double>();
+    const double sigma = mode.at("decay_rate_per_s");
+    EXPECT_NEAR(sigma, -(1e-6 * omega * omega + 3) / 2, 1e-9 * omega * omega);
+    EXPECT_NEAR(mode.at("damped_frequency_hz").get<double>(),
+                std::sqrt(omega * omega - sigma * sigma) / (2 * std::numbers::pi), 1e-6);
+    EXPECT_LT(mode.at("residual"), 1e-5);
+  }
+}
+
+TEST_F(CarillonPrecomputeTest, ModelFileIsTheStoredForm) {
+  const Json report = Json::parse(RunBar(kSteel).output);
+  const std::vector<v1::ModalModelRecord> records = ReadRecords(model);
+  ASSERT_GT(records.size(), 1u);
+  const v1::ModalModelHeader& header = records[0].header();
+  EXPECT_EQ(header.format_version(), 1u);
+  EXPECT_EQ(header.mode_count(), report.at("modes").size());
+  EXPECT_EQ(header.settings().element(), v1::ELEMENT_LINEAR);
+  EXPECT_EQ(header.settings().metres_per_unit(), 0.001);
+  EXPECT_EQ(header.mesh_digest().size(), 64u);
+  EXPECT_NEAR(header.volume_m3(), 0.1 * 0.02 * 0.012, 1e-12);
+  EXPECT_EQ(header.verification().sturm_count(), 6 + header.mode_count());
+  std::vector<std::string> arrays(static_cast<size_t>(header.arrays_size()));
+  for (size_t k = 1; k < records.size(); ++k) {
+    const v1::ModalModelChunk& chunk = records[k].chunk();
+    EXPECT_LE(chunk.data().size(), size_t{1} << 20);
+    EXPECT_EQ(chunk.xxh3(), XXH3_64bits(chunk.data().data(), chunk.data().size()));
+    EXPECT_EQ(chunk.offset(), arrays[chunk.array()].size());
+    arrays[chunk.array()] += chunk.data();
+  }
+  std::vector<std::string> names;
+  for (int i = 0; i < header.arrays_size(); ++i) {
+    const v1::ArrayDescriptor& array = header.arrays(i);
+    names.push_back(array.name());
+    size_t bytes = array.type() == v1::ELEMENT_TYPE_FLOAT64 ? 8 : 4;
+    for (const uint64_t extent : array.shape()) bytes *= extent;
+    EXPECT_EQ(arrays[static_cast<size_t>(i)].size(), bytes) << array.name();
+  }
+  EXPECT_THAT(names, ElementsAre("eigenvalues", "residuals", "couplings", "vertices", "triangles",
+                                 "given_triangle", "given_vertices", "given_triangles", "shapes"));
+  double first = 0;
+  std::memcpy(&first, arrays[0].data(), sizeof first);
+  EXPECT_NEAR(std::sqrt(first * 210e9 / 7850) / (2 * std::numbers::pi),
+              report.at("modes")[0].at("frequency_hz").get<double>(), 1e-6);
+}
+
+// The matrices alone must lead to the same frequencies.
+TEST_F(CarillonPrecomputeTest, MatricesAreThoseSolved) {
+  const Json report = Json::parse(RunBar(std::string(kSteel) + " --matrices " + folder).output);
+  const auto read = [&](const std::string& name) {
+    std::ifstream file(folder + "/" + name);
+    std::string banner;
+    std::getline(file, banner);
+    EXPECT_EQ(banner, "%%MatrixMarket matrix coordinate real symmetric");
+    Eigen::Index rows = 0, columns = 0, entries = 0, row = 0, column = 0;
+    file >> rows >> columns >> entries;
+    Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(rows, columns);
+    double value = 0;
+    while (file >> row >> column >> value) {
+      matrix(row - 1, column - 1) = matrix(column - 1, row - 1) = value;
+    }
+    return matrix;
+  };
+  const Eigen::MatrixXd K = read("K.mtx");
+  const Eigen::MatrixXd M = read("M.mtx");
+  ASSERT_EQ(K.rows(), report.at("unknowns"));
+  EXPECT_NEAR(M.sum(), 3 * 7850 * 0.1 * 0.02 * 0.012, 1e-9);
+  const Eigen::VectorXd eigenvalues =
+      Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd>(K, M, Eigen::EigenvaluesOnly)
+          .eigenvalues();
+  EXPECT_NEAR(std::sqrt(eigenvalues[6]) / (2 * std::numbers::pi),
+              report.at("modes")[0].at("frequency_hz").get<double>(), 1e-3);
+}
+
+TEST_F(CarillonPrecomputeTest, LameConstantsSayTheSameAsYoungAndPoisson) {
+  const double nu = 0.3, young = 210e9;
+  const std::string lame = " --density 7850 --lame-lambda " +
+                           std::to_string(young * nu / ((1 + nu) * (1 - 2 * nu))) + " --lame-mu " +
+                           std::to_string(young / (2 * (1 + nu)));
+  const Json by_young = Json::parse(RunBar(kSteel).output);
+  const Json by_lame = Json::parse(RunBar(lame).output);
+  EXPECT_NEAR(by_young.at("modes")[0].at("frequency_hz").get<double>(),
+              by_lame.at("modes")[0].at("frequency_hz").get<double>(), 1e-5);
+}
+
+TEST_F(CarillonPrecomputeTest, TwiceTheSizeSoundsAnOctaveLower) {
+  const Json one = Json::parse(RunBar(kSteel).output);
+  const Json two = Json::parse(RunBar(std::string(kSteel) + " --size 2").output);
+  EXPECT_NEAR(one.at("modes")[0].at("frequency_hz").get<double>() /
+                  two.at("modes")[0].at("frequency_hz").get<double>(),
+              2, 1e-9);
+  EXPECT_GT(two.at("modes").size(), one.at("modes").size());
+}
+
+TEST_F(CarillonPrecomputeTest, SameInputGivesTheSameModel) {
+  RunBar(kSteel);
+  const auto first = ReadRecords(model);
+  RunBar(kSteel);
+  const auto second = ReadRecords(model);
+  ASSERT_EQ(first.size(), second.size());
+  for (size_t k = 0; k < first.size(); ++k) {
+    EXPECT_EQ(first[k].SerializeAsString(), second[k].SerializeAsString()) << k;
+  }
+}
+
+TEST_F(CarillonPrecomputeTest, BodyWithoutAModeInTheBandIsToldItsFirst) {
+  const Result full = RunBar(kSteel);
+  std::filesystem::remove(model);
+  const Result result = RunBar(std::string(kSteel) + " --band 20:1000");
+  EXPECT_EQ(ReasonOf(result), "NO_MODE_IN_BAND");
+  const std::string first_hz =
+      Json::parse(result.output).at("error").at("figures").at("first_mode_hz");
+  EXPECT_NEAR(std::stod(first_hz) /
+                  Json::parse(full.output).at("modes")[0].at("frequency_hz").get<double>(),
+              1, 1e-5);
+}
+
+TEST_F(CarillonPrecomputeTest, ContradictoryOptionsAreRefusedInWords) {
+  for (const char* options :
+       {"--young 1e9 --poisson 0.3 --density 1000 --lame-lambda 1e9 --lame-mu 1e9",
+        "--lame-lambda 1e9 --density 1000", "", "--material brass --band 300:200",
+        "--material brass --keep-surface --refine-surface", "--material brass --element cubic",
+        "--material brass --size 0", "--material brass --nonsense"}) {
+    EXPECT_EQ(ReasonOf(RunBar(options)), "INVALID_SETTINGS") << options;
+  }
+  EXPECT_EQ(ReasonOf(RunBar("--material unobtainium")), "UNKNOWN_MATERIAL");
+  EXPECT_EQ(ReasonOf(RunBar("--material brass --poisson 0.5")), "INVALID_MATERIAL");
+}
+
+TEST_F(CarillonPrecomputeTest, FilesThatAreNotThereAreRefused) {
+  EXPECT_EQ(ReasonOf(Run(folder + "/none.obj --out " + model + " --material brass --json")),
+            "MESH_FILE_NOT_READABLE");
+  EXPECT_EQ(ReasonOf(Run(bar + " --unit mm --element linear --nodes 100 --material brass --json "
+                               "--out /nowhere/bar.modes")),
+            "OUTPUT_NOT_WRITABLE");
+}
+
+TEST_F(CarillonPrecomputeTest, OpenSurfaceIsRefused) {
+  std::ofstream(bar, std::ios::trunc) << "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\n";
+  EXPECT_EQ(ReasonOf(RunBar(kSteel)), "MESH_NOT_CLOSED");
+}
+
+struct WorkerEventsTest : CarillonPrecomputeTest {
+  std::vector<v1::WorkerEvent> EventsOf(const std::string& options) const {
+    const std::string events = folder + "/events";
+    RunBar(options + " --events-fd 3 3> " + events);
+    const int descriptor = open(events.c_str(), O_RDONLY);
+    google::protobuf::io::FileInputStream file(descriptor);
+    std::vector<v1::WorkerEvent> result;
+    v1::WorkerEvent event;
+    while (google::protobuf::util::ParseDelimitedFromZeroCopyStream(&event, &file, nullptr)) {
+      result.push_back(event);
+    }
+    close(descriptor);
+    return result;
+  }
+};
+
+TEST_F(WorkerEventsTest, ProgressNeverGoesBackAndEndsWithAll) {
+  const std::vector<v1::WorkerEvent> events = EventsOf(kSteel);
+  ASSERT_FALSE(events.empty());
+  double last = 0;
+  for (const v1::WorkerEvent& event : events) {
+    ASSERT_TRUE(event.has_progress());
+    EXPECT_GE(event.progress().fraction(), last);
+    last = event.progress().fraction();
+  }
+  EXPECT_EQ(last, 1);
+  EXPECT_EQ(events.back().progress().phase(), v1::PHASE_WRITE);
+  EXPECT_GT(events.back().progress().node_count(), 0u);
+  EXPECT_GT(events.back().progress().converged_mode_count(), 0u);
+}
+
+TEST_F(WorkerEventsTest, RefusalIsTheLastEvent) {
+  const std::vector<v1::WorkerEvent> events = EventsOf(std::string(kSteel) + " --band 20:1000");
+  ASSERT_FALSE(events.empty());
+  EXPECT_EQ(events.back().error().reason(), "NO_MODE_IN_BAND");
+  EXPECT_TRUE(events.back().error().metadata().contains("first_mode_hz"));
+}
+
+}  // namespace
+}  // namespace carillon::precompute
