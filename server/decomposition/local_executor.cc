@@ -15,8 +15,8 @@
 
 #include "absl/base/thread_annotations.h"
 #include "absl/strings/str_cat.h"
-#include "absl/synchronization/mutex.h"
 #include "proto/error_reason.h"
+#include "server/base/mutex.h"
 #include "server/decomposition/local_worker.h"
 
 namespace carillon {
@@ -35,7 +35,7 @@ class LocalExecutor final : public Executor {
 
   ~LocalExecutor() override {
     {
-      absl::MutexLock lock(&mutex_);
+      MutexLock lock(&mutex_);
       stopping_ = true;
     }
     Wake();
@@ -46,13 +46,13 @@ class LocalExecutor final : public Executor {
   int worker_count() const override { return options_.worker_count; }
 
   void Start(DecompositionTask task) override {
-    absl::MutexLock lock(&mutex_);
+    MutexLock lock(&mutex_);
     starts_.push_back(std::move(task));
     Wake();
   }
 
   void Cancel(const std::string& digest) override {
-    absl::MutexLock lock(&mutex_);
+    MutexLock lock(&mutex_);
     cancels_.push_back(digest);
     Wake();
   }
@@ -81,7 +81,7 @@ class LocalExecutor final : public Executor {
     std::vector<DecompositionTask> starts;
     std::vector<std::string> cancels;
     {
-      absl::MutexLock lock(&mutex_);
+      MutexLock lock(&mutex_);
       if (stopping_) return false;
       starts.swap(starts_);
       cancels.swap(cancels_);
@@ -139,7 +139,7 @@ class LocalExecutor final : public Executor {
   const Clock& clock_;
   const int wake_ = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
   std::list<LocalWorker> workers_;  // of the thread
-  absl::Mutex mutex_;
+  Mutex mutex_;
   bool stopping_ ABSL_GUARDED_BY(mutex_) = false;
   std::vector<DecompositionTask> starts_ ABSL_GUARDED_BY(mutex_);
   std::vector<std::string> cancels_ ABSL_GUARDED_BY(mutex_);

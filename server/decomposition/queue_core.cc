@@ -75,7 +75,7 @@ absl::Status QueueCore::TakeUp() {
   const auto records = database_.jobs().Unfinished();
   if (!records.ok()) return records.status();
   Notices notices;  // nobody watches yet
-  absl::MutexLock lock(&mutex_);
+  MutexLock lock(&mutex_);
   for (JobRecord record : *records) {
     auto request = ParseRequest(record);
     const absl::StatusOr<bool> satisfied =
@@ -95,7 +95,7 @@ absl::Status QueueCore::TakeUp() {
 
 void QueueCore::Stop() {
   {
-    absl::MutexLock lock(&mutex_);
+    MutexLock lock(&mutex_);
     stopping_ = true;
   }
   executor_.reset();
@@ -108,7 +108,7 @@ absl::StatusOr<v1::Job> QueueCore::Submit(const v1::CreateModalModelRequest& req
   Notices notices;
   absl::StatusOr<v1::Job> job;
   {
-    absl::MutexLock lock(&mutex_);
+    MutexLock lock(&mutex_);
     const auto active = active_.find(digest);
     job = active == active_.end() ? SubmitNew(digest, *resolved, notices)
                                   : SubmitAgain(active->second, *resolved);
@@ -213,7 +213,7 @@ DecompositionTask QueueCore::MakeTask(const Active& active) {
 void QueueCore::OnProgress(const std::string& digest, const v1::Progress& progress) {
   Notice notice;
   {
-    absl::MutexLock lock(&mutex_);
+    MutexLock lock(&mutex_);
     Active& active = active_.at(digest);
     active.progress = progress;
     notice = Announce(active);
@@ -225,7 +225,7 @@ void QueueCore::OnEnd(const std::string& digest, const Outcome& outcome) {
   const Outcome result = Store(digest, outcome);
   Notices notices;
   {
-    absl::MutexLock lock(&mutex_);
+    MutexLock lock(&mutex_);
     --running_count_;
     Active& active = active_.at(digest);
     // Deleted while it was being stored. It may not have come that far: then there is none.
@@ -256,7 +256,7 @@ Outcome QueueCore::Store(const std::string& digest, const Outcome& outcome) {
   if (outcome.verdict != Verdict::kOk) return outcome;
   std::string label;
   {
-    absl::MutexLock lock(&mutex_);
+    MutexLock lock(&mutex_);
     const Active& active = active_.at(digest);
     if (active.deleted) return {Verdict::kCancelled, {}, {}};
     label = active.record.label;
@@ -274,12 +274,12 @@ bool QueueCore::RunAgain(const Active& active, const Outcome& outcome) const {
 }
 
 absl::StatusOr<v1::Job> QueueCore::Get(const std::string& digest) {
-  absl::MutexLock lock(&mutex_);
+  MutexLock lock(&mutex_);
   return FindJob(digest);
 }
 
 absl::StatusOr<DecompositionJobPage> QueueCore::List(int page_size, const std::string& page_token) {
-  absl::MutexLock lock(&mutex_);
+  MutexLock lock(&mutex_);
   const absl::StatusOr<JobPage> records = database_.jobs().List(page_size, page_token);
   if (!records.ok()) return records.status();
   DecompositionJobPage page;
@@ -295,7 +295,7 @@ absl::StatusOr<v1::Job> QueueCore::Cancel(const std::string& digest) {
   Notice notice;
   absl::StatusOr<v1::Job> job;
   {
-    absl::MutexLock lock(&mutex_);
+    MutexLock lock(&mutex_);
     const auto found = active_.find(digest);
     if (found == active_.end()) return FindJob(digest);
     Active& active = found->second;
@@ -320,7 +320,7 @@ absl::StatusOr<v1::Job> QueueCore::Cancel(const std::string& digest) {
 absl::Status QueueCore::DeleteModel(const std::string& digest) {
   Notice notice;
   {
-    absl::MutexLock lock(&mutex_);
+    MutexLock lock(&mutex_);
     if (const absl::Status status = database_.models().Delete(digest); !status.ok()) return status;
     const auto found = active_.find(digest);
     if (found == active_.end()) return absl::OkStatus();
@@ -343,7 +343,7 @@ absl::Status QueueCore::DeleteModel(const std::string& digest) {
 absl::Status QueueCore::Watch(const std::string& digest, const std::shared_ptr<Watcher>& watcher) {
   Notice notice;
   {
-    absl::MutexLock lock(&mutex_);
+    MutexLock lock(&mutex_);
     const absl::StatusOr<v1::Job> job = FindJob(digest);
     if (!job.ok()) return job.status();
     if (const auto active = active_.find(digest); active != active_.end()) {
@@ -356,7 +356,7 @@ absl::Status QueueCore::Watch(const std::string& digest, const std::shared_ptr<W
 }
 
 void QueueCore::Forget(const std::string& digest, const std::shared_ptr<Watcher>& watcher) {
-  absl::MutexLock lock(&mutex_);
+  MutexLock lock(&mutex_);
   const auto active = active_.find(digest);
   if (active != active_.end()) std::erase(active->second.watchers, watcher);
 }

@@ -12,10 +12,10 @@
 #include "absl/base/thread_annotations.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "absl/synchronization/mutex.h"
 #include "carillon/v1/decomposition.pb.h"
 #include "carillon/v1/modal_model_service.pb.h"
 #include "server/base/clock.h"
+#include "server/base/mutex.h"
 #include "server/decomposition/decomposition_queue.h"
 #include "server/decomposition/executor.h"
 #include "server/decomposition/watcher.h"
@@ -83,7 +83,7 @@ class QueueCore {
 
   ModeDatabase& database_;
   const Clock& clock_;
-  absl::Mutex mutex_;
+  Mutex mutex_;
   bool stopping_ ABSL_GUARDED_BY(mutex_) = false;
   std::map<std::string, Active> active_ ABSL_GUARDED_BY(mutex_);
   std::deque<std::string> queued_ ABSL_GUARDED_BY(mutex_);

@@ -58,7 +58,7 @@ absl::StatusOr<std::unique_ptr<Database>> Database::Open(const std::filesystem::
 }
 
 absl::Status Database::Write(absl::FunctionRef<absl::Status(SqliteConnection&)> body) {
-  absl::MutexLock lock(&writer_mutex_);
+  MutexLock lock(&writer_mutex_);
   return InTransaction(*writer_, "BEGIN IMMEDIATE", body);
 }
 
@@ -66,14 +66,14 @@ absl::Status Database::Read(absl::FunctionRef<absl::Status(SqliteConnection&)> b
   auto reader = TakeReader();
   if (!reader.ok()) return reader.status();
   const absl::Status status = InTransaction(**reader, "BEGIN DEFERRED", body);
-  absl::MutexLock lock(&readers_mutex_);
+  MutexLock lock(&readers_mutex_);
   idle_readers_.push_back(*std::move(reader));
   return status;
 }
 
 absl::StatusOr<std::unique_ptr<SqliteConnection>> Database::TakeReader() {
   {
-    absl::MutexLock lock(&readers_mutex_);
+    MutexLock lock(&readers_mutex_);
     if (!idle_readers_.empty()) {
       auto reader = std::move(idle_readers_.back());
       idle_readers_.pop_back();

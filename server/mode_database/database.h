@@ -9,7 +9,7 @@
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "absl/synchronization/mutex.h"
+#include "server/base/mutex.h"
 #include "server/mode_database/sqlite_connection.h"
 
 namespace carillon {
@@ -38,9 +38,9 @@ class Database {
   absl::StatusOr<std::unique_ptr<SqliteConnection>> TakeReader();
 
   const std::filesystem::path file_;
-  absl::Mutex writer_mutex_;
+  Mutex writer_mutex_;
   std::unique_ptr<SqliteConnection> writer_ ABSL_PT_GUARDED_BY(writer_mutex_);
-  absl::Mutex readers_mutex_;
+  Mutex readers_mutex_;
   std::vector<std::unique_ptr<SqliteConnection>> idle_readers_ ABSL_GUARDED_BY(readers_mutex_);
 };
 

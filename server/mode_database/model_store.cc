@@ -267,7 +267,7 @@ absl::StatusOr<ModelExport> ModelStore::Export(const std::string& digest) {
 }
 
 absl::StatusOr<std::shared_ptr<const ModalModel>> ModelStore::Find(const std::string& digest) {
-  absl::MutexLock lock(&cache_mutex_);
+  MutexLock lock(&cache_mutex_);
   std::shared_ptr<const ModalModel> model;
   const absl::Status status = database_->Read([&](SqliteConnection& connection) {
     const absl::StatusOr<ModelRow> row = SelectModel(connection, digest);

@@ -13,9 +13,9 @@
 #include "absl/base/thread_annotations.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "absl/synchronization/mutex.h"
 #include "carillon/v1/modal_model.pb.h"
 #include "server/base/clock.h"
+#include "server/base/mutex.h"
 #include "server/mode_database/modal_model.h"
 
 namespace carillon {
@@ -126,7 +126,7 @@ class ModelStore {
   Database* database_;
   const Clock* clock_;
   // Held while a model is read, so that two objects of one model cannot read it twice.
-  absl::Mutex cache_mutex_;
+  Mutex cache_mutex_;
   std::map<std::string, Cached> cache_ ABSL_GUARDED_BY(cache_mutex_);
 };
 

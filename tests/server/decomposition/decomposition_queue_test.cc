@@ -5,12 +5,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <set>
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
 #include <thread>
 #include <vector>
 
-#include "absl/strings/match.h"
-#include "absl/synchronization/mutex.h"
 #include "server/base/sha256.h"
 #include "server/decomposition/decomposition_request.h"
 #include "server/decomposition/local_executor.h"
@@ -22,7 +22,7 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-constexpr absl::Duration kDeadline = absl::Seconds(60);
+constexpr std::chrono::seconds kDeadline(60);
 
 std::string DigestOf(const v1::Job& job) { return job.name().substr(5); }
 
@@ -30,38 +30,37 @@ std::string DigestOf(const v1::Job& job) { return job.name().substr(5); }
 class Diary {
  public:
   void Write(const v1::Job& job) {
-    absl::MutexLock lock(&mutex_);
+    const std::lock_guard lock(mutex_);
     if (states_.empty() || states_.back() != job.state()) states_.push_back(job.state());
     last_ = job;
+    written_.notify_all();
   }
 
   v1::Job Await(v1::JobState state) {
-    absl::MutexLock lock(&mutex_);
-    const auto reached = [&]() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
-      return last_.state() == state;
-    };
-    EXPECT_TRUE(mutex_.AwaitWithTimeout(absl::Condition(&reached), kDeadline)) << state;
-    return last_;
+    return AwaitThat([state](const v1::Job& job) { return job.state() == state; });
   }
 
   v1::Job AwaitEnd() {
-    absl::MutexLock lock(&mutex_);
-    const auto ended = [&]() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
-      return last_.state() >= v1::JOB_STATE_SUCCEEDED;
-    };
-    EXPECT_TRUE(mutex_.AwaitWithTimeout(absl::Condition(&ended), kDeadline));
-    return last_;
+    return AwaitThat([](const v1::Job& job) { return job.state() >= v1::JOB_STATE_SUCCEEDED; });
   }
 
   std::vector<v1::JobState> states() {
-    absl::MutexLock lock(&mutex_);
+    const std::lock_guard lock(mutex_);
     return states_;
   }
 
  private:
-  absl::Mutex mutex_;
-  std::vector<v1::JobState> states_ ABSL_GUARDED_BY(mutex_);
-  v1::Job last_ ABSL_GUARDED_BY(mutex_);
+  template <typename Test>
+  v1::Job AwaitThat(Test test) {
+    std::unique_lock lock(mutex_);
+    EXPECT_TRUE(written_.wait_for(lock, kDeadline, [&] { return test(last_); }));
+    return last_;
+  }
+
+  std::mutex mutex_;
+  std::condition_variable written_;
+  std::vector<v1::JobState> states_;
+  v1::Job last_;
 };
 
 // Every run of a script appends a line to "runs". The models in the folder are complete up to what
@@ -331,11 +330,11 @@ TEST_F(DecompositionQueueTest, AWatchTellsEveryStateAndProgressThenEnds) {
   Submit(Request(20'000, 1));
   const v1::Job job = Submit(Request(20'000, 2));
   Diary diary;
-  absl::Mutex mutex;
+  std::mutex mutex;
   double fraction = 0;
   const auto watch = queue_->Watch(DigestOf(job), [&](const v1::Job& now) {
     diary.Write(now);
-    absl::MutexLock lock(&mutex);
+    const std::lock_guard lock(mutex);
     fraction = std::max(fraction, now.progress().fraction());
   });
   gate.Open();
@@ -343,7 +342,7 @@ TEST_F(DecompositionQueueTest, AWatchTellsEveryStateAndProgressThenEnds) {
   diary.AwaitEnd();
   EXPECT_THAT(diary.states(),
               ElementsAre(v1::JOB_STATE_QUEUED, v1::JOB_STATE_RUNNING, v1::JOB_STATE_SUCCEEDED));
-  absl::MutexLock lock(&mutex);
+  const std::lock_guard lock(mutex);
   EXPECT_EQ(fraction, 0.75);
 }
 
@@ -351,25 +350,25 @@ TEST_F(DecompositionQueueTest, AWatchMayEndItselfAndIsNotCalledAgain) {
   const Gate gate(folder_ / "gate");
   MakeQueue(absl::StrCat(kWaitAtGate, kSucceed));
   const v1::Job job = Submit(Request(20'000));
-  absl::Mutex mutex;
+  std::mutex mutex;
   std::unique_ptr<JobWatch> watch;
   bool ended = false;
   int calls_after_end = 0;
   auto made = queue_->Watch(DigestOf(job), [&](const v1::Job&) {
-    absl::MutexLock lock(&mutex);
+    const std::lock_guard lock(mutex);
     if (ended) ++calls_after_end;
     if (watch != nullptr) ended = true;
     watch.reset();
   });
   {
-    absl::MutexLock lock(&mutex);
+    const std::lock_guard lock(mutex);
     if (!ended) watch = *std::move(made);
   }
   Diary diary;
   const auto other = Watch(job, diary);
   gate.Open();
   diary.AwaitEnd();
-  absl::MutexLock lock(&mutex);
+  const std::lock_guard lock(mutex);
   EXPECT_EQ(calls_after_end, 0);
 }
 

@@ -6,10 +6,10 @@
 #include <signal.h>
 #include <sys/wait.h>
 
+#include <chrono>
 #include <future>
 #include <limits>
 
-#include "absl/synchronization/notification.h"
 #include "server/base/sha256.h"
 #include "server/decomposition/decomposition_request.h"
 #include "tests/server/decomposition/scripted_worker.h"
@@ -20,16 +20,21 @@ namespace {
 using std::chrono::milliseconds;
 using ::testing::HasSubstr;
 
-constexpr absl::Duration kDeadline = absl::Seconds(30);
+constexpr std::chrono::seconds kDeadline(30);
 
 /// One task, and what became of it.
 struct TaskRun {
-  absl::Notification progressed;
-  absl::Notification ended;
+  std::promise<void> progressed;
+  std::promise<void> ended;
   std::vector<double> fractions;
   Outcome outcome;
   std::string model;  // content of the model file
 };
+
+/// Whether it does so in time. Call once.
+bool Happens(std::promise<void>& event) {
+  return event.get_future().wait_for(kDeadline) == std::future_status::ready;
+}
 
 class LocalExecutorTest : public ::testing::Test {
  protected:
@@ -52,21 +57,21 @@ class LocalExecutorTest : public ::testing::Test {
                       .on_progress =
                           [&run](const v1::Progress& progress) {
                             run.fractions.push_back(progress.fraction());
-                            if (run.fractions.size() == 1) run.progressed.Notify();
+                            if (run.fractions.size() == 1) run.progressed.set_value();
                           },
                       .on_end =
                           [&run](const Outcome& outcome) {
                             run.outcome = outcome;
                             if (outcome.verdict == Verdict::kOk)
                               run.model = ReadBytes(outcome.model_file);
-                            run.ended.Notify();
+                            run.ended.set_value();
                           }});
   }
 
   Outcome RunScript(const std::string& script) {
     MakeExecutor(script);
     Start(run_);
-    EXPECT_TRUE(run_.ended.WaitForNotificationWithTimeout(kDeadline));
+    EXPECT_TRUE(Happens(run_.ended));
     return run_.outcome;
   }
 
@@ -187,9 +192,9 @@ TEST_F(LocalExecutorTest, CancelsARunningWorker) {
   WriteEvents(ProgressBytes(0.5));
   MakeExecutor("cat \"$here/events\" >&3; sleep 1000");
   Start(run_);
-  ASSERT_TRUE(run_.progressed.WaitForNotificationWithTimeout(kDeadline));
+  ASSERT_TRUE(Happens(run_.progressed));
   executor_->Cancel(digest_);
-  ASSERT_TRUE(run_.ended.WaitForNotificationWithTimeout(kDeadline));
+  ASSERT_TRUE(Happens(run_.ended));
   EXPECT_EQ(run_.outcome.verdict, Verdict::kCancelled);
 }
 
@@ -210,10 +215,10 @@ TEST_F(LocalExecutorTest, ItsDestructionKillsWhatRunsWithoutAWord) {
   WriteEvents(ProgressBytes(0.5));
   MakeExecutor("exec 4>\"$here/life\"; cat \"$here/events\" >&3; exec sleep 1000");
   Start(run_);
-  ASSERT_TRUE(run_.progressed.WaitForNotificationWithTimeout(kDeadline));
+  ASSERT_TRUE(Happens(run_.progressed));
   executor_.reset();
   EXPECT_TRUE(life.LosesItsWriters());
-  EXPECT_FALSE(run_.ended.HasBeenNotified());
+  EXPECT_EQ(run_.ended.get_future().wait_for(milliseconds(0)), std::future_status::timeout);
 }
 
 TEST_F(LocalExecutorTest, WorkersDieWithTheDaemonHoweverItDies) {
