@@ -53,8 +53,8 @@ void AddMeshOptions(CLI::App& app, Options& options) {
   const std::string group = "Mesh";
   app.add_option("--format", options.format, "obj, ply, stl, off or msh (default: by the suffix)")
       ->group(group);
-  app.add_option("--unit", options.unit, "Unit of the file's coordinates")
-      ->check(CLI::IsMember({"m", "mm", "cm", "in"}))
+  app.add_option("--unit", options.unit,
+                 "Unit of the file's coordinates: m, mm, cm, in, or a number of metres")
       ->capture_default_str()
       ->group(group);
   app.add_flag("--keep-surface", options.keep_surface, "Add no vertices on the surface")
@@ -164,17 +164,27 @@ absl::StatusOr<IntendedUse> MakeUse(const Options& options, const v1::Material& 
   return use;
 }
 
-MeshFile MakeMeshFile(const Options& options) {
+absl::StatusOr<double> MetresPerUnit(const std::string& unit) {
   const std::map<std::string, double> metres = {
       {"m", 1}, {"cm", 0.01}, {"mm", 0.001}, {"in", 0.0254}};
+  if (const auto named = metres.find(unit); named != metres.end()) return named->second;
+  double number = 0;
+  if (absl::SimpleAtod(unit, &number) && number > 0 && std::isfinite(number)) return number;
+  return Invalid(absl::StrCat("--unit is \"", unit,
+                              "\"; it must be m, mm, cm, in, or a number of metres above zero"));
+}
+
+absl::StatusOr<MeshFile> MakeMeshFile(const Options& options) {
+  const absl::StatusOr<double> metres_per_unit = MetresPerUnit(options.unit);
+  if (!metres_per_unit.ok()) return metres_per_unit.status();
   std::string format = options.format;
   if (format.empty()) {
     format = std::filesystem::path(options.input).extension().string();
     if (!format.empty()) format.erase(0, 1);
   }
-  return {.path = options.input,
-          .format = absl::AsciiStrToLower(format),
-          .metres_per_unit = metres.at(options.unit)};
+  return MeshFile{.path = options.input,
+                  .format = absl::AsciiStrToLower(format),
+                  .metres_per_unit = *metres_per_unit};
 }
 
 absl::StatusOr<CommandLine> MakeCommandLine(const Options& options) {
@@ -182,8 +192,10 @@ absl::StatusOr<CommandLine> MakeCommandLine(const Options& options) {
   if (!material.ok()) return material.status();
   const absl::StatusOr<IntendedUse> use = MakeUse(options, *material);
   if (!use.ok()) return use.status();
+  const absl::StatusOr<MeshFile> mesh = MakeMeshFile(options);
+  if (!mesh.ok()) return mesh.status();
   CommandLine result{
-      .mesh = MakeMeshFile(options),
+      .mesh = *mesh,
       .output = options.output,
       .settings = {.poisson_ratio = material->poisson_ratio(),
                    .mass =

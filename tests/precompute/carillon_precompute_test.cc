@@ -128,6 +128,18 @@ TEST_F(CarillonPrecomputeTest, JsonHasEveryKey) {
   }
 }
 
+TEST_F(CarillonPrecomputeTest, UnitMayBeANumberOfMetres) {
+  const auto volume_m3 = [&](const std::string& unit) {
+    Run(bar + " --out " + model + " --unit " + unit + " --element linear --nodes 100 " + kSteel);
+    const std::vector<v1::ModalModelRecord> records = ReadRecords(model);
+    return records.empty() ? 0 : records[0].header().volume_m3();
+  };
+  EXPECT_EQ(volume_m3("0.001"), volume_m3("mm"));
+  std::filesystem::remove(model);
+  EXPECT_EQ(ReasonOf(Run(bar + " --out " + model + " --unit ell --json " + kSteel)),
+            "INVALID_SETTINGS");
+}
+
 TEST_F(CarillonPrecomputeTest, ModelFileIsTheStoredForm) {
   const Json report = Json::parse(RunBar(kSteel).output);
   const std::vector<v1::ModalModelRecord> records = ReadRecords(model);
