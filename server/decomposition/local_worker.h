@@ -41,10 +41,10 @@ struct WorkerLimits {
 /// destruction kills what still runs and removes the folder. One thread.
 class LocalWorker {
  public:
-  /// Makes `folder`, brings the mesh there and starts the program.
+  /// Makes the folder `path`, brings the mesh there and starts the program.
   /// Errors: those of write_mesh and ChildProcess::Spawn, FailedPrecondition (DATABASE_UNUSABLE).
   static absl::StatusOr<LocalWorker> Start(DecompositionTask task,
-                                           const std::filesystem::path& folder,
+                                           const std::filesystem::path& path,
                                            const std::filesystem::path& program, int thread_count,
                                            std::chrono::nanoseconds now);
   const DecompositionTask& task() const { return task_; }

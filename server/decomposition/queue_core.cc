@@ -87,7 +87,7 @@ absl::Status QueueCore::TakeUp() {
     // The daemon died between storing the model and saying so, or the row is damaged.
     record.state = satisfied.ok() ? v1::JOB_STATE_SUCCEEDED : v1::JOB_STATE_FAILED;
     if (!satisfied.ok()) record.error = ToErrorInfo(satisfied.status());
-    if (const absl::Status status = database_.jobs().Put(record); !status.ok()) return status;
+    if (absl::Status status = database_.jobs().Put(record); !status.ok()) return status;
   }
   StartWhatFits(notices);
   return absl::OkStatus();
@@ -321,7 +321,7 @@ absl::Status QueueCore::DeleteModel(const std::string& digest) {
   Notice notice;
   {
     MutexLock lock(&mutex_);
-    if (const absl::Status status = database_.models().Delete(digest); !status.ok()) return status;
+    if (absl::Status status = database_.models().Delete(digest); !status.ok()) return status;
     const auto found = active_.find(digest);
     if (found == active_.end()) return absl::OkStatus();
     Active& active = found->second;

@@ -65,7 +65,7 @@ absl::Status Database::Write(absl::FunctionRef<absl::Status(SqliteConnection&)> 
 absl::Status Database::Read(absl::FunctionRef<absl::Status(SqliteConnection&)> body) {
   auto reader = TakeReader();
   if (!reader.ok()) return reader.status();
-  const absl::Status status = InTransaction(**reader, "BEGIN DEFERRED", body);
+  absl::Status status = InTransaction(**reader, "BEGIN DEFERRED", body);
   MutexLock lock(&readers_mutex_);
   idle_readers_.push_back(*std::move(reader));
   return status;

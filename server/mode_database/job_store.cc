@@ -55,8 +55,9 @@ absl::StatusOr<std::optional<JobRecord>> JobStore::Find(const std::string& diges
     return connection.Query(absl::StrCat(kSelectRows, "WHERE digest = ?").c_str(), {digest},
                             [&](const SqlRow& row) {
                               absl::StatusOr<JobRecord> found = ParseRow(row);
-                              if (found.ok()) job = *std::move(found);
-                              return found.status();
+                              if (!found.ok()) return found.status();
+                              job = *std::move(found);
+                              return absl::OkStatus();
                             });
   });
   if (!status.ok()) return status;
@@ -71,8 +72,9 @@ absl::StatusOr<std::vector<JobRecord>> JobStore::Unfinished() {
         {static_cast<int64_t>(v1::JOB_STATE_QUEUED), static_cast<int64_t>(v1::JOB_STATE_RUNNING)},
         [&](const SqlRow& row) {
           absl::StatusOr<JobRecord> job = ParseRow(row);
-          if (job.ok()) jobs.push_back(*std::move(job));
-          return job.status();
+          if (!job.ok()) return job.status();
+          jobs.push_back(*std::move(job));
+          return absl::OkStatus();
         });
   });
   if (!status.ok()) return status;

@@ -129,8 +129,9 @@ absl::StatusOr<StoredMesh> MeshStore::Find(const std::string& digest) {
   std::optional<StoredMesh> mesh;
   const absl::Status status = database_->Read([&](SqliteConnection& connection) {
     auto found = Select(connection, digest);
-    if (found.ok()) mesh = *std::move(found);
-    return found.status();
+    if (!found.ok()) return found.status();
+    mesh = *std::move(found);
+    return absl::OkStatus();
   });
   if (!status.ok()) return status;
   if (!mesh.has_value()) return NotFound(digest);
@@ -143,7 +144,7 @@ absl::Status MeshStore::WriteFile(const std::string& digest, const std::filesyst
   NewFile out(file);
   if (!out.is_open()) return CannotWrite(file);
   Sha256 sha;
-  const absl::Status status = database_->Read([&](SqliteConnection& connection) {
+  absl::Status status = database_->Read([&](SqliteConnection& connection) {
     return connection.Query("SELECT data FROM mesh_chunks WHERE digest = ? ORDER BY byte_offset",
                             {digest}, [&](const SqlRow& row) {
                               sha.Update(row.Blob(0));

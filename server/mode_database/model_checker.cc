@@ -101,7 +101,7 @@ absl::Status ModelChecker::CheckHeader(const v1::ModalModelHeader& header) {
   dimensions_['3'] = 3;
   dimensions_['m'] = header.mode_count();
   for (const v1::ArrayDescriptor& array : header.arrays()) {
-    const absl::Status status = CheckArray(array);
+    absl::Status status = CheckArray(array);
     if (!status.ok()) return status;
   }
   for (const ArraySpec& spec : kArrays) {
@@ -165,7 +165,7 @@ absl::Status ModelChecker::CheckChunk(const v1::ModalModelChunk& chunk) {
                                 " is wrong, so its bytes have changed since they were computed: "
                                 "decompose the mesh again, or import the model from a copy"));
   }
-  const absl::Status status = CheckNumbers(array, data);
+  absl::Status status = CheckNumbers(array, data);
   if (!status.ok()) return status;
   offset_ += data.size();
   if (offset_ == byte_counts_[static_cast<size_t>(array_)]) {

@@ -147,7 +147,7 @@ std::string Delimited(const v1::ModalModelRecord& record) {
 }
 
 absl::Status ModelDecoder::Append(const v1::ModalModelRecord& record) {
-  const absl::Status status = checker_.Check(record);
+  absl::Status status = checker_.Check(record);
   if (!status.ok()) return status;
   if (record.has_header()) {
     MakeRoom(record.header());

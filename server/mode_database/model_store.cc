@@ -110,12 +110,11 @@ absl::Status InsertChunk(SqliteConnection& connection, int64_t revision, int64_t
 
 // The label of the revision to be replaced stays; without one, `summary` keeps its own.
 absl::Status RemoveOldRevision(SqliteConnection& connection, ModelSummary& summary) {
-  const absl::Status status = connection.Query("SELECT label FROM models WHERE digest = ?",
-                                               {summary.digest}, [&](const SqlRow& row) {
-                                                 if (!row.Text(0).empty())
-                                                   summary.label = row.Text(0);
-                                                 return absl::OkStatus();
-                                               });
+  absl::Status status = connection.Query("SELECT label FROM models WHERE digest = ?",
+                                         {summary.digest}, [&](const SqlRow& row) {
+                                           if (!row.Text(0).empty()) summary.label = row.Text(0);
+                                           return absl::OkStatus();
+                                         });
   if (!status.ok()) return status;
   return connection.Run("DELETE FROM models WHERE digest = ?", {summary.digest});
 }
@@ -191,7 +190,7 @@ ModelImport& ModelImport::operator=(ModelImport&&) noexcept = default;
 ModelImport::~ModelImport() = default;
 
 absl::Status ModelImport::Append(const v1::ModalModelRecord& record) {
-  const absl::Status status = state_->checker.Check(record);
+  absl::Status status = state_->checker.Check(record);
   if (!status.ok()) return status;
   return state_->file.Append(Delimited(record));
 }

@@ -123,7 +123,7 @@ absl::Status SqliteConnection::Query(const char* sql,
     SQLite::Statement statement(state_->database, sql);
     Bind(statement, parameters);
     while (statement.executeStep()) {
-      const absl::Status status = on_row(Row(statement));
+      absl::Status status = on_row(Row(statement));
       if (!status.ok()) return status;
     }
     return absl::OkStatus();

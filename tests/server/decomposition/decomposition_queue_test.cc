@@ -149,6 +149,7 @@ TEST_F(DecompositionQueueTest, FiftySubmitsAtATimeComputeOnce) {
   MakeQueue(absl::StrCat(kCount, kSucceed));
   std::vector<v1::Job> jobs(50);
   std::vector<std::thread> threads;
+  threads.reserve(jobs.size());
   for (v1::Job& job : jobs) threads.emplace_back([&] { job = SubmitAndAwaitEnd(Request(20'000)); });
   for (std::thread& thread : threads) thread.join();
   for (const v1::Job& job : jobs) {

@@ -41,9 +41,8 @@ TEST(WorkerEvents, RefusesGarbageWithoutKeepingIt) {
       std::string(6, '\xff'),              // a length of no end
       std::string("\x80\x80\x80\x01", 4),  // a length of 2 MiB
       std::string(1, '\0'),                // an event that says nothing
-      "\x04"
-      "text",                      // no protobuf
-      "\x05\x12\x03\x0a\x01\xff",  // a reason that is no UTF-8
+      "\004text",                          // no protobuf
+      "\x05\x12\x03\x0a\x01\xff",          // a reason that is no UTF-8
   };
   for (const std::string& bytes : garbage) {
     WorkerEventReader reader;

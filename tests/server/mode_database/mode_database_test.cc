@@ -190,6 +190,7 @@ TEST_F(ModeDatabaseTest, AModelIsInMemoryOnceHoweverManyAskAtATime) {
   ASSERT_TRUE(Put(a_, SampleModel(10, 100)).ok());
   std::vector<std::shared_ptr<const ModalModel>> found(8);
   std::vector<std::thread> threads;
+  threads.reserve(found.size());
   for (auto& model : found) {
     threads.emplace_back([&] { model = database_->models().Find(a_).value(); });
   }

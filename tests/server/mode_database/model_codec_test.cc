@@ -22,7 +22,7 @@ using Records = std::vector<v1::ModalModelRecord>;
 absl::Status CheckAll(const Records& records) {
   ModelChecker checker;
   for (const v1::ModalModelRecord& record : records) {
-    const absl::Status status = checker.Check(record);
+    absl::Status status = checker.Check(record);
     if (!status.ok()) return status;
   }
   return checker.Finish();
