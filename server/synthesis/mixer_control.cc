@@ -36,7 +36,7 @@ Mixer::Mixer(const MixerSettings& settings)
 Mixer::~Mixer() = default;
 
 absl::StatusOr<BankId> Mixer::Add(std::unique_ptr<OscillatorBank> bank) {
-  const MutexLock lock(control_mutex_);
+  const MutexLock lock(&control_mutex_);
   if (free_slots_.empty()) {
     return Refusal(absl::StatusCode::kResourceExhausted, "TOO_MANY_OBJECTS",
                    absl::StrCat("the mixer holds ", settings_.most_banks,
@@ -52,7 +52,7 @@ absl::StatusOr<BankId> Mixer::Add(std::unique_ptr<OscillatorBank> bank) {
 }
 
 void Mixer::LetRingOut(BankId bank) {
-  const MutexLock lock(control_mutex_);
+  const MutexLock lock(&control_mutex_);
   OwnedBank* owned = Find(bank);
   if (owned == nullptr || owned->leaving) return;
   owned->leaving = true;
@@ -60,7 +60,7 @@ void Mixer::LetRingOut(BankId bank) {
 }
 
 void Mixer::FadeOut(BankId bank) {
-  const MutexLock lock(control_mutex_);
+  const MutexLock lock(&control_mutex_);
   OwnedBank* owned = Find(bank);
   if (owned == nullptr || owned->fading) return;
   owned->leaving = owned->fading = true;
@@ -69,7 +69,7 @@ void Mixer::FadeOut(BankId bank) {
 
 absl::StatusOr<std::unique_ptr<StrikeStream>> Mixer::OpenStream(size_t capacity) {
   auto queue = std::make_shared<StrikeQueue>(capacity);
-  const MutexLock lock(control_mutex_);
+  const MutexLock lock(&control_mutex_);
   if (queues_.size() == settings_.most_streams) {
     return Refusal(absl::StatusCode::kResourceExhausted, "TOO_MANY_STREAMS",
                    absl::StrCat("the mixer serves ", settings_.most_streams,
@@ -82,7 +82,7 @@ absl::StatusOr<std::unique_ptr<StrikeStream>> Mixer::OpenStream(size_t capacity)
 
 void Mixer::CollectGarbage() {
   std::vector<std::unique_ptr<OscillatorBank>> garbage;  // freed outside the lock
-  const MutexLock lock(control_mutex_);
+  const MutexLock lock(&control_mutex_);
   for (Retired retired; retired_.TryPop(retired);) {
     if (retired.queue != nullptr) {
       std::erase_if(queues_, [&](const auto& queue) { return queue.get() == retired.queue; });
