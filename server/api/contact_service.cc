@@ -7,11 +7,11 @@
 #include <utility>
 
 #include "absl/base/thread_annotations.h"
-#include "absl/synchronization/mutex.h"
 #include "proto/error_reason.h"
 #include "server/api/contact_conversion.h"
 #include "server/api/resource_name.h"
 #include "server/api/status_conversion.h"
+#include "server/base/mutex.h"
 
 namespace carillon {
 namespace {
@@ -41,7 +41,7 @@ class ContactReactor final
   void OnWriteDone(bool ok) override {
     std::optional<grpc::Status> end;
     {
-      const absl::MutexLock lock(&mutex_);
+      const MutexLock lock(&mutex_);
       writing_ = false;
       if (!ok) waiting_.reset();
       end = Advance();
@@ -107,7 +107,7 @@ class ContactReactor final
   void Answer() {
     answer_due_ = daemon_.clock.Monotonic() + kAnswerPeriod;
     v1::StreamContactsResponse answer = Snapshot();
-    const absl::MutexLock lock(&mutex_);
+    const MutexLock lock(&mutex_);
     waiting_ = std::move(answer);
     Advance();  // never the end: that comes after the last answer
   }
@@ -131,7 +131,7 @@ class ContactReactor final
   void End(const grpc::Status& status) {
     std::optional<grpc::Status> end;
     {
-      const absl::MutexLock lock(&mutex_);
+      const MutexLock lock(&mutex_);
       end_ = status;
       end = Advance();
     }
@@ -153,7 +153,7 @@ class ContactReactor final
   v1::StreamContactsRequest request_;
   std::unique_ptr<ContactStream> stream_;
   std::chrono::nanoseconds answer_due_{0};
-  absl::Mutex mutex_;
+  Mutex mutex_;
   v1::StreamContactsResponse answer_;  // gRPC's while writing_
   std::optional<v1::StreamContactsResponse> waiting_ ABSL_GUARDED_BY(mutex_);
   std::optional<grpc::Status> end_ ABSL_GUARDED_BY(mutex_);

@@ -7,9 +7,9 @@
 #include <utility>
 
 #include "absl/base/thread_annotations.h"
-#include "absl/synchronization/mutex.h"
 #include "server/api/resource_name.h"
 #include "server/api/unary_call.h"
+#include "server/base/mutex.h"
 
 namespace carillon {
 namespace {
@@ -27,7 +27,7 @@ class JobWatchReactor final : public grpc::ServerWriteReactor<v1::WatchJobRespon
     absl::StatusOr<std::unique_ptr<JobWatch>> watch =
         digest.ok() ? queue.Watch(*digest, [this](const v1::Job& job) { OnChange(job); })
                     : digest.status();
-    const absl::MutexLock lock(&mutex_);
+    const MutexLock lock(&mutex_);
     if (watch.ok()) {
       watch_ = *std::move(watch);
     } else {
@@ -37,7 +37,7 @@ class JobWatchReactor final : public grpc::ServerWriteReactor<v1::WatchJobRespon
   }
 
   void OnWriteDone(bool ok) override {
-    const absl::MutexLock lock(&mutex_);
+    const MutexLock lock(&mutex_);
     writing_ = false;
     if (!ok || cancelled_) return End(grpc::Status::CANCELLED);
     if (HasEnded(response_.job())) return End(grpc::Status::OK);
@@ -45,7 +45,7 @@ class JobWatchReactor final : public grpc::ServerWriteReactor<v1::WatchJobRespon
   }
 
   void OnCancel() override {
-    const absl::MutexLock lock(&mutex_);
+    const MutexLock lock(&mutex_);
     cancelled_ = true;
     if (!writing_) End(grpc::Status::CANCELLED);
   }
@@ -54,7 +54,7 @@ class JobWatchReactor final : public grpc::ServerWriteReactor<v1::WatchJobRespon
 
  private:
   void OnChange(const v1::Job& job) {
-    const absl::MutexLock lock(&mutex_);
+    const MutexLock lock(&mutex_);
     if (!waiting_.empty() && waiting_.back().state() == job.state()) waiting_.pop_back();
     waiting_.push_back(job);
     Next();
@@ -73,7 +73,7 @@ class JobWatchReactor final : public grpc::ServerWriteReactor<v1::WatchJobRespon
     Finish(status);
   }
 
-  absl::Mutex mutex_;
+  Mutex mutex_;
   v1::WatchJobResponse response_;  // gRPC's while writing_
   std::deque<v1::Job> waiting_ ABSL_GUARDED_BY(mutex_);
   bool writing_ ABSL_GUARDED_BY(mutex_) = false;

@@ -5,9 +5,9 @@
 #include <utility>
 
 #include "absl/base/thread_annotations.h"
-#include "absl/synchronization/mutex.h"
 #include "server/api/sample_bytes.h"
 #include "server/api/status_conversion.h"
+#include "server/base/mutex.h"
 
 namespace carillon {
 namespace {
@@ -18,7 +18,7 @@ class ListenCall final : public grpc::ServerWriteReactor<v1::ListenResponse> {
   explicit ListenCall(LiveOutput& output) {
     absl::StatusOr<std::unique_ptr<BlockBroadcast::Listener>> listener =
         output.broadcast().Subscribe([this] { Wake(); });
-    const absl::MutexLock lock(&mutex_);
+    const MutexLock lock(&mutex_);
     if (!listener.ok()) {
       End(ToGrpcStatus(listener.status()));
       return;
@@ -31,14 +31,14 @@ class ListenCall final : public grpc::ServerWriteReactor<v1::ListenResponse> {
   }
 
   void OnWriteDone(bool ok) override {
-    const absl::MutexLock lock(&mutex_);
+    const MutexLock lock(&mutex_);
     writing_ = false;
     if (!ok || cancelled_) return End(grpc::Status::CANCELLED);
     Next();
   }
 
   void OnCancel() override {
-    const absl::MutexLock lock(&mutex_);
+    const MutexLock lock(&mutex_);
     cancelled_ = true;
     if (!writing_) End(grpc::Status::CANCELLED);
   }
@@ -47,7 +47,7 @@ class ListenCall final : public grpc::ServerWriteReactor<v1::ListenResponse> {
 
  private:
   void Wake() {
-    const absl::MutexLock lock(&mutex_);
+    const MutexLock lock(&mutex_);
     Next();
   }
 
@@ -68,7 +68,7 @@ class ListenCall final : public grpc::ServerWriteReactor<v1::ListenResponse> {
     Finish(status);
   }
 
-  absl::Mutex mutex_;
+  Mutex mutex_;
   v1::ListenResponse response_;  // gRPC's while writing_
   bool writing_ ABSL_GUARDED_BY(mutex_) = false;
   bool cancelled_ ABSL_GUARDED_BY(mutex_) = false;

@@ -46,13 +46,13 @@ LiveOutput::LiveOutput(const OutputSettings& settings, Clock& clock, Log log)
 LiveOutput::~LiveOutput() {
   stopping_ = true;
   if (housekeeper_.joinable()) housekeeper_.join();
-  const absl::MutexLock lock(&mutex_);
+  const MutexLock lock(&mutex_);
   if (output_.device) output_.device->Stop();
   look_ahead_.Stop();
 }
 
 absl::Status LiveOutput::Open() {
-  const absl::MutexLock lock(&mutex_);
+  const MutexLock lock(&mutex_);
   absl::StatusOr<OpenedDevice> opened = OpenDevice(settings_.device, settings_.format, clock_);
   if (!opened.ok()) return opened.status();
   output_ = *std::move(opened);
@@ -73,7 +73,7 @@ OutputState LiveOutput::state() const {
   OutputState state;
   state.load = look_ahead_.load();
   state.mixer = mixer_.statistics();
-  const absl::MutexLock lock(&mutex_);
+  const MutexLock lock(&mutex_);
   const AudioDevice& device = *output_.device;
   state.device = device.description();
   state.device_message = output_.message;
@@ -101,13 +101,13 @@ void LiveOutput::KeepHouse() {
 
 void LiveOutput::NotePeak() {
   const std::chrono::nanoseconds now = clock_.Monotonic();
-  const absl::MutexLock lock(&mutex_);
+  const MutexLock lock(&mutex_);
   peaks_.push_back({.time = now, .value = mixer_.TakePeak()});
   while (peaks_.front().time < now - kPeakMemory) peaks_.pop_front();
 }
 
 void LiveOutput::ReplaceDeadDevice() {
-  const absl::MutexLock lock(&mutex_);
+  const MutexLock lock(&mutex_);
   if (output_.device->alive()) return;
   const std::string dead = output_.device->description();
   output_.device->Stop();

@@ -12,11 +12,11 @@
 
 #include "absl/base/thread_annotations.h"
 #include "absl/status/statusor.h"
-#include "absl/synchronization/mutex.h"
 #include "server/audio_device/block_broadcast.h"
 #include "server/audio_device/look_ahead.h"
 #include "server/audio_device/open_device.h"
 #include "server/base/clock.h"
+#include "server/base/mutex.h"
 #include "server/synthesis/mixer.h"
 
 namespace carillon {
@@ -77,7 +77,7 @@ class LiveOutput {
   Mixer mixer_;
   BlockBroadcast broadcast_;
   LookAhead look_ahead_;
-  mutable absl::Mutex mutex_;
+  mutable Mutex mutex_;
   OpenedDevice output_ ABSL_GUARDED_BY(mutex_);
   /// Of devices that died.
   uint64_t earlier_xrun_count_ ABSL_GUARDED_BY(mutex_) = 0;

@@ -3,11 +3,12 @@
 
 #include <deque>
 #include <functional>
+#include <semaphore>
 #include <thread>
 #include <vector>
 
 #include "absl/base/thread_annotations.h"
-#include "absl/synchronization/mutex.h"
+#include "server/base/mutex.h"
 
 namespace carillon {
 
@@ -27,11 +28,12 @@ class WorkPool {
 
  private:
   void Work(int niceness);
-  bool HasWork() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) { return ending_ || !tasks_.empty(); }
+  std::function<void()> Take();
 
-  absl::Mutex mutex_;
+  Mutex mutex_;
   std::deque<std::function<void()>> tasks_ ABSL_GUARDED_BY(mutex_);
-  bool ending_ ABSL_GUARDED_BY(mutex_) = false;
+  /// Counts the tasks, and one for each thread once the pool ends.
+  std::counting_semaphore<> ready_{0};
   std::vector<std::thread> threads_;
 };
 

@@ -19,20 +19,20 @@ absl::Status ObjectExists(uint64_t scene, uint32_t handle) {
 
 absl::Status Scene::Use(uint32_t handle,
                         absl::FunctionRef<absl::Status(const SoundingObject&)> use) const {
-  const absl::ReaderMutexLock lock(&mutex_);
+  const MutexLock lock(&mutex_);
   const auto found = Locate(handle);
   return found.ok() ? use((*found)->second) : found.status();
 }
 
 absl::StatusOr<SoundingObject> Scene::Find(uint32_t handle) const {
-  const absl::ReaderMutexLock lock(&mutex_);
+  const MutexLock lock(&mutex_);
   const auto found = Locate(handle);
   if (!found.ok()) return found.status();
   return (*found)->second;
 }
 
 absl::StatusOr<uint32_t> Scene::ChooseHandle(uint32_t handle) const {
-  const absl::ReaderMutexLock lock(&mutex_);
+  const MutexLock lock(&mutex_);
   if (handle != 0) {
     if (objects_.contains(handle)) return ObjectExists(id_, handle);
     return handle;
@@ -46,27 +46,27 @@ absl::StatusOr<uint32_t> Scene::ChooseHandle(uint32_t handle) const {
 }
 
 absl::Status Scene::Insert(uint32_t handle, SoundingObject object) {
-  const absl::MutexLock lock(&mutex_);
+  const MutexLock lock(&mutex_);
   if (closed_) return SceneNotFound();
   if (!objects_.emplace(handle, std::move(object)).second) return ObjectExists(id_, handle);
   return absl::OkStatus();
 }
 
 absl::StatusOr<SoundingObject> Scene::Replace(uint32_t handle, SoundingObject object) {
-  const absl::MutexLock lock(&mutex_);
+  const MutexLock lock(&mutex_);
   if (const auto found = Locate(handle); !found.ok()) return found.status();
   return std::exchange(objects_[handle], std::move(object));
 }
 
 absl::StatusOr<SoundingObject> Scene::Remove(uint32_t handle) {
-  const absl::MutexLock lock(&mutex_);
+  const MutexLock lock(&mutex_);
   const auto found = Locate(handle);
   if (!found.ok()) return found.status();
   return std::move(objects_.extract(*found).mapped());
 }
 
 std::map<uint32_t, SoundingObject> Scene::Close() {
-  const absl::MutexLock lock(&mutex_);
+  const MutexLock lock(&mutex_);
   closed_ = true;
   return std::exchange(objects_, {});
 }

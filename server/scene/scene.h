@@ -9,14 +9,14 @@
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "absl/synchronization/mutex.h"
+#include "server/base/mutex.h"
 #include "server/scene/sounding_object.h"
 
 namespace carillon {
 
-/// The objects that one client makes sound together. Safe from every thread; contacts read it at
-/// the same time, and what takes an object off the mixer waits for them, so that no strike is sent
-/// to a bank that has been given up.
+/// The objects that one client makes sound together. Safe from every thread; a contact uses
+/// it under its lock, and what takes an object off the mixer waits for that, so that no strike is
+/// sent to a bank that has been given up.
 class Scene {
  public:
   explicit Scene(uint64_t id) : id_(id) {}
@@ -49,11 +49,11 @@ class Scene {
 
  private:
   absl::StatusOr<std::map<uint32_t, SoundingObject>::const_iterator> Locate(uint32_t handle) const
-      ABSL_SHARED_LOCKS_REQUIRED(mutex_);
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   absl::Status SceneNotFound() const;
 
   const uint64_t id_;
-  mutable absl::Mutex mutex_;
+  mutable Mutex mutex_;
   std::map<uint32_t, SoundingObject> objects_ ABSL_GUARDED_BY(mutex_);
   bool closed_ ABSL_GUARDED_BY(mutex_) = false;
 };

@@ -30,7 +30,7 @@ ObjectProperties Changed(ObjectProperties properties, const ObjectChange& change
 }  // namespace
 
 absl::StatusOr<uint64_t> SceneRegistry::CreateScene() {
-  const absl::MutexLock lock(&mutex_);
+  const MutexLock lock(&mutex_);
   if (scenes_.size() >= kMaxSceneCount) {
     return TooMany("TOO_MANY_SCENES", kMaxSceneCount, "scenes");
   }
@@ -40,12 +40,12 @@ absl::StatusOr<uint64_t> SceneRegistry::CreateScene() {
 }
 
 absl::Status SceneRegistry::DeleteScene(uint64_t scene) {
-  const absl::MutexLock change_lock(&change_mutex_);
+  const MutexLock change_lock(&change_mutex_);
   absl::StatusOr<std::shared_ptr<Scene>> found = FindScene(scene);
   if (!found.ok()) return found.status();
   const std::map<uint32_t, SoundingObject> objects = (*found)->Close();
   for (const auto& [handle, object] : objects) mixer_.FadeOut(object.bank);
-  const absl::MutexLock lock(&mutex_);
+  const MutexLock lock(&mutex_);
   scenes_.erase(scene);
   object_count_ -= objects.size();
   return absl::OkStatus();
@@ -54,7 +54,7 @@ absl::Status SceneRegistry::DeleteScene(uint64_t scene) {
 absl::StatusOr<PlacedObject> SceneRegistry::AddObject(uint64_t scene, uint32_t handle,
                                                       std::shared_ptr<const ModalModel> model,
                                                       const ObjectProperties& properties) {
-  const absl::MutexLock change_lock(&change_mutex_);
+  const MutexLock change_lock(&change_mutex_);
   const absl::StatusOr<std::shared_ptr<Scene>> found = FindScene(scene);
   if (!found.ok()) return found.status();
   const absl::StatusOr<uint32_t> chosen = (*found)->ChooseHandle(handle);
@@ -68,14 +68,14 @@ absl::StatusOr<PlacedObject> SceneRegistry::AddObject(uint64_t scene, uint32_t h
   if (!object.ok()) return object.status();
   // Nothing can be in its way: every change holds change_mutex_.
   (*found)->Insert(*chosen, *object).IgnoreError();
-  const absl::MutexLock lock(&mutex_);
+  const MutexLock lock(&mutex_);
   ++object_count_;
   return PlacedObject{.handle = *chosen, .object = *std::move(object)};
 }
 
 absl::StatusOr<PlacedObject> SceneRegistry::UpdateObject(uint64_t scene, uint32_t handle,
                                                          const ObjectChange& change) {
-  const absl::MutexLock change_lock(&change_mutex_);
+  const MutexLock change_lock(&change_mutex_);
   const absl::StatusOr<std::shared_ptr<Scene>> found = FindScene(scene);
   if (!found.ok()) return found.status();
   const absl::StatusOr<SoundingObject> old = (*found)->Find(handle);
@@ -89,13 +89,13 @@ absl::StatusOr<PlacedObject> SceneRegistry::UpdateObject(uint64_t scene, uint32_
 }
 
 absl::Status SceneRegistry::RemoveObject(uint64_t scene, uint32_t handle) {
-  const absl::MutexLock change_lock(&change_mutex_);
+  const MutexLock change_lock(&change_mutex_);
   const absl::StatusOr<std::shared_ptr<Scene>> found = FindScene(scene);
   if (!found.ok()) return found.status();
   const absl::StatusOr<SoundingObject> removed = (*found)->Remove(handle);
   if (!removed.ok()) return removed.status();
   mixer_.FadeOut(removed->bank);
-  const absl::MutexLock lock(&mutex_);
+  const MutexLock lock(&mutex_);
   --object_count_;
   return absl::OkStatus();
 }
@@ -108,12 +108,12 @@ absl::StatusOr<std::unique_ptr<ContactStream>> SceneRegistry::OpenContactStream(
 }
 
 size_t SceneRegistry::object_count() const {
-  const absl::MutexLock lock(&mutex_);
+  const MutexLock lock(&mutex_);
   return object_count_;
 }
 
 absl::StatusOr<std::shared_ptr<Scene>> SceneRegistry::FindScene(uint64_t scene) const {
-  const absl::MutexLock lock(&mutex_);
+  const MutexLock lock(&mutex_);
   if (const auto found = scenes_.find(scene); found != scenes_.end()) return found->second;
   return Refusal(
       absl::StatusCode::kNotFound, "SCENE_NOT_FOUND",

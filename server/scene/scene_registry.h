@@ -8,7 +8,7 @@
 
 #include "absl/base/thread_annotations.h"
 #include "absl/status/statusor.h"
-#include "absl/synchronization/mutex.h"
+#include "server/base/mutex.h"
 #include "server/scene/contact_stream.h"
 #include "server/scene/scene.h"
 #include "server/scene/sounding_body.h"
@@ -75,8 +75,8 @@ class SceneRegistry {
   BodyCache bodies_;
   /// Held while objects come, change and go, so that limits are exact and two changes of one object
   /// do not undo each other. Contacts do not take it.
-  absl::Mutex change_mutex_;
-  mutable absl::Mutex mutex_ ABSL_ACQUIRED_AFTER(change_mutex_);
+  Mutex change_mutex_;
+  mutable Mutex mutex_ ABSL_ACQUIRED_AFTER(change_mutex_);
   std::map<uint64_t, std::shared_ptr<Scene>> scenes_ ABSL_GUARDED_BY(mutex_);
   uint64_t next_scene_ ABSL_GUARDED_BY(mutex_) = 1;
   size_t object_count_ ABSL_GUARDED_BY(mutex_) = 0;

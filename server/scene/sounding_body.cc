@@ -23,7 +23,7 @@ absl::StatusOr<std::shared_ptr<const SoundingBody>> MakeBody(
 
 absl::StatusOr<std::shared_ptr<const SoundingBody>> BodyCache::Get(
     std::shared_ptr<const ModalModel> model) {
-  const absl::MutexLock lock(&mutex_);
+  const MutexLock lock(&mutex_);
   if (const auto found = bodies_.find(model.get()); found != bodies_.end()) {
     if (std::shared_ptr<const SoundingBody> body = found->second.lock()) return body;
   }

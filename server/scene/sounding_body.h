@@ -6,7 +6,7 @@
 
 #include "absl/base/thread_annotations.h"
 #include "absl/status/statusor.h"
-#include "absl/synchronization/mutex.h"
+#include "server/base/mutex.h"
 #include "server/excitation/surface_locator.h"
 #include "server/mode_database/modal_model.h"
 
@@ -26,7 +26,7 @@ class BodyCache {
   absl::StatusOr<std::shared_ptr<const SoundingBody>> Get(std::shared_ptr<const ModalModel> model);
 
  private:
-  absl::Mutex mutex_;
+  Mutex mutex_;
   std::map<const ModalModel*, std::weak_ptr<const SoundingBody>> bodies_ ABSL_GUARDED_BY(mutex_);
 };
 
