@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The real programs for a test: a daemon in a folder of its own, and the command line."""
+
+import os
+import pathlib
+import signal
+import subprocess
+import tempfile
+import unittest
+
+import strike
+
+BIN = pathlib.Path(os.environ["CARILLON_BIN_DIR"])
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+
+
+class Daemon:
+    """carillond on a Unix socket within `folder`, without a sound device."""
+
+    def __init__(self, folder):
+        self.folder = pathlib.Path(folder)
+        self.server = f"unix:{self.folder}/socket"
+        self.process = None
+        self.start()
+
+    def start(self):
+        """Returns once it listens."""
+        with open(self.folder / "log", "ab") as log:
+            self.process = subprocess.Popen(
+                [BIN / "carillond", "--data-dir", self.folder / "data", "--listen", self.server,
+                 "--audio-device", "null"],
+                stdout=subprocess.PIPE, stderr=log, text=True)
+        if not self.process.stdout.readline().startswith("listening on "):
+            raise RuntimeError("carillond did not start: " + (self.folder / "log").read_text())
+
+    def client(self):
+        return strike.Client(self.server)
+
+    def kill(self):
+        """As when the power fails, for this process."""
+        self._end(signal.SIGKILL)
+
+    def stop(self):
+        self._end(signal.SIGTERM)
+        return self.process.returncode
+
+    def _end(self, number):
+        if self.process.poll() is None:
+            self.process.send_signal(number)
+        self.process.wait()
+        self.process.stdout.close()
+
+    def command(self, *arguments, check=True):
+        """Runs `carillon`; returns what subprocess.run does."""
+        return subprocess.run([BIN / "carillon", "--server", self.server, *map(str, arguments)],
+                              capture_output=True, text=True, check=check)
+
+
+class DaemonTest(unittest.TestCase):
+    """Tests of one class share a daemon, which must end well."""
+
+    @classmethod
+    def setUpClass(cls):
+        scratch = tempfile.TemporaryDirectory(prefix="carillon-")
+        cls.addClassCleanup(scratch.cleanup)
+        cls.folder = pathlib.Path(scratch.name)
+        cls.daemon = Daemon(cls.folder)
+        cls.addClassCleanup(cls.stop_daemon)
+        cls.client = cls.daemon.client()
+
+    @classmethod
+    def stop_daemon(cls):
+        status = cls.daemon.stop()
+        if status != 0:
+            raise AssertionError(f"carillond ended with {status}: "
+                                 + (cls.folder / "log").read_text())

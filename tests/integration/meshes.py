@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Small bodies as OBJ files, good and bad ones."""
+
+import math
+
+MATERIAL = "chime_aluminum"
+YOUNG_PA, DENSITY, ALPHA1_S = 6.835179e10, 2700, 1e-7  # of that preset
+
+BOX_FACES = ((0, 2, 1), (0, 3, 2), (4, 5, 6), (4, 6, 7), (0, 1, 5), (0, 5, 4),
+             (1, 2, 6), (1, 6, 5), (2, 3, 7), (2, 7, 6), (3, 0, 4), (3, 4, 7))
+
+
+def obj(vertices, faces):
+    """Vertices as numbers, faces counted from 0."""
+    lines = [f"v {x} {y} {z}" for x, y, z in vertices]
+    lines += ["f " + " ".join(str(i + 1) for i in face) for face in faces]
+    return ("\n".join(lines) + "\n").encode()
+
+
+def box(size, low=(0, 0, 0)):
+    """(vertices, faces) of a box; counter-clockwise from outside."""
+    corners = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))
+    return [tuple(l + s * c for l, s, c in zip(low, size, corner)) for corner in corners], BOX_FACES
+
+
+def joined(*parts):
+    vertices, faces = [], []
+    for part_vertices, part_faces in parts:
+        faces += [tuple(i + len(vertices) for i in face) for face in part_faces]
+        vertices += part_vertices
+    return vertices, faces
+
+
+# A slender free bar, its bending modes in two planes far apart.
+BAR_SIZE = (0.200, 0.016, 0.010)
+
+
+def bar():
+    return obj(*box(BAR_SIZE))
+
+
+def bar_first_bending_hz():
+    """Euler-Bernoulli, free-free, in the thin direction: 4.730041^2/(2 pi L^2) sqrt(E h^2/(12 rho))."""
+    length, _, height = BAR_SIZE
+    return (4.730041**2 / (2 * math.pi * length**2)
+            * math.sqrt(YOUNG_PA * height**2 / (12 * DENSITY)))
+
+
+TUBE_RADIUS = 0.0125
+
+
+def tube(length=0.3, wall=0.001, around=24, along=28):
+    """A chime, centred, about z; its polygon has the circle's area."""
+    angle = 2 * math.pi / around
+    correction = math.sqrt(angle / math.sin(angle))
+    vertices = [
+        (r * correction * math.cos(i * angle), r * correction * math.sin(i * angle),
+         length * (ring / along - 0.5))
+        for r in (TUBE_RADIUS, TUBE_RADIUS - wall) for ring in range(along + 1) for i in range(around)]
+    inner = (along + 1) * around
+    faces = []
+
+    def band(low, high):
+        for i in range(around):
+            j = (i + 1) % around
+            faces.extend(((low + i, low + j, high + j), (low + i, high + j, high + i)))
+
+    for ring in range(along):
+        band(ring * around, (ring + 1) * around)
+        band(inner + (ring + 1) * around, inner + ring * around)
+    band(inner, 0)
+    band(along * around, inner + along * around)
+    return obj(vertices, faces)

@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Contact traces to the daemon's sound, and that sound in numbers."""
+
+import json
+import wave
+from collections import namedtuple
+
+import numpy
+from google.protobuf.internal.encoder import _VarintBytes
+
+from carillon.v1 import contact_pb2, contact_trace_pb2
+
+RATE = 48000
+
+Partial = namedtuple("Partial", "frequency_hz decay_per_s amplitude")
+
+
+def impulse(point, force, handle=1, duration_s=0.0):
+    return contact_pb2.Impulse(
+        object=handle, point_m=contact_pb2.Vec3(x=point[0], y=point[1], z=point[2]),
+        impulse_newton_seconds=contact_pb2.Vec3(x=force[0], y=force[1], z=force[2]),
+        duration_s=duration_s)
+
+
+def write_trace(path, objects, steps):
+    """A trace as any simulator would write it: each record after its length."""
+    record = contact_trace_pb2.ContactTraceRecord
+    header = contact_trace_pb2.ContactTraceHeader(format_version=1, simulator="test", step_s=0.01)
+    records = [record(header=header)]
+    records += [record(object=o) for o in objects]
+    records += [record(step=s) for s in steps]
+    with open(path, "wb") as out:
+        for item in map(record.SerializeToString, records):
+            out.write(_VarintBytes(len(item)) + item)
+
+
+def read_wave(path):
+    """(frames, channels) of a 24-bit WAV file, full scale 1."""
+    with wave.open(str(path), "rb") as file:
+        assert file.getsampwidth() == 3 and file.getframerate() == RATE
+        bytes_ = numpy.frombuffer(file.readframes(file.getnframes()), numpy.uint8)
+        channels = file.getnchannels()
+    words = numpy.zeros((len(bytes_) // 3, 4), numpy.uint8)
+    words[:, 1:] = bytes_.reshape(-1, 3)
+    return words.view("<i4").reshape(-1, channels) / 2**31
+
+
+def render(daemon, objects, steps, tail_s):
+    """Renders through the command line; (samples of the first channel, summary)."""
+    trace, out = daemon.folder / "trace.contacts", daemon.folder / "trace.wav"
+    write_trace(trace, objects, steps)
+    printed = daemon.command("--json", "render", trace, "--out", out, "--sample-rate", RATE,
+                             "--tail", tail_s)
+    return read_wave(out)[:, 0], json.loads(printed.stdout)
+
+
+def measure(samples, frequency_hz, begin_s, end_s, smoothing_s=0.01):
+    """The partial near a frequency of what was struck at time zero.
+
+    Moves it to frequency zero, smooths with a Gaussian, and fits straight lines to the logarithm of
+    the magnitude and to the phase between two times. Partials 100 Hz away are down by 170 dB.
+    """
+    reach = int(5 * smoothing_s * RATE)
+    first, last = int(begin_s * RATE), int(end_s * RATE)
+    assert first >= reach and last + reach <= len(samples)
+    time = numpy.arange(first - reach, last + reach) / RATE
+    moved = samples[first - reach:last + reach] * numpy.exp(-2j * numpy.pi * frequency_hz * time)
+    kernel = numpy.exp(-0.5 * (numpy.arange(-reach, reach + 1) / (smoothing_s * RATE))**2)
+    smooth = numpy.convolve(moved, kernel / kernel.sum(), "valid")
+    time = time[reach:-reach]
+    slope, intercept = numpy.polyfit(time, numpy.log(numpy.abs(smooth)), 1)
+    turning, _ = numpy.polyfit(time, numpy.unwrap(numpy.angle(smooth)), 1)
+    # Smoothing a decaying signal scales it by exp(slope^2 smoothing^2/2).
+    amplitude = 2 * numpy.exp(intercept - (slope * smoothing_s)**2 / 2)
+    return Partial(frequency_hz + turning / (2 * numpy.pi), slope, amplitude)
+
+
+def spectral_peaks_hz(samples, floor_db):
+    """Frequencies of the spectrum's peaks down to `floor_db` below the highest, with parabolas."""
+    spectrum = 20 * numpy.log10(numpy.abs(numpy.fft.rfft(samples * numpy.blackman(len(samples))))
+                                + 1e-30)
+    inner = spectrum[1:-1]
+    peaks = 1 + numpy.flatnonzero((inner > spectrum[:-2]) & (inner >= spectrum[2:])
+                                  & (inner > spectrum.max() + floor_db))
+    left, middle, right = spectrum[peaks - 1], spectrum[peaks], spectrum[peaks + 1]
+    offset = 0.5 * (left - right) / (left - 2 * middle + right)
+    return (peaks + offset) * RATE / len(samples)
+
+
+def level_db(samples):
+    return 10 * numpy.log10(numpy.mean(numpy.square(samples)))
