@@ -76,9 +76,11 @@ def measure(samples, frequency_hz, begin_s, end_s, smoothing_s=0.01):
 
 
 def spectral_peaks_hz(samples, floor_db):
-    """Frequencies of the spectrum's peaks down to `floor_db` below the highest, with parabolas."""
-    spectrum = 20 * numpy.log10(numpy.abs(numpy.fft.rfft(samples * numpy.blackman(len(samples))))
-                                + 1e-30)
+    """Frequencies of the peaks of the spectrum of what was struck at time zero, down to `floor_db`
+    below the highest, with parabolas. The window is the falling half of Blackman's, so that modes
+    that die early count as they began, and a decaying mode has one smooth peak."""
+    window = numpy.blackman(2 * len(samples))[len(samples):]
+    spectrum = 20 * numpy.log10(numpy.abs(numpy.fft.rfft(samples * window)) + 1e-30)
     inner = spectrum[1:-1]
     peaks = 1 + numpy.flatnonzero((inner > spectrum[:-2]) & (inner >= spectrum[2:])
                                   & (inner > spectrum.max() + floor_db))

@@ -18,7 +18,7 @@ class PythonClientTest(DaemonTest):
         printed = subprocess.run(
             [sys.executable, ROOT / "client_sdk/python/strike.py", mesh, "--server",
              self.daemon.server, "--material", meshes.MATERIAL, "--point", "0,0.008,0.01",
-             "--impulse", "0,0,-0.002", "--duration", "0.001", "--seconds", "1.5", "--out", out],
+             "--impulse", "0,0,-0.02", "--duration", "0.001", "--seconds", "1.5", "--out", out],
             capture_output=True, text=True, check=True).stdout
         lowest = float(re.search(r"the lowest at ([0-9.]+) Hz", printed)[1])
         loudest = float(re.search(r"loudest at ([0-9.]+) Hz", printed)[1])
