@@ -23,7 +23,7 @@ namespace carillon {
 
 /// How the daemon plays.
 struct OutputSettings {
-  DeviceFormat format;
+  DeviceFormat format{};
   /// Blocks rendered ahead of the device.
   uint32_t look_ahead_block_count = 8;
   /// As OpenDevice takes it.

@@ -1,0 +1,222 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstring>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "server/api/listen_address.h"
+#include "tests/server/api/served_daemon.h"
+
+namespace carillon {
+namespace {
+
+void AppendSamples(const v1::AudioBlock& block, std::vector<float>& sound) {
+  const size_t old_size = sound.size();
+  sound.resize(old_size + block.samples().size() / sizeof(float));
+  std::memcpy(sound.data() + old_size, block.samples().data(), block.samples().size());
+}
+
+/// Everything from the first sample that is not silent.
+std::vector<float> FromOnset(const std::vector<float>& sound) {
+  return {std::ranges::find_if(sound, [](float x) { return x != 0; }), sound.end()};
+}
+
+class AudioApi : public ServedDaemon {
+ protected:
+  using Requests = std::vector<v1::RenderRequest>;
+
+  struct Rendering {
+    grpc::Status status;
+    v1::AudioFormat format;
+    std::vector<float> sound;
+    v1::RenderSummary summary;
+  };
+
+  /// A trace of one object that is struck at 0.5 s.
+  Requests Trace() {
+    Requests requests(4);
+    requests[0].mutable_settings()->set_tail_s(0.2);
+    requests[1].mutable_record()->mutable_header()->set_format_version(1);
+    v1::ContactTraceObject& object = *requests[2].mutable_record()->mutable_object();
+    object.set_handle(1);
+    object.set_modal_model(ImportSmallModel());
+    *object.mutable_material() = SmallMaterial();
+    v1::ContactStep& step = *requests[3].mutable_record()->mutable_step();
+    step.set_time_s(0.5);
+    *step.add_impulses() = Strike(1);
+    return requests;
+  }
+
+  Rendering Render(const Requests& requests) {
+    Rendering rendering;
+    grpc::ClientContext context;
+    const auto stream = audio->Render(&context);
+    for (const v1::RenderRequest& request : requests) stream->Write(request);
+    stream->WritesDone();
+    v1::RenderResponse response;
+    while (stream->Read(&response)) {
+      if (response.has_format()) rendering.format = response.format();
+      if (response.has_summary()) rendering.summary = response.summary();
+      if (response.has_block()) {
+        EXPECT_EQ(response.block().first_frame(), rendering.sound.size());
+        AppendSamples(response.block(), rendering.sound);
+      }
+    }
+    rendering.status = stream->Finish();
+    return rendering;
+  }
+
+  /// Listens while `act` happens, until a second has been heard after the first sound.
+  std::vector<float> Hear(const std::function<void()>& act) {
+    grpc::ClientContext context;
+    const auto reader = audio->Listen(&context, {});
+    v1::ListenResponse response;
+    EXPECT_TRUE(reader->Read(&response));
+    EXPECT_EQ(response.format().sample_rate_hz(), 48000U);
+    EXPECT_EQ(response.format().channel_count(), 1U);
+    act();
+    std::vector<float> sound;
+    uint64_t next_frame = 0;
+    while (FromOnset(sound).size() < 9600 && reader->Read(&response)) {
+      if (!sound.empty()) {
+        EXPECT_EQ(response.block().first_frame(), next_frame);
+      }
+      AppendSamples(response.block(), sound);
+      next_frame = response.block().first_frame() + response.block().samples().size() / 4;
+    }
+    EXPECT_EQ(response.lost_frame_count(), 0U);
+    context.TryCancel();
+    return sound;
+  }
+};
+
+TEST_F(AudioApi, RenderGivesFormatSoundAndSummary) {
+  const Rendering rendering = Render(Trace());
+  ASSERT_TRUE(rendering.status.ok()) << rendering.status.error_message();
+  EXPECT_EQ(rendering.format.sample_rate_hz(), 48000U);
+  EXPECT_EQ(rendering.format.channel_count(), 1U);
+  EXPECT_EQ(rendering.sound.size(), 0.7 * 48000);
+  EXPECT_EQ(rendering.summary.frame_count(), rendering.sound.size());
+  EXPECT_EQ(rendering.summary.accepted_count(), 1U);
+  EXPECT_EQ(rendering.summary.rejected_count(), 0U);
+  EXPECT_GT(rendering.summary.peak(), 0.001);
+}
+
+TEST_F(AudioApi, AListenerHearsWhatTheMixerRenders) {
+  const std::vector<float> rendered = FromOnset(Render(Trace()).sound);
+  const std::string scene = CreateScene();
+  v1::AddObjectResponse added;
+  ASSERT_TRUE(Add(SmallObject(scene), added).ok());
+  std::vector<float> heard = FromOnset(Hear([&] {
+    grpc::ClientContext context;
+    const auto stream = contacts->StreamContacts(&context);
+    v1::StreamContactsRequest request;
+    request.mutable_start()->set_scene(scene);
+    request.mutable_start()->set_step_s(0.01);
+    request.mutable_start()->set_scheduling_delay_s(0.5);  // as in the trace: the same block phase
+    stream->Write(request);
+    *request.mutable_step()->add_impulses() = Strike(1);
+    stream->Write(request);
+    stream->WritesDone();
+    v1::StreamContactsResponse answer;
+    while (stream->Read(&answer)) {
+    }
+    EXPECT_TRUE(stream->Finish().ok());
+    EXPECT_EQ(answer.accepted_count(), 1U);
+  }));
+  ASSERT_GE(rendered.size(), 9000U);
+  ASSERT_GE(heard.size(), rendered.size());
+  heard.resize(rendered.size());
+  EXPECT_EQ(heard, rendered);
+}
+
+TEST_F(AudioApi, TheNumberOfListenersIsLimited) {
+  std::vector<std::unique_ptr<grpc::ClientContext>> contexts;
+  std::vector<std::unique_ptr<grpc::ClientReader<v1::ListenResponse>>> readers;
+  v1::ListenResponse response;
+  for (size_t i = 0; i < BlockBroadcast::kMaxListenerCount; ++i) {
+    contexts.push_back(std::make_unique<grpc::ClientContext>());
+    readers.push_back(audio->Listen(contexts.back().get(), {}));
+    ASSERT_TRUE(readers.back()->Read(&response));
+  }
+  grpc::ClientContext context;
+  const auto refused = audio->Listen(&context, {});
+  EXPECT_FALSE(refused->Read(&response));
+  ExpectRefused(refused->Finish(), grpc::RESOURCE_EXHAUSTED, "TOO_MANY_LISTENERS");
+  for (const auto& one : contexts) one->TryCancel();
+}
+
+TEST_F(AudioApi, WhatIsNoTraceIsRefused) {
+  const Requests good = Trace();
+  const auto expect = [&](const Requests& requests) {
+    ExpectRefused(Render(requests).status, grpc::INVALID_ARGUMENT, "TRACE_MALFORMED");
+  };
+  expect({});
+  expect({good[0]});
+  expect({good[1], good[2]});           // no settings
+  expect({good[0], good[0], good[1]});  // settings twice
+  expect({good[0], good[2]});           // no header
+  expect({good[0], good[1], good[1]});  // header twice
+  expect({good[0], v1::RenderRequest()});
+  Requests newer = good;
+  newer[1].mutable_record()->mutable_header()->set_format_version(2);
+  expect(newer);
+  Requests backwards = good;
+  backwards.push_back(good[3]);
+  backwards[4].mutable_record()->mutable_step()->set_time_s(0.05);
+  expect(backwards);
+}
+
+TEST_F(AudioApi, SettingsAndObjectsThatCannotBeAreRefusedWithTheirReasons) {
+  const Requests good = Trace();
+  Requests requests = good;
+  requests[0].mutable_settings()->set_sample_rate_hz(1);
+  ExpectRefused(Render(requests).status, grpc::INVALID_ARGUMENT, "INVALID_SETTINGS");
+  requests = good;
+  v1::ContactTraceObject& object = *requests[2].mutable_record()->mutable_object();
+  object.set_modal_model(std::string("modalModels/").append(64, '0'));
+  ExpectRefused(Render(requests).status, grpc::NOT_FOUND, "MODAL_MODEL_NOT_FOUND");
+  object = good[2].record().object();
+  object.mutable_material()->set_poisson_ratio(0.1);
+  ExpectRefused(Render(requests).status, grpc::FAILED_PRECONDITION, "POISSON_RATIO_DIFFERS");
+  requests = good;
+  requests.insert(requests.begin() + 2, good[2]);
+  ExpectRefused(Render(requests).status, grpc::ALREADY_EXISTS, "OBJECT_EXISTS");
+}
+
+TEST_F(AudioApi, ImpulsesThatCannotBeUsedAreCountedAndTheRestIsRendered) {
+  Requests requests = Trace();
+  *requests[3].mutable_record()->mutable_step()->add_impulses() = Strike(2);
+  const Rendering rendering = Render(requests);
+  ASSERT_TRUE(rendering.status.ok());
+  EXPECT_EQ(rendering.summary.accepted_count(), 1U);
+  EXPECT_EQ(rendering.summary.rejected_count(), 1U);
+}
+
+TEST_F(AudioApi, TheMixerSaysHowItPlays) {
+  v1::AddObjectResponse added;
+  ASSERT_TRUE(Add(SmallObject(CreateScene()), added).ok());
+  grpc::ClientContext context;
+  v1::GetMixerResponse mixer;
+  ASSERT_TRUE(audio->GetMixer(&context, {}, &mixer).ok());
+  EXPECT_EQ(mixer.version(), "test");
+  EXPECT_EQ(mixer.device(), "null");
+  EXPECT_EQ(mixer.format().sample_rate_hz(), 48000U);
+  EXPECT_EQ(mixer.block_frame_count(), 128U);
+  EXPECT_DOUBLE_EQ(mixer.output_latency_s(), 8 * 128 / 48000.0);
+  EXPECT_EQ(mixer.object_count(), 1U);
+  EXPECT_GE(mixer.frame_count(), 8U * 128);  // what is rendered ahead before it serves
+  EXPECT_NE(mixer.simd_target(), "");
+}
+
+TEST_F(AudioApi, ASecondDaemonOnTheSameSocketIsRefused) {
+  EXPECT_THAT(PrepareSocket(address().substr(5)).ToString(),
+              testing::HasSubstr("ADDRESS_IN_USE: "));
+}
+
+}  // namespace
+}  // namespace carillon

@@ -1,0 +1,238 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gmock/gmock.h>
+#include <google/protobuf/util/message_differencer.h>
+#include <grpcpp/generic/generic_stub.h>
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "tests/server/api/served_daemon.h"
+
+namespace carillon {
+namespace {
+
+class ModelApi : public ServedDaemon {
+ protected:
+  grpc::Status Upload(const std::vector<std::string>& pieces, v1::UploadMeshResponse& response) {
+    grpc::ClientContext context;
+    const auto writer = models->UploadMesh(&context, &response);
+    for (const std::string& piece : pieces) {
+      v1::UploadMeshRequest request;
+      request.set_data(piece);
+      writer->Write(request);
+    }
+    writer->WritesDone();
+    return writer->Finish();
+  }
+
+  v1::CreateModalModelRequest RequestFor(const std::string& mesh) {
+    v1::UploadMeshResponse uploaded;
+    EXPECT_TRUE(Upload({mesh}, uploaded).ok());
+    v1::CreateModalModelRequest request;
+    request.set_mesh_digest(uploaded.mesh_digest());
+    request.set_mesh_format("obj");
+    request.mutable_material()->set_preset("chime_aluminum");
+    return request;
+  }
+
+  grpc::Status Create(const v1::CreateModalModelRequest& request, v1::Job& job) {
+    grpc::ClientContext context;
+    v1::CreateModalModelResponse response;
+    const grpc::Status status = models->CreateModalModel(&context, request, &response);
+    job = response.job();
+    return status;
+  }
+
+  grpc::Status Import(const std::vector<v1::ModalModelRecord>& records) {
+    grpc::ClientContext context;
+    v1::ImportModalModelResponse response;
+    const auto writer = models->ImportModalModel(&context, &response);
+    v1::ImportModalModelRequest request;
+    request.set_name(std::string("modalModels/").append(64, 'b'));
+    for (const v1::ModalModelRecord& record : records) {
+      *request.mutable_record() = record;
+      writer->Write(request);
+    }
+    writer->WritesDone();
+    return writer->Finish();
+  }
+
+  grpc::Status Export(const std::string& name, std::vector<v1::ModalModelRecord>& records) {
+    grpc::ClientContext context;
+    v1::ExportModalModelRequest request;
+    request.set_name(name);
+    const auto reader = models->ExportModalModel(&context, request);
+    v1::ExportModalModelResponse response;
+    while (reader->Read(&response)) records.push_back(response.record());
+    return reader->Finish();
+  }
+};
+
+TEST_F(ModelApi, AMeshIsStoredUnderTheDigestOfItsBytes) {
+  v1::UploadMeshResponse response;
+  ASSERT_TRUE(Upload({"ab", "c"}, response).ok());
+  EXPECT_EQ(response.mesh_digest(),
+            "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");  // FIPS 180-4
+  EXPECT_EQ(response.byte_count(), 3U);
+}
+
+TEST_F(ModelApi, AnEmptyMeshIsRefused) {
+  v1::UploadMeshResponse response;
+  ExpectRefused(Upload({}, response), grpc::INVALID_ARGUMENT, "MESH_EMPTY");
+  ExpectRefused(Upload({""}, response), grpc::INVALID_ARGUMENT, "MESH_EMPTY");
+}
+
+TEST_F(ModelApi, ARequestThatCannotBeComputedIsRefused) {
+  const v1::CreateModalModelRequest good = RequestFor("mesh");
+  v1::Job job;
+  v1::CreateModalModelRequest request = good;
+  request.set_mesh_digest(std::string(64, '0'));
+  ExpectRefused(Create(request, job), grpc::NOT_FOUND, "MESH_NOT_FOUND");
+  request = good;
+  request.set_mesh_format("doc");
+  ExpectRefused(Create(request, job), grpc::INVALID_ARGUMENT, "MESH_FORMAT_UNKNOWN");
+  request = good;
+  request.mutable_material()->set_preset("cheese");
+  ExpectRefused(Create(request, job), grpc::INVALID_ARGUMENT, "UNKNOWN_MATERIAL");
+  request = good;
+  request.mutable_settings()->set_poisson_ratio(0.5);
+  ExpectRefused(Create(request, job), grpc::INVALID_ARGUMENT, "INVALID_SETTINGS");
+}
+
+TEST_F(ModelApi, AWatchedJobIsSeenUntilItHasEnded) {
+  v1::Job job;
+  ASSERT_TRUE(Create(RequestFor("mesh"), job).ok());
+  grpc::ClientContext context;
+  v1::WatchJobRequest request;
+  request.set_name(job.name());
+  const auto reader = jobs->WatchJob(&context, request);
+  v1::WatchJobResponse seen;
+  int message_count = 0;
+  while (reader->Read(&seen)) ++message_count;
+  EXPECT_TRUE(reader->Finish().ok());
+  EXPECT_GE(message_count, 1);
+  EXPECT_EQ(seen.job().state(), v1::JOB_STATE_FAILED);  // its worker only exits
+  EXPECT_NE(seen.job().error().reason(), "");
+
+  v1::GetJobRequest get;
+  get.set_name(job.name());
+  v1::GetJobResponse got;
+  grpc::ClientContext get_context;
+  ASSERT_TRUE(jobs->GetJob(&get_context, get, &got).ok());
+  EXPECT_EQ(got.job().state(), v1::JOB_STATE_FAILED);
+  v1::ListJobsResponse listed;
+  grpc::ClientContext list_context;
+  ASSERT_TRUE(jobs->ListJobs(&list_context, {}, &listed).ok());
+  ASSERT_EQ(listed.jobs_size(), 1);
+  EXPECT_EQ(listed.jobs(0).name(), job.name());
+}
+
+TEST_F(ModelApi, AJobThatIsNotThereIsNotFound) {
+  for (const std::string& name :
+       {std::string("jobs/").append(64, '0'), std::string("jobs"), std::string()}) {
+    v1::GetJobRequest get;
+    get.set_name(name);
+    v1::GetJobResponse got;
+    grpc::ClientContext get_context;
+    ExpectRefused(jobs->GetJob(&get_context, get, &got), grpc::NOT_FOUND, "JOB_NOT_FOUND");
+    v1::CancelJobRequest cancel;
+    cancel.set_name(name);
+    v1::CancelJobResponse cancelled;
+    grpc::ClientContext cancel_context;
+    ExpectRefused(jobs->CancelJob(&cancel_context, cancel, &cancelled), grpc::NOT_FOUND,
+                  "JOB_NOT_FOUND");
+    v1::WatchJobRequest watch;
+    watch.set_name(name);
+    grpc::ClientContext watch_context;
+    const auto reader = jobs->WatchJob(&watch_context, watch);
+    v1::WatchJobResponse seen;
+    EXPECT_FALSE(reader->Read(&seen));
+    ExpectRefused(reader->Finish(), grpc::NOT_FOUND, "JOB_NOT_FOUND");
+  }
+}
+
+TEST_F(ModelApi, WhatIsImportedIsExportedUnchangedAndListed) {
+  const std::string name = ImportSmallModel();
+  const std::vector<v1::ModalModelRecord> sent = SampleRecords(*SmallModel());
+  std::vector<v1::ModalModelRecord> received;
+  ASSERT_TRUE(Export(name, received).ok());
+  ASSERT_EQ(received.size(), sent.size());
+  for (size_t i = 0; i < sent.size(); ++i) {
+    EXPECT_TRUE(google::protobuf::util::MessageDifferencer::Equals(received[i], sent[i]));
+  }
+  grpc::ClientContext get_context;
+  v1::GetModalModelRequest get;
+  get.set_name(name);
+  v1::GetModalModelResponse got;
+  ASSERT_TRUE(models->GetModalModel(&get_context, get, &got).ok());
+  EXPECT_EQ(got.modal_model().label(), "small");
+  EXPECT_THAT(got.modal_model().eigenvalues(),
+              testing::ElementsAreArray(SmallModel()->eigenvalues));
+  grpc::ClientContext list_context;
+  v1::ListModalModelsResponse listed;
+  ASSERT_TRUE(models->ListModalModels(&list_context, {}, &listed).ok());
+  ASSERT_EQ(listed.modal_models_size(), 1);
+  EXPECT_EQ(listed.modal_models(0).name(), name);
+  EXPECT_EQ(listed.modal_models(0).eigenvalues_size(), 0);
+}
+
+TEST_F(ModelApi, AModelThatIsNotThereIsNotFound) {
+  const std::string name = std::string("modalModels/").append(64, '0');
+  grpc::ClientContext get_context;
+  v1::GetModalModelRequest get;
+  get.set_name(name);
+  v1::GetModalModelResponse got;
+  ExpectRefused(models->GetModalModel(&get_context, get, &got), grpc::NOT_FOUND,
+                "MODAL_MODEL_NOT_FOUND");
+  grpc::ClientContext delete_context;
+  v1::DeleteModalModelRequest remove;
+  remove.set_name(name);
+  v1::DeleteModalModelResponse removed;
+  ExpectRefused(models->DeleteModalModel(&delete_context, remove, &removed), grpc::NOT_FOUND,
+                "MODAL_MODEL_NOT_FOUND");
+  std::vector<v1::ModalModelRecord> records;
+  ExpectRefused(Export(name, records), grpc::NOT_FOUND, "MODAL_MODEL_NOT_FOUND");
+}
+
+TEST_F(ModelApi, ADamagedModelIsRefused) {
+  std::vector<v1::ModalModelRecord> records = SampleRecords(*SmallModel());
+  ExpectRefused(Import({}), grpc::INVALID_ARGUMENT, "MODAL_MODEL_MALFORMED");
+  ExpectRefused(Import({records[0]}), grpc::INVALID_ARGUMENT, "MODAL_MODEL_MALFORMED");
+  records[1].mutable_chunk()->mutable_data()->front() ^= 1;
+  ExpectRefused(Import(records), grpc::DATA_LOSS, "MODAL_MODEL_CORRUPT");
+}
+
+TEST_F(ModelApi, MaterialsAreListed) {
+  grpc::ClientContext context;
+  v1::ListMaterialsResponse response;
+  ASSERT_TRUE(models->ListMaterials(&context, {}, &response).ok());
+  std::vector<std::string> names;
+  for (const v1::CatalogueMaterial& material : response.materials())
+    names.push_back(material.name());
+  EXPECT_THAT(names, testing::Contains("chime_aluminum"));
+}
+
+TEST_F(ModelApi, HealthSaysServing) {
+  grpc::GenericStub stub(channel());
+  grpc::ClientContext context;
+  grpc::CompletionQueue queue;
+  const grpc::Slice empty;  // an empty HealthCheckRequest: the server as a whole
+  const grpc::ByteBuffer request(&empty, 1);
+  grpc::ByteBuffer response;
+  grpc::Status status;
+  const auto call =
+      stub.PrepareUnaryCall(&context, "/grpc.health.v1.Health/Check", request, &queue);
+  call->StartCall();
+  call->Finish(&response, &status, nullptr);
+  void* tag = nullptr;
+  bool ok = false;
+  ASSERT_TRUE(queue.Next(&tag, &ok));
+  ASSERT_TRUE(status.ok()) << status.error_message();
+  grpc::Slice bytes;
+  ASSERT_TRUE(response.DumpToSingleSlice(&bytes).ok());
+  EXPECT_EQ(std::string(bytes.begin(), bytes.end()), "\x08\x01");  // status = SERVING
+}
+
+}  // namespace
+}  // namespace carillon

@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "tests/server/api/served_daemon.h"
+
+namespace carillon {
+namespace {
+
+class SceneApi : public ServedDaemon {
+ protected:
+  using Stream = grpc::ClientReaderWriter<v1::StreamContactsRequest, v1::StreamContactsResponse>;
+
+  static v1::StreamContactsRequest Start(const std::string& scene) {
+    v1::StreamContactsRequest request;
+    request.mutable_start()->set_scene(scene);
+    request.mutable_start()->set_step_s(0.01);
+    return request;
+  }
+
+  /// Sends `requests`, then reads to the end; the last answer stays in `last`.
+  grpc::Status Exchange(const std::vector<v1::StreamContactsRequest>& requests,
+                        v1::StreamContactsResponse& last) {
+    grpc::ClientContext context;
+    const auto stream = contacts->StreamContacts(&context);
+    for (const v1::StreamContactsRequest& request : requests) stream->Write(request);
+    stream->WritesDone();
+    while (stream->Read(&last)) {
+    }
+    return stream->Finish();
+  }
+
+  grpc::Status Remove(const std::string& name) {
+    grpc::ClientContext context;
+    v1::RemoveObjectRequest request;
+    request.set_name(name);
+    v1::RemoveObjectResponse response;
+    return scenes->RemoveObject(&context, request, &response);
+  }
+
+  grpc::Status Update(const v1::UpdateObjectRequest& request, v1::UpdateObjectResponse& response) {
+    grpc::ClientContext context;
+    return scenes->UpdateObject(&context, request, &response);
+  }
+};
+
+TEST_F(SceneApi, AnObjectStatesHowItSounds) {
+  const std::string scene = CreateScene();
+  v1::AddObjectResponse response;
+  ASSERT_TRUE(Add(SmallObject(scene), response).ok());
+  const v1::SoundingObject& object = response.object();
+  EXPECT_EQ(object.name(), scene + "/objects/1");
+  EXPECT_EQ(object.handle(), 1U);
+  EXPECT_EQ(object.size(), 1);
+  EXPECT_EQ(object.gain(), 1);
+  EXPECT_EQ(object.sounding_mode_count(), 3U);
+  EXPECT_NEAR(object.lowest_frequency_hz(), 440, 1e-9);
+  EXPECT_EQ(object.material().poisson_ratio(), 0.33);  // the model's: the material has none
+  EXPECT_FALSE(object.has_complete_to_hz());
+}
+
+TEST_F(SceneApi, AnUpdateAnswersWithTheObjectAsItIsNow) {
+  v1::AddObjectResponse added;
+  ASSERT_TRUE(Add(SmallObject(CreateScene()), added).ok());
+  v1::UpdateObjectRequest request;
+  request.set_name(added.object().name());
+  request.set_size(2);
+  request.set_gain(0.5);
+  v1::UpdateObjectResponse response;
+  ASSERT_TRUE(Update(request, response).ok());
+  EXPECT_EQ(response.object().size(), 2);
+  EXPECT_EQ(response.object().gain(), 0.5);
+  EXPECT_NEAR(response.object().lowest_frequency_hz(), 220, 1e-9);
+}
+
+TEST_F(SceneApi, WhatIsNotThereIsNotFound) {
+  const std::string scene = CreateScene();
+  const v1::AddObjectRequest good = SmallObject(scene);
+  v1::AddObjectResponse added;
+  v1::AddObjectRequest request = good;
+  request.set_scene("scenes/77");
+  ExpectRefused(Add(request, added), grpc::NOT_FOUND, "SCENE_NOT_FOUND");
+  request.set_scene("nonsense");
+  ExpectRefused(Add(request, added), grpc::NOT_FOUND, "SCENE_NOT_FOUND");
+  request = good;
+  request.set_modal_model(std::string("modalModels/").append(64, '0'));
+  ExpectRefused(Add(request, added), grpc::NOT_FOUND, "MODAL_MODEL_NOT_FOUND");
+  ExpectRefused(Remove(scene + "/objects/5"), grpc::NOT_FOUND, "OBJECT_NOT_FOUND");
+  ExpectRefused(Remove(scene), grpc::NOT_FOUND, "OBJECT_NOT_FOUND");
+  v1::UpdateObjectRequest update;
+  update.set_name(scene + "/objects/5");
+  v1::UpdateObjectResponse updated;
+  ExpectRefused(Update(update, updated), grpc::NOT_FOUND, "OBJECT_NOT_FOUND");
+  grpc::ClientContext context;
+  v1::DeleteSceneRequest remove;
+  remove.set_name("scenes/77");
+  v1::DeleteSceneResponse removed;
+  ExpectRefused(scenes->DeleteScene(&context, remove, &removed), grpc::NOT_FOUND,
+                "SCENE_NOT_FOUND");
+}
+
+TEST_F(SceneApi, AnObjectThatCannotSoundIsRefusedWithItsReason) {
+  const v1::AddObjectRequest good = SmallObject(CreateScene());
+  v1::AddObjectResponse response;
+  v1::AddObjectRequest request = good;
+  request.mutable_material()->set_preset("cheese");
+  ExpectRefused(Add(request, response), grpc::INVALID_ARGUMENT, "UNKNOWN_MATERIAL");
+  request = good;
+  request.mutable_material()->set_density_kg_per_m3(-1);
+  ExpectRefused(Add(request, response), grpc::INVALID_ARGUMENT, "INVALID_MATERIAL");
+  request = good;
+  request.set_size(-1);
+  ExpectRefused(Add(request, response), grpc::INVALID_ARGUMENT, "INVALID_OBJECT");
+  request = good;
+  request.mutable_material()->set_poisson_ratio(0.2);
+  ExpectRefused(Add(request, response), grpc::FAILED_PRECONDITION, "POISSON_RATIO_DIFFERS");
+  request = good;
+  request.set_size(0.01);
+  const grpc::Status status = Add(request, response);
+  ExpectRefused(status, grpc::FAILED_PRECONDITION, "NO_MODE_IN_BAND");
+  EXPECT_NEAR(std::stod(ErrorOf(status).metadata().at("first_mode_hz")), 44000, 1);
+  request = good;
+  request.set_handle(3);
+  ASSERT_TRUE(Add(request, response).ok());
+  ExpectRefused(Add(request, response), grpc::ALREADY_EXISTS, "OBJECT_EXISTS");
+}
+
+TEST_F(SceneApi, ContactsAreCountedAndTheLastRejectionSaysWhy) {
+  const std::string scene = CreateScene();
+  v1::AddObjectResponse added;
+  ASSERT_TRUE(Add(SmallObject(scene), added).ok());
+  v1::StreamContactsRequest step;
+  *step.mutable_step()->add_impulses() = Strike(1);
+  *step.mutable_step()->add_impulses() = Strike(99);
+  step.mutable_step()->add_impulses()->set_object(1);  // no location
+  v1::StreamContactsRequest columns;
+  v1::ImpulseColumns& column = *columns.mutable_step()->mutable_columns();
+  for (int i = 0; i < 2; ++i) {
+    column.add_object(1);
+    for (const float x : {0.0F, 0.0F, 0.0F}) column.add_point_m(x);
+    for (const float x : {1.0F, 0.0F, 0.0F}) column.add_impulse_newton_seconds(x);
+  }
+  v1::StreamContactsRequest ragged = columns;
+  ragged.mutable_step()->mutable_columns()->add_point_m(0);
+  v1::StreamContactsResponse last;
+  ASSERT_TRUE(Exchange({Start(scene), step, columns, ragged}, last).ok());
+  EXPECT_EQ(last.step_count(), 3U);
+  // Whether a block was rendered in between is the machine's affair; nothing may be lost.
+  EXPECT_EQ(last.accepted_count() + last.late_count(), 3U);
+  EXPECT_EQ(last.dropped_count(), 0U);
+  EXPECT_EQ(last.rejected_count(), 4U);
+  EXPECT_EQ(last.last_rejection().reason(), "COLUMNS_MISMATCHED");
+  EXPECT_DOUBLE_EQ(last.scheduling_delay_s(), 0.01 + 128 / 48000.0 + 0.005);
+  EXPECT_DOUBLE_EQ(last.output_latency_s(), 8 * 128 / 48000.0);  // the null device adds none
+}
+
+TEST_F(SceneApi, TheFirstAnswerComesBeforeAnyStep) {
+  const std::string scene = CreateScene();
+  grpc::ClientContext context;
+  const auto stream = contacts->StreamContacts(&context);
+  stream->Write(Start(scene));
+  v1::StreamContactsResponse answer;
+  ASSERT_TRUE(stream->Read(&answer));
+  EXPECT_EQ(answer.step_count(), 0U);
+  EXPECT_GT(answer.scheduling_delay_s(), 0);
+  stream->WritesDone();
+  EXPECT_TRUE(stream->Read(&answer));  // once at the end
+  EXPECT_FALSE(stream->Read(&answer));
+  EXPECT_TRUE(stream->Finish().ok());
+}
+
+TEST_F(SceneApi, AStreamOutOfOrderIsRefused) {
+  const std::string scene = CreateScene();
+  v1::StreamContactsRequest step;
+  step.mutable_step()->set_time_s(1);
+  v1::StreamContactsRequest earlier;
+  earlier.mutable_step()->set_time_s(0.5);
+  v1::StreamContactsRequest no_step_s = Start(scene);
+  no_step_s.mutable_start()->clear_step_s();
+  v1::StreamContactsResponse last;
+  ExpectRefused(Exchange({step}, last), grpc::INVALID_ARGUMENT, "STREAM_NOT_STARTED");
+  ExpectRefused(Exchange({Start("scenes/77")}, last), grpc::NOT_FOUND, "SCENE_NOT_FOUND");
+  ExpectRefused(Exchange({Start(scene), Start(scene)}, last), grpc::INVALID_ARGUMENT,
+                "INVALID_STREAM");
+  ExpectRefused(Exchange({Start(scene), step, earlier}, last), grpc::INVALID_ARGUMENT,
+                "INVALID_STREAM");
+  ExpectRefused(Exchange({no_step_s}, last), grpc::INVALID_ARGUMENT, "INVALID_STREAM");
+  ExpectRefused(Exchange({v1::StreamContactsRequest()}, last), grpc::INVALID_ARGUMENT,
+                "INVALID_STREAM");
+}
+
+TEST_F(SceneApi, ASceneOutlivesAStreamThatWasCutOff) {
+  const std::string scene = CreateScene();
+  {
+    grpc::ClientContext context;
+    const auto stream = contacts->StreamContacts(&context);
+    stream->Write(Start(scene));
+    v1::StreamContactsResponse answer;
+    ASSERT_TRUE(stream->Read(&answer));
+    context.TryCancel();
+    EXPECT_EQ(stream->Finish().error_code(), grpc::CANCELLED);
+  }
+  v1::StreamContactsResponse last;
+  EXPECT_TRUE(Exchange({Start(scene)}, last).ok());
+}
+
+}  // namespace
+}  // namespace carillon

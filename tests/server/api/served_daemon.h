@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <gmock/gmock.h>
+#include <grpcpp/grpcpp.h>
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <string>
+
+#include "carillon/v1/audio_service.grpc.pb.h"
+#include "carillon/v1/contact_service.grpc.pb.h"
+#include "carillon/v1/decomposition_service.grpc.pb.h"
+#include "carillon/v1/error.pb.h"
+#include "carillon/v1/modal_model_service.grpc.pb.h"
+#include "carillon/v1/scene_service.grpc.pb.h"
+#include "server/api/api_server.h"
+#include "server/api/live_output.h"
+#include "server/decomposition/local_executor.h"
+#include "tests/server/mode_database/sample_model.h"
+#include "tests/server/scene/small_model.h"
+
+namespace carillon {
+
+/// All rooms of a daemon, on the null device, served on a Unix socket; and clients of it. Its
+/// decompositions fail: the worker is a program that only exits.
+class ServedDaemon : public testing::Test {
+ protected:
+  ServedDaemon() {
+    server_ = *ApiServer::Start({.addresses = {address_},
+                                 .tls_certificate_file = "",
+                                 .tls_key_file = "",
+                                 .version = "test"},
+                                {.database = *database_,
+                                 .decompositions = *queue_,
+                                 .scenes = scenes_,
+                                 .output = *output_,
+                                 .clock = clock_});
+    channel_ = grpc::CreateChannel(address_, grpc::InsecureChannelCredentials());
+    models = v1::ModalModelService::NewStub(channel_);
+    jobs = v1::DecompositionService::NewStub(channel_);
+    scenes = v1::SceneService::NewStub(channel_);
+    contacts = v1::ContactService::NewStub(channel_);
+    audio = v1::AudioService::NewStub(channel_);
+  }
+
+  /// Calls a method with one request and one response; the response stays in `response`.
+  template <typename Stub, typename Request, typename Response>
+  static grpc::Status Call(Stub& stub,
+                           grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&,
+                                                        Response*),
+                           const Request& request, Response& response) {
+    grpc::ClientContext context;
+    return (stub.*method)(&context, request, &response);
+  }
+
+  /// Stores SmallModel and returns its name.
+  std::string ImportSmallModel() {
+    grpc::ClientContext context;
+    v1::ImportModalModelResponse response;
+    const auto writer = models->ImportModalModel(&context, &response);
+    v1::ImportModalModelRequest request;
+    request.set_name("modalModels/" + SmallModel()->digest);
+    request.set_label("small");
+    for (const v1::ModalModelRecord& record : SampleRecords(*SmallModel())) {
+      *request.mutable_record() = record;
+      writer->Write(request);
+    }
+    writer->WritesDone();
+    const grpc::Status status = writer->Finish();
+    EXPECT_TRUE(status.ok()) << status.error_message();
+    return response.modal_model().name();
+  }
+
+  std::string CreateScene() {
+    grpc::ClientContext context;
+    v1::CreateSceneResponse response;
+    EXPECT_TRUE(scenes->CreateScene(&context, {}, &response).ok());
+    return response.name();
+  }
+
+  /// What SmallModel is made of.
+  static v1::Material SmallMaterial() {
+    const ObjectProperties small = SmallProperties();
+    v1::Material material;
+    material.set_young_pa(small.material.young_pa);
+    material.set_density_kg_per_m3(small.material.density_kg_per_m3);
+    material.set_alpha1_s(small.material.alpha1_s);
+    material.set_alpha2_per_s(small.material.alpha2_per_s);
+    return material;
+  }
+
+  v1::AddObjectRequest SmallObject(const std::string& scene) {
+    v1::AddObjectRequest request;
+    request.set_scene(scene);
+    request.set_modal_model(ImportSmallModel());
+    *request.mutable_material() = SmallMaterial();
+    return request;
+  }
+
+  grpc::Status Add(const v1::AddObjectRequest& request, v1::AddObjectResponse& response) {
+    grpc::ClientContext context;
+    return scenes->AddObject(&context, request, &response);
+  }
+
+  /// 1 N s along x at the origin of object `handle`.
+  static v1::Impulse Strike(uint32_t handle) {
+    v1::Impulse impulse;
+    impulse.set_object(handle);
+    impulse.mutable_point_m();
+    impulse.mutable_impulse_newton_seconds()->set_x(1);
+    return impulse;
+  }
+
+  std::unique_ptr<v1::ModalModelService::Stub> models;
+  std::unique_ptr<v1::DecompositionService::Stub> jobs;
+  std::unique_ptr<v1::SceneService::Stub> scenes;
+  std::unique_ptr<v1::ContactService::Stub> contacts;
+  std::unique_ptr<v1::AudioService::Stub> audio;
+  std::shared_ptr<grpc::Channel> channel() { return channel_; }
+  LiveOutput& output() { return *output_; }
+  const std::string& address() const { return address_; }
+
+ private:
+  std::unique_ptr<DecompositionQueue> MakeQueue() {
+    LocalExecutorOptions options;
+    options.program = "/bin/false";
+    options.directory = folder_ / "work";
+    return *DecompositionQueue::Make(*database_, *MakeLocalExecutor(options, clock_), clock_);
+  }
+
+  TemporaryFolder folder_;
+  std::string address_ = "unix:" + (folder_ / "socket").string();
+  SystemClock clock_;
+  std::unique_ptr<ModeDatabase> database_ = *ModeDatabase::Open(folder_ / "carillon.db", clock_);
+  std::unique_ptr<DecompositionQueue> queue_ = MakeQueue();
+  std::unique_ptr<LiveOutput> output_ =
+      *LiveOutput::Start({.device = "null"}, clock_, [](const std::string&) {});
+  SceneRegistry scenes_{output_->mixer()};
+  std::unique_ptr<ApiServer> server_;
+  std::shared_ptr<grpc::Channel> channel_;
+};
+
+/// What the trailing metadata of a refused call says.
+inline v1::ErrorInfo ErrorOf(const grpc::Status& status) {
+  v1::StatusDetails details;
+  v1::ErrorInfo error;
+  EXPECT_TRUE(details.ParseFromString(status.error_details()));
+  EXPECT_EQ(details.code(), status.error_code());
+  EXPECT_EQ(details.message(), status.error_message());
+  EXPECT_EQ(details.details_size(), 1);
+  if (details.details_size() == 1) {
+    EXPECT_TRUE(details.details(0).UnpackTo(&error));
+  }
+  return error;
+}
+
+inline void ExpectRefused(const grpc::Status& status, grpc::StatusCode code, const char* reason) {
+  EXPECT_EQ(status.error_code(), code) << status.error_message();
+  EXPECT_EQ(ErrorOf(status).reason(), reason);
+  EXPECT_NE(ErrorOf(status).message(), "");
+}
+
+}  // namespace carillon

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/options.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "tests/server/mode_database/sample_model.h"
+
+namespace carillon {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+absl::StatusOr<CommandLine> Read(std::vector<const char*> arguments) {
+  arguments.insert(arguments.begin(), "carillond");
+  return ReadCommandLine(static_cast<int>(arguments.size()), arguments.data(), "0");
+}
+
+class OptionsFile : public testing::Test {
+ protected:
+  const char* Write(const std::string& text) {
+    WriteBytes(file_, text);
+    return file_.c_str();
+  }
+
+ private:
+  TemporaryFolder folder_;
+  std::filesystem::path file_ = folder_ / "carillond.toml";
+};
+
+TEST_F(OptionsFile, FlagsWinOverTheFileAndTheFileOverTheDefaults) {
+  const char* file =
+      Write("listen = [\"unix:/a\", \"127.0.0.1:1\"]\nsample_rate = 44100\nblock_frames = 64\n");
+  const absl::StatusOr<CommandLine> command = Read({"--config", file, "--block-frames", "256"});
+  ASSERT_TRUE(command.ok()) << command.status();
+  EXPECT_TRUE(command->run);
+  EXPECT_THAT(command->options.addresses, ElementsAre("unix:/a", "127.0.0.1:1"));
+  EXPECT_EQ(command->options.sample_rate_hz, 44100U);
+  EXPECT_EQ(command->options.block_frame_count, 256U);
+  EXPECT_EQ(command->options.audio_device, "auto");
+}
+
+TEST_F(OptionsFile, ListenMayBeGivenMoreThanOnceAndReplacesTheFiles) {
+  const char* file = Write("listen = \"unix:/a\"\n");
+  const absl::StatusOr<CommandLine> command =
+      Read({"--config", file, "--listen", "unix:/b", "--listen", "127.0.0.1:0"});
+  ASSERT_TRUE(command.ok()) << command.status();
+  EXPECT_THAT(command->options.addresses, ElementsAre("unix:/b", "127.0.0.1:0"));
+}
+
+TEST_F(OptionsFile, WhatTheFileMayNotSayIsRefusedByName) {
+  const auto expect = [&](const char* text, const char* named) {
+    EXPECT_THAT(Read({"--config", Write(text)}).status().ToString(),
+                testing::AllOf(HasSubstr("INVALID_CONFIGURATION: "), HasSubstr(named)));
+  };
+  expect("volume = 11\n", "volume");
+  expect("sample_rate = \"high\"\n", "sample_rate");
+  expect("sample_rate = 100\n", "--sample-rate");
+  expect("block_frames = 4096\n", "--block-frames");
+  expect("listen = []\n", "--listen");
+  expect("tls_key = \"key.pem\"\n", "--tls-certificate");
+  expect("a = \n", "line 1");
+}
+
+TEST(Options, AFileThatIsNotThereIsRefused) {
+  EXPECT_THAT(Read({"--config", "/nonexistent.toml"}).status().ToString(),
+              HasSubstr("INVALID_CONFIGURATION: "));
+}
+
+TEST(Options, VersionAndUnknownFlagsDoNotRun) {
+  testing::internal::CaptureStdout();
+  testing::internal::CaptureStderr();
+  const absl::StatusOr<CommandLine> version = Read({"--version"});
+  const absl::StatusOr<CommandLine> unknown = Read({"--loud"});
+  EXPECT_EQ(testing::internal::GetCapturedStdout(), "carillond 0\n");
+  EXPECT_THAT(testing::internal::GetCapturedStderr(), HasSubstr("--loud"));
+  EXPECT_FALSE(version->run);
+  EXPECT_EQ(version->exit_status, 0);
+  EXPECT_FALSE(unknown->run);
+  EXPECT_NE(unknown->exit_status, 0);
+}
+
+}  // namespace
+}  // namespace carillon
