@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The way through PortAudio to a sound server, on a JACK server of its own without a sound card.
+// Skips, with a reason, where that cannot run.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sndfile.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/api/live_output.h"
+#include "server/scene/scene_registry.h"
+#include "tests/server/audio_device/child.h"
+#include "tests/server/mode_database/sample_model.h"
+#include "tests/server/scene/small_model.h"
+
+namespace carillon {
+namespace {
+
+/// A JACK server that nobody else uses, in real time but without hardware.
+class JackServer {
+ public:
+  JackServer() {
+    setenv("JACK_DEFAULT_SERVER", ("carillon-test-" + std::to_string(getpid())).c_str(), 1);
+    setenv("JACK_NO_AUDIO_RESERVATION", "1", 1);
+    setenv("JACK_NO_START_SERVER", "1", 1);
+    server_.emplace(std::vector<std::string>{"jackd", "-R", "-P", "50", "-d", "dummy", "-r",
+                                             "48000", "-p", "128"});
+    runs_ = Child({"jack_wait", "-w", "-t", "10"}).Wait() == 0;
+  }
+  bool runs() const { return runs_; }
+
+ private:
+  std::optional<Child> server_;
+  bool runs_ = false;
+};
+
+/// Everything that listeners are given from now on.
+class Recorder {
+ public:
+  explicit Recorder(BlockBroadcast& broadcast)
+      : listener_(*broadcast.Subscribe([this] { Drain(); })) {
+    const std::lock_guard lock(mutex_);
+    listening_ = listener_.get();
+  }
+
+  std::vector<float> sound() {
+    const std::lock_guard lock(mutex_);
+    return sound_;
+  }
+
+ private:
+  void Drain() {
+    const std::lock_guard lock(mutex_);
+    if (listening_ == nullptr) return;
+    while (const auto block = listening_->TryTake()) {
+      sound_.insert(sound_.end(), block->samples.begin(), block->samples.end());
+    }
+  }
+
+  std::mutex mutex_;
+  std::vector<float> sound_;
+  BlockBroadcast::Listener* listening_ = nullptr;
+  std::unique_ptr<BlockBroadcast::Listener> listener_;  // last: ends before what Drain touches
+};
+
+/// Strikes of different strength for the next seconds, so that no two pieces are alike.
+void StrikeForAWhile(SceneRegistry& scenes) {
+  const uint64_t scene = *scenes.CreateScene();
+  ASSERT_TRUE(scenes.AddObject(scene, 1, SmallModel(), SmallProperties()).ok());
+  const auto stream = *scenes.OpenContactStream(scene, {.step_s = 0.1});
+  for (int step = 0; step < 60; ++step) {
+    ASSERT_TRUE(stream->BeginStep(0.1 * step).ok());
+    stream->Strike(SmallImpulse(1, 0.5 + 0.01 * step));
+  }
+}
+
+std::vector<float> ReadWav(const std::string& path) {
+  SF_INFO info{};
+  SNDFILE* file = sf_open(path.c_str(), SFM_READ, &info);
+  if (file == nullptr) return {};
+  std::vector<float> samples(static_cast<size_t>(info.frames * info.channels));
+  sf_readf_float(file, samples.data(), info.frames);
+  sf_close(file);
+  return samples;
+}
+
+TEST(JackDevice, PlaysBitForBitWhatListenersHear) {
+  const JackServer jack;
+  if (!jack.runs()) GTEST_SKIP() << "jackd cannot run here: not installed, or no shared memory";
+  const TemporaryFolder folder;
+  SystemClock clock;
+  const auto output =
+      LiveOutput::Start({.device = "portaudio:jack"}, clock, [](const std::string&) {});
+  ASSERT_TRUE(output.ok()) << output.status();
+  EXPECT_THAT((*output)->state().device, testing::HasSubstr("JACK"));
+  EXPECT_GE((*output)->state().latency_s, 9 * 128 / 48000.0);  // look-ahead and a period of JACK
+  Recorder recorder((*output)->broadcast());
+  SceneRegistry scenes((*output)->mixer());
+  StrikeForAWhile(scenes);
+  const std::string file = folder / "capture.wav";
+  if (Child({"jack_capture", "--daemon", "-c", "1", "-b", "FLOAT", "-p", "PortAudio:out_0", "-d",
+             "2", file})
+          .Wait() != 0) {
+    GTEST_SKIP() << "jack_capture cannot run here";
+  }
+  const std::vector<float> captured = ReadWav(file);
+  const std::vector<float> listened = recorder.sound();
+  if (const uint64_t xrun_count = (*output)->state().xrun_count; xrun_count > 0) {
+    GTEST_SKIP() << "this machine is too busy for sound: " << xrun_count << " xruns";
+  }
+  ASSERT_GE(captured.size(), 90000U);
+  // jack_capture sets in at some moment: its first half second says where in what was heard.
+  const auto start =
+      std::search(listened.begin(), listened.end(), captured.begin(), captured.begin() + 24000);
+  ASSERT_NE(start, listened.end()) << "what was captured was never rendered";
+  ASSERT_GE(listened.end() - start, static_cast<ptrdiff_t>(captured.size()));
+  EXPECT_TRUE(std::equal(captured.begin(), captured.end(), start));
+  EXPECT_GT(*std::ranges::max_element(captured), 0.001F);
+}
+
+}  // namespace
+}  // namespace carillon
