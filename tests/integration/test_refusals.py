@@ -33,8 +33,8 @@ BAD_MESHES = {
     "MESH_DUPLICATE_SHELL": meshes.obj(*meshes.joined(BOX, BOX)),
     "MESH_NOT_FINITE": with_vertex(3, ("nan", 0.03, 0)),
     "MESH_INDEX_OUT_OF_RANGE": meshes.obj(BOX[0], BOX[1] + ((0, 1, 99),)),
-    # A grain of half a millimetre rings in the megahertz.
-    "NO_MODE_IN_BAND": meshes.obj(*meshes.box((0.0005, 0.0004, 0.0003))),
+    # A splinter of a millimetre rings at 256 kHz, which no ear hears.
+    "NO_MODE_IN_BAND": meshes.obj(*meshes.box([length / 200 for length in meshes.BAR_SIZE])),
 }
 
 
