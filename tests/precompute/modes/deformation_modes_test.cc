@@ -120,9 +120,10 @@ TEST_P(DeformationModesTest, PiecesThatHangTogetherByAnEdgeAreRefused) {
 INSTANTIATE_TEST_SUITE_P(Cells, DeformationModesTest,
                          ::testing::Values(std::array{4, 3, 2}, std::array{9, 6, 3}));
 
-TEST(PrefersDense, WhereAFifthOfAllModesIsWanted) {
-  EXPECT_TRUE(PrefersDense(3000, 601));
-  EXPECT_FALSE(PrefersDense(30000, 601));
+TEST(PrefersDense, WhereAnEighthOfAllModesIsWantedAndMemoryAllows) {
+  EXPECT_TRUE(PrefersDense(3000, 376));
+  EXPECT_FALSE(PrefersDense(3000, 375));
+  EXPECT_FALSE(PrefersDense(30000, 5000));
 }
 
 TEST(DeformationModes, MoreThanTheStatedLimitAreRefused) {
