@@ -112,10 +112,10 @@ QuadraticStiffness MakeQuadraticStiffness(const TetGeometry& geometry, const Lam
 }
 
 QuadraticMass MakeQuadraticMass(double volume_m3, double density_kg_per_m3, MassSharing sharing) {
-  static const QuadraticMass kUnit = MakeUnitQuadraticMass();
+  static const QuadraticMass unit = MakeUnitQuadraticMass();
   const double mass = volume_m3 * density_kg_per_m3;
-  if (sharing == MassSharing::kConsistent) return mass * kUnit;
-  const QuadraticMass diagonal = kUnit.diagonal().asDiagonal();
+  if (sharing == MassSharing::kConsistent) return mass * unit;
+  const QuadraticMass diagonal = unit.diagonal().asDiagonal();
   return mass / diagonal.trace() * diagonal;
 }
 

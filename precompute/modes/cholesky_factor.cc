@@ -75,7 +75,7 @@ struct CholeskyFactor::Insides {
     return absl::OkStatus();
   }
 
-  void Solve(int system, Eigen::Ref<Eigen::MatrixXd> X) {
+  void Solve(int system, Eigen::Ref<Eigen::MatrixXd>& X) {
     cholmod_dense right{};
     right.nrow = static_cast<size_t>(X.rows());
     right.ncol = static_cast<size_t>(X.cols());

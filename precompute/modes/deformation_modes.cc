@@ -59,7 +59,7 @@ class Solution {
 
   absl::StatusOr<int> CountBelow(double limit) const {
     watch_(SolveStage::kFactor, 0);
-    const absl::StatusOr<int> count =
+    absl::StatusOr<int> count =
         CountEigenvaluesBelow(ordered_.fronts, ordered_.matrix, limit,
                               [this](double done) { watch_(SolveStage::kFactor, done); });
     if (!count.ok()) return count;

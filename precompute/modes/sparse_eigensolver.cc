@@ -39,11 +39,11 @@ class InverseOperator {
  public:
   using Scalar = double;
 
-  InverseOperator(const CholeskyFactor& factor, const Sparse& lower_M,
-                  const SolveProgress& progress, int expected_count)
+  InverseOperator(const CholeskyFactor& factor, const Sparse& mass, const SolveProgress& progress,
+                  int expected_count)
       : factor_(factor), progress_(progress), expected_count_(expected_count) {
     const Permutation P = IntoPivotOrder(factor.order());
-    M_ = lower_M.selfadjointView<Eigen::Lower>().twistedBy(P);
+    M_ = mass.selfadjointView<Eigen::Lower>().twistedBy(P);
   }
 
   Eigen::Index rows() const { return M_.rows(); }
@@ -76,14 +76,14 @@ absl::Status NotConverged(int count) {
 }
 
 /// phi = P^T L^-T y, M-normalised.
-Modes MakeModes(const CholeskyFactor& factor, const Sparse& lower_M, double shift,
+Modes MakeModes(const CholeskyFactor& factor, const Sparse& mass, double shift,
                 const Eigen::VectorXd& nu, Eigen::MatrixXd y) {
   factor.SolveLTransposed(y);
   Modes modes{.eigenvalues = nu.cwiseInverse().array() + shift,
               .shapes = IntoPivotOrder(factor.order()).transpose() * y};
   for (Eigen::Index m = 0; m < modes.shapes.cols(); ++m) {
     auto shape = modes.shapes.col(m);
-    shape /= std::sqrt(shape.dot(lower_M.selfadjointView<Eigen::Lower>() * shape));
+    shape /= std::sqrt(shape.dot(mass.selfadjointView<Eigen::Lower>() * shape));
   }
   return modes;
 }

@@ -17,7 +17,7 @@ double Sampled(double area, double f0, double f1, double f2, int n) {
   for (int i = 0; i < n; ++i) {
     for (int j = 0; j < 2 * (n - i) - 1; ++j) {
       const double row = (i + (j % 2 == 0 ? 1.0 : 2.0) / 3) / n;
-      const double column = (j / 2 + (j % 2 == 0 ? 1.0 : 2.0) / 3) / n;
+      const double column = (std::floor(0.5 * j) + (j % 2 == 0 ? 1.0 : 2.0) / 3) / n;
       sum += std::abs(f0 * (1 - row - column) + f1 * row + f2 * column);
     }
   }

@@ -45,11 +45,11 @@ double SolveResidual(const SystemMatrices& system) {
   x.topRows(rows) = right.cast<Real>();
   factor.value().Solve(x.data());
   const VectorBlock solution = x.topRows(rows).template cast<double>();
-  VectorBlock Kx(rows, kBlockWidth);
-  VectorBlock Mx(rows, kBlockWidth);
-  MultiplyStiffness(ordered.matrix, solution.data(), Kx.data());
-  MultiplyMass(ordered.matrix, solution.data(), Mx.data());
-  return (Kx - shift * Mx - right).norm() / right.norm();
+  VectorBlock elastic(rows, kBlockWidth);
+  VectorBlock inertial(rows, kBlockWidth);
+  MultiplyStiffness(ordered.matrix, solution.data(), elastic.data());
+  MultiplyMass(ordered.matrix, solution.data(), inertial.data());
+  return (elastic - shift * inertial - right).norm() / right.norm();
 }
 
 TEST(Multifrontal, SolvesLinearAndQuadraticSystemsInDouble) {
