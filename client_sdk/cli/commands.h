@@ -60,11 +60,12 @@ absl::Status ShowStatus(const client::Client& daemon, const std::string& server,
 absl::Status CreateModel(const client::Client& daemon, const CreateModelOptions& options,
                          bool json);
 absl::Status ListModels(const client::Client& daemon, bool json);
-/// With the frequencies of `material`, where one is given.
-absl::Status ShowModel(const client::Client& daemon, const std::string& model,
-                       const MaterialFigures& material, bool json);
-absl::Status DeleteModel(const client::Client& daemon, const std::string& model);
-absl::Status WatchJob(const client::Client& daemon, const std::string& job, bool json);
+/// `text` is a name, a label or the first digits of a digest. With the frequencies that `figures`
+/// give, where there are any.
+absl::Status ShowModel(const client::Client& daemon, const std::string& text,
+                       const MaterialFigures& figures, bool json);
+absl::Status DeleteModel(const client::Client& daemon, const std::string& text);
+absl::Status WatchJob(const client::Client& daemon, const std::string& text, bool json);
 absl::Status Strike(const client::Client& daemon, const StrikeOptions& options,
                     const StopSignal& stop, bool json);
 absl::Status Listen(const client::Client& daemon, const ListenOptions& options,

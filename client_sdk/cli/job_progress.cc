@@ -3,6 +3,7 @@
 
 #include <unistd.h>
 
+#include <cmath>
 #include <cstdio>
 #include <string>
 
@@ -57,7 +58,7 @@ double Fraction(const v1::Job& job) {
 
 /// The bar, redrawn in place; the job's label before it.
 void DrawBar(const v1::Job& job) {
-  const int filled = static_cast<int>(Fraction(job) * kBarWidth + 0.5);
+  const int filled = static_cast<int>(std::lround(Fraction(job) * kBarWidth));
   absl::FPrintF(stderr, "\r\033[K%s  [%s%s]  %s", job.label(), std::string(filled, '#'),
                 std::string(kBarWidth - filled, '.'), ProgressText(job));
 }

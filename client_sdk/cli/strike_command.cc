@@ -60,7 +60,7 @@ absl::Status SendImpulse(const client::Client& daemon, const std::string& scene,
   Set(*impulse.mutable_point_m(), options.point_m);
   Set(*impulse.mutable_impulse_newton_seconds(), options.impulse_newton_seconds);
   impulse.set_duration_s(options.duration_s);
-  if (const absl::Status sent = (*stream)->Send(std::move(step)); !sent.ok()) return sent;
+  if (absl::Status sent = (*stream)->Send(std::move(step)); !sent.ok()) return sent;
   const auto report = (*stream)->Finish();
   if (!report.ok()) return report.status();
   if (report->rejected_count() == 0) return absl::OkStatus();
@@ -71,7 +71,7 @@ absl::Status StrikeIn(const client::Client& daemon, const std::string& scene,
                       const StrikeOptions& options, const StopSignal& stop, bool json) {
   const auto object = AddObject(daemon, scene, options);
   if (!object.ok()) return object.status();
-  const absl::Status struck = SendImpulse(daemon, scene, object->handle(), options);
+  absl::Status struck = SendImpulse(daemon, scene, object->handle(), options);
   if (!struck.ok()) return struck;
   if (json) {
     PrintJson(*object);

@@ -33,7 +33,7 @@ absl::StatusOr<WaveFile> WaveFile::Create(const std::string& path, uint32_t samp
                      static_cast<int>(channel_count), static_cast<int>(sample_rate_hz));
   // Its conversion to bool says nothing about the file.
   if (file.error() != SF_ERR_NO_ERROR) return NotWritable(path, file.strError());
-  return WaveFile(std::make_unique<Sound>(Sound{path, std::move(file)}));
+  return WaveFile(std::make_unique<Sound>(Sound{path, file}));
 }
 
 absl::Status WaveFile::Write(std::span<const float> samples) {

@@ -42,7 +42,7 @@ Request Named(const std::string& name) {
 
 }  // namespace
 
-Client::Client(std::string server)
+Client::Client(const std::string& server)
     : stubs_(std::make_unique<Stubs>(
           server, grpc::CreateChannel(server, grpc::InsecureChannelCredentials()))) {}
 Client::Client(Client&&) noexcept = default;

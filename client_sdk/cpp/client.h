@@ -29,7 +29,7 @@ class Client {
  public:
   /// `server` is "unix:PATH" or "HOST:PORT". Connects at the first call, and again when the daemon
   /// comes back.
-  explicit Client(std::string server);
+  explicit Client(const std::string& server);
   Client(Client&&) noexcept;
   Client& operator=(Client&&) noexcept;
   ~Client();

@@ -150,12 +150,12 @@ absl::Status Play(const PlayOptions& options) {
     if (!live) continue;
     // The simulation is ahead of its own time by what this step took; real time is kept here.
     std::this_thread::sleep_until(start + i * std::chrono::duration<double>(WindChimes::kStep_s));
-    if (const absl::Status sent = live->Send(step); !sent.ok()) return sent;
+    if (absl::Status sent = live->Send(step); !sent.ok()) return sent;
   }
   absl::PrintF("%d strikes in %.1f s\n", strike_count, options.seconds);
 
   if (trace) {
-    if (const absl::Status closed = trace->Close(); !closed.ok()) return closed;
+    if (absl::Status closed = trace->Close(); !closed.ok()) return closed;
   }
   if (!live) return absl::OkStatus();
   const auto report = live->Finish();

@@ -28,7 +28,7 @@ class BulletStrikesTest : public testing::Test {
         this);
   }
 
-  ~BulletStrikesTest() override {
+  void TearDown() override {
     for (const auto& body : bodies_) world_.removeRigidBody(body.get());
   }
 

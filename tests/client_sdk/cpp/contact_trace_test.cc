@@ -17,7 +17,7 @@ using testing::HasSubstr;
 /// A file of its own for each test, removed at its end.
 class ContactTrace : public testing::Test {
  protected:
-  ~ContactTrace() override { std::filesystem::remove(path_); }
+  void TearDown() override { std::filesystem::remove(path_); }
 
   void WriteExample() {
     v1::ContactTraceHeader header;
@@ -102,7 +102,7 @@ TEST_F(ContactTrace, IsMalformedWhereverItIsCutOffWithinARecord) {
 TEST_F(ContactTrace, RefusesFilesOfOtherKinds) {
   const std::vector<std::string> foreign = {"", "v 0 0 0\nv 1 0 0\nf 1 2 3\n",
                                             std::string(100, '\0'), std::string(100, '\xff'),
-                                            "RIFF\x24\x00\x00\x00WAVEfmt "};
+                                            "RIFF" + std::string(4, '\0') + "WAVEfmt "};
   for (const std::string& bytes : foreign) {
     Overwrite(bytes);
     EXPECT_THAT(ReadAll().ToString(), HasSubstr("TRACE_MALFORMED: ")) << bytes;
