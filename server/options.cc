@@ -25,7 +25,7 @@ std::string Environment(const char* name) {
 
 /// $STATE_DIRECTORY as systemd sets it, else as the XDG base directories have it.
 std::string DefaultDataDirectory() {
-  if (const std::string state = Environment("STATE_DIRECTORY"); !state.empty()) return state;
+  if (std::string state = Environment("STATE_DIRECTORY"); !state.empty()) return state;
   if (const std::string xdg = Environment("XDG_STATE_HOME"); !xdg.empty()) return xdg + "/carillon";
   return Environment("HOME") + "/.local/state/carillon";
 }

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
 #include "precompute/mesh/text_lines.h"
 
 namespace carillon::precompute {
@@ -43,7 +44,8 @@ absl::Status AppendPoint(const TextLines& lines, Words words, std::string& out) 
                      absl::StrCat("line ", lines.number(), ": a vertex has the coordinate ",
                                   ToAbsl(word), ": give it finite coordinates"));
     }
-    absl::StrAppend(&out, " ", ToAbsl(word));
+    // Written anew: assimp passes over a vertex with a number like ".5".
+    absl::StrAppendFormat(&out, " %.17g", *x);
   }
   out += '\n';
   return absl::OkStatus();

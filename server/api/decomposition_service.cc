@@ -92,8 +92,9 @@ grpc::ServerUnaryReactor* DecompositionService::GetJob(grpc::CallbackServerConte
     const absl::StatusOr<std::string> digest = ParseJobName(request->name());
     if (!digest.ok()) return digest.status();
     absl::StatusOr<v1::Job> job = queue_.Get(*digest);
-    if (job.ok()) *response->mutable_job() = *std::move(job);
-    return job.status();
+    if (!job.ok()) return job.status();
+    *response->mutable_job() = *std::move(job);
+    return absl::OkStatus();
   });
 }
 
@@ -117,8 +118,9 @@ grpc::ServerUnaryReactor* DecompositionService::CancelJob(grpc::CallbackServerCo
     const absl::StatusOr<std::string> digest = ParseJobName(request->name());
     if (!digest.ok()) return digest.status();
     absl::StatusOr<v1::Job> job = queue_.Cancel(*digest);
-    if (job.ok()) *response->mutable_job() = *std::move(job);
-    return job.status();
+    if (!job.ok()) return job.status();
+    *response->mutable_job() = *std::move(job);
+    return absl::OkStatus();
   });
 }
 

@@ -22,8 +22,9 @@ grpc::ServerUnaryReactor* ModalModelService::CreateModalModel(
     v1::CreateModalModelResponse* response) {
   return Answer(context, pool_, [this, request, response] {
     absl::StatusOr<v1::Job> job = queue_.Submit(*request);
-    if (job.ok()) *response->mutable_job() = *std::move(job);
-    return job.status();
+    if (!job.ok()) return job.status();
+    *response->mutable_job() = *std::move(job);
+    return absl::OkStatus();
   });
 }
 

@@ -67,8 +67,9 @@ class MeshSink {
   absl::Status Begin() {
     if (upload_) return absl::OkStatus();
     absl::StatusOr<MeshUpload> upload = meshes_->Begin();
-    if (upload.ok()) upload_ = *std::move(upload);
-    return upload.status();
+    if (!upload.ok()) return upload.status();
+    upload_ = *std::move(upload);
+    return absl::OkStatus();
   }
 
   MeshStore* meshes_;
@@ -100,8 +101,9 @@ class ModelSink {
     absl::string_view digest = first.name();
     absl::ConsumePrefix(&digest, "modalModels/");
     absl::StatusOr<ModelImport> import = models_->Import(std::string(digest), first.label());
-    if (import.ok()) import_ = *std::move(import);
-    return import.status();
+    if (!import.ok()) return import.status();
+    import_ = *std::move(import);
+    return absl::OkStatus();
   }
 
   ModelStore* models_;

@@ -45,8 +45,9 @@ absl::Status TraceReader::TakeSettings(const v1::RenderSettings& settings) {
   if (settings.sample_rate_hz() != 0) sample_rate_hz_ = settings.sample_rate_hz();
   absl::StatusOr<std::unique_ptr<OfflineRenderer>> renderer = OfflineRenderer::Make(
       {.sample_rate_hz = sample_rate_hz_, .tail_s = settings.tail_s()}, bodies_);
-  if (renderer.ok()) renderer_ = *std::move(renderer);
-  return renderer.status();
+  if (!renderer.ok()) return renderer.status();
+  renderer_ = *std::move(renderer);
+  return absl::OkStatus();
 }
 
 absl::Status TraceReader::TakeRecord(const v1::ContactTraceRecord& record) {

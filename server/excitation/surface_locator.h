@@ -44,7 +44,7 @@ class SurfaceLocator {
 
   /// The point of the sounding surface at a point of a given triangle; triangles that lie on that
   /// given triangle are preferred. INVALID_ARGUMENT (TRIANGLE_OUT_OF_RANGE, INVALID_WEIGHTS).
-  absl::StatusOr<LocatedPoint> OnGivenTriangle(const SurfacePoint& point) const;
+  absl::StatusOr<LocatedPoint> OnGivenTriangle(const SurfacePoint& at) const;
 
  private:
   struct Index;

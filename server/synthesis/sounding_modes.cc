@@ -63,6 +63,7 @@ void ShareMean(SoundingMode& first, SoundingMode& second) {
 /// Pairs the closest neighbours first: an ovalling mode of a tube may lie between two pairs.
 void PairDegenerate(std::vector<SoundingMode>& modes, double tolerance) {
   std::vector<SoundingMode*> single;
+  single.reserve(modes.size());
   for (SoundingMode& mode : modes) single.push_back(&mode);
   while (single.size() > 1) {
     std::vector<double> splits;

@@ -21,7 +21,7 @@ std::unique_ptr<OscillatorBank> MakeLastingBank() {
 
 /// Blocks of 128 frames of so many ringing modes; modes_per_core is what one core renders in real
 /// time.
-void BM_Ringing(benchmark::State& state) {
+void Ringing(benchmark::State& state) {
   Mixer mixer;
   const auto stream = mixer.OpenStream().value();
   std::vector<float> block(128);
@@ -38,10 +38,10 @@ void BM_Ringing(benchmark::State& state) {
                          benchmark::Counter::kIsRate);
   state.SetLabel(std::string(SimdTarget()));
 }
-BENCHMARK(BM_Ringing)->Arg(800)->Arg(8000)->Arg(80000);
+BENCHMARK(Ringing)->Arg(800)->Arg(8000)->Arg(80000);
 
 /// Blocks in which so many strikes arrive at a bank of 800 modes, each between two samples.
-void BM_Strikes(benchmark::State& state) {
+void StrikeBlocks(benchmark::State& state) {
   SoundingModes sounding;
   for (uint32_t m = 0; m < 800; ++m) sounding.modes.push_back(MakeMode(m, 24 * (m + 1), -5));
   Mixer mixer;
@@ -62,7 +62,7 @@ void BM_Strikes(benchmark::State& state) {
   }
   state.SetItemsProcessed(state.iterations() * state.range(0));
 }
-BENCHMARK(BM_Strikes)->Arg(0)->Arg(1)->Arg(16)->Arg(256);
+BENCHMARK(StrikeBlocks)->Arg(0)->Arg(1)->Arg(16)->Arg(256);
 
 }  // namespace
 }  // namespace carillon

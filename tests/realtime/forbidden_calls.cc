@@ -29,11 +29,13 @@ size_t ForbiddenCalls::count() const { return call_count; }
 // The program's own definitions come before the C library's, for every library it loads.
 extern "C" {
 
+// NOLINTBEGIN(readability-identifier-naming): the C library named them.
 void* __libc_malloc(size_t size);
 void* __libc_calloc(size_t count, size_t size);
 void* __libc_realloc(void* old, size_t size);
 void* __libc_memalign(size_t alignment, size_t size);
 void __libc_free(void* old);
+// NOLINTEND(readability-identifier-naming)
 
 void* malloc(size_t size) {
   carillon::Note();

@@ -91,6 +91,7 @@ TEST(MixerRealtime, ControlStrikesHousekeepingAndRenderingRunAtOnce) {
     }
   });
   std::vector<std::thread> clients;
+  clients.reserve(2);
   for (int client = 0; client < 2; ++client) {
     clients.emplace_back([&mixer] {
       const auto stream = mixer.OpenStream(64).value();

@@ -82,6 +82,16 @@ TEST_F(ReadSurfaceTest, ObjKeepsItsOrderThroughObjectsGroupsAndMaterials) {
   ExpectSameTriangles(ReadSurfaceOf(text, "obj"), box);
 }
 
+TEST_F(ReadSurfaceTest, NumbersMayBeginWithTheirPoint) {
+  const SurfaceMesh box = MakeBoxSurface({0.5, 0.5, 0.5});
+  std::string text = ToObj(box);
+  for (size_t at = text.find(" 0.5"); at != std::string::npos; at = text.find(" 0.5", at)) {
+    text.erase(at + 1, 1);
+  }
+  ASSERT_NE(text.find(" .5"), std::string::npos);
+  ExpectSameTriangles(ReadSurfaceOf(text, "obj"), box);
+}
+
 TEST_F(ReadSurfaceTest, ObjWithSplitNormalsIsOneSurface) {
   const SurfaceMesh box = MakeBoxSurface({1, 1, 1});
   std::string text = "mtllib none.mtl\nvn 0 0 1\nvt 0 0\ns 1\n";

@@ -39,7 +39,7 @@ class ModelApi : public ServedDaemon {
   grpc::Status Create(const v1::CreateModalModelRequest& request, v1::Job& job) {
     grpc::ClientContext context;
     v1::CreateModalModelResponse response;
-    const grpc::Status status = models->CreateModalModel(&context, request, &response);
+    grpc::Status status = models->CreateModalModel(&context, request, &response);
     job = response.job();
     return status;
   }

@@ -40,7 +40,7 @@ inline std::string ErrorBytes(const std::string& reason) {
 /// to write in $out, the band in $band, and its own files in $here; descriptor 3 takes events.
 inline std::filesystem::path WriteWorkerScript(const std::filesystem::path& folder,
                                                const std::string& body) {
-  const std::filesystem::path script = folder / "worker.sh";
+  std::filesystem::path script = folder / "worker.sh";
   WriteBytes(folder / "worker.new", absl::StrCat("#!/bin/sh\nhere='", folder.string(), R"('
 mesh=$1
 for option; do

@@ -59,7 +59,8 @@ struct Tube {
   /// The half of the strip, below or above its diagonal, in which the triangle's middle lies.
   uint32_t GivenTriangleOf(uint32_t t) const {
     const uint32_t side = t / 2 % kSides;
-    const double z = (t / 2 / kSides + (t % 2 == 0 ? 1.0 / 3 : 2.0 / 3)) / kRings;
+    const uint32_t ring = t / 2 / kSides;
+    const double z = (ring + (t % 2 == 0 ? 1.0 / 3 : 2.0 / 3)) / kRings;
     const double along = t % 2 == 0 ? 2.0 / 3 : 1.0 / 3;
     return 2 * side + (z > along ? 1 : 0);
   }
@@ -139,6 +140,7 @@ TEST(SurfaceLocator, AnswersSeveralThreadsAtOnce) {
   const auto locator = SurfaceLocator::Make(tube.surfaces()).value();
   std::vector<double> distances(4);
   std::vector<std::thread> threads;
+  threads.reserve(distances.size());
   for (double& distance : distances) {
     threads.emplace_back([&] {
       for (int i = 0; i < 200; ++i) distance += locator->Nearest({0, 0.02, 0.002 * i})->distance_m;

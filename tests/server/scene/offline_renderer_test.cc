@@ -56,7 +56,7 @@ class OfflineRendererTest : public testing::Test {
 
 TEST_F(OfflineRendererTest, IsBitForBitTheSameHoweverOftenAndInWhateverPieces) {
   std::vector<std::vector<float>> sounds;
-  for (const size_t blocks_at_a_time : {1, 1, 7, 64}) {
+  for (const size_t blocks_at_a_time : {1U, 1U, 7U, 64U}) {
     const auto renderer = Make();
     StrikeAll(
         [&](double time_s, const ObjectImpulse& impulse) { renderer->Strike(time_s, impulse); });

@@ -117,7 +117,7 @@ TEST_F(MixerTest, OneCallOverManyBlocksGivesTheBitsOfManyCalls) {
   Mixer other;
   const BankId bank = other.Add(MakeBank()).value();
   const auto stream = other.OpenStream(8).value();
-  for (const uint64_t frame : {3, 130, 131, 1000}) {
+  for (const uint64_t frame : {3U, 130U, 131U, 1000U}) {
     Strike(bank_, frame, 0.3F);
     stream->TryPush(
         {.bank = bank, .frame = frame, .fraction = 0.3F, .excitation = MakeUnitExcitation()});
