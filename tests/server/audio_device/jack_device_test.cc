@@ -97,8 +97,8 @@ TEST(JackDevice, PlaysBitForBitWhatListenersHear) {
   if (!jack.runs()) GTEST_SKIP() << "jackd cannot run here: not installed, or no shared memory";
   const TemporaryFolder folder;
   SystemClock clock;
-  const auto output =
-      LiveOutput::Start({.device = "portaudio:jack"}, clock, [](const std::string&) {});
+  const auto output = LiveOutput::Start({.device = "portaudio:JACK Audio Connection Kit"}, clock,
+                                        [](const std::string&) {});
   ASSERT_TRUE(output.ok()) << output.status();
   EXPECT_THAT((*output)->state().device, testing::HasSubstr("JACK"));
   EXPECT_GE((*output)->state().latency_s, 9 * 128 / 48000.0);  // look-ahead and a period of JACK
