@@ -5,7 +5,7 @@
     table2.py CARILLON_PRECOMPUTE [--notes D3,E3] [--quadratic-only]
 
 Every chime goes the way of a user: its surface as an OBJ file through carillon-precompute. Prints a
-Markdown table of base frequencies and a convergence table of linear elements. Exits with 1 where a
+Markdown table of base frequencies. Exits with 1 where a
 frequency with quadratic elements is off by more than 0.5 % from Timoshenko's beam or from a mesh twice
 as fine, or by more than 2 % from the measured column, or where one with linear elements at about the
 paper's number of nodes is off by more than 1.5 % from the computed column.
