@@ -16,7 +16,13 @@ fi
 
 if (($# == 0)); then set -- ./deploy/test.sh ./deploy/demo.sh; fi
 tree=$(mktemp --directory --tmpdir="${TMPDIR:-/var/tmp}" carillon-bare-XXXXXX)
-trap 'umount --recursive --lazy "$tree"/{proc,sys,dev} 2>/dev/null || true; rm -rf --one-file-system "$tree"' EXIT
+# What runs here is all below this script, the first process of its namespace.
+clean_up() {
+  if (($$ == 1)); then kill -KILL -1 2>/dev/null || true; fi
+  umount --recursive --lazy "$tree"/{proc,sys,dev} 2>/dev/null || true
+  rm -rf --one-file-system "$tree"
+}
+trap clean_up EXIT
 chmod 755 "$tree"
 
 # Debian from wherever this machine has it.
