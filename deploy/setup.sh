@@ -1,12 +1,17 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 #
-# Installs what is missing of deploy/packages.txt, from Debian as this machine's apt is set up, and
-# buf, from the npm registry. Calls neither when nothing is missing.
+# deploy/setup.sh [LIST...]
+#
+# Installs what is missing of deploy/packages.txt, and of the further lists of packages given, from
+# Debian as this machine's apt is set up, and buf, from the npm registry. Calls neither when nothing is
+# missing.
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 # shellcheck source=deploy/environment.sh
 source "$root/deploy/environment.sh"
+
+lists=("$root/deploy/packages.txt" "$@")
 
 missing_packages() {
   local -A installed=()
@@ -15,7 +20,7 @@ missing_packages() {
     dpkg-query -W -f '${db:Status-Abbrev} ${Package}\n' 2>/dev/null | sed -n 's/^.i  *//p')
   while read -r name; do
     [[ -n ${installed[$name]:-} ]] || printf '%s\n' "$name"
-  done < <(sed -e 's/#.*//' -e '/^ *$/d' "$root/deploy/packages.txt")
+  done < <(sed -e 's/#.*//' -e '/^ *$/d' "${lists[@]}")
   # Any npm will do, and others than Debian's bring it inside their nodejs.
   [[ -x $CARILLON_BUF ]] || command -v npm >/dev/null || printf 'npm\n'
 }
