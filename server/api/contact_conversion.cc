@@ -21,22 +21,76 @@ SurfacePoint ToSurfacePoint(const v1::SurfacePoint& point) {
           .weights = {1 - point.weight1() - point.weight2(), point.weight1(), point.weight2()}};
 }
 
-absl::StatusOr<ObjectImpulse> FromRow(const v1::Impulse& row) {
-  ObjectImpulse impulse;
-  impulse.handle = row.object();
-  impulse.time_offset_s = row.time_offset_s();
-  impulse.impulse.impulse_newton_seconds = ToArray(row.impulse_newton_seconds());
-  impulse.impulse.duration_s = row.duration_s();
+/// Where a row's contact acts.
+template <typename Row>
+absl::StatusOr<ContactImpulse> FromLocation(const Row& row) {
+  ContactImpulse contact;
   if (row.has_point_m()) {
-    impulse.impulse.location = ToArray(row.point_m());
+    contact.location = ToArray(row.point_m());
   } else if (row.has_surface_point()) {
-    impulse.impulse.location = ToSurfacePoint(row.surface_point());
+    contact.location = ToSurfacePoint(row.surface_point());
   } else {
     return Refusal(absl::StatusCode::kInvalidArgument, "LOCATION_MISSING",
-                   absl::StrCat("an impulse on object ", row.object(),
+                   absl::StrCat("a contact on object ", row.object(),
                                 " has neither point_m nor surface_point"));
   }
-  return impulse;
+  return contact;
+}
+
+HertzContact FromProto(const v1::HertzContact& hertz) {
+  return {.reduced_mass_kg = hertz.reduced_mass_kg(),
+          .reduced_radius_m = hertz.reduced_radius_m(),
+          .approach_speed_m_per_s = hertz.approach_speed_m_per_s(),
+          .striker_young_pa = hertz.striker_young_pa(),
+          .striker_poisson_ratio = hertz.striker_poisson_ratio()};
+}
+
+Roughness FromProto(const v1::Roughness& proto) {
+  Roughness roughness;
+  roughness.travel_speed_m_per_s = proto.travel_speed_m_per_s();
+  roughness.depth = proto.depth();
+  if (proto.grain_m() != 0) roughness.grain_m = proto.grain_m();
+  return roughness;
+}
+
+absl::StatusOr<ObjectImpulse> FromRow(const v1::Impulse& row) {
+  absl::StatusOr<ContactImpulse> contact = FromLocation(row);
+  if (!contact.ok()) return contact.status();
+  contact->impulse_newton_seconds = ToArray(row.impulse_newton_seconds());
+  contact->duration_s = row.duration_s();
+  if (row.has_hertz()) contact->hertz = FromProto(row.hertz());
+  return ObjectImpulse{
+      .handle = row.object(), .time_offset_s = row.time_offset_s(), .impulse = *contact};
+}
+
+absl::StatusOr<ObjectForce> FromRow(const v1::SustainedContact& row) {
+  absl::StatusOr<ContactImpulse> contact = FromLocation(row);
+  if (!contact.ok()) return contact.status();
+  contact->impulse_newton_seconds = ToArray(row.force_newtons());
+  return ObjectForce{
+      .handle = row.object(), .force = *contact, .roughness = FromProto(row.roughness())};
+}
+
+absl::StatusOr<ObjectTouch> FromRow(const v1::EngineContact& row) {
+  absl::StatusOr<ContactImpulse> contact = FromLocation(row);
+  if (!contact.ok()) return contact.status();
+  contact->impulse_newton_seconds = ToArray(row.impulse_newton_seconds());
+  contact->duration_s = row.duration_s();
+  return ObjectTouch{.handle = row.object(),
+                     .partner = row.partner(),
+                     .impulse = *contact,
+                     .roughness = FromProto(row.roughness())};
+}
+
+template <typename Rows, typename Use>
+void ForEachRow(const Rows& rows, const Use& use, const ContactSink& sink) {
+  for (const auto& row : rows) {
+    if (const auto contact = FromRow(row); contact.ok()) {
+      use(*contact);
+    } else {
+      sink.reject(1, contact.status());
+    }
+  }
 }
 
 ObjectImpulse FromColumns(const v1::ImpulseColumns& columns, int row) {
@@ -64,21 +118,16 @@ absl::Status CheckColumns(const v1::ImpulseColumns& columns) {
 
 }  // namespace
 
-void ForEachImpulse(const v1::ContactStep& step, absl::FunctionRef<void(const ObjectImpulse&)> use,
-                    absl::FunctionRef<void(uint64_t, absl::Status)> reject) {
-  for (const v1::Impulse& row : step.impulses()) {
-    if (absl::StatusOr<ObjectImpulse> impulse = FromRow(row); impulse.ok()) {
-      use(*impulse);
-    } else {
-      reject(1, impulse.status());
-    }
-  }
+void ReadStep(const v1::ContactStep& step, const ContactSink& sink) {
+  ForEachRow(step.impulses(), sink.strike, sink);
   const v1::ImpulseColumns& columns = step.columns();
   if (absl::Status status = CheckColumns(columns); !status.ok()) {
-    reject(static_cast<uint64_t>(std::max(1, columns.object_size())), std::move(status));
-    return;
+    sink.reject(static_cast<uint64_t>(std::max(1, columns.object_size())), std::move(status));
+  } else {
+    for (int row = 0; row < columns.object_size(); ++row) sink.strike(FromColumns(columns, row));
   }
-  for (int row = 0; row < columns.object_size(); ++row) use(FromColumns(columns, row));
+  ForEachRow(step.sustained(), sink.hold, sink);
+  ForEachRow(step.contacts(), sink.touch, sink);
 }
 
 }  // namespace carillon

@@ -10,9 +10,16 @@
 
 namespace carillon {
 
-/// Gives `use` every impulse of a step, rows first, and `reject` how many could not be read and why
-/// (LOCATION_MISSING, COLUMNS_MISMATCHED).
-void ForEachImpulse(const v1::ContactStep& step, absl::FunctionRef<void(const ObjectImpulse&)> use,
-                    absl::FunctionRef<void(uint64_t, absl::Status)> reject);
+/// Takes what a step holds.
+struct ContactSink {
+  absl::FunctionRef<void(const ObjectImpulse&)> strike;
+  absl::FunctionRef<void(const ObjectForce&)> hold;
+  absl::FunctionRef<void(const ObjectTouch&)> touch;
+  /// How many contacts could not be read, and why (LOCATION_MISSING, COLUMNS_MISMATCHED).
+  absl::FunctionRef<void(uint64_t, absl::Status)> reject;
+};
+
+/// Gives `sink` every contact of a step: impulses, rows first, then forces, then touches.
+void ReadStep(const v1::ContactStep& step, const ContactSink& sink);
 
 }  // namespace carillon

@@ -88,9 +88,14 @@ class ContactReactor final
                      "the first request of a contact stream must be start");
     }
     if (absl::Status status = stream_->BeginStep(step.time_s()); !status.ok()) return status;
-    ForEachImpulse(
-        step, [this](const ObjectImpulse& impulse) { stream_->Strike(impulse); },
-        [this](uint64_t count, absl::Status reason) { stream_->Reject(count, std::move(reason)); });
+    ReadStep(step, {.strike = [this](const ObjectImpulse& impulse) { stream_->Strike(impulse); },
+                    .hold = [this](const ObjectForce& force) { stream_->Hold(force); },
+                    .touch = [this](const ObjectTouch& touch) { stream_->Touch(touch); },
+                    .reject =
+                        [this](uint64_t count, absl::Status reason) {
+                          stream_->Reject(count, std::move(reason));
+                        }});
+    stream_->EndStep();
     if (daemon_.clock.Monotonic() >= answer_due_) Answer();
     return absl::OkStatus();
   }

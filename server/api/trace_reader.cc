@@ -65,6 +65,7 @@ absl::Status TraceReader::TakeHeader(const v1::ContactTraceHeader& header) {
     return Malformed(absl::StrCat("the trace is of format version ", header.format_version(),
                                   "; this daemon reads ", kFormatVersion));
   }
+  if (header.step_s() > 0 && header.step_s() <= 1) renderer_->SetSimulatorStep(header.step_s());
   has_header_ = true;
   return absl::OkStatus();
 }
@@ -88,15 +89,20 @@ absl::Status TraceReader::TakeStep(const v1::ContactStep& step) {
                                   OfflineRenderer::kMaxTimeS, " s"));
   }
   time_s_ = step.time_s();
-  impulse_count_ += static_cast<uint64_t>(step.impulses_size() + step.columns().object_size());
+  impulse_count_ += static_cast<uint64_t>(step.impulses_size() + step.columns().object_size() +
+                                          step.sustained_size() + step.contacts_size());
   if (impulse_count_ > kMaxImpulseCount) {
     return Refusal(
         absl::StatusCode::kResourceExhausted, "TRACE_TOO_LARGE",
         absl::StrCat("the trace has over ", kMaxImpulseCount, " impulses; render it in pieces"));
   }
-  ForEachImpulse(
-      step, [&](const ObjectImpulse& impulse) { renderer_->Strike(step.time_s(), impulse); },
-      [&](uint64_t count, const absl::Status&) { renderer_->Reject(count); });
+  renderer_->BeginStep(time_s_);
+  ReadStep(step,
+           {.strike = [this](const ObjectImpulse& impulse) { renderer_->Strike(impulse); },
+            .hold = [this](const ObjectForce& force) { renderer_->Hold(force); },
+            .touch = [this](const ObjectTouch& touch) { renderer_->Touch(touch); },
+            .reject = [this](uint64_t count, const absl::Status&) { renderer_->Reject(count); }});
+  renderer_->EndStep();
   return absl::OkStatus();
 }
 

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <variant>
 
 #include "absl/status/status.h"
@@ -18,12 +19,31 @@ struct SurfacePoint {
 /// A point in space, metres.
 using Point = std::array<double, 3>;
 
-/// An impulse on one object, all in the object's frame (and size).
+/// A collision of an object with an elastic striker.
+struct HertzContact {
+  double reduced_mass_kg = 0;
+  double reduced_radius_m = 0;
+  double approach_speed_m_per_s = 0;
+  /// Of the striker; zero: as the object's, and so is its Poisson's ratio.
+  double striker_young_pa = 0;
+  double striker_poisson_ratio = 0;
+};
+
+/// An impulse, or a force, on one object, all in the object's frame (and size).
 struct ContactImpulse {
   /// Where: a point, or a point on a triangle of the surface as given.
   std::variant<Point, SurfacePoint> location;
-  std::array<double, 3> impulse_newton_seconds{};
+  std::array<double, 3> impulse_newton_seconds{};  ///< of a force, N
   double duration_s = 0;
+  /// In place of the duration.
+  std::optional<HertzContact> hertz = std::nullopt;
+};
+
+/// How the force of a contact fluctuates that travels over a surface.
+struct Roughness {
+  double travel_speed_m_per_s = 0;
+  double depth = 0;  ///< root mean square, relative to the force
+  double grain_m = 0.001;
 };
 
 /// The longest contact.
@@ -35,8 +55,19 @@ absl::Status ValidatePoint(const Point& point);
 /// INVALID_ARGUMENT (INVALID_WEIGHTS).
 absl::Status ValidateWeights(const std::array<double, 3>& weights);
 
-/// INVALID_ARGUMENT with IMPULSE_NOT_FINITE, POINT_NOT_FINITE, INVALID_DURATION or INVALID_WEIGHTS.
+/// INVALID_ARGUMENT with IMPULSE_NOT_FINITE, POINT_NOT_FINITE, INVALID_DURATION,
+/// INVALID_HERTZ_CONTACT or INVALID_WEIGHTS.
 absl::Status Validate(const ContactImpulse& contact);
+
+/// INVALID_ARGUMENT (INVALID_ROUGHNESS).
+absl::Status Validate(const Roughness& roughness);
+
+/// How long the bodies touch, seconds (Johnson, Contact Mechanics, 11.4):
+///
+///   T = 2.87 (m^2 / (R E^2 v))^(1/5),  1/E = (1 - nu1^2)/E1 + (1 - nu2^2)/E2
+///
+/// for an object of Young's modulus `young_pa` and Poisson's ratio `poisson_ratio`.
+double HertzDurationS(const HertzContact& contact, double young_pa, double poisson_ratio);
 
 /// Standard deviation of the Gaussian over which a contact of this duration spreads its impulse.
 inline double GaussianTauS(double duration_s) { return duration_s / 4; }

@@ -46,15 +46,16 @@ absl::StatusOr<std::unique_ptr<ContactStream>> ContactStream::Make(
   absl::StatusOr<std::unique_ptr<StrikeStream>> strikes = mixer.OpenStream(kQueueCapacity);
   if (!strikes.ok()) return strikes.status();
   return std::unique_ptr<ContactStream>(
-      new ContactStream(std::move(scene), mixer, *delay_s, *std::move(strikes)));
+      new ContactStream(std::move(scene), mixer, settings.step_s, *delay_s, *std::move(strikes)));
 }
 
-ContactStream::ContactStream(std::shared_ptr<const Scene> scene, Mixer& mixer,
+ContactStream::ContactStream(std::shared_ptr<const Scene> scene, Mixer& mixer, double step_s,
                              double scheduling_delay_s, std::unique_ptr<StrikeStream> strikes)
     : scene_(std::move(scene)),
       mixer_(mixer),
       scheduling_delay_s_(scheduling_delay_s),
-      strikes_(std::move(strikes)) {}
+      strikes_(std::move(strikes)),
+      forces_(step_s) {}
 
 absl::Status ContactStream::BeginStep(double time_s) {
   if (!std::isfinite(time_s)) {
@@ -68,6 +69,7 @@ absl::Status ContactStream::BeginStep(double time_s) {
                                       " s at step ", step_count_,
                                       "; open another stream for another run"));
   }
+  forces_.Begin(time_s, [this](auto... force) { PushForce(force...); });
   time_s_ = time_s;
   ++step_count_;
   return absl::OkStatus();
@@ -82,18 +84,63 @@ void ContactStream::Reject(uint64_t count, absl::Status reason) {
   last_rejection_ = std::move(reason);
 }
 
+void ContactStream::Hold(const ObjectForce& force) {
+  absl::Status status =
+      Locate(force.handle, force.force, force.roughness, [&](const Excitation& excitation) {
+        forces_.Add(force.handle, excitation, force.roughness);
+      });
+  if (!status.ok()) Reject(1, std::move(status));
+}
+
+void ContactStream::Touch(const ObjectTouch& touch) {
+  absl::Status status =
+      Locate(touch.handle, touch.impulse, touch.roughness,
+             [&](const Excitation& excitation) { forces_.Touch(touch, excitation); });
+  if (!status.ok()) Reject(1, std::move(status));
+}
+
+void ContactStream::EndStep() {
+  forces_.End([this](auto... force) { PushForce(force...); });
+}
+
+void ContactStream::PushForce(uint32_t handle, carillon::Strike strike, double time_s) {
+  // An object that has gone meanwhile feels nothing more.
+  scene_
+      ->Use(handle,
+            [&](const SoundingObject& object) {
+              strike.bank = object.bank;
+              Push(strike, FrameOf(time_s));
+              return absl::OkStatus();
+            })
+      .IgnoreError();
+}
+
+absl::Status ContactStream::Locate(uint32_t handle, const ContactImpulse& contact,
+                                   const Roughness& roughness,
+                                   absl::FunctionRef<void(const Excitation&)> use) const {
+  if (absl::Status status = Validate(roughness); !status.ok()) return status;
+  return scene_->Use(handle, [&](const SoundingObject& object) -> absl::Status {
+    const absl::StatusOr<Excitation> excitation = LocateImpulse(object, contact);
+    if (excitation.ok()) use(*excitation);
+    return excitation.status();
+  });
+}
+
 absl::Status ContactStream::TryStrike(const ObjectImpulse& impulse) {
   const absl::StatusOr<double> frame = FrameAt(time_s_ + impulse.time_offset_s);
   if (!frame.ok()) return frame.status();
   return scene_->Use(impulse.handle, [&](const SoundingObject& object) -> absl::Status {
-    absl::StatusOr<Excitation> excitation = LocateImpulse(object, impulse.impulse);
+    const absl::StatusOr<Excitation> excitation = LocateImpulse(object, impulse.impulse);
     if (!excitation.ok()) return excitation.status();
-    carillon::Strike strike{.bank = object.bank, .excitation = *excitation};
-    SetFrame(strike, *frame);
-    ++pushed_count_;
-    strikes_->TryPush(strike);  // a full queue is counted by the mixer
+    Push({.bank = object.bank, .excitation = *excitation}, *frame);
     return absl::OkStatus();
   });
+}
+
+void ContactStream::Push(carillon::Strike strike, double frame) {
+  SetFrame(strike, frame);
+  if (strike.kind == StrikeKind::kImpulse) ++pushed_count_;
+  strikes_->TryPush(strike);  // a full queue is counted by the mixer
 }
 
 absl::StatusOr<double> ContactStream::FrameAt(double time_s) const {
@@ -102,16 +149,20 @@ absl::StatusOr<double> ContactStream::FrameAt(double time_s) const {
                    absl::StrCat("the impulse lies ", time_s - time_s_,
                                 " s after its step; it must be zero or more"));
   }
-  const double rate = mixer_.settings().sample_rate_hz;
-  const double frame =
-      static_cast<double>(first_frame_) + (time_s - *first_time_s_ + scheduling_delay_s_) * rate;
-  const double ahead_s = (frame - static_cast<double>(mixer_.frame())) / rate;
+  const double frame = FrameOf(time_s);
+  const double ahead_s =
+      (frame - static_cast<double>(mixer_.frame())) / mixer_.settings().sample_rate_hz;
   if (ahead_s > kMaxAheadS + scheduling_delay_s_) {
     return Refusal(absl::StatusCode::kInvalidArgument, "TIME_TOO_FAR_AHEAD",
                    absl::StrCat("the impulse is due in ", ahead_s, " s, over ", kMaxAheadS,
                                 " s ahead; send steps as they happen, or render a trace offline"));
   }
   return frame;
+}
+
+double ContactStream::FrameOf(double time_s) const {
+  return static_cast<double>(first_frame_) +
+         (time_s - *first_time_s_ + scheduling_delay_s_) * mixer_.settings().sample_rate_hz;
 }
 
 ContactCounts ContactStream::counts() const {

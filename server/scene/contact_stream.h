@@ -6,9 +6,11 @@
 #include <optional>
 #include <span>
 
+#include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "server/excitation/contact.h"
+#include "server/scene/contact_forces.h"
 #include "server/scene/scene.h"
 #include "server/synthesis/mixer.h"
 
@@ -59,6 +61,14 @@ class ContactStream {
   /// An impulse of that step. Where it cannot be used it is counted as rejected and says why.
   void Strike(const ObjectImpulse& impulse);
 
+  /// A force that lasts, in that step, and a contact that may be a blow or a load. Both must be
+  /// said again in each step until they end. Rejected as an impulse is.
+  void Hold(const ObjectForce& force);
+  void Touch(const ObjectTouch& touch);
+
+  /// Ends the step: its forces are all known.
+  void EndStep();
+
   /// Counts `count` impulses that could not even be read.
   void Reject(uint64_t count, absl::Status reason);
 
@@ -74,11 +84,16 @@ class ContactStream {
   const absl::Status& last_rejection() const { return last_rejection_; }
 
  private:
-  ContactStream(std::shared_ptr<const Scene> scene, Mixer& mixer, double scheduling_delay_s,
-                std::unique_ptr<StrikeStream> strikes);
+  ContactStream(std::shared_ptr<const Scene> scene, Mixer& mixer, double step_s,
+                double scheduling_delay_s, std::unique_ptr<StrikeStream> strikes);
 
   absl::Status TryStrike(const ObjectImpulse& impulse);
+  absl::Status Locate(uint32_t handle, const ContactImpulse& contact, const Roughness& roughness,
+                      absl::FunctionRef<void(const Excitation&)> use) const;
+  void Push(carillon::Strike strike, double frame);
+  void PushForce(uint32_t handle, carillon::Strike strike, double time_s);
   absl::StatusOr<double> FrameAt(double time_s) const;
+  double FrameOf(double time_s) const;
 
   std::shared_ptr<const Scene> scene_;
   Mixer& mixer_;
@@ -86,6 +101,7 @@ class ContactStream {
   std::unique_ptr<StrikeStream> strikes_;
   std::optional<double> first_time_s_;
   double time_s_ = 0;
+  ContactForces forces_;
   uint64_t first_frame_ = 0;
   uint64_t step_count_ = 0;
   uint64_t pushed_count_ = 0;

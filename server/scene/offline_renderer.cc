@@ -76,23 +76,57 @@ absl::Status OfflineRenderer::AddObject(uint32_t handle, std::shared_ptr<const M
   return absl::OkStatus();
 }
 
-void OfflineRenderer::Strike(double time_s, const ObjectImpulse& impulse) {
-  if (!TryStrike(time_s, impulse).ok()) Reject(1);
+void OfflineRenderer::Strike(const ObjectImpulse& impulse) {
+  if (!TryStrike(impulse).ok()) Reject(1);
 }
 
-absl::Status OfflineRenderer::TryStrike(double time_s, const ObjectImpulse& impulse) {
-  const double due_s = time_s + impulse.time_offset_s;
-  const auto found = objects_.find(impulse.handle);
-  if (found == objects_.end() ||
-      !(impulse.time_offset_s >= 0 && due_s >= 0 && due_s <= kMaxTimeS)) {
-    return absl::InvalidArgumentError("no such object, or no such time");
+absl::Status OfflineRenderer::TryStrike(const ObjectImpulse& impulse) {
+  const double due_s = step_time_s_ + impulse.time_offset_s;
+  if (!(impulse.time_offset_s >= 0 && due_s >= 0 && due_s <= kMaxTimeS)) {
+    return absl::InvalidArgumentError("no such time");
   }
-  absl::StatusOr<Excitation> excitation = LocateImpulse(found->second, impulse.impulse);
+  absl::StatusOr<Excitation> excitation = Locate(impulse.handle, impulse.impulse);
   if (!excitation.ok()) return excitation.status();
-  carillon::Strike strike{.bank = found->second.bank, .excitation = *excitation};
-  SetFrame(strike, due_s * settings_.sample_rate_hz);
-  strikes_.push_back(strike);
+  Push({.bank = objects_.at(impulse.handle).bank, .excitation = *excitation}, due_s);
   return absl::OkStatus();
+}
+
+void OfflineRenderer::BeginStep(double time_s) {
+  step_time_s_ = time_s;
+  forces_.Begin(time_s, [this](auto... force) { PushForce(force...); });
+}
+
+void OfflineRenderer::Hold(const ObjectForce& force) {
+  const absl::StatusOr<Excitation> excitation = Locate(force.handle, force.force);
+  if (!excitation.ok() || !Validate(force.roughness).ok()) return Reject(1);
+  forces_.Add(force.handle, *excitation, force.roughness);
+}
+
+void OfflineRenderer::Touch(const ObjectTouch& touch) {
+  const absl::StatusOr<Excitation> excitation = Locate(touch.handle, touch.impulse);
+  if (!excitation.ok() || !Validate(touch.roughness).ok()) return Reject(1);
+  forces_.Touch(touch, *excitation);
+}
+
+void OfflineRenderer::EndStep() {
+  forces_.End([this](auto... force) { PushForce(force...); });
+}
+
+void OfflineRenderer::PushForce(uint32_t handle, carillon::Strike strike, double time_s) {
+  strike.bank = objects_.at(handle).bank;
+  Push(strike, time_s);
+}
+
+absl::StatusOr<Excitation> OfflineRenderer::Locate(uint32_t handle,
+                                                   const ContactImpulse& contact) const {
+  const auto found = objects_.find(handle);
+  if (found == objects_.end()) return absl::InvalidArgumentError("no such object");
+  return LocateImpulse(found->second, contact);
+}
+
+void OfflineRenderer::Push(carillon::Strike strike, double time_s) {
+  SetFrame(strike, time_s * settings_.sample_rate_hz);
+  strikes_.push_back(strike);
 }
 
 size_t OfflineRenderer::Render(std::span<float> frames) {

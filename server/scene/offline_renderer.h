@@ -51,9 +51,21 @@ class OfflineRenderer {
   absl::Status AddObject(uint32_t handle, std::shared_ptr<const ModalModel> model,
                          const ObjectProperties& properties);
 
-  /// An impulse of the step at simulation time `time_s`. Where it cannot be used it is counted as
-  /// rejected.
-  void Strike(double time_s, const ObjectImpulse& impulse);
+  /// Says the simulator's step, seconds, above 0 and at most 1; without this, 1/60. Before all
+  /// steps.
+  void SetSimulatorStep(double step_s) { forces_ = ContactForces(step_s); }
+
+  /// Begins the step at simulation time `time_s`, which does not go back.
+  void BeginStep(double time_s);
+
+  /// An impulse of that step, a force that lasts, and a contact that may be a blow or a load. Where
+  /// it cannot be used it is counted as rejected.
+  void Strike(const ObjectImpulse& impulse);
+  void Hold(const ObjectForce& force);
+  void Touch(const ObjectTouch& touch);
+
+  /// Ends the step: its forces are all known.
+  void EndStep();
 
   /// Counts `count` impulses that could not be used.
   void Reject(uint64_t count) { summary_.rejected_count += count; }
@@ -68,7 +80,10 @@ class OfflineRenderer {
  private:
   OfflineRenderer(const OfflineSettings& settings, BodyCache& bodies);
 
-  absl::Status TryStrike(double time_s, const ObjectImpulse& impulse);
+  absl::Status TryStrike(const ObjectImpulse& impulse);
+  absl::StatusOr<Excitation> Locate(uint32_t handle, const ContactImpulse& contact) const;
+  void Push(carillon::Strike strike, double time_s);
+  void PushForce(uint32_t handle, carillon::Strike strike, double time_s);
   void PushStrikesBefore(uint64_t frame);
   size_t RenderBlock(std::span<float> block);
   bool TailEnded(std::span<const float> block);
@@ -79,6 +94,8 @@ class OfflineRenderer {
   std::unique_ptr<StrikeStream> stream_;
   std::map<uint32_t, SoundingObject> objects_;
   std::vector<carillon::Strike> strikes_;  // in order of time once rendering has begun
+  ContactForces forces_{1.0 / 60};
+  double step_time_s_ = 0;
   size_t pushed_count_ = 0;
   uint64_t quiet_frame_count_ = 0;
   bool begun_ = false;

@@ -71,6 +71,13 @@ std::optional<double> CompleteTo(const ModalModel& model, const SoundingMaterial
   return complete_hz;
 }
 
+double DurationS(const SoundingObject& object, const ContactImpulse& impulse) {
+  if (!impulse.hertz) return impulse.duration_s;
+  return std::min(HertzDurationS(*impulse.hertz, object.properties.material.young_pa,
+                                 object.body->model->poisson_ratio),
+                  kLongestContactS);
+}
+
 }  // namespace
 
 absl::StatusOr<SoundingObject> MakeSoundingObject(std::shared_ptr<const SoundingBody> body,
@@ -116,7 +123,7 @@ absl::StatusOr<Excitation> LocateImpulse(const SoundingObject& object,
   }
   if (!located.ok()) return located.status();
   Excitation excitation{.vertices = located->vertices,
-                        .tau_s = static_cast<float>(GaussianTauS(impulse.duration_s))};
+                        .tau_s = static_cast<float>(GaussianTauS(DurationS(object, impulse)))};
   std::ranges::transform(located->weights, excitation.weights.begin(),
                          [](double weight) { return static_cast<float>(weight); });
   std::ranges::transform(impulse.impulse_newton_seconds, excitation.impulse_newton_seconds.begin(),

@@ -97,7 +97,9 @@ void Mixer::Take(const Strike& strike, StrikeQueue& queue) noexcept {
   PendingStrike pending{.sample = strike.frame + (between ? 1 : 0),
                         .lead_frames = between ? 1 - strike.fraction : 0,
                         .bank = strike.bank,
-                        .excitation = strike.excitation};
+                        .kind = strike.kind,
+                        .excitation = strike.excitation,
+                        .knot = strike.knot};
   const bool late = pending.sample < block_start_;
   if (late) {
     pending.sample = block_start_;
@@ -108,6 +110,7 @@ void Mixer::Take(const Strike& strike, StrikeQueue& queue) noexcept {
     return Count(statistics_.dropped_count);
   }
   ++slot->pending_count;
+  if (strike.kind != StrikeKind::kImpulse) return;
   Count(late ? queue.late_count : queue.accepted_count);
   Count(late ? statistics_.late_count : statistics_.accepted_count);
 }
@@ -128,11 +131,21 @@ void Mixer::StrikeBank(const PendingStrike& strike) noexcept {
   const bool postponed = strike.sample < block_start_;
   Count(statistics_.postponed_count, postponed ? 1 : 0);
   const size_t offset = postponed ? 0 : static_cast<size_t>(strike.sample - block_start_);
-  if (!slot->bank->Strike(strike.excitation, offset, strike.lead_frames, mix_)) {
-    return Count(statistics_.dropped_count);
-  }
+  if (!Excite(*slot->bank, strike, offset)) return Count(statistics_.dropped_count);
+  if (strike.kind == StrikeKind::kForce) return;  // nothing moves before the knot
   if (!slot->sounding) sounding_.push_back(strike.bank.slot);
   slot->sounding = true;
+}
+
+bool Mixer::Excite(OscillatorBank& bank, const PendingStrike& strike, size_t offset) noexcept {
+  switch (strike.kind) {
+    case StrikeKind::kForce:
+      return bank.Gather(strike.excitation);
+    case StrikeKind::kKnot:
+      return bank.Tie(strike.knot, offset, mix_);
+    default:
+      return bank.Strike(strike.excitation, offset, strike.lead_frames, mix_);
+  }
 }
 
 void Mixer::RenderBanks() noexcept {

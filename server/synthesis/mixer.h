@@ -136,6 +136,7 @@ class Mixer {
   void Take(const Strike& strike, StrikeQueue& queue) noexcept;
   void StrikeDueBanks() noexcept;
   void StrikeBank(const PendingStrike& strike) noexcept;
+  bool Excite(OscillatorBank& bank, const PendingStrike& strike, size_t offset) noexcept;
   void RenderBanks() noexcept;
   void RenderBank(Slot& slot, LaneMix& mix) noexcept;
   void RenderFadingBanks(std::span<float> block) noexcept;

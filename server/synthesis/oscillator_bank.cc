@@ -42,10 +42,12 @@ Complex GaussianExponent(const SoundingMode& mode) {
 /// Fills in lanes one after the other.
 class LaneWriter {
  public:
-  LaneWriter(LaneArrays& lanes, const SoundingModes& sounding,
+  LaneWriter(LaneArrays& lanes, SustainedForce& force, const SoundingModes& sounding,
              const OscillatorBankSettings& settings)
       : lanes_(lanes),
+        force_(force),
         settings_(settings),
+        lowest_rad_per_s_(sounding.modes.empty() ? 1 : sounding.modes.front().damped_rad_per_s),
         first_column_(FirstColumn(sounding)),
         gain_(sounding.shape_scale * kSamplesPerVolumeVelocity * settings.gain) {}
 
@@ -67,6 +69,7 @@ class LaneWriter {
         std::polar(gain * mode.coupling / mode.damped_rad_per_s, mode.output_phase_rad) *
         Complex(0, -1);
     Set(lanes_.gain_re, lanes_.gain_im, start);
+    force_.SetLane(lane_, start, log_q * settings_.sample_rate_hz, lowest_rad_per_s_);
     Set(lanes_.lead_re, lanes_.lead_im, log_q);
     Set(lanes_.tau_re, lanes_.tau_im, GaussianExponent(mode));
     lanes_.column[lane_] = mode.column - first_column_;
@@ -85,7 +88,9 @@ class LaneWriter {
   }
 
   LaneArrays& lanes_;
+  SustainedForce& force_;
   const OscillatorBankSettings& settings_;
+  double lowest_rad_per_s_;
   uint32_t first_column_;
   double gain_;
   size_t lane_ = 0;
@@ -101,23 +106,23 @@ OscillatorBank::OscillatorBank(const SoundingModes& sounding, ShapeTable shapes,
       lane_count_(CountLanes(sounding)),
       first_column_(FirstColumn(sounding)),
       column_count_(CountColumns(sounding)),
-      lanes_(lane_count_, column_count_) {
+      lanes_(lane_count_, column_count_),
+      force_(lane_count_, column_count_, settings.sample_rate_hz, settings.noise_seed) {
   assert(block_frame_count_ > 0 && block_frame_count_ <= kMostBlockFrames);
   assert(first_column_ + column_count_ <= shapes_.mode_count);
-  LaneWriter writer(lanes_, sounding, settings);
+  LaneWriter writer(lanes_, force_, sounding, settings);
   for (const SoundingMode& mode : sounding.modes) writer.AddMode(mode);
   for (const SoundingMode& mode : sounding.modes) {
     if (mode.output_phase_rad != 0) writer.AddCompanion(mode);
   }
 }
 
-bool OscillatorBank::Strike(const Excitation& excitation, size_t offset, float lead_frames,
-                            LaneMix& mix) noexcept {
-  bank_kernel::Projection projection{
-      .column_count = column_count_, .lead_frames = lead_frames, .tau_s = excitation.tau_s};
+std::optional<bank_kernel::Projection> OscillatorBank::Project(
+    const Excitation& excitation) const noexcept {
+  bank_kernel::Projection projection{.column_count = column_count_, .tau_s = excitation.tau_s};
   for (size_t i = 0; i < 3; ++i) {
     const size_t vertex = excitation.vertices[i];
-    if (vertex >= shapes_.vertex_count) return false;
+    if (vertex >= shapes_.vertex_count) return std::nullopt;
     for (size_t axis = 0; axis < 3; ++axis) {
       projection.rows[3 * i + axis] =
           shapes_.values.get() + (3 * vertex + axis) * shapes_.mode_count + first_column_;
@@ -125,30 +130,66 @@ bool OscillatorBank::Strike(const Excitation& excitation, size_t offset, float l
           excitation.weights[i] * excitation.impulse_newton_seconds[axis];
     }
   }
-  if (newborn_) RenderNewborn(offset, mix);
-  if (!bank_kernel::Excite(projection, lanes_, lane_count_)) return false;
+  return projection;
+}
+
+bool OscillatorBank::Strike(const Excitation& excitation, size_t offset, float lead_frames,
+                            LaneMix& mix) noexcept {
+  std::optional<bank_kernel::Projection> projection = Project(excitation);
+  if (!projection) return false;
+  projection->lead_frames = lead_frames;
+  const bool was_newborn = newborn_;
+  BringNewbornTo(offset, mix);
+  const bool finite = bank_kernel::Excite(*projection, lanes_, lane_count_);
+  newborn_ = finite || was_newborn || force_.driving();
+  return finite;
+}
+
+bool OscillatorBank::Gather(const Excitation& force) noexcept {
+  const std::optional<bank_kernel::Projection> projection = Project(force);
+  if (projection) force_.Gather(*projection);
+  return projection.has_value();
+}
+
+bool OscillatorBank::Tie(const ForceKnot& knot, size_t offset, LaneMix& mix) noexcept {
+  BringNewbornTo(offset, mix);
   newborn_ = true;
+  return force_.Tie(knot, lanes_);
+}
+
+void OscillatorBank::BringNewbornTo(size_t offset, LaneMix& mix) noexcept {
+  if (force_.driving() && !newborn_) {
+    newborn_ = true;
+    newborn_offset_ = 0;
+  }
+  if (newborn_) RenderNewborn(offset, mix);
   newborn_offset_ = offset;
-  return true;
 }
 
 void OscillatorBank::RenderNewborn(size_t end, LaneMix& mix) noexcept {
   assert(end >= newborn_offset_);
-  bank_kernel::RingNewborn(lanes_, lane_count_, end - newborn_offset_,
-                           mix.lanes() + newborn_offset_ * kMostLanes);
+  const size_t frame_count = end - newborn_offset_;
+  float* frames = mix.lanes() + newborn_offset_ * kMostLanes;
+  if (force_.driving()) {
+    force_.RenderNewborn(frame_count, lanes_, frames);
+  } else {
+    bank_kernel::RingNewborn(lanes_, lane_count_, frame_count, frames);
+  }
   newborn_offset_ = end;
 }
 
 bool OscillatorBank::RenderAdd(LaneMix& mix) noexcept {
   if (silent()) return true;
   bank_kernel::Ring(lanes_, awake_lane_count_, block_frame_count_, mix.lanes());
-  if (newborn_) RenderNewborn(block_frame_count_, mix);
+  if (newborn_ || force_.driving()) BringNewbornTo(block_frame_count_, mix);
   const size_t lane_count = newborn_ ? lane_count_ : awake_lane_count_;
   const auto [awake_lane_count, finite] = bank_kernel::Advance(lanes_, lane_count, newborn_);
   newborn_ = false;
   awake_lane_count_ = finite ? awake_lane_count : 0;
-  if (!finite) lanes_.Silence(0, lane_count_);
-  return finite;
+  if (finite) return true;
+  lanes_.Silence(0, lane_count_);
+  force_.Silence();
+  return false;
 }
 
 size_t OscillatorBank::active_mode_count() const noexcept {

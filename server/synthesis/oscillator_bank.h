@@ -4,13 +4,16 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string_view>
 #include <vector>
 
+#include "server/synthesis/bank_kernel.h"
 #include "server/synthesis/lane_arrays.h"
 #include "server/synthesis/lane_mix.h"
 #include "server/synthesis/sounding_modes.h"
 #include "server/synthesis/strike.h"
+#include "server/synthesis/sustained_force.h"
 
 namespace carillon {
 
@@ -27,6 +30,7 @@ struct OscillatorBankSettings {
   double sample_rate_hz = 48000;
   size_t block_frame_count = 128;  ///< at most kMostBlockFrames
   double gain = 1;                 ///< of this object, linear
+  uint64_t noise_seed = 0;         ///< of this object's roughness
 };
 
 /// All modes of one sounding object, each a decaying complex exponential (the paper, 3.4):
@@ -58,12 +62,19 @@ class OscillatorBank {
   bool Strike(const Excitation& excitation, size_t offset, float lead_frames,
               LaneMix& mix) noexcept;
 
+  /// Adds a contact's force to that at the next knot. False: no such vertex, and nothing was done.
+  bool Gather(const Excitation& force) noexcept;
+
+  /// The sustained force has come to what was gathered, at sample `offset` as for Strike. False: it
+  /// was not finite, and is zero.
+  bool Tie(const ForceKnot& knot, size_t offset, LaneMix& mix) noexcept;
+
   /// Adds the next block of `block_frame_count` frames to `mix`. False: the state was not finite
   /// and the bank has been silenced.
   bool RenderAdd(LaneMix& mix) noexcept;
 
   /// Nothing rings: rendering would cost and add nothing.
-  bool silent() const noexcept { return awake_lane_count_ == 0 && !newborn_; }
+  bool silent() const noexcept { return awake_lane_count_ == 0 && !newborn_ && !force_.driving(); }
 
   /// Modes that still ring.
   size_t active_mode_count() const noexcept;
@@ -72,6 +83,8 @@ class OscillatorBank {
   size_t mode_count() const noexcept { return mode_count_; }
 
  private:
+  std::optional<bank_kernel::Projection> Project(const Excitation& excitation) const noexcept;
+  void BringNewbornTo(size_t offset, LaneMix& mix) noexcept;
   void RenderNewborn(size_t end, LaneMix& mix) noexcept;
 
   ShapeTable shapes_;
@@ -84,6 +97,7 @@ class OscillatorBank {
   bool newborn_ = false;         // struck in this block
   size_t newborn_offset_ = 0;    // the newborn state is that of this sample
   LaneArrays lanes_;
+  SustainedForce force_;
 };
 
 /// The SIMD target in use on this machine ("AVX3", "AVX2", "SSE4", "NEON", ...).

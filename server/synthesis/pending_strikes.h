@@ -15,8 +15,10 @@ struct PendingStrike {
   uint64_t sample = 0;
   uint64_t arrival = 0;   ///< breaks ties, so that the order never depends on the heap
   float lead_frames = 0;  ///< from the strike to that sample
-  BankId bank;
-  Excitation excitation;
+  BankId bank{};
+  StrikeKind kind = StrikeKind::kImpulse;
+  Excitation excitation{};
+  ForceKnot knot{};
 };
 
 /// Strikes ordered by sample, then by arrival. All memory is taken when it is made.

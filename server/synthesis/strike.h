@@ -13,22 +13,39 @@ struct BankId {
   friend bool operator==(const BankId&, const BankId&) = default;
 };
 
-/// An impulse on a triangle of the sounding surface.
+/// An impulse, or a force, on a triangle of the sounding surface.
 struct Excitation {
   std::array<uint32_t, 3> vertices{};
   std::array<float, 3> weights{};                 ///< barycentric
-  std::array<float, 3> impulse_newton_seconds{};  ///< in the object's frame
+  std::array<float, 3> impulse_newton_seconds{};  ///< in the object's frame; of a force, N
   float tau_s = 0;  ///< standard deviation of the contact's Gaussian; zero: instantaneous
+};
+
+/// What a sustained force has come to at the end of a simulation step, its kind of surface
+/// included.
+struct ForceKnot {
+  float step_s = 0;        ///< since the knot before
+  float roughness = 0;     ///< root mean square of the fluctuation, relative to the force
+  float bandwidth_hz = 0;  ///< of the fluctuation; zero: it does not move, so there is none
+};
+
+/// What a strike does to its bank.
+enum class StrikeKind : uint8_t {
+  kImpulse,  ///< the excitation at once
+  kForce,    ///< adds the excitation to the force at the next knot
+  kKnot,     ///< the forces added since the last knot are the whole force now
 };
 
 /// An excitation of one bank at its time: frame + fraction, in frames since the mixer began. The
 /// first sample that can be heard is the first at or after it, with the phase that has passed
 /// since.
 struct Strike {
-  BankId bank;
+  BankId bank{};
   uint64_t frame = 0;
   float fraction = 0;  ///< 0 <= fraction < 1
-  Excitation excitation;
+  StrikeKind kind = StrikeKind::kImpulse;
+  Excitation excitation{};  ///< of an impulse or a force
+  ForceKnot knot{};         ///< of a knot
 };
 
 }  // namespace carillon

@@ -29,6 +29,12 @@ void StrikeAll(auto&& strike) {
   }
 }
 
+void StrikeAt(OfflineRenderer& renderer, double time_s, const ObjectImpulse& impulse) {
+  renderer.BeginStep(time_s);
+  renderer.Strike(impulse);
+  renderer.EndStep();
+}
+
 class OfflineRendererTest : public testing::Test {
  protected:
   std::unique_ptr<OfflineRenderer> Make(double tail_s = 0) {
@@ -59,7 +65,7 @@ TEST_F(OfflineRendererTest, IsBitForBitTheSameHoweverOftenAndInWhateverPieces) {
   for (const size_t blocks_at_a_time : {1U, 1U, 7U, 64U}) {
     const auto renderer = Make();
     StrikeAll(
-        [&](double time_s, const ObjectImpulse& impulse) { renderer->Strike(time_s, impulse); });
+        [&](double time_s, const ObjectImpulse& impulse) { StrikeAt(*renderer, time_s, impulse); });
     sounds.push_back(RenderAll(*renderer, blocks_at_a_time));
   }
   EXPECT_GT(sounds[0].size(), kRate / 2);
@@ -77,7 +83,7 @@ TEST_F(OfflineRendererTest, IsBitForBitWhatTheLiveMixerRenders) {
   const auto stream = *scenes.OpenContactStream(scene, {.step_s = 0.0137, .scheduling_delay_s = 0});
   const auto renderer = Make(0.5);
   StrikeAll([&](double time_s, const ObjectImpulse& impulse) {
-    renderer->Strike(time_s, impulse);
+    StrikeAt(*renderer, time_s, impulse);
     ASSERT_TRUE(stream->BeginStep(time_s).ok());
     stream->Strike(impulse);
   });
@@ -91,7 +97,7 @@ TEST_F(OfflineRendererTest, IsBitForBitWhatTheLiveMixerRenders) {
 
 TEST_F(OfflineRendererTest, FrameZeroIsSimulationTimeZero) {
   const auto renderer = Make();
-  renderer->Strike(0.125, SmallImpulse(1));
+  StrikeAt(*renderer, 0.125, SmallImpulse(1));
   const std::vector<float> sound = RenderAll(*renderer, 8);
   const auto onset = std::ranges::find_if(sound, [](float x) { return x != 0; });
   EXPECT_EQ(onset - sound.begin(), 0.125 * kRate + 1);  // sin(0) is silent
@@ -99,7 +105,7 @@ TEST_F(OfflineRendererTest, FrameZeroIsSimulationTimeZero) {
 
 TEST_F(OfflineRendererTest, EndsOnceAllIsBelowMinus80Db) {
   const auto renderer = Make();
-  renderer->Strike(0, SmallImpulse(1));
+  StrikeAt(*renderer, 0, SmallImpulse(1));
   const std::vector<float> sound = RenderAll(*renderer, 8);
   const auto loud = [](float x) { return std::abs(x) >= 1e-4F; };
   const auto last_loud = std::ranges::find_if(sound.rbegin(), sound.rend(), loud);
@@ -112,16 +118,16 @@ TEST_F(OfflineRendererTest, EndsOnceAllIsBelowMinus80Db) {
 
 TEST_F(OfflineRendererTest, ATailThatIsGivenIsKeptToTheFrame) {
   const auto renderer = Make(0.1);
-  renderer->Strike(0.05, SmallImpulse(1));
+  StrikeAt(*renderer, 0.05, SmallImpulse(1));
   EXPECT_EQ(RenderAll(*renderer, 8).size(), 0.15 * kRate);
 }
 
 TEST_F(OfflineRendererTest, CountsWhatSoundedAndWhatCouldNotBeUsed) {
   const auto renderer = Make();
-  renderer->Strike(0, SmallImpulse(1));
-  renderer->Strike(0, SmallImpulse(7));                // no such object
-  renderer->Strike(0, SmallImpulse(1, std::nan("")));  // no number
-  renderer->Strike(-1, SmallImpulse(1));               // before the beginning
+  StrikeAt(*renderer, 0, SmallImpulse(1));
+  StrikeAt(*renderer, 0, SmallImpulse(7));                // no such object
+  StrikeAt(*renderer, 0, SmallImpulse(1, std::nan("")));  // no number
+  StrikeAt(*renderer, -1, SmallImpulse(1));               // before the beginning
   const std::vector<float> sound = RenderAll(*renderer, 8);
   EXPECT_EQ(renderer->summary().accepted_count, 1U);
   EXPECT_EQ(renderer->summary().rejected_count, 3U);
@@ -133,7 +139,7 @@ TEST_F(OfflineRendererTest, CountsWhatSoundedAndWhatCouldNotBeUsed) {
 
 TEST_F(OfflineRendererTest, TakesMoreImpulsesAtOnceThanTheLiveMixer) {
   const auto renderer = Make();
-  for (int i = 0; i < 5000; ++i) renderer->Strike(0.001, SmallImpulse(1, 1e-4));
+  for (int i = 0; i < 5000; ++i) StrikeAt(*renderer, 0.001, SmallImpulse(1, 1e-4));
   RenderAll(*renderer, 8);
   EXPECT_EQ(renderer->summary().accepted_count, 5000U);
   EXPECT_EQ(renderer->summary().rejected_count, 0U);

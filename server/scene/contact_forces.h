@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "absl/functional/function_ref.h"
+#include "server/excitation/contact.h"
+#include "server/excitation/load_tracker.h"
+#include "server/synthesis/strike.h"
+
+namespace carillon {
+
+/// A force that lasts on an object of the scene.
+struct ObjectForce {
+  uint32_t handle = 0;
+  ContactImpulse force;  ///< newtons for newton seconds
+  Roughness roughness;
+};
+
+/// A contact of an object of which it is not known whether it is a blow or a load.
+struct ObjectTouch {
+  uint32_t handle = 0;
+  uint32_t partner = 0;    ///< names the other body
+  ContactImpulse impulse;  ///< of the whole step
+  Roughness roughness;
+};
+
+/// Turns the lasting contacts of one simulation, step by step, into what the mixer understands: for
+/// each object that has some the forces, then a knot; and strikes where a contact was a blow. One
+/// thread at a time.
+class ContactForces {
+ public:
+  /// A strike without bank and time, and its simulation time.
+  using Push = absl::FunctionRef<void(uint32_t handle, Strike strike, double time_s)>;
+
+  /// `step_s`: the simulator's step, seconds.
+  explicit ContactForces(double step_s) : nominal_step_s_(step_s) {}
+
+  /// Begins the step at simulation time `time_s`, not before the last. Where steps were left out,
+  /// forces ended there.
+  void Begin(double time_s, Push push);
+
+  /// A force of this step, whose place and newtons are `force`.
+  void Add(uint32_t handle, const Excitation& force, const Roughness& roughness);
+
+  /// A contact of this step that is a blow or a load, whose place and newton seconds are `impulse`.
+  void Touch(const ObjectTouch& touch, const Excitation& impulse);
+
+  /// Ends the step.
+  void End(Push push);
+
+ private:
+  struct Force {
+    Excitation excitation;
+    Roughness roughness;
+  };
+  struct Object {
+    std::vector<Force> forces;  // of this step
+    int steps_without = 0;
+  };
+  struct Pair {
+    LoadTracker load;
+    std::vector<Force> touches;  // of this step, N s
+  };
+
+  void Divide(uint32_t handle, Pair& pair, Push push);
+  static ForceKnot Tie(const std::vector<Force>& forces, double step_s);
+
+  double nominal_step_s_;
+  double step_s_ = 0;  // since the step before
+  std::optional<double> time_s_;
+  std::map<uint32_t, Object> objects_;
+  std::map<std::pair<uint32_t, uint32_t>, Pair> pairs_;
+};
+
+}  // namespace carillon
