@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The bodies that the decomposition benchmark decomposes: their surfaces, as OBJ files."""
+
+import math
+
+import numpy
+import pyopenvdb
+
+BUNNY = "/usr/share/glmark2/models/bunny.obj"  # crosses itself, so that no mesher takes it
+
+
+def write_obj(path, vertices, triangles):
+    with open(path, "w", encoding="ascii") as file:
+        for x, y, z in vertices:
+            file.write(f"v {x:.9g} {y:.9g} {z:.9g}\n")
+        for a, b, c in triangles:
+            file.write(f"f {a + 1} {b + 1} {c + 1}\n")
+
+
+def polygon_radius(radius, corners):
+    """Of the regular polygon with the area of the circle: one inscribed would be a smaller tube."""
+    angle = 2 * math.pi / corners
+    return radius * math.sqrt(angle / math.sin(angle))
+
+
+def tube(length, around, along, outer=.0125, wall=.001):
+    """Both walls and the ring at each end of a hollow cylinder, as (vertices, triangles)."""
+    angle = 2 * math.pi * numpy.arange(around) / around
+    circle = numpy.stack([numpy.cos(angle), numpy.sin(angle), 0 * angle], axis=1)
+    layers = [(circle * polygon_radius(radius, around) + (0, 0, length * k / along))
+              for radius in (outer, outer - wall) for k in range(along + 1)]
+
+    def vertex(side, k, i):
+        return (side * (along + 1) + k) * around + i % around
+
+    triangles = []
+
+    def quad(a, b, c, d):
+        triangles.extend([(a, b, c), (a, c, d)])
+
+    for i in range(around):
+        for k in range(along):
+            quad(vertex(0, k, i), vertex(0, k, i + 1), vertex(0, k + 1, i + 1), vertex(0, k + 1, i))
+            quad(vertex(1, k, i), vertex(1, k + 1, i), vertex(1, k + 1, i + 1), vertex(1, k, i + 1))
+        quad(vertex(0, 0, i), vertex(1, 0, i), vertex(1, 0, i + 1), vertex(0, 0, i + 1))
+        quad(vertex(0, along, i), vertex(0, along, i + 1), vertex(1, along, i + 1),
+             vertex(1, along, i))
+    return numpy.concatenate(layers), triangles
+
+
+def read_bunny(size):
+    """Vertices and triangles, `size` metres along its longest side."""
+    vertices, triangles = [], []
+    with open(BUNNY, encoding="ascii") as file:
+        for line in file:
+            words = line.split()
+            if words[:1] == ["v"]:
+                vertices.append([float(x) for x in words[1:4]])
+            elif words[:1] == ["f"]:
+                triangles.append([int(word.split("/")[0]) - 1 for word in words[1:4]])
+    vertices = numpy.array(vertices)
+    vertices *= size / (vertices.max(axis=0) - vertices.min(axis=0)).max()
+    return vertices.astype(numpy.float32), numpy.array(triangles, dtype=numpy.uint32)
+
+
+def isosurface(distance, value, inward):
+    vertices, quads = distance.convertToQuads(value)
+    triangles = numpy.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]).astype(numpy.int64)
+    return vertices, triangles if inward else triangles[:, ::-1]
+
+
+def bunny(size, spacing, wall=0.0):
+    """The bunny anew, as an isosurface of its signed distance with vertices `spacing` metres apart; hollow
+    where it has a wall."""
+    vertices, triangles = read_bunny(size)
+    distance = pyopenvdb.FloatGrid.createLevelSetFromPolygons(
+        vertices, triangles=triangles, transform=pyopenvdb.createLinearTransform(spacing),
+        halfWidth=wall / spacing + 3)
+    outer, faces = isosurface(distance, 0.0, False)
+    if wall == 0:
+        return outer, faces
+    inner, inner_faces = isosurface(distance, -wall, True)
+    return (numpy.concatenate([outer, inner]),
+            numpy.concatenate([faces, inner_faces + len(outer)]))

@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Carillon beside SciPy, SLEPc and Spectra on the same matrices: every mode from 20 Hz to 20 kHz."""
+
+import dataclasses
+import json
+import math
+import pathlib
+import subprocess
+import sys
+from typing import Callable
+
+import bodies
+import solutions
+
+LOW_HZ, HIGH_HZ = 20.0, 20000.0
+MAX_RESIDUAL = 1e-6
+# Below all eigenvalues and a tenth of the highest frequency away: what suits Carillon suits the others.
+SHIFT = -(2 * math.pi * HIGH_HZ / 10)**2
+HERE = pathlib.Path(__file__).parent
+
+# Young's modulus in Pa, Poisson's ratio, density in kg/m^3: from Lame's constants in the paper's Table 1.
+ALUMINIUM = (6.835179e10, .329801, 2700.)
+CERAMIC = (5.454222e9, .330298, 2700.)
+
+
+@dataclasses.dataclass
+class Body:
+    name: str
+    surface: Callable
+    element: str
+    mass: str
+    material: tuple
+    nodes: int = 0
+
+
+BODIES = [
+    Body("chime", lambda: bodies.tube(.505, 48, 195), "linear", "lumped", ALUMINIUM),
+    Body("hollow-bunny", lambda: bodies.bunny(.15, .15 / 76, wall=.005), "linear", "lumped", CERAMIC),
+    Body("solid-bunny", lambda: bodies.bunny(.15, .15 / 55), "linear", "lumped", CERAMIC, 36000),
+    Body("chime-quadratic", lambda: bodies.tube(.505, 24, 120), "quadratic", "consistent", ALUMINIUM),
+    Body("bunny-quadratic", lambda: bodies.bunny(.15, .15 / 28), "quadratic", "consistent", CERAMIC,
+         4000),
+]
+
+
+@dataclasses.dataclass
+class Peer:
+    """Another program. Its tolerance, in its own measure, is the loosest power of ten with which its modes of
+    all bodies have residuals of at most MAX_RESIDUAL."""
+    name: str
+    label: str
+    command: list
+    tolerance: float
+    slow_on: tuple = ()
+
+
+BUNNIES = ("hollow-bunny", "solid-bunny", "bunny-quadratic")
+
+
+def peers(build):
+    spectra = str(build / "tests/spectra_peer")
+    script = ["/usr/bin/python3"]
+    return [
+        Peer("slepc", "SLEPc Krylov-Schur, MUMPS", [*script, str(HERE / "slepc_peer.py")], 1e-6),
+        Peer("spectra-cholmod", "Spectra, CHOLMOD", [spectra, "cholmod"], 1e-6),
+        Peer("spectra-eigen", "Spectra, Eigen's SimplicialLDLT", [spectra, "eigen"], 1e-6, BUNNIES),
+        Peer("spectra-default", "Spectra's own SymShiftInvert", [spectra, "default"], 1e-6, BUNNIES),
+        Peer("scipy", "scipy eigsh", [*script, str(HERE / "scipy_peer.py"), "default"], 1e-6, BUNNIES),
+        Peer("scipy-symmetric", "scipy eigsh, symmetric SuperLU",
+             [*script, str(HERE / "scipy_peer.py"), "symmetric"], 1e-6, BUNNIES),
+    ]
+
+
+def run(command, environment):
+    """The times that a program prints, or None where it fails."""
+    done = subprocess.run([str(word) for word in command], stdout=subprocess.PIPE, env=environment,
+                          check=False)
+    return json.loads(done.stdout) if done.returncode == 0 else None
+
+
+def make_matrices(body, folder, build, environment):
+    vertices, triangles = body.surface()
+    bodies.write_obj(folder / "surface.obj", vertices, triangles)
+    made = subprocess.run(
+        [build / "tests/matrices_benchmark", "make", folder / "surface.obj", folder, body.element,
+         body.mass, str(body.nodes), *map(repr, body.material)], env=environment, check=False)
+    if made.returncode != 0:
+        sys.exit(f"{body.name}: no matrices")
+
+
+def row(body, label, times, checked, ours):
+    ratio = times["cpu_seconds"] / ours["cpu_seconds"]
+    spread = abs(checked.frequencies_hz / ours["frequencies_hz"] - 1).max()
+    verdict = "" if checked.max_residual <= MAX_RESIDUAL else " (too large)"
+    print(f"| {body.name} | {label} | {len(checked.frequencies_hz)} | {times['cpu_seconds']:.2f} "
+          f"| {ratio:.1f} | {times['seconds']:.2f} | {checked.max_residual:.1e}{verdict} "
+          f"| {checked.max_orthogonality_error:.0e} | {spread:.0e} |", flush=True)
+
+
+def compare_on(body, folder, options, environment):
+    make_matrices(body, folder, options.build, environment)
+    K, M = solutions.read_symmetric(folder / "K"), solutions.read_symmetric(folder / "M")
+    ours = {}
+    for threads in (1, 2):
+        times = run([options.build / "tests/matrices_benchmark", "solve", folder, HIGH_HZ, threads],
+                    {**environment, "OMP_NUM_THREADS": str(threads),
+                     "OPENBLAS_NUM_THREADS": str(threads)})
+        if times is None:
+            sys.exit(f"{body.name}: Carillon failed")
+        checked = solutions.check(folder, K, M, LOW_HZ, HIGH_HZ)
+        if not ours:
+            ours = {**times, "frequencies_hz": checked.frequencies_hz}
+        row(body, f"**Carillon**, {threads} thread{'s' * (threads > 1)}, {K.shape[0]} unknowns", times,
+            checked, ours)
+    for peer in peers(options.build):
+        skipped = options.peers and peer.name not in options.peers
+        if skipped or (body.name in peer.slow_on and not options.full and not options.peers):
+            continue
+        times = run([*peer.command, folder, len(ours["frequencies_hz"]) + 6, SHIFT, peer.tolerance],
+                    environment)
+        if times is None:
+            print(f"| {body.name} | {peer.label} | failed |", flush=True)
+            continue
+        checked = solutions.check(folder, K, M, LOW_HZ, HIGH_HZ)
+        if len(checked.frequencies_hz) != len(ours["frequencies_hz"]):
+            print(f"| {body.name} | {peer.label} | {len(checked.frequencies_hz)} modes |", flush=True)
+            continue
+        row(body, peer.label, times, checked, ours)
+
+
+def compare(options, folder, environment):
+    print("| body | program | modes | CPU s | times Carillon's | wall s | largest residual "
+          "| M-orthogonal to | frequencies within |\n" + "| --- " * 9 + "|", flush=True)
+    for body in BODIES:
+        if options.only and body.name not in options.only:
+            continue
+        place = folder / body.name
+        place.mkdir()
+        compare_on(body, place, options, environment)

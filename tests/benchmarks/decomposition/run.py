@@ -1,0 +1,66 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: Apache-2.0
+"""Carillon's decomposition beside the programs that others use, on the same input, in turn.
+
+Each part prints a Markdown table:
+  compare   SciPy, SLEPc and Spectra on the same matrices: CPU seconds, residuals
+
+Nothing is kept from one run to the next. Slow programs on large bodies run with --full only, or where
+--peers names them. CPU seconds are those of one thread for everybody.
+"""
+
+import argparse
+import os
+import pathlib
+import sys
+import tempfile
+
+import compare
+
+
+def processor_flags():
+    with open("/proc/cpuinfo", encoding="ascii") as file:
+        for line in file:
+            if line.startswith("flags"):
+                return set(line.split())
+    return set()
+
+
+def fair_environment():
+    """One thread, and OpenBLAS' kernels for this processor: Debian's takes its oldest ones on a processor it does
+    not know by number. Carillon mends that for itself; here everybody gets the same."""
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    flags = processor_flags()
+    if "OPENBLAS_CORETYPE" not in environment:
+        if {"avx512vl", "avx512bw"} <= flags:
+            environment["OPENBLAS_CORETYPE"] = "SkylakeX"
+        elif {"avx2", "fma"} <= flags:
+            environment["OPENBLAS_CORETYPE"] = "Haswell"
+    return environment
+
+
+PARTS = {"compare": compare.compare}
+
+
+def names(text):
+    return text.split(",")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--build", type=pathlib.Path, required=True, help="the release build's folder")
+    parser.add_argument("--full", action="store_true", help="slow programs and large bodies, too")
+    parser.add_argument("--parts", type=names, default=list(PARTS), help="some of " + ",".join(PARTS))
+    parser.add_argument("--only", type=names, default=[], help="bodies, by name")
+    parser.add_argument("--peers", type=names, default=[], help="other programs, by name")
+    options = parser.parse_args()
+    for part in options.parts:
+        print(f"\n## {part}\n", flush=True)
+        with tempfile.TemporaryDirectory() as folder:
+            PARTS[part](options, pathlib.Path(folder), fair_environment())
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
