@@ -12,6 +12,8 @@
 #include <hwy/contrib/math/math-inl.h>
 // clang-format on
 
+#include <algorithm>
+
 HWY_BEFORE_NAMESPACE();
 namespace carillon::bank_kernel {
 namespace HWY_NAMESPACE {
@@ -22,10 +24,11 @@ using Doubles = hn::Repartition<double, Floats>;
 using HalfFloats = hn::Half<Floats>;
 using V = hn::Vec<Floats>;
 
-// -140 dB of full scale, squared.
-constexpr double kSilenceSquared = 1e-14;
 // Far above any sound, far below what a float's square can hold.
 constexpr float kMostSquared = 1e30F;
+
+// How far ahead the lanes of long blocks are asked for.
+constexpr size_t kGroupsAhead = 2;
 
 // Vectors rendered together: enough to hide the latency of the state's recurrence, few enough to
 // keep states in registers.
@@ -62,12 +65,14 @@ struct Vectors {
     }
   }
 
-  /// Multiplies the state of vector v by q^(k+1).
-  HWY_INLINE void Step(size_t v, size_t k) {
-    const V next = hn::NegMulAdd(im[v], q_im[v][k], hn::Mul(re[v], q_re[v][k]));
-    im[v] = hn::MulAdd(im[v], q_re[v][k], hn::Mul(re[v], q_im[v][k]));
-    re[v] = next;
+  /// Multiplies a state of vector v by q^(k+1).
+  HWY_INLINE void Multiply(size_t v, size_t k, V& of_re, V& of_im) const {
+    const V next = hn::NegMulAdd(of_im, q_im[v][k], hn::Mul(of_re, q_re[v][k]));
+    of_im = hn::MulAdd(of_im, q_re[v][k], hn::Mul(of_re, q_im[v][k]));
+    of_re = next;
   }
+
+  HWY_INLINE void Step(size_t v, size_t k) { Multiply(v, k, re[v], im[v]); }
 
   /// Renders one tile: each sample straight from the state, then one step for all of them.
   HWY_INLINE void AddTile(float* HWY_RESTRICT mix) {
@@ -107,29 +112,115 @@ struct Vectors {
   }
 };
 
-void Ring(const LaneArrays& lanes, size_t lane_count, size_t frame_count, float* mix) {
+void Ring(const LaneArrays& lanes, LaneRange range, size_t frame_count, float* mix) {
   const float *re = lanes.start_re.data(), *im = lanes.start_im.data();
   const size_t pass = kVectorsAPass * hn::Lanes(Floats());
-  size_t lane = 0;
-  for (; lane + pass <= lane_count; lane += pass) {
+  const size_t end = range.first + range.count;
+  size_t lane = range.first;
+  for (; lane + pass <= end; lane += pass) {
     Vectors<kVectorsAPass> vectors;
     vectors.Load(lanes, lane, re, im);
     vectors.Add(frame_count, mix);
   }
-  for (; lane < lane_count; lane += hn::Lanes(Floats())) {
+  for (; lane < end; lane += hn::Lanes(Floats())) {
     Vectors<1> vectors;
     vectors.Load(lanes, lane, re, im);
     vectors.Add(frame_count, mix);
   }
 }
 
-void RingNewborn(LaneArrays& lanes, size_t lane_count, size_t frame_count, float* mix) {
-  float *re = lanes.newborn_re.data(), *im = lanes.newborn_im.data();
+/// Vectors that are struck: what rings, and of it what is newborn, which advances beside it.
+template <size_t kVectors>
+struct StruckVectors {
+  Vectors<kVectors> all;
+  V newborn_re[kVectors], newborn_im[kVectors];
+
+  HWY_INLINE void Load(const LaneArrays& lanes, size_t lane) {
+    const Floats d;
+    all.Load(lanes, lane, lanes.start_re.data(), lanes.start_im.data());
+#pragma GCC unroll 8
+    for (size_t v = 0; v < kVectors; ++v, lane += hn::Lanes(d)) {
+      newborn_re[v] = hn::Load(d, lanes.newborn_re.data() + lane);
+      newborn_im[v] = hn::Load(d, lanes.newborn_im.data() + lane);
+    }
+  }
+
+  HWY_INLINE void Store(LaneArrays& lanes, size_t lane) const {
+    const Floats d;
+    all.Store(lane, lanes.start_re.data(), lanes.start_im.data());
+#pragma GCC unroll 8
+    for (size_t v = 0; v < kVectors; ++v, lane += hn::Lanes(d)) {
+      hn::Store(newborn_re[v], d, lanes.newborn_re.data() + lane);
+      hn::Store(newborn_im[v], d, lanes.newborn_im.data() + lane);
+    }
+  }
+
+  HWY_INLINE void Strike(const float* added_re, const float* added_im) {
+    const Floats d;
+#pragma GCC unroll 8
+    for (size_t v = 0; v < kVectors; ++v) {
+      const V re = hn::Load(d, added_re + v * hn::Lanes(d));
+      const V im = hn::Load(d, added_im + v * hn::Lanes(d));
+      all.re[v] = hn::Add(all.re[v], re);
+      all.im[v] = hn::Add(all.im[v], im);
+      newborn_re[v] = hn::Add(newborn_re[v], re);
+      newborn_im[v] = hn::Add(newborn_im[v], im);
+    }
+  }
+
+  HWY_INLINE void Step(size_t k) {
+#pragma GCC unroll 8
+    for (size_t v = 0; v < kVectors; ++v) all.Multiply(v, k, newborn_re[v], newborn_im[v]);
+  }
+
+  /// `bare`: nothing is newborn yet.
+  HWY_INLINE void Add(size_t begin, size_t end, bool bare, float* mix) {
+    size_t n = begin;
+    for (; n + kTileFrames <= end; n += kTileFrames) {
+      all.AddTile(mix + n * kMostLanes);
+      if (!bare) Step(kTileFrames - 1);
+    }
+    for (; n < end; ++n) {
+      all.AddFrame(mix + n * kMostLanes);
+      if (!bare) Step(0);
+    }
+  }
+
+  HWY_INLINE void Ring(const StruckPart& part, size_t lane, float* mix) {
+    size_t frame = part.begin;
+    for (size_t i = 0; i < part.batch.count; ++i) {
+      Add(frame, part.batch.offsets[i], part.begin == 0 && i == 0, mix);
+      frame = part.batch.offsets[i];
+      Strike(part.batch.re(i, part.lane_count) + lane, part.batch.im(i, part.lane_count) + lane);
+    }
+    Add(frame, part.end, false, mix);
+  }
+};
+
+void RingStruck(LaneArrays& lanes, LaneRange range, const StruckPart& part, float* mix) {
+  const size_t pass = kVectorsAPass * hn::Lanes(Floats());
+  const size_t end = range.first + range.count;
+  size_t lane = range.first;
+  for (; lane + pass <= end; lane += pass) {
+    StruckVectors<kVectorsAPass> vectors;
+    vectors.Load(lanes, lane);
+    vectors.Ring(part, lane, mix);
+    vectors.Store(lanes, lane);
+  }
+  for (; lane < end; lane += hn::Lanes(Floats())) {
+    StruckVectors<1> vectors;
+    vectors.Load(lanes, lane);
+    vectors.Ring(part, lane, mix);
+    vectors.Store(lanes, lane);
+  }
+}
+
+void AddStrike(LaneArrays& lanes, size_t lane_count, const float* added_re, const float* added_im) {
   for (size_t lane = 0; lane < lane_count; lane += hn::Lanes(Floats())) {
-    Vectors<1> vectors;
-    vectors.Load(lanes, lane, re, im);
-    vectors.Add(frame_count, mix);
-    vectors.Store(lane, re, im);
+    StruckVectors<1> vectors;
+    vectors.Load(lanes, lane);
+    vectors.Strike(added_re + lane, added_im + lane);
+    vectors.Store(lanes, lane);
   }
 }
 
@@ -156,29 +247,142 @@ HWY_INLINE hn::Vec<Doubles> AdvanceVector(LaneArrays& lanes, size_t lane, bool n
   return hn::MulAdd(re, re, hn::Mul(im, im));
 }
 
-Advanced Advance(LaneArrays& lanes, size_t lane_count, bool newborn) {
-  const Doubles d;
+/// What is found of a group of lanes while they advance.
+struct GroupState {
+  hn::Vec<Doubles> all_small, loudest;
+
+  HWY_INLINE void Clear() {
+    all_small = hn::Set(Doubles(), 1.0);
+    loudest = hn::Zero(Doubles());
+  }
+  HWY_INLINE void Note(hn::Vec<Doubles> squared) {
+    const Doubles d;
+    loudest = hn::Max(loudest, squared);
+    all_small = hn::IfThenElseZero(hn::Le(squared, hn::Set(d, double{kMostSquared})), all_small);
+  }
+  HWY_INLINE bool Finite() const {
+    return hn::AllTrue(Doubles(), hn::Gt(all_small, hn::Zero(Doubles())));
+  }
+  HWY_INLINE bool Silent(double silence_squared) const {
+    return hn::AllFalse(Doubles(), hn::Gt(loudest, hn::Set(Doubles(), silence_squared)));
+  }
+};
+
+Advanced Advance(LaneArrays& lanes, LaneRange range, bool newborn, double silence_squared) {
   Advanced advanced;
-  for (size_t group = 0; group < lane_count; group += kMostLanes) {
-    auto all_small = hn::Set(d, 1.0);
-    auto loudest = hn::Zero(d);
-    for (size_t i = 0; i < kMostLanes; i += hn::Lanes(d)) {
-      const auto squared = AdvanceVector(lanes, group + i, newborn);
-      loudest = hn::Max(loudest, squared);
-      const auto small = hn::Le(squared, hn::Set(d, double{kMostSquared}));
-      all_small = hn::IfThenElseZero(small, all_small);
+  for (size_t group = 0; group < range.count; group += kMostLanes) {
+    GroupState state;
+    state.Clear();
+    for (size_t i = 0; i < kMostLanes; i += hn::Lanes(Doubles())) {
+      state.Note(AdvanceVector(lanes, range.first + group + i, newborn));
     }
-    advanced.finite &= hn::AllTrue(d, hn::Gt(all_small, hn::Zero(d)));
-    if (hn::AllFalse(d, hn::Gt(loudest, hn::Set(d, kSilenceSquared)))) {
-      lanes.Silence(group, kMostLanes);
+    advanced.finite &= state.Finite();
+    if (state.Silent(silence_squared)) {
+      lanes.Silence({range.first + group, kMostLanes});
     } else {
+      advanced.awake = true;
       advanced.awake_lane_count = group + kMostLanes;
     }
   }
   return advanced;
 }
 
-/// modal_impulse[c] = sum over rows of factor * row[c]: g_m of the header, but for the scale.
+/// The state of a group of spectral lanes in single precision.
+struct GroupStart {
+  alignas(64) float re[kMostLanes], im[kMostLanes];
+};
+
+HWY_INLINE GroupState StartGroup(const SpectralLanes& lanes, size_t group, GroupStart& start) {
+  const Doubles d;
+  const HalfFloats df;
+  GroupState state;
+  state.Clear();
+  for (size_t i = 0; i < kMostLanes; i += hn::Lanes(d)) {
+    const auto re = hn::Load(d, lanes.re.data() + group + i);
+    const auto im = hn::Load(d, lanes.im.data() + group + i);
+    hn::Store(hn::DemoteTo(df, re), df, start.re + i);
+    hn::Store(hn::DemoteTo(df, im), df, start.im + i);
+    state.Note(hn::MulAdd(re, re, hn::Mul(im, im)));
+  }
+  return state;
+}
+
+HWY_INLINE void AdvanceGroup(SpectralLanes& lanes, size_t group) {
+  const Doubles d;
+  for (size_t lane = group; lane < group + kMostLanes; lane += hn::Lanes(d)) {
+    const auto q_re = hn::Load(d, lanes.block_re.data() + lane);
+    const auto q_im = hn::Load(d, lanes.block_im.data() + lane);
+    const auto re = hn::Load(d, lanes.re.data() + lane);
+    const auto im = hn::Load(d, lanes.im.data() + lane);
+    hn::Store(hn::NegMulAdd(im, q_im, hn::Mul(re, q_re)), d, lanes.re.data() + lane);
+    hn::Store(hn::MulAdd(im, q_re, hn::Mul(re, q_im)), d, lanes.im.data() + lane);
+  }
+}
+
+/// slot += (re + i im) * weights, complex numbers lying pairwise in the lanes.
+HWY_INLINE void SpreadMode(const float* HWY_RESTRICT weights, float re, float im,
+                           float* HWY_RESTRICT slot) {
+#if HWY_TARGET == HWY_SCALAR
+  for (size_t i = 0; i < 2 * kSpreadBins; i += 2) {
+    slot[i] += re * weights[i] - im * weights[i + 1];
+    slot[i + 1] += re * weights[i + 1] + im * weights[i];
+  }
+#else
+  const Floats d;
+  const V z_re = hn::Set(d, re);
+  const V z_im = hn::OddEven(hn::Set(d, im), hn::Set(d, -im));
+#pragma GCC unroll 4
+  for (size_t i = 0; i < 2 * kSpreadBins; i += hn::Lanes(d)) {
+    const V w = hn::Load(d, weights + i);
+    const V sum = hn::MulAdd(z_re, w, hn::Load(d, slot + i));
+    hn::Store(hn::MulAdd(z_im, hn::Reverse2(d, w), sum), d, slot + i);
+  }
+#endif
+}
+
+/// Asks for the lines of a group that will be needed soon: the figures of a large scene come from
+/// beyond the caches.
+HWY_INLINE void PrefetchGroup(const SpectralLanes& lanes, size_t group) {
+  constexpr size_t kLine = 64;
+  const auto prefetch = [](const auto* first, size_t count) {
+    for (size_t i = 0; i < count; i += kLine / sizeof(*first)) __builtin_prefetch(first + i);
+  };
+  prefetch(lanes.re.data() + group, kMostLanes);
+  prefetch(lanes.im.data() + group, kMostLanes);
+  prefetch(lanes.block_re.data() + group, kMostLanes);
+  prefetch(lanes.block_im.data() + group, kMostLanes);
+  prefetch(lanes.slot.data() + group, kMostLanes);
+  prefetch(lanes.weights.data() + group * 2 * kSpreadBins, kMostLanes * 2 * kSpreadBins);
+}
+
+Advanced Spread(SpectralLanes& lanes, size_t mode_count, double silence_squared, float* slots) {
+  Advanced advanced;
+  for (size_t group = 0; group < mode_count; group += kMostLanes) {
+    uint8_t& awake = lanes.awake[group / kMostLanes];
+    if (awake == 0) continue;
+    PrefetchGroup(lanes, group + kGroupsAhead * kMostLanes);
+    GroupStart start;
+    const GroupState state = StartGroup(lanes, group, start);
+    advanced.finite &= state.Finite();
+    if (state.Silent(silence_squared)) {
+      std::fill_n(lanes.re.data() + group, kMostLanes, 0.0);
+      std::fill_n(lanes.im.data() + group, kMostLanes, 0.0);
+      awake = 0;
+      continue;
+    }
+    advanced.awake = true;
+    AdvanceGroup(lanes, group);
+    if (!state.Finite()) continue;
+    const size_t count = std::min(kMostLanes, mode_count - group);
+    for (size_t i = 0; i < count; ++i) {
+      const size_t lane = group + i;
+      SpreadMode(lanes.weights.data() + lane * 2 * kSpreadBins, start.re[i], start.im[i],
+                 slots + size_t{lanes.slot.data()[lane]} * 2 * kSpreadBins);
+    }
+  }
+  return advanced;
+}
+
 void Project(const Projection& projection, float* HWY_RESTRICT modal_impulse) {
   const Floats d;
   const size_t count = projection.column_count;
@@ -217,42 +421,27 @@ HWY_INLINE void Delay(const LaneArrays& lanes, size_t lane, V lead, V tau_square
   re = rotated;
 }
 
-/// What the modal impulses add to the states, into added_re and added_im; false: not finite.
-bool Add(const Projection& projection, LaneArrays& lanes, size_t lane_count) {
+bool Excite(const LaneArrays& lanes, size_t lane_count, const float* modal_impulses,
+            const Onset& onset, float* added_re, float* added_im) {
   const Floats d;
   const hn::RebindToSigned<Floats> di;
-  const bool delayed = projection.lead_frames > 0 || projection.tau_s > 0;
-  const V lead = hn::Set(d, projection.lead_frames);
-  const V tau_squared = hn::Set(d, projection.tau_s * projection.tau_s);
+  const bool delayed = onset.lead_frames > 0 || onset.tau_s > 0;
+  const V lead = hn::Set(d, onset.lead_frames);
+  const V tau_squared = hn::Set(d, onset.tau_s * onset.tau_s);
   bool finite = true;
   for (size_t lane = 0; lane < lane_count; lane += hn::Lanes(d)) {
     const auto column =
         hn::BitCast(di, hn::Load(hn::RebindToUnsigned<Floats>(), lanes.column.data() + lane));
-    const V g = hn::GatherIndex(d, lanes.modal_impulse.data(), column);
+    const V g = hn::GatherIndex(d, modal_impulses, column);
     V re = hn::Mul(g, hn::Load(d, lanes.gain_re.data() + lane));
     V im = hn::Mul(g, hn::Load(d, lanes.gain_im.data() + lane));
     if (delayed) Delay(lanes, lane, lead, tau_squared, re, im);
-    hn::Store(re, d, lanes.added_re.data() + lane);
-    hn::Store(im, d, lanes.added_im.data() + lane);
+    hn::Store(re, d, added_re + lane);
+    hn::Store(im, d, added_im + lane);
     const V squared = hn::MulAdd(re, re, hn::Mul(im, im));
     finite &= hn::AllTrue(d, hn::Le(squared, hn::Set(d, kMostSquared)));
   }
   return finite;
-}
-
-void AddTo(float* HWY_RESTRICT sum, const float* HWY_RESTRICT added, size_t lane_count) {
-  const Floats d;
-  for (size_t lane = 0; lane < lane_count; lane += hn::Lanes(d)) {
-    hn::Store(hn::Add(hn::Load(d, sum + lane), hn::Load(d, added + lane)), d, sum + lane);
-  }
-}
-
-bool Excite(const Projection& projection, LaneArrays& lanes, size_t lane_count) {
-  Project(projection, lanes.modal_impulse.data());
-  if (!Add(projection, lanes, lane_count)) return false;
-  AddTo(lanes.newborn_re.data(), lanes.added_re.data(), lane_count);
-  AddTo(lanes.newborn_im.data(), lanes.added_im.data(), lane_count);
-  return true;
 }
 
 const char* Target() { return hwy::TargetName(HWY_TARGET); }
@@ -264,25 +453,44 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace carillon::bank_kernel {
 HWY_EXPORT(Ring);
-HWY_EXPORT(RingNewborn);
+HWY_EXPORT(RingStruck);
+HWY_EXPORT(AddStrike);
 HWY_EXPORT(Advance);
+HWY_EXPORT(Spread);
+HWY_EXPORT(Project);
 HWY_EXPORT(Excite);
 HWY_EXPORT(Target);
 
-void Ring(const LaneArrays& lanes, size_t lane_count, size_t frame_count, float* mix) noexcept {
-  HWY_DYNAMIC_DISPATCH(Ring)(lanes, lane_count, frame_count, mix);
+void Ring(const LaneArrays& lanes, LaneRange range, size_t frame_count, float* mix) noexcept {
+  HWY_DYNAMIC_DISPATCH(Ring)(lanes, range, frame_count, mix);
 }
 
-void RingNewborn(LaneArrays& lanes, size_t lane_count, size_t frame_count, float* mix) noexcept {
-  HWY_DYNAMIC_DISPATCH(RingNewborn)(lanes, lane_count, frame_count, mix);
+void RingStruck(LaneArrays& lanes, LaneRange range, const StruckPart& part, float* mix) noexcept {
+  HWY_DYNAMIC_DISPATCH(RingStruck)(lanes, range, part, mix);
 }
 
-Advanced Advance(LaneArrays& lanes, size_t lane_count, bool newborn) noexcept {
-  return HWY_DYNAMIC_DISPATCH(Advance)(lanes, lane_count, newborn);
+void AddStrike(LaneArrays& lanes, size_t lane_count, const float* added_re,
+               const float* added_im) noexcept {
+  HWY_DYNAMIC_DISPATCH(AddStrike)(lanes, lane_count, added_re, added_im);
 }
 
-bool Excite(const Projection& projection, LaneArrays& lanes, size_t lane_count) noexcept {
-  return HWY_DYNAMIC_DISPATCH(Excite)(projection, lanes, lane_count);
+Advanced Advance(LaneArrays& lanes, LaneRange range, bool newborn,
+                 double silence_squared) noexcept {
+  return HWY_DYNAMIC_DISPATCH(Advance)(lanes, range, newborn, silence_squared);
+}
+
+Advanced Spread(SpectralLanes& lanes, size_t mode_count, double silence_squared,
+                float* slots) noexcept {
+  return HWY_DYNAMIC_DISPATCH(Spread)(lanes, mode_count, silence_squared, slots);
+}
+
+void Project(const Projection& projection, float* modal_impulses) noexcept {
+  HWY_DYNAMIC_DISPATCH(Project)(projection, modal_impulses);
+}
+
+bool Excite(const LaneArrays& lanes, size_t lane_count, const float* modal_impulses,
+            const Onset& onset, float* added_re, float* added_im) noexcept {
+  return HWY_DYNAMIC_DISPATCH(Excite)(lanes, lane_count, modal_impulses, onset, added_re, added_im);
 }
 
 std::string_view Target() { return HWY_DYNAMIC_DISPATCH(Target)(); }

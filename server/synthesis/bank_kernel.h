@@ -6,44 +6,72 @@
 #include <string_view>
 
 #include "server/synthesis/lane_arrays.h"
+#include "server/synthesis/spectral_lanes.h"
+#include "server/synthesis/strike_batch.h"
 
 namespace carillon {
 
 /// The inner loops of an oscillator bank, compiled for every SIMD target and dispatched at run
-/// time. Lane counts are multiples of kMostLanes. None allocates, locks or throws.
+/// time. None allocates, locks or throws.
 namespace bank_kernel {
 
-/// Adds the first `lane_count` lanes' samples [0, frame_count) to `mix` (frame n at
-/// mix[n * kMostLanes]), from the state at the start of the block, which stays.
-void Ring(const LaneArrays& lanes, size_t lane_count, size_t frame_count, float* mix) noexcept;
+/// Adds the samples [0, frame_count) of `range` to `mix` (frame n at mix[n * kMostLanes]), from the
+/// state at the start of the block, which stays.
+void Ring(const LaneArrays& lanes, LaneRange range, size_t frame_count, float* mix) noexcept;
 
-/// The same from the newborn state, which is advanced by `frame_count`.
-void RingNewborn(LaneArrays& lanes, size_t lane_count, size_t frame_count, float* mix) noexcept;
+/// A part of a block, with the strikes that fall into it.
+struct StruckPart {
+  size_t begin = 0;  ///< frames
+  size_t end = 0;
+  StrikeBatch& batch;
+  size_t lane_count = 0;  ///< of the whole bank
+};
 
-/// What Advance found.
+/// The same for [part.begin, part.end), struck at the batch's offsets; advances start and newborn
+/// state to part.end.
+void RingStruck(LaneArrays& lanes, LaneRange range, const StruckPart& part, float* mix) noexcept;
+
+/// Adds to the start and newborn states of the first `lane_count` lanes.
+void AddStrike(LaneArrays& lanes, size_t lane_count, const float* added_re,
+               const float* added_im) noexcept;
+
+/// What Advance and Spread found.
 struct Advanced {
-  size_t awake_lane_count = 0;  ///< all lanes beyond are silent
+  size_t awake_lane_count = 0;  ///< Advance: of the range; all lanes beyond are silent
+  bool awake = false;           ///< any lane is
   bool finite = true;
 };
 
-/// Advances the first `lane_count` lanes by a block; with `newborn`, adds the newborn state, which
-/// it clears. Groups of kMostLanes lanes below -140 dB of full scale are silenced.
-Advanced Advance(LaneArrays& lanes, size_t lane_count, bool newborn) noexcept;
+/// Advances `range` by a block; with `newborn`, adds the newborn state, which it clears. Groups of
+/// kMostLanes lanes whose squared amplitudes are all below `silence_squared` are silenced.
+Advanced Advance(LaneArrays& lanes, LaneRange range, bool newborn, double silence_squared) noexcept;
 
-/// A strike as the kernel needs it.
+/// Adds the first `mode_count` lanes to the slots of a spectrum and advances them by a long block.
+/// Silence as for Advance, before anything is added.
+Advanced Spread(SpectralLanes& lanes, size_t mode_count, double silence_squared,
+                float* slots) noexcept;
+
+/// A strike on the surface as the kernel needs it.
 struct Projection {
   /// For each vertex and axis: the row of the shape table from the first column projected, and
   /// weight times impulse.
   std::array<const float*, 9> rows{};
   std::array<float, 9> factors{};
   size_t column_count = 0;
-  float lead_frames = 0;
-  float tau_s = 0;
 };
 
-/// Projects a strike onto the modes and adds it to the newborn state. False: not finite, and
-/// nothing was added.
-bool Excite(const Projection& projection, LaneArrays& lanes, size_t lane_count) noexcept;
+/// modal_impulses[c] = sum over rows of factor * row[c]: g_m, but for the scale of the shapes.
+void Project(const Projection& projection, float* modal_impulses) noexcept;
+
+/// How modal impulses reach the states.
+struct Onset {
+  float lead_frames = 0;  ///< from the strike to its first sample
+  float tau_s = 0;        ///< of the Gaussian contact
+};
+
+/// What modal impulses add to the states, into added_re and added_im. False: not finite.
+bool Excite(const LaneArrays& lanes, size_t lane_count, const float* modal_impulses,
+            const Onset& onset, float* added_re, float* added_im) noexcept;
 
 /// Name of the target dispatched to.
 std::string_view Target();

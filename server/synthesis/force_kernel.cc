@@ -56,15 +56,12 @@ HWY_INLINE V LoadColumns(const LaneArrays& lanes, size_t lane, const float* valu
   return hn::GatherIndex(Floats(), values, hn::BitCast(signed_tag, column));
 }
 
-void Kink(const ForceArrays& force, LaneArrays& lanes) {
+void Kink(const ForceArrays& force, const LaneArrays& lanes, float* added_re, float* added_im) {
   const Floats d;
-  float *re = lanes.newborn_re.data(), *im = lanes.newborn_im.data();
   for (size_t lane = 0; lane < force.lane_count; lane += hn::Lanes(d)) {
     const V jump = LoadColumns(lanes, lane, force.jump.data());
-    hn::Store(hn::MulAdd(jump, hn::Load(d, force.kink_re.data() + lane), hn::Load(d, re + lane)), d,
-              re + lane);
-    hn::Store(hn::MulAdd(jump, hn::Load(d, force.kink_im.data() + lane), hn::Load(d, im + lane)), d,
-              im + lane);
+    hn::Store(hn::Mul(jump, hn::Load(d, force.kink_re.data() + lane)), d, added_re + lane);
+    hn::Store(hn::Mul(jump, hn::Load(d, force.kink_im.data() + lane)), d, added_im + lane);
   }
 }
 
@@ -88,8 +85,30 @@ void Aim(float position, float scale, const LaneArrays& lanes, ForceArrays& forc
   }
 }
 
-void DriveNewborn(const ForceArrays& force, const float* from_share, const float* to_share,
-                  size_t frame_count, LaneArrays& lanes, float* mix) {
+/// A state of complex numbers that is driven and advanced by q.
+struct DrivenState {
+  V re, im;
+
+  HWY_INLINE void Load(const float* from_re, const float* from_im) {
+    re = hn::Load(Floats(), from_re);
+    im = hn::Load(Floats(), from_im);
+  }
+  HWY_INLINE void Store(float* to_re, float* to_im) const {
+    hn::Store(re, Floats(), to_re);
+    hn::Store(im, Floats(), to_im);
+  }
+  HWY_INLINE void Grow(V by_re, V by_im) {
+    re = hn::Add(re, by_re);
+    im = hn::Add(im, by_im);
+  }
+  HWY_INLINE void Step(V q_re, V q_im) {
+    const V next = hn::NegMulAdd(im, q_im, hn::Mul(re, q_re));
+    im = hn::MulAdd(im, q_re, hn::Mul(re, q_im));
+    re = next;
+  }
+};
+
+void RingDriven(const ForceArrays& force, const Drive& drive, LaneArrays& lanes, float* mix) {
   const Floats d;
   for (size_t lane = 0; lane < force.lane_count; lane += hn::Lanes(d)) {
     const float* power = lanes.powers.data() + LaneArrays::PowerIndex(lane, 0);
@@ -98,20 +117,22 @@ void DriveNewborn(const ForceArrays& force, const float* from_share, const float
     const V from_im = hn::Load(d, force.from_im.data() + lane);
     const V to_re = hn::Load(d, force.to_re.data() + lane);
     const V to_im = hn::Load(d, force.to_im.data() + lane);
-    V re = hn::Load(d, lanes.newborn_re.data() + lane);
-    V im = hn::Load(d, lanes.newborn_im.data() + lane);
-    for (size_t n = 0; n < frame_count; ++n) {
-      const V a = hn::Set(d, from_share[n]), b = hn::Set(d, to_share[n]);
-      re = hn::MulAdd(a, from_re, hn::MulAdd(b, to_re, re));
-      im = hn::MulAdd(a, from_im, hn::MulAdd(b, to_im, im));
+    DrivenState all, newborn;
+    all.Load(lanes.start_re.data() + lane, lanes.start_im.data() + lane);
+    newborn.Load(lanes.newborn_re.data() + lane, lanes.newborn_im.data() + lane);
+    for (size_t n = 0; n < drive.frame_count; ++n) {
+      const V a = hn::Set(d, drive.from_share[n]), b = hn::Set(d, drive.to_share[n]);
+      const V by_re = hn::MulAdd(a, from_re, hn::Mul(b, to_re));
+      const V by_im = hn::MulAdd(a, from_im, hn::Mul(b, to_im));
+      all.Grow(by_re, by_im);
+      newborn.Grow(by_re, by_im);
       float* HWY_RESTRICT frame = mix + n * kMostLanes;
-      hn::Store(hn::Add(hn::Load(d, frame), re), d, frame);
-      const V next = hn::NegMulAdd(im, q_im, hn::Mul(re, q_re));
-      im = hn::MulAdd(im, q_re, hn::Mul(re, q_im));
-      re = next;
+      hn::Store(hn::Add(hn::Load(d, frame), all.re), d, frame);
+      all.Step(q_re, q_im);
+      newborn.Step(q_re, q_im);
     }
-    hn::Store(re, d, lanes.newborn_re.data() + lane);
-    hn::Store(im, d, lanes.newborn_im.data() + lane);
+    all.Store(lanes.start_re.data() + lane, lanes.start_im.data() + lane);
+    newborn.Store(lanes.newborn_re.data() + lane, lanes.newborn_im.data() + lane);
   }
 }
 
@@ -136,7 +157,7 @@ HWY_EXPORT(Gather);
 HWY_EXPORT(EndStep);
 HWY_EXPORT(Kink);
 HWY_EXPORT(Aim);
-HWY_EXPORT(DriveNewborn);
+HWY_EXPORT(RingDriven);
 
 void Gather(const bank_kernel::Projection& projection, float* next) noexcept {
   HWY_DYNAMIC_DISPATCH(Gather)(projection, next);
@@ -146,17 +167,18 @@ bool EndStep(float rate_hz, ForceArrays& force) noexcept {
   return HWY_DYNAMIC_DISPATCH(EndStep)(rate_hz, force);
 }
 
-void Kink(const ForceArrays& force, LaneArrays& lanes) noexcept {
-  HWY_DYNAMIC_DISPATCH(Kink)(force, lanes);
+void Kink(const ForceArrays& force, const LaneArrays& lanes, float* added_re,
+          float* added_im) noexcept {
+  HWY_DYNAMIC_DISPATCH(Kink)(force, lanes, added_re, added_im);
 }
 
 void Aim(float position, float scale, const LaneArrays& lanes, ForceArrays& force) noexcept {
   HWY_DYNAMIC_DISPATCH(Aim)(position, scale, lanes, force);
 }
 
-void DriveNewborn(const ForceArrays& force, const float* from_share, const float* to_share,
-                  size_t frame_count, LaneArrays& lanes, float* mix) noexcept {
-  HWY_DYNAMIC_DISPATCH(DriveNewborn)(force, from_share, to_share, frame_count, lanes, mix);
+void RingDriven(const ForceArrays& force, const Drive& drive, LaneArrays& lanes,
+                float* mix) noexcept {
+  HWY_DYNAMIC_DISPATCH(RingDriven)(force, drive, lanes, mix);
 }
 
 }  // namespace force_kernel

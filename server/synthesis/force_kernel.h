@@ -49,17 +49,25 @@ void Gather(const bank_kernel::Projection& projection, float* next) noexcept;
 /// False: a force was not finite, and all are zero now.
 bool EndStep(float rate_hz, ForceArrays& force) noexcept;
 
-/// Adds the kinks of `jump` to the newborn state.
-void Kink(const ForceArrays& force, LaneArrays& lanes) noexcept;
+/// What the kinks of `jump` add to the states, into added_re and added_im.
+void Kink(const ForceArrays& force, const LaneArrays& lanes, float* added_re,
+          float* added_im) noexcept;
 
 /// from = where the drive stands, `position` (0 to 1) of the way to `to`; to = `last` times
 /// `scale`.
 void Aim(float position, float scale, const LaneArrays& lanes, ForceArrays& force) noexcept;
 
-/// Adds the newborn state's samples to `mix` while driving it: before sample n it grows by
-/// from * from_share[n] + to * to_share[n].
-void DriveNewborn(const ForceArrays& force, const float* from_share, const float* to_share,
-                  size_t frame_count, LaneArrays& lanes, float* mix) noexcept;
+/// How the drive runs: before sample n the states grow by from * from_share[n] + to * to_share[n].
+struct Drive {
+  const float* from_share = nullptr;
+  const float* to_share = nullptr;
+  size_t frame_count = 0;
+};
+
+/// Adds the samples of all lanes to `mix` while driving them, as bank_kernel::RingStruck does for
+/// strikes.
+void RingDriven(const ForceArrays& force, const Drive& drive, LaneArrays& lanes,
+                float* mix) noexcept;
 
 }  // namespace force_kernel
 }  // namespace carillon

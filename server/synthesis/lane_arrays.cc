@@ -5,7 +5,7 @@
 
 namespace carillon {
 
-LaneArrays::LaneArrays(size_t lane_count, size_t column_count)
+LaneArrays::LaneArrays(size_t lane_count)
     : powers(lane_count * 2 * kTileFrames),
       block_re(lane_count),
       block_im(lane_count),
@@ -21,17 +21,14 @@ LaneArrays::LaneArrays(size_t lane_count, size_t column_count)
       lead_im(lane_count),
       tau_re(lane_count),
       tau_im(lane_count),
-      column(lane_count),
-      modal_impulse(column_count),
-      added_re(lane_count),
-      added_im(lane_count) {}
+      column(lane_count) {}
 
-void LaneArrays::Silence(size_t first_lane, size_t lane_count) noexcept {
+void LaneArrays::Silence(LaneRange range) noexcept {
   for (LaneArray<double>* state : {&re, &im}) {
-    std::fill_n(state->data() + first_lane, lane_count, 0.0);
+    std::fill_n(state->data() + range.first, range.count, 0.0);
   }
   for (LaneArray<float>* state : {&start_re, &start_im}) {
-    std::fill_n(state->data() + first_lane, lane_count, 0.0F);
+    std::fill_n(state->data() + range.first, range.count, 0.0F);
   }
 }
 

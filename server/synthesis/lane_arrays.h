@@ -35,25 +35,31 @@ class LaneArray {
   std::unique_ptr<T[], Delete> values_;
 };
 
-/// The figures of a bank's modes, one lane each: first the modes in the order of their columns,
-/// then the companions, then silent lanes up to a whole vector.
+/// Lanes [first, first + count), whole groups of kMostLanes.
+struct LaneRange {
+  size_t first = 0;
+  size_t count = 0;
+};
+
+/// The figures of a bank's modes as they ring in the time domain, one lane each.
 struct LaneArrays {
-  /// `lane_count` is a multiple of kMostLanes; `column_count` columns are projected.
-  LaneArrays(size_t lane_count, size_t column_count);
+  /// `lane_count` is a multiple of kMostLanes.
+  explicit LaneArrays(size_t lane_count);
 
   /// Where power k + 1 of lane's q is, real part; its imaginary part is kMostLanes further.
   static size_t PowerIndex(size_t lane, size_t k) {
     return (lane / kMostLanes * kTileFrames + k) * 2 * kMostLanes + lane % kMostLanes;
   }
 
-  /// Zeroes the state at the start of the block of `lane_count` lanes from `first_lane` on.
-  void Silence(size_t first_lane, size_t lane_count) noexcept;
+  /// Zeroes the state at the start of the block.
+  void Silence(LaneRange range) noexcept;
 
   /// q, q^2, q^3, q^4: for each kMostLanes lanes together, see PowerIndex.
   LaneArray<float> powers;
   /// q^N for a block of N frames.
   LaneArray<double> block_re, block_im;
-  /// The state at the start of the block, and the same in single precision.
+  /// The state at the start of the block, and the same in single precision, which advances within a
+  /// block that has strikes.
   LaneArray<double> re, im;
   LaneArray<float> start_re, start_im;
   /// The state of what was struck in this block.
@@ -67,9 +73,6 @@ struct LaneArrays {
   LaneArray<float> tau_re, tau_im;
   /// Where among the projected columns.
   LaneArray<uint32_t> column;
-
-  /// Of the strike under way: modal impulses by column, additions to the state by lane.
-  LaneArray<float> modal_impulse, added_re, added_im;
 };
 
 }  // namespace carillon

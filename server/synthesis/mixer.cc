@@ -4,7 +4,6 @@
 #include "server/synthesis/mixer.h"
 
 #include <algorithm>
-#include <array>
 #include <cassert>
 #include <cmath>
 
@@ -18,29 +17,32 @@ void Count(std::atomic<uint64_t>& counter, uint64_t more = 1) noexcept {
   counter.store(counter.load(std::memory_order_relaxed) + more, std::memory_order_relaxed);
 }
 
+/// Of a strike's place in the order of rendering.
+constexpr uint64_t kArrivalMask = (uint64_t{1} << 28) - 1;
+
 }  // namespace
 
 void Mixer::Render(std::span<float> frames) noexcept {
   assert(frames.size() % settings_.block_frame_count == 0);
   const FlushDenormals flush_denormals;
-  for (; !frames.empty(); frames = frames.subspan(settings_.block_frame_count)) {
-    RenderBlock(frames.first(settings_.block_frame_count));
+  while (!frames.empty()) {
+    const size_t count = std::min(frames.size(), kBlocksTogether * settings_.block_frame_count);
+    RenderBlocks(frames.first(count));
+    frames = frames.subspan(count);
   }
 }
 
-void Mixer::RenderBlock(std::span<float> block) noexcept {
+void Mixer::RenderBlocks(std::span<float> frames) noexcept {
+  const size_t block_count = frames.size() / settings_.block_frame_count;
   ObeyCommands();
-  TakeStrikes();
-  mix_.Clear(block.size());
-  StrikeDueBanks();
-  RenderBanks();
-  mix_.Reduce(block);
-  RenderFadingBanks(block);
-  DismissSilentBanks();
+  TakeStrikes(block_count);
+  CollectDueStrikes(block_count);
+  RenderSections(frames);
+  pending_.Forget(due_);
   RetireLeavingBanks();
-  NotePeak(block);
-  Count(statistics_.limited_frame_count, limiter_.Apply(block));
-  block_start_ += block.size();
+  NotePeak(frames);
+  Count(statistics_.limited_frame_count, limiter_.Apply(frames));
+  block_start_ += frames.size();
   statistics_.frame_count.store(block_start_, std::memory_order_release);
 }
 
@@ -52,26 +54,29 @@ void Mixer::Obey(const Command& command) noexcept {
   if (command.kind == Command::Kind::kAddStream) {
     open_queues_.push_back(command.queue);
   } else if (command.kind == Command::Kind::kAddBank) {
-    slots_[command.id.slot] = {.bank = command.bank, .generation = command.id.generation};
+    slots_[command.id.slot] = {
+        .bank = command.bank, .generation = command.id.generation, .section = command.section};
     Count(statistics_.bank_count);
-  } else if (Slot* slot = FindSlot(command.id)) {  // it may have rung out before it was to fade
+  } else if (BankSlot* slot = FindSlot(command.id)) {  // it may have rung out before it was to fade
     if (!slot->leaving) leaving_.push_back(command.id.slot);
     slot->leaving = true;
-    slot->fading |= command.kind == Command::Kind::kFadeOut;
+    if (command.kind != Command::Kind::kFadeOut) return;
+    slot->fading = true;
+    slot->bank->LeaveSpectrum();
   }
 }
 
-Mixer::Slot* Mixer::FindSlot(BankId id) noexcept {
+BankSlot* Mixer::FindSlot(BankId id) noexcept {
   if (id.slot >= slots_.size()) return nullptr;
-  Slot& slot = slots_[id.slot];
+  BankSlot& slot = slots_[id.slot];
   return slot.bank != nullptr && slot.generation == id.generation ? &slot : nullptr;
 }
 
-void Mixer::TakeStrikes() noexcept {
+void Mixer::TakeStrikes(size_t block_count) noexcept {
   // Each block begins with another stream, so that a flood in one does not starve the rest.
   const size_t count = open_queues_.size();
   const size_t first = count == 0 ? 0 : block_start_ / settings_.block_frame_count % count;
-  size_t budget = settings_.most_strikes_per_block;
+  size_t budget = settings_.most_strikes_per_block * block_count;
   all_strikes_taken_ = true;
   for (size_t i = 0; i < count; ++i) {
     StrikeQueue& queue = *open_queues_[(first + i) % count];
@@ -92,7 +97,7 @@ void Mixer::Take(const Strike& strike, StrikeQueue& queue) noexcept {
     ObeyCommands();
     all_strikes_taken_ = false;
   }
-  Slot* slot = FindSlot(strike.bank);
+  BankSlot* slot = FindSlot(strike.bank);
   const bool between = strike.fraction > 0;
   PendingStrike pending{.sample = strike.frame + (between ? 1 : 0),
                         .lead_frames = between ? 1 - strike.fraction : 0,
@@ -115,79 +120,61 @@ void Mixer::Take(const Strike& strike, StrikeQueue& queue) noexcept {
   Count(late ? statistics_.late_count : statistics_.accepted_count);
 }
 
-void Mixer::StrikeDueBanks() noexcept {
-  const uint64_t block_end = block_start_ + settings_.block_frame_count;
-  size_t budget = settings_.most_strikes_per_block;
-  for (; budget > 0 && !pending_.empty() && pending_.front().sample < block_end; --budget) {
-    StrikeBank(pending_.front());
-    pending_.PopFront();
+void Mixer::CollectDueStrikes(size_t block_count) noexcept {
+  due_.clear();
+  due_order_.clear();
+  due_strikes_.clear();
+  for (size_t block = 0; block < block_count; ++block) {
+    const uint64_t start = block_start_ + block * settings_.block_frame_count;
+    const size_t first = due_.size();
+    pending_.Collect(start, due_);
+    for (size_t i = first; i < due_.size(); ++i) {
+      const PendingStrike& strike = pending_[due_[i]];
+      BankSlot* slot = FindSlot(strike.bank);
+      if (slot == nullptr) {
+        Count(statistics_.dropped_count);
+        continue;
+      }
+      --slot->pending_count;
+      // By section, block, bank and offset, then by arrival.
+      due_order_.push_back(uint64_t{slot->section} << 60 | block << 52 |
+                           uint64_t{strike.bank.slot} << 36 | (strike.sample - start) << 28 | i);
+    }
+  }
+  std::ranges::sort(due_order_);
+  due_ends_.fill(0);
+  for (const uint64_t order : due_order_) {
+    const PendingStrike& strike = pending_[due_[order & kArrivalMask]];
+    due_strikes_.push_back({.slot = strike.bank.slot,
+                            .block = static_cast<uint32_t>(order >> 52 & 0xFF),
+                            .offset = static_cast<uint32_t>(order >> 28 & 0xFF),
+                            .strike = &strike});
+    due_ends_[order >> 60] = due_strikes_.size();
   }
 }
 
-void Mixer::StrikeBank(const PendingStrike& strike) noexcept {
-  Slot* slot = FindSlot(strike.bank);
-  if (slot == nullptr || slot->fading) return Count(statistics_.dropped_count);
-  --slot->pending_count;
-  const bool postponed = strike.sample < block_start_;
-  Count(statistics_.postponed_count, postponed ? 1 : 0);
-  const size_t offset = postponed ? 0 : static_cast<size_t>(strike.sample - block_start_);
-  if (!Excite(*slot->bank, strike, offset)) return Count(statistics_.dropped_count);
-  if (strike.kind == StrikeKind::kForce) return;  // nothing moves before the knot
-  if (!slot->sounding) sounding_.push_back(strike.bank.slot);
-  slot->sounding = true;
-}
-
-bool Mixer::Excite(OscillatorBank& bank, const PendingStrike& strike, size_t offset) noexcept {
-  switch (strike.kind) {
-    case StrikeKind::kForce:
-      return bank.Gather(strike.excitation);
-    case StrikeKind::kKnot:
-      return bank.Tie(strike.knot, offset, mix_);
-    default:
-      return bank.Strike(strike.excitation, offset, strike.lead_frames, mix_);
-  }
-}
-
-void Mixer::RenderBanks() noexcept {
+void Mixer::RenderSections(std::span<float> frames) noexcept {
+  const std::span<float> section_frames = std::span(section_frames_).first(frames.size());
+  std::ranges::fill(frames, 0.0F);
   uint64_t active_mode_count = 0;
-  for (const uint32_t index : sounding_) {
-    Slot& slot = slots_[index];
-    active_mode_count += slot.bank->active_mode_count();
-    if (!slot.fading) RenderBank(slot, mix_);
+  size_t begin = 0;
+  for (size_t section = 0; section < kSectionCount; ++section) {
+    const size_t end = std::max(due_ends_[section], begin);
+    const SectionCounts counts = sections_[section].Render(
+        block_start_ / settings_.block_frame_count,
+        std::span(due_strikes_).subspan(begin, end - begin), section_frames, desk_);
+    begin = end;
+    for (size_t n = 0; n < frames.size(); ++n) frames[n] += section_frames[n];
+    Count(statistics_.dropped_count, counts.dropped_count);
+    Count(statistics_.reset_bank_count, counts.reset_bank_count);
+    active_mode_count += counts.active_mode_count;
   }
   statistics_.active_mode_count.store(active_mode_count, std::memory_order_relaxed);
 }
 
-void Mixer::RenderBank(Slot& slot, LaneMix& mix) noexcept {
-  if (!slot.bank->RenderAdd(mix)) Count(statistics_.reset_bank_count);
-}
-
-void Mixer::RenderFadingBanks(std::span<float> block) noexcept {
-  std::array<float, kMostBlockFrames> faded;
-  for (const uint32_t index : sounding_) {
-    Slot& slot = slots_[index];
-    if (!slot.fading) continue;
-    fading_mix_.Clear(block.size());
-    RenderBank(slot, fading_mix_);
-    fading_mix_.Reduce(std::span(faded).first(block.size()));
-    for (size_t n = 0; n < block.size(); ++n) {
-      slot.fade_gain = std::max(slot.fade_gain - fade_step_, 0.0F);
-      block[n] += slot.fade_gain * faded[n];
-    }
-  }
-}
-
-void Mixer::DismissSilentBanks() noexcept {
-  std::erase_if(sounding_, [this](uint32_t index) {
-    Slot& slot = slots_[index];
-    slot.sounding = !slot.bank->silent() && slot.fade_gain > 0;
-    return !slot.sounding;
-  });
-}
-
 void Mixer::RetireLeavingBanks() noexcept {
   std::erase_if(leaving_, [this](uint32_t index) {
-    Slot& slot = slots_[index];
+    BankSlot& slot = slots_[index];
     const bool awaited = !slot.fading && (slot.pending_count > 0 || !all_strikes_taken_);
     if (slot.sounding || awaited) return false;
     SendBack({.id = {.slot = index, .generation = slot.generation}});

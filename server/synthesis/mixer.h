@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
@@ -12,14 +13,23 @@
 #include "absl/status/statusor.h"
 #include "server/base/mutex.h"
 #include "server/base/spsc_ring.h"
-#include "server/synthesis/lane_mix.h"
+#include "server/synthesis/bank_slot.h"
+#include "server/synthesis/block_mix.h"
 #include "server/synthesis/limiter.h"
 #include "server/synthesis/oscillator_bank.h"
 #include "server/synthesis/pending_strikes.h"
+#include "server/synthesis/render_section.h"
 #include "server/synthesis/strike.h"
 #include "server/synthesis/strike_stream.h"
 
 namespace carillon {
+
+/// Parts that a mixer's banks are spread over.
+inline constexpr size_t kSectionCount = 8;
+
+/// Blocks that are rendered in one go where the caller asks for as many: each section renders all
+/// of them before the next does.
+inline constexpr size_t kBlocksTogether = 8;
 
 /// Bounds of a mixer; all memory is taken when it is made.
 struct MixerSettings {
@@ -27,8 +37,8 @@ struct MixerSettings {
   size_t block_frame_count = 128;  ///< at most kMostBlockFrames
   size_t most_banks = 8192;        ///< those that ring out or fade included
   size_t most_streams = 1024;
-  size_t most_pending_strikes = 65536;   ///< waiting for their time
-  size_t most_strikes_per_block = 1024;  ///< further ones sound in the next block
+  size_t most_pending_strikes = 262144;   ///< waiting for their time
+  size_t most_strikes_per_block = 32768;  ///< taken from the streams; further ones wait there
 };
 
 /// What a mixer has counted since it was made, and what it renders now.
@@ -37,7 +47,6 @@ struct MixerStatistics {
   uint64_t accepted_count = 0;       ///< strikes that came in time
   uint64_t late_count = 0;           ///< strikes that came too late and sounded at once
   uint64_t dropped_count = 0;        ///< strikes lost: no such bank, too many, or not finite
-  uint64_t postponed_count = 0;      ///< strikes put off because a block had too many
   uint64_t reset_bank_count = 0;     ///< banks silenced because their state was not finite
   uint64_t limited_frame_count = 0;  ///< frames in which the limiter worked
   uint64_t bank_count = 0;           ///< on the mixer
@@ -45,6 +54,9 @@ struct MixerStatistics {
 };
 
 /// Renders all sounding objects into one stream of samples.
+///
+/// Banks are spread over kSectionCount sections, whose long blocks begin in different blocks, so
+/// that the work is even.
 ///
 /// Threads: one at a time calls Render; any may call the rest. Nothing under Render allocates,
 /// locks, logs, throws or calls the system. The same strikes sound bit for bit the same on one SIMD
@@ -67,7 +79,8 @@ class Mixer {
   /// still sound.
   void LetRingOut(BankId bank);
 
-  /// Takes a bank off after a fade of 10 ms; strikes on their way to it are lost.
+  /// Takes a bank off after a fade of 10 ms, which begins when its long blocks under way have
+  /// ended, within 1024 frames; strikes on their way to it are lost.
   void FadeOut(BankId bank);
 
   /// A new stream of strikes, of which `capacity` may wait to be taken.
@@ -94,6 +107,7 @@ class Mixer {
     enum class Kind { kAddBank, kLetRingOut, kFadeOut, kAddStream } kind;
     BankId id{};
     OscillatorBank* bank = nullptr;
+    uint32_t section = 0;
     StrikeQueue* queue = nullptr;
   };
   /// Back: a bank's slot, or a stream's queue, that Render holds no longer.
@@ -101,50 +115,38 @@ class Mixer {
     BankId id{};
     StrikeQueue* queue = nullptr;
   };
-  /// A place for a bank as the rendering thread sees it.
-  struct Slot {
-    OscillatorBank* bank = nullptr;
-    uint32_t generation = 0;
-    uint32_t pending_count = 0;  // strikes that wait for their time
-    bool sounding = false;       // is in sounding_
-    bool leaving = false;        // is in leaving_
-    bool fading = false;
-    float fade_gain = 1;
-  };
   /// A place for a bank as the controlling threads see it.
   struct OwnedBank {
     std::unique_ptr<OscillatorBank> bank;
     uint32_t generation = 0;
+    uint32_t section = 0;
+    size_t mode_count = 0;
     bool leaving = false;
     bool fading = false;
   };
   struct Counters {
     std::atomic<uint64_t> frame_count{0};
-    std::atomic<uint64_t> accepted_count{0}, late_count{0}, dropped_count{0}, postponed_count{0};
+    std::atomic<uint64_t> accepted_count{0}, late_count{0}, dropped_count{0};
     std::atomic<uint64_t> reset_bank_count{0}, limited_frame_count{0};
     std::atomic<uint64_t> bank_count{0}, active_mode_count{0};
   };
 
   OwnedBank* Find(BankId id) ABSL_EXCLUSIVE_LOCKS_REQUIRED(control_mutex_);
+  uint32_t ChooseSection() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(control_mutex_);
   void Send(const Command& command) ABSL_EXCLUSIVE_LOCKS_REQUIRED(control_mutex_);
 
   // The rest is the rendering thread's.
-  void RenderBlock(std::span<float> block) noexcept;
+  void RenderBlocks(std::span<float> frames) noexcept;
   void ObeyCommands() noexcept;
   void Obey(const Command& command) noexcept;
-  void TakeStrikes() noexcept;
+  void TakeStrikes(size_t block_count) noexcept;
   void Take(const Strike& strike, StrikeQueue& queue) noexcept;
-  void StrikeDueBanks() noexcept;
-  void StrikeBank(const PendingStrike& strike) noexcept;
-  bool Excite(OscillatorBank& bank, const PendingStrike& strike, size_t offset) noexcept;
-  void RenderBanks() noexcept;
-  void RenderBank(Slot& slot, LaneMix& mix) noexcept;
-  void RenderFadingBanks(std::span<float> block) noexcept;
-  void DismissSilentBanks() noexcept;
+  void CollectDueStrikes(size_t block_count) noexcept;
+  void RenderSections(std::span<float> frames) noexcept;
   void RetireLeavingBanks() noexcept;
   void SendBack(const Retired& retired) noexcept;
   void NotePeak(std::span<const float> block) noexcept;
-  Slot* FindSlot(BankId id) noexcept;
+  BankSlot* FindSlot(BankId id) noexcept;
 
   const MixerSettings settings_;
   Counters statistics_;
@@ -153,21 +155,26 @@ class Mixer {
   Mutex control_mutex_;
   std::vector<OwnedBank> owned_ ABSL_GUARDED_BY(control_mutex_);
   std::vector<uint32_t> free_slots_ ABSL_GUARDED_BY(control_mutex_);
+  std::array<size_t, kSectionCount> section_mode_counts_ ABSL_GUARDED_BY(control_mutex_){};
   std::vector<std::shared_ptr<StrikeQueue>> queues_ ABSL_GUARDED_BY(control_mutex_);
   SpscRing<Command> commands_;  // produced under control_mutex_
   SpscRing<Retired> retired_;   // consumed under control_mutex_
 
-  const float fade_step_;
   uint64_t block_start_ = 0;
-  std::vector<Slot> slots_;
-  std::vector<uint32_t> sounding_;  // slots whose banks are not silent, in order of their awakening
-  std::vector<uint32_t> leaving_;   // slots to be retired when they are silent
+  std::vector<BankSlot> slots_;
+  std::vector<uint32_t> leaving_;  // slots to be retired when they are silent
   std::vector<StrikeQueue*> open_queues_;
   // All that was pushed before the commands of this block were given: a bank let ring out may be
   // retired, for no strike is on its way to it.
   bool all_strikes_taken_ = true;
   PendingStrikes pending_;
-  LaneMix mix_, fading_mix_;
+  std::vector<uint32_t> due_;        // of the blocks rendered together: places in pending_
+  std::vector<uint64_t> due_order_;  // see CollectDueStrikes
+  std::vector<DueStrike> due_strikes_;
+  std::array<size_t, kSectionCount + 1> due_ends_{};  // in due_strikes_
+  std::vector<RenderSection> sections_;
+  std::vector<float> section_frames_;
+  RenderDesk desk_;
   Limiter limiter_;
 };
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The controlling threads' side of the mixer.
+#include <algorithm>
 #include <cassert>
 #include <utility>
 
@@ -11,6 +12,8 @@ namespace carillon {
 namespace {
 
 constexpr double kFadeS = 0.01;
+/// A strike's place in the order of rendering has so much room for the slot.
+constexpr size_t kMostBanks = 65536;
 
 }  // namespace
 
@@ -20,15 +23,27 @@ Mixer::Mixer(const MixerSettings& settings)
       // Each bank is added, let ring out and faded at most once before its slot is used again.
       commands_(3 * settings.most_banks + settings.most_streams),
       retired_(settings.most_banks + settings.most_streams),
-      fade_step_(static_cast<float>(1 / (kFadeS * settings.sample_rate_hz))),
       slots_(settings.most_banks),
-      pending_(settings.most_pending_strikes),
+      pending_(settings.most_pending_strikes, settings.block_frame_count),
+      section_frames_(kBlocksTogether * settings.block_frame_count),
+      desk_(settings.block_frame_count),
       limiter_(settings.sample_rate_hz) {
   assert(settings.block_frame_count > 0 && settings.block_frame_count <= kMostBlockFrames);
+  assert(settings.most_banks <= kMostBanks);
+  for (size_t section = 0; section < kSectionCount; ++section) {
+    sections_.emplace_back(RenderSection::Settings{.block_frame_count = settings.block_frame_count,
+                                                   .stagger = section,
+                                                   .most_banks = settings.most_banks,
+                                                   .fade_step = static_cast<float>(
+                                                       1 / (kFadeS * settings.sample_rate_hz))},
+                           slots_);
+  }
+  due_.reserve(settings.most_pending_strikes);
+  due_order_.reserve(settings.most_pending_strikes);
+  due_strikes_.reserve(settings.most_pending_strikes);
   for (size_t slot = settings.most_banks; slot-- > 0;) {
     free_slots_.push_back(static_cast<uint32_t>(slot));
   }
-  sounding_.reserve(settings.most_banks);
   leaving_.reserve(settings.most_banks);
   open_queues_.reserve(settings.most_streams);
 }
@@ -45,9 +60,17 @@ absl::StatusOr<BankId> Mixer::Add(std::unique_ptr<OscillatorBank> bank) {
   const uint32_t slot = free_slots_.back();
   free_slots_.pop_back();
   OwnedBank& owned = owned_[slot];
-  owned = {.bank = std::move(bank), .generation = owned.generation + 1};
+  const size_t mode_count = bank->mode_count();
+  owned = {.bank = std::move(bank),
+           .generation = owned.generation + 1,
+           .section = ChooseSection(),
+           .mode_count = mode_count};
+  section_mode_counts_[owned.section] += mode_count;
   const BankId id{.slot = slot, .generation = owned.generation};
-  Send({.kind = Command::Kind::kAddBank, .id = id, .bank = owned.bank.get()});
+  Send({.kind = Command::Kind::kAddBank,
+        .id = id,
+        .bank = owned.bank.get(),
+        .section = owned.section});
   return id;
 }
 
@@ -87,7 +110,9 @@ void Mixer::CollectGarbage() {
     if (retired.queue != nullptr) {
       std::erase_if(queues_, [&](const auto& queue) { return queue.get() == retired.queue; });
     } else {
-      garbage.push_back(std::move(owned_[retired.id.slot].bank));
+      OwnedBank& owned = owned_[retired.id.slot];
+      section_mode_counts_[owned.section] -= owned.mode_count;
+      garbage.push_back(std::move(owned.bank));
       free_slots_.push_back(retired.id.slot);
     }
   }
@@ -98,11 +123,15 @@ MixerStatistics Mixer::statistics() const noexcept {
           .accepted_count = statistics_.accepted_count,
           .late_count = statistics_.late_count,
           .dropped_count = statistics_.dropped_count,
-          .postponed_count = statistics_.postponed_count,
           .reset_bank_count = statistics_.reset_bank_count,
           .limited_frame_count = statistics_.limited_frame_count,
           .bank_count = statistics_.bank_count,
           .active_mode_count = statistics_.active_mode_count};
+}
+
+uint32_t Mixer::ChooseSection() const {
+  return static_cast<uint32_t>(std::ranges::min_element(section_mode_counts_) -
+                               section_mode_counts_.begin());
 }
 
 Mixer::OwnedBank* Mixer::Find(BankId id) {

@@ -8,19 +8,16 @@
 #include <utility>
 
 #include "server/synthesis/bank_kernel.h"
-#include "server/synthesis/level.h"
+#include "server/synthesis/lane_plan.h"
 
 namespace carillon {
 namespace {
 
 using Complex = std::complex<double>;
 
-size_t CountLanes(const SoundingModes& sounding) {
-  const auto companions = std::ranges::count_if(
-      sounding.modes, [](const SoundingMode& mode) { return mode.output_phase_rad != 0; });
-  const size_t used = sounding.modes.size() + static_cast<size_t>(companions);
-  return (used + kMostLanes - 1) / kMostLanes * kMostLanes;
-}
+/// A bank that was struck in so many long blocks on end rings in the time domain as a whole: by
+/// spectrum it would cost that and the spectrum too.
+constexpr uint32_t kBusyStreak = 4;
 
 uint32_t FirstColumn(const SoundingModes& sounding) {
   return sounding.modes.empty() ? 0 : sounding.modes.front().column;
@@ -31,95 +28,104 @@ size_t CountColumns(const SoundingModes& sounding) {
                                 : sounding.modes.back().column - FirstColumn(sounding) + size_t{1};
 }
 
-/// s^2/2; of a mode so damped that it is over before the contact is, where that would explode,
-/// -|s|^2/2.
-Complex GaussianExponent(const SoundingMode& mode) {
-  const Complex s(mode.decay_rate_per_s, mode.damped_rad_per_s);
-  const Complex exponent = s * s / 2.0;
-  return exponent.real() < 0 ? exponent : -std::norm(s) / 2;
+size_t CountLanes(const LanePlan& plan) {
+  size_t count = 0;
+  for (size_t part = 0; part < plan.lanes.size(); ++part) count += plan.PaddedCount(part);
+  return count;
 }
 
-/// Fills in lanes one after the other.
-class LaneWriter {
- public:
-  LaneWriter(LaneArrays& lanes, SustainedForce& force, const SoundingModes& sounding,
-             const OscillatorBankSettings& settings)
-      : lanes_(lanes),
-        force_(force),
-        settings_(settings),
-        lowest_rad_per_s_(sounding.modes.empty() ? 1 : sounding.modes.front().damped_rad_per_s),
-        first_column_(FirstColumn(sounding)),
-        gain_(sounding.shape_scale * kSamplesPerVolumeVelocity * settings.gain) {}
+void Set(LaneArray<float>& re, LaneArray<float>& im, size_t lane, Complex value) {
+  re[lane] = static_cast<float>(value.real());
+  im[lane] = static_cast<float>(value.imag());
+}
 
-  void AddMode(const SoundingMode& mode) { Add(mode, mode.decay_rate_per_s, gain_); }
-
-  void AddCompanion(const SoundingMode& mode) {
-    Add(mode, mode.decay_rate_per_s - mode.damped_rad_per_s, -gain_);
+void WriteLane(const PlannedLane& planned, uint32_t first_column, size_t block_frame_count,
+               size_t lane, LaneArrays& lanes) {
+  for (size_t k = 0; k < kTileFrames; ++k) {
+    const Complex power = std::exp(planned.log_q * static_cast<double>(k + 1));
+    const size_t index = LaneArrays::PowerIndex(lane, k);
+    lanes.powers[index] = static_cast<float>(power.real());
+    lanes.powers[index + kMostLanes] = static_cast<float>(power.imag());
   }
+  const Complex block = std::exp(planned.log_q * static_cast<double>(block_frame_count));
+  lanes.block_re[lane] = block.real();
+  lanes.block_im[lane] = block.imag();
+  Set(lanes.gain_re, lanes.gain_im, lane, planned.start);
+  Set(lanes.lead_re, lanes.lead_im, lane, planned.log_q);
+  Set(lanes.tau_re, lanes.tau_im, lane, planned.gaussian_exponent);
+  lanes.column[lane] = planned.column - first_column;
+}
 
- private:
-  void Add(const SoundingMode& mode, double decay_rate_per_s, double gain) {
-    const Complex log_q =
-        Complex(decay_rate_per_s, mode.damped_rad_per_s) / settings_.sample_rate_hz;
-    for (size_t k = 0; k < kTileFrames; ++k) SetPower(k, std::exp(log_q * double(k + 1)));
-    const Complex block = std::exp(log_q * double(settings_.block_frame_count));
-    lanes_.block_re[lane_] = block.real();
-    lanes_.block_im[lane_] = block.imag();
-    const Complex start =
-        std::polar(gain * mode.coupling / mode.damped_rad_per_s, mode.output_phase_rad) *
-        Complex(0, -1);
-    Set(lanes_.gain_re, lanes_.gain_im, start);
-    force_.SetLane(lane_, start, log_q * settings_.sample_rate_hz, lowest_rad_per_s_);
-    Set(lanes_.lead_re, lanes_.lead_im, log_q);
-    Set(lanes_.tau_re, lanes_.tau_im, GaussianExponent(mode));
-    lanes_.column[lane_] = mode.column - first_column_;
-    ++lane_;
+SpectralLanes MakeSpectralLanes(const std::vector<PlannedLane>& planned, size_t padded_count,
+                                const LongBlock& block) {
+  SpectralLanes lanes(padded_count);
+  for (size_t lane = 0; lane < planned.size(); ++lane) {
+    const Complex q = std::exp(planned[lane].log_q * static_cast<double>(block.frame_count));
+    lanes.block_re[lane] = q.real();
+    lanes.block_im[lane] = q.imag();
+    lanes.slot[lane] = static_cast<uint32_t>(planned[lane].spread.slot);
+    for (size_t k = 0; k < kSpreadBins; ++k) {
+      lanes.weights[2 * (lane * kSpreadBins + k)] = planned[lane].spread.weights[k].real();
+      lanes.weights[2 * (lane * kSpreadBins + k) + 1] = planned[lane].spread.weights[k].imag();
+    }
   }
-
-  void SetPower(size_t k, Complex power) {
-    const size_t index = LaneArrays::PowerIndex(lane_, k);
-    lanes_.powers[index] = static_cast<float>(power.real());
-    lanes_.powers[index + kMostLanes] = static_cast<float>(power.imag());
-  }
-
-  void Set(LaneArray<float>& re, LaneArray<float>& im, Complex value) {
-    re[lane_] = static_cast<float>(value.real());
-    im[lane_] = static_cast<float>(value.imag());
-  }
-
-  LaneArrays& lanes_;
-  SustainedForce& force_;
-  const OscillatorBankSettings& settings_;
-  double lowest_rad_per_s_;
-  uint32_t first_column_;
-  double gain_;
-  size_t lane_ = 0;
-};
+  return lanes;
+}
 
 }  // namespace
 
 OscillatorBank::OscillatorBank(const SoundingModes& sounding, ShapeTable shapes,
                                const OscillatorBankSettings& settings)
+    : OscillatorBank(PlanLanes(sounding, {.sample_rate_hz = settings.sample_rate_hz,
+                                          .block_frame_count = settings.block_frame_count,
+                                          .gain = settings.gain}),
+                     sounding, std::move(shapes), settings) {}
+
+OscillatorBank::OscillatorBank(const LanePlan& plan, const SoundingModes& sounding,
+                               ShapeTable shapes, const OscillatorBankSettings& settings)
     : shapes_(std::move(shapes)),
       block_frame_count_(settings.block_frame_count),
+      silence_squared_(settings.silence * settings.silence),
       mode_count_(sounding.modes.size()),
-      lane_count_(CountLanes(sounding)),
+      lane_count_(CountLanes(plan)),
       first_column_(FirstColumn(sounding)),
       column_count_(CountColumns(sounding)),
-      lanes_(lane_count_, column_count_),
+      lanes_(lane_count_),
       force_(lane_count_, column_count_, settings.sample_rate_hz, settings.noise_seed) {
   assert(block_frame_count_ > 0 && block_frame_count_ <= kMostBlockFrames);
   assert(first_column_ + column_count_ <= shapes_.mode_count);
-  LaneWriter writer(lanes_, force_, sounding, settings);
-  for (const SoundingMode& mode : sounding.modes) writer.AddMode(mode);
-  for (const SoundingMode& mode : sounding.modes) {
-    if (mode.output_phase_rad != 0) writer.AddCompanion(mode);
+  assert(lane_count_ <= StrikeBatch::kMostBankLanes);
+  assert(column_count_ <= StrikeBatch::kMostBankLanes);
+  const double lowest_rad_per_s =
+      sounding.modes.empty() ? 1 : sounding.modes.front().damped_rad_per_s;
+  group_mode_counts_.resize(lane_count_ / kMostLanes);
+  const auto long_blocks = MakeLongBlocks(block_frame_count_);
+  size_t lane = 0;
+  for (size_t part = 0; part < plan.lanes.size(); ++part) {
+    const std::vector<PlannedLane>& planned = plan.lanes[part];
+    segments_[part].range = {lane, plan.PaddedCount(part)};
+    for (size_t i = 0; i < planned.size(); ++i) {
+      WriteLane(planned[i], first_column_, block_frame_count_, lane + i, lanes_);
+      force_.SetLane(lane + i, planned[i].start, planned[i].log_q * settings.sample_rate_hz,
+                     lowest_rad_per_s);
+      if (!planned[i].companion) ++group_mode_counts_[(lane + i) / kMostLanes];
+    }
+    lane += plan.PaddedCount(part);
+    if (part == 0) continue;
+    long_segments_.push_back(
+        {.lanes = MakeSpectralLanes(planned, plan.PaddedCount(part), long_blocks[part - 1]),
+         .mode_count = planned.size()});
   }
+}
+
+bool OscillatorBank::out_of_spectrum() const noexcept {
+  return std::ranges::none_of(
+      long_segments_, [](const LongSegment& segment) { return segment.awake || segment.sounding; });
 }
 
 std::optional<bank_kernel::Projection> OscillatorBank::Project(
     const Excitation& excitation) const noexcept {
-  bank_kernel::Projection projection{.column_count = column_count_, .tau_s = excitation.tau_s};
+  bank_kernel::Projection projection{.column_count = column_count_};
   for (size_t i = 0; i < 3; ++i) {
     const size_t vertex = excitation.vertices[i];
     if (vertex >= shapes_.vertex_count) return std::nullopt;
@@ -134,14 +140,28 @@ std::optional<bank_kernel::Projection> OscillatorBank::Project(
 }
 
 bool OscillatorBank::Strike(const Excitation& excitation, size_t offset, float lead_frames,
-                            LaneMix& mix) noexcept {
-  std::optional<bank_kernel::Projection> projection = Project(excitation);
+                            BlockMix& mix) noexcept {
+  const std::optional<bank_kernel::Projection> projection = Project(excitation);
   if (!projection) return false;
-  projection->lead_frames = lead_frames;
-  const bool was_newborn = newborn_;
-  BringNewbornTo(offset, mix);
-  const bool finite = bank_kernel::Excite(*projection, lanes_, lane_count_);
-  newborn_ = finite || was_newborn || force_.driving();
+  float* modal_impulses = mix.batch().modal_impulses();
+  bank_kernel::Project(*projection, modal_impulses);
+  return StrikeModes({modal_impulses, column_count_}, offset,
+                     {.lead_frames = lead_frames, .tau_s = excitation.tau_s}, mix);
+}
+
+bool OscillatorBank::StrikeModes(std::span<const float> modal_impulses, size_t offset,
+                                 const bank_kernel::Onset& onset, BlockMix& mix) noexcept {
+  assert(modal_impulses.size() == column_count_);
+  BeginStrikes(mix);
+  StrikeBatch& batch = mix.batch();
+  assert(offset >= (batch.count > 0 ? batch.offsets[batch.count - 1] : rendered_to_));
+  if (batch.count == StrikeBatch::Capacity(lane_count_)) RenderStrikes(offset, mix);
+  const bool finite =
+      bank_kernel::Excite(lanes_, lane_count_, modal_impulses.data(), onset,
+                          batch.re(batch.count, lane_count_), batch.im(batch.count, lane_count_));
+  if (finite) batch.offsets[batch.count++] = offset;
+  newborn_ = newborn_ || finite;
+  begun_ = begun_ && !silent();  // a silent bank is not rendered in this block
   return finite;
 }
 
@@ -151,49 +171,165 @@ bool OscillatorBank::Gather(const Excitation& force) noexcept {
   return projection.has_value();
 }
 
-bool OscillatorBank::Tie(const ForceKnot& knot, size_t offset, LaneMix& mix) noexcept {
-  BringNewbornTo(offset, mix);
+bool OscillatorBank::Tie(const ForceKnot& knot, size_t offset, BlockMix& mix) noexcept {
+  BeginStrikes(mix);
+  RenderStrikes(offset, mix);
+  StrikeBatch& batch = mix.batch();
+  const bool finite = force_.Tie(knot, lanes_, batch.re(0, lane_count_), batch.im(0, lane_count_));
+  if (finite) batch.offsets[batch.count++] = offset;
   newborn_ = true;
-  return force_.Tie(knot, lanes_);
+  return finite;
 }
 
-void OscillatorBank::BringNewbornTo(size_t offset, LaneMix& mix) noexcept {
-  if (force_.driving() && !newborn_) {
-    newborn_ = true;
-    newborn_offset_ = 0;
+void OscillatorBank::BeginStrikes(BlockMix& mix) noexcept {
+  BeginBlock(mix);
+  if (!newborn_) mix.batch().count = rendered_to_ = 0;
+}
+
+void OscillatorBank::RenderStrikes(size_t end, BlockMix& mix) noexcept {
+  if (force_.driving()) return RenderDrivenStrikes(end, mix);
+  const bank_kernel::StruckPart part{
+      .begin = rendered_to_, .end = end, .batch = mix.batch(), .lane_count = lane_count_};
+  for (const Segment& segment : segments_) {
+    bank_kernel::RingStruck(lanes_, segment.range, part, mix.lanes().lanes());
   }
-  if (newborn_) RenderNewborn(offset, mix);
-  newborn_offset_ = offset;
+  mix.batch().count = 0;
+  rendered_to_ = end;
 }
 
-void OscillatorBank::RenderNewborn(size_t end, LaneMix& mix) noexcept {
-  assert(end >= newborn_offset_);
-  const size_t frame_count = end - newborn_offset_;
-  float* frames = mix.lanes() + newborn_offset_ * kMostLanes;
-  if (force_.driving()) {
-    force_.RenderNewborn(frame_count, lanes_, frames);
-  } else {
-    bank_kernel::RingNewborn(lanes_, lane_count_, frame_count, frames);
+void OscillatorBank::RenderDrivenStrikes(size_t end, BlockMix& mix) noexcept {
+  StrikeBatch& batch = mix.batch();
+  for (size_t i = 0; i < batch.count; ++i) {
+    RenderDriven(batch.offsets[i], mix.lanes());
+    bank_kernel::AddStrike(lanes_, lane_count_, batch.re(i, lane_count_), batch.im(i, lane_count_));
   }
-  newborn_offset_ = end;
+  batch.count = 0;
+  RenderDriven(end, mix.lanes());
 }
 
-bool OscillatorBank::RenderAdd(LaneMix& mix) noexcept {
+void OscillatorBank::RenderDriven(size_t end, LaneMix& mix) noexcept {
+  force_.Render(end - rendered_to_, lanes_, mix.lanes() + rendered_to_ * kMostLanes);
+  rendered_to_ = end;
+}
+
+bool OscillatorBank::RenderAdd(BlockMix& mix) noexcept {
   if (silent()) return true;
-  bank_kernel::Ring(lanes_, awake_lane_count_, block_frame_count_, mix.lanes());
-  if (newborn_ || force_.driving()) BringNewbornTo(block_frame_count_, mix);
-  const size_t lane_count = newborn_ ? lane_count_ : awake_lane_count_;
-  const auto [awake_lane_count, finite] = bank_kernel::Advance(lanes_, lane_count, newborn_);
-  newborn_ = false;
-  awake_lane_count_ = finite ? awake_lane_count : 0;
-  if (finite) return true;
-  lanes_.Silence(0, lane_count_);
-  force_.Silence();
-  return false;
+  if (!newborn_ && !force_.driving()) {
+    BeginBlock(mix);
+    return RenderAddInTime(mix.lanes());
+  }
+  BeginStrikes(mix);
+  newborn_ = true;
+  RenderStrikes(block_frame_count_, mix);
+  rendered_to_ = 0;
+  return Advance();
 }
 
-size_t OscillatorBank::active_mode_count() const noexcept {
-  return std::min(newborn_ ? lane_count_ : awake_lane_count_, mode_count_);
+bool OscillatorBank::RenderAddInTime(LaneMix& mix) noexcept {
+  for (const Segment& segment : segments_) {
+    bank_kernel::Ring(lanes_, {segment.range.first, segment.awake_count}, block_frame_count_,
+                      mix.lanes());
+  }
+  return Advance();
+}
+
+bool OscillatorBank::Advance() noexcept {
+  for (size_t part = 0; part < segments_.size(); ++part) {
+    Segment& segment = segments_[part];
+    const LaneRange range{segment.range.first,
+                          newborn_ ? segment.range.count : segment.awake_count};
+    if (range.count == 0) continue;
+    const bank_kernel::Advanced advanced =
+        bank_kernel::Advance(lanes_, range, newborn_, silence_squared_);
+    segment.awake_count = advanced.awake_lane_count;
+    finite_ &= advanced.finite;
+    if (part > 0 && newborn_) long_segments_[part - 1].struck = true;
+  }
+  newborn_ = begun_ = false;
+  if (!finite_) Silence();
+  CountAwake();
+  return std::exchange(finite_, true);
+}
+
+void OscillatorBank::BeginBlock(BlockMix& mix) noexcept {
+  if (std::exchange(begun_, true)) return;
+  for (size_t kind = 0; kind < long_segments_.size(); ++kind) {
+    if (mix.begins(kind)) finite_ &= BeginLongBlock(kind, mix);
+  }
+}
+
+bool OscillatorBank::BeginLongBlock(size_t kind, BlockMix& mix) noexcept {
+  LongSegment& segment = long_segments_[kind];
+  const bool struck = std::exchange(segment.struck, false);
+  segment.struck_streak = struck ? segment.struck_streak + 1 : 0;
+  segment.sounding = false;
+  if (segment.struck_streak >= kBusyStreak || leaving_spectrum_) {
+    MoveToTime(kind);
+    return true;
+  }
+  MoveToSpectrum(kind);
+  if (!segment.awake) return true;
+  const bank_kernel::Advanced advanced =
+      bank_kernel::Spread(segment.lanes, segment.mode_count, silence_squared_, mix.Slots(kind));
+  segment.awake = segment.sounding = advanced.awake;
+  return advanced.finite;
+}
+
+void OscillatorBank::MoveToSpectrum(size_t kind) noexcept {
+  Segment& from = segments_[kind + 1];
+  LongSegment& to = long_segments_[kind];
+  for (size_t lane = 0; lane < from.awake_count; ++lane) {
+    to.lanes.re[lane] += lanes_.re[from.range.first + lane];
+    to.lanes.im[lane] += lanes_.im[from.range.first + lane];
+  }
+  std::fill_n(to.lanes.awake.begin(), from.awake_count / kMostLanes, uint8_t{1});
+  to.awake |= from.awake_count > 0;
+  lanes_.Silence({from.range.first, from.awake_count});
+  from.awake_count = 0;
+}
+
+void OscillatorBank::MoveToTime(size_t kind) noexcept {
+  LongSegment& from = long_segments_[kind];
+  Segment& to = segments_[kind + 1];
+  if (!from.awake) return;
+  for (size_t i = 0; i < to.range.count; ++i) {
+    const size_t lane = to.range.first + i;
+    lanes_.re[lane] += std::exchange(from.lanes.re[i], 0);
+    lanes_.im[lane] += std::exchange(from.lanes.im[i], 0);
+    lanes_.start_re[lane] = static_cast<float>(lanes_.re[lane]);
+    lanes_.start_im[lane] = static_cast<float>(lanes_.im[lane]);
+  }
+  std::ranges::fill(from.lanes.awake, uint8_t{0});
+  from.awake = false;
+  to.awake_count = to.range.count;
+}
+
+void OscillatorBank::Silence() noexcept {
+  lanes_.Silence({0, lane_count_});
+  force_.Silence();
+  for (Segment& segment : segments_) segment.awake_count = 0;
+  for (LongSegment& segment : long_segments_) {
+    std::fill_n(segment.lanes.re.data(), segment.lanes.awake.size() * kMostLanes, 0.0);
+    std::fill_n(segment.lanes.im.data(), segment.lanes.awake.size() * kMostLanes, 0.0);
+    std::ranges::fill(segment.lanes.awake, uint8_t{0});
+    segment.awake = segment.sounding = false;
+  }
+}
+
+void OscillatorBank::CountAwake() noexcept {
+  active_mode_count_ = 0;
+  any_awake_ = false;
+  for (size_t part = 0; part < segments_.size(); ++part) {
+    const Segment& segment = segments_[part];
+    const LongSegment* by_spectrum = part == 0 ? nullptr : &long_segments_[part - 1];
+    any_awake_ |= segment.awake_count > 0;
+    if (by_spectrum != nullptr) any_awake_ |= by_spectrum->awake || by_spectrum->sounding;
+    for (size_t i = 0; i < segment.range.count; i += kMostLanes) {
+      const bool awake = i < segment.awake_count ||
+                         (by_spectrum != nullptr && by_spectrum->lanes.awake[i / kMostLanes] != 0);
+      if (awake) active_mode_count_ += group_mode_counts_[(segment.range.first + i) / kMostLanes];
+    }
+  }
 }
 
 std::string_view SimdTarget() { return bank_kernel::Target(); }

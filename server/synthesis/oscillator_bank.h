@@ -1,21 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string_view>
 #include <vector>
 
 #include "server/synthesis/bank_kernel.h"
+#include "server/synthesis/block_mix.h"
 #include "server/synthesis/lane_arrays.h"
 #include "server/synthesis/lane_mix.h"
 #include "server/synthesis/sounding_modes.h"
+#include "server/synthesis/spectral_lanes.h"
 #include "server/synthesis/strike.h"
 #include "server/synthesis/sustained_force.h"
 
 namespace carillon {
+
+struct LanePlan;
 
 /// Mode shapes of one body on its sounding surface, #V by 3 by #m, row-major:
 /// values[(vertex * 3 + axis) * mode_count + column]. Shared with the modal model that owns them.
@@ -31,6 +37,7 @@ struct OscillatorBankSettings {
   size_t block_frame_count = 128;  ///< at most kMostBlockFrames
   double gain = 1;                 ///< of this object, linear
   uint64_t noise_seed = 0;         ///< of this object's roughness
+  double silence = 1e-7;           ///< modes that fall below this amplitude fall asleep: -140 dB
 };
 
 /// All modes of one sounding object, each a decaying complex exponential (the paper, 3.4):
@@ -42,60 +49,118 @@ struct OscillatorBankSettings {
 /// contact, exact once the contact is over (where sigma^2 > omega^2, exp(-|s_m|^2 tau^2 / 2)
 /// instead).
 ///
-/// Within a block the state is float, SIMD across modes; between blocks it is kept in double, which
-/// holds the error below -100 dB. Modes that fall below -140 dB of full scale fall asleep.
+/// What was struck rings in the time domain, SIMD across modes: float within a block, between
+/// blocks in double, which holds the error below -100 dB. At the next long block of its kind a mode
+/// goes over to the spectral form, by linearity: the state that was struck since is added to the
+/// one that rings on by spectrum, and both are the same sound. Modes too short for any long block
+/// stay in the time domain, and so does a bank that is struck all the time. Modes that fall below
+/// -140 dB of full scale fall asleep, in groups of kMostLanes.
 ///
 /// The second mode of a degenerate pair is a cosine, which would begin with a jump: a click under a
 /// soft mallet. It comes with a companion of the same frequency and opposite sign that decays by
 /// exp(-1) in a radian: the sum, cos(omega t) (exp(sigma t) - exp((sigma - omega) t)), begins at
 /// zero with the slope of its sibling.
 ///
-/// Made anywhere; then used by one thread at a time. Strike and Render neither allocate nor lock.
+/// Made anywhere; then used by one thread at a time, which neither allocates nor locks. In each
+/// block of the mix: first the strikes, then RenderAdd, with no other bank's calls between them.
 class OscillatorBank {
  public:
+  /// At most StrikeBatch::kMostBankLanes lanes and columns.
   OscillatorBank(const SoundingModes& sounding, ShapeTable shapes,
                  const OscillatorBankSettings& settings);
 
-  /// Applies an excitation at sample `offset` of the block to be rendered next, `lead_frames` (0 to
-  /// 1) after it happened. Offsets within one block may not go back. False: not finite or no such
-  /// vertex, and nothing was done.
+  /// Applies an excitation at sample `offset` of the block of `mix`, `lead_frames` (0 to 1) after
+  /// it happened. Offsets within one block may not go back. False: not finite or no such vertex,
+  /// and nothing was done.
   bool Strike(const Excitation& excitation, size_t offset, float lead_frames,
-              LaneMix& mix) noexcept;
+              BlockMix& mix) noexcept;
+
+  /// The same with the modal impulses g_m, but for the scale of the shapes, of the projected
+  /// columns (column_count() of them): what is not a single impulse on a triangle comes in here.
+  bool StrikeModes(std::span<const float> modal_impulses, size_t offset,
+                   const bank_kernel::Onset& onset, BlockMix& mix) noexcept;
 
   /// Adds a contact's force to that at the next knot. False: no such vertex, and nothing was done.
   bool Gather(const Excitation& force) noexcept;
 
   /// The sustained force has come to what was gathered, at sample `offset` as for Strike. False: it
   /// was not finite, and is zero.
-  bool Tie(const ForceKnot& knot, size_t offset, LaneMix& mix) noexcept;
+  bool Tie(const ForceKnot& knot, size_t offset, BlockMix& mix) noexcept;
 
-  /// Adds the next block of `block_frame_count` frames to `mix`. False: the state was not finite
-  /// and the bank has been silenced.
-  bool RenderAdd(LaneMix& mix) noexcept;
+  /// Adds the block to `mix`. False: the state was not finite and the bank has been silenced.
+  bool RenderAdd(BlockMix& mix) noexcept;
+
+  /// From its next long blocks on the bank rings in the time domain only.
+  void LeaveSpectrum() noexcept { leaving_spectrum_ = true; }
+
+  /// Nothing of the bank sounds in a long block that is under way or to come.
+  bool out_of_spectrum() const noexcept;
+
+  /// RenderAdd for a bank out of the spectrum, not struck in this block.
+  bool RenderAddInTime(LaneMix& mix) noexcept;
 
   /// Nothing rings: rendering would cost and add nothing.
-  bool silent() const noexcept { return awake_lane_count_ == 0 && !newborn_ && !force_.driving(); }
+  bool silent() const noexcept { return !newborn_ && !any_awake_ && !force_.driving(); }
 
   /// Modes that still ring.
-  size_t active_mode_count() const noexcept;
+  size_t active_mode_count() const noexcept { return newborn_ ? mode_count_ : active_mode_count_; }
+
+  /// Columns of the shape table that are projected, from the first mode's on.
+  size_t column_count() const noexcept { return column_count_; }
 
   /// Modes of the object.
   size_t mode_count() const noexcept { return mode_count_; }
 
  private:
+  /// Lanes of one kind: what of them rings in the time domain is `awake` and those before it.
+  struct Segment {
+    LaneRange range;
+    size_t awake_count = 0;
+  };
+  /// Lanes that may ring by spectrum, in long blocks of one kind.
+  struct LongSegment {
+    SpectralLanes lanes;
+    size_t mode_count = 0;
+    bool awake = false;
+    bool sounding = false;       // in the long block under way
+    bool struck = false;         // since that began
+    uint32_t struck_streak = 0;  // long blocks on end in which it was struck
+  };
+
+  OscillatorBank(const LanePlan& plan, const SoundingModes& sounding, ShapeTable shapes,
+                 const OscillatorBankSettings& settings);
+
+  void BeginBlock(BlockMix& mix) noexcept;
+  bool BeginLongBlock(size_t kind, BlockMix& mix) noexcept;
+  void MoveToSpectrum(size_t kind) noexcept;
+  void MoveToTime(size_t kind) noexcept;
   std::optional<bank_kernel::Projection> Project(const Excitation& excitation) const noexcept;
-  void BringNewbornTo(size_t offset, LaneMix& mix) noexcept;
-  void RenderNewborn(size_t end, LaneMix& mix) noexcept;
+  void BeginStrikes(BlockMix& mix) noexcept;
+  void RenderStrikes(size_t end, BlockMix& mix) noexcept;
+  void RenderDrivenStrikes(size_t end, BlockMix& mix) noexcept;
+  void RenderDriven(size_t end, LaneMix& mix) noexcept;
+  bool Advance() noexcept;
+  void Silence() noexcept;
+  void CountAwake() noexcept;
 
   ShapeTable shapes_;
   size_t block_frame_count_;
+  double silence_squared_;
   size_t mode_count_;
-  size_t lane_count_;  // modes and companions, padded to whole vectors
-  size_t first_column_ = 0;
-  size_t column_count_ = 0;
-  size_t awake_lane_count_ = 0;  // the lanes beyond it sleep
-  bool newborn_ = false;         // struck in this block
-  size_t newborn_offset_ = 0;    // the newborn state is that of this sample
+  size_t lane_count_;  // modes and companions, each kind padded to whole vectors
+  uint32_t first_column_;
+  size_t column_count_;
+  std::array<Segment, 1 + kLongBlockKinds>
+      segments_;                            // the first of lanes for the time domain only
+  std::vector<LongSegment> long_segments_;  // kLongBlockKinds of them
+  std::vector<uint8_t> group_mode_counts_;  // modes, not companions, of kMostLanes lanes
+  bool begun_ = false;                      // this block
+  bool newborn_ = false;                    // struck in this block
+  bool finite_ = true;
+  bool any_awake_ = false;
+  bool leaving_spectrum_ = false;
+  size_t rendered_to_ = 0;  // in a block with strikes
+  size_t active_mode_count_ = 0;
   LaneArrays lanes_;
   SustainedForce force_;
 };

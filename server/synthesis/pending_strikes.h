@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
+#include <span>
 #include <vector>
 
 #include "server/synthesis/strike.h"
@@ -13,7 +14,6 @@ namespace carillon {
 /// A strike waiting for the sample at which it is first heard.
 struct PendingStrike {
   uint64_t sample = 0;
-  uint64_t arrival = 0;   ///< breaks ties, so that the order never depends on the heap
   float lead_frames = 0;  ///< from the strike to that sample
   BankId bank{};
   StrikeKind kind = StrikeKind::kImpulse;
@@ -21,38 +21,46 @@ struct PendingStrike {
   ForceKnot knot{};
 };
 
-/// Strikes ordered by sample, then by arrival. All memory is taken when it is made.
+/// A calendar of strikes, a page a block. Neither adding one nor collecting a block's depends on
+/// how many wait. All memory is taken when it is made.
 class PendingStrikes {
  public:
-  explicit PendingStrikes(size_t capacity) : capacity_(capacity) { heap_.reserve(capacity); }
+  PendingStrikes(size_t capacity, size_t block_frame_count);
 
-  /// False: full.
-  bool TryPush(PendingStrike strike) noexcept {
-    if (heap_.size() == capacity_) return false;
-    strike.arrival = ++arrival_count_;
-    heap_.push_back(strike);
-    std::push_heap(heap_.begin(), heap_.end(), Later);
-    return true;
-  }
+  /// False: full. The sample does not lie before the block that was collected last.
+  bool TryPush(const PendingStrike& strike) noexcept;
 
-  bool empty() const noexcept { return heap_.empty(); }
+  /// The strikes of the block that begins at `block_start`, in order of arrival, by index; what was
+  /// collected before is forgotten. Blocks are collected in turn; with several before Forget,
+  /// their strikes stay.
+  void Collect(uint64_t block_start, std::vector<uint32_t>& indices) noexcept;
 
-  /// The first of those that wait; there is one.
-  const PendingStrike& front() const noexcept { return heap_.front(); }
+  /// Frees the places of collected strikes.
+  void Forget(std::span<const uint32_t> indices) noexcept;
 
-  void PopFront() noexcept {
-    std::pop_heap(heap_.begin(), heap_.end(), Later);
-    heap_.pop_back();
-  }
+  const PendingStrike& operator[](uint32_t index) const noexcept { return entries_[index].strike; }
 
  private:
-  static bool Later(const PendingStrike& a, const PendingStrike& b) noexcept {
-    return a.sample != b.sample ? a.sample > b.sample : a.arrival > b.arrival;
-  }
+  static constexpr uint32_t kNone = UINT32_MAX;
+  struct Entry {
+    PendingStrike strike;
+    uint32_t next = kNone;
+  };
+  /// A list, in order of arrival.
+  struct Page {
+    uint32_t first = kNone;
+    uint32_t last = kNone;
+  };
+
+  uint32_t TakeEntry() noexcept;
+  void Append(Page& page, uint32_t index) noexcept;
 
   size_t capacity_;
-  uint64_t arrival_count_ = 0;
-  std::vector<PendingStrike> heap_;
+  size_t block_frame_count_;
+  std::unique_ptr<Entry[]> entries_;
+  uint32_t used_count_ = 0;  // entries that were ever used
+  uint32_t first_free_ = kNone;
+  std::vector<Page> pages_;
 };
 
 }  // namespace carillon

@@ -32,10 +32,11 @@ void SustainedForce::SetLane(size_t lane, std::complex<double> gain, std::comple
   arrays_.kink_im[lane] = static_cast<float>(kink.imag());
 }
 
-bool SustainedForce::Tie(const ForceKnot& knot, LaneArrays& lanes) noexcept {
+bool SustainedForce::Tie(const ForceKnot& knot, const LaneArrays& lanes, float* added_re,
+                         float* added_im) noexcept {
   const float step_s = std::clamp(knot.step_s, kShortestStepS, kLongestStepS);
   const bool finite = force_kernel::EndStep(1 / step_s, arrays_);
-  if (finite) force_kernel::Kink(arrays_, lanes);
+  if (finite) force_kernel::Kink(arrays_, lanes, added_re, added_im);
   const bool travels = finite && knot.roughness > 0 && knot.bandwidth_hz > 0;
   if (!travels && !driving_) return finite;
   if (travels) noise_.SetBandwidth(knot.bandwidth_hz, sample_rate_hz_);
@@ -49,10 +50,12 @@ bool SustainedForce::Tie(const ForceKnot& knot, LaneArrays& lanes) noexcept {
   return finite;
 }
 
-void SustainedForce::RenderNewborn(size_t frame_count, LaneArrays& lanes, float* mix) noexcept {
+void SustainedForce::Render(size_t frame_count, LaneArrays& lanes, float* mix) noexcept {
   Shares from, to;
   NextShares(frame_count, from, to);
-  force_kernel::DriveNewborn(arrays_, from.data(), to.data(), frame_count, lanes, mix);
+  force_kernel::RingDriven(
+      arrays_, {.from_share = from.data(), .to_share = to.data(), .frame_count = frame_count},
+      lanes, mix);
   if (position_ < 1 || frames_to_hold_ > 0) return;
   if (letting_go_) {
     driving_ = false;

@@ -43,14 +43,16 @@ class SustainedForce {
     force_kernel::Gather(projection, arrays_.next.data());
   }
 
-  /// The next knot is now. False: the force was not finite, and is zero.
-  bool Tie(const ForceKnot& knot, LaneArrays& lanes) noexcept;
+  /// The next knot is now: what that adds to the states, into added_re and added_im. False: the
+  /// force was not finite, and is zero, and nothing is to be added.
+  bool Tie(const ForceKnot& knot, const LaneArrays& lanes, float* added_re,
+           float* added_im) noexcept;
 
-  /// The noise is heard: RenderNewborn is to be called for every sample.
+  /// The noise is heard: Render is to be called for every sample.
   bool driving() const noexcept { return driving_; }
 
-  /// The newborn state's next samples, driven, into `mix`, as bank_kernel::RingNewborn does.
-  void RenderNewborn(size_t frame_count, LaneArrays& lanes, float* mix) noexcept;
+  /// The next samples of all lanes, driven, into `mix`, as bank_kernel::RingStruck does.
+  void Render(size_t frame_count, LaneArrays& lanes, float* mix) noexcept;
 
   /// There is no force from now on.
   void Silence() noexcept;

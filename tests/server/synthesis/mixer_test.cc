@@ -203,23 +203,6 @@ TEST_F(MixerTest, AClosedStreamMakesRoomForAnotherAndWhatItPushedStillSounds) {
   EXPECT_TRUE(mixer.OpenStream().ok());
 }
 
-TEST_F(MixerTest, TooManyStrikesForOneBlockAreSpreadOverTheNextAndCounted) {
-  Mixer mixer({.most_strikes_per_block = 4});
-  const BankId bank = mixer.Add(MakeBank(2)).value();
-  const auto stream = mixer.OpenStream().value();
-  for (int i = 0; i < 12; ++i) {
-    stream->TryPush({.bank = bank, .frame = 600, .excitation = MakeUnitExcitation()});
-  }
-  std::vector<float> frames(128 * 10);
-  mixer.Render(frames);
-  EXPECT_EQ(mixer.statistics().accepted_count, 12u);
-  EXPECT_EQ(mixer.statistics().postponed_count, 8u);
-  // At once, at the start of the next block, and at that of the one after.
-  for (size_t n = 600; n < frames.size(); ++n) {
-    EXPECT_NEAR(frames[n], 4 * (Right(n, 600, 2) + Right(n, 640, 2) + Right(n, 768, 2)), 1e-5) << n;
-  }
-}
-
 TEST_F(MixerTest, WhatIsNotFiniteNeverLeaves) {
   constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
   const BankId broken = mixer_.Add(MakeBank(std::numeric_limits<double>::quiet_NaN())).value();

@@ -2,7 +2,6 @@
 #include "server/synthesis/oscillator_bank.h"
 
 #include <gtest/gtest.h>
-#include <hwy/targets.h>
 
 #include <cmath>
 #include <complex>
@@ -11,12 +10,13 @@
 #include <vector>
 
 #include "tests/server/synthesis/closed_form.h"
+#include "tests/server/synthesis/on_every_target.h"
 
 namespace carillon {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-constexpr double kDt = 1 / kTestSampleRateHz;
+constexpr double kDt = kTestFrameS;
 
 /// Modes over the whole band and all kinds of decay; more than a vector of them, not a multiple.
 SoundingModes MakeWideModes() {
@@ -27,41 +27,6 @@ SoundingModes MakeWideModes() {
   }
   return sounding;
 }
-
-double SumOfModes(const SoundingModes& sounding, double g, double time_s, double tau_s = 0) {
-  double sum = 0;
-  for (const SoundingMode& mode : sounding.modes) sum += ClosedForm(mode, g, time_s, tau_s);
-  return sum;
-}
-
-/// Largest deviation from the closed form over its largest value, decibels; of long sounds every
-/// 13th sample is compared.
-double ErrorDb(const std::vector<float>& sound, const SoundingModes& sounding, double g,
-               double strike_frame, double tau_s = 0) {
-  double error = 0, peak = 0;
-  const size_t stride = sound.size() > 10000 ? 13 : 1;
-  for (size_t n = 0; n < sound.size(); n += stride) {
-    const double right =
-        SumOfModes(sounding, g, (static_cast<double>(n) - strike_frame) * kDt, tau_s);
-    error = std::max(error, std::abs(sound[n] - right));
-    peak = std::max(peak, std::abs(right));
-  }
-  return 20 * std::log10(error / peak);
-}
-
-/// Runs a test on each SIMD target that this machine has.
-class OnEveryTarget : public testing::TestWithParam<int64_t> {
- protected:
-  void SetUp() override {
-    hwy::SetSupportedTargetsForTest(GetParam());
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-    ASSERT_EQ(SimdTarget(), hwy::TargetName(GetParam()));
-  }
-  void TearDown() override {
-    hwy::SetSupportedTargetsForTest(0);
-    hwy::GetChosenTarget().DeInit();
-  }
-};
 
 INSTANTIATE_TEST_SUITE_P(OscillatorBank, OnEveryTarget,
                          testing::ValuesIn(hwy::SupportedAndGeneratedTargets()),
@@ -154,15 +119,15 @@ TEST(OscillatorBank, TwoStrikesSuperpose) {
   const Excitation excitation = MakeUnitExcitation();
   OscillatorBank bank(sounding, MakeUniformShapes(37), {});
   std::vector<float> sound(12800);
-  LaneMix mix;
+  TestMix test;
   for (size_t block = 0; block < 100; ++block) {
-    mix.Clear(128);
+    BlockMix& mix = test.Begin();
     if (block == 3) bank.Strike(excitation, 17, 0.5F, mix);
     if (block == 3) bank.Strike(excitation, 17, 0.25F, mix);
     if (block == 3) bank.Strike(excitation, 90, 0, mix);
     if (block == 40) bank.Strike(excitation, 127, 0, mix);
     bank.RenderAdd(mix);
-    mix.Reduce(std::span(sound).subspan(128 * block, 128));
+    test.Finish(std::span(sound).subspan(128 * block, 128));
   }
   double error = 0, peak = 0;
   for (size_t n = 0; n < sound.size(); n += 7) {
@@ -261,19 +226,21 @@ TEST(OscillatorBank, TheCosineOfADegeneratePairBeginsWithoutAClick) {
 TEST(OscillatorBank, FallsSilentAndThenAddsNothing) {
   OscillatorBank bank({.modes = {MakeMode(0, 440, -700)}}, MakeUniformShapes(1), {});
   EXPECT_TRUE(bank.silent());
-  LaneMix mix;
-  mix.Clear(128);
-  bank.Strike(MakeUnitExcitation(), 0, 0, mix);
+  TestMix test;
+  bank.Strike(MakeUnitExcitation(), 0, 0, test.Begin());
   EXPECT_FALSE(bank.silent());
   EXPECT_EQ(bank.active_mode_count(), 1u);
   // 200 dB at 700 nepers a second: 0.033 s, 13 blocks.
-  for (int block = 0; block < 13; ++block) bank.RenderAdd(mix);
+  std::vector<float> sound(128);
+  test.Render(bank, sound);
+  for (int block = 1; block < 13; ++block) {
+    test.Begin();
+    test.Render(bank, sound);
+  }
   EXPECT_TRUE(bank.silent());
   EXPECT_EQ(bank.active_mode_count(), 0u);
-  std::vector<float> sound(128);
-  mix.Clear(128);
-  bank.RenderAdd(mix);
-  mix.Reduce(sound);
+  test.Begin();
+  test.Render(bank, sound);
   EXPECT_EQ(sound, std::vector<float>(128));
 }
 
@@ -284,8 +251,12 @@ TEST(OscillatorBank, ModesFallAsleepOneVectorAfterAnother) {
   OscillatorBank bank(sounding, MakeUniformShapes(64), {});
   Ring(bank, MakeUnitExcitation(), 4800);
   const size_t soon = bank.active_mode_count();
-  LaneMix mix;
-  for (int block = 0; block < 300; ++block) bank.RenderAdd(mix);
+  std::vector<float> sound(128);
+  TestMix test;
+  for (int block = 0; block < 300; ++block) {
+    test.Begin();
+    test.Render(bank, sound);
+  }
   EXPECT_LE(soon, 64u);
   EXPECT_LT(bank.active_mode_count(), soon);
   EXPECT_GT(bank.active_mode_count(), 0u);
@@ -294,7 +265,8 @@ TEST(OscillatorBank, ModesFallAsleepOneVectorAfterAnother) {
 TEST(OscillatorBank, AStrikeThatIsNotFiniteOrOffTheBodyLeavesItAsItWas) {
   const SoundingModes sounding = MakeWideModes();
   OscillatorBank bank(sounding, MakeUniformShapes(37), {});
-  LaneMix mix;
+  TestMix test;
+  BlockMix& mix = test.Begin();
   for (const float bad :
        {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), 1e38F}) {
     Excitation excitation = MakeUnitExcitation();

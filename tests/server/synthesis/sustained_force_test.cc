@@ -31,7 +31,7 @@ class Held {
     Excitation force = MakeUnitExcitation();
     force.impulse_newton_seconds = {static_cast<float>(force_newtons), 0, 0};
     EXPECT_TRUE(bank_.Gather(force));
-    EXPECT_TRUE(bank_.Tie(knot, offset, mix_));
+    EXPECT_TRUE(bank_.Tie(knot, offset, *mix_));
   }
 
   template <typename Force>
@@ -41,27 +41,31 @@ class Held {
     knot.step_s = static_cast<float>(static_cast<double>(step_frames) / kTestSampleRateHz);
     size_t next_knot = 0;
     for (size_t start = 0; start < sound.size(); start += kBlock) {
-      mix_.Clear(kBlock);
+      mix_ = &test_.Begin();
       for (; next_knot < start + kBlock; next_knot += step_frames) {
         Tie(force_newtons(static_cast<double>(next_knot) / kTestSampleRateHz), knot,
             next_knot - start);
       }
-      bank_.RenderAdd(mix_);
-      mix_.Reduce(std::span(sound).subspan(start, kBlock));
+      test_.Render(bank_, std::span(sound).subspan(start, kBlock));
     }
     return sound;
   }
 
   /// Lets `block_count` blocks pass without a knot.
   void Wait(size_t block_count) {
-    for (; block_count > 0; --block_count) bank_.RenderAdd(mix_);
+    std::vector<float> sound(kBlock);
+    for (; block_count > 0; --block_count) {
+      test_.Begin();
+      test_.Render(bank_, sound);
+    }
   }
 
   bool silent() const { return bank_.silent(); }
 
  private:
   OscillatorBank bank_;
-  LaneMix mix_;
+  TestMix test_;
+  BlockMix* mix_ = nullptr;
 };
 
 double PeakOf(std::span<const float> sound) {
@@ -154,15 +158,15 @@ TEST(SustainedForce, ARoughSlideOfWhichNothingMoreIsHeardDiesAway) {
 
 TEST(SustainedForce, AForceThatIsNoNumberIsRefusedAndLeavesTheBankSound) {
   OscillatorBank bank(ThreeModes(), MakeUniformShapes(3), {});
-  LaneMix mix;
-  mix.Clear(kBlock);
+  TestMix test;
+  BlockMix& mix = test.Begin();
   Excitation force = MakeUnitExcitation();
   force.impulse_newton_seconds[0] = std::numeric_limits<float>::infinity();
   bank.Gather(force);
   EXPECT_FALSE(bank.Tie({.step_s = 0.01F, .roughness = 1, .bandwidth_hz = 500}, 3, mix));
   EXPECT_TRUE(bank.RenderAdd(mix));
   std::vector<float> sound(kBlock);
-  mix.Reduce(sound);
+  test.Finish(sound);
   EXPECT_EQ(PeakOf(sound), 0);
   const auto ringing = Ring(bank, MakeUnitExcitation(), 4800);
   EXPECT_GT(PeakOf(ringing), 0);

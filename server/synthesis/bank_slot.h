@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+
+#include "server/synthesis/oscillator_bank.h"
+
+namespace carillon {
+
+/// A place for a bank as the rendering threads see it.
+struct BankSlot {
+  OscillatorBank* bank = nullptr;
+  uint32_t generation = 0;
+  uint32_t section = 0;        ///< which one renders it
+  uint32_t pending_count = 0;  ///< strikes that wait for their time
+  bool sounding = false;       ///< is among its section's sounding banks
+  bool rendered = false;       ///< in this block
+  bool leaving = false;        ///< is to be retired when it is silent
+  bool fading = false;
+  float fade_gain = 1;
+};
+
+}  // namespace carillon

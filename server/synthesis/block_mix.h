@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "server/synthesis/lane_mix.h"
+#include "server/synthesis/long_block.h"
+#include "server/synthesis/spectrum.h"
+#include "server/synthesis/strike_batch.h"
+
+namespace carillon {
+
+/// Workspace of one rendering thread, which may serve many mixes in turn.
+struct RenderDesk {
+  explicit RenderDesk(size_t block_frame_count);
+
+  StrikeBatch batch;
+  std::array<Spectrum, kLongBlockKinds> spectra;
+};
+
+/// What some banks sound like together, block by block: the sum of what rings in the time domain
+/// and of the long blocks under way.
+class BlockMix {
+ public:
+  /// A long block of m blocks begins where m divides the block's number plus stagger * m / 8, so
+  /// that mixes of different stagger, 0 to 7, do that work in different blocks.
+  explicit BlockMix(size_t block_frame_count, size_t stagger = 0);
+
+  /// Begins the block of this number; Begin and Finish alternate.
+  void Begin(uint64_t block_number, RenderDesk& desk) noexcept;
+
+  /// Writes the block.
+  void Finish(std::span<float> block) noexcept;
+
+  /// Whether a long block of this kind begins with this block.
+  bool begins(size_t kind) const noexcept { return begins_[kind]; }
+
+  /// Where modes add themselves to the long block of this kind that begins.
+  float* Slots(size_t kind) noexcept {
+    used_[kind] = true;
+    return desk_->spectra[kind].slots();
+  }
+
+  LaneMix& lanes() noexcept { return lanes_; }
+  StrikeBatch& batch() noexcept { return desk_->batch; }
+
+ private:
+  /// Frames of a long block under way.
+  struct Rendered {
+    std::vector<float> frames;
+    size_t next = 0;
+    bool sounding = false;
+  };
+
+  std::array<LongBlock, kLongBlockKinds> long_blocks_;
+  size_t stagger_;
+  RenderDesk* desk_ = nullptr;
+  std::array<bool, kLongBlockKinds> begins_{}, used_{};
+  std::array<Rendered, kLongBlockKinds> rendered_;
+  LaneMix lanes_;
+};
+
+}  // namespace carillon

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/synthesis/lane_plan.h"
+
+#include <algorithm>
+#include <optional>
+
+#include "server/synthesis/level.h"
+
+namespace carillon {
+namespace {
+
+using Complex = std::complex<double>;
+
+/// s^2/2; of a mode so damped that it is over before the contact is, where that would explode,
+/// -|s|^2/2.
+Complex GaussianExponent(const SoundingMode& mode) {
+  const Complex s(mode.decay_rate_per_s, mode.damped_rad_per_s);
+  const Complex exponent = s * s / 2.0;
+  return exponent.real() < 0 ? exponent : -std::norm(s) / 2;
+}
+
+PlannedLane PlanLane(const SoundingMode& mode, const LanePlanSettings& settings, double gain,
+                     bool companion) {
+  const double sigma = mode.decay_rate_per_s - (companion ? mode.damped_rad_per_s : 0);
+  return {.column = mode.column,
+          .log_q = Complex(sigma, mode.damped_rad_per_s) / settings.sample_rate_hz,
+          .start = std::polar((companion ? -gain : gain) * mode.coupling / mode.damped_rad_per_s,
+                              mode.output_phase_rad) *
+                   Complex(0, -1),
+          .gaussian_exponent = GaussianExponent(mode),
+          .spread = {},
+          .companion = companion};
+}
+
+/// A companion is over within two periods and stays in the time domain.
+void Place(PlannedLane lane, size_t block_frame_count, LanePlan& plan) {
+  const std::optional<size_t> kind =
+      lane.companion ? std::nullopt : ChooseLongBlock(lane.log_q, block_frame_count);
+  if (kind) lane.spread = MakeSpreadMode(lane.log_q, MakeLongBlocks(block_frame_count)[*kind]);
+  plan.lanes[kind ? *kind + 1 : 0].push_back(lane);
+}
+
+}  // namespace
+
+LanePlan PlanLanes(const SoundingModes& sounding, const LanePlanSettings& settings) {
+  const double gain = sounding.shape_scale * kSamplesPerVolumeVelocity * settings.gain;
+  LanePlan plan;
+  for (const SoundingMode& mode : sounding.modes) {
+    Place(PlanLane(mode, settings, gain, false), settings.block_frame_count, plan);
+    if (mode.output_phase_rad == 0) continue;
+    Place(PlanLane(mode, settings, gain, true), settings.block_frame_count, plan);
+  }
+  std::ranges::stable_sort(plan.lanes[0], std::ranges::greater(),
+                           [](const PlannedLane& lane) { return lane.log_q.real(); });
+  for (size_t part = 1; part < plan.lanes.size(); ++part) {
+    std::ranges::stable_sort(plan.lanes[part], {},
+                             [](const PlannedLane& lane) { return lane.spread.slot; });
+  }
+  return plan;
+}
+
+}  // namespace carillon

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <complex>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "server/synthesis/lane_arrays.h"
+#include "server/synthesis/long_block.h"
+#include "server/synthesis/sounding_modes.h"
+#include "server/synthesis/spreading_kernel.h"
+
+namespace carillon {
+
+/// One lane of a bank: a mode or the companion of one.
+struct PlannedLane {
+  uint32_t column = 0;
+  std::complex<double> log_q;  ///< (sigma + i omega)/rate
+  std::complex<double> start;  ///< the state after a unit of what the shape table projects
+  std::complex<double> gaussian_exponent;  ///< of the contact, for each second squared of tau^2
+  SpreadMode spread;                       ///< for the kind of long block that it rings in
+  bool companion = false;
+};
+
+/// The lanes of a bank by kind of long block, those first that stay in the time domain: these with
+/// the longest decay first, the others ascending by slot.
+struct LanePlan {
+  std::array<std::vector<PlannedLane>, 1 + kLongBlockKinds> lanes;
+
+  /// How many lanes the parts take, each padded to whole vectors.
+  size_t PaddedCount(size_t part) const {
+    return (lanes[part].size() + kMostLanes - 1) / kMostLanes * kMostLanes;
+  }
+};
+
+/// How a body sounds in a mixer.
+struct LanePlanSettings {
+  double sample_rate_hz = 0;
+  size_t block_frame_count = 0;
+  double gain = 1;
+};
+
+LanePlan PlanLanes(const SoundingModes& sounding, const LanePlanSettings& settings);
+
+}  // namespace carillon

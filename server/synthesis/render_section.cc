@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/synthesis/render_section.h"
+
+#include <algorithm>
+#include <array>
+
+namespace carillon {
+
+RenderSection::RenderSection(const Settings& settings, std::span<BankSlot> slots)
+    : settings_(settings), slots_(slots), mix_(settings.block_frame_count, settings.stagger) {
+  sounding_.reserve(settings.most_banks);
+}
+
+SectionCounts RenderSection::Render(uint64_t block_number, std::span<const DueStrike> strikes,
+                                    std::span<float> frames, RenderDesk& desk) noexcept {
+  SectionCounts counts;
+  for (uint32_t i = 0; !frames.empty(); ++i) {
+    const std::span<float> block = frames.first(settings_.block_frame_count);
+    frames = frames.subspan(block.size());
+    mix_.Begin(block_number + i, desk);
+    const auto later = std::ranges::find_if(strikes, [i](const auto& s) { return s.block > i; });
+    const auto due_count = static_cast<size_t>(later - strikes.begin());
+    Strike(strikes.first(due_count), counts);
+    strikes = strikes.subspan(due_count);
+    for (const uint32_t index : sounding_) RenderBank(slots_[index], counts);
+    mix_.Finish(block);
+    counts.active_mode_count = 0;
+    for (const uint32_t index : sounding_) {
+      BankSlot& slot = slots_[index];
+      if (!slot.rendered) RenderFading(slot, block, counts);
+      slot.rendered = false;
+      counts.active_mode_count += slot.bank->active_mode_count();
+    }
+    DismissSilentBanks();
+  }
+  return counts;
+}
+
+void RenderSection::Strike(std::span<const DueStrike> strikes, SectionCounts& counts) noexcept {
+  for (size_t i = 0; i < strikes.size(); ++i) {
+    const DueStrike& strike = strikes[i];
+    BankSlot& slot = slots_[strike.slot];
+    const bool struck = !slot.fading && Excite(*slot.bank, strike);
+    if (!struck) ++counts.dropped_count;
+    // Nothing moves before the knot.
+    if (struck && !slot.sounding && strike.strike->kind != StrikeKind::kForce) {
+      slot.sounding = true;
+      sounding_.push_back(strike.slot);
+    }
+    const bool last = i + 1 == strikes.size() || strikes[i + 1].slot != strike.slot;
+    if (last && slot.sounding) RenderBank(slot, counts);
+  }
+}
+
+bool RenderSection::Excite(OscillatorBank& bank, const DueStrike& due) noexcept {
+  const PendingStrike& strike = *due.strike;
+  switch (strike.kind) {
+    case StrikeKind::kForce:
+      return bank.Gather(strike.excitation);
+    case StrikeKind::kKnot:
+      return bank.Tie(strike.knot, due.offset, mix_);
+    default:
+      return bank.Strike(strike.excitation, due.offset, strike.lead_frames, mix_);
+  }
+}
+
+void RenderSection::RenderBank(BankSlot& slot, SectionCounts& counts) noexcept {
+  if (slot.rendered || (slot.fading && slot.bank->out_of_spectrum())) return;
+  slot.rendered = true;
+  if (!slot.bank->RenderAdd(mix_)) ++counts.reset_bank_count;
+}
+
+void RenderSection::RenderFading(BankSlot& slot, std::span<float> block,
+                                 SectionCounts& counts) noexcept {
+  std::array<float, kMostBlockFrames> faded;
+  fading_mix_.Clear(block.size());
+  if (!slot.bank->RenderAddInTime(fading_mix_)) ++counts.reset_bank_count;
+  fading_mix_.Reduce(std::span(faded).first(block.size()));
+  for (size_t n = 0; n < block.size(); ++n) {
+    slot.fade_gain = std::max(slot.fade_gain - settings_.fade_step, 0.0F);
+    block[n] += slot.fade_gain * faded[n];
+  }
+}
+
+void RenderSection::DismissSilentBanks() noexcept {
+  std::erase_if(sounding_, [this](uint32_t index) {
+    BankSlot& slot = slots_[index];
+    slot.sounding = !slot.bank->silent() && slot.fade_gain > 0;
+    return !slot.sounding;
+  });
+}
+
+}  // namespace carillon

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "server/synthesis/bank_slot.h"
+#include "server/synthesis/block_mix.h"
+#include "server/synthesis/pending_strikes.h"
+
+namespace carillon {
+
+/// A strike in its block.
+struct DueStrike {
+  uint32_t slot = 0;
+  uint32_t block = 0;   ///< of those rendered together
+  uint32_t offset = 0;  ///< frames
+  const PendingStrike* strike = nullptr;
+};
+
+/// What a section has counted while rendering.
+struct SectionCounts {
+  uint64_t dropped_count = 0;
+  uint64_t reset_bank_count = 0;
+  uint64_t active_mode_count = 0;  ///< now
+};
+
+/// Some of a mixer's banks, which one thread renders together; several sections may render at once.
+/// Long blocks begin in another block in each, so that their work is spread evenly.
+class RenderSection {
+ public:
+  struct Settings {
+    size_t block_frame_count = 0;
+    size_t stagger = 0;     ///< see BlockMix
+    size_t most_banks = 0;  ///< in this section
+    float fade_step = 0;    ///< of a fading bank's gain in a frame
+  };
+  /// `slots` belong to the mixer; this section touches its own only.
+  RenderSection(const Settings& settings, std::span<BankSlot> slots);
+
+  /// Renders `frames`, whole blocks, the first of which has this number. `strikes` are this
+  /// section's, ascending by block, then slot, then offset.
+  SectionCounts Render(uint64_t block_number, std::span<const DueStrike> strikes,
+                       std::span<float> frames, RenderDesk& desk) noexcept;
+
+ private:
+  void Strike(std::span<const DueStrike> strikes, SectionCounts& counts) noexcept;
+  bool Excite(OscillatorBank& bank, const DueStrike& due) noexcept;
+  void RenderBank(BankSlot& slot, SectionCounts& counts) noexcept;
+  void RenderFading(BankSlot& slot, std::span<float> block, SectionCounts& counts) noexcept;
+  void DismissSilentBanks() noexcept;
+
+  Settings settings_;
+  std::span<BankSlot> slots_;
+  std::vector<uint32_t> sounding_;  // slots whose banks are not silent, in order of their awakening
+  BlockMix mix_;
+  LaneMix fading_mix_;
+};
+
+}  // namespace carillon

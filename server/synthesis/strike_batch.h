@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+
+#include "server/synthesis/lane_arrays.h"
+
+namespace carillon {
+
+/// Strikes of one bank within a block that are rendered in one pass over its lanes: what each adds
+/// to the states, and at which frame. Workspace of one rendering thread.
+class StrikeBatch {
+ public:
+  static constexpr size_t kMostStrikes = 32;
+  /// A bank has no more lanes, and projects no more columns, than this.
+  static constexpr size_t kMostBankLanes = 16384;
+
+  StrikeBatch() : modal_impulses_(kMostBankLanes), re_(kMostBankLanes), im_(kMostBankLanes) {}
+
+  /// How many strikes of a bank of `lane_count` lanes fit.
+  static size_t Capacity(size_t lane_count) {
+    return lane_count == 0 ? kMostStrikes : std::min(kMostStrikes, kMostBankLanes / lane_count);
+  }
+
+  float* modal_impulses() noexcept { return modal_impulses_.data(); }
+  float* re(size_t strike, size_t lane_count) noexcept { return re_.data() + strike * lane_count; }
+  float* im(size_t strike, size_t lane_count) noexcept { return im_.data() + strike * lane_count; }
+
+  size_t count = 0;
+  std::array<size_t, kMostStrikes> offsets{};  ///< in the block, ascending
+
+ private:
+  LaneArray<float> modal_impulses_;  // by column
+  LaneArray<float> re_, im_;         // by strike, then by lane
+};
+
+}  // namespace carillon
