@@ -1,25 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "client_sdk/adapters/bullet_strikes.h"
 
+#include "client_sdk/adapters/bullet_impulse.h"
+
 namespace carillon::adapters {
 namespace {
-
-void Set(v1::Vec3& target, const btVector3& source) {
-  target.set_x(source.x());
-  target.set_y(source.y());
-  target.set_z(source.z());
-}
-
-/// The impulse on body A, in world coordinates: normal and friction.
-btVector3 ImpulseOnA(const btManifoldPoint& point) {
-  btVector3 impulse = point.m_normalWorldOnB * point.m_appliedImpulse +
-                      point.m_lateralFrictionDir1 * point.m_appliedImpulseLateral1;
-  // Bullet sets the second direction only where its solver uses it.
-  if (point.m_appliedImpulseLateral2 != 0) {
-    impulse += point.m_lateralFrictionDir2 * point.m_appliedImpulseLateral2;
-  }
-  return impulse;
-}
 
 double NormalImpulse(const btPersistentManifold& manifold) {
   double sum = 0;

@@ -14,14 +14,20 @@ class RoughnessNoise {
  public:
   explicit RoughnessNoise(uint64_t seed) noexcept : state_(Mix(seed)) {}
 
-  /// Where the spectrum has fallen by 6 dB, at most about half of Nyquist.
+  /// What is narrower is no noise that is heard.
+  static constexpr double kLowestHz = 20;
+
+  /// Where the spectrum has fallen by 6 dB: kLowestHz to about half of Nyquist. The noise goes on
+  /// without a jump.
   void SetBandwidth(double bandwidth_hz, double sample_rate_hz) noexcept {
     const double pole = std::exp(-2 * std::numbers::pi * bandwidth_hz / sample_rate_hz);
     // The variance of white noise of variance 1/3 behind the two: (1-p)^4 (1+p^2)/(1-p^2)^3 / 3.
     const double variance = (1 - pole) * (1 + pole * pole) / std::pow(1 + pole, 3) / 3;
+    const auto gain = static_cast<float>(1 / std::sqrt(variance));
+    for (float* state : {&first_, &second_, &mean_}) *state *= gain_ > 0 ? gain_ / gain : 1;
+    gain_ = gain;
     pole_ = static_cast<float>(pole);
     block_ = static_cast<float>(2 * std::numbers::pi * kLowestHz / sample_rate_hz);
-    gain_ = variance > 0 ? static_cast<float>(1 / std::sqrt(variance)) : 0;
   }
 
   float Next() noexcept {
@@ -34,7 +40,6 @@ class RoughnessNoise {
   }
 
  private:
-  static constexpr double kLowestHz = 20;
   static constexpr uint64_t kIncrement = 0x9E3779B97F4A7C15;
 
   /// SplitMix64: a counter, scrambled by David Stafford's variant 13 of MurmurHash3's finalizer.

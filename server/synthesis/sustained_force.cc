@@ -37,7 +37,8 @@ bool SustainedForce::Tie(const ForceKnot& knot, const LaneArrays& lanes, float* 
   const float step_s = std::clamp(knot.step_s, kShortestStepS, kLongestStepS);
   const bool finite = force_kernel::EndStep(1 / step_s, arrays_);
   if (finite) force_kernel::Kink(arrays_, lanes, added_re, added_im);
-  const bool travels = finite && knot.roughness > 0 && knot.bandwidth_hz > 0;
+  const bool travels =
+      finite && knot.roughness > 0 && knot.bandwidth_hz >= RoughnessNoise::kLowestHz;
   if (!travels && !driving_) return finite;
   if (travels) noise_.SetBandwidth(knot.bandwidth_hz, sample_rate_hz_);
   force_kernel::Aim(driving_ ? position_ : 1, travels ? knot.roughness / sample_rate_hz_ : 0, lanes,

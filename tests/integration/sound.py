@@ -22,10 +22,11 @@ def impulse(point, force, handle=1, duration_s=0.0):
         duration_s=duration_s)
 
 
-def write_trace(path, objects, steps):
+def write_trace(path, objects, steps, step_s=0.01):
     """A trace as any simulator would write it: each record after its length."""
     record = contact_trace_pb2.ContactTraceRecord
-    header = contact_trace_pb2.ContactTraceHeader(format_version=1, simulator="test", step_s=0.01)
+    header = contact_trace_pb2.ContactTraceHeader(format_version=1, simulator="test",
+                                                  step_s=step_s)
     records = [record(header=header)]
     records += [record(object=o) for o in objects]
     records += [record(step=s) for s in steps]

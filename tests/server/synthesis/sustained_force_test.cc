@@ -156,6 +156,14 @@ TEST(SustainedForce, ARoughSlideOfWhichNothingMoreIsHeardDiesAway) {
   EXPECT_TRUE(held.silent());
 }
 
+TEST(SustainedForce, WhatHardlyMovesIsSilentEvenAfterASlide) {
+  Held held({.modes = {MakeMode(0, 400, -100)}});
+  held.Render(4800, 480, [](double) { return 10.0; }, {.roughness = 1, .bandwidth_hz = 2000});
+  const auto sound =
+      held.Render(48000, 480, [](double) { return 10.0; }, {.roughness = 1, .bandwidth_hz = 1e-6F});
+  EXPECT_EQ(PeakOf(std::span(sound).last(4800)), 0);
+}
+
 TEST(SustainedForce, AForceThatIsNoNumberIsRefusedAndLeavesTheBankSound) {
   OscillatorBank bank(ThreeModes(), MakeUniformShapes(3), {});
   TestMix test;

@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Contacts as Bullet and ODE report them, a resting load in every step, do not drone; a slide and a roll
+are heard."""
+
+import json
+import subprocess
+import unittest
+
+import numpy
+
+import meshes
+import sound
+from carillon.v1 import contact_pb2, contact_trace_pb2, material_pb2, modal_model_pb2
+from daemon import BIN, DaemonTest
+
+MATERIAL = "oak"
+# As the example has it, its origin in the middle.
+BOX_M = (0.20, 0.14, 0.03)
+RATES_HZ = (60, 240, 1000)
+
+
+def centred_box():
+    return meshes.obj(*meshes.box(BOX_M, low=[-side / 2 for side in BOX_M]))
+
+
+def decibels(ratio):
+    return 20 * numpy.log10(ratio + 1e-30)
+
+
+def rms(samples):
+    return numpy.sqrt(numpy.mean(numpy.square(samples)))
+
+
+class RestTest(DaemonTest):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.model = cls.decompose(centred_box(), MATERIAL)
+
+    @classmethod
+    def decompose(cls, mesh, material):
+        return cls.client.wait(cls.client.create(
+            mesh, "obj", settings=modal_model_pb2.DecompositionSettings(),
+            material=material_pb2.Material(preset=material)))
+
+    def render(self, trace):
+        out = self.folder / "sound.wav"
+        printed = self.daemon.command("--json", "render", trace, "--out", out, "--sample-rate",
+                                      sound.RATE, "--tail", 1)
+        self.assertEqual(int(json.loads(printed.stdout).get("rejected_count", 0)), 0)
+        return sound.read_wave(out)[:, 0]
+
+    def simulate(self, engine, scene, rate_hz, seconds, model=None, material=MATERIAL):
+        trace = self.folder / "floor.contacts"
+        subprocess.run([BIN / "carillon-rough-floor", trace, "--model", model or self.model,
+                        "--material", material, "--engine", engine, "--scene", scene,
+                        "--rate", str(rate_hz), "--seconds", str(seconds)], check=True)
+        return self.render(trace)
+
+    @staticmethod
+    def between(samples, begin_s, end_s):
+        return samples[int(begin_s * sound.RATE):int(end_s * sound.RATE)]
+
+    def assert_quiet(self, samples, begin_s, end_s, limit_db):
+        quiet = numpy.abs(self.between(samples, begin_s, end_s)).max()
+        level = decibels(quiet / numpy.abs(samples).max())
+        print(f"{self.id().rsplit('.')[-1]}: {level:.1f} dB", flush=True)
+        self.assertLess(level, limit_db)
+
+    def constant_load(self, rate_hz):
+        """A blow, and then the weight of 2 kg from two seconds on."""
+        steps = [contact_pb2.ContactStep(time_s=0, impulses=[
+            sound.impulse((0.03, 0.02, -0.015), (0, 0, 2), duration_s=0.0005)])]
+        place = contact_pb2.Vec3(x=0.03, y=0.02, z=-0.015)
+        for step in range(2 * rate_hz, 5 * rate_hz):
+            force = contact_pb2.SustainedContact(object=1, point_m=place,
+                                                 force_newtons=contact_pb2.Vec3(z=19.62))
+            steps.append(contact_pb2.ContactStep(time_s=step / rate_hz, sustained=[force]))
+        trace = self.folder / "load.contacts"
+        body = contact_trace_pb2.ContactTraceObject(
+            handle=1, modal_model=self.model, material=material_pb2.Material(preset=MATERIAL))
+        sound.write_trace(trace, [body], steps, step_s=1 / rate_hz)
+        return self.render(trace)
+
+    def test_a_constant_load_is_silent(self):
+        for rate_hz in RATES_HZ:
+            with self.subTest(rate_hz=rate_hz):
+                self.assert_quiet(self.constant_load(rate_hz), 2.5, 4.9, -80)
+
+    def test_a_box_at_rest_in_an_engine_is_silent(self):
+        for engine in ("bullet", "ode"):
+            for rate_hz in RATES_HZ:
+                with self.subTest(engine=engine, rate_hz=rate_hz):
+                    samples = self.simulate(engine, "rest", rate_hz, 5)
+                    self.assert_quiet(samples, 2.5, 4.9, -60)
+
+    def test_the_same_box_dragged_is_heard(self):
+        for engine in ("bullet", "ode"):
+            with self.subTest(engine=engine):
+                samples = self.simulate(engine, "drag", 240, 5)
+                dragged = rms(self.between(samples, 2.2, 3.9))
+                rests = rms(self.between(samples, 4.6, 4.9))
+                level = decibels(dragged / numpy.abs(samples).max())
+                print(f"dragged in {engine}: {level:.1f} dB of the impact's peak", flush=True)
+                self.assertGreater(level, -50)
+                self.assertLess(decibels(rests / dragged), -40)
+
+    def test_a_rolling_bowl_is_heard_without_lines_at_the_step_rate(self):
+        bowl = self.decompose(meshes.bowl(), "porcelain")
+        for engine in ("bullet", "ode"):
+            with self.subTest(engine=engine):
+                samples = self.simulate(engine, "roll", 240, 4, bowl, "porcelain")
+                rolls = self.between(samples, 0.5, 3.5)
+                self.assertGreater(rms(rolls), 1e-5)
+                self.assert_no_lines(rolls, 240)
+
+    def assert_no_lines(self, samples, rate_hz):
+        """Averaged spectra at the multiples of the step rate against those between them."""
+        size = sound.RATE // 10  # bins of 10 Hz, of which 240 Hz is a multiple
+        pieces = samples[:len(samples) // size * size].reshape(-1, size) * numpy.hanning(size)
+        power = numpy.mean(numpy.abs(numpy.fft.rfft(pieces))**2, axis=0)
+        lines, beside = [], []
+        for multiple in range(rate_hz // 10, len(power) - 6, rate_hz // 10):
+            lines.append(power[multiple])
+            beside.append(numpy.exp(numpy.mean(numpy.log(power[[multiple - 5, multiple - 4,
+                                                                multiple + 4, multiple + 5]]))))
+        excess = decibels(numpy.exp(numpy.mean(numpy.log(numpy.divide(lines, beside))))) / 2
+        print(f"lines at the step rate: {excess:.1f} dB over what is beside them", flush=True)
+        self.assertLess(excess, 3)
+
+
+if __name__ == "__main__":
+    unittest.main()
