@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <functional>
 #include <string>
@@ -130,8 +131,14 @@ TEST_F(AudioApi, AListenerHearsWhatTheMixerRenders) {
   }));
   ASSERT_GE(rendered.size(), 9000U);
   ASSERT_GE(heard.size(), rendered.size());
-  heard.resize(rendered.size());
-  EXPECT_EQ(heard, rendered);
+  // Bit for bit only where the strike falls into the same phase of the long blocks; else within what
+  // the spectral form is accurate to.
+  float peak = 0, error = 0;
+  for (size_t n = 0; n < rendered.size(); ++n) {
+    peak = std::max(peak, std::abs(rendered[n]));
+    error = std::max(error, std::abs(heard[n] - rendered[n]));
+  }
+  EXPECT_LT(error, 1e-5F * peak);
 }
 
 TEST_F(AudioApi, TheNumberOfListenersIsLimited) {
