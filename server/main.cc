@@ -43,6 +43,7 @@ sigset_t BlockStopSignals() {
   sigaddset(&signals, SIGTERM);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   signal(SIGPIPE, SIG_IGN);
+  signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error like a full disk
   return signals;
 }
 
@@ -76,7 +77,9 @@ absl::StatusOr<std::unique_ptr<DecompositionQueue>> MakeQueue(const Options& opt
   executor_options.worker_count = options.worker_count;
   absl::StatusOr<std::unique_ptr<Executor>> executor = MakeLocalExecutor(executor_options, clock);
   if (!executor.ok()) return executor.status();
-  return DecompositionQueue::Make(database, *std::move(executor), clock);
+  return DecompositionQueue::Make(
+      database, *std::move(executor), clock,
+      {.log = [](const std::string& line) { spdlog::warn("{}", line); }});
 }
 
 OutputSettings OutputSettingsOf(const Options& options) {

@@ -11,6 +11,23 @@
 #include "server/api/unary_call.h"
 
 namespace carillon {
+namespace {
+
+ModelFilter FilterOf(const v1::ListModalModelsRequest& request) {
+  ModelFilter filter{.label_contains = request.label_contains(),
+                     .tag = request.tag(),
+                     .min_stored_bytes = static_cast<int64_t>(request.min_stored_bytes()),
+                     .created_since_unix_ms = request.created_since_unix_ms()};
+  if (request.max_stored_bytes() > 0) {
+    filter.max_stored_bytes = static_cast<int64_t>(request.max_stored_bytes());
+  }
+  if (request.created_before_unix_ms() > 0) {
+    filter.created_before_unix_ms = request.created_before_unix_ms();
+  }
+  return filter;
+}
+
+}  // namespace
 
 grpc::ServerReadReactor<v1::UploadMeshRequest>* ModalModelService::UploadMesh(
     grpc::CallbackServerContext* context, v1::UploadMeshResponse* response) {
@@ -38,6 +55,12 @@ grpc::ServerUnaryReactor* ModalModelService::ListModalModels(
     grpc::CallbackServerContext* context, const v1::ListModalModelsRequest* request,
     v1::ListModalModelsResponse* response) {
   return Answer(context, pool_, [this, request, response] { return List(*request, *response); });
+}
+
+grpc::ServerUnaryReactor* ModalModelService::UpdateModalModel(
+    grpc::CallbackServerContext* context, const v1::UpdateModalModelRequest* request,
+    v1::UpdateModalModelResponse* response) {
+  return Answer(context, pool_, [this, request, response] { return Update(*request, *response); });
 }
 
 grpc::ServerUnaryReactor* ModalModelService::DeleteModalModel(
@@ -72,20 +95,34 @@ absl::Status ModalModelService::Get(const v1::GetModalModelRequest& request,
                                     v1::GetModalModelResponse& response) {
   const absl::StatusOr<std::string> digest = ParseModelName(request.name());
   if (!digest.ok()) return digest.status();
-  const absl::StatusOr<ModelSummary> summary = database_.models().Summary(*digest);
-  if (!summary.ok()) return summary.status();
   const absl::StatusOr<std::vector<double>> eigenvalues = database_.models().Eigenvalues(*digest);
   if (!eigenvalues.ok()) return eigenvalues.status();
+  const absl::StatusOr<ModelSummary> summary = database_.models().Summary(*digest);
+  if (!summary.ok()) return summary.status();
   *response.mutable_modal_model() = ToProto(*summary);
   response.mutable_modal_model()->mutable_eigenvalues()->Add(eigenvalues->begin(),
                                                              eigenvalues->end());
   return absl::OkStatus();
 }
 
+absl::Status ModalModelService::Update(const v1::UpdateModalModelRequest& request,
+                                       v1::UpdateModalModelResponse& response) {
+  const absl::StatusOr<std::string> digest = ParseModelName(request.name());
+  if (!digest.ok()) return digest.status();
+  ModelChange change{.add_tags = {request.add_tags().begin(), request.add_tags().end()},
+                     .remove_tags = {request.remove_tags().begin(), request.remove_tags().end()}};
+  if (request.has_label()) change.label = request.label();
+  if (request.has_pinned()) change.pinned = request.pinned();
+  const absl::StatusOr<ModelSummary> summary = database_.models().Update(*digest, change);
+  if (!summary.ok()) return summary.status();
+  *response.mutable_modal_model() = ToProto(*summary);
+  return absl::OkStatus();
+}
+
 absl::Status ModalModelService::List(const v1::ListModalModelsRequest& request,
                                      v1::ListModalModelsResponse& response) {
   const absl::StatusOr<ModelPage> page =
-      database_.models().List(request.page_size(), request.page_token());
+      database_.models().List(FilterOf(request), request.page_size(), request.page_token());
   if (!page.ok()) return page.status();
   for (const ModelSummary& summary : page->models) *response.add_modal_models() = ToProto(summary);
   response.set_next_page_token(page->next_page_token);

@@ -25,6 +25,9 @@ class ModalModelService final : public v1::ModalModelService::CallbackService {
   grpc::ServerUnaryReactor* ListModalModels(grpc::CallbackServerContext* context,
                                             const v1::ListModalModelsRequest* request,
                                             v1::ListModalModelsResponse* response) override;
+  grpc::ServerUnaryReactor* UpdateModalModel(grpc::CallbackServerContext* context,
+                                             const v1::UpdateModalModelRequest* request,
+                                             v1::UpdateModalModelResponse* response) override;
   grpc::ServerUnaryReactor* DeleteModalModel(grpc::CallbackServerContext* context,
                                              const v1::DeleteModalModelRequest* request,
                                              v1::DeleteModalModelResponse* response) override;
@@ -38,6 +41,8 @@ class ModalModelService final : public v1::ModalModelService::CallbackService {
 
  private:
   absl::Status Get(const v1::GetModalModelRequest& request, v1::GetModalModelResponse& response);
+  absl::Status Update(const v1::UpdateModalModelRequest& request,
+                      v1::UpdateModalModelResponse& response);
   absl::Status List(const v1::ListModalModelsRequest& request,
                     v1::ListModalModelsResponse& response);
 

@@ -178,6 +178,10 @@ v1::ModalModelSummary ToProto(const ModelSummary& summary) {
   *proto.mutable_header() = summary.header;
   proto.set_stored_bytes(summary.stored_bytes);
   proto.set_created_unix_ms(summary.created_unix_ms);
+  proto.set_revision(summary.revision);
+  proto.mutable_tags()->Assign(summary.tags.begin(), summary.tags.end());
+  proto.set_pinned(summary.pinned);
+  proto.set_sounded_unix_ms(summary.sounded_unix_ms);
   return proto;
 }
 

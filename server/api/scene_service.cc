@@ -61,7 +61,7 @@ absl::Status SceneService::Add(const v1::AddObjectRequest& request,
       ToObjectProperties(request.material(), request.size(),
                          request.has_gain() ? std::optional(request.gain()) : std::nullopt);
   if (!properties.ok()) return properties.status();
-  absl::StatusOr<std::shared_ptr<const ModalModel>> model = database_.models().Find(*digest);
+  absl::StatusOr<std::shared_ptr<const ModalModel>> model = database_.models().FindToSound(*digest);
   if (!model.ok()) return model.status();
   const absl::StatusOr<PlacedObject> placed =
       scenes_.AddObject(*scene, request.handle(), *std::move(model), *properties);

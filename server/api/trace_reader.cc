@@ -77,7 +77,7 @@ absl::Status TraceReader::TakeObject(const v1::ContactTraceObject& object) {
       ToObjectProperties(object.material(), object.size(),
                          object.has_gain() ? std::optional(object.gain()) : std::nullopt);
   if (!properties.ok()) return properties.status();
-  absl::StatusOr<std::shared_ptr<const ModalModel>> model = models_.Find(*digest);
+  absl::StatusOr<std::shared_ptr<const ModalModel>> model = models_.FindToSound(*digest);
   if (!model.ok()) return model.status();
   return renderer_->AddObject(object.handle(), *std::move(model), *properties);
 }

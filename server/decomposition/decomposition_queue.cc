@@ -30,8 +30,10 @@ DecompositionQueue::DecompositionQueue(std::shared_ptr<QueueCore> core) : core_(
 DecompositionQueue::~DecompositionQueue() { core_->Stop(); }
 
 absl::StatusOr<std::unique_ptr<DecompositionQueue>> DecompositionQueue::Make(
-    ModeDatabase& database, std::unique_ptr<Executor> executor, const Clock& clock) {
-  auto core = std::make_shared<QueueCore>(database, std::move(executor), clock);
+    ModeDatabase& database, std::unique_ptr<Executor> executor, const Clock& clock,
+    QueueSettings settings) {
+  auto core =
+      std::make_shared<QueueCore>(database, std::move(executor), clock, std::move(settings));
   if (const absl::Status status = core->TakeUp(); !status.ok()) {
     core->Stop();
     return status;

@@ -26,6 +26,12 @@ class JobWatch {
   virtual ~JobWatch() = default;
 };
 
+struct QueueSettings {
+  size_t max_queued_count = 1024;
+  /// What people should know though no caller is told: a line each. Called on any thread.
+  std::function<void(const std::string& line)> log = [](const std::string&) {};
+};
+
 struct DecompositionJobPage {
   std::vector<v1::Job> jobs;
   std::string next_page_token;  ///< empty: this was the last page
@@ -35,12 +41,12 @@ struct DecompositionJobPage {
 /// accepted is computed even if the daemon dies meanwhile. Safe from every thread.
 class DecompositionQueue {
  public:
-  static constexpr size_t kMaxQueuedCount = 1024;
-
   /// Takes up the jobs that an earlier run of the daemon left. `database` and `clock` must outlive
-  /// the queue. Its destruction ends running children and keeps their jobs for the next start.
+  /// the queue. Its destruction ends running children and keeps their jobs for the next start. A
+  /// model that the database puts into quarantine is computed again, where it has a job.
   static absl::StatusOr<std::unique_ptr<DecompositionQueue>> Make(
-      ModeDatabase& database, std::unique_ptr<Executor> executor, const Clock& clock);
+      ModeDatabase& database, std::unique_ptr<Executor> executor, const Clock& clock,
+      QueueSettings settings = {});
   ~DecompositionQueue();
 
   /// Asks for the modal model of a mesh (ResolveRequest is applied). The job is in the database

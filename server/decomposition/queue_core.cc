@@ -30,10 +30,10 @@ absl::Status NotFound(const std::string& digest) {
                  absl::StrCat("no job is named jobs/", digest, ": create the modal model again"));
 }
 
-absl::Status QueueFull() {
-  return Refusal(absl::StatusCode::kResourceExhausted, "QUEUE_FULL",
-                 absl::StrCat(DecompositionQueue::kMaxQueuedCount,
-                              " decompositions wait already: try again when some have ended"));
+absl::Status QueueFull(size_t count) {
+  return Refusal(
+      absl::StatusCode::kResourceExhausted, "QUEUE_FULL",
+      absl::StrCat(count, " decompositions wait already: try again when some have ended"));
 }
 
 bool SameHints(const v1::CreateModalModelRequest& a, const v1::CreateModalModelRequest& b) {
@@ -75,8 +75,15 @@ absl::Status QueueCore::TakeUp() {
   const auto records = database_.jobs().Unfinished();
   if (!records.ok()) return records.status();
   Notices notices;  // nobody watches yet
+  database_.models().ListenToQuarantine(
+      [this](const std::string& digest, const absl::Status& why) { OnQuarantine(digest, why); });
   MutexLock lock(&mutex_);
   for (JobRecord record : *records) {
+    if (record.damaged) {
+      settings_.log(record.error.message());
+      if (absl::Status status = database_.jobs().Put(record); !status.ok()) return status;
+      continue;
+    }
     auto request = ParseRequest(record);
     const absl::StatusOr<bool> satisfied =
         request.ok() ? IsSatisfied(std::nullopt, record.digest, *request) : request.status();
@@ -94,6 +101,7 @@ absl::Status QueueCore::TakeUp() {
 }
 
 void QueueCore::Stop() {
+  database_.models().ListenToQuarantine(nullptr);
   {
     MutexLock lock(&mutex_);
     stopping_ = true;
@@ -132,7 +140,7 @@ absl::StatusOr<v1::Job> QueueCore::SubmitNew(const std::string& digest,
   if (!*satisfied) {
     const auto mesh = database_.meshes().Find(request.mesh_digest());
     if (!mesh.ok()) return mesh.status();
-    if (queued_.size() >= DecompositionQueue::kMaxQueuedCount) return QueueFull();
+    if (queued_.size() >= settings_.max_queued_count) return QueueFull(queued_.size());
   }
   JobRecord record{.digest = digest,
                    .request = request.SerializeAsString(),
@@ -174,6 +182,31 @@ absl::StatusOr<bool> QueueCore::IsSatisfied(const std::optional<JobRecord>& reco
   if (!record.has_value() || record->state != v1::JOB_STATE_SUCCEEDED) return false;
   const auto ran = ParseRequest(*record);
   return ran.ok() && WantedEigenvalue(*ran) >= wanted;
+}
+
+void QueueCore::OnQuarantine(const std::string& digest, const absl::Status& why) {
+  Notices notices;
+  bool again = false;
+  {
+    MutexLock lock(&mutex_);
+    again = ComputeAgain(digest, notices);
+  }
+  settings_.log(absl::StrCat(why.message(), again ? "; it is computed again" : "; it has no job"));
+  TellAll(notices);
+}
+
+// Whether the model of that name is being computed now.
+bool QueueCore::ComputeAgain(const std::string& digest, Notices& notices) {
+  if (active_.contains(digest)) return true;
+  auto record = database_.jobs().Find(digest);
+  if (!record.ok() || !record->has_value() || (*record)->damaged) return false;
+  auto request = ParseRequest(**record);
+  if (!request.ok()) return false;
+  (*record)->state = v1::JOB_STATE_QUEUED;
+  if (!database_.jobs().Put(**record).ok()) return false;
+  Enqueue(**std::move(record), *std::move(request));
+  StartWhatFits(notices);
+  return true;
 }
 
 void QueueCore::Enqueue(JobRecord record, v1::CreateModalModelRequest request) {

@@ -30,8 +30,12 @@ namespace carillon {
 /// that starts has to run them anyway.
 class QueueCore {
  public:
-  QueueCore(ModeDatabase& database, std::unique_ptr<Executor> executor, const Clock& clock)
-      : database_(database), clock_(clock), executor_(std::move(executor)) {}
+  QueueCore(ModeDatabase& database, std::unique_ptr<Executor> executor, const Clock& clock,
+            QueueSettings settings)
+      : database_(database),
+        clock_(clock),
+        settings_(std::move(settings)),
+        executor_(std::move(executor)) {}
 
   /// Queues what an earlier run of the daemon left.
   absl::Status TakeUp();
@@ -69,6 +73,9 @@ class QueueCore {
                                    const v1::CreateModalModelRequest& request);
   void Enqueue(JobRecord record, v1::CreateModalModelRequest request)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void OnQuarantine(const std::string& digest, const absl::Status& why);
+  bool ComputeAgain(const std::string& digest, Notices& notices)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void StartWhatFits(Notices& notices) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   DecompositionTask MakeTask(const Active& active);
 
@@ -83,6 +90,7 @@ class QueueCore {
 
   ModeDatabase& database_;
   const Clock& clock_;
+  const QueueSettings settings_;
   Mutex mutex_;
   bool stopping_ ABSL_GUARDED_BY(mutex_) = false;
   std::map<std::string, Active> active_ ABSL_GUARDED_BY(mutex_);

@@ -47,7 +47,8 @@ absl::StatusOr<std::unique_ptr<Database>> Database::Open(const std::filesystem::
   std::filesystem::create_directories(absolute.parent_path(), error);
   if (error) return Unusable(absolute, error.message());
   auto connection = Connect(absolute);
-  if (!connection.ok() && connection.status().code() == absl::StatusCode::kInternal) {
+  if (!connection.ok() &&
+      (absl::IsInternal(connection.status()) || absl::IsFailedPrecondition(connection.status()))) {
     return Unusable(absolute, connection.status().message());
   }
   if (!connection.ok()) return connection.status();

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/mode_database/job_store.h"
 
+#include <bit>
 #include <iterator>
+#include <string_view>
 #include <utility>
 
 #include "absl/functional/function_ref.h"
 #include "absl/strings/str_cat.h"
 #include "proto/error_reason.h"
+#include "server/base/xxh3.h"
 #include "server/mode_database/database.h"
 #include "server/mode_database/page_token.h"
 
@@ -14,21 +17,48 @@ namespace carillon {
 namespace {
 
 constexpr char kSelectRows[] =
-    "SELECT number, digest, label, state, remembered, created_unix_ms, error, request FROM jobs ";
+    "SELECT number, digest, label, state, remembered, created_unix_ms, priority, start_count, way, "
+    "peak_bytes, xxh3 IS NULL, xxh3, error, request FROM jobs ";
 
-absl::StatusOr<JobRecord> ParseRow(const SqlRow& row) {
+// Of all that is stored, so that no bit of an intent can change unseen.
+int64_t RowHash(const JobRecord& job, std::string_view error) {
+  std::string text =
+      absl::StrCat(job.digest, " ", static_cast<int>(job.state), " ", job.remembered ? 1 : 0, " ",
+                   job.created_unix_ms, " ", job.priority, " ", job.start_count, " ", job.way, " ",
+                   job.peak_bytes, " ", job.label.size(), " ", error.size(), " ");
+  text.append(job.label).append(error).append(job.request);
+  return std::bit_cast<int64_t>(Xxh3(text));
+}
+
+JobRecord Damaged(const JobRecord& job) {
+  JobRecord damaged{.digest = job.digest,
+                    .label = job.label,
+                    .state = v1::JOB_STATE_FAILED,
+                    .created_unix_ms = job.created_unix_ms,
+                    .damaged = true};
+  damaged.error = ToErrorInfo(Refusal(
+      absl::StatusCode::kDataLoss, "DATABASE_CORRUPT",
+      absl::StrCat("jobs/", job.digest,
+                   " has changed on the disk: create its model again, and check the disk")));
+  return damaged;
+}
+
+JobRecord ParseRow(const SqlRow& row) {
   JobRecord job{.digest = row.Text(1),
-                .request = std::string(row.Blob(7)),
+                .request = std::string(row.Blob(13)),
                 .label = row.Text(2),
                 .state = static_cast<v1::JobState>(row.Int(3)),
                 .remembered = row.Int(4) != 0,
-                .created_unix_ms = row.Int(5)};
-  const std::string_view error = row.Blob(6);
-  if (!job.error.ParseFromArray(error.data(), static_cast<int>(error.size()))) {
-    return Refusal(absl::StatusCode::kDataLoss, "DATABASE_CORRUPT",
-                   absl::StrCat("jobs/", job.digest,
-                                " cannot be read: delete the model of that name "
-                                "and create it again"));
+                .created_unix_ms = row.Int(5),
+                .priority = static_cast<int32_t>(row.Int(6)),
+                .start_count = static_cast<uint32_t>(row.Int(7)),
+                .way = static_cast<uint32_t>(row.Int(8)),
+                .peak_bytes = static_cast<uint64_t>(row.Int(9))};
+  const std::string_view error = row.Blob(12);
+  const bool hashed = row.Int(10) == 0;
+  if ((hashed && RowHash(job, error) != row.Int(11)) ||
+      !job.error.ParseFromArray(error.data(), static_cast<int>(error.size()))) {
+    return Damaged(job);
   }
   return job;
 }
@@ -36,16 +66,22 @@ absl::StatusOr<JobRecord> ParseRow(const SqlRow& row) {
 }  // namespace
 
 absl::Status JobStore::Put(const JobRecord& job) {
+  const std::string error = job.error.SerializeAsString();
   return database_->Write([&](SqliteConnection& connection) {
     return connection.Run(
-        "INSERT INTO jobs (digest, label, state, remembered, created_unix_ms, error, request) "
-        "VALUES (?, ?, ?, ?, ?, ?, ?) ON CONFLICT (digest) DO UPDATE SET label = excluded.label, "
-        "state = excluded.state, remembered = excluded.remembered, "
-        "created_unix_ms = excluded.created_unix_ms, error = excluded.error, "
+        "INSERT INTO jobs (digest, label, state, remembered, created_unix_ms, priority, "
+        "start_count, way, peak_bytes, xxh3, error, request) "
+        "VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (digest) DO UPDATE SET "
+        "label = excluded.label, state = excluded.state, remembered = excluded.remembered, "
+        "created_unix_ms = excluded.created_unix_ms, priority = excluded.priority, "
+        "start_count = excluded.start_count, way = excluded.way, "
+        "peak_bytes = excluded.peak_bytes, xxh3 = excluded.xxh3, error = excluded.error, "
         "request = excluded.request",
         {job.digest, job.label, static_cast<int64_t>(job.state),
          static_cast<int64_t>(job.remembered ? 1 : 0), job.created_unix_ms,
-         SqlBlob{job.error.SerializeAsString()}, SqlBlob{job.request}});
+         static_cast<int64_t>(job.priority), static_cast<int64_t>(job.start_count),
+         static_cast<int64_t>(job.way), static_cast<int64_t>(job.peak_bytes), RowHash(job, error),
+         SqlBlob{error}, SqlBlob{job.request}});
   });
 }
 
@@ -54,9 +90,7 @@ absl::StatusOr<std::optional<JobRecord>> JobStore::Find(const std::string& diges
   const absl::Status status = database_->Read([&](SqliteConnection& connection) {
     return connection.Query(absl::StrCat(kSelectRows, "WHERE digest = ?").c_str(), {digest},
                             [&](const SqlRow& row) {
-                              absl::StatusOr<JobRecord> found = ParseRow(row);
-                              if (!found.ok()) return found.status();
-                              job = *std::move(found);
+                              job = ParseRow(row);
                               return absl::OkStatus();
                             });
   });
@@ -67,15 +101,16 @@ absl::StatusOr<std::optional<JobRecord>> JobStore::Find(const std::string& diges
 absl::StatusOr<std::vector<JobRecord>> JobStore::Unfinished() {
   std::vector<JobRecord> jobs;
   const absl::Status status = database_->Read([&](SqliteConnection& connection) {
-    return connection.Query(
-        absl::StrCat(kSelectRows, "WHERE state IN (?, ?) ORDER BY number").c_str(),
-        {static_cast<int64_t>(v1::JOB_STATE_QUEUED), static_cast<int64_t>(v1::JOB_STATE_RUNNING)},
-        [&](const SqlRow& row) {
-          absl::StatusOr<JobRecord> job = ParseRow(row);
-          if (!job.ok()) return job.status();
-          jobs.push_back(*std::move(job));
-          return absl::OkStatus();
-        });
+    // All rows are looked at: a state that has changed on the disk would hide its job.
+    return connection.Query(absl::StrCat(kSelectRows, "ORDER BY number").c_str(), {},
+                            [&](const SqlRow& row) {
+                              JobRecord job = ParseRow(row);
+                              if (job.damaged || job.state == v1::JOB_STATE_QUEUED ||
+                                  job.state == v1::JOB_STATE_RUNNING) {
+                                jobs.push_back(std::move(job));
+                              }
+                              return absl::OkStatus();
+                            });
   });
   if (!status.ok()) return status;
   return jobs;
@@ -89,10 +124,8 @@ absl::StatusOr<JobPage> JobStore::List(int page_size, const std::string& page_to
     return connection.Query(
         absl::StrCat(kSelectRows, "WHERE number < ? ORDER BY number DESC LIMIT ?").c_str(),
         {range->below, range->size}, [&](const SqlRow& row) {
-          absl::StatusOr<JobRecord> job = ParseRow(row);
-          if (!job.ok()) return job.status();
           page.next_page_token = absl::StrCat(row.Int(0));
-          page.jobs.push_back(*std::move(job));
+          page.jobs.push_back(ParseRow(row));
           return absl::OkStatus();
         });
   });

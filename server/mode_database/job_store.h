@@ -23,6 +23,12 @@ struct JobRecord {
   v1::ErrorInfo error{};    ///< while `state` is JOB_STATE_FAILED
   bool remembered = false;  ///< the failure would come again: it is not tried again
   int64_t created_unix_ms = 0;
+  int32_t priority = 0;      ///< higher starts first
+  uint32_t start_count = 0;  ///< starts of a worker since it was last asked for, that saw no end
+  uint32_t way = 0;          ///< how it is computed: 0 as asked, above that another way
+  uint64_t peak_bytes = 0;   ///< most memory that its worker took, once it ran
+  /// The row has changed on the disk: only its digest is right, `state` and `error` say so.
+  bool damaged = false;
 };
 
 struct JobPage {
@@ -40,7 +46,7 @@ class JobStore {
 
   absl::StatusOr<std::optional<JobRecord>> Find(const std::string& digest);
 
-  /// Queued and running jobs, oldest first.
+  /// Queued, running and damaged jobs, oldest first.
   absl::StatusOr<std::vector<JobRecord>> Unfinished();
 
   /// Newest first. `page_size` 0: 100; at most 1000. Errors: InvalidArgument (INVALID_PAGE).

@@ -152,13 +152,15 @@ absl::Status MeshStore::WriteFile(const std::string& digest, const std::filesyst
                             });
   });
   if (!status.ok()) return status;
-  if (sha.Finish() != digest) {
-    return Refusal(absl::StatusCode::kDataLoss, "MESH_CORRUPT",
-                   absl::StrCat("the stored mesh ", digest,
-                                " has changed on the disk: upload it again "
-                                "under a fresh database, and check the disk"));
-  }
-  return absl::OkStatus();
+  if (sha.Finish() == digest) return absl::OkStatus();
+  // Out of the way, so that an upload stores it anew.
+  status = database_->Write([&](SqliteConnection& connection) {
+    return connection.Run("DELETE FROM meshes WHERE digest = ?", {digest});
+  });
+  if (!status.ok()) return status;
+  return Refusal(absl::StatusCode::kDataLoss, "MESH_CORRUPT",
+                 absl::StrCat("the stored mesh ", digest,
+                              " has changed on the disk: upload it again, and check the disk"));
 }
 
 }  // namespace carillon

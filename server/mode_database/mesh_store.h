@@ -59,7 +59,7 @@ class MeshStore {
 
   /// Writes the mesh to a new file that only its owner may read.
   /// Errors: NotFound (MESH_NOT_FOUND), DataLoss (MESH_CORRUPT: its bytes no longer have its
-  /// digest).
+  /// digest; it is deleted, so that it can be stored anew).
   absl::Status WriteFile(const std::string& digest, const std::filesystem::path& file);
 
  private:

@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/mode_database/model_store.h"
 
-#include <bit>
+#include <algorithm>
 #include <iterator>
-#include <limits>
 #include <utility>
 
+#include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
 #include "proto/error_reason.h"
 #include "server/base/sha256.h"
 #include "server/base/xxh3.h"
 #include "server/mode_database/database.h"
 #include "server/mode_database/model_codec.h"
+#include "server/mode_database/model_rows.h"
 #include "server/mode_database/page_token.h"
 #include "server/mode_database/spool_file.h"
 
@@ -19,23 +20,7 @@ namespace carillon {
 namespace {
 
 constexpr size_t kMaxLabelBytes = 200;
-
-struct ModelRow {
-  int64_t revision = 0;
-  ModelSummary summary;
-};
-
-absl::Status NotFound(const std::string& digest) {
-  return Refusal(absl::StatusCode::kNotFound, "MODAL_MODEL_NOT_FOUND",
-                 absl::StrCat("no modal model is named modalModels/", digest,
-                              ": create or import it first, and let its job succeed"));
-}
-
-absl::Status Corrupt(const std::string& digest, absl::string_view what) {
-  return Refusal(absl::StatusCode::kDataLoss, "MODAL_MODEL_CORRUPT",
-                 absl::StrCat("modalModels/", digest, " has changed on the disk (", what,
-                              "): delete it and create it again, or import it from a copy"));
-}
+constexpr size_t kMaxTagBytes = 64;
 
 absl::Status CheckName(const std::string& digest) {
   if (IsSha256Hex(digest)) return absl::OkStatus();
@@ -43,119 +28,16 @@ absl::Status CheckName(const std::string& digest) {
                  "a modal model is named modalModels/ and 64 lower-case hexadecimal digits");
 }
 
-constexpr char kSelectRows[] =
-    "SELECT revision, digest, label, stored_bytes, created_unix_ms, header_xxh3, header FROM "
-    "models ";
-
-absl::StatusOr<ModelRow> ParseRow(const SqlRow& row) {
-  ModelRow model{row.Int(0),
-                 {.digest = row.Text(1),
-                  .label = row.Text(2),
-                  .stored_bytes = static_cast<uint64_t>(row.Int(3)),
-                  .created_unix_ms = row.Int(4)}};
-  const std::string_view header = row.Blob(6);
-  if (std::bit_cast<int64_t>(Xxh3(header)) != row.Int(5) ||
-      !model.summary.header.ParseFromArray(header.data(), static_cast<int>(header.size()))) {
-    return Corrupt(model.summary.digest, "the hash of its header is wrong");
-  }
-  return model;
-}
-
-absl::StatusOr<ModelRow> SelectModel(SqliteConnection& connection, const std::string& digest) {
-  absl::StatusOr<ModelRow> model = NotFound(digest);
-  const absl::Status status = connection.Query(
-      absl::StrCat(kSelectRows, "WHERE digest = ?").c_str(), {digest}, [&](const SqlRow& row) {
-        model = ParseRow(row);
-        return model.status();
+absl::Status CheckTag(const std::string& tag) {
+  const bool fits =
+      !tag.empty() && tag.size() <= kMaxTagBytes && std::ranges::all_of(tag, [](unsigned char c) {
+        return absl::ascii_isalnum(c) ||
+               absl::string_view("._:/+-").find(static_cast<char>(c)) != absl::string_view::npos;
       });
-  if (!status.ok()) return status;
-  return model;
-}
-
-// Calls `on_chunk` for the chunks numbered from `first` on, at most `limit`.
-absl::Status SelectChunks(SqliteConnection& connection, int64_t revision, int64_t first,
-                          int64_t limit,
-                          absl::FunctionRef<absl::Status(v1::ModalModelRecord)> on_chunk) {
-  return connection.Query(
-      "SELECT array, byte_offset, xxh3, data FROM model_chunks "
-      "WHERE revision = ? AND number >= ? ORDER BY number LIMIT ?",
-      {revision, first, limit}, [&](const SqlRow& row) {
-        v1::ModalModelRecord record;
-        v1::ModalModelChunk& chunk = *record.mutable_chunk();
-        chunk.set_array(static_cast<uint32_t>(row.Int(0)));
-        chunk.set_offset(static_cast<uint64_t>(row.Int(1)));
-        chunk.set_xxh3(std::bit_cast<uint64_t>(row.Int(2)));
-        chunk.set_data(row.Blob(3).data(), row.Blob(3).size());
-        return on_chunk(std::move(record));
-      });
-}
-
-absl::Status InsertHeader(SqliteConnection& connection, const ModelSummary& summary) {
-  const std::string header = summary.header.SerializeAsString();
-  return connection.Run(
-      "INSERT INTO models (digest, label, stored_bytes, created_unix_ms, header_xxh3, header) "
-      "VALUES (?, ?, ?, ?, ?, ?)",
-      {summary.digest, summary.label, static_cast<int64_t>(summary.stored_bytes),
-       summary.created_unix_ms, std::bit_cast<int64_t>(Xxh3(header)), SqlBlob{header}});
-}
-
-absl::Status InsertChunk(SqliteConnection& connection, int64_t revision, int64_t number,
-                         const v1::ModalModelChunk& chunk) {
-  return connection.Run(
-      "INSERT INTO model_chunks (revision, number, array, byte_offset, xxh3, data) "
-      "VALUES (?, ?, ?, ?, ?, ?)",
-      {revision, number, static_cast<int64_t>(chunk.array()), static_cast<int64_t>(chunk.offset()),
-       std::bit_cast<int64_t>(chunk.xxh3()), SqlBlob{chunk.data()}});
-}
-
-// The label of the revision to be replaced stays; without one, `summary` keeps its own.
-absl::Status RemoveOldRevision(SqliteConnection& connection, ModelSummary& summary) {
-  absl::Status status = connection.Query("SELECT label FROM models WHERE digest = ?",
-                                         {summary.digest}, [&](const SqlRow& row) {
-                                           if (!row.Text(0).empty()) summary.label = row.Text(0);
-                                           return absl::OkStatus();
-                                         });
-  if (!status.ok()) return status;
-  return connection.Run("DELETE FROM models WHERE digest = ?", {summary.digest});
-}
-
-// Reads and checks every record, and inserts it.
-absl::Status InsertModel(SqliteConnection& connection, ModelFileReader& records,
-                         ModelSummary& summary) {
-  absl::Status status = RemoveOldRevision(connection, summary);
-  ModelChecker checker;
-  int64_t revision = 0;
-  for (int64_t number = -1; status.ok(); ++number) {
-    const auto record = records.Next();
-    if (!record.ok()) return record.status();
-    if (!record->has_value()) return checker.Finish();
-    status = checker.Check(**record);
-    if (!status.ok()) return status;
-    if (number >= 0) {
-      status = InsertChunk(connection, revision, number, (*record)->chunk());
-      continue;
-    }
-    summary.header = checker.header();
-    summary.stored_bytes = checker.array_bytes();
-    status = InsertHeader(connection, summary);
-    revision = connection.last_row_id();
-  }
-  return status;
-}
-
-absl::StatusOr<ModalModel> ReadModel(SqliteConnection& connection, const ModelRow& row) {
-  ModelDecoder decoder;
-  v1::ModalModelRecord header;
-  *header.mutable_header() = row.summary.header;
-  absl::Status status = decoder.Append(header);
-  if (status.ok()) {
-    status = SelectChunks(connection, row.revision, 0, std::numeric_limits<int64_t>::max(),
-                          [&](const v1::ModalModelRecord& chunk) { return decoder.Append(chunk); });
-  }
-  if (!status.ok()) return Corrupt(row.summary.digest, status.message());
-  absl::StatusOr<ModalModel> model = decoder.Finish(row.summary.digest);
-  if (!model.ok()) return Corrupt(row.summary.digest, model.status().message());
-  return model;
+  if (fits) return absl::OkStatus();
+  return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_TAG",
+                 absl::StrCat("\"", tag, "\" is no tag: give one to ", kMaxTagBytes,
+                              " letters, digits or any of . _ : / + -"));
 }
 
 absl::StatusOr<ModelSummary> PutRecords(Database& database, const Clock& clock,
@@ -172,6 +54,31 @@ ModelSummary Named(const std::string& digest, const std::string& label) {
   summary.digest = digest;
   summary.label = label.substr(0, kMaxLabelBytes);
   return summary;
+}
+
+absl::Status Apply(SqliteConnection& connection, const std::string& digest,
+                   const ModelChange& change) {
+  absl::Status status;
+  if (change.label.has_value()) {
+    status = connection.Run("UPDATE models SET label = ? WHERE digest = ?",
+                            {change.label->substr(0, kMaxLabelBytes), digest});
+  }
+  if (status.ok() && change.pinned.has_value()) {
+    status = connection.Run("UPDATE models SET pinned = ? WHERE digest = ?",
+                            {static_cast<int64_t>(*change.pinned), digest});
+  }
+  for (const std::string& tag : change.add_tags) {
+    if (status.ok()) status = CheckTag(tag);
+    if (status.ok()) {
+      status = connection.Run("INSERT OR IGNORE INTO model_tags (tag, digest) VALUES (?, ?)",
+                              {tag, digest});
+    }
+  }
+  for (const std::string& tag : change.remove_tags) {
+    if (!status.ok()) break;
+    status = connection.Run("DELETE FROM model_tags WHERE tag = ? AND digest = ?", {tag, digest});
+  }
+  return status;
 }
 
 }  // namespace
@@ -207,16 +114,17 @@ absl::StatusOr<std::optional<v1::ModalModelRecord>> ModelExport::Next() {
   if (!header_sent_) {
     header_sent_ = true;
     v1::ModalModelRecord record;
-    *record.mutable_header() = std::move(header_);
+    *record.mutable_header() = summary_.header;
     return record;
   }
   if (next_chunk_ == chunk_count_) return std::nullopt;
   std::optional<v1::ModalModelRecord> record;
   const absl::Status status = database_->Read([&](SqliteConnection& connection) {
-    return SelectChunks(connection, revision_, next_chunk_, 1, [&](v1::ModalModelRecord chunk) {
-      record = std::move(chunk);
-      return absl::OkStatus();
-    });
+    return SelectChunks(connection, summary_.revision, next_chunk_, 1,
+                        [&](v1::ModalModelRecord chunk) {
+                          record = std::move(chunk);
+                          return absl::OkStatus();
+                        });
   });
   if (!status.ok()) return status;
   if (!record.has_value()) {
@@ -224,10 +132,32 @@ absl::StatusOr<std::optional<v1::ModalModelRecord>> ModelExport::Next() {
                    "the model was replaced or deleted while it was read: export it again");
   }
   if (Xxh3(record->chunk().data()) != record->chunk().xxh3()) {
-    return Corrupt(digest_, absl::StrCat("the hash of chunk ", next_chunk_, " is wrong"));
+    return store_->Quarantine(
+        summary_.digest, ModelCorrupt(summary_.digest, absl::StrCat("the hash of chunk ",
+                                                                    next_chunk_, " is wrong")));
   }
   ++next_chunk_;
   return record;
+}
+
+void ModelStore::ListenToQuarantine(OnQuarantine on_quarantine) {
+  MutexLock lock(&listener_mutex_);
+  on_quarantine_ = std::move(on_quarantine);
+}
+
+// Returns `why`, or what kept the model out of quarantine.
+absl::Status ModelStore::Quarantine(const std::string& digest, const absl::Status& why) {
+  bool news = false;
+  absl::Status status = database_->Write([&](SqliteConnection& connection) {
+    absl::Status marked = connection.Run(
+        "UPDATE models SET quarantined = 1 WHERE digest = ? AND quarantined = 0", {digest});
+    news = connection.changed_row_count() > 0;
+    return marked;
+  });
+  if (!status.ok()) return status;
+  MutexLock lock(&listener_mutex_);
+  if (news && on_quarantine_) on_quarantine_(digest, why);
+  return why;
 }
 
 absl::StatusOr<ModelSummary> ModelStore::PutFile(const std::string& digest,
@@ -249,14 +179,12 @@ absl::StatusOr<ModelImport> ModelStore::Import(const std::string& digest,
 }
 
 absl::StatusOr<ModelExport> ModelStore::Export(const std::string& digest) {
-  ModelExport result(*database_, digest);
+  absl::StatusOr<ModelSummary> summary = Summary(digest);
+  if (!summary.ok()) return summary.status();
+  ModelExport result(*database_, *this, *std::move(summary));
   const absl::Status status = database_->Read([&](SqliteConnection& connection) {
-    absl::StatusOr<ModelRow> row = SelectModel(connection, digest);
-    if (!row.ok()) return row.status();
-    result.revision_ = row->revision;
-    result.header_ = std::move(row->summary.header);
-    return connection.Query("SELECT count(*) FROM model_chunks WHERE revision = ?", {row->revision},
-                            [&](const SqlRow& count) {
+    return connection.Query("SELECT count(*) FROM model_chunks WHERE revision = ?",
+                            {result.summary_.revision}, [&](const SqlRow& count) {
                               result.chunk_count_ = count.Int(0);
                               return absl::OkStatus();
                             });
@@ -266,10 +194,24 @@ absl::StatusOr<ModelExport> ModelStore::Export(const std::string& digest) {
 }
 
 absl::StatusOr<std::shared_ptr<const ModalModel>> ModelStore::Find(const std::string& digest) {
+  auto model = Load(digest);
+  if (absl::IsDataLoss(model.status())) return Quarantine(digest, model.status());
+  return model;
+}
+
+absl::StatusOr<std::shared_ptr<const ModalModel>> ModelStore::FindToSound(
+    const std::string& digest) {
+  auto model = Find(digest);
+  MutexLock lock(&cache_mutex_);
+  if (model.ok()) sounded_[digest] = clock_->UnixMs();
+  return model;
+}
+
+absl::StatusOr<std::shared_ptr<const ModalModel>> ModelStore::Load(const std::string& digest) {
   MutexLock lock(&cache_mutex_);
   std::shared_ptr<const ModalModel> model;
   const absl::Status status = database_->Read([&](SqliteConnection& connection) {
-    const absl::StatusOr<ModelRow> row = SelectModel(connection, digest);
+    const absl::StatusOr<ModelSummary> row = SelectModel(connection, digest);
     if (!row.ok()) return row.status();
     Cached& cached = cache_[digest];
     model = cached.revision == row->revision ? cached.model.lock() : nullptr;
@@ -286,13 +228,13 @@ absl::StatusOr<std::shared_ptr<const ModalModel>> ModelStore::Find(const std::st
 }
 
 absl::StatusOr<ModelSummary> ModelStore::Summary(const std::string& digest) {
-  absl::StatusOr<ModelRow> row = NotFound(digest);
+  absl::StatusOr<ModelSummary> summary = ModelNotFound(digest);
   const absl::Status status = database_->Read([&](SqliteConnection& connection) {
-    row = SelectModel(connection, digest);
-    return row.status();
+    summary = SelectModel(connection, digest);
+    return summary.status();
   });
   if (!status.ok()) return status;
-  return std::move(row->summary);
+  return summary;
 }
 
 absl::StatusOr<std::vector<double>> ModelStore::Eigenvalues(const std::string& digest) {
@@ -301,33 +243,93 @@ absl::StatusOr<std::vector<double>> ModelStore::Eigenvalues(const std::string& d
   return (*model)->eigenvalues;
 }
 
-absl::StatusOr<ModelPage> ModelStore::List(int page_size, const std::string& page_token) {
+absl::StatusOr<ModelPage> ModelStore::List(const ModelFilter& filter, int page_size,
+                                           const std::string& page_token) {
   const absl::StatusOr<PageRange> range = ParsePage(page_size, page_token);
   if (!range.ok()) return range.status();
   ModelPage page;
+  std::vector<std::pair<std::string, absl::Status>> damaged;
   const absl::Status status = database_->Read([&](SqliteConnection& connection) {
-    return connection.Query(
-        absl::StrCat(kSelectRows, "WHERE revision < ? ORDER BY revision DESC LIMIT ?").c_str(),
-        {range->below, range->size}, [&](const SqlRow& row) {
-          absl::StatusOr<ModelRow> model = ParseRow(row);
-          if (!model.ok()) return model.status();
-          page.next_page_token = absl::StrCat(model->revision);
-          page.models.push_back(std::move(model->summary));
-          return absl::OkStatus();
+    return SelectModels(
+        connection, filter, range->below, range->size,
+        [&](ModelSummary model) { page.models.push_back(std::move(model)); },
+        [&](std::string digest, absl::Status why) {
+          damaged.emplace_back(std::move(digest), std::move(why));
         });
   });
   if (!status.ok()) return status;
-  if (std::ssize(page.models) < range->size) page.next_page_token.clear();
+  for (const auto& [digest, why] : damaged) Quarantine(digest, why).IgnoreError();
+  // A page with damaged ones is shorter, yet not the last.
+  if (std::ssize(page.models) + std::ssize(damaged) == range->size && !page.models.empty()) {
+    page.next_page_token = absl::StrCat(page.models.back().revision);
+  }
   return page;
 }
 
-absl::Status ModelStore::Delete(const std::string& digest) {
-  return database_->Write([&](SqliteConnection& connection) {
-    absl::Status status = connection.Run("DELETE FROM models WHERE digest = ?", {digest});
-    if (status.ok() && connection.changed_row_count() == 0) return NotFound(digest);
-    if (status.ok()) status = connection.Run("DELETE FROM jobs WHERE digest = ?", {digest});
-    return status;
+absl::StatusOr<ModelSummary> ModelStore::Update(const std::string& digest,
+                                                const ModelChange& change) {
+  absl::StatusOr<ModelSummary> summary = ModelNotFound(digest);
+  const absl::Status status = database_->Write([&](SqliteConnection& connection) {
+    summary = SelectModel(connection, digest);
+    absl::Status changed = summary.ok() ? Apply(connection, digest, change) : summary.status();
+    if (changed.ok()) summary = SelectModel(connection, digest);
+    return changed.ok() ? summary.status() : changed;
   });
+  if (!status.ok()) return status;
+  return summary;
+}
+
+absl::Status ModelStore::Delete(const std::string& digest) {
+  return database_->Write(
+      [&](SqliteConnection& connection) { return DeleteModelRows(connection, digest); });
+}
+
+absl::Status ModelStore::WriteSounded(SqliteConnection& connection) {
+  absl::Status status;
+  for (const auto& [digest, unix_ms] : sounded_) {
+    if (!status.ok()) break;
+    status =
+        connection.Run("UPDATE models SET sounded_unix_ms = ? WHERE digest = ?", {unix_ms, digest});
+  }
+  return status;
+}
+
+absl::StatusOr<Collected> ModelStore::Collect(uint64_t budget_bytes) {
+  struct Candidate {
+    std::string digest;
+    uint64_t bytes = 0;
+    bool stays = false;
+  };
+  MutexLock lock(&cache_mutex_);
+  Collected collected;
+  const absl::Status status = database_->Write([&](SqliteConnection& connection) {
+    absl::Status written = WriteSounded(connection);
+    if (!written.ok()) return written;
+    std::vector<Candidate> oldest_first;
+    uint64_t total_bytes = 0;
+    written = connection.Query(
+        "SELECT digest, stored_bytes, pinned FROM models "
+        "ORDER BY max(sounded_unix_ms, created_unix_ms), revision",
+        {}, [&](const SqlRow& row) {
+          const auto bytes = static_cast<uint64_t>(row.Int(1));
+          const auto cached = cache_.find(row.Text(0));
+          const bool in_memory = cached != cache_.end() && !cached->second.model.expired();
+          oldest_first.push_back({row.Text(0), bytes, row.Int(2) != 0 || in_memory});
+          total_bytes += bytes;
+          return absl::OkStatus();
+        });
+    for (const Candidate& model : oldest_first) {
+      if (!written.ok() || total_bytes <= budget_bytes) break;
+      if (model.stays) continue;
+      written = DeleteModelRows(connection, model.digest);
+      total_bytes -= model.bytes;
+      collected = {collected.model_count + 1, collected.bytes + model.bytes};
+    }
+    return written;
+  });
+  if (!status.ok()) return status;
+  sounded_.clear();
+  return collected;
 }
 
 }  // namespace carillon

@@ -3,6 +3,8 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
@@ -21,14 +23,43 @@
 namespace carillon {
 
 class Database;
+class SqliteConnection;
 
 /// A modal model without its arrays.
 struct ModelSummary {
   std::string digest{};
-  std::string label{};  ///< given when it was first stored
+  std::string label{};  ///< given when it was first stored, or changed since
   v1::ModalModelHeader header{};
   uint64_t stored_bytes = 0;  ///< of its arrays
   int64_t created_unix_ms = 0;
+  int64_t revision = 0;  ///< greater for everything stored later
+  bool pinned = false;   ///< garbage collection leaves it alone
+  int64_t sounded_unix_ms = 0;
+  std::vector<std::string> tags{};  ///< ascending
+};
+
+/// Which models to list: those that match all of it.
+struct ModelFilter {
+  std::string label_contains{};  ///< in any case
+  std::string tag{};
+  int64_t min_stored_bytes = 0;
+  int64_t max_stored_bytes = std::numeric_limits<int64_t>::max();
+  int64_t created_since_unix_ms = 0;
+  int64_t created_before_unix_ms = std::numeric_limits<int64_t>::max();
+};
+
+/// What to change of a model; what is absent stays.
+struct ModelChange {
+  std::optional<std::string> label{};
+  std::vector<std::string> add_tags{};
+  std::vector<std::string> remove_tags{};
+  std::optional<bool> pinned{};
+};
+
+/// What garbage collection has done.
+struct Collected {
+  uint64_t model_count = 0;
+  uint64_t bytes = 0;
 };
 
 struct ModelPage {
@@ -65,28 +96,36 @@ class ModelImport {
 /// model that is replaced meanwhile ends the export. One thread at a time.
 class ModelExport {
  public:
-  /// The next record; nullopt after the last. Errors: DataLoss (MODAL_MODEL_CORRUPT), Aborted
-  /// (MODAL_MODEL_REPLACED: replaced or deleted meanwhile).
+  /// The next record; nullopt after the last. Errors: DataLoss (MODAL_MODEL_CORRUPT, and the model
+  /// goes into quarantine), Aborted (MODAL_MODEL_REPLACED: replaced or deleted meanwhile).
   absl::StatusOr<std::optional<v1::ModalModelRecord>> Next();
 
  private:
   friend class ModelStore;
-  ModelExport(Database& database, std::string digest)
-      : database_(&database), digest_(std::move(digest)) {}
+  ModelExport(Database& database, ModelStore& store, ModelSummary summary)
+      : database_(&database), store_(&store), summary_(std::move(summary)) {}
 
   Database* database_;
-  std::string digest_;
-  int64_t revision_ = 0;
-  v1::ModalModelHeader header_;
+  ModelStore* store_;
+  ModelSummary summary_;
   bool header_sent_ = false;
   int64_t next_chunk_ = 0;
   int64_t chunk_count_ = 0;
 };
 
 /// Modal models by digest. Safe from every thread.
+///
+/// A model found damaged goes into quarantine: its rows stay as they are, for whoever wants to know
+/// what happened, but every call answers MODAL_MODEL_CORRUPT until it is stored anew.
 class ModelStore {
  public:
+  /// Called once for each model that goes into quarantine, with no lock of the store held.
+  using OnQuarantine = std::function<void(const std::string& digest, const absl::Status& why)>;
+
   ModelStore(Database& database, const Clock& clock) : database_(&database), clock_(&clock) {}
+
+  /// Replaces the listener; the old one neither runs nor will run afterwards.
+  void ListenToQuarantine(OnQuarantine on_quarantine);
 
   /// Stores the model of a file in the stored form, in one transaction, durable on return; replaces
   /// an older revision of the same digest, whose label stays. Checked before: every hash, that all
@@ -102,32 +141,55 @@ class ModelStore {
   absl::StatusOr<ModelExport> Export(const std::string& digest);
 
   /// The whole model; in memory once however many objects hold it.
-  /// Errors: NotFound (MODAL_MODEL_NOT_FOUND), DataLoss (MODAL_MODEL_CORRUPT: a hash is wrong).
+  /// Errors: NotFound (MODAL_MODEL_NOT_FOUND), DataLoss (MODAL_MODEL_CORRUPT: a hash is wrong, and
+  /// the model goes into quarantine).
   absl::StatusOr<std::shared_ptr<const ModalModel>> Find(const std::string& digest);
+
+  /// As Find, and the model counts as having sounded now, for garbage collection.
+  absl::StatusOr<std::shared_ptr<const ModalModel>> FindToSound(const std::string& digest);
 
   /// Errors: NotFound (MODAL_MODEL_NOT_FOUND), DataLoss (MODAL_MODEL_CORRUPT).
   absl::StatusOr<ModelSummary> Summary(const std::string& digest);
 
-  /// Eigenvalues for unit material, ascending. Errors as for Summary.
+  /// Eigenvalues for unit material, ascending. Errors as for Find.
   absl::StatusOr<std::vector<double>> Eigenvalues(const std::string& digest);
 
   /// Newest first. `page_size` 0: 100; at most 1000. Errors: InvalidArgument (INVALID_PAGE).
-  absl::StatusOr<ModelPage> List(int page_size, const std::string& page_token);
+  absl::StatusOr<ModelPage> List(const ModelFilter& filter, int page_size,
+                                 const std::string& page_token);
 
-  /// Deletes a model and its job. Errors: NotFound (MODAL_MODEL_NOT_FOUND).
+  /// Errors: NotFound (MODAL_MODEL_NOT_FOUND), InvalidArgument (INVALID_TAG), DataLoss
+  /// (MODAL_MODEL_CORRUPT).
+  absl::StatusOr<ModelSummary> Update(const std::string& digest, const ModelChange& change);
+
+  /// Deletes a model, its tags and its job. Errors: NotFound (MODAL_MODEL_NOT_FOUND).
   absl::Status Delete(const std::string& digest);
 
+  /// Deletes models with their jobs, least recently sounded (or, never sounded, stored) first,
+  /// until the arrays of those left fit into `budget_bytes`. Pinned ones and those in memory stay.
+  absl::StatusOr<Collected> Collect(uint64_t budget_bytes);
+
  private:
+  friend class ModelExport;
   struct Cached {
     int64_t revision = 0;
     std::weak_ptr<const ModalModel> model;
   };
+
+  absl::StatusOr<std::shared_ptr<const ModalModel>> Load(const std::string& digest);
+  absl::Status Quarantine(const std::string& digest, const absl::Status& why);
+  absl::Status WriteSounded(SqliteConnection& connection);
 
   Database* database_;
   const Clock* clock_;
   // Held while a model is read, so that two objects of one model cannot read it twice.
   Mutex cache_mutex_;
   std::map<std::string, Cached> cache_ ABSL_GUARDED_BY(cache_mutex_);
+  // When models sounded, until the next collection writes it down: what begins to sound must not
+  // wait for the disk.
+  std::map<std::string, int64_t> sounded_ ABSL_GUARDED_BY(cache_mutex_);
+  Mutex listener_mutex_;
+  OnQuarantine on_quarantine_ ABSL_GUARDED_BY(listener_mutex_);
 };
 
 }  // namespace carillon

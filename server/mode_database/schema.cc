@@ -13,7 +13,8 @@ namespace {
 //
 // Every hash is an XXH3 whose 64 bits are read as a signed integer. Blobs come last in their rows,
 // so that the columns before them are read without them. A model that is replaced gets a new
-// revision.
+// revision; tags belong to its name and stay. The hash of a job is of its whole row; NULL where an
+// older program wrote it.
 constexpr std::array kMigrations = {R"sql(
   CREATE TABLE meshes (
     digest TEXT PRIMARY KEY,
@@ -54,6 +55,27 @@ constexpr std::array kMigrations = {R"sql(
     request BLOB NOT NULL
   ) STRICT;
   CREATE INDEX jobs_by_state ON jobs (state);
+)sql",
+                                    R"sql(
+  ALTER TABLE models ADD COLUMN quarantined INTEGER NOT NULL DEFAULT 0;
+  ALTER TABLE models ADD COLUMN pinned INTEGER NOT NULL DEFAULT 0;
+  ALTER TABLE models ADD COLUMN sounded_unix_ms INTEGER NOT NULL DEFAULT 0;
+  CREATE TABLE model_tags (
+    tag TEXT NOT NULL,
+    digest TEXT NOT NULL,
+    PRIMARY KEY (tag, digest)
+  ) STRICT, WITHOUT ROWID;
+  CREATE INDEX model_tags_by_digest ON model_tags (digest);
+  ALTER TABLE jobs ADD COLUMN priority INTEGER NOT NULL DEFAULT 0;
+  ALTER TABLE jobs ADD COLUMN start_count INTEGER NOT NULL DEFAULT 0;
+  ALTER TABLE jobs ADD COLUMN way INTEGER NOT NULL DEFAULT 0;
+  ALTER TABLE jobs ADD COLUMN peak_bytes INTEGER NOT NULL DEFAULT 0;
+  ALTER TABLE jobs ADD COLUMN xxh3 INTEGER;
+  DROP INDEX jobs_by_state;
+  CREATE TABLE facts (
+    name TEXT PRIMARY KEY,
+    value TEXT NOT NULL
+  ) STRICT, WITHOUT ROWID;
 )sql"};
 
 absl::StatusOr<int64_t> Version(SqliteConnection& connection) {

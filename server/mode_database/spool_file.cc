@@ -17,7 +17,7 @@ namespace {
 absl::Status Failed(absl::string_view what) {
   const int error = errno;
   const std::string why = std::generic_category().message(error);
-  if (error == ENOSPC || error == EDQUOT) {
+  if (error == ENOSPC || error == EDQUOT || error == EFBIG) {
     return Refusal(absl::StatusCode::kResourceExhausted, "DATABASE_FULL",
                    absl::StrCat("no space is left beside the database (", why,
                                 "): free some, or delete models"));

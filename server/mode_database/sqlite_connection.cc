@@ -31,6 +31,16 @@ absl::Status ToStatus(const SQLite::Exception& error) {
       return Refusal(absl::StatusCode::kDataLoss, "DATABASE_CORRUPT",
                      absl::StrCat("the database file is damaged (", what,
                                   "): restore it from a copy, or move it away to start anew"));
+    case SQLITE_READONLY:
+    case SQLITE_CANTOPEN:
+    case SQLITE_PERM:
+      return Refusal(absl::StatusCode::kFailedPrecondition, "DATABASE_UNUSABLE",
+                     absl::StrCat("the database cannot be opened or written (", what,
+                                  "): see that this user may write in its folder"));
+    case SQLITE_IOERR:
+      return Refusal(absl::StatusCode::kUnavailable, "DATABASE_IO_ERROR",
+                     absl::StrCat("the disk under the database fails (", what,
+                                  "): see the system's log, and try again"));
     default:
       return Refusal(absl::StatusCode::kInternal, "DATABASE_ERROR", absl::StrCat("SQLite: ", what));
   }

@@ -17,8 +17,9 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 class Daemon:
     """carillond on a Unix socket within `folder`, without a sound device."""
 
-    def __init__(self, folder):
+    def __init__(self, folder, *arguments):
         self.folder = pathlib.Path(folder)
+        self.arguments = [str(argument) for argument in arguments]
         self.server = f"unix:{self.folder}/socket"
         self.process = None
         self.start()
@@ -28,7 +29,7 @@ class Daemon:
         with open(self.folder / "log", "ab") as log:
             self.process = subprocess.Popen(
                 [BIN / "carillond", "--data-dir", self.folder / "data", "--listen", self.server,
-                 "--audio-device", "null"],
+                 "--audio-device", "null", *self.arguments],
                 stdout=subprocess.PIPE, stderr=log, text=True)
         if not self.process.stdout.readline().startswith("listening on "):
             raise RuntimeError("carillond did not start: " + (self.folder / "log").read_text())

@@ -401,7 +401,7 @@ TEST_F(DecompositionQueueTest, RefusesMoreThanItCanRemember) {
   const Gate gate(folder_ / "gate");
   MakeQueue(kWaitAtGate);
   // One runs, the others wait.
-  for (uint32_t i = 0; i <= DecompositionQueue::kMaxQueuedCount; ++i) {
+  for (uint32_t i = 0; i <= QueueSettings().max_queued_count; ++i) {
     ASSERT_TRUE(queue_->Submit(Request(20'000, 1 + i)).ok());
   }
   const auto refused = queue_->Submit(Request(20'000, 5'000));

@@ -145,11 +145,39 @@ TEST_F(ModeDatabaseTest, AFlippedBitInAnArrayIsFoundWhenTheModelIsRead) {
   const auto found = database_->models().Find(a_);
   EXPECT_EQ(found.status().code(), absl::StatusCode::kDataLoss);
   EXPECT_THAT(found.status().ToString(), HasSubstr("MODAL_MODEL_CORRUPT"));
+  EXPECT_EQ(database_->models().Summary(a_).status().code(), absl::StatusCode::kDataLoss);
+}
+
+TEST_F(ModeDatabaseTest, AFlippedBitInAnArrayIsFoundWhenTheModelIsExported) {
+  ModalModel model = SampleModel(3, 4);
+  model.couplings = {1.234567890123, 2.345678901234, 3.456789012345};
+  ASSERT_TRUE(Put(a_, model).ok());
+  FlipABitWithin({reinterpret_cast<const char*>(model.couplings.data()), 24});
   auto records = database_->models().Export(a_);
   ASSERT_TRUE(records.ok()) << records.status();
   absl::Status status;
   for (int i = 0; status.ok() && i < 10; ++i) status = records->Next().status();
   EXPECT_EQ(status.code(), absl::StatusCode::kDataLoss);
+}
+
+TEST_F(ModeDatabaseTest, ADamagedModelIsReportedOnceLeftOutOfListsAndReplacedByTheNext) {
+  ASSERT_TRUE(Put(a_, SampleModel(3, 4), "bell").ok());
+  ASSERT_TRUE(Put(b_, SampleModel(3, 4)).ok());
+  ASSERT_TRUE(database_->models().Update(a_, {.add_tags = {"bronze"}, .pinned = true}).ok());
+  FlipABitWithin("sample 1.0");
+  std::vector<std::string> reported;
+  database_->models().ListenToQuarantine(
+      [&](const std::string& digest, const absl::Status&) { reported.push_back(digest); });
+  ASSERT_EQ(database_->models().List({}, 0, "")->models.size(), 1U);
+  const std::string damaged = database_->models().List({}, 0, "")->models[0].digest == a_ ? b_ : a_;
+  EXPECT_FALSE(database_->models().Find(damaged).ok());
+  EXPECT_THAT(reported, ElementsAre(damaged));
+  ASSERT_TRUE(Put(damaged, SampleModel(2, 4)).ok());
+  EXPECT_TRUE(database_->models().Find(damaged).ok());
+  const auto healed = database_->models().Summary(a_);
+  EXPECT_EQ(healed->label, "bell");
+  EXPECT_THAT(healed->tags, ElementsAre("bronze"));
+  EXPECT_TRUE(healed->pinned);
 }
 
 TEST_F(ModeDatabaseTest, AFlippedBitInAHeaderIsFoundWhenTheModelIsRead) {
@@ -234,14 +262,62 @@ TEST_F(ModeDatabaseTest, PagesListEveryModelOnceNewestFirst) {
   std::vector<std::string> listed;
   std::string token;
   do {
-    const auto page = database_->models().List(2, token);
+    const auto page = database_->models().List({}, 2, token);
     ASSERT_TRUE(page.ok()) << page.status();
     EXPECT_LE(page->models.size(), 2U);
     for (const ModelSummary& model : page->models) listed.push_back(model.digest);
     token = page->next_page_token;
   } while (!token.empty());
   EXPECT_EQ(listed, newest_first);
-  EXPECT_THAT(database_->models().List(2, "x").status().ToString(), HasSubstr("INVALID_PAGE"));
+  EXPECT_THAT(database_->models().List({}, 2, "x").status().ToString(), HasSubstr("INVALID_PAGE"));
+}
+
+TEST_F(ModeDatabaseTest, ListsTheModelsThatMatchEveryFieldOfAFilter) {
+  ASSERT_TRUE(Put(a_, SampleModel(2, 4), "Church Bell").ok());
+  ASSERT_TRUE(Put(b_, SampleModel(50, 400), "glass").ok());
+  ASSERT_TRUE(database_->models().Update(b_, {.add_tags = {"fragile", "set:2"}}).ok());
+  const auto listed = [&](const ModelFilter& filter) {
+    std::string labels;
+    const auto page = database_->models().List(filter, 0, "");
+    for (const ModelSummary& model : page->models) labels += model.label + ";";
+    return labels;
+  };
+  const int64_t size = static_cast<int64_t>(database_->models().Summary(b_)->stored_bytes);
+  EXPECT_EQ(listed({}), "glass;Church Bell;");
+  EXPECT_EQ(listed({.label_contains = "bell"}), "Church Bell;");
+  EXPECT_EQ(listed({.tag = "fragile"}), "glass;");
+  EXPECT_EQ(listed({.label_contains = "bell", .tag = "fragile"}), "");
+  EXPECT_EQ(listed({.min_stored_bytes = size}), "glass;");
+  EXPECT_EQ(listed({.max_stored_bytes = size - 1}), "Church Bell;");
+  EXPECT_EQ(listed({.created_before_unix_ms = 1}), "");
+  EXPECT_EQ(listed({.created_since_unix_ms = clock_.UnixMs() + 60'000}), "");
+  ASSERT_TRUE(database_->models().Update(b_, {.remove_tags = {"fragile", "none"}}).ok());
+  EXPECT_EQ(listed({.tag = "fragile"}), "");
+  EXPECT_THAT(database_->models().Update(b_, {.add_tags = {"two words"}}).status().ToString(),
+              HasSubstr("INVALID_TAG"));
+  EXPECT_THAT(database_->models().Update(Sha256Hex("c"), {}).status().ToString(),
+              HasSubstr("MODAL_MODEL_NOT_FOUND"));
+}
+
+TEST_F(ModeDatabaseTest, CollectionTakesTheLeastRecentlySoundedAndNeverThePinned) {
+  const std::string c = Sha256Hex("c");
+  const std::string d = Sha256Hex("d");
+  for (const std::string& digest : {a_, b_, c, d}) {
+    ASSERT_TRUE(Put(digest, SampleModel(10, 100)).ok());
+  }
+  const uint64_t size = database_->models().Summary(a_)->stored_bytes;
+  ASSERT_TRUE(database_->models().Update(a_, {.pinned = true}).ok());
+  ASSERT_TRUE(database_->models().FindToSound(b_).ok());
+  const auto sounds = database_->models().Find(c);
+  EXPECT_EQ(database_->models().Collect(4 * size)->model_count, 0U);
+  const auto first = database_->models().Collect(3 * size);
+  ASSERT_TRUE(first.ok()) << first.status();
+  EXPECT_EQ(first->model_count, 1U);
+  EXPECT_EQ(first->bytes, size);
+  EXPECT_FALSE(database_->models().Find(d).ok()) << "stored after all others, but b sounded since";
+  EXPECT_EQ(database_->models().Collect(0)->model_count, 1U) << "b; a is pinned, c in memory";
+  EXPECT_TRUE(database_->models().Find(a_).ok());
+  EXPECT_TRUE(database_->models().Find(c).ok());
 }
 
 TEST_F(ModeDatabaseTest, OnlyADigestNamesAModel) {

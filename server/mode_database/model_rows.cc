@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/mode_database/model_rows.h"
+
+#include <bit>
+#include <limits>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "proto/error_reason.h"
+#include "server/base/xxh3.h"
+#include "server/mode_database/model_checker.h"
+
+namespace carillon {
+namespace {
+
+constexpr char kSelectRows[] =
+    "SELECT revision, digest, label, stored_bytes, created_unix_ms, pinned, sounded_unix_ms, "
+    "quarantined, header_xxh3, header FROM models ";
+
+absl::StatusOr<ModelSummary> ParseRow(const SqlRow& row) {
+  ModelSummary model{.digest = row.Text(1),
+                     .label = row.Text(2),
+                     .stored_bytes = static_cast<uint64_t>(row.Int(3)),
+                     .created_unix_ms = row.Int(4),
+                     .revision = row.Int(0),
+                     .pinned = row.Int(5) != 0,
+                     .sounded_unix_ms = row.Int(6)};
+  if (row.Int(7) != 0) return ModelCorrupt(model.digest, "it is in quarantine");
+  const std::string_view header = row.Blob(9);
+  if (std::bit_cast<int64_t>(Xxh3(header)) != row.Int(8) ||
+      !model.header.ParseFromArray(header.data(), static_cast<int>(header.size()))) {
+    return ModelCorrupt(model.digest, "the hash of its header is wrong");
+  }
+  return model;
+}
+
+absl::Status SelectTags(SqliteConnection& connection, ModelSummary& model) {
+  return connection.Query("SELECT tag FROM model_tags WHERE digest = ? ORDER BY tag",
+                          {model.digest}, [&](const SqlRow& row) {
+                            model.tags.push_back(row.Text(0));
+                            return absl::OkStatus();
+                          });
+}
+
+absl::Status InsertHeader(SqliteConnection& connection, const ModelSummary& summary) {
+  const std::string header = summary.header.SerializeAsString();
+  return connection.Run(
+      "INSERT INTO models (digest, label, stored_bytes, created_unix_ms, pinned, sounded_unix_ms, "
+      "header_xxh3, header) VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
+      {summary.digest, summary.label, static_cast<int64_t>(summary.stored_bytes),
+       summary.created_unix_ms, static_cast<int64_t>(summary.pinned), summary.sounded_unix_ms,
+       std::bit_cast<int64_t>(Xxh3(header)), SqlBlob{header}});
+}
+
+absl::Status InsertChunk(SqliteConnection& connection, int64_t revision, int64_t number,
+                         const v1::ModalModelChunk& chunk) {
+  return connection.Run(
+      "INSERT INTO model_chunks (revision, number, array, byte_offset, xxh3, data) "
+      "VALUES (?, ?, ?, ?, ?, ?)",
+      {revision, number, static_cast<int64_t>(chunk.array()), static_cast<int64_t>(chunk.offset()),
+       std::bit_cast<int64_t>(chunk.xxh3()), SqlBlob{chunk.data()}});
+}
+
+absl::Status RemoveOldRevision(SqliteConnection& connection, ModelSummary& summary) {
+  absl::Status status =
+      connection.Query("SELECT label, pinned, sounded_unix_ms FROM models WHERE digest = ?",
+                       {summary.digest}, [&](const SqlRow& row) {
+                         if (!row.Text(0).empty()) summary.label = row.Text(0);
+                         summary.pinned = row.Int(1) != 0;
+                         summary.sounded_unix_ms = row.Int(2);
+                         return absl::OkStatus();
+                       });
+  if (!status.ok()) return status;
+  return connection.Run("DELETE FROM models WHERE digest = ?", {summary.digest});
+}
+
+}  // namespace
+
+absl::Status ModelNotFound(const std::string& digest) {
+  return Refusal(absl::StatusCode::kNotFound, "MODAL_MODEL_NOT_FOUND",
+                 absl::StrCat("no modal model is named modalModels/", digest,
+                              ": create or import it first, and let its job succeed"));
+}
+
+absl::Status ModelCorrupt(const std::string& digest, absl::string_view what) {
+  return Refusal(absl::StatusCode::kDataLoss, "MODAL_MODEL_CORRUPT",
+                 absl::StrCat("modalModels/", digest, " has changed on the disk (", what,
+                              "): wait for its job, which computes it again; where it has none, "
+                              "import it from a copy"));
+}
+
+absl::StatusOr<ModelSummary> SelectModel(SqliteConnection& connection, const std::string& digest) {
+  absl::StatusOr<ModelSummary> model = ModelNotFound(digest);
+  absl::Status status = connection.Query(absl::StrCat(kSelectRows, "WHERE digest = ?").c_str(),
+                                         {digest}, [&](const SqlRow& row) {
+                                           model = ParseRow(row);
+                                           return model.status();
+                                         });
+  if (status.ok() && model.ok()) status = SelectTags(connection, *model);
+  if (!status.ok()) return status;
+  return model;
+}
+
+absl::Status SelectModels(SqliteConnection& connection, const ModelFilter& filter, int64_t below,
+                          int64_t limit, absl::FunctionRef<void(ModelSummary)> on_model,
+                          absl::FunctionRef<void(std::string, absl::Status)> on_damaged) {
+  std::vector<ModelSummary> models;
+  absl::Status status = connection.Query(
+      absl::StrCat(kSelectRows,
+                   "WHERE revision < ?1 AND quarantined = 0 "
+                   "AND (?2 = '' OR instr(lower(label), lower(?2)) > 0) "
+                   "AND (?3 = '' OR digest IN (SELECT digest FROM model_tags WHERE tag = ?3)) "
+                   "AND stored_bytes BETWEEN ?4 AND ?5 "
+                   "AND created_unix_ms >= ?6 AND created_unix_ms < ?7 "
+                   "ORDER BY revision DESC LIMIT ?8")
+          .c_str(),
+      {below, filter.label_contains, filter.tag, filter.min_stored_bytes, filter.max_stored_bytes,
+       filter.created_since_unix_ms, filter.created_before_unix_ms, limit},
+      [&](const SqlRow& row) {
+        absl::StatusOr<ModelSummary> model = ParseRow(row);
+        if (model.ok()) {
+          models.push_back(*std::move(model));
+        } else {
+          on_damaged(row.Text(1), model.status());
+        }
+        return absl::OkStatus();
+      });
+  for (ModelSummary& model : models) {
+    if (status.ok()) status = SelectTags(connection, model);
+    if (status.ok()) on_model(std::move(model));
+  }
+  return status;
+}
+
+absl::Status SelectChunks(SqliteConnection& connection, int64_t revision, int64_t first,
+                          int64_t limit,
+                          absl::FunctionRef<absl::Status(v1::ModalModelRecord)> on_chunk) {
+  return connection.Query(
+      "SELECT array, byte_offset, xxh3, data FROM model_chunks "
+      "WHERE revision = ? AND number >= ? ORDER BY number LIMIT ?",
+      {revision, first, limit}, [&](const SqlRow& row) {
+        v1::ModalModelRecord record;
+        v1::ModalModelChunk& chunk = *record.mutable_chunk();
+        chunk.set_array(static_cast<uint32_t>(row.Int(0)));
+        chunk.set_offset(static_cast<uint64_t>(row.Int(1)));
+        chunk.set_xxh3(std::bit_cast<uint64_t>(row.Int(2)));
+        chunk.set_data(row.Blob(3).data(), row.Blob(3).size());
+        return on_chunk(std::move(record));
+      });
+}
+
+absl::StatusOr<ModalModel> ReadModel(SqliteConnection& connection, const ModelSummary& summary) {
+  ModelDecoder decoder;
+  v1::ModalModelRecord header;
+  *header.mutable_header() = summary.header;
+  absl::Status bad = decoder.Append(header);
+  const absl::Status status =
+      SelectChunks(connection, summary.revision, 0, std::numeric_limits<int64_t>::max(),
+                   [&](const v1::ModalModelRecord& chunk) {
+                     if (bad.ok()) bad = decoder.Append(chunk);
+                     return bad;
+                   });
+  // A disk that cannot be read now is no proof that the model is damaged.
+  if (bad.ok() && !status.ok() && !absl::IsDataLoss(status)) return status;
+  if (!status.ok()) return ModelCorrupt(summary.digest, status.message());
+  absl::StatusOr<ModalModel> model = decoder.Finish(summary.digest);
+  if (!model.ok()) return ModelCorrupt(summary.digest, model.status().message());
+  return model;
+}
+
+absl::Status InsertModel(SqliteConnection& connection, ModelFileReader& records,
+                         ModelSummary& summary) {
+  absl::Status status = RemoveOldRevision(connection, summary);
+  ModelChecker checker;
+  for (int64_t number = -1; status.ok(); ++number) {
+    const auto record = records.Next();
+    if (!record.ok()) return record.status();
+    if (!record->has_value()) {
+      status = checker.Finish();
+      return status.ok() ? SelectTags(connection, summary) : status;
+    }
+    status = checker.Check(**record);
+    if (!status.ok()) return status;
+    if (number >= 0) {
+      status = InsertChunk(connection, summary.revision, number, (*record)->chunk());
+      continue;
+    }
+    summary.header = checker.header();
+    summary.stored_bytes = checker.array_bytes();
+    status = InsertHeader(connection, summary);
+    summary.revision = connection.last_row_id();
+  }
+  return status;
+}
+
+absl::Status DeleteModelRows(SqliteConnection& connection, const std::string& digest) {
+  absl::Status status = connection.Run("DELETE FROM models WHERE digest = ?", {digest});
+  if (status.ok() && connection.changed_row_count() == 0) return ModelNotFound(digest);
+  if (status.ok()) status = connection.Run("DELETE FROM model_tags WHERE digest = ?", {digest});
+  if (status.ok()) status = connection.Run("DELETE FROM jobs WHERE digest = ?", {digest});
+  return status;
+}
+
+}  // namespace carillon

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A shell script in the place of carillon-precompute, and what it leaves behind."""
+
+import pathlib
+import subprocess
+
+import meshes
+from carillon.v1 import modal_model_pb2
+from daemon import BIN
+from google.protobuf.internal.decoder import _DecodeVarint32
+
+OPTIONS = r"""#!/bin/sh
+here='{here}'
+mesh=$1
+for option; do
+  case $option in
+    --out=*) out=${{option#--out=}} ;;
+    --nodes=*) nodes=${{option#--nodes=}} ;;
+  esac
+done
+{body}
+"""
+
+
+def worker(folder, body):
+    """A program for --precompute. Its script finds the mesh in $mesh, the file to write in $out, the
+    number of nodes asked for in $nodes, and its own files in $here; descriptor 3 takes events."""
+    path = pathlib.Path(folder) / "worker.sh"
+    path.write_text(OPTIONS.format(here=folder, body=body))
+    path.chmod(0o700)
+    return path
+
+
+def make_model(folder, band="20:20000"):
+    """A file with the model of the bar."""
+    mesh, model = pathlib.Path(folder) / "bar.obj", pathlib.Path(folder) / "bar.model"
+    mesh.write_bytes(meshes.bar())
+    subprocess.run([BIN / "carillon-precompute", mesh, "--material", meshes.MATERIAL, "--band", band,
+                    "--out", model], check=True, capture_output=True)
+    return model
+
+
+def read_records(path):
+    """The records of a model file."""
+    data, at, records = path.read_bytes(), 0, []
+    while at < len(data):
+        size, at = _DecodeVarint32(data, at)
+        records.append(modal_model_pb2.ModalModelRecord.FromString(data[at:at + size]))
+        at += size
+    return records
+
+
+def processes_of(folder):
+    """Numbers of the processes whose command line names something in the folder, but no zombies'."""
+    found = []
+    for entry in pathlib.Path("/proc").iterdir():
+        if entry.name.isdigit():
+            try:
+                if str(folder).encode() in (entry / "cmdline").read_bytes():
+                    found.append(int(entry.name))
+            except OSError:
+                pass  # it has ended meanwhile
+    return found

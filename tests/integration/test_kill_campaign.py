@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: Apache-2.0
+"""kill -9 of the daemon, again and again, in the middle of writes and jobs.
+
+CARILLON_KILLS says how often (200 is the whole campaign), CARILLON_SEED repeats one.
+"""
+
+import itertools
+import os
+import pathlib
+import random
+import sqlite3
+import tempfile
+import threading
+import time
+import unittest
+
+import grpc
+
+import meshes
+import scripted
+from carillon.v1 import decomposition_pb2, decomposition_service_pb2, material_pb2, modal_model_pb2
+from carillon.v1 import modal_model_service_pb2
+from daemon import Daemon
+
+KILL_COUNT = int(os.environ.get("CARILLON_KILLS", "6"))
+SEED = int(os.environ.get("CARILLON_SEED", "0")) or random.SystemRandom().getrandbits(32)
+MATERIAL = material_pb2.Material(preset=meshes.MATERIAL)
+
+# Between 0 and 80 ms of work, then a model; what began and what ended is written down.
+WORKER = """echo $nodes >>"$here/began"
+sleep 0.0$((nodes % 9))
+cp "$here/bar.model" "$out"
+echo $nodes >>"$here/ended"
+"""
+
+
+class Writers:
+    """Clients that import models and create jobs, as fast as they can, until the daemon is gone.
+    `models` and `jobs` hold what has been acknowledged."""
+
+    def __init__(self, records):
+        self.records = records
+        self.numbers = itertools.count(1)
+        self.models, self.jobs = {}, set()
+        self.begun_count = 0
+
+    def run(self, daemon, duration_s, rng):
+        """Writes until the daemon is killed under the writers' hands."""
+        digest = daemon.client().upload(meshes.bar())
+        clients = [threading.Thread(target=self._until_killed, args=(daemon.client(), work, digest))
+                   for work in (self._import, self._import, self._create)]
+        for client in clients:
+            client.start()
+        time.sleep(duration_s * rng.random())  # when it dies is the experiment
+        daemon.kill()
+        for client in clients:
+            client.join()
+
+    def _until_killed(self, client, work, mesh_digest):
+        try:
+            while True:
+                work(client, mesh_digest)
+        except grpc.RpcError as error:
+            if error.code() not in (grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.CANCELLED):
+                raise
+
+    def records_of(self, number):
+        """A model that is like no other."""
+        first = modal_model_pb2.ModalModelRecord()
+        first.CopyFrom(self.records[0])
+        first.header.solver = f"campaign {number}"
+        return [first, *self.records[1:]]
+
+    def _import(self, client, _):
+        number = next(self.numbers)
+        name = f"modalModels/{number:064x}"
+        self.begun_count += 1
+        client.models.ImportModalModel(
+            modal_model_service_pb2.ImportModalModelRequest(record=record, name=name)
+            for record in self.records_of(number))
+        self.models[name] = number
+
+    def _create(self, client, mesh_digest):
+        settings = modal_model_pb2.DecompositionSettings(
+            mesh=modal_model_pb2.MeshSettings(target_node_count=next(self.numbers)))
+        job = client.models.CreateModalModel(modal_model_service_pb2.CreateModalModelRequest(
+            mesh_digest=mesh_digest, mesh_format="obj", material=MATERIAL, settings=settings)).job
+        self.jobs.add(job.name)
+        if job.state == decomposition_pb2.JOB_STATE_QUEUED:
+            client.wait(job)
+
+
+class KillCampaign(unittest.TestCase):
+    def setUp(self):
+        scratch = tempfile.TemporaryDirectory(prefix="carillon-")
+        self.addCleanup(scratch.cleanup)
+        self.folder = pathlib.Path(scratch.name)
+        self.records = scripted.read_records(scripted.make_model(self.folder))
+        self.rng = random.Random(SEED)
+
+    def listed(self, client):
+        names, token = [], ""
+        while True:
+            page = client.models.ListModalModels(
+                modal_model_service_pb2.ListModalModelsRequest(page_size=1000, page_token=token))
+            names += [model.name for model in page.modal_models]
+            token = page.next_page_token
+            if not token:
+                return names
+
+    def exported(self, client, name):
+        """The records of a model; the daemon checks each hash on the way."""
+        return [answer.record for answer in client.models.ExportModalModel(
+            modal_model_service_pb2.ExportModalModelRequest(name=name))]
+
+    def check_models(self, client, writers, known):
+        """Every acknowledged model is there, and every model there, acknowledged or not, is whole."""
+        listed = self.listed(client)
+        self.assertEqual(len(listed), len(set(listed)))
+        self.assertLessEqual(set(writers.models), set(listed))
+        for name in set(listed) - known:
+            records = self.exported(client, name)
+            number = int(name.removeprefix("modalModels/"), 16)
+            expected = writers.records_of(number) if number < 2**64 else self.records
+            self.assertEqual(records, expected)
+        known.update(listed)
+
+    def assert_no_child_left(self):
+        deadline = time.monotonic() + 5
+        while scripted.processes_of(self.folder / "data") and time.monotonic() < deadline:
+            os.sched_yield()
+        self.assertEqual(scripted.processes_of(self.folder / "data"), [])
+
+    def lines(self, name):
+        path = self.folder / name
+        return path.read_text().split() if path.exists() else []
+
+    def test_nothing_acknowledged_is_lost_or_partial_and_every_job_ends_once(self):
+        daemon = Daemon(self.folder, "--precompute", scripted.worker(self.folder, WORKER))
+        self.addCleanup(daemon.stop)
+        writers, known = Writers(self.records), set()
+        for _ in range(KILL_COUNT):
+            writers.run(daemon, 0.4, self.rng)
+            self.assert_no_child_left()
+            daemon.start()
+            self.check_models(daemon.client(), writers, known)
+        client = daemon.client()
+        for name in writers.jobs:
+            client.wait(client.jobs.GetJob(decomposition_service_pb2.GetJobRequest(name=name)).job)
+        self.check_models(client, writers, known)
+        self.assertEqual(daemon.stop(), 0)
+        self.check_file()
+        print(f"\nseed {SEED}: {KILL_COUNT} kills, {len(writers.models)} of {writers.begun_count} imports and "
+              f"{len(writers.jobs)} jobs acknowledged, {len(known)} models whole; "
+              f"{len(self.lines('began'))} runs begun, {len(self.lines('ended'))} ended")
+
+    def check_file(self):
+        database = sqlite3.connect(self.folder / "data/carillon.db")
+        self.addCleanup(database.close)
+        self.assertEqual(database.execute("PRAGMA integrity_check").fetchall(), [("ok",)])
+        stored, = database.execute("SELECT count(*) FROM models").fetchone()
+        # Revisions are never used twice: had a model been stored again, one would be missing here.
+        last, = database.execute("SELECT seq FROM sqlite_sequence WHERE name = 'models'").fetchone()
+        self.assertEqual(last, stored)
+        unfinished, = database.execute("SELECT count(*) FROM jobs WHERE state != ?",
+                                       (decomposition_pb2.JOB_STATE_SUCCEEDED,)).fetchone()
+        self.assertEqual(unfinished, 0)
+
+
+if __name__ == "__main__":
+    unittest.main()

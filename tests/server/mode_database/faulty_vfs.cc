@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/server/mode_database/faulty_vfs.h"
+
+#include <sqlite3.h>
+
+#include <atomic>
+#include <limits>
+#include <map>
+#include <memory>
+#include <mutex>
+
+namespace carillon {
+namespace {
+
+constexpr int64_t kNever = std::numeric_limits<int64_t>::max();
+
+std::atomic<int64_t> good_count = kNever;
+std::atomic<bool> failed = false;
+std::atomic<DiskFault> disk_fault = DiskFault::kFull;
+
+/// Whether this access fails.
+bool Fails(bool write) {
+  if (good_count == kNever || write == (disk_fault == DiskFault::kReadError)) return false;
+  if (good_count-- > 0) return false;
+  good_count = 0;
+  failed = true;
+  return true;
+}
+
+/// The methods of a file, with those that write replaced; SQLite's own lie behind.
+struct Methods {
+  sqlite3_io_methods replaced;  // first, so that a file's methods lead here
+  const sqlite3_io_methods* real;
+};
+
+const sqlite3_io_methods& Real(sqlite3_file* file) {
+  return *reinterpret_cast<const Methods*>(file->pMethods)->real;
+}
+
+int Write(sqlite3_file* file, const void* data, int size, sqlite3_int64 offset) {
+  if (!Fails(true)) return Real(file).xWrite(file, data, size, offset);
+  if (disk_fault == DiskFault::kReadOnly) return SQLITE_READONLY;
+  Real(file).xWrite(file, data, size / 2, offset);
+  return disk_fault == DiskFault::kFull ? SQLITE_FULL : SQLITE_IOERR_WRITE;
+}
+
+int Read(sqlite3_file* file, void* data, int size, sqlite3_int64 offset) {
+  return Fails(false) ? SQLITE_IOERR_READ : Real(file).xRead(file, data, size, offset);
+}
+
+int Sync(sqlite3_file* file, int flags) {
+  return disk_fault == DiskFault::kWriteError && Fails(true) ? SQLITE_IOERR_FSYNC
+                                                             : Real(file).xSync(file, flags);
+}
+
+int Truncate(sqlite3_file* file, sqlite3_int64 size) {
+  return disk_fault == DiskFault::kWriteError && Fails(true) ? SQLITE_IOERR_TRUNCATE
+                                                             : Real(file).xTruncate(file, size);
+}
+
+/// One table for each of SQLite's own: these differ by the way of locking.
+const sqlite3_io_methods* Wrapped(const sqlite3_io_methods* real) {
+  static std::mutex mutex;
+  static std::map<const sqlite3_io_methods*, std::unique_ptr<Methods>> known;
+  const std::lock_guard lock(mutex);
+  std::unique_ptr<Methods>& methods = known[real];
+  if (methods == nullptr) {
+    methods = std::make_unique<Methods>(Methods{*real, real});
+    methods->replaced.xWrite = Write;
+    methods->replaced.xRead = Read;
+    methods->replaced.xSync = Sync;
+    methods->replaced.xTruncate = Truncate;
+    // Without it every access comes through the methods above.
+    methods->replaced.xFetch = [](sqlite3_file*, sqlite3_int64, int, void** page) {
+      *page = nullptr;
+      return SQLITE_OK;
+    };
+  }
+  return &methods->replaced;
+}
+
+sqlite3_vfs* real_vfs = nullptr;
+sqlite3_vfs faulty_vfs;
+
+int Open(sqlite3_vfs*, const char* name, sqlite3_file* file, int flags, int* out_flags) {
+  const int result = real_vfs->xOpen(real_vfs, name, file, flags, out_flags);
+  if (result == SQLITE_OK) file->pMethods = Wrapped(file->pMethods);
+  return result;
+}
+
+}  // namespace
+
+FaultyDisk::FaultyDisk() {
+  real_vfs = sqlite3_vfs_find(nullptr);
+  faulty_vfs = *real_vfs;
+  faulty_vfs.zName = "faulty";
+  faulty_vfs.xOpen = Open;
+  sqlite3_vfs_register(&faulty_vfs, 1);
+}
+
+FaultyDisk::~FaultyDisk() {
+  Repair();
+  sqlite3_vfs_unregister(&faulty_vfs);
+  sqlite3_vfs_register(real_vfs, 1);
+}
+
+void FaultyDisk::FailAfter(int64_t count, DiskFault fault) {
+  failed = false;
+  disk_fault = fault;
+  good_count = count;
+}
+
+bool FaultyDisk::Repair() {
+  good_count = kNever;
+  return failed;
+}
+
+}  // namespace carillon

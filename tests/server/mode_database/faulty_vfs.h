@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+
+namespace carillon {
+
+/// What a disk may answer to a write.
+enum class DiskFault {
+  kFull,        ///< ENOSPC, after half of the bytes
+  kReadOnly,    ///< nothing is written
+  kWriteError,  ///< EIO, after half of the bytes; a sync or truncation fails likewise
+  kReadError,   ///< EIO, of reads instead of writes
+};
+
+/// While it lives, every file that SQLite opens in this process is on a disk that fails: from a
+/// given access on until it is repaired. One at a time.
+class FaultyDisk {
+ public:
+  FaultyDisk();
+  FaultyDisk(const FaultyDisk&) = delete;
+  FaultyDisk& operator=(const FaultyDisk&) = delete;
+  ~FaultyDisk();
+
+  /// The first `good_count` accesses of the kind that `fault` hits go well, the others do not.
+  static void FailAfter(int64_t good_count, DiskFault fault);
+
+  /// Whether any access has failed since FailAfter; all go well from now on.
+  static bool Repair();
+};
+
+}  // namespace carillon
