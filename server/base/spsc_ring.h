@@ -19,6 +19,9 @@ class SpscRing {
   /// Consumer only. False: the ring is empty and `value` is untouched.
   bool TryPop(T& value) noexcept { return queue_.pop(value); }
 
+  /// Consumer only. Moves up to `most` values to `values`; returns how many.
+  size_t PopSome(T* values, size_t most) noexcept { return queue_.pop(values, most); }
+
   /// Consumer only.
   bool empty() const noexcept { return queue_.read_available() == 0; }
 

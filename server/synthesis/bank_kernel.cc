@@ -263,9 +263,7 @@ struct GroupState {
   HWY_INLINE bool Finite() const {
     return hn::AllTrue(Doubles(), hn::Gt(all_small, hn::Zero(Doubles())));
   }
-  HWY_INLINE bool Silent(double silence_squared) const {
-    return hn::AllFalse(Doubles(), hn::Gt(loudest, hn::Set(Doubles(), silence_squared)));
-  }
+  HWY_INLINE double Loudest() const { return hn::GetLane(hn::MaxOfLanes(Doubles(), loudest)); }
 };
 
 Advanced Advance(LaneArrays& lanes, LaneRange range, bool newborn, double silence_squared) {
@@ -277,7 +275,9 @@ Advanced Advance(LaneArrays& lanes, LaneRange range, bool newborn, double silenc
       state.Note(AdvanceVector(lanes, range.first + group + i, newborn));
     }
     advanced.finite &= state.Finite();
-    if (state.Silent(silence_squared)) {
+    const double loudest = state.Loudest();
+    advanced.loudest_squared = std::max(advanced.loudest_squared, loudest);
+    if (!(loudest > silence_squared)) {
       lanes.Silence({range.first + group, kMostLanes});
     } else {
       advanced.awake = true;
@@ -364,7 +364,9 @@ Advanced Spread(SpectralLanes& lanes, size_t mode_count, double silence_squared,
     GroupStart start;
     const GroupState state = StartGroup(lanes, group, start);
     advanced.finite &= state.Finite();
-    if (state.Silent(silence_squared)) {
+    const double loudest = state.Loudest();
+    advanced.loudest_squared = std::max(advanced.loudest_squared, loudest);
+    if (!(loudest > silence_squared)) {
       std::fill_n(lanes.re.data() + group, kMostLanes, 0.0);
       std::fill_n(lanes.im.data() + group, kMostLanes, 0.0);
       awake = 0;
@@ -383,24 +385,33 @@ Advanced Spread(SpectralLanes& lanes, size_t mode_count, double silence_squared,
   return advanced;
 }
 
-void Project(const Projection& projection, float* HWY_RESTRICT modal_impulse) {
+/// `kRows` rows, or as many as there are.
+template <size_t kRows>
+HWY_INLINE void ProjectRows(const Projection& projection, float* HWY_RESTRICT modal_impulses) {
   const Floats d;
   const size_t count = projection.column_count;
+  const size_t row_count = kRows == 0 ? projection.row_count : kRows;
   size_t c = 0;
   for (; c + hn::Lanes(d) <= count; c += hn::Lanes(d)) {
-    V sum = hn::Zero(d);
-    for (size_t row = 0; row < projection.rows.size(); ++row) {
+    V sum = projection.add ? hn::Load(d, modal_impulses + c) : hn::Zero(d);
+    for (size_t row = 0; row < row_count; ++row) {
       sum = hn::MulAdd(hn::Set(d, projection.factors[row]), hn::LoadU(d, projection.rows[row] + c),
                        sum);
     }
-    hn::Store(sum, d, modal_impulse + c);
+    hn::Store(sum, d, modal_impulses + c);
   }
   for (; c < count; ++c) {
-    modal_impulse[c] = 0;
-    for (size_t row = 0; row < projection.rows.size(); ++row) {
-      modal_impulse[c] += projection.factors[row] * projection.rows[row][c];
+    float sum = projection.add ? modal_impulses[c] : 0;
+    for (size_t row = 0; row < row_count; ++row) {
+      sum += projection.factors[row] * projection.rows[row][c];
     }
+    modal_impulses[c] = sum;
   }
+}
+
+void Project(const Projection& projection, float* modal_impulses) {
+  if (projection.row_count == 9) return ProjectRows<9>(projection, modal_impulses);
+  ProjectRows<0>(projection, modal_impulses);
 }
 
 /// (re, im) *= exp(lead_frames log q + tau^2 s^2/2).

@@ -39,6 +39,7 @@ void AddStrike(LaneArrays& lanes, size_t lane_count, const float* added_re,
 struct Advanced {
   size_t awake_lane_count = 0;  ///< Advance: of the range; all lanes beyond are silent
   bool awake = false;           ///< any lane is
+  double loudest_squared = 0;   ///< largest squared amplitude
   bool finite = true;
 };
 
@@ -57,7 +58,9 @@ struct Projection {
   /// weight times impulse.
   std::array<const float*, 9> rows{};
   std::array<float, 9> factors{};
+  size_t row_count = 0;
   size_t column_count = 0;
+  bool add = false;  ///< to what the modal impulses are already
 };
 
 /// modal_impulses[c] = sum over rows of factor * row[c]: g_m, but for the scale of the shapes.

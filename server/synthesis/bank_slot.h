@@ -17,6 +17,7 @@ struct BankSlot {
   bool rendered = false;       ///< in this block
   bool leaving = false;        ///< is to be retired when it is silent
   bool fading = false;
+  bool awakening = false;  ///< a strike of the block being chosen for awakes the bank
   float fade_gain = 1;
 };
 

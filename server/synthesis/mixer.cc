@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <utility>
 
 #include "server/synthesis/flush_denormals.h"
 
@@ -18,7 +19,11 @@ void Count(std::atomic<uint64_t>& counter, uint64_t more = 1) noexcept {
 }
 
 /// Of a strike's place in the order of rendering.
-constexpr uint64_t kArrivalMask = (uint64_t{1} << 28) - 1;
+constexpr uint64_t kArrivalMask = (uint64_t{1} << 27) - 1;
+constexpr int kMergedBit = 29;
+
+/// Of the bound, for what rings: the rest is for strikes.
+constexpr double kRingingShare = 0.9;
 
 }  // namespace
 
@@ -34,6 +39,7 @@ void Mixer::Render(std::span<float> frames) noexcept {
 
 void Mixer::RenderBlocks(std::span<float> frames) noexcept {
   const size_t block_count = frames.size() / settings_.block_frame_count;
+  budget_.Begin();
   ObeyCommands();
   TakeStrikes(block_count);
   CollectDueStrikes(block_count);
@@ -44,6 +50,7 @@ void Mixer::RenderBlocks(std::span<float> frames) noexcept {
   Count(statistics_.limited_frame_count, limiter_.Apply(frames));
   block_start_ += frames.size();
   statistics_.frame_count.store(block_start_, std::memory_order_release);
+  budget_.End(rendered_work_, static_cast<double>(block_count));
 }
 
 void Mixer::ObeyCommands() noexcept {
@@ -80,7 +87,14 @@ void Mixer::TakeStrikes(size_t block_count) noexcept {
   all_strikes_taken_ = true;
   for (size_t i = 0; i < count; ++i) {
     StrikeQueue& queue = *open_queues_[(first + i) % count];
-    for (Strike strike; budget > 0 && queue.ring.TryPop(strike); --budget) Take(strike, queue);
+    while (budget > 0) {
+      const size_t most = std::min(budget, taken_.size());
+      const size_t popped = queue.ring.PopSome(taken_.data(), most);
+      for (size_t k = 0; k < popped; ++k) Take(taken_[k], queue);
+      taken_count_ += popped;
+      budget -= popped;
+      if (popped < most) break;
+    }
   }
   if (budget == 0) all_strikes_taken_ = false;
   // Asked in this order, a queue that is closed and empty stays empty.
@@ -124,32 +138,106 @@ void Mixer::CollectDueStrikes(size_t block_count) noexcept {
   due_.clear();
   due_order_.clear();
   due_strikes_.clear();
+  rendered_work_ = 0;
+  if (budget_.bounded() && ringing_work_ > budget_.most_work()) ShedBanks();
   for (size_t block = 0; block < block_count; ++block) {
-    const uint64_t start = block_start_ + block * settings_.block_frame_count;
     const size_t first = due_.size();
-    pending_.Collect(start, due_);
-    for (size_t i = first; i < due_.size(); ++i) {
-      const PendingStrike& strike = pending_[due_[i]];
-      BankSlot* slot = FindSlot(strike.bank);
-      if (slot == nullptr) {
-        Count(statistics_.dropped_count);
-        continue;
-      }
-      --slot->pending_count;
-      // By section, block, bank and offset, then by arrival.
-      due_order_.push_back(uint64_t{slot->section} << 60 | block << 52 |
-                           uint64_t{strike.bank.slot} << 36 | (strike.sample - start) << 28 | i);
-    }
+    pending_.Collect(block_start_ + block * settings_.block_frame_count, due_);
+    const std::span<const uint32_t> due = std::span(due_).subspan(first);
+    if (budget_.bounded()) DecideTreatment(due);
+    ChooseStrikes(block, due);
   }
   std::ranges::sort(due_order_);
   due_ends_.fill(0);
   for (const uint64_t order : due_order_) {
     const PendingStrike& strike = pending_[due_[order & kArrivalMask]];
+    const auto block = static_cast<uint32_t>(order >> 52 & 0xFF);
+    const auto offset =
+        static_cast<uint32_t>(strike.sample - block_start_ - block * settings_.block_frame_count);
     due_strikes_.push_back({.slot = strike.bank.slot,
-                            .block = static_cast<uint32_t>(order >> 52 & 0xFF),
-                            .offset = static_cast<uint32_t>(order >> 28 & 0xFF),
+                            .block = block,
+                            .offset = offset,
+                            .merged = (order >> kMergedBit & 1) != 0,
                             .strike = &strike});
     due_ends_[order >> 60] = due_strikes_.size();
+  }
+}
+
+/// What of a block's strikes is exact, merged or shed.
+void Mixer::DecideTreatment(std::span<const uint32_t> due) noexcept {
+  triage_.Clear();
+  for (const uint32_t index : due) {
+    const PendingStrike& strike = pending_[index];
+    BankSlot* slot = FindSlot(strike.bank);
+    if (slot == nullptr || strike.kind != StrikeKind::kImpulse) continue;
+    const double awakening = slot->awakening ? 0 : slot->bank->awakening_work();
+    slot->awakening = true;
+    triage_.Note(LoudnessOf(strike, *slot), slot->bank->strike_work() + awakening,
+                 slot->bank->merged_strike_work() + awakening);
+  }
+  for (const uint32_t index : due) {
+    if (BankSlot* slot = FindSlot(pending_[index].bank)) slot->awakening = false;
+  }
+  const double taken = work::kTakeStrike * static_cast<double>(std::exchange(taken_count_, 0));
+  const double spent = ringing_work_ + taken;
+  rendered_work_ += spent + triage_.Decide(budget_.most_work() - spent);
+}
+
+float Mixer::LoudnessOf(const PendingStrike& strike, const BankSlot& slot) const noexcept {
+  const auto& impulse = strike.excitation.impulse_newton_seconds;
+  const float squared = impulse[0] * impulse[0] + impulse[1] * impulse[1] + impulse[2] * impulse[2];
+  return slot.bank->loudness_of_blow() * std::sqrt(squared);
+}
+
+/// Puts a block's strikes in the order of rendering: by section, block, bank and time, merged ones
+/// after exact ones within kMergedFrames, then by arrival.
+void Mixer::ChooseStrikes(size_t block, std::span<const uint32_t> due) noexcept {
+  const uint64_t start = block_start_ + block * settings_.block_frame_count;
+  auto place = static_cast<uint64_t>(due.data() - due_.data());
+  for (const uint32_t index : due) {
+    const PendingStrike& strike = pending_[index];
+    const uint64_t arrival = place++;
+    BankSlot* slot = FindSlot(strike.bank);
+    if (slot == nullptr) {
+      Count(statistics_.dropped_count);
+      continue;
+    }
+    --slot->pending_count;
+    Treatment treatment = Treatment::kExact;
+    if (budget_.bounded() && strike.kind == StrikeKind::kImpulse) {
+      treatment = triage_.Treat(LoudnessOf(strike, *slot));
+    }
+    if (treatment == Treatment::kShed) {
+      Count(statistics_.shed_count);
+      continue;
+    }
+    const uint64_t merged = treatment == Treatment::kMerged ? 1 : 0;
+    Count(statistics_.merged_count, merged);
+    const uint64_t offset = strike.sample - start;
+    due_order_.push_back(uint64_t{slot->section} << 60 | block << 52 |
+                         uint64_t{strike.bank.slot} << 36 | offset / kMergedFrames << 30 |
+                         merged << kMergedBit | offset % kMergedFrames << 27 | arrival);
+  }
+}
+
+/// Silences the least audible banks, until the rest can ring in time.
+void Mixer::ShedBanks() noexcept {
+  triage_.Clear();
+  for (const RenderSection& section : sections_) {
+    for (const uint32_t index : section.sounding()) {
+      const OscillatorBank& bank = *slots_[index].bank;
+      triage_.Note(static_cast<float>(bank.loudest_squared()), bank.ringing_work(),
+                   bank.ringing_work());
+    }
+  }
+  ringing_work_ = triage_.Decide(kRingingShare * budget_.most_work());
+  for (const RenderSection& section : sections_) {
+    for (const uint32_t index : section.sounding()) {
+      OscillatorBank& bank = *slots_[index].bank;
+      if (triage_.Treat(static_cast<float>(bank.loudest_squared())) != Treatment::kShed) continue;
+      bank.Shed();
+      Count(statistics_.shed_bank_count);
+    }
   }
 }
 
@@ -157,6 +245,7 @@ void Mixer::RenderSections(std::span<float> frames) noexcept {
   const std::span<float> section_frames = std::span(section_frames_).first(frames.size());
   std::ranges::fill(frames, 0.0F);
   uint64_t active_mode_count = 0;
+  ringing_work_ = 0;
   size_t begin = 0;
   for (size_t section = 0; section < kSectionCount; ++section) {
     const size_t end = std::max(due_ends_[section], begin);
@@ -168,6 +257,7 @@ void Mixer::RenderSections(std::span<float> frames) noexcept {
     Count(statistics_.dropped_count, counts.dropped_count);
     Count(statistics_.reset_bank_count, counts.reset_bank_count);
     active_mode_count += counts.active_mode_count;
+    ringing_work_ += counts.ringing_work;
   }
   statistics_.active_mode_count.store(active_mode_count, std::memory_order_relaxed);
 }

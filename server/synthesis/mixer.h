@@ -11,6 +11,7 @@
 
 #include "absl/base/thread_annotations.h"
 #include "absl/status/statusor.h"
+#include "server/base/clock.h"
 #include "server/base/mutex.h"
 #include "server/base/spsc_ring.h"
 #include "server/synthesis/bank_slot.h"
@@ -21,6 +22,8 @@
 #include "server/synthesis/render_section.h"
 #include "server/synthesis/strike.h"
 #include "server/synthesis/strike_stream.h"
+#include "server/synthesis/strike_triage.h"
+#include "server/synthesis/work_budget.h"
 
 namespace carillon {
 
@@ -39,6 +42,12 @@ struct MixerSettings {
   size_t most_streams = 1024;
   size_t most_pending_strikes = 262144;   ///< waiting for their time
   size_t most_strikes_per_block = 32768;  ///< taken from the streams; further ones wait there
+  /// Where there is a clock, a block's work is bounded, so that its deadline is kept: beyond it the
+  /// least audible strikes are merged, then shed, then banks; see MixerStatistics. Without one
+  /// nothing is, and the sound depends on nothing but what was asked for. It must outlive the
+  /// mixer.
+  const Clock* clock = nullptr;
+  double most_load = 0.7;  ///< part of real time
 };
 
 /// What a mixer has counted since it was made, and what it renders now.
@@ -47,6 +56,9 @@ struct MixerStatistics {
   uint64_t accepted_count = 0;       ///< strikes that came in time
   uint64_t late_count = 0;           ///< strikes that came too late and sounded at once
   uint64_t dropped_count = 0;        ///< strikes lost: no such bank, too many, or not finite
+  uint64_t merged_count = 0;         ///< accepted strikes that were merged with their neighbours
+  uint64_t shed_count = 0;           ///< accepted strikes shed: the least audible of too many
+  uint64_t shed_bank_count = 0;      ///< banks silenced: the least audible of too many
   uint64_t reset_bank_count = 0;     ///< banks silenced because their state was not finite
   uint64_t limited_frame_count = 0;  ///< frames in which the limiter worked
   uint64_t bank_count = 0;           ///< on the mixer
@@ -127,6 +139,7 @@ class Mixer {
   struct Counters {
     std::atomic<uint64_t> frame_count{0};
     std::atomic<uint64_t> accepted_count{0}, late_count{0}, dropped_count{0};
+    std::atomic<uint64_t> merged_count{0}, shed_count{0}, shed_bank_count{0};
     std::atomic<uint64_t> reset_bank_count{0}, limited_frame_count{0};
     std::atomic<uint64_t> bank_count{0}, active_mode_count{0};
   };
@@ -142,6 +155,10 @@ class Mixer {
   void TakeStrikes(size_t block_count) noexcept;
   void Take(const Strike& strike, StrikeQueue& queue) noexcept;
   void CollectDueStrikes(size_t block_count) noexcept;
+  void ChooseStrikes(size_t block, std::span<const uint32_t> due) noexcept;
+  void ShedBanks() noexcept;
+  void DecideTreatment(std::span<const uint32_t> due) noexcept;
+  float LoudnessOf(const PendingStrike& strike, const BankSlot& slot) const noexcept;
   void RenderSections(std::span<float> frames) noexcept;
   void RetireLeavingBanks() noexcept;
   void SendBack(const Retired& retired) noexcept;
@@ -167,11 +184,17 @@ class Mixer {
   // All that was pushed before the commands of this block were given: a bank let ring out may be
   // retired, for no strike is on its way to it.
   bool all_strikes_taken_ = true;
+  std::array<Strike, 64> taken_{};
   PendingStrikes pending_;
   std::vector<uint32_t> due_;        // of the blocks rendered together: places in pending_
   std::vector<uint64_t> due_order_;  // see CollectDueStrikes
   std::vector<DueStrike> due_strikes_;
   std::array<size_t, kSectionCount + 1> due_ends_{};  // in due_strikes_
+  StrikeTriage triage_;
+  WorkBudget budget_;
+  size_t taken_count_ = 0;    // strikes, for the blocks rendered together
+  double ringing_work_ = 0;   // of the sounding banks, in the next block
+  double rendered_work_ = 0;  // of the blocks rendered together
   std::vector<RenderSection> sections_;
   std::vector<float> section_frames_;
   RenderDesk desk_;

@@ -9,6 +9,7 @@
 
 #include "server/synthesis/bank_kernel.h"
 #include "server/synthesis/lane_plan.h"
+#include "server/synthesis/work_budget.h"
 
 namespace carillon {
 namespace {
@@ -72,6 +73,10 @@ SpectralLanes MakeSpectralLanes(const std::vector<PlannedLane>& planned, size_t 
   return lanes;
 }
 
+double Norm(const std::array<float, 3>& vector) {
+  return std::hypot(vector[0], vector[1], vector[2]);
+}
+
 }  // namespace
 
 OscillatorBank::OscillatorBank(const SoundingModes& sounding, ShapeTable shapes,
@@ -114,8 +119,10 @@ OscillatorBank::OscillatorBank(const LanePlan& plan, const SoundingModes& soundi
     if (part == 0) continue;
     long_segments_.push_back(
         {.lanes = MakeSpectralLanes(planned, plan.PaddedCount(part), long_blocks[part - 1]),
-         .mode_count = planned.size()});
+         .mode_count = planned.size(),
+         .block_count = long_blocks[part - 1].block_count});
   }
+  MeasureBlow(plan);
 }
 
 bool OscillatorBank::out_of_spectrum() const noexcept {
@@ -127,16 +134,60 @@ std::optional<bank_kernel::Projection> OscillatorBank::Project(
     const Excitation& excitation) const noexcept {
   bank_kernel::Projection projection{.column_count = column_count_};
   for (size_t i = 0; i < 3; ++i) {
-    const size_t vertex = excitation.vertices[i];
-    if (vertex >= shapes_.vertex_count) return std::nullopt;
-    for (size_t axis = 0; axis < 3; ++axis) {
-      projection.rows[3 * i + axis] =
-          shapes_.values.get() + (3 * vertex + axis) * shapes_.mode_count + first_column_;
-      projection.factors[3 * i + axis] =
-          excitation.weights[i] * excitation.impulse_newton_seconds[axis];
-    }
+    if (excitation.vertices[i] >= shapes_.vertex_count) return std::nullopt;
+    AddVertex(excitation.vertices[i], excitation.weights[i], excitation, projection);
   }
   return projection;
+}
+
+void OscillatorBank::AddVertex(size_t vertex, float weight, const Excitation& excitation,
+                               bank_kernel::Projection& projection) const noexcept {
+  for (size_t axis = 0; axis < 3; ++axis) {
+    projection.rows[projection.row_count] =
+        shapes_.values.get() + (3 * vertex + axis) * shapes_.mode_count + first_column_;
+    projection.factors[projection.row_count++] = weight * excitation.impulse_newton_seconds[axis];
+  }
+}
+
+void OscillatorBank::Prefetch(const Excitation& excitation) const noexcept {
+  constexpr size_t kLineFloats = 16;
+  for (const size_t vertex : excitation.vertices) {
+    if (vertex >= shapes_.vertex_count) return;
+    const float* rows = shapes_.values.get() + 3 * vertex * shapes_.mode_count;
+    for (size_t i = 0; i < 3 * shapes_.mode_count; i += kLineFloats) {
+      __builtin_prefetch(rows + i, 0, 2);
+    }
+  }
+}
+
+bool OscillatorBank::StrikeMerged(std::span<const DueStrike> strikes, BlockMix& mix) noexcept {
+  float* modal_impulses = mix.batch().modal_impulses();
+  bank_kernel::Projection projection{.column_count = column_count_};
+  double weight_sum = 0, time_sum = 0, tau_squared_sum = 0;
+  for (const DueStrike& due : strikes) {
+    const Excitation& excitation = due.strike->excitation;
+    const auto nearest = static_cast<size_t>(std::ranges::max_element(excitation.weights) -
+                                             excitation.weights.begin());
+    if (excitation.vertices[nearest] >= shapes_.vertex_count) continue;
+    const double weight = Norm(excitation.impulse_newton_seconds);
+    weight_sum += weight;
+    time_sum += weight * (due.offset - double{due.strike->lead_frames});
+    tau_squared_sum += weight * excitation.tau_s * excitation.tau_s;
+    AddVertex(excitation.vertices[nearest], 1, excitation, projection);
+    if (projection.row_count < projection.rows.size()) continue;
+    bank_kernel::Project(projection, modal_impulses);
+    projection.row_count = 0;
+    projection.add = true;
+  }
+  if (!(weight_sum > 0)) return false;
+  if (projection.row_count > 0) bank_kernel::Project(projection, modal_impulses);
+  const size_t end = (strikes.front().offset / kMergedFrames + 1) * kMergedFrames;
+  const size_t offset = std::min(end, block_frame_count_) - 1;
+  const double lead_frames = static_cast<double>(offset) - time_sum / weight_sum;
+  return StrikeModes({modal_impulses, column_count_}, offset,
+                     {.lead_frames = static_cast<float>(std::max(lead_frames, 0.0)),
+                      .tau_s = static_cast<float>(std::sqrt(tau_squared_sum / weight_sum))},
+                     mix);
 }
 
 bool OscillatorBank::Strike(const Excitation& excitation, size_t offset, float lead_frames,
@@ -242,6 +293,7 @@ bool OscillatorBank::Advance() noexcept {
     const bank_kernel::Advanced advanced =
         bank_kernel::Advance(lanes_, range, newborn_, silence_squared_);
     segment.awake_count = advanced.awake_lane_count;
+    segment.loudest_squared = advanced.loudest_squared;
     finite_ &= advanced.finite;
     if (part > 0 && newborn_) long_segments_[part - 1].struck = true;
   }
@@ -272,6 +324,7 @@ bool OscillatorBank::BeginLongBlock(size_t kind, BlockMix& mix) noexcept {
   const bank_kernel::Advanced advanced =
       bank_kernel::Spread(segment.lanes, segment.mode_count, silence_squared_, mix.Slots(kind));
   segment.awake = segment.sounding = advanced.awake;
+  segment.loudest_squared = advanced.loudest_squared;
   return advanced.finite;
 }
 
@@ -316,13 +369,68 @@ void OscillatorBank::Silence() noexcept {
   }
 }
 
+double OscillatorBank::strike_work() const noexcept {
+  return work::kStrikeLane * static_cast<double>(lane_count_);
+}
+
+double OscillatorBank::merged_strike_work() const noexcept {
+  return work::kMergedLane * static_cast<double>(lane_count_);
+}
+
+double OscillatorBank::awakening_work() const noexcept {
+  size_t asleep_count = lane_count_;
+  for (const Segment& segment : segments_) asleep_count -= segment.awake_count;
+  return TimeWork(asleep_count);
+}
+
+double OscillatorBank::TimeWork(size_t lane_count) const noexcept {
+  return work::kTimeLane * static_cast<double>(lane_count * block_frame_count_) / 128;
+}
+
+double OscillatorBank::loudest_squared() const noexcept {
+  double loudest = 0;
+  for (const Segment& segment : segments_) {
+    if (segment.awake_count > 0) loudest = std::max(loudest, segment.loudest_squared);
+  }
+  for (const LongSegment& segment : long_segments_) {
+    if (segment.awake) loudest = std::max(loudest, segment.loudest_squared);
+  }
+  return loudest;
+}
+
+/// Over at most kRows rows of the shape table, evenly.
+void OscillatorBank::MeasureBlow(const LanePlan& plan) {
+  constexpr size_t kRows = 64;
+  const size_t row_count = 3 * shapes_.vertex_count;
+  const size_t stride = std::max<size_t>(row_count / kRows, 1);
+  double sum = 0;
+  size_t count = 0;
+  for (size_t row = 0; row < row_count; row += stride, ++count) {
+    const float* shape = shapes_.values.get() + row * shapes_.mode_count;
+    for (const auto& planned : plan.lanes) {
+      for (const PlannedLane& lane : planned) {
+        if (!lane.companion) sum += std::norm(lane.start) * shape[lane.column] * shape[lane.column];
+      }
+    }
+  }
+  // A blow has one direction of the three.
+  loudness_of_blow_ =
+      count == 0 ? 0 : static_cast<float>(std::sqrt(sum / static_cast<double>(count)));
+}
+
 void OscillatorBank::CountAwake() noexcept {
   active_mode_count_ = 0;
+  ringing_work_ = 0;
   any_awake_ = false;
   for (size_t part = 0; part < segments_.size(); ++part) {
     const Segment& segment = segments_[part];
     const LongSegment* by_spectrum = part == 0 ? nullptr : &long_segments_[part - 1];
     any_awake_ |= segment.awake_count > 0;
+    ringing_work_ += TimeWork(segment.awake_count);
+    if (by_spectrum != nullptr && by_spectrum->awake) {
+      ringing_work_ += work::kSpectralLane * static_cast<double>(by_spectrum->mode_count) /
+                       static_cast<double>(by_spectrum->block_count);
+    }
     if (by_spectrum != nullptr) any_awake_ |= by_spectrum->awake || by_spectrum->sounding;
     for (size_t i = 0; i < segment.range.count; i += kMostLanes) {
       const bool awake = i < segment.awake_count ||

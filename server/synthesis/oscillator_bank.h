@@ -12,6 +12,7 @@
 
 #include "server/synthesis/bank_kernel.h"
 #include "server/synthesis/block_mix.h"
+#include "server/synthesis/due_strike.h"
 #include "server/synthesis/lane_arrays.h"
 #include "server/synthesis/lane_mix.h"
 #include "server/synthesis/sounding_modes.h"
@@ -80,6 +81,13 @@ class OscillatorBank {
   bool StrikeModes(std::span<const float> modal_impulses, size_t offset,
                    const bank_kernel::Onset& onset, BlockMix& mix) noexcept;
 
+  /// Strikes that sound as one, which costs less: each on the nearest vertex of its triangle, all
+  /// at their mean time, weighted by impulse. They are neighbours in time, and lie in this block.
+  bool StrikeMerged(std::span<const DueStrike> strikes, BlockMix& mix) noexcept;
+
+  /// Asks the memory for what a strike will need.
+  void Prefetch(const Excitation& excitation) const noexcept;
+
   /// Adds a contact's force to that at the next knot. False: no such vertex, and nothing was done.
   bool Gather(const Excitation& force) noexcept;
 
@@ -105,6 +113,23 @@ class OscillatorBank {
   /// Modes that still ring.
   size_t active_mode_count() const noexcept { return newborn_ ? mode_count_ : active_mode_count_; }
 
+  /// Units of work (work_budget.h) that a block takes: now, of a strike, and of what a first strike
+  /// brings with it.
+  double ringing_work() const noexcept { return ringing_work_; }
+  double strike_work() const noexcept;
+  double merged_strike_work() const noexcept;
+  double awakening_work() const noexcept;
+
+  /// How loud, about, a blow of one newton second is: root of the mean over the surface of the sum
+  /// of the modes' squared amplitudes.
+  float loudness_of_blow() const noexcept { return loudness_of_blow_; }
+
+  /// The largest squared amplitude of a mode that rings, lately.
+  double loudest_squared() const noexcept;
+
+  /// Silences the bank; what of it sounds in a long block under way ends with that.
+  void Shed() noexcept { Silence(); }
+
   /// Columns of the shape table that are projected, from the first mode's on.
   size_t column_count() const noexcept { return column_count_; }
 
@@ -116,11 +141,14 @@ class OscillatorBank {
   struct Segment {
     LaneRange range;
     size_t awake_count = 0;
+    double loudest_squared = 0;
   };
   /// Lanes that may ring by spectrum, in long blocks of one kind.
   struct LongSegment {
     SpectralLanes lanes;
     size_t mode_count = 0;
+    size_t block_count = 1;  // of the mixer's in a long one
+    double loudest_squared = 0;
     bool awake = false;
     bool sounding = false;       // in the long block under way
     bool struck = false;         // since that began
@@ -135,6 +163,10 @@ class OscillatorBank {
   void MoveToSpectrum(size_t kind) noexcept;
   void MoveToTime(size_t kind) noexcept;
   std::optional<bank_kernel::Projection> Project(const Excitation& excitation) const noexcept;
+  void AddVertex(size_t vertex, float weight, const Excitation& excitation,
+                 bank_kernel::Projection& projection) const noexcept;
+  void MeasureBlow(const LanePlan& plan);
+  double TimeWork(size_t lane_count) const noexcept;
   void BeginStrikes(BlockMix& mix) noexcept;
   void RenderStrikes(size_t end, BlockMix& mix) noexcept;
   void RenderDrivenStrikes(size_t end, BlockMix& mix) noexcept;
@@ -161,6 +193,8 @@ class OscillatorBank {
   bool leaving_spectrum_ = false;
   size_t rendered_to_ = 0;  // in a block with strikes
   size_t active_mode_count_ = 0;
+  double ringing_work_ = 0;
+  float loudness_of_blow_ = 0;
   LaneArrays lanes_;
   SustainedForce force_;
 };

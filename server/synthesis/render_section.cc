@@ -5,6 +5,20 @@
 #include <array>
 
 namespace carillon {
+namespace {
+
+/// How many of the strikes, from the first on, sound as one.
+size_t CountTogether(std::span<const DueStrike> strikes) {
+  const DueStrike& first = strikes.front();
+  if (!first.merged) return 1;
+  const auto other = std::ranges::find_if(strikes, [&first](const DueStrike& strike) {
+    return !strike.merged || strike.slot != first.slot ||
+           strike.offset / kMergedFrames != first.offset / kMergedFrames;
+  });
+  return static_cast<size_t>(other - strikes.begin());
+}
+
+}  // namespace
 
 RenderSection::RenderSection(const Settings& settings, std::span<BankSlot> slots)
     : settings_(settings), slots_(slots), mix_(settings.block_frame_count, settings.stagger) {
@@ -25,11 +39,13 @@ SectionCounts RenderSection::Render(uint64_t block_number, std::span<const DueSt
     for (const uint32_t index : sounding_) RenderBank(slots_[index], counts);
     mix_.Finish(block);
     counts.active_mode_count = 0;
+    counts.ringing_work = 0;
     for (const uint32_t index : sounding_) {
       BankSlot& slot = slots_[index];
       if (!slot.rendered) RenderFading(slot, block, counts);
       slot.rendered = false;
       counts.active_mode_count += slot.bank->active_mode_count();
+      counts.ringing_work += slot.bank->ringing_work();
     }
     DismissSilentBanks();
   }
@@ -37,30 +53,35 @@ SectionCounts RenderSection::Render(uint64_t block_number, std::span<const DueSt
 }
 
 void RenderSection::Strike(std::span<const DueStrike> strikes, SectionCounts& counts) noexcept {
-  for (size_t i = 0; i < strikes.size(); ++i) {
-    const DueStrike& strike = strikes[i];
-    BankSlot& slot = slots_[strike.slot];
-    const bool struck = !slot.fading && Excite(*slot.bank, strike);
-    if (!struck) ++counts.dropped_count;
+  while (!strikes.empty()) {
+    const size_t count = CountTogether(strikes);
+    const std::span<const DueStrike> due = strikes.first(count);
+    strikes = strikes.subspan(count);
+    const uint32_t index = due.front().slot;
+    BankSlot& slot = slots_[index];
+    const bool same_bank_next = !strikes.empty() && strikes.front().slot == index;
+    if (same_bank_next) slot.bank->Prefetch(strikes.front().strike->excitation);
+    const bool struck = !slot.fading && Excite(*slot.bank, due);
+    if (!struck) counts.dropped_count += count;
     // Nothing moves before the knot.
-    if (struck && !slot.sounding && strike.strike->kind != StrikeKind::kForce) {
+    if (struck && !slot.sounding && due.front().strike->kind != StrikeKind::kForce) {
       slot.sounding = true;
-      sounding_.push_back(strike.slot);
+      sounding_.push_back(index);
     }
-    const bool last = i + 1 == strikes.size() || strikes[i + 1].slot != strike.slot;
-    if (last && slot.sounding) RenderBank(slot, counts);
+    if (!same_bank_next && slot.sounding) RenderBank(slot, counts);
   }
 }
 
-bool RenderSection::Excite(OscillatorBank& bank, const DueStrike& due) noexcept {
-  const PendingStrike& strike = *due.strike;
+bool RenderSection::Excite(OscillatorBank& bank, std::span<const DueStrike> due) noexcept {
+  const PendingStrike& strike = *due.front().strike;
+  if (due.front().merged) return bank.StrikeMerged(due, mix_);
   switch (strike.kind) {
     case StrikeKind::kForce:
       return bank.Gather(strike.excitation);
     case StrikeKind::kKnot:
-      return bank.Tie(strike.knot, due.offset, mix_);
+      return bank.Tie(strike.knot, due.front().offset, mix_);
     default:
-      return bank.Strike(strike.excitation, due.offset, strike.lead_frames, mix_);
+      return bank.Strike(strike.excitation, due.front().offset, strike.lead_frames, mix_);
   }
 }
 

@@ -8,23 +8,16 @@
 
 #include "server/synthesis/bank_slot.h"
 #include "server/synthesis/block_mix.h"
-#include "server/synthesis/pending_strikes.h"
+#include "server/synthesis/due_strike.h"
 
 namespace carillon {
-
-/// A strike in its block.
-struct DueStrike {
-  uint32_t slot = 0;
-  uint32_t block = 0;   ///< of those rendered together
-  uint32_t offset = 0;  ///< frames
-  const PendingStrike* strike = nullptr;
-};
 
 /// What a section has counted while rendering.
 struct SectionCounts {
   uint64_t dropped_count = 0;
   uint64_t reset_bank_count = 0;
   uint64_t active_mode_count = 0;  ///< now
+  double ringing_work = 0;  ///< units (work_budget.h) that the next block takes without strikes
 };
 
 /// Some of a mixer's banks, which one thread renders together; several sections may render at once.
@@ -40,6 +33,9 @@ class RenderSection {
   /// `slots` belong to the mixer; this section touches its own only.
   RenderSection(const Settings& settings, std::span<BankSlot> slots);
 
+  /// Its sounding banks' slots.
+  std::span<const uint32_t> sounding() const noexcept { return sounding_; }
+
   /// Renders `frames`, whole blocks, the first of which has this number. `strikes` are this
   /// section's, ascending by block, then slot, then offset.
   SectionCounts Render(uint64_t block_number, std::span<const DueStrike> strikes,
@@ -47,7 +43,7 @@ class RenderSection {
 
  private:
   void Strike(std::span<const DueStrike> strikes, SectionCounts& counts) noexcept;
-  bool Excite(OscillatorBank& bank, const DueStrike& due) noexcept;
+  bool Excite(OscillatorBank& bank, std::span<const DueStrike> due) noexcept;
   void RenderBank(BankSlot& slot, SectionCounts& counts) noexcept;
   void RenderFading(BankSlot& slot, std::span<float> block, SectionCounts& counts) noexcept;
   void DismissSilentBanks() noexcept;
