@@ -15,8 +15,9 @@ absl::StatusOr<std::shared_ptr<const SoundingBody>> MakeBody(
                             .given_vertices = model->given_vertices,
                             .given_triangles = model->given_triangles});
   if (!locator.ok()) return locator.status();
-  return std::make_shared<const SoundingBody>(
-      SoundingBody{.model = std::move(model), .locator = *std::move(locator)});
+  ShapeTable shapes(model->shapes, model->vertices.size(), model->mode_count());
+  return std::make_shared<const SoundingBody>(SoundingBody{
+      .model = std::move(model), .shapes = std::move(shapes), .locator = *std::move(locator)});
 }
 
 }  // namespace

@@ -9,13 +9,15 @@
 #include "server/base/mutex.h"
 #include "server/excitation/surface_locator.h"
 #include "server/mode_database/modal_model.h"
+#include "server/synthesis/shape_table.h"
 
 namespace carillon {
 
-/// A modal model and the index that finds points on its surface; shared by all objects of that
-/// shape.
+/// A modal model, its shapes as strikes are projected with them, and the index that finds points on
+/// its surface; shared by all objects of that shape.
 struct SoundingBody {
   std::shared_ptr<const ModalModel> model;
+  ShapeTable shapes;
   std::unique_ptr<const SurfaceLocator> locator;
 };
 

@@ -90,11 +90,8 @@ absl::StatusOr<SoundingObject> MakeSoundingObject(std::shared_ptr<const Sounding
   const SoundingModes sounding = SelectSoundingModes(
       model.eigenvalues, model.couplings, properties.material, settings.sample_rate_hz, band);
   if (sounding.modes.empty()) return NoModeInBand(model, properties.material, band);
-  const ShapeTable shapes{.values = {body->model, model.shapes.data()},
-                          .vertex_count = model.vertices.size(),
-                          .mode_count = model.mode_count()};
   absl::StatusOr<BankId> bank = mixer.Add(std::make_unique<OscillatorBank>(
-      sounding, shapes,
+      sounding, body->shapes,
       OscillatorBankSettings{.sample_rate_hz = settings.sample_rate_hz,
                              .block_frame_count = settings.block_frame_count,
                              .gain = properties.gain}));

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <string_view>
 
 #include "server/synthesis/lane_arrays.h"
@@ -56,14 +57,15 @@ Advanced Spread(SpectralLanes& lanes, size_t mode_count, double silence_squared,
 struct Projection {
   /// For each vertex and axis: the row of the shape table from the first column projected, and
   /// weight times impulse.
-  std::array<const float*, 9> rows{};
+  std::array<const int16_t*, 9> rows{};
   std::array<float, 9> factors{};
   size_t row_count = 0;
   size_t column_count = 0;
   bool add = false;  ///< to what the modal impulses are already
 };
 
-/// modal_impulses[c] = sum over rows of factor * row[c]: g_m, but for the scale of the shapes.
+/// modal_impulses[c] = sum over rows of factor * row[c]: g_m in units of the shape table's scales,
+/// up to the end of a vector.
 void Project(const Projection& projection, float* modal_impulses) noexcept;
 
 /// How modal impulses reach the states.
@@ -74,7 +76,8 @@ struct Onset {
 
 /// What modal impulses add to the states, into added_re and added_im. False: not finite.
 bool Excite(const LaneArrays& lanes, size_t lane_count, const float* modal_impulses,
-            const Onset& onset, float* added_re, float* added_im) noexcept;
+            const Onset& onset, const StrikeBatch::RowsAhead& ahead, float* added_re,
+            float* added_im) noexcept;
 
 /// Name of the target dispatched to.
 std::string_view Target();

@@ -27,8 +27,9 @@ constexpr float kMostForce = 1e15F;
 void Gather(const bank_kernel::Projection& projection, float* HWY_RESTRICT next) {
   for (size_t row = 0; row < projection.row_count; ++row) {
     const float factor = projection.factors[row];
-    const float* HWY_RESTRICT shape = projection.rows[row];
-    for (size_t c = 0; c < projection.column_count; ++c) next[c] += factor * shape[c];
+    const int16_t* HWY_RESTRICT shape = projection.rows[row];
+    for (size_t c = 0; c < projection.column_count; ++c)
+      next[c] += factor * static_cast<float>(shape[c]);
   }
 }
 

@@ -42,10 +42,12 @@ void Place(PlannedLane lane, size_t block_frame_count, LanePlan& plan) {
 
 }  // namespace
 
-LanePlan PlanLanes(const SoundingModes& sounding, const LanePlanSettings& settings) {
-  const double gain = sounding.shape_scale * kSamplesPerVolumeVelocity * settings.gain;
+LanePlan PlanLanes(const SoundingModes& sounding, const ShapeTable& shapes,
+                   const LanePlanSettings& settings) {
   LanePlan plan;
   for (const SoundingMode& mode : sounding.modes) {
+    const double gain = sounding.shape_scale * kSamplesPerVolumeVelocity * settings.gain *
+                        double{shapes.scale(mode.column)};
     Place(PlanLane(mode, settings, gain, false), settings.block_frame_count, plan);
     if (mode.output_phase_rad == 0) continue;
     Place(PlanLane(mode, settings, gain, true), settings.block_frame_count, plan);

@@ -9,6 +9,7 @@
 
 #include "server/synthesis/lane_arrays.h"
 #include "server/synthesis/long_block.h"
+#include "server/synthesis/shape_table.h"
 #include "server/synthesis/sounding_modes.h"
 #include "server/synthesis/spreading_kernel.h"
 
@@ -18,7 +19,7 @@ namespace carillon {
 struct PlannedLane {
   uint32_t column = 0;
   std::complex<double> log_q;  ///< (sigma + i omega)/rate
-  std::complex<double> start;  ///< the state after a unit of what the shape table projects
+  std::complex<double> start;  ///< the state after a modal impulse of one scale of the shape table
   std::complex<double> gaussian_exponent;  ///< of the contact, for each second squared of tau^2
   SpreadMode spread;                       ///< for the kind of long block that it rings in
   bool companion = false;
@@ -42,6 +43,7 @@ struct LanePlanSettings {
   double gain = 1;
 };
 
-LanePlan PlanLanes(const SoundingModes& sounding, const LanePlanSettings& settings);
+LanePlan PlanLanes(const SoundingModes& sounding, const ShapeTable& shapes,
+                   const LanePlanSettings& settings);
 
 }  // namespace carillon

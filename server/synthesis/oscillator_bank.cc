@@ -73,18 +73,25 @@ SpectralLanes MakeSpectralLanes(const std::vector<PlannedLane>& planned, size_t 
   return lanes;
 }
 
+/// Of the triangle's.
+size_t NearestVertex(const Excitation& excitation) {
+  return static_cast<size_t>(std::ranges::max_element(excitation.weights) -
+                             excitation.weights.begin());
+}
+
 double Norm(const std::array<float, 3>& vector) {
   return std::hypot(vector[0], vector[1], vector[2]);
 }
 
 }  // namespace
 
-OscillatorBank::OscillatorBank(const SoundingModes& sounding, ShapeTable shapes,
+OscillatorBank::OscillatorBank(const SoundingModes& sounding, const ShapeTable& shapes,
                                const OscillatorBankSettings& settings)
-    : OscillatorBank(PlanLanes(sounding, {.sample_rate_hz = settings.sample_rate_hz,
-                                          .block_frame_count = settings.block_frame_count,
-                                          .gain = settings.gain}),
-                     sounding, std::move(shapes), settings) {}
+    : OscillatorBank(PlanLanes(sounding, shapes,
+                               {.sample_rate_hz = settings.sample_rate_hz,
+                                .block_frame_count = settings.block_frame_count,
+                                .gain = settings.gain}),
+                     sounding, shapes, settings) {}
 
 OscillatorBank::OscillatorBank(const LanePlan& plan, const SoundingModes& sounding,
                                ShapeTable shapes, const OscillatorBankSettings& settings)
@@ -98,7 +105,7 @@ OscillatorBank::OscillatorBank(const LanePlan& plan, const SoundingModes& soundi
       lanes_(lane_count_),
       force_(lane_count_, column_count_, settings.sample_rate_hz, settings.noise_seed) {
   assert(block_frame_count_ > 0 && block_frame_count_ <= kMostBlockFrames);
-  assert(first_column_ + column_count_ <= shapes_.mode_count);
+  assert(first_column_ + column_count_ <= shapes_.mode_count());
   assert(lane_count_ <= StrikeBatch::kMostBankLanes);
   assert(column_count_ <= StrikeBatch::kMostBankLanes);
   const double lowest_rad_per_s =
@@ -134,7 +141,7 @@ std::optional<bank_kernel::Projection> OscillatorBank::Project(
     const Excitation& excitation) const noexcept {
   bank_kernel::Projection projection{.column_count = column_count_};
   for (size_t i = 0; i < 3; ++i) {
-    if (excitation.vertices[i] >= shapes_.vertex_count) return std::nullopt;
+    if (excitation.vertices[i] >= shapes_.vertex_count()) return std::nullopt;
     AddVertex(excitation.vertices[i], excitation.weights[i], excitation, projection);
   }
   return projection;
@@ -143,21 +150,21 @@ std::optional<bank_kernel::Projection> OscillatorBank::Project(
 void OscillatorBank::AddVertex(size_t vertex, float weight, const Excitation& excitation,
                                bank_kernel::Projection& projection) const noexcept {
   for (size_t axis = 0; axis < 3; ++axis) {
-    projection.rows[projection.row_count] =
-        shapes_.values.get() + (3 * vertex + axis) * shapes_.mode_count + first_column_;
+    projection.rows[projection.row_count] = shapes_.Row(vertex, axis) + first_column_;
     projection.factors[projection.row_count++] = weight * excitation.impulse_newton_seconds[axis];
   }
 }
 
-void OscillatorBank::Prefetch(const Excitation& excitation) const noexcept {
-  constexpr size_t kLineFloats = 16;
-  for (const size_t vertex : excitation.vertices) {
-    if (vertex >= shapes_.vertex_count) return;
-    const float* rows = shapes_.values.get() + 3 * vertex * shapes_.mode_count;
-    for (size_t i = 0; i < 3 * shapes_.mode_count; i += kLineFloats) {
-      __builtin_prefetch(rows + i, 0, 2);
-    }
+StrikeBatch::RowsAhead OscillatorBank::RowsOf(const DueStrike& strike) const noexcept {
+  const Excitation& excitation = strike.strike->excitation;
+  const size_t nearest = NearestVertex(excitation);
+  StrikeBatch::RowsAhead ahead{.value_count = 3 * shapes_.stride()};
+  for (size_t i = 0; i < 3; ++i) {
+    const size_t vertex = excitation.vertices[i];
+    if (vertex >= shapes_.vertex_count() || (strike.merged && i != nearest)) continue;
+    ahead.rows[ahead.count++] = shapes_.Row(vertex, 0);
   }
+  return ahead;
 }
 
 bool OscillatorBank::StrikeMerged(std::span<const DueStrike> strikes, BlockMix& mix) noexcept {
@@ -166,9 +173,8 @@ bool OscillatorBank::StrikeMerged(std::span<const DueStrike> strikes, BlockMix& 
   double weight_sum = 0, time_sum = 0, tau_squared_sum = 0;
   for (const DueStrike& due : strikes) {
     const Excitation& excitation = due.strike->excitation;
-    const auto nearest = static_cast<size_t>(std::ranges::max_element(excitation.weights) -
-                                             excitation.weights.begin());
-    if (excitation.vertices[nearest] >= shapes_.vertex_count) continue;
+    const size_t nearest = NearestVertex(excitation);
+    if (excitation.vertices[nearest] >= shapes_.vertex_count()) continue;
     const double weight = Norm(excitation.impulse_newton_seconds);
     weight_sum += weight;
     time_sum += weight * (due.offset - double{due.strike->lead_frames});
@@ -208,7 +214,7 @@ bool OscillatorBank::StrikeModes(std::span<const float> modal_impulses, size_t o
   assert(offset >= (batch.count > 0 ? batch.offsets[batch.count - 1] : rendered_to_));
   if (batch.count == StrikeBatch::Capacity(lane_count_)) RenderStrikes(offset, mix);
   const bool finite =
-      bank_kernel::Excite(lanes_, lane_count_, modal_impulses.data(), onset,
+      bank_kernel::Excite(lanes_, lane_count_, modal_impulses.data(), onset, batch.ahead,
                           batch.re(batch.count, lane_count_), batch.im(batch.count, lane_count_));
   if (finite) batch.offsets[batch.count++] = offset;
   newborn_ = newborn_ || finite;
@@ -398,18 +404,19 @@ double OscillatorBank::loudest_squared() const noexcept {
   return loudest;
 }
 
-/// Over at most kRows rows of the shape table, evenly.
+/// Over at most kVertices vertices, evenly.
 void OscillatorBank::MeasureBlow(const LanePlan& plan) {
-  constexpr size_t kRows = 64;
-  const size_t row_count = 3 * shapes_.vertex_count;
-  const size_t stride = std::max<size_t>(row_count / kRows, 1);
+  constexpr size_t kVertices = 32;
+  const size_t stride = std::max<size_t>(shapes_.vertex_count() / kVertices, 1);
   double sum = 0;
   size_t count = 0;
-  for (size_t row = 0; row < row_count; row += stride, ++count) {
-    const float* shape = shapes_.values.get() + row * shapes_.mode_count;
-    for (const auto& planned : plan.lanes) {
-      for (const PlannedLane& lane : planned) {
-        if (!lane.companion) sum += std::norm(lane.start) * shape[lane.column] * shape[lane.column];
+  for (size_t vertex = 0; vertex < shapes_.vertex_count(); vertex += stride) {
+    for (size_t axis = 0; axis < 3; ++axis, ++count) {
+      for (const auto& planned : plan.lanes) {
+        for (const PlannedLane& lane : planned) {
+          const double shape = shapes_.Row(vertex, axis)[lane.column];
+          if (!lane.companion) sum += std::norm(lane.start) * shape * shape;
+        }
       }
     }
   }

@@ -15,6 +15,7 @@
 #include "server/synthesis/due_strike.h"
 #include "server/synthesis/lane_arrays.h"
 #include "server/synthesis/lane_mix.h"
+#include "server/synthesis/shape_table.h"
 #include "server/synthesis/sounding_modes.h"
 #include "server/synthesis/spectral_lanes.h"
 #include "server/synthesis/strike.h"
@@ -23,14 +24,6 @@
 namespace carillon {
 
 struct LanePlan;
-
-/// Mode shapes of one body on its sounding surface, #V by 3 by #m, row-major:
-/// values[(vertex * 3 + axis) * mode_count + column]. Shared with the modal model that owns them.
-struct ShapeTable {
-  std::shared_ptr<const float> values;
-  size_t vertex_count = 0;
-  size_t mode_count = 0;
-};
 
 /// How a bank is rendered.
 struct OscillatorBankSettings {
@@ -67,7 +60,7 @@ struct OscillatorBankSettings {
 class OscillatorBank {
  public:
   /// At most StrikeBatch::kMostBankLanes lanes and columns.
-  OscillatorBank(const SoundingModes& sounding, ShapeTable shapes,
+  OscillatorBank(const SoundingModes& sounding, const ShapeTable& shapes,
                  const OscillatorBankSettings& settings);
 
   /// Applies an excitation at sample `offset` of the block of `mix`, `lead_frames` (0 to 1) after
@@ -85,8 +78,8 @@ class OscillatorBank {
   /// at their mean time, weighted by impulse. They are neighbours in time, and lie in this block.
   bool StrikeMerged(std::span<const DueStrike> strikes, BlockMix& mix) noexcept;
 
-  /// Asks the memory for what a strike will need.
-  void Prefetch(const Excitation& excitation) const noexcept;
+  /// What a strike will read.
+  StrikeBatch::RowsAhead RowsOf(const DueStrike& strike) const noexcept;
 
   /// Adds a contact's force to that at the next knot. False: no such vertex, and nothing was done.
   bool Gather(const Excitation& force) noexcept;

@@ -60,7 +60,10 @@ void RenderSection::Strike(std::span<const DueStrike> strikes, SectionCounts& co
     const uint32_t index = due.front().slot;
     BankSlot& slot = slots_[index];
     const bool same_bank_next = !strikes.empty() && strikes.front().slot == index;
-    if (same_bank_next) slot.bank->Prefetch(strikes.front().strike->excitation);
+    mix_.batch().ahead = {};
+    if (!strikes.empty()) {
+      mix_.batch().ahead = slots_[strikes.front().slot].bank->RowsOf(strikes.front());
+    }
     const bool struck = !slot.fading && Excite(*slot.bank, due);
     if (!struck) counts.dropped_count += count;
     // Nothing moves before the knot.

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <cstdint>
 
 #include "server/synthesis/lane_arrays.h"
 
@@ -17,6 +18,14 @@ class StrikeBatch {
   /// A bank has no more lanes, and projects no more columns, than this.
   static constexpr size_t kMostBankLanes = 16384;
 
+  /// Rows that the next strike will read: asked for while this one is worked on, because at once
+  /// they would only wait for each other.
+  struct RowsAhead {
+    std::array<const int16_t*, 3> rows{};
+    size_t count = 0;
+    size_t value_count = 0;  ///< of each
+  };
+
   StrikeBatch() : modal_impulses_(kMostBankLanes), re_(kMostBankLanes), im_(kMostBankLanes) {}
 
   /// How many strikes of a bank of `lane_count` lanes fit.
@@ -28,6 +37,7 @@ class StrikeBatch {
   float* re(size_t strike, size_t lane_count) noexcept { return re_.data() + strike * lane_count; }
   float* im(size_t strike, size_t lane_count) noexcept { return im_.data() + strike * lane_count; }
 
+  RowsAhead ahead;
   size_t count = 0;
   std::array<size_t, kMostStrikes> offsets{};  ///< in the block, ascending
 

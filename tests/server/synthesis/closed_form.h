@@ -21,12 +21,8 @@ inline constexpr double kTestSampleRateHz = 48000;
 inline constexpr double kTestFrameS = 1 / kTestSampleRateHz;
 
 /// A body of one triangle whose shapes are given by the tests: values[(vertex*3 + axis)*m + mode].
-inline ShapeTable MakeShapes(std::vector<float> values, size_t mode_count) {
-  const size_t vertex_count = values.size() / (3 * mode_count);
-  auto owner = std::make_shared<const std::vector<float>>(std::move(values));
-  return {.values = std::shared_ptr<const float>(owner, owner->data()),
-          .vertex_count = vertex_count,
-          .mode_count = mode_count};
+inline ShapeTable MakeShapes(const std::vector<float>& values, size_t mode_count) {
+  return {values, values.size() / (3 * mode_count), mode_count};
 }
 
 /// Every mode moves by `shape` along x at vertices 0 to 2, and not along y and z.
@@ -36,7 +32,7 @@ inline ShapeTable MakeUniformShapes(size_t mode_count, float shape = 1) {
     std::fill_n(values.begin() + static_cast<ptrdiff_t>(3 * vertex * mode_count), mode_count,
                 shape);
   }
-  return MakeShapes(std::move(values), mode_count);
+  return MakeShapes(values, mode_count);
 }
 
 /// A unit impulse along x in the middle of the triangle.

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+namespace carillon {
+
+/// Mode shapes of one body on its sounding surface as strikes are projected with them: 16 bits a
+/// value, scaled by each mode's largest, because a flood of strikes is bounded by memory. The
+/// rounding is 101 dB below that largest value, root mean square. Copies share the values.
+class ShapeTable {
+ public:
+  ShapeTable() = default;
+
+  /// `shapes` are #V by 3 by #m, row-major: shapes[(vertex * 3 + axis) * mode_count + mode]; they
+  /// are not needed afterwards.
+  ShapeTable(std::span<const float> shapes, size_t vertex_count, size_t mode_count);
+
+  size_t vertex_count() const noexcept { return vertex_count_; }
+  size_t mode_count() const noexcept { return mode_count_; }
+
+  /// Values of all modes at a vertex along an axis, in units of scale(mode); readable up to the end
+  /// of the vector that the last one lies in.
+  const int16_t* Row(size_t vertex, size_t axis) const noexcept {
+    return values_.get() + (3 * vertex + axis) * stride_;
+  }
+
+  /// Values from one row to the next.
+  size_t stride() const noexcept { return stride_; }
+
+  float scale(size_t mode) const noexcept { return scales_[mode]; }
+
+ private:
+  size_t vertex_count_ = 0;
+  size_t mode_count_ = 0;
+  size_t stride_ = 0;
+  std::vector<float> scales_;
+  std::shared_ptr<const int16_t> values_;
+};
+
+}  // namespace carillon

@@ -1,0 +1,269 @@
+// SPDX-License-Identifier: Apache-2.0
+// A flood of impulses on twenty ringing bodies, in real time: what is exact, merged and shed, and
+// whether any deadline is missed.
+#include <pthread.h>
+#include <sched.h>
+
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <memory>
+#include <random>
+#include <thread>
+#include <vector>
+
+#include "server/base/clock.h"
+#include "server/synthesis/mixer.h"
+#include "tests/benchmarks/mixer/measured_time.h"
+#include "tests/benchmarks/mixer/programs.h"
+#include "tests/server/synthesis/closed_form.h"
+
+namespace carillon {
+namespace {
+
+using std::chrono::nanoseconds;
+constexpr size_t kBodies = 20, kVertices = 10'000, kModes = 800, kStreams = 4, kBlock = 128;
+constexpr double kBlockS = kBlock / kTestSampleRateHz;
+constexpr double kGoldenAngle = 2.399963229728653;
+
+/// Points evenly on a unit sphere; i, i + 89 and i + 144 are neighbours.
+std::array<double, 3> VertexAt(size_t i) {
+  const double z = 1 - (2 * static_cast<double>(i) + 1) / kVertices;
+  const double angle = kGoldenAngle * static_cast<double>(i), r = std::sqrt(1 - z * z);
+  return {r * std::cos(angle), r * std::sin(angle), z};
+}
+
+/// Smooth shapes: standing waves whose length shrinks as that of a body's modes does, mode m with
+/// about sqrt(m) half waves around the body.
+ShapeTable MakeWaves(uint64_t body) {
+  std::mt19937 random(static_cast<uint32_t>(body));
+  std::normal_distribution<float> normal;
+  std::vector<float> values(3 * kVertices * kModes);
+  std::vector<std::array<float, 7>> waves(kModes);
+  for (size_t m = 0; m < kModes; ++m) {
+    for (float& x : waves[m]) x = normal(random);
+    const float length = std::hypot(waves[m][0], waves[m][1], waves[m][2]);
+    for (size_t i = 0; i < 3; ++i) waves[m][i] *= std::sqrt(static_cast<float>(m) + 1) / length;
+  }
+  for (size_t v = 0; v < kVertices; ++v) {
+    const auto at = VertexAt(v);
+    for (size_t m = 0; m < kModes; ++m) {
+      const auto& w = waves[m];
+      const float wave =
+          std::sin(w[0] * static_cast<float>(at[0]) + w[1] * static_cast<float>(at[1]) +
+                   w[2] * static_cast<float>(at[2]) + w[6]);
+      for (size_t axis = 0; axis < 3; ++axis) {
+        values[(3 * v + axis) * kModes + m] = wave * w[3 + axis];
+      }
+    }
+  }
+  return MakeShapes(values, kModes);
+}
+
+SoundingModes MakeBodyModes(uint64_t body) {
+  std::mt19937 random(static_cast<uint32_t>(body) + 1000);
+  std::uniform_real_distribution<double> uniform;
+  SoundingModes sounding;
+  for (uint32_t m = 0; m < kModes; ++m) {
+    const double frequency_hz = 150 + 22.0 * m + 15 * uniform(random);
+    const double t60_s = 0.3 * std::pow(10.0, uniform(random));
+    sounding.modes.push_back(MakeMode(m, frequency_hz, -std::log(1000.0) / t60_s, 1e-3));
+  }
+  return sounding;
+}
+
+/// Impulses whose sizes spread over 60 dB, as in a pile of debris.
+class Impulses {
+ public:
+  explicit Impulses(uint32_t seed) : random_(seed) {
+    std::uniform_real_distribution<float> uniform;
+    for (Strike& strike : strikes_) {
+      const auto v = static_cast<uint32_t>(random_() % (kVertices - 144));
+      const float a = std::sqrt(uniform(random_)), b = uniform(random_);
+      strike.excitation = {.vertices = {v, v + 89, v + 144},
+                           .weights = {1 - a, a * (1 - b), a * b}};
+      const float size = 1e-3F * std::pow(10.0F, -3 * uniform(random_));
+      for (float& x : strike.excitation.impulse_newton_seconds) {
+        x = size * (2 * uniform(random_) - 1);
+      }
+      strike.fraction = uniform(random_);
+    }
+  }
+
+  Strike Next() {
+    Strike strike = strikes_[next_++ % strikes_.size()];
+    strike.frame = random_() % kBlock;
+    body_ = random_() % kBodies;
+    return strike;
+  }
+  size_t body() const { return body_; }
+
+ private:
+  std::mt19937 random_;
+  std::vector<Strike> strikes_ = std::vector<Strike>(1 << 16);
+  size_t next_ = 0, body_ = 0;
+};
+
+struct Bodies {
+  std::vector<SoundingModes> modes;
+  std::vector<ShapeTable> shapes;
+  Bodies() {
+    for (size_t body = 0; body < kBodies; ++body) {
+      modes.push_back(MakeBodyModes(body));
+      shapes.push_back(MakeWaves(body));
+    }
+  }
+};
+
+/// Pushes `rate` impulses a second onto four streams until `done`.
+void Flood(Mixer& mixer, const std::vector<BankId>& banks, double rate,
+           const std::atomic<bool>& done) {
+  std::vector<std::unique_ptr<StrikeStream>> streams;
+  for (size_t i = 0; i < kStreams; ++i) streams.push_back(mixer.OpenStream(1 << 17).value());
+  Impulses impulses(7);
+  uint64_t block = mixer.frame() / kBlock;
+  double due = 0;
+  for (; !done; std::this_thread::sleep_for(std::chrono::microseconds(300))) {
+    // The impulses of a block are pushed two blocks ahead of it.
+    for (; block <= mixer.frame() / kBlock + 2; ++block) {
+      for (due += rate * kBlockS; due >= 1; --due) {
+        Strike strike = impulses.Next();
+        strike.bank = banks[impulses.body()];
+        strike.frame += block * kBlock;
+        streams[static_cast<size_t>(due) % kStreams]->TryPush(strike);
+      }
+    }
+  }
+}
+
+bool MakeThisThreadRealtime() {
+  const sched_param priority{.sched_priority = 20};
+  return pthread_setschedparam(pthread_self(), SCHED_FIFO, &priority) == 0;
+}
+
+struct Result {
+  std::vector<double> block_s, cpu_s;
+  uint64_t missed_count = 0;
+  bool realtime = false;
+};
+
+/// A device of 128 frames: each block has to be there when the next begins.
+Result RenderInTime(Mixer& mixer, const Clock& clock, double seconds) {
+  Result result;
+  result.realtime = MakeThisThreadRealtime();
+  std::vector<float> block(kBlock);
+  const auto block_count = static_cast<size_t>(seconds / kBlockS);
+  const nanoseconds start = clock.Monotonic();
+  const auto due = [start](size_t i) {
+    return start + nanoseconds(int64_t(1e9 * kBlockS * double(i)));
+  };
+  for (size_t i = 0; i < block_count; ++i) {
+    while (clock.Monotonic() < due(i)) std::this_thread::sleep_for(due(i) - clock.Monotonic());
+    const double cpu = ThreadSeconds();
+    const nanoseconds begin = clock.Monotonic();
+    mixer.Render(block);
+    const nanoseconds end = clock.Monotonic();
+    result.cpu_s.push_back(ThreadSeconds() - cpu);
+    result.block_s.push_back(1e-9 * static_cast<double>((end - begin).count()));
+    result.missed_count += end > due(i + 1) ? 1 : 0;
+  }
+  return result;
+}
+
+/// What merging changes: one body struck at a twentieth of `rate`, all merged, against all exact;
+/// energy of the difference over that of the sound.
+double MergedErrorDb(const Bodies& bodies, double rate) {
+  OscillatorBank exact(bodies.modes[0], bodies.shapes[0], {});
+  OscillatorBank merged(bodies.modes[0], bodies.shapes[0], {});
+  TestMix exact_mix, merged_mix;
+  Impulses impulses(3);
+  const auto count = static_cast<size_t>(rate / kBodies * kBlockS);
+  double error = 0, energy = 0;
+  std::vector<float> a(kBlock), b(kBlock);
+  for (size_t block = 0; block < 200; ++block) {
+    std::vector<PendingStrike> strikes(count);
+    for (PendingStrike& pending : strikes) {
+      const Strike strike = impulses.Next();
+      pending = {.sample = strike.frame,
+                 .lead_frames = 1 - strike.fraction,
+                 .excitation = strike.excitation};
+    }
+    std::ranges::stable_sort(strikes, {}, &PendingStrike::sample);
+    BlockMix &of_exact = exact_mix.Begin(), &of_merged = merged_mix.Begin();
+    for (const auto& s : strikes) {
+      exact.Strike(s.excitation, static_cast<size_t>(s.sample), s.lead_frames, of_exact);
+    }
+    for (size_t i = 0; i < count;) {
+      std::vector<DueStrike> group;
+      const uint64_t tile = strikes[i].sample / kMergedFrames;
+      for (; i < count && strikes[i].sample / kMergedFrames == tile; ++i) {
+        group.push_back({.offset = static_cast<uint32_t>(strikes[i].sample),
+                         .merged = true,
+                         .strike = &strikes[i]});
+      }
+      merged.StrikeMerged(group, of_merged);
+    }
+    exact_mix.Render(exact, a);
+    merged_mix.Render(merged, b);
+    for (size_t n = 0; n < kBlock; ++n) {
+      error += std::pow(double{a[n]} - b[n], 2);
+      energy += std::pow(double{a[n]}, 2);
+    }
+  }
+  return 10 * std::log10(error / energy);
+}
+
+void MeasureRate(const Bodies& bodies, double rate, double seconds) {
+  SystemClock clock;
+  Mixer mixer({.most_banks = kBodies, .clock = &clock});
+  std::vector<BankId> banks;
+  for (size_t body = 0; body < kBodies; ++body) {
+    banks.push_back(mixer
+                        .Add(std::make_unique<OscillatorBank>(
+                            bodies.modes[body], bodies.shapes[body], OscillatorBankSettings{}))
+                        .value());
+  }
+  std::atomic<bool> done{false};
+  std::thread client([&] { Flood(mixer, banks, rate, done); });
+  Result result;
+  std::thread render([&] { result = RenderInTime(mixer, clock, seconds); });
+  render.join();
+  done = true;
+  client.join();
+  const MixerStatistics s = mixer.statistics();
+  double load = 0;
+  for (const double cpu : result.cpu_s) load += cpu / kBlockS;
+  const auto per_s = [seconds](uint64_t count) { return static_cast<double>(count) / seconds; };
+  std::printf(
+      "{\"what\": \"flood\", \"rate\": %.0f, \"seconds\": %.0f, \"realtime\": %s, "
+      "\"taken_per_s\": %.0f, \"late_per_s\": %.0f, \"merged_per_s\": %.0f, \"shed_per_s\": %.0f, "
+      "\"dropped\": %llu, \"shed_banks\": %llu, \"load\": %.3f, \"median_block_ms\": %.3f, "
+      "\"p999_block_ms\": %.3f, \"worst_block_ms\": %.3f, \"worst_cpu_ms\": %.3f, "
+      "\"missed\": %llu}\n",
+      rate, seconds, result.realtime ? "true" : "false", per_s(s.accepted_count + s.late_count),
+      per_s(s.late_count), per_s(s.merged_count), per_s(s.shed_count),
+      static_cast<unsigned long long>(s.dropped_count),
+      static_cast<unsigned long long>(s.shed_bank_count),
+      load / static_cast<double>(result.cpu_s.size()), 1e3 * Quantile(result.block_s, 0.5),
+      1e3 * Quantile(result.block_s, 0.999), 1e3 * Quantile(result.block_s, 1),
+      1e3 * Quantile(result.cpu_s, 1), static_cast<unsigned long long>(result.missed_count));
+  std::fflush(stdout);
+}
+
+}  // namespace
+
+int MeasureFlood(const Arguments& arguments) {
+  const double seconds = arguments.empty() ? 60 : std::atof(arguments[0].c_str());
+  const Bodies bodies;
+  std::printf("{\"what\": \"merging\", \"rate\": 1e6, \"error_db\": %.1f}\n",
+              MergedErrorDb(bodies, 1e6));
+  for (const double rate : {3e5, 1e6, 1e7}) {
+    if (arguments.size() > 1 && std::atof(arguments[1].c_str()) != rate) continue;
+    MeasureRate(bodies, rate, seconds);
+  }
+  return EXIT_SUCCESS;
+}
+
+}  // namespace carillon

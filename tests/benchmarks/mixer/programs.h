@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace carillon {
+
+using Arguments = std::vector<std::string>;
+
+/// Each prints one JSON object a line and returns the program's exit status.
+/// SECONDS of sound a measurement.
+int MeasureRingingAndStruck(const Arguments& arguments);
+/// SECONDS of sound.
+int MeasureAccuracy(const Arguments& arguments);
+/// IMPULSES_PER_SECOND SECONDS.
+int MeasureFlood(const Arguments& arguments);
+/// Prints the population, one "frequency_hz t60_s amplitude" a line, for other programs. COUNT
+/// SEED.
+int PrintPopulation(const Arguments& arguments);
+
+}  // namespace carillon

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+// How many modes one core renders in real time: ringing freely, and struck in every block.
+#include <cstdio>
+#include <cstdlib>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "server/synthesis/mixer.h"
+#include "tests/benchmarks/mixer/measured_time.h"
+#include "tests/benchmarks/mixer/population.h"
+#include "tests/benchmarks/mixer/programs.h"
+#include "tests/server/synthesis/closed_form.h"
+
+namespace carillon {
+namespace {
+
+constexpr uint32_t kModesABank = 800;
+constexpr size_t kBlock = 128;
+constexpr double kBlockS = kBlock / kTestSampleRateHz;
+
+/// Banks whose modes never fall asleep: all are rendered in every block, as others' synthesisers
+/// do.
+class Stage {
+ public:
+  explicit Stage(size_t mode_count) : mixer_({.most_banks = mode_count / kModesABank}) {
+    const ShapeTable shapes = MakeUniformShapes(kModesABank, 1e-4F);
+    for (size_t i = 0; i < mode_count / kModesABank; ++i) {
+      banks_.push_back(
+          mixer_
+              .Add(std::make_unique<OscillatorBank>(DrawModes(kModesABank, i), shapes,
+                                                    OscillatorBankSettings{.silence = 0}))
+              .value());
+    }
+  }
+
+  void Strike(size_t bank, uint64_t offset) {
+    stream_->TryPush({.bank = banks_[bank % banks_.size()],
+                      .frame = mixer_.frame() + offset,
+                      .fraction = 0.5F,
+                      .excitation = MakeUnitExcitation()});
+  }
+
+  /// CPU seconds of one block.
+  double Render() {
+    const double begin = ThreadSeconds();
+    mixer_.Render(block_);
+    return ThreadSeconds() - begin;
+  }
+
+  size_t bank_count() const { return banks_.size(); }
+  uint64_t active_mode_count() const { return mixer_.statistics().active_mode_count; }
+
+ private:
+  Mixer mixer_;
+  std::unique_ptr<StrikeStream> stream_ = mixer_.OpenStream(65536).value();
+  std::vector<BankId> banks_;
+  std::vector<float> block_ = std::vector<float>(kBlock);
+};
+
+void Report(const char* name, const Stage& stage, const std::vector<double>& block_s) {
+  double sum = 0;
+  for (const double s : block_s) sum += s;
+  const double load = sum / static_cast<double>(block_s.size()) / kBlockS;
+  const auto modes = static_cast<double>(stage.active_mode_count());
+  std::printf(
+      "{\"what\": \"%s\", \"target\": \"%s\", \"modes\": %.0f, \"load\": %.4f, "
+      "\"modes_per_core\": %.0f, \"median_block_ms\": %.4f, \"p99_block_ms\": %.4f}\n",
+      name, std::string(SimdTarget()).c_str(), modes, load, modes / load,
+      1e3 * Quantile(block_s, 0.5), 1e3 * Quantile(block_s, 0.99));
+  std::fflush(stdout);
+}
+
+/// Every bank is struck once a second, in turn, and rings on by spectrum.
+void MeasureRinging(size_t mode_count, double seconds) {
+  Stage stage(mode_count);
+  for (size_t bank = 0; bank < stage.bank_count(); ++bank) {
+    stage.Strike(bank, bank % kBlock);
+    if (bank % 8 == 7) stage.Render();
+  }
+  for (int block = 0; block < 16; ++block) stage.Render();
+  std::vector<double> block_s;
+  double due = 0;
+  size_t struck = 0;
+  for (double time_s = 0; time_s < seconds; time_s += kBlockS) {
+    for (due += kBlockS * static_cast<double>(stage.bank_count()); due >= 1; --due, ++struck) {
+      stage.Strike(struck, struck * 37 % kBlock);
+    }
+    block_s.push_back(stage.Render());
+  }
+  Report("ringing", stage, block_s);
+}
+
+/// Every bank is struck in every block, between two samples.
+void MeasureStruck(size_t mode_count, double seconds) {
+  Stage stage(mode_count);
+  std::vector<double> block_s;
+  const int warm_up = 64;  // until all banks have left the spectrum
+  for (int block = 0; block < warm_up + seconds / kBlockS; ++block) {
+    for (size_t bank = 0; bank < stage.bank_count(); ++bank) {
+      stage.Strike(bank, (bank * 37 + static_cast<size_t>(block) * 11) % kBlock);
+    }
+    const double s = stage.Render();
+    if (block >= warm_up) block_s.push_back(s);
+  }
+  Report("struck", stage, block_s);
+}
+
+}  // namespace
+
+int MeasureRingingAndStruck(const Arguments& arguments) {
+  const double seconds = arguments.empty() ? 3 : std::atof(arguments[0].c_str());
+  MeasureRinging(800'000, seconds);
+  for (const size_t modes : {8'000U, 80'000U}) MeasureRinging(modes, seconds);
+  for (const size_t modes : {800U, 8'000U, 80'000U}) MeasureStruck(modes, seconds);
+  return EXIT_SUCCESS;
+}
+
+}  // namespace carillon
