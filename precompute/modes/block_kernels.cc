@@ -21,11 +21,15 @@ namespace hn = hwy::HWY_NAMESPACE;
 template <typename Real>
 using Lanes = hn::CappedTag<Real, kBlockWidth>;
 
+template <typename Real>
+constexpr int LaneCount() {
+  return std::min(kBlockWidth, static_cast<int>(HWY_MAX_BYTES / sizeof(Real)));
+}
+
 /// Right-hand sides in two vectors, as many as registers allow for six rows.
 template <typename Real>
 constexpr int Chunk() {
-  const int lanes = static_cast<int>(HWY_MAX_BYTES / sizeof(Real));
-  return lanes >= kBlockWidth ? kBlockWidth : 2 * lanes;
+  return std::min(kBlockWidth, 2 * LaneCount<Real>());
 }
 
 template <typename Real>
@@ -33,9 +37,7 @@ HWY_INLINE void Forward(const Real* HWY_RESTRICT tile, int column_count, const R
                         Real* const x[2]) {
   const Lanes<Real> d;
   using V = hn::Vec<Lanes<Real>>;
-  constexpr int kLanes = HWY_MAX_BYTES / sizeof(Real) >= kBlockWidth
-                             ? kBlockWidth
-                             : static_cast<int>(HWY_MAX_BYTES / sizeof(Real));
+  constexpr int kLanes = LaneCount<Real>();
   constexpr int kVectors = Chunk<Real>() / kLanes;
   for (int c = 0; c < kBlockWidth; c += Chunk<Real>()) {
     V sum[kTileRows][kVectors];
@@ -66,9 +68,7 @@ HWY_INLINE void Backward(const Real* HWY_RESTRICT tile, int column_count, Real* 
                          const Real* const x[2]) {
   const Lanes<Real> d;
   using V = hn::Vec<Lanes<Real>>;
-  constexpr int kLanes = HWY_MAX_BYTES / sizeof(Real) >= kBlockWidth
-                             ? kBlockWidth
-                             : static_cast<int>(HWY_MAX_BYTES / sizeof(Real));
+  constexpr int kLanes = LaneCount<Real>();
   constexpr int kVectors = Chunk<Real>() / kLanes;
   for (int c = 0; c < kBlockWidth; c += Chunk<Real>()) {
     V xv[kTileRows][kVectors];
@@ -149,41 +149,46 @@ void MultiplyColumn(const double* HWY_RESTRICT blocks, const int32_t* HWY_RESTRI
   }
 }
 
-void MultiplyColumnScalar(const double* HWY_RESTRICT m, const int32_t* HWY_RESTRICT rows, int count,
-                          int j, const double* HWY_RESTRICT x, double* HWY_RESTRICT y) {
-  const Lanes<double> d;
-  using V = hn::Vec<Lanes<double>>;
-  const int lanes = static_cast<int>(hn::Lanes(d));
+template <typename Real>
+HWY_INLINE void MultiplyRow(const Real* HWY_RESTRICT m, const int32_t* HWY_RESTRICT columns,
+                            int count, const Real* HWY_RESTRICT x, Real* HWY_RESTRICT y) {
+  const Lanes<Real> d;
+  using V = hn::Vec<Lanes<Real>>;
+  constexpr int kLanes = LaneCount<Real>();
   constexpr int kNode = 3 * kBlockWidth;
-  for (int c = 0; c < kNode; c += lanes) {
-    const V xj = hn::LoadU(d, x + static_cast<size_t>(j) * kNode + c);
-    double* out_j = y + static_cast<size_t>(j) * kNode + c;
-    V yj = hn::MulAdd(hn::Set(d, m[0]), xj, hn::LoadU(d, out_j));
-    for (int e = 1; e < count; ++e) {
-      const size_t at = static_cast<size_t>(rows[e]) * kNode + static_cast<size_t>(c);
-      const V me = hn::Set(d, m[e]);
-      hn::StoreU(hn::MulAdd(me, xj, hn::LoadU(d, y + at)), d, y + at);
-      yj = hn::MulAdd(me, hn::LoadU(d, x + at), yj);
+  for (int c = 0; c < kNode; c += kLanes) {
+    V sum = hn::Zero(d);
+    for (int e = 0; e < count; ++e) {
+      const Real* xj = x + static_cast<size_t>(columns[e]) * kNode + c;
+      sum = hn::MulAdd(hn::Set(d, m[e]), hn::LoadU(d, xj), sum);
     }
-    hn::StoreU(yj, d, out_j);
+    hn::StoreU(sum, d, y + c);
   }
 }
 
-void Dot(const double* HWY_RESTRICT a, const double* HWY_RESTRICT b, int64_t rows,
-         double* HWY_RESTRICT product) {
-  const Lanes<double> d;
-  using V = hn::Vec<Lanes<double>>;
-  constexpr int kLanes = static_cast<int>(HWY_MAX_BYTES / sizeof(double));
-  constexpr int kVectors = Chunk<double>() / kLanes;
-  constexpr int kRows = kVectors == 2 && HWY_MAX_BYTES == 64 ? 8 : 4;
+/// Rows of a's columns whose products with b are kept in registers at once.
+template <typename Real>
+constexpr int DotRows() {
+  if (HWY_MAX_BYTES < 64) return 4;
+  return LaneCount<Real>() == kBlockWidth ? 16 : 8;
+}
+
+template <typename Real>
+HWY_INLINE void Dot(const Real* HWY_RESTRICT a, const Real* HWY_RESTRICT b, int64_t rows,
+                    Real* HWY_RESTRICT product) {
+  const Lanes<Real> d;
+  using V = hn::Vec<Lanes<Real>>;
+  constexpr int kLanes = LaneCount<Real>();
+  constexpr int kVectors = Chunk<Real>() / kLanes;
+  constexpr int kRows = DotRows<Real>();
   for (int first = 0; first < kBlockWidth; first += kRows) {
-    for (int c = 0; c < kBlockWidth; c += Chunk<double>()) {
+    for (int c = 0; c < kBlockWidth; c += Chunk<Real>()) {
       V sum[kRows][kVectors];
       for (auto& row : sum) {
         for (V& v : row) v = hn::Zero(d);
       }
-      const double* HWY_RESTRICT ai = a + first;
-      const double* HWY_RESTRICT bi = b + c;
+      const Real* HWY_RESTRICT ai = a + first;
+      const Real* HWY_RESTRICT bi = b + c;
       for (int64_t i = 0; i < rows; ++i, ai += kBlockWidth, bi += kBlockWidth) {
         for (int v = 0; v < kVectors; ++v) {
           const V bv = hn::LoadU(d, bi + v * kLanes);
@@ -191,28 +196,27 @@ void Dot(const double* HWY_RESTRICT a, const double* HWY_RESTRICT b, int64_t row
         }
       }
       for (int r = 0; r < kRows; ++r) {
-        double* out = product + (first + r) * kBlockWidth + c;
-        for (int v = 0; v < kVectors; ++v) {
-          hn::StoreU(hn::Add(hn::LoadU(d, out + v * kLanes), sum[r][v]), d, out + v * kLanes);
-        }
+        Real* out = product + (first + r) * kBlockWidth + c;
+        for (int v = 0; v < kVectors; ++v) hn::StoreU(sum[r][v], d, out + v * kLanes);
       }
     }
   }
 }
 
-void SubtractTimes(const double* HWY_RESTRICT q, const double* HWY_RESTRICT h, int64_t rows,
-                   double* HWY_RESTRICT x) {
-  const Lanes<double> d;
-  using V = hn::Vec<Lanes<double>>;
-  constexpr int kLanes = static_cast<int>(HWY_MAX_BYTES / sizeof(double));
-  constexpr int kVectors = Chunk<double>() / kLanes;
-  constexpr int kRows = 4;
+template <typename Real>
+HWY_INLINE void SubtractTimes(const Real* HWY_RESTRICT q, const Real* HWY_RESTRICT h, int64_t rows,
+                              Real* HWY_RESTRICT x) {
+  const Lanes<Real> d;
+  using V = hn::Vec<Lanes<Real>>;
+  constexpr int kLanes = LaneCount<Real>();
+  constexpr int kVectors = Chunk<Real>() / kLanes;
+  constexpr int kRows = 8 / kVectors;
   int64_t i = 0;
   const auto rows_at = [&](auto count) {
     constexpr int kCount = decltype(count)::value;
-    for (int c = 0; c < kBlockWidth; c += Chunk<double>()) {
+    for (int c = 0; c < kBlockWidth; c += Chunk<Real>()) {
       V sum[kCount][kVectors];
-      double* out = x + i * kBlockWidth + c;
+      Real* out = x + i * kBlockWidth + c;
       for (int r = 0; r < kCount; ++r) {
         for (int v = 0; v < kVectors; ++v) {
           sum[r][v] = hn::LoadU(d, out + r * kBlockWidth + v * kLanes);
@@ -237,6 +241,25 @@ void SubtractTimes(const double* HWY_RESTRICT q, const double* HWY_RESTRICT h, i
   for (; i < rows; ++i) rows_at(std::integral_constant<int, 1>{});
 }
 
+void RowDouble(const double* m, const int32_t* columns, int count, const double* x, double* y) {
+  MultiplyRow<double>(m, columns, count, x, y);
+}
+void RowFloat(const float* m, const int32_t* columns, int count, const float* x, float* y) {
+  MultiplyRow<float>(m, columns, count, x, y);
+}
+void DotDouble(const double* a, const double* b, int64_t rows, double* product) {
+  Dot<double>(a, b, rows, product);
+}
+void DotFloat(const float* a, const float* b, int64_t rows, float* product) {
+  Dot<float>(a, b, rows, product);
+}
+void SubtractDouble(const double* q, const double* h, int64_t rows, double* x) {
+  SubtractTimes<double>(q, h, rows, x);
+}
+void SubtractFloat(const float* q, const float* h, int64_t rows, float* x) {
+  SubtractTimes<float>(q, h, rows, x);
+}
+
 }  // namespace carillon::precompute::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -248,9 +271,12 @@ HWY_EXPORT(ForwardFloat);
 HWY_EXPORT(BackwardDouble);
 HWY_EXPORT(BackwardFloat);
 HWY_EXPORT(MultiplyColumn);
-HWY_EXPORT(MultiplyColumnScalar);
-HWY_EXPORT(Dot);
-HWY_EXPORT(SubtractTimes);
+HWY_EXPORT(RowDouble);
+HWY_EXPORT(RowFloat);
+HWY_EXPORT(DotDouble);
+HWY_EXPORT(DotFloat);
+HWY_EXPORT(SubtractDouble);
+HWY_EXPORT(SubtractFloat);
 
 template <>
 void TileForward<double>(const double* tile, int column_count, const double* y,
@@ -276,23 +302,31 @@ void ColumnMultiply(const double* blocks, const int32_t* rows, int count, int j,
   HWY_DYNAMIC_DISPATCH(MultiplyColumn)(blocks, rows, count, j, x, y);
 }
 
-void ColumnMultiplyScalar(const double* m, const int32_t* rows, int count, int j, const double* x,
-                          double* y) {
-  HWY_DYNAMIC_DISPATCH(MultiplyColumnScalar)(m, rows, count, j, x, y);
+template <>
+void RowMultiply<double>(const double* m, const int32_t* columns, int count, const double* x,
+                         double* y) {
+  HWY_DYNAMIC_DISPATCH(RowDouble)(m, columns, count, x, y);
 }
-
-void BlockDot(const double* a, const double* b, int64_t rows, double* product) {
-  // In stretches that stay in the first-level cache while the product is made piece by piece.
-  constexpr int64_t kStretch = 64;
-  std::fill(product, product + kBlockWidth * kBlockWidth, 0.0);
-  for (int64_t i = 0; i < rows; i += kStretch) {
-    HWY_DYNAMIC_DISPATCH(Dot)
-    (a + i * kBlockWidth, b + i * kBlockWidth, std::min(kStretch, rows - i), product);
-  }
+template <>
+void RowMultiply<float>(const float* m, const int32_t* columns, int count, const float* x,
+                        float* y) {
+  HWY_DYNAMIC_DISPATCH(RowFloat)(m, columns, count, x, y);
 }
-
-void BlockSubtractTimes(const double* q, const double* h, int64_t rows, double* x) {
-  HWY_DYNAMIC_DISPATCH(SubtractTimes)(q, h, rows, x);
+template <>
+void BlockDot<double>(const double* a, const double* b, int64_t rows, double* product) {
+  HWY_DYNAMIC_DISPATCH(DotDouble)(a, b, rows, product);
+}
+template <>
+void BlockDot<float>(const float* a, const float* b, int64_t rows, float* product) {
+  HWY_DYNAMIC_DISPATCH(DotFloat)(a, b, rows, product);
+}
+template <>
+void BlockSubtractTimes<double>(const double* q, const double* h, int64_t rows, double* x) {
+  HWY_DYNAMIC_DISPATCH(SubtractDouble)(q, h, rows, x);
+}
+template <>
+void BlockSubtractTimes<float>(const float* q, const float* h, int64_t rows, float* x) {
+  HWY_DYNAMIC_DISPATCH(SubtractFloat)(q, h, rows, x);
 }
 
 }  // namespace carillon::precompute

@@ -25,14 +25,18 @@ void TileBackward(const Real* tile, int column_count, Real* y, const Real* const
 void ColumnMultiply(const double* blocks, const int32_t* rows, int count, int j, const double* x,
                     double* y);
 
-/// The same for a matrix m (x) I3.
-void ColumnMultiplyScalar(const double* m, const int32_t* rows, int count, int j, const double* x,
-                          double* y);
+/// y = row of a matrix m (x) I3 times x: `count` numbers m in `columns`. x: all nodes, y: one, 3
+/// rows each.
+template <typename Real>
+void RowMultiply(const Real* m, const int32_t* columns, int count, const Real* x, Real* y);
 
-/// product = a^T b, kBlockWidth square, row-major; a and b: `rows` by kBlockWidth, row-major.
-void BlockDot(const double* a, const double* b, int64_t rows, double* product);
+/// product = a^T b, kBlockWidth square, row-major; a and b: `rows` by kBlockWidth, row-major. A few
+/// hundred rows at a time stay in the first-level cache, and lose little when summed in float.
+template <typename Real>
+void BlockDot(const Real* a, const Real* b, int64_t rows, Real* product);
 
 /// x -= q h; q and x: `rows` by kBlockWidth, h square, all row-major.
-void BlockSubtractTimes(const double* q, const double* h, int64_t rows, double* x);
+template <typename Real>
+void BlockSubtractTimes(const Real* q, const Real* h, int64_t rows, Real* x);
 
 }  // namespace carillon::precompute

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <numeric>
 #include <optional>
 #include <string>
 
@@ -11,7 +12,9 @@
 #include "precompute/modes/block_lanczos_eigensolver.h"
 #include "precompute/modes/dense_eigensolver.h"
 #include "precompute/modes/multifrontal_inertia.h"
+#include "precompute/modes/openblas.h"
 #include "precompute/modes/rigid_body.h"
+#include "precompute/modes/workers.h"
 #include "proto/error_reason.h"
 
 namespace carillon::precompute {
@@ -31,8 +34,17 @@ absl::Status VerificationFailed(const std::string& what) {
                  absl::StrCat(what, "; no model was made; another number of nodes may do"));
 }
 
-Modes Columns(const Modes& modes, const std::vector<Eigen::Index>& which) {
-  return {.eigenvalues = modes.eigenvalues(which), .shapes = modes.shapes(Eigen::all, which)};
+/// Keeps the modes named, ascending, in the memory that they have: shapes fill gigabytes.
+void Keep(const std::vector<Eigen::Index>& which, Modes& modes) {
+  for (size_t k = 0; k < which.size(); ++k) {
+    const auto to = static_cast<Eigen::Index>(k);
+    if (which[k] == to) continue;
+    modes.eigenvalues[to] = modes.eigenvalues[which[k]];
+    modes.shapes.col(to) = modes.shapes.col(which[k]);
+  }
+  const auto count = static_cast<Eigen::Index>(which.size());
+  modes.eigenvalues.conservativeResize(count);
+  modes.shapes.conservativeResize(Eigen::NoChange, count);
 }
 
 /// Makes the first of the large components of each shape positive, so that a mesh gives one answer;
@@ -55,10 +67,13 @@ class Solution {
       : system_(system),
         watch_(watch),
         ordered_(std::move(ordered)),
-        rigid_(RigidBodyModes(nodes, system)) {}
+        rigid_(RigidBodyModes(nodes, system)),
+        rigid_momenta_(system.M.selfadjointView<Eigen::Lower>() * rigid_),
+        workers_(ThreadCount()) {}
 
   absl::StatusOr<int> CountBelow(double limit) const {
     watch_(SolveStage::kFactor, 0);
+    const ScopedBlasThreads threads(workers_.count());
     absl::StatusOr<int> count =
         CountEigenvaluesBelow(ordered_.fronts, ordered_.matrix, limit,
                               [this](double done) { watch_(SolveStage::kFactor, done); });
@@ -88,13 +103,13 @@ class Solution {
   }
 
   /// Splits rigid-body modes off, checks everything but completeness.
-  absl::StatusOr<DeformationModes> Verify(const Modes& all, double limit) const {
+  absl::StatusOr<DeformationModes> Verify(Modes all, double limit) const {
     watch_(SolveStage::kVerify, 0);
     DeformationModes result;
-    result.verification.max_orthogonality_error = OrthogonalityError(system_, all.shapes);
+    const Measurement measured = Measure(ordered_.matrix, ordered_.fronts.order, all, workers_);
+    result.verification.max_orthogonality_error = OrthogonalityError(measured.gram);
     std::vector<Eigen::Index> kept;
-    const Eigen::MatrixXd in_rigid =
-        rigid_.transpose() * (system_.M.selfadjointView<Eigen::Lower>() * all.shapes);
+    const Eigen::MatrixXd in_rigid = rigid_momenta_.transpose() * all.shapes;
     for (Eigen::Index m = 0; m < all.shapes.cols(); ++m) {
       if (in_rigid.col(m).squaredNorm() < 0.5) kept.push_back(m);
     }
@@ -102,9 +117,10 @@ class Solution {
         static_cast<int>(all.shapes.cols()) - static_cast<int>(kept.size());
     const Eigen::Index free_motions = (all.eigenvalues.array() < FreeMotionBound(limit)).count();
     if (free_motions > kRigidModeCount) return SeveralPieces(free_motions);
-    result.modes = Columns(all, kept);
+    Keep(kept, all);
+    result.modes = std::move(all);
     FixSigns(result.modes.shapes);
-    result.residuals = Residuals(system_, result.modes);
+    result.residuals = measured.residuals(kept);
     if (!kept.empty()) {
       result.lowest_eigenvalue = result.modes.eigenvalues[0];
       result.verification.max_residual = result.residuals.maxCoeff();
@@ -155,6 +171,8 @@ class Solution {
   const SolveWatch& watch_;
   OrderedSystem ordered_;
   Eigen::MatrixXd rigid_;
+  Eigen::MatrixXd rigid_momenta_;  ///< M times rigid_
+  mutable Workers workers_;
 };
 
 /// No mode lies below the limit: says where the lowest one is.
@@ -167,20 +185,14 @@ absl::StatusOr<DeformationModes> FindLowest(const Solution& solution, double lim
     if (!counted.ok()) return counted.status();
     count = *counted;
   }
-  const absl::StatusOr<Modes> lowest = solution.SolveLowest(kRigidModeCount + 1, above);
+  absl::StatusOr<Modes> lowest = solution.SolveLowest(kRigidModeCount + 1, above);
   if (!lowest.ok()) return lowest.status();
-  absl::StatusOr<DeformationModes> result = solution.Verify(*lowest, above);
+  absl::StatusOr<DeformationModes> result = solution.Verify(*std::move(lowest), above);
   if (!result.ok()) return result;
   result->modes = {};
   result->residuals.resize(0);
   result->complete_to_eigenvalue = limit;
   return result;
-}
-
-/// Those of `modes` that lie below `limit`.
-Modes Below(const Modes& modes, double limit) {
-  const Eigen::Index count = (modes.eigenvalues.array() < limit).count();
-  return {.eigenvalues = modes.eigenvalues.head(count), .shapes = modes.shapes.leftCols(count)};
 }
 
 }  // namespace
@@ -197,11 +209,14 @@ absl::StatusOr<DeformationModes> SolveDeformationModes(const SystemMatrices& sys
     const absl::StatusOr<int> count = solution.CountBelow(limit);
     if (!count.ok()) return count.status();
     if (*count == kRigidModeCount) return FindLowest(solution, limit);
-    const absl::StatusOr<Modes> all = solution.SolveLowest(*count + 4 * attempt, limit);
+    absl::StatusOr<Modes> all = solution.SolveLowest(*count + 4 * attempt, limit);
     if (!all.ok()) return all.status();
-    const Modes below = Below(*all, limit);
-    if (below.eigenvalues.size() != *count) continue;
-    absl::StatusOr<DeformationModes> result = solution.Verify(below, limit);
+    std::vector<Eigen::Index> below(
+        static_cast<size_t>((all->eigenvalues.array() < limit).count()));
+    std::iota(below.begin(), below.end(), 0);
+    if (static_cast<int>(below.size()) != *count) continue;
+    Keep(below, *all);
+    absl::StatusOr<DeformationModes> result = solution.Verify(*std::move(all), limit);
     if (!result.ok()) return result;
     result->verification.sturm_count = *count;
     result->verification.sturm_eigenvalue = limit;

@@ -40,4 +40,27 @@ inline void SubtractProduct(int m, int n, int k, const double* A, int lda, const
   cblas_dgemm(CblasColMajor, CblasNoTrans, CblasTrans, m, n, k, -1.0, A, lda, B, ldb, 1.0, C, ldc);
 }
 
+/// C = A^T B, A k by m, B k by n.
+inline void TransposedProduct(int m, int n, int k, const double* A, int lda, const double* B,
+                              int ldb, double* C, int ldc) {
+  cblas_dgemm(CblasColMajor, CblasTrans, CblasNoTrans, m, n, k, 1.0, A, lda, B, ldb, 0.0, C, ldc);
+}
+
+/// C = A B, A m by k, B k by n.
+inline void Product(int m, int n, int k, const double* A, int lda, const double* B, int ldb,
+                    double* C, int ldc) {
+  cblas_dgemm(CblasColMajor, CblasNoTrans, CblasNoTrans, m, n, k, 1.0, A, lda, B, ldb, 0.0, C, ldc);
+}
+
+/// Eigenvalues of a symmetric matrix, ascending; A, given by its lower triangle, becomes its
+/// eigenvectors. False: the iteration did not converge.
+inline bool SymmetricEigen(int n, double* A, double* eigenvalues) {
+  return LAPACKE_dsyevd(LAPACK_COL_MAJOR, 'V', 'L', n, A, n, eigenvalues) == 0;
+}
+
+/// The same of A x = lambda B x with B positive definite.
+inline bool GeneralizedEigen(int n, double* A, double* B, double* eigenvalues) {
+  return LAPACKE_dsygvd(LAPACK_COL_MAJOR, 1, 'V', 'L', n, A, n, B, n, eigenvalues) == 0;
+}
+
 }  // namespace carillon::precompute::blas

@@ -6,6 +6,7 @@
 #include <new>
 
 #include "absl/strings/str_cat.h"
+#include "precompute/modes/openblas.h"
 #include "proto/error_reason.h"
 
 namespace carillon::precompute {
@@ -18,6 +19,7 @@ absl::StatusOr<Modes> DenseEigensolver::Solve(const SystemMatrices& system,
     Eigen::MatrixXd M = system.M;
     Eigen::VectorXd eigenvalues(K.rows());
     const auto size = static_cast<lapack_int>(K.rows());
+    const ScopedBlasThreads threads(ThreadCount());
     const lapack_int info = LAPACKE_dsygvd(LAPACK_COL_MAJOR, 1, 'V', 'L', size, K.data(), size,
                                            M.data(), size, eigenvalues.data());
     if (info == LAPACK_WORK_MEMORY_ERROR) throw std::bad_alloc();

@@ -2,6 +2,8 @@
 #include "precompute/modes/node_matrix.h"
 
 #include <algorithm>
+#include <cmath>
+#include <numeric>
 
 #include "precompute/modes/block_kernels.h"
 
@@ -46,6 +48,25 @@ void FillPattern(const Sparse& K, const std::vector<int32_t>& position, NodeMatr
   }
 }
 
+/// K := D^-1/2 K D^-1/2 and the same for M.
+void ScaleByMass(NodeMatrix& A) {
+  A.root_mass.resize(static_cast<size_t>(A.node_count));
+  for (size_t j = 0; j < A.root_mass.size(); ++j) {
+    A.root_mass[j] = std::sqrt(A.mass[static_cast<size_t>(A.column_start[j])]);
+  }
+  A.mass_is_identity = true;
+  for (size_t j = 0; j < A.root_mass.size(); ++j) {
+    for (auto e = static_cast<size_t>(A.column_start[j]);
+         e < static_cast<size_t>(A.column_start[j + 1]); ++e) {
+      const auto i = static_cast<size_t>(A.row[e]);
+      const double scale = 1 / (A.root_mass[i] * A.root_mass[j]);
+      for (size_t k = 9 * e; k < 9 * e + 9; ++k) A.stiffness[k] *= scale;
+      A.mass[e] = i == j ? 1 : A.mass[e] * scale;
+      if (i != j && A.mass[e] != 0) A.mass_is_identity = false;
+    }
+  }
+}
+
 }  // namespace
 
 NodeMatrix MakeNodeMatrix(const Sparse& K, const Sparse& M, const std::vector<int32_t>& order) {
@@ -74,6 +95,7 @@ NodeMatrix MakeNodeMatrix(const Sparse& K, const Sparse& M, const std::vector<in
         std::minmax(position[static_cast<size_t>(i)], position[static_cast<size_t>(j)]);
     A.mass[entry(high, low)] = value;
   });
+  ScaleByMass(A);
   return A;
 }
 
@@ -86,12 +108,53 @@ void MultiplyStiffness(const NodeMatrix& A, const double* x, double* y) {
   }
 }
 
-void MultiplyMass(const NodeMatrix& A, const double* x, double* y) {
-  std::fill(y, y + static_cast<ptrdiff_t>(A.node_count) * 3 * kBlockWidth, 0.0);
-  for (int j = 0; j < A.node_count; ++j) {
-    const int first = A.column_start[j];
-    ColumnMultiplyScalar(&A.mass[first], &A.row[first], A.column_start[j + 1] - first, j, x, y);
-  }
+template <typename Real>
+MassRows<Real> MakeMassRows(const NodeMatrix& A) {
+  MassRows<Real> M;
+  if (A.mass_is_identity) return M;
+  const auto n = static_cast<size_t>(A.node_count);
+  const auto for_each = [&](const auto& visit) {
+    for (size_t j = 0; j < n; ++j) {
+      for (int e = A.column_start[j]; e < A.column_start[j + 1]; ++e) {
+        const auto entry = static_cast<size_t>(e);
+        visit(A.row[entry], static_cast<int32_t>(j), A.mass[entry]);
+        if (A.row[entry] != static_cast<int32_t>(j)) {
+          visit(static_cast<int32_t>(j), A.row[entry], A.mass[entry]);
+        }
+      }
+    }
+  };
+  M.start.assign(n + 1, 0);
+  for_each([&](int32_t i, int32_t, double) { ++M.start[static_cast<size_t>(i) + 1]; });
+  std::partial_sum(M.start.begin(), M.start.end(), M.start.begin());
+  M.column.resize(static_cast<size_t>(M.start[n]));
+  M.value.resize(M.column.size());
+  std::vector<int32_t> next(M.start.begin(), M.start.end() - 1);
+  for_each([&](int32_t i, int32_t j, double value) {
+    const auto at = static_cast<size_t>(next[static_cast<size_t>(i)]++);
+    M.column[at] = j;
+    M.value[at] = static_cast<Real>(value);
+  });
+  return M;
 }
+
+template <typename Real>
+void MultiplyMass(const MassRows<Real>& M, Workers& workers, const Real* x, Real* y) {
+  constexpr ptrdiff_t kNode = 3 * kBlockWidth;
+  constexpr int64_t kGrain = 64;
+  workers.ForParts(static_cast<int64_t>(M.start.size()) - 1, kGrain,
+                   [&](int64_t begin, int64_t end, int) {
+                     for (auto i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
+                       const auto first = static_cast<size_t>(M.start[i]);
+                       RowMultiply(&M.value[first], &M.column[first], M.start[i + 1] - M.start[i],
+                                   x, y + static_cast<ptrdiff_t>(i) * kNode);
+                     }
+                   });
+}
+
+template MassRows<float> MakeMassRows(const NodeMatrix&);
+template MassRows<double> MakeMassRows(const NodeMatrix&);
+template void MultiplyMass(const MassRows<float>&, Workers&, const float*, float*);
+template void MultiplyMass(const MassRows<double>&, Workers&, const double*, double*);
 
 }  // namespace carillon::precompute

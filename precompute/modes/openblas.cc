@@ -4,16 +4,30 @@
 #include <cblas.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cstdlib>
 #include <string_view>
 #include <thread>
 
 namespace carillon::precompute {
 
+namespace {
+
+/// One for the process, as OpenBLAS' own.
+std::atomic<int> thread_count = 1;
+
+}  // namespace
+
 void SetThreadCount(int count) {
   const int processors = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-  openblas_set_num_threads(count > 0 ? count : processors);
+  thread_count = count > 0 ? count : processors;
+  openblas_set_num_threads(1);
 }
+
+int ThreadCount() { return thread_count; }
+
+ScopedBlasThreads::ScopedBlasThreads(int count) { openblas_set_num_threads(count); }
+ScopedBlasThreads::~ScopedBlasThreads() { openblas_set_num_threads(1); }
 
 const char* BetterOpenBlasCore() {
 #if defined(__x86_64__)

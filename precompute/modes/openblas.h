@@ -3,8 +3,19 @@
 
 namespace carillon::precompute {
 
-/// How many threads dense kernels may use from now on; zero: one for each processor.
+/// How many threads solvers may use from now on; zero: one for each processor.
 void SetThreadCount(int count);
+int ThreadCount();
+
+/// While it lives dense kernels share their work among threads of their own; otherwise they run in
+/// the thread that calls them, so that our threads may call them side by side.
+class ScopedBlasThreads {
+ public:
+  explicit ScopedBlasThreads(int count);
+  ~ScopedBlasThreads();
+  ScopedBlasThreads(const ScopedBlasThreads&) = delete;
+  ScopedBlasThreads& operator=(const ScopedBlasThreads&) = delete;
+};
 
 /// OpenBLAS chooses its kernels by the model number of the processor, and takes the oldest (SSE3)
 /// where it does not know the number, as Debian 12's version does with most processors made since:

@@ -2,6 +2,8 @@
 #pragma once
 
 #include "precompute/modes/eigensolver.h"
+#include "precompute/modes/node_matrix.h"
+#include "precompute/modes/workers.h"
 
 namespace carillon::precompute {
 
@@ -22,10 +24,21 @@ struct Verification {
 inline constexpr double kMaxResidual = 1e-5;
 inline constexpr double kMaxOrthogonalityError = 1e-7;
 
-/// |K phi - Lambda M phi| / |Lambda M phi| of each mode, none of them rigid.
-Eigen::VectorXd Residuals(const SystemMatrices& system, const Modes& modes);
+/// What is measured of modes.
+struct Measurement {
+  Eigen::VectorXd residuals;  ///< |K phi - Lambda M phi| / |Lambda M phi| of each, if not rigid
+  Eigen::MatrixXd gram;       ///< phi_i^T M phi_j
+};
 
-/// Largest |phi_i^T M phi_j - delta_ij|.
+/// `order`: of the nodes in A, see MakeNodeMatrix.
+Measurement Measure(const NodeMatrix& A, const std::vector<int32_t>& order, const Modes& modes,
+                    Workers& workers);
+
+/// Largest |gram_ij - delta_ij|.
+double OrthogonalityError(const Eigen::MatrixXd& gram);
+
+/// The same from the matrices as assembled.
+Eigen::VectorXd Residuals(const SystemMatrices& system, const Modes& modes);
 double OrthogonalityError(const SystemMatrices& system, const Eigen::MatrixXd& shapes);
 
 }  // namespace carillon::precompute

@@ -16,9 +16,9 @@ namespace {
 
 constexpr ElasticConstants kAluminium{.young_pa = 7e10, .poisson_ratio = 0.33};
 
-SystemMatrices BoxSystem(int nodes_per_element) {
+SystemMatrices BoxSystem(int nodes_per_element, MassSharing sharing = MassSharing::kConsistent) {
   const TetMesh mesh = MakeTetBox({0.1, 0.03, 0.02}, {7, 3, 2}, nodes_per_element);
-  return Assemble(mesh, kAluminium, 2700, MassSharing::kConsistent);
+  return Assemble(mesh, kAluminium, 2700, sharing);
 }
 
 Eigen::MatrixXd Full(const SystemMatrices::Sparse& lower) {
@@ -48,7 +48,8 @@ double SolveResidual(const SystemMatrices& system) {
   VectorBlock elastic(rows, kBlockWidth);
   VectorBlock inertial(rows, kBlockWidth);
   MultiplyStiffness(ordered.matrix, solution.data(), elastic.data());
-  MultiplyMass(ordered.matrix, solution.data(), inertial.data());
+  Workers workers(1);
+  MultiplyMass(MakeMassRows<double>(ordered.matrix), workers, solution.data(), inertial.data());
   return (elastic - shift * inertial - right).norm() / right.norm();
 }
 
@@ -63,25 +64,35 @@ TEST(Multifrontal, SolvesInFloatToFloatPrecision) {
   EXPECT_GT(SolveResidual<float>(BoxSystem(10)), 1e-9);
 }
 
+/// The unknowns of NodeMatrix from those of the user, multiplied by a power of D^1/2.
+Eigen::MatrixXd Reordered(const OrderedSystem& ordered, const Eigen::MatrixXd& x, double power) {
+  Eigen::MatrixXd y(x.rows(), x.cols());
+  for (size_t i = 0; i < ordered.fronts.order.size(); ++i) {
+    y.middleRows(3 * static_cast<Eigen::Index>(i), 3) =
+        x.middleRows(3 * ordered.fronts.order[i], 3) * std::pow(ordered.matrix.root_mass[i], power);
+  }
+  return y;
+}
+
 TEST(Multifrontal, MultipliesLikeTheMatricesItWasMadeOf) {
-  const SystemMatrices system = BoxSystem(10);
-  const OrderedSystem ordered = OrderedSystem::Make(system).value();
-  const Eigen::Index rows = system.unknown_count();
-  std::srand(2);
-  const VectorBlock x = VectorBlock::Random(rows, kBlockWidth);
-  VectorBlock y(rows, kBlockWidth);
-  MultiplyStiffness(ordered.matrix, x.data(), y.data());
-  Eigen::MatrixXd in_order(rows, kBlockWidth);
-  Eigen::MatrixXd expected(rows, kBlockWidth);
-  const auto& order = ordered.fronts.order;
-  for (size_t i = 0; i < order.size(); ++i) {
-    in_order.middleRows(3 * order[i], 3) = x.middleRows(3 * static_cast<Eigen::Index>(i), 3);
+  for (const MassSharing sharing : {MassSharing::kConsistent, MassSharing::kLumped}) {
+    const SystemMatrices system = BoxSystem(10, sharing);
+    const OrderedSystem ordered = OrderedSystem::Make(system).value();
+    const Eigen::Index rows = system.unknown_count();
+    std::srand(2);
+    const Eigen::MatrixXd x = Eigen::MatrixXd::Random(rows, kBlockWidth);
+    const VectorBlock scaled = Reordered(ordered, x, 1);
+    VectorBlock y(rows, kBlockWidth);
+    MultiplyStiffness(ordered.matrix, scaled.data(), y.data());
+    const Eigen::MatrixXd Kx = system.K.selfadjointView<Eigen::Lower>() * x;
+    EXPECT_LT((y - Reordered(ordered, Kx, -1)).norm(), 1e-12 * y.norm());
+    EXPECT_EQ(ordered.matrix.mass_is_identity, sharing == MassSharing::kLumped);
+    if (ordered.matrix.mass_is_identity) continue;
+    Workers workers(2);
+    MultiplyMass(MakeMassRows<double>(ordered.matrix), workers, scaled.data(), y.data());
+    const Eigen::MatrixXd Mx = system.M.selfadjointView<Eigen::Lower>() * x;
+    EXPECT_LT((y - Reordered(ordered, Mx, -1)).norm(), 1e-12 * y.norm());
   }
-  const Eigen::MatrixXd product = system.K.selfadjointView<Eigen::Lower>() * in_order;
-  for (size_t i = 0; i < order.size(); ++i) {
-    expected.middleRows(3 * static_cast<Eigen::Index>(i), 3) = product.middleRows(3 * order[i], 3);
-  }
-  EXPECT_LT((y - expected).norm(), 1e-12 * expected.norm());
 }
 
 TEST(Multifrontal, RefusesAMatrixThatIsNotPositiveDefinite) {

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "precompute/modes/shift_invert.h"
+
+#include <algorithm>
+
+namespace carillon::precompute {
+namespace {
+
+/// How far off a solve may be. Measured: with 1e-5 the modes of a hollow body came out with
+/// residuals of 4e-7, with 2e-4 those of a thin tube with 5e-6, and later corrections hardly
+/// helped.
+constexpr double kMaxSolveError = 1.5e-5;
+
+}  // namespace
+
+template <typename Real>
+ShiftInvert<Real>::ShiftInvert(const NodeMatrix& A, const MultifrontalCholesky<Real>& factor,
+                               double shift, Workers& workers)
+    : A_(A),
+      factor_(factor),
+      shift_(shift),
+      workers_(workers),
+      measured_(std::is_same_v<Real, double>),
+      solution_(3 * static_cast<Eigen::Index>(A.node_count) + 3, kBlockWidth) {}
+
+template <typename Real>
+void ShiftInvert<Real>::Apply(const Block& x, Block& y) {
+  const Eigen::Index rows = x.rows();
+  std::copy_n(x.data(), x.size(), solution_.data());
+  factor_.Solve(solution_.data());
+  if (!measured_ || refines_) {
+    const double error = Refine(x);
+    if (!measured_) refines_ = error > kMaxSolveError;
+    measured_ = true;
+  }
+  y = solution_.topRows(rows) * static_cast<Real>(-shift_);
+}
+
+/// Improves solution_ by its residual for the right-hand side x; returns by how much, relatively.
+template <typename Real>
+double ShiftInvert<Real>::Refine(const Block& x) {
+  const Eigen::Index rows = x.rows();
+  if (y_.size() == 0 && !A_.mass_is_identity) mass_ = MakeMassRows<double>(A_);
+  elastic_.resize(rows, kBlockWidth);
+  y_ = solution_.topRows(rows).template cast<double>();
+  MultiplyStiffness(A_, y_.data(), elastic_.data());
+  if (A_.mass_is_identity) {
+    elastic_ -= shift_ * y_;
+  } else {
+    inertial_.resize(rows, kBlockWidth);
+    MultiplyMass(mass_, workers_, y_.data(), inertial_.data());
+    elastic_ -= shift_ * inertial_;
+  }
+  solution_.topRows(rows) = x - elastic_.template cast<Real>();
+  factor_.Solve(solution_.data());
+  const double change = solution_.topRows(rows).norm() / y_.norm();
+  solution_.topRows(rows) += y_.template cast<Real>();
+  return change;
+}
+
+template class ShiftInvert<float>;
+template class ShiftInvert<double>;
+
+}  // namespace carillon::precompute

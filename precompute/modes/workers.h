@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+namespace carillon::precompute {
+
+/// Threads that share a piece of work and wait for the next one.
+class Workers {
+ public:
+  /// `count` threads, the caller's included.
+  explicit Workers(int count);
+  ~Workers();
+  Workers(const Workers&) = delete;
+  Workers& operator=(const Workers&) = delete;
+
+  int count() const { return static_cast<int>(threads_.size()) + 1; }
+
+  /// Calls work(0) ... work(count() - 1), each in a thread of its own, and waits for all.
+  void Run(const std::function<void(int)>& work);
+
+  /// Calls visit(begin, end, t) for contiguous parts of 0 ... n - 1, part t in thread t; parts
+  /// begin at multiples of `grain`.
+  void ForParts(int64_t n, int64_t grain, const std::function<void(int64_t, int64_t, int)>& visit);
+
+  /// Calls visit(i) for 0 <= i < n, the next one by whichever thread is free.
+  void ForEach(int64_t n, const std::function<void(int64_t)>& visit);
+
+ private:
+  void Serve(int index);
+
+  std::mutex mutex_;
+  std::condition_variable begun_;
+  std::condition_variable ended_;
+  const std::function<void(int)>* work_ = nullptr;
+  uint64_t round_ = 0;
+  int busy_ = 0;
+  bool stopping_ = false;
+  std::vector<std::thread> threads_;
+};
+
+}  // namespace carillon::precompute
