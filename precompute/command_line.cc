@@ -25,6 +25,7 @@ struct Options {
   std::optional<double> lambda_pa, mu_pa;
   double size = 1;
   bool keep_surface = false, refine_surface = false, json = false;
+  bool cautious = false;
   int node_count = 0, event_descriptor = -1, thread_count = 0;
 };
 
@@ -61,6 +62,9 @@ void AddMeshOptions(CLI::App& app, Options& options) {
       ->group(group);
   app.add_flag("--refine-surface", options.refine_surface, "Add vertices on the surface as needed")
       ->excludes("--keep-surface")
+      ->group(group);
+  app.add_flag("--cautious", options.cautious,
+               "Mesh with a coarser tolerance and rougher elements, where the mesher fails")
       ->group(group);
   app.add_option("--nodes", options.node_count,
                  "About how many corner nodes (default: by the surface)")
@@ -211,6 +215,7 @@ absl::StatusOr<CommandLine> MakeCommandLine(const Options& options) {
       .message = {}};
   if (options.keep_surface) result.settings.meshing.keep_surface = true;
   if (options.refine_surface) result.settings.meshing.keep_surface = false;
+  result.settings.meshing.cautious = options.cautious;
   return result;
 }
 

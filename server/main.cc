@@ -7,6 +7,8 @@
 #include <spdlog/spdlog.h>
 #include <systemd/sd-daemon.h>
 
+#include <chrono>
+#include <cstdint>
 #include <iostream>
 #include <memory>
 #include <string>
@@ -67,6 +69,10 @@ void LogOutput(const LiveOutput& output) {
                output.format().sample_rate_hz, state.latency_s * 1000);
 }
 
+std::chrono::milliseconds Milliseconds(double seconds) {
+  return std::chrono::milliseconds(static_cast<int64_t>(seconds * 1000));
+}
+
 absl::StatusOr<std::unique_ptr<DecompositionQueue>> MakeQueue(const Options& options,
                                                               const DataDirectory& directory,
                                                               ModeDatabase& database,
@@ -75,11 +81,17 @@ absl::StatusOr<std::unique_ptr<DecompositionQueue>> MakeQueue(const Options& opt
   executor_options.program = options.precompute_program;
   executor_options.directory = directory.work_directory();
   executor_options.worker_count = options.worker_count;
+  executor_options.memory_budget_bytes = static_cast<uint64_t>(options.memory_budget_mib) << 20U;
+  executor_options.memory_limit_bytes = static_cast<uint64_t>(options.job_memory_mib) << 20U;
+  executor_options.time_limit = Milliseconds(options.job_time_s);
+  executor_options.stall_limit = Milliseconds(options.stall_time_s);
   absl::StatusOr<std::unique_ptr<Executor>> executor = MakeLocalExecutor(executor_options, clock);
   if (!executor.ok()) return executor.status();
   return DecompositionQueue::Make(
       database, *std::move(executor), clock,
-      {.log = [](const std::string& line) { spdlog::warn("{}", line); }});
+      {.max_queued_count = static_cast<size_t>(options.queue_limit),
+       .model_budget_bytes = static_cast<uint64_t>(options.model_budget_mib) << 20U,
+       .log = [](const std::string& line) { spdlog::warn("{}", line); }});
 }
 
 OutputSettings OutputSettingsOf(const Options& options) {

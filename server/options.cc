@@ -6,6 +6,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdlib>
 #include <filesystem>
+#include <type_traits>
 
 #include "absl/strings/str_cat.h"
 #include "proto/error_reason.h"
@@ -78,6 +79,12 @@ absl::Status ReadKey(const std::string& key, const toml::node& node, Options& op
   if (key == "block_frames") return ReadValue(key, node, options.block_frame_count);
   if (key == "look_ahead_blocks") return ReadValue(key, node, options.look_ahead_block_count);
   if (key == "workers") return ReadValue(key, node, options.worker_count);
+  if (key == "memory_budget_mib") return ReadValue(key, node, options.memory_budget_mib);
+  if (key == "job_memory_mib") return ReadValue(key, node, options.job_memory_mib);
+  if (key == "job_time") return ReadValue(key, node, options.job_time_s);
+  if (key == "stall_time") return ReadValue(key, node, options.stall_time_s);
+  if (key == "queue_limit") return ReadValue(key, node, options.queue_limit);
+  if (key == "model_budget_mib") return ReadValue(key, node, options.model_budget_mib);
   if (key == "precompute") return ReadValue(key, node, options.precompute_program);
   if (key == "tls_certificate") return ReadValue(key, node, options.tls_certificate_file);
   if (key == "tls_key") return ReadValue(key, node, options.tls_key_file);
@@ -101,7 +108,12 @@ absl::Status ReadFile(const std::string& path, Options& options) {
   return absl::OkStatus();
 }
 
-absl::Status CheckRange(absl::string_view what, int64_t value, int64_t least, int64_t most) {
+constexpr int64_t kMostMib = 1LL << 40;
+constexpr double kMostSeconds = 1e8;
+
+template <typename T>
+absl::Status CheckRange(absl::string_view what, T value, std::type_identity_t<T> least,
+                        std::type_identity_t<T> most) {
   if (value >= least && value <= most) return absl::OkStatus();
   return InvalidConfiguration(
       absl::StrCat(what, " is ", value, "; it must be ", least, " to ", most));
@@ -112,7 +124,13 @@ absl::Status Check(const Options& options) {
        {CheckRange("--sample-rate", options.sample_rate_hz, 8000, 192000),
         CheckRange("--block-frames", options.block_frame_count, 16, 256),
         CheckRange("--look-ahead-blocks", options.look_ahead_block_count, 2, 64),
-        CheckRange("--workers", options.worker_count, 0, 1024)}) {
+        CheckRange("--workers", options.worker_count, 0, 1024),
+        CheckRange("--memory-budget-mib", options.memory_budget_mib, 0, kMostMib),
+        CheckRange("--job-memory-mib", options.job_memory_mib, 0, kMostMib),
+        CheckRange("--job-time", options.job_time_s, 0.1, kMostSeconds),
+        CheckRange("--stall-time", options.stall_time_s, 0.1, kMostSeconds),
+        CheckRange("--queue-limit", options.queue_limit, 1, 1'000'000),
+        CheckRange("--model-budget-mib", options.model_budget_mib, 0, kMostMib)}) {
     if (!status.ok()) return status;
   }
   if (options.addresses.empty()) return InvalidConfiguration("--listen names no address");
@@ -140,6 +158,22 @@ void AddFlags(CLI::App& app, Options& options) {
       ->capture_default_str();
   app.add_option("--workers", options.worker_count,
                  "decompositions at a time; 0: half of the processors")
+      ->capture_default_str();
+  app.add_option("--memory-budget-mib", options.memory_budget_mib,
+                 "memory of all decompositions together; 0: half of the machine's")
+      ->capture_default_str();
+  app.add_option("--job-memory-mib", options.job_memory_mib,
+                 "memory of one decomposition; 0: all of the budget")
+      ->capture_default_str();
+  app.add_option("--job-time", options.job_time_s, "seconds that a decomposition may take")
+      ->capture_default_str();
+  app.add_option("--stall-time", options.stall_time_s,
+                 "seconds that a decomposition may give no sign of life")
+      ->capture_default_str();
+  app.add_option("--queue-limit", options.queue_limit, "decompositions that may wait")
+      ->capture_default_str();
+  app.add_option("--model-budget-mib", options.model_budget_mib,
+                 "room for stored models, least recently sounded ones deleted; 0: no limit")
       ->capture_default_str();
   app.add_option("--precompute", options.precompute_program, "the program that decomposes")
       ->capture_default_str();

@@ -17,7 +17,13 @@ struct Options {
   uint32_t sample_rate_hz = 48000;
   uint32_t block_frame_count = 128;
   uint32_t look_ahead_block_count = 8;
-  int worker_count = 0;            ///< 0: half of the processors
+  int worker_count = 0;           ///< 0: half of the processors
+  int64_t memory_budget_mib = 0;  ///< of all decompositions; 0: half of the machine's
+  int64_t job_memory_mib = 0;     ///< of one; 0: the budget
+  double job_time_s = 21600;
+  double stall_time_s = 60;        ///< without a sign of life
+  int64_t queue_limit = 1024;      ///< jobs that wait
+  int64_t model_budget_mib = 0;    ///< of stored models; 0: without limit
   std::string precompute_program;  ///< carillon-precompute
   std::string tls_certificate_file;
   std::string tls_key_file;

@@ -26,6 +26,9 @@ struct CreateModelOptions {
   double max_frequency_hz = 20000;
   std::optional<bool> keep_surface;
   uint32_t target_node_count = 0;
+  int32_t priority = 0;
+  double time_limit_s = 0;
+  uint64_t memory_limit_mib = 0;
   bool wait = false;
 };
 

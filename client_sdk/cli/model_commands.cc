@@ -72,6 +72,9 @@ absl::StatusOr<v1::CreateModalModelRequest> MakeRequest(const CreateModelOptions
   request.set_size(options.size);
   request.set_min_frequency_hz(options.min_frequency_hz);
   request.set_max_frequency_hz(options.max_frequency_hz);
+  request.set_priority(options.priority);
+  request.set_time_limit_s(options.time_limit_s);
+  request.set_memory_limit_bytes(options.memory_limit_mib << 20U);
   request.set_label(options.label.empty() ? std::filesystem::path(options.file).stem().string()
                                           : options.label);
   return request;

@@ -89,6 +89,8 @@ std::string RunTetgen(const FillRequest& request) {
   DescribeCavities(request.cavities, in);
   // Piecewise linear complex, quality, volume bound, indices from zero, quiet; keep the surface.
   std::string switches = request.keep_surface ? "pqazQY" : "pqazQ";
+  // Radius to edge up to 3 instead of 2, tolerance 1e-6 instead of 1e-8.
+  if (request.cautious) switches = request.keep_surface ? "pq3azT1e-6QY" : "pq3azT1e-6Q";
   tetgenbehavior behavior;
   behavior.parse_commandline(switches.data());
   behavior.fixedvolume = 1;

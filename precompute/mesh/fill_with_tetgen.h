@@ -21,6 +21,9 @@ struct FillRequest {
   bool keep_surface;
   /// Adds at most so many vertices.
   int max_added_nodes;
+  /// For a surface that the mesher came to grief over: tolerates more in the surface and asks for
+  /// less in the shape of the tetrahedra.
+  bool cautious = false;
 };
 
 /// Fills the surface with 4-node tetrahedra, in a process of its own: TetGen crashes on input it

@@ -201,7 +201,8 @@ class Filler {
                         .cavities = PointsInCavities(surface_, shells_),
                         .max_volume = kVolumeOfRegular * edge * edge * edge,
                         .keep_surface = true,
-                        .max_added_nodes = kMaxAddedNodes};
+                        .max_added_nodes = kMaxAddedNodes,
+                        .cautious = settings_.cautious};
     absl::StatusOr<TetMesh> mesh = FillAndCheck(request);
     if (mesh.ok() || keep_surface) return mesh;
     request.keep_surface = false;

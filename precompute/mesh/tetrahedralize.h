@@ -16,6 +16,8 @@ struct MeshingSettings {
   int target_node_count = 0;
   /// 4 or 10. Mid-side nodes lie on straight edges.
   int nodes_per_element = 10;
+  /// As FillRequest::cautious.
+  bool cautious = false;
 };
 
 /// Fills a surface that CheckSurface accepted with tetrahedra; cavities stay empty. Each face of

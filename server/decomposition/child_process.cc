@@ -2,6 +2,7 @@
 #include "server/decomposition/child_process.h"
 
 #include <fcntl.h>
+#include <sched.h>
 #include <signal.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
@@ -83,12 +84,27 @@ bool ArrangeDescriptors(int events, int errors) {
   return arranged;
 }
 
-[[noreturn]] void RunInChild(pid_t parent, char* const* arguments, int events, int errors) {
+// The last `count` processors of those that this process may use.
+cpu_set_t LastProcessors(int count) {
+  cpu_set_t usable;
+  CPU_ZERO(&usable);
+  sched_getaffinity(0, sizeof usable, &usable);
+  cpu_set_t last;
+  CPU_ZERO(&last);
+  for (int i = CPU_SETSIZE - 1; i >= 0 && CPU_COUNT(&last) < count; --i) {
+    if (CPU_ISSET(static_cast<size_t>(i), &usable)) CPU_SET(static_cast<size_t>(i), &last);
+  }
+  return last;
+}
+
+[[noreturn]] void RunInChild(pid_t parent, char* const* arguments, const cpu_set_t& processors,
+                             int events, int errors) {
   constexpr int kNotExecuted = 127;
   setpgid(0, 0);
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (getppid() != parent) _exit(kNotExecuted);  // it died before the line above
   setpriority(PRIO_PROCESS, 0, kNice);
+  sched_setaffinity(0, sizeof processors, &processors);
   const rlimit no_core{0, 0};
   setrlimit(RLIMIT_CORE, &no_core);
   MakeFirstToBeKilled();
@@ -99,7 +115,8 @@ bool ArrangeDescriptors(int events, int errors) {
 
 }  // namespace
 
-absl::StatusOr<ChildProcess> ChildProcess::Spawn(const std::vector<std::string>& command) {
+absl::StatusOr<ChildProcess> ChildProcess::Spawn(const std::vector<std::string>& command,
+                                                 int processor_count) {
   Pipe events;
   Pipe errors;
   if (!events.Make() || !errors.Make()) return NotStarted();
@@ -109,10 +126,12 @@ absl::StatusOr<ChildProcess> ChildProcess::Spawn(const std::vector<std::string>&
     arguments.push_back(const_cast<char*>(argument.c_str()));
   }
   arguments.push_back(nullptr);
+  const cpu_set_t processors = LastProcessors(processor_count);
   const pid_t parent = getpid();
   const pid_t pid = fork();
   if (pid < 0) return NotStarted();
-  if (pid == 0) RunInChild(parent, arguments.data(), events.write_end, errors.write_end);
+  if (pid == 0)
+    RunInChild(parent, arguments.data(), processors, events.write_end, errors.write_end);
   setpgid(pid, pid);  // as the child does: whichever comes first
   // By number: the header of glibc 2.36 cannot be used from C++.
   const int process = static_cast<int>(syscall(SYS_pidfd_open, pid, 0));

@@ -23,9 +23,11 @@ struct ProcessEnd {
 /// and output are /dev/null; its standard error and its descriptor 3 are pipes to here.
 class ChildProcess {
  public:
-  /// `command`: path of the program, then its arguments.
+  /// `command`: path of the program, then its arguments. It runs on the last `processor_count`
+  /// processors that this process may use, so that the first ones are left to others.
   /// Errors: ResourceExhausted (WORKER_NOT_STARTED: no process or pipe to be had).
-  static absl::StatusOr<ChildProcess> Spawn(const std::vector<std::string>& command);
+  static absl::StatusOr<ChildProcess> Spawn(const std::vector<std::string>& command,
+                                            int processor_count);
 
   ChildProcess(ChildProcess&& other) noexcept;
   ChildProcess& operator=(ChildProcess&&) = delete;

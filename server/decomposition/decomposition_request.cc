@@ -17,6 +17,7 @@ namespace {
 
 constexpr std::array kFormats = {"obj", "ply", "stl", "off", "msh"};
 constexpr size_t kMaxLabelBytes = 200;
+constexpr int kMostPriority = 100;
 constexpr double kPoissonSteps = 1e4;  // of one
 
 absl::Status Invalid(absl::string_view what) {
@@ -62,6 +63,14 @@ absl::Status CheckHints(const v1::CreateModalModelRequest& request) {
     return Invalid(absl::StrCat("the band is ", request.min_frequency_hz(), " to ",
                                 request.max_frequency_hz(),
                                 " Hz; it must rise from above zero to a finite frequency"));
+  }
+  if (request.priority() < -kMostPriority || request.priority() > kMostPriority) {
+    return Invalid(absl::StrCat("priority is ", request.priority(), "; it must be ", -kMostPriority,
+                                " to ", kMostPriority));
+  }
+  if (!(std::isfinite(request.time_limit_s()) && request.time_limit_s() >= 0)) {
+    return Invalid(
+        absl::StrCat("time_limit_s is ", request.time_limit_s(), "; it must be zero or more"));
   }
   if (request.label().size() > kMaxLabelBytes) {
     return Invalid(absl::StrCat("label has ", request.label().size(), " bytes; at most ",

@@ -6,7 +6,13 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <deque>
+#include <functional>
 #include <list>
+#include <memory>
+#include <optional>
+#include <semaphore>
+#include <set>
 #include <string>
 #include <system_error>
 #include <thread>
@@ -28,6 +34,54 @@ using std::chrono::nanoseconds;
 // GB/s, so it cannot get far beyond its limit.
 constexpr int kTickMs = 100;
 
+/// One thread for what waits for the disk, in order.
+class FileThread {
+ public:
+  FileThread() : thread_([this] { Work(); }) {}
+  FileThread(const FileThread&) = delete;
+  FileThread& operator=(const FileThread&) = delete;
+  ~FileThread() { End(); }
+
+  void Run(std::function<void()> work) {
+    {
+      MutexLock lock(&mutex_);
+      waiting_.push_back(std::move(work));
+    }
+    ready_.release();
+  }
+
+  /// Forgets what waits and returns once nothing runs. May be called again.
+  void End() {
+    {
+      MutexLock lock(&mutex_);
+      ended_ = true;
+      waiting_.clear();
+    }
+    ready_.release();
+    if (thread_.joinable()) thread_.join();
+  }
+
+ private:
+  void Work() {
+    while (const std::function<void()> work = Take()) work();
+  }
+
+  std::function<void()> Take() {
+    ready_.acquire();
+    MutexLock lock(&mutex_);
+    if (ended_) return nullptr;
+    std::function<void()> work = std::move(waiting_.front());
+    waiting_.pop_front();
+    return work;
+  }
+
+  Mutex mutex_;
+  bool ended_ ABSL_GUARDED_BY(mutex_) = false;
+  std::deque<std::function<void()>> waiting_ ABSL_GUARDED_BY(mutex_);
+  std::counting_semaphore<> ready_{0};
+  std::thread thread_;
+};
+
 class LocalExecutor final : public Executor {
  public:
   LocalExecutor(LocalExecutorOptions options, const Clock& clock)
@@ -40,15 +94,19 @@ class LocalExecutor final : public Executor {
     }
     Wake();
     thread_.join();
+    files_.End();
     close(wake_);
   }
 
   int worker_count() const override { return options_.worker_count; }
+  uint64_t memory_budget_bytes() const override { return options_.memory_budget_bytes; }
 
   void Start(DecompositionTask task) override {
-    MutexLock lock(&mutex_);
-    starts_.push_back(std::move(task));
-    Wake();
+    {
+      MutexLock lock(&mutex_);
+      preparing_.insert(task.digest);
+    }
+    files_.Run([this, task = std::move(task)] { Prepare(task); });
   }
 
   void Cancel(const std::string& digest) override {
@@ -64,13 +122,27 @@ class LocalExecutor final : public Executor {
     [[maybe_unused]] const ssize_t written = write(wake_, &one, sizeof one);
   }
 
+  // On the thread for files. Each run has a folder of its own: the last one's may still be there.
+  void Prepare(const DecompositionTask& task) {
+    const std::filesystem::path folder =
+        options_.directory / absl::StrCat(task.digest, "-", ++folder_count_);
+    absl::StatusOr<PreparedTask> prepared = PreparedTask::Make(task, folder);
+    MutexLock lock(&mutex_);
+    if (prepared.ok()) {
+      starts_.push_back(*std::move(prepared));
+    } else {
+      failures_.emplace_back(task, ToErrorInfo(prepared.status()));
+    }
+    Wake();
+  }
+
   void Run() {
     while (TakeCommands()) {
       Wait();
       // All reading before any judging: where this thread was held up, what the workers wrote
       // meanwhile counts.
       for (LocalWorker& worker : workers_) worker.Read(clock_.Monotonic());
-      for (LocalWorker& worker : workers_) worker.Enforce(limits_, clock_.Monotonic());
+      Enforce();
       CollectEnded();
     }
     workers_.clear();
@@ -78,26 +150,34 @@ class LocalExecutor final : public Executor {
 
   // False when it is time to stop.
   bool TakeCommands() {
-    std::vector<DecompositionTask> starts;
+    std::vector<PreparedTask> starts;
+    std::vector<std::pair<DecompositionTask, v1::ErrorInfo>> failures;
     std::vector<std::string> cancels;
     {
       MutexLock lock(&mutex_);
       if (stopping_) return false;
       starts.swap(starts_);
+      failures.swap(failures_);
       cancels.swap(cancels_);
+      for (const PreparedTask& start : starts) preparing_.erase(start.task.digest);
+      for (const auto& [task, error] : failures) preparing_.erase(task.digest);
+      // One that is still being prepared is cancelled when it is ready, which is soon.
+      for (const std::string& digest : cancels) {
+        if (preparing_.contains(digest)) cancels_.push_back(digest);
+      }
     }
-    for (DecompositionTask& task : starts) StartWorker(std::move(task));
+    for (const auto& [task, error] : failures) task.on_end({Verdict::kCrashed, error, {}});
+    for (PreparedTask& start : starts) StartWorker(std::move(start));
     for (LocalWorker& worker : workers_) {
       if (std::ranges::find(cancels, worker.task().digest) != cancels.end()) worker.Cancel();
     }
     return true;
   }
 
-  void StartWorker(DecompositionTask task) {
-    const auto on_end = task.on_end;
-    const std::filesystem::path folder = options_.directory / task.digest;
-    absl::StatusOr<LocalWorker> worker = LocalWorker::Start(
-        std::move(task), folder, options_.program, options_.threads_per_worker, clock_.Monotonic());
+  void StartWorker(PreparedTask prepared) {
+    const auto on_end = prepared.task.on_end;
+    absl::StatusOr<LocalWorker> worker = LocalWorker::Start(std::move(prepared), options_.program,
+                                                            share_, limits_, clock_.Monotonic());
     if (worker.ok()) {
       workers_.push_back(*std::move(worker));
     } else {
@@ -121,14 +201,29 @@ class LocalExecutor final : public Executor {
     }
   }
 
+  // Where all together take too much, the youngest makes room: it has lost least.
+  void Enforce() {
+    uint64_t total_bytes = 0;
+    for (LocalWorker& worker : workers_) total_bytes += worker.Enforce(clock_.Monotonic());
+    if (workers_.size() > 1 && total_bytes > options_.memory_budget_bytes) {
+      workers_.back().MakeRoom(options_.memory_budget_bytes);
+    }
+  }
+
   void CollectEnded() {
     for (auto worker = workers_.begin(); worker != workers_.end();) {
       const std::optional<Outcome> outcome = worker->TakeOutcome(clock_.Monotonic());
-      if (outcome.has_value()) {
-        worker->task().on_end(*outcome);
-        worker = workers_.erase(worker);
-      } else {
+      if (!outcome.has_value()) {
         ++worker;
+        continue;
+      }
+      const auto ended = std::make_shared<LocalWorker>(std::move(*worker));
+      worker = workers_.erase(worker);
+      if (outcome->verdict == Verdict::kOk) {
+        // Storing a model waits for the disk.
+        files_.Run([ended, outcome = *outcome] { ended->task().on_end(outcome); });
+      } else {
+        ended->task().on_end(*outcome);
       }
     }
   }
@@ -136,13 +231,19 @@ class LocalExecutor final : public Executor {
   const LocalExecutorOptions options_;
   const WorkerLimits limits_{options_.memory_limit_bytes, options_.time_limit,
                              options_.stall_limit};
+  const WorkerShare share_{options_.threads_per_worker,
+                           options_.threads_per_worker* options_.worker_count};
   const Clock& clock_;
   const int wake_ = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
-  std::list<LocalWorker> workers_;  // of the thread
+  std::list<LocalWorker> workers_;  // of the thread, oldest first
+  uint64_t folder_count_ = 0;       // of the thread for files
   Mutex mutex_;
   bool stopping_ ABSL_GUARDED_BY(mutex_) = false;
-  std::vector<DecompositionTask> starts_ ABSL_GUARDED_BY(mutex_);
+  std::set<std::string> preparing_ ABSL_GUARDED_BY(mutex_);
+  std::vector<PreparedTask> starts_ ABSL_GUARDED_BY(mutex_);
+  std::vector<std::pair<DecompositionTask, v1::ErrorInfo>> failures_ ABSL_GUARDED_BY(mutex_);
   std::vector<std::string> cancels_ ABSL_GUARDED_BY(mutex_);
+  FileThread files_;
   std::thread thread_;
 };
 
@@ -180,9 +281,8 @@ absl::StatusOr<std::unique_ptr<Executor>> MakeLocalExecutor(const LocalExecutorO
   if (filled.worker_count == 0) {
     filled.worker_count = std::max(1, static_cast<int>(std::thread::hardware_concurrency()) / 2);
   }
-  if (filled.memory_limit_bytes == 0) {
-    filled.memory_limit_bytes = PhysicalBytes() / 2 / static_cast<uint64_t>(filled.worker_count);
-  }
+  if (filled.memory_budget_bytes == 0) filled.memory_budget_bytes = PhysicalBytes() / 2;
+  if (filled.memory_limit_bytes == 0) filled.memory_limit_bytes = filled.memory_budget_bytes;
   return std::make_unique<LocalExecutor>(std::move(filled), clock);
 }
 

@@ -11,6 +11,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "proto/error_reason.h"
+#include "server/decomposition/memory_estimate.h"
 #include "server/decomposition/worker_command.h"
 
 namespace carillon {
@@ -47,6 +48,12 @@ v1::ErrorInfo OutOfMemory(absl::string_view what) {
                    "more memory"));
 }
 
+std::string WouldNeed(uint32_t node_count) {
+  if (node_count == 0) return "";
+  return absl::StrCat(" (with its ", node_count, " nodes it would need about ",
+                      MemoryOfNodes(node_count) >> 20U, " MiB)");
+}
+
 // The log is any bytes; a message is text on one line.
 std::string LogSentence(std::string log) {
   if (log.empty()) return "";
@@ -63,10 +70,21 @@ ScratchFolder::~ScratchFolder() {
   std::filesystem::remove_all(path_, ignored);
 }
 
-absl::StatusOr<LocalWorker> LocalWorker::Start(DecompositionTask task,
-                                               const std::filesystem::path& path,
-                                               const std::filesystem::path& program,
-                                               int thread_count, nanoseconds now) {
+WorkerLimits WorkerLimits::For(const v1::CreateModalModelRequest& request) const {
+  WorkerLimits limits = *this;
+  if (request.memory_limit_bytes() > 0) {
+    limits.memory_bytes = std::min(limits.memory_bytes, request.memory_limit_bytes());
+  }
+  if (request.time_limit_s() > 0) {
+    const double seconds =
+        std::min(request.time_limit_s(), std::chrono::duration<double>(limits.time).count());
+    limits.time = std::chrono::duration_cast<nanoseconds>(std::chrono::duration<double>(seconds));
+  }
+  return limits;
+}
+
+absl::StatusOr<PreparedTask> PreparedTask::Make(DecompositionTask task,
+                                                const std::filesystem::path& path) {
   std::error_code error;
   std::filesystem::remove_all(path, error);
   if (!std::filesystem::create_directory(path, error)) {
@@ -75,11 +93,21 @@ absl::StatusOr<LocalWorker> LocalWorker::Start(DecompositionTask task,
                                 "): see that this user may write there"));
   }
   ScratchFolder folder(path);
-  const WorkerPlace place{program, folder / "mesh", folder / "model", thread_count};
-  if (const absl::Status status = task.write_mesh(place.mesh_file); !status.ok()) return status;
-  absl::StatusOr<ChildProcess> process = ChildProcess::Spawn(WorkerCommand(task.request, place));
+  if (const absl::Status status = task.write_mesh(folder / "mesh"); !status.ok()) return status;
+  return PreparedTask{std::move(task), std::move(folder)};
+}
+
+absl::StatusOr<LocalWorker> LocalWorker::Start(PreparedTask prepared,
+                                               const std::filesystem::path& program,
+                                               const WorkerShare& share, const WorkerLimits& limits,
+                                               nanoseconds now) {
+  const ScratchFolder& folder = prepared.folder;
+  const WorkerPlace place{program, folder / "mesh", folder / "model", share.thread_count};
+  const WorkerLimits own = limits.For(prepared.task.request);
+  absl::StatusOr<ChildProcess> process = ChildProcess::Spawn(
+      WorkerCommand(prepared.task.request, prepared.task.way, place), share.processor_count);
   if (!process.ok()) return process.status();
-  return LocalWorker(std::move(task), std::move(folder), *std::move(process), now);
+  return LocalWorker(std::move(prepared), *std::move(process), own, now);
 }
 
 void LocalWorker::Read(nanoseconds now) {
@@ -113,26 +141,39 @@ void LocalWorker::OnProgress(v1::Progress progress) {
     fraction_ = std::max(fraction_, std::min(progress.fraction(), 1.0));
   }
   progress.set_fraction(fraction_);
+  node_count_ = std::max(node_count_, progress.node_count());
   task_.on_progress(progress);
 }
 
-void LocalWorker::Enforce(const WorkerLimits& limits, nanoseconds now) {
-  if (process_.ResidentBytes() > limits.memory_bytes) {
+uint64_t LocalWorker::Enforce(nanoseconds now) {
+  const uint64_t resident_bytes = process_.ResidentBytes();
+  peak_bytes_ = std::max(peak_bytes_, resident_bytes);
+  if (resident_bytes > limits_.memory_bytes) {
     Kill(Verdict::kOutOfMemory,
-         OutOfMemory(absl::StrCat("took more than its ", limits.memory_bytes >> 20U, " MiB")));
-  } else if (now - started_ > limits.time) {
-    Kill(
-        Verdict::kTimeout,
-        Error("TIMEOUT", absl::StrCat("the decomposition took more than its ", Seconds(limits.time),
-                                      " s: ask for fewer nodes or a lower maximal frequency, or "
-                                      "give it more time")));
-  } else if (now - last_event_ > limits.stall) {
+         OutOfMemory(absl::StrCat("took more than its ", limits_.memory_bytes >> 20U, " MiB",
+                                  WouldNeed(node_count_))));
+  } else if (now - started_ > limits_.time) {
+    Kill(Verdict::kTimeout,
+         Error("TIMEOUT",
+               absl::StrCat("the decomposition took more than its ", Seconds(limits_.time),
+                            " s: ask for fewer nodes or a lower maximal frequency, or "
+                            "give it more time")));
+  } else if (now - last_event_ > limits_.stall) {
     Kill(Verdict::kStalled,
          Error("WORKER_STALLED", absl::StrCat("the decomposing process gave no sign of life for ",
-                                              Seconds(limits.stall),
+                                              Seconds(limits_.stall),
                                               " s: try again; if it stalls again, report it with "
                                               "the mesh")));
   }
+  return resident_bytes;
+}
+
+void LocalWorker::MakeRoom(uint64_t budget_bytes) {
+  if (killed_.has_value()) return;
+  Kill(Verdict::kOutOfMemory,
+       OutOfMemory(absl::StrCat("and others took more than the ", budget_bytes >> 20U,
+                                " MiB of all together")));
+  killed_->crowded = true;
 }
 
 void LocalWorker::Kill(Verdict verdict, v1::ErrorInfo error) {
@@ -145,7 +186,9 @@ std::optional<Outcome> LocalWorker::TakeOutcome(nanoseconds now) {
   const std::optional<ProcessEnd> end = process_.Reap();
   if (!end.has_value()) return std::nullopt;
   Read(now);  // its last words
-  return Judge(*end);
+  Outcome outcome = Judge(*end);
+  outcome.peak_bytes = peak_bytes_;
+  return outcome;
 }
 
 Outcome LocalWorker::Judge(const ProcessEnd& end) const {
@@ -158,7 +201,9 @@ Outcome LocalWorker::Judge(const ProcessEnd& end) const {
 Outcome LocalWorker::JudgeFailure(const ProcessEnd& end) const {
   if (!end.exited && end.status == SIGKILL) {
     // Not by us: this is what the kernel does when memory runs out.
-    return {Verdict::kOutOfMemory, OutOfMemory("was killed by the system"), {}};
+    return {Verdict::kOutOfMemory,
+            OutOfMemory(absl::StrCat("was killed by the system", WouldNeed(node_count_))),
+            {}};
   }
   if (end.exited && reported_.has_value()) {
     Verdict verdict = Verdict::kBadInput;

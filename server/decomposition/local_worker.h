@@ -35,17 +35,36 @@ struct WorkerLimits {
   uint64_t memory_bytes = 0;
   std::chrono::nanoseconds time{};
   std::chrono::nanoseconds stall{};
+
+  /// These, or what the request wants where that is less.
+  WorkerLimits For(const v1::CreateModalModelRequest& request) const;
+};
+
+/// What of the processors a worker gets.
+struct WorkerShare {
+  int thread_count = 1;
+  int processor_count = 1;  ///< the last so many of the machine, shared by all workers
+};
+
+/// A task with its mesh in a folder of its own, ready to be started.
+struct PreparedTask {
+  /// Makes the folder `path` and brings the mesh there.
+  /// Errors: those of write_mesh, FailedPrecondition (DATABASE_UNUSABLE).
+  static absl::StatusOr<PreparedTask> Make(DecompositionTask task,
+                                           const std::filesystem::path& path);
+
+  DecompositionTask task;
+  ScratchFolder folder;
 };
 
 /// One running decomposition: its process, what it has said, and the verdict over it. Its
 /// destruction kills what still runs and removes the folder. One thread.
 class LocalWorker {
  public:
-  /// Makes the folder `path`, brings the mesh there and starts the program.
-  /// Errors: those of write_mesh and ChildProcess::Spawn, FailedPrecondition (DATABASE_UNUSABLE).
-  static absl::StatusOr<LocalWorker> Start(DecompositionTask task,
-                                           const std::filesystem::path& path,
-                                           const std::filesystem::path& program, int thread_count,
+  /// Starts the program. Errors: those of ChildProcess::Spawn.
+  static absl::StatusOr<LocalWorker> Start(PreparedTask prepared,
+                                           const std::filesystem::path& program,
+                                           const WorkerShare& share, const WorkerLimits& limits,
                                            std::chrono::nanoseconds now);
   const DecompositionTask& task() const { return task_; }
   const ChildProcess& process() const { return process_; }
@@ -53,20 +72,24 @@ class LocalWorker {
   /// Takes in what the process has written; an event counts as a sign of life at `now`.
   void Read(std::chrono::nanoseconds now);
 
-  /// Kills the process where it has used up a limit.
-  void Enforce(const WorkerLimits& limits, std::chrono::nanoseconds now);
+  /// Kills the process where it has used up a limit. Returns its memory in RAM, bytes.
+  uint64_t Enforce(std::chrono::nanoseconds now);
 
   void Cancel() { Kill(Verdict::kCancelled, {}); }
+
+  /// Kills the process because all workers together take more than `budget_bytes`.
+  void MakeRoom(uint64_t budget_bytes);
 
   /// The outcome, once the process has ended.
   std::optional<Outcome> TakeOutcome(std::chrono::nanoseconds now);
 
  private:
-  LocalWorker(DecompositionTask task, ScratchFolder folder, ChildProcess process,
+  LocalWorker(PreparedTask prepared, ChildProcess process, const WorkerLimits& limits,
               std::chrono::nanoseconds now)
-      : task_(std::move(task)),
-        folder_(std::move(folder)),
+      : task_(std::move(prepared.task)),
+        folder_(std::move(prepared.folder)),
         process_(std::move(process)),
+        limits_(limits),
         started_(now),
         last_event_(now) {}
 
@@ -79,6 +102,9 @@ class LocalWorker {
   DecompositionTask task_;
   ScratchFolder folder_;  // before the process, so that it goes after it
   ChildProcess process_;
+  WorkerLimits limits_;
+  uint64_t peak_bytes_ = 0;
+  uint32_t node_count_ = 0;
   std::chrono::nanoseconds started_;
   std::chrono::nanoseconds last_event_;
   WorkerEventReader events_;

@@ -2,12 +2,16 @@
 #include "server/decomposition/queue_core.h"
 
 #include <algorithm>
-#include <array>
+#include <chrono>
+#include <cmath>
 #include <utility>
 
+#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "proto/error_reason.h"
 #include "server/decomposition/decomposition_request.h"
+#include "server/decomposition/job_rules.h"
+#include "server/decomposition/worker_command.h"
 
 namespace carillon {
 namespace {
@@ -15,54 +19,22 @@ namespace {
 // Eigenvalues go to the worker as decimals of its own units and come back: not the last bits.
 constexpr double kRelativeTolerance = 1e-9;
 
-v1::Job ToJob(const JobRecord& record) {
-  v1::Job job;
-  job.set_name(absl::StrCat("jobs/", record.digest));
-  job.set_modal_model(absl::StrCat("modalModels/", record.digest));
-  job.set_state(record.state);
-  if (record.state == v1::JOB_STATE_FAILED) *job.mutable_error() = record.error;
-  job.set_label(record.label);
-  return job;
-}
+// A daemon that was killed so often under one job may have been killed by it.
+constexpr uint32_t kMostStarts = 10;
+constexpr char kCorrectionFact[] = "memory_correction";
 
 absl::Status NotFound(const std::string& digest) {
   return Refusal(absl::StatusCode::kNotFound, "JOB_NOT_FOUND",
                  absl::StrCat("no job is named jobs/", digest, ": create the modal model again"));
 }
 
-absl::Status QueueFull(size_t count) {
-  return Refusal(
-      absl::StatusCode::kResourceExhausted, "QUEUE_FULL",
-      absl::StrCat(count, " decompositions wait already: try again when some have ended"));
-}
-
-bool SameHints(const v1::CreateModalModelRequest& a, const v1::CreateModalModelRequest& b) {
-  return WantedEigenvalue(a) == WantedEigenvalue(b) &&
-         UnitEigenvalue(a, a.min_frequency_hz()) == UnitEigenvalue(b, b.min_frequency_hz());
-}
-
-// Whether a refusal has to do with the band, so that other hints may have other luck.
-bool DependsOnHints(const std::string& reason) {
-  constexpr std::array kReasons = {"NO_MODE_IN_BAND", "TOO_MANY_MODES", "VERIFICATION_FAILED"};
-  return std::ranges::find(kReasons, reason) != kReasons.end();
-}
-
-absl::StatusOr<v1::CreateModalModelRequest> ParseRequest(const JobRecord& record) {
-  v1::CreateModalModelRequest request;
-  if (request.ParseFromString(record.request)) return request;
-  return Refusal(absl::StatusCode::kDataLoss, "DATABASE_CORRUPT",
-                 absl::StrCat("jobs/", record.digest, " cannot be read: create its model again"));
-}
-
-bool WouldFailAgain(const JobRecord& record, const v1::CreateModalModelRequest& request) {
-  if (record.state != v1::JOB_STATE_FAILED || !record.remembered) return false;
-  const auto refused = ParseRequest(record);
-  return !DependsOnHints(record.error.reason()) || (refused.ok() && SameHints(*refused, request));
-}
-
-v1::JobState StateOf(Verdict verdict) {
-  if (verdict == Verdict::kOk) return v1::JOB_STATE_SUCCEEDED;
-  return verdict == Verdict::kCancelled ? v1::JOB_STATE_CANCELLED : v1::JOB_STATE_FAILED;
+absl::Status QueueFull(size_t count, double retry_after_s) {
+  const int64_t seconds = std::max<int64_t>(1, std::llround(retry_after_s));
+  absl::Status status =
+      Refusal(absl::StatusCode::kResourceExhausted, "QUEUE_FULL",
+              absl::StrCat(count, " decompositions wait already: try again in ", seconds, " s"));
+  AddFigure(status, "retry_after_s", absl::StrCat(seconds));
+  return status;
 }
 
 void TellAll(const std::vector<Notice>& notices) {
@@ -77,7 +49,13 @@ absl::Status QueueCore::TakeUp() {
   Notices notices;  // nobody watches yet
   database_.models().ListenToQuarantine(
       [this](const std::string& digest, const absl::Status& why) { OnQuarantine(digest, why); });
+  const auto correction = database_.jobs().Fact(kCorrectionFact);
+  double factor = 1;
+  if (correction.ok() && correction->has_value()) {
+    if (!absl::SimpleAtod(**correction, &factor)) factor = 1;
+  }
   MutexLock lock(&mutex_);
+  experience_ = MemoryExperience(factor);
   for (JobRecord record : *records) {
     if (record.damaged) {
       settings_.log(record.error.message());
@@ -87,13 +65,21 @@ absl::Status QueueCore::TakeUp() {
     auto request = ParseRequest(record);
     const absl::StatusOr<bool> satisfied =
         request.ok() ? IsSatisfied(std::nullopt, record.digest, *request) : request.status();
-    if (satisfied.ok() && !*satisfied) {
+    if (satisfied.ok() && !*satisfied && record.start_count < kMostStarts) {
       Enqueue(std::move(record), *std::move(request));
+      continue;
+    }
+    if (satisfied.ok() && !*satisfied) {
+      record.state = v1::JOB_STATE_FAILED;
+      record.error = GaveUp(std::exchange(record.start_count, 0));
+      settings_.log(absl::StrCat("jobs/", record.digest, ": ", record.error.message()));
+      if (absl::Status status = database_.jobs().Put(record); !status.ok()) return status;
       continue;
     }
     // The daemon died between storing the model and saying so, or the row is damaged.
     record.state = satisfied.ok() ? v1::JOB_STATE_SUCCEEDED : v1::JOB_STATE_FAILED;
     if (!satisfied.ok()) record.error = ToErrorInfo(satisfied.status());
+    record.start_count = 0;
     if (absl::Status status = database_.jobs().Put(record); !status.ok()) return status;
   }
   StartWhatFits(notices);
@@ -105,6 +91,12 @@ void QueueCore::Stop() {
   {
     MutexLock lock(&mutex_);
     stopping_ = true;
+    // These ends are the daemon's doing, not the jobs'.
+    for (auto& [digest, active] : active_) {
+      if (!active.running.has_value() || active.record.start_count == 0) continue;
+      --active.record.start_count;
+      if (!active.deleted) database_.jobs().Put(active.record).IgnoreError();
+    }
   }
   executor_.reset();
 }
@@ -140,13 +132,17 @@ absl::StatusOr<v1::Job> QueueCore::SubmitNew(const std::string& digest,
   if (!*satisfied) {
     const auto mesh = database_.meshes().Find(request.mesh_digest());
     if (!mesh.ok()) return mesh.status();
-    if (queued_.size() >= settings_.max_queued_count) return QueueFull(queued_.size());
+    if (queued_.size() >= settings_.max_queued_count) {
+      return QueueFull(queued_.size(), mean_run_s_ / executor_->worker_count());
+    }
   }
   JobRecord record{.digest = digest,
                    .request = request.SerializeAsString(),
                    .label = request.label(),
                    .state = *satisfied ? v1::JOB_STATE_SUCCEEDED : v1::JOB_STATE_QUEUED,
-                   .created_unix_ms = clock_.UnixMs()};
+                   .created_unix_ms = clock_.UnixMs(),
+                   .priority = request.priority()};
+  if (known->has_value()) record.peak_bytes = (*known)->peak_bytes;
   if (const absl::Status status = database_.jobs().Put(record); !status.ok()) return status;
   if (*satisfied) return ToJob(record);
   Enqueue(std::move(record), request);
@@ -159,13 +155,17 @@ absl::StatusOr<v1::Job> QueueCore::SubmitAgain(Active& active,
                                                const v1::CreateModalModelRequest& request) {
   const bool wanted_no_more = active.record.state == v1::JOB_STATE_CANCELLED || active.deleted;
   const bool farther = WantedEigenvalue(request) > WantedEigenvalue(active.request);
-  if (!wanted_no_more && !farther) return ActiveJob(active);
+  const bool sooner = request.priority() > active.record.priority;
+  if (!wanted_no_more && !farther && !sooner) return ActiveJob(active);
   JobRecord record = active.record;
   record.state = v1::JOB_STATE_QUEUED;
-  record.request = request.SerializeAsString();
+  record.priority = std::max(record.priority, request.priority());
+  if (wanted_no_more || farther) record.request = request.SerializeAsString();
   if (const absl::Status status = database_.jobs().Put(record); !status.ok()) return status;
+  const bool waits = queued_.erase(PlaceOf(active)) > 0;
   active.record = std::move(record);
-  active.request = request;
+  if (waits) queued_.insert(PlaceOf(active));
+  if (wanted_no_more || farther) active.request = request;
   active.again = active.again || wanted_no_more;
   return ActiveJob(active);
 }
@@ -213,28 +213,55 @@ void QueueCore::Enqueue(JobRecord record, v1::CreateModalModelRequest request) {
   const std::string digest = record.digest;
   record.state = v1::JOB_STATE_QUEUED;
   Active active;
+  const auto mesh = database_.meshes().Find(request.mesh_digest());
+  active.guess_bytes = MemoryOfNodes(GuessNodeCount(request, mesh.ok() ? mesh->byte_count : 0));
+  active.estimate_bytes =
+      record.peak_bytes > 0 ? record.peak_bytes : experience_.Corrected(active.guess_bytes);
   active.record = std::move(record);
   active.request = std::move(request);
-  active_.emplace(digest, std::move(active));
-  queued_.push_back(digest);
+  Requeue(active_.emplace(digest, std::move(active)).first->second);
 }
 
+void QueueCore::Requeue(Active& active) {
+  active.number = ++last_number_;
+  queued_.insert(PlaceOf(active));
+}
+
+QueueCore::Place QueueCore::PlaceOf(const Active& active) {
+  return {-active.record.priority, active.number, active.record.digest};
+}
+
+// The first in the queue starts where a worker and the memory for it are free. Nobody overtakes it:
+// else small ones might keep a large one waiting for ever.
 void QueueCore::StartWhatFits(Notices& notices) {
   while (!stopping_ && !queued_.empty() && running_count_ < executor_->worker_count()) {
-    Active& active = active_.at(queued_.front());
-    queued_.pop_front();
+    Active& active = active_.at(std::get<std::string>(*queued_.begin()));
+    const bool fits = reserved_bytes_ + active.estimate_bytes <= executor_->memory_budget_bytes();
+    if (!fits && running_count_ > 0) return;
+    queued_.erase(queued_.begin());
     ++running_count_;
+    Reserve(active, active.estimate_bytes);
     active.running = active.request;
+    active.started = clock_.Monotonic();
     active.progress.Clear();
+    ++active.record.start_count;
+    // Where it cannot be counted, nothing worse follows than one start more after a kill.
+    database_.jobs().Put(active.record).IgnoreError();
     executor_->Start(MakeTask(active));
     notices.push_back(Announce(active));
   }
+}
+
+void QueueCore::Reserve(Active& active, uint64_t bytes) {
+  reserved_bytes_ += bytes - active.reserved_bytes;
+  active.reserved_bytes = bytes;
 }
 
 DecompositionTask QueueCore::MakeTask(const Active& active) {
   const std::string& digest = active.record.digest;
   return {.digest = digest,
           .request = active.request,
+          .way = active.record.way,
           .write_mesh =
               [this, mesh = active.request.mesh_digest()](const std::filesystem::path& file) {
                 return database_.meshes().WriteFile(mesh, file);
@@ -248,6 +275,12 @@ void QueueCore::OnProgress(const std::string& digest, const v1::Progress& progre
   {
     MutexLock lock(&mutex_);
     Active& active = active_.at(digest);
+    // Once the mesh is there, its nodes tell better than its file what is to come.
+    if (active.progress.node_count() == 0 && progress.node_count() > 0) {
+      active.guess_bytes = MemoryOfNodes(progress.node_count());
+      active.estimate_bytes = experience_.Corrected(active.guess_bytes);
+      Reserve(active, active.estimate_bytes);
+    }
     active.progress = progress;
     notice = Announce(active);
   }
@@ -261,27 +294,44 @@ void QueueCore::OnEnd(const std::string& digest, const Outcome& outcome) {
     MutexLock lock(&mutex_);
     --running_count_;
     Active& active = active_.at(digest);
+    Reserve(active, 0);
+    LearnFrom(active, result);
     // Deleted while it was being stored. It may not have come that far: then there is none.
     if (active.deleted) database_.models().Delete(digest).IgnoreError();
+    active.record.start_count = 0;
     if (RunAgain(active, result)) {
       active.running.reset();
       active.again = active.deleted = false;
-      queued_.push_back(digest);
+      Requeue(active);
       notices.push_back(Announce(active));
     } else {
-      JobRecord record = active.record;
-      record.state = StateOf(result.verdict);
-      record.remembered = result.verdict == Verdict::kBadInput;
-      if (record.state == v1::JOB_STATE_FAILED) record.error = result.error;
-      // Where even this cannot be written, the row still says queued, and the next start of the
-      // daemon puts it right.
-      if (!active.deleted) database_.jobs().Put(record).IgnoreError();
-      notices.push_back({std::move(active.watchers), ToJob(record), ++version_});
-      active_.erase(digest);
+      notices.push_back(Finish(active, result));
     }
     StartWhatFits(notices);
   }
   TellAll(notices);
+}
+
+Notice QueueCore::Finish(Active& active, const Outcome& result) {
+  JobRecord record = active.record;
+  record.state = StateOf(result.verdict);
+  record.remembered = IsDeterministic(result);
+  if (record.state == v1::JOB_STATE_FAILED) record.error = result.error;
+  // Where even this cannot be written, the row still says queued, and the next start of the daemon
+  // puts it right.
+  if (!active.deleted) database_.jobs().Put(record).IgnoreError();
+  Notice notice{std::move(active.watchers), ToJob(record), ++version_};
+  active_.erase(record.digest);
+  return notice;
+}
+
+void QueueCore::LearnFrom(Active& active, const Outcome& result) {
+  active.record.peak_bytes = std::max(active.record.peak_bytes, result.peak_bytes);
+  const double run_s = std::chrono::duration<double>(clock_.Monotonic() - active.started).count();
+  mean_run_s_ += 0.1 * (run_s - mean_run_s_);
+  if (result.verdict != Verdict::kOk || result.peak_bytes == 0) return;
+  experience_.Learn(active.guess_bytes, result.peak_bytes);
+  database_.jobs().PutFact(kCorrectionFact, absl::StrCat(experience_.correction())).IgnoreError();
 }
 
 // The model goes into the database; where it does not, that is the outcome.
@@ -295,13 +345,36 @@ Outcome QueueCore::Store(const std::string& digest, const Outcome& outcome) {
     label = active.record.label;
   }
   const auto stored = database_.models().PutFile(digest, label, outcome.model_file);
-  if (stored.ok()) return outcome;
+  if (stored.ok()) {
+    CollectGarbage();
+    return outcome;
+  }
   return {Verdict::kCrashed, ToErrorInfo(stored.status()), {}};
 }
 
-bool QueueCore::RunAgain(const Active& active, const Outcome& outcome) const {
+void QueueCore::CollectGarbage() {
+  if (settings_.model_budget_bytes == 0) return;
+  const auto collected = database_.models().Collect(settings_.model_budget_bytes);
+  if (collected.ok() && collected->model_count == 0) return;
+  settings_.log(collected.ok() ? absl::StrCat(collected->model_count,
+                                              " models were deleted to keep to the budget")
+                               : std::string(collected.status().message()));
+}
+
+bool QueueCore::RunAgain(Active& active, const Outcome& outcome) {
   if (active.again) return true;
-  if (active.deleted || SameHints(active.request, *active.running)) return false;
+  if (active.deleted || outcome.verdict == Verdict::kCancelled) return false;
+  if (outcome.crowded) {
+    active.estimate_bytes = std::max(2 * active.estimate_bytes, outcome.peak_bytes * 3 / 2);
+    return true;
+  }
+  if (DependsOnWay(outcome) && active.record.way + 1 < kWayCount) {
+    ++active.record.way;
+    settings_.log(absl::StrCat("jobs/", active.record.digest, " is tried another way after ",
+                               outcome.error.message()));
+    return true;
+  }
+  if (SameHints(active.request, *active.running)) return false;
   if (outcome.verdict == Verdict::kBadInput) return DependsOnHints(outcome.error.reason());
   return outcome.verdict == Verdict::kOk;
 }
@@ -332,18 +405,17 @@ absl::StatusOr<v1::Job> QueueCore::Cancel(const std::string& digest) {
     const auto found = active_.find(digest);
     if (found == active_.end()) return FindJob(digest);
     Active& active = found->second;
+    // Before it is written down, which may take a while.
+    if (active.running.has_value() && !stopping_) executor_->Cancel(digest);
     JobRecord record = active.record;
     record.state = v1::JOB_STATE_CANCELLED;
     if (const absl::Status status = database_.jobs().Put(record); !status.ok()) return status;
     active.record = std::move(record);
     active.again = false;
-    if (active.running.has_value()) {
-      if (!stopping_) executor_->Cancel(digest);
-      return ActiveJob(active);
-    }
+    if (active.running.has_value()) return ActiveJob(active);
     job = ToJob(active.record);
     notice = {std::move(active.watchers), *job, ++version_};
-    std::erase(queued_, digest);
+    queued_.erase(PlaceOf(active));
     active_.erase(found);
   }
   notice.Tell();
@@ -366,7 +438,7 @@ absl::Status QueueCore::DeleteModel(const std::string& digest) {
       return absl::OkStatus();
     }
     notice = {std::move(active.watchers), ToJob(active.record), ++version_};
-    std::erase(queued_, digest);
+    queued_.erase(PlaceOf(active));
     active_.erase(found);
   }
   notice.Tell();
@@ -401,6 +473,7 @@ Notice QueueCore::Announce(const Active& active) {
 v1::Job QueueCore::ActiveJob(const Active& active) const {
   v1::Job job = ToJob(active.record);
   job.set_state(active.running.has_value() ? v1::JOB_STATE_RUNNING : v1::JOB_STATE_QUEUED);
+  job.set_memory_bytes(std::max(active.record.peak_bytes, active.estimate_bytes));
   if (active.running.has_value()) *job.mutable_progress() = active.progress;
   return job;
 }

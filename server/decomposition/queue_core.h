@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <chrono>
 #include <cstdint>
-#include <deque>
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "absl/base/thread_annotations.h"
@@ -18,6 +20,7 @@
 #include "server/base/mutex.h"
 #include "server/decomposition/decomposition_queue.h"
 #include "server/decomposition/executor.h"
+#include "server/decomposition/memory_estimate.h"
 #include "server/decomposition/watcher.h"
 #include "server/mode_database/mode_database.h"
 
@@ -57,11 +60,18 @@ class QueueCore {
     v1::CreateModalModelRequest request;                 // the farthest reaching one so far
     std::optional<v1::CreateModalModelRequest> running;  // as it was started
     v1::Progress progress;
-    bool again = false;    // asked for anew after a cancel: to be started once more
-    bool deleted = false;  // its result is no longer wanted
+    bool again = false;           // asked for anew after a cancel: to be started once more
+    bool deleted = false;         // its result is no longer wanted
+    uint64_t number = 0;          // among those that wait
+    uint64_t guess_bytes = 0;     // of memory, before any correction
+    uint64_t estimate_bytes = 0;  // of memory
+    uint64_t reserved_bytes = 0;  // while it runs
+    std::chrono::nanoseconds started{};
     std::vector<std::shared_ptr<Watcher>> watchers;
   };
   using Notices = std::vector<Notice>;
+  /// In the queue: by priority, highest first, then by number.
+  using Place = std::tuple<int32_t, uint64_t, std::string>;
 
   absl::StatusOr<v1::Job> SubmitNew(const std::string& digest,
                                     const v1::CreateModalModelRequest& request, Notices& notices)
@@ -77,12 +87,18 @@ class QueueCore {
   bool ComputeAgain(const std::string& digest, Notices& notices)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void StartWhatFits(Notices& notices) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void Requeue(Active& active) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  static Place PlaceOf(const Active& active);
+  void Reserve(Active& active, uint64_t bytes) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   DecompositionTask MakeTask(const Active& active);
 
   void OnProgress(const std::string& digest, const v1::Progress& progress);
   void OnEnd(const std::string& digest, const Outcome& outcome);
   Outcome Store(const std::string& digest, const Outcome& outcome);
-  bool RunAgain(const Active& active, const Outcome& outcome) const;
+  void CollectGarbage();
+  bool RunAgain(Active& active, const Outcome& outcome) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  Notice Finish(Active& active, const Outcome& result) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void LearnFrom(Active& active, const Outcome& result) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   Notice Announce(const Active& active) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   v1::Job ActiveJob(const Active& active) const;
@@ -94,8 +110,12 @@ class QueueCore {
   Mutex mutex_;
   bool stopping_ ABSL_GUARDED_BY(mutex_) = false;
   std::map<std::string, Active> active_ ABSL_GUARDED_BY(mutex_);
-  std::deque<std::string> queued_ ABSL_GUARDED_BY(mutex_);
+  std::set<Place> queued_ ABSL_GUARDED_BY(mutex_);
+  uint64_t last_number_ ABSL_GUARDED_BY(mutex_) = 0;
   int running_count_ ABSL_GUARDED_BY(mutex_) = 0;
+  uint64_t reserved_bytes_ ABSL_GUARDED_BY(mutex_) = 0;
+  MemoryExperience experience_ ABSL_GUARDED_BY(mutex_);
+  double mean_run_s_ ABSL_GUARDED_BY(mutex_) = 10;  // before anything was seen
   uint64_t version_ ABSL_GUARDED_BY(mutex_) = 0;
   std::unique_ptr<Executor> executor_;
 };

@@ -6,7 +6,7 @@
 
 namespace carillon {
 
-std::vector<std::string> WorkerCommand(const v1::CreateModalModelRequest& resolved,
+std::vector<std::string> WorkerCommand(const v1::CreateModalModelRequest& resolved, uint32_t way,
                                        const WorkerPlace& place) {
   const v1::DecompositionSettings& settings = resolved.settings();
   const v1::Material& material = resolved.material();
@@ -40,6 +40,7 @@ std::vector<std::string> WorkerCommand(const v1::CreateModalModelRequest& resolv
   if (mesh.target_node_count() > 0) {
     command.push_back(absl::StrCat("--nodes=", mesh.target_node_count()));
   }
+  if (way >= 1) command.emplace_back("--cautious");
   return command;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -17,8 +18,12 @@ struct WorkerPlace {
   int thread_count = 1;
 };
 
-/// The command line of carillon-precompute for a resolved request; it reports to descriptor 3.
-std::vector<std::string> WorkerCommand(const v1::CreateModalModelRequest& resolved,
+/// The ways there are to compute one request: as asked; meshing with more caution.
+constexpr uint32_t kWayCount = 2;
+
+/// The command line of carillon-precompute for a resolved request, computed in way `way` (below
+/// kWayCount); it reports to descriptor 3.
+std::vector<std::string> WorkerCommand(const v1::CreateModalModelRequest& resolved, uint32_t way,
                                        const WorkerPlace& place);
 
 }  // namespace carillon

@@ -140,4 +140,24 @@ absl::Status JobStore::Delete(const std::string& digest) {
   });
 }
 
+absl::StatusOr<std::optional<std::string>> JobStore::Fact(const std::string& name) {
+  std::optional<std::string> value;
+  const absl::Status status = database_->Read([&](SqliteConnection& connection) {
+    return connection.Query("SELECT value FROM facts WHERE name = ?", {name},
+                            [&](const SqlRow& row) {
+                              value = row.Text(0);
+                              return absl::OkStatus();
+                            });
+  });
+  if (!status.ok()) return status;
+  return value;
+}
+
+absl::Status JobStore::PutFact(const std::string& name, const std::string& value) {
+  return database_->Write([&](SqliteConnection& connection) {
+    return connection.Run("INSERT OR REPLACE INTO facts (name, value) VALUES (?, ?)",
+                          {name, value});
+  });
+}
+
 }  // namespace carillon

@@ -55,6 +55,10 @@ class JobStore {
   /// Deleting a job that is not there is no error.
   absl::Status Delete(const std::string& digest);
 
+  /// A figure that is learnt from jobs, under a name; absent before it was first stored.
+  absl::StatusOr<std::optional<std::string>> Fact(const std::string& name);
+  absl::Status PutFact(const std::string& name, const std::string& value);
+
  private:
   Database* database_;
 };

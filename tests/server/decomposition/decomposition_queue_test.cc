@@ -11,9 +11,11 @@
 #include <thread>
 #include <vector>
 
+#include "proto/error_reason.h"
 #include "server/base/sha256.h"
 #include "server/decomposition/decomposition_request.h"
 #include "server/decomposition/local_executor.h"
+#include "server/decomposition/worker_command.h"
 #include "tests/server/decomposition/scripted_worker.h"
 
 namespace carillon {
@@ -97,13 +99,11 @@ class DecompositionQueueTest : public ::testing::Test {
 
   void MakeQueue(const std::string& script) {
     queue_.reset();
-    LocalExecutorOptions options;
-    options.program = WriteWorkerScript(folder_.path(), script);
-    options.directory = folder_ / "running";
-    options.worker_count = 1;
-    auto executor = MakeLocalExecutor(options, clock_);
+    options_.program = WriteWorkerScript(folder_.path(), script);
+    options_.directory = folder_ / "running";
+    auto executor = MakeLocalExecutor(options_, clock_);
     ASSERT_TRUE(executor.ok()) << executor.status();
-    auto queue = DecompositionQueue::Make(*database_, *std::move(executor), clock_);
+    auto queue = DecompositionQueue::Make(*database_, *std::move(executor), clock_, settings_);
     ASSERT_TRUE(queue.ok()) << queue.status();
     queue_ = *std::move(queue);
   }
@@ -140,17 +140,25 @@ class DecompositionQueueTest : public ::testing::Test {
 
   TemporaryFolder folder_;
   SystemClock clock_;
+  LocalExecutorOptions options_{.worker_count = 1};
+  QueueSettings settings_;
   std::string mesh_;
   std::unique_ptr<ModeDatabase> database_;
   std::unique_ptr<DecompositionQueue> queue_;
 };
 
-TEST_F(DecompositionQueueTest, FiftySubmitsAtATimeComputeOnce) {
+TEST_F(DecompositionQueueTest, AThousandSubmitsOfFiftyClientsComputeOnceAndAllAreTold) {
   MakeQueue(absl::StrCat(kCount, kSucceed));
-  std::vector<v1::Job> jobs(50);
+  std::vector<v1::Job> jobs(1000);
   std::vector<std::thread> threads;
-  threads.reserve(jobs.size());
-  for (v1::Job& job : jobs) threads.emplace_back([&] { job = SubmitAndAwaitEnd(Request(20'000)); });
+  threads.reserve(50);
+  for (size_t client = 0; client < 50; ++client) {
+    threads.emplace_back([&, client] {
+      for (size_t i = client; i < jobs.size(); i += 50) {
+        jobs[i] = SubmitAndAwaitEnd(Request(20'000));
+      }
+    });
+  }
   for (std::thread& thread : threads) thread.join();
   for (const v1::Job& job : jobs) {
     EXPECT_EQ(job.name(), jobs.front().name());
@@ -227,13 +235,80 @@ TEST_F(DecompositionQueueTest, ABodyWithoutModesInTheBandIsTriedAgainInAnotherBa
   EXPECT_EQ(RunCount(), 2U);
 }
 
-TEST_F(DecompositionQueueTest, ACrashIsTriedAgainWhenAskedAgain) {
-  MakeQueue(absl::StrCat(kCount, "if [ -e \"$here/crashed\" ]; then ", kSucceed,
-                         "; else touch \"$here/crashed\"; kill -SEGV $$; fi"));
-  const v1::Job crashed = SubmitAndAwaitEnd(Request(20'000));
-  EXPECT_EQ(crashed.state(), v1::JOB_STATE_FAILED);
-  EXPECT_EQ(crashed.error().reason(), "WORKER_CRASHED");
+TEST_F(DecompositionQueueTest, ACrashIsTriedAnotherWay) {
+  MakeQueue(absl::StrCat(kCount, "case \"$*\" in *--cautious*) ", kSucceed,
+                         ";; *) kill -SEGV $$;; esac"));
+  const v1::Job job = SubmitAndAwaitEnd(Request(20'000));
+  EXPECT_EQ(job.state(), v1::JOB_STATE_SUCCEEDED);
+  EXPECT_EQ(job.way(), 1U);
+  EXPECT_EQ(RunCount(), 2U);
+}
+
+TEST_F(DecompositionQueueTest, ACrashInEveryWayIsRememberedAcrossARestart) {
+  MakeQueue(absl::StrCat(kCount, "kill -SEGV $$"));
+  EXPECT_EQ(SubmitAndAwaitEnd(Request(20'000)).error().reason(), "WORKER_CRASHED");
+  EXPECT_EQ(RunCount(), kWayCount);
+  Open("carillon.db");
+  MakeQueue(absl::StrCat(kCount, kSucceed));
+  EXPECT_EQ(Submit(Request(20'000)).error().reason(), "WORKER_CRASHED");
+  EXPECT_EQ(RunCount(), kWayCount);
+}
+
+TEST_F(DecompositionQueueTest, AJobUnderWhichTheDaemonDiesAgainAndAgainIsGivenUpUntilAskedAgain) {
+  const auto request = ResolveRequest(Request(20'000));
+  const std::string digest = RequestDigest(*request);
+  JobRecord record{.digest = digest, .request = request->SerializeAsString()};
+  record.start_count = 9;
+  ASSERT_TRUE(database_->jobs().Put(record).ok());
+  const Gate gate(folder_ / "gate");
+  MakeQueue(absl::StrCat(kWaitAtGate, kSucceed));
+  EXPECT_EQ((*database_->jobs().Find(digest))->start_count, 10U) << "its tenth start";
+  queue_.reset();
+  EXPECT_EQ((*database_->jobs().Find(digest))->start_count, 9U) << "an orderly end does not count";
+  record.start_count = 10;
+  ASSERT_TRUE(database_->jobs().Put(record).ok());
+  MakeQueue(kSucceed);
+  EXPECT_EQ(queue_->Get(digest)->error().reason(), "DECOMPOSITION_GIVEN_UP");
   EXPECT_EQ(SubmitAndAwaitEnd(Request(20'000)).state(), v1::JOB_STATE_SUCCEEDED);
+}
+
+TEST_F(DecompositionQueueTest, AHigherPriorityStartsFirstAndMayBeGivenLater) {
+  const Gate gate(folder_ / "gate");
+  MakeQueue(absl::StrCat("for o; do case $o in --nodes=*) echo ${o#--nodes=} >>\"$here/order\";; ",
+                         "esac; done\n", kWaitAtGate, kSucceed));
+  const auto with_priority = [&](uint32_t nodes, int priority) {
+    auto request = Request(20'000, nodes);
+    request.set_priority(priority);
+    return request;
+  };
+  Diary first;
+  const auto watch = Watch(Submit(with_priority(1, 0)), first);
+  first.Await(v1::JOB_STATE_RUNNING);
+  const v1::Job last = Submit(with_priority(2, -1));
+  Submit(with_priority(3, 0));
+  Submit(with_priority(4, 5));
+  Submit(with_priority(5, 0));
+  EXPECT_EQ(Submit(with_priority(5, 7)).priority(), 7);
+  Diary diary;
+  const auto watch_last = Watch(last, diary);
+  for (int i = 0; i < 5; ++i) gate.Open();
+  diary.AwaitEnd();
+  EXPECT_EQ(ReadBytes(folder_ / "order"), "1\n5\n4\n3\n2\n");
+}
+
+TEST_F(DecompositionQueueTest, NoMoreRunAtATimeThanAreEstimatedToFitIntoTheMemory) {
+  options_.worker_count = 4;
+  options_.memory_budget_bytes = 100 << 20;  // the smallest body is estimated to take 70 MB
+  MakeQueue(absl::StrCat("mkdir \"$here/alone\" || touch \"$here/crowd\"\n", kSucceed,
+                         "\nrmdir \"$here/alone\""));
+  std::vector<v1::Job> jobs;
+  for (uint32_t i = 0; i < 4; ++i) jobs.push_back(Submit(Request(20'000, 600 + i)));
+  for (const v1::Job& job : jobs) {
+    Diary diary;
+    const auto watch = Watch(job, diary);
+    EXPECT_EQ(diary.AwaitEnd().state(), v1::JOB_STATE_SUCCEEDED);
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "crowd"));
 }
 
 TEST_F(DecompositionQueueTest, AModelThatBreaksTheRulesIsAFailureAndNotStored) {
@@ -399,14 +474,16 @@ TEST_F(DecompositionQueueTest, ListsJobsNewestFirstAsTheyStandNow) {
 
 TEST_F(DecompositionQueueTest, RefusesMoreThanItCanRemember) {
   const Gate gate(folder_ / "gate");
+  settings_.max_queued_count = 20;
   MakeQueue(kWaitAtGate);
   // One runs, the others wait.
-  for (uint32_t i = 0; i <= QueueSettings().max_queued_count; ++i) {
+  for (uint32_t i = 0; i <= settings_.max_queued_count; ++i) {
     ASSERT_TRUE(queue_->Submit(Request(20'000, 1 + i)).ok());
   }
   const auto refused = queue_->Submit(Request(20'000, 5'000));
   EXPECT_TRUE(absl::IsResourceExhausted(refused.status()));
   EXPECT_THAT(refused.status().ToString(), HasSubstr("QUEUE_FULL"));
+  EXPECT_GE(std::stoi(ToErrorInfo(refused.status()).metadata().at("retry_after_s")), 1);
 }
 
 TEST_F(DecompositionQueueTest, RefusesAMeshThatWasNeverUploaded) {

@@ -46,9 +46,12 @@ class LocalExecutorTest : public ::testing::Test {
     executor_ = *std::move(executor);
   }
 
-  void Start(TaskRun& run) {
-    executor_->Start({.digest = digest_,
-                      .request = *ResolveRequest(SampleRequest(Sha256Hex("solid"))),
+  void Start(TaskRun& run) { Start(run, digest_); }
+
+  void Start(TaskRun& run, const std::string& digest) {
+    executor_->Start({.digest = digest,
+                      .request = request_,
+                      .way = 0,
                       .write_mesh =
                           [](const std::filesystem::path& file) {
                             WriteBytes(file, "solid");
@@ -81,6 +84,7 @@ class LocalExecutorTest : public ::testing::Test {
   SystemClock clock_;
   LocalExecutorOptions options_;
   const std::string digest_ = Sha256Hex("task");
+  v1::CreateModalModelRequest request_ = *ResolveRequest(SampleRequest(Sha256Hex("solid")));
   TaskRun run_;
   std::unique_ptr<Executor> executor_;
 };
@@ -157,6 +161,56 @@ TEST_F(LocalExecutorTest, KillsAWorkerThatTakesTooMuchMemory) {
   EXPECT_THAT(outcome.error.message(), HasSubstr("100 MiB"));
 }
 
+TEST_F(LocalExecutorTest, TheRequestsOwnLimitsBindWhereTheyAreLower) {
+  request_.set_memory_limit_bytes(50 << 20);
+  const Outcome outcome = RunScript("x=0123456789abcdef; while :; do x=$x$x; done");
+  EXPECT_EQ(outcome.verdict, Verdict::kOutOfMemory);
+  EXPECT_THAT(outcome.error.message(), HasSubstr("50 MiB"));
+  EXPECT_GT(outcome.peak_bytes, 50U << 20);
+  EXPECT_FALSE(outcome.crowded);
+}
+
+TEST_F(LocalExecutorTest, TheRequestsTimeLimitBinds) {
+  request_.set_time_limit_s(0.2);
+  EXPECT_EQ(RunScript("sleep 1000").verdict, Verdict::kTimeout);
+}
+
+TEST_F(LocalExecutorTest, ALackOfMemoryTellsHowMuchTheMeshWouldNeed) {
+  v1::WorkerEvent event;
+  event.mutable_progress()->set_node_count(1'000'000);
+  WriteEvents(EventBytes(event));
+  EXPECT_THAT(RunScript("cat \"$here/events\" >&3; kill -KILL $$").error.message(),
+              HasSubstr("with its 1000000 nodes it would need about 62"));
+}
+
+TEST_F(LocalExecutorTest, WhereAllTogetherTakeTooMuchTheYoungestMakesRoom) {
+  options_.worker_count = 2;
+  options_.memory_budget_bytes = 40 << 20;
+  options_.memory_limit_bytes = 1 << 30;
+  WriteEvents(ProgressBytes(0.5));
+  // 34 MB of text each, and what the shell takes for it.
+  MakeExecutor(
+      "x=0123456789abcdef; for i in 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21; do "
+      "x=$x$x; "
+      "done; cat \"$here/events\" >&3; sleep 1000");
+  Start(run_);
+  ASSERT_TRUE(Happens(run_.progressed));
+  TaskRun second;
+  Start(second, Sha256Hex("second"));
+  ASSERT_TRUE(Happens(second.ended));
+  EXPECT_EQ(second.outcome.verdict, Verdict::kOutOfMemory);
+  EXPECT_TRUE(second.outcome.crowded);
+  executor_->Cancel(digest_);
+  ASSERT_TRUE(Happens(run_.ended));
+  EXPECT_EQ(run_.outcome.verdict, Verdict::kCancelled);
+}
+
+TEST_F(LocalExecutorTest, WorkersKeepToTheirShareOfTheProcessors) {
+  options_.worker_count = 1;
+  RunScript("nproc >\"$out\"");
+  EXPECT_EQ(run_.model, "1\n");
+}
+
 TEST_F(LocalExecutorTest, KillsAWorkerWithoutSignsOfLifeAndItsChildren) {
   const NamedPipe life(folder_ / "life");
   options_.stall_limit = milliseconds(1000);
@@ -204,6 +258,7 @@ TEST_F(LocalExecutorTest, AMeshThatCannotBeBroughtEndsTheTask) {
   executor_->Start(
       {.digest = digest_,
        .request = {},
+       .way = 0,
        .write_mesh = [](const auto&) { return absl::DataLossError("MESH_CORRUPT: x"); },
        .on_progress = [](const v1::Progress&) {},
        .on_end = [&](const Outcome& outcome) { ended.set_value(outcome); }});

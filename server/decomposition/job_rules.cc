@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/decomposition/job_rules.h"
+
+#include <algorithm>
+#include <array>
+
+#include "absl/strings/str_cat.h"
+#include "proto/error_reason.h"
+#include "server/decomposition/decomposition_request.h"
+
+namespace carillon {
+namespace {
+
+template <size_t N>
+bool IsOneOf(const std::string& reason, const std::array<const char*, N>& reasons) {
+  return std::ranges::find(reasons, reason) != reasons.end();
+}
+
+}  // namespace
+
+v1::Job ToJob(const JobRecord& record) {
+  v1::Job job;
+  job.set_name(absl::StrCat("jobs/", record.digest));
+  job.set_modal_model(absl::StrCat("modalModels/", record.digest));
+  job.set_state(record.state);
+  if (record.state == v1::JOB_STATE_FAILED) *job.mutable_error() = record.error;
+  job.set_label(record.label);
+  job.set_priority(record.priority);
+  job.set_way(record.way);
+  job.set_memory_bytes(record.peak_bytes);
+  return job;
+}
+
+absl::StatusOr<v1::CreateModalModelRequest> ParseRequest(const JobRecord& record) {
+  v1::CreateModalModelRequest request;
+  if (!record.damaged && request.ParseFromString(record.request)) return request;
+  return Refusal(absl::StatusCode::kDataLoss, "DATABASE_CORRUPT",
+                 absl::StrCat("jobs/", record.digest, " cannot be read: create its model again"));
+}
+
+bool SameHints(const v1::CreateModalModelRequest& a, const v1::CreateModalModelRequest& b) {
+  return WantedEigenvalue(a) == WantedEigenvalue(b) &&
+         UnitEigenvalue(a, a.min_frequency_hz()) == UnitEigenvalue(b, b.min_frequency_hz());
+}
+
+bool DependsOnHints(const std::string& reason) {
+  return IsOneOf<3>(reason, {"NO_MODE_IN_BAND", "TOO_MANY_MODES", "VERIFICATION_FAILED"});
+}
+
+bool WouldFailAgain(const JobRecord& record, const v1::CreateModalModelRequest& request) {
+  if (record.state != v1::JOB_STATE_FAILED || !record.remembered) return false;
+  const auto refused = ParseRequest(record);
+  return !DependsOnHints(record.error.reason()) || (refused.ok() && SameHints(*refused, request));
+}
+
+bool DependsOnWay(const Outcome& outcome) {
+  return IsOneOf<3>(outcome.error.reason(),
+                    {"WORKER_CRASHED", "WORKER_GARBAGE", "MESH_TETRAHEDRALIZATION_FAILED"});
+}
+
+bool IsDeterministic(const Outcome& outcome) {
+  return outcome.verdict == Verdict::kBadInput || DependsOnWay(outcome);
+}
+
+v1::JobState StateOf(Verdict verdict) {
+  if (verdict == Verdict::kOk) return v1::JOB_STATE_SUCCEEDED;
+  return verdict == Verdict::kCancelled ? v1::JOB_STATE_CANCELLED : v1::JOB_STATE_FAILED;
+}
+
+v1::ErrorInfo GaveUp(uint32_t start_count) {
+  return ToErrorInfo(Refusal(
+      absl::StatusCode::kInternal, "DECOMPOSITION_GIVEN_UP",
+      absl::StrCat("the daemon was killed ", start_count,
+                   " times while it computed this: see the system's log for want of memory, and "
+                   "create the model again")));
+}
+
+}  // namespace carillon
