@@ -68,7 +68,7 @@ void ResetSignals() {
   sigemptyset(&none);
   sigprocmask(SIG_SETMASK, &none, nullptr);
   signal(SIGPIPE, SIG_DFL);
-  signal(SIGXFSZ, SIG_DFL);
+  signal(SIGXFSZ, SIG_IGN);  // where a file may not grow, writing fails as on a full disk
   signal(SIGINT, SIG_DFL);
   signal(SIGTERM, SIG_DFL);
 }
