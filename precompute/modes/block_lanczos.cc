@@ -40,7 +40,7 @@ bool LanczosRecurrence<Real>::Start() {
 template <typename Real>
 bool LanczosRecurrence<Real>::Step() {
   basis_.Append(next_);
-  below_.push_back(R_);
+  below_.emplace_back(R_);
   operator_.Apply(mass_is_identity_ ? next_ : mass_times_, next_);
   // The recurrence takes the large parts out first, so that what is left loses no digits when it is
   // made orthogonal to everything.

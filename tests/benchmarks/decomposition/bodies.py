@@ -48,6 +48,58 @@ def tube(length, around, along, outer=.0125, wall=.001):
     return numpy.concatenate(layers), triangles
 
 
+def lathe(profile, around):
+    """The surface of a closed profile of (radius, height), counter-clockwise, turned about the z axis; points
+    with radius zero are poles."""
+    vertices, rings = [], []
+    for radius, height in profile:
+        count = around if radius > 0 else 1
+        rings.append([len(vertices) + i % count for i in range(around + 1)])
+        for i in range(count):
+            angle = 2 * math.pi * i / around
+            vertices.append((radius * math.cos(angle), radius * math.sin(angle), height))
+    triangles = []
+    for low, high in zip(rings, rings[1:] + rings[:1]):
+        for i in range(around):
+            for triangle in ((low[i], low[i + 1], high[i + 1]), (low[i], high[i + 1], high[i])):
+                if len(set(triangle)) == 3:
+                    triangles.append(triangle)
+    return numpy.array(vertices), triangles
+
+
+def bowl(radius, wall, around, along):
+    """Half a hollow sphere, open above."""
+    angles = [math.pi / 2 * k / along for k in range(along + 1)]
+    outer = [(radius * math.sin(a), -radius * math.cos(a)) for a in angles]
+    inner = [((radius - wall) * math.sin(a), -(radius - wall) * math.cos(a)) for a in angles]
+    return lathe(outer + inner[::-1], around)
+
+
+def box(size, cells):
+    """Twelve faces cut into cells; vertices on edges are shared."""
+    number, vertices, triangles = {}, [], []
+
+    def vertex(point):
+        if point not in number:
+            number[point] = len(vertices)
+            vertices.append([size[a] * point[a] / cells[a] for a in range(3)])
+        return number[point]
+
+    for axis in range(3):
+        u, v = (axis + 1) % 3, (axis + 2) % 3
+        for side in (0, cells[axis]):
+            for i in range(cells[u]):
+                for j in range(cells[v]):
+                    corners = []
+                    for du, dv in ((0, 0), (1, 0), (1, 1), (0, 1)):
+                        point = [0, 0, 0]
+                        point[axis], point[u], point[v] = side, i + du, j + dv
+                        corners.append(vertex(tuple(point)))
+                    a, b, c, d = corners if side else corners[::-1]
+                    triangles.extend([(a, b, c), (a, c, d)])
+    return numpy.array(vertices), triangles
+
+
 def read_bunny(size):
     """Vertices and triangles, `size` metres along its longest side."""
     vertices, triangles = [], []

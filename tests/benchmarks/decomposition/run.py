@@ -4,6 +4,8 @@
 
 Each part prints a Markdown table:
   compare   SciPy, SLEPc and Spectra on the same matrices: CPU seconds, residuals
+  calculix  CalculiX on the same meshes: frequencies
+  table1    the sizes of the paper's Table 1, beside its times
 
 Nothing is kept from one run to the next. Slow programs on large bodies run with --full only, or where
 --peers names them. CPU seconds are those of one thread for everybody.
@@ -15,7 +17,9 @@ import pathlib
 import sys
 import tempfile
 
+import calculix
 import compare
+import table1
 
 
 def processor_flags():
@@ -39,7 +43,8 @@ def fair_environment():
     return environment
 
 
-PARTS = {"compare": compare.compare}
+PARTS = {"compare": compare.compare, "calculix": calculix.compare_frequencies,
+         "table1": table1.table1}
 
 
 def names(text):
