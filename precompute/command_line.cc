@@ -2,6 +2,7 @@
 #include "precompute/command_line.h"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <filesystem>
@@ -24,7 +25,8 @@ struct Options {
   std::optional<double> young_pa, poisson_ratio, density_kg_per_m3, alpha1_s, alpha2_per_s;
   std::optional<double> lambda_pa, mu_pa;
   double size = 1;
-  bool keep_surface = false, refine_surface = false, json = false;
+  std::string wall;
+  bool keep_surface = false, refine_surface = false, repair = false, json = false;
   bool cautious = false;
   int node_count = 0, event_descriptor = -1, thread_count = 0;
 };
@@ -57,6 +59,14 @@ void AddMeshOptions(CLI::App& app, Options& options) {
   app.add_option("--unit", options.unit,
                  "Unit of the file's coordinates: m, mm, cm, in, or a number of metres")
       ->capture_default_str()
+      ->group(group);
+  app.add_flag("--repair", options.repair,
+               "Mend a surface that is no closed body: gently first, else by wrapping it; the "
+               "warnings say what was done and how far it went")
+      ->group(group);
+  app.add_option("--wall", options.wall,
+                 "Hollow the body out to a wall so thick, or thicken an open sheet: a number with "
+                 "m, mm, cm or in, or of metres")
       ->group(group);
   app.add_flag("--keep-surface", options.keep_surface, "Add no vertices on the surface")
       ->group(group);
@@ -178,6 +188,21 @@ absl::StatusOr<double> MetresPerUnit(const std::string& unit) {
                               "\"; it must be m, mm, cm, in, or a number of metres above zero"));
 }
 
+/// Of the body as large as its file and unit make it; empty: none.
+absl::StatusOr<double> WallM(const std::string& wall) {
+  if (wall.empty()) return 0;
+  const size_t digits = std::min(wall.find_first_not_of("0123456789.eE+-"), wall.size());
+  const absl::StatusOr<double> unit =
+      digits == wall.size() ? 1.0 : MetresPerUnit(wall.substr(digits));
+  double number = 0;
+  if (unit.ok() && absl::SimpleAtod(wall.substr(0, digits), &number) && number > 0 &&
+      std::isfinite(number)) {
+    return number * *unit;
+  }
+  return Invalid(absl::StrCat("--wall is \"", wall,
+                              "\"; it must be a length above zero, such as 3mm or 0.003"));
+}
+
 absl::StatusOr<MeshFile> MakeMeshFile(const Options& options) {
   const absl::StatusOr<double> metres_per_unit = MetresPerUnit(options.unit);
   if (!metres_per_unit.ok()) return metres_per_unit.status();
@@ -198,12 +223,15 @@ absl::StatusOr<CommandLine> MakeCommandLine(const Options& options) {
   if (!use.ok()) return use.status();
   const absl::StatusOr<MeshFile> mesh = MakeMeshFile(options);
   if (!mesh.ok()) return mesh.status();
+  const absl::StatusOr<double> wall_m = WallM(options.wall);
+  if (!wall_m.ok()) return wall_m.status();
   CommandLine result{
       .mesh = *mesh,
       .output = options.output,
       .settings = {.poisson_ratio = material->poisson_ratio(),
                    .mass =
                        options.mass == "lumped" ? MassSharing::kLumped : MassSharing::kConsistent,
+                   .preparation = {.repair = options.repair, .wall_m = *wall_m},
                    .meshing = {.keep_surface = {},
                                .target_node_count = options.node_count,
                                .nodes_per_element = options.element == "linear" ? 4 : 10},

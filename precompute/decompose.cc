@@ -10,8 +10,8 @@
 #include "precompute/fem/assembly.h"
 #include "precompute/fem/matrix_market.h"
 #include "precompute/mesh/boundary.h"
-#include "precompute/mesh/check_surface.h"
 #include "precompute/mesh/midside_nodes.h"
+#include "precompute/mesh/prepare_surface.h"
 #include "precompute/mesh/read_mesh.h"
 #include "precompute/modes/deformation_modes.h"
 #include "proto/error_reason.h"
@@ -26,12 +26,15 @@ struct Body {
   std::vector<std::string> warnings;
 };
 
-absl::StatusOr<Body> FillSurface(SurfaceMesh surface, const MeshingSettings& meshing) {
-  absl::StatusOr<std::vector<std::string>> warnings = CheckSurface(surface);
-  if (!warnings.ok()) return warnings.status();
-  absl::StatusOr<TetMesh> mesh = Tetrahedralize(surface, meshing);
+absl::StatusOr<Body> FillSurface(SurfaceMesh given, const DecompositionSettings& settings) {
+  absl::StatusOr<PreparedSurface> prepared = PrepareSurface(given, settings.preparation);
+  if (!prepared.ok()) return prepared.status();
+  absl::StatusOr<TetMesh> mesh = Tetrahedralize(prepared->surface, settings.meshing);
   if (!mesh.ok()) return mesh.status();
-  return Body{std::move(surface), *std::move(mesh), *std::move(warnings)};
+  for (BoundaryFace& face : mesh->boundary) {
+    face.given_triangle = prepared->given_triangle[static_cast<size_t>(face.given_triangle)];
+  }
+  return Body{std::move(given), *std::move(mesh), std::move(prepared->warnings)};
 }
 
 absl::StatusOr<Body> TakeTetrahedra(TetMesh mesh, int nodes_per_element) {
@@ -46,16 +49,16 @@ absl::StatusOr<Body> TakeTetrahedra(TetMesh mesh, int nodes_per_element) {
   return Body{std::move(given), std::move(mesh), {}};
 }
 
-absl::StatusOr<Body> ReadBody(const MeshFile& file, const MeshingSettings& meshing,
+absl::StatusOr<Body> ReadBody(const MeshFile& file, const DecompositionSettings& settings,
                               DecompositionObserver& observer) {
   observer.OnProgress(Phase::kRead, 0);
   absl::StatusOr<Mesh> mesh = ReadMesh(file.path, file.format, file.metres_per_unit);
   if (!mesh.ok()) return mesh.status();
   observer.OnProgress(Phase::kMesh, 0);
   if (auto* tetrahedra = std::get_if<TetMesh>(&*mesh)) {
-    return TakeTetrahedra(std::move(*tetrahedra), meshing.nodes_per_element);
+    return TakeTetrahedra(std::move(*tetrahedra), settings.meshing.nodes_per_element);
   }
-  return FillSurface(std::get<SurfaceMesh>(std::move(*mesh)), meshing);
+  return FillSurface(std::get<SurfaceMesh>(std::move(*mesh)), settings);
 }
 
 absl::Status SaveMatrices(const SystemMatrices& system, const DecompositionSettings& settings) {
@@ -99,7 +102,7 @@ absl::Status CheckBand(const DeformationModes& solution, const IntendedUse& use)
 
 absl::StatusOr<ModalModel> Decompose(const MeshFile& file, const DecompositionSettings& settings,
                                      DecompositionObserver& observer) {
-  const absl::StatusOr<Body> body = ReadBody(file, settings.meshing, observer);
+  const absl::StatusOr<Body> body = ReadBody(file, settings, observer);
   if (!body.ok()) return body.status();
   observer.OnMesh(body->mesh.nodes.size(), body->mesh.element_count());
 

@@ -7,6 +7,7 @@
 #include "precompute/decomposition_observer.h"
 #include "precompute/fem/element.h"
 #include "precompute/intended_use.h"
+#include "precompute/mesh/prepare_surface.h"
 #include "precompute/mesh/tetrahedralize.h"
 #include "precompute/modes/modal_model.h"
 
@@ -23,6 +24,7 @@ struct DecompositionSettings {
   double poisson_ratio = 0;
   MassSharing mass = MassSharing::kConsistent;
   /// How to fill a surface; its nodes_per_element holds for tetrahedra given, too.
+  PreparationSettings preparation;
   MeshingSettings meshing;
   IntendedUse use;
   /// Where to write K.mtx and M.mtx, SI, for the material of `use`; empty: nowhere.

@@ -140,6 +140,8 @@ v1::DecompositionSettings ToProto(const MeshFile& file, const DecompositionSetti
   result.set_metres_per_unit(file.metres_per_unit);
   v1::MeshSettings& mesh = *result.mutable_mesh();
   if (settings.meshing.keep_surface) mesh.set_keep_surface(*settings.meshing.keep_surface);
+  mesh.set_repair(settings.preparation.repair);
+  mesh.set_wall_m(settings.preparation.wall_m);
   mesh.set_target_node_count(static_cast<uint32_t>(settings.meshing.target_node_count));
   return result;
 }

@@ -29,6 +29,8 @@ struct CreateModelOptions {
   int32_t priority = 0;
   double time_limit_s = 0;
   uint64_t memory_limit_mib = 0;
+  bool repair = false;
+  double wall_m = 0;
   bool wait = false;
 };
 

@@ -87,6 +87,11 @@ void AddModelCreate(CLI::App& app, Program& program) {
   create.add_option("--priority", options->priority, "-100 to 100: higher ones start first");
   create.add_option("--time-limit", options->time_limit_s, "give up after so many seconds");
   create.add_option("--memory-limit-mib", options->memory_limit_mib, "memory that it may take");
+  create.add_flag("--repair", options->repair, "mend a surface that is no closed body");
+  create
+      .add_option("--wall", options->wall_m,
+                  "hollow out, or thicken an open sheet, to so many metres")
+      ->check(CLI::PositiveNumber);
   create.add_flag("--wait", options->wait, "show the progress and end with the job");
   AddMaterial(create, options->material);
   create.callback([&program, options, band] {

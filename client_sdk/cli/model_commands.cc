@@ -57,6 +57,8 @@ v1::DecompositionSettings Settings(const CreateModelOptions& options) {
   settings.set_metres_per_unit(MetresPerUnit(options.unit));
   if (options.keep_surface) settings.mutable_mesh()->set_keep_surface(*options.keep_surface);
   settings.mutable_mesh()->set_target_node_count(options.target_node_count);
+  settings.mutable_mesh()->set_repair(options.repair);
+  settings.mutable_mesh()->set_wall_m(options.wall_m);
   return settings;
 }
 

@@ -5,21 +5,24 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cstddef>
 #include <cstring>
-#include <span>
 #include <string>
 
 #include "absl/container/flat_hash_map.h"
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
 #include "precompute/mesh/boundary.h"
+#include "precompute/mesh/byte_stream.h"
 #include "precompute/mesh/run_in_child.h"
 #include "proto/error_reason.h"
 
 namespace carillon::precompute {
 namespace {
 
+/// The largest meshes that are taken need a minute.
+constexpr std::chrono::seconds kMostCpu(600);
 constexpr int kTetgenOutOfMemory = 1;  // what terminatetetgen throws
 
 absl::Status Failed(absl::string_view what) {
@@ -37,23 +40,6 @@ struct Filling {
   std::vector<int32_t> face_corners;     // three a face
   std::vector<int32_t> given_triangles;  // one a face
 };
-
-template <typename T>
-void Append(std::string& bytes, std::span<const T> values) {
-  const size_t count = values.size();
-  bytes.append(reinterpret_cast<const char*>(&count), sizeof count);
-  bytes.append(reinterpret_cast<const char*>(values.data()), values.size_bytes());
-}
-
-template <typename T>
-std::vector<T> Take(const char*& bytes) {
-  size_t count = 0;
-  std::memcpy(&count, bytes, sizeof count);
-  std::vector<T> values(count);
-  std::memcpy(values.data(), bytes + sizeof count, count * sizeof(T));
-  bytes += sizeof count + count * sizeof(T);
-  return values;
-}
 
 void DescribeSurface(const RefinedSurface& surface, tetgenio& in) {
   const auto& [vertices, triangles] = surface.surface;
@@ -103,22 +89,23 @@ std::string RunTetgen(const FillRequest& request) {
     error = code;
   }
   std::string bytes;
-  Append<int>(bytes, {&error, 1});
-  Append<double>(bytes, {out.pointlist, static_cast<size_t>(out.numberofpoints) * 3});
-  Append<int32_t>(bytes, {out.tetrahedronlist, static_cast<size_t>(out.numberoftetrahedra) * 4});
-  Append<int32_t>(bytes, {out.trifacelist, static_cast<size_t>(out.numberoftrifaces) * 3});
-  Append<int32_t>(bytes, {out.trifacemarkerlist, static_cast<size_t>(out.numberoftrifaces)});
+  AppendValues<int>(bytes, {&error, 1});
+  AppendValues<double>(bytes, {out.pointlist, static_cast<size_t>(out.numberofpoints) * 3});
+  AppendValues<int32_t>(bytes,
+                        {out.tetrahedronlist, static_cast<size_t>(out.numberoftetrahedra) * 4});
+  AppendValues<int32_t>(bytes, {out.trifacelist, static_cast<size_t>(out.numberoftrifaces) * 3});
+  AppendValues<int32_t>(bytes, {out.trifacemarkerlist, static_cast<size_t>(out.numberoftrifaces)});
   return bytes;
 }
 
 Filling Parse(const std::string& bytes) {
   const char* next = bytes.data();
   Filling filling;
-  filling.error = Take<int>(next)[0];
-  filling.coordinates = Take<double>(next);
-  filling.corners = Take<int32_t>(next);
-  filling.face_corners = Take<int32_t>(next);
-  filling.given_triangles = Take<int32_t>(next);
+  filling.error = TakeValues<int>(next)[0];
+  filling.coordinates = TakeValues<double>(next);
+  filling.corners = TakeValues<int32_t>(next);
+  filling.face_corners = TakeValues<int32_t>(next);
+  filling.given_triangles = TakeValues<int32_t>(next);
   return filling;
 }
 
@@ -163,7 +150,8 @@ absl::StatusOr<TetMesh> MakeMesh(const Filling& filling) {
 }  // namespace
 
 absl::StatusOr<TetMesh> FillWithTetgen(const FillRequest& request) {
-  const absl::StatusOr<std::string> bytes = RunInChild([&] { return RunTetgen(request); });
+  const absl::StatusOr<std::string> bytes =
+      RunInChild([&] { return RunTetgen(request); }, kMostCpu);
   if (!bytes.ok()) return Failed(absl::StrCat("TetGen was ", bytes.status().message()));
   return MakeMesh(Parse(*bytes));
 }

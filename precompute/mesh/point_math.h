@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -37,6 +39,18 @@ inline std::array<Point, 3> CornersOf(const SurfaceMesh& surface, size_t t) {
   return {surface.vertices[static_cast<size_t>(triangle[0])],
           surface.vertices[static_cast<size_t>(triangle[1])],
           surface.vertices[static_cast<size_t>(triangle[2])]};
+}
+
+/// Diagonal of the box around a surface that has vertices.
+inline double Diagonal(const SurfaceMesh& surface) {
+  Point low = surface.vertices.front(), high = low;
+  for (const Point& p : surface.vertices) {
+    for (size_t i = 0; i < 3; ++i) {
+      low[i] = std::min(low[i], p[i]);
+      high[i] = std::max(high[i], p[i]);
+    }
+  }
+  return Distance(low, high);
 }
 
 /// Twice the area times the unit normal of a triangle.

@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -39,8 +40,11 @@ absl::StatusOr<std::string> ReadAll(int file) {
   return bytes;
 }
 
-[[noreturn]] void BeChild(const std::function<std::string()>& work, int result) {
+[[noreturn]] void BeChild(const std::function<std::string()>& work, int result,
+                          std::chrono::seconds most_cpu) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
+  const rlimit limit{static_cast<rlim_t>(most_cpu.count()), RLIM_INFINITY};
+  setrlimit(RLIMIT_CPU, &limit);
   const int null = open("/dev/null", O_WRONLY | O_CLOEXEC);
   dup2(null, STDOUT_FILENO);
   dup2(null, STDERR_FILENO);
@@ -49,16 +53,21 @@ absl::StatusOr<std::string> ReadAll(int file) {
 
 }  // namespace
 
-absl::StatusOr<std::string> RunInChild(const std::function<std::string()>& work) {
+absl::StatusOr<std::string> RunInChild(const std::function<std::string()>& work,
+                                       std::chrono::seconds most_cpu) {
   const int result = memfd_create("carillon-child", MFD_CLOEXEC);
   if (result < 0) return absl::InternalError(absl::StrCat("memfd_create: ", strerror(errno)));
   const absl::Cleanup close_result = [result] { close(result); };
   const pid_t child = fork();
   if (child < 0) return absl::InternalError(absl::StrCat("fork: ", strerror(errno)));
-  if (child == 0) BeChild(work, result);
+  if (child == 0) BeChild(work, result, most_cpu);
   int status = 0;
   while (waitpid(child, &status, 0) < 0) {
     if (errno != EINTR) return absl::InternalError(absl::StrCat("waitpid: ", strerror(errno)));
+  }
+  if (WIFSIGNALED(status) && WTERMSIG(status) == SIGXCPU) {
+    return absl::AbortedError(
+        absl::StrCat("stopped after ", most_cpu.count(), " s of processor time"));
   }
   if (WIFSIGNALED(status)) {
     return absl::AbortedError(absl::StrCat("killed by signal ", WTERMSIG(status), " (",

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include <chrono>
 #include <functional>
 #include <string>
 
@@ -9,9 +10,11 @@
 namespace carillon::precompute {
 
 /// Runs `work` in a forked child, silent on standard output and error, and returns its bytes. A
-/// crash in `work` ends the child only. The child dies with the calling thread.
+/// crash in `work` ends the child only. The child dies with the calling thread, and once it has
+/// used `most_cpu`.
 ///
 /// Errors: Aborted, with how the child died; Internal if no child could be made.
-absl::StatusOr<std::string> RunInChild(const std::function<std::string()>& work);
+absl::StatusOr<std::string> RunInChild(const std::function<std::string()>& work,
+                                       std::chrono::seconds most_cpu);
 
 }  // namespace carillon::precompute

@@ -48,6 +48,10 @@ absl::Status CheckSettings(const v1::DecompositionSettings& settings) {
     return Invalid(absl::StrCat("metres_per_unit is ", settings.metres_per_unit(),
                                 "; it must be greater than zero"));
   }
+  if (!(std::isfinite(settings.mesh().wall_m()) && settings.mesh().wall_m() >= 0)) {
+    return Invalid(
+        absl::StrCat("wall_m is ", settings.mesh().wall_m(), "; it must be zero or more"));
+  }
   if (!v1::Element_IsValid(settings.element()) || !v1::MassMatrix_IsValid(settings.mass_matrix())) {
     return Invalid("element or mass_matrix has a value that this daemon does not know");
   }
@@ -117,16 +121,21 @@ absl::StatusOr<v1::CreateModalModelRequest> ResolveRequest(
 
 std::string CanonicalText(const v1::CreateModalModelRequest& resolved) {
   const v1::DecompositionSettings& settings = resolved.settings();
-  return absl::StrCat("carillon-decomposition 1\n",             //
-                      "mesh ", resolved.mesh_digest(), "\n",    //
-                      "format ", resolved.mesh_format(), "\n",  //
-                      "poisson_1e-4 ", std::lround(settings.poisson_ratio() * kPoissonSteps), "\n",
-                      "element ", settings.element() == v1::ELEMENT_LINEAR ? "linear" : "quadratic",
-                      "\n", "mass ",
-                      settings.mass_matrix() == v1::MASS_MATRIX_LUMPED ? "lumped" : "consistent",
-                      "\n", "metres_per_unit ", ShortestDecimal(settings.metres_per_unit()), "\n",
-                      "keep_surface ", KeepSurface(settings.mesh()), "\n", "target_node_count ",
-                      settings.mesh().target_node_count(), "\n");
+  std::string text = absl::StrCat(
+      "carillon-decomposition 1\n",             //
+      "mesh ", resolved.mesh_digest(), "\n",    //
+      "format ", resolved.mesh_format(), "\n",  //
+      "poisson_1e-4 ", std::lround(settings.poisson_ratio() * kPoissonSteps), "\n", "element ",
+      settings.element() == v1::ELEMENT_LINEAR ? "linear" : "quadratic", "\n", "mass ",
+      settings.mass_matrix() == v1::MASS_MATRIX_LUMPED ? "lumped" : "consistent", "\n",
+      "metres_per_unit ", ShortestDecimal(settings.metres_per_unit()), "\n", "keep_surface ",
+      KeepSurface(settings.mesh()), "\n", "target_node_count ", settings.mesh().target_node_count(),
+      "\n");
+  // What came later is named only where it is used, so that a model keeps its name.
+  const v1::MeshSettings& mesh = settings.mesh();
+  if (mesh.repair()) absl::StrAppend(&text, "repair yes\n");
+  if (mesh.wall_m() > 0) absl::StrAppend(&text, "wall_m ", ShortestDecimal(mesh.wall_m()), "\n");
+  return text;
 }
 
 std::string RequestDigest(const v1::CreateModalModelRequest& resolved) {

@@ -29,6 +29,8 @@ absl::StatusOr<v1::CreateModalModelRequest> ResolveRequest(
 ///     metres_per_unit <shortest decimal that reads back as the same double>
 ///     keep_surface <auto|yes|no>
 ///     target_node_count <integer; 0: decided from the surface>
+///     repair yes            (only where it is set)
+///     wall_m <shortest decimal, metres>   (only where it is above zero)
 std::string CanonicalText(const v1::CreateModalModelRequest& resolved);
 
 /// SHA-256 of CanonicalText.

@@ -41,6 +41,8 @@ std::vector<std::string> WorkerCommand(const v1::CreateModalModelRequest& resolv
     command.push_back(absl::StrCat("--nodes=", mesh.target_node_count()));
   }
   if (way >= 1) command.emplace_back("--cautious");
+  if (mesh.repair()) command.emplace_back("--repair");
+  if (mesh.wall_m() > 0) command.push_back(option("wall", mesh.wall_m()));
   return command;
 }
 

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <set>
@@ -165,18 +166,30 @@ TEST(Tetrahedralize, RefusesAMeshOverTheLimit) {
               HasSubstr("MESH_TOO_LARGE"));
 }
 
+constexpr std::chrono::seconds kMostCpu(10);
+
+TEST(RunInChild, StopsAChildThatDoesNotEnd) {
+  const auto run_on = []() -> std::string {
+    for (volatile bool on = true; on;) {
+    }
+    return "ended";
+  };
+  EXPECT_THAT(RunInChild(run_on, std::chrono::seconds(1)).status().ToString(),
+              HasSubstr("stopped after 1 s"));
+}
+
 TEST(RunInChild, ReturnsTheBytesOfTheChild) {
   std::string bytes(3'000'000, 'x');
-  EXPECT_EQ(RunInChild([&] { return bytes; }).value(), bytes);
+  EXPECT_EQ(RunInChild([&] { return bytes; }, kMostCpu).value(), bytes);
 }
 
 TEST(RunInChild, SurvivesACrashOfTheChild) {
-  EXPECT_THAT(RunInChild([]() -> std::string { std::abort(); }).status().ToString(),
+  EXPECT_THAT(RunInChild([]() -> std::string { std::abort(); }, kMostCpu).status().ToString(),
               HasSubstr("signal 6"));
 }
 
 TEST(RunInChild, TellsTheExitStatusOfTheChild) {
-  EXPECT_THAT(RunInChild([]() -> std::string { _Exit(3); }).status().ToString(),
+  EXPECT_THAT(RunInChild([]() -> std::string { _Exit(3); }, kMostCpu).status().ToString(),
               HasSubstr("status 3"));
 }
 

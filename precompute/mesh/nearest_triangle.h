@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "precompute/mesh/surface_mesh.h"
+
+namespace carillon::precompute {
+
+/// Finds the nearest place of a surface, which may be any soup of triangles, one at least of which
+/// has an extent.
+class NearestTriangle {
+ public:
+  explicit NearestTriangle(const SurfaceMesh& surface);
+  ~NearestTriangle();
+
+  struct Place {
+    int32_t triangle;
+    Point point;
+    double distance_m;
+  };
+  Place Find(const Point& point) const;
+
+ private:
+  struct Index;
+  std::unique_ptr<Index> index_;
+};
+
+}  // namespace carillon::precompute
