@@ -65,18 +65,7 @@ absl::Status FactorizePanel(Front<double>& front, double smallest, std::vector<d
   return absl::OkStatus();
 }
 
-/// Below this the sign of a pivot of the front is rounding: thin elements elsewhere are far stiffer.
-double SmallestPivot(const Front<double>& front) {
-  double largest = 0;
-  for (int c = 0; c < front.pivots; ++c) {
-    const size_t diagonal = static_cast<size_t>(c) * static_cast<size_t>(front.height() + 1);
-    largest = std::max(largest, std::abs(front.panel[diagonal]));
-  }
-  return 1e-14 * largest;
-}
-
-absl::Status EliminateLdl(Front<double>& front, int& negative) {
-  const double smallest = SmallestPivot(front);
+absl::Status EliminateLdl(Front<double>& front, double smallest, int& negative) {
   std::vector<double> scaled(front.panel.size());
   if (absl::Status status = FactorizePanel(front, smallest, scaled, negative); !status.ok()) {
     return status;
@@ -97,9 +86,14 @@ absl::Status EliminateLdl(Front<double>& front, int& negative) {
 
 absl::StatusOr<int> CountEigenvaluesBelow(const FrontalStructure& fronts, const NodeMatrix& A,
                                           double shift, const PartDone& progress) {
+  double largest = 0;
+  for (size_t e = 0; e < A.row.size(); ++e)
+    largest = std::max(largest, std::abs(A.stiffness[9 * e]));
+  // Below this the sign of a pivot is rounding.
+  const double smallest = 1e-14 * largest;
   int negative = 0;
   const auto eliminate = [&](int, Front<double>& front) {
-    return EliminateLdl(front, negative);
+    return EliminateLdl(front, smallest, negative);
   };
   FrontWalk<double, decltype(eliminate)> walk(fronts, A, shift);
   if (absl::Status status = walk.Run(eliminate, progress); !status.ok()) return status;

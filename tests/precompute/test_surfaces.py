@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: AGPL-3.0-or-later
 """Ill-made surfaces end in the body that was meant or in their own reason: those that are quick, of what
-tests/benchmarks/decomposition/surfaces.py runs whole."""
+benchmark/surfaces_table.py runs whole."""
 
 import os
 import pathlib

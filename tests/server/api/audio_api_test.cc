@@ -131,8 +131,8 @@ TEST_F(AudioApi, AListenerHearsWhatTheMixerRenders) {
   }));
   ASSERT_GE(rendered.size(), 9000U);
   ASSERT_GE(heard.size(), rendered.size());
-  // Bit for bit only where the strike falls into the same phase of the long blocks; else within what
-  // the spectral form is accurate to.
+  // Bit for bit only where the strike falls into the same phase of the long blocks; else within
+  // what the spectral form is accurate to.
   float peak = 0, error = 0;
   for (size_t n = 0; n < rendered.size(); ++n) {
     peak = std::max(peak, std::abs(rendered[n]));

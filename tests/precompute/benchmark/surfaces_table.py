@@ -5,8 +5,8 @@ import argparse
 import pathlib
 import sys
 
-ROOT = pathlib.Path(__file__).resolve().parents[3]
-sys.path.insert(0, str(ROOT / "tests/precompute"))
+PRECOMPUTE_TESTS = pathlib.Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(PRECOMPUTE_TESTS))
 
 import ill_made_surfaces  # noqa: E402
 import surfaces  # noqa: E402
