@@ -15,12 +15,14 @@
 #include <utility>
 
 #include "absl/status/status.h"
+#include "proto/error_reason.h"
 #include "server/api/api_server.h"
 #include "server/api/live_output.h"
 #include "server/base/clock.h"
 #include "server/data_directory.h"
 #include "server/decomposition/decomposition_queue.h"
 #include "server/decomposition/local_executor.h"
+#include "server/mode_database/database_admin.h"
 #include "server/mode_database/mode_database.h"
 #include "server/options.h"
 #include "server/scene/scene_registry.h"
@@ -105,6 +107,7 @@ ApiSettings ApiSettingsOf(const Options& options) {
   return {.addresses = options.addresses,
           .tls_certificate_file = options.tls_certificate_file,
           .tls_key_file = options.tls_key_file,
+          .admin_token_file = options.admin_token_file,
           .version = kVersion};
 }
 
@@ -139,11 +142,35 @@ absl::Status Run(const Options& options) {
   return absl::OkStatus();
 }
 
+/// `carillond db ...`.
+absl::Status LookAfterDatabase(const CommandLine& command) {
+  const absl::StatusOr<DataDirectory> directory =
+      DataDirectory::Open(command.options.data_directory);
+  if (!directory.ok()) return directory.status();
+  int finding_count = 0;
+  const auto on_finding = [&](const std::string& line) {
+    ++finding_count;
+    std::cout << line << std::endl;
+  };
+  const std::filesystem::path file = directory->database_file();
+  if (command.database_command == "restore") return RestoreDatabase(file, command.backup_file);
+  const absl::Status status = command.database_command == "check"
+                                  ? CheckDatabase(file, on_finding)
+                                  : RepairDatabase(file, on_finding);
+  if (!status.ok()) return status;
+  std::cout << finding_count << (finding_count == 1 ? " fault" : " faults") << std::endl;
+  if (command.database_command == "repair" || finding_count == 0) return absl::OkStatus();
+  return Refusal(absl::StatusCode::kDataLoss, "DATABASE_CORRUPT",
+                 "the faults above were found: `carillond db repair` keeps what is whole");
+}
+
 int Main(int argc, const char* const* argv) {
   SetUpLog();
   const absl::StatusOr<CommandLine> command = ReadCommandLine(argc, argv, kVersion);
   if (command.ok() && !command->run) return command->exit_status;
-  const absl::Status status = command.ok() ? Run(command->options) : command.status();
+  const absl::Status status = !command.ok()                       ? command.status()
+                              : command->database_command.empty() ? Run(command->options)
+                                                                  : LookAfterDatabase(*command);
   if (status.ok()) return 0;
   spdlog::error("{}", std::string(status.message()));
   return 1;

@@ -87,6 +87,7 @@ absl::Status ReadKey(const std::string& key, const toml::node& node, Options& op
   if (key == "model_budget_mib") return ReadValue(key, node, options.model_budget_mib);
   if (key == "precompute") return ReadValue(key, node, options.precompute_program);
   if (key == "tls_certificate") return ReadValue(key, node, options.tls_certificate_file);
+  if (key == "admin_token_file") return ReadValue(key, node, options.admin_token_file);
   if (key == "tls_key") return ReadValue(key, node, options.tls_key_file);
   return InvalidConfiguration(absl::StrCat("there is no setting \"", key,
                                            "\"; settings are named as the flags, with _ for -"));
@@ -179,15 +180,34 @@ void AddFlags(CLI::App& app, Options& options) {
       ->capture_default_str();
   app.add_option("--tls-certificate", options.tls_certificate_file, "PEM file, for TCP");
   app.add_option("--tls-key", options.tls_key_file, "PEM file, for TCP");
+  app.add_option("--admin-token-file", options.admin_token_file,
+                 "file with the token of administrators who call over TCP");
+}
+
+/// "db check|repair|restore FILE".
+void AddDatabaseCommands(CLI::App& app, CommandLine& command) {
+  CLI::App& db = *app.add_subcommand("db", "look after the database while no daemon runs");
+  db.require_subcommand(1);
+  const auto add = [&](const char* name, const char* description) {
+    CLI::App* const sub = db.add_subcommand(name, description);
+    sub->callback([&command, name] { command.database_command = name; });
+    return sub;
+  };
+  add("check", "check structure and every hash; exit status 1 where something is wrong");
+  add("repair", "keep what is whole in a new file, and the old one beside it");
+  add("restore", "put a backup in its place")
+      ->add_option("FILE", command.backup_file, "made by `carillon db backup`")
+      ->required();
 }
 
 /// Parses into `options`. Nothing where the program is to run; else its exit status.
 std::optional<int> ParseFlags(int argc, const char* const* argv, const std::string& version,
-                              std::string& configuration, Options& options) {
+                              std::string& configuration, CommandLine& command) {
   CLI::App app("Makes rigid-body simulations audible.", "carillond");
   app.set_version_flag("--version", "carillond " + version);
   app.add_option("--config", configuration, "TOML file; its keys are the flags, with _ for -");
-  AddFlags(app, options);
+  AddFlags(app, command.options);
+  AddDatabaseCommands(app, command);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -211,7 +231,7 @@ absl::StatusOr<CommandLine> ReadCommandLine(int argc, const char* const* argv,
         return status;
       }
     }
-    if (const auto exit_status = ParseFlags(argc, argv, version, configuration, command.options)) {
+    if (const auto exit_status = ParseFlags(argc, argv, version, configuration, command)) {
       command.exit_status = *exit_status;
       return command;
     }

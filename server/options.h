@@ -27,12 +27,17 @@ struct Options {
   std::string precompute_program;  ///< carillon-precompute
   std::string tls_certificate_file;
   std::string tls_key_file;
+  std::string admin_token_file;
 };
 
 /// What to do: run, or end at once with this text (--help, --version) or complaint.
 struct CommandLine {
   Options options;
   bool run = false;
+  /// Empty: serve. Else what to do with the database, which no daemon may have open: "check",
+  /// "repair" or "restore".
+  std::string database_command{};
+  std::string backup_file{};  ///< to restore
   int exit_status = 0;
 };
 

@@ -64,7 +64,18 @@ struct RenderOptions {
 absl::Status ShowStatus(const client::Client& daemon, const std::string& server, bool json);
 absl::Status CreateModel(const client::Client& daemon, const CreateModelOptions& options,
                          bool json);
-absl::Status ListModels(const client::Client& daemon, bool json);
+/// Times of `filter` are those of the contract.
+absl::Status ListModels(const client::Client& daemon, const v1::ListModalModelsRequest& filter,
+                        bool json);
+absl::Status UpdateModel(const client::Client& daemon, const std::string& text,
+                         v1::UpdateModalModelRequest change, bool json);
+/// An empty `file`: the digest and ".model", here.
+absl::Status ExportModel(const client::Client& daemon, const std::string& text, std::string file);
+/// A file whose name is a digest keeps that name.
+absl::Status ImportModel(const client::Client& daemon, const std::string& file,
+                         const std::string& label, bool json);
+absl::Status ShowDatabaseStats(const client::Client& daemon, bool json);
+absl::Status CollectGarbage(const client::Client& daemon, uint64_t budget_mib, bool json);
 /// `text` is a name, a label or the first digits of a digest. With the frequencies that `figures`
 /// give, where there are any.
 absl::Status ShowModel(const client::Client& daemon, const std::string& text,

@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "client_sdk/cli/commands.h"
 #include "client_sdk/cli/output.h"
@@ -18,7 +19,13 @@ struct Program {
   bool json = false;
   std::function<absl::Status()> command;
 
-  client::Client Daemon() const { return client::Client(server); }
+  std::string admin_token;
+
+  client::Client Daemon() const {
+    client::Client daemon(server);
+    daemon.SetAdminToken(admin_token);
+    return daemon;
+  }
 };
 
 template <class T>
@@ -123,14 +130,110 @@ void AddModelDelete(CLI::App& app, Program& program) {
   });
 }
 
+void AddModelList(CLI::App& app, Program& program) {
+  auto filter = std::make_shared<v1::ListModalModelsRequest>();
+  CLI::App& list = *app.add_subcommand("list", "list the models, newest first");
+  list.add_option_function<std::string>(
+      "--label", [filter](const std::string& text) { filter->set_label_contains(text); },
+      "only those whose label contains this");
+  list.add_option_function<std::string>(
+      "--tag", [filter](const std::string& text) { filter->set_tag(text); },
+      "only those with this tag");
+  list.callback([&program, filter] {
+    program.command = [&program, filter] {
+      return ListModels(program.Daemon(), *filter, program.json);
+    };
+  });
+}
+
+void AddModelTag(CLI::App& app, Program& program) {
+  auto model = std::make_shared<std::string>();
+  auto change = std::make_shared<v1::UpdateModalModelRequest>();
+  CLI::App& tag = *app.add_subcommand("tag", "label, tag or pin a model");
+  tag.add_option("model", *model, "name, label, or first digits of the digest")->required();
+  tag.add_option_function<std::string>(
+      "--label", [change](const std::string& text) { change->set_label(text); }, "its new label");
+  tag.add_option_function<std::vector<std::string>>(
+      "--add",
+      [change](const std::vector<std::string>& tags) {
+        change->mutable_add_tags()->Assign(tags.begin(), tags.end());
+      },
+      "tags to add");
+  tag.add_option_function<std::vector<std::string>>(
+      "--remove",
+      [change](const std::vector<std::string>& tags) {
+        change->mutable_remove_tags()->Assign(tags.begin(), tags.end());
+      },
+      "tags to take away");
+  tag.add_flag_function(
+      "--pin,!--unpin", [change](int64_t count) { change->set_pinned(count > 0); },
+      "garbage collection leaves it alone, or does not");
+  tag.callback([&program, model, change] {
+    program.command = [&program, model, change] {
+      return UpdateModel(program.Daemon(), *model, *change, program.json);
+    };
+  });
+}
+
+void AddModelExport(CLI::App& app, Program& program) {
+  auto model = std::make_shared<std::string>();
+  auto file = std::make_shared<std::string>();
+  CLI::App& command = *app.add_subcommand("export", "write a model to a file");
+  command.add_option("model", *model, "name, label, or first digits of the digest")->required();
+  command.add_option("--out", *file, "where to [its digest, with .model]");
+  command.callback([&program, model, file] {
+    program.command = [&program, model, file] {
+      return ExportModel(program.Daemon(), *model, *file);
+    };
+  });
+}
+
+void AddModelImport(CLI::App& app, Program& program) {
+  auto file = std::make_shared<std::string>();
+  auto label = std::make_shared<std::string>();
+  CLI::App& command = *app.add_subcommand("import", "store the model of a file");
+  command.add_option("file", *file, "written by export or by carillon-precompute")->required();
+  command.add_option("--label", *label, "name for people");
+  command.callback([&program, file, label] {
+    program.command = [&program, file, label] {
+      return ImportModel(program.Daemon(), *file, *label, program.json);
+    };
+  });
+}
+
 void AddModel(CLI::App& app, Program& program) {
   CLI::App& model = *app.add_subcommand("model", "modal models")->require_subcommand(1);
   AddModelCreate(model, program);
-  model.add_subcommand("list", "list the models, newest first")->callback([&program] {
-    program.command = [&program] { return ListModels(program.Daemon(), program.json); };
-  });
+  AddModelList(model, program);
   AddModelShow(model, program);
   AddModelDelete(model, program);
+  AddModelTag(model, program);
+  AddModelExport(model, program);
+  AddModelImport(model, program);
+}
+
+void AddDatabase(CLI::App& app, Program& program) {
+  auto file = std::make_shared<std::string>();
+  auto budget_mib = std::make_shared<uint64_t>(0);
+  CLI::App& db = *app.add_subcommand("db", "the daemon's database, for administrators");
+  db.require_subcommand(1);
+  db.add_option("--token", program.admin_token, "an administrator's token, over TCP")
+      ->envname("CARILLON_ADMIN_TOKEN");
+  db.add_subcommand("stats", "say what it holds")->callback([&program] {
+    program.command = [&program] { return ShowDatabaseStats(program.Daemon(), program.json); };
+  });
+  CLI::App& backup = *db.add_subcommand("backup", "write a copy of it to a file");
+  backup.add_option("file", *file, "where to")->required();
+  backup.callback([&program, file] {
+    program.command = [&program, file] { return program.Daemon().BackUpDatabase(*file); };
+  });
+  CLI::App& collect = *db.add_subcommand("collect", "delete models, least recently sounded first");
+  collect.add_option("--budget-mib", *budget_mib, "what those left may take")->required();
+  collect.callback([&program, budget_mib] {
+    program.command = [&program, budget_mib] {
+      return CollectGarbage(program.Daemon(), *budget_mib, program.json);
+    };
+  });
 }
 
 void AddJob(CLI::App& app, Program& program) {
@@ -209,6 +312,7 @@ int Main(int argc, char** argv) {
       "Exits with 0 when done, 1 when refused (stderr says why), 2 when called wrongly, 3 "
       "when no daemon answers.");
   AddStatus(app, program);
+  AddDatabase(app, program);
   AddModel(app, program);
   AddJob(app, program);
   AddStrike(app, program);

@@ -139,8 +139,9 @@ absl::Status CreateModel(const client::Client& daemon, const CreateModelOptions&
   return absl::OkStatus();
 }
 
-absl::Status ListModels(const client::Client& daemon, bool json) {
-  const auto models = daemon.ListModalModels();
+absl::Status ListModels(const client::Client& daemon, const v1::ListModalModelsRequest& filter,
+                        bool json) {
+  const auto models = daemon.ListModalModels(filter);
   if (!models.ok()) return models.status();
   if (json) {
     v1::ListModalModelsResponse list;

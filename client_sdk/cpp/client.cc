@@ -63,9 +63,19 @@ absl::StatusOr<v1::ModalModelSummary> Client::GetModalModel(const std::string& n
   return std::move(*response->mutable_modal_model());
 }
 
-absl::StatusOr<std::vector<v1::ModalModelSummary>> Client::ListModalModels() const {
+absl::StatusOr<v1::ModalModelSummary> Client::UpdateModalModel(
+    const v1::UpdateModalModelRequest& request) const {
+  auto response =
+      Call(stubs_->models, stubs_->server, &v1::ModalModelService::Stub::UpdateModalModel, request);
+  if (!response.ok()) return response.status();
+  return std::move(*response->mutable_modal_model());
+}
+
+absl::StatusOr<std::vector<v1::ModalModelSummary>> Client::ListModalModels(
+    const v1::ListModalModelsRequest& filter) const {
   std::vector<v1::ModalModelSummary> models;
-  v1::ListModalModelsRequest request;
+  v1::ListModalModelsRequest request = filter;
+  request.clear_page_token();
   request.set_page_size(kPageSize);
   do {
     auto page = Call(stubs_->models, stubs_->server, &v1::ModalModelService::Stub::ListModalModels,

@@ -9,6 +9,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
+#include "carillon/v1/admin_service.pb.h"
 #include "carillon/v1/audio_service.pb.h"
 #include "carillon/v1/contact_service.pb.h"
 #include "carillon/v1/decomposition_service.pb.h"
@@ -38,8 +39,20 @@ class Client {
   absl::StatusOr<std::string> UploadMesh(absl::string_view bytes) const;
   absl::StatusOr<v1::Job> CreateModalModel(const v1::CreateModalModelRequest& request) const;
   absl::StatusOr<v1::ModalModelSummary> GetModalModel(const std::string& name) const;
-  /// All of them, newest first, without their eigenvalues.
-  absl::StatusOr<std::vector<v1::ModalModelSummary>> ListModalModels() const;
+  /// Newest first, without their eigenvalues: all, or those that match `filter`, whose page is
+  /// ignored.
+  absl::StatusOr<std::vector<v1::ModalModelSummary>> ListModalModels(
+      const v1::ListModalModelsRequest& filter = {}) const;
+  absl::StatusOr<v1::ModalModelSummary> UpdateModalModel(
+      const v1::UpdateModalModelRequest& request) const;
+  /// Writes a model to a file in the stored form. Errors also: Internal (OUTPUT_NOT_WRITABLE).
+  absl::Status ExportModalModel(const std::string& name, const std::string& file) const;
+  /// Stores the model of a file in the stored form. `name`: "modalModels/{digest}", or empty: named
+  /// after its content. Errors also: NotFound (FILE_NOT_FOUND), InvalidArgument
+  /// (MODAL_MODEL_MALFORMED).
+  absl::StatusOr<v1::ModalModelSummary> ImportModalModel(const std::string& file,
+                                                         const std::string& name,
+                                                         const std::string& label) const;
   absl::Status DeleteModalModel(const std::string& name) const;
   absl::StatusOr<std::vector<v1::CatalogueMaterial>> ListMaterials() const;
 
@@ -71,6 +84,13 @@ class Client {
                                            ContactTraceReader& trace,
                                            const AudioCallback& on_block) const;
   absl::StatusOr<v1::GetMixerResponse> GetMixer() const;
+
+  /// What the calls of an administrator show over TCP; a Unix socket needs none.
+  void SetAdminToken(const std::string& token);
+  absl::StatusOr<v1::GetDatabaseStatsResponse> GetDatabaseStats() const;
+  /// Writes a copy of the daemon's database to a file. Errors also: Internal (OUTPUT_NOT_WRITABLE).
+  absl::Status BackUpDatabase(const std::string& file) const;
+  absl::StatusOr<v1::CollectGarbageResponse> CollectGarbage(uint64_t budget_bytes) const;
 
  private:
   struct Stubs;

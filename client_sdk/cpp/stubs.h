@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 
+#include "carillon/v1/admin_service.grpc.pb.h"
 #include "carillon/v1/audio_service.grpc.pb.h"
 #include "carillon/v1/contact_service.grpc.pb.h"
 #include "carillon/v1/decomposition_service.grpc.pb.h"
@@ -23,14 +24,17 @@ struct Client::Stubs {
         decompositions(channel),
         scenes(channel),
         contacts(channel),
-        audio(channel) {}
+        audio(channel),
+        admin(channel) {}
 
   std::string server;
+  std::string admin_token;
   v1::ModalModelService::Stub models;
   v1::DecompositionService::Stub decompositions;
   v1::SceneService::Stub scenes;
   v1::ContactService::Stub contacts;
   v1::AudioService::Stub audio;
+  v1::AdminService::Stub admin;
 };
 
 }  // namespace carillon::client

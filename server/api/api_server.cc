@@ -13,6 +13,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "proto/error_reason.h"
+#include "server/api/admin_service.h"
 #include "server/api/audio_service.h"
 #include "server/api/contact_service.h"
 #include "server/api/decomposition_service.h"
@@ -28,6 +29,7 @@ constexpr int kCallThreadCount = 4;
 /// Rendering offline stands back behind everything that is heard now.
 constexpr int kRenderThreadCount = 2;
 constexpr int kRenderNiceness = 10;
+constexpr size_t kShortestToken = 16;
 constexpr std::chrono::milliseconds kGracePeriod(500);
 
 absl::Status Unready(absl::string_view reason, absl::string_view message) {
@@ -41,6 +43,16 @@ absl::StatusOr<std::string> ReadFile(const std::string& path) {
     return Unready("TLS_UNUSABLE", absl::StrCat("cannot read \"", path, "\""));
   }
   return content;
+}
+
+absl::StatusOr<std::string> ReadToken(const std::string& path) {
+  if (path.empty()) return std::string();
+  std::ifstream file(path);
+  std::string token;
+  if (std::getline(file, token) && token.size() >= kShortestToken) return token;
+  return Unready("ADMIN_TOKEN_UNUSABLE",
+                 absl::StrCat("cannot read a token of at least ", kShortestToken,
+                              " characters from \"", path, "\""));
 }
 
 absl::StatusOr<std::shared_ptr<grpc::ServerCredentials>> TcpCredentials(
@@ -78,8 +90,9 @@ absl::StatusOr<std::deque<ListenAddress>> ParseAddresses(const ApiSettings& sett
 }  // namespace
 
 struct ApiServer::State {
-  State(const ApiSettings& settings, const ServedRooms& rooms)
-      : models(rooms.database, rooms.decompositions, call_pool),
+  State(const ApiSettings& settings, const ServedRooms& rooms, std::string admin_token)
+      : admin(rooms.database, std::move(admin_token), call_pool),
+        models(rooms.database, rooms.decompositions, call_pool),
         decompositions(rooms.decompositions, call_pool),
         scenes(rooms.scenes, rooms.database, call_pool),
         contacts({.scenes = rooms.scenes,
@@ -92,6 +105,7 @@ struct ApiServer::State {
 
   WorkPool call_pool{kCallThreadCount};
   WorkPool render_pool{kRenderThreadCount, kRenderNiceness};
+  AdminService admin;
   ModalModelService models;
   DecompositionService decompositions;
   SceneService scenes;
@@ -118,8 +132,8 @@ absl::Status ApiServer::State::Listen(const ApiSettings& settings) {
       builder.AddListeningPort(address.ToString(), *tcp_credentials, &address.port);
     }
   }
-  for (grpc::Service* service : std::initializer_list<grpc::Service*>{&models, &decompositions,
-                                                                      &scenes, &contacts, &audio}) {
+  for (grpc::Service* service : std::initializer_list<grpc::Service*>{
+           &admin, &models, &decompositions, &scenes, &contacts, &audio}) {
     builder.RegisterService(service);
   }
   server = builder.BuildAndStart();
@@ -136,7 +150,9 @@ absl::StatusOr<std::unique_ptr<ApiServer>> ApiServer::Start(const ApiSettings& s
                                                             const ServedRooms& rooms) {
   grpc::EnableDefaultHealthCheckService(true);
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();
-  auto state = std::make_unique<State>(settings, rooms);
+  absl::StatusOr<std::string> admin_token = ReadToken(settings.admin_token_file);
+  if (!admin_token.ok()) return admin_token.status();
+  auto state = std::make_unique<State>(settings, rooms, *std::move(admin_token));
   if (absl::Status status = state->Listen(settings); !status.ok()) return status;
   return std::unique_ptr<ApiServer>(new ApiServer(std::move(state)));
 }

@@ -21,6 +21,9 @@ struct ApiSettings {
   /// PEM files for all TCP addresses; empty: without TLS, on this machine's own addresses only.
   std::string tls_certificate_file;
   std::string tls_key_file;
+  /// A file whose first line lets callers from the network do what administrators may; empty: only
+  /// those on a Unix socket may.
+  std::string admin_token_file{};
   /// Of the daemon.
   std::string version;
 };
@@ -38,7 +41,7 @@ struct ServedRooms {
 class ApiServer {
  public:
   /// Serves once it returns. Errors: InvalidArgument (INVALID_ADDRESS), FailedPrecondition
-  /// (TLS_REQUIRED: a network address without TLS, TLS_UNUSABLE, ADDRESS_IN_USE, LISTEN_FAILED).
+  /// (TLS_REQUIRED: a network address without TLS, TLS_UNUSABLE, ADMIN_TOKEN_UNUSABLE, ADDRESS_IN_USE, LISTEN_FAILED).
   static absl::StatusOr<std::unique_ptr<ApiServer>> Start(const ApiSettings& settings,
                                                           const ServedRooms& rooms);
 

@@ -72,6 +72,12 @@ absl::Status Database::Read(absl::FunctionRef<absl::Status(SqliteConnection&)> b
   return status;
 }
 
+absl::Status Database::ReadOutsideTransaction(
+    absl::FunctionRef<absl::Status(SqliteConnection&)> body) {
+  auto connection = Connect(file_);
+  return connection.ok() ? body(**connection) : connection.status();
+}
+
 absl::StatusOr<std::unique_ptr<SqliteConnection>> Database::TakeReader() {
   {
     MutexLock lock(&readers_mutex_);

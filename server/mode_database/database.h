@@ -28,6 +28,9 @@ class Database {
   /// Runs `body` on one snapshot of the database.
   absl::Status Read(absl::FunctionRef<absl::Status(SqliteConnection&)> body);
 
+  /// Runs `body` on a connection for what cannot be within a transaction.
+  absl::Status ReadOutsideTransaction(absl::FunctionRef<absl::Status(SqliteConnection&)> body);
+
   /// Where files that wait for a transaction belong: on the same disk.
   std::filesystem::path folder() const { return file_.parent_path(); }
 

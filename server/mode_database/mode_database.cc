@@ -20,6 +20,8 @@ ModeDatabase::ModeDatabase(std::unique_ptr<Database> database, const Clock& cloc
       models_(*database_, clock),
       jobs_(*database_) {}
 
+std::filesystem::path ModeDatabase::folder() const { return database_->folder(); }
+
 ModeDatabase::~ModeDatabase() = default;
 
 }  // namespace carillon

@@ -29,6 +29,9 @@ class ModeDatabase {
   MeshStore& meshes() { return meshes_; }
   ModelStore& models() { return models_; }
   JobStore& jobs() { return jobs_; }
+  Database& database() { return *database_; }  ///< for database_admin.h
+  /// The folder of the file: for files that belong beside it.
+  std::filesystem::path folder() const;
 
  private:
   ModeDatabase(std::unique_ptr<Database> database, const Clock& clock);

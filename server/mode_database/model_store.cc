@@ -89,6 +89,7 @@ struct ModelImport::State {
   SpoolFile file;
   ModelSummary summary;
   ModelChecker checker;
+  Sha256 sha;
 };
 
 ModelImport::ModelImport(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -99,13 +100,16 @@ ModelImport::~ModelImport() = default;
 absl::Status ModelImport::Append(const v1::ModalModelRecord& record) {
   absl::Status status = state_->checker.Check(record);
   if (!status.ok()) return status;
-  return state_->file.Append(Delimited(record));
+  const std::string bytes = Delimited(record);
+  state_->sha.Update(bytes);
+  return state_->file.Append(bytes);
 }
 
 absl::StatusOr<ModelSummary> ModelImport::Finish() {
   absl::Status status = state_->checker.Finish();
   if (status.ok()) status = state_->file.Rewind();
   if (!status.ok()) return status;
+  if (state_->summary.digest.empty()) state_->summary.digest = state_->sha.Finish();
   return PutRecords(state_->database, state_->clock, ModelFileReader(state_->file.descriptor()),
                     state_->summary);
 }
@@ -171,11 +175,11 @@ absl::StatusOr<ModelSummary> ModelStore::PutFile(const std::string& digest,
 
 absl::StatusOr<ModelImport> ModelStore::Import(const std::string& digest,
                                                const std::string& label) {
-  if (const absl::Status status = CheckName(digest); !status.ok()) return status;
+  if (const absl::Status status = CheckName(digest); !digest.empty() && !status.ok()) return status;
   absl::StatusOr<SpoolFile> file = SpoolFile::Make(database_->folder());
   if (!file.ok()) return file.status();
   return ModelImport(std::make_unique<ModelImport::State>(
-      ModelImport::State{*database_, *clock_, *std::move(file), Named(digest, label), {}}));
+      ModelImport::State{*database_, *clock_, *std::move(file), Named(digest, label), {}, {}}));
 }
 
 absl::StatusOr<ModelExport> ModelStore::Export(const std::string& digest) {

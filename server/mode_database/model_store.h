@@ -134,6 +134,7 @@ class ModelStore {
   absl::StatusOr<ModelSummary> PutFile(const std::string& digest, const std::string& label,
                                        const std::filesystem::path& file);
 
+  /// An empty `digest`: that of the records, as they stand in a file.
   /// Errors: InvalidArgument (INVALID_NAME: not a digest).
   absl::StatusOr<ModelImport> Import(const std::string& digest, const std::string& label);
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/mode_database/sqlite_connection.h"
 
+#include <SQLiteCpp/Backup.h>
 #include <SQLiteCpp/SQLiteCpp.h>
 #include <sqlite3.h>
 
@@ -136,6 +137,16 @@ absl::Status SqliteConnection::Query(const char* sql,
       absl::Status status = on_row(Row(statement));
       if (!status.ok()) return status;
     }
+    return absl::OkStatus();
+  });
+}
+
+absl::Status SqliteConnection::BackUpTo(const std::filesystem::path& copy) {
+  return Guarded([&] {
+    SQLite::Database target(copy.string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE,
+                            kBusyTimeoutMs);
+    // All in one step, which is one snapshot: writers append to the log meanwhile.
+    SQLite::Backup(target, state_->database).executeStep(-1);
     return absl::OkStatus();
   });
 }

@@ -51,6 +51,9 @@ class SqliteConnection {
   absl::Status Query(const char* sql, std::initializer_list<SqlParameter> parameters,
                      absl::FunctionRef<absl::Status(const SqlRow&)> on_row);
 
+  /// Writes a copy of the database as it stands now into a new file. Outside a transaction.
+  absl::Status BackUpTo(const std::filesystem::path& copy);
+
   /// Rows that the last statement changed.
   int64_t changed_row_count() const;
 

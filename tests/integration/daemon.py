@@ -31,7 +31,9 @@ class Daemon:
                 [BIN / "carillond", "--data-dir", self.folder / "data", "--listen", self.server,
                  "--audio-device", "null", *self.arguments],
                 stdout=subprocess.PIPE, stderr=log, text=True)
-        if not self.process.stdout.readline().startswith("listening on "):
+        address_count = 1 + self.arguments.count("--listen")
+        self.listening = [self.process.stdout.readline() for _ in range(address_count)]
+        if not self.listening[-1].startswith("listening on "):
             raise RuntimeError("carillond did not start: " + (self.folder / "log").read_text())
 
     def client(self):

@@ -8,6 +8,7 @@ import meshes
 from carillon.v1 import modal_model_pb2
 from daemon import BIN
 from google.protobuf.internal.decoder import _DecodeVarint32
+from google.protobuf.internal.encoder import _VarintBytes
 
 OPTIONS = r"""#!/bin/sh
 here='{here}'
@@ -48,6 +49,12 @@ def read_records(path):
         records.append(modal_model_pb2.ModalModelRecord.FromString(data[at:at + size]))
         at += size
     return records
+
+
+def delimited(record):
+    """A record as it stands in a file."""
+    data = record.SerializeToString()
+    return _VarintBytes(len(data)) + data
 
 
 def processes_of(folder):

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The calls of Client that move files, and those of administrators.
+#include <fcntl.h>
+#include <google/protobuf/io/zero_copy_stream_impl.h>
+#include <google/protobuf/util/delimited_message_util.h>
+#include <grpcpp/client_context.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <fstream>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "client_sdk/cpp/client.h"
+#include "client_sdk/cpp/rpc_status.h"
+#include "client_sdk/cpp/stubs.h"
+#include "proto/error_reason.h"
+
+namespace carillon::client {
+namespace {
+
+constexpr auto kCallTimeout = std::chrono::seconds(60);
+constexpr int kMaxRecordBytes = 2 << 20;
+
+absl::Status NotWritable(const std::string& file) {
+  return Refusal(absl::StatusCode::kInternal, "OUTPUT_NOT_WRITABLE",
+                 absl::StrCat(file, " cannot be written: see its folder, its rights and the room"));
+}
+
+/// Shows the token, where there is one.
+void Authorize(grpc::ClientContext& context, const std::string& token) {
+  if (!token.empty()) context.AddMetadata("authorization", absl::StrCat("Bearer ", token));
+}
+
+/// Sends the records of `in` to the writer; the first message carries name and label too.
+template <class Writer>
+absl::Status SendRecords(google::protobuf::io::FileInputStream& in,
+                         v1::ImportModalModelRequest& request, Writer& writer) {
+  while (true) {
+    bool at_end = false;
+    v1::ModalModelRecord& record = *request.mutable_record();
+    record.Clear();
+    if (!google::protobuf::util::ParseDelimitedFromZeroCopyStream(&record, &in, &at_end)) {
+      if (at_end) return absl::OkStatus();
+      return Refusal(absl::StatusCode::kInvalidArgument, "MODAL_MODEL_MALFORMED",
+                     "the file is not a sequence of modal model records, or is cut short");
+    }
+    if (!writer.Write(request)) return absl::OkStatus();  // Finish tells why
+    request.clear_name();
+    request.clear_label();
+  }
+}
+
+}  // namespace
+
+absl::Status Client::ExportModalModel(const std::string& name, const std::string& file) const {
+  std::ofstream out(file, std::ios::binary);
+  if (!out) return NotWritable(file);
+  grpc::ClientContext context;
+  v1::ExportModalModelRequest request;
+  request.set_name(name);
+  const auto reader = stubs_->models.ExportModalModel(&context, request);
+  v1::ExportModalModelResponse response;
+  while (out && reader->Read(&response)) {
+    google::protobuf::util::SerializeDelimitedToOstream(response.record(), &out);
+  }
+  out.close();
+  if (!out) context.TryCancel();
+  const absl::Status status = FromRpc(reader->Finish(), stubs_->server);
+  return out ? status : NotWritable(file);
+}
+
+absl::StatusOr<v1::ModalModelSummary> Client::ImportModalModel(const std::string& file,
+                                                               const std::string& name,
+                                                               const std::string& label) const {
+  const int descriptor = open(file.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor < 0) {
+    return Refusal(absl::StatusCode::kNotFound, "FILE_NOT_FOUND",
+                   absl::StrCat(file, " cannot be read: see its name and rights"));
+  }
+  google::protobuf::io::FileInputStream in(descriptor, kMaxRecordBytes);
+  in.SetCloseOnDelete(true);
+  grpc::ClientContext context;
+  v1::ImportModalModelResponse response;
+  const auto writer = stubs_->models.ImportModalModel(&context, &response);
+  v1::ImportModalModelRequest request;
+  request.set_name(name);
+  request.set_label(label);
+  const absl::Status sent = SendRecords(in, request, *writer);
+  if (!sent.ok()) context.TryCancel();
+  writer->WritesDone();
+  const absl::Status status = FromRpc(writer->Finish(), stubs_->server);
+  if (!sent.ok()) return sent;
+  if (!status.ok()) return status;
+  return std::move(*response.mutable_modal_model());
+}
+
+void Client::SetAdminToken(const std::string& token) { stubs_->admin_token = token; }
+
+absl::StatusOr<v1::GetDatabaseStatsResponse> Client::GetDatabaseStats() const {
+  grpc::ClientContext context;
+  context.set_deadline(std::chrono::system_clock::now() + kCallTimeout);
+  Authorize(context, stubs_->admin_token);
+  v1::GetDatabaseStatsResponse response;
+  const absl::Status status =
+      FromRpc(stubs_->admin.GetDatabaseStats(&context, {}, &response), stubs_->server);
+  if (!status.ok()) return status;
+  return response;
+}
+
+absl::Status Client::BackUpDatabase(const std::string& file) const {
+  std::ofstream out(file, std::ios::binary);
+  if (!out) return NotWritable(file);
+  grpc::ClientContext context;
+  Authorize(context, stubs_->admin_token);
+  const auto reader = stubs_->admin.BackUpDatabase(&context, {});
+  v1::BackUpDatabaseResponse response;
+  uint64_t byte_count = 0;
+  uint64_t received = 0;
+  while (out && reader->Read(&response)) {
+    byte_count = std::max(byte_count, response.byte_count());
+    received += response.data().size();
+    out << response.data();
+  }
+  out.close();
+  if (!out) context.TryCancel();
+  const absl::Status status = FromRpc(reader->Finish(), stubs_->server);
+  if (!out) return NotWritable(file);
+  if (status.ok() && received != byte_count) {
+    return absl::DataLossError("the daemon ended before the whole copy was sent");
+  }
+  return status;
+}
+
+absl::StatusOr<v1::CollectGarbageResponse> Client::CollectGarbage(uint64_t budget_bytes) const {
+  grpc::ClientContext context;
+  context.set_deadline(std::chrono::system_clock::now() + kCallTimeout);
+  Authorize(context, stubs_->admin_token);
+  v1::CollectGarbageRequest request;
+  request.set_budget_bytes(budget_bytes);
+  v1::CollectGarbageResponse response;
+  const absl::Status status =
+      FromRpc(stubs_->admin.CollectGarbage(&context, request, &response), stubs_->server);
+  if (!status.ok()) return status;
+  return response;
+}
+
+}  // namespace carillon::client

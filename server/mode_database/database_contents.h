@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
+#include "server/mode_database/database.h"
+#include "server/mode_database/sqlite_connection.h"
+
+namespace carillon {
+
+/// Reading what a damaged database still holds.
+
+/// The digests in table `table`, as many as can be read, from either end; what cannot be read is
+/// told to `on_finding`.
+inline std::vector<std::string> Names(Database& database, const std::string& table,
+                                      const std::function<void(const std::string&)>& on_finding) {
+  std::vector<std::string> names;
+  const absl::Status status = database.Read([&](SqliteConnection& connection) {
+    return connection.Query(("SELECT digest FROM " + table + " ORDER BY rowid").c_str(), {},
+                            [&](const SqlRow& row) {
+                              names.push_back(row.Text(0));
+                              return absl::OkStatus();
+                            });
+  });
+  if (status.ok()) return names;
+  on_finding(table + ": " + std::string(status.message()));
+  // Backwards as far as that goes.
+  std::vector<std::string> from_the_end;
+  database
+      .Read([&](SqliteConnection& connection) {
+        return connection.Query(("SELECT digest FROM " + table + " ORDER BY rowid DESC").c_str(),
+                                {}, [&](const SqlRow& row) {
+                                  from_the_end.push_back(row.Text(0));
+                                  return absl::OkStatus();
+                                });
+      })
+      .IgnoreError();
+  names.insert(names.end(), from_the_end.rbegin(), from_the_end.rend());
+  return names;
+}
+
+/// The bytes of a mesh, piece by piece, unchecked.
+inline absl::Status ReadMesh(Database& database, const std::string& digest,
+                             absl::FunctionRef<absl::Status(std::string_view)> on_bytes) {
+  return database.Read([&](SqliteConnection& connection) {
+    return connection.Query("SELECT data FROM mesh_chunks WHERE digest = ? ORDER BY byte_offset",
+                            {digest}, [&](const SqlRow& row) { return on_bytes(row.Blob(0)); });
+  });
+}
+
+}  // namespace carillon

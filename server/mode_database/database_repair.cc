@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <memory>
+#include <string>
+#include <string_view>
+#include <system_error>
+
+#include "absl/strings/str_cat.h"
+#include "proto/error_reason.h"
+#include "server/base/clock.h"
+#include "server/base/sha256.h"
+#include "server/mode_database/database.h"
+#include "server/mode_database/database_admin.h"
+#include "server/mode_database/database_contents.h"
+#include "server/mode_database/job_store.h"
+#include "server/mode_database/mesh_store.h"
+#include "server/mode_database/model_rows.h"
+#include "server/mode_database/model_store.h"
+#include "server/mode_database/sqlite_connection.h"
+
+namespace carillon {
+namespace {
+
+absl::Status CannotMove(const std::filesystem::path& file, const std::error_code& error) {
+  return Refusal(absl::StatusCode::kFailedPrecondition, "DATABASE_UNUSABLE",
+                 absl::StrCat(file.string(), " cannot be moved or copied (", error.message(),
+                              "): see that this user may write in its folder"));
+}
+
+// The file with its log, where it has one.
+absl::Status Move(const std::filesystem::path& from, const std::filesystem::path& to) {
+  std::error_code error;
+  for (const char* suffix : {"", "-wal"}) {
+    const std::filesystem::path source = from.string() + suffix;
+    if (std::filesystem::exists(source)) {
+      std::filesystem::rename(source, to.string() + suffix, error);
+      if (error) return CannotMove(source, error);
+    } else {
+      std::filesystem::remove(to.string() + suffix, error);
+    }
+  }
+  std::filesystem::remove(from.string() + "-shm", error);
+  return absl::OkStatus();
+}
+
+void Remove(const std::filesystem::path& file) {
+  std::error_code ignored;
+  for (const char* suffix : {"", "-wal", "-shm"}) {
+    std::filesystem::remove(file.string() + suffix, ignored);
+  }
+}
+
+absl::Status CopyModel(Database& from, Database& to, const std::string& digest) {
+  const SystemClock clock;
+  ModelStore source(from, clock);
+  ModelStore target(to, clock);
+  absl::StatusOr<ModelExport> records = source.Export(digest);
+  if (!records.ok()) return records.status();
+  const absl::StatusOr<ModelSummary> summary = source.Summary(digest);
+  if (!summary.ok()) return summary.status();
+  absl::StatusOr<ModelImport> copy = target.Import(digest, summary->label);
+  if (!copy.ok()) return copy.status();
+  while (true) {
+    const auto record = records->Next();
+    if (!record.ok()) return record.status();
+    if (!record->has_value()) break;
+    if (absl::Status status = copy->Append(**record); !status.ok()) return status;
+  }
+  if (const auto stored = copy->Finish(); !stored.ok()) return stored.status();
+  const auto updated =
+      target.Update(digest, {.add_tags = summary->tags, .pinned = summary->pinned});
+  if (!updated.ok()) return updated.status();
+  return to.Write([&](SqliteConnection& connection) {
+    return connection.Run(
+        "UPDATE models SET created_unix_ms = ?, sounded_unix_ms = ? WHERE digest = ?",
+        {summary->created_unix_ms, summary->sounded_unix_ms, digest});
+  });
+}
+
+absl::Status CopyMesh(Database& from, Database& to, const std::string& digest) {
+  Sha256 sha;
+  absl::Status status = ReadMesh(from, digest, [&](std::string_view bytes) {
+    sha.Update(bytes);
+    return absl::OkStatus();
+  });
+  if (!status.ok() || sha.Finish() != digest) {
+    return Refusal(absl::StatusCode::kDataLoss, "MESH_CORRUPT",
+                   absl::StrCat("the mesh ", digest, " has changed on the disk: upload it again"));
+  }
+  absl::StatusOr<MeshUpload> copy = MeshStore(to).Begin();
+  if (!copy.ok()) return copy.status();
+  status = ReadMesh(from, digest, [&](std::string_view bytes) { return copy->Append(bytes); });
+  return status.ok() ? copy->Finish().status() : status;
+}
+
+absl::Status CopyJob(Database& from, Database& to, const std::string& digest) {
+  const auto job = JobStore(from).Find(digest);
+  if (!job.ok()) return job.status();
+  if (!job->has_value()) return absl::OkStatus();
+  if ((*job)->damaged) return FromErrorInfo(absl::StatusCode::kDataLoss, (*job)->error);
+  return JobStore(to).Put(**job);
+}
+
+// A full disk ends the whole; damage only leaves out what is damaged.
+absl::Status CopyWhole(Database& from, Database& to, const OnFinding& on_finding) {
+  struct Kind {
+    const char* table;
+    absl::Status (*copy)(Database&, Database&, const std::string&);
+  };
+  for (const Kind& kind :
+       {Kind{"meshes", CopyMesh}, Kind{"models", CopyModel}, Kind{"jobs", CopyJob}}) {
+    for (const std::string& digest : Names(from, kind.table, on_finding)) {
+      const absl::Status status = kind.copy(from, to, digest);
+      if (absl::IsResourceExhausted(status)) return status;
+      if (!status.ok()) on_finding(absl::StrCat("left out: ", std::string(status.message())));
+    }
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::Status RepairDatabase(const std::filesystem::path& file, const OnFinding& on_finding) {
+  const std::filesystem::path fresh = file.string() + ".repaired";
+  Remove(fresh);
+  {
+    const absl::StatusOr<std::unique_ptr<Database>> from = Database::Open(file);
+    if (!from.ok()) return from.status();
+    const absl::StatusOr<std::unique_ptr<Database>> to = Database::Open(fresh);
+    if (!to.ok()) return to.status();
+    const absl::Status status = CopyWhole(**from, **to, on_finding);
+    if (!status.ok()) return status;
+  }
+  if (absl::Status status = Move(file, file.string() + ".damaged"); !status.ok()) return status;
+  return Move(fresh, file);
+}
+
+absl::Status RestoreDatabase(const std::filesystem::path& file, const std::filesystem::path& copy) {
+  std::error_code error;
+  const std::filesystem::path incoming = file.string() + ".incoming";
+  Remove(incoming);
+  if (!std::filesystem::exists(copy)) {
+    return Refusal(absl::StatusCode::kNotFound, "FILE_NOT_FOUND",
+                   absl::StrCat("there is no file ", copy.string(), ": name a backup"));
+  }
+  std::filesystem::create_directories(std::filesystem::absolute(file).parent_path(), error);
+  std::filesystem::copy_file(copy, incoming, error);
+  if (error) return CannotMove(copy, error);
+  std::string first_finding;
+  absl::Status status = CheckDatabase(incoming, [&](const std::string& line) {
+    if (first_finding.empty()) first_finding = line;
+  });
+  if (status.ok() && !first_finding.empty()) {
+    status = Refusal(absl::StatusCode::kDataLoss, "DATABASE_CORRUPT",
+                     absl::StrCat(copy.string(), " is damaged (", first_finding,
+                                  "): take an older copy, or repair this one first"));
+  }
+  if (status.ok() && std::filesystem::exists(file)) {
+    status = Move(file, file.string() + ".replaced");
+  }
+  if (status.ok()) status = Move(incoming, file);
+  if (!status.ok()) Remove(incoming);
+  return status;
+}
+
+}  // namespace carillon
