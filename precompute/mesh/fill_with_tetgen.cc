@@ -9,12 +9,14 @@
 #include <cstddef>
 #include <cstring>
 #include <string>
+#include <utility>
 
 #include "absl/container/flat_hash_map.h"
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
 #include "precompute/mesh/boundary.h"
 #include "precompute/mesh/byte_stream.h"
+#include "precompute/mesh/point_math.h"
 #include "precompute/mesh/run_in_child.h"
 #include "proto/error_reason.h"
 
@@ -74,8 +76,9 @@ std::string RunTetgen(const FillRequest& request) {
   DescribeSurface(request.surface, in);
   DescribeCavities(request.cavities, in);
   // Piecewise linear complex, quality, volume bound, indices from zero, quiet; keep the surface.
-  std::string switches = request.keep_surface ? "pqazQY" : "pqazQ";
-  // Radius to edge up to 3 instead of 2, tolerance 1e-6 instead of 1e-8.
+  // What is plane but for single precision is plane.
+  std::string switches = request.keep_surface ? "pqazT1e-6QY" : "pqazT1e-6Q";
+  // Radius to edge up to 3 instead of 2.
   if (request.cautious) switches = request.keep_surface ? "pq3azT1e-6QY" : "pq3azT1e-6Q";
   tetgenbehavior behavior;
   behavior.parse_commandline(switches.data());
@@ -109,20 +112,83 @@ Filling Parse(const std::string& bytes) {
   return filling;
 }
 
-absl::Status NameGivenTriangles(const Filling& filling, TetMesh& mesh) {
-  using Corners = std::array<int32_t, 3>;
-  absl::flat_hash_map<Corners, int32_t> given_triangle_of_face;
+using Corners = std::array<int32_t, 3>;
+using GivenTriangles = absl::flat_hash_map<Corners, int32_t>;
+
+Corners Sorted(Corners corners) {
+  std::ranges::sort(corners);
+  return corners;
+}
+
+GivenTriangles GivenTrianglesOfFaces(const Filling& filling) {
+  GivenTriangles given;
   for (size_t f = 0; f < filling.given_triangles.size(); ++f) {
     const int32_t* c = &filling.face_corners[3 * f];
-    Corners corners{c[0], c[1], c[2]};
-    std::ranges::sort(corners);
-    given_triangle_of_face[corners] = filling.given_triangles[f] - 1;
+    given[Sorted({c[0], c[1], c[2]})] = filling.given_triangles[f] - 1;
   }
+  return given;
+}
+
+std::array<Corners, 4> FacesOf(const int32_t* corners) {
+  std::array<Corners, 4> faces;
+  for (size_t f = 0; f < 4; ++f) {
+    for (size_t i = 0; i < 3; ++i) faces[f][i] = corners[kTetFaces[f][i]];
+    faces[f] = Sorted(faces[f]);
+  }
+  return faces;
+}
+
+/// Whether a tetrahedron is as flat as the rounding of a plane's coordinates.
+bool IsFlat(const std::vector<Point>& nodes, const int32_t* corners) {
+  constexpr double kFlat = 1e-6;  // volume in cubes of the longest edge
+  double longest = 0;
+  std::array<Point, 4> p;
+  for (size_t i = 0; i < 4; ++i) p[i] = nodes[static_cast<size_t>(corners[i])];
+  for (const auto& [a, b] : kTetEdges) {
+    longest = std::max(longest, Distance(p[static_cast<size_t>(a)], p[static_cast<size_t>(b)]));
+  }
+  return TetVolume(p[0], p[1], p[2], p[3]) < kFlat * longest * longest * longest;
+}
+
+/// Takes off flat tetrahedra with two faces on the boundary, which the mesher lays on faces that
+/// are plane but for the rounding of single precision: their nodes would hang in the air. The other
+/// two faces take their place.
+void PeelFlatTetrahedra(TetMesh& mesh, GivenTriangles& given) {
+  absl::flat_hash_map<Corners, int> use_count;
+  const size_t count = mesh.elements.size() / 4;
+  for (size_t e = 0; e < count; ++e) {
+    for (const Corners& face : FacesOf(&mesh.elements[4 * e])) ++use_count[face];
+  }
+  std::vector<bool> gone(count, false);
+  for (bool again = true; again;) {
+    again = false;
+    for (size_t e = 0; e < count; ++e) {
+      if (gone[e] || !IsFlat(mesh.nodes, &mesh.elements[4 * e])) continue;
+      const std::array<Corners, 4> faces = FacesOf(&mesh.elements[4 * e]);
+      const auto outer = [&](const Corners& face) { return use_count[face] == 1; };
+      if (std::ranges::count_if(faces, outer) != 2) continue;
+      const auto found = given.find(*std::ranges::find_if(faces, outer));
+      const int32_t triangle = found == given.end() ? -1 : found->second;
+      for (const Corners& face : faces) {
+        if (!outer(face)) given.try_emplace(face, triangle);
+      }
+      for (const Corners& face : faces) --use_count[face];
+      gone[e] = again = true;
+    }
+  }
+  std::vector<int32_t> kept;
+  for (size_t e = 0; e < count; ++e) {
+    if (!gone[e]) {
+      kept.insert(kept.end(), &mesh.elements[4 * e], &mesh.elements[4 * e] + 4);
+    }
+  }
+  mesh.elements = std::move(kept);
+}
+
+absl::Status NameGivenTriangles(const GivenTriangles& given, TetMesh& mesh) {
   for (BoundaryFace& face : mesh.boundary) {
-    Corners corners{face.nodes[0], face.nodes[1], face.nodes[2]};
-    std::ranges::sort(corners);
-    const auto found = given_triangle_of_face.find(corners);
-    if (found == given_triangle_of_face.end() || found->second < 0) {
+    const auto found = given.find(Sorted({face.nodes[0], face.nodes[1], face.nodes[2]}));
+    if (found == given.end() || found->second < 0) {
       return Failed("a face of its boundary lies on no triangle");
     }
     face.given_triangle = found->second;
@@ -142,8 +208,10 @@ absl::StatusOr<TetMesh> MakeMesh(const Filling& filling) {
   std::memcpy(mesh.nodes.data(), filling.coordinates.data(),
               filling.coordinates.size() * sizeof(double));
   mesh.elements = filling.corners;
+  GivenTriangles given = GivenTrianglesOfFaces(filling);
+  PeelFlatTetrahedra(mesh, given);
   if (absl::Status status = FindBoundary(mesh); !status.ok()) return status;
-  if (absl::Status status = NameGivenTriangles(filling, mesh); !status.ok()) return status;
+  if (absl::Status status = NameGivenTriangles(given, mesh); !status.ok()) return status;
   return mesh;
 }
 
