@@ -12,6 +12,7 @@ struct BankSlot {
   OscillatorBank* bank = nullptr;
   uint32_t generation = 0;
   uint32_t section = 0;        ///< which one renders it
+  float loudness_of_blow = 0;  ///< the bank's
   uint32_t pending_count = 0;  ///< strikes that wait for their time
   bool sounding = false;       ///< is among its section's sounding banks
   bool rendered = false;       ///< in this block

@@ -22,6 +22,10 @@ void Count(std::atomic<uint64_t>& counter, uint64_t more = 1) noexcept {
 constexpr uint64_t kArrivalMask = (uint64_t{1} << 27) - 1;
 constexpr int kMergedBit = 29;
 
+/// 6 dB below what was shed in the last block.
+constexpr float kHopeless = 0.5F;
+constexpr uint64_t kHopelessBlocks = 8;
+
 /// Of the bound, for what rings: the rest is for strikes.
 constexpr double kRingingShare = 0.9;
 
@@ -61,8 +65,10 @@ void Mixer::Obey(const Command& command) noexcept {
   if (command.kind == Command::Kind::kAddStream) {
     open_queues_.push_back(command.queue);
   } else if (command.kind == Command::Kind::kAddBank) {
-    slots_[command.id.slot] = {
-        .bank = command.bank, .generation = command.id.generation, .section = command.section};
+    slots_[command.id.slot] = {.bank = command.bank,
+                               .generation = command.id.generation,
+                               .section = command.section,
+                               .loudness_of_blow = command.bank->loudness_of_blow()};
     Count(statistics_.bank_count);
   } else if (BankSlot* slot = FindSlot(command.id)) {  // it may have rung out before it was to fade
     if (!slot->leaving) leaving_.push_back(command.id.slot);
@@ -124,14 +130,25 @@ void Mixer::Take(const Strike& strike, StrikeQueue& queue) noexcept {
     pending.sample = block_start_;
     pending.lead_frames = 0;
   }
-  if (slot == nullptr || slot->fading || !pending_.TryPush(pending)) {
+  const bool known = slot != nullptr && !slot->fading;
+  const bool hopeless = known && IsHopeless(strike, pending.sample, *slot);
+  if (!known || (!hopeless && !pending_.TryPush(pending))) {
     Count(queue.dropped_count);
     return Count(statistics_.dropped_count);
   }
-  ++slot->pending_count;
+  Count(statistics_.shed_count, hopeless ? 1 : 0);
+  if (!hopeless) ++slot->pending_count;
   if (strike.kind != StrikeKind::kImpulse) return;
   Count(late ? queue.late_count : queue.accepted_count);
   Count(late ? statistics_.late_count : statistics_.accepted_count);
+}
+
+/// Far too quiet for what the last block could render, and due as soon: it is shed before it costs
+/// more.
+bool Mixer::IsHopeless(const Strike& strike, uint64_t sample, const BankSlot& slot) const noexcept {
+  return hopeless_below_ > 0 && strike.kind == StrikeKind::kImpulse &&
+         sample < block_start_ + kHopelessBlocks * settings_.block_frame_count &&
+         LoudnessOf(strike.excitation, slot) < hopeless_below_;
 }
 
 void Mixer::CollectDueStrikes(size_t block_count) noexcept {
@@ -172,21 +189,23 @@ void Mixer::DecideTreatment(std::span<const uint32_t> due) noexcept {
     if (slot == nullptr || strike.kind != StrikeKind::kImpulse) continue;
     const double awakening = slot->awakening ? 0 : slot->bank->awakening_work();
     slot->awakening = true;
-    triage_.Note(LoudnessOf(strike, *slot), slot->bank->strike_work() + awakening,
+    triage_.Note(LoudnessOf(strike.excitation, *slot), slot->bank->strike_work() + awakening,
                  slot->bank->merged_strike_work() + awakening);
   }
   for (const uint32_t index : due) {
     if (BankSlot* slot = FindSlot(pending_[index].bank)) slot->awakening = false;
   }
   const double taken = work::kTakeStrike * static_cast<double>(std::exchange(taken_count_, 0));
-  const double spent = ringing_work_ + taken;
+  const double judged = work::kJudgeStrike * static_cast<double>(due.size());
+  const double spent = ringing_work_ + taken + judged;
   rendered_work_ += spent + triage_.Decide(budget_.most_work() - spent);
+  hopeless_below_ = triage_.shed_below() * kHopeless;
 }
 
-float Mixer::LoudnessOf(const PendingStrike& strike, const BankSlot& slot) const noexcept {
-  const auto& impulse = strike.excitation.impulse_newton_seconds;
+float Mixer::LoudnessOf(const Excitation& excitation, const BankSlot& slot) noexcept {
+  const auto& impulse = excitation.impulse_newton_seconds;
   const float squared = impulse[0] * impulse[0] + impulse[1] * impulse[1] + impulse[2] * impulse[2];
-  return slot.bank->loudness_of_blow() * std::sqrt(squared);
+  return slot.loudness_of_blow * std::sqrt(squared);
 }
 
 /// Puts a block's strikes in the order of rendering: by section, block, bank and time, merged ones
@@ -205,7 +224,7 @@ void Mixer::ChooseStrikes(size_t block, std::span<const uint32_t> due) noexcept 
     --slot->pending_count;
     Treatment treatment = Treatment::kExact;
     if (budget_.bounded() && strike.kind == StrikeKind::kImpulse) {
-      treatment = triage_.Treat(LoudnessOf(strike, *slot));
+      treatment = triage_.Treat(LoudnessOf(strike.excitation, *slot));
     }
     if (treatment == Treatment::kShed) {
       Count(statistics_.shed_count);

@@ -158,7 +158,8 @@ class Mixer {
   void ChooseStrikes(size_t block, std::span<const uint32_t> due) noexcept;
   void ShedBanks() noexcept;
   void DecideTreatment(std::span<const uint32_t> due) noexcept;
-  float LoudnessOf(const PendingStrike& strike, const BankSlot& slot) const noexcept;
+  static float LoudnessOf(const Excitation& excitation, const BankSlot& slot) noexcept;
+  bool IsHopeless(const Strike& strike, uint64_t sample, const BankSlot& slot) const noexcept;
   void RenderSections(std::span<float> frames) noexcept;
   void RetireLeavingBanks() noexcept;
   void SendBack(const Retired& retired) noexcept;
@@ -192,6 +193,7 @@ class Mixer {
   std::array<size_t, kSectionCount + 1> due_ends_{};  // in due_strikes_
   StrikeTriage triage_;
   WorkBudget budget_;
+  float hopeless_below_ = 0;  // loudness
   size_t taken_count_ = 0;    // strikes, for the blocks rendered together
   double ringing_work_ = 0;   // of the sounding banks, in the next block
   double rendered_work_ = 0;  // of the blocks rendered together

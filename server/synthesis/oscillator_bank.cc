@@ -155,14 +155,17 @@ void OscillatorBank::AddVertex(size_t vertex, float weight, const Excitation& ex
   }
 }
 
-StrikeBatch::RowsAhead OscillatorBank::RowsOf(const DueStrike& strike) const noexcept {
-  const Excitation& excitation = strike.strike->excitation;
-  const size_t nearest = NearestVertex(excitation);
+StrikeBatch::RowsAhead OscillatorBank::RowsOf(std::span<const DueStrike> strikes) const noexcept {
   StrikeBatch::RowsAhead ahead{.value_count = 3 * shapes_.stride()};
-  for (size_t i = 0; i < 3; ++i) {
-    const size_t vertex = excitation.vertices[i];
-    if (vertex >= shapes_.vertex_count() || (strike.merged && i != nearest)) continue;
-    ahead.rows[ahead.count++] = shapes_.Row(vertex, 0);
+  for (const DueStrike& strike : strikes) {
+    const Excitation& excitation = strike.strike->excitation;
+    const size_t nearest = NearestVertex(excitation);
+    for (size_t i = 0; i < 3; ++i) {
+      const size_t vertex = excitation.vertices[i];
+      if (vertex >= shapes_.vertex_count() || (strike.merged && i != nearest)) continue;
+      ahead.rows[ahead.count++] = shapes_.Row(vertex, 0);
+      if (ahead.count == ahead.rows.size()) return ahead;
+    }
   }
   return ahead;
 }

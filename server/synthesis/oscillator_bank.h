@@ -78,8 +78,8 @@ class OscillatorBank {
   /// at their mean time, weighted by impulse. They are neighbours in time, and lie in this block.
   bool StrikeMerged(std::span<const DueStrike> strikes, BlockMix& mix) noexcept;
 
-  /// What a strike will read.
-  StrikeBatch::RowsAhead RowsOf(const DueStrike& strike) const noexcept;
+  /// What strikes, one or some merged, will read.
+  StrikeBatch::RowsAhead RowsOf(std::span<const DueStrike> strikes) const noexcept;
 
   /// Adds a contact's force to that at the next knot. False: no such vertex, and nothing was done.
   bool Gather(const Excitation& force) noexcept;

@@ -62,7 +62,8 @@ void RenderSection::Strike(std::span<const DueStrike> strikes, SectionCounts& co
     const bool same_bank_next = !strikes.empty() && strikes.front().slot == index;
     mix_.batch().ahead = {};
     if (!strikes.empty()) {
-      mix_.batch().ahead = slots_[strikes.front().slot].bank->RowsOf(strikes.front());
+      const std::span<const DueStrike> next = strikes.first(CountTogether(strikes));
+      mix_.batch().ahead = slots_[next.front().slot].bank->RowsOf(next);
     }
     const bool struck = !slot.fading && Excite(*slot.bank, due);
     if (!struck) counts.dropped_count += count;

@@ -21,7 +21,7 @@ class StrikeBatch {
   /// Rows that the next strike will read: asked for while this one is worked on, because at once
   /// they would only wait for each other.
   struct RowsAhead {
-    std::array<const int16_t*, 3> rows{};
+    std::array<const int16_t*, 12> rows{};
     size_t count = 0;
     size_t value_count = 0;  ///< of each
   };

@@ -50,6 +50,10 @@ double StrikeTriage::ShareOut(double most_work, double all_merged) noexcept {
   return work;
 }
 
+float StrikeTriage::shed_below() const noexcept {
+  return std::bit_cast<float>(static_cast<uint32_t>(first_merged_) << 20);
+}
+
 Treatment StrikeTriage::Treat(float loudness) const noexcept {
   const size_t bin = Bin(loudness);
   if (bin >= first_exact_) return Treatment::kExact;

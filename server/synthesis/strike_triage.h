@@ -28,11 +28,14 @@ class StrikeTriage {
   /// Settles the treatment of all loudnesses; returns the work of what was noted.
   double Decide(double most_work) noexcept;
 
+  /// Strikes quieter than this are shed; zero where none is.
+  float shed_below() const noexcept;
+
   Treatment Treat(float loudness) const noexcept;
 
  private:
   /// Exponent and three bits of the fraction: 0.5 to 1 dB a bin.
-  static constexpr size_t kBins = 2048;
+  static constexpr size_t kBins = 2040;
   static size_t Bin(float loudness) noexcept;
 
   double ShareOut(double most_work, double all_merged) noexcept;

@@ -14,7 +14,8 @@ inline constexpr double kTimeLane = 6.5;      ///< a lane in the time domain, 12
 inline constexpr double kSpectralLane = 6.5;  ///< a lane in a long block
 inline constexpr double kStrikeLane = 2;      ///< a strike, each lane
 inline constexpr double kMergedLane = 0.8;    ///< a merged strike, each lane
-inline constexpr double kTakeStrike = 40;     ///< to take a strike from its stream and to judge it
+inline constexpr double kTakeStrike = 30;     ///< to take a strike from its stream
+inline constexpr double kJudgeStrike = 70;    ///< to keep it until it is due, and to judge it
 }  // namespace work
 
 /// How much work a block may have, so that its deadline is kept.
