@@ -112,12 +112,30 @@ struct Vectors {
   }
 };
 
+/// Asks for what rendering a group of lanes, and advancing them thereafter, will need.
+HWY_INLINE void PrefetchLanes(const LaneArrays& lanes, size_t lane) {
+  constexpr size_t kLine = 64;
+  const auto prefetch = [](const auto* first, size_t count) {
+    for (size_t i = 0; i < count; i += kLine / sizeof(*first)) __builtin_prefetch(first + i);
+  };
+  const size_t group = lane / kMostLanes * kMostLanes;
+  prefetch(lanes.powers.data() + LaneArrays::PowerIndex(group, 0), kMostLanes * 2 * kTileFrames);
+  for (const LaneArray<float>* state :
+       {&lanes.start_re, &lanes.start_im, &lanes.newborn_re, &lanes.newborn_im}) {
+    prefetch(state->data() + group, kMostLanes);
+  }
+  for (const LaneArray<double>* state : {&lanes.re, &lanes.im, &lanes.block_re, &lanes.block_im}) {
+    prefetch(state->data() + group, kMostLanes);
+  }
+}
+
 void Ring(const LaneArrays& lanes, LaneRange range, size_t frame_count, float* mix) {
   const float *re = lanes.start_re.data(), *im = lanes.start_im.data();
   const size_t pass = kVectorsAPass * hn::Lanes(Floats());
   const size_t end = range.first + range.count;
   size_t lane = range.first;
   for (; lane + pass <= end; lane += pass) {
+    for (size_t i = 0; i < pass; i += kMostLanes) PrefetchLanes(lanes, lane + pass + i);
     Vectors<kVectorsAPass> vectors;
     vectors.Load(lanes, lane, re, im);
     vectors.Add(frame_count, mix);
@@ -202,6 +220,7 @@ void RingStruck(LaneArrays& lanes, LaneRange range, const StruckPart& part, floa
   const size_t end = range.first + range.count;
   size_t lane = range.first;
   for (; lane + pass <= end; lane += pass) {
+    for (size_t i = 0; i < pass; i += kMostLanes) PrefetchLanes(lanes, lane + pass + i);
     StruckVectors<kVectorsAPass> vectors;
     vectors.Load(lanes, lane);
     vectors.Ring(part, lane, mix);
@@ -370,6 +389,7 @@ Advanced Spread(SpectralLanes& lanes, size_t mode_count, double silence_squared,
       std::fill_n(lanes.re.data() + group, kMostLanes, 0.0);
       std::fill_n(lanes.im.data() + group, kMostLanes, 0.0);
       awake = 0;
+      advanced.fell_asleep = true;
       continue;
     }
     advanced.awake = true;
@@ -448,12 +468,15 @@ HWY_INLINE void SineCosine(V angle, V& sine, V& cosine) {
 }
 
 /// (re, im) *= exp(lead_frames log q + tau^2 s^2/2).
-HWY_INLINE void Delay(const LaneArrays& lanes, size_t lane, V lead, V tau_squared, V& re, V& im) {
+HWY_INLINE void Delay(const LaneArrays& lanes, size_t lane, V lead, V tau_squared, bool soft, V& re,
+                      V& im) {
   const Floats d;
-  const V logarithm = hn::MulAdd(lead, hn::Load(d, lanes.lead_re.data() + lane),
-                                 hn::Mul(tau_squared, hn::Load(d, lanes.tau_re.data() + lane)));
-  const V angle = hn::MulAdd(lead, hn::Load(d, lanes.lead_im.data() + lane),
-                             hn::Mul(tau_squared, hn::Load(d, lanes.tau_im.data() + lane)));
+  V logarithm = hn::Mul(lead, hn::Load(d, lanes.lead_re.data() + lane));
+  V angle = hn::Mul(lead, hn::Load(d, lanes.lead_im.data() + lane));
+  if (soft) {
+    logarithm = hn::MulAdd(tau_squared, hn::Load(d, lanes.tau_re.data() + lane), logarithm);
+    angle = hn::MulAdd(tau_squared, hn::Load(d, lanes.tau_im.data() + lane), angle);
+  }
   // Below exp(-80) nothing is heard, and the angle may be too large for a sine.
   const auto heard = hn::Gt(logarithm, hn::Set(d, -80.0F));
   const V magnitude = hn::IfThenElseZero(heard, hn::Exp(d, logarithm));
@@ -494,7 +517,7 @@ bool Excite(const LaneArrays& lanes, size_t lane_count, const float* modal_impul
     const V g = hn::GatherIndex(d, modal_impulses, column);
     V re = hn::Mul(g, hn::Load(d, lanes.gain_re.data() + lane));
     V im = hn::Mul(g, hn::Load(d, lanes.gain_im.data() + lane));
-    if (delayed) Delay(lanes, lane, lead, tau_squared, re, im);
+    if (delayed) Delay(lanes, lane, lead, tau_squared, onset.tau_s > 0, re, im);
     hn::Store(re, d, added_re + lane);
     hn::Store(im, d, added_im + lane);
     const V squared = hn::MulAdd(re, re, hn::Mul(im, im));

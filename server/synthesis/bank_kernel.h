@@ -40,6 +40,7 @@ void AddStrike(LaneArrays& lanes, size_t lane_count, const float* added_re,
 struct Advanced {
   size_t awake_lane_count = 0;  ///< Advance: of the range; all lanes beyond are silent
   bool awake = false;           ///< any lane is
+  bool fell_asleep = false;     ///< Spread: some lanes did
   double loudest_squared = 0;   ///< largest squared amplitude
   bool finite = true;
 };

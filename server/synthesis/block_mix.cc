@@ -28,10 +28,12 @@ BlockMix::BlockMix(size_t block_frame_count, size_t stagger)
 
 void BlockMix::Begin(uint64_t block_number, RenderDesk& desk) noexcept {
   desk_ = &desk;
+  any_begins_ = false;
   for (size_t kind = 0; kind < kLongBlockKinds; ++kind) {
     const size_t count = long_blocks_[kind].block_count;
-    begins_[kind] = (block_number + stagger_ * count / 8) % count == 0;
+    begins_[kind] = (block_number + stagger_ * count / kStaggers) % count == 0;
     used_[kind] = false;
+    any_begins_ |= begins_[kind];
   }
   lanes_.Clear(long_blocks_[0].frame_count / long_blocks_[0].block_count);
 }

@@ -26,8 +26,10 @@ struct RenderDesk {
 /// and of the long blocks under way.
 class BlockMix {
  public:
-  /// A long block of m blocks begins where m divides the block's number plus stagger * m / 8, so
-  /// that mixes of different stagger, 0 to 7, do that work in different blocks.
+  static constexpr size_t kStaggers = 16;
+
+  /// Mixes of different stagger, 0 to kStaggers - 1, begin long blocks in different blocks: a long
+  /// block of m blocks where m divides the block's number plus stagger * m / kStaggers.
   explicit BlockMix(size_t block_frame_count, size_t stagger = 0);
 
   /// Begins the block of this number; Begin and Finish alternate.
@@ -38,6 +40,9 @@ class BlockMix {
 
   /// Whether a long block of this kind begins with this block.
   bool begins(size_t kind) const noexcept { return begins_[kind]; }
+
+  /// Whether one of any kind does.
+  bool any_begins() const noexcept { return any_begins_; }
 
   /// Where modes add themselves to the long block of this kind that begins.
   float* Slots(size_t kind) noexcept {
@@ -60,6 +65,7 @@ class BlockMix {
   size_t stagger_;
   RenderDesk* desk_ = nullptr;
   std::array<bool, kLongBlockKinds> begins_{}, used_{};
+  bool any_begins_ = false;
   std::array<Rendered, kLongBlockKinds> rendered_;
   LaneMix lanes_;
 };

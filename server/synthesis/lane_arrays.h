@@ -13,7 +13,7 @@ inline constexpr size_t kMostLanes = 16;
 
 /// Samples that the kernel renders from one float state: q, q^2, q^3 give the samples between, q^4
 /// the next state.
-inline constexpr size_t kTileFrames = 4;
+inline constexpr size_t kTileFrames = 8;
 
 /// A zeroed array aligned for the widest vector.
 template <typename T>

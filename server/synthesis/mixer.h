@@ -28,11 +28,11 @@
 namespace carillon {
 
 /// Parts that a mixer's banks are spread over.
-inline constexpr size_t kSectionCount = 8;
+inline constexpr size_t kSectionCount = BlockMix::kStaggers;
 
 /// Blocks that are rendered in one go where the caller asks for as many: each section renders all
 /// of them before the next does.
-inline constexpr size_t kBlocksTogether = 8;
+inline constexpr size_t kBlocksTogether = 16;
 
 /// Bounds of a mixer; all memory is taken when it is made.
 struct MixerSettings {
@@ -92,7 +92,7 @@ class Mixer {
   void LetRingOut(BankId bank);
 
   /// Takes a bank off after a fade of 10 ms, which begins when its long blocks under way have
-  /// ended, within 1024 frames; strikes on their way to it are lost.
+  /// ended, within 2048 frames; strikes on their way to it are lost.
   void FadeOut(BankId bank);
 
   /// A new stream of strikes, of which `capacity` may wait to be taken.

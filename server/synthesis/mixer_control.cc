@@ -2,6 +2,7 @@
 // The controlling threads' side of the mixer.
 #include <algorithm>
 #include <cassert>
+#include <numeric>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -12,6 +13,8 @@ namespace carillon {
 namespace {
 
 constexpr double kFadeS = 0.01;
+/// Their work for a long block costs about as much as its transform.
+constexpr size_t kModesASection = 4000;
 /// A strike's place in the order of rendering has so much room for the slot.
 constexpr size_t kMostBanks = 65536;
 
@@ -135,9 +138,13 @@ MixerStatistics Mixer::statistics() const noexcept {
           .active_mode_count = statistics_.active_mode_count};
 }
 
+/// The least filled; few modes are spread over few sections, for each has transforms of its own.
 uint32_t Mixer::ChooseSection() const {
-  return static_cast<uint32_t>(std::ranges::min_element(section_mode_counts_) -
-                               section_mode_counts_.begin());
+  const auto begin = section_mode_counts_.begin();
+  const size_t mode_count = std::accumulate(begin, section_mode_counts_.end(), size_t{0});
+  const size_t used = std::min(mode_count / kModesASection + 1, kSectionCount);
+  return static_cast<uint32_t>(std::min_element(begin, begin + static_cast<ptrdiff_t>(used)) -
+                               begin);
 }
 
 Mixer::OwnedBank* Mixer::Find(BankId id) {

@@ -275,6 +275,7 @@ void OscillatorBank::RenderDriven(size_t end, LaneMix& mix) noexcept {
 bool OscillatorBank::RenderAdd(BlockMix& mix) noexcept {
   if (silent()) return true;
   if (!newborn_ && !force_.driving()) {
+    if (!awake_in_time_ && !mix.any_begins()) return true;
     BeginBlock(mix);
     return RenderAddInTime(mix.lanes());
   }
@@ -301,6 +302,7 @@ bool OscillatorBank::Advance() noexcept {
     if (range.count == 0) continue;
     const bank_kernel::Advanced advanced =
         bank_kernel::Advance(lanes_, range, newborn_, silence_squared_);
+    changed_ |= newborn_ || segment.awake_count != advanced.awake_lane_count;
     segment.awake_count = advanced.awake_lane_count;
     segment.loudest_squared = advanced.loudest_squared;
     finite_ &= advanced.finite;
@@ -308,7 +310,7 @@ bool OscillatorBank::Advance() noexcept {
   }
   newborn_ = begun_ = false;
   if (!finite_) Silence();
-  CountAwake();
+  if (std::exchange(changed_, false)) CountAwake();
   return std::exchange(finite_, true);
 }
 
@@ -323,6 +325,7 @@ bool OscillatorBank::BeginLongBlock(size_t kind, BlockMix& mix) noexcept {
   LongSegment& segment = long_segments_[kind];
   const bool struck = std::exchange(segment.struck, false);
   segment.struck_streak = struck ? segment.struck_streak + 1 : 0;
+  changed_ |= segments_[kind + 1].awake_count > 0 || (segment.sounding && !segment.awake);
   segment.sounding = false;
   if (segment.struck_streak >= kBusyStreak || leaving_spectrum_) {
     MoveToTime(kind);
@@ -332,6 +335,7 @@ bool OscillatorBank::BeginLongBlock(size_t kind, BlockMix& mix) noexcept {
   if (!segment.awake) return true;
   const bank_kernel::Advanced advanced =
       bank_kernel::Spread(segment.lanes, segment.mode_count, silence_squared_, mix.Slots(kind));
+  changed_ |= advanced.fell_asleep;
   segment.awake = segment.sounding = advanced.awake;
   segment.loudest_squared = advanced.loudest_squared;
   return advanced.finite;
@@ -354,6 +358,7 @@ void OscillatorBank::MoveToTime(size_t kind) noexcept {
   LongSegment& from = long_segments_[kind];
   Segment& to = segments_[kind + 1];
   if (!from.awake) return;
+  changed_ = true;
   for (size_t i = 0; i < to.range.count; ++i) {
     const size_t lane = to.range.first + i;
     lanes_.re[lane] += std::exchange(from.lanes.re[i], 0);
@@ -367,6 +372,7 @@ void OscillatorBank::MoveToTime(size_t kind) noexcept {
 }
 
 void OscillatorBank::Silence() noexcept {
+  changed_ = true;
   lanes_.Silence({0, lane_count_});
   force_.Silence();
   for (Segment& segment : segments_) segment.awake_count = 0;
@@ -431,11 +437,11 @@ void OscillatorBank::MeasureBlow(const LanePlan& plan) {
 void OscillatorBank::CountAwake() noexcept {
   active_mode_count_ = 0;
   ringing_work_ = 0;
-  any_awake_ = false;
+  any_awake_ = awake_in_time_ = false;
   for (size_t part = 0; part < segments_.size(); ++part) {
     const Segment& segment = segments_[part];
     const LongSegment* by_spectrum = part == 0 ? nullptr : &long_segments_[part - 1];
-    any_awake_ |= segment.awake_count > 0;
+    awake_in_time_ |= segment.awake_count > 0;
     ringing_work_ += TimeWork(segment.awake_count);
     if (by_spectrum != nullptr && by_spectrum->awake) {
       ringing_work_ += work::kSpectralLane * static_cast<double>(by_spectrum->mode_count) /
@@ -448,6 +454,7 @@ void OscillatorBank::CountAwake() noexcept {
       if (awake) active_mode_count_ += group_mode_counts_[(segment.range.first + i) / kMostLanes];
     }
   }
+  any_awake_ |= awake_in_time_;
 }
 
 std::string_view SimdTarget() { return bank_kernel::Target(); }

@@ -182,7 +182,9 @@ class OscillatorBank {
   bool begun_ = false;                      // this block
   bool newborn_ = false;                    // struck in this block
   bool finite_ = true;
+  bool changed_ = false;  // which lanes are awake
   bool any_awake_ = false;
+  bool awake_in_time_ = false;
   bool leaving_spectrum_ = false;
   size_t rendered_to_ = 0;  // in a block with strikes
   size_t active_mode_count_ = 0;

@@ -38,16 +38,7 @@ SectionCounts RenderSection::Render(uint64_t block_number, std::span<const DueSt
     strikes = strikes.subspan(due_count);
     for (const uint32_t index : sounding_) RenderBank(slots_[index], counts);
     mix_.Finish(block);
-    counts.active_mode_count = 0;
-    counts.ringing_work = 0;
-    for (const uint32_t index : sounding_) {
-      BankSlot& slot = slots_[index];
-      if (!slot.rendered) RenderFading(slot, block, counts);
-      slot.rendered = false;
-      counts.active_mode_count += slot.bank->active_mode_count();
-      counts.ringing_work += slot.bank->ringing_work();
-    }
-    DismissSilentBanks();
+    FinishBanks(block, counts);
   }
   return counts;
 }
@@ -107,9 +98,16 @@ void RenderSection::RenderFading(BankSlot& slot, std::span<float> block,
   }
 }
 
-void RenderSection::DismissSilentBanks() noexcept {
-  std::erase_if(sounding_, [this](uint32_t index) {
+/// Fades those that fade, counts, and dismisses the silent.
+void RenderSection::FinishBanks(std::span<float> block, SectionCounts& counts) noexcept {
+  counts.active_mode_count = 0;
+  counts.ringing_work = 0;
+  std::erase_if(sounding_, [&](uint32_t index) {
     BankSlot& slot = slots_[index];
+    if (!slot.rendered) RenderFading(slot, block, counts);
+    slot.rendered = false;
+    counts.active_mode_count += slot.bank->active_mode_count();
+    counts.ringing_work += slot.bank->ringing_work();
     slot.sounding = !slot.bank->silent() && slot.fade_gain > 0;
     return !slot.sounding;
   });

@@ -46,7 +46,7 @@ class RenderSection {
   bool Excite(OscillatorBank& bank, std::span<const DueStrike> due) noexcept;
   void RenderBank(BankSlot& slot, SectionCounts& counts) noexcept;
   void RenderFading(BankSlot& slot, std::span<float> block, SectionCounts& counts) noexcept;
-  void DismissSilentBanks() noexcept;
+  void FinishBanks(std::span<float> block, SectionCounts& counts) noexcept;
 
   Settings settings_;
   std::span<BankSlot> slots_;

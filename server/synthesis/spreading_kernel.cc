@@ -21,7 +21,7 @@ Complex BesselI0(Complex u_squared) {
   for (int k = 1; k < 60; ++k) {
     term *= u_squared / (4.0 * k * k);
     sum += term;
-    if (std::abs(term) < 1e-17 * std::abs(sum)) break;
+    if (std::norm(term) < 1e-34 * std::norm(sum)) break;
   }
   return sum;
 }
