@@ -1,0 +1,128 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: Apache-2.0
+"""Carillon's mixer beside the synthesisers that others use, one after the other on one core, and one table.
+
+Modes a core: how many modes one core renders in real time at 48 kHz, from CPU time; of other programs the median of
+three runs, fixed costs taken off. All render the same modes: frequencies log-uniform from 20 Hz to 20 kHz, T60
+log-uniform from 20 ms to 60 s; none ever sleeps. Error: largest deviation from the closed form in double over the
+largest sample, and the same of root mean squares; of another program against its own recurrence in double, so that
+only its rounding counts.
+"""
+
+import argparse
+import json
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+import csound_peer
+import faust_peer
+import measuring
+import stk_peer
+import supercollider_peer
+
+HERE = pathlib.Path(__file__).parent
+PARTS = ("ringing", "accuracy", "flood")
+
+
+def carillon(build, *arguments, most_target=None):
+    environment = dict(os.environ, **({"CARILLON_MOST_TARGET": most_target} if most_target else {}))
+    run = subprocess.run([build / "tests/mixer_measure", *map(str, arguments)], check=True, capture_output=True,
+                         text=True, env=environment)
+    return [json.loads(line) for line in run.stdout.splitlines()]
+
+
+def population(build, count):
+    text = subprocess.run([build / "tests/mixer_measure", "population", str(count), "1"], check=True,
+                          capture_output=True, text=True).stdout
+    return [tuple(map(float, line.split())) for line in text.splitlines()]
+
+
+def row(*cells):
+    print("| " + " | ".join(str(cell) for cell in cells) + " |", flush=True)
+
+
+def has(target, build):
+    return subprocess.run([build / "tests/mixer_measure", "population", "1"], capture_output=True,
+                          env=dict(os.environ, CARILLON_MOST_TARGET=target)).returncode == 0
+
+
+def peers(build, folder):
+    """Name and modes a core of each."""
+    modes = population(build, 800)
+    program = folder / "stk_peer"
+    subprocess.run(["g++", "-O3", "-march=native", "-o", program, HERE / "stk_peer.cc", "-lstk"], check=True)
+    yield "scsynth Klank, 800 modes", supercollider_peer.throughput(folder, modes)
+    yield "Faust pm.modeFilter, 100 modes, -vec", faust_peer.throughput(folder, modes[:100])
+    yield "Faust pm.modeFilter, 100 modes, scalar", faust_peer.throughput(folder, modes[:100], ())
+    yield "Csound mode", csound_peer.throughput(folder, modes)
+    yield "STK BiQuad", stk_peer.throughput(program, modes)
+
+
+def ringing(options, folder):
+    print("\n## Modes a core\n\n| what | modes | load | modes a core | times Klank | times the best other |\n"
+          "| --- | --- | --- | --- | --- | --- |")
+    others = dict(peers(options.build, folder))
+    klank, best = next(iter(others.values())), max(others.values())
+    for name, rate in others.items():
+        row(name, "", "", f"{rate:,.0f}", f"{rate / klank:.2f}", f"{rate / best:.2f}")
+    for target in filter(lambda name: has(name, options.build), ("AVX3", "AVX2", "SSE4", "NEON")):
+        for result in carillon(options.build, "ringing", options.seconds, most_target=target):
+            what = {"ringing": "ringing freely", "struck": "every bank struck in every block"}[result["what"]]
+            row(f"Carillon {target}, {what}", f"{result['modes']:,.0f}", f"{result['load']:.1%}",
+                f"{result['modes_per_core']:,.0f}", f"{result['modes_per_core'] / klank:.1f}",
+                f"{result['modes_per_core'] / best:.1f}")
+
+
+def accuracy(options, folder):
+    print("\n## Error over 10 s of the same 800 modes\n\n| what | worst, dB of the peak | root mean square, dB |\n"
+          "| --- | --- | --- |")
+    for result in carillon(options.build, "accuracy", 10):
+        row(f"Carillon {result['target']}, seven strikes", f"{result['worst_db']:.1f}", f"{result['rms_db']:.1f}")
+    modes = population(options.build, 800)
+    supercollider_peer.render(folder, modes, 1, 10)
+    sound = measuring.read_wave(folder / "klank.wav")
+    worst, mean = measuring.error_db(sound, supercollider_peer.exact(modes, 480000))
+    row("scsynth Klank, one impulse", f"{worst:.1f}", f"{mean:.1f}")
+    single = faust_peer.sound(folder, modes[:100], ["-single"], 480000)
+    double = faust_peer.sound(folder, modes[:100], ["-double"], 480000)
+    worst, mean = measuring.error_db(single, double)
+    row("Faust -single against -double, 100 modes, one impulse", f"{worst:.1f}", f"{mean:.1f}")
+    row("Csound, STK", "compute in double", "")
+
+
+def flood(options, _folder):
+    print("\n## Flood: 20 ringing bodies of 10,000 vertices and 800 modes, random triangles, four streams\n\n"
+          "| impulses/s | taken/s | merged/s | shed/s | lost | load | median, worst block ms | over 2.67 ms | "
+          "missed behind 8 blocks |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- |")
+    for result in carillon(options.build, "flood", options.flood_seconds):
+        if result["what"] == "merging":
+            merging = result["error_db"]
+            continue
+        row(f"{result['rate']:,.0f}", f"{result['taken_per_s']:,.0f}", f"{result['merged_per_s']:,.0f}",
+            f"{result['shed_per_s']:,.0f}", result["dropped"], f"{result['load']:.1%}",
+            f"{result['median_block_ms']:.2f}, {result['worst_block_ms']:.2f}", result["late_blocks"],
+            result["missed"])
+    print(f"\nMerging all of 1,000,000 a second changes the sound by {merging:.1f} dB of its energy.")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--build", type=pathlib.Path, required=True, help="the release build's folder")
+    parser.add_argument("--parts", type=lambda text: text.split(","), default=list(PARTS),
+                        help="some of " + ",".join(PARTS))
+    parser.add_argument("--seconds", type=float, default=5, help="of sound, for each measurement of modes")
+    parser.add_argument("--flood-seconds", type=float, default=60)
+    options = parser.parse_args()
+    print(f"load average before: {os.getloadavg()[0]:.1f}", flush=True)
+    for part in options.parts:
+        with tempfile.TemporaryDirectory() as folder:
+            {"ringing": ringing, "accuracy": accuracy, "flood": flood}[part](options, pathlib.Path(folder))
+    print(f"\nload average after: {os.getloadavg()[0]:.1f}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
