@@ -22,6 +22,11 @@ absl::Status ShowStatus(const client::Client& daemon, const std::string& server,
                mixer->active_mode_count(), Decibels(mixer->peak()), mixer->load() * 100);
   absl::PrintF("missed   %d times, %d frames; limited %d of %d frames\n", mixer->xrun_count(),
                mixer->lost_frame_count(), mixer->limited_frame_count(), mixer->frame_count());
+  if (mixer->merged_impulse_count() + mixer->shed_object_count() > 0) {
+    absl::PrintF("overload %d impulses merged, %d shed, %d objects silenced\n",
+                 mixer->merged_impulse_count(), mixer->shed_impulse_count(),
+                 mixer->shed_object_count());
+  }
   return absl::OkStatus();
 }
 

@@ -40,6 +40,9 @@ grpc::ServerUnaryReactor* AudioService::GetMixer(grpc::CallbackServerContext* co
   response->set_peak(state.peak);
   response->set_device_message(state.device_message);
   response->set_simd_target(std::string(SimdTarget()));
+  response->set_merged_impulse_count(state.mixer.merged_count);
+  response->set_shed_impulse_count(state.mixer.shed_count);
+  response->set_shed_object_count(state.mixer.shed_bank_count);
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
   reactor->Finish(grpc::Status::OK);
   return reactor;

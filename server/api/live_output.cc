@@ -19,9 +19,10 @@ size_t BlocksPerSecond(const DeviceFormat& format) {
   return format.sample_rate_hz / format.block_frame_count + 1;
 }
 
-MixerSettings MixerSettingsOf(const DeviceFormat& format) {
+MixerSettings MixerSettingsOf(const DeviceFormat& format, const Clock& clock) {
   return {.sample_rate_hz = static_cast<double>(format.sample_rate_hz),
-          .block_frame_count = format.block_frame_count};
+          .block_frame_count = format.block_frame_count,
+          .clock = &clock};
 }
 
 }  // namespace
@@ -37,7 +38,7 @@ LiveOutput::LiveOutput(const OutputSettings& settings, Clock& clock, Log log)
     : settings_(settings),
       clock_(clock),
       log_(std::move(log)),
-      mixer_(MixerSettingsOf(settings.format)),
+      mixer_(MixerSettingsOf(settings.format, clock)),
       broadcast_(settings.format.block_frame_count, BlocksPerSecond(settings.format)),
       look_ahead_(
           settings.format, settings.look_ahead_block_count,

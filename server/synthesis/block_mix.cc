@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/synthesis/block_mix.h"
 
+#include <algorithm>
 #include <cassert>
 #include <utility>
 
@@ -36,6 +37,10 @@ void BlockMix::Begin(uint64_t block_number, RenderDesk& desk) noexcept {
     any_begins_ |= begins_[kind];
   }
   lanes_.Clear(long_blocks_[0].frame_count / long_blocks_[0].block_count);
+}
+
+bool BlockMix::idle() const noexcept {
+  return std::ranges::none_of(rendered_, &Rendered::sounding);
 }
 
 void BlockMix::Finish(std::span<float> block) noexcept {

@@ -50,6 +50,9 @@ class BlockMix {
     return desk_->spectra[kind].slots();
   }
 
+  /// No long block is under way: without banks there is silence.
+  bool idle() const noexcept;
+
   LaneMix& lanes() noexcept { return lanes_; }
   StrikeBatch& batch() noexcept { return desk_->batch; }
 

@@ -31,6 +31,10 @@ SectionCounts RenderSection::Render(uint64_t block_number, std::span<const DueSt
   for (uint32_t i = 0; !frames.empty(); ++i) {
     const std::span<float> block = frames.first(settings_.block_frame_count);
     frames = frames.subspan(block.size());
+    if (sounding_.empty() && mix_.idle() && (strikes.empty() || strikes.front().block > i)) {
+      std::ranges::fill(block, 0.0F);
+      continue;
+    }
     mix_.Begin(block_number + i, desk);
     const auto later = std::ranges::find_if(strikes, [i](const auto& s) { return s.block > i; });
     const auto due_count = static_cast<size_t>(later - strikes.begin());

@@ -9,7 +9,7 @@ namespace {
 /// Follows the median, so that a block in which the thread had to wait teaches little.
 constexpr double kLearningStep = 1.02;
 /// Where there was less to do than this part of the bound, the fixed costs hide the rest.
-constexpr double kWorthLearning = 0.2;
+constexpr double kWorthLearning = 0.05;
 constexpr double kLeastNsPerUnit = 0.1;
 constexpr double kMostNsPerUnit = 100;
 
