@@ -17,7 +17,9 @@ absl::StatusOr<std::unique_ptr<SqliteConnection>> Connect(const std::filesystem:
   const absl::Status status =
       (*connection)
           ->RunScript(
-              "PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL; PRAGMA foreign_keys = ON;");
+              // Large pages for large blobs; a file that is there keeps its own.
+              "PRAGMA page_size = 65536; PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL; "
+              "PRAGMA foreign_keys = ON;");
   if (!status.ok()) return status;
   return connection;
 }

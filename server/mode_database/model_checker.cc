@@ -61,7 +61,7 @@ absl::Status Malformed(absl::string_view what) {
 }
 
 template <typename T, typename Test>
-bool AllOf(const std::string& data, Test test) {
+bool AllOf(std::string_view data, Test test) {
   for (size_t at = 0; at < data.size(); at += sizeof(T)) {
     T value;
     std::memcpy(&value, data.data() + at, sizeof value);
@@ -70,10 +70,20 @@ bool AllOf(const std::string& data, Test test) {
   return true;
 }
 
-bool NumbersAreFinite(v1::ElementType type, const std::string& data) {
-  if (type == v1::ELEMENT_TYPE_FLOAT32) {
-    return AllOf<float>(data, [](float x) { return std::isfinite(x); });
+// By the exponent, without an early end, so that the compiler takes many at a time.
+bool FloatsAreFinite(std::string_view data) {
+  constexpr uint32_t kExponent = 0x7f800000;
+  uint32_t not_finite = 0;
+  for (size_t at = 0; at + sizeof(uint32_t) <= data.size(); at += sizeof(uint32_t)) {
+    uint32_t bits;
+    std::memcpy(&bits, data.data() + at, sizeof bits);
+    not_finite |= static_cast<uint32_t>((bits & kExponent) == kExponent);
   }
+  return not_finite == 0;
+}
+
+bool NumbersAreFinite(v1::ElementType type, std::string_view data) {
+  if (type == v1::ELEMENT_TYPE_FLOAT32) return FloatsAreFinite(data);
   return type != v1::ELEMENT_TYPE_FLOAT64 ||
          AllOf<double>(data, [](double x) { return std::isfinite(x); });
 }
@@ -82,7 +92,10 @@ bool NumbersAreFinite(v1::ElementType type, const std::string& data) {
 
 absl::Status ModelChecker::Check(const v1::ModalModelRecord& record) {
   if (record.has_header() && !has_header_) return CheckHeader(record.header());
-  if (record.has_chunk() && has_header_) return CheckChunk(record.chunk());
+  if (record.has_chunk() && has_header_) {
+    const v1::ModalModelChunk& chunk = record.chunk();
+    return CheckChunk({chunk.array(), chunk.offset(), chunk.xxh3(), chunk.data()});
+  }
   return Malformed(has_header_ ? "a record after the header is not a chunk"
                                : "its first record is not a header");
 }
@@ -145,11 +158,11 @@ absl::Status ModelChecker::CheckShape(const v1::ArrayDescriptor& array) {
       absl::StrCat("type or shape of array \"", array.name(), "\" disagrees with the others"));
 }
 
-absl::Status ModelChecker::CheckChunk(const v1::ModalModelChunk& chunk) {
+absl::Status ModelChecker::CheckChunk(const ChunkView& chunk) {
   if (array_ == header_.arrays_size()) return Malformed("a chunk follows the last array");
   const v1::ArrayDescriptor& array = header_.arrays(array_);
-  const std::string& data = chunk.data();
-  if (chunk.array() != static_cast<uint32_t>(array_) || chunk.offset() != offset_) {
+  const std::string_view data = chunk.data;
+  if (chunk.array != static_cast<uint32_t>(array_) || chunk.offset != offset_) {
     return Malformed(absl::StrCat("a chunk is missing or out of order: byte ", offset_,
                                   " of array \"", array.name(), "\" should follow"));
   }
@@ -159,7 +172,7 @@ absl::Status ModelChecker::CheckChunk(const v1::ModalModelChunk& chunk) {
     return Malformed(absl::StrCat("a chunk of array \"", array.name(), "\" has a wrong size, ",
                                   data.size(), " bytes"));
   }
-  if (Xxh3(data) != chunk.xxh3()) {
+  if (Xxh3(data) != chunk.xxh3) {
     return Refusal(absl::StatusCode::kDataLoss, "MODAL_MODEL_CORRUPT",
                    absl::StrCat("the hash of array \"", array.name(), "\" at byte ", offset_,
                                 " is wrong, so its bytes have changed since they were computed: "
@@ -175,7 +188,7 @@ absl::Status ModelChecker::CheckChunk(const v1::ModalModelChunk& chunk) {
   return absl::OkStatus();
 }
 
-absl::Status ModelChecker::CheckNumbers(const v1::ArrayDescriptor& array, const std::string& data) {
+absl::Status ModelChecker::CheckNumbers(const v1::ArrayDescriptor& array, std::string_view data) {
   const ArraySpec* spec = FindSpec(array.name());
   if (spec == nullptr) return absl::OkStatus();
   bool good = NumbersAreFinite(array.type(), data);

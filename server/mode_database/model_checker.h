@@ -4,12 +4,22 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "absl/status/status.h"
 #include "carillon/v1/modal_model.pb.h"
 
 namespace carillon {
+
+/// A piece of an array, as ModalModelChunk, whose bytes lie elsewhere.
+struct ChunkView {
+  uint32_t array = 0;
+  uint64_t offset = 0;
+  uint64_t xxh3 = 0;
+  std::string_view data;
+};
 
 /// Checks a stored model record by record: hashes, the order and completeness of the chunks, that
 /// the arrays of format version 1 are there with consistent shapes, that numbers are finite,
@@ -19,6 +29,9 @@ class ModelChecker {
   /// Errors: InvalidArgument (MODAL_MODEL_MALFORMED), DataLoss (MODAL_MODEL_CORRUPT: a hash is
   /// wrong). After an error the checker is of no further use.
   absl::Status Check(const v1::ModalModelRecord& record);
+
+  /// As Check of a record with that chunk, after the header.
+  absl::Status CheckChunk(const ChunkView& chunk);
 
   /// Whether every byte of every array has come. Errors: InvalidArgument (MODAL_MODEL_MALFORMED).
   absl::Status Finish() const;
@@ -32,8 +45,7 @@ class ModelChecker {
   absl::Status CheckHeader(const v1::ModalModelHeader& header);
   absl::Status CheckArray(const v1::ArrayDescriptor& array);
   absl::Status CheckShape(const v1::ArrayDescriptor& array);
-  absl::Status CheckChunk(const v1::ModalModelChunk& chunk);
-  absl::Status CheckNumbers(const v1::ArrayDescriptor& array, const std::string& data);
+  absl::Status CheckNumbers(const v1::ArrayDescriptor& array, std::string_view data);
 
   bool has_header_ = false;
   v1::ModalModelHeader header_;

@@ -151,11 +151,23 @@ absl::Status ModelDecoder::Append(const v1::ModalModelRecord& record) {
   if (!status.ok()) return status;
   if (record.has_header()) {
     MakeRoom(record.header());
-  } else if (char* destination = destinations_[record.chunk().array()]; destination != nullptr) {
-    const std::string& data = record.chunk().data();
-    std::memcpy(destination + record.chunk().offset(), data.data(), data.size());
+  } else {
+    const v1::ModalModelChunk& chunk = record.chunk();
+    Take({chunk.array(), chunk.offset(), chunk.xxh3(), chunk.data()});
   }
   return absl::OkStatus();
+}
+
+absl::Status ModelDecoder::AppendChunk(const ChunkView& chunk) {
+  absl::Status status = checker_.CheckChunk(chunk);
+  if (status.ok()) Take(chunk);
+  return status;
+}
+
+void ModelDecoder::Take(const ChunkView& chunk) {
+  char* const destination = destinations_[chunk.array];
+  if (destination == nullptr) return;
+  std::memcpy(destination + chunk.offset, chunk.data.data(), chunk.data.size());
 }
 
 void ModelDecoder::MakeRoom(const v1::ModalModelHeader& header) {

@@ -47,12 +47,16 @@ class ModelDecoder {
   /// Errors: as ModelChecker::Check.
   absl::Status Append(const v1::ModalModelRecord& record);
 
+  /// As Append of a record with that chunk, after the header.
+  absl::Status AppendChunk(const ChunkView& chunk);
+
   /// Call once, last. Errors: as ModelChecker::Finish.
   absl::StatusOr<ModalModel> Finish(const std::string& digest);
 
   const v1::ModalModelHeader& header() const { return checker_.header(); }
 
  private:
+  void Take(const ChunkView& chunk);
   void MakeRoom(const v1::ModalModelHeader& header);
 
   ModelChecker checker_;

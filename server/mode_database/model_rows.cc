@@ -134,18 +134,13 @@ absl::Status SelectModels(SqliteConnection& connection, const ModelFilter& filte
 
 absl::Status SelectChunks(SqliteConnection& connection, int64_t revision, int64_t first,
                           int64_t limit,
-                          absl::FunctionRef<absl::Status(v1::ModalModelRecord)> on_chunk) {
+                          absl::FunctionRef<absl::Status(const ChunkView&)> on_chunk) {
   return connection.Query(
       "SELECT array, byte_offset, xxh3, data FROM model_chunks "
       "WHERE revision = ? AND number >= ? ORDER BY number LIMIT ?",
       {revision, first, limit}, [&](const SqlRow& row) {
-        v1::ModalModelRecord record;
-        v1::ModalModelChunk& chunk = *record.mutable_chunk();
-        chunk.set_array(static_cast<uint32_t>(row.Int(0)));
-        chunk.set_offset(static_cast<uint64_t>(row.Int(1)));
-        chunk.set_xxh3(std::bit_cast<uint64_t>(row.Int(2)));
-        chunk.set_data(row.Blob(3).data(), row.Blob(3).size());
-        return on_chunk(std::move(record));
+        return on_chunk({static_cast<uint32_t>(row.Int(0)), static_cast<uint64_t>(row.Int(1)),
+                         std::bit_cast<uint64_t>(row.Int(2)), row.Blob(3)});
       });
 }
 
@@ -156,8 +151,8 @@ absl::StatusOr<ModalModel> ReadModel(SqliteConnection& connection, const ModelSu
   absl::Status bad = decoder.Append(header);
   const absl::Status status =
       SelectChunks(connection, summary.revision, 0, std::numeric_limits<int64_t>::max(),
-                   [&](const v1::ModalModelRecord& chunk) {
-                     if (bad.ok()) bad = decoder.Append(chunk);
+                   [&](const ChunkView& chunk) {
+                     if (bad.ok()) bad = decoder.AppendChunk(chunk);
                      return bad;
                    });
   // A disk that cannot be read now is no proof that the model is damaged.

@@ -32,7 +32,7 @@ absl::Status SelectModels(SqliteConnection& connection, const ModelFilter& filte
 /// Calls `on_chunk` for the chunks numbered from `first` on, at most `limit`.
 absl::Status SelectChunks(SqliteConnection& connection, int64_t revision, int64_t first,
                           int64_t limit,
-                          absl::FunctionRef<absl::Status(v1::ModalModelRecord)> on_chunk);
+                          absl::FunctionRef<absl::Status(const ChunkView&)> on_chunk);
 
 /// The whole model, every hash checked.
 absl::StatusOr<ModalModel> ReadModel(SqliteConnection& connection, const ModelSummary& summary);

@@ -124,11 +124,14 @@ absl::StatusOr<std::optional<v1::ModalModelRecord>> ModelExport::Next() {
   if (next_chunk_ == chunk_count_) return std::nullopt;
   std::optional<v1::ModalModelRecord> record;
   const absl::Status status = database_->Read([&](SqliteConnection& connection) {
-    return SelectChunks(connection, summary_.revision, next_chunk_, 1,
-                        [&](v1::ModalModelRecord chunk) {
-                          record = std::move(chunk);
-                          return absl::OkStatus();
-                        });
+    return SelectChunks(connection, summary_.revision, next_chunk_, 1, [&](const ChunkView& view) {
+      v1::ModalModelChunk& chunk = *record.emplace().mutable_chunk();
+      chunk.set_array(view.array);
+      chunk.set_offset(view.offset);
+      chunk.set_xxh3(view.xxh3);
+      chunk.set_data(view.data.data(), view.data.size());
+      return absl::OkStatus();
+    });
   });
   if (!status.ok()) return status;
   if (!record.has_value()) {
