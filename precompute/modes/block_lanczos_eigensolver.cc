@@ -102,10 +102,8 @@ absl::StatusOr<RitzPairs> Iterate(LanczosRecurrence<Real>& recurrence, Index wan
 template <typename Real>
 absl::StatusOr<Modes> SolveIn(const OrderedSystem& ordered, const MatrixXd& rigid, double shift,
                               Index wanted, Workers& workers, const SolveProgress& progress) {
-  const absl::StatusOr<MultifrontalCholesky<Real>> factor = [&] {
-    const ScopedBlasThreads threads(workers.count());
-    return MultifrontalCholesky<Real>::Factorize(ordered.fronts, ordered.matrix, shift, nullptr);
-  }();
+  const auto factor = MultifrontalCholesky<Real>::Factorize(ordered.fronts, ordered.matrix, shift,
+                                                            workers, nullptr);
   if (!factor.ok()) return factor.status();
   std::vector<VectorBlockOf<Real>> rough;
   bool exact = true;

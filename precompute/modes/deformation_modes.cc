@@ -65,6 +65,7 @@ class Solution {
   Solution(const SystemMatrices& system, OrderedSystem ordered, const std::vector<Point>& nodes,
            const SolveWatch& watch)
       : system_(system),
+        nodes_(nodes),
         watch_(watch),
         ordered_(std::move(ordered)),
         rigid_(RigidBodyModes(nodes, system)),
@@ -73,9 +74,8 @@ class Solution {
 
   absl::StatusOr<int> CountBelow(double limit) const {
     watch_(SolveStage::kFactor, 0);
-    const ScopedBlasThreads threads(workers_.count());
     absl::StatusOr<int> count =
-        CountEigenvaluesBelow(ordered_.fronts, ordered_.matrix, limit,
+        CountEigenvaluesBelow(ordered_.fronts, ordered_.matrix, limit, workers_,
                               [this](double done) { watch_(SolveStage::kFactor, done); });
     if (!count.ok()) return count;
     if (*count < kRigidModeCount) {
@@ -101,6 +101,9 @@ class Solution {
       watch_(SolveStage::kSolve, done);
     });
   }
+
+  /// An upper bound of the lowest deformation mode, of its size.
+  double BoundOfLowest() const { return LowestEigenvalueBound(nodes_, system_); }
 
   /// Splits rigid-body modes off, checks everything but completeness.
   absl::StatusOr<DeformationModes> Verify(Modes all, double limit) const {
@@ -168,6 +171,7 @@ class Solution {
   }
 
   const SystemMatrices& system_;
+  const std::vector<Point>& nodes_;
   const SolveWatch& watch_;
   OrderedSystem ordered_;
   Eigen::MatrixXd rigid_;
@@ -175,16 +179,9 @@ class Solution {
   mutable Workers workers_;
 };
 
-/// No mode lies below the limit: says where the lowest one is.
+/// No mode lies below the limit: says where the lowest one is, at the price of one factorization.
 absl::StatusOr<DeformationModes> FindLowest(const Solution& solution, double limit) {
-  double above = limit;
-  int count = kRigidModeCount;
-  while (count == kRigidModeCount) {
-    above *= 16;
-    const absl::StatusOr<int> counted = solution.CountBelow(above);
-    if (!counted.ok()) return counted.status();
-    count = *counted;
-  }
+  const double above = solution.BoundOfLowest();
   absl::StatusOr<Modes> lowest = solution.SolveLowest(kRigidModeCount + 1, above);
   if (!lowest.ok()) return lowest.status();
   absl::StatusOr<DeformationModes> result = solution.Verify(*std::move(lowest), above);

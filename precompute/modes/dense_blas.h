@@ -40,6 +40,12 @@ inline void SubtractProduct(int m, int n, int k, const double* A, int lda, const
   cblas_dgemm(CblasColMajor, CblasNoTrans, CblasTrans, m, n, k, -1.0, A, lda, B, ldb, 1.0, C, ldc);
 }
 
+inline void SubtractProduct(int m, int n, int k, const float* A, int lda, const float* B, int ldb,
+                            float* C, int ldc) {
+  cblas_sgemm(CblasColMajor, CblasNoTrans, CblasTrans, m, n, k, -1.0F, A, lda, B, ldb, 1.0F, C,
+              ldc);
+}
+
 /// C = A^T B, A k by m, B k by n.
 inline void TransposedProduct(int m, int n, int k, const double* A, int lda, const double* B,
                               int ldb, double* C, int ldc) {

@@ -2,16 +2,19 @@
 #pragma once
 
 #include <algorithm>
+#include <atomic>
 #include <cstdint>
+#include <cstring>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
 #include "precompute/modes/frontal_structure.h"
 #include "precompute/modes/node_matrix.h"
-#include "proto/error_reason.h"
+#include "precompute/modes/workers.h"
 
 namespace carillon::precompute {
 
@@ -25,113 +28,190 @@ struct Front {
   int pivots = 0;
   int updates = 0;
   std::vector<Real> panel;
-  std::unique_ptr<Real[]> update;
+  Real* update = nullptr;
 
   int height() const { return pivots + updates; }
 };
 
 /// Walks the supernodes from the leaves to the roots: assembles each front from A and from the
-/// update matrices of its children, and hands it to `eliminate(s, front)`.
+/// update matrices of its children, and hands it to `eliminate(s, front, workers)`. Subtrees go
+/// side by side, each in one thread with its update matrices on a stack; the fronts above them
+/// follow one by one, each shared by all threads.
 template <typename Real, typename Eliminate>
 class FrontWalk {
  public:
-  FrontWalk(const FrontalStructure& fronts, const NodeMatrix& A, double shift)
+  FrontWalk(const FrontalStructure& fronts, const NodeMatrix& A, double shift,
+            const Eliminate& eliminate, Workers& workers)
       : fronts_(fronts),
         A_(A),
         shift_(shift),
-        local_(fronts.order.size()),
-        children_(fronts.parent.size()),
-        waiting_(fronts.parent.size()) {
-    for (int s = 0; s < fronts.supernode_count(); ++s) {
-      if (fronts.parent[s] >= 0) children_[fronts.parent[s]].push_back(s);
-    }
-  }
+        eliminate_(eliminate),
+        workers_(workers),
+        waiting_(fronts.parent.size(), nullptr),
+        kept_(fronts.parent.size()) {}
 
-  absl::Status Run(const Eliminate& eliminate, const PartDone& progress) {
-    double done = 0;
-    for (int s = 0; s < fronts_.supernode_count(); ++s) {
-      Assemble(s);
-      if (absl::Status status = eliminate(s, front_); !status.ok()) return status;
-      waiting_[s] = std::move(front_.update);
-      done += Flops();
-      if (progress) progress(std::min(1.0, done / fronts_.factor_flops));
+  absl::Status Run(const PartDone& progress) {
+    absl::Status status = RunSubtrees(progress);
+    if (!status.ok()) return status;
+    Assembler assembler(*this);
+    for (const int s : fronts_.top) {
+      const size_t size = UpdateSize(s);
+      kept_[s].reset(new Real[size]);
+      status = assembler.Process(s, kept_[s].get(), workers_);
+      if (!status.ok()) return status;
+      waiting_[s] = kept_[s].get();
+      for (const int child : fronts_.children(s)) kept_[child].reset();
+      done_ = done_ + fronts_.flops[s];
+      Report(progress);
     }
     return absl::OkStatus();
   }
 
  private:
-  double Flops() const {
-    const double h = front_.height();
-    const double p = front_.pivots;
-    return p * h * h - p * p * h + p * p * p / 3;
+  class Assembler;
+
+  size_t UpdateSize(int s) const {
+    const auto updates = static_cast<size_t>(fronts_.update_count(s));
+    return updates * updates;
   }
 
-  void Assemble(int s) {
-    const int first = fronts_.first_pivot[s];
-    const int last = fronts_.first_pivot[s + 1];
-    const int64_t begin = fronts_.row_start[s];
-    const int rows = static_cast<int>(fronts_.row_start[s + 1] - begin);
-    front_.pivots = 3 * (last - first);
-    front_.updates = 3 * rows - front_.pivots;
-    front_.panel.assign(static_cast<size_t>(front_.height()) * static_cast<size_t>(front_.pivots),
-                        0);
-    const size_t update_size =
-        static_cast<size_t>(front_.updates) * static_cast<size_t>(front_.updates);
-    front_.update = std::make_unique<Real[]>(update_size);
-    for (int r = 0; r < rows; ++r) local_[fronts_.rows[begin + r]] = r;
-    for (int j = first; j < last; ++j) AddColumn(j);
-    for (int child : children_[s]) AddUpdate(child);
+  void Report(const PartDone& progress) const {
+    if (progress) progress(std::min(1.0, done_ / fronts_.factor_flops));
   }
 
-  void AddColumn(int j) {
-    for (int e = A_.column_start[j]; e < A_.column_start[j + 1]; ++e) {
-      const double* block = &A_.stiffness[static_cast<size_t>(e) * 9];
-      for (int b = 0; b < 3; ++b) {
-        Real* column = Column(3 * local_[j] + b) + 3 * local_[A_.row[e]];
-        for (int a = 0; a < 3; ++a) {
-          column[a] += static_cast<Real>(block[3 * a + b] - (a == b ? shift_ * A_.mass[e] : 0.0));
+  absl::Status RunSubtrees(const PartDone& progress) {
+    std::atomic<size_t> next = 0;
+    absl::Status failure;
+    std::mutex mutex;
+    workers_.Run([&](int t) {
+      Workers alone(1);
+      Assembler assembler(*this);
+      for (size_t i = next++; i < fronts_.subtrees.size(); i = next++) {
+        const absl::Status status = RunSubtree(fronts_.subtrees[i], assembler, alone);
+        const std::lock_guard lock(mutex);
+        if (!status.ok()) failure = status;
+        if (!failure.ok()) return;
+        for (int s = fronts_.subtrees[i].begin; s < fronts_.subtrees[i].end; ++s) {
+          done_ = done_ + fronts_.flops[s];
+        }
+        if (t == 0) Report(progress);
+      }
+    });
+    return failure;
+  }
+
+  /// The update matrices of children lie on top of the stack when their parent comes; its own is
+  /// made above them and then moved to their place.
+  absl::Status RunSubtree(const Subtree& subtree, Assembler& assembler, Workers& alone);
+
+  class Assembler {
+   public:
+    explicit Assembler(FrontWalk& walk) : walk_(walk), local_(walk.fronts_.order.size()) {}
+
+    absl::Status Process(int s, Real* update, Workers& workers) {
+      Assemble(s, update);
+      return walk_.eliminate_(s, front_, workers);
+    }
+
+   private:
+    void Assemble(int s, Real* update) {
+      const FrontalStructure& fronts = walk_.fronts_;
+      const int first = fronts.first_pivot[s];
+      const int last = fronts.first_pivot[s + 1];
+      const int64_t begin = fronts.row_start[s];
+      const int rows = static_cast<int>(fronts.row_start[s + 1] - begin);
+      front_.pivots = 3 * (last - first);
+      front_.updates = 3 * rows - front_.pivots;
+      front_.panel.assign(static_cast<size_t>(front_.height()) * static_cast<size_t>(front_.pivots),
+                          0);
+      front_.update = update;
+      for (int j = 0; j < front_.updates; ++j) {
+        std::fill_n(update + static_cast<ptrdiff_t>(j) * (front_.updates + 1), front_.updates - j,
+                    Real{0});
+      }
+      for (int r = 0; r < rows; ++r) local_[fronts.rows[begin + r]] = r;
+      for (int j = first; j < last; ++j) AddColumn(j);
+      for (const int child : fronts.children(s)) AddUpdate(child);
+    }
+
+    void AddColumn(int j) {
+      const NodeMatrix& A = walk_.A_;
+      for (int e = A.column_start[j]; e < A.column_start[j + 1]; ++e) {
+        const double* block = &A.stiffness[static_cast<size_t>(e) * 9];
+        for (int b = 0; b < 3; ++b) {
+          Real* column = Column(3 * local_[j] + b) + 3 * local_[A.row[e]];
+          for (int a = 0; a < 3; ++a) {
+            column[a] +=
+                static_cast<Real>(block[3 * a + b] - (a == b ? walk_.shift_ * A.mass[e] : 0.0));
+          }
         }
       }
     }
-  }
 
-  /// The column of the front, indexed by row of the front (for update columns rows below the pivots
-  /// only).
-  Real* Column(int c) {
-    if (c < front_.pivots) return &front_.panel[static_cast<size_t>(c) * front_.height()];
-    return front_.update.get() + static_cast<ptrdiff_t>(c - front_.pivots) * front_.updates -
-           front_.pivots;
-  }
+    /// The column of the front, indexed by row of the front (for update columns rows below the
+    /// pivots only).
+    Real* Column(int c) {
+      if (c < front_.pivots) return &front_.panel[static_cast<size_t>(c) * front_.height()];
+      return front_.update + static_cast<ptrdiff_t>(c - front_.pivots) * front_.updates -
+             front_.pivots;
+    }
 
-  void AddUpdate(int child) {
-    const int64_t begin =
-        fronts_.row_start[child] + fronts_.first_pivot[child + 1] - fronts_.first_pivot[child];
-    const int rows = static_cast<int>(fronts_.row_start[child + 1] - begin);
-    const std::unique_ptr<Real[]> update = std::move(waiting_[child]);
-    target_.resize(static_cast<size_t>(rows));
-    for (int r = 0; r < rows; ++r) target_[r] = 3 * local_[fronts_.rows[begin + r]];
-    const int ld = 3 * rows;
-    for (int j = 0; j < rows; ++j) {
-      for (int b = 0; b < 3; ++b) {
-        const Real* from = update.get() + static_cast<ptrdiff_t>(3 * j + b) * ld;
-        Real* to = Column(target_[j] + b);
-        for (int i = j; i < rows; ++i) {
-          to[target_[i]] += from[3 * i];
-          to[target_[i] + 1] += from[3 * i + 1];
-          to[target_[i] + 2] += from[3 * i + 2];
+    void AddUpdate(int child) {
+      const FrontalStructure& fronts = walk_.fronts_;
+      const int64_t begin =
+          fronts.row_start[child] + fronts.first_pivot[child + 1] - fronts.first_pivot[child];
+      const int rows = static_cast<int>(fronts.row_start[child + 1] - begin);
+      const Real* update = walk_.waiting_[child];
+      target_.resize(static_cast<size_t>(rows));
+      for (int r = 0; r < rows; ++r) target_[r] = 3 * local_[fronts.rows[begin + r]];
+      const ptrdiff_t ld = 3 * rows;
+      for (int j = 0; j < rows; ++j) {
+        for (int b = 0; b < 3; ++b) {
+          const Real* from = update + (3 * j + b) * ld;
+          Real* to = Column(target_[j] + b);
+          for (int i = j; i < rows; ++i) {
+            to[target_[i]] += from[3 * i];
+            to[target_[i] + 1] += from[3 * i + 1];
+            to[target_[i] + 2] += from[3 * i + 2];
+          }
         }
       }
     }
-  }
+
+    FrontWalk& walk_;
+    std::vector<int32_t> local_;
+    std::vector<int32_t> target_;
+    Front<Real> front_;
+  };
 
   const FrontalStructure& fronts_;
   const NodeMatrix& A_;
   const double shift_;
-  std::vector<int32_t> local_;
-  std::vector<int32_t> target_;
-  std::vector<std::vector<int32_t>> children_;
-  std::vector<std::unique_ptr<Real[]>> waiting_;
-  Front<Real> front_;
+  const Eliminate& eliminate_;
+  Workers& workers_;
+  std::vector<const Real*> waiting_;           ///< update matrices not yet taken by their parents
+  std::vector<std::unique_ptr<Real[]>> kept_;  ///< those of the top, and of subtrees' roots
+  double done_ = 0;                            ///< flops
 };
+
+template <typename Real, typename Eliminate>
+absl::Status FrontWalk<Real, Eliminate>::RunSubtree(const Subtree& subtree, Assembler& assembler,
+                                                    Workers& alone) {
+  const std::unique_ptr<Real[]> stack(new Real[subtree.stack_size]);
+  Real* top = stack.get();
+  for (int s = subtree.begin; s < subtree.end; ++s) {
+    if (absl::Status status = assembler.Process(s, top, alone); !status.ok()) return status;
+    Real* base = top;
+    for (const int child : fronts_.children(s)) base -= UpdateSize(child);
+    std::memmove(base, top, UpdateSize(s) * sizeof(Real));
+    waiting_[s] = base;
+    top = base + UpdateSize(s);
+  }
+  const int root = subtree.end - 1;
+  kept_[root].reset(new Real[UpdateSize(root)]);
+  std::copy_n(waiting_[root], UpdateSize(root), kept_[root].get());
+  waiting_[root] = kept_[root].get();
+  return absl::OkStatus();
+}
 
 }  // namespace carillon::precompute

@@ -3,11 +3,20 @@
 
 #include <Eigen/SparseCore>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "absl/status/statusor.h"
 
 namespace carillon::precompute {
+
+/// Supernodes begin ... end - 1, the last one the root of all others.
+struct Subtree {
+  int begin = 0;
+  int end = 0;
+  /// Numbers that the update matrices of its supernodes need at most at once.
+  size_t stack_size = 0;
+};
 
 /// The supernodes of a Cholesky factorization, by node (each stands for three unknowns).
 struct FrontalStructure {
@@ -19,12 +28,34 @@ struct FrontalStructure {
   /// pivots first, ascending, numbered in elimination order.
   std::vector<int64_t> row_start;
   std::vector<int32_t> rows;
-  /// #supernodes: the supernode that takes the update matrix of s; -1 at a root.
+  /// #supernodes: the supernode that takes the update matrix of s; -1 at a root. Supernodes are in
+  /// postorder: a subtree is contiguous, and the children of s are the roots of the subtrees that
+  /// end before s.
   std::vector<int32_t> parent;
-  /// Multiply-adds of the factorization, three unknowns a node.
+  /// #supernodes + 1, and all children by parent, ascending.
+  std::vector<int32_t> child_start;
+  std::vector<int32_t> child;
+  /// #supernodes: multiply-adds of each, three unknowns a node, and their sum.
+  std::vector<double> flops;
   double factor_flops = 0;
+  /// Subtrees of little work each, for threads, and the supernodes above them, ascending.
+  std::vector<Subtree> subtrees;
+  std::vector<int32_t> top;
 
   int supernode_count() const { return static_cast<int>(parent.size()); }
+  std::span<const int32_t> children(int s) const {
+    return std::span(child).subspan(static_cast<size_t>(child_start[static_cast<size_t>(s)]),
+                                    static_cast<size_t>(child_start[static_cast<size_t>(s) + 1] -
+                                                        child_start[static_cast<size_t>(s)]));
+  }
+  int pivot_count(int s) const {
+    return 3 * (first_pivot[static_cast<size_t>(s) + 1] - first_pivot[static_cast<size_t>(s)]);
+  }
+  int height(int s) const {
+    return 3 * static_cast<int>(row_start[static_cast<size_t>(s) + 1] -
+                                row_start[static_cast<size_t>(s)]);
+  }
+  int update_count(int s) const { return height(s) - pivot_count(s); }
 };
 
 /// Orders the graph of nodes (a third the size of the graph of unknowns, and METIS finds better

@@ -7,6 +7,7 @@
 
 #include "precompute/modes/block_kernels.h"
 #include "precompute/modes/dense_blas.h"
+#include "precompute/modes/strips.h"
 #include "proto/error_reason.h"
 
 namespace carillon::precompute {
@@ -59,15 +60,46 @@ absl::Status NotPositiveDefinite() {
       "has elements too flat to compute with; mesh it anew with better-shaped elements");
 }
 
+/// The columns of the panel, kPanel at a time, rows shared out.
 template <typename Real>
-absl::Status EliminateCholesky(Front<Real>& front) {
+bool FactorizePanel(Front<Real>& front, Workers& workers) {
+  constexpr int kPanel = 192;
   const int h = front.height();
   const int p = front.pivots;
-  Real* panel = front.panel.data();
-  if (!blas::Cholesky(p, panel, h)) return NotPositiveDefinite();
-  if (front.updates == 0) return absl::OkStatus();
-  blas::SolveRight(front.updates, p, panel, h, panel + p, h, false);
-  blas::SubtractSquare(front.updates, p, panel + p, h, front.update.get(), front.updates);
+  for (int k = 0; k < p; k += kPanel) {
+    const int width = std::min(kPanel, p - k);
+    Real* block = front.panel.data() + static_cast<ptrdiff_t>(k) * (h + 1);
+    if (!blas::Cholesky(width, block, h)) return false;
+    workers.ForParts(h - k - width, kTileRows, [&](int64_t begin, int64_t end, int) {
+      blas::SolveRight(static_cast<int>(end - begin), width, block, h, block + width + begin, h,
+                       false);
+    });
+    const int rest = h - k - width;
+    const int later = p - k - width;
+    Real* L = block + width;
+    ForStrips(workers, later, [&](int j, int columns) {
+      blas::SubtractProduct(rest - j, columns, width, L + j, h, L + j, h,
+                            L + static_cast<ptrdiff_t>(width + j) * h + j, h);
+    });
+  }
+  return true;
+}
+
+template <typename Real>
+absl::Status EliminateCholesky(Front<Real>& front, Workers& workers) {
+  const int h = front.height();
+  const int p = front.pivots;
+  const int u = front.updates;
+  if (!FactorizePanel(front, workers)) return NotPositiveDefinite();
+  const Real* below = front.panel.data() + p;
+  if (workers.count() == 1) {
+    if (u > 0) blas::SubtractSquare(u, p, below, h, front.update, u);
+    return absl::OkStatus();
+  }
+  ForStrips(workers, u, [&](int j, int columns) {
+    blas::SubtractProduct(u - j, columns, p, below + j, h, below + j, h,
+                          front.update + static_cast<ptrdiff_t>(j) * (u + 1), u);
+  });
   return absl::OkStatus();
 }
 
@@ -75,7 +107,8 @@ absl::Status EliminateCholesky(Front<Real>& front) {
 
 template <typename Real>
 absl::StatusOr<MultifrontalCholesky<Real>> MultifrontalCholesky<Real>::Factorize(
-    const FrontalStructure& fronts, const NodeMatrix& A, double shift, const PartDone& progress) {
+    const FrontalStructure& fronts, const NodeMatrix& A, double shift, Workers& workers,
+    const PartDone& progress) {
   MultifrontalCholesky factor;
   factor.fronts_ = &fronts;
   factor.tile_start_.push_back(0);
@@ -85,13 +118,13 @@ absl::StatusOr<MultifrontalCholesky<Real>> MultifrontalCholesky<Real>::Factorize
     factor.tile_start_.push_back(factor.tile_start_.back() + PackedSize(pivots, height - pivots));
   }
   factor.tiles_.resize(factor.tile_start_.back());
-  const auto eliminate = [&](int s, Front<Real>& front) {
-    absl::Status status = EliminateCholesky(front);
+  const auto eliminate = [&](int s, Front<Real>& front, Workers& sharing) {
+    absl::Status status = EliminateCholesky(front, sharing);
     if (status.ok()) PackPanel(front, &factor.tiles_[factor.tile_start_[s]]);
     return status;
   };
-  FrontWalk<Real, decltype(eliminate)> walk(fronts, A, shift);
-  if (absl::Status status = walk.Run(eliminate, progress); !status.ok()) return status;
+  FrontWalk<Real, decltype(eliminate)> walk(fronts, A, shift, eliminate, workers);
+  if (absl::Status status = walk.Run(progress); !status.ok()) return status;
   return factor;
 }
 

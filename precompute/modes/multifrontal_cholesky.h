@@ -19,7 +19,7 @@ class MultifrontalCholesky {
   /// Errors: VERIFICATION_FAILED where K - shift M is not positive definite.
   static absl::StatusOr<MultifrontalCholesky> Factorize(const FrontalStructure& fronts,
                                                         const NodeMatrix& A, double shift,
-                                                        const PartDone& progress);
+                                                        Workers& workers, const PartDone& progress);
 
   /// Overwrites x, (3 #nodes + 3) by kBlockWidth, row-major, in elimination order, by its solution.
   /// The last three rows are scratch.

@@ -2,11 +2,14 @@
 #include "precompute/modes/multifrontal_inertia.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <vector>
 
 #include "precompute/modes/dense_blas.h"
 #include "precompute/modes/front_walk.h"
+#include "precompute/modes/strips.h"
+#include "proto/error_reason.h"
 
 namespace carillon::precompute {
 namespace {
@@ -37,8 +40,8 @@ absl::Status VanishingPivot() {
 }
 
 /// Turns the panel into L and `scaled`, of its shape, into L D below each diagonal block.
-absl::Status FactorizePanel(Front<double>& front, double smallest, std::vector<double>& scaled,
-                            int& negative) {
+absl::Status FactorizePanel(Front<double>& front, double smallest, Workers& workers,
+                            std::vector<double>& scaled, int& negative) {
   const int h = front.height();
   const int p = front.pivots;
   for (int k = 0; k < p; k += kLdlBlock) {
@@ -47,56 +50,60 @@ absl::Status FactorizePanel(Front<double>& front, double smallest, std::vector<d
     const size_t corner = static_cast<size_t>(k) * static_cast<size_t>(h + 1);
     double* block = &front.panel[corner];
     if (!FactorizeBlock(width, block, h, smallest, negative)) return VanishingPivot();
-    if (rest == 0) continue;
     double* L = block + width;
-    double* LD = &scaled[corner] + width;
-    blas::SolveRight(rest, width, block, h, L, h, true);
-    for (int c = 0; c < width; ++c) {
-      const ptrdiff_t column = static_cast<ptrdiff_t>(c) * h;
-      const double d = block[column + c];
-      std::copy(L + column, L + column + rest, LD + column);
-      for (int i = 0; i < rest; ++i) L[column + i] /= d;
-    }
-    const int later = p - k - width;
-    if (later == 0) continue;
-    blas::SubtractProduct(rest, later, width, L, h, LD, h, L + static_cast<ptrdiff_t>(width) * h,
-                          h);
+    double* LD = scaled.data() + corner + width;
+    workers.ForParts(rest, 16, [&](int64_t begin, int64_t end, int) {
+      blas::SolveRight(static_cast<int>(end - begin), width, block, h, L + begin, h, true);
+      for (int c = 0; c < width; ++c) {
+        const ptrdiff_t column = static_cast<ptrdiff_t>(c) * h;
+        const double d = block[column + c];
+        std::copy(L + column + begin, L + column + end, LD + column + begin);
+        for (int64_t i = begin; i < end; ++i) L[column + i] /= d;
+      }
+    });
+    ForStrips(workers, p - k - width, [&](int j, int columns) {
+      blas::SubtractProduct(rest - j, columns, width, L + j, h, LD + j, h,
+                            L + static_cast<ptrdiff_t>(width + j) * h + j, h);
+    });
   }
   return absl::OkStatus();
 }
 
-absl::Status EliminateLdl(Front<double>& front, double smallest, int& negative) {
+absl::Status EliminateLdl(Front<double>& front, double smallest, Workers& workers, int& negative) {
   std::vector<double> scaled(front.panel.size());
-  if (absl::Status status = FactorizePanel(front, smallest, scaled, negative); !status.ok()) {
+  if (absl::Status status = FactorizePanel(front, smallest, workers, scaled, negative);
+      !status.ok()) {
     return status;
   }
   const int h = front.height();
   const int p = front.pivots;
-  constexpr int kColumns = 192;  // Only the lower triangle of the update matrix is wanted.
-  for (int j = 0; j < front.updates; j += kColumns) {
-    blas::SubtractProduct(front.updates - j, std::min(kColumns, front.updates - j), p,
-                          front.panel.data() + p + j, h, scaled.data() + p + j, h,
-                          front.update.get() + static_cast<ptrdiff_t>(j) * (front.updates + 1),
-                          front.updates);
-  }
+  const int u = front.updates;
+  ForStrips(workers, u, [&](int j, int columns) {
+    blas::SubtractProduct(u - j, columns, p, front.panel.data() + p + j, h, scaled.data() + p + j,
+                          h, front.update + static_cast<ptrdiff_t>(j) * (u + 1), u);
+  });
   return absl::OkStatus();
 }
 
 }  // namespace
 
 absl::StatusOr<int> CountEigenvaluesBelow(const FrontalStructure& fronts, const NodeMatrix& A,
-                                          double shift, const PartDone& progress) {
+                                          double shift, Workers& workers,
+                                          const PartDone& progress) {
   double largest = 0;
   for (size_t e = 0; e < A.row.size(); ++e)
     largest = std::max(largest, std::abs(A.stiffness[9 * e]));
   // Below this the sign of a pivot is rounding.
   const double smallest = 1e-14 * largest;
-  int negative = 0;
-  const auto eliminate = [&](int, Front<double>& front) {
-    return EliminateLdl(front, smallest, negative);
+  std::atomic<int> negative = 0;
+  const auto eliminate = [&](int, Front<double>& front, Workers& sharing) {
+    int count = 0;
+    absl::Status status = EliminateLdl(front, smallest, sharing, count);
+    negative += count;
+    return status;
   };
-  FrontWalk<double, decltype(eliminate)> walk(fronts, A, shift);
-  if (absl::Status status = walk.Run(eliminate, progress); !status.ok()) return status;
+  FrontWalk<double, decltype(eliminate)> walk(fronts, A, shift, eliminate, workers);
+  if (absl::Status status = walk.Run(progress); !status.ok()) return status;
   return negative;
 }
 

@@ -13,6 +13,6 @@ namespace carillon::precompute {
 /// Errors: VERIFICATION_FAILED where a pivot is too small to trust its sign (the shift lies on an
 /// eigenvalue: move it).
 absl::StatusOr<int> CountEigenvaluesBelow(const FrontalStructure& fronts, const NodeMatrix& A,
-                                          double shift, const PartDone& progress);
+                                          double shift, Workers& workers, const PartDone& progress);
 
 }  // namespace carillon::precompute

@@ -14,4 +14,8 @@ namespace carillon::precompute {
 /// dependent: its elements have volume.
 Eigen::MatrixXd RigidBodyModes(const std::vector<Point>& nodes, const SystemMatrices& system);
 
+/// An upper bound of a free body's lowest deformation eigenvalue: the seventh of K and M projected
+/// on displacements that are polynomials of second degree in the position (Rayleigh and Ritz).
+double LowestEigenvalueBound(const std::vector<Point>& nodes, const SystemMatrices& system);
+
 }  // namespace carillon::precompute

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <utility>
 
 namespace carillon::precompute {
 
@@ -31,9 +32,19 @@ void Workers::Run(const std::function<void(int)>& work) {
     ++round_;
   }
   begun_.notify_all();
-  work(0);
+  Try(work, 0);
   std::unique_lock lock(mutex_);
   ended_.wait(lock, [this] { return busy_ == 0; });
+  if (thrown_) std::rethrow_exception(std::exchange(thrown_, nullptr));
+}
+
+void Workers::Try(const std::function<void(int)>& work, int index) {
+  try {
+    work(index);
+  } catch (...) {
+    const std::lock_guard lock(mutex_);
+    thrown_ = std::current_exception();
+  }
 }
 
 void Workers::ForParts(int64_t n, int64_t grain,
@@ -64,7 +75,7 @@ void Workers::Serve(int index) {
       seen = round_;
       work = work_;
     }
-    (*work)(index);
+    Try(*work, index);
     const std::lock_guard lock(mutex_);
     if (--busy_ == 0) ended_.notify_one();
   }

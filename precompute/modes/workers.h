@@ -3,6 +3,7 @@
 
 #include <condition_variable>
 #include <cstdint>
+#include <exception>
 #include <functional>
 #include <mutex>
 #include <thread>
@@ -21,7 +22,8 @@ class Workers {
 
   int count() const { return static_cast<int>(threads_.size()) + 1; }
 
-  /// Calls work(0) ... work(count() - 1), each in a thread of its own, and waits for all.
+  /// Calls work(0) ... work(count() - 1), each in a thread of its own, and waits for all. Throws
+  /// what one of them threw.
   void Run(const std::function<void(int)>& work);
 
   /// Calls visit(begin, end, t) for contiguous parts of 0 ... n - 1, part t in thread t; parts
@@ -33,6 +35,7 @@ class Workers {
 
  private:
   void Serve(int index);
+  void Try(const std::function<void(int)>& work, int index);
 
   std::mutex mutex_;
   std::condition_variable begun_;
@@ -41,6 +44,7 @@ class Workers {
   uint64_t round_ = 0;
   int busy_ = 0;
   bool stopping_ = false;
+  std::exception_ptr thrown_;
   std::vector<std::thread> threads_;
 };
 

@@ -5,6 +5,7 @@
 Each part prints a Markdown table:
   compare   SciPy, SLEPc and Spectra on the same matrices: CPU seconds, residuals
   calculix  CalculiX on the same meshes: frequencies
+  growth    time and memory over the number of nodes, up to a million with --full
   table1    the sizes of the paper's Table 1, beside its times
 
 Nothing is kept from one run to the next. Slow programs on large bodies run with --full only, or where
@@ -19,6 +20,7 @@ import tempfile
 
 import calculix
 import compare
+import growth
 import table1
 
 
@@ -44,7 +46,7 @@ def fair_environment():
 
 
 PARTS = {"compare": compare.compare, "calculix": calculix.compare_frequencies,
-         "table1": table1.table1}
+         "table1": table1.table1, "growth": growth.growth}
 
 
 def names(text):

@@ -71,6 +71,18 @@ TEST(RigidBodyModes, AreOrthonormalAndWithoutEnergy) {
   EXPECT_LT((system.K.selfadjointView<Eigen::Lower>() * rigid).norm(), 1e-12);
 }
 
+TEST(LowestEigenvalueBound, LiesAboveTheLowestDeformationModeAndNearIt) {
+  for (const Point& size : {Point{1, 0.6, 0.3}, Point{1, 0.05, 0.05}}) {
+    const TetMesh mesh = MakeTetBox(size, {8, 2, 2}, 10);
+    const SystemMatrices system = AssembleUnit(mesh);
+    const Modes modes =
+        DenseEigensolver().Solve(system, {.count = 7, .eigenvalue_limit = 0}, kSilent).value();
+    const double bound = LowestEigenvalueBound(mesh.nodes, system);
+    EXPECT_GE(bound, modes.eigenvalues[6]);
+    EXPECT_LT(bound, 4 * modes.eigenvalues[6]);
+  }
+}
+
 TEST(Residuals, TellAModeFromAnotherVector) {
   const SystemMatrices system = AssembleUnit(MakeTetBox({1, 0.6, 0.3}, {3, 2, 2}, 4));
   absl::StatusOr<Modes> modes =

@@ -36,8 +36,9 @@ template <typename Real>
 double SolveResidual(const SystemMatrices& system) {
   const double shift = -1e8;
   const OrderedSystem ordered = OrderedSystem::Make(system).value();
-  const auto factor =
-      MultifrontalCholesky<Real>::Factorize(ordered.fronts, ordered.matrix, shift, nullptr);
+  Workers workers(2);
+  const auto factor = MultifrontalCholesky<Real>::Factorize(ordered.fronts, ordered.matrix, shift,
+                                                            workers, nullptr);
   const Eigen::Index rows = system.unknown_count();
   std::srand(1);
   const VectorBlock right = VectorBlock::Random(rows, kBlockWidth);
@@ -48,7 +49,6 @@ double SolveResidual(const SystemMatrices& system) {
   VectorBlock elastic(rows, kBlockWidth);
   VectorBlock inertial(rows, kBlockWidth);
   MultiplyStiffness(ordered.matrix, solution.data(), elastic.data());
-  Workers workers(1);
   MultiplyMass(MakeMassRows<double>(ordered.matrix), workers, solution.data(), inertial.data());
   return (elastic - shift * inertial - right).norm() / right.norm();
 }
@@ -97,8 +97,9 @@ TEST(Multifrontal, MultipliesLikeTheMatricesItWasMadeOf) {
 
 TEST(Multifrontal, RefusesAMatrixThatIsNotPositiveDefinite) {
   const OrderedSystem ordered = OrderedSystem::Make(BoxSystem(4)).value();
-  const auto factor =
-      MultifrontalCholesky<double>::Factorize(ordered.fronts, ordered.matrix, 1e10, nullptr);
+  Workers workers(2);
+  const auto factor = MultifrontalCholesky<double>::Factorize(ordered.fronts, ordered.matrix, 1e10,
+                                                              workers, nullptr);
   EXPECT_NE(factor.status().ToString().find("VERIFICATION_FAILED"), std::string::npos);
 }
 
@@ -106,10 +107,11 @@ TEST(CountEigenvaluesBelow, AgreesWithAllEigenvaluesBetweenAnyTwo) {
   const SystemMatrices system = BoxSystem(4);
   const OrderedSystem ordered = OrderedSystem::Make(system).value();
   const Eigen::VectorXd all = AllEigenvalues(system);
+  Workers workers(2);
   for (Eigen::Index i = 6; i + 1 < all.size(); i += 9) {
     if (all[i + 1] - all[i] < 1e-6 * all[i]) continue;
-    const auto count =
-        CountEigenvaluesBelow(ordered.fronts, ordered.matrix, (all[i] + all[i + 1]) / 2, nullptr);
+    const auto count = CountEigenvaluesBelow(ordered.fronts, ordered.matrix,
+                                             (all[i] + all[i + 1]) / 2, workers, nullptr);
     ASSERT_TRUE(count.ok()) << count.status();
     EXPECT_EQ(*count, i + 1);
   }
