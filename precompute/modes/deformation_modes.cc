@@ -14,6 +14,7 @@
 #include "precompute/modes/multifrontal_inertia.h"
 #include "precompute/modes/openblas.h"
 #include "precompute/modes/rigid_body.h"
+#include "precompute/modes/solve_cost.h"
 #include "precompute/modes/workers.h"
 #include "proto/error_reason.h"
 
@@ -59,6 +60,10 @@ void FixSigns(Eigen::MatrixXd& shapes) {
   }
 }
 
+absl::Status CheckMemory(const OrderedSystem& ordered, int mode_count) {
+  return CheckMemory(PredictSolveCost(ordered, mode_count, ThreadCount()));
+}
+
 /// One solution: counts, solves and verifies.
 class Solution {
  public:
@@ -94,6 +99,7 @@ class Solution {
   }
 
   absl::StatusOr<Modes> SolveLowest(int count, double limit) const {
+    if (absl::Status status = CheckMemory(ordered_, count); !status.ok()) return status;
     const ModeRequest request{
         .count = static_cast<int>(std::min<Eigen::Index>(count, system_.unknown_count())),
         .eigenvalue_limit = limit};
@@ -200,6 +206,7 @@ absl::StatusOr<DeformationModes> SolveDeformationModes(const SystemMatrices& sys
                                                        const SolveWatch& watch) {
   absl::StatusOr<OrderedSystem> ordered = OrderedSystem::Make(system);
   if (!ordered.ok()) return ordered.status();
+  if (absl::Status status = CheckMemory(*ordered, kRigidModeCount); !status.ok()) return status;
   const Solution solution(system, *std::move(ordered), nodes, watch);
   for (int attempt = 0; attempt < kMaxAttempts; ++attempt) {
     const double limit = eigenvalue_limit * (1 + 1e-4 * attempt);

@@ -36,8 +36,8 @@ using SolveWatch = std::function<void(SolveStage, double)>;
 /// nearly all digits it is raised by a hair.
 ///
 /// `nodes`: positions, in the order of the unknowns.
-/// Errors: BODY_IN_SEVERAL_PIECES, TOO_MANY_MODES, OUT_OF_MEMORY, MESH_TOO_LARGE,
-/// VERIFICATION_FAILED.
+/// Errors: BODY_IN_SEVERAL_PIECES, TOO_MANY_MODES, MEMORY_TOO_SMALL (before it is taken),
+/// OUT_OF_MEMORY, MESH_TOO_LARGE, VERIFICATION_FAILED.
 absl::StatusOr<DeformationModes> SolveDeformationModes(const SystemMatrices& system,
                                                        const std::vector<Point>& nodes,
                                                        double eigenvalue_limit,

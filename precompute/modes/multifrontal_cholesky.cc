@@ -113,9 +113,8 @@ absl::StatusOr<MultifrontalCholesky<Real>> MultifrontalCholesky<Real>::Factorize
   factor.fronts_ = &fronts;
   factor.tile_start_.push_back(0);
   for (int s = 0; s < fronts.supernode_count(); ++s) {
-    const int pivots = 3 * (fronts.first_pivot[s + 1] - fronts.first_pivot[s]);
-    const int height = 3 * static_cast<int>(fronts.row_start[s + 1] - fronts.row_start[s]);
-    factor.tile_start_.push_back(factor.tile_start_.back() + PackedSize(pivots, height - pivots));
+    factor.tile_start_.push_back(factor.tile_start_.back() +
+                                 PackedSize(fronts.pivot_count(s), fronts.update_count(s)));
   }
   factor.tiles_.resize(factor.tile_start_.back());
   const auto eliminate = [&](int s, Front<Real>& front, Workers& sharing) {
@@ -223,6 +222,14 @@ void MultifrontalCholesky<Real>::Solve(Real* x) const {
       TileBackward<Real>(start, row, pivot, rows);
     }
   }
+}
+
+size_t FactorNumbers(const FrontalStructure& fronts) {
+  size_t numbers = 0;
+  for (int s = 0; s < fronts.supernode_count(); ++s) {
+    numbers += PackedSize(fronts.pivot_count(s), fronts.update_count(s));
+  }
+  return numbers;
 }
 
 template class MultifrontalCholesky<double>;

@@ -33,4 +33,7 @@ class MultifrontalCholesky {
   std::vector<size_t> tile_start_;  ///< #supernodes + 1, into tiles_
 };
 
+/// Numbers that a factor stores.
+size_t FactorNumbers(const FrontalStructure& fronts);
+
 }  // namespace carillon::precompute

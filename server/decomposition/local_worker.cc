@@ -207,7 +207,8 @@ Outcome LocalWorker::JudgeFailure(const ProcessEnd& end) const {
   }
   if (end.exited && reported_.has_value()) {
     Verdict verdict = Verdict::kBadInput;
-    if (reported_->reason() == "OUT_OF_MEMORY") verdict = Verdict::kOutOfMemory;
+    if (reported_->reason() == "OUT_OF_MEMORY" || reported_->reason() == "MEMORY_TOO_SMALL")
+      verdict = Verdict::kOutOfMemory;
     if (MaySucceedNextTime(reported_->reason())) verdict = Verdict::kCrashed;
     return {verdict, *reported_, {}};
   }
