@@ -4,6 +4,7 @@
 #include <mutex>
 
 #include "absl/base/thread_annotations.h"
+#include "server/base/thread_role.h"
 
 namespace carillon {
 
@@ -11,7 +12,7 @@ namespace carillon {
 /// ThreadSanitizer sees nothing of the locks of a library that was compiled without it.
 class ABSL_LOCKABLE Mutex {
  public:
-  void Lock() ABSL_EXCLUSIVE_LOCK_FUNCTION() { mutex_.lock(); }
+  void Lock() ABSL_EXCLUSIVE_LOCK_FUNCTION() ABSL_LOCKS_EXCLUDED(kRenderRole) { mutex_.lock(); }
   void Unlock() ABSL_UNLOCK_FUNCTION() { mutex_.unlock(); }
 
  private:
@@ -21,7 +22,9 @@ class ABSL_LOCKABLE Mutex {
 /// Holds a mutex for the length of a scope.
 class ABSL_SCOPED_LOCKABLE MutexLock {
  public:
-  explicit MutexLock(Mutex* mutex) ABSL_EXCLUSIVE_LOCK_FUNCTION(mutex) : mutex_(mutex) {
+  explicit MutexLock(Mutex* mutex) ABSL_EXCLUSIVE_LOCK_FUNCTION(mutex)
+      ABSL_LOCKS_EXCLUDED(kRenderRole)
+      : mutex_(mutex) {
     mutex_->Lock();
   }
   MutexLock(const MutexLock&) = delete;

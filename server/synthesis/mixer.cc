@@ -33,6 +33,7 @@ constexpr double kRingingShare = 0.9;
 
 void Mixer::Render(std::span<float> frames) noexcept {
   assert(frames.size() % settings_.block_frame_count == 0);
+  const InRole role(kRenderRole);
   const FlushDenormals flush_denormals;
   while (!frames.empty()) {
     const size_t count = std::min(frames.size(), kBlocksTogether * settings_.block_frame_count);
@@ -104,7 +105,7 @@ void Mixer::TakeStrikes(size_t block_count) noexcept {
   }
   if (budget == 0) all_strikes_taken_ = false;
   // Asked in this order, a queue that is closed and empty stays empty.
-  std::erase_if(open_queues_, [this](StrikeQueue* queue) {
+  open_queues_.EraseIf([this](StrikeQueue* queue) ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole) {
     const bool done = queue->closed.load(std::memory_order_acquire) && queue->ring.empty();
     if (done) SendBack({.queue = queue});
     return done;
@@ -282,7 +283,7 @@ void Mixer::RenderSections(std::span<float> frames) noexcept {
 }
 
 void Mixer::RetireLeavingBanks() noexcept {
-  std::erase_if(leaving_, [this](uint32_t index) {
+  leaving_.EraseIf([this](uint32_t index) ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole) {
     BankSlot& slot = slots_[index];
     const bool awaited = !slot.fading && (slot.pending_count > 0 || !all_strikes_taken_);
     if (slot.sounding || awaited) return false;

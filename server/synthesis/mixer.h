@@ -12,8 +12,10 @@
 #include "absl/base/thread_annotations.h"
 #include "absl/status/statusor.h"
 #include "server/base/clock.h"
+#include "server/base/fixed_vector.h"
 #include "server/base/mutex.h"
 #include "server/base/spsc_ring.h"
+#include "server/base/thread_role.h"
 #include "server/synthesis/bank_slot.h"
 #include "server/synthesis/block_mix.h"
 #include "server/synthesis/limiter.h"
@@ -85,22 +87,23 @@ class Mixer {
 
   /// Puts a bank on the mixer; it can be struck when the call returns. The bank was made for this
   /// mixer's sample rate and block. RESOURCE_EXHAUSTED (TOO_MANY_OBJECTS).
-  absl::StatusOr<BankId> Add(std::unique_ptr<OscillatorBank> bank);
+  absl::StatusOr<BankId> Add(std::unique_ptr<OscillatorBank> bank) ABSL_LOCKS_EXCLUDED(kRenderRole);
 
   /// Takes a bank off once it is silent. The caller sends it no further strikes; those on their way
   /// still sound.
-  void LetRingOut(BankId bank);
+  void LetRingOut(BankId bank) ABSL_LOCKS_EXCLUDED(kRenderRole);
 
   /// Takes a bank off after a fade of 10 ms, which begins when its long blocks under way have
   /// ended, within 2048 frames; strikes on their way to it are lost.
-  void FadeOut(BankId bank);
+  void FadeOut(BankId bank) ABSL_LOCKS_EXCLUDED(kRenderRole);
 
   /// A new stream of strikes, of which `capacity` may wait to be taken.
   /// RESOURCE_EXHAUSTED (TOO_MANY_STREAMS).
-  absl::StatusOr<std::unique_ptr<StrikeStream>> OpenStream(size_t capacity = 4096);
+  absl::StatusOr<std::unique_ptr<StrikeStream>> OpenStream(size_t capacity = 4096)
+      ABSL_LOCKS_EXCLUDED(kRenderRole);
 
   /// Frees what Render has retired; a housekeeping thread calls it now and then.
-  void CollectGarbage();
+  void CollectGarbage() ABSL_LOCKS_EXCLUDED(kRenderRole);
 
   /// Number of the next frame to be rendered.
   uint64_t frame() const noexcept { return statistics_.frame_count.load(); }
@@ -149,22 +152,27 @@ class Mixer {
   void Send(const Command& command) ABSL_EXCLUSIVE_LOCKS_REQUIRED(control_mutex_);
 
   // The rest is the rendering thread's.
-  void RenderBlocks(std::span<float> frames) noexcept;
-  void ObeyCommands() noexcept;
-  void Obey(const Command& command) noexcept;
-  void TakeStrikes(size_t block_count) noexcept;
-  void Take(const Strike& strike, StrikeQueue& queue) noexcept;
-  void CollectDueStrikes(size_t block_count) noexcept;
-  void ChooseStrikes(size_t block, std::span<const uint32_t> due) noexcept;
-  void ShedBanks() noexcept;
-  void DecideTreatment(std::span<const uint32_t> due) noexcept;
-  static float LoudnessOf(const Excitation& excitation, const BankSlot& slot) noexcept;
-  bool IsHopeless(const Strike& strike, uint64_t sample, const BankSlot& slot) const noexcept;
-  void RenderSections(std::span<float> frames) noexcept;
-  void RetireLeavingBanks() noexcept;
-  void SendBack(const Retired& retired) noexcept;
-  void NotePeak(std::span<const float> block) noexcept;
-  BankSlot* FindSlot(BankId id) noexcept;
+  void RenderBlocks(std::span<float> frames) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  void ObeyCommands() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  void Obey(const Command& command) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  void TakeStrikes(size_t block_count) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  void Take(const Strike& strike, StrikeQueue& queue) noexcept
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  void CollectDueStrikes(size_t block_count) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  void ChooseStrikes(size_t block, std::span<const uint32_t> due) noexcept
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  void ShedBanks() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  void DecideTreatment(std::span<const uint32_t> due) noexcept
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  static float LoudnessOf(const Excitation& excitation, const BankSlot& slot) noexcept
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  bool IsHopeless(const Strike& strike, uint64_t sample, const BankSlot& slot) const noexcept
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  void RenderSections(std::span<float> frames) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  void RetireLeavingBanks() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  void SendBack(const Retired& retired) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  void NotePeak(std::span<const float> block) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  BankSlot* FindSlot(BankId id) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
   const MixerSettings settings_;
   Counters statistics_;
@@ -178,29 +186,37 @@ class Mixer {
   SpscRing<Command> commands_;  // produced under control_mutex_
   SpscRing<Retired> retired_;   // consumed under control_mutex_
 
-  uint64_t block_start_ = 0;
-  std::vector<BankSlot> slots_;
-  std::vector<uint32_t> leaving_;  // slots to be retired when they are silent
-  std::vector<StrikeQueue*> open_queues_;
+  uint64_t block_start_ ABSL_GUARDED_BY(kRenderRole) = 0;
+  std::vector<BankSlot> slots_ ABSL_GUARDED_BY(kRenderRole);
+  // Slots to be retired when they are silent.
+  FixedVector<uint32_t> leaving_ ABSL_GUARDED_BY(kRenderRole);
+  FixedVector<StrikeQueue*> open_queues_ ABSL_GUARDED_BY(kRenderRole);
   // All that was pushed before the commands of this block were given: a bank let ring out may be
   // retired, for no strike is on its way to it.
-  bool all_strikes_taken_ = true;
-  std::array<Strike, 64> taken_{};
-  PendingStrikes pending_;
-  std::vector<uint32_t> due_;        // of the blocks rendered together: places in pending_
-  std::vector<uint64_t> due_order_;  // see CollectDueStrikes
-  std::vector<DueStrike> due_strikes_;
-  std::array<size_t, kSectionCount + 1> due_ends_{};  // in due_strikes_
-  StrikeTriage triage_;
-  WorkBudget budget_;
-  float hopeless_below_ = 0;  // loudness
-  size_t taken_count_ = 0;    // strikes, for the blocks rendered together
-  double ringing_work_ = 0;   // of the sounding banks, in the next block
-  double rendered_work_ = 0;  // of the blocks rendered together
-  std::vector<RenderSection> sections_;
-  std::vector<float> section_frames_;
-  RenderDesk desk_;
-  Limiter limiter_;
+  bool all_strikes_taken_ ABSL_GUARDED_BY(kRenderRole) = true;
+  std::array<Strike, 64> taken_ ABSL_GUARDED_BY(kRenderRole){};
+  PendingStrikes pending_ ABSL_GUARDED_BY(kRenderRole);
+  // Of the blocks rendered together: places in pending_.
+  FixedVector<uint32_t> due_ ABSL_GUARDED_BY(kRenderRole);
+  // See ChooseStrikes.
+  FixedVector<uint64_t> due_order_ ABSL_GUARDED_BY(kRenderRole);
+  FixedVector<DueStrike> due_strikes_ ABSL_GUARDED_BY(kRenderRole);
+  // Of each section, in due_strikes_.
+  std::array<size_t, kSectionCount + 1> due_ends_ ABSL_GUARDED_BY(kRenderRole){};
+  StrikeTriage triage_ ABSL_GUARDED_BY(kRenderRole);
+  WorkBudget budget_ ABSL_GUARDED_BY(kRenderRole);
+  // Loudness.
+  float hopeless_below_ ABSL_GUARDED_BY(kRenderRole) = 0;
+  // Strikes, for the blocks rendered together.
+  size_t taken_count_ ABSL_GUARDED_BY(kRenderRole) = 0;
+  // Of the sounding banks, in the next block.
+  double ringing_work_ ABSL_GUARDED_BY(kRenderRole) = 0;
+  // Of the blocks rendered together.
+  double rendered_work_ ABSL_GUARDED_BY(kRenderRole) = 0;
+  std::vector<RenderSection> sections_ ABSL_GUARDED_BY(kRenderRole);
+  std::vector<float> section_frames_ ABSL_GUARDED_BY(kRenderRole);
+  RenderDesk desk_ ABSL_GUARDED_BY(kRenderRole);
+  Limiter limiter_ ABSL_GUARDED_BY(kRenderRole);
 };
 
 }  // namespace carillon

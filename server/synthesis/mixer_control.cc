@@ -27,7 +27,12 @@ Mixer::Mixer(const MixerSettings& settings)
       commands_(3 * settings.most_banks + settings.most_streams),
       retired_(settings.most_banks + settings.most_streams),
       slots_(settings.most_banks),
+      leaving_(settings.most_banks),
+      open_queues_(settings.most_streams),
       pending_(settings.most_pending_strikes, settings.block_frame_count),
+      due_(settings.most_pending_strikes),
+      due_order_(settings.most_pending_strikes),
+      due_strikes_(settings.most_pending_strikes),
       budget_(settings.clock,
               static_cast<double>(settings.block_frame_count) / settings.sample_rate_hz,
               settings.most_load),
@@ -44,14 +49,9 @@ Mixer::Mixer(const MixerSettings& settings)
                                                        1 / (kFadeS * settings.sample_rate_hz))},
                            slots_);
   }
-  due_.reserve(settings.most_pending_strikes);
-  due_order_.reserve(settings.most_pending_strikes);
-  due_strikes_.reserve(settings.most_pending_strikes);
   for (size_t slot = settings.most_banks; slot-- > 0;) {
     free_slots_.push_back(static_cast<uint32_t>(slot));
   }
-  leaving_.reserve(settings.most_banks);
-  open_queues_.reserve(settings.most_streams);
 }
 
 Mixer::~Mixer() = default;

@@ -10,6 +10,8 @@
 #include <string_view>
 #include <vector>
 
+#include "absl/base/thread_annotations.h"
+#include "server/base/thread_role.h"
 #include "server/synthesis/bank_kernel.h"
 #include "server/synthesis/block_mix.h"
 #include "server/synthesis/due_strike.h"
@@ -67,38 +69,43 @@ class OscillatorBank {
   /// it happened. Offsets within one block may not go back. False: not finite or no such vertex,
   /// and nothing was done.
   bool Strike(const Excitation& excitation, size_t offset, float lead_frames,
-              BlockMix& mix) noexcept;
+              BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
   /// The same with the modal impulses g_m, but for the scale of the shapes, of the projected
   /// columns (column_count() of them): what is not a single impulse on a triangle comes in here.
   bool StrikeModes(std::span<const float> modal_impulses, size_t offset,
-                   const bank_kernel::Onset& onset, BlockMix& mix) noexcept;
+                   const bank_kernel::Onset& onset, BlockMix& mix) noexcept
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
   /// Strikes that sound as one, which costs less: each on the nearest vertex of its triangle, all
   /// at their mean time, weighted by impulse. They are neighbours in time, and lie in this block.
-  bool StrikeMerged(std::span<const DueStrike> strikes, BlockMix& mix) noexcept;
+  bool StrikeMerged(std::span<const DueStrike> strikes, BlockMix& mix) noexcept
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
   /// What strikes, one or some merged, will read.
   StrikeBatch::RowsAhead RowsOf(std::span<const DueStrike> strikes) const noexcept;
 
   /// Adds a contact's force to that at the next knot. False: no such vertex, and nothing was done.
-  bool Gather(const Excitation& force) noexcept;
+  bool Gather(const Excitation& force) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
   /// The sustained force has come to what was gathered, at sample `offset` as for Strike. False: it
   /// was not finite, and is zero.
-  bool Tie(const ForceKnot& knot, size_t offset, BlockMix& mix) noexcept;
+  bool Tie(const ForceKnot& knot, size_t offset, BlockMix& mix) noexcept
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
   /// Adds the block to `mix`. False: the state was not finite and the bank has been silenced.
-  bool RenderAdd(BlockMix& mix) noexcept;
+  bool RenderAdd(BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
   /// From its next long blocks on the bank rings in the time domain only.
-  void LeaveSpectrum() noexcept { leaving_spectrum_ = true; }
+  void LeaveSpectrum() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole) {
+    leaving_spectrum_ = true;
+  }
 
   /// Nothing of the bank sounds in a long block that is under way or to come.
   bool out_of_spectrum() const noexcept;
 
   /// RenderAdd for a bank out of the spectrum, not struck in this block.
-  bool RenderAddInTime(LaneMix& mix) noexcept;
+  bool RenderAddInTime(LaneMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
   /// Nothing rings: rendering would cost and add nothing.
   bool silent() const noexcept { return !newborn_ && !any_awake_ && !force_.driving(); }
@@ -121,7 +128,7 @@ class OscillatorBank {
   double loudest_squared() const noexcept;
 
   /// Silences the bank; what of it sounds in a long block under way ends with that.
-  void Shed() noexcept { Silence(); }
+  void Shed() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole) { Silence(); }
 
   /// Columns of the shape table that are projected, from the first mode's on.
   size_t column_count() const noexcept { return column_count_; }
@@ -151,7 +158,7 @@ class OscillatorBank {
   OscillatorBank(const LanePlan& plan, const SoundingModes& sounding, ShapeTable shapes,
                  const OscillatorBankSettings& settings);
 
-  void BeginBlock(BlockMix& mix) noexcept;
+  void BeginBlock(BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   bool BeginLongBlock(size_t kind, BlockMix& mix) noexcept;
   void MoveToSpectrum(size_t kind) noexcept;
   void MoveToTime(size_t kind) noexcept;
@@ -160,11 +167,12 @@ class OscillatorBank {
                  bank_kernel::Projection& projection) const noexcept;
   void MeasureBlow(const LanePlan& plan);
   double TimeWork(size_t lane_count) const noexcept;
-  void BeginStrikes(BlockMix& mix) noexcept;
-  void RenderStrikes(size_t end, BlockMix& mix) noexcept;
-  void RenderDrivenStrikes(size_t end, BlockMix& mix) noexcept;
+  void BeginStrikes(BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  void RenderStrikes(size_t end, BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  void RenderDrivenStrikes(size_t end, BlockMix& mix) noexcept
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void RenderDriven(size_t end, LaneMix& mix) noexcept;
-  bool Advance() noexcept;
+  bool Advance() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void Silence() noexcept;
   void CountAwake() noexcept;
 

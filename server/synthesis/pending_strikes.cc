@@ -46,7 +46,7 @@ void PendingStrikes::Append(Page& page, uint32_t index) noexcept {
   page.last = index;
 }
 
-void PendingStrikes::Collect(uint64_t block_start, std::vector<uint32_t>& indices) noexcept {
+void PendingStrikes::Collect(uint64_t block_start, FixedVector<uint32_t>& indices) noexcept {
   Page& page = pages_[block_start / block_frame_count_ % kPageCount];
   const uint64_t block_end = block_start + block_frame_count_;
   Page later;

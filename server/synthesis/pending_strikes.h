@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "server/base/fixed_vector.h"
 #include "server/synthesis/strike.h"
 
 namespace carillon {
@@ -33,7 +34,7 @@ class PendingStrikes {
   /// The strikes of the block that begins at `block_start`, in order of arrival, by index; what was
   /// collected before is forgotten. Blocks are collected in turn; with several before Forget,
   /// their strikes stay.
-  void Collect(uint64_t block_start, std::vector<uint32_t>& indices) noexcept;
+  void Collect(uint64_t block_start, FixedVector<uint32_t>& indices) noexcept;
 
   /// Frees the places of collected strikes.
   void Forget(std::span<const uint32_t> indices) noexcept;

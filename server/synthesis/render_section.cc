@@ -21,9 +21,10 @@ size_t CountTogether(std::span<const DueStrike> strikes) {
 }  // namespace
 
 RenderSection::RenderSection(const Settings& settings, std::span<BankSlot> slots)
-    : settings_(settings), slots_(slots), mix_(settings.block_frame_count, settings.stagger) {
-  sounding_.reserve(settings.most_banks);
-}
+    : settings_(settings),
+      slots_(slots),
+      sounding_(settings.most_banks),
+      mix_(settings.block_frame_count, settings.stagger) {}
 
 SectionCounts RenderSection::Render(uint64_t block_number, std::span<const DueStrike> strikes,
                                     std::span<float> frames, RenderDesk& desk) noexcept {
@@ -106,7 +107,7 @@ void RenderSection::RenderFading(BankSlot& slot, std::span<float> block,
 void RenderSection::FinishBanks(std::span<float> block, SectionCounts& counts) noexcept {
   counts.active_mode_count = 0;
   counts.ringing_work = 0;
-  std::erase_if(sounding_, [&](uint32_t index) {
+  sounding_.EraseIf([&](uint32_t index) ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole) {
     BankSlot& slot = slots_[index];
     if (!slot.rendered) RenderFading(slot, block, counts);
     slot.rendered = false;

@@ -4,8 +4,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
-#include <vector>
 
+#include "absl/base/thread_annotations.h"
+#include "server/base/fixed_vector.h"
+#include "server/base/thread_role.h"
 #include "server/synthesis/bank_slot.h"
 #include "server/synthesis/block_mix.h"
 #include "server/synthesis/due_strike.h"
@@ -39,18 +41,24 @@ class RenderSection {
   /// Renders `frames`, whole blocks, the first of which has this number. `strikes` are this
   /// section's, ascending by block, then slot, then offset.
   SectionCounts Render(uint64_t block_number, std::span<const DueStrike> strikes,
-                       std::span<float> frames, RenderDesk& desk) noexcept;
+                       std::span<float> frames, RenderDesk& desk) noexcept
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
  private:
-  void Strike(std::span<const DueStrike> strikes, SectionCounts& counts) noexcept;
-  bool Excite(OscillatorBank& bank, std::span<const DueStrike> due) noexcept;
-  void RenderBank(BankSlot& slot, SectionCounts& counts) noexcept;
-  void RenderFading(BankSlot& slot, std::span<float> block, SectionCounts& counts) noexcept;
-  void FinishBanks(std::span<float> block, SectionCounts& counts) noexcept;
+  void Strike(std::span<const DueStrike> strikes, SectionCounts& counts) noexcept
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  bool Excite(OscillatorBank& bank, std::span<const DueStrike> due) noexcept
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  void RenderBank(BankSlot& slot, SectionCounts& counts) noexcept
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  void RenderFading(BankSlot& slot, std::span<float> block, SectionCounts& counts) noexcept
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  void FinishBanks(std::span<float> block, SectionCounts& counts) noexcept
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
   Settings settings_;
   std::span<BankSlot> slots_;
-  std::vector<uint32_t> sounding_;  // slots whose banks are not silent, in order of their awakening
+  FixedVector<uint32_t> sounding_;  // slots whose banks are not silent, in order of their awakening
   BlockMix mix_;
   LaneMix fading_mix_;
 };

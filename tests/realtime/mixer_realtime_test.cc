@@ -1,8 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
+#include <linux/filter.h>
+#include <linux/seccomp.h>
+#include <signal.h>
+#include <sys/prctl.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
+#include <array>
 #include <atomic>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 #include <memory>
 #include <mutex>
@@ -71,6 +80,63 @@ TEST(MixerRealtime, RenderNeitherAllocatesNorFreesNorLocks) {
   EXPECT_GT(statistics.accepted_count, 0u);
   EXPECT_GT(statistics.late_count, 0u);
   EXPECT_GT(statistics.dropped_count, 0u);
+}
+
+/// From now on the kernel kills this process at its first system call but exit. Not the strict
+/// mode, which forbids reading the processor's clock too.
+void ForbidSystemCalls() {
+  std::array<sock_filter, 4> filter = {{
+      BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, nr)),
+      BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, SYS_exit, 0, 1),
+      BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW),
+      BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_KILL_PROCESS),
+  }};
+  const sock_fprog program{.len = filter.size(), .filter = filter.data()};
+  prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
+  prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &program);
+}
+
+/// Runs `body` in a child without system calls; the child's status.
+template <typename Body>
+int RunWithoutSystemCalls(const Body& body) {
+  const pid_t child = fork();
+  if (child == 0) {
+    ForbidSystemCalls();
+    body();
+    syscall(SYS_exit, 0);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  return status;
+}
+
+TEST(MixerRealtime, ASystemCallIsSeen) {
+  if (!kForbiddenCallsAreSeen) GTEST_SKIP() << "sanitizers call the system themselves";
+  const int status = RunWithoutSystemCalls([] { syscall(SYS_getppid); });
+  EXPECT_TRUE(WIFSIGNALED(status));
+  EXPECT_EQ(WTERMSIG(status), SIGSYS);
+}
+
+TEST(MixerRealtime, RenderMakesNoSystemCall) {
+  if (!kForbiddenCallsAreSeen) GTEST_SKIP() << "sanitizers call the system themselves";
+  SystemClock clock;
+  clock.Monotonic();
+  Mixer mixer({.most_banks = 8, .clock = &clock});
+  const auto stream = mixer.OpenStream(4096).value();
+  for (int bank = 0; bank < 8; ++bank) {
+    const BankId id = mixer.Add(MakeBank(bank % 2 == 0 ? -3 : -300)).value();
+    for (uint64_t i = 0; i < 200; ++i) {
+      stream->TryPush(
+          {.bank = id, .frame = 90 * i, .fraction = 0.5F, .excitation = MakeUnitExcitation()});
+    }
+    if (bank == 5) mixer.FadeOut(id);
+    if (bank == 6) mixer.LetRingOut(id);
+  }
+  std::vector<float> block(128);
+  const int status = RunWithoutSystemCalls([&] {
+    for (int i = 0; i < 300; ++i) mixer.Render(block);
+  });
+  EXPECT_TRUE(WIFEXITED(status)) << "signal " << WTERMSIG(status);
 }
 
 TEST(MixerRealtime, ControlStrikesHousekeepingAndRenderingRunAtOnce) {
