@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What deploy/lint/check_thread_roles.py finds in files with planted mistakes."""
 
+import os
 import pathlib
 import subprocess
 import sys
@@ -9,7 +10,7 @@ import tempfile
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-BUILD = pathlib.Path(sys.argv.pop(1)) if len(sys.argv) > 1 else ROOT / "build/release"
+BUILD = pathlib.Path(os.environ.get("CARILLON_BUILD", ROOT / "build/release"))
 
 
 def problems_in(body):
