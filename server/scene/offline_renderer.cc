@@ -24,13 +24,14 @@ constexpr float kQuiet = 1e-4F;
 constexpr double kQuietS = 0.25;
 constexpr size_t kQueueCapacity = 65536;
 
-MixerSettings SettingsOf(const OfflineSettings& settings) {
+MixerSettings SettingsOf(const OfflineSettings& settings, SectionCrew& crew) {
   // Nothing waits here, so a block takes however many strikes fall into it.
   return {.sample_rate_hz = static_cast<double>(settings.sample_rate_hz),
           .block_frame_count = OfflineRenderer::kBlockFrameCount,
           .most_streams = 1,
           .most_pending_strikes = kQueueCapacity,
-          .most_strikes_per_block = kQueueCapacity};
+          .most_strikes_per_block = kQueueCapacity,
+          .crew = &crew};
 }
 
 bool Earlier(const Strike& a, const Strike& b) {
@@ -60,7 +61,10 @@ absl::StatusOr<std::unique_ptr<OfflineRenderer>> OfflineRenderer::Make(
 }
 
 OfflineRenderer::OfflineRenderer(const OfflineSettings& settings, BodyCache& bodies)
-    : settings_(settings), bodies_(bodies), mixer_(SettingsOf(settings)) {}
+    : settings_(settings),
+      bodies_(bodies),
+      crew_(settings.thread_count),
+      mixer_(SettingsOf(settings, crew_)) {}
 
 absl::Status OfflineRenderer::AddObject(uint32_t handle, std::shared_ptr<const ModalModel> model,
                                         const ObjectProperties& properties) {
@@ -135,23 +139,27 @@ size_t OfflineRenderer::Render(std::span<float> frames) {
   const FlushDenormals flush;
   size_t count = 0;
   while (!ended_ && count + kBlockFrameCount <= frames.size()) {
-    count += RenderBlock(frames.subspan(count, kBlockFrameCount));
+    count += RenderBlocks(frames.subspan(count));
   }
   return count;
 }
 
-size_t OfflineRenderer::RenderBlock(std::span<float> block) {
-  PushStrikesBefore(mixer_.frame() + block.size());
-  mixer_.Render(block);
+/// Renders some of `frames`; returns how many count.
+size_t OfflineRenderer::RenderBlocks(std::span<float> frames) {
+  frames = frames.first(CountBlocks(frames.size() / kBlockFrameCount) * kBlockFrameCount);
+  const uint64_t first = mixer_.frame();
+  PushStrikesBefore(first + frames.size());
+  mixer_.Render(frames);
   mixer_.CollectGarbage();
-  size_t count = block.size();
+  size_t count = frames.size();
   if (pushed_count_ == strikes_.size()) {
-    const uint64_t last = strikes_.empty() ? 0 : strikes_.back().frame;
-    const double tail_s = settings_.tail_s > 0 ? settings_.tail_s : kLongestOpenTailS;
-    const uint64_t end = last + static_cast<uint64_t>(std::ceil(tail_s * settings_.sample_rate_hz));
-    const uint64_t begin = mixer_.frame() - block.size();
-    count = static_cast<size_t>(std::min<uint64_t>(count, end - std::min(begin, end)));
-    ended_ = mixer_.frame() >= end || TailEnded(block);
+    count =
+        static_cast<size_t>(std::min<uint64_t>(count, EndFrame() - std::min(first, EndFrame())));
+    for (size_t n = 0; n < count && !ended_; n += kBlockFrameCount) {
+      ended_ = TailEnded(frames.subspan(n, kBlockFrameCount));
+      if (ended_) count = std::min(count, n + kBlockFrameCount);
+    }
+    ended_ = ended_ || mixer_.frame() >= EndFrame();
   }
   const MixerStatistics statistics = mixer_.statistics();
   summary_.frame_count += count;
@@ -159,6 +167,26 @@ size_t OfflineRenderer::RenderBlock(std::span<float> block) {
   summary_.limited_frame_count = statistics.limited_frame_count;
   summary_.peak = std::max(summary_.peak, mixer_.TakePeak());
   return count;
+}
+
+/// How many blocks are rendered together: not past the end, nor more than whose strikes the queue
+/// holds.
+size_t OfflineRenderer::CountBlocks(size_t most) const {
+  const uint64_t first = mixer_.frame();
+  const uint64_t left = EndFrame() - std::min(first, EndFrame());
+  size_t count = std::min<size_t>({most, kBlocksTogether, left / kBlockFrameCount + 1});
+  const size_t full = pushed_count_ + kQueueCapacity / 2;
+  while (count > 1 && full < strikes_.size() &&
+         strikes_[full].frame < first + count * kBlockFrameCount) {
+    --count;
+  }
+  return count;
+}
+
+uint64_t OfflineRenderer::EndFrame() const {
+  const uint64_t last = strikes_.empty() ? 0 : strikes_.back().frame;
+  const double tail_s = settings_.tail_s > 0 ? settings_.tail_s : kLongestOpenTailS;
+  return last + static_cast<uint64_t>(std::ceil(tail_s * settings_.sample_rate_hz));
 }
 
 void OfflineRenderer::PushStrikesBefore(uint64_t frame) {

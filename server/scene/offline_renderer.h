@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <map>
 #include <memory>
 #include <span>
+#include <thread>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -13,6 +15,7 @@
 #include "server/scene/sounding_body.h"
 #include "server/scene/sounding_object.h"
 #include "server/synthesis/mixer.h"
+#include "server/synthesis/render_crew.h"
 
 namespace carillon {
 
@@ -22,6 +25,8 @@ struct OfflineSettings {
   /// How long to go on after the last impulse; zero: until all is below -80 dB of full scale, at
   /// most 60 s.
   double tail_s = 0;
+  /// The sound does not depend on it, not by a bit.
+  size_t thread_count = std::max(std::thread::hardware_concurrency(), 1U);
 };
 
 /// What has been rendered.
@@ -85,11 +90,14 @@ class OfflineRenderer {
   void Push(carillon::Strike strike, double time_s);
   void PushForce(uint32_t handle, carillon::Strike strike, double time_s);
   void PushStrikesBefore(uint64_t frame);
-  size_t RenderBlock(std::span<float> block);
+  size_t RenderBlocks(std::span<float> frames);
+  size_t CountBlocks(size_t most) const;
+  uint64_t EndFrame() const;
   bool TailEnded(std::span<const float> block);
 
   const OfflineSettings settings_;
   BodyCache& bodies_;
+  RenderCrew crew_;
   Mixer mixer_;
   std::unique_ptr<StrikeStream> stream_;
   std::map<uint32_t, SoundingObject> objects_;

@@ -261,19 +261,41 @@ void Mixer::ShedBanks() noexcept {
   }
 }
 
+void Mixer::RenderOneSection(size_t worker, size_t section, size_t frame_count) noexcept {
+  const size_t begin = section == 0 ? 0 : due_ends_[section - 1];
+  section_counts_[section] = sections_[section].Render(
+      block_start_ / settings_.block_frame_count,
+      std::span(due_strikes_).subspan(begin, due_ends_[section] - begin),
+      std::span(section_frames_).subspan(section * frame_count, frame_count), desks_[worker]);
+}
+
 void Mixer::RenderSections(std::span<float> frames) noexcept {
-  const std::span<float> section_frames = std::span(section_frames_).first(frames.size());
+  for (size_t section = 1; section < kSectionCount; ++section) {
+    due_ends_[section] = std::max(due_ends_[section], due_ends_[section - 1]);
+  }
+  const auto render = [&](size_t worker, size_t section) {
+    const InRole role(kRenderRole);  // a thread of the crew, too
+    RenderOneSection(worker, section, frames.size());
+  };
+  if (settings_.crew != nullptr) {
+    settings_.crew->Render(kSectionCount, render);
+  } else {
+    for (size_t section = 0; section < kSectionCount; ++section) {
+      RenderOneSection(0, section, frames.size());
+    }
+  }
+  MixSections(frames);
+}
+
+/// In order, whoever rendered them.
+void Mixer::MixSections(std::span<float> frames) noexcept {
   std::ranges::fill(frames, 0.0F);
   uint64_t active_mode_count = 0;
   ringing_work_ = 0;
-  size_t begin = 0;
   for (size_t section = 0; section < kSectionCount; ++section) {
-    const size_t end = std::max(due_ends_[section], begin);
-    const SectionCounts counts = sections_[section].Render(
-        block_start_ / settings_.block_frame_count,
-        std::span(due_strikes_).subspan(begin, end - begin), section_frames, desk_);
-    begin = end;
-    for (size_t n = 0; n < frames.size(); ++n) frames[n] += section_frames[n];
+    const float* rendered = section_frames_.data() + section * frames.size();
+    for (size_t n = 0; n < frames.size(); ++n) frames[n] += rendered[n];
+    const SectionCounts& counts = section_counts_[section];
     Count(statistics_.dropped_count, counts.dropped_count);
     Count(statistics_.reset_bank_count, counts.reset_bank_count);
     active_mode_count += counts.active_mode_count;

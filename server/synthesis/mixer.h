@@ -21,6 +21,7 @@
 #include "server/synthesis/limiter.h"
 #include "server/synthesis/oscillator_bank.h"
 #include "server/synthesis/pending_strikes.h"
+#include "server/synthesis/render_crew.h"
 #include "server/synthesis/render_section.h"
 #include "server/synthesis/strike.h"
 #include "server/synthesis/strike_stream.h"
@@ -50,6 +51,9 @@ struct MixerSettings {
   /// mixer.
   const Clock* clock = nullptr;
   double most_load = 0.7;  ///< part of real time
+  /// Who renders the sections; none: the caller alone. The sound is the same, bit for bit. It must
+  /// outlive the mixer.
+  SectionCrew* crew = nullptr;
 };
 
 /// What a mixer has counted since it was made, and what it renders now.
@@ -168,7 +172,10 @@ class Mixer {
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   bool IsHopeless(const Strike& strike, uint64_t sample, const BankSlot& slot) const noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  void RenderOneSection(size_t worker, size_t section, size_t frame_count) noexcept
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void RenderSections(std::span<float> frames) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  void MixSections(std::span<float> frames) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void RetireLeavingBanks() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void SendBack(const Retired& retired) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void NotePeak(std::span<const float> block) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
@@ -214,8 +221,9 @@ class Mixer {
   // Of the blocks rendered together.
   double rendered_work_ ABSL_GUARDED_BY(kRenderRole) = 0;
   std::vector<RenderSection> sections_ ABSL_GUARDED_BY(kRenderRole);
+  std::array<SectionCounts, kSectionCount> section_counts_ ABSL_GUARDED_BY(kRenderRole){};
   std::vector<float> section_frames_ ABSL_GUARDED_BY(kRenderRole);
-  RenderDesk desk_ ABSL_GUARDED_BY(kRenderRole);
+  std::vector<RenderDesk> desks_ ABSL_GUARDED_BY(kRenderRole);  // one for each of the crew
   Limiter limiter_ ABSL_GUARDED_BY(kRenderRole);
 };
 

@@ -36,11 +36,12 @@ Mixer::Mixer(const MixerSettings& settings)
       budget_(settings.clock,
               static_cast<double>(settings.block_frame_count) / settings.sample_rate_hz,
               settings.most_load),
-      section_frames_(kBlocksTogether * settings.block_frame_count),
-      desk_(settings.block_frame_count),
+      section_frames_(kSectionCount * kBlocksTogether * settings.block_frame_count),
       limiter_(settings.sample_rate_hz) {
   assert(settings.block_frame_count > 0 && settings.block_frame_count <= kMostBlockFrames);
   assert(settings.most_banks <= kMostBanks);
+  const size_t worker_count = settings.crew == nullptr ? 1 : settings.crew->size();
+  for (size_t i = 0; i < worker_count; ++i) desks_.emplace_back(settings.block_frame_count);
   for (size_t section = 0; section < kSectionCount; ++section) {
     sections_.emplace_back(RenderSection::Settings{.block_frame_count = settings.block_frame_count,
                                                    .stagger = section,

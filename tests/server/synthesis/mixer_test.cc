@@ -131,6 +131,38 @@ TEST_F(MixerTest, OneCallOverManyBlocksGivesTheBitsOfManyCalls) {
   EXPECT_EQ(whole, parts);
 }
 
+/// Sixty objects struck all over, rendered by so many threads.
+std::vector<float> RenderBy(size_t thread_count) {
+  RenderCrew crew(thread_count);
+  Mixer mixer({.most_banks = 60, .crew = &crew});
+  const auto stream = mixer.OpenStream().value();
+  for (uint32_t i = 0; i < 60; ++i) {
+    SoundingModes sounding;
+    for (uint32_t m = 0; m < 150; ++m) {
+      sounding.modes.push_back(MakeMode(m, 60 + 97 * m + i, -1 - 0.3 * (m * 7 % 150)));
+    }
+    const BankId bank = mixer
+                            .Add(std::make_unique<OscillatorBank>(
+                                sounding, MakeUniformShapes(150, 1e-2F), OscillatorBankSettings{}))
+                            .value();
+    for (uint64_t k = 0; k < 20; ++k) {
+      stream->TryPush({.bank = bank,
+                       .frame = (i * 131 + k * 977) % 12000,
+                       .fraction = 0.4F,
+                       .excitation = MakeUnitExcitation()});
+    }
+  }
+  std::vector<float> sound(size_t{128} * 120);
+  mixer.Render(sound);
+  return sound;
+}
+
+TEST(MixerCrew, TheSoundIsTheSameBitForBitFromRunToRunAndForAnyNumberOfThreads) {
+  const std::vector<float> alone = RenderBy(1);
+  EXPECT_GT(Rms(alone), 0);
+  for (const size_t thread_count : {1U, 2U, 3U, 7U}) EXPECT_EQ(RenderBy(thread_count), alone);
+}
+
 TEST_F(MixerTest, ABankLetRingOutSoundsToItsEndAndIsThenFreed) {
   Strike(bank_, 0);
   Strike(bank_, 6000);  // on its way when the bank is let ring out
