@@ -118,7 +118,7 @@ absl::StatusOr<Modes> SolveIn(const OrderedSystem& ordered, const MatrixXd& rigi
   }
   return RefineModes(
       ordered.matrix, *factor, rigid, rough,
-      {.wanted = wanted, .first_steps = exact ? 2 : 3, .free_motion = -kFreeMotion * shift},
+      {.wanted = wanted, .first_steps = exact ? 1 : 3, .free_motion = -kFreeMotion * shift},
       workers);
 }
 

@@ -42,6 +42,7 @@ struct FrontalStructure {
   std::vector<Subtree> subtrees;
   std::vector<int32_t> top;
 
+  int node_count() const { return static_cast<int>(order.size()); }
   int supernode_count() const { return static_cast<int>(parent.size()); }
   std::span<const int32_t> children(int s) const {
     return std::span(child).subspan(static_cast<size_t>(child_start[static_cast<size_t>(s)]),

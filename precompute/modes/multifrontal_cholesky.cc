@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <vector>
 
 #include "precompute/modes/block_kernels.h"
@@ -12,6 +13,9 @@
 
 namespace carillon::precompute {
 namespace {
+
+/// Numbers of a node in a block of vectors.
+constexpr ptrdiff_t kNode = 3 * kBlockWidth;
 
 int TileCount(int rows) { return (rows + kTileRows - 1) / kTileRows; }
 
@@ -117,6 +121,13 @@ absl::StatusOr<MultifrontalCholesky<Real>> MultifrontalCholesky<Real>::Factorize
                                  PackedSize(fronts.pivot_count(s), fronts.update_count(s)));
   }
   factor.tiles_.resize(factor.tile_start_.back());
+  factor.top_index_.assign(fronts.order.size(), -1);
+  for (const int top : fronts.top) {
+    for (int node = fronts.first_pivot[top]; node < fronts.first_pivot[top + 1]; ++node) {
+      factor.top_index_[node] = static_cast<int32_t>(factor.top_nodes_.size());
+      factor.top_nodes_.push_back(node);
+    }
+  }
   const auto eliminate = [&](int s, Front<Real>& front, Workers& sharing) {
     absl::Status status = EliminateCholesky(front, sharing);
     if (status.ok()) PackPanel(front, &factor.tiles_[factor.tile_start_[s]]);
@@ -169,59 +180,183 @@ void WithTileRows(Real* x, int rows, const TileSolve& solve) {
   std::copy(copy.begin(), copy.begin() + rows * kBlockWidth, x);
 }
 
+/// Tiles whose triangle one thread solves while the others wait.
+constexpr int kGroup = 32;
+
+/// Numbers of a front from which on it is worth to wake other threads for it.
+constexpr size_t kShared = 200'000;
+
 }  // namespace
 
+/// One solution: the panels of the factor with the rows of x that they act on.
 template <typename Real>
-void MultifrontalCholesky<Real>::Solve(Real* x) const {
-  constexpr ptrdiff_t kNode = 3 * kBlockWidth;
-  const FrontalStructure& fronts = *fronts_;
-  Real* const scratch = x + static_cast<ptrdiff_t>(fronts.order.size()) * kNode;
-  std::fill(scratch, scratch + kNode, Real{0});
-  const auto below = [&](int s, const auto& visit) {
-    const int64_t end = fronts.row_start[s + 1];
-    int64_t r = fronts.row_start[s] + fronts.first_pivot[s + 1] - fronts.first_pivot[s];
-    for (; r < end; r += 2) {
-      Real* const rows[2] = {x + fronts.rows[r] * kNode,
-                             r + 1 < end ? x + fronts.rows[r + 1] * kNode : scratch};
-      visit(rows);
-    }
+class MultifrontalCholesky<Real>::Substitution {
+ public:
+  Substitution(const MultifrontalCholesky& factor, Real* x)
+      : factor_(factor), fronts_(*factor.fronts_), x_(x) {}
+
+  /// Where a thread finds the rows of nodes: those from `end` on, of the top, in `above`, because
+  /// several subtrees add to them; a tile's second node may be missing, then it is `scratch`.
+  struct Rows {
+    int end = 0;
+    Real* above = nullptr;
+    std::array<Real, static_cast<size_t>(kNode)> scratch{};
   };
-  for (int s = 0; s < fronts.supernode_count(); ++s) {
-    const Real* tile = &tiles_[tile_start_[s]];
-    const int pivots = 3 * (fronts.first_pivot[s + 1] - fronts.first_pivot[s]);
-    Real* pivot = x + fronts.first_pivot[s] * kNode;
-    for (int row = 0; row < pivots; row += kTileRows) {
-      Real* at = pivot + row * kBlockWidth;
-      Real* const rows[2] = {at, row + 3 < pivots ? at + kNode : scratch};
-      TileForward<Real>(tile, row, pivot, rows);
-      tile += row * kTileRows;
-      WithTileRows(at, pivots - row, [&](Real* t) { SolveTile(tile, t); });
-      tile += kTileRows * kTileRows;
-    }
-    below(s, [&](Real* const rows[2]) {
-      TileForward<Real>(tile, pivots, pivot, rows);
-      tile += pivots * kTileRows;
-    });
-  }
-  for (int s = fronts.supernode_count() - 1; s >= 0; --s) {
-    const int pivots = 3 * (fronts.first_pivot[s + 1] - fronts.first_pivot[s]);
-    Real* pivot = x + fronts.first_pivot[s] * kNode;
+
+  void Forward(int s, Rows& rows, Workers& workers) const {
+    const int pivots = fronts_.pivot_count(s);
+    Real* pivot = At(fronts_.first_pivot[s]);
     const int tiles = TileCount(pivots);
-    const Real* tile = &tiles_[tile_start_[s]] + kTileRows * kTileRows * tiles * (tiles + 1) / 2;
-    below(s, [&](Real* const rows[2]) {
-      TileBackward<Real>(tile, pivots, pivot, rows);
-      tile += pivots * kTileRows;
+    for (int first = 0; first < tiles; first += kGroup) {
+      const int last = std::min(tiles, first + kGroup);
+      const int solved = first * kTileRows;
+      Share(workers, solved * (last - first), last - first, [&](int begin, int end) {
+        std::array<Real, static_cast<size_t>(kNode)> scratch{};
+        for (int t = first + begin; t < first + end; ++t) {
+          Real* const at[2] = {PivotRow(pivot, t),
+                               SecondPivotRow(pivot, t, pivots, scratch.data())};
+          TileForward<Real>(Triangle(s, t), solved, pivot, at);
+        }
+      });
+      for (int t = first; t < last; ++t) {
+        const int row = t * kTileRows;
+        const Real* tile = Triangle(s, t) + solved * kTileRows;
+        Real* const at[2] = {PivotRow(pivot, t),
+                             SecondPivotRow(pivot, t, pivots, rows.scratch.data())};
+        TileForward<Real>(tile, row - solved, pivot + solved * kBlockWidth, at);
+        WithTileRows(at[0], pivots - row,
+                     [&](Real* x6) { SolveTile(tile + (row - solved) * kTileRows, x6); });
+      }
+    }
+    const int below = BelowCount(s);
+    Share(workers, pivots, below, [&](int begin, int end) {
+      std::array<Real, static_cast<size_t>(kNode)> scratch{};
+      for (int t = begin; t < end; ++t) {
+        Real* at[2];
+        BelowRows(s, t, rows, scratch.data(), at);
+        TileForward<Real>(Below(s, t), pivots, pivot, at);
+      }
     });
-    for (int t = tiles - 1; t >= 0; --t) {
-      const int row = t * kTileRows;
-      const Real* start = &tiles_[tile_start_[s]] + kTileRows * kTileRows * t * (t + 1) / 2;
-      Real* at = pivot + row * kBlockWidth;
-      WithTileRows(at, pivots - row,
-                   [&](Real* x6) { SolveTileTransposed(start + row * kTileRows, x6); });
-      Real* const rows[2] = {at, row + 3 < pivots ? at + kNode : scratch};
-      TileBackward<Real>(start, row, pivot, rows);
+  }
+
+  /// Columns are shared out, because all tiles add to all of them.
+  void Backward(int s, Workers& workers) const {
+    const int pivots = fronts_.pivot_count(s);
+    Real* pivot = At(fronts_.first_pivot[s]);
+    const int tiles = TileCount(pivots);
+    std::array<Real, static_cast<size_t>(kNode)> zero{};
+    Rows rows{.end = fronts_.node_count(), .above = nullptr, .scratch = {}};
+    Share(workers, BelowCount(s) * kTileRows, pivots, [&](int begin, int end) {
+      for (int t = 0; t < BelowCount(s); ++t) {
+        Real* at[2];
+        BelowRows(s, t, rows, zero.data(), at);
+        TileBackward<Real>(Below(s, t) + begin * kTileRows, end - begin,
+                           pivot + begin * kBlockWidth, at);
+      }
+    });
+    for (int first = (tiles - 1) / kGroup * kGroup; first >= 0; first -= kGroup) {
+      const int last = std::min(tiles, first + kGroup);
+      const int left = first * kTileRows;
+      for (int t = last - 1; t >= first; --t) {
+        const int row = t * kTileRows;
+        const Real* tile = Triangle(s, t);
+        Real* const at[2] = {PivotRow(pivot, t), SecondPivotRow(pivot, t, pivots, zero.data())};
+        WithTileRows(at[0], pivots - row,
+                     [&](Real* x6) { SolveTileTransposed(tile + row * kTileRows, x6); });
+        TileBackward<Real>(tile + left * kTileRows, row - left, pivot + left * kBlockWidth, at);
+      }
+      Share(workers, (last - first) * kTileRows, left, [&](int begin, int end) {
+        for (int t = first; t < last; ++t) {
+          Real* const at[2] = {PivotRow(pivot, t), SecondPivotRow(pivot, t, pivots, zero.data())};
+          TileBackward<Real>(Triangle(s, t) + begin * kTileRows, end - begin,
+                             pivot + begin * kBlockWidth, at);
+        }
+      });
     }
   }
+
+ private:
+  Real* At(int node) const { return x_ + node * kNode; }
+  static Real* PivotRow(Real* pivot, int tile) { return pivot + tile * kTileRows * kBlockWidth; }
+  static Real* SecondPivotRow(Real* pivot, int tile, int pivots, Real* scratch) {
+    return tile * kTileRows + 3 < pivots ? PivotRow(pivot, tile) + kNode : scratch;
+  }
+
+  const Real* Triangle(int s, int tile) const {
+    return &factor_.tiles_[factor_.tile_start_[s]] +
+           static_cast<ptrdiff_t>(kTileRows) * kTileRows * tile * (tile + 1) / 2;
+  }
+  const Real* Below(int s, int tile) const {
+    const int pivots = fronts_.pivot_count(s);
+    return Triangle(s, TileCount(pivots)) + static_cast<ptrdiff_t>(tile) * pivots * kTileRows;
+  }
+  int BelowCount(int s) const { return TileCount(fronts_.update_count(s)); }
+
+  void BelowRows(int s, int tile, Rows& rows, Real* scratch, Real** at) const {
+    const int64_t first = fronts_.row_start[s] + fronts_.pivot_count(s) / 3 + 2 * tile;
+    const auto find = [&](int node) {
+      return node < rows.end ? At(node) : rows.above + factor_.top_index_[node] * kNode;
+    };
+    at[0] = find(fronts_.rows[first]);
+    at[1] = first + 1 < fronts_.row_start[s + 1] ? find(fronts_.rows[first + 1]) : scratch;
+  }
+
+  /// Calls visit(begin, end) for parts of 0 ... n - 1, each of `work` numbers an item.
+  template <typename Visit>
+  static void Share(Workers& workers, int work, int n, const Visit& visit) {
+    if (workers.count() == 1 || static_cast<size_t>(work) * static_cast<size_t>(n) < kShared) {
+      if (n > 0) visit(0, n);
+      return;
+    }
+    workers.ForParts(n, 1, [&](int64_t begin, int64_t end, int) {
+      visit(static_cast<int>(begin), static_cast<int>(end));
+    });
+  }
+
+  const MultifrontalCholesky& factor_;
+  const FrontalStructure& fronts_;
+  Real* x_;
+};
+
+template <typename Real>
+void MultifrontalCholesky<Real>::Solve(Real* x, Workers& workers) const {
+  const FrontalStructure& fronts = *fronts_;
+  const Substitution substitution(*this, x);
+  if (workers.count() == 1) {
+    typename Substitution::Rows rows{.end = fronts.node_count(), .above = nullptr, .scratch = {}};
+    for (int s = 0; s < fronts.supernode_count(); ++s) substitution.Forward(s, rows, workers);
+    for (int s = fronts.supernode_count(); s-- > 0;) substitution.Backward(s, workers);
+    return;
+  }
+  const size_t above_size = top_nodes_.size() * static_cast<size_t>(kNode);
+  std::vector<std::vector<Real>> above(static_cast<size_t>(workers.count()));
+  std::atomic<size_t> next = 0;
+  workers.Run([&](int t) {
+    Workers alone(1);
+    std::vector<Real>& mine = above[static_cast<size_t>(t)];
+    mine.assign(above_size, Real{0});
+    for (size_t i = next++; i < fronts.subtrees.size(); i = next++) {
+      const Subtree& subtree = fronts.subtrees[i];
+      typename Substitution::Rows rows{
+          .end = fronts.first_pivot[subtree.end], .above = mine.data(), .scratch = {}};
+      for (int s = subtree.begin; s < subtree.end; ++s) substitution.Forward(s, rows, alone);
+    }
+  });
+  for (const std::vector<Real>& part : above) {
+    for (size_t k = 0; k < top_nodes_.size(); ++k) {
+      Real* to = x + top_nodes_[k] * kNode;
+      const Real* from = &part[k * static_cast<size_t>(kNode)];
+      for (ptrdiff_t c = 0; c < kNode; ++c) to[c] += from[c];
+    }
+  }
+  typename Substitution::Rows rows{.end = fronts.node_count(), .above = nullptr, .scratch = {}};
+  for (const int s : fronts.top) substitution.Forward(s, rows, workers);
+  for (size_t k = fronts.top.size(); k-- > 0;) substitution.Backward(fronts.top[k], workers);
+  workers.ForEach(static_cast<int64_t>(fronts.subtrees.size()), [&](int64_t i) {
+    Workers alone(1);
+    const Subtree& subtree = fronts.subtrees[static_cast<size_t>(i)];
+    for (int s = subtree.end; s-- > subtree.begin;) substitution.Backward(s, alone);
+  });
 }
 
 size_t FactorNumbers(const FrontalStructure& fronts) {

@@ -21,16 +21,19 @@ class MultifrontalCholesky {
                                                         const NodeMatrix& A, double shift,
                                                         Workers& workers, const PartDone& progress);
 
-  /// Overwrites x, (3 #nodes + 3) by kBlockWidth, row-major, in elimination order, by its solution.
-  /// The last three rows are scratch.
-  void Solve(Real* x) const;
+  /// Overwrites x, 3 #nodes by kBlockWidth, row-major, in elimination order, by its solution.
+  void Solve(Real* x, Workers& workers) const;
 
   size_t stored_bytes() const { return tiles_.size() * sizeof(Real); }
 
  private:
+  class Substitution;
+
   const FrontalStructure* fronts_ = nullptr;
   std::vector<Real> tiles_;
   std::vector<size_t> tile_start_;  ///< #supernodes + 1, into tiles_
+  std::vector<int32_t> top_nodes_;  ///< eliminated by the fronts above all subtrees
+  std::vector<int32_t> top_index_;  ///< #nodes: place in top_nodes_, or -1
 };
 
 /// Numbers that a factor stores.

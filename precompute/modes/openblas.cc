@@ -2,6 +2,7 @@
 #include "precompute/modes/openblas.h"
 
 #include <cblas.h>
+#include <malloc.h>
 
 #include <algorithm>
 #include <atomic>
@@ -22,6 +23,10 @@ void SetThreadCount(int count) {
   const int processors = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   thread_count = count > 0 ? count : processors;
   openblas_set_num_threads(1);
+  // Blocks of vectors come and go by the hundred: their memory is kept, because the kernel clears
+  // every page that it hands out.
+  mallopt(M_MMAP_THRESHOLD, 32 << 20);
+  mallopt(M_TRIM_THRESHOLD, 512 << 20);
 }
 
 int ThreadCount() { return thread_count; }

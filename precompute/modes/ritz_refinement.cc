@@ -61,7 +61,7 @@ class Refinement {
     std::atomic<Index> next = 0;
     workers_.Run([&](int) {
       Products p(rows_);
-      VectorBlockOf<Real> change(rows_ + 3, kBlockWidth);
+      VectorBlockOf<Real> change(rows_, kBlockWidth);
       for (Index b = next++; b < x_.cols() / kBlockWidth; b = next++) {
         CorrectBlock(b, steps, p, change);
       }
@@ -152,12 +152,13 @@ class Refinement {
   }
 
   void CorrectBlock(Index b, int steps, Products& p, VectorBlockOf<Real>& change) {
+    Workers alone(1);
     Multiply(b, p);
     for (int step = 0; step < steps; ++step) {
       Subtract(b, p);
-      change.topRows(rows_) = p.elastic.template cast<Real>();
-      factor_.Solve(change.data());
-      p.x -= change.topRows(rows_).template cast<double>();
+      change = p.elastic.template cast<Real>();
+      factor_.Solve(change.data(), alone);
+      p.x -= change.template cast<double>();
       MassTimes(p.x, p.inertial);
       Deflate(p);
       MultiplyStiffness(A_, p.x.data(), p.elastic.data());

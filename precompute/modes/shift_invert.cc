@@ -21,19 +21,18 @@ ShiftInvert<Real>::ShiftInvert(const NodeMatrix& A, const MultifrontalCholesky<R
       shift_(shift),
       workers_(workers),
       measured_(std::is_same_v<Real, double>),
-      solution_(3 * static_cast<Eigen::Index>(A.node_count) + 3, kBlockWidth) {}
+      solution_(3 * static_cast<Eigen::Index>(A.node_count), kBlockWidth) {}
 
 template <typename Real>
 void ShiftInvert<Real>::Apply(const Block& x, Block& y) {
-  const Eigen::Index rows = x.rows();
   std::copy_n(x.data(), x.size(), solution_.data());
-  factor_.Solve(solution_.data());
+  factor_.Solve(solution_.data(), workers_);
   if (!measured_ || refines_) {
     const double error = Refine(x);
     if (!measured_) refines_ = error > kMaxSolveError;
     measured_ = true;
   }
-  y = solution_.topRows(rows) * static_cast<Real>(-shift_);
+  y = solution_ * static_cast<Real>(-shift_);
 }
 
 /// Improves solution_ by its residual for the right-hand side x; returns by how much, relatively.
@@ -42,7 +41,7 @@ double ShiftInvert<Real>::Refine(const Block& x) {
   const Eigen::Index rows = x.rows();
   if (y_.size() == 0 && !A_.mass_is_identity) mass_ = MakeMassRows<double>(A_);
   elastic_.resize(rows, kBlockWidth);
-  y_ = solution_.topRows(rows).template cast<double>();
+  y_ = solution_.template cast<double>();
   MultiplyStiffness(A_, y_.data(), elastic_.data());
   if (A_.mass_is_identity) {
     elastic_ -= shift_ * y_;
@@ -51,10 +50,10 @@ double ShiftInvert<Real>::Refine(const Block& x) {
     MultiplyMass(mass_, workers_, y_.data(), inertial_.data());
     elastic_ -= shift_ * inertial_;
   }
-  solution_.topRows(rows) = x - elastic_.template cast<Real>();
-  factor_.Solve(solution_.data());
-  const double change = solution_.topRows(rows).norm() / y_.norm();
-  solution_.topRows(rows) += y_.template cast<Real>();
+  solution_ = x - elastic_.template cast<Real>();
+  factor_.Solve(solution_.data(), workers_);
+  const double change = solution_.norm() / y_.norm();
+  solution_ += y_.template cast<Real>();
   return change;
 }
 

@@ -42,10 +42,9 @@ double SolveResidual(const SystemMatrices& system) {
   const Eigen::Index rows = system.unknown_count();
   std::srand(1);
   const VectorBlock right = VectorBlock::Random(rows, kBlockWidth);
-  Eigen::Matrix<Real, Eigen::Dynamic, kBlockWidth, Eigen::RowMajor> x(rows + 3, kBlockWidth);
-  x.topRows(rows) = right.cast<Real>();
-  factor.value().Solve(x.data());
-  const VectorBlock solution = x.topRows(rows).template cast<double>();
+  VectorBlockOf<Real> x = right.cast<Real>();
+  factor.value().Solve(x.data(), workers);
+  const VectorBlock solution = x.template cast<double>();
   VectorBlock elastic(rows, kBlockWidth);
   VectorBlock inertial(rows, kBlockWidth);
   MultiplyStiffness(ordered.matrix, solution.data(), elastic.data());
