@@ -16,7 +16,7 @@ constexpr double kFadeS = 0.01;
 /// Their work for a long block costs about as much as its transform.
 constexpr size_t kModesASection = 4000;
 /// A strike's place in the order of rendering has so much room for the slot.
-constexpr size_t kMostBanks = 65536;
+[[maybe_unused]] constexpr size_t kMostBanks = 65536;
 
 }  // namespace
 

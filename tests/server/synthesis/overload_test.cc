@@ -127,6 +127,7 @@ TEST(Overload, TheQuietestBanksAreShedUntilTheRestCanRing) {
   Mixer mixer(Bounded(clock, 0.04));              // 107,000 units: 102 banks in the time domain
   const auto stream = mixer.OpenStream(4096).value();
   std::vector<BankId> banks;
+  banks.reserve(400);
   for (int i = 0; i < 400; ++i) {
     banks.push_back(mixer.Add(MakeBank(i < 300 ? 10 : 100)).value());
   }
@@ -197,6 +198,7 @@ TEST(Overload, WhateverStrikesComeWhatLeavesIsFiniteAndWithinFullScale) {
     Mixer mixer({.most_banks = 8, .clock = of_mixer, .most_load = 0.02});
     const auto stream = mixer.OpenStream(4096).value();
     std::vector<BankId> banks;
+    banks.reserve(8);
     for (int i = 0; i < 8; ++i) banks.push_back(mixer.Add(MakeBank()).value());
     std::vector<float> block(128);
     for (int i = 0; i < 400; ++i) {
