@@ -9,9 +9,11 @@
 #include <map>
 
 #include "absl/strings/ascii.h"
+#include "absl/strings/match.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
+#include "absl/strings/strip.h"
 #include "proto/error_reason.h"
 #include "proto/material_catalogue.h"
 
@@ -25,7 +27,7 @@ struct Options {
   std::optional<double> young_pa, poisson_ratio, density_kg_per_m3, alpha1_s, alpha2_per_s;
   std::optional<double> lambda_pa, mu_pa;
   double size = 1;
-  std::string wall;
+  std::string wall, accuracy, budget;
   bool keep_surface = false, refine_surface = false, repair = false, json = false;
   bool cautious = false;
   int node_count = 0, event_descriptor = -1, thread_count = 0;
@@ -79,6 +81,12 @@ void AddMeshOptions(CLI::App& app, Options& options) {
   app.add_option("--nodes", options.node_count,
                  "About how many corner nodes (default: by the surface)")
       ->check(CLI::NonNegativeNumber)
+      ->group(group);
+  app.add_option("--accuracy", options.accuracy,
+                 "Mesh so finely that no mode is estimated to be off by more, such as 1% or 0.01")
+      ->group(group);
+  app.add_option("--budget", options.budget,
+                 "SECONDS[:GIB] of processor time and memory: mesh as finely as they allow")
       ->group(group);
   app.add_option("--element", options.element, "Order of the elements")
       ->check(CLI::IsMember({"linear", "quadratic"}))
@@ -203,6 +211,31 @@ absl::StatusOr<double> WallM(const std::string& wall) {
                               "\"; it must be a length above zero, such as 3mm or 0.003"));
 }
 
+absl::StatusOr<ResolutionGoal> MakeGoal(const Options& options) {
+  ResolutionGoal goal;
+  if (!options.accuracy.empty()) {
+    const bool percent = absl::EndsWith(options.accuracy, "%");
+    const absl::string_view digits = absl::StripSuffix(options.accuracy, "%");
+    if (!absl::SimpleAtod(digits, &goal.accuracy) || !(goal.accuracy > 0) ||
+        !std::isfinite(goal.accuracy)) {
+      return Invalid(absl::StrCat("--accuracy is \"", options.accuracy,
+                                  "\"; it must be above zero, such as 1% or 0.01"));
+    }
+    if (percent) goal.accuracy /= 100;
+  }
+  if (options.budget.empty()) return goal;
+  const std::vector<std::string> parts = absl::StrSplit(options.budget, ':');
+  double gib = 0;
+  const bool numbers = parts.size() <= 2 && absl::SimpleAtod(parts[0], &goal.budget_s) &&
+                       (parts.size() == 1 || absl::SimpleAtod(parts[1], &gib));
+  if (!numbers || !(goal.budget_s >= 0 && gib >= 0) || !std::isfinite(goal.budget_s + gib)) {
+    return Invalid(absl::StrCat("--budget is \"", options.budget,
+                                "\"; it must be seconds, or seconds:GiB, such as 60 or 60:4"));
+  }
+  goal.budget_bytes = gib * 1024 * 1024 * 1024;
+  return goal;
+}
+
 absl::StatusOr<MeshFile> MakeMeshFile(const Options& options) {
   const absl::StatusOr<double> metres_per_unit = MetresPerUnit(options.unit);
   if (!metres_per_unit.ok()) return metres_per_unit.status();
@@ -225,6 +258,8 @@ absl::StatusOr<CommandLine> MakeCommandLine(const Options& options) {
   if (!mesh.ok()) return mesh.status();
   const absl::StatusOr<double> wall_m = WallM(options.wall);
   if (!wall_m.ok()) return wall_m.status();
+  const absl::StatusOr<ResolutionGoal> goal = MakeGoal(options);
+  if (!goal.ok()) return goal.status();
   CommandLine result{
       .mesh = *mesh,
       .output = options.output,
@@ -236,6 +271,7 @@ absl::StatusOr<CommandLine> MakeCommandLine(const Options& options) {
                                .target_node_count = options.node_count,
                                .nodes_per_element = options.element == "linear" ? 4 : 10},
                    .use = *use,
+                   .resolution = *goal,
                    .matrices_folder = options.matrices_folder},
       .json = options.json,
       .event_descriptor = options.event_descriptor,

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "precompute/decompose.h"
 
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <optional>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -19,6 +23,9 @@
 namespace carillon::precompute {
 namespace {
 
+/// Nodes of a mesh of quadratic elements for each corner, about.
+constexpr double kNodesPerCorner = 7.5;
+
 /// The body to decompose, and the surface that its boundary refers to.
 struct Body {
   SurfaceMesh given;
@@ -26,15 +33,19 @@ struct Body {
   std::vector<std::string> warnings;
 };
 
-absl::StatusOr<Body> FillSurface(SurfaceMesh given, const DecompositionSettings& settings) {
-  absl::StatusOr<PreparedSurface> prepared = PrepareSurface(given, settings.preparation);
-  if (!prepared.ok()) return prepared.status();
-  absl::StatusOr<TetMesh> mesh = Tetrahedralize(prepared->surface, settings.meshing);
+/// A surface that can be filled as finely as one likes.
+struct Fillable {
+  SurfaceMesh given;
+  PreparedSurface prepared;
+};
+
+absl::StatusOr<Body> FillSurface(const Fillable& surface, const MeshingSettings& meshing) {
+  absl::StatusOr<TetMesh> mesh = Tetrahedralize(surface.prepared.surface, meshing);
   if (!mesh.ok()) return mesh.status();
   for (BoundaryFace& face : mesh->boundary) {
-    face.given_triangle = prepared->given_triangle[static_cast<size_t>(face.given_triangle)];
+    face.given_triangle = surface.prepared.given_triangle[static_cast<size_t>(face.given_triangle)];
   }
-  return Body{std::move(given), *std::move(mesh), std::move(prepared->warnings)};
+  return Body{surface.given, *std::move(mesh), surface.prepared.warnings};
 }
 
 absl::StatusOr<Body> TakeTetrahedra(TetMesh mesh, int nodes_per_element) {
@@ -49,16 +60,25 @@ absl::StatusOr<Body> TakeTetrahedra(TetMesh mesh, int nodes_per_element) {
   return Body{std::move(given), std::move(mesh), {}};
 }
 
-absl::StatusOr<Body> ReadBody(const MeshFile& file, const DecompositionSettings& settings,
-                              DecompositionObserver& observer) {
+/// A surface to be filled, or a mesh of tetrahedra as it is.
+using Input = std::variant<Fillable, Body>;
+
+absl::StatusOr<Input> ReadInput(const MeshFile& file, const DecompositionSettings& settings,
+                                DecompositionObserver& observer) {
   observer.OnProgress(Phase::kRead, 0);
   absl::StatusOr<Mesh> mesh = ReadMesh(file.path, file.format, file.metres_per_unit);
   if (!mesh.ok()) return mesh.status();
   observer.OnProgress(Phase::kMesh, 0);
   if (auto* tetrahedra = std::get_if<TetMesh>(&*mesh)) {
-    return TakeTetrahedra(std::move(*tetrahedra), settings.meshing.nodes_per_element);
+    absl::StatusOr<Body> body =
+        TakeTetrahedra(std::move(*tetrahedra), settings.meshing.nodes_per_element);
+    if (!body.ok()) return body.status();
+    return *std::move(body);
   }
-  return FillSurface(std::get<SurfaceMesh>(std::move(*mesh)), settings);
+  auto& given = std::get<SurfaceMesh>(*mesh);
+  absl::StatusOr<PreparedSurface> prepared = PrepareSurface(given, settings.preparation);
+  if (!prepared.ok()) return prepared.status();
+  return Fillable{std::move(given), *std::move(prepared)};
 }
 
 absl::Status SaveMatrices(const SystemMatrices& system, const DecompositionSettings& settings) {
@@ -84,10 +104,12 @@ Phase PhaseOf(SolveStage stage) {
   return Phase::kSolve;
 }
 
-absl::Status CheckBand(const DeformationModes& solution, const IntendedUse& use) {
-  const Eigen::VectorXd& eigenvalues = solution.modes.eigenvalues;
-  if ((eigenvalues.array() >= use.UnitEigenvalue(use.low_hz)).any()) return absl::OkStatus();
-  const double first_hz = use.FrequencyHz(solution.lowest_eigenvalue);
+absl::Status CheckBand(const ModalModel& model, const IntendedUse& use) {
+  const double lowest = use.UnitEigenvalue(use.low_hz);
+  if (std::ranges::any_of(model.eigenvalues, [&](double x) { return x >= lowest; })) {
+    return absl::OkStatus();
+  }
+  const double first_hz = use.FrequencyHz(model.lowest_eigenvalue);
   absl::Status status =
       Refusal(absl::StatusCode::kFailedPrecondition, "NO_MODE_IN_BAND",
               absl::StrFormat(
@@ -98,29 +120,93 @@ absl::Status CheckBand(const DeformationModes& solution, const IntendedUse& use)
   return status;
 }
 
+/// One body solved whole.
+absl::StatusOr<ModalModel> Solve(const Body& body, const DecompositionSettings& settings,
+                                 DecompositionObserver& observer) {
+  observer.OnMesh(body.mesh.nodes.size(), body.mesh.element_count());
+  observer.OnProgress(Phase::kAssemble, 0);
+  const ElasticConstants elastic{.young_pa = 1, .poisson_ratio = settings.poisson_ratio};
+  const SystemMatrices system = Assemble(body.mesh, elastic, 1, settings.mass);
+  if (absl::Status status = SaveMatrices(system, settings); !status.ok()) return status;
+
+  const absl::StatusOr<DeformationModes> solution = SolveDeformationModes(
+      system, body.mesh.nodes, settings.use.UnitEigenvalue(settings.use.high_hz),
+      [&](SolveStage stage, double done) { observer.OnProgress(PhaseOf(stage), done); });
+  if (!solution.ok()) return solution.status();
+  observer.OnProgress(Phase::kVerify, 1);
+  ModalModel model = MakeModalModel(body.mesh, body.given, elastic, *solution);
+  model.warnings = body.warnings;
+  return model;
+}
+
+double CpuSeconds() {
+  double seconds = 0;
+  for (const int who : {RUSAGE_SELF, RUSAGE_CHILDREN}) {
+    rusage usage{};
+    getrusage(who, &usage);
+    seconds += static_cast<double>(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
+               1e-6 * static_cast<double>(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
+  }
+  return seconds;
+}
+
+double PeakBytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return 1024.0 * static_cast<double>(usage.ru_maxrss);
+}
+
+/// Fills and solves a surface finer and finer until the goal is met.
+absl::StatusOr<ModalModel> SolveToGoal(const Fillable& surface, DecompositionSettings settings,
+                                       DecompositionObserver& observer) {
+  MeshingSettings& meshing = settings.meshing;
+  if (settings.resolution.given() && meshing.target_node_count == 0) {
+    meshing.target_node_count = kFirstCornerNodeCount;
+  }
+  std::vector<Round> rounds;
+  while (true) {
+    const double begun_s = CpuSeconds();
+    observer.OnProgress(Phase::kMesh, 0);
+    const absl::StatusOr<Body> body = FillSurface(surface, meshing);
+    if (!body.ok()) return body.status();
+    absl::StatusOr<ModalModel> model = Solve(*body, settings, observer);
+    if (!model.ok() || !settings.resolution.given()) return model;
+    const double corners = static_cast<double>(body->mesh.nodes.size()) /
+                           (body->mesh.nodes_per_element == 10 ? kNodesPerCorner : 1);
+    rounds.push_back({.corner_node_count = corners,
+                      .worst_error = model->WorstError(),
+                      .cpu_s = CpuSeconds() - begun_s,
+                      .peak_bytes = PeakBytes()});
+    const std::optional<int> next = NextCornerNodeCount(settings.resolution, rounds);
+    if (!next) return model;
+    meshing.target_node_count = *next;
+  }
+}
+
+void WarnOfAccuracy(const ResolutionGoal& goal, ModalModel& model) {
+  const double reached = model.WorstError();
+  if (!(goal.accuracy > 0) || reached <= goal.accuracy) return;
+  model.warnings.push_back(absl::StrFormat(
+      "the accuracy of %.3g %% asked for was not reached: the worst mode is estimated to be off by "
+      "%.3g %%; allow more time, memory or nodes, or a mesh that can be refined",
+      100 * goal.accuracy, 100 * reached));
+}
+
 }  // namespace
 
 absl::StatusOr<ModalModel> Decompose(const MeshFile& file, const DecompositionSettings& settings,
                                      DecompositionObserver& observer) {
-  const absl::StatusOr<Body> body = ReadBody(file, settings, observer);
-  if (!body.ok()) return body.status();
-  observer.OnMesh(body->mesh.nodes.size(), body->mesh.element_count());
-
-  observer.OnProgress(Phase::kAssemble, 0);
-  const SystemMatrices system = Assemble(
-      body->mesh, {.young_pa = 1, .poisson_ratio = settings.poisson_ratio}, 1, settings.mass);
-  if (absl::Status status = SaveMatrices(system, settings); !status.ok()) return status;
-
-  const absl::StatusOr<DeformationModes> solution = SolveDeformationModes(
-      system, body->mesh.nodes, settings.use.UnitEigenvalue(settings.use.high_hz),
-      [&](SolveStage stage, double done) { observer.OnProgress(PhaseOf(stage), done); });
-  if (!solution.ok()) return solution.status();
-  if (absl::Status status = CheckBand(*solution, settings.use); !status.ok()) return status;
-  observer.OnModes(static_cast<size_t>(solution->modes.eigenvalues.size()));
-
+  const absl::StatusOr<Input> input = ReadInput(file, settings, observer);
+  if (!input.ok()) return input.status();
+  const auto* surface = std::get_if<Fillable>(&*input);
+  absl::StatusOr<ModalModel> model = surface != nullptr
+                                         ? SolveToGoal(*surface, settings, observer)
+                                         : Solve(std::get<Body>(*input), settings, observer);
+  if (!model.ok()) return model;
+  if (absl::Status status = CheckBand(*model, settings.use); !status.ok()) return status;
+  WarnOfAccuracy(settings.resolution, *model);
+  observer.OnModes(model->eigenvalues.size());
   observer.OnProgress(Phase::kWrite, 0);
-  ModalModel model = MakeModalModel(body->mesh, body->given, *solution);
-  model.warnings = body->warnings;
   return model;
 }
 

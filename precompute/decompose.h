@@ -10,6 +10,7 @@
 #include "precompute/mesh/prepare_surface.h"
 #include "precompute/mesh/tetrahedralize.h"
 #include "precompute/modes/modal_model.h"
+#include "precompute/resolution.h"
 
 namespace carillon::precompute {
 
@@ -27,12 +28,16 @@ struct DecompositionSettings {
   PreparationSettings preparation;
   MeshingSettings meshing;
   IntendedUse use;
+  /// Above `meshing`'s count of nodes.
+  ResolutionGoal resolution;
   /// Where to write K.mtx and M.mtx, SI, for the material of `use`; empty: nowhere.
   std::string matrices_folder;
 };
 
 /// From a mesh file to the modal model of the body, with every deformation mode up to the top of
-/// the band that `settings.use` names.
+/// the band that `settings.use` names. With a resolution goal a surface is filled and solved again,
+/// finer each time, until the goal is met or as far as it allows; the model's warnings say where
+/// the accuracy asked for was not reached.
 ///
 /// Errors: those of ReadMesh, CheckSurface, Tetrahedralize and SolveDeformationModes;
 /// NO_MODE_IN_BAND with the figure first_mode_hz; INVALID_SETTINGS (linear elements asked of a mesh

@@ -42,7 +42,8 @@ Json ModesInBand(const ModalModel& model, const IntendedUse& use) {
     modes.push_back({{"frequency_hz", use.FrequencyHz(eigenvalue)},
                      {"damped_frequency_hz", use.DampedFrequencyHz(eigenvalue)},
                      {"decay_rate_per_s", use.DecayRatePerS(eigenvalue)},
-                     {"residual", model.residuals[m]}});
+                     {"residual", model.residuals[m]},
+                     {"estimated_error", model.estimated_errors[m]}});
   }
   return modes;
 }
@@ -56,6 +57,7 @@ std::string JsonReport(const ModalModel& model, const IntendedUse& use,
                        {"unknowns", 3 * int64_t{model.node_count}},
                        {"peak_memory_bytes", PeakMemoryBytes()},
                        {"phases", PhaseTimes(reporter.clock())},
+                       {"accuracy", model.WorstError()},
                        {"warnings", model.warnings},
                        {"modes", ModesInBand(model, use)}};
   return report.dump(2);

@@ -20,6 +20,8 @@ static_assert(std::endian::native == std::endian::little, "arrays are stored lit
 namespace carillon::precompute {
 namespace {
 
+constexpr double kBytesPerGib = 1024.0 * 1024 * 1024;
+
 using google::protobuf::io::FileOutputStream;
 using google::protobuf::util::SerializeDelimitedToZeroCopyStream;
 
@@ -98,6 +100,9 @@ v1::ModalModelRecord MakeHeader(const ModalModel& model, const ModelOrigin& orig
   *header.mutable_verification() = ToProto(model.verification);
   for (const StoredArray& array : arrays) *header.add_arrays() = array.descriptor;
   for (const std::string& warning : model.warnings) header.add_warnings(warning);
+  for (const double error : model.estimated_errors) {
+    header.add_estimated_errors(static_cast<float>(error));
+  }
   return record;
 }
 
@@ -142,6 +147,9 @@ v1::DecompositionSettings ToProto(const MeshFile& file, const DecompositionSetti
   if (settings.meshing.keep_surface) mesh.set_keep_surface(*settings.meshing.keep_surface);
   mesh.set_repair(settings.preparation.repair);
   mesh.set_wall_m(settings.preparation.wall_m);
+  mesh.set_accuracy(settings.resolution.accuracy);
+  mesh.set_budget_s(settings.resolution.budget_s);
+  mesh.set_budget_gib(settings.resolution.budget_bytes / kBytesPerGib);
   mesh.set_target_node_count(static_cast<uint32_t>(settings.meshing.target_node_count));
   return result;
 }

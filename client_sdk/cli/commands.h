@@ -31,6 +31,7 @@ struct CreateModelOptions {
   uint64_t memory_limit_mib = 0;
   bool repair = false;
   double wall_m = 0;
+  double accuracy = 0;
   bool wait = false;
 };
 

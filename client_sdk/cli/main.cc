@@ -91,6 +91,10 @@ void AddModelCreate(CLI::App& app, Program& program) {
   create.add_flag("--keep-surface,!--refine-surface", options->keep_surface,
                   "add no vertices on the surface, or do [decided from the surface]");
   create.add_option("--nodes", options->target_node_count, "about so many corner nodes");
+  create
+      .add_option("--accuracy", options->accuracy,
+                  "so fine a mesh that no mode is off by more, such as 0.01")
+      ->check(CLI::PositiveNumber);
   create.add_option("--priority", options->priority, "-100 to 100: higher ones start first");
   create.add_option("--time-limit", options->time_limit_s, "give up after so many seconds");
   create.add_option("--memory-limit-mib", options->memory_limit_mib, "memory that it may take");

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cerrno>
 #include <cmath>
 #include <cstring>
@@ -59,6 +60,7 @@ v1::DecompositionSettings Settings(const CreateModelOptions& options) {
   settings.mutable_mesh()->set_target_node_count(options.target_node_count);
   settings.mutable_mesh()->set_repair(options.repair);
   settings.mutable_mesh()->set_wall_m(options.wall_m);
+  settings.mutable_mesh()->set_accuracy(options.accuracy);
   return settings;
 }
 
@@ -100,6 +102,10 @@ void PrintSummary(const v1::ModalModelSummary& model) {
   absl::PrintF("residual   %.2g at most, orthogonality %.2g\n", proof.max_residual(),
                proof.max_orthogonality_error());
   absl::PrintF("stored     %d bytes by %s\n", model.stored_bytes(), header.solver());
+  if (header.estimated_errors_size() > 0) {
+    absl::PrintF("accuracy   %.2g %%, as estimated of the worst mode\n",
+                 100 * *std::ranges::max_element(header.estimated_errors()));
+  }
   for (const std::string& warning : header.warnings()) absl::PrintF("warning    %s\n", warning);
 }
 

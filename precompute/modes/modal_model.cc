@@ -5,6 +5,7 @@
 
 #include "precompute/mesh/sounding_surface.h"
 #include "precompute/modes/coupling.h"
+#include "precompute/modes/error_estimate.h"
 
 namespace carillon::precompute {
 namespace {
@@ -33,23 +34,25 @@ std::vector<float> ShapesOnSurface(const SoundingSurface& surface, const Eigen::
 }  // namespace
 
 ModalModel MakeModalModel(const TetMesh& mesh, const SurfaceMesh& given,
-                          const DeformationModes& solution) {
+                          const ElasticConstants& elastic, const DeformationModes& solution) {
   SoundingSurface surface = MakeSoundingSurface(mesh);
-  ModalModel model{.node_count = static_cast<int>(mesh.nodes.size()),
-                   .element_count = static_cast<int>(mesh.element_count()),
-                   .volume_m3 = VolumeM3(mesh),
-                   .complete_to_eigenvalue = solution.complete_to_eigenvalue,
-                   .lowest_eigenvalue = solution.lowest_eigenvalue,
-                   .verification = solution.verification,
-                   .warnings = {},
-                   .eigenvalues = ToVector(solution.modes.eigenvalues),
-                   .residuals = ToVector(solution.residuals),
-                   .couplings = ToVector(Couplings(mesh, surface, solution.modes)),
-                   .vertices = {},
-                   .triangles = std::move(surface.triangles),
-                   .given_triangle = std::move(surface.given_triangle),
-                   .given = given,
-                   .shapes = ShapesOnSurface(surface, solution.modes.shapes)};
+  ModalModel model{
+      .node_count = static_cast<int>(mesh.nodes.size()),
+      .element_count = static_cast<int>(mesh.element_count()),
+      .volume_m3 = VolumeM3(mesh),
+      .complete_to_eigenvalue = solution.complete_to_eigenvalue,
+      .lowest_eigenvalue = solution.lowest_eigenvalue,
+      .verification = solution.verification,
+      .warnings = {},
+      .eigenvalues = ToVector(solution.modes.eigenvalues),
+      .residuals = ToVector(solution.residuals),
+      .couplings = ToVector(Couplings(mesh, surface, solution.modes)),
+      .estimated_errors = ToVector(EstimateFrequencyErrors(mesh, elastic, solution.modes)),
+      .vertices = {},
+      .triangles = std::move(surface.triangles),
+      .given_triangle = std::move(surface.given_triangle),
+      .given = given,
+      .shapes = ShapesOnSurface(surface, solution.modes.shapes)};
   for (const int32_t node : surface.nodes) {
     model.vertices.push_back(ToFloat(mesh.nodes[static_cast<size_t>(node)]));
   }

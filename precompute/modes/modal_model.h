@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <string>
@@ -27,6 +28,8 @@ struct ModalModel {
   std::vector<double> eigenvalues;  ///< #modes, ascending, 1/s^2
   std::vector<double> residuals;    ///< #modes, relative
   std::vector<double> couplings;    ///< #modes, see Couplings
+  /// #modes, see EstimateFrequencyErrors.
+  std::vector<double> estimated_errors;
 
   /// The sounding surface: boundary nodes of the mesh, metres, and its triangles.
   std::vector<std::array<float, 3>> vertices;
@@ -38,10 +41,16 @@ struct ModalModel {
   /// #vertices by 3 by #modes, row-major: mass-normalised shapes on the sounding surface,
   /// kg^(-1/2).
   std::vector<float> shapes;
+
+  /// The greatest of the estimated errors; zero without modes.
+  double WorstError() const {
+    return estimated_errors.empty() ? 0 : *std::ranges::max_element(estimated_errors);
+  }
 };
 
-/// `given`: the surface as given, to which the boundary of `mesh` refers.
+/// `given`: the surface as given, to which the boundary of `mesh` refers. `elastic`: of the
+/// matrices.
 ModalModel MakeModalModel(const TetMesh& mesh, const SurfaceMesh& given,
-                          const DeformationModes& solution);
+                          const ElasticConstants& elastic, const DeformationModes& solution);
 
 }  // namespace carillon::precompute

@@ -52,6 +52,11 @@ absl::Status CheckSettings(const v1::DecompositionSettings& settings) {
     return Invalid(
         absl::StrCat("wall_m is ", settings.mesh().wall_m(), "; it must be zero or more"));
   }
+  for (const double figure :
+       {settings.mesh().accuracy(), settings.mesh().budget_s(), settings.mesh().budget_gib()}) {
+    if (std::isfinite(figure) && figure >= 0) continue;
+    return Invalid(absl::StrCat("an accuracy or budget is ", figure, "; it must be zero or more"));
+  }
   if (!v1::Element_IsValid(settings.element()) || !v1::MassMatrix_IsValid(settings.mass_matrix())) {
     return Invalid("element or mass_matrix has a value that this daemon does not know");
   }
@@ -135,6 +140,13 @@ std::string CanonicalText(const v1::CreateModalModelRequest& resolved) {
   const v1::MeshSettings& mesh = settings.mesh();
   if (mesh.repair()) absl::StrAppend(&text, "repair yes\n");
   if (mesh.wall_m() > 0) absl::StrAppend(&text, "wall_m ", ShortestDecimal(mesh.wall_m()), "\n");
+  if (mesh.accuracy() > 0) {
+    absl::StrAppend(&text, "accuracy ", ShortestDecimal(mesh.accuracy()), "\n");
+  }
+  if (mesh.budget_s() > 0 || mesh.budget_gib() > 0) {
+    absl::StrAppend(&text, "budget ", ShortestDecimal(mesh.budget_s()), " ",
+                    ShortestDecimal(mesh.budget_gib()), "\n");
+  }
   return text;
 }
 

@@ -31,6 +31,8 @@ absl::StatusOr<v1::CreateModalModelRequest> ResolveRequest(
 ///     target_node_count <integer; 0: decided from the surface>
 ///     repair yes            (only where it is set)
 ///     wall_m <shortest decimal, metres>   (only where it is above zero)
+///     accuracy <shortest decimal>         (only where it is above zero)
+///     budget <seconds> <GiB>              (only where one is above zero)
 std::string CanonicalText(const v1::CreateModalModelRequest& resolved);
 
 /// SHA-256 of CanonicalText.

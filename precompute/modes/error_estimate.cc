@@ -1,0 +1,279 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "precompute/modes/error_estimate.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "absl/container/flat_hash_map.h"
+#include "precompute/fem/element.h"
+
+namespace carillon::precompute {
+namespace {
+
+/// Barycentric coordinates, and the derivatives of a function by them.
+using Barycentric = Eigen::Vector4d;
+
+/// What C of the header is, by order of the elements.
+constexpr double kLinearConstant = 1.3;
+constexpr double kQuadraticConstant = 1.5;
+/// Part of an eigenvalue that may be error; beyond it the mesh says nothing about the mode.
+constexpr double kMostError = 0.99;
+
+/// The residuals of some modes at a time, of at least so many, take so much memory.
+constexpr size_t kResidualBytes = size_t{512} << 20U;
+constexpr size_t kFewestModesAtATime = 8;
+
+struct Value {
+  double value;
+  Barycentric derivative;
+};
+
+Value Product(const Value& f, const Value& g) {
+  return {f.value * g.value, f.value * g.derivative + g.value * f.derivative};
+}
+
+Value Coordinate(const Barycentric& at, int i) { return {at[i], Barycentric::Unit(i)}; }
+
+/// The element's own shape functions, in the order of TetMesh.
+std::vector<Value> BaseFunctions(const Barycentric& at, int node_count) {
+  std::vector<Value> functions;
+  for (int i = 0; i < 4; ++i) {
+    Value f = Coordinate(at, i);
+    if (node_count == 10) {
+      f = Product(f, {2 * at[i] - 1, 2 * Barycentric::Unit(i)});
+    }
+    functions.push_back(f);
+  }
+  if (node_count == 4) return functions;
+  for (const auto& [a, b] : kTetEdges) {
+    Value f = Product(Coordinate(at, a), Coordinate(at, b));
+    functions.push_back({4 * f.value, 4 * f.derivative});
+  }
+  return functions;
+}
+
+/// What the next order adds: to linear elements 4 L_a L_b on each edge; to quadratic ones
+/// L_a L_b (L_a - L_b) on each edge, L_a L_b L_c on each face.
+std::vector<Value> AddedFunctions(const Barycentric& at, int node_count) {
+  std::vector<Value> functions;
+  for (const auto& [a, b] : kTetEdges) {
+    Value f = Product(Coordinate(at, a), Coordinate(at, b));
+    if (node_count == 10) {
+      f = Product(f, {at[a] - at[b], Barycentric::Unit(a) - Barycentric::Unit(b)});
+    }
+    functions.push_back(f);
+  }
+  if (node_count == 4) return functions;
+  for (const auto& [a, b, c] : kTetFaces) {
+    functions.push_back(Product(Product(Coordinate(at, a), Coordinate(at, b)), Coordinate(at, c)));
+  }
+  return functions;
+}
+
+/// Integrals over the reference tetrahedron, of volume one, of products of two sets of functions.
+class ReferenceIntegrals {
+ public:
+  explicit ReferenceIntegrals(int node_count) {
+    ForEachPoint([&](const Barycentric& at, double weight) {
+      const std::vector<Value> base = BaseFunctions(at, node_count);
+      const std::vector<Value> added = AddedFunctions(at, node_count);
+      mixed.resize(added.size() * base.size(), Eigen::Matrix4d::Zero());
+      own.resize(added.size(), Eigen::Matrix4d::Zero());
+      if (mass.size() == 0) mass.setZero(Eigen::Index(added.size()), Eigen::Index(base.size()));
+      for (size_t i = 0; i < added.size(); ++i) {
+        own[i] += weight * added[i].derivative * added[i].derivative.transpose();
+        for (size_t j = 0; j < base.size(); ++j) {
+          mixed[i * base.size() + j] +=
+              weight * added[i].derivative * base[j].derivative.transpose();
+          mass(Eigen::Index(i), Eigen::Index(j)) += weight * added[i].value * base[j].value;
+        }
+      }
+    });
+  }
+
+  std::vector<Eigen::Matrix4d> mixed;  ///< [added * #base + base], by derivative
+  std::vector<Eigen::Matrix4d> own;    ///< [added], with itself
+  Eigen::MatrixXd mass;                ///< #added by #base
+
+ private:
+  /// The product of Gauss-Legendre rules of four points, collapsed onto the tetrahedron: exact for
+  /// polynomials of degree five.
+  template <typename Use>
+  static void ForEachPoint(const Use& use) {
+    constexpr std::array<double, 4> kAt = {0.0694318442029737, 0.3300094782075719,
+                                           0.6699905217924281, 0.9305681557970263};
+    constexpr std::array<double, 4> kWeight = {0.1739274225687269, 0.3260725774312731,
+                                               0.3260725774312731, 0.1739274225687269};
+    for (size_t i = 0; i < 4; ++i) {
+      for (size_t j = 0; j < 4; ++j) {
+        for (size_t k = 0; k < 4; ++k) {
+          const double x = kAt[i], y = (1 - x) * kAt[j], z = (1 - x - y) * kAt[k];
+          // The volume is 1/6; the integral is divided by it.
+          const double jacobian = 6 * (1 - x) * (1 - x - y);
+          use(Barycentric(1 - x - y - z, x, y, z), jacobian * kWeight[i] * kWeight[j] * kWeight[k]);
+        }
+      }
+    }
+  }
+};
+
+/// a(f, g) of two functions, a 3 by 3 block for their components, from the integrals of their
+/// derivatives: lambda G + mu G^T + mu tr(G) I with G = vol sum_ij T_ij grad L_i grad L_j^T.
+Eigen::Matrix3d Stiffness(const Eigen::Matrix4d& integrals, const TetGeometry& geometry,
+                          const LameConstants& lame) {
+  const Eigen::Matrix3d G =
+      geometry.volume_m3 * geometry.gradients.transpose() * integrals * geometry.gradients;
+  return lame.lambda_pa * G + lame.mu_pa * G.transpose() +
+         lame.mu_pa * G.trace() * Eigen::Matrix3d::Identity();
+}
+
+/// The edges and faces of a mesh, numbered; each element's in the order of AddedFunctions.
+class Places {
+ public:
+  explicit Places(const TetMesh& mesh) : added_(mesh.nodes_per_element == 10 ? 10 : 6) {
+    absl::flat_hash_map<std::array<int32_t, 3>, int32_t> numbers;
+    for (size_t e = 0; e < mesh.element_count(); ++e) {
+      const int32_t* corners = &mesh.elements[e * static_cast<size_t>(mesh.nodes_per_element)];
+      for (const auto& [a, b] : kTetEdges) {
+        Number({corners[a], corners[b], -1}, corners[a] < corners[b] ? 1 : -1, numbers);
+      }
+      if (added_ == 6) continue;
+      for (const auto& [a, b, c] : kTetFaces) {
+        Number({corners[a], corners[b], corners[c]}, 1, numbers);
+      }
+    }
+    count_ = numbers.size();
+  }
+
+  size_t count() const { return count_; }
+  size_t added() const { return added_; }
+  int32_t Of(size_t element, size_t i) const { return number_[element * added_ + i]; }
+  /// An odd function on an edge changes its sign with the edge's direction; that of a linear
+  /// element is even.
+  double Sign(size_t element, size_t i) const {
+    return added_ == 6 ? 1.0 : static_cast<double>(sign_[element * added_ + i]);
+  }
+
+ private:
+  void Number(std::array<int32_t, 3> nodes, int sign,
+              absl::flat_hash_map<std::array<int32_t, 3>, int32_t>& numbers) {
+    std::ranges::sort(nodes);
+    const auto next = static_cast<int32_t>(numbers.size());
+    number_.push_back(numbers.try_emplace(nodes, next).first->second);
+    sign_.push_back(static_cast<int8_t>(sign));
+  }
+
+  size_t added_;
+  size_t count_ = 0;
+  std::vector<int32_t> number_;
+  std::vector<int8_t> sign_;
+};
+
+TetGeometry GeometryOf(const TetMesh& mesh, const int32_t* element) {
+  Eigen::Matrix<double, 3, 4> corners;
+  for (int i = 0; i < 4; ++i) {
+    corners.col(i) = Eigen::Vector3d::Map(mesh.nodes[static_cast<size_t>(element[i])].data());
+  }
+  return MakeTetGeometry(corners);
+}
+
+/// Adds up over the elements what belongs to each place.
+class Estimator {
+ public:
+  Estimator(const TetMesh& mesh, const ElasticConstants& elastic)
+      : mesh_(mesh),
+        lame_(ToLame(elastic)),
+        nodes_(static_cast<size_t>(mesh.nodes_per_element)),
+        integrals_(mesh.nodes_per_element),
+        places_(mesh),
+        stiffness_(places_.count(), Eigen::Matrix3d::Zero()) {
+    for (size_t e = 0; e < mesh_.element_count(); ++e) {
+      const TetGeometry geometry = GeometryOf(mesh_, Element(e));
+      for (size_t i = 0; i < places_.added(); ++i) {
+        stiffness_[static_cast<size_t>(places_.Of(e, i))] +=
+            Stiffness(integrals_.own[i], geometry, lame_);
+      }
+    }
+  }
+
+  /// How many modes are best treated at a time.
+  Eigen::Index ModesAtATime() const {
+    const size_t bytes_of_mode = 3 * sizeof(double) * places_.count();
+    return static_cast<Eigen::Index>(std::max(kFewestModesAtATime, kResidualBytes / bytes_of_mode));
+  }
+
+  /// sum_b r_b^T a(b, b)^-1 r_b of some modes: shapes #U by #modes.
+  Eigen::VectorXd Corrections(const Eigen::VectorXd& eigenvalues, const Eigen::MatrixXd& shapes) {
+    Eigen::MatrixXd residuals =
+        Eigen::MatrixXd::Zero(3 * static_cast<Eigen::Index>(places_.count()), shapes.cols());
+    for (size_t e = 0; e < mesh_.element_count(); ++e)
+      AddElement(e, eigenvalues, shapes, residuals);
+    Eigen::VectorXd sums = Eigen::VectorXd::Zero(shapes.cols());
+    for (size_t b = 0; b < places_.count(); ++b) {
+      const auto r = residuals.middleRows<3>(3 * static_cast<Eigen::Index>(b));
+      sums += r.cwiseProduct(stiffness_[b].inverse() * r).colwise().sum().transpose();
+    }
+    return sums;
+  }
+
+ private:
+  const int32_t* Element(size_t e) const { return &mesh_.elements[e * nodes_]; }
+
+  void AddElement(size_t e, const Eigen::VectorXd& eigenvalues, const Eigen::MatrixXd& shapes,
+                  Eigen::MatrixXd& residuals) const {
+    const TetGeometry geometry = GeometryOf(mesh_, Element(e));
+    const auto unknowns = static_cast<Eigen::Index>(3 * nodes_);
+    Eigen::MatrixXd local(unknowns, shapes.cols());
+    for (size_t n = 0; n < nodes_; ++n) {
+      local.middleRows<3>(3 * static_cast<Eigen::Index>(n)) =
+          shapes.middleRows<3>(3 * Eigen::Index{Element(e)[n]});
+    }
+    const Eigen::MatrixXd with_eigenvalues = local * eigenvalues.asDiagonal();
+    Eigen::Matrix<double, 3, Eigen::Dynamic> coupling(3, unknowns), inertia(3, unknowns);
+    for (size_t i = 0; i < places_.added(); ++i) {
+      inertia.setZero();
+      for (size_t n = 0; n < nodes_; ++n) {
+        const auto column = static_cast<Eigen::Index>(3 * n);
+        coupling.middleCols<3>(column) =
+            Stiffness(integrals_.mixed[i * nodes_ + n], geometry, lame_);
+        inertia.middleCols<3>(column).diagonal().setConstant(
+            geometry.volume_m3 *
+            integrals_.mass(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(n)));
+      }
+      residuals.middleRows<3>(3 * Eigen::Index{places_.Of(e, i)}) +=
+          places_.Sign(e, i) * (coupling * local - inertia * with_eigenvalues);
+    }
+  }
+
+  const TetMesh& mesh_;
+  const LameConstants lame_;
+  const size_t nodes_;
+  const ReferenceIntegrals integrals_;
+  const Places places_;
+  std::vector<Eigen::Matrix3d> stiffness_;  // a(b, b) of each place
+};
+
+}  // namespace
+
+Eigen::VectorXd EstimateFrequencyErrors(const TetMesh& mesh, const ElasticConstants& elastic,
+                                        const Modes& modes) {
+  Estimator estimator(mesh, elastic);
+  const double constant = mesh.nodes_per_element == 10 ? kQuadraticConstant : kLinearConstant;
+  Eigen::VectorXd errors(modes.eigenvalues.size());
+  const Eigen::Index at_a_time = estimator.ModesAtATime();
+  for (Eigen::Index first = 0; first < errors.size(); first += at_a_time) {
+    const Eigen::Index count = std::min(at_a_time, errors.size() - first);
+    const Eigen::VectorXd corrections = estimator.Corrections(
+        modes.eigenvalues.segment(first, count), modes.shapes.middleCols(first, count));
+    const Eigen::ArrayXd part =
+        constant * corrections.array() / modes.eigenvalues.segment(first, count).array();
+    // A frequency goes with the root of its eigenvalue.
+    errors.segment(first, count) = (1 - part.min(kMostError)).sqrt().inverse() - 1;
+  }
+  return errors;
+}
+
+}  // namespace carillon::precompute

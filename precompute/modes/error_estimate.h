@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+
+#include "precompute/fem/material.h"
+#include "precompute/mesh/tet_mesh.h"
+#include "precompute/modes/eigensolver.h"
+
+namespace carillon::precompute {
+
+/// How far each mode's frequency is too high for the coarseness of the mesh, relatively: an
+/// estimate.
+///
+/// What elements one order higher would add is tested, edge by edge and (quadratic elements) face
+/// by face, with the hierarchical function b of that edge or face (Bank and Smith, A posteriori
+/// error estimates based on hierarchical bases, SIAM J. Numer. Anal. 30, 1993):
+///
+///     r_b = a(b, phi) - Lambda m(b, phi),   delta Lambda ~ C sum_b r_b^T a(b, b)^-1 r_b
+///
+/// which sees the locking of thin walls, where averaged stresses do not. C is fitted to tubes,
+/// plates, bowls and solids (tests/precompute/benchmark/accuracy_table.py) so that it rarely says
+/// too little. The body is the polyhedron of its mesh: how well that follows a curved original is
+/// not in it.
+///
+/// `elastic` is that of the matrices the modes were solved from, for unit density; a consistent
+/// mass is assumed. Result: one number a mode, 0.01 for one percent.
+Eigen::VectorXd EstimateFrequencyErrors(const TetMesh& mesh, const ElasticConstants& elastic,
+                                        const Modes& modes);
+
+}  // namespace carillon::precompute

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <optional>
+#include <vector>
+
+namespace carillon::precompute {
+
+/// How fine a mesh is to be, said by what comes of it. Zero: no matter.
+struct ResolutionGoal {
+  double accuracy = 0;      ///< no mode's frequency further off, relatively, as estimated
+  double budget_s = 0;      ///< processor time for all rounds
+  double budget_bytes = 0;  ///< memory
+
+  bool given() const { return accuracy > 0 || budget_s > 0 || budget_bytes > 0; }
+};
+
+/// A mesh that was solved, what it cost, and how well it did.
+struct Round {
+  double corner_node_count = 0;
+  double worst_error = 0;  ///< zero: it has no mode
+  double cpu_s = 0;
+  double peak_bytes = 0;
+};
+
+/// Corner nodes of the mesh to begin with.
+inline constexpr int kFirstCornerNodeCount = 1500;
+
+/// Corner nodes of the next mesh to try, or none where the last one is good enough, or the best
+/// that the goal allows. Errors fall with a power of the nodes that the last two rounds show; time
+/// and memory grow with powers that solids show.
+std::optional<int> NextCornerNodeCount(const ResolutionGoal& goal,
+                                       const std::vector<Round>& rounds);
+
+}  // namespace carillon::precompute

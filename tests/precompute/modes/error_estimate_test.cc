@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "precompute/modes/error_estimate.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "precompute/modes/deformation_modes.h"
+#include "tests/precompute/test_meshes.h"
+
+namespace carillon::precompute {
+namespace {
+
+constexpr ElasticConstants kElastic{.young_pa = 1, .poisson_ratio = 0.3};
+
+/// A plate whose two thinnest cells are far from enough for linear elements.
+struct Mesh {
+  std::array<int, 3> cells;
+  int nodes_per_element;
+};
+
+DeformationModes Solve(const TetMesh& mesh, double limit) {
+  auto solution = SolveDeformationModes(Assemble(mesh, kElastic, 1, MassSharing::kConsistent),
+                                        mesh.nodes, limit, [](SolveStage, double) {});
+  EXPECT_TRUE(solution.ok()) << solution.status();
+  return *std::move(solution);
+}
+
+class EstimateTest : public testing::TestWithParam<Mesh> {};
+
+INSTANTIATE_TEST_SUITE_P(Meshes, EstimateTest,
+                         testing::Values(Mesh{{12, 4, 3}, 4}, Mesh{{24, 8, 6}, 4},
+                                         Mesh{{6, 3, 2}, 10}, Mesh{{12, 5, 3}, 10}),
+                         [](const auto& tested) {
+                           return "Mesh" + std::to_string(tested.param.cells[0]) + "Of" +
+                                  std::to_string(tested.param.nodes_per_element);
+                         });
+
+TEST_P(EstimateTest, IsNearTheTrueErrorAndSeldomBelowIt) {
+  const Point size{1, 0.4, 0.3};
+  constexpr double kLimit = 60;
+  const DeformationModes fine = Solve(MakeTetBox(size, {20, 8, 6}, 10), kLimit);
+  const auto& [cells, nodes_per_element] = GetParam();
+  const TetMesh mesh = MakeTetBox(size, cells, nodes_per_element);
+  const DeformationModes coarse = Solve(mesh, 2 * kLimit);
+  const Eigen::VectorXd errors = EstimateFrequencyErrors(mesh, kElastic, coarse.modes);
+  ASSERT_GE(fine.modes.eigenvalues.size(), 6);
+  ASSERT_GE(errors.size(), fine.modes.eigenvalues.size());
+  for (Eigen::Index m = 0; m < fine.modes.eigenvalues.size(); ++m) {
+    const double right = std::sqrt(coarse.modes.eigenvalues[m] / fine.modes.eigenvalues[m]) - 1;
+    // The fine mesh has an error of its own, some 1e-5.
+    EXPECT_GT(errors[m], 0.8 * right - 2e-5) << "mode " << m << ", in truth " << right;
+    EXPECT_LT(errors[m], 3 * right + 2e-5) << "mode " << m << ", in truth " << right;
+  }
+}
+
+}  // namespace
+}  // namespace carillon::precompute
