@@ -60,6 +60,11 @@ std::optional<int> NextCornerNodeCount(const ResolutionGoal& goal,
   if (goal.accuracy > 0 && last.worst_error > 0) {
     growth = std::pow(last.worst_error / (kMargin * goal.accuracy), 1 / ErrorPower(rounds));
   }
+  // A surface of long triangles is refined by halves: between them there is no mesh.
+  const bool stuck =
+      rounds.size() > 1 &&
+      last.corner_node_count < kLeastGrowth * rounds[rounds.size() - 2].corner_node_count;
+  if (stuck) growth = kMostGrowth;
   growth = std::min({growth, kMostGrowth, AffordableGrowth(goal, rounds),
                      kMaxMeshNodes / kNodesPerCorner / last.corner_node_count});
   if (growth < kLeastGrowth) return std::nullopt;

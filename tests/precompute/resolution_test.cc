@@ -27,6 +27,13 @@ TEST(Resolution, LearnsFromTwoRoundsHowFastTheErrorFalls) {
   EXPECT_GT(*slow, *fast);
 }
 
+TEST(Resolution, GoesFurtherWhereTheMeshDidNotGrow) {
+  const auto next =
+      NextCornerNodeCount({.accuracy = 0.01}, {{2000, 0.015, 1, 1e8}, {2000, 0.015, 1, 1e8}});
+  ASSERT_TRUE(next);
+  EXPECT_GE(*next, 3 * 2000);
+}
+
 TEST(Resolution, KeepsToItsBudgets) {
   EXPECT_FALSE(NextCornerNodeCount({.accuracy = 0.01, .budget_s = 10}, {{2000, 0.5, 9, 1e8}}));
   EXPECT_FALSE(NextCornerNodeCount({.budget_bytes = 1e9}, {{2000, 0.5, 9, 1e9}}));
