@@ -48,7 +48,8 @@ TEST_P(EstimateTest, IsNearTheTrueErrorAndSeldomBelowIt) {
   const Eigen::VectorXd errors = EstimateFrequencyErrors(mesh, kElastic, coarse.modes);
   ASSERT_GE(fine.modes.eigenvalues.size(), 6);
   ASSERT_GE(errors.size(), fine.modes.eigenvalues.size());
-  for (Eigen::Index m = 0; m < fine.modes.eigenvalues.size(); ++m) {
+  // Further up the coarsest mesh has other modes in between.
+  for (Eigen::Index m = 0; m < 6; ++m) {
     const double right = std::sqrt(coarse.modes.eigenvalues[m] / fine.modes.eigenvalues[m]) - 1;
     // The fine mesh has an error of its own, some 1e-5.
     EXPECT_GT(errors[m], 0.8 * right - 2e-5) << "mode " << m << ", in truth " << right;
