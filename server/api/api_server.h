@@ -41,7 +41,8 @@ struct ServedRooms {
 class ApiServer {
  public:
   /// Serves once it returns. Errors: InvalidArgument (INVALID_ADDRESS), FailedPrecondition
-  /// (TLS_REQUIRED: a network address without TLS, TLS_UNUSABLE, ADMIN_TOKEN_UNUSABLE, ADDRESS_IN_USE, LISTEN_FAILED).
+  /// (TLS_REQUIRED: a network address without TLS, TLS_UNUSABLE, ADMIN_TOKEN_UNUSABLE,
+  /// ADDRESS_IN_USE, LISTEN_FAILED).
   static absl::StatusOr<std::unique_ptr<ApiServer>> Start(const ApiSettings& settings,
                                                           const ServedRooms& rooms);
 
