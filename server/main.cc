@@ -22,6 +22,7 @@
 #include "server/data_directory.h"
 #include "server/decomposition/decomposition_queue.h"
 #include "server/decomposition/local_executor.h"
+#include "server/decomposition/slurm_executor.h"
 #include "server/mode_database/database_admin.h"
 #include "server/mode_database/mode_database.h"
 #include "server/options.h"
@@ -75,10 +76,9 @@ std::chrono::milliseconds Milliseconds(double seconds) {
   return std::chrono::milliseconds(static_cast<int64_t>(seconds * 1000));
 }
 
-absl::StatusOr<std::unique_ptr<DecompositionQueue>> MakeQueue(const Options& options,
-                                                              const DataDirectory& directory,
-                                                              ModeDatabase& database,
-                                                              const Clock& clock) {
+absl::StatusOr<std::unique_ptr<Executor>> MakeLocal(const Options& options,
+                                                    const DataDirectory& directory,
+                                                    const Clock& clock) {
   LocalExecutorOptions executor_options;
   executor_options.program = options.precompute_program;
   executor_options.directory = directory.work_directory();
@@ -87,7 +87,32 @@ absl::StatusOr<std::unique_ptr<DecompositionQueue>> MakeQueue(const Options& opt
   executor_options.memory_limit_bytes = static_cast<uint64_t>(options.job_memory_mib) << 20U;
   executor_options.time_limit = Milliseconds(options.job_time_s);
   executor_options.stall_limit = Milliseconds(options.stall_time_s);
-  absl::StatusOr<std::unique_ptr<Executor>> executor = MakeLocalExecutor(executor_options, clock);
+  return MakeLocalExecutor(executor_options, clock);
+}
+
+absl::StatusOr<std::unique_ptr<Executor>> MakeExecutor(const Options& options,
+                                                       const DataDirectory& directory,
+                                                       const Clock& clock) {
+  if (options.executor == "local") return MakeLocal(options, directory, clock);
+  SlurmExecutorOptions slurm;
+  slurm.program = options.precompute_program;
+  slurm.directory = options.slurm_directory;
+  if (slurm.directory.empty()) slurm.directory = directory.database_file().parent_path() / "slurm";
+  slurm.partition = options.slurm_partition;
+  if (options.worker_count > 0) slurm.job_count = options.worker_count;
+  if (options.job_memory_mib > 0) {
+    slurm.memory_limit_bytes = static_cast<uint64_t>(options.job_memory_mib) << 20U;
+  }
+  slurm.time_limit =
+      std::chrono::duration_cast<std::chrono::seconds>(Milliseconds(options.job_time_s));
+  return MakeSlurmExecutor(slurm);
+}
+
+absl::StatusOr<std::unique_ptr<DecompositionQueue>> MakeQueue(const Options& options,
+                                                              const DataDirectory& directory,
+                                                              ModeDatabase& database,
+                                                              const Clock& clock) {
+  absl::StatusOr<std::unique_ptr<Executor>> executor = MakeExecutor(options, directory, clock);
   if (!executor.ok()) return executor.status();
   return DecompositionQueue::Make(
       database, *std::move(executor), clock,

@@ -85,6 +85,9 @@ absl::Status ReadKey(const std::string& key, const toml::node& node, Options& op
   if (key == "stall_time") return ReadValue(key, node, options.stall_time_s);
   if (key == "queue_limit") return ReadValue(key, node, options.queue_limit);
   if (key == "model_budget_mib") return ReadValue(key, node, options.model_budget_mib);
+  if (key == "executor") return ReadValue(key, node, options.executor);
+  if (key == "slurm_dir") return ReadValue(key, node, options.slurm_directory);
+  if (key == "slurm_partition") return ReadValue(key, node, options.slurm_partition);
   if (key == "precompute") return ReadValue(key, node, options.precompute_program);
   if (key == "tls_certificate") return ReadValue(key, node, options.tls_certificate_file);
   if (key == "admin_token_file") return ReadValue(key, node, options.admin_token_file);
@@ -134,6 +137,10 @@ absl::Status Check(const Options& options) {
         CheckRange("--model-budget-mib", options.model_budget_mib, 0, kMostMib)}) {
     if (!status.ok()) return status;
   }
+  if (options.executor != "local" && options.executor != "slurm") {
+    return InvalidConfiguration(
+        absl::StrCat("--executor is \"", options.executor, "\"; it must be local or slurm"));
+  }
   if (options.addresses.empty()) return InvalidConfiguration("--listen names no address");
   if (options.tls_certificate_file.empty() != options.tls_key_file.empty()) {
     return InvalidConfiguration("--tls-certificate and --tls-key belong together");
@@ -176,6 +183,12 @@ void AddFlags(CLI::App& app, Options& options) {
   app.add_option("--model-budget-mib", options.model_budget_mib,
                  "room for stored models, least recently sounded ones deleted; 0: no limit")
       ->capture_default_str();
+  app.add_option("--executor", options.executor,
+                 "where decompositions run: local, or slurm (the cluster of the Slurm commands)")
+      ->capture_default_str();
+  app.add_option("--slurm-dir", options.slurm_directory,
+                 "folder that every node of the cluster sees [in the data folder]");
+  app.add_option("--slurm-partition", options.slurm_partition, "[the cluster's default]");
   app.add_option("--precompute", options.precompute_program, "the program that decomposes")
       ->capture_default_str();
   app.add_option("--tls-certificate", options.tls_certificate_file, "PEM file, for TCP");

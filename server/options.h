@@ -24,6 +24,9 @@ struct Options {
   double stall_time_s = 60;        ///< without a sign of life
   int64_t queue_limit = 1024;      ///< jobs that wait
   int64_t model_budget_mib = 0;    ///< of stored models; 0: without limit
+  std::string executor = "local";  ///< or "slurm"
+  std::string slurm_directory;     ///< shared with the nodes; empty: "slurm" in the data folder
+  std::string slurm_partition;     ///< empty: the default one
   std::string precompute_program;  ///< carillon-precompute
   std::string tls_certificate_file;
   std::string tls_key_file;

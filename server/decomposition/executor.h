@@ -39,6 +39,7 @@ struct DecompositionTask {
   std::string digest;                   ///< names the task; no two run at a time under one digest
   v1::CreateModalModelRequest request;  ///< resolved
   uint32_t way = 0;                     ///< as JobRecord::way
+  uint64_t estimate_bytes = 0;          ///< of the memory that it will take
   /// Brings the mesh to where the worker reads it.
   std::function<absl::Status(const std::filesystem::path& file)> write_mesh;
   std::function<void(const v1::Progress&)> on_progress;

@@ -62,6 +62,15 @@ bool IsDeterministic(const Outcome& outcome) {
   return outcome.verdict == Verdict::kBadInput || DependsOnWay(outcome);
 }
 
+Verdict VerdictOfReport(const std::string& reason) {
+  if (IsOneOf<2>(reason, {"OUT_OF_MEMORY", "MEMORY_TOO_SMALL"})) return Verdict::kOutOfMemory;
+  // Another attempt may well succeed.
+  if (IsOneOf<3>(reason, {"INTERNAL", "OUTPUT_NOT_WRITABLE", "MESH_FILE_NOT_READABLE"})) {
+    return Verdict::kCrashed;
+  }
+  return Verdict::kBadInput;
+}
+
 v1::JobState StateOf(Verdict verdict) {
   if (verdict == Verdict::kOk) return v1::JOB_STATE_SUCCEEDED;
   return verdict == Verdict::kCancelled ? v1::JOB_STATE_CANCELLED : v1::JOB_STATE_FAILED;

@@ -33,6 +33,9 @@ bool DependsOnWay(const Outcome& outcome);
 /// Whether the same request would end so again, whatever the machine does meanwhile.
 bool IsDeterministic(const Outcome& outcome);
 
+/// What a worker's own report of failure means.
+Verdict VerdictOfReport(const std::string& reason);
+
 v1::JobState StateOf(Verdict verdict);
 
 /// What follows after a daemon died under the job so often that it may be the job's doing.

@@ -4,13 +4,13 @@
 #include <signal.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <system_error>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "proto/error_reason.h"
+#include "server/decomposition/job_rules.h"
 #include "server/decomposition/memory_estimate.h"
 #include "server/decomposition/worker_command.h"
 
@@ -32,12 +32,6 @@ v1::ErrorInfo Error(absl::string_view reason, absl::string_view message) {
 
 int64_t Seconds(nanoseconds time) {
   return std::chrono::duration_cast<std::chrono::seconds>(time).count();
-}
-
-// The worker refuses, but another attempt may well succeed.
-bool MaySucceedNextTime(const std::string& reason) {
-  constexpr std::array kReasons = {"INTERNAL", "OUTPUT_NOT_WRITABLE", "MESH_FILE_NOT_READABLE"};
-  return std::ranges::find(kReasons, reason) != kReasons.end();
 }
 
 v1::ErrorInfo OutOfMemory(absl::string_view what) {
@@ -206,11 +200,7 @@ Outcome LocalWorker::JudgeFailure(const ProcessEnd& end) const {
             {}};
   }
   if (end.exited && reported_.has_value()) {
-    Verdict verdict = Verdict::kBadInput;
-    if (reported_->reason() == "OUT_OF_MEMORY" || reported_->reason() == "MEMORY_TOO_SMALL")
-      verdict = Verdict::kOutOfMemory;
-    if (MaySucceedNextTime(reported_->reason())) verdict = Verdict::kCrashed;
-    return {verdict, *reported_, {}};
+    return {VerdictOfReport(reported_->reason()), *reported_, {}};
   }
   return {Verdict::kCrashed,
           Error("WORKER_CRASHED",

@@ -262,6 +262,7 @@ DecompositionTask QueueCore::MakeTask(const Active& active) {
   return {.digest = digest,
           .request = active.request,
           .way = active.record.way,
+          .estimate_bytes = active.estimate_bytes,
           .write_mesh =
               [this, mesh = active.request.mesh_digest()](const std::filesystem::path& file) {
                 return database_.meshes().WriteFile(mesh, file);

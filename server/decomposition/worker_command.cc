@@ -41,7 +41,7 @@ std::vector<std::string> WorkerCommand(const v1::CreateModalModelRequest& resolv
     command.push_back(absl::StrCat("--nodes=", mesh.target_node_count()));
   }
   if (way >= 1) command.emplace_back("--cautious");
-  if (mesh.repair()) command.emplace_back("--repair");
+  if (mesh.repair() || way >= 2) command.emplace_back("--repair");
   if (mesh.wall_m() > 0) command.push_back(option("wall", mesh.wall_m()));
   if (mesh.accuracy() > 0) command.push_back(option("accuracy", mesh.accuracy()));
   if (mesh.budget_s() > 0 || mesh.budget_gib() > 0) {

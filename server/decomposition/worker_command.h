@@ -18,8 +18,9 @@ struct WorkerPlace {
   int thread_count = 1;
 };
 
-/// The ways there are to compute one request: as asked; meshing with more caution.
-constexpr uint32_t kWayCount = 2;
+/// The ways there are to compute one request: as asked; meshing with more caution; with the surface
+/// repaired, too.
+constexpr uint32_t kWayCount = 3;
 
 /// The command line of carillon-precompute for a resolved request, computed in way `way` (below
 /// kWayCount); it reports to descriptor 3.

@@ -4,6 +4,7 @@
 #include <sys/mman.h>
 
 #include <algorithm>
+#include <bit>
 #include <cassert>
 #include <cmath>
 #include <cstdlib>
@@ -32,6 +33,15 @@ std::shared_ptr<int16_t> Allocate(size_t count) {
   return {static_cast<int16_t*>(memory), std::free};
 }
 
+// To the nearest integer, below 2^22: what a float of that size keeps behind 1.5 * 2^23. A table of
+// a hundred megabytes is made while an object waits for it, and std::lrint is not taken by the
+// vector.
+int16_t Rounded(float value) {
+  constexpr float kBare = 12582912.0F;
+  return static_cast<int16_t>(std::bit_cast<int32_t>(value + kBare) -
+                              std::bit_cast<int32_t>(kBare));
+}
+
 }  // namespace
 
 ShapeTable::ShapeTable(std::span<const float> shapes, size_t vertex_count, size_t mode_count)
@@ -40,10 +50,13 @@ ShapeTable::ShapeTable(std::span<const float> shapes, size_t vertex_count, size_
       stride_((mode_count + kLineValues - 1) / kLineValues * kLineValues),
       scales_(mode_count, 0.0F) {
   assert(shapes.size() == 3 * vertex_count * mode_count);
-  for (size_t i = 0; i < shapes.size(); ++i) {
-    float& scale = scales_[i % mode_count];
-    scale = std::max(scale, std::abs(shapes[i]) / kMost);
+  for (size_t row = 0; row < 3 * vertex_count; ++row) {
+    const float* const values_of_row = &shapes[row * mode_count];
+    for (size_t mode = 0; mode < mode_count; ++mode) {
+      scales_[mode] = std::max(scales_[mode], std::abs(values_of_row[mode]));
+    }
   }
+  for (float& scale : scales_) scale /= kMost;
   // One line more: a projection that begins within a row may read past the last.
   const size_t count = 3 * vertex_count * stride_ + kLineValues;
   const std::shared_ptr<int16_t> values = Allocate(count);
@@ -52,7 +65,7 @@ ShapeTable::ShapeTable(std::span<const float> shapes, size_t vertex_count, size_
     for (size_t mode = 0; mode < mode_count; ++mode) {
       const float scale = scales_[mode];
       const float value = scale > 0 ? shapes[row * mode_count + mode] / scale : 0;
-      values.get()[row * stride_ + mode] = static_cast<int16_t>(std::lrint(value));
+      values.get()[row * stride_ + mode] = Rounded(value);
     }
   }
   values_ = values;

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace carillon {
+
+/// What a command printed, to both of its streams, and whether its exit status was zero.
+struct CommandResult {
+  bool success = false;
+  std::string output;
+};
+
+/// Runs a program of the search path to its end; one that takes over half a minute is killed.
+CommandResult RunCommand(const std::vector<std::string>& command);
+
+}  // namespace carillon

@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/decomposition/slurm_executor.h"
+
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <limits>
+#include <list>
+#include <set>
+#include <string>
+#include <system_error>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/strings/str_cat.h"
+#include "proto/error_reason.h"
+#include "server/base/mutex.h"
+#include "server/decomposition/slurm_queue.h"
+#include "server/decomposition/slurm_task.h"
+
+namespace carillon {
+namespace {
+
+// Looks at a job that has left the queue before it is given up for lost: its last words may still
+// be on their way through the shared folder.
+constexpr int kLooksBeforeLost = 2;
+
+class SlurmExecutor final : public Executor {
+ public:
+  explicit SlurmExecutor(SlurmExecutorOptions options)
+      : options_(std::move(options)), thread_([this] { Run(); }) {}
+
+  ~SlurmExecutor() override {
+    {
+      MutexLock lock(&mutex_);
+      stopping_ = true;
+    }
+    Wake();
+    thread_.join();
+    close(wake_);
+  }
+
+  int worker_count() const override { return options_.job_count; }
+
+  // Memory is reserved by Slurm.
+  uint64_t memory_budget_bytes() const override { return std::numeric_limits<uint64_t>::max() / 2; }
+
+  void Start(DecompositionTask task) override {
+    MutexLock lock(&mutex_);
+    starts_.push_back(std::move(task));
+    Wake();
+  }
+
+  void Cancel(const std::string& digest) override {
+    MutexLock lock(&mutex_);
+    cancels_.push_back(digest);
+    Wake();
+  }
+
+ private:
+  struct Tracked {
+    SlurmTask task;
+    int looks_in_vain = 0;
+  };
+
+  void Wake() const {
+    const uint64_t one = 1;
+    [[maybe_unused]] const ssize_t written = write(wake_, &one, sizeof one);
+  }
+
+  void Run() {
+    while (TakeCommands()) {
+      CollectEnded();
+      if (!tasks_.empty() || !ended_.empty()) Reconcile();
+      Wait();
+    }
+  }
+
+  void Wait() const {
+    pollfd polled{wake_, POLLIN, 0};
+    poll(&polled, 1,
+         tasks_.empty() && ended_.empty() ? -1 : static_cast<int>(options_.poll_interval.count()));
+    uint64_t count = 0;
+    [[maybe_unused]] const ssize_t got = read(wake_, &count, sizeof count);
+  }
+
+  bool TakeCommands() {
+    std::vector<DecompositionTask> starts;
+    std::vector<std::string> cancels;
+    {
+      MutexLock lock(&mutex_);
+      if (stopping_) return false;
+      starts.swap(starts_);
+      cancels.swap(cancels_);
+    }
+    for (DecompositionTask& task : starts) Prepare(std::move(task));
+    for (const std::string& digest : cancels) {
+      const auto found = std::ranges::find_if(
+          tasks_, [&](const Tracked& t) { return t.task.task().digest == digest; });
+      if (found == tasks_.end()) continue;
+      End(found, {Verdict::kCancelled, {}, {}});
+    }
+    return true;
+  }
+
+  void Prepare(DecompositionTask task) {
+    const auto on_end = task.on_end;
+    absl::StatusOr<SlurmTask> prepared = SlurmTask::Prepare(std::move(task), options_);
+    if (prepared.ok()) {
+      tasks_.push_back({*std::move(prepared), 0});
+    } else {
+      on_end({Verdict::kCrashed, ToErrorInfo(prepared.status()), {}});
+    }
+  }
+
+  void CollectEnded() {
+    for (auto tracked = tasks_.begin(); tracked != tasks_.end();) {
+      const auto here = tracked++;
+      if (IsStopping()) return;
+      if (const auto outcome = here->task.TakeEnd()) {
+        End(here, *outcome);
+      } else {
+        here->task.ReadProgress();
+      }
+    }
+  }
+
+  // The folder goes after the model is stored, or never if the daemon dies before: then the next
+  // one finds the end again.
+  void End(std::list<Tracked>::iterator tracked, const Outcome& outcome) {
+    const SlurmTask task = std::move(tracked->task);
+    tasks_.erase(tracked);
+    task.task().on_end(outcome);
+    task.Remove();
+    ended_.insert(task.job().name);
+  }
+
+  // A second run of what has ended, or one that a controller takes to run still.
+  void CancelWhatIsLeft(const SlurmJobs& jobs) {
+    for (const Tracked& tracked : tasks_) ended_.erase(tracked.task.job().name);
+    for (const auto& [key, state] : jobs) {
+      if (state == SlurmState::kWaitsOrRuns && ended_.contains(key.first)) CancelByName(key.first);
+    }
+    ended_.clear();
+  }
+
+  // What has neither ended nor is in the queue is submitted, or submitted again.
+  void Reconcile() {
+    const std::optional<SlurmJobs> jobs = ReadSqueue();
+    if (!jobs.has_value()) return;  // the controller is down: nothing is known, nothing done
+    CancelWhatIsLeft(*jobs);
+    for (auto tracked = tasks_.begin(); tracked != tasks_.end();) {
+      const auto here = tracked++;
+      if (IsStopping()) return;
+      const SlurmJob& job = here->task.job();
+      const auto known = jobs->find({job.name, job.ticket});
+      if (known == jobs->end()) {
+        SubmitUnlessEnded(here);
+      } else if (known->second == SlurmState::kWaitsOrRuns) {
+        here->looks_in_vain = 0;
+      } else if (++here->looks_in_vain > kLooksBeforeLost) {
+        JudgeLoss(here, known->second);
+      }
+    }
+  }
+
+  // Not in the queue: never submitted, forgotten by the controller, or ended just now.
+  void SubmitUnlessEnded(std::list<Tracked>::iterator tracked) {
+    if (tracked->task.TakeEnd().has_value()) return;  // it is collected next time
+    JudgeLoss(tracked, ReadSacct(tracked->task.job().name, tracked->task.job().ticket));
+  }
+
+  void JudgeLoss(std::list<Tracked>::iterator tracked, std::optional<SlurmState> state) {
+    if (tracked->task.TakeEnd().has_value()) return;
+    const std::optional<Outcome> outcome = tracked->task.JudgeLoss(state);
+    if (outcome.has_value()) {
+      End(tracked, *outcome);
+    } else {
+      tracked->looks_in_vain = 0;
+      Submit(tracked->task.job());
+    }
+  }
+
+  bool IsStopping() {
+    MutexLock lock(&mutex_);
+    return stopping_;
+  }
+
+  const SlurmExecutorOptions options_;
+  const int wake_ = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+  std::list<Tracked> tasks_;     // of the thread
+  std::set<std::string> ended_;  // of the thread: names of jobs since the last look at the queue
+  Mutex mutex_;
+  bool stopping_ ABSL_GUARDED_BY(mutex_) = false;
+  std::vector<DecompositionTask> starts_ ABSL_GUARDED_BY(mutex_);
+  std::vector<std::string> cancels_ ABSL_GUARDED_BY(mutex_);
+  std::thread thread_;
+};
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<Executor>> MakeSlurmExecutor(const SlurmExecutorOptions& options) {
+  std::error_code error;
+  SlurmExecutorOptions filled = options;
+  filled.directory = std::filesystem::absolute(options.directory);
+  filled.program = std::filesystem::absolute(options.program);
+  std::filesystem::create_directories(filled.directory, error);
+  if (error) {
+    return Refusal(absl::StatusCode::kFailedPrecondition, "DATABASE_UNUSABLE",
+                   absl::StrCat("the folder ", filled.directory.string(), " cannot be made (",
+                                error.message(), "): name one that every node shares"));
+  }
+  return std::make_unique<SlurmExecutor>(std::move(filled));
+}
+
+}  // namespace carillon

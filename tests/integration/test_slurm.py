@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Decompositions on a Slurm cluster of this machine, whose daemons are killed under them.
+
+CARILLON_SLURM_BODIES says how many bodies (40 is the whole campaign), CARILLON_SEED repeats one.
+Needs slurm-wlm and munge, and root; skipped where no cluster can be started.
+"""
+
+import os
+import pathlib
+import random
+import signal
+import sqlite3
+import subprocess
+import tempfile
+import time
+import unittest
+
+import meshes
+import scripted
+import strike
+from carillon.v1 import decomposition_pb2, decomposition_service_pb2, material_pb2, modal_model_pb2
+from daemon import ROOT, Daemon
+
+BODY_COUNT = int(os.environ.get("CARILLON_SLURM_BODIES", "4"))
+SEED = int(os.environ.get("CARILLON_SEED", "0")) or random.SystemRandom().getrandbits(32)
+MATERIAL = material_pb2.Material(preset=meshes.MATERIAL)
+# The controller is killed so often, up to so long after a submit.
+BATCH_COUNT, LATEST_KILL_S = (10, 10) if BODY_COUNT >= 40 else (2, 2)
+SCRIPT = ROOT / "deploy/slurm/one_machine.sh"
+
+
+class Cluster:
+    def __init__(self, folder):
+        self.folder = folder
+        os.environ["SLURM_CONF"] = str(folder / "slurm.conf")
+
+    def run(self, action):
+        return subprocess.run([SCRIPT, action, self.folder], capture_output=True, text=True,
+                              check=False, timeout=120)
+
+    def start(self):
+        """Whether it works: a job that does nothing comes to its end."""
+        try:
+            if self.run("start").returncode != 0:
+                return False
+            return subprocess.run(["srun", "--mem=10M", "true"], capture_output=True, timeout=60,
+                                  check=False).returncode == 0
+        except (OSError, subprocess.TimeoutExpired):
+            return False
+
+    def kill(self, program):
+        """kill -9, and the program starts again."""
+        pid_file = self.folder / f"{program}.pid"
+        try:
+            os.kill(int(pid_file.read_text()), signal.SIGKILL)
+        except (OSError, ValueError):
+            return
+        while self.run(program).returncode != 0:
+            pass
+
+
+class SlurmTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        scratch = tempfile.TemporaryDirectory(prefix="carillon-slurm-")
+        cls.addClassCleanup(scratch.cleanup)
+        cls.cluster = Cluster(pathlib.Path(scratch.name))
+        cls.addClassCleanup(cls.cluster.run, "stop")
+        if not cls.cluster.start():
+            raise unittest.SkipTest("no Slurm cluster can be started here")
+
+    def setUp(self):
+        # A controller that was killed may take jobs that have ended to run for ever.
+        subprocess.run(["scancel", "--user", "root"], capture_output=True, timeout=60, check=False)
+        scratch = tempfile.TemporaryDirectory(prefix="carillon-")
+        self.addCleanup(scratch.cleanup)
+        self.folder = pathlib.Path(scratch.name)
+        self.rng = random.Random(SEED)
+
+    def start_daemon(self, *arguments):
+        self.daemon = Daemon(self.folder, "--executor", "slurm", *arguments)
+        self.addCleanup(lambda: self.daemon.stop())
+
+    def create(self, client, number, **settings):
+        # Real bodies, each another: the number of nodes makes the name, and some 0.3 s of work.
+        return client.create(
+            meshes.bar(), "obj", material=MATERIAL, **settings,
+            settings=modal_model_pb2.DecompositionSettings(
+                mesh=modal_model_pb2.MeshSettings(target_node_count=200 + number)))
+
+    def wait(self, job):
+        client = self.daemon.client()
+        return client.wait(client.jobs.GetJob(
+            decomposition_service_pb2.GetJobRequest(name=job.name)).job)
+
+    def stored(self):
+        """(models, revisions ever stored, jobs that did not succeed) in the database."""
+        database = sqlite3.connect(self.folder / "data/carillon.db")
+        count, = database.execute("SELECT count(*) FROM models").fetchone()
+        last, = database.execute("SELECT seq FROM sqlite_sequence WHERE name = 'models'").fetchone()
+        failed, = database.execute("SELECT count(*) FROM jobs WHERE state != ?",
+                                   (decomposition_pb2.JOB_STATE_SUCCEEDED,)).fetchone()
+        database.close()
+        return count, last, failed
+
+    def test_every_model_is_there_once_though_daemons_of_the_cluster_and_ours_are_killed(self):
+        self.start_daemon()
+        batches = [range(BODY_COUNT)[i::BATCH_COUNT] for i in range(BATCH_COUNT)]
+        jobs = []
+        for i, batch in enumerate(batches):
+            jobs += [self.create(self.daemon.client(), number) for number in batch]
+            time.sleep(self.rng.uniform(0, LATEST_KILL_S))  # when they die is the experiment
+            self.cluster.kill("slurmctld")
+            if i == 0:
+                self.cluster.kill("slurmd")
+            if i in (BATCH_COUNT // 2, BATCH_COUNT - 1):
+                self.daemon.kill()
+                self.daemon.start()
+        for job in jobs:
+            self.wait(job)
+        self.assertEqual(self.daemon.stop(), 0)
+        self.assertEqual(self.stored(), (BODY_COUNT, BODY_COUNT, 0))
+        print(f"\nseed {SEED}: {BODY_COUNT} bodies, slurmctld killed {BATCH_COUNT} times, slurmd once, the daemon "
+              f"twice: {BODY_COUNT} models stored once each")
+
+    def test_verdicts_come_through_the_cluster(self):
+        body = """
+case $((nodes % 10)) in
+  1) kill -SEGV $$ ;;
+  2) x=0123456789abcdef; while :; do x=$x$x; done ;;
+  *) sleep 1000 ;;
+esac"""
+        self.start_daemon("--precompute", scripted.worker(self.folder, body), "--job-memory-mib", 100)
+        client = self.daemon.client()
+        for number, reason in ((1, "WORKER_CRASHED"), (2, "OUT_OF_MEMORY")):
+            with self.assertRaises(strike.Refused) as refused:
+                client.wait(self.create(client, number))
+            self.assertEqual(refused.exception.info.reason, reason)
+        endless = self.create(client, 3)
+        client.jobs.CancelJob(decomposition_service_pb2.CancelJobRequest(name=endless.name))
+        *_, last = client.jobs.WatchJob(decomposition_service_pb2.WatchJobRequest(name=endless.name))
+        self.assertEqual(last.job.state, decomposition_pb2.JOB_STATE_CANCELLED)
+
+
+if __name__ == "__main__":
+    unittest.main()
