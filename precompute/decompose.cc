@@ -164,12 +164,16 @@ absl::StatusOr<ModalModel> SolveToGoal(const Fillable& surface, DecompositionSet
     meshing.target_node_count = kFirstCornerNodeCount;
   }
   std::vector<Round> rounds;
+  absl::StatusOr<ModalModel> best = absl::UnknownError("");
   while (true) {
     const double begun_s = CpuSeconds();
     observer.OnProgress(Phase::kMesh, 0);
     const absl::StatusOr<Body> body = FillSurface(surface, meshing);
+    // A finer mesh that cannot be had takes nothing from the coarser one.
+    if (!body.ok() && best.ok()) return best;
     if (!body.ok()) return body.status();
     absl::StatusOr<ModalModel> model = Solve(*body, settings, observer);
+    if (!model.ok() && best.ok()) return best;
     if (!model.ok() || !settings.resolution.given()) return model;
     const double corners = static_cast<double>(body->mesh.nodes.size()) /
                            (body->mesh.nodes_per_element == 10 ? kNodesPerCorner : 1);
@@ -179,6 +183,7 @@ absl::StatusOr<ModalModel> SolveToGoal(const Fillable& surface, DecompositionSet
                       .peak_bytes = PeakBytes()});
     const std::optional<int> next = NextCornerNodeCount(settings.resolution, rounds);
     if (!next) return model;
+    best = std::move(model);
     meshing.target_node_count = *next;
   }
 }

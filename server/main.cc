@@ -179,9 +179,8 @@ absl::Status LookAfterDatabase(const CommandLine& command) {
   };
   const std::filesystem::path file = directory->database_file();
   if (command.database_command == "restore") return RestoreDatabase(file, command.backup_file);
-  const absl::Status status = command.database_command == "check"
-                                  ? CheckDatabase(file, on_finding)
-                                  : RepairDatabase(file, on_finding);
+  absl::Status status = command.database_command == "check" ? CheckDatabase(file, on_finding)
+                                                            : RepairDatabase(file, on_finding);
   if (!status.ok()) return status;
   std::cout << finding_count << (finding_count == 1 ? " fault" : " faults") << std::endl;
   if (command.database_command == "repair" || finding_count == 0) return absl::OkStatus();

@@ -41,7 +41,7 @@ absl::Status ExportModel(const client::Client& daemon, const std::string& text, 
   const auto name = FindModel(daemon, text);
   if (!name.ok()) return name.status();
   if (file.empty()) file = absl::StrCat(absl::StripPrefix(*name, "modalModels/"), ".model");
-  const absl::Status status = daemon.ExportModalModel(*name, file);
+  absl::Status status = daemon.ExportModalModel(*name, file);
   if (status.ok()) absl::PrintF("%s\n", file);
   return status;
 }

@@ -125,7 +125,7 @@ absl::Status Client::BackUpDatabase(const std::string& file) const {
   }
   out.close();
   if (!out) context.TryCancel();
-  const absl::Status status = FromRpc(reader->Finish(), stubs_->server);
+  absl::Status status = FromRpc(reader->Finish(), stubs_->server);
   if (!out) return NotWritable(file);
   if (status.ok() && received != byte_count) {
     return absl::DataLossError("the daemon ended before the whole copy was sent");

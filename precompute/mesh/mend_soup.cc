@@ -118,7 +118,7 @@ size_t CutAtTJunctions(SurfaceMesh& surface, double tolerance) {
   absl::flat_hash_set<int32_t> corners;
   for (const auto& [edge, triangles] : TrianglesAtEdges(surface)) {
     if (triangles.size() != 1) continue;
-    border.push_back({edge, triangles.front()});
+    border.emplace_back(edge, triangles.front());
     corners.insert({edge.first, edge.second});
   }
   if (border.size() * corners.size() > kMostBorderPairs) return 0;
@@ -127,7 +127,9 @@ size_t CutAtTJunctions(SurfaceMesh& surface, double tolerance) {
   std::ranges::sort(ordered);
   const auto at = [&](int32_t v) { return surface.vertices[static_cast<size_t>(v)]; };
   absl::flat_hash_set<size_t> cut;
-  for (const auto& [edge, t] : border) {
+  for (const auto& at_border : border) {
+    const Edge& edge = at_border.first;
+    const size_t t = at_border.second;
     if (cut.contains(t)) continue;
     const auto on_edge = std::ranges::find_if(ordered, [&](int32_t v) {
       return std::ranges::find(surface.triangles[t], v) == surface.triangles[t].end() &&

@@ -53,7 +53,8 @@ class BlockBasis {
 
   /// x -= q h for the block q = back(before).
   void SubtractBlock(size_t before, const SmallBlock& h, Block& x) const {
-    const SmallBlockOf<Real> rounded = h.template cast<Real>();
+    SmallBlockOf<Real> rounded;
+    rounded = h.template cast<Real>();
     workers_.ForParts(rows_, kStretch, [&](int64_t begin, int64_t end, int) {
       BlockSubtractTimes(At(back(before), begin), rounded.data(), end - begin, At(x, begin));
     });

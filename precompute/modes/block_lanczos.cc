@@ -47,7 +47,7 @@ bool LanczosRecurrence<Real>::Step() {
   const SmallBlock H = BlockBasis<Real>::Dot(basis_.back(0), MassTimes(next_), workers_);
   basis_.SubtractBlock(0, H, next_);
   if (basis_.size() > kBlockWidth) basis_.SubtractBlock(1, R_.transpose(), next_);
-  diagonal_.push_back((H + H.transpose()) / 2);
+  diagonal_.emplace_back((H + H.transpose()) / 2);
   Orthogonalize();
   return Normalize();
 }

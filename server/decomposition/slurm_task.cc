@@ -109,7 +109,8 @@ Outcome Crashed(absl::string_view how) {
 
 absl::StatusOr<SlurmTask> SlurmTask::Prepare(DecompositionTask task,
                                              const SlurmExecutorOptions& options) {
-  SlurmTask result(std::move(task), options.directory / task.digest);
+  const std::filesystem::path folder = options.directory / task.digest;
+  SlurmTask result(std::move(task), folder);
   const DecompositionTask& own = result.task_;
   const std::string request = absl::StrCat(own.way, "\n", own.request.SerializeAsString());
   result.taken_up_ = ReadFile(result.folder_ / "request") == request &&

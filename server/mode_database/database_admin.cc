@@ -128,7 +128,7 @@ absl::Status CheckDatabase(const std::filesystem::path& file, const OnFinding& o
   const absl::StatusOr<std::unique_ptr<Database>> database = Database::Open(file);
   if (!database.ok()) return database.status();
   for (const auto check : {CheckStructure, CheckModels, CheckMeshes, CheckJobs}) {
-    const absl::Status status = check(**database, on_finding);
+    absl::Status status = check(**database, on_finding);
     if (!status.ok()) return status;
   }
   return absl::OkStatus();

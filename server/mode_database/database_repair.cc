@@ -109,7 +109,7 @@ absl::Status CopyWhole(Database& from, Database& to, const OnFinding& on_finding
   for (const Kind& kind :
        {Kind{"meshes", CopyMesh}, Kind{"models", CopyModel}, Kind{"jobs", CopyJob}}) {
     for (const std::string& digest : Names(from, kind.table, on_finding)) {
-      const absl::Status status = kind.copy(from, to, digest);
+      absl::Status status = kind.copy(from, to, digest);
       if (absl::IsResourceExhausted(status)) return status;
       if (!status.ok()) on_finding(absl::StrCat("left out: ", std::string(status.message())));
     }
@@ -127,7 +127,7 @@ absl::Status RepairDatabase(const std::filesystem::path& file, const OnFinding& 
     if (!from.ok()) return from.status();
     const absl::StatusOr<std::unique_ptr<Database>> to = Database::Open(fresh);
     if (!to.ok()) return to.status();
-    const absl::Status status = CopyWhole(**from, **to, on_finding);
+    absl::Status status = CopyWhole(**from, **to, on_finding);
     if (!status.ok()) return status;
   }
   if (absl::Status status = Move(file, file.string() + ".damaged"); !status.ok()) return status;

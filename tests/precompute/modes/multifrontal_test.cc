@@ -83,14 +83,14 @@ TEST(Multifrontal, MultipliesLikeTheMatricesItWasMadeOf) {
     const VectorBlock scaled = Reordered(ordered, x, 1);
     VectorBlock y(rows, kBlockWidth);
     MultiplyStiffness(ordered.matrix, scaled.data(), y.data());
-    const Eigen::MatrixXd Kx = system.K.selfadjointView<Eigen::Lower>() * x;
-    EXPECT_LT((y - Reordered(ordered, Kx, -1)).norm(), 1e-12 * y.norm());
+    const Eigen::MatrixXd stiffness_times_x = system.K.selfadjointView<Eigen::Lower>() * x;
+    EXPECT_LT((y - Reordered(ordered, stiffness_times_x, -1)).norm(), 1e-12 * y.norm());
     EXPECT_EQ(ordered.matrix.mass_is_identity, sharing == MassSharing::kLumped);
     if (ordered.matrix.mass_is_identity) continue;
     Workers workers(2);
     MultiplyMass(MakeMassRows<double>(ordered.matrix), workers, scaled.data(), y.data());
-    const Eigen::MatrixXd Mx = system.M.selfadjointView<Eigen::Lower>() * x;
-    EXPECT_LT((y - Reordered(ordered, Mx, -1)).norm(), 1e-12 * y.norm());
+    const Eigen::MatrixXd mass_times_x = system.M.selfadjointView<Eigen::Lower>() * x;
+    EXPECT_LT((y - Reordered(ordered, mass_times_x, -1)).norm(), 1e-12 * y.norm());
   }
 }
 

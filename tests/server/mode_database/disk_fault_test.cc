@@ -30,8 +30,9 @@ class DiskFaultTest : public ::testing::TestWithParam<DiskFault> {
   absl::Status Open() {
     database_.reset();
     auto opened = ModeDatabase::Open(file_, clock_);
-    if (opened.ok()) database_ = *std::move(opened);
-    return opened.status();
+    const absl::Status status = opened.status();
+    if (status.ok()) database_ = *std::move(opened);
+    return status;
   }
 
   absl::Status Put(const std::string& name) {

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <complex>
 #include <limits>
-#include <numbers>
 #include <vector>
 
 #include "tests/server/synthesis/closed_form.h"
@@ -15,7 +14,6 @@ namespace carillon {
 namespace {
 
 constexpr size_t kBlock = 128;
-constexpr double kPi = std::numbers::pi;
 
 SoundingModes ThreeModes() {
   return {.modes = {MakeMode(0, 400, -3), MakeMode(1, 1100, -5), MakeMode(2, 5000, -40)}};
@@ -24,7 +22,7 @@ SoundingModes ThreeModes() {
 /// A bank whose force is `force_newtons(t)` at every step of `step_frames` frames, rendered.
 class Held {
  public:
-  explicit Held(SoundingModes modes)
+  explicit Held(const SoundingModes& modes)
       : bank_(modes, MakeUniformShapes(modes.modes.size()), {.noise_seed = 7}) {}
 
   void Tie(double force_newtons, const ForceKnot& knot, size_t offset) {
@@ -88,10 +86,10 @@ TEST_P(AtEveryStep, AConstantForceIsSilent) {
 
 TEST_P(AtEveryStep, AJitteringLoadIsFarBelowTheBodysOwnImpact) {
   const size_t step_frames = 48000 / static_cast<size_t>(GetParam());
-  const double kWeight = 9.81;  // of 1 kg
+  const double weight = 9.81;  // of 1 kg
   Held held(ThreeModes());
   const auto sound = held.Render(4 * 48000, step_frames, [&](double t) {
-    return kWeight * (1 + 0.3 * std::sin(1e6 * t));  // as good as random from step to step
+    return weight * (1 + 0.3 * std::sin(1e6 * t));  // as good as random from step to step
   });
   OscillatorBank bank(ThreeModes(), MakeUniformShapes(3), {});
   const auto impact = Ring(bank, MakeUnitExcitation(), 48000);  // 1 kg that falls at 1 m/s
@@ -120,18 +118,18 @@ TEST(SustainedForce, AChangeOfSlopeRingsAsTheFreeResponseToARamp) {
 TEST(SustainedForce, RoughnessDrivesTheModesAsItsNoiseSays) {
   const SoundingModes modes = ThreeModes();
   Held held(modes);
-  const double kLoad = 20, kDepth = 0.5, kBandwidth = 3000;
+  const double full_load = 20, depth = 0.5, bandwidth_hz = 3000;
   const auto sound = held.Render(
-      9600, 800, [&](double) { return kLoad; },
-      {.roughness = static_cast<float>(kDepth), .bandwidth_hz = static_cast<float>(kBandwidth)});
+      9600, 800, [&](double) { return full_load; },
+      {.roughness = static_cast<float>(depth), .bandwidth_hz = static_cast<float>(bandwidth_hz)});
   // The same, mode by mode in double; the first step's force rises from zero.
   RoughnessNoise noise(7);
-  noise.SetBandwidth(kBandwidth, kTestSampleRateHz);
+  noise.SetBandwidth(bandwidth_hz, kTestSampleRateHz);
   std::vector<std::complex<double>> states(3);
   double error = 0, peak = 0;
   for (size_t n = 0; n < sound.size(); ++n) {
-    const double load = kLoad * std::min(1.0, static_cast<double>(n) / 800);
-    const double force = load * kDepth * noise.Next();
+    const double load = full_load * std::min(1.0, static_cast<double>(n) / 800);
+    const double force = load * depth * noise.Next();
     double sum = 0;
     for (size_t m = 0; m < 3; ++m) {
       const SoundingMode& mode = modes.modes[m];
