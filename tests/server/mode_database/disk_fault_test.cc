@@ -30,7 +30,7 @@ class DiskFaultTest : public ::testing::TestWithParam<DiskFault> {
   absl::Status Open() {
     database_.reset();
     auto opened = ModeDatabase::Open(file_, clock_);
-    const absl::Status status = opened.status();
+    absl::Status status = opened.status();
     if (status.ok()) database_ = *std::move(opened);
     return status;
   }
