@@ -214,7 +214,7 @@ bool OscillatorBank::StrikeModes(std::span<const float> modal_impulses, size_t o
   assert(modal_impulses.size() == column_count_);
   BeginStrikes(mix);
   StrikeBatch& batch = mix.batch();
-  assert(offset >= (batch.count > 0 ? batch.offsets[batch.count - 1] : rendered_to_));
+  offset = NotBeforeTheLast(offset, batch);
   if (batch.count == StrikeBatch::Capacity(lane_count_)) RenderStrikes(offset, mix);
   const bool finite =
       bank_kernel::Excite(lanes_, lane_count_, modal_impulses.data(), onset, batch.ahead,
@@ -233,12 +233,17 @@ bool OscillatorBank::Gather(const Excitation& force) noexcept {
 
 bool OscillatorBank::Tie(const ForceKnot& knot, size_t offset, BlockMix& mix) noexcept {
   BeginStrikes(mix);
-  RenderStrikes(offset, mix);
   StrikeBatch& batch = mix.batch();
+  offset = NotBeforeTheLast(offset, batch);
+  RenderStrikes(offset, mix);
   const bool finite = force_.Tie(knot, lanes_, batch.re(0, lane_count_), batch.im(0, lane_count_));
   if (finite) batch.offsets[batch.count++] = offset;
   newborn_ = true;
   return finite;
+}
+
+size_t OscillatorBank::NotBeforeTheLast(size_t offset, const StrikeBatch& batch) const noexcept {
+  return std::max(offset, batch.count > 0 ? batch.offsets[batch.count - 1] : rendered_to_);
 }
 
 void OscillatorBank::BeginStrikes(BlockMix& mix) noexcept {

@@ -167,6 +167,8 @@ class OscillatorBank {
                  bank_kernel::Projection& projection) const noexcept;
   void MeasureBlow(const LanePlan& plan);
   double TimeWork(size_t lane_count) const noexcept;
+  /// Strikes that were merged sound at the end of their frames, and what follows not before them.
+  size_t NotBeforeTheLast(size_t offset, const StrikeBatch& batch) const noexcept;
   void BeginStrikes(BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void RenderStrikes(size_t end, BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void RenderDrivenStrikes(size_t end, BlockMix& mix) noexcept
