@@ -215,9 +215,7 @@ absl::Status CheckCrossings(const SurfaceMesh& surface) {
 }
 
 bool IsInside(const SurfaceMesh& surface, const Shell& inner, const Shell& outer) {
-  const auto [a, b, c] = CornersOf(surface, static_cast<size_t>(inner.triangles.front()));
-  const Point middle = {(a[0] + b[0] + c[0]) / 3, (a[1] + b[1] + c[1]) / 3,
-                        (a[2] + b[2] + c[2]) / 3};
+  const Point middle = MiddleOf(CornersOf(surface, static_cast<size_t>(inner.triangles.front())));
   return std::abs(WindingNumber(surface, outer, middle)) > 0.5;
 }
 

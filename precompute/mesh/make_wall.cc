@@ -80,7 +80,7 @@ SurfaceMesh Isosurface(const openvdb::FloatGrid& distance, double voxel, double 
   return surface;
 }
 
-/// Turned outward where `outward`, else inward; shells of less than a voxel's size dropped.
+/// Turns the surface outward where `outward`, else inward.
 void Turn(SurfaceMesh& surface, bool outward) {
   double volume = 0;
   for (const Shell& shell : FindShells(surface)) volume += shell.volume_m3;

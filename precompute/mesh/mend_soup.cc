@@ -253,9 +253,7 @@ size_t TurnShells(SurfaceMesh& surface) {
   const std::vector<Shell> shells = FindShells(surface);
   std::vector<const Shell*> wrong;
   for (const Shell& shell : shells) {
-    const auto [a, b, c] = CornersOf(surface, static_cast<size_t>(shell.triangles.front()));
-    Point middle;
-    for (size_t i = 0; i < 3; ++i) middle[i] = (a[i] + b[i] + c[i]) / 3;
+    const Point middle = MiddleOf(CornersOf(surface, static_cast<size_t>(shell.triangles.front())));
     const auto depth = std::ranges::count_if(shells, [&](const Shell& other) {
       return &other != &shell && std::abs(WindingNumber(surface, other, middle)) > 0.5;
     });

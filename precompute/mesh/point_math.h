@@ -41,6 +41,13 @@ inline std::array<Point, 3> CornersOf(const SurfaceMesh& surface, size_t t) {
           surface.vertices[static_cast<size_t>(triangle[2])]};
 }
 
+/// The middle of a triangle.
+inline Point MiddleOf(const std::array<Point, 3>& corner) {
+  Point middle;
+  for (size_t i = 0; i < 3; ++i) middle[i] = (corner[0][i] + corner[1][i] + corner[2][i]) / 3;
+  return middle;
+}
+
 /// Diagonal of the box around a surface that has vertices.
 inline double Diagonal(const SurfaceMesh& surface) {
   Point low = surface.vertices.front(), high = low;

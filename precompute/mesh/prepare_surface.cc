@@ -39,10 +39,7 @@ std::vector<int32_t> NearestGiven(const SurfaceMesh& surface, const SurfaceMesh&
   const NearestTriangle index(given);
   std::vector<int32_t> nearest;
   for (size_t t = 0; t < surface.triangles.size(); ++t) {
-    const auto [a, b, c] = CornersOf(surface, t);
-    Point middle;
-    for (size_t i = 0; i < 3; ++i) middle[i] = (a[i] + b[i] + c[i]) / 3;
-    nearest.push_back(index.Find(middle).triangle);
+    nearest.push_back(index.Find(MiddleOf(CornersOf(surface, t))).triangle);
   }
   return nearest;
 }

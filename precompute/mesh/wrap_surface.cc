@@ -147,12 +147,11 @@ double SheetPart(const SurfaceMesh& given, const SurfaceMesh& wrap, double offse
   int sheet_count = 0;
   for (int i = 0; i < kSampleCount; ++i) {
     const auto corners = CornersOf(given, pick(random));
-    const Point normal = AreaNormal(corners);
+    const Point normal = AreaNormal(corners), middle = MiddleOf(corners);
     Point front, back;
     for (size_t k = 0; k < 3; ++k) {
-      const double middle = (corners[0][k] + corners[1][k] + corners[2][k]) / 3;
-      front[k] = middle + kAway * offset * normal[k] / Norm(normal);
-      back[k] = middle - kAway * offset * normal[k] / Norm(normal);
+      front[k] = middle[k] + kAway * offset * normal[k] / Norm(normal);
+      back[k] = middle[k] - kAway * offset * normal[k] / Norm(normal);
     }
     if (!Inside(wrap, shells, front) && !Inside(wrap, shells, back)) ++sheet_count;
   }
@@ -164,10 +163,7 @@ double DistanceFrom(const SurfaceMesh& surface, const NearestTriangle& other) {
   double distance = 0;
   for (const Point& p : surface.vertices) distance = std::max(distance, other.Find(p).distance_m);
   for (size_t t = 0; t < surface.triangles.size(); ++t) {
-    const auto [a, b, c] = CornersOf(surface, t);
-    Point middle;
-    for (size_t i = 0; i < 3; ++i) middle[i] = (a[i] + b[i] + c[i]) / 3;
-    distance = std::max(distance, other.Find(middle).distance_m);
+    distance = std::max(distance, other.Find(MiddleOf(CornersOf(surface, t))).distance_m);
   }
   return distance;
 }
