@@ -18,6 +18,7 @@
 #include "precompute/mesh/prepare_surface.h"
 #include "precompute/mesh/read_mesh.h"
 #include "precompute/modes/deformation_modes.h"
+#include "precompute/phase_clock.h"
 #include "proto/error_reason.h"
 
 namespace carillon::precompute {
@@ -139,17 +140,6 @@ absl::StatusOr<ModalModel> Solve(const Body& body, const DecompositionSettings& 
   return model;
 }
 
-double CpuSeconds() {
-  double seconds = 0;
-  for (const int who : {RUSAGE_SELF, RUSAGE_CHILDREN}) {
-    rusage usage{};
-    getrusage(who, &usage);
-    seconds += static_cast<double>(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
-               1e-6 * static_cast<double>(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
-  }
-  return seconds;
-}
-
 double PeakBytes() {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
@@ -166,7 +156,7 @@ absl::StatusOr<ModalModel> SolveToGoal(const Fillable& surface, DecompositionSet
   std::vector<Round> rounds;
   absl::StatusOr<ModalModel> best = absl::UnknownError("");
   while (true) {
-    const double begun_s = CpuSeconds();
+    const double begun_s = PhaseClock::Now().cpu_seconds;
     observer.OnProgress(Phase::kMesh, 0);
     const absl::StatusOr<Body> body = FillSurface(surface, meshing);
     // A finer mesh that cannot be had takes nothing from the coarser one.
@@ -179,7 +169,7 @@ absl::StatusOr<ModalModel> SolveToGoal(const Fillable& surface, DecompositionSet
                            (body->mesh.nodes_per_element == 10 ? kNodesPerCorner : 1);
     rounds.push_back({.corner_node_count = corners,
                       .worst_error = model->WorstError(),
-                      .cpu_s = CpuSeconds() - begun_s,
+                      .cpu_s = PhaseClock::Now().cpu_seconds - begun_s,
                       .peak_bytes = PeakBytes()});
     const std::optional<int> next = NextCornerNodeCount(settings.resolution, rounds);
     if (!next) return model;

@@ -25,11 +25,11 @@ class PhaseClock {
   void Enter(Phase phase);
   /// Ends the phase under way.
   void Stop();
+  /// The clocks' state, of which differences are times.
+  static Times Now();
   const Times& Of(Phase phase) const { return times_[static_cast<size_t>(phase)]; }
 
  private:
-  static Times Now();
-
   std::array<Times, kPhaseCount> times_;
   Phase phase_ = Phase::kRead;
   Times last_;
