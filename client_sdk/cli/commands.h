@@ -7,6 +7,7 @@
 
 #include "absl/status/status.h"
 #include "client_sdk/cli/material_figures.h"
+#include "client_sdk/cli/quantity.h"
 #include "client_sdk/cli/stop_signal.h"
 #include "client_sdk/cpp/client.h"
 
@@ -32,6 +33,7 @@ struct CreateModelOptions {
   bool repair = false;
   double wall_m = 0;
   double accuracy = 0;
+  Budget budget;
   bool wait = false;
 };
 
@@ -65,7 +67,7 @@ struct RenderOptions {
 absl::Status ShowStatus(const client::Client& daemon, const std::string& server, bool json);
 absl::Status CreateModel(const client::Client& daemon, const CreateModelOptions& options,
                          bool json);
-/// Times of `filter` are those of the contract.
+/// All that match `filter`, or, where it has a page size, that page and where to go on.
 absl::Status ListModels(const client::Client& daemon, const v1::ListModalModelsRequest& filter,
                         bool json);
 absl::Status UpdateModel(const client::Client& daemon, const std::string& text,

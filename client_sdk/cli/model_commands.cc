@@ -13,6 +13,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/strip.h"
+#include "absl/time/time.h"
 #include "client_sdk/cli/commands.h"
 #include "client_sdk/cli/find_model.h"
 #include "client_sdk/cli/job_progress.h"
@@ -61,6 +62,8 @@ v1::DecompositionSettings Settings(const CreateModelOptions& options) {
   settings.mutable_mesh()->set_repair(options.repair);
   settings.mutable_mesh()->set_wall_m(options.wall_m);
   settings.mutable_mesh()->set_accuracy(options.accuracy);
+  settings.mutable_mesh()->set_budget_s(options.budget.seconds);
+  settings.mutable_mesh()->set_budget_gib(options.budget.gib);
   return settings;
 }
 
@@ -109,6 +112,17 @@ void PrintSummary(const v1::ModalModelSummary& model) {
   for (const std::string& warning : header.warnings()) absl::PrintF("warning    %s\n", warning);
 }
 
+void PrintRow(const v1::ModalModelSummary& model) {
+  const absl::string_view digest = absl::StripPrefix(model.name(), "modalModels/");
+  absl::PrintF("%s  %4d modes  %7d nodes  %-9s  %8.1f MiB  %s  %s\n", digest.substr(0, 12),
+               model.header().mode_count(), model.header().node_count(),
+               ElementName(model.header().settings().element()),
+               static_cast<double>(model.stored_bytes()) / (1 << 20),
+               absl::FormatTime("%Y-%m-%d %H:%M", absl::FromUnixMillis(model.created_unix_ms()),
+                                absl::LocalTimeZone()),
+               model.label());
+}
+
 /// The modes as `material` makes them: Lambda = eigenvalue E/rho, sigma = (alpha1 Lambda +
 /// alpha2)/2.
 void PrintModes(const v1::ModalModelSummary& model, const v1::Material& material) {
@@ -147,19 +161,23 @@ absl::Status CreateModel(const client::Client& daemon, const CreateModelOptions&
 
 absl::Status ListModels(const client::Client& daemon, const v1::ListModalModelsRequest& filter,
                         bool json) {
-  const auto models = daemon.ListModalModels(filter);
-  if (!models.ok()) return models.status();
+  v1::ListModalModelsResponse list;
+  if (filter.page_size() > 0) {
+    auto page = daemon.ListModalModelsPage(filter);
+    if (!page.ok()) return page.status();
+    list = *std::move(page);
+  } else {
+    auto models = daemon.ListModalModels(filter);
+    if (!models.ok()) return models.status();
+    for (auto& model : *models) *list.add_modal_models() = std::move(model);
+  }
   if (json) {
-    v1::ListModalModelsResponse list;
-    for (const auto& model : *models) *list.add_modal_models() = model;
     PrintJson(list);
     return absl::OkStatus();
   }
-  for (const auto& model : *models) {
-    const absl::string_view digest = absl::StripPrefix(model.name(), "modalModels/");
-    absl::PrintF("%s  %4d modes  %7d nodes  %-9s  %s\n", digest.substr(0, 12),
-                 model.header().mode_count(), model.header().node_count(),
-                 ElementName(model.header().settings().element()), model.label());
+  for (const auto& model : list.modal_models()) PrintRow(model);
+  if (!list.next_page_token().empty()) {
+    absl::PrintF("more with --page-token %s\n", list.next_page_token());
   }
   return absl::OkStatus();
 }

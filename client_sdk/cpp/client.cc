@@ -78,13 +78,18 @@ absl::StatusOr<std::vector<v1::ModalModelSummary>> Client::ListModalModels(
   request.clear_page_token();
   request.set_page_size(kPageSize);
   do {
-    auto page = Call(stubs_->models, stubs_->server, &v1::ModalModelService::Stub::ListModalModels,
-                     request);
+    auto page = ListModalModelsPage(request);
     if (!page.ok()) return page.status();
     for (auto& model : *page->mutable_modal_models()) models.push_back(std::move(model));
     request.set_page_token(page->next_page_token());
   } while (!request.page_token().empty());
   return models;
+}
+
+absl::StatusOr<v1::ListModalModelsResponse> Client::ListModalModelsPage(
+    const v1::ListModalModelsRequest& request) const {
+  return Call(stubs_->models, stubs_->server, &v1::ModalModelService::Stub::ListModalModels,
+              request);
 }
 
 absl::Status Client::DeleteModalModel(const std::string& name) const {

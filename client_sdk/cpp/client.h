@@ -43,6 +43,9 @@ class Client {
   /// ignored.
   absl::StatusOr<std::vector<v1::ModalModelSummary>> ListModalModels(
       const v1::ListModalModelsRequest& filter = {}) const;
+  /// One page of them, and the token of the next.
+  absl::StatusOr<v1::ListModalModelsResponse> ListModalModelsPage(
+      const v1::ListModalModelsRequest& request) const;
   absl::StatusOr<v1::ModalModelSummary> UpdateModalModel(
       const v1::UpdateModalModelRequest& request) const;
   /// Writes a model to a file in the stored form. Errors also: Internal (OUTPUT_NOT_WRITABLE).

@@ -68,6 +68,16 @@ class Client:
         return self.models.CreateModalModel(modal_model_service_pb2.CreateModalModelRequest(
             mesh_digest=self.upload(data), mesh_format=mesh_format, **request)).job
 
+    def list(self, **filters):
+        """Yields the models that match, newest first, a page at a time; all without a filter."""
+        request = modal_model_service_pb2.ListModalModelsRequest(**filters)
+        while True:
+            page = self.models.ListModalModels(request)
+            yield from page.modal_models
+            if not page.next_page_token:
+                return
+            request.page_token = page.next_page_token
+
     def wait(self, job, on_change=lambda job: None):
         """Follows a job to its end; returns the name of its model."""
         for answer in self.jobs.WatchJob(decomposition_service_pb2.WatchJobRequest(name=job.name)):

@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "client_sdk/cli/material_figures.h"
+
+namespace CLI {
+class App;
+}
+
+namespace carillon::cli {
+
+/// The options of a command that name a material. Both must outlive the parsing.
+void AddMaterial(CLI::App& app, MaterialFigures& material);
+
+}  // namespace carillon::cli

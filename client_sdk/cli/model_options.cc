@@ -1,0 +1,239 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The command line of `carillon model`.
+#include "client_sdk/cli/model_options.h"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "client_sdk/cli/commands.h"
+#include "client_sdk/cli/material_options.h"
+#include "client_sdk/cli/quantity.h"
+
+namespace carillon::cli {
+namespace {
+
+/// An option whose text `parse` takes apart, for `take`; `form` says what the text must be.
+template <class T, class Take>
+void AddParsed(CLI::App& app, const std::string& name,
+               std::optional<T> (*parse)(const std::string&), const std::string& form,
+               const std::string& description, Take take) {
+  app.add_option_function<std::string>(
+      name,
+      [=](const std::string& text) {
+        const std::optional<T> value = parse(text);
+        if (!value) throw CLI::ValidationError(name, "\"" + text + "\" must be " + form);
+        take(*value);
+      },
+      description);
+}
+
+/// "LO:HI" into two frequencies.
+CLI::Validator Band(CreateModelOptions& options) {
+  return CLI::Validator(
+      [&options](std::string& text) -> std::string {
+        const size_t colon = text.find(':');
+        const bool parsed =
+            colon != std::string::npos &&
+            CLI::detail::lexical_cast(text.substr(0, colon), options.min_frequency_hz) &&
+            CLI::detail::lexical_cast(text.substr(colon + 1), options.max_frequency_hz);
+        return parsed ? std::string() : text + " is not two frequencies LO:HI";
+      },
+      "LO:HI");
+}
+
+void AddModelCreate(CLI::App& app, Program& program) {
+  auto options = std::make_shared<CreateModelOptions>();
+  auto band = std::make_shared<std::string>("20:20000");
+  CLI::App& create = *app.add_subcommand("create", "compute the modal model of a mesh file");
+  create.add_option("file", options->file, "surface (OBJ, PLY, STL, OFF) or tetrahedra (MSH)")
+      ->required();
+  create.add_option("--format", options->format, "obj, ply, stl, off or msh [the file's suffix]");
+  create.add_option("--label", options->label, "name for people [the file's name]");
+  create.add_option("--unit", options->unit, "length unit of the file")
+      ->check(CLI::IsMember({"m", "mm", "cm", "in"}))
+      ->capture_default_str();
+  create.add_option("--element", options->element, "order of the element")
+      ->check(CLI::IsMember({"linear", "quadratic"}))
+      ->capture_default_str();
+  create.add_option("--mass", options->mass, "mass matrix")
+      ->check(CLI::IsMember({"lumped", "consistent"}))
+      ->capture_default_str();
+  create.add_option("--size", options->size,
+                    "size it is meant to sound with, relative to the file");
+  create.add_option("--band", *band, "frequencies wanted, Hz")
+      ->check(Band(*options))
+      ->capture_default_str();
+  create.add_flag("--keep-surface,!--refine-surface", options->keep_surface,
+                  "add no vertices on the surface, or do [decided from the surface]");
+  create.add_option("--nodes", options->target_node_count, "about so many corner nodes");
+  AddParsed(create, "--accuracy", ParseShare, "above zero, such as 1% or 0.01",
+            "so fine a mesh that no mode is off by more, such as 1%",
+            [options](double share) { options->accuracy = share; });
+  AddParsed(create, "--budget", ParseBudget, "seconds, or seconds:GiB, such as 60 or 60:4",
+            "SECONDS[:GIB] of processor time and memory: as fine a mesh as they allow",
+            [options](const Budget& budget) { options->budget = budget; });
+  create.add_option("--priority", options->priority, "-100 to 100: higher ones start first");
+  create.add_option("--time-limit", options->time_limit_s, "give up after so many seconds");
+  create.add_option("--memory-limit-mib", options->memory_limit_mib, "memory that it may take");
+  create.add_flag("--repair", options->repair, "mend a surface that is no closed body");
+  create
+      .add_option("--wall", options->wall_m,
+                  "hollow out, or thicken an open sheet, to so many metres")
+      ->check(CLI::PositiveNumber);
+  create.add_flag("--wait", options->wait, "show the progress and end with the job");
+  AddMaterial(create, options->material);
+  create.callback([&program, options, band] {
+    program.command = [&program, options] {
+      return CreateModel(program.Daemon(), *options, program.json);
+    };
+  });
+}
+
+void AddModelShow(CLI::App& app, Program& program) {
+  auto model = std::make_shared<std::string>();
+  auto material = std::make_shared<MaterialFigures>();
+  CLI::App& show = *app.add_subcommand("show", "show a model; with a material, its frequencies");
+  show.add_option("model", *model, "name, label, or first digits of the digest")->required();
+  AddMaterial(show, *material);
+  show.callback([&program, model, material] {
+    program.command = [&program, model, material] {
+      return ShowModel(program.Daemon(), *model, *material, program.json);
+    };
+  });
+}
+
+void AddModelDelete(CLI::App& app, Program& program) {
+  auto model = std::make_shared<std::string>();
+  CLI::App& command = *app.add_subcommand("delete", "delete a model");
+  command.add_option("model", *model, "name, label, or first digits of the digest")->required();
+  command.callback([&program, model] {
+    program.command = [&program, model] { return DeleteModel(program.Daemon(), *model); };
+  });
+}
+
+/// A number of MiB as bytes.
+uint64_t Bytes(double mib) { return static_cast<uint64_t>(std::llround(mib * (1 << 20))); }
+
+void AddSizes(CLI::App& list, const std::shared_ptr<v1::ListModalModelsRequest>& filter) {
+  constexpr double kMostMib = 1 << 30;
+  list.add_option_function<double>(
+          "--min-mib", [filter](double mib) { filter->set_min_stored_bytes(Bytes(mib)); },
+          "only those of at least so many MiB")
+      ->check(CLI::Range(0.0, kMostMib));
+  list.add_option_function<double>(
+          "--max-mib",
+          // Zero would be no limit.
+          [filter](double mib) { filter->set_max_stored_bytes(std::max<uint64_t>(1, Bytes(mib))); },
+          "only those of at most so many MiB")
+      ->check(CLI::Range(0.0, kMostMib));
+}
+
+void AddTimes(CLI::App& list, const std::shared_ptr<v1::ListModalModelsRequest>& filter) {
+  const std::string form = "a date, or a date and a time, such as 2026-11-21 or 2026-11-21T14:30";
+  AddParsed(list, "--since", ParseTimeUnixMs, form, "only those stored at or after this time",
+            [filter](int64_t ms) { filter->set_created_since_unix_ms(ms); });
+  AddParsed(list, "--before", ParseTimeUnixMs, form, "only those stored before this time",
+            [filter](int64_t ms) { filter->set_created_before_unix_ms(ms); });
+}
+
+void AddModelList(CLI::App& app, Program& program) {
+  auto filter = std::make_shared<v1::ListModalModelsRequest>();
+  CLI::App& list = *app.add_subcommand("list", "list the models, newest first");
+  list.add_option_function<std::string>(
+      "--label", [filter](const std::string& text) { filter->set_label_contains(text); },
+      "only those whose label contains this, in any case");
+  list.add_option_function<std::string>(
+      "--tag", [filter](const std::string& text) { filter->set_tag(text); },
+      "only those with this tag");
+  AddSizes(list, filter);
+  AddTimes(list, filter);
+  list.add_option_function<int>(
+          "--page-size", [filter](int count) { filter->set_page_size(count); },
+          "at most so many, and where to go on [all]")
+      ->check(CLI::Range(1, 1000));
+  list.add_option_function<std::string>(
+          "--page-token", [filter](const std::string& token) { filter->set_page_token(token); },
+          "go on there")
+      ->needs("--page-size");
+  list.callback([&program, filter] {
+    program.command = [&program, filter] {
+      return ListModels(program.Daemon(), *filter, program.json);
+    };
+  });
+}
+
+void AddModelTag(CLI::App& app, Program& program) {
+  auto model = std::make_shared<std::string>();
+  auto change = std::make_shared<v1::UpdateModalModelRequest>();
+  CLI::App& tag = *app.add_subcommand("tag", "label, tag or pin a model");
+  tag.add_option("model", *model, "name, label, or first digits of the digest")->required();
+  tag.add_option_function<std::string>(
+      "--label", [change](const std::string& text) { change->set_label(text); }, "its new label");
+  tag.add_option_function<std::vector<std::string>>(
+      "--add",
+      [change](const std::vector<std::string>& tags) {
+        change->mutable_add_tags()->Assign(tags.begin(), tags.end());
+      },
+      "tags to add");
+  tag.add_option_function<std::vector<std::string>>(
+      "--remove",
+      [change](const std::vector<std::string>& tags) {
+        change->mutable_remove_tags()->Assign(tags.begin(), tags.end());
+      },
+      "tags to take away");
+  tag.add_flag_function(
+      "--pin,!--unpin", [change](int64_t count) { change->set_pinned(count > 0); },
+      "garbage collection leaves it alone, or does not");
+  tag.callback([&program, model, change] {
+    program.command = [&program, model, change] {
+      return UpdateModel(program.Daemon(), *model, *change, program.json);
+    };
+  });
+}
+
+void AddModelExport(CLI::App& app, Program& program) {
+  auto model = std::make_shared<std::string>();
+  auto file = std::make_shared<std::string>();
+  CLI::App& command = *app.add_subcommand("export", "write a model to a file");
+  command.add_option("model", *model, "name, label, or first digits of the digest")->required();
+  command.add_option("--out", *file, "where to [its digest, with .model]");
+  command.callback([&program, model, file] {
+    program.command = [&program, model, file] {
+      return ExportModel(program.Daemon(), *model, *file);
+    };
+  });
+}
+
+void AddModelImport(CLI::App& app, Program& program) {
+  auto file = std::make_shared<std::string>();
+  auto label = std::make_shared<std::string>();
+  CLI::App& command = *app.add_subcommand("import", "store the model of a file");
+  command.add_option("file", *file, "written by export or by carillon-precompute")->required();
+  command.add_option("--label", *label, "name for people");
+  command.callback([&program, file, label] {
+    program.command = [&program, file, label] {
+      return ImportModel(program.Daemon(), *file, *label, program.json);
+    };
+  });
+}
+
+}  // namespace
+
+void AddModel(CLI::App& app, Program& program) {
+  CLI::App& model = *app.add_subcommand("model", "modal models")->require_subcommand(1);
+  AddModelCreate(model, program);
+  AddModelList(model, program);
+  AddModelShow(model, program);
+  AddModelDelete(model, program);
+  AddModelTag(model, program);
+  AddModelExport(model, program);
+  AddModelImport(model, program);
+}
+
+}  // namespace carillon::cli

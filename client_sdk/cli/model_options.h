@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "client_sdk/cli/program.h"
+
+namespace CLI {
+class App;
+}
+
+namespace carillon::cli {
+
+/// `carillon model ...`: each of its commands sets `program.command`.
+void AddModel(CLI::App& app, Program& program);
+
+}  // namespace carillon::cli

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client_sdk/cli/quantity.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+
+namespace carillon::cli {
+namespace {
+
+TEST(Quantity, AShareIsAPercentageOrAFraction) {
+  EXPECT_EQ(ParseShare("1%"), 0.01);
+  EXPECT_EQ(ParseShare("0.01"), 0.01);
+  EXPECT_EQ(ParseShare("2.5%"), 0.025);
+  for (const char* text : {"", "%", "0", "0%", "-1%", "nan", "inf", "one", "1%%", "1 %x"}) {
+    EXPECT_FALSE(ParseShare(text)) << text;
+  }
+}
+
+TEST(Quantity, ABudgetIsSecondsAndPerhapsGib) {
+  EXPECT_EQ(ParseBudget("60")->seconds, 60);
+  EXPECT_EQ(ParseBudget("60")->gib, 0);
+  EXPECT_EQ(ParseBudget("0:1.5")->gib, 1.5);
+  for (const char* text : {"", ":", "60:", ":4", "60:4:1", "-1", "60:-4", "nan", "1e999"}) {
+    EXPECT_FALSE(ParseBudget(text)) << text;
+  }
+}
+
+TEST(Quantity, ATimeWithAZoneIsThatMoment) {
+  EXPECT_EQ(ParseTimeUnixMs("1970-01-01T00:00:01Z"), 1000);
+  EXPECT_EQ(ParseTimeUnixMs("1970-01-01T02:00:00+02:00"), 0);
+  for (const char* text : {"", "yesterday", "2026-13-01", "2026-11-21T25:00", "2026-11-21 x"}) {
+    EXPECT_FALSE(ParseTimeUnixMs(text)) << text;
+  }
+}
+
+TEST(Quantity, ADateIsTheMidnightThatBeginsItHere) {
+  const auto midnight = ParseTimeUnixMs("2026-11-21");
+  ASSERT_TRUE(midnight);
+  EXPECT_EQ(ParseTimeUnixMs("2026-11-21T00:00"), midnight);
+  EXPECT_EQ(ParseTimeUnixMs("2026-11-21T14:30:05"), *midnight + (14 * 3600 + 30 * 60 + 5) * 1000);
+  // Nowhere is midnight further from that of UTC than 14 hours.
+  EXPECT_LE(std::abs(*midnight - *ParseTimeUnixMs("2026-11-21T00:00:00Z")), 14 * 3600 * 1000);
+}
+
+}  // namespace
+}  // namespace carillon::cli
