@@ -122,6 +122,7 @@ class ContactReactor final
     v1::StreamContactsResponse answer;
     answer.set_scheduling_delay_s(stream_->scheduling_delay_s());
     answer.set_output_latency_s(daemon_.output.state().latency_s);
+    if (const auto frame = stream_->first_frame()) answer.set_first_frame(*frame);
     answer.set_step_count(counts.step_count);
     answer.set_accepted_count(counts.accepted_count);
     answer.set_late_count(counts.late_count);

@@ -15,6 +15,7 @@ namespace carillon {
 namespace {
 
 constexpr uint32_t kFormatVersion = 1;
+constexpr uint64_t kMostFirstFrame = uint64_t{1} << 48;
 
 absl::Status Malformed(absl::string_view message) {
   return Refusal(absl::StatusCode::kInvalidArgument, "TRACE_MALFORMED", message);
@@ -34,39 +35,62 @@ absl::Status TraceReader::Take(const v1::RenderRequest& request) {
 }
 
 absl::StatusOr<std::unique_ptr<OfflineRenderer>> TraceReader::Finish() {
-  if (!renderer_ || !has_header_) {
+  if (!renderer_) {
     return Malformed("the trace is empty; send settings, a header, objects, then steps");
   }
   return std::move(renderer_);
 }
 
 absl::Status TraceReader::TakeSettings(const v1::RenderSettings& settings) {
-  if (renderer_) return Malformed("settings were sent twice; they come first, once");
-  if (settings.sample_rate_hz() != 0) sample_rate_hz_ = settings.sample_rate_hz();
-  absl::StatusOr<std::unique_ptr<OfflineRenderer>> renderer = OfflineRenderer::Make(
-      {.sample_rate_hz = sample_rate_hz_, .tail_s = settings.tail_s()}, bodies_);
-  if (!renderer.ok()) return renderer.status();
-  renderer_ = *std::move(renderer);
+  if (settings_) return Malformed("settings were sent twice; they come first, once");
+  settings_.emplace();
+  if (settings.sample_rate_hz() != 0) settings_->sample_rate_hz = settings.sample_rate_hz();
+  settings_->tail_s = settings.tail_s();
   return absl::OkStatus();
 }
 
 absl::Status TraceReader::TakeRecord(const v1::ContactTraceRecord& record) {
-  if (!renderer_) return Malformed("a record came before the settings; they come first, once");
+  if (!settings_) return Malformed("a record came before the settings; they come first, once");
   if (record.has_header()) return TakeHeader(record.header());
-  if (!has_header_) return Malformed("the first record is not a header");
+  if (!renderer_) return Malformed("the first record is not a header");
   if (record.has_object()) return TakeObject(record.object());
   if (record.has_step()) return TakeStep(record.step());
   return Malformed("a record is neither header, object nor step");
 }
 
 absl::Status TraceReader::TakeHeader(const v1::ContactTraceHeader& header) {
-  if (has_header_) return Malformed("the trace has two headers");
+  if (renderer_) return Malformed("the trace has two headers");
   if (header.format_version() != kFormatVersion) {
     return Malformed(absl::StrCat("the trace is of format version ", header.format_version(),
                                   "; this daemon reads ", kFormatVersion));
   }
-  if (header.step_s() > 0 && header.step_s() <= 1) renderer_->SetSimulatorStep(header.step_s());
-  has_header_ = true;
+  if (header.step_s() > 0 && header.step_s() <= 1) settings_->step_s = header.step_s();
+  if (header.has_clock()) {
+    if (absl::Status status = TakeClock(header.clock()); !status.ok()) return status;
+  }
+  absl::StatusOr<std::unique_ptr<OfflineRenderer>> renderer =
+      OfflineRenderer::Make(*settings_, bodies_);
+  if (!renderer.ok()) return renderer.status();
+  renderer_ = *std::move(renderer);
+  return absl::OkStatus();
+}
+
+absl::Status TraceReader::TakeClock(const v1::ContactTraceClock& clock) {
+  const bool known_time =
+      clock.first_time_s() >= 0 && clock.first_time_s() <= OfflineRenderer::kMaxTimeS;
+  const bool known_delay = clock.scheduling_delay_s() >= 0 && clock.scheduling_delay_s() <= 10;
+  if (clock.first_frame() % OfflineRenderer::kBlockFrameCount != 0 ||
+      clock.first_frame() > kMostFirstFrame || !known_time || !known_delay) {
+    return Malformed(absl::StrCat(
+        "the header's clock says frame ", clock.first_frame(), " at ", clock.first_time_s(),
+        " s and ", clock.scheduling_delay_s(), " s of delay; it must be a multiple of ",
+        OfflineRenderer::kBlockFrameCount, " up to 2^48, 0 to ", OfflineRenderer::kMaxTimeS,
+        " s, and 0 to 10 s, as the daemon answered"));
+  }
+  settings_->mapping = {.first_frame = clock.first_frame(),
+                        .first_time_s = clock.first_time_s(),
+                        .delay_s = clock.scheduling_delay_s()};
+  time_s_ = clock.first_time_s();
   return absl::OkStatus();
 }
 
@@ -84,9 +108,10 @@ absl::Status TraceReader::TakeObject(const v1::ContactTraceObject& object) {
 
 absl::Status TraceReader::TakeStep(const v1::ContactStep& step) {
   if (!(step.time_s() >= time_s_ && step.time_s() <= OfflineRenderer::kMaxTimeS)) {
-    return Malformed(absl::StrCat("a step at ", step.time_s(), " s follows one at ", time_s_,
-                                  " s; times start at zero or later, do not go back, and end by ",
-                                  OfflineRenderer::kMaxTimeS, " s"));
+    return Malformed(
+        absl::StrCat("a step at ", step.time_s(), " s follows one at ", time_s_,
+                     " s; times start at zero or at the clock's first, do not go back, and end by ",
+                     OfflineRenderer::kMaxTimeS, " s"));
   }
   time_s_ = step.time_s();
   impulse_count_ += static_cast<uint64_t>(step.impulses_size() + step.columns().object_size() +

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 
 #include "absl/status/statusor.h"
 #include "carillon/v1/audio_service.pb.h"
@@ -26,20 +27,20 @@ class TraceReader {
   /// Once all is read: the renderer. Errors: InvalidArgument (TRACE_MALFORMED: nothing was sent).
   absl::StatusOr<std::unique_ptr<OfflineRenderer>> Finish();
 
-  uint32_t sample_rate_hz() const { return sample_rate_hz_; }
+  uint32_t sample_rate_hz() const { return settings_->sample_rate_hz; }
 
  private:
   absl::Status TakeSettings(const v1::RenderSettings& settings);
   absl::Status TakeRecord(const v1::ContactTraceRecord& record);
   absl::Status TakeHeader(const v1::ContactTraceHeader& header);
+  absl::Status TakeClock(const v1::ContactTraceClock& clock);
   absl::Status TakeObject(const v1::ContactTraceObject& object);
   absl::Status TakeStep(const v1::ContactStep& step);
 
   ModelStore& models_;
   BodyCache& bodies_;
-  std::unique_ptr<OfflineRenderer> renderer_;
-  uint32_t sample_rate_hz_ = 48000;
-  bool has_header_ = false;
+  std::optional<OfflineSettings> settings_;
+  std::unique_ptr<OfflineRenderer> renderer_;  // once there is a header
   double time_s_ = 0;
   uint64_t impulse_count_ = 0;
 };

@@ -7,7 +7,6 @@
 
 #include "absl/strings/str_cat.h"
 #include "proto/error_reason.h"
-#include "server/scene/frame_time.h"
 
 namespace carillon {
 namespace {
@@ -53,7 +52,7 @@ ContactStream::ContactStream(std::shared_ptr<const Scene> scene, Mixer& mixer, d
                              double scheduling_delay_s, std::unique_ptr<StrikeStream> strikes)
     : scene_(std::move(scene)),
       mixer_(mixer),
-      scheduling_delay_s_(scheduling_delay_s),
+      mapping_{.delay_s = scheduling_delay_s},
       strikes_(std::move(strikes)),
       forces_(step_s) {}
 
@@ -61,9 +60,9 @@ absl::Status ContactStream::BeginStep(double time_s) {
   if (!std::isfinite(time_s)) {
     return InvalidStream(absl::StrCat("time_s of step ", step_count_, " is ", time_s));
   }
-  if (!first_time_s_) {
-    first_time_s_ = time_s;
-    first_frame_ = mixer_.frame();
+  if (step_count_ == 0) {
+    mapping_.first_time_s = time_s;
+    mapping_.first_frame = mixer_.frame();
   } else if (time_s < time_s_) {
     return InvalidStream(absl::StrCat("time goes back from ", time_s_, " s to ", time_s,
                                       " s at step ", step_count_,
@@ -152,7 +151,7 @@ absl::StatusOr<double> ContactStream::FrameAt(double time_s) const {
   const double frame = FrameOf(time_s);
   const double ahead_s =
       (frame - static_cast<double>(mixer_.frame())) / mixer_.settings().sample_rate_hz;
-  if (ahead_s > kMaxAheadS + scheduling_delay_s_) {
+  if (ahead_s > kMaxAheadS + mapping_.delay_s) {
     return Refusal(absl::StatusCode::kInvalidArgument, "TIME_TOO_FAR_AHEAD",
                    absl::StrCat("the impulse is due in ", ahead_s, " s, over ", kMaxAheadS,
                                 " s ahead; send steps as they happen, or render a trace offline"));
@@ -161,8 +160,7 @@ absl::StatusOr<double> ContactStream::FrameAt(double time_s) const {
 }
 
 double ContactStream::FrameOf(double time_s) const {
-  return static_cast<double>(first_frame_) +
-         (time_s - *first_time_s_ + scheduling_delay_s_) * mixer_.settings().sample_rate_hz;
+  return mapping_.FrameOf(time_s, mixer_.settings().sample_rate_hz);
 }
 
 ContactCounts ContactStream::counts() const {

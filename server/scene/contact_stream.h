@@ -11,6 +11,7 @@
 #include "absl/status/statusor.h"
 #include "server/excitation/contact.h"
 #include "server/scene/contact_forces.h"
+#include "server/scene/frame_time.h"
 #include "server/scene/scene.h"
 #include "server/synthesis/mixer.h"
 
@@ -72,7 +73,12 @@ class ContactStream {
   /// Counts `count` impulses that could not even be read.
   void Reject(uint64_t count, absl::Status reason);
 
-  double scheduling_delay_s() const { return scheduling_delay_s_; }
+  double scheduling_delay_s() const { return mapping_.delay_s; }
+
+  /// The mixer's frame at the arrival of the first step, once that has come.
+  std::optional<uint64_t> first_frame() const {
+    return step_count_ > 0 ? std::optional(mapping_.first_frame) : std::nullopt;
+  }
 
   /// What the mixer has not taken yet is in none of the counts.
   ContactCounts counts() const;
@@ -97,12 +103,10 @@ class ContactStream {
 
   std::shared_ptr<const Scene> scene_;
   Mixer& mixer_;
-  double scheduling_delay_s_;
+  TimeMapping mapping_;
   std::unique_ptr<StrikeStream> strikes_;
-  std::optional<double> first_time_s_;
   double time_s_ = 0;
   ContactForces forces_;
-  uint64_t first_frame_ = 0;
   uint64_t step_count_ = 0;
   uint64_t pushed_count_ = 0;
   uint64_t rejected_count_ = 0;

@@ -8,6 +8,18 @@
 
 namespace carillon {
 
+/// How simulation time is mapped to a mixer's frames.
+struct TimeMapping {
+  uint64_t first_frame = 0;
+  double first_time_s = 0;  ///< simulation time at that frame
+  double delay_s = 0;
+
+  /// frame(t) = first frame + (t - first time + delay) rate
+  double FrameOf(double time_s, double sample_rate_hz) const {
+    return static_cast<double>(first_frame) + (time_s - first_time_s + delay_s) * sample_rate_hz;
+  }
+};
+
 /// Sets the time of `strike`: `frames`, zero or more, since the mixer began.
 inline void SetFrame(Strike& strike, double frames) {
   const double whole = std::floor(frames);

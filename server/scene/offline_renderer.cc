@@ -8,7 +8,6 @@
 
 #include "absl/strings/str_cat.h"
 #include "proto/error_reason.h"
-#include "server/scene/frame_time.h"
 #include "server/synthesis/flush_denormals.h"
 
 namespace carillon {
@@ -28,15 +27,15 @@ MixerSettings SettingsOf(const OfflineSettings& settings, SectionCrew& crew) {
   // Nothing waits here, so a block takes however many strikes fall into it.
   return {.sample_rate_hz = static_cast<double>(settings.sample_rate_hz),
           .block_frame_count = OfflineRenderer::kBlockFrameCount,
+          .first_frame = settings.mapping.first_frame,
           .most_streams = 1,
           .most_pending_strikes = kQueueCapacity,
           .most_strikes_per_block = kQueueCapacity,
           .crew = &crew};
 }
 
-bool Earlier(const Strike& a, const Strike& b) {
-  return std::pair(a.frame, a.fraction) < std::pair(b.frame, b.fraction);
-}
+/// Strikes of one sample keep their order, as when they come live.
+bool Earlier(const Strike& a, const Strike& b) { return FirstSample(a) < FirstSample(b); }
 
 }  // namespace
 
@@ -64,7 +63,8 @@ OfflineRenderer::OfflineRenderer(const OfflineSettings& settings, BodyCache& bod
     : settings_(settings),
       bodies_(bodies),
       crew_(settings.thread_count),
-      mixer_(SettingsOf(settings, crew_)) {}
+      mixer_(SettingsOf(settings, crew_)),
+      forces_(settings.step_s) {}
 
 absl::Status OfflineRenderer::AddObject(uint32_t handle, std::shared_ptr<const ModalModel> model,
                                         const ObjectProperties& properties) {
@@ -86,7 +86,8 @@ void OfflineRenderer::Strike(const ObjectImpulse& impulse) {
 
 absl::Status OfflineRenderer::TryStrike(const ObjectImpulse& impulse) {
   const double due_s = step_time_s_ + impulse.time_offset_s;
-  if (!(impulse.time_offset_s >= 0 && due_s >= 0 && due_s <= kMaxTimeS)) {
+  if (!(impulse.time_offset_s >= 0 && due_s >= settings_.mapping.first_time_s &&
+        due_s <= kMaxTimeS)) {
     return absl::InvalidArgumentError("no such time");
   }
   absl::StatusOr<Excitation> excitation = Locate(impulse.handle, impulse.impulse);
@@ -129,7 +130,7 @@ absl::StatusOr<Excitation> OfflineRenderer::Locate(uint32_t handle,
 }
 
 void OfflineRenderer::Push(carillon::Strike strike, double time_s) {
-  SetFrame(strike, time_s * settings_.sample_rate_hz);
+  SetFrame(strike, settings_.mapping.FrameOf(time_s, settings_.sample_rate_hz));
   strikes_.push_back(strike);
 }
 
@@ -177,20 +178,21 @@ size_t OfflineRenderer::CountBlocks(size_t most) const {
   size_t count = std::min<size_t>({most, kBlocksTogether, left / kBlockFrameCount + 1});
   const size_t full = pushed_count_ + kQueueCapacity / 2;
   while (count > 1 && full < strikes_.size() &&
-         strikes_[full].frame < first + count * kBlockFrameCount) {
+         FirstSample(strikes_[full]) < first + count * kBlockFrameCount) {
     --count;
   }
   return count;
 }
 
 uint64_t OfflineRenderer::EndFrame() const {
-  const uint64_t last = strikes_.empty() ? 0 : strikes_.back().frame;
+  const uint64_t last =
+      strikes_.empty() ? settings_.mapping.first_frame : FirstSample(strikes_.back());
   const double tail_s = settings_.tail_s > 0 ? settings_.tail_s : kLongestOpenTailS;
   return last + static_cast<uint64_t>(std::ceil(tail_s * settings_.sample_rate_hz));
 }
 
 void OfflineRenderer::PushStrikesBefore(uint64_t frame) {
-  while (pushed_count_ < strikes_.size() && strikes_[pushed_count_].frame < frame) {
+  while (pushed_count_ < strikes_.size() && FirstSample(strikes_[pushed_count_]) < frame) {
     if (!stream_->TryPush(strikes_[pushed_count_])) Reject(1);
     ++pushed_count_;
   }

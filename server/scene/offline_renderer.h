@@ -12,6 +12,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "server/scene/contact_stream.h"
+#include "server/scene/frame_time.h"
 #include "server/scene/sounding_body.h"
 #include "server/scene/sounding_object.h"
 #include "server/synthesis/mixer.h"
@@ -25,6 +26,11 @@ struct OfflineSettings {
   /// How long to go on after the last impulse; zero: until all is below -80 dB of full scale, at
   /// most 60 s.
   double tail_s = 0;
+  /// The simulator's step, seconds, above 0 and at most 1.
+  double step_s = 1.0 / 60;
+  /// As the trace was heard live: the rendering begins at its first frame, a multiple of
+  /// OfflineRenderer::kBlockFrameCount.
+  TimeMapping mapping{};
   /// The sound does not depend on it, not by a bit.
   size_t thread_count = std::max(std::thread::hardware_concurrency(), 1U);
 };
@@ -39,7 +45,8 @@ struct OfflineSummary {
 };
 
 /// Renders a recorded simulation on a virtual clock with a mixer of its own, as fast as it can and
-/// bit for bit the same each time: frame 0 is simulation time zero, and nothing comes late. Objects
+/// bit for bit the same each time: frame 0 is simulation time zero, unless the settings map time
+/// otherwise, and nothing comes late. Objects
 /// first, then the impulses, then Render until it is done. One thread at a time.
 class OfflineRenderer {
  public:
@@ -55,10 +62,6 @@ class OfflineRenderer {
   /// Errors: AlreadyExists (OBJECT_EXISTS), and those of MakeSoundingObject.
   absl::Status AddObject(uint32_t handle, std::shared_ptr<const ModalModel> model,
                          const ObjectProperties& properties);
-
-  /// Says the simulator's step, seconds, above 0 and at most 1; without this, 1/60. Before all
-  /// steps.
-  void SetSimulatorStep(double step_s) { forces_ = ContactForces(step_s); }
 
   /// Begins the step at simulation time `time_s`, which does not go back.
   void BeginStep(double time_s);
@@ -102,7 +105,7 @@ class OfflineRenderer {
   std::unique_ptr<StrikeStream> stream_;
   std::map<uint32_t, SoundingObject> objects_;
   std::vector<carillon::Strike> strikes_;  // in order of time once rendering has begun
-  ContactForces forces_{1.0 / 60};
+  ContactForces forces_;
   double step_time_s_ = 0;
   size_t pushed_count_ = 0;
   uint64_t quiet_frame_count_ = 0;

@@ -119,9 +119,8 @@ void Mixer::Take(const Strike& strike, StrikeQueue& queue) noexcept {
     all_strikes_taken_ = false;
   }
   BankSlot* slot = FindSlot(strike.bank);
-  const bool between = strike.fraction > 0;
-  PendingStrike pending{.sample = strike.frame + (between ? 1 : 0),
-                        .lead_frames = between ? 1 - strike.fraction : 0,
+  PendingStrike pending{.sample = FirstSample(strike),
+                        .lead_frames = strike.fraction > 0 ? 1 - strike.fraction : 0,
                         .bank = strike.bank,
                         .kind = strike.kind,
                         .excitation = strike.excitation,

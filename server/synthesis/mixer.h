@@ -41,6 +41,7 @@ inline constexpr size_t kBlocksTogether = 16;
 struct MixerSettings {
   double sample_rate_hz = 48000;
   size_t block_frame_count = 128;  ///< at most kMostBlockFrames
+  uint64_t first_frame = 0;        ///< number of the first; a multiple of block_frame_count
   size_t most_banks = 8192;        ///< those that ring out or fade included
   size_t most_streams = 1024;
   size_t most_pending_strikes = 262144;   ///< waiting for their time
@@ -193,7 +194,7 @@ class Mixer {
   SpscRing<Command> commands_;  // produced under control_mutex_
   SpscRing<Retired> retired_;   // consumed under control_mutex_
 
-  uint64_t block_start_ ABSL_GUARDED_BY(kRenderRole) = 0;
+  uint64_t block_start_ ABSL_GUARDED_BY(kRenderRole);
   std::vector<BankSlot> slots_ ABSL_GUARDED_BY(kRenderRole);
   // Slots to be retired when they are silent.
   FixedVector<uint32_t> leaving_ ABSL_GUARDED_BY(kRenderRole);

@@ -26,6 +26,7 @@ Mixer::Mixer(const MixerSettings& settings)
       // Each bank is added, let ring out and faded at most once before its slot is used again.
       commands_(3 * settings.most_banks + settings.most_streams),
       retired_(settings.most_banks + settings.most_streams),
+      block_start_(settings.first_frame),
       slots_(settings.most_banks),
       leaving_(settings.most_banks),
       open_queues_(settings.most_streams),
@@ -39,7 +40,9 @@ Mixer::Mixer(const MixerSettings& settings)
       section_frames_(kSectionCount * kBlocksTogether * settings.block_frame_count),
       limiter_(settings.sample_rate_hz) {
   assert(settings.block_frame_count > 0 && settings.block_frame_count <= kMostBlockFrames);
+  assert(settings.first_frame % settings.block_frame_count == 0);
   assert(settings.most_banks <= kMostBanks);
+  statistics_.frame_count = settings.first_frame;
   const size_t worker_count = settings.crew == nullptr ? 1 : settings.crew->size();
   for (size_t i = 0; i < worker_count; ++i) desks_.emplace_back(settings.block_frame_count);
   for (size_t section = 0; section < kSectionCount; ++section) {

@@ -48,4 +48,9 @@ struct Strike {
   ForceKnot knot{};         ///< of a knot
 };
 
+/// Number of the first sample that can be heard.
+inline uint64_t FirstSample(const Strike& strike) noexcept {
+  return strike.frame + (strike.fraction > 0 ? 1 : 0);
+}
+
 }  // namespace carillon

@@ -178,6 +178,31 @@ TEST_F(AudioApi, WhatIsNoTraceIsRefused) {
   expect(backwards);
 }
 
+TEST_F(AudioApi, ATraceThatWasHeardLiveBeginsAtItsFirstStep) {
+  Requests heard = Trace();
+  v1::ContactTraceClock& clock = *heard[1].mutable_record()->mutable_header()->mutable_clock();
+  clock.set_first_frame(1280);
+  clock.set_first_time_s(0.25);
+  clock.set_scheduling_delay_s(0.125);
+  const Rendering rendering = Render(heard);
+  ASSERT_TRUE(rendering.status.ok()) << rendering.status.error_message();
+  const size_t silent = rendering.sound.size() - FromOnset(rendering.sound).size();
+  EXPECT_EQ(silent, (0.5 - 0.25 + 0.125) * 48000 + 1);  // sin(0) is silent
+}
+
+TEST_F(AudioApi, AClockThatNoDaemonCanHaveHadIsRefused) {
+  const auto expect = [&](const std::function<void(v1::ContactTraceClock&)>& spoil) {
+    Requests requests = Trace();
+    spoil(*requests[1].mutable_record()->mutable_header()->mutable_clock());
+    ExpectRefused(Render(requests).status, grpc::INVALID_ARGUMENT, "TRACE_MALFORMED");
+  };
+  expect([](auto& clock) { clock.set_first_frame(100); });
+  expect([](auto& clock) { clock.set_first_frame(uint64_t{1} << 60); });
+  expect([](auto& clock) { clock.set_first_time_s(-1); });
+  expect([](auto& clock) { clock.set_first_time_s(0.6); });  // after the first step
+  expect([](auto& clock) { clock.set_scheduling_delay_s(std::nan("")); });
+}
+
 TEST_F(AudioApi, SettingsAndObjectsThatCannotBeAreRefusedWithTheirReasons) {
   const Requests good = Trace();
   Requests requests = good;
