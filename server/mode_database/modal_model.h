@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "server/base/large_allocator.h"
+
 namespace carillon {
 
 /// A modal model as the server holds it: unit Young's modulus, density and size (see
@@ -27,7 +29,7 @@ struct ModalModel {
   std::vector<std::array<float, 3>> given_vertices;
   std::vector<std::array<uint32_t, 3>> given_triangles;
   /// #V by 3 by #m, row-major: shapes[(vertex * 3 + axis) * m + mode], 1/kg^(1/2).
-  std::vector<float> shapes;
+  std::vector<float, LargeAllocator<float>> shapes;
 
   size_t mode_count() const { return eigenvalues.size(); }
 };

@@ -38,9 +38,10 @@ struct Field {
   std::string_view bytes;
 };
 
-template <typename T>
-std::string_view Bytes(const std::vector<T>& values) {
-  return {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T)};
+template <typename Vector>
+std::string_view Bytes(const Vector& values) {
+  return {reinterpret_cast<const char*>(values.data()),
+          values.size() * sizeof(typename Vector::value_type)};
 }
 
 std::array<Field, 9> Fields(const ModalModel& model, const std::vector<double>& residuals) {
@@ -60,8 +61,8 @@ std::array<Field, 9> Fields(const ModalModel& model, const std::vector<double>& 
            {"shapes", v1::ELEMENT_TYPE_FLOAT32, {v, 3, m}, Bytes(model.shapes)}}};
 }
 
-template <typename T>
-char* Resize(std::vector<T>& values, uint64_t count) {
+template <typename Vector>
+char* Resize(Vector& values, uint64_t count) {
   values.resize(count);
   return reinterpret_cast<char*>(values.data());
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/scene/sounding_body.h"
 
+#include <future>
 #include <utility>
 
 namespace carillon {
@@ -8,14 +9,17 @@ namespace {
 
 absl::StatusOr<std::shared_ptr<const SoundingBody>> MakeBody(
     std::shared_ptr<const ModalModel> model) {
-  absl::StatusOr<std::unique_ptr<SurfaceLocator>> locator =
-      SurfaceLocator::Make({.vertices = model->vertices,
-                            .triangles = model->triangles,
-                            .given_triangle = model->given_triangle,
-                            .given_vertices = model->given_vertices,
-                            .given_triangles = model->given_triangles});
-  if (!locator.ok()) return locator.status();
+  // Side by side: somebody waits for the object.
+  auto indexing = std::async([&model] {
+    return SurfaceLocator::Make({.vertices = model->vertices,
+                                 .triangles = model->triangles,
+                                 .given_triangle = model->given_triangle,
+                                 .given_vertices = model->given_vertices,
+                                 .given_triangles = model->given_triangles});
+  });
   ShapeTable shapes(model->shapes, model->vertices.size(), model->mode_count());
+  absl::StatusOr<std::unique_ptr<SurfaceLocator>> locator = indexing.get();
+  if (!locator.ok()) return locator.status();
   return std::make_shared<const SoundingBody>(SoundingBody{
       .model = std::move(model), .shapes = std::move(shapes), .locator = *std::move(locator)});
 }

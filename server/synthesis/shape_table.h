@@ -7,6 +7,8 @@
 #include <span>
 #include <vector>
 
+#include "server/base/large_allocator.h"
+
 namespace carillon {
 
 /// Mode shapes of one body on its sounding surface as strikes are projected with them: 16 bits a
@@ -26,7 +28,7 @@ class ShapeTable {
   /// Values of all modes at a vertex along an axis, in units of scale(mode); readable up to the end
   /// of the vector that the last one lies in.
   const int16_t* Row(size_t vertex, size_t axis) const noexcept {
-    return values_.get() + (3 * vertex + axis) * stride_;
+    return values_ + (3 * vertex + axis) * stride_;
   }
 
   /// Values from one row to the next.
@@ -39,7 +41,8 @@ class ShapeTable {
   size_t mode_count_ = 0;
   size_t stride_ = 0;
   std::vector<float> scales_;
-  std::shared_ptr<const int16_t> values_;
+  std::shared_ptr<const std::vector<int16_t, LargeAllocator<int16_t>>> memory_;
+  const int16_t* values_ = nullptr;  // of memory_
 };
 
 }  // namespace carillon
