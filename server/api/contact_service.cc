@@ -96,7 +96,8 @@ class ContactReactor final
                           stream_->Reject(count, std::move(reason));
                         }});
     stream_->EndStep();
-    if (daemon_.clock.Monotonic() >= answer_due_) Answer();
+    const bool first = stream_->counts().step_count == 1;
+    if (first || daemon_.clock.Monotonic() >= answer_due_) Answer();
     return absl::OkStatus();
   }
 

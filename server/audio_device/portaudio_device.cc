@@ -151,7 +151,8 @@ class PortAudioDevice final : public AudioDevice {
  private:
   absl::Status OpenStream(PaDeviceIndex index) {
     const PaDeviceInfo* device = Pa_GetDeviceInfo(index);
-    const bool alsa = Pa_GetHostApiInfo(device->hostApi)->type == paALSA;
+    const PaHostApiTypeId api = Pa_GetHostApiInfo(device->hostApi)->type;
+    const bool alsa = api == paALSA;
     channel_count_ = std::min(kMaxChannelCount, device->maxOutputChannels);
     const PaStreamParameters parameters{
         .device = index,
@@ -169,6 +170,9 @@ class PortAudioDevice final : public AudioDevice {
     }
     Pa_SetStreamFinishedCallback(stream_, &Finished);
     latency_s_ = Pa_GetStreamInfo(stream_)->outputLatency;
+    // Of JACK's latency PortAudio leaves out the period that is played while the next is asked for.
+    if (api == paJACK)
+      latency_s_ += static_cast<double>(format_.block_frame_count) / format_.sample_rate_hz;
     return absl::OkStatus();
   }
 

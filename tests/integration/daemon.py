@@ -15,9 +15,10 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 
 class Daemon:
-    """carillond on a Unix socket within `folder`, without a sound device."""
+    """carillond on a Unix socket within `folder`, without a sound device unless `arguments` name one."""
 
-    def __init__(self, folder, *arguments):
+    def __init__(self, folder, *arguments, environment=None):
+        self.environment = environment
         self.folder = pathlib.Path(folder)
         self.arguments = [str(argument) for argument in arguments]
         self.server = f"unix:{self.folder}/socket"
@@ -29,8 +30,8 @@ class Daemon:
         with open(self.folder / "log", "ab") as log:
             self.process = subprocess.Popen(
                 [BIN / "carillond", "--data-dir", self.folder / "data", "--listen", self.server,
-                 "--audio-device", "null", *self.arguments],
-                stdout=subprocess.PIPE, stderr=log, text=True)
+                 *([] if "--audio-device" in self.arguments else ["--audio-device", "null"]), *self.arguments],
+                stdout=subprocess.PIPE, stderr=log, text=True, env=self.environment)
         address_count = 1 + self.arguments.count("--listen")
         self.listening = [self.process.stdout.readline() for _ in range(address_count)]
         if not self.listening[-1].startswith("listening on "):

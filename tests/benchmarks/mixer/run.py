@@ -23,8 +23,9 @@ import measuring
 import stk_peer
 import supercollider_peer
 
-HERE = pathlib.Path(__file__).parent
-PARTS = ("ringing", "accuracy", "flood")
+HERE = pathlib.Path(__file__).resolve().parent
+ROOT = HERE.parents[2]
+PARTS = ("ringing", "accuracy", "flood", "latency")
 
 
 def carillon(build, *arguments, most_target=None):
@@ -108,6 +109,31 @@ def flood(options, _folder):
     print(f"\nMerging all of 1,000,000 a second changes the sound by {merging:.1f} dB of its energy.")
 
 
+def latency(options, folder):
+    os.environ["CARILLON_BIN_DIR"] = str(options.build / "bin")
+    sys.path += [str(ROOT / "tests/integration"), str(ROOT / "client_sdk/python"),
+                 str(options.build / "client_sdk/python")]
+    import jack  # these need the generated messages, which come with the build
+    print("\n## From a strike at the client to its first sample in a JACK capture, ms\n\n"
+          "| time stamp, blocks ahead | strikes | delay + look-ahead, as stated | p50 | p99 | p99.9 | least, most | "
+          "late | out of place | JACK cycles missed, xruns |\n"
+          "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |")
+    names = {"stream": "now", "ahead": "50 ms before", "arrival": "now, no delay"}
+    for blocks in (8, 2):
+        scratch = folder / str(blocks)
+        scratch.mkdir()
+        measurement = jack.LatencyMeasurement(scratch, "--look-ahead-blocks", blocks)
+        for way in jack.LatencyMeasurement.WAYS:
+            found = measurement.measure(way, *options.latency_strikes)
+            # Of what comes late all are out of place, by as much as they are late.
+            row(f"{names[way]}, {blocks}", found["heard"],
+                f"{found['delay_ms']:.2f} + {found['stated_ms'] - found['delay_ms']:.2f}", f"{found['p50_ms']:.2f}",
+                f"{found['p99_ms']:.2f}", f"{found['p999_ms']:.2f}",
+                f"{found['least_ms']:.2f}, {found['most_ms']:.2f}", found["late"],
+                found["displaced"] - found["late"], f"{found['missed_cycles']}, {found['xruns']}")
+        measurement.stop()
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--build", type=pathlib.Path, required=True, help="the release build's folder")
@@ -115,11 +141,13 @@ def main():
                         help="some of " + ",".join(PARTS))
     parser.add_argument("--seconds", type=float, default=5, help="of sound, for each measurement of modes")
     parser.add_argument("--flood-seconds", type=float, default=60)
+    parser.add_argument("--latency-strikes", type=lambda text: tuple(map(int, text.split("x"))), default=(40, 100),
+                        help="STREAMSxSTRIKES: so many streams, and strikes in each")
     options = parser.parse_args()
     print(f"load average before: {os.getloadavg()[0]:.1f}", flush=True)
     for part in options.parts:
         with tempfile.TemporaryDirectory() as folder:
-            {"ringing": ringing, "accuracy": accuracy, "flood": flood}[part](options, pathlib.Path(folder))
+            {"ringing": ringing, "accuracy": accuracy, "flood": flood, "latency": latency}[part](options, pathlib.Path(folder))
     print(f"\nload average after: {os.getloadavg()[0]:.1f}")
     return 0
 

@@ -101,7 +101,8 @@ TEST(JackDevice, PlaysBitForBitWhatListenersHear) {
                                         [](const std::string&) {});
   ASSERT_TRUE(output.ok()) << output.status();
   EXPECT_THAT((*output)->state().device, testing::HasSubstr("JACK"));
-  EXPECT_GE((*output)->state().latency_s, 9 * 128 / 48000.0);  // look-ahead and a period of JACK
+  // The look-ahead, and the two periods that JACK says lie between its clients and the ear.
+  EXPECT_DOUBLE_EQ((*output)->state().latency_s, 10 * 128 / 48000.0);
   Recorder recorder((*output)->broadcast());
   SceneRegistry scenes((*output)->mixer());
   StrikeForAWhile(scenes);

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From a strike at the client to its first sample in a JACK capture: as late as the daemon states, and no sample
+later.
+
+The client's clock and the capture's are one (CLOCK_MONOTONIC). `./deploy/bench.sh mixer` measures more of them.
+"""
+
+import tempfile
+import unittest
+
+import jack
+
+BLOCK_MS = 1000 * jack.PERIOD_FRAMES / jack.RATE
+# JACK's own cycles may come late by so much before it counts one as missed.
+JACK_MS = 2 * BLOCK_MS
+
+
+class LatencyTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        scratch = tempfile.TemporaryDirectory(prefix="carillon-")
+        cls.addClassCleanup(scratch.cleanup)
+        cls.measurement = jack.LatencyMeasurement(scratch.name)
+        cls.addClassCleanup(cls.measurement.stop)
+
+    def measure(self, way):
+        found = self.measurement.measure(way, streams=2, strikes=40)
+        print(f"{way}: stated {found['stated_ms']:.2f} ms, "
+              f"measured {found['least_ms']:.2f} to {found['most_ms']:.2f} ms; "
+              f"{found['late']} of {found['strikes']} late", flush=True)
+        missed, xruns = found["missed_cycles"], found["xruns"]
+        if missed + xruns > 0:
+            self.skipTest(f"too busy for sound here: {missed} cycles of JACK missed, {xruns} xruns of the daemon")
+        return found
+
+    def assert_as_stated(self, found):
+        self.assertEqual(found["heard"], found["strikes"])
+        # All that came in time lie where the daemon says, to the sample; what did not is counted.
+        self.assertEqual(found["displaced"], found["late"])
+        # None sounds before it has been sent, nor, beyond what is stated, later than the first step took to
+        # arrive, rounded up to a block.
+        self.assertGreaterEqual(found["least_ms"], found["delay_ms"])
+        self.assertLessEqual(found["most_over_ms"], BLOCK_MS + JACK_MS)
+
+    def test_a_strike_of_now_sounds_when_the_daemon_states(self):
+        self.assert_as_stated(self.measure("stream"))
+
+    def test_a_strike_sent_ahead_sounds_as_long_after_its_time(self):
+        self.assert_as_stated(self.measure("ahead"))
+
+    def test_without_a_delay_a_strike_sounds_on_arrival(self):
+        self.assert_as_stated(self.measure("arrival"))
+
+
+if __name__ == "__main__":
+    unittest.main()
