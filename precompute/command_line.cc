@@ -27,7 +27,7 @@ struct Options {
   std::optional<double> young_pa, poisson_ratio, density_kg_per_m3, alpha1_s, alpha2_per_s;
   std::optional<double> lambda_pa, mu_pa;
   double size = 1;
-  std::string wall, accuracy, budget;
+  std::string wall, accuracy, budget, loss_factor;
   bool keep_surface = false, refine_surface = false, repair = false, json = false;
   bool cautious = false;
   int node_count = 0, event_descriptor = -1, thread_count = 0;
@@ -51,6 +51,9 @@ void AddMaterialOptions(CLI::App& app, Options& options) {
   app.add_option("--alpha1", options.alpha1_s, "Damping in proportion to stiffness, s")
       ->group(group);
   app.add_option("--alpha2", options.alpha2_per_s, "Damping in proportion to mass, 1/s")
+      ->group(group);
+  app.add_option("--loss-factor", options.loss_factor,
+                 "Damping added by a loss factor: ETA, or HZ:ETA,HZ:ETA,...")
       ->group(group);
 }
 
@@ -152,6 +155,11 @@ absl::StatusOr<v1::Material> MakeMaterial(const Options& options) {
   if (options.alpha2_per_s || options.material.empty()) {
     material.set_alpha2_per_s(options.alpha2_per_s.value_or(0));
   }
+  if (!options.loss_factor.empty()) {
+    const absl::StatusOr<std::vector<LossFactorPoint>> points = ReadLossFactor(options.loss_factor);
+    if (!points.ok()) return points.status();
+    SetLossFactor(*points, material);
+  }
   if (options.material.empty() && !(material.has_young_pa() && material.has_poisson_ratio() &&
                                     material.has_density_kg_per_m3())) {
     return Invalid(
@@ -181,7 +189,8 @@ absl::StatusOr<IntendedUse> MakeUse(const Options& options, const v1::Material& 
                   .density_kg_per_m3 = material.density_kg_per_m3(),
                   .alpha1_s = material.alpha1_s(),
                   .alpha2_per_s = material.alpha2_per_s(),
-                  .size = options.size};
+                  .size = options.size,
+                  .loss_factor = LossFactorOf(material)};
   if (absl::Status status = SetBand(options.band, use); !status.ok()) return status;
   return use;
 }

@@ -26,7 +26,9 @@ double IntendedUse::UnitEigenvalue(double frequency_hz) const {
 }
 
 double IntendedUse::DecayRatePerS(double unit_eigenvalue) const {
-  return -(alpha1_s * Eigenvalue(unit_eigenvalue) + alpha2_per_s) / 2;
+  const double natural_hz = FrequencyHz(unit_eigenvalue);
+  const double loss_rate = LossFactorAt(loss_factor, natural_hz) * kTwoPi * natural_hz;
+  return -(alpha1_s * Eigenvalue(unit_eigenvalue) + alpha2_per_s + loss_rate) / 2;
 }
 
 double IntendedUse::DampedFrequencyHz(double unit_eigenvalue) const {

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include <vector>
+
+#include "proto/loss_factor.h"
+
 namespace carillon::precompute {
 
 /// What a body is meant to be when it sounds; tells how far up to compute and what to report. None
@@ -13,6 +17,7 @@ struct IntendedUse {
   double size = 1;     ///< relative to the mesh
   double low_hz = 20;  ///< the band of natural frequencies wanted
   double high_hz = 20000;
+  std::vector<LossFactorPoint> loss_factor = {};  ///< ascending; damping added to D
 
   /// Lambda (unit material and size) -> Lambda E / (rho s^2), 1/s^2.
   double Eigenvalue(double unit_eigenvalue) const;
@@ -20,7 +25,7 @@ struct IntendedUse {
   double FrequencyHz(double unit_eigenvalue) const;
   /// The inverse of FrequencyHz.
   double UnitEigenvalue(double frequency_hz) const;
-  /// sigma = -(alpha1 Lambda + alpha2) / 2, 1/s.
+  /// sigma = -(alpha1 Lambda + alpha2 + eta omega) / 2, 1/s, with the loss factor eta at omega.
   double DecayRatePerS(double unit_eigenvalue) const;
   /// sqrt(Lambda - sigma^2) / (2 pi); zero for an overdamped mode.
   double DampedFrequencyHz(double unit_eigenvalue) const;

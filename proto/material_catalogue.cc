@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <numbers>
 
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
@@ -38,12 +39,32 @@ absl::Status OutOfRange(const char* field, double value, const char* range) {
       absl::StrCat("INVALID_MATERIAL: ", field, " is ", value, "; it must be ", range));
 }
 
+absl::Status CheckLossFactor(const v1::Material& m) {
+  constexpr int kMostPoints = 256;
+  if (m.loss_factor_size() > kMostPoints) {
+    return OutOfRange("the number of points of loss_factor", m.loss_factor_size(), "at most 256");
+  }
+  double last_hz = 0;
+  for (const v1::LossFactorPoint& point : m.loss_factor()) {
+    if (!(point.frequency_hz() > last_hz && std::isfinite(point.frequency_hz()))) {
+      return OutOfRange("loss_factor.frequency_hz", point.frequency_hz(),
+                        "greater than zero and than that of the point before");
+    }
+    if (!(point.loss_factor() > 0 && point.loss_factor() < 2)) {
+      return OutOfRange("loss_factor.loss_factor", point.loss_factor(),
+                        "greater than zero and less than 2");
+    }
+    last_hz = point.frequency_hz();
+  }
+  return absl::OkStatus();
+}
+
 absl::Status Check(const v1::Material& m) {
   if (!m.has_young_pa() || !m.has_density_kg_per_m3() || !m.has_alpha1_s() ||
       !m.has_alpha2_per_s()) {
     return absl::InvalidArgumentError(
         "INVALID_MATERIAL: a material needs young_pa, density_kg_per_m3, alpha1_s and "
-        "alpha2_per_s; "
+        "alpha2_per_s (or loss_factor); "
         "name a preset to start from or give all four");
   }
   const auto positive = [](double x) { return std::isfinite(x) && x > 0; };
@@ -59,7 +80,7 @@ absl::Status Check(const v1::Material& m) {
   if (m.has_poisson_ratio() && !(m.poisson_ratio() > -1 && m.poisson_ratio() < 0.5)) {
     return OutOfRange("poisson_ratio", m.poisson_ratio(), "greater than -1 and less than 0.5");
   }
-  return absl::OkStatus();
+  return CheckLossFactor(m);
 }
 
 }  // namespace
@@ -78,8 +99,35 @@ absl::StatusOr<v1::Material> ResolveMaterial(const v1::Material& material) {
   }
   resolved.MergeFrom(material);
   resolved.clear_preset();
+  if (resolved.loss_factor_size() > 0) {
+    resolved.set_alpha1_s(resolved.alpha1_s());
+    resolved.set_alpha2_per_s(resolved.alpha2_per_s());
+  }
   if (absl::Status status = Check(resolved); !status.ok()) return status;
   return resolved;
+}
+
+std::vector<LossFactorPoint> LossFactorOf(const v1::Material& material) {
+  std::vector<LossFactorPoint> points;
+  for (const v1::LossFactorPoint& point : material.loss_factor()) {
+    points.push_back({point.frequency_hz(), point.loss_factor()});
+  }
+  return points;
+}
+
+void SetLossFactor(std::span<const LossFactorPoint> points, v1::Material& material) {
+  material.clear_loss_factor();
+  for (const LossFactorPoint& point : points) {
+    v1::LossFactorPoint& added = *material.add_loss_factor();
+    added.set_frequency_hz(point.frequency_hz);
+    added.set_loss_factor(point.loss_factor);
+  }
+}
+
+double DecayRatePerS(const v1::Material& resolved, double natural_frequency_hz) {
+  const double omega = 2 * std::numbers::pi * natural_frequency_hz;
+  const double eta = LossFactorAt(LossFactorOf(resolved), natural_frequency_hz);
+  return (resolved.alpha1_s() * omega * omega + resolved.alpha2_per_s() + eta * omega) / 2;
 }
 
 }  // namespace carillon

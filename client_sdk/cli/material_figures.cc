@@ -2,6 +2,8 @@
 #include "client_sdk/cli/material_figures.h"
 
 #include "proto/error_reason.h"
+#include "proto/loss_factor.h"
+#include "proto/material_catalogue.h"
 
 namespace carillon::cli {
 
@@ -13,6 +15,11 @@ absl::StatusOr<v1::Material> ToMaterial(const MaterialFigures& figures) {
   if (figures.density_kg_per_m3) material.set_density_kg_per_m3(*figures.density_kg_per_m3);
   if (figures.alpha1_s) material.set_alpha1_s(*figures.alpha1_s);
   if (figures.alpha2_per_s) material.set_alpha2_per_s(*figures.alpha2_per_s);
+  if (!figures.loss_factor.empty()) {
+    const auto points = ReadLossFactor(figures.loss_factor);
+    if (!points.ok()) return points.status();
+    SetLossFactor(*points, material);
+  }
   if (!figures.lame_lambda_pa && !figures.lame_mu_pa) return material;
   if (!figures.lame_lambda_pa || !figures.lame_mu_pa || figures.young_pa || figures.poisson_ratio) {
     return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_MATERIAL",

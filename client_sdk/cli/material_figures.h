@@ -19,6 +19,7 @@ struct MaterialFigures {
   std::optional<double> density_kg_per_m3;
   std::optional<double> alpha1_s;
   std::optional<double> alpha2_per_s;
+  std::string loss_factor;  ///< as ReadLossFactor takes it; empty: none
 };
 
 /// The contract's form. Lamé's constants become E = mu (3 lambda + 2 mu)/(lambda + mu) and

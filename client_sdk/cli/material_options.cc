@@ -24,6 +24,9 @@ void AddMaterial(CLI::App& app, MaterialFigures& material) {
   AddFigure(app, "--density", material.density_kg_per_m3, "density, kg/m^3");
   AddFigure(app, "--alpha1", material.alpha1_s, "damping proportional to stiffness, s");
   AddFigure(app, "--alpha2", material.alpha2_per_s, "damping proportional to mass, 1/s");
+  app.add_option("--loss-factor", material.loss_factor,
+                 "damping added by a loss factor: ETA, or HZ:ETA,HZ:ETA,...")
+      ->group("Material");
 }
 
 }  // namespace carillon::cli

@@ -123,18 +123,17 @@ void PrintRow(const v1::ModalModelSummary& model) {
                model.label());
 }
 
-/// The modes as `material` makes them: Lambda = eigenvalue E/rho, sigma = (alpha1 Lambda +
-/// alpha2)/2.
+/// The modes as `material` makes them: Lambda = eigenvalue E/rho.
 void PrintModes(const v1::ModalModelSummary& model, const v1::Material& material) {
   absl::PrintF("\n%5s %14s %14s %12s %9s\n", "mode", "natural Hz", "damped Hz", "decay 1/s",
                "T60 s");
   for (int i = 0; i < model.eigenvalues_size(); ++i) {
     const double lambda = model.eigenvalues(i) * material.young_pa() / material.density_kg_per_m3();
-    const double sigma = (material.alpha1_s() * lambda + material.alpha2_per_s()) / 2;
+    const double natural_hz = std::sqrt(lambda) / (2 * std::numbers::pi);
+    const double sigma = DecayRatePerS(material, natural_hz);
     const double damped = std::sqrt(std::fmax(0, lambda - sigma * sigma));
-    absl::PrintF("%5d %14.3f %14.3f %12.4f %9.3f\n", i + 1,
-                 std::sqrt(lambda) / (2 * std::numbers::pi), damped / (2 * std::numbers::pi),
-                 -sigma, std::log(1000) / sigma);
+    absl::PrintF("%5d %14.3f %14.3f %12.4f %9.3f\n", i + 1, natural_hz,
+                 damped / (2 * std::numbers::pi), -sigma, std::log(1000) / sigma);
   }
 }
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "absl/strings/str_format.h"
 #include "client_sdk/cli/commands.h"
 #include "client_sdk/cli/find_model.h"
 #include "client_sdk/cli/output.h"
 #include "proto/error_reason.h"
+#include "proto/material_catalogue.h"
 
 namespace carillon::cli {
 namespace {
@@ -15,12 +15,17 @@ namespace {
 constexpr double kLongestSound = 30;  // seconds
 constexpr double kStep = 0.001;       // seconds; there is one step only
 
-/// Until the mode that decays slowest, the lowest, is 60 dB down: with omega its natural angular
-/// frequency, sigma = (alpha1 omega^2 + alpha2)/2 and T60 = ln(1000)/sigma.
+/// Until the mode that decays slowest is 60 dB down, T60 = ln(1000)/sigma: the lowest, or, with a
+/// loss factor, one at a point of its table or the highest.
 double SoundingSeconds(const v1::SoundingObject& object) {
-  const double omega = 2 * std::numbers::pi * object.lowest_frequency_hz();
-  const double sigma =
-      (object.material().alpha1_s() * omega * omega + object.material().alpha2_per_s()) / 2;
+  const v1::Material& material = object.material();
+  double sigma = DecayRatePerS(material, object.lowest_frequency_hz());
+  sigma = std::min(sigma, DecayRatePerS(material, object.highest_frequency_hz()));
+  for (const v1::LossFactorPoint& point : material.loss_factor()) {
+    const double hz = std::clamp(point.frequency_hz(), object.lowest_frequency_hz(),
+                                 object.highest_frequency_hz());
+    sigma = std::min(sigma, DecayRatePerS(material, hz));
+  }
   return std::min(kLongestSound, std::log(1000) / sigma);
 }
 

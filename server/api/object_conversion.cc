@@ -12,7 +12,8 @@ SoundingMaterial ToSoundingMaterial(const v1::Material& resolved, double size) {
           .density_kg_per_m3 = resolved.density_kg_per_m3(),
           .alpha1_s = resolved.alpha1_s(),
           .alpha2_per_s = resolved.alpha2_per_s(),
-          .size = size};
+          .size = size,
+          .loss_factor = LossFactorOf(resolved)};
 }
 
 std::optional<double> PoissonRatio(const v1::Material& resolved) {
@@ -27,6 +28,7 @@ v1::Material ToProto(const ObjectProperties& properties, double model_poisson_ra
   material.set_density_kg_per_m3(properties.material.density_kg_per_m3);
   material.set_alpha1_s(properties.material.alpha1_s);
   material.set_alpha2_per_s(properties.material.alpha2_per_s);
+  SetLossFactor(properties.material.loss_factor, material);
   return material;
 }
 

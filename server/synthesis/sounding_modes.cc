@@ -97,7 +97,9 @@ SoundingModes SelectSoundingModes(std::span<const double> eigenvalues,
   for (size_t m = 0; m < eigenvalues.size(); ++m) {
     const double natural_hz = NaturalFrequencyHz(eigenvalues[m], material);
     const double eigenvalue = std::pow(2 * kPi * natural_hz, 2);
-    const double sigma = -(material.alpha1_s * eigenvalue + material.alpha2_per_s) / 2;
+    const double eta = LossFactorAt(material.loss_factor, natural_hz);
+    const double sigma =
+        -(material.alpha1_s * eigenvalue + material.alpha2_per_s + eta * std::sqrt(eigenvalue)) / 2;
     if (!Sounds(natural_hz, eigenvalue, sigma, sample_rate_hz / 2, band)) continue;
     sounding.modes.push_back({.column = static_cast<uint32_t>(m),
                               .natural_frequency_hz = natural_hz,

@@ -6,6 +6,8 @@
 #include <span>
 #include <vector>
 
+#include "proto/loss_factor.h"
+
 namespace carillon {
 
 /// What turns a modal model of unit Young's modulus, density and size into a sounding object.
@@ -14,7 +16,8 @@ struct SoundingMaterial {
   double density_kg_per_m3 = 0;
   double alpha1_s = 0;  ///< D = alpha1 K + alpha2 M
   double alpha2_per_s = 0;
-  double size = 1;  ///< relative to the model's
+  double size = 1;                                ///< relative to the model's
+  std::vector<LossFactorPoint> loss_factor = {};  ///< ascending; damping added to D
 };
 
 /// Which modes may sound.
@@ -53,16 +56,16 @@ double NaturalFrequencyHz(double eigenvalue, const SoundingMaterial& material);
 /// Applies material and size to a model's eigenvalues and couplings (each #m, ascending), and
 /// selects the modes that sound (design: physics.md 2 and 3; the paper, 3.4):
 ///
-///   Lambda' = Lambda E/(rho s^2),  sigma = -(alpha1 Lambda' + alpha2)/2,
+///   Lambda' = Lambda E/(rho s^2),  sigma = -(alpha1 Lambda' + alpha2 + eta Lambda'^(1/2))/2,
 ///   omega_d = sqrt(Lambda' - sigma^2),  c' = c E^(1/2) rho^(-1) s^(-1/2)
 ///
-/// with natural frequency in the band and below Nyquist, sigma^2 < Lambda', and T60 long enough.
-/// The two modes of a degenerate pair get a quarter period of difference in phase and share their
-/// mean frequency, decay and coupling, so that loudness does not depend on where around the body it
-/// is struck: left split by 1e-4, which is the mesh's doing, the pair of a chime would beat over
-/// seconds and differ by 2 dB. Where more than `most_modes` qualify, those are kept whose sound
-/// after a unit modal impulse has the most A-weighted energy in its first 0.2 s (about the ear's
-/// integration time).
+/// with the loss factor eta at the natural frequency, this frequency in the band and below Nyquist,
+/// sigma^2 < Lambda', and T60 long enough. The two modes of a degenerate pair get a quarter period
+/// of difference in phase and share their mean frequency, decay and coupling, so that loudness does
+/// not depend on where around the body it is struck: left split by 1e-4, which is the mesh's doing,
+/// the pair of a chime would beat over seconds and differ by 2 dB. Where more than `most_modes`
+/// qualify, those are kept whose sound after a unit modal impulse has the most A-weighted energy in
+/// its first 0.2 s (about the ear's integration time).
 SoundingModes SelectSoundingModes(std::span<const double> eigenvalues,
                                   std::span<const double> couplings,
                                   const SoundingMaterial& material, double sample_rate_hz,

@@ -52,6 +52,37 @@ TEST(ResolveMaterial, PutsGivenFiguresOverThePreset) {
   EXPECT_TRUE(resolved->preset().empty());
 }
 
+TEST(ResolveMaterial, ALossFactorStandsInForRayleighDamping) {
+  v1::Material material;
+  material.set_young_pa(7e10);
+  material.set_density_kg_per_m3(2700);
+  EXPECT_FALSE(ResolveMaterial(material).ok());
+  SetLossFactor(std::vector<LossFactorPoint>{{500, 0.01}}, material);
+  const absl::StatusOr<v1::Material> resolved = ResolveMaterial(material);
+  ASSERT_TRUE(resolved.ok()) << resolved.status();
+  EXPECT_TRUE(resolved->has_alpha1_s() && resolved->has_alpha2_per_s());
+  EXPECT_NEAR(DecayRatePerS(*resolved, 1000), 0.01 * 2 * std::numbers::pi * 1000 / 2, 1e-9);
+}
+
+TEST(ResolveMaterial, RefusesALossFactorThatIsOutOfRangeOrNotAscending) {
+  v1::Material material;
+  material.set_preset("chime_aluminum");
+  for (const std::vector<LossFactorPoint>& points :
+       {std::vector<LossFactorPoint>{{500, 0}}, {{500, 2}}, {{0, 0.1}}, {{500, 0.1}, {500, 0.1}}}) {
+    SetLossFactor(points, material);
+    EXPECT_THAT(ResolveMaterial(material).status().ToString(), HasSubstr("INVALID_MATERIAL: "));
+  }
+}
+
+TEST(LossFactor, IsStraightInTheLogarithmsAndConstantBeyondTheEnds) {
+  const std::vector<LossFactorPoint> points = {{100, 0.001}, {10000, 0.1}};
+  EXPECT_NEAR(LossFactorAt(points, 1000), 0.01, 1e-12);
+  EXPECT_NEAR(LossFactorAt(points, 200), 0.002, 1e-12);
+  EXPECT_EQ(LossFactorAt(points, 10), 0.001);
+  EXPECT_EQ(LossFactorAt(points, 20000), 0.1);
+  EXPECT_EQ(LossFactorAt({}, 1000), 0);
+}
+
 TEST(ResolveMaterial, UnknownPresetListsTheKnownOnes) {
   v1::Material material;
   material.set_preset("unobtainium");

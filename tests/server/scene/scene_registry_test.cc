@@ -180,12 +180,13 @@ TEST(SceneRegistry, AfterAnUpdateWhatRangGoesOnAndWhatIsStruckSoundsTheNewWay) {
 TEST(SceneRegistry, AnUpdateKeepsWhatItDoesNotName) {
   Stage stage;
   const uint32_t handle = stage.Add();
+  ObjectChange twice_as_large;
+  twice_as_large.size = 2;
+  ASSERT_TRUE(stage.scenes.UpdateObject(stage.scene, handle, twice_as_large).ok());
+  SoundingMaterial stiffer = SmallProperties().material;
+  stiffer.young_pa *= 4;
   ObjectChange change;
-  change.size = 2;
-  ASSERT_TRUE(stage.scenes.UpdateObject(stage.scene, handle, change).ok());
-  change = {};
-  change.material = SmallProperties().material;
-  change.material->young_pa *= 4;
+  change.material = stiffer;
   const PlacedObject placed = *stage.scenes.UpdateObject(stage.scene, handle, change);
   EXPECT_EQ(placed.object.properties.material.size, 2);
   EXPECT_NEAR(placed.object.lowest_frequency_hz, 440, 1e-9);  // twice as large, four times as stiff

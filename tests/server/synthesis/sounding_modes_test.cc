@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 // The chime of the paper's Table 1.
-constexpr SoundingMaterial kChime{
+const SoundingMaterial kChime{
     .young_pa = 6.835e10, .density_kg_per_m3 = 2700, .alpha1_s = 1e-7, .alpha2_per_s = 0};
 
 /// The eigenvalue of the model that sounds at this natural frequency in this material.
@@ -45,6 +45,21 @@ TEST(SoundingModes, FrequencyDecayAndDampedFrequencyFollowTheRayleighDamping) {
   EXPECT_NEAR(
       mode.damped_rad_per_s * mode.damped_rad_per_s + mode.decay_rate_per_s * mode.decay_rate_per_s,
       eigenvalue, 1e-6 * eigenvalue);
+}
+
+TEST(SoundingModes, ALossFactorAddsHalfOfItTimesTheAngularFrequencyToTheDecay) {
+  SoundingMaterial material{
+      .young_pa = 3e9, .density_kg_per_m3 = 900, .alpha1_s = 2e-6, .alpha2_per_s = 12};
+  const std::vector<double> eigenvalues = EigenvaluesFor({440, 3000}, material);
+  const SoundingModes before = Select(eigenvalues, material);
+  material.loss_factor = {{.frequency_hz = 1000, .loss_factor = 0.01}};  // at all frequencies
+  const SoundingModes after = Select(eigenvalues, material);
+  for (size_t m = 0; m < 2; ++m) {
+    const double omega = 2 * kPi * before.modes[m].natural_frequency_hz;
+    const double decay = after.modes[m].decay_rate_per_s;
+    EXPECT_NEAR(decay - before.modes[m].decay_rate_per_s, -0.01 * omega / 2, 1e-9 * omega);
+    EXPECT_NEAR(std::hypot(after.modes[m].damped_rad_per_s, decay), omega, 1e-9 * omega);
+  }
 }
 
 TEST(SoundingModes, TheChimeOfTable1DecaysAsPrinted) {
