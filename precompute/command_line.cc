@@ -14,7 +14,9 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
 #include "absl/strings/strip.h"
+#include "precompute/fixture_codec.h"
 #include "proto/error_reason.h"
+#include "proto/fixture_text.h"
 #include "proto/material_catalogue.h"
 
 namespace carillon::precompute {
@@ -28,6 +30,7 @@ struct Options {
   std::optional<double> lambda_pa, mu_pa;
   double size = 1;
   std::string wall, accuracy, budget, loss_factor;
+  std::vector<std::string> fixtures;
   bool keep_surface = false, refine_surface = false, repair = false, json = false;
   bool cautious = false;
   int node_count = 0, event_descriptor = -1, thread_count = 0;
@@ -90,6 +93,13 @@ void AddMeshOptions(CLI::App& app, Options& options) {
       ->group(group);
   app.add_option("--budget", options.budget,
                  "SECONDS[:GIB] of processor time and memory: mesh as finely as they allow")
+      ->group(group);
+  app.add_option(
+         "--fix", options.fixtures,
+         "Hold the body where it touches or lies behind a plane, in a box, at vertices or in a "
+         "group of the file; repeat it for more. plane:X,Y,Z/NX,NY,NZ (the normal points to what "
+         "is free), box:X,Y,Z/X,Y,Z, vertices:I,J,... or group:NAME, in metres")
+      ->allow_extra_args(false)
       ->group(group);
   app.add_option("--element", options.element, "Order of the elements")
       ->check(CLI::IsMember({"linear", "quadratic"}))
@@ -245,6 +255,16 @@ absl::StatusOr<ResolutionGoal> MakeGoal(const Options& options) {
   return goal;
 }
 
+absl::StatusOr<std::vector<Fixture>> MakeFixtures(const Options& options) {
+  std::vector<Fixture> fixtures;
+  for (const std::string& text : options.fixtures) {
+    const absl::StatusOr<v1::Fixture> said = ParseFixture(text);
+    if (!said.ok()) return said.status();
+    fixtures.push_back(FromProto(*said));
+  }
+  return fixtures;
+}
+
 absl::StatusOr<MeshFile> MakeMeshFile(const Options& options) {
   const absl::StatusOr<double> metres_per_unit = MetresPerUnit(options.unit);
   if (!metres_per_unit.ok()) return metres_per_unit.status();
@@ -269,12 +289,15 @@ absl::StatusOr<CommandLine> MakeCommandLine(const Options& options) {
   if (!wall_m.ok()) return wall_m.status();
   const absl::StatusOr<ResolutionGoal> goal = MakeGoal(options);
   if (!goal.ok()) return goal.status();
+  absl::StatusOr<std::vector<Fixture>> fixtures = MakeFixtures(options);
+  if (!fixtures.ok()) return fixtures.status();
   CommandLine result{
       .mesh = *mesh,
       .output = options.output,
       .settings = {.poisson_ratio = material->poisson_ratio(),
                    .mass =
                        options.mass == "lumped" ? MassSharing::kLumped : MassSharing::kConsistent,
+                   .fixtures = *std::move(fixtures),
                    .preparation = {.repair = options.repair, .wall_m = *wall_m},
                    .meshing = {.keep_surface = {},
                                .target_node_count = options.node_count,

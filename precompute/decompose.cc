@@ -38,18 +38,23 @@ struct Body {
 struct Fillable {
   SurfaceMesh given;
   PreparedSurface prepared;
+  MeshNames names;
 };
 
-absl::StatusOr<Body> FillSurface(const Fillable& surface, const MeshingSettings& meshing) {
-  absl::StatusOr<TetMesh> mesh = Tetrahedralize(surface.prepared.surface, meshing);
+absl::StatusOr<Body> FillSurface(const Fillable& surface, const DecompositionSettings& settings) {
+  absl::StatusOr<TetMesh> mesh = Tetrahedralize(surface.prepared.surface, settings.meshing);
   if (!mesh.ok()) return mesh.status();
   for (BoundaryFace& face : mesh->boundary) {
     face.given_triangle = surface.prepared.given_triangle[static_cast<size_t>(face.given_triangle)];
   }
+  absl::Status status = Hold(settings.fixtures, surface.given, surface.names, *mesh);
+  if (!status.ok()) return status;
   return Body{surface.given, *std::move(mesh), surface.prepared.warnings};
 }
 
-absl::StatusOr<Body> TakeTetrahedra(TetMesh mesh, int nodes_per_element) {
+absl::StatusOr<Body> TakeTetrahedra(TetMesh mesh, const MeshNames& names,
+                                    const DecompositionSettings& settings) {
+  const int nodes_per_element = settings.meshing.nodes_per_element;
   if (mesh.nodes_per_element > nodes_per_element) {
     return Refusal(
         absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
@@ -58,6 +63,8 @@ absl::StatusOr<Body> TakeTetrahedra(TetMesh mesh, int nodes_per_element) {
   }
   SurfaceMesh given = BoundarySurface(mesh);
   if (mesh.nodes_per_element < nodes_per_element) AddMidsideNodes(mesh);
+  absl::Status status = Hold(settings.fixtures, given, names, mesh);
+  if (!status.ok()) return status;
   return Body{std::move(given), std::move(mesh), {}};
 }
 
@@ -67,19 +74,18 @@ using Input = std::variant<Fillable, Body>;
 absl::StatusOr<Input> ReadInput(const MeshFile& file, const DecompositionSettings& settings,
                                 DecompositionObserver& observer) {
   observer.OnProgress(Phase::kRead, 0);
-  absl::StatusOr<Mesh> mesh = ReadMesh(file.path, file.format, file.metres_per_unit);
-  if (!mesh.ok()) return mesh.status();
+  absl::StatusOr<NamedMesh> read = ReadMesh(file.path, file.format, file.metres_per_unit);
+  if (!read.ok()) return read.status();
   observer.OnProgress(Phase::kMesh, 0);
-  if (auto* tetrahedra = std::get_if<TetMesh>(&*mesh)) {
-    absl::StatusOr<Body> body =
-        TakeTetrahedra(std::move(*tetrahedra), settings.meshing.nodes_per_element);
+  if (auto* tetrahedra = std::get_if<TetMesh>(&read->mesh)) {
+    absl::StatusOr<Body> body = TakeTetrahedra(std::move(*tetrahedra), read->names, settings);
     if (!body.ok()) return body.status();
     return *std::move(body);
   }
-  auto& given = std::get<SurfaceMesh>(*mesh);
+  auto& given = std::get<SurfaceMesh>(read->mesh);
   absl::StatusOr<PreparedSurface> prepared = PrepareSurface(given, settings.preparation);
   if (!prepared.ok()) return prepared.status();
-  return Fillable{std::move(given), *std::move(prepared)};
+  return Fillable{std::move(given), *std::move(prepared), std::move(read->names)};
 }
 
 absl::Status SaveMatrices(const SystemMatrices& system, const DecompositionSettings& settings) {
@@ -131,7 +137,7 @@ absl::StatusOr<ModalModel> Solve(const Body& body, const DecompositionSettings& 
   if (absl::Status status = SaveMatrices(system, settings); !status.ok()) return status;
 
   const absl::StatusOr<DeformationModes> solution = SolveDeformationModes(
-      system, body.mesh.nodes, settings.use.UnitEigenvalue(settings.use.high_hz),
+      system, body.mesh, settings.use.UnitEigenvalue(settings.use.high_hz),
       [&](SolveStage stage, double done) { observer.OnProgress(PhaseOf(stage), done); });
   if (!solution.ok()) return solution.status();
   observer.OnProgress(Phase::kVerify, 1);
@@ -158,7 +164,7 @@ absl::StatusOr<ModalModel> SolveToGoal(const Fillable& surface, DecompositionSet
   while (true) {
     const double begun_s = PhaseClock::Now().cpu_seconds;
     observer.OnProgress(Phase::kMesh, 0);
-    const absl::StatusOr<Body> body = FillSurface(surface, meshing);
+    const absl::StatusOr<Body> body = FillSurface(surface, settings);
     // A finer mesh that cannot be had takes nothing from the coarser one.
     if (!body.ok() && best.ok()) return best;
     if (!body.ok()) return body.status();

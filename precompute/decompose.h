@@ -2,11 +2,13 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "absl/status/statusor.h"
 #include "precompute/decomposition_observer.h"
 #include "precompute/fem/element.h"
 #include "precompute/intended_use.h"
+#include "precompute/mesh/hold.h"
 #include "precompute/mesh/prepare_surface.h"
 #include "precompute/mesh/tetrahedralize.h"
 #include "precompute/modes/modal_model.h"
@@ -24,6 +26,8 @@ struct MeshFile {
 struct DecompositionSettings {
   double poisson_ratio = 0;
   MassSharing mass = MassSharing::kConsistent;
+  /// Where the body is held; none: it is free.
+  std::vector<Fixture> fixtures = {};
   /// How to fill a surface; its nodes_per_element holds for tetrahedra given, too.
   PreparationSettings preparation;
   MeshingSettings meshing;
@@ -39,7 +43,7 @@ struct DecompositionSettings {
 /// finer each time, until the goal is met or as far as it allows; the model's warnings say where
 /// the accuracy asked for was not reached.
 ///
-/// Errors: those of ReadMesh, CheckSurface, Tetrahedralize and SolveDeformationModes;
+/// Errors: those of ReadMesh, CheckSurface, Tetrahedralize, Hold and SolveDeformationModes;
 /// NO_MODE_IN_BAND with the figure first_mode_hz; INVALID_SETTINGS (linear elements asked of a mesh
 /// of ten-node ones); OUTPUT_NOT_WRITABLE. The mesher may also crash the process.
 absl::StatusOr<ModalModel> Decompose(const MeshFile& file, const DecompositionSettings& settings,

@@ -13,6 +13,7 @@
 #include <span>
 
 #include "absl/strings/str_cat.h"
+#include "precompute/fixture_codec.h"
 #include "proto/error_reason.h"
 
 static_assert(std::endian::native == std::endian::little, "arrays are stored little endian");
@@ -151,6 +152,7 @@ v1::DecompositionSettings ToProto(const MeshFile& file, const DecompositionSetti
   mesh.set_budget_s(settings.resolution.budget_s);
   mesh.set_budget_gib(settings.resolution.budget_bytes / kBytesPerGib);
   mesh.set_target_node_count(static_cast<uint32_t>(settings.meshing.target_node_count));
+  for (const Fixture& fixture : settings.fixtures) *result.add_fixtures() = ToProto(fixture);
   return result;
 }
 

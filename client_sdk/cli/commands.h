@@ -4,6 +4,7 @@
 #include <array>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "client_sdk/cli/material_figures.h"
@@ -34,6 +35,7 @@ struct CreateModelOptions {
   double wall_m = 0;
   double accuracy = 0;
   Budget budget;
+  std::vector<std::string> fixtures;  ///< as ParseFixture reads them
   bool wait = false;
 };
 

@@ -19,6 +19,7 @@
 #include "client_sdk/cli/job_progress.h"
 #include "client_sdk/cli/output.h"
 #include "proto/error_reason.h"
+#include "proto/fixture_text.h"
 #include "proto/material_catalogue.h"
 
 namespace carillon::cli {
@@ -75,6 +76,11 @@ absl::StatusOr<v1::CreateModalModelRequest> MakeRequest(const CreateModelOptions
   request.set_mesh_digest(std::move(mesh_digest));
   request.set_mesh_format(Format(options));
   *request.mutable_settings() = Settings(options);
+  for (const std::string& text : options.fixtures) {
+    const auto fixture = ParseFixture(text);
+    if (!fixture.ok()) return fixture.status();
+    *request.mutable_settings()->add_fixtures() = *fixture;
+  }
   *request.mutable_material() = *std::move(material);
   request.set_size(options.size);
   request.set_min_frequency_hz(options.min_frequency_hz);
@@ -102,6 +108,9 @@ void PrintSummary(const v1::ModalModelSummary& model) {
                header.element_count(), ElementName(header.settings().element()),
                header.volume_m3());
   absl::PrintF("poisson    %.4f\n", header.settings().poisson_ratio());
+  for (const v1::Fixture& fixture : header.settings().fixtures()) {
+    absl::PrintF("held       %s\n", FixtureText(fixture).value_or("?"));
+  }
   absl::PrintF("residual   %.2g at most, orthogonality %.2g\n", proof.max_residual(),
                proof.max_orthogonality_error());
   absl::PrintF("stored     %d bytes by %s\n", model.stored_bytes(), header.solver());

@@ -86,6 +86,12 @@ void AddModelCreate(CLI::App& app, Program& program) {
       .add_option("--wall", options->wall_m,
                   "hollow out, or thicken an open sheet, to so many metres")
       ->check(CLI::PositiveNumber);
+  create
+      .add_option(
+          "--fix", options->fixtures,
+          "hold the body; repeat it for more: plane:X,Y,Z/NX,NY,NZ (and behind it; the normal "
+          "points to what is free), box:X,Y,Z/X,Y,Z, vertices:I,J,... or group:NAME, in metres")
+      ->allow_extra_args(false);
   create.add_flag("--wait", options->wait, "show the progress and end with the job");
   AddMaterial(create, options->material);
   create.callback([&program, options, band] {

@@ -6,6 +6,8 @@
 #include <span>
 #include <vector>
 
+#include "precompute/fem/held_nodes.h"
+
 namespace carillon::precompute {
 namespace {
 
@@ -189,7 +191,8 @@ SystemMatrices Assemble(const TetMesh& mesh, const ElasticConstants& elastic,
                  MakeQuadraticMass(geometry.volume_m3, density_kg_per_m3, sharing), system);
     }
   }
-  return system;
+  if (mesh.held.empty()) return system;
+  return Restricted(system, MovingNodes(mesh));
 }
 
 double VolumeM3(const TetMesh& mesh) {

@@ -9,7 +9,8 @@
 
 namespace carillon::precompute {
 
-/// Stiffness and mass of a body; unknown 3 i + a is component a of node i's displacement.
+/// Stiffness and mass of a body; unknown 3 i + a is component a of the displacement of the i-th
+/// node that can move.
 struct SystemMatrices {
   using Sparse = Eigen::SparseMatrix<double>;
 
@@ -21,8 +22,8 @@ struct SystemMatrices {
   Eigen::Index unknown_count() const { return K.rows(); }
 };
 
-/// Assembles the matrices of a free body; the elements' order is that of the mesh (4 or 10 nodes).
-/// Every element must have positive volume.
+/// Assembles the matrices of a body; the elements' order is that of the mesh (4 or 10 nodes). Held
+/// nodes have no unknowns. Every element must have positive volume.
 SystemMatrices Assemble(const TetMesh& mesh, const ElasticConstants& elastic,
                         double density_kg_per_m3, MassSharing sharing);
 

@@ -83,18 +83,6 @@ absl::Status AppendObjFace(const ObjFace& face, size_t vertex_count, std::string
   return absl::OkStatus();
 }
 
-/// The next line, with those that a '\' at its end continues.
-bool NextObjLine(TextLines& lines, std::string& joined) {
-  std::string_view line;
-  if (!lines.Next(line)) return false;
-  joined = line;
-  while (joined.ends_with('\\') && lines.Next(line)) {
-    joined.pop_back();
-    joined += line;
-  }
-  return true;
-}
-
 }  // namespace
 
 absl::StatusOr<std::string> CleanObj(const std::string& bytes) {
@@ -171,7 +159,7 @@ absl::StatusOr<std::string> CleanOff(const std::string& bytes) {
   return clean;
 }
 
-absl::StatusOr<std::string> CleanSurfaceFile(std::string bytes, const std::string& format) {
+absl::StatusOr<std::string> CleanSurfaceFile(const std::string& bytes, const std::string& format) {
   if (format == "obj") return CleanObj(bytes);
   if (format == "off") return CleanOff(bytes);
   if (format == "ply") {

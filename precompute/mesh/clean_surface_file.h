@@ -14,7 +14,7 @@ namespace carillon::precompute {
 /// `format`: "obj", "off", "ply" or "stl" (returned as it is: assimp hides nothing there).
 /// Errors: MESH_UNREADABLE, MESH_NOT_FINITE, MESH_INDEX_OUT_OF_RANGE, each with the line;
 /// MESH_EMPTY.
-absl::StatusOr<std::string> CleanSurfaceFile(std::string bytes, const std::string& format);
+absl::StatusOr<std::string> CleanSurfaceFile(const std::string& bytes, const std::string& format);
 
 /// One format each.
 absl::StatusOr<std::string> CleanObj(const std::string& bytes);

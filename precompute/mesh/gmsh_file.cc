@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstring>
+#include <map>
 #include <optional>
 #include <span>
 #include <string_view>
@@ -21,24 +22,41 @@ namespace {
 
 constexpr int kTetrahedron4 = 4, kTetrahedron10 = 11;
 
-/// Nodes of the elements we know by their type in the file, from 0; 0 for those we do not take.
-constexpr std::array<int, 17> kNodesOfType = {0, 2, 3, 4, 4, 0, 0, 0, 3, 6, 9, 10, 0, 0, 0, 1, 8};
+/// A kind of element by its type in the file.
+struct Kind {
+  int type;
+  int dimension;
+  int node_count;
+  size_t corner_count;
+};
 
-std::optional<int> NodesOfType(int type) {
-  if (type < 0 || type >= static_cast<int>(kNodesOfType.size())) return std::nullopt;
-  const int nodes = kNodesOfType[static_cast<size_t>(type)];
-  return nodes == 0 ? std::nullopt : std::optional(nodes);
+/// Those that we take or pass over: points, lines, triangles, quadrangles, tetrahedra.
+constexpr std::array<Kind, 10> kKinds = {{{15, 0, 1, 1},
+                                          {1, 1, 2, 2},
+                                          {8, 1, 3, 2},
+                                          {2, 2, 3, 3},
+                                          {9, 2, 6, 3},
+                                          {3, 2, 4, 4},
+                                          {10, 2, 9, 4},
+                                          {16, 2, 8, 4},
+                                          {kTetrahedron4, 3, 4, 4},
+                                          {kTetrahedron10, 3, 10, 4}}};
+
+const Kind* KindOfType(int type) {
+  const auto* kind = std::ranges::find(kKinds, type, &Kind::type);
+  return kind == kKinds.end() ? nullptr : kind;
 }
 
 class Parser {
  public:
   explicit Parser(const std::string& bytes) : lines_(bytes) {}
 
-  absl::StatusOr<GmshFile> Parse() && {
+  absl::StatusOr<TetFile> Parse() && {
     std::string_view line;
     while (lines_.Next(line)) {
       absl::Status status = absl::OkStatus();
       if (line == "$MeshFormat") status = ReadFormat();
+      if (line == "$PhysicalNames") status = ReadPhysicalNames();
       if (line == "$Nodes") status = ReadNodes();
       if (line == "$Elements") status = ReadElements();
       if (!status.ok()) return status;
@@ -83,6 +101,26 @@ class Parser {
     // A node or an element takes more than eight bytes.
     if (*count > lines_.rest().size() / 8) return Unreadable("the file ends within a section");
     return *count;
+  }
+
+  /// "dimension number "name"", text in both kinds of file.
+  absl::Status ReadPhysicalNames() {
+    const auto words = lines_.NextWords();
+    const auto count = words.empty() ? std::nullopt : ToNumber<size_t>(words[0]);
+    if (!count) return lines_.Unreadable("no number of physical names");
+    for (size_t i = 0; i < *count; ++i) {
+      std::string_view line;
+      std::array<int32_t, 2> figures{};
+      const bool read = lines_.Next(line);
+      const auto parts = TextLines::Words(line);
+      const size_t open = line.find('"'), close = line.rfind('"');
+      if (!read || parts.size() < 3 || !Assign(parts[0], figures[0]) ||
+          !Assign(parts[1], figures[1]) || open == close) {
+        return lines_.Unreadable("no physical name (\"dimension number \"name\"\")");
+      }
+      physical_names_[figures] = line.substr(open + 1, close - open - 1);
+    }
+    return absl::OkStatus();
   }
 
   absl::Status ReadNodes() {
@@ -131,16 +169,15 @@ class Parser {
       if (!Assign(word, figures.emplace_back())) return lines_.Unreadable("no element");
     }
     if (figures.size() < 3 || figures[2] < 0) return lines_.Unreadable("no element");
-    const std::optional<int> node_count = NodesOfType(figures[1]);
-    if (!node_count) return Unsupported(absl::StrCat("an element of Gmsh's type ", figures[1]));
+    const Kind* kind = KindOfType(figures[1]);
+    if (kind == nullptr) return Unsupported(absl::StrCat("an element of Gmsh's type ", figures[1]));
     const size_t first = 3 + static_cast<size_t>(figures[2]);
-    if (figures.size() != first + static_cast<size_t>(*node_count)) {
+    if (figures.size() != first + static_cast<size_t>(kind->node_count)) {
       return lines_.Unreadable("an element with another number of nodes than its type has");
     }
-    if (absl::Status status = AddElement(figures[1], std::span(figures).subspan(first));
-        !status.ok()) {
-      return status;
-    }
+    const int32_t physical = figures[2] > 0 ? figures[3] : 0;
+    absl::Status status = AddElement(*kind, physical, std::span(figures).subspan(first));
+    if (!status.ok()) return status;
     return 1;
   }
 
@@ -150,28 +187,41 @@ class Parser {
     if (!Take(std::span(header)) || header[1] < 1 || header[2] < 0) {
       return Unreadable("the elements end too early");
     }
-    const std::optional<int> node_count = NodesOfType(header[0]);
-    if (!node_count) return Unsupported(absl::StrCat("an element of Gmsh's type ", header[0]));
+    const Kind* kind = KindOfType(header[0]);
+    if (kind == nullptr) return Unsupported(absl::StrCat("an element of Gmsh's type ", header[0]));
     const size_t first = 1 + static_cast<size_t>(header[2]);
     std::vector<int32_t> figures(std::min(first, lines_.rest().size()) +
-                                 static_cast<size_t>(*node_count));
+                                 static_cast<size_t>(kind->node_count));
     for (int32_t i = 0; i < header[1]; ++i) {
       if (!Take(std::span(figures))) return Unreadable("the elements end too early");
-      absl::Status status = AddElement(header[0], std::span(figures).subspan(first));
+      const int32_t physical = first > 1 ? figures[1] : 0;
+      absl::Status status = AddElement(*kind, physical, std::span(figures).subspan(first));
       if (!status.ok()) return status;
     }
     return static_cast<size_t>(header[1]);
   }
 
-  absl::Status AddElement(int type, std::span<const int32_t> nodes) {
-    if (type != kTetrahedron4 && type != kTetrahedron10) return absl::OkStatus();
-    const auto count = static_cast<int>(nodes.size());
-    if (file_.nodes_per_element != 0 && file_.nodes_per_element != count) {
+  absl::Status AddElement(const Kind& kind, int32_t physical, std::span<const int32_t> nodes) {
+    const std::vector<int64_t> numbers(nodes.begin(), nodes.end());
+    AddToGroup(kind, physical, std::span(numbers).first(kind.corner_count));
+    if (kind.dimension != 3) return absl::OkStatus();
+    if (file_.nodes_per_element != 0 && file_.nodes_per_element != kind.node_count) {
       return Unsupported("tetrahedra of 4 and of 10 nodes");
     }
-    file_.nodes_per_element = count;
-    file_.elements.insert(file_.elements.end(), nodes.begin(), nodes.end());
+    file_.nodes_per_element = kind.node_count;
+    file_.elements.insert(file_.elements.end(), numbers.begin(), numbers.end());
+    // Gmsh puts the last two mid-side nodes on the edges 2-3 and 1-3.
+    if (kind.type == kTetrahedron10) std::swap(file_.elements.end()[-1], file_.elements.end()[-2]);
     return absl::OkStatus();
+  }
+
+  void AddToGroup(const Kind& kind, int32_t physical, std::span<const int64_t> corners) {
+    const auto name = physical_names_.find({kind.dimension, physical});
+    if (name != physical_names_.end()) {
+      file_.AddToGroup(name->second, corners);
+    } else if (physical != 0 && kind.dimension < 3) {
+      file_.AddToGroup(absl::StrCat(physical), corners);
+    }
   }
 
   template <typename T>
@@ -190,13 +240,14 @@ class Parser {
   }
 
   TextLines lines_;
-  GmshFile file_;
+  TetFile file_;
+  std::map<std::array<int32_t, 2>, std::string> physical_names_;  // by dimension and number
   bool has_format_ = false;
   bool is_binary_ = false;
 };
 
 }  // namespace
 
-absl::StatusOr<GmshFile> ParseGmsh(const std::string& bytes) { return Parser(bytes).Parse(); }
+absl::StatusOr<TetFile> ParseGmsh(const std::string& bytes) { return Parser(bytes).Parse(); }
 
 }  // namespace carillon::precompute

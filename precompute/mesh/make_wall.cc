@@ -94,7 +94,7 @@ struct Grid {
 };
 
 absl::StatusOr<Grid> ChooseGrid(const SurfaceMesh& surface, double wall_m) {
-  const double diagonal = Diagonal(surface);
+  const double diagonal = Diagonal(surface.vertices);
   const double voxel = std::min(diagonal / kVoxelsAcross, wall_m / kVoxelsInWall);
   if (!(wall_m < diagonal)) {
     return Impossible(

@@ -277,7 +277,7 @@ MendedSurface MendSoup(const SurfaceMesh& given) {
   const auto remark = [&](size_t count, absl::string_view what) {
     if (count > 0) mended.remarks.push_back(absl::StrCat("repaired: ", count, " ", what));
   };
-  const double diagonal = given.vertices.empty() ? 0 : Diagonal(given);
+  const double diagonal = given.vertices.empty() ? 0 : Diagonal(given.vertices);
   if (!(diagonal > 0)) return {given, {}};
   const double tolerance = kWeldPart * diagonal;
   SurfaceMesh& surface = mended.surface;

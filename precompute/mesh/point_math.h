@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include "precompute/mesh/surface_mesh.h"
 
@@ -48,10 +49,10 @@ inline Point MiddleOf(const std::array<Point, 3>& corner) {
   return middle;
 }
 
-/// Diagonal of the box around a surface that has vertices.
-inline double Diagonal(const SurfaceMesh& surface) {
-  Point low = surface.vertices.front(), high = low;
-  for (const Point& p : surface.vertices) {
+/// Diagonal of the box around points, of which there are some.
+inline double Diagonal(const std::vector<Point>& points) {
+  Point low = points.front(), high = low;
+  for (const Point& p : points) {
     for (size_t i = 0; i < 3; ++i) {
       low[i] = std::min(low[i], p[i]);
       high[i] = std::max(high[i], p[i]);

@@ -10,7 +10,8 @@
 
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
-#include "precompute/mesh/read_gmsh.h"
+#include "precompute/mesh/gmsh_file.h"
+#include "precompute/mesh/make_tet_mesh.h"
 #include "precompute/mesh/read_surface.h"
 #include "proto/error_reason.h"
 
@@ -33,34 +34,39 @@ absl::StatusOr<std::string> ReadFile(const std::string& path) {
   return bytes;
 }
 
-void Scale(std::vector<Point>& points, double factor) {
-  for (Point& p : points) {
-    for (double& x : p) x *= factor;
-  }
+void Scale(Point& p, double factor) {
+  for (double& x : p) x *= factor;
+}
+
+void Scale(NamedMesh& named, double factor) {
+  auto* surface = std::get_if<SurfaceMesh>(&named.mesh);
+  auto& points = surface != nullptr ? surface->vertices : std::get<TetMesh>(named.mesh).nodes;
+  for (Point& p : points) Scale(p, factor);
+  for (auto& [number, p] : named.names.vertices) Scale(p, factor);
+}
+
+absl::StatusOr<NamedMesh> ReadTets(const std::string& bytes) {
+  absl::StatusOr<TetFile> file = ParseGmsh(bytes);
+  if (!file.ok()) return file.status();
+  return MakeTetMesh(*std::move(file));
 }
 
 }  // namespace
 
-absl::StatusOr<Mesh> ReadMesh(const std::string& path, const std::string& format,
-                              double metres_per_unit) {
+absl::StatusOr<NamedMesh> ReadMesh(const std::string& path, const std::string& format,
+                                   double metres_per_unit) {
   const bool is_surface = std::ranges::find(kSurfaceFormats, format) != kSurfaceFormats.end();
   if (!is_surface && format != "msh") {
     return Refusal(absl::StatusCode::kInvalidArgument, "MESH_FORMAT_UNKNOWN",
                    absl::StrCat("there is no mesh format \"", format,
                                 "\": give obj, ply, stl or off (a surface) or msh (Gmsh MSH 2.2)"));
   }
-  absl::StatusOr<std::string> bytes = ReadFile(path);
+  const absl::StatusOr<std::string> bytes = ReadFile(path);
   if (!bytes.ok()) return bytes.status();
-  if (is_surface) {
-    absl::StatusOr<SurfaceMesh> surface = ReadSurface(*std::move(bytes), format);
-    if (!surface.ok()) return surface.status();
-    Scale(surface->vertices, metres_per_unit);
-    return *std::move(surface);
-  }
-  absl::StatusOr<TetMesh> mesh = ReadGmsh(*bytes);
-  if (!mesh.ok()) return mesh.status();
-  Scale(mesh->nodes, metres_per_unit);
-  return *std::move(mesh);
+  absl::StatusOr<NamedMesh> named = is_surface ? ReadSurface(*bytes, format) : ReadTets(*bytes);
+  if (!named.ok()) return named.status();
+  Scale(*named, metres_per_unit);
+  return named;
 }
 
 }  // namespace carillon::precompute

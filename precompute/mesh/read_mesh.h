@@ -2,16 +2,11 @@
 #pragma once
 
 #include <string>
-#include <variant>
 
 #include "absl/status/statusor.h"
-#include "precompute/mesh/surface_mesh.h"
-#include "precompute/mesh/tet_mesh.h"
+#include "precompute/mesh/mesh_names.h"
 
 namespace carillon::precompute {
-
-/// What a mesh file holds: a surface still to be filled, or a mesh of tetrahedra ready for use.
-using Mesh = std::variant<SurfaceMesh, TetMesh>;
 
 /// Reads the mesh file at `path`.
 ///
@@ -23,7 +18,7 @@ using Mesh = std::variant<SurfaceMesh, TetMesh>;
 /// Errors: MESH_FORMAT_UNKNOWN, MESH_FILE_NOT_READABLE, MESH_EMPTY, MESH_UNREADABLE,
 /// MESH_NOT_FINITE, MESH_INDEX_OUT_OF_RANGE, MESH_TOO_LARGE, MESH_ELEMENT_UNSUPPORTED,
 /// MESH_ZERO_VOLUME, MESH_SEVERAL_PIECES, MESH_NOT_MANIFOLD.
-absl::StatusOr<Mesh> ReadMesh(const std::string& path, const std::string& format,
-                              double metres_per_unit);
+absl::StatusOr<NamedMesh> ReadMesh(const std::string& path, const std::string& format,
+                                   double metres_per_unit);
 
 }  // namespace carillon::precompute

@@ -11,6 +11,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -18,6 +19,8 @@
 #include "absl/strings/str_cat.h"
 #include "precompute/mesh/clean_surface_file.h"
 #include "precompute/mesh/merge_vertices.h"
+#include "precompute/mesh/obj_groups.h"
+#include "precompute/mesh/text_lines.h"
 #include "proto/error_reason.h"
 
 namespace carillon::precompute {
@@ -97,10 +100,43 @@ Triangles CollectTriangles(const aiScene& scene) {
   return triangles;
 }
 
+/// The first three numbers of a line as assimp keeps them, in 24 bits.
+Point ToPoint(std::span<const std::string_view> words) {
+  Point p{};
+  for (size_t i = 0; i < 3; ++i) p[i] = static_cast<float>(ToNumber<double>(words[i]).value_or(0));
+  return p;
+}
+
+/// Vertices in the order of the file, of which assimp makes others (OBJ, OFF) but for PLY.
+absl::flat_hash_map<int64_t, Point> NumberVertices(const aiScene& scene, const std::string& clean,
+                                                   const std::string& format) {
+  absl::flat_hash_map<int64_t, Point> vertices;
+  const auto add = [&](const Point& p) { vertices[static_cast<int64_t>(vertices.size())] = p; };
+  if (format == "ply") {
+    for (const aiVector3D& p :
+         std::span(scene.mMeshes[0]->mVertices, scene.mMeshes[0]->mNumVertices)) {
+      add({p.x, p.y, p.z});
+    }
+  }
+  TextLines lines(clean);
+  if (format == "obj") {
+    for (auto words = lines.NextWords(); !words.empty() && words[0] == "v";
+         words = lines.NextWords()) {
+      add(ToPoint(std::span(words).subspan(1)));
+    }
+  }
+  if (format == "off") {
+    lines.NextWords();
+    const size_t count = ToNumber<size_t>(lines.NextWords()[0]).value_or(0);
+    while (vertices.size() < count) add(ToPoint(lines.NextWords()));
+  }
+  return vertices;
+}
+
 }  // namespace
 
-absl::StatusOr<SurfaceMesh> ReadSurface(std::string bytes, const std::string& format) {
-  const absl::StatusOr<std::string> clean = CleanSurfaceFile(std::move(bytes), format);
+absl::StatusOr<NamedMesh> ReadSurface(const std::string& bytes, const std::string& format) {
+  const absl::StatusOr<std::string> clean = CleanSurfaceFile(bytes, format);
   if (!clean.ok()) return clean.status();
   Assimp::Importer importer;
   const aiScene* scene =
@@ -112,6 +148,8 @@ absl::StatusOr<SurfaceMesh> ReadSurface(std::string bytes, const std::string& fo
   if (expected == 0) {
     return Refuse("MESH_EMPTY", "the file has no faces: export the body as triangles or polygons");
   }
+  MeshNames names;
+  names.vertices = NumberVertices(*scene, *clean, format);
   scene = importer.ApplyPostProcessing(aiProcess_Triangulate);
   if (scene == nullptr) return Unreadable(format, importer.GetErrorString());
   const Triangles triangles = CollectTriangles(*scene);
@@ -119,7 +157,8 @@ absl::StatusOr<SurfaceMesh> ReadSurface(std::string bytes, const std::string& fo
     return Unreadable(format, absl::StrCat("its polygons give ", triangles.size(), " triangles of ",
                                            expected, "; export triangles instead"));
   }
-  return MergeVertices(triangles);
+  names.groups = format == "obj" ? ObjGroups(bytes) : std::vector<MeshGroup>();
+  return NamedMesh{MergeVertices(triangles), std::move(names)};
 }
 
 }  // namespace carillon::precompute

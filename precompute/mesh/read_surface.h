@@ -4,15 +4,15 @@
 #include <string>
 
 #include "absl/status/statusor.h"
-#include "precompute/mesh/surface_mesh.h"
+#include "precompute/mesh/mesh_names.h"
 
 namespace carillon::precompute {
 
-/// Reads a surface from the bytes of a file, in the file's unit. Coordinates have the 24 bits of
-/// assimp's numbers.
+/// Reads a surface from the bytes of a file, in the file's unit, and what it calls its parts.
+/// Coordinates have the 24 bits of assimp's numbers.
 ///
 /// `format`: "obj", "ply", "stl" or "off".
 /// Errors: MESH_EMPTY, MESH_UNREADABLE, MESH_NOT_FINITE, MESH_INDEX_OUT_OF_RANGE.
-absl::StatusOr<SurfaceMesh> ReadSurface(std::string bytes, const std::string& format);
+absl::StatusOr<NamedMesh> ReadSurface(const std::string& bytes, const std::string& format);
 
 }  // namespace carillon::precompute

@@ -73,6 +73,18 @@ class TextLines {
   int number_ = 0;
 };
 
+/// The next line of an OBJ file, with those that a '\' at its end continues.
+inline bool NextObjLine(TextLines& lines, std::string& joined) {
+  std::string_view line;
+  if (!lines.Next(line)) return false;
+  joined = line;
+  while (joined.ends_with('\\') && lines.Next(line)) {
+    joined.pop_back();
+    joined += line;
+  }
+  return true;
+}
+
 /// The number that `word` is, as a whole ("1e-3", "-inf"); nothing if it is none.
 template <typename T>
 std::optional<T> ToNumber(std::string_view word) {

@@ -181,7 +181,7 @@ std::string Remark(const SurfaceMesh& wrap, const SurfaceMesh& given, const Near
 }  // namespace
 
 absl::StatusOr<MendedSurface> WrapSurface(const SurfaceMesh& given) {
-  const double diagonal = Diagonal(given);
+  const double diagonal = Diagonal(given.vertices);
   if (!(diagonal > 0)) return Failed("it has no extent");
   const absl::StatusOr<std::string> bytes =
       RunInChild([&] { return RunWrap(given, diagonal); }, kMostCpu);

@@ -137,9 +137,9 @@ absl::StatusOr<Modes> BlockLanczosEigensolver::Solve(const SystemMatrices& syste
   if (!bent.ok()) return bent;
   Modes modes;
   modes.eigenvalues.resize(request.count);
-  modes.eigenvalues
-      << (rigid_.transpose() * (system.K.selfadjointView<Eigen::Lower>() * rigid_)).diagonal(),
-      bent->eigenvalues;
+  modes.eigenvalues.head(rigid_.cols()) =
+      (rigid_.transpose() * (system.K.selfadjointView<Eigen::Lower>() * rigid_)).diagonal();
+  modes.eigenvalues.tail(wanted) = bent->eigenvalues;
   modes.shapes.resize(system.unknown_count(), request.count);
   modes.shapes.leftCols(rigid_.cols()) = rigid_;
   FromNodeOrder(bent->shapes, ordered_, modes.shapes.rightCols(wanted));

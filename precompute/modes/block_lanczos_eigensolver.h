@@ -14,7 +14,8 @@ namespace carillon::precompute {
 /// serves sixteen solves) and find degenerate modes whole.
 class BlockLanczosEigensolver : public Eigensolver {
  public:
-  /// `ordered`: of the system to be solved; outlives the solver. `rigid`: #U by 6, M-orthonormal.
+  /// `ordered`: of the system to be solved; outlives the solver. `rigid`: the
+  /// rigid-body modes, #U by at most six, M-orthonormal.
   BlockLanczosEigensolver(const OrderedSystem& ordered, const Eigen::MatrixXd& rigid)
       : ordered_(ordered), rigid_(rigid) {}
 

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "absl/strings/str_cat.h"
+#include "precompute/fem/held_nodes.h"
 #include "precompute/modes/block_lanczos_eigensolver.h"
 #include "precompute/modes/dense_eigensolver.h"
 #include "precompute/modes/multifrontal_inertia.h"
@@ -20,8 +21,6 @@
 
 namespace carillon::precompute {
 namespace {
-
-constexpr int kRigidModeCount = 6;
 
 /// Tries to find as many modes as were counted, each with more room for those missed.
 constexpr int kMaxAttempts = 3;
@@ -68,14 +67,18 @@ absl::Status CheckMemory(const OrderedSystem& ordered, int mode_count) {
 class Solution {
  public:
   Solution(const SystemMatrices& system, OrderedSystem ordered, const std::vector<Point>& nodes,
-           const SolveWatch& watch)
+           const std::vector<Point>& held, const SolveWatch& watch)
       : system_(system),
         nodes_(nodes),
+        held_(held),
         watch_(watch),
         ordered_(std::move(ordered)),
-        rigid_(RigidBodyModes(nodes, system)),
+        rigid_(RigidBodyModes(nodes, system, held)),
         rigid_momenta_(system.M.selfadjointView<Eigen::Lower>() * rigid_),
         workers_(ThreadCount()) {}
+
+  /// Of a free body six.
+  int rigid_mode_count() const { return static_cast<int>(rigid_.cols()); }
 
   absl::StatusOr<int> CountBelow(double limit) const {
     watch_(SolveStage::kFactor, 0);
@@ -83,14 +86,14 @@ class Solution {
         CountEigenvaluesBelow(ordered_.fronts, ordered_.matrix, limit, workers_,
                               [this](double done) { watch_(SolveStage::kFactor, done); });
     if (!count.ok()) return count;
-    if (*count < kRigidModeCount) {
-      return VerificationFailed(absl::StrCat("only ", *count,
-                                             " of the six rigid-body modes lie below "
+    if (*count < rigid_mode_count()) {
+      return VerificationFailed(absl::StrCat("only ", *count, " of the ", rigid_mode_count(),
+                                             " rigid-body modes lie below "
                                              "the limit"));
     }
-    if (*count - kRigidModeCount > kMaxModeCount) {
+    if (*count - rigid_mode_count() > kMaxModeCount) {
       return Refusal(absl::StatusCode::kInvalidArgument, "TOO_MANY_MODES",
-                     absl::StrCat(*count - kRigidModeCount,
+                     absl::StrCat(*count - rigid_mode_count(),
                                   " modes lie below the top of the band; the "
                                   "limit is ",
                                   kMaxModeCount, "; lower the band's upper frequency"));
@@ -109,7 +112,7 @@ class Solution {
   }
 
   /// An upper bound of the lowest deformation mode, of its size.
-  double BoundOfLowest() const { return LowestEigenvalueBound(nodes_, system_); }
+  double BoundOfLowest() const { return LowestEigenvalueBound(nodes_, system_, held_); }
 
   /// Splits rigid-body modes off, checks everything but completeness.
   absl::StatusOr<DeformationModes> Verify(Modes all, double limit) const {
@@ -125,7 +128,7 @@ class Solution {
     result.verification.rigid_mode_count =
         static_cast<int>(all.shapes.cols()) - static_cast<int>(kept.size());
     const Eigen::Index free_motions = (all.eigenvalues.array() < FreeMotionBound(limit)).count();
-    if (free_motions > kRigidModeCount) return SeveralPieces(free_motions);
+    if (free_motions > rigid_mode_count()) return SeveralPieces(free_motions);
     Keep(kept, all);
     result.modes = std::move(all);
     FixSigns(result.modes.shapes);
@@ -150,19 +153,22 @@ class Solution {
     return std::min(kFreeMotion * limit, kRounding * stiffest);
   }
 
-  static absl::Status SeveralPieces(Eigen::Index free_motions) {
+  absl::Status SeveralPieces(Eigen::Index free_motions) const {
     return Refusal(
         absl::StatusCode::kInvalidArgument, "BODY_IN_SEVERAL_PIECES",
-        absl::StrCat("the body can move in ", free_motions,
-                     " ways without bending, a body "
-                     "in one piece in six: parts of it are separate, or hang together by an "
-                     "edge or a point only; join them, or make each a body of its own"));
+        absl::StrCat(
+            "the body can move in ", free_motions,
+            " ways without bending, a body "
+            "in one piece",
+            held_.empty() ? " in six" : absl::StrCat(" held as this one in ", rigid_mode_count()),
+            ": parts of it are separate, or hang together by an "
+            "edge or a point only; join them, or make each a body of its own"));
   }
 
-  static absl::Status Check(const Verification& proof) {
-    if (proof.rigid_mode_count != kRigidModeCount) {
-      return VerificationFailed(
-          absl::StrCat(proof.rigid_mode_count, " rigid-body modes were found, not six"));
+  absl::Status Check(const Verification& proof) const {
+    if (proof.rigid_mode_count != rigid_mode_count()) {
+      return VerificationFailed(absl::StrCat(
+          proof.rigid_mode_count, " rigid-body modes were found, not ", rigid_mode_count()));
     }
     if (!(proof.max_residual <= kMaxResidual)) {
       return VerificationFailed(absl::StrCat("a mode has the relative residual ",
@@ -178,6 +184,7 @@ class Solution {
 
   const SystemMatrices& system_;
   const std::vector<Point>& nodes_;
+  const std::vector<Point>& held_;
   const SolveWatch& watch_;
   OrderedSystem ordered_;
   Eigen::MatrixXd rigid_;
@@ -188,7 +195,7 @@ class Solution {
 /// No mode lies below the limit: says where the lowest one is, at the price of one factorization.
 absl::StatusOr<DeformationModes> FindLowest(const Solution& solution, double limit) {
   const double above = solution.BoundOfLowest();
-  absl::StatusOr<Modes> lowest = solution.SolveLowest(kRigidModeCount + 1, above);
+  absl::StatusOr<Modes> lowest = solution.SolveLowest(solution.rigid_mode_count() + 1, above);
   if (!lowest.ok()) return lowest.status();
   absl::StatusOr<DeformationModes> result = solution.Verify(*std::move(lowest), above);
   if (!result.ok()) return result;
@@ -203,16 +210,17 @@ absl::StatusOr<DeformationModes> FindLowest(const Solution& solution, double lim
 absl::StatusOr<DeformationModes> SolveDeformationModes(const SystemMatrices& system,
                                                        const std::vector<Point>& nodes,
                                                        double eigenvalue_limit,
-                                                       const SolveWatch& watch) {
+                                                       const SolveWatch& watch,
+                                                       const std::vector<Point>& held) {
   absl::StatusOr<OrderedSystem> ordered = OrderedSystem::Make(system);
   if (!ordered.ok()) return ordered.status();
-  if (absl::Status status = CheckMemory(*ordered, kRigidModeCount); !status.ok()) return status;
-  const Solution solution(system, *std::move(ordered), nodes, watch);
+  if (absl::Status status = CheckMemory(*ordered, 1); !status.ok()) return status;
+  const Solution solution(system, *std::move(ordered), nodes, held, watch);
   for (int attempt = 0; attempt < kMaxAttempts; ++attempt) {
     const double limit = eigenvalue_limit * (1 + 1e-4 * attempt);
     const absl::StatusOr<int> count = solution.CountBelow(limit);
     if (!count.ok()) return count.status();
-    if (*count == kRigidModeCount) return FindLowest(solution, limit);
+    if (*count == solution.rigid_mode_count()) return FindLowest(solution, limit);
     absl::StatusOr<Modes> all = solution.SolveLowest(*count + 4 * attempt, limit);
     if (!all.ok()) return all.status();
     std::vector<Eigen::Index> below(
@@ -228,6 +236,18 @@ absl::StatusOr<DeformationModes> SolveDeformationModes(const SystemMatrices& sys
     return result;
   }
   return VerificationFailed("not all modes that were counted below the limit could be found");
+}
+
+absl::StatusOr<DeformationModes> SolveDeformationModes(const SystemMatrices& system,
+                                                       const TetMesh& mesh, double eigenvalue_limit,
+                                                       const SolveWatch& watch) {
+  if (mesh.held.empty()) return SolveDeformationModes(system, mesh.nodes, eigenvalue_limit, watch);
+  const std::vector<int32_t> moving = MovingNodes(mesh);
+  absl::StatusOr<DeformationModes> result = SolveDeformationModes(
+      system, PlacesOf(moving, mesh), eigenvalue_limit, watch, PlacesOf(mesh.held, mesh));
+  if (!result.ok()) return result;
+  result->modes.shapes = Extended(result->modes.shapes, moving, mesh.nodes.size());
+  return result;
 }
 
 bool PrefersDense(Eigen::Index unknown_count, int mode_count) {

@@ -6,13 +6,14 @@
 
 #include "absl/status/statusor.h"
 #include "precompute/mesh/surface_mesh.h"
+#include "precompute/mesh/tet_mesh.h"
 #include "precompute/modes/eigensolver.h"
 #include "precompute/modes/verification.h"
 
 namespace carillon::precompute {
 
-/// Every deformation mode of a free body below an eigenvalue, verified; its six rigid-body modes
-/// are left to the simulator.
+/// Every deformation mode of a body below an eigenvalue, verified; its rigid-body modes (six, fewer
+/// where it is held) are left to the simulator.
 struct DeformationModes {
   Modes modes;
   Eigen::VectorXd residuals;  ///< relative, of each mode
@@ -35,12 +36,19 @@ using SolveWatch = std::function<void(SolveStage, double)>;
 /// so that the solver knows when it has them all; where the limit agrees with an eigenvalue to
 /// nearly all digits it is raised by a hair.
 ///
-/// `nodes`: positions, in the order of the unknowns.
+/// `nodes`: positions, in the order of the unknowns; `held`: of the nodes that are held.
 /// Errors: BODY_IN_SEVERAL_PIECES, TOO_MANY_MODES, MEMORY_TOO_SMALL (before it is taken),
 /// OUT_OF_MEMORY, MESH_TOO_LARGE, VERIFICATION_FAILED.
 absl::StatusOr<DeformationModes> SolveDeformationModes(const SystemMatrices& system,
                                                        const std::vector<Point>& nodes,
                                                        double eigenvalue_limit,
+                                                       const SolveWatch& watch,
+                                                       const std::vector<Point>& held = {});
+
+/// The same of the body whose matrices Assemble made; the shapes have all its nodes, and are zero
+/// where they are held.
+absl::StatusOr<DeformationModes> SolveDeformationModes(const SystemMatrices& system,
+                                                       const TetMesh& mesh, double eigenvalue_limit,
                                                        const SolveWatch& watch);
 
 /// True where the dense solver is the faster one, by measurement.

@@ -145,10 +145,24 @@ class Places {
         Number({corners[a], corners[b], corners[c]}, 1, numbers);
       }
     }
-    count_ = numbers.size();
+    nodes_.resize(numbers.size());
+    for (const auto& [nodes, number] : numbers) nodes_[static_cast<size_t>(number)] = nodes;
   }
 
-  size_t count() const { return count_; }
+  /// For each place whether it is held: all its corners are.
+  std::vector<bool> HeldWith(const TetMesh& mesh) const {
+    std::vector<bool> node_is_held(mesh.nodes.size());
+    for (const int32_t node : mesh.held) node_is_held[static_cast<size_t>(node)] = true;
+    std::vector<bool> held;
+    for (const auto& corners : nodes_) {
+      held.push_back(std::ranges::all_of(corners, [&](int32_t node) {
+        return node < 0 || node_is_held[static_cast<size_t>(node)];
+      }));
+    }
+    return held;
+  }
+
+  size_t count() const { return nodes_.size(); }
   size_t added() const { return added_; }
   int32_t Of(size_t element, size_t i) const { return number_[element * added_ + i]; }
   /// An odd function on an edge changes its sign with the edge's direction; that of a linear
@@ -167,7 +181,7 @@ class Places {
   }
 
   size_t added_;
-  size_t count_ = 0;
+  std::vector<std::array<int32_t, 3>> nodes_;  // corners of each, after -1 for an edge
   std::vector<int32_t> number_;
   std::vector<int8_t> sign_;
 };
@@ -189,6 +203,7 @@ class Estimator {
         nodes_(static_cast<size_t>(mesh.nodes_per_element)),
         integrals_(mesh.nodes_per_element),
         places_(mesh),
+        held_(places_.HeldWith(mesh)),
         stiffness_(places_.count(), Eigen::Matrix3d::Zero()) {
     for (size_t e = 0; e < mesh_.element_count(); ++e) {
       const TetGeometry geometry = GeometryOf(mesh_, Element(e));
@@ -213,6 +228,7 @@ class Estimator {
       AddElement(e, eigenvalues, shapes, residuals);
     Eigen::VectorXd sums = Eigen::VectorXd::Zero(shapes.cols());
     for (size_t b = 0; b < places_.count(); ++b) {
+      if (held_[b]) continue;  // its residual is what holds it
       const auto r = residuals.middleRows<3>(3 * static_cast<Eigen::Index>(b));
       sums += r.cwiseProduct(stiffness_[b].inverse() * r).colwise().sum().transpose();
     }
@@ -253,6 +269,7 @@ class Estimator {
   const size_t nodes_;
   const ReferenceIntegrals integrals_;
   const Places places_;
+  const std::vector<bool> held_;
   std::vector<Eigen::Matrix3d> stiffness_;  // a(b, b) of each place
 };
 

@@ -24,7 +24,8 @@ namespace carillon::precompute {
 /// body is the polyhedron of its mesh: how well that follows a curved original is not in it.
 ///
 /// `elastic` is that of the matrices the modes were solved from, for unit density; a consistent
-/// mass is assumed. Result: one number a mode, 0.01 for one percent.
+/// mass is assumed. Shapes have all nodes; where the mesh is held nothing is added. Result: one
+/// number a mode, 0.01 for one percent.
 Eigen::VectorXd EstimateFrequencyErrors(const TetMesh& mesh, const ElasticConstants& elastic,
                                         const Modes& modes);
 

@@ -4,52 +4,132 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
+#include <cmath>
 
 namespace carillon::precompute {
+namespace {
 
-Eigen::MatrixXd RigidBodyModes(const std::vector<Point>& nodes, const SystemMatrices& system) {
-  Eigen::Map<const Eigen::Matrix3Xd> positions(nodes.front().data(), 3,
-                                               static_cast<Eigen::Index>(nodes.size()));
-  const Eigen::Vector3d centroid = positions.rowwise().mean();
-  Eigen::MatrixXd motions = Eigen::MatrixXd::Zero(3 * positions.cols(), 6);
-  for (Eigen::Index i = 0; i < positions.cols(); ++i) {
-    const Eigen::Vector3d arm = positions.col(i) - centroid;
+using Eigen::Index;
+using Eigen::MatrixXd;
+
+/// Motions of the places held smaller than this, as a part of the largest, are rounding.
+constexpr double kRankTolerance = 1e-6;
+
+/// So many of the places held say how far away the rest of the body is.
+constexpr size_t kMaxDistanceSamples = 256;
+
+Eigen::Map<const Eigen::Matrix3Xd> Positions(const std::vector<Point>& nodes) {
+  return {nodes.front().data(), 3, static_cast<Index>(nodes.size())};
+}
+
+/// Where the nodes are, and half their extent.
+struct Frame {
+  explicit Frame(const std::vector<Point>& nodes)
+      : centroid(Positions(nodes).rowwise().mean()),
+        size((Positions(nodes).colwise() - centroid).cwiseAbs().maxCoeff()) {}
+
+  Eigen::Vector3d centroid;
+  double size;
+};
+
+/// Translations, then rotations about the centroid by which a node `size` away moves by one: 3
+/// #nodes by 6.
+MatrixXd Motions(const std::vector<Point>& nodes, const Frame& frame) {
+  MatrixXd motions = MatrixXd::Zero(3 * static_cast<Index>(nodes.size()), 6);
+  for (size_t n = 0; n < nodes.size(); ++n) {
+    const auto i = static_cast<Index>(n);
+    const Eigen::Vector3d arm =
+        (Eigen::Vector3d::Map(nodes[n].data()) - frame.centroid) / frame.size;
     motions.block<3, 3>(3 * i, 0).setIdentity();
     for (int axis = 0; axis < 3; ++axis) {
       motions.block<3, 1>(3 * i, 3 + axis) = Eigen::Vector3d::Unit(axis).cross(arm);
     }
   }
-  const Eigen::MatrixXd gram =
-      motions.transpose() * (system.M.selfadjointView<Eigen::Lower>() * motions);
-  const Eigen::LLT<Eigen::MatrixXd> factor(gram);
+  return motions;
+}
+
+/// What to combine of the six motions so that the places held stay where they are: 6 by the number
+/// of such motions.
+MatrixXd FreeCombinations(const std::vector<Point>& held, const Frame& frame) {
+  if (held.empty()) return MatrixXd::Identity(6, 6);
+  const MatrixXd motions = Motions(held, frame);
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> gram(motions.transpose() * motions);
+  const double largest = gram.eigenvalues().maxCoeff();
+  const Index count =
+      (gram.eigenvalues().array() < kRankTolerance * kRankTolerance * largest).count();
+  return gram.eigenvectors().leftCols(count);
+}
+
+/// For each node its distance to what is held, as a part of the body's size; one without.
+Eigen::VectorXd Weights(const std::vector<Point>& nodes, const std::vector<Point>& held,
+                        double size) {
+  Eigen::VectorXd weights = Eigen::VectorXd::Ones(static_cast<Index>(nodes.size()));
+  if (held.empty()) return weights;
+  const size_t stride = (held.size() + kMaxDistanceSamples - 1) / kMaxDistanceSamples;
+  for (size_t n = 0; n < nodes.size(); ++n) {
+    const auto p = Eigen::Vector3d::Map(nodes[n].data());
+    double nearest = HUGE_VAL;
+    for (size_t h = 0; h < held.size(); h += stride) {
+      nearest = std::min(nearest, (p - Eigen::Vector3d::Map(held[h].data())).squaredNorm());
+    }
+    weights[static_cast<Index>(n)] = std::sqrt(nearest) / size;
+  }
+  return weights;
+}
+
+/// Displacements that are polynomials of second degree times the distance to what is held.
+MatrixXd PolynomialFields(const std::vector<Point>& nodes, const std::vector<Point>& held) {
+  const Frame frame(nodes);
+  const Eigen::VectorXd weights = Weights(nodes, held, frame.size);
+  MatrixXd fields = MatrixXd::Zero(3 * static_cast<Index>(nodes.size()), 30);
+  for (size_t n = 0; n < nodes.size(); ++n) {
+    const auto i = static_cast<Index>(n);
+    const Eigen::Vector3d p = (Eigen::Vector3d::Map(nodes[n].data()) - frame.centroid) / frame.size;
+    const std::array<double, 10> terms = {1,           p[0],        p[1],        p[2],
+                                          p[0] * p[0], p[1] * p[1], p[2] * p[2], p[0] * p[1],
+                                          p[1] * p[2], p[2] * p[0]};
+    for (Index t = 0; t < 10; ++t) {
+      for (int axis = 0; axis < 3; ++axis) {
+        fields(3 * i + axis, 3 * t + axis) = weights[i] * terms[static_cast<size_t>(t)];
+      }
+    }
+  }
+  return fields;
+}
+
+}  // namespace
+
+MatrixXd RigidBodyModes(const std::vector<Point>& nodes, const SystemMatrices& system,
+                        const std::vector<Point>& held) {
+  const Frame frame(nodes);
+  MatrixXd motions = Motions(nodes, frame) * FreeCombinations(held, frame);
+  if (motions.cols() == 0) return motions;
+  const MatrixXd gram = motions.transpose() * (system.M.selfadjointView<Eigen::Lower>() * motions);
+  const Eigen::LLT<MatrixXd> factor(gram);
   factor.matrixU().solveInPlace<Eigen::OnTheRight>(motions);
   return motions;
 }
 
-double LowestEigenvalueBound(const std::vector<Point>& nodes, const SystemMatrices& system) {
-  Eigen::Map<const Eigen::Matrix3Xd> positions(nodes.front().data(), 3,
-                                               static_cast<Eigen::Index>(nodes.size()));
-  const Eigen::Vector3d centroid = positions.rowwise().mean();
-  const double size = (positions.colwise() - centroid).cwiseAbs().maxCoeff();
-  Eigen::MatrixXd fields = Eigen::MatrixXd::Zero(3 * positions.cols(), 30);
-  for (Eigen::Index i = 0; i < positions.cols(); ++i) {
-    const Eigen::Vector3d p = (positions.col(i) - centroid) / size;
-    const std::array<double, 10> terms = {1,           p[0],        p[1],        p[2],
-                                          p[0] * p[0], p[1] * p[1], p[2] * p[2], p[0] * p[1],
-                                          p[1] * p[2], p[2] * p[0]};
-    for (Eigen::Index t = 0; t < 10; ++t) {
-      for (int axis = 0; axis < 3; ++axis) {
-        fields(3 * i + axis, 3 * t + axis) = terms[static_cast<size_t>(t)];
-      }
-    }
+double LowestEigenvalueBound(const std::vector<Point>& nodes, const SystemMatrices& system,
+                             const std::vector<Point>& held) {
+  MatrixXd fields = PolynomialFields(nodes, held);
+  Index rigid_count = 6;  // polynomials all, where the body is free
+  if (!held.empty()) {
+    const MatrixXd rigid = RigidBodyModes(nodes, system, held);
+    rigid_count = rigid.cols();
+    fields.conservativeResize(Eigen::NoChange, 30 + rigid_count);
+    fields.rightCols(rigid_count) = rigid;
   }
-  const Eigen::MatrixXd K =
-      fields.transpose() * (system.K.selfadjointView<Eigen::Lower>() * fields);
-  const Eigen::MatrixXd M =
-      fields.transpose() * (system.M.selfadjointView<Eigen::Lower>() * fields);
-  return Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd>(K, M, Eigen::EigenvaluesOnly)
-      .eigenvalues()[6];
+  // On a handful of nodes the fields are dependent.
+  if (system.unknown_count() < 2 * fields.cols()) {
+    return (system.K.diagonal().array() / system.M.diagonal().array()).maxCoeff();
+  }
+  const MatrixXd K = fields.transpose() * (system.K.selfadjointView<Eigen::Lower>() * fields);
+  const MatrixXd M = fields.transpose() * (system.M.selfadjointView<Eigen::Lower>() * fields);
+  return Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd>(K, M, Eigen::EigenvaluesOnly)
+      .eigenvalues()[rigid_count];
 }
 
 }  // namespace carillon::precompute

@@ -5,9 +5,11 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <set>
 
 #include "absl/strings/str_cat.h"
 #include "proto/error_reason.h"
+#include "proto/fixture_text.h"
 #include "proto/material_catalogue.h"
 #include "server/base/sha256.h"
 #include "server/decomposition/shortest_decimal.h"
@@ -18,6 +20,7 @@ namespace {
 constexpr std::array kFormats = {"obj", "ply", "stl", "off", "msh"};
 constexpr size_t kMaxLabelBytes = 200;
 constexpr int kMostPriority = 100;
+constexpr int kMostFixtures = 16;
 constexpr double kPoissonSteps = 1e4;  // of one
 
 absl::Status Invalid(absl::string_view what) {
@@ -56,6 +59,13 @@ absl::Status CheckSettings(const v1::DecompositionSettings& settings) {
        {settings.mesh().accuracy(), settings.mesh().budget_s(), settings.mesh().budget_gib()}) {
     if (std::isfinite(figure) && figure >= 0) continue;
     return Invalid(absl::StrCat("an accuracy or budget is ", figure, "; it must be zero or more"));
+  }
+  for (const v1::Fixture& fixture : settings.fixtures()) {
+    if (const auto text = FixtureText(fixture); !text.ok()) return text.status();
+  }
+  if (settings.fixtures_size() > kMostFixtures) {
+    return Invalid(absl::StrCat("there are ", settings.fixtures_size(), " fixtures; at most ",
+                                kMostFixtures, " are taken: hold a group, or a larger box"));
   }
   if (!v1::Element_IsValid(settings.element()) || !v1::MassMatrix_IsValid(settings.mass_matrix())) {
     return Invalid("element or mass_matrix has a value that this daemon does not know");
@@ -147,6 +157,11 @@ std::string CanonicalText(const v1::CreateModalModelRequest& resolved) {
     absl::StrAppend(&text, "budget ", ShortestDecimal(mesh.budget_s()), " ",
                     ShortestDecimal(mesh.budget_gib()), "\n");
   }
+  std::set<std::string> fixtures;
+  for (const v1::Fixture& fixture : settings.fixtures()) {
+    fixtures.insert(FixtureText(fixture).value_or(""));
+  }
+  for (const std::string& fixture : fixtures) absl::StrAppend(&text, "fix ", fixture, "\n");
   return text;
 }
 

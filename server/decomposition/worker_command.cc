@@ -2,6 +2,7 @@
 #include "server/decomposition/worker_command.h"
 
 #include "absl/strings/str_cat.h"
+#include "proto/fixture_text.h"
 #include "server/decomposition/shortest_decimal.h"
 
 namespace carillon {
@@ -47,6 +48,9 @@ std::vector<std::string> WorkerCommand(const v1::CreateModalModelRequest& resolv
   if (mesh.budget_s() > 0 || mesh.budget_gib() > 0) {
     command.push_back(absl::StrCat("--budget=", ShortestDecimal(mesh.budget_s()), ":",
                                    ShortestDecimal(mesh.budget_gib())));
+  }
+  for (const v1::Fixture& fixture : settings.fixtures()) {
+    command.push_back(absl::StrCat("--fix=", FixtureText(fixture).value_or("")));
   }
   return command;
 }

@@ -18,7 +18,7 @@ inline DeformationModes ModesOf(const TetMesh& mesh, const ElasticConstants& ela
   const SystemMatrices system = Assemble(mesh, elastic, density_kg_per_m3, sharing);
   const double omega = 2 * std::numbers::pi * limit_hz;
   absl::StatusOr<DeformationModes> modes =
-      SolveDeformationModes(system, mesh.nodes, omega * omega, [](SolveStage, double) {});
+      SolveDeformationModes(system, mesh, omega * omega, [](SolveStage, double) {});
   EXPECT_TRUE(modes.ok()) << modes.status();
   return *std::move(modes);
 }

@@ -39,6 +39,37 @@ double FirstBendingHz(const FreeBeam& beam, const BeamMaterial& material) {
   return low / (2 * std::numbers::pi);
 }
 
+double ClampedBendingHz(const FreeBeam& beam, const BeamMaterial& material, int order) {
+  const double bending = material.young_pa * beam.second_moment_m4;
+  const double shear = beam.shear_coefficient * beam.area_m2 * material.young_pa /
+                       (2 * (1 + material.poisson_ratio));
+  const double r2 = beam.second_moment_m4 / (beam.area_m2 * beam.length_m * beam.length_m);
+  const double s2 = bending / (shear * beam.length_m * beam.length_m);
+  // Below the frequency at which shear alone resonates, so that all is real.
+  const auto equation = [&](double b) {
+    const double root = std::sqrt((r2 - s2) * (r2 - s2) + 4 / (b * b));
+    const double alpha = std::sqrt((root - r2 - s2) / 2);
+    const double beta = std::sqrt((root + r2 + s2) / 2);
+    return 2 + (b * b * (r2 - s2) * (r2 - s2) + 2) * std::cosh(b * alpha) * std::cos(b * beta) -
+           b * (r2 + s2) / std::sqrt(1 - b * b * r2 * s2) * std::sinh(b * alpha) *
+               std::sin(b * beta);
+  };
+  constexpr double kStep = 0.01;  // far below the distance of two roots
+  double b = kStep;
+  for (int found = 0; found < order; b += kStep) {
+    if (equation(b) * equation(b + kStep) <= 0) ++found;
+  }
+  double low = b - kStep;
+  double high = b;
+  for (int k = 0; k < 100; ++k) {
+    const double middle = (low + high) / 2;
+    (equation(low) * equation(middle) <= 0 ? high : low) = middle;
+  }
+  return low / (2 * std::numbers::pi) *
+         std::sqrt(bending / (material.density_kg_per_m3 * beam.area_m2)) /
+         (beam.length_m * beam.length_m);
+}
+
 FreeBeam RectangularBeam(double length_m, double height_m, double width_m, double poisson_ratio) {
   return {.length_m = length_m,
           .area_m2 = height_m * width_m,

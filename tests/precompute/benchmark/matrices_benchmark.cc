@@ -36,7 +36,7 @@ int Make(char** argv) {
   const bool linear = std::string_view(argv[2]) == "linear";
   const MassSharing sharing =
       std::string_view(argv[3]) == "lumped" ? MassSharing::kLumped : MassSharing::kConsistent;
-  const Mesh surface = ValueOrThrow(ReadMesh(argv[0], "obj", 1));
+  const Mesh surface = ValueOrThrow(ReadMesh(argv[0], "obj", 1)).mesh;
   const TetMesh mesh = ValueOrThrow(
       Tetrahedralize(std::get<SurfaceMesh>(surface), {.keep_surface = true,
                                                       .target_node_count = std::atoi(argv[4]),

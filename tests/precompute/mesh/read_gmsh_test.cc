@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
-#include "precompute/mesh/read_gmsh.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -17,10 +17,17 @@ class ReadMeshTest : public testing::Test {
  protected:
   absl::StatusOr<Mesh> Read(const std::string& bytes, const std::string& format,
                             double metres_per_unit = 1) const {
+    absl::StatusOr<NamedMesh> named = ReadNamed(bytes, format, metres_per_unit);
+    if (!named.ok()) return named.status();
+    return std::move(named->mesh);
+  }
+
+  absl::StatusOr<NamedMesh> ReadNamed(const std::string& bytes, const std::string& format,
+                                      double metres_per_unit = 1) const {
     std::ofstream(path_, std::ios::binary) << bytes;
-    absl::StatusOr<Mesh> mesh = ReadMesh(path_, format, metres_per_unit);
+    absl::StatusOr<NamedMesh> named = ReadMesh(path_, format, metres_per_unit);
     std::filesystem::remove(path_);
-    return mesh;
+    return named;
   }
 
   SurfaceMesh ReadSurfaceOf(const std::string& bytes, const std::string& format) const {

@@ -220,9 +220,9 @@ TEST_F(ReadSurfaceTest, WordsInPlaceOfNumbersAreRefusedWithTheirLine) {
 TEST_F(ReadSurfaceTest, TheBunnyWhoseFilledHolesCrossItIsRefusedBeforeTheMesherCrashes) {
   const char* path = "/usr/share/glmark2/models/bunny.obj";
   if (!std::filesystem::exists(path)) GTEST_SKIP() << "glmark2-data is not installed";
-  const absl::StatusOr<Mesh> bunny = ReadMesh(path, "obj", 1);
+  const absl::StatusOr<NamedMesh> bunny = ReadMesh(path, "obj", 1);
   ASSERT_TRUE(bunny.ok()) << bunny.status();
-  const auto& surface = std::get<SurfaceMesh>(*bunny);
+  const auto& surface = std::get<SurfaceMesh>(bunny->mesh);
   EXPECT_EQ(surface.triangles.size(), 69'666U);
   EXPECT_EQ(surface.vertices.size(), 34'835U);
   EXPECT_THAT(CheckSurface(surface).status().ToString(), HasSubstr("MESH_SELF_INTERSECTING"));

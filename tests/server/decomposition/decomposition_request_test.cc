@@ -95,7 +95,10 @@ TEST(DecompositionRequest, EverySettingIsPartOfTheName) {
       [](Request& r) { r.mutable_settings()->set_metres_per_unit(0.0254); },
       [](Request& r) { r.mutable_settings()->mutable_mesh()->set_keep_surface(true); },
       [](Request& r) { r.mutable_settings()->mutable_mesh()->set_keep_surface(false); },
-      [](Request& r) { r.mutable_settings()->mutable_mesh()->set_target_node_count(500); }};
+      [](Request& r) { r.mutable_settings()->mutable_mesh()->set_target_node_count(500); },
+      [](Request& r) { r.mutable_settings()->add_fixtures()->set_group("base"); },
+      [](Request& r) { r.mutable_settings()->add_fixtures()->set_group("rim"); },
+      [](Request& r) { r.mutable_settings()->add_fixtures()->mutable_vertices()->add_indices(0); }};
   std::set<std::string> digests;
   for (const auto& change : changes) {
     Request request = Aluminum();
@@ -103,6 +106,21 @@ TEST(DecompositionRequest, EverySettingIsPartOfTheName) {
     digests.insert(Digest(request));
   }
   EXPECT_EQ(digests.size(), changes.size());
+}
+
+TEST(DecompositionRequest, OrderAndRepetitionOfFixturesAreNoPartOfTheName) {
+  const auto digest = [](const std::vector<std::string>& groups) {
+    Request request = Aluminum();
+    for (const std::string& group : groups) {
+      request.mutable_settings()->add_fixtures()->set_group(group);
+    }
+    return Digest(request);
+  };
+  EXPECT_EQ(digest({"rim", "base"}), digest({"base", "rim", "base"}));
+  EXPECT_NE(digest({"rim", "base"}), digest({"base"}));
+  Request request = Aluminum();
+  request.mutable_settings()->add_fixtures()->mutable_plane()->mutable_normal()->set_z(2);
+  EXPECT_THAT(CanonicalText(*ResolveRequest(request)), HasSubstr("\nfix plane:0,0,0/0,0,1\n"));
 }
 
 // A mode at the wanted eigenvalue, scaled to the material and size as modal_model.proto says,
@@ -134,6 +152,12 @@ TEST(DecompositionRequest, RefusesWhatCannotBeComputed) {
   EXPECT_THAT(refusal([](Request& r) { r.mutable_material()->set_preset("cheese"); }),
               HasSubstr("UNKNOWN_MATERIAL"));
   EXPECT_THAT(refusal([](Request& r) { r.clear_material(); }), HasSubstr("INVALID_MATERIAL"));
+  EXPECT_THAT(refusal([](Request& r) { r.mutable_settings()->add_fixtures(); }),
+              HasSubstr("INVALID_SETTINGS: a fixture says nothing"));
+  EXPECT_THAT(refusal([](Request& r) {
+                for (int i = 0; i < 17; ++i) r.mutable_settings()->add_fixtures()->set_group("g");
+              }),
+              HasSubstr("INVALID_SETTINGS: there are 17 fixtures; at most 16"));
   EXPECT_THAT(refusal([](Request& r) { r.mutable_settings()->set_poisson_ratio(0.49999); }),
               HasSubstr("INVALID_SETTINGS"));
   EXPECT_THAT(refusal([](Request& r) { r.mutable_settings()->set_metres_per_unit(kNan); }),

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
-#include "precompute/mesh/read_gmsh.h"
+#include "precompute/mesh/make_tet_mesh.h"
 
 #include <algorithm>
 #include <array>
@@ -13,7 +13,6 @@
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
 #include "precompute/mesh/boundary.h"
-#include "precompute/mesh/gmsh_file.h"
 #include "precompute/mesh/point_math.h"
 #include "proto/error_reason.h"
 
@@ -24,7 +23,7 @@ absl::Status Refuse(absl::string_view reason, absl::string_view message) {
   return Refusal(absl::StatusCode::kInvalidArgument, reason, message);
 }
 
-absl::Status CheckFinite(const GmshFile& file) {
+absl::Status CheckFinite(const TetFile& file) {
   for (size_t n = 0; n < file.nodes.size(); ++n) {
     const Point& p = file.nodes[n];
     if (std::ranges::all_of(p, [](double x) { return std::isfinite(x); })) continue;
@@ -35,15 +34,22 @@ absl::Status CheckFinite(const GmshFile& file) {
   return absl::OkStatus();
 }
 
-/// Elements by index into `file.nodes`.
-absl::StatusOr<std::vector<int32_t>> FindNodes(const GmshFile& file) {
-  absl::flat_hash_map<int32_t, int32_t> node_of_number;
+using NodeOfNumber = absl::flat_hash_map<int64_t, int32_t>;
+
+NodeOfNumber NumberNodes(const TetFile& file) {
+  NodeOfNumber node_of_number;
   for (size_t n = 0; n < file.node_numbers.size(); ++n) {
     node_of_number[file.node_numbers[n]] = static_cast<int32_t>(n);
   }
+  return node_of_number;
+}
+
+/// Elements by index into `file.nodes`.
+absl::StatusOr<std::vector<int32_t>> FindNodes(const TetFile& file,
+                                               const NodeOfNumber& node_of_number) {
   std::vector<int32_t> elements;
   elements.reserve(file.elements.size());
-  for (const int32_t number : file.elements) {
+  for (const int64_t number : file.elements) {
     const auto found = node_of_number.find(number);
     if (found == node_of_number.end()) {
       return Refuse("MESH_INDEX_OUT_OF_RANGE",
@@ -57,8 +63,8 @@ absl::StatusOr<std::vector<int32_t>> FindNodes(const GmshFile& file) {
   return elements;
 }
 
-/// Leaves out the nodes that no element has.
-void DropUnusedNodes(TetMesh& mesh) {
+/// Leaves out the nodes that no element has; returns the new index of each, -1 for one left out.
+std::vector<int32_t> DropUnusedNodes(TetMesh& mesh) {
   std::vector<int32_t> new_index(mesh.nodes.size(), -1);
   for (const int32_t node : mesh.elements) new_index[static_cast<size_t>(node)] = 0;
   std::vector<Point> used;
@@ -69,6 +75,33 @@ void DropUnusedNodes(TetMesh& mesh) {
   }
   for (int32_t& node : mesh.elements) node = new_index[static_cast<size_t>(node)];
   mesh.nodes = std::move(used);
+  return new_index;
+}
+
+/// What the file calls the nodes that are left; a simplex with another node is passed over.
+MeshNames NamesOf(const TetFile& file, const NodeOfNumber& node_of_number,
+                  const std::vector<int32_t>& new_index, const TetMesh& mesh) {
+  const auto index_of = [&](int64_t number) {
+    const auto found = node_of_number.find(number);
+    return found == node_of_number.end() ? -1 : new_index[static_cast<size_t>(found->second)];
+  };
+  MeshNames names;
+  for (const int64_t number : file.node_numbers) {
+    const int32_t node = index_of(number);
+    if (node >= 0) names.vertices[number] = mesh.nodes[static_cast<size_t>(node)];
+  }
+  for (const TetFile::Group& group : file.groups) {
+    MeshGroup& named = names.groups.emplace_back(MeshGroup{.name = group.name});
+    for (const auto& numbers : group.simplices) {
+      std::array<int32_t, 4> corners = {-1, -1, -1, -1};
+      size_t count = 0;
+      while (count < 4 && numbers[count] != TetFile::kNoNode) ++count;
+      std::transform(numbers.begin(), numbers.begin() + count, corners.begin(), index_of);
+      const auto end = corners.begin() + count;
+      if (std::find(corners.begin(), end, -1) == end) named.simplices.push_back(corners);
+    }
+  }
+  return names;
 }
 
 /// Swaps corners 0 and 1, and with them their mid-side nodes.
@@ -86,8 +119,6 @@ absl::Status OrientElements(TetMesh& mesh) {
   const auto stride = static_cast<size_t>(mesh.nodes_per_element);
   for (size_t e = 0; e < mesh.element_count(); ++e) {
     int32_t* element = &mesh.elements[e * stride];
-    // Gmsh puts the last two mid-side nodes on the edges 2-3 and 1-3.
-    if (stride == 10) std::swap(element[8], element[9]);
     const auto at = [&](int i) { return mesh.nodes[static_cast<size_t>(element[i])]; };
     const double volume = TetVolume(at(0), at(1), at(2), at(3));
     double longest = 0;
@@ -115,12 +146,13 @@ absl::Status CheckMidsideNodes(const TetMesh& mesh) {
       const Point b = at(static_cast<size_t>(kTetEdges[edge][1]));
       const Point middle = {(a[0] + b[0]) / 2, (a[1] + b[1]) / 2, (a[2] + b[2]) / 2};
       if (Distance(at(4 + edge), middle) < Distance(a, b) / 4) continue;
-      return Refuse("MESH_MIDSIDE_NODE_MISPLACED",
-                    absl::StrCat("tetrahedron ", e,
-                                 " (counted from zero) has a mid-side node more "
-                                 "than a quarter of its edge from the middle, near (",
-                                 middle[0], ", ", middle[1], ", ", middle[2],
-                                 "): write the nodes in Gmsh's order, or curve elements less"));
+      return Refuse(
+          "MESH_MIDSIDE_NODE_MISPLACED",
+          absl::StrCat("tetrahedron ", e,
+                       " (counted from zero) has a mid-side node more "
+                       "than a quarter of its edge from the middle, near (",
+                       middle[0], ", ", middle[1], ", ", middle[2],
+                       "): write the nodes in the order of the format, or curve elements less"));
     }
   }
   return absl::OkStatus();
@@ -170,25 +202,33 @@ absl::Status CheckOnePiece(const TetMesh& mesh) {
 
 }  // namespace
 
-absl::StatusOr<TetMesh> ReadGmsh(const std::string& bytes) {
-  absl::StatusOr<GmshFile> file = ParseGmsh(bytes);
-  if (!file.ok()) return file.status();
-  if (absl::Status status = CheckFinite(*file); !status.ok()) return status;
-  if (file->elements.empty()) {
+absl::StatusOr<NamedMesh> MakeTetMesh(TetFile file) {
+  if (absl::Status status = CheckFinite(file); !status.ok()) return status;
+  if (file.elements.empty()) {
     return Refuse("MESH_EMPTY",
                   "the file has no tetrahedra: mesh the volume (\"gmsh -3\"), or give the surface "
                   "as OBJ, PLY, STL or OFF");
   }
-  absl::StatusOr<std::vector<int32_t>> elements = FindNodes(*file);
+  const NodeOfNumber node_of_number = NumberNodes(file);
+  absl::StatusOr<std::vector<int32_t>> elements = FindNodes(file, node_of_number);
   if (!elements.ok()) return elements.status();
-  TetMesh mesh{std::move(file->nodes), file->nodes_per_element, *std::move(elements), {}};
-  DropUnusedNodes(mesh);
+  TetMesh mesh{std::move(file.nodes), file.nodes_per_element, *std::move(elements), {}};
+  const std::vector<int32_t> new_index = DropUnusedNodes(mesh);
   if (absl::Status status = OrientElements(mesh); !status.ok()) return status;
   for (const auto check : {CheckMidsideNodes, CheckOnePiece}) {
     if (absl::Status status = check(mesh); !status.ok()) return status;
   }
   if (absl::Status status = FindBoundary(mesh); !status.ok()) return status;
-  return mesh;
+  MeshNames names = NamesOf(file, node_of_number, new_index, mesh);
+  return NamedMesh{std::move(mesh), std::move(names)};
+}
+
+void TetFile::AddToGroup(const std::string& name, std::span<const int64_t> corners) {
+  auto group = std::ranges::find(groups, name, &Group::name);
+  if (group == groups.end()) group = groups.insert(groups.end(), {.name = name, .simplices = {}});
+  auto& simplex = group->simplices.emplace_back();
+  simplex.fill(kNoNode);
+  std::ranges::copy(corners, simplex.begin());
 }
 
 }  // namespace carillon::precompute

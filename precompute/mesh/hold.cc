@@ -1,0 +1,263 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "precompute/mesh/hold.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+#include "absl/container/flat_hash_set.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+#include "precompute/mesh/point_math.h"
+#include "proto/error_reason.h"
+
+namespace carillon::precompute {
+namespace {
+
+constexpr double kTolerance = 1e-6;  // of the body's diagonal
+constexpr size_t kMaxNamesTold = 20;
+
+double DistanceToSegment(const Point& p, const Point& a, const Point& b) {
+  const Point along = Difference(b, a);
+  const double length2 = Dot(along, along);
+  const double t = length2 == 0 ? 0 : std::clamp(Dot(Difference(p, a), along) / length2, 0.0, 1.0);
+  return Distance(p, {a[0] + t * along[0], a[1] + t * along[1], a[2] + t * along[2]});
+}
+
+absl::Status NothingHeld(absl::string_view by, absl::string_view repair) {
+  return Refusal(absl::StatusCode::kInvalidArgument, "NO_VERTEX_HELD",
+                 absl::StrCat("no node of the body is held by ", by, ": ", repair));
+}
+
+/// Finds the node nearest to a place.
+class NearestNode {
+ public:
+  explicit NearestNode(const std::vector<Point>& nodes) : nodes_(nodes), by_x_(nodes.size()) {
+    for (size_t n = 0; n < nodes.size(); ++n) by_x_[n] = static_cast<int32_t>(n);
+    std::ranges::sort(by_x_, {}, [&](int32_t n) { return At(n)[0]; });
+  }
+
+  int32_t Find(const Point& p) const {
+    const auto start =
+        std::ranges::lower_bound(by_x_, p[0], {}, [&](int32_t n) { return At(n)[0]; });
+    Nearest nearest;
+    for (auto it = start; it != by_x_.end() && At(*it)[0] - p[0] < nearest.distance; ++it) {
+      Look(*it, p, nearest);
+    }
+    for (auto it = start; it != by_x_.begin() && p[0] - At(*(it - 1))[0] < nearest.distance; --it) {
+      Look(*(it - 1), p, nearest);
+    }
+    return nearest.node;
+  }
+
+ private:
+  struct Nearest {
+    int32_t node = 0;
+    double distance = HUGE_VAL;
+  };
+
+  const Point& At(int32_t n) const { return nodes_[static_cast<size_t>(n)]; }
+
+  void Look(int32_t n, const Point& p, Nearest& nearest) const {
+    const double distance = Distance(At(n), p);
+    if (distance < nearest.distance) nearest = {n, distance};
+  }
+
+  const std::vector<Point>& nodes_;
+  std::vector<int32_t> by_x_;
+};
+
+/// Marks nodes, fixture by fixture.
+class Holder {
+ public:
+  Holder(const SurfaceMesh& given, const MeshNames& names, const TetMesh& mesh)
+      : given_(given),
+        names_(names),
+        mesh_(mesh),
+        tolerance_m_(kTolerance * Diagonal(mesh.nodes)),
+        is_held_(mesh.nodes.size()) {}
+
+  absl::Status operator()(const HeldPlane& plane) {
+    const double length = Norm(plane.normal);
+    HoldWhere([&](const Point& p) {
+      return Dot(Difference(p, plane.point_m), plane.normal) <= tolerance_m_ * length;
+    });
+    if (any_) return absl::OkStatus();
+    return NothingHeld("the plane",
+                       "it leaves all of the body on the side of its normal; move its point, in "
+                       "metres, or turn its normal, which points to what is free");
+  }
+
+  absl::Status operator()(const HeldBox& box) {
+    HoldWhere([&](const Point& p) {
+      bool inside = true;
+      for (size_t x = 0; x < 3; ++x) {
+        inside =
+            inside && p[x] >= box.low_m[x] - tolerance_m_ && p[x] <= box.high_m[x] + tolerance_m_;
+      }
+      return inside;
+    });
+    if (any_) return absl::OkStatus();
+    return NothingHeld("the box",
+                       "it lies beside the body or between its nodes; its corners are "
+                       "in metres, of the body as large as its unit makes it");
+  }
+
+  absl::Status operator()(const HeldVertices& vertices) {
+    absl::flat_hash_set<Point> places;
+    const NearestNode nearest(mesh_.nodes);
+    for (const int64_t number : vertices.numbers) {
+      const auto found = names_.vertices.find(number);
+      if (found == names_.vertices.end()) return NoSuchVertex(number);
+      places.insert(found->second);
+      Mark(nearest.Find(found->second));
+    }
+    HoldBetween(places);
+    return absl::OkStatus();
+  }
+
+  absl::Status operator()(const HeldGroup& asked) {
+    const auto group = std::ranges::find(names_.groups, asked.name, &MeshGroup::name);
+    if (group == names_.groups.end()) return NoSuchGroup(asked.name);
+    HoldTriangles(*group);
+    HoldSimplices(*group);
+    if (any_) return absl::OkStatus();
+    return NothingHeld(absl::StrCat("the group \"", asked.name, "\""),
+                       "nothing of it bounds the body; name another group, a plane or a box");
+  }
+
+  absl::Status Take(const Fixture& fixture) {
+    any_ = false;
+    return std::visit(*this, fixture);
+  }
+
+  absl::StatusOr<std::vector<int32_t>> Nodes() const {
+    if (std::ranges::all_of(is_held_, [](bool held) { return held; })) {
+      return Refusal(absl::StatusCode::kInvalidArgument, "ALL_VERTICES_HELD",
+                     "all nodes of the body are held, so that nothing can sound: hold less of it "
+                     "(the normal of a plane points to what is free)");
+    }
+    std::vector<int32_t> nodes;
+    for (size_t n = 0; n < is_held_.size(); ++n) {
+      if (is_held_[n]) nodes.push_back(static_cast<int32_t>(n));
+    }
+    return nodes;
+  }
+
+ private:
+  void Mark(int32_t node) {
+    if (node < 0) return;
+    is_held_[static_cast<size_t>(node)] = true;
+    any_ = true;
+  }
+
+  template <typename Condition>
+  void HoldWhere(const Condition& holds) {
+    for (size_t n = 0; n < mesh_.nodes.size(); ++n) {
+      if (holds(mesh_.nodes[n])) Mark(static_cast<int32_t>(n));
+    }
+  }
+
+  /// Nodes on given triangles and edges whose corners are all among `places`.
+  void HoldBetween(const absl::flat_hash_set<Point>& places) {
+    for (const BoundaryFace& face : mesh_.boundary) {
+      std::vector<Point> corners;
+      for (const int32_t v : given_.triangles[static_cast<size_t>(face.given_triangle)]) {
+        const Point& p = given_.vertices[static_cast<size_t>(v)];
+        if (places.contains(p)) corners.push_back(p);
+      }
+      if (corners.size() < 2) continue;
+      for (const int32_t node : face.nodes) {
+        const bool between =
+            corners.size() == 3 ||
+            (node >= 0 && DistanceToSegment(mesh_.nodes[static_cast<size_t>(node)], corners[0],
+                                            corners[1]) <= tolerance_m_);
+        if (between) Mark(node);
+      }
+    }
+  }
+
+  void HoldTriangles(const MeshGroup& group) {
+    const absl::flat_hash_set<int32_t> triangles(group.triangles.begin(), group.triangles.end());
+    for (const BoundaryFace& face : mesh_.boundary) {
+      if (!triangles.contains(face.given_triangle)) continue;
+      for (const int32_t node : face.nodes) Mark(node);
+    }
+  }
+
+  /// Corners, and the mid-side nodes of the edges between the corners of one simplex.
+  void HoldSimplices(const MeshGroup& group) {
+    absl::flat_hash_set<std::pair<int32_t, int32_t>> edges;
+    for (const auto& corners : group.simplices) {
+      for (size_t i = 0; i < corners.size() && corners[i] >= 0; ++i) {
+        Mark(corners[i]);
+        for (size_t j = 0; j < i; ++j) edges.insert(std::minmax(corners[i], corners[j]));
+      }
+    }
+    if (mesh_.nodes_per_element != 10) return;
+    for (size_t e = 0; e < mesh_.elements.size(); e += 10) {
+      const int32_t* element = &mesh_.elements[e];
+      for (size_t k = 0; k < kTetEdges.size(); ++k) {
+        const int32_t a = element[kTetEdges[k][0]], b = element[kTetEdges[k][1]];
+        if (edges.contains(std::minmax(a, b))) Mark(element[4 + k]);
+      }
+    }
+  }
+
+  absl::Status NoSuchVertex(int64_t number) const {
+    if (names_.vertices.empty()) {
+      return NothingHeld(absl::StrCat("vertex ", number),
+                         "files of this format do not number vertices; hold a plane or a box");
+    }
+    int64_t least = number, most = number;
+    bool first = true;
+    for (const auto& [n, place] : names_.vertices) {
+      least = first ? n : std::min(least, n);
+      most = first ? n : std::max(most, n);
+      first = false;
+    }
+    return NothingHeld(absl::StrCat("vertex ", number),
+                       absl::StrCat("the numbers of the file go from ", least, " to ", most));
+  }
+
+  absl::Status NoSuchGroup(const std::string& name) const {
+    std::vector<std::string> known;
+    for (const MeshGroup& group : names_.groups) known.push_back(group.name);
+    const size_t told = std::min(known.size(), kMaxNamesTold);
+    const std::string list =
+        absl::StrJoin(known.begin(), known.begin() + static_cast<ptrdiff_t>(told), ", ");
+    return Refusal(absl::StatusCode::kInvalidArgument, "GROUP_UNKNOWN",
+                   absl::StrCat("the mesh file has no group \"", name, "\": ",
+                                known.empty() ? "it names none; hold a plane or a box"
+                                              : absl::StrCat("it has ", list,
+                                                             told < known.size() ? ", ..." : "")));
+  }
+
+  const SurfaceMesh& given_;
+  const MeshNames& names_;
+  const TetMesh& mesh_;
+  double tolerance_m_;
+  std::vector<bool> is_held_;
+  bool any_ = false;  // whether the fixture at hand holds a node
+};
+
+}  // namespace
+
+absl::Status Hold(const std::vector<Fixture>& fixtures, const SurfaceMesh& given,
+                  const MeshNames& names, TetMesh& mesh) {
+  mesh.held.clear();
+  if (fixtures.empty()) return absl::OkStatus();
+  Holder holder(given, names, mesh);
+  for (const Fixture& fixture : fixtures) {
+    if (absl::Status status = holder.Take(fixture); !status.ok()) return status;
+  }
+  absl::StatusOr<std::vector<int32_t>> nodes = holder.Nodes();
+  if (!nodes.ok()) return nodes.status();
+  mesh.held = *std::move(nodes);
+  return absl::OkStatus();
+}
+
+}  // namespace carillon::precompute

@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "precompute/mesh/mesh_names.h"
+
+namespace carillon::precompute {
+
+/// The groups and objects ("g", "o") of an OBJ file that CleanObj accepts, with their triangles as
+/// ReadSurface counts them. A group and an object of one name are one.
+std::vector<MeshGroup> ObjGroups(const std::string& bytes);
+
+}  // namespace carillon::precompute

@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+//
+// Bodies that are held: every solver finds the modes of the nodes that move.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "precompute/fem/held_nodes.h"
+#include "precompute/mesh/boundary.h"
+#include "precompute/mesh/hold.h"
+#include "precompute/modes/deformation_modes.h"
+#include "precompute/modes/dense_eigensolver.h"
+#include "precompute/modes/error_estimate.h"
+#include "precompute/modes/node_ordering.h"
+#include "precompute/modes/rigid_body.h"
+#include "precompute/modes/sparse_eigensolver.h"
+#include "tests/precompute/test_meshes.h"
+
+namespace carillon::precompute {
+namespace {
+
+const SolveWatch kSilent = [](SolveStage, double) {};
+constexpr ElasticConstants kElastic{.young_pa = 1, .poisson_ratio = 0.3};
+constexpr Point kSize{1, 0.6, 0.3};
+
+/// What is held at the box's corner at the origin, and how many motions are left.
+struct Holding {
+  const char* name;
+  std::vector<Fixture> fixtures;
+  int rigid_mode_count;
+};
+
+const Holding kPoint{"Point", {HeldBox{{0, 0, 0}, {0, 0, 0}}}, 3};
+const Holding kTwoPoints{"TwoPoints", {HeldBox{{0, 0, 0}, {0, 0, 0}}, HeldBox{kSize, kSize}}, 1};
+const Holding kLine{"Line", {HeldBox{{0, 0, 0}, {1, 0, 0}}}, 1};
+const Holding kFace{"Face", {HeldPlane{{0, 0, 0}, {2, 0, 0}}}, 0};
+const Holding kMiddle{"Middle", {HeldBox{{0.3, 0, 0}, {0.7, 1, 1}}}, 0};
+
+TetMesh HeldBoxMesh(const Holding& holding, const std::array<int, 3>& cells, int nodes) {
+  TetMesh mesh = MakeTetBox(kSize, cells, nodes);
+  const absl::Status status = Hold(holding.fixtures, BoundarySurface(mesh), {}, mesh);
+  EXPECT_TRUE(status.ok()) << status;
+  return mesh;
+}
+
+struct Case {
+  Holding holding;
+  std::array<int, 3> cells;
+  int nodes_per_element;
+  MassSharing mass;
+};
+
+void PrintTo(const Case& c, std::ostream* out) {
+  *out << c.holding.name << c.cells[0] << "x" << c.nodes_per_element
+       << (c.mass == MassSharing::kLumped ? "lumped" : "consistent");
+}
+
+struct HeldBodyTest : ::testing::TestWithParam<Case> {
+  TetMesh mesh = HeldBoxMesh(GetParam().holding, GetParam().cells, GetParam().nodes_per_element);
+  SystemMatrices system = Assemble(mesh, kElastic, 1, GetParam().mass);
+  int rigid = GetParam().holding.rigid_mode_count;
+
+  Eigen::VectorXd AllEigenvalues() const {
+    const auto count = static_cast<int>(system.unknown_count());
+    return DenseEigensolver()
+        .Solve(system, {.count = count, .eigenvalue_limit = 0}, [](double) {})
+        ->eigenvalues;
+  }
+};
+
+TEST_P(HeldBodyTest, ModesAreAllThoseBelowTheLimitAndTheProofSaysSo) {
+  const Eigen::VectorXd eigenvalues = AllEigenvalues();
+  const double limit = (eigenvalues[rigid + 19] + eigenvalues[rigid + 20]) / 2;
+  const auto result = SolveDeformationModes(system, mesh, limit, kSilent);
+  ASSERT_TRUE(result.ok()) << result.status();
+  ASSERT_EQ(result->modes.eigenvalues.size(), 20);
+  for (Eigen::Index m = 0; m < 20; ++m) {
+    // The dense solution is exact to rounding of the highest eigenvalue, 1e6 times the lowest.
+    EXPECT_NEAR(result->modes.eigenvalues[m] / eigenvalues[m + rigid], 1, 1e-8) << m;
+  }
+  EXPECT_EQ(result->verification.rigid_mode_count, rigid);
+  EXPECT_EQ(result->verification.sturm_count, rigid + 20);
+  EXPECT_LE(result->verification.max_residual, 1e-6);
+}
+
+TEST_P(HeldBodyTest, ShapesAreZeroWhereTheBodyIsHeld) {
+  const auto result = SolveDeformationModes(system, mesh, 60, kSilent);
+  ASSERT_TRUE(result.ok()) << result.status();
+  const Eigen::MatrixXd& shapes = result->modes.shapes;
+  ASSERT_EQ(shapes.rows(), 3 * static_cast<Eigen::Index>(mesh.nodes.size()));
+  ASSERT_GT(shapes.cols(), 0);
+  for (const int32_t node : mesh.held) {
+    EXPECT_EQ(shapes.middleRows<3>(3 * Eigen::Index{node}).cwiseAbs().maxCoeff(), 0);
+  }
+  for (const int32_t node : MovingNodes(mesh)) {
+    EXPECT_GT(shapes.middleRows<3>(3 * Eigen::Index{node}).cwiseAbs().maxCoeff(), 0);
+  }
+}
+
+TEST_P(HeldBodyTest, LowestModeAboveTheLimitIsTold) {
+  const double lowest = AllEigenvalues()[rigid];
+  const auto result = SolveDeformationModes(system, mesh, lowest / 1e4, kSilent);
+  ASSERT_TRUE(result.ok()) << result.status();
+  EXPECT_EQ(result->modes.eigenvalues.size(), 0);
+  EXPECT_NEAR(result->lowest_eigenvalue / lowest, 1, 1e-8);
+}
+
+TEST_P(HeldBodyTest, LowestEigenvalueBoundLiesAboveTheLowestModeAndNearIt) {
+  const std::vector<Point> moving = PlacesOf(MovingNodes(mesh), mesh);
+  const double bound = LowestEigenvalueBound(moving, system, PlacesOf(mesh.held, mesh));
+  const double lowest = AllEigenvalues()[rigid];
+  EXPECT_GT(bound, lowest * (1 - 1e-9));
+  // It sets the scale of a shift, for which two decades are as good.
+  EXPECT_LT(bound, 30 * lowest);
+}
+
+TEST_P(HeldBodyTest, SpectraFindsTheSameModes) {
+  const auto ours = SolveDeformationModes(system, mesh, 60, kSilent);
+  ASSERT_TRUE(ours.ok()) << ours.status();
+  const auto count = static_cast<int>(ours->modes.eigenvalues.size());
+  const auto spectra =
+      SparseEigensolver(OrderUnknowns(system))
+          .Solve(system, {.count = rigid + count, .eigenvalue_limit = 60}, [](double) {});
+  ASSERT_TRUE(spectra.ok()) << spectra.status();
+  for (Eigen::Index m = 0; m < count; ++m) {
+    EXPECT_NEAR(spectra->eigenvalues[rigid + m] / ours->modes.eigenvalues[m], 1, 1e-8) << m;
+  }
+}
+
+// Dense and block Lanczos, linear and quadratic elements, both mass matrices, all ranks.
+INSTANTIATE_TEST_SUITE_P(Bodies, HeldBodyTest,
+                         ::testing::Values(Case{kPoint, {4, 3, 2}, 4, MassSharing::kConsistent},
+                                           Case{kPoint, {8, 5, 3}, 4, MassSharing::kLumped},
+                                           Case{kTwoPoints, {4, 3, 2}, 4, MassSharing::kConsistent},
+                                           Case{kLine, {4, 3, 2}, 4, MassSharing::kLumped},
+                                           Case{kLine, {4, 3, 2}, 10, MassSharing::kConsistent},
+                                           Case{kFace, {4, 3, 2}, 4, MassSharing::kConsistent},
+                                           Case{kFace, {8, 5, 3}, 4, MassSharing::kLumped},
+                                           Case{kFace, {4, 3, 2}, 10, MassSharing::kConsistent},
+                                           Case{kFace, {4, 3, 2}, 10, MassSharing::kLumped},
+                                           Case{kMiddle, {10, 4, 2}, 4, MassSharing::kConsistent}));
+
+TEST(HeldBody, RigidBodyModesLeaveWhatIsHeldWhereItIsAndBendNothing) {
+  for (const Holding& holding : {kPoint, kTwoPoints, kLine, kFace}) {
+    const TetMesh mesh = HeldBoxMesh(holding, {4, 3, 2}, 4);
+    const SystemMatrices system = Assemble(mesh, kElastic, 1, MassSharing::kConsistent);
+    const std::vector<int32_t> moving = MovingNodes(mesh);
+    const Eigen::MatrixXd rigid =
+        RigidBodyModes(PlacesOf(moving, mesh), system, PlacesOf(mesh.held, mesh));
+    ASSERT_EQ(rigid.cols(), holding.rigid_mode_count) << holding.name;
+    if (rigid.cols() == 0) continue;
+    // The energy of the free body, so that the motion of what is held would count.
+    TetMesh free = mesh;
+    free.held.clear();
+    const SystemMatrices whole = Assemble(free, kElastic, 1, MassSharing::kConsistent);
+    const Eigen::MatrixXd motion = Extended(rigid, moving, mesh.nodes.size());
+    const Eigen::MatrixXd energy =
+        motion.transpose() * (whole.K.selfadjointView<Eigen::Lower>() * motion);
+    EXPECT_LT(energy.cwiseAbs().maxCoeff(), 1e-12) << holding.name;
+  }
+}
+
+// Where a body is clamped there is a singularity of stress, which costs accuracy: more than the
+// estimate says is not there.
+TEST(HeldBody, ErrorOfEachModeIsEstimated) {
+  const auto solve = [](const std::array<int, 3>& cells) {
+    const TetMesh mesh = HeldBoxMesh(kFace, cells, 10);
+    auto result = SolveDeformationModes(Assemble(mesh, kElastic, 1, MassSharing::kConsistent), mesh,
+                                        20, kSilent);
+    EXPECT_TRUE(result.ok()) << result.status();
+    return std::pair(mesh, *std::move(result));
+  };
+  const auto [mesh, coarse] = solve({4, 2, 1});
+  const auto [fine_mesh, fine] = solve({16, 10, 5});
+  const Eigen::VectorXd errors = EstimateFrequencyErrors(mesh, kElastic, coarse.modes);
+  ASSERT_GE(coarse.modes.eigenvalues.size(), 5);
+  for (Eigen::Index m = 0; m < 5; ++m) {
+    const double true_error =
+        std::sqrt(coarse.modes.eigenvalues[m] / fine.modes.eigenvalues[m]) - 1;
+    EXPECT_GT(errors[m], 0.5 * true_error) << m;
+    EXPECT_LT(errors[m], 3 * true_error) << m;
+  }
+}
+
+}  // namespace
+}  // namespace carillon::precompute
