@@ -39,6 +39,24 @@ struct CreateModelOptions {
   bool wait = false;
 };
 
+/// What `carillon model export` writes, and where to.
+struct ExportOptions {
+  std::string model;
+  std::string file;          ///< empty: the digest, with the format's suffix, here
+  std::string format;        ///< empty: by the file's suffix
+  MaterialFigures material;  ///< for a glTF, which holds what a body of one material sounds like
+};
+
+/// What `carillon model import` reads.
+struct ImportOptions {
+  std::string file;
+  std::string format;  ///< empty: by the file's suffix
+  std::string label;   ///< empty: the name that a glTF gives, or none
+  std::string pick;    ///< of the models of a glTF: its name or number, or the name of a node
+  MaterialFigures
+      material;  ///< of which a glTF's model was computed, where it does not say so itself
+};
+
 /// What `carillon strike` strikes, and how.
 struct StrikeOptions {
   std::string model;
@@ -74,11 +92,8 @@ absl::Status ListModels(const client::Client& daemon, const v1::ListModalModelsR
                         bool json);
 absl::Status UpdateModel(const client::Client& daemon, const std::string& text,
                          v1::UpdateModalModelRequest change, bool json);
-/// An empty `file`: the digest and ".model", here.
-absl::Status ExportModel(const client::Client& daemon, const std::string& text, std::string file);
-/// A file whose name is a digest keeps that name.
-absl::Status ImportModel(const client::Client& daemon, const std::string& file,
-                         const std::string& label, bool json);
+absl::Status ExportModel(const client::Client& daemon, const ExportOptions& options);
+absl::Status ImportModel(const client::Client& daemon, const ImportOptions& options, bool json);
 absl::Status ShowDatabaseStats(const client::Client& daemon, bool json);
 absl::Status CollectGarbage(const client::Client& daemon, uint64_t budget_mib, bool json);
 /// `text` is a name, a label or the first digits of a digest. With the frequencies that `figures`

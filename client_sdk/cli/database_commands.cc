@@ -1,14 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // The commands that look after stored models.
-#include <algorithm>
-#include <filesystem>
-#include <utility>
-
-#include "absl/strings/ascii.h"
-#include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
-#include "absl/strings/strip.h"
 #include "client_sdk/cli/commands.h"
 #include "client_sdk/cli/find_model.h"
 #include "client_sdk/cli/output.h"
@@ -17,12 +10,6 @@ namespace carillon::cli {
 namespace {
 
 constexpr double kMib = 1 << 20;
-
-bool IsDigest(const std::string& text) {
-  return text.size() == 64 && std::ranges::all_of(text, [](unsigned char c) {
-           return absl::ascii_isdigit(c) || (c >= 'a' && c <= 'f');
-         });
-}
 
 }  // namespace
 
@@ -34,29 +21,6 @@ absl::Status UpdateModel(const client::Client& daemon, const std::string& text,
   const auto model = daemon.UpdateModalModel(change);
   if (!model.ok()) return model.status();
   if (json) PrintJson(*model);
-  return absl::OkStatus();
-}
-
-absl::Status ExportModel(const client::Client& daemon, const std::string& text, std::string file) {
-  const auto name = FindModel(daemon, text);
-  if (!name.ok()) return name.status();
-  if (file.empty()) file = absl::StrCat(absl::StripPrefix(*name, "modalModels/"), ".model");
-  absl::Status status = daemon.ExportModalModel(*name, file);
-  if (status.ok()) absl::PrintF("%s\n", file);
-  return status;
-}
-
-absl::Status ImportModel(const client::Client& daemon, const std::string& file,
-                         const std::string& label, bool json) {
-  const std::string stem = std::filesystem::path(file).stem();
-  const std::string name = IsDigest(stem) ? absl::StrCat("modalModels/", stem) : "";
-  const auto model = daemon.ImportModalModel(file, name, label);
-  if (!model.ok()) return model.status();
-  if (json) {
-    PrintJson(*model);
-  } else {
-    absl::PrintF("%s\n", model->name());
-  }
   return absl::OkStatus();
 }
 

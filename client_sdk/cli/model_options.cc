@@ -203,28 +203,43 @@ void AddModelTag(CLI::App& app, Program& program) {
   });
 }
 
+/// How a model lies in a file.
+void AddFileFormat(CLI::App& app, std::string& format) {
+  app.add_option("--format", format, "how it lies in the file [the file's suffix, else model]")
+      ->check(CLI::IsMember({"model", "glb", "gltf", "npz"}));
+}
+
 void AddModelExport(CLI::App& app, Program& program) {
-  auto model = std::make_shared<std::string>();
-  auto file = std::make_shared<std::string>();
-  CLI::App& command = *app.add_subcommand("export", "write a model to a file");
-  command.add_option("model", *model, "name, label, or first digits of the digest")->required();
-  command.add_option("--out", *file, "where to [its digest, with .model]");
-  command.callback([&program, model, file] {
-    program.command = [&program, model, file] {
-      return ExportModel(program.Daemon(), *model, *file);
-    };
+  auto options = std::make_shared<ExportOptions>();
+  CLI::App& command = *app.add_subcommand(
+      "export", "write a model to a file: as it is stored, as glTF, or for NumPy");
+  command.add_option("model", options->model, "name, label, or first digits of the digest")
+      ->required();
+  command.add_option("--out", options->file,
+                     "where to: FILE.model, .glb, .gltf or .npz [its digest, with .model]");
+  AddFileFormat(command, options->format);
+  AddMaterial(command, options->material);
+  command.callback([&program, options] {
+    program.command = [&program, options] { return ExportModel(program.Daemon(), *options); };
   });
 }
 
 void AddModelImport(CLI::App& app, Program& program) {
-  auto file = std::make_shared<std::string>();
-  auto label = std::make_shared<std::string>();
+  auto options = std::make_shared<ImportOptions>();
   CLI::App& command = *app.add_subcommand("import", "store the model of a file");
-  command.add_option("file", *file, "written by export or by carillon-precompute")->required();
-  command.add_option("--label", *label, "name for people");
-  command.callback([&program, file, label] {
-    program.command = [&program, file, label] {
-      return ImportModel(program.Daemon(), *file, *label, program.json);
+  command
+      .add_option(
+          "file", options->file,
+          "written by export or by carillon-precompute, a glTF with modal models, or a .npz")
+      ->required();
+  AddFileFormat(command, options->format);
+  command.add_option("--label", options->label, "name for people [a glTF's own]");
+  command.add_option("--pick", options->pick,
+                     "of several models of a glTF: its name or number, or a node's name");
+  AddMaterial(command, options->material);
+  command.callback([&program, options] {
+    program.command = [&program, options] {
+      return ImportModel(program.Daemon(), *options, program.json);
     };
   });
 }

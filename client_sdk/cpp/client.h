@@ -48,6 +48,15 @@ class Client {
       const v1::ListModalModelsRequest& request) const;
   absl::StatusOr<v1::ModalModelSummary> UpdateModalModel(
       const v1::UpdateModalModelRequest& request) const;
+  /// Takes the records of a model's stored form, one by one; its error ends the transfer.
+  using RecordSink = std::function<absl::Status(const v1::ModalModelRecord&)>;
+  /// Hands the records of a model to `sink`, whose error is returned.
+  absl::Status ExportModalModel(const std::string& name, const RecordSink& sink) const;
+  /// Stores the model whose records `send` gives to the sink that it gets; an error of `send` is
+  /// returned, and nothing stored. `name`: as below.
+  absl::StatusOr<v1::ModalModelSummary> ImportModalModel(
+      const std::function<absl::Status(const RecordSink&)>& send, const std::string& name,
+      const std::string& label) const;
   /// Writes a model to a file in the stored form. Errors also: Internal (OUTPUT_NOT_WRITABLE).
   absl::Status ExportModalModel(const std::string& name, const std::string& file) const;
   /// Stores the model of a file in the stored form. `name`: "modalModels/{digest}", or empty: named

@@ -33,42 +33,72 @@ void Authorize(grpc::ClientContext& context, const std::string& token) {
   if (!token.empty()) context.AddMetadata("authorization", absl::StrCat("Bearer ", token));
 }
 
-/// Sends the records of `in` to the writer; the first message carries name and label too.
-template <class Writer>
-absl::Status SendRecords(google::protobuf::io::FileInputStream& in,
-                         v1::ImportModalModelRequest& request, Writer& writer) {
+/// Hands the records of a file to `sink`.
+absl::Status ReadRecords(google::protobuf::io::FileInputStream& in,
+                         const Client::RecordSink& sink) {
   while (true) {
     bool at_end = false;
-    v1::ModalModelRecord& record = *request.mutable_record();
-    record.Clear();
+    v1::ModalModelRecord record;
     if (!google::protobuf::util::ParseDelimitedFromZeroCopyStream(&record, &in, &at_end)) {
       if (at_end) return absl::OkStatus();
       return Refusal(absl::StatusCode::kInvalidArgument, "MODAL_MODEL_MALFORMED",
                      "the file is not a sequence of modal model records, or is cut short");
     }
-    if (!writer.Write(request)) return absl::OkStatus();  // Finish tells why
-    request.clear_name();
-    request.clear_label();
+    absl::Status status = sink(record);
+    if (!status.ok()) return status;
   }
 }
 
 }  // namespace
 
-absl::Status Client::ExportModalModel(const std::string& name, const std::string& file) const {
-  std::ofstream out(file, std::ios::binary);
-  if (!out) return NotWritable(file);
+absl::Status Client::ExportModalModel(const std::string& name, const RecordSink& sink) const {
   grpc::ClientContext context;
   v1::ExportModalModelRequest request;
   request.set_name(name);
   const auto reader = stubs_->models.ExportModalModel(&context, request);
   v1::ExportModalModelResponse response;
-  while (out && reader->Read(&response)) {
-    google::protobuf::util::SerializeDelimitedToOstream(response.record(), &out);
-  }
+  absl::Status taken = absl::OkStatus();
+  while (taken.ok() && reader->Read(&response)) taken = sink(response.record());
+  if (!taken.ok()) context.TryCancel();
+  absl::Status status = FromRpc(reader->Finish(), stubs_->server);
+  return taken.ok() ? status : taken;
+}
+
+absl::Status Client::ExportModalModel(const std::string& name, const std::string& file) const {
+  std::ofstream out(file, std::ios::binary);
+  if (!out) return NotWritable(file);
+  absl::Status status = ExportModalModel(name, [&](const v1::ModalModelRecord& record) {
+    google::protobuf::util::SerializeDelimitedToOstream(record, &out);
+    return out ? absl::OkStatus() : NotWritable(file);
+  });
   out.close();
-  if (!out) context.TryCancel();
-  const absl::Status status = FromRpc(reader->Finish(), stubs_->server);
-  return out ? status : NotWritable(file);
+  if (status.ok() && !out) status = NotWritable(file);
+  return status;
+}
+
+absl::StatusOr<v1::ModalModelSummary> Client::ImportModalModel(
+    const std::function<absl::Status(const RecordSink&)>& send, const std::string& name,
+    const std::string& label) const {
+  grpc::ClientContext context;
+  v1::ImportModalModelResponse response;
+  const auto writer = stubs_->models.ImportModalModel(&context, &response);
+  v1::ImportModalModelRequest request;
+  request.set_name(name);
+  request.set_label(label);
+  bool open = true;
+  absl::Status sent = send([&](const v1::ModalModelRecord& record) {
+    *request.mutable_record() = record;
+    open = writer->Write(request);
+    request.clear_name();
+    request.clear_label();
+    return open ? absl::OkStatus() : absl::CancelledError();  // Finish tells why
+  });
+  if (open && !sent.ok()) context.TryCancel();
+  writer->WritesDone();
+  const absl::Status status = FromRpc(writer->Finish(), stubs_->server);
+  if (open && !sent.ok()) return sent;
+  if (!status.ok()) return status;
+  return std::move(*response.mutable_modal_model());
 }
 
 absl::StatusOr<v1::ModalModelSummary> Client::ImportModalModel(const std::string& file,
@@ -81,19 +111,8 @@ absl::StatusOr<v1::ModalModelSummary> Client::ImportModalModel(const std::string
   }
   google::protobuf::io::FileInputStream in(descriptor, kMaxRecordBytes);
   in.SetCloseOnDelete(true);
-  grpc::ClientContext context;
-  v1::ImportModalModelResponse response;
-  const auto writer = stubs_->models.ImportModalModel(&context, &response);
-  v1::ImportModalModelRequest request;
-  request.set_name(name);
-  request.set_label(label);
-  const absl::Status sent = SendRecords(in, request, *writer);
-  if (!sent.ok()) context.TryCancel();
-  writer->WritesDone();
-  const absl::Status status = FromRpc(writer->Finish(), stubs_->server);
-  if (!sent.ok()) return sent;
-  if (!status.ok()) return status;
-  return std::move(*response.mutable_modal_model());
+  return ImportModalModel([&](const RecordSink& sink) { return ReadRecords(in, sink); }, name,
+                          label);
 }
 
 void Client::SetAdminToken(const std::string& token) { stubs_->admin_token = token; }

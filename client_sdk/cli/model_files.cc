@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The commands that move models from files into the daemon and back.
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <utility>
+
+#include "absl/strings/ascii.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "absl/strings/strip.h"
+#include "client_sdk/cli/commands.h"
+#include "client_sdk/cli/find_model.h"
+#include "client_sdk/cli/output.h"
+#include "client_sdk/interchange/gltf_model.h"
+#include "client_sdk/interchange/model_records.h"
+#include "client_sdk/interchange/npz_model.h"
+#include "proto/error_reason.h"
+#include "proto/material_catalogue.h"
+
+namespace carillon::cli {
+namespace {
+
+using interchange::StoredModel;
+
+bool IsDigest(const std::string& text) {
+  return text.size() == 64 && std::ranges::all_of(text, [](unsigned char c) {
+           return absl::ascii_isdigit(c) || (c >= 'a' && c <= 'f');
+         });
+}
+
+/// "model", "glb", "gltf" or "npz".
+std::string FormatOf(const std::string& file, const std::string& format) {
+  if (!format.empty()) return format;
+  const std::string suffix =
+      absl::AsciiStrToLower(std::filesystem::path(file).extension().string());
+  const bool known = suffix == ".glb" || suffix == ".gltf" || suffix == ".npz";
+  return known ? suffix.substr(1) : "model";
+}
+
+bool IsGltf(const std::string& format) { return format == "glb" || format == "gltf"; }
+
+bool IsGiven(const v1::Material& material) {
+  return !material.preset().empty() || material.has_young_pa() || material.has_poisson_ratio() ||
+         material.has_density_kg_per_m3() || material.has_alpha1_s() || material.has_alpha2_per_s();
+}
+
+/// The material of the command line, which only a glTF has a use for.
+absl::StatusOr<v1::Material> MaterialFor(const std::string& format,
+                                         const MaterialFigures& figures) {
+  absl::StatusOr<v1::Material> material = ToMaterial(figures);
+  if (!material.ok() || IsGltf(format) || !IsGiven(*material)) return material;
+  return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
+                 absl::StrCat("a file of the format '", format,
+                              "' holds a model for every material; leave the material out"));
+}
+
+absl::StatusOr<StoredModel> Fetch(const client::Client& daemon, const std::string& name) {
+  interchange::ModelAssembler assembler;
+  const absl::Status status = daemon.ExportModalModel(
+      name, [&](const v1::ModalModelRecord& record) { return assembler.Append(record); });
+  if (!status.ok()) return status;
+  return assembler.Finish();
+}
+
+absl::Status WriteGltf(const client::Client& daemon, const std::string& name,
+                       const std::string& file, const v1::Material& given, bool binary) {
+  if (!IsGiven(given)) {
+    return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
+                   "a glTF holds the frequencies and decay rates of one material; give --material");
+  }
+  absl::StatusOr<v1::Material> material = ResolveMaterial(given);
+  if (!material.ok()) return material.status();
+  const absl::StatusOr<v1::ModalModelSummary> summary = daemon.GetModalModel(name);
+  if (!summary.ok()) return summary.status();
+  const absl::StatusOr<StoredModel> model = Fetch(daemon, name);
+  if (!model.ok()) return model.status();
+  if (!material->has_poisson_ratio()) {
+    material->set_poisson_ratio(model->header.settings().poisson_ratio());
+  }
+  return interchange::WriteGltfModel(
+      file, *model, *material, {.body = summary->label(), .material = given.preset()}, binary);
+}
+
+absl::Status WriteNpz(const client::Client& daemon, const std::string& name,
+                      const std::string& file) {
+  const absl::StatusOr<StoredModel> model = Fetch(daemon, name);
+  if (!model.ok()) return model.status();
+  return interchange::WriteNpz(file, *model);
+}
+
+absl::StatusOr<v1::ModalModelSummary> Store(const client::Client& daemon, const StoredModel& model,
+                                            const std::string& label) {
+  const auto send = [&](const client::Client::RecordSink& sink) {
+    return interchange::SendRecords(model, sink);
+  };
+  return daemon.ImportModalModel(send, "", label);
+}
+
+/// What an import has made.
+struct Imported {
+  v1::ModalModelSummary summary;
+  std::string sounds_with;  ///< the options of a material, where the file says one
+};
+
+absl::StatusOr<Imported> ImportGltf(const client::Client& daemon, const ImportOptions& options,
+                                    v1::Material material) {
+  if (!material.preset().empty()) {
+    absl::StatusOr<v1::Material> resolved = ResolveMaterial(material);
+    if (!resolved.ok()) return resolved.status();
+    material = *std::move(resolved);
+  }
+  const auto read = interchange::ReadGltfModel(options.file, options.pick, material);
+  if (!read.ok()) return read.status();
+  auto summary = Store(daemon, read->model, options.label.empty() ? read->label : options.label);
+  if (!summary.ok()) return summary.status();
+  const v1::Material& ours = read->material;
+  return Imported{
+      .summary = *std::move(summary),
+      .sounds_with = absl::StrFormat(
+          "--young %.9g --poisson %.9g --density %.9g --alpha1 %.9g --alpha2 %.9g", ours.young_pa(),
+          ours.poisson_ratio(), ours.density_kg_per_m3(), ours.alpha1_s(), ours.alpha2_per_s())};
+}
+
+absl::StatusOr<Imported> ImportNpz(const client::Client& daemon, const ImportOptions& options) {
+  const absl::StatusOr<StoredModel> model = interchange::ReadNpz(options.file);
+  if (!model.ok()) return model.status();
+  auto summary = Store(daemon, *model, options.label);
+  if (!summary.ok()) return summary.status();
+  return Imported{.summary = *std::move(summary), .sounds_with = ""};
+}
+
+/// A file whose name is a digest keeps that name: nothing in it has been rounded.
+absl::StatusOr<Imported> ImportStored(const client::Client& daemon, const ImportOptions& options) {
+  const std::string stem = std::filesystem::path(options.file).stem();
+  const std::string name = IsDigest(stem) ? absl::StrCat("modalModels/", stem) : "";
+  auto summary = daemon.ImportModalModel(options.file, name, options.label);
+  if (!summary.ok()) return summary.status();
+  return Imported{.summary = *std::move(summary), .sounds_with = ""};
+}
+
+}  // namespace
+
+absl::Status ExportModel(const client::Client& daemon, const ExportOptions& options) {
+  const auto name = FindModel(daemon, options.model);
+  if (!name.ok()) return name.status();
+  const std::string format = FormatOf(options.file, options.format);
+  const auto material = MaterialFor(format, options.material);
+  if (!material.ok()) return material.status();
+  const std::string file = options.file.empty()
+                               ? absl::StrCat(absl::StripPrefix(*name, "modalModels/"), ".", format)
+                               : options.file;
+  absl::Status status = IsGltf(format) ? WriteGltf(daemon, *name, file, *material, format == "glb")
+                        : format == "npz" ? WriteNpz(daemon, *name, file)
+                                          : daemon.ExportModalModel(*name, file);
+  if (status.ok()) absl::PrintF("%s\n", file);
+  return status;
+}
+
+absl::Status ImportModel(const client::Client& daemon, const ImportOptions& options, bool json) {
+  const std::string format = FormatOf(options.file, options.format);
+  const auto material = MaterialFor(format, options.material);
+  if (!material.ok()) return material.status();
+  const auto imported = IsGltf(format)    ? ImportGltf(daemon, options, *material)
+                        : format == "npz" ? ImportNpz(daemon, options)
+                                          : ImportStored(daemon, options);
+  if (!imported.ok()) return imported.status();
+  // To stderr, so that stdout is the name alone.
+  for (const std::string& warning : imported->summary.header().warnings()) {
+    absl::FPrintF(stderr, "carillon: %s\n", warning);
+  }
+  if (!imported->sounds_with.empty()) {
+    absl::FPrintF(stderr, "carillon: sounds as the file says with %s\n", imported->sounds_with);
+  }
+  if (json) {
+    PrintJson(imported->summary);
+  } else {
+    absl::PrintF("%s\n", imported->summary.name());
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace carillon::cli

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client_sdk/interchange/file_refusal.h"
+
+#include "absl/strings/str_cat.h"
+#include "proto/error_reason.h"
+
+namespace carillon::interchange {
+
+absl::Status Malformed(absl::string_view what) {
+  return Refusal(absl::StatusCode::kInvalidArgument, "MODEL_FILE_MALFORMED",
+                 absl::StrCat(what, ": copy the file again, or write it anew"));
+}
+
+absl::Status Incomplete(absl::string_view what, absl::string_view repair) {
+  return Refusal(absl::StatusCode::kInvalidArgument, "MODEL_FILE_INCOMPLETE",
+                 absl::StrCat(what, ": ", repair));
+}
+
+absl::Status TooLarge(absl::string_view what) {
+  return Refusal(absl::StatusCode::kResourceExhausted, "MODEL_FILE_TOO_LARGE",
+                 absl::StrCat(what, ": use the stored form (.model)"));
+}
+
+}  // namespace carillon::interchange

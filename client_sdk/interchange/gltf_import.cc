@@ -1,0 +1,276 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <numeric>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "client_sdk/interchange/complete_model.h"
+#include "client_sdk/interchange/file_refusal.h"
+#include "client_sdk/interchange/gltf_accessor.h"
+#include "client_sdk/interchange/gltf_document.h"
+#include "client_sdk/interchange/gltf_model.h"
+#include "client_sdk/interchange/gltf_nodes.h"
+#include "client_sdk/interchange/gltf_surface.h"
+#include "client_sdk/interchange/header_json.h"
+#include "client_sdk/interchange/rayleigh.h"
+
+namespace carillon::interchange {
+namespace {
+
+using nlohmann::json;
+
+constexpr double kPoissonTolerance = 1e-4;
+/// Decay rates off by more than this, relatively, are worth a warning: a tenth of a decibel a
+/// second where a mode decays by ten.
+constexpr double kDampingTolerance = 0.01;
+
+/// The arrays of a modal model as they lie in the file.
+struct GltfModes {
+  std::vector<float> frequencies_hz;
+  std::vector<float> decay_rates_per_s;
+  std::vector<float> positions;
+  std::vector<float> shapes;  ///< mode by mode, a vector a position
+  std::vector<uint32_t> indices;
+
+  size_t mode_count() const { return frequencies_hz.size(); }
+  size_t point_count() const { return positions.size() / 3; }
+};
+
+bool AllFinite(const std::vector<float>& numbers) {
+  return std::ranges::all_of(numbers, [](float x) { return std::isfinite(x); });
+}
+
+absl::Status Check(const GltfModes& modes) {
+  if (modes.decay_rates_per_s.size() != modes.mode_count()) {
+    return Malformed(absl::StrCat("there are ", modes.mode_count(), " frequencies, but ",
+                                  modes.decay_rates_per_s.size(), " decay rates"));
+  }
+  // Each count fits in memory, so that their product does not overflow.
+  if (modes.shapes.size() / 3 != modes.mode_count() * modes.point_count()) {
+    return Malformed(absl::StrCat("there are ", modes.shapes.size() / 3,
+                                  " shape vectors, not one for each of ", modes.mode_count(),
+                                  " modes and ", modes.point_count(), " positions"));
+  }
+  if (!AllFinite(modes.frequencies_hz) || !AllFinite(modes.decay_rates_per_s) ||
+      !AllFinite(modes.positions) || !AllFinite(modes.shapes)) {
+    return Malformed("a frequency, decay rate, position or shape is not finite");
+  }
+  if (std::ranges::min(modes.frequencies_hz) <= 0 ||
+      std::ranges::min(modes.decay_rates_per_s) < 0) {
+    return Malformed("a frequency is not above zero, or a decay rate is below");
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<GltfModes> ReadModes(GltfDocument& file, const json& model) {
+  GltfModes modes;
+  const auto read = [&](const char* name, const char* type, std::vector<float>& numbers) {
+    absl::StatusOr<std::vector<float>> found = ReadFloats(file, Member(model, name), name, type);
+    if (!found.ok()) return found.status();
+    numbers = *std::move(found);
+    return absl::OkStatus();
+  };
+  for (const absl::Status& status :
+       {read("frequencies", "SCALAR", modes.frequencies_hz),
+        read("decayRates", "SCALAR", modes.decay_rates_per_s),
+        read("positions", "VEC3", modes.positions), read("shapes", "VEC3", modes.shapes)}) {
+    if (!status.ok()) return status;
+  }
+  if (const json& indices = Member(model, "indices"); !indices.is_null()) {
+    absl::StatusOr<std::vector<uint32_t>> found = ReadIndices(file, indices, "indices");
+    if (!found.ok()) return found.status();
+    const absl::Status status = CheckTriangles(*found, modes.point_count());
+    if (!status.ok()) return status;
+    modes.indices = *std::move(found);
+  }
+  const absl::Status status = Check(modes);
+  if (!status.ok()) return status;
+  return modes;
+}
+
+/// Figures of the file where `given` has none. Damping stays open where neither has it.
+absl::StatusOr<v1::Material> MaterialOf(const GltfDocument& file, const json& model,
+                                        const v1::Material& given) {
+  const json& materials = Member(
+      Member(Member(file.root(), "extensions"), "KHR_audio_rigid_bodies"), "acousticMaterials");
+  const auto index = Whole(Member(model, "material"));
+  const bool known = index && materials.is_array() && *index < materials.size();
+  if (index && !known) return Malformed(absl::StrCat("there is no acoustic material ", *index));
+  const json& ours = known ? materials[*index] : Member(model, "");
+  v1::Material material = given;
+  material.clear_preset();
+  const auto fill = [&](const char* key, bool has, auto set) {
+    const auto figure = Number(Member(ours, key));
+    if (!has && figure) set(*figure);
+  };
+  fill("density", given.has_density_kg_per_m3(),
+       [&](double x) { material.set_density_kg_per_m3(x); });
+  fill("youngsModulus", given.has_young_pa(), [&](double x) { material.set_young_pa(x); });
+  fill("poissonRatio", given.has_poisson_ratio(), [&](double x) { material.set_poisson_ratio(x); });
+  fill("beta", given.has_alpha1_s(), [&](double x) { material.set_alpha1_s(x); });
+  fill("alpha", given.has_alpha2_per_s(), [&](double x) { material.set_alpha2_per_s(x); });
+  if (!material.has_density_kg_per_m3() || !material.has_young_pa() ||
+      !material.has_poisson_ratio()) {
+    return Incomplete(
+        "the glTF file does not say density, Young's modulus and Poisson's ratio of the "
+        "modal model's material",
+        "give --material, or --density, --young and --poisson");
+  }
+  const double density = material.density_kg_per_m3();
+  const double young = material.young_pa();
+  const double poisson = material.poisson_ratio();
+  if (!(density > 0 && young > 0 && std::isfinite(density + young) && poisson > -1 &&
+        poisson < 0.5)) {
+    return Malformed("density, Young's modulus or Poisson's ratio of the material is impossible");
+  }
+  return material;
+}
+
+std::vector<DampedMode> Damped(const GltfModes& modes) {
+  std::vector<DampedMode> damped;
+  for (size_t m = 0; m < modes.mode_count(); ++m) {
+    const double omega = 2 * std::numbers::pi * modes.frequencies_hz[m];
+    const double decay = modes.decay_rates_per_s[m];
+    damped.push_back({.omega2 = omega * omega + decay * decay, .decay_per_s = decay});
+  }
+  return damped;
+}
+
+/// Makes the material damp as the decay rates say, as nearly as it can; warns where that is not
+/// near.
+void SetDamping(const std::vector<DampedMode>& modes, v1::Material& material,
+                v1::ModalModelHeader& header) {
+  Rayleigh damping = {material.alpha1_s(), material.alpha2_per_s()};
+  const bool known = material.has_alpha1_s() && material.has_alpha2_per_s();
+  if (!known || Deviation(damping, modes) > kDampingTolerance) damping = FitRayleigh(modes);
+  material.set_alpha1_s(damping.alpha1_s);
+  material.set_alpha2_per_s(damping.alpha2_per_s);
+  const double off = Deviation(damping, modes);
+  if (off <= kDampingTolerance) return;
+  header.add_warnings(absl::StrFormat(
+      "the decay rates of the file are those of no material: alpha1 %.4g s and alpha2 %.4g 1/s are "
+      "nearest, and off by up to %.0f %%",
+      damping.alpha1_s, damping.alpha2_per_s, 100 * off));
+}
+
+/// Eigenvalues for unit material, ascending, and shapes with their modes in that order: those of
+/// `points`, one for each vertex.
+void SetModes(const GltfModes& modes, const std::vector<DampedMode>& damped,
+              const std::vector<uint32_t>& points, const v1::Material& material,
+              StoredModel& model) {
+  std::vector<size_t> order(modes.mode_count());
+  std::iota(order.begin(), order.end(), size_t{0});
+  std::ranges::stable_sort(order, {}, [&](size_t mode) { return damped[mode].omega2; });
+  for (const size_t mode : order) {
+    model.eigenvalues.push_back(damped[mode].omega2 * material.density_kg_per_m3() /
+                                material.young_pa());
+  }
+  const double scale = std::sqrt(material.density_kg_per_m3());
+  model.shapes.reserve(points.size() * 3 * order.size());
+  for (const uint32_t point : points) {
+    for (size_t axis = 0; axis < 3; ++axis) {
+      for (const size_t mode : order) {
+        const float shape = modes.shapes[(mode * modes.point_count() + point) * 3 + axis];
+        model.shapes.push_back(static_cast<float>(shape * scale));
+      }
+    }
+  }
+}
+
+/// The sounding surface: the triangles between the sample points, or else the mesh of the node,
+/// each of whose vertices moves as the nearest sample point, as the draft has it. Returns the
+/// sample point of each vertex.
+absl::StatusOr<std::vector<uint32_t>> SetSurface(GltfDocument& file, const ChosenModel& chosen,
+                                                 const GltfModes& modes, StoredModel& model) {
+  std::vector<uint32_t> points(modes.point_count());
+  std::iota(points.begin(), points.end(), 0U);
+  if (!modes.indices.empty()) {
+    model.vertices = modes.positions;
+    model.triangles = modes.indices;
+  } else {
+    if (!chosen.mesh) {
+      return Incomplete("the modal model has sample points without triangles, and its node no mesh",
+                        "store the triangles as the model's indices");
+    }
+    absl::StatusOr<GltfSurface> mesh = ReadMesh(file, *chosen.mesh);
+    if (!mesh.ok()) return mesh.status();
+    if (!AllFinite(mesh->vertices)) return Malformed("a vertex of the mesh is not finite");
+    points = NearestPoints(modes.positions, mesh->vertices);
+    model.vertices = std::move(mesh->vertices);
+    model.triangles = std::move(mesh->triangles);
+  }
+  for (float& x : model.vertices) x = static_cast<float>(x * chosen.metres_per_unit);
+  return points;
+}
+
+/// The surface as given, where a Carillon wrote the file and nobody has changed it since; else it
+/// is left out.
+void SetGivenSurface(GltfDocument& file, const ChosenModel& chosen, StoredModel& model) {
+  const json& ours = Member(Member(Member(*chosen.model, "extras"), "carillon"), "givenTriangle");
+  if (ours.is_null() || !chosen.mesh) return;
+  absl::StatusOr<std::vector<uint32_t>> lies_on = ReadIndices(file, ours, "givenTriangle");
+  absl::StatusOr<GltfSurface> mesh = ReadMesh(file, *chosen.mesh);
+  if (!lies_on.ok() || !mesh.ok() || !AllFinite(mesh->vertices)) return;
+  if (lies_on->size() != model.triangle_count()) return;
+  if (std::ranges::max(*lies_on) >= mesh->triangles.size() / 3) return;
+  model.given_triangle = *std::move(lies_on);
+  model.given_vertices = std::move(mesh->vertices);
+  model.given_triangles = std::move(mesh->triangles);
+  for (float& x : model.given_vertices) x = static_cast<float>(x * chosen.metres_per_unit);
+}
+
+/// The header that a Carillon wrote, where it is still true; else what the file says of itself.
+v1::ModalModelHeader HeaderOf(const GltfDocument& file, const ChosenModel& chosen,
+                              const GltfModes& modes, const v1::Material& material) {
+  const json& ours = Member(Member(Member(*chosen.model, "extras"), "carillon"), "header");
+  const auto written = ours.is_object() ? HeaderFromJson(ours.dump()) : std::nullopt;
+  if (written && written->mode_count() == modes.mode_count() && chosen.metres_per_unit == 1 &&
+      std::abs(written->settings().poisson_ratio() - material.poisson_ratio()) <=
+          kPoissonTolerance) {
+    return *written;
+  }
+  v1::ModalModelHeader header;
+  header.mutable_settings()->set_poisson_ratio(material.poisson_ratio());
+  header.mutable_settings()->set_metres_per_unit(chosen.metres_per_unit);
+  const std::string generator = Text(Member(Member(file.root(), "asset"), "generator"));
+  header.set_solver(
+      absl::StrCat("glTF", generator.empty() ? "" : " by ", generator.substr(0, 100)));
+  header.add_warnings("read from a glTF file, which does not say whether modes are missing");
+  return header;
+}
+
+}  // namespace
+
+absl::StatusOr<GltfModel> ReadGltfModel(const std::string& path, const std::string& pick,
+                                        const v1::Material& material) {
+  absl::StatusOr<GltfDocument> file = GltfDocument::Read(path);
+  if (!file.ok()) return file.status();
+  const absl::StatusOr<ChosenModel> chosen = ChooseModel(*file, pick);
+  if (!chosen.ok()) return chosen.status();
+  const absl::StatusOr<GltfModes> modes = ReadModes(*file, *chosen->model);
+  if (!modes.ok()) return modes.status();
+  absl::StatusOr<v1::Material> resolved = MaterialOf(*file, *chosen->model, material);
+  if (!resolved.ok()) return resolved.status();
+  GltfModel result = {
+      .model = {}, .label = Text(Member(*chosen->model, "name")), .material = *resolved};
+  const absl::StatusOr<std::vector<uint32_t>> points =
+      SetSurface(*file, *chosen, *modes, result.model);
+  if (!points.ok()) return points.status();
+  SetGivenSurface(*file, *chosen, result.model);
+  result.model.header = HeaderOf(*file, *chosen, *modes, *resolved);
+  const std::vector<DampedMode> damped = Damped(*modes);
+  SetDamping(damped, result.material, result.model.header);
+  SetModes(*modes, damped, *points, *resolved, result.model);
+  const absl::Status status = Complete(result.model);
+  if (!status.ok()) return status;
+  return result;
+}
+
+}  // namespace carillon::interchange

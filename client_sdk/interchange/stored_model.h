@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "carillon/v1/modal_model.pb.h"
+
+namespace carillon::interchange {
+
+/// A modal model in memory as proto/carillon/v1/modal_model.proto stores it: unit Young's modulus
+/// and density. Arrays are flat and row-major, with #V vertices and #T triangles of the sounding
+/// surface, #G and #H of the surface as given, #m modes.
+struct StoredModel {
+  /// All but what the arrays say: `arrays` and `mode_count` are filled in where it is written.
+  v1::ModalModelHeader header;
+  std::vector<double> eigenvalues;        ///< #m, ascending
+  std::vector<double> residuals;          ///< #m
+  std::vector<double> couplings;          ///< #m
+  std::vector<float> vertices;            ///< #V by 3, m
+  std::vector<uint32_t> triangles;        ///< #T by 3
+  std::vector<uint32_t> given_triangle;   ///< #T
+  std::vector<float> given_vertices;      ///< #G by 3, m
+  std::vector<uint32_t> given_triangles;  ///< #H by 3
+  std::vector<float> shapes;              ///< #V by 3 by #m, 1/kg^(1/2)
+
+  size_t mode_count() const { return eigenvalues.size(); }
+  size_t vertex_count() const { return vertices.size() / 3; }
+  size_t triangle_count() const { return triangles.size() / 3; }
+};
+
+/// Calls `visit(name, numbers, dimensions)` for each array of format version 1 in its order. Each
+/// letter of `dimensions` is one of modal_model.proto, or '3'.
+template <class Model, class Visitor>
+void VisitArrays(Model& model, Visitor visit) {
+  visit("eigenvalues", model.eigenvalues, "m");
+  visit("residuals", model.residuals, "m");
+  visit("couplings", model.couplings, "m");
+  visit("vertices", model.vertices, "V3");
+  visit("triangles", model.triangles, "T3");
+  visit("given_triangle", model.given_triangle, "T");
+  visit("given_vertices", model.given_vertices, "G3");
+  visit("given_triangles", model.given_triangles, "H3");
+  visit("shapes", model.shapes, "V3m");
+}
+
+/// The sizes that the letters of VisitArrays stand for.
+std::vector<uint64_t> Shape(const StoredModel& model, std::string_view dimensions);
+
+/// Whether the arrays fit together, numbers are finite, eigenvalues positive and ascending, and
+/// indices in range. Errors: InvalidArgument (MODEL_FILE_MALFORMED).
+absl::Status Validate(const StoredModel& model);
+
+}  // namespace carillon::interchange

@@ -1,0 +1,346 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client_sdk/interchange/gltf_model.h"
+
+#include <gmock/gmock.h>
+#include <google/protobuf/util/message_differencer.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <random>
+
+#include "absl/strings/escaping.h"
+#include "tests/client_sdk/interchange/small_model.h"
+
+namespace carillon::interchange {
+namespace {
+
+using google::protobuf::util::MessageDifferencer;
+using nlohmann::json;
+using testing::HasSubstr;
+using testing::TempDir;
+
+// Single precision, twice rounded.
+constexpr double kTolerance = 2.5e-7;
+
+template <class T>
+void ExpectNear(const std::vector<T>& a, const std::vector<T>& b) {
+  ASSERT_EQ(a.size(), b.size());
+  for (size_t i = 0; i < a.size(); ++i) {
+    EXPECT_NEAR(a[i], b[i], kTolerance * std::abs(double{b[i]})) << i;
+  }
+}
+
+class GltfModelTest : public testing::Test {
+ protected:
+  absl::Status Write(const v1::Material& material = SmallMaterial()) const {
+    return WriteGltfModel(path_, model_, material, {.body = "bell", .material = "metal"}, false);
+  }
+
+  absl::StatusOr<GltfModel> Read(const std::string& pick = "",
+                                 const v1::Material& given = {}) const {
+    return ReadGltfModel(path_, pick, given);
+  }
+
+  /// What becomes of a good file in which `change` changes something.
+  absl::StatusOr<GltfModel> ReadChanged(const std::function<void(json&)>& change,
+                                        const std::string& pick = "",
+                                        const v1::Material& given = {}) const {
+    EXPECT_TRUE(Write().ok());
+    json file = json::parse(ReadBytes(path_));
+    change(file);
+    WriteBytes(path_, file.dump());
+    return Read(pick, given);
+  }
+
+  std::string Refused(const std::function<void(json&)>& change,
+                      const std::string& pick = "") const {
+    return ReadChanged(change, pick).status().ToString();
+  }
+
+  static json& Extension(json& file) { return file["extensions"]["KHR_audio_rigid_bodies"]; }
+  static json& Model(json& file) { return Extension(file)["modalModels"][0]; }
+  static json& Accessor(json& file, const char* name) {
+    return file["accessors"][Model(file)[name].get<size_t>()];
+  }
+
+  const StoredModel model_ = SmallModel();
+  const std::string path_ =
+      TempDir() + testing::UnitTest::GetInstance()->current_test_info()->name() + ".gltf";
+};
+
+TEST_F(GltfModelTest, WhatIsWrittenIsReadBackInSinglePrecision) {
+  for (const bool binary : {false, true}) {
+    ASSERT_TRUE(
+        WriteGltfModel(path_, model_, SmallMaterial(), {.body = "bell", .material = ""}, binary)
+            .ok());
+    const auto read = Read();
+    ASSERT_TRUE(read.ok()) << read.status();
+    EXPECT_EQ(read->label, "bell");
+    const StoredModel& model = read->model;
+    EXPECT_TRUE(MessageDifferencer::Equals(read->material, SmallMaterial()));
+    EXPECT_TRUE(MessageDifferencer::Equals(model.header, model_.header));
+    ExpectNear(model.eigenvalues, model_.eigenvalues);
+    ExpectNear(model.shapes, model_.shapes);
+    for (size_t m = 0; m < 3; ++m) {
+      EXPECT_NEAR(model.couplings[m] / model_.couplings[m], 1, 1e-6) << m;
+    }
+    EXPECT_EQ(model.vertices, model_.vertices);
+    EXPECT_EQ(model.triangles, model_.triangles);
+    EXPECT_EQ(model.given_triangle, model_.given_triangle);
+    EXPECT_EQ(model.given_vertices, model_.given_vertices);
+    EXPECT_EQ(model.given_triangles, model_.given_triangles);
+  }
+}
+
+TEST_F(GltfModelTest, AForeignFileGivesItsSamplePointsAsBothSurfaces) {
+  const auto read = ReadChanged([](json& file) { Model(file).erase("extras"); });
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_EQ(read->model.given_triangles, model_.triangles);
+  EXPECT_EQ(read->model.given_vertices, model_.vertices);
+  EXPECT_EQ(read->model.header.solver(), "glTF by Carillon");
+  EXPECT_THAT(read->model.header.warnings(0), HasSubstr("does not say whether modes are missing"));
+}
+
+TEST_F(GltfModelTest, WithoutIndicesTheMeshMovesAsTheNearestSamplePoints) {
+  const auto read = ReadChanged([](json& file) {
+    Model(file).erase("indices");
+    Model(file).erase("extras");
+  });
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_EQ(read->model.vertices, model_.given_vertices);
+  EXPECT_EQ(read->model.triangles, model_.given_triangles);
+  const std::vector<float> four(read->model.shapes.begin(), read->model.shapes.begin() + 36);
+  ExpectNear(four, model_.shapes);
+}
+
+TEST_F(GltfModelTest, WithoutIndicesAndMeshItIsIncomplete) {
+  EXPECT_THAT(Refused([](json& file) {
+                Model(file).erase("indices");
+                file["nodes"][0].erase("mesh");
+              }),
+              HasSubstr("MODEL_FILE_INCOMPLETE: "));
+}
+
+TEST_F(GltfModelTest, TheScaleOfTheNodeAndItsParentsIsTheSize) {
+  const auto read = ReadChanged([](json& file) {
+    file["nodes"][0]["scale"] = {0.5, 0.5, 0.5};
+    file["nodes"][0]["rotation"] = {0, 0.6, 0, 0.8};
+    file["nodes"].push_back(
+        {{"children", {0}}, {"matrix", {0, 4, 0, 0, -4, 0, 0, 0, 0, 0, 4, 0, 1, 2, 3, 1}}});
+  });
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_NEAR(read->model.vertices[3], 2, 1e-6);
+  EXPECT_NEAR(read->model.given_vertices[12], 1, 1e-6);
+  // What sounds, sounds at the size it has: frequencies stay.
+  ExpectNear(read->model.eigenvalues, model_.eigenvalues);
+}
+
+TEST_F(GltfModelTest, UnevenScaleAndNodesInACircleAreRefused) {
+  EXPECT_THAT(Refused([](json& file) {
+                file["nodes"][0]["scale"] = {1, 1, 2};
+              }),
+              HasSubstr("MODEL_FILE_MALFORMED: "));
+  EXPECT_THAT(Refused([](json& file) {
+                file["nodes"][0]["scale"] = {1, 1};
+              }),
+              HasSubstr("MODEL_FILE_MALFORMED: "));
+  EXPECT_THAT(Refused([](json& file) { file["nodes"][0]["children"] = {0}; }),
+              HasSubstr("MODEL_FILE_MALFORMED: "));
+}
+
+void AddSecondModel(json& file) {
+  json& models = file["extensions"]["KHR_audio_rigid_bodies"]["modalModels"];
+  models.push_back(models[0]);
+  models[1]["name"] = "second";
+  file["nodes"].push_back({{"name", "large"},
+                           {"scale", {2, 2, 2}},
+                           {"extensions", {{"KHR_audio_rigid_bodies", {{"modalModel", 0}}}}}});
+}
+
+TEST_F(GltfModelTest, OfSeveralModelsOneIsPicked) {
+  EXPECT_THAT(Refused(AddSecondModel), HasSubstr("MODEL_FILE_AMBIGUOUS: "));
+  EXPECT_THAT(Refused(AddSecondModel, "third"), HasSubstr("0: bell, 1: second"));
+  EXPECT_THAT(Refused(AddSecondModel, "2"), HasSubstr("MODEL_FILE_AMBIGUOUS: "));
+  EXPECT_EQ(ReadChanged(AddSecondModel, "second")->label, "second");
+  EXPECT_EQ(ReadChanged(AddSecondModel, "1")->label, "second");
+  // Two nodes of different size sound with the first; its own name is that of one of them too.
+  EXPECT_THAT(Refused(AddSecondModel, "0"), HasSubstr("different scale"));
+  const auto large = ReadChanged(AddSecondModel, "large");
+  ASSERT_TRUE(large.ok()) << large.status();
+  EXPECT_EQ(large->model.vertices[3], 2);
+}
+
+TEST_F(GltfModelTest, AMaterialThatTheFileLacksMustBeGiven) {
+  const auto forget = [](json& file) { Model(file).erase("material"); };
+  EXPECT_THAT(Refused(forget), HasSubstr("MODEL_FILE_INCOMPLETE: "));
+  const auto read = ReadChanged(forget, "", SmallMaterial());
+  ASSERT_TRUE(read.ok()) << read.status();
+  ExpectNear(read->model.eigenvalues, model_.eigenvalues);
+}
+
+TEST_F(GltfModelTest, DampingIsFittedToTheDecayRates) {
+  const auto read = ReadChanged([](json& file) {
+    Extension(file)["acousticMaterials"][0].erase("alpha");
+    Extension(file)["acousticMaterials"][0].erase("beta");
+  });
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_NEAR(read->material.alpha1_s(), 1e-7, 1e-12);
+  EXPECT_NEAR(read->material.alpha2_per_s(), 3, 1e-4);
+  EXPECT_EQ(read->model.header.warnings_size(), 1);
+}
+
+TEST_F(GltfModelTest, DecayRatesOfNoMaterialGiveAWarning) {
+  // The decay rates in the place of frequencies, and the reverse: they fall where they should rise.
+  const auto read = ReadChanged([](json& file) {
+    Extension(file)["acousticMaterials"][0]["alpha"] = 5000;
+    Model(file)["decayRates"] = Model(file)["frequencies"];
+  });
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_THAT(read->model.header.warnings(1), HasSubstr("are those of no material"));
+}
+
+TEST_F(GltfModelTest, AnotherPoissonsRatioIsRefused) {
+  v1::Material material = SmallMaterial();
+  material.set_poisson_ratio(0.3);
+  EXPECT_THAT(Write(material).ToString(), HasSubstr("POISSON_RATIO_DIFFERS: "));
+}
+
+TEST_F(GltfModelTest, OverdampedModesAreLeftOutAndSaidToBe) {
+  v1::Material material = SmallMaterial();
+  // Critical damping lies between the first eigenvalue and the second.
+  material.set_alpha2_per_s(2 * std::sqrt(1.0 * 7e10 / 2700));
+  material.set_alpha1_s(0);
+  ASSERT_TRUE(Write(material).ok());
+  const auto read = Read();
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_EQ(read->model.mode_count(), 2);
+  EXPECT_LT(read->model.header.complete_to_eigenvalue(), model_.eigenvalues[0]);
+  EXPECT_THAT(read->model.header.warnings(1), HasSubstr("left out 1 modes"));
+  material.set_alpha2_per_s(1e9);
+  EXPECT_THAT(Write(material).ToString(), HasSubstr("NO_MODE_IN_BAND: "));
+}
+
+TEST_F(GltfModelTest, AFileWithoutModalModelsIsIncomplete) {
+  for (const auto& change : std::vector<std::function<void(json&)>>{
+           [](json& file) { file.erase("extensions"); }, [](json& file) { file["extensions"] = 3; },
+           [](json& file) { Extension(file)["modalModels"] = json::array(); },
+           [](json& file) { Extension(file)["modalModels"] = "none"; }}) {
+    EXPECT_THAT(Refused(change), HasSubstr("MODEL_FILE_INCOMPLETE: "));
+  }
+}
+
+TEST_F(GltfModelTest, WrongCountsSizesIndicesAndTypesAreRefused) {
+  const std::vector<std::function<void(json&)>> changes = {
+      [](json& file) { Model(file)["shapes"] = 99; },
+      [](json& file) { Model(file)["shapes"] = -1; },
+      [](json& file) { Model(file)["shapes"] = "shapes"; },
+      [](json& file) { Model(file).erase("frequencies"); },
+      [](json& file) { Model(file)["material"] = 1; },
+      [](json& file) { Model(file)["decayRates"] = Model(file)["indices"]; },
+      [](json& file) { Model(file)["positions"] = Model(file)["frequencies"]; },
+      [](json& file) { Model(file)["indices"] = Model(file)["frequencies"]; },
+      [](json& file) { Accessor(file, "shapes")["count"] = 11; },
+      [](json& file) { Accessor(file, "shapes")["count"] = 13; },
+      [](json& file) { Accessor(file, "shapes")["count"] = UINT64_MAX / 12 + 2; },
+      [](json& file) { Accessor(file, "shapes")["count"] = 1e300; },
+      [](json& file) { Accessor(file, "shapes")["count"] = 0; },
+      [](json& file) { Accessor(file, "decayRates")["count"] = 2; },
+      [](json& file) { Accessor(file, "positions")["count"] = 3; },
+      [](json& file) { Accessor(file, "indices")["count"] = 11; },
+      [](json& file) { Accessor(file, "shapes")["byteOffset"] = UINT64_MAX; },
+      [](json& file) { Accessor(file, "shapes")["componentType"] = 5130; },
+      [](json& file) { Accessor(file, "shapes").erase("bufferView"); },
+      [](json& file) { Accessor(file, "shapes")["sparse"] = json::object(); },
+      [](json& file) { file["bufferViews"][3]["byteLength"] = UINT64_MAX; },
+      [](json& file) { file["bufferViews"][3]["byteOffset"] = UINT64_MAX - 4; },
+      [](json& file) { file["bufferViews"][3]["byteStride"] = 0; },
+      [](json& file) { file["bufferViews"][3]["byteStride"] = 4; },
+      [](json& file) { file["bufferViews"][3]["byteStride"] = UINT64_MAX; },
+      [](json& file) { file["bufferViews"][3]["buffer"] = 1; },
+      [](json& file) { file["bufferViews"] = nullptr; },
+      [](json& file) { file["buffers"][0].erase("uri"); },
+      [](json& file) { file["buffers"][0]["uri"] = "data:application/octet-stream;base64,??"; },
+      [](json& file) { file["buffers"][0]["uri"] = "../../../etc/passwd"; },
+      [](json& file) { file["buffers"][0]["uri"] = "%2e%2e/secret"; },
+      [](json& file) { file["buffers"][0]["uri"] = "/etc/passwd"; },
+      [](json& file) { file["buffers"][0]["uri"] = "file:///etc/passwd"; },
+      [](json& file) {
+        file["nodes"][0]["extensions"]["KHR_audio_rigid_bodies"]["modalModel"] = 0;
+        Extension(file)["acousticMaterials"][0]["density"] = -1;
+      },
+      [](json& file) { file["asset"]["version"] = "1.0"; }};
+  for (size_t i = 0; i < changes.size(); ++i) {
+    EXPECT_THAT(Refused(changes[i]), HasSubstr("MODEL_FILE_MALFORMED: ")) << i;
+  }
+}
+
+TEST_F(GltfModelTest, NumbersThatAreNoneAreRefused) {
+  // Where a shape stood, a NaN; where an index stood, one that is out of range. All arrays lie in
+  // one buffer, in a file beside this one.
+  struct Change {
+    const char* array;
+    uint32_t bits;
+  };
+  for (const auto& [array, bits] :
+       {Change{"frequencies", 0x7fc00000}, Change{"frequencies", 0x80000000},
+        Change{"decayRates", 0xbf800000}, Change{"positions", 0x7f800000},
+        Change{"shapes", 0xff800000}, Change{"indices", 4}}) {
+    EXPECT_TRUE(WriteGltfModel(path_, model_, SmallMaterial(), {}, true).ok());
+    std::string bytes = ReadBytes(path_);
+    uint32_t json_bytes = 0;
+    std::memcpy(&json_bytes, bytes.data() + 12, sizeof json_bytes);
+    json file = json::parse(bytes.substr(20, json_bytes));
+    const size_t view = Accessor(file, array)["bufferView"];
+    const size_t at = 28 + json_bytes + file["bufferViews"][view]["byteOffset"].get<size_t>();
+    std::memcpy(bytes.data() + at, &bits, sizeof bits);
+    WriteBytes(path_, bytes);
+    EXPECT_THAT(Read().status().ToString(), HasSubstr("MODEL_FILE_MALFORMED: ")) << array;
+  }
+}
+
+TEST_F(GltfModelTest, ABufferMayBeAFileBesideIt) {
+  const auto read = ReadChanged([&](json& file) {
+    const std::string uri = file["buffers"][0]["uri"];
+    std::string bytes;
+    ASSERT_TRUE(absl::Base64Unescape(uri.substr(uri.find(',') + 1), &bytes));
+    WriteBytes(TempDir() + "a buffer.bin", bytes);
+    file["buffers"][0]["uri"] = "a%20buffer.bin";
+  });
+  ASSERT_TRUE(read.ok()) << read.status();
+  ExpectNear(read->model.shapes, model_.shapes);
+}
+
+TEST_F(GltfModelTest, AFileCutShortAnywhereIsRefused) {
+  for (const bool binary : {false, true}) {
+    EXPECT_TRUE(WriteGltfModel(path_, model_, SmallMaterial(), {}, binary).ok());
+    const std::string whole = ReadBytes(path_);
+    for (size_t size = 0; size + 1 < whole.size(); size += 7) {
+      WriteBytes(path_, whole.substr(0, size));
+      EXPECT_THAT(Read().status().ToString(), HasSubstr("MODEL_FILE_MALFORMED: ")) << size;
+    }
+  }
+}
+
+TEST_F(GltfModelTest, WhateverBytesChangeTheReaderLives) {
+  std::mt19937 random(1);
+  for (const bool binary : {false, true}) {
+    EXPECT_TRUE(WriteGltfModel(path_, model_, SmallMaterial(), {}, binary).ok());
+    const std::string whole = ReadBytes(path_);
+    for (int i = 0; i < 500; ++i) {
+      std::string changed = whole;
+      for (int k = 0; k < 3; ++k) {
+        changed[random() % changed.size()] = static_cast<char>(random() % 256);
+      }
+      WriteBytes(path_, changed);
+      const auto read = Read();
+      EXPECT_TRUE(!read.ok() || Validate(read->model).ok()) << i;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace carillon::interchange

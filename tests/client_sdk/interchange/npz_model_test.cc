@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client_sdk/interchange/npz_model.h"
+
+#include <gmock/gmock.h>
+#include <google/protobuf/util/message_differencer.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <random>
+
+#include "client_sdk/interchange/npy_array.h"
+#include "client_sdk/interchange/zip_archive.h"
+#include "tests/client_sdk/interchange/small_model.h"
+
+namespace carillon::interchange {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::TempDir;
+
+template <class T>
+ZipEntry Entry(const std::string& name, const std::string& type, const std::vector<uint64_t>& shape,
+               const std::vector<T>& numbers) {
+  return {
+      .name = name + ".npy",
+      .head = NpyHeader(type, shape) + std::string(reinterpret_cast<const char*>(numbers.data()),
+                                                   numbers.size() * sizeof(T)),
+      .body = {}};
+}
+
+class NpzModel : public testing::Test {
+ protected:
+  /// The least that makes a model, with NumPy's usual types.
+  std::vector<ZipEntry> Least() const {
+    const std::vector<double> vertices(model_.vertices.begin(), model_.vertices.end());
+    const std::vector<int64_t> triangles(model_.triangles.begin(), model_.triangles.end());
+    return {Entry("eigenvalues", "<f8", {3}, model_.eigenvalues),
+            Entry("vertices", "<f8", {4, 3}, vertices),
+            Entry("triangles", "<i8", {4, 3}, triangles),
+            Entry("shapes", "<f4", {4, 3, 3}, model_.shapes),
+            Entry("poisson_ratio", "<f8", {}, std::vector<double>{0.3})};
+  }
+
+  absl::StatusOr<StoredModel> ReadBack(const std::vector<ZipEntry>& entries) const {
+    EXPECT_TRUE(WriteZip(path_, entries).ok());
+    return ReadNpz(path_);
+  }
+
+  std::string Refused(const std::vector<ZipEntry>& entries) const {
+    return ReadBack(entries).status().ToString();
+  }
+
+  const StoredModel model_ = SmallModel();
+  const std::string path_ =
+      TempDir() + testing::UnitTest::GetInstance()->current_test_info()->name() + ".npz";
+};
+
+TEST_F(NpzModel, WhatIsWrittenIsReadBackToTheBit) {
+  ASSERT_TRUE(WriteNpz(path_, model_).ok());
+  const auto read = ReadNpz(path_);
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_EQ(read->eigenvalues, model_.eigenvalues);
+  EXPECT_EQ(read->residuals, model_.residuals);
+  EXPECT_EQ(read->couplings, model_.couplings);
+  EXPECT_EQ(read->vertices, model_.vertices);
+  EXPECT_EQ(read->triangles, model_.triangles);
+  EXPECT_EQ(read->given_triangle, model_.given_triangle);
+  EXPECT_EQ(read->given_vertices, model_.given_vertices);
+  EXPECT_EQ(read->given_triangles, model_.given_triangles);
+  EXPECT_EQ(read->shapes, model_.shapes);
+  EXPECT_TRUE(google::protobuf::util::MessageDifferencer::Equals(read->header, model_.header))
+      << read->header.DebugString();
+}
+
+TEST_F(NpzModel, TheSameModelGivesTheSameBytes) {
+  ASSERT_TRUE(WriteNpz(path_, model_).ok());
+  const std::string first = ReadBytes(path_);
+  ASSERT_TRUE(WriteNpz(path_, model_).ok());
+  EXPECT_EQ(ReadBytes(path_), first);
+}
+
+TEST_F(NpzModel, WhatAResearcherLeavesOutIsMade) {
+  const auto read = ReadBack(Least());
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_EQ(read->vertices, model_.vertices);
+  EXPECT_EQ(read->triangles, model_.triangles);
+  EXPECT_EQ(read->given_triangles, model_.triangles);
+  EXPECT_THAT(read->given_triangle, ElementsAre(0, 1, 2, 3));
+  EXPECT_EQ(read->couplings, model_.couplings);
+  EXPECT_EQ(read->header.complete_to_eigenvalue(), model_.eigenvalues.back());
+  EXPECT_DOUBLE_EQ(read->header.volume_m3(), 1.0 / 6);
+  EXPECT_EQ(read->header.settings().poisson_ratio(), 0.3);
+}
+
+TEST_F(NpzModel, ArraysInFortransOrderAreTurned) {
+  // Row-major 4 by 3 as NumPy stores its transpose's memory: column by column.
+  std::vector<double> columns;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    for (size_t v = 0; v < 4; ++v) columns.push_back(model_.vertices[3 * v + axis]);
+  }
+  std::vector<ZipEntry> entries = Least();
+  entries[1] = Entry("vertices", "<f8", {4, 3}, columns);
+  const size_t at = entries[1].head.find("False");
+  entries[1].head.replace(at, 5, "True ");
+  const auto read = ReadBack(entries);
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_EQ(read->vertices, model_.vertices);
+}
+
+TEST_F(NpzModel, AModelWithoutWhatItNeedsIsIncomplete) {
+  for (const size_t missing : {0U, 1U, 2U, 3U, 4U}) {
+    std::vector<ZipEntry> entries = Least();
+    entries.erase(entries.begin() + static_cast<ptrdiff_t>(missing));
+    EXPECT_THAT(Refused(entries), HasSubstr("MODEL_FILE_INCOMPLETE: ")) << missing;
+  }
+}
+
+TEST_F(NpzModel, ArraysThatAreWrongAreRefusedByName) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const std::vector<std::pair<size_t, ZipEntry>> wrong = {
+      {0, Entry("eigenvalues", "<f8", {3}, std::vector<double>{1, nan, 3})},
+      {0, Entry("eigenvalues", "<f8", {3}, std::vector<double>{3, 2, 1})},
+      {0, Entry("eigenvalues", "<f8", {3}, std::vector<double>{0, 2, 3})},
+      {0, Entry("eigenvalues", "<f8", {4}, std::vector<double>{1, 2, 3})},
+      {0, Entry("eigenvalues", ">f8", {3}, std::vector<double>{1, 2, 3})},
+      {0, Entry("eigenvalues", "<f8", {1ULL << 62, 8}, std::vector<double>{1, 2, 3})},
+      {0, Entry("eigenvalues", "<f8", {0}, std::vector<double>{})},
+      {1, Entry("vertices", "<f8", {3, 4}, std::vector<double>(12, 1.0))},
+      {2, Entry("triangles", "<i8", {4, 3}, std::vector<int64_t>(12, 4))},
+      {2, Entry("triangles", "<i8", {4, 3}, std::vector<int64_t>(12, -1))},
+      {2, Entry("triangles", "<i8", {4, 3}, std::vector<int64_t>(12, int64_t{1} << 32))},
+      {2, Entry("triangles", "<f8", {4, 3}, std::vector<double>(12, 1))},
+      {3, Entry("shapes", "<f4", {4, 3, 4}, std::vector<float>(48, 1))},
+      {3, Entry("shapes", "<f4", {3, 3, 3}, std::vector<float>(27, 1))},
+      {4, Entry("poisson_ratio", "<f8", {}, std::vector<double>{0.5})},
+      {4, Entry("poisson_ratio", "<f8", {2}, std::vector<double>{0.3, 0.3})}};
+  for (const auto& [index, entry] : wrong) {
+    std::vector<ZipEntry> entries = Least();
+    entries[index] = entry;
+    EXPECT_THAT(Refused(entries), HasSubstr("MODEL_FILE_MALFORMED: ")) << entry.head;
+  }
+}
+
+TEST_F(NpzModel, AFileCutShortAnywhereIsRefused) {
+  ASSERT_TRUE(WriteNpz(path_, model_).ok());
+  const std::string whole = ReadBytes(path_);
+  for (size_t size = 0; size < whole.size(); size += 7) {
+    WriteBytes(path_, whole.substr(0, size));
+    EXPECT_FALSE(ReadNpz(path_).ok()) << size;
+  }
+}
+
+TEST_F(NpzModel, AChangedByteIsFoundOrHarmless) {
+  ASSERT_TRUE(WriteNpz(path_, model_).ok());
+  const std::string whole = ReadBytes(path_);
+  std::mt19937 random(1);
+  for (int i = 0; i < 300; ++i) {
+    std::string changed = whole;
+    changed[random() % changed.size()] ^= static_cast<char>(1U << random() % 8);
+    WriteBytes(path_, changed);
+    const auto read = ReadNpz(path_);
+    // The archive has a hash of each array: what is still read is what was written.
+    EXPECT_TRUE(!read.ok() || read->shapes == model_.shapes) << i;
+  }
+}
+
+TEST_F(NpzModel, NoFileIsNotFound) {
+  EXPECT_THAT(ReadNpz("/proc/no/such").status().ToString(), HasSubstr("FILE_NOT_FOUND: "));
+  EXPECT_THAT(WriteNpz("/proc/no/such.npz", model_).ToString(), HasSubstr("OUTPUT_NOT_WRITABLE: "));
+}
+
+TEST(NpyArray, ATextOfCharactersIsUtf8) {
+  const std::vector<uint32_t> codes = {'a', 0xe9, 0x20ac, 0x1d11e, 0};
+  NpyArray array{.type = "<U5", .shape = {}, .bytes = {}};
+  array.bytes.assign(reinterpret_cast<const char*>(codes.data()), codes.size() * sizeof(uint32_t));
+  EXPECT_EQ(*ToText("header", array), "a\xc3\xa9\xe2\x82\xac\xf0\x9d\x84\x9e");
+}
+
+}  // namespace
+}  // namespace carillon::interchange

@@ -1,0 +1,271 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Modal models leave and enter as glTF and NumPy files, and sound as those say."""
+
+import json
+import math
+import re
+import subprocess
+import unittest
+
+import jsonschema
+import numpy
+
+import gltf
+import meshes
+import scripted
+import sound
+from carillon.v1 import contact_pb2, contact_trace_pb2, material_pb2
+from daemon import DaemonTest
+
+FLOAT = 1.2e-7  # the spacing of single precision: what is stored in it is half of that off
+# Names, types and dimensions that client_sdk/interchange/README.md promises.
+ARRAYS = {
+    "eigenvalues": ("f8", "m"), "residuals": ("f8", "m"), "couplings": ("f8", "m"),
+    "vertices": ("f4", "V3"), "triangles": ("u4", "T3"), "given_triangle": ("u4", "T"),
+    "given_vertices": ("f4", "G3"), "given_triangles": ("u4", "H3"), "shapes": ("f4", "V3m")}
+
+
+class InterchangeTest(DaemonTest):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.model_file = scripted.make_model(cls.folder)
+        cls.name = cls.daemon.command("model", "import", cls.model_file, "--label", "bar").stdout.strip()
+        cls.bar = cls.exported(cls.name, "bar.npz")
+
+    @classmethod
+    def exported(cls, model, name, *options):
+        """The arrays of a model by way of a file."""
+        path = cls.folder / name
+        cls.daemon.command("model", "export", model, "--out", path, *options)
+        return numpy.load(path) if name.endswith(".npz") else path
+
+    def imported(self, path, *options):
+        """(name of the model, what was said on stderr)."""
+        done = self.daemon.command("model", "import", path, *options, check=False)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return done.stdout.strip(), done.stderr
+
+    def refused(self, *arguments):
+        """The reason."""
+        done = self.daemon.command("model", *arguments, check=False)
+        self.assertEqual((done.returncode, done.stdout), (1, ""), done)
+        return done.stderr.split(": ")[1]
+
+    def heard(self, model, material, tail_s):
+        """What one blow on the bar sounds like."""
+        body = contact_trace_pb2.ContactTraceObject(handle=1, modal_model=model, material=material,
+                                                    size=1, gain=1)
+        blow = sound.impulse((0.006, 0.0013, 0.010), (0.0, 0.002, -0.005))
+        step = contact_pb2.ContactStep(time_s=0, impulses=[blow])
+        samples, summary = sound.render(self.daemon, [body], [step], tail_s)
+        self.assertEqual(int(summary["rejected_count"]), 0)
+        return samples
+
+    def test_numpy_loads_every_array_as_documented(self):
+        sizes = {"3": 3}
+        self.assertEqual(set(self.bar), set(ARRAYS) | {"header"})
+        for name, (kind, dimensions) in ARRAYS.items():
+            self.assertEqual(self.bar[name].dtype, numpy.dtype("<" + kind), name)
+            for dimension, size in zip(dimensions, self.bar[name].shape, strict=True):
+                self.assertEqual(sizes.setdefault(dimension, size), size, name)
+        header = json.loads(self.bar["header"].item())
+        self.assertEqual(header["mode_count"], sizes["m"])
+        # Unit material: the lowest mode is where beam theory has it with this one's.
+        lowest = math.sqrt(self.bar["eigenvalues"][0] * meshes.YOUNG_PA / meshes.DENSITY) / (2 * math.pi)
+        self.assertLess(abs(lowest / meshes.bar_first_bending_hz() - 1), 0.02)
+
+    def test_a_model_comes_back_from_numpy_to_the_bit(self):
+        name, _ = self.imported(self.folder / "bar.npz")
+        back = self.exported(name, "back.model")
+        self.assertEqual(back.read_bytes(), self.model_file.read_bytes())
+
+    def test_what_numpy_saves_is_imported(self):
+        path = self.folder / "saved.npz"
+        numpy.savez_compressed(
+            path, eigenvalues=self.bar["eigenvalues"][:5], poisson_ratio=0.33,
+            vertices=numpy.asfortranarray(self.bar["vertices"], dtype=float),
+            triangles=self.bar["triangles"].astype(int), shapes=self.bar["shapes"][:, :, :5])
+        name, _ = self.imported(path, "--label", "saved")
+        back = self.exported(name, "saved_back.npz")
+        for array in ("vertices", "triangles"):
+            numpy.testing.assert_array_equal(back[array], self.bar[array])
+        # The stored shapes are rounded, the couplings were made of the exact ones.
+        numpy.testing.assert_allclose(back["couplings"], self.bar["couplings"][:5], rtol=1e-5)
+
+    def test_a_gltf_keeps_the_rules_of_the_draft(self):
+        for name in ("rules.glb", "rules.gltf"):
+            path = self.exported(self.name, name, "--material", meshes.MATERIAL)
+            document, buffer = gltf.read(path)
+            jsonschema.validate(document, gltf.SCHEMA)
+            model = document["extensions"][gltf.EXTENSION]["modalModels"][0]
+            kinds = {"frequencies": ("SCALAR", 5126), "decayRates": ("SCALAR", 5126),
+                     "positions": ("VEC3", 5126), "shapes": ("VEC3", 5126), "indices": ("SCALAR", 5125)}
+            for key, kind in kinds.items():
+                accessor = document["accessors"][model[key]]
+                self.assertEqual((accessor["type"], accessor["componentType"]), kind, key)
+            modes, points = len(self.bar["eigenvalues"]), len(self.bar["vertices"])
+            arrays = {key: gltf.array(document, buffer, model[key]) for key in kinds}
+            self.assertEqual(len(arrays["frequencies"]), modes)
+            self.assertEqual(len(arrays["decayRates"]), modes)
+            self.assertEqual(len(arrays["positions"]), points)
+            self.assertEqual(len(arrays["shapes"]), modes * points)
+            self.assertGreater(arrays["frequencies"].min(), 0)
+            self.assertGreaterEqual(arrays["decayRates"].min(), 0)
+            self.assertLess(arrays["indices"].max(), points)
+            for view in document["bufferViews"]:
+                self.assertLessEqual(view["byteOffset"] + view["byteLength"],
+                                     document["buffers"][0]["byteLength"])
+
+    def test_a_gltf_has_damped_frequencies_decay_rates_and_mass_normalised_shapes(self):
+        figures = ("--alpha1", 3e-7, "--alpha2", 25)
+        path = self.exported(self.name, "figures.glb", "--material", meshes.MATERIAL, *figures)
+        document, buffer = gltf.read(path)
+        extension = document["extensions"][gltf.EXTENSION]
+        self.assertEqual((extension["acousticMaterials"][0]["alpha"],
+                          extension["acousticMaterials"][0]["beta"]), (25, 3e-7))
+        arrays = {key: gltf.array(document, buffer, extension["modalModels"][0][key])
+                  for key in ("frequencies", "decayRates", "positions", "shapes")}
+        omega2 = self.bar["eigenvalues"] * meshes.YOUNG_PA / meshes.DENSITY
+        decay = (3e-7 * omega2 + 25) / 2
+        order = numpy.argsort(arrays["frequencies"])
+        numpy.testing.assert_allclose(arrays["frequencies"][order],
+                                      numpy.sqrt(omega2 - decay**2) / (2 * math.pi), rtol=FLOAT)
+        numpy.testing.assert_allclose(arrays["decayRates"][order], decay, rtol=FLOAT)
+        numpy.testing.assert_array_equal(arrays["positions"], self.bar["vertices"])
+        shapes = arrays["shapes"].reshape(len(order), -1, 3)[order]
+        expected = self.bar["shapes"].transpose(2, 0, 1) / math.sqrt(meshes.DENSITY)
+        numpy.testing.assert_allclose(shapes, expected, rtol=FLOAT)
+        # What is heard most comes first: whoever renders one mode hears the pitch of the bar.
+        heard = self.bar["couplings"] * numpy.sqrt((expected**2).sum((1, 2)) / omega2)
+        self.assertEqual(order.tolist().index(0), int(numpy.argmax(heard)))
+
+    def test_the_mesh_of_a_gltf_opens_elsewhere(self):
+        for name in ("mesh.glb", "mesh.gltf"):
+            path = self.exported(self.name, name, "--material", meshes.MATERIAL)
+            said = subprocess.run(["assimp", "info", path], capture_output=True, text=True,
+                                  check=True).stdout
+            self.assertRegex(said, r"Faces: +12\n")
+            self.assertRegex(said, r"Maximum point +\(0\.2000*\d? 0\.0160*\d? 0\.0100*\d?\)")
+
+    def test_a_model_comes_back_from_gltf_in_single_precision(self):
+        for name in ("back.glb", "back.gltf"):
+            path = self.exported(self.name, name, "--material", meshes.MATERIAL)
+            model, said = self.imported(path)
+            self.assertIn("--young 6.835179e+10 ", said)
+            back = self.exported(model, "from_" + name + ".npz")
+            for array in ("vertices", "triangles", "given_triangle", "given_vertices", "given_triangles",
+                          "header"):
+                numpy.testing.assert_array_equal(back[array], self.bar[array], array)
+            # Squared: twice a rounding. Shapes are rounded twice. The couplings are made anew.
+            for array, tolerance in (("eigenvalues", 2 * FLOAT), ("shapes", 2 * FLOAT),
+                                     ("couplings", 1e-5)):
+                numpy.testing.assert_allclose(back[array], self.bar[array], rtol=tolerance,
+                                              err_msg=array)
+
+    def test_a_model_by_way_of_gltf_sounds_as_before(self):
+        path = self.exported(self.name, "sounds.glb", "--material", meshes.MATERIAL)
+        model, _ = self.imported(path)
+        material = material_pb2.Material(preset=meshes.MATERIAL)
+        before, after = (self.heard(name, material, 0.2) for name in (self.name, model))
+        # 20 kHz off by the rounding of single precision turns by 2 mrad in 0.2 s.
+        self.assertLess(numpy.abs(after - before).max(), 0.003 * numpy.abs(before).max())
+        self.assertGreater(numpy.abs(before).max(), 0.01)
+
+    # A body from elsewhere: two modes of its own figures, on the surface of the bar.
+    FREQUENCIES_HZ = (1100.0, 440.0)
+    DECAYS_PER_S = (9.0, 6.0)
+
+    def foreign(self, **changes):
+        """A document that another program might write."""
+        vertices, triangles = self.bar["vertices"], self.bar["triangles"].astype(numpy.uint16)
+        writer = gltf.Writer()
+        along = vertices[:, 0] / vertices[:, 0].max()
+        shapes = numpy.zeros((2, len(vertices), 3), numpy.float32)
+        shapes[0, :, 2] = 8 * numpy.cos(2 * math.pi * along)
+        shapes[1, :, 2] = 8 * numpy.cos(math.pi * along)
+        model = {"name": "from elsewhere", "material": 0,
+                 "frequencies": writer.add(numpy.array(self.FREQUENCIES_HZ)),
+                 "decayRates": writer.add(numpy.array(self.DECAYS_PER_S)),
+                 "positions": writer.add(vertices), "shapes": writer.add(shapes.reshape(-1, 3)),
+                 "indices": writer.add(triangles.reshape(-1))}
+        mesh = {"attributes": {"POSITION": writer.add(vertices)},
+                "indices": writer.add(triangles.reshape(-1))}
+        material = {"density": 2500, "youngsModulus": 7e10, "poissonRatio": 0.22}
+        for name in changes.pop("without", ()):
+            model.pop(name)
+        return writer.document(model | changes, [material], mesh)
+
+    def write(self, document, name="foreign.gltf"):
+        path = self.folder / name
+        path.write_text(json.dumps(document))
+        return path
+
+    def assert_sounds_as_it_says(self, path):
+        model, said = self.imported(path)
+        figures = {key: float(value) for key, value in
+                   re.findall(r"--(\w+) ([0-9.e+-]+)", said)}
+        material = material_pb2.Material(
+            young_pa=figures["young"], density_kg_per_m3=figures["density"],
+            alpha1_s=figures["alpha1"], alpha2_per_s=figures["alpha2"])
+        samples = self.heard(model, material, 0.6)
+        for frequency_hz, decay_per_s in zip(self.FREQUENCIES_HZ, self.DECAYS_PER_S):
+            partial = sound.measure(samples, frequency_hz, 0.06, 0.4)
+            self.assertLess(abs(partial.frequency_hz - frequency_hz), 0.05)
+            self.assertLess(abs(partial.decay_per_s / -decay_per_s - 1), 0.01)
+        return model, samples
+
+    def test_a_foreign_gltf_sounds_at_its_frequencies_and_dies_at_its_rates(self):
+        document = self.foreign()
+        jsonschema.validate(document, gltf.SCHEMA)
+        model, _ = self.assert_sounds_as_it_says(self.write(document))
+        listed = json.loads(self.daemon.command("--json", "model", "show", model).stdout)
+        self.assertEqual(listed["label"], "from elsewhere")
+        self.assertEqual(listed["header"]["solver"], "glTF by a test")
+
+    def test_sample_points_without_triangles_sound_on_the_mesh_of_their_node(self):
+        _, with_triangles = self.assert_sounds_as_it_says(self.write(self.foreign()))
+        _, without = self.assert_sounds_as_it_says(
+            self.write(self.foreign(without=["indices"]), "points.gltf"))
+        # The mesh has the sample points as its vertices: the same surface, the same sound.
+        numpy.testing.assert_array_equal(without, with_triangles)
+
+    def test_files_that_are_bad_are_refused_and_nothing_is_stored(self):
+        def count():
+            return len(list(self.client.list()))
+
+        before = count()
+        glb = self.exported(self.name, "bad.glb", "--material", meshes.MATERIAL)
+        short = self.folder / "short.glb"
+        short.write_bytes(glb.read_bytes()[:-1000])
+        self.assertEqual(self.refused("import", short), "MODEL_FILE_MALFORMED")
+        short = self.folder / "short.npz"
+        short.write_bytes((self.folder / "bar.npz").read_bytes()[:-1000])
+        self.assertEqual(self.refused("import", short), "MODEL_FILE_MALFORMED")
+        nan = {**{key: self.bar[key] for key in self.bar}, "shapes": self.bar["shapes"] * math.nan}
+        numpy.savez(self.folder / "nan.npz", **nan)
+        self.assertEqual(self.refused("import", self.folder / "nan.npz"), "MODEL_FILE_MALFORMED")
+        crossed = self.foreign()
+        model = crossed["extensions"][gltf.EXTENSION]["modalModels"][0]
+        model["shapes"] = model["positions"]
+        self.assertEqual(self.refused("import", self.write(crossed)), "MODEL_FILE_MALFORMED")
+        self.assertEqual(self.refused("import", self.write(self.foreign(without=["shapes"]))),
+                         "MODEL_FILE_MALFORMED")
+        self.assertEqual(self.refused("import", self.write({"asset": {"version": "2.0"}})),
+                         "MODEL_FILE_INCOMPLETE")
+        self.assertEqual(self.refused("import", self.write(self.foreign(without=["material"]))),
+                         "MODEL_FILE_INCOMPLETE")
+        self.assertEqual(self.refused("import", self.folder / "none.glb"), "FILE_NOT_FOUND")
+        self.assertEqual(count(), before)
+
+    def test_a_material_goes_with_gltf_and_with_nothing_else(self):
+        out = self.folder / "material"
+        self.assertEqual(self.refused("export", self.name, "--out", f"{out}.glb"), "INVALID_SETTINGS")
+        self.assertEqual(self.refused("export", self.name, "--out", f"{out}.npz", "--material",
+                                      meshes.MATERIAL), "INVALID_SETTINGS")
+        self.assertEqual(self.refused("export", self.name, "--out", f"{out}.glb", "--material",
+                                      meshes.MATERIAL, "--poisson", 0.1), "POISSON_RATIO_DIFFERS")
+
+
+if __name__ == "__main__":
+    unittest.main()
