@@ -226,6 +226,7 @@ class Holder {
   absl::Status NoSuchGroup(const std::string& name) const {
     std::vector<std::string> known;
     for (const MeshGroup& group : names_.groups) known.push_back(group.name);
+    std::ranges::sort(known);
     const size_t told = std::min(known.size(), kMaxNamesTold);
     const std::string list =
         absl::StrJoin(known.begin(), known.begin() + static_cast<ptrdiff_t>(told), ", ");

@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "precompute/mesh/hold.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+
+#include "precompute/mesh/boundary.h"
+#include "precompute/mesh/tetrahedralize.h"
+#include "tests/precompute/mesh/mesh_files.h"
+#include "tests/precompute/mesh/read_mesh_fixture.h"
+#include "tests/precompute/test_meshes.h"
+
+namespace carillon::precompute {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr Point kSize{1, 0.5, 0.25};
+
+/// Nodes of a mesh where a condition holds.
+std::vector<int32_t> NodesWhere(const TetMesh& mesh,
+                                const std::function<bool(const Point&)>& holds) {
+  std::vector<int32_t> nodes;
+  for (size_t n = 0; n < mesh.nodes.size(); ++n) {
+    if (holds(mesh.nodes[n])) nodes.push_back(static_cast<int32_t>(n));
+  }
+  return nodes;
+}
+
+/// Below single precision, in which surfaces are read.
+bool Near(double a, double b) { return std::abs(a - b) < 1e-6; }
+
+class HoldTest : public ReadMeshTest {
+ protected:
+  /// The nodes held of a body read from a file, a surface filled with quadratic elements.
+  TetMesh Held(const std::string& bytes, const std::string& format,
+               const std::vector<Fixture>& fixtures) {
+    absl::StatusOr<NamedMesh> named = ReadNamed(bytes, format);
+    EXPECT_TRUE(named.ok()) << named.status();
+    TetMesh mesh;
+    SurfaceMesh given;
+    if (auto* surface = std::get_if<SurfaceMesh>(&named->mesh)) {
+      given = *surface;
+      mesh = Tetrahedralize(given, {.target_node_count = 100}).value();
+    } else {
+      mesh = std::get<TetMesh>(named->mesh);
+      given = BoundarySurface(mesh);
+    }
+    status = Hold(fixtures, given, named->names, mesh);
+    return mesh;
+  }
+
+  absl::Status status;
+};
+
+TEST_F(HoldTest, PlaneHoldsWhatLiesInItAndBehindIt) {
+  const std::string box = ToTextGmsh(MakeTetBox(kSize, {4, 2, 2}, 10));
+  const TetMesh face = Held(box, "msh", {HeldPlane{{0, 9, 9}, {3, 0, 0}}});
+  EXPECT_EQ(face.held, NodesWhere(face, [](const Point& p) { return p[0] == 0; }));
+  const TetMesh half = Held(box, "msh", {HeldPlane{{0.5, 0, 0}, {-1, 0, 0}}});
+  EXPECT_EQ(half.held, NodesWhere(half, [](const Point& p) { return p[0] >= 0.5; }));
+  // A thousandth of the body's size away is away.
+  Held(box, "msh", {HeldPlane{{-0.001, 0, 0}, {1, 0, 0}}});
+  EXPECT_THAT(status.ToString(),
+              HasSubstr("NO_VERTEX_HELD: no node of the body is held by the plane"));
+}
+
+TEST_F(HoldTest, BoxHoldsWhatLiesInItAndOnIt) {
+  const std::string box = ToTextGmsh(MakeTetBox(kSize, {4, 2, 2}, 10));
+  const TetMesh mesh = Held(box, "msh", {HeldBox{{0.5, 0, 0}, {2, 0.25, 2}}});
+  EXPECT_EQ(mesh.held,
+            NodesWhere(mesh, [](const Point& p) { return p[0] >= 0.5 && p[1] <= 0.25; }));
+  Held(box, "msh", {HeldBox{{0.1, 0.1, 0.1}, {0.11, 0.11, 0.11}}});
+  EXPECT_THAT(status.ToString(),
+              HasSubstr("NO_VERTEX_HELD: no node of the body is held by the box"));
+}
+
+TEST_F(HoldTest, VertexHoldsItsNode) {
+  for (const char* format : {"obj", "off", "ply"}) {
+    const SurfaceMesh surface = MakeBoxSurface(kSize);
+    const std::string bytes = std::string(format) == "obj"   ? ToObj(surface)
+                              : std::string(format) == "off" ? ToOff(surface)
+                                                             : ToBinaryPly(surface);
+    for (size_t v = 0; v < surface.vertices.size(); ++v) {
+      const Point& at = surface.vertices[v];
+      const TetMesh mesh = Held(bytes, format, {HeldVertices{{static_cast<int64_t>(v)}}});
+      ASSERT_TRUE(status.ok()) << status;
+      EXPECT_EQ(mesh.held, NodesWhere(mesh,
+                                      [&](const Point& p) {
+                                        return Near(p[0], at[0]) && Near(p[1], at[1]) &&
+                                               Near(p[2], at[2]);
+                                      }))
+          << format << v;
+    }
+  }
+}
+
+TEST_F(HoldTest, VerticesHoldAllOfATriangleAndAnEdgeBetweenThem) {
+  const SurfaceMesh surface = MakeBoxSurface(kSize);
+  std::vector<int64_t> bottom, edge;
+  for (size_t v = 0; v < surface.vertices.size(); ++v) {
+    const Point& p = surface.vertices[v];
+    if (p[2] == 0) bottom.push_back(static_cast<int64_t>(v));
+    if (p[2] == 0 && p[1] == 0) edge.push_back(static_cast<int64_t>(v));
+  }
+  const TetMesh face = Held(ToObj(surface), "obj", {HeldVertices{bottom}});
+  EXPECT_EQ(face.held, NodesWhere(face, [](const Point& p) { return Near(p[2], 0); }));
+  EXPECT_GT(face.held.size(), 20u);
+  const TetMesh line = Held(ToObj(surface), "obj", {HeldVertices{edge}});
+  EXPECT_EQ(line.held,
+            NodesWhere(line, [](const Point& p) { return Near(p[2], 0) && Near(p[1], 0); }));
+  EXPECT_GT(line.held.size(), 4u);
+}
+
+TEST_F(HoldTest, VerticesOfTetrahedraHaveTheNumbersOfTheFile) {
+  const TetMesh box = MakeTetBox(kSize, {4, 2, 2}, 4);
+  const TetMesh mesh = Held(ToTextGmsh(box), "msh", {HeldVertices{{11, 20}}});
+  EXPECT_THAT(mesh.held, ::testing::ElementsAre(0, 9));
+  Held(ToTextGmsh(box), "msh", {HeldVertices{{10}}});
+  EXPECT_THAT(status.ToString(),
+              HasSubstr("NO_VERTEX_HELD: no node of the body is held by vertex 10: the numbers of "
+                        "the file go from 11 to 55"));
+}
+
+TEST_F(HoldTest, VerticesOfAFormatThatNumbersNoneAreRefused) {
+  Held(ToBinaryStl(MakeBoxSurface(kSize)), "stl", {HeldVertices{{0}}});
+  EXPECT_THAT(status.ToString(), HasSubstr("files of this format do not number vertices"));
+}
+
+/// A box whose faces are polygons, in groups and objects.
+constexpr char kGroupedObj[] =
+    "v 0 0 0\nv 1 0 0\nv 1 0.5 0\nv 0 0.5 0\nv 0 0 0.25\nv 1 0 0.25\nv 1 0.5 0.25\nv 0 0.5 0.25\n"
+    "o body\ng base ends\nf 1 4 3 2\ng top\nf 5 6 7 8\ng\nf 1 2 6 \\\n5\nf 3 4 8 7\n"
+    "g ends\nf 2 3 7 6\nf 4 1 5 8\n";
+
+TEST_F(HoldTest, GroupOfAnObjFileHoldsItsFaces) {
+  const TetMesh base = Held(kGroupedObj, "obj", {HeldGroup{"base"}});
+  EXPECT_EQ(base.held, NodesWhere(base, [](const Point& p) { return Near(p[2], 0); }));
+  const TetMesh ends = Held(kGroupedObj, "obj", {HeldGroup{"ends"}});
+  EXPECT_EQ(ends.held, NodesWhere(ends, [](const Point& p) {
+              return Near(p[2], 0) || Near(p[0], 0) || Near(p[0], 1);
+            }));
+  const TetMesh both = Held(kGroupedObj, "obj", {HeldGroup{"base"}, HeldGroup{"top"}});
+  EXPECT_EQ(both.held,
+            NodesWhere(both, [](const Point& p) { return Near(p[2], 0) || Near(p[2], 0.25); }));
+}
+
+TEST_F(HoldTest, GroupThatIsNotThereIsRefusedWithThoseThatAre) {
+  Held(kGroupedObj, "obj", {HeldGroup{"bottom"}});
+  EXPECT_THAT(status.ToString(), HasSubstr("GROUP_UNKNOWN: the mesh file has no group \"bottom\": "
+                                           "it has base, body, ends, top"));
+  Held(ToBinaryStl(MakeBoxSurface(kSize)), "stl", {HeldGroup{"base"}});
+  EXPECT_THAT(status.ToString(), HasSubstr("it names none; hold a plane or a box"));
+}
+
+/// A box of ten-node tetrahedra, of which the triangles at z = 0 have a physical group of this tag.
+std::string GmshWithABase(const std::string& physical_names) {
+  const TetMesh box = MakeTetBox(kSize, {3, 2, 1}, 10);
+  std::string text = ToTextGmsh(box);
+  text.replace(text.find("1\n3 7 \"body\"\n"), 13, physical_names);
+  size_t at = text.find("$Elements\n");
+  for (const BoundaryFace& face : box.boundary) {
+    at = text.find(" 2 2 5 6 ", at + 1);
+    bool in_base = true;
+    for (const int32_t node : face.nodes) in_base &= box.nodes[static_cast<size_t>(node)][2] == 0;
+    if (in_base) text.replace(at, 9, " 2 2 9 6 ");
+  }
+  return text;
+}
+
+TEST_F(HoldTest, PhysicalGroupHoldsItsElementsWithTheirMidsideNodes) {
+  const auto base = [](const Point& p) { return p[2] == 0; };
+  const TetMesh named =
+      Held(GmshWithABase("2\n3 7 \"body\"\n2 9 \"the base\"\n"), "msh", {HeldGroup{"the base"}});
+  ASSERT_TRUE(status.ok()) << status;
+  EXPECT_EQ(named.held, NodesWhere(named, base));
+  const TetMesh numbered = Held(GmshWithABase("1\n3 7 \"body\"\n"), "msh", {HeldGroup{"9"}});
+  EXPECT_EQ(numbered.held, NodesWhere(numbered, base));
+  Held(GmshWithABase("0\n"), "msh", {HeldGroup{"7"}});
+  EXPECT_THAT(status.ToString(), HasSubstr("it has 5, 9")) << "a volume's number is a material's";
+}
+
+TEST_F(HoldTest, BodyHeldAllOverIsRefused) {
+  const std::string box = ToTextGmsh(MakeTetBox(kSize, {2, 1, 1}, 4));
+  Held(box, "msh", {HeldPlane{{0.6, 0, 0}, {1, 0, 0}}, HeldPlane{{0.6, 0, 0}, {-1, 0, 0}}});
+  EXPECT_THAT(status.ToString(), HasSubstr("ALL_VERTICES_HELD: "));
+  Held(box, "msh", {HeldGroup{"body"}});
+  EXPECT_THAT(status.ToString(), HasSubstr("ALL_VERTICES_HELD: "));
+}
+
+}  // namespace
+}  // namespace carillon::precompute
