@@ -24,7 +24,8 @@ class JackCapture {
     double begin_s = 0;  ///< of CLOCK_MONOTONIC, as JACK's loop has smoothed it
   };
 
-  /// Records `port` for at most `seconds` from now on. Errors: Unavailable.
+  /// Records `port` for at most `seconds` from now on; returns when the server has settled after
+  /// the new client. Errors: Unavailable.
   static absl::StatusOr<std::unique_ptr<JackCapture>> Start(const std::string& port,
                                                             double seconds);
   ~JackCapture();
@@ -46,7 +47,7 @@ class JackCapture {
   /// By how much JACK's clock ran fast against CLOCK_MONOTONIC, parts in a million.
   double ClockPpm() const;
 
-  /// Cycles that JACK or this client missed.
+  /// Cycles that JACK or this client missed since Start returned.
   uint64_t missed_count() const { return missed_count_.load(); }
 
   /// From the port to the ear as JACK states it, seconds.

@@ -11,9 +11,11 @@
 #include <cstdio>
 #include <cstdlib>
 #include <iostream>
+#include <map>
 #include <memory>
 #include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -99,13 +101,14 @@ absl::StatusOr<Stream> Strike(const client::Client& daemon, const std::string& s
   if (absl::Status begun = Begin(**contacts, stream); !begun.ok()) return begun;
   std::uniform_real_distribution<double> gap_s(kShortestGapS, kLongestGapS);
   double next_s = MonotonicSeconds() + kLongestGapS;
-  for (int i = 0; i < arguments.strike_count; ++i, next_s += gap_s(random)) {
+  for (int i = 0; i < arguments.strike_count; ++i) {
     SleepUntil(next_s);
     const double ahead_s = arguments.way == "ahead" ? kAheadS : 0;
     const double stamp_s = MonotonicSeconds() - stream.first_s + ahead_s;
     absl::Status sent = (*contacts)->Send(MakeStep(stamp_s, object));
     if (!sent.ok()) return sent;
     stream.stamps_s.push_back(stamp_s);
+    next_s = MonotonicSeconds() + gap_s(random);
   }
   SleepUntil(MonotonicSeconds() + 0.2);  // the next stream begins in silence
   const auto report = (*contacts)->Finish();
@@ -138,66 +141,107 @@ double FirstHeardFrame(const Stream& stream, double stamp_s, double rate_hz) {
          1;
 }
 
-struct Findings {
-  std::vector<double> latencies_s;
-  std::vector<double> displacements;  ///< frames from where the daemon says, but for a constant
-  std::vector<double> over_bound_s;   ///< of those in place: latency beyond what is stated
-  uint64_t late_count = 0;
+/// A strike as it was sent, and where its stream says that it is first heard.
+struct SentStrike {
+  const Stream* stream;
+  double stamp_s = 0;
+  double mixer_frame = 0;
 };
 
-Findings Compare(const std::vector<Stream>& streams, const std::vector<uint64_t>& onsets,
-                 const JackCapture& capture, double stated_output_s) {
-  Findings found;
-  size_t next = 0;
+std::vector<SentStrike> AllStrikes(const std::vector<Stream>& streams, double rate_hz) {
+  std::vector<SentStrike> strikes;
   for (const Stream& stream : streams) {
-    found.late_count += stream.report.late_count();
     for (const double stamp_s : stream.stamps_s) {
-      if (next == onsets.size()) return found;
-      const uint64_t onset = onsets[next++];
-      const double latency_s = capture.TimeOf(onset) - (stream.first_s + stamp_s);
-      found.latencies_s.push_back(latency_s);
-      found.displacements.push_back(static_cast<double>(onset) -
-                                    FirstHeardFrame(stream, stamp_s, capture.sample_rate_hz()));
-      found.over_bound_s.push_back(latency_s - stream.report.scheduling_delay_s() -
-                                   stated_output_s - (stream.arrived_s - stream.first_s));
+      strikes.push_back({&stream, stamp_s, FirstHeardFrame(stream, stamp_s, rate_hz)});
     }
+  }
+  return strikes;
+}
+
+/// From the mixer's frames to the capture's: what most strikes agree on.
+double FindShift(const std::vector<SentStrike>& strikes, const std::vector<uint64_t>& onsets) {
+  constexpr size_t kReach = 16;  // strikes that ran together are one onset
+  std::map<double, int> votes;
+  for (size_t i = 0; i < strikes.size(); ++i) {
+    for (size_t k = i - std::min(i, kReach); k < std::min(i + 1, onsets.size()); ++k) {
+      ++votes[static_cast<double>(onsets[k]) - strikes[i].mixer_frame];
+    }
+  }
+  const auto most =
+      std::ranges::max_element(votes, {}, [](const auto& vote) { return vote.second; });
+  return most == votes.end() ? 0 : most->first;
+}
+
+struct Findings {
+  std::vector<double> latencies_s;
+  uint64_t in_place_count = 0;   ///< to the sample where the daemon says
+  uint64_t displaced_count = 0;  ///< heard later
+  uint64_t unheard_count = 0;    ///< ran together with another
+  double most_over_s = -1;       ///< of those in place: latency beyond what is stated
+};
+
+Findings Compare(const std::vector<SentStrike>& strikes, const std::vector<uint64_t>& onsets,
+                 const JackCapture& capture, double stated_output_s) {
+  const double shift = FindShift(strikes, onsets);
+  Findings found;
+  auto onset = onsets.begin();
+  for (size_t i = 0; i < strikes.size(); ++i) {
+    const auto [stream, stamp_s, mixer_frame] = strikes[i];
+    const double due = mixer_frame + shift;
+    onset = std::find_if(onset, onsets.end(),
+                         [&](uint64_t frame) { return static_cast<double>(frame) >= due; });
+    const double next_due = i + 1 < strikes.size() ? strikes[i + 1].mixer_frame + shift : INFINITY;
+    if (onset == onsets.end() || static_cast<double>(*onset) >= next_due) {
+      ++found.unheard_count;
+      continue;
+    }
+    const double latency_s = capture.TimeOf(*onset) - (stream->first_s + stamp_s);
+    found.latencies_s.push_back(latency_s);
+    if (static_cast<double>(*onset) > due) {
+      ++found.displaced_count;
+      continue;
+    }
+    ++found.in_place_count;
+    const double arrival_s = stream->arrived_s - stream->first_s;
+    found.most_over_s =
+        std::max(found.most_over_s,
+                 latency_s - stream->report.scheduling_delay_s() - stated_output_s - arrival_s);
   }
   return found;
 }
 
-/// What is out of place, and the largest excess of what is in place.
-void Print(const Arguments& arguments, const std::vector<Stream>& streams, size_t onset_count,
+void Print(const Arguments& arguments, const std::vector<Stream>& streams,
            const JackCapture& capture, const v1::GetMixerResponse& before,
-           const v1::GetMixerResponse& mixer) {
-  const double stated_output_s = mixer.output_latency_s() - capture.playback_latency_s();
-  const Findings found = Compare(streams, FindOnsets(capture.samples()), capture, stated_output_s);
-  const double in_place = Quantile(found.displacements, 0);  // what comes late is further
-  uint64_t displaced_count = 0;
-  double most_over_s = -1;
-  for (size_t i = 0; i < found.displacements.size(); ++i) {
-    if (found.displacements[i] != in_place) {
-      ++displaced_count;
-    } else {
-      most_over_s = std::max(most_over_s, found.over_bound_s[i]);
-    }
-  }
-  const auto milliseconds = [&](double share) { return 1e3 * Quantile(found.latencies_s, share); };
+           const v1::GetMixerResponse& after) {
+  const double stated_output_s = after.output_latency_s() - capture.playback_latency_s();
+  const std::vector<SentStrike> strikes = AllStrikes(streams, capture.sample_rate_hz());
+  const Findings found = Compare(strikes, FindOnsets(capture.samples()), capture, stated_output_s);
+  uint64_t late_count = 0;
+  for (const Stream& stream : streams) late_count += stream.report.late_count();
   std::printf(
-      "{\"way\": \"%s\", \"strikes\": %zu, \"heard\": %zu, \"late\": %llu, \"displaced\": %llu, "
-      "\"delay_ms\": %.3f, \"output_ms\": %.3f, \"beyond_capture_ms\": %.3f, \"least_ms\": %.3f, "
-      "\"p50_ms\": %.3f, \"p99_ms\": %.3f, \"p999_ms\": %.3f, \"most_ms\": %.3f, "
-      "\"most_over_ms\": %.3f, \"clock_ppm\": %.1f, \"missed_cycles\": %llu, \"xruns\": %llu, "
-      "\"lost_frames\": %llu}\n",
-      arguments.way.c_str(),
-      static_cast<size_t>(arguments.stream_count) * static_cast<size_t>(arguments.strike_count),
-      onset_count, static_cast<unsigned long long>(found.late_count),
-      static_cast<unsigned long long>(displaced_count),
-      1e3 * streams.front().report.scheduling_delay_s(), 1e3 * mixer.output_latency_s(),
-      1e3 * capture.playback_latency_s(), milliseconds(0), milliseconds(0.5), milliseconds(0.99),
-      milliseconds(0.999), milliseconds(1), 1e3 * most_over_s, capture.ClockPpm(),
-      static_cast<unsigned long long>(capture.missed_count()),
-      static_cast<unsigned long long>(mixer.xrun_count() - before.xrun_count()),
-      static_cast<unsigned long long>(mixer.lost_frame_count() - before.lost_frame_count()));
+      "{\"way\": \"%s\", \"delay_ms\": %.3f, \"output_ms\": %.3f, \"beyond_capture_ms\": %.3f",
+      arguments.way.c_str(), 1e3 * streams.front().report.scheduling_delay_s(),
+      1e3 * after.output_latency_s(), 1e3 * capture.playback_latency_s());
+  const std::pair<const char*, double> quantiles[] = {
+      {"least", 0}, {"p50", 0.5}, {"p99", 0.99}, {"p999", 0.999}, {"most", 1}};
+  for (const auto& [name, share] : quantiles) {
+    std::printf(", \"%s_ms\": %.3f", name, 1e3 * Quantile(found.latencies_s, share));
+  }
+  std::printf(", \"most_over_ms\": %.3f, \"clock_ppm\": %.1f", 1e3 * found.most_over_s,
+              capture.ClockPpm());
+  const std::pair<const char*, uint64_t> counts[] = {
+      {"strikes", strikes.size()},
+      {"late", late_count},
+      {"in_place", found.in_place_count},
+      {"displaced", found.displaced_count},
+      {"unheard", found.unheard_count},
+      {"missed_cycles", capture.missed_count()},
+      {"xruns", after.xrun_count() - before.xrun_count()},
+      {"lost_frames", after.lost_frame_count() - before.lost_frame_count()}};
+  for (const auto& [name, count] : counts) {
+    std::printf(", \"%s\": %llu", name, static_cast<unsigned long long>(count));
+  }
+  std::printf("}\n");
 }
 
 absl::Status Measure(const Arguments& arguments) {
@@ -222,7 +266,7 @@ absl::Status Measure(const Arguments& arguments) {
   (*capture)->Stop();
   const auto mixer = daemon.GetMixer();
   if (!mixer.ok()) return mixer.status();
-  Print(arguments, streams, FindOnsets((*capture)->samples()).size(), **capture, *before, *mixer);
+  Print(arguments, streams, **capture, *before, *mixer);
   return daemon.DeleteScene(*scene);
 }
 

@@ -25,7 +25,7 @@ import supercollider_peer
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[2]
-PARTS = ("ringing", "accuracy", "flood", "latency")
+PARTS = ("ringing", "accuracy", "flood", "latency", "session")
 
 
 def carillon(build, *arguments, most_target=None):
@@ -109,14 +109,19 @@ def flood(options, _folder):
     print(f"\nMerging all of 1,000,000 a second changes the sound by {merging:.1f} dB of its energy.")
 
 
-def latency(options, folder):
+def use_integration_tests(options):
+    """Their modules need the generated messages, which come with the build."""
     os.environ["CARILLON_BIN_DIR"] = str(options.build / "bin")
     sys.path += [str(ROOT / "tests/integration"), str(ROOT / "client_sdk/python"),
                  str(options.build / "client_sdk/python")]
-    import jack  # these need the generated messages, which come with the build
+
+
+def latency(options, folder):
+    use_integration_tests(options)
+    import jack
     print("\n## From a strike at the client to its first sample in a JACK capture, ms\n\n"
           "| time stamp, blocks ahead | strikes | delay + look-ahead, as stated | p50 | p99 | p99.9 | least, most | "
-          "late | out of place | JACK cycles missed, xruns |\n"
+          "came too late | in place to the sample | JACK cycles missed, xruns |\n"
           "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |")
     names = {"stream": "now", "ahead": "50 ms before", "arrival": "now, no delay"}
     for blocks in (8, 2):
@@ -125,13 +130,26 @@ def latency(options, folder):
         measurement = jack.LatencyMeasurement(scratch, "--look-ahead-blocks", blocks)
         for way in jack.LatencyMeasurement.WAYS:
             found = measurement.measure(way, *options.latency_strikes)
-            # Of what comes late all are out of place, by as much as they are late.
-            row(f"{names[way]}, {blocks}", found["heard"],
+            row(f"{names[way]}, {blocks}", found["strikes"],
                 f"{found['delay_ms']:.2f} + {found['stated_ms'] - found['delay_ms']:.2f}", f"{found['p50_ms']:.2f}",
                 f"{found['p99_ms']:.2f}", f"{found['p999_ms']:.2f}",
-                f"{found['least_ms']:.2f}, {found['most_ms']:.2f}", found["late"],
-                found["displaced"] - found["late"], f"{found['missed_cycles']}, {found['xruns']}")
+                f"{found['least_ms']:.2f}, {found['most_ms']:.2f}", found["late"], found["in_place"],
+                f"{found['missed_cycles']}, {found['xruns']}")
         measurement.stop()
+
+
+def session(options, folder):
+    use_integration_tests(options)
+    import session as sessions
+    print("\n## A session under a busy loop on each core and decompositions: JACK capture against the rendering of its "
+          "trace\n\n| seconds | impulses | late, dropped, merged or shed | real-time priority | xruns, JACK cycles missed "
+          "| frames compared | differing |\n| --- | --- | --- | --- | --- | --- | --- |")
+    played = sessions.Session(folder)
+    found = played.run(options.session_seconds)
+    played.stop()
+    row(found["seconds"], found["accepted"], f"{found['late']}, {found['dropped']}, {found['merged_or_shed']}",
+        "yes" if found["realtime"] else "not allowed", f"{found['xruns']}, {found['missed_cycles']}",
+        f"{found['frames']:,}", found["differing_frames"])
 
 
 def main():
@@ -143,11 +161,13 @@ def main():
     parser.add_argument("--flood-seconds", type=float, default=60)
     parser.add_argument("--latency-strikes", type=lambda text: tuple(map(int, text.split("x"))), default=(40, 100),
                         help="STREAMSxSTRIKES: so many streams, and strikes in each")
+    parser.add_argument("--session-seconds", type=int, default=600)
     options = parser.parse_args()
     print(f"load average before: {os.getloadavg()[0]:.1f}", flush=True)
     for part in options.parts:
         with tempfile.TemporaryDirectory() as folder:
-            {"ringing": ringing, "accuracy": accuracy, "flood": flood, "latency": latency}[part](options, pathlib.Path(folder))
+            run = {"ringing": ringing, "accuracy": accuracy, "flood": flood, "latency": latency, "session": session}
+            run[part](options, pathlib.Path(folder))
     print(f"\nload average after: {os.getloadavg()[0]:.1f}")
     return 0
 
