@@ -43,7 +43,8 @@ bool IsGltf(const std::string& format) { return format == "glb" || format == "gl
 
 bool IsGiven(const v1::Material& material) {
   return !material.preset().empty() || material.has_young_pa() || material.has_poisson_ratio() ||
-         material.has_density_kg_per_m3() || material.has_alpha1_s() || material.has_alpha2_per_s();
+         material.has_density_kg_per_m3() || material.has_alpha1_s() ||
+         material.has_alpha2_per_s() || material.loss_factor_size() > 0;
 }
 
 /// The material of the command line, which only a glTF has a use for.
@@ -104,6 +105,21 @@ struct Imported {
   std::string sounds_with;  ///< the options of a material, where the file says one
 };
 
+/// The options that make a material.
+std::string OptionsOf(const v1::Material& material) {
+  std::string options =
+      absl::StrFormat("--young %.9g --poisson %.9g --density %.9g --alpha1 %.9g --alpha2 %.9g",
+                      material.young_pa(), material.poisson_ratio(), material.density_kg_per_m3(),
+                      material.alpha1_s(), material.alpha2_per_s());
+  const char* separator = " --loss-factor ";
+  for (const v1::LossFactorPoint& point : material.loss_factor()) {
+    absl::StrAppendFormat(&options, "%s%.9g:%.9g", separator, point.frequency_hz(),
+                          point.loss_factor());
+    separator = ",";
+  }
+  return options;
+}
+
 absl::StatusOr<Imported> ImportGltf(const client::Client& daemon, const ImportOptions& options,
                                     v1::Material material) {
   if (!material.preset().empty()) {
@@ -115,12 +131,7 @@ absl::StatusOr<Imported> ImportGltf(const client::Client& daemon, const ImportOp
   if (!read.ok()) return read.status();
   auto summary = Store(daemon, read->model, options.label.empty() ? read->label : options.label);
   if (!summary.ok()) return summary.status();
-  const v1::Material& ours = read->material;
-  return Imported{
-      .summary = *std::move(summary),
-      .sounds_with = absl::StrFormat(
-          "--young %.9g --poisson %.9g --density %.9g --alpha1 %.9g --alpha2 %.9g", ours.young_pa(),
-          ours.poisson_ratio(), ours.density_kg_per_m3(), ours.alpha1_s(), ours.alpha2_per_s())};
+  return Imported{.summary = *std::move(summary), .sounds_with = OptionsOf(read->material)};
 }
 
 absl::StatusOr<Imported> ImportNpz(const client::Client& daemon, const ImportOptions& options) {

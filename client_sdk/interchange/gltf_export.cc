@@ -12,6 +12,7 @@
 #include "client_sdk/interchange/gltf_model.h"
 #include "client_sdk/interchange/header_json.h"
 #include "proto/error_reason.h"
+#include "proto/material_catalogue.h"
 
 namespace carillon::interchange {
 namespace {
@@ -51,7 +52,7 @@ std::vector<SoundingMode> SoundingModes(const StoredModel& model, const v1::Mate
   std::vector<SoundingMode> modes;
   for (size_t m = 0; m < model.mode_count(); ++m) {
     const double omega2 = model.eigenvalues[m] * material.young_pa() / material.density_kg_per_m3();
-    const double decay = (material.alpha1_s() * omega2 + material.alpha2_per_s()) / 2;
+    const double decay = DecayRatePerS(material, std::sqrt(omega2) / (2 * std::numbers::pi));
     if (decay * decay >= omega2) continue;
     modes.push_back({.column = m,
                      .frequency_hz = std::sqrt(omega2 - decay * decay) / (2 * std::numbers::pi),
@@ -104,9 +105,12 @@ v1::ModalModelHeader HeaderOf(const StoredModel& model, const std::vector<Soundi
 json MaterialOf(const v1::Material& material, const std::string& name) {
   json result = {{"density", material.density_kg_per_m3()},
                  {"youngsModulus", material.young_pa()},
-                 {"poissonRatio", material.poisson_ratio()},
-                 {"alpha", material.alpha2_per_s()},
-                 {"beta", material.alpha1_s()}};
+                 {"poissonRatio", material.poisson_ratio()}};
+  // Two figures do not say what a loss factor does; then the decay rates stand alone.
+  if (material.loss_factor_size() == 0) {
+    result["alpha"] = material.alpha2_per_s();
+    result["beta"] = material.alpha1_s();
+  }
   if (!name.empty()) result["name"] = name;
   return result;
 }

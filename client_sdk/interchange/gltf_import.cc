@@ -12,6 +12,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "client_sdk/interchange/complete_model.h"
+#include "client_sdk/interchange/damping.h"
 #include "client_sdk/interchange/file_refusal.h"
 #include "client_sdk/interchange/gltf_accessor.h"
 #include "client_sdk/interchange/gltf_document.h"
@@ -19,7 +20,6 @@
 #include "client_sdk/interchange/gltf_nodes.h"
 #include "client_sdk/interchange/gltf_surface.h"
 #include "client_sdk/interchange/header_json.h"
-#include "client_sdk/interchange/rayleigh.h"
 
 namespace carillon::interchange {
 namespace {
@@ -27,9 +27,7 @@ namespace {
 using nlohmann::json;
 
 constexpr double kPoissonTolerance = 1e-4;
-/// Decay rates off by more than this, relatively, are worth a warning: a tenth of a decibel a
-/// second where a mode decays by ten.
-constexpr double kDampingTolerance = 0.01;
+constexpr double kOmegaPerHz = 2 * std::numbers::pi;
 
 /// The arrays of a modal model as they lie in the file.
 struct GltfModes {
@@ -136,28 +134,23 @@ absl::StatusOr<v1::Material> MaterialOf(const GltfDocument& file, const json& mo
 std::vector<DampedMode> Damped(const GltfModes& modes) {
   std::vector<DampedMode> damped;
   for (size_t m = 0; m < modes.mode_count(); ++m) {
-    const double omega = 2 * std::numbers::pi * modes.frequencies_hz[m];
     const double decay = modes.decay_rates_per_s[m];
-    damped.push_back({.omega2 = omega * omega + decay * decay, .decay_per_s = decay});
+    damped.push_back({.natural_hz = std::hypot(modes.frequencies_hz[m], decay / kOmegaPerHz),
+                      .decay_per_s = decay});
   }
   return damped;
 }
 
-/// Makes the material damp as the decay rates say, as nearly as it can; warns where that is not
-/// near.
+/// Makes the material damp as the decay rates say; warns where it cannot.
 void SetDamping(const std::vector<DampedMode>& modes, v1::Material& material,
                 v1::ModalModelHeader& header) {
-  Rayleigh damping = {material.alpha1_s(), material.alpha2_per_s()};
-  const bool known = material.has_alpha1_s() && material.has_alpha2_per_s();
-  if (!known || Deviation(damping, modes) > kDampingTolerance) damping = FitRayleigh(modes);
-  material.set_alpha1_s(damping.alpha1_s);
-  material.set_alpha2_per_s(damping.alpha2_per_s);
-  const double off = Deviation(damping, modes);
-  if (off <= kDampingTolerance) return;
-  header.add_warnings(absl::StrFormat(
-      "the decay rates of the file are those of no material: alpha1 %.4g s and alpha2 %.4g 1/s are "
-      "nearest, and off by up to %.0f %%",
-      damping.alpha1_s, damping.alpha2_per_s, 100 * off));
+  FitDamping(modes, material);
+  const double off = DampingError(modes, material);
+  if (off <= kSameDamping) return;
+  header.add_warnings(
+      absl::StrFormat("the decay rates of the file are those of no material: with the nearest, "
+                      "some are off by %.0f %%",
+                      100 * off));
 }
 
 /// Eigenvalues for unit material, ascending, and shapes with their modes in that order: those of
@@ -167,10 +160,10 @@ void SetModes(const GltfModes& modes, const std::vector<DampedMode>& damped,
               StoredModel& model) {
   std::vector<size_t> order(modes.mode_count());
   std::iota(order.begin(), order.end(), size_t{0});
-  std::ranges::stable_sort(order, {}, [&](size_t mode) { return damped[mode].omega2; });
+  std::ranges::stable_sort(order, {}, [&](size_t mode) { return damped[mode].natural_hz; });
   for (const size_t mode : order) {
-    model.eigenvalues.push_back(damped[mode].omega2 * material.density_kg_per_m3() /
-                                material.young_pa());
+    const double omega = kOmegaPerHz * damped[mode].natural_hz;
+    model.eigenvalues.push_back(omega * omega * material.density_kg_per_m3() / material.young_pa());
   }
   const double scale = std::sqrt(material.density_kg_per_m3());
   model.shapes.reserve(points.size() * 3 * order.size());

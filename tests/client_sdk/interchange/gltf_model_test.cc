@@ -5,14 +5,17 @@
 #include <google/protobuf/util/message_differencer.h>
 #include <gtest/gtest.h>
 
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <functional>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <random>
 
 #include "absl/strings/escaping.h"
+#include "proto/material_catalogue.h"
 #include "tests/client_sdk/interchange/small_model.h"
 
 namespace carillon::interchange {
@@ -65,6 +68,18 @@ class GltfModelTest : public testing::Test {
   static json& Model(json& file) { return Extension(file)["modalModels"][0]; }
   static json& Accessor(json& file, const char* name) {
     return file["accessors"][Model(file)[name].get<size_t>()];
+  }
+
+  /// Puts other numbers at the beginning of an array.
+  static void Patch(json& file, const char* array, const std::vector<float>& numbers) {
+    const json& view = file["bufferViews"][Accessor(file, array)["bufferView"].get<size_t>()];
+    const std::string uri = file["buffers"][0]["uri"];
+    const size_t comma = uri.find(',') + 1;
+    std::string bytes;
+    EXPECT_TRUE(absl::Base64Unescape(uri.substr(comma), &bytes));
+    std::memcpy(bytes.data() + view["byteOffset"].get<size_t>(), numbers.data(),
+                numbers.size() * sizeof(float));
+    file["buffers"][0]["uri"] = uri.substr(0, comma) + absl::Base64Escape(bytes);
   }
 
   const StoredModel model_ = SmallModel();
@@ -193,14 +208,36 @@ TEST_F(GltfModelTest, DampingIsFittedToTheDecayRates) {
   EXPECT_EQ(read->model.header.warnings_size(), 1);
 }
 
+TEST_F(GltfModelTest, DampingByALossFactorComesBackAsTheSameDecayRates) {
+  v1::Material material = SmallMaterial();
+  for (const auto& [hz, eta] : {std::pair{100.0, 0.02}, std::pair{2000.0, 0.001}}) {
+    v1::LossFactorPoint& point = *material.add_loss_factor();
+    point.set_frequency_hz(hz);
+    point.set_loss_factor(eta);
+  }
+  ASSERT_TRUE(Write(material).ok());
+  json file = json::parse(ReadBytes(path_));
+  EXPECT_FALSE(Extension(file)["acousticMaterials"][0].contains("alpha"));
+  const auto read = Read();
+  ASSERT_TRUE(read.ok()) << read.status();
+  for (const double eigenvalue : model_.eigenvalues) {
+    const double hz = std::sqrt(eigenvalue * 7e10 / 2700) / (2 * std::numbers::pi);
+    EXPECT_NEAR(DecayRatePerS(read->material, hz) / DecayRatePerS(material, hz), 1, 1e-6) << hz;
+  }
+  EXPECT_EQ(read->model.header.warnings_size(), 1);
+}
+
 TEST_F(GltfModelTest, DecayRatesOfNoMaterialGiveAWarning) {
-  // The decay rates in the place of frequencies, and the reverse: they fall where they should rise.
-  const auto read = ReadChanged([](json& file) {
-    Extension(file)["acousticMaterials"][0]["alpha"] = 5000;
-    Model(file)["decayRates"] = Model(file)["frequencies"];
+  // Two modes of one natural frequency that decay differently, and so damped to different ones.
+  const auto damped = [](float decay_per_s) {
+    return std::sqrt(500.0F * 500.0F - std::pow(decay_per_s / 6.2831853F, 2.0F));
+  };
+  const auto read = ReadChanged([&](json& file) {
+    Patch(file, "frequencies", {damped(1), damped(9), 900});
+    Patch(file, "decayRates", {1, 9, 5});
   });
   ASSERT_TRUE(read.ok()) << read.status();
-  EXPECT_THAT(read->model.header.warnings(1), HasSubstr("are those of no material"));
+  EXPECT_THAT(read->model.header.warnings(1), HasSubstr("off by 80 %"));
 }
 
 TEST_F(GltfModelTest, AnotherPoissonsRatioIsRefused) {
@@ -279,26 +316,20 @@ TEST_F(GltfModelTest, WrongCountsSizesIndicesAndTypesAreRefused) {
 }
 
 TEST_F(GltfModelTest, NumbersThatAreNoneAreRefused) {
-  // Where a shape stood, a NaN; where an index stood, one that is out of range. All arrays lie in
-  // one buffer, in a file beside this one.
-  struct Change {
-    const char* array;
-    uint32_t bits;
-  };
-  for (const auto& [array, bits] :
-       {Change{"frequencies", 0x7fc00000}, Change{"frequencies", 0x80000000},
-        Change{"decayRates", 0xbf800000}, Change{"positions", 0x7f800000},
-        Change{"shapes", 0xff800000}, Change{"indices", 4}}) {
-    EXPECT_TRUE(WriteGltfModel(path_, model_, SmallMaterial(), {}, true).ok());
-    std::string bytes = ReadBytes(path_);
-    uint32_t json_bytes = 0;
-    std::memcpy(&json_bytes, bytes.data() + 12, sizeof json_bytes);
-    json file = json::parse(bytes.substr(20, json_bytes));
-    const size_t view = Accessor(file, array)["bufferView"];
-    const size_t at = 28 + json_bytes + file["bufferViews"][view]["byteOffset"].get<size_t>();
-    std::memcpy(bytes.data() + at, &bits, sizeof bits);
-    WriteBytes(path_, bytes);
-    EXPECT_THAT(Read().status().ToString(), HasSubstr("MODEL_FILE_MALFORMED: ")) << array;
+  const float infinity = std::numeric_limits<float>::infinity();
+  const std::vector<std::pair<const char*, float>> wrong = {{"frequencies", std::nanf("")},
+                                                            {"frequencies", 0.0F},
+                                                            {"frequencies", -440.0F},
+                                                            {"decayRates", -1.0F},
+                                                            {"decayRates", infinity},
+                                                            {"positions", infinity},
+                                                            {"shapes", -infinity},
+                                                            {"shapes", std::nanf("")},
+                                                            {"indices", std::bit_cast<float>(4)}};
+  for (const auto& change : wrong) {
+    EXPECT_THAT(Refused([&](json& file) { Patch(file, change.first, {change.second}); }),
+                HasSubstr("MODEL_FILE_MALFORMED: "))
+        << change.first << change.second;
   }
 }
 
