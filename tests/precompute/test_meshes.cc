@@ -140,6 +140,27 @@ SurfaceMesh MakeSphereSurface(double radius_m, int halvings) {
   return sphere;
 }
 
+SurfaceMesh MakeRodSurface(double radius_m, double length_m, int around, int along) {
+  SurfaceMesh rod{{{0, 0, 0}, {length_m, 0, 0}}, {}};
+  const double r = PolygonRadius(radius_m, around);
+  for (int k = 0; k <= along; ++k) {
+    for (int i = 0; i < around; ++i) {
+      const double angle = 2 * std::numbers::pi * i / around;
+      rod.vertices.push_back({length_m * k / along, r * std::cos(angle), r * std::sin(angle)});
+    }
+  }
+  const auto at = [&](int k, int i) { return 2 + k * around + i % around; };
+  for (int i = 0; i < around; ++i) {
+    rod.triangles.push_back({0, at(0, i + 1), at(0, i)});
+    rod.triangles.push_back({1, at(along, i), at(along, i + 1)});
+    for (int k = 0; k < along; ++k) {
+      rod.triangles.push_back({at(k, i), at(k, i + 1), at(k + 1, i + 1)});
+      rod.triangles.push_back({at(k, i), at(k + 1, i + 1), at(k + 1, i)});
+    }
+  }
+  return rod;
+}
+
 void AddShell(SurfaceMesh& whole, const SurfaceMesh& part, const Point& offset_m) {
   const auto first = static_cast<int32_t>(whole.vertices.size());
   for (const Point& p : part.vertices) {

@@ -38,6 +38,10 @@ TetMesh MakeTetBox(const Point& size_m, const std::array<int, 3>& cells, int nod
 /// A sphere about the origin: an octahedron whose edges are halved `halvings` times.
 SurfaceMesh MakeSphereSurface(double radius_m, int halvings);
 
+/// A round bar about the x axis, from x = 0: a polygon of `around` corners with the circle's area,
+/// cut `along` times; its ends are fans.
+SurfaceMesh MakeRodSurface(double radius_m, double length_m, int around, int along);
+
 /// `part` added to `whole`, moved by `offset_m`.
 void AddShell(SurfaceMesh& whole, const SurfaceMesh& part, const Point& offset_m = {0, 0, 0});
 
