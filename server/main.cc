@@ -22,6 +22,7 @@
 #include "server/data_directory.h"
 #include "server/decomposition/decomposition_queue.h"
 #include "server/decomposition/local_executor.h"
+#include "server/decomposition/remote_runs.h"
 #include "server/decomposition/slurm_executor.h"
 #include "server/mode_database/database_admin.h"
 #include "server/mode_database/mode_database.h"
@@ -92,27 +93,32 @@ absl::StatusOr<std::unique_ptr<Executor>> MakeLocal(const Options& options,
 
 absl::StatusOr<std::unique_ptr<Executor>> MakeExecutor(const Options& options,
                                                        const DataDirectory& directory,
-                                                       const Clock& clock) {
+                                                       const Clock& clock, RemoteRuns& runs) {
   if (options.executor == "local") return MakeLocal(options, directory, clock);
   SlurmExecutorOptions slurm;
   slurm.program = options.precompute_program;
   slurm.directory = options.slurm_directory;
   if (slurm.directory.empty()) slurm.directory = directory.database_file().parent_path() / "slurm";
   slurm.partition = options.slurm_partition;
+  slurm.upload = {.address = options.slurm_upload,
+                  .client = options.slurm_client,
+                  .tls_roots_file = options.slurm_tls_roots};
   if (options.worker_count > 0) slurm.job_count = options.worker_count;
   if (options.job_memory_mib > 0) {
     slurm.memory_limit_bytes = static_cast<uint64_t>(options.job_memory_mib) << 20U;
   }
   slurm.time_limit =
       std::chrono::duration_cast<std::chrono::seconds>(Milliseconds(options.job_time_s));
-  return MakeSlurmExecutor(slurm);
+  return MakeSlurmExecutor(slurm, runs);
 }
 
 absl::StatusOr<std::unique_ptr<DecompositionQueue>> MakeQueue(const Options& options,
                                                               const DataDirectory& directory,
                                                               ModeDatabase& database,
-                                                              const Clock& clock) {
-  absl::StatusOr<std::unique_ptr<Executor>> executor = MakeExecutor(options, directory, clock);
+                                                              const Clock& clock,
+                                                              RemoteRuns& runs) {
+  absl::StatusOr<std::unique_ptr<Executor>> executor =
+      MakeExecutor(options, directory, clock, runs);
   if (!executor.ok()) return executor.status();
   return DecompositionQueue::Make(
       database, *std::move(executor), clock,
@@ -146,8 +152,9 @@ absl::Status Run(const Options& options) {
   const absl::StatusOr<std::unique_ptr<ModeDatabase>> database =
       ModeDatabase::Open(directory->database_file(), clock);
   if (!database.ok()) return database.status();
+  RemoteRuns runs;
   const absl::StatusOr<std::unique_ptr<DecompositionQueue>> decompositions =
-      MakeQueue(options, *directory, **database, clock);
+      MakeQueue(options, *directory, **database, clock, runs);
   if (!decompositions.ok()) return decompositions.status();
   const absl::StatusOr<std::unique_ptr<LiveOutput>> output = LiveOutput::Start(
       OutputSettingsOf(options), clock, [](const std::string& line) { spdlog::warn("{}", line); });
@@ -156,6 +163,7 @@ absl::Status Run(const Options& options) {
   const absl::StatusOr<std::unique_ptr<ApiServer>> server =
       ApiServer::Start(ApiSettingsOf(options), {.database = **database,
                                                 .decompositions = **decompositions,
+                                                .runs = runs,
                                                 .scenes = scenes,
                                                 .output = **output,
                                                 .clock = clock});

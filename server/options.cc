@@ -36,15 +36,17 @@ std::string DefaultAddress() {
   return runtime.empty() ? DefaultServerAddress() : "unix:" + runtime + "/carillond.sock";
 }
 
-std::string DefaultPrecompute() {
-  return std::filesystem::read_symlink("/proc/self/exe").replace_filename("carillon-precompute");
+/// A program in the daemon's own folder.
+std::string Beside(const char* name) {
+  return std::filesystem::read_symlink("/proc/self/exe").replace_filename(name);
 }
 
 Options Defaults() {
   Options options;
   options.data_directory = DefaultDataDirectory();
   options.addresses = {DefaultAddress()};
-  options.precompute_program = DefaultPrecompute();
+  options.precompute_program = Beside("carillon-precompute");
+  options.slurm_client = Beside("carillon");
   return options;
 }
 
@@ -88,6 +90,9 @@ absl::Status ReadKey(const std::string& key, const toml::node& node, Options& op
   if (key == "executor") return ReadValue(key, node, options.executor);
   if (key == "slurm_dir") return ReadValue(key, node, options.slurm_directory);
   if (key == "slurm_partition") return ReadValue(key, node, options.slurm_partition);
+  if (key == "slurm_upload") return ReadValue(key, node, options.slurm_upload);
+  if (key == "slurm_client") return ReadValue(key, node, options.slurm_client);
+  if (key == "slurm_tls_roots") return ReadValue(key, node, options.slurm_tls_roots);
   if (key == "precompute") return ReadValue(key, node, options.precompute_program);
   if (key == "tls_certificate") return ReadValue(key, node, options.tls_certificate_file);
   if (key == "admin_token_file") return ReadValue(key, node, options.admin_token_file);
@@ -189,6 +194,13 @@ void AddFlags(CLI::App& app, Options& options) {
   app.add_option("--slurm-dir", options.slurm_directory,
                  "folder that every node of the cluster sees [in the data folder]");
   app.add_option("--slurm-partition", options.slurm_partition, "[the cluster's default]");
+  app.add_option("--slurm-upload", options.slurm_upload,
+                 "HOST:PORT of this daemon, as the nodes reach it: they fetch meshes and bring "
+                 "results there, and share no folder");
+  app.add_option("--slurm-client", options.slurm_client, "the program `carillon`, on every node")
+      ->capture_default_str();
+  app.add_option("--slurm-tls-roots", options.slurm_tls_roots,
+                 "PEM file, on every node, that vouches for this daemon's TLS certificate");
   app.add_option("--precompute", options.precompute_program, "the program that decomposes")
       ->capture_default_str();
   app.add_option("--tls-certificate", options.tls_certificate_file, "PEM file, for TCP");

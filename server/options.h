@@ -27,6 +27,9 @@ struct Options {
   std::string executor = "local";  ///< or "slurm"
   std::string slurm_directory;     ///< shared with the nodes; empty: "slurm" in the data folder
   std::string slurm_partition;     ///< empty: the default one
+  std::string slurm_upload;        ///< the daemon as the nodes reach it; empty: a shared folder
+  std::string slurm_client;        ///< `carillon`, on every node
+  std::string slurm_tls_roots;     ///< PEM file on every node
   std::string precompute_program;  ///< carillon-precompute
   std::string tls_certificate_file;
   std::string tls_key_file;

@@ -57,6 +57,13 @@ struct ImportOptions {
       material;  ///< of which a glTF's model was computed, where it does not say so itself
 };
 
+/// What `carillon job run` runs.
+struct RunJobOptions {
+  std::string digest;
+  std::string token;
+  std::vector<std::string> command;
+};
+
 /// What `carillon strike` strikes, and how.
 struct StrikeOptions {
   std::string model;
@@ -102,6 +109,12 @@ absl::Status ShowModel(const client::Client& daemon, const std::string& text,
                        const MaterialFigures& figures, bool json);
 absl::Status DeleteModel(const client::Client& daemon, const std::string& text);
 absl::Status WatchJob(const client::Client& daemon, const std::string& text, bool json);
+/// Fetches the mesh of a job as the file "mesh" in a folder of its own, runs the command there,
+/// tells its progress (WorkerEvent on descriptor 3), and brings the file "model" or the error. A
+/// daemon that does not answer is asked again for ten minutes. Errors: those of JobRunService,
+/// Internal (OUTPUT_NOT_WRITABLE: no folder), Cancelled (RUN_STOPPED).
+absl::Status RunJob(const client::Client& daemon, const RunJobOptions& options,
+                    const StopSignal& stop);
 absl::Status Strike(const client::Client& daemon, const StrikeOptions& options,
                     const StopSignal& stop, bool json);
 absl::Status Listen(const client::Client& daemon, const ListenOptions& options,

@@ -52,6 +52,21 @@ void AddJob(CLI::App& app, Program& program) {
   watch.callback([&program, name] {
     program.command = [&program, name] { return WatchJob(program.Daemon(), *name, program.json); };
   });
+  auto options = std::make_shared<RunJobOptions>();
+  CLI::App& run = *job.add_subcommand(
+      "run", "decompose for the daemon on another machine: what its batch jobs call");
+  run.add_option("digest", options->digest, "of the job")->required();
+  run.add_option("command", options->command, "reads the file mesh, writes the file model")
+      ->required();
+  run.add_option("--token", options->token, "of this run [$CARILLON_JOB_TOKEN]")
+      ->envname("CARILLON_JOB_TOKEN")
+      ->required();
+  run.callback([&program, options] {
+    program.command = [&program, options] {
+      const StopSignal stop;
+      return RunJob(program.Daemon(), *options, stop);
+    };
+  });
 }
 
 void AddStrike(CLI::App& app, Program& program) {
@@ -114,6 +129,10 @@ int Main(int argc, char** argv) {
   CLI::App app("Makes rigid-body simulations audible: talks to the daemon carillond.", "carillon");
   app.add_option("--server", program.server, "unix:PATH or HOST:PORT [$CARILLON_SERVER]")
       ->capture_default_str();
+  app.add_option("--tls-roots", program.tls_roots_file,
+                 "PEM file that vouches for a daemon with TLS [$CARILLON_TLS_ROOTS]")
+      ->envname("CARILLON_TLS_ROOTS")
+      ->check(CLI::ExistingFile);
   app.add_flag("--json", program.json, "print results as JSON");
   app.require_subcommand(1)->fallthrough();
   app.footer(

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <fstream>
 #include <functional>
+#include <iterator>
 #include <string>
 
 #include "absl/status/status.h"
@@ -14,14 +16,23 @@ namespace carillon::cli {
 /// line chose.
 struct Program {
   std::string server = DefaultServerAddress();
+  std::string tls_roots_file;
   std::string admin_token;
   bool json = false;
   std::function<absl::Status()> command;
 
   client::Client Daemon() const {
-    client::Client daemon(server);
+    client::Client daemon(server, TlsRoots());
     daemon.SetAdminToken(admin_token);
     return daemon;
+  }
+
+ private:
+  /// A Unix socket has no TLS.
+  std::string TlsRoots() const {
+    if (server.rfind("unix:", 0) == 0) return "";
+    std::ifstream file(tls_roots_file, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
   }
 };
 

@@ -6,6 +6,7 @@
 #include <grpcpp/security/credentials.h>
 
 #include <chrono>
+#include <memory>
 #include <utility>
 
 #include "client_sdk/cpp/contact_stream_call.h"
@@ -33,6 +34,13 @@ absl::StatusOr<Response> Call(Stub& stub, const std::string& server,
   return response;
 }
 
+std::shared_ptr<grpc::ChannelCredentials> CredentialsFor(const std::string& tls_roots_pem) {
+  if (tls_roots_pem.empty()) return grpc::InsecureChannelCredentials();
+  grpc::SslCredentialsOptions options;
+  options.pem_root_certs = tls_roots_pem;
+  return grpc::SslCredentials(options);
+}
+
 template <class Request>
 Request Named(const std::string& name) {
   Request request;
@@ -42,9 +50,9 @@ Request Named(const std::string& name) {
 
 }  // namespace
 
-Client::Client(const std::string& server)
-    : stubs_(std::make_unique<Stubs>(
-          server, grpc::CreateChannel(server, grpc::InsecureChannelCredentials()))) {}
+Client::Client(const std::string& server, const std::string& tls_roots_pem)
+    : stubs_(std::make_unique<Stubs>(server,
+                                     grpc::CreateChannel(server, CredentialsFor(tls_roots_pem)))) {}
 Client::Client(Client&&) noexcept = default;
 Client& Client::operator=(Client&&) noexcept = default;
 Client::~Client() = default;

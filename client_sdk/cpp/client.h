@@ -13,6 +13,7 @@
 #include "carillon/v1/audio_service.pb.h"
 #include "carillon/v1/contact_service.pb.h"
 #include "carillon/v1/decomposition_service.pb.h"
+#include "carillon/v1/job_run_service.pb.h"
 #include "carillon/v1/modal_model_service.pb.h"
 #include "carillon/v1/scene_service.pb.h"
 #include "client_sdk/cpp/audio.h"
@@ -20,6 +21,12 @@
 #include "client_sdk/cpp/contact_trace.h"
 
 namespace carillon::client {
+
+/// One run of a job on a machine of a cluster: what JobRunService asks for.
+struct JobRun {
+  std::string job;  ///< "jobs/{digest}"
+  std::string token;
+};
 
 /// The daemon, seen from outside: its calls, as proto/carillon/v1/*_service.proto describes them.
 ///
@@ -29,8 +36,9 @@ namespace carillon::client {
 class Client {
  public:
   /// `server` is "unix:PATH" or "HOST:PORT". Connects at the first call, and again when the daemon
-  /// comes back.
-  explicit Client(const std::string& server);
+  /// comes back. `tls_roots_pem`: certificates that vouch for a daemon with TLS; empty: without
+  /// TLS.
+  explicit Client(const std::string& server, const std::string& tls_roots_pem = "");
   Client(Client&&) noexcept;
   Client& operator=(Client&&) noexcept;
   ~Client();
@@ -96,6 +104,14 @@ class Client {
                                            ContactTraceReader& trace,
                                            const AudioCallback& on_block) const;
   absl::StatusOr<v1::GetMixerResponse> GetMixer() const;
+
+  /// Begins a run and writes its mesh to a file. Errors also: Internal (OUTPUT_NOT_WRITABLE).
+  absl::Status FetchMesh(const JobRun& run, const std::string& file) const;
+  absl::Status ReportProgress(const JobRun& run, const v1::Progress& progress) const;
+  /// Ends a run: with the model of a file in the stored form, unless `model_file` is empty. Errors
+  /// also: NotFound (FILE_NOT_FOUND), InvalidArgument (MODAL_MODEL_MALFORMED).
+  absl::Status UploadResult(const JobRun& run, const v1::RunEnd& end,
+                            const std::string& model_file) const;
 
   /// What the calls of an administrator show over TCP; a Unix socket needs none.
   void SetAdminToken(const std::string& token);

@@ -1,53 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // The calls of Client that move files, and those of administrators.
-#include <fcntl.h>
-#include <google/protobuf/io/zero_copy_stream_impl.h>
 #include <google/protobuf/util/delimited_message_util.h>
 #include <grpcpp/client_context.h>
-#include <unistd.h>
 
 #include <chrono>
 #include <fstream>
 #include <utility>
 
-#include "absl/strings/str_cat.h"
+#include "client_sdk/cpp/authorize.h"
 #include "client_sdk/cpp/client.h"
+#include "client_sdk/cpp/model_file.h"
 #include "client_sdk/cpp/rpc_status.h"
 #include "client_sdk/cpp/stubs.h"
-#include "proto/error_reason.h"
 
 namespace carillon::client {
 namespace {
 
 constexpr auto kCallTimeout = std::chrono::seconds(60);
-constexpr int kMaxRecordBytes = 2 << 20;
-
-absl::Status NotWritable(const std::string& file) {
-  return Refusal(absl::StatusCode::kInternal, "OUTPUT_NOT_WRITABLE",
-                 absl::StrCat(file, " cannot be written: see its folder, its rights and the room"));
-}
-
-/// Shows the token, where there is one.
-void Authorize(grpc::ClientContext& context, const std::string& token) {
-  if (!token.empty()) context.AddMetadata("authorization", absl::StrCat("Bearer ", token));
-}
-
-/// Hands the records of a file to `sink`.
-absl::Status ReadRecords(google::protobuf::io::FileInputStream& in,
-                         const Client::RecordSink& sink) {
-  while (true) {
-    bool at_end = false;
-    v1::ModalModelRecord record;
-    if (!google::protobuf::util::ParseDelimitedFromZeroCopyStream(&record, &in, &at_end)) {
-      if (at_end) return absl::OkStatus();
-      return Refusal(absl::StatusCode::kInvalidArgument, "MODAL_MODEL_MALFORMED",
-                     "the file is not a sequence of modal model records, or is cut short");
-    }
-    absl::Status status = sink(record);
-    if (!status.ok()) return status;
-  }
-}
 
 }  // namespace
 
@@ -104,14 +74,7 @@ absl::StatusOr<v1::ModalModelSummary> Client::ImportModalModel(
 absl::StatusOr<v1::ModalModelSummary> Client::ImportModalModel(const std::string& file,
                                                                const std::string& name,
                                                                const std::string& label) const {
-  const int descriptor = open(file.c_str(), O_RDONLY | O_CLOEXEC);
-  if (descriptor < 0) {
-    return Refusal(absl::StatusCode::kNotFound, "FILE_NOT_FOUND",
-                   absl::StrCat(file, " cannot be read: see its name and rights"));
-  }
-  google::protobuf::io::FileInputStream in(descriptor, kMaxRecordBytes);
-  in.SetCloseOnDelete(true);
-  return ImportModalModel([&](const RecordSink& sink) { return ReadRecords(in, sink); }, name,
+  return ImportModalModel([&](const RecordSink& sink) { return ReadRecords(file, sink); }, name,
                           label);
 }
 

@@ -10,6 +10,7 @@
 #include "carillon/v1/audio_service.grpc.pb.h"
 #include "carillon/v1/contact_service.grpc.pb.h"
 #include "carillon/v1/decomposition_service.grpc.pb.h"
+#include "carillon/v1/job_run_service.grpc.pb.h"
 #include "carillon/v1/modal_model_service.grpc.pb.h"
 #include "carillon/v1/scene_service.grpc.pb.h"
 #include "client_sdk/cpp/client.h"
@@ -25,7 +26,8 @@ struct Client::Stubs {
         scenes(channel),
         contacts(channel),
         audio(channel),
-        admin(channel) {}
+        admin(channel),
+        job_runs(channel) {}
 
   std::string server;
   std::string admin_token;
@@ -35,6 +37,7 @@ struct Client::Stubs {
   v1::ContactService::Stub contacts;
   v1::AudioService::Stub audio;
   v1::AdminService::Stub admin;
+  v1::JobRunService::Stub job_runs;
 };
 
 }  // namespace carillon::client

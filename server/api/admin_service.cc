@@ -9,6 +9,7 @@
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "proto/error_reason.h"
+#include "server/api/bearer_token.h"
 #include "server/api/unary_call.h"
 #include "server/mode_database/database_admin.h"
 
@@ -96,11 +97,7 @@ class BackupReactor final : public grpc::ServerWriteReactor<v1::BackUpDatabaseRe
 
 absl::Status AdminService::Authorize(const grpc::CallbackServerContext& context) const {
   if (absl::StartsWith(context.peer(), "unix:")) return absl::OkStatus();
-  const auto shown = context.client_metadata().find("authorization");
-  if (!token_.empty() && shown != context.client_metadata().end() &&
-      SameSecret({shown->second.data(), shown->second.size()}, absl::StrCat("Bearer ", token_))) {
-    return absl::OkStatus();
-  }
+  if (!token_.empty() && SameSecret(BearerToken(context), token_)) return absl::OkStatus();
   return Refusal(absl::StatusCode::kPermissionDenied, "ADMINISTRATOR_ONLY",
                  "this call is for administrators: come through the daemon's Unix socket, or show "
                  "the token of its --admin-token-file");

@@ -17,6 +17,7 @@
 #include "server/api/audio_service.h"
 #include "server/api/contact_service.h"
 #include "server/api/decomposition_service.h"
+#include "server/api/job_run_service.h"
 #include "server/api/listen_address.h"
 #include "server/api/modal_model_service.h"
 #include "server/api/scene_service.h"
@@ -94,6 +95,7 @@ struct ApiServer::State {
       : admin(rooms.database, std::move(admin_token), call_pool),
         models(rooms.database, rooms.decompositions, call_pool),
         decompositions(rooms.decompositions, call_pool),
+        job_runs(rooms.runs, call_pool),
         scenes(rooms.scenes, rooms.database, call_pool),
         contacts({.scenes = rooms.scenes,
                   .output = rooms.output,
@@ -108,6 +110,7 @@ struct ApiServer::State {
   AdminService admin;
   ModalModelService models;
   DecompositionService decompositions;
+  JobRunService job_runs;
   SceneService scenes;
   ContactService contacts;
   AudioService audio;
@@ -133,7 +136,7 @@ absl::Status ApiServer::State::Listen(const ApiSettings& settings) {
     }
   }
   for (grpc::Service* service : std::initializer_list<grpc::Service*>{
-           &admin, &models, &decompositions, &scenes, &contacts, &audio}) {
+           &admin, &models, &decompositions, &job_runs, &scenes, &contacts, &audio}) {
     builder.RegisterService(service);
   }
   server = builder.BuildAndStart();

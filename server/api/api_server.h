@@ -9,6 +9,7 @@
 #include "server/api/live_output.h"
 #include "server/base/clock.h"
 #include "server/decomposition/decomposition_queue.h"
+#include "server/decomposition/remote_runs.h"
 #include "server/mode_database/mode_database.h"
 #include "server/scene/scene_registry.h"
 
@@ -32,6 +33,7 @@ struct ApiSettings {
 struct ServedRooms {
   ModeDatabase& database;
   DecompositionQueue& decompositions;
+  RemoteRuns& runs;
   SceneRegistry& scenes;
   LiveOutput& output;
   Clock& clock;

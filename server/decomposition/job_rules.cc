@@ -65,7 +65,8 @@ bool IsDeterministic(const Outcome& outcome) {
 Verdict VerdictOfReport(const std::string& reason) {
   if (IsOneOf<2>(reason, {"OUT_OF_MEMORY", "MEMORY_TOO_SMALL"})) return Verdict::kOutOfMemory;
   // Another attempt may well succeed.
-  if (IsOneOf<3>(reason, {"INTERNAL", "OUTPUT_NOT_WRITABLE", "MESH_FILE_NOT_READABLE"})) {
+  if (IsOneOf<4>(reason, {"INTERNAL", "OUTPUT_NOT_WRITABLE", "MESH_FILE_NOT_READABLE",
+                          "WORKER_NOT_FOUND"})) {
     return Verdict::kCrashed;
   }
   return Verdict::kBadInput;

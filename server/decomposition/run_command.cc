@@ -5,6 +5,7 @@
 #include <poll.h>
 #include <signal.h>
 #include <spawn.h>
+#include <sys/mman.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -17,7 +18,7 @@ namespace {
 
 constexpr std::chrono::seconds kPatience(30);
 
-pid_t Spawn(const std::vector<std::string>& command, int output) {
+pid_t Spawn(const std::vector<std::string>& command, int input, int output) {
   std::vector<char*> arguments;
   arguments.reserve(command.size() + 1);
   for (const std::string& argument : command) {
@@ -26,7 +27,7 @@ pid_t Spawn(const std::vector<std::string>& command, int output) {
   arguments.push_back(nullptr);
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_adddup2(&actions, input, STDIN_FILENO);
   posix_spawn_file_actions_adddup2(&actions, output, STDOUT_FILENO);
   posix_spawn_file_actions_adddup2(&actions, output, STDERR_FILENO);
   // The daemon blocks the signals that end it, in every thread; the program must not.
@@ -65,12 +66,30 @@ std::string ReadAll(int descriptor, pid_t pid) {
   }
 }
 
+/// A file in memory that stands at its beginning, or -1.
+int FileOf(const std::string& content) {
+  const int file = memfd_create("input", MFD_CLOEXEC);
+  for (size_t at = 0; file >= 0 && at < content.size();) {
+    const ssize_t written = write(file, content.data() + at, content.size() - at);
+    if (written <= 0) break;
+    at += static_cast<size_t>(written);
+  }
+  if (file >= 0) lseek(file, 0, SEEK_SET);
+  return file;
+}
+
 }  // namespace
 
-CommandResult RunCommand(const std::vector<std::string>& command) {
+CommandResult RunCommand(const std::vector<std::string>& command, const std::string& input) {
+  const int input_file = FileOf(input);
+  if (input_file < 0) return {};
   std::array<int, 2> ends;
-  if (pipe2(ends.data(), O_CLOEXEC) != 0) return {};
-  const pid_t pid = Spawn(command, ends[1]);
+  if (pipe2(ends.data(), O_CLOEXEC) != 0) {
+    close(input_file);
+    return {};
+  }
+  const pid_t pid = Spawn(command, input_file, ends[1]);
+  close(input_file);
   close(ends[1]);
   CommandResult result;
   if (pid > 0) {

@@ -12,7 +12,8 @@ struct CommandResult {
   std::string output;
 };
 
-/// Runs a program of the search path to its end; one that takes over half a minute is killed.
-CommandResult RunCommand(const std::vector<std::string>& command);
+/// Runs a program of the search path to its end, with `input` on its standard input; one that takes
+/// over half a minute is killed.
+CommandResult RunCommand(const std::vector<std::string>& command, const std::string& input = "");
 
 }  // namespace carillon

@@ -31,8 +31,8 @@ constexpr int kLooksBeforeLost = 2;
 
 class SlurmExecutor final : public Executor {
  public:
-  explicit SlurmExecutor(SlurmExecutorOptions options)
-      : options_(std::move(options)), thread_([this] { Run(); }) {}
+  SlurmExecutor(SlurmExecutorOptions options, RemoteRuns& runs)
+      : options_(std::move(options)), runs_(runs), thread_([this] { Run(); }) {}
 
   ~SlurmExecutor() override {
     {
@@ -109,7 +109,7 @@ class SlurmExecutor final : public Executor {
 
   void Prepare(DecompositionTask task) {
     const auto on_end = task.on_end;
-    absl::StatusOr<SlurmTask> prepared = SlurmTask::Prepare(std::move(task), options_);
+    absl::StatusOr<SlurmTask> prepared = SlurmTask::Prepare(std::move(task), options_, runs_);
     if (prepared.ok()) {
       tasks_.push_back({*std::move(prepared), 0});
     } else {
@@ -181,7 +181,9 @@ class SlurmExecutor final : public Executor {
       End(tracked, *outcome);
     } else {
       tracked->looks_in_vain = 0;
-      Submit(tracked->task.job());
+      if (state == SlurmState::kStuck) CancelByName(tracked->task.job().name);
+      // Where there is none to submit, for want of space perhaps, the next look tries again.
+      if (const auto job = tracked->task.NextSubmission(); job.ok()) Submit(*job);
     }
   }
 
@@ -191,6 +193,7 @@ class SlurmExecutor final : public Executor {
   }
 
   const SlurmExecutorOptions options_;
+  RemoteRuns& runs_;
   const int wake_ = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
   std::list<Tracked> tasks_;     // of the thread
   std::set<std::string> ended_;  // of the thread: names of jobs since the last look at the queue
@@ -203,7 +206,8 @@ class SlurmExecutor final : public Executor {
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<Executor>> MakeSlurmExecutor(const SlurmExecutorOptions& options) {
+absl::StatusOr<std::unique_ptr<Executor>> MakeSlurmExecutor(const SlurmExecutorOptions& options,
+                                                            RemoteRuns& runs) {
   std::error_code error;
   SlurmExecutorOptions filled = options;
   filled.directory = std::filesystem::absolute(options.directory);
@@ -214,7 +218,8 @@ absl::StatusOr<std::unique_ptr<Executor>> MakeSlurmExecutor(const SlurmExecutorO
                    absl::StrCat("the folder ", filled.directory.string(), " cannot be made (",
                                 error.message(), "): name one that every node shares"));
   }
-  return std::make_unique<SlurmExecutor>(std::move(filled));
+  SlurmTask::AdmitLeft(filled.directory, runs);
+  return std::make_unique<SlurmExecutor>(std::move(filled), runs);
 }
 
 }  // namespace carillon

@@ -13,7 +13,12 @@
 namespace carillon {
 namespace {
 
-SlurmState StateOf(absl::string_view word) {
+// A controller that forgot a job gives its number to another, and a node on which the first still
+// runs refuses the second, which is then held. A job that people hold is another matter.
+constexpr char kRefusedByNode[] = "launch failed requeued held";
+
+SlurmState StateOf(absl::string_view word, absl::string_view reason) {
+  if (word == "PENDING" && reason == kRefusedByNode) return SlurmState::kStuck;
   for (const char* alive : {"PENDING", "RUNNING", "CONFIGURING", "COMPLETING", "SUSPENDED",
                             "REQUEUED", "REQUEUE_HOLD", "REQUEUE_FED", "RESIZING", "SIGNALING",
                             "STAGE_OUT", "STOPPED", "SPECIAL_EXIT", "RESV_DEL_HOLD"}) {
@@ -34,8 +39,8 @@ SlurmJobs ParseSqueue(const std::string& output) {
   SlurmJobs jobs;
   for (const absl::string_view line : absl::StrSplit(output, '\n')) {
     const std::vector<std::string> fields = absl::StrSplit(line, '|');
-    if (fields.size() != 3) continue;
-    const SlurmState state = StateOf(fields[2]);
+    if (fields.size() < 3) continue;
+    const SlurmState state = StateOf(fields[2], fields.size() > 3 ? fields[3] : "");
     const auto [known, is_new] = jobs.emplace(std::pair(fields[0], fields[1]), state);
     if (!is_new) known->second = std::min(known->second, state);
   }
@@ -44,7 +49,7 @@ SlurmJobs ParseSqueue(const std::string& output) {
 
 std::optional<SlurmJobs> ReadSqueue() {
   const CommandResult result =
-      RunCommand({"squeue", "--noheader", "--states=all", "--format=%j|%k|%T"});
+      RunCommand({"squeue", "--noheader", "--states=all", "--format=%j|%k|%T|%r"});
   if (!result.success) return std::nullopt;
   return ParseSqueue(result.output);
 }
@@ -73,8 +78,7 @@ bool Submit(const SlurmJob& job) {
                                       "--error=/dev/null",
                                       "--chdir=/"};
   if (!job.partition.empty()) command.push_back(absl::StrCat("--partition=", job.partition));
-  command.push_back(job.script.string());
-  return RunCommand(command).success;
+  return RunCommand(command, job.script).success;
 }
 
 void CancelByName(const std::string& name) {

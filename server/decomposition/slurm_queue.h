@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <map>
 #include <optional>
 #include <string>
@@ -16,14 +15,15 @@ enum class SlurmState {
   kOutOfMemory,
   kTimeout,
   kCancelled,
-  kLost,  ///< its node failed, or something else that another run may be spared
+  kLost,   ///< its node failed, or something else that another run may be spared
+  kStuck,  ///< its node refused it, and it is held until somebody releases it
 };
 
 /// A job as it is submitted. The ticket tells this submission's jobs from older ones of the name.
 struct SlurmJob {
   std::string name;
   std::string ticket;
-  std::filesystem::path script;
+  std::string script{};  ///< its text
   std::string partition;
   int thread_count = 1;
   uint64_t memory_bytes = 0;
@@ -33,7 +33,7 @@ struct SlurmJob {
 /// By name and ticket; of several jobs of one, the state that leaves most hope.
 using SlurmJobs = std::map<std::pair<std::string, std::string>, SlurmState>;
 
-/// What `squeue` prints for its format "%j|%k|%T", for the tests.
+/// What `squeue` prints for its format "%j|%k|%T|%r", or sacct without the reason, for the tests.
 SlurmJobs ParseSqueue(const std::string& output);
 
 /// All jobs in the queue and those that ended lately; absent where the controller does not answer.

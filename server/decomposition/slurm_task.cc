@@ -5,7 +5,6 @@
 #include <cmath>
 #include <fstream>
 #include <iterator>
-#include <random>
 #include <sstream>
 #include <system_error>
 #include <utility>
@@ -15,6 +14,7 @@
 #include "absl/strings/str_replace.h"
 #include "proto/error_reason.h"
 #include "server/decomposition/job_rules.h"
+#include "server/decomposition/random_digits.h"
 #include "server/decomposition/worker_command.h"
 #include "server/decomposition/worker_events.h"
 
@@ -23,6 +23,7 @@ namespace {
 
 // A run that vanishes without a word three times is taken to crash.
 constexpr int kMostRuns = 3;
+constexpr int kTicketWords = 2;  // of 32 bits
 constexpr int kSignalled = 128;  // what a shell adds to the number of a signal
 constexpr int kKilled = kSignalled + 9;
 
@@ -48,12 +49,18 @@ std::string Quoted(const std::string& word) {
   return absl::StrCat("'", absl::StrReplaceAll(word, {{"'", R"('\'')"}}), "'");
 }
 
-// A link can be made once: of several runs of one job, one ends it.
-std::string Script(const std::filesystem::path& folder, const std::vector<std::string>& command) {
+std::string Joined(const std::vector<std::string>& command) {
   std::string words;
   for (const std::string& word : command) absl::StrAppend(&words, " ", Quoted(word));
+  return words;
+}
+
+// A link can be made once: of several runs of one job, one ends it.
+std::string ScriptInFolder(const std::filesystem::path& folder,
+                           const std::vector<std::string>& command) {
   // The name of the result is known to the run alone.
-  words = absl::StrReplaceAll(words, {{Quoted("--out=@model@"), "--out=\"model.$run\""}});
+  const std::string words =
+      absl::StrReplaceAll(Joined(command), {{Quoted("--out=@model@"), "--out=\"model.$run\""}});
   return absl::StrCat("#!/bin/sh\ncd ", Quoted(folder.string()),
                       R"( || exit 1
 [ -e end ] && exit 0
@@ -69,9 +76,27 @@ exit 0
 )");
 }
 
-std::string NewTicket() {
-  std::random_device random;
-  return absl::StrCat(absl::Hex(random()), absl::Hex(random()));
+// The client fetches the mesh, runs the command beside it and brings the model; Slurm shows a
+// script to its owner alone.
+std::string ScriptThatUploads(const SlurmUpload& upload, const std::string& digest,
+                              const std::string& token, const std::vector<std::string>& command) {
+  return absl::StrCat("#!/bin/sh\nexport CARILLON_SERVER=", Quoted(upload.address),
+                      "\nexport CARILLON_TLS_ROOTS=", Quoted(upload.tls_roots_file),
+                      "\nexport CARILLON_JOB_TOKEN=", Quoted(token), "\nexec ",
+                      Quoted(upload.client.string()), " job run ", digest, " --", Joined(command),
+                      "\n");
+}
+
+/// The file "ticket".
+struct Ticket {
+  std::string name;
+  std::string token_hash;
+};
+
+Ticket ReadTicket(const std::filesystem::path& folder) {
+  Ticket ticket;
+  std::istringstream(ReadFile(folder / "ticket")) >> ticket.name >> ticket.token_hash;
+  return ticket;
 }
 
 // The events of a run; what follows after the last whole one is ignored.
@@ -108,17 +133,13 @@ Outcome Crashed(absl::string_view how) {
 }  // namespace
 
 absl::StatusOr<SlurmTask> SlurmTask::Prepare(DecompositionTask task,
-                                             const SlurmExecutorOptions& options) {
-  const std::filesystem::path folder = options.directory / task.digest;
-  SlurmTask result(std::move(task), folder);
+                                             const SlurmExecutorOptions& options,
+                                             RemoteRuns& runs) {
+  SlurmTask result(std::move(task), options, runs);
   const DecompositionTask& own = result.task_;
   const std::string request = absl::StrCat(own.way, "\n", own.request.SerializeAsString());
-  result.taken_up_ = ReadFile(result.folder_ / "request") == request &&
-                     !ReadFile(result.folder_ / "ticket").empty();
-  if (!result.taken_up_) {
-    if (const absl::Status status = result.MakeFolder(request, options); !status.ok()) {
-      return status;
-    }
+  if (ReadFile(result.folder_ / "request") != request || ReadTicket(result.folder_).name.empty()) {
+    if (const absl::Status status = result.MakeFolder(request); !status.ok()) return status;
   }
   const uint64_t reserved =
       std::min({std::max<uint64_t>(2 * own.estimate_bytes, 256 << 20), options.memory_limit_bytes,
@@ -128,8 +149,7 @@ absl::StatusOr<SlurmTask> SlurmTask::Prepare(DecompositionTask task,
   const double wanted_s = own.request.time_limit_s();
   result.job_ = {
       .name = own.digest,
-      .ticket = ReadFile(result.folder_ / "ticket"),
-      .script = result.folder_ / "job.sh",
+      .ticket = ReadTicket(result.folder_).name,
       .partition = options.partition,
       .thread_count = options.threads_per_job,
       .memory_bytes = reserved,
@@ -138,22 +158,50 @@ absl::StatusOr<SlurmTask> SlurmTask::Prepare(DecompositionTask task,
 }
 
 // The ticket comes last: without it the folder is not taken up.
-absl::Status SlurmTask::MakeFolder(const std::string& request,
-                                   const SlurmExecutorOptions& options) {
+absl::Status SlurmTask::MakeFolder(const std::string& request) {
+  runs_->Dismiss(task_.digest);
   std::error_code error;
   std::filesystem::remove_all(folder_, error);
   if (!std::filesystem::create_directories(folder_, error)) {
     return Unusable(folder_, error.message());
   }
   if (absl::Status status = task_.write_mesh(folder_ / "mesh"); !status.ok()) return status;
-  const std::vector<std::string> command =
-      WorkerCommand(task_.request, task_.way,
-                    {options.program, folder_ / "mesh", "@model@", options.threads_per_job});
-  if (!WriteFile(folder_ / "job.sh", Script(folder_, command)) ||
-      !WriteFile(folder_ / "request", request) || !WriteFile(folder_ / "ticket", NewTicket())) {
+  if (!WriteFile(folder_ / "request", request) ||
+      !WriteFile(folder_ / "ticket", RandomDigits(kTicketWords))) {
     return Unusable(folder_, "a file cannot be written");
   }
   return absl::OkStatus();
+}
+
+absl::StatusOr<SlurmJob> SlurmTask::NextSubmission() {
+  const std::string token = RemoteRuns::NewToken();
+  const std::string hash = uploads() ? RemoteRuns::HashOf(task_.digest, token) : "";
+  const std::string ticket = RandomDigits(kTicketWords);
+  if (!WriteFile(folder_ / "ticket", absl::StrCat(ticket, " ", hash))) {
+    return Unusable(folder_, "a file cannot be written");
+  }
+  job_.ticket = ticket;
+  if (uploads()) runs_->Admit(task_.digest, folder_, hash);
+  const bool shared = !uploads();
+  const std::vector<std::string> command =
+      WorkerCommand(task_.request, task_.way,
+                    {.program = options_->program,
+                     .mesh_file = shared ? folder_ / "mesh" : "mesh",
+                     .model_file = shared ? "@model@" : "model",
+                     .thread_count = options_->threads_per_job});
+  SlurmJob job = job_;
+  job.script = shared ? ScriptInFolder(folder_, command)
+                      : ScriptThatUploads(options_->upload, task_.digest, token, command);
+  return job;
+}
+
+void SlurmTask::AdmitLeft(const std::filesystem::path& directory, RemoteRuns& runs) {
+  std::error_code ignored;
+  for (const auto& entry : std::filesystem::directory_iterator(directory, ignored)) {
+    const Ticket ticket = ReadTicket(entry.path());
+    if (ticket.token_hash.empty()) continue;
+    runs.Admit(entry.path().filename().string(), entry.path(), ticket.token_hash);
+  }
 }
 
 int SlurmTask::RunCount() const {
@@ -204,11 +252,7 @@ std::optional<Outcome> SlurmTask::TakeEnd() const {
 
 std::optional<Outcome> SlurmTask::JudgeLoss(std::optional<SlurmState> state) const {
   if (state == SlurmState::kOutOfMemory && RunCount() == 0) {
-    return Failure(Verdict::kCrashed,
-                   Error("WORKER_NOT_STARTED",
-                         absl::StrCat("the cluster's node could not begin: see that it has the "
-                                      "folder ",
-                                      folder_.string(), " under this name")));
+    return Failure(Verdict::kCrashed, Error("WORKER_NOT_STARTED", NotBegun()));
   }
   if (state == SlurmState::kOutOfMemory) return OutOfMemory(job_.memory_bytes);
   if (state == SlurmState::kTimeout) {
@@ -223,7 +267,18 @@ std::optional<Outcome> SlurmTask::JudgeLoss(std::optional<SlurmState> state) con
   return std::nullopt;
 }
 
+std::string SlurmTask::NotBegun() const {
+  if (!uploads()) {
+    return absl::StrCat("the cluster's node could not begin: see that it has the folder ",
+                        folder_.string(), " under this name");
+  }
+  return absl::StrCat("the cluster's node could not begin: see that it has ",
+                      options_->upload.client.string(), " and that a carillond answers it at ",
+                      options_->upload.address);
+}
+
 void SlurmTask::Remove() const {
+  runs_->Dismiss(task_.digest);
   std::error_code ignored;
   std::filesystem::remove_all(folder_, ignored);
 }

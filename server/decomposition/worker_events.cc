@@ -2,6 +2,9 @@
 #include "server/decomposition/worker_events.h"
 
 #include <google/protobuf/io/coded_stream.h>
+#include <google/protobuf/util/delimited_message_util.h>
+
+#include <sstream>
 
 #include "proto/error_reason.h"
 
@@ -45,6 +48,12 @@ absl::Status WorkerEventReader::Feed(std::string_view bytes,
   }
   pending_.erase(0, begin);
   return absl::OkStatus();
+}
+
+std::string Delimited(const v1::WorkerEvent& event) {
+  std::ostringstream out;
+  google::protobuf::util::SerializeDelimitedToOstream(event, &out);
+  return out.str();
 }
 
 }  // namespace carillon

@@ -26,4 +26,7 @@ class WorkerEventReader {
   std::string pending_;
 };
 
+/// An event as the pipe has it.
+std::string Delimited(const v1::WorkerEvent& event);
+
 }  // namespace carillon

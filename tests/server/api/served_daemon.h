@@ -12,6 +12,7 @@
 #include "carillon/v1/contact_service.grpc.pb.h"
 #include "carillon/v1/decomposition_service.grpc.pb.h"
 #include "carillon/v1/error.pb.h"
+#include "carillon/v1/job_run_service.grpc.pb.h"
 #include "carillon/v1/modal_model_service.grpc.pb.h"
 #include "carillon/v1/scene_service.grpc.pb.h"
 #include "server/api/api_server.h"
@@ -33,6 +34,7 @@ class ServedDaemon : public testing::Test {
                                  .version = "test"},
                                 {.database = *database_,
                                  .decompositions = *queue_,
+                                 .runs = runs_,
                                  .scenes = scenes_,
                                  .output = *output_,
                                  .clock = clock_});
@@ -42,6 +44,7 @@ class ServedDaemon : public testing::Test {
     scenes = v1::SceneService::NewStub(channel_);
     contacts = v1::ContactService::NewStub(channel_);
     audio = v1::AudioService::NewStub(channel_);
+    job_runs = v1::JobRunService::NewStub(channel_);
   }
 
   /// Calls a method with one request and one response; the response stays in `response`.
@@ -117,8 +120,11 @@ class ServedDaemon : public testing::Test {
   std::unique_ptr<v1::SceneService::Stub> scenes;
   std::unique_ptr<v1::ContactService::Stub> contacts;
   std::unique_ptr<v1::AudioService::Stub> audio;
+  std::unique_ptr<v1::JobRunService::Stub> job_runs;
   std::shared_ptr<grpc::Channel> channel() { return channel_; }
   LiveOutput& output() { return *output_; }
+  RemoteRuns& runs() { return runs_; }
+  std::filesystem::path folder() const { return folder_ / ""; }
   const std::string& address() const { return address_; }
 
  private:
@@ -137,6 +143,7 @@ class ServedDaemon : public testing::Test {
   std::unique_ptr<LiveOutput> output_ =
       *LiveOutput::Start({.device = "null"}, clock_, [](const std::string&) {});
   SceneRegistry scenes_{output_->mixer()};
+  RemoteRuns runs_;
   std::unique_ptr<ApiServer> server_;
   std::shared_ptr<grpc::Channel> channel_;
 };

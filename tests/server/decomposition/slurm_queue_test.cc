@@ -20,6 +20,12 @@ TEST(SlurmQueue, TellsWhatHasHopeFromWhatHasNone) {
   EXPECT_EQ(StateOf("A_STATE_OF_THE_FUTURE"), SlurmState::kLost);
 }
 
+TEST(SlurmQueue, AJobThatItsNodeRefusedIsStuckButOneThatPeopleHoldWaits) {
+  EXPECT_EQ(StateOf("PENDING|launch failed requeued held"), SlurmState::kStuck);
+  EXPECT_EQ(StateOf("PENDING|JobHeldUser"), SlurmState::kWaitsOrRuns);
+  EXPECT_EQ(StateOf("RUNNING|None"), SlurmState::kWaitsOrRuns);
+}
+
 TEST(SlurmQueue, OfSeveralJobsOfOneTicketTheMostHopefulCounts) {
   EXPECT_EQ(ParseSqueue("n|t|NODE_FAIL\nn|t|RUNNING\nn|t|TIMEOUT\n").at({"n", "t"}),
             SlurmState::kWaitsOrRuns);

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The calls of Client for runs of jobs on other machines.
+#include <grpcpp/client_context.h>
+
+#include <chrono>
+#include <fstream>
+#include <utility>
+
+#include "client_sdk/cpp/authorize.h"
+#include "client_sdk/cpp/client.h"
+#include "client_sdk/cpp/model_file.h"
+#include "client_sdk/cpp/rpc_status.h"
+#include "client_sdk/cpp/stubs.h"
+
+namespace carillon::client {
+namespace {
+
+/// Progress is news for so long: the run must not wait for it.
+constexpr auto kReportTimeout = std::chrono::seconds(2);
+
+}  // namespace
+
+absl::Status Client::FetchMesh(const JobRun& run, const std::string& file) const {
+  std::ofstream out(file, std::ios::binary);
+  if (!out) return NotWritable(file);
+  grpc::ClientContext context;
+  Authorize(context, run.token);
+  v1::FetchMeshRequest request;
+  request.set_job(run.job);
+  const auto reader = stubs_->job_runs.FetchMesh(&context, request);
+  v1::FetchMeshResponse response;
+  while (out && reader->Read(&response)) out << response.data();
+  out.close();
+  if (!out) context.TryCancel();
+  const absl::Status status = FromRpc(reader->Finish(), stubs_->server);
+  return out ? status : NotWritable(file);
+}
+
+absl::Status Client::ReportProgress(const JobRun& run, const v1::Progress& progress) const {
+  grpc::ClientContext context;
+  context.set_deadline(std::chrono::system_clock::now() + kReportTimeout);
+  Authorize(context, run.token);
+  v1::ReportProgressRequest request;
+  request.set_job(run.job);
+  *request.mutable_progress() = progress;
+  v1::ReportProgressResponse response;
+  return FromRpc(stubs_->job_runs.ReportProgress(&context, request, &response), stubs_->server);
+}
+
+absl::Status Client::UploadResult(const JobRun& run, const v1::RunEnd& end,
+                                  const std::string& model_file) const {
+  grpc::ClientContext context;
+  Authorize(context, run.token);
+  v1::UploadResultResponse response;
+  const auto writer = stubs_->job_runs.UploadResult(&context, &response);
+  v1::UploadResultRequest request;
+  request.set_job(run.job);
+  bool open = true;
+  absl::Status sent;
+  if (!model_file.empty()) {
+    sent = ReadRecords(model_file, [&](const v1::ModalModelRecord& record) {
+      *request.mutable_record() = record;
+      open = writer->Write(request);
+      request.clear_job();
+      return open ? absl::OkStatus() : absl::CancelledError();  // Finish tells why
+    });
+  }
+  *request.mutable_end() = end;
+  if (sent.ok()) writer->Write(request);
+  if (open && !sent.ok()) context.TryCancel();
+  writer->WritesDone();
+  const absl::Status status = FromRpc(writer->Finish(), stubs_->server);
+  return open && !sent.ok() ? sent : status;
+}
+
+}  // namespace carillon::client

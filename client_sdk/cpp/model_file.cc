@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client_sdk/cpp/model_file.h"
+
+#include <fcntl.h>
+#include <google/protobuf/io/zero_copy_stream_impl.h>
+#include <google/protobuf/util/delimited_message_util.h>
+
+#include "absl/strings/str_cat.h"
+#include "proto/error_reason.h"
+
+namespace carillon::client {
+namespace {
+
+constexpr int kMaxRecordBytes = 2 << 20;
+
+}  // namespace
+
+absl::Status NotWritable(const std::string& file) {
+  return Refusal(absl::StatusCode::kInternal, "OUTPUT_NOT_WRITABLE",
+                 absl::StrCat(file, " cannot be written: see its folder, its rights and the room"));
+}
+
+absl::Status ReadRecords(const std::string& file,
+                         absl::FunctionRef<absl::Status(const v1::ModalModelRecord&)> sink) {
+  const int descriptor = open(file.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor < 0) {
+    return Refusal(absl::StatusCode::kNotFound, "FILE_NOT_FOUND",
+                   absl::StrCat(file, " cannot be read: see its name and rights"));
+  }
+  google::protobuf::io::FileInputStream in(descriptor, kMaxRecordBytes);
+  in.SetCloseOnDelete(true);
+  while (true) {
+    bool at_end = false;
+    v1::ModalModelRecord record;
+    if (!google::protobuf::util::ParseDelimitedFromZeroCopyStream(&record, &in, &at_end)) {
+      if (at_end) return absl::OkStatus();
+      return Refusal(absl::StatusCode::kInvalidArgument, "MODAL_MODEL_MALFORMED",
+                     "the file is not a sequence of modal model records, or is cut short");
+    }
+    if (absl::Status status = sink(record); !status.ok()) return status;
+  }
+}
+
+}  // namespace carillon::client

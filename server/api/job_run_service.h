@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "carillon/v1/job_run_service.grpc.pb.h"
+#include "server/api/work_pool.h"
+#include "server/decomposition/remote_runs.h"
+
+namespace carillon {
+
+/// carillon.v1.JobRunService. What it is given must outlive it.
+class JobRunService final : public v1::JobRunService::CallbackService {
+ public:
+  JobRunService(RemoteRuns& runs, WorkPool& pool) : runs_(runs), pool_(pool) {}
+
+  grpc::ServerWriteReactor<v1::FetchMeshResponse>* FetchMesh(
+      grpc::CallbackServerContext* context, const v1::FetchMeshRequest* request) override;
+  grpc::ServerUnaryReactor* ReportProgress(grpc::CallbackServerContext* context,
+                                           const v1::ReportProgressRequest* request,
+                                           v1::ReportProgressResponse* response) override;
+  grpc::ServerReadReactor<v1::UploadResultRequest>* UploadResult(
+      grpc::CallbackServerContext* context, v1::UploadResultResponse* response) override;
+
+ private:
+  RemoteRuns& runs_;
+  WorkPool& pool_;
+};
+
+}  // namespace carillon

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "carillon/v1/decomposition.pb.h"
+#include "carillon/v1/job_run_service.pb.h"
+#include "carillon/v1/modal_model.pb.h"
+#include "server/base/mutex.h"
+
+namespace carillon {
+
+class RemoteRuns;
+
+/// The result of one run as it arrives. Nothing is kept of one that does not come to its end. One
+/// thread at a time.
+class RunUpload {
+ public:
+  RunUpload(RunUpload&&) noexcept;
+  RunUpload& operator=(RunUpload&&) noexcept;
+  ~RunUpload();
+
+  /// Errors: InvalidArgument (MODAL_MODEL_MALFORMED), DataLoss (MODAL_MODEL_CORRUPT),
+  /// ResourceExhausted (DATABASE_FULL).
+  absl::Status Append(const v1::ModalModelRecord& record);
+
+  /// Ends the run: its result is on the disk and counts, and its token is used up. Call once, last.
+  /// Errors: those of Append and of RemoteRuns.
+  absl::Status Finish(const v1::RunEnd& end);
+
+ private:
+  friend class RemoteRuns;
+  struct State;
+  explicit RunUpload(std::unique_ptr<State> state);
+
+  std::unique_ptr<State> state_;
+};
+
+/// Runs of jobs on machines that share no folder with this one. Each shows a token, of which only
+/// the hash is kept: of one job, of one submission of it, for as long as that runs, and for one
+/// result. What runs bring goes into the job's folder, as slurm_task.h describes it. Every call
+/// with a token: PermissionDenied (JOB_TOKEN_WRONG), FailedPrecondition (JOB_TOKEN_EXPIRED,
+/// JOB_TOKEN_USED). Safe from every thread.
+class RemoteRuns {
+ public:
+  /// A token that nobody can guess.
+  static std::string NewToken();
+
+  /// What is kept of a token, bound to its job.
+  static std::string HashOf(const std::string& digest, const std::string& token);
+
+  /// Lets the run in that has the token with that hash, and no other of the job from now on.
+  void Admit(const std::string& digest, const std::filesystem::path& folder,
+             const std::string& token_hash);
+
+  /// Lets no run of the job in any more.
+  void Dismiss(const std::string& digest);
+
+  /// Counts a run as begun. Returns the file with its mesh.
+  absl::StatusOr<std::filesystem::path> Begin(const std::string& digest, const std::string& token);
+
+  absl::Status Report(const std::string& digest, const std::string& token,
+                      const v1::Progress& progress);
+
+  absl::StatusOr<RunUpload> BeginUpload(const std::string& digest, const std::string& token);
+
+ private:
+  friend class RunUpload;
+  struct Place {
+    std::filesystem::path folder;
+    std::string token_hash;
+    std::set<std::string> past_hashes;
+  };
+
+  absl::StatusOr<std::filesystem::path> FolderOf(const std::string& digest,
+                                                 const std::string& token)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+
+  Mutex mutex_;
+  std::map<std::string, Place> places_ ABSL_GUARDED_BY(mutex_);
+};
+
+}  // namespace carillon

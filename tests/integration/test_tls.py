@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The daemon over TLS, with a certificate made here."""
+
+import pathlib
+import subprocess
+import tempfile
+import unittest
+
+from daemon import BIN, Daemon
+
+
+class TlsTest(unittest.TestCase):
+    def setUp(self):
+        scratch = tempfile.TemporaryDirectory(prefix="carillon-")
+        self.addCleanup(scratch.cleanup)
+        self.folder = pathlib.Path(scratch.name)
+        self.certificate, key = self.folder / "certificate.pem", self.folder / "key.pem"
+        subprocess.run(["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes",
+                        "-subj", "/CN=carillon", "-addext", "subjectAltName=IP:127.0.0.1", "-days", "2",
+                        "-keyout", key, "-out", self.certificate], check=True, capture_output=True)
+        self.daemon = Daemon(self.folder, "--listen", "127.0.0.1:0", "--tls-certificate", self.certificate,
+                             "--tls-key", key)
+        self.addCleanup(self.daemon.stop)
+        self.address = self.daemon.listening[1].split()[-1]
+
+    def status(self, *arguments):
+        return subprocess.run([BIN / "carillon", "--server", self.address, *arguments, "status"],
+                              capture_output=True, text=True, check=False, timeout=60)
+
+    def test_the_command_line_talks_to_a_daemon_that_its_roots_vouch_for(self):
+        done = self.status("--tls-roots", self.certificate)
+        self.assertEqual(done.returncode, 0, done.stderr)
+
+    def test_without_roots_it_gets_no_answer(self):
+        done = self.status()
+        self.assertEqual(done.returncode, 3)
+        self.assertIn("SERVER_UNAVAILABLE", done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
