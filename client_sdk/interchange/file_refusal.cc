@@ -21,4 +21,10 @@ absl::Status TooLarge(absl::string_view what) {
                  absl::StrCat(what, ": use the stored form (.model)"));
 }
 
+absl::Status OutOfMemory(absl::string_view path) {
+  return Refusal(absl::StatusCode::kResourceExhausted, "OUT_OF_MEMORY",
+                 absl::StrCat("the memory does not suffice to read ", path,
+                              ": use a machine with more, or a smaller model"));
+}
+
 }  // namespace carillon::interchange

@@ -16,4 +16,7 @@ absl::Status Incomplete(absl::string_view what, absl::string_view repair);
 /// More than the format or the reader holds: ResourceExhausted (MODEL_FILE_TOO_LARGE).
 absl::Status TooLarge(absl::string_view what);
 
+/// The memory did not suffice for the file: ResourceExhausted (OUT_OF_MEMORY).
+absl::Status OutOfMemory(absl::string_view path);
+
 }  // namespace carillon::interchange

@@ -29,6 +29,7 @@ constexpr char kMagic[] = "glTF";
 constexpr uint32_t kJsonChunk = 0x4e4f534a;
 constexpr uint32_t kBinaryChunk = 0x004e4942;
 constexpr size_t kHeaderBytes = 12;
+constexpr int kMostDepth = 64;
 constexpr size_t kChunkHeaderBytes = 8;
 
 uint32_t Word(std::string_view bytes, size_t at) {
@@ -44,10 +45,10 @@ void AppendWord(std::string& bytes, size_t word) {
 
 absl::StatusOr<std::string> ReadFile(const std::string& path) {
   std::error_code error;
-  std::ifstream file(path, std::ios::binary);
-  if (file && std::filesystem::is_regular_file(path, error)) {
+  if (std::filesystem::is_regular_file(path, error)) {
+    std::ifstream file(path, std::ios::binary);
     std::string bytes((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
-    if (!file.bad()) return bytes;
+    if (file.is_open() && !file.bad()) return bytes;
   }
   return Refusal(absl::StatusCode::kNotFound, "FILE_NOT_FOUND",
                  absl::StrCat(path, " cannot be read: see its name and rights"));
@@ -132,7 +133,9 @@ absl::StatusOr<GltfDocument> GltfDocument::Read(const std::string& path) {
     text = chunks->json;
     if (chunks->binary) document.binary_ = std::string(*chunks->binary);
   }
-  document.root_ = json::parse(text, nullptr, false);
+  // What lies deeper is left out, lest it exhaust the stack of those who walk through.
+  const auto shallow = [](int depth, json::parse_event_t, json&) { return depth <= kMostDepth; };
+  document.root_ = json::parse(text, shallow, false);
   if (document.root_.is_discarded()) return Malformed("the glTF file is no JSON, or is cut short");
   const std::string version = Text(Member(Member(document.root_, "asset"), "version"));
   if (!absl::StartsWith(version, "2.")) return Malformed("the file is no glTF of version 2");

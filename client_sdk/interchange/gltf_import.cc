@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <new>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <numeric>
@@ -16,6 +16,7 @@
 #include "client_sdk/interchange/file_refusal.h"
 #include "client_sdk/interchange/gltf_accessor.h"
 #include "client_sdk/interchange/gltf_document.h"
+#include "client_sdk/interchange/gltf_extension.h"
 #include "client_sdk/interchange/gltf_model.h"
 #include "client_sdk/interchange/gltf_nodes.h"
 #include "client_sdk/interchange/gltf_surface.h"
@@ -96,12 +97,12 @@ absl::StatusOr<GltfModes> ReadModes(GltfDocument& file, const json& model) {
 /// Figures of the file where `given` has none. Damping stays open where neither has it.
 absl::StatusOr<v1::Material> MaterialOf(const GltfDocument& file, const json& model,
                                         const v1::Material& given) {
-  const json& materials = Member(
-      Member(Member(file.root(), "extensions"), "KHR_audio_rigid_bodies"), "acousticMaterials");
+  const json& materials =
+      Member(Member(Member(file.root(), "extensions"), kExtension), "acousticMaterials");
   const auto index = Whole(Member(model, "material"));
   const bool known = index && materials.is_array() && *index < materials.size();
   if (index && !known) return Malformed(absl::StrCat("there is no acoustic material ", *index));
-  const json& ours = known ? materials[*index] : Member(model, "");
+  const json ours = known ? materials[*index] : json();
   v1::Material material = given;
   material.clear_preset();
   const auto fill = [&](const char* key, bool has, auto set) {
@@ -219,6 +220,15 @@ void SetGivenSurface(GltfDocument& file, const ChosenModel& chosen, StoredModel&
   for (float& x : model.given_vertices) x = static_cast<float>(x * chosen.metres_per_unit);
 }
 
+/// A name of at most 200 bytes, as labels are; no character is cut.
+std::string ShortText(const json& value) {
+  std::string text = Text(value);
+  size_t size = std::min<size_t>(text.size(), 200);
+  while (size < text.size() && (static_cast<unsigned char>(text[size]) & 0xc0U) == 0x80U) --size;
+  text.resize(size);
+  return text;
+}
+
 /// The header that a Carillon wrote, where it is still true; else what the file says of itself.
 v1::ModalModelHeader HeaderOf(const GltfDocument& file, const ChosenModel& chosen,
                               const GltfModes& modes, const v1::Material& material) {
@@ -232,17 +242,14 @@ v1::ModalModelHeader HeaderOf(const GltfDocument& file, const ChosenModel& chose
   v1::ModalModelHeader header;
   header.mutable_settings()->set_poisson_ratio(material.poisson_ratio());
   header.mutable_settings()->set_metres_per_unit(chosen.metres_per_unit);
-  const std::string generator = Text(Member(Member(file.root(), "asset"), "generator"));
-  header.set_solver(
-      absl::StrCat("glTF", generator.empty() ? "" : " by ", generator.substr(0, 100)));
+  const std::string generator = ShortText(Member(Member(file.root(), "asset"), "generator"));
+  header.set_solver(absl::StrCat("glTF", generator.empty() ? "" : " by ", generator));
   header.add_warnings("read from a glTF file, which does not say whether modes are missing");
   return header;
 }
 
-}  // namespace
-
-absl::StatusOr<GltfModel> ReadGltfModel(const std::string& path, const std::string& pick,
-                                        const v1::Material& material) {
+absl::StatusOr<GltfModel> ReadWhole(const std::string& path, const std::string& pick,
+                                    const v1::Material& material) {
   absl::StatusOr<GltfDocument> file = GltfDocument::Read(path);
   if (!file.ok()) return file.status();
   const absl::StatusOr<ChosenModel> chosen = ChooseModel(*file, pick);
@@ -252,7 +259,7 @@ absl::StatusOr<GltfModel> ReadGltfModel(const std::string& path, const std::stri
   absl::StatusOr<v1::Material> resolved = MaterialOf(*file, *chosen->model, material);
   if (!resolved.ok()) return resolved.status();
   GltfModel result = {
-      .model = {}, .label = Text(Member(*chosen->model, "name")), .material = *resolved};
+      .model = {}, .label = ShortText(Member(*chosen->model, "name")), .material = *resolved};
   const absl::StatusOr<std::vector<uint32_t>> points =
       SetSurface(*file, *chosen, *modes, result.model);
   if (!points.ok()) return points.status();
@@ -264,6 +271,17 @@ absl::StatusOr<GltfModel> ReadGltfModel(const std::string& path, const std::stri
   const absl::Status status = Complete(result.model);
   if (!status.ok()) return status;
   return result;
+}
+
+}  // namespace
+
+absl::StatusOr<GltfModel> ReadGltfModel(const std::string& path, const std::string& pick,
+                                        const v1::Material& material) {
+  try {
+    return ReadWhole(path, pick, material);
+  } catch (const std::bad_alloc&) {
+    return OutOfMemory(path);
+  }
 }
 
 }  // namespace carillon::interchange

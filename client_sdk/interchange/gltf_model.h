@@ -36,7 +36,8 @@ struct GltfModel {
 /// Reads a modal model of a glTF, text or binary. `pick` is its name or number, or the name of a
 /// node that sounds with it; empty: the only one. Figures of `material` go before those of the
 /// file, which must not be missing in both. Errors: NotFound (FILE_NOT_FOUND), InvalidArgument
-/// (MODEL_FILE_MALFORMED, MODEL_FILE_INCOMPLETE, MODEL_FILE_AMBIGUOUS).
+/// (MODEL_FILE_MALFORMED, MODEL_FILE_INCOMPLETE, MODEL_FILE_AMBIGUOUS), ResourceExhausted
+/// (OUT_OF_MEMORY).
 absl::StatusOr<GltfModel> ReadGltfModel(const std::string& path, const std::string& pick,
                                         const v1::Material& material);
 

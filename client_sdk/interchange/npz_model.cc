@@ -2,6 +2,7 @@
 #include "client_sdk/interchange/npz_model.h"
 
 #include <map>
+#include <new>
 #include <optional>
 #include <string_view>
 #include <utility>
@@ -107,6 +108,25 @@ absl::Status RequireArrays(const StoredModel& model) {
   return absl::OkStatus();
 }
 
+absl::StatusOr<StoredModel> ReadWhole(const std::string& path) {
+  const absl::StatusOr<ZipReader> archive = ZipReader::Open(path);
+  if (!archive.ok()) return archive.status();
+  StoredModel model;
+  ArrayReader reader(*archive);
+  absl::Status status = absl::OkStatus();
+  VisitArrays(model, [&](const char* name, auto& numbers, const char* dimensions) {
+    if (status.ok()) status = reader.Read(name, numbers, dimensions);
+  });
+  if (status.ok()) status = RequireArrays(model);
+  if (!status.ok()) return status;
+  absl::StatusOr<v1::ModalModelHeader> header = ReadHeader(*archive);
+  if (!header.ok()) return header.status();
+  model.header = *std::move(header);
+  status = Complete(model);
+  if (!status.ok()) return status;
+  return model;
+}
+
 }  // namespace
 
 absl::Status WriteNpz(const std::string& path, const StoredModel& model) {
@@ -126,22 +146,11 @@ absl::Status WriteNpz(const std::string& path, const StoredModel& model) {
 }
 
 absl::StatusOr<StoredModel> ReadNpz(const std::string& path) {
-  const absl::StatusOr<ZipReader> archive = ZipReader::Open(path);
-  if (!archive.ok()) return archive.status();
-  StoredModel model;
-  ArrayReader reader(*archive);
-  absl::Status status = absl::OkStatus();
-  VisitArrays(model, [&](const char* name, auto& numbers, const char* dimensions) {
-    if (status.ok()) status = reader.Read(name, numbers, dimensions);
-  });
-  if (status.ok()) status = RequireArrays(model);
-  if (!status.ok()) return status;
-  absl::StatusOr<v1::ModalModelHeader> header = ReadHeader(*archive);
-  if (!header.ok()) return header.status();
-  model.header = *std::move(header);
-  status = Complete(model);
-  if (!status.ok()) return status;
-  return model;
+  try {
+    return ReadWhole(path);
+  } catch (const std::bad_alloc&) {
+    return OutOfMemory(path);
+  }
 }
 
 }  // namespace carillon::interchange

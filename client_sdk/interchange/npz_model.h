@@ -18,7 +18,7 @@ absl::Status WriteNpz(const std::string& path, const StoredModel& model);
 /// Needs "eigenvalues", "vertices", "triangles", "shapes", and "header" or else "poisson_ratio", a
 /// number; what else is missing is made of these. Errors: NotFound (FILE_NOT_FOUND),
 /// InvalidArgument (MODEL_FILE_MALFORMED, MODEL_FILE_INCOMPLETE), ResourceExhausted
-/// (MODEL_FILE_TOO_LARGE).
+/// (MODEL_FILE_TOO_LARGE, OUT_OF_MEMORY).
 absl::StatusOr<StoredModel> ReadNpz(const std::string& path);
 
 }  // namespace carillon::interchange

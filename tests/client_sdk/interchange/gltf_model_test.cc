@@ -333,6 +333,32 @@ TEST_F(GltfModelTest, NumbersThatAreNoneAreRefused) {
   }
 }
 
+TEST_F(GltfModelTest, WhatIsNestedWithoutEndIsLeftOut) {
+  EXPECT_TRUE(Write().ok());
+  std::string text = ReadBytes(path_);
+  const size_t at = text.find("\"header\"");
+  const std::string deep(1000000, '[');
+  text.insert(at, "\"deep\": " + deep + std::string(deep.size(), ']') + ", ");
+  WriteBytes(path_, text);
+  const auto read = Read();
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_EQ(read->model.header.solver(), "test");
+  // And where the header itself is the deep one, there is none.
+  text.replace(text.find("\"header\""), 8, "\"other\"");
+  text.replace(text.find("\"deep\": ["), 9, "\"header\": {\"a\": [");
+  text.replace(text.find("], \"other\""), 1, "]}");
+  WriteBytes(path_, text);
+  EXPECT_EQ(Read()->model.header.solver(), "glTF by Carillon");
+}
+
+TEST_F(GltfModelTest, ALongNameIsShortenedBetweenCharacters) {
+  std::string name = "x";
+  for (int i = 0; i < 300; ++i) name += "\xc3\xa9";
+  const auto read = ReadChanged([&](json& file) { Model(file)["name"] = name; });
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_EQ(read->label, name.substr(0, 199));
+}
+
 TEST_F(GltfModelTest, ABufferMayBeAFileBesideIt) {
   const auto read = ReadChanged([&](json& file) {
     const std::string uri = file["buffers"][0]["uri"];
