@@ -62,7 +62,9 @@ void AddMaterialOptions(CLI::App& app, Options& options) {
 
 void AddMeshOptions(CLI::App& app, Options& options) {
   const std::string group = "Mesh";
-  app.add_option("--format", options.format, "obj, ply, stl, off or msh (default: by the suffix)")
+  app.add_option(
+         "--format", options.format,
+         "obj, ply, stl, off, msh (Gmsh), mesh (Medit) or node (TetGen; default: by the suffix)")
       ->group(group);
   app.add_option("--unit", options.unit,
                  "Unit of the file's coordinates: m, mm, cm, in, or a number of metres")
@@ -112,7 +114,9 @@ void AddMeshOptions(CLI::App& app, Options& options) {
 }
 
 void AddOptions(CLI::App& app, Options& options) {
-  app.add_option("IN", options.input, "Mesh file: a closed surface, or tetrahedra (msh)")
+  app.add_option(
+         "IN", options.input,
+         "Mesh file: a closed surface, or tetrahedra (msh, mesh, node with the ele beside it)")
       ->required();
   app.add_option("--out", options.output, "Where to write the modal model")->required();
   AddMaterialOptions(app, options);
@@ -273,8 +277,9 @@ absl::StatusOr<MeshFile> MakeMeshFile(const Options& options) {
     format = std::filesystem::path(options.input).extension().string();
     if (!format.empty()) format.erase(0, 1);
   }
+  format = absl::AsciiStrToLower(format);
   return MeshFile{.path = options.input,
-                  .format = absl::AsciiStrToLower(format),
+                  .format = format == "ele" ? "node" : format,
                   .metres_per_unit = *metres_per_unit};
 }
 

@@ -10,6 +10,7 @@
 
 #include "precompute/command_line.h"
 #include "precompute/json_report.h"
+#include "precompute/mesh/read_mesh.h"
 #include "precompute/modal_model_codec.h"
 #include "precompute/modes/openblas.h"
 #include "precompute/progress_bar.h"
@@ -24,11 +25,12 @@ namespace {
 constexpr std::chrono::milliseconds kProgressInterval(250);
 
 absl::StatusOr<ModalModel> DecomposeAndWrite(const CommandLine& asked, ProgressReporter& reporter) {
-  const absl::StatusOr<std::string> digest = Sha256OfFile(asked.mesh.path);
-  if (!digest.ok()) return digest.status();
+  const absl::StatusOr<std::string> bytes = ReadMeshFile(asked.mesh.path, asked.mesh.format);
+  if (!bytes.ok()) return bytes.status();
+  const std::string digest = Sha256Hex(*bytes);
   absl::StatusOr<ModalModel> model = Decompose(asked.mesh, asked.settings, reporter);
   if (!model.ok()) return model;
-  const ModelOrigin origin{.mesh_digest = *digest, .settings = ToProto(asked.mesh, asked.settings)};
+  const ModelOrigin origin{.mesh_digest = digest, .settings = ToProto(asked.mesh, asked.settings)};
   if (absl::Status status = WriteModalModel(asked.output, *model, origin); !status.ok()) {
     return status;
   }

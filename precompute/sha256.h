@@ -3,11 +3,9 @@
 
 #include <string>
 
-#include "absl/status/statusor.h"
-
 namespace carillon::precompute {
 
-/// SHA-256 of a file's bytes, lower-case hexadecimal. Errors: NotFound MESH_FILE_NOT_READABLE.
-absl::StatusOr<std::string> Sha256OfFile(const std::string& path);
+/// SHA-256 of some bytes, lower-case hexadecimal.
+std::string Sha256Hex(const std::string& bytes);
 
 }  // namespace carillon::precompute

@@ -5,7 +5,6 @@
 #include <array>
 #include <cstddef>
 #include <cstring>
-#include <map>
 #include <optional>
 #include <span>
 #include <string_view>
@@ -13,78 +12,51 @@
 
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
-#include "precompute/mesh/mesh_limits.h"
+#include "precompute/mesh/gmsh41_sections.h"
+#include "precompute/mesh/gmsh_elements.h"
 #include "precompute/mesh/text_lines.h"
 #include "proto/error_reason.h"
 
 namespace carillon::precompute {
 namespace {
 
-constexpr int kTetrahedron4 = 4, kTetrahedron10 = 11;
-
-/// A kind of element by its type in the file.
-struct Kind {
-  int type;
-  int dimension;
-  int node_count;
-  size_t corner_count;
-};
-
-/// Those that we take or pass over: points, lines, triangles, quadrangles, tetrahedra.
-constexpr std::array<Kind, 10> kKinds = {{{15, 0, 1, 1},
-                                          {1, 1, 2, 2},
-                                          {8, 1, 3, 2},
-                                          {2, 2, 3, 3},
-                                          {9, 2, 6, 3},
-                                          {3, 2, 4, 4},
-                                          {10, 2, 9, 4},
-                                          {16, 2, 8, 4},
-                                          {kTetrahedron4, 3, 4, 4},
-                                          {kTetrahedron10, 3, 10, 4}}};
-
-const Kind* KindOfType(int type) {
-  const auto* kind = std::ranges::find(kKinds, type, &Kind::type);
-  return kind == kKinds.end() ? nullptr : kind;
-}
-
 class Parser {
  public:
   explicit Parser(const std::string& bytes) : lines_(bytes) {}
 
-  absl::StatusOr<TetFile> Parse() && {
+  absl::StatusOr<ElementFile> Parse() && {
     std::string_view line;
     while (lines_.Next(line)) {
       absl::Status status = absl::OkStatus();
       if (line == "$MeshFormat") status = ReadFormat();
       if (line == "$PhysicalNames") status = ReadPhysicalNames();
-      if (line == "$Nodes") status = ReadNodes();
-      if (line == "$Elements") status = ReadElements();
+      if (line == "$Entities" && is_41_) status = Read41(&Gmsh41Sections::ReadEntities);
+      if (line == "$Nodes") status = is_41_ ? Read41(&Gmsh41Sections::ReadNodes) : ReadNodes();
+      if (line == "$Elements") {
+        status = is_41_ ? Read41(&Gmsh41Sections::ReadElements) : ReadElements();
+      }
       if (!status.ok()) return status;
     }
     if (!has_format_) return Unreadable("it has no $MeshFormat");
-    return std::move(file_);
+    return std::move(elements_.file);
   }
 
  private:
   static absl::Status Unreadable(absl::string_view what) {
     return Refusal(absl::StatusCode::kInvalidArgument, "MESH_UNREADABLE",
-                   absl::StrCat("the file cannot be read as Gmsh MSH 2.2: ", what,
-                                ". Write it by \"gmsh -format msh22\""));
-  }
-
-  static absl::Status Unsupported(absl::string_view what) {
-    return Refusal(absl::StatusCode::kInvalidArgument, "MESH_ELEMENT_UNSUPPORTED",
-                   absl::StrCat("the file has ", what,
-                                ": mesh the volume with tetrahedra of 4 or of 10 nodes alone"));
+                   absl::StrCat("the file cannot be read as Gmsh MSH 2.2 or 4.1: ", what,
+                                ". Write it by \"gmsh -format msh41\""));
   }
 
   absl::Status ReadFormat() {
     const auto words = lines_.NextWords();
     if (words.size() != 3) return lines_.Unreadable("no mesh format of Gmsh");
-    if (!words[0].starts_with("2.")) {
+    is_41_ = words[0] == "4.1";
+    if (!is_41_ && !words[0].starts_with("2.")) {
       return Unreadable(
           absl::StrCat("its version is ", absl::string_view(words[0].data(), words[0].size())));
     }
+    if (is_41_ && words[2] != "8") return Unreadable("its numbers have not eight bytes");
     has_format_ = true;
     is_binary_ = words[1] == "1";
     int32_t one = 1;
@@ -92,6 +64,13 @@ class Parser {
       return Unreadable("its bytes are in the other order");
     }
     return absl::OkStatus();
+  }
+
+  absl::Status Read41(absl::Status (Gmsh41Sections::*read)(NumberStream&)) {
+    NumberStream stream(lines_.rest(), is_binary_);
+    absl::Status status = (sections_.*read)(stream);
+    lines_.Skip(lines_.rest().size() - stream.rest().size());
+    return status;
   }
 
   absl::StatusOr<size_t> ReadCount() {
@@ -118,7 +97,7 @@ class Parser {
           !Assign(parts[1], figures[1]) || open == close) {
         return lines_.Unreadable("no physical name (\"dimension number \"name\"\")");
       }
-      physical_names_[figures] = line.substr(open + 1, close - open - 1);
+      elements_.physical_names[figures] = line.substr(open + 1, close - open - 1);
     }
     return absl::OkStatus();
   }
@@ -126,11 +105,7 @@ class Parser {
   absl::Status ReadNodes() {
     const absl::StatusOr<size_t> count = ReadCount();
     if (!count.ok()) return count.status();
-    if (*count > kMaxMeshNodes) {
-      return Refusal(absl::StatusCode::kResourceExhausted, "MESH_TOO_LARGE",
-                     absl::StrCat("the mesh has ", *count, " nodes; the limit is ", kMaxMeshNodes,
-                                  ": give a coarser mesh"));
-    }
+    if (absl::Status status = CheckNodeCountOfFile(*count); !status.ok()) return status;
     for (size_t i = 0; i < *count; ++i) {
       int32_t number = 0;
       Point p;
@@ -145,8 +120,8 @@ class Parser {
           return lines_.Unreadable("no node (\"number x y z\")");
         }
       }
-      file_.node_numbers.push_back(number);
-      file_.nodes.push_back(p);
+      elements_.file.node_numbers.push_back(number);
+      elements_.file.nodes.push_back(p);
     }
     return absl::OkStatus();
   }
@@ -169,10 +144,10 @@ class Parser {
       if (!Assign(word, figures.emplace_back())) return lines_.Unreadable("no element");
     }
     if (figures.size() < 3 || figures[2] < 0) return lines_.Unreadable("no element");
-    const Kind* kind = KindOfType(figures[1]);
-    if (kind == nullptr) return Unsupported(absl::StrCat("an element of Gmsh's type ", figures[1]));
+    const GmshKind* kind = FindGmshKind(figures[1]);
+    if (kind == nullptr) return UnknownGmshKind(figures[1]);
     const size_t first = 3 + static_cast<size_t>(figures[2]);
-    if (figures.size() != first + static_cast<size_t>(kind->node_count)) {
+    if (figures.size() != first + kind->node_count) {
       return lines_.Unreadable("an element with another number of nodes than its type has");
     }
     const int32_t physical = figures[2] > 0 ? figures[3] : 0;
@@ -187,11 +162,10 @@ class Parser {
     if (!Take(std::span(header)) || header[1] < 1 || header[2] < 0) {
       return Unreadable("the elements end too early");
     }
-    const Kind* kind = KindOfType(header[0]);
-    if (kind == nullptr) return Unsupported(absl::StrCat("an element of Gmsh's type ", header[0]));
+    const GmshKind* kind = FindGmshKind(header[0]);
+    if (kind == nullptr) return UnknownGmshKind(header[0]);
     const size_t first = 1 + static_cast<size_t>(header[2]);
-    std::vector<int32_t> figures(std::min(first, lines_.rest().size()) +
-                                 static_cast<size_t>(kind->node_count));
+    std::vector<int32_t> figures(std::min(first, lines_.rest().size()) + kind->node_count);
     for (int32_t i = 0; i < header[1]; ++i) {
       if (!Take(std::span(figures))) return Unreadable("the elements end too early");
       const int32_t physical = first > 1 ? figures[1] : 0;
@@ -201,27 +175,9 @@ class Parser {
     return static_cast<size_t>(header[1]);
   }
 
-  absl::Status AddElement(const Kind& kind, int32_t physical, std::span<const int32_t> nodes) {
+  absl::Status AddElement(const GmshKind& kind, int32_t physical, std::span<const int32_t> nodes) {
     const std::vector<int64_t> numbers(nodes.begin(), nodes.end());
-    AddToGroup(kind, physical, std::span(numbers).first(kind.corner_count));
-    if (kind.dimension != 3) return absl::OkStatus();
-    if (file_.nodes_per_element != 0 && file_.nodes_per_element != kind.node_count) {
-      return Unsupported("tetrahedra of 4 and of 10 nodes");
-    }
-    file_.nodes_per_element = kind.node_count;
-    file_.elements.insert(file_.elements.end(), numbers.begin(), numbers.end());
-    // Gmsh puts the last two mid-side nodes on the edges 2-3 and 1-3.
-    if (kind.type == kTetrahedron10) std::swap(file_.elements.end()[-1], file_.elements.end()[-2]);
-    return absl::OkStatus();
-  }
-
-  void AddToGroup(const Kind& kind, int32_t physical, std::span<const int64_t> corners) {
-    const auto name = physical_names_.find({kind.dimension, physical});
-    if (name != physical_names_.end()) {
-      file_.AddToGroup(name->second, corners);
-    } else if (physical != 0 && kind.dimension < 3) {
-      file_.AddToGroup(absl::StrCat(physical), corners);
-    }
+    return elements_.Add(kind, std::span(&physical, 1), numbers);
   }
 
   template <typename T>
@@ -240,14 +196,15 @@ class Parser {
   }
 
   TextLines lines_;
-  TetFile file_;
-  std::map<std::array<int32_t, 2>, std::string> physical_names_;  // by dimension and number
+  GmshElements elements_;
+  Gmsh41Sections sections_{elements_};
+  bool is_41_ = false;
   bool has_format_ = false;
   bool is_binary_ = false;
 };
 
 }  // namespace
 
-absl::StatusOr<TetFile> ParseGmsh(const std::string& bytes) { return Parser(bytes).Parse(); }
+absl::StatusOr<ElementFile> ParseGmsh(const std::string& bytes) { return Parser(bytes).Parse(); }
 
 }  // namespace carillon::precompute

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <utility>
@@ -11,8 +12,10 @@
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
 #include "precompute/mesh/gmsh_file.h"
-#include "precompute/mesh/make_tet_mesh.h"
+#include "precompute/mesh/make_mesh.h"
+#include "precompute/mesh/medit_file.h"
 #include "precompute/mesh/read_surface.h"
+#include "precompute/mesh/tetgen_file.h"
 #include "proto/error_reason.h"
 
 namespace carillon::precompute {
@@ -45,25 +48,53 @@ void Scale(NamedMesh& named, double factor) {
   for (auto& [number, p] : named.names.vertices) Scale(p, factor);
 }
 
-absl::StatusOr<NamedMesh> ReadTets(const std::string& bytes) {
-  absl::StatusOr<TetFile> file = ParseGmsh(bytes);
+bool IsSurfaceFormat(const std::string& format) {
+  return std::ranges::find(kSurfaceFormats, format) != kSurfaceFormats.end();
+}
+
+absl::StatusOr<ElementFile> ParseElements(const std::string& bytes, const std::string& format) {
+  if (format == "msh") return ParseGmsh(bytes);
+  return format == "mesh" ? ParseMedit(bytes) : ParseTetgen(bytes);
+}
+
+absl::StatusOr<NamedMesh> ReadElements(const std::string& bytes, const std::string& format) {
+  absl::StatusOr<ElementFile> file = ParseElements(bytes, format);
   if (!file.ok()) return file.status();
-  return MakeTetMesh(*std::move(file));
+  return MakeMesh(*std::move(file));
 }
 
 }  // namespace
 
+absl::StatusOr<std::string> ReadMeshFile(const std::string& path, const std::string& format) {
+  const std::filesystem::path file(path);
+  if (format != "node" || (file.extension() != ".node" && file.extension() != ".ele")) {
+    return ReadFile(path);
+  }
+  absl::StatusOr<std::string> nodes =
+      ReadFile(std::filesystem::path(file).replace_extension(".node"));
+  if (!nodes.ok()) return nodes;
+  const std::filesystem::path elements = std::filesystem::path(file).replace_extension(".ele");
+  // They may stand in one file already.
+  if (!std::filesystem::exists(elements)) return nodes;
+  const absl::StatusOr<std::string> rest = ReadFile(elements);
+  if (!rest.ok()) return rest;
+  return absl::StrCat(*nodes, nodes->ends_with('\n') ? "" : "\n", *rest);
+}
+
 absl::StatusOr<NamedMesh> ReadMesh(const std::string& path, const std::string& format,
                                    double metres_per_unit) {
-  const bool is_surface = std::ranges::find(kSurfaceFormats, format) != kSurfaceFormats.end();
-  if (!is_surface && format != "msh") {
-    return Refusal(absl::StatusCode::kInvalidArgument, "MESH_FORMAT_UNKNOWN",
-                   absl::StrCat("there is no mesh format \"", format,
-                                "\": give obj, ply, stl or off (a surface) or msh (Gmsh MSH 2.2)"));
+  const bool is_surface = IsSurfaceFormat(format);
+  if (!is_surface && format != "msh" && format != "mesh" && format != "node") {
+    return Refusal(
+        absl::StatusCode::kInvalidArgument, "MESH_FORMAT_UNKNOWN",
+        absl::StrCat("there is no mesh format \"", format,
+                     "\": give obj, ply, stl or off (a surface), msh (Gmsh), mesh (Medit) "
+                     "or node (TetGen)"));
   }
-  const absl::StatusOr<std::string> bytes = ReadFile(path);
+  const absl::StatusOr<std::string> bytes = ReadMeshFile(path, format);
   if (!bytes.ok()) return bytes.status();
-  absl::StatusOr<NamedMesh> named = is_surface ? ReadSurface(*bytes, format) : ReadTets(*bytes);
+  absl::StatusOr<NamedMesh> named =
+      is_surface ? ReadSurface(*bytes, format) : ReadElements(*bytes, format);
   if (!named.ok()) return named.status();
   Scale(*named, metres_per_unit);
   return named;

@@ -8,16 +8,21 @@
 
 namespace carillon::precompute {
 
-/// Reads the mesh file at `path`.
+/// The bytes of a mesh file; of TetGen's pair the .node file followed by the .ele file, whichever
+/// is named, where they are not in one file already. Errors: MESH_FILE_NOT_READABLE, MESH_EMPTY.
+absl::StatusOr<std::string> ReadMeshFile(const std::string& path, const std::string& format);
+
+/// Reads the mesh file at `path`, and what it calls its parts.
 ///
 /// `format`: "obj", "ply", "stl", "off" (a surface; polygons are split into triangles, otherwise
-/// triangles keep their order and count; vertices at the same place become one) or "msh" (Gmsh MSH
-/// 2.2 of 4- or 10-node tetrahedra; the boundary is filled in).
+/// triangles keep their order and count; vertices at the same place become one), "msh" (Gmsh
+/// MSH 2.2 or 4.1), "mesh" (Medit, text) or "node" (TetGen's .node and .ele): 4- or 10-node
+/// tetrahedra, whose boundary is filled in, or without any the triangles as a surface.
 /// `metres_per_unit`: length of one unit of the file.
 ///
 /// Errors: MESH_FORMAT_UNKNOWN, MESH_FILE_NOT_READABLE, MESH_EMPTY, MESH_UNREADABLE,
 /// MESH_NOT_FINITE, MESH_INDEX_OUT_OF_RANGE, MESH_TOO_LARGE, MESH_ELEMENT_UNSUPPORTED,
-/// MESH_ZERO_VOLUME, MESH_SEVERAL_PIECES, MESH_NOT_MANIFOLD.
+/// MESH_ZERO_VOLUME, MESH_MIDSIDE_NODE_MISPLACED, MESH_SEVERAL_PIECES, MESH_NOT_MANIFOLD.
 absl::StatusOr<NamedMesh> ReadMesh(const std::string& path, const std::string& format,
                                    double metres_per_unit);
 

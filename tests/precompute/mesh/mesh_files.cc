@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "tests/precompute/mesh/mesh_files.h"
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -42,6 +44,122 @@ std::vector<int32_t> GmshNodes(const TetMesh& mesh, size_t e) {
   if (stride == 10) std::swap(nodes[8], nodes[9]);
   for (int32_t& node : nodes) node += kFirstNodeNumber;
   return nodes;
+}
+
+/// Numbers as MSH 4.1 has them: text, or bytes.
+class Figures {
+ public:
+  explicit Figures(bool is_binary) : is_binary_(is_binary) {}
+
+  template <typename T>
+  void Put(T value) {
+    if (is_binary_) {
+      Append(bytes, value);
+    } else if constexpr (std::is_same_v<T, double>) {
+      absl::StrAppendFormat(&bytes, " %.17g", value);
+    } else {
+      absl::StrAppend(&bytes, " ", value);
+    }
+  }
+  template <typename T>
+  void PutAll(const std::vector<T>& values) {
+    for (const T value : values) Put(value);
+  }
+  void EndLine() {
+    if (!is_binary_) bytes += '\n';
+  }
+
+  std::string bytes;
+
+ private:
+  bool is_binary_;
+};
+
+void PutEntities(Figures& out) {
+  out.PutAll<uint64_t>({1, 0, 1, 1});
+  out.EndLine();
+  out.Put(int32_t{3});
+  out.PutAll<double>({0, 0, 0});
+  out.Put(uint64_t{0});
+  out.EndLine();
+  out.Put(int32_t{6});
+  out.PutAll<double>({0, 0, 0, 1, 1, 1});
+  out.Put(uint64_t{2});
+  out.PutAll<int32_t>({8, -5});
+  out.Put(uint64_t{1});
+  out.Put(int32_t{3});
+  out.EndLine();
+  out.Put(int32_t{1});
+  out.PutAll<double>({0, 0, 0, 1, 1, 1});
+  out.Put(uint64_t{1});
+  out.Put(int32_t{7});
+  out.Put(uint64_t{1});
+  out.Put(int32_t{6});
+  out.EndLine();
+}
+
+void PutNodes(const TetMesh& mesh, Figures& out) {
+  const size_t on_surface = mesh.nodes.size() / 2;
+  out.PutAll<uint64_t>(
+      {2, mesh.nodes.size(), kFirstNodeNumber, kFirstNodeNumber + mesh.nodes.size() - 1});
+  out.EndLine();
+  for (const bool surface : {true, false}) {
+    const size_t first = surface ? 0 : on_surface;
+    const size_t last = surface ? on_surface : mesh.nodes.size();
+    out.PutAll<int32_t>({surface ? 2 : 3, surface ? 6 : 1, surface ? 1 : 0});
+    out.Put(uint64_t{last - first});
+    out.EndLine();
+    for (size_t n = first; n < last; ++n) out.Put(uint64_t{n + kFirstNodeNumber});
+    out.EndLine();
+    for (size_t n = first; n < last; ++n) {
+      for (const double x : mesh.nodes[n]) out.Put(x);
+      if (surface) out.PutAll<double>({0.5, 0.25});
+      out.EndLine();
+    }
+  }
+}
+
+void PutElements(const TetMesh& mesh, Figures& out) {
+  uint64_t number = 1;
+  out.PutAll<uint64_t>({2, mesh.boundary.size() + mesh.element_count(), 1,
+                        mesh.boundary.size() + mesh.element_count()});
+  out.EndLine();
+  out.PutAll<int32_t>({2, 6, 2});
+  out.Put(uint64_t{mesh.boundary.size()});
+  out.EndLine();
+  for (const BoundaryFace& face : mesh.boundary) {
+    out.Put(number++);
+    for (size_t i = 0; i < 3; ++i) {
+      out.Put(static_cast<uint64_t>(face.nodes[i]) + kFirstNodeNumber);
+    }
+    out.EndLine();
+  }
+  out.PutAll<int32_t>({3, 1, mesh.nodes_per_element == 10 ? 11 : 4});
+  out.Put(uint64_t{mesh.element_count()});
+  out.EndLine();
+  for (size_t e = 0; e < mesh.element_count(); ++e) {
+    out.Put(number++);
+    for (const int32_t node : GmshNodes(mesh, e)) out.Put(static_cast<uint64_t>(node));
+    out.EndLine();
+  }
+}
+
+std::string ToGmsh41(const TetMesh& mesh, bool is_binary) {
+  std::string file = is_binary ? "$MeshFormat\n4.1 1 8\n" : "$MeshFormat\n4.1 0 8\n";
+  if (is_binary) {
+    Append(file, int32_t{1});
+    file += '\n';
+  }
+  absl::StrAppend(&file, "$EndMeshFormat\n$PhysicalNames\n2\n2 8 \"skin\"\n3 7 \"body\"\n",
+                  "$EndPhysicalNames\n");
+  for (const char* section : {"Entities", "Nodes", "Elements"}) {
+    Figures figures(is_binary);
+    if (section[0] == 'N') PutNodes(mesh, figures);
+    if (section[1] == 'n') PutEntities(figures);
+    if (section[1] == 'l') PutElements(mesh, figures);
+    absl::StrAppend(&file, "$", section, "\n", figures.bytes, "\n$End", section, "\n");
+  }
+  return file;
 }
 
 int GmshType(const TetMesh& mesh) { return mesh.nodes_per_element == 10 ? 11 : 4; }
@@ -161,6 +279,57 @@ std::string ToBinaryGmsh(const TetMesh& mesh) {
     for (const int32_t node : GmshNodes(mesh, e)) Append(bytes, node);
   }
   return bytes + "\n$EndElements\n";
+}
+
+std::string ToTextGmsh41(const TetMesh& mesh) { return ToGmsh41(mesh, false); }
+std::string ToBinaryGmsh41(const TetMesh& mesh) { return ToGmsh41(mesh, true); }
+
+std::string ToMedit(const TetMesh& mesh) {
+  const bool quadratic = mesh.nodes_per_element == 10;
+  std::string text = absl::StrCat("MeshVersionFormatted 2 # of a test\nDimension\n3\n\nVertices\n",
+                                  mesh.nodes.size(), "\n");
+  for (size_t n = 0; n < mesh.nodes.size(); ++n) {
+    const Point& p = mesh.nodes[n];
+    absl::StrAppendFormat(&text, "%.17g %.17g %.17g %d\n", p[0], p[1], p[2], n == 0 ? 9 : 5);
+  }
+  absl::StrAppend(&text, "Corners\n1\n1\n", quadratic ? "TrianglesP2\n" : "Triangles\n",
+                  mesh.boundary.size(), "\n");
+  for (const BoundaryFace& face : mesh.boundary) {
+    for (size_t i = 0; i < (quadratic ? 6U : 3U); ++i) {
+      absl::StrAppend(&text, face.nodes[i] + 1, " ");
+    }
+    text += "5\n";
+  }
+  absl::StrAppend(&text, quadratic ? "TetrahedraP2 " : "Tetrahedra ", mesh.element_count(), "\n");
+  const auto stride = static_cast<size_t>(mesh.nodes_per_element);
+  for (size_t e = 0; e < mesh.element_count(); ++e) {
+    for (size_t i = 0; i < stride; ++i) {
+      absl::StrAppend(&text, mesh.elements[e * stride + i] + 1, " ");
+    }
+    text += "1\n";
+  }
+  return text + "End\n";
+}
+
+std::string ToTetgen(const TetMesh& mesh, int first) {
+  const auto stride = static_cast<size_t>(mesh.nodes_per_element);
+  std::string text = absl::StrCat("# of a test\n", mesh.nodes.size(), " 3 1 1\n");
+  for (size_t n = 0; n < mesh.nodes.size(); ++n) {
+    const Point& p = mesh.nodes[n];
+    absl::StrAppendFormat(&text, "%d  %.17g %.17g %.17g  0.5 %d\n", static_cast<int>(n) + first,
+                          p[0], p[1], p[2], n < 2 ? 5 : 0);
+  }
+  absl::StrAppend(&text, "# its elements\n", mesh.element_count(), " ", stride, " 1\n");
+  // The mid-side nodes of edges 2-3, 0-3, 0-1, 1-2, 1-3 and 0-2.
+  constexpr std::array<size_t, 10> kOrder = {0, 1, 2, 3, 9, 7, 4, 5, 8, 6};
+  for (size_t e = 0; e < mesh.element_count(); ++e) {
+    absl::StrAppend(&text, e + static_cast<size_t>(first));
+    for (size_t i = 0; i < stride; ++i) {
+      absl::StrAppend(&text, " ", mesh.elements[e * stride + kOrder[i]] + first);
+    }
+    text += " 0.25\n";
+  }
+  return text;
 }
 
 }  // namespace carillon::precompute

@@ -21,4 +21,16 @@ std::string ToBinaryStl(const SurfaceMesh& surface);
 std::string ToTextGmsh(const TetMesh& mesh);
 std::string ToBinaryGmsh(const TetMesh& mesh);
 
+/// MSH 4.1, nodes and boundary as above; the boundary is on surface 6, which is in the physical
+/// groups "skin" and 5, its nodes have parameters, and they come in two blocks.
+std::string ToTextGmsh41(const TetMesh& mesh);
+std::string ToBinaryGmsh41(const TetMesh& mesh);
+
+/// Medit's .mesh, the boundary with reference 5, vertices with references 5 and (the first) 9.
+std::string ToMedit(const TetMesh& mesh);
+
+/// TetGen's .node and .ele, one after the other, nodes numbered from `first`, the first two with
+/// the boundary marker 5.
+std::string ToTetgen(const TetMesh& mesh, int first);
+
 }  // namespace carillon::precompute

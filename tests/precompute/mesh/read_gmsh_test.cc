@@ -21,17 +21,6 @@ TetMesh Box(int nodes_per_element) {
   return MakeTetBox({1, 0.5, 0.25}, {3, 2, 1}, nodes_per_element);
 }
 
-void ExpectSame(const TetMesh& read, const TetMesh& written) {
-  EXPECT_EQ(read.nodes, written.nodes);
-  EXPECT_EQ(read.nodes_per_element, written.nodes_per_element);
-  EXPECT_EQ(read.elements, written.elements);
-  ASSERT_EQ(read.boundary.size(), written.boundary.size());
-  for (size_t f = 0; f < read.boundary.size(); ++f) {
-    EXPECT_EQ(read.boundary[f].nodes, written.boundary[f].nodes);
-    EXPECT_EQ(read.boundary[f].given_triangle, static_cast<int32_t>(f));
-  }
-}
-
 std::string Header() { return "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n"; }
 
 /// One tetrahedron whose fourth node has the coordinates `fourth`.
@@ -45,6 +34,8 @@ TEST_F(ReadGmshTest, GivesTheMeshThatWasWritten) {
     const TetMesh box = Box(nodes_per_element);
     ExpectSame(ReadTetsOf(ToTextGmsh(box)), box);
     ExpectSame(ReadTetsOf(ToBinaryGmsh(box)), box);
+    ExpectSame(ReadTetsOf(ToTextGmsh41(box)), box);
+    ExpectSame(ReadTetsOf(ToBinaryGmsh41(box)), box);
   }
 }
 
@@ -83,12 +74,31 @@ TEST_F(ReadGmshTest, PassesOverNodesThatNoTetrahedronHas) {
 
 TEST_F(ReadGmshTest, AnotherVersionIsRefused) {
   EXPECT_THAT(
-      Refused("$MeshFormat\n4.1 0 8\n$EndMeshFormat\n", "msh"),
-      HasSubstr("MESH_UNREADABLE: the file cannot be read as Gmsh MSH 2.2: its version is 4.1"));
+      Refused("$MeshFormat\n4 0 8\n$EndMeshFormat\n", "msh"),
+      HasSubstr(
+          "MESH_UNREADABLE: the file cannot be read as Gmsh MSH 2.2 or 4.1: its version is 4"));
+  EXPECT_THAT(Refused("$MeshFormat\n4.1 1 4\n", "msh"), HasSubstr("numbers have not eight bytes"));
 }
 
-TEST_F(ReadGmshTest, AFileWithoutTetrahedraIsRefused) {
-  EXPECT_THAT(Refused(OneTet("0 0 1", "1 2 0 1 2 3"), "msh"), HasSubstr("MESH_EMPTY: "));
+TEST_F(ReadGmshTest, AFileWithNeitherTetrahedraNorTrianglesIsRefused) {
+  EXPECT_THAT(Refused(OneTet("0 0 1", "1 1 0 1 2"), "msh"), HasSubstr("MESH_EMPTY: "));
+}
+
+TEST_F(ReadGmshTest, AFileOfTrianglesAloneIsASurfaceWithItsGroups) {
+  const std::string file =
+      Header() +
+      "$PhysicalNames\n1\n2 4 \"base\"\n$EndPhysicalNames\n$Nodes\n5\n1 0 0 0\n2 1 0 0\n3 1 1 0\n"
+      "4 0 1 0\n5 0 0 1\n$EndNodes\n$Elements\n5\n1 3 2 4 1 1 4 3 2\n2 2 0 1 2 5\n3 2 0 2 3 5\n"
+      "4 2 0 3 4 5\n5 2 0 4 1 5\n$EndElements\n";
+  const absl::StatusOr<NamedMesh> read = ReadNamed(file, "msh");
+  ASSERT_TRUE(read.ok()) << read.status();
+  const auto& surface = std::get<SurfaceMesh>(read->mesh);
+  EXPECT_EQ(surface.vertices.size(), 5u);
+  ASSERT_EQ(surface.triangles.size(), 6u);  // the quadrangle gives two
+  ASSERT_EQ(read->names.groups.size(), 1u);
+  EXPECT_EQ(read->names.groups[0].name, "base");
+  EXPECT_THAT(read->names.groups[0].triangles, ::testing::ElementsAre(0, 1));
+  EXPECT_EQ(read->names.vertices.at(5), (Point{0, 0, 1}));
 }
 
 TEST_F(ReadGmshTest, ANodeThatIsNotThereIsRefused) {
@@ -143,12 +153,39 @@ TEST_F(ReadGmshTest, PiecesThatDoNotHangTogetherAreRefused) {
 }
 
 TEST_F(ReadGmshTest, AFileThatEndsEarlyIsRefused) {
-  for (const std::string& file : {ToTextGmsh(Box(4)), ToBinaryGmsh(Box(4))}) {
+  for (const std::string& file :
+       {ToTextGmsh(Box(4)), ToBinaryGmsh(Box(4)), ToTextGmsh41(Box(4)), ToBinaryGmsh41(Box(4))}) {
     for (const size_t part : {3U, 5U, 40U}) {
       EXPECT_THAT(Refused(file.substr(0, file.size() - file.size() / part), "msh"),
                   HasSubstr("MESH_UNREADABLE: "));
     }
   }
+}
+
+TEST_F(ReadGmshTest, PhysicalGroupsAreThoseOfTheEntities) {
+  for (const std::string& file : {ToTextGmsh41(Box(4)), ToBinaryGmsh41(Box(4))}) {
+    const absl::StatusOr<NamedMesh> read = ReadNamed(file, "msh");
+    ASSERT_TRUE(read.ok()) << read.status();
+    std::vector<std::string> names;
+    for (const MeshGroup& group : read->names.groups) names.push_back(group.name);
+    EXPECT_THAT(names, ::testing::ElementsAre("skin", "5", "body"));
+    EXPECT_EQ(read->names.groups[0].simplices.size(), Box(4).boundary.size());
+    EXPECT_EQ(read->names.groups[2].simplices.size(), Box(4).element_count());
+  }
+}
+
+// Bytes that are no mesh must not be believed: a count of 2^60 nodes, elements, groups.
+TEST_F(ReadGmshTest, CountsThatTheFileCannotHoldAreRefused) {
+  std::string file = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n";
+  const std::string many = "1152921504606846976";
+  EXPECT_THAT(Refused(file + "$Nodes\n1 " + many + " 1 9\n", "msh"), HasSubstr("MESH_TOO_LARGE"));
+  EXPECT_THAT(Refused(file + "$Nodes\n1 9 1 9\n3 1 0 " + many + "\n", "msh"),
+              HasSubstr("MESH_TOO_LARGE"));
+  EXPECT_THAT(Refused(file + "$Nodes\n" + many + " 9 1 9\n", "msh"), HasSubstr("MESH_UNREADABLE"));
+  EXPECT_THAT(Refused(file + "$Entities\n0 " + many + " 0 0\n", "msh"),
+              HasSubstr("MESH_UNREADABLE"));
+  EXPECT_THAT(Refused(file + "$Elements\n1 9 1 9\n3 1 4 " + many + "\n", "msh"),
+              HasSubstr("MESH_UNREADABLE"));
 }
 
 TEST_F(ReadGmshTest, AMeshOverTheLimitIsRefused) {

@@ -36,8 +36,8 @@ class ReadMeshTest : public testing::Test {
     return mesh.ok() ? std::get<SurfaceMesh>(*mesh) : SurfaceMesh{};
   }
 
-  TetMesh ReadTetsOf(const std::string& bytes) const {
-    const absl::StatusOr<Mesh> mesh = Read(bytes, "msh");
+  TetMesh ReadTetsOf(const std::string& bytes, const std::string& format = "msh") const {
+    const absl::StatusOr<Mesh> mesh = Read(bytes, format);
     EXPECT_TRUE(mesh.ok()) << mesh.status();
     return mesh.ok() ? std::get<TetMesh>(*mesh) : TetMesh{};
   }
@@ -51,5 +51,16 @@ class ReadMeshTest : public testing::Test {
   std::string path_ = testing::TempDir() + "mesh_of_" +
                       testing::UnitTest::GetInstance()->current_test_info()->name();
 };
+
+inline void ExpectSame(const TetMesh& read, const TetMesh& written) {
+  EXPECT_EQ(read.nodes, written.nodes);
+  EXPECT_EQ(read.nodes_per_element, written.nodes_per_element);
+  EXPECT_EQ(read.elements, written.elements);
+  ASSERT_EQ(read.boundary.size(), written.boundary.size());
+  for (size_t f = 0; f < read.boundary.size(); ++f) {
+    EXPECT_EQ(read.boundary[f].nodes, written.boundary[f].nodes);
+    EXPECT_EQ(read.boundary[f].given_triangle, static_cast<int32_t>(f));
+  }
+}
 
 }  // namespace carillon::precompute

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
-#include "precompute/mesh/make_tet_mesh.h"
+#include "precompute/mesh/make_mesh.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -13,6 +14,7 @@
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
 #include "precompute/mesh/boundary.h"
+#include "precompute/mesh/merge_vertices.h"
 #include "precompute/mesh/point_math.h"
 #include "proto/error_reason.h"
 
@@ -23,7 +25,7 @@ absl::Status Refuse(absl::string_view reason, absl::string_view message) {
   return Refusal(absl::StatusCode::kInvalidArgument, reason, message);
 }
 
-absl::Status CheckFinite(const TetFile& file) {
+absl::Status CheckFinite(const ElementFile& file) {
   for (size_t n = 0; n < file.nodes.size(); ++n) {
     const Point& p = file.nodes[n];
     if (std::ranges::all_of(p, [](double x) { return std::isfinite(x); })) continue;
@@ -36,7 +38,7 @@ absl::Status CheckFinite(const TetFile& file) {
 
 using NodeOfNumber = absl::flat_hash_map<int64_t, int32_t>;
 
-NodeOfNumber NumberNodes(const TetFile& file) {
+NodeOfNumber NumberNodes(const ElementFile& file) {
   NodeOfNumber node_of_number;
   for (size_t n = 0; n < file.node_numbers.size(); ++n) {
     node_of_number[file.node_numbers[n]] = static_cast<int32_t>(n);
@@ -44,23 +46,23 @@ NodeOfNumber NumberNodes(const TetFile& file) {
   return node_of_number;
 }
 
-/// Elements by index into `file.nodes`.
-absl::StatusOr<std::vector<int32_t>> FindNodes(const TetFile& file,
+/// Nodes by their index into `file.nodes`, of elements of so many nodes each.
+absl::StatusOr<std::vector<int32_t>> FindNodes(std::span<const int64_t> numbers, size_t of_each,
+                                               absl::string_view element,
                                                const NodeOfNumber& node_of_number) {
-  std::vector<int32_t> elements;
-  elements.reserve(file.elements.size());
-  for (const int64_t number : file.elements) {
+  std::vector<int32_t> nodes;
+  nodes.reserve(numbers.size());
+  for (const int64_t number : numbers) {
     const auto found = node_of_number.find(number);
     if (found == node_of_number.end()) {
-      return Refuse("MESH_INDEX_OUT_OF_RANGE",
-                    absl::StrCat("tetrahedron ",
-                                 elements.size() / static_cast<size_t>(file.nodes_per_element),
-                                 " (counted from zero) names node ", number,
-                                 ", which the file does not have: export the mesh again"));
+      return Refuse(
+          "MESH_INDEX_OUT_OF_RANGE",
+          absl::StrCat(element, " ", nodes.size() / of_each, " (counted from zero) names node ",
+                       number, ", which the file does not have: export the mesh again"));
     }
-    elements.push_back(found->second);
+    nodes.push_back(found->second);
   }
-  return elements;
+  return nodes;
 }
 
 /// Leaves out the nodes that no element has; returns the new index of each, -1 for one left out.
@@ -79,7 +81,7 @@ std::vector<int32_t> DropUnusedNodes(TetMesh& mesh) {
 }
 
 /// What the file calls the nodes that are left; a simplex with another node is passed over.
-MeshNames NamesOf(const TetFile& file, const NodeOfNumber& node_of_number,
+MeshNames NamesOf(const ElementFile& file, const NodeOfNumber& node_of_number,
                   const std::vector<int32_t>& new_index, const TetMesh& mesh) {
   const auto index_of = [&](int64_t number) {
     const auto found = node_of_number.find(number);
@@ -90,12 +92,12 @@ MeshNames NamesOf(const TetFile& file, const NodeOfNumber& node_of_number,
     const int32_t node = index_of(number);
     if (node >= 0) names.vertices[number] = mesh.nodes[static_cast<size_t>(node)];
   }
-  for (const TetFile::Group& group : file.groups) {
+  for (const ElementFile::Group& group : file.groups) {
     MeshGroup& named = names.groups.emplace_back(MeshGroup{.name = group.name});
     for (const auto& numbers : group.simplices) {
       std::array<int32_t, 4> corners = {-1, -1, -1, -1};
       size_t count = 0;
-      while (count < 4 && numbers[count] != TetFile::kNoNode) ++count;
+      while (count < 4 && numbers[count] != ElementFile::kNoNode) ++count;
       std::transform(numbers.begin(), numbers.begin() + count, corners.begin(), index_of);
       const auto end = corners.begin() + count;
       if (std::find(corners.begin(), end, -1) == end) named.simplices.push_back(corners);
@@ -200,17 +202,9 @@ absl::Status CheckOnePiece(const TetMesh& mesh) {
                    "at the same place), or submit each as a mesh of its own"));
 }
 
-}  // namespace
-
-absl::StatusOr<NamedMesh> MakeTetMesh(TetFile file) {
-  if (absl::Status status = CheckFinite(file); !status.ok()) return status;
-  if (file.elements.empty()) {
-    return Refuse("MESH_EMPTY",
-                  "the file has no tetrahedra: mesh the volume (\"gmsh -3\"), or give the surface "
-                  "as OBJ, PLY, STL or OFF");
-  }
-  const NodeOfNumber node_of_number = NumberNodes(file);
-  absl::StatusOr<std::vector<int32_t>> elements = FindNodes(file, node_of_number);
+absl::StatusOr<NamedMesh> MakeTetrahedra(ElementFile& file, const NodeOfNumber& node_of_number) {
+  absl::StatusOr<std::vector<int32_t>> elements = FindNodes(
+      file.elements, static_cast<size_t>(file.nodes_per_element), "tetrahedron", node_of_number);
   if (!elements.ok()) return elements.status();
   TetMesh mesh{std::move(file.nodes), file.nodes_per_element, *std::move(elements), {}};
   const std::vector<int32_t> new_index = DropUnusedNodes(mesh);
@@ -223,12 +217,37 @@ absl::StatusOr<NamedMesh> MakeTetMesh(TetFile file) {
   return NamedMesh{std::move(mesh), std::move(names)};
 }
 
-void TetFile::AddToGroup(const std::string& name, std::span<const int64_t> corners) {
-  auto group = std::ranges::find(groups, name, &Group::name);
-  if (group == groups.end()) group = groups.insert(groups.end(), {.name = name, .simplices = {}});
-  auto& simplex = group->simplices.emplace_back();
-  simplex.fill(kNoNode);
-  std::ranges::copy(corners, simplex.begin());
+/// A file of triangles alone, whose groups are of triangles, too.
+absl::StatusOr<NamedMesh> MakeSurface(const ElementFile& file, const NodeOfNumber& node_of_number) {
+  const std::span<const int64_t> numbers(file.triangles.front().data(), 3 * file.triangles.size());
+  const absl::StatusOr<std::vector<int32_t>> nodes =
+      FindNodes(numbers, 3, "triangle", node_of_number);
+  if (!nodes.ok()) return nodes.status();
+  std::vector<std::array<Point, 3>> triangles(file.triangles.size());
+  for (size_t i = 0; i < nodes->size(); ++i) {
+    triangles[i / 3][i % 3] = file.nodes[static_cast<size_t>((*nodes)[i])];
+  }
+  NamedMesh named{MergeVertices(triangles)};
+  for (size_t n = 0; n < file.nodes.size(); ++n) {
+    named.names.vertices[file.node_numbers[n]] = file.nodes[n];
+  }
+  for (const ElementFile::Group& group : file.groups) {
+    named.names.groups.push_back({.name = group.name, .triangles = group.triangles});
+  }
+  return named;
+}
+
+}  // namespace
+
+absl::StatusOr<NamedMesh> MakeMesh(ElementFile file) {
+  if (absl::Status status = CheckFinite(file); !status.ok()) return status;
+  const NodeOfNumber node_of_number = NumberNodes(file);
+  if (!file.elements.empty()) return MakeTetrahedra(file, node_of_number);
+  if (!file.triangles.empty()) return MakeSurface(file, node_of_number);
+  return Refuse(
+      "MESH_EMPTY",
+      "the file has neither tetrahedra nor triangles: mesh the volume (\"gmsh -3\") or its "
+      "surface (\"gmsh -2\")");
 }
 
 }  // namespace carillon::precompute

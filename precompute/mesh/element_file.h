@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "precompute/mesh/surface_mesh.h"
+
+namespace carillon::precompute {
+
+/// What a file of nodes and elements says, not yet checked; nodes are named by their numbers in the
+/// file.
+struct ElementFile {
+  /// Points, edges, faces and elements that belong together.
+  struct Group {
+    std::string name;
+    /// Numbers of the nodes at the corners of each; kNoNode past the last.
+    std::vector<std::array<int64_t, 4>> simplices;
+    /// Which of `triangles`.
+    std::vector<int32_t> triangles;
+  };
+  static constexpr int64_t kNoNode = std::numeric_limits<int64_t>::min();
+
+  std::vector<int64_t> node_numbers;
+  std::vector<Point> nodes;       ///< their places
+  int nodes_per_element = 0;      ///< 4 or 10; 0 where there is no tetrahedron
+  std::vector<int64_t> elements;  ///< node numbers of each tetrahedron, in the order of TetMesh
+  std::vector<std::array<int64_t, 3>> triangles;  ///< on surfaces, which bound or divide the body
+  std::vector<Group> groups;
+
+  /// Adds a simplex to each of these groups.
+  void AddToGroups(std::span<const std::string> names, std::span<const int64_t> corners);
+  /// Adds a triangle, or the two or four into which a face is split.
+  void AddTriangles(std::span<const std::string> names,
+                    std::span<const std::array<int64_t, 3>> pieces);
+  /// Adds a tetrahedron of 4 or 10 nodes. Errors: MESH_ELEMENT_UNSUPPORTED (both in one file).
+  absl::Status AddTetrahedron(std::span<const int64_t> nodes);
+
+ private:
+  Group& Named(const std::string& name);
+};
+
+/// Errors: MESH_TOO_LARGE, where there are more nodes than can be taken.
+absl::Status CheckNodeCountOfFile(size_t count);
+
+/// The error MESH_ELEMENT_UNSUPPORTED of a file that has `what`.
+absl::Status UnsupportedElements(absl::string_view what);
+
+}  // namespace carillon::precompute
