@@ -49,7 +49,22 @@ absl::StatusOr<std::string> ReadMesh(const std::string& path) {
 std::string Format(const CreateModelOptions& options) {
   if (!options.format.empty()) return options.format;
   const std::string suffix = std::filesystem::path(options.file).extension();
-  return absl::AsciiStrToLower(absl::StripPrefix(suffix, "."));
+  const std::string format = absl::AsciiStrToLower(absl::StripPrefix(suffix, "."));
+  return format == "ele" ? "node" : format;
+}
+
+/// What TetGen writes into two files goes to the daemon as one.
+absl::StatusOr<std::string> ReadAllOfMesh(const CreateModelOptions& options) {
+  const std::filesystem::path path(options.file);
+  const auto elements = std::filesystem::path(path).replace_extension(".ele");
+  const bool pair = Format(options) == "node" && std::filesystem::exists(elements);
+  if (!pair) return ReadMesh(options.file);
+  absl::StatusOr<std::string> nodes =
+      ReadMesh(std::filesystem::path(path).replace_extension(".node"));
+  const absl::StatusOr<std::string> rest = ReadMesh(elements);
+  if (!nodes.ok()) return nodes;
+  if (!rest.ok()) return rest;
+  return absl::StrCat(*nodes, nodes->ends_with('\n') ? "" : "\n", *rest);
 }
 
 v1::DecompositionSettings Settings(const CreateModelOptions& options) {
@@ -150,7 +165,7 @@ void PrintModes(const v1::ModalModelSummary& model, const v1::Material& material
 
 absl::Status CreateModel(const client::Client& daemon, const CreateModelOptions& options,
                          bool json) {
-  const auto bytes = ReadMesh(options.file);
+  const auto bytes = ReadAllOfMesh(options);
   if (!bytes.ok()) return bytes.status();
   auto digest = daemon.UploadMesh(*bytes);
   if (!digest.ok()) return digest.status();

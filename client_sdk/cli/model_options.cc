@@ -51,9 +51,12 @@ void AddModelCreate(CLI::App& app, Program& program) {
   auto options = std::make_shared<CreateModelOptions>();
   auto band = std::make_shared<std::string>("20:20000");
   CLI::App& create = *app.add_subcommand("create", "compute the modal model of a mesh file");
-  create.add_option("file", options->file, "surface (OBJ, PLY, STL, OFF) or tetrahedra (MSH)")
+  create
+      .add_option("file", options->file,
+                  "surface (OBJ, PLY, STL, OFF) or tetrahedra (Gmsh MSH, Medit, TetGen)")
       ->required();
-  create.add_option("--format", options->format, "obj, ply, stl, off or msh [the file's suffix]");
+  create.add_option("--format", options->format,
+                    "obj, ply, stl, off, msh, mesh or node [the file's suffix]");
   create.add_option("--label", options->label, "name for people [the file's name]");
   create.add_option("--unit", options->unit, "length unit of the file")
       ->check(CLI::IsMember({"m", "mm", "cm", "in"}))

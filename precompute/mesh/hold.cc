@@ -188,9 +188,26 @@ class Holder {
     }
   }
 
-  /// Corners, and the mid-side nodes of the edges between the corners of one simplex.
+  using Edges = absl::flat_hash_set<std::pair<int32_t, int32_t>>;
+
+  /// A group that marks nodes means the part of the boundary between them.
+  void AddEdgesBetweenPoints(const MeshGroup& group, Edges& edges) const {
+    absl::flat_hash_set<int32_t> points;
+    for (const auto& corners : group.simplices) {
+      if (corners[1] < 0) points.insert(corners[0]);
+    }
+    for (const BoundaryFace& face : mesh_.boundary) {
+      for (size_t i = 0; i < 3; ++i) {
+        const int32_t a = face.nodes[i], b = face.nodes[(i + 1) % 3];
+        if (points.contains(a) && points.contains(b)) edges.insert(std::minmax(a, b));
+      }
+    }
+  }
+
+  /// Corners, and the mid-side nodes of the edges between the corners of one simplex, or between
+  /// points.
   void HoldSimplices(const MeshGroup& group) {
-    absl::flat_hash_set<std::pair<int32_t, int32_t>> edges;
+    Edges edges;
     for (const auto& corners : group.simplices) {
       for (size_t i = 0; i < corners.size() && corners[i] >= 0; ++i) {
         Mark(corners[i]);
@@ -198,6 +215,7 @@ class Holder {
       }
     }
     if (mesh_.nodes_per_element != 10) return;
+    AddEdgesBetweenPoints(group, edges);
     for (size_t e = 0; e < mesh_.elements.size(); e += 10) {
       const int32_t* element = &mesh_.elements[e];
       for (size_t k = 0; k < kTetEdges.size(); ++k) {

@@ -17,7 +17,7 @@
 namespace carillon {
 namespace {
 
-constexpr std::array kFormats = {"obj", "ply", "stl", "off", "msh"};
+constexpr std::array kFormats = {"obj", "ply", "stl", "off", "msh", "mesh", "node"};
 constexpr size_t kMaxLabelBytes = 200;
 constexpr int kMostPriority = 100;
 constexpr int kMostFixtures = 16;
@@ -31,7 +31,7 @@ absl::Status CheckMesh(const v1::CreateModalModelRequest& request) {
   if (std::ranges::find(kFormats, request.mesh_format()) == kFormats.end()) {
     return Refusal(absl::StatusCode::kInvalidArgument, "MESH_FORMAT_UNKNOWN",
                    absl::StrCat("mesh_format is \"", request.mesh_format(),
-                                "\"; name one of obj, ply, stl, off, msh"));
+                                "\"; name one of obj, ply, stl, off, msh, mesh, node"));
   }
   if (!IsSha256Hex(request.mesh_digest())) {
     return Refusal(

@@ -22,7 +22,7 @@ absl::StatusOr<v1::CreateModalModelRequest> ResolveRequest(
 ///
 ///     carillon-decomposition 1
 ///     mesh <SHA-256 of the mesh file>
-///     format <obj|ply|stl|off|msh>
+///     format <obj|ply|stl|off|msh|mesh|node>
 ///     poisson_1e-4 <Poisson's ratio in units of 1e-4, an integer>
 ///     element <linear|quadratic>
 ///     mass <lumped|consistent>

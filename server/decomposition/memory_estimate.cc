@@ -8,11 +8,15 @@
 namespace carillon {
 namespace {
 
+bool IsOfTetrahedra(const std::string& format) {
+  return format == "msh" || format == "mesh" || format == "node";
+}
+
 // A closed surface has two triangles a vertex; text as most programs write it, else binary.
 double BytesAVertex(const std::string& format) {
   if (format == "obj") return 90;
   if (format == "stl") return 100;
-  if (format == "msh") return 250;  // a vertex of tetrahedra, of which there are five each
+  if (IsOfTetrahedra(format)) return 250;  // a vertex of tetrahedra, of which there are five each
   return 60;
 }
 
@@ -24,7 +28,7 @@ constexpr double kCornersAVertex = 2;  // those inside, too
 }  // namespace
 
 double GuessNodeCount(const v1::CreateModalModelRequest& resolved, uint64_t mesh_bytes) {
-  const bool tetrahedra = resolved.mesh_format() == "msh";
+  const bool tetrahedra = IsOfTetrahedra(resolved.mesh_format());
   const double vertices = static_cast<double>(mesh_bytes) / BytesAVertex(resolved.mesh_format());
   double corners = std::max(kFewestCorners, vertices * (tetrahedra ? 1 : kCornersAVertex));
   const uint32_t asked = resolved.settings().mesh().target_node_count();

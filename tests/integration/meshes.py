@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Small bodies as OBJ files, good and bad ones."""
 
+import itertools
 import math
 
 MATERIAL = "chime_aluminum"
@@ -37,6 +38,23 @@ BAR_SIZE = (0.200, 0.016, 0.010)
 
 def bar():
     return obj(*box(BAR_SIZE))
+
+
+def tetrahedra_of_bar(*cells):
+    """(nodes, tetrahedra counted from 0) of the bar, cut into so many cells a side, each into the six
+    tetrahedra that climb from its lowest corner to its highest along the axes, in all orders."""
+    at = {}
+    for corner in itertools.product(*(range(count + 1) for count in cells)):
+        at[corner] = len(at)
+    nodes = [tuple(side * i / count for side, i, count in zip(BAR_SIZE, corner, cells)) for corner in at]
+    tetrahedra = []
+    for low in itertools.product(*map(range, cells)):
+        for order in itertools.permutations(range(3)):
+            path = [low]
+            for axis in order:
+                path.append(tuple(i + (k == axis) for k, i in enumerate(path[-1])))
+            tetrahedra.append(tuple(at[corner] for corner in path))
+    return nodes, tetrahedra
 
 
 def bar_first_bending_hz():

@@ -33,9 +33,9 @@ class HeldTest(DaemonTest):
         cls.bar = cls.folder / "bar.obj"
         cls.bar.write_bytes(bar_with_an_end())
 
-    def create(self, *options):
+    def create(self, *options, file=None):
         """The name of the bar's model."""
-        printed = self.daemon.command("model", "create", self.bar, "--material", meshes.MATERIAL, "--nodes",
+        printed = self.daemon.command("model", "create", file or self.bar, "--material", meshes.MATERIAL, "--nodes",
                                       300, "--band", "20:6000", "--wait", *options)
         return printed.stdout.strip()
 
@@ -83,6 +83,29 @@ class HeldTest(DaemonTest):
 
         self.assertGreater(loudness(LENGTH), 1e-4)
         self.assertEqual(loudness(0), 0)
+
+    def test_tetrahedra_of_tetgen_and_medit_are_held_by_their_own_names(self):
+        nodes, tetrahedra = meshes.tetrahedra_of_bar(16, 2, 1)
+        at_end = [1 if x == 0 else 0 for x, _, _ in nodes]
+        node_file = self.folder / "bar.node"
+        node_file.write_text(f"{len(nodes)} 3 0 1\n" + "".join(
+            f"{i} {x} {y} {z} {end}\n" for i, ((x, y, z), end) in enumerate(zip(nodes, at_end))))
+        self.folder.joinpath("bar.ele").write_text(f"{len(tetrahedra)} 4 0\n" + "".join(
+            f"{i} {a} {b} {c} {d}\n" for i, (a, b, c, d) in enumerate(tetrahedra)))
+        medit_file = self.folder / "bar.mesh"
+        medit_file.write_text(f"MeshVersionFormatted 2\nDimension 3\nVertices {len(nodes)}\n" + "".join(
+            f"{x} {y} {z} {end}\n" for (x, y, z), end in zip(nodes, at_end))
+            + f"Tetrahedra {len(tetrahedra)}\n" + "".join(
+                f"{a + 1} {b + 1} {c + 1} {d + 1} 0\n" for a, b, c, d in tetrahedra) + "End\n")
+        by_plane, by_marker, by_reference = (
+            self.create("--fix", fixture, file=file)
+            for file, fixture in ((node_file, CLAMP), (node_file.with_suffix(".ele"), "group:1"),
+                                  (medit_file, "group:1")))
+        frequencies = self.frequencies_hz(by_plane)
+        self.assertGreater(len(frequencies), 3)
+        # The mid-side nodes between those that are marked are held, too.
+        self.assertEqual(self.frequencies_hz(by_marker), frequencies)
+        self.assertEqual(self.frequencies_hz(by_reference), frequencies)
 
     def test_refusals_say_what_is_held(self):
         for fixture, reason in (("group:nose", "GROUP_UNKNOWN"), ("vertices:77", "NO_VERTEX_HELD"),
