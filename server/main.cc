@@ -66,6 +66,15 @@ void AnnounceReady(const ApiServer& server) {
   sd_notify(0, "READY=1");
 }
 
+void LogWarning(const std::string& line) { spdlog::warn("{}", line); }
+
+void CollectUnusedMeshes(ModeDatabase& database) {
+  const auto collected = database.meshes().Collect();
+  if (!collected.ok()) return LogWarning(std::string(collected.status().message()));
+  if (collected->mesh_count == 0) return;
+  spdlog::info("{} meshes that no model or job refers to were deleted", collected->mesh_count);
+}
+
 void LogOutput(const LiveOutput& output) {
   const OutputState state = output.state();
   if (!state.device_message.empty()) spdlog::warn("no sound: {}", state.device_message);
@@ -122,9 +131,7 @@ absl::StatusOr<std::unique_ptr<DecompositionQueue>> MakeQueue(const Options& opt
   if (!executor.ok()) return executor.status();
   return DecompositionQueue::Make(
       database, *std::move(executor), clock,
-      {.max_queued_count = static_cast<size_t>(options.queue_limit),
-       .model_budget_bytes = static_cast<uint64_t>(options.model_budget_mib) << 20U,
-       .log = [](const std::string& line) { spdlog::warn("{}", line); }});
+      {.max_queued_count = static_cast<size_t>(options.queue_limit), .log = LogWarning});
 }
 
 OutputSettings OutputSettingsOf(const Options& options) {
@@ -152,12 +159,15 @@ absl::Status Run(const Options& options) {
   const absl::StatusOr<std::unique_ptr<ModeDatabase>> database =
       ModeDatabase::Open(directory->database_file(), clock);
   if (!database.ok()) return database.status();
+  (*database)->models().KeepWithin(
+      {.bytes = static_cast<uint64_t>(options.model_budget_mib) << 20U, .log = LogWarning});
+  CollectUnusedMeshes(**database);
   RemoteRuns runs;
   const absl::StatusOr<std::unique_ptr<DecompositionQueue>> decompositions =
       MakeQueue(options, *directory, **database, clock, runs);
   if (!decompositions.ok()) return decompositions.status();
-  const absl::StatusOr<std::unique_ptr<LiveOutput>> output = LiveOutput::Start(
-      OutputSettingsOf(options), clock, [](const std::string& line) { spdlog::warn("{}", line); });
+  const absl::StatusOr<std::unique_ptr<LiveOutput>> output =
+      LiveOutput::Start(OutputSettingsOf(options), clock, LogWarning);
   if (!output.ok()) return output.status();
   SceneRegistry scenes((*output)->mixer());
   const absl::StatusOr<std::unique_ptr<ApiServer>> server =

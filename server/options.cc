@@ -185,8 +185,10 @@ void AddFlags(CLI::App& app, Options& options) {
       ->capture_default_str();
   app.add_option("--queue-limit", options.queue_limit, "decompositions that may wait")
       ->capture_default_str();
-  app.add_option("--model-budget-mib", options.model_budget_mib,
-                 "room for stored models, least recently sounded ones deleted; 0: no limit")
+  app.add_option(
+         "--model-budget-mib", options.model_budget_mib,
+         "room for stored models; the least recently sounded ones go, but never the newest, those "
+         "that sound or pinned ones; 0: no limit")
       ->capture_default_str();
   app.add_option("--executor", options.executor,
                  "where decompositions run: local, or slurm (the cluster of the Slurm commands)")

@@ -50,8 +50,10 @@ absl::Status CollectGarbage(const client::Client& daemon, uint64_t budget_mib, b
   if (json) {
     PrintJson(*collected);
   } else {
-    absl::PrintF("%d models deleted, %.1f MiB\n", collected->deleted_count(),
-                 static_cast<double>(collected->deleted_bytes()) / kMib);
+    absl::PrintF("%d models deleted, %.1f MiB; %d meshes without a model or job, %.1f MiB\n",
+                 collected->deleted_count(), static_cast<double>(collected->deleted_bytes()) / kMib,
+                 collected->deleted_mesh_count(),
+                 static_cast<double>(collected->deleted_mesh_bytes()) / kMib);
   }
   return absl::OkStatus();
 }

@@ -128,6 +128,10 @@ grpc::ServerUnaryReactor* AdminService::CollectGarbage(grpc::CallbackServerConte
     if (!collected.ok()) return collected.status();
     response->set_deleted_count(collected->model_count);
     response->set_deleted_bytes(collected->bytes);
+    const absl::StatusOr<CollectedMeshes> meshes = database_.meshes().Collect();
+    if (!meshes.ok()) return meshes.status();
+    response->set_deleted_mesh_count(meshes->mesh_count);
+    response->set_deleted_mesh_bytes(meshes->bytes);
     return absl::OkStatus();
   });
 }

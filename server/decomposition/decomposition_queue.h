@@ -28,8 +28,6 @@ class JobWatch {
 
 struct QueueSettings {
   size_t max_queued_count = 1024;
-  /// Of all stored models; garbage is collected after each new one. 0: no limit.
-  uint64_t model_budget_bytes = 0;
   /// What people should know though no caller is told: a line each. Called on any thread.
   std::function<void(const std::string& line)> log = [](const std::string&) {};
 };

@@ -346,20 +346,8 @@ Outcome QueueCore::Store(const std::string& digest, const Outcome& outcome) {
     label = active.record.label;
   }
   const auto stored = database_.models().PutFile(digest, label, outcome.model_file);
-  if (stored.ok()) {
-    CollectGarbage();
-    return outcome;
-  }
+  if (stored.ok()) return outcome;
   return {Verdict::kCrashed, ToErrorInfo(stored.status()), {}};
-}
-
-void QueueCore::CollectGarbage() {
-  if (settings_.model_budget_bytes == 0) return;
-  const auto collected = database_.models().Collect(settings_.model_budget_bytes);
-  if (collected.ok() && collected->model_count == 0) return;
-  settings_.log(collected.ok() ? absl::StrCat(collected->model_count,
-                                              " models were deleted to keep to the budget")
-                               : std::string(collected.status().message()));
 }
 
 bool QueueCore::RunAgain(Active& active, const Outcome& outcome) {

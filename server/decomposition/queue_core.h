@@ -95,7 +95,6 @@ class QueueCore {
   void OnProgress(const std::string& digest, const v1::Progress& progress);
   void OnEnd(const std::string& digest, const Outcome& outcome);
   Outcome Store(const std::string& digest, const Outcome& outcome);
-  void CollectGarbage();
   bool RunAgain(Active& active, const Outcome& outcome) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   Notice Finish(Active& active, const Outcome& result) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void LearnFrom(Active& active, const Outcome& result) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);

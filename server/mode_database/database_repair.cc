@@ -86,7 +86,8 @@ absl::Status CopyMesh(Database& from, Database& to, const std::string& digest) {
     return Refusal(absl::StatusCode::kDataLoss, "MESH_CORRUPT",
                    absl::StrCat("the mesh ", digest, " has changed on the disk: upload it again"));
   }
-  absl::StatusOr<MeshUpload> copy = MeshStore(to).Begin();
+  const SystemClock clock;
+  absl::StatusOr<MeshUpload> copy = MeshStore(to, clock).Begin();
   if (!copy.ok()) return copy.status();
   status = ReadMesh(from, digest, [&](std::string_view bytes) { return copy->Append(bytes); });
   return status.ok() ? copy->Finish().status() : status;

@@ -6,10 +6,14 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <map>
 #include <optional>
 #include <system_error>
 
+#include "absl/functional/function_ref.h"
 #include "absl/strings/str_cat.h"
+#include "carillon/v1/modal_model.pb.h"
+#include "carillon/v1/modal_model_service.pb.h"
 #include "proto/error_reason.h"
 #include "server/mode_database/database.h"
 
@@ -30,11 +34,17 @@ absl::StatusOr<std::optional<StoredMesh>> Select(SqliteConnection& connection,
   return mesh;
 }
 
-absl::Status Insert(SqliteConnection& connection, const StoredMesh& mesh, SpoolFile& file) {
+absl::Status Insert(SqliteConnection& connection, const StoredMesh& mesh, int64_t unix_ms,
+                    SpoolFile& file) {
   const auto known = Select(connection, mesh.digest);
-  if (!known.ok() || known->has_value()) return known.status();
-  absl::Status status = connection.Run("INSERT INTO meshes (digest, byte_count) VALUES (?, ?)",
-                                       {mesh.digest, static_cast<int64_t>(mesh.byte_count)});
+  if (!known.ok()) return known.status();
+  if (known->has_value()) {
+    return connection.Run("UPDATE meshes SET uploaded_unix_ms = ? WHERE digest = ?",
+                          {unix_ms, mesh.digest});
+  }
+  absl::Status status =
+      connection.Run("INSERT INTO meshes (digest, byte_count, uploaded_unix_ms) VALUES (?, ?, ?)",
+                     {mesh.digest, static_cast<int64_t>(mesh.byte_count), unix_ms});
   if (status.ok()) status = file.Rewind();
   for (uint64_t offset = 0; status.ok() && offset < mesh.byte_count; offset += kChunkBytes) {
     const absl::StatusOr<std::string> bytes = file.Read(kChunkBytes);
@@ -43,6 +53,28 @@ absl::Status Insert(SqliteConnection& connection, const StoredMesh& mesh, SpoolF
                             {mesh.digest, static_cast<int64_t>(offset), SqlBlob{*bytes}});
   }
   return status;
+}
+
+/// Calls `on_mesh` with the mesh of each model and each job. A row that cannot be read has none.
+absl::Status ForEachReference(SqliteConnection& connection,
+                              absl::FunctionRef<void(const std::string&)> on_mesh) {
+  absl::Status status = connection.Query("SELECT header FROM models", {}, [&](const SqlRow& row) {
+    v1::ModalModelHeader header;
+    const std::string_view bytes = row.Blob(0);
+    if (header.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) {
+      on_mesh(header.mesh_digest());
+    }
+    return absl::OkStatus();
+  });
+  if (!status.ok()) return status;
+  return connection.Query("SELECT request FROM jobs", {}, [&](const SqlRow& row) {
+    v1::CreateModalModelRequest request;
+    const std::string_view bytes = row.Blob(0);
+    if (request.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) {
+      on_mesh(request.mesh_digest());
+    }
+    return absl::OkStatus();
+  });
 }
 
 absl::Status NotFound(const std::string& digest) {
@@ -105,8 +137,9 @@ absl::StatusOr<StoredMesh> MeshUpload::Finish() {
                    "the mesh file has no bytes: send its content");
   }
   const StoredMesh mesh{digest_.Finish(), byte_count_};
-  const absl::Status status = database_->Write(
-      [&](SqliteConnection& connection) { return Insert(connection, mesh, file_); });
+  const absl::Status status = database_->Write([&](SqliteConnection& connection) {
+    return Insert(connection, mesh, clock_->UnixMs(), file_);
+  });
   if (!status.ok()) return status;
   return mesh;
 }
@@ -114,7 +147,7 @@ absl::StatusOr<StoredMesh> MeshUpload::Finish() {
 absl::StatusOr<MeshUpload> MeshStore::Begin() {
   absl::StatusOr<SpoolFile> file = SpoolFile::Make(database_->folder());
   if (!file.ok()) return file.status();
-  return MeshUpload(*database_, *std::move(file));
+  return MeshUpload(*database_, *clock_, *std::move(file));
 }
 
 absl::StatusOr<StoredMesh> MeshStore::Put(std::string_view bytes) {
@@ -161,6 +194,30 @@ absl::Status MeshStore::WriteFile(const std::string& digest, const std::filesyst
   return Refusal(absl::StatusCode::kDataLoss, "MESH_CORRUPT",
                  absl::StrCat("the stored mesh ", digest,
                               " has changed on the disk: upload it again, and check the disk"));
+}
+
+absl::StatusOr<CollectedMeshes> MeshStore::Collect() {
+  const int64_t before =
+      clock_->UnixMs() - std::chrono::milliseconds(MeshStore::kUnusedLife).count();
+  CollectedMeshes collected;
+  const absl::Status status = database_->Write([&](SqliteConnection& connection) {
+    std::map<std::string, uint64_t> unused;
+    absl::Status done =
+        connection.Query("SELECT digest, byte_count FROM meshes WHERE uploaded_unix_ms <= ?",
+                         {before}, [&](const SqlRow& row) {
+                           unused[row.Text(0)] = static_cast<uint64_t>(row.Int(1));
+                           return absl::OkStatus();
+                         });
+    if (!done.ok() || unused.empty()) return done;
+    done = ForEachReference(connection, [&](const std::string& mesh) { unused.erase(mesh); });
+    for (const auto& [digest, bytes] : unused) {
+      if (done.ok()) done = connection.Run("DELETE FROM meshes WHERE digest = ?", {digest});
+      collected = {collected.mesh_count + 1, collected.bytes + bytes};
+    }
+    return done;
+  });
+  if (!status.ok()) return status;
+  return collected;
 }
 
 }  // namespace carillon

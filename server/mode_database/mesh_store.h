@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -9,6 +10,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "server/base/clock.h"
 #include "server/base/sha256.h"
 #include "server/mode_database/spool_file.h"
 
@@ -34,12 +36,20 @@ class MeshUpload {
 
  private:
   friend class MeshStore;
-  MeshUpload(Database& database, SpoolFile file) : database_(&database), file_(std::move(file)) {}
+  MeshUpload(Database& database, const Clock& clock, SpoolFile file)
+      : database_(&database), clock_(&clock), file_(std::move(file)) {}
 
   Database* database_;
+  const Clock* clock_;
   SpoolFile file_;
   Sha256 digest_;
   uint64_t byte_count_ = 0;
+};
+
+/// What a collection of garbage deleted.
+struct CollectedMeshes {
+  uint64_t mesh_count = 0;
+  uint64_t bytes = 0;
 };
 
 /// Mesh files, as bytes, under their SHA-256. Safe from every thread.
@@ -47,7 +57,11 @@ class MeshStore {
  public:
   static constexpr uint64_t kMaxByteCount = 256ULL << 20;
 
-  explicit MeshStore(Database& database) : database_(&database) {}
+  /// A mesh that nothing refers to is kept so long after it was last uploaded: its model may yet be
+  /// asked for.
+  static constexpr std::chrono::hours kUnusedLife{24};
+
+  MeshStore(Database& database, const Clock& clock) : database_(&database), clock_(&clock) {}
 
   absl::StatusOr<MeshUpload> Begin();
 
@@ -62,8 +76,12 @@ class MeshStore {
   /// digest; it is deleted, so that it can be stored anew).
   absl::Status WriteFile(const std::string& digest, const std::filesystem::path& file);
 
+  /// Deletes meshes that no model and no job refers to, a day after their last upload.
+  absl::StatusOr<CollectedMeshes> Collect();
+
  private:
   Database* database_;
+  const Clock* clock_;
 };
 
 }  // namespace carillon

@@ -16,7 +16,7 @@ absl::StatusOr<std::unique_ptr<ModeDatabase>> ModeDatabase::Open(const std::file
 
 ModeDatabase::ModeDatabase(std::unique_ptr<Database> database, const Clock& clock)
     : database_(std::move(database)),
-      meshes_(*database_),
+      meshes_(*database_, clock),
       models_(*database_, clock),
       jobs_(*database_) {}
 

@@ -40,15 +40,6 @@ absl::Status CheckTag(const std::string& tag) {
                               " letters, digits or any of . _ : / + -"));
 }
 
-absl::StatusOr<ModelSummary> PutRecords(Database& database, const Clock& clock,
-                                        ModelFileReader records, ModelSummary summary) {
-  summary.created_unix_ms = clock.UnixMs();
-  const absl::Status status = database.Write(
-      [&](SqliteConnection& connection) { return InsertModel(connection, records, summary); });
-  if (!status.ok()) return status;
-  return summary;
-}
-
 ModelSummary Named(const std::string& digest, const std::string& label) {
   ModelSummary summary;
   summary.digest = digest;
@@ -84,8 +75,7 @@ absl::Status Apply(SqliteConnection& connection, const std::string& digest,
 }  // namespace
 
 struct ModelImport::State {
-  Database& database;
-  const Clock& clock;
+  ModelStore& store;
   SpoolFile file;
   ModelSummary summary;
   ModelChecker checker;
@@ -110,8 +100,7 @@ absl::StatusOr<ModelSummary> ModelImport::Finish() {
   if (status.ok()) status = state_->file.Rewind();
   if (!status.ok()) return status;
   if (state_->summary.digest.empty()) state_->summary.digest = state_->sha.Finish();
-  return PutRecords(state_->database, state_->clock, ModelFileReader(state_->file.descriptor()),
-                    state_->summary);
+  return state_->store.Store(ModelFileReader(state_->file.descriptor()), state_->summary);
 }
 
 absl::StatusOr<std::optional<v1::ModalModelRecord>> ModelExport::Next() {
@@ -167,13 +156,28 @@ absl::Status ModelStore::Quarantine(const std::string& digest, const absl::Statu
   return why;
 }
 
+absl::StatusOr<ModelSummary> ModelStore::Store(ModelFileReader records, ModelSummary summary) {
+  summary.created_unix_ms = clock_->UnixMs();
+  const absl::Status status = database_->Write(
+      [&](SqliteConnection& connection) { return InsertModel(connection, records, summary); });
+  if (!status.ok()) return status;
+  if (budget_.bytes == 0) return summary;
+  const absl::StatusOr<Collected> collected = Collect(budget_.bytes, summary.digest);
+  if (!collected.ok()) {
+    budget_.log(std::string(collected.status().message()));
+  } else if (collected->model_count > 0) {
+    budget_.log(absl::StrCat(collected->model_count, " models were deleted to keep to the budget"));
+  }
+  return summary;
+}
+
 absl::StatusOr<ModelSummary> ModelStore::PutFile(const std::string& digest,
                                                  const std::string& label,
                                                  const std::filesystem::path& file) {
   if (const absl::Status status = CheckName(digest); !status.ok()) return status;
   absl::StatusOr<ModelFileReader> records = ModelFileReader::Open(file);
   if (!records.ok()) return records.status();
-  return PutRecords(*database_, *clock_, *std::move(records), Named(digest, label));
+  return Store(*std::move(records), Named(digest, label));
 }
 
 absl::StatusOr<ModelImport> ModelStore::Import(const std::string& digest,
@@ -182,7 +186,7 @@ absl::StatusOr<ModelImport> ModelStore::Import(const std::string& digest,
   absl::StatusOr<SpoolFile> file = SpoolFile::Make(database_->folder());
   if (!file.ok()) return file.status();
   return ModelImport(std::make_unique<ModelImport::State>(
-      ModelImport::State{*database_, *clock_, *std::move(file), Named(digest, label), {}, {}}));
+      ModelImport::State{*this, *std::move(file), Named(digest, label), {}, {}}));
 }
 
 absl::StatusOr<ModelExport> ModelStore::Export(const std::string& digest) {
@@ -301,7 +305,7 @@ absl::Status ModelStore::WriteSounded(SqliteConnection& connection) {
   return status;
 }
 
-absl::StatusOr<Collected> ModelStore::Collect(uint64_t budget_bytes) {
+absl::StatusOr<Collected> ModelStore::Collect(uint64_t budget_bytes, const std::string& spared) {
   struct Candidate {
     std::string digest;
     uint64_t bytes = 0;
@@ -321,7 +325,8 @@ absl::StatusOr<Collected> ModelStore::Collect(uint64_t budget_bytes) {
           const auto bytes = static_cast<uint64_t>(row.Int(1));
           const auto cached = cache_.find(row.Text(0));
           const bool in_memory = cached != cache_.end() && !cached->second.model.expired();
-          oldest_first.push_back({row.Text(0), bytes, row.Int(2) != 0 || in_memory});
+          const bool stays = row.Int(2) != 0 || in_memory || row.Text(0) == spared;
+          oldest_first.push_back({row.Text(0), bytes, stays});
           total_bytes += bytes;
           return absl::OkStatus();
         });

@@ -23,6 +23,7 @@
 namespace carillon {
 
 class Database;
+class ModelFileReader;
 class SqliteConnection;
 
 /// A modal model without its arrays.
@@ -60,6 +61,13 @@ struct ModelChange {
 struct Collected {
   uint64_t model_count = 0;
   uint64_t bytes = 0;
+};
+
+/// Room for stored models.
+struct ModelBudget {
+  uint64_t bytes = 0;  ///< of all their arrays; 0: no limit
+  /// What people should know of a collection. Called on any thread.
+  std::function<void(const std::string& line)> log = [](const std::string&) {};
 };
 
 struct ModelPage {
@@ -124,6 +132,9 @@ class ModelStore {
 
   ModelStore(Database& database, const Clock& clock) : database_(&database), clock_(&clock) {}
 
+  /// From now on each model that is stored is followed by a collection. Before any other call.
+  void KeepWithin(ModelBudget budget) { budget_ = std::move(budget); }
+
   /// Replaces the listener; the old one neither runs nor will run afterwards.
   void ListenToQuarantine(OnQuarantine on_quarantine);
 
@@ -167,22 +178,26 @@ class ModelStore {
   absl::Status Delete(const std::string& digest);
 
   /// Deletes models with their jobs, least recently sounded (or, never sounded, stored) first,
-  /// until the arrays of those left fit into `budget_bytes`. Pinned ones and those in memory stay.
-  absl::StatusOr<Collected> Collect(uint64_t budget_bytes);
+  /// until the arrays of those left fit into `budget_bytes`. Pinned ones and those in memory stay,
+  /// and `spared`: a model that was just stored, until something newer needs the room.
+  absl::StatusOr<Collected> Collect(uint64_t budget_bytes, const std::string& spared = "");
 
  private:
   friend class ModelExport;
+  friend class ModelImport;
   struct Cached {
     int64_t revision = 0;
     std::weak_ptr<const ModalModel> model;
   };
 
   absl::StatusOr<std::shared_ptr<const ModalModel>> Load(const std::string& digest);
+  absl::StatusOr<ModelSummary> Store(ModelFileReader records, ModelSummary summary);
   absl::Status Quarantine(const std::string& digest, const absl::Status& why);
   absl::Status WriteSounded(SqliteConnection& connection);
 
   Database* database_;
   const Clock* clock_;
+  ModelBudget budget_;
   // Held while a model is read, so that two objects of one model cannot read it twice.
   Mutex cache_mutex_;
   std::map<std::string, Cached> cache_ ABSL_GUARDED_BY(cache_mutex_);

@@ -76,6 +76,9 @@ constexpr std::array kMigrations = {R"sql(
     name TEXT PRIMARY KEY,
     value TEXT NOT NULL
   ) STRICT, WITHOUT ROWID;
+)sql",
+                                    R"sql(
+  ALTER TABLE meshes ADD COLUMN uploaded_unix_ms INTEGER NOT NULL DEFAULT 0;
 )sql"};
 
 absl::StatusOr<int64_t> Version(SqliteConnection& connection) {

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <thread>
 
+#include "carillon/v1/modal_model_service.pb.h"
 #include "server/base/sha256.h"
 #include "tests/server/mode_database/sample_model.h"
 
@@ -318,6 +319,61 @@ TEST_F(ModeDatabaseTest, CollectionTakesTheLeastRecentlySoundedAndNeverThePinned
   EXPECT_EQ(database_->models().Collect(0)->model_count, 1U) << "b; a is pinned, c in memory";
   EXPECT_TRUE(database_->models().Find(a_).ok());
   EXPECT_TRUE(database_->models().Find(c).ok());
+}
+
+TEST_F(ModeDatabaseTest, AModelJustStoredStaysUntilANewerOneNeedsTheRoom) {
+  database_->models().KeepWithin({.bytes = 1});
+  ASSERT_TRUE(Put(a_, SampleModel(10, 100)).ok());
+  EXPECT_TRUE(database_->models().Find(a_).ok()) << "though it alone is beyond the budget";
+  ASSERT_TRUE(Put(a_, SampleModel(20, 100)).ok());
+  EXPECT_TRUE(database_->models().Find(a_).ok()) << "its next revision, too";
+  auto import = database_->models().Import(b_, "");
+  ASSERT_TRUE(import.ok());
+  for (const v1::ModalModelRecord& record : SampleRecords(SampleModel(10, 100))) {
+    ASSERT_TRUE(import->Append(record).ok());
+  }
+  ASSERT_TRUE(import->Finish().ok());
+  EXPECT_TRUE(absl::IsNotFound(database_->models().Find(a_).status()));
+  EXPECT_TRUE(database_->models().Find(b_).ok());
+}
+
+/// A clock that stands where it is set.
+class StandingClock final : public Clock {
+ public:
+  std::chrono::nanoseconds Monotonic() const noexcept override { return {}; }
+  int64_t UnixMs() const noexcept override { return unix_ms; }
+  int64_t unix_ms = 1;
+};
+
+TEST_F(ModeDatabaseTest, AMeshThatNothingRefersToGoesADayAfterItsLastUpload) {
+  StandingClock clock;
+  database_.reset();
+  database_ = *ModeDatabase::Open(file_, clock);
+  MeshStore& meshes = database_->meshes();
+  const StoredMesh of_model = *meshes.Put("the mesh of a model");
+  const StoredMesh of_job = *meshes.Put("the mesh of a job");
+  const StoredMesh unused = *meshes.Put("nobody's mesh");
+  std::vector<v1::ModalModelRecord> records = SampleRecords(SampleModel(3, 10));
+  records.front().mutable_header()->set_mesh_digest(of_model.digest);
+  WriteRecords(folder_ / "model", records);
+  ASSERT_TRUE(database_->models().PutFile(a_, "", folder_ / "model").ok());
+  v1::CreateModalModelRequest request;
+  request.set_mesh_digest(of_job.digest);
+  ASSERT_TRUE(database_->jobs().Put({.digest = b_, .request = request.SerializeAsString()}).ok());
+
+  const int64_t day_ms = std::chrono::milliseconds(MeshStore::kUnusedLife).count();
+  clock.unix_ms = day_ms;
+  ASSERT_TRUE(meshes.Put("nobody's mesh").ok());
+  clock.unix_ms = 2 * day_ms - 1;
+  EXPECT_EQ(meshes.Collect()->mesh_count, 0U) << "it was uploaded again";
+  clock.unix_ms = 2 * day_ms;
+  const auto collected = meshes.Collect();
+  ASSERT_TRUE(collected.ok()) << collected.status();
+  EXPECT_EQ(collected->mesh_count, 1U);
+  EXPECT_EQ(collected->bytes, unused.byte_count);
+  EXPECT_TRUE(absl::IsNotFound(meshes.Find(unused.digest).status()));
+  EXPECT_TRUE(meshes.Find(of_model.digest).ok());
+  EXPECT_TRUE(meshes.Find(of_job.digest).ok());
 }
 
 TEST_F(ModeDatabaseTest, OnlyADigestNamesAModel) {
