@@ -63,7 +63,7 @@ absl::StatusOr<std::string> ReadAllOfMesh(const CreateModelOptions& options) {
       ReadMesh(std::filesystem::path(path).replace_extension(".node"));
   const absl::StatusOr<std::string> rest = ReadMesh(elements);
   if (!nodes.ok()) return nodes;
-  if (!rest.ok()) return rest;
+  if (!rest.ok()) return rest.status();
   return absl::StrCat(*nodes, nodes->ends_with('\n') ? "" : "\n", *rest);
 }
 

@@ -34,13 +34,13 @@ void ElementFile::AddTriangles(std::span<const std::string> names,
   }
 }
 
-absl::Status ElementFile::AddTetrahedron(std::span<const int64_t> tetrahedron) {
-  const auto count = static_cast<int>(tetrahedron.size());
+absl::Status ElementFile::AddTetrahedron(std::span<const int64_t> nodes_of_one) {
+  const auto count = static_cast<int>(nodes_of_one.size());
   if (nodes_per_element != 0 && nodes_per_element != count) {
     return UnsupportedElements("tetrahedra of 4 and of 10 nodes");
   }
   nodes_per_element = count;
-  elements.insert(elements.end(), tetrahedron.begin(), tetrahedron.end());
+  elements.insert(elements.end(), nodes_of_one.begin(), nodes_of_one.end());
   return absl::OkStatus();
 }
 

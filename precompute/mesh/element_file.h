@@ -39,7 +39,7 @@ struct ElementFile {
   void AddTriangles(std::span<const std::string> names,
                     std::span<const std::array<int64_t, 3>> pieces);
   /// Adds a tetrahedron of 4 or 10 nodes. Errors: MESH_ELEMENT_UNSUPPORTED (both in one file).
-  absl::Status AddTetrahedron(std::span<const int64_t> nodes);
+  absl::Status AddTetrahedron(std::span<const int64_t> nodes_of_one);
 
  private:
   Group& Named(const std::string& name);

@@ -26,7 +26,10 @@ class NumberStream {
 
   template <typename Range>
   bool TakeAll(Range& values) {
-    return std::ranges::all_of(values, [this](auto& value) { return Take(value); });
+    for (auto& value : values) {
+      if (!Take(value)) return false;
+    }
+    return true;
   }
 
   /// Of a text the next word; empty at the end.

@@ -77,7 +77,7 @@ absl::StatusOr<std::string> ReadMeshFile(const std::string& path, const std::str
   // They may stand in one file already.
   if (!std::filesystem::exists(elements)) return nodes;
   const absl::StatusOr<std::string> rest = ReadFile(elements);
-  if (!rest.ok()) return rest;
+  if (!rest.ok()) return rest.status();
   return absl::StrCat(*nodes, nodes->ends_with('\n') ? "" : "\n", *rest);
 }
 
