@@ -14,6 +14,7 @@
 #include "precompute/fem/assembly.h"
 #include "precompute/fem/matrix_market.h"
 #include "precompute/mesh/boundary.h"
+#include "precompute/mesh/grain.h"
 #include "precompute/mesh/midside_nodes.h"
 #include "precompute/mesh/prepare_surface.h"
 #include "precompute/mesh/read_mesh.h"
@@ -23,9 +24,6 @@
 
 namespace carillon::precompute {
 namespace {
-
-/// Nodes of a mesh of quadratic elements for each corner, about.
-constexpr double kNodesPerCorner = 7.5;
 
 /// The body to decompose, and the surface that its boundary refers to.
 struct Body {
@@ -152,6 +150,23 @@ double PeakBytes() {
   return 1024.0 * static_cast<double>(usage.ru_maxrss);
 }
 
+/// Part of the nodes on the boundary from which on a body is all wall.
+constexpr double kThin = 0.8;
+/// Nodes of a mesh of quadratic elements for each corner of it, in a wall.
+constexpr double kNodesPerCorner = 6;
+
+Round Describe(const TetMesh& mesh, const ModalModel& model, double cpu_s) {
+  const double count = static_cast<double>(mesh.nodes.size());
+  const double corners_on_boundary = static_cast<double>(mesh.boundary.size()) / 2;
+  const double nodes_per_corner = mesh.nodes_per_element == 10 ? kNodesPerCorner : 1;
+  return {.grain_m = Grain(BoundarySurface(mesh)),
+          .node_count = count,
+          .thin = nodes_per_corner * corners_on_boundary > kThin * count,
+          .worst_error = model.WorstError(),
+          .cpu_s = cpu_s,
+          .peak_bytes = PeakBytes()};
+}
+
 /// Fills and solves a surface finer and finer until the goal is met.
 absl::StatusOr<ModalModel> SolveToGoal(const Fillable& surface, DecompositionSettings settings,
                                        DecompositionObserver& observer) {
@@ -171,16 +186,13 @@ absl::StatusOr<ModalModel> SolveToGoal(const Fillable& surface, DecompositionSet
     absl::StatusOr<ModalModel> model = Solve(*body, settings, observer);
     if (!model.ok() && best.ok()) return best;
     if (!model.ok() || !settings.resolution.given()) return model;
-    const double corners = static_cast<double>(body->mesh.nodes.size()) /
-                           (body->mesh.nodes_per_element == 10 ? kNodesPerCorner : 1);
-    rounds.push_back({.corner_node_count = corners,
-                      .worst_error = model->WorstError(),
-                      .cpu_s = PhaseClock::Now().cpu_seconds - begun_s,
-                      .peak_bytes = PeakBytes()});
-    const std::optional<int> next = NextCornerNodeCount(settings.resolution, rounds);
+    rounds.push_back(Describe(body->mesh, *model, PhaseClock::Now().cpu_seconds - begun_s));
+    fprintf(stderr, "round grain %g mm nodes %g err %g cpu %g\n", rounds.back().grain_m * 1e3,
+            rounds.back().node_count, rounds.back().worst_error, rounds.back().cpu_s);
+    const std::optional<double> next = NextGrain(settings.resolution, rounds);
     if (!next) return model;
     best = std::move(model);
-    meshing.target_node_count = *next;
+    meshing.grain_m = *next;
   }
 }
 

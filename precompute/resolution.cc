@@ -10,25 +10,26 @@
 namespace carillon::precompute {
 namespace {
 
-/// Quadratic elements: the error of a frequency goes with the fourth power of their size, which is
-/// the 4/3 of the nodes of a solid, the square of a wall's.
-constexpr double kErrorPower = 1.8;
+/// Of the error of a frequency over the grain: four in the limit of quadratic elements, less where
+/// walls are thin and elements as long as they are thick.
+constexpr double kErrorPower = 2.4, kLeastErrorPower = 1.5, kMostErrorPower = 4;
 constexpr double kTimePower = 1.6, kMemoryPower = 1.4;
 /// Of the accuracy and the budgets wanted, so that the next round is rarely one too few.
 constexpr double kMargin = 0.8;
-constexpr double kLeastGrowth = 1.15, kMostGrowth = 4;
+/// Of the nodes from round to round.
+constexpr double kLeastGrowth = 1.15, kMostGrowth = 6;
 constexpr size_t kMostRounds = 6;
-/// Corner and mid-side nodes of a mesh for each corner.
-constexpr double kNodesPerCorner = 8;
+/// Of the grain, below which a mesh was not refined.
+constexpr double kSameGrain = 0.97;
 
 double ErrorPower(const std::vector<Round>& rounds) {
   if (rounds.size() < 2) return kErrorPower;
   const Round& last = rounds.back();
   const Round& before = rounds[rounds.size() - 2];
-  const double growth = last.corner_node_count / before.corner_node_count;
-  if (!(growth > kLeastGrowth && before.worst_error > 0 && last.worst_error > 0))
-    return kErrorPower;
-  return std::clamp(std::log(before.worst_error / last.worst_error) / std::log(growth), 0.6, 2.5);
+  if (before.worst_error == 0 || last.worst_error == 0) return kErrorPower;
+  const double power =
+      std::log(before.worst_error / last.worst_error) / std::log(before.grain_m / last.grain_m);
+  return std::clamp(power, kLeastErrorPower, kMostErrorPower);
 }
 
 /// By how much the nodes may grow before the budget is used up.
@@ -47,28 +48,29 @@ double AffordableGrowth(const ResolutionGoal& goal, const std::vector<Round>& ro
   return growth;
 }
 
+bool Refined(const std::vector<Round>& rounds) {
+  return rounds.size() < 2 ||
+         rounds.back().grain_m < kSameGrain * rounds[rounds.size() - 2].grain_m;
+}
+
 }  // namespace
 
-std::optional<int> NextCornerNodeCount(const ResolutionGoal& goal,
-                                       const std::vector<Round>& rounds) {
+std::optional<double> NextGrain(const ResolutionGoal& goal, const std::vector<Round>& rounds) {
   const Round& last = rounds.back();
-  if (rounds.size() >= kMostRounds) return std::nullopt;
+  if (rounds.size() >= kMostRounds || !Refined(rounds)) return std::nullopt;
   if (goal.accuracy > 0 && last.worst_error > 0 && last.worst_error <= goal.accuracy) {
     return std::nullopt;
   }
-  double growth = kMostGrowth;
+  const double dimension = last.thin ? 2 : 3;
+  double growth =
+      std::min({kMostGrowth, AffordableGrowth(goal, rounds), kMaxMeshNodes / last.node_count});
   if (goal.accuracy > 0 && last.worst_error > 0) {
-    growth = std::pow(last.worst_error / (kMargin * goal.accuracy), 1 / ErrorPower(rounds));
+    const double finer =
+        std::pow(last.worst_error / (kMargin * goal.accuracy), 1 / ErrorPower(rounds));
+    growth = std::min(growth, std::pow(finer, dimension));
   }
-  // A surface of long triangles is refined by halves: between them there is no mesh.
-  const bool stuck =
-      rounds.size() > 1 &&
-      last.corner_node_count < kLeastGrowth * rounds[rounds.size() - 2].corner_node_count;
-  if (stuck) growth = kMostGrowth;
-  growth = std::min({growth, kMostGrowth, AffordableGrowth(goal, rounds),
-                     kMaxMeshNodes / kNodesPerCorner / last.corner_node_count});
   if (growth < kLeastGrowth) return std::nullopt;
-  return static_cast<int>(growth * last.corner_node_count);
+  return last.grain_m * std::pow(growth, -1 / dimension);
 }
 
 }  // namespace carillon::precompute

@@ -17,7 +17,9 @@ struct ResolutionGoal {
 
 /// A mesh that was solved, what it cost, and how well it did.
 struct Round {
-  double corner_node_count = 0;
+  double grain_m = 0;      ///< of its surface, as Grain() measures it
+  double node_count = 0;   ///< mid-side nodes, too
+  bool thin = false;       ///< nodes grow with the second power of 1 / grain, not with the third
   double worst_error = 0;  ///< zero: it has no mode
   double cpu_s = 0;
   double peak_bytes = 0;
@@ -26,10 +28,9 @@ struct Round {
 /// Corner nodes of the mesh to begin with.
 inline constexpr int kFirstCornerNodeCount = 1500;
 
-/// Corner nodes of the next mesh to try, or none where the last one is good enough, or the best
-/// that the goal allows. Errors fall with a power of the nodes that the last two rounds show; time
-/// and memory grow with powers that solids show.
-std::optional<int> NextCornerNodeCount(const ResolutionGoal& goal,
-                                       const std::vector<Round>& rounds);
+/// Grain in metres of the next mesh to try, or none where the last one is good enough, or the best
+/// that the goal allows. Errors fall with a power of the grain that the last two rounds show; time
+/// and memory grow with powers of the nodes that solids show.
+std::optional<double> NextGrain(const ResolutionGoal& goal, const std::vector<Round>& rounds);
 
 }  // namespace carillon::precompute

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <queue>
 #include <tuple>
@@ -89,14 +90,22 @@ class Refiner {
     const Edge apexes{Apex(sides[0], edge), Apex(sides[1], edge)};
     triangles_of_edge_.erase(edge);
     const auto middle = static_cast<int32_t>(refined_.surface.vertices.size());
-    const Point a = Vertex(edge.first), b = Vertex(edge.second);
-    refined_.surface.vertices.push_back({(a[0] + b[0]) / 2, (a[1] + b[1]) / 2, (a[2] + b[2]) / 2});
+    refined_.surface.vertices.push_back(SplitPoint(edge));
     for (const int32_t t : sides) SplitTriangle(t, edge, middle);
     for (const int32_t end : {edge.first, edge.second}) {
       for (const int32_t apex : {apexes.first, apexes.second})
         suspects_.push_back(EdgeOf(end, apex));
     }
     MakeDelaunay();
+  }
+
+  /// Where as many parts lie on both sides, or one more on the second, of the fewest equal ones
+  /// that are short enough.
+  Point SplitPoint(const Edge& edge) const {
+    const Point &a = Vertex(edge.first), &b = Vertex(edge.second);
+    const double parts = std::ceil(Distance(a, b) / (kPartLength * max_edge_m_) - kRounding);
+    const double t = parts < 2 ? 0.5 : std::floor(parts / 2) / parts;
+    return {a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])};
   }
 
   /// Triangle `t` keeps the half that ends in edge.first; a new one takes the other.
@@ -155,6 +164,10 @@ class Refiner {
 
   // Below it, rounding in a square cell could flip its diagonal for ever.
   static constexpr double kFlipTolerance = 1e-9;
+
+  // Parts leave room for the diagonals between the cuts of a narrow triangle.
+  static constexpr double kPartLength = 0.93;
+  static constexpr double kRounding = 1e-9;  // makes no part more
 
   double max_edge_m_;
   bool edges_inside_too_ = false;

@@ -15,10 +15,10 @@ struct RefinedSurface {
   std::vector<int32_t> given_triangle;
 };
 
-/// Halves edges until none is longer than `max_edge_m`: first those of the given triangles, so that
-/// a long thin triangle is cut across, then those inside, always the longest first. Inside a given
-/// triangle edges are flipped until they are Delaunay (Lawson 1977), which keeps angles large.
-/// Collapsed triangles are left out. The surface must be closed and manifold.
+/// Cuts edges into equal parts until none is longer than `max_edge_m`: first those of the given
+/// triangles, so that a long thin triangle is cut across, then those inside, always the longest
+/// first. Inside a given triangle edges are flipped until they are Delaunay (Lawson 1977), which
+/// keeps angles large. Collapsed triangles are left out. The surface must be closed and manifold.
 RefinedSurface RefineSurface(const SurfaceMesh& surface, double max_edge_m);
 
 }  // namespace carillon::precompute

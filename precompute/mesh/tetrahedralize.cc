@@ -11,6 +11,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "precompute/mesh/fill_with_tetgen.h"
+#include "precompute/mesh/grain.h"
 #include "precompute/mesh/mesh_limits.h"
 #include "precompute/mesh/midside_nodes.h"
 #include "precompute/mesh/point_math.h"
@@ -31,7 +32,8 @@ constexpr double kMaxElements = 12'000;
 constexpr size_t kMaxTriangles = 20'000;  // about 60,000 nodes with mid-sides in a thin wall
 constexpr double kCoarsening = 1.2;
 
-constexpr double kLongestToMeanEdge = 1.4;    // where edges above the longest are halved
+constexpr double kLongestToMeanEdge =
+    1.4;  // where edges above the longest are cut into equal parts
 constexpr double kVolumeOfRegular = 0.11785;  // of a tetrahedron with edges of length 1
 
 // Vertices added inside at most; with mid-side nodes a mesh has about eight times as many.
@@ -40,6 +42,12 @@ constexpr int kMaxAddedNodes = kMaxMeshNodes / kNodesPerCorner;
 
 constexpr int kMaxCorrections = 3;
 constexpr double kTargetTolerance = 0.2;
+
+// The count of nodes goes with a power of the edge between two (on the surface) and three (inside).
+constexpr double kEdgeByNodes = 1 / 2.5;
+constexpr int kMaxEdgeSteps = 8;
+constexpr double kCoarsestToGrain = 2.5;
+constexpr double kNodesPerCubedEdge = 2;  // as TetGen fills solids
 
 /// Where a surface lies and how large it is; scale * (p - low) is within the unit box.
 struct UnitBox {
@@ -152,13 +160,16 @@ std::vector<Point> PointsInCavities(const SurfaceMesh& surface, const std::vecto
 /// A surface at unit size, filled as finely as asked.
 class Filler {
  public:
-  Filler(const SurfaceMesh& unit_surface, const MeshingSettings& settings)
+  /// `scale`: of the unit surface to the one given.
+  Filler(const SurfaceMesh& unit_surface, double scale, const MeshingSettings& settings)
       : surface_(unit_surface),
+        scale_(scale),
         settings_(settings),
         shells_(FindShells(surface_)),
         extent_(Measure(surface_, shells_)) {}
 
   absl::StatusOr<TetMesh> Fill() const {
+    if (settings_.grain_m != 0) return FillWithEdge(EdgeForGrain(settings_.grain_m * scale_));
     if (settings_.target_node_count != 0) return FillToTarget();
     return FillWithEdge(CoarserOnNarrowTriangles(AutomaticEdge(extent_)));
   }
@@ -177,26 +188,59 @@ class Filler {
     return edge;
   }
 
-  /// First as many elements as nodes are wanted, times four; then, as the count of nodes goes with
-  /// a power of the edge between two (on the surface) and three (inside), corrected.
+  /// Nodes to expect: those of the refined surface, and inside of what is deeper than half an edge.
+  double ExpectedNodes(double edge) const {
+    const SurfaceMesh surface = RefineSurface(surface_, LongestOnSurface(edge)).surface;
+    const double deep = std::max(extent_.volume - extent_.area * edge / 2, 0.0);
+    return static_cast<double>(surface.vertices.size()) +
+           kNodesPerCubedEdge * deep / (edge * edge * edge);
+  }
+
+  /// The edge, from `edge` on, for which about `count` nodes are expected.
+  double EdgeForNodes(double count, double edge) const {
+    for (int step = 0; step < kMaxEdgeSteps; ++step) {
+      const double excess = ExpectedNodes(edge) / count;
+      if (std::abs(excess - 1) < kTargetTolerance / 4) break;
+      edge = std::min(edge * std::pow(excess, kEdgeByNodes), 1.0);
+    }
+    return edge;
+  }
+
+  /// By what is expected, then by how far that was off.
   absl::StatusOr<TetMesh> FillToTarget() const {
     const double target = settings_.target_node_count;
-    double edge = EdgeForElements(extent_, 4 * target);
+    double edge = EdgeForNodes(target, EdgeForElements(extent_, 4 * target));
     absl::StatusOr<TetMesh> mesh = FillWithEdge(edge);
     for (int correction = 0; correction < kMaxCorrections && mesh.ok(); ++correction) {
-      const double excess = static_cast<double>(mesh->nodes.size()) / target;
-      if (std::abs(excess - 1) < kTargetTolerance) break;
-      edge *= std::pow(excess, 1 / 2.5);
+      const double count = static_cast<double>(mesh->nodes.size());
+      if (std::abs(count / target - 1) < kTargetTolerance) break;
+      const double better = EdgeForNodes(target * ExpectedNodes(edge) / count, edge);
+      if (better == edge) break;
+      edge = better;
       mesh = FillWithEdge(edge);
     }
     return mesh;
   }
 
+  /// The longest edge with which the surface is no coarser than `grain`. All sides of a surface of
+  /// few triangles are cut at once, so it may come out finer.
+  double EdgeForGrain(double grain) const {
+    double fine = grain, coarse = kCoarsestToGrain * grain;
+    for (int step = 0; step < kMaxEdgeSteps; ++step) {
+      const double middle = std::sqrt(fine * coarse);
+      (Grain(RefineSurface(surface_, middle).surface) <= grain ? fine : coarse) = middle;
+    }
+    return fine / kLongestToMeanEdge;
+  }
+
+  double LongestOnSurface(double edge) const {
+    return settings_.keep_surface.value_or(false) ? std::numeric_limits<double>::infinity()
+                                                  : kLongestToMeanEdge * edge;
+  }
+
   absl::StatusOr<TetMesh> FillWithEdge(double edge) const {
     const bool keep_surface = settings_.keep_surface.value_or(false);
-    const RefinedSurface refined =
-        RefineSurface(surface_, keep_surface ? std::numeric_limits<double>::infinity()
-                                             : kLongestToMeanEdge * edge);
+    const RefinedSurface refined = RefineSurface(surface_, LongestOnSurface(edge));
     FillRequest request{.surface = refined,
                         .cavities = PointsInCavities(surface_, shells_),
                         .max_volume = kVolumeOfRegular * edge * edge * edge,
@@ -217,6 +261,7 @@ class Filler {
   }
 
   const SurfaceMesh& surface_;
+  double scale_;
   const MeshingSettings& settings_;
   std::vector<Shell> shells_;
   Extent extent_;
@@ -233,7 +278,7 @@ absl::StatusOr<TetMesh> Tetrahedralize(const SurfaceMesh& surface,
   }
   const UnitBox box = FindUnitBox(surface);
   const SurfaceMesh unit_surface = ToUnitBox(surface, box);
-  absl::StatusOr<TetMesh> mesh = Filler(unit_surface, settings).Fill();
+  absl::StatusOr<TetMesh> mesh = Filler(unit_surface, box.scale, settings).Fill();
   if (!mesh.ok()) return mesh;
   FromUnitBox(*mesh, box);
   if (settings.nodes_per_element == 10) AddMidsideNodes(*mesh);

@@ -14,6 +14,8 @@ struct MeshingSettings {
   std::optional<bool> keep_surface = std::nullopt;
   /// About how many corner nodes the mesh should have; zero: decided from the surface.
   int target_node_count = 0;
+  /// How coarse the mesh may be on its surface, as Grain() measures it, in metres; zero: no matter.
+  double grain_m = 0;
   /// 4 or 10. Mid-side nodes lie on straight edges.
   int nodes_per_element = 10;
   /// As FillRequest::cautious.

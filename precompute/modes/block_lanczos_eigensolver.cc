@@ -23,6 +23,10 @@ using Eigen::VectorXd;
 /// On |OP y - theta y| / theta. Refinement takes the rest away.
 constexpr double kTolerance = 1e-6;
 
+/// Ritz vectors to refine beyond those wanted, at least: float mixes modes with their neighbours,
+/// and refinement unmixes only what it is given.
+constexpr Index kGuards = 8;
+
 /// The shift, as a part of the highest eigenvalue wanted: 5 kHz for a band to 20 kHz. The count of
 /// iterations hardly depends on it, and a larger one spares digits.
 constexpr double kShift = -0.0625;
@@ -61,7 +65,7 @@ RitzPairs FindRitzPairs(const LanczosRecurrence<Real>& recurrence, Index wanted)
   VectorXd theta(T.rows());
   RitzPairs pairs;
   if (!blas::SymmetricEigen(static_cast<int>(T.rows()), T.data(), theta.data())) return pairs;
-  const Index padded = (wanted + kBlockWidth - 1) / kBlockWidth * kBlockWidth;
+  const Index padded = (wanted + kGuards + kBlockWidth - 1) / kBlockWidth * kBlockWidth;
   pairs.coordinates = T.rightCols(std::min(padded, T.cols())).rowwise().reverse();
   for (Index i = 0; i < wanted; ++i) {
     const double off = recurrence.Remainder(pairs.coordinates.col(i).tail(kBlockWidth));

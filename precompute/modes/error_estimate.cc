@@ -9,9 +9,13 @@
 
 #include "absl/container/flat_hash_map.h"
 #include "precompute/fem/element.h"
+#include "precompute/modes/dense_blas.h"
 
 namespace carillon::precompute {
 namespace {
+
+/// One row for each unknown, so that an element's rows lie together.
+using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 /// Barycentric coordinates, and the derivatives of a function by them.
 using Barycentric = Eigen::Vector4d;
@@ -221,11 +225,19 @@ class Estimator {
   }
 
   /// sum_b r_b^T a(b, b)^-1 r_b of some modes: shapes #U by #modes.
-  Eigen::VectorXd Corrections(const Eigen::VectorXd& eigenvalues, const Eigen::MatrixXd& shapes) {
-    Eigen::MatrixXd residuals =
-        Eigen::MatrixXd::Zero(3 * static_cast<Eigen::Index>(places_.count()), shapes.cols());
-    for (size_t e = 0; e < mesh_.element_count(); ++e)
-      AddElement(e, eigenvalues, shapes, residuals);
+  Eigen::VectorXd Corrections(const Eigen::VectorXd& eigenvalues, const RowMatrix& shapes) const {
+    RowMatrix residuals =
+        RowMatrix::Zero(3 * static_cast<Eigen::Index>(places_.count()), shapes.cols());
+    ElementResidual element(static_cast<Eigen::Index>(3 * places_.added()),
+                            static_cast<Eigen::Index>(3 * nodes_), shapes.cols());
+    for (size_t e = 0; e < mesh_.element_count(); ++e) {
+      Fill(e, shapes, element);
+      element.Compute(eigenvalues);
+      for (size_t i = 0; i < places_.added(); ++i) {
+        residuals.middleRows<3>(3 * Eigen::Index{places_.Of(e, i)}) +=
+            places_.Sign(e, i) * element.result.middleRows<3>(3 * static_cast<Eigen::Index>(i));
+      }
+    }
     Eigen::VectorXd sums = Eigen::VectorXd::Zero(shapes.cols());
     for (size_t b = 0; b < places_.count(); ++b) {
       if (held_[b]) continue;  // its residual is what holds it
@@ -236,31 +248,51 @@ class Estimator {
   }
 
  private:
+  /// What the added functions of an element see of the modes: a(b, phi) - m(b, phi) Lambda.
+  struct ElementResidual {
+    ElementResidual(Eigen::Index added, Eigen::Index unknowns, Eigen::Index mode_count)
+        : stiffness(added, unknowns),
+          mass(RowMatrix::Zero(added, unknowns)),
+          shapes(unknowns, mode_count),
+          inertial(added, mode_count),
+          result(added, mode_count) {}
+
+    void Compute(const Eigen::VectorXd& eigenvalues) {
+      RowProduct(stiffness, shapes, result);
+      RowProduct(mass, shapes, inertial);
+      result.array() -= inertial.array().rowwise() * eigenvalues.transpose().array();
+    }
+
+    RowMatrix stiffness;  ///< #added by #unknowns
+    RowMatrix mass;
+    RowMatrix shapes;  ///< #unknowns by #modes
+    RowMatrix inertial;
+    RowMatrix result;  ///< #added by #modes
+  };
+
+  /// z := x y, as column-major matrices: z^T = y^T x^T.
+  static void RowProduct(const RowMatrix& x, const RowMatrix& y, RowMatrix& z) {
+    const auto columns = static_cast<int>(y.cols()), inner = static_cast<int>(x.cols());
+    blas::Product(columns, static_cast<int>(x.rows()), inner, y.data(), columns, x.data(), inner,
+                  z.data(), columns);
+  }
+
   const int32_t* Element(size_t e) const { return &mesh_.elements[e * nodes_]; }
 
-  void AddElement(size_t e, const Eigen::VectorXd& eigenvalues, const Eigen::MatrixXd& shapes,
-                  Eigen::MatrixXd& residuals) const {
+  void Fill(size_t e, const RowMatrix& shapes, ElementResidual& element) const {
     const TetGeometry geometry = GeometryOf(mesh_, Element(e));
-    const auto unknowns = static_cast<Eigen::Index>(3 * nodes_);
-    Eigen::MatrixXd local(unknowns, shapes.cols());
     for (size_t n = 0; n < nodes_; ++n) {
-      local.middleRows<3>(3 * static_cast<Eigen::Index>(n)) =
-          shapes.middleRows<3>(3 * Eigen::Index{Element(e)[n]});
-    }
-    const Eigen::MatrixXd with_eigenvalues = local * eigenvalues.asDiagonal();
-    Eigen::Matrix<double, 3, Eigen::Dynamic> coupling(3, unknowns), inertia(3, unknowns);
-    for (size_t i = 0; i < places_.added(); ++i) {
-      inertia.setZero();
-      for (size_t n = 0; n < nodes_; ++n) {
-        const auto column = static_cast<Eigen::Index>(3 * n);
-        coupling.middleCols<3>(column) =
+      const auto column = static_cast<Eigen::Index>(3 * n);
+      element.shapes.middleRows<3>(column) = shapes.middleRows<3>(3 * Eigen::Index{Element(e)[n]});
+      for (size_t i = 0; i < places_.added(); ++i) {
+        const auto row = static_cast<Eigen::Index>(3 * i);
+        element.stiffness.block<3, 3>(row, column) =
             Stiffness(integrals_.mixed[i * nodes_ + n], geometry, lame_);
-        inertia.middleCols<3>(column).diagonal().setConstant(
-            geometry.volume_m3 *
-            integrals_.mass(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(n)));
+        element.mass.block<3, 3>(row, column)
+            .diagonal()
+            .setConstant(geometry.volume_m3 * integrals_.mass(static_cast<Eigen::Index>(i),
+                                                              static_cast<Eigen::Index>(n)));
       }
-      residuals.middleRows<3>(3 * Eigen::Index{places_.Of(e, i)}) +=
-          places_.Sign(e, i) * (coupling * local - inertia * with_eigenvalues);
     }
   }
 

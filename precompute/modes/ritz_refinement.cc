@@ -17,9 +17,13 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 /// On |K phi - Lambda M phi| / |Lambda M phi|, Euclidean, in the unknowns of the user.
-constexpr double kTolerance = 5e-7;
+constexpr double kTolerance = 8e-7;
 
-constexpr int kMaxRounds = 4;
+constexpr int kMaxRounds = 6;
+
+/// After so many rounds, only vectors are left that hold something of modes not much above their
+/// own, which each correction lessens by a third or so: two cost less than another projection.
+constexpr int kQuickRounds = 2;
 
 /// kBlockWidth vectors with their products.
 struct Products {
@@ -53,23 +57,25 @@ class Refinement {
     }
   }
 
-  /// Corrects every vector `steps` times. What it takes up of the others Project takes out.
-  void Correct(int steps) {
+  /// Corrects every block of vectors `steps` times, unless the first `wanted` vectors' of it are
+  /// good already. What a vector takes up of the others Project takes out.
+  void Correct(int steps, Index wanted) {
     elastic_.resize(rows_, x_.cols());
     if (!A_.mass_is_identity) inertial_.resize(rows_, x_.cols());
+    const std::vector<bool> good = GoodBlocks(wanted);
     residuals_.resize(x_.cols());
     std::atomic<Index> next = 0;
     workers_.Run([&](int) {
       Products p(rows_);
       VectorBlockOf<Real> change(rows_, kBlockWidth);
       for (Index b = next++; b < x_.cols() / kBlockWidth; b = next++) {
-        CorrectBlock(b, steps, p, change);
+        CorrectBlock(b, good[static_cast<size_t>(b)] ? 0 : steps, p, change);
       }
     });
   }
 
-  /// x := x V with V from the projected problem; keeps `kept` vectors.
-  bool Project(Index kept) {
+  /// x := x V with V from the projected problem.
+  bool Project() {
     const MatrixXd& inertial = A_.mass_is_identity ? x_ : inertial_;
     MatrixXd stiffness = Gram(elastic_);
     MatrixXd mass = Gram(inertial);
@@ -78,10 +84,9 @@ class Refinement {
     if (!blas::GeneralizedEigen(size, stiffness.data(), mass.data(), eigenvalues_.data())) {
       return false;
     }
-    MatrixXd rotated = MatrixXd::Zero(rows_, (kept + kBlockWidth - 1) / kBlockWidth * kBlockWidth);
-    kept = std::min<Index>(rotated.cols(), x_.cols());
+    MatrixXd rotated = MatrixXd::Zero(rows_, x_.cols());
     workers_.ForParts(rows_, 64, [&](int64_t begin, int64_t end, int) {
-      blas::Product(static_cast<int>(end - begin), static_cast<int>(kept), size, x_.data() + begin,
+      blas::Product(static_cast<int>(end - begin), size, size, x_.data() + begin,
                     static_cast<int>(rows_), stiffness.data(), size, rotated.data() + begin,
                     static_cast<int>(rows_));
     });
@@ -112,6 +117,15 @@ class Refinement {
 
   static auto Columns(MatrixXd& x, Index b) {
     return x.middleCols(b * kBlockWidth, Index{kBlockWidth});
+  }
+
+  /// None before residuals are known; those without a vector that is wanted are.
+  std::vector<bool> GoodBlocks(Index wanted) const {
+    std::vector<bool> good(static_cast<size_t>(x_.cols() / kBlockWidth), residuals_.size() != 0);
+    for (Index i = 0; i < std::min(wanted, residuals_.size()); ++i) {
+      if (!(residuals_[i] <= kTolerance)) good[static_cast<size_t>(i / kBlockWidth)] = false;
+    }
+    return good;
   }
 
   void MassTimes(const VectorBlock& x, VectorBlock& y) const {
@@ -222,11 +236,13 @@ absl::StatusOr<Modes> RefineModes(const NodeMatrix& A, const MultifrontalCholesk
   Refinement<Real> refinement(A, factor, deflated, plan.free_motion, workers);
   refinement.Take(rough);
   double residual = 1;
+  int steps = plan.first_steps;
   for (int round = 0; round < kMaxRounds; ++round) {
-    refinement.Correct(round == 0 ? plan.first_steps : 1);
-    if (!refinement.Project(plan.wanted)) break;
+    refinement.Correct(steps, plan.wanted);
+    if (!refinement.Project()) break;
     residual = refinement.LargestResidual(plan.wanted);
     if (residual <= kTolerance) return refinement.Result(plan.wanted);
+    steps = round + 1 < kQuickRounds ? 1 : 2;
   }
   return Refusal(absl::StatusCode::kInternal, "VERIFICATION_FAILED",
                  absl::StrCat("modes could be found to a relative residual of ", residual,

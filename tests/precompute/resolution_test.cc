@@ -8,42 +8,64 @@
 namespace carillon::precompute {
 namespace {
 
+/// A round with a grain of so many millimetres.
+Round Solved(double grain_mm, double worst_error) {
+  return {.grain_m = 1e-3 * grain_mm,
+          .node_count = 10'000,
+          .thin = true,
+          .worst_error = worst_error,
+          .cpu_s = 1,
+          .peak_bytes = 1e8};
+}
+
 TEST(Resolution, StopsWhereTheAccuracyIsReached) {
-  EXPECT_FALSE(NextCornerNodeCount({.accuracy = 0.01}, {{2000, 0.009, 1, 1e8}}));
+  EXPECT_FALSE(NextGrain({.accuracy = 0.01}, {Solved(4, 0.009)}));
 }
 
 TEST(Resolution, GoesOnAsFarAsTheErrorNeeds) {
-  const auto next = NextCornerNodeCount({.accuracy = 0.01}, {{2000, 0.02, 1, 1e8}});
+  const auto next = NextGrain({.accuracy = 0.01}, {Solved(4, 0.02)});
   ASSERT_TRUE(next);
-  EXPECT_GT(*next, 2000 * 1.4);
-  EXPECT_LT(*next, 2000 * 2);
+  EXPECT_GT(*next, 4e-3 / 2);
+  EXPECT_LT(*next, 4e-3 / 1.2);
 }
 
 TEST(Resolution, LearnsFromTwoRoundsHowFastTheErrorFalls) {
   const ResolutionGoal goal{.accuracy = 0.01};
-  const auto slow = NextCornerNodeCount(goal, {{1000, 0.04, 1, 1e8}, {2000, 0.02, 2, 2e8}});
-  const auto fast = NextCornerNodeCount(goal, {{1000, 0.08, 1, 1e8}, {2000, 0.02, 2, 2e8}});
+  const auto slow = NextGrain(goal, {Solved(8, 0.06), Solved(4, 0.02)});
+  const auto fast = NextGrain(goal, {Solved(8, 0.2), Solved(4, 0.02)});
   ASSERT_TRUE(slow && fast);
-  EXPECT_GT(*slow, *fast);
+  EXPECT_LT(*slow, *fast);
 }
 
-TEST(Resolution, GoesFurtherWhereTheMeshDidNotGrow) {
-  const auto next =
-      NextCornerNodeCount({.accuracy = 0.01}, {{2000, 0.015, 1, 1e8}, {2000, 0.015, 1, 1e8}});
-  ASSERT_TRUE(next);
-  EXPECT_GE(*next, 3 * 2000);
+TEST(Resolution, RefinesWallsFurtherThanSolidsInAStep) {
+  Round solid = Solved(4, 0.5);
+  solid.thin = false;
+  const auto wall = NextGrain({.accuracy = 0.01}, {Solved(4, 0.5)});
+  const auto inside = NextGrain({.accuracy = 0.01}, {solid});
+  ASSERT_TRUE(wall && inside);
+  EXPECT_LT(*wall, *inside);
+}
+
+TEST(Resolution, EndsWhereTheMeshCannotBeRefined) {
+  EXPECT_FALSE(NextGrain({.accuracy = 0.01}, {Solved(4, 0.02), Solved(4, 0.02)}));
 }
 
 TEST(Resolution, KeepsToItsBudgets) {
-  EXPECT_FALSE(NextCornerNodeCount({.accuracy = 0.01, .budget_s = 10}, {{2000, 0.5, 9, 1e8}}));
-  EXPECT_FALSE(NextCornerNodeCount({.budget_bytes = 1e9}, {{2000, 0.5, 9, 1e9}}));
-  const auto next = NextCornerNodeCount({.budget_s = 60}, {{2000, 0.5, 1, 1e8}});
+  Round dear = Solved(4, 0.5);
+  dear.cpu_s = 9;
+  EXPECT_FALSE(NextGrain({.accuracy = 0.01, .budget_s = 10}, {dear}));
+  EXPECT_FALSE(NextGrain({.budget_bytes = 1e8}, {Solved(4, 0.5)}));
+  const auto next = NextGrain({.budget_s = 60}, {Solved(4, 0.5)});
   ASSERT_TRUE(next);
-  EXPECT_GT(*next, 2 * 2000);
+  EXPECT_LT(*next, 4e-3 / 1.4);
 }
 
 TEST(Resolution, EndsAfterSomeRounds) {
-  EXPECT_FALSE(NextCornerNodeCount({.accuracy = 1e-9}, std::vector<Round>(6, {2000, 0.5, 1, 1e8})));
+  std::vector<Round> rounds;
+  for (const double grain_mm : {32, 16, 8, 4, 2}) rounds.push_back(Solved(grain_mm, 0.5));
+  EXPECT_TRUE(NextGrain({.accuracy = 1e-9}, rounds));
+  rounds.push_back(Solved(1, 0.5));
+  EXPECT_FALSE(NextGrain({.accuracy = 1e-9}, rounds));
 }
 
 }  // namespace
