@@ -82,6 +82,7 @@ absl::Status Patiently(const StopSignal& stop, const std::function<absl::Status(
 /// Starts the command in the folder, with `events` as its descriptor 3; -1 where it cannot.
 pid_t Spawn(const std::vector<std::string>& command, const RunFolder& folder, int events) {
   std::vector<char*> arguments;
+  arguments.reserve(command.size() + 1);
   for (const std::string& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
   arguments.push_back(nullptr);
   posix_spawn_file_actions_t actions;
@@ -181,7 +182,7 @@ absl::Status RunJob(const client::Client& daemon, const RunJobOptions& options,
   const client::JobRun run{.job = absl::StrCat("jobs/", options.digest), .token = options.token};
   const absl::StatusOr<RunFolder> folder = RunFolder::Make();
   if (!folder.ok()) return folder.status();
-  const absl::Status fetched =
+  absl::Status fetched =
       Patiently(stop, [&] { return daemon.FetchMesh(run, folder->File("mesh")); });
   if (!fetched.ok()) return fetched;
   const absl::StatusOr<v1::RunEnd> end = RunToEnd(

@@ -47,8 +47,9 @@ class ResultSink {
     const absl::StatusOr<std::string> digest = ParseJobName(job);
     if (!digest.ok()) return digest.status();
     absl::StatusOr<RunUpload> upload = runs_->BeginUpload(*digest, token_);
-    if (upload.ok()) upload_ = *std::move(upload);
-    return upload.status();
+    if (!upload.ok()) return upload.status();
+    upload_ = *std::move(upload);
+    return absl::OkStatus();
   }
 
   /// Before the caller is told of a refusal, nothing of its result is there any more.

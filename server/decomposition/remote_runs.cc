@@ -58,6 +58,13 @@ bool Write(const std::filesystem::path& file, const std::string& content) {
 }  // namespace
 
 struct RunUpload::State {
+  State(RemoteRuns& of, std::string of_digest, std::string of_token,
+        std::filesystem::path of_folder)
+      : runs(of),
+        digest(std::move(of_digest)),
+        token(std::move(of_token)),
+        folder(std::move(of_folder)) {}
+
   RemoteRuns& runs;
   std::string digest;
   std::string token;
@@ -188,8 +195,7 @@ absl::StatusOr<RunUpload> RemoteRuns::BeginUpload(const std::string& digest,
   const MutexLock lock(&mutex_);
   auto folder = FolderOf(digest, token);
   if (!folder.ok()) return folder.status();
-  return RunUpload(std::unique_ptr<RunUpload::State>(
-      new RunUpload::State{.runs = *this, .digest = digest, .token = token, .folder = *folder}));
+  return RunUpload(std::make_unique<RunUpload::State>(*this, digest, token, *folder));
 }
 
 }  // namespace carillon
