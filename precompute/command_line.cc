@@ -33,7 +33,7 @@ struct Options {
   std::vector<std::string> fixtures;
   bool keep_surface = false, refine_surface = false, repair = false, json = false;
   bool cautious = false;
-  int node_count = 0, event_descriptor = -1, thread_count = 0;
+  int node_count = 0, keep_count = 0, event_descriptor = -1, thread_count = 0;
 };
 
 absl::Status Invalid(absl::string_view message) {
@@ -126,6 +126,10 @@ void AddOptions(CLI::App& app, Options& options) {
   app.add_option("--band", options.band,
                  "LO:HI in Hz: all modes up to natural HI are computed, one must lie in the band")
       ->capture_default_str();
+  app.add_option("--keep", options.keep_count,
+                 "Keep only so many modes, the most audible of a strike anywhere on the surface; "
+                 "for bodies of more than 5000 modes")
+      ->check(CLI::Range(0, kMaxModeCount));
   app.add_option("--matrices", options.matrices_folder,
                  "Folder for K.mtx and M.mtx (Matrix Market, SI, nodes in the file's order, three "
                  "unknowns a node)");
@@ -309,6 +313,7 @@ absl::StatusOr<CommandLine> MakeCommandLine(const Options& options) {
                                .nodes_per_element = options.element == "linear" ? 4 : 10},
                    .use = *use,
                    .resolution = *goal,
+                   .keep_mode_count = options.keep_count,
                    .matrices_folder = options.matrices_folder},
       .json = options.json,
       .event_descriptor = options.event_descriptor,

@@ -18,6 +18,7 @@
 #include "precompute/mesh/midside_nodes.h"
 #include "precompute/mesh/prepare_surface.h"
 #include "precompute/mesh/read_mesh.h"
+#include "precompute/modes/audible_modes.h"
 #include "precompute/modes/deformation_modes.h"
 #include "precompute/phase_clock.h"
 #include "proto/error_reason.h"
@@ -125,6 +126,20 @@ absl::Status CheckBand(const ModalModel& model, const IntendedUse& use) {
   return status;
 }
 
+/// What takes time after the matrices.
+std::vector<PlannedStep> PlanOf(const SolveCost& cost) {
+  return {{.phase = Phase::kVerify, .predicted_s = cost.count_s},
+          {.phase = Phase::kFactor, .predicted_s = cost.factor_s},
+          {.phase = Phase::kSolve, .predicted_s = cost.solve_s},
+          {.phase = Phase::kVerify, .predicted_s = cost.verify_s},
+          {.phase = Phase::kWrite, .predicted_s = cost.model_s}};
+}
+
+SolveOptions OptionsOf(const DecompositionSettings& settings, DecompositionObserver& observer) {
+  return {.max_mode_count = settings.keep_mode_count > 0 ? kMaxFoundModeCount : kMaxModeCount,
+          .on_cost = [&observer](const SolveCost& cost) { observer.OnPlan(PlanOf(cost)); }};
+}
+
 /// One body solved whole.
 absl::StatusOr<ModalModel> Solve(const Body& body, const DecompositionSettings& settings,
                                  DecompositionObserver& observer) {
@@ -136,11 +151,13 @@ absl::StatusOr<ModalModel> Solve(const Body& body, const DecompositionSettings& 
 
   const absl::StatusOr<DeformationModes> solution = SolveDeformationModes(
       system, body.mesh, settings.use.UnitEigenvalue(settings.use.high_hz),
-      [&](SolveStage stage, double done) { observer.OnProgress(PhaseOf(stage), done); });
+      [&](SolveStage stage, double done) { observer.OnProgress(PhaseOf(stage), done); },
+      OptionsOf(settings, observer));
   if (!solution.ok()) return solution.status();
-  observer.OnProgress(Phase::kVerify, 1);
+  observer.OnProgress(Phase::kWrite, 0);
   ModalModel model = MakeModalModel(body.mesh, body.given, elastic, *solution);
   model.warnings = body.warnings;
+  KeepMostAudible(settings.keep_mode_count, model);
   return model;
 }
 
@@ -175,9 +192,11 @@ absl::StatusOr<ModalModel> SolveToGoal(const Fillable& surface, DecompositionSet
     meshing.target_node_count = kFirstCornerNodeCount;
   }
   std::vector<Round> rounds;
+  RoundForecast forecast{.later_rounds = settings.resolution.given() ? kLaterRoundsAfterFirst : 0};
   absl::StatusOr<ModalModel> best = absl::UnknownError("");
   while (true) {
-    const double begun_s = PhaseClock::Now().cpu_seconds;
+    const PhaseClock::Times begun = PhaseClock::Now();
+    observer.OnRound(forecast);
     observer.OnProgress(Phase::kMesh, 0);
     const absl::StatusOr<Body> body = FillSurface(surface, settings);
     // A finer mesh that cannot be had takes nothing from the coarser one.
@@ -186,13 +205,14 @@ absl::StatusOr<ModalModel> SolveToGoal(const Fillable& surface, DecompositionSet
     absl::StatusOr<ModalModel> model = Solve(*body, settings, observer);
     if (!model.ok() && best.ok()) return best;
     if (!model.ok() || !settings.resolution.given()) return model;
-    rounds.push_back(Describe(body->mesh, *model, PhaseClock::Now().cpu_seconds - begun_s));
-    fprintf(stderr, "round grain %g mm nodes %g err %g cpu %g\n", rounds.back().grain_m * 1e3,
-            rounds.back().node_count, rounds.back().worst_error, rounds.back().cpu_s);
+    const PhaseClock::Times ended = PhaseClock::Now();
+    rounds.push_back(Describe(body->mesh, *model, ended.cpu_seconds - begun.cpu_seconds));
     const std::optional<double> next = NextGrain(settings.resolution, rounds);
     if (!next) return model;
     best = std::move(model);
     meshing.grain_m = *next;
+    forecast = {.expected_s = (ended.seconds - begun.seconds) * TimeGrowth(rounds.back(), *next),
+                .later_rounds = kLaterRounds};
   }
 }
 
@@ -219,7 +239,6 @@ absl::StatusOr<ModalModel> Decompose(const MeshFile& file, const DecompositionSe
   if (absl::Status status = CheckBand(*model, settings.use); !status.ok()) return status;
   WarnOfAccuracy(settings.resolution, *model);
   observer.OnModes(model->eigenvalues.size());
-  observer.OnProgress(Phase::kWrite, 0);
   return model;
 }
 

@@ -34,6 +34,8 @@ struct DecompositionSettings {
   IntendedUse use;
   /// Above `meshing`'s count of nodes.
   ResolutionGoal resolution;
+  /// Above zero: keep only so many modes, see KeepMostAudible; then more may be found.
+  int keep_mode_count = 0;
   /// Where to write K.mtx and M.mtx, SI, for the material of `use`; empty: nowhere.
   std::string matrices_folder;
 };

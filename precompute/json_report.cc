@@ -57,6 +57,7 @@ std::string JsonReport(const ModalModel& model, const IntendedUse& use,
                        {"unknowns", 3 * int64_t{model.node_count}},
                        {"peak_memory_bytes", PeakMemoryBytes()},
                        {"phases", PhaseTimes(reporter.clock())},
+                       {"left_out_modes", model.left_out_mode_count},
                        {"accuracy", model.WorstError()},
                        {"warnings", model.warnings},
                        {"modes", ModesInBand(model, use)}};

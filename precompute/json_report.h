@@ -10,8 +10,8 @@
 
 namespace carillon::precompute {
 
-/// The object that --json prints: nodes, elements, unknowns, peak_memory_bytes, phases, warnings,
-/// and of the modes held those in the band of `use`.
+/// The object that --json prints: nodes, elements, unknowns, peak_memory_bytes, phases, modes left
+/// out, warnings, and of the modes held those in the band of `use`.
 std::string JsonReport(const ModalModel& model, const IntendedUse& use,
                        const ProgressReporter& reporter);
 

@@ -98,6 +98,7 @@ v1::ModalModelRecord MakeHeader(const ModalModel& model, const ModelOrigin& orig
   header.set_mode_count(static_cast<uint32_t>(model.eigenvalues.size()));
   header.set_complete_to_eigenvalue(model.complete_to_eigenvalue);
   header.set_volume_m3(model.volume_m3);
+  header.set_left_out_mode_count(static_cast<uint32_t>(model.left_out_mode_count));
   *header.mutable_verification() = ToProto(model.verification);
   for (const StoredArray& array : arrays) *header.add_arrays() = array.descriptor;
   for (const std::string& warning : model.warnings) header.add_warnings(warning);
@@ -152,6 +153,7 @@ v1::DecompositionSettings ToProto(const MeshFile& file, const DecompositionSetti
   mesh.set_budget_s(settings.resolution.budget_s);
   mesh.set_budget_gib(settings.resolution.budget_bytes / kBytesPerGib);
   mesh.set_target_node_count(static_cast<uint32_t>(settings.meshing.target_node_count));
+  result.set_keep_mode_count(static_cast<uint32_t>(settings.keep_mode_count));
   for (const Fixture& fixture : settings.fixtures) *result.add_fixtures() = ToProto(fixture);
   return result;
 }

@@ -6,11 +6,19 @@
 #include <cstdio>
 #include <string>
 
+#include "absl/strings/str_format.h"
+
 namespace carillon::precompute {
 namespace {
 
 constexpr size_t kWidth = 30;
 constexpr char kEraseLine[] = "\r\x1b[K";
+
+std::string RoughTime(double seconds) {
+  if (seconds < 100) return absl::StrFormat("%.0f s", seconds);
+  return seconds < 6000 ? absl::StrFormat("%.0f min", seconds / 60)
+                        : absl::StrFormat("%.1f h", seconds / 3600);
+}
 
 }  // namespace
 
@@ -28,6 +36,9 @@ void ProgressBar::Draw(const ProgressState& state) const {
                std::string(PhaseName(state.phase)).c_str());
   if (state.node_count > 0) std::fprintf(stderr, ", %zu nodes", state.node_count);
   if (state.mode_count > 0) std::fprintf(stderr, ", %zu modes", state.mode_count);
+  if (state.remaining_s) {
+    std::fprintf(stderr, ", %s left", RoughTime(*state.remaining_s).c_str());
+  }
   std::fflush(stderr);
 }
 

@@ -2,20 +2,15 @@
 #include "precompute/progress_reporter.h"
 
 #include <algorithm>
-#include <array>
 #include <utility>
 
 namespace carillon::precompute {
 namespace {
 
-/// Where in the whole work each phase begins and ends: measured on tubes and solid boxes of 20,000
-/// nodes.
-constexpr std::array<double, kPhaseCount + 1> kPhaseBounds = {0,    0.02, 0.10, 0.12,
-                                                              0.25, 0.93, 0.98, 1};
-
-double FractionOfWhole(Phase phase, double fraction) {
-  const auto k = static_cast<size_t>(phase);
-  return kPhaseBounds[k] + std::clamp(fraction, 0.0, 1.0) * (kPhaseBounds[k + 1] - kPhaseBounds[k]);
+/// Of the whole work, about, before anybody knows how much there is.
+double FractionByPhase(Phase phase) {
+  if (phase == Phase::kRead) return 0;
+  return phase == Phase::kMesh ? 0.01 : 0.05;
 }
 
 }  // namespace
@@ -30,8 +25,34 @@ void ProgressReporter::OnProgress(Phase phase, double fraction) {
   const std::lock_guard lock(mutex_);
   if (phase != state_.phase) clock_.Enter(phase);
   state_.phase = phase;
-  state_.fraction = std::max(state_.fraction, FractionOfWhole(phase, fraction));
+  state_.fraction = std::max(state_.fraction, FractionByPhase(phase));
+  remaining_.Progress(Now(), phase, fraction);
+  Estimate();
+  if (phase != Phase::kWrite || fraction < 1) return;
+  remaining_ = {};
+  state_.remaining_s.reset();
+  state_.fraction = 1;
 }
+
+void ProgressReporter::OnRound(const RoundForecast& forecast) {
+  const std::lock_guard lock(mutex_);
+  remaining_.BeginRound(Now(), forecast);
+}
+
+void ProgressReporter::OnPlan(const std::vector<PlannedStep>& steps) {
+  const std::lock_guard lock(mutex_);
+  remaining_.Plan(Now(), steps);
+}
+
+void ProgressReporter::Estimate() {
+  const double now_s = Now();
+  state_.remaining_s = remaining_.Seconds(now_s);
+  if (!state_.remaining_s) return;
+  const double whole_s = std::max(now_s + *state_.remaining_s, 1e-9);
+  state_.fraction = std::max(state_.fraction, now_s / whole_s);
+}
+
+double ProgressReporter::Now() const { return PhaseClock::Now().seconds - begun_s_; }
 
 void ProgressReporter::OnMesh(size_t node_count, size_t element_count) {
   const std::lock_guard lock(mutex_);
@@ -63,6 +84,7 @@ ProgressState ProgressReporter::state() const {
 void ProgressReporter::Run() {
   std::unique_lock lock(mutex_);
   while (true) {
+    Estimate();
     const ProgressState state = state_;
     const bool last = stopping_;
     lock.unlock();

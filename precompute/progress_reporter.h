@@ -6,10 +6,12 @@
 #include <cstddef>
 #include <functional>
 #include <mutex>
+#include <optional>
 #include <thread>
 
 #include "precompute/decomposition_observer.h"
 #include "precompute/phase_clock.h"
+#include "precompute/remaining_time.h"
 
 namespace carillon::precompute {
 
@@ -17,6 +19,7 @@ namespace carillon::precompute {
 struct ProgressState {
   Phase phase = Phase::kRead;
   double fraction = 0;  ///< of the whole work, estimated; never goes back
+  std::optional<double> remaining_s = {};
   size_t node_count = 0;
   size_t element_count = 0;
   size_t mode_count = 0;
@@ -32,6 +35,8 @@ class ProgressReporter : public DecompositionObserver {
   ~ProgressReporter() override;
 
   void OnProgress(Phase phase, double fraction) override;
+  void OnRound(const RoundForecast& forecast) override;
+  void OnPlan(const std::vector<PlannedStep>& steps) override;
   void OnMesh(size_t node_count, size_t element_count) override;
   void OnModes(size_t mode_count) override;
 
@@ -44,6 +49,9 @@ class ProgressReporter : public DecompositionObserver {
 
  private:
   void Run();
+  double Now() const;
+  /// Brings fraction and remaining time up to date; mutex_ is held.
+  void Estimate();
 
   std::function<void(const ProgressState&)> show_;
   std::chrono::milliseconds interval_;
@@ -52,6 +60,8 @@ class ProgressReporter : public DecompositionObserver {
   ProgressState state_;
   bool stopping_ = false;
   PhaseClock clock_;
+  double begun_s_ = PhaseClock::Now().seconds;
+  RemainingTime remaining_;
   std::thread thread_;
 };
 

@@ -53,7 +53,14 @@ bool Refined(const std::vector<Round>& rounds) {
          rounds.back().grain_m < kSameGrain * rounds[rounds.size() - 2].grain_m;
 }
 
+/// Of the space that elements of one size fill.
+double Dimension(const Round& round) { return round.thin ? 2 : 3; }
+
 }  // namespace
+
+double TimeGrowth(const Round& last, double grain_m) {
+  return std::pow(last.grain_m / grain_m, Dimension(last) * kTimePower);
+}
 
 std::optional<double> NextGrain(const ResolutionGoal& goal, const std::vector<Round>& rounds) {
   const Round& last = rounds.back();
@@ -61,7 +68,7 @@ std::optional<double> NextGrain(const ResolutionGoal& goal, const std::vector<Ro
   if (goal.accuracy > 0 && last.worst_error > 0 && last.worst_error <= goal.accuracy) {
     return std::nullopt;
   }
-  const double dimension = last.thin ? 2 : 3;
+  const double dimension = Dimension(last);
   double growth =
       std::min({kMostGrowth, AffordableGrowth(goal, rounds), kMaxMeshNodes / last.node_count});
   if (goal.accuracy > 0 && last.worst_error > 0) {

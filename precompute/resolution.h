@@ -33,4 +33,11 @@ inline constexpr int kFirstCornerNodeCount = 1500;
 /// and memory grow with powers of the nodes that solids show.
 std::optional<double> NextGrain(const ResolutionGoal& goal, const std::vector<Round>& rounds);
 
+/// How many times as long as `last` a round with that grain will take.
+double TimeGrowth(const Round& last, double grain_m);
+
+/// What the rounds after the first one will take, in times of it, before its errors are known; and
+/// those after a later one, which is meant to be the last.
+inline constexpr double kLaterRoundsAfterFirst = 6, kLaterRounds = 0.3;
+
 }  // namespace carillon::precompute

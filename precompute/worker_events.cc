@@ -21,6 +21,7 @@ void WorkerEvents::SendProgress(const ProgressState& state) const {
   v1::Progress& progress = *event.mutable_progress();
   progress.set_phase(static_cast<v1::Phase>(static_cast<int>(state.phase) + v1::PHASE_READ));
   progress.set_fraction(state.fraction);
+  progress.set_remaining_s(state.remaining_s.value_or(0));
   progress.set_node_count(static_cast<uint32_t>(state.node_count));
   progress.set_converged_mode_count(static_cast<uint32_t>(state.mode_count));
   Send(descriptor_, event);

@@ -31,6 +31,11 @@ constexpr Index kGuards = 8;
 /// iterations hardly depends on it, and a larger one spares digits.
 constexpr double kShift = -0.0625;
 
+/// Vectors that the iteration takes, about, see solve_cost; part of the solution's time that it is.
+constexpr double kBasisOfWanted = 2.6;
+constexpr Index kBasisAtLeast = 120;
+constexpr double kIterationPart = 0.6;
+
 /// Eigenvalues below this part of the shift are zero but for rounding.
 constexpr double kFreeMotion = 1e-7;
 
@@ -87,6 +92,8 @@ absl::StatusOr<RitzPairs> Iterate(LanczosRecurrence<Real>& recurrence, Index wan
                                   const SolveProgress& progress) {
   RitzPairs pairs;
   bool open = recurrence.Start();
+  progress(0);
+  const double foreseen = kBasisOfWanted * static_cast<double>(wanted) + kBasisAtLeast;
   // Looking costs the cube of the size; from three halves on, two more vectors make about one more
   // pair.
   for (Index look = 3 * wanted / 2 + 3 * kBlockWidth; pairs.converged_count < wanted;) {
@@ -94,11 +101,11 @@ absl::StatusOr<RitzPairs> Iterate(LanczosRecurrence<Real>& recurrence, Index wan
       return NotConverged(pairs.converged_count, wanted);
     }
     open = recurrence.Step();
+    progress(kIterationPart * std::min(1.0, static_cast<double>(recurrence.size()) / foreseen));
     if (open && recurrence.size() < look) continue;
     pairs = FindRitzPairs(recurrence, wanted);
     const Index missing = wanted - pairs.converged_count;
     look = recurrence.size() + std::max<Index>(kBlockWidth, missing);
-    progress(static_cast<double>(pairs.converged_count) / static_cast<double>(wanted));
   }
   return pairs;
 }

@@ -29,6 +29,9 @@ constexpr int kMaxAttempts = 3;
 constexpr double kFreeMotion = 1e-9;
 constexpr double kRounding = 1e-12;
 
+/// Of the dense solver, for the cube of the unknowns: see PrefersDense.
+constexpr double kDenseSeconds = 1.4e-10;
+
 absl::Status VerificationFailed(const std::string& what) {
   return Refusal(absl::StatusCode::kInternal, "VERIFICATION_FAILED",
                  absl::StrCat(what, "; no model was made; another number of nodes may do"));
@@ -59,21 +62,38 @@ void FixSigns(Eigen::MatrixXd& shapes) {
   }
 }
 
-absl::Status CheckMemory(const OrderedSystem& ordered, int mode_count) {
-  return CheckMemory(PredictSolveCost(ordered, mode_count, ThreadCount()));
+absl::Status TooManyModes(int count, int limit) {
+  const std::string keep =
+      limit < kMaxFoundModeCount
+          ? absl::StrCat(
+                ", or keep only the most audible (--keep, keep_mode_count), which may be of ",
+                kMaxFoundModeCount)
+          : "";
+  return Refusal(absl::StatusCode::kInvalidArgument, "TOO_MANY_MODES",
+                 absl::StrCat(count, " modes lie below the top of the band; the limit is ", limit,
+                              "; lower the band's upper frequency", keep));
+}
+
+/// Elastic waves in a volume (Weyl): the fewest that a body is likely to have; at a Poisson's ratio
+/// of 0.3, unit Young's modulus and density.
+int GuessModeCount(const SystemMatrices& system, double limit) {
+  const Eigen::VectorXd ones = Eigen::VectorXd::Ones(system.unknown_count());
+  const double volume = ones.dot(system.M.selfadjointView<Eigen::Lower>() * ones) / 3;
+  return static_cast<int>(
+      std::min<double>(0.153 * volume * std::pow(limit, 1.5), kMaxFoundModeCount));
 }
 
 /// One solution: counts, solves and verifies.
 class Solution {
  public:
   Solution(const SystemMatrices& system, OrderedSystem ordered, const std::vector<Point>& nodes,
-           const std::vector<Point>& held, const SolveWatch& watch)
+           const SolveWatch& watch, const SolveOptions& options)
       : system_(system),
         nodes_(nodes),
-        held_(held),
+        options_(options),
         watch_(watch),
         ordered_(std::move(ordered)),
-        rigid_(RigidBodyModes(nodes, system, held)),
+        rigid_(RigidBodyModes(nodes, system, options.held)),
         rigid_momenta_(system.M.selfadjointView<Eigen::Lower>() * rigid_),
         workers_(ThreadCount()) {}
 
@@ -81,28 +101,28 @@ class Solution {
   int rigid_mode_count() const { return static_cast<int>(rigid_.cols()); }
 
   absl::StatusOr<int> CountBelow(double limit) const {
-    watch_(SolveStage::kFactor, 0);
+    options_.on_cost(Cost(rigid_mode_count() + GuessModeCount(system_, limit)));
+    watch_(SolveStage::kVerify, 0);
     absl::StatusOr<int> count =
         CountEigenvaluesBelow(ordered_.fronts, ordered_.matrix, limit, workers_,
-                              [this](double done) { watch_(SolveStage::kFactor, done); });
+                              [this](double done) { watch_(SolveStage::kVerify, done); });
     if (!count.ok()) return count;
     if (*count < rigid_mode_count()) {
       return VerificationFailed(absl::StrCat("only ", *count, " of the ", rigid_mode_count(),
                                              " rigid-body modes lie below "
                                              "the limit"));
     }
-    if (*count - rigid_mode_count() > kMaxModeCount) {
-      return Refusal(absl::StatusCode::kInvalidArgument, "TOO_MANY_MODES",
-                     absl::StrCat(*count - rigid_mode_count(),
-                                  " modes lie below the top of the band; the "
-                                  "limit is ",
-                                  kMaxModeCount, "; lower the band's upper frequency"));
-    }
+    const int found = *count - rigid_mode_count();
+    if (found > options_.max_mode_count) return TooManyModes(found, options_.max_mode_count);
     return count;
   }
 
   absl::StatusOr<Modes> SolveLowest(int count, double limit) const {
-    if (absl::Status status = CheckMemory(ordered_, count); !status.ok()) return status;
+    const SolveCost cost = Cost(count);
+    if (absl::Status status = CheckMemory(cost); !status.ok()) return status;
+    options_.on_cost(cost);
+    const bool dense = PrefersDense(system_.unknown_count(), count);
+    watch_(dense ? SolveStage::kSolve : SolveStage::kFactor, 0);
     const ModeRequest request{
         .count = static_cast<int>(std::min<Eigen::Index>(count, system_.unknown_count())),
         .eigenvalue_limit = limit};
@@ -112,7 +132,7 @@ class Solution {
   }
 
   /// An upper bound of the lowest deformation mode, of its size.
-  double BoundOfLowest() const { return LowestEigenvalueBound(nodes_, system_, held_); }
+  double BoundOfLowest() const { return LowestEigenvalueBound(nodes_, system_, options_.held); }
 
   /// Splits rigid-body modes off, checks everything but completeness.
   absl::StatusOr<DeformationModes> Verify(Modes all, double limit) const {
@@ -142,6 +162,14 @@ class Solution {
   }
 
  private:
+  SolveCost Cost(int count) const {
+    SolveCost cost = PredictSolveCost(ordered_, count, ThreadCount());
+    if (!PrefersDense(system_.unknown_count(), count)) return cost;
+    cost.factor_s = 0;
+    cost.solve_s = kDenseSeconds * std::pow(static_cast<double>(system_.unknown_count()), 3);
+    return cost;
+  }
+
   std::unique_ptr<Eigensolver> MakeSolver(int count) const {
     if (PrefersDense(system_.unknown_count(), count)) return std::make_unique<DenseEigensolver>();
     return std::make_unique<BlockLanczosEigensolver>(ordered_, rigid_);
@@ -154,15 +182,15 @@ class Solution {
   }
 
   absl::Status SeveralPieces(Eigen::Index free_motions) const {
-    return Refusal(
-        absl::StatusCode::kInvalidArgument, "BODY_IN_SEVERAL_PIECES",
-        absl::StrCat(
-            "the body can move in ", free_motions,
-            " ways without bending, a body "
-            "in one piece",
-            held_.empty() ? " in six" : absl::StrCat(" held as this one in ", rigid_mode_count()),
-            ": parts of it are separate, or hang together by an "
-            "edge or a point only; join them, or make each a body of its own"));
+    return Refusal(absl::StatusCode::kInvalidArgument, "BODY_IN_SEVERAL_PIECES",
+                   absl::StrCat("the body can move in ", free_motions,
+                                " ways without bending, a body "
+                                "in one piece",
+                                options_.held.empty()
+                                    ? " in six"
+                                    : absl::StrCat(" held as this one in ", rigid_mode_count()),
+                                ": parts of it are separate, or hang together by an "
+                                "edge or a point only; join them, or make each a body of its own"));
   }
 
   absl::Status Check(const Verification& proof) const {
@@ -184,7 +212,7 @@ class Solution {
 
   const SystemMatrices& system_;
   const std::vector<Point>& nodes_;
-  const std::vector<Point>& held_;
+  const SolveOptions& options_;
   const SolveWatch& watch_;
   OrderedSystem ordered_;
   Eigen::MatrixXd rigid_;
@@ -211,11 +239,12 @@ absl::StatusOr<DeformationModes> SolveDeformationModes(const SystemMatrices& sys
                                                        const std::vector<Point>& nodes,
                                                        double eigenvalue_limit,
                                                        const SolveWatch& watch,
-                                                       const std::vector<Point>& held) {
+                                                       const SolveOptions& options) {
   absl::StatusOr<OrderedSystem> ordered = OrderedSystem::Make(system);
   if (!ordered.ok()) return ordered.status();
-  if (absl::Status status = CheckMemory(*ordered, 1); !status.ok()) return status;
-  const Solution solution(system, *std::move(ordered), nodes, held, watch);
+  const SolveCost least = PredictSolveCost(*ordered, 1, ThreadCount());
+  if (absl::Status status = CheckMemory(least); !status.ok()) return status;
+  const Solution solution(system, *std::move(ordered), nodes, watch, options);
   for (int attempt = 0; attempt < kMaxAttempts; ++attempt) {
     const double limit = eigenvalue_limit * (1 + 1e-4 * attempt);
     const absl::StatusOr<int> count = solution.CountBelow(limit);
@@ -240,11 +269,15 @@ absl::StatusOr<DeformationModes> SolveDeformationModes(const SystemMatrices& sys
 
 absl::StatusOr<DeformationModes> SolveDeformationModes(const SystemMatrices& system,
                                                        const TetMesh& mesh, double eigenvalue_limit,
-                                                       const SolveWatch& watch) {
-  if (mesh.held.empty()) return SolveDeformationModes(system, mesh.nodes, eigenvalue_limit, watch);
+                                                       const SolveWatch& watch,
+                                                       SolveOptions options) {
+  options.held = PlacesOf(mesh.held, mesh);
+  if (mesh.held.empty()) {
+    return SolveDeformationModes(system, mesh.nodes, eigenvalue_limit, watch, options);
+  }
   const std::vector<int32_t> moving = MovingNodes(mesh);
-  absl::StatusOr<DeformationModes> result = SolveDeformationModes(
-      system, PlacesOf(moving, mesh), eigenvalue_limit, watch, PlacesOf(mesh.held, mesh));
+  absl::StatusOr<DeformationModes> result =
+      SolveDeformationModes(system, PlacesOf(moving, mesh), eigenvalue_limit, watch, options);
   if (!result.ok()) return result;
   result->modes.shapes = Extended(result->modes.shapes, moving, mesh.nodes.size());
   return result;

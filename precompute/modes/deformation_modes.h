@@ -8,6 +8,7 @@
 #include "precompute/mesh/surface_mesh.h"
 #include "precompute/mesh/tet_mesh.h"
 #include "precompute/modes/eigensolver.h"
+#include "precompute/modes/solve_cost.h"
 #include "precompute/modes/verification.h"
 
 namespace carillon::precompute {
@@ -25,31 +26,41 @@ struct DeformationModes {
 
 /// More modes than this are refused: as many never sound at once, and their shapes fill gigabytes.
 inline constexpr int kMaxModeCount = 5000;
+/// As many may be found where only the most audible are kept.
+inline constexpr int kMaxFoundModeCount = 20'000;
 
-/// What a solution is at; factoring and verifying may come twice.
+/// What a solution is at: it counts the modes first, which belongs to their proof.
 enum class SolveStage { kFactor, kSolve, kVerify };
 
 /// Told of every stage and of the part of it that is done, 0 to 1.
 using SolveWatch = std::function<void(SolveStage, double)>;
 
+struct SolveOptions {
+  std::vector<Point> held = {};  ///< of the nodes that are held
+  int max_mode_count = kMaxModeCount;
+  /// Told of the cost before the modes are counted, from a guess of their number, and after.
+  std::function<void(const SolveCost&)> on_cost = [](const SolveCost&) {};
+};
+
 /// Finds all deformation modes below `eigenvalue_limit`. Their number is counted first, by inertia,
 /// so that the solver knows when it has them all; where the limit agrees with an eigenvalue to
 /// nearly all digits it is raised by a hair.
 ///
-/// `nodes`: positions, in the order of the unknowns; `held`: of the nodes that are held.
+/// `nodes`: positions, in the order of the unknowns.
 /// Errors: BODY_IN_SEVERAL_PIECES, TOO_MANY_MODES, MEMORY_TOO_SMALL (before it is taken),
 /// OUT_OF_MEMORY, MESH_TOO_LARGE, VERIFICATION_FAILED.
 absl::StatusOr<DeformationModes> SolveDeformationModes(const SystemMatrices& system,
                                                        const std::vector<Point>& nodes,
                                                        double eigenvalue_limit,
                                                        const SolveWatch& watch,
-                                                       const std::vector<Point>& held = {});
+                                                       const SolveOptions& options = {});
 
-/// The same of the body whose matrices Assemble made; the shapes have all its nodes, and are zero
-/// where they are held.
+/// The same of the body whose matrices Assemble made, which says what is held; the shapes have all
+/// its nodes, and are zero where they are held.
 absl::StatusOr<DeformationModes> SolveDeformationModes(const SystemMatrices& system,
                                                        const TetMesh& mesh, double eigenvalue_limit,
-                                                       const SolveWatch& watch);
+                                                       const SolveWatch& watch,
+                                                       SolveOptions options = {});
 
 /// True where the dense solver is the faster one, by measurement.
 bool PrefersDense(Eigen::Index unknown_count, int mode_count);

@@ -22,6 +22,7 @@ struct ModalModel {
   /// The lowest deformation mode of the body, held or (where it is the first beyond) not.
   double lowest_eigenvalue = 0;
   Verification verification;
+  int left_out_mode_count = 0;  ///< found, but not kept: see KeepMostAudible
   /// What the user should know though it stopped nothing.
   std::vector<std::string> warnings;
 

@@ -61,6 +61,8 @@ size_t BasisSize(int mode_count) { return static_cast<size_t>(2.6 * mode_count) 
 constexpr double kDoubleRate = 20e9;
 constexpr double kFloatRate = 45e9;
 constexpr double kBandwidth = 8e9;
+/// Seconds that coupling and estimated error of a mode take, for each unknown.
+constexpr double kModelSeconds = 50e-9;
 
 }  // namespace
 
@@ -84,9 +86,12 @@ SolveCost PredictSolveCost(const OrderedSystem& ordered, int mode_count, int thr
   const auto n = static_cast<double>(unknowns);
   const auto m = static_cast<double>(BasisSize(mode_count));
   const auto p = static_cast<double>(modes);
-  cost.cpu_seconds = fronts.factor_flops * (1 / kDoubleRate + 1 / kFloatRate) +
-                     steps * 2 * static_cast<double>(factor) / kBandwidth +
-                     n * (m * m + m * p) / kFloatRate + 4 * n * p * p / kDoubleRate;
+  cost.count_s = fronts.factor_flops / kDoubleRate;
+  cost.factor_s = fronts.factor_flops / kFloatRate;
+  cost.solve_s = steps * 2 * static_cast<double>(factor) / kBandwidth +
+                 n * (m * m + m * p) / kFloatRate + 3 * n * p * p / kDoubleRate;
+  cost.verify_s = n * p * p / kDoubleRate;
+  cost.model_s = n * p * kModelSeconds;
   return cost;
 }
 

@@ -10,8 +10,15 @@ namespace carillon::precompute {
 
 /// What a solution takes, known from the symbolic analysis alone.
 struct SolveCost {
-  size_t peak_bytes = 0;   ///< of everything that the solution allocates, the matrices included
-  double cpu_seconds = 0;  ///< on a core of 2023 with AVX-512; a few times as many on an old one
+  size_t peak_bytes = 0;  ///< of everything that the solution allocates, the matrices included
+  /// Processor time on a core of 2023 with AVX-512; a few times as many on an old one.
+  double count_s = 0;   ///< of the modes, by inertia
+  double factor_s = 0;  ///< the factorization to solve with
+  double solve_s = 0;   ///< iteration and refinement
+  double verify_s = 0;  ///< residuals and orthogonality
+  double model_s = 0;   ///< couplings, estimated errors
+
+  double cpu_seconds() const { return count_s + factor_s + solve_s + verify_s + model_s; }
 };
 
 /// `mode_count`: rigid-body modes included.

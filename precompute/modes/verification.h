@@ -14,7 +14,7 @@ struct Verification {
   /// Largest |phi_i^T M phi_j - delta_ij|, rigid-body modes included.
   double max_orthogonality_error = 0;
   int rigid_mode_count = 0;
-  /// Eigenvalues below sturm_eigenvalue by inertia: rigid_mode_count plus the modes kept.
+  /// Eigenvalues below sturm_eigenvalue by inertia: rigid_mode_count plus the modes found.
   int sturm_count = 0;
   double sturm_eigenvalue = 0;
 };

@@ -128,6 +128,27 @@ TEST_F(CarillonPrecomputeTest, JsonHasEveryKey) {
   }
 }
 
+TEST_F(CarillonPrecomputeTest, KeepsTheMostAudibleModesAndSaysHowManyItLeftOut) {
+  ASSERT_EQ(RunBar(std::string(kSteel) + " --band 20:60000").exit_status, 0);
+  const v1::ModalModelHeader whole = ReadRecords(model)[0].header();
+  ASSERT_GT(whole.mode_count(), 5U);
+  EXPECT_EQ(whole.left_out_mode_count(), 0U);
+  const Result result = RunBar(std::string(kSteel) + " --band 20:60000 --keep 3");
+  ASSERT_EQ(result.exit_status, 0) << result.output;
+  const v1::ModalModelHeader kept = ReadRecords(model)[0].header();
+  EXPECT_EQ(kept.mode_count(), 3U);
+  EXPECT_EQ(kept.left_out_mode_count(), whole.mode_count() - 3);
+  EXPECT_EQ(kept.settings().keep_mode_count(), 3U);
+  EXPECT_EQ(kept.verification().sturm_count(), whole.mode_count() + 6);
+  EXPECT_EQ(kept.complete_to_eigenvalue(), whole.complete_to_eigenvalue());
+  ASSERT_EQ(kept.warnings_size(), whole.warnings_size() + 1);
+  const Json report = Json::parse(result.output);
+  EXPECT_EQ(report.at("left_out_modes"), whole.mode_count() - 3);
+  EXPECT_EQ(report.at("modes").size(), 3U);
+  std::filesystem::remove(model);
+  EXPECT_EQ(ReasonOf(RunBar(std::string(kSteel) + " --keep 5001")), "INVALID_SETTINGS");
+}
+
 TEST_F(CarillonPrecomputeTest, UnitMayBeANumberOfMetres) {
   const auto volume_m3 = [&](const std::string& unit) {
     Run(bar + " --out " + model + " --unit " + unit + " --element linear --nodes 100 " + kSteel);

@@ -68,5 +68,13 @@ TEST(Resolution, EndsAfterSomeRounds) {
   EXPECT_FALSE(NextGrain({.accuracy = 1e-9}, rounds));
 }
 
+TEST(TimeGrowth, IsThatOfTheNodesAndMore) {
+  const Round wall{.grain_m = 0.002, .thin = true};
+  EXPECT_DOUBLE_EQ(TimeGrowth(wall, 0.002), 1);
+  // Half the grain: four times the nodes of a wall, eight times those of a solid.
+  EXPECT_GT(TimeGrowth(wall, 0.001), 4);
+  EXPECT_GT(TimeGrowth({.grain_m = 0.002, .thin = false}, 0.001), 8);
+}
+
 }  // namespace
 }  // namespace carillon::precompute

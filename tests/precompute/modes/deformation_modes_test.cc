@@ -127,8 +127,36 @@ TEST(PrefersDense, WhereAnEighthOfAllModesIsWantedAndMemoryAllows) {
 }
 
 TEST(DeformationModes, MoreThanTheStatedLimitAreRefused) {
-  EXPECT_THAT(Solve(MakeTetBox({1, 1, 1}, {12, 12, 12}, 4), 1e9).status().ToString(),
-              HasSubstr("TOO_MANY_MODES: 6585 modes lie below the top of the band"));
+  EXPECT_THAT(
+      Solve(MakeTetBox({1, 1, 1}, {12, 12, 12}, 4), 1e9).status().ToString(),
+      HasSubstr("TOO_MANY_MODES: 6585 modes lie below the top of the band; the limit is 5000; "
+                "lower the band's upper frequency, or keep only the most audible (--keep"));
+}
+
+TEST(DeformationModes, TheProofIsToldApartFromTheSolution) {
+  for (const std::array<int, 3>& cells : {std::array{4, 3, 2}, std::array{9, 6, 3}}) {
+    const TetMesh mesh = MakeTetBox({1, 0.6, 0.3}, cells, 4);
+    std::vector<SolveStage> stages;
+    std::vector<SolveCost> costs;
+    const auto result =
+        SolveDeformationModes(AssembleUnit(mesh), mesh.nodes, 40,
+                              [&](SolveStage stage, double) {
+                                if (stages.empty() || stages.back() != stage)
+                                  stages.push_back(stage);
+                              },
+                              {.on_cost = [&](const SolveCost& cost) { costs.push_back(cost); }});
+    ASSERT_TRUE(result.ok()) << result.status();
+    using enum SolveStage;
+    // Of the first the dense solver does all at once.
+    const bool dense = PrefersDense(static_cast<Eigen::Index>(3 * mesh.nodes.size()), 7);
+    EXPECT_EQ(stages, dense ? std::vector({kVerify, kSolve, kVerify})
+                            : std::vector({kVerify, kFactor, kSolve, kVerify}));
+    ASSERT_EQ(costs.size(), 2U) << "before the modes are counted, and after";
+    EXPECT_GT(costs[0].count_s, 0);
+    EXPECT_EQ(costs[0].count_s, costs[1].count_s) << "the count does not depend on what it finds";
+    EXPECT_GT(costs[1].solve_s, 0);
+    EXPECT_EQ(costs[1].factor_s > 0, !dense);
+  }
 }
 
 }  // namespace

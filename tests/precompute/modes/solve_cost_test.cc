@@ -34,8 +34,8 @@ TEST(SolveCost, GrowsWithModesAndFasterThanTheMesh) {
   EXPECT_GT(PredictSolveCost(coarse, 100, 1).peak_bytes,
             PredictSolveCost(coarse, 50, 1).peak_bytes);
   // Nested dissection of a solid: time as the square of the nodes, 6.4 times as many here.
-  EXPECT_GT(PredictSolveCost(fine, 50, 1).cpu_seconds,
-            6.4 * PredictSolveCost(coarse, 50, 1).cpu_seconds);
+  EXPECT_GT(PredictSolveCost(fine, 50, 1).cpu_seconds(),
+            6.4 * PredictSolveCost(coarse, 50, 1).cpu_seconds());
 }
 
 TEST(SolveCost, WhatTheMachineLacksIsRefusedWithFigures) {
