@@ -28,6 +28,8 @@ struct CreateModelOptions {
   double max_frequency_hz = 20000;
   std::optional<bool> keep_surface;
   uint32_t target_node_count = 0;
+  uint32_t keep_mode_count = 0;
+  bool coarse_first = false;
   int32_t priority = 0;
   double time_limit_s = 0;
   uint64_t memory_limit_mib = 0;

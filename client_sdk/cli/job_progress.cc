@@ -56,6 +56,12 @@ double Fraction(const v1::Job& job) {
   return job.state() == v1::JOB_STATE_SUCCEEDED ? 1.0 : job.progress().fraction();
 }
 
+std::string RoughTime(double seconds) {
+  if (seconds < 100) return absl::StrFormat("%.0f s", seconds);
+  return seconds < 6000 ? absl::StrFormat("%.0f min", seconds / 60)
+                        : absl::StrFormat("%.1f h", seconds / 3600);
+}
+
 /// The bar, redrawn in place; the job's label before it.
 void DrawBar(const v1::Job& job) {
   const int filled = static_cast<int>(std::lround(Fraction(job) * kBarWidth));
@@ -71,6 +77,10 @@ std::string ProgressText(const v1::Job& job) {
   if (progress.node_count() > 0) absl::StrAppend(&text, ", ", progress.node_count(), " nodes");
   if (progress.converged_mode_count() > 0) {
     absl::StrAppend(&text, ", ", progress.converged_mode_count(), " modes");
+  }
+  if (job.coarse_ready()) absl::StrAppend(&text, ", coarse model ready");
+  if (progress.remaining_s() > 0) {
+    absl::StrAppend(&text, ", ", RoughTime(progress.remaining_s()), " left");
   }
   return text;
 }

@@ -75,6 +75,7 @@ v1::DecompositionSettings Settings(const CreateModelOptions& options) {
   settings.set_metres_per_unit(MetresPerUnit(options.unit));
   if (options.keep_surface) settings.mutable_mesh()->set_keep_surface(*options.keep_surface);
   settings.mutable_mesh()->set_target_node_count(options.target_node_count);
+  settings.set_keep_mode_count(options.keep_mode_count);
   settings.mutable_mesh()->set_repair(options.repair);
   settings.mutable_mesh()->set_wall_m(options.wall_m);
   settings.mutable_mesh()->set_accuracy(options.accuracy);
@@ -91,6 +92,7 @@ absl::StatusOr<v1::CreateModalModelRequest> MakeRequest(const CreateModelOptions
   request.set_mesh_digest(std::move(mesh_digest));
   request.set_mesh_format(Format(options));
   *request.mutable_settings() = Settings(options);
+  request.set_coarse_first(options.coarse_first);
   for (const std::string& text : options.fixtures) {
     const auto fixture = ParseFixture(text);
     if (!fixture.ok()) return fixture.status();

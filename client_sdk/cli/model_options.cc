@@ -81,6 +81,10 @@ void AddModelCreate(CLI::App& app, Program& program) {
   AddParsed(create, "--budget", ParseBudget, "seconds, or seconds:GiB, such as 60 or 60:4",
             "SECONDS[:GIB] of processor time and memory: as fine a mesh as they allow",
             [options](const Budget& budget) { options->budget = budget; });
+  create.add_option("--keep", options->keep_mode_count,
+                    "keep only so many modes, the most audible; for bodies of more than 5000");
+  create.add_flag("--coarse-first", options->coarse_first,
+                  "first a model of few nodes, under the same name, to sound with meanwhile");
   create.add_option("--priority", options->priority, "-100 to 100: higher ones start first");
   create.add_option("--time-limit", options->time_limit_s, "give up after so many seconds");
   create.add_option("--memory-limit-mib", options->memory_limit_mib, "memory that it may take");

@@ -21,6 +21,7 @@ constexpr std::array kFormats = {"obj", "ply", "stl", "off", "msh", "mesh", "nod
 constexpr size_t kMaxLabelBytes = 200;
 constexpr int kMostPriority = 100;
 constexpr int kMostFixtures = 16;
+constexpr uint32_t kMostKept = 5000;
 constexpr double kPoissonSteps = 1e4;  // of one
 
 absl::Status Invalid(absl::string_view what) {
@@ -66,6 +67,10 @@ absl::Status CheckSettings(const v1::DecompositionSettings& settings) {
   if (settings.fixtures_size() > kMostFixtures) {
     return Invalid(absl::StrCat("there are ", settings.fixtures_size(), " fixtures; at most ",
                                 kMostFixtures, " are taken: hold a group, or a larger box"));
+  }
+  if (settings.keep_mode_count() > kMostKept) {
+    return Invalid(absl::StrCat("keep_mode_count is ", settings.keep_mode_count(),
+                                "; it must be at most ", kMostKept));
   }
   if (!v1::Element_IsValid(settings.element()) || !v1::MassMatrix_IsValid(settings.mass_matrix())) {
     return Invalid("element or mass_matrix has a value that this daemon does not know");
@@ -156,6 +161,9 @@ std::string CanonicalText(const v1::CreateModalModelRequest& resolved) {
   if (mesh.budget_s() > 0 || mesh.budget_gib() > 0) {
     absl::StrAppend(&text, "budget ", ShortestDecimal(mesh.budget_s()), " ",
                     ShortestDecimal(mesh.budget_gib()), "\n");
+  }
+  if (settings.keep_mode_count() > 0) {
+    absl::StrAppend(&text, "keep ", settings.keep_mode_count(), "\n");
   }
   std::set<std::string> fixtures;
   for (const v1::Fixture& fixture : settings.fixtures()) {

@@ -33,6 +33,7 @@ absl::StatusOr<v1::CreateModalModelRequest> ResolveRequest(
 ///     wall_m <shortest decimal, metres>   (only where it is above zero)
 ///     accuracy <shortest decimal>         (only where it is above zero)
 ///     budget <seconds> <GiB>              (only where one is above zero)
+///     keep <integer>                      (only where it is above zero)
 ///     fix <FixtureText>                   (one for each, in alphabetical order, each once)
 std::string CanonicalText(const v1::CreateModalModelRequest& resolved);
 

@@ -9,6 +9,7 @@
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "proto/error_reason.h"
+#include "server/decomposition/coarse_request.h"
 #include "server/decomposition/decomposition_request.h"
 #include "server/decomposition/job_rules.h"
 #include "server/decomposition/worker_command.h"
@@ -57,6 +58,7 @@ absl::Status QueueCore::TakeUp() {
   MutexLock lock(&mutex_);
   experience_ = MemoryExperience(factor);
   for (JobRecord record : *records) {
+    if (active_.contains(record.digest)) continue;  // wanted by one before it
     if (record.damaged) {
       settings_.log(record.error.message());
       if (absl::Status status = database_.jobs().Put(record); !status.ok()) return status;
@@ -66,7 +68,8 @@ absl::Status QueueCore::TakeUp() {
     const absl::StatusOr<bool> satisfied =
         request.ok() ? IsSatisfied(std::nullopt, record.digest, *request) : request.status();
     if (satisfied.ok() && !*satisfied && record.start_count < kMostStarts) {
-      Enqueue(std::move(record), *std::move(request));
+      std::string coarse = StartCoarse(record.digest, *request, notices);
+      Enqueue(std::move(record), *std::move(request), std::move(coarse));
       continue;
     }
     if (satisfied.ok() && !*satisfied) {
@@ -136,6 +139,8 @@ absl::StatusOr<v1::Job> QueueCore::SubmitNew(const std::string& digest,
       return QueueFull(queued_.size(), mean_run_s_ / executor_->worker_count());
     }
   }
+  // Before the job itself is written down: whoever takes that up finds this one in the queue.
+  std::string coarse = *satisfied ? "" : StartCoarse(digest, request, notices);
   JobRecord record{.digest = digest,
                    .request = request.SerializeAsString(),
                    .label = request.label(),
@@ -145,9 +150,44 @@ absl::StatusOr<v1::Job> QueueCore::SubmitNew(const std::string& digest,
   if (known->has_value()) record.peak_bytes = (*known)->peak_bytes;
   if (const absl::Status status = database_.jobs().Put(record); !status.ok()) return status;
   if (*satisfied) return ToJob(record);
-  Enqueue(std::move(record), request);
+  Enqueue(std::move(record), request, std::move(coarse));
   StartWhatFits(notices);
   return FindJob(digest);
+}
+
+// The job of the coarse model that the request wants first, where it has not ended yet; empty: none
+// is to be waited for. What cannot be had coarsely is had finely only.
+std::string QueueCore::StartCoarse(const std::string& digest,
+                                   const v1::CreateModalModelRequest& request, Notices& notices) {
+  if (!request.coarse_first() || database_.models().Summary(digest).ok()) return "";
+  const auto mesh = database_.meshes().Find(request.mesh_digest());
+  const auto coarse = CoarseRequest(request, mesh.ok() ? mesh->byte_count : 0);
+  if (!coarse.has_value()) return "";
+  std::string coarse_digest = RequestDigest(*coarse);
+  if (!active_.contains(coarse_digest)) {
+    SubmitNew(coarse_digest, *coarse, notices).status().IgnoreError();
+  }
+  if (active_.contains(coarse_digest)) return coarse_digest;
+  database_.models().CopyIfAbsent(coarse_digest, digest, request.label()).IgnoreError();
+  return "";
+}
+
+// The coarse model's job has ended, however it did: those that waited for it have their turn.
+void QueueCore::ReleaseWaiting(const std::string& coarse, Notices& notices) {
+  for (auto& [digest, active] : active_) {
+    if (active.waits_for != coarse) continue;
+    active.waits_for.clear();
+    queued_.insert(PlaceOf(active));
+    // Where there is none, nothing can be copied; the wait is over all the same.
+    database_.models().CopyIfAbsent(coarse, digest, active.record.label).IgnoreError();
+    active.coarse_ready = HasCoarse(digest, active.request);
+    notices.push_back(Announce(active));
+  }
+}
+
+bool QueueCore::HasCoarse(const std::string& digest, const v1::CreateModalModelRequest& request) {
+  const absl::StatusOr<ModelSummary> model = database_.models().Summary(digest);
+  return model.ok() && IsCoarseOf(model->header, request);
 }
 
 // A waiting or running job is told to go as far as the farthest request wants.
@@ -177,6 +217,7 @@ absl::StatusOr<bool> QueueCore::IsSatisfied(const std::optional<JobRecord>& reco
   const absl::StatusOr<ModelSummary> model = database_.models().Summary(digest);
   if (absl::IsNotFound(model.status()) || absl::IsDataLoss(model.status())) return false;
   if (!model.ok()) return model.status();
+  if (IsCoarseOf(model->header, request)) return false;
   const double wanted = WantedEigenvalue(request) * (1 - kRelativeTolerance);
   if (model->header.complete_to_eigenvalue() >= wanted) return true;
   if (!record.has_value() || record->state != v1::JOB_STATE_SUCCEEDED) return false;
@@ -209,7 +250,8 @@ bool QueueCore::ComputeAgain(const std::string& digest, Notices& notices) {
   return true;
 }
 
-void QueueCore::Enqueue(JobRecord record, v1::CreateModalModelRequest request) {
+void QueueCore::Enqueue(JobRecord record, v1::CreateModalModelRequest request,
+                        std::string waits_for) {
   const std::string digest = record.digest;
   record.state = v1::JOB_STATE_QUEUED;
   Active active;
@@ -219,12 +261,14 @@ void QueueCore::Enqueue(JobRecord record, v1::CreateModalModelRequest request) {
       record.peak_bytes > 0 ? record.peak_bytes : experience_.Corrected(active.guess_bytes);
   active.record = std::move(record);
   active.request = std::move(request);
+  active.waits_for = std::move(waits_for);
+  active.coarse_ready = HasCoarse(digest, active.request);
   Requeue(active_.emplace(digest, std::move(active)).first->second);
 }
 
 void QueueCore::Requeue(Active& active) {
   active.number = ++last_number_;
-  queued_.insert(PlaceOf(active));
+  if (active.waits_for.empty()) queued_.insert(PlaceOf(active));
 }
 
 QueueCore::Place QueueCore::PlaceOf(const Active& active) {
@@ -307,6 +351,7 @@ void QueueCore::OnEnd(const std::string& digest, const Outcome& outcome) {
       notices.push_back(Announce(active));
     } else {
       notices.push_back(Finish(active, result));
+      ReleaseWaiting(digest, notices);
     }
     StartWhatFits(notices);
   }
@@ -387,7 +432,7 @@ absl::StatusOr<DecompositionJobPage> QueueCore::List(int page_size, const std::s
 }
 
 absl::StatusOr<v1::Job> QueueCore::Cancel(const std::string& digest) {
-  Notice notice;
+  Notices notices;
   absl::StatusOr<v1::Job> job;
   {
     MutexLock lock(&mutex_);
@@ -403,16 +448,18 @@ absl::StatusOr<v1::Job> QueueCore::Cancel(const std::string& digest) {
     active.again = false;
     if (active.running.has_value()) return ActiveJob(active);
     job = ToJob(active.record);
-    notice = {std::move(active.watchers), *job, ++version_};
+    notices.push_back({std::move(active.watchers), *job, ++version_});
     queued_.erase(PlaceOf(active));
     active_.erase(found);
+    ReleaseWaiting(digest, notices);
+    StartWhatFits(notices);
   }
-  notice.Tell();
+  TellAll(notices);
   return job;
 }
 
 absl::Status QueueCore::DeleteModel(const std::string& digest) {
-  Notice notice;
+  Notices notices;
   {
     MutexLock lock(&mutex_);
     if (absl::Status status = database_.models().Delete(digest); !status.ok()) return status;
@@ -426,11 +473,13 @@ absl::Status QueueCore::DeleteModel(const std::string& digest) {
       if (!stopping_) executor_->Cancel(digest);
       return absl::OkStatus();
     }
-    notice = {std::move(active.watchers), ToJob(active.record), ++version_};
+    notices.push_back({std::move(active.watchers), ToJob(active.record), ++version_});
     queued_.erase(PlaceOf(active));
     active_.erase(found);
+    ReleaseWaiting(digest, notices);
+    StartWhatFits(notices);
   }
-  notice.Tell();
+  TellAll(notices);
   return absl::OkStatus();
 }
 
@@ -463,6 +512,7 @@ v1::Job QueueCore::ActiveJob(const Active& active) const {
   v1::Job job = ToJob(active.record);
   job.set_state(active.running.has_value() ? v1::JOB_STATE_RUNNING : v1::JOB_STATE_QUEUED);
   job.set_memory_bytes(std::max(active.record.peak_bytes, active.estimate_bytes));
+  job.set_coarse_ready(active.coarse_ready);
   if (active.running.has_value()) *job.mutable_progress() = active.progress;
   return job;
 }

@@ -60,6 +60,8 @@ class QueueCore {
     v1::CreateModalModelRequest request;                 // the farthest reaching one so far
     std::optional<v1::CreateModalModelRequest> running;  // as it was started
     v1::Progress progress;
+    std::string waits_for;        // digest of the coarse model's job, until that has ended
+    bool coarse_ready = false;    // a coarse model is there under the name
     bool again = false;           // asked for anew after a cancel: to be started once more
     bool deleted = false;         // its result is no longer wanted
     uint64_t number = 0;          // among those that wait
@@ -81,7 +83,12 @@ class QueueCore {
   absl::StatusOr<bool> IsSatisfied(const std::optional<JobRecord>& record,
                                    const std::string& digest,
                                    const v1::CreateModalModelRequest& request);
-  void Enqueue(JobRecord record, v1::CreateModalModelRequest request)
+  std::string StartCoarse(const std::string& digest, const v1::CreateModalModelRequest& request,
+                          Notices& notices) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void ReleaseWaiting(const std::string& coarse, Notices& notices)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  bool HasCoarse(const std::string& digest, const v1::CreateModalModelRequest& request);
+  void Enqueue(JobRecord record, v1::CreateModalModelRequest request, std::string waits_for = {})
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void OnQuarantine(const std::string& digest, const absl::Status& why);
   bool ComputeAgain(const std::string& digest, Notices& notices)

@@ -49,6 +49,9 @@ std::vector<std::string> WorkerCommand(const v1::CreateModalModelRequest& resolv
     command.push_back(absl::StrCat("--budget=", ShortestDecimal(mesh.budget_s()), ":",
                                    ShortestDecimal(mesh.budget_gib())));
   }
+  if (settings.keep_mode_count() > 0) {
+    command.push_back(absl::StrCat("--keep=", settings.keep_mode_count()));
+  }
   for (const v1::Fixture& fixture : settings.fixtures()) {
     command.push_back(absl::StrCat("--fix=", FixtureText(fixture).value_or("")));
   }

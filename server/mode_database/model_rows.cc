@@ -188,6 +188,21 @@ absl::Status InsertModel(SqliteConnection& connection, ModelFileReader& records,
   return status;
 }
 
+absl::Status InsertCopy(SqliteConnection& connection, const std::string& digest,
+                        ModelSummary& summary) {
+  const int64_t from = summary.revision;
+  summary.digest = digest;
+  summary.pinned = false;
+  summary.sounded_unix_ms = 0;
+  summary.tags.clear();
+  if (absl::Status status = InsertHeader(connection, summary); !status.ok()) return status;
+  summary.revision = connection.last_row_id();
+  return connection.Run(
+      "INSERT INTO model_chunks (revision, number, array, byte_offset, xxh3, data) "
+      "SELECT ?, number, array, byte_offset, xxh3, data FROM model_chunks WHERE revision = ?",
+      {summary.revision, from});
+}
+
 absl::Status DeleteModelRows(SqliteConnection& connection, const std::string& digest) {
   absl::Status status = connection.Run("DELETE FROM models WHERE digest = ?", {digest});
   if (status.ok() && connection.changed_row_count() == 0) return ModelNotFound(digest);

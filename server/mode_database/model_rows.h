@@ -42,6 +42,11 @@ absl::StatusOr<ModalModel> ReadModel(SqliteConnection& connection, const ModelSu
 absl::Status InsertModel(SqliteConnection& connection, ModelFileReader& records,
                          ModelSummary& summary);
 
+/// Inserts the model that `summary` describes once more under another digest, with all its chunks
+/// as they are. Changes what is of the revision in `summary`.
+absl::Status InsertCopy(SqliteConnection& connection, const std::string& digest,
+                        ModelSummary& summary);
+
 /// Deletes model, tags and job. Errors: NotFound (MODAL_MODEL_NOT_FOUND).
 absl::Status DeleteModelRows(SqliteConnection& connection, const std::string& digest);
 

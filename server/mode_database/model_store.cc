@@ -180,6 +180,20 @@ absl::StatusOr<ModelSummary> ModelStore::PutFile(const std::string& digest,
   return Store(*std::move(records), Named(digest, label));
 }
 
+absl::Status ModelStore::CopyIfAbsent(const std::string& from, const std::string& to,
+                                      const std::string& label) {
+  if (const absl::Status status = CheckName(to); !status.ok()) return status;
+  return database_->Write([&](SqliteConnection& connection) {
+    absl::StatusOr<ModelSummary> summary = SelectModel(connection, from);
+    if (!summary.ok()) return summary.status();
+    const absl::StatusOr<ModelSummary> there = SelectModel(connection, to);
+    if (!absl::IsNotFound(there.status())) return there.status();
+    summary->label = label.substr(0, kMaxLabelBytes);
+    summary->created_unix_ms = clock_->UnixMs();
+    return InsertCopy(connection, to, *summary);
+  });
+}
+
 absl::StatusOr<ModelImport> ModelStore::Import(const std::string& digest,
                                                const std::string& label) {
   if (const absl::Status status = CheckName(digest); !digest.empty() && !status.ok()) return status;

@@ -145,6 +145,12 @@ class ModelStore {
   absl::StatusOr<ModelSummary> PutFile(const std::string& digest, const std::string& label,
                                        const std::filesystem::path& file);
 
+  /// Stores the model of `from` under `to` as well, with its hashes as they are, unless there is
+  /// one of that name, damaged or not; one transaction, durable on return. Errors: NotFound
+  /// (MODAL_MODEL_NOT_FOUND), DataLoss (MODAL_MODEL_CORRUPT).
+  absl::Status CopyIfAbsent(const std::string& from, const std::string& to,
+                            const std::string& label);
+
   /// An empty `digest`: that of the records, as they stand in a file.
   /// Errors: InvalidArgument (INVALID_NAME: not a digest).
   absl::StatusOr<ModelImport> Import(const std::string& digest, const std::string& label);

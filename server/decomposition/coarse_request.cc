@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/decomposition/coarse_request.h"
+
+#include <algorithm>
+#include <array>
+#include <string>
+
+#include "absl/strings/str_cat.h"
+#include "server/decomposition/memory_estimate.h"
+
+namespace carillon {
+namespace {
+
+constexpr std::array kSurfaceFormats = {"obj", "ply", "stl", "off"};
+constexpr uint32_t kCoarseCornerCount = 300;
+/// Corners beyond which quadratic elements are not quick.
+constexpr double kFineSurface = 1500;
+constexpr size_t kMaxLabelBytes = 200;
+
+std::string CoarseLabel(const std::string& label) {
+  const std::string coarse = absl::StrCat(label, " (coarse)");
+  return label.empty() || coarse.size() > kMaxLabelBytes ? "" : coarse;
+}
+
+}  // namespace
+
+std::optional<v1::CreateModalModelRequest> CoarseRequest(
+    const v1::CreateModalModelRequest& resolved, uint64_t mesh_bytes) {
+  if (!resolved.coarse_first()) return std::nullopt;
+  const auto* format = std::ranges::find(kSurfaceFormats, resolved.mesh_format());
+  if (format == kSurfaceFormats.end()) return std::nullopt;
+  const uint32_t asked = resolved.settings().mesh().target_node_count();
+  if (asked > 0 && asked <= kCoarseCornerCount) return std::nullopt;
+  v1::CreateModalModelRequest coarse = resolved;
+  coarse.set_coarse_first(false);
+  coarse.set_label(CoarseLabel(resolved.label()));
+  v1::MeshSettings& mesh = *coarse.mutable_settings()->mutable_mesh();
+  mesh.clear_accuracy();
+  mesh.clear_budget_s();
+  mesh.clear_budget_gib();
+  mesh.clear_target_node_count();
+  // No mesh has fewer nodes than its surface.
+  coarse.mutable_settings()->set_element(v1::ELEMENT_LINEAR);
+  const bool fine_surface = GuessNodeCount(coarse, mesh_bytes) > kFineSurface;
+  if (!fine_surface) coarse.mutable_settings()->set_element(resolved.settings().element());
+  if (fine_surface && resolved.settings().element() == v1::ELEMENT_LINEAR) return std::nullopt;
+  mesh.set_target_node_count(kCoarseCornerCount);
+  return coarse;
+}
+
+bool IsCoarseOf(const v1::ModalModelHeader& header, const v1::CreateModalModelRequest& resolved) {
+  const auto count = [](const v1::DecompositionSettings& settings) {
+    return settings.mesh().target_node_count();
+  };
+  return count(header.settings()) == kCoarseCornerCount &&
+         count(resolved.settings()) != kCoarseCornerCount;
+}
+
+}  // namespace carillon
