@@ -136,7 +136,8 @@ absl::StatusOr<std::unique_ptr<DecompositionQueue>> MakeQueue(const Options& opt
 
 OutputSettings OutputSettingsOf(const Options& options) {
   return {.format = {.sample_rate_hz = options.sample_rate_hz,
-                     .block_frame_count = options.block_frame_count},
+                     .block_frame_count = options.block_frame_count,
+                     .channel_count = options.channel_count},
           .look_ahead_block_count = options.look_ahead_block_count,
           .device = options.audio_device};
 }

@@ -78,6 +78,7 @@ absl::Status ReadKey(const std::string& key, const toml::node& node, Options& op
   if (key == "listen") return ReadAddresses(node, options.addresses);
   if (key == "audio_device") return ReadValue(key, node, options.audio_device);
   if (key == "sample_rate") return ReadValue(key, node, options.sample_rate_hz);
+  if (key == "channels") return ReadValue(key, node, options.channel_count);
   if (key == "block_frames") return ReadValue(key, node, options.block_frame_count);
   if (key == "look_ahead_blocks") return ReadValue(key, node, options.look_ahead_block_count);
   if (key == "workers") return ReadValue(key, node, options.worker_count);
@@ -131,6 +132,7 @@ absl::Status CheckRange(absl::string_view what, T value, std::type_identity_t<T>
 absl::Status Check(const Options& options) {
   for (const absl::Status& status :
        {CheckRange("--sample-rate", options.sample_rate_hz, 8000, 192000),
+        CheckRange("--channels", options.channel_count, 1, 2),
         CheckRange("--block-frames", options.block_frame_count, 16, 256),
         CheckRange("--look-ahead-blocks", options.look_ahead_block_count, 2, 64),
         CheckRange("--workers", options.worker_count, 0, 1024),
@@ -164,6 +166,7 @@ void AddFlags(CLI::App& app, Options& options) {
                  "auto, portaudio[:NAME], null or file:PATH")
       ->capture_default_str();
   app.add_option("--sample-rate", options.sample_rate_hz, "frames a second")->capture_default_str();
+  app.add_option("--channels", options.channel_count, "1: mono, 2: stereo")->capture_default_str();
   app.add_option("--block-frames", options.block_frame_count, "frames rendered at a time")
       ->capture_default_str();
   app.add_option("--look-ahead-blocks", options.look_ahead_block_count,

@@ -17,6 +17,7 @@ struct Options {
   uint32_t sample_rate_hz = 48000;
   uint32_t block_frame_count = 128;
   uint32_t look_ahead_block_count = 8;
+  uint32_t channel_count = 1;
   int worker_count = 0;           ///< 0: half of the processors
   int64_t memory_budget_mib = 0;  ///< of all decompositions; 0: half of the machine's
   int64_t job_memory_mib = 0;     ///< of one; 0: the budget

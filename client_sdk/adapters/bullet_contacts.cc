@@ -40,36 +40,54 @@ double TravelSpeed(const btManifoldPoint& point, const btCollisionObject& a,
 void BulletContacts::Read(btDispatcher& dispatcher, v1::ContactStep& step) {
   for (int i = 0; i < dispatcher.getNumManifolds(); ++i) {
     const btPersistentManifold& manifold = *dispatcher.getManifoldByIndexInternal(i);
-    const btCollisionObject& a = *manifold.getBody0();
-    const btCollisionObject& b = *manifold.getBody1();
     for (int j = 0; j < manifold.getNumContacts(); ++j) {
       const btManifoldPoint& point = manifold.getContactPoint(j);
       if (point.m_appliedImpulse <= 0) continue;
       const btVector3 impulse = ImpulseOnA(point);
-      const double speed = TravelSpeed(point, a, b);
-      Append(a, b, point.m_localPointA, impulse, speed, step);
-      Append(b, a, point.m_localPointB, -impulse, speed, step);
+      const Side a{*manifold.getBody0(), point.m_localPointA, impulse};
+      const Side b{*manifold.getBody1(), point.m_localPointB, -impulse};
+      Append(a, b, TravelSpeed(point, a.body, b.body), step);
     }
   }
 }
 
-void BulletContacts::Append(const btCollisionObject& body, const btCollisionObject& other,
-                            const btVector3& local_point, const btVector3& impulse,
-                            double travel_speed_m_per_s, v1::ContactStep& step) {
-  const auto handle = handles_.find(&body);
-  if (handle == handles_.end()) return;
+void BulletContacts::Append(const Side& a, const Side& b, double travel_speed_m_per_s,
+                            v1::ContactStep& step) {
+  const auto heard_a = handles_.find(&a.body), heard_b = handles_.find(&b.body);
+  const bool has_a = heard_a != handles_.end(), has_b = heard_b != handles_.end();
+  if (!has_a && !has_b) return;
+  // Always the same of a pair comes first, however Bullet orders them.
+  if (!has_a || (has_b && heard_b->second < heard_a->second)) {
+    return Append(b, a, travel_speed_m_per_s, step);
+  }
   const auto next = static_cast<uint32_t>(partners_.size());
   v1::EngineContact& contact = *step.add_contacts();
-  contact.set_object(handle->second);
-  contact.set_partner(partners_.try_emplace(&other, next).first->second);
-  Set(*contact.mutable_point_m(), local_point);
-  Set(*contact.mutable_impulse_newton_seconds(),
-      body.getWorldTransform().getBasis().transpose() * impulse);
+  contact.set_object(heard_a->second);
+  contact.set_partner(partners_.try_emplace(&b.body, next).first->second);
+  Set(*contact.mutable_point_m(), a.local_point);
+  const btMatrix3x3& turned = a.body.getWorldTransform().getBasis();
+  Set(*contact.mutable_impulse_newton_seconds(), turned.transpose() * a.impulse);
   contact.set_duration_s(settings_.duration_s);
   v1::Roughness& roughness = *contact.mutable_roughness();
   roughness.set_travel_speed_m_per_s(travel_speed_m_per_s);
   roughness.set_depth(settings_.roughness_depth);
   roughness.set_grain_m(settings_.grain_m);
+  if (!has_b) return;
+  v1::SecondObject& second = *contact.mutable_second();
+  second.set_object(heard_b->second);
+  Set(*second.mutable_point_m(), b.local_point);
+  btQuaternion rotation;
+  (b.body.getWorldTransform().getBasis().transpose() * turned).getRotation(rotation);
+  Set(*second.mutable_rotation(), rotation);
+}
+
+void BulletContacts::ReadPoses(v1::ContactStep& step) const {
+  for (const auto& [body, handle] : handles_) {
+    v1::ObjectPose& pose = *step.add_poses();
+    pose.set_object(handle);
+    Set(*pose.mutable_pose()->mutable_position_m(), body->getWorldTransform().getOrigin());
+    Set(*pose.mutable_pose()->mutable_orientation(), body->getWorldTransform().getRotation());
+  }
 }
 
 }  // namespace carillon::adapters

@@ -26,13 +26,21 @@ class BulletContacts {
   void AddObject(const btCollisionObject& body, uint32_t handle) { handles_[&body] = handle; }
 
   /// Appends the contacts of the substep that has just been solved; call it from the world's
-  /// internal tick callback, with a ContactStep for each substep.
+  /// internal tick callback, with a ContactStep for each substep. A contact of two objects is one
+  /// row with a second object.
   void Read(btDispatcher& dispatcher, v1::ContactStep& step);
 
+  /// Appends where the objects are; heard in a scene that has a carillon.v1.Hearing.
+  void ReadPoses(v1::ContactStep& step) const;
+
  private:
-  void Append(const btCollisionObject& body, const btCollisionObject& other,
-              const btVector3& local_point, const btVector3& impulse, double travel_speed_m_per_s,
-              v1::ContactStep& step);
+  /// A body of a contact, with where and what it feels, the impulse in world coordinates.
+  struct Side {
+    const btCollisionObject& body;
+    btVector3 local_point, impulse;
+  };
+
+  void Append(const Side& a, const Side& b, double travel_speed_m_per_s, v1::ContactStep& step);
 
   Settings settings_;
   std::map<const btCollisionObject*, uint32_t> handles_;

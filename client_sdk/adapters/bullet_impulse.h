@@ -13,6 +13,13 @@ inline void Set(v1::Vec3& target, const btVector3& source) {
   target.set_z(source.z());
 }
 
+inline void Set(v1::Quaternion& target, const btQuaternion& source) {
+  target.set_w(source.w());
+  target.set_x(source.x());
+  target.set_y(source.y());
+  target.set_z(source.z());
+}
+
 /// The impulse of one substep on body A, N s, in world coordinates: normal and friction.
 inline btVector3 ImpulseOnA(const btManifoldPoint& point) {
   btVector3 impulse = point.m_normalWorldOnB * point.m_appliedImpulse +

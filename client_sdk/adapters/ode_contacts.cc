@@ -26,6 +26,20 @@ void Set(v1::Vec3& target, const Vector& source) {
   target.set_z(source[2]);
 }
 
+void Set(v1::Quaternion& target, const dReal* source) {
+  target.set_w(source[0]);
+  target.set_x(source[1]);
+  target.set_y(source[2]);
+  target.set_z(source[3]);
+}
+
+/// From the frame of `from` into that of `to`.
+void SetRotation(dBodyID from, dBodyID to, v1::Quaternion& rotation) {
+  dQuaternion product;
+  dQMultiply1(product, dBodyGetQuaternion(to), dBodyGetQuaternion(from));  // inverse of the first
+  Set(rotation, product);
+}
+
 }  // namespace
 
 void OdeContacts::Add(dJointID joint, const dContactGeom& geometry) {
@@ -45,26 +59,30 @@ void OdeContacts::Add(dJointID joint, const dContactGeom& geometry) {
 
 void OdeContacts::Read(double step_s, v1::ContactStep& step) {
   for (const Contact& contact : contacts_) {
-    Append(contact, 0, step_s, step);
-    Append(contact, 1, step_s, step);
+    const auto heard_0 = handles_.find(contact.bodies[0]);
+    const auto heard_1 = handles_.find(contact.bodies[1]);
+    if (heard_0 == handles_.end() && heard_1 == handles_.end()) continue;
+    // Always the same of a pair comes first, however the joint orders them.
+    const bool second_first = heard_0 == handles_.end() ||
+                              (heard_1 != handles_.end() && heard_1->second < heard_0->second);
+    Append(contact, second_first ? 1 : 0, step_s, step);
   }
   contacts_.clear();
 }
 
-void OdeContacts::Append(const Contact& contact, int side, double step_s, v1::ContactStep& step) {
-  const auto index = static_cast<size_t>(side);
-  const dBodyID body = contact.bodies[index];
-  const auto handle = handles_.find(body);
+void OdeContacts::Append(const Contact& contact, size_t side, double step_s,
+                         v1::ContactStep& step) {
+  const dBodyID body = contact.bodies[side], other = contact.bodies[1 - side];
   const Vector force = ToArray(side == 0 ? contact.feedback.f1 : contact.feedback.f2);
-  if (body == nullptr || handle == handles_.end() || Dot(force, force) == 0) return;
+  if (Dot(force, force) == 0) return;
   dVector3 local_force;
   dBodyVectorFromWorld(body, static_cast<dReal>(force[0]), static_cast<dReal>(force[1]),
                        static_cast<dReal>(force[2]), local_force);
   v1::EngineContact& row = *step.add_contacts();
-  row.set_object(handle->second);
+  row.set_object(handles_.at(body));
   const auto next = static_cast<uint32_t>(partners_.size());
-  row.set_partner(partners_.try_emplace(contact.bodies[1 - index], next).first->second);
-  Set(*row.mutable_point_m(), contact.local_point[index]);
+  row.set_partner(partners_.try_emplace(other, next).first->second);
+  Set(*row.mutable_point_m(), contact.local_point[side]);
   Vector impulse = ToArray(local_force);
   for (double& component : impulse) component *= step_s;
   Set(*row.mutable_impulse_newton_seconds(), impulse);
@@ -73,6 +91,21 @@ void OdeContacts::Append(const Contact& contact, int side, double step_s, v1::Co
   roughness.set_travel_speed_m_per_s(TravelSpeed(contact));
   roughness.set_depth(settings_.roughness_depth);
   roughness.set_grain_m(settings_.grain_m);
+  if (const auto heard = handles_.find(other); heard != handles_.end()) {
+    v1::SecondObject& second = *row.mutable_second();
+    second.set_object(heard->second);
+    Set(*second.mutable_point_m(), contact.local_point[1 - side]);
+    SetRotation(body, other, *second.mutable_rotation());
+  }
+}
+
+void OdeContacts::ReadPoses(v1::ContactStep& step) const {
+  for (const auto& [body, handle] : handles_) {
+    v1::ObjectPose& pose = *step.add_poses();
+    pose.set_object(handle);
+    Set(*pose.mutable_pose()->mutable_position_m(), ToArray(dBodyGetPosition(body)));
+    Set(*pose.mutable_pose()->mutable_orientation(), dBodyGetQuaternion(body));
+  }
 }
 
 /// As BulletContacts has it: the slip, and for a roll omega R.

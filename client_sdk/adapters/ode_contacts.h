@@ -32,8 +32,12 @@ class OdeContacts {
   void Add(dJointID joint, const dContactGeom& geometry);
 
   /// Appends the contacts of the step of `step_s` that has just been solved, and forgets them: call
-  /// it after dWorldStep or dWorldQuickStep, before the joints go.
+  /// it after dWorldStep or dWorldQuickStep, before the joints go. A contact of two objects is one
+  /// row with a second object.
   void Read(double step_s, v1::ContactStep& step);
+
+  /// Appends where the objects are; heard in a scene that has a carillon.v1.Hearing.
+  void ReadPoses(v1::ContactStep& step) const;
 
  private:
   using Vector = std::array<double, 3>;
@@ -44,7 +48,7 @@ class OdeContacts {
     dJointFeedback feedback{};
   };
 
-  void Append(const Contact& contact, int side, double step_s, v1::ContactStep& step);
+  void Append(const Contact& contact, size_t side, double step_s, v1::ContactStep& step);
   static double TravelSpeed(const Contact& contact);
 
   Settings settings_;

@@ -89,6 +89,7 @@ struct RenderOptions {
   std::string trace;
   std::string out;
   uint32_t sample_rate_hz = 48000;
+  uint32_t channel_count = 1;
   double tail_s = 0;
 };
 

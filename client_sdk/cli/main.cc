@@ -115,6 +115,9 @@ void AddRender(CLI::App& app, Program& program) {
   render.add_option("--out", options->out, "WAV file")->required();
   render.add_option("--sample-rate", options->sample_rate_hz, "frames a second")
       ->capture_default_str();
+  render.add_option("--channels", options->channel_count, "1: mono, 2: stereo")
+      ->check(CLI::Range(1, 2))
+      ->capture_default_str();
   render.add_option("--tail", options->tail_s,
                     "seconds after the last contact [until it is silent]");
   render.callback([&program, options] {

@@ -33,6 +33,7 @@ absl::Status Render(const client::Client& daemon, const RenderOptions& options, 
   if (!trace.ok()) return trace.status();
   v1::RenderSettings settings;
   settings.set_sample_rate_hz(options.sample_rate_hz);
+  settings.set_channel_count(options.channel_count);
   settings.set_tail_s(options.tail_s);
 
   std::optional<WaveFile> file;

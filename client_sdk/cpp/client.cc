@@ -143,9 +143,9 @@ absl::StatusOr<v1::Job> Client::CancelJob(const std::string& name) const {
   return std::move(*response->mutable_job());
 }
 
-absl::StatusOr<std::string> Client::CreateScene() const {
-  auto response = Call(stubs_->scenes, stubs_->server, &v1::SceneService::Stub::CreateScene,
-                       v1::CreateSceneRequest());
+absl::StatusOr<std::string> Client::CreateScene(const v1::CreateSceneRequest& request) const {
+  auto response =
+      Call(stubs_->scenes, stubs_->server, &v1::SceneService::Stub::CreateScene, request);
   if (!response.ok()) return response.status();
   return response->name();
 }
@@ -173,6 +173,11 @@ absl::StatusOr<v1::SoundingObject> Client::UpdateObject(
 absl::Status Client::RemoveObject(const std::string& name) const {
   return Call(stubs_->scenes, stubs_->server, &v1::SceneService::Stub::RemoveObject,
               Named<v1::RemoveObjectRequest>(name))
+      .status();
+}
+
+absl::Status Client::UpdateListener(const v1::UpdateListenerRequest& request) const {
+  return Call(stubs_->scenes, stubs_->server, &v1::SceneService::Stub::UpdateListener, request)
       .status();
 }
 

@@ -86,11 +86,12 @@ class Client {
                                    const std::function<void(const v1::Job&)>& on_change) const;
 
   /// Returns "scenes/{id}".
-  absl::StatusOr<std::string> CreateScene() const;
+  absl::StatusOr<std::string> CreateScene(const v1::CreateSceneRequest& request = {}) const;
   absl::Status DeleteScene(const std::string& name) const;
   absl::StatusOr<v1::SoundingObject> AddObject(const v1::AddObjectRequest& request) const;
   absl::StatusOr<v1::SoundingObject> UpdateObject(const v1::UpdateObjectRequest& request) const;
   absl::Status RemoveObject(const std::string& name) const;
+  absl::Status UpdateListener(const v1::UpdateListenerRequest& request) const;
 
   /// Opens a contact stream and waits for the daemon's first answer.
   absl::StatusOr<std::unique_ptr<ContactStream>> StreamContacts(

@@ -18,7 +18,7 @@ import grpc
 from carillon.v1 import (
     audio_service_pb2, audio_service_pb2_grpc, contact_pb2, contact_service_pb2,
     contact_service_pb2_grpc, decomposition_pb2, decomposition_service_pb2,
-    decomposition_service_pb2_grpc, error_pb2, material_pb2, modal_model_service_pb2,
+    decomposition_service_pb2_grpc, error_pb2, hearing_pb2, material_pb2, modal_model_service_pb2,
     modal_model_service_pb2_grpc, scene_service_pb2, scene_service_pb2_grpc)
 
 PIECE_BYTES = 1 << 20
@@ -147,10 +147,15 @@ def show_progress(job):
 
 def strike_and_listen(client, model, options):
     """Puts the model into a scene, strikes it, hears it."""
-    scene = client.scenes.CreateScene(scene_service_pb2.CreateSceneRequest()).name
+    # Without `at` it is heard as if the listener were a metre away, whatever the direction.
+    hearing = hearing_pb2.Hearing(distance_gain=True, propagation_delay=True, panning=True)
+    pose = contact_pb2.Pose(position_m=contact_pb2.Vec3(**dict(zip("xyz", options.at or ()))))
+    scene = client.scenes.CreateScene(scene_service_pb2.CreateSceneRequest(
+        hearing=hearing if options.at else None)).name
     try:
         added = client.scenes.AddObject(scene_service_pb2.AddObjectRequest(
-            scene=scene, modal_model=model, material=material_pb2.Material(preset=options.material)))
+            scene=scene, modal_model=model, material=material_pb2.Material(preset=options.material),
+            pose=pose if options.at else None))
         impulse = contact_pb2.Impulse(
             object=added.object.handle, point_m=contact_pb2.Vec3(**dict(zip("xyz", options.point))),
             impulse_newton_seconds=contact_pb2.Vec3(**dict(zip("xyz", options.impulse))),
@@ -196,6 +201,8 @@ def main():
     parser.add_argument("--point", type=vector, required=True, help="where: x,y,z in m")
     parser.add_argument("--impulse", type=vector, required=True, help="how hard: x,y,z in N s")
     parser.add_argument("--duration", type=float, default=0.0003, help="of the contact, s")
+    parser.add_argument("--at", type=vector, help="where it is: x,y,z in m from a listener who looks "
+                        "along -z; to the right of him is +x")
     parser.add_argument("--material", default="chime_aluminum")
     parser.add_argument("--seconds", type=float, default=2)
     parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("strike.wav"))

@@ -27,7 +27,7 @@ grpc::ServerUnaryReactor* AudioService::GetMixer(grpc::CallbackServerContext* co
   response->set_version(version_);
   response->set_device(state.device);
   response->mutable_format()->set_sample_rate_hz(output_.format().sample_rate_hz);
-  response->mutable_format()->set_channel_count(1);
+  response->mutable_format()->set_channel_count(output_.format().channel_count);
   response->set_block_frame_count(output_.format().block_frame_count);
   response->set_output_latency_s(state.latency_s);
   response->set_frame_count(state.mixer.frame_count);

@@ -2,10 +2,13 @@
 #include "server/api/contact_conversion.h"
 
 #include <algorithm>
+#include <optional>
 #include <utility>
+#include <variant>
 
 #include "absl/strings/str_cat.h"
 #include "proto/error_reason.h"
+#include "server/api/pose_conversion.h"
 
 namespace carillon {
 namespace {
@@ -23,17 +26,32 @@ SurfacePoint ToSurfacePoint(const v1::SurfacePoint& point) {
 
 /// Where a row's contact acts.
 template <typename Row>
-absl::StatusOr<ContactImpulse> FromLocation(const Row& row) {
-  ContactImpulse contact;
-  if (row.has_point_m()) {
-    contact.location = ToArray(row.point_m());
-  } else if (row.has_surface_point()) {
-    contact.location = ToSurfacePoint(row.surface_point());
-  } else {
-    return Refusal(absl::StatusCode::kInvalidArgument, "LOCATION_MISSING",
-                   absl::StrCat("a contact on object ", row.object(),
-                                " has neither point_m nor surface_point"));
-  }
+absl::StatusOr<std::variant<Point, SurfacePoint>> FromLocation(const Row& row) {
+  if (row.has_point_m()) return ToArray(row.point_m());
+  if (row.has_surface_point()) return ToSurfacePoint(row.surface_point());
+  return Refusal(
+      absl::StatusCode::kInvalidArgument, "LOCATION_MISSING",
+      absl::StrCat("a contact on object ", row.object(), " has neither point_m nor surface_point"));
+}
+
+/// What all kinds of contacts have.
+struct CommonContact {
+  ContactImpulse impulse;
+  std::optional<SecondObject> second;
+};
+
+template <typename Row>
+absl::StatusOr<CommonContact> FromCommon(const Row& row, const v1::Vec3& vector) {
+  const auto location = FromLocation(row);
+  if (!location.ok()) return location.status();
+  CommonContact contact;
+  contact.impulse.location = *location;
+  contact.impulse.impulse_newton_seconds = ToArray(vector);
+  if (!row.has_second()) return contact;
+  const auto second = FromLocation(row.second());
+  if (!second.ok()) return second.status();
+  contact.second = {.handle = row.second().object(), .location = *second};
+  if (row.second().has_rotation()) contact.second->rotation = FromProto(row.second().rotation());
   return contact;
 }
 
@@ -54,32 +72,34 @@ Roughness FromProto(const v1::Roughness& proto) {
 }
 
 absl::StatusOr<ObjectImpulse> FromRow(const v1::Impulse& row) {
-  absl::StatusOr<ContactImpulse> contact = FromLocation(row);
+  absl::StatusOr<CommonContact> contact = FromCommon(row, row.impulse_newton_seconds());
   if (!contact.ok()) return contact.status();
-  contact->impulse_newton_seconds = ToArray(row.impulse_newton_seconds());
-  contact->duration_s = row.duration_s();
-  if (row.has_hertz()) contact->hertz = FromProto(row.hertz());
-  return ObjectImpulse{
-      .handle = row.object(), .time_offset_s = row.time_offset_s(), .impulse = *contact};
+  contact->impulse.duration_s = row.duration_s();
+  if (row.has_hertz()) contact->impulse.hertz = FromProto(row.hertz());
+  return ObjectImpulse{.handle = row.object(),
+                       .time_offset_s = row.time_offset_s(),
+                       .impulse = contact->impulse,
+                       .second = contact->second};
 }
 
 absl::StatusOr<ObjectForce> FromRow(const v1::SustainedContact& row) {
-  absl::StatusOr<ContactImpulse> contact = FromLocation(row);
+  const absl::StatusOr<CommonContact> contact = FromCommon(row, row.force_newtons());
   if (!contact.ok()) return contact.status();
-  contact->impulse_newton_seconds = ToArray(row.force_newtons());
-  return ObjectForce{
-      .handle = row.object(), .force = *contact, .roughness = FromProto(row.roughness())};
+  return ObjectForce{.handle = row.object(),
+                     .force = contact->impulse,
+                     .roughness = FromProto(row.roughness()),
+                     .second = contact->second};
 }
 
 absl::StatusOr<ObjectTouch> FromRow(const v1::EngineContact& row) {
-  absl::StatusOr<ContactImpulse> contact = FromLocation(row);
+  absl::StatusOr<CommonContact> contact = FromCommon(row, row.impulse_newton_seconds());
   if (!contact.ok()) return contact.status();
-  contact->impulse_newton_seconds = ToArray(row.impulse_newton_seconds());
-  contact->duration_s = row.duration_s();
+  contact->impulse.duration_s = row.duration_s();
   return ObjectTouch{.handle = row.object(),
                      .partner = row.partner(),
-                     .impulse = *contact,
-                     .roughness = FromProto(row.roughness())};
+                     .impulse = contact->impulse,
+                     .roughness = FromProto(row.roughness()),
+                     .second = contact->second};
 }
 
 template <typename Rows, typename Use>
@@ -88,7 +108,7 @@ void ForEachRow(const Rows& rows, const Use& use, const ContactSink& sink) {
     if (const auto contact = FromRow(row); contact.ok()) {
       use(*contact);
     } else {
-      sink.reject(1, contact.status());
+      sink.reject(row.has_second() ? 2 : 1, contact.status());
     }
   }
 }
@@ -119,6 +139,8 @@ absl::Status CheckColumns(const v1::ImpulseColumns& columns) {
 }  // namespace
 
 void ReadStep(const v1::ContactStep& step, const ContactSink& sink) {
+  for (const v1::ObjectPose& row : step.poses()) sink.move(row.object(), FromProto(row.pose()));
+  if (step.has_listener()) sink.move_listener(FromProto(step.listener()));
   ForEachRow(step.impulses(), sink.strike, sink);
   const v1::ImpulseColumns& columns = step.columns();
   if (absl::Status status = CheckColumns(columns); !status.ok()) {

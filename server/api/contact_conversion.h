@@ -12,6 +12,8 @@ namespace carillon {
 
 /// Takes what a step holds.
 struct ContactSink {
+  absl::FunctionRef<void(uint32_t handle, const Pose&)> move;
+  absl::FunctionRef<void(const Pose&)> move_listener;
   absl::FunctionRef<void(const ObjectImpulse&)> strike;
   absl::FunctionRef<void(const ObjectForce&)> hold;
   absl::FunctionRef<void(const ObjectTouch&)> touch;
@@ -19,7 +21,7 @@ struct ContactSink {
   absl::FunctionRef<void(uint64_t, absl::Status)> reject;
 };
 
-/// Gives `sink` every contact of a step: impulses, rows first, then forces, then touches.
+/// Gives `sink` all that a step holds: poses, impulses, rows first, then forces, then touches.
 void ReadStep(const v1::ContactStep& step, const ContactSink& sink);
 
 }  // namespace carillon

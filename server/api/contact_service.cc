@@ -88,13 +88,15 @@ class ContactReactor final
                      "the first request of a contact stream must be start");
     }
     if (absl::Status status = stream_->BeginStep(step.time_s()); !status.ok()) return status;
-    ReadStep(step, {.strike = [this](const ObjectImpulse& impulse) { stream_->Strike(impulse); },
-                    .hold = [this](const ObjectForce& force) { stream_->Hold(force); },
-                    .touch = [this](const ObjectTouch& touch) { stream_->Touch(touch); },
-                    .reject =
-                        [this](uint64_t count, absl::Status reason) {
-                          stream_->Reject(count, std::move(reason));
-                        }});
+    ReadStep(
+        step,
+        {.move = [this](uint32_t handle, const Pose& pose) { stream_->Move(handle, pose); },
+         .move_listener = [this](const Pose& pose) { stream_->MoveListener(pose); },
+         .strike = [this](const ObjectImpulse& impulse) { stream_->Strike(impulse); },
+         .hold = [this](const ObjectForce& force) { stream_->Hold(force); },
+         .touch = [this](const ObjectTouch& touch) { stream_->Touch(touch); },
+         .reject = [this](uint64_t count,
+                          absl::Status reason) { stream_->Reject(count, std::move(reason)); }});
     stream_->EndStep();
     const bool first = stream_->counts().step_count == 1;
     if (first || daemon_.clock.Monotonic() >= answer_due_) Answer();

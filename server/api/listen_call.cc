@@ -25,7 +25,7 @@ class ListenCall final : public grpc::ServerWriteReactor<v1::ListenResponse> {
     }
     listener_ = *std::move(listener);
     response_.mutable_format()->set_sample_rate_hz(output.format().sample_rate_hz);
-    response_.mutable_format()->set_channel_count(1);
+    response_.mutable_format()->set_channel_count(output.format().channel_count);
     writing_ = true;
     StartWrite(&response_);
   }

@@ -22,6 +22,7 @@ size_t BlocksPerSecond(const DeviceFormat& format) {
 MixerSettings MixerSettingsOf(const DeviceFormat& format, const Clock& clock) {
   return {.sample_rate_hz = static_cast<double>(format.sample_rate_hz),
           .block_frame_count = format.block_frame_count,
+          .channel_count = format.channel_count,
           .clock = &clock};
 }
 
@@ -39,7 +40,7 @@ LiveOutput::LiveOutput(const OutputSettings& settings, Clock& clock, Log log)
       clock_(clock),
       log_(std::move(log)),
       mixer_(MixerSettingsOf(settings.format, clock)),
-      broadcast_(settings.format.block_frame_count, BlocksPerSecond(settings.format)),
+      broadcast_(settings.format, BlocksPerSecond(settings.format)),
       look_ahead_(
           settings.format, settings.look_ahead_block_count,
           [this](std::span<float> block) { RenderBlock(block); }, clock) {}

@@ -2,6 +2,7 @@
 #include "server/api/object_conversion.h"
 
 #include "proto/material_catalogue.h"
+#include "server/api/pose_conversion.h"
 #include "server/api/resource_name.h"
 
 namespace carillon {
@@ -53,6 +54,8 @@ absl::StatusOr<ObjectChange> ToObjectChange(const v1::UpdateObjectRequest& reque
   }
   if (request.has_size()) change.size = request.size();
   if (request.has_gain()) change.gain = request.gain();
+  if (request.has_pose()) change.pose = FromProto(request.pose());
+  change.glide_s = request.glide_s();
   return change;
 }
 
@@ -69,6 +72,7 @@ v1::SoundingObject ToProto(uint64_t scene, const PlacedObject& placed) {
   proto.set_lowest_frequency_hz(object.lowest_frequency_hz);
   proto.set_highest_frequency_hz(object.highest_frequency_hz);
   if (object.complete_to_hz) proto.set_complete_to_hz(*object.complete_to_hz);
+  if (object.properties.pose) *proto.mutable_pose() = ToProto(*object.properties.pose);
   return proto;
 }
 

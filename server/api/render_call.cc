@@ -59,18 +59,19 @@ class RenderCall final : public grpc::ServerBidiReactor<v1::RenderRequest, v1::R
     absl::StatusOr<std::unique_ptr<OfflineRenderer>> renderer = reader_.Finish();
     if (!renderer.ok()) return Finish(ToGrpcStatus(renderer.status()));
     renderer_ = *std::move(renderer);
-    frames_.resize(kFramesPerMessage);
+    samples_.resize(kFramesPerMessage * reader_.channel_count());
     response_.mutable_format()->set_sample_rate_hz(reader_.sample_rate_hz());
-    response_.mutable_format()->set_channel_count(1);
+    response_.mutable_format()->set_channel_count(reader_.channel_count());
     StartWrite(&response_);
   }
 
   void SendNext() {
     const uint64_t first_frame = renderer_->summary().frame_count;
-    const size_t count = renderer_->Render(frames_);
+    const size_t count = renderer_->Render(samples_);
     if (count > 0) {
       response_.mutable_block()->set_first_frame(first_frame);
-      response_.mutable_block()->set_samples(ToBytes(std::span(frames_).first(count)));
+      response_.mutable_block()->set_samples(
+          ToBytes(std::span(samples_).first(count * reader_.channel_count())));
     } else {
       FillSummary(*response_.mutable_summary());
     }
@@ -89,7 +90,7 @@ class RenderCall final : public grpc::ServerBidiReactor<v1::RenderRequest, v1::R
   const RenderContext daemon_;
   TraceReader reader_;
   std::unique_ptr<OfflineRenderer> renderer_;
-  std::vector<float> frames_;
+  std::vector<float> samples_;
   v1::RenderRequest request_;
   v1::RenderResponse response_;
 };

@@ -6,16 +6,18 @@
 #include <string>
 
 #include "server/api/object_conversion.h"
+#include "server/api/pose_conversion.h"
 #include "server/api/resource_name.h"
 #include "server/api/unary_call.h"
 
 namespace carillon {
 
 grpc::ServerUnaryReactor* SceneService::CreateScene(grpc::CallbackServerContext* context,
-                                                    const v1::CreateSceneRequest*,
+                                                    const v1::CreateSceneRequest* request,
                                                     v1::CreateSceneResponse* response) {
-  return Answer(context, pool_, [this, response] {
-    const absl::StatusOr<uint64_t> scene = scenes_.CreateScene();
+  return Answer(context, pool_, [this, request, response] {
+    const absl::StatusOr<uint64_t> scene =
+        scenes_.CreateScene(ToSceneSpace(request->hearing(), request->listener()));
     if (scene.ok()) response->set_name(SceneName(*scene));
     return scene.status();
   });
@@ -51,16 +53,27 @@ grpc::ServerUnaryReactor* SceneService::RemoveObject(grpc::CallbackServerContext
   });
 }
 
+grpc::ServerUnaryReactor* SceneService::UpdateListener(grpc::CallbackServerContext* context,
+                                                       const v1::UpdateListenerRequest* request,
+                                                       v1::UpdateListenerResponse*) {
+  return Answer(context, pool_, [this, request] {
+    const absl::StatusOr<uint64_t> scene = ParseSceneName(request->scene());
+    if (!scene.ok()) return scene.status();
+    return scenes_.UpdateListener(*scene, FromProto(request->pose()), request->glide_s());
+  });
+}
+
 absl::Status SceneService::Add(const v1::AddObjectRequest& request,
                                v1::AddObjectResponse& response) {
   const absl::StatusOr<uint64_t> scene = ParseSceneName(request.scene());
   if (!scene.ok()) return scene.status();
   const absl::StatusOr<std::string> digest = ParseModelName(request.modal_model());
   if (!digest.ok()) return digest.status();
-  const absl::StatusOr<ObjectProperties> properties =
+  absl::StatusOr<ObjectProperties> properties =
       ToObjectProperties(request.material(), request.size(),
                          request.has_gain() ? std::optional(request.gain()) : std::nullopt);
   if (!properties.ok()) return properties.status();
+  if (request.has_pose()) properties->pose = FromProto(request.pose());
   absl::StatusOr<std::shared_ptr<const ModalModel>> model = database_.models().FindToSound(*digest);
   if (!model.ok()) return model.status();
   const absl::StatusOr<PlacedObject> placed =

@@ -29,6 +29,9 @@ class SceneService final : public v1::SceneService::CallbackService {
   grpc::ServerUnaryReactor* RemoveObject(grpc::CallbackServerContext* context,
                                          const v1::RemoveObjectRequest* request,
                                          v1::RemoveObjectResponse* response) override;
+  grpc::ServerUnaryReactor* UpdateListener(grpc::CallbackServerContext* context,
+                                           const v1::UpdateListenerRequest* request,
+                                           v1::UpdateListenerResponse* response) override;
 
  private:
   absl::Status Add(const v1::AddObjectRequest& request, v1::AddObjectResponse& response);

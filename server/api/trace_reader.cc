@@ -9,6 +9,7 @@
 #include "proto/error_reason.h"
 #include "server/api/contact_conversion.h"
 #include "server/api/object_conversion.h"
+#include "server/api/pose_conversion.h"
 #include "server/api/resource_name.h"
 
 namespace carillon {
@@ -46,6 +47,7 @@ absl::Status TraceReader::TakeSettings(const v1::RenderSettings& settings) {
   settings_.emplace();
   if (settings.sample_rate_hz() != 0) settings_->sample_rate_hz = settings.sample_rate_hz();
   settings_->tail_s = settings.tail_s();
+  if (settings.channel_count() != 0) settings_->channel_count = settings.channel_count();
   return absl::OkStatus();
 }
 
@@ -65,6 +67,7 @@ absl::Status TraceReader::TakeHeader(const v1::ContactTraceHeader& header) {
                                   "; this daemon reads ", kFormatVersion));
   }
   if (header.step_s() > 0 && header.step_s() <= 1) settings_->step_s = header.step_s();
+  settings_->space = ToSceneSpace(header.hearing(), header.listener());
   if (header.has_clock()) {
     if (absl::Status status = TakeClock(header.clock()); !status.ok()) return status;
   }
@@ -97,12 +100,14 @@ absl::Status TraceReader::TakeClock(const v1::ContactTraceClock& clock) {
 absl::Status TraceReader::TakeObject(const v1::ContactTraceObject& object) {
   const absl::StatusOr<std::string> digest = ParseModelName(object.modal_model());
   if (!digest.ok()) return digest.status();
-  const absl::StatusOr<ObjectProperties> properties =
+  absl::StatusOr<ObjectProperties> properties =
       ToObjectProperties(object.material(), object.size(),
                          object.has_gain() ? std::optional(object.gain()) : std::nullopt);
   if (!properties.ok()) return properties.status();
+  if (object.has_pose()) properties->pose = FromProto(object.pose());
   absl::StatusOr<std::shared_ptr<const ModalModel>> model = models_.FindToSound(*digest);
   if (!model.ok()) return model.status();
+  ++object_count_;
   return renderer_->AddObject(object.handle(), *std::move(model), *properties);
 }
 
@@ -114,16 +119,21 @@ absl::Status TraceReader::TakeStep(const v1::ContactStep& step) {
                      OfflineRenderer::kMaxTimeS, " s"));
   }
   time_s_ = step.time_s();
-  impulse_count_ += static_cast<uint64_t>(step.impulses_size() + step.columns().object_size() +
-                                          step.sustained_size() + step.contacts_size());
+  impulse_count_ +=
+      static_cast<uint64_t>(step.impulses_size() + step.columns().object_size() +
+                            step.sustained_size() + step.contacts_size() + step.poses_size());
+  // Each object hears of the listener's.
+  if (step.has_listener()) impulse_count_ += object_count_;
   if (impulse_count_ > kMaxImpulseCount) {
-    return Refusal(
-        absl::StatusCode::kResourceExhausted, "TRACE_TOO_LARGE",
-        absl::StrCat("the trace has over ", kMaxImpulseCount, " impulses; render it in pieces"));
+    return Refusal(absl::StatusCode::kResourceExhausted, "TRACE_TOO_LARGE",
+                   absl::StrCat("the trace has over ", kMaxImpulseCount,
+                                " impulses and poses; render it in pieces"));
   }
   renderer_->BeginStep(time_s_);
   ReadStep(step,
-           {.strike = [this](const ObjectImpulse& impulse) { renderer_->Strike(impulse); },
+           {.move = [this](uint32_t handle, const Pose& pose) { renderer_->Move(handle, pose); },
+            .move_listener = [this](const Pose& pose) { renderer_->MoveListener(pose); },
+            .strike = [this](const ObjectImpulse& impulse) { renderer_->Strike(impulse); },
             .hold = [this](const ObjectForce& force) { renderer_->Hold(force); },
             .touch = [this](const ObjectTouch& touch) { renderer_->Touch(touch); },
             .reject = [this](uint64_t count, const absl::Status&) { renderer_->Reject(count); }});

@@ -28,6 +28,7 @@ class TraceReader {
   absl::StatusOr<std::unique_ptr<OfflineRenderer>> Finish();
 
   uint32_t sample_rate_hz() const { return settings_->sample_rate_hz; }
+  uint32_t channel_count() const { return settings_->channel_count; }
 
  private:
   absl::Status TakeSettings(const v1::RenderSettings& settings);
@@ -42,7 +43,8 @@ class TraceReader {
   std::optional<OfflineSettings> settings_;
   std::unique_ptr<OfflineRenderer> renderer_;  // once there is a header
   double time_s_ = 0;
-  uint64_t impulse_count_ = 0;
+  uint64_t impulse_count_ = 0;  // and poses
+  uint64_t object_count_ = 0;
 };
 
 }  // namespace carillon

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 
@@ -14,6 +15,10 @@ struct DeviceFormat {
   uint32_t sample_rate_hz = 48000;
   /// Frames of every pull.
   uint32_t block_frame_count = 128;
+  /// Samples of a frame: 1 or 2.
+  uint32_t channel_count = 1;
+
+  size_t block_size() const { return size_t{block_frame_count} * channel_count; }
 };
 
 /// Somewhere to play. A new kind of device is a new implementation of this and a line in

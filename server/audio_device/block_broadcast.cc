@@ -30,18 +30,19 @@ void BlockBroadcast::Listener::Offer(const std::shared_ptr<const RenderedBlock>&
                                      size_t queue_limit) {
   const std::lock_guard lock(mutex_);
   lost_frame_count_ += block->first_frame - next_frame_.value_or(block->first_frame);
-  next_frame_ = block->first_frame + block->samples.size();
+  const uint32_t frame_count = broadcast_.format_.block_frame_count;
+  next_frame_ = block->first_frame + frame_count;
   if (queue_.size() < queue_limit) {
     queue_.push_back(block);
   } else {
-    lost_frame_count_ += block->samples.size();
+    lost_frame_count_ += frame_count;
   }
 }
 
-BlockBroadcast::BlockBroadcast(uint32_t block_frame_count, size_t queue_block_count)
-    : block_frame_count_(block_frame_count),
+BlockBroadcast::BlockBroadcast(const DeviceFormat& format, size_t queue_block_count)
+    : format_(format),
       queue_block_count_(queue_block_count),
-      samples_(block_frame_count * queue_block_count),
+      samples_(format.block_size() * queue_block_count),
       first_frames_(queue_block_count) {}
 
 void BlockBroadcast::Publish(uint64_t first_frame, std::span<const float> block) noexcept {
@@ -82,7 +83,7 @@ void BlockBroadcast::Remove(Listener* listener) {
 std::shared_ptr<const RenderedBlock> BlockBroadcast::TryTakePublished() {
   auto block = std::make_shared<RenderedBlock>();
   if (first_frames_.Pop({&block->first_frame, 1}) == 0) return nullptr;
-  block->samples.resize(block_frame_count_);
+  block->samples.resize(format_.block_size());
   samples_.Pop(block->samples);
   return block;
 }

@@ -11,11 +11,12 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "server/audio_device/audio_device.h"
 #include "server/audio_device/copy_ring.h"
 
 namespace carillon {
 
-/// Some consecutive rendered frames.
+/// Some consecutive rendered frames, interleaved.
 struct RenderedBlock {
   /// Number of the first since the mixer began.
   uint64_t first_frame = 0;
@@ -57,8 +58,8 @@ class BlockBroadcast {
     std::optional<uint64_t> next_frame_;
   };
 
-  /// Blocks of `block_frame_count`; ring and queues hold `queue_block_count` of them.
-  BlockBroadcast(uint32_t block_frame_count, size_t queue_block_count);
+  /// Ring and queues hold `queue_block_count` blocks of `format`.
+  BlockBroadcast(const DeviceFormat& format, size_t queue_block_count);
 
   /// Render thread: passes on a block, or, where Deliver has not kept up, leaves it out.
   void Publish(uint64_t first_frame, std::span<const float> block) noexcept;
@@ -74,7 +75,7 @@ class BlockBroadcast {
   void Remove(Listener* listener);
   std::shared_ptr<const RenderedBlock> TryTakePublished();
 
-  const uint32_t block_frame_count_;
+  const DeviceFormat format_;
   const size_t queue_block_count_;
   CopyRing<float> samples_;
   CopyRing<uint64_t> first_frames_;

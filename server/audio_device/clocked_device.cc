@@ -27,10 +27,11 @@ void ClockedDevice::Stop() {
 }
 
 void ClockedDevice::Run() {
-  std::vector<float> block(format_.block_frame_count);
+  std::vector<float> block(format_.block_size());
+  const uint64_t frame_count = format_.block_frame_count;
   const std::chrono::nanoseconds start = clock_.Monotonic();
   // Due times are counted from the start, not from the last block: rounding does not add up.
-  for (uint64_t frames = block.size(); !stopping_; frames += block.size()) {
+  for (uint64_t frames = frame_count; !stopping_; frames += frame_count) {
     source_->Pull(block);
     if (sink_ && !sink_(block)) {
       alive_ = false;

@@ -5,7 +5,7 @@
 
 namespace carillon {
 
-/// What a device plays: mono frames in order, full scale is 1.
+/// What a device plays: frames in order, interleaved, full scale is 1.
 ///
 /// A device calls Pull on a thread of its own, again and again between Start and Stop, never from
 /// two threads at once. With a sound card that thread has a deadline of one callback, so an

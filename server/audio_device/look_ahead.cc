@@ -15,8 +15,8 @@ LookAhead::LookAhead(const DeviceFormat& format, uint32_t block_count, RenderBlo
       block_count_(block_count),
       render_(std::move(render)),
       clock_(clock),
-      ring_(static_cast<size_t>(block_count) * format.block_frame_count),
-      block_(format.block_frame_count) {}
+      ring_(block_count * format.block_size()),
+      block_(format.block_size()) {}
 
 LookAhead::~LookAhead() { Stop(); }
 
@@ -37,11 +37,12 @@ void LookAhead::Pull(std::span<float> frames) noexcept {
   if (ready == frames.size()) return;
   std::ranges::fill(frames.subspan(ready), 0.0F);
   xrun_count_.fetch_add(1, std::memory_order_relaxed);
-  lost_frame_count_.fetch_add(frames.size() - ready, std::memory_order_relaxed);
+  lost_frame_count_.fetch_add((frames.size() - ready) / format_.channel_count,
+                              std::memory_order_relaxed);
 }
 
 double LookAhead::latency_s() const {
-  return static_cast<double>(ring_.capacity()) / format_.sample_rate_hz;
+  return static_cast<double>(block_count_) * format_.block_frame_count / format_.sample_rate_hz;
 }
 
 void LookAhead::Run() {
@@ -58,7 +59,7 @@ void LookAhead::RenderOne() {
   render_(block_);
   const std::chrono::duration<double> taken = clock_.Monotonic() - start;
   ring_.Push(block_);
-  const double block_s = static_cast<double>(block_.size()) / format_.sample_rate_hz;
+  const double block_s = static_cast<double>(format_.block_frame_count) / format_.sample_rate_hz;
   const double old_load = load();
   load_.store(old_load + block_s * (taken.count() / block_s - old_load), std::memory_order_relaxed);
 }

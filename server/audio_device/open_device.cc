@@ -20,7 +20,8 @@ std::unique_ptr<AudioDevice> OpenNullDevice(const DeviceFormat& format, Clock& c
 absl::StatusOr<std::unique_ptr<AudioDevice>> OpenFileDevice(absl::string_view path,
                                                             const DeviceFormat& format,
                                                             Clock& clock) {
-  absl::StatusOr<WavWriter> made = WavWriter::Make(std::string(path), format.sample_rate_hz);
+  absl::StatusOr<WavWriter> made =
+      WavWriter::Make(std::string(path), format.sample_rate_hz, format.channel_count);
   if (!made.ok()) return made.status();
   auto writer = std::make_shared<WavWriter>(*std::move(made));
   return std::make_unique<ClockedDevice>(

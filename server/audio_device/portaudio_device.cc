@@ -154,6 +154,10 @@ class PortAudioDevice final : public AudioDevice {
     const PaHostApiTypeId api = Pa_GetHostApiInfo(device->hostApi)->type;
     const bool alsa = api == paALSA;
     channel_count_ = std::min(kMaxChannelCount, device->maxOutputChannels);
+    if (channel_count() < format_.channel_count) {
+      return Refusal(absl::StatusCode::kUnavailable, "AUDIO_DEVICE_FAILED",
+                     absl::StrCat(name_, " has one channel; start the daemon with --channels 1"));
+    }
     const PaStreamParameters parameters{
         .device = index,
         .channelCount = channel_count_,
@@ -191,8 +195,9 @@ class PortAudioDevice final : public AudioDevice {
 
   size_t channel_count() const { return static_cast<size_t>(channel_count_); }
 
-  /// The same sound on every channel: pulled into the front of `samples`, spread from the back.
+  /// A mono mix sounds on every channel: pulled into the front of `samples`, spread from the back.
   void Fill(std::span<float> samples) noexcept {
+    if (format_.channel_count == channel_count()) return source_->Pull(samples);
     const size_t frame_count = samples.size() / channel_count();
     source_->Pull(samples.first(frame_count));
     for (size_t frame = frame_count; frame-- > 0;) {

@@ -17,13 +17,14 @@ SNDFILE* Cast(void* file) { return static_cast<SNDFILE*>(file); }
 
 void WavWriter::CloseFile::operator()(void* file) const { sf_close(Cast(file)); }
 
-WavWriter::WavWriter(File file, std::string path)
-    : file_(std::move(file)), path_(std::move(path)) {}
+WavWriter::WavWriter(File file, std::string path, uint32_t channel_count)
+    : file_(std::move(file)), path_(std::move(path)), channel_count_(channel_count) {}
 
-absl::StatusOr<WavWriter> WavWriter::Make(const std::string& path, uint32_t sample_rate_hz) {
+absl::StatusOr<WavWriter> WavWriter::Make(const std::string& path, uint32_t sample_rate_hz,
+                                          uint32_t channel_count) {
   SF_INFO info{};
   info.samplerate = static_cast<int>(sample_rate_hz);
-  info.channels = 1;
+  info.channels = static_cast<int>(channel_count);
   info.format = SF_FORMAT_RF64 | SF_FORMAT_FLOAT;
   File file(sf_open(path.c_str(), SFM_WRITE, &info));
   if (file == nullptr) {
@@ -33,11 +34,11 @@ absl::StatusOr<WavWriter> WavWriter::Make(const std::string& path, uint32_t samp
   }
   sf_command(Cast(file.get()), SFC_RF64_AUTO_DOWNGRADE, nullptr, SF_TRUE);
   sf_command(Cast(file.get()), SFC_SET_UPDATE_HEADER_AUTO, nullptr, SF_TRUE);
-  return WavWriter(std::move(file), path);
+  return WavWriter(std::move(file), path, channel_count);
 }
 
 absl::Status WavWriter::Write(std::span<const float> frames) {
-  const auto count = static_cast<sf_count_t>(frames.size());
+  const auto count = static_cast<sf_count_t>(frames.size() / channel_count_);
   if (sf_writef_float(Cast(file_.get()), frames.data(), count) == count) return absl::OkStatus();
   return Refusal(
       absl::StatusCode::kDataLoss, "AUDIO_FILE_FAILED",

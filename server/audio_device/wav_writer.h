@@ -10,15 +10,17 @@
 
 namespace carillon {
 
-/// Writes a mono WAV file of float32 samples (WAVE_FORMAT_EXTENSIBLE; RF64 past 4 GiB). The header
+/// Writes a WAV file of float32 samples (WAVE_FORMAT_EXTENSIBLE; RF64 past 4 GiB). The header
 /// is kept true while the file grows, so that a file whose writer was killed can be read up to
 /// there.
 class WavWriter {
  public:
   /// Truncates or creates `path`. Errors: FailedPrecondition (AUDIO_FILE_FAILED).
-  static absl::StatusOr<WavWriter> Make(const std::string& path, uint32_t sample_rate_hz);
+  static absl::StatusOr<WavWriter> Make(const std::string& path, uint32_t sample_rate_hz,
+                                        uint32_t channel_count);
 
-  /// Appends frames. Errors: DataLoss (AUDIO_FILE_FAILED), for instance because the disk is full.
+  /// Appends frames, interleaved. Errors: DataLoss (AUDIO_FILE_FAILED), for instance because the
+  /// disk is full.
   absl::Status Write(std::span<const float> frames);
 
  private:
@@ -27,10 +29,11 @@ class WavWriter {
   };
   using File = std::unique_ptr<void, CloseFile>;
 
-  WavWriter(File file, std::string path);
+  WavWriter(File file, std::string path, uint32_t channel_count);
 
   File file_;
   std::string path_;
+  uint32_t channel_count_;
 };
 
 }  // namespace carillon

@@ -38,16 +38,18 @@ void ContactForces::Begin(double time_s, Push push) {
   time_s_ = time_s;
 }
 
-void ContactForces::Add(uint32_t handle, const Excitation& force, const Roughness& roughness) {
-  objects_[handle].forces.push_back({force, roughness});
+void ContactForces::Add(const FeltContact& force, const Roughness& roughness) {
+  for (const Felt& felt : force.all()) {
+    objects_[felt.handle].forces.push_back({felt.excitation, roughness});
+  }
 }
 
-void ContactForces::Touch(const ObjectTouch& touch, const Excitation& impulse) {
+void ContactForces::Touch(const ObjectTouch& touch, const FeltContact& impulse) {
   pairs_[{touch.handle, touch.partner}].touches.push_back({impulse, touch.roughness});
 }
 
 void ContactForces::End(Push push) {
-  for (auto& [key, pair] : pairs_) Divide(key.first, pair, push);
+  for (auto& [key, pair] : pairs_) Divide(pair, push);
   std::erase_if(pairs_, [](const auto& pair) { return pair.second.load.idle(); });
   for (auto& [handle, object] : objects_) {
     for (const Force& force : object.forces) {
@@ -61,13 +63,17 @@ void ContactForces::End(Push push) {
                 [](const auto& object) { return object.second.steps_without >= kKnotsToEnd; });
 }
 
-void ContactForces::Divide(uint32_t handle, Pair& pair, Push push) {
+void ContactForces::Divide(Pair& pair, Push push) {
   double impulse = 0;
-  for (const Force& touch : pair.touches) impulse += Magnitude(touch.excitation);
+  for (const PairTouch& touch : pair.touches) impulse += Magnitude(touch.impulse.by[0].excitation);
   const double blow = pair.load.Next(impulse, step_s_);
-  for (const Force& touch : pair.touches) {
-    if (blow > 0) push(handle, {.excitation = Scaled(touch.excitation, blow)}, *time_s_);
-    Add(handle, Scaled(touch.excitation, (1 - blow) / step_s_), touch.roughness);
+  for (const PairTouch& touch : pair.touches) {
+    FeltContact load = touch.impulse;
+    for (Felt& felt : std::span(load.by).first(load.count)) {
+      if (blow > 0) push(felt.handle, {.excitation = Scaled(felt.excitation, blow)}, *time_s_);
+      felt.excitation = Scaled(felt.excitation, (1 - blow) / step_s_);
+    }
+    Add(load, touch.roughness);
   }
   pair.touches.clear();
 }

@@ -10,6 +10,7 @@
 #include "absl/functional/function_ref.h"
 #include "server/excitation/contact.h"
 #include "server/excitation/load_tracker.h"
+#include "server/scene/sounding_object.h"
 #include "server/synthesis/strike.h"
 
 namespace carillon {
@@ -19,14 +20,16 @@ struct ObjectForce {
   uint32_t handle = 0;
   ContactImpulse force;  ///< newtons for newton seconds
   Roughness roughness;
+  std::optional<SecondObject> second = std::nullopt;
 };
 
 /// A contact of an object of which it is not known whether it is a blow or a load.
 struct ObjectTouch {
   uint32_t handle = 0;
-  uint32_t partner = 0;    ///< names the other body
-  ContactImpulse impulse;  ///< of the whole step
-  Roughness roughness;
+  uint32_t partner = 0;      ///< names the other body
+  ContactImpulse impulse{};  ///< of the whole step
+  Roughness roughness{};
+  std::optional<SecondObject> second = std::nullopt;
 };
 
 /// Turns the lasting contacts of one simulation, step by step, into what the mixer understands: for
@@ -44,11 +47,11 @@ class ContactForces {
   /// forces ended there.
   void Begin(double time_s, Push push);
 
-  /// A force of this step, whose place and newtons are `force`.
-  void Add(uint32_t handle, const Excitation& force, const Roughness& roughness);
+  /// A force of this step, N.
+  void Add(const FeltContact& force, const Roughness& roughness);
 
-  /// A contact of this step that is a blow or a load, whose place and newton seconds are `impulse`.
-  void Touch(const ObjectTouch& touch, const Excitation& impulse);
+  /// A contact of this step that is a blow or a load, N s.
+  void Touch(const ObjectTouch& touch, const FeltContact& impulse);
 
   /// Ends the step.
   void End(Push push);
@@ -62,12 +65,16 @@ class ContactForces {
     std::vector<Force> forces;  // of this step
     int steps_without = 0;
   };
+  struct PairTouch {
+    FeltContact impulse;
+    Roughness roughness;
+  };
   struct Pair {
     LoadTracker load;
-    std::vector<Force> touches;  // of this step, N s
+    std::vector<PairTouch> touches;  // of this step
   };
 
-  void Divide(uint32_t handle, Pair& pair, Push push);
+  void Divide(Pair& pair, Push push);
   static ForceKnot Tie(const std::vector<Force>& forces, double step_s);
 
   double nominal_step_s_;

@@ -39,7 +39,7 @@ absl::StatusOr<double> SchedulingDelay(const ContactStreamSettings& settings, co
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<ContactStream>> ContactStream::Make(
-    std::shared_ptr<const Scene> scene, Mixer& mixer, const ContactStreamSettings& settings) {
+    std::shared_ptr<Scene> scene, Mixer& mixer, const ContactStreamSettings& settings) {
   const absl::StatusOr<double> delay_s = SchedulingDelay(settings, mixer);
   if (!delay_s.ok()) return delay_s.status();
   absl::StatusOr<std::unique_ptr<StrikeStream>> strikes = mixer.OpenStream(kQueueCapacity);
@@ -48,13 +48,14 @@ absl::StatusOr<std::unique_ptr<ContactStream>> ContactStream::Make(
       new ContactStream(std::move(scene), mixer, settings.step_s, *delay_s, *std::move(strikes)));
 }
 
-ContactStream::ContactStream(std::shared_ptr<const Scene> scene, Mixer& mixer, double step_s,
+ContactStream::ContactStream(std::shared_ptr<Scene> scene, Mixer& mixer, double step_s,
                              double scheduling_delay_s, std::unique_ptr<StrikeStream> strikes)
     : scene_(std::move(scene)),
       mixer_(mixer),
       mapping_{.delay_s = scheduling_delay_s},
       strikes_(std::move(strikes)),
-      forces_(step_s) {}
+      forces_(step_s),
+      pose_times_(step_s) {}
 
 absl::Status ContactStream::BeginStep(double time_s) {
   if (!std::isfinite(time_s)) {
@@ -75,7 +76,8 @@ absl::Status ContactStream::BeginStep(double time_s) {
 }
 
 void ContactStream::Strike(const ObjectImpulse& impulse) {
-  if (absl::Status status = TryStrike(impulse); !status.ok()) Reject(1, std::move(status));
+  absl::Status status = TryStrike(impulse);
+  if (!status.ok()) Reject(impulse.second ? 2 : 1, std::move(status));
 }
 
 void ContactStream::Reject(uint64_t count, absl::Status reason) {
@@ -84,17 +86,41 @@ void ContactStream::Reject(uint64_t count, absl::Status reason) {
 }
 
 void ContactStream::Hold(const ObjectForce& force) {
-  absl::Status status =
-      Locate(force.handle, force.force, force.roughness, [&](const Excitation& excitation) {
-        forces_.Add(force.handle, excitation, force.roughness);
-      });
-  if (!status.ok()) Reject(1, std::move(status));
+  absl::Status status = Validate(force.roughness);
+  if (status.ok()) {
+    status = Locate(force.handle, force.force, force.second,
+                    [&](const FeltContact& felt) { forces_.Add(felt, force.roughness); });
+  }
+  if (!status.ok()) Reject(force.second ? 2 : 1, std::move(status));
 }
 
 void ContactStream::Touch(const ObjectTouch& touch) {
-  absl::Status status =
-      Locate(touch.handle, touch.impulse, touch.roughness,
-             [&](const Excitation& excitation) { forces_.Touch(touch, excitation); });
+  absl::Status status = Validate(touch.roughness);
+  if (status.ok()) {
+    status = Locate(touch.handle, touch.impulse, touch.second,
+                    [&](const FeltContact& felt) { forces_.Touch(touch, felt); });
+  }
+  if (!status.ok()) Reject(touch.second ? 2 : 1, std::move(status));
+}
+
+void ContactStream::Move(uint32_t handle, const Pose& pose) {
+  absl::Status status = scene_->Move(handle, pose, [&](const SoundingObject& object) {
+    if (object.voice == nullptr) return;
+    const double glide_s = pose_times_.GlideS(handle, time_s_);
+    Push(MakeMove(StrikeKind::kMove, object.bank, pose, glide_s * mixer_.settings().sample_rate_hz),
+         FrameOf(time_s_ - glide_s));
+  });
+  if (!status.ok()) Reject(1, std::move(status));
+}
+
+void ContactStream::MoveListener(const Pose& pose) {
+  if (absl::Status status = Validate(pose); !status.ok()) return Reject(1, std::move(status));
+  const double glide_s = pose_times_.GlideS(std::nullopt, time_s_);
+  absl::Status status = scene_->MoveListener(pose, [&](const SoundingObject& object) {
+    Push(MakeMove(StrikeKind::kMoveListener, object.bank, pose,
+                  glide_s * mixer_.settings().sample_rate_hz),
+         FrameOf(time_s_ - glide_s));
+  });
   if (!status.ok()) Reject(1, std::move(status));
 }
 
@@ -115,24 +141,29 @@ void ContactStream::PushForce(uint32_t handle, carillon::Strike strike, double t
 }
 
 absl::Status ContactStream::Locate(uint32_t handle, const ContactImpulse& contact,
-                                   const Roughness& roughness,
-                                   absl::FunctionRef<void(const Excitation&)> use) const {
-  if (absl::Status status = Validate(roughness); !status.ok()) return status;
-  return scene_->Use(handle, [&](const SoundingObject& object) -> absl::Status {
-    const absl::StatusOr<Excitation> excitation = LocateImpulse(object, contact);
-    if (excitation.ok()) use(*excitation);
-    return excitation.status();
-  });
+                                   const std::optional<SecondObject>& second,
+                                   absl::FunctionRef<void(const FeltContact&)> use) const {
+  const auto take = [&](const absl::StatusOr<FeltContact>& felt) {
+    if (felt.ok()) use(*felt);
+    return felt.status();
+  };
+  if (!second) {
+    return scene_->Use(
+        handle, [&](const SoundingObject& object) { return take(Feel(contact, handle, object)); });
+  }
+  return scene_->Use(handle, second->handle,
+                     [&](const SoundingObject& object, const SoundingObject& other) {
+                       return take(Feel(contact, handle, object, *second, other));
+                     });
 }
 
 absl::Status ContactStream::TryStrike(const ObjectImpulse& impulse) {
   const absl::StatusOr<double> frame = FrameAt(time_s_ + impulse.time_offset_s);
   if (!frame.ok()) return frame.status();
-  return scene_->Use(impulse.handle, [&](const SoundingObject& object) -> absl::Status {
-    const absl::StatusOr<Excitation> excitation = LocateImpulse(object, impulse.impulse);
-    if (!excitation.ok()) return excitation.status();
-    Push({.bank = object.bank, .excitation = *excitation}, *frame);
-    return absl::OkStatus();
+  return Locate(impulse.handle, impulse.impulse, impulse.second, [&](const FeltContact& contact) {
+    for (const Felt& felt : contact.all()) {
+      Push({.bank = felt.bank, .excitation = felt.excitation}, *frame);
+    }
   });
 }
 

@@ -29,6 +29,7 @@ struct ObjectImpulse {
   uint32_t handle = 0;
   double time_offset_s = 0;
   ContactImpulse impulse;
+  std::optional<SecondObject> second = std::nullopt;
 };
 
 /// What became of a stream's impulses so far.
@@ -51,7 +52,7 @@ class ContactStream {
   static constexpr double kMaxAheadS = 60;
 
   /// Errors: InvalidArgument (INVALID_STREAM), ResourceExhausted (TOO_MANY_STREAMS).
-  static absl::StatusOr<std::unique_ptr<ContactStream>> Make(std::shared_ptr<const Scene> scene,
+  static absl::StatusOr<std::unique_ptr<ContactStream>> Make(std::shared_ptr<Scene> scene,
                                                              Mixer& mixer,
                                                              const ContactStreamSettings& settings);
 
@@ -66,6 +67,11 @@ class ContactStream {
   /// said again in each step until they end. Rejected as an impulse is.
   void Hold(const ObjectForce& force);
   void Touch(const ObjectTouch& touch);
+
+  /// Where an object is at that step's time, and where the listener is: they move there from where
+  /// they were told to be before. Rejected as an impulse is.
+  void Move(uint32_t handle, const Pose& pose);
+  void MoveListener(const Pose& pose);
 
   /// Ends the step: its forces are all known.
   void EndStep();
@@ -90,23 +96,25 @@ class ContactStream {
   const absl::Status& last_rejection() const { return last_rejection_; }
 
  private:
-  ContactStream(std::shared_ptr<const Scene> scene, Mixer& mixer, double step_s,
+  ContactStream(std::shared_ptr<Scene> scene, Mixer& mixer, double step_s,
                 double scheduling_delay_s, std::unique_ptr<StrikeStream> strikes);
 
   absl::Status TryStrike(const ObjectImpulse& impulse);
-  absl::Status Locate(uint32_t handle, const ContactImpulse& contact, const Roughness& roughness,
-                      absl::FunctionRef<void(const Excitation&)> use) const;
+  absl::Status Locate(uint32_t handle, const ContactImpulse& contact,
+                      const std::optional<SecondObject>& second,
+                      absl::FunctionRef<void(const FeltContact&)> use) const;
   void Push(carillon::Strike strike, double frame);
   void PushForce(uint32_t handle, carillon::Strike strike, double time_s);
   absl::StatusOr<double> FrameAt(double time_s) const;
   double FrameOf(double time_s) const;
 
-  std::shared_ptr<const Scene> scene_;
+  std::shared_ptr<Scene> scene_;
   Mixer& mixer_;
   TimeMapping mapping_;
   std::unique_ptr<StrikeStream> strikes_;
   double time_s_ = 0;
   ContactForces forces_;
+  PoseTimes pose_times_;
   uint64_t step_count_ = 0;
   uint64_t pushed_count_ = 0;
   uint64_t rejected_count_ = 0;

@@ -27,6 +27,7 @@ MixerSettings SettingsOf(const OfflineSettings& settings, SectionCrew& crew) {
   // Nothing waits here, so a block takes however many strikes fall into it.
   return {.sample_rate_hz = static_cast<double>(settings.sample_rate_hz),
           .block_frame_count = OfflineRenderer::kBlockFrameCount,
+          .channel_count = settings.channel_count,
           .first_frame = settings.mapping.first_frame,
           .most_streams = 1,
           .most_pending_strikes = kQueueCapacity,
@@ -36,6 +37,10 @@ MixerSettings SettingsOf(const OfflineSettings& settings, SectionCrew& crew) {
 
 /// Strikes of one sample keep their order, as when they come live.
 bool Earlier(const Strike& a, const Strike& b) { return FirstSample(a) < FirstSample(b); }
+
+bool IsMove(const Strike& strike) {
+  return strike.kind == StrikeKind::kMove || strike.kind == StrikeKind::kMoveListener;
+}
 
 }  // namespace
 
@@ -51,6 +56,12 @@ absl::StatusOr<std::unique_ptr<OfflineRenderer>> OfflineRenderer::Make(
         absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
         absl::StrCat("tail_s is ", settings.tail_s, "; it must be 0 to ", kLongestTailS));
   }
+  if (settings.channel_count < 1 || settings.channel_count > 2) {
+    return Refusal(
+        absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
+        absl::StrCat("channel_count is ", settings.channel_count, "; it must be 1 or 2"));
+  }
+  if (absl::Status status = Validate(settings.space); !status.ok()) return status;
   std::unique_ptr<OfflineRenderer> renderer(new OfflineRenderer(settings, bodies));
   absl::StatusOr<std::unique_ptr<StrikeStream>> stream =
       renderer->mixer_.OpenStream(kQueueCapacity);
@@ -64,7 +75,8 @@ OfflineRenderer::OfflineRenderer(const OfflineSettings& settings, BodyCache& bod
       bodies_(bodies),
       crew_(settings.thread_count),
       mixer_(SettingsOf(settings, crew_)),
-      forces_(settings.step_s) {}
+      forces_(settings.step_s),
+      pose_times_(settings.step_s) {}
 
 absl::Status OfflineRenderer::AddObject(uint32_t handle, std::shared_ptr<const ModalModel> model,
                                         const ObjectProperties& properties) {
@@ -74,14 +86,16 @@ absl::Status OfflineRenderer::AddObject(uint32_t handle, std::shared_ptr<const M
   }
   absl::StatusOr<std::shared_ptr<const SoundingBody>> body = bodies_.Get(std::move(model));
   if (!body.ok()) return body.status();
-  absl::StatusOr<SoundingObject> object = MakeSoundingObject(*std::move(body), properties, mixer_);
+  absl::StatusOr<SoundingObject> object =
+      MakeSoundingObject(*std::move(body), properties, mixer_,
+                         MakeVoice(settings_.space, properties.pose, mixer_.settings()));
   if (!object.ok()) return object.status();
   objects_.emplace(handle, *std::move(object));
   return absl::OkStatus();
 }
 
 void OfflineRenderer::Strike(const ObjectImpulse& impulse) {
-  if (!TryStrike(impulse).ok()) Reject(1);
+  if (!TryStrike(impulse).ok()) Reject(impulse.second ? 2 : 1);
 }
 
 absl::Status OfflineRenderer::TryStrike(const ObjectImpulse& impulse) {
@@ -90,9 +104,12 @@ absl::Status OfflineRenderer::TryStrike(const ObjectImpulse& impulse) {
         due_s <= kMaxTimeS)) {
     return absl::InvalidArgumentError("no such time");
   }
-  absl::StatusOr<Excitation> excitation = Locate(impulse.handle, impulse.impulse);
-  if (!excitation.ok()) return excitation.status();
-  Push({.bank = objects_.at(impulse.handle).bank, .excitation = *excitation}, due_s);
+  const absl::StatusOr<FeltContact> contact =
+      Locate(impulse.handle, impulse.impulse, impulse.second);
+  if (!contact.ok()) return contact.status();
+  for (const Felt& felt : contact->all()) {
+    Push({.bank = felt.bank, .excitation = felt.excitation}, due_s);
+  }
   return absl::OkStatus();
 }
 
@@ -102,15 +119,36 @@ void OfflineRenderer::BeginStep(double time_s) {
 }
 
 void OfflineRenderer::Hold(const ObjectForce& force) {
-  const absl::StatusOr<Excitation> excitation = Locate(force.handle, force.force);
-  if (!excitation.ok() || !Validate(force.roughness).ok()) return Reject(1);
-  forces_.Add(force.handle, *excitation, force.roughness);
+  const absl::StatusOr<FeltContact> felt = Locate(force.handle, force.force, force.second);
+  if (!felt.ok() || !Validate(force.roughness).ok()) return Reject(force.second ? 2 : 1);
+  forces_.Add(*felt, force.roughness);
 }
 
 void OfflineRenderer::Touch(const ObjectTouch& touch) {
-  const absl::StatusOr<Excitation> excitation = Locate(touch.handle, touch.impulse);
-  if (!excitation.ok() || !Validate(touch.roughness).ok()) return Reject(1);
-  forces_.Touch(touch, *excitation);
+  const absl::StatusOr<FeltContact> felt = Locate(touch.handle, touch.impulse, touch.second);
+  if (!felt.ok() || !Validate(touch.roughness).ok()) return Reject(touch.second ? 2 : 1);
+  forces_.Touch(touch, *felt);
+}
+
+void OfflineRenderer::Move(uint32_t handle, const Pose& pose) {
+  const auto found = objects_.find(handle);
+  if (found == objects_.end() || !Validate(pose).ok()) return Reject(1);
+  SoundingObject& object = found->second;
+  object.properties.pose = pose;
+  if (object.voice == nullptr) return;
+  const double glide_s = pose_times_.GlideS(handle, step_time_s_);
+  Push(MakeMove(StrikeKind::kMove, object.bank, pose, glide_s * settings_.sample_rate_hz),
+       step_time_s_ - glide_s);
+}
+
+void OfflineRenderer::MoveListener(const Pose& pose) {
+  if (!Validate(pose).ok()) return Reject(1);
+  const double glide_s = pose_times_.GlideS(std::nullopt, step_time_s_);
+  for (const auto& [handle, object] : objects_) {
+    if (object.voice == nullptr) continue;
+    Push(MakeMove(StrikeKind::kMoveListener, object.bank, pose, glide_s * settings_.sample_rate_hz),
+         step_time_s_ - glide_s);
+  }
 }
 
 void OfflineRenderer::EndStep() {
@@ -122,11 +160,16 @@ void OfflineRenderer::PushForce(uint32_t handle, carillon::Strike strike, double
   Push(strike, time_s);
 }
 
-absl::StatusOr<Excitation> OfflineRenderer::Locate(uint32_t handle,
-                                                   const ContactImpulse& contact) const {
+absl::StatusOr<FeltContact> OfflineRenderer::Locate(
+    uint32_t handle, const ContactImpulse& contact,
+    const std::optional<SecondObject>& second) const {
   const auto found = objects_.find(handle);
-  if (found == objects_.end()) return absl::InvalidArgumentError("no such object");
-  return LocateImpulse(found->second, contact);
+  const auto other = second ? objects_.find(second->handle) : found;
+  if (found == objects_.end() || other == objects_.end()) {
+    return absl::InvalidArgumentError("no such object");
+  }
+  return second ? Feel(contact, handle, found->second, *second, other->second)
+                : Feel(contact, handle, found->second);
 }
 
 void OfflineRenderer::Push(carillon::Strike strike, double time_s) {
@@ -134,30 +177,36 @@ void OfflineRenderer::Push(carillon::Strike strike, double time_s) {
   strikes_.push_back(strike);
 }
 
-size_t OfflineRenderer::Render(std::span<float> frames) {
-  if (!begun_) std::ranges::stable_sort(strikes_, Earlier);
+size_t OfflineRenderer::Render(std::span<float> samples) {
+  if (!begun_) {
+    std::ranges::stable_sort(strikes_, Earlier);
+    const auto last = std::find_if_not(strikes_.rbegin(), strikes_.rend(), IsMove);
+    contact_count_ = static_cast<size_t>(strikes_.rend() - last);
+  }
   begun_ = true;
   const FlushDenormals flush;
   size_t count = 0;
-  while (!ended_ && count + kBlockFrameCount <= frames.size()) {
-    count += RenderBlocks(frames.subspan(count));
+  while (!ended_ && (count + kBlockFrameCount) * settings_.channel_count <= samples.size()) {
+    count += RenderBlocks(samples.subspan(count * settings_.channel_count));
   }
   return count;
 }
 
-/// Renders some of `frames`; returns how many count.
-size_t OfflineRenderer::RenderBlocks(std::span<float> frames) {
-  frames = frames.first(CountBlocks(frames.size() / kBlockFrameCount) * kBlockFrameCount);
+/// Renders some of `samples`; returns how many frames count.
+size_t OfflineRenderer::RenderBlocks(std::span<float> samples) {
+  const size_t block_size = kBlockFrameCount * settings_.channel_count;
+  const size_t block_count = CountBlocks(samples.size() / block_size);
+  samples = samples.first(block_count * block_size);
   const uint64_t first = mixer_.frame();
-  PushStrikesBefore(first + frames.size());
-  mixer_.Render(frames);
+  size_t count = block_count * kBlockFrameCount;
+  PushStrikesBefore(first + count);
+  mixer_.Render(samples);
   mixer_.CollectGarbage();
-  size_t count = frames.size();
-  if (pushed_count_ == strikes_.size()) {
+  if (pushed_count_ >= contact_count_) {
     count =
         static_cast<size_t>(std::min<uint64_t>(count, EndFrame() - std::min(first, EndFrame())));
     for (size_t n = 0; n < count && !ended_; n += kBlockFrameCount) {
-      ended_ = TailEnded(frames.subspan(n, kBlockFrameCount));
+      ended_ = TailEnded(samples.subspan(n * settings_.channel_count, block_size));
       if (ended_) count = std::min(count, n + kBlockFrameCount);
     }
     ended_ = ended_ || mixer_.frame() >= EndFrame();
@@ -185,8 +234,8 @@ size_t OfflineRenderer::CountBlocks(size_t most) const {
 }
 
 uint64_t OfflineRenderer::EndFrame() const {
-  const uint64_t last =
-      strikes_.empty() ? settings_.mapping.first_frame : FirstSample(strikes_.back());
+  const uint64_t last = contact_count_ == 0 ? settings_.mapping.first_frame
+                                            : FirstSample(strikes_[contact_count_ - 1]);
   const double tail_s = settings_.tail_s > 0 ? settings_.tail_s : kLongestOpenTailS;
   return last + static_cast<uint64_t>(std::ceil(tail_s * settings_.sample_rate_hz));
 }
@@ -200,9 +249,14 @@ void OfflineRenderer::PushStrikesBefore(uint64_t frame) {
 
 bool OfflineRenderer::TailEnded(std::span<const float> block) {
   const bool quiet = std::ranges::all_of(block, [](float x) { return std::abs(x) < kQuiet; });
-  quiet_frame_count_ = quiet ? quiet_frame_count_ + block.size() : 0;
+  quiet_frame_count_ = quiet ? quiet_frame_count_ + kBlockFrameCount : 0;
   return settings_.tail_s == 0 &&
-         static_cast<double>(quiet_frame_count_) >= kQuietS * settings_.sample_rate_hz;
+         static_cast<double>(quiet_frame_count_) >= QuietS() * settings_.sample_rate_hz;
+}
+
+/// What is on its way may still arrive.
+double OfflineRenderer::QuietS() const {
+  return kQuietS + (settings_.space.hearing.propagation_delay ? kLongestPropagationS : 0);
 }
 
 }  // namespace carillon

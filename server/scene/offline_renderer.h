@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <span>
 #include <thread>
 #include <vector>
@@ -23,11 +24,13 @@ namespace carillon {
 /// How to render offline.
 struct OfflineSettings {
   uint32_t sample_rate_hz = 48000;
-  /// How long to go on after the last impulse; zero: until all is below -80 dB of full scale, at
+  uint32_t channel_count = 1;  ///< or 2
+  /// How long to go on after the last contact; zero: until all is below -80 dB of full scale, at
   /// most 60 s.
   double tail_s = 0;
   /// The simulator's step, seconds, above 0 and at most 1.
   double step_s = 1.0 / 60;
+  SceneSpace space{};
   /// As the trace was heard live: the rendering begins at its first frame, a multiple of
   /// OfflineRenderer::kBlockFrameCount.
   TimeMapping mapping{};
@@ -55,7 +58,8 @@ class OfflineRenderer {
   /// Impulses later than this are rejected.
   static constexpr double kMaxTimeS = 86400;
 
-  /// `bodies` must outlive the renderer. Errors: InvalidArgument (INVALID_SETTINGS).
+  /// `bodies` must outlive the renderer. Errors: InvalidArgument (INVALID_SETTINGS,
+  /// INVALID_HEARING, INVALID_POSE).
   static absl::StatusOr<std::unique_ptr<OfflineRenderer>> Make(const OfflineSettings& settings,
                                                                BodyCache& bodies);
 
@@ -72,15 +76,19 @@ class OfflineRenderer {
   void Hold(const ObjectForce& force);
   void Touch(const ObjectTouch& touch);
 
+  /// Where an object is at that step's time, and where the listener is. Rejected likewise.
+  void Move(uint32_t handle, const Pose& pose);
+  void MoveListener(const Pose& pose);
+
   /// Ends the step: its forces are all known.
   void EndStep();
 
   /// Counts `count` impulses that could not be used.
   void Reject(uint64_t count) { summary_.rejected_count += count; }
 
-  /// Renders the next frames, up to `frames.size()`, a multiple of kBlockFrameCount; returns how
-  /// many, zero after the end.
-  size_t Render(std::span<float> frames);
+  /// Renders the next frames, interleaved, as many as `samples` holds, a multiple of
+  /// kBlockFrameCount; returns how many, zero after the end.
+  size_t Render(std::span<float> samples);
 
   /// True for everything rendered so far.
   const OfflineSummary& summary() const { return summary_; }
@@ -89,14 +97,16 @@ class OfflineRenderer {
   OfflineRenderer(const OfflineSettings& settings, BodyCache& bodies);
 
   absl::Status TryStrike(const ObjectImpulse& impulse);
-  absl::StatusOr<Excitation> Locate(uint32_t handle, const ContactImpulse& contact) const;
+  absl::StatusOr<FeltContact> Locate(uint32_t handle, const ContactImpulse& contact,
+                                     const std::optional<SecondObject>& second) const;
   void Push(carillon::Strike strike, double time_s);
   void PushForce(uint32_t handle, carillon::Strike strike, double time_s);
   void PushStrikesBefore(uint64_t frame);
-  size_t RenderBlocks(std::span<float> frames);
+  size_t RenderBlocks(std::span<float> samples);
   size_t CountBlocks(size_t most) const;
   uint64_t EndFrame() const;
   bool TailEnded(std::span<const float> block);
+  double QuietS() const;
 
   const OfflineSettings settings_;
   BodyCache& bodies_;
@@ -106,8 +116,10 @@ class OfflineRenderer {
   std::map<uint32_t, SoundingObject> objects_;
   std::vector<carillon::Strike> strikes_;  // in order of time once rendering has begun
   ContactForces forces_;
+  PoseTimes pose_times_;
   double step_time_s_ = 0;
   size_t pushed_count_ = 0;
+  size_t contact_count_ = 0;  // of the strikes up to the last that is no move
   uint64_t quiet_frame_count_ = 0;
   bool begun_ = false;
   bool ended_ = false;

@@ -24,6 +24,44 @@ absl::Status Scene::Use(uint32_t handle,
   return found.ok() ? use((*found)->second) : found.status();
 }
 
+absl::Status Scene::Use(
+    uint32_t first, uint32_t second,
+    absl::FunctionRef<absl::Status(const SoundingObject&, const SoundingObject&)> use) const {
+  const MutexLock lock(&mutex_);
+  const auto found = Locate(first);
+  if (!found.ok()) return found.status();
+  const auto other = Locate(second);
+  return other.ok() ? use((*found)->second, (*other)->second) : other.status();
+}
+
+SceneSpace Scene::space() const {
+  const MutexLock lock(&mutex_);
+  return space_;
+}
+
+absl::Status Scene::Move(uint32_t handle, const Pose& pose,
+                         absl::FunctionRef<void(const SoundingObject&)> use) {
+  if (absl::Status status = Validate(pose); !status.ok()) return status;
+  const MutexLock lock(&mutex_);
+  if (const auto found = Locate(handle); !found.ok()) return found.status();
+  SoundingObject& object = objects_[handle];
+  object.properties.pose = pose;
+  use(object);
+  return absl::OkStatus();
+}
+
+absl::Status Scene::MoveListener(const Pose& pose,
+                                 absl::FunctionRef<void(const SoundingObject&)> use) {
+  if (absl::Status status = Validate(pose); !status.ok()) return status;
+  const MutexLock lock(&mutex_);
+  if (closed_) return SceneNotFound();
+  space_.listener = pose;
+  for (const auto& [handle, object] : objects_) {
+    if (object.voice != nullptr) use(object);
+  }
+  return absl::OkStatus();
+}
+
 absl::StatusOr<SoundingObject> Scene::Find(uint32_t handle) const {
   const MutexLock lock(&mutex_);
   const auto found = Locate(handle);

@@ -10,6 +10,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "server/base/mutex.h"
+#include "server/scene/scene_space.h"
 #include "server/scene/sounding_object.h"
 
 namespace carillon {
@@ -19,14 +20,31 @@ namespace carillon {
 /// sent to a bank that has been given up.
 class Scene {
  public:
-  explicit Scene(uint64_t id) : id_(id) {}
+  explicit Scene(uint64_t id, const SceneSpace& space = {}) : id_(id), space_(space) {}
 
   uint64_t id() const { return id_; }
+
+  /// How it is heard, and where the listener is, as told last.
+  SceneSpace space() const;
+
+  /// Notes where an object is, and calls `use` with it.
+  /// Errors: InvalidArgument (INVALID_POSE), NotFound (SCENE_NOT_FOUND, OBJECT_NOT_FOUND).
+  absl::Status Move(uint32_t handle, const Pose& pose,
+                    absl::FunctionRef<void(const SoundingObject&)> use);
+
+  /// Notes where the listener is, and calls `use` with each object whose place is heard.
+  /// Errors: InvalidArgument (INVALID_POSE), NotFound (SCENE_NOT_FOUND).
+  absl::Status MoveListener(const Pose& pose, absl::FunctionRef<void(const SoundingObject&)> use);
 
   /// Calls `use` with the object while no change can happen.
   /// Errors: NotFound (SCENE_NOT_FOUND: deleted meanwhile, OBJECT_NOT_FOUND), and those of `use`.
   absl::Status Use(uint32_t handle,
                    absl::FunctionRef<absl::Status(const SoundingObject&)> use) const;
+
+  /// The same with two objects.
+  absl::Status Use(
+      uint32_t first, uint32_t second,
+      absl::FunctionRef<absl::Status(const SoundingObject&, const SoundingObject&)> use) const;
 
   /// Errors: NotFound (SCENE_NOT_FOUND, OBJECT_NOT_FOUND).
   absl::StatusOr<SoundingObject> Find(uint32_t handle) const;
@@ -54,6 +72,7 @@ class Scene {
 
   const uint64_t id_;
   mutable Mutex mutex_;
+  SceneSpace space_ ABSL_GUARDED_BY(mutex_);
   std::map<uint32_t, SoundingObject> objects_ ABSL_GUARDED_BY(mutex_);
   bool closed_ ABSL_GUARDED_BY(mutex_) = false;
 };

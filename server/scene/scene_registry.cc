@@ -24,18 +24,27 @@ ObjectProperties Changed(ObjectProperties properties, const ObjectChange& change
   }
   if (change.size) properties.material.size = *change.size;
   if (change.gain) properties.gain = *change.gain;
+  if (change.pose) properties.pose = change.pose;
   return properties;
+}
+
+absl::Status ValidateGlide(double glide_s) {
+  constexpr double kLongestGlideS = 10;
+  if (glide_s >= 0 && glide_s <= kLongestGlideS) return absl::OkStatus();
+  return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_GLIDE",
+                 absl::StrCat("glide_s is ", glide_s, "; it must be 0 to ", kLongestGlideS));
 }
 
 }  // namespace
 
-absl::StatusOr<uint64_t> SceneRegistry::CreateScene() {
+absl::StatusOr<uint64_t> SceneRegistry::CreateScene(const SceneSpace& space) {
+  if (absl::Status status = Validate(space); !status.ok()) return status;
   const MutexLock lock(&mutex_);
   if (scenes_.size() >= kMaxSceneCount) {
     return TooMany("TOO_MANY_SCENES", kMaxSceneCount, "scenes");
   }
   const uint64_t id = next_scene_++;
-  scenes_[id] = std::make_shared<Scene>(id);
+  scenes_[id] = std::make_shared<Scene>(id, space);
   return id;
 }
 
@@ -64,7 +73,9 @@ absl::StatusOr<PlacedObject> SceneRegistry::AddObject(uint64_t scene, uint32_t h
   }
   absl::StatusOr<std::shared_ptr<const SoundingBody>> body = bodies_.Get(std::move(model));
   if (!body.ok()) return body.status();
-  absl::StatusOr<SoundingObject> object = MakeSoundingObject(*std::move(body), properties, mixer_);
+  absl::StatusOr<SoundingObject> object =
+      MakeSoundingObject(*std::move(body), properties, mixer_,
+                         MakeVoice((*found)->space(), properties.pose, mixer_.settings()));
   if (!object.ok()) return object.status();
   // Nothing can be in its way: every change holds change_mutex_.
   (*found)->Insert(*chosen, *object).IgnoreError();
@@ -78,14 +89,58 @@ absl::StatusOr<PlacedObject> SceneRegistry::UpdateObject(uint64_t scene, uint32_
   const MutexLock change_lock(&change_mutex_);
   const absl::StatusOr<std::shared_ptr<Scene>> found = FindScene(scene);
   if (!found.ok()) return found.status();
+  if (absl::Status status = ValidateGlide(change.glide_s); !status.ok()) return status;
+  if (change.pose) {
+    if (absl::Status status = Validate(*change.pose); !status.ok()) return status;
+  }
   const absl::StatusOr<SoundingObject> old = (*found)->Find(handle);
   if (!old.ok()) return old.status();
-  absl::StatusOr<SoundingObject> object =
-      MakeSoundingObject(old->body, Changed(old->properties, change), mixer_);
+  if (change.material || change.size || change.gain) {
+    absl::StatusOr<SoundingObject> object =
+        MakeSoundingObject(old->body, Changed(old->properties, change), mixer_, old->voice);
+    if (!object.ok()) return object.status();
+    (*found)->Replace(handle, *std::move(object)).IgnoreError();
+    mixer_.LetRingOut(old->bank);
+  }
+  if (change.pose) {
+    if (absl::Status status = OpenMoves(); !status.ok()) return status;
+    (*found)
+        ->Move(handle, *change.pose,
+               [&](const SoundingObject& object) ABSL_EXCLUSIVE_LOCKS_REQUIRED(change_mutex_) {
+                 SendMove(StrikeKind::kMove, object, *change.pose, change.glide_s);
+               })
+        .IgnoreError();
+  }
+  absl::StatusOr<SoundingObject> object = (*found)->Find(handle);
   if (!object.ok()) return object.status();
-  (*found)->Replace(handle, *object).IgnoreError();
-  mixer_.LetRingOut(old->bank);
   return PlacedObject{.handle = handle, .object = *std::move(object)};
+}
+
+absl::Status SceneRegistry::UpdateListener(uint64_t scene, const Pose& pose, double glide_s) {
+  const MutexLock change_lock(&change_mutex_);
+  const absl::StatusOr<std::shared_ptr<Scene>> found = FindScene(scene);
+  if (!found.ok()) return found.status();
+  if (absl::Status status = ValidateGlide(glide_s); !status.ok()) return status;
+  if (absl::Status status = OpenMoves(); !status.ok()) return status;
+  return (*found)->MoveListener(
+      pose, [&](const SoundingObject& object) ABSL_EXCLUSIVE_LOCKS_REQUIRED(change_mutex_) {
+        SendMove(StrikeKind::kMoveListener, object, pose, glide_s);
+      });
+}
+
+absl::Status SceneRegistry::OpenMoves() {
+  if (moves_ != nullptr) return absl::OkStatus();
+  absl::StatusOr<std::unique_ptr<StrikeStream>> moves = mixer_.OpenStream(kMaxObjectCount);
+  if (!moves.ok()) return moves.status();
+  moves_ = *std::move(moves);
+  return absl::OkStatus();
+}
+
+/// Of time zero: it comes at once.
+void SceneRegistry::SendMove(StrikeKind kind, const SoundingObject& object, const Pose& pose,
+                             double glide_s) {
+  if (object.voice == nullptr) return;
+  moves_->TryPush(MakeMove(kind, object.bank, pose, glide_s * mixer_.settings().sample_rate_hz));
 }
 
 absl::Status SceneRegistry::RemoveObject(uint64_t scene, uint32_t handle) {

@@ -28,6 +28,8 @@ struct ObjectChange {
   std::optional<double> poisson_ratio;  ///< of that material
   std::optional<double> size;
   std::optional<double> gain;
+  std::optional<Pose> pose;
+  double glide_s = 0;  ///< on the way there, 0 to 10; zero: it jumps
 };
 
 /// All scenes of the daemon, on one mixer. Safe from every thread.
@@ -39,8 +41,8 @@ class SceneRegistry {
   /// `mixer` must outlive the registry.
   explicit SceneRegistry(Mixer& mixer) : mixer_(mixer) {}
 
-  /// A new scene's id. Errors: ResourceExhausted (TOO_MANY_SCENES).
-  absl::StatusOr<uint64_t> CreateScene();
+  /// A new scene's id. Errors: ResourceExhausted (TOO_MANY_SCENES), and those of Validate.
+  absl::StatusOr<uint64_t> CreateScene(const SceneSpace& space = {});
 
   /// Fades out the scene's objects. Errors: NotFound (SCENE_NOT_FOUND).
   absl::Status DeleteScene(uint64_t scene);
@@ -52,10 +54,15 @@ class SceneRegistry {
                                          std::shared_ptr<const ModalModel> model,
                                          const ObjectProperties& properties);
 
-  /// A new bank takes the strikes from now on; the old one rings out. Errors: NotFound
-  /// (SCENE_NOT_FOUND, OBJECT_NOT_FOUND), and those of MakeSoundingObject.
+  /// Where more than the pose changes, a new bank takes the strikes from now on; the old one rings
+  /// out. Errors: NotFound (SCENE_NOT_FOUND, OBJECT_NOT_FOUND), InvalidArgument (INVALID_GLIDE),
+  /// and those of MakeSoundingObject.
   absl::StatusOr<PlacedObject> UpdateObject(uint64_t scene, uint32_t handle,
                                             const ObjectChange& change);
+
+  /// The listener goes to `pose`, in `glide_s` as for objects. Errors: NotFound (SCENE_NOT_FOUND),
+  /// InvalidArgument (INVALID_POSE, INVALID_GLIDE).
+  absl::Status UpdateListener(uint64_t scene, const Pose& pose, double glide_s);
 
   /// Fades the object out. Errors: NotFound (SCENE_NOT_FOUND, OBJECT_NOT_FOUND).
   absl::Status RemoveObject(uint64_t scene, uint32_t handle);
@@ -70,12 +77,17 @@ class SceneRegistry {
 
  private:
   absl::StatusOr<std::shared_ptr<Scene>> FindScene(uint64_t scene) const;
+  absl::Status OpenMoves() ABSL_EXCLUSIVE_LOCKS_REQUIRED(change_mutex_);
+  void SendMove(StrikeKind kind, const SoundingObject& object, const Pose& pose, double glide_s)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(change_mutex_);
 
   Mixer& mixer_;
   BodyCache bodies_;
   /// Held while objects come, change and go, so that limits are exact and two changes of one object
   /// do not undo each other. Contacts do not take it.
   Mutex change_mutex_;
+  /// For moves that no contact stream brings; opened when there is one.
+  std::unique_ptr<StrikeStream> moves_ ABSL_GUARDED_BY(change_mutex_);
   mutable Mutex mutex_ ABSL_ACQUIRED_AFTER(change_mutex_);
   std::map<uint64_t, std::shared_ptr<Scene>> scenes_ ABSL_GUARDED_BY(mutex_);
   uint64_t next_scene_ ABSL_GUARDED_BY(mutex_) = 1;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <string>
 #include <utility>
 
@@ -30,6 +31,9 @@ absl::Status Check(const ModalModel& model, const ObjectProperties& properties) 
   }
   if (!(properties.gain >= 0 && properties.gain <= kLargestGain)) {
     return OutOfRange("gain", properties.gain, 0, kLargestGain);
+  }
+  if (properties.pose) {
+    if (absl::Status status = Validate(*properties.pose); !status.ok()) return status;
   }
   const double wanted = properties.poisson_ratio.value_or(model.poisson_ratio);
   if (std::abs(wanted - model.poisson_ratio) <= kPoissonTolerance) return absl::OkStatus();
@@ -78,11 +82,29 @@ double DurationS(const SoundingObject& object, const ContactImpulse& impulse) {
                   kLongestContactS);
 }
 
+/// With the striker's material, where the contact is that of elastic bodies and names none.
+ContactImpulse StruckBy(const SoundingObject& striker, ContactImpulse impulse) {
+  if (impulse.hertz && impulse.hertz->striker_young_pa == 0) {
+    impulse.hertz->striker_young_pa = striker.properties.material.young_pa;
+    impulse.hertz->striker_poisson_ratio = striker.body->model->poisson_ratio;
+  }
+  return impulse;
+}
+
+/// From the frame of `from` into that of `to`, as their poses say.
+Quaternion RotationBetween(const SoundingObject& from, const SoundingObject& to) {
+  const auto orientation = [](const SoundingObject& object) {
+    const std::optional<Pose>& pose = object.properties.pose;
+    return pose ? Normalized(pose->orientation) : Quaternion();
+  };
+  return Product(Inverse(orientation(to)), orientation(from));
+}
+
 }  // namespace
 
 absl::StatusOr<SoundingObject> MakeSoundingObject(std::shared_ptr<const SoundingBody> body,
-                                                  const ObjectProperties& properties,
-                                                  Mixer& mixer) {
+                                                  const ObjectProperties& properties, Mixer& mixer,
+                                                  std::shared_ptr<Voice> voice) {
   const ModalModel& model = *body->model;
   if (absl::Status status = Check(model, properties); !status.ok()) return status;
   const SoundingBand band;
@@ -90,11 +112,13 @@ absl::StatusOr<SoundingObject> MakeSoundingObject(std::shared_ptr<const Sounding
   const SoundingModes sounding = SelectSoundingModes(
       model.eigenvalues, model.couplings, properties.material, settings.sample_rate_hz, band);
   if (sounding.modes.empty()) return NoModeInBand(model, properties.material, band);
-  absl::StatusOr<BankId> bank = mixer.Add(std::make_unique<OscillatorBank>(
-      sounding, body->shapes,
-      OscillatorBankSettings{.sample_rate_hz = settings.sample_rate_hz,
-                             .block_frame_count = settings.block_frame_count,
-                             .gain = properties.gain}));
+  absl::StatusOr<BankId> bank =
+      mixer.Add(std::make_unique<OscillatorBank>(
+                    sounding, body->shapes,
+                    OscillatorBankSettings{.sample_rate_hz = settings.sample_rate_hz,
+                                           .block_frame_count = settings.block_frame_count,
+                                           .gain = properties.gain}),
+                voice);
   if (!bank.ok()) return bank.status();
   const double top_hz = std::min(band.highest_hz, settings.sample_rate_hz / 2);
   return SoundingObject{.body = std::move(body),
@@ -103,7 +127,8 @@ absl::StatusOr<SoundingObject> MakeSoundingObject(std::shared_ptr<const Sounding
                         .lowest_frequency_hz = sounding.modes.front().natural_frequency_hz,
                         .highest_frequency_hz = sounding.modes.back().natural_frequency_hz,
                         .complete_to_hz = CompleteTo(model, properties.material, top_hz),
-                        .bank = *bank};
+                        .bank = *bank,
+                        .voice = std::move(voice)};
 }
 
 absl::StatusOr<Excitation> LocateImpulse(const SoundingObject& object,
@@ -126,6 +151,31 @@ absl::StatusOr<Excitation> LocateImpulse(const SoundingObject& object,
   std::ranges::transform(impulse.impulse_newton_seconds, excitation.impulse_newton_seconds.begin(),
                          [](double component) { return static_cast<float>(component); });
   return excitation;
+}
+
+absl::StatusOr<FeltContact> Feel(const ContactImpulse& impulse, uint32_t handle,
+                                 const SoundingObject& object) {
+  const absl::StatusOr<Excitation> excitation = LocateImpulse(object, impulse);
+  if (!excitation.ok()) return excitation.status();
+  return FeltContact{.by = {Felt{handle, object.bank, *excitation}}, .count = 1};
+}
+
+absl::StatusOr<FeltContact> Feel(const ContactImpulse& impulse, uint32_t handle,
+                                 const SoundingObject& object, const SecondObject& contact,
+                                 const SoundingObject& second) {
+  const Quaternion rotation = contact.rotation.value_or(RotationBetween(object, second));
+  if (absl::Status status = Validate(rotation); !status.ok()) return status;
+  absl::StatusOr<FeltContact> felt = Feel(StruckBy(second, impulse), handle, object);
+  if (!felt.ok()) return felt;
+  ContactImpulse opposite{.location = contact.location};
+  const Vector3 turned = Rotated(impulse.impulse_newton_seconds, Normalized(rotation));
+  std::ranges::transform(turned, opposite.impulse_newton_seconds.begin(), std::negate());
+  const absl::StatusOr<Excitation> answered = LocateImpulse(second, opposite);
+  if (!answered.ok()) return answered.status();
+  felt->by[1] = {contact.handle, second.bank, *answered};
+  felt->by[1].excitation.tau_s = felt->by[0].excitation.tau_s;
+  felt->count = 2;
+  return felt;
 }
 
 }  // namespace carillon

@@ -4,12 +4,14 @@
 #include <cstdint>
 
 #include "server/synthesis/oscillator_bank.h"
+#include "server/synthesis/voice.h"
 
 namespace carillon {
 
 /// A place for a bank as the rendering threads see it.
 struct BankSlot {
   OscillatorBank* bank = nullptr;
+  Voice* voice = nullptr;  ///< through which it is heard; null: as it is
   uint32_t generation = 0;
   uint32_t section = 0;        ///< which one renders it
   float loudness_of_blow = 0;  ///< the bank's

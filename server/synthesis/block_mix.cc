@@ -43,6 +43,18 @@ bool BlockMix::idle() const noexcept {
   return std::ranges::none_of(rendered_, &Rendered::sounding);
 }
 
+void BlockMix::SetApart(size_t block_frame_count) noexcept {
+  if (!apart_) lanes_apart_.Clear(block_frame_count);
+  apart_ = true;
+}
+
+void BlockMix::TakeApart(std::span<float> frames) noexcept {
+  std::array<float, kMostBlockFrames> apart;
+  const std::span<float> block = std::span(apart).first(frames.size());
+  lanes_apart_.Reduce(block);
+  for (size_t n = 0; n < frames.size(); ++n) frames[n] += block[n];
+}
+
 void BlockMix::Finish(std::span<float> block) noexcept {
   lanes_.Reduce(block);
   for (size_t kind = 0; kind < kLongBlockKinds; ++kind) {

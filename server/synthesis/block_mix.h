@@ -53,7 +53,15 @@ class BlockMix {
   /// No long block is under way: without banks there is silence.
   bool idle() const noexcept;
 
-  LaneMix& lanes() noexcept { return lanes_; }
+  /// What rings in the time domain goes here.
+  LaneMix& lanes() noexcept { return apart_ ? lanes_apart_ : lanes_; }
+
+  /// From now on that is not part of the block, until Reunite; in the middle of it nothing changes.
+  void SetApart(size_t block_frame_count) noexcept;
+  /// Adds what rang apart to `frames`.
+  void TakeApart(std::span<float> frames) noexcept;
+  void Reunite() noexcept { apart_ = false; }
+
   StrikeBatch& batch() noexcept { return desk_->batch; }
 
  private:
@@ -70,7 +78,8 @@ class BlockMix {
   std::array<bool, kLongBlockKinds> begins_{}, used_{};
   bool any_begins_ = false;
   std::array<Rendered, kLongBlockKinds> rendered_;
-  LaneMix lanes_;
+  LaneMix lanes_, lanes_apart_;
+  bool apart_ = false;
 };
 
 }  // namespace carillon

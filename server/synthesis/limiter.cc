@@ -18,18 +18,28 @@ float Limited(float envelope) {
 
 }  // namespace
 
-Limiter::Limiter(double sample_rate_hz)
-    : release_(static_cast<float>(std::exp(-1 / (kReleaseS * sample_rate_hz)))) {}
+Limiter::Limiter(double sample_rate_hz, size_t channel_count)
+    : channel_count_(channel_count),
+      release_(static_cast<float>(std::exp(-1 / (kReleaseS * sample_rate_hz)))) {}
 
 uint64_t Limiter::Apply(std::span<float> block) noexcept {
   uint64_t limited = 0;
-  for (float& sample : block) {
-    const bool finite = std::isfinite(sample);
-    if (!finite) sample = 0;
-    envelope_ = std::max(std::abs(sample), release_ * envelope_);
+  for (; !block.empty(); block = block.subspan(channel_count_)) {
+    bool finite = true;
+    float peak = 0;
+    for (float& sample : block.first(channel_count_)) {
+      finite &= std::isfinite(sample);
+      if (!std::isfinite(sample)) sample = 0;
+      peak = std::max(peak, std::abs(sample));
+    }
+    envelope_ = std::max(peak, release_ * envelope_);
     const bool loud = envelope_ > kThreshold;
-    if (loud) sample = std::clamp(sample * (Limited(envelope_) / envelope_), -1.0F, 1.0F);
     limited += !finite || loud;
+    if (!loud) continue;
+    const float gain = Limited(envelope_) / envelope_;
+    for (float& sample : block.first(channel_count_)) {
+      sample = std::clamp(sample * gain, -1.0F, 1.0F);
+    }
   }
   return limited;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 
@@ -12,15 +13,17 @@ namespace carillon {
 ///   f(e) = T + (1 - T) u/(1 + u),  u = (e - T)/(1 - T)
 ///
 /// whose slope is one at T and whose limit is one. Below T the samples pass bit for bit. No delay;
-/// the gain recovers with a time constant of 0.1 s. A sample that is not finite becomes zero.
+/// the gain recovers with a time constant of 0.1 s. A sample that is not finite becomes zero. All
+/// channels of a frame get one gain, that of the loudest, so that nothing moves to a side.
 class Limiter {
  public:
-  explicit Limiter(double sample_rate_hz);
+  explicit Limiter(double sample_rate_hz, size_t channel_count = 1);
 
-  /// Limits `block` in place; returns the number of frames it changed.
+  /// Limits `block`, interleaved, in place; returns the number of frames it changed.
   uint64_t Apply(std::span<float> block) noexcept;
 
  private:
+  size_t channel_count_;
   float release_;
   float envelope_ = 0;
 };

@@ -32,18 +32,20 @@ constexpr double kRingingShare = 0.9;
 }  // namespace
 
 void Mixer::Render(std::span<float> frames) noexcept {
-  assert(frames.size() % settings_.block_frame_count == 0);
+  const size_t block_size = settings_.block_frame_count * settings_.channel_count;
+  assert(frames.size() % block_size == 0);
   const InRole role(kRenderRole);
   const FlushDenormals flush_denormals;
   while (!frames.empty()) {
-    const size_t count = std::min(frames.size(), kBlocksTogether * settings_.block_frame_count);
+    const size_t count = std::min(frames.size(), kBlocksTogether * block_size);
     RenderBlocks(frames.first(count));
     frames = frames.subspan(count);
   }
 }
 
 void Mixer::RenderBlocks(std::span<float> frames) noexcept {
-  const size_t block_count = frames.size() / settings_.block_frame_count;
+  const size_t frame_count = frames.size() / settings_.channel_count;
+  const size_t block_count = frame_count / settings_.block_frame_count;
   budget_.Begin();
   ObeyCommands();
   TakeStrikes(block_count);
@@ -53,7 +55,7 @@ void Mixer::RenderBlocks(std::span<float> frames) noexcept {
   RetireLeavingBanks();
   NotePeak(frames);
   Count(statistics_.limited_frame_count, limiter_.Apply(frames));
-  block_start_ += frames.size();
+  block_start_ += frame_count;
   statistics_.frame_count.store(block_start_, std::memory_order_release);
   budget_.End(rendered_work_, static_cast<double>(block_count));
 }
@@ -67,10 +69,14 @@ void Mixer::Obey(const Command& command) noexcept {
     open_queues_.push_back(command.queue);
   } else if (command.kind == Command::Kind::kAddBank) {
     slots_[command.id.slot] = {.bank = command.bank,
+                               .voice = command.voice,
                                .generation = command.id.generation,
                                .section = command.section,
                                .loudness_of_blow = command.bank->loudness_of_blow()};
     Count(statistics_.bank_count);
+    if (command.voice == nullptr) return;
+    ++command.voice->bank_count;
+    command.bank->LeaveSpectrum();                     // a voice has no spectrum of its own
   } else if (BankSlot* slot = FindSlot(command.id)) {  // it may have rung out before it was to fade
     if (!slot->leaving) leaving_.push_back(command.id.slot);
     slot->leaving = true;
@@ -265,22 +271,27 @@ void Mixer::RenderOneSection(size_t worker, size_t section, size_t frame_count) 
   section_counts_[section] = sections_[section].Render(
       block_start_ / settings_.block_frame_count,
       std::span(due_strikes_).subspan(begin, due_ends_[section] - begin),
-      std::span(section_frames_).subspan(section * frame_count, frame_count), desks_[worker]);
+      {.frames = std::span(section_frames_).subspan(section * frame_count, frame_count),
+       .placed = std::span(placed_frames_)
+                     .subspan(section * frame_count * settings_.channel_count,
+                              frame_count * settings_.channel_count)},
+      desks_[worker]);
 }
 
 void Mixer::RenderSections(std::span<float> frames) noexcept {
   for (size_t section = 1; section < kSectionCount; ++section) {
     due_ends_[section] = std::max(due_ends_[section], due_ends_[section - 1]);
   }
+  const size_t frame_count = frames.size() / settings_.channel_count;
   const auto render = [&](size_t worker, size_t section) {
     const InRole role(kRenderRole);  // a thread of the crew, too
-    RenderOneSection(worker, section, frames.size());
+    RenderOneSection(worker, section, frame_count);
   };
   if (settings_.crew != nullptr) {
     settings_.crew->Render(kSectionCount, render);
   } else {
     for (size_t section = 0; section < kSectionCount; ++section) {
-      RenderOneSection(0, section, frames.size());
+      RenderOneSection(0, section, frame_count);
     }
   }
   MixSections(frames);
@@ -288,12 +299,15 @@ void Mixer::RenderSections(std::span<float> frames) noexcept {
 
 /// In order, whoever rendered them.
 void Mixer::MixSections(std::span<float> frames) noexcept {
-  std::ranges::fill(frames, 0.0F);
+  const size_t frame_count = frames.size() / settings_.channel_count;
+  const std::span<float> mixed =
+      settings_.channel_count == 1 ? frames : std::span(mixed_frames_).first(frame_count);
+  std::ranges::fill(mixed, 0.0F);
   uint64_t active_mode_count = 0;
   ringing_work_ = 0;
   for (size_t section = 0; section < kSectionCount; ++section) {
-    const float* rendered = section_frames_.data() + section * frames.size();
-    for (size_t n = 0; n < frames.size(); ++n) frames[n] += rendered[n];
+    const float* rendered = section_frames_.data() + section * frame_count;
+    for (size_t n = 0; n < frame_count; ++n) mixed[n] += rendered[n];
     const SectionCounts& counts = section_counts_[section];
     Count(statistics_.dropped_count, counts.dropped_count);
     Count(statistics_.reset_bank_count, counts.reset_bank_count);
@@ -301,15 +315,27 @@ void Mixer::MixSections(std::span<float> frames) noexcept {
     ringing_work_ += counts.ringing_work;
   }
   statistics_.active_mode_count.store(active_mode_count, std::memory_order_relaxed);
+  if (settings_.channel_count == 2) {
+    for (size_t n = 0; n < frame_count; ++n) frames[2 * n] = frames[2 * n + 1] = mixed[n];
+  }
+  for (size_t section = 0; section < kSectionCount; ++section) {
+    if (!section_counts_[section].placed) continue;
+    const float* placed = placed_frames_.data() + section * frames.size();
+    for (size_t n = 0; n < frames.size(); ++n) frames[n] += placed[n];
+  }
 }
 
 void Mixer::RetireLeavingBanks() noexcept {
   leaving_.EraseIf([this](uint32_t index) ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole) {
     BankSlot& slot = slots_[index];
     const bool awaited = !slot.fading && (slot.pending_count > 0 || !all_strikes_taken_);
-    if (slot.sounding || awaited) return false;
+    // The last bank of a voice goes when all of its sound has arrived.
+    const bool last_of_voice = slot.voice != nullptr && slot.voice->bank_count == 1;
+    if (slot.sounding || awaited || (last_of_voice && !slot.voice->asleep())) return false;
+    if (slot.voice != nullptr) --slot.voice->bank_count;
     SendBack({.id = {.slot = index, .generation = slot.generation}});
     slot.bank = nullptr;
+    slot.voice = nullptr;
     statistics_.bank_count.fetch_sub(1, std::memory_order_relaxed);
     return true;
   });

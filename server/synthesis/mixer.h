@@ -41,6 +41,7 @@ inline constexpr size_t kBlocksTogether = 16;
 struct MixerSettings {
   double sample_rate_hz = 48000;
   size_t block_frame_count = 128;  ///< at most kMostBlockFrames
+  size_t channel_count = 1;        ///< or 2: what has no voice sounds on both alike
   uint64_t first_frame = 0;        ///< number of the first; a multiple of block_frame_count
   size_t most_banks = 8192;        ///< those that ring out or fade included
   size_t most_streams = 1024;
@@ -87,12 +88,17 @@ class Mixer {
   Mixer(const Mixer&) = delete;
   Mixer& operator=(const Mixer&) = delete;
 
-  /// Renders the next frames, mono, within +-1. `frames` holds whole blocks of block_frame_count.
+  /// Renders the next frames, interleaved, within +-1. `frames` holds whole blocks of
+  /// block_frame_count.
   void Render(std::span<float> frames) noexcept;
 
   /// Puts a bank on the mixer; it can be struck when the call returns. The bank was made for this
-  /// mixer's sample rate and block. RESOURCE_EXHAUSTED (TOO_MANY_OBJECTS).
-  absl::StatusOr<BankId> Add(std::unique_ptr<OscillatorBank> bank) ABSL_LOCKS_EXCLUDED(kRenderRole);
+  /// mixer's sample rate, block and channels, and so was the voice through which it is heard, which
+  /// serves one object; without one it is heard as it is. A bank with a voice rings in the time
+  /// domain. RESOURCE_EXHAUSTED (TOO_MANY_OBJECTS).
+  absl::StatusOr<BankId> Add(std::unique_ptr<OscillatorBank> bank,
+                             std::shared_ptr<Voice> voice = nullptr)
+      ABSL_LOCKS_EXCLUDED(kRenderRole);
 
   /// Takes a bank off once it is silent. The caller sends it no further strikes; those on their way
   /// still sound.
@@ -127,6 +133,7 @@ class Mixer {
     enum class Kind { kAddBank, kLetRingOut, kFadeOut, kAddStream } kind;
     BankId id{};
     OscillatorBank* bank = nullptr;
+    Voice* voice = nullptr;
     uint32_t section = 0;
     StrikeQueue* queue = nullptr;
   };
@@ -138,6 +145,7 @@ class Mixer {
   /// A place for a bank as the controlling threads see it.
   struct OwnedBank {
     std::unique_ptr<OscillatorBank> bank;
+    std::shared_ptr<Voice> voice;
     uint32_t generation = 0;
     uint32_t section = 0;
     size_t mode_count = 0;
@@ -224,7 +232,9 @@ class Mixer {
   std::vector<RenderSection> sections_ ABSL_GUARDED_BY(kRenderRole);
   std::array<SectionCounts, kSectionCount> section_counts_ ABSL_GUARDED_BY(kRenderRole){};
   std::vector<float> section_frames_ ABSL_GUARDED_BY(kRenderRole);
-  std::vector<RenderDesk> desks_ ABSL_GUARDED_BY(kRenderRole);  // one for each of the crew
+  std::vector<float> placed_frames_ ABSL_GUARDED_BY(kRenderRole);
+  std::vector<float> mixed_frames_ ABSL_GUARDED_BY(kRenderRole);  // mono
+  std::vector<RenderDesk> desks_ ABSL_GUARDED_BY(kRenderRole);    // one for each of the crew
   Limiter limiter_ ABSL_GUARDED_BY(kRenderRole);
 };
 

@@ -38,7 +38,9 @@ Mixer::Mixer(const MixerSettings& settings)
               static_cast<double>(settings.block_frame_count) / settings.sample_rate_hz,
               settings.most_load),
       section_frames_(kSectionCount * kBlocksTogether * settings.block_frame_count),
-      limiter_(settings.sample_rate_hz) {
+      placed_frames_(section_frames_.size() * settings.channel_count),
+      mixed_frames_(kBlocksTogether * settings.block_frame_count),
+      limiter_(settings.sample_rate_hz, settings.channel_count) {
   assert(settings.block_frame_count > 0 && settings.block_frame_count <= kMostBlockFrames);
   assert(settings.first_frame % settings.block_frame_count == 0);
   assert(settings.most_banks <= kMostBanks);
@@ -50,7 +52,8 @@ Mixer::Mixer(const MixerSettings& settings)
                                                    .stagger = section,
                                                    .most_banks = settings.most_banks,
                                                    .fade_step = static_cast<float>(
-                                                       1 / (kFadeS * settings.sample_rate_hz))},
+                                                       1 / (kFadeS * settings.sample_rate_hz)),
+                                                   .channel_count = settings.channel_count},
                            slots_);
   }
   for (size_t slot = settings.most_banks; slot-- > 0;) {
@@ -60,7 +63,8 @@ Mixer::Mixer(const MixerSettings& settings)
 
 Mixer::~Mixer() = default;
 
-absl::StatusOr<BankId> Mixer::Add(std::unique_ptr<OscillatorBank> bank) {
+absl::StatusOr<BankId> Mixer::Add(std::unique_ptr<OscillatorBank> bank,
+                                  std::shared_ptr<Voice> voice) {
   const MutexLock lock(&control_mutex_);
   if (free_slots_.empty()) {
     return Refusal(absl::StatusCode::kResourceExhausted, "TOO_MANY_OBJECTS",
@@ -71,15 +75,19 @@ absl::StatusOr<BankId> Mixer::Add(std::unique_ptr<OscillatorBank> bank) {
   free_slots_.pop_back();
   OwnedBank& owned = owned_[slot];
   const size_t mode_count = bank->mode_count();
+  const uint32_t section = voice != nullptr && voice->section ? *voice->section : ChooseSection();
+  if (voice != nullptr) voice->section = section;
   owned = {.bank = std::move(bank),
+           .voice = std::move(voice),
            .generation = owned.generation + 1,
-           .section = ChooseSection(),
+           .section = section,
            .mode_count = mode_count};
   section_mode_counts_[owned.section] += mode_count;
   const BankId id{.slot = slot, .generation = owned.generation};
   Send({.kind = Command::Kind::kAddBank,
         .id = id,
         .bank = owned.bank.get(),
+        .voice = owned.voice.get(),
         .section = owned.section});
   return id;
 }
@@ -115,6 +123,7 @@ absl::StatusOr<std::unique_ptr<StrikeStream>> Mixer::OpenStream(size_t capacity)
 
 void Mixer::CollectGarbage() {
   std::vector<std::unique_ptr<OscillatorBank>> garbage;  // freed outside the lock
+  std::vector<std::shared_ptr<Voice>> silent_voices;
   const MutexLock lock(&control_mutex_);
   for (Retired retired; retired_.TryPop(retired);) {
     if (retired.queue != nullptr) {
@@ -123,6 +132,7 @@ void Mixer::CollectGarbage() {
       OwnedBank& owned = owned_[retired.id.slot];
       section_mode_counts_[owned.section] -= owned.mode_count;
       garbage.push_back(std::move(owned.bank));
+      silent_voices.push_back(std::move(owned.voice));
       free_slots_.push_back(retired.id.slot);
     }
   }

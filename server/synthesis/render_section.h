@@ -20,6 +20,7 @@ struct SectionCounts {
   uint64_t reset_bank_count = 0;
   uint64_t active_mode_count = 0;  ///< now
   double ringing_work = 0;  ///< units (work_budget.h) that the next block takes without strikes
+  bool placed = false;      ///< something was heard through a voice
 };
 
 /// Some of a mixer's banks, which one thread renders together; several sections may render at once.
@@ -31,6 +32,7 @@ class RenderSection {
     size_t stagger = 0;     ///< see BlockMix
     size_t most_banks = 0;  ///< in this section
     float fade_step = 0;    ///< of a fading bank's gain in a frame
+    size_t channel_count = 1;
   };
   /// `slots` belong to the mixer; this section touches its own only.
   RenderSection(const Settings& settings, std::span<BankSlot> slots);
@@ -38,16 +40,23 @@ class RenderSection {
   /// Its sounding banks' slots.
   std::span<const uint32_t> sounding() const noexcept { return sounding_; }
 
-  /// Renders `frames`, whole blocks, the first of which has this number. `strikes` are this
-  /// section's, ascending by block, then slot, then offset.
+  /// Where it renders to.
+  struct Output {
+    std::span<float> frames;  ///< what is heard as it is: whole blocks, mono
+    std::span<float> placed;  ///< what is heard through voices: as many, interleaved
+  };
+
+  /// Renders blocks, the first of which has this number. `strikes` are this section's, ascending by
+  /// block, then slot, then offset. Where the counts say that nothing was placed, `placed` is
+  /// untouched.
   SectionCounts Render(uint64_t block_number, std::span<const DueStrike> strikes,
-                       std::span<float> frames, RenderDesk& desk) noexcept
+                       const Output& output, RenderDesk& desk) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
  private:
   void Strike(std::span<const DueStrike> strikes, SectionCounts& counts) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
-  bool Excite(OscillatorBank& bank, std::span<const DueStrike> due) noexcept
+  bool Excite(BankSlot& slot, std::span<const DueStrike> due) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void RenderBank(BankSlot& slot, SectionCounts& counts) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
@@ -56,9 +65,14 @@ class RenderSection {
   void FinishBanks(std::span<float> block, SectionCounts& counts) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
+  bool Move(Voice* voice, const PendingStrike& strike, size_t offset) noexcept;
+  void Awake(Voice& voice) noexcept;
+  void RenderVoices(std::span<float> placed, SectionCounts& counts) noexcept;
+
   Settings settings_;
   std::span<BankSlot> slots_;
   FixedVector<uint32_t> sounding_;  // slots whose banks are not silent, in order of their awakening
+  FixedVector<Voice*> voices_;      // that are not asleep, in order of their awakening
   BlockMix mix_;
   LaneMix fading_mix_;
 };

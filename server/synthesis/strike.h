@@ -29,11 +29,33 @@ struct ForceKnot {
   float bandwidth_hz = 0;  ///< of the fluctuation; zero: it does not move, so there is none
 };
 
+/// Where a voice, or the listener who hears it, goes.
+struct Motion {
+  std::array<float, 3> position_m{};
+  std::array<float, 3> right{1, 0, 0};  ///< of the listener: the direction to the right
+  float glide_frames = 0;               ///< on the way, which is straight; below one: a jump
+};
+
+/// A move travels in the place of an excitation, so that strikes are no larger for it.
+constexpr Excitation ToExcitation(const Motion& motion) {
+  return {.weights = motion.position_m,
+          .impulse_newton_seconds = motion.right,
+          .tau_s = motion.glide_frames};
+}
+
+constexpr Motion ToMotion(const Excitation& excitation) {
+  return {.position_m = excitation.weights,
+          .right = excitation.impulse_newton_seconds,
+          .glide_frames = excitation.tau_s};
+}
+
 /// What a strike does to its bank.
 enum class StrikeKind : uint8_t {
-  kImpulse,  ///< the excitation at once
-  kForce,    ///< adds the excitation to the force at the next knot
-  kKnot,     ///< the forces added since the last knot are the whole force now
+  kImpulse,       ///< the excitation at once
+  kForce,         ///< adds the excitation to the force at the next knot
+  kKnot,          ///< the forces added since the last knot are the whole force now
+  kMove,          ///< the bank's voice goes elsewhere
+  kMoveListener,  ///< the listener of the bank's voice does
 };
 
 /// An excitation of one bank at its time: frame + fraction, in frames since the mixer began. The
@@ -44,7 +66,7 @@ struct Strike {
   uint64_t frame = 0;
   float fraction = 0;  ///< 0 <= fraction < 1
   StrikeKind kind = StrikeKind::kImpulse;
-  Excitation excitation{};  ///< of an impulse or a force
+  Excitation excitation{};  ///< of an impulse or a force; of a move, ToExcitation of it
   ForceKnot knot{};         ///< of a knot
 };
 

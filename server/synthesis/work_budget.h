@@ -14,6 +14,7 @@ inline constexpr double kTimeLane = 6.5;      ///< a lane in the time domain, 12
 inline constexpr double kSpectralLane = 6.5;  ///< a lane in a long block
 inline constexpr double kStrikeLane = 2;      ///< a strike, each lane
 inline constexpr double kMergedLane = 0.8;    ///< a merged strike, each lane
+inline constexpr double kVoice = 3000;        ///< a voice, 128 frames
 inline constexpr double kTakeStrike = 30;     ///< to take a strike from its stream
 inline constexpr double kJudgeStrike = 70;    ///< to keep it until it is due, and to judge it
 }  // namespace work

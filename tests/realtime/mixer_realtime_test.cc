@@ -35,6 +35,12 @@ std::unique_ptr<OscillatorBank> MakeBank(double decay_rate_per_s) {
                                           OscillatorBankSettings{});
 }
 
+std::shared_ptr<Voice> MakeVoice() {
+  const HearingSettings all{.distance_gain = true, .propagation_delay = true, .panning = true};
+  return std::make_shared<Voice>(Voice::Settings{.hearing = all, .channel_count = 2}, Place(),
+                                 Place());
+}
+
 TEST(MixerRealtime, TheWatchSeesMallocFreeAndLocks) {
   if (!kForbiddenCallsAreSeen) GTEST_SKIP() << "sanitizers replace these functions";
   const ForbiddenCalls calls;
@@ -50,12 +56,19 @@ TEST(MixerRealtime, TheWatchSeesMallocFreeAndLocks) {
 
 TEST(MixerRealtime, RenderNeitherAllocatesNorFreesNorLocks) {
   if (!kForbiddenCallsAreSeen) GTEST_SKIP() << "sanitizers replace these functions";
-  Mixer mixer({.most_banks = 64, .most_streams = 2, .most_pending_strikes = 100});
-  std::vector<float> block(128);
+  Mixer mixer(
+      {.channel_count = 2, .most_banks = 64, .most_streams = 2, .most_pending_strikes = 100});
+  std::vector<float> block(2 * 128);
   std::vector<BankId> banks;
   auto stream = mixer.OpenStream(256).value();
   for (int i = 0; i < 300; ++i) {
-    if (i % 5 == 0 && i < 250) banks.push_back(mixer.Add(MakeBank(-300)).value());
+    if (i % 5 == 0 && i < 250) {
+      banks.push_back(mixer.Add(MakeBank(-300), i % 2 == 0 ? MakeVoice() : nullptr).value());
+    }
+    stream->TryPush({.bank = banks.back(),
+                     .kind = i % 3 == 0 ? StrikeKind::kMoveListener : StrikeKind::kMove,
+                     .excitation = ToExcitation({.position_m = {1.0F * static_cast<float>(i), 0, 0},
+                                                 .glide_frames = i % 4 == 0 ? 0.0F : 300.0F})});
     Excitation excitation = MakeUnitExcitation();
     excitation.tau_s = 1e-4F;
     if (i % 7 == 0) excitation.impulse_newton_seconds[0] = std::numeric_limits<float>::quiet_NaN();

@@ -33,14 +33,16 @@ class OptionsFile : public testing::Test {
 };
 
 TEST_F(OptionsFile, FlagsWinOverTheFileAndTheFileOverTheDefaults) {
-  const char* file =
-      Write("listen = [\"unix:/a\", \"127.0.0.1:1\"]\nsample_rate = 44100\nblock_frames = 64\n");
+  const char* file = Write(
+      "listen = [\"unix:/a\", \"127.0.0.1:1\"]\nsample_rate = 44100\nblock_frames = 64\nchannels = "
+      "2\n");
   const absl::StatusOr<CommandLine> command = Read({"--config", file, "--block-frames", "256"});
   ASSERT_TRUE(command.ok()) << command.status();
   EXPECT_TRUE(command->run);
   EXPECT_THAT(command->options.addresses, ElementsAre("unix:/a", "127.0.0.1:1"));
   EXPECT_EQ(command->options.sample_rate_hz, 44100U);
   EXPECT_EQ(command->options.block_frame_count, 256U);
+  EXPECT_EQ(command->options.channel_count, 2U);
   EXPECT_EQ(command->options.audio_device, "auto");
 }
 

@@ -63,7 +63,8 @@ class AudioApi : public ServedDaemon {
       if (response.has_format()) rendering.format = response.format();
       if (response.has_summary()) rendering.summary = response.summary();
       if (response.has_block()) {
-        EXPECT_EQ(response.block().first_frame(), rendering.sound.size());
+        EXPECT_EQ(response.block().first_frame(),
+                  rendering.sound.size() / rendering.format.channel_count());
         AppendSamples(response.block(), rendering.sound);
       }
     }
@@ -105,6 +106,50 @@ TEST_F(AudioApi, RenderGivesFormatSoundAndSummary) {
   EXPECT_EQ(rendering.summary.accepted_count(), 1U);
   EXPECT_EQ(rendering.summary.rejected_count(), 0U);
   EXPECT_GT(rendering.summary.peak(), 0.001);
+}
+
+TEST_F(AudioApi, ATraceCarriesHowAndFromWhereItIsHeard) {
+  Requests requests = Trace();
+  requests[0].mutable_settings()->set_channel_count(2);
+  v1::ContactTraceHeader& header = *requests[1].mutable_record()->mutable_header();
+  header.mutable_hearing()->set_propagation_delay(true);
+  header.mutable_hearing()->set_panning(true);
+  header.mutable_hearing()->set_sound_speed_m_per_s(480);
+  header.mutable_listener()->mutable_position_m()->set_y(2);
+  v1::ContactTraceObject& object = *requests[2].mutable_record()->mutable_object();
+  object.mutable_pose()->mutable_position_m()->set_y(2);
+  object.mutable_pose()->mutable_position_m()->set_x(4.8);  // 480 frames to the right
+  const Rendering rendering = Render(requests);
+  ASSERT_TRUE(rendering.status.ok()) << rendering.status.error_message();
+  EXPECT_EQ(rendering.format.channel_count(), 2U);
+  EXPECT_EQ(rendering.summary.frame_count(), rendering.sound.size() / 2);
+  const auto heard = [](float x) { return std::abs(x) > 1e-6; };
+  const auto onset = std::ranges::find_if(rendering.sound, heard) - rendering.sound.begin();
+  EXPECT_EQ(onset % 2, 1);
+  // sin(0) is silent; what lies between two samples rings a little before.
+  EXPECT_NEAR(static_cast<double>(onset / 2), 0.5 * 48000 + 480 + 1, 1);
+}
+
+TEST_F(AudioApi, PosesInTheStepsMoveTheObjectsOfATrace) {
+  Requests requests = Trace();
+  requests[0].mutable_settings()->set_channel_count(2);
+  requests[1].mutable_record()->mutable_header()->mutable_hearing()->set_panning(true);
+  v1::ContactStep& step = *requests[3].mutable_record()->mutable_step();
+  v1::ObjectPose& pose = *step.add_poses();
+  pose.set_object(1);
+  pose.mutable_pose()->mutable_position_m()->set_x(-1);
+  *step.add_poses() = pose;
+  step.mutable_poses(1)->set_object(7);  // there is none
+  const Rendering rendering = Render(requests);
+  ASSERT_TRUE(rendering.status.ok()) << rendering.status.error_message();
+  EXPECT_EQ(rendering.summary.rejected_count(), 1U);
+  double left = 0, right = 0;
+  for (size_t n = 0; n < rendering.sound.size(); n += 2) {
+    left += std::abs(rendering.sound[n]);
+    right += std::abs(rendering.sound[n + 1]);
+  }
+  EXPECT_GT(left, 1);
+  EXPECT_LT(right, 1e-5 * left);
 }
 
 TEST_F(AudioApi, AListenerHearsWhatTheMixerRenders) {
@@ -218,6 +263,15 @@ TEST_F(AudioApi, SettingsAndObjectsThatCannotBeAreRefusedWithTheirReasons) {
   requests = good;
   requests.insert(requests.begin() + 2, good[2]);
   ExpectRefused(Render(requests).status, grpc::ALREADY_EXISTS, "OBJECT_EXISTS");
+  requests = good;
+  requests[0].mutable_settings()->set_channel_count(3);
+  ExpectRefused(Render(requests).status, grpc::INVALID_ARGUMENT, "INVALID_SETTINGS");
+  requests = good;
+  requests[1].mutable_record()->mutable_header()->mutable_hearing()->set_reference_distance_m(-1);
+  ExpectRefused(Render(requests).status, grpc::INVALID_ARGUMENT, "INVALID_HEARING");
+  requests = good;
+  requests[2].mutable_record()->mutable_object()->mutable_pose()->mutable_orientation()->set_w(2);
+  ExpectRefused(Render(requests).status, grpc::INVALID_ARGUMENT, "INVALID_POSE");
 }
 
 TEST_F(AudioApi, ImpulsesThatCannotBeUsedAreCountedAndTheRestIsRendered) {

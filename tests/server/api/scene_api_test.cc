@@ -46,6 +46,41 @@ class SceneApi : public ServedDaemon {
   }
 };
 
+TEST_F(SceneApi, AnObjectStatesWhereItIsOnceItWasTold) {
+  const std::string scene = CreateScene();
+  v1::AddObjectResponse added;
+  ASSERT_TRUE(Add(SmallObject(scene), added).ok());
+  EXPECT_FALSE(added.object().has_pose());
+  v1::UpdateObjectRequest request;
+  request.set_name(added.object().name());
+  request.mutable_pose()->mutable_position_m()->set_z(-3);
+  v1::UpdateObjectResponse updated;
+  ASSERT_TRUE(Update(request, updated).ok());
+  EXPECT_EQ(updated.object().pose().position_m().z(), -3);
+  EXPECT_EQ(updated.object().pose().orientation().w(), 1);
+  request.set_glide_s(-1);
+  ExpectRefused(Update(request, updated), grpc::INVALID_ARGUMENT, "INVALID_GLIDE");
+  v1::AddObjectRequest nowhere = SmallObject(scene);
+  nowhere.mutable_pose()->mutable_position_m()->set_x(1e7);
+  ExpectRefused(Add(nowhere, added), grpc::INVALID_ARGUMENT, "INVALID_POSE");
+}
+
+TEST_F(SceneApi, TheListenerOfASceneCanBeMoved) {
+  v1::UpdateListenerRequest request;
+  request.set_scene(CreateScene());
+  request.mutable_pose()->mutable_position_m()->set_x(1);
+  const auto update = [&] {
+    grpc::ClientContext context;
+    v1::UpdateListenerResponse response;
+    return scenes->UpdateListener(&context, request, &response);
+  };
+  EXPECT_TRUE(update().ok());
+  request.mutable_pose()->mutable_orientation()->set_x(0.5);
+  ExpectRefused(update(), grpc::INVALID_ARGUMENT, "INVALID_POSE");
+  request.set_scene("scenes/99");
+  ExpectRefused(update(), grpc::NOT_FOUND, "SCENE_NOT_FOUND");
+}
+
 TEST_F(SceneApi, AnObjectStatesHowItSounds) {
   const std::string scene = CreateScene();
   v1::AddObjectResponse response;

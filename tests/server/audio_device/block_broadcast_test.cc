@@ -36,7 +36,7 @@ class BlockBroadcastTest : public testing::Test {
     return first_frames;
   }
 
-  BlockBroadcast broadcast_{kBlock, 3};
+  BlockBroadcast broadcast_{DeviceFormat{.block_frame_count = kBlock}, 3};
   uint64_t next_block_ = 0;
   int wake_count_ = 0;
 };

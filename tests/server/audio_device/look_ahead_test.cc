@@ -68,6 +68,22 @@ TEST(LookAhead, LosesNoFrameBetweenRendererAndDevice) {
   for (size_t i = 0; i < heard.size(); ++i) ASSERT_EQ(heard[i], static_cast<float>(i + 1));
 }
 
+TEST(LookAhead, InStereoCountsFramesNotSamples) {
+  DeviceFormat stereo = kFormat;
+  stereo.channel_count = 2;
+  ManualClock clock;
+  LookAhead look_ahead(stereo, 4, Ramp(), clock);
+  EXPECT_DOUBLE_EQ(look_ahead.latency_s(), 4 * 16 / 48000.0);
+  look_ahead.Start().IgnoreError();
+  look_ahead.Stop();
+  std::vector<float> samples(2 * 64);
+  look_ahead.Pull(samples);
+  EXPECT_EQ(samples.back(), 128);
+  std::vector<float> rest(2 * 100);
+  while (look_ahead.xrun_count() == 0) look_ahead.Pull(rest);  // the thread may have run once more
+  EXPECT_LE(look_ahead.lost_frame_count(), 100U);
+}
+
 TEST(LookAhead, StatesTheLatencyItAdds) {
   ManualClock clock;
   const LookAhead look_ahead(kFormat, 6, Ramp(), clock);

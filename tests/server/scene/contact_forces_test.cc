@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
 #include <vector>
 
 namespace carillon {
@@ -10,6 +11,10 @@ namespace {
 
 constexpr double kStepS = 0.01;
 constexpr Excitation kTenNewtons{.weights = {1, 0, 0}, .impulse_newton_seconds = {0, 0, 10}};
+
+FeltContact FeltBy(uint32_t handle, const Excitation& excitation) {
+  return {.by = {Felt{.handle = handle, .excitation = excitation}}, .count = 1};
+}
 
 struct Pushed {
   uint32_t handle;
@@ -33,7 +38,7 @@ class ContactForcesTest : public testing::Test {
   }
 
   std::vector<Pushed> Hold(double time_s, const Roughness& roughness = {}) {
-    return Step(time_s, [&] { forces_.Add(3, kTenNewtons, roughness); });
+    return Step(time_s, [&] { forces_.Add(FeltBy(3, kTenNewtons), roughness); });
   }
 
   std::vector<Pushed> Nothing(double time_s) {
@@ -52,6 +57,22 @@ TEST_F(ContactForcesTest, GivesEachObjectItsForcesAndThenAKnot) {
   EXPECT_EQ(pushed[1].strike.kind, StrikeKind::kKnot);
   EXPECT_FLOAT_EQ(pushed[1].strike.knot.step_s, 0.01F);
   EXPECT_EQ(pushed[1].time_s, 0.5);
+}
+
+TEST_F(ContactForcesTest, WhatIsABlowToOneObjectOfAPairIsABlowToBoth) {
+  FeltContact impulse = FeltBy(3, kTenNewtons);
+  impulse.by[1] = {.handle = 4, .excitation = kTenNewtons};
+  impulse.by[1].excitation.impulse_newton_seconds[2] = -10;
+  impulse.count = 2;
+  const ObjectTouch touch{.handle = 3, .partner = 9};
+  const auto pushed = Step(0, [&] { forces_.Touch(touch, impulse); });
+  std::map<uint32_t, float> struck;
+  for (const Pushed& push : pushed) {
+    if (push.strike.kind != StrikeKind::kImpulse) continue;
+    struck[push.handle] += push.strike.excitation.impulse_newton_seconds[2];
+  }
+  EXPECT_GT(struck[3], 1);  // nothing was usual before, so it is mostly a blow
+  EXPECT_EQ(struck[4], -struck[3]);
 }
 
 TEST_F(ContactForcesTest, EndsAForceWithTwoKnotsAndThenIsStill) {
@@ -74,8 +95,9 @@ TEST_F(ContactForcesTest, EndsAForceWhereStepsWereLeftOut) {
 
 TEST_F(ContactForcesTest, ARoughnessIsWeighedByItsForce) {
   const auto pushed = Step(0, [&] {
-    forces_.Add(3, kTenNewtons, {.travel_speed_m_per_s = 2, .depth = 0.4, .grain_m = 0.001});
-    forces_.Add(3, kTenNewtons, {});  // rests
+    forces_.Add(FeltBy(3, kTenNewtons),
+                {.travel_speed_m_per_s = 2, .depth = 0.4, .grain_m = 0.001});
+    forces_.Add(FeltBy(3, kTenNewtons), {});  // rests
   });
   EXPECT_FLOAT_EQ(pushed.back().strike.knot.roughness, 0.2F);
   EXPECT_FLOAT_EQ(pushed.back().strike.knot.bandwidth_hz, 2000);
@@ -86,7 +108,8 @@ TEST_F(ContactForcesTest, OfATouchThePartThatIsABlowStrikesAndTheRestIsAForce) {
     return [this, newton_seconds] {
       Excitation impulse = kTenNewtons;
       impulse.impulse_newton_seconds[2] = static_cast<float>(newton_seconds);
-      forces_.Touch({.handle = 3, .partner = 9, .impulse = {}, .roughness = {}}, impulse);
+      forces_.Touch({.handle = 3, .partner = 9, .impulse = {}, .roughness = {}},
+                    FeltBy(3, impulse));
     };
   };
   auto pushed = Step(0, touch(1));  // from flight
@@ -104,7 +127,8 @@ TEST_F(ContactForcesTest, OfATouchThePartThatIsABlowStrikesAndTheRestIsAForce) {
 
 TEST_F(ContactForcesTest, AnotherPartnerIsAnotherPair) {
   const auto touch = [this](uint32_t partner) {
-    forces_.Touch({.handle = 3, .partner = partner, .impulse = {}, .roughness = {}}, kTenNewtons);
+    forces_.Touch({.handle = 3, .partner = partner, .impulse = {}, .roughness = {}},
+                  FeltBy(3, kTenNewtons));
   };
   for (int i = 0; i < 20; ++i) Step(i * kStepS, [&] { touch(1); });
   const auto pushed = Step(20 * kStepS, [&] {

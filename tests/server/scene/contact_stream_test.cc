@@ -58,6 +58,79 @@ TEST_F(ContactStreamTest, AContactSoundsAtTheFirstStepsArrivalPlusItsTimePlusThe
   EXPECT_EQ(Onset(Render(40000)), expected + 1);  // sin(0) is silent
 }
 
+/// On object 1, by object 2 at the same place of its own.
+ObjectImpulse PairImpulse(const std::optional<Quaternion>& rotation = std::nullopt) {
+  ObjectImpulse impulse = SmallImpulse(1);
+  impulse.second = {.handle = 2, .location = Point{0, 0, 0}, .rotation = rotation};
+  return impulse;
+}
+
+TEST_F(ContactStreamTest, TheSecondObjectOfAContactFeelsTheOpposite) {
+  ASSERT_TRUE(scenes_.AddObject(scene_, 2, SmallModel(), SmallProperties()).ok());
+  const auto stream = Open(0);
+  ASSERT_TRUE(stream->BeginStep(0).ok());
+  stream->Strike(PairImpulse());
+  // Two equal bodies, struck at once with opposite impulses: nothing is left but rounding, 100 dB
+  // below one of them.
+  for (const float sample : Render(4800)) EXPECT_LT(std::abs(sample), 2e-7);
+  EXPECT_EQ(stream->counts().accepted_count, 2U);
+}
+
+TEST_F(ContactStreamTest, TheImpulseOnTheSecondObjectIsTurnedIntoItsFrame) {
+  ASSERT_TRUE(scenes_.AddObject(scene_, 2, SmallModel(), SmallProperties()).ok());
+  const auto stream = Open(0);
+  ASSERT_TRUE(stream->BeginStep(0).ok());
+  // Half a turn about z: what was opposite is alike, and both sound as one struck twice as hard.
+  stream->Strike(PairImpulse(Quaternion{.w = 0, .z = 1}));
+  const std::vector<float> both = Render(4800);
+  Mixer alone;
+  SceneRegistry scenes(alone);
+  const uint64_t scene = *scenes.CreateScene();
+  ASSERT_TRUE(scenes.AddObject(scene, 1, SmallModel(), SmallProperties()).ok());
+  const auto other = *scenes.OpenContactStream(scene, {.step_s = 0.01, .scheduling_delay_s = 0});
+  ASSERT_TRUE(other->BeginStep(0).ok());
+  other->Strike(SmallImpulse(1, 2));
+  std::vector<float> twice(4864);
+  alone.Render(twice);
+  for (size_t n = 0; n < both.size(); ++n) EXPECT_NEAR(both[n], twice[n], 1e-6) << n;
+}
+
+TEST_F(ContactStreamTest, AContactWithAnUnknownSecondObjectIsRejectedForBoth) {
+  const auto stream = Open(0);
+  ASSERT_TRUE(stream->BeginStep(0).ok());
+  stream->Strike(PairImpulse());
+  EXPECT_EQ(stream->counts().rejected_count, 2U);
+  EXPECT_THAT(stream->last_rejection().ToString(), HasSubstr("OBJECT_NOT_FOUND"));
+  ASSERT_TRUE(scenes_.AddObject(scene_, 2, SmallModel(), SmallProperties()).ok());
+  stream->Strike(PairImpulse(Quaternion{.w = 2}));
+  EXPECT_EQ(stream->counts().rejected_count, 4U);
+  EXPECT_THAT(stream->last_rejection().ToString(), HasSubstr("INVALID_POSE"));
+  EXPECT_EQ(Onset(Render(4800)), 4800U);
+}
+
+TEST_F(ContactStreamTest, AnElasticCollisionOfTwoObjectsLastsAsLongForBothByBothsStiffness) {
+  ObjectProperties soft = SmallProperties();
+  soft.material.young_pa /= 100;
+  ASSERT_TRUE(scenes_.AddObject(scene_, 2, SmallModel(), SmallProperties()).ok());
+  ASSERT_TRUE(scenes_.AddObject(scene_, 3, SmallModel(), soft).ok());
+  const auto feel = [&](uint32_t first, uint32_t second) {
+    ContactImpulse impulse = SmallImpulse(first).impulse;
+    impulse.hertz = {.reduced_mass_kg = 0.1, .reduced_radius_m = 0.02, .approach_speed_m_per_s = 1};
+    const auto placed = [&](uint32_t handle) {
+      return scenes_.UpdateObject(scene_, handle, {})->object;
+    };
+    return *Feel(impulse, first, placed(first), {.handle = second, .location = Point{0, 0, 0}},
+                 placed(second));
+  };
+  const FeltContact hard = feel(1, 2), mixed = feel(1, 3), reversed = feel(3, 1);
+  EXPECT_EQ(hard.by[0].excitation.tau_s, hard.by[1].excitation.tau_s);
+  EXPECT_EQ(mixed.by[0].excitation.tau_s, mixed.by[1].excitation.tau_s);
+  EXPECT_FLOAT_EQ(mixed.by[0].excitation.tau_s, reversed.by[0].excitation.tau_s);
+  // 1/E goes from 2 to 1 + 100 of its unit, and the duration is its power 2/5.
+  EXPECT_NEAR(mixed.by[0].excitation.tau_s / hard.by[0].excitation.tau_s, std::pow(50.5, 0.4),
+              1e-4);
+}
+
 TEST_F(ContactStreamTest, AnImpulseBetweenTwoFramesIsFirstHeardAtTheLater) {
   const auto stream = Open(0.02);
   ASSERT_TRUE(stream->BeginStep(0).ok());

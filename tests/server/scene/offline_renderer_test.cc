@@ -103,6 +103,73 @@ TEST_F(OfflineRendererTest, IsBitForBitWhatTheLiveMixerRenders) {
   EXPECT_EQ(offline, live);
 }
 
+constexpr HearingSettings kAllHeard{
+    .distance_gain = true, .propagation_delay = true, .panning = true};
+
+/// One object circles, the listener walks and turns, and is struck on the way.
+template <typename Target>
+void MoveAt(Target& target, double time_s) {
+  target.Move(1, {.position_m = {3 * std::cos(2 * time_s), 0, 3 * std::sin(2 * time_s)}});
+  target.MoveListener({.position_m = {0, time_s, 0}, .orientation = Normalized({1, 0, time_s, 0})});
+}
+
+std::vector<float> RenderPlaced(size_t thread_count, const TimeMapping& mapping,
+                                BodyCache& bodies) {
+  const auto renderer = *OfflineRenderer::Make({.sample_rate_hz = kRate,
+                                                .channel_count = 2,
+                                                .tail_s = 0.5,
+                                                .step_s = 0.0137,
+                                                .space = {.hearing = kAllHeard, .listener = {}},
+                                                .mapping = mapping,
+                                                .thread_count = thread_count},
+                                               bodies);
+  for (const uint32_t handle : {1U, 2U}) {
+    EXPECT_TRUE(renderer->AddObject(handle, SmallModel(), SmallProperties()).ok());
+  }
+  double last_s = -1;
+  StrikeAll([&](double time_s, const ObjectImpulse& impulse) {
+    renderer->BeginStep(time_s);
+    if (time_s > last_s) MoveAt(*renderer, time_s);
+    last_s = time_s;
+    renderer->Strike(impulse);
+    renderer->EndStep();
+  });
+  std::vector<float> sound(size_t{2} * 48000 * 3);
+  sound.resize(2 * renderer->Render(sound));
+  EXPECT_EQ(renderer->summary().rejected_count, 0U);
+  return sound;
+}
+
+TEST_F(OfflineRendererTest, PlacesAreHeardBitForBitAsLiveAndForAnyNumberOfThreads) {
+  Mixer mixer({.sample_rate_hz = kRate,
+               .block_frame_count = OfflineRenderer::kBlockFrameCount,
+               .channel_count = 2});
+  SceneRegistry scenes(mixer);
+  const uint64_t scene = *scenes.CreateScene({.hearing = kAllHeard, .listener = {}});
+  for (const uint32_t handle : {1U, 2U}) {
+    ASSERT_TRUE(scenes.AddObject(scene, handle, model_, SmallProperties()).ok());
+  }
+  std::vector<float> before(2 * 21 * OfflineRenderer::kBlockFrameCount);
+  mixer.Render(before);
+  const auto stream =
+      *scenes.OpenContactStream(scene, {.step_s = 0.0137, .scheduling_delay_s = 0.0271});
+  double last_s = -1;
+  StrikeAll([&](double time_s, const ObjectImpulse& impulse) {
+    ASSERT_TRUE(stream->BeginStep(time_s).ok());
+    if (time_s > last_s) MoveAt(*stream, time_s);
+    last_s = time_s;
+    stream->Strike(impulse);
+  });
+  const TimeMapping mapping{.first_frame = *stream->first_frame(), .delay_s = 0.0271};
+  const std::vector<float> offline = RenderPlaced(1, mapping, bodies_);
+  std::vector<float> live((offline.size() + 255) / 256 * 256);
+  mixer.Render(live);
+  live.resize(offline.size());
+  EXPECT_GT(*std::ranges::max_element(offline), 0.003);
+  EXPECT_EQ(offline, live);
+  EXPECT_EQ(RenderPlaced(2, mapping, bodies_), offline);
+}
+
 TEST_F(OfflineRendererTest, FrameZeroIsSimulationTimeZero) {
   const auto renderer = Make();
   StrikeAt(*renderer, 0.125, SmallImpulse(1));

@@ -177,6 +177,26 @@ TEST(SceneRegistry, AfterAnUpdateWhatRangGoesOnAndWhatIsStruckSoundsTheNewWay) {
   EXPECT_GT(Peak(sound), 1e-3);
 }
 
+TEST(SceneRegistry, WhateverChangesWhatRingsGoesOnBitForBit) {
+  ObjectChange larger, softer, louder;
+  larger.size = 3;
+  softer.material = SmallProperties().material;
+  softer.material->young_pa /= 9;
+  softer.material->loss_factor = {{.frequency_hz = 1000, .loss_factor = 0.01}};
+  louder.gain = 10;
+  for (const ObjectChange& change : {larger, softer, louder}) {
+    Stage stage, untouched;
+    const uint32_t handle = stage.Add();
+    untouched.Strike(untouched.Add());
+    stage.Strike(handle);
+    ASSERT_EQ(stage.Render(7), untouched.Render(7));
+    ASSERT_TRUE(stage.scenes.UpdateObject(stage.scene, handle, change).ok());
+    const std::vector<float> sound = stage.Render(40);
+    EXPECT_GT(Peak(sound), 1e-3);
+    EXPECT_EQ(sound, untouched.Render(40));
+  }
+}
+
 TEST(SceneRegistry, AnUpdateKeepsWhatItDoesNotName) {
   Stage stage;
   const uint32_t handle = stage.Add();
@@ -191,6 +211,68 @@ TEST(SceneRegistry, AnUpdateKeepsWhatItDoesNotName) {
   EXPECT_EQ(placed.object.properties.material.size, 2);
   EXPECT_NEAR(placed.object.lowest_frequency_hz, 440, 1e-9);  // twice as large, four times as stiff
   EXPECT_EQ(stage.scenes.object_count(), 1U);
+}
+
+/// The level of the left channel to that of the right.
+double Side(const std::vector<float>& sound) {
+  double left = 0, right = 0;
+  for (size_t n = 0; n < sound.size(); n += 2) {
+    left += sound[n] * sound[n];
+    right += sound[n + 1] * sound[n + 1];
+  }
+  return std::sqrt(left / right);
+}
+
+TEST(SceneRegistry, AnObjectThatRingsIsHeardWhereItGoesAndFromWhereTheListenerGoes) {
+  Mixer mixer({.channel_count = 2});
+  SceneRegistry scenes(mixer);
+  const HearingSettings panning{.panning = true};
+  const uint64_t scene = *scenes.CreateScene({.hearing = panning, .listener = {}});
+  ObjectProperties properties = SmallProperties();
+  properties.pose = Pose{.position_m = {-1, 0, 0}};
+  const uint32_t handle = scenes.AddObject(scene, 0, SmallModel(), properties)->handle;
+  const auto stream = *scenes.OpenContactStream(scene, {.step_s = 0.01, .scheduling_delay_s = 0});
+  ASSERT_TRUE(stream->BeginStep(0).ok());
+  stream->Strike(SmallImpulse(handle));
+  std::vector<float> sound(2 * 1280);
+  const auto render = [&] {
+    mixer.Render(sound);
+    return Side(sound);
+  };
+  EXPECT_GT(render(), 1000);
+  ObjectChange change;
+  change.pose = Pose{.position_m = {1, 0, 0}};
+  change.glide_s = 0.01;
+  const PlacedObject placed = *scenes.UpdateObject(scene, handle, change);
+  EXPECT_EQ(placed.object.properties.pose->position_m[0], 1);
+  render();
+  render();
+  EXPECT_LT(render(), 0.001);
+  ASSERT_TRUE(scenes.UpdateListener(scene, {.position_m = {2, 0, 0}}, 0).ok());
+  render();
+  EXPECT_GT(render(), 1000);
+}
+
+TEST(SceneRegistry, RefusesPosesGlidesAndHearingsOutOfRange) {
+  Stage stage;
+  const uint32_t handle = stage.Add();
+  ObjectChange nowhere;
+  nowhere.pose = Pose{.position_m = {std::nan(""), 0, 0}};
+  ObjectChange slow;
+  slow.glide_s = 11;
+  const auto update = [&](const ObjectChange& change) {
+    return stage.scenes.UpdateObject(stage.scene, handle, change).status().ToString();
+  };
+  EXPECT_THAT(update(nowhere), HasSubstr("INVALID_POSE"));
+  EXPECT_THAT(update(slow), HasSubstr("INVALID_GLIDE"));
+  EXPECT_THAT(stage.scenes.UpdateListener(stage.scene, {}, -1).ToString(),
+              HasSubstr("INVALID_GLIDE"));
+  EXPECT_THAT(stage.scenes.UpdateListener(stage.scene, {.orientation = {.w = 3}}, 0).ToString(),
+              HasSubstr("INVALID_POSE"));
+  HearingSettings hearing;
+  hearing.sound_speed_m_per_s = 0;
+  EXPECT_THAT(stage.scenes.CreateScene({.hearing = hearing, .listener = {}}).status().ToString(),
+              HasSubstr("INVALID_HEARING"));
 }
 
 TEST(SceneRegistry, ARemovedObjectFadesOut) {

@@ -57,6 +57,15 @@ TEST(Limiter, TheGainRecoversWithinASecond) {
   EXPECT_EQ(soft.back(), 0.1F);
 }
 
+TEST(Limiter, AllChannelsOfAFrameGetTheGainOfTheLoudest) {
+  Limiter limiter(48000, 2);
+  std::vector<float> frames = {2, 0.5F, 0.1F, -4, 0, 0.25F};
+  EXPECT_EQ(limiter.Apply(frames), 3U);
+  EXPECT_NEAR(frames[1] / frames[0], 0.25, 1e-6);
+  EXPECT_NEAR(frames[2] / frames[3], -0.025, 1e-6);
+  EXPECT_LE(std::abs(frames[3]), 1);
+}
+
 TEST(Limiter, WhatIsNotFiniteBecomesSilence) {
   constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
   constexpr float kInfinity = std::numeric_limits<float>::infinity();

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client_sdk/adapters/bullet_contacts.h"
+
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+namespace carillon::adapters {
+namespace {
+
+/// A ball that runs into one that rests and is turned by a quarter about z; read out after every
+/// substep.
+class BulletContactsTest : public testing::Test {
+ protected:
+  BulletContactsTest() : dispatcher_(&configuration_) {
+    world_.setGravity({0, 0, 0});
+    world_.setInternalTickCallback(
+        [](btDynamicsWorld* world, btScalar) {
+          auto& test = *static_cast<BulletContactsTest*>(world->getWorldUserInfo());
+          test.contacts_.Read(test.dispatcher_, test.step_);
+        },
+        this);
+    for (btRigidBody* body : {&left_, &right_}) world_.addRigidBody(body);
+    left_.setLinearVelocity({1, 0, 0});
+    const btQuaternion quarter({0, 0, 1}, std::numbers::pi_v<btScalar> / 2);
+    right_.setWorldTransform(btTransform(quarter, {0.101F, 0, 0}));
+  }
+  ~BulletContactsTest() override {
+    for (btRigidBody* body : {&left_, &right_}) world_.removeRigidBody(body);
+  }
+
+  void Simulate() {
+    for (int i = 0; i < 10; ++i) world_.stepSimulation(0.001F, 0);
+  }
+
+  btSphereShape ball_{0.05F};
+  btRigidBody left_{{1, nullptr, &ball_, {1, 1, 1}}}, right_{{1, nullptr, &ball_, {1, 1, 1}}};
+  btDefaultCollisionConfiguration configuration_;
+  btCollisionDispatcher dispatcher_;
+  btDbvtBroadphase broadphase_;
+  btSequentialImpulseConstraintSolver solver_;
+  btDiscreteDynamicsWorld world_{&dispatcher_, &broadphase_, &solver_, &configuration_};
+  BulletContacts contacts_{{}};
+  v1::ContactStep step_;
+};
+
+TEST_F(BulletContactsTest, WhatIsNotHeardIsNotRead) {
+  Simulate();
+  EXPECT_EQ(step_.contacts_size(), 0);
+  EXPECT_GT(right_.getLinearVelocity().x(), 0);  // they have met
+}
+
+TEST_F(BulletContactsTest, AContactOfTwoObjectsIsOneRowWithASecondObject) {
+  contacts_.AddObject(right_, 4);
+  contacts_.AddObject(left_, 9);
+  Simulate();
+  ASSERT_GT(step_.contacts_size(), 0);
+  for (const v1::EngineContact& contact : step_.contacts()) {
+    EXPECT_EQ(contact.object(), 4U);
+    EXPECT_EQ(contact.second().object(), 9U);
+  }
+  const v1::EngineContact& contact = step_.contacts(0);
+  // In the frame of the right ball, x of the world is -y.
+  EXPECT_GT(contact.impulse_newton_seconds().y(), -2);
+  EXPECT_LT(contact.impulse_newton_seconds().y(), -1e-3);
+  EXPECT_NEAR(contact.impulse_newton_seconds().x(), 0, 1e-6);
+  EXPECT_NEAR(contact.point_m().y(), 0.05, 0.002);
+  EXPECT_NEAR(contact.second().point_m().x(), 0.05, 0.002);
+  // Back from there.
+  EXPECT_NEAR(std::abs(contact.second().rotation().z()), std::numbers::sqrt2 / 2, 1e-6);
+  EXPECT_GT(contact.second().rotation().w() * contact.second().rotation().z(), 0);
+}
+
+TEST_F(BulletContactsTest, PosesAreThoseOfTheBodies) {
+  contacts_.AddObject(right_, 4);
+  contacts_.AddObject(left_, 9);
+  Simulate();
+  v1::ContactStep step;
+  contacts_.ReadPoses(step);
+  ASSERT_EQ(step.poses_size(), 2);
+  for (const v1::ObjectPose& pose : step.poses()) {
+    const btRigidBody& body = pose.object() == 4 ? right_ : left_;
+    EXPECT_EQ(pose.pose().position_m().x(), body.getWorldTransform().getOrigin().x());
+    EXPECT_EQ(pose.pose().orientation().z(), body.getWorldTransform().getRotation().z());
+  }
+}
+
+}  // namespace
+}  // namespace carillon::adapters
