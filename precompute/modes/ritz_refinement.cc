@@ -7,6 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "precompute/modes/dense_blas.h"
+#include "precompute/modes/verification.h"
 #include "proto/error_reason.h"
 
 namespace carillon::precompute {
@@ -45,6 +46,7 @@ class Refinement {
         mass_(MakeMassRows<double>(A)),
         workers_(workers),
         free_motion_(free_motion),
+        stiffest_(StiffestNode(A)),
         rows_(3 * static_cast<Index>(A.node_count)),
         deflated_(VectorBlock::Zero(rows_, kBlockWidth)) {
     deflated_.leftCols(deflated.cols()) = deflated;
@@ -106,6 +108,15 @@ class Refinement {
       }
     });
     return residuals_.head(wanted).maxCoeff();
+  }
+
+  /// Whether the residuals of the first `wanted` are small, or as small as rounding lets them be.
+  bool IsDone(Index wanted) const {
+    for (Index m = 0; m < wanted; ++m) {
+      const double rounding = ResidualOfRounding(stiffest_, eigenvalues_[m]);
+      if (!(residuals_[m] <= std::max(kTolerance, rounding))) return false;
+    }
+    return true;
   }
 
   Modes Result(Index wanted) const {
@@ -217,6 +228,7 @@ class Refinement {
   MassRows<double> mass_;
   Workers& workers_;
   double free_motion_;
+  double stiffest_;
   Index rows_;
   VectorBlock deflated_;
   MatrixXd x_;
@@ -241,7 +253,7 @@ absl::StatusOr<Modes> RefineModes(const NodeMatrix& A, const MultifrontalCholesk
     refinement.Correct(steps, plan.wanted);
     if (!refinement.Project()) break;
     residual = refinement.LargestResidual(plan.wanted);
-    if (residual <= kTolerance) return refinement.Result(plan.wanted);
+    if (refinement.IsDone(plan.wanted)) return refinement.Result(plan.wanted);
     steps = round + 1 < kQuickRounds ? 1 : 2;
   }
   return Refusal(absl::StatusCode::kInternal, "VERIFICATION_FAILED",

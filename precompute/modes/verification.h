@@ -19,10 +19,18 @@ struct Verification {
   double sturm_eigenvalue = 0;
 };
 
-/// Residuals above this are no solution. It leaves room for rounding on fine meshes, whose
-/// stiffness is 1e9 times that of their lowest mode; the error of an eigenvalue is its square.
+/// Residuals above this, and above what rounding leaves, are no solution; the error of an
+/// eigenvalue is its square.
 inline constexpr double kMaxResidual = 1e-5;
 inline constexpr double kMaxOrthogonalityError = 1e-7;
+
+/// The residual, as above, that rounding leaves of an exact mode: the product with K errs by digits
+/// of its stiffest node, which on a slender body is 1e12 times as stiff as the lowest mode. Counted
+/// up to a thousandth only.
+double ResidualOfRounding(double stiffest, double eigenvalue);
+
+/// The largest diagonal entry of K over that of M.
+double StiffestNode(const NodeMatrix& A);
 
 /// What is measured of modes.
 struct Measurement {
