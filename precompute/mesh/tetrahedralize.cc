@@ -169,7 +169,7 @@ class Filler {
         extent_(Measure(surface_, shells_)) {}
 
   absl::StatusOr<TetMesh> Fill() const {
-    if (settings_.grain_m != 0) return FillWithEdge(EdgeForGrain(settings_.grain_m * scale_));
+    if (settings_.grain_m != 0) return FillToGrain(settings_.grain_m * scale_);
     if (settings_.target_node_count != 0) return FillToTarget();
     return FillWithEdge(CoarserOnNarrowTriangles(AutomaticEdge(extent_)));
   }
@@ -222,6 +222,13 @@ class Filler {
     return mesh;
   }
 
+  /// Inside elements may be as long as the longest on the surface: where the surface is finer than
+  /// it need be, the inside is not.
+  absl::StatusOr<TetMesh> FillToGrain(double grain) const {
+    const double edge = EdgeForGrain(grain);
+    return FillWithEdge(edge, kLongestToMeanEdge * edge);
+  }
+
   /// The longest edge with which the surface is no coarser than `grain`. All sides of a surface of
   /// few triangles are cut at once, so it may come out finer.
   double EdgeForGrain(double grain) const {
@@ -238,12 +245,14 @@ class Filler {
                                                   : kLongestToMeanEdge * edge;
   }
 
-  absl::StatusOr<TetMesh> FillWithEdge(double edge) const {
+  absl::StatusOr<TetMesh> FillWithEdge(double edge) const { return FillWithEdge(edge, edge); }
+
+  absl::StatusOr<TetMesh> FillWithEdge(double edge, double inside) const {
     const bool keep_surface = settings_.keep_surface.value_or(false);
     const RefinedSurface refined = RefineSurface(surface_, LongestOnSurface(edge));
     FillRequest request{.surface = refined,
                         .cavities = PointsInCavities(surface_, shells_),
-                        .max_volume = kVolumeOfRegular * edge * edge * edge,
+                        .max_volume = kVolumeOfRegular * inside * inside * inside,
                         .keep_surface = true,
                         .max_added_nodes = kMaxAddedNodes,
                         .cautious = settings_.cautious};

@@ -75,6 +75,17 @@ def bowl(radius, wall, around, along):
     return lathe(outer + inner[::-1], around)
 
 
+def bell(around=32):
+    """A bell of our own drawing: 100 mm high, 120 mm wide at its mouth, its wall 2.5 mm at the waist and 5 mm at the
+    lip; mouth upwards."""
+    outer = numpy.array([(0, 0), (14, 0), (24, 3), (30, 10), (33, 22), (35, 40), (38, 58), (43, 74), (50, 88),
+                         (60, 100)], dtype=float)
+    inner = numpy.array([(56, 100), (45.5, 89), (39, 75.5), (34.8, 59), (32.3, 41), (30.3, 23), (27, 12.5),
+                         (22, 6.5), (13.5, 4), (0, 4)], dtype=float)
+
+    return lathe([(.001 * r, .001 * z) for r, z in numpy.concatenate([outer, inner])], around)
+
+
 def box(size, cells):
     """Twelve faces cut into cells; vertices on edges are shared."""
     number, vertices, triangles = {}, [], []
