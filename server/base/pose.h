@@ -26,13 +26,13 @@ absl::Status Validate(const Pose& pose);
 absl::Status Validate(const Quaternion& rotation);
 
 /// Of exactly unit length.
-Quaternion Normalized(const Quaternion& rotation);
+Quaternion Normalized(const Quaternion& q);
 
-Quaternion Inverse(const Quaternion& rotation);
+Quaternion Inverse(const Quaternion& q);
 
-/// First `second`, then `first`.
-Quaternion Product(const Quaternion& first, const Quaternion& second);
+/// First `b`, then `a`.
+Quaternion Product(const Quaternion& a, const Quaternion& b);
 
-Vector3 Rotated(const Vector3& vector, const Quaternion& rotation);
+Vector3 Rotated(const Vector3& v, const Quaternion& q);
 
 }  // namespace carillon
