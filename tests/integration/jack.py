@@ -13,6 +13,8 @@ from carillon.v1 import material_pb2
 from daemon import BIN, Daemon
 
 PROGRAMS = pathlib.Path(os.environ.get("CARILLON_TEST_PROGRAMS", BIN.parent / "tests"))
+# In full, for ALSA may have a device "jack" too.
+DEVICE = "portaudio:JACK Audio Connection Kit"
 PORT = "PortAudio:out_0"
 PERIOD_FRAMES = 128
 RATE = 48000
@@ -21,13 +23,13 @@ RATE = 48000
 class Jack:
     """A server that nobody else uses: in real time, but without hardware. Its programs run with `environment`."""
 
-    def __init__(self):
+    def __init__(self, period_frames=PERIOD_FRAMES):
         if shutil.which("jackd") is None:
             raise unittest.SkipTest("jackd is not installed")
         self.environment = dict(os.environ, JACK_DEFAULT_SERVER=f"carillon-test-{os.getpid()}",
                                 JACK_NO_AUDIO_RESERVATION="1", JACK_NO_START_SERVER="1")
         self.process = subprocess.Popen(
-            ["jackd", "-R", "-P", "50", "-d", "dummy", "-r", str(RATE), "-p", str(PERIOD_FRAMES)],
+            ["jackd", "-R", "-P", "50", "-d", "dummy", "-r", str(RATE), "-p", str(period_frames)],
             env=self.environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         waited = subprocess.run(["jack_wait", "-w", "-t", "10"], env=self.environment, check=False,
                                 stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
@@ -47,7 +49,7 @@ class LatencyMeasurement:
 
     def __init__(self, folder, *arguments):
         self.jack = Jack()
-        self.daemon = Daemon(pathlib.Path(folder), "--audio-device", "portaudio:jack", *arguments,
+        self.daemon = Daemon(pathlib.Path(folder), "--audio-device", DEVICE, *arguments,
                              environment=self.jack.environment)
         client = self.daemon.client()
         self.model = client.wait(client.create(

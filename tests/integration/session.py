@@ -20,7 +20,10 @@ from daemon import Daemon
 
 STEP_S = 1 / 240
 # Python, on a machine whose every core is busy, is late by that much now and then.
-DELAY_S = 0.5
+DELAY_S = 2.0
+# JACK's own deadline, which is not the daemon's: a kernel that is not preempted everywhere keeps a thread of the
+# highest priority waiting for some milliseconds, now and then.
+JACK_PERIOD_FRAMES = 512
 TAIL_S = 1.0
 UNFINISHED = (decomposition_pb2.JOB_STATE_QUEUED, decomposition_pb2.JOB_STATE_RUNNING)
 BODIES = ((meshes.bar, "chime_aluminum", 1.0, 20), (meshes.bar, "oak", 1.4, 20), (meshes.bowl, "porcelain", 1.0, 50),
@@ -113,8 +116,8 @@ class Session:
 
     def __init__(self, folder):
         self.folder = folder
-        self.jack = jack.Jack()
-        self.daemon = Daemon(folder, "--audio-device", "portaudio:jack", environment=self.jack.environment)
+        self.jack = jack.Jack(JACK_PERIOD_FRAMES)
+        self.daemon = Daemon(folder, "--audio-device", jack.DEVICE, environment=self.jack.environment)
         self.client = self.daemon.client()
         self.objects = [self.make_object(handle, *body) for handle, body in enumerate(BODIES, start=1)]
         self.steps = []
