@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// mixer_measure ringing|accuracy|flood|population [ARGUMENTS...]
+// mixer_measure ringing|struck|accuracy|flood|population [ARGUMENTS...]
 #include <hwy/targets.h>
 
 #include <cstdio>
@@ -11,7 +11,8 @@
 int main(int count, char** values) {
   using carillon::Arguments;
   const std::map<std::string, int (*)(const Arguments&)> programs = {
-      {"ringing", carillon::MeasureRingingAndStruck},
+      {"ringing", carillon::MeasureRinging},
+      {"struck", carillon::MeasureStruck},
       {"accuracy", carillon::MeasureAccuracy},
       {"flood", carillon::MeasureFlood},
       {"population", carillon::PrintPopulation},

@@ -10,7 +10,8 @@ using Arguments = std::vector<std::string>;
 
 /// Each prints one JSON object a line and returns the program's exit status.
 /// SECONDS of sound a measurement.
-int MeasureRingingAndStruck(const Arguments& arguments);
+int MeasureRinging(const Arguments& arguments);
+int MeasureStruck(const Arguments& arguments);
 /// SECONDS of sound.
 int MeasureAccuracy(const Arguments& arguments);
 /// IMPULSES_PER_SECOND SECONDS.

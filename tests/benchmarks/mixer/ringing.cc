@@ -108,10 +108,15 @@ void MeasureStruck(size_t mode_count, double seconds) {
 
 }  // namespace
 
-int MeasureRingingAndStruck(const Arguments& arguments) {
+int MeasureRinging(const Arguments& arguments) {
   const double seconds = arguments.empty() ? 3 : std::atof(arguments[0].c_str());
-  MeasureRinging(800'000, seconds);
-  for (const size_t modes : {8'000U, 80'000U}) MeasureRinging(modes, seconds);
+  for (const size_t modes : {800'000U, 8'000U, 80'000U}) MeasureRinging(modes, seconds);
+  return EXIT_SUCCESS;
+}
+
+int MeasureStruck(const Arguments& arguments) {
+  const double seconds = arguments.empty() ? 3 : std::atof(arguments[0].c_str());
+  if (arguments.size() > 1) { MeasureStruck(std::stoul(arguments[1]), seconds); return EXIT_SUCCESS; }
   for (const size_t modes : {800U, 8'000U, 80'000U}) MeasureStruck(modes, seconds);
   return EXIT_SUCCESS;
 }
