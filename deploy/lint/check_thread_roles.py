@@ -18,7 +18,7 @@ import project
 
 ROOMS = ("server/base/", "server/synthesis/", "server/audio_device/", "server/scene/")
 # Compiled once for each SIMD target, and without a lock or a role: minutes for nothing.
-KERNELS = ("server/synthesis/bank_kernel.cc", "server/synthesis/force_kernel.cc")
+KERNELS = tuple(f"server/synthesis/{name}_kernel.cc" for name in ("force", "ring", "spectral", "strike"))
 KEPT = ("-I", "-isystem", "-D", "-std")
 
 

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-// Vectors of unknown size: see bank_kernel.cc.
+// Vectors of unknown size: see ring_kernel.cc.
 #define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "server/synthesis/force_kernel.cc"
@@ -24,7 +24,7 @@ using V = hn::Vec<Floats>;
 // Far above any force, far below what the products that follow can hold.
 constexpr float kMostForce = 1e15F;
 
-void Gather(const bank_kernel::Projection& projection, float* HWY_RESTRICT next) {
+void Gather(const strike_kernel::Projection& projection, float* HWY_RESTRICT next) {
   for (size_t row = 0; row < projection.row_count; ++row) {
     const float factor = projection.factors[row];
     const int16_t* HWY_RESTRICT shape = projection.rows[row];
@@ -160,7 +160,7 @@ HWY_EXPORT(Kink);
 HWY_EXPORT(Aim);
 HWY_EXPORT(RingDriven);
 
-void Gather(const bank_kernel::Projection& projection, float* next) noexcept {
+void Gather(const strike_kernel::Projection& projection, float* next) noexcept {
   HWY_DYNAMIC_DISPATCH(Gather)(projection, next);
 }
 

@@ -3,8 +3,8 @@
 
 #include <cstddef>
 
-#include "server/synthesis/bank_kernel.h"
 #include "server/synthesis/lane_arrays.h"
+#include "server/synthesis/strike_kernel.h"
 
 namespace carillon {
 
@@ -43,7 +43,7 @@ struct ForceArrays {
 namespace force_kernel {
 
 /// next += the modal forces of one contact.
-void Gather(const bank_kernel::Projection& projection, float* next) noexcept;
+void Gather(const strike_kernel::Projection& projection, float* next) noexcept;
 
 /// Ends a step that lasted 1 / rate_hz: sets slope and jump, moves next to last and clears it.
 /// False: a force was not finite, and all are zero now.
@@ -64,7 +64,7 @@ struct Drive {
   size_t frame_count = 0;
 };
 
-/// Adds the samples of all lanes to `mix` while driving them, as bank_kernel::RingStruck does for
+/// Adds the samples of all lanes to `mix` while driving them, as ring_kernel::RingStruck does for
 /// strikes.
 void RingDriven(const ForceArrays& force, const Drive& drive, LaneArrays& lanes,
                 float* mix) noexcept;

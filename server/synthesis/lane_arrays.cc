@@ -27,9 +27,6 @@ void LaneArrays::Silence(LaneRange range) noexcept {
   for (LaneArray<double>* state : {&re, &im}) {
     std::fill_n(state->data() + range.first, range.count, 0.0);
   }
-  for (LaneArray<float>* state : {&start_re, &start_im}) {
-    std::fill_n(state->data() + range.first, range.count, 0.0F);
-  }
 }
 
 }  // namespace carillon

@@ -11,8 +11,8 @@ namespace carillon {
 /// The widest vector of floats that any SIMD target uses; arrays over modes are padded to it.
 inline constexpr size_t kMostLanes = 16;
 
-/// Samples that the kernel renders from one float state: q, q^2, q^3 give the samples between, q^4
-/// the next state.
+/// Samples that the kernel renders from one float state: the lower powers of q give the samples
+/// between, q^kTileFrames the next state.
 inline constexpr size_t kTileFrames = 8;
 
 /// A zeroed array aligned for the widest vector.
@@ -54,15 +54,15 @@ struct LaneArrays {
   /// Zeroes the state at the start of the block.
   void Silence(LaneRange range) noexcept;
 
-  /// q, q^2, q^3, q^4: for each kMostLanes lanes together, see PowerIndex.
+  /// q, q^2, ... q^kTileFrames: for each kMostLanes lanes together, see PowerIndex.
   LaneArray<float> powers;
   /// q^N for a block of N frames.
   LaneArray<double> block_re, block_im;
-  /// The state at the start of the block, and the same in single precision, which advances within a
-  /// block that has strikes.
+  /// The state at the start of the block.
   LaneArray<double> re, im;
+  /// Where a block is rendered in parts: the state in single precision at the start of the next
+  /// part, and that of what was struck in this block.
   LaneArray<float> start_re, start_im;
-  /// The state of what was struck in this block.
   LaneArray<float> newborn_re, newborn_im;
 
   /// From modal impulse to state: -i exp(i phase) c / omega_d with all scales.

@@ -12,15 +12,16 @@
 
 #include "absl/base/thread_annotations.h"
 #include "server/base/thread_role.h"
-#include "server/synthesis/bank_kernel.h"
 #include "server/synthesis/block_mix.h"
 #include "server/synthesis/due_strike.h"
 #include "server/synthesis/lane_arrays.h"
 #include "server/synthesis/lane_mix.h"
+#include "server/synthesis/ring_kernel.h"
 #include "server/synthesis/shape_table.h"
 #include "server/synthesis/sounding_modes.h"
 #include "server/synthesis/spectral_lanes.h"
 #include "server/synthesis/strike.h"
+#include "server/synthesis/strike_kernel.h"
 #include "server/synthesis/sustained_force.h"
 
 namespace carillon {
@@ -74,7 +75,7 @@ class OscillatorBank {
   /// The same with the modal impulses g_m, but for the scale of the shapes, of the projected
   /// columns (column_count() of them): what is not a single impulse on a triangle comes in here.
   bool StrikeModes(std::span<const float> modal_impulses, size_t offset,
-                   const bank_kernel::Onset& onset, BlockMix& mix) noexcept
+                   const strike_kernel::Onset& onset, BlockMix& mix) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
   /// Strikes that sound as one, which costs less: each on the nearest vertex of its triangle, all
@@ -137,12 +138,6 @@ class OscillatorBank {
   size_t mode_count() const noexcept { return mode_count_; }
 
  private:
-  /// Lanes of one kind: what of them rings in the time domain is `awake` and those before it.
-  struct Segment {
-    LaneRange range;
-    size_t awake_count = 0;
-    double loudest_squared = 0;
-  };
   /// Lanes that may ring by spectrum, in long blocks of one kind.
   struct LongSegment {
     SpectralLanes lanes;
@@ -162,9 +157,9 @@ class OscillatorBank {
   bool BeginLongBlock(size_t kind, BlockMix& mix) noexcept;
   void MoveToSpectrum(size_t kind) noexcept;
   void MoveToTime(size_t kind) noexcept;
-  std::optional<bank_kernel::Projection> Project(const Excitation& excitation) const noexcept;
+  std::optional<strike_kernel::Projection> Project(const Excitation& excitation) const noexcept;
   void AddVertex(size_t vertex, float weight, const Excitation& excitation,
-                 bank_kernel::Projection& projection) const noexcept;
+                 strike_kernel::Projection& projection) const noexcept;
   void MeasureBlow(const LanePlan& plan);
   double TimeWork(size_t lane_count) const noexcept;
   /// Strikes that were merged sound at the end of their frames, and what follows not before them.
@@ -174,7 +169,11 @@ class OscillatorBank {
   void RenderDrivenStrikes(size_t end, BlockMix& mix) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void RenderDriven(size_t end, LaneMix& mix) noexcept;
-  bool Advance() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  ring_kernel::StruckPart NextPart(size_t end, BlockMix& mix) const noexcept;
+  bool FinishStruck(BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  bool EndBlock() noexcept;
+  using Counts = std::array<size_t, 1 + kLongBlockKinds>;
+  Counts AwakeCounts() const noexcept;
   void Silence() noexcept;
   void CountAwake() noexcept;
 
@@ -185,12 +184,14 @@ class OscillatorBank {
   size_t lane_count_;  // modes and companions, each kind padded to whole vectors
   uint32_t first_column_;
   size_t column_count_;
-  std::array<Segment, 1 + kLongBlockKinds>
+  std::array<RingingSegment, 1 + kLongBlockKinds>
       segments_;                            // the first of lanes for the time domain only
+  Counts counted_{};                        // what of them was awake when that was counted
   std::vector<LongSegment> long_segments_;  // kLongBlockKinds of them
   std::vector<uint8_t> group_mode_counts_;  // modes, not companions, of kMostLanes lanes
   bool begun_ = false;                      // this block
   bool newborn_ = false;                    // struck in this block
+  bool started_ = false;                    // the block is rendered in parts
   bool finite_ = true;
   bool changed_ = false;  // which lanes are awake
   bool any_awake_ = false;

@@ -6,12 +6,12 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "server/synthesis/bank_kernel.h"
 #include "server/synthesis/force_kernel.h"
 #include "server/synthesis/lane_arrays.h"
 #include "server/synthesis/lane_mix.h"
 #include "server/synthesis/roughness_noise.h"
 #include "server/synthesis/strike.h"
+#include "server/synthesis/strike_kernel.h"
 
 namespace carillon {
 
@@ -39,7 +39,7 @@ class SustainedForce {
                double lowest_rad_per_s);
 
   /// Adds a contact's force to that at the next knot.
-  void Gather(const bank_kernel::Projection& projection) noexcept {
+  void Gather(const strike_kernel::Projection& projection) noexcept {
     force_kernel::Gather(projection, arrays_.next.data());
   }
 
@@ -51,7 +51,7 @@ class SustainedForce {
   /// The noise is heard: Render is to be called for every sample.
   bool driving() const noexcept { return driving_; }
 
-  /// The next samples of all lanes, driven, into `mix`, as bank_kernel::RingStruck does.
+  /// The next samples of all lanes, driven, into `mix`, as ring_kernel::RingStruck does.
   void Render(size_t frame_count, LaneArrays& lanes, float* mix) noexcept;
 
   /// There is no force from now on.

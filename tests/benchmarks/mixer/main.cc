@@ -11,10 +11,8 @@
 int main(int count, char** values) {
   using carillon::Arguments;
   const std::map<std::string, int (*)(const Arguments&)> programs = {
-      {"ringing", carillon::MeasureRinging},
-      {"struck", carillon::MeasureStruck},
-      {"accuracy", carillon::MeasureAccuracy},
-      {"flood", carillon::MeasureFlood},
+      {"ringing", carillon::MeasureRinging},     {"struck", carillon::MeasureStruck},
+      {"accuracy", carillon::MeasureAccuracy},   {"flood", carillon::MeasureFlood},
       {"population", carillon::PrintPopulation},
   };
   const auto found = count > 1 ? programs.find(values[1]) : programs.end();

@@ -11,6 +11,7 @@ using Arguments = std::vector<std::string>;
 /// Each prints one JSON object a line and returns the program's exit status.
 /// SECONDS of sound a measurement.
 int MeasureRinging(const Arguments& arguments);
+/// SECONDS of sound a measurement, MODES; without, several numbers of modes.
 int MeasureStruck(const Arguments& arguments);
 /// SECONDS of sound.
 int MeasureAccuracy(const Arguments& arguments);

@@ -116,8 +116,9 @@ int MeasureRinging(const Arguments& arguments) {
 
 int MeasureStruck(const Arguments& arguments) {
   const double seconds = arguments.empty() ? 3 : std::atof(arguments[0].c_str());
-  if (arguments.size() > 1) { MeasureStruck(std::stoul(arguments[1]), seconds); return EXIT_SUCCESS; }
-  for (const size_t modes : {800U, 8'000U, 80'000U}) MeasureStruck(modes, seconds);
+  std::vector<size_t> counts = {800, 8'000, 80'000};
+  if (arguments.size() > 1) counts = {std::stoul(arguments[1])};
+  for (const size_t modes : counts) MeasureStruck(modes, seconds);
   return EXIT_SUCCESS;
 }
 

@@ -142,6 +142,43 @@ TEST(OscillatorBank, TwoStrikesSuperpose) {
   EXPECT_LT(20 * std::log10(error / peak), -100);
 }
 
+/// More than fit into a batch: the block is rendered in parts, which end where strikes are, on the
+/// tiles of the kernel and between them.
+TEST_P(OnEveryTarget, ManyStrikesInABlockSuperpose) {
+  constexpr size_t kStrikes = 3 * StrikeBatch::kMostStrikes;
+  const SoundingModes sounding = MakeWideModes();
+  for (const size_t offset : {0U, 8U, 77U, 127U}) {
+    OscillatorBank bank(sounding, MakeUniformShapes(37), {});
+    std::vector<float> sound(512);
+    TestMix test;
+    for (size_t start = 0; start < sound.size(); start += 128) {
+      BlockMix& mix = test.Begin();
+      for (size_t i = 0; start == 128 && i < kStrikes; ++i) {
+        bank.Strike(MakeUnitExcitation(), offset, 0, mix);
+      }
+      test.Render(bank, std::span(sound).subspan(start, 128));
+    }
+    EXPECT_LT(ErrorDb(sound, sounding, kStrikes, static_cast<double>(128 + offset)), -100)
+        << offset;
+  }
+}
+
+TEST(OscillatorBank, AForceThatIsNotFiniteLeavesASilentBankAsItWas) {
+  const SoundingModes sounding = MakeWideModes();
+  OscillatorBank bank(sounding, MakeUniformShapes(37), {}),
+      fresh(sounding, MakeUniformShapes(37), {});
+  TestMix test;
+  std::vector<float> block(128);
+  Excitation force = MakeUnitExcitation();
+  force.impulse_newton_seconds[0] = std::numeric_limits<float>::infinity();
+  BlockMix& mix = test.Begin();
+  EXPECT_TRUE(bank.Gather(force));
+  EXPECT_FALSE(bank.Tie({.step_s = 0.01F}, 50, mix));
+  EXPECT_TRUE(bank.silent());
+  test.Finish(block);
+  EXPECT_EQ(Ring(bank, MakeUnitExcitation(), 1024, 5), Ring(fresh, MakeUnitExcitation(), 1024, 5));
+}
+
 TEST(OscillatorBank, AGaussianContactIsTheConvolutionWithAGaussian) {
   const SoundingModes sounding{
       .modes = {MakeMode(0, 180, -60, 3), MakeMode(1, 700, -400, 4), MakeMode(2, 1500, -30, 5)}};
