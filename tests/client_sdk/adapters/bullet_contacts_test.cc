@@ -25,7 +25,7 @@ class BulletContactsTest : public testing::Test {
     const btQuaternion quarter({0, 0, 1}, std::numbers::pi_v<btScalar> / 2);
     right_.setWorldTransform(btTransform(quarter, {0.101F, 0, 0}));
   }
-  ~BulletContactsTest() override {
+  void TearDown() override {
     for (btRigidBody* body : {&left_, &right_}) world_.removeRigidBody(body);
   }
 
