@@ -7,6 +7,9 @@
 namespace carillon::precompute {
 namespace {
 
+/// Until the modes are counted there may be many more of them than guessed.
+constexpr double kMostBeforeCount = 0.15;
+
 /// Of the whole work, about, before anybody knows how much there is.
 double FractionByPhase(Phase phase) {
   if (phase == Phase::kRead) return 0;
@@ -26,6 +29,7 @@ void ProgressReporter::OnProgress(Phase phase, double fraction) {
   if (phase != state_.phase) clock_.Enter(phase);
   state_.phase = phase;
   state_.fraction = std::max(state_.fraction, FractionByPhase(phase));
+  counted_ = counted_ || phase == Phase::kFactor || phase == Phase::kSolve;
   remaining_.Progress(Now(), phase, fraction);
   Estimate();
   if (phase != Phase::kWrite || fraction < 1) return;
@@ -49,7 +53,8 @@ void ProgressReporter::Estimate() {
   state_.remaining_s = remaining_.Seconds(now_s);
   if (!state_.remaining_s) return;
   const double whole_s = std::max(now_s + *state_.remaining_s, 1e-9);
-  state_.fraction = std::max(state_.fraction, now_s / whole_s);
+  const double done = now_s / whole_s;
+  state_.fraction = std::max(state_.fraction, counted_ ? done : std::min(done, kMostBeforeCount));
 }
 
 double ProgressReporter::Now() const { return PhaseClock::Now().seconds - begun_s_; }

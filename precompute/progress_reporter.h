@@ -62,6 +62,7 @@ class ProgressReporter : public DecompositionObserver {
   PhaseClock clock_;
   double begun_s_ = PhaseClock::Now().seconds;
   RemainingTime remaining_;
+  bool counted_ = false;  ///< how many modes there are is known
   std::thread thread_;
 };
 

@@ -10,7 +10,7 @@ namespace {
 /// So much of the prediction is taken on trust, so that the first milliseconds measured do not
 /// decide.
 constexpr double kTrust_s = 0.05;
-/// A step that nobody knows the part done of is never over before its end.
+/// Of what is open by the last report: a step is never over before its end.
 constexpr double kMostByTime = 0.95;
 
 }  // namespace
@@ -44,7 +44,9 @@ void RemainingTime::Progress(double now_s, Phase phase, double fraction) {
     if (found == steps_.end()) return;
     Go(now_s, static_cast<size_t>(found - steps_.begin()));
   }
-  fraction_ = std::clamp(fraction, 0.0, 1.0);
+  if (fraction <= fraction_) return;
+  fraction_ = std::min(fraction, 1.0);
+  reported_s_ = now_s;
 }
 
 void RemainingTime::Go(double now_s, size_t step) {
@@ -55,14 +57,15 @@ void RemainingTime::Go(double now_s, size_t step) {
   step_ = step;
   under_way_ = step < steps_.size();
   step_begun_s_ = now_s;
+  reported_s_ = now_s;
   fraction_ = 0;
 }
 
-double RemainingTime::Slowness(double now_s) const {
+double RemainingTime::Slowness() const {
   double measured = done_s_ + kTrust_s;
   double predicted = predicted_s_ + kTrust_s;
   if (under_way_ && fraction_ > 0) {
-    measured += now_s - step_begun_s_;
+    measured += reported_s_ - step_begun_s_;
     predicted += fraction_ * current()->predicted_s;
   }
   return measured / predicted;
@@ -70,13 +73,13 @@ double RemainingTime::Slowness(double now_s) const {
 
 double RemainingTime::ThisRound(double now_s) const {
   if (steps_.empty()) return std::max(0.0, forecast_.expected_s - (now_s - round_begun_s_));
-  const double slowness = Slowness(now_s);
+  const double slowness = Slowness();
   double left = 0;
   for (size_t k = step_; k < steps_.size(); ++k) left += slowness * steps_[k].predicted_s;
   if (!under_way_) return left;
   const double whole = slowness * current()->predicted_s;
-  return left -
-         (fraction_ > 0 ? fraction_ * whole : std::min(kMostByTime * whole, now_s - step_begun_s_));
+  const double open = (1 - fraction_) * whole;
+  return left - whole + open - std::min(kMostByTime * open, now_s - reported_s_);
 }
 
 std::optional<double> RemainingTime::Seconds(double now_s) const {

@@ -27,7 +27,7 @@ class RemainingTime {
   const PlannedStep* current() const { return step_ < steps_.size() ? &steps_[step_] : nullptr; }
   void Go(double now_s, size_t step);
   /// Seconds that a predicted second takes.
-  double Slowness(double now_s) const;
+  double Slowness() const;
   double ThisRound(double now_s) const;
 
   RoundForecast forecast_;
@@ -36,7 +36,8 @@ class RemainingTime {
   size_t step_ = 0;  ///< the one under way; with no plan, or before its first one, none
   bool under_way_ = false;
   double step_begun_s_ = 0;
-  double fraction_ = 0;
+  double fraction_ = 0;  ///< as last reported, and when
+  double reported_s_ = 0;
   double done_s_ = 0;       ///< measured, of all steps done, in earlier rounds too
   double predicted_s_ = 0;  ///< of the same
 };

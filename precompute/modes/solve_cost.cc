@@ -60,7 +60,8 @@ size_t BasisSize(int mode_count) { return static_cast<size_t>(2.6 * mode_count) 
 /// Multiply-adds a second, and bytes a second from memory, of one core.
 constexpr double kDoubleRate = 20e9;
 constexpr double kFloatRate = 45e9;
-constexpr double kBandwidth = 8e9;
+constexpr double kOrthogonalRate = 20e9;
+constexpr double kBandwidth = 4e9;
 /// Seconds that coupling and estimated error of a mode take, for each unknown.
 constexpr double kModelSeconds = 50e-9;
 
@@ -89,7 +90,7 @@ SolveCost PredictSolveCost(const OrderedSystem& ordered, int mode_count, int thr
   cost.count_s = fronts.factor_flops / kDoubleRate;
   cost.factor_s = fronts.factor_flops / kFloatRate;
   cost.solve_s = steps * 2 * static_cast<double>(factor) / kBandwidth +
-                 n * (m * m + m * p) / kFloatRate + 3 * n * p * p / kDoubleRate;
+                 n * (m * m + m * p) / kOrthogonalRate + 3 * n * p * p / kDoubleRate;
   cost.verify_s = n * p * p / kDoubleRate;
   cost.model_s = n * p * kModelSeconds;
   return cost;

@@ -86,6 +86,18 @@ TEST(RemainingTime, WhatIsReportedWithinAPhaseCorrectsItAtOnce) {
   EXPECT_NEAR(remaining.Seconds(15).value(), 345, 0.02 * 345);
 }
 
+TEST(RemainingTime, FallsBySecondsAfterTheLastReportOfAPhase) {
+  RemainingTime remaining;
+  remaining.BeginRound(0, {});
+  remaining.Plan(0, kSteps);
+  remaining.Progress(0, Phase::kVerify, 0);
+  remaining.Progress(5, Phase::kVerify, 0.5);
+  EXPECT_DOUBLE_EQ(remaining.Seconds(5).value(), 115);
+  EXPECT_DOUBLE_EQ(remaining.Seconds(8).value(), 112);
+  // Silence is no news of the machine's speed.
+  EXPECT_DOUBLE_EQ(remaining.Seconds(50).value(), 110.25);
+}
+
 TEST(RemainingTime, ANewPlanKeepsTheMeasuredSpeed) {
   RemainingTime remaining;
   remaining.BeginRound(0, {});
