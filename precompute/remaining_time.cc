@@ -72,14 +72,17 @@ double RemainingTime::Slowness() const {
 }
 
 double RemainingTime::ThisRound(double now_s) const {
-  if (steps_.empty()) return std::max(0.0, forecast_.expected_s - (now_s - round_begun_s_));
+  const double foreseen = std::max(0.0, forecast_.expected_s - (now_s - round_begun_s_));
+  if (steps_.empty()) return foreseen;
   const double slowness = Slowness();
   double left = 0;
   for (size_t k = step_; k < steps_.size(); ++k) left += slowness * steps_[k].predicted_s;
   if (!under_way_) return left;
   const double whole = slowness * current()->predicted_s;
   const double open = (1 - fraction_) * whole;
-  return left - whole + open - std::min(kMostByTime * open, now_s - reported_s_);
+  left += open - whole - std::min(kMostByTime * open, now_s - reported_s_);
+  // Until the modes are counted, the round before tells better how many there are.
+  return step_ == 0 ? std::max(left, foreseen) : left;
 }
 
 std::optional<double> RemainingTime::Seconds(double now_s) const {

@@ -38,6 +38,6 @@ double TimeGrowth(const Round& last, double grain_m);
 
 /// What the rounds after the first one will take, in times of it, before its errors are known; and
 /// those after a later one, which is meant to be the last.
-inline constexpr double kLaterRoundsAfterFirst = 6, kLaterRounds = 0.3;
+inline constexpr double kLaterRoundsAfterFirst = 6, kLaterRounds = 0.1;
 
 }  // namespace carillon::precompute

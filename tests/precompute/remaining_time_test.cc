@@ -123,6 +123,16 @@ TEST(RemainingTime, CountsTheRoundsThatAreToFollow) {
   EXPECT_DOUBLE_EQ(remaining.Seconds(140).value(), 280);
 }
 
+TEST(RemainingTime, TheRoundBeforeTellsMoreThanThePlanUntilTheModesAreCounted) {
+  RemainingTime remaining;
+  remaining.BeginRound(0, {.expected_s = 300});
+  remaining.Plan(10, kSteps);
+  remaining.Progress(10, Phase::kVerify, 0);
+  EXPECT_DOUBLE_EQ(remaining.Seconds(10).value(), 290);
+  remaining.Progress(20, Phase::kFactor, 0);
+  EXPECT_DOUBLE_EQ(remaining.Seconds(20).value(), 110);
+}
+
 TEST(RemainingTime, StepsOfASecondAttemptCountAgain) {
   RemainingTime remaining;
   remaining.BeginRound(0, {});
