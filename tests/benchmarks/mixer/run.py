@@ -143,7 +143,7 @@ def session(options, folder):
     use_integration_tests(options)
     import session as sessions
     print("\n## A session under a busy loop on each core and decompositions: JACK capture against the rendering of its "
-          "trace\n\n| seconds | impulses | late, dropped, merged or shed | real-time priority | xruns, JACK cycles missed "
+          "trace\n\n| seconds | impulses | late, dropped, merged or shed | real-time priority | xruns told by JACK, its cycles missed "
           "| frames compared | differing |\n| --- | --- | --- | --- | --- | --- | --- |")
     played = sessions.Session(folder)
     found = played.run(options.session_seconds)
