@@ -3,7 +3,7 @@
 
 #include "client_sdk/cli/program.h"
 
-namespace CLI {
+namespace CLI {  // NOLINT(readability-identifier-naming): as the library has it
 class App;
 }
 

@@ -3,6 +3,8 @@
 
 #include <utility>
 
+#include "server/audio_device/realtime_priority.h"
+
 namespace carillon {
 
 ClockedDevice::ClockedDevice(std::string description, const DeviceFormat& format, Clock& clock,
@@ -18,6 +20,10 @@ absl::Status ClockedDevice::Start(FrameSource& source) {
   source_ = &source;
   stopping_ = false;
   thread_ = std::thread([this] { Run(); });
+  // A sound card does not wait for other programs either: kept from running, this thread would pull
+  // what it missed at once, faster than anybody renders. Where that is not allowed the look-ahead,
+  // which asks for the same, says so.
+  MakeRealtime(thread_).IgnoreError();
   return absl::OkStatus();
 }
 

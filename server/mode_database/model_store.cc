@@ -182,7 +182,7 @@ absl::StatusOr<ModelSummary> ModelStore::PutFile(const std::string& digest,
 
 absl::Status ModelStore::CopyIfAbsent(const std::string& from, const std::string& to,
                                       const std::string& label) {
-  if (const absl::Status status = CheckName(to); !status.ok()) return status;
+  if (absl::Status status = CheckName(to); !status.ok()) return status;
   return database_->Write([&](SqliteConnection& connection) {
     absl::StatusOr<ModelSummary> summary = SelectModel(connection, from);
     if (!summary.ok()) return summary.status();

@@ -127,7 +127,8 @@ TEST_F(AudioApi, ATraceCarriesHowAndFromWhereItIsHeard) {
   const auto onset = std::ranges::find_if(rendering.sound, heard) - rendering.sound.begin();
   EXPECT_EQ(onset % 2, 1);
   // sin(0) is silent; what lies between two samples rings a little before.
-  EXPECT_NEAR(static_cast<double>(onset / 2), 0.5 * 48000 + 480 + 1, 1);
+  const auto frame = onset / 2;
+  EXPECT_NEAR(static_cast<double>(frame), 0.5 * 48000 + 480 + 1, 1);
 }
 
 TEST_F(AudioApi, PosesInTheStepsMoveTheObjectsOfATrace) {
