@@ -25,7 +25,7 @@ constexpr double kTolerance = 1e-6;
 
 /// Ritz vectors to refine beyond those wanted, at least: float mixes modes with their neighbours,
 /// and refinement unmixes only what it is given.
-constexpr Index kGuards = 8;
+constexpr Index kGuards = 4;
 
 /// The shift, as a part of the highest eigenvalue wanted: 5 kHz for a band to 20 kHz. The count of
 /// iterations hardly depends on it, and a larger one spares digits.
