@@ -29,9 +29,9 @@ using carillon::HWY_NAMESPACE::Oscillators;
 using carillon::HWY_NAMESPACE::States;
 using carillon::HWY_NAMESPACE::V;
 
-// Vectors rendered together: two share the sums, which are as many loads and stores less; the
+// Vectors rendered together: four share the sums, which are as many loads and stores less; the
 // powers come from the cache.
-constexpr size_t kVectorsAPass = 2;
+constexpr size_t kVectorsAPass = 4;
 
 /// Asks for what rendering a group of lanes, and advancing them thereafter, will need.
 HWY_INLINE void PrefetchLanes(const LaneArrays& lanes, size_t lane) {
@@ -74,10 +74,12 @@ struct StruckVectors {
   const Oscillators<kVectors>& oscillators;
   Z all, newborn;
   size_t newborn_at = 0;  // the frame of its state
+  bool any_newborn = false;
 
   HWY_INLINE void Load(const LaneArrays& lanes, size_t lane) {
     all.Load(lanes.start_re.data() + lane, lanes.start_im.data() + lane);
     newborn.Load(lanes.newborn_re.data() + lane, lanes.newborn_im.data() + lane);
+    any_newborn = true;
   }
   HWY_INLINE void Store(LaneArrays& lanes, size_t lane) const {
     all.Store(lanes.start_re.data() + lane, lanes.start_im.data() + lane);
@@ -106,7 +108,7 @@ struct StruckVectors {
   }
 
   HWY_INLINE void MoveNewborn(size_t frame) {
-    oscillators.Advance((frame - newborn_at) / kTileFrames, newborn);
+    if (any_newborn) oscillators.Advance((frame - newborn_at) / kTileFrames, newborn);
     newborn_at = frame;
   }
 
@@ -121,6 +123,7 @@ struct StruckVectors {
     all.Add(struck);
     if (newborn_at != tile_end) MoveNewborn(tile_end);
     newborn.Add(struck);
+    any_newborn = true;
   }
 };
 
