@@ -1,23 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/api/contact_conversion.h"
 
-#include <algorithm>
 #include <optional>
-#include <utility>
 #include <variant>
 
 #include "absl/strings/str_cat.h"
 #include "proto/error_reason.h"
+#include "server/api/column_conversion.h"
 #include "server/api/pose_conversion.h"
 
 namespace carillon {
 namespace {
 
 Point ToArray(const v1::Vec3& vector) { return {vector.x(), vector.y(), vector.z()}; }
-
-Point ToArray(const google::protobuf::RepeatedField<float>& column, int row) {
-  return {column[3 * row], column[3 * row + 1], column[3 * row + 2]};
-}
 
 SurfacePoint ToSurfacePoint(const v1::SurfacePoint& point) {
   return {.triangle = point.triangle(),
@@ -113,41 +108,14 @@ void ForEachRow(const Rows& rows, const Use& use, const ContactSink& sink) {
   }
 }
 
-ObjectImpulse FromColumns(const v1::ImpulseColumns& columns, int row) {
-  return {.handle = columns.object(row),
-          .time_offset_s = columns.time_offset_s().empty() ? 0 : columns.time_offset_s(row),
-          .impulse = {.location = ToArray(columns.point_m(), row),
-                      .impulse_newton_seconds = ToArray(columns.impulse_newton_seconds(), row),
-                      .duration_s = columns.duration_s().empty() ? 0 : columns.duration_s(row)}};
-}
-
-absl::Status CheckColumns(const v1::ImpulseColumns& columns) {
-  const int count = columns.object_size();
-  const auto fits = [count](int size) { return size == 0 || size == count; };
-  if (columns.point_m_size() == 3 * count && columns.impulse_newton_seconds_size() == 3 * count &&
-      fits(columns.duration_s_size()) && fits(columns.time_offset_s_size())) {
-    return absl::OkStatus();
-  }
-  return Refusal(
-      absl::StatusCode::kInvalidArgument, "COLUMNS_MISMATCHED",
-      absl::StrCat("the columns have ", count, " objects, ", columns.point_m_size(),
-                   " coordinates, ", columns.impulse_newton_seconds_size(), " impulse components, ",
-                   columns.duration_s_size(), " durations and ", columns.time_offset_s_size(),
-                   " offsets; n objects need 3 n, 3 n, n or none, n or none"));
-}
-
 }  // namespace
 
 void ReadStep(const v1::ContactStep& step, const ContactSink& sink) {
   for (const v1::ObjectPose& row : step.poses()) sink.move(row.object(), FromProto(row.pose()));
+  ReadColumns(step.pose_columns(), sink);
   if (step.has_listener()) sink.move_listener(FromProto(step.listener()));
   ForEachRow(step.impulses(), sink.strike, sink);
-  const v1::ImpulseColumns& columns = step.columns();
-  if (absl::Status status = CheckColumns(columns); !status.ok()) {
-    sink.reject(static_cast<uint64_t>(std::max(1, columns.object_size())), std::move(status));
-  } else {
-    for (int row = 0; row < columns.object_size(); ++row) sink.strike(FromColumns(columns, row));
-  }
+  ReadColumns(step.columns(), sink);
   ForEachRow(step.sustained(), sink.hold, sink);
   ForEachRow(step.contacts(), sink.touch, sink);
 }

@@ -21,7 +21,8 @@ struct ContactSink {
   absl::FunctionRef<void(uint64_t, absl::Status)> reject;
 };
 
-/// Gives `sink` all that a step holds: poses, impulses, rows first, then forces, then touches.
+/// Gives `sink` all that a step holds: poses, impulses, then forces, then touches; rows before
+/// columns.
 void ReadStep(const v1::ContactStep& step, const ContactSink& sink);
 
 }  // namespace carillon

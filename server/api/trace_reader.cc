@@ -119,9 +119,9 @@ absl::Status TraceReader::TakeStep(const v1::ContactStep& step) {
                      OfflineRenderer::kMaxTimeS, " s"));
   }
   time_s_ = step.time_s();
-  impulse_count_ +=
-      static_cast<uint64_t>(step.impulses_size() + step.columns().object_size() +
-                            step.sustained_size() + step.contacts_size() + step.poses_size());
+  impulse_count_ += static_cast<uint64_t>(step.impulses_size() + step.columns().object_size() +
+                                          step.sustained_size() + step.contacts_size() +
+                                          step.poses_size() + step.pose_columns().object_size());
   // Each object hears of the listener's.
   if (step.has_listener()) impulse_count_ += object_count_;
   if (impulse_count_ > kMaxImpulseCount) {

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <functional>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "server/api/listen_address.h"
@@ -151,6 +152,91 @@ TEST_F(AudioApi, PosesInTheStepsMoveTheObjectsOfATrace) {
   }
   EXPECT_GT(left, 1);
   EXPECT_LT(right, 1e-5 * left);
+}
+
+/// The same as columns; what they carry must be told by points.
+void TurnIntoColumns(v1::ContactStep& step) {
+  v1::ImpulseColumns& columns = *step.mutable_columns();
+  const auto add = [](const v1::Vec3& vector, auto* column) {
+    using Number = std::decay_t<decltype(column->Get(0))>;
+    for (const double x : {vector.x(), vector.y(), vector.z()}) column->Add(static_cast<Number>(x));
+  };
+  const auto turn = [](const v1::Quaternion& q, auto* column) {
+    for (const double x : {q.w(), q.x(), q.y(), q.z()}) column->Add(static_cast<float>(x));
+  };
+  for (const v1::Impulse& row : step.impulses()) {
+    columns.add_object(row.object());
+    add(row.point_m(), columns.mutable_point_m());
+    add(row.impulse_newton_seconds(), columns.mutable_impulse_newton_seconds());
+    columns.add_duration_s(static_cast<float>(row.duration_s()));
+    columns.add_time_offset_s(static_cast<float>(row.time_offset_s()));
+    columns.add_second_object(row.second().object());
+    add(row.second().point_m(), columns.mutable_second_point_m());
+    turn(row.second().rotation(), columns.mutable_second_rotation());
+  }
+  for (const v1::ObjectPose& row : step.poses()) {
+    step.mutable_pose_columns()->add_object(row.object());
+    add(row.pose().position_m(), step.mutable_pose_columns()->mutable_position_m());
+    turn(row.pose().orientation(), step.mutable_pose_columns()->mutable_orientation());
+  }
+  step.clear_impulses();
+  step.clear_poses();
+}
+
+/// Twenty contacts of two objects that move and turn, some of the first alone; all figures are
+/// such as single precision holds.
+std::vector<v1::ContactStep> ContactsOfTwo(const v1::Impulse& strike) {
+  std::vector<v1::ContactStep> steps(20);
+  for (int i = 0; i < 20; ++i) {
+    v1::ContactStep& step = steps[i];
+    step.set_time_s(0.5 + i / 64.0);
+    for (const uint32_t object : {1U, 2U}) {
+      v1::ObjectPose& pose = *step.add_poses();
+      pose.set_object(object);
+      pose.mutable_pose()->mutable_position_m()->set_x((object == 1 ? -1 : 1) * (i + 1) / 16.0);
+      if (i % 2 == 0) continue;  // not turned
+      pose.mutable_pose()->mutable_orientation()->set_w(object == 1 ? 0.6F : 0.8F);
+      pose.mutable_pose()->mutable_orientation()->set_z(object == 1 ? 0.8F : 0.6F);
+    }
+    v1::Impulse& impulse = *step.add_impulses() = strike;
+    impulse.set_duration_s((i % 3) / 1024.0);
+    impulse.set_time_offset_s(i / 4096.0);
+    if (i % 5 == 4) continue;  // alone
+    impulse.mutable_second()->set_object(2);
+    impulse.mutable_second()->mutable_point_m()->set_y(0.0625);
+    if (i % 5 == 3) continue;  // turned as the poses say
+    impulse.mutable_second()->mutable_rotation()->set_w(0.6F);
+    impulse.mutable_second()->mutable_rotation()->set_z(0.8F);
+  }
+  return steps;
+}
+
+TEST_F(AudioApi, ColumnsSoundBitForBitAsTheSameInRows) {
+  Requests rows = Trace();
+  rows[0].mutable_settings()->set_channel_count(2);
+  rows[1].mutable_record()->mutable_header()->mutable_hearing()->set_panning(true);
+  rows.insert(rows.begin() + 3, rows[2]);
+  rows[3].mutable_record()->mutable_object()->set_handle(2);
+  rows[3].mutable_record()->mutable_object()->set_size(0.8);  // sounds higher than the first
+  rows.resize(4);
+  Requests columns = rows, alone = rows;
+  for (v1::ContactStep& step : ContactsOfTwo(Strike(1))) {
+    *rows.emplace_back().mutable_record()->mutable_step() = step;
+    TurnIntoColumns(step);
+    *columns.emplace_back().mutable_record()->mutable_step() = step;
+    step.mutable_columns()->clear_second_object();
+    step.mutable_columns()->clear_second_point_m();
+    step.mutable_columns()->clear_second_rotation();
+    *alone.emplace_back().mutable_record()->mutable_step() = step;
+  }
+  const Rendering by_rows = Render(rows);
+  const Rendering by_columns = Render(columns);
+  EXPECT_EQ(by_rows.summary.rejected_count(), 0U);
+  EXPECT_EQ(by_rows.summary.accepted_count(), 20U + 16);  // four are of one object
+  EXPECT_EQ(by_columns.summary.accepted_count(), 20U + 16);
+  EXPECT_GT(by_rows.summary.peak(), 0.001);
+  EXPECT_EQ(by_columns.sound, by_rows.sound);
+  EXPECT_NE(by_columns.sound, Render(alone).sound);
 }
 
 TEST_F(AudioApi, AListenerHearsWhatTheMixerRenders) {
