@@ -129,14 +129,16 @@ def latency(options, folder):
         scratch = folder / str(blocks)
         scratch.mkdir()
         measurement = jack.LatencyMeasurement(scratch, "--look-ahead-blocks", blocks)
-        for way in jack.LatencyMeasurement.WAYS:
-            found = measurement.measure(way, *options.latency_strikes)
-            row(f"{names[way]}, {blocks}", found["strikes"],
-                f"{found['delay_ms']:.2f} + {found['stated_ms'] - found['delay_ms']:.2f}", f"{found['p50_ms']:.2f}",
-                f"{found['p99_ms']:.2f}", f"{found['p999_ms']:.2f}",
-                f"{found['least_ms']:.2f}, {found['most_ms']:.2f}", found["late"], found["in_place"],
-                f"{found['missed_cycles']}, {found['xruns']}")
-        measurement.stop()
+        try:
+            for way in jack.LatencyMeasurement.WAYS:
+                found = measurement.measure(way, *options.latency_strikes)
+                row(f"{names[way]}, {blocks}", found["strikes"],
+                    f"{found['delay_ms']:.2f} + {found['stated_ms'] - found['delay_ms']:.2f}", f"{found['p50_ms']:.2f}",
+                    f"{found['p99_ms']:.2f}", f"{found['p999_ms']:.2f}",
+                    f"{found['least_ms']:.2f}, {found['most_ms']:.2f}", found["late"], found["in_place"],
+                    f"{found['missed_cycles']}, {found['xruns']}")
+        finally:
+            measurement.stop()
 
 
 def session(options, folder):
@@ -146,8 +148,10 @@ def session(options, folder):
           "trace\n\n| seconds | impulses | late, dropped, merged or shed | real-time priority | xruns told by JACK, its cycles missed "
           "| frames compared | differing |\n| --- | --- | --- | --- | --- | --- | --- |")
     played = sessions.Session(folder)
-    found = played.run(options.session_seconds)
-    played.stop()
+    try:
+        found = played.run(options.session_seconds)
+    finally:
+        played.stop()
     row(found["seconds"], found["accepted"], f"{found['late']}, {found['dropped']}, {found['merged_or_shed']}",
         "yes" if found["realtime"] else "not allowed", f"{found['xruns']}, {found['missed_cycles']}",
         f"{found['frames']:,}", found["differing_frames"])
