@@ -73,7 +73,9 @@ void OdeContacts::Read(double step_s, v1::ContactStep& step) {
 void OdeContacts::Append(const Contact& contact, size_t side, double step_s,
                          v1::ContactStep& step) {
   const dBodyID body = contact.bodies[side], other = contact.bodies[1 - side];
-  const Vector force = ToArray(side == 0 ? contact.feedback.f1 : contact.feedback.f2);
+  // ODE takes a joint's only body for its first one, though dJointGetBody does not.
+  const bool is_first = side == 0 || other == nullptr;
+  const Vector force = ToArray(is_first ? contact.feedback.f1 : contact.feedback.f2);
   if (Dot(force, force) == 0) return;
   dVector3 local_force;
   dBodyVectorFromWorld(body, static_cast<dReal>(force[0]), static_cast<dReal>(force[1]),
