@@ -49,7 +49,7 @@ class AudioDevice {
   /// Times that the device itself reported frames missed, beyond those its source counts.
   virtual uint64_t xrun_count() const = 0;
 
-  /// Frames of silence the device put in their place, as far as its clock tells.
+  /// Frames by which its time has gone on without those of its source, as far as its clock tells.
   virtual uint64_t lost_frame_count() const = 0;
 };
 

@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <cmath>
 #include <span>
 #include <string>
 #include <utility>
@@ -18,6 +17,7 @@
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "proto/error_reason.h"
+#include "server/audio_device/output_clock.h"
 
 namespace carillon {
 namespace {
@@ -108,7 +108,8 @@ class Library {
 
 class PortAudioDevice final : public AudioDevice {
  public:
-  explicit PortAudioDevice(const DeviceFormat& format) : format_(format) {}
+  explicit PortAudioDevice(const DeviceFormat& format)
+      : format_(format), clock_(format.sample_rate_hz) {}
   ~PortAudioDevice() override { Stop(); }
 
   absl::Status Open(absl::string_view name) {
@@ -123,7 +124,7 @@ class PortAudioDevice final : public AudioDevice {
 
   absl::Status Start(FrameSource& source) override {
     source_ = &source;
-    last_callback_s_ = 0;
+    clock_.Restart();
     if (const PaError error = Pa_StartStream(stream_); error != paNoError) {
       return Failed(name_, error);
     }
@@ -143,10 +144,8 @@ class PortAudioDevice final : public AudioDevice {
   std::string description() const override { return absl::StrCat("portaudio: ", name_); }
   double latency_s() const override { return latency_s_; }
   bool alive() const override { return !started_ || !finished_.load(std::memory_order_relaxed); }
-  uint64_t xrun_count() const override { return xrun_count_.load(std::memory_order_relaxed); }
-  uint64_t lost_frame_count() const override {
-    return lost_frame_count_.load(std::memory_order_relaxed);
-  }
+  uint64_t xrun_count() const override { return clock_.xrun_count(); }
+  uint64_t lost_frame_count() const override { return clock_.lost_frame_count(); }
 
  private:
   absl::Status OpenStream(PaDeviceIndex index) {
@@ -184,7 +183,8 @@ class PortAudioDevice final : public AudioDevice {
                       const PaStreamCallbackTimeInfo* time, PaStreamCallbackFlags flags,
                       void* self) {
     auto* device = static_cast<PortAudioDevice*>(self);
-    device->CountLoss(time->currentTime, frame_count, (flags & paOutputUnderflow) != 0);
+    device->clock_.Count(time->currentTime, time->outputBufferDacTime, frame_count,
+                         (flags & paOutputUnderflow) != 0);
     device->Fill({static_cast<float*>(output), frame_count * device->channel_count()});
     return paContinue;
   }
@@ -208,20 +208,6 @@ class PortAudioDevice final : public AudioDevice {
     }
   }
 
-  /// PortAudio tells of an underrun once, in the next callback, and not how long it was: the time
-  /// since the last callback, less the block it asked for, was silence.
-  void CountLoss(double now_s, size_t frame_count, bool underflow) noexcept {
-    if (underflow && last_callback_s_ > 0) {
-      xrun_count_.fetch_add(1, std::memory_order_relaxed);
-      const double gap =
-          (now_s - last_callback_s_) * format_.sample_rate_hz - static_cast<double>(frame_count);
-      if (gap > 0) {
-        lost_frame_count_.fetch_add(static_cast<uint64_t>(gap), std::memory_order_relaxed);
-      }
-    }
-    last_callback_s_ = now_s;
-  }
-
   const DeviceFormat format_;
   std::unique_ptr<Library> library_;
   PaStream* stream_ = nullptr;
@@ -229,11 +215,9 @@ class PortAudioDevice final : public AudioDevice {
   std::string name_;
   int channel_count_ = 1;
   double latency_s_ = 0;
-  double last_callback_s_ = 0;
+  OutputClock clock_;
   bool started_ = false;
   std::atomic<bool> finished_{false};
-  std::atomic<uint64_t> xrun_count_{0};
-  std::atomic<uint64_t> lost_frame_count_{0};
 };
 
 }  // namespace

@@ -21,16 +21,18 @@ RATE = 48000
 
 
 class Jack:
-    """A server that nobody else uses: in real time, but without hardware. Its programs run with `environment`."""
+    """A server that nobody else uses: in real time, but without hardware. Its programs run with `environment`; what
+    it says goes to the file `log`."""
 
-    def __init__(self, period_frames=PERIOD_FRAMES):
+    def __init__(self, period_frames=PERIOD_FRAMES, log=os.devnull):
         if shutil.which("jackd") is None:
             raise unittest.SkipTest("jackd is not installed")
         self.environment = dict(os.environ, JACK_DEFAULT_SERVER=f"carillon-test-{os.getpid()}",
                                 JACK_NO_AUDIO_RESERVATION="1", JACK_NO_START_SERVER="1")
-        self.process = subprocess.Popen(
-            ["jackd", "-R", "-P", "50", "-d", "dummy", "-r", str(RATE), "-p", str(period_frames)],
-            env=self.environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        with open(log, "wb") as output:
+            self.process = subprocess.Popen(
+                ["jackd", "-R", "-P", "50", "-d", "dummy", "-r", str(RATE), "-p", str(period_frames)],
+                env=self.environment, stdout=output, stderr=subprocess.STDOUT)
         waited = subprocess.run(["jack_wait", "-w", "-t", "10"], env=self.environment, check=False,
                                 stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         if waited.returncode != 0:

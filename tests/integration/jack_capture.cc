@@ -63,6 +63,11 @@ absl::Status JackCapture::Record(const std::string& port, double seconds) {
     return static_cast<JackCapture*>(self)->Process(frame_count);
   };
   jack_set_process_callback(client_, process, this);
+  const auto count_xrun = [](void* self) {
+    static_cast<JackCapture*>(self)->told_xrun_count_.fetch_add(1, std::memory_order_relaxed);
+    return 0;
+  };
+  jack_set_xrun_callback(client_, count_xrun, this);
   if (jack_activate(client_) != 0 ||
       jack_connect(client_, port.c_str(), jack_port_name(input_)) != 0) {
     return absl::UnavailableError(absl::StrCat("JACK has no port ", port));
@@ -73,7 +78,7 @@ absl::Status JackCapture::Record(const std::string& port, double seconds) {
   playback_latency_s_ = static_cast<double>(latency.max) / sample_rate_hz_;
   // A client that joins makes the server itself miss cycles.
   while (static_cast<double>(frame_count()) < kSettleS * sample_rate_hz_) usleep(1000);
-  missed_count_ = 0;
+  missed_count_ = missed_frame_count_ = told_xrun_count_ = 0;
   return absl::OkStatus();
 }
 
@@ -85,6 +90,9 @@ int JackCapture::Process(jack_nframes_t frame_count) {
   const uint64_t recorded = frame_count_.load(std::memory_order_relaxed);
   if (recorded > 0 && jack_frame != next_jack_frame_) {
     missed_count_.fetch_add(1, std::memory_order_relaxed);
+    // A late client may be run twice in one cycle: its frames then come back.
+    missed_frame_count_.fetch_add(static_cast<int32_t>(jack_frame - next_jack_frame_),
+                                  std::memory_order_relaxed);
   }
   next_jack_frame_ = jack_frame + frame_count;
   if (recorded + frame_count > samples_.size() || cycle_count_ == cycles_.size()) return 0;

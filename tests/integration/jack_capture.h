@@ -50,6 +50,13 @@ class JackCapture {
   /// Cycles that JACK or this client missed since Start returned.
   uint64_t missed_count() const { return missed_count_.load(); }
 
+  /// Frames of those cycles, as JACK counts them.
+  int64_t missed_frame_count() const { return missed_frame_count_.load(); }
+
+  /// Times that JACK has told of an xrun since, whoever was late; of one that made several clients
+  /// late it tells for each.
+  uint64_t told_xrun_count() const { return told_xrun_count_.load(); }
+
   /// From the port to the ear as JACK states it, seconds.
   double playback_latency_s() const { return playback_latency_s_; }
 
@@ -69,6 +76,8 @@ class JackCapture {
   jack_nframes_t next_jack_frame_ = 0;
   std::atomic<uint64_t> frame_count_{0};
   std::atomic<uint64_t> missed_count_{0};
+  std::atomic<int64_t> missed_frame_count_{0};
+  std::atomic<uint64_t> told_xrun_count_{0};
 };
 
 /// Seconds of CLOCK_MONOTONIC.

@@ -33,8 +33,11 @@ int Record(const char* port, double seconds, const char* file) {
   std::ofstream out(file, std::ios::binary);
   out.write(reinterpret_cast<const char*>(samples.data()),
             static_cast<std::streamsize>(samples.size_bytes()));
-  std::printf("{\"frames\": %zu, \"missed_cycles\": %llu}\n", samples.size(),
-              static_cast<unsigned long long>((*capture)->missed_count()));
+  std::printf(
+      "{\"frames\": %zu, \"missed_cycles\": %llu, \"missed_frames\": %lld, \"told_xruns\": %llu}\n",
+      samples.size(), static_cast<unsigned long long>((*capture)->missed_count()),
+      static_cast<long long>((*capture)->missed_frame_count()),
+      static_cast<unsigned long long>((*capture)->told_xrun_count()));
   return out.good() ? EXIT_SUCCESS : EXIT_FAILURE;
 }
 

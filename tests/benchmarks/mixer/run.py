@@ -145,7 +145,7 @@ def session(options, folder):
     use_integration_tests(options)
     import session as sessions
     print("\n## A session under a busy loop on each core and decompositions: JACK capture against the rendering of its "
-          "trace\n\n| seconds | impulses | late, dropped, merged or shed | real-time priority | xruns told by JACK, its cycles missed "
+          "trace\n\n| seconds | impulses | late, dropped, merged or shed | real-time priority | xruns told by JACK, frames lost "
           "| frames compared | differing |\n| --- | --- | --- | --- | --- | --- | --- |")
     played = sessions.Session(folder)
     try:
@@ -153,7 +153,7 @@ def session(options, folder):
     finally:
         played.stop()
     row(found["seconds"], found["accepted"], f"{found['late']}, {found['dropped']}, {found['merged_or_shed']}",
-        "yes" if found["realtime"] else "not allowed", f"{found['xruns']}, {found['missed_cycles']}",
+        "yes" if found["realtime"] else "not allowed", f"{found['xruns']}, {found['lost_frames']}",
         f"{found['frames']:,}", found["differing_frames"])
 
 
