@@ -9,6 +9,8 @@
 
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+#include "proto/near_names.h"
 
 namespace carillon {
 namespace {
@@ -24,14 +26,16 @@ v1::MaterialCatalogue ParseCatalogue() {
 }
 
 absl::StatusOr<v1::Material> FindPreset(const std::string& name) {
-  std::string known;
+  std::vector<std::string> known;
   for (const v1::CatalogueMaterial& entry : Materials().materials()) {
     if (entry.name() == name) return entry.material();
-    absl::StrAppend(&known, known.empty() ? "" : ", ", entry.name());
+    known.push_back(entry.name());
   }
-  return absl::InvalidArgumentError(absl::StrCat("UNKNOWN_MATERIAL: no material is named \"", name,
-                                                 "\"; name one of ", known,
-                                                 ", or give the figures themselves"));
+  const std::vector<std::string> near = NearNames(name, known);
+  return absl::InvalidArgumentError(absl::StrCat(
+      "UNKNOWN_MATERIAL: no material is named \"", name, "\"",
+      near.empty() ? "" : ", the nearest is ", absl::StrJoin(near, " or "), "; name one of ",
+      absl::StrJoin(known, ", "), ", or give the figures themselves"));
 }
 
 absl::Status OutOfRange(const char* field, double value, const char* range) {

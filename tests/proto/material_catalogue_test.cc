@@ -8,10 +8,13 @@
 #include <set>
 #include <string>
 
+#include "absl/strings/str_cat.h"
+
 namespace carillon {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 TEST(MaterialCatalogue, EveryEntryIsCompleteSourcedAndNamedOnce) {
   std::set<std::string> names;
@@ -89,6 +92,31 @@ TEST(ResolveMaterial, UnknownPresetListsTheKnownOnes) {
   const absl::StatusOr<v1::Material> resolved = ResolveMaterial(material);
   EXPECT_THAT(resolved.status().ToString(), HasSubstr("UNKNOWN_MATERIAL: "));
   EXPECT_THAT(resolved.status().ToString(), HasSubstr("chime_aluminum"));
+  EXPECT_THAT(resolved.status().ToString(), Not(HasSubstr("nearest")));
+}
+
+TEST(ResolveMaterial, UnknownPresetNamesTheNearest) {
+  const auto expect = [](const char* written, const char* nearest) {
+    v1::Material material;
+    material.set_preset(written);
+    EXPECT_THAT(ResolveMaterial(material).status().ToString(),
+                HasSubstr(absl::StrCat("no material is named \"", written, "\", the nearest is ",
+                                       nearest, "; name one of chime_aluminum, ")));
+  };
+  expect("bell_bornze", "bell_bronze");
+  expect("bell-bronze", "bell_bronze");
+  expect("Brass", "brass");
+  expect("bras", "brass");
+  expect("mapple", "maple");
+  // By one word of the name.
+  expect("steel", "structural_steel");
+  expect("aluminium", "chime_aluminum or shelf_aluminum or aluminum_6061");
+}
+
+TEST(ResolveMaterial, ANameOfAnyLengthIsAnswered) {
+  v1::Material material;
+  material.set_preset(std::string(1 << 20, 'x'));
+  EXPECT_THAT(ResolveMaterial(material).status().ToString(), Not(HasSubstr("nearest")));
 }
 
 TEST(ResolveMaterial, RefusesFiguresOutOfRangeByName) {

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "proto/near_names.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "absl/strings/ascii.h"
+#include "absl/strings/str_split.h"
+
+namespace carillon {
+namespace {
+
+constexpr size_t kLongestName = 64;
+
+/// Levenshtein's, row by row of the table of all beginnings.
+size_t EditDistance(const std::string& a, const std::string& b) {
+  std::vector<size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), size_t{0});
+  for (const char letter : a) {
+    size_t diagonal = row[0]++;
+    for (size_t j = 0; j < b.size(); ++j) {
+      const size_t changed = diagonal + (letter == b[j] ? 0 : 1);
+      diagonal = row[j + 1];
+      row[j + 1] = std::min({changed, row[j] + 1, row[j + 1] + 1});
+    }
+  }
+  return row.back();
+}
+
+size_t Distance(const std::string& written, const std::string& name) {
+  size_t least = EditDistance(written, name);
+  const std::vector<std::string> words = absl::StrSplit(name, '_');
+  for (const std::string& word : words) least = std::min(least, EditDistance(written, word));
+  return least;
+}
+
+}  // namespace
+
+std::vector<std::string> NearNames(std::string_view written, std::span<const std::string> names) {
+  if (written.size() > kLongestName) return {};
+  const std::string lower =
+      absl::AsciiStrToLower(absl::string_view(written.data(), written.size()));
+  size_t least = std::max<size_t>(1, lower.size() / 3);
+  std::vector<std::string> nearest;
+  for (const std::string& name : names) {
+    const size_t distance = Distance(lower, absl::AsciiStrToLower(name));
+    if (distance > least) continue;
+    if (distance < least) nearest.clear();
+    least = distance;
+    nearest.push_back(name);
+  }
+  return nearest;
+}
+
+}  // namespace carillon
