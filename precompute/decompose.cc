@@ -4,6 +4,7 @@
 #include <sys/resource.h>
 
 #include <algorithm>
+#include <iterator>
 #include <optional>
 #include <utility>
 #include <variant>
@@ -229,6 +230,7 @@ void WarnOfAccuracy(const ResolutionGoal& goal, ModalModel& model) {
 
 absl::StatusOr<ModalModel> Decompose(const MeshFile& file, const DecompositionSettings& settings,
                                      DecompositionObserver& observer) {
+  const double begun_cpu_s = PhaseClock::Now().cpu_seconds;
   const absl::StatusOr<Input> input = ReadInput(file, settings, observer);
   if (!input.ok()) return input.status();
   const auto* surface = std::get_if<Fillable>(&*input);
@@ -238,6 +240,9 @@ absl::StatusOr<ModalModel> Decompose(const MeshFile& file, const DecompositionSe
   if (!model.ok()) return model;
   if (absl::Status status = CheckBand(*model, settings.use); !status.ok()) return status;
   WarnOfAccuracy(settings.resolution, *model);
+  const double used_s = PhaseClock::Now().cpu_seconds - begun_cpu_s;
+  std::ranges::move(OverrunWarnings(settings.resolution, used_s, PeakBytes()),
+                    std::back_inserter(model->warnings));
   observer.OnModes(model->eigenvalues.size());
   return model;
 }

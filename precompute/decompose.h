@@ -43,7 +43,7 @@ struct DecompositionSettings {
 /// From a mesh file to the modal model of the body, with every deformation mode up to the top of
 /// the band that `settings.use` names. With a resolution goal a surface is filled and solved again,
 /// finer each time, until the goal is met or as far as it allows; the model's warnings say where
-/// the accuracy asked for was not reached.
+/// the accuracy asked for was not reached, or a budget was overrun.
 ///
 /// Errors: those of ReadMesh, CheckSurface, Tetrahedralize, Hold and SolveDeformationModes;
 /// NO_MODE_IN_BAND with the figure first_mode_hz; INVALID_SETTINGS (linear elements asked of a mesh

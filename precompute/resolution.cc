@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "absl/strings/str_format.h"
 #include "precompute/mesh/mesh_limits.h"
 
 namespace carillon::precompute {
@@ -55,6 +56,14 @@ bool Refined(const std::vector<Round>& rounds) {
          rounds.back().grain_m < kSameGrain * rounds[rounds.size() - 2].grain_m;
 }
 
+std::string Overrun(const char* what, double asked, double used) {
+  return absl::StrFormat(
+      "the budget of %.3g %s was overrun: %.3g were used; ask for fewer nodes, linear elements or "
+      "a "
+      "lower band, or allow more",
+      asked, what, used);
+}
+
 /// Of the space that elements of one size fill.
 double Dimension(const Round& round) { return round.thin ? 2 : 3; }
 
@@ -81,6 +90,19 @@ std::optional<double> NextGrain(const ResolutionGoal& goal, const std::vector<Ro
   }
   if (growth < kLeastGrowth) return std::nullopt;
   return last.grain_m * std::pow(growth, -1 / dimension);
+}
+
+std::vector<std::string> OverrunWarnings(const ResolutionGoal& goal, double used_s,
+                                         double used_bytes) {
+  constexpr double kGib = 1024.0 * 1024 * 1024;
+  std::vector<std::string> warnings;
+  if (goal.budget_s > 0 && used_s > goal.budget_s) {
+    warnings.push_back(Overrun("s of processor time", goal.budget_s, used_s));
+  }
+  if (goal.budget_bytes > 0 && used_bytes > goal.budget_bytes) {
+    warnings.push_back(Overrun("GiB of memory", goal.budget_bytes / kGib, used_bytes / kGib));
+  }
+  return warnings;
 }
 
 }  // namespace carillon::precompute

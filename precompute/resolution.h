@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 namespace carillon::precompute {
@@ -35,6 +36,11 @@ std::optional<double> NextGrain(const ResolutionGoal& goal, const std::vector<Ro
 
 /// How many times as long as `last` a round with that grain will take.
 double TimeGrowth(const Round& last, double grain_m);
+
+/// What a user is told of each budget that was overrun; nothing where both were kept to. The first
+/// round is solved whatever it takes, and later ones are only foretold.
+std::vector<std::string> OverrunWarnings(const ResolutionGoal& goal, double used_s,
+                                         double used_bytes);
 
 /// What the rounds after the first one will take, in times of it, before its errors are known; and
 /// those after a later one, which is meant to be the last.

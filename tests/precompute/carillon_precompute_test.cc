@@ -27,7 +27,9 @@ namespace carillon::precompute {
 namespace {
 
 using ::testing::ElementsAre;
+using ::testing::ElementsAreArray;
 using ::testing::HasSubstr;
+using ::testing::StartsWith;
 using Json = nlohmann::json;
 
 constexpr char kSteel[] = " --young 210e9 --poisson 0.3 --density 7850";
@@ -80,10 +82,14 @@ struct CarillonPrecomputeTest : ::testing::Test {
     EXPECT_FALSE(std::filesystem::exists(model));
     const Json error = Json::parse(result.output).at("error");
     EXPECT_FALSE(error.at("message").get<std::string>().empty());
-    std::ifstream file(folder + "/stderr");
-    const std::string on_stderr((std::istreambuf_iterator<char>(file)), {});
-    EXPECT_THAT(on_stderr, HasSubstr(error.at("reason").get<std::string>()));
+    EXPECT_THAT(OnStandardError(), HasSubstr(error.at("reason").get<std::string>()));
     return error.at("reason");
+  }
+
+  /// What the last run printed there.
+  std::string OnStandardError() const {
+    std::ifstream file(folder + "/stderr");
+    return {std::istreambuf_iterator<char>(file), {}};
   }
 
   std::string folder = ::testing::TempDir() + "/carillon_precompute_" + std::to_string(getpid());
@@ -126,6 +132,22 @@ TEST_F(CarillonPrecomputeTest, JsonHasEveryKey) {
                 std::sqrt(omega * omega - sigma * sigma) / (2 * std::numbers::pi), 1e-6);
     EXPECT_LT(mode.at("residual"), 1e-5);
   }
+}
+
+TEST_F(CarillonPrecomputeTest, SaysInWordsThatABudgetWasOverrun) {
+  const Result result = RunBar(std::string(kSteel) + " --budget 0.001:0.001");
+  ASSERT_EQ(result.exit_status, 0) << result.output;
+  const Json report = Json::parse(result.output);
+  const std::vector<std::string> warnings = report.at("warnings");
+  ASSERT_EQ(warnings.size(), 2U);
+  EXPECT_THAT(warnings[0], StartsWith("the budget of 0.001 s of processor time was overrun: "));
+  EXPECT_THAT(warnings[1], StartsWith("the budget of 0.001 GiB of memory was overrun: "));
+  EXPECT_THAT(ReadRecords(model)[0].header().warnings(), ElementsAreArray(warnings));
+  // The summary for people has them as well.
+  ASSERT_EQ(Run(bar + " --out " + model + " --element linear --nodes 100 --budget 0.001" + kSteel)
+                .exit_status,
+            0);
+  EXPECT_THAT(OnStandardError(), StartsWith("warning: the budget of 0.001 s of processor time"));
 }
 
 TEST_F(CarillonPrecomputeTest, KeepsTheMostAudibleModesAndSaysHowManyItLeftOut) {

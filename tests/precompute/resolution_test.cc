@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "precompute/resolution.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <vector>
 
 namespace carillon::precompute {
 namespace {
+
+using ::testing::StartsWith;
 
 /// A round with a grain of so many millimetres.
 Round Solved(double grain_mm, double worst_error) {
@@ -58,6 +61,20 @@ TEST(Resolution, KeepsToItsBudgets) {
   const auto next = NextGrain({.budget_s = 60}, {Solved(4, 0.5)});
   ASSERT_TRUE(next);
   EXPECT_LT(*next, 4e-3 / 1.4);
+}
+
+TEST(Resolution, ABudgetThatWasOverrunIsSaidWithWhatWasUsed) {
+  const double gib = 1024.0 * 1024 * 1024;
+  const ResolutionGoal goal{.budget_s = 10, .budget_bytes = 2 * gib};
+  EXPECT_TRUE(OverrunWarnings(goal, 9.9, 1.9 * gib).empty());
+  const auto slow = OverrunWarnings(goal, 12.5, 1.9 * gib);
+  ASSERT_EQ(slow.size(), 1U);
+  EXPECT_THAT(slow[0], StartsWith("the budget of 10 s of processor time was overrun: 12.5 were"));
+  const auto large = OverrunWarnings(goal, 9.9, 2.25 * gib);
+  ASSERT_EQ(large.size(), 1U);
+  EXPECT_THAT(large[0], StartsWith("the budget of 2 GiB of memory was overrun: 2.25 were used"));
+  EXPECT_EQ(OverrunWarnings(goal, 12.5, 2.25 * gib).size(), 2U);
+  EXPECT_TRUE(OverrunWarnings({.accuracy = 0.01}, 1e9, 1e15).empty());
 }
 
 TEST(Resolution, EndsAfterSomeRounds) {
