@@ -8,29 +8,27 @@
 namespace carillon {
 namespace {
 
-/// JACK's clock loses about a hundredth of its error in a cycle: a quarter in so many.
-constexpr int kHalfWatchCycles = 24;
-/// What is steady changes less than this, relative to the gain.
-constexpr double kSteady = 0.1;
-/// Stamps are not more exact.
-constexpr double kLeastLossFrames = 16;
+/// A sound card's clock and the system's may drift apart by 0.3 ms in a second.
+constexpr double kLeastLossS = 0.001;
+/// JACK's loop has a bandwidth of 1/8 Hz and is of second order: of what throws it off by 1,
+/// exp(-x) (cos x - sin x) with x = 0.555 t is left, 0.52 after half a second and 0.19 after one.
+constexpr double kLeftOfDecrease = 0.19 / (0.52 - 0.19);
 
 }  // namespace
 
 void OutputClock::Restart() noexcept {
-  cycle_count_ = given_count_ = 0;
+  begun_ = watching_ = false;
+  given_count_ = cycle_first_ = stretch_first_ = 0;
   least_ = least_before_ = kNever;
-  watched_count_ = 0;
 }
 
 void OutputClock::Count(double cycle_s, double output_s, size_t frame_count,
                         bool underflow) noexcept {
   // Some devices of ALSA have no clock: theirs stands still.
-  if (cycle_count_ == 0 || cycle_s != cycle_s_ || (underflow && !underflow_)) {
-    const double lead_frames = output_s * sample_rate_hz_ - static_cast<double>(given_count_);
+  if (!begun_ || cycle_s != cycle_s_ || (underflow && !underflow_)) {
     // Before the first cycle nothing was to be heard.
-    BeginCycle(lead_frames, underflow && cycle_count_ > 0);
-    ++cycle_count_;
+    BeginCycle(output_s * sample_rate_hz_ - static_cast<double>(given_count_), underflow && begun_);
+    begun_ = true;
   }
   cycle_s_ = cycle_s;
   underflow_ = underflow;
@@ -38,42 +36,35 @@ void OutputClock::Count(double cycle_s, double output_s, size_t frame_count,
 }
 
 void OutputClock::BeginCycle(double lead_frames, bool underflow) noexcept {
+  cycle_frame_count_ =
+      static_cast<double>(given_count_ - std::exchange(cycle_first_, given_count_));
   if (underflow) {
     xrun_count_.fetch_add(1, std::memory_order_relaxed);
     // Of several in a row the whole is measured.
-    if (watched_count_ == 0) usual_ = std::min(least_, least_before_);
-    watched_count_ = 2 * kHalfWatchCycles;
-    early_ = late_ = kNever;
+    if (!watching_) usual_ = std::min(least_, least_before_);
+    watching_ = true;
+    stretch_first_ = given_count_;
+    least_ = least_before_ = kNever;
   }
-  if (watched_count_ > 0) {
-    Watch(lead_frames);
-  } else {
-    Follow(lead_frames);
-  }
-}
-
-/// The least of a stretch, for what is late now and then; of a short one, for sound card and clock
-/// drift apart.
-void OutputClock::Follow(double lead_frames) noexcept {
   least_ = std::min(least_, lead_frames);
-  if (cycle_count_ % kHalfWatchCycles != 0) return;
-  least_before_ = std::exchange(least_, kNever);
+  if (given_count_ - stretch_first_ >= half_watch_) EndStretch();
 }
 
-void OutputClock::Watch(double lead_frames) noexcept {
-  double& least = watched_count_ > kHalfWatchCycles ? early_ : late_;
-  least = std::min(least, lead_frames);
-  if (--watched_count_ == 0) Settle();
-}
-
-void OutputClock::Settle() noexcept {
-  const double gain = late_ - usual_;
-  if (gain >= kLeastLossFrames && std::abs(late_ - early_) <= kSteady * gain) {
-    lost_frame_count_.fetch_add(static_cast<uint64_t>(std::llround(gain)),
+void OutputClock::EndStretch() noexcept {
+  if (watching_ && least_before_ != kNever) {
+    const double lost = LostFrames(least_before_ - usual_, least_ - usual_);
+    lost_frame_count_.fetch_add(static_cast<uint64_t>(std::llround(lost)),
                                 std::memory_order_relaxed);
+    watching_ = false;
   }
-  least_ = kNever;
-  least_before_ = late_;
+  least_before_ = std::exchange(least_, kNever);
+  stretch_first_ = given_count_;
+}
+
+double OutputClock::LostFrames(double early, double late) const noexcept {
+  if (kind_ == LossKind::kAnyLength) return late < kLeastLossS * sample_rate_hz_ ? 0 : late;
+  const double gain = late - kLeftOfDecrease * (early - late);
+  return std::max(0.0, std::round(gain / cycle_frame_count_)) * cycle_frame_count_;
 }
 
 }  // namespace carillon

@@ -8,17 +8,27 @@
 
 namespace carillon {
 
+/// How a device loses frames.
+enum class LossKind {
+  kAnyLength,    ///< it stands still until it is started again
+  kWholeCycles,  ///< its cycles go on without them (JACK)
+};
+
 /// Finds from the time stamps of a device's callbacks how much of the sound was lost where the
 /// device says that it had an xrun.
 ///
-/// When the device is late, so is the time stamp, and the next ones are not: nothing was lost. When
+/// When a callback is late, so is its time stamp, and the next ones are not: nothing was lost. When
 /// frames were lost, the time at which frames are heard stays ahead of the frames given by as many.
-/// So their difference is watched for some cycles of the device: what it has steadily gained is
-/// lost. A gain that dwindles is a clock that finds its way back after the device itself was late
-/// (JACK's, of its graph: its frames wait as long as everybody else does, and none is missing).
+/// So their difference, the lead, is watched for a second: what it has gained by then is lost.
+///
+/// JACK's stamps come from a loop that follows its cycles. Where its server itself was late, all
+/// frames waited as long and none is missing, but the loop is thrown off: a lead that dwindles.
 class OutputClock {
  public:
-  explicit OutputClock(double sample_rate_hz) : sample_rate_hz_(sample_rate_hz) {}
+  OutputClock(double sample_rate_hz, LossKind kind)
+      : half_watch_(static_cast<uint64_t>(sample_rate_hz / 2)),
+        sample_rate_hz_(sample_rate_hz),
+        kind_(kind) {}
 
   /// Forgets what was before; the counts stay.
   void Restart() noexcept;
@@ -30,27 +40,30 @@ class OutputClock {
   /// Cycles in which the device said so. Any thread.
   uint64_t xrun_count() const { return xrun_count_.load(std::memory_order_relaxed); }
 
-  /// Known about half a second after. Any thread.
+  /// Known a second after. Any thread.
   uint64_t lost_frame_count() const { return lost_frame_count_.load(std::memory_order_relaxed); }
 
  private:
   static constexpr double kNever = std::numeric_limits<double>::infinity();
 
   void BeginCycle(double lead_frames, bool underflow) noexcept;
-  void Follow(double lead_frames) noexcept;
-  void Watch(double lead_frames) noexcept;
-  void Settle() noexcept;
+  void EndStretch() noexcept;
+  /// `early`, `late`: what the lead has gained half a second and a second after.
+  double LostFrames(double early, double late) const noexcept;
 
+  const uint64_t half_watch_;  ///< frames
   const double sample_rate_hz_;
+  const LossKind kind_;
   double cycle_s_ = 0;  ///< of the last callback
   bool underflow_ = false;
-  uint64_t given_count_ = 0;  ///< frames
-  uint64_t cycle_count_ = 0;
-  /// Least lead lately: of this stretch of cycles, and of the one before.
+  uint64_t given_count_ = 0;      ///< frames
+  uint64_t cycle_first_ = 0;      ///< the first frame of this cycle
+  double cycle_frame_count_ = 0;  ///< of the last whole cycle
+  uint64_t stretch_first_ = 0;    ///< the first frame of this half second
+  bool begun_ = false, watching_ = false;
+  /// Least lead, for some callbacks are late: of this half second, and of the one before.
   double least_ = kNever, least_before_ = kNever;
-  double usual_ = 0;                       ///< lead before the xrun that is being watched
-  int watched_count_ = 0;                  ///< cycles left; zero: none is watched
-  double early_ = kNever, late_ = kNever;  ///< least lead in both halves of the watch
+  double usual_ = 0;  ///< lead before the xrun that is being watched
   std::atomic<uint64_t> xrun_count_{0};
   std::atomic<uint64_t> lost_frame_count_{0};
 };

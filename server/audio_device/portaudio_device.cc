@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -108,8 +109,7 @@ class Library {
 
 class PortAudioDevice final : public AudioDevice {
  public:
-  explicit PortAudioDevice(const DeviceFormat& format)
-      : format_(format), clock_(format.sample_rate_hz) {}
+  explicit PortAudioDevice(const DeviceFormat& format) : format_(format) {}
   ~PortAudioDevice() override { Stop(); }
 
   absl::Status Open(absl::string_view name) {
@@ -124,7 +124,7 @@ class PortAudioDevice final : public AudioDevice {
 
   absl::Status Start(FrameSource& source) override {
     source_ = &source;
-    clock_.Restart();
+    clock_->Restart();
     if (const PaError error = Pa_StartStream(stream_); error != paNoError) {
       return Failed(name_, error);
     }
@@ -144,8 +144,8 @@ class PortAudioDevice final : public AudioDevice {
   std::string description() const override { return absl::StrCat("portaudio: ", name_); }
   double latency_s() const override { return latency_s_; }
   bool alive() const override { return !started_ || !finished_.load(std::memory_order_relaxed); }
-  uint64_t xrun_count() const override { return clock_.xrun_count(); }
-  uint64_t lost_frame_count() const override { return clock_.lost_frame_count(); }
+  uint64_t xrun_count() const override { return clock_->xrun_count(); }
+  uint64_t lost_frame_count() const override { return clock_->lost_frame_count(); }
 
  private:
   absl::Status OpenStream(PaDeviceIndex index) {
@@ -172,6 +172,8 @@ class PortAudioDevice final : public AudioDevice {
       return Failed(absl::StrCat(name_, " at ", format_.sample_rate_hz, " Hz"), error);
     }
     Pa_SetStreamFinishedCallback(stream_, &Finished);
+    clock_.emplace(format_.sample_rate_hz,
+                   api == paJACK ? LossKind::kWholeCycles : LossKind::kAnyLength);
     latency_s_ = Pa_GetStreamInfo(stream_)->outputLatency;
     // Of JACK's latency PortAudio leaves out the period that is played while the next is asked for.
     if (api == paJACK)
@@ -183,8 +185,8 @@ class PortAudioDevice final : public AudioDevice {
                       const PaStreamCallbackTimeInfo* time, PaStreamCallbackFlags flags,
                       void* self) {
     auto* device = static_cast<PortAudioDevice*>(self);
-    device->clock_.Count(time->currentTime, time->outputBufferDacTime, frame_count,
-                         (flags & paOutputUnderflow) != 0);
+    device->clock_->Count(time->currentTime, time->outputBufferDacTime, frame_count,
+                          (flags & paOutputUnderflow) != 0);
     device->Fill({static_cast<float*>(output), frame_count * device->channel_count()});
     return paContinue;
   }
@@ -215,7 +217,7 @@ class PortAudioDevice final : public AudioDevice {
   std::string name_;
   int channel_count_ = 1;
   double latency_s_ = 0;
-  OutputClock clock_;
+  std::optional<OutputClock> clock_;  ///< once it is open
   bool started_ = false;
   std::atomic<bool> finished_{false};
 };

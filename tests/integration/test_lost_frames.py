@@ -46,13 +46,13 @@ class LostFramesTest(unittest.TestCase):
 
     def test_frames_lost_are_those_a_capture_misses(self):
         recorder = self.record()
-        self.let_pass(0.7)  # what the capture's arrival cost is known
+        self.let_pass(1.2)  # what the capture's arrival cost is known
         before = self.mixer()
         for stop_s in STOPS_S:
             self.daemon.process.send_signal(signal.SIGSTOP)
             time.sleep(stop_s)
             self.daemon.process.send_signal(signal.SIGCONT)
-            self.let_pass(0.8)
+            self.let_pass(1.2)
         after = self.mixer()
         printed, _ = recorder.communicate()  # which ends its standard input
         captured = json.loads(printed)
@@ -64,8 +64,10 @@ class LostFramesTest(unittest.TestCase):
         if "JackTimedDriver::Process XRun" in (self.folder / "jackd").read_text():
             self.skipTest("too busy for sound here: JACK itself was late, and has set its frames anew")
         self.assertGreaterEqual(lost, sum(STOPS_S) * jack.RATE - 4 * PERIOD_FRAMES)
-        # JACK's clock is as exact as a few frames.
-        self.assertAlmostEqual(lost, captured["missed_frames"], delta=8)
+        # On a busy machine the capture, which waits for the daemon, may miss one cycle more each time.
+        self.assertEqual(lost % PERIOD_FRAMES, 0)
+        self.assertLessEqual(lost, captured["missed_frames"])
+        self.assertGreaterEqual(lost, captured["missed_frames"] - len(STOPS_S) * PERIOD_FRAMES)
 
 
 if __name__ == "__main__":
