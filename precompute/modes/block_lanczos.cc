@@ -13,8 +13,10 @@ using Eigen::MatrixXd;
 template <typename Real>
 LanczosRecurrence<Real>::LanczosRecurrence(const NodeMatrix& A,
                                            const MultifrontalCholesky<Real>& factor, double shift,
-                                           const MatrixXd& deflated, Workers& workers)
+                                           const MatrixXd& deflated, double foreseen,
+                                           Workers& workers)
     : workers_(workers),
+      foreseen_(foreseen),
       operator_(A, factor, shift, workers),
       mass_(MakeMassRows<Real>(A)),
       mass_is_identity_(A.mass_is_identity),
@@ -41,7 +43,7 @@ template <typename Real>
 bool LanczosRecurrence<Real>::Step() {
   basis_.Append(next_);
   below_.emplace_back(R_);
-  operator_.Apply(mass_is_identity_ ? next_ : mass_times_, next_);
+  operator_.Apply(mass_is_identity_ ? next_ : mass_times_, next_, done());
   // The recurrence takes the large parts out first, so that what is left loses no digits when it is
   // made orthogonal to everything.
   const SmallBlock H = BlockBasis<Real>::Dot(basis_.back(0), MassTimes(next_), workers_);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <vector>
 
 #include "precompute/modes/block_basis.h"
@@ -23,9 +24,10 @@ class LanczosRecurrence {
  public:
   using Block = VectorBlockOf<Real>;
 
-  /// `deflated`: at most kBlockWidth vectors, M-orthonormal, in elimination order. All outlive it.
+  /// `deflated`: at most kBlockWidth vectors, M-orthonormal, in elimination order; `foreseen`: the
+  /// size at which the iteration will end, about. All but the number outlive it.
   LanczosRecurrence(const NodeMatrix& A, const MultifrontalCholesky<Real>& factor, double shift,
-                    const Eigen::MatrixXd& deflated, Workers& workers);
+                    const Eigen::MatrixXd& deflated, double foreseen, Workers& workers);
 
   /// Begins with random vectors, seeded: a body gives the same model each time.
   bool Start();
@@ -35,9 +37,9 @@ class LanczosRecurrence {
   bool Step();
 
   int size() const { return basis_.size(); }
-
-  /// False: OP is that of a stiffness nearby, to the precision of Real.
-  bool exact() const { return operator_.exact(); }
+  double solve_error() const { return operator_.error(); }
+  /// The part of the iteration that is done, about.
+  double done() const { return std::min(1.0, size() / foreseen_); }
 
   /// The projection of OP on the basis, block-tridiagonal, size() square.
   Eigen::MatrixXd T() const;
@@ -58,6 +60,7 @@ class LanczosRecurrence {
   void TimesRight(const SmallBlock& u, Block& x);
 
   Workers& workers_;
+  double foreseen_;
   ShiftInvert<Real> operator_;
   MassRows<Real> mass_;
   bool mass_is_identity_;

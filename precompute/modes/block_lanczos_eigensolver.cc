@@ -36,6 +36,11 @@ constexpr double kBasisOfWanted = 2.6;
 constexpr Index kBasisAtLeast = 120;
 constexpr double kIterationPart = 0.6;
 
+/// Corrections before K and M are projected for the first time. Where solves are this far off, one
+/// correction gains little as long as modes are mixed with each other, which the projection mends.
+constexpr int kFirstSteps = 2;
+constexpr double kLargeSolveError = 5e-4;
+
 /// Eigenvalues below this part of the shift are zero but for rounding.
 constexpr double kFreeMotion = 1e-7;
 
@@ -93,7 +98,6 @@ absl::StatusOr<RitzPairs> Iterate(LanczosRecurrence<Real>& recurrence, Index wan
   RitzPairs pairs;
   bool open = recurrence.Start();
   progress(0);
-  const double foreseen = kBasisOfWanted * static_cast<double>(wanted) + kBasisAtLeast;
   // Looking costs the cube of the size; from three halves on, two more vectors make about one more
   // pair.
   for (Index look = 3 * wanted / 2 + 3 * kBlockWidth; pairs.converged_count < wanted;) {
@@ -101,7 +105,7 @@ absl::StatusOr<RitzPairs> Iterate(LanczosRecurrence<Real>& recurrence, Index wan
       return NotConverged(pairs.converged_count, wanted);
     }
     open = recurrence.Step();
-    progress(kIterationPart * std::min(1.0, static_cast<double>(recurrence.size()) / foreseen));
+    progress(kIterationPart * recurrence.done());
     if (open && recurrence.size() < look) continue;
     pairs = FindRitzPairs(recurrence, wanted);
     const Index missing = wanted - pairs.converged_count;
@@ -117,20 +121,21 @@ absl::StatusOr<Modes> SolveIn(const OrderedSystem& ordered, const MatrixXd& rigi
                                                             workers, nullptr);
   if (!factor.ok()) return factor.status();
   std::vector<VectorBlockOf<Real>> rough;
-  bool exact = true;
+  int first_steps = 1;
   {
-    LanczosRecurrence<Real> recurrence(ordered.matrix, *factor, shift, rigid, workers);
+    const double foreseen = kBasisOfWanted * static_cast<double>(wanted) + kBasisAtLeast;
+    LanczosRecurrence<Real> recurrence(ordered.matrix, *factor, shift, rigid, foreseen, workers);
     const Index largest = std::min<Index>(
         3 * static_cast<Index>(ordered.matrix.node_count) - rigid.cols(), 10 * wanted + 500);
     const absl::StatusOr<RitzPairs> pairs = Iterate(recurrence, wanted, largest, progress);
     if (!pairs.ok()) return pairs.status();
     rough = recurrence.Combine(pairs->coordinates);
-    exact = recurrence.exact();
+    const double error = recurrence.solve_error();
+    if (error > 0 && error < kLargeSolveError) first_steps = kFirstSteps;
   }
   return RefineModes(
       ordered.matrix, *factor, rigid, rough,
-      {.wanted = wanted, .first_steps = exact ? 1 : 3, .free_motion = -kFreeMotion * shift},
-      workers);
+      {.wanted = wanted, .first_steps = first_steps, .free_motion = -kFreeMotion * shift}, workers);
 }
 
 }  // namespace

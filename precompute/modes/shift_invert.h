@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
-#include <type_traits>
-
 #include "precompute/modes/block_basis.h"
 #include "precompute/modes/multifrontal_cholesky.h"
 #include "precompute/modes/node_matrix.h"
@@ -11,8 +9,10 @@
 namespace carillon::precompute {
 
 /// y = -shift (K - shift M)^-1 x, by a factor in Real. A factor in float is as good as one for
-/// another stiffness nearby, whose modes are others: where the first solve finds that far off, each
-/// solve is followed by one for its residual in double.
+/// another stiffness nearby, whose modes are others: so solves are followed by one for their
+/// residual in double, in the first part of an iteration. How long that part is the error of the
+/// first solve decides: a Krylov method may err the more the nearer it is to its end (Simoncini and
+/// Szyld 2003), because what converged lies in the vectors before.
 template <typename Real>
 class ShiftInvert {
  public:
@@ -21,11 +21,11 @@ class ShiftInvert {
   ShiftInvert(const NodeMatrix& A, const MultifrontalCholesky<Real>& factor, double shift,
               Workers& workers);
 
-  /// x and y, in elimination order, may be one.
-  void Apply(const Block& x, Block& y);
+  /// x and y, in elimination order, may be one; `done`: the part of the iteration that is.
+  void Apply(const Block& x, Block& y, double done);
 
-  /// Whether solves are good to more than the precision of a factor in float.
-  bool exact() const { return refines_ || std::is_same_v<Real, double>; }
+  /// By how much the first solve was off, relatively; 0 in double.
+  double error() const { return error_; }
 
  private:
   double Refine(const Block& x);
@@ -35,8 +35,8 @@ class ShiftInvert {
   double shift_;
   Workers& workers_;
   MassRows<double> mass_;
-  bool measured_ = false;
-  bool refines_ = false;
+  double refined_part_ = 1;  ///< of the iteration
+  double error_ = 0;
   Block solution_;
   VectorBlock y_;
   VectorBlock elastic_;
