@@ -135,8 +135,7 @@ absl::StatusOr<Modes> SolveIn(const OrderedSystem& ordered, const MatrixXd& rigi
   }
   return RefineModes(
       ordered.matrix, *factor, rigid, rough,
-      {.wanted = wanted, .first_steps = first_steps, .free_motion = -kFreeMotion * shift}, workers,
-      [&](double done) { progress(kIterationPart + (1 - kIterationPart) * done); });
+      {.wanted = wanted, .first_steps = first_steps, .free_motion = -kFreeMotion * shift}, workers);
 }
 
 }  // namespace

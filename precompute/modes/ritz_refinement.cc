@@ -26,10 +26,6 @@ constexpr int kMaxRounds = 6;
 /// own, which each correction lessens by a third or so: two cost less than another projection.
 constexpr int kQuickRounds = 2;
 
-/// Of what is left to do when a round begins, about; of a round the corrections, as measured.
-constexpr double kRoundPart = 0.8;
-constexpr double kCorrectionPart = 0.7;
-
 /// kBlockWidth vectors with their products.
 struct Products {
   explicit Products(Index rows)
@@ -65,19 +61,17 @@ class Refinement {
 
   /// Corrects every block of vectors `steps` times, unless the first `wanted` vectors' of it are
   /// good already. What a vector takes up of the others Project takes out.
-  void Correct(int steps, Index wanted, const SolveProgress& progress) {
+  void Correct(int steps, Index wanted) {
     elastic_.resize(rows_, x_.cols());
     if (!A_.mass_is_identity) inertial_.resize(rows_, x_.cols());
     const std::vector<bool> good = GoodBlocks(wanted);
     residuals_.resize(x_.cols());
     std::atomic<Index> next = 0;
-    const Index count = x_.cols() / kBlockWidth;
-    workers_.Run([&](int thread) {
+    workers_.Run([&](int) {
       Products p(rows_);
       VectorBlockOf<Real> change(rows_, kBlockWidth);
-      for (Index b = next++; b < count; b = next++) {
+      for (Index b = next++; b < x_.cols() / kBlockWidth; b = next++) {
         CorrectBlock(b, good[static_cast<size_t>(b)] ? 0 : steps, p, change);
-        if (thread == 0) progress(static_cast<double>(b + 1) / static_cast<double>(count));
       }
     });
   }
@@ -250,16 +244,13 @@ template <typename Real>
 absl::StatusOr<Modes> RefineModes(const NodeMatrix& A, const MultifrontalCholesky<Real>& factor,
                                   const MatrixXd& deflated,
                                   const std::vector<VectorBlockOf<Real>>& rough,
-                                  const RefinementPlan& plan, Workers& workers,
-                                  const SolveProgress& progress) {
+                                  const RefinementPlan& plan, Workers& workers) {
   Refinement<Real> refinement(A, factor, deflated, plan.free_motion, workers);
   refinement.Take(rough);
   double residual = 1;
-  double left = 1;
   int steps = plan.first_steps;
-  for (int round = 0; round < kMaxRounds; ++round, left *= 1 - kRoundPart) {
-    const auto done = [&](double part) { progress(1 - left * (1 - kRoundPart * part)); };
-    refinement.Correct(steps, plan.wanted, [&](double part) { done(kCorrectionPart * part); });
+  for (int round = 0; round < kMaxRounds; ++round) {
+    refinement.Correct(steps, plan.wanted);
     if (!refinement.Project()) break;
     residual = refinement.LargestResidual(plan.wanted);
     if (refinement.IsDone(plan.wanted)) return refinement.Result(plan.wanted);
@@ -273,10 +264,10 @@ absl::StatusOr<Modes> RefineModes(const NodeMatrix& A, const MultifrontalCholesk
 template absl::StatusOr<Modes> RefineModes(const NodeMatrix&, const MultifrontalCholesky<float>&,
                                            const MatrixXd&,
                                            const std::vector<VectorBlockOf<float>>&,
-                                           const RefinementPlan&, Workers&, const SolveProgress&);
+                                           const RefinementPlan&, Workers&);
 template absl::StatusOr<Modes> RefineModes(const NodeMatrix&, const MultifrontalCholesky<double>&,
                                            const MatrixXd&,
                                            const std::vector<VectorBlockOf<double>>&,
-                                           const RefinementPlan&, Workers&, const SolveProgress&);
+                                           const RefinementPlan&, Workers&);
 
 }  // namespace carillon::precompute

@@ -27,13 +27,11 @@ struct RefinementPlan {
 ///
 /// `rough`: in elimination order; the last blocks may hold more than is wanted. `deflated`: as for
 /// LanczosRecurrence. Returns the wanted ones, in elimination order, scaled as NodeMatrix is.
-/// `progress` is called in this thread.
 /// Errors: VERIFICATION_FAILED where residuals stay large.
 template <typename Real>
 absl::StatusOr<Modes> RefineModes(const NodeMatrix& A, const MultifrontalCholesky<Real>& factor,
                                   const Eigen::MatrixXd& deflated,
                                   const std::vector<VectorBlockOf<Real>>& rough,
-                                  const RefinementPlan& plan, Workers& workers,
-                                  const SolveProgress& progress);
+                                  const RefinementPlan& plan, Workers& workers);
 
 }  // namespace carillon::precompute
