@@ -95,6 +95,39 @@ HWY_INLINE void Backward(const Real* HWY_RESTRICT tile, int column_count, Real* 
   }
 }
 
+/// Six rows of x by the triangle of a diagonal tile, its diagonal inverted.
+template <typename Real, bool kTransposed>
+HWY_INLINE void SolveTriangle(const Real* HWY_RESTRICT tile, Real* HWY_RESTRICT x) {
+  const Lanes<Real> d;
+  using V = hn::Vec<Lanes<Real>>;
+  constexpr int kLanes = LaneCount<Real>();
+  for (int k = 0; k < kBlockWidth; k += kLanes) {
+    V row[kTileRows];
+    for (int r = 0; r < kTileRows; ++r) row[r] = hn::LoadU(d, x + r * kBlockWidth + k);
+    for (int step = 0; step < kTileRows; ++step) {
+      const int c = kTransposed ? kTileRows - 1 - step : step;
+      const Real* column = tile + c * kTileRows;
+      if (kTransposed) {
+        for (int r = c + 1; r < kTileRows; ++r) {
+          row[c] = hn::NegMulAdd(hn::Set(d, column[r]), row[r], row[c]);
+        }
+      }
+      row[c] = hn::Mul(row[c], hn::Set(d, column[c]));
+      if (!kTransposed) {
+        for (int r = c + 1; r < kTileRows; ++r) {
+          row[r] = hn::NegMulAdd(hn::Set(d, column[r]), row[c], row[r]);
+        }
+      }
+    }
+    for (int r = 0; r < kTileRows; ++r) hn::StoreU(row[r], d, x + r * kBlockWidth + k);
+  }
+}
+
+void TriangleDouble(const double* tile, double* x) { SolveTriangle<double, false>(tile, x); }
+void TriangleFloat(const float* tile, float* x) { SolveTriangle<float, false>(tile, x); }
+void TransposedDouble(const double* tile, double* x) { SolveTriangle<double, true>(tile, x); }
+void TransposedFloat(const float* tile, float* x) { SolveTriangle<float, true>(tile, x); }
+
 void ForwardDouble(const double* tile, int n, const double* y, double* const x[2]) {
   Forward<double>(tile, n, y, x);
 }
@@ -266,6 +299,10 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace carillon::precompute {
 
+HWY_EXPORT(TriangleDouble);
+HWY_EXPORT(TriangleFloat);
+HWY_EXPORT(TransposedDouble);
+HWY_EXPORT(TransposedFloat);
 HWY_EXPORT(ForwardDouble);
 HWY_EXPORT(ForwardFloat);
 HWY_EXPORT(BackwardDouble);
@@ -295,6 +332,23 @@ void TileBackward<double>(const double* tile, int column_count, double* y,
 template <>
 void TileBackward<float>(const float* tile, int column_count, float* y, const float* const x[2]) {
   HWY_DYNAMIC_DISPATCH(BackwardFloat)(tile, column_count, y, x);
+}
+
+template <>
+void TileSolve<double>(const double* tile, double* x) {
+  HWY_DYNAMIC_DISPATCH(TriangleDouble)(tile, x);
+}
+template <>
+void TileSolve<float>(const float* tile, float* x) {
+  HWY_DYNAMIC_DISPATCH(TriangleFloat)(tile, x);
+}
+template <>
+void TileSolveTransposed<double>(const double* tile, double* x) {
+  HWY_DYNAMIC_DISPATCH(TransposedDouble)(tile, x);
+}
+template <>
+void TileSolveTransposed<float>(const float* tile, float* x) {
+  HWY_DYNAMIC_DISPATCH(TransposedFloat)(tile, x);
 }
 
 void ColumnMultiply(const double* blocks, const int32_t* rows, int count, int j, const double* x,

@@ -19,6 +19,13 @@ void TileForward(const Real* tile, int column_count, const Real* y, Real* const 
 template <typename Real>
 void TileBackward(const Real* tile, int column_count, Real* y, const Real* const x[2]);
 
+/// x = D^-1 x and x = D^-T x for the lower triangle D of a diagonal tile (its diagonal inverted);
+/// x: six rows.
+template <typename Real>
+void TileSolve(const Real* tile, Real* x);
+template <typename Real>
+void TileSolveTransposed(const Real* tile, Real* x);
+
 /// y_i += B x_j and, off the diagonal, y_j += B^T x_i for the column j of a NodeMatrix: `count`
 /// blocks B (3x3, row-major) with their nodes `rows`, the diagonal first. x and y: all nodes, 3
 /// rows each.

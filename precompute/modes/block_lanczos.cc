@@ -33,8 +33,9 @@ LanczosRecurrence<Real>::LanczosRecurrence(const NodeMatrix& A,
 template <typename Real>
 bool LanczosRecurrence<Real>::Start() {
   std::mt19937 random(20020721);
-  std::normal_distribution<Real> normal;
-  std::generate_n(next_.data(), next_.size(), [&] { return normal(random); });
+  constexpr auto kHalf = static_cast<Real>(1U << 31);
+  std::generate_n(next_.data(), next_.size(),
+                  [&] { return static_cast<Real>(random()) / kHalf - 1; });
   Orthogonalize();
   return Normalize();
 }

@@ -44,7 +44,7 @@ constexpr double kLargeSolveError = 5e-4;
 /// Eigenvalues below this part of the shift are zero but for rounding.
 constexpr double kFreeMotion = 1e-7;
 
-/// Vectors `x` of the user's unknowns as those of NodeMatrix, or back.
+/// Vectors `x` of the user's unknowns as those of NodeMatrix, and back.
 MatrixXd ToNodeOrder(const MatrixXd& x, const OrderedSystem& ordered) {
   MatrixXd y(x.rows(), x.cols());
   for (size_t i = 0; i < ordered.fronts.order.size(); ++i) {
@@ -54,13 +54,21 @@ MatrixXd ToNodeOrder(const MatrixXd& x, const OrderedSystem& ordered) {
   }
   return y;
 }
-void FromNodeOrder(const MatrixXd& y, const OrderedSystem& ordered, Eigen::Ref<MatrixXd> x) {
-  for (Index c = 0; c < y.cols(); ++c) {
-    for (size_t i = 0; i < ordered.fronts.order.size(); ++i) {
-      x.col(c).segment<3>(3 * Index{ordered.fronts.order[i]}) =
-          y.col(c).segment<3>(3 * static_cast<Index>(i)) / ordered.matrix.root_mass[i];
+void FromNodeOrder(const VectorBlocks& y, const OrderedSystem& ordered, Workers& workers,
+                   Eigen::Ref<MatrixXd> x) {
+  const std::vector<int32_t> position = Inverse(ordered.fronts.order);
+  workers.ForEach(static_cast<int64_t>(y.size()), [&](int64_t b) {
+    const Index first = b * kBlockWidth;
+    const Index width = std::min<Index>(kBlockWidth, x.cols() - first);
+    for (size_t node = 0; node < position.size(); ++node) {
+      const double scale = 1 / ordered.matrix.root_mass[static_cast<size_t>(position[node])];
+      for (Index a = 0; a < 3; ++a) {
+        const double* from = &y[static_cast<size_t>(b)](3 * Index{position[node]} + a, 0);
+        double* to = &x(3 * static_cast<Index>(node) + a, first);
+        for (Index c = 0; c < width; ++c) to[c * x.outerStride()] = scale * from[c];
+      }
     }
-  }
+  });
 }
 
 /// The Ritz pairs of a recurrence, of the lowest Lambda first.
@@ -115,8 +123,9 @@ absl::StatusOr<RitzPairs> Iterate(LanczosRecurrence<Real>& recurrence, Index wan
 }
 
 template <typename Real>
-absl::StatusOr<Modes> SolveIn(const OrderedSystem& ordered, const MatrixXd& rigid, double shift,
-                              Index wanted, Workers& workers, const SolveProgress& progress) {
+absl::StatusOr<RefinedModes> SolveIn(const OrderedSystem& ordered, const MatrixXd& rigid,
+                                     double shift, Index wanted, Workers& workers,
+                                     const SolveProgress& progress) {
   const auto factor = MultifrontalCholesky<Real>::Factorize(ordered.fronts, ordered.matrix, shift,
                                                             workers, nullptr);
   if (!factor.ok()) return factor.status();
@@ -147,10 +156,11 @@ absl::StatusOr<Modes> BlockLanczosEigensolver::Solve(const SystemMatrices& syste
   const double shift = kShift * request.eigenvalue_limit;
   const MatrixXd rigid = ToNodeOrder(rigid_, ordered_);
   Workers workers(ThreadCount());
-  absl::StatusOr<Modes> bent = SolveIn<float>(ordered_, rigid, shift, wanted, workers, progress);
+  absl::StatusOr<RefinedModes> bent =
+      SolveIn<float>(ordered_, rigid, shift, wanted, workers, progress);
   // What float cannot resolve, as on elements that are nearly flat, double may.
   if (!bent.ok()) bent = SolveIn<double>(ordered_, rigid, shift, wanted, workers, progress);
-  if (!bent.ok()) return bent;
+  if (!bent.ok()) return bent.status();
   Modes modes;
   modes.eigenvalues.resize(request.count);
   modes.eigenvalues.head(rigid_.cols()) =
@@ -158,7 +168,7 @@ absl::StatusOr<Modes> BlockLanczosEigensolver::Solve(const SystemMatrices& syste
   modes.eigenvalues.tail(wanted) = bent->eigenvalues;
   modes.shapes.resize(system.unknown_count(), request.count);
   modes.shapes.leftCols(rigid_.cols()) = rigid_;
-  FromNodeOrder(bent->shapes, ordered_, modes.shapes.rightCols(wanted));
+  FromNodeOrder(bent->shapes, ordered_, workers, modes.shapes.rightCols(wanted));
   return modes;
 }
 

@@ -140,33 +140,6 @@ absl::StatusOr<MultifrontalCholesky<Real>> MultifrontalCholesky<Real>::Factorize
 
 namespace {
 
-/// x = D^-1 x for the lower triangle D of a diagonal tile (its diagonal inverted), six rows.
-template <typename Real>
-void SolveTile(const Real* tile, Real* x) {
-  for (int c = 0; c < kTileRows; ++c) {
-    Real* xc = x + c * kBlockWidth;
-    for (int k = 0; k < kBlockWidth; ++k) xc[k] *= tile[c * kTileRows + c];
-    for (int r = c + 1; r < kTileRows; ++r) {
-      const Real l = tile[c * kTileRows + r];
-      Real* xr = x + r * kBlockWidth;
-      for (int k = 0; k < kBlockWidth; ++k) xr[k] -= l * xc[k];
-    }
-  }
-}
-
-template <typename Real>
-void SolveTileTransposed(const Real* tile, Real* x) {
-  for (int c = kTileRows - 1; c >= 0; --c) {
-    Real* xc = x + c * kBlockWidth;
-    for (int r = c + 1; r < kTileRows; ++r) {
-      const Real l = tile[c * kTileRows + r];
-      const Real* xr = x + r * kBlockWidth;
-      for (int k = 0; k < kBlockWidth; ++k) xc[k] -= l * xr[k];
-    }
-    for (int k = 0; k < kBlockWidth; ++k) xc[k] *= tile[c * kTileRows + c];
-  }
-}
-
 /// A diagonal tile may be half full: its rows are copied out and back, absent ones zero.
 template <typename Real, typename TileSolve>
 void WithTileRows(Real* x, int rows, const TileSolve& solve) {
@@ -225,7 +198,7 @@ class MultifrontalCholesky<Real>::Substitution {
                              SecondPivotRow(pivot, t, pivots, rows.scratch.data())};
         TileForward<Real>(tile, row - solved, pivot + solved * kBlockWidth, at);
         WithTileRows(at[0], pivots - row,
-                     [&](Real* x6) { SolveTile(tile + (row - solved) * kTileRows, x6); });
+                     [&](Real* x6) { TileSolve<Real>(tile + (row - solved) * kTileRows, x6); });
       }
     }
     const int below = BelowCount(s);
@@ -262,7 +235,7 @@ class MultifrontalCholesky<Real>::Substitution {
         const Real* tile = Triangle(s, t);
         Real* const at[2] = {PivotRow(pivot, t), SecondPivotRow(pivot, t, pivots, zero.data())};
         WithTileRows(at[0], pivots - row,
-                     [&](Real* x6) { SolveTileTransposed(tile + row * kTileRows, x6); });
+                     [&](Real* x6) { TileSolveTransposed<Real>(tile + row * kTileRows, x6); });
         TileBackward<Real>(tile + left * kTileRows, row - left, pivot + left * kBlockWidth, at);
       }
       Share(workers, (last - first) * kTileRows, left, [&](int begin, int end) {

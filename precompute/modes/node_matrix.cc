@@ -23,14 +23,6 @@ void ForEachEntry(const Sparse& A, const Visit& visit) {
   }
 }
 
-std::vector<int32_t> Inverse(const std::vector<int32_t>& order) {
-  std::vector<int32_t> inverse(order.size());
-  for (size_t i = 0; i < order.size(); ++i) {
-    inverse[static_cast<size_t>(order[i])] = static_cast<int32_t>(i);
-  }
-  return inverse;
-}
-
 /// The pattern: one entry a pair of nodes that share a block.
 void FillPattern(const Sparse& K, const std::vector<int32_t>& position, NodeMatrix& A) {
   std::vector<std::vector<int32_t>> columns(position.size());
@@ -68,6 +60,14 @@ void ScaleByMass(NodeMatrix& A) {
 }
 
 }  // namespace
+
+std::vector<int32_t> Inverse(const std::vector<int32_t>& order) {
+  std::vector<int32_t> inverse(order.size());
+  for (size_t i = 0; i < order.size(); ++i) {
+    inverse[static_cast<size_t>(order[i])] = static_cast<int32_t>(i);
+  }
+  return inverse;
+}
 
 NodeMatrix MakeNodeMatrix(const Sparse& K, const Sparse& M, const std::vector<int32_t>& order) {
   const std::vector<int32_t> position = Inverse(order);

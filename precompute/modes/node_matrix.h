@@ -34,6 +34,9 @@ struct NodeMatrix {
   bool mass_is_identity = false;
 };
 
+/// Where each node of an order stands in it.
+std::vector<int32_t> Inverse(const std::vector<int32_t>& order);
+
 /// Re-orders K and M (3n by 3n, lower triangles) to `order`: node order[i] becomes i.
 NodeMatrix MakeNodeMatrix(const Eigen::SparseMatrix<double>& K,
                           const Eigen::SparseMatrix<double>& M, const std::vector<int32_t>& order);

@@ -6,7 +6,7 @@
 
 #include "absl/status/statusor.h"
 #include "precompute/modes/block_basis.h"
-#include "precompute/modes/eigensolver.h"
+#include "precompute/modes/block_gram.h"
 #include "precompute/modes/multifrontal_cholesky.h"
 #include "precompute/modes/node_matrix.h"
 #include "precompute/modes/workers.h"
@@ -20,18 +20,25 @@ struct RefinementPlan {
   double free_motion;
 };
 
+/// In elimination order, scaled as NodeMatrix is; the last block may hold more than is wanted.
+struct RefinedModes {
+  Eigen::VectorXd eigenvalues;
+  VectorBlocks shapes;
+};
+
 /// Makes good modes, in double precision, of rough ones found with a factor in Real: each is
 /// corrected by x -= (K - shift M)^-1 (K - rho M) x, one step of inverse iteration in which the
 /// factor acts on the residual only, so that its rounding fades; then K and M are projected on all
 /// of them (Rayleigh and Ritz), in double. Repeated until residuals are small.
 ///
 /// `rough`: in elimination order; the last blocks may hold more than is wanted. `deflated`: as for
-/// LanczosRecurrence. Returns the wanted ones, in elimination order, scaled as NodeMatrix is.
+/// LanczosRecurrence.
 /// Errors: VERIFICATION_FAILED where residuals stay large.
 template <typename Real>
-absl::StatusOr<Modes> RefineModes(const NodeMatrix& A, const MultifrontalCholesky<Real>& factor,
-                                  const Eigen::MatrixXd& deflated,
-                                  const std::vector<VectorBlockOf<Real>>& rough,
-                                  const RefinementPlan& plan, Workers& workers);
+absl::StatusOr<RefinedModes> RefineModes(const NodeMatrix& A,
+                                         const MultifrontalCholesky<Real>& factor,
+                                         const Eigen::MatrixXd& deflated,
+                                         const std::vector<VectorBlockOf<Real>>& rough,
+                                         const RefinementPlan& plan, Workers& workers);
 
 }  // namespace carillon::precompute

@@ -5,58 +5,28 @@
 #include <cmath>
 #include <limits>
 
-#include "precompute/modes/block_basis.h"
-#include "precompute/modes/dense_blas.h"
+#include "precompute/modes/block_gram.h"
+#include "precompute/modes/residual_kernels.h"
 
 namespace carillon::precompute {
 namespace {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
-using Row = Eigen::Array<double, 1, kBlockWidth>;
-
 /// Vectors of the user's unknowns, from column `first` on, as those of `A`; zero past the last.
-VectorBlock Gather(const NodeMatrix& A, const std::vector<int32_t>& order, const MatrixXd& shapes,
-                   Index first) {
+VectorBlock Gather(const NodeMatrix& A, const std::vector<int32_t>& position,
+                   const MatrixXd& shapes, Index first) {
   VectorBlock y = VectorBlock::Zero(shapes.rows(), kBlockWidth);
-  for (Index c = first; c < std::min(first + kBlockWidth, shapes.cols()); ++c) {
-    for (size_t i = 0; i < order.size(); ++i) {
-      for (Index a = 0; a < 3; ++a) {
-        y(3 * static_cast<Index>(i) + a, c - first) =
-            A.root_mass[i] * shapes(3 * Index{order[i]} + a, c);
-      }
+  const Index width = std::min<Index>(kBlockWidth, shapes.cols() - first);
+  for (size_t node = 0; node < position.size(); ++node) {
+    const double root = A.root_mass[static_cast<size_t>(position[node])];
+    for (Index a = 0; a < 3; ++a) {
+      const double* from = &shapes(3 * static_cast<Index>(node) + a, first);
+      double* to = &y(3 * Index{position[node]} + a, 0);
+      for (Index c = 0; c < width; ++c) to[c] = root * from[c * shapes.rows()];
     }
   }
   return y;
-}
-
-/// |D^1/2 (elastic - inertial Lambda)| / |D^1/2 inertial Lambda| of each column: D^1/2 takes the
-/// products back to the user's unknowns.
-Row RelativeResiduals(const NodeMatrix& A, const VectorBlock& elastic, const VectorBlock& inertial,
-                      const Row& eigenvalues) {
-  Row residual = Row::Zero();
-  Row scale = Row::Zero();
-  for (Index i = 0; i < elastic.rows(); ++i) {
-    const double root = A.root_mass[static_cast<size_t>(i / 3)];
-    const Row load = root * eigenvalues * inertial.row(i).array();
-    residual += (root * elastic.row(i).array() - load).square();
-    scale += load.square();
-  }
-  return (residual / scale).sqrt();
-}
-
-/// x^T y of n by k matrices, the lower triangle mirrored.
-MatrixXd Gram(const MatrixXd& x, const MatrixXd& y, Workers& workers) {
-  constexpr Index kStrip = 64;
-  MatrixXd gram = MatrixXd::Zero(x.cols(), x.cols());
-  workers.ForEach((x.cols() + kStrip - 1) / kStrip, [&](int64_t strip) {
-    const Index j = strip * kStrip;
-    blas::TransposedProduct(
-        static_cast<int>(x.cols() - j), static_cast<int>(std::min(kStrip, x.cols() - j)),
-        static_cast<int>(x.rows()), x.col(j).data(), static_cast<int>(x.rows()), y.col(j).data(),
-        static_cast<int>(x.rows()), &gram(j, j), static_cast<int>(x.cols()));
-  });
-  return gram.selfadjointView<Eigen::Lower>();
 }
 
 std::vector<int32_t> NaturalOrder(const SystemMatrices& system) {
@@ -78,28 +48,43 @@ Measurement Measure(const NodeMatrix& A, const std::vector<int32_t>& order, cons
   const Index rows = modes.shapes.rows();
   const Index count = modes.shapes.cols();
   const MassRows<double> mass = MakeMassRows<double>(A);
-  MatrixXd y(rows, count);
-  MatrixXd inertial(A.mass_is_identity ? 0 : rows, count);
+  const std::vector<int32_t> position = Inverse(order);
+  const auto blocks = static_cast<size_t>((count + kBlockWidth - 1) / kBlockWidth);
+  VectorBlocks x(blocks);
+  VectorBlocks inertial(A.mass_is_identity ? 0 : blocks);
   Measurement result;
   result.residuals.resize(count);
-  workers.ForEach((count + kBlockWidth - 1) / kBlockWidth, [&](int64_t b) {
+  workers.ForEach(static_cast<int64_t>(blocks), [&](int64_t b) {
+    const auto at = static_cast<size_t>(b);
     const Index first = b * kBlockWidth;
     const Index width = std::min<Index>(kBlockWidth, count - first);
     Workers alone(1);
-    const VectorBlock block = Gather(A, order, modes.shapes, first);
-    VectorBlock load = block;
-    if (!A.mass_is_identity) MultiplyMass(mass, alone, block.data(), load.data());
+    x[at] = Gather(A, position, modes.shapes, first);
+    if (!A.mass_is_identity) {
+      inertial[at].resize(rows, kBlockWidth);
+      MultiplyMass(mass, alone, x[at].data(), inertial[at].data());
+    }
     VectorBlock elastic(rows, kBlockWidth);
-    MultiplyStiffness(A, block.data(), elastic.data());
-    Row eigenvalues = Row::Ones();
+    MultiplyStiffness(A, x[at].data(), elastic.data());
+    BlockRow eigenvalues = BlockRow::Ones();
     eigenvalues.head(width) = modes.eigenvalues.segment(first, width).transpose();
     result.residuals.segment(first, width) =
-        RelativeResiduals(A, elastic, load, eigenvalues).head(width).matrix();
-    y.middleCols(first, width) = block.leftCols(width);
-    if (!A.mass_is_identity) inertial.middleCols(first, width) = load.leftCols(width);
+        RelativeResiduals(A, elastic, A.mass_is_identity ? x[at] : inertial[at], eigenvalues)
+            .head(width)
+            .matrix();
   });
-  result.gram = Gram(y, A.mass_is_identity ? y : inertial, workers);
+  const MatrixXd gram = Gram(x, A.mass_is_identity ? x : inertial, workers);
+  result.gram = gram.topLeftCorner(count, count).selfadjointView<Eigen::Lower>();
   return result;
+}
+
+BlockRow RelativeResiduals(const NodeMatrix& A, const VectorBlock& elastic,
+                           const VectorBlock& inertial, const BlockRow& eigenvalues) {
+  BlockRow residual = BlockRow::Zero();
+  BlockRow scale = BlockRow::Zero();
+  AddResidualSums(eigenvalues.data(), A.root_mass.data(), elastic.data(), inertial.data(),
+                  A.node_count, residual.data(), scale.data());
+  return (residual / scale).sqrt() / eigenvalues.abs();
 }
 
 double ResidualOfRounding(double stiffest, double eigenvalue) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include "precompute/modes/block_basis.h"
 #include "precompute/modes/eigensolver.h"
 #include "precompute/modes/node_matrix.h"
 #include "precompute/modes/workers.h"
@@ -44,6 +45,14 @@ Measurement Measure(const NodeMatrix& A, const std::vector<int32_t>& order, cons
 
 /// Largest |gram_ij - delta_ij|.
 double OrthogonalityError(const Eigen::MatrixXd& gram);
+
+/// A number for each vector of a block.
+using BlockRow = Eigen::Array<double, 1, kBlockWidth>;
+
+/// |D^1/2 (elastic - inertial Lambda)| / |D^1/2 inertial Lambda| of each column of the products K x
+/// and M x: D^1/2 takes them back to the user's unknowns.
+BlockRow RelativeResiduals(const NodeMatrix& A, const VectorBlock& elastic,
+                           const VectorBlock& inertial, const BlockRow& eigenvalues);
 
 /// The same from the matrices as assembled.
 Eigen::VectorXd Residuals(const SystemMatrices& system, const Modes& modes);

@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "precompute/modes/residual_kernels.h"
+
+#include <algorithm>
+#include <type_traits>
+
+#include "precompute/modes/node_matrix.h"
+
+// The kernels keep arrays of vectors in registers, which scalable vectors do not allow.
+#define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "precompute/modes/residual_kernels.cc"
+#include <hwy/foreach_target.h>  // must come before highway.h
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace carillon::precompute::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+using D = hn::CappedTag<double, kBlockWidth>;
+using V = hn::Vec<D>;
+constexpr int kLanes = std::min(kBlockWidth, static_cast<int>(HWY_MAX_BYTES / sizeof(double)));
+constexpr int kVectors = kBlockWidth / kLanes;
+
+struct Row {
+  V v[kVectors];
+};
+
+HWY_INLINE Row Load(const double* from) {
+  Row row;
+  for (int i = 0; i < kVectors; ++i) row.v[i] = hn::LoadU(D(), from + i * kLanes);
+  return row;
+}
+
+HWY_INLINE void Store(const Row& row, double* to) {
+  for (int i = 0; i < kVectors; ++i) hn::StoreU(row.v[i], D(), to + i * kLanes);
+}
+
+void RayleighSums(const double* x, const double* elastic, const double* inertial, int64_t rows,
+                  double* energy, double* mass) {
+  Row e = Load(energy);
+  Row m = Load(mass);
+  for (int64_t r = 0; r < rows; ++r) {
+    const Row xr = Load(x + r * kBlockWidth);
+    const Row kx = Load(elastic + r * kBlockWidth);
+    const Row mx = Load(inertial + r * kBlockWidth);
+    for (int i = 0; i < kVectors; ++i) {
+      e.v[i] = hn::MulAdd(xr.v[i], kx.v[i], e.v[i]);
+      m.v[i] = hn::MulAdd(xr.v[i], mx.v[i], m.v[i]);
+    }
+  }
+  Store(e, energy);
+  Store(m, mass);
+}
+
+void ResidualSums(const double* quotient, const double* root_mass, const double* elastic,
+                  const double* inertial, int64_t nodes, double* residual, double* scale) {
+  const Row q = Load(quotient);
+  Row left = Load(residual);
+  Row whole = Load(scale);
+  for (int64_t r = 0; r < 3 * nodes; ++r) {
+    const V root = hn::Set(D(), root_mass[r / 3]);
+    const Row kx = Load(elastic + r * kBlockWidth);
+    const Row mx = Load(inertial + r * kBlockWidth);
+    for (int i = 0; i < kVectors; ++i) {
+      const V off = hn::Mul(root, hn::NegMulAdd(q.v[i], mx.v[i], kx.v[i]));
+      const V load = hn::Mul(root, mx.v[i]);
+      left.v[i] = hn::MulAdd(off, off, left.v[i]);
+      whole.v[i] = hn::MulAdd(load, load, whole.v[i]);
+    }
+  }
+  Store(left, residual);
+  Store(whole, scale);
+}
+
+template <typename Real>
+HWY_INLINE void WriteResidual(const double* quotient, const double* elastic, const double* inertial,
+                              int64_t rows, Real* HWY_RESTRICT out) {
+  const hn::Rebind<Real, D> narrow;
+  const Row q = Load(quotient);
+  for (int64_t r = 0; r < rows; ++r) {
+    const Row kx = Load(elastic + r * kBlockWidth);
+    const Row mx = Load(inertial + r * kBlockWidth);
+    for (int i = 0; i < kVectors; ++i) {
+      const V off = hn::NegMulAdd(q.v[i], mx.v[i], kx.v[i]);
+      Real* to = out + r * kBlockWidth + i * kLanes;
+      if constexpr (std::is_same_v<Real, float>) {
+        hn::StoreU(hn::DemoteTo(narrow, off), narrow, to);
+      } else {
+        hn::StoreU(off, narrow, to);
+      }
+    }
+  }
+}
+
+template <typename Real>
+HWY_INLINE void Change(const Real* HWY_RESTRICT change, int64_t rows, double* HWY_RESTRICT x) {
+  const hn::Rebind<Real, D> narrow;
+  for (int64_t r = 0; r < rows * kVectors; ++r) {
+    double* to = x + r * kLanes;
+    const auto from = hn::LoadU(narrow, change + r * kLanes);
+    if constexpr (std::is_same_v<Real, float>) {
+      hn::StoreU(hn::Sub(hn::LoadU(D(), to), hn::PromoteTo(D(), from)), D(), to);
+    } else {
+      hn::StoreU(hn::Sub(hn::LoadU(D(), to), from), D(), to);
+    }
+  }
+}
+
+void ResidualFloat(const double* quotient, const double* elastic, const double* inertial,
+                   int64_t rows, float* out) {
+  WriteResidual<float>(quotient, elastic, inertial, rows, out);
+}
+void ResidualDouble(const double* quotient, const double* elastic, const double* inertial,
+                    int64_t rows, double* out) {
+  WriteResidual<double>(quotient, elastic, inertial, rows, out);
+}
+void ChangeFloat(const float* change, int64_t rows, double* x) { Change<float>(change, rows, x); }
+void ChangeDouble(const double* change, int64_t rows, double* x) {
+  Change<double>(change, rows, x);
+}
+
+}  // namespace carillon::precompute::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace carillon::precompute {
+
+HWY_EXPORT(RayleighSums);
+HWY_EXPORT(ResidualSums);
+HWY_EXPORT(ResidualFloat);
+HWY_EXPORT(ResidualDouble);
+HWY_EXPORT(ChangeFloat);
+HWY_EXPORT(ChangeDouble);
+
+void AddRayleighSums(const double* x, const double* elastic, const double* inertial, int64_t rows,
+                     double* energy, double* mass) {
+  HWY_DYNAMIC_DISPATCH(RayleighSums)(x, elastic, inertial, rows, energy, mass);
+}
+void AddResidualSums(const double* quotient, const double* root_mass, const double* elastic,
+                     const double* inertial, int64_t nodes, double* residual, double* scale) {
+  HWY_DYNAMIC_DISPATCH(ResidualSums)
+  (quotient, root_mass, elastic, inertial, nodes, residual, scale);
+}
+template <>
+void StoreResidual<float>(const double* quotient, const double* elastic, const double* inertial,
+                          int64_t rows, float* out) {
+  HWY_DYNAMIC_DISPATCH(ResidualFloat)(quotient, elastic, inertial, rows, out);
+}
+template <>
+void StoreResidual<double>(const double* quotient, const double* elastic, const double* inertial,
+                           int64_t rows, double* out) {
+  HWY_DYNAMIC_DISPATCH(ResidualDouble)(quotient, elastic, inertial, rows, out);
+}
+template <>
+void SubtractChange<float>(const float* change, int64_t rows, double* x) {
+  HWY_DYNAMIC_DISPATCH(ChangeFloat)(change, rows, x);
+}
+template <>
+void SubtractChange<double>(const double* change, int64_t rows, double* x) {
+  HWY_DYNAMIC_DISPATCH(ChangeDouble)(change, rows, x);
+}
+
+}  // namespace carillon::precompute
+#endif

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+
+namespace carillon::precompute {
+
+// What is left of blocks of vectors x with their products K x and M x, one pass over memory each,
+// chosen at run time for the machine. Blocks: `rows` by kBlockWidth, row-major, three rows a node.
+// `energy`, `mass`, `quotient`, `residual` and `scale`: kBlockWidth numbers, one a vector.
+
+/// energy += x . elastic, mass += x . inertial
+void AddRayleighSums(const double* x, const double* elastic, const double* inertial, int64_t rows,
+                     double* energy, double* mass);
+
+/// residual += |D^1/2 (elastic - inertial quotient)|^2, scale += |D^1/2 inertial|^2: D^1/2 takes
+/// products back to the user's unknowns; `root_mass`, see NodeMatrix.
+void AddResidualSums(const double* quotient, const double* root_mass, const double* elastic,
+                     const double* inertial, int64_t nodes, double* residual, double* scale);
+
+/// out = elastic - inertial quotient
+template <typename Real>
+void StoreResidual(const double* quotient, const double* elastic, const double* inertial,
+                   int64_t rows, Real* out);
+
+/// x -= change
+template <typename Real>
+void SubtractChange(const Real* change, int64_t rows, double* x);
+
+}  // namespace carillon::precompute
