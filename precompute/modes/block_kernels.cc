@@ -33,126 +33,29 @@ constexpr int Chunk() {
 }
 
 template <typename Real>
-HWY_INLINE void Forward(const Real* HWY_RESTRICT tile, int column_count, const Real* HWY_RESTRICT y,
-                        Real* const x[2]) {
-  const Lanes<Real> d;
-  using V = hn::Vec<Lanes<Real>>;
-  constexpr int kLanes = LaneCount<Real>();
-  constexpr int kVectors = Chunk<Real>() / kLanes;
-  for (int c = 0; c < kBlockWidth; c += Chunk<Real>()) {
-    V sum[kTileRows][kVectors];
-    for (auto& row : sum) {
-      for (V& v : row) v = hn::Zero(d);
-    }
-    const Real* HWY_RESTRICT l = tile;
-    const Real* HWY_RESTRICT yi = y + c;
-    for (int i = 0; i < column_count; ++i, l += kTileRows, yi += kBlockWidth) {
-      V yv[kVectors];
-      for (int v = 0; v < kVectors; ++v) yv[v] = hn::LoadU(d, yi + v * kLanes);
-      for (int r = 0; r < kTileRows; ++r) {
-        const V lr = hn::Set(d, l[r]);
-        for (int v = 0; v < kVectors; ++v) sum[r][v] = hn::MulAdd(lr, yv[v], sum[r][v]);
-      }
-    }
-    for (int r = 0; r < kTileRows; ++r) {
-      Real* out = x[r / 3] + r % 3 * kBlockWidth + c;
-      for (int v = 0; v < kVectors; ++v) {
-        hn::StoreU(hn::Sub(hn::LoadU(d, out + v * kLanes), sum[r][v]), d, out + v * kLanes);
-      }
-    }
+HWY_INLINE hn::Vec<Lanes<double>> LoadAsDouble(const Real* from) {
+  const Lanes<double> d;
+  if constexpr (std::is_same_v<Real, float>) {
+    return hn::PromoteTo(d, hn::LoadU(hn::Rebind<float, Lanes<double>>(), from));
+  } else {
+    return hn::LoadU(d, from);
   }
 }
 
 template <typename Real>
-HWY_INLINE void Backward(const Real* HWY_RESTRICT tile, int column_count, Real* HWY_RESTRICT y,
-                         const Real* const x[2]) {
-  const Lanes<Real> d;
-  using V = hn::Vec<Lanes<Real>>;
-  constexpr int kLanes = LaneCount<Real>();
-  constexpr int kVectors = Chunk<Real>() / kLanes;
-  for (int c = 0; c < kBlockWidth; c += Chunk<Real>()) {
-    V xv[kTileRows][kVectors];
-    for (int r = 0; r < kTileRows; ++r) {
-      for (int v = 0; v < kVectors; ++v) {
-        xv[r][v] = hn::LoadU(d, x[r / 3] + r % 3 * kBlockWidth + c + v * kLanes);
-      }
-    }
-    const Real* HWY_RESTRICT l = tile;
-    Real* HWY_RESTRICT yi = y + c;
-    for (int i = 0; i < column_count; ++i, l += kTileRows, yi += kBlockWidth) {
-      for (int v = 0; v < kVectors; ++v) {
-        // Two chains of three, because each multiply-add waits for the one before.
-        V even = hn::LoadU(d, yi + v * kLanes);
-        V odd = hn::Mul(hn::Set(d, l[1]), xv[1][v]);
-        even = hn::NegMulAdd(hn::Set(d, l[0]), xv[0][v], even);
-        odd = hn::MulAdd(hn::Set(d, l[3]), xv[3][v], odd);
-        even = hn::NegMulAdd(hn::Set(d, l[2]), xv[2][v], even);
-        odd = hn::MulAdd(hn::Set(d, l[5]), xv[5][v], odd);
-        even = hn::NegMulAdd(hn::Set(d, l[4]), xv[4][v], even);
-        hn::StoreU(hn::Sub(even, odd), d, yi + v * kLanes);
-      }
-    }
-  }
-}
-
-/// Six rows of x by the triangle of a diagonal tile, its diagonal inverted.
-template <typename Real, bool kTransposed>
-HWY_INLINE void SolveTriangle(const Real* HWY_RESTRICT tile, Real* HWY_RESTRICT x) {
-  const Lanes<Real> d;
-  using V = hn::Vec<Lanes<Real>>;
-  constexpr int kLanes = LaneCount<Real>();
-  for (int k = 0; k < kBlockWidth; k += kLanes) {
-    V row[kTileRows];
-    for (int r = 0; r < kTileRows; ++r) row[r] = hn::LoadU(d, x + r * kBlockWidth + k);
-    for (int step = 0; step < kTileRows; ++step) {
-      const int c = kTransposed ? kTileRows - 1 - step : step;
-      const Real* column = tile + c * kTileRows;
-      if (kTransposed) {
-        for (int r = c + 1; r < kTileRows; ++r) {
-          row[c] = hn::NegMulAdd(hn::Set(d, column[r]), row[r], row[c]);
-        }
-      }
-      row[c] = hn::Mul(row[c], hn::Set(d, column[c]));
-      if (!kTransposed) {
-        for (int r = c + 1; r < kTileRows; ++r) {
-          row[r] = hn::NegMulAdd(hn::Set(d, column[r]), row[c], row[r]);
-        }
-      }
-    }
-    for (int r = 0; r < kTileRows; ++r) hn::StoreU(row[r], d, x + r * kBlockWidth + k);
-  }
-}
-
-void TriangleDouble(const double* tile, double* x) { SolveTriangle<double, false>(tile, x); }
-void TriangleFloat(const float* tile, float* x) { SolveTriangle<float, false>(tile, x); }
-void TransposedDouble(const double* tile, double* x) { SolveTriangle<double, true>(tile, x); }
-void TransposedFloat(const float* tile, float* x) { SolveTriangle<float, true>(tile, x); }
-
-void ForwardDouble(const double* tile, int n, const double* y, double* const x[2]) {
-  Forward<double>(tile, n, y, x);
-}
-void ForwardFloat(const float* tile, int n, const float* y, float* const x[2]) {
-  Forward<float>(tile, n, y, x);
-}
-void BackwardDouble(const double* tile, int n, double* y, const double* const x[2]) {
-  Backward<double>(tile, n, y, x);
-}
-void BackwardFloat(const float* tile, int n, float* y, const float* const x[2]) {
-  Backward<float>(tile, n, y, x);
-}
-
-void MultiplyColumn(const double* HWY_RESTRICT blocks, const int32_t* HWY_RESTRICT rows, int count,
-                    int j, const double* HWY_RESTRICT x, double* HWY_RESTRICT y) {
+HWY_INLINE void MultiplyColumn(const double* HWY_RESTRICT blocks, const int32_t* HWY_RESTRICT rows,
+                               int count, int j, const Real* HWY_RESTRICT x,
+                               double* HWY_RESTRICT y) {
   const Lanes<double> d;
   using V = hn::Vec<Lanes<double>>;
   const int lanes = static_cast<int>(hn::Lanes(d));
   constexpr int kNode = 3 * kBlockWidth;
-  const double* xj = x + static_cast<size_t>(j) * kNode;
+  const Real* xj = x + static_cast<size_t>(j) * kNode;
   double* yj = y + static_cast<size_t>(j) * kNode;
   for (int c = 0; c < kBlockWidth; c += lanes) {
-    const V x0 = hn::LoadU(d, xj + c);
-    const V x1 = hn::LoadU(d, xj + kBlockWidth + c);
-    const V x2 = hn::LoadU(d, xj + 2 * kBlockWidth + c);
+    const V x0 = LoadAsDouble(xj + c);
+    const V x1 = LoadAsDouble(xj + kBlockWidth + c);
+    const V x2 = LoadAsDouble(xj + 2 * kBlockWidth + c);
     V y0 = hn::LoadU(d, yj + c);
     V y1 = hn::LoadU(d, yj + kBlockWidth + c);
     V y2 = hn::LoadU(d, yj + 2 * kBlockWidth + c);
@@ -165,12 +68,12 @@ void MultiplyColumn(const double* HWY_RESTRICT blocks, const int32_t* HWY_RESTRI
     y2 = hn::Add(y2, row(blocks + 6));
     for (int e = 1; e < count; ++e) {
       const double* b = blocks + static_cast<size_t>(e) * 9;
-      const double* xi = x + static_cast<size_t>(rows[e]) * kNode + c;
+      const Real* xi = x + static_cast<size_t>(rows[e]) * kNode + c;
       double* yi = y + static_cast<size_t>(rows[e]) * kNode + c;
       for (int a = 0; a < 3; ++a) {
         double* out = yi + a * kBlockWidth;
         hn::StoreU(hn::Add(hn::LoadU(d, out), row(b + 3 * a)), d, out);
-        const V xa = hn::LoadU(d, xi + a * kBlockWidth);
+        const V xa = LoadAsDouble(xi + a * kBlockWidth);
         y0 = hn::MulAdd(hn::Set(d, b[3 * a]), xa, y0);
         y1 = hn::MulAdd(hn::Set(d, b[3 * a + 1]), xa, y1);
         y2 = hn::MulAdd(hn::Set(d, b[3 * a + 2]), xa, y2);
@@ -274,6 +177,14 @@ HWY_INLINE void SubtractTimes(const Real* HWY_RESTRICT q, const Real* HWY_RESTRI
   for (; i < rows; ++i) rows_at(std::integral_constant<int, 1>{});
 }
 
+void ColumnDouble(const double* blocks, const int32_t* rows, int count, int j, const double* x,
+                  double* y) {
+  MultiplyColumn<double>(blocks, rows, count, j, x, y);
+}
+void ColumnFloat(const double* blocks, const int32_t* rows, int count, int j, const float* x,
+                 double* y) {
+  MultiplyColumn<float>(blocks, rows, count, j, x, y);
+}
 void RowDouble(const double* m, const int32_t* columns, int count, const double* x, double* y) {
   MultiplyRow<double>(m, columns, count, x, y);
 }
@@ -299,15 +210,8 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace carillon::precompute {
 
-HWY_EXPORT(TriangleDouble);
-HWY_EXPORT(TriangleFloat);
-HWY_EXPORT(TransposedDouble);
-HWY_EXPORT(TransposedFloat);
-HWY_EXPORT(ForwardDouble);
-HWY_EXPORT(ForwardFloat);
-HWY_EXPORT(BackwardDouble);
-HWY_EXPORT(BackwardFloat);
-HWY_EXPORT(MultiplyColumn);
+HWY_EXPORT(ColumnDouble);
+HWY_EXPORT(ColumnFloat);
 HWY_EXPORT(RowDouble);
 HWY_EXPORT(RowFloat);
 HWY_EXPORT(DotDouble);
@@ -316,44 +220,14 @@ HWY_EXPORT(SubtractDouble);
 HWY_EXPORT(SubtractFloat);
 
 template <>
-void TileForward<double>(const double* tile, int column_count, const double* y,
-                         double* const x[2]) {
-  HWY_DYNAMIC_DISPATCH(ForwardDouble)(tile, column_count, y, x);
+void ColumnMultiply<double>(const double* blocks, const int32_t* rows, int count, int j,
+                            const double* x, double* y) {
+  HWY_DYNAMIC_DISPATCH(ColumnDouble)(blocks, rows, count, j, x, y);
 }
 template <>
-void TileForward<float>(const float* tile, int column_count, const float* y, float* const x[2]) {
-  HWY_DYNAMIC_DISPATCH(ForwardFloat)(tile, column_count, y, x);
-}
-template <>
-void TileBackward<double>(const double* tile, int column_count, double* y,
-                          const double* const x[2]) {
-  HWY_DYNAMIC_DISPATCH(BackwardDouble)(tile, column_count, y, x);
-}
-template <>
-void TileBackward<float>(const float* tile, int column_count, float* y, const float* const x[2]) {
-  HWY_DYNAMIC_DISPATCH(BackwardFloat)(tile, column_count, y, x);
-}
-
-template <>
-void TileSolve<double>(const double* tile, double* x) {
-  HWY_DYNAMIC_DISPATCH(TriangleDouble)(tile, x);
-}
-template <>
-void TileSolve<float>(const float* tile, float* x) {
-  HWY_DYNAMIC_DISPATCH(TriangleFloat)(tile, x);
-}
-template <>
-void TileSolveTransposed<double>(const double* tile, double* x) {
-  HWY_DYNAMIC_DISPATCH(TransposedDouble)(tile, x);
-}
-template <>
-void TileSolveTransposed<float>(const float* tile, float* x) {
-  HWY_DYNAMIC_DISPATCH(TransposedFloat)(tile, x);
-}
-
-void ColumnMultiply(const double* blocks, const int32_t* rows, int count, int j, const double* x,
-                    double* y) {
-  HWY_DYNAMIC_DISPATCH(MultiplyColumn)(blocks, rows, count, j, x, y);
+void ColumnMultiply<float>(const double* blocks, const int32_t* rows, int count, int j,
+                           const float* x, double* y) {
+  HWY_DYNAMIC_DISPATCH(ColumnFloat)(blocks, rows, count, j, x, y);
 }
 
 template <>

@@ -5,31 +5,11 @@
 
 namespace carillon::precompute {
 
-/// Rows of a packed panel that one tile holds: two nodes.
-inline constexpr int kTileRows = 6;
-
-/// One tile of a packed panel times kBlockWidth right-hand sides, chosen at run time for the
-/// machine. The tile holds columns one after another, kTileRows numbers each. `y` has
-/// `column_count` rows of kBlockWidth numbers; `x[0]` and `x[1]` point at three rows each, one
-/// node.
-///
-///     TileForward:   x -= tile * y        TileBackward:   y -= tile^T * x
-template <typename Real>
-void TileForward(const Real* tile, int column_count, const Real* y, Real* const x[2]);
-template <typename Real>
-void TileBackward(const Real* tile, int column_count, Real* y, const Real* const x[2]);
-
-/// x = D^-1 x and x = D^-T x for the lower triangle D of a diagonal tile (its diagonal inverted);
-/// x: six rows.
-template <typename Real>
-void TileSolve(const Real* tile, Real* x);
-template <typename Real>
-void TileSolveTransposed(const Real* tile, Real* x);
-
 /// y_i += B x_j and, off the diagonal, y_j += B^T x_i for the column j of a NodeMatrix: `count`
 /// blocks B (3x3, row-major) with their nodes `rows`, the diagonal first. x and y: all nodes, 3
 /// rows each.
-void ColumnMultiply(const double* blocks, const int32_t* rows, int count, int j, const double* x,
+template <typename Real>
+void ColumnMultiply(const double* blocks, const int32_t* rows, int count, int j, const Real* x,
                     double* y);
 
 /// y = row of a matrix m (x) I3 times x: `count` numbers m in `columns`. x: all nodes, y: one, 3

@@ -61,8 +61,8 @@ class LanczosRecurrence {
 
   Workers& workers_;
   double foreseen_;
-  ShiftInvert<Real> operator_;
   MassRows<Real> mass_;
+  ShiftInvert<Real> operator_;
   bool mass_is_identity_;
   Eigen::Index rows_;
   BlockBasis<Real> deflated_;

@@ -6,16 +6,13 @@
 #include <atomic>
 #include <vector>
 
-#include "precompute/modes/block_kernels.h"
 #include "precompute/modes/dense_blas.h"
 #include "precompute/modes/strips.h"
+#include "precompute/modes/tile_kernels.h"
 #include "proto/error_reason.h"
 
 namespace carillon::precompute {
 namespace {
-
-/// Numbers of a node in a block of vectors.
-constexpr ptrdiff_t kNode = 3 * kBlockWidth;
 
 int TileCount(int rows) { return (rows + kTileRows - 1) / kTileRows; }
 
@@ -141,16 +138,16 @@ absl::StatusOr<MultifrontalCholesky<Real>> MultifrontalCholesky<Real>::Factorize
 namespace {
 
 /// A diagonal tile may be half full: its rows are copied out and back, absent ones zero.
-template <typename Real, typename TileSolve>
-void WithTileRows(Real* x, int rows, const TileSolve& solve) {
+template <int kWidth, typename Real, typename Solve>
+void WithTileRows(Real* x, int rows, const Solve& solve) {
   if (rows >= kTileRows) {
     solve(x);
     return;
   }
-  std::array<Real, kTileRows * kBlockWidth> copy{};
-  std::copy(x, x + rows * kBlockWidth, copy.begin());
+  std::array<Real, kTileRows * kWidth> copy{};
+  std::copy(x, x + rows * kWidth, copy.begin());
   solve(copy.data());
-  std::copy(copy.begin(), copy.begin() + rows * kBlockWidth, x);
+  std::copy(copy.begin(), copy.begin() + rows * kWidth, x);
 }
 
 /// Tiles whose triangle one thread solves while the others wait.
@@ -163,8 +160,12 @@ constexpr size_t kShared = 200'000;
 
 /// One solution: the panels of the factor with the rows of x that they act on.
 template <typename Real>
+template <int kWidth>
 class MultifrontalCholesky<Real>::Substitution {
  public:
+  /// Numbers of a node in a block of vectors.
+  static constexpr ptrdiff_t kNode = 3 * kWidth;
+
   Substitution(const MultifrontalCholesky& factor, Real* x)
       : factor_(factor), fronts_(*factor.fronts_), x_(x) {}
 
@@ -175,6 +176,13 @@ class MultifrontalCholesky<Real>::Substitution {
     Real* above = nullptr;
     std::array<Real, static_cast<size_t>(kNode)> scratch{};
   };
+
+  /// All fronts, one after another.
+  void Run(Workers& workers) const {
+    Rows rows{.end = fronts_.node_count(), .above = nullptr, .scratch = {}};
+    for (int s = 0; s < fronts_.supernode_count(); ++s) Forward(s, rows, workers);
+    for (int s = fronts_.supernode_count(); s-- > 0;) Backward(s, workers);
+  }
 
   void Forward(int s, Rows& rows, Workers& workers) const {
     const int pivots = fronts_.pivot_count(s);
@@ -188,7 +196,7 @@ class MultifrontalCholesky<Real>::Substitution {
         for (int t = first + begin; t < first + end; ++t) {
           Real* const at[2] = {PivotRow(pivot, t),
                                SecondPivotRow(pivot, t, pivots, scratch.data())};
-          TileForward<Real>(Triangle(s, t), solved, pivot, at);
+          TileForward<Real, kWidth>(Triangle(s, t), solved, pivot, at);
         }
       });
       for (int t = first; t < last; ++t) {
@@ -196,9 +204,10 @@ class MultifrontalCholesky<Real>::Substitution {
         const Real* tile = Triangle(s, t) + solved * kTileRows;
         Real* const at[2] = {PivotRow(pivot, t),
                              SecondPivotRow(pivot, t, pivots, rows.scratch.data())};
-        TileForward<Real>(tile, row - solved, pivot + solved * kBlockWidth, at);
-        WithTileRows(at[0], pivots - row,
-                     [&](Real* x6) { TileSolve<Real>(tile + (row - solved) * kTileRows, x6); });
+        TileForward<Real, kWidth>(tile, row - solved, pivot + solved * kWidth, at);
+        WithTileRows<kWidth>(at[0], pivots - row, [&](Real* x6) {
+          TileSolve<Real, kWidth>(tile + (row - solved) * kTileRows, x6);
+        });
       }
     }
     const int below = BelowCount(s);
@@ -207,7 +216,7 @@ class MultifrontalCholesky<Real>::Substitution {
       for (int t = begin; t < end; ++t) {
         Real* at[2];
         BelowRows(s, t, rows, scratch.data(), at);
-        TileForward<Real>(Below(s, t), pivots, pivot, at);
+        TileForward<Real, kWidth>(Below(s, t), pivots, pivot, at);
       }
     });
   }
@@ -223,8 +232,8 @@ class MultifrontalCholesky<Real>::Substitution {
       for (int t = 0; t < BelowCount(s); ++t) {
         Real* at[2];
         BelowRows(s, t, rows, zero.data(), at);
-        TileBackward<Real>(Below(s, t) + begin * kTileRows, end - begin,
-                           pivot + begin * kBlockWidth, at);
+        TileBackward<Real, kWidth>(Below(s, t) + begin * kTileRows, end - begin,
+                                   pivot + begin * kWidth, at);
       }
     });
     for (int first = (tiles - 1) / kGroup * kGroup; first >= 0; first -= kGroup) {
@@ -234,15 +243,16 @@ class MultifrontalCholesky<Real>::Substitution {
         const int row = t * kTileRows;
         const Real* tile = Triangle(s, t);
         Real* const at[2] = {PivotRow(pivot, t), SecondPivotRow(pivot, t, pivots, zero.data())};
-        WithTileRows(at[0], pivots - row,
-                     [&](Real* x6) { TileSolveTransposed<Real>(tile + row * kTileRows, x6); });
-        TileBackward<Real>(tile + left * kTileRows, row - left, pivot + left * kBlockWidth, at);
+        WithTileRows<kWidth>(at[0], pivots - row, [&](Real* x6) {
+          TileSolveTransposed<Real, kWidth>(tile + row * kTileRows, x6);
+        });
+        TileBackward<Real, kWidth>(tile + left * kTileRows, row - left, pivot + left * kWidth, at);
       }
       Share(workers, (last - first) * kTileRows, left, [&](int begin, int end) {
         for (int t = first; t < last; ++t) {
           Real* const at[2] = {PivotRow(pivot, t), SecondPivotRow(pivot, t, pivots, zero.data())};
-          TileBackward<Real>(Triangle(s, t) + begin * kTileRows, end - begin,
-                             pivot + begin * kBlockWidth, at);
+          TileBackward<Real, kWidth>(Triangle(s, t) + begin * kTileRows, end - begin,
+                                     pivot + begin * kWidth, at);
         }
       });
     }
@@ -250,7 +260,7 @@ class MultifrontalCholesky<Real>::Substitution {
 
  private:
   Real* At(int node) const { return x_ + node * kNode; }
-  static Real* PivotRow(Real* pivot, int tile) { return pivot + tile * kTileRows * kBlockWidth; }
+  static Real* PivotRow(Real* pivot, int tile) { return pivot + tile * kTileRows * kWidth; }
   static Real* SecondPivotRow(Real* pivot, int tile, int pivots, Real* scratch) {
     return tile * kTileRows + 3 < pivots ? PivotRow(pivot, tile) + kNode : scratch;
   }
@@ -294,11 +304,11 @@ class MultifrontalCholesky<Real>::Substitution {
 template <typename Real>
 void MultifrontalCholesky<Real>::Solve(Real* x, Workers& workers) const {
   const FrontalStructure& fronts = *fronts_;
-  const Substitution substitution(*this, x);
+  using Narrow = Substitution<kBlockWidth>;
+  constexpr ptrdiff_t kNode = Narrow::kNode;
+  const Narrow substitution(*this, x);
   if (workers.count() == 1) {
-    typename Substitution::Rows rows{.end = fronts.node_count(), .above = nullptr, .scratch = {}};
-    for (int s = 0; s < fronts.supernode_count(); ++s) substitution.Forward(s, rows, workers);
-    for (int s = fronts.supernode_count(); s-- > 0;) substitution.Backward(s, workers);
+    substitution.Run(workers);
     return;
   }
   const size_t above_size = top_nodes_.size() * static_cast<size_t>(kNode);
@@ -310,7 +320,7 @@ void MultifrontalCholesky<Real>::Solve(Real* x, Workers& workers) const {
     mine.assign(above_size, Real{0});
     for (size_t i = next++; i < fronts.subtrees.size(); i = next++) {
       const Subtree& subtree = fronts.subtrees[i];
-      typename Substitution::Rows rows{
+      typename Narrow::Rows rows{
           .end = fronts.first_pivot[subtree.end], .above = mine.data(), .scratch = {}};
       for (int s = subtree.begin; s < subtree.end; ++s) substitution.Forward(s, rows, alone);
     }
@@ -322,7 +332,7 @@ void MultifrontalCholesky<Real>::Solve(Real* x, Workers& workers) const {
       for (ptrdiff_t c = 0; c < kNode; ++c) to[c] += from[c];
     }
   }
-  typename Substitution::Rows rows{.end = fronts.node_count(), .above = nullptr, .scratch = {}};
+  typename Narrow::Rows rows{.end = fronts.node_count(), .above = nullptr, .scratch = {}};
   for (const int s : fronts.top) substitution.Forward(s, rows, workers);
   for (size_t k = fronts.top.size(); k-- > 0;) substitution.Backward(fronts.top[k], workers);
   workers.ForEach(static_cast<int64_t>(fronts.subtrees.size()), [&](int64_t i) {
@@ -330,6 +340,12 @@ void MultifrontalCholesky<Real>::Solve(Real* x, Workers& workers) const {
     const Subtree& subtree = fronts.subtrees[static_cast<size_t>(i)];
     for (int s = subtree.end; s-- > subtree.begin;) substitution.Backward(s, alone);
   });
+}
+
+template <typename Real>
+void MultifrontalCholesky<Real>::SolveWide(Real* x) const requires std::is_same_v<Real, float> {
+  Workers alone(1);
+  Substitution<kWideBlock>(*this, x).Run(alone);
 }
 
 size_t FactorNumbers(const FrontalStructure& fronts) {

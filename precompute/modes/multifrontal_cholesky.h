@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <type_traits>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -24,9 +25,13 @@ class MultifrontalCholesky {
   /// Overwrites x, 3 #nodes by kBlockWidth, row-major, in elimination order, by its solution.
   void Solve(Real* x, Workers& workers) const;
 
+  /// The same of x with kWideBlock columns, by one thread.
+  void SolveWide(Real* x) const requires std::is_same_v<Real, float>;
+
   size_t stored_bytes() const { return tiles_.size() * sizeof(Real); }
 
  private:
+  template <int kWidth>
   class Substitution;
 
   const FrontalStructure* fronts_ = nullptr;

@@ -99,7 +99,8 @@ NodeMatrix MakeNodeMatrix(const Sparse& K, const Sparse& M, const std::vector<in
   return A;
 }
 
-void MultiplyStiffness(const NodeMatrix& A, const double* x, double* y) {
+template <typename Real>
+void MultiplyStiffness(const NodeMatrix& A, const Real* x, double* y) {
   std::fill(y, y + static_cast<ptrdiff_t>(A.node_count) * 3 * kBlockWidth, 0.0);
   for (int j = 0; j < A.node_count; ++j) {
     const int first = A.column_start[j];
@@ -152,6 +153,8 @@ void MultiplyMass(const MassRows<Real>& M, Workers& workers, const Real* x, Real
                    });
 }
 
+template void MultiplyStiffness(const NodeMatrix&, const float*, double*);
+template void MultiplyStiffness(const NodeMatrix&, const double*, double*);
 template MassRows<float> MakeMassRows(const NodeMatrix&);
 template MassRows<double> MakeMassRows(const NodeMatrix&);
 template void MultiplyMass(const MassRows<float>&, Workers&, const float*, float*);

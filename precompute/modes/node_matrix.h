@@ -42,7 +42,8 @@ NodeMatrix MakeNodeMatrix(const Eigen::SparseMatrix<double>& K,
                           const Eigen::SparseMatrix<double>& M, const std::vector<int32_t>& order);
 
 /// y = K x; x and y: 3 #nodes by kBlockWidth, row-major, in elimination order.
-void MultiplyStiffness(const NodeMatrix& A, const double* x, double* y);
+template <typename Real>
+void MultiplyStiffness(const NodeMatrix& A, const Real* x, double* y);
 
 /// Empty where the mass matrix is the identity.
 template <typename Real>

@@ -76,7 +76,7 @@ void ResidualSums(const double* quotient, const double* root_mass, const double*
 
 template <typename Real>
 HWY_INLINE void WriteResidual(const double* quotient, const double* elastic, const double* inertial,
-                              int64_t rows, Real* HWY_RESTRICT out) {
+                              int64_t rows, int64_t stride, Real* HWY_RESTRICT out) {
   const hn::Rebind<Real, D> narrow;
   const Row q = Load(quotient);
   for (int64_t r = 0; r < rows; ++r) {
@@ -84,7 +84,7 @@ HWY_INLINE void WriteResidual(const double* quotient, const double* elastic, con
     const Row mx = Load(inertial + r * kBlockWidth);
     for (int i = 0; i < kVectors; ++i) {
       const V off = hn::NegMulAdd(q.v[i], mx.v[i], kx.v[i]);
-      Real* to = out + r * kBlockWidth + i * kLanes;
+      Real* to = out + r * stride + i * kLanes;
       if constexpr (std::is_same_v<Real, float>) {
         hn::StoreU(hn::DemoteTo(narrow, off), narrow, to);
       } else {
@@ -95,30 +95,62 @@ HWY_INLINE void WriteResidual(const double* quotient, const double* elastic, con
 }
 
 template <typename Real>
-HWY_INLINE void Change(const Real* HWY_RESTRICT change, int64_t rows, double* HWY_RESTRICT x) {
+HWY_INLINE void Change(const Real* HWY_RESTRICT change, int64_t stride, int64_t rows,
+                       double* HWY_RESTRICT x) {
   const hn::Rebind<Real, D> narrow;
-  for (int64_t r = 0; r < rows * kVectors; ++r) {
-    double* to = x + r * kLanes;
-    const auto from = hn::LoadU(narrow, change + r * kLanes);
-    if constexpr (std::is_same_v<Real, float>) {
-      hn::StoreU(hn::Sub(hn::LoadU(D(), to), hn::PromoteTo(D(), from)), D(), to);
-    } else {
-      hn::StoreU(hn::Sub(hn::LoadU(D(), to), from), D(), to);
+  for (int64_t r = 0; r < rows; ++r) {
+    for (int i = 0; i < kVectors; ++i) {
+      double* to = x + r * kBlockWidth + i * kLanes;
+      const auto from = hn::LoadU(narrow, change + r * stride + i * kLanes);
+      if constexpr (std::is_same_v<Real, float>) {
+        hn::StoreU(hn::Sub(hn::LoadU(D(), to), hn::PromoteTo(D(), from)), D(), to);
+      } else {
+        hn::StoreU(hn::Sub(hn::LoadU(D(), to), from), D(), to);
+      }
     }
   }
 }
 
+template <typename Real>
+HWY_INLINE void SolveResidual(const Real* HWY_RESTRICT right, const double* HWY_RESTRICT elastic,
+                              const Real* HWY_RESTRICT inertial, double shift, int64_t count,
+                              Real* HWY_RESTRICT out) {
+  const hn::Rebind<Real, D> narrow;
+  const V s = hn::Set(D(), shift);
+  for (int64_t i = 0; i < count; i += kLanes) {
+    const auto b = hn::LoadU(narrow, right + i);
+    const auto m = hn::LoadU(narrow, inertial + i);
+    const V kx = hn::LoadU(D(), elastic + i);
+    if constexpr (std::is_same_v<Real, float>) {
+      const V off = hn::NegMulAdd(s, hn::PromoteTo(D(), m), kx);
+      hn::StoreU(hn::Sub(b, hn::DemoteTo(narrow, off)), narrow, out + i);
+    } else {
+      hn::StoreU(hn::Sub(b, hn::NegMulAdd(s, m, kx)), narrow, out + i);
+    }
+  }
+}
+
+void SolveResidualFloat(const float* right, const double* elastic, const float* inertial,
+                        double shift, int64_t count, float* out) {
+  SolveResidual<float>(right, elastic, inertial, shift, count, out);
+}
+void SolveResidualDouble(const double* right, const double* elastic, const double* inertial,
+                         double shift, int64_t count, double* out) {
+  SolveResidual<double>(right, elastic, inertial, shift, count, out);
+}
 void ResidualFloat(const double* quotient, const double* elastic, const double* inertial,
-                   int64_t rows, float* out) {
-  WriteResidual<float>(quotient, elastic, inertial, rows, out);
+                   int64_t rows, int64_t stride, float* out) {
+  WriteResidual<float>(quotient, elastic, inertial, rows, stride, out);
 }
 void ResidualDouble(const double* quotient, const double* elastic, const double* inertial,
-                    int64_t rows, double* out) {
-  WriteResidual<double>(quotient, elastic, inertial, rows, out);
+                    int64_t rows, int64_t stride, double* out) {
+  WriteResidual<double>(quotient, elastic, inertial, rows, stride, out);
 }
-void ChangeFloat(const float* change, int64_t rows, double* x) { Change<float>(change, rows, x); }
-void ChangeDouble(const double* change, int64_t rows, double* x) {
-  Change<double>(change, rows, x);
+void ChangeFloat(const float* change, int64_t stride, int64_t rows, double* x) {
+  Change<float>(change, stride, rows, x);
+}
+void ChangeDouble(const double* change, int64_t stride, int64_t rows, double* x) {
+  Change<double>(change, stride, rows, x);
 }
 
 }  // namespace carillon::precompute::HWY_NAMESPACE
@@ -131,6 +163,8 @@ HWY_EXPORT(RayleighSums);
 HWY_EXPORT(ResidualSums);
 HWY_EXPORT(ResidualFloat);
 HWY_EXPORT(ResidualDouble);
+HWY_EXPORT(SolveResidualFloat);
+HWY_EXPORT(SolveResidualDouble);
 HWY_EXPORT(ChangeFloat);
 HWY_EXPORT(ChangeDouble);
 
@@ -145,21 +179,31 @@ void AddResidualSums(const double* quotient, const double* root_mass, const doub
 }
 template <>
 void StoreResidual<float>(const double* quotient, const double* elastic, const double* inertial,
-                          int64_t rows, float* out) {
-  HWY_DYNAMIC_DISPATCH(ResidualFloat)(quotient, elastic, inertial, rows, out);
+                          int64_t rows, int64_t stride, float* out) {
+  HWY_DYNAMIC_DISPATCH(ResidualFloat)(quotient, elastic, inertial, rows, stride, out);
 }
 template <>
 void StoreResidual<double>(const double* quotient, const double* elastic, const double* inertial,
-                           int64_t rows, double* out) {
-  HWY_DYNAMIC_DISPATCH(ResidualDouble)(quotient, elastic, inertial, rows, out);
+                           int64_t rows, int64_t stride, double* out) {
+  HWY_DYNAMIC_DISPATCH(ResidualDouble)(quotient, elastic, inertial, rows, stride, out);
 }
 template <>
-void SubtractChange<float>(const float* change, int64_t rows, double* x) {
-  HWY_DYNAMIC_DISPATCH(ChangeFloat)(change, rows, x);
+void StoreSolveResidual<float>(const float* right, const double* elastic, const float* inertial,
+                               double shift, int64_t count, float* out) {
+  HWY_DYNAMIC_DISPATCH(SolveResidualFloat)(right, elastic, inertial, shift, count, out);
 }
 template <>
-void SubtractChange<double>(const double* change, int64_t rows, double* x) {
-  HWY_DYNAMIC_DISPATCH(ChangeDouble)(change, rows, x);
+void StoreSolveResidual<double>(const double* right, const double* elastic, const double* inertial,
+                                double shift, int64_t count, double* out) {
+  HWY_DYNAMIC_DISPATCH(SolveResidualDouble)(right, elastic, inertial, shift, count, out);
+}
+template <>
+void SubtractChange<float>(const float* change, int64_t stride, int64_t rows, double* x) {
+  HWY_DYNAMIC_DISPATCH(ChangeFloat)(change, stride, rows, x);
+}
+template <>
+void SubtractChange<double>(const double* change, int64_t stride, int64_t rows, double* x) {
+  HWY_DYNAMIC_DISPATCH(ChangeDouble)(change, stride, rows, x);
 }
 
 }  // namespace carillon::precompute

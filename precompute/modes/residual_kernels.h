@@ -18,13 +18,19 @@ void AddRayleighSums(const double* x, const double* elastic, const double* inert
 void AddResidualSums(const double* quotient, const double* root_mass, const double* elastic,
                      const double* inertial, int64_t nodes, double* residual, double* scale);
 
-/// out = elastic - inertial quotient
+/// out = elastic - inertial quotient; rows of `out` and `change` lie `stride` numbers apart.
 template <typename Real>
 void StoreResidual(const double* quotient, const double* elastic, const double* inertial,
-                   int64_t rows, Real* out);
+                   int64_t rows, int64_t stride, Real* out);
+
+/// out = right - (elastic - shift inertial): what a solve for `right` leaves; all of `count`
+/// numbers.
+template <typename Real>
+void StoreSolveResidual(const Real* right, const double* elastic, const Real* inertial,
+                        double shift, int64_t count, Real* out);
 
 /// x -= change
 template <typename Real>
-void SubtractChange(const Real* change, int64_t rows, double* x);
+void SubtractChange(const Real* change, int64_t stride, int64_t rows, double* x);
 
 }  // namespace carillon::precompute

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
+#include <type_traits>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -65,10 +67,14 @@ class Refinement {
   /// Corrects every block of vectors `steps` times, unless the wanted vectors of it are good
   /// already. What a vector takes up of the others Project takes out.
   void Correct(int steps) {
-    const std::vector<bool> good = GoodBlocks();
-    ForBlocks([&](size_t b) {
-      VectorBlockOf<Real> change(good[b] ? 0 : rows_, kBlockWidth);
-      for (int step = 0; step < (good[b] ? 0 : steps); ++step) CorrectBlock(b, change);
+    const std::vector<size_t> bad = BadBlocks();
+    const size_t width = GroupWidth(bad.size());
+    workers_.ForEach(static_cast<int64_t>((bad.size() + width - 1) / width), [&](int64_t group) {
+      const size_t first = static_cast<size_t>(group) * width;
+      const std::span blocks(&bad[first], std::min(width, bad.size() - first));
+      Eigen::Matrix<Real, Eigen::Dynamic, 1> change(rows_ * kBlockWidth *
+                                                    static_cast<Index>(blocks.size()));
+      for (int step = 0; step < steps; ++step) CorrectBlocks(blocks, change.data());
     });
   }
 
@@ -121,13 +127,23 @@ class Refinement {
 
   const VectorBlock& Inertial(size_t b) const { return A_.mass_is_identity ? x_[b] : inertial_[b]; }
 
-  /// None before residuals are known; those without a vector that is wanted are.
-  std::vector<bool> GoodBlocks() const {
-    std::vector<bool> good(x_.size(), residuals_.size() != 0);
-    for (Index i = 0; i < std::min(wanted_, residuals_.size()); ++i) {
-      if (!(residuals_[i] <= kTolerance)) good[static_cast<size_t>(i / kBlockWidth)] = false;
+  /// Before residuals are known all; then those with a vector that is wanted and not good.
+  std::vector<size_t> BadBlocks() const {
+    std::vector<size_t> bad;
+    for (size_t b = 0; b < x_.size(); ++b) {
+      const Index first = static_cast<Index>(b) * kBlockWidth;
+      const Index count = std::clamp<Index>(wanted_ - first, 0, kBlockWidth);
+      const bool good = residuals_.size() != 0 &&
+                        (count == 0 || residuals_.segment(first, count).maxCoeff() <= kTolerance);
+      if (!good) bad.push_back(b);
     }
-    return good;
+    return bad;
+  }
+
+  /// Two blocks at once read a factor in float once; each thread should have some.
+  size_t GroupWidth(size_t blocks) const {
+    const auto threads = static_cast<size_t>(workers_.count());
+    return std::is_same_v<Real, float> && blocks >= 2 * threads ? 2 : 1;
   }
 
   /// The products of a block of vectors and their Rayleigh quotients.
@@ -144,23 +160,45 @@ class Refinement {
     quotients_[b] = energy / mass;
   }
 
-  void CorrectBlock(size_t b, VectorBlockOf<Real>& change) {
+  /// `change`: room for all blocks, side by side in each row.
+  void CorrectBlocks(std::span<const size_t> blocks, Real* change) {
+    const auto stride = static_cast<int64_t>(blocks.size()) * kBlockWidth;
+    for (size_t i = 0; i < blocks.size(); ++i) {
+      const size_t b = blocks[i];
+      StoreResidual(quotients_[b].data(), elastic_[b].data(), Inertial(b).data(), rows_, stride,
+                    change + i * kBlockWidth);
+    }
+    Solve(change, blocks.size());
+    for (size_t i = 0; i < blocks.size(); ++i) {
+      Subtract(change + i * kBlockWidth, stride, blocks[i]);
+      Multiply(blocks[i]);
+    }
+  }
+
+  void Solve(Real* change, size_t blocks) const {
+    if constexpr (std::is_same_v<Real, float>) {
+      if (blocks == 2) {
+        factor_.SolveWide(change);
+        return;
+      }
+    }
     Workers alone(1);
-    StoreResidual(quotients_[b].data(), elastic_[b].data(), Inertial(b).data(), rows_,
-                  change.data());
-    factor_.Solve(change.data(), alone);
+    factor_.Solve(change, alone);
+  }
+
+  /// x -= change, kept orthogonal to the deflated vectors.
+  void Subtract(const Real* change, int64_t stride, size_t b) {
     SmallBlock deflated = SmallBlock::Zero();
     SmallBlock h;
     constexpr Index kStretch = 256;
     for (Index i = 0; i < rows_; i += kStretch) {
       const Index count = std::min(kStretch, rows_ - i);
       double* x = x_[b].data() + i * kBlockWidth;
-      SubtractChange(change.data() + i * kBlockWidth, count, x);
+      SubtractChange(change + i * stride, stride, count, x);
       BlockDot(deflated_momenta_.data() + i * kBlockWidth, x, count, h.data());
       deflated += h;
     }
     BlockSubtractTimes(deflated_.data(), deflated.data(), rows_, x_[b].data());
-    Multiply(b);
   }
 
   const NodeMatrix& A_;

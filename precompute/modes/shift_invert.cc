@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <type_traits>
 
+#include "precompute/modes/residual_kernels.h"
+
 namespace carillon::precompute {
 namespace {
 
@@ -19,9 +21,10 @@ constexpr double kRefinedPartOfCoarse = 0.75;
 
 template <typename Real>
 ShiftInvert<Real>::ShiftInvert(const NodeMatrix& A, const MultifrontalCholesky<Real>& factor,
-                               double shift, Workers& workers)
+                               const MassRows<Real>& mass, double shift, Workers& workers)
     : A_(A),
       factor_(factor),
+      mass_(mass),
       shift_(shift),
       workers_(workers),
       solution_(3 * static_cast<Eigen::Index>(A.node_count), kBlockWidth) {}
@@ -31,35 +34,28 @@ void ShiftInvert<Real>::Apply(const Block& x, Block& y, double done) {
   std::copy_n(x.data(), x.size(), solution_.data());
   factor_.Solve(solution_.data(), workers_);
   if (std::is_same_v<Real, float> && done < refined_part_) {
-    const double change = Refine(x);
-    if (error_ == 0) {
-      error_ = change;
-      refined_part_ = change > kSmallSolveError ? kRefinedPartOfCoarse : kRefinedPart;
-    }
+    Refine(x);
+    refined_part_ = error_ > kSmallSolveError ? kRefinedPartOfCoarse : kRefinedPart;
   }
   y = solution_ * static_cast<Real>(-shift_);
 }
 
-/// Improves solution_ by its residual for the right-hand side x; returns by how much, relatively.
+/// Improves solution_ by its residual for the right-hand side x.
 template <typename Real>
-double ShiftInvert<Real>::Refine(const Block& x) {
-  const Eigen::Index rows = x.rows();
-  if (y_.size() == 0 && !A_.mass_is_identity) mass_ = MakeMassRows<double>(A_);
-  elastic_.resize(rows, kBlockWidth);
-  y_ = solution_.template cast<double>();
+void ShiftInvert<Real>::Refine(const Block& x) {
+  elastic_.resize(x.rows(), kBlockWidth);
+  y_.resize(x.rows(), kBlockWidth);
+  y_.swap(solution_);
   MultiplyStiffness(A_, y_.data(), elastic_.data());
-  if (A_.mass_is_identity) {
-    elastic_ -= shift_ * y_;
-  } else {
-    inertial_.resize(rows, kBlockWidth);
+  if (!A_.mass_is_identity) {
+    inertial_.resize(x.rows(), kBlockWidth);
     MultiplyMass(mass_, workers_, y_.data(), inertial_.data());
-    elastic_ -= shift_ * inertial_;
   }
-  solution_ = x - elastic_.template cast<Real>();
+  StoreSolveResidual(x.data(), elastic_.data(), (A_.mass_is_identity ? y_ : inertial_).data(),
+                     shift_, x.size(), solution_.data());
   factor_.Solve(solution_.data(), workers_);
-  const double change = solution_.norm() / y_.norm();
-  solution_ += y_.template cast<Real>();
-  return change;
+  if (error_ == 0) error_ = solution_.norm() / y_.norm();
+  solution_ += y_;
 }
 
 template class ShiftInvert<float>;

@@ -18,8 +18,8 @@ class ShiftInvert {
  public:
   using Block = VectorBlockOf<Real>;
 
-  ShiftInvert(const NodeMatrix& A, const MultifrontalCholesky<Real>& factor, double shift,
-              Workers& workers);
+  ShiftInvert(const NodeMatrix& A, const MultifrontalCholesky<Real>& factor,
+              const MassRows<Real>& mass, double shift, Workers& workers);
 
   /// x and y, in elimination order, may be one; `done`: the part of the iteration that is.
   void Apply(const Block& x, Block& y, double done);
@@ -28,19 +28,19 @@ class ShiftInvert {
   double error() const { return error_; }
 
  private:
-  double Refine(const Block& x);
+  void Refine(const Block& x);
 
   const NodeMatrix& A_;
   const MultifrontalCholesky<Real>& factor_;
+  const MassRows<Real>& mass_;
   double shift_;
   Workers& workers_;
-  MassRows<double> mass_;
   double refined_part_ = 1;  ///< of the iteration
   double error_ = 0;
   Block solution_;
-  VectorBlock y_;
+  Block y_;
   VectorBlock elastic_;
-  VectorBlock inertial_;
+  Block inertial_;
 };
 
 }  // namespace carillon::precompute
