@@ -144,7 +144,8 @@ absl::StatusOr<RefinedModes> SolveIn(const OrderedSystem& ordered, const MatrixX
   }
   return RefineModes(
       ordered.matrix, *factor, rigid, rough,
-      {.wanted = wanted, .first_steps = first_steps, .free_motion = -kFreeMotion * shift}, workers);
+      {.wanted = wanted, .first_steps = first_steps, .free_motion = -kFreeMotion * shift}, workers,
+      [&](double done) { progress(kIterationPart + (1 - kIterationPart) * done); });
 }
 
 }  // namespace

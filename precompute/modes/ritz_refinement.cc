@@ -30,6 +30,10 @@ constexpr int kMaxRounds = 6;
 /// own, which each correction lessens by a third or so: two cost less than another projection.
 constexpr int kQuickRounds = 2;
 
+/// Of what is left to do when a round begins, about; of a round the corrections.
+constexpr double kRoundPart = 0.8;
+constexpr double kCorrectionPart = 0.7;
+
 template <typename Real>
 class Refinement {
  public:
@@ -226,13 +230,17 @@ absl::StatusOr<RefinedModes> RefineModes(const NodeMatrix& A,
                                          const MultifrontalCholesky<Real>& factor,
                                          const MatrixXd& deflated,
                                          const std::vector<VectorBlockOf<Real>>& rough,
-                                         const RefinementPlan& plan, Workers& workers) {
+                                         const RefinementPlan& plan, Workers& workers,
+                                         const SolveProgress& progress) {
   Refinement<Real> refinement(A, factor, deflated, plan, workers);
   refinement.Take(rough);
   double residual = 1;
+  double left = 1;
   int steps = plan.first_steps;
-  for (int round = 0; round < kMaxRounds; ++round) {
+  for (int round = 0; round < kMaxRounds; ++round, left *= 1 - kRoundPart) {
+    progress(1 - left);
     refinement.Correct(steps);
+    progress(1 - left * (1 - kRoundPart * kCorrectionPart));
     if (!refinement.Project()) break;
     residual = refinement.LargestResidual();
     if (refinement.IsDone()) return refinement.Result();
@@ -247,11 +255,13 @@ template absl::StatusOr<RefinedModes> RefineModes(const NodeMatrix&,
                                                   const MultifrontalCholesky<float>&,
                                                   const MatrixXd&,
                                                   const std::vector<VectorBlockOf<float>>&,
-                                                  const RefinementPlan&, Workers&);
+                                                  const RefinementPlan&, Workers&,
+                                                  const SolveProgress&);
 template absl::StatusOr<RefinedModes> RefineModes(const NodeMatrix&,
                                                   const MultifrontalCholesky<double>&,
                                                   const MatrixXd&,
                                                   const std::vector<VectorBlockOf<double>>&,
-                                                  const RefinementPlan&, Workers&);
+                                                  const RefinementPlan&, Workers&,
+                                                  const SolveProgress&);
 
 }  // namespace carillon::precompute

@@ -7,6 +7,7 @@
 #include "absl/status/statusor.h"
 #include "precompute/modes/block_basis.h"
 #include "precompute/modes/block_gram.h"
+#include "precompute/modes/eigensolver.h"
 #include "precompute/modes/multifrontal_cholesky.h"
 #include "precompute/modes/node_matrix.h"
 #include "precompute/modes/workers.h"
@@ -32,13 +33,14 @@ struct RefinedModes {
 /// of them (Rayleigh and Ritz), in double. Repeated until residuals are small.
 ///
 /// `rough`: in elimination order; the last blocks may hold more than is wanted. `deflated`: as for
-/// LanczosRecurrence.
+/// LanczosRecurrence. `progress` is called in this thread.
 /// Errors: VERIFICATION_FAILED where residuals stay large.
 template <typename Real>
 absl::StatusOr<RefinedModes> RefineModes(const NodeMatrix& A,
                                          const MultifrontalCholesky<Real>& factor,
                                          const Eigen::MatrixXd& deflated,
                                          const std::vector<VectorBlockOf<Real>>& rough,
-                                         const RefinementPlan& plan, Workers& workers);
+                                         const RefinementPlan& plan, Workers& workers,
+                                         const SolveProgress& progress);
 
 }  // namespace carillon::precompute

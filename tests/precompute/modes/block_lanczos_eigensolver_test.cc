@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <vector>
 
 #include "precompute/modes/dense_eigensolver.h"
 #include "precompute/modes/node_ordering.h"
@@ -119,6 +120,26 @@ TEST(BlockLanczos, FindsBothOfEachDegeneratePair) {
   Body body(MakeTetTube({.length_m = 0.3, .around = 8, .along = 20}, 10), MassSharing::kConsistent);
   const Modes modes = body.Solve(12);
   EXPECT_NEAR(modes.eigenvalues[7] / modes.eigenvalues[6], 1, 2e-3);
+}
+
+// What remains is told by it: it must not stand still while modes are refined.
+TEST(BlockLanczos, ToldProgressGoesOnWhileModesAreRefined) {
+  Body body(MakeTetTube({.wall_m = 0.002, .length_m = 0.3, .around = 24, .along = 24}, 4),
+            MassSharing::kLumped);
+  std::vector<double> told;
+  ASSERT_TRUE(BlockLanczosEigensolver(body.ordered, body.rigid)
+                  .Solve(body.system, {.count = 100, .eigenvalue_limit = kLimit},
+                         [&](double done) { told.push_back(done); })
+                  .ok());
+  ASSERT_FALSE(told.empty());
+  EXPECT_EQ(told.front(), 0);
+  for (size_t i = 1; i < told.size(); ++i) {
+    EXPECT_GE(told[i], told[i - 1]);
+    EXPECT_LT(told[i] - told[i - 1], 0.25);
+  }
+  // The last projection and its residuals are yet to come when the last correction is told.
+  EXPECT_GT(told.back(), 0.8);
+  EXPECT_LE(told.back(), 1);
 }
 
 TEST(BlockLanczos, GivesTheSameModesEachTime) {
