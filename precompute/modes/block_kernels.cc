@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "precompute/modes/block_kernels.h"
 
+#include <hwy/cache_control.h>
+
 #include <algorithm>
 #include <type_traits>
 
@@ -17,6 +19,9 @@ HWY_BEFORE_NAMESPACE();
 namespace carillon::precompute::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
+
+/// Numbers ahead that are asked for: prefetchers of the machine stop at the end of each page.
+constexpr int kAhead = 384;
 
 template <typename Real>
 using Lanes = hn::CappedTag<Real, kBlockWidth>;
@@ -68,6 +73,7 @@ HWY_INLINE void MultiplyColumn(const double* HWY_RESTRICT blocks, const int32_t*
     y2 = hn::Add(y2, row(blocks + 6));
     for (int e = 1; e < count; ++e) {
       const double* b = blocks + static_cast<size_t>(e) * 9;
+      hwy::Prefetch(b + kAhead);
       const Real* xi = x + static_cast<size_t>(rows[e]) * kNode + c;
       double* yi = y + static_cast<size_t>(rows[e]) * kNode + c;
       for (int a = 0; a < 3; ++a) {
@@ -126,6 +132,7 @@ HWY_INLINE void Dot(const Real* HWY_RESTRICT a, const Real* HWY_RESTRICT b, int6
       const Real* HWY_RESTRICT ai = a + first;
       const Real* HWY_RESTRICT bi = b + c;
       for (int64_t i = 0; i < rows; ++i, ai += kBlockWidth, bi += kBlockWidth) {
+        hwy::Prefetch(ai + kAhead);
         for (int v = 0; v < kVectors; ++v) {
           const V bv = hn::LoadU(d, bi + v * kLanes);
           for (int r = 0; r < kRows; ++r) sum[r][v] = hn::MulAdd(hn::Set(d, ai[r]), bv, sum[r][v]);
@@ -150,6 +157,7 @@ HWY_INLINE void SubtractTimes(const Real* HWY_RESTRICT q, const Real* HWY_RESTRI
   int64_t i = 0;
   const auto rows_at = [&](auto count) {
     constexpr int kCount = decltype(count)::value;
+    for (int r = 0; r < kCount; ++r) hwy::Prefetch(q + (i + r) * kBlockWidth + kAhead);
     for (int c = 0; c < kBlockWidth; c += Chunk<Real>()) {
       V sum[kCount][kVectors];
       Real* out = x + i * kBlockWidth + c;

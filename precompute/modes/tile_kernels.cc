@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "precompute/modes/tile_kernels.h"
 
+#include <hwy/cache_control.h>
+
 #include <algorithm>
 #include <type_traits>
 
@@ -17,6 +19,10 @@ HWY_BEFORE_NAMESPACE();
 namespace carillon::precompute::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
+
+/// Numbers ahead that are asked for: prefetchers of the machine stop at the end of each page, and a
+/// factor fills many.
+constexpr int kAhead = 768;
 
 template <typename Real>
 using Lanes = hn::CappedTag<Real, kBlockWidth>;
@@ -47,6 +53,7 @@ HWY_INLINE void Forward(const Real* HWY_RESTRICT tile, int column_count, const R
     const Real* HWY_RESTRICT l = tile;
     const Real* HWY_RESTRICT yi = y + c;
     for (int i = 0; i < column_count; ++i, l += kTileRows, yi += kWidth) {
+      hwy::Prefetch(l + kAhead);
       V yv[kVectors];
       for (int v = 0; v < kVectors; ++v) yv[v] = hn::LoadU(d, yi + v * kLanes);
       for (int r = 0; r < kTileRows; ++r) {
@@ -80,6 +87,7 @@ HWY_INLINE void Backward(const Real* HWY_RESTRICT tile, int column_count, Real* 
     const Real* HWY_RESTRICT l = tile;
     Real* HWY_RESTRICT yi = y + c;
     for (int i = 0; i < column_count; ++i, l += kTileRows, yi += kWidth) {
+      hwy::Prefetch(l + kAhead);
       for (int v = 0; v < kVectors; ++v) {
         // Two chains of three, because each multiply-add waits for the one before.
         V even = hn::LoadU(d, yi + v * kLanes);
