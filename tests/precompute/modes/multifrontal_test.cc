@@ -9,6 +9,7 @@
 #include "precompute/modes/multifrontal_cholesky.h"
 #include "precompute/modes/multifrontal_inertia.h"
 #include "precompute/modes/ordered_system.h"
+#include "precompute/modes/tile_kernels.h"
 #include "tests/precompute/test_meshes.h"
 
 namespace carillon::precompute {
@@ -61,6 +62,25 @@ TEST(Multifrontal, SolvesLinearAndQuadraticSystemsInDouble) {
 TEST(Multifrontal, SolvesInFloatToFloatPrecision) {
   EXPECT_LT(SolveResidual<float>(BoxSystem(10)), 1e-1);
   EXPECT_GT(SolveResidual<float>(BoxSystem(10)), 1e-9);
+}
+
+TEST(Multifrontal, SolvesTwoBlocksAtOnceAsOneByOne) {
+  const SystemMatrices system = BoxSystem(10);
+  const OrderedSystem ordered = OrderedSystem::Make(system).value();
+  Workers alone(1);
+  const auto factor =
+      MultifrontalCholesky<float>::Factorize(ordered.fronts, ordered.matrix, -1e8, alone, nullptr);
+  std::srand(3);
+  Eigen::Matrix<float, Eigen::Dynamic, kWideBlock, Eigen::RowMajor> wide;
+  wide.setRandom(system.unknown_count(), kWideBlock);
+  VectorBlockOf<float> first = wide.leftCols<kBlockWidth>();
+  VectorBlockOf<float> second = wide.rightCols<kBlockWidth>();
+  factor->SolveWide(wide.data());
+  factor->Solve(first.data(), alone);
+  factor->Solve(second.data(), alone);
+  // The same products in the same order.
+  EXPECT_LE((wide.leftCols<kBlockWidth>() - first).norm(), 1e-6 * first.norm());
+  EXPECT_LE((wide.rightCols<kBlockWidth>() - second).norm(), 1e-6 * second.norm());
 }
 
 /// The unknowns of NodeMatrix from those of the user, multiplied by a power of D^1/2.
