@@ -40,7 +40,7 @@ class AudioDevice {
   /// "portaudio: NAME", "null" or "file: PATH".
   virtual std::string description() const = 0;
 
-  /// From a pull to the ear as far as the device knows, seconds; valid after Start.
+  /// From a pull to the ear as far as the device knows, seconds; valid from its second pull on.
   virtual double latency_s() const = 0;
 
   /// False once a started device has died by itself (its server went away, its disk is full).

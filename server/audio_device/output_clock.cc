@@ -36,8 +36,11 @@ void OutputClock::Count(double cycle_s, double output_s, size_t frame_count,
 }
 
 void OutputClock::BeginCycle(double lead_frames, bool underflow) noexcept {
-  cycle_frame_count_ =
-      static_cast<double>(given_count_ - std::exchange(cycle_first_, given_count_));
+  const uint64_t frames = given_count_ - std::exchange(cycle_first_, given_count_);
+  cycle_frame_count_ = static_cast<double>(frames);
+  if (frames > longest_cycle_frames()) {
+    longest_cycle_frames_.store(frames, std::memory_order_relaxed);
+  }
   if (underflow) {
     xrun_count_.fetch_add(1, std::memory_order_relaxed);
     // Of several in a row the whole is measured.

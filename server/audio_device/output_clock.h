@@ -40,6 +40,11 @@ class OutputClock {
   /// Cycles in which the device said so. Any thread.
   uint64_t xrun_count() const { return xrun_count_.load(std::memory_order_relaxed); }
 
+  /// Of the longest cycle so far; 0 before the first is whole. Any thread.
+  size_t longest_cycle_frames() const {
+    return longest_cycle_frames_.load(std::memory_order_relaxed);
+  }
+
   /// Known a second after. Any thread.
   uint64_t lost_frame_count() const { return lost_frame_count_.load(std::memory_order_relaxed); }
 
@@ -64,6 +69,7 @@ class OutputClock {
   /// Least lead, for some callbacks are late: of this half second, and of the one before.
   double least_ = kNever, least_before_ = kNever;
   double usual_ = 0;  ///< lead before the xrun that is being watched
+  std::atomic<size_t> longest_cycle_frames_{0};
   std::atomic<uint64_t> xrun_count_{0};
   std::atomic<uint64_t> lost_frame_count_{0};
 };

@@ -142,7 +142,13 @@ class PortAudioDevice final : public AudioDevice {
   }
 
   std::string description() const override { return absl::StrCat("portaudio: ", name_); }
-  double latency_s() const override { return latency_s_; }
+  /// Of JACK's latency PortAudio leaves out the cycle that is played while the next is asked for.
+  double latency_s() const override {
+    if (!is_jack_) return latency_s_;
+    const size_t frames =
+        std::max<size_t>(clock_->longest_cycle_frames(), format_.block_frame_count);
+    return latency_s_ + static_cast<double>(frames) / format_.sample_rate_hz;
+  }
   bool alive() const override { return !started_ || !finished_.load(std::memory_order_relaxed); }
   uint64_t xrun_count() const override { return clock_->xrun_count(); }
   uint64_t lost_frame_count() const override { return clock_->lost_frame_count(); }
@@ -172,12 +178,10 @@ class PortAudioDevice final : public AudioDevice {
       return Failed(absl::StrCat(name_, " at ", format_.sample_rate_hz, " Hz"), error);
     }
     Pa_SetStreamFinishedCallback(stream_, &Finished);
+    is_jack_ = api == paJACK;
     clock_.emplace(format_.sample_rate_hz,
-                   api == paJACK ? LossKind::kWholeCycles : LossKind::kAnyLength);
+                   is_jack_ ? LossKind::kWholeCycles : LossKind::kAnyLength);
     latency_s_ = Pa_GetStreamInfo(stream_)->outputLatency;
-    // Of JACK's latency PortAudio leaves out the period that is played while the next is asked for.
-    if (api == paJACK)
-      latency_s_ += static_cast<double>(format_.block_frame_count) / format_.sample_rate_hz;
     return absl::OkStatus();
   }
 
@@ -216,7 +220,8 @@ class PortAudioDevice final : public AudioDevice {
   FrameSource* source_ = nullptr;
   std::string name_;
   int channel_count_ = 1;
-  double latency_s_ = 0;
+  bool is_jack_ = false;
+  double latency_s_ = 0;              ///< as PortAudio says
   std::optional<OutputClock> clock_;  ///< once it is open
   bool started_ = false;
   std::atomic<bool> finished_{false};

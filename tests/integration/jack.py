@@ -49,8 +49,8 @@ class LatencyMeasurement:
 
     WAYS = ("stream", "ahead", "arrival")
 
-    def __init__(self, folder, *arguments):
-        self.jack = Jack()
+    def __init__(self, folder, *arguments, period_frames=PERIOD_FRAMES):
+        self.jack = Jack(period_frames)
         self.daemon = Daemon(pathlib.Path(folder), "--audio-device", DEVICE, *arguments,
                              environment=self.jack.environment)
         client = self.daemon.client()

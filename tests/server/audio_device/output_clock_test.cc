@@ -43,6 +43,15 @@ class Device {
   double frame_ = 1e6;
 };
 
+TEST(OutputClock, KnowsHowManyBlocksACycleHas) {
+  OutputClock clock(kRateHz, LossKind::kWholeCycles);
+  Device device(clock, 3);
+  device.Run(1);
+  EXPECT_EQ(clock.longest_cycle_frames(), 0U);
+  device.Run(2);
+  EXPECT_EQ(clock.longest_cycle_frames(), 3 * kBlock);
+}
+
 TEST(OutputClock, ACycleThatCameLateLostNothing) {
   for (const LossKind kind : {LossKind::kAnyLength, LossKind::kWholeCycles}) {
     OutputClock clock(kRateHz, kind);
