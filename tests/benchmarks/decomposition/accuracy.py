@@ -12,8 +12,8 @@ import bodies
 import numpy
 
 ACCURACY = .01
-# Of the nodes: half the grain of a wall, whose error falls by about five.
-FINER, MOST_NODES = 4, 150_000
+# Times the nodes, the first for which memory suffices: 4 is half the grain of a wall, whose error falls by about five.
+FINER, MOST_NODES = (4, 3, 2), 150_000
 # Below it the finer mesh's own error counts.
 SMALLEST_ERROR = 1e-3
 
@@ -28,11 +28,15 @@ class Case:
 
 CASES = [
     Case("chime", lambda: bodies.tube(.505, 24, 120), "chime_aluminum"),
-    Case("bowl", lambda: bodies.bowl(.08, .003, 64, 24), "bowl_metal"),
+    Case("bowl", lambda: bodies.bowl(.08, .003, 64, 24), "structural_steel"),
     Case("plate", lambda: bodies.box((.3, .2, .003), (1, 1, 1)), "structural_steel"),
     Case("bunny", lambda: bodies.bunny(.15, .15 / 28), "bunny_ceramic", solid=True),
     Case("bell", bodies.bell, "bell_bronze"),
 ]
+
+
+class Refused(Exception):
+    """A reason, and a message."""
 
 
 def decompose(surface, material, options, environment, *more):
@@ -43,9 +47,22 @@ def decompose(surface, material, options, environment, *more):
         stdout=subprocess.PIPE, env=environment, check=False)
     report = json.loads(run.stdout)
     if run.returncode != 0:
-        sys.exit(f"{surface}: {report['error']['message']}")
+        raise Refused(report["error"]["reason"], f"{surface}: {report['error']['message']}")
     report["cpu_seconds"] = sum(phase["cpu_seconds"] for phase in report["phases"])
     return report
+
+
+def decompose_finer(case, surface, nodes, options, environment):
+    """The report of a mesh with so many times `nodes` as memory allows."""
+    for finer in FINER:
+        most = min(finer * nodes, MOST_NODES) if case.solid else finer * nodes
+        corners = int(most / (7.5 if case.solid else 6))
+        try:
+            return decompose(surface, case.material, options, environment, "--nodes", str(corners))
+        except Refused as refused:
+            if refused.args[0] != "MEMORY_TOO_SMALL":
+                raise
+    sys.exit(f"{surface}: memory does not suffice for a mesh {FINER[-1]} times as fine")
 
 
 def column(report, name):
@@ -53,10 +70,12 @@ def column(report, name):
 
 
 def errors(report, finer):
-    """Estimated and true, of the modes that both have."""
-    count = min(len(report["modes"]), len(finer["modes"]))
-    true = column(report, "frequency_hz")[:count] / column(finer, "frequency_hz")[:count] - 1
-    return column(report, "estimated_error")[:count], true
+    """Estimated and true, of the modes that both have. Modes of different errors may swap places, so they are paired
+    in the order of what the estimate makes of them."""
+    frequency, estimated = column(report, "frequency_hz"), column(report, "estimated_error")
+    order = numpy.argsort(frequency / (1 + estimated))[:len(finer["modes"])]
+    true = frequency[order] / column(finer, "frequency_hz")[:len(order)] - 1
+    return estimated[order], true
 
 
 def draw(found, path):
@@ -84,9 +103,7 @@ def accuracy(options, folder, environment):
         surface = folder / f"{case.name}.obj"
         bodies.write_obj(surface, *case.surface())
         report = decompose(surface, case.material, options, environment, "--accuracy", str(ACCURACY))
-        nodes = min(FINER * report["nodes"], MOST_NODES) if case.solid else FINER * report["nodes"]
-        corners = int(nodes / (7.5 if case.solid else 6))
-        finer = decompose(surface, case.material, options, environment, "--nodes", str(corners))
+        finer = decompose_finer(case, surface, report["nodes"], options, environment)
         estimated, true = found[case.name] = errors(report, finer)
         told = estimated[true > SMALLEST_ERROR] / true[true > SMALLEST_ERROR]
         ratios = ", ".join(f"{x:.2f}" for x in (told.min(), numpy.median(told), told.max())) if len(told) else "-"
