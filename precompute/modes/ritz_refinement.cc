@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <span>
 #include <type_traits>
 #include <utility>
@@ -107,8 +108,8 @@ class Refinement {
     return residuals_.head(wanted_).maxCoeff();
   }
 
-  /// Whether the residuals of those wanted are small, or as small as rounding lets them be.
-  bool IsDone() const {
+  /// Whether the residuals of those wanted are as small as rounding lets them be.
+  bool IsExhausted() const {
     for (Index m = 0; m < wanted_; ++m) {
       const double rounding = ResidualOfRounding(stiffest_, eigenvalues_[m]);
       if (!(residuals_[m] <= std::max(kTolerance, rounding))) return false;
@@ -234,7 +235,7 @@ absl::StatusOr<RefinedModes> RefineModes(const NodeMatrix& A,
                                          const SolveProgress& progress) {
   Refinement<Real> refinement(A, factor, deflated, plan, workers);
   refinement.Take(rough);
-  double residual = 1;
+  double residual = std::numeric_limits<double>::infinity();
   double left = 1;
   int steps = plan.first_steps;
   for (int round = 0; round < kMaxRounds; ++round, left *= 1 - kRoundPart) {
@@ -242,8 +243,11 @@ absl::StatusOr<RefinedModes> RefineModes(const NodeMatrix& A,
     refinement.Correct(steps);
     progress(1 - left * (1 - kRoundPart * kCorrectionPart));
     if (!refinement.Project()) break;
-    residual = refinement.LargestResidual();
-    if (refinement.IsDone()) return refinement.Result();
+    const double before = std::exchange(residual, refinement.LargestResidual());
+    if (residual <= kTolerance) return refinement.Result();
+    if (refinement.IsExhausted() && (residual > before / 2 || round + 1 == kMaxRounds)) {
+      return refinement.Result();
+    }
     steps = round + 1 < kQuickRounds ? 1 : 2;
   }
   return Refusal(absl::StatusCode::kInternal, "VERIFICATION_FAILED",
