@@ -22,7 +22,7 @@ using Barycentric = Eigen::Vector4d;
 
 /// What C of the header is, by order of the elements.
 constexpr double kLinearConstant = 1.3;
-constexpr double kQuadraticConstant = 1.5;
+constexpr double kQuadraticConstant = 1.8;
 /// Part of an eigenvalue that may be error; beyond it the mesh says nothing about the mode.
 constexpr double kMostError = 0.99;
 
