@@ -57,7 +57,7 @@ MatrixXd ToNodeOrder(const MatrixXd& x, const OrderedSystem& ordered) {
 void FromNodeOrder(const VectorBlocks& y, const OrderedSystem& ordered, Workers& workers,
                    Eigen::Ref<MatrixXd> x) {
   const std::vector<int32_t> position = Inverse(ordered.fronts.order);
-  workers.ForEach(static_cast<int64_t>(y.size()), [&](int64_t b) {
+  workers.ForEach((x.cols() + kBlockWidth - 1) / kBlockWidth, [&](int64_t b) {
     const Index first = b * kBlockWidth;
     const Index width = std::min<Index>(kBlockWidth, x.cols() - first);
     for (size_t node = 0; node < position.size(); ++node) {
