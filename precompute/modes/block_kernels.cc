@@ -3,7 +3,6 @@
 
 #include <hwy/cache_control.h>
 
-#include <algorithm>
 #include <type_traits>
 
 #include "precompute/modes/node_matrix.h"
@@ -12,8 +11,12 @@
 #define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "precompute/modes/block_kernels.cc"
-#include <hwy/foreach_target.h>  // must come before highway.h
+// foreach_target.h includes this file once for each target, and must come first.
+// clang-format off
+#include <hwy/foreach_target.h>
 #include <hwy/highway.h>
+#include "precompute/modes/block_lanes-inl.h"
+// clang-format on
 
 HWY_BEFORE_NAMESPACE();
 namespace carillon::precompute::HWY_NAMESPACE {
@@ -22,20 +25,6 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 /// Numbers ahead that are asked for: prefetchers of the machine stop at the end of each page.
 constexpr int kAhead = 384;
-
-template <typename Real>
-using Lanes = hn::CappedTag<Real, kBlockWidth>;
-
-template <typename Real>
-constexpr int LaneCount() {
-  return std::min(kBlockWidth, static_cast<int>(HWY_MAX_BYTES / sizeof(Real)));
-}
-
-/// Right-hand sides in two vectors, as many as registers allow for six rows.
-template <typename Real>
-constexpr int Chunk() {
-  return std::min(kBlockWidth, 2 * LaneCount<Real>());
-}
 
 template <typename Real>
 HWY_INLINE hn::Vec<Lanes<double>> LoadAsDouble(const Real* from) {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "precompute/modes/residual_kernels.h"
 
-#include <algorithm>
 #include <type_traits>
 
 #include "precompute/modes/node_matrix.h"
@@ -10,17 +9,21 @@
 #define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "precompute/modes/residual_kernels.cc"
-#include <hwy/foreach_target.h>  // must come before highway.h
+// foreach_target.h includes this file once for each target, and must come first.
+// clang-format off
+#include <hwy/foreach_target.h>
 #include <hwy/highway.h>
+#include "precompute/modes/block_lanes-inl.h"
+// clang-format on
 
 HWY_BEFORE_NAMESPACE();
 namespace carillon::precompute::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-using D = hn::CappedTag<double, kBlockWidth>;
+using D = Lanes<double>;
 using V = hn::Vec<D>;
-constexpr int kLanes = std::min(kBlockWidth, static_cast<int>(HWY_MAX_BYTES / sizeof(double)));
+constexpr int kLanes = LaneCount<double>();
 constexpr int kVectors = kBlockWidth / kLanes;
 
 struct Row {
