@@ -36,9 +36,7 @@ constexpr double kLongestToMeanEdge =
     1.4;  // where edges above the longest are cut into equal parts
 constexpr double kVolumeOfRegular = 0.11785;  // of a tetrahedron with edges of length 1
 
-// Vertices added inside at most; with mid-side nodes a mesh has about eight times as many.
-constexpr int kNodesPerCorner = 8;
-constexpr int kMaxAddedNodes = kMaxMeshNodes / kNodesPerCorner;
+constexpr int kNodesPerCorner = 8;  // about, of a solid with mid-side nodes
 
 constexpr int kMaxCorrections = 3;
 constexpr double kTargetTolerance = 0.2;
@@ -151,6 +149,10 @@ void FromUnitBox(TetMesh& mesh, const UnitBox& box) {
   }
 }
 
+int NodesPerCorner(const MeshingSettings& settings) {
+  return settings.nodes_per_element == 10 ? kNodesPerCorner : 1;
+}
+
 std::vector<Point> PointsInCavities(const SurfaceMesh& surface, const std::vector<Shell>& shells) {
   std::vector<Point> points;
   for (size_t s = 1; s < shells.size(); ++s) points.push_back(PointInside(surface, shells[s]));
@@ -254,7 +256,7 @@ class Filler {
                         .cavities = PointsInCavities(surface_, shells_),
                         .max_volume = kVolumeOfRegular * inside * inside * inside,
                         .keep_surface = true,
-                        .max_added_nodes = kMaxAddedNodes,
+                        .max_added_nodes = kMaxMeshNodes / NodesPerCorner(settings_),
                         .cautious = settings_.cautious};
     absl::StatusOr<TetMesh> mesh = FillAndCheck(request);
     if (mesh.ok() || keep_surface) return mesh;
@@ -280,9 +282,8 @@ class Filler {
 
 absl::StatusOr<TetMesh> Tetrahedralize(const SurfaceMesh& surface,
                                        const MeshingSettings& settings) {
-  const double nodes_per_corner = settings.nodes_per_element == 10 ? kNodesPerCorner : 1;
-  if (absl::Status status = CheckNodeCount(nodes_per_corner * settings.target_node_count);
-      !status.ok()) {
+  const double target = settings.target_node_count;
+  if (absl::Status status = CheckNodeCount(target * NodesPerCorner(settings)); !status.ok()) {
     return status;
   }
   const UnitBox box = FindUnitBox(surface);

@@ -34,7 +34,7 @@ class BlockBasis {
 
   BlockBasis(Eigen::Index rows, Workers& workers) : rows_(rows), workers_(workers) {}
 
-  void Append(const Block& block) { blocks_.push_back(std::make_unique<Block>(block)); }
+  void Append(Block block) { blocks_.push_back(std::make_unique<Block>(std::move(block))); }
   /// The block appended `before` blocks before the last one.
   const Block& back(size_t before) const { return *blocks_[blocks_.size() - 1 - before]; }
   int size() const { return static_cast<int>(blocks_.size()) * kBlockWidth; }

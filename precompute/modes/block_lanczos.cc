@@ -4,6 +4,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <random>
+#include <utility>
 
 namespace carillon::precompute {
 
@@ -26,7 +27,7 @@ LanczosRecurrence<Real>::LanczosRecurrence(const NodeMatrix& A,
       next_(rows_, kBlockWidth) {
   Block block = Block::Zero(rows_, kBlockWidth);
   block.leftCols(deflated.cols()) = deflated.cast<Real>();
-  deflated_.Append(block);
+  deflated_.Append(std::move(block));
   if (!mass_is_identity_) mass_times_.resize(rows_, kBlockWidth);
 }
 
@@ -42,9 +43,9 @@ bool LanczosRecurrence<Real>::Start() {
 
 template <typename Real>
 bool LanczosRecurrence<Real>::Step() {
-  basis_.Append(next_);
+  basis_.Append(std::move(next_));
   below_.emplace_back(R_);
-  operator_.Apply(mass_is_identity_ ? next_ : mass_times_, next_, done());
+  operator_.Apply(mass_is_identity_ ? basis_.back(0) : mass_times_, next_, done());
   // The recurrence takes the large parts out first, so that what is left loses no digits when it is
   // made orthogonal to everything.
   const SmallBlock H = BlockBasis<Real>::Dot(basis_.back(0), MassTimes(next_), workers_);

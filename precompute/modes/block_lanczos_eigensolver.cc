@@ -2,6 +2,7 @@
 #include "precompute/modes/block_lanczos_eigensolver.h"
 
 #include <algorithm>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
@@ -143,7 +144,7 @@ absl::StatusOr<RefinedModes> SolveIn(const OrderedSystem& ordered, const MatrixX
     if (error > 0 && error < kLargeSolveError) first_steps = kFirstSteps;
   }
   return RefineModes(
-      ordered.matrix, *factor, rigid, rough,
+      ordered.matrix, *factor, rigid, std::move(rough),
       {.wanted = wanted, .first_steps = first_steps, .free_motion = -kFreeMotion * shift}, workers,
       [&](double done) { progress(kIterationPart + (1 - kIterationPart) * done); });
 }

@@ -252,9 +252,15 @@ absl::StatusOr<DeformationModes> SolveDeformationModes(const SystemMatrices& sys
   const SolveCost least = PredictSolveCost(*ordered, 1, ThreadCount());
   if (absl::Status status = CheckMemory(least); !status.ok()) return status;
   const Solution solution(system, *std::move(ordered), nodes, watch, options);
+  absl::Status failure =
+      VerificationFailed("not all modes that were counted below the limit could be found");
   for (int attempt = 0; attempt < kMaxAttempts; ++attempt) {
     const double limit = eigenvalue_limit * (1 + 1e-4 * attempt);
     const absl::StatusOr<int> count = solution.CountBelow(limit);
+    if (absl::IsInternal(count.status())) {  // the limit may lie on an eigenvalue
+      failure = count.status();
+      continue;
+    }
     if (!count.ok()) return count.status();
     if (*count == solution.rigid_mode_count()) return FindLowest(solution, limit);
     absl::StatusOr<Modes> all = solution.SolveLowest(*count + 4 * attempt, limit);
@@ -271,7 +277,7 @@ absl::StatusOr<DeformationModes> SolveDeformationModes(const SystemMatrices& sys
     result->complete_to_eigenvalue = limit;
     return result;
   }
-  return VerificationFailed("not all modes that were counted below the limit could be found");
+  return failure;
 }
 
 absl::StatusOr<DeformationModes> SolveDeformationModes(const SystemMatrices& system,

@@ -17,13 +17,13 @@ inline bool Cholesky(int n, float* A, int ld) {
 }
 
 /// B = B L^-T, B rows by n.
-inline void SolveRight(int rows, int n, const double* L, int ldl, double* B, int ldb, bool unit) {
-  cblas_dtrsm(CblasColMajor, CblasRight, CblasLower, CblasTrans, unit ? CblasUnit : CblasNonUnit,
-              rows, n, 1.0, L, ldl, B, ldb);
+inline void SolveRight(int rows, int n, const double* L, int ldl, double* B, int ldb) {
+  cblas_dtrsm(CblasColMajor, CblasRight, CblasLower, CblasTrans, CblasNonUnit, rows, n, 1.0, L, ldl,
+              B, ldb);
 }
-inline void SolveRight(int rows, int n, const float* L, int ldl, float* B, int ldb, bool unit) {
-  cblas_strsm(CblasColMajor, CblasRight, CblasLower, CblasTrans, unit ? CblasUnit : CblasNonUnit,
-              rows, n, 1.0F, L, ldl, B, ldb);
+inline void SolveRight(int rows, int n, const float* L, int ldl, float* B, int ldb) {
+  cblas_strsm(CblasColMajor, CblasRight, CblasLower, CblasTrans, CblasNonUnit, rows, n, 1.0F, L,
+              ldl, B, ldb);
 }
 
 /// C -= A A^T, lower, A n by k.

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "precompute/modes/front_elimination.h"
 #include "precompute/modes/frontal_structure.h"
 #include "precompute/modes/node_matrix.h"
 #include "precompute/modes/workers.h"
@@ -21,31 +22,19 @@ namespace carillon::precompute {
 /// Told of the part of a work that is done, 0 to 1.
 using PartDone = std::function<void(double)>;
 
-/// The dense matrix of one supernode: its pivot columns (height by pivots) and the update matrix
-/// for its parent (updates by updates), both column-major, lower.
-template <typename Real>
-struct Front {
-  int pivots = 0;
-  int updates = 0;
-  std::vector<Real> panel;
-  Real* update = nullptr;
-
-  int height() const { return pivots + updates; }
-};
-
 /// Walks the supernodes from the leaves to the roots: assembles each front from A and from the
-/// update matrices of its children, and hands it to `eliminate(s, front, workers)`. Subtrees go
+/// update matrices of its children, and hands it to `visit(s, front, workers)`. Subtrees go
 /// side by side, each in one thread with its update matrices on a stack; the fronts above them
 /// follow one by one, each shared by all threads.
-template <typename Real, typename Eliminate>
+template <typename Real, typename Visit>
 class FrontWalk {
  public:
-  FrontWalk(const FrontalStructure& fronts, const NodeMatrix& A, double shift,
-            const Eliminate& eliminate, Workers& workers)
+  FrontWalk(const FrontalStructure& fronts, const NodeMatrix& A, double shift, const Visit& visit,
+            Workers& workers)
       : fronts_(fronts),
         A_(A),
         shift_(shift),
-        eliminate_(eliminate),
+        visit_(visit),
         workers_(workers),
         waiting_(fronts.parent.size(), nullptr),
         kept_(fronts.parent.size()) {}
@@ -83,11 +72,13 @@ class FrontWalk {
     std::atomic<size_t> next = 0;
     absl::Status failure;
     std::mutex mutex;
+    const size_t stack_size = LargestStack();
     workers_.Run([&](int t) {
       Workers alone(1);
       Assembler assembler(*this);
+      const std::unique_ptr<Real[]> stack(new Real[stack_size]);
       for (size_t i = next++; i < fronts_.subtrees.size(); i = next++) {
-        const absl::Status status = RunSubtree(fronts_.subtrees[i], assembler, alone);
+        const absl::Status status = RunSubtree(fronts_.subtrees[i], stack.get(), assembler, alone);
         const std::lock_guard lock(mutex);
         if (!status.ok()) failure = status;
         if (!failure.ok()) return;
@@ -102,7 +93,24 @@ class FrontWalk {
 
   /// The update matrices of children lie on top of the stack when their parent comes; its own is
   /// made above them and then moved to their place.
-  absl::Status RunSubtree(const Subtree& subtree, Assembler& assembler, Workers& alone);
+  absl::Status RunSubtree(const Subtree& subtree, Real* stack, Assembler& assembler,
+                          Workers& alone);
+
+  size_t LargestStack() const {
+    size_t largest = 0;
+    for (const Subtree& subtree : fronts_.subtrees) {
+      largest = std::max(largest, subtree.stack_size);
+    }
+    return largest;
+  }
+
+  /// Lower triangles of columns; `to` may lie where `from` does, or before.
+  static void MoveUpdate(const Real* from, ptrdiff_t columns, Real* to) {
+    for (ptrdiff_t j = 0; j < columns; ++j) {
+      std::memmove(to + j * (columns + 1), from + j * (columns + 1),
+                   static_cast<size_t>(columns - j) * sizeof(Real));
+    }
+  }
 
   class Assembler {
    public:
@@ -110,7 +118,7 @@ class FrontWalk {
 
     absl::Status Process(int s, Real* update, Workers& workers) {
       Assemble(s, update);
-      return walk_.eliminate_(s, front_, workers);
+      return walk_.visit_(s, front_, workers);
     }
 
    private:
@@ -122,8 +130,9 @@ class FrontWalk {
       const int rows = static_cast<int>(fronts.row_start[s + 1] - begin);
       front_.pivots = 3 * (last - first);
       front_.updates = 3 * rows - front_.pivots;
-      front_.panel.assign(static_cast<size_t>(front_.height()) * static_cast<size_t>(front_.pivots),
-                          0);
+      const auto size = static_cast<size_t>(front_.height()) * static_cast<size_t>(front_.pivots);
+      if (front_.panel.capacity() < size) front_.panel = {};  // not two at once
+      front_.panel.assign(size, 0);
       front_.update = update;
       for (int j = 0; j < front_.updates; ++j) {
         std::fill_n(update + static_cast<ptrdiff_t>(j) * (front_.updates + 1), front_.updates - j,
@@ -187,29 +196,28 @@ class FrontWalk {
   const FrontalStructure& fronts_;
   const NodeMatrix& A_;
   const double shift_;
-  const Eliminate& eliminate_;
+  const Visit& visit_;
   Workers& workers_;
   std::vector<const Real*> waiting_;           ///< update matrices not yet taken by their parents
   std::vector<std::unique_ptr<Real[]>> kept_;  ///< those of the top, and of subtrees' roots
   double done_ = 0;                            ///< flops
 };
 
-template <typename Real, typename Eliminate>
-absl::Status FrontWalk<Real, Eliminate>::RunSubtree(const Subtree& subtree, Assembler& assembler,
-                                                    Workers& alone) {
-  const std::unique_ptr<Real[]> stack(new Real[subtree.stack_size]);
-  Real* top = stack.get();
+template <typename Real, typename Visit>
+absl::Status FrontWalk<Real, Visit>::RunSubtree(const Subtree& subtree, Real* stack,
+                                                Assembler& assembler, Workers& alone) {
+  Real* top = stack;
   for (int s = subtree.begin; s < subtree.end; ++s) {
     if (absl::Status status = assembler.Process(s, top, alone); !status.ok()) return status;
     Real* base = top;
     for (const int child : fronts_.children(s)) base -= UpdateSize(child);
-    std::memmove(base, top, UpdateSize(s) * sizeof(Real));
+    MoveUpdate(top, fronts_.update_count(s), base);
     waiting_[s] = base;
     top = base + UpdateSize(s);
   }
   const int root = subtree.end - 1;
   kept_[root].reset(new Real[UpdateSize(root)]);
-  std::copy_n(waiting_[root], UpdateSize(root), kept_[root].get());
+  MoveUpdate(waiting_[root], fronts_.update_count(root), kept_[root].get());
   waiting_[root] = kept_[root].get();
   return absl::OkStatus();
 }

@@ -6,8 +6,7 @@
 #include <atomic>
 #include <vector>
 
-#include "precompute/modes/dense_blas.h"
-#include "precompute/modes/strips.h"
+#include "precompute/modes/front_elimination.h"
 #include "precompute/modes/tile_kernels.h"
 #include "proto/error_reason.h"
 
@@ -61,49 +60,6 @@ absl::Status NotPositiveDefinite() {
       "has elements too flat to compute with; mesh it anew with better-shaped elements");
 }
 
-/// The columns of the panel, kPanel at a time, rows shared out.
-template <typename Real>
-bool FactorizePanel(Front<Real>& front, Workers& workers) {
-  constexpr int kPanel = 192;
-  const int h = front.height();
-  const int p = front.pivots;
-  for (int k = 0; k < p; k += kPanel) {
-    const int width = std::min(kPanel, p - k);
-    Real* block = front.panel.data() + static_cast<ptrdiff_t>(k) * (h + 1);
-    if (!blas::Cholesky(width, block, h)) return false;
-    workers.ForParts(h - k - width, kTileRows, [&](int64_t begin, int64_t end, int) {
-      blas::SolveRight(static_cast<int>(end - begin), width, block, h, block + width + begin, h,
-                       false);
-    });
-    const int rest = h - k - width;
-    const int later = p - k - width;
-    Real* L = block + width;
-    ForStrips(workers, later, [&](int j, int columns) {
-      blas::SubtractProduct(rest - j, columns, width, L + j, h, L + j, h,
-                            L + static_cast<ptrdiff_t>(width + j) * h + j, h);
-    });
-  }
-  return true;
-}
-
-template <typename Real>
-absl::Status EliminateCholesky(Front<Real>& front, Workers& workers) {
-  const int h = front.height();
-  const int p = front.pivots;
-  const int u = front.updates;
-  if (!FactorizePanel(front, workers)) return NotPositiveDefinite();
-  const Real* below = front.panel.data() + p;
-  if (workers.count() == 1) {
-    if (u > 0) blas::SubtractSquare(u, p, below, h, front.update, u);
-    return absl::OkStatus();
-  }
-  ForStrips(workers, u, [&](int j, int columns) {
-    blas::SubtractProduct(u - j, columns, p, below + j, h, below + j, h,
-                          front.update + static_cast<ptrdiff_t>(j) * (u + 1), u);
-  });
-  return absl::OkStatus();
-}
-
 }  // namespace
 
 template <typename Real>
@@ -117,7 +73,7 @@ absl::StatusOr<MultifrontalCholesky<Real>> MultifrontalCholesky<Real>::Factorize
     factor.tile_start_.push_back(factor.tile_start_.back() +
                                  PackedSize(fronts.pivot_count(s), fronts.update_count(s)));
   }
-  factor.tiles_.resize(factor.tile_start_.back());
+  factor.tiles_.reset(new Real[factor.tile_start_.back()]);
   factor.top_index_.assign(fronts.order.size(), -1);
   for (const int top : fronts.top) {
     for (int node = fronts.first_pivot[top]; node < fronts.first_pivot[top + 1]; ++node) {
@@ -126,9 +82,10 @@ absl::StatusOr<MultifrontalCholesky<Real>> MultifrontalCholesky<Real>::Factorize
     }
   }
   const auto eliminate = [&](int s, Front<Real>& front, Workers& sharing) {
-    absl::Status status = EliminateCholesky(front, sharing);
-    if (status.ok()) PackPanel(front, &factor.tiles_[factor.tile_start_[s]]);
-    return status;
+    const Elimination result = Eliminate(front, Real{0}, sharing, nullptr);
+    if (result != Elimination::kDone) return NotPositiveDefinite();
+    PackPanel(front, &factor.tiles_[factor.tile_start_[s]]);
+    return absl::OkStatus();
   };
   FrontWalk<Real, decltype(eliminate)> walk(fronts, A, shift, eliminate, workers);
   if (absl::Status status = walk.Run(progress); !status.ok()) return status;

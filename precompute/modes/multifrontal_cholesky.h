@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <type_traits>
 #include <vector>
 
@@ -28,14 +29,14 @@ class MultifrontalCholesky {
   /// The same of x with kWideBlock columns, by one thread.
   void SolveWide(Real* x) const requires std::is_same_v<Real, float>;
 
-  size_t stored_bytes() const { return tiles_.size() * sizeof(Real); }
+  size_t stored_bytes() const { return tile_start_.back() * sizeof(Real); }
 
  private:
   template <int kWidth>
   class Substitution;
 
   const FrontalStructure* fronts_ = nullptr;
-  std::vector<Real> tiles_;
+  std::unique_ptr<Real[]> tiles_;   // written whole by the factorization: not zeroed before
   std::vector<size_t> tile_start_;  ///< #supernodes + 1, into tiles_
   std::vector<int32_t> top_nodes_;  ///< eliminated by the fronts above all subtrees
   std::vector<int32_t> top_index_;  ///< #nodes: place in top_nodes_, or -1

@@ -56,13 +56,14 @@ class Refinement {
     }
   }
 
-  void Take(const std::vector<VectorBlockOf<Real>>& rough) {
+  void Take(std::vector<VectorBlockOf<Real>> rough) {
     x_.resize(rough.size());
     elastic_.resize(rough.size());
     inertial_.resize(A_.mass_is_identity ? 0 : rough.size());
     quotients_.resize(rough.size());
     ForBlocks([&](size_t b) {
       x_[b] = rough[b].template cast<double>();
+      rough[b].resize(0, kBlockWidth);
       elastic_[b].resize(rows_, kBlockWidth);
       if (!A_.mass_is_identity) inertial_[b].resize(rows_, kBlockWidth);
       Multiply(b);
@@ -230,11 +231,11 @@ template <typename Real>
 absl::StatusOr<RefinedModes> RefineModes(const NodeMatrix& A,
                                          const MultifrontalCholesky<Real>& factor,
                                          const MatrixXd& deflated,
-                                         const std::vector<VectorBlockOf<Real>>& rough,
+                                         std::vector<VectorBlockOf<Real>> rough,
                                          const RefinementPlan& plan, Workers& workers,
                                          const SolveProgress& progress) {
   Refinement<Real> refinement(A, factor, deflated, plan, workers);
-  refinement.Take(rough);
+  refinement.Take(std::move(rough));
   double residual = std::numeric_limits<double>::infinity();
   double left = 1;
   int steps = plan.first_steps;
@@ -255,17 +256,11 @@ absl::StatusOr<RefinedModes> RefineModes(const NodeMatrix& A,
                               " only; another number of nodes may do"));
 }
 
-template absl::StatusOr<RefinedModes> RefineModes(const NodeMatrix&,
-                                                  const MultifrontalCholesky<float>&,
-                                                  const MatrixXd&,
-                                                  const std::vector<VectorBlockOf<float>>&,
-                                                  const RefinementPlan&, Workers&,
-                                                  const SolveProgress&);
-template absl::StatusOr<RefinedModes> RefineModes(const NodeMatrix&,
-                                                  const MultifrontalCholesky<double>&,
-                                                  const MatrixXd&,
-                                                  const std::vector<VectorBlockOf<double>>&,
-                                                  const RefinementPlan&, Workers&,
-                                                  const SolveProgress&);
+template absl::StatusOr<RefinedModes> RefineModes(
+    const NodeMatrix&, const MultifrontalCholesky<float>&, const MatrixXd&,
+    std::vector<VectorBlockOf<float>>, const RefinementPlan&, Workers&, const SolveProgress&);
+template absl::StatusOr<RefinedModes> RefineModes(
+    const NodeMatrix&, const MultifrontalCholesky<double>&, const MatrixXd&,
+    std::vector<VectorBlockOf<double>>, const RefinementPlan&, Workers&, const SolveProgress&);
 
 }  // namespace carillon::precompute

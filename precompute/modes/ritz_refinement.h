@@ -32,14 +32,14 @@ struct RefinedModes {
 /// factor acts on the residual only, so that its rounding fades; then K and M are projected on all
 /// of them (Rayleigh and Ritz), in double. Repeated until residuals are small.
 ///
-/// `rough`: in elimination order; the last blocks may hold more than is wanted. `deflated`: as for
-/// LanczosRecurrence. `progress` is called in this thread.
+/// `rough`: in elimination order; the last blocks may hold more than is wanted; each is given back
+/// as it is taken. `deflated`: as for LanczosRecurrence. `progress` is called in this thread.
 /// Errors: VERIFICATION_FAILED where residuals stay large.
 template <typename Real>
 absl::StatusOr<RefinedModes> RefineModes(const NodeMatrix& A,
                                          const MultifrontalCholesky<Real>& factor,
                                          const Eigen::MatrixXd& deflated,
-                                         const std::vector<VectorBlockOf<Real>>& rough,
+                                         std::vector<VectorBlockOf<Real>> rough,
                                          const RefinementPlan& plan, Workers& workers,
                                          const SolveProgress& progress);
 

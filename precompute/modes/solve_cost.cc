@@ -17,34 +17,35 @@ namespace {
 constexpr size_t kDouble = sizeof(double);
 constexpr size_t kFloat = sizeof(float);
 
-/// Numbers that factorizing holds at once beside the factor: the stacks of as many subtrees as
-/// there are threads, or the update matrices that wait for the fronts above, and the panel of one
-/// front.
+/// Numbers of an update matrix that are in memory, about: those of its lower triangle, and in each
+/// column half a page above it.
+size_t UpdateNumbers(const FrontalStructure& fronts, int s) {
+  constexpr size_t kHalfPage = 512;
+  const auto n = static_cast<size_t>(fronts.update_count(s));
+  return n * (n + 1) / 2 + n * std::min(n / 2, kHalfPage);
+}
+
+/// Numbers that factorizing holds at once beside the factor: a stack for each thread, or the update
+/// matrices that wait for the fronts above, and the panel of one front.
 size_t FrontNumbers(const FrontalStructure& fronts, int thread_count) {
-  const auto square = [](size_t n) { return n * n; };
-  const auto update = [&](int s) { return square(static_cast<size_t>(fronts.update_count(s))); };
-  std::vector<size_t> stacks;
   size_t waiting = 0;
+  size_t stack = 0;
   for (const Subtree& subtree : fronts.subtrees) {
-    stacks.push_back(subtree.stack_size);
-    waiting += update(subtree.end - 1);
+    stack = std::max(stack, subtree.stack_size);
+    waiting += UpdateNumbers(fronts, subtree.end - 1);
   }
-  std::ranges::sort(stacks, std::greater<>());
-  size_t most = waiting;
-  for (size_t t = 0; t < std::min(stacks.size(), static_cast<size_t>(thread_count)); ++t) {
-    most += stacks[t];
-  }
+  size_t most = waiting + static_cast<size_t>(thread_count) * stack;
   size_t panel = 0;
   for (int s = 0; s < fronts.supernode_count(); ++s) {
     panel = std::max(
         panel, static_cast<size_t>(fronts.height(s)) * static_cast<size_t>(fronts.pivot_count(s)));
   }
   for (const int s : fronts.top) {
-    waiting += update(s);
+    waiting += UpdateNumbers(fronts, s);
     most = std::max(most, waiting);
-    for (const int child : fronts.children(s)) waiting -= update(child);
+    for (const int child : fronts.children(s)) waiting -= UpdateNumbers(fronts, child);
   }
-  return most + 2 * panel;
+  return most + panel;
 }
 
 size_t MatrixBytes(const NodeMatrix& A) {
@@ -56,6 +57,15 @@ size_t MatrixBytes(const NodeMatrix& A) {
 
 /// Vectors in the basis when all modes have converged, as measured: 4.5 times 60, 2.8 times 280.
 size_t BasisSize(int mode_count) { return static_cast<size_t>(2.6 * mode_count) + 120; }
+
+/// Blocks of vectors, counted in float, that the iteration holds beside its basis, and the
+/// refinement of modes beside them, in all and for each thread.
+constexpr size_t kIterationBlocks = 8;
+constexpr size_t kRefinementBlocks = 4;
+constexpr size_t kRefinementBlocksOfThread = 2;
+
+/// Rigid-body modes, their momenta, and the modes in elimination order.
+constexpr size_t kRigidVectors = 18;
 
 /// Multiply-adds a second, and bytes a second from memory, of one core.
 constexpr double kDoubleRate = 20e9;
@@ -77,11 +87,15 @@ SolveCost PredictSolveCost(const OrderedSystem& ordered, int mode_count, int thr
   const size_t rough = modes * unknowns * kFloat;
   const size_t shapes = modes * unknowns * kDouble;
   const size_t mass_times = ordered.matrix.mass_is_identity ? 0 : shapes;
+  const size_t block = kBlockWidth * unknowns * kFloat;
+  const size_t refinement =
+      kRefinementBlocks + kRefinementBlocksOfThread * static_cast<size_t>(thread_count);
   SolveCost cost;
-  cost.peak_bytes =
-      MatrixBytes(ordered.matrix) +
-      std::max({front_numbers * kDouble, factor + front_numbers * kFloat, factor + basis + rough,
-                factor + rough + 3 * shapes + mass_times, 3 * shapes + mass_times});
+  cost.matrix_bytes = MatrixBytes(ordered.matrix);
+  cost.peak_bytes = cost.matrix_bytes + kRigidVectors * unknowns * kDouble +
+                    std::max({front_numbers * kDouble, factor + front_numbers * kFloat,
+                              factor + basis + std::max(rough, kIterationBlocks * block),
+                              factor + 2 * shapes + mass_times + refinement * block});
   const double steps = static_cast<double>(BasisSize(mode_count)) / kBlockWidth +
                        3.0 * static_cast<double>(modes) / kBlockWidth;
   const auto n = static_cast<double>(unknowns);
@@ -97,20 +111,20 @@ SolveCost PredictSolveCost(const OrderedSystem& ordered, int mode_count, int thr
 }
 
 absl::Status CheckMemory(const SolveCost& cost) {
+  const size_t needed = cost.peak_bytes - cost.matrix_bytes;
   std::ifstream file("/proc/meminfo");
   std::string name;
   std::string unit;
   for (size_t kib = 0; file >> name >> kib; std::getline(file, unit)) {
     const size_t available = kib * 1024;
-    if (name != "MemAvailable:" || cost.peak_bytes <= available) continue;
+    if (name != "MemAvailable:" || needed <= available) continue;
     constexpr double kGib = 1 << 30;
-    absl::Status status =
-        Refusal(absl::StatusCode::kResourceExhausted, "MEMORY_TOO_SMALL",
-                absl::StrFormat("the decomposition needs %.1f GiB of memory, of which %.1f GiB are "
-                                "available; ask for fewer nodes, or free memory",
-                                static_cast<double>(cost.peak_bytes) / kGib,
-                                static_cast<double>(available) / kGib));
-    AddFigure(status, "needed_bytes", absl::StrFormat("%d", cost.peak_bytes));
+    absl::Status status = Refusal(
+        absl::StatusCode::kResourceExhausted, "MEMORY_TOO_SMALL",
+        absl::StrFormat("the decomposition needs %.1f GiB more memory, of which %.1f GiB are "
+                        "available; ask for fewer nodes, or free memory",
+                        static_cast<double>(needed) / kGib, static_cast<double>(available) / kGib));
+    AddFigure(status, "needed_bytes", absl::StrFormat("%d", needed));
     AddFigure(status, "available_bytes", absl::StrFormat("%d", available));
     return status;
   }

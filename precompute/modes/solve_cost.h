@@ -10,7 +10,8 @@ namespace carillon::precompute {
 
 /// What a solution takes, known from the symbolic analysis alone.
 struct SolveCost {
-  size_t peak_bytes = 0;  ///< of everything that the solution allocates, the matrices included
+  size_t peak_bytes = 0;    ///< of everything that the solution allocates, the matrices included
+  size_t matrix_bytes = 0;  ///< of those, which are there already
   /// Processor time on a core of 2023 with AVX-512; a few times as many on an old one.
   double count_s = 0;   ///< of the modes, by inertia
   double factor_s = 0;  ///< the factorization to solve with
@@ -25,7 +26,7 @@ struct SolveCost {
 SolveCost PredictSolveCost(const OrderedSystem& ordered, int mode_count, int thread_count);
 
 /// Errors: MEMORY_TOO_SMALL with the figures needed_bytes and available_bytes, where the machine
-/// has less memory available than `cost` says.
+/// has less memory available than `cost` says beyond the matrices.
 absl::Status CheckMemory(const SolveCost& cost);
 
 }  // namespace carillon::precompute

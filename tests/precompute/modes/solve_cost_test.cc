@@ -45,5 +45,10 @@ TEST(SolveCost, WhatTheMachineLacksIsRefusedWithFigures) {
   EXPECT_EQ(ToErrorInfo(status).metadata().at("needed_bytes"), "1125899906842624");
 }
 
+TEST(SolveCost, MatricesThatAreThereAlreadyAreNotAskedForAgain) {
+  constexpr size_t kMuch = size_t{1} << 50;
+  EXPECT_TRUE(CheckMemory({.peak_bytes = kMuch + (1 << 20), .matrix_bytes = kMuch}).ok());
+}
+
 }  // namespace
 }  // namespace carillon::precompute
