@@ -106,24 +106,40 @@ HWY_INLINE void SineCosineOfHalfTurn(V angle, V& sine, V& cosine) {
   cosine = hn::NegMulAdd(twice, s, hn::Set(d, 1.0F));
 }
 
+/// exp(x) for x <= 0: of small x, as a mode's decay within a frame is, by its series.
+HWY_INLINE V ExpOfDecay(V x) {
+  const Floats d;
+  const V one = hn::Set(d, 1.0F);
+  if (HWY_UNLIKELY(!hn::AllTrue(d, hn::Ge(x, hn::Set(d, -0.05F))))) return hn::Exp(d, x);
+  V e = hn::MulAdd(x, hn::Set(d, 1.0F / 24), hn::Set(d, 1.0F / 6));
+  e = hn::MulAdd(e, x, hn::Set(d, 0.5F));
+  e = hn::MulAdd(e, x, one);
+  return hn::MulAdd(e, x, one);
+}
+
+/// How a strike reaches the lanes' states.
+enum class Reach {
+  kAtOnce,   ///< at the frame
+  kLead,     ///< up to a frame before it
+  kContact,  ///< and by a contact that takes time
+};
+
 /// (re, im) *= exp(lead_frames log q + tau^2 s^2/2).
-HWY_INLINE void Delay(const LaneArrays& lanes, size_t lane, V lead, V tau_squared, bool soft, V& re,
-                      V& im) {
+template <Reach kReach>
+HWY_INLINE void Delay(const LaneArrays& lanes, size_t lane, V lead, V tau_squared, V& re, V& im) {
   const Floats d;
   V logarithm = hn::Mul(lead, hn::Load(d, lanes.lead_re.data() + lane));
   V angle = hn::Mul(lead, hn::Load(d, lanes.lead_im.data() + lane));
-  if (soft) {
+  V magnitude, sine, cosine;
+  if constexpr (kReach == Reach::kContact) {
     logarithm = hn::MulAdd(tau_squared, hn::Load(d, lanes.tau_re.data() + lane), logarithm);
     angle = hn::MulAdd(tau_squared, hn::Load(d, lanes.tau_im.data() + lane), angle);
-  }
-  V magnitude, sine, cosine;
-  if (soft) {
     // Below exp(-80) nothing is heard, and the angle may be too large for a sine.
     const auto heard = hn::Gt(logarithm, hn::Set(d, -80.0F));
     magnitude = hn::IfThenElseZero(heard, hn::Exp(d, logarithm));
     SineCosine(hn::IfThenElseZero(heard, angle), sine, cosine);
   } else {
-    magnitude = hn::Exp(d, logarithm);
+    magnitude = ExpOfDecay(logarithm);
     SineCosineOfHalfTurn(angle, sine, cosine);  // at most a frame: below half a turn
   }
   const V factor_re = hn::Mul(magnitude, cosine);
@@ -142,15 +158,15 @@ HWY_INLINE void PrefetchRows(const StrikeBatch::RowsAhead& ahead, size_t first, 
   }
 }
 
-bool Excite(const LaneArrays& lanes, size_t lane_count, const float* modal_impulses,
-            const Onset& onset, const StrikeBatch::RowsAhead& ahead, float* added_re,
-            float* added_im) {
+template <Reach kReach>
+bool ExciteLanes(const LaneArrays& lanes, size_t lane_count, const float* modal_impulses,
+                            const Onset& onset, const StrikeBatch::RowsAhead& ahead,
+                            float* HWY_RESTRICT added_re, float* HWY_RESTRICT added_im) {
   const Floats d;
   const hn::RebindToSigned<Floats> di;
-  const bool delayed = onset.lead_frames > 0 || onset.tau_s > 0;
   const V lead = hn::Set(d, onset.lead_frames);
   const V tau_squared = hn::Set(d, onset.tau_s * onset.tau_s);
-  bool finite = true;
+  auto small = hn::FirstN(d, hn::Lanes(d));
   // A share of the rows ahead for each vector.
   const size_t share = ahead.value_count * hn::Lanes(d) / std::max<size_t>(lane_count, 1) + 1;
   for (size_t lane = 0; lane < lane_count; lane += hn::Lanes(d)) {
@@ -160,13 +176,22 @@ bool Excite(const LaneArrays& lanes, size_t lane_count, const float* modal_impul
     const V g = hn::GatherIndex(d, modal_impulses, column);
     V re = hn::Mul(g, hn::Load(d, lanes.gain_re.data() + lane));
     V im = hn::Mul(g, hn::Load(d, lanes.gain_im.data() + lane));
-    if (delayed) Delay(lanes, lane, lead, tau_squared, onset.tau_s > 0, re, im);
+    if constexpr (kReach != Reach::kAtOnce) Delay<kReach>(lanes, lane, lead, tau_squared, re, im);
     hn::Store(re, d, added_re + lane);
     hn::Store(im, d, added_im + lane);
     const V squared = hn::MulAdd(re, re, hn::Mul(im, im));
-    finite &= hn::AllTrue(d, hn::Le(squared, hn::Set(d, kMostSquared)));
+    small = hn::And(small, hn::Le(squared, hn::Set(d, kMostSquared)));
   }
-  return finite;
+  return hn::AllTrue(d, small);
+}
+
+bool Excite(const LaneArrays& lanes, size_t lane_count, const float* modal_impulses,
+            const Onset& onset, const StrikeBatch::RowsAhead& ahead, float* added_re,
+            float* added_im) {
+  const auto excite = onset.tau_s > 0         ? ExciteLanes<Reach::kContact>
+                      : onset.lead_frames > 0 ? ExciteLanes<Reach::kLead>
+                                              : ExciteLanes<Reach::kAtOnce>;
+  return excite(lanes, lane_count, modal_impulses, onset, ahead, added_re, added_im);
 }
 
 }  // namespace HWY_NAMESPACE
