@@ -40,6 +40,30 @@ void Place(PlannedLane lane, size_t block_frame_count, LanePlan& plan) {
   plan.lanes[kind ? *kind + 1 : 0].push_back(lane);
 }
 
+/// Moves the `count` lanes of a part that decay fastest to the next shorter kind of long block.
+void MoveToShorter(size_t part, size_t count, size_t block_frame_count, LanePlan& plan) {
+  const LongBlock shorter = MakeLongBlocks(block_frame_count)[part - 2];
+  std::vector<PlannedLane>& from = plan.lanes[part];
+  const auto first = from.end() - static_cast<ptrdiff_t>(count);
+  std::ranges::nth_element(from, first, std::ranges::greater(),
+                           [](const PlannedLane& lane) { return lane.log_q.real(); });
+  for (auto lane = first; lane != from.end(); ++lane) {
+    lane->spread = MakeSpreadMode(lane->log_q, shorter);
+    plan.lanes[part - 1].push_back(*lane);
+  }
+  from.erase(first, from.end());
+}
+
+/// Where a few lanes are left over from whole vectors, they cost as much as a vector in the time
+/// domain, but little more in shorter long blocks.
+void FillVectors(size_t block_frame_count, LanePlan& plan) {
+  constexpr size_t kLeastPerMoved = 4;
+  for (size_t part = kLongBlockKinds; part > 1; --part) {
+    const size_t size = plan.lanes[part].size(), few = size % kMostLanes;
+    if (few * kLeastPerMoved <= size) MoveToShorter(part, few, block_frame_count, plan);
+  }
+}
+
 }  // namespace
 
 LanePlan PlanLanes(const SoundingModes& sounding, const ShapeTable& shapes,
@@ -52,6 +76,7 @@ LanePlan PlanLanes(const SoundingModes& sounding, const ShapeTable& shapes,
     if (mode.output_phase_rad == 0) continue;
     Place(PlanLane(mode, settings, gain, true), settings.block_frame_count, plan);
   }
+  FillVectors(settings.block_frame_count, plan);
   std::ranges::stable_sort(plan.lanes[0], std::ranges::greater(),
                            [](const PlannedLane& lane) { return lane.log_q.real(); });
   for (size_t part = 1; part < plan.lanes.size(); ++part) {

@@ -158,14 +158,6 @@ struct Oscillators {
     }
     if (frame_count > 0) z.Multiply(Power(frame_count - 1));
   }
-
-  HWY_INLINE void Add(size_t frame_count, Z& z, float* mix) const {
-    size_t n = 0;
-    for (; n + kTileFrames <= frame_count; n += kTileFrames) {
-      AddTile(z, mix + n * kMostLanes);
-    }
-    AddPart(z, frame_count - n, mix + n * kMostLanes);
-  }
 };
 
 }  // namespace carillon::HWY_NAMESPACE

@@ -33,37 +33,73 @@ using carillon::HWY_NAMESPACE::V;
 // powers come from the cache.
 constexpr size_t kVectorsAPass = 4;
 
-/// Asks for what rendering a group of lanes, and advancing them thereafter, will need.
-HWY_INLINE void PrefetchLanes(const LaneArrays& lanes, size_t lane) {
-  constexpr size_t kLine = 64;
-  const auto prefetch = [](const auto* first, size_t count) {
-    for (size_t i = 0; i < count; i += kLine / sizeof(*first)) __builtin_prefetch(first + i);
-  };
-  const size_t group = lane / kMostLanes * kMostLanes;
-  prefetch(lanes.powers.data() + LaneArrays::PowerIndex(group, 0), kMostLanes * 2 * kTileFrames);
-  for (const LaneArray<double>* state : {&lanes.re, &lanes.im, &lanes.block_re, &lanes.block_im}) {
-    prefetch(state->data() + group, kMostLanes);
-  }
-}
+/// Asks for what the vectors after some will need, bit by bit while those are rendered: at once,
+/// the requests would only wait for each other.
+class Prefetching {
+ public:
+  /// Behind the last lane nothing is there, which does no harm.
+  HWY_INLINE Prefetching(const LaneArrays& lanes, size_t lane)
+      : powers_(lanes.powers.data() + LaneArrays::PowerIndex(lane, 0)),
+        states_{lanes.re.data() + lane, lanes.im.data() + lane},
+        blocks_{lanes.block_re.data() + lane, lanes.block_im.data() + lane} {}
 
-/// Calls ring(oscillators, lane) for all lanes of `range`, some vectors at a time.
+  HWY_INLINE void Step() {
+    Prefetch(powers_, kPowers);
+    powers_ += kPowers;
+    if (step_++ % kSteps < kSteps / 2) {
+      StepBoth(states_);
+    } else {
+      StepBoth(blocks_);
+    }
+  }
+
+ private:
+  static constexpr size_t kSteps = 128 / kTileFrames;
+  static constexpr size_t kLanes = kVectorsAPass * hn::MaxLanes(Floats());
+  static constexpr size_t kPowers = kLanes * 2 * kTileFrames / kSteps;
+  static constexpr size_t kDoubles = kLanes / (kSteps / 2);
+
+  template <typename T>
+  static HWY_INLINE void Prefetch(const T* first, size_t count) {
+    constexpr size_t kLine = 64;
+    for (size_t i = 0; i < count; i += kLine / sizeof(T)) __builtin_prefetch(first + i);
+  }
+  static HWY_INLINE void StepBoth(const double* (&arrays)[2]) {
+    for (const double*& array : arrays) {
+      Prefetch(array, kDoubles);
+      array += kDoubles;
+    }
+  }
+
+  const float* powers_;
+  const double *states_[2], *blocks_[2];
+  size_t step_ = 0;
+};
+
+/// Calls ring(oscillators, ahead, lane) for all lanes of `range`, some vectors at a time.
 template <class RingSome>
 HWY_INLINE void ForVectors(const LaneArrays& lanes, LaneRange range, const RingSome& ring) {
   const size_t pass = kVectorsAPass * hn::Lanes(Floats());
   const size_t end = range.first + range.count;
   size_t lane = range.first;
   for (; lane + pass <= end; lane += pass) {
-    for (size_t i = 0; i < pass; i += kMostLanes) PrefetchLanes(lanes, lane + pass + i);
-    ring(Oscillators<kVectorsAPass>(lanes, lane), lane);
+    ring(Oscillators<kVectorsAPass>(lanes, lane), Prefetching(lanes, lane + pass), lane);
   }
-  for (; lane < end; lane += hn::Lanes(Floats())) ring(Oscillators<1>(lanes, lane), lane);
+  for (; lane < end; lane += hn::Lanes(Floats())) {
+    ring(Oscillators<1>(lanes, lane), Prefetching(lanes, lane), lane);
+  }
 }
 
 void Ring(const LaneArrays& lanes, LaneRange range, size_t frame_count, float* mix) {
-  ForVectors(lanes, range, [&](const auto& oscillators, size_t lane) {
+  ForVectors(lanes, range, [&](const auto& oscillators, Prefetching ahead, size_t lane) {
     typename std::decay_t<decltype(oscillators)>::Z z;
     z.Load(lanes.re.data() + lane, lanes.im.data() + lane);
-    oscillators.Add(frame_count, z, mix);
+    size_t frame = 0;
+    for (; frame + kTileFrames <= frame_count; frame += kTileFrames) {
+      ahead.Step();
+      oscillators.AddTile(z, mix + frame * kMostLanes);
+    }
+    oscillators.AddPart(z, frame_count - frame, mix + frame * kMostLanes);
   });
 }
 
@@ -72,6 +108,7 @@ template <size_t kVectors>
 struct StruckVectors {
   using Z = States<kVectors>;
   const Oscillators<kVectors>& oscillators;
+  Prefetching ahead;
   Z all, newborn;
   size_t newborn_at = 0;  // the frame of its state
   bool any_newborn = false;
@@ -92,6 +129,7 @@ struct StruckVectors {
     size_t frame = newborn_at = part.begin;
     size_t strike = 0;
     for (; frame + kTileFrames <= part.end; frame += kTileFrames) {
+      ahead.Step();
       oscillators.AddTile(all, mix + frame * kMostLanes);
       for (; strike < part.batch.count && part.batch.offsets[strike] < frame + kTileFrames;
            ++strike) {
@@ -138,24 +176,27 @@ void Start(LaneArrays& lanes, size_t lane_count) {
 }
 
 void RingStruck(LaneArrays& lanes, const StruckPart& part, float* mix) {
-  ForVectors(lanes, {0, part.lane_count}, [&](const auto& oscillators, size_t lane) {
-    StruckVectors<std::decay_t<decltype(oscillators)>::kCount> vectors{oscillators, {}, {}};
-    vectors.Load(lanes, lane);
-    vectors.Ring(part, lane, mix);
-    vectors.Store(lanes, lane);
-  });
+  ForVectors(lanes, {0, part.lane_count},
+             [&](const auto& oscillators, Prefetching ahead, size_t lane) {
+               StruckVectors<std::decay_t<decltype(oscillators)>::kCount> vectors{
+                   oscillators, ahead, {}, {}};
+               vectors.Load(lanes, lane);
+               vectors.Ring(part, lane, mix);
+               vectors.Store(lanes, lane);
+             });
 }
 
 void AddStrike(LaneArrays& lanes, size_t lane_count, const float* added_re, const float* added_im) {
   for (size_t lane = 0; lane < lane_count; lane += hn::Lanes(Floats())) {
-    const Oscillators<1> oscillators(lanes, lane);
-    StruckVectors<1> vectors{oscillators, {}, {}};
-    vectors.Load(lanes, lane);
-    States<1> struck;
-    struck.Load(added_re + lane, added_im + lane);
-    vectors.all.Add(struck);
-    vectors.newborn.Add(struck);
-    vectors.Store(lanes, lane);
+    const auto add = [&](LaneArray<float>& re, LaneArray<float>& im) {
+      States<1> sum, added;
+      sum.Load(re.data() + lane, im.data() + lane);
+      added.Load(added_re + lane, added_im + lane);
+      sum.Add(added);
+      sum.Store(re.data() + lane, im.data() + lane);
+    };
+    add(lanes.start_re, lanes.start_im);
+    add(lanes.newborn_re, lanes.newborn_im);
   }
 }
 
@@ -251,23 +292,24 @@ bool FinishStruck(LaneArrays& lanes, std::span<RingingSegment> segments, const S
   Advancing advancing(lanes, segments, silence_squared);
   // Of some vectors, or as many as a group has.
   alignas(64) float newborn_re[kVectorsAPass * kMostLanes], newborn_im[kVectorsAPass * kMostLanes];
-  ForVectors(lanes, {0, part.lane_count}, [&](const auto& oscillators, size_t lane) {
-    constexpr size_t kVectors = std::decay_t<decltype(oscillators)>::kCount;
-    StruckVectors<kVectors> vectors{oscillators, {}, {}};
-    if (part.started) {
-      vectors.Load(lanes, lane);
-    } else {
-      vectors.all.Load(lanes.re.data() + lane, lanes.im.data() + lane);
-      vectors.newborn.Clear();
-    }
-    vectors.Ring(part, lane, mix);
-    const size_t first = lane % kMostLanes;
-    vectors.newborn.Store(newborn_re + first, newborn_im + first);
-    const size_t end = first + kVectors * hn::Lanes(Floats());
-    for (size_t group = 0; group + kMostLanes <= end; group += kMostLanes) {
-      advancing.AdvanceGroup(lane - first + group, newborn_re + group, newborn_im + group);
-    }
-  });
+  ForVectors(
+      lanes, {0, part.lane_count}, [&](const auto& oscillators, Prefetching ahead, size_t lane) {
+        constexpr size_t kVectors = std::decay_t<decltype(oscillators)>::kCount;
+        StruckVectors<kVectors> vectors{oscillators, ahead, {}, {}};
+        if (part.started) {
+          vectors.Load(lanes, lane);
+        } else {
+          vectors.all.Load(lanes.re.data() + lane, lanes.im.data() + lane);
+          vectors.newborn.Clear();
+        }
+        vectors.Ring(part, lane, mix);
+        const size_t first = lane % kMostLanes;
+        vectors.newborn.Store(newborn_re + first, newborn_im + first);
+        const size_t end = first + kVectors * hn::Lanes(Floats());
+        for (size_t group = 0; group + kMostLanes <= end; group += kMostLanes) {
+          advancing.AdvanceGroup(lane - first + group, newborn_re + group, newborn_im + group);
+        }
+      });
   return advancing.Finish();
 }
 
