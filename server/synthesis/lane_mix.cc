@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "server/synthesis/ring_kernel.h"
+
 namespace carillon {
 
 void LaneMix::Clear(size_t frame_count) noexcept {
@@ -10,13 +12,7 @@ void LaneMix::Clear(size_t frame_count) noexcept {
 }
 
 void LaneMix::Reduce(std::span<float> block) const noexcept {
-  const float* lanes = lanes_.data();
-  for (float& sample : block) {
-    std::array<float, 4> sum{};
-    for (size_t lane = 0; lane < kMostLanes; ++lane) sum[lane % 4] += lanes[lane];
-    sample = (sum[0] + sum[2]) + (sum[1] + sum[3]);
-    lanes += kMostLanes;
-  }
+  ring_kernel::SumLanes(lanes_.data(), block);
 }
 
 }  // namespace carillon

@@ -313,6 +313,14 @@ bool FinishStruck(LaneArrays& lanes, std::span<RingingSegment> segments, const S
   return advancing.Finish();
 }
 
+/// Kernels add to as many lanes of a frame as their vectors have.
+void SumLanes(const float* mix, std::span<float> block) {
+  const Floats d;
+  for (size_t n = 0; n < block.size(); ++n) {
+    block[n] = hn::GetLane(hn::SumOfLanes(d, hn::Load(d, mix + n * kMostLanes)));
+  }
+}
+
 const char* Target() { return hwy::TargetName(HWY_TARGET); }
 
 }  // namespace HWY_NAMESPACE
@@ -326,6 +334,7 @@ HWY_EXPORT(Start);
 HWY_EXPORT(RingStruck);
 HWY_EXPORT(AddStrike);
 HWY_EXPORT(FinishStruck);
+HWY_EXPORT(SumLanes);
 HWY_EXPORT(Target);
 
 bool RingFreely(LaneArrays& lanes, std::span<RingingSegment> segments, const FreeBlock& block,
@@ -349,6 +358,10 @@ void AddStrike(LaneArrays& lanes, size_t lane_count, const float* added_re,
 bool FinishStruck(LaneArrays& lanes, std::span<RingingSegment> segments, const StruckPart& part,
                   double silence_squared, float* mix) noexcept {
   return HWY_DYNAMIC_DISPATCH(FinishStruck)(lanes, segments, part, silence_squared, mix);
+}
+
+void SumLanes(const float* mix, std::span<float> block) noexcept {
+  HWY_DYNAMIC_DISPATCH(SumLanes)(mix, block);
 }
 
 std::string_view Target() { return HWY_DYNAMIC_DISPATCH(Target)(); }

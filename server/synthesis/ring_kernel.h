@@ -60,6 +60,9 @@ void AddStrike(LaneArrays& lanes, size_t lane_count, const float* added_re,
 bool FinishStruck(LaneArrays& lanes, std::span<RingingSegment> segments, const StruckPart& part,
                   double silence_squared, float* mix) noexcept;
 
+/// Writes the sum of each frame's lanes.
+void SumLanes(const float* mix, std::span<float> block) noexcept;
+
 /// Name of the target dispatched to.
 std::string_view Target();
 

@@ -160,8 +160,8 @@ HWY_INLINE void PrefetchRows(const StrikeBatch::RowsAhead& ahead, size_t first, 
 
 template <Reach kReach>
 bool ExciteLanes(const LaneArrays& lanes, size_t lane_count, const float* modal_impulses,
-                            const Onset& onset, const StrikeBatch::RowsAhead& ahead,
-                            float* HWY_RESTRICT added_re, float* HWY_RESTRICT added_im) {
+                 const Onset& onset, const StrikeBatch::RowsAhead& ahead,
+                 float* HWY_RESTRICT added_re, float* HWY_RESTRICT added_im) {
   const Floats d;
   const hn::RebindToSigned<Floats> di;
   const V lead = hn::Set(d, onset.lead_frames);
