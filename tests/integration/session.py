@@ -111,6 +111,53 @@ class CompetingLoad(threading.Thread):
         self.join()
 
 
+class XrunWatch(threading.Thread):
+    """When the daemon counted xruns, and when the machine itself stood still, so that nothing on it could be in time:
+    see watch_standstills.cc. A JACK cycle that late is nobody's on the machine."""
+
+    POLL_S = 0.2
+    LEAST_MS = 1000 * JACK_PERIOD_FRAMES / jack.RATE / 2
+
+    def __init__(self, client):
+        super().__init__()
+        self.client = client
+        self.xruns = []  # the time before, the time after, how many
+        self.standstills = []
+        self.stopped = threading.Event()
+
+    def count(self):
+        return self.client.audio.GetMixer(audio_service_pb2.GetMixerRequest()).xrun_count
+
+    def run(self):
+        count, begin_s = self.count(), time.monotonic()
+        while not self.stopped.wait(self.POLL_S):
+            now, now_s = self.count(), time.monotonic()
+            if now > count:
+                self.xruns.append((begin_s, now_s, now - count))
+            count, begin_s = now, now_s
+
+    def __enter__(self):
+        self.machine = subprocess.Popen([jack.PROGRAMS / "watch_standstills", str(self.LEAST_MS)], text=True,
+                                        stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        assert self.machine.stdout.readline() == "watching\n"
+        self.start()
+        return self
+
+    def __exit__(self, *_):
+        self.stopped.set()
+        self.join()
+        printed = json.loads(self.machine.communicate()[0])  # which ends its standard input
+        self.standstills = printed["standstills"] if printed["realtime"] else []
+
+    def excused(self):
+        """Xruns told of at most a poll after a standstill."""
+        return sum(count for begin_s, end_s, count in self.xruns
+                   if any(begin < end_s and end > begin_s - self.POLL_S for begin, end in self.standstills))
+
+    def longest_ms(self):
+        return max((1000 * (end - begin) for begin, end in self.standstills), default=0)
+
+
 class Session:
     """A JACK server, and a daemon with bodies that can be struck, in `folder`."""
 
@@ -148,7 +195,7 @@ class Session:
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         assert recorder.stdout.readline() == "recording\n"
         before = self.client.audio.GetMixer(audio_service_pb2.GetMixerRequest())
-        with CompetingLoad(self.client) as load:
+        with XrunWatch(self.client) as watch, CompetingLoad(self.client) as load:
             *_, answer = self.client.contacts.StreamContacts(self.requests(scene, seconds))
             time.sleep(DELAY_S + TAIL_S + 0.5)
         mixer = self.client.audio.GetMixer(audio_service_pb2.GetMixerRequest())
@@ -156,6 +203,8 @@ class Session:
         found = {"missed_cycles": json.loads(printed)["missed_cycles"], "decompositions": load.job_count,
                  "merged_or_shed": mixer.merged_impulse_count + mixer.shed_impulse_count + mixer.shed_object_count,
                  "limited_frames": mixer.limited_frame_count, "xruns": mixer.xrun_count - before.xrun_count,
+                 "xruns_of_standstills": watch.excused(), "standstills": len(watch.standstills),
+                 "longest_standstill_ms": watch.longest_ms(),
                  "lost_frames": mixer.lost_frame_count - before.lost_frame_count}
         return numpy.fromfile(recording, numpy.float32), found, answer
 

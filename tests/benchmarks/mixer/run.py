@@ -145,15 +145,18 @@ def session(options, folder):
     use_integration_tests(options)
     import session as sessions
     print("\n## A session under a busy loop on each core and decompositions: JACK capture against the rendering of its "
-          "trace\n\n| seconds | impulses | late, dropped, merged or shed | real-time priority | xruns told by JACK, frames lost "
-          "| frames compared | differing |\n| --- | --- | --- | --- | --- | --- | --- |")
+          "trace\n\n| seconds | impulses | late, dropped, merged or shed | real-time priority | xruns told by JACK; of "
+          "these, while a core of the machine stood still; frames lost | such standstills, longest ms | frames compared "
+          "| differing |\n| --- | --- | --- | --- | --- | --- | --- | --- |")
     played = sessions.Session(folder)
     try:
         found = played.run(options.session_seconds)
     finally:
         played.stop()
     row(found["seconds"], found["accepted"], f"{found['late']}, {found['dropped']}, {found['merged_or_shed']}",
-        "yes" if found["realtime"] else "not allowed", f"{found['xruns']}, {found['lost_frames']}",
+        "yes" if found["realtime"] else "not allowed",
+        f"{found['xruns']}; {found['xruns_of_standstills']}; {found['lost_frames']}",
+        f"{found['standstills']}, {found['longest_standstill_ms']:.0f}",
         f"{found['frames']:,}", found["differing_frames"])
 
 
