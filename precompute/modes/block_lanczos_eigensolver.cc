@@ -165,8 +165,8 @@ absl::StatusOr<Modes> BlockLanczosEigensolver::Solve(const SystemMatrices& syste
   if (!bent.ok()) return bent.status();
   Modes modes;
   modes.eigenvalues.resize(request.count);
-  modes.eigenvalues.head(rigid_.cols()) =
-      (rigid_.transpose() * (system.K.selfadjointView<Eigen::Lower>() * rigid_)).diagonal();
+  const MatrixXd elastic = system.K.selfadjointView<Eigen::Lower>() * rigid_;
+  modes.eigenvalues.head(rigid_.cols()) = rigid_.cwiseProduct(elastic).colwise().sum().transpose();
   modes.eigenvalues.tail(wanted) = bent->eigenvalues;
   modes.shapes.resize(system.unknown_count(), request.count);
   modes.shapes.leftCols(rigid_.cols()) = rigid_;

@@ -11,6 +11,7 @@
 #include "absl/strings/str_cat.h"
 #include "precompute/fem/held_nodes.h"
 #include "precompute/modes/block_lanczos_eigensolver.h"
+#include "precompute/modes/dense_blas.h"
 #include "precompute/modes/dense_eigensolver.h"
 #include "precompute/modes/multifrontal_inertia.h"
 #include "precompute/modes/openblas.h"
@@ -141,7 +142,7 @@ class Solution {
     const Measurement measured = Measure(ordered_.matrix, ordered_.fronts.order, all, workers_);
     result.verification.max_orthogonality_error = OrthogonalityError(measured.gram);
     std::vector<Eigen::Index> kept;
-    const Eigen::MatrixXd in_rigid = rigid_momenta_.transpose() * all.shapes;
+    const Eigen::MatrixXd in_rigid = InRigid(all.shapes);
     for (Eigen::Index m = 0; m < all.shapes.cols(); ++m) {
       if (in_rigid.col(m).squaredNorm() < 0.5) kept.push_back(m);
     }
@@ -174,6 +175,18 @@ class Solution {
   std::unique_ptr<Eigensolver> MakeSolver(int count) const {
     if (PrefersDense(system_.unknown_count(), count)) return std::make_unique<DenseEigensolver>();
     return std::make_unique<BlockLanczosEigensolver>(ordered_, rigid_);
+  }
+
+  /// What shapes have of the rigid-body modes: #rigid by #shapes.
+  Eigen::MatrixXd InRigid(const Eigen::MatrixXd& shapes) const {
+    const auto rows = static_cast<int>(shapes.rows());
+    const auto rigid = static_cast<int>(rigid_momenta_.cols());
+    const auto count = static_cast<int>(shapes.cols());
+    Eigen::MatrixXd parts(rigid, count);
+    if (parts.size() == 0) return parts;
+    blas::TransposedProduct(rigid, count, rows, rigid_momenta_.data(), rows, shapes.data(), rows,
+                            parts.data(), rigid);
+    return parts;
   }
 
   double FreeMotionBound(double limit) const {

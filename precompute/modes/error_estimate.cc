@@ -10,6 +10,8 @@
 #include "absl/container/flat_hash_map.h"
 #include "precompute/fem/element.h"
 #include "precompute/modes/dense_blas.h"
+#include "precompute/modes/openblas.h"
+#include "precompute/modes/workers.h"
 
 namespace carillon::precompute {
 namespace {
@@ -26,8 +28,10 @@ constexpr double kQuadraticConstant = 1.8;
 /// Part of an eigenvalue that may be error; beyond it the mesh says nothing about the mode.
 constexpr double kMostError = 0.99;
 
-/// The residuals of some modes at a time, of at least so many, take so much memory.
+/// The residuals of some modes at a time, of at least so many, take so much memory, or as many
+/// times as much as the shapes: less than the solution took beside them.
 constexpr size_t kResidualBytes = size_t{512} << 20U;
+constexpr size_t kTimesShapes = 2;
 constexpr size_t kFewestModesAtATime = 8;
 
 struct Value {
@@ -218,10 +222,15 @@ class Estimator {
     }
   }
 
-  /// How many modes are best treated at a time.
-  Eigen::Index ModesAtATime() const {
+  /// How many modes each of the threads had best treat at a time: all in one pass over the elements
+  /// by one thread, where there is the memory, because most of a pass is spent on the elements.
+  Eigen::Index ModesAtATime(const Eigen::MatrixXd& shapes, int thread_count) const {
     const size_t bytes_of_mode = 3 * sizeof(double) * places_.count();
-    return static_cast<Eigen::Index>(std::max(kFewestModesAtATime, kResidualBytes / bytes_of_mode));
+    const size_t shape_bytes = sizeof(double) * static_cast<size_t>(shapes.size());
+    const size_t most = std::max(kResidualBytes, kTimesShapes * shape_bytes) / bytes_of_mode;
+    if (most >= static_cast<size_t>(shapes.cols())) return std::max<Eigen::Index>(shapes.cols(), 1);
+    return static_cast<Eigen::Index>(
+        std::max(kFewestModesAtATime, most / static_cast<size_t>(thread_count)));
   }
 
   /// sum_b r_b^T a(b, b)^-1 r_b of some modes: shapes #U by #modes.
@@ -312,16 +321,18 @@ Eigen::VectorXd EstimateFrequencyErrors(const TetMesh& mesh, const ElasticConsta
   Estimator estimator(mesh, elastic);
   const double constant = mesh.nodes_per_element == 10 ? kQuadraticConstant : kLinearConstant;
   Eigen::VectorXd errors(modes.eigenvalues.size());
-  const Eigen::Index at_a_time = estimator.ModesAtATime();
-  for (Eigen::Index first = 0; first < errors.size(); first += at_a_time) {
+  Workers workers(ThreadCount());
+  const Eigen::Index at_a_time = estimator.ModesAtATime(modes.shapes, workers.count());
+  workers.ForEach((errors.size() + at_a_time - 1) / at_a_time, [&](int64_t part) {
+    const Eigen::Index first = part * at_a_time;
     const Eigen::Index count = std::min(at_a_time, errors.size() - first);
     const Eigen::VectorXd corrections = estimator.Corrections(
         modes.eigenvalues.segment(first, count), modes.shapes.middleCols(first, count));
-    const Eigen::ArrayXd part =
+    const Eigen::ArrayXd relative =
         constant * corrections.array() / modes.eigenvalues.segment(first, count).array();
     // A frequency goes with the root of its eigenvalue.
-    errors.segment(first, count) = (1 - part.min(kMostError)).sqrt().inverse() - 1;
-  }
+    errors.segment(first, count) = (1 - relative.min(kMostError)).sqrt().inverse() - 1;
+  });
   return errors;
 }
 

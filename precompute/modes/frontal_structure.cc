@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "precompute/modes/node_ordering.h"
 #include "proto/error_reason.h"
 
 namespace carillon::precompute {
@@ -144,11 +145,13 @@ absl::StatusOr<FrontalStructure> AnalyzeFronts(const Eigen::SparseMatrix<double>
   cholmod_common common;
   cholmod_start(&common);
   common.nmethods = 1;
-  common.method[0].ordering = CHOLMOD_METIS;
+  std::vector<int> order = OrderThinWall(K);
+  common.method[0].ordering = order.empty() ? CHOLMOD_METIS : CHOLMOD_GIVEN;
   common.supernodal = CHOLMOD_SUPERNODAL;
   common.postorder = 1;
   common.print = 0;
-  cholmod_factor* L = cholmod_analyze(&view, &common);
+  cholmod_factor* L =
+      cholmod_analyze_p(&view, order.empty() ? nullptr : order.data(), nullptr, 0, &common);
   absl::StatusOr<FrontalStructure> fronts =
       Refusal(absl::StatusCode::kResourceExhausted, "OUT_OF_MEMORY",
               "the matrix could not be ordered in the memory there is; use fewer nodes");

@@ -14,7 +14,7 @@ using Sparse = Eigen::SparseMatrix<double>;
 
 /// Calls visit(row node, column node, row axis, column axis, value) for each entry.
 template <typename Visit>
-void ForEachEntry(const Sparse& A, const Visit& visit) {
+void ForEachEntry(const Sparse& A, Visit visit) {
   for (int column = 0; column < A.outerSize(); ++column) {
     for (Sparse::InnerIterator it(A, column); it; ++it) {
       const int row = static_cast<int>(it.row());
@@ -25,18 +25,25 @@ void ForEachEntry(const Sparse& A, const Visit& visit) {
 
 /// The pattern: one entry a pair of nodes that share a block.
 void FillPattern(const Sparse& K, const std::vector<int32_t>& position, NodeMatrix& A) {
-  std::vector<std::vector<int32_t>> columns(position.size());
-  ForEachEntry(K, [&](int i, int j, int a, int b, double) {
-    if (a != 0 || b != 0) return;
-    const auto [low, high] =
-        std::minmax(position[static_cast<size_t>(i)], position[static_cast<size_t>(j)]);
-    columns[static_cast<size_t>(low)].push_back(high);
+  const auto for_each = [&](const auto& visit) {
+    for (int column = 0; column < K.outerSize(); column += 3) {
+      for (Sparse::InnerIterator it(K, column); it; ++it) {
+        if (it.row() % 3 != 0) continue;
+        visit(std::minmax(position[static_cast<size_t>(it.row()) / 3],
+                          position[static_cast<size_t>(column) / 3]));
+      }
+    }
+  };
+  A.column_start.assign(position.size() + 1, 0);
+  for_each([&](const auto& pair) { ++A.column_start[static_cast<size_t>(pair.first) + 1]; });
+  std::partial_sum(A.column_start.begin(), A.column_start.end(), A.column_start.begin());
+  A.row.resize(static_cast<size_t>(A.column_start.back()));
+  std::vector<int32_t> next(A.column_start.begin(), A.column_start.end() - 1);
+  for_each([&](const auto& pair) {
+    A.row[static_cast<size_t>(next[static_cast<size_t>(pair.first)]++)] = pair.second;
   });
-  A.column_start.push_back(0);
-  for (std::vector<int32_t>& column : columns) {
-    std::sort(column.begin(), column.end());
-    A.row.insert(A.row.end(), column.begin(), column.end());
-    A.column_start.push_back(static_cast<int32_t>(A.row.size()));
+  for (size_t j = 0; j < position.size(); ++j) {
+    std::sort(A.row.begin() + A.column_start[j], A.row.begin() + A.column_start[j + 1]);
   }
 }
 
@@ -81,10 +88,14 @@ NodeMatrix MakeNodeMatrix(const Sparse& K, const Sparse& M, const std::vector<in
     const auto last = A.row.begin() + A.column_start[static_cast<size_t>(column) + 1];
     return static_cast<size_t>(std::lower_bound(first, last, row) - A.row.begin());
   };
-  ForEachEntry(K, [&](int i, int j, int a, int b, double value) {
-    const int pi = position[static_cast<size_t>(i)];
-    const int pj = position[static_cast<size_t>(j)];
-    double* block = &A.stiffness[entry(std::max(pi, pj), std::min(pi, pj)) * 9];
+  double* block = nullptr;
+  ForEachEntry(K, [&, row = -1, pi = 0, pj = 0](int i, int j, int a, int b, double value) mutable {
+    if (i != row || i == j) {  // the three of a column follow one another
+      row = i;
+      pi = position[static_cast<size_t>(i)];
+      pj = position[static_cast<size_t>(j)];
+      block = &A.stiffness[entry(std::max(pi, pj), std::min(pi, pj)) * 9];
+    }
     // A block below the diagonal before the re-ordering may stand above it now.
     if (pi >= pj) block[3 * a + b] = value;
     if (pi <= pj) block[3 * b + a] = value;

@@ -12,4 +12,9 @@ namespace carillon::precompute {
 /// components then follow one another.
 std::vector<int> OrderUnknowns(const SystemMatrices& system);
 
+/// Such an order of the nodes of a body whose walls are mostly one element thick, with the two
+/// nodes of each place of the wall taken as one: found in less than half the time, and as sparse.
+/// Empty where the body is another.
+std::vector<int> OrderThinWall(const SystemMatrices::Sparse& K);
+
 }  // namespace carillon::precompute

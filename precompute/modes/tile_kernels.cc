@@ -32,26 +32,39 @@ HWY_INLINE void Forward(const Real* HWY_RESTRICT tile, int column_count, const R
   using V = hn::Vec<Lanes<Real>>;
   constexpr int kLanes = LaneCount<Real>();
   constexpr int kVectors = Chunk<Real, kWidth>() / kLanes;
+  // Sums of one vector a row are six chains, too few to keep two units busy: twice as many, then.
+  constexpr int kSets = kVectors == 1 ? 2 : 1;
   for (int c = 0; c < kWidth; c += Chunk<Real, kWidth>()) {
-    V sum[kTileRows][kVectors];
-    for (auto& row : sum) {
-      for (V& v : row) v = hn::Zero(d);
+    V sum[kSets][kTileRows][kVectors];
+    for (auto& set : sum) {
+      for (auto& row : set) {
+        for (V& v : row) v = hn::Zero(d);
+      }
     }
     const Real* HWY_RESTRICT l = tile;
     const Real* HWY_RESTRICT yi = y + c;
-    for (int i = 0; i < column_count; ++i, l += kTileRows, yi += kWidth) {
-      hwy::Prefetch(l + kAhead);
+    const auto add_column = [&](auto& set) HWY_ATTR {
       V yv[kVectors];
       for (int v = 0; v < kVectors; ++v) yv[v] = hn::LoadU(d, yi + v * kLanes);
       for (int r = 0; r < kTileRows; ++r) {
         const V lr = hn::Set(d, l[r]);
-        for (int v = 0; v < kVectors; ++v) sum[r][v] = hn::MulAdd(lr, yv[v], sum[r][v]);
+        for (int v = 0; v < kVectors; ++v) set[r][v] = hn::MulAdd(lr, yv[v], set[r][v]);
       }
+      l += kTileRows;
+      yi += kWidth;
+    };
+    int i = 0;
+    for (; i + 2 <= column_count; i += 2) {
+      hwy::Prefetch(l + kAhead);
+      add_column(sum[0]);
+      add_column(sum[kSets - 1]);
     }
+    if (i < column_count) add_column(sum[0]);
     for (int r = 0; r < kTileRows; ++r) {
       Real* out = x[r / 3] + r % 3 * kWidth + c;
       for (int v = 0; v < kVectors; ++v) {
-        hn::StoreU(hn::Sub(hn::LoadU(d, out + v * kLanes), sum[r][v]), d, out + v * kLanes);
+        if (kSets == 2) sum[0][r][v] = hn::Add(sum[0][r][v], sum[kSets - 1][r][v]);
+        hn::StoreU(hn::Sub(hn::LoadU(d, out + v * kLanes), sum[0][r][v]), d, out + v * kLanes);
       }
     }
   }
@@ -73,8 +86,7 @@ HWY_INLINE void Backward(const Real* HWY_RESTRICT tile, int column_count, Real* 
     }
     const Real* HWY_RESTRICT l = tile;
     Real* HWY_RESTRICT yi = y + c;
-    for (int i = 0; i < column_count; ++i, l += kTileRows, yi += kWidth) {
-      hwy::Prefetch(l + kAhead);
+    const auto subtract_column = [&]() HWY_ATTR {
       for (int v = 0; v < kVectors; ++v) {
         // Two chains of three, because each multiply-add waits for the one before.
         V even = hn::LoadU(d, yi + v * kLanes);
@@ -86,7 +98,16 @@ HWY_INLINE void Backward(const Real* HWY_RESTRICT tile, int column_count, Real* 
         even = hn::NegMulAdd(hn::Set(d, l[4]), xv[4][v], even);
         hn::StoreU(hn::Sub(even, odd), d, yi + v * kLanes);
       }
+      l += kTileRows;
+      yi += kWidth;
+    };
+    int i = 0;
+    for (; i + 2 <= column_count; i += 2) {
+      hwy::Prefetch(l + kAhead);
+      subtract_column();
+      subtract_column();
     }
+    if (i < column_count) subtract_column();
   }
 }
 
