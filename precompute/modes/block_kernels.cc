@@ -142,7 +142,7 @@ HWY_INLINE void SubtractTimes(const Real* HWY_RESTRICT q, const Real* HWY_RESTRI
   using V = hn::Vec<Lanes<Real>>;
   constexpr int kLanes = LaneCount<Real>();
   constexpr int kVectors = Chunk<Real>() / kLanes;
-  constexpr int kRows = (HWY_MAX_BYTES < 64 ? 8 : 16) / kVectors;
+  constexpr int kRows = 8 / kVectors;
   int64_t i = 0;
   const auto rows_at = [&](auto count) {
     constexpr int kCount = decltype(count)::value;

@@ -3,7 +3,6 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <cstdint>
 #include <random>
 #include <utility>
 
@@ -34,12 +33,10 @@ LanczosRecurrence<Real>::LanczosRecurrence(const NodeMatrix& A,
 
 template <typename Real>
 bool LanczosRecurrence<Real>::Start() {
-  // Knuth's multiplier and increment; the upper bits are random enough.
-  std::linear_congruential_engine<uint64_t, 6364136223846793005, 1442695040888963407, 0> random(
-      20020721);
-  constexpr auto kHalf = static_cast<Real>(1U << 23U);
+  std::mt19937 random(20020721);
+  constexpr auto kHalf = static_cast<Real>(1U << 31);
   std::generate_n(next_.data(), next_.size(),
-                  [&] { return static_cast<Real>(random() >> 40U) / kHalf - 1; });
+                  [&] { return static_cast<Real>(random()) / kHalf - 1; });
   Orthogonalize();
   return Normalize();
 }

@@ -9,7 +9,8 @@
 namespace carillon::precompute {
 
 /// The number of negative eigenvalues of K - shift M, which is the number of eigenvalues of
-/// K x = Lambda M x below `shift` (Sylvester's law of inertia), by an L D L^T without pivoting.
+/// K x = Lambda M x below `shift` (Sylvester's law of inertia), by an L S L^T with signs S, without
+/// pivoting.
 /// Errors: VERIFICATION_FAILED where a pivot is too small to trust its sign (the shift lies on an
 /// eigenvalue: move it).
 absl::StatusOr<int> CountEigenvaluesBelow(const FrontalStructure& fronts, const NodeMatrix& A,

@@ -10,16 +10,12 @@ namespace carillon::precompute {
 namespace {
 
 /// Measured: with solves that are off by 1e-5 (bunnies) a seventh of the iteration suffices for
-/// residuals of 4e-7 after two corrections, with 1e-4 (chimes) three fifths are needed, with 1e-3
-/// (quadratic elements) two thirds to three quarters; with less, the modes hold something of those
-/// above that corrections hardly take away.
+/// residuals of 4e-7 after two corrections, with 1e-4 to 1.4e-3 (tubes, quadratic elements) three
+/// fifths to three quarters are needed; with less, the modes hold something of those above that
+/// corrections hardly take away.
 constexpr double kSmallSolveError = 1.5e-5;
-constexpr double kLargeSolveError = 4e-4;
-
-double RefinedPart(double error) {
-  if (error > kLargeSolveError) return 0.75;
-  return error > kSmallSolveError ? 0.65 : 0.15;
-}
+constexpr double kRefinedPart = 0.15;
+constexpr double kRefinedPartOfCoarse = 0.75;
 
 }  // namespace
 
@@ -39,7 +35,7 @@ void ShiftInvert<Real>::Apply(const Block& x, Block& y, double done) {
   factor_.Solve(solution_.data(), workers_);
   if (std::is_same_v<Real, float> && done < refined_part_) {
     Refine(x);
-    refined_part_ = RefinedPart(error_);
+    refined_part_ = error_ > kSmallSolveError ? kRefinedPartOfCoarse : kRefinedPart;
     y = (solution_ + y_) * static_cast<Real>(-shift_);
   } else {
     y = solution_ * static_cast<Real>(-shift_);
