@@ -67,13 +67,21 @@ constexpr size_t kRefinementBlocksOfThread = 2;
 /// Rigid-body modes, their momenta, and the modes in elimination order.
 constexpr size_t kRigidVectors = 18;
 
-/// Multiply-adds a second, and bytes a second from memory, of one core.
-constexpr double kDoubleRate = 20e9;
-constexpr double kFloatRate = 45e9;
-constexpr double kOrthogonalRate = 20e9;
-constexpr double kBandwidth = 4e9;
-/// Seconds that coupling and estimated error of a mode take, for each unknown.
-constexpr double kModelSeconds = 50e-9;
+/// Measured on two tubes and two bunnies, linear and quadratic, within a third: operations a second
+/// of factorizations in double and float and of products with the basis, bytes of the factor a
+/// second in solves with sixteen right-hand sides.
+constexpr double kDoubleRate = 40e9;
+constexpr double kFloatRate = 70e9;
+constexpr double kOrthogonalRate = 45e9;
+constexpr double kSolveRate = 9e9;
+/// Solves of a step of the iteration, and of a block of modes refined, two of which go together.
+constexpr double kSolvesOfStep = 1.3;
+constexpr double kSolvesOfRefinement = 1.2;
+/// Seconds that refining and verifying a mode take beside, and its coupling and estimated error,
+/// for each unknown.
+constexpr double kRefineSeconds = 30e-9;
+constexpr double kVerifySeconds = 12e-9;
+constexpr double kModelSeconds = 100e-9;
 
 }  // namespace
 
@@ -96,16 +104,16 @@ SolveCost PredictSolveCost(const OrderedSystem& ordered, int mode_count, int thr
                     std::max({front_numbers * kDouble, factor + front_numbers * kFloat,
                               factor + basis + std::max(rough, kIterationBlocks * block),
                               factor + 2 * shapes + mass_times + refinement * block});
-  const double steps = static_cast<double>(BasisSize(mode_count)) / kBlockWidth +
-                       3.0 * static_cast<double>(modes) / kBlockWidth;
   const auto n = static_cast<double>(unknowns);
   const auto m = static_cast<double>(BasisSize(mode_count));
   const auto p = static_cast<double>(modes);
+  const double solves = (kSolvesOfStep * m + kSolvesOfRefinement * p) / kBlockWidth;
   cost.count_s = fronts.factor_flops / kDoubleRate;
   cost.factor_s = fronts.factor_flops / kFloatRate;
-  cost.solve_s = steps * 2 * static_cast<double>(factor) / kBandwidth +
-                 n * (m * m + m * p) / kOrthogonalRate + 3 * n * p * p / kDoubleRate;
-  cost.verify_s = n * p * p / kDoubleRate;
+  cost.solve_s = solves * 2 * static_cast<double>(factor) / kSolveRate +
+                 n * (m * m + m * p) / kOrthogonalRate + 3 * n * p * p / kDoubleRate +
+                 n * p * kRefineSeconds;
+  cost.verify_s = n * p * p / kDoubleRate + n * p * kVerifySeconds;
   cost.model_s = n * p * kModelSeconds;
   return cost;
 }
