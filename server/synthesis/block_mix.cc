@@ -36,7 +36,7 @@ void BlockMix::Begin(uint64_t block_number, RenderDesk& desk) noexcept {
     used_[kind] = false;
     any_begins_ |= begins_[kind];
   }
-  lanes_.Clear(long_blocks_[0].frame_count / long_blocks_[0].block_count);
+  desk_->lanes.Clear(long_blocks_[0].frame_count / long_blocks_[0].block_count);
 }
 
 bool BlockMix::idle() const noexcept {
@@ -44,19 +44,19 @@ bool BlockMix::idle() const noexcept {
 }
 
 void BlockMix::SetApart(size_t block_frame_count) noexcept {
-  if (!apart_) lanes_apart_.Clear(block_frame_count);
+  if (!apart_) desk_->lanes_apart.Clear(block_frame_count);
   apart_ = true;
 }
 
 void BlockMix::TakeApart(std::span<float> frames) noexcept {
   std::array<float, kMostBlockFrames> apart;
   const std::span<float> block = std::span(apart).first(frames.size());
-  lanes_apart_.Reduce(block);
+  desk_->lanes_apart.Reduce(block);
   for (size_t n = 0; n < frames.size(); ++n) frames[n] += block[n];
 }
 
 void BlockMix::Finish(std::span<float> block) noexcept {
-  lanes_.Reduce(block);
+  desk_->lanes.Reduce(block);
   for (size_t kind = 0; kind < kLongBlockKinds; ++kind) {
     Rendered& rendered = rendered_[kind];
     if (begins_[kind]) {

@@ -20,6 +20,7 @@ struct RenderDesk {
 
   StrikeBatch batch;
   std::array<Spectrum, kLongBlockKinds> spectra;
+  LaneMix lanes, lanes_apart;
 };
 
 /// What some banks sound like together, block by block: the sum of what rings in the time domain
@@ -54,7 +55,7 @@ class BlockMix {
   bool idle() const noexcept;
 
   /// What rings in the time domain goes here.
-  LaneMix& lanes() noexcept { return apart_ ? lanes_apart_ : lanes_; }
+  LaneMix& lanes() noexcept { return apart_ ? desk_->lanes_apart : desk_->lanes; }
 
   /// From now on that is not part of the block, until Reunite; in the middle of it nothing changes.
   void SetApart(size_t block_frame_count) noexcept;
@@ -78,7 +79,6 @@ class BlockMix {
   std::array<bool, kLongBlockKinds> begins_{}, used_{};
   bool any_begins_ = false;
   std::array<Rendered, kLongBlockKinds> rendered_;
-  LaneMix lanes_, lanes_apart_;
   bool apart_ = false;
 };
 

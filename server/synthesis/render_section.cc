@@ -140,10 +140,11 @@ void RenderSection::RenderVoices(std::span<float> placed, SectionCounts& counts)
 
 void RenderSection::RenderFading(BankSlot& slot, std::span<float> block,
                                  SectionCounts& counts) noexcept {
-  std::array<float, kMostBlockFrames> faded;
-  fading_mix_.Clear(block.size());
-  if (!slot.bank->RenderAddInTime(fading_mix_)) ++counts.reset_bank_count;
-  fading_mix_.Reduce(std::span(faded).first(block.size()));
+  std::array<float, kMostBlockFrames> faded{};
+  mix_.SetApart(block.size());
+  if (!slot.bank->RenderAddInTime(mix_.lanes())) ++counts.reset_bank_count;
+  mix_.TakeApart(std::span(faded).first(block.size()));
+  mix_.Reunite();
   for (size_t n = 0; n < block.size(); ++n) {
     slot.fade_gain = std::max(slot.fade_gain - settings_.fade_step, 0.0F);
     block[n] += slot.fade_gain * faded[n];

@@ -74,7 +74,6 @@ class RenderSection {
   FixedVector<uint32_t> sounding_;  // slots whose banks are not silent, in order of their awakening
   FixedVector<Voice*> voices_;      // that are not asleep, in order of their awakening
   BlockMix mix_;
-  LaneMix fading_mix_;
 };
 
 }  // namespace carillon

@@ -76,7 +76,17 @@ class Prefetching {
   size_t step_ = 0;
 };
 
-/// Calls ring(oscillators, ahead, lane) for all lanes of `range`, some vectors at a time.
+/// Calls ring(oscillators, ahead, lane) for the vectors at `lane`, at most kMost.
+template <size_t kMost, class RingSome>
+HWY_INLINE void ForRest(const LaneArrays& lanes, size_t lane, size_t count, const RingSome& ring) {
+  if (count == kMost) {
+    ring(Oscillators<kMost>(lanes, lane), Prefetching(lanes, lane), lane);
+  } else if constexpr (kMost > 1) {
+    ForRest<kMost - 1>(lanes, lane, count, ring);
+  }
+}
+
+/// The same for all lanes of `range`, some vectors at a time.
 template <class RingSome>
 HWY_INLINE void ForVectors(const LaneArrays& lanes, LaneRange range, const RingSome& ring) {
   const size_t pass = kVectorsAPass * hn::Lanes(Floats());
@@ -85,9 +95,7 @@ HWY_INLINE void ForVectors(const LaneArrays& lanes, LaneRange range, const RingS
   for (; lane + pass <= end; lane += pass) {
     ring(Oscillators<kVectorsAPass>(lanes, lane), Prefetching(lanes, lane + pass), lane);
   }
-  for (; lane < end; lane += hn::Lanes(Floats())) {
-    ring(Oscillators<1>(lanes, lane), Prefetching(lanes, lane), lane);
-  }
+  ForRest<kVectorsAPass - 1>(lanes, lane, (end - lane) / hn::Lanes(Floats()), ring);
 }
 
 void Ring(const LaneArrays& lanes, LaneRange range, size_t frame_count, float* mix) {
