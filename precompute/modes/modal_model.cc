@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "precompute/modes/modal_model.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "precompute/mesh/sounding_surface.h"
@@ -19,12 +20,18 @@ std::array<float, 3> ToFloat(const Point& p) {
 }
 
 std::vector<float> ShapesOnSurface(const SoundingSurface& surface, const Eigen::MatrixXd& shapes) {
-  std::vector<float> result;
-  result.reserve(3 * surface.nodes.size() * static_cast<size_t>(shapes.cols()));
-  for (const int32_t node : surface.nodes) {
-    for (int a = 0; a < 3; ++a) {
-      for (Eigen::Index m = 0; m < shapes.cols(); ++m) {
-        result.push_back(static_cast<float>(shapes(3 * Eigen::Index{node} + a, m)));
+  // Turned over in parts that stay in the cache.
+  constexpr size_t kPart = 256;
+  const auto mode_count = static_cast<size_t>(shapes.cols());
+  std::vector<float> result(3 * surface.nodes.size() * mode_count);
+  for (size_t first = 0; first < surface.nodes.size(); first += kPart) {
+    const size_t last = std::min(surface.nodes.size(), first + kPart);
+    for (size_t m = 0; m < mode_count; ++m) {
+      for (size_t n = first; n < last; ++n) {
+        const double* from =
+            &shapes(3 * Eigen::Index{surface.nodes[n]}, static_cast<Eigen::Index>(m));
+        float* to = &result[3 * n * mode_count + m];
+        for (size_t a = 0; a < 3; ++a) to[a * mode_count] = static_cast<float>(from[a]);
       }
     }
   }
