@@ -65,6 +65,7 @@ Eigen::MatrixXd Extended(const Eigen::MatrixXd& vectors, const std::vector<int32
                          size_t node_count) {
   Eigen::MatrixXd all =
       Eigen::MatrixXd::Zero(3 * static_cast<Eigen::Index>(node_count), vectors.cols());
+  if (vectors.cols() == 0) return all;  // and `vectors` may have no rows
   for (size_t i = 0; i < moving.size(); ++i) {
     all.middleRows<3>(3 * Eigen::Index{moving[i]}) =
         vectors.middleRows<3>(3 * static_cast<Eigen::Index>(i));
