@@ -11,6 +11,7 @@
 #include "precompute/modes/multifrontal_cholesky.h"
 #include "precompute/modes/openblas.h"
 #include "precompute/modes/ritz_refinement.h"
+#include "precompute/modes/solve_cost.h"
 #include "precompute/modes/workers.h"
 #include "proto/error_reason.h"
 
@@ -32,9 +33,7 @@ constexpr Index kGuards = 4;
 /// iterations hardly depends on it, and a larger one spares digits.
 constexpr double kShift = -0.0625;
 
-/// Vectors that the iteration takes, about, see solve_cost; part of the solution's time that it is.
-constexpr double kBasisOfWanted = 2.6;
-constexpr Index kBasisAtLeast = 120;
+/// Part of the solution's time that is the iteration's, about.
 constexpr double kIterationPart = 0.6;
 
 /// Corrections before K and M are projected for the first time. Where solves are this far off, one
@@ -133,7 +132,7 @@ absl::StatusOr<RefinedModes> SolveIn(const OrderedSystem& ordered, const MatrixX
   std::vector<VectorBlockOf<Real>> rough;
   int first_steps = 1;
   {
-    const double foreseen = kBasisOfWanted * static_cast<double>(wanted) + kBasisAtLeast;
+    const double foreseen = PredictBasisSize(static_cast<int>(wanted));
     LanczosRecurrence<Real> recurrence(ordered.matrix, *factor, shift, rigid, foreseen, workers);
     const Index largest = std::min<Index>(
         3 * static_cast<Index>(ordered.matrix.node_count) - rigid.cols(), 10 * wanted + 500);

@@ -265,8 +265,7 @@ absl::StatusOr<DeformationModes> SolveDeformationModes(const SystemMatrices& sys
   const SolveCost least = PredictSolveCost(*ordered, 1, ThreadCount());
   if (absl::Status status = CheckMemory(least); !status.ok()) return status;
   const Solution solution(system, *std::move(ordered), nodes, watch, options);
-  absl::Status failure =
-      VerificationFailed("not all modes that were counted below the limit could be found");
+  absl::Status failure;
   for (int attempt = 0; attempt < kMaxAttempts; ++attempt) {
     const double limit = eigenvalue_limit * (1 + 1e-4 * attempt);
     const absl::StatusOr<int> count = solution.CountBelow(limit);
@@ -281,7 +280,11 @@ absl::StatusOr<DeformationModes> SolveDeformationModes(const SystemMatrices& sys
     std::vector<Eigen::Index> below(
         static_cast<size_t>((all->eigenvalues.array() < limit).count()));
     std::iota(below.begin(), below.end(), 0);
-    if (static_cast<int>(below.size()) != *count) continue;
+    if (static_cast<int>(below.size()) != *count) {
+      failure =
+          VerificationFailed("not all modes that were counted below the limit could be found");
+      continue;
+    }
     Keep(below, *all);
     absl::StatusOr<DeformationModes> result = solution.Verify(*std::move(all), limit);
     if (!result.ok()) return result;

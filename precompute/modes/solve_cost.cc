@@ -55,9 +55,6 @@ size_t MatrixBytes(const NodeMatrix& A) {
          entries * (10 * kDouble + sizeof(int32_t));
 }
 
-/// Vectors in the basis when all modes have converged, as measured: 4.5 times 60, 2.8 times 280.
-size_t BasisSize(int mode_count) { return static_cast<size_t>(2.6 * mode_count) + 120; }
-
 /// Blocks of vectors, counted in float, that the iteration holds beside its basis, and the
 /// refinement of modes beside them, in all and for each thread.
 constexpr size_t kIterationBlocks = 8;
@@ -85,13 +82,16 @@ constexpr double kModelSeconds = 100e-9;
 
 }  // namespace
 
+double PredictBasisSize(int mode_count) { return 2.6 * mode_count + 120; }
+
 SolveCost PredictSolveCost(const OrderedSystem& ordered, int mode_count, int thread_count) {
   const FrontalStructure& fronts = ordered.fronts;
   const size_t unknowns = 3 * fronts.order.size();
   const auto modes = static_cast<size_t>(mode_count + kBlockWidth);
   const size_t front_numbers = FrontNumbers(fronts, thread_count);
   const size_t factor = FactorNumbers(fronts) * kFloat;
-  const size_t basis = BasisSize(mode_count) * unknowns * kFloat;
+  const auto basis_size = static_cast<size_t>(PredictBasisSize(mode_count));
+  const size_t basis = basis_size * unknowns * kFloat;
   const size_t rough = modes * unknowns * kFloat;
   const size_t shapes = modes * unknowns * kDouble;
   const size_t mass_times = ordered.matrix.mass_is_identity ? 0 : shapes;
@@ -105,7 +105,7 @@ SolveCost PredictSolveCost(const OrderedSystem& ordered, int mode_count, int thr
                               factor + basis + std::max(rough, kIterationBlocks * block),
                               factor + 2 * shapes + mass_times + refinement * block});
   const auto n = static_cast<double>(unknowns);
-  const auto m = static_cast<double>(BasisSize(mode_count));
+  const auto m = static_cast<double>(basis_size);
   const auto p = static_cast<double>(modes);
   const double solves = (kSolvesOfStep * m + kSolvesOfRefinement * p) / kBlockWidth;
   cost.count_s = fronts.factor_flops / kDoubleRate;

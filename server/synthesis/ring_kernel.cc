@@ -76,11 +76,16 @@ class Prefetching {
   size_t step_ = 0;
 };
 
+/// Where no vectors come after some.
+struct NothingAhead {
+  HWY_INLINE void Step() const {}
+};
+
 /// Calls ring(oscillators, ahead, lane) for the vectors at `lane`, at most kMost.
 template <size_t kMost, class RingSome>
 HWY_INLINE void ForRest(const LaneArrays& lanes, size_t lane, size_t count, const RingSome& ring) {
   if (count == kMost) {
-    ring(Oscillators<kMost>(lanes, lane), Prefetching(lanes, lane), lane);
+    ring(Oscillators<kMost>(lanes, lane), NothingAhead(), lane);
   } else if constexpr (kMost > 1) {
     ForRest<kMost - 1>(lanes, lane, count, ring);
   }
@@ -99,7 +104,7 @@ HWY_INLINE void ForVectors(const LaneArrays& lanes, LaneRange range, const RingS
 }
 
 void Ring(const LaneArrays& lanes, LaneRange range, size_t frame_count, float* mix) {
-  ForVectors(lanes, range, [&](const auto& oscillators, Prefetching ahead, size_t lane) {
+  ForVectors(lanes, range, [&](const auto& oscillators, auto ahead, size_t lane) {
     typename std::decay_t<decltype(oscillators)>::Z z;
     z.Load(lanes.re.data() + lane, lanes.im.data() + lane);
     size_t frame = 0;
@@ -112,11 +117,11 @@ void Ring(const LaneArrays& lanes, LaneRange range, size_t frame_count, float* m
 }
 
 /// Vectors that are struck: what rings, and of it what is newborn.
-template <size_t kVectors>
+template <size_t kVectors, class Ahead>
 struct StruckVectors {
   using Z = States<kVectors>;
   const Oscillators<kVectors>& oscillators;
-  Prefetching ahead;
+  Ahead ahead;
   Z all, newborn;
   size_t newborn_at = 0;  // the frame of its state
   bool any_newborn = false;
@@ -184,14 +189,13 @@ void Start(LaneArrays& lanes, size_t lane_count) {
 }
 
 void RingStruck(LaneArrays& lanes, const StruckPart& part, float* mix) {
-  ForVectors(lanes, {0, part.lane_count},
-             [&](const auto& oscillators, Prefetching ahead, size_t lane) {
-               StruckVectors<std::decay_t<decltype(oscillators)>::kCount> vectors{
-                   oscillators, ahead, {}, {}};
-               vectors.Load(lanes, lane);
-               vectors.Ring(part, lane, mix);
-               vectors.Store(lanes, lane);
-             });
+  ForVectors(lanes, {0, part.lane_count}, [&](const auto& oscillators, auto ahead, size_t lane) {
+    constexpr size_t kVectors = std::decay_t<decltype(oscillators)>::kCount;
+    StruckVectors<kVectors, decltype(ahead)> vectors{oscillators, ahead, {}, {}};
+    vectors.Load(lanes, lane);
+    vectors.Ring(part, lane, mix);
+    vectors.Store(lanes, lane);
+  });
 }
 
 void AddStrike(LaneArrays& lanes, size_t lane_count, const float* added_re, const float* added_im) {
@@ -300,24 +304,23 @@ bool FinishStruck(LaneArrays& lanes, std::span<RingingSegment> segments, const S
   Advancing advancing(lanes, segments, silence_squared);
   // Of some vectors, or as many as a group has.
   alignas(64) float newborn_re[kVectorsAPass * kMostLanes], newborn_im[kVectorsAPass * kMostLanes];
-  ForVectors(
-      lanes, {0, part.lane_count}, [&](const auto& oscillators, Prefetching ahead, size_t lane) {
-        constexpr size_t kVectors = std::decay_t<decltype(oscillators)>::kCount;
-        StruckVectors<kVectors> vectors{oscillators, ahead, {}, {}};
-        if (part.started) {
-          vectors.Load(lanes, lane);
-        } else {
-          vectors.all.Load(lanes.re.data() + lane, lanes.im.data() + lane);
-          vectors.newborn.Clear();
-        }
-        vectors.Ring(part, lane, mix);
-        const size_t first = lane % kMostLanes;
-        vectors.newborn.Store(newborn_re + first, newborn_im + first);
-        const size_t end = first + kVectors * hn::Lanes(Floats());
-        for (size_t group = 0; group + kMostLanes <= end; group += kMostLanes) {
-          advancing.AdvanceGroup(lane - first + group, newborn_re + group, newborn_im + group);
-        }
-      });
+  ForVectors(lanes, {0, part.lane_count}, [&](const auto& oscillators, auto ahead, size_t lane) {
+    constexpr size_t kVectors = std::decay_t<decltype(oscillators)>::kCount;
+    StruckVectors<kVectors, decltype(ahead)> vectors{oscillators, ahead, {}, {}};
+    if (part.started) {
+      vectors.Load(lanes, lane);
+    } else {
+      vectors.all.Load(lanes.re.data() + lane, lanes.im.data() + lane);
+      vectors.newborn.Clear();
+    }
+    vectors.Ring(part, lane, mix);
+    const size_t first = lane % kMostLanes;
+    vectors.newborn.Store(newborn_re + first, newborn_im + first);
+    const size_t end = first + kVectors * hn::Lanes(Floats());
+    for (size_t group = 0; group + kMostLanes <= end; group += kMostLanes) {
+      advancing.AdvanceGroup(lane - first + group, newborn_re + group, newborn_im + group);
+    }
+  });
   return advancing.Finish();
 }
 
