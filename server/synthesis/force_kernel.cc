@@ -112,8 +112,8 @@ struct DrivenState {
 void RingDriven(const ForceArrays& force, const Drive& drive, LaneArrays& lanes, float* mix) {
   const Floats d;
   for (size_t lane = 0; lane < force.lane_count; lane += hn::Lanes(d)) {
-    const float* power = lanes.powers.data() + LaneArrays::PowerIndex(lane, 0);
-    const V q_re = hn::Load(d, power), q_im = hn::Load(d, power + kMostLanes);
+    const V q_re = hn::Load(d, lanes.q_re.data() + lane);
+    const V q_im = hn::Load(d, lanes.q_im.data() + lane);
     const V from_re = hn::Load(d, force.from_re.data() + lane);
     const V from_im = hn::Load(d, force.from_im.data() + lane);
     const V to_re = hn::Load(d, force.to_re.data() + lane);

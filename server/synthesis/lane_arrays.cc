@@ -6,7 +6,11 @@
 namespace carillon {
 
 LaneArrays::LaneArrays(size_t lane_count)
-    : powers(lane_count * 2 * kTileFrames),
+    : powers(lane_count * 2 * kTileNodes),
+      q_re(lane_count),
+      q_im(lane_count),
+      step_re(lane_count),
+      step_im(lane_count),
       block_re(lane_count),
       block_im(lane_count),
       re(lane_count),
@@ -22,6 +26,21 @@ LaneArrays::LaneArrays(size_t lane_count)
       tau_re(lane_count),
       tau_im(lane_count),
       column(lane_count) {}
+
+const LaneRun& LaneArrays::Add(size_t lane_count, size_t tile_kind, size_t segment,
+                               size_t first_in_segment) {
+  LaneRange& same = by_tile[tile_kind];
+  if (same.count == 0 && !runs.empty()) {
+    same.first = runs.back().range.first + runs.back().range.count;
+  }
+  const LaneRange range{same.first + same.count, lane_count};
+  same.count += lane_count;
+  runs.push_back({.range = range,
+                  .tile_kind = tile_kind,
+                  .segment = segment,
+                  .first_in_segment = first_in_segment});
+  return runs.back();
+}
 
 void LaneArrays::Silence(LaneRange range) noexcept {
   for (LaneArray<double>* state : {&re, &im}) {

@@ -1,19 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <new>
+#include <vector>
+
+#include "server/synthesis/tile.h"
 
 namespace carillon {
 
 /// The widest vector of floats that any SIMD target uses; arrays over modes are padded to it.
 inline constexpr size_t kMostLanes = 16;
-
-/// Samples that the kernel renders from one float state: the lower powers of q give the samples
-/// between, q^kTileFrames the next state.
-inline constexpr size_t kTileFrames = 8;
 
 /// A zeroed array aligned for the widest vector.
 template <typename T>
@@ -41,21 +42,43 @@ struct LaneRange {
   size_t count = 0;
 };
 
+/// Lanes of one segment that are rendered in tiles of one kind.
+struct LaneRun {
+  LaneRange range;
+  size_t tile_kind = 0;
+  size_t segment = 0;
+  size_t first_in_segment = 0;  ///< lanes of the segment that are in runs before
+
+  /// How many of these lanes are among the first `count` of the segment.
+  size_t CountOfFirst(size_t count) const {
+    return std::clamp(count, first_in_segment, first_in_segment + range.count) - first_in_segment;
+  }
+};
+
 /// The figures of a bank's modes as they ring in the time domain, one lane each.
 struct LaneArrays {
   /// `lane_count` is a multiple of kMostLanes.
   explicit LaneArrays(size_t lane_count);
 
-  /// Where power k + 1 of lane's q is, real part; its imaginary part is kMostLanes further.
+  /// Where the power of lane's q is that leads to node k + 1 of its tile, the last to the next
+  /// tile: real part; its imaginary part is kMostLanes further.
   static size_t PowerIndex(size_t lane, size_t k) {
-    return (lane / kMostLanes * kTileFrames + k) * 2 * kMostLanes + lane % kMostLanes;
+    return (lane / kMostLanes * kTileNodes + k) * 2 * kMostLanes + lane % kMostLanes;
   }
+
+  /// Places so many lanes more behind all others; in order of their tiles' kind.
+  const LaneRun& Add(size_t lane_count, size_t tile_kind, size_t segment, size_t first_in_segment);
 
   /// Zeroes the state at the start of the block.
   void Silence(LaneRange range) noexcept;
 
-  /// q, q^2, ... q^kTileFrames: for each kMostLanes lanes together, see PowerIndex.
+  /// All lanes, by kind of tile and then by segment.
+  std::vector<LaneRun> runs;
+  std::array<LaneRange, kTileKinds> by_tile;
+  /// For each kMostLanes lanes together, see PowerIndex.
   LaneArray<float> powers;
+  /// q, and its power that leads from one tile of the first kind to the next.
+  LaneArray<float> q_re, q_im, step_re, step_im;
   /// q^N for a block of N frames.
   LaneArray<double> block_re, block_im;
   /// The state at the start of the block.

@@ -6,28 +6,36 @@
 #include <span>
 
 #include "server/synthesis/lane_arrays.h"
+#include "server/synthesis/node_mix.h"
 
 namespace carillon {
 
-/// Blocks are no longer than this: single-precision coefficients drift from the double state within
-/// a block.
-inline constexpr size_t kMostBlockFrames = 256;
-
-/// One block of sound, still split into the lanes of a vector: all banks add to it, and the lanes
-/// are summed once for all of them.
+/// One block of sound, all but some of it still split into the lanes of a vector: all banks add to
+/// it, and lanes and nodes are summed once for all of them.
 class LaneMix {
  public:
   /// Silences the first `frame_count` frames.
   void Clear(size_t frame_count) noexcept;
 
-  /// Writes the sum of each frame's lanes into `block`.
-  void Reduce(std::span<float> block) const noexcept;
+  /// Writes the sum of all that was added into `block`, of as many frames.
+  void Reduce(std::span<float> block) noexcept;
 
   /// Frame n is lanes()[n * kMostLanes] and the kMostLanes - 1 floats after it.
   float* lanes() noexcept { return lanes_.data(); }
 
+  /// Tiles from the block's begin on.
+  NodeMix& nodes() noexcept { return nodes_; }
+
+  /// What is not split, up to the end of a vector.
+  float* frames() noexcept { return frames_.data(); }
+
+  size_t frame_count() const noexcept { return frame_count_; }
+
  private:
+  size_t frame_count_ = 0;
   alignas(64) std::array<float, kMostBlockFrames * kMostLanes> lanes_;
+  alignas(64) std::array<float, kMostBlockFrames + kMostLanes> frames_;
+  NodeMix nodes_;
 };
 
 }  // namespace carillon

@@ -64,7 +64,26 @@ void FillVectors(size_t block_frame_count, LanePlan& plan) {
   }
 }
 
+/// The end of a part's whole vectors, from its begin on, whose lanes all go in tiles of this kind
+/// or longer ones.
+size_t EndOfTiled(const std::vector<PlannedLane>& lanes, size_t tile_kind) {
+  const auto other = std::ranges::find_if(
+      lanes, [=](const PlannedLane& lane) { return ChooseTile(lane.log_q) < tile_kind; });
+  const auto count = static_cast<size_t>(other - lanes.begin());
+  const bool all = other == lanes.end();
+  return (all ? count + kMostLanes - 1 : count) / kMostLanes * kMostLanes;
+}
+
 }  // namespace
+
+LaneRange LanePlan::Tiled(size_t part, size_t tile_kind) const {
+  const auto end = [&](size_t kind) {
+    if (kind == kTileKinds || (part == 0 && kind > 0)) return size_t{0};
+    return EndOfTiled(lanes[part], kind);
+  };
+  const size_t first = end(tile_kind + 1);
+  return {first, end(tile_kind) - first};
+}
 
 LanePlan PlanLanes(const SoundingModes& sounding, const ShapeTable& shapes,
                    const LanePlanSettings& settings) {

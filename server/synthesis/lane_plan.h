@@ -34,6 +34,10 @@ struct LanePlan {
   size_t PaddedCount(size_t part) const {
     return (lanes[part].size() + kMostLanes - 1) / kMostLanes * kMostLanes;
   }
+
+  /// Which of a part's lanes, padded so, are rendered in tiles of this kind: those that turn
+  /// fastest in the shortest. What stays in the time domain, being short, goes in those too.
+  LaneRange Tiled(size_t part, size_t tile_kind) const;
 };
 
 /// How a body sounds in a mixer.

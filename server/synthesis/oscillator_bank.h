@@ -74,9 +74,8 @@ class OscillatorBank {
 
   /// The same with the modal impulses g_m, but for the scale of the shapes, of the projected
   /// columns (column_count() of them): what is not a single impulse on a triangle comes in here.
-  bool StrikeModes(std::span<const float> modal_impulses, size_t offset,
-                   const strike_kernel::Onset& onset, BlockMix& mix) noexcept
-      ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  bool StrikeModes(std::span<const float> modal_impulses, size_t offset, strike_kernel::Onset onset,
+                   BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
   /// Strikes that sound as one, which costs less: each on the nearest vertex of its triangle, all
   /// at their mean time, weighted by impulse. They are neighbours in time, and lie in this block.
@@ -160,19 +159,25 @@ class OscillatorBank {
   std::optional<strike_kernel::Projection> Project(const Excitation& excitation) const noexcept;
   void AddVertex(size_t vertex, float weight, const Excitation& excitation,
                  strike_kernel::Projection& projection) const noexcept;
+  void PlaceLanes(const LanePlan& plan, size_t part, size_t tile_kind);
+  void SetSegments(const LanePlan& plan);
   void MeasureBlow(const LanePlan& plan);
   double TimeWork(size_t lane_count) const noexcept;
-  /// Strikes that were merged sound at the end of their frames, and what follows not before them.
+  /// Strikes that were merged come after others that they may lie before: these are added later
+  /// then, as they would sound there.
   size_t NotBeforeTheLast(size_t offset, const StrikeBatch& batch) const noexcept;
   void BeginStrikes(BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void RenderStrikes(size_t end, BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void RenderDrivenStrikes(size_t end, BlockMix& mix) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void RenderDriven(size_t end, LaneMix& mix) noexcept;
-  ring_kernel::StruckPart NextPart(size_t end, BlockMix& mix) const noexcept;
+  /// Begins and ends what a part needs of a mix.
+  ring_kernel::StruckPart BeginPart(size_t end, BlockMix& mix) const noexcept;
+  void FinishPart(const ring_kernel::StruckPart& part, BlockMix& mix) const noexcept;
+  ring_kernel::TileSums Sums(NodeMix& nodes, size_t frame_count, LaneMix& mix) const noexcept;
   bool FinishStruck(BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   bool EndBlock() noexcept;
-  using Counts = std::array<size_t, 1 + kLongBlockKinds>;
+  using Counts = std::array<size_t, kMostSegments>;
   Counts AwakeCounts() const noexcept;
   void Silence() noexcept;
   void CountAwake() noexcept;
@@ -184,14 +189,15 @@ class OscillatorBank {
   size_t lane_count_;  // modes and companions, each kind padded to whole vectors
   uint32_t first_column_;
   size_t column_count_;
-  std::array<RingingSegment, 1 + kLongBlockKinds>
-      segments_;                            // the first of lanes for the time domain only
+  std::array<RingingSegment, kMostSegments> segments_;  // the first for the time domain only
   Counts counted_{};                        // what of them was awake when that was counted
   std::vector<LongSegment> long_segments_;  // kLongBlockKinds of them
-  std::vector<uint8_t> group_mode_counts_;  // modes, not companions, of kMostLanes lanes
-  bool begun_ = false;                      // this block
-  bool newborn_ = false;                    // struck in this block
-  bool started_ = false;                    // the block is rendered in parts
+  std::vector<uint8_t>
+      group_mode_counts_;   // modes, not companions, of kMostLanes lanes, by segment
+  bool begun_ = false;      // this block
+  bool newborn_ = false;    // struck in this block
+  bool by_frames_ = false;  // longer tiles are not used in this block
+  bool started_ = false;    // the block is rendered in parts
   bool finite_ = true;
   bool changed_ = false;  // which lanes are awake
   bool any_awake_ = false;

@@ -34,14 +34,19 @@ void Set(LaneArray<float>& re, LaneArray<float>& im, size_t lane, Complex value)
   im[lane] = static_cast<float>(value.imag());
 }
 
-void WriteLane(const PlannedLane& planned, uint32_t first_column, size_t block_frame_count,
-               size_t lane, LaneArrays& lanes) {
-  for (size_t k = 0; k < kTileFrames; ++k) {
-    const Complex power = std::exp(planned.log_q * static_cast<double>(k + 1));
+void WritePowers(Complex log_q, size_t tile_kind, size_t lane, LaneArrays& lanes) {
+  for (size_t k = 0; k < kTileNodes; ++k) {
+    const Complex power = std::exp(log_q * TileNode(tile_kind, k + 1));
     const size_t index = LaneArrays::PowerIndex(lane, k);
     lanes.powers[index] = static_cast<float>(power.real());
     lanes.powers[index + kMostLanes] = static_cast<float>(power.imag());
   }
+  Set(lanes.q_re, lanes.q_im, lane, std::exp(log_q));
+  Set(lanes.step_re, lanes.step_im, lane, std::exp(log_q * static_cast<double>(kTileFrames[0])));
+}
+
+void WriteLane(const PlannedLane& planned, uint32_t first_column, size_t block_frame_count,
+               size_t lane, LaneArrays& lanes) {
   const Complex block = std::exp(planned.log_q * static_cast<double>(block_frame_count));
   lanes.block_re[lane] = block.real();
   lanes.block_im[lane] = block.imag();
@@ -65,6 +70,13 @@ SpectralLanes MakeSpectralLanes(const std::vector<PlannedLane>& planned, size_t 
     }
   }
   return lanes;
+}
+
+/// Those of a run that are not padding.
+std::span<const PlannedLane> LanesOf(const LaneRun& run, const LanePlan& plan) {
+  const std::span<const PlannedLane> planned = plan.lanes[run.segment];
+  return planned.subspan(run.first_in_segment,
+                         std::min(run.range.count, planned.size() - run.first_in_segment));
 }
 
 }  // namespace
@@ -92,28 +104,50 @@ OscillatorBank::OscillatorBank(const LanePlan& plan, const SoundingModes& soundi
   assert(first_column_ + column_count_ <= shapes_.mode_count());
   assert(lane_count_ <= StrikeBatch::kMostBankLanes);
   assert(column_count_ <= StrikeBatch::kMostBankLanes);
+  for (const size_t tile_kind : kTileOrder) {
+    for (size_t part = 0; part < plan.lanes.size(); ++part) PlaceLanes(plan, part, tile_kind);
+  }
+  SetSegments(plan);
   const double lowest_rad_per_s =
       sounding.modes.empty() ? 1 : sounding.modes.front().damped_rad_per_s;
-  group_mode_counts_.resize(lane_count_ / kMostLanes);
+  for (const LaneRun& run : lanes_.runs) {
+    const std::span<const PlannedLane> planned = LanesOf(run, plan);
+    for (size_t i = 0; i < planned.size(); ++i) {
+      force_.SetLane(run.range.first + i, planned[i].start,
+                     planned[i].log_q * settings.sample_rate_hz, lowest_rad_per_s);
+    }
+  }
+  MeasureBlow(plan);
+}
+
+void OscillatorBank::PlaceLanes(const LanePlan& plan, size_t part, size_t tile_kind) {
+  const LaneRange tiled = plan.Tiled(part, tile_kind);
+  if (tiled.count == 0) return;
+  const LaneRun& run = lanes_.Add(tiled.count, tile_kind, part, tiled.first);
+  const std::span<const PlannedLane> planned = LanesOf(run, plan);
+  for (size_t i = 0; i < planned.size(); ++i) {
+    const size_t lane = run.range.first + i;
+    WritePowers(planned[i].log_q, tile_kind, lane, lanes_);
+    WriteLane(planned[i], first_column_, block_frame_count_, lane, lanes_);
+  }
+}
+
+void OscillatorBank::SetSegments(const LanePlan& plan) {
   const auto long_blocks = MakeLongBlocks(block_frame_count_);
-  size_t lane = 0;
   for (size_t part = 0; part < plan.lanes.size(); ++part) {
     const std::vector<PlannedLane>& planned = plan.lanes[part];
-    segments_[part].range = {lane, plan.PaddedCount(part)};
+    segments_[part].lane_count = plan.PaddedCount(part);
+    const size_t first_group = group_mode_counts_.size();
+    group_mode_counts_.resize(first_group + plan.PaddedCount(part) / kMostLanes);
     for (size_t i = 0; i < planned.size(); ++i) {
-      WriteLane(planned[i], first_column_, block_frame_count_, lane + i, lanes_);
-      force_.SetLane(lane + i, planned[i].start, planned[i].log_q * settings.sample_rate_hz,
-                     lowest_rad_per_s);
-      if (!planned[i].companion) ++group_mode_counts_[(lane + i) / kMostLanes];
+      if (!planned[i].companion) ++group_mode_counts_[first_group + i / kMostLanes];
     }
-    lane += plan.PaddedCount(part);
     if (part == 0) continue;
     long_segments_.push_back(
         {.lanes = MakeSpectralLanes(planned, plan.PaddedCount(part), long_blocks[part - 1]),
          .mode_count = planned.size(),
          .block_count = long_blocks[part - 1].block_count});
   }
-  MeasureBlow(plan);
 }
 
 /// Over at most kVertices vertices, evenly.

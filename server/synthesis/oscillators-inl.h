@@ -78,17 +78,52 @@ struct States {
   }
 };
 
-/// The oscillators of some vectors of lanes.
+/// The powers of q for tiles of the first kind, of lanes that go in longer ones else.
+template <size_t kVectors>
+struct FramePowers {
+  alignas(64) float values[kVectors][2 * kTileNodes * kMostLanes];
+
+  HWY_INLINE void Set(const LaneArrays& lanes, size_t lane) {
+    States<kVectors> q, power, step;
+    q.Load(lanes.q_re.data() + lane, lanes.q_im.data() + lane);
+    power = q;
+    for (size_t k = 0; k + 1 < kTileNodes; ++k) {
+      Store(power, k);
+      power.Multiply(q);
+    }
+    step.Load(lanes.step_re.data() + lane, lanes.step_im.data() + lane);
+    Store(step, kTileNodes - 1);
+  }
+
+ private:
+  HWY_INLINE void Store(const States<kVectors>& power, size_t k) {
+    for (size_t v = 0; v < kVectors; ++v) {
+      hn::Store(power.re[v], Floats(), values[v] + k * 2 * kMostLanes);
+      hn::Store(power.im[v], Floats(), values[v] + (k * 2 + 1) * kMostLanes);
+    }
+  }
+};
+
+/// The oscillators of some vectors of lanes, all in tiles of one kind.
 template <size_t kVectors>
 struct Oscillators {
   using Z = States<kVectors>;
   static constexpr size_t kCount = kVectors;
   const float* powers[kVectors];
+  const float *q_re, *q_im;
+  size_t tile_kind;
 
-  HWY_INLINE Oscillators(const LaneArrays& lanes, size_t lane) {
+  HWY_INLINE Oscillators(const LaneArrays& lanes, size_t lane, size_t kind)
+      : q_re(lanes.q_re.data() + lane), q_im(lanes.q_im.data() + lane), tile_kind(kind) {
     for (size_t v = 0; v < kVectors; ++v) {
       powers[v] = lanes.powers.data() + LaneArrays::PowerIndex(lane + v * hn::Lanes(Floats()), 0);
     }
+  }
+
+  /// From now on in tiles of the first kind.
+  HWY_INLINE void Use(const FramePowers<kVectors>& frame_powers) {
+    for (size_t v = 0; v < kVectors; ++v) powers[v] = frame_powers.values[v];
+    tile_kind = 0;
   }
 
   HWY_INLINE V PowerRe(size_t v, size_t k) const {
@@ -97,7 +132,7 @@ struct Oscillators {
   HWY_INLINE V PowerIm(size_t v, size_t k) const {
     return hn::Load(Floats(), powers[v] + (k * 2 + 1) * kMostLanes);
   }
-  /// q^(k+1).
+  /// See LaneArrays::PowerIndex.
   HWY_INLINE Z Power(size_t k) const {
     Z power;
 #pragma GCC unroll 8
@@ -108,39 +143,28 @@ struct Oscillators {
     return power;
   }
 
-  /// Advances `z` by whole tiles, in as many steps as their number has bits.
+  /// Advances `z` by whole tiles.
   HWY_INLINE void Advance(size_t tile_count, Z& z) const {
-    if (tile_count == 0) return;
-    Z power = Power(kTileFrames - 1);
-    for (;;) {
-      if ((tile_count & 1) != 0) z.Multiply(power);
-      tile_count >>= 1;
-      if (tile_count == 0) return;
-      power.Multiply(Z(power));
-    }
+    Raise(Power(kTileNodes - 1), tile_count, z);
   }
 
-  /// Renders one tile: each sample straight from the state, then one step for all of them.
-  HWY_INLINE void AddTile(Z& z, float* HWY_RESTRICT mix) const {
-    const Floats d;
-    V sum[kTileFrames];
-#pragma GCC unroll 16
-    for (size_t k = 0; k < kTileFrames; ++k) sum[k] = hn::Load(d, mix + k * kMostLanes);
-#pragma GCC unroll 8
-    for (size_t v = 0; v < kVectors; ++v) {
-      sum[0] = hn::Add(sum[0], z.re[v]);
-#pragma GCC unroll 16
-      for (size_t k = 1; k < kTileFrames; ++k) {
-        sum[k] = hn::MulAdd(z.re[v], PowerRe(v, k - 1), sum[k]);
-        sum[k] = hn::NegMulAdd(z.im[v], PowerIm(v, k - 1), sum[k]);
-      }
-      z.Multiply(v, PowerRe(v, kTileFrames - 1), PowerIm(v, kTileFrames - 1));
-    }
-#pragma GCC unroll 16
-    for (size_t k = 0; k < kTileFrames; ++k) hn::Store(sum[k], d, mix + k * kMostLanes);
+  /// q^frame_count, of at least one.
+  HWY_INLINE Z FramePower(size_t frame_count) const {
+    Z q;
+    q.Load(q_re, q_im);
+    Z power = q;
+    Raise(q, frame_count - 1, power);
+    return power;
   }
 
-  /// The first `frame_count` samples of a tile, and the state at its end.
+  /// Renders one tile of the first kind: each sample straight from the state, then one step for all
+  /// of them.
+  HWY_INLINE void AddTile(Z& z, float* mix) const { AddNodes<kTileNodes>(z, mix); }
+
+  /// The same to the nodes of a longer tile, at its end too.
+  HWY_INLINE void AddClosedTile(Z& z, float* nodes) const { AddNodes<kClosedTileNodes>(z, nodes); }
+
+  /// The first `frame_count` samples of a tile of the first kind, and the state at its end.
   HWY_INLINE void AddPart(Z& z, size_t frame_count, float* HWY_RESTRICT mix) const {
     const Floats d;
     for (size_t k = 0; k < frame_count; ++k) {
@@ -157,6 +181,39 @@ struct Oscillators {
       hn::Store(sum, d, mix + k * kMostLanes);
     }
     if (frame_count > 0) z.Multiply(Power(frame_count - 1));
+  }
+
+ private:
+  /// z *= power^exponent, in as many steps as the exponent has bits.
+  static HWY_INLINE void Raise(Z power, size_t exponent, Z& z) {
+    if (exponent == 0) return;
+    for (;;) {
+      if ((exponent & 1) != 0) z.Multiply(power);
+      exponent >>= 1;
+      if (exponent == 0) return;
+      power.Multiply(Z(power));
+    }
+  }
+
+  template <size_t kNodes>
+  HWY_INLINE void AddNodes(Z& z, float* HWY_RESTRICT mix) const {
+    const Floats d;
+    V sum[kNodes];
+#pragma GCC unroll 16
+    for (size_t k = 0; k < kNodes; ++k) sum[k] = hn::Load(d, mix + k * kMostLanes);
+#pragma GCC unroll 8
+    for (size_t v = 0; v < kVectors; ++v) {
+      sum[0] = hn::Add(sum[0], z.re[v]);
+#pragma GCC unroll 16
+      for (size_t k = 1; k < kTileNodes; ++k) {
+        sum[k] = hn::MulAdd(z.re[v], PowerRe(v, k - 1), sum[k]);
+        sum[k] = hn::NegMulAdd(z.im[v], PowerIm(v, k - 1), sum[k]);
+      }
+      z.Multiply(v, PowerRe(v, kTileNodes - 1), PowerIm(v, kTileNodes - 1));
+      if constexpr (kNodes > kTileNodes) sum[kTileNodes] = hn::Add(sum[kTileNodes], z.re[v]);
+    }
+#pragma GCC unroll 16
+    for (size_t k = 0; k < kNodes; ++k) hn::Store(sum[k], d, mix + k * kMostLanes);
   }
 };
 

@@ -21,6 +21,16 @@ size_t CountTogether(std::span<const DueStrike> strikes) {
   return static_cast<size_t>(other - strikes.begin());
 }
 
+/// Of the first strike's bank.
+size_t CountImpulses(std::span<const DueStrike> strikes) {
+  size_t count = 0;
+  for (const DueStrike& strike : strikes) {
+    if (strike.slot != strikes.front().slot) break;
+    if (strike.strike->kind == StrikeKind::kImpulse) ++count;
+  }
+  return count;
+}
+
 }  // namespace
 
 RenderSection::RenderSection(const Settings& settings, std::span<BankSlot> slots)
@@ -59,13 +69,14 @@ SectionCounts RenderSection::Render(uint64_t block_number, std::span<const DueSt
 }
 
 void RenderSection::Strike(std::span<const DueStrike> strikes, SectionCounts& counts) noexcept {
-  while (!strikes.empty()) {
+  for (bool same_bank = false; !strikes.empty();) {
+    if (!same_bank) mix_.batch().due_count = CountImpulses(strikes);
     const size_t count = CountTogether(strikes);
     const std::span<const DueStrike> due = strikes.first(count);
     strikes = strikes.subspan(count);
     const uint32_t index = due.front().slot;
     BankSlot& slot = slots_[index];
-    const bool same_bank_next = !strikes.empty() && strikes.front().slot == index;
+    same_bank = !strikes.empty() && strikes.front().slot == index;
     mix_.batch().ahead = {};
     if (!strikes.empty()) {
       const std::span<const DueStrike> next = strikes.first(CountTogether(strikes));
@@ -80,8 +91,8 @@ void RenderSection::Strike(std::span<const DueStrike> strikes, SectionCounts& co
       slot.sounding = true;
       sounding_.push_back(index);
     }
-    if (!same_bank_next && slot.sounding) RenderBank(slot, counts);
-    if (!same_bank_next) mix_.Reunite();
+    if (!same_bank && slot.sounding) RenderBank(slot, counts);
+    if (!same_bank) mix_.Reunite();
   }
 }
 

@@ -11,6 +11,7 @@
 #include <hwy/highway.h>
 #include "server/synthesis/lane_vectors-inl.h"
 #include "server/synthesis/oscillators-inl.h"
+#include "server/synthesis/passes-inl.h"
 // clang-format on
 
 #include <algorithm>
@@ -22,160 +23,168 @@ namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 using carillon::HWY_NAMESPACE::Doubles;
 using carillon::HWY_NAMESPACE::Floats;
+using carillon::HWY_NAMESPACE::ForVectors;
 using carillon::HWY_NAMESPACE::HalfFloats;
 using carillon::HWY_NAMESPACE::kMostSquared;
+using carillon::HWY_NAMESPACE::kVectorsAPass;
 using carillon::HWY_NAMESPACE::Loudness;
 using carillon::HWY_NAMESPACE::Oscillators;
 using carillon::HWY_NAMESPACE::States;
 using carillon::HWY_NAMESPACE::V;
 
-// Vectors rendered together: four share the sums, which are as many loads and stores less; the
-// powers come from the cache.
-constexpr size_t kVectorsAPass = 4;
-
-/// Asks for what the vectors after some will need, bit by bit while those are rendered: at once,
-/// the requests would only wait for each other.
-class Prefetching {
- public:
-  /// Behind the last lane nothing is there, which does no harm.
-  HWY_INLINE Prefetching(const LaneArrays& lanes, size_t lane)
-      : powers_(lanes.powers.data() + LaneArrays::PowerIndex(lane, 0)),
-        states_{lanes.re.data() + lane, lanes.im.data() + lane},
-        blocks_{lanes.block_re.data() + lane, lanes.block_im.data() + lane} {}
-
-  HWY_INLINE void Step() {
-    Prefetch(powers_, kPowers);
-    powers_ += kPowers;
-    if (step_++ % kSteps < kSteps / 2) {
-      StepBoth(states_);
-    } else {
-      StepBoth(blocks_);
-    }
-  }
-
- private:
-  static constexpr size_t kSteps = 128 / kTileFrames;
-  static constexpr size_t kLanes = kVectorsAPass * hn::MaxLanes(Floats());
-  static constexpr size_t kPowers = kLanes * 2 * kTileFrames / kSteps;
-  static constexpr size_t kDoubles = kLanes / (kSteps / 2);
-
-  template <typename T>
-  static HWY_INLINE void Prefetch(const T* first, size_t count) {
-    constexpr size_t kLine = 64;
-    for (size_t i = 0; i < count; i += kLine / sizeof(T)) __builtin_prefetch(first + i);
-  }
-  static HWY_INLINE void StepBoth(const double* (&arrays)[2]) {
-    for (const double*& array : arrays) {
-      Prefetch(array, kDoubles);
-      array += kDoubles;
-    }
-  }
-
-  const float* powers_;
-  const double *states_[2], *blocks_[2];
-  size_t step_ = 0;
-};
-
-/// Where no vectors come after some.
-struct NothingAhead {
-  HWY_INLINE void Step() const {}
-};
-
-/// Calls ring(oscillators, ahead, lane) for the vectors at `lane`, at most kMost.
-template <size_t kMost, class RingSome>
-HWY_INLINE void ForRest(const LaneArrays& lanes, size_t lane, size_t count, const RingSome& ring) {
-  if (count == kMost) {
-    ring(Oscillators<kMost>(lanes, lane), NothingAhead(), lane);
-  } else if constexpr (kMost > 1) {
-    ForRest<kMost - 1>(lanes, lane, count, ring);
-  }
-}
-
-/// The same for all lanes of `range`, some vectors at a time.
-template <class RingSome>
-HWY_INLINE void ForVectors(const LaneArrays& lanes, LaneRange range, const RingSome& ring) {
-  const size_t pass = kVectorsAPass * hn::Lanes(Floats());
-  const size_t end = range.first + range.count;
-  size_t lane = range.first;
-  for (; lane + pass <= end; lane += pass) {
-    ring(Oscillators<kVectorsAPass>(lanes, lane), Prefetching(lanes, lane + pass), lane);
-  }
-  ForRest<kVectorsAPass - 1>(lanes, lane, (end - lane) / hn::Lanes(Floats()), ring);
-}
-
-void Ring(const LaneArrays& lanes, LaneRange range, size_t frame_count, float* mix) {
-  ForVectors(lanes, range, [&](const auto& oscillators, auto ahead, size_t lane) {
-    typename std::decay_t<decltype(oscillators)>::Z z;
-    z.Load(lanes.re.data() + lane, lanes.im.data() + lane);
-    size_t frame = 0;
-    for (; frame + kTileFrames <= frame_count; frame += kTileFrames) {
-      ahead.Step();
-      oscillators.AddTile(z, mix + frame * kMostLanes);
-    }
-    oscillators.AddPart(z, frame_count - frame, mix + frame * kMostLanes);
-  });
+void Ring(const LaneArrays& lanes, LaneRange range, size_t tile_kind, size_t frame_count,
+          const TileSums& sums) {
+  ForVectors(lanes, range, {.tile_kind = tile_kind},
+             [&](const auto& oscillators, auto ahead, size_t lane) {
+               typename std::decay_t<decltype(oscillators)>::Z z;
+               z.Load(lanes.re.data() + lane, lanes.im.data() + lane);
+               const size_t kind = oscillators.tile_kind;
+               float* sum = sums[kind];
+               if (kind > 0) {
+                 for (size_t frame = 0; frame < frame_count; frame += kTileFrames[kind]) {
+                   ahead.Step(kind);
+                   oscillators.AddClosedTile(z, sum);
+                   sum += kClosedTileNodes * kMostLanes;
+                 }
+                 return;
+               }
+               size_t frame = 0;
+               for (; frame + kTileFrames[0] <= frame_count; frame += kTileFrames[0]) {
+                 ahead.Step(0);
+                 oscillators.AddTile(z, sum + frame * kMostLanes);
+               }
+               oscillators.AddPart(z, frame_count - frame, sum + frame * kMostLanes);
+             });
 }
 
 /// Vectors that are struck: what rings, and of it what is newborn.
 template <size_t kVectors, class Ahead>
-struct StruckVectors {
+class StruckVectors {
+ public:
   using Z = States<kVectors>;
-  const Oscillators<kVectors>& oscillators;
-  Ahead ahead;
   Z all, newborn;
-  size_t newborn_at = 0;  // the frame of its state
-  bool any_newborn = false;
+
+  HWY_INLINE StruckVectors(const Oscillators<kVectors>& oscillators, const Ahead& next)
+      : oscillators_(oscillators), ahead_(next) {}
 
   HWY_INLINE void Load(const LaneArrays& lanes, size_t lane) {
     all.Load(lanes.start_re.data() + lane, lanes.start_im.data() + lane);
     newborn.Load(lanes.newborn_re.data() + lane, lanes.newborn_im.data() + lane);
-    any_newborn = true;
+    any_newborn_ = true;
   }
   HWY_INLINE void Store(LaneArrays& lanes, size_t lane) const {
     all.Store(lanes.start_re.data() + lane, lanes.start_im.data() + lane);
     newborn.Store(lanes.newborn_re.data() + lane, lanes.newborn_im.data() + lane);
   }
 
-  /// From part.begin to part.end, in tiles from there on. What is struck within a tile is rendered
-  /// to the tile's end beside the rest, and is a part of it from there on.
-  HWY_INLINE void Ring(const StruckPart& part, size_t lane, float* mix) {
-    size_t frame = newborn_at = part.begin;
+  /// From part.begin to part.end, in tiles from there on.
+  HWY_INLINE void Ring(const StruckPart& part, size_t lane) {
+    newborn_at_ = part.begin;
+    if (oscillators_.tile_kind == 0) {
+      RingFrames(part, lane);
+    } else {
+      RingNodes(part, lane);
+    }
+  }
+
+ private:
+  /// What is struck within a tile is rendered to the tile's end beside the rest, and is a part of
+  /// it from there on.
+  HWY_INLINE void RingFrames(const StruckPart& part, size_t lane) {
+    size_t frame = part.begin;
     size_t strike = 0;
-    for (; frame + kTileFrames <= part.end; frame += kTileFrames) {
-      ahead.Step();
-      oscillators.AddTile(all, mix + frame * kMostLanes);
-      for (; strike < part.batch.count && part.batch.offsets[strike] < frame + kTileFrames;
+    for (; frame + kTileFrames[0] <= part.end; frame += kTileFrames[0]) {
+      ahead_.Step(0);
+      oscillators_.AddTile(all, part.sums[0] + frame * kMostLanes);
+      for (; strike < part.batch.count && part.batch.offsets[strike] < frame + kTileFrames[0];
            ++strike) {
-        Strike(part, strike, lane, frame + kTileFrames, mix);
+        Strike(part, strike, lane, frame + kTileFrames[0]);
       }
     }
     MoveNewborn(frame);
     if (const size_t rest = part.end - frame; rest > 0) {
-      oscillators.AddPart(all, rest, mix + frame * kMostLanes);
-      newborn.Multiply(oscillators.Power(rest - 1));
-      newborn_at = part.end;
+      oscillators_.AddPart(all, rest, part.sums[0] + frame * kMostLanes);
+      newborn.Multiply(oscillators_.Power(rest - 1));
+      newborn_at_ = part.end;
     }
-    for (; strike < part.batch.count; ++strike) Strike(part, strike, lane, part.end, mix);
+    for (; strike < part.batch.count; ++strike) Strike(part, strike, lane, part.end);
+  }
+
+  /// The same in longer tiles, to nodes.
+  HWY_INLINE void RingNodes(const StruckPart& part, size_t lane) {
+    const size_t kind = oscillators_.tile_kind, frame_count = kTileFrames[kind];
+    float* nodes = part.sums[kind];
+    size_t strike = 0;
+    for (size_t frame = part.begin; frame < part.end; frame += frame_count) {
+      ahead_.Step(kind);
+      const size_t tile_end = std::min(frame + frame_count, part.end);
+      Z power;  // to the part's end within a tile
+      const Z* shortened = nullptr;
+      if (tile_end < frame + frame_count) {
+        power = oscillators_.FramePower(tile_end - frame);
+        shortened = &power;
+      }
+      AddNodes(shortened, all, nodes);
+      nodes += kClosedTileNodes * kMostLanes;
+      for (; strike < part.batch.count && part.batch.offsets[strike] < frame + frame_count;
+           ++strike) {
+        Z struck = Struck(part, strike, lane);
+        AddNodes(shortened, struck, part.batch.nodes(strike, kind));
+        Join(struck, tile_end);
+      }
+    }
+    MoveNewborn(part.end);
+    for (; strike < part.batch.count; ++strike) Join(Struck(part, strike, lane), part.end);
+  }
+
+  /// A longer tile; if it is shortened, with the power that leads to its end.
+  HWY_INLINE void AddNodes(const Z* shortened, Z& z, float* nodes) const {
+    const Z begin = z;
+    oscillators_.AddClosedTile(z, nodes);
+    if (shortened == nullptr) return;
+    z = begin;
+    z.Multiply(*shortened);
   }
 
   HWY_INLINE void MoveNewborn(size_t frame) {
-    if (any_newborn) oscillators.Advance((frame - newborn_at) / kTileFrames, newborn);
-    newborn_at = frame;
+    const size_t tile_frames = kTileFrames[oscillators_.tile_kind];
+    if (any_newborn_) {
+      oscillators_.Advance((frame - newborn_at_) / tile_frames, newborn);
+      if (oscillators_.tile_kind > 0) {
+        const size_t rest = (frame - newborn_at_) % tile_frames;
+        if (rest > 0) newborn.Multiply(oscillators_.FramePower(rest));
+      }
+    }
+    newborn_at_ = frame;
   }
 
-  /// A strike that is heard from within the tile that ends at `tile_end`, where the states are.
-  HWY_INLINE void Strike(const StruckPart& part, size_t strike, size_t lane, size_t tile_end,
-                         float* mix) {
-    const size_t offset = part.batch.offsets[strike];
+  HWY_INLINE Z Struck(const StruckPart& part, size_t strike, size_t lane) const {
     Z struck;
     struck.Load(part.batch.re(strike, part.lane_count) + lane,
                 part.batch.im(strike, part.lane_count) + lane);
-    oscillators.AddPart(struck, tile_end - offset, mix + offset * kMostLanes);
-    all.Add(struck);
-    if (newborn_at != tile_end) MoveNewborn(tile_end);
-    newborn.Add(struck);
-    any_newborn = true;
+    return struck;
   }
+
+  /// A strike that is heard from within the tile that ends at `tile_end`, where the states are.
+  HWY_INLINE void Strike(const StruckPart& part, size_t strike, size_t lane, size_t tile_end) {
+    const size_t offset = part.batch.offsets[strike];
+    Z struck = Struck(part, strike, lane);
+    oscillators_.AddPart(struck, tile_end - offset, part.sums[0] + offset * kMostLanes);
+    Join(struck, tile_end);
+  }
+
+  /// Adds what was struck to the states at `frame`.
+  HWY_INLINE void Join(const Z& struck, size_t frame) {
+    all.Add(struck);
+    if (newborn_at_ != frame) MoveNewborn(frame);
+    newborn.Add(struck);
+    any_newborn_ = true;
+  }
+
+  const Oscillators<kVectors>& oscillators_;
+  Ahead ahead_;
+  size_t newborn_at_ = 0;  // the frame of its state
+  bool any_newborn_ = false;
 };
 
 void Start(LaneArrays& lanes, size_t lane_count) {
@@ -188,12 +197,12 @@ void Start(LaneArrays& lanes, size_t lane_count) {
   }
 }
 
-void RingStruck(LaneArrays& lanes, const StruckPart& part, float* mix) {
-  ForVectors(lanes, {0, part.lane_count}, [&](const auto& oscillators, auto ahead, size_t lane) {
+void RingStruck(LaneArrays& lanes, const StruckPart& part) {
+  ForVectors(lanes, part.by_frames, [&](const auto& oscillators, auto ahead, size_t lane) {
     constexpr size_t kVectors = std::decay_t<decltype(oscillators)>::kCount;
-    StruckVectors<kVectors, decltype(ahead)> vectors{oscillators, ahead, {}, {}};
+    StruckVectors<kVectors, decltype(ahead)> vectors(oscillators, ahead);
     vectors.Load(lanes, lane);
-    vectors.Ring(part, lane, mix);
+    vectors.Ring(part, lane);
     vectors.Store(lanes, lane);
   });
 }
@@ -237,13 +246,17 @@ class Advancing {
  public:
   HWY_INLINE Advancing(LaneArrays& lanes, std::span<RingingSegment> segments,
                        double silence_squared)
-      : lanes_(lanes), segments_(segments), silence_squared_(silence_squared) {
-    Begin();
+      : lanes_(lanes), segments_(segments), runs_(lanes.runs), silence_squared_(silence_squared) {
+    for (RingingSegment& segment : segments) {
+      segment.awake_count = 0;
+      segment.loudest_squared = 0;
+    }
+    all_.Clear();
   }
 
   /// `newborn_re` and `newborn_im` are of this group, or null.
   HWY_INLINE void AdvanceGroup(size_t lane, const float* newborn_re, const float* newborn_im) {
-    while (lane >= segments_.front().range.first + segments_.front().range.count) Next();
+    while (lane >= runs_.front().range.first + runs_.front().range.count) Next();
     Loudness group;
     group.Clear();
     for (size_t i = 0; i < kMostLanes; i += hn::Lanes(Doubles())) {
@@ -253,7 +266,7 @@ class Advancing {
     }
     all_.Join(group);
     if (group.Above(silence_squared_)) {
-      segments_.front().awake_count = lane + kMostLanes - segments_.front().range.first;
+      awake_count_ = lane + kMostLanes - runs_.front().range.first;
     } else {
       lanes_.Silence({lane, kMostLanes});
     }
@@ -261,59 +274,62 @@ class Advancing {
 
   /// Whether everything was finite.
   HWY_INLINE bool Finish() {
-    while (!segments_.empty()) Next();
+    while (!runs_.empty()) Next();
     return finite_;
   }
 
  private:
-  HWY_INLINE void Begin() {
-    all_.Clear();
-    if (!segments_.empty()) segments_.front().awake_count = 0;
-  }
   HWY_INLINE void Next() {
-    segments_.front().loudest_squared = all_.Loudest();
+    const LaneRun& run = runs_.front();
+    RingingSegment& segment = segments_[run.segment];
+    segment.loudest_squared = std::max(segment.loudest_squared, all_.Loudest());
+    if (awake_count_ > 0) {
+      segment.awake_count = std::max(segment.awake_count, run.first_in_segment + awake_count_);
+    }
     finite_ &= all_.Finite();
-    segments_ = segments_.subspan(1);
-    Begin();
+    runs_ = runs_.subspan(1);
+    awake_count_ = 0;
+    all_.Clear();
   }
 
   LaneArrays& lanes_;
   std::span<RingingSegment> segments_;
+  std::span<const LaneRun> runs_;  // from this one on
   double silence_squared_;
+  size_t awake_count_ = 0;  // of this run
   Loudness all_;
   bool finite_ = true;
 };
 
-bool RingFreely(LaneArrays& lanes, std::span<RingingSegment> segments, const FreeBlock& block,
-                float* mix) {
-  bool finite = true;
-  for (RingingSegment& segment : segments) {
-    const LaneRange awake{segment.range.first, segment.awake_count};
-    Ring(lanes, awake, block.frame_count, mix);
-    Advancing advancing(lanes, {&segment, 1}, block.silence_squared);
+bool RingFreely(LaneArrays& lanes, std::span<RingingSegment> segments, const FreeBlock& block) {
+  std::array<size_t, kMostSegments> awake_counts;
+  std::ranges::transform(segments, awake_counts.begin(), &RingingSegment::awake_count);
+  Advancing advancing(lanes, segments, block.silence_squared);
+  for (const LaneRun& run : lanes.runs) {
+    const LaneRange awake{run.range.first, run.CountOfFirst(awake_counts[run.segment])};
+    Ring(lanes, awake, run.tile_kind, block.frame_count, block.sums);
     for (size_t group = 0; group < awake.count; group += kMostLanes) {
       advancing.AdvanceGroup(awake.first + group, nullptr, nullptr);
     }
-    finite &= advancing.Finish();
   }
-  return finite;
+  return advancing.Finish();
 }
 
 bool FinishStruck(LaneArrays& lanes, std::span<RingingSegment> segments, const StruckPart& part,
-                  double silence_squared, float* mix) {
+                  double silence_squared) {
   Advancing advancing(lanes, segments, silence_squared);
   // Of some vectors, or as many as a group has.
   alignas(64) float newborn_re[kVectorsAPass * kMostLanes], newborn_im[kVectorsAPass * kMostLanes];
-  ForVectors(lanes, {0, part.lane_count}, [&](const auto& oscillators, auto ahead, size_t lane) {
+  ForVectors(lanes, part.by_frames, [&](const auto& oscillators, auto ahead, size_t lane) {
     constexpr size_t kVectors = std::decay_t<decltype(oscillators)>::kCount;
-    StruckVectors<kVectors, decltype(ahead)> vectors{oscillators, ahead, {}, {}};
+    StruckVectors<kVectors, decltype(ahead)> vectors(oscillators, ahead);
     if (part.started) {
       vectors.Load(lanes, lane);
     } else {
       vectors.all.Load(lanes.re.data() + lane, lanes.im.data() + lane);
       vectors.newborn.Clear();
     }
-    vectors.Ring(part, lane, mix);
+    vectors.Ring(part, lane);
     const size_t first = lane % kMostLanes;
     vectors.newborn.Store(newborn_re + first, newborn_im + first);
     const size_t end = first + kVectors * hn::Lanes(Floats());
@@ -322,14 +338,6 @@ bool FinishStruck(LaneArrays& lanes, std::span<RingingSegment> segments, const S
     }
   });
   return advancing.Finish();
-}
-
-/// Kernels add to as many lanes of a frame as their vectors have.
-void SumLanes(const float* mix, std::span<float> block) {
-  const Floats d;
-  for (size_t n = 0; n < block.size(); ++n) {
-    block[n] = hn::GetLane(hn::SumOfLanes(d, hn::Load(d, mix + n * kMostLanes)));
-  }
 }
 
 const char* Target() { return hwy::TargetName(HWY_TARGET); }
@@ -345,20 +353,19 @@ HWY_EXPORT(Start);
 HWY_EXPORT(RingStruck);
 HWY_EXPORT(AddStrike);
 HWY_EXPORT(FinishStruck);
-HWY_EXPORT(SumLanes);
 HWY_EXPORT(Target);
 
-bool RingFreely(LaneArrays& lanes, std::span<RingingSegment> segments, const FreeBlock& block,
-                float* mix) noexcept {
-  return HWY_DYNAMIC_DISPATCH(RingFreely)(lanes, segments, block, mix);
+bool RingFreely(LaneArrays& lanes, std::span<RingingSegment> segments,
+                const FreeBlock& block) noexcept {
+  return HWY_DYNAMIC_DISPATCH(RingFreely)(lanes, segments, block);
 }
 
 void Start(LaneArrays& lanes, size_t lane_count) noexcept {
   HWY_DYNAMIC_DISPATCH(Start)(lanes, lane_count);
 }
 
-void RingStruck(LaneArrays& lanes, const StruckPart& part, float* mix) noexcept {
-  HWY_DYNAMIC_DISPATCH(RingStruck)(lanes, part, mix);
+void RingStruck(LaneArrays& lanes, const StruckPart& part) noexcept {
+  HWY_DYNAMIC_DISPATCH(RingStruck)(lanes, part);
 }
 
 void AddStrike(LaneArrays& lanes, size_t lane_count, const float* added_re,
@@ -367,12 +374,8 @@ void AddStrike(LaneArrays& lanes, size_t lane_count, const float* added_re,
 }
 
 bool FinishStruck(LaneArrays& lanes, std::span<RingingSegment> segments, const StruckPart& part,
-                  double silence_squared, float* mix) noexcept {
-  return HWY_DYNAMIC_DISPATCH(FinishStruck)(lanes, segments, part, silence_squared, mix);
-}
-
-void SumLanes(const float* mix, std::span<float> block) noexcept {
-  HWY_DYNAMIC_DISPATCH(SumLanes)(mix, block);
+                  double silence_squared) noexcept {
+  return HWY_DYNAMIC_DISPATCH(FinishStruck)(lanes, segments, part, silence_squared);
 }
 
 std::string_view Target() { return HWY_DYNAMIC_DISPATCH(Target)(); }

@@ -7,6 +7,7 @@
 #include <cstdint>
 
 #include "server/synthesis/lane_arrays.h"
+#include "server/synthesis/node_mix.h"
 
 namespace carillon {
 
@@ -26,7 +27,11 @@ class StrikeBatch {
     size_t value_count = 0;  ///< of each
   };
 
-  StrikeBatch() : modal_impulses_(kMostBankLanes), re_(kMostBankLanes), im_(kMostBankLanes) {}
+  StrikeBatch()
+      : modal_impulses_(kMostBankLanes),
+        re_(kMostBankLanes),
+        im_(kMostBankLanes),
+        nodes_(kMostStrikes * kNodeStride) {}
 
   /// How many strikes of a bank of `lane_count` lanes fit.
   static size_t Capacity(size_t lane_count) {
@@ -37,13 +42,27 @@ class StrikeBatch {
   float* re(size_t strike, size_t lane_count) noexcept { return re_.data() + strike * lane_count; }
   float* im(size_t strike, size_t lane_count) noexcept { return im_.data() + strike * lane_count; }
 
+  /// What the strike adds to the nodes of its tile of this kind, not the first; node k is
+  /// [k * kMostLanes].
+  float* nodes(size_t strike, size_t tile_kind) noexcept {
+    return nodes_.data() + strike * kNodeStride + (tile_kind - 1) * kNodeFloats;
+  }
+  static constexpr size_t kNodeFloats = kClosedTileNodes * kMostLanes;
+  static constexpr size_t kNodeStride = (kTileKinds - 1) * kNodeFloats;
+
+  /// Of a part of a block by itself.
+  NodeMix part_nodes;
+
   RowsAhead ahead;
+  /// Impulses of the bank in this block, of all batches.
+  size_t due_count = 0;
   size_t count = 0;
   std::array<size_t, kMostStrikes> offsets{};  ///< in the block, ascending
 
  private:
   LaneArray<float> modal_impulses_;  // by column
   LaneArray<float> re_, im_;         // by strike, then by lane
+  LaneArray<float> nodes_;           // by strike, then by kind
 };
 
 }  // namespace carillon

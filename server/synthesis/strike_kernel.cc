@@ -23,7 +23,6 @@ using carillon::HWY_NAMESPACE::Doubles;
 using carillon::HWY_NAMESPACE::Floats;
 using carillon::HWY_NAMESPACE::HalfFloats;
 using carillon::HWY_NAMESPACE::kMostSquared;
-using carillon::HWY_NAMESPACE::Loudness;
 using carillon::HWY_NAMESPACE::V;
 
 template <size_t kRows>
@@ -88,30 +87,42 @@ HWY_INLINE void SineCosine(V angle, V& sine, V& cosine) {
   cosine = hn::Xor(hn::IfThenElse(odd, s, c), hn::BitCast(d, cosine_sign));
 }
 
-/// The same for 0 <= angle <= pi, from half of it.
-HWY_INLINE void SineCosineOfHalfTurn(V angle, V& sine, V& cosine) {
+/// The same of 2^kDoublings times `angle`, which is at most a quarter turn.
+template <int kDoublings>
+HWY_INLINE void SineCosineOfMultiple(V angle, V& sine, V& cosine) {
   const Floats d;
-  const V half = hn::Mul(angle, hn::Set(d, 0.5F));
-  const V x = hn::Mul(half, half);
+  const V x = hn::Mul(angle, angle);
   V s = hn::MulAdd(x, hn::Set(d, 2.6000559500971576e-06F), hn::Set(d, -1.980661618290469e-04F));
   s = hn::MulAdd(s, x, hn::Set(d, 8.333017118275166e-03F));
   s = hn::MulAdd(s, x, hn::Set(d, -1.6666656732559204e-01F));
-  s = hn::MulAdd(hn::Mul(s, x), half, half);
+  s = hn::MulAdd(hn::Mul(s, x), angle, angle);
   V c = hn::MulAdd(x, hn::Set(d, 2.319440864084754e-05F), hn::Set(d, -1.3855928555130959e-03F));
   c = hn::MulAdd(c, x, hn::Set(d, 4.1663989424705505e-02F));
   c = hn::MulAdd(c, x, hn::Set(d, -4.999993145465851e-01F));
   c = hn::MulAdd(c, x, hn::Set(d, 1.0F));
-  const V twice = hn::Add(s, s);
-  sine = hn::Mul(twice, c);
-  cosine = hn::NegMulAdd(twice, s, hn::Set(d, 1.0F));
+  for (int i = 0; i < kDoublings; ++i) {
+    const V twice = hn::Add(s, s);
+    const V doubled = hn::Mul(twice, c);
+    c = hn::NegMulAdd(twice, s, hn::Set(d, 1.0F));
+    s = doubled;
+  }
+  sine = s;
+  cosine = c;
 }
 
-/// exp(x) for x <= 0: of small x, as a mode's decay within a frame is, by its series.
+/// exp(x): of small x, as a mode's decay within a frame or a tile is, by its series.
 HWY_INLINE V ExpOfDecay(V x) {
   const Floats d;
   const V one = hn::Set(d, 1.0F);
-  if (HWY_UNLIKELY(!hn::AllTrue(d, hn::Ge(x, hn::Set(d, -0.05F))))) return hn::Exp(d, x);
-  V e = hn::MulAdd(x, hn::Set(d, 1.0F / 24), hn::Set(d, 1.0F / 6));
+  const V size = hn::Abs(x);
+  V e = hn::Set(d, 1.0F / 24);
+  if (HWY_UNLIKELY(!hn::AllTrue(d, hn::Le(size, hn::Set(d, 0.05F))))) {
+    if (!hn::AllTrue(d, hn::Le(size, hn::Set(d, 0.5F)))) return hn::Exp(d, x);
+    V more = hn::MulAdd(x, hn::Set(d, 1.0F / 5040), hn::Set(d, 1.0F / 720));
+    more = hn::MulAdd(more, x, hn::Set(d, 1.0F / 120));
+    e = hn::MulAdd(more, x, e);
+  }
+  e = hn::MulAdd(e, x, hn::Set(d, 1.0F / 6));
   e = hn::MulAdd(e, x, hn::Set(d, 0.5F));
   e = hn::MulAdd(e, x, one);
   return hn::MulAdd(e, x, one);
@@ -121,26 +132,38 @@ HWY_INLINE V ExpOfDecay(V x) {
 enum class Reach {
   kAtOnce,   ///< at the frame
   kLead,     ///< up to a frame before it
-  kContact,  ///< and by a contact that takes time
+  kTile,     ///< from elsewhere in a tile, or that far
+  kContact,  ///< from anywhere, and by a contact that takes time
+};
+
+/// How far it is to where a strike's states are wanted.
+struct Way {
+  V lead_frames;  ///< negative: before the strike
+  V tau_squared;
+  size_t share_ahead;  ///< of the values in the rows ahead, for each vector
 };
 
 /// (re, im) *= exp(lead_frames log q + tau^2 s^2/2).
 template <Reach kReach>
-HWY_INLINE void Delay(const LaneArrays& lanes, size_t lane, V lead, V tau_squared, V& re, V& im) {
+HWY_INLINE void Delay(const LaneArrays& lanes, size_t lane, const Way& way, V& re, V& im) {
   const Floats d;
-  V logarithm = hn::Mul(lead, hn::Load(d, lanes.lead_re.data() + lane));
-  V angle = hn::Mul(lead, hn::Load(d, lanes.lead_im.data() + lane));
+  V logarithm = hn::Mul(way.lead_frames, hn::Load(d, lanes.lead_re.data() + lane));
+  V angle = hn::Load(d, lanes.lead_im.data() + lane);
   V magnitude, sine, cosine;
   if constexpr (kReach == Reach::kContact) {
-    logarithm = hn::MulAdd(tau_squared, hn::Load(d, lanes.tau_re.data() + lane), logarithm);
-    angle = hn::MulAdd(tau_squared, hn::Load(d, lanes.tau_im.data() + lane), angle);
+    logarithm = hn::MulAdd(way.tau_squared, hn::Load(d, lanes.tau_re.data() + lane), logarithm);
+    angle = hn::MulAdd(way.tau_squared, hn::Load(d, lanes.tau_im.data() + lane),
+                       hn::Mul(way.lead_frames, angle));
     // Below exp(-80) nothing is heard, and the angle may be too large for a sine.
     const auto heard = hn::Gt(logarithm, hn::Set(d, -80.0F));
     magnitude = hn::IfThenElseZero(heard, hn::Exp(d, logarithm));
     SineCosine(hn::IfThenElseZero(heard, angle), sine, cosine);
   } else {
+    // A frame is at most half a turn, a tile less than a turn.
+    constexpr int kDoublings = kReach == Reach::kTile ? 2 : 1;
     magnitude = ExpOfDecay(logarithm);
-    SineCosineOfHalfTurn(angle, sine, cosine);  // at most a frame: below half a turn
+    const V part = hn::Mul(way.lead_frames, hn::Set(d, 1.0F / (1 << kDoublings)));
+    SineCosineOfMultiple<kDoublings>(hn::Mul(part, angle), sine, cosine);
   }
   const V factor_re = hn::Mul(magnitude, cosine);
   const V factor_im = hn::Mul(magnitude, sine);
@@ -149,6 +172,7 @@ HWY_INLINE void Delay(const LaneArrays& lanes, size_t lane, V lead, V tau_square
   re = rotated;
 }
 
+/// Asks for some values of all rows ahead.
 HWY_INLINE void PrefetchRows(const StrikeBatch::RowsAhead& ahead, size_t first, size_t count) {
   constexpr size_t kLineValues = 32;
   const size_t end = std::min(first + count, ahead.value_count);
@@ -158,40 +182,56 @@ HWY_INLINE void PrefetchRows(const StrikeBatch::RowsAhead& ahead, size_t first, 
   }
 }
 
+/// Whose square sums may be added up; Finite() is false of what is not a number.
+class SumOfSquares {
+ public:
+  HWY_INLINE SumOfSquares() : sum_(hn::Zero(Floats())) {}
+  HWY_INLINE void Add(V re, V im) { sum_ = hn::MulAdd(re, re, hn::MulAdd(im, im, sum_)); }
+  HWY_INLINE bool Finite() const {
+    return hn::GetLane(hn::SumOfLanes(Floats(), sum_)) <= kMostSquared;
+  }
+
+ private:
+  V sum_;
+};
+
 template <Reach kReach>
-bool ExciteLanes(const LaneArrays& lanes, size_t lane_count, const float* modal_impulses,
-                 const Onset& onset, const StrikeBatch::RowsAhead& ahead,
+void ExciteLanes(const LaneArrays& lanes, LaneRange range, const float* modal_impulses,
+                 const Way& way, const StrikeBatch::RowsAhead& ahead, SumOfSquares& sum,
                  float* HWY_RESTRICT added_re, float* HWY_RESTRICT added_im) {
   const Floats d;
   const hn::RebindToSigned<Floats> di;
-  const V lead = hn::Set(d, onset.lead_frames);
-  const V tau_squared = hn::Set(d, onset.tau_s * onset.tau_s);
-  auto small = hn::FirstN(d, hn::Lanes(d));
-  // A share of the rows ahead for each vector.
-  const size_t share = ahead.value_count * hn::Lanes(d) / std::max<size_t>(lane_count, 1) + 1;
-  for (size_t lane = 0; lane < lane_count; lane += hn::Lanes(d)) {
-    PrefetchRows(ahead, lane / hn::Lanes(d) * share, share);
+  for (size_t lane = range.first; lane < range.first + range.count; lane += hn::Lanes(d)) {
+    PrefetchRows(ahead, lane / hn::Lanes(d) * way.share_ahead, way.share_ahead);
     const auto column =
         hn::BitCast(di, hn::Load(hn::RebindToUnsigned<Floats>(), lanes.column.data() + lane));
     const V g = hn::GatherIndex(d, modal_impulses, column);
     V re = hn::Mul(g, hn::Load(d, lanes.gain_re.data() + lane));
     V im = hn::Mul(g, hn::Load(d, lanes.gain_im.data() + lane));
-    if constexpr (kReach != Reach::kAtOnce) Delay<kReach>(lanes, lane, lead, tau_squared, re, im);
+    if constexpr (kReach != Reach::kAtOnce) Delay<kReach>(lanes, lane, way, re, im);
     hn::Store(re, d, added_re + lane);
     hn::Store(im, d, added_im + lane);
-    const V squared = hn::MulAdd(re, re, hn::Mul(im, im));
-    small = hn::And(small, hn::Le(squared, hn::Set(d, kMostSquared)));
+    sum.Add(re, im);
   }
-  return hn::AllTrue(d, small);
 }
 
 bool Excite(const LaneArrays& lanes, size_t lane_count, const float* modal_impulses,
             const Onset& onset, const StrikeBatch::RowsAhead& ahead, float* added_re,
             float* added_im) {
-  const auto excite = onset.tau_s > 0         ? ExciteLanes<Reach::kContact>
-                      : onset.lead_frames > 0 ? ExciteLanes<Reach::kLead>
-                                              : ExciteLanes<Reach::kAtOnce>;
-  return excite(lanes, lane_count, modal_impulses, onset, ahead, added_re, added_im);
+  const Floats d;
+  const size_t share = ahead.value_count * hn::Lanes(d) / std::max<size_t>(lane_count, 1) + 1;
+  SumOfSquares sum;
+  for (const size_t tile_kind : kTileOrder) {
+    const size_t back = tile_kind == 0 ? 0 : onset.frames_into_tiles % kTileFrames[tile_kind];
+    const float lead_frames = onset.lead_frames - static_cast<float>(back);
+    const Way way{hn::Set(d, lead_frames), hn::Set(d, onset.tau_s * onset.tau_s), share};
+    const auto excite = onset.tau_s > 0 || onset.lead_frames > 1 ? ExciteLanes<Reach::kContact>
+                        : back > 0                               ? ExciteLanes<Reach::kTile>
+                        : lead_frames > 0                        ? ExciteLanes<Reach::kLead>
+                                                                 : ExciteLanes<Reach::kAtOnce>;
+    excite(lanes, lanes.by_tile[tile_kind], modal_impulses, way, ahead, sum, added_re, added_im);
+  }
+  return sum.Finite();
 }
 
 }  // namespace HWY_NAMESPACE

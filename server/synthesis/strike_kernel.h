@@ -31,9 +31,12 @@ void Project(const Projection& projection, float* modal_impulses) noexcept;
 struct Onset {
   float lead_frames = 0;  ///< from the strike to its first sample
   float tau_s = 0;        ///< of the Gaussian contact
+  /// From the begin of longer tiles (tile.h) to the strike's frame.
+  size_t frames_into_tiles = 0;
 };
 
-/// What modal impulses add to the states, into added_re and added_im. False: not finite.
+/// What modal impulses add to the states at the strike's frame, of lanes in longer tiles at the
+/// begin of the tile that it falls into; into added_re and added_im. False: not finite.
 bool Excite(const LaneArrays& lanes, size_t lane_count, const float* modal_impulses,
             const Onset& onset, const StrikeBatch::RowsAhead& ahead, float* added_re,
             float* added_im) noexcept;

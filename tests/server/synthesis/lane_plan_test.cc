@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 #include <optional>
@@ -66,6 +67,26 @@ TEST(LanePlan, NoModeRingsInLongerBlocksThanItsDecayAllows) {
       EXPECT_LE(part, ChooseLongBlock(lane.log_q, kBlockFrames).value() + 1);
     }
   }
+}
+
+TEST(LanePlan, EveryLaneIsTiledOnceAndNoneInATileTooLongForIt) {
+  const LanePlan plan = PlanOfManyDecays(800);
+  std::array<size_t, kTileKinds> counts{};
+  for (size_t part = 0; part < plan.lanes.size(); ++part) {
+    size_t end = 0;
+    for (const size_t kind : kTileOrder) {
+      const LaneRange tiled = plan.Tiled(part, kind);
+      EXPECT_EQ(tiled.first, end);
+      EXPECT_EQ(tiled.count % kMostLanes, 0U);
+      end += tiled.count;
+      counts[kind] += tiled.count;
+      for (size_t i = tiled.first; i < std::min(end, plan.lanes[part].size()); ++i) {
+        EXPECT_GE(ChooseTile(plan.lanes[part][i].log_q), kind);
+      }
+    }
+    EXPECT_EQ(end, plan.PaddedCount(part));
+  }
+  for (const size_t count : counts) EXPECT_GT(count, 0U);
 }
 
 }  // namespace

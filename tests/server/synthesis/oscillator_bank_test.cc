@@ -163,6 +163,100 @@ TEST_P(OnEveryTarget, ManyStrikesInABlockSuperpose) {
   }
 }
 
+/// Whole vectors of modes for each kind of tile, and some more of each.
+SoundingModes MakeModesOfAllTiles() {
+  SoundingModes sounding;
+  for (const double lowest_hz : {40.0, 700.0, 4000.0}) {
+    for (int m = 0; m < 37; ++m) {
+      const auto column = static_cast<uint32_t>(sounding.modes.size());
+      sounding.modes.push_back(
+          MakeMode(column, lowest_hz * std::pow(3.1, m / 36.5), -0.5 - 1.5 * m, 40 + m));
+    }
+  }
+  return sounding;
+}
+
+/// With blocks that are whole tiles and such that are not, few strikes, which ring in tiles, and
+/// many.
+TEST_P(OnEveryTarget, StrikesInAndBetweenTilesOfAllKindsSuperpose) {
+  const SoundingModes sounding = MakeModesOfAllTiles();
+  const size_t mode_count = sounding.modes.size();
+  for (const size_t block_frame_count : {128U, 48U, 100U, 256U}) {
+    for (const size_t strike_count : {1U, 3U, 40U}) {
+      OscillatorBank bank(sounding, MakeUniformShapes(mode_count),
+                          {.block_frame_count = block_frame_count});
+      std::vector<float> sound(6 * block_frame_count);
+      std::vector<double> strikes;
+      TestMix test(block_frame_count);
+      for (size_t start = 0; start < sound.size(); start += block_frame_count) {
+        BlockMix& mix = test.Begin();
+        mix.batch().due_count = strike_count;
+        for (size_t i = 0; start <= 2 * block_frame_count && i < strike_count; ++i) {
+          const size_t offset = (i + 1) * (block_frame_count - 1) / strike_count;
+          const float lead = i % 2 == 0 ? 0.375F : 0;
+          bank.Strike(MakeUnitExcitation(), offset, lead, mix);
+          strikes.push_back(static_cast<double>(start + offset) - lead);
+        }
+        test.Render(bank, std::span(sound).subspan(start, block_frame_count));
+      }
+      double error = 0, peak = 0;
+      for (size_t n = 0; n < sound.size(); n += 5) {
+        double right = 0;
+        for (const double strike : strikes) {
+          right += SumOfModes(sounding, 1, (static_cast<double>(n) - strike) * kDt);
+        }
+        error = std::max(error, std::abs(sound[n] - right));
+        peak = std::max(peak, std::abs(right));
+      }
+      EXPECT_LT(20 * std::log10(error / peak), -110)
+          << strike_count << " strikes in blocks of " << block_frame_count;
+    }
+  }
+}
+
+/// A contact that takes time reaches into tiles, too.
+TEST_P(OnEveryTarget, AContactThatTakesTimeRingsInTilesOfAllKinds) {
+  const SoundingModes sounding = MakeModesOfAllTiles();
+  for (const size_t offset : {0U, 50U, 127U}) {
+    OscillatorBank bank(sounding, MakeUniformShapes(sounding.modes.size()), {});
+    Excitation excitation = MakeUnitExcitation();
+    excitation.tau_s = 1e-4F;
+    const auto sound = Ring(bank, excitation, 1024, offset, 0.25F);
+    EXPECT_LT(ErrorDb(std::vector(sound.begin() + static_cast<ptrdiff_t>(offset), sound.end()),
+                      sounding, 1, -0.25, excitation.tau_s),
+              -110)
+        << offset;
+  }
+}
+
+TEST_P(OnEveryTarget, MergedStrikesSoundAtTheirMeanTimeWhateverCameBefore) {
+  const SoundingModes sounding = MakeWideModes();
+  PendingStrike pending{.lead_frames = 0.25F, .excitation = MakeUnitExcitation()};
+  const DueStrike merged[] = {{.offset = 8, .merged = true, .strike = &pending},
+                              {.offset = 8, .merged = true, .strike = &pending}};
+  constexpr double kMeanFrame = 8 - 0.25;
+  for (const double exact_frame : {0.0, 11.0}) {
+    OscillatorBank bank(sounding, MakeUniformShapes(37), {});
+    std::vector<float> sound(1024);
+    TestMix test;
+    for (size_t start = 0; start < sound.size(); start += 128) {
+      BlockMix& mix = test.Begin();
+      if (start == 0) bank.Strike(MakeUnitExcitation(), static_cast<size_t>(exact_frame), 0, mix);
+      if (start == 0) bank.StrikeMerged(merged, mix);
+      test.Render(bank, std::span(sound).subspan(start, 128));
+    }
+    double error = 0, peak = 0;
+    for (size_t n = 12; n < sound.size(); ++n) {
+      const auto frame = static_cast<double>(n);
+      const double right = SumOfModes(sounding, 1, (frame - exact_frame) * kDt) +
+                           SumOfModes(sounding, 2, (frame - kMeanFrame) * kDt);
+      error = std::max(error, std::abs(sound[n] - right));
+      peak = std::max(peak, std::abs(right));
+    }
+    EXPECT_LT(20 * std::log10(error / peak), -100) << exact_frame;
+  }
+}
+
 TEST(OscillatorBank, AForceThatIsNotFiniteLeavesASilentBankAsItWas) {
   const SoundingModes sounding = MakeWideModes();
   OscillatorBank bank(sounding, MakeUniformShapes(37), {}),

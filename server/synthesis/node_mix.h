@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "server/synthesis/lane_arrays.h"
+#include "server/synthesis/tile.h"
+
+namespace carillon {
+
+/// Blocks are no longer than this: single-precision coefficients drift from the double state within
+/// a block.
+inline constexpr size_t kMostBlockFrames = 256;
+
+/// Sums over modes at the nodes of tiles longer than the first kind's, still split into the lanes
+/// of a vector.
+class NodeMix {
+ public:
+  void Clear() noexcept { used_ = {}; }
+
+  /// The nodes of this kind's tiles, the first ones of which cover `frame_count` frames; silent at
+  /// the first use. Node k of tile i is [(i * kClosedTileNodes + k) * kMostLanes].
+  float* Use(size_t kind, size_t frame_count) noexcept;
+
+  /// Adds what the tiles sound like, of which the first of each kind begins at `begin`, to
+  /// frames[begin] to frames[end - 1]; reads as far as sum_kernel::AddTiles.
+  void AddTo(size_t begin, size_t end, float* frames) const noexcept;
+
+ private:
+  static constexpr size_t kTileFloats = kClosedTileNodes * kMostLanes;
+  static constexpr std::array<size_t, kTileKinds> kMostTiles = {
+      0, kMostBlockFrames / kTileFrames[1], kMostBlockFrames / kTileFrames[2]};
+
+  float* Nodes(size_t kind) noexcept {
+    return nodes_.data() + (kind == 1 ? 0 : kMostTiles[1] * kTileFloats);
+  }
+  const float* Nodes(size_t kind) const noexcept { return const_cast<NodeMix*>(this)->Nodes(kind); }
+
+  std::array<bool, kTileKinds> used_{};
+  alignas(64) std::array<float, (kMostTiles[1] + kMostTiles[2]) * kTileFloats> nodes_;
+};
+
+}  // namespace carillon
