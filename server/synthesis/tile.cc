@@ -15,8 +15,9 @@ constexpr double kMostDecay = 0.5;
 constexpr double kHighestFrequency = 1.04;
 
 NodeShares MakeNodeShares(size_t kind) noexcept {
+  constexpr double kHarmonics = double{kTileNodes} / 2;
   const double half_step =
-      kHighestFrequency * kMostHalfTurn / static_cast<double>(kTileFrames[kind]) / (kTileNodes / 2);
+      kHighestFrequency * kMostHalfTurn / (kHarmonics * static_cast<double>(kTileFrames[kind]));
   NodeShares shares{};
   for (size_t frame = 0; frame < kTileFrames[kind]; ++frame) {
     for (size_t node = 0; node < kClosedTileNodes; ++node) {
