@@ -3,7 +3,8 @@
 """Carillon's mixer beside the synthesisers that others use, one after the other on one core, and one table.
 
 Modes a core: how many modes one core renders in real time at 48 kHz, from CPU time; of other programs the median of
-three runs, fixed costs taken off. All render the same modes: frequencies log-uniform from 20 Hz to 20 kHz, T60
+three runs, fixed costs taken off. Because a shared core's speed changes from minute to minute, Carillon and Klank run in
+turns: what is printed is the median of the turns, and of the times Klank in each turn, with their range. All render the same modes: frequencies log-uniform from 20 Hz to 20 kHz, T60
 log-uniform from 20 ms to 60 s; none ever sleeps. Error: largest deviation from the closed form in double over the
 largest sample, and the same of root mean squares; of another program against its own recurrence in double, so that
 only its rounding counts.
@@ -13,6 +14,7 @@ import argparse
 import json
 import os
 import pathlib
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -50,9 +52,8 @@ def has(target, build):
                           env=dict(os.environ, CARILLON_MOST_TARGET=target)).returncode == 0
 
 
-def peers(build, folder):
+def peers(folder, modes):
     """Name and modes a core of each."""
-    modes = population(build, 800)
     program = folder / "stk_peer"
     subprocess.run(["g++", "-O3", "-march=native", "-o", program, HERE / "stk_peer.cc", "-lstk"], check=True)
     yield "scsynth Klank, 800 modes", supercollider_peer.throughput(folder, modes)
@@ -62,20 +63,33 @@ def peers(build, folder):
     yield "STK BiQuad", stk_peer.throughput(program, modes)
 
 
+def turns(options, folder, modes):
+    """Carillon's results by target, kind and count of modes: (load, modes a core, times Klank) of each turn."""
+    found = {}
+    targets = [name for name in ("AVX3", "AVX2", "SSE4", "NEON") if has(name, options.build)]
+    for _ in range(options.turns):
+        for target in targets:
+            klank = supercollider_peer.throughput(folder, modes)
+            for what in ("struck", "ringing"):
+                for result in carillon(options.build, what, options.seconds, most_target=target):
+                    found.setdefault((target, what, result["modes"]), []).append(
+                        (result["load"], result["modes_per_core"], result["modes_per_core"] / klank))
+    return found
+
+
 def ringing(options, folder):
-    print("\n## Modes a core\n\n| what | modes | load | modes a core | times Klank | times the best other |\n"
+    print("\n## Modes a core\n\n| what | modes | load | modes a core | times Klank | from ... to |\n"
           "| --- | --- | --- | --- | --- | --- |")
-    others = dict(peers(options.build, folder))
-    klank, best = next(iter(others.values())), max(others.values())
+    modes = population(options.build, 800)
+    others = dict(peers(folder, modes))
+    klank = next(iter(others.values()))
     for name, rate in others.items():
-        row(name, "", "", f"{rate:,.0f}", f"{rate / klank:.2f}", f"{rate / best:.2f}")
-    for target in filter(lambda name: has(name, options.build), ("AVX3", "AVX2", "SSE4", "NEON")):
-        for result in [result for what in ("ringing", "struck")
-                       for result in carillon(options.build, what, options.seconds, most_target=target)]:
-            what = {"ringing": "ringing freely", "struck": "every bank struck in every block"}[result["what"]]
-            row(f"Carillon {target}, {what}", f"{result['modes']:,.0f}", f"{result['load']:.1%}",
-                f"{result['modes_per_core']:,.0f}", f"{result['modes_per_core'] / klank:.1f}",
-                f"{result['modes_per_core'] / best:.1f}")
+        row(name, "", "", f"{rate:,.0f}", f"{rate / klank:.2f}", "")
+    for (target, what, count), results in turns(options, folder, modes).items():
+        loads, rates, times = zip(*results)
+        what = {"ringing": "ringing freely", "struck": "every bank struck in every block"}[what]
+        row(f"Carillon {target}, {what}", f"{count:,.0f}", f"{statistics.median(loads):.1%}",
+            f"{statistics.median(rates):,.0f}", f"{statistics.median(times):.1f}", f"{min(times):.1f} ... {max(times):.1f}")
 
 
 def accuracy(options, folder):
@@ -166,6 +180,7 @@ def main():
     parser.add_argument("--parts", type=lambda text: text.split(","), default=list(PARTS),
                         help="some of " + ",".join(PARTS))
     parser.add_argument("--seconds", type=float, default=5, help="of sound, for each measurement of modes")
+    parser.add_argument("--turns", type=int, default=5, help="of measurements of modes")
     parser.add_argument("--flood-seconds", type=float, default=60)
     parser.add_argument("--latency-strikes", type=lambda text: tuple(map(int, text.split("x"))), default=(40, 100),
                         help="STREAMSxSTRIKES: so many streams, and strikes in each")
