@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "absl/strings/str_cat.h"
 #include "proto/error_reason.h"
@@ -12,6 +13,12 @@ namespace {
 
 bool Finite(const std::array<double, 3>& vector) {
   return std::ranges::all_of(vector, [](double x) { return std::isfinite(x); });
+}
+
+/// In single precision, too, in which strikes are rendered.
+bool FiniteInSingle(const std::array<double, 3>& vector) {
+  return std::ranges::all_of(
+      vector, [](double x) { return std::abs(x) <= std::numeric_limits<float>::max(); });
 }
 
 absl::Status Invalid(absl::string_view reason, absl::string_view message) {
@@ -56,10 +63,11 @@ absl::Status ValidateWeights(const std::array<double, 3>& weights) {
 }
 
 absl::Status Validate(const ContactImpulse& contact) {
-  if (!Finite(contact.impulse_newton_seconds)) {
-    return Invalid("IMPULSE_NOT_FINITE",
-                   "the impulse has a component that is not a finite number: send N s in the "
-                   "object's frame");
+  if (!FiniteInSingle(contact.impulse_newton_seconds)) {
+    return Invalid(
+        "IMPULSE_NOT_FINITE",
+        "the impulse has a component that is no finite number, or beyond 3.4e38: send N s in "
+        "the object's frame");
   }
   if (!(contact.duration_s >= 0 && contact.duration_s <= kLongestContactS)) {
     return Invalid("INVALID_DURATION",

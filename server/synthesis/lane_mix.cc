@@ -2,23 +2,20 @@
 #include "server/synthesis/lane_mix.h"
 
 #include <algorithm>
-#include <cassert>
 
 #include "server/synthesis/sum_kernel.h"
 
 namespace carillon {
 
 void LaneMix::Clear(size_t frame_count) noexcept {
-  frame_count_ = frame_count;
   std::fill_n(lanes_.data(), frame_count * kMostLanes, 0.0F);
   std::fill_n(frames_.data(), frame_count, 0.0F);
   nodes_.Clear();
 }
 
 void LaneMix::Reduce(std::span<float> block) noexcept {
-  assert(block.size() == frame_count_);
   sum_kernel::SumLanes(lanes_.data(), block);
-  nodes_.AddTo(0, frame_count_, frames_.data());
+  nodes_.AddTo(0, block.size(), frames_.data());
   for (size_t n = 0; n < block.size(); ++n) block[n] += frames_[n];
 }
 

@@ -29,10 +29,7 @@ class LaneMix {
   /// What is not split, up to the end of a vector.
   float* frames() noexcept { return frames_.data(); }
 
-  size_t frame_count() const noexcept { return frame_count_; }
-
  private:
-  size_t frame_count_ = 0;
   alignas(64) std::array<float, kMostBlockFrames * kMostLanes> lanes_;
   alignas(64) std::array<float, kMostBlockFrames + kMostLanes> frames_;
   NodeMix nodes_;

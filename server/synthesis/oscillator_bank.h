@@ -74,6 +74,7 @@ class OscillatorBank {
 
   /// The same with the modal impulses g_m, but for the scale of the shapes, of the projected
   /// columns (column_count() of them): what is not a single impulse on a triangle comes in here.
+  /// Tiles are this function's matter, not the caller's.
   bool StrikeModes(std::span<const float> modal_impulses, size_t offset, strike_kernel::Onset onset,
                    BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 

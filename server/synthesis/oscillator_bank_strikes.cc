@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <utility>
 
 #include "server/synthesis/oscillator_bank.h"
 #include "server/synthesis/sum_kernel.h"
@@ -77,7 +78,7 @@ bool OscillatorBank::StrikeMerged(std::span<const DueStrike> strikes, BlockMix& 
     projection.row_count = 0;
     projection.add = true;
   }
-  if (!(weight_sum > 0)) return false;
+  if (!(weight_sum > 0) || !std::isfinite(weight_sum)) return false;
   if (projection.row_count > 0) strike_kernel::Project(projection, modal_impulses);
   const double time = time_sum / weight_sum;
   const double offset = std::max(std::ceil(time), 0.0);
@@ -102,9 +103,8 @@ bool OscillatorBank::StrikeModes(std::span<const float> modal_impulses, size_t o
   assert(modal_impulses.size() == column_count_);
   BeginStrikes(mix);
   StrikeBatch& batch = mix.batch();
-  onset.lead_frames -= static_cast<float>(offset);
-  offset = NotBeforeTheLast(offset, batch);
-  onset.lead_frames += static_cast<float>(offset);
+  const size_t asked = std::exchange(offset, NotBeforeTheLast(offset, batch));
+  onset.lead_frames += static_cast<float>(offset - asked);
   if (batch.count == StrikeBatch::Capacity(lane_count_)) RenderStrikes(offset, mix);
   if (!force_.driving() && !by_frames_) onset.frames_into_tiles = offset - rendered_to_;
   const bool finite =

@@ -83,11 +83,12 @@ template <size_t kVectors>
 struct FramePowers {
   alignas(64) float values[kVectors][2 * kTileNodes * kMostLanes];
 
-  HWY_INLINE void Set(const LaneArrays& lanes, size_t lane) {
+  /// As many as `frame_count` frames need.
+  HWY_INLINE void Set(const LaneArrays& lanes, size_t lane, size_t frame_count) {
     States<kVectors> q, power, step;
     q.Load(lanes.q_re.data() + lane, lanes.q_im.data() + lane);
     power = q;
-    for (size_t k = 0; k + 1 < kTileNodes; ++k) {
+    for (size_t k = 0; k < HWY_MIN(frame_count, kTileNodes - 1); ++k) {
       Store(power, k);
       power.Multiply(q);
     }

@@ -49,6 +49,7 @@ class Prefetching {
 struct Manner {
   size_t tile_kind = 0;
   bool by_frames = false;  ///< in tiles of the first kind all the same
+  size_t frame_count = 0;  ///< so many frames then
 };
 
 /// Calls ring(oscillators, ahead, lane) for some vectors.
@@ -57,7 +58,7 @@ HWY_INLINE void ForSome(const LaneArrays& lanes, size_t lane, Manner manner, con
   Oscillators<kVectors> oscillators(lanes, lane, manner.tile_kind);
   FramePowers<kVectors> powers;
   if (manner.by_frames && manner.tile_kind > 0) {
-    powers.Set(lanes, lane);
+    powers.Set(lanes, lane, manner.frame_count);
     oscillators.Use(powers);
   }
   ring(oscillators, Prefetching<kVectors>(lanes, lane), lane);
@@ -87,10 +88,10 @@ HWY_INLINE void ForVectors(const LaneArrays& lanes, LaneRange range, Manner mann
 
 /// The same for all lanes that there are, ascending.
 template <class RingSome>
-HWY_INLINE void ForVectors(const LaneArrays& lanes, bool by_frames, const RingSome& ring) {
+HWY_INLINE void ForVectors(const LaneArrays& lanes, Manner manner, const RingSome& ring) {
   for (const size_t tile_kind : kTileOrder) {
-    ForVectors(lanes, lanes.by_tile[tile_kind], {.tile_kind = tile_kind, .by_frames = by_frames},
-               ring);
+    manner.tile_kind = tile_kind;
+    ForVectors(lanes, lanes.by_tile[tile_kind], manner, ring);
   }
 }
 

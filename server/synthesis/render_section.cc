@@ -23,10 +23,11 @@ size_t CountTogether(std::span<const DueStrike> strikes) {
 
 /// Of the first strike's bank.
 size_t CountImpulses(std::span<const DueStrike> strikes) {
+  const uint32_t slot = strikes.front().slot;
   size_t count = 0;
-  for (const DueStrike& strike : strikes) {
-    if (strike.slot != strikes.front().slot) break;
-    if (strike.strike->kind == StrikeKind::kImpulse) ++count;
+  while (!strikes.empty() && strikes.front().slot == slot) {
+    if (strikes.front().strike->kind == StrikeKind::kImpulse) ++count;
+    strikes = strikes.subspan(CountTogether(strikes));
   }
   return count;
 }

@@ -28,6 +28,7 @@ using carillon::HWY_NAMESPACE::HalfFloats;
 using carillon::HWY_NAMESPACE::kMostSquared;
 using carillon::HWY_NAMESPACE::kVectorsAPass;
 using carillon::HWY_NAMESPACE::Loudness;
+using carillon::HWY_NAMESPACE::Manner;
 using carillon::HWY_NAMESPACE::Oscillators;
 using carillon::HWY_NAMESPACE::States;
 using carillon::HWY_NAMESPACE::V;
@@ -150,10 +151,8 @@ class StruckVectors {
     const size_t tile_frames = kTileFrames[oscillators_.tile_kind];
     if (any_newborn_) {
       oscillators_.Advance((frame - newborn_at_) / tile_frames, newborn);
-      if (oscillators_.tile_kind > 0) {
-        const size_t rest = (frame - newborn_at_) % tile_frames;
-        if (rest > 0) newborn.Multiply(oscillators_.FramePower(rest));
-      }
+      const size_t rest = (frame - newborn_at_) % tile_frames;
+      if (rest > 0) newborn.Multiply(oscillators_.FramePower(rest));
     }
     newborn_at_ = frame;
   }
@@ -197,8 +196,12 @@ void Start(LaneArrays& lanes, size_t lane_count) {
   }
 }
 
+Manner MannerOf(const StruckPart& part) {
+  return {.by_frames = part.by_frames, .frame_count = part.end - part.begin};
+}
+
 void RingStruck(LaneArrays& lanes, const StruckPart& part) {
-  ForVectors(lanes, part.by_frames, [&](const auto& oscillators, auto ahead, size_t lane) {
+  ForVectors(lanes, MannerOf(part), [&](const auto& oscillators, auto ahead, size_t lane) {
     constexpr size_t kVectors = std::decay_t<decltype(oscillators)>::kCount;
     StruckVectors<kVectors, decltype(ahead)> vectors(oscillators, ahead);
     vectors.Load(lanes, lane);
@@ -320,7 +323,7 @@ bool FinishStruck(LaneArrays& lanes, std::span<RingingSegment> segments, const S
   Advancing advancing(lanes, segments, silence_squared);
   // Of some vectors, or as many as a group has.
   alignas(64) float newborn_re[kVectorsAPass * kMostLanes], newborn_im[kVectorsAPass * kMostLanes];
-  ForVectors(lanes, part.by_frames, [&](const auto& oscillators, auto ahead, size_t lane) {
+  ForVectors(lanes, MannerOf(part), [&](const auto& oscillators, auto ahead, size_t lane) {
     constexpr size_t kVectors = std::decay_t<decltype(oscillators)>::kCount;
     StruckVectors<kVectors, decltype(ahead)> vectors(oscillators, ahead);
     if (part.started) {

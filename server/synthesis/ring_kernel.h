@@ -28,7 +28,7 @@ namespace ring_kernel {
 
 /// Where values are added, by kind of tile: of the first, those of frame n of the block at
 /// [n * kMostLanes]; of others, those of node k of tile i at
-/// [(i * kClosedTileNodes + k) * kMostLanes]; null where no lanes have that kind.
+/// [(i * kClosedTileNodes + k) * kMostLanes]; null where no lanes are rendered in that kind.
 using TileSums = std::array<float*, kTileKinds>;
 
 /// A block in which nothing is struck.

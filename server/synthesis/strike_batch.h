@@ -54,7 +54,7 @@ class StrikeBatch {
   NodeMix part_nodes;
 
   RowsAhead ahead;
-  /// Impulses of the bank in this block, of all batches.
+  /// Impulses in this block, of all batches, of the bank that is being struck; merged ones are one.
   size_t due_count = 0;
   size_t count = 0;
   std::array<size_t, kMostStrikes> offsets{};  ///< in the block, ascending

@@ -31,7 +31,8 @@ void Project(const Projection& projection, float* modal_impulses) noexcept;
 struct Onset {
   float lead_frames = 0;  ///< from the strike to its first sample
   float tau_s = 0;        ///< of the Gaussian contact
-  /// From the begin of longer tiles (tile.h) to the strike's frame.
+  /// To the strike's frame from that where longer tiles (tile.h) begin one after the other; 0:
+  /// states are wanted at the strike's frame.
   size_t frames_into_tiles = 0;
 };
 

@@ -19,8 +19,9 @@ inline constexpr size_t kClosedTileNodes = kTileNodes + 1;
 /// The longest first.
 inline constexpr std::array<size_t, kTileKinds> kTileOrder = {2, 1, 0};
 
-/// The longest kind of tile that renders a mode to -110 dB of its amplitude; `log_q` is
-/// (sigma + i omega)/rate. Within it the mode makes less than a whole turn.
+/// The longest kind of tile that renders a mode to -110 dB of its amplitude at the tile's begin,
+/// which may be 4 dB above that of a strike late in the tile; `log_q` is (sigma + i omega)/rate.
+/// Within it the mode makes less than a whole turn.
 size_t ChooseTile(std::complex<double> log_q);
 
 /// Where a node is, in frames from the tile's begin: of longer tiles Chebyshev's points with both

@@ -28,7 +28,7 @@ TEST(Contact, AnOrdinaryOneIsValid) {
 }
 
 TEST(Contact, AnImpulseMustBeFinite) {
-  for (const double bad : {kNan, kInfinity, -kInfinity}) {
+  for (const double bad : {kNan, kInfinity, -kInfinity, 4e38, -1e300}) {
     ContactImpulse contact = MakeContact();
     contact.impulse_newton_seconds[1] = bad;
     EXPECT_THAT(Validate(contact).ToString(), HasSubstr("IMPULSE_NOT_FINITE"));

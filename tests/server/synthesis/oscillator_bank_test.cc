@@ -3,8 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <complex>
+#include <initializer_list>
 #include <limits>
 #include <numbers>
 #include <vector>
@@ -176,13 +178,14 @@ SoundingModes MakeModesOfAllTiles() {
   return sounding;
 }
 
-/// With blocks that are whole tiles and such that are not, few strikes, which ring in tiles, and
-/// many.
+/// With blocks that are whole tiles and such that are not, few strikes and many, which go frame by
+/// frame if that was told, in parts of a block.
 TEST_P(OnEveryTarget, StrikesInAndBetweenTilesOfAllKindsSuperpose) {
   const SoundingModes sounding = MakeModesOfAllTiles();
   const size_t mode_count = sounding.modes.size();
   for (const size_t block_frame_count : {128U, 48U, 100U, 256U}) {
-    for (const size_t strike_count : {1U, 3U, 40U}) {
+    for (const auto [strike_count, due_count] :
+         std::initializer_list<std::array<size_t, 2>>{{1, 1}, {3, 3}, {40, 40}, {40, 1}}) {
       OscillatorBank bank(sounding, MakeUniformShapes(mode_count),
                           {.block_frame_count = block_frame_count});
       std::vector<float> sound(6 * block_frame_count);
@@ -190,10 +193,10 @@ TEST_P(OnEveryTarget, StrikesInAndBetweenTilesOfAllKindsSuperpose) {
       TestMix test(block_frame_count);
       for (size_t start = 0; start < sound.size(); start += block_frame_count) {
         BlockMix& mix = test.Begin();
-        mix.batch().due_count = strike_count;
+        mix.batch().due_count = due_count;
         for (size_t i = 0; start <= 2 * block_frame_count && i < strike_count; ++i) {
           const size_t offset = (i + 1) * (block_frame_count - 1) / strike_count;
-          const float lead = i % 2 == 0 ? 0.375F : 0;
+          const float lead = i % 2 == 0 ? 0.3F : 0;
           bank.Strike(MakeUnitExcitation(), offset, lead, mix);
           strikes.push_back(static_cast<double>(start + offset) - lead);
         }
@@ -211,6 +214,15 @@ TEST_P(OnEveryTarget, StrikesInAndBetweenTilesOfAllKindsSuperpose) {
       EXPECT_LT(20 * std::log10(error / peak), -110)
           << strike_count << " strikes in blocks of " << block_frame_count;
     }
+  }
+}
+
+TEST_P(OnEveryTarget, LateInALongBlockAStrikeBetweenSamplesIsAsExactAsEarly) {
+  const SoundingModes sounding{.modes = {MakeMode(0, 19000, -5, 40)}};
+  for (const size_t offset : {0U, 255U}) {
+    OscillatorBank bank(sounding, MakeUniformShapes(1), {.block_frame_count = 256});
+    const auto sound = Ring(bank, MakeUnitExcitation(), 1024, offset, 0.3F, 256);
+    EXPECT_LT(ErrorDb(sound, sounding, 1, static_cast<double>(offset) - double{0.3F}), -110);
   }
 }
 
@@ -255,6 +267,28 @@ TEST_P(OnEveryTarget, MergedStrikesSoundAtTheirMeanTimeWhateverCameBefore) {
     }
     EXPECT_LT(20 * std::log10(error / peak), -100) << exact_frame;
   }
+}
+
+TEST(OscillatorBank, MergedStrikesThatAreNotFiniteLeaveItAsItWas) {
+  const SoundingModes sounding = MakeWideModes();
+  OscillatorBank bank(sounding, MakeUniformShapes(37), {}),
+      fresh(sounding, MakeUniformShapes(37), {});
+  PendingStrike pending{.excitation = MakeUnitExcitation()};
+  pending.excitation.impulse_newton_seconds[0] = std::numeric_limits<float>::infinity();
+  const DueStrike merged[] = {{.offset = 8, .merged = true, .strike = &pending},
+                              {.offset = 9, .merged = true, .strike = &pending}};
+  std::vector<float> block(128), right(128);
+  TestMix test, fresh_test;
+  BlockMix &mix = test.Begin(), &fresh_mix = fresh_test.Begin();
+  // As many as fit: one more would render what is there first.
+  for (size_t i = 0; i < StrikeBatch::kMostStrikes; ++i) {
+    bank.Strike(MakeUnitExcitation(), 5, 0, mix);
+    fresh.Strike(MakeUnitExcitation(), 5, 0, fresh_mix);
+  }
+  EXPECT_FALSE(bank.StrikeMerged(merged, mix));
+  test.Render(bank, block);
+  fresh_test.Render(fresh, right);
+  EXPECT_EQ(block, right);
 }
 
 TEST(OscillatorBank, AForceThatIsNotFiniteLeavesASilentBankAsItWas) {
