@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // How many modes one core renders in real time: ringing freely, and struck in every block.
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
@@ -71,9 +72,17 @@ void Report(const char* name, const Stage& stage, const std::vector<double>& blo
   std::fflush(stdout);
 }
 
+/// Small scenes are rendered longer, so that each takes about as much CPU time as other programs
+/// are given.
+double LengthS(size_t mode_count, double seconds) {
+  constexpr double kLargeScene = 80'000;
+  return seconds * std::max(kLargeScene / static_cast<double>(mode_count), 1.0);
+}
+
 /// Every bank is struck once a second, in turn, and rings on by spectrum.
 void MeasureRinging(size_t mode_count, double seconds) {
   Stage stage(mode_count);
+  seconds = LengthS(mode_count, seconds);
   for (size_t bank = 0; bank < stage.bank_count(); ++bank) {
     stage.Strike(bank, bank % kBlock);
     if (bank % 8 == 7) stage.Render();
@@ -94,6 +103,7 @@ void MeasureRinging(size_t mode_count, double seconds) {
 /// Every bank is struck in every block, between two samples.
 void MeasureStruck(size_t mode_count, double seconds) {
   Stage stage(mode_count);
+  seconds = LengthS(mode_count, seconds);
   std::vector<double> block_s;
   const int warm_up = 64;  // until all banks have left the spectrum
   for (int block = 0; block < warm_up + seconds / kBlockS; ++block) {

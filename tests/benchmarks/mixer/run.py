@@ -179,7 +179,7 @@ def main():
     parser.add_argument("--build", type=pathlib.Path, required=True, help="the release build's folder")
     parser.add_argument("--parts", type=lambda text: text.split(","), default=list(PARTS),
                         help="some of " + ",".join(PARTS))
-    parser.add_argument("--seconds", type=float, default=5, help="of sound, for each measurement of modes")
+    parser.add_argument("--seconds", type=float, default=5, help="of sound, for each measurement of 80,000 modes or more; of fewer it is longer")
     parser.add_argument("--turns", type=int, default=5, help="of measurements of modes")
     parser.add_argument("--flood-seconds", type=float, default=60)
     parser.add_argument("--latency-strikes", type=lambda text: tuple(map(int, text.split("x"))), default=(40, 100),
