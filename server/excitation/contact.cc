@@ -11,14 +11,9 @@
 namespace carillon {
 namespace {
 
-bool Finite(const std::array<double, 3>& vector) {
-  return std::ranges::all_of(vector, [](double x) { return std::isfinite(x); });
-}
-
-/// In single precision, too, in which strikes are rendered.
-bool FiniteInSingle(const std::array<double, 3>& vector) {
-  return std::ranges::all_of(
-      vector, [](double x) { return std::abs(x) <= std::numeric_limits<float>::max(); });
+/// And no component beyond `most`.
+bool Finite(const std::array<double, 3>& vector, double most = std::numeric_limits<double>::max()) {
+  return std::ranges::all_of(vector, [most](double x) { return std::abs(x) <= most; });
 }
 
 absl::Status Invalid(absl::string_view reason, absl::string_view message) {
@@ -63,7 +58,8 @@ absl::Status ValidateWeights(const std::array<double, 3>& weights) {
 }
 
 absl::Status Validate(const ContactImpulse& contact) {
-  if (!FiniteInSingle(contact.impulse_newton_seconds)) {
+  // Strikes are rendered in single precision.
+  if (!Finite(contact.impulse_newton_seconds, std::numeric_limits<float>::max())) {
     return Invalid(
         "IMPULSE_NOT_FINITE",
         "the impulse has a component that is no finite number, or beyond 3.4e38: send N s in "

@@ -27,19 +27,14 @@ LaneArrays::LaneArrays(size_t lane_count)
       tau_im(lane_count),
       column(lane_count) {}
 
-const LaneRun& LaneArrays::Add(size_t lane_count, size_t tile_kind, size_t segment,
-                               size_t first_in_segment) {
-  LaneRange& same = by_tile[tile_kind];
-  if (same.count == 0 && !runs.empty()) {
-    same.first = runs.back().range.first + runs.back().range.count;
-  }
-  const LaneRange range{same.first + same.count, lane_count};
-  same.count += lane_count;
-  runs.push_back({.range = range,
+void LaneArrays::Add(size_t lane_count, size_t tile_kind, size_t segment, size_t first_in_segment) {
+  const size_t first = runs.empty() ? 0 : runs.back().range.first + runs.back().range.count;
+  if (by_tile[tile_kind].count == 0) by_tile[tile_kind].first = first;
+  by_tile[tile_kind].count += lane_count;
+  runs.push_back({.range = {first, lane_count},
                   .tile_kind = tile_kind,
                   .segment = segment,
                   .first_in_segment = first_in_segment});
-  return runs.back();
 }
 
 void LaneArrays::Silence(LaneRange range) noexcept {

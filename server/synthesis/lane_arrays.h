@@ -16,6 +16,9 @@ namespace carillon {
 /// The widest vector of floats that any SIMD target uses; arrays over modes are padded to it.
 inline constexpr size_t kMostLanes = 16;
 
+/// What the nodes of a longer tile take while they are split into lanes.
+inline constexpr size_t kNodeFloats = kClosedTileNodes * kMostLanes;
+
 /// A zeroed array aligned for the widest vector.
 template <typename T>
 class LaneArray {
@@ -67,7 +70,7 @@ struct LaneArrays {
   }
 
   /// Places so many lanes more behind all others; in order of their tiles' kind.
-  const LaneRun& Add(size_t lane_count, size_t tile_kind, size_t segment, size_t first_in_segment);
+  void Add(size_t lane_count, size_t tile_kind, size_t segment, size_t first_in_segment);
 
   /// Zeroes the state at the start of the block.
   void Silence(LaneRange range) noexcept;

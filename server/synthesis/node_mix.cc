@@ -9,10 +9,10 @@
 namespace carillon {
 
 float* NodeMix::Use(size_t kind, size_t frame_count) noexcept {
-  float* nodes = Nodes(kind);
+  float* nodes = nodes_.data() + kFirst[kind];
   if (!std::exchange(used_[kind], true)) {
     const size_t tile_count = (frame_count + kTileFrames[kind] - 1) / kTileFrames[kind];
-    std::fill_n(nodes, tile_count * kTileFloats, 0.0F);
+    std::fill_n(nodes, tile_count * kNodeFloats, 0.0F);
   }
   return nodes;
 }
@@ -20,11 +20,8 @@ float* NodeMix::Use(size_t kind, size_t frame_count) noexcept {
 void NodeMix::AddTo(size_t begin, size_t end, float* frames) const noexcept {
   for (size_t kind = 1; kind < kTileKinds; ++kind) {
     if (!used_[kind]) continue;
-    sum_kernel::AddTiles({.shares = GetNodeShares(kind),
-                          .frame_count = kTileFrames[kind],
-                          .begin = begin,
-                          .end = end},
-                         Nodes(kind), frames);
+    sum_kernel::AddTiles({.kind = kind, .begin = begin, .end = end}, nodes_.data() + kFirst[kind],
+                         frames);
   }
 }
 

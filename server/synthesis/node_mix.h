@@ -28,17 +28,14 @@ class NodeMix {
   void AddTo(size_t begin, size_t end, float* frames) const noexcept;
 
  private:
-  static constexpr size_t kTileFloats = kClosedTileNodes * kMostLanes;
   static constexpr std::array<size_t, kTileKinds> kMostTiles = {
       0, kMostBlockFrames / kTileFrames[1], kMostBlockFrames / kTileFrames[2]};
 
-  float* Nodes(size_t kind) noexcept {
-    return nodes_.data() + (kind == 1 ? 0 : kMostTiles[1] * kTileFloats);
-  }
-  const float* Nodes(size_t kind) const noexcept { return const_cast<NodeMix*>(this)->Nodes(kind); }
+  /// Where the nodes of a kind are.
+  static constexpr std::array<size_t, kTileKinds> kFirst = {0, 0, kMostTiles[1] * kNodeFloats};
 
   std::array<bool, kTileKinds> used_{};
-  alignas(64) std::array<float, (kMostTiles[1] + kMostTiles[2]) * kTileFloats> nodes_;
+  alignas(64) std::array<float, (kMostTiles[1] + kMostTiles[2]) * kNodeFloats> nodes_;
 };
 
 }  // namespace carillon

@@ -160,7 +160,6 @@ class OscillatorBank {
   std::optional<strike_kernel::Projection> Project(const Excitation& excitation) const noexcept;
   void AddVertex(size_t vertex, float weight, const Excitation& excitation,
                  strike_kernel::Projection& projection) const noexcept;
-  void PlaceLanes(const LanePlan& plan, size_t part, size_t tile_kind);
   void SetSegments(const LanePlan& plan);
   void MeasureBlow(const LanePlan& plan);
   double TimeWork(size_t lane_count) const noexcept;

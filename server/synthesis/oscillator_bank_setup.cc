@@ -105,31 +105,24 @@ OscillatorBank::OscillatorBank(const LanePlan& plan, const SoundingModes& soundi
   assert(lane_count_ <= StrikeBatch::kMostBankLanes);
   assert(column_count_ <= StrikeBatch::kMostBankLanes);
   for (const size_t tile_kind : kTileOrder) {
-    for (size_t part = 0; part < plan.lanes.size(); ++part) PlaceLanes(plan, part, tile_kind);
+    for (size_t part = 0; part < plan.lanes.size(); ++part) {
+      const LaneRange tiled = plan.Tiled(part, tile_kind);
+      if (tiled.count > 0) lanes_.Add(tiled.count, tile_kind, part, tiled.first);
+    }
   }
   SetSegments(plan);
   const double lowest_rad_per_s =
       sounding.modes.empty() ? 1 : sounding.modes.front().damped_rad_per_s;
   for (const LaneRun& run : lanes_.runs) {
-    const std::span<const PlannedLane> planned = LanesOf(run, plan);
-    for (size_t i = 0; i < planned.size(); ++i) {
-      force_.SetLane(run.range.first + i, planned[i].start,
-                     planned[i].log_q * settings.sample_rate_hz, lowest_rad_per_s);
+    size_t lane = run.range.first;
+    for (const PlannedLane& planned : LanesOf(run, plan)) {
+      WritePowers(planned.log_q, run.tile_kind, lane, lanes_);
+      WriteLane(planned, first_column_, block_frame_count_, lane, lanes_);
+      force_.SetLane(lane++, planned.start, planned.log_q * settings.sample_rate_hz,
+                     lowest_rad_per_s);
     }
   }
   MeasureBlow(plan);
-}
-
-void OscillatorBank::PlaceLanes(const LanePlan& plan, size_t part, size_t tile_kind) {
-  const LaneRange tiled = plan.Tiled(part, tile_kind);
-  if (tiled.count == 0) return;
-  const LaneRun& run = lanes_.Add(tiled.count, tile_kind, part, tiled.first);
-  const std::span<const PlannedLane> planned = LanesOf(run, plan);
-  for (size_t i = 0; i < planned.size(); ++i) {
-    const size_t lane = run.range.first + i;
-    WritePowers(planned[i].log_q, tile_kind, lane, lanes_);
-    WriteLane(planned[i], first_column_, block_frame_count_, lane, lanes_);
-  }
 }
 
 void OscillatorBank::SetSegments(const LanePlan& plan) {

@@ -152,16 +152,17 @@ void OscillatorBank::BeginStrikes(BlockMix& mix) noexcept {
 ring_kernel::StruckPart OscillatorBank::BeginPart(size_t end, BlockMix& mix) const noexcept {
   StrikeBatch& batch = mix.batch();
   batch.part_nodes.Clear();
-  for (size_t kind = 1; kind < kTileKinds && !by_frames_; ++kind) {
-    if (lanes_.by_tile[kind].count == 0) continue;
-    for (size_t i = 0; i < batch.count; ++i) {
-      std::fill_n(batch.nodes(i, kind), StrikeBatch::kNodeFloats, 0.0F);
-    }
-  }
   const bool whole = rendered_to_ == 0 && end == block_frame_count_;
   NodeMix& nodes = whole ? mix.lanes().nodes() : batch.part_nodes;
-  return {.sums = by_frames_ ? ring_kernel::TileSums{mix.lanes().lanes()}
-                             : Sums(nodes, end - rendered_to_, mix.lanes()),
+  const ring_kernel::TileSums sums = by_frames_ ? ring_kernel::TileSums{mix.lanes().lanes()}
+                                                : Sums(nodes, end - rendered_to_, mix.lanes());
+  for (size_t kind = 1; kind < kTileKinds; ++kind) {
+    if (sums[kind] == nullptr) continue;
+    for (size_t i = 0; i < batch.count; ++i) {
+      std::fill_n(batch.nodes(i, kind), kNodeFloats, 0.0F);
+    }
+  }
+  return {.sums = sums,
           .begin = rendered_to_,
           .end = end,
           .started = started_,
@@ -184,10 +185,7 @@ void OscillatorBank::FinishPart(const ring_kernel::StruckPart& part, BlockMix& m
   part.batch.part_nodes.AddTo(part.begin, part.end, frames);
   for (size_t kind = 1; kind < kTileKinds; ++kind) {
     if (part.sums[kind] == nullptr) continue;
-    sum_kernel::AddStruckTiles({.shares = GetNodeShares(kind),
-                                .frame_count = kTileFrames[kind],
-                                .begin = part.begin,
-                                .end = part.end},
+    sum_kernel::AddStruckTiles({.kind = kind, .begin = part.begin, .end = part.end},
                                std::span(part.batch.offsets).first(part.batch.count),
                                part.batch.nodes(0, kind), StrikeBatch::kNodeStride, frames);
   }

@@ -45,7 +45,7 @@ void Ring(const LaneArrays& lanes, LaneRange range, size_t tile_kind, size_t fra
                  for (size_t frame = 0; frame < frame_count; frame += kTileFrames[kind]) {
                    ahead.Step(kind);
                    oscillators.AddClosedTile(z, sum);
-                   sum += kClosedTileNodes * kMostLanes;
+                   sum += kNodeFloats;
                  }
                  return;
                }
@@ -126,7 +126,7 @@ class StruckVectors {
         shortened = &power;
       }
       AddNodes(shortened, all, nodes);
-      nodes += kClosedTileNodes * kMostLanes;
+      nodes += kNodeFloats;
       for (; strike < part.batch.count && part.batch.offsets[strike] < frame + frame_count;
            ++strike) {
         Z struck = Struck(part, strike, lane);

@@ -47,7 +47,6 @@ class StrikeBatch {
   float* nodes(size_t strike, size_t tile_kind) noexcept {
     return nodes_.data() + strike * kNodeStride + (tile_kind - 1) * kNodeFloats;
   }
-  static constexpr size_t kNodeFloats = kClosedTileNodes * kMostLanes;
   static constexpr size_t kNodeStride = (kTileKinds - 1) * kNodeFloats;
 
   /// Of a part of a block by itself.

@@ -76,29 +76,32 @@ HWY_INLINE void AddFrames(const NodeShares& shares, const float* sums, size_t fi
 }
 
 void AddTiles(const Tiles& tiles, const float* nodes, float* frames) {
-  for (size_t first = tiles.begin; first < tiles.end; first += tiles.frame_count) {
+  const size_t frame_count = kTileFrames[tiles.kind];
+  const NodeShares& shares = GetNodeShares(tiles.kind);
+  for (size_t first = tiles.begin; first < tiles.end; first += frame_count) {
     float sums[kClosedTileNodes + kMostLanes];
     SumEach<kClosedTileNodes>(nodes, sums);
-    AddFrames(tiles.shares, sums, first, first, std::min(first + tiles.frame_count, tiles.end),
-              frames);
-    nodes += kClosedTileNodes * kMostLanes;
+    AddFrames(shares, sums, first, first, std::min(first + frame_count, tiles.end), frames);
+    nodes += kNodeFloats;
   }
 }
 
 void AddStruckTiles(const Tiles& tiles, std::span<const size_t> offsets, const float* nodes,
                     size_t node_stride, float* frames) {
+  const size_t frame_count = kTileFrames[tiles.kind];
+  const NodeShares& shares = GetNodeShares(tiles.kind);
   float all[kClosedTileNodes] = {};
   size_t tile_end = 0;
   for (size_t i = 0; i < offsets.size(); ++i) {
-    const size_t first = offsets[i] - (offsets[i] - tiles.begin) % tiles.frame_count;
+    const size_t first = offsets[i] - (offsets[i] - tiles.begin) % frame_count;
     if (first >= tile_end) std::fill_n(all, kClosedTileNodes, 0.0F);
-    tile_end = first + tiles.frame_count;
+    tile_end = first + frame_count;
     float sums[kClosedTileNodes + kMostLanes];
     SumEach<kClosedTileNodes>(nodes + i * node_stride, sums);
     for (size_t k = 0; k < kClosedTileNodes; ++k) all[k] += sums[k];
     size_t end = std::min(tile_end, tiles.end);
     if (i + 1 < offsets.size()) end = std::min(end, offsets[i + 1]);
-    AddFrames(tiles.shares, all, first, offsets[i], end, frames);
+    AddFrames(shares, all, first, offsets[i], end, frames);
   }
 }
 

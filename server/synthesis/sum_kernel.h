@@ -15,8 +15,7 @@ void SumLanes(const float* mix, std::span<float> block) noexcept;
 
 /// Tiles of one kind, of which the first begins at frame `begin`; those before `end` are heard.
 struct Tiles {
-  const NodeShares& shares;
-  size_t frame_count = 0;  ///< of a tile
+  size_t kind = 0;
   size_t begin = 0;
   size_t end = 0;
 };

@@ -71,21 +71,36 @@ inline double SumOfModes(const SoundingModes& sounding, double g, double time_s,
   return sum;
 }
 
-/// Largest deviation from the closed form over its largest value, decibels; of long sounds every
-/// 13th sample is compared.
-inline double ErrorDb(const std::vector<float>& sound, const SoundingModes& sounding, double g,
-                      double strike_frame, double tau_s = 0) {
+/// Largest deviation from right(n) over its largest value, decibels, of every `stride`-th sample
+/// from `first` on.
+template <class Right>
+double DeviationDb(std::span<const float> sound, size_t first, size_t stride, const Right& right) {
   double error = 0, peak = 0;
-  const size_t stride = sound.size() > 10000 ? 13 : 1;
-  for (size_t n = 0; n < sound.size(); n += stride) {
-    const double right =
-        SumOfModes(sounding, g, (static_cast<double>(n) - strike_frame) * kTestFrameS, tau_s);
-    error = std::max(error, std::abs(sound[n] - right));
-    peak = std::max(peak, std::abs(right));
+  for (size_t n = first; n < sound.size(); n += stride) {
+    const double wanted = right(n);
+    error = std::max(error, std::abs(sound[n] - wanted));
+    peak = std::max(peak, std::abs(wanted));
   }
   return 20 * std::log10(error / peak);
 }
 
+/// The same of the closed form; of long sounds every 13th sample is compared.
+inline double ErrorDb(const std::vector<float>& sound, const SoundingModes& sounding, double g,
+                      double strike_frame, double tau_s = 0) {
+  return DeviationDb(sound, 0, sound.size() > 10000 ? 13 : 1, [&](size_t n) {
+    return SumOfModes(sounding, g, (static_cast<double>(n) - strike_frame) * kTestFrameS, tau_s);
+  });
+}
+
+/// Modes over the whole band and all kinds of decay; more than a vector of them, not a multiple.
+inline SoundingModes MakeWideModes() {
+  SoundingModes sounding;
+  for (uint32_t m = 0; m < 37; ++m) {
+    const double frequency_hz = 20 * std::pow(1000.0, m / 36.5);
+    sounding.modes.push_back(MakeMode(m, frequency_hz, m % 3 == 0 ? -0.2 : -0.5 * (m + 1), 40 + m));
+  }
+  return sounding;
+}
 /// A mix and its workspace, block by block.
 class TestMix {
  public:
