@@ -15,9 +15,9 @@
 #include "absl/strings/str_split.h"
 #include "absl/strings/strip.h"
 #include "precompute/fixture_codec.h"
-#include "proto/error_reason.h"
-#include "proto/fixture_text.h"
-#include "proto/material_catalogue.h"
+#include "proto/cpp/error_reason.h"
+#include "proto/cpp/fixture_text.h"
+#include "proto/cpp/material_catalogue.h"
 
 namespace carillon::precompute {
 namespace {

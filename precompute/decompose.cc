@@ -22,7 +22,7 @@
 #include "precompute/modes/audible_modes.h"
 #include "precompute/modes/deformation_modes.h"
 #include "precompute/phase_clock.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 
 namespace carillon::precompute {
 namespace {

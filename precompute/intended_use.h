@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "proto/loss_factor.h"
+#include "proto/cpp/loss_factor.h"
 
 namespace carillon::precompute {
 

@@ -17,7 +17,7 @@
 #include "precompute/progress_reporter.h"
 #include "precompute/sha256.h"
 #include "precompute/worker_events.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 
 namespace carillon::precompute {
 namespace {

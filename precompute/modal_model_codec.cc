@@ -14,7 +14,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "precompute/fixture_codec.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 
 static_assert(std::endian::native == std::endian::little, "arrays are stored little endian");
 

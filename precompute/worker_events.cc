@@ -4,7 +4,7 @@
 #include <google/protobuf/util/delimited_message_util.h>
 
 #include "carillon/v1/decomposition.pb.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 
 namespace carillon::precompute {
 namespace {

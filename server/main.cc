@@ -15,7 +15,7 @@
 #include <utility>
 
 #include "absl/status/status.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 #include "server/api/api_server.h"
 #include "server/api/live_output.h"
 #include "server/base/clock.h"

@@ -9,8 +9,8 @@
 #include <type_traits>
 
 #include "absl/strings/str_cat.h"
-#include "proto/error_reason.h"
-#include "proto/server_address.h"
+#include "proto/cpp/error_reason.h"
+#include "proto/cpp/server_address.h"
 
 namespace carillon {
 namespace {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "client_sdk/cli/material_figures.h"
 
-#include "proto/error_reason.h"
-#include "proto/loss_factor.h"
-#include "proto/material_catalogue.h"
+#include "proto/cpp/error_reason.h"
+#include "proto/cpp/loss_factor.h"
+#include "proto/cpp/material_catalogue.h"
 
 namespace carillon::cli {
 

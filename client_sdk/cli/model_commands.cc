@@ -18,9 +18,9 @@
 #include "client_sdk/cli/find_model.h"
 #include "client_sdk/cli/job_progress.h"
 #include "client_sdk/cli/output.h"
-#include "proto/error_reason.h"
-#include "proto/fixture_text.h"
-#include "proto/material_catalogue.h"
+#include "proto/cpp/error_reason.h"
+#include "proto/cpp/fixture_text.h"
+#include "proto/cpp/material_catalogue.h"
 
 namespace carillon::cli {
 namespace {

@@ -16,8 +16,8 @@
 #include "client_sdk/interchange/gltf_model.h"
 #include "client_sdk/interchange/model_records.h"
 #include "client_sdk/interchange/npz_model.h"
-#include "proto/error_reason.h"
-#include "proto/material_catalogue.h"
+#include "proto/cpp/error_reason.h"
+#include "proto/cpp/material_catalogue.h"
 
 namespace carillon::cli {
 namespace {

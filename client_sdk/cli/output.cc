@@ -8,7 +8,7 @@
 #include <cstdio>
 
 #include "absl/strings/str_format.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 
 namespace carillon::cli {
 

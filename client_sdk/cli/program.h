@@ -8,7 +8,7 @@
 
 #include "absl/status/status.h"
 #include "client_sdk/cpp/client.h"
-#include "proto/server_address.h"
+#include "proto/cpp/server_address.h"
 
 namespace carillon::cli {
 

@@ -7,7 +7,7 @@
 #include "client_sdk/cli/commands.h"
 #include "client_sdk/cli/output.h"
 #include "client_sdk/cli/wave_file.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 
 namespace carillon::cli {
 namespace {

@@ -6,8 +6,8 @@
 #include "client_sdk/cli/commands.h"
 #include "client_sdk/cli/find_model.h"
 #include "client_sdk/cli/output.h"
-#include "proto/error_reason.h"
-#include "proto/material_catalogue.h"
+#include "proto/cpp/error_reason.h"
+#include "proto/cpp/material_catalogue.h"
 
 namespace carillon::cli {
 namespace {

@@ -30,7 +30,7 @@ struct JobRun {
 
 /// The daemon, seen from outside: its calls, as proto/carillon/v1/*_service.proto describes them.
 ///
-/// Every error is a refusal "REASON: message" with its figures (proto/error_reason.h takes it
+/// Every error is a refusal "REASON: message" with its figures (proto/cpp/error_reason.h takes it
 /// apart): those the daemon gives, and SERVER_UNAVAILABLE where none answers. Every method may be
 /// called from every thread.
 class Client {

@@ -12,7 +12,7 @@
 #include "client_sdk/cpp/client.h"
 #include "client_sdk/cpp/rpc_status.h"
 #include "client_sdk/cpp/stubs.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 
 namespace carillon::client {
 namespace {

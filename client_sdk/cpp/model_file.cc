@@ -6,7 +6,7 @@
 #include <google/protobuf/util/delimited_message_util.h>
 
 #include "absl/strings/str_cat.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 
 namespace carillon::client {
 namespace {

@@ -3,7 +3,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "carillon/v1/error.pb.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 
 namespace carillon::client {
 

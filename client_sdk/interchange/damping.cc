@@ -5,8 +5,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "proto/loss_factor.h"
-#include "proto/material_catalogue.h"
+#include "proto/cpp/loss_factor.h"
+#include "proto/cpp/material_catalogue.h"
 
 namespace carillon::interchange {
 namespace {

@@ -2,7 +2,7 @@
 #include "client_sdk/interchange/file_refusal.h"
 
 #include "absl/strings/str_cat.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 
 namespace carillon::interchange {
 

@@ -18,7 +18,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
 #include "client_sdk/interchange/file_refusal.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 
 namespace carillon::interchange {
 namespace {

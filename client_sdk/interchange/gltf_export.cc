@@ -11,8 +11,8 @@
 #include "client_sdk/interchange/gltf_extension.h"
 #include "client_sdk/interchange/gltf_model.h"
 #include "client_sdk/interchange/header_json.h"
-#include "proto/error_reason.h"
-#include "proto/material_catalogue.h"
+#include "proto/cpp/error_reason.h"
+#include "proto/cpp/material_catalogue.h"
 
 namespace carillon::interchange {
 namespace {

@@ -11,7 +11,7 @@
 #include "absl/strings/str_join.h"
 #include "client_sdk/interchange/file_refusal.h"
 #include "client_sdk/interchange/gltf_extension.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 
 namespace carillon::interchange {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "precompute/mesh/mesh_limits.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 
 namespace carillon::precompute {
 

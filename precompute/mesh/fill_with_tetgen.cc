@@ -18,7 +18,7 @@
 #include "precompute/mesh/byte_stream.h"
 #include "precompute/mesh/point_math.h"
 #include "precompute/mesh/run_in_child.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 
 namespace carillon::precompute {
 namespace {

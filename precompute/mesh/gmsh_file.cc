@@ -15,7 +15,7 @@
 #include "precompute/mesh/gmsh41_sections.h"
 #include "precompute/mesh/gmsh_elements.h"
 #include "precompute/mesh/text_lines.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 
 namespace carillon::precompute {
 namespace {

@@ -12,7 +12,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "precompute/mesh/point_math.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 
 namespace carillon::precompute {
 namespace {

@@ -16,7 +16,7 @@
 #include "precompute/mesh/boundary.h"
 #include "precompute/mesh/merge_vertices.h"
 #include "precompute/mesh/point_math.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 
 namespace carillon::precompute {
 namespace {

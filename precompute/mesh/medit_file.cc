@@ -9,7 +9,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "precompute/mesh/number_stream.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 
 namespace carillon::precompute {
 namespace {

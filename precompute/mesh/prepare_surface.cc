@@ -11,7 +11,7 @@
 #include "precompute/mesh/nearest_triangle.h"
 #include "precompute/mesh/point_math.h"
 #include "precompute/mesh/wrap_surface.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 
 namespace carillon::precompute {
 namespace {

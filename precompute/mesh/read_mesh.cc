@@ -16,7 +16,7 @@
 #include "precompute/mesh/medit_file.h"
 #include "precompute/mesh/read_surface.h"
 #include "precompute/mesh/tetgen_file.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 
 namespace carillon::precompute {
 namespace {

@@ -21,7 +21,7 @@
 #include "precompute/mesh/merge_vertices.h"
 #include "precompute/mesh/obj_groups.h"
 #include "precompute/mesh/text_lines.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 
 namespace carillon::precompute {
 namespace {

@@ -17,7 +17,7 @@
 #include "precompute/mesh/point_math.h"
 #include "precompute/mesh/refine_surface.h"
 #include "precompute/mesh/surface_shells.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 
 namespace carillon::precompute {
 namespace {

@@ -13,7 +13,7 @@
 #include "precompute/modes/ritz_refinement.h"
 #include "precompute/modes/solve_cost.h"
 #include "precompute/modes/workers.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 
 namespace carillon::precompute {
 namespace {

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 
 namespace carillon::precompute {
 namespace {

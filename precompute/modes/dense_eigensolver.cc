@@ -7,7 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "precompute/modes/openblas.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 
 namespace carillon::precompute {
 

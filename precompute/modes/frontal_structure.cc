@@ -7,7 +7,7 @@
 #include <numeric>
 
 #include "precompute/modes/node_ordering.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 
 namespace carillon::precompute {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "precompute/modes/front_elimination.h"
 #include "precompute/modes/tile_kernels.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 
 namespace carillon::precompute {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "precompute/modes/front_elimination.h"
 #include "precompute/modes/front_walk.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 
 namespace carillon::precompute {
 namespace {

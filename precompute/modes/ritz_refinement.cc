@@ -13,7 +13,7 @@
 #include "precompute/modes/dense_blas.h"
 #include "precompute/modes/residual_kernels.h"
 #include "precompute/modes/verification.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 
 namespace carillon::precompute {
 namespace {

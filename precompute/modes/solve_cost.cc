@@ -9,7 +9,7 @@
 #include "absl/strings/str_format.h"
 #include "precompute/modes/block_kernels.h"
 #include "precompute/modes/multifrontal_cholesky.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 
 namespace carillon::precompute {
 namespace {

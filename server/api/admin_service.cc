@@ -8,7 +8,7 @@
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 #include "server/api/bearer_token.h"
 #include "server/api/unary_call.h"
 #include "server/mode_database/database_admin.h"

@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 #include "server/api/admin_service.h"
 #include "server/api/audio_service.h"
 #include "server/api/contact_service.h"

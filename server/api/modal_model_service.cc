@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "proto/material_catalogue.h"
+#include "proto/cpp/material_catalogue.h"
 #include "server/api/model_transfer.h"
 #include "server/api/resource_name.h"
 #include "server/api/unary_call.h"

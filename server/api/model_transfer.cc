@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "absl/strings/strip.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 #include "server/api/read_call.h"
 #include "server/api/resource_name.h"
 #include "server/api/status_conversion.h"

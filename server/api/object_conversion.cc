@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/api/object_conversion.h"
 
-#include "proto/material_catalogue.h"
+#include "proto/cpp/material_catalogue.h"
 #include "server/api/pose_conversion.h"
 #include "server/api/resource_name.h"
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 #include "server/api/sample_bytes.h"
 #include "server/api/status_conversion.h"
 #include "server/api/trace_reader.h"

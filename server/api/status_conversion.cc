@@ -4,7 +4,7 @@
 #include <string>
 
 #include "carillon/v1/error.pb.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 
 namespace carillon {
 

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 #include "server/api/contact_conversion.h"
 #include "server/api/object_conversion.h"
 #include "server/api/pose_conversion.h"

@@ -5,7 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/strip.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 #include "server/audio_device/clocked_device.h"
 #include "server/audio_device/portaudio_device.h"
 #include "server/audio_device/wav_writer.h"

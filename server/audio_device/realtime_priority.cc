@@ -4,7 +4,7 @@
 #include <pthread.h>
 #include <sched.h>
 
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 
 namespace carillon {
 namespace {

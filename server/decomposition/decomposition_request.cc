@@ -8,9 +8,9 @@
 #include <set>
 
 #include "absl/strings/str_cat.h"
-#include "proto/error_reason.h"
-#include "proto/fixture_text.h"
-#include "proto/material_catalogue.h"
+#include "proto/cpp/error_reason.h"
+#include "proto/cpp/fixture_text.h"
+#include "proto/cpp/material_catalogue.h"
 #include "server/base/sha256.h"
 #include "server/decomposition/shortest_decimal.h"
 

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 #include "server/decomposition/job_rules.h"
 #include "server/decomposition/memory_estimate.h"
 #include "server/decomposition/worker_command.h"

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 #include "server/base/sha256.h"
 #include "server/decomposition/random_digits.h"
 #include "server/decomposition/worker_events.h"

@@ -12,7 +12,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_replace.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 #include "server/decomposition/job_rules.h"
 #include "server/decomposition/random_digits.h"
 #include "server/decomposition/worker_command.h"

@@ -2,7 +2,7 @@
 #include "server/decomposition/worker_command.h"
 
 #include "absl/strings/str_cat.h"
-#include "proto/fixture_text.h"
+#include "proto/cpp/fixture_text.h"
 #include "server/decomposition/shortest_decimal.h"
 
 namespace carillon {

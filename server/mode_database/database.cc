@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 #include "server/mode_database/schema.h"
 
 namespace carillon {

@@ -8,7 +8,7 @@
 
 #include "absl/functional/function_ref.h"
 #include "absl/strings/str_cat.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 #include "server/base/xxh3.h"
 #include "server/mode_database/database.h"
 #include "server/mode_database/page_token.h"

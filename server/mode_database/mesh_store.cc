@@ -14,7 +14,7 @@
 #include "absl/strings/str_cat.h"
 #include "carillon/v1/modal_model.pb.h"
 #include "carillon/v1/modal_model_service.pb.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 #include "server/mode_database/database.h"
 
 namespace carillon {

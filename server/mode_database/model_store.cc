@@ -7,7 +7,7 @@
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 #include "server/base/sha256.h"
 #include "server/base/xxh3.h"
 #include "server/mode_database/database.h"

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "proto/loss_factor.h"
+#include "proto/cpp/loss_factor.h"
 
 namespace carillon {
 

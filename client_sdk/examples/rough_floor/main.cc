@@ -9,7 +9,7 @@
 #include "absl/strings/str_format.h"
 #include "client_sdk/cpp/contact_trace.h"
 #include "client_sdk/examples/rough_floor/rough_floor.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 
 namespace carillon::rough_floor {
 namespace {

@@ -17,8 +17,8 @@
 #include "client_sdk/cpp/client.h"
 #include "client_sdk/examples/wind_chimes/tubes.h"
 #include "client_sdk/examples/wind_chimes/wind_chimes.h"
-#include "proto/error_reason.h"
-#include "proto/server_address.h"
+#include "proto/cpp/error_reason.h"
+#include "proto/cpp/server_address.h"
 
 namespace carillon::wind_chimes {
 namespace {

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "carillon/v1/error.pb.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 
 namespace carillon::client {
 namespace {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "proto/material_catalogue.h"
+#include "proto/cpp/material_catalogue.h"
 
 namespace carillon::interchange {
 namespace {

@@ -15,7 +15,7 @@
 #include <random>
 
 #include "absl/strings/escaping.h"
-#include "proto/material_catalogue.h"
+#include "proto/cpp/material_catalogue.h"
 #include "tests/client_sdk/interchange/small_model.h"
 
 namespace carillon::interchange {

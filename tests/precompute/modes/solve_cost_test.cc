@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "precompute/modes/multifrontal_cholesky.h"
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 #include "tests/precompute/test_meshes.h"
 
 namespace carillon::precompute {

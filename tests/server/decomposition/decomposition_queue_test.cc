@@ -11,7 +11,7 @@
 #include <thread>
 #include <vector>
 
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 #include "server/base/sha256.h"
 #include "server/decomposition/decomposition_request.h"
 #include "server/decomposition/local_executor.h"

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <vector>
 
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 #include "tests/server/scene/small_model.h"
 
 namespace carillon {

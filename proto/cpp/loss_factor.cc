@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "proto/loss_factor.h"
+#include "proto/cpp/loss_factor.h"
 
 #include <algorithm>
 #include <cmath>

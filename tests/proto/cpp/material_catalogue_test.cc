@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "proto/material_catalogue.h"
+#include "proto/cpp/material_catalogue.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

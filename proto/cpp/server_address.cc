@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "proto/server_address.h"
+#include "proto/cpp/server_address.h"
 
 #include <unistd.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "proto/error_reason.h"
+#include "proto/cpp/error_reason.h"
 
 #include <gtest/gtest.h>
 

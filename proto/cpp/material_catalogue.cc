@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "proto/material_catalogue.h"
+#include "proto/cpp/material_catalogue.h"
 
 #include <google/protobuf/text_format.h>
 
@@ -10,7 +10,7 @@
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
-#include "proto/near_names.h"
+#include "proto/cpp/near_names.h"
 
 namespace carillon {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "proto/fixture_text.h"
+#include "proto/cpp/fixture_text.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

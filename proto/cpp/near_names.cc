@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "proto/near_names.h"
+#include "proto/cpp/near_names.h"
 
 #include <algorithm>
 #include <numeric>

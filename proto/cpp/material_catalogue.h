@@ -7,7 +7,7 @@
 
 #include "absl/status/statusor.h"
 #include "carillon/v1/material.pb.h"
-#include "proto/loss_factor.h"
+#include "proto/cpp/loss_factor.h"
 
 namespace carillon {
 
