@@ -17,7 +17,7 @@
 #include "absl/status/status.h"
 #include "proto/cpp/error_reason.h"
 #include "server/api/api_server.h"
-#include "server/api/live_output.h"
+#include "server/live_output/live_output.h"
 #include "server/base/clock.h"
 #include "server/data_directory.h"
 #include "server/decomposition/decomposition_queue.h"

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "server/api/live_output.h"
+#include "server/live_output/live_output.h"
 #include "server/base/clock.h"
 #include "server/decomposition/decomposition_queue.h"
 #include "server/decomposition/remote_runs.h"

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "carillon/v1/audio_service.grpc.pb.h"
-#include "server/api/live_output.h"
+#include "server/live_output/live_output.h"
 #include "server/api/work_pool.h"
 #include "server/mode_database/mode_database.h"
 #include "server/scene/scene_registry.h"

@@ -4,7 +4,7 @@
 #include <grpcpp/grpcpp.h>
 
 #include "carillon/v1/audio_service.pb.h"
-#include "server/api/live_output.h"
+#include "server/live_output/live_output.h"
 
 namespace carillon {
 

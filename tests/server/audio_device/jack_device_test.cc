@@ -15,7 +15,7 @@
 #include <string>
 #include <vector>
 
-#include "server/api/live_output.h"
+#include "server/live_output/live_output.h"
 #include "server/scene/scene_registry.h"
 #include "tests/server/audio_device/child.h"
 #include "tests/server/mode_database/sample_model.h"

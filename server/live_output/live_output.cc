@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "server/api/live_output.h"
+#include "server/live_output/live_output.h"
 
 #include <algorithm>
 #include <utility>
