@@ -18,7 +18,8 @@ import project
 
 ROOMS = ("server/base/", "server/synthesis/", "server/audio_device/", "server/scene/")
 # Compiled once for each SIMD target, and without a lock or a role: minutes for nothing.
-KERNELS = tuple(f"server/synthesis/{name}_kernel.cc" for name in ("force", "ring", "spectral", "strike"))
+KERNELS = ("server/synthesis/ringing/force_kernel.cc", "server/synthesis/ringing/ring_kernel.cc",
+           "server/synthesis/ringing/strike_kernel.cc", "server/synthesis/spectrum/spectral_kernel.cc")
 KEPT = ("-I", "-isystem", "-D", "-std")
 
 

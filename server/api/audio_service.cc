@@ -3,7 +3,7 @@
 
 #include "server/api/listen_call.h"
 #include "server/api/render_call.h"
-#include "server/synthesis/oscillator_bank.h"
+#include "server/synthesis/bank/oscillator_bank.h"
 
 namespace carillon {
 

@@ -11,7 +11,7 @@
 #include "server/excitation/contact.h"
 #include "server/excitation/load_tracker.h"
 #include "server/scene/sounding_object.h"
-#include "server/synthesis/strike.h"
+#include "server/synthesis/schedule/strike.h"
 
 namespace carillon {
 

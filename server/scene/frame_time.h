@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "server/synthesis/strike.h"
+#include "server/synthesis/schedule/strike.h"
 
 namespace carillon {
 

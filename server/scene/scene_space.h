@@ -9,7 +9,7 @@
 #include "absl/status/status.h"
 #include "server/base/pose.h"
 #include "server/synthesis/mixer.h"
-#include "server/synthesis/voice.h"
+#include "server/synthesis/voice/voice.h"
 
 namespace carillon {
 

@@ -9,7 +9,7 @@
 #include "server/base/mutex.h"
 #include "server/excitation/surface_locator.h"
 #include "server/mode_database/modal_model.h"
-#include "server/synthesis/shape_table.h"
+#include "server/synthesis/bank/shape_table.h"
 
 namespace carillon {
 

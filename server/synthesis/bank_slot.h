@@ -3,8 +3,8 @@
 
 #include <cstdint>
 
-#include "server/synthesis/oscillator_bank.h"
-#include "server/synthesis/voice.h"
+#include "server/synthesis/bank/oscillator_bank.h"
+#include "server/synthesis/voice/voice.h"
 
 namespace carillon {
 

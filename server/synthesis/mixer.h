@@ -17,16 +17,16 @@
 #include "server/base/spsc_ring.h"
 #include "server/base/thread_role.h"
 #include "server/synthesis/bank_slot.h"
-#include "server/synthesis/block_mix.h"
+#include "server/synthesis/bank/block_mix.h"
 #include "server/synthesis/limiter.h"
-#include "server/synthesis/oscillator_bank.h"
-#include "server/synthesis/pending_strikes.h"
+#include "server/synthesis/bank/oscillator_bank.h"
+#include "server/synthesis/schedule/pending_strikes.h"
 #include "server/synthesis/render_crew.h"
 #include "server/synthesis/render_section.h"
-#include "server/synthesis/strike.h"
-#include "server/synthesis/strike_stream.h"
-#include "server/synthesis/strike_triage.h"
-#include "server/synthesis/work_budget.h"
+#include "server/synthesis/schedule/strike.h"
+#include "server/synthesis/schedule/strike_stream.h"
+#include "server/synthesis/schedule/strike_triage.h"
+#include "server/synthesis/schedule/work_budget.h"
 
 namespace carillon {
 

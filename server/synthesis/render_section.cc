@@ -5,7 +5,7 @@
 #include <array>
 #include <utility>
 
-#include "server/synthesis/work_budget.h"
+#include "server/synthesis/schedule/work_budget.h"
 
 namespace carillon {
 namespace {

@@ -9,8 +9,8 @@
 #include "server/base/fixed_vector.h"
 #include "server/base/thread_role.h"
 #include "server/synthesis/bank_slot.h"
-#include "server/synthesis/block_mix.h"
-#include "server/synthesis/due_strike.h"
+#include "server/synthesis/bank/block_mix.h"
+#include "server/synthesis/schedule/due_strike.h"
 
 namespace carillon {
 

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "server/synthesis/level.h"
+#include "server/synthesis/bank/level.h"
 #include "server/synthesis/mixer.h"
 #include "tests/benchmarks/mixer/population.h"
 #include "tests/benchmarks/mixer/programs.h"

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <random>
 
-#include "server/synthesis/sounding_modes.h"
+#include "server/synthesis/bank/sounding_modes.h"
 
 namespace carillon {
 

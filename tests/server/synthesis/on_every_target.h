@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 #include <hwy/targets.h>
 
-#include "server/synthesis/oscillator_bank.h"
+#include "server/synthesis/bank/oscillator_bank.h"
 
 namespace carillon {
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "server/synthesis/mixer.h"
-#include "server/synthesis/strike_triage.h"
+#include "server/synthesis/schedule/strike_triage.h"
 #include "tests/server/synthesis/closed_form.h"
 
 namespace carillon {

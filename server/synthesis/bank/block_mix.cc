@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/synthesis/bank/block_mix.h"
+
+#include <algorithm>
+#include <cassert>
+#include <utility>
+
+namespace carillon {
+namespace {
+
+template <size_t... kKinds>
+std::array<Spectrum, kLongBlockKinds> MakeSpectra(size_t block_frame_count,
+                                                  std::index_sequence<kKinds...>) {
+  const auto blocks = MakeLongBlocks(block_frame_count);
+  return {Spectrum(blocks[kKinds])...};
+}
+
+}  // namespace
+
+RenderDesk::RenderDesk(size_t block_frame_count)
+    : spectra(MakeSpectra(block_frame_count, std::make_index_sequence<kLongBlockKinds>())) {}
+
+BlockMix::BlockMix(size_t block_frame_count, size_t stagger)
+    : long_blocks_(MakeLongBlocks(block_frame_count)), stagger_(stagger) {
+  for (size_t kind = 0; kind < kLongBlockKinds; ++kind) {
+    rendered_[kind].frames.resize(long_blocks_[kind].frame_count);
+  }
+}
+
+void BlockMix::Begin(uint64_t block_number, RenderDesk& desk) noexcept {
+  desk_ = &desk;
+  any_begins_ = false;
+  for (size_t kind = 0; kind < kLongBlockKinds; ++kind) {
+    const size_t count = long_blocks_[kind].block_count;
+    begins_[kind] = (block_number + stagger_ * count / kStaggers) % count == 0;
+    used_[kind] = false;
+    any_begins_ |= begins_[kind];
+  }
+  desk_->lanes.Clear(long_blocks_[0].frame_count / long_blocks_[0].block_count);
+}
+
+bool BlockMix::idle() const noexcept {
+  return std::ranges::none_of(rendered_, &Rendered::sounding);
+}
+
+void BlockMix::SetApart(size_t block_frame_count) noexcept {
+  if (!apart_) desk_->lanes_apart.Clear(block_frame_count);
+  apart_ = true;
+}
+
+void BlockMix::TakeApart(std::span<float> frames) noexcept {
+  std::array<float, kMostBlockFrames> apart;
+  const std::span<float> block = std::span(apart).first(frames.size());
+  desk_->lanes_apart.Reduce(block);
+  for (size_t n = 0; n < frames.size(); ++n) frames[n] += block[n];
+}
+
+void BlockMix::Finish(std::span<float> block) noexcept {
+  desk_->lanes.Reduce(block);
+  for (size_t kind = 0; kind < kLongBlockKinds; ++kind) {
+    Rendered& rendered = rendered_[kind];
+    if (begins_[kind]) {
+      rendered.next = 0;
+      rendered.sounding = used_[kind];
+      if (used_[kind]) desk_->spectra[kind].Transform(rendered.frames);
+    }
+    if (!rendered.sounding) continue;
+    assert(rendered.next + block.size() <= rendered.frames.size());
+    const float* frames = rendered.frames.data() + rendered.next;
+    for (size_t n = 0; n < block.size(); ++n) block[n] += frames[n];
+    rendered.next += block.size();
+  }
+}
+
+}  // namespace carillon

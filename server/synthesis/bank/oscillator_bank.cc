@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: Apache-2.0
+// The rendering thread's side of a bank.
+#include "server/synthesis/bank/oscillator_bank.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "server/synthesis/spectrum/spectral_kernel.h"
+#include "server/synthesis/schedule/work_budget.h"
+
+namespace carillon {
+namespace {
+
+/// A bank that was struck in so many long blocks on end rings in the time domain as a whole: by
+/// spectrum it would cost that and the spectrum too.
+constexpr uint32_t kBusyStreak = 4;
+
+}  // namespace
+
+bool OscillatorBank::out_of_spectrum() const noexcept {
+  return std::ranges::none_of(
+      long_segments_, [](const LongSegment& segment) { return segment.awake || segment.sounding; });
+}
+
+bool OscillatorBank::RenderAdd(BlockMix& mix) noexcept {
+  if (silent()) return true;
+  if (!newborn_ && !force_.driving()) {
+    if (!awake_in_time_ && !mix.any_begins()) return true;
+    BeginBlock(mix);
+    return RenderAddInTime(mix.lanes());
+  }
+  BeginStrikes(mix);
+  return FinishStruck(mix);
+}
+
+bool OscillatorBank::RenderAddInTime(LaneMix& mix) noexcept {
+  finite_ &= ring_kernel::RingFreely(lanes_, segments_,
+                                     {.sums = Sums(mix.nodes(), block_frame_count_, mix),
+                                      .frame_count = block_frame_count_,
+                                      .silence_squared = silence_squared_});
+  return EndBlock();
+}
+
+bool OscillatorBank::EndBlock() noexcept {
+  begun_ = false;
+  if (!finite_) Silence();
+  if (std::exchange(changed_, false) || AwakeCounts() != counted_) CountAwake();
+  return std::exchange(finite_, true);
+}
+
+OscillatorBank::Counts OscillatorBank::AwakeCounts() const noexcept {
+  Counts counts;
+  std::ranges::transform(segments_, counts.begin(), &RingingSegment::awake_count);
+  return counts;
+}
+
+void OscillatorBank::BeginBlock(BlockMix& mix) noexcept {
+  if (std::exchange(begun_, true)) return;
+  for (size_t kind = 0; kind < long_segments_.size(); ++kind) {
+    if (mix.begins(kind)) finite_ &= BeginLongBlock(kind, mix);
+  }
+}
+
+bool OscillatorBank::BeginLongBlock(size_t kind, BlockMix& mix) noexcept {
+  LongSegment& segment = long_segments_[kind];
+  const bool struck = std::exchange(segment.struck, false);
+  segment.struck_streak = struck ? segment.struck_streak + 1 : 0;
+  changed_ |= segment.sounding && !segment.awake;
+  segment.sounding = false;
+  if (segment.struck_streak >= kBusyStreak || leaving_spectrum_) {
+    MoveToTime(kind);
+    return true;
+  }
+  MoveToSpectrum(kind);
+  if (!segment.awake) return true;
+  const spectral_kernel::Spreading advanced =
+      spectral_kernel::Spread(segment.lanes, segment.mode_count, silence_squared_, mix.Slots(kind));
+  changed_ |= advanced.fell_asleep;
+  segment.awake = segment.sounding = advanced.awake;
+  segment.loudest_squared = advanced.loudest_squared;
+  return advanced.finite;
+}
+
+void OscillatorBank::MoveToSpectrum(size_t kind) noexcept {
+  RingingSegment& from = segments_[kind + 1];
+  LongSegment& to = long_segments_[kind];
+  for (const LaneRun& run : lanes_.runs) {
+    if (run.segment != kind + 1) continue;
+    const size_t awake_count = run.CountOfFirst(from.awake_count);
+    for (size_t i = 0; i < awake_count; ++i) {
+      to.lanes.re[run.first_in_segment + i] += lanes_.re[run.range.first + i];
+      to.lanes.im[run.first_in_segment + i] += lanes_.im[run.range.first + i];
+    }
+    lanes_.Silence({run.range.first, awake_count});
+  }
+  std::fill_n(to.lanes.awake.begin(), from.awake_count / kMostLanes, uint8_t{1});
+  to.awake |= from.awake_count > 0;
+  from.awake_count = 0;
+}
+
+void OscillatorBank::MoveToTime(size_t kind) noexcept {
+  LongSegment& from = long_segments_[kind];
+  RingingSegment& to = segments_[kind + 1];
+  if (!from.awake) return;
+  changed_ = true;
+  for (const LaneRun& run : lanes_.runs) {
+    if (run.segment != kind + 1) continue;
+    for (size_t i = 0; i < run.range.count; ++i) {
+      lanes_.re[run.range.first + i] += std::exchange(from.lanes.re[run.first_in_segment + i], 0);
+      lanes_.im[run.range.first + i] += std::exchange(from.lanes.im[run.first_in_segment + i], 0);
+    }
+  }
+  std::ranges::fill(from.lanes.awake, uint8_t{0});
+  from.awake = false;
+  to.awake_count = to.lane_count;
+}
+
+void OscillatorBank::Silence() noexcept {
+  changed_ = true;
+  lanes_.Silence({0, lane_count_});
+  force_.Silence();
+  for (RingingSegment& segment : segments_) segment.awake_count = 0;
+  for (LongSegment& segment : long_segments_) {
+    std::fill_n(segment.lanes.re.data(), segment.lanes.awake.size() * kMostLanes, 0.0);
+    std::fill_n(segment.lanes.im.data(), segment.lanes.awake.size() * kMostLanes, 0.0);
+    std::ranges::fill(segment.lanes.awake, uint8_t{0});
+    segment.awake = segment.sounding = false;
+  }
+}
+
+double OscillatorBank::strike_work() const noexcept {
+  return work::kStrikeLane * static_cast<double>(lane_count_);
+}
+
+double OscillatorBank::merged_strike_work() const noexcept {
+  return work::kMergedLane * static_cast<double>(lane_count_);
+}
+
+double OscillatorBank::awakening_work() const noexcept {
+  size_t asleep_count = lane_count_;
+  for (const RingingSegment& segment : segments_) asleep_count -= segment.awake_count;
+  return TimeWork(asleep_count);
+}
+
+double OscillatorBank::TimeWork(size_t lane_count) const noexcept {
+  return work::kTimeLane * static_cast<double>(lane_count * block_frame_count_) / 128;
+}
+
+double OscillatorBank::loudest_squared() const noexcept {
+  double loudest = 0;
+  for (const RingingSegment& segment : segments_) {
+    if (segment.awake_count > 0) loudest = std::max(loudest, segment.loudest_squared);
+  }
+  for (const LongSegment& segment : long_segments_) {
+    if (segment.awake) loudest = std::max(loudest, segment.loudest_squared);
+  }
+  return loudest;
+}
+
+void OscillatorBank::CountAwake() noexcept {
+  counted_ = AwakeCounts();
+  active_mode_count_ = 0;
+  ringing_work_ = 0;
+  any_awake_ = awake_in_time_ = false;
+  auto mode_count = group_mode_counts_.begin();
+  for (size_t part = 0; part < segments_.size(); ++part) {
+    const RingingSegment& segment = segments_[part];
+    const LongSegment* by_spectrum = part == 0 ? nullptr : &long_segments_[part - 1];
+    awake_in_time_ |= segment.awake_count > 0;
+    ringing_work_ += TimeWork(segment.awake_count);
+    if (by_spectrum != nullptr && by_spectrum->awake) {
+      ringing_work_ += work::kSpectralLane * static_cast<double>(by_spectrum->mode_count) /
+                       static_cast<double>(by_spectrum->block_count);
+    }
+    if (by_spectrum != nullptr) any_awake_ |= by_spectrum->awake || by_spectrum->sounding;
+    for (size_t i = 0; i < segment.lane_count; i += kMostLanes, ++mode_count) {
+      const bool awake = i < segment.awake_count ||
+                         (by_spectrum != nullptr && by_spectrum->lanes.awake[i / kMostLanes] != 0);
+      if (awake) active_mode_count_ += *mode_count;
+    }
+  }
+  any_awake_ |= awake_in_time_;
+}
+
+std::string_view SimdTarget() { return ring_kernel::Target(); }
+
+}  // namespace carillon

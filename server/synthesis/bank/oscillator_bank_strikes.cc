@@ -1,0 +1,232 @@
+// SPDX-License-Identifier: Apache-2.0
+// What happens to a bank within a block.
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <utility>
+
+#include "server/synthesis/bank/oscillator_bank.h"
+#include "server/synthesis/ringing/sum_kernel.h"
+
+namespace carillon {
+namespace {
+
+/// Each strike costs more in longer tiles, of which it takes one by itself; more of them in a block
+/// than this cost more than the tiles save.
+constexpr size_t kMostStrikesInTiles = 8;
+
+/// Of the triangle's.
+size_t NearestVertex(const Excitation& excitation) {
+  return static_cast<size_t>(std::ranges::max_element(excitation.weights) -
+                             excitation.weights.begin());
+}
+
+double Norm(const std::array<float, 3>& vector) {
+  return std::hypot(vector[0], vector[1], vector[2]);
+}
+
+}  // namespace
+
+std::optional<strike_kernel::Projection> OscillatorBank::Project(
+    const Excitation& excitation) const noexcept {
+  strike_kernel::Projection projection{.column_count = column_count_};
+  for (size_t i = 0; i < 3; ++i) {
+    if (excitation.vertices[i] >= shapes_.vertex_count()) return std::nullopt;
+    AddVertex(excitation.vertices[i], excitation.weights[i], excitation, projection);
+  }
+  return projection;
+}
+
+void OscillatorBank::AddVertex(size_t vertex, float weight, const Excitation& excitation,
+                               strike_kernel::Projection& projection) const noexcept {
+  for (size_t axis = 0; axis < 3; ++axis) {
+    projection.rows[projection.row_count] = shapes_.Row(vertex, axis) + first_column_;
+    projection.factors[projection.row_count++] = weight * excitation.impulse_newton_seconds[axis];
+  }
+}
+
+StrikeBatch::RowsAhead OscillatorBank::RowsOf(std::span<const DueStrike> strikes) const noexcept {
+  StrikeBatch::RowsAhead ahead{.value_count = 3 * shapes_.stride()};
+  for (const DueStrike& strike : strikes) {
+    const Excitation& excitation = strike.strike->excitation;
+    const size_t nearest = NearestVertex(excitation);
+    for (size_t i = 0; i < 3; ++i) {
+      const size_t vertex = excitation.vertices[i];
+      if (vertex >= shapes_.vertex_count() || (strike.merged && i != nearest)) continue;
+      ahead.rows[ahead.count++] = shapes_.Row(vertex, 0);
+      if (ahead.count == ahead.rows.size()) return ahead;
+    }
+  }
+  return ahead;
+}
+
+bool OscillatorBank::StrikeMerged(std::span<const DueStrike> strikes, BlockMix& mix) noexcept {
+  float* modal_impulses = mix.batch().modal_impulses();
+  strike_kernel::Projection projection{.column_count = column_count_};
+  double weight_sum = 0, time_sum = 0, tau_squared_sum = 0;
+  for (const DueStrike& due : strikes) {
+    const Excitation& excitation = due.strike->excitation;
+    const size_t nearest = NearestVertex(excitation);
+    if (excitation.vertices[nearest] >= shapes_.vertex_count()) continue;
+    const double weight = Norm(excitation.impulse_newton_seconds);
+    weight_sum += weight;
+    time_sum += weight * (due.offset - double{due.strike->lead_frames});
+    tau_squared_sum += weight * excitation.tau_s * excitation.tau_s;
+    AddVertex(excitation.vertices[nearest], 1, excitation, projection);
+    if (projection.row_count < projection.rows.size()) continue;
+    strike_kernel::Project(projection, modal_impulses);
+    projection.row_count = 0;
+    projection.add = true;
+  }
+  if (!(weight_sum > 0) || !std::isfinite(weight_sum)) return false;
+  if (projection.row_count > 0) strike_kernel::Project(projection, modal_impulses);
+  const double time = time_sum / weight_sum;
+  const double offset = std::max(std::ceil(time), 0.0);
+  return StrikeModes({modal_impulses, column_count_}, static_cast<size_t>(offset),
+                     {.lead_frames = static_cast<float>(offset - time),
+                      .tau_s = static_cast<float>(std::sqrt(tau_squared_sum / weight_sum))},
+                     mix);
+}
+
+bool OscillatorBank::Strike(const Excitation& excitation, size_t offset, float lead_frames,
+                            BlockMix& mix) noexcept {
+  const std::optional<strike_kernel::Projection> projection = Project(excitation);
+  if (!projection) return false;
+  float* modal_impulses = mix.batch().modal_impulses();
+  strike_kernel::Project(*projection, modal_impulses);
+  return StrikeModes({modal_impulses, column_count_}, offset,
+                     {.lead_frames = lead_frames, .tau_s = excitation.tau_s}, mix);
+}
+
+bool OscillatorBank::StrikeModes(std::span<const float> modal_impulses, size_t offset,
+                                 strike_kernel::Onset onset, BlockMix& mix) noexcept {
+  assert(modal_impulses.size() == column_count_);
+  BeginStrikes(mix);
+  StrikeBatch& batch = mix.batch();
+  const size_t asked = std::exchange(offset, NotBeforeTheLast(offset, batch));
+  onset.lead_frames += static_cast<float>(offset - asked);
+  if (batch.count == StrikeBatch::Capacity(lane_count_)) RenderStrikes(offset, mix);
+  if (!force_.driving() && !by_frames_) onset.frames_into_tiles = offset - rendered_to_;
+  const bool finite =
+      strike_kernel::Excite(lanes_, lane_count_, modal_impulses.data(), onset, batch.ahead,
+                            batch.re(batch.count, lane_count_), batch.im(batch.count, lane_count_));
+  if (finite) batch.offsets[batch.count++] = offset;
+  newborn_ = newborn_ || finite;
+  begun_ = begun_ && !silent();  // a silent bank is not rendered in this block
+  return finite;
+}
+
+bool OscillatorBank::Gather(const Excitation& force) noexcept {
+  const std::optional<strike_kernel::Projection> projection = Project(force);
+  if (projection) force_.Gather(*projection);
+  return projection.has_value();
+}
+
+bool OscillatorBank::Tie(const ForceKnot& knot, size_t offset, BlockMix& mix) noexcept {
+  BeginStrikes(mix);
+  StrikeBatch& batch = mix.batch();
+  const bool silent_before = silent();
+  offset = NotBeforeTheLast(offset, batch);
+  RenderStrikes(offset, mix);
+  const bool finite = force_.Tie(knot, lanes_, batch.re(0, lane_count_), batch.im(0, lane_count_));
+  if (finite) batch.offsets[batch.count++] = offset;
+  newborn_ = newborn_ || finite || !silent_before;
+  begun_ = begun_ && !silent();
+  return finite;
+}
+
+size_t OscillatorBank::NotBeforeTheLast(size_t offset, const StrikeBatch& batch) const noexcept {
+  return std::max(offset, batch.count > 0 ? batch.offsets[batch.count - 1] : rendered_to_);
+}
+
+void OscillatorBank::BeginStrikes(BlockMix& mix) noexcept {
+  BeginBlock(mix);
+  if (newborn_) return;
+  mix.batch().count = rendered_to_ = 0;
+  by_frames_ = mix.batch().due_count > kMostStrikesInTiles;
+  started_ = false;
+}
+
+/// The part of the block up to `end`, with what the batch holds. The nodes of a whole block are
+/// those of all banks, those of another part its own.
+ring_kernel::StruckPart OscillatorBank::BeginPart(size_t end, BlockMix& mix) const noexcept {
+  StrikeBatch& batch = mix.batch();
+  batch.part_nodes.Clear();
+  const bool whole = rendered_to_ == 0 && end == block_frame_count_;
+  NodeMix& nodes = whole ? mix.lanes().nodes() : batch.part_nodes;
+  const ring_kernel::TileSums sums = by_frames_ ? ring_kernel::TileSums{mix.lanes().lanes()}
+                                                : Sums(nodes, end - rendered_to_, mix.lanes());
+  for (size_t kind = 1; kind < kTileKinds; ++kind) {
+    if (sums[kind] == nullptr) continue;
+    for (size_t i = 0; i < batch.count; ++i) {
+      std::fill_n(batch.nodes(i, kind), kNodeFloats, 0.0F);
+    }
+  }
+  return {.sums = sums,
+          .begin = rendered_to_,
+          .end = end,
+          .started = started_,
+          .by_frames = by_frames_,
+          .batch = batch,
+          .lane_count = lane_count_};
+}
+
+ring_kernel::TileSums OscillatorBank::Sums(NodeMix& nodes, size_t frame_count,
+                                           LaneMix& mix) const noexcept {
+  ring_kernel::TileSums sums{mix.lanes()};
+  for (size_t kind = 1; kind < kTileKinds; ++kind) {
+    if (lanes_.by_tile[kind].count > 0) sums[kind] = nodes.Use(kind, frame_count);
+  }
+  return sums;
+}
+
+void OscillatorBank::FinishPart(const ring_kernel::StruckPart& part, BlockMix& mix) const noexcept {
+  float* frames = mix.lanes().frames();
+  part.batch.part_nodes.AddTo(part.begin, part.end, frames);
+  for (size_t kind = 1; kind < kTileKinds; ++kind) {
+    if (part.sums[kind] == nullptr) continue;
+    sum_kernel::AddStruckTiles({.kind = kind, .begin = part.begin, .end = part.end},
+                               std::span(part.batch.offsets).first(part.batch.count),
+                               part.batch.nodes(0, kind), StrikeBatch::kNodeStride, frames);
+  }
+}
+
+/// Renders what must be rendered before more can happen in this block.
+void OscillatorBank::RenderStrikes(size_t end, BlockMix& mix) noexcept {
+  if (!started_) ring_kernel::Start(lanes_, lane_count_);
+  started_ = true;
+  if (force_.driving()) return RenderDrivenStrikes(end, mix);
+  const ring_kernel::StruckPart part = BeginPart(end, mix);
+  ring_kernel::RingStruck(lanes_, part);
+  FinishPart(part, mix);
+  mix.batch().count = 0;
+  rendered_to_ = end;
+}
+
+void OscillatorBank::RenderDrivenStrikes(size_t end, BlockMix& mix) noexcept {
+  StrikeBatch& batch = mix.batch();
+  for (size_t i = 0; i < batch.count; ++i) {
+    RenderDriven(batch.offsets[i], mix.lanes());
+    ring_kernel::AddStrike(lanes_, lane_count_, batch.re(i, lane_count_), batch.im(i, lane_count_));
+  }
+  batch.count = 0;
+  RenderDriven(end, mix.lanes());
+}
+
+void OscillatorBank::RenderDriven(size_t end, LaneMix& mix) noexcept {
+  force_.Render(end - rendered_to_, lanes_, mix.lanes() + rendered_to_ * kMostLanes);
+  rendered_to_ = end;
+}
+
+bool OscillatorBank::FinishStruck(BlockMix& mix) noexcept {
+  if (force_.driving()) RenderStrikes(block_frame_count_, mix);
+  const ring_kernel::StruckPart part = BeginPart(block_frame_count_, mix);
+  finite_ &= ring_kernel::FinishStruck(lanes_, segments_, part, silence_squared_);
+  FinishPart(part, mix);
+  for (LongSegment& segment : long_segments_) segment.struck = true;
+  newborn_ = false;
+  rendered_to_ = 0;
+  return EndBlock();
+}
+
+}  // namespace carillon

@@ -1,0 +1,387 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/synthesis/ringing/ring_kernel.h"
+
+// Vectors of unknown size cannot be kept in arrays, and kMostLanes bounds them.
+#define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "server/synthesis/ringing/ring_kernel.cc"
+// foreach_target.h includes this file once for each target, and must come first.
+// clang-format off
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+#include "server/synthesis/ringing/lane_vectors-inl.h"
+#include "server/synthesis/ringing/oscillators-inl.h"
+#include "server/synthesis/ringing/passes-inl.h"
+// clang-format on
+
+#include <algorithm>
+#include <type_traits>
+
+HWY_BEFORE_NAMESPACE();
+namespace carillon::ring_kernel {
+namespace HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+using carillon::HWY_NAMESPACE::Doubles;
+using carillon::HWY_NAMESPACE::Floats;
+using carillon::HWY_NAMESPACE::ForVectors;
+using carillon::HWY_NAMESPACE::HalfFloats;
+using carillon::HWY_NAMESPACE::kMostSquared;
+using carillon::HWY_NAMESPACE::kVectorsAPass;
+using carillon::HWY_NAMESPACE::Loudness;
+using carillon::HWY_NAMESPACE::Manner;
+using carillon::HWY_NAMESPACE::Oscillators;
+using carillon::HWY_NAMESPACE::States;
+using carillon::HWY_NAMESPACE::V;
+
+void Ring(const LaneArrays& lanes, LaneRange range, size_t tile_kind, size_t frame_count,
+          const TileSums& sums) {
+  ForVectors(lanes, range, {.tile_kind = tile_kind},
+             [&](const auto& oscillators, auto ahead, size_t lane) {
+               typename std::decay_t<decltype(oscillators)>::Z z;
+               z.Load(lanes.re.data() + lane, lanes.im.data() + lane);
+               const size_t kind = oscillators.tile_kind;
+               float* sum = sums[kind];
+               if (kind > 0) {
+                 for (size_t frame = 0; frame < frame_count; frame += kTileFrames[kind]) {
+                   ahead.Step(kind);
+                   oscillators.AddClosedTile(z, sum);
+                   sum += kNodeFloats;
+                 }
+                 return;
+               }
+               size_t frame = 0;
+               for (; frame + kTileFrames[0] <= frame_count; frame += kTileFrames[0]) {
+                 ahead.Step(0);
+                 oscillators.AddTile(z, sum + frame * kMostLanes);
+               }
+               oscillators.AddPart(z, frame_count - frame, sum + frame * kMostLanes);
+             });
+}
+
+/// Vectors that are struck: what rings, and of it what is newborn.
+template <size_t kVectors, class Ahead>
+class StruckVectors {
+ public:
+  using Z = States<kVectors>;
+  Z all, newborn;
+
+  HWY_INLINE StruckVectors(const Oscillators<kVectors>& oscillators, const Ahead& next)
+      : oscillators_(oscillators), ahead_(next) {}
+
+  HWY_INLINE void Load(const LaneArrays& lanes, size_t lane) {
+    all.Load(lanes.start_re.data() + lane, lanes.start_im.data() + lane);
+    newborn.Load(lanes.newborn_re.data() + lane, lanes.newborn_im.data() + lane);
+    any_newborn_ = true;
+  }
+  HWY_INLINE void Store(LaneArrays& lanes, size_t lane) const {
+    all.Store(lanes.start_re.data() + lane, lanes.start_im.data() + lane);
+    newborn.Store(lanes.newborn_re.data() + lane, lanes.newborn_im.data() + lane);
+  }
+
+  /// From part.begin to part.end, in tiles from there on.
+  HWY_INLINE void Ring(const StruckPart& part, size_t lane) {
+    newborn_at_ = part.begin;
+    if (oscillators_.tile_kind == 0) {
+      RingFrames(part, lane);
+    } else {
+      RingNodes(part, lane);
+    }
+  }
+
+ private:
+  /// What is struck within a tile is rendered to the tile's end beside the rest, and is a part of
+  /// it from there on.
+  HWY_INLINE void RingFrames(const StruckPart& part, size_t lane) {
+    size_t frame = part.begin;
+    size_t strike = 0;
+    for (; frame + kTileFrames[0] <= part.end; frame += kTileFrames[0]) {
+      ahead_.Step(0);
+      oscillators_.AddTile(all, part.sums[0] + frame * kMostLanes);
+      for (; strike < part.batch.count && part.batch.offsets[strike] < frame + kTileFrames[0];
+           ++strike) {
+        Strike(part, strike, lane, frame + kTileFrames[0]);
+      }
+    }
+    MoveNewborn(frame);
+    if (const size_t rest = part.end - frame; rest > 0) {
+      oscillators_.AddPart(all, rest, part.sums[0] + frame * kMostLanes);
+      newborn.Multiply(oscillators_.Power(rest - 1));
+      newborn_at_ = part.end;
+    }
+    for (; strike < part.batch.count; ++strike) Strike(part, strike, lane, part.end);
+  }
+
+  /// The same in longer tiles, to nodes.
+  HWY_INLINE void RingNodes(const StruckPart& part, size_t lane) {
+    const size_t kind = oscillators_.tile_kind, frame_count = kTileFrames[kind];
+    float* nodes = part.sums[kind];
+    size_t strike = 0;
+    for (size_t frame = part.begin; frame < part.end; frame += frame_count) {
+      ahead_.Step(kind);
+      const size_t tile_end = std::min(frame + frame_count, part.end);
+      Z power;  // to the part's end within a tile
+      const Z* shortened = nullptr;
+      if (tile_end < frame + frame_count) {
+        power = oscillators_.FramePower(tile_end - frame);
+        shortened = &power;
+      }
+      AddNodes(shortened, all, nodes);
+      nodes += kNodeFloats;
+      for (; strike < part.batch.count && part.batch.offsets[strike] < frame + frame_count;
+           ++strike) {
+        Z struck = Struck(part, strike, lane);
+        AddNodes(shortened, struck, part.batch.nodes(strike, kind));
+        Join(struck, tile_end);
+      }
+    }
+    MoveNewborn(part.end);
+    for (; strike < part.batch.count; ++strike) Join(Struck(part, strike, lane), part.end);
+  }
+
+  /// A longer tile; if it is shortened, with the power that leads to its end.
+  HWY_INLINE void AddNodes(const Z* shortened, Z& z, float* nodes) const {
+    const Z begin = z;
+    oscillators_.AddClosedTile(z, nodes);
+    if (shortened == nullptr) return;
+    z = begin;
+    z.Multiply(*shortened);
+  }
+
+  HWY_INLINE void MoveNewborn(size_t frame) {
+    const size_t tile_frames = kTileFrames[oscillators_.tile_kind];
+    if (any_newborn_) {
+      oscillators_.Advance((frame - newborn_at_) / tile_frames, newborn);
+      const size_t rest = (frame - newborn_at_) % tile_frames;
+      if (rest > 0) newborn.Multiply(oscillators_.FramePower(rest));
+    }
+    newborn_at_ = frame;
+  }
+
+  HWY_INLINE Z Struck(const StruckPart& part, size_t strike, size_t lane) const {
+    Z struck;
+    struck.Load(part.batch.re(strike, part.lane_count) + lane,
+                part.batch.im(strike, part.lane_count) + lane);
+    return struck;
+  }
+
+  /// A strike that is heard from within the tile that ends at `tile_end`, where the states are.
+  HWY_INLINE void Strike(const StruckPart& part, size_t strike, size_t lane, size_t tile_end) {
+    const size_t offset = part.batch.offsets[strike];
+    Z struck = Struck(part, strike, lane);
+    oscillators_.AddPart(struck, tile_end - offset, part.sums[0] + offset * kMostLanes);
+    Join(struck, tile_end);
+  }
+
+  /// Adds what was struck to the states at `frame`.
+  HWY_INLINE void Join(const Z& struck, size_t frame) {
+    all.Add(struck);
+    if (newborn_at_ != frame) MoveNewborn(frame);
+    newborn.Add(struck);
+    any_newborn_ = true;
+  }
+
+  const Oscillators<kVectors>& oscillators_;
+  Ahead ahead_;
+  size_t newborn_at_ = 0;  // the frame of its state
+  bool any_newborn_ = false;
+};
+
+void Start(LaneArrays& lanes, size_t lane_count) {
+  for (size_t lane = 0; lane < lane_count; lane += hn::Lanes(Floats())) {
+    States<1> z;
+    z.Load(lanes.re.data() + lane, lanes.im.data() + lane);
+    z.Store(lanes.start_re.data() + lane, lanes.start_im.data() + lane);
+    z.Clear();
+    z.Store(lanes.newborn_re.data() + lane, lanes.newborn_im.data() + lane);
+  }
+}
+
+Manner MannerOf(const StruckPart& part) {
+  return {.by_frames = part.by_frames, .frame_count = part.end - part.begin};
+}
+
+void RingStruck(LaneArrays& lanes, const StruckPart& part) {
+  ForVectors(lanes, MannerOf(part), [&](const auto& oscillators, auto ahead, size_t lane) {
+    constexpr size_t kVectors = std::decay_t<decltype(oscillators)>::kCount;
+    StruckVectors<kVectors, decltype(ahead)> vectors(oscillators, ahead);
+    vectors.Load(lanes, lane);
+    vectors.Ring(part, lane);
+    vectors.Store(lanes, lane);
+  });
+}
+
+void AddStrike(LaneArrays& lanes, size_t lane_count, const float* added_re, const float* added_im) {
+  for (size_t lane = 0; lane < lane_count; lane += hn::Lanes(Floats())) {
+    const auto add = [&](LaneArray<float>& re, LaneArray<float>& im) {
+      States<1> sum, added;
+      sum.Load(re.data() + lane, im.data() + lane);
+      added.Load(added_re + lane, added_im + lane);
+      sum.Add(added);
+      sum.Store(re.data() + lane, im.data() + lane);
+    };
+    add(lanes.start_re, lanes.start_im);
+    add(lanes.newborn_re, lanes.newborn_im);
+  }
+}
+
+/// Advances one vector in double, and adds what is newborn if there is any; returns |Z|^2.
+HWY_INLINE hn::Vec<Doubles> AdvanceVector(LaneArrays& lanes, size_t lane, const float* newborn_re,
+                                          const float* newborn_im) {
+  const Doubles d;
+  const HalfFloats df;
+  const auto q_re = hn::Load(d, lanes.block_re.data() + lane);
+  const auto q_im = hn::Load(d, lanes.block_im.data() + lane);
+  const auto old_re = hn::Load(d, lanes.re.data() + lane);
+  const auto old_im = hn::Load(d, lanes.im.data() + lane);
+  auto re = hn::NegMulAdd(old_im, q_im, hn::Mul(old_re, q_re));
+  auto im = hn::MulAdd(old_im, q_re, hn::Mul(old_re, q_im));
+  if (newborn_re != nullptr) {
+    re = hn::Add(re, hn::PromoteTo(d, hn::Load(df, newborn_re)));
+    im = hn::Add(im, hn::PromoteTo(d, hn::Load(df, newborn_im)));
+  }
+  hn::Store(re, d, lanes.re.data() + lane);
+  hn::Store(im, d, lanes.im.data() + lane);
+  return hn::MulAdd(re, re, hn::Mul(im, im));
+}
+
+/// Advances groups of lanes, ascending, and finds out about the segments that they belong to.
+class Advancing {
+ public:
+  HWY_INLINE Advancing(LaneArrays& lanes, std::span<RingingSegment> segments,
+                       double silence_squared)
+      : lanes_(lanes), segments_(segments), runs_(lanes.runs), silence_squared_(silence_squared) {
+    for (RingingSegment& segment : segments) {
+      segment.awake_count = 0;
+      segment.loudest_squared = 0;
+    }
+    all_.Clear();
+  }
+
+  /// `newborn_re` and `newborn_im` are of this group, or null.
+  HWY_INLINE void AdvanceGroup(size_t lane, const float* newborn_re, const float* newborn_im) {
+    while (lane >= runs_.front().range.first + runs_.front().range.count) Next();
+    Loudness group;
+    group.Clear();
+    for (size_t i = 0; i < kMostLanes; i += hn::Lanes(Doubles())) {
+      const bool newborn = newborn_re != nullptr;
+      group.Note(AdvanceVector(lanes_, lane + i, newborn ? newborn_re + i : nullptr,
+                               newborn ? newborn_im + i : nullptr));
+    }
+    all_.Join(group);
+    if (group.Above(silence_squared_)) {
+      awake_count_ = lane + kMostLanes - runs_.front().range.first;
+    } else {
+      lanes_.Silence({lane, kMostLanes});
+    }
+  }
+
+  /// Whether everything was finite.
+  HWY_INLINE bool Finish() {
+    while (!runs_.empty()) Next();
+    return finite_;
+  }
+
+ private:
+  HWY_INLINE void Next() {
+    const LaneRun& run = runs_.front();
+    RingingSegment& segment = segments_[run.segment];
+    segment.loudest_squared = std::max(segment.loudest_squared, all_.Loudest());
+    if (awake_count_ > 0) {
+      segment.awake_count = std::max(segment.awake_count, run.first_in_segment + awake_count_);
+    }
+    finite_ &= all_.Finite();
+    runs_ = runs_.subspan(1);
+    awake_count_ = 0;
+    all_.Clear();
+  }
+
+  LaneArrays& lanes_;
+  std::span<RingingSegment> segments_;
+  std::span<const LaneRun> runs_;  // from this one on
+  double silence_squared_;
+  size_t awake_count_ = 0;  // of this run
+  Loudness all_;
+  bool finite_ = true;
+};
+
+bool RingFreely(LaneArrays& lanes, std::span<RingingSegment> segments, const FreeBlock& block) {
+  std::array<size_t, kMostSegments> awake_counts;
+  std::ranges::transform(segments, awake_counts.begin(), &RingingSegment::awake_count);
+  Advancing advancing(lanes, segments, block.silence_squared);
+  for (const LaneRun& run : lanes.runs) {
+    const LaneRange awake{run.range.first, run.CountOfFirst(awake_counts[run.segment])};
+    Ring(lanes, awake, run.tile_kind, block.frame_count, block.sums);
+    for (size_t group = 0; group < awake.count; group += kMostLanes) {
+      advancing.AdvanceGroup(awake.first + group, nullptr, nullptr);
+    }
+  }
+  return advancing.Finish();
+}
+
+bool FinishStruck(LaneArrays& lanes, std::span<RingingSegment> segments, const StruckPart& part,
+                  double silence_squared) {
+  Advancing advancing(lanes, segments, silence_squared);
+  // Of some vectors, or as many as a group has.
+  alignas(64) float newborn_re[kVectorsAPass * kMostLanes], newborn_im[kVectorsAPass * kMostLanes];
+  ForVectors(lanes, MannerOf(part), [&](const auto& oscillators, auto ahead, size_t lane) {
+    constexpr size_t kVectors = std::decay_t<decltype(oscillators)>::kCount;
+    StruckVectors<kVectors, decltype(ahead)> vectors(oscillators, ahead);
+    if (part.started) {
+      vectors.Load(lanes, lane);
+    } else {
+      vectors.all.Load(lanes.re.data() + lane, lanes.im.data() + lane);
+      vectors.newborn.Clear();
+    }
+    vectors.Ring(part, lane);
+    const size_t first = lane % kMostLanes;
+    vectors.newborn.Store(newborn_re + first, newborn_im + first);
+    const size_t end = first + kVectors * hn::Lanes(Floats());
+    for (size_t group = 0; group + kMostLanes <= end; group += kMostLanes) {
+      advancing.AdvanceGroup(lane - first + group, newborn_re + group, newborn_im + group);
+    }
+  });
+  return advancing.Finish();
+}
+
+const char* Target() { return hwy::TargetName(HWY_TARGET); }
+
+}  // namespace HWY_NAMESPACE
+}  // namespace carillon::ring_kernel
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace carillon::ring_kernel {
+HWY_EXPORT(RingFreely);
+HWY_EXPORT(Start);
+HWY_EXPORT(RingStruck);
+HWY_EXPORT(AddStrike);
+HWY_EXPORT(FinishStruck);
+HWY_EXPORT(Target);
+
+bool RingFreely(LaneArrays& lanes, std::span<RingingSegment> segments,
+                const FreeBlock& block) noexcept {
+  return HWY_DYNAMIC_DISPATCH(RingFreely)(lanes, segments, block);
+}
+
+void Start(LaneArrays& lanes, size_t lane_count) noexcept {
+  HWY_DYNAMIC_DISPATCH(Start)(lanes, lane_count);
+}
+
+void RingStruck(LaneArrays& lanes, const StruckPart& part) noexcept {
+  HWY_DYNAMIC_DISPATCH(RingStruck)(lanes, part);
+}
+
+void AddStrike(LaneArrays& lanes, size_t lane_count, const float* added_re,
+               const float* added_im) noexcept {
+  HWY_DYNAMIC_DISPATCH(AddStrike)(lanes, lane_count, added_re, added_im);
+}
+
+bool FinishStruck(LaneArrays& lanes, std::span<RingingSegment> segments, const StruckPart& part,
+                  double silence_squared) noexcept {
+  return HWY_DYNAMIC_DISPATCH(FinishStruck)(lanes, segments, part, silence_squared);
+}
+
+std::string_view Target() { return HWY_DYNAMIC_DISPATCH(Target)(); }
+
+}  // namespace carillon::ring_kernel
+#endif

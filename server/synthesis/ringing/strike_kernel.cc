@@ -1,0 +1,258 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/synthesis/ringing/strike_kernel.h"
+
+// Vectors of unknown size cannot be kept in arrays, and kMostLanes bounds them.
+#define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "server/synthesis/ringing/strike_kernel.cc"
+// foreach_target.h includes this file once for each target, and must come first.
+// clang-format off
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+#include <hwy/contrib/math/math-inl.h>
+#include "server/synthesis/ringing/lane_vectors-inl.h"
+// clang-format on
+
+#include <algorithm>
+
+HWY_BEFORE_NAMESPACE();
+namespace carillon::strike_kernel {
+namespace HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+using carillon::HWY_NAMESPACE::Doubles;
+using carillon::HWY_NAMESPACE::Floats;
+using carillon::HWY_NAMESPACE::HalfFloats;
+using carillon::HWY_NAMESPACE::kMostSquared;
+using carillon::HWY_NAMESPACE::V;
+
+template <size_t kRows>
+HWY_INLINE void ProjectRows(const Projection& projection, float* HWY_RESTRICT modal_impulses) {
+  const Floats d;
+  const hn::RebindToSigned<Floats> d32;
+  const hn::Rebind<int16_t, Floats> d16;
+  const int16_t* rows[kRows];
+  V factors[kRows];
+#pragma GCC unroll 9
+  for (size_t row = 0; row < kRows; ++row) {
+    rows[row] = projection.rows[row];
+    factors[row] = hn::Set(d, projection.factors[row]);
+  }
+  const bool add = projection.add;
+  const size_t count = projection.column_count;
+  for (size_t c = 0; c < count; c += hn::Lanes(d)) {
+    V sum = add ? hn::Load(d, modal_impulses + c) : hn::Zero(d);
+#pragma GCC unroll 9
+    for (size_t row = 0; row < kRows; ++row) {
+      const auto values = hn::PromoteTo(d32, hn::LoadU(d16, rows[row] + c));
+      sum = hn::MulAdd(factors[row], hn::ConvertTo(d, values), sum);
+    }
+    hn::Store(sum, d, modal_impulses + c);
+  }
+}
+
+/// `row_count` is that of one, two or three vertices.
+void Project(const Projection& projection, float* modal_impulses) {
+  switch (projection.row_count) {
+    case 9:
+      return ProjectRows<9>(projection, modal_impulses);
+    case 6:
+      return ProjectRows<6>(projection, modal_impulses);
+    default:
+      return ProjectRows<3>(projection, modal_impulses);
+  }
+}
+
+/// Sine and cosine at once, to 1e-7 for |angle| up to some thousands: reduced to a quarter turn in
+/// three parts (Cody and Waite), then the series of each, telescoped.
+HWY_INLINE void SineCosine(V angle, V& sine, V& cosine) {
+  const Floats d;
+  const hn::RebindToSigned<Floats> di;
+  const V turns = hn::Round(hn::Mul(angle, hn::Set(d, 0.636619772F)));
+  V r = hn::NegMulAdd(turns, hn::Set(d, 1.5703125F), angle);
+  r = hn::NegMulAdd(turns, hn::Set(d, 4.837512969970703e-4F), r);
+  r = hn::NegMulAdd(turns, hn::Set(d, 7.549789948768648e-8F), r);
+  const V x = hn::Mul(r, r);
+  V s = hn::MulAdd(x, hn::Set(d, -1.9515295891e-4F), hn::Set(d, 8.3321608736e-3F));
+  s = hn::MulAdd(s, x, hn::Set(d, -1.6666654611e-1F));
+  s = hn::MulAdd(hn::Mul(s, x), r, r);
+  V c = hn::MulAdd(x, hn::Set(d, 2.443315711809948e-5F), hn::Set(d, -1.388731625493765e-3F));
+  c = hn::MulAdd(c, x, hn::Set(d, 4.166664568298827e-2F));
+  c = hn::MulAdd(hn::Mul(c, x), x, hn::NegMulAdd(x, hn::Set(d, 0.5F), hn::Set(d, 1.0F)));
+  const auto quarter = hn::ConvertTo(di, turns);
+  const auto one = hn::Set(di, 1), two = hn::Set(di, 2);
+  const auto odd = hn::RebindMask(d, hn::Eq(hn::And(quarter, one), one));
+  const auto sine_sign = hn::ShiftLeft<30>(hn::And(quarter, two));
+  const auto cosine_sign = hn::ShiftLeft<30>(hn::And(hn::Add(quarter, one), two));
+  sine = hn::Xor(hn::IfThenElse(odd, c, s), hn::BitCast(d, sine_sign));
+  cosine = hn::Xor(hn::IfThenElse(odd, s, c), hn::BitCast(d, cosine_sign));
+}
+
+/// The same of 2^kDoublings times `angle`, which is at most a quarter turn.
+template <int kDoublings>
+HWY_INLINE void SineCosineOfMultiple(V angle, V& sine, V& cosine) {
+  const Floats d;
+  const V x = hn::Mul(angle, angle);
+  V s = hn::MulAdd(x, hn::Set(d, 2.6000559500971576e-06F), hn::Set(d, -1.980661618290469e-04F));
+  s = hn::MulAdd(s, x, hn::Set(d, 8.333017118275166e-03F));
+  s = hn::MulAdd(s, x, hn::Set(d, -1.6666656732559204e-01F));
+  s = hn::MulAdd(hn::Mul(s, x), angle, angle);
+  V c = hn::MulAdd(x, hn::Set(d, 2.319440864084754e-05F), hn::Set(d, -1.3855928555130959e-03F));
+  c = hn::MulAdd(c, x, hn::Set(d, 4.1663989424705505e-02F));
+  c = hn::MulAdd(c, x, hn::Set(d, -4.999993145465851e-01F));
+  c = hn::MulAdd(c, x, hn::Set(d, 1.0F));
+  for (int i = 0; i < kDoublings; ++i) {
+    const V twice = hn::Add(s, s);
+    const V doubled = hn::Mul(twice, c);
+    c = hn::NegMulAdd(twice, s, hn::Set(d, 1.0F));
+    s = doubled;
+  }
+  sine = s;
+  cosine = c;
+}
+
+/// exp(x): of small x, as a mode's decay within a frame or a tile is, by its series.
+HWY_INLINE V ExpOfDecay(V x) {
+  const Floats d;
+  const V one = hn::Set(d, 1.0F);
+  const V size = hn::Abs(x);
+  V e = hn::Set(d, 1.0F / 24);
+  if (HWY_UNLIKELY(!hn::AllTrue(d, hn::Le(size, hn::Set(d, 0.05F))))) {
+    if (!hn::AllTrue(d, hn::Le(size, hn::Set(d, 0.5F)))) return hn::Exp(d, x);
+    V more = hn::MulAdd(x, hn::Set(d, 1.0F / 5040), hn::Set(d, 1.0F / 720));
+    more = hn::MulAdd(more, x, hn::Set(d, 1.0F / 120));
+    e = hn::MulAdd(more, x, e);
+  }
+  e = hn::MulAdd(e, x, hn::Set(d, 1.0F / 6));
+  e = hn::MulAdd(e, x, hn::Set(d, 0.5F));
+  e = hn::MulAdd(e, x, one);
+  return hn::MulAdd(e, x, one);
+}
+
+/// How a strike reaches the lanes' states.
+enum class Reach {
+  kAtOnce,   ///< at the frame
+  kLead,     ///< up to a frame before it
+  kTile,     ///< from elsewhere in a tile, or that far
+  kContact,  ///< from anywhere, and by a contact that takes time
+};
+
+/// How far it is to where a strike's states are wanted.
+struct Way {
+  V lead_frames;  ///< negative: before the strike
+  V tau_squared;
+  size_t share_ahead;  ///< of the values in the rows ahead, for each vector
+};
+
+/// (re, im) *= exp(lead_frames log q + tau^2 s^2/2).
+template <Reach kReach>
+HWY_INLINE void Delay(const LaneArrays& lanes, size_t lane, const Way& way, V& re, V& im) {
+  const Floats d;
+  V logarithm = hn::Mul(way.lead_frames, hn::Load(d, lanes.lead_re.data() + lane));
+  V angle = hn::Load(d, lanes.lead_im.data() + lane);
+  V magnitude, sine, cosine;
+  if constexpr (kReach == Reach::kContact) {
+    logarithm = hn::MulAdd(way.tau_squared, hn::Load(d, lanes.tau_re.data() + lane), logarithm);
+    angle = hn::MulAdd(way.tau_squared, hn::Load(d, lanes.tau_im.data() + lane),
+                       hn::Mul(way.lead_frames, angle));
+    // Below exp(-80) nothing is heard, and the angle may be too large for a sine.
+    const auto heard = hn::Gt(logarithm, hn::Set(d, -80.0F));
+    magnitude = hn::IfThenElseZero(heard, hn::Exp(d, logarithm));
+    SineCosine(hn::IfThenElseZero(heard, angle), sine, cosine);
+  } else {
+    // A frame is at most half a turn, a tile less than a turn.
+    constexpr int kDoublings = kReach == Reach::kTile ? 2 : 1;
+    magnitude = ExpOfDecay(logarithm);
+    const V part = hn::Mul(way.lead_frames, hn::Set(d, 1.0F / (1 << kDoublings)));
+    SineCosineOfMultiple<kDoublings>(hn::Mul(part, angle), sine, cosine);
+  }
+  const V factor_re = hn::Mul(magnitude, cosine);
+  const V factor_im = hn::Mul(magnitude, sine);
+  const V rotated = hn::NegMulAdd(im, factor_im, hn::Mul(re, factor_re));
+  im = hn::MulAdd(im, factor_re, hn::Mul(re, factor_im));
+  re = rotated;
+}
+
+/// Asks for some values of all rows ahead.
+HWY_INLINE void PrefetchRows(const StrikeBatch::RowsAhead& ahead, size_t first, size_t count) {
+  constexpr size_t kLineValues = 32;
+  const size_t end = std::min(first + count, ahead.value_count);
+  for (size_t i = (first + kLineValues - 1) / kLineValues * kLineValues; i < end;
+       i += kLineValues) {
+    for (size_t row = 0; row < ahead.count; ++row) __builtin_prefetch(ahead.rows[row] + i);
+  }
+}
+
+/// Whose square sums may be added up; Finite() is false of what is not a number.
+class SumOfSquares {
+ public:
+  HWY_INLINE SumOfSquares() : sum_(hn::Zero(Floats())) {}
+  HWY_INLINE void Add(V re, V im) { sum_ = hn::MulAdd(re, re, hn::MulAdd(im, im, sum_)); }
+  HWY_INLINE bool Finite() const {
+    return hn::GetLane(hn::SumOfLanes(Floats(), sum_)) <= kMostSquared;
+  }
+
+ private:
+  V sum_;
+};
+
+template <Reach kReach>
+void ExciteLanes(const LaneArrays& lanes, LaneRange range, const float* modal_impulses,
+                 const Way& way, const StrikeBatch::RowsAhead& ahead, SumOfSquares& sum,
+                 float* HWY_RESTRICT added_re, float* HWY_RESTRICT added_im) {
+  const Floats d;
+  const hn::RebindToSigned<Floats> di;
+  for (size_t lane = range.first; lane < range.first + range.count; lane += hn::Lanes(d)) {
+    PrefetchRows(ahead, lane / hn::Lanes(d) * way.share_ahead, way.share_ahead);
+    const auto column =
+        hn::BitCast(di, hn::Load(hn::RebindToUnsigned<Floats>(), lanes.column.data() + lane));
+    const V g = hn::GatherIndex(d, modal_impulses, column);
+    V re = hn::Mul(g, hn::Load(d, lanes.gain_re.data() + lane));
+    V im = hn::Mul(g, hn::Load(d, lanes.gain_im.data() + lane));
+    if constexpr (kReach != Reach::kAtOnce) Delay<kReach>(lanes, lane, way, re, im);
+    hn::Store(re, d, added_re + lane);
+    hn::Store(im, d, added_im + lane);
+    sum.Add(re, im);
+  }
+}
+
+bool Excite(const LaneArrays& lanes, size_t lane_count, const float* modal_impulses,
+            const Onset& onset, const StrikeBatch::RowsAhead& ahead, float* added_re,
+            float* added_im) {
+  const Floats d;
+  const size_t share = ahead.value_count * hn::Lanes(d) / std::max<size_t>(lane_count, 1) + 1;
+  SumOfSquares sum;
+  for (const size_t tile_kind : kTileOrder) {
+    const size_t back = tile_kind == 0 ? 0 : onset.frames_into_tiles % kTileFrames[tile_kind];
+    const float lead_frames = onset.lead_frames - static_cast<float>(back);
+    const Way way{hn::Set(d, lead_frames), hn::Set(d, onset.tau_s * onset.tau_s), share};
+    const auto excite = onset.tau_s > 0 || onset.lead_frames > 1 ? ExciteLanes<Reach::kContact>
+                        : back > 0                               ? ExciteLanes<Reach::kTile>
+                        : lead_frames > 0                        ? ExciteLanes<Reach::kLead>
+                                                                 : ExciteLanes<Reach::kAtOnce>;
+    excite(lanes, lanes.by_tile[tile_kind], modal_impulses, way, ahead, sum, added_re, added_im);
+  }
+  return sum.Finite();
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace carillon::strike_kernel
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace carillon::strike_kernel {
+HWY_EXPORT(Project);
+HWY_EXPORT(Excite);
+
+void Project(const Projection& projection, float* modal_impulses) noexcept {
+  HWY_DYNAMIC_DISPATCH(Project)(projection, modal_impulses);
+}
+
+bool Excite(const LaneArrays& lanes, size_t lane_count, const float* modal_impulses,
+            const Onset& onset, const StrikeBatch::RowsAhead& ahead, float* added_re,
+            float* added_im) noexcept {
+  return HWY_DYNAMIC_DISPATCH(Excite)(lanes, lane_count, modal_impulses, onset, ahead, added_re,
+                                      added_im);
+}
+
+}  // namespace carillon::strike_kernel
+#endif

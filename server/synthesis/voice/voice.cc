@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/synthesis/voice/voice.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace carillon {
+namespace {
+
+constexpr double kFadeS = 0.01;
+/// A delay that changes faster, in frames a frame, is a jump.
+constexpr double kFastestDelay = 0.5;
+/// Nearer than this an object comes to sound from the middle.
+constexpr double kNearM = 0.1;
+
+size_t HistoryBlocks(const Voice::Settings& settings) {
+  if (!settings.hearing.propagation_delay) return 1;
+  return static_cast<size_t>(kLongestPropagationS * settings.sample_rate_hz /
+                             static_cast<double>(settings.block_frame_count)) +
+         3;
+}
+
+double Length(const std::array<double, 3>& v) { return std::hypot(v[0], v[1], v[2]); }
+
+std::array<double, 3> Minus(const std::array<double, 3>& a, const std::array<double, 3>& b) {
+  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
+
+double Dot(const std::array<double, 3>& a, const std::array<double, 3>& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+}  // namespace
+
+Voice::Voice(const Settings& settings, const Place& object, const Place& listener)
+    : settings_(settings),
+      object_(object, settings.sample_rate_hz, settings.block_frame_count),
+      listener_(listener, settings.sample_rate_hz, settings.block_frame_count),
+      positions_(HistoryBlocks(settings), object.position_m),
+      input_(settings.block_frame_count),
+      fade_step_(static_cast<float>(1 / (kFadeS * settings.sample_rate_hz))) {
+  if (delayed()) {
+    line_.emplace(static_cast<size_t>(kLongestPropagationS * settings.sample_rate_hz),
+                  2 * settings.block_frame_count);
+  }
+  heard_.fill(Hear(0));
+}
+
+/// Where the object was so many blocks before the end of the last one.
+std::array<double, 3> Voice::PositionBefore(double blocks) const noexcept {
+  const size_t count = positions_.size();
+  const auto whole = std::min(static_cast<size_t>(blocks), count - 2);
+  const double part = std::min(blocks - static_cast<double>(whole), 1.0);
+  const auto& after = positions_[(newest_ + count - whole) % count];
+  const auto& before = positions_[(newest_ + count - whole - 1) % count];
+  return {after[0] + part * (before[0] - after[0]), after[1] + part * (before[1] - after[1]),
+          after[2] + part * (before[2] - after[2])};
+}
+
+/// At the end of the last block; `delay_frames` is about the delay.
+Voice::Heard Voice::Hear(double delay_frames) const noexcept {
+  const HearingSettings& hearing = settings_.hearing;
+  const Place listener = listener_.place();
+  std::array<double, 3> away = Minus(positions_[newest_], listener.position_m);
+  Heard heard;
+  if (delayed()) {
+    const double frames_a_metre = settings_.sample_rate_hz / hearing.sound_speed_m_per_s;
+    const double most = kLongestPropagationS * settings_.sample_rate_hz;
+    // Each round brings it nearer by the ratio of the object's speed to that of sound.
+    constexpr int kRounds = 5;
+    for (int round = 0; round < kRounds; ++round) {
+      const double blocks = delay_frames / static_cast<double>(settings_.block_frame_count);
+      away = Minus(PositionBefore(blocks), listener.position_m);
+      delay_frames = std::clamp(Length(away) * frames_a_metre, DelayLine::kLeastDelay, most);
+    }
+    heard.delay_frames = delay_frames;
+  }
+  const double distance = Length(away);
+  const double reference = hearing.reference_distance_m;
+  const double gain = hearing.distance_gain ? reference / std::max(distance, reference) : 1;
+  heard.gains.fill(static_cast<float>(gain));
+  if (hearing.panning && settings_.channel_count == 2) {
+    const double unit = std::max(Length(listener.right), 0.5);
+    const double side =
+        std::clamp(Dot(listener.right, away) / (unit * std::max(distance, kNearM)), -1.0, 1.0);
+    const double angle = std::numbers::pi * (1 + side) / 4;
+    heard.gains = {static_cast<float>(gain * std::numbers::sqrt2 * std::cos(angle)),
+                   static_cast<float>(gain * std::numbers::sqrt2 * std::sin(angle))};
+  }
+  return heard;
+}
+
+void Voice::NoteHeard() noexcept {
+  object_.Advance();
+  listener_.Advance();
+  newest_ = (newest_ + 1) % positions_.size();
+  positions_[newest_] = object_.place().position_m;
+  if (object_.jumped()) std::ranges::fill(positions_, positions_[newest_]);
+  const double trend = 2 * heard_[3].delay_frames - heard_[2].delay_frames;
+  const Heard next = Hear(trend);
+  const double most_change = kFastestDelay * static_cast<double>(settings_.block_frame_count);
+  jump_waits_ |= object_.jumped() || listener_.jumped() ||
+                 std::abs(next.delay_frames - heard_[3].delay_frames) > most_change;
+  if (!jump_waits_) {
+    heard_ = {heard_[1], heard_[2], heard_[3], next};
+  } else if (fade_ < 1) {  // the jump waits where it is
+    heard_ = {heard_[1], heard_[2], heard_[3], heard_[3]};
+  } else {
+    heard_before_.fill(heard_[2]);
+    heard_.fill(next);
+    fade_ = silent() ? 1 : 0;
+    jump_waits_ = false;
+  }
+}
+
+void Voice::Render(std::span<float> frames) noexcept {
+  NoteHeard();
+  if (line_) line_->Write(input_);
+  if (fade_ < 1) {
+    RenderFrom(heard_before_, 1 - fade_, -fade_step_, frames);
+    RenderFrom(heard_, fade_, fade_step_, frames);
+    fade_ += fade_step_ * static_cast<float>(input_.size());
+  } else {
+    RenderFrom(heard_, 1, 0, frames);
+  }
+  quiet_frame_count_ = fed_ ? 0 : quiet_frame_count_ + input_.size();
+  rest_block_count_ = object_.at_rest() && listener_.at_rest() ? rest_block_count_ + 1 : 0;
+  asleep_ = silent() && rest_block_count_ > positions_.size() + heard_.size();
+  if (fed_) std::ranges::fill(input_, 0.0F);
+  fed_ = false;
+}
+
+float Voice::Sample(double delay_frames, size_t n) const noexcept {
+  return line_ ? line_->Read(delay_frames + static_cast<double>(input_.size() - n)) : input_[n];
+}
+
+/// The delay is a cubic between the ends of the block, with the slopes of its neighbours there.
+void Voice::RenderFrom(const Hearings& heard, float fade, float fade_step,
+                       std::span<float> frames) noexcept {
+  const size_t channels = settings_.channel_count;
+  const double d0 = heard[1].delay_frames, d1 = heard[2].delay_frames;
+  const double m0 = (d1 - heard[0].delay_frames) / 2, m1 = (heard[3].delay_frames - d0) / 2;
+  const double cubic = 2 * d0 + m0 - 2 * d1 + m1, square = -3 * d0 - 2 * m0 + 3 * d1 - m1;
+  const double step = 1 / static_cast<double>(input_.size());
+  for (size_t n = 0; n < input_.size(); ++n) {
+    const double u = static_cast<double>(n) * step;
+    const float sample =
+        std::clamp(fade, 0.0F, 1.0F) * Sample(((cubic * u + square) * u + m0) * u + d0, n);
+    for (size_t channel = 0; channel < channels; ++channel) {
+      const float from = heard[1].gains[channel], to = heard[2].gains[channel];
+      frames[n * channels + channel] += sample * (from + static_cast<float>(u) * (to - from));
+    }
+    fade += fade_step;
+  }
+}
+
+}  // namespace carillon

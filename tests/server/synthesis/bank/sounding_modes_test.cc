@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/synthesis/bank/sounding_modes.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+namespace carillon {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+// The chime of the paper's Table 1.
+const SoundingMaterial kChime{
+    .young_pa = 6.835e10, .density_kg_per_m3 = 2700, .alpha1_s = 1e-7, .alpha2_per_s = 0};
+
+/// The eigenvalue of the model that sounds at this natural frequency in this material.
+double EigenvalueFor(double frequency_hz, const SoundingMaterial& material) {
+  return std::pow(2 * kPi * frequency_hz * material.size, 2) * material.density_kg_per_m3 /
+         material.young_pa;
+}
+
+std::vector<double> EigenvaluesFor(std::vector<double> frequencies_hz,
+                                   const SoundingMaterial& material) {
+  for (double& f : frequencies_hz) f = EigenvalueFor(f, material);
+  return frequencies_hz;
+}
+
+SoundingModes Select(const std::vector<double>& eigenvalues, const SoundingMaterial& material,
+                     const SoundingBand& band = {}) {
+  const std::vector<double> couplings(eigenvalues.size(), 1.0);
+  return SelectSoundingModes(eigenvalues, couplings, material, 48000, band);
+}
+
+TEST(SoundingModes, FrequencyDecayAndDampedFrequencyFollowTheRayleighDamping) {
+  const SoundingMaterial material{
+      .young_pa = 3e9, .density_kg_per_m3 = 900, .alpha1_s = 2e-6, .alpha2_per_s = 12};
+  const SoundingModes sounding = Select(EigenvaluesFor({440}, material), material);
+  ASSERT_EQ(sounding.modes.size(), 1u);
+  const SoundingMode& mode = sounding.modes[0];
+  const double eigenvalue = std::pow(2 * kPi * 440, 2);
+  EXPECT_NEAR(mode.natural_frequency_hz, 440, 1e-9);
+  EXPECT_NEAR(mode.decay_rate_per_s, -(2e-6 * eigenvalue + 12) / 2, 1e-9);
+  EXPECT_NEAR(
+      mode.damped_rad_per_s * mode.damped_rad_per_s + mode.decay_rate_per_s * mode.decay_rate_per_s,
+      eigenvalue, 1e-6 * eigenvalue);
+}
+
+TEST(SoundingModes, ALossFactorAddsHalfOfItTimesTheAngularFrequencyToTheDecay) {
+  SoundingMaterial material{
+      .young_pa = 3e9, .density_kg_per_m3 = 900, .alpha1_s = 2e-6, .alpha2_per_s = 12};
+  const std::vector<double> eigenvalues = EigenvaluesFor({440, 3000}, material);
+  const SoundingModes before = Select(eigenvalues, material);
+  material.loss_factor = {{.frequency_hz = 1000, .loss_factor = 0.01}};  // at all frequencies
+  const SoundingModes after = Select(eigenvalues, material);
+  for (size_t m = 0; m < 2; ++m) {
+    const double omega = 2 * kPi * before.modes[m].natural_frequency_hz;
+    const double decay = after.modes[m].decay_rate_per_s;
+    EXPECT_NEAR(decay - before.modes[m].decay_rate_per_s, -0.01 * omega / 2, 1e-9 * omega);
+    EXPECT_NEAR(std::hypot(after.modes[m].damped_rad_per_s, decay), omega, 1e-9 * omega);
+  }
+}
+
+TEST(SoundingModes, TheChimeOfTable1DecaysAsPrinted) {
+  // 587.4 Hz; errata: 0.68 1/s, printed as 0.6.
+  const SoundingModes sounding = Select(EigenvaluesFor({587.4}, kChime), kChime);
+  EXPECT_NEAR(sounding.modes.at(0).decay_rate_per_s, -0.681, 1e-3);
+}
+
+/// Pitch, coupling and shape of one mode, relative to those of another material and size.
+struct Scaling {
+  double frequency, coupling, shape, decay;
+};
+
+Scaling Compare(const SoundingMaterial& material) {
+  const std::vector<double> eigenvalues = EigenvaluesFor({1000}, kChime);
+  const SoundingModes before = Select(eigenvalues, kChime), after = Select(eigenvalues, material);
+  return {after.modes.at(0).natural_frequency_hz / before.modes.at(0).natural_frequency_hz,
+          after.modes.at(0).coupling / before.modes.at(0).coupling,
+          after.shape_scale / before.shape_scale,
+          after.modes.at(0).decay_rate_per_s / before.modes.at(0).decay_rate_per_s};
+}
+
+TEST(SoundingModes, StiffnessRaisesPitchAndCouplingByItsRoot) {
+  SoundingMaterial material = kChime;
+  material.young_pa *= 4;
+  const Scaling scaling = Compare(material);
+  EXPECT_NEAR(scaling.frequency, 2, 1e-12);
+  EXPECT_NEAR(scaling.coupling, 2, 1e-12);
+  EXPECT_NEAR(scaling.shape, 1, 1e-12);
+  EXPECT_NEAR(scaling.decay, 4, 1e-12);
+}
+
+TEST(SoundingModes, DensityLowersPitchByItsRootAndCouplingByItself) {
+  SoundingMaterial material = kChime;
+  material.density_kg_per_m3 *= 4;
+  const Scaling scaling = Compare(material);
+  EXPECT_NEAR(scaling.frequency, 0.5, 1e-12);
+  EXPECT_NEAR(scaling.coupling, 0.25, 1e-12);
+  EXPECT_NEAR(scaling.shape, 0.5, 1e-12);
+  EXPECT_NEAR(scaling.decay, 0.25, 1e-12);
+}
+
+TEST(SoundingModes, SizeLowersPitchByItselfAndShapesByItsPowerOfThreeHalves) {
+  SoundingMaterial material = kChime;
+  material.size = 4;
+  const Scaling scaling = Compare(material);
+  EXPECT_NEAR(scaling.frequency, 0.25, 1e-12);
+  EXPECT_NEAR(scaling.coupling, 0.5, 1e-12);
+  EXPECT_NEAR(scaling.shape, 0.125, 1e-12);
+  EXPECT_NEAR(scaling.decay, 1.0 / 16, 1e-12);
+}
+
+TEST(SoundingModes, NewDampingChangesDecayOnly) {
+  SoundingMaterial material = kChime;
+  material.alpha1_s *= 3;
+  const Scaling scaling = Compare(material);
+  EXPECT_NEAR(scaling.frequency, 1, 1e-12);
+  EXPECT_NEAR(scaling.coupling, 1, 1e-12);
+  EXPECT_NEAR(scaling.decay, 3, 1e-12);
+}
+
+TEST(SoundingModes, ModesOutsideTheBandAreDropped) {
+  const auto eigenvalues = EigenvaluesFor({19, 21, 10000, 19999, 20001}, kChime);
+  const SoundingModes sounding = Select(eigenvalues, kChime);
+  ASSERT_EQ(sounding.modes.size(), 3u);
+  EXPECT_EQ(sounding.modes.front().column, 1u);
+  EXPECT_EQ(sounding.modes.back().column, 3u);
+  EXPECT_EQ(Select(eigenvalues, kChime, {.lowest_hz = 18}).modes.size(), 4u);
+}
+
+TEST(SoundingModes, NyquistBoundsTheBand) {
+  const auto eigenvalues = EigenvaluesFor({10000, 11026}, kChime);
+  const std::vector<double> couplings(2, 1.0);
+  EXPECT_EQ(SelectSoundingModes(eigenvalues, couplings, kChime, 22050).modes.size(), 1u);
+}
+
+TEST(SoundingModes, OverdampedModesAreDroppedThoughTheirFrequencyIsInTheBand) {
+  // alpha1 = 8e-6 s makes sigma^2 = Lambda at 39.8 kHz; a T60 of 2 ms ends at 4.7 kHz.
+  SoundingMaterial wood{
+      .young_pa = 2.8e8, .density_kg_per_m3 = 550, .alpha1_s = 8e-6, .alpha2_per_s = 50};
+  const auto eigenvalues = EigenvaluesFor({4600, 4700, 39000, 40000}, wood);
+  EXPECT_EQ(Select(eigenvalues, wood).modes.size(), 1u);
+  const SoundingModes all = SelectSoundingModes(eigenvalues, std::vector(4, 1.0), wood, 192000,
+                                                {.highest_hz = 1e6, .shortest_t60_s = 0});
+  EXPECT_EQ(all.modes.size(), 3u);
+}
+
+TEST(SoundingModes, OfTooManyTheMostAudibleAreKeptInTheOrderOfTheModel) {
+  const auto eigenvalues = EigenvaluesFor({100, 200, 400, 800, 1600, 3200}, kChime);
+  const std::vector<double> couplings{1, 1e6, 2, 1e6, 1e6, 3};
+  const SoundingModes sounding =
+      SelectSoundingModes(eigenvalues, couplings, kChime, 48000, {.most_modes = 3});
+  ASSERT_EQ(sounding.modes.size(), 3u);
+  EXPECT_EQ(sounding.modes[0].column, 1u);
+  EXPECT_EQ(sounding.modes[1].column, 3u);
+  EXPECT_EQ(sounding.modes[2].column, 4u);
+}
+
+TEST(SoundingModes, TheTwoOfADegeneratePairShareAllButAQuarterPeriod) {
+  const auto eigenvalues = EigenvaluesFor({587.0, 587.5, 1500}, kChime);
+  const std::vector<double> couplings{3, 4, 5};
+  const auto modes = SelectSoundingModes(eigenvalues, couplings, kChime, 48000).modes;
+  ASSERT_EQ(modes.size(), 3u);
+  EXPECT_EQ(modes[0].coupling, modes[1].coupling);
+  EXPECT_EQ(modes[0].damped_rad_per_s, modes[1].damped_rad_per_s);
+  EXPECT_EQ(modes[0].decay_rate_per_s, modes[1].decay_rate_per_s);
+  EXPECT_NEAR(modes[0].natural_frequency_hz, 587.25, 1e-9);
+  EXPECT_EQ(modes[0].output_phase_rad, 0);
+  EXPECT_NEAR(modes[1].output_phase_rad, kPi / 2, 1e-15);
+  EXPECT_EQ(modes[2].output_phase_rad, 0);
+}
+
+TEST(SoundingModes, TheClosestNeighboursArePairedFirst) {
+  // Two bending modes between two of a looser pair.
+  const auto eigenvalues = EigenvaluesFor({4659.02, 4660.440, 4660.442, 4663.04}, kChime);
+  const auto modes = Select(eigenvalues, kChime).modes;
+  EXPECT_EQ(modes[1].damped_rad_per_s, modes[2].damped_rad_per_s);
+  EXPECT_NEAR(modes[2].output_phase_rad, kPi / 2, 1e-15);
+  EXPECT_EQ(modes[0].damped_rad_per_s, modes[3].damped_rad_per_s);
+  EXPECT_NEAR(modes[3].output_phase_rad, kPi / 2, 1e-15);
+}
+
+TEST(SoundingModes, NeighboursThatRadiateDifferentlyAreNoPair) {
+  // A torsional mode that happens to lie beside a bending one.
+  const auto eigenvalues = EigenvaluesFor({587.0, 587.1}, kChime);
+  const std::vector<double> couplings{3, 0.01};
+  const auto modes = SelectSoundingModes(eigenvalues, couplings, kChime, 48000).modes;
+  EXPECT_NEAR(modes[0].natural_frequency_hz, 587.0, 1e-9);
+  EXPECT_EQ(modes[1].output_phase_rad, 0);
+}
+
+TEST(SoundingModes, AnEigenvalueThatIsNotANumberDoesNotSound) {
+  EXPECT_TRUE(Select({std::nan("")}, kChime).modes.empty());
+}
+
+}  // namespace
+}  // namespace carillon
