@@ -12,7 +12,7 @@
 #include "precompute/json_report.h"
 #include "precompute/mesh/read_mesh.h"
 #include "precompute/modal_model_codec.h"
-#include "precompute/modes/openblas.h"
+#include "precompute/sparse/openblas.h"
 #include "precompute/progress_bar.h"
 #include "precompute/progress_reporter.h"
 #include "precompute/sha256.h"

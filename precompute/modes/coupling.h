@@ -5,7 +5,7 @@
 
 #include "precompute/mesh/sounding_surface.h"
 #include "precompute/mesh/tet_mesh.h"
-#include "precompute/modes/eigensolver.h"
+#include "precompute/eigen/eigensolver.h"
 
 namespace carillon::precompute {
 

@@ -10,14 +10,14 @@
 
 #include "absl/strings/str_cat.h"
 #include "precompute/fem/held_nodes.h"
-#include "precompute/modes/block_lanczos_eigensolver.h"
-#include "precompute/modes/dense_blas.h"
-#include "precompute/modes/dense_eigensolver.h"
-#include "precompute/modes/multifrontal_inertia.h"
-#include "precompute/modes/openblas.h"
+#include "precompute/eigen/block_lanczos_eigensolver.h"
+#include "precompute/sparse/dense_blas.h"
+#include "precompute/eigen/dense_eigensolver.h"
+#include "precompute/sparse/multifrontal_inertia.h"
+#include "precompute/sparse/openblas.h"
 #include "precompute/modes/rigid_body.h"
-#include "precompute/modes/solve_cost.h"
-#include "precompute/modes/workers.h"
+#include "precompute/eigen/solve_cost.h"
+#include "precompute/sparse/workers.h"
 #include "proto/cpp/error_reason.h"
 
 namespace carillon::precompute {

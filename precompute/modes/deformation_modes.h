@@ -7,9 +7,9 @@
 #include "absl/status/statusor.h"
 #include "precompute/mesh/surface_mesh.h"
 #include "precompute/mesh/tet_mesh.h"
-#include "precompute/modes/eigensolver.h"
-#include "precompute/modes/solve_cost.h"
-#include "precompute/modes/verification.h"
+#include "precompute/eigen/eigensolver.h"
+#include "precompute/eigen/solve_cost.h"
+#include "precompute/eigen/verification.h"
 
 namespace carillon::precompute {
 

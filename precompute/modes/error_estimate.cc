@@ -9,9 +9,9 @@
 
 #include "absl/container/flat_hash_map.h"
 #include "precompute/fem/element.h"
-#include "precompute/modes/dense_blas.h"
-#include "precompute/modes/openblas.h"
-#include "precompute/modes/workers.h"
+#include "precompute/sparse/dense_blas.h"
+#include "precompute/sparse/openblas.h"
+#include "precompute/sparse/workers.h"
 
 namespace carillon::precompute {
 namespace {

@@ -19,7 +19,7 @@
 #include "precompute/mesh/read_mesh.h"
 #include "precompute/mesh/tetrahedralize.h"
 #include "precompute/modes/deformation_modes.h"
-#include "precompute/modes/openblas.h"
+#include "precompute/sparse/openblas.h"
 #include "tests/benchmarks/decomposition/matrix_file.h"
 
 namespace carillon::precompute {

@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "precompute/modes/dense_eigensolver.h"
+#include "precompute/eigen/dense_eigensolver.h"
 #include "tests/precompute/test_meshes.h"
 
 namespace carillon::precompute {

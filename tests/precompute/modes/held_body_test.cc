@@ -8,11 +8,11 @@
 #include "precompute/mesh/boundary.h"
 #include "precompute/mesh/hold.h"
 #include "precompute/modes/deformation_modes.h"
-#include "precompute/modes/dense_eigensolver.h"
+#include "precompute/eigen/dense_eigensolver.h"
 #include "precompute/modes/error_estimate.h"
-#include "precompute/modes/node_ordering.h"
+#include "precompute/sparse/node_ordering.h"
 #include "precompute/modes/rigid_body.h"
-#include "precompute/modes/sparse_eigensolver.h"
+#include "precompute/eigen/sparse_eigensolver.h"
 #include "tests/precompute/test_meshes.h"
 
 namespace carillon::precompute {

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+
+#include "precompute/eigen/eigensolver.h"
+#include "precompute/sparse/ordered_system.h"
+
+namespace carillon::precompute {
+
+/// Block Lanczos with shift-invert and full re-orthogonalization (Grimes, Lewis and Simon 1994):
+/// the Krylov space of (K - shift M)^-1 M, kBlockWidth vectors at a time, kept orthogonal to the
+/// rigid-body modes, which are known in closed form. Blocks make it fast (one pass over the factor
+/// serves sixteen solves) and find degenerate modes whole.
+class BlockLanczosEigensolver : public Eigensolver {
+ public:
+  /// `ordered`: of the system to be solved; outlives the solver. `rigid`: the
+  /// rigid-body modes, #U by at most six, M-orthonormal.
+  BlockLanczosEigensolver(const OrderedSystem& ordered, const Eigen::MatrixXd& rigid)
+      : ordered_(ordered), rigid_(rigid) {}
+
+  absl::StatusOr<Modes> Solve(const SystemMatrices& system, const ModeRequest& request,
+                              const SolveProgress& progress) override;
+
+ private:
+  const OrderedSystem& ordered_;
+  const Eigen::MatrixXd& rigid_;
+};
+
+}  // namespace carillon::precompute

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include "precompute/eigen/block_basis.h"
+#include "precompute/eigen/eigensolver.h"
+#include "precompute/sparse/node_matrix.h"
+#include "precompute/sparse/workers.h"
+
+namespace carillon::precompute {
+
+/// The proof that goes with a set of deformation modes.
+struct Verification {
+  /// Largest |K phi - Lambda M phi| / |Lambda M phi|, Euclidean.
+  double max_residual = 0;
+  /// Largest |phi_i^T M phi_j - delta_ij|, rigid-body modes included.
+  double max_orthogonality_error = 0;
+  int rigid_mode_count = 0;
+  /// Eigenvalues below sturm_eigenvalue by inertia: rigid_mode_count plus the modes found.
+  int sturm_count = 0;
+  double sturm_eigenvalue = 0;
+};
+
+/// Residuals above this, and above what rounding leaves, are no solution; the error of an
+/// eigenvalue is its square.
+inline constexpr double kMaxResidual = 1e-5;
+inline constexpr double kMaxOrthogonalityError = 1e-7;
+
+/// The residual, as above, that rounding leaves of an exact mode: the product with K errs by digits
+/// of its stiffest node, which on a slender body is 1e12 times as stiff as the lowest mode. Counted
+/// up to a thousandth only.
+double ResidualOfRounding(double stiffest, double eigenvalue);
+
+/// The largest diagonal entry of K over that of M.
+double StiffestNode(const NodeMatrix& A);
+
+/// What is measured of modes.
+struct Measurement {
+  Eigen::VectorXd residuals;  ///< |K phi - Lambda M phi| / |Lambda M phi| of each, if not rigid
+  Eigen::MatrixXd gram;       ///< phi_i^T M phi_j
+};
+
+/// `order`: of the nodes in A, see MakeNodeMatrix.
+Measurement Measure(const NodeMatrix& A, const std::vector<int32_t>& order, const Modes& modes,
+                    Workers& workers);
+
+/// Largest |gram_ij - delta_ij|.
+double OrthogonalityError(const Eigen::MatrixXd& gram);
+
+/// A number for each vector of a block.
+using BlockRow = Eigen::Array<double, 1, kBlockWidth>;
+
+/// |D^1/2 (elastic - inertial Lambda)| / |D^1/2 inertial Lambda| of each column of the products K x
+/// and M x: D^1/2 takes them back to the user's unknowns.
+BlockRow RelativeResiduals(const NodeMatrix& A, const VectorBlock& elastic,
+                           const VectorBlock& inertial, const BlockRow& eigenvalues);
+
+/// The same from the matrices as assembled.
+Eigen::VectorXd Residuals(const SystemMatrices& system, const Modes& modes);
+double OrthogonalityError(const SystemMatrices& system, const Eigen::MatrixXd& shapes);
+
+}  // namespace carillon::precompute

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <type_traits>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "precompute/sparse/front_walk.h"
+#include "precompute/sparse/frontal_structure.h"
+#include "precompute/sparse/node_matrix.h"
+
+namespace carillon::precompute {
+
+/// L L^T = K - shift M by the multifrontal method (Duff and Reid 1983), for solves of kBlockWidth
+/// right-hand sides at once. The panels of L are packed in tiles that one kernel streams through.
+template <typename Real>
+class MultifrontalCholesky {
+ public:
+  /// Errors: VERIFICATION_FAILED where K - shift M is not positive definite.
+  static absl::StatusOr<MultifrontalCholesky> Factorize(const FrontalStructure& fronts,
+                                                        const NodeMatrix& A, double shift,
+                                                        Workers& workers, const PartDone& progress);
+
+  /// Overwrites x, 3 #nodes by kBlockWidth, row-major, in elimination order, by its solution.
+  void Solve(Real* x, Workers& workers) const;
+
+  /// The same of x with kWideBlock columns, by one thread.
+  void SolveWide(Real* x) const requires std::is_same_v<Real, float>;
+
+  size_t stored_bytes() const { return tile_start_.back() * sizeof(Real); }
+
+ private:
+  template <int kWidth>
+  class Substitution;
+
+  const FrontalStructure* fronts_ = nullptr;
+  std::unique_ptr<Real[]> tiles_;   // written whole by the factorization: not zeroed before
+  std::vector<size_t> tile_start_;  ///< #supernodes + 1, into tiles_
+  std::vector<int32_t> top_nodes_;  ///< eliminated by the fronts above all subtrees
+  std::vector<int32_t> top_index_;  ///< #nodes: place in top_nodes_, or -1
+};
+
+/// Numbers that a factor stores.
+size_t FactorNumbers(const FrontalStructure& fronts);
+
+}  // namespace carillon::precompute

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include "absl/status/statusor.h"
+#include "precompute/sparse/front_walk.h"
+#include "precompute/sparse/frontal_structure.h"
+#include "precompute/sparse/node_matrix.h"
+
+namespace carillon::precompute {
+
+/// The number of negative eigenvalues of K - shift M, which is the number of eigenvalues of
+/// K x = Lambda M x below `shift` (Sylvester's law of inertia), by an L S L^T with signs S, without
+/// pivoting.
+/// Errors: VERIFICATION_FAILED where a pivot is too small to trust its sign (the shift lies on an
+/// eigenvalue: move it).
+absl::StatusOr<int> CountEigenvaluesBelow(const FrontalStructure& fronts, const NodeMatrix& A,
+                                          double shift, Workers& workers, const PartDone& progress);
+
+}  // namespace carillon::precompute
