@@ -8,9 +8,9 @@
 #include "precompute/decomposition_observer.h"
 #include "precompute/fem/element.h"
 #include "precompute/intended_use.h"
+#include "precompute/mesh/fill/tetrahedralize.h"
 #include "precompute/mesh/hold.h"
-#include "precompute/mesh/prepare_surface.h"
-#include "precompute/mesh/tetrahedralize.h"
+#include "precompute/mesh/surface/prepare_surface.h"
 #include "precompute/modes/modal_model.h"
 #include "precompute/resolution.h"
 

@@ -10,12 +10,12 @@
 
 #include "precompute/command_line.h"
 #include "precompute/json_report.h"
-#include "precompute/mesh/read_mesh.h"
+#include "precompute/mesh/read/read_mesh.h"
 #include "precompute/modal_model_codec.h"
-#include "precompute/sparse/openblas.h"
 #include "precompute/progress_bar.h"
 #include "precompute/progress_reporter.h"
 #include "precompute/sha256.h"
+#include "precompute/sparse/openblas.h"
 #include "precompute/worker_events.h"
 #include "proto/cpp/error_reason.h"
 

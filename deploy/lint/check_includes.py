@@ -25,10 +25,10 @@ class Rules:
         return max(inside, key=len, default=None)
 
     def may_include(self, room, included):
-        allowed = [room, *self.rooms[room]]
-        return "*" in allowed or any(
-            included == one or included.startswith(one + "/") or fnmatch.fnmatch(included, one)
-            for one in allowed)
+        at = self.room_of(included)
+        return any(
+            at == one or fnmatch.fnmatch(included, one) or (at is None and included.startswith(one + "/"))
+            for one in (room, *self.rooms[room]))
 
     def library_of(self, header):
         for name, library in self.libraries.items():

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "precompute/eigen/block_basis.h"
+#include "precompute/eigen/shift_invert.h"
 #include "precompute/sparse/multifrontal_cholesky.h"
 #include "precompute/sparse/node_matrix.h"
-#include "precompute/eigen/shift_invert.h"
 #include "precompute/sparse/workers.h"
 
 namespace carillon::precompute {

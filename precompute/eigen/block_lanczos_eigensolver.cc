@@ -7,11 +7,11 @@
 
 #include "absl/strings/str_cat.h"
 #include "precompute/eigen/block_lanczos.h"
+#include "precompute/eigen/ritz_refinement.h"
+#include "precompute/eigen/solve_cost.h"
 #include "precompute/sparse/dense_blas.h"
 #include "precompute/sparse/multifrontal_cholesky.h"
 #include "precompute/sparse/openblas.h"
-#include "precompute/eigen/ritz_refinement.h"
-#include "precompute/eigen/solve_cost.h"
 #include "precompute/sparse/workers.h"
 #include "proto/cpp/error_reason.h"
 

@@ -9,10 +9,10 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "precompute/sparse/block_kernels.h"
-#include "precompute/sparse/dense_blas.h"
 #include "precompute/eigen/residual_kernels.h"
 #include "precompute/eigen/verification.h"
+#include "precompute/sparse/block_kernels.h"
+#include "precompute/sparse/dense_blas.h"
 #include "proto/cpp/error_reason.h"
 
 namespace carillon::precompute {

@@ -3,9 +3,9 @@
 
 #include <Eigen/Core>
 
+#include "precompute/eigen/eigensolver.h"
 #include "precompute/mesh/sounding_surface.h"
 #include "precompute/mesh/tet_mesh.h"
-#include "precompute/eigen/eigensolver.h"
 
 namespace carillon::precompute {
 

@@ -9,14 +9,14 @@
 #include <string>
 
 #include "absl/strings/str_cat.h"
-#include "precompute/fem/held_nodes.h"
 #include "precompute/eigen/block_lanczos_eigensolver.h"
-#include "precompute/sparse/dense_blas.h"
 #include "precompute/eigen/dense_eigensolver.h"
+#include "precompute/eigen/solve_cost.h"
+#include "precompute/fem/held_nodes.h"
+#include "precompute/modes/rigid_body.h"
+#include "precompute/sparse/dense_blas.h"
 #include "precompute/sparse/multifrontal_inertia.h"
 #include "precompute/sparse/openblas.h"
-#include "precompute/modes/rigid_body.h"
-#include "precompute/eigen/solve_cost.h"
 #include "precompute/sparse/workers.h"
 #include "proto/cpp/error_reason.h"
 

@@ -5,11 +5,11 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "precompute/mesh/surface_mesh.h"
-#include "precompute/mesh/tet_mesh.h"
 #include "precompute/eigen/eigensolver.h"
 #include "precompute/eigen/solve_cost.h"
 #include "precompute/eigen/verification.h"
+#include "precompute/mesh/surface_mesh.h"
+#include "precompute/mesh/tet_mesh.h"
 
 namespace carillon::precompute {
 

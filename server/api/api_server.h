@@ -6,10 +6,10 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "server/live_output/live_output.h"
 #include "server/base/clock.h"
 #include "server/decomposition/decomposition_queue.h"
 #include "server/decomposition/remote_runs.h"
+#include "server/live_output/live_output.h"
 #include "server/mode_database/mode_database.h"
 #include "server/scene/scene_registry.h"
 

@@ -5,8 +5,8 @@
 #include <string>
 
 #include "carillon/v1/audio_service.grpc.pb.h"
-#include "server/live_output/live_output.h"
 #include "server/api/work_pool.h"
+#include "server/live_output/live_output.h"
 #include "server/mode_database/mode_database.h"
 #include "server/scene/scene_registry.h"
 #include "server/scene/sounding_body.h"

@@ -2,9 +2,9 @@
 #pragma once
 
 #include "carillon/v1/contact_service.grpc.pb.h"
-#include "server/live_output/live_output.h"
 #include "server/api/work_pool.h"
 #include "server/base/clock.h"
+#include "server/live_output/live_output.h"
 #include "server/scene/scene_registry.h"
 
 namespace carillon {

@@ -13,9 +13,9 @@
 #include "server/base/pose.h"
 #include "server/excitation/contact.h"
 #include "server/scene/sounding_body.h"
-#include "server/synthesis/mixer.h"
 #include "server/synthesis/bank/oscillator_bank.h"
 #include "server/synthesis/bank/sounding_modes.h"
+#include "server/synthesis/mixer.h"
 #include "server/synthesis/schedule/strike.h"
 #include "server/synthesis/voice/voice.h"
 

@@ -8,8 +8,8 @@
 #include "absl/base/thread_annotations.h"
 #include "server/base/fixed_vector.h"
 #include "server/base/thread_role.h"
-#include "server/synthesis/bank_slot.h"
 #include "server/synthesis/bank/block_mix.h"
+#include "server/synthesis/bank_slot.h"
 #include "server/synthesis/schedule/due_strike.h"
 
 namespace carillon {

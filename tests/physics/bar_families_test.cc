@@ -3,7 +3,7 @@
 // Bars with free ends: each family of modes, told apart by its shapes, against its closed form.
 #include <gtest/gtest.h>
 
-#include "precompute/mesh/tetrahedralize.h"
+#include "precompute/mesh/fill/tetrahedralize.h"
 #include "tests/physics/mode_families.h"
 #include "tests/physics/natural_frequencies.h"
 #include "tests/physics/timoshenko_beam.h"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
-#include "precompute/mesh/tetrahedralize.h"
+#include "precompute/mesh/fill/tetrahedralize.h"
 #include "tests/physics/natural_frequencies.h"
 #include "tests/physics/timoshenko_beam.h"
 #include "tests/precompute/test_meshes.h"

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "precompute/mesh/tetrahedralize.h"
+#include "precompute/mesh/fill/tetrahedralize.h"
 #include "tests/physics/lamb_sphere.h"
 #include "tests/physics/natural_frequencies.h"
 #include "tests/precompute/test_meshes.h"

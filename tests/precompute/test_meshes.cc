@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "precompute/mesh/boundary.h"
-#include "precompute/mesh/midside_nodes.h"
+#include "precompute/mesh/fill/midside_nodes.h"
 
 namespace carillon::precompute {
 namespace {

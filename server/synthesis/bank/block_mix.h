@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "server/synthesis/ringing/lane_mix.h"
+#include "server/synthesis/ringing/strike_batch.h"
 #include "server/synthesis/spectrum/long_block.h"
 #include "server/synthesis/spectrum/spectrum.h"
-#include "server/synthesis/ringing/strike_batch.h"
 
 namespace carillon {
 

@@ -7,10 +7,10 @@
 #include <cstdint>
 #include <vector>
 
-#include "server/synthesis/ringing/lane_arrays.h"
-#include "server/synthesis/spectrum/long_block.h"
 #include "server/synthesis/bank/shape_table.h"
 #include "server/synthesis/bank/sounding_modes.h"
+#include "server/synthesis/ringing/lane_arrays.h"
+#include "server/synthesis/spectrum/long_block.h"
 #include "server/synthesis/spectrum/spreading_kernel.h"
 
 namespace carillon {

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "server/synthesis/spectrum/spectral_kernel.h"
 #include "server/synthesis/schedule/work_budget.h"
+#include "server/synthesis/spectrum/spectral_kernel.h"
 
 namespace carillon {
 namespace {

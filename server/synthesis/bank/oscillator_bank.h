@@ -13,16 +13,16 @@
 #include "absl/base/thread_annotations.h"
 #include "server/base/thread_role.h"
 #include "server/synthesis/bank/block_mix.h"
-#include "server/synthesis/schedule/due_strike.h"
+#include "server/synthesis/bank/shape_table.h"
+#include "server/synthesis/bank/sounding_modes.h"
+#include "server/synthesis/bank/sustained_force.h"
 #include "server/synthesis/ringing/lane_arrays.h"
 #include "server/synthesis/ringing/lane_mix.h"
 #include "server/synthesis/ringing/ring_kernel.h"
-#include "server/synthesis/bank/shape_table.h"
-#include "server/synthesis/bank/sounding_modes.h"
-#include "server/synthesis/spectrum/spectral_lanes.h"
-#include "server/synthesis/schedule/strike.h"
 #include "server/synthesis/ringing/strike_kernel.h"
-#include "server/synthesis/bank/sustained_force.h"
+#include "server/synthesis/schedule/due_strike.h"
+#include "server/synthesis/schedule/strike.h"
+#include "server/synthesis/spectrum/spectral_lanes.h"
 
 namespace carillon {
 

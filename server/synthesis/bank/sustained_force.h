@@ -6,12 +6,12 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "server/synthesis/bank/roughness_noise.h"
 #include "server/synthesis/ringing/force_kernel.h"
 #include "server/synthesis/ringing/lane_arrays.h"
 #include "server/synthesis/ringing/lane_mix.h"
-#include "server/synthesis/bank/roughness_noise.h"
-#include "server/synthesis/schedule/strike.h"
 #include "server/synthesis/ringing/strike_kernel.h"
+#include "server/synthesis/schedule/strike.h"
 
 namespace carillon {
 

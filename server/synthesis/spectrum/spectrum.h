@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "server/synthesis/spectrum/inverse_transform.h"
 #include "server/synthesis/ringing/lane_arrays.h"
+#include "server/synthesis/spectrum/inverse_transform.h"
 #include "server/synthesis/spectrum/long_block.h"
 
 namespace carillon {

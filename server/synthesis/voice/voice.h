@@ -8,9 +8,9 @@
 #include <span>
 #include <vector>
 
+#include "server/synthesis/schedule/strike.h"
 #include "server/synthesis/voice/delay_line.h"
 #include "server/synthesis/voice/glide.h"
-#include "server/synthesis/schedule/strike.h"
 
 namespace carillon {
 

@@ -16,8 +16,8 @@
 #include <string_view>
 
 #include "precompute/fem/assembly.h"
-#include "precompute/mesh/read_mesh.h"
-#include "precompute/mesh/tetrahedralize.h"
+#include "precompute/mesh/fill/tetrahedralize.h"
+#include "precompute/mesh/read/read_mesh.h"
 #include "precompute/modes/deformation_modes.h"
 #include "precompute/sparse/openblas.h"
 #include "tests/benchmarks/decomposition/matrix_file.h"

@@ -4,10 +4,10 @@
 #include <gtest/gtest.h>
 
 #include "precompute/eigen/dense_eigensolver.h"
-#include "precompute/sparse/node_ordering.h"
-#include "precompute/modes/rigid_body.h"
 #include "precompute/eigen/sparse_eigensolver.h"
 #include "precompute/eigen/verification.h"
+#include "precompute/modes/rigid_body.h"
+#include "precompute/sparse/node_ordering.h"
 #include "tests/precompute/test_meshes.h"
 
 namespace carillon::precompute {

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "precompute/eigen/cholesky_factor.h"
-#include "tests/precompute/reference/inertia.h"
 #include "precompute/sparse/node_ordering.h"
+#include "tests/precompute/reference/inertia.h"
 #include "tests/precompute/test_meshes.h"
 
 namespace carillon::precompute {

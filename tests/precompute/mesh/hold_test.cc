@@ -8,7 +8,7 @@
 #include <functional>
 
 #include "precompute/mesh/boundary.h"
-#include "precompute/mesh/tetrahedralize.h"
+#include "precompute/mesh/fill/tetrahedralize.h"
 #include "tests/precompute/mesh/mesh_files.h"
 #include "tests/precompute/mesh/read_mesh_fixture.h"
 #include "tests/precompute/test_meshes.h"

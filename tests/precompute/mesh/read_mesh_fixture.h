@@ -8,7 +8,7 @@
 #include <string>
 #include <variant>
 
-#include "precompute/mesh/read_mesh.h"
+#include "precompute/mesh/read/read_mesh.h"
 
 namespace carillon::precompute {
 

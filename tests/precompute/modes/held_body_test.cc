@@ -4,15 +4,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "precompute/eigen/dense_eigensolver.h"
+#include "precompute/eigen/sparse_eigensolver.h"
 #include "precompute/fem/held_nodes.h"
 #include "precompute/mesh/boundary.h"
 #include "precompute/mesh/hold.h"
 #include "precompute/modes/deformation_modes.h"
-#include "precompute/eigen/dense_eigensolver.h"
 #include "precompute/modes/error_estimate.h"
-#include "precompute/sparse/node_ordering.h"
 #include "precompute/modes/rigid_body.h"
-#include "precompute/eigen/sparse_eigensolver.h"
+#include "precompute/sparse/node_ordering.h"
 #include "tests/precompute/test_meshes.h"
 
 namespace carillon::precompute {

@@ -4,8 +4,8 @@
 #include <Eigen/Dense>
 #include <cmath>
 
-#include "precompute/fem/assembly.h"
 #include "precompute/eigen/block_basis.h"
+#include "precompute/fem/assembly.h"
 #include "precompute/sparse/multifrontal_cholesky.h"
 #include "precompute/sparse/multifrontal_inertia.h"
 #include "precompute/sparse/ordered_system.h"

@@ -16,8 +16,8 @@
 #include "carillon/v1/modal_model_service.grpc.pb.h"
 #include "carillon/v1/scene_service.grpc.pb.h"
 #include "server/api/api_server.h"
-#include "server/live_output/live_output.h"
 #include "server/decomposition/local_executor.h"
+#include "server/live_output/live_output.h"
 #include "tests/server/mode_database/sample_model.h"
 #include "tests/server/scene/small_model.h"
 

@@ -11,9 +11,9 @@
 
 #include "server/synthesis/bank/block_mix.h"
 #include "server/synthesis/bank/level.h"
-#include "server/synthesis/mixer.h"
 #include "server/synthesis/bank/oscillator_bank.h"
 #include "server/synthesis/bank/sounding_modes.h"
+#include "server/synthesis/mixer.h"
 
 namespace carillon {
 

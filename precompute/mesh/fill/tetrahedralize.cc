@@ -1,0 +1,300 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "precompute/mesh/fill/tetrahedralize.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <numeric>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "precompute/mesh/fill/element_size.h"
+#include "precompute/mesh/fill/fill_with_tetgen.h"
+#include "precompute/mesh/fill/midside_nodes.h"
+#include "precompute/mesh/mesh_limits.h"
+#include "precompute/mesh/point_math.h"
+#include "precompute/mesh/surface/refine_surface.h"
+#include "precompute/mesh/surface/surface_shells.h"
+#include "proto/cpp/error_reason.h"
+
+namespace carillon::precompute {
+namespace {
+
+// An automatic mesh has edges of at most a twentieth of the body's length, and elements at most so
+// many times as long as the wall is thick, as far as these two bounds on elements allow: enough for
+// the first bending mode of a compact body within 1 %, few enough to be solved in seconds.
+constexpr double kEdgesAlongBody = 20;
+constexpr double kEdgesPerThickness = 8;
+constexpr double kMinElements = 1'500;
+constexpr double kMaxElements = 12'000;
+constexpr size_t kMaxTriangles = 20'000;  // about 60,000 nodes with mid-sides in a thin wall
+constexpr double kCoarsening = 1.2;
+
+constexpr double kLongestToMeanEdge =
+    1.4;  // where edges above the longest are cut into equal parts
+constexpr double kVolumeOfRegular = 0.11785;  // of a tetrahedron with edges of length 1
+
+constexpr int kNodesPerCorner = 8;  // about, of a solid with mid-side nodes
+
+constexpr int kMaxCorrections = 3;
+constexpr double kTargetTolerance = 0.2;
+
+// The count of nodes goes with a power of the edge between two (on the surface) and three (inside).
+constexpr double kEdgeByNodes = 1 / 2.5;
+constexpr int kMaxEdgeSteps = 8;
+constexpr double kCoarsestToGrain = 2.5;
+constexpr double kNodesPerCubedEdge = 2;  // as TetGen fills solids
+
+/// Where a surface lies and how large it is; scale * (p - low) is within the unit box.
+struct UnitBox {
+  Point low;
+  double scale;
+};
+
+UnitBox FindUnitBox(const SurfaceMesh& surface) {
+  Point low = surface.vertices.front(), high = low;
+  for (const Point& p : surface.vertices) {
+    for (size_t x = 0; x < 3; ++x) {
+      low[x] = std::min(low[x], p[x]);
+      high[x] = std::max(high[x], p[x]);
+    }
+  }
+  const Point size = Difference(high, low);
+  return {low, 1 / std::max({size[0], size[1], size[2]})};
+}
+
+struct Extent {
+  double area = 0;
+  double volume = 0;
+};
+
+Extent Measure(const SurfaceMesh& surface, const std::vector<Shell>& shells) {
+  Extent extent;
+  for (size_t t = 0; t < surface.triangles.size(); ++t) {
+    extent.area += Norm(AreaNormal(CornersOf(surface, t))) / 2;
+  }
+  for (const Shell& shell : shells) extent.volume += shell.volume_m3;
+  extent.volume = std::abs(extent.volume);
+  return extent;
+}
+
+/// Elements to expect with edges of length `edge`: regular tetrahedra inside, or, where the wall is
+/// thinner than an edge, one layer of three for each two triangles of both its sides.
+double ExpectedElements(const Extent& extent, double edge) {
+  const double inside = extent.volume * 6 * std::sqrt(2.0) / (edge * edge * edge);
+  const double on_surface = 1.5 * extent.area * 4 / (std::sqrt(3.0) * edge * edge);
+  return std::max(inside, on_surface);
+}
+
+/// The edge length for which about `count` elements are expected, at unit size.
+double EdgeForElements(const Extent& extent, double count) {
+  double low = 1e-6, high = 1;
+  for (int step = 0; step < 60; ++step) {
+    const double middle = std::sqrt(low * high);
+    (ExpectedElements(extent, middle) > count ? low : high) = middle;
+  }
+  return high;
+}
+
+double AutomaticEdge(const Extent& extent) {
+  const double thickness = 2 * extent.volume / extent.area;
+  const double edge = std::min(1 / kEdgesAlongBody, kEdgesPerThickness * thickness);
+  return std::clamp(edge, EdgeForElements(extent, kMaxElements),
+                    EdgeForElements(extent, kMinElements));
+}
+
+absl::Status CheckVolumes(const TetMesh& mesh, double surface_volume) {
+  double sum = 0;
+  for (size_t e = 0; e < mesh.elements.size(); e += 4) {
+    const auto node = [&](size_t i) {
+      return mesh.nodes[static_cast<size_t>(mesh.elements[e + i])];
+    };
+    const double volume = TetVolume(node(0), node(1), node(2), node(3));
+    if (volume <= 0) {
+      return Refusal(absl::StatusCode::kInvalidArgument, "MESH_TETRAHEDRALIZATION_FAILED",
+                     absl::StrCat("tetrahedron ", e / 4, " came out flat near (", node(0)[0], ", ",
+                                  node(0)[1], ", ", node(0)[2],
+                                  ") of the unit box: move apart what nearly touches there"));
+    }
+    sum += volume;
+  }
+  if (std::abs(sum - surface_volume) > 1e-6 * surface_volume) {
+    return Refusal(
+        absl::StatusCode::kInvalidArgument, "MESH_TETRAHEDRALIZATION_FAILED",
+        absl::StrCat("the tetrahedra fill ", sum / surface_volume,
+                     " of the volume inside the surface: repair parts of it that touch"));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CheckNodeCount(double count) {
+  if (count <= kMaxMeshNodes) return absl::OkStatus();
+  return Refusal(absl::StatusCode::kResourceExhausted, "MESH_TOO_LARGE",
+                 absl::StrCat("the mesh would have ", count, " nodes; the limit is ", kMaxMeshNodes,
+                              ": give a coarser surface or a smaller target_node_count"));
+}
+
+SurfaceMesh ToUnitBox(SurfaceMesh surface, const UnitBox& box) {
+  for (Point& p : surface.vertices) {
+    for (size_t x = 0; x < 3; ++x) p[x] = (p[x] - box.low[x]) * box.scale;
+  }
+  return surface;
+}
+
+void FromUnitBox(TetMesh& mesh, const UnitBox& box) {
+  for (Point& p : mesh.nodes) {
+    for (size_t x = 0; x < 3; ++x) p[x] = p[x] / box.scale + box.low[x];
+  }
+}
+
+int NodesPerCorner(const MeshingSettings& settings) {
+  return settings.nodes_per_element == 10 ? kNodesPerCorner : 1;
+}
+
+std::vector<Point> PointsInCavities(const SurfaceMesh& surface, const std::vector<Shell>& shells) {
+  std::vector<Point> points;
+  for (size_t s = 1; s < shells.size(); ++s) points.push_back(PointInside(surface, shells[s]));
+  return points;
+}
+
+/// A surface at unit size, filled as finely as asked.
+class Filler {
+ public:
+  /// `scale`: of the unit surface to the one given.
+  Filler(const SurfaceMesh& unit_surface, double scale, const MeshingSettings& settings)
+      : surface_(unit_surface),
+        scale_(scale),
+        settings_(settings),
+        shells_(FindShells(surface_)),
+        extent_(Measure(surface_, shells_)) {}
+
+  absl::StatusOr<TetMesh> Fill() const {
+    if (settings_.grain_m != 0) return FillToGrain(settings_.grain_m * scale_);
+    if (settings_.target_node_count != 0) return FillToTarget();
+    return FillWithEdge(CoarserOnNarrowTriangles(AutomaticEdge(extent_)));
+  }
+
+ private:
+  /// Narrow triangles are cut into many more than their area suggests: then longer edges must do,
+  /// up to those that still let the body bend.
+  double CoarserOnNarrowTriangles(double edge) const {
+    const auto count = [&](double longest) {
+      return RefineSurface(surface_, longest).surface.triangles.size();
+    };
+    while (edge * kCoarsening <= 1 / kEdgesAlongBody &&
+           count(edge * kLongestToMeanEdge) > std::max(kMaxTriangles, surface_.triangles.size())) {
+      edge *= kCoarsening;
+    }
+    return edge;
+  }
+
+  /// Nodes to expect: those of the refined surface, and inside of what is deeper than half an edge.
+  double ExpectedNodes(double edge) const {
+    const SurfaceMesh surface = RefineSurface(surface_, LongestOnSurface(edge)).surface;
+    const double deep = std::max(extent_.volume - extent_.area * edge / 2, 0.0);
+    return static_cast<double>(surface.vertices.size()) +
+           kNodesPerCubedEdge * deep / (edge * edge * edge);
+  }
+
+  /// The edge, from `edge` on, for which about `count` nodes are expected.
+  double EdgeForNodes(double count, double edge) const {
+    for (int step = 0; step < kMaxEdgeSteps; ++step) {
+      const double excess = ExpectedNodes(edge) / count;
+      if (std::abs(excess - 1) < kTargetTolerance / 4) break;
+      edge = std::min(edge * std::pow(excess, kEdgeByNodes), 1.0);
+    }
+    return edge;
+  }
+
+  /// By what is expected, then by how far that was off.
+  absl::StatusOr<TetMesh> FillToTarget() const {
+    const double target = settings_.target_node_count;
+    double edge = EdgeForNodes(target, EdgeForElements(extent_, 4 * target));
+    absl::StatusOr<TetMesh> mesh = FillWithEdge(edge);
+    for (int correction = 0; correction < kMaxCorrections && mesh.ok(); ++correction) {
+      const double count = static_cast<double>(mesh->nodes.size());
+      if (std::abs(count / target - 1) < kTargetTolerance) break;
+      const double better = EdgeForNodes(target * ExpectedNodes(edge) / count, edge);
+      if (better == edge) break;
+      edge = better;
+      mesh = FillWithEdge(edge);
+    }
+    return mesh;
+  }
+
+  /// Inside elements may be as long as the longest on the surface: where the surface is finer than
+  /// it need be, the inside is not.
+  absl::StatusOr<TetMesh> FillToGrain(double grain) const {
+    const double edge = EdgeForGrain(grain);
+    return FillWithEdge(edge, kLongestToMeanEdge * edge);
+  }
+
+  /// The longest edge with which the surface is no coarser than `grain`. All sides of a surface of
+  /// few triangles are cut at once, so it may come out finer.
+  double EdgeForGrain(double grain) const {
+    double fine = grain, coarse = kCoarsestToGrain * grain;
+    for (int step = 0; step < kMaxEdgeSteps; ++step) {
+      const double middle = std::sqrt(fine * coarse);
+      (Grain(RefineSurface(surface_, middle).surface) <= grain ? fine : coarse) = middle;
+    }
+    return fine / kLongestToMeanEdge;
+  }
+
+  double LongestOnSurface(double edge) const {
+    return settings_.keep_surface.value_or(false) ? std::numeric_limits<double>::infinity()
+                                                  : kLongestToMeanEdge * edge;
+  }
+
+  absl::StatusOr<TetMesh> FillWithEdge(double edge) const { return FillWithEdge(edge, edge); }
+
+  absl::StatusOr<TetMesh> FillWithEdge(double edge, double inside) const {
+    const bool keep_surface = settings_.keep_surface.value_or(false);
+    const RefinedSurface refined = RefineSurface(surface_, LongestOnSurface(edge));
+    FillRequest request{.surface = refined,
+                        .cavities = PointsInCavities(surface_, shells_),
+                        .max_volume = kVolumeOfRegular * inside * inside * inside,
+                        .keep_surface = true,
+                        .max_added_nodes = kMaxMeshNodes / NodesPerCorner(settings_),
+                        .cautious = settings_.cautious};
+    absl::StatusOr<TetMesh> mesh = FillAndCheck(request);
+    if (mesh.ok() || keep_surface) return mesh;
+    request.keep_surface = false;
+    return FillAndCheck(request);
+  }
+
+  absl::StatusOr<TetMesh> FillAndCheck(const FillRequest& request) const {
+    absl::StatusOr<TetMesh> mesh = FillWithTetgen(request);
+    if (!mesh.ok()) return mesh;
+    if (absl::Status status = CheckVolumes(*mesh, extent_.volume); !status.ok()) return status;
+    return mesh;
+  }
+
+  const SurfaceMesh& surface_;
+  double scale_;
+  const MeshingSettings& settings_;
+  std::vector<Shell> shells_;
+  Extent extent_;
+};
+
+}  // namespace
+
+absl::StatusOr<TetMesh> Tetrahedralize(const SurfaceMesh& surface,
+                                       const MeshingSettings& settings) {
+  const double target = settings.target_node_count;
+  if (absl::Status status = CheckNodeCount(target * NodesPerCorner(settings)); !status.ok()) {
+    return status;
+  }
+  const UnitBox box = FindUnitBox(surface);
+  const SurfaceMesh unit_surface = ToUnitBox(surface, box);
+  absl::StatusOr<TetMesh> mesh = Filler(unit_surface, box.scale, settings).Fill();
+  if (!mesh.ok()) return mesh;
+  FromUnitBox(*mesh, box);
+  if (settings.nodes_per_element == 10) AddMidsideNodes(*mesh);
+  absl::Status status = CheckNodeCount(static_cast<double>(mesh->nodes.size()));
+  if (!status.ok()) return status;
+  return mesh;
+}
+
+}  // namespace carillon::precompute

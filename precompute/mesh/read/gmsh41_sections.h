@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "precompute/mesh/read/gmsh_elements.h"
+#include "precompute/mesh/read/number_stream.h"
+
+namespace carillon::precompute {
+
+/// The sections of a file of MSH 4.1 that differ from those of 2.2. Each reads `stream` from behind
+/// its name on.
+/// https://gmsh.info/doc/texinfo/gmsh.html#MSH-file-format
+/// Errors: MESH_UNREADABLE, MESH_TOO_LARGE, MESH_ELEMENT_UNSUPPORTED.
+class Gmsh41Sections {
+ public:
+  explicit Gmsh41Sections(GmshElements& elements) : elements_(elements) {}
+
+  /// Which physical groups the points, curves, surfaces and volumes of the geometry are in.
+  absl::Status ReadEntities(NumberStream& stream);
+  absl::Status ReadNodes(NumberStream& stream);
+  absl::Status ReadElements(NumberStream& stream);
+
+ private:
+  bool ReadEntity(int dimension, NumberStream& stream);
+  absl::Status ReadNodeBlock(NumberStream& stream);
+  absl::Status ReadElementBlock(NumberStream& stream);
+
+  GmshElements& elements_;
+  std::map<std::array<int32_t, 2>, std::vector<int32_t>> physicals_;  // by dimension and number
+};
+
+}  // namespace carillon::precompute

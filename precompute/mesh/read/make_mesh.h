@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include "absl/status/statusor.h"
+#include "precompute/mesh/mesh_names.h"
+#include "precompute/mesh/read/element_file.h"
+
+namespace carillon::precompute {
+
+/// Checks the tetrahedra of a file and finds their boundary; of a file without any makes a surface
+/// of its triangles. Nodes that no tetrahedron has are passed over; the others keep their order.
+/// Tetrahedra given mirrored are turned.
+///
+/// Errors: MESH_NOT_FINITE, MESH_INDEX_OUT_OF_RANGE, MESH_EMPTY, MESH_ZERO_VOLUME,
+/// MESH_MIDSIDE_NODE_MISPLACED, MESH_NOT_MANIFOLD, MESH_SEVERAL_PIECES.
+absl::StatusOr<NamedMesh> MakeMesh(ElementFile file);
+
+}  // namespace carillon::precompute

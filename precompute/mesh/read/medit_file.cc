@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "precompute/mesh/read/medit_file.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <string_view>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "precompute/mesh/read/number_stream.h"
+#include "proto/cpp/error_reason.h"
+
+namespace carillon::precompute {
+namespace {
+
+/// What a section lists: nodes of each entry, and how many of them are corners.
+struct Kind {
+  std::string_view keyword;
+  int dimension;
+  size_t node_count;
+  size_t corner_count;
+};
+
+constexpr std::array<Kind, 7> kKinds = {{{"Edges", 1, 2, 2},
+                                         {"EdgesP2", 1, 3, 2},
+                                         {"Triangles", 2, 3, 3},
+                                         {"TrianglesP2", 2, 6, 3},
+                                         {"Quadrilaterals", 2, 4, 4},
+                                         {"Tetrahedra", 3, 4, 4},
+                                         {"TetrahedraP2", 3, 10, 4}}};
+
+/// Elements that fill volume and are no tetrahedra.
+constexpr std::array<std::string_view, 6> kOtherVolumes = {
+    "Hexahedra", "HexahedraQ2", "Prisms", "PrismsP2", "Pyramids", "PyramidsP2"};
+
+class Parser {
+ public:
+  explicit Parser(const std::string& bytes) : bytes_(bytes), stream_(bytes, false) {}
+
+  absl::StatusOr<ElementFile> Parse() && {
+    if (stream_.NextWord() != "MeshVersionFormatted") return Unreadable("it is no text of Medit");
+    for (std::string_view word = stream_.NextWord(); !word.empty() && word != "End";
+         word = stream_.NextWord()) {
+      if (absl::Status status = ReadSection(word); !status.ok()) return status;
+    }
+    ChooseGroups();
+    return std::move(file_);
+  }
+
+ private:
+  absl::Status Unreadable(absl::string_view what) const {
+    const auto lines = std::count(
+        bytes_.begin(), bytes_.end() - static_cast<ptrdiff_t>(stream_.rest().size()), '\n');
+    return Refusal(absl::StatusCode::kInvalidArgument, "MESH_UNREADABLE",
+                   absl::StrCat("the file cannot be read as Medit's .mesh: line ", lines + 1, ": ",
+                                what, ". Export the mesh again, as text"));
+  }
+
+  absl::Status ReadSection(std::string_view keyword) {
+    if (keyword == "Dimension") return ReadDimension();
+    if (keyword == "Vertices") return ReadVertices();
+    const auto* kind = std::ranges::find(kKinds, keyword, &Kind::keyword);
+    if (kind != kKinds.end()) return ReadElements(*kind);
+    uint64_t count = 0;
+    if (std::ranges::find(kOtherVolumes, keyword) != kOtherVolumes.end() && stream_.Take(count) &&
+        count > 0) {
+      return UnsupportedElements(absl::string_view(keyword.data(), keyword.size()));
+    }
+    // Of another section everything up to the next keyword.
+    for (std::string_view word = stream_.PeekWord();
+         !word.empty() && std::isalpha(static_cast<unsigned char>(word[0])) == 0;
+         word = stream_.PeekWord()) {
+      stream_.NextWord();
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status ReadDimension() {
+    int dimension = 0;
+    if (!stream_.Take(dimension) || dimension != 3) return Unreadable("its dimension is not 3");
+    return absl::OkStatus();
+  }
+
+  absl::Status ReadVertices() {
+    uint64_t count = 0;
+    if (!stream_.Take(count)) return Unreadable("no number of vertices");
+    if (absl::Status status = CheckNodeCountOfFile(count); !status.ok()) return status;
+    for (uint64_t i = 0; i < count; ++i) {
+      Point p{};
+      int64_t reference = 0;
+      if (!stream_.TakeAll(p) || !stream_.Take(reference)) {
+        return Unreadable("no vertex (\"x y z reference\")");
+      }
+      const auto number = static_cast<int64_t>(file_.nodes.size()) + 1;
+      file_.node_numbers.push_back(number);
+      file_.nodes.push_back(p);
+      AddTo(0, reference, std::span(&number, 1));
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status ReadElements(const Kind& kind) {
+    uint64_t count = 0;
+    if (!stream_.Take(count)) return Unreadable("no number of elements");
+    std::vector<int64_t> nodes(kind.node_count);
+    for (uint64_t i = 0; i < count; ++i) {
+      int64_t reference = 0;
+      if (!stream_.TakeAll(nodes) || !stream_.Take(reference)) {
+        return Unreadable(absl::StrCat("no entry of ",
+                                       absl::string_view(kind.keyword.data(), kind.keyword.size()),
+                                       " (nodes, then the reference)"));
+      }
+      if (kind.dimension == 3) {
+        if (absl::Status status = file_.AddTetrahedron(nodes); !status.ok()) return status;
+        continue;
+      }
+      AddTo(kind.dimension, reference, std::span(nodes).first(kind.corner_count));
+      if (kind.dimension == 2) AddFace(reference, nodes);
+    }
+    return absl::OkStatus();
+  }
+
+  /// Of first order alone; a curved one by its corners, because Medit's surfaces are for looking
+  /// at.
+  void AddFace(int64_t reference, const std::vector<int64_t>& n) {
+    const std::vector<std::string> names = Names(2, reference);
+    const std::array<std::array<int64_t, 3>, 1> first = {{{n[0], n[1], n[2]}}};
+    file_.AddTriangles(names, first);
+    if (n.size() != 4) return;
+    const std::array<std::array<int64_t, 3>, 1> second = {{{n[0], n[2], n[3]}}};
+    file_.AddTriangles(names, second);
+  }
+
+  void AddTo(int dimension, int64_t reference, std::span<const int64_t> corners) {
+    file_.AddToGroups(Names(dimension, reference), corners);
+  }
+
+  /// Names that tell the kinds apart until all are known.
+  static std::vector<std::string> Names(int dimension, int64_t reference) {
+    if (reference == 0) return {};
+    return {absl::StrCat(dimension, " ", reference)};
+  }
+
+  /// Of the groups of one number only that of the highest dimension stays.
+  void ChooseGroups() {
+    std::ranges::sort(file_.groups, std::greater<>(), &ElementFile::Group::name);
+    std::vector<ElementFile::Group> chosen;
+    for (ElementFile::Group& group : file_.groups) {
+      group.name.erase(0, 2);
+      if (std::ranges::find(chosen, group.name, &ElementFile::Group::name) == chosen.end()) {
+        chosen.push_back(std::move(group));
+      }
+    }
+    file_.groups = std::move(chosen);
+  }
+
+  const std::string& bytes_;
+  NumberStream stream_;
+  ElementFile file_;
+};
+
+}  // namespace
+
+absl::StatusOr<ElementFile> ParseMedit(const std::string& bytes) { return Parser(bytes).Parse(); }
+
+}  // namespace carillon::precompute

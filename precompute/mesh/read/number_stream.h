@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <algorithm>
+#include <cstring>
+#include <string_view>
+
+#include "precompute/mesh/read/text_lines.h"
+
+namespace carillon::precompute {
+
+/// Numbers one after the other, as words of a text (a '#' begins a comment that ends with the line)
+/// or as plain bytes of the machine.
+class NumberStream {
+ public:
+  NumberStream(std::string_view bytes, bool is_binary) : rest_(bytes), is_binary_(is_binary) {}
+
+  /// False, where the next is no such number, or nothing is left.
+  template <typename T>
+  bool Take(T& value) {
+    if (is_binary_) return TakeBytes(value);
+    const std::optional<T> number = ToNumber<T>(NextWord());
+    if (number) value = *number;
+    return number.has_value();
+  }
+
+  template <typename Range>
+  bool TakeAll(Range& values) {
+    for (auto& value : values) {
+      if (!Take(value)) return false;
+    }
+    return true;
+  }
+
+  /// Of a text the next word; empty at the end.
+  std::string_view NextWord() {
+    const std::string_view word = PeekWord();
+    rest_.remove_prefix(word.size());
+    return word;
+  }
+
+  /// The word that comes next.
+  std::string_view PeekWord() {
+    SkipBlanks();
+    return rest_.substr(0, std::min(rest_.find_first_of(" \t\r\v\f\n#"), rest_.size()));
+  }
+
+  std::string_view rest() const { return rest_; }
+
+ private:
+  template <typename T>
+  bool TakeBytes(T& value) {
+    if (rest_.size() < sizeof value) return false;
+    std::memcpy(&value, rest_.data(), sizeof value);
+    rest_.remove_prefix(sizeof value);
+    return true;
+  }
+
+  void SkipBlanks() {
+    while (!rest_.empty()) {
+      rest_.remove_prefix(std::min(rest_.find_first_not_of(" \t\r\v\f\n"), rest_.size()));
+      if (!rest_.starts_with('#')) return;
+      rest_.remove_prefix(std::min(rest_.find('\n'), rest_.size()));
+    }
+  }
+
+  std::string_view rest_;
+  bool is_binary_;
+};
+
+}  // namespace carillon::precompute

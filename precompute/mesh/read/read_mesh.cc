@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "precompute/mesh/read/read_mesh.h"
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/strings/str_cat.h"
+#include "precompute/mesh/read/gmsh_file.h"
+#include "precompute/mesh/read/make_mesh.h"
+#include "precompute/mesh/read/medit_file.h"
+#include "precompute/mesh/read/read_surface.h"
+#include "precompute/mesh/read/tetgen_file.h"
+#include "proto/cpp/error_reason.h"
+
+namespace carillon::precompute {
+namespace {
+
+constexpr std::array<const char*, 4> kSurfaceFormats = {"obj", "ply", "stl", "off"};
+
+absl::StatusOr<std::string> ReadFile(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::string bytes{std::istreambuf_iterator<char>(file), {}};
+  if (!file.is_open() || file.bad()) {
+    return Refusal(absl::StatusCode::kNotFound, "MESH_FILE_NOT_READABLE",
+                   absl::StrCat(path, " cannot be read: check its name and its permissions"));
+  }
+  if (bytes.empty()) {
+    return Refusal(absl::StatusCode::kInvalidArgument, "MESH_EMPTY",
+                   "the mesh file has no bytes: export the body again");
+  }
+  return bytes;
+}
+
+void Scale(Point& p, double factor) {
+  for (double& x : p) x *= factor;
+}
+
+void Scale(NamedMesh& named, double factor) {
+  auto* surface = std::get_if<SurfaceMesh>(&named.mesh);
+  auto& points = surface != nullptr ? surface->vertices : std::get<TetMesh>(named.mesh).nodes;
+  for (Point& p : points) Scale(p, factor);
+  for (auto& [number, p] : named.names.vertices) Scale(p, factor);
+}
+
+bool IsSurfaceFormat(const std::string& format) {
+  return std::ranges::find(kSurfaceFormats, format) != kSurfaceFormats.end();
+}
+
+absl::StatusOr<ElementFile> ParseElements(const std::string& bytes, const std::string& format) {
+  if (format == "msh") return ParseGmsh(bytes);
+  return format == "mesh" ? ParseMedit(bytes) : ParseTetgen(bytes);
+}
+
+absl::StatusOr<NamedMesh> ReadElements(const std::string& bytes, const std::string& format) {
+  absl::StatusOr<ElementFile> file = ParseElements(bytes, format);
+  if (!file.ok()) return file.status();
+  return MakeMesh(*std::move(file));
+}
+
+}  // namespace
+
+absl::StatusOr<std::string> ReadMeshFile(const std::string& path, const std::string& format) {
+  const std::filesystem::path file(path);
+  if (format != "node" || (file.extension() != ".node" && file.extension() != ".ele")) {
+    return ReadFile(path);
+  }
+  absl::StatusOr<std::string> nodes =
+      ReadFile(std::filesystem::path(file).replace_extension(".node"));
+  if (!nodes.ok()) return nodes;
+  const std::filesystem::path elements = std::filesystem::path(file).replace_extension(".ele");
+  // They may stand in one file already.
+  if (!std::filesystem::exists(elements)) return nodes;
+  const absl::StatusOr<std::string> rest = ReadFile(elements);
+  if (!rest.ok()) return rest.status();
+  return absl::StrCat(*nodes, nodes->ends_with('\n') ? "" : "\n", *rest);
+}
+
+absl::StatusOr<NamedMesh> ReadMesh(const std::string& path, const std::string& format,
+                                   double metres_per_unit) {
+  const bool is_surface = IsSurfaceFormat(format);
+  if (!is_surface && format != "msh" && format != "mesh" && format != "node") {
+    return Refusal(
+        absl::StatusCode::kInvalidArgument, "MESH_FORMAT_UNKNOWN",
+        absl::StrCat("there is no mesh format \"", format,
+                     "\": give obj, ply, stl or off (a surface), msh (Gmsh), mesh (Medit) "
+                     "or node (TetGen)"));
+  }
+  const absl::StatusOr<std::string> bytes = ReadMeshFile(path, format);
+  if (!bytes.ok()) return bytes.status();
+  absl::StatusOr<NamedMesh> named =
+      is_surface ? ReadSurface(*bytes, format) : ReadElements(*bytes, format);
+  if (!named.ok()) return named.status();
+  Scale(*named, metres_per_unit);
+  return named;
+}
+
+}  // namespace carillon::precompute

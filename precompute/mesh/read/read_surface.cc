@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "precompute/mesh/read/read_surface.h"
+
+#include <assimp/mesh.h>
+#include <assimp/postprocess.h>
+#include <assimp/scene.h>
+
+#include <array>
+#include <assimp/Importer.hpp>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/strings/str_cat.h"
+#include "precompute/mesh/read/clean_surface_file.h"
+#include "precompute/mesh/read/merge_vertices.h"
+#include "precompute/mesh/read/obj_groups.h"
+#include "precompute/mesh/read/text_lines.h"
+#include "proto/cpp/error_reason.h"
+
+namespace carillon::precompute {
+namespace {
+
+using Triangles = std::vector<std::array<Point, 3>>;
+
+absl::Status Refuse(absl::string_view reason, absl::string_view message) {
+  return Refusal(absl::StatusCode::kInvalidArgument, reason, message);
+}
+
+absl::Status Unreadable(absl::string_view format, absl::string_view what) {
+  return Refuse("MESH_UNREADABLE", absl::StrCat("the file cannot be read as ", format, ": ", what,
+                                                ". Name its right format, or export it again"));
+}
+
+std::span<aiMesh* const> Meshes(const aiScene& scene) { return {scene.mMeshes, scene.mNumMeshes}; }
+
+std::span<const aiFace> Faces(const aiMesh& mesh) { return {mesh.mFaces, mesh.mNumFaces}; }
+
+/// assimp passes on indices of a PLY file as they are; its own steps would read past the vertices.
+absl::Status CheckIndices(const aiScene& scene) {
+  size_t face_number = 0;
+  for (const aiMesh* mesh : Meshes(scene)) {
+    for (const aiFace& face : Faces(*mesh)) {
+      for (const unsigned index : std::span(face.mIndices, face.mNumIndices)) {
+        if (index < mesh->mNumVertices) continue;
+        return Refuse("MESH_INDEX_OUT_OF_RANGE",
+                      absl::StrCat("face ", face_number, " names vertex ",
+                                   static_cast<int32_t>(index), " of ", mesh->mNumVertices,
+                                   " (counted from zero): export the mesh again"));
+      }
+      ++face_number;
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CheckFinite(const aiScene& scene) {
+  size_t vertex_number = 0;
+  for (const aiMesh* mesh : Meshes(scene)) {
+    for (const aiVector3D& p : std::span(mesh->mVertices, mesh->mNumVertices)) {
+      if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
+        return Refuse("MESH_NOT_FINITE",
+                      absl::StrCat("vertex ", vertex_number, " (counted from zero) lies at (", p.x,
+                                   ", ", p.y, ", ", p.z, "): give it finite coordinates"));
+      }
+      ++vertex_number;
+    }
+  }
+  return absl::OkStatus();
+}
+
+/// Triangles that the polygons of the file must give.
+size_t CountTriangles(const aiScene& scene) {
+  size_t count = 0;
+  for (const aiMesh* mesh : Meshes(scene)) {
+    for (const aiFace& face : Faces(*mesh)) {
+      if (face.mNumIndices >= 3) count += face.mNumIndices - 2;
+    }
+  }
+  return count;
+}
+
+Triangles CollectTriangles(const aiScene& scene) {
+  Triangles triangles;
+  for (const aiMesh* mesh : Meshes(scene)) {
+    for (const aiFace& face : Faces(*mesh)) {
+      if (face.mNumIndices != 3) continue;  // points and lines bound nothing
+      auto& corners = triangles.emplace_back();
+      for (size_t i = 0; i < 3; ++i) {
+        const aiVector3D& p = mesh->mVertices[face.mIndices[i]];
+        corners[i] = {p.x, p.y, p.z};
+      }
+    }
+  }
+  return triangles;
+}
+
+/// The first three numbers of a line as assimp keeps them, in 24 bits.
+Point ToPoint(std::span<const std::string_view> words) {
+  Point p{};
+  for (size_t i = 0; i < 3; ++i) p[i] = static_cast<float>(ToNumber<double>(words[i]).value_or(0));
+  return p;
+}
+
+/// Vertices in the order of the file, of which assimp makes others (OBJ, OFF) but for PLY.
+absl::flat_hash_map<int64_t, Point> NumberVertices(const aiScene& scene, const std::string& clean,
+                                                   const std::string& format) {
+  absl::flat_hash_map<int64_t, Point> vertices;
+  const auto add = [&](const Point& p) { vertices[static_cast<int64_t>(vertices.size())] = p; };
+  if (format == "ply") {
+    for (const aiVector3D& p :
+         std::span(scene.mMeshes[0]->mVertices, scene.mMeshes[0]->mNumVertices)) {
+      add({p.x, p.y, p.z});
+    }
+  }
+  TextLines lines(clean);
+  if (format == "obj") {
+    for (auto words = lines.NextWords(); !words.empty() && words[0] == "v";
+         words = lines.NextWords()) {
+      add(ToPoint(std::span(words).subspan(1)));
+    }
+  }
+  if (format == "off") {
+    lines.NextWords();
+    const size_t count = ToNumber<size_t>(lines.NextWords()[0]).value_or(0);
+    while (vertices.size() < count) add(ToPoint(lines.NextWords()));
+  }
+  return vertices;
+}
+
+}  // namespace
+
+absl::StatusOr<NamedMesh> ReadSurface(const std::string& bytes, const std::string& format) {
+  const absl::StatusOr<std::string> clean = CleanSurfaceFile(bytes, format);
+  if (!clean.ok()) return clean.status();
+  Assimp::Importer importer;
+  const aiScene* scene =
+      importer.ReadFileFromMemory(clean->data(), clean->size(), 0, format.c_str());
+  if (scene == nullptr) return Unreadable(format, importer.GetErrorString());
+  if (absl::Status status = CheckIndices(*scene); !status.ok()) return status;
+  if (absl::Status status = CheckFinite(*scene); !status.ok()) return status;
+  const size_t expected = CountTriangles(*scene);
+  if (expected == 0) {
+    return Refuse("MESH_EMPTY", "the file has no faces: export the body as triangles or polygons");
+  }
+  MeshNames names;
+  names.vertices = NumberVertices(*scene, *clean, format);
+  scene = importer.ApplyPostProcessing(aiProcess_Triangulate);
+  if (scene == nullptr) return Unreadable(format, importer.GetErrorString());
+  const Triangles triangles = CollectTriangles(*scene);
+  if (triangles.size() != expected) {
+    return Unreadable(format, absl::StrCat("its polygons give ", triangles.size(), " triangles of ",
+                                           expected, "; export triangles instead"));
+  }
+  names.groups = format == "obj" ? ObjGroups(bytes) : std::vector<MeshGroup>();
+  return NamedMesh{MergeVertices(triangles), std::move(names)};
+}
+
+}  // namespace carillon::precompute

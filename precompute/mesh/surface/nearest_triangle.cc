@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "precompute/mesh/surface/nearest_triangle.h"
+
+#include <CGAL/AABB_traits.h>
+#include <CGAL/AABB_tree.h>
+#include <CGAL/AABB_triangle_primitive.h>
+#include <CGAL/Simple_cartesian.h>
+
+#include <vector>
+
+#include "precompute/mesh/point_math.h"
+
+namespace carillon::precompute {
+namespace {
+
+using Kernel = CGAL::Simple_cartesian<double>;
+using Triangles = std::vector<Kernel::Triangle_3>;
+using Primitive = CGAL::AABB_triangle_primitive<Kernel, Triangles::const_iterator>;
+using Tree = CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>>;
+
+Kernel::Point_3 ToCgal(const Point& p) { return {p[0], p[1], p[2]}; }
+
+}  // namespace
+
+struct NearestTriangle::Index {
+  Triangles triangles;
+  std::vector<int32_t> numbers;  // of each in the surface
+  Tree tree;
+};
+
+NearestTriangle::NearestTriangle(const SurfaceMesh& surface) : index_(std::make_unique<Index>()) {
+  for (size_t t = 0; t < surface.triangles.size(); ++t) {
+    const auto [a, b, c] = CornersOf(surface, t);
+    const Kernel::Triangle_3 triangle(ToCgal(a), ToCgal(b), ToCgal(c));
+    if (triangle.is_degenerate()) continue;
+    index_->triangles.push_back(triangle);
+    index_->numbers.push_back(static_cast<int32_t>(t));
+  }
+  index_->tree.insert(index_->triangles.begin(), index_->triangles.end());
+  index_->tree.accelerate_distance_queries();
+}
+
+NearestTriangle::~NearestTriangle() = default;
+
+NearestTriangle::Place NearestTriangle::Find(const Point& point) const {
+  const auto [nearest, triangle] = index_->tree.closest_point_and_primitive(ToCgal(point));
+  const Point found = {nearest.x(), nearest.y(), nearest.z()};
+  const auto number = static_cast<size_t>(triangle - index_->triangles.cbegin());
+  return {index_->numbers[number], found, Distance(point, found)};
+}
+
+}  // namespace carillon::precompute

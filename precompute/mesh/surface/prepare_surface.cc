@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "precompute/mesh/surface/prepare_surface.h"
+
+#include <numeric>
+#include <utility>
+
+#include "absl/status/status.h"
+#include "precompute/mesh/point_math.h"
+#include "precompute/mesh/surface/check_surface.h"
+#include "precompute/mesh/surface/make_wall.h"
+#include "precompute/mesh/surface/nearest_triangle.h"
+#include "precompute/mesh/surface/repair_soup.h"
+#include "precompute/mesh/surface/wrap_surface.h"
+#include "proto/cpp/error_reason.h"
+
+namespace carillon::precompute {
+namespace {
+
+using Warnings = std::vector<std::string>;
+
+bool Is(const absl::Status& status, absl::string_view reason) {
+  return ToErrorInfo(status).reason() == reason;
+}
+
+/// What no repair can know: there is no surface, or no number, or several bodies.
+bool BeyondRepair(const absl::Status& status) {
+  for (const char* reason : {"MESH_EMPTY", "MESH_TOO_LARGE", "MESH_INDEX_OUT_OF_RANGE",
+                             "MESH_NOT_FINITE", "MESH_SEVERAL_PIECES"}) {
+    if (Is(status, reason)) return true;
+  }
+  return false;
+}
+
+void AddTo(Warnings& warnings, const Warnings& more) {
+  warnings.insert(warnings.end(), more.begin(), more.end());
+}
+
+std::vector<int32_t> NearestGiven(const SurfaceMesh& surface, const SurfaceMesh& given) {
+  const NearestTriangle index(given);
+  std::vector<int32_t> nearest;
+  for (size_t t = 0; t < surface.triangles.size(); ++t) {
+    nearest.push_back(index.Find(MiddleOf(CornersOf(surface, t))).triangle);
+  }
+  return nearest;
+}
+
+/// The surface mended until it passes the checks; adds what was done to `warnings`.
+absl::StatusOr<SurfaceMesh> Repair(const SurfaceMesh& given, Warnings& warnings) {
+  MendedSurface mended = MendSoup(given);
+  const absl::StatusOr<Warnings> sound = CheckSurface(mended.surface);
+  if (sound.ok()) {
+    AddTo(warnings, mended.remarks);
+    AddTo(warnings, *sound);
+    return std::move(mended.surface);
+  }
+  if (BeyondRepair(sound.status())) return sound.status();
+  absl::StatusOr<MendedSurface> wrapped = WrapSurface(mended.surface);
+  if (!wrapped.ok()) return wrapped.status();
+  AddTo(warnings, wrapped->remarks);
+  return std::move(wrapped->surface);
+}
+
+absl::StatusOr<MendedSurface> WithWall(const SurfaceMesh& surface, const absl::Status& sound,
+                                       double wall_m) {
+  return sound.ok() ? HollowOut(surface, wall_m) : Thicken(surface, wall_m);
+}
+
+}  // namespace
+
+absl::StatusOr<PreparedSurface> PrepareSurface(const SurfaceMesh& given,
+                                               const PreparationSettings& settings) {
+  PreparedSurface prepared{given, {}, {}};
+  const absl::StatusOr<Warnings> as_given = CheckSurface(given);
+  absl::Status sound = as_given.status();
+  if (as_given.ok()) prepared.warnings = *as_given;
+  if (!sound.ok() && BeyondRepair(sound)) return sound;
+  // An open sheet that is to get a wall needs no repair.
+  if (!sound.ok() && settings.repair && !(settings.wall_m > 0 && Is(sound, "MESH_NOT_CLOSED"))) {
+    absl::StatusOr<SurfaceMesh> repaired = Repair(given, prepared.warnings);
+    sound = repaired.status();
+    if (repaired.ok()) prepared.surface = *std::move(repaired);
+  }
+  const bool thickens = settings.wall_m > 0 && Is(sound, "MESH_NOT_CLOSED");
+  if (!sound.ok() && !thickens) return sound;
+  if (settings.wall_m > 0) {
+    absl::StatusOr<MendedSurface> walled = WithWall(prepared.surface, sound, settings.wall_m);
+    if (!walled.ok()) return walled.status();
+    prepared.surface = std::move(walled->surface);
+    AddTo(prepared.warnings, walled->remarks);
+  }
+  prepared.given_triangle.resize(given.triangles.size());
+  std::iota(prepared.given_triangle.begin(), prepared.given_triangle.end(), 0);
+  const bool changed = settings.wall_m > 0 || !as_given.ok();
+  if (changed) prepared.given_triangle = NearestGiven(prepared.surface, given);
+  return prepared;
+}
+
+}  // namespace carillon::precompute

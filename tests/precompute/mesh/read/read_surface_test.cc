@@ -1,0 +1,232 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+
+#include "absl/strings/str_cat.h"
+#include "precompute/mesh/point_math.h"
+#include "precompute/mesh/surface/check_surface.h"
+#include "tests/precompute/mesh/mesh_files.h"
+#include "tests/precompute/mesh/read_mesh_fixture.h"
+#include "tests/precompute/test_meshes.h"
+
+namespace carillon::precompute {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+using ReadSurfaceTest = ReadMeshTest;
+
+struct FileOfKind {
+  std::string kind;
+  std::string format;
+  std::string bytes;
+};
+
+std::vector<FileOfKind> EveryKind(const SurfaceMesh& surface) {
+  return {{"obj", "obj", ToObj(surface)},          {"off", "off", ToOff(surface)},
+          {"text ply", "ply", ToTextPly(surface)}, {"binary ply", "ply", ToBinaryPly(surface)},
+          {"text stl", "stl", ToTextStl(surface)}, {"binary stl", "stl", ToBinaryStl(surface)}};
+}
+
+void ExpectSameTriangles(const SurfaceMesh& read, const SurfaceMesh& written) {
+  EXPECT_EQ(read.vertices.size(), written.vertices.size());
+  ASSERT_EQ(read.triangles.size(), written.triangles.size());
+  for (size_t t = 0; t < read.triangles.size(); ++t) {
+    const auto got = CornersOf(read, t), wanted = CornersOf(written, t);
+    // Numbers pass through 24 bits: 6e-8 of coordinates up to 0.5 m.
+    for (size_t i = 0; i < 3; ++i) EXPECT_LT(Distance(got[i], wanted[i]), 5e-8);
+  }
+}
+
+TEST_F(ReadSurfaceTest, EveryFormatGivesTheTrianglesInTheOrderWritten) {
+  const SurfaceMesh tube = MakeTubeSurface({.around = 12, .along = 10});
+  for (const FileOfKind& file : EveryKind(tube)) {
+    SCOPED_TRACE(file.kind);
+    ExpectSameTriangles(ReadSurfaceOf(file.bytes, file.format), tube);
+  }
+}
+
+TEST_F(ReadSurfaceTest, EveryFormatGivesASurfaceThatPassesTheChecks) {
+  for (const FileOfKind& file : EveryKind(MakeTubeSurface({.around = 12, .along = 10}))) {
+    EXPECT_TRUE(CheckSurface(ReadSurfaceOf(file.bytes, file.format)).ok()) << file.kind;
+  }
+}
+
+TEST_F(ReadSurfaceTest, LengthsAreInMetres) {
+  const absl::StatusOr<Mesh> box = Read(ToOff(MakeBoxSurface({1, 2, 4})), "off", 0.5);
+  ASSERT_TRUE(box.ok());
+  Point high{};
+  for (const Point& p : std::get<SurfaceMesh>(*box).vertices) {
+    for (size_t x = 0; x < 3; ++x) high[x] = std::max(high[x], p[x]);
+  }
+  EXPECT_EQ(high, (Point{0.5, 1, 2}));
+}
+
+TEST_F(ReadSurfaceTest, ObjKeepsItsOrderThroughObjectsGroupsAndMaterials) {
+  const SurfaceMesh box = MakeBoxSurface({1, 1, 1});
+  std::string text = ToObj(box);
+  int face = 0;
+  for (size_t at = text.find("\nf "); at != std::string::npos;
+       at = text.find("\nf ", at + 4), ++face) {
+    const std::string group =
+        absl::StrCat("\no part", face % 3, "\ng side", face % 2, "\nusemtl paint", face % 4);
+    text.insert(at, group);
+    at += group.size();
+  }
+  ExpectSameTriangles(ReadSurfaceOf(text, "obj"), box);
+}
+
+TEST_F(ReadSurfaceTest, NumbersMayBeginWithTheirPoint) {
+  const SurfaceMesh box = MakeBoxSurface({0.5, 0.5, 0.5});
+  std::string text = ToObj(box);
+  for (size_t at = text.find(" 0.5"); at != std::string::npos; at = text.find(" 0.5", at)) {
+    text.erase(at + 1, 1);
+  }
+  ASSERT_NE(text.find(" .5"), std::string::npos);
+  ExpectSameTriangles(ReadSurfaceOf(text, "obj"), box);
+}
+
+TEST_F(ReadSurfaceTest, ObjWithSplitNormalsIsOneSurface) {
+  const SurfaceMesh box = MakeBoxSurface({1, 1, 1});
+  std::string text = "mtllib none.mtl\nvn 0 0 1\nvt 0 0\ns 1\n";
+  for (const auto& triangle : box.triangles) {
+    for (const int32_t v : triangle) {
+      absl::StrAppend(&text, "v ", box.vertices[static_cast<size_t>(v)][0], " ",
+                      box.vertices[static_cast<size_t>(v)][1], " ",
+                      box.vertices[static_cast<size_t>(v)][2], "\r\n");
+    }
+    absl::StrAppend(&text, "f -3/1/1 -2/1/1 \\\n-1/1/1\r\n");
+  }
+  ExpectSameTriangles(ReadSurfaceOf(text, "obj"), box);
+}
+
+TEST_F(ReadSurfaceTest, PolygonsBecomeTrianglesOfTheSameSurface) {
+  const SurfaceMesh prism = ReadSurfaceOf(
+      "OFF 10 7 0\n0 0 0\n2 0 0\n3 1 0\n1 3 0\n-1 1 0\n0 0 1\n2 0 1\n3 1 1\n1 3 1\n-1 1 1\n"
+      "5 4 3 2 1 0\n5 5 6 7 8 9\n4 0 1 6 5\n4 1 2 7 6\n4 2 3 8 7\n4 3 4 9 8\n4 4 0 5 9\n",
+      "off");
+  EXPECT_EQ(prism.vertices.size(), 10U);
+  EXPECT_EQ(prism.triangles.size(), 2U * 3U + 5U * 2U);
+  EXPECT_TRUE(CheckSurface(prism).ok());
+}
+
+TEST_F(ReadSurfaceTest, PointsAndLinesAreNoTriangles) {
+  const SurfaceMesh box = MakeBoxSurface({1, 1, 1});
+  ExpectSameTriangles(ReadSurfaceOf(ToObj(box) + "f 1 2\nl 1 2 3\np 4\n", "obj"), box);
+}
+
+TEST_F(ReadSurfaceTest, AMissingFileIsRefused) {
+  EXPECT_THAT(ReadMesh("/nonexistent/mesh.obj", "obj", 1).status().ToString(),
+              HasSubstr("NOT_FOUND: MESH_FILE_NOT_READABLE: /nonexistent/mesh.obj"));
+}
+
+TEST_F(ReadSurfaceTest, AnUnknownFormatIsRefused) {
+  EXPECT_THAT(Refused("x", "dae"),
+              HasSubstr("MESH_FORMAT_UNKNOWN: there is no mesh format \"dae\""));
+}
+
+TEST_F(ReadSurfaceTest, AnEmptyFileIsRefused) {
+  for (const char* format : {"obj", "off", "ply", "stl", "msh"}) {
+    EXPECT_THAT(Refused("", format), HasSubstr("MESH_EMPTY: ")) << format;
+  }
+}
+
+TEST_F(ReadSurfaceTest, ATextFileIsRefused) {
+  for (const char* format : {"obj", "off", "ply", "stl", "msh"}) {
+    EXPECT_THAT(Refused("This is a letter.\nIt holds no mesh.\n", format),
+                HasSubstr("MESH_UNREADABLE: "))
+        << format;
+  }
+}
+
+TEST_F(ReadSurfaceTest, AFileWithoutFacesIsRefused) {
+  const SurfaceMesh points{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {}};
+  for (const FileOfKind& file : EveryKind(points)) {
+    EXPECT_THAT(Refused(file.bytes, file.format), HasSubstr("MESH_EMPTY: ")) << file.kind;
+  }
+}
+
+TEST_F(ReadSurfaceTest, ACoordinateThatIsNoNumberIsRefused) {
+  for (const double x : {std::nan(""), HUGE_VAL}) {
+    SurfaceMesh box = MakeBoxSurface({1, 1, 1});
+    box.vertices[2][1] = x;
+    for (const FileOfKind& file : EveryKind(box)) {
+      EXPECT_THAT(Refused(file.bytes, file.format), HasSubstr("MESH_NOT_FINITE: ")) << file.kind;
+    }
+  }
+}
+
+TEST_F(ReadSurfaceTest, ACoordinateTooLargeForItsNumberIsRefused) {
+  EXPECT_THAT(Refused("v 1e999 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "obj"),
+              HasSubstr("MESH_NOT_FINITE: line 1"));
+}
+
+TEST_F(ReadSurfaceTest, AnIndexOutOfRangeIsRefused) {
+  for (const int32_t index : {8, -1, 2'000'000'000}) {
+    SurfaceMesh box = MakeBoxSurface({1, 1, 1});
+    box.triangles[4][1] = index;
+    const std::map<std::string, std::string> files = {{"off", ToOff(box)}, {"ply", ToTextPly(box)}};
+    for (const auto& [format, bytes] : files) {
+      EXPECT_THAT(Refused(bytes, format), HasSubstr("MESH_INDEX_OUT_OF_RANGE: ")) << format;
+    }
+    EXPECT_THAT(Refused(ToBinaryPly(box), "ply"),
+                AllOf(HasSubstr("MESH_INDEX_OUT_OF_RANGE: face 4 names vertex "),
+                      HasSubstr(absl::StrCat(" ", index, " of 8"))));
+  }
+  for (const char* face : {"f 1 2 9", "f 1 2 0", "f 1 2 -9"}) {
+    EXPECT_THAT(Refused(ToObj(MakeBoxSurface({1, 1, 1})) + face, "obj"),
+                HasSubstr("MESH_INDEX_OUT_OF_RANGE: line 22: "))
+        << face;
+  }
+}
+
+TEST_F(ReadSurfaceTest, AFileThatEndsEarlyIsRefused) {
+  for (const FileOfKind& file : EveryKind(MakeBoxSurface({1, 1, 1}))) {
+    if (file.format == "obj") continue;  // a shorter OBJ file is one with fewer faces: open
+    const std::string cut = file.bytes.substr(0, file.bytes.size() - file.bytes.size() / 7);
+    const absl::StatusOr<Mesh> read = Read(cut, file.format);
+    // Text STL has no count either: what is left must at least not pass for the whole.
+    EXPECT_TRUE(!read.ok() || !CheckSurface(std::get<SurfaceMesh>(*read)).ok()) << file.kind;
+    if (file.kind != "text stl") {
+      EXPECT_THAT(read.status().ToString(), HasSubstr("MESH_UNREADABLE: ")) << file.kind;
+    }
+  }
+}
+
+TEST_F(ReadSurfaceTest, ACountBeyondTheFileIsRefusedWithoutRoomForIt) {
+  EXPECT_THAT(Refused("OFF\n4000000000 4000000000 0\n0 0 0\n", "off"),
+              HasSubstr("MESH_UNREADABLE"));
+  EXPECT_THAT(Refused("ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\n"
+                      "property float x\nproperty float y\nproperty float z\nelement face 1\n"
+                      "property list uchar int vertex_indices\nend_header\nxyz",
+                      "ply"),
+              HasSubstr("MESH_UNREADABLE: line 9: the file ends within vertex 0"));
+}
+
+TEST_F(ReadSurfaceTest, WordsInPlaceOfNumbersAreRefusedWithTheirLine) {
+  EXPECT_THAT(Refused("v 0 0 0\nv 1 x 0\n", "obj"), HasSubstr("line 2: \"x\" is no coordinate"));
+  EXPECT_THAT(Refused("v 0 0 0\nf 1 b 3\n", "obj"), HasSubstr("line 2: \"b\" is no vertex"));
+  EXPECT_THAT(Refused("v 0 0\n", "obj"), HasSubstr("line 1: a vertex with fewer than three"));
+  EXPECT_THAT(Refused("OFF\n1 1 0\n0 0 0\n4 0 0 0\n", "off"),
+              HasSubstr("line 4: a face with fewer"));
+}
+
+TEST_F(ReadSurfaceTest, TheBunnyWhoseFilledHolesCrossItIsRefusedBeforeTheMesherCrashes) {
+  const char* path = "/usr/share/glmark2/models/bunny.obj";
+  if (!std::filesystem::exists(path)) GTEST_SKIP() << "glmark2-data is not installed";
+  const absl::StatusOr<NamedMesh> bunny = ReadMesh(path, "obj", 1);
+  ASSERT_TRUE(bunny.ok()) << bunny.status();
+  const auto& surface = std::get<SurfaceMesh>(bunny->mesh);
+  EXPECT_EQ(surface.triangles.size(), 69'666U);
+  EXPECT_EQ(surface.vertices.size(), 34'835U);
+  EXPECT_THAT(CheckSurface(surface).status().ToString(), HasSubstr("MESH_SELF_INTERSECTING"));
+}
+
+}  // namespace
+}  // namespace carillon::precompute

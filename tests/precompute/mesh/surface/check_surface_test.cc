@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "precompute/mesh/surface/check_surface.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "precompute/mesh/mesh_limits.h"
+#include "tests/precompute/test_meshes.h"
+
+namespace carillon::precompute {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+SurfaceMesh Box() { return MakeBoxSurface({1, 1, 1}); }
+
+std::string Refused(const SurfaceMesh& surface) {
+  return CheckSurface(surface).status().ToString();
+}
+
+TEST(CheckSurface, AcceptsSolidsWithoutAWarning) {
+  EXPECT_THAT(CheckSurface(Box()).value(), IsEmpty());
+  EXPECT_THAT(CheckSurface(MakeTubeSurface({})).value(), IsEmpty());
+  EXPECT_THAT(CheckSurface(MakeSphereSurface(0.01, 4)).value(), IsEmpty());
+}
+
+TEST(CheckSurface, AcceptsCavities) {
+  SurfaceMesh hollow = Box();
+  AddShell(hollow, InsideOut(MakeSphereSurface(0.1, 2)), {0.3, 0.3, 0.3});
+  AddShell(hollow, InsideOut(MakeSphereSurface(0.1, 2)), {0.7, 0.7, 0.7});
+  EXPECT_THAT(CheckSurface(hollow).value(), IsEmpty());
+}
+
+TEST(CheckSurface, AcceptsABodyInsideOutWithAWarning) {
+  EXPECT_THAT(CheckSurface(InsideOut(Box())).value(), ElementsAre(HasSubstr("inside out")));
+}
+
+TEST(CheckSurface, PassesOverCollapsedTrianglesWithAWarning) {
+  SurfaceMesh box = Box();
+  box.triangles.push_back({0, 1, 1});
+  EXPECT_THAT(CheckSurface(box).value(), ElementsAre(HasSubstr("1 triangles with two equal")));
+}
+
+TEST(CheckSurface, RefusesAnEmptySurface) { EXPECT_THAT(Refused({}), HasSubstr("MESH_EMPTY: ")); }
+
+TEST(CheckSurface, RefusesASurfaceOverTheLimitAndStatesIt) {
+  SurfaceMesh large = Box();
+  large.triangles.resize(kMaxSurfaceTriangles + 1, {0, 1, 2});
+  EXPECT_THAT(Refused(large), AllOf(HasSubstr("RESOURCE_EXHAUSTED: MESH_TOO_LARGE: "),
+                                    HasSubstr("1000001"), HasSubstr("1000000")));
+}
+
+TEST(CheckSurface, RefusesAnIndexOutOfRangeAndNamesIt) {
+  SurfaceMesh box = Box();
+  box.triangles[3][1] = 8;
+  EXPECT_THAT(Refused(box), HasSubstr("MESH_INDEX_OUT_OF_RANGE: triangle 3 names vertex 8 of 8"));
+  box.triangles[3][1] = -1;
+  EXPECT_THAT(Refused(box), HasSubstr("MESH_INDEX_OUT_OF_RANGE: triangle 3 names vertex -1"));
+}
+
+TEST(CheckSurface, RefusesCoordinatesThatAreNotFinite) {
+  for (const double x : {std::nan(""), std::numeric_limits<double>::infinity()}) {
+    SurfaceMesh box = Box();
+    box.vertices[5][1] = x;
+    EXPECT_THAT(Refused(box), HasSubstr("MESH_NOT_FINITE: vertex 5"));
+  }
+}
+
+TEST(CheckSurface, RefusesAShellThatIsThereTwice) {
+  SurfaceMesh twice = Box();
+  twice.triangles.insert(twice.triangles.end(), twice.triangles.begin(), twice.triangles.end());
+  EXPECT_THAT(Refused(twice),
+              HasSubstr("MESH_DUPLICATE_SHELL: 12 triangles lie on another with the same corners, "
+                        "first triangles 0 and 12"));
+}
+
+TEST(CheckSurface, RefusesAnOpenSurfaceAndCountsItsOpenEdges) {
+  SurfaceMesh open = Box();
+  open.triangles.pop_back();
+  EXPECT_THAT(Refused(open), HasSubstr("MESH_NOT_CLOSED: the surface has 3 open edges"));
+}
+
+TEST(CheckSurface, RefusesAnEdgeOfFourTriangles) {
+  // Two tetrahedra that share the edge 0-1 only.
+  const SurfaceMesh touching{
+      {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0, -1, 0}, {0, 0, -1}},
+      {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}, {0, 4, 1}, {0, 1, 5}, {1, 4, 5}, {4, 0, 5}}};
+  EXPECT_THAT(Refused(touching), HasSubstr("MESH_NOT_MANIFOLD: 1 edges have more than two"));
+}
+
+TEST(CheckSurface, RefusesTetrahedraThatTouchAtOneVertex) {
+  SurfaceMesh touching{
+      {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {-1, 0, 0}, {0, -1, 0}, {0, 0, -1}},
+      {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}}};
+  for (const auto& t : {std::array{0, 4, 5}, {0, 6, 4}, {4, 6, 5}, {5, 6, 0}}) {
+    touching.triangles.push_back(t);
+  }
+  EXPECT_FALSE(CheckSurface(touching).ok());
+}
+
+TEST(CheckSurface, RefusesATriangleTurnedAgainstItsNeighbours) {
+  SurfaceMesh mixed = Box();
+  std::swap(mixed.triangles[4][1], mixed.triangles[4][2]);
+  EXPECT_THAT(Refused(mixed), HasSubstr("MESH_NOT_ORIENTED: the triangles on both sides of 3"));
+}
+
+TEST(CheckSurface, RefusesACavityTurnedLikeItsBody) {
+  SurfaceMesh nested = Box();
+  AddShell(nested, MakeSphereSurface(0.1, 2), {0.5, 0.5, 0.5});
+  EXPECT_THAT(Refused(nested), HasSubstr("MESH_NOT_ORIENTED: the shell with triangle 12"));
+}
+
+TEST(CheckSurface, RefusesAFlatBody) {
+  EXPECT_THAT(Refused(MakeBoxSurface({1, 1, 0})), HasSubstr("MESH_ZERO_VOLUME"));
+}
+
+TEST(CheckSurface, RefusesATriangleOfThreeCornersOnOneLine) {
+  // A box, one of whose edges has a vertex in its middle that only a flat triangle uses.
+  SurfaceMesh box = Box();
+  const auto [a, b, c] = box.triangles[0];
+  const Point p = box.vertices[static_cast<size_t>(a)], q = box.vertices[static_cast<size_t>(b)];
+  const auto middle = static_cast<int32_t>(box.vertices.size());
+  box.vertices.push_back({(p[0] + q[0]) / 2, (p[1] + q[1]) / 2, (p[2] + q[2]) / 2});
+  box.triangles[0] = {a, middle, c};
+  box.triangles.push_back({middle, b, c});
+  box.triangles.push_back({a, b, middle});
+  EXPECT_THAT(Refused(box), HasSubstr("MESH_DEGENERATE_TRIANGLE: triangle 13"));
+}
+
+TEST(CheckSurface, RefusesBoxesThroughEachOtherAndNamesTwoTriangles) {
+  SurfaceMesh crossing = Box();
+  AddShell(crossing, Box(), {0.5, 0.25, 0.125});
+  EXPECT_THAT(Refused(crossing), AllOf(HasSubstr("MESH_SELF_INTERSECTING: triangle "),
+                                       HasSubstr(" touches triangle ")));
+}
+
+TEST(CheckSurface, RefusesBoxesThatTouchAtAFace) {
+  SurfaceMesh touching = Box();
+  AddShell(touching, Box(), {1, 0.25, 0.25});
+  EXPECT_THAT(Refused(touching), HasSubstr("MESH_SELF_INTERSECTING"));
+}
+
+TEST(CheckSurface, RefusesASphereFoldedThroughItself) {
+  SurfaceMesh sphere = MakeSphereSurface(1, 3);
+  for (double& x : sphere.vertices[0]) x = -1.5 * x;
+  EXPECT_THAT(Refused(sphere), HasSubstr("MESH_SELF_INTERSECTING"));
+}
+
+TEST(CheckSurface, RefusesSeveralBodies) {
+  SurfaceMesh two = Box();
+  AddShell(two, Box(), {2, 0, 0});
+  EXPECT_THAT(Refused(two), HasSubstr("MESH_SEVERAL_PIECES"));
+}
+
+TEST(CheckSurface, RefusesABodyInsideACavity) {
+  SurfaceMesh rattle = Box();
+  AddShell(rattle, InsideOut(MakeSphereSurface(0.3, 2)), {0.5, 0.5, 0.5});
+  AddShell(rattle, MakeSphereSurface(0.1, 2), {0.5, 0.5, 0.5});
+  EXPECT_THAT(Refused(rattle), HasSubstr("MESH_SEVERAL_PIECES"));
+}
+
+}  // namespace
+}  // namespace carillon::precompute

@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "precompute/mesh/surface/prepare_surface.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "precompute/mesh/point_math.h"
+#include "precompute/mesh/surface/check_surface.h"
+#include "precompute/mesh/surface/make_wall.h"
+#include "precompute/mesh/surface/repair_soup.h"
+#include "precompute/mesh/surface/surface_shells.h"
+#include "precompute/mesh/surface/wrap_surface.h"
+#include "tests/precompute/test_meshes.h"
+
+namespace carillon::precompute {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr double kPi = std::numbers::pi;
+
+double Volume(const SurfaceMesh& surface) {
+  double volume = 0;
+  for (const Shell& shell : FindShells(surface)) volume += shell.volume_m3;
+  return volume;
+}
+
+TEST(PrepareSurface, ASoundSurfaceStaysAsItIs) {
+  const SurfaceMesh box = MakeBoxSurface({1, 0.5, 0.3});
+  const auto prepared = PrepareSurface(box, {.repair = true});
+  ASSERT_TRUE(prepared.ok()) << prepared.status();
+  EXPECT_EQ(prepared->surface.triangles, box.triangles);
+  EXPECT_EQ(prepared->given_triangle.back(), 11);
+  EXPECT_TRUE(prepared->warnings.empty());
+}
+
+TEST(PrepareSurface, WithoutRepairAFaultIsRefused) {
+  SurfaceMesh box = MakeBoxSurface({1, 0.5, 0.3});
+  std::swap(box.triangles[3][0], box.triangles[3][1]);
+  EXPECT_THAT(PrepareSurface(box, {}).status().ToString(), HasSubstr("MESH_NOT_ORIENTED"));
+  const auto repaired = PrepareSurface(box, {.repair = true});
+  ASSERT_TRUE(repaired.ok()) << repaired.status();
+  EXPECT_NEAR(Volume(repaired->surface), 0.15, 1e-12);
+  EXPECT_EQ(repaired->given_triangle[3], 3);
+}
+
+TEST(PrepareSurface, ABallHollowedOutHasTheVolumeOfItsShellAndNamesItsOwnTriangles) {
+  const SurfaceMesh ball = MakeSphereSurface(0.1, 4);
+  const auto hollow = PrepareSurface(ball, {.wall_m = 0.02});
+  ASSERT_TRUE(hollow.ok()) << hollow.status();
+  // The polyhedron of 2048 triangles has 0.5 % less than the ball.
+  const double shell = 4 * kPi / 3 * (std::pow(0.1, 3) - std::pow(0.08, 3));
+  EXPECT_NEAR(Volume(hollow->surface), shell, 0.01 * shell);
+  for (size_t t = 0; t < ball.triangles.size(); ++t) {
+    EXPECT_EQ(hollow->given_triangle[t], static_cast<int32_t>(t));
+  }
+  // What lies inside is under the triangle it names.
+  for (size_t t = ball.triangles.size(); t < hollow->surface.triangles.size(); t += 97) {
+    const auto inner = CornersOf(hollow->surface, t);
+    const auto outer = CornersOf(ball, static_cast<size_t>(hollow->given_triangle[t]));
+    EXPECT_NEAR(Distance(inner[0], outer[0]), 0.02, 0.02);
+  }
+}
+
+TEST(PrepareSurface, AnOpenSheetGetsAThickness) {
+  SurfaceMesh sheet;
+  sheet.vertices = {{0, 0, 0}, {0.2, 0, 0}, {0.2, 0.1, 0}, {0, 0.1, 0}};
+  sheet.triangles = {{0, 1, 2}, {0, 2, 3}};
+  EXPECT_THAT(PrepareSurface(sheet, {}).status().ToString(), HasSubstr("MESH_NOT_CLOSED"));
+  const auto thick = PrepareSurface(sheet, {.wall_m = 0.01});
+  ASSERT_TRUE(thick.ok()) << thick.status();
+  // A slab with a round edge, a half cylinder of radius 5 mm, and quarter balls at the corners.
+  const double slab = 0.2 * 0.1 * 0.01 + 0.6 * kPi / 2 * 25e-6 + 4 * kPi / 3 * 125e-9;
+  EXPECT_NEAR(Volume(thick->surface), slab, 0.02 * slab);
+}
+
+TEST(PrepareSurface, AnImpossibleWallIsRefusedWithFigures) {
+  const SurfaceMesh box = MakeBoxSurface({0.2, 0.03, 0.02});
+  for (const double wall_m : {0.011, 0.3, 1e-6}) {
+    EXPECT_THAT(PrepareSurface(box, {.wall_m = wall_m}).status().ToString(),
+                HasSubstr("MESH_WALL_IMPOSSIBLE"))
+        << wall_m;
+  }
+}
+
+TEST(PrepareSurface, BodiesThatCrossAreUnitedByAWrap) {
+  SurfaceMesh cross = MakeBoxSurface({0.2, 0.05, 0.05});
+  AddShell(cross, MakeBoxSurface({0.05, 0.2, 0.05}), {0.075, -0.075, 0});
+  const auto united = PrepareSurface(cross, {.repair = true});
+  ASSERT_TRUE(united.ok()) << united.status();
+  const double volume = 0.05 * 0.05 * (0.2 + 0.2 - 0.05);
+  EXPECT_NEAR(Volume(united->surface), volume, 0.01 * volume);
+  ASSERT_EQ(united->warnings.size(), 1U);
+  EXPECT_THAT(united->warnings[0], HasSubstr("wrapped"));
+}
+
+TEST(PrepareSurface, BodiesApartAreNotJoined) {
+  SurfaceMesh two = MakeBoxSurface({0.2, 0.05, 0.05});
+  AddShell(two, MakeBoxSurface({0.2, 0.05, 0.05}), {0, 0.2, 0});
+  EXPECT_THAT(PrepareSurface(two, {.repair = true}).status().ToString(),
+              HasSubstr("MESH_SEVERAL_PIECES"));
+}
+
+TEST(MendSoup, ATJunctionIsCutAndASeamClosed) {
+  SurfaceMesh box = MakeBoxSurface({1, 1, 1});
+  // The first triangle's first edge gets a vertex that its neighbour does not have.
+  const auto [a, b, c] = box.triangles[0];
+  const auto middle = static_cast<int32_t>(box.vertices.size());
+  const auto [p, q, r] = CornersOf(box, 0);
+  box.vertices.push_back({(p[0] + q[0]) / 2, (p[1] + q[1]) / 2, (p[2] + q[2]) / 2});
+  box.triangles[0] = {a, middle, c};
+  box.triangles.push_back({middle, b, c});
+  EXPECT_THAT(CheckSurface(box).status().ToString(), HasSubstr("MESH_NOT_CLOSED"));
+  const MendedSurface mended = MendSoup(box);
+  EXPECT_TRUE(CheckSurface(mended.surface).ok());
+  EXPECT_EQ(mended.surface.triangles.size(), 14U);
+}
+
+}  // namespace
+}  // namespace carillon::precompute
