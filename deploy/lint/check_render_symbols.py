@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Checks that nothing which the compiled Mixer::Render can reach calls what a rendering thread must not.
 
-Walks from the roots over every call, jump and address in the archive's machine code; of the functions outside
-it, only those that are listed here may be reached. What is called through a table of pointers, as the kernels of
+Walks from the roots over every call, jump and address in the archives' machine code; of the functions outside
+them, only those that are listed here may be reached. What is called through a table of pointers, as the kernels of
 each SIMD target are, counts as reached with the table.
 
-Usage: check_render_symbols.py ARCHIVE [ROOT_PATTERN]
+Usage: check_render_symbols.py ARCHIVE...
 """
 
 import collections
@@ -39,17 +39,17 @@ def run(*command):
 class Archive:
     """What refers to what: nodes are symbols, or "object section" for data that has none."""
 
-    def __init__(self, path):
+    def __init__(self, paths):
         self.edges = collections.defaultdict(set)
         self.defined = set()
         self.placed = collections.defaultdict(list)  # (object, section): (start, size, symbol)
-        self._read_symbols(path)
-        self._read_code(path)
-        self._read_data(path)
+        self._read_symbols(paths)
+        self._read_code(paths)
+        self._read_data(paths)
 
-    def _read_symbols(self, path):
+    def _read_symbols(self, paths):
         member = ""
-        for line in run("objdump", "-t", path).splitlines():
+        for line in run("objdump", "-t", *paths).splitlines():
             if ":     file format" in line:
                 member = line.split(":")[0]
             match = SYMBOL.match(line)
@@ -75,9 +75,9 @@ class Archive:
         local = f"{member} {text}"
         return local if local in self.defined else text
 
-    def _read_code(self, path):
+    def _read_code(self, paths):
         member = function = ""
-        for line in run("objdump", "-dr", "--no-show-raw-insn", path).splitlines():
+        for line in run("objdump", "-dr", "--no-show-raw-insn", *paths).splitlines():
             if ":     file format" in line:
                 member = line.split(":")[0]
             elif line.endswith(">:"):
@@ -90,9 +90,9 @@ class Archive:
             elif match := NEAR.match(line):
                 self.edges[function].add(self._target(member, match[1], 0))
 
-    def _read_data(self, path):
+    def _read_data(self, paths):
         member = section = ""
-        for line in run("objdump", "-r", path).splitlines():
+        for line in run("objdump", "-r", *paths).splitlines():
             if ":     file format" in line:
                 member = line.split(":")[0]
             elif line.startswith("RELOCATION RECORDS FOR"):
@@ -104,14 +104,14 @@ class Archive:
                         self.edges[node].add(target)
 
 
-def forbidden(path, root):
+def forbidden(paths):
     """Each symbol that may not be reached, with the way to it."""
-    archive = Archive(path)
+    archive = Archive(paths)
     names = sorted(archive.defined | set(archive.edges))
     plain = dict(zip(names, run("c++filt", *names).splitlines())) if names else {}
-    roots = [name for name in names if re.search(root, plain[name])]
+    roots = [name for name in names if re.search(ROOT, plain[name])]
     if not roots:
-        yield f"{path}: no function matches {root}"
+        yield f"{' '.join(paths)}: no function matches {ROOT}"
     before = dict.fromkeys(roots)
     queue = list(roots)
     while queue:
@@ -133,7 +133,7 @@ def forbidden(path, root):
 
 
 def main():
-    problems = list(forbidden(sys.argv[1], sys.argv[2] if len(sys.argv) > 2 else ROOT))
+    problems = list(forbidden(sys.argv[1:]))
     for problem in problems:
         print(problem)
     print(f"{len(problems)} problems")
