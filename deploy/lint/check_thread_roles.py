@@ -16,7 +16,8 @@ import sys
 
 import project
 
-ROOMS = ("server/base/", "server/synthesis/", "server/audio_device/", "server/scene/")
+ROOMS = ("server/base/", "server/mode_database/", "server/decomposition/", "server/synthesis/", "server/audio_device/",
+         "server/live_output/", "server/scene/")
 # Compiled once for each SIMD target, and without a lock or a role: minutes for nothing.
 KERNELS = ("server/synthesis/ringing/force_kernel.cc", "server/synthesis/ringing/ring_kernel.cc",
            "server/synthesis/ringing/strike_kernel.cc", "server/synthesis/spectrum/spectral_kernel.cc")

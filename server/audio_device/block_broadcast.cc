@@ -14,7 +14,7 @@ BlockBroadcast::Listener::Listener(BlockBroadcast& broadcast, std::function<void
 BlockBroadcast::Listener::~Listener() { broadcast_.Remove(this); }
 
 std::shared_ptr<const RenderedBlock> BlockBroadcast::Listener::TryTake() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(&mutex_);
   if (queue_.empty()) return nullptr;
   std::shared_ptr<const RenderedBlock> block = std::move(queue_.front());
   queue_.pop_front();
@@ -22,13 +22,13 @@ std::shared_ptr<const RenderedBlock> BlockBroadcast::Listener::TryTake() {
 }
 
 uint64_t BlockBroadcast::Listener::lost_frame_count() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(&mutex_);
   return lost_frame_count_;
 }
 
 void BlockBroadcast::Listener::Offer(const std::shared_ptr<const RenderedBlock>& block,
                                      size_t queue_limit) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(&mutex_);
   lost_frame_count_ += block->first_frame - next_frame_.value_or(block->first_frame);
   const uint32_t frame_count = broadcast_.format_.block_frame_count;
   next_frame_ = block->first_frame + frame_count;
@@ -52,7 +52,7 @@ void BlockBroadcast::Publish(uint64_t first_frame, std::span<const float> block)
 }
 
 void BlockBroadcast::Deliver() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(&mutex_);
   bool any = false;
   while (const std::shared_ptr<const RenderedBlock> block = TryTakePublished()) {
     for (Listener* listener : listeners_) listener->Offer(block, queue_block_count_);
@@ -64,7 +64,7 @@ void BlockBroadcast::Deliver() {
 
 absl::StatusOr<std::unique_ptr<BlockBroadcast::Listener>> BlockBroadcast::Subscribe(
     std::function<void()> wake) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(&mutex_);
   if (listeners_.size() >= kMaxListenerCount) {
     return Refusal(absl::StatusCode::kResourceExhausted, "TOO_MANY_LISTENERS",
                    absl::StrCat(kMaxListenerCount,
@@ -76,7 +76,7 @@ absl::StatusOr<std::unique_ptr<BlockBroadcast::Listener>> BlockBroadcast::Subscr
 }
 
 void BlockBroadcast::Remove(Listener* listener) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(&mutex_);
   std::erase(listeners_, listener);
 }
 

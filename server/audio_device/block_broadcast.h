@@ -5,14 +5,15 @@
 #include <deque>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <span>
 #include <vector>
 
+#include "absl/base/thread_annotations.h"
 #include "absl/status/statusor.h"
 #include "server/audio_device/audio_device.h"
 #include "server/audio_device/copy_ring.h"
+#include "server/base/mutex.h"
 
 namespace carillon {
 
@@ -51,11 +52,11 @@ class BlockBroadcast {
 
     BlockBroadcast& broadcast_;
     const std::function<void()> wake_;
-    mutable std::mutex mutex_;
-    std::deque<std::shared_ptr<const RenderedBlock>> queue_;
-    uint64_t lost_frame_count_ = 0;
+    mutable Mutex mutex_;
+    std::deque<std::shared_ptr<const RenderedBlock>> queue_ ABSL_GUARDED_BY(mutex_);
+    uint64_t lost_frame_count_ ABSL_GUARDED_BY(mutex_) = 0;
     /// The frame that comes next when nothing is lost; unset before the first block.
-    std::optional<uint64_t> next_frame_;
+    std::optional<uint64_t> next_frame_ ABSL_GUARDED_BY(mutex_);
   };
 
   /// Ring and queues hold `queue_block_count` blocks of `format`.
@@ -79,8 +80,8 @@ class BlockBroadcast {
   const size_t queue_block_count_;
   CopyRing<float> samples_;
   CopyRing<uint64_t> first_frames_;
-  std::mutex mutex_;
-  std::vector<Listener*> listeners_;
+  Mutex mutex_;
+  std::vector<Listener*> listeners_ ABSL_GUARDED_BY(mutex_);
 };
 
 }  // namespace carillon

@@ -4,11 +4,12 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <utility>
 #include <vector>
 
+#include "absl/base/thread_annotations.h"
 #include "carillon/v1/decomposition.pb.h"
+#include "server/base/recursive_mutex.h"
 
 namespace carillon {
 
@@ -20,7 +21,7 @@ class Watcher {
 
   /// Tells it of `job`, unless something newer has been told. Versions count from 1.
   void Tell(const v1::Job& job, uint64_t version) {
-    const std::lock_guard lock(mutex_);
+    const RecursiveMutexLock lock(&mutex_);
     if (closed_ || version <= told_) return;
     told_ = version;
     on_change_(job);
@@ -28,16 +29,16 @@ class Watcher {
 
   /// Returns when no call runs and none will.
   void Close() {
-    const std::lock_guard lock(mutex_);
+    const RecursiveMutexLock lock(&mutex_);
     closed_ = true;
   }
 
  private:
-  // Recursive: a watch may be ended within its own call.
-  std::recursive_mutex mutex_;
-  bool closed_ = false;
-  uint64_t told_ = 0;
-  std::function<void(const v1::Job&)> on_change_;
+  // Recursive, because a watch may be ended within its own call.
+  RecursiveMutex mutex_;
+  bool closed_ ABSL_GUARDED_BY(mutex_) = false;
+  uint64_t told_ ABSL_GUARDED_BY(mutex_) = 0;
+  const std::function<void(const v1::Job&)> on_change_;
 };
 
 /// A change to be told once no lock is held.
