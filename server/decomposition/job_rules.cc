@@ -77,6 +77,11 @@ v1::JobState StateOf(Verdict verdict) {
   return verdict == Verdict::kCancelled ? v1::JOB_STATE_CANCELLED : v1::JOB_STATE_FAILED;
 }
 
+bool HasEnded(v1::JobState state) {
+  return state == v1::JOB_STATE_SUCCEEDED || state == v1::JOB_STATE_FAILED ||
+         state == v1::JOB_STATE_CANCELLED;
+}
+
 v1::ErrorInfo GaveUp(uint32_t start_count) {
   return ToErrorInfo(Refusal(
       absl::StatusCode::kInternal, "DECOMPOSITION_GIVEN_UP",

@@ -38,6 +38,8 @@ Verdict VerdictOfReport(const std::string& reason);
 
 v1::JobState StateOf(Verdict verdict);
 
+bool HasEnded(v1::JobState state);
+
 /// What follows after a daemon died under the job so often that it may be the job's doing.
 v1::ErrorInfo GaveUp(uint32_t start_count);
 

@@ -127,12 +127,12 @@ class LocalExecutor final : public Executor {
     const std::filesystem::path folder =
         options_.directory / absl::StrCat(task.digest, "-", ++folder_count_);
     absl::StatusOr<PreparedTask> prepared = PreparedTask::Make(task, folder);
-    MutexLock lock(&mutex_);
-    if (prepared.ok()) {
-      starts_.push_back(*std::move(prepared));
-    } else {
-      failures_.emplace_back(task, ToErrorInfo(prepared.status()));
+    {
+      MutexLock lock(&mutex_);
+      preparing_.erase(task.digest);
+      if (prepared.ok()) starts_.push_back(*std::move(prepared));
     }
+    if (!prepared.ok()) task.on_end({Verdict::kCrashed, ToErrorInfo(prepared.status()), {}});
     Wake();
   }
 
@@ -151,22 +151,17 @@ class LocalExecutor final : public Executor {
   // False when it is time to stop.
   bool TakeCommands() {
     std::vector<PreparedTask> starts;
-    std::vector<std::pair<DecompositionTask, v1::ErrorInfo>> failures;
     std::vector<std::string> cancels;
     {
       MutexLock lock(&mutex_);
       if (stopping_) return false;
       starts.swap(starts_);
-      failures.swap(failures_);
       cancels.swap(cancels_);
-      for (const PreparedTask& start : starts) preparing_.erase(start.task.digest);
-      for (const auto& [task, error] : failures) preparing_.erase(task.digest);
-      // One that is still being prepared is cancelled when it is ready, which is soon.
+      // A task that is still being prepared is cancelled as soon as it is ready.
       for (const std::string& digest : cancels) {
         if (preparing_.contains(digest)) cancels_.push_back(digest);
       }
     }
-    for (const auto& [task, error] : failures) task.on_end({Verdict::kCrashed, error, {}});
     for (PreparedTask& start : starts) StartWorker(std::move(start));
     for (LocalWorker& worker : workers_) {
       if (std::ranges::find(cancels, worker.task().digest) != cancels.end()) worker.Cancel();
@@ -181,7 +176,8 @@ class LocalExecutor final : public Executor {
     if (worker.ok()) {
       workers_.push_back(*std::move(worker));
     } else {
-      on_end({Verdict::kCrashed, ToErrorInfo(worker.status()), {}});
+      const Outcome outcome{Verdict::kCrashed, ToErrorInfo(worker.status()), {}};
+      files_.Run([on_end, outcome] { on_end(outcome); });
     }
   }
 
@@ -219,12 +215,8 @@ class LocalExecutor final : public Executor {
       }
       const auto ended = std::make_shared<LocalWorker>(std::move(*worker));
       worker = workers_.erase(worker);
-      if (outcome->verdict == Verdict::kOk) {
-        // Storing a model waits for the disk.
-        files_.Run([ended, outcome = *outcome] { ended->task().on_end(outcome); });
-      } else {
-        ended->task().on_end(*outcome);
-      }
+      // The caller stores the end on the disk, which must not delay the events of other workers.
+      files_.Run([ended, outcome = *outcome] { ended->task().on_end(outcome); });
     }
   }
 
@@ -241,7 +233,6 @@ class LocalExecutor final : public Executor {
   bool stopping_ ABSL_GUARDED_BY(mutex_) = false;
   std::set<std::string> preparing_ ABSL_GUARDED_BY(mutex_);
   std::vector<PreparedTask> starts_ ABSL_GUARDED_BY(mutex_);
-  std::vector<std::pair<DecompositionTask, v1::ErrorInfo>> failures_ ABSL_GUARDED_BY(mutex_);
   std::vector<std::string> cancels_ ABSL_GUARDED_BY(mutex_);
   FileThread files_;
   std::thread thread_;

@@ -2,27 +2,24 @@
 #include "server/decomposition/queue_core.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
+#include <map>
+#include <optional>
 #include <utility>
 
-#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 #include "server/decomposition/coarse_request.h"
 #include "server/decomposition/decomposition_request.h"
 #include "server/decomposition/job_rules.h"
-#include "server/decomposition/worker_command.h"
+#include "server/decomposition/memory_estimate.h"
+#include "server/decomposition/stored_model.h"
 
 namespace carillon {
 namespace {
 
-// Eigenvalues go to the worker as decimals of its own units and come back: not the last bits.
-constexpr double kRelativeTolerance = 1e-9;
-
-// A daemon that was killed so often under one job may have been killed by it.
+// A daemon that was killed this often while a job ran may have been killed because of the job.
 constexpr uint32_t kMostStarts = 10;
-constexpr char kCorrectionFact[] = "memory_correction";
 
 absl::Status NotFound(const std::string& digest) {
   return Refusal(absl::StatusCode::kNotFound, "JOB_NOT_FOUND",
@@ -50,58 +47,45 @@ absl::Status QueueCore::TakeUp() {
   Notices notices;  // nobody watches yet
   database_.models().ListenToQuarantine(
       [this](const std::string& digest, const absl::Status& why) { OnQuarantine(digest, why); });
-  const auto correction = database_.jobs().Fact(kCorrectionFact);
-  double factor = 1;
-  if (correction.ok() && correction->has_value()) {
-    if (!absl::SimpleAtod(**correction, &factor)) factor = 1;
+  runs_.RecallExperience();
+  MutexLock lock(&runs_.writer());
+  for (const JobRecord& record : *records) {
+    // A coarse model's job may have been queued already, by the job that waits for it.
+    if (jobs_.Contains(record.digest)) continue;
+    if (absl::Status status = TakeUpJob(record, notices); !status.ok()) return status;
   }
-  MutexLock lock(&mutex_);
-  experience_ = MemoryExperience(factor);
-  for (JobRecord record : *records) {
-    if (active_.contains(record.digest)) continue;  // wanted by one before it
-    if (record.damaged) {
-      settings_.log(record.error.message());
-      if (absl::Status status = database_.jobs().Put(record); !status.ok()) return status;
-      continue;
-    }
-    auto request = ParseRequest(record);
-    const absl::StatusOr<bool> satisfied =
-        request.ok() ? IsSatisfied(std::nullopt, record.digest, *request) : request.status();
-    if (satisfied.ok() && !*satisfied && record.start_count < kMostStarts) {
-      std::string coarse = StartCoarse(record.digest, *request, notices);
-      Enqueue(std::move(record), *std::move(request), std::move(coarse));
-      continue;
-    }
-    if (satisfied.ok() && !*satisfied) {
-      record.state = v1::JOB_STATE_FAILED;
-      record.error = GaveUp(std::exchange(record.start_count, 0));
-      settings_.log(absl::StrCat("jobs/", record.digest, ": ", record.error.message()));
-      if (absl::Status status = database_.jobs().Put(record); !status.ok()) return status;
-      continue;
-    }
-    // The daemon died between storing the model and saying so, or the row is damaged.
-    record.state = satisfied.ok() ? v1::JOB_STATE_SUCCEEDED : v1::JOB_STATE_FAILED;
-    if (!satisfied.ok()) record.error = ToErrorInfo(satisfied.status());
-    record.start_count = 0;
-    if (absl::Status status = database_.jobs().Put(record); !status.ok()) return status;
-  }
-  StartWhatFits(notices);
+  runs_.StartWhatFits(notices);
   return absl::OkStatus();
+}
+
+absl::Status QueueCore::TakeUpJob(JobRecord record, Notices& notices) {
+  if (record.damaged) {
+    settings_.log(record.error.message());
+    return database_.jobs().Put(record);
+  }
+  auto request = ParseRequest(record);
+  const absl::StatusOr<bool> satisfied =
+      request.ok() ? IsSatisfied(database_.models(), record.digest, std::nullopt, *request)
+                   : request.status();
+  if (satisfied.ok() && !*satisfied && record.start_count < kMostStarts) {
+    std::string coarse = StartCoarse(record.digest, *request, notices);
+    Enqueue(std::move(record), *std::move(request), std::move(coarse));
+    return absl::OkStatus();
+  }
+  const uint32_t start_count = std::exchange(record.start_count, 0);
+  // Succeeded: the daemon was killed after it stored the model and before it stored the job's end.
+  record.state = satisfied.ok() && *satisfied ? v1::JOB_STATE_SUCCEEDED : v1::JOB_STATE_FAILED;
+  if (!satisfied.ok()) record.error = ToErrorInfo(satisfied.status());
+  if (satisfied.ok() && !*satisfied) {
+    record.error = GaveUp(start_count);
+    settings_.log(absl::StrCat("jobs/", record.digest, ": ", record.error.message()));
+  }
+  return database_.jobs().Put(record);
 }
 
 void QueueCore::Stop() {
   database_.models().ListenToQuarantine(nullptr);
-  {
-    MutexLock lock(&mutex_);
-    stopping_ = true;
-    // These ends are the daemon's doing, not the jobs'.
-    for (auto& [digest, active] : active_) {
-      if (!active.running.has_value() || active.record.start_count == 0) continue;
-      --active.record.start_count;
-      if (!active.deleted) database_.jobs().Put(active.record).IgnoreError();
-    }
-  }
-  executor_.reset();
+  runs_.Stop();
 }
 
 absl::StatusOr<v1::Job> QueueCore::Submit(const v1::CreateModalModelRequest& request) {
@@ -111,10 +95,10 @@ absl::StatusOr<v1::Job> QueueCore::Submit(const v1::CreateModalModelRequest& req
   Notices notices;
   absl::StatusOr<v1::Job> job;
   {
-    MutexLock lock(&mutex_);
-    const auto active = active_.find(digest);
-    job = active == active_.end() ? SubmitNew(digest, *resolved, notices)
-                                  : SubmitAgain(active->second, *resolved);
+    MutexLock lock(&runs_.writer());
+    const std::optional<ActiveJob> active = jobs_.Find(digest);
+    job = active.has_value() ? SubmitAgain(*active, *resolved)
+                             : SubmitNew(digest, *resolved, notices);
   }
   TellAll(notices);
   return job;
@@ -125,21 +109,17 @@ absl::StatusOr<v1::Job> QueueCore::SubmitNew(const std::string& digest,
                                              Notices& notices) {
   const absl::StatusOr<std::optional<JobRecord>> known = database_.jobs().Find(digest);
   if (!known.ok()) return known.status();
-  const absl::StatusOr<bool> satisfied = IsSatisfied(*known, digest, request);
+  const absl::StatusOr<bool> satisfied = IsSatisfied(database_.models(), digest, *known, request);
   if (!satisfied.ok()) return satisfied.status();
   if (known->has_value() && (*satisfied ? (*known)->state == v1::JOB_STATE_SUCCEEDED
                                         : WouldFailAgain(**known, request))) {
-    // As it stands: its request tells how far the model was computed.
+    // The record stays unchanged: its request tells how far the model was computed.
     return ToJob(**known);
   }
   if (!*satisfied) {
-    const auto mesh = database_.meshes().Find(request.mesh_digest());
-    if (!mesh.ok()) return mesh.status();
-    if (queued_.size() >= settings_.max_queued_count) {
-      return QueueFull(queued_.size(), mean_run_s_ / executor_->worker_count());
-    }
+    if (absl::Status status = CheckAcceptable(request); !status.ok()) return status;
   }
-  // Before the job itself is written down: whoever takes that up finds this one in the queue.
+  // The coarse job is stored first. A daemon that takes up this job then finds the coarse one.
   std::string coarse = *satisfied ? "" : StartCoarse(digest, request, notices);
   JobRecord record{.digest = digest,
                    .request = request.SerializeAsString(),
@@ -151,12 +131,20 @@ absl::StatusOr<v1::Job> QueueCore::SubmitNew(const std::string& digest,
   if (const absl::Status status = database_.jobs().Put(record); !status.ok()) return status;
   if (*satisfied) return ToJob(record);
   Enqueue(std::move(record), request, std::move(coarse));
-  StartWhatFits(notices);
-  return FindJob(digest);
+  runs_.StartWhatFits(notices);
+  return Get(digest);
 }
 
-// The job of the coarse model that the request wants first, where it has not ended yet; empty: none
-// is to be waited for. What cannot be had coarsely is had finely only.
+absl::Status QueueCore::CheckAcceptable(const v1::CreateModalModelRequest& request) {
+  const auto mesh = database_.meshes().Find(request.mesh_digest());
+  if (!mesh.ok()) return mesh.status();
+  const size_t count = jobs_.queued_count();
+  if (count < settings_.max_queued_count) return absl::OkStatus();
+  return QueueFull(count, runs_.retry_after_s());
+}
+
+// The digest of the coarse model's job that the request has to wait for; empty if there is none. A
+// request whose coarse model cannot be computed gets the fine one only.
 std::string QueueCore::StartCoarse(const std::string& digest,
                                    const v1::CreateModalModelRequest& request, Notices& notices) {
   if (!request.coarse_first() || database_.models().Summary(digest).ok()) return "";
@@ -164,81 +152,53 @@ std::string QueueCore::StartCoarse(const std::string& digest,
   const auto coarse = CoarseRequest(request, mesh.ok() ? mesh->byte_count : 0);
   if (!coarse.has_value()) return "";
   std::string coarse_digest = RequestDigest(*coarse);
-  if (!active_.contains(coarse_digest)) {
+  if (!jobs_.Contains(coarse_digest)) {
     SubmitNew(coarse_digest, *coarse, notices).status().IgnoreError();
   }
-  if (active_.contains(coarse_digest)) return coarse_digest;
+  if (jobs_.Contains(coarse_digest)) return coarse_digest;
   database_.models().CopyIfAbsent(coarse_digest, digest, request.label()).IgnoreError();
   return "";
 }
 
-// The coarse model's job has ended, however it did: those that waited for it have their turn.
-void QueueCore::ReleaseWaiting(const std::string& coarse, Notices& notices) {
-  for (auto& [digest, active] : active_) {
-    if (active.waits_for != coarse) continue;
-    active.waits_for.clear();
-    queued_.insert(PlaceOf(active));
-    // Where there is none, nothing can be copied; the wait is over all the same.
-    database_.models().CopyIfAbsent(coarse, digest, active.record.label).IgnoreError();
-    active.coarse_ready = HasCoarse(digest, active.request);
-    notices.push_back(Announce(active));
-  }
-}
-
-bool QueueCore::HasCoarse(const std::string& digest, const v1::CreateModalModelRequest& request) {
-  const absl::StatusOr<ModelSummary> model = database_.models().Summary(digest);
-  return model.ok() && IsCoarseOf(model->header, request);
-}
-
-// A waiting or running job is told to go as far as the farthest request wants.
-absl::StatusOr<v1::Job> QueueCore::SubmitAgain(Active& active,
+// A job that waits or runs serves all requests for its digest: it is extended up to the highest
+// eigenvalue that any of them wants.
+absl::StatusOr<v1::Job> QueueCore::SubmitAgain(const ActiveJob& active,
                                                const v1::CreateModalModelRequest& request) {
+  const std::string& digest = active.record.digest;
   const bool wanted_no_more = active.record.state == v1::JOB_STATE_CANCELLED || active.deleted;
   const bool farther = WantedEigenvalue(request) > WantedEigenvalue(active.request);
   const bool sooner = request.priority() > active.record.priority;
-  if (!wanted_no_more && !farther && !sooner) return ActiveJob(active);
+  if (!wanted_no_more && !farther && !sooner) return Get(digest);
   JobRecord record = active.record;
   record.state = v1::JOB_STATE_QUEUED;
   record.priority = std::max(record.priority, request.priority());
   if (wanted_no_more || farther) record.request = request.SerializeAsString();
   if (const absl::Status status = database_.jobs().Put(record); !status.ok()) return status;
-  const bool waits = queued_.erase(PlaceOf(active)) > 0;
-  active.record = std::move(record);
-  if (waits) queued_.insert(PlaceOf(active));
-  if (wanted_no_more || farther) active.request = request;
-  active.again = active.again || wanted_no_more;
-  return ActiveJob(active);
-}
-
-// Whether the stored model goes as far as wanted, or as far as a job that wanted as much could go.
-absl::StatusOr<bool> QueueCore::IsSatisfied(const std::optional<JobRecord>& record,
-                                            const std::string& digest,
-                                            const v1::CreateModalModelRequest& request) {
-  const absl::StatusOr<ModelSummary> model = database_.models().Summary(digest);
-  if (absl::IsNotFound(model.status()) || absl::IsDataLoss(model.status())) return false;
-  if (!model.ok()) return model.status();
-  if (IsCoarseOf(model->header, request)) return false;
-  const double wanted = WantedEigenvalue(request) * (1 - kRelativeTolerance);
-  if (model->header.complete_to_eigenvalue() >= wanted) return true;
-  if (!record.has_value() || record->state != v1::JOB_STATE_SUCCEEDED) return false;
-  const auto ran = ParseRequest(*record);
-  return ran.ok() && WantedEigenvalue(*ran) >= wanted;
+  return jobs_
+      .Change(digest,
+              [&](ActiveJob& job) {
+                job.record = std::move(record);
+                if (wanted_no_more || farther) job.request = request;
+                job.again = job.again || wanted_no_more;
+              })
+      .job;
 }
 
 void QueueCore::OnQuarantine(const std::string& digest, const absl::Status& why) {
   Notices notices;
   bool again = false;
   {
-    MutexLock lock(&mutex_);
+    MutexLock lock(&runs_.writer());
     again = ComputeAgain(digest, notices);
   }
-  settings_.log(absl::StrCat(why.message(), again ? "; it is computed again" : "; it has no job"));
+  settings_.log(absl::StrCat(why.message(),
+                             again ? "; the model is computed again" : "; the model has no job"));
   TellAll(notices);
 }
 
-// Whether the model of that name is being computed now.
+// Whether the model of that digest is being computed when this returns.
 bool QueueCore::ComputeAgain(const std::string& digest, Notices& notices) {
-  if (active_.contains(digest)) return true;
+  if (jobs_.Contains(digest)) return true;
   auto record = database_.jobs().Find(digest);
   if (!record.ok() || !record->has_value() || (*record)->damaged) return false;
   auto request = ParseRequest(**record);
@@ -246,280 +206,120 @@ bool QueueCore::ComputeAgain(const std::string& digest, Notices& notices) {
   (*record)->state = v1::JOB_STATE_QUEUED;
   if (!database_.jobs().Put(**record).ok()) return false;
   Enqueue(**std::move(record), *std::move(request));
-  StartWhatFits(notices);
+  runs_.StartWhatFits(notices);
   return true;
 }
 
 void QueueCore::Enqueue(JobRecord record, v1::CreateModalModelRequest request,
                         std::string waits_for) {
-  const std::string digest = record.digest;
   record.state = v1::JOB_STATE_QUEUED;
-  Active active;
   const auto mesh = database_.meshes().Find(request.mesh_digest());
-  active.guess_bytes = MemoryOfNodes(GuessNodeCount(request, mesh.ok() ? mesh->byte_count : 0));
-  active.estimate_bytes =
-      record.peak_bytes > 0 ? record.peak_bytes : experience_.Corrected(active.guess_bytes);
-  active.record = std::move(record);
-  active.request = std::move(request);
-  active.waits_for = std::move(waits_for);
-  active.coarse_ready = HasCoarse(digest, active.request);
-  Requeue(active_.emplace(digest, std::move(active)).first->second);
-}
-
-void QueueCore::Requeue(Active& active) {
-  active.number = ++last_number_;
-  if (active.waits_for.empty()) queued_.insert(PlaceOf(active));
-}
-
-QueueCore::Place QueueCore::PlaceOf(const Active& active) {
-  return {-active.record.priority, active.number, active.record.digest};
-}
-
-// The first in the queue starts where a worker and the memory for it are free. Nobody overtakes it:
-// else small ones might keep a large one waiting for ever.
-void QueueCore::StartWhatFits(Notices& notices) {
-  while (!stopping_ && !queued_.empty() && running_count_ < executor_->worker_count()) {
-    Active& active = active_.at(std::get<std::string>(*queued_.begin()));
-    const bool fits = reserved_bytes_ + active.estimate_bytes <= executor_->memory_budget_bytes();
-    if (!fits && running_count_ > 0) return;
-    queued_.erase(queued_.begin());
-    ++running_count_;
-    Reserve(active, active.estimate_bytes);
-    active.running = active.request;
-    active.started = clock_.Monotonic();
-    active.progress.Clear();
-    ++active.record.start_count;
-    // Where it cannot be counted, nothing worse follows than one start more after a kill.
-    database_.jobs().Put(active.record).IgnoreError();
-    executor_->Start(MakeTask(active));
-    notices.push_back(Announce(active));
-  }
-}
-
-void QueueCore::Reserve(Active& active, uint64_t bytes) {
-  reserved_bytes_ += bytes - active.reserved_bytes;
-  active.reserved_bytes = bytes;
-}
-
-DecompositionTask QueueCore::MakeTask(const Active& active) {
-  const std::string& digest = active.record.digest;
-  return {.digest = digest,
-          .request = active.request,
-          .way = active.record.way,
-          .estimate_bytes = active.estimate_bytes,
-          .write_mesh =
-              [this, mesh = active.request.mesh_digest()](const std::filesystem::path& file) {
-                return database_.meshes().WriteFile(mesh, file);
-              },
-          .on_progress = [this, digest](const v1::Progress& p) { OnProgress(digest, p); },
-          .on_end = [this, digest](const Outcome& outcome) { OnEnd(digest, outcome); }};
-}
-
-void QueueCore::OnProgress(const std::string& digest, const v1::Progress& progress) {
-  Notice notice;
-  {
-    MutexLock lock(&mutex_);
-    Active& active = active_.at(digest);
-    // Once the mesh is there, its nodes tell better than its file what is to come.
-    if (active.progress.node_count() == 0 && progress.node_count() > 0) {
-      active.guess_bytes = MemoryOfNodes(progress.node_count());
-      active.estimate_bytes = experience_.Corrected(active.guess_bytes);
-      Reserve(active, active.estimate_bytes);
-    }
-    active.progress = progress;
-    notice = Announce(active);
-  }
-  notice.Tell();
-}
-
-void QueueCore::OnEnd(const std::string& digest, const Outcome& outcome) {
-  const Outcome result = Store(digest, outcome);
-  Notices notices;
-  {
-    MutexLock lock(&mutex_);
-    --running_count_;
-    Active& active = active_.at(digest);
-    Reserve(active, 0);
-    LearnFrom(active, result);
-    // Deleted while it was being stored. It may not have come that far: then there is none.
-    if (active.deleted) database_.models().Delete(digest).IgnoreError();
-    active.record.start_count = 0;
-    if (RunAgain(active, result)) {
-      active.running.reset();
-      active.again = active.deleted = false;
-      Requeue(active);
-      notices.push_back(Announce(active));
-    } else {
-      notices.push_back(Finish(active, result));
-      ReleaseWaiting(digest, notices);
-    }
-    StartWhatFits(notices);
-  }
-  TellAll(notices);
-}
-
-Notice QueueCore::Finish(Active& active, const Outcome& result) {
-  JobRecord record = active.record;
-  record.state = StateOf(result.verdict);
-  record.remembered = IsDeterministic(result);
-  if (record.state == v1::JOB_STATE_FAILED) record.error = result.error;
-  // Where even this cannot be written, the row still says queued, and the next start of the daemon
-  // puts it right.
-  if (!active.deleted) database_.jobs().Put(record).IgnoreError();
-  Notice notice{std::move(active.watchers), ToJob(record), ++version_};
-  active_.erase(record.digest);
-  return notice;
-}
-
-void QueueCore::LearnFrom(Active& active, const Outcome& result) {
-  active.record.peak_bytes = std::max(active.record.peak_bytes, result.peak_bytes);
-  const double run_s = std::chrono::duration<double>(clock_.Monotonic() - active.started).count();
-  mean_run_s_ += 0.1 * (run_s - mean_run_s_);
-  if (result.verdict != Verdict::kOk || result.peak_bytes == 0) return;
-  experience_.Learn(active.guess_bytes, result.peak_bytes);
-  database_.jobs().PutFact(kCorrectionFact, absl::StrCat(experience_.correction())).IgnoreError();
-}
-
-// The model goes into the database; where it does not, that is the outcome.
-Outcome QueueCore::Store(const std::string& digest, const Outcome& outcome) {
-  if (outcome.verdict != Verdict::kOk) return outcome;
-  std::string label;
-  {
-    MutexLock lock(&mutex_);
-    const Active& active = active_.at(digest);
-    if (active.deleted) return {Verdict::kCancelled, {}, {}};
-    label = active.record.label;
-  }
-  const auto stored = database_.models().PutFile(digest, label, outcome.model_file);
-  if (stored.ok()) return outcome;
-  return {Verdict::kCrashed, ToErrorInfo(stored.status()), {}};
-}
-
-bool QueueCore::RunAgain(Active& active, const Outcome& outcome) {
-  if (active.again) return true;
-  if (active.deleted || outcome.verdict == Verdict::kCancelled) return false;
-  if (outcome.crowded) {
-    active.estimate_bytes = std::max(2 * active.estimate_bytes, outcome.peak_bytes * 3 / 2);
-    return true;
-  }
-  if (DependsOnWay(outcome) && active.record.way + 1 < kWayCount) {
-    ++active.record.way;
-    settings_.log(absl::StrCat("jobs/", active.record.digest, " is tried another way after ",
-                               outcome.error.message()));
-    return true;
-  }
-  if (SameHints(active.request, *active.running)) return false;
-  if (outcome.verdict == Verdict::kBadInput) return DependsOnHints(outcome.error.reason());
-  return outcome.verdict == Verdict::kOk;
+  const uint64_t mesh_bytes = mesh.ok() ? mesh->byte_count : 0;
+  const bool coarse_ready = HasCoarseModel(database_.models(), record.digest, request);
+  const uint64_t guess_bytes = MemoryOfNodes(GuessNodeCount(request, mesh_bytes));
+  jobs_.Add({.record = std::move(record),
+             .request = std::move(request),
+             .waits_for = std::move(waits_for),
+             .coarse_ready = coarse_ready,
+             .guess_bytes = guess_bytes});
 }
 
 absl::StatusOr<v1::Job> QueueCore::Get(const std::string& digest) {
-  MutexLock lock(&mutex_);
-  return FindJob(digest);
+  // In this order: a job leaves the memory only after its end is stored.
+  if (auto active = jobs_.View(digest)) return *std::move(active);
+  return FindStored(digest);
 }
 
 absl::StatusOr<DecompositionJobPage> QueueCore::List(int page_size, const std::string& page_token) {
-  MutexLock lock(&mutex_);
+  // As they stand now, before the database is read: a job seen running is not listed as queued.
+  std::map<std::string, v1::Job> active = jobs_.ViewAll();
   const absl::StatusOr<JobPage> records = database_.jobs().List(page_size, page_token);
   if (!records.ok()) return records.status();
   DecompositionJobPage page;
   page.next_page_token = records->next_page_token;
   for (const JobRecord& record : records->jobs) {
-    const auto active = active_.find(record.digest);
-    page.jobs.push_back(active == active_.end() ? ToJob(record) : ActiveJob(active->second));
+    const auto job = active.find(record.digest);
+    page.jobs.push_back(job == active.end() ? ToJob(record) : std::move(job->second));
   }
   return page;
 }
 
 absl::StatusOr<v1::Job> QueueCore::Cancel(const std::string& digest) {
   Notices notices;
-  absl::StatusOr<v1::Job> job;
+  JobRecord record;
   {
-    MutexLock lock(&mutex_);
-    const auto found = active_.find(digest);
-    if (found == active_.end()) return FindJob(digest);
-    Active& active = found->second;
-    // Before it is written down, which may take a while.
-    if (active.running.has_value() && !stopping_) executor_->Cancel(digest);
-    JobRecord record = active.record;
+    MutexLock lock(&runs_.writer());
+    const std::optional<ActiveJob> active = jobs_.Find(digest);
+    if (!active.has_value()) return FindStored(digest);
+    // The worker ends first, because the database may take a while.
+    if (active->running.has_value()) runs_.Cancel(digest);
+    record = active->record;
     record.state = v1::JOB_STATE_CANCELLED;
     if (const absl::Status status = database_.jobs().Put(record); !status.ok()) return status;
-    active.record = std::move(record);
-    active.again = false;
-    if (active.running.has_value()) return ActiveJob(active);
-    job = ToJob(active.record);
-    notices.push_back({std::move(active.watchers), *job, ++version_});
-    queued_.erase(PlaceOf(active));
-    active_.erase(found);
-    ReleaseWaiting(digest, notices);
-    StartWhatFits(notices);
+    if (active->running.has_value()) {
+      return jobs_
+          .Change(digest,
+                  [&](ActiveJob& job) {
+                    job.record = record;
+                    job.again = false;
+                  })
+          .job;
+    }
+    EndQueued(record, notices);
   }
   TellAll(notices);
-  return job;
+  return ToJob(record);
 }
 
 absl::Status QueueCore::DeleteModel(const std::string& digest) {
   Notices notices;
   {
-    MutexLock lock(&mutex_);
+    MutexLock lock(&runs_.writer());
     if (absl::Status status = database_.models().Delete(digest); !status.ok()) return status;
-    const auto found = active_.find(digest);
-    if (found == active_.end()) return absl::OkStatus();
-    Active& active = found->second;
-    active.record.state = v1::JOB_STATE_CANCELLED;
-    active.deleted = true;
-    active.again = false;
-    if (active.running.has_value()) {
-      if (!stopping_) executor_->Cancel(digest);
-      return absl::OkStatus();
+    std::optional<ActiveJob> active = jobs_.Find(digest);
+    if (!active.has_value()) return absl::OkStatus();
+    active->record.state = v1::JOB_STATE_CANCELLED;
+    if (!active->running.has_value()) {
+      EndQueued(active->record, notices);
+    } else {
+      runs_.Cancel(digest);
+      jobs_.Change(digest, [&](ActiveJob& job) {
+        job.record.state = v1::JOB_STATE_CANCELLED;
+        job.deleted = true;
+        job.again = false;
+      });
     }
-    notices.push_back({std::move(active.watchers), ToJob(active.record), ++version_});
-    queued_.erase(PlaceOf(active));
-    active_.erase(found);
-    ReleaseWaiting(digest, notices);
-    StartWhatFits(notices);
   }
   TellAll(notices);
   return absl::OkStatus();
 }
 
+void QueueCore::EndQueued(const JobRecord& record, Notices& notices) {
+  notices.push_back(jobs_.Remove(record.digest, ToJob(record)));
+  runs_.ReleaseWaiting(record.digest, notices);
+  runs_.StartWhatFits(notices);
+}
+
 absl::Status QueueCore::Watch(const std::string& digest, const std::shared_ptr<Watcher>& watcher) {
-  Notice notice;
-  {
-    MutexLock lock(&mutex_);
-    const absl::StatusOr<v1::Job> job = FindJob(digest);
-    if (!job.ok()) return job.status();
-    if (const auto active = active_.find(digest); active != active_.end()) {
-      active->second.watchers.push_back(watcher);
+  // Registered before the database is read, so that no change falls in between.
+  Notice first = jobs_.Watch(digest, watcher);
+  if (first.job.name().empty()) {
+    const absl::StatusOr<v1::Job> stored = FindStored(digest);
+    if (!stored.ok()) {
+      jobs_.Forget(digest, watcher);
+      return stored.status();
     }
-    notice = {{watcher}, *job, ++version_};
+    first = jobs_.CompleteWatch(digest, std::move(first), *stored);
   }
-  notice.Tell();
+  first.Tell();
   return absl::OkStatus();
 }
 
 void QueueCore::Forget(const std::string& digest, const std::shared_ptr<Watcher>& watcher) {
-  MutexLock lock(&mutex_);
-  const auto active = active_.find(digest);
-  if (active != active_.end()) std::erase(active->second.watchers, watcher);
+  jobs_.Forget(digest, watcher);
 }
 
-Notice QueueCore::Announce(const Active& active) {
-  return {active.watchers, ActiveJob(active), ++version_};
-}
-
-v1::Job QueueCore::ActiveJob(const Active& active) const {
-  v1::Job job = ToJob(active.record);
-  job.set_state(active.running.has_value() ? v1::JOB_STATE_RUNNING : v1::JOB_STATE_QUEUED);
-  job.set_memory_bytes(std::max(active.record.peak_bytes, active.estimate_bytes));
-  job.set_coarse_ready(active.coarse_ready);
-  if (active.running.has_value()) *job.mutable_progress() = active.progress;
-  return job;
-}
-
-absl::StatusOr<v1::Job> QueueCore::FindJob(const std::string& digest) {
-  const auto active = active_.find(digest);
-  if (active != active_.end()) return ActiveJob(active->second);
+absl::StatusOr<v1::Job> QueueCore::FindStored(const std::string& digest) {
   const absl::StatusOr<std::optional<JobRecord>> record = database_.jobs().Find(digest);
   if (!record.ok()) return record.status();
   if (!record->has_value()) return NotFound(digest);

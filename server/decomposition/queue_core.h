@@ -1,15 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <chrono>
-#include <cstdint>
-#include <map>
 #include <memory>
-#include <optional>
-#include <set>
 #include <string>
-#include <tuple>
-#include <vector>
+#include <utility>
 
 #include "absl/base/thread_annotations.h"
 #include "absl/status/status.h"
@@ -17,20 +11,24 @@
 #include "carillon/v1/decomposition.pb.h"
 #include "carillon/v1/modal_model_service.pb.h"
 #include "server/base/clock.h"
-#include "server/base/mutex.h"
+#include "server/decomposition/active_jobs.h"
 #include "server/decomposition/decomposition_queue.h"
 #include "server/decomposition/executor.h"
-#include "server/decomposition/memory_estimate.h"
+#include "server/decomposition/job_runs.h"
 #include "server/decomposition/watcher.h"
 #include "server/mode_database/mode_database.h"
 
 namespace carillon {
 
-/// What DecompositionQueue does; its calls are documented there.
+/// Implements DecompositionQueue, whose calls are documented there.
 ///
-/// Invariants: a job that waits or runs is in `active_` and as JOB_STATE_QUEUED in the database;
-/// one that has ended is in the database only. Running jobs stay JOB_STATE_QUEUED there: a daemon
-/// that starts has to run them anyway.
+/// A job that waits or runs is in `jobs_` and, as JOB_STATE_QUEUED, in the database; a job that has
+/// ended is in the database only. Running jobs stay JOB_STATE_QUEUED there, because a daemon that
+/// starts has to run them anyway.
+///
+/// Calls that change jobs hold the writer's lock of `runs_`, also while the database writes. They
+/// store a change first and show it in `jobs_` second. Get, List, Watch and Forget take no lock but
+/// the one of `jobs_`, which is never held across an access to the disk.
 class QueueCore {
  public:
   QueueCore(ModeDatabase& database, std::unique_ptr<Executor> executor, const Clock& clock,
@@ -38,11 +36,11 @@ class QueueCore {
       : database_(database),
         clock_(clock),
         settings_(std::move(settings)),
-        executor_(std::move(executor)) {}
+        runs_(database, std::move(executor), clock, jobs_, settings_.log) {}
 
-  /// Queues what an earlier run of the daemon left.
+  /// Queues the unfinished jobs of an earlier run of the daemon.
   absl::Status TakeUp();
-  /// Ends running children; nothing is told afterwards.
+  /// Ends running workers; no watcher is told of a change afterwards.
   void Stop();
 
   absl::StatusOr<v1::Job> Submit(const v1::CreateModalModelRequest& request);
@@ -54,76 +52,34 @@ class QueueCore {
   void Forget(const std::string& digest, const std::shared_ptr<Watcher>& watcher);
 
  private:
-  /// A job that waits or runs.
-  struct Active {
-    JobRecord record;
-    v1::CreateModalModelRequest request;                 // the farthest reaching one so far
-    std::optional<v1::CreateModalModelRequest> running;  // as it was started
-    v1::Progress progress;
-    std::string waits_for;        // digest of the coarse model's job, until that has ended
-    bool coarse_ready = false;    // a coarse model is there under the name
-    bool again = false;           // asked for anew after a cancel: to be started once more
-    bool deleted = false;         // its result is no longer wanted
-    uint64_t number = 0;          // among those that wait
-    uint64_t guess_bytes = 0;     // of memory, before any correction
-    uint64_t estimate_bytes = 0;  // of memory
-    uint64_t reserved_bytes = 0;  // while it runs
-    std::chrono::nanoseconds started{};
-    std::vector<std::shared_ptr<Watcher>> watchers;
-  };
-  using Notices = std::vector<Notice>;
-  /// In the queue: by priority, highest first, then by number.
-  using Place = std::tuple<int32_t, uint64_t, std::string>;
+  using Notices = JobRuns::Notices;
 
+  absl::Status TakeUpJob(JobRecord record, Notices& notices)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
   absl::StatusOr<v1::Job> SubmitNew(const std::string& digest,
                                     const v1::CreateModalModelRequest& request, Notices& notices)
-      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  absl::StatusOr<v1::Job> SubmitAgain(Active& active, const v1::CreateModalModelRequest& request)
-      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  absl::StatusOr<bool> IsSatisfied(const std::optional<JobRecord>& record,
-                                   const std::string& digest,
-                                   const v1::CreateModalModelRequest& request);
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
+  absl::Status CheckAcceptable(const v1::CreateModalModelRequest& request)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
+  absl::StatusOr<v1::Job> SubmitAgain(const ActiveJob& active,
+                                      const v1::CreateModalModelRequest& request)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
   std::string StartCoarse(const std::string& digest, const v1::CreateModalModelRequest& request,
-                          Notices& notices) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  void ReleaseWaiting(const std::string& coarse, Notices& notices)
-      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  bool HasCoarse(const std::string& digest, const v1::CreateModalModelRequest& request);
+                          Notices& notices) ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
   void Enqueue(JobRecord record, v1::CreateModalModelRequest request, std::string waits_for = {})
-      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
   void OnQuarantine(const std::string& digest, const absl::Status& why);
   bool ComputeAgain(const std::string& digest, Notices& notices)
-      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  void StartWhatFits(Notices& notices) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  void Requeue(Active& active) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  static Place PlaceOf(const Active& active);
-  void Reserve(Active& active, uint64_t bytes) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  DecompositionTask MakeTask(const Active& active);
-
-  void OnProgress(const std::string& digest, const v1::Progress& progress);
-  void OnEnd(const std::string& digest, const Outcome& outcome);
-  Outcome Store(const std::string& digest, const Outcome& outcome);
-  bool RunAgain(Active& active, const Outcome& outcome) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  Notice Finish(Active& active, const Outcome& result) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  void LearnFrom(Active& active, const Outcome& result) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-
-  Notice Announce(const Active& active) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  v1::Job ActiveJob(const Active& active) const;
-  absl::StatusOr<v1::Job> FindJob(const std::string& digest) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
+  void EndQueued(const JobRecord& record, Notices& notices)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
+  absl::StatusOr<v1::Job> FindStored(const std::string& digest);
 
   ModeDatabase& database_;
   const Clock& clock_;
   const QueueSettings settings_;
-  Mutex mutex_;
-  bool stopping_ ABSL_GUARDED_BY(mutex_) = false;
-  std::map<std::string, Active> active_ ABSL_GUARDED_BY(mutex_);
-  std::set<Place> queued_ ABSL_GUARDED_BY(mutex_);
-  uint64_t last_number_ ABSL_GUARDED_BY(mutex_) = 0;
-  int running_count_ ABSL_GUARDED_BY(mutex_) = 0;
-  uint64_t reserved_bytes_ ABSL_GUARDED_BY(mutex_) = 0;
-  MemoryExperience experience_ ABSL_GUARDED_BY(mutex_);
-  double mean_run_s_ ABSL_GUARDED_BY(mutex_) = 10;  // before anything was seen
-  uint64_t version_ ABSL_GUARDED_BY(mutex_) = 0;
-  std::unique_ptr<Executor> executor_;
+  ActiveJobs jobs_;
+  JobRuns runs_;
 };
 
 }  // namespace carillon

@@ -4,6 +4,8 @@
 #include <sqlite3.h>
 
 #include <atomic>
+#include <chrono>
+#include <condition_variable>
 #include <limits>
 #include <map>
 #include <memory>
@@ -27,6 +29,44 @@ bool Fails(bool write) {
   return true;
 }
 
+/// The writes that wait until the test releases them.
+class Latch {
+ public:
+  void HoldAfter(int64_t count) {
+    const std::lock_guard lock(mutex_);
+    good_count_ = count;
+  }
+
+  void Release() {
+    const std::lock_guard lock(mutex_);
+    good_count_ = kNever;
+    changed_.notify_all();
+  }
+
+  bool AwaitHeld() {
+    std::unique_lock lock(mutex_);
+    return changed_.wait_for(lock, std::chrono::minutes(1), [this] { return held_count_ > 0; });
+  }
+
+  void Pass() {
+    std::unique_lock lock(mutex_);
+    if (good_count_ == kNever || good_count_-- > 0) return;
+    good_count_ = 0;
+    ++held_count_;
+    changed_.notify_all();
+    changed_.wait(lock, [this] { return good_count_ == kNever; });
+    --held_count_;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  int64_t good_count_ = kNever;
+  int held_count_ = 0;
+};
+
+Latch latch;
+
 /// The methods of a file, with those that write replaced; SQLite's own lie behind.
 struct Methods {
   sqlite3_io_methods replaced;  // first, so that a file's methods lead here
@@ -38,6 +78,7 @@ const sqlite3_io_methods& Real(sqlite3_file* file) {
 }
 
 int Write(sqlite3_file* file, const void* data, int size, sqlite3_int64 offset) {
+  latch.Pass();
   if (!Fails(true)) return Real(file).xWrite(file, data, size, offset);
   if (disk_fault == DiskFault::kReadOnly) return SQLITE_READONLY;
   Real(file).xWrite(file, data, size / 2, offset);
@@ -49,11 +90,13 @@ int Read(sqlite3_file* file, void* data, int size, sqlite3_int64 offset) {
 }
 
 int Sync(sqlite3_file* file, int flags) {
+  latch.Pass();
   return disk_fault == DiskFault::kWriteError && Fails(true) ? SQLITE_IOERR_FSYNC
                                                              : Real(file).xSync(file, flags);
 }
 
 int Truncate(sqlite3_file* file, sqlite3_int64 size) {
+  latch.Pass();
   return disk_fault == DiskFault::kWriteError && Fails(true) ? SQLITE_IOERR_TRUNCATE
                                                              : Real(file).xTruncate(file, size);
 }
@@ -100,6 +143,7 @@ FaultyDisk::FaultyDisk() {
 
 FaultyDisk::~FaultyDisk() {
   Repair();
+  ReleaseWrites();
   sqlite3_vfs_unregister(&faulty_vfs);
   sqlite3_vfs_register(real_vfs, 1);
 }
@@ -114,5 +158,11 @@ bool FaultyDisk::Repair() {
   good_count = kNever;
   return failed;
 }
+
+void FaultyDisk::HoldWritesAfter(int64_t count) { latch.HoldAfter(count); }
+
+bool FaultyDisk::AwaitHeldWrite() { return latch.AwaitHeld(); }
+
+void FaultyDisk::ReleaseWrites() { latch.Release(); }
 
 }  // namespace carillon

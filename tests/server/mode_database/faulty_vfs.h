@@ -9,12 +9,13 @@ namespace carillon {
 enum class DiskFault {
   kFull,        ///< ENOSPC, after half of the bytes
   kReadOnly,    ///< nothing is written
-  kWriteError,  ///< EIO, after half of the bytes; a sync or truncation fails likewise
+  kWriteError,  ///< EIO, after half of the bytes; a sync or truncation fails, too
   kReadError,   ///< EIO, of reads instead of writes
 };
 
-/// While it lives, every file that SQLite opens in this process is on a disk that fails: from a
-/// given access on until it is repaired. One at a time.
+/// While it lives, every file that SQLite opens in this process is on a disk that fails, from a
+/// given access on until it is repaired, or that holds its writes until they are released. One at a
+/// time.
 class FaultyDisk {
  public:
   FaultyDisk();
@@ -27,6 +28,14 @@ class FaultyDisk {
 
   /// Whether any access has failed since FailAfter; all go well from now on.
   static bool Repair();
+
+  /// The next `good_count` writes, syncs and truncations return; later ones wait for ReleaseWrites.
+  static void HoldWritesAfter(int64_t good_count);
+
+  /// Whether a write is held now, or comes to be held within a minute.
+  static bool AwaitHeldWrite();
+
+  static void ReleaseWrites();
 };
 
 }  // namespace carillon

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/functional/function_ref.h"
+#include "carillon/v1/decomposition.pb.h"
+#include "carillon/v1/modal_model_service.pb.h"
+#include "server/base/mutex.h"
+#include "server/decomposition/memory_estimate.h"
+#include "server/decomposition/watcher.h"
+#include "server/mode_database/job_store.h"
+
+namespace carillon {
+
+/// A job that waits or runs.
+struct ActiveJob {
+  JobRecord record;                                      ///< as the database has it
+  v1::CreateModalModelRequest request;                   ///< the farthest reaching one so far
+  std::optional<v1::CreateModalModelRequest> running{};  ///< the request that its run was given
+  v1::Progress progress{};                               ///< of the run
+  std::string waits_for{};      ///< digest of the coarse model's job, until that has ended
+  bool coarse_ready = false;    ///< a coarse model is stored under the job's digest
+  bool again = false;           ///< submitted after a cancel: it runs once more after this run
+  bool deleted = false;         ///< its model was deleted: the result is not stored
+  uint64_t number = 0;          ///< order in which jobs of one priority start
+  uint64_t guess_bytes = 0;     ///< predicted memory, before the correction by experience
+  uint64_t estimate_bytes = 0;  ///< predicted memory
+  uint64_t reserved_bytes = 0;  ///< share of the memory budget while it runs
+  std::chrono::nanoseconds started{};  ///< monotonic clock at the begin of the run
+};
+
+/// The jobs that wait or run, and everybody who watches a job: all in memory. No call waits for a
+/// disk, so readers and progress reports are served while the database is busy. Safe from every
+/// thread; one thread at a time adds, removes and changes jobs. A returned notice is told by the
+/// caller once it holds no lock.
+class ActiveJobs {
+ public:
+  /// What may run at a time.
+  struct Capacity {
+    int worker_count = 0;
+    uint64_t memory_bytes = 0;
+  };
+
+  std::optional<ActiveJob> Find(const std::string& digest);
+  bool Contains(const std::string& digest);
+  size_t queued_count();
+  std::vector<ActiveJob> Running();
+  /// Digests of the jobs that wait for the coarse model's job `coarse`.
+  std::vector<std::string> WaitingFor(const std::string& coarse);
+
+  /// A job as clients see it; absent if it neither waits nor runs.
+  std::optional<v1::Job> View(const std::string& digest);
+  /// All jobs as clients see them at one moment, by digest.
+  std::map<std::string, v1::Job> ViewAll();
+
+  /// Appends a job to the queue, behind those of its priority. Its memory is predicted from
+  /// `guess_bytes`, or known from an earlier run.
+  void Add(ActiveJob job);
+
+  /// Applies `change` to a job. A waiting job moves to the place in the queue that it then has.
+  Notice Change(const std::string& digest, absl::FunctionRef<void(ActiveJob&)> change);
+
+  /// Removes a job; `last` is what its watchers are told.
+  Notice Remove(const std::string& digest, const v1::Job& last);
+
+  /// Marks the first job of the queue as running if a worker and the memory for it are free. No
+  /// other job overtakes it, because small jobs could delay a large one for ever. A job that does
+  /// not fit into the budget at all runs alone.
+  std::optional<ActiveJob> BeginRun(const Capacity& capacity, std::chrono::nanoseconds now);
+
+  /// Records the progress of a run. The node count of the mesh, once it is known, predicts the
+  /// memory better than the size of the file.
+  Notice Report(const std::string& digest, const v1::Progress& progress);
+
+  /// Frees the worker and the memory of a run that has ended. The job still counts as running for
+  /// readers, until it is removed or queued again.
+  ActiveJob EndRun(const std::string& digest);
+
+  /// Queues a job again whose run has ended, behind those of its priority.
+  Notice QueueAgain(ActiveJob job);
+
+  /// Registers a watcher of a digest, whether its job is active or not. If it is not, the notice
+  /// has a job without a name: complete it by CompleteWatch.
+  Notice Watch(const std::string& digest, const std::shared_ptr<Watcher>& watcher);
+  /// The first notice of a watch whose job was not active: `stored` is what the database said
+  /// afterwards. An ended job has no further news, so its watcher is forgotten.
+  Notice CompleteWatch(const std::string& digest, Notice watch, const v1::Job& stored);
+  void Forget(const std::string& digest, const std::shared_ptr<Watcher>& watcher);
+
+  void SetExperience(const MemoryExperience& experience);
+  /// Compares the memory of a run with its guess. Returns the correction of guesses from now on.
+  double Learn(uint64_t guess_bytes, uint64_t peak_bytes);
+
+ private:
+  /// In the queue: by priority, highest first, then by number.
+  using Place = std::tuple<int32_t, uint64_t, std::string>;
+
+  static Place PlaceOf(const ActiveJob& job);
+  static v1::Job ViewOf(const ActiveJob& job);
+  Notice Announce(const ActiveJob& job) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void Enqueue(ActiveJob& job) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void Reserve(ActiveJob& job, uint64_t bytes) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void EraseWatcher(const std::string& digest, const std::shared_ptr<Watcher>& watcher)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+
+  Mutex mutex_;
+  std::map<std::string, ActiveJob> jobs_ ABSL_GUARDED_BY(mutex_);
+  std::set<Place> queue_ ABSL_GUARDED_BY(mutex_);
+  std::map<std::string, std::vector<std::shared_ptr<Watcher>>> watchers_ ABSL_GUARDED_BY(mutex_);
+  uint64_t last_number_ ABSL_GUARDED_BY(mutex_) = 0;
+  uint64_t version_ ABSL_GUARDED_BY(mutex_) = 0;
+  int running_count_ ABSL_GUARDED_BY(mutex_) = 0;
+  uint64_t reserved_bytes_ ABSL_GUARDED_BY(mutex_) = 0;
+  MemoryExperience experience_ ABSL_GUARDED_BY(mutex_);
+};
+
+}  // namespace carillon

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/base/thread_annotations.h"
+#include "server/base/clock.h"
+#include "server/base/mutex.h"
+#include "server/decomposition/active_jobs.h"
+#include "server/decomposition/executor.h"
+#include "server/decomposition/watcher.h"
+#include "server/mode_database/mode_database.h"
+
+namespace carillon {
+
+/// Starts queued jobs on the executor, stores their results and decides what follows from them.
+class JobRuns {
+ public:
+  using Notices = std::vector<Notice>;
+
+  /// `log` takes a line for people and may be called on any thread. `database`, `clock` and `jobs`
+  /// must outlive the object.
+  JobRuns(ModeDatabase& database, std::unique_ptr<Executor> executor, const Clock& clock,
+          ActiveJobs& jobs, std::function<void(const std::string& line)> log);
+
+  /// Held by the one thread that writes jobs into the database and into `jobs`, also while it waits
+  /// for the disk. Readers never take it.
+  Mutex& writer() ABSL_LOCK_RETURNED(writer_) { return writer_; }
+
+  /// Restores what earlier runs of the daemon learnt about memory.
+  void RecallExperience();
+
+  /// Ends the running workers; no job changes afterwards.
+  void Stop();
+
+  /// Starts jobs while workers and memory are free.
+  void StartWhatFits(Notices& notices) ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
+
+  /// Ends the worker of a running job; the job ends, or is queued again, when the worker has ended.
+  void Cancel(const std::string& digest) ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
+
+  /// The coarse model's job `coarse` has ended, successfully or not: queues the jobs that waited
+  /// for it, with its model, if there is one, copied under their digests.
+  void ReleaseWaiting(const std::string& coarse, Notices& notices)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
+
+  /// Mean time until a place in a full queue becomes free, in seconds.
+  double retry_after_s() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_) {
+    return mean_run_s_ / capacity_.worker_count;
+  }
+
+ private:
+  DecompositionTask MakeTask(const ActiveJob& job);
+  void OnEnd(const std::string& digest, const Outcome& outcome);
+  Outcome Store(const std::string& digest, const Outcome& outcome);
+  bool RunsAgain(ActiveJob& job, const Outcome& result) const;
+  Notice Finish(JobRecord record, const Outcome& result, bool deleted)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
+  void LearnFrom(ActiveJob& job, const Outcome& result) ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
+
+  ModeDatabase& database_;
+  const Clock& clock_;
+  ActiveJobs& jobs_;
+  const std::function<void(const std::string& line)> log_;
+  Mutex writer_;
+  bool stopping_ ABSL_GUARDED_BY(writer_) = false;
+  double mean_run_s_ ABSL_GUARDED_BY(writer_) = 10;  // until a run has ended
+  std::unique_ptr<Executor> executor_;
+  const ActiveJobs::Capacity capacity_;
+};
+
+}  // namespace carillon
