@@ -1,15 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <fcntl.h>
 #include <google/protobuf/io/zero_copy_stream_impl.h>
 #include <google/protobuf/util/delimited_message_util.h>
 #include <signal.h>
-#include <spawn.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <array>
 #include <atomic>
-#include <cerrno>
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
@@ -22,6 +18,7 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
 #include "client_sdk/cli/commands.h"
+#include "proto/cpp/child_process.h"
 #include "proto/cpp/error_reason.h"
 
 namespace carillon::cli {
@@ -29,7 +26,6 @@ namespace {
 
 using std::chrono::steady_clock;
 
-constexpr int kEventDescriptor = 3;
 constexpr int kSignalled = 128;  // what a shell adds to the number of a signal
 constexpr int kNotFound = 127;   // as a shell has it
 constexpr auto kPatience = std::chrono::minutes(10);
@@ -79,35 +75,12 @@ absl::Status Patiently(const StopSignal& stop, const std::function<absl::Status(
   }
 }
 
-/// Starts the command in the folder, with `events` as its descriptor 3; -1 where it cannot.
-pid_t Spawn(const std::vector<std::string>& command, const RunFolder& folder, int events) {
-  std::vector<char*> arguments;
-  arguments.reserve(command.size() + 1);
-  for (const std::string& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
-  arguments.push_back(nullptr);
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
-  posix_spawn_file_actions_adddup2(&actions, events, kEventDescriptor);
-  posix_spawn_file_actions_addchdir_np(&actions, folder.path().c_str());
-  posix_spawnattr_t attributes;
-  posix_spawnattr_init(&attributes);
-  sigset_t none;
-  sigemptyset(&none);
-  posix_spawnattr_setsigmask(&attributes, &none);
-  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK);
-  pid_t child = -1;
-  const int error =
-      posix_spawnp(&child, arguments[0], &actions, &attributes, arguments.data(), environ);
-  posix_spawnattr_destroy(&attributes);
-  posix_spawn_file_actions_destroy(&actions);
-  return error == 0 ? child : -1;
-}
-
-/// Reads what the command reports until it ends: its error, if any; progress is passed on.
-void FollowEvents(int descriptor, v1::RunEnd& end,
+/// Reads the events of the command until it closes the pipe: keeps its error, if any, and passes
+/// progress on. A command that goes on writing after something that is no event gets SIGPIPE.
+void FollowEvents(Pipe events, v1::RunEnd& end,
                   const std::function<void(const v1::Progress&)>& on_progress) {
-  google::protobuf::io::FileInputStream in(descriptor);
+  events.CloseWriteEnd();
+  google::protobuf::io::FileInputStream in(events.read_end());
   auto reported = steady_clock::now() - kBetweenReports;
   v1::WorkerEvent event;
   bool at_end = false;
@@ -131,45 +104,44 @@ std::string HostName() {
   return gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "the node";
 }
 
-int ExitStatusOf(pid_t child) {
-  int status = 0;
-  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
-  }
-  return WIFEXITED(status) ? WEXITSTATUS(status) : kSignalled + WTERMSIG(status);
+/// The end of a run whose command could not be started.
+v1::RunEnd NotStarted(const std::string& program) {
+  v1::RunEnd end;
+  end.set_exit_status(kNotFound);
+  *end.mutable_error() =
+      ToErrorInfo(Refusal(absl::StatusCode::kFailedPrecondition, "WORKER_NOT_FOUND",
+                          absl::StrCat(program, " cannot be started on ", HostName(),
+                                       ": install it there, or name another with --precompute")));
+  return end;
 }
 
 absl::StatusOr<v1::RunEnd> RunToEnd(const std::vector<std::string>& command,
                                     const RunFolder& folder, const StopSignal& stop,
                                     const std::function<void(const v1::Progress&)>& on_progress) {
-  std::array<int, 2> ends{-1, -1};
-  const pid_t child =
-      pipe2(ends.data(), O_CLOEXEC) == 0 ? Spawn(command, folder, ends[1]) : pid_t{-1};
-  close(ends[1]);
-  v1::RunEnd end;
-  if (child < 0) {
-    close(ends[0]);
-    end.set_exit_status(kNotFound);
-    *end.mutable_error() =
-        ToErrorInfo(Refusal(absl::StatusCode::kFailedPrecondition, "WORKER_NOT_FOUND",
-                            absl::StrCat(command.front(), " cannot be started on ", HostName(),
-                                         ": install it there, or name another with --precompute")));
-    return end;
-  }
+  absl::StatusOr<Pipe> events = Pipe::Make();
+  if (!events.ok()) return NotStarted(command.front());
+  absl::StatusOr<ChildProcess> child = ChildProcess::Start({.words = command,
+                                                            .input = STDIN_FILENO,
+                                                            .errors = STDERR_FILENO,
+                                                            .events = events->write_end(),
+                                                            .folder = folder.path().string()});
+  if (!child.ok()) return NotStarted(command.front());
   std::atomic<bool> stopped = false;
   std::jthread watch([&](const std::stop_token& over) {
     while (!over.stop_requested()) {
       if (!stop.ArrivesWithin(0.1)) continue;
       stopped = true;
-      kill(child, SIGTERM);
+      child->Kill(SIGTERM);
       return;
     }
   });
-  FollowEvents(ends[0], end, on_progress);
-  close(ends[0]);
+  v1::RunEnd end;
+  FollowEvents(*std::move(events), end, on_progress);
   watch.request_stop();
   watch.join();
-  end.set_exit_status(ExitStatusOf(child));
-  // Else the end of a run that was told to stop would look like a crash.
+  const ProcessEnd ended = child->Wait();
+  end.set_exit_status(ended.exited ? ended.status : kSignalled + ended.status);
+  // A run that was told to stop must not look like a crash.
   if (stopped || stop.ArrivesWithin(0)) return Stopped();
   return end;
 }

@@ -30,11 +30,11 @@ namespace {
 
 using std::chrono::nanoseconds;
 
-// Between looks at memory and clocks while anything runs: a worker touches new memory at 1 to 2
-// GB/s, so it cannot get far beyond its limit.
+// Time between two checks of memory and clocks while a worker runs. A worker touches new memory at
+// 1 to 2 GB/s, so it cannot get far beyond its limit in between.
 constexpr int kTickMs = 100;
 
-/// One thread for what waits for the disk, in order.
+/// A thread that runs functions which wait for the disk, one after the other.
 class FileThread {
  public:
   FileThread() : thread_([this] { Work(); }) {}
@@ -50,7 +50,7 @@ class FileThread {
     ready_.release();
   }
 
-  /// Forgets what waits and returns once nothing runs. May be called again.
+  /// Drops the functions that wait and returns when none runs. May be called again.
   void End() {
     {
       MutexLock lock(&mutex_);
@@ -118,11 +118,12 @@ class LocalExecutor final : public Executor {
  private:
   void Wake() const {
     const uint64_t one = 1;
-    // Fails only when the counter is full, and then the thread is awake anyway.
+    // The write fails only if the counter is full, and then the thread is awake anyway.
     [[maybe_unused]] const ssize_t written = write(wake_, &one, sizeof one);
   }
 
-  // On the thread for files. Each run has a folder of its own: the last one's may still be there.
+  // Runs on the thread for files. Each run has a folder of its own, because the folder of the run
+  // before may still exist.
   void Prepare(const DecompositionTask& task) {
     const std::filesystem::path folder =
         options_.directory / absl::StrCat(task.digest, "-", ++folder_count_);
@@ -139,8 +140,8 @@ class LocalExecutor final : public Executor {
   void Run() {
     while (TakeCommands()) {
       Wait();
-      // All reading before any judging: where this thread was held up, what the workers wrote
-      // meanwhile counts.
+      // All events are read before any limit is enforced: if this thread was delayed, the events
+      // that came in between still count as signs of life.
       for (LocalWorker& worker : workers_) worker.Read(clock_.Monotonic());
       Enforce();
       CollectEnded();
@@ -184,9 +185,7 @@ class LocalExecutor final : public Executor {
   void Wait() const {
     std::vector<pollfd> polled = {{wake_, POLLIN, 0}};
     for (const LocalWorker& worker : workers_) {
-      const ChildProcess& process = worker.process();
-      for (const int descriptor :
-           {process.process_descriptor(), process.event_descriptor(), process.error_descriptor()}) {
+      for (const int descriptor : worker.descriptors()) {
         polled.push_back({descriptor, POLLIN, 0});  // poll ignores -1
       }
     }
@@ -197,7 +196,7 @@ class LocalExecutor final : public Executor {
     }
   }
 
-  // Where all together take too much, the youngest makes room: it has lost least.
+  // If all workers together exceed the budget, the youngest is ended, because it loses least work.
   void Enforce() {
     uint64_t total_bytes = 0;
     for (LocalWorker& worker : workers_) total_bytes += worker.Enforce(clock_.Monotonic());
@@ -238,7 +237,7 @@ class LocalExecutor final : public Executor {
   std::thread thread_;
 };
 
-// Empties the directory, which only this user may enter.
+// Makes the directory empty and readable by this user only.
 absl::Status PrepareDirectory(const std::filesystem::path& directory) {
   std::error_code error;
   std::filesystem::remove_all(directory, error);

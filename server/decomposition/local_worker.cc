@@ -22,7 +22,7 @@ using std::chrono::nanoseconds;
 constexpr size_t kReadBytes =
     256 << 10;  // at a time, so that one flooding worker does not hold all
 constexpr size_t kLogBytes = 4 << 10;
-// Far more than one event a second needs; a worker that writes more is out of its mind.
+// Far above one event a second; a worker that writes more is faulty.
 constexpr uint64_t kFreeEventBytes = 1 << 20;
 constexpr uint64_t kEventBytesPerS = 64 << 10;
 
@@ -48,12 +48,19 @@ std::string WouldNeed(uint32_t node_count) {
                       MemoryOfNodes(node_count) >> 20U, " MiB)");
 }
 
-// The log is any bytes; a message is text on one line.
+// The log may hold any bytes; a message is one line of text.
 std::string LogSentence(std::string log) {
   if (log.empty()) return "";
   std::ranges::replace_if(
       log, [](char c) { return c < ' ' || c > '~'; }, ' ');
-  return absl::StrCat("; its last words: ", log);
+  return absl::StrCat("; the end of its log: ", log);
+}
+
+absl::StatusOr<Pipe> MakePipe() {
+  absl::StatusOr<Pipe> pipe = Pipe::Make();
+  if (!pipe.ok()) return pipe.status();
+  if (absl::Status status = pipe->DoNotWait(); !status.ok()) return status;
+  return pipe;
 }
 
 }  // namespace
@@ -98,14 +105,24 @@ absl::StatusOr<LocalWorker> LocalWorker::Start(PreparedTask prepared,
   const ScratchFolder& folder = prepared.folder;
   const WorkerPlace place{program, folder / "mesh", folder / "model", share.thread_count};
   const WorkerLimits own = limits.For(prepared.task.request);
-  absl::StatusOr<ChildProcess> process = ChildProcess::Spawn(
-      WorkerCommand(prepared.task.request, prepared.task.way, place), share.processor_count);
+  absl::StatusOr<Pipe> events = MakePipe();
+  absl::StatusOr<Pipe> errors = MakePipe();
+  if (!events.ok()) return events.status();
+  if (!errors.ok()) return errors.status();
+  absl::StatusOr<ChildProcess> process =
+      ChildProcess::Start({.words = WorkerCommand(prepared.task.request, prepared.task.way, place),
+                           .errors = errors->write_end(),
+                           .events = events->write_end(),
+                           .worker_processor_count = share.processor_count});
   if (!process.ok()) return process.status();
-  return LocalWorker(std::move(prepared), *std::move(process), own, now);
+  events->CloseWriteEnd();
+  errors->CloseWriteEnd();
+  return LocalWorker(std::move(prepared), *std::move(events), *std::move(errors),
+                     *std::move(process), own, now);
 }
 
 void LocalWorker::Read(nanoseconds now) {
-  const std::string bytes = process_.ReadEvents(kReadBytes);
+  const std::string bytes = event_pipe_.Read(kReadBytes);
   event_byte_count_ += bytes.size();
   const absl::Status status =
       events_.Feed(bytes, [&](const v1::WorkerEvent& event) { OnEvent(event, now); });
@@ -117,7 +134,7 @@ void LocalWorker::Read(nanoseconds now) {
                                   "the decomposing process floods its event pipe: this is a fault "
                                   "in it; report it with the mesh"));
   }
-  log_ += process_.ReadErrors(kReadBytes);
+  log_ += error_pipe_.Read(kReadBytes);
   if (log_.size() > kLogBytes) log_.erase(0, log_.size() - kLogBytes);
 }
 
@@ -179,7 +196,7 @@ void LocalWorker::Kill(Verdict verdict, v1::ErrorInfo error) {
 std::optional<Outcome> LocalWorker::TakeOutcome(nanoseconds now) {
   const std::optional<ProcessEnd> end = process_.Reap();
   if (!end.has_value()) return std::nullopt;
-  Read(now);  // its last words
+  Read(now);  // the output before its end
   Outcome outcome = Judge(*end);
   outcome.peak_bytes = peak_bytes_;
   return outcome;
@@ -194,7 +211,7 @@ Outcome LocalWorker::Judge(const ProcessEnd& end) const {
 
 Outcome LocalWorker::JudgeFailure(const ProcessEnd& end) const {
   if (!end.exited && end.status == SIGKILL) {
-    // Not by us: this is what the kernel does when memory runs out.
+    // This class did not kill it, so the kernel did, for lack of memory.
     return {Verdict::kOutOfMemory,
             OutOfMemory(absl::StrCat("was killed by the system", WouldNeed(node_count_))),
             {}};

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
@@ -10,7 +11,7 @@
 
 #include "absl/status/statusor.h"
 #include "carillon/v1/decomposition.pb.h"
-#include "server/decomposition/child_process.h"
+#include "proto/cpp/child_process.h"
 #include "server/decomposition/executor.h"
 #include "server/decomposition/worker_events.h"
 
@@ -30,25 +31,25 @@ class ScratchFolder {
   std::filesystem::path path_;
 };
 
-/// What a worker may use before it is killed.
+/// Limits beyond which a worker is killed.
 struct WorkerLimits {
   uint64_t memory_bytes = 0;
   std::chrono::nanoseconds time{};
   std::chrono::nanoseconds stall{};
 
-  /// These, or what the request wants where that is less.
+  /// These limits, each lowered to the one of the request if that is less.
   WorkerLimits For(const v1::CreateModalModelRequest& request) const;
 };
 
-/// What of the processors a worker gets.
+/// The share of the processors that a worker gets.
 struct WorkerShare {
   int thread_count = 1;
-  int processor_count = 1;  ///< the last so many of the machine, shared by all workers
+  int processor_count = 1;  ///< shared by all workers; see ChildCommand
 };
 
 /// A task with its mesh in a folder of its own, ready to be started.
 struct PreparedTask {
-  /// Makes the folder `path` and brings the mesh there.
+  /// Makes the folder `path` and writes the mesh into it.
   /// Errors: those of write_mesh, FailedPrecondition (DATABASE_UNUSABLE).
   static absl::StatusOr<PreparedTask> Make(DecompositionTask task,
                                            const std::filesystem::path& path);
@@ -57,37 +58,44 @@ struct PreparedTask {
   ScratchFolder folder;
 };
 
-/// One running decomposition: its process, what it has said, and the verdict over it. Its
-/// destruction kills what still runs and removes the folder. One thread.
+/// One running decomposition: its process, its events and the verdict on it. The destructor kills
+/// the process and removes the folder. One thread at a time.
 class LocalWorker {
  public:
-  /// Starts the program. Errors: those of ChildProcess::Spawn.
+  /// Starts the program. Errors: those of ChildProcess::Start.
   static absl::StatusOr<LocalWorker> Start(PreparedTask prepared,
                                            const std::filesystem::path& program,
                                            const WorkerShare& share, const WorkerLimits& limits,
                                            std::chrono::nanoseconds now);
   const DecompositionTask& task() const { return task_; }
-  const ChildProcess& process() const { return process_; }
 
-  /// Takes in what the process has written; an event counts as a sign of life at `now`.
+  /// Each becomes readable when there is something to do: the process has ended, or Read finds an
+  /// event or a line of its log. -1: no more of that comes.
+  std::array<int, 3> descriptors() const {
+    return {process_.descriptor(), event_pipe_.read_end(), error_pipe_.read_end()};
+  }
+
+  /// Reads the output of the process; an event counts as a sign of life at `now`.
   void Read(std::chrono::nanoseconds now);
 
-  /// Kills the process where it has used up a limit. Returns its memory in RAM, bytes.
+  /// Kills the process if it exceeds a limit. Returns its memory in RAM, bytes.
   uint64_t Enforce(std::chrono::nanoseconds now);
 
   void Cancel() { Kill(Verdict::kCancelled, {}); }
 
-  /// Kills the process because all workers together take more than `budget_bytes`.
+  /// Kills the process because all workers together exceed `budget_bytes`.
   void MakeRoom(uint64_t budget_bytes);
 
   /// The outcome, once the process has ended.
   std::optional<Outcome> TakeOutcome(std::chrono::nanoseconds now);
 
  private:
-  LocalWorker(PreparedTask prepared, ChildProcess process, const WorkerLimits& limits,
-              std::chrono::nanoseconds now)
+  LocalWorker(PreparedTask prepared, Pipe events, Pipe errors, ChildProcess process,
+              const WorkerLimits& limits, std::chrono::nanoseconds now)
       : task_(std::move(prepared.task)),
         folder_(std::move(prepared.folder)),
+        event_pipe_(std::move(events)),
+        error_pipe_(std::move(errors)),
         process_(std::move(process)),
         limits_(limits),
         started_(now),
@@ -100,7 +108,9 @@ class LocalWorker {
   Outcome JudgeFailure(const ProcessEnd& end) const;
 
   DecompositionTask task_;
-  ScratchFolder folder_;  // before the process, so that it goes after it
+  ScratchFolder folder_;  // destroyed after the process
+  Pipe event_pipe_;
+  Pipe error_pipe_;
   ChildProcess process_;
   WorkerLimits limits_;
   uint64_t peak_bytes_ = 0;
@@ -109,10 +119,10 @@ class LocalWorker {
   std::chrono::nanoseconds last_event_;
   WorkerEventReader events_;
   uint64_t event_byte_count_ = 0;
-  std::string log_;  // the end of what it wrote to its standard error
+  std::string log_;  // the end of its standard error
   double fraction_ = 0;
   std::optional<v1::ErrorInfo> reported_;  // by the worker itself
-  std::optional<Outcome> killed_;          // by us, and why
+  std::optional<Outcome> killed_;          // the outcome if this class killed it
 };
 
 }  // namespace carillon
