@@ -2,6 +2,7 @@
 #include "server/scene/contact_forces.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace carillon {
@@ -10,16 +11,13 @@ namespace {
 /// After the last force one knot brings it down to zero, and one ends the slope.
 constexpr int kKnotsToEnd = 2;
 
-Excitation Scaled(Excitation excitation, double factor) {
-  for (float& component : excitation.impulse_newton_seconds) {
-    component *= static_cast<float>(factor);
-  }
-  return excitation;
+std::array<float, 3> Scaled(std::array<float, 3> vector, double factor) {
+  for (float& component : vector) component *= static_cast<float>(factor);
+  return vector;
 }
 
-double Magnitude(const Excitation& excitation) {
-  const auto& [x, y, z] = excitation.impulse_newton_seconds;
-  return std::hypot(double{x}, double{y}, double{z});
+double Magnitude(const std::array<float, 3>& vector) {
+  return std::hypot(double{vector[0]}, double{vector[1]}, double{vector[2]});
 }
 
 }  // namespace
@@ -40,8 +38,15 @@ void ContactForces::Begin(double time_s, Push push) {
 
 void ContactForces::Add(const FeltContact& force, const Roughness& roughness) {
   for (const Felt& felt : force.all()) {
-    objects_[felt.handle].forces.push_back({felt.excitation, roughness});
+    Add(felt, 1, roughness);
   }
+}
+
+void ContactForces::Add(const Felt& felt, double per_second, const Roughness& roughness) {
+  const SurfaceForce force{
+      .at = felt.impulse.at,
+      .force_newtons = Scaled(felt.impulse.impulse_newton_seconds, per_second)};
+  objects_[felt.handle].forces.push_back({force, roughness});
 }
 
 void ContactForces::Touch(const ObjectTouch& touch, const FeltContact& impulse) {
@@ -53,9 +58,9 @@ void ContactForces::End(Push push) {
   std::erase_if(pairs_, [](const auto& pair) { return pair.second.load.idle(); });
   for (auto& [handle, object] : objects_) {
     for (const Force& force : object.forces) {
-      push(handle, {.kind = StrikeKind::kForce, .excitation = force.excitation}, *time_s_);
+      push(handle, force.force, *time_s_);
     }
-    push(handle, {.kind = StrikeKind::kKnot, .knot = Tie(object.forces, step_s_)}, *time_s_);
+    push(handle, Tie(object.forces, step_s_), *time_s_);
     object.steps_without = object.forces.empty() ? object.steps_without + 1 : 0;
     object.forces.clear();
   }
@@ -65,23 +70,27 @@ void ContactForces::End(Push push) {
 
 void ContactForces::Divide(Pair& pair, Push push) {
   double impulse = 0;
-  for (const PairTouch& touch : pair.touches) impulse += Magnitude(touch.impulse.by[0].excitation);
+  for (const PairTouch& touch : pair.touches) {
+    impulse += Magnitude(touch.impulse.by[0].impulse.impulse_newton_seconds);
+  }
   const double blow = pair.load.Next(impulse, step_s_);
   for (const PairTouch& touch : pair.touches) {
-    FeltContact load = touch.impulse;
-    for (Felt& felt : std::span(load.by).first(load.count)) {
-      if (blow > 0) push(felt.handle, {.excitation = Scaled(felt.excitation, blow)}, *time_s_);
-      felt.excitation = Scaled(felt.excitation, (1 - blow) / step_s_);
+    for (const Felt& felt : touch.impulse.all()) {
+      if (blow > 0) {
+        SurfaceImpulse part = felt.impulse;
+        part.impulse_newton_seconds = Scaled(part.impulse_newton_seconds, blow);
+        push(felt.handle, part, *time_s_);
+      }
+      Add(felt, (1 - blow) / step_s_, touch.roughness);
     }
-    Add(load, touch.roughness);
   }
   pair.touches.clear();
 }
 
 ForceKnot ContactForces::Tie(const std::vector<Force>& forces, double step_s) {
   double load = 0, fluctuation = 0, bandwidth = 0;
-  for (const auto& [excitation, roughness] : forces) {
-    const double share = Magnitude(excitation);
+  for (const auto& [force, roughness] : forces) {
+    const double share = Magnitude(force.force_newtons);
     const bool travels = roughness.travel_speed_m_per_s > 0;
     load += share;
     fluctuation += travels ? share * roughness.depth : 0;

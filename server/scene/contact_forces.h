@@ -11,7 +11,7 @@
 #include "server/excitation/contact.h"
 #include "server/excitation/load_tracker.h"
 #include "server/scene/sounding_object.h"
-#include "server/synthesis/schedule/strike.h"
+#include "server/synthesis/schedule/mixer_event.h"
 
 namespace carillon {
 
@@ -37,8 +37,9 @@ struct ObjectTouch {
 /// thread at a time.
 class ContactForces {
  public:
-  /// A strike without bank and time, and its simulation time.
-  using Push = absl::FunctionRef<void(uint32_t handle, Strike strike, double time_s)>;
+  /// Takes what happens to an object at a simulation time.
+  using Push =
+      absl::FunctionRef<void(uint32_t handle, const MixerEvent::Action& action, double time_s)>;
 
   /// `step_s`: the simulator's step, seconds.
   explicit ContactForces(double step_s) : nominal_step_s_(step_s) {}
@@ -47,7 +48,7 @@ class ContactForces {
   /// forces ended there.
   void Begin(double time_s, Push push);
 
-  /// A force of this step, N.
+  /// A force of this step, in newtons where the contact says newton seconds.
   void Add(const FeltContact& force, const Roughness& roughness);
 
   /// A contact of this step that is a blow or a load, N s.
@@ -58,7 +59,7 @@ class ContactForces {
 
  private:
   struct Force {
-    Excitation excitation;
+    SurfaceForce force;
     Roughness roughness;
   };
   struct Object {
@@ -74,6 +75,8 @@ class ContactForces {
     std::vector<PairTouch> touches;  // of this step
   };
 
+  /// Adds an impulse times `per_second` as a force of this step.
+  void Add(const Felt& felt, double per_second, const Roughness& roughness);
   void Divide(Pair& pair, Push push);
   static ForceKnot Tie(const std::vector<Force>& forces, double step_s);
 

@@ -42,18 +42,18 @@ absl::StatusOr<std::unique_ptr<ContactStream>> ContactStream::Make(
     std::shared_ptr<Scene> scene, Mixer& mixer, const ContactStreamSettings& settings) {
   const absl::StatusOr<double> delay_s = SchedulingDelay(settings, mixer);
   if (!delay_s.ok()) return delay_s.status();
-  absl::StatusOr<std::unique_ptr<StrikeStream>> strikes = mixer.OpenStream(kQueueCapacity);
-  if (!strikes.ok()) return strikes.status();
+  absl::StatusOr<std::unique_ptr<EventStream>> events = mixer.OpenStream(kQueueCapacity);
+  if (!events.ok()) return events.status();
   return std::unique_ptr<ContactStream>(
-      new ContactStream(std::move(scene), mixer, settings.step_s, *delay_s, *std::move(strikes)));
+      new ContactStream(std::move(scene), mixer, settings.step_s, *delay_s, *std::move(events)));
 }
 
 ContactStream::ContactStream(std::shared_ptr<Scene> scene, Mixer& mixer, double step_s,
-                             double scheduling_delay_s, std::unique_ptr<StrikeStream> strikes)
+                             double scheduling_delay_s, std::unique_ptr<EventStream> events)
     : scene_(std::move(scene)),
       mixer_(mixer),
       mapping_{.delay_s = scheduling_delay_s},
-      strikes_(std::move(strikes)),
+      events_(std::move(events)),
       forces_(step_s),
       pose_times_(step_s) {}
 
@@ -107,7 +107,7 @@ void ContactStream::Move(uint32_t handle, const Pose& pose) {
   absl::Status status = scene_->Move(handle, pose, [&](const SoundingObject& object) {
     if (object.voice == nullptr) return;
     const double glide_s = pose_times_.GlideS(handle, time_s_);
-    Push(MakeMove(StrikeKind::kMove, object.bank, pose, glide_s * mixer_.settings().sample_rate_hz),
+    Push(object.bank, ObjectMove{MotionTo(pose, glide_s * mixer_.settings().sample_rate_hz)},
          FrameOf(time_s_ - glide_s));
   });
   if (!status.ok()) Reject(1, std::move(status));
@@ -117,8 +117,7 @@ void ContactStream::MoveListener(const Pose& pose) {
   if (absl::Status status = Validate(pose); !status.ok()) return Reject(1, std::move(status));
   const double glide_s = pose_times_.GlideS(std::nullopt, time_s_);
   absl::Status status = scene_->MoveListener(pose, [&](const SoundingObject& object) {
-    Push(MakeMove(StrikeKind::kMoveListener, object.bank, pose,
-                  glide_s * mixer_.settings().sample_rate_hz),
+    Push(object.bank, ListenerMove{MotionTo(pose, glide_s * mixer_.settings().sample_rate_hz)},
          FrameOf(time_s_ - glide_s));
   });
   if (!status.ok()) Reject(1, std::move(status));
@@ -128,13 +127,12 @@ void ContactStream::EndStep() {
   forces_.End([this](auto... force) { PushForce(force...); });
 }
 
-void ContactStream::PushForce(uint32_t handle, carillon::Strike strike, double time_s) {
+void ContactStream::PushForce(uint32_t handle, const MixerEvent::Action& action, double time_s) {
   // An object that has gone meanwhile feels nothing more.
   scene_
       ->Use(handle,
             [&](const SoundingObject& object) {
-              strike.bank = object.bank;
-              Push(strike, FrameOf(time_s));
+              Push(object.bank, action, FrameOf(time_s));
               return absl::OkStatus();
             })
       .IgnoreError();
@@ -162,15 +160,16 @@ absl::Status ContactStream::TryStrike(const ObjectImpulse& impulse) {
   if (!frame.ok()) return frame.status();
   return Locate(impulse.handle, impulse.impulse, impulse.second, [&](const FeltContact& contact) {
     for (const Felt& felt : contact.all()) {
-      Push({.bank = felt.bank, .excitation = felt.excitation}, *frame);
+      Push(felt.bank, felt.impulse, *frame);
     }
   });
 }
 
-void ContactStream::Push(carillon::Strike strike, double frame) {
-  SetFrame(strike, frame);
-  if (strike.kind == StrikeKind::kImpulse) ++pushed_count_;
-  strikes_->TryPush(strike);  // a full queue is counted by the mixer
+void ContactStream::Push(BankId bank, const MixerEvent::Action& action, double frame) {
+  MixerEvent event{.bank = bank, .action = action};
+  SetFrame(event, frame);
+  if (event.impulse() != nullptr) ++pushed_count_;
+  events_->TryPush(event);  // a full queue is counted by the mixer
 }
 
 absl::StatusOr<double> ContactStream::FrameAt(double time_s) const {
@@ -196,9 +195,9 @@ double ContactStream::FrameOf(double time_s) const {
 
 ContactCounts ContactStream::counts() const {
   return {.step_count = step_count_,
-          .accepted_count = strikes_->accepted_count(),
-          .late_count = strikes_->late_count(),
-          .dropped_count = strikes_->dropped_count(),
+          .accepted_count = events_->accepted_count(),
+          .late_count = events_->late_count(),
+          .dropped_count = events_->dropped_count(),
           .rejected_count = rejected_count_};
 }
 

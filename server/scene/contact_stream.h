@@ -97,21 +97,21 @@ class ContactStream {
 
  private:
   ContactStream(std::shared_ptr<Scene> scene, Mixer& mixer, double step_s,
-                double scheduling_delay_s, std::unique_ptr<StrikeStream> strikes);
+                double scheduling_delay_s, std::unique_ptr<EventStream> events);
 
   absl::Status TryStrike(const ObjectImpulse& impulse);
   absl::Status Locate(uint32_t handle, const ContactImpulse& contact,
                       const std::optional<SecondObject>& second,
                       absl::FunctionRef<void(const FeltContact&)> use) const;
-  void Push(carillon::Strike strike, double frame);
-  void PushForce(uint32_t handle, carillon::Strike strike, double time_s);
+  void Push(BankId bank, const MixerEvent::Action& action, double frame);
+  void PushForce(uint32_t handle, const MixerEvent::Action& action, double time_s);
   absl::StatusOr<double> FrameAt(double time_s) const;
   double FrameOf(double time_s) const;
 
   std::shared_ptr<Scene> scene_;
   Mixer& mixer_;
   TimeMapping mapping_;
-  std::unique_ptr<StrikeStream> strikes_;
+  std::unique_ptr<EventStream> events_;
   double time_s_ = 0;
   ContactForces forces_;
   PoseTimes pose_times_;

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "server/synthesis/schedule/strike.h"
+#include "server/synthesis/schedule/mixer_event.h"
 
 namespace carillon {
 
@@ -20,12 +20,12 @@ struct TimeMapping {
   }
 };
 
-/// Sets the time of `strike`: `frames`, zero or more, since the mixer began.
-inline void SetFrame(Strike& strike, double frames) {
+/// Sets the time of `event`: `frames`, zero or more, since the mixer began.
+inline void SetFrame(MixerEvent& event, double frames) {
   const double whole = std::floor(frames);
-  strike.frame = static_cast<uint64_t>(whole);
+  event.frame = static_cast<uint64_t>(whole);
   // The cast may round 1 - 1e-9 up to 1.
-  strike.fraction = std::fmin(static_cast<float>(frames - whole), 0x1.fffffep-1F);
+  event.fraction = std::fmin(static_cast<float>(frames - whole), 0x1.fffffep-1F);
 }
 
 }  // namespace carillon

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <utility>
+#include <variant>
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
@@ -24,22 +25,20 @@ constexpr double kQuietS = 0.25;
 constexpr size_t kQueueCapacity = 65536;
 
 MixerSettings SettingsOf(const OfflineSettings& settings, SectionCrew& crew) {
-  // Nothing waits here, so a block takes however many strikes fall into it.
+  // Nothing waits here, so a block takes however many events fall into it.
   return {.sample_rate_hz = static_cast<double>(settings.sample_rate_hz),
           .block_frame_count = OfflineRenderer::kBlockFrameCount,
           .channel_count = settings.channel_count,
           .first_frame = settings.mapping.first_frame,
           .most_streams = 1,
-          .most_pending_strikes = kQueueCapacity,
-          .most_strikes_per_block = kQueueCapacity,
+          .most_pending_events = kQueueCapacity,
+          .most_events_per_block = kQueueCapacity,
           .crew = &crew};
 }
 
-/// Strikes of one sample keep their order, as when they come live.
-bool Earlier(const Strike& a, const Strike& b) { return FirstSample(a) < FirstSample(b); }
-
-bool IsMove(const Strike& strike) {
-  return strike.kind == StrikeKind::kMove || strike.kind == StrikeKind::kMoveListener;
+bool IsMove(const MixerEvent& event) {
+  return std::holds_alternative<ObjectMove>(event.action) ||
+         std::holds_alternative<ListenerMove>(event.action);
 }
 
 }  // namespace
@@ -63,8 +62,7 @@ absl::StatusOr<std::unique_ptr<OfflineRenderer>> OfflineRenderer::Make(
   }
   if (absl::Status status = Validate(settings.space); !status.ok()) return status;
   std::unique_ptr<OfflineRenderer> renderer(new OfflineRenderer(settings, bodies));
-  absl::StatusOr<std::unique_ptr<StrikeStream>> stream =
-      renderer->mixer_.OpenStream(kQueueCapacity);
+  absl::StatusOr<std::unique_ptr<EventStream>> stream = renderer->mixer_.OpenStream(kQueueCapacity);
   if (!stream.ok()) return stream.status();
   renderer->stream_ = *std::move(stream);
   return renderer;
@@ -108,7 +106,7 @@ absl::Status OfflineRenderer::TryStrike(const ObjectImpulse& impulse) {
       Locate(impulse.handle, impulse.impulse, impulse.second);
   if (!contact.ok()) return contact.status();
   for (const Felt& felt : contact->all()) {
-    Push({.bank = felt.bank, .excitation = felt.excitation}, due_s);
+    Push(felt.bank, felt.impulse, due_s);
   }
   return absl::OkStatus();
 }
@@ -137,7 +135,7 @@ void OfflineRenderer::Move(uint32_t handle, const Pose& pose) {
   object.properties.pose = pose;
   if (object.voice == nullptr) return;
   const double glide_s = pose_times_.GlideS(handle, step_time_s_);
-  Push(MakeMove(StrikeKind::kMove, object.bank, pose, glide_s * settings_.sample_rate_hz),
+  Push(object.bank, ObjectMove{MotionTo(pose, glide_s * settings_.sample_rate_hz)},
        step_time_s_ - glide_s);
 }
 
@@ -146,7 +144,7 @@ void OfflineRenderer::MoveListener(const Pose& pose) {
   const double glide_s = pose_times_.GlideS(std::nullopt, step_time_s_);
   for (const auto& [handle, object] : objects_) {
     if (object.voice == nullptr) continue;
-    Push(MakeMove(StrikeKind::kMoveListener, object.bank, pose, glide_s * settings_.sample_rate_hz),
+    Push(object.bank, ListenerMove{MotionTo(pose, glide_s * settings_.sample_rate_hz)},
          step_time_s_ - glide_s);
   }
 }
@@ -155,9 +153,8 @@ void OfflineRenderer::EndStep() {
   forces_.End([this](auto... force) { PushForce(force...); });
 }
 
-void OfflineRenderer::PushForce(uint32_t handle, carillon::Strike strike, double time_s) {
-  strike.bank = objects_.at(handle).bank;
-  Push(strike, time_s);
+void OfflineRenderer::PushForce(uint32_t handle, const MixerEvent::Action& action, double time_s) {
+  Push(objects_.at(handle).bank, action, time_s);
 }
 
 absl::StatusOr<FeltContact> OfflineRenderer::Locate(
@@ -172,16 +169,18 @@ absl::StatusOr<FeltContact> OfflineRenderer::Locate(
                 : Feel(contact, handle, found->second);
 }
 
-void OfflineRenderer::Push(carillon::Strike strike, double time_s) {
-  SetFrame(strike, settings_.mapping.FrameOf(time_s, settings_.sample_rate_hz));
-  strikes_.push_back(strike);
+void OfflineRenderer::Push(BankId bank, const MixerEvent::Action& action, double time_s) {
+  MixerEvent event{.bank = bank, .action = action};
+  SetFrame(event, settings_.mapping.FrameOf(time_s, settings_.sample_rate_hz));
+  events_.push_back(event);
 }
 
 size_t OfflineRenderer::Render(std::span<float> samples) {
   if (!begun_) {
-    std::ranges::stable_sort(strikes_, Earlier);
-    const auto last = std::find_if_not(strikes_.rbegin(), strikes_.rend(), IsMove);
-    contact_count_ = static_cast<size_t>(strikes_.rend() - last);
+    // Events of one sample keep their order, as when they come live.
+    std::ranges::stable_sort(events_, {}, &MixerEvent::FirstSample);
+    const auto last = std::find_if_not(events_.rbegin(), events_.rend(), IsMove);
+    contact_count_ = static_cast<size_t>(events_.rend() - last);
   }
   begun_ = true;
   const FlushDenormals flush;
@@ -199,7 +198,7 @@ size_t OfflineRenderer::RenderBlocks(std::span<float> samples) {
   samples = samples.first(block_count * block_size);
   const uint64_t first = mixer_.frame();
   size_t count = block_count * kBlockFrameCount;
-  PushStrikesBefore(first + count);
+  PushEventsBefore(first + count);
   mixer_.Render(samples);
   mixer_.CollectGarbage();
   if (pushed_count_ >= contact_count_) {
@@ -226,8 +225,8 @@ size_t OfflineRenderer::CountBlocks(size_t most) const {
   const uint64_t left = EndFrame() - std::min(first, EndFrame());
   size_t count = std::min<size_t>({most, kBlocksTogether, left / kBlockFrameCount + 1});
   const size_t full = pushed_count_ + kQueueCapacity / 2;
-  while (count > 1 && full < strikes_.size() &&
-         FirstSample(strikes_[full]) < first + count * kBlockFrameCount) {
+  while (count > 1 && full < events_.size() &&
+         events_[full].FirstSample() < first + count * kBlockFrameCount) {
     --count;
   }
   return count;
@@ -235,14 +234,14 @@ size_t OfflineRenderer::CountBlocks(size_t most) const {
 
 uint64_t OfflineRenderer::EndFrame() const {
   const uint64_t last = contact_count_ == 0 ? settings_.mapping.first_frame
-                                            : FirstSample(strikes_[contact_count_ - 1]);
+                                            : events_[contact_count_ - 1].FirstSample();
   const double tail_s = settings_.tail_s > 0 ? settings_.tail_s : kLongestOpenTailS;
   return last + static_cast<uint64_t>(std::ceil(tail_s * settings_.sample_rate_hz));
 }
 
-void OfflineRenderer::PushStrikesBefore(uint64_t frame) {
-  while (pushed_count_ < strikes_.size() && FirstSample(strikes_[pushed_count_]) < frame) {
-    if (!stream_->TryPush(strikes_[pushed_count_])) Reject(1);
+void OfflineRenderer::PushEventsBefore(uint64_t frame) {
+  while (pushed_count_ < events_.size() && events_[pushed_count_].FirstSample() < frame) {
+    if (!stream_->TryPush(events_[pushed_count_])) Reject(1);
     ++pushed_count_;
   }
 }

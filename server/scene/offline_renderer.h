@@ -99,9 +99,9 @@ class OfflineRenderer {
   absl::Status TryStrike(const ObjectImpulse& impulse);
   absl::StatusOr<FeltContact> Locate(uint32_t handle, const ContactImpulse& contact,
                                      const std::optional<SecondObject>& second) const;
-  void Push(carillon::Strike strike, double time_s);
-  void PushForce(uint32_t handle, carillon::Strike strike, double time_s);
-  void PushStrikesBefore(uint64_t frame);
+  void Push(BankId bank, const MixerEvent::Action& action, double time_s);
+  void PushForce(uint32_t handle, const MixerEvent::Action& action, double time_s);
+  void PushEventsBefore(uint64_t frame);
   size_t RenderBlocks(std::span<float> samples);
   size_t CountBlocks(size_t most) const;
   uint64_t EndFrame() const;
@@ -112,14 +112,14 @@ class OfflineRenderer {
   BodyCache& bodies_;
   RenderCrew crew_;
   Mixer mixer_;
-  std::unique_ptr<StrikeStream> stream_;
+  std::unique_ptr<EventStream> stream_;
   std::map<uint32_t, SoundingObject> objects_;
-  std::vector<carillon::Strike> strikes_;  // in order of time once rendering has begun
+  std::vector<MixerEvent> events_;  // in order of time once rendering has begun
   ContactForces forces_;
   PoseTimes pose_times_;
   double step_time_s_ = 0;
   size_t pushed_count_ = 0;
-  size_t contact_count_ = 0;  // of the strikes up to the last that is no move
+  size_t contact_count_ = 0;  // events up to the last that is no move
   uint64_t quiet_frame_count_ = 0;
   bool begun_ = false;
   bool ended_ = false;

@@ -107,7 +107,7 @@ absl::StatusOr<PlacedObject> SceneRegistry::UpdateObject(uint64_t scene, uint32_
     (*found)
         ->Move(handle, *change.pose,
                [&](const SoundingObject& object) ABSL_EXCLUSIVE_LOCKS_REQUIRED(change_mutex_) {
-                 SendMove(StrikeKind::kMove, object, *change.pose, change.glide_s);
+                 SendMove(object, ObjectMove{MotionOf(*change.pose, change.glide_s)});
                })
         .IgnoreError();
   }
@@ -124,23 +124,25 @@ absl::Status SceneRegistry::UpdateListener(uint64_t scene, const Pose& pose, dou
   if (absl::Status status = OpenMoves(); !status.ok()) return status;
   return (*found)->MoveListener(
       pose, [&](const SoundingObject& object) ABSL_EXCLUSIVE_LOCKS_REQUIRED(change_mutex_) {
-        SendMove(StrikeKind::kMoveListener, object, pose, glide_s);
+        SendMove(object, ListenerMove{MotionOf(pose, glide_s)});
       });
 }
 
 absl::Status SceneRegistry::OpenMoves() {
   if (moves_ != nullptr) return absl::OkStatus();
-  absl::StatusOr<std::unique_ptr<StrikeStream>> moves = mixer_.OpenStream(kMaxObjectCount);
+  absl::StatusOr<std::unique_ptr<EventStream>> moves = mixer_.OpenStream(kMaxObjectCount);
   if (!moves.ok()) return moves.status();
   moves_ = *std::move(moves);
   return absl::OkStatus();
 }
 
 /// Of time zero: it comes at once.
-void SceneRegistry::SendMove(StrikeKind kind, const SoundingObject& object, const Pose& pose,
-                             double glide_s) {
-  if (object.voice == nullptr) return;
-  moves_->TryPush(MakeMove(kind, object.bank, pose, glide_s * mixer_.settings().sample_rate_hz));
+void SceneRegistry::SendMove(const SoundingObject& object, const MixerEvent::Action& move) {
+  if (object.voice != nullptr) moves_->TryPush({.bank = object.bank, .action = move});
+}
+
+Motion SceneRegistry::MotionOf(const Pose& pose, double glide_s) const {
+  return MotionTo(pose, glide_s * mixer_.settings().sample_rate_hz);
 }
 
 absl::Status SceneRegistry::RemoveObject(uint64_t scene, uint32_t handle) {

@@ -78,8 +78,9 @@ class SceneRegistry {
  private:
   absl::StatusOr<std::shared_ptr<Scene>> FindScene(uint64_t scene) const;
   absl::Status OpenMoves() ABSL_EXCLUSIVE_LOCKS_REQUIRED(change_mutex_);
-  void SendMove(StrikeKind kind, const SoundingObject& object, const Pose& pose, double glide_s)
+  void SendMove(const SoundingObject& object, const MixerEvent::Action& move)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(change_mutex_);
+  Motion MotionOf(const Pose& pose, double glide_s) const;
 
   Mixer& mixer_;
   BodyCache bodies_;
@@ -87,7 +88,7 @@ class SceneRegistry {
   /// do not undo each other. Contacts do not take it.
   Mutex change_mutex_;
   /// For moves that no contact stream brings; opened when there is one.
-  std::unique_ptr<StrikeStream> moves_ ABSL_GUARDED_BY(change_mutex_);
+  std::unique_ptr<EventStream> moves_ ABSL_GUARDED_BY(change_mutex_);
   mutable Mutex mutex_ ABSL_ACQUIRED_AFTER(change_mutex_);
   std::map<uint64_t, std::shared_ptr<Scene>> scenes_ ABSL_GUARDED_BY(mutex_);
   uint64_t next_scene_ ABSL_GUARDED_BY(mutex_) = 1;

@@ -39,13 +39,13 @@ std::shared_ptr<Voice> MakeVoice(const SceneSpace& space, const std::optional<Po
                                  PlaceOf(pose.value_or(Pose())), PlaceOf(space.listener));
 }
 
-Strike MakeMove(StrikeKind kind, BankId bank, const Pose& pose, double glide_frames) {
+Motion MotionTo(const Pose& pose, double glide_frames) {
   const Place place = PlaceOf(pose);
   Motion motion{.glide_frames = static_cast<float>(glide_frames)};
   const auto narrow = [](double x) { return static_cast<float>(x); };
   std::ranges::transform(place.position_m, motion.position_m.begin(), narrow);
   std::ranges::transform(place.right, motion.right.begin(), narrow);
-  return {.bank = bank, .kind = kind, .excitation = ToExcitation(motion)};
+  return motion;
 }
 
 double PoseTimes::GlideS(std::optional<uint32_t> handle, double time_s) {

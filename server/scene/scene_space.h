@@ -26,8 +26,8 @@ absl::Status Validate(const SceneSpace& space);
 std::shared_ptr<Voice> MakeVoice(const SceneSpace& space, const std::optional<Pose>& pose,
                                  const MixerSettings& mixer);
 
-/// A move to `pose`, of an object's voice or of the listener who hears it.
-Strike MakeMove(StrikeKind kind, BankId bank, const Pose& pose, double glide_frames);
+/// The motion of an object or of the listener to `pose`.
+Motion MotionTo(const Pose& pose, double glide_frames);
 
 /// How long what moves is on its way from pose to pose: one simulation goes step by step, so at
 /// most a step.

@@ -131,8 +131,8 @@ absl::StatusOr<SoundingObject> MakeSoundingObject(std::shared_ptr<const Sounding
                         .voice = std::move(voice)};
 }
 
-absl::StatusOr<Excitation> LocateImpulse(const SoundingObject& object,
-                                         const ContactImpulse& impulse) {
+absl::StatusOr<SurfaceImpulse> LocateImpulse(const SoundingObject& object,
+                                             const ContactImpulse& impulse) {
   if (absl::Status status = Validate(impulse); !status.ok()) return status;
   const SurfaceLocator& locator = *object.body->locator;
   absl::StatusOr<LocatedPoint> located = absl::UnknownError("");
@@ -144,20 +144,20 @@ absl::StatusOr<Excitation> LocateImpulse(const SoundingObject& object,
     located = locator.Nearest(point);
   }
   if (!located.ok()) return located.status();
-  Excitation excitation{.vertices = located->vertices,
-                        .tau_s = static_cast<float>(GaussianTauS(DurationS(object, impulse)))};
-  std::ranges::transform(located->weights, excitation.weights.begin(),
+  SurfaceImpulse felt{.at = {.vertices = located->vertices},
+                      .tau_s = static_cast<float>(GaussianTauS(DurationS(object, impulse)))};
+  std::ranges::transform(located->weights, felt.at.weights.begin(),
                          [](double weight) { return static_cast<float>(weight); });
-  std::ranges::transform(impulse.impulse_newton_seconds, excitation.impulse_newton_seconds.begin(),
+  std::ranges::transform(impulse.impulse_newton_seconds, felt.impulse_newton_seconds.begin(),
                          [](double component) { return static_cast<float>(component); });
-  return excitation;
+  return felt;
 }
 
 absl::StatusOr<FeltContact> Feel(const ContactImpulse& impulse, uint32_t handle,
                                  const SoundingObject& object) {
-  const absl::StatusOr<Excitation> excitation = LocateImpulse(object, impulse);
-  if (!excitation.ok()) return excitation.status();
-  return FeltContact{.by = {Felt{handle, object.bank, *excitation}}, .count = 1};
+  const absl::StatusOr<SurfaceImpulse> felt = LocateImpulse(object, impulse);
+  if (!felt.ok()) return felt.status();
+  return FeltContact{.by = {Felt{handle, object.bank, *felt}}, .count = 1};
 }
 
 absl::StatusOr<FeltContact> Feel(const ContactImpulse& impulse, uint32_t handle,
@@ -170,10 +170,10 @@ absl::StatusOr<FeltContact> Feel(const ContactImpulse& impulse, uint32_t handle,
   ContactImpulse opposite{.location = contact.location};
   const Vector3 turned = Rotated(impulse.impulse_newton_seconds, Normalized(rotation));
   std::ranges::transform(turned, opposite.impulse_newton_seconds.begin(), std::negate());
-  const absl::StatusOr<Excitation> answered = LocateImpulse(second, opposite);
+  const absl::StatusOr<SurfaceImpulse> answered = LocateImpulse(second, opposite);
   if (!answered.ok()) return answered.status();
   felt->by[1] = {contact.handle, second.bank, *answered};
-  felt->by[1].excitation.tau_s = felt->by[0].excitation.tau_s;
+  felt->by[1].impulse.tau_s = felt->by[0].impulse.tau_s;
   felt->count = 2;
   return felt;
 }

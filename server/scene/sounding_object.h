@@ -16,7 +16,7 @@
 #include "server/synthesis/bank/oscillator_bank.h"
 #include "server/synthesis/bank/sounding_modes.h"
 #include "server/synthesis/mixer.h"
-#include "server/synthesis/schedule/strike.h"
+#include "server/synthesis/schedule/mixer_event.h"
 #include "server/synthesis/voice/voice.h"
 
 namespace carillon {
@@ -62,14 +62,14 @@ absl::StatusOr<SoundingObject> MakeSoundingObject(std::shared_ptr<const Sounding
 
 /// Where and how an impulse excites `object`. Points are in metres of the object as large as it is.
 /// Errors: InvalidArgument (those of Validate and of SurfaceLocator).
-absl::StatusOr<Excitation> LocateImpulse(const SoundingObject& object,
-                                         const ContactImpulse& impulse);
+absl::StatusOr<SurfaceImpulse> LocateImpulse(const SoundingObject& object,
+                                             const ContactImpulse& impulse);
 
 /// What an object feels of a contact.
 struct Felt {
   uint32_t handle = 0;
   BankId bank{};
-  Excitation excitation{};
+  SurfaceImpulse impulse{};
 };
 
 /// What the one or two objects of a contact feel.

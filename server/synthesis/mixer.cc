@@ -48,10 +48,10 @@ void Mixer::RenderBlocks(std::span<float> frames) noexcept {
   const size_t block_count = frame_count / settings_.block_frame_count;
   budget_.Begin();
   ObeyCommands();
-  TakeStrikes(block_count);
-  CollectDueStrikes(block_count);
+  TakeEvents(block_count);
+  CollectDueEvents(block_count);
   RenderSections(frames);
-  pending_.Forget(due_);
+  pending_.Free(due_);
   RetireLeavingBanks();
   NotePeak(frames);
   Count(statistics_.limited_frame_count, limiter_.Apply(frames));
@@ -92,75 +92,69 @@ BankSlot* Mixer::FindSlot(BankId id) noexcept {
   return slot.bank != nullptr && slot.generation == id.generation ? &slot : nullptr;
 }
 
-void Mixer::TakeStrikes(size_t block_count) noexcept {
+void Mixer::TakeEvents(size_t block_count) noexcept {
   // Each block begins with another stream, so that a flood in one does not starve the rest.
   const size_t count = open_queues_.size();
   const size_t first = count == 0 ? 0 : block_start_ / settings_.block_frame_count % count;
-  size_t budget = settings_.most_strikes_per_block * block_count;
-  all_strikes_taken_ = true;
+  size_t budget = settings_.most_events_per_block * block_count;
+  all_events_taken_ = true;
   for (size_t i = 0; i < count; ++i) {
-    StrikeQueue& queue = *open_queues_[(first + i) % count];
+    EventQueue& queue = *open_queues_[(first + i) % count];
     while (budget > 0) {
       const size_t most = std::min(budget, taken_.size());
-      const size_t popped = queue.ring.PopSome(taken_.data(), most);
+      const size_t popped = queue.events.PopSome(taken_.data(), most);
       for (size_t k = 0; k < popped; ++k) Take(taken_[k], queue);
       taken_count_ += popped;
       budget -= popped;
       if (popped < most) break;
     }
   }
-  if (budget == 0) all_strikes_taken_ = false;
+  if (budget == 0) all_events_taken_ = false;
   // Asked in this order, a queue that is closed and empty stays empty.
-  open_queues_.EraseIf([this](StrikeQueue* queue) ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole) {
-    const bool done = queue->closed.load(std::memory_order_acquire) && queue->ring.empty();
+  open_queues_.EraseIf([this](EventQueue* queue) ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole) {
+    const bool done = queue->closed.load(std::memory_order_acquire) && queue->events.empty();
     if (done) SendBack({.queue = queue});
     return done;
   });
 }
 
-void Mixer::Take(const Strike& strike, StrikeQueue& queue) noexcept {
+void Mixer::Take(MixerEvent event, EventQueue& queue) noexcept {
   // A bank may have been added, and struck, since the commands of this block were obeyed.
-  if (FindSlot(strike.bank) == nullptr) {
+  if (FindSlot(event.bank) == nullptr) {
     ObeyCommands();
-    all_strikes_taken_ = false;
+    all_events_taken_ = false;
   }
-  BankSlot* slot = FindSlot(strike.bank);
-  PendingStrike pending{.sample = FirstSample(strike),
-                        .lead_frames = strike.fraction > 0 ? 1 - strike.fraction : 0,
-                        .bank = strike.bank,
-                        .kind = strike.kind,
-                        .excitation = strike.excitation,
-                        .knot = strike.knot};
-  const bool late = pending.sample < block_start_;
+  BankSlot* slot = FindSlot(event.bank);
+  const bool late = event.FirstSample() < block_start_;
   if (late) {
-    pending.sample = block_start_;
-    pending.lead_frames = 0;
+    event.frame = block_start_;
+    event.fraction = 0;
   }
   const bool known = slot != nullptr && !slot->fading;
-  const bool hopeless = known && IsHopeless(strike, pending.sample, *slot);
-  if (!known || (!hopeless && !pending_.TryPush(pending))) {
+  const bool hopeless = known && IsHopeless(event, *slot);
+  if (!known || (!hopeless && !pending_.TryPush(event))) {
     Count(queue.dropped_count);
     return Count(statistics_.dropped_count);
   }
   Count(statistics_.shed_count, hopeless ? 1 : 0);
   if (!hopeless) ++slot->pending_count;
-  if (strike.kind != StrikeKind::kImpulse) return;
+  if (event.impulse() == nullptr) return;
   Count(late ? queue.late_count : queue.accepted_count);
   Count(late ? statistics_.late_count : statistics_.accepted_count);
 }
 
 /// Far too quiet for what the last block could render, and due as soon: it is shed before it costs
 /// more.
-bool Mixer::IsHopeless(const Strike& strike, uint64_t sample, const BankSlot& slot) const noexcept {
-  return hopeless_below_ > 0 && strike.kind == StrikeKind::kImpulse &&
-         sample < block_start_ + kHopelessBlocks * settings_.block_frame_count &&
-         LoudnessOf(strike.excitation, slot) < hopeless_below_;
+bool Mixer::IsHopeless(const MixerEvent& event, const BankSlot& slot) const noexcept {
+  return hopeless_below_ > 0 && event.impulse() != nullptr &&
+         event.FirstSample() < block_start_ + kHopelessBlocks * settings_.block_frame_count &&
+         LoudnessOf(*event.impulse(), slot) < hopeless_below_;
 }
 
-void Mixer::CollectDueStrikes(size_t block_count) noexcept {
+void Mixer::CollectDueEvents(size_t block_count) noexcept {
   due_.clear();
   due_order_.clear();
-  due_strikes_.clear();
+  due_events_.clear();
   rendered_work_ = 0;
   if (budget_.bounded() && ringing_work_ > budget_.most_work()) ShedBanks();
   for (size_t block = 0; block < block_count; ++block) {
@@ -168,21 +162,21 @@ void Mixer::CollectDueStrikes(size_t block_count) noexcept {
     pending_.Collect(block_start_ + block * settings_.block_frame_count, due_);
     const std::span<const uint32_t> due = std::span(due_).subspan(first);
     if (budget_.bounded()) DecideTreatment(due);
-    ChooseStrikes(block, due);
+    ChooseEvents(block, due);
   }
   std::ranges::sort(due_order_);
   due_ends_.fill(0);
   for (const uint64_t order : due_order_) {
-    const PendingStrike& strike = pending_[due_[order & kArrivalMask]];
+    const MixerEvent& event = pending_[due_[order & kArrivalMask]];
     const auto block = static_cast<uint32_t>(order >> 52 & 0xFF);
-    const auto offset =
-        static_cast<uint32_t>(strike.sample - block_start_ - block * settings_.block_frame_count);
-    due_strikes_.push_back({.slot = strike.bank.slot,
-                            .block = block,
-                            .offset = offset,
-                            .merged = (order >> kMergedBit & 1) != 0,
-                            .strike = &strike});
-    due_ends_[order >> 60] = due_strikes_.size();
+    const auto offset = static_cast<uint32_t>(event.FirstSample() - block_start_ -
+                                              block * settings_.block_frame_count);
+    due_events_.push_back({.slot = event.bank.slot,
+                           .block = block,
+                           .offset = offset,
+                           .merged = (order >> kMergedBit & 1) != 0,
+                           .event = &event});
+    due_ends_[order >> 60] = due_events_.size();
   }
 }
 
@@ -190,12 +184,12 @@ void Mixer::CollectDueStrikes(size_t block_count) noexcept {
 void Mixer::DecideTreatment(std::span<const uint32_t> due) noexcept {
   triage_.Clear();
   for (const uint32_t index : due) {
-    const PendingStrike& strike = pending_[index];
-    BankSlot* slot = FindSlot(strike.bank);
-    if (slot == nullptr || strike.kind != StrikeKind::kImpulse) continue;
+    const MixerEvent& event = pending_[index];
+    BankSlot* slot = FindSlot(event.bank);
+    if (slot == nullptr || event.impulse() == nullptr) continue;
     const double awakening = slot->awakening ? 0 : slot->bank->awakening_work();
     slot->awakening = true;
-    triage_.Note(LoudnessOf(strike.excitation, *slot), slot->bank->strike_work() + awakening,
+    triage_.Note(LoudnessOf(*event.impulse(), *slot), slot->bank->strike_work() + awakening,
                  slot->bank->merged_strike_work() + awakening);
   }
   for (const uint32_t index : due) {
@@ -208,29 +202,29 @@ void Mixer::DecideTreatment(std::span<const uint32_t> due) noexcept {
   hopeless_below_ = triage_.shed_below() * kHopeless;
 }
 
-float Mixer::LoudnessOf(const Excitation& excitation, const BankSlot& slot) noexcept {
-  const auto& impulse = excitation.impulse_newton_seconds;
-  const float squared = impulse[0] * impulse[0] + impulse[1] * impulse[1] + impulse[2] * impulse[2];
+float Mixer::LoudnessOf(const SurfaceImpulse& impulse, const BankSlot& slot) noexcept {
+  const auto& [x, y, z] = impulse.impulse_newton_seconds;
+  const float squared = x * x + y * y + z * z;
   return slot.loudness_of_blow * std::sqrt(squared);
 }
 
 /// Puts a block's strikes in the order of rendering: by section, block, bank and time, merged ones
 /// after exact ones within kMergedFrames, then by arrival.
-void Mixer::ChooseStrikes(size_t block, std::span<const uint32_t> due) noexcept {
+void Mixer::ChooseEvents(size_t block, std::span<const uint32_t> due) noexcept {
   const uint64_t start = block_start_ + block * settings_.block_frame_count;
   auto place = static_cast<uint64_t>(due.data() - due_.data());
   for (const uint32_t index : due) {
-    const PendingStrike& strike = pending_[index];
+    const MixerEvent& event = pending_[index];
     const uint64_t arrival = place++;
-    BankSlot* slot = FindSlot(strike.bank);
+    BankSlot* slot = FindSlot(event.bank);
     if (slot == nullptr) {
       Count(statistics_.dropped_count);
       continue;
     }
     --slot->pending_count;
     Treatment treatment = Treatment::kExact;
-    if (budget_.bounded() && strike.kind == StrikeKind::kImpulse) {
-      treatment = triage_.Treat(LoudnessOf(strike.excitation, *slot));
+    if (budget_.bounded() && event.impulse() != nullptr) {
+      treatment = triage_.Treat(LoudnessOf(*event.impulse(), *slot));
     }
     if (treatment == Treatment::kShed) {
       Count(statistics_.shed_count);
@@ -238,9 +232,9 @@ void Mixer::ChooseStrikes(size_t block, std::span<const uint32_t> due) noexcept 
     }
     const uint64_t merged = treatment == Treatment::kMerged ? 1 : 0;
     Count(statistics_.merged_count, merged);
-    const uint64_t offset = strike.sample - start;
+    const uint64_t offset = event.FirstSample() - start;
     due_order_.push_back(uint64_t{slot->section} << 60 | block << 52 |
-                         uint64_t{strike.bank.slot} << 36 | offset / kMergedFrames << 30 |
+                         uint64_t{event.bank.slot} << 36 | offset / kMergedFrames << 30 |
                          merged << kMergedBit | offset % kMergedFrames << 27 | arrival);
   }
 }
@@ -270,7 +264,7 @@ void Mixer::RenderOneSection(size_t worker, size_t section, size_t frame_count) 
   const size_t begin = section == 0 ? 0 : due_ends_[section - 1];
   section_counts_[section] = sections_[section].Render(
       block_start_ / settings_.block_frame_count,
-      std::span(due_strikes_).subspan(begin, due_ends_[section] - begin),
+      std::span(due_events_).subspan(begin, due_ends_[section] - begin),
       {.frames = std::span(section_frames_).subspan(section * frame_count, frame_count),
        .placed = std::span(placed_frames_)
                      .subspan(section * frame_count * settings_.channel_count,
@@ -328,7 +322,7 @@ void Mixer::MixSections(std::span<float> frames) noexcept {
 void Mixer::RetireLeavingBanks() noexcept {
   leaving_.EraseIf([this](uint32_t index) ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole) {
     BankSlot& slot = slots_[index];
-    const bool awaited = !slot.fading && (slot.pending_count > 0 || !all_strikes_taken_);
+    const bool awaited = !slot.fading && (slot.pending_count > 0 || !all_events_taken_);
     // The last bank of a voice goes when all of its sound has arrived.
     const bool last_of_voice = slot.voice != nullptr && slot.voice->bank_count == 1;
     if (slot.sounding || awaited || (last_of_voice && !slot.voice->asleep())) return false;

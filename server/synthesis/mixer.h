@@ -22,10 +22,10 @@
 #include "server/synthesis/limiter.h"
 #include "server/synthesis/render_crew.h"
 #include "server/synthesis/render_section.h"
-#include "server/synthesis/schedule/pending_strikes.h"
-#include "server/synthesis/schedule/strike.h"
-#include "server/synthesis/schedule/strike_stream.h"
-#include "server/synthesis/schedule/strike_triage.h"
+#include "server/synthesis/schedule/event_stream.h"
+#include "server/synthesis/schedule/loudness_triage.h"
+#include "server/synthesis/schedule/mixer_event.h"
+#include "server/synthesis/schedule/pending_events.h"
 #include "server/synthesis/schedule/work_budget.h"
 
 namespace carillon {
@@ -45,8 +45,8 @@ struct MixerSettings {
   uint64_t first_frame = 0;        ///< number of the first; a multiple of block_frame_count
   size_t most_banks = 8192;        ///< those that ring out or fade included
   size_t most_streams = 1024;
-  size_t most_pending_strikes = 262144;   ///< waiting for their time
-  size_t most_strikes_per_block = 32768;  ///< taken from the streams; further ones wait there
+  size_t most_pending_events = 262144;   ///< waiting for their time
+  size_t most_events_per_block = 32768;  ///< taken from the streams; further ones wait there
   /// Where there is a clock, a block's work is bounded, so that its deadline is kept: beyond it the
   /// least audible strikes are merged, then shed, then banks; see MixerStatistics. Without one
   /// nothing is, and the sound depends on nothing but what was asked for. It must outlive the
@@ -110,7 +110,7 @@ class Mixer {
 
   /// A new stream of strikes, of which `capacity` may wait to be taken.
   /// RESOURCE_EXHAUSTED (TOO_MANY_STREAMS).
-  absl::StatusOr<std::unique_ptr<StrikeStream>> OpenStream(size_t capacity = 4096)
+  absl::StatusOr<std::unique_ptr<EventStream>> OpenStream(size_t capacity = 4096)
       ABSL_LOCKS_EXCLUDED(kRenderRole);
 
   /// Frees what Render has retired; a housekeeping thread calls it now and then.
@@ -135,12 +135,12 @@ class Mixer {
     OscillatorBank* bank = nullptr;
     Voice* voice = nullptr;
     uint32_t section = 0;
-    StrikeQueue* queue = nullptr;
+    EventQueue* queue = nullptr;
   };
   /// Back: a bank's slot, or a stream's queue, that Render holds no longer.
   struct Retired {
     BankId id{};
-    StrikeQueue* queue = nullptr;
+    EventQueue* queue = nullptr;
   };
   /// A place for a bank as the controlling threads see it.
   struct OwnedBank {
@@ -168,18 +168,18 @@ class Mixer {
   void RenderBlocks(std::span<float> frames) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void ObeyCommands() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void Obey(const Command& command) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
-  void TakeStrikes(size_t block_count) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
-  void Take(const Strike& strike, StrikeQueue& queue) noexcept
+  void TakeEvents(size_t block_count) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  void Take(MixerEvent event, EventQueue& queue) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
-  void CollectDueStrikes(size_t block_count) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
-  void ChooseStrikes(size_t block, std::span<const uint32_t> due) noexcept
+  void CollectDueEvents(size_t block_count) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  void ChooseEvents(size_t block, std::span<const uint32_t> due) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void ShedBanks() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void DecideTreatment(std::span<const uint32_t> due) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
-  static float LoudnessOf(const Excitation& excitation, const BankSlot& slot) noexcept
+  static float LoudnessOf(const SurfaceImpulse& impulse, const BankSlot& slot) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
-  bool IsHopeless(const Strike& strike, uint64_t sample, const BankSlot& slot) const noexcept
+  bool IsHopeless(const MixerEvent& event, const BankSlot& slot) const noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void RenderOneSection(size_t worker, size_t section, size_t frame_count) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
@@ -198,7 +198,7 @@ class Mixer {
   std::vector<OwnedBank> owned_ ABSL_GUARDED_BY(control_mutex_);
   std::vector<uint32_t> free_slots_ ABSL_GUARDED_BY(control_mutex_);
   std::array<size_t, kSectionCount> section_mode_counts_ ABSL_GUARDED_BY(control_mutex_){};
-  std::vector<std::shared_ptr<StrikeQueue>> queues_ ABSL_GUARDED_BY(control_mutex_);
+  std::vector<std::shared_ptr<EventQueue>> queues_ ABSL_GUARDED_BY(control_mutex_);
   SpscRing<Command> commands_;  // produced under control_mutex_
   SpscRing<Retired> retired_;   // consumed under control_mutex_
 
@@ -206,20 +206,20 @@ class Mixer {
   std::vector<BankSlot> slots_ ABSL_GUARDED_BY(kRenderRole);
   // Slots to be retired when they are silent.
   FixedVector<uint32_t> leaving_ ABSL_GUARDED_BY(kRenderRole);
-  FixedVector<StrikeQueue*> open_queues_ ABSL_GUARDED_BY(kRenderRole);
+  FixedVector<EventQueue*> open_queues_ ABSL_GUARDED_BY(kRenderRole);
   // All that was pushed before the commands of this block were given: a bank let ring out may be
   // retired, for no strike is on its way to it.
-  bool all_strikes_taken_ ABSL_GUARDED_BY(kRenderRole) = true;
-  std::array<Strike, 64> taken_ ABSL_GUARDED_BY(kRenderRole){};
-  PendingStrikes pending_ ABSL_GUARDED_BY(kRenderRole);
+  bool all_events_taken_ ABSL_GUARDED_BY(kRenderRole) = true;
+  std::array<MixerEvent, 64> taken_ ABSL_GUARDED_BY(kRenderRole){};
+  PendingEvents pending_ ABSL_GUARDED_BY(kRenderRole);
   // Of the blocks rendered together: places in pending_.
   FixedVector<uint32_t> due_ ABSL_GUARDED_BY(kRenderRole);
-  // See ChooseStrikes.
+  // See ChooseEvents.
   FixedVector<uint64_t> due_order_ ABSL_GUARDED_BY(kRenderRole);
-  FixedVector<DueStrike> due_strikes_ ABSL_GUARDED_BY(kRenderRole);
-  // Of each section, in due_strikes_.
+  FixedVector<DueEvent> due_events_ ABSL_GUARDED_BY(kRenderRole);
+  // Of each section, in due_events_.
   std::array<size_t, kSectionCount + 1> due_ends_ ABSL_GUARDED_BY(kRenderRole){};
-  StrikeTriage triage_ ABSL_GUARDED_BY(kRenderRole);
+  LoudnessTriage triage_ ABSL_GUARDED_BY(kRenderRole);
   WorkBudget budget_ ABSL_GUARDED_BY(kRenderRole);
   // Loudness.
   float hopeless_below_ ABSL_GUARDED_BY(kRenderRole) = 0;

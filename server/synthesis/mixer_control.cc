@@ -30,10 +30,10 @@ Mixer::Mixer(const MixerSettings& settings)
       slots_(settings.most_banks),
       leaving_(settings.most_banks),
       open_queues_(settings.most_streams),
-      pending_(settings.most_pending_strikes, settings.block_frame_count),
-      due_(settings.most_pending_strikes),
-      due_order_(settings.most_pending_strikes),
-      due_strikes_(settings.most_pending_strikes),
+      pending_(settings.most_pending_events, settings.block_frame_count),
+      due_(settings.most_pending_events),
+      due_order_(settings.most_pending_events),
+      due_events_(settings.most_pending_events),
       budget_(settings.clock,
               static_cast<double>(settings.block_frame_count) / settings.sample_rate_hz,
               settings.most_load),
@@ -108,8 +108,8 @@ void Mixer::FadeOut(BankId bank) {
   Send({.kind = Command::Kind::kFadeOut, .id = bank});
 }
 
-absl::StatusOr<std::unique_ptr<StrikeStream>> Mixer::OpenStream(size_t capacity) {
-  auto queue = std::make_shared<StrikeQueue>(capacity);
+absl::StatusOr<std::unique_ptr<EventStream>> Mixer::OpenStream(size_t capacity) {
+  auto queue = std::make_shared<EventQueue>(capacity);
   const MutexLock lock(&control_mutex_);
   if (queues_.size() == settings_.most_streams) {
     return Refusal(absl::StatusCode::kResourceExhausted, "TOO_MANY_STREAMS",
@@ -118,7 +118,7 @@ absl::StatusOr<std::unique_ptr<StrikeStream>> Mixer::OpenStream(size_t capacity)
   }
   queues_.push_back(queue);
   Send({.kind = Command::Kind::kAddStream, .queue = queue.get()});
-  return std::make_unique<StrikeStream>(std::move(queue));
+  return std::make_unique<EventStream>(std::move(queue));
 }
 
 void Mixer::CollectGarbage() {

@@ -4,32 +4,38 @@
 #include <algorithm>
 #include <array>
 #include <utility>
+#include <variant>
 
 #include "server/synthesis/schedule/work_budget.h"
 
 namespace carillon {
 namespace {
 
-/// How many of the strikes, from the first on, sound as one.
-size_t CountTogether(std::span<const DueStrike> strikes) {
-  const DueStrike& first = strikes.front();
+/// How many of the events, from the first on, are rendered as one.
+size_t CountTogether(std::span<const DueEvent> events) {
+  const DueEvent& first = events.front();
   if (!first.merged) return 1;
-  const auto other = std::ranges::find_if(strikes, [&first](const DueStrike& strike) {
-    return !strike.merged || strike.slot != first.slot ||
-           strike.offset / kMergedFrames != first.offset / kMergedFrames;
+  const auto other = std::ranges::find_if(events, [&first](const DueEvent& due) {
+    return !due.merged || due.slot != first.slot ||
+           due.offset / kMergedFrames != first.offset / kMergedFrames;
   });
-  return static_cast<size_t>(other - strikes.begin());
+  return static_cast<size_t>(other - events.begin());
 }
 
-/// Of the first strike's bank.
-size_t CountImpulses(std::span<const DueStrike> strikes) {
-  const uint32_t slot = strikes.front().slot;
+/// Impulses of the first event's bank, merged ones counted once.
+size_t CountImpulses(std::span<const DueEvent> events) {
+  const uint32_t slot = events.front().slot;
   size_t count = 0;
-  while (!strikes.empty() && strikes.front().slot == slot) {
-    if (strikes.front().strike->kind == StrikeKind::kImpulse) ++count;
-    strikes = strikes.subspan(CountTogether(strikes));
+  while (!events.empty() && events.front().slot == slot) {
+    if (events.front().event->impulse() != nullptr) ++count;
+    events = events.subspan(CountTogether(events));
   }
   return count;
+}
+
+/// Whether the event can make a silent bank sound. A force takes effect at its knot.
+bool CanAwaken(const MixerEvent& event) {
+  return event.impulse() != nullptr || std::holds_alternative<ForceKnot>(event.action);
 }
 
 }  // namespace
@@ -41,7 +47,7 @@ RenderSection::RenderSection(const Settings& settings, std::span<BankSlot> slots
       voices_(settings.most_banks),
       mix_(settings.block_frame_count, settings.stagger) {}
 
-SectionCounts RenderSection::Render(uint64_t block_number, std::span<const DueStrike> strikes,
+SectionCounts RenderSection::Render(uint64_t block_number, std::span<const DueEvent> events,
                                     const Output& output, RenderDesk& desk) noexcept {
   SectionCounts counts;
   const size_t placed_count = settings_.block_frame_count * settings_.channel_count;
@@ -50,15 +56,15 @@ SectionCounts RenderSection::Render(uint64_t block_number, std::span<const DueSt
     const std::span<float> block = frames.first(settings_.block_frame_count);
     frames = frames.subspan(block.size());
     if (sounding_.empty() && voices_.empty() && mix_.idle() &&
-        (strikes.empty() || strikes.front().block > i)) {
+        (events.empty() || events.front().block > i)) {
       std::ranges::fill(block, 0.0F);
       continue;
     }
     mix_.Begin(block_number + i, desk);
-    const auto later = std::ranges::find_if(strikes, [i](const auto& s) { return s.block > i; });
-    const auto due_count = static_cast<size_t>(later - strikes.begin());
-    Strike(strikes.first(due_count), counts);
-    strikes = strikes.subspan(due_count);
+    const auto later = std::ranges::find_if(events, [i](const auto& due) { return due.block > i; });
+    const auto due_count = static_cast<size_t>(later - events.begin());
+    Execute(events.first(due_count), counts);
+    events = events.subspan(due_count);
     for (const uint32_t index : sounding_) RenderBank(slots_[index], counts);
     mix_.Finish(block);
     FinishBanks(block, counts);
@@ -69,26 +75,24 @@ SectionCounts RenderSection::Render(uint64_t block_number, std::span<const DueSt
   return counts;
 }
 
-void RenderSection::Strike(std::span<const DueStrike> strikes, SectionCounts& counts) noexcept {
-  for (bool same_bank = false; !strikes.empty();) {
-    if (!same_bank) mix_.batch().due_count = CountImpulses(strikes);
-    const size_t count = CountTogether(strikes);
-    const std::span<const DueStrike> due = strikes.first(count);
-    strikes = strikes.subspan(count);
+void RenderSection::Execute(std::span<const DueEvent> events, SectionCounts& counts) noexcept {
+  for (bool same_bank = false; !events.empty();) {
+    if (!same_bank) mix_.batch().due_count = CountImpulses(events);
+    const size_t count = CountTogether(events);
+    const std::span<const DueEvent> due = events.first(count);
+    events = events.subspan(count);
     const uint32_t index = due.front().slot;
     BankSlot& slot = slots_[index];
-    same_bank = !strikes.empty() && strikes.front().slot == index;
+    same_bank = !events.empty() && events.front().slot == index;
     mix_.batch().ahead = {};
-    if (!strikes.empty()) {
-      const std::span<const DueStrike> next = strikes.first(CountTogether(strikes));
+    if (!events.empty()) {
+      const std::span<const DueEvent> next = events.first(CountTogether(events));
       mix_.batch().ahead = slots_[next.front().slot].bank->RowsOf(next);
     }
     if (slot.voice != nullptr) mix_.SetApart(settings_.block_frame_count);
-    const bool struck = !slot.fading && Excite(slot, due);
-    if (!struck) counts.dropped_count += count;
-    const StrikeKind kind = due.front().strike->kind;
-    // Nothing rings before the knot.
-    if (struck && !slot.sounding && (kind == StrikeKind::kImpulse || kind == StrikeKind::kKnot)) {
+    const bool applied = !slot.fading && Apply(slot, due);
+    if (!applied) counts.dropped_count += count;
+    if (applied && !slot.sounding && CanAwaken(*due.front().event)) {
       slot.sounding = true;
       sounding_.push_back(index);
     }
@@ -97,21 +101,19 @@ void RenderSection::Strike(std::span<const DueStrike> strikes, SectionCounts& co
   }
 }
 
-bool RenderSection::Excite(BankSlot& slot, std::span<const DueStrike> due) noexcept {
-  const PendingStrike& strike = *due.front().strike;
+bool RenderSection::Apply(BankSlot& slot, std::span<const DueEvent> due) noexcept {
+  const DueEvent& first = due.front();
+  const MixerEvent& event = *first.event;
   OscillatorBank& bank = *slot.bank;
-  if (due.front().merged) return bank.StrikeMerged(due, mix_);
-  switch (strike.kind) {
-    case StrikeKind::kForce:
-      return bank.Gather(strike.excitation);
-    case StrikeKind::kKnot:
-      return bank.Tie(strike.knot, due.front().offset, mix_);
-    case StrikeKind::kMove:
-    case StrikeKind::kMoveListener:
-      return Move(slot.voice, strike, due.front().offset);
-    default:
-      return bank.Strike(strike.excitation, due.front().offset, strike.lead_frames, mix_);
+  if (first.merged) return bank.StrikeMerged(due, mix_);
+  if (const SurfaceImpulse* impulse = event.impulse()) {
+    return bank.Strike(*impulse, first.offset, event.LeadFrames(), mix_);
   }
+  if (const auto* force = std::get_if<SurfaceForce>(&event.action)) return bank.Gather(*force);
+  if (const auto* knot = std::get_if<ForceKnot>(&event.action)) {
+    return bank.Tie(*knot, first.offset, mix_);
+  }
+  return Move(slot.voice, event, first.offset);
 }
 
 void RenderSection::RenderBank(BankSlot& slot, SectionCounts& counts) noexcept {
@@ -125,13 +127,13 @@ void RenderSection::RenderBank(BankSlot& slot, SectionCounts& counts) noexcept {
   mix_.Reunite();
 }
 
-bool RenderSection::Move(Voice* voice, const PendingStrike& strike, size_t offset) noexcept {
+bool RenderSection::Move(Voice* voice, const MixerEvent& event, size_t offset) noexcept {
   if (voice == nullptr) return false;
   Awake(*voice);
-  if (strike.kind == StrikeKind::kMove) {
-    voice->Move(ToMotion(strike.excitation), offset);
-  } else {
-    voice->MoveListener(ToMotion(strike.excitation), offset);
+  if (const auto* object = std::get_if<ObjectMove>(&event.action)) {
+    voice->Move(object->motion, offset);
+  } else if (const auto* listener = std::get_if<ListenerMove>(&event.action)) {
+    voice->MoveListener(listener->motion, offset);
   }
   return true;
 }

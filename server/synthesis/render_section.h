@@ -10,7 +10,7 @@
 #include "server/base/thread_role.h"
 #include "server/synthesis/bank/block_mix.h"
 #include "server/synthesis/bank_slot.h"
-#include "server/synthesis/schedule/due_strike.h"
+#include "server/synthesis/schedule/due_event.h"
 
 namespace carillon {
 
@@ -46,17 +46,17 @@ class RenderSection {
     std::span<float> placed;  ///< what is heard through voices: as many, interleaved
   };
 
-  /// Renders blocks, the first of which has this number. `strikes` are this section's, ascending by
+  /// Renders blocks, the first of which has this number. `events` are this section's, ascending by
   /// block, then slot, then offset. Where the counts say that nothing was placed, `placed` is
   /// untouched.
-  SectionCounts Render(uint64_t block_number, std::span<const DueStrike> strikes,
+  SectionCounts Render(uint64_t block_number, std::span<const DueEvent> events,
                        const Output& output, RenderDesk& desk) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
  private:
-  void Strike(std::span<const DueStrike> strikes, SectionCounts& counts) noexcept
+  void Execute(std::span<const DueEvent> events, SectionCounts& counts) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
-  bool Excite(BankSlot& slot, std::span<const DueStrike> due) noexcept
+  bool Apply(BankSlot& slot, std::span<const DueEvent> due) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void RenderBank(BankSlot& slot, SectionCounts& counts) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
@@ -65,7 +65,7 @@ class RenderSection {
   void FinishBanks(std::span<float> block, SectionCounts& counts) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
-  bool Move(Voice* voice, const PendingStrike& strike, size_t offset) noexcept;
+  bool Move(Voice* voice, const MixerEvent& event, size_t offset) noexcept;
   void Awake(Voice& voice) noexcept;
   void RenderVoices(std::span<float> placed, SectionCounts& counts) noexcept;
 

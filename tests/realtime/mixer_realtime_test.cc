@@ -57,7 +57,7 @@ TEST(MixerRealtime, TheWatchSeesMallocFreeAndLocks) {
 TEST(MixerRealtime, RenderNeitherAllocatesNorFreesNorLocks) {
   if (!kForbiddenCallsAreSeen) GTEST_SKIP() << "sanitizers replace these functions";
   Mixer mixer(
-      {.channel_count = 2, .most_banks = 64, .most_streams = 2, .most_pending_strikes = 100});
+      {.channel_count = 2, .most_banks = 64, .most_streams = 2, .most_pending_events = 100});
   std::vector<float> block(2 * 128);
   std::vector<BankId> banks;
   auto stream = mixer.OpenStream(256).value();
@@ -65,19 +65,20 @@ TEST(MixerRealtime, RenderNeitherAllocatesNorFreesNorLocks) {
     if (i % 5 == 0 && i < 250) {
       banks.push_back(mixer.Add(MakeBank(-300), i % 2 == 0 ? MakeVoice() : nullptr).value());
     }
-    stream->TryPush({.bank = banks.back(),
-                     .kind = i % 3 == 0 ? StrikeKind::kMoveListener : StrikeKind::kMove,
-                     .excitation = ToExcitation({.position_m = {1.0F * static_cast<float>(i), 0, 0},
-                                                 .glide_frames = i % 4 == 0 ? 0.0F : 300.0F})});
-    Excitation excitation = MakeUnitExcitation();
-    excitation.tau_s = 1e-4F;
-    if (i % 7 == 0) excitation.impulse_newton_seconds[0] = std::numeric_limits<float>::quiet_NaN();
+    const Motion motion{.position_m = {1.0F * static_cast<float>(i), 0, 0},
+                        .glide_frames = i % 4 == 0 ? 0.0F : 300.0F};
+    MixerEvent move{.bank = banks.back(), .action = ObjectMove{motion}};
+    if (i % 3 == 0) move.action = ListenerMove{motion};
+    stream->TryPush(move);
+    SurfaceImpulse impulse = MakeUnitImpulse();
+    impulse.tau_s = 1e-4F;
+    if (i % 7 == 0) impulse.impulse_newton_seconds[0] = std::numeric_limits<float>::quiet_NaN();
     // In time, between samples, late, and, while the heap is full, too many.
     for (uint64_t k = 0; k < 8; ++k) {
       stream->TryPush({.bank = banks[(static_cast<size_t>(i) + k) % banks.size()],
                        .frame = k == 0 ? 0 : mixer.frame() + 300 * k,
                        .fraction = 0.5F,
-                       .excitation = excitation});
+                       .action = impulse});
     }
     if (i % 11 == 0) mixer.LetRingOut(banks[static_cast<size_t>(i) % banks.size()]);
     if (i % 13 == 0) mixer.FadeOut(banks[static_cast<size_t>(i) % banks.size()]);
@@ -139,8 +140,7 @@ TEST(MixerRealtime, RenderMakesNoSystemCall) {
   for (int bank = 0; bank < 8; ++bank) {
     const BankId id = mixer.Add(MakeBank(bank % 2 == 0 ? -3 : -300)).value();
     for (uint64_t i = 0; i < 200; ++i) {
-      stream->TryPush(
-          {.bank = id, .frame = 90 * i, .fraction = 0.5F, .excitation = MakeUnitExcitation()});
+      stream->TryPush({.bank = id, .frame = 90 * i, .fraction = 0.5F, .action = MakeUnitImpulse()});
     }
     if (bank == 5) mixer.FadeOut(id);
     if (bank == 6) mixer.LetRingOut(id);
@@ -179,7 +179,7 @@ TEST(MixerRealtime, ControlStrikesHousekeepingAndRenderingRunAtOnce) {
         if (!bank.ok()) continue;  // until the garbage has been collected
         for (uint64_t i = 0; i < 50; ++i) {
           stream->TryPush(
-              {.bank = *bank, .frame = mixer.frame() + 10 * i, .excitation = MakeUnitExcitation()});
+              {.bank = *bank, .frame = mixer.frame() + 10 * i, .action = MakeUnitImpulse()});
         }
         ++object % 2 == 0 ? mixer.LetRingOut(*bank) : mixer.FadeOut(*bank);
       }

@@ -20,8 +20,8 @@
 #include "server/synthesis/ringing/lane_mix.h"
 #include "server/synthesis/ringing/ring_kernel.h"
 #include "server/synthesis/ringing/strike_kernel.h"
-#include "server/synthesis/schedule/due_strike.h"
-#include "server/synthesis/schedule/strike.h"
+#include "server/synthesis/schedule/due_event.h"
+#include "server/synthesis/schedule/mixer_event.h"
 #include "server/synthesis/spectrum/spectral_lanes.h"
 
 namespace carillon {
@@ -66,10 +66,10 @@ class OscillatorBank {
   OscillatorBank(const SoundingModes& sounding, const ShapeTable& shapes,
                  const OscillatorBankSettings& settings);
 
-  /// Applies an excitation at sample `offset` of the block of `mix`, `lead_frames` (0 to 1) after
+  /// Applies an impulse at sample `offset` of the block of `mix`, `lead_frames` (0 to 1) after
   /// it happened. Offsets within one block may not go back. False: not finite or no such vertex,
   /// and nothing was done.
-  bool Strike(const Excitation& excitation, size_t offset, float lead_frames,
+  bool Strike(const SurfaceImpulse& impulse, size_t offset, float lead_frames,
               BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
   /// The same with the modal impulses g_m, but for the scale of the shapes, of the projected
@@ -80,14 +80,14 @@ class OscillatorBank {
 
   /// Strikes that sound as one, which costs less: each on the nearest vertex of its triangle, all
   /// at their mean time, weighted by impulse. They are neighbours in time, and lie in this block.
-  bool StrikeMerged(std::span<const DueStrike> strikes, BlockMix& mix) noexcept
+  bool StrikeMerged(std::span<const DueEvent> events, BlockMix& mix) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
   /// What strikes, one or some merged, will read.
-  StrikeBatch::RowsAhead RowsOf(std::span<const DueStrike> strikes) const noexcept;
+  StrikeBatch::RowsAhead RowsOf(std::span<const DueEvent> events) const noexcept;
 
   /// Adds a contact's force to that at the next knot. False: no such vertex, and nothing was done.
-  bool Gather(const Excitation& force) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  bool Gather(const SurfaceForce& force) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
   /// The sustained force has come to what was gathered, at sample `offset` as for Strike. False: it
   /// was not finite, and is zero.
@@ -157,8 +157,9 @@ class OscillatorBank {
   bool BeginLongBlock(size_t kind, BlockMix& mix) noexcept;
   void MoveToSpectrum(size_t kind) noexcept;
   void MoveToTime(size_t kind) noexcept;
-  std::optional<strike_kernel::Projection> Project(const Excitation& excitation) const noexcept;
-  void AddVertex(size_t vertex, float weight, const Excitation& excitation,
+  std::optional<strike_kernel::Projection> Project(
+      const TrianglePoint& at, const std::array<float, 3>& vector) const noexcept;
+  void AddVertex(size_t vertex, float weight, const std::array<float, 3>& vector,
                  strike_kernel::Projection& projection) const noexcept;
   void SetSegments(const LanePlan& plan);
   void MeasureBlow(const LanePlan& plan);

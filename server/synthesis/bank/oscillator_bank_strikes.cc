@@ -4,6 +4,7 @@
 #include <cassert>
 #include <cmath>
 #include <utility>
+#include <variant>
 
 #include "server/synthesis/bank/oscillator_bank.h"
 #include "server/synthesis/ringing/sum_kernel.h"
@@ -15,10 +16,16 @@ namespace {
 /// than this cost more than the tiles save.
 constexpr size_t kMostStrikesInTiles = 8;
 
-/// Of the triangle's.
-size_t NearestVertex(const Excitation& excitation) {
-  return static_cast<size_t>(std::ranges::max_element(excitation.weights) -
-                             excitation.weights.begin());
+/// The corner of the triangle that is nearest to the point.
+size_t NearestCorner(const TrianglePoint& at) {
+  return static_cast<size_t>(std::ranges::max_element(at.weights) - at.weights.begin());
+}
+
+/// Where an impulse or a force acts; null for another kind of event.
+const TrianglePoint* PointOf(const MixerEvent& event) {
+  if (const SurfaceImpulse* impulse = event.impulse()) return &impulse->at;
+  const auto* force = std::get_if<SurfaceForce>(&event.action);
+  return force != nullptr ? &force->at : nullptr;
 }
 
 double Norm(const std::array<float, 3>& vector) {
@@ -28,31 +35,32 @@ double Norm(const std::array<float, 3>& vector) {
 }  // namespace
 
 std::optional<strike_kernel::Projection> OscillatorBank::Project(
-    const Excitation& excitation) const noexcept {
+    const TrianglePoint& at, const std::array<float, 3>& vector) const noexcept {
   strike_kernel::Projection projection{.column_count = column_count_};
   for (size_t i = 0; i < 3; ++i) {
-    if (excitation.vertices[i] >= shapes_.vertex_count()) return std::nullopt;
-    AddVertex(excitation.vertices[i], excitation.weights[i], excitation, projection);
+    if (at.vertices[i] >= shapes_.vertex_count()) return std::nullopt;
+    AddVertex(at.vertices[i], at.weights[i], vector, projection);
   }
   return projection;
 }
 
-void OscillatorBank::AddVertex(size_t vertex, float weight, const Excitation& excitation,
+void OscillatorBank::AddVertex(size_t vertex, float weight, const std::array<float, 3>& vector,
                                strike_kernel::Projection& projection) const noexcept {
   for (size_t axis = 0; axis < 3; ++axis) {
     projection.rows[projection.row_count] = shapes_.Row(vertex, axis) + first_column_;
-    projection.factors[projection.row_count++] = weight * excitation.impulse_newton_seconds[axis];
+    projection.factors[projection.row_count++] = weight * vector[axis];
   }
 }
 
-StrikeBatch::RowsAhead OscillatorBank::RowsOf(std::span<const DueStrike> strikes) const noexcept {
+StrikeBatch::RowsAhead OscillatorBank::RowsOf(std::span<const DueEvent> events) const noexcept {
   StrikeBatch::RowsAhead ahead{.value_count = 3 * shapes_.stride()};
-  for (const DueStrike& strike : strikes) {
-    const Excitation& excitation = strike.strike->excitation;
-    const size_t nearest = NearestVertex(excitation);
+  for (const DueEvent& due : events) {
+    const TrianglePoint* at = PointOf(*due.event);
+    if (at == nullptr) continue;
+    const size_t nearest = NearestCorner(*at);
     for (size_t i = 0; i < 3; ++i) {
-      const size_t vertex = excitation.vertices[i];
-      if (vertex >= shapes_.vertex_count() || (strike.merged && i != nearest)) continue;
+      const size_t vertex = at->vertices[i];
+      if (vertex >= shapes_.vertex_count() || (due.merged && i != nearest)) continue;
       ahead.rows[ahead.count++] = shapes_.Row(vertex, 0);
       if (ahead.count == ahead.rows.size()) return ahead;
     }
@@ -60,19 +68,20 @@ StrikeBatch::RowsAhead OscillatorBank::RowsOf(std::span<const DueStrike> strikes
   return ahead;
 }
 
-bool OscillatorBank::StrikeMerged(std::span<const DueStrike> strikes, BlockMix& mix) noexcept {
+bool OscillatorBank::StrikeMerged(std::span<const DueEvent> events, BlockMix& mix) noexcept {
   float* modal_impulses = mix.batch().modal_impulses();
   strike_kernel::Projection projection{.column_count = column_count_};
   double weight_sum = 0, time_sum = 0, tau_squared_sum = 0;
-  for (const DueStrike& due : strikes) {
-    const Excitation& excitation = due.strike->excitation;
-    const size_t nearest = NearestVertex(excitation);
-    if (excitation.vertices[nearest] >= shapes_.vertex_count()) continue;
-    const double weight = Norm(excitation.impulse_newton_seconds);
+  for (const DueEvent& due : events) {
+    const SurfaceImpulse* impulse = due.event->impulse();
+    assert(impulse != nullptr);
+    const uint32_t nearest = impulse->at.vertices[NearestCorner(impulse->at)];
+    if (nearest >= shapes_.vertex_count()) continue;
+    const double weight = Norm(impulse->impulse_newton_seconds);
     weight_sum += weight;
-    time_sum += weight * (due.offset - double{due.strike->lead_frames});
-    tau_squared_sum += weight * excitation.tau_s * excitation.tau_s;
-    AddVertex(excitation.vertices[nearest], 1, excitation, projection);
+    time_sum += weight * (due.offset - double{due.event->LeadFrames()});
+    tau_squared_sum += weight * impulse->tau_s * impulse->tau_s;
+    AddVertex(nearest, 1, impulse->impulse_newton_seconds, projection);
     if (projection.row_count < projection.rows.size()) continue;
     strike_kernel::Project(projection, modal_impulses);
     projection.row_count = 0;
@@ -88,14 +97,15 @@ bool OscillatorBank::StrikeMerged(std::span<const DueStrike> strikes, BlockMix& 
                      mix);
 }
 
-bool OscillatorBank::Strike(const Excitation& excitation, size_t offset, float lead_frames,
+bool OscillatorBank::Strike(const SurfaceImpulse& impulse, size_t offset, float lead_frames,
                             BlockMix& mix) noexcept {
-  const std::optional<strike_kernel::Projection> projection = Project(excitation);
+  const std::optional<strike_kernel::Projection> projection =
+      Project(impulse.at, impulse.impulse_newton_seconds);
   if (!projection) return false;
   float* modal_impulses = mix.batch().modal_impulses();
   strike_kernel::Project(*projection, modal_impulses);
   return StrikeModes({modal_impulses, column_count_}, offset,
-                     {.lead_frames = lead_frames, .tau_s = excitation.tau_s}, mix);
+                     {.lead_frames = lead_frames, .tau_s = impulse.tau_s}, mix);
 }
 
 bool OscillatorBank::StrikeModes(std::span<const float> modal_impulses, size_t offset,
@@ -116,8 +126,9 @@ bool OscillatorBank::StrikeModes(std::span<const float> modal_impulses, size_t o
   return finite;
 }
 
-bool OscillatorBank::Gather(const Excitation& force) noexcept {
-  const std::optional<strike_kernel::Projection> projection = Project(force);
+bool OscillatorBank::Gather(const SurfaceForce& force) noexcept {
+  const std::optional<strike_kernel::Projection> projection =
+      Project(force.at, force.force_newtons);
   if (projection) force_.Gather(*projection);
   return projection.has_value();
 }

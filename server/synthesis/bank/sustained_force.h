@@ -11,7 +11,7 @@
 #include "server/synthesis/ringing/lane_arrays.h"
 #include "server/synthesis/ringing/lane_mix.h"
 #include "server/synthesis/ringing/strike_kernel.h"
-#include "server/synthesis/schedule/strike.h"
+#include "server/synthesis/schedule/mixer_event.h"
 
 namespace carillon {
 

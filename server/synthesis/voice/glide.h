@@ -4,7 +4,7 @@
 #include <array>
 #include <cstddef>
 
-#include "server/synthesis/schedule/strike.h"
+#include "server/synthesis/schedule/mixer_event.h"
 
 namespace carillon {
 

@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "server/synthesis/schedule/strike.h"
+#include "server/synthesis/schedule/mixer_event.h"
 #include "server/synthesis/voice/delay_line.h"
 #include "server/synthesis/voice/glide.h"
 

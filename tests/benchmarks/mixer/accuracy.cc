@@ -37,7 +37,7 @@ std::vector<float> Render(size_t frame_count) {
     stream->TryPush({.bank = bank,
                      .frame = static_cast<uint64_t>(at),
                      .fraction = static_cast<float>(at - std::floor(at)),
-                     .excitation = MakeUnitExcitation()});
+                     .action = MakeUnitImpulse()});
   }
   std::vector<float> sound(frame_count / 128 * 128);
   mixer.Render(sound);

@@ -81,30 +81,29 @@ class Impulses {
  public:
   explicit Impulses(uint32_t seed) : random_(seed) {
     std::uniform_real_distribution<float> uniform;
-    for (Strike& strike : strikes_) {
+    for (MixerEvent& event : events_) {
       const auto v = static_cast<uint32_t>(random_() % (kVertices - 144));
       const float a = std::sqrt(uniform(random_)), b = uniform(random_);
-      strike.excitation = {.vertices = {v, v + 89, v + 144},
-                           .weights = {1 - a, a * (1 - b), a * b}};
+      SurfaceImpulse impulse{
+          .at = {.vertices = {v, v + 89, v + 144}, .weights = {1 - a, a * (1 - b), a * b}}};
       const float size = 1e-3F * std::pow(10.0F, -3 * uniform(random_));
-      for (float& x : strike.excitation.impulse_newton_seconds) {
-        x = size * (2 * uniform(random_) - 1);
-      }
-      strike.fraction = uniform(random_);
+      for (float& x : impulse.impulse_newton_seconds) x = size * (2 * uniform(random_) - 1);
+      event.action = impulse;
+      event.fraction = uniform(random_);
     }
   }
 
-  Strike Next() {
-    Strike strike = strikes_[next_++ % strikes_.size()];
-    strike.frame = random_() % kBlock;
+  MixerEvent Next() {
+    MixerEvent event = events_[next_++ % events_.size()];
+    event.frame = random_() % kBlock;
     body_ = random_() % kBodies;
-    return strike;
+    return event;
   }
   size_t body() const { return body_; }
 
  private:
   std::mt19937 random_;
-  std::vector<Strike> strikes_ = std::vector<Strike>(1 << 16);
+  std::vector<MixerEvent> events_ = std::vector<MixerEvent>(1 << 16);
   size_t next_ = 0, body_ = 0;
 };
 
@@ -122,7 +121,7 @@ struct Bodies {
 /// Pushes `rate` impulses a second onto four streams until `done`.
 void Flood(Mixer& mixer, const std::vector<BankId>& banks, double rate,
            const std::atomic<bool>& done) {
-  std::vector<std::unique_ptr<StrikeStream>> streams;
+  std::vector<std::unique_ptr<EventStream>> streams;
   for (size_t i = 0; i < kStreams; ++i) streams.push_back(mixer.OpenStream(1 << 17).value());
   Impulses impulses(7);
   uint64_t block = mixer.frame() / kBlock;
@@ -131,10 +130,10 @@ void Flood(Mixer& mixer, const std::vector<BankId>& banks, double rate,
     // The impulses of a block are pushed two blocks ahead of it.
     for (; block <= mixer.frame() / kBlock + 2; ++block) {
       for (due += rate * kBlockS; due >= 1; --due) {
-        Strike strike = impulses.Next();
-        strike.bank = banks[impulses.body()];
-        strike.frame += block * kBlock;
-        streams[static_cast<size_t>(due) % kStreams]->TryPush(strike);
+        MixerEvent event = impulses.Next();
+        event.bank = banks[impulses.body()];
+        event.frame += block * kBlock;
+        streams[static_cast<size_t>(due) % kStreams]->TryPush(event);
       }
     }
   }
@@ -187,25 +186,20 @@ double MergedErrorDb(const Bodies& bodies, double rate) {
   double error = 0, energy = 0;
   std::vector<float> a(kBlock), b(kBlock);
   for (size_t block = 0; block < 200; ++block) {
-    std::vector<PendingStrike> strikes(count);
-    for (PendingStrike& pending : strikes) {
-      const Strike strike = impulses.Next();
-      pending = {.sample = strike.frame,
-                 .lead_frames = 1 - strike.fraction,
-                 .excitation = strike.excitation};
-    }
-    std::ranges::stable_sort(strikes, {}, &PendingStrike::sample);
+    std::vector<MixerEvent> events(count);
+    for (MixerEvent& event : events) event = impulses.Next();
+    std::ranges::stable_sort(events, {}, &MixerEvent::frame);
     BlockMix &of_exact = exact_mix.Begin(), &of_merged = merged_mix.Begin();
-    for (const auto& s : strikes) {
-      exact.Strike(s.excitation, static_cast<size_t>(s.sample), s.lead_frames, of_exact);
+    for (const MixerEvent& event : events) {
+      exact.Strike(*event.impulse(), event.frame, event.LeadFrames(), of_exact);
     }
     for (size_t i = 0; i < count;) {
-      std::vector<DueStrike> group;
-      const uint64_t tile = strikes[i].sample / kMergedFrames;
-      for (; i < count && strikes[i].sample / kMergedFrames == tile; ++i) {
-        group.push_back({.offset = static_cast<uint32_t>(strikes[i].sample),
+      std::vector<DueEvent> group;
+      const uint64_t tile = events[i].frame / kMergedFrames;
+      for (; i < count && events[i].frame / kMergedFrames == tile; ++i) {
+        group.push_back({.offset = static_cast<uint32_t>(events[i].frame),
                          .merged = true,
-                         .strike = &strikes[i]});
+                         .event = &events[i]});
       }
       merged.StrikeMerged(group, of_merged);
     }

@@ -27,7 +27,7 @@ void Ringing(benchmark::State& state) {
   std::vector<float> block(128);
   for (int64_t modes = 0; modes < state.range(0); modes += 800) {
     const BankId id = mixer.Add(MakeLastingBank()).value();
-    stream->TryPush({.bank = id, .excitation = MakeUnitExcitation()});
+    stream->TryPush({.bank = id, .action = MakeUnitImpulse()});
     if (modes % 8000 == 0) mixer.Render(block);
   }
   mixer.Render(block);
@@ -56,7 +56,7 @@ void StrikeBlocks(benchmark::State& state) {
       stream->TryPush({.bank = id,
                        .frame = mixer.frame() + static_cast<uint64_t>(i) % 128,
                        .fraction = 0.5F,
-                       .excitation = MakeUnitExcitation()});
+                       .action = MakeUnitImpulse()});
     }
     mixer.Render(block);
   }

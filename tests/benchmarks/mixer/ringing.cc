@@ -39,7 +39,7 @@ class Stage {
     stream_->TryPush({.bank = banks_[bank % banks_.size()],
                       .frame = mixer_.frame() + offset,
                       .fraction = 0.5F,
-                      .excitation = MakeUnitExcitation()});
+                      .action = MakeUnitImpulse()});
   }
 
   /// CPU seconds of one block.
@@ -54,7 +54,7 @@ class Stage {
 
  private:
   Mixer mixer_;
-  std::unique_ptr<StrikeStream> stream_ = mixer_.OpenStream(65536).value();
+  std::unique_ptr<EventStream> stream_ = mixer_.OpenStream(65536).value();
   std::vector<BankId> banks_;
   std::vector<float> block_ = std::vector<float>(kBlock);
 };

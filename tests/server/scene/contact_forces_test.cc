@@ -4,22 +4,36 @@
 #include <gtest/gtest.h>
 
 #include <map>
+#include <optional>
+#include <variant>
 #include <vector>
 
 namespace carillon {
 namespace {
 
 constexpr double kStepS = 0.01;
-constexpr Excitation kTenNewtons{.weights = {1, 0, 0}, .impulse_newton_seconds = {0, 0, 10}};
+constexpr SurfaceImpulse kTen{.at = {.weights = {1, 0, 0}}, .impulse_newton_seconds = {0, 0, 10}};
 
-FeltContact FeltBy(uint32_t handle, const Excitation& excitation) {
-  return {.by = {Felt{.handle = handle, .excitation = excitation}}, .count = 1};
+FeltContact FeltBy(uint32_t handle, const SurfaceImpulse& impulse) {
+  return {.by = {Felt{.handle = handle, .impulse = impulse}}, .count = 1};
 }
 
 struct Pushed {
   uint32_t handle;
-  Strike strike;
+  MixerEvent::Action action;
   double time_s;
+
+  bool IsKnot() const { return std::holds_alternative<ForceKnot>(action); }
+  /// Along z, in newton seconds; none where this is no impulse.
+  std::optional<float> Impulse() const {
+    const auto* impulse = std::get_if<SurfaceImpulse>(&action);
+    return impulse != nullptr ? std::optional(impulse->impulse_newton_seconds[2]) : std::nullopt;
+  }
+  /// Along z, in newtons; none where this is no force.
+  std::optional<float> Force() const {
+    const auto* force = std::get_if<SurfaceForce>(&action);
+    return force != nullptr ? std::optional(force->force_newtons[2]) : std::nullopt;
+  }
 };
 
 class ContactForcesTest : public testing::Test {
@@ -28,8 +42,8 @@ class ContactForcesTest : public testing::Test {
   template <typename Add>
   std::vector<Pushed> Step(double time_s, const Add& add) {
     std::vector<Pushed> pushed;
-    const auto push = [&](uint32_t handle, const Strike& strike, double at_s) {
-      pushed.push_back({handle, strike, at_s});
+    const auto push = [&](uint32_t handle, const MixerEvent::Action& action, double at_s) {
+      pushed.push_back({handle, action, at_s});
     };
     forces_.Begin(time_s, push);
     add();
@@ -38,7 +52,7 @@ class ContactForcesTest : public testing::Test {
   }
 
   std::vector<Pushed> Hold(double time_s, const Roughness& roughness = {}) {
-    return Step(time_s, [&] { forces_.Add(FeltBy(3, kTenNewtons), roughness); });
+    return Step(time_s, [&] { forces_.Add(FeltBy(3, kTen), roughness); });
   }
 
   std::vector<Pushed> Nothing(double time_s) {
@@ -52,24 +66,22 @@ TEST_F(ContactForcesTest, GivesEachObjectItsForcesAndThenAKnot) {
   const auto pushed = Hold(0.5);
   ASSERT_EQ(pushed.size(), 2U);
   EXPECT_EQ(pushed[0].handle, 3U);
-  EXPECT_EQ(pushed[0].strike.kind, StrikeKind::kForce);
-  EXPECT_EQ(pushed[0].strike.excitation.impulse_newton_seconds[2], 10);
-  EXPECT_EQ(pushed[1].strike.kind, StrikeKind::kKnot);
-  EXPECT_FLOAT_EQ(pushed[1].strike.knot.step_s, 0.01F);
+  EXPECT_EQ(pushed[0].Force(), 10);
+  ASSERT_TRUE(pushed[1].IsKnot());
+  EXPECT_FLOAT_EQ(std::get<ForceKnot>(pushed[1].action).step_s, 0.01F);
   EXPECT_EQ(pushed[1].time_s, 0.5);
 }
 
 TEST_F(ContactForcesTest, WhatIsABlowToOneObjectOfAPairIsABlowToBoth) {
-  FeltContact impulse = FeltBy(3, kTenNewtons);
-  impulse.by[1] = {.handle = 4, .excitation = kTenNewtons};
-  impulse.by[1].excitation.impulse_newton_seconds[2] = -10;
+  FeltContact impulse = FeltBy(3, kTen);
+  impulse.by[1] = {.handle = 4, .impulse = kTen};
+  impulse.by[1].impulse.impulse_newton_seconds[2] = -10;
   impulse.count = 2;
   const ObjectTouch touch{.handle = 3, .partner = 9};
   const auto pushed = Step(0, [&] { forces_.Touch(touch, impulse); });
   std::map<uint32_t, float> struck;
   for (const Pushed& push : pushed) {
-    if (push.strike.kind != StrikeKind::kImpulse) continue;
-    struck[push.handle] += push.strike.excitation.impulse_newton_seconds[2];
+    struck[push.handle] += push.Impulse().value_or(0);
   }
   EXPECT_GT(struck[3], 1);  // nothing was usual before, so it is mostly a blow
   EXPECT_EQ(struck[4], -struck[3]);
@@ -80,7 +92,7 @@ TEST_F(ContactForcesTest, EndsAForceWithTwoKnotsAndThenIsStill) {
   for (const double time_s : {0.01, 0.02}) {
     const auto pushed = Nothing(time_s);
     ASSERT_EQ(pushed.size(), 1U);
-    EXPECT_EQ(pushed[0].strike.kind, StrikeKind::kKnot);
+    EXPECT_TRUE(pushed[0].IsKnot());
   }
   EXPECT_TRUE(Nothing(0.03).empty());
 }
@@ -95,47 +107,45 @@ TEST_F(ContactForcesTest, EndsAForceWhereStepsWereLeftOut) {
 
 TEST_F(ContactForcesTest, ARoughnessIsWeighedByItsForce) {
   const auto pushed = Step(0, [&] {
-    forces_.Add(FeltBy(3, kTenNewtons),
-                {.travel_speed_m_per_s = 2, .depth = 0.4, .grain_m = 0.001});
-    forces_.Add(FeltBy(3, kTenNewtons), {});  // rests
+    forces_.Add(FeltBy(3, kTen), {.travel_speed_m_per_s = 2, .depth = 0.4, .grain_m = 0.001});
+    forces_.Add(FeltBy(3, kTen), {});  // rests
   });
-  EXPECT_FLOAT_EQ(pushed.back().strike.knot.roughness, 0.2F);
-  EXPECT_FLOAT_EQ(pushed.back().strike.knot.bandwidth_hz, 2000);
+  const auto& knot = std::get<ForceKnot>(pushed.back().action);
+  EXPECT_FLOAT_EQ(knot.roughness, 0.2F);
+  EXPECT_FLOAT_EQ(knot.bandwidth_hz, 2000);
 }
 
 TEST_F(ContactForcesTest, OfATouchThePartThatIsABlowStrikesAndTheRestIsAForce) {
   const auto touch = [&](double newton_seconds) {
     return [this, newton_seconds] {
-      Excitation impulse = kTenNewtons;
+      SurfaceImpulse impulse = kTen;
       impulse.impulse_newton_seconds[2] = static_cast<float>(newton_seconds);
       forces_.Touch({.handle = 3, .partner = 9, .impulse = {}, .roughness = {}},
                     FeltBy(3, impulse));
     };
   };
   auto pushed = Step(0, touch(1));  // from flight
-  EXPECT_EQ(pushed[0].strike.kind, StrikeKind::kImpulse);
-  EXPECT_EQ(pushed[0].strike.excitation.impulse_newton_seconds[2], 1);
+  EXPECT_EQ(pushed[0].Impulse(), 1);
   for (int i = 1; i < 20; ++i) pushed = Step(i * kStepS, touch(0.1));
   ASSERT_EQ(pushed.size(), 2U);
-  EXPECT_EQ(pushed[0].strike.kind, StrikeKind::kForce);
-  EXPECT_FLOAT_EQ(pushed[0].strike.excitation.impulse_newton_seconds[2], 10);  // 0.1 N s in 0.01 s
+  EXPECT_FLOAT_EQ(pushed[0].Force().value_or(0), 10);  // 0.1 N s in 0.01 s
   pushed = Step(20 * kStepS, touch(3));
   ASSERT_EQ(pushed.size(), 3U);
-  EXPECT_FLOAT_EQ(pushed[0].strike.excitation.impulse_newton_seconds[2], 2.7F);
-  EXPECT_FLOAT_EQ(pushed[1].strike.excitation.impulse_newton_seconds[2], 30);
+  EXPECT_FLOAT_EQ(pushed[0].Impulse().value_or(0), 2.7F);
+  EXPECT_FLOAT_EQ(pushed[1].Force().value_or(0), 30);
 }
 
 TEST_F(ContactForcesTest, AnotherPartnerIsAnotherPair) {
   const auto touch = [this](uint32_t partner) {
     forces_.Touch({.handle = 3, .partner = partner, .impulse = {}, .roughness = {}},
-                  FeltBy(3, kTenNewtons));
+                  FeltBy(3, kTen));
   };
   for (int i = 0; i < 20; ++i) Step(i * kStepS, [&] { touch(1); });
   const auto pushed = Step(20 * kStepS, [&] {
     touch(1);
     touch(2);
   });
-  EXPECT_EQ(pushed[0].strike.kind, StrikeKind::kImpulse);
+  EXPECT_TRUE(pushed[0].Impulse());
 }
 
 }  // namespace

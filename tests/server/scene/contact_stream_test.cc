@@ -123,12 +123,11 @@ TEST_F(ContactStreamTest, AnElasticCollisionOfTwoObjectsLastsAsLongForBothByBoth
                  placed(second));
   };
   const FeltContact hard = feel(1, 2), mixed = feel(1, 3), reversed = feel(3, 1);
-  EXPECT_EQ(hard.by[0].excitation.tau_s, hard.by[1].excitation.tau_s);
-  EXPECT_EQ(mixed.by[0].excitation.tau_s, mixed.by[1].excitation.tau_s);
-  EXPECT_FLOAT_EQ(mixed.by[0].excitation.tau_s, reversed.by[0].excitation.tau_s);
+  EXPECT_EQ(hard.by[0].impulse.tau_s, hard.by[1].impulse.tau_s);
+  EXPECT_EQ(mixed.by[0].impulse.tau_s, mixed.by[1].impulse.tau_s);
+  EXPECT_FLOAT_EQ(mixed.by[0].impulse.tau_s, reversed.by[0].impulse.tau_s);
   // 1/E goes from 2 to 1 + 100 of its unit, and the duration is its power 2/5.
-  EXPECT_NEAR(mixed.by[0].excitation.tau_s / hard.by[0].excitation.tau_s, std::pow(50.5, 0.4),
-              1e-4);
+  EXPECT_NEAR(mixed.by[0].impulse.tau_s / hard.by[0].impulse.tau_s, std::pow(50.5, 0.4), 1e-4);
 }
 
 TEST_F(ContactStreamTest, AnImpulseBetweenTwoFramesIsFirstHeardAtTheLater) {

@@ -303,10 +303,10 @@ TEST(SoundingObject, APointIsInMetresOfTheObjectAsLargeAsItIs) {
   const PlacedObject placed = *stage.scenes.AddObject(stage.scene, 0, SmallModel(), properties);
   ContactImpulse impulse = SmallImpulse(1).impulse;
   impulse.location = Point{0, 0.15, 0};  // half way up an edge of 0.3 m, from vertex 0 to vertex 2
-  const Excitation excitation = *LocateImpulse(placed.object, impulse);
+  const SurfaceImpulse felt = *LocateImpulse(placed.object, impulse);
   for (size_t corner = 0; corner < 3; ++corner) {
-    const uint32_t vertex = excitation.vertices[corner];
-    EXPECT_NEAR(excitation.weights[corner], vertex == 0 || vertex == 2 ? 0.5 : 0, 1e-6);
+    const uint32_t vertex = felt.at.vertices[corner];
+    EXPECT_NEAR(felt.at.weights[corner], vertex == 0 || vertex == 2 ? 0.5 : 0, 1e-6);
   }
 }
 

@@ -36,9 +36,8 @@ inline ShapeTable MakeUniformShapes(size_t mode_count, float shape = 1) {
 }
 
 /// A unit impulse along x in the middle of the triangle.
-inline Excitation MakeUnitExcitation() {
-  return {.vertices = {0, 1, 2},
-          .weights = {1.0F / 3, 1.0F / 3, 1.0F / 3},
+inline SurfaceImpulse MakeUnitImpulse() {
+  return {.at = {.vertices = {0, 1, 2}, .weights = {1.0F / 3, 1.0F / 3, 1.0F / 3}},
           .impulse_newton_seconds = {1, 0, 0}};
 }
 
@@ -125,14 +124,14 @@ class TestMix {
 };
 
 /// Renders a bank by itself, without mixer or limiter.
-inline std::vector<float> Ring(OscillatorBank& bank, const Excitation& excitation,
+inline std::vector<float> Ring(OscillatorBank& bank, const SurfaceImpulse& impulse,
                                size_t frame_count, size_t offset = 0, float lead_frames = 0,
                                size_t block_frame_count = 128, size_t stagger = 0) {
   std::vector<float> sound(frame_count / block_frame_count * block_frame_count);
   TestMix test(block_frame_count, stagger);
   for (size_t start = 0; start < sound.size(); start += block_frame_count) {
     BlockMix& mix = test.Begin();
-    if (start == 0) bank.Strike(excitation, offset, lead_frames, mix);
+    if (start == 0) bank.Strike(impulse, offset, lead_frames, mix);
     bank.RenderAdd(mix);
     test.Finish(std::span(sound).subspan(start, block_frame_count));
   }

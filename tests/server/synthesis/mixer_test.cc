@@ -29,11 +29,10 @@ class MixerTest : public testing::Test {
         OscillatorBankSettings{});
   }
 
-  void Strike(BankId bank, uint64_t frame, float fraction = 0, float impulse = 1) {
-    Excitation excitation = MakeUnitExcitation();
-    excitation.impulse_newton_seconds[0] = impulse;
-    stream_->TryPush(
-        {.bank = bank, .frame = frame, .fraction = fraction, .excitation = excitation});
+  void Strike(BankId bank, uint64_t frame, float fraction = 0, float newton_seconds = 1) {
+    SurfaceImpulse impulse = MakeUnitImpulse();
+    impulse.impulse_newton_seconds[0] = newton_seconds;
+    stream_->TryPush({.bank = bank, .frame = frame, .fraction = fraction, .action = impulse});
   }
 
   std::vector<float> Render(size_t block_count) {
@@ -50,7 +49,7 @@ class MixerTest : public testing::Test {
 
   Mixer mixer_;
   BankId bank_ = mixer_.Add(MakeBank()).value();
-  std::unique_ptr<StrikeStream> stream_ = mixer_.OpenStream(8).value();
+  std::unique_ptr<EventStream> stream_ = mixer_.OpenStream(8).value();
 };
 
 TEST_F(MixerTest, IsSilentUntilStruck) { EXPECT_THAT(Render(4), Each(0.0F)); }
@@ -119,8 +118,7 @@ TEST_F(MixerTest, OneCallOverManyBlocksGivesTheBitsOfManyCalls) {
   const auto stream = other.OpenStream(8).value();
   for (const uint64_t frame : {3U, 130U, 131U, 1000U}) {
     Strike(bank_, frame, 0.3F);
-    stream->TryPush(
-        {.bank = bank, .frame = frame, .fraction = 0.3F, .excitation = MakeUnitExcitation()});
+    stream->TryPush({.bank = bank, .frame = frame, .fraction = 0.3F, .action = MakeUnitImpulse()});
   }
   std::vector<float> whole(128 * 16), parts;
   other.Render(whole);
@@ -149,7 +147,7 @@ std::vector<float> RenderBy(size_t thread_count) {
       stream->TryPush({.bank = bank,
                        .frame = (i * 131 + k * 977) % 12000,
                        .fraction = 0.4F,
-                       .excitation = MakeUnitExcitation()});
+                       .action = MakeUnitImpulse()});
     }
   }
   std::vector<float> sound(size_t{128} * 120);
@@ -226,7 +224,7 @@ TEST_F(MixerTest, AClosedStreamMakesRoomForAnotherAndWhatItPushedStillSounds) {
   const BankId bank = mixer.Add(MakeBank()).value();
   auto stream = mixer.OpenStream().value();
   EXPECT_THAT(mixer.OpenStream().status().ToString(), HasSubstr("TOO_MANY_STREAMS"));
-  stream->TryPush({.bank = bank, .excitation = MakeUnitExcitation()});
+  stream->TryPush({.bank = bank, .action = MakeUnitImpulse()});
   stream.reset();
   std::vector<float> block(128);
   mixer.Render(block);

@@ -8,14 +8,14 @@
 #include <vector>
 
 #include "server/synthesis/mixer.h"
-#include "server/synthesis/schedule/strike_triage.h"
+#include "server/synthesis/schedule/loudness_triage.h"
 #include "tests/server/synthesis/closed_form.h"
 
 namespace carillon {
 namespace {
 
-TEST(StrikeTriage, AllAreExactWithinTheBound) {
-  StrikeTriage triage;
+TEST(LoudnessTriage, AllAreExactWithinTheBound) {
+  LoudnessTriage triage;
   triage.Clear();
   for (int i = 1; i <= 10; ++i) triage.Note(static_cast<float>(i), 10, 3);
   EXPECT_EQ(triage.Decide(100), 100);
@@ -23,8 +23,8 @@ TEST(StrikeTriage, AllAreExactWithinTheBound) {
   EXPECT_EQ(triage.shed_below(), 0);
 }
 
-TEST(StrikeTriage, TheLoudestStayExactWhereAllCanBeRenderedMerged) {
-  StrikeTriage triage;
+TEST(LoudnessTriage, TheLoudestStayExactWhereAllCanBeRenderedMerged) {
+  LoudnessTriage triage;
   triage.Clear();
   for (int i = 0; i < 10; ++i) triage.Note(std::exp2(static_cast<float>(i)), 10, 3);
   EXPECT_LE(triage.Decide(45), 45);  // two exact and eight merged
@@ -32,8 +32,8 @@ TEST(StrikeTriage, TheLoudestStayExactWhereAllCanBeRenderedMerged) {
   for (int i = 8; i < 10; ++i) EXPECT_EQ(triage.Treat(std::exp2(float(i))), Treatment::kExact);
 }
 
-TEST(StrikeTriage, TheLeastAudibleAreShed) {
-  StrikeTriage triage;
+TEST(LoudnessTriage, TheLeastAudibleAreShed) {
+  LoudnessTriage triage;
   triage.Clear();
   for (int i = 0; i < 10; ++i) triage.Note(std::exp2(static_cast<float>(i)), 10, 3);
   triage.Note(std::numeric_limits<float>::quiet_NaN(), 10, 3);
@@ -82,12 +82,12 @@ Struck StrikeAtOnce(const MixerSettings& settings, int count) {
   Mixer mixer(settings);
   const BankId bank = mixer.Add(MakeBank()).value();
   const auto stream = mixer.OpenStream(4096).value();
-  Excitation quiet = MakeUnitExcitation();
+  SurfaceImpulse quiet = MakeUnitImpulse();
   quiet.impulse_newton_seconds[0] = 1e-4F;
   for (int i = 0; i < count; ++i) {
-    stream->TryPush({.bank = bank, .frame = static_cast<uint64_t>(i % 128), .excitation = quiet});
+    stream->TryPush({.bank = bank, .frame = static_cast<uint64_t>(i % 128), .action = quiet});
   }
-  stream->TryPush({.bank = bank, .frame = 64, .excitation = MakeUnitExcitation()});
+  stream->TryPush({.bank = bank, .frame = 64, .action = MakeUnitImpulse()});
   Struck struck{.statistics = {}, .sound = std::vector<float>(512)};
   for (size_t start = 0; start < 512; start += 128) {
     mixer.Render(std::span(struck.sound).subspan(start, 128));
@@ -134,7 +134,7 @@ TEST(Overload, TheQuietestBanksAreShedUntilTheRestCanRing) {
   std::vector<float> block(128);
   for (size_t first = 0; first < banks.size(); first += 50) {
     for (size_t i = first; i < first + 50; ++i) {
-      stream->TryPush({.bank = banks[i], .excitation = MakeUnitExcitation()});
+      stream->TryPush({.bank = banks[i], .action = MakeUnitImpulse()});
     }
     for (int i = 0; i < 17; ++i) mixer.Render(block);  // until they ring by spectrum
   }
@@ -155,15 +155,13 @@ TEST(Overload, MergedStrikesOfCloseNeighboursAreNearlyTheExactOnes) {
   OscillatorBank exact(sounding, MakeUniformShapes(40), {});
   OscillatorBank merged(sounding, MakeUniformShapes(40), {});
   TestMix exact_mix, merged_mix;
-  std::vector<PendingStrike> strikes;
-  for (uint64_t i = 0; i < 4; ++i) {
-    strikes.push_back({.sample = 8 + i, .lead_frames = 0.25F, .excitation = MakeUnitExcitation()});
-  }
-  std::vector<DueStrike> due;
+  const SurfaceImpulse impulse = MakeUnitImpulse();
+  const MixerEvent event{.fraction = 0.75F, .action = impulse};
+  std::vector<DueEvent> due;
   BlockMix &of_exact = exact_mix.Begin(), &of_merged = merged_mix.Begin();
-  for (const PendingStrike& strike : strikes) {
-    due.push_back({.offset = static_cast<uint32_t>(strike.sample), .strike = &strike});
-    exact.Strike(strike.excitation, strike.sample, strike.lead_frames, of_exact);
+  for (uint32_t offset = 8; offset < 12; ++offset) {
+    due.push_back({.offset = offset, .event = &event});
+    exact.Strike(impulse, offset, event.LeadFrames(), of_exact);
   }
   EXPECT_TRUE(merged.StrikeMerged(due, of_merged));
   std::vector<float> a(128), b(128), difference(128);
@@ -204,15 +202,19 @@ TEST(Overload, WhateverStrikesComeWhatLeavesIsFiniteAndWithinFullScale) {
     for (int i = 0; i < 400; ++i) {
       for (int k = 0; k < 40; ++k) {
         const auto vertex = [&] { return static_cast<uint32_t>(random() % 4); };
-        stream->TryPush({.bank = banks[random() % banks.size()],
+        MixerEvent event{.bank = banks[random() % banks.size()],
                          .frame = random() % 50 == 0 ? random() : mixer.frame() + random() % 300,
-                         .fraction = k % 3 == 0 ? any() : 0.5F,
-                         .kind = static_cast<StrikeKind>(random() % 3),
-                         .excitation = {.vertices = {vertex(), vertex(), vertex()},
-                                        .weights = {any(), any(), any()},
-                                        .impulse_newton_seconds = {any(), any(), any()},
-                                        .tau_s = any()},
-                         .knot = {.step_s = any(), .roughness = any(), .bandwidth_hz = any()}});
+                         .fraction = k % 3 == 0 ? any() : 0.5F};
+        const TrianglePoint at{.vertices = {vertex(), vertex(), vertex()},
+                               .weights = {any(), any(), any()}};
+        if (const size_t kind = random() % 3; kind == 0) {
+          event.action = SurfaceImpulse{at, {any(), any(), any()}, any()};
+        } else if (kind == 1) {
+          event.action = SurfaceForce{at, {any(), any(), any()}};
+        } else {
+          event.action = ForceKnot{any(), any(), any()};
+        }
+        stream->TryPush(event);
       }
       mixer.Render(block);
       for (const float x : block) ASSERT_LE(std::abs(x), 1.0F) << "block " << i;

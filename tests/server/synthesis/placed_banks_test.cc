@@ -46,8 +46,8 @@ std::vector<float> Render(Mixer& mixer, size_t block_count, size_t blocks_a_call
   return frames;
 }
 
-void Strike(StrikeStream& stream, BankId bank, uint64_t frame) {
-  stream.TryPush({.bank = bank, .frame = frame, .excitation = MakeUnitExcitation()});
+void Strike(EventStream& stream, BankId bank, uint64_t frame) {
+  stream.TryPush({.bank = bank, .frame = frame, .action = MakeUnitImpulse()});
 }
 
 TEST(PlacedBanks, WithoutVoicesBothChannelsAreTheMonoMixBitForBit) {
@@ -144,12 +144,11 @@ std::vector<float> RenderCrowd(size_t thread_count, size_t blocks_a_call) {
     for (uint64_t k = 0; k < 40; ++k) {
       Strike(*stream, bank, 317 * k + static_cast<uint64_t>(i));
       if (i % 4 == 0) continue;
-      const auto x = static_cast<float>(k) * 0.2F;
-      stream->TryPush({.bank = bank,
-                       .frame = 800 * k,
-                       .kind = k % 10 == 9 ? StrikeKind::kMoveListener : StrikeKind::kMove,
-                       .excitation = ToExcitation({.position_m = {x, 1, -2},
-                                                   .glide_frames = k % 7 == 6 ? 0.0F : 800.0F})});
+      const Motion motion{.position_m = {static_cast<float>(k) * 0.2F, 1, -2},
+                          .glide_frames = k % 7 == 6 ? 0.0F : 800.0F};
+      MixerEvent event{.bank = bank, .frame = 800 * k, .action = ObjectMove{motion}};
+      if (k % 10 == 9) event.action = ListenerMove{motion};
+      stream->TryPush(event);
     }
   }
   return Render(mixer, 256, blocks_a_call);
@@ -165,7 +164,7 @@ TEST(PlacedBanks, TheSoundIsTheSameBitForBitForAnyNumberOfThreadsAndBlocksACall)
 TEST(PlacedBanks, AMoveOfABankWithoutAVoiceIsDropped) {
   Mixer mixer;
   const BankId bank = mixer.Add(MakeBank()).value();
-  mixer.OpenStream().value()->TryPush({.bank = bank, .kind = StrikeKind::kMove});
+  mixer.OpenStream().value()->TryPush({.bank = bank, .action = ObjectMove{}});
   Render(mixer, 1);
   EXPECT_EQ(mixer.statistics().dropped_count, 1U);
 }

@@ -34,16 +34,16 @@ auto SumOfStrikes(const SoundingModes& sounding, const std::vector<double>& stri
 
 TEST(OscillatorBankStrikes, TwoStrikesSuperpose) {
   const SoundingModes sounding = MakeWideModes();
-  const Excitation excitation = MakeUnitExcitation();
+  const SurfaceImpulse impulse = MakeUnitImpulse();
   OscillatorBank bank(sounding, MakeUniformShapes(37), {});
   std::vector<float> sound(12800);
   TestMix test;
   for (size_t block = 0; block < 100; ++block) {
     BlockMix& mix = test.Begin();
-    if (block == 3) bank.Strike(excitation, 17, 0.5F, mix);
-    if (block == 3) bank.Strike(excitation, 17, 0.25F, mix);
-    if (block == 3) bank.Strike(excitation, 90, 0, mix);
-    if (block == 40) bank.Strike(excitation, 127, 0, mix);
+    if (block == 3) bank.Strike(impulse, 17, 0.5F, mix);
+    if (block == 3) bank.Strike(impulse, 17, 0.25F, mix);
+    if (block == 3) bank.Strike(impulse, 90, 0, mix);
+    if (block == 40) bank.Strike(impulse, 127, 0, mix);
     bank.RenderAdd(mix);
     test.Finish(std::span(sound).subspan(128 * block, 128));
   }
@@ -64,7 +64,7 @@ TEST_P(OnEveryTarget, ManyStrikesInABlockSuperpose) {
     for (size_t start = 0; start < sound.size(); start += 128) {
       BlockMix& mix = test.Begin();
       for (size_t i = 0; start == 128 && i < kStrikes; ++i) {
-        bank.Strike(MakeUnitExcitation(), offset, 0, mix);
+        bank.Strike(MakeUnitImpulse(), offset, 0, mix);
       }
       test.Render(bank, std::span(sound).subspan(start, 128));
     }
@@ -105,7 +105,7 @@ TEST_P(OnEveryTarget, StrikesInAndBetweenTilesOfAllKindsSuperpose) {
         for (size_t i = 0; start <= 2 * block_frame_count && i < strike_count; ++i) {
           const size_t offset = (i + 1) * (block_frame_count - 1) / strike_count;
           const float lead = i % 2 == 0 ? 0.3F : 0;
-          bank.Strike(MakeUnitExcitation(), offset, lead, mix);
+          bank.Strike(MakeUnitImpulse(), offset, lead, mix);
           strikes.push_back(static_cast<double>(start + offset) - lead);
         }
         test.Render(bank, std::span(sound).subspan(start, block_frame_count));
@@ -120,7 +120,7 @@ TEST_P(OnEveryTarget, LateInALongBlockAStrikeBetweenSamplesIsAsExactAsEarly) {
   const SoundingModes sounding{.modes = {MakeMode(0, 19000, -5, 40)}};
   for (const size_t offset : {0U, 255U}) {
     OscillatorBank bank(sounding, MakeUniformShapes(1), {.block_frame_count = 256});
-    const auto sound = Ring(bank, MakeUnitExcitation(), 1024, offset, 0.3F, 256);
+    const auto sound = Ring(bank, MakeUnitImpulse(), 1024, offset, 0.3F, 256);
     EXPECT_LT(ErrorDb(sound, sounding, 1, static_cast<double>(offset) - double{0.3F}), -110);
   }
 }
@@ -130,11 +130,11 @@ TEST_P(OnEveryTarget, AContactThatTakesTimeRingsInTilesOfAllKinds) {
   const SoundingModes sounding = MakeModesOfAllTiles();
   for (const size_t offset : {0U, 50U, 127U}) {
     OscillatorBank bank(sounding, MakeUniformShapes(sounding.modes.size()), {});
-    Excitation excitation = MakeUnitExcitation();
-    excitation.tau_s = 1e-4F;
-    const auto sound = Ring(bank, excitation, 1024, offset, 0.25F);
+    SurfaceImpulse impulse = MakeUnitImpulse();
+    impulse.tau_s = 1e-4F;
+    const auto sound = Ring(bank, impulse, 1024, offset, 0.25F);
     EXPECT_LT(ErrorDb(std::vector(sound.begin() + static_cast<ptrdiff_t>(offset), sound.end()),
-                      sounding, 1, -0.25, excitation.tau_s),
+                      sounding, 1, -0.25, impulse.tau_s),
               -110)
         << offset;
   }
@@ -142,9 +142,9 @@ TEST_P(OnEveryTarget, AContactThatTakesTimeRingsInTilesOfAllKinds) {
 
 TEST_P(OnEveryTarget, MergedStrikesSoundAtTheirMeanTimeWhateverCameBefore) {
   const SoundingModes sounding = MakeWideModes();
-  PendingStrike pending{.lead_frames = 0.25F, .excitation = MakeUnitExcitation()};
-  const DueStrike merged[] = {{.offset = 8, .merged = true, .strike = &pending},
-                              {.offset = 8, .merged = true, .strike = &pending}};
+  const MixerEvent event{.fraction = 0.75F, .action = MakeUnitImpulse()};
+  const DueEvent merged[] = {{.offset = 8, .merged = true, .event = &event},
+                             {.offset = 8, .merged = true, .event = &event}};
   constexpr double kMeanFrame = 8 - 0.25;
   for (const double exact_frame : {0.0, 11.0}) {
     OscillatorBank bank(sounding, MakeUniformShapes(37), {});
@@ -152,7 +152,7 @@ TEST_P(OnEveryTarget, MergedStrikesSoundAtTheirMeanTimeWhateverCameBefore) {
     TestMix test;
     for (size_t start = 0; start < sound.size(); start += 128) {
       BlockMix& mix = test.Begin();
-      if (start == 0) bank.Strike(MakeUnitExcitation(), static_cast<size_t>(exact_frame), 0, mix);
+      if (start == 0) bank.Strike(MakeUnitImpulse(), static_cast<size_t>(exact_frame), 0, mix);
       if (start == 0) bank.StrikeMerged(merged, mix);
       test.Render(bank, std::span(sound).subspan(start, 128));
     }
@@ -165,17 +165,18 @@ TEST(OscillatorBankStrikes, MergedStrikesThatAreNotFiniteLeaveItAsItWas) {
   const SoundingModes sounding = MakeWideModes();
   OscillatorBank bank(sounding, MakeUniformShapes(37), {}),
       fresh(sounding, MakeUniformShapes(37), {});
-  PendingStrike pending{.excitation = MakeUnitExcitation()};
-  pending.excitation.impulse_newton_seconds[0] = std::numeric_limits<float>::infinity();
-  const DueStrike merged[] = {{.offset = 8, .merged = true, .strike = &pending},
-                              {.offset = 9, .merged = true, .strike = &pending}};
+  SurfaceImpulse impulse = MakeUnitImpulse();
+  impulse.impulse_newton_seconds[0] = std::numeric_limits<float>::infinity();
+  const MixerEvent event{.action = impulse};
+  const DueEvent merged[] = {{.offset = 8, .merged = true, .event = &event},
+                             {.offset = 9, .merged = true, .event = &event}};
   std::vector<float> block(128), right(128);
   TestMix test, fresh_test;
   BlockMix &mix = test.Begin(), &fresh_mix = fresh_test.Begin();
   // As many as fit: one more would render what is there first.
   for (size_t i = 0; i < StrikeBatch::kMostStrikes; ++i) {
-    bank.Strike(MakeUnitExcitation(), 5, 0, mix);
-    fresh.Strike(MakeUnitExcitation(), 5, 0, fresh_mix);
+    bank.Strike(MakeUnitImpulse(), 5, 0, mix);
+    fresh.Strike(MakeUnitImpulse(), 5, 0, fresh_mix);
   }
   EXPECT_FALSE(bank.StrikeMerged(merged, mix));
   test.Render(bank, block);
@@ -189,25 +190,24 @@ TEST(OscillatorBankStrikes, AForceThatIsNotFiniteLeavesASilentBankAsItWas) {
       fresh(sounding, MakeUniformShapes(37), {});
   TestMix test;
   std::vector<float> block(128);
-  Excitation force = MakeUnitExcitation();
-  force.impulse_newton_seconds[0] = std::numeric_limits<float>::infinity();
   BlockMix& mix = test.Begin();
-  EXPECT_TRUE(bank.Gather(force));
+  EXPECT_TRUE(bank.Gather({.at = MakeUnitImpulse().at,
+                           .force_newtons = {std::numeric_limits<float>::infinity(), 0, 0}}));
   EXPECT_FALSE(bank.Tie({.step_s = 0.01F}, 50, mix));
   EXPECT_TRUE(bank.silent());
   test.Finish(block);
-  EXPECT_EQ(Ring(bank, MakeUnitExcitation(), 1024, 5), Ring(fresh, MakeUnitExcitation(), 1024, 5));
+  EXPECT_EQ(Ring(bank, MakeUnitImpulse(), 1024, 5), Ring(fresh, MakeUnitImpulse(), 1024, 5));
 }
 
 TEST(OscillatorBankStrikes, AGaussianContactIsTheConvolutionWithAGaussian) {
   const SoundingModes sounding{
       .modes = {MakeMode(0, 180, -60, 3), MakeMode(1, 700, -400, 4), MakeMode(2, 1500, -30, 5)}};
   const double tau_s = 0.25e-3;
-  Excitation excitation = MakeUnitExcitation();
-  excitation.tau_s = static_cast<float>(tau_s);
+  SurfaceImpulse impulse = MakeUnitImpulse();
+  impulse.tau_s = static_cast<float>(tau_s);
   OscillatorBank bank(sounding, MakeUniformShapes(3), {});
   const size_t offset = 100;
-  const auto sound = Ring(bank, excitation, 4096, offset);
+  const auto sound = Ring(bank, impulse, 4096, offset);
   double error = 0, peak = 0;
   // The closed form holds once the contact is over: from 6 tau on, where its tail is below 1e-8.
   const auto over = static_cast<size_t>(6 * tau_s / kDt) + 1;
@@ -229,12 +229,12 @@ TEST(OscillatorBankStrikes, AGaussianContactIsTheConvolutionWithAGaussian) {
 TEST(OscillatorBankStrikes, ALongContactNeverMakesAModeLouder) {
   // Damped so strongly that sigma^2 > omega^2, where the Gaussian's factor would explode.
   const SoundingModes sounding{.modes = {MakeMode(0, 30, -3000, 1)}};
-  Excitation excitation = MakeUnitExcitation();
+  SurfaceImpulse impulse = MakeUnitImpulse();
   OscillatorBank hard(sounding, MakeUniformShapes(1), {});
-  const double hard_rms = Rms(Ring(hard, excitation, 4096));
-  excitation.tau_s = 0.025F;
+  const double hard_rms = Rms(Ring(hard, impulse, 4096));
+  impulse.tau_s = 0.025F;
   OscillatorBank soft(sounding, MakeUniformShapes(1), {});
-  EXPECT_LT(Rms(Ring(soft, excitation, 4096)), 2 * hard_rms);
+  EXPECT_LT(Rms(Ring(soft, impulse, 4096)), 2 * hard_rms);
 }
 
 }  // namespace

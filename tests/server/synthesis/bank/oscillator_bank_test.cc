@@ -25,7 +25,7 @@ INSTANTIATE_TEST_SUITE_P(OscillatorBank, OnEveryTarget,
 TEST_P(OnEveryTarget, StaysWithin100DecibelsOfTheClosedFormForTenSeconds) {
   const SoundingModes sounding = MakeWideModes();
   OscillatorBank bank(sounding, MakeUniformShapes(37), {});
-  const auto sound = Ring(bank, MakeUnitExcitation(), 480000);
+  const auto sound = Ring(bank, MakeUnitImpulse(), 480000);
   const double error_db = ErrorDb(sound, sounding, 1, 0);
   RecordProperty("error_db", std::to_string(error_db));
   EXPECT_LT(error_db, -100);
@@ -36,7 +36,7 @@ TEST_P(OnEveryTarget, StartsAtAnySampleAndBetweenSamples) {
   for (const size_t offset : {size_t{0}, size_t{1}, size_t{77}, size_t{127}}) {
     for (const float lead : {0.0F, 0.25F, 0.875F}) {
       OscillatorBank bank(sounding, MakeUniformShapes(37), {});
-      const auto sound = Ring(bank, MakeUnitExcitation(), 512, offset, lead);
+      const auto sound = Ring(bank, MakeUnitImpulse(), 512, offset, lead);
       for (size_t n = 0; n < offset; ++n) ASSERT_EQ(sound[n], 0.0F);
       EXPECT_LT(ErrorDb(sound, sounding, 1, static_cast<double>(offset) - lead), -100);
     }
@@ -51,11 +51,10 @@ TEST_P(OnEveryTarget, ProjectsAnImpulseOntoTheShapesOfItsTriangle) {
   for (uint32_t m = 2; m < mode_count - 3; m += 1 + m % 3) {
     sounding.modes.push_back(MakeMode(m, 300 + 90 * m, -20));
   }
-  const Excitation excitation{.vertices = {2, 0, 1},
-                              .weights = {0.2F, 0.5F, 0.3F},
-                              .impulse_newton_seconds = {0.1F, -0.7F, 0.4F}};
+  const SurfaceImpulse impulse{.at = {.vertices = {2, 0, 1}, .weights = {0.2F, 0.5F, 0.3F}},
+                               .impulse_newton_seconds = {0.1F, -0.7F, 0.4F}};
   OscillatorBank bank(sounding, MakeShapes(values, mode_count), {});
-  const auto sound = Ring(bank, excitation, 1024);
+  const auto sound = Ring(bank, impulse, 1024);
   double error = 0, peak = 0;
   for (size_t n = 0; n < sound.size(); ++n) {
     double right = 0;
@@ -63,8 +62,8 @@ TEST_P(OnEveryTarget, ProjectsAnImpulseOntoTheShapesOfItsTriangle) {
       double g = 0;
       for (size_t i = 0; i < 3; ++i) {
         for (size_t axis = 0; axis < 3; ++axis) {
-          g += double{excitation.weights[i]} * excitation.impulse_newton_seconds[axis] *
-               values[(3 * excitation.vertices[i] + axis) * mode_count + mode.column];
+          g += double{impulse.at.weights[i]} * impulse.impulse_newton_seconds[axis] *
+               values[(3 * impulse.at.vertices[i] + axis) * mode_count + mode.column];
         }
       }
       right += ClosedForm(mode, g, static_cast<double>(n) * kDt);
@@ -78,14 +77,14 @@ TEST_P(OnEveryTarget, ProjectsAnImpulseOntoTheShapesOfItsTriangle) {
 TEST_P(OnEveryTarget, TheSameStrikesGiveTheSameBits) {
   const SoundingModes sounding = MakeWideModes();
   OscillatorBank one(sounding, MakeUniformShapes(37), {}), two(sounding, MakeUniformShapes(37), {});
-  EXPECT_EQ(Ring(one, MakeUnitExcitation(), 4096, 5, 0.5F),
-            Ring(two, MakeUnitExcitation(), 4096, 5, 0.5F));
+  EXPECT_EQ(Ring(one, MakeUnitImpulse(), 4096, 5, 0.5F),
+            Ring(two, MakeUnitImpulse(), 4096, 5, 0.5F));
 }
 
 TEST(OscillatorBank, PitchAndDecayAreThoseOfTheModes) {
   const double frequency_hz = 1234.5, sigma = -7.5;
   OscillatorBank bank({.modes = {MakeMode(0, frequency_hz, sigma, 100)}}, MakeUniformShapes(1), {});
-  const auto sound = Ring(bank, MakeUnitExcitation(), 24000);
+  const auto sound = Ring(bank, MakeUnitImpulse(), 24000);
   // Any x(n) = 2 Re(q) x(n-1) - |q|^2 x(n-2) for a damped sine: fit both by least squares, over a
   // long lag so that the rounding of samples does not matter.
   const size_t lag = 1000;
@@ -114,12 +113,12 @@ std::vector<float> StrikePair(double angle, double tau_s) {
   SoundingModes sounding{
       .modes = {MakeMode(0, 587.33, -0.68, 440), MakeMode(1, 587.33, -0.68, 440)}};
   sounding.modes[1].output_phase_rad = kPi / 2;
-  Excitation excitation = MakeUnitExcitation();
-  excitation.impulse_newton_seconds = {static_cast<float>(std::cos(angle)),
-                                       static_cast<float>(std::sin(angle)), 0};
-  excitation.tau_s = static_cast<float>(tau_s);
+  SurfaceImpulse impulse = MakeUnitImpulse();
+  impulse.impulse_newton_seconds = {static_cast<float>(std::cos(angle)),
+                                    static_cast<float>(std::sin(angle)), 0};
+  impulse.tau_s = static_cast<float>(tau_s);
   OscillatorBank bank(sounding, MakeShapes(values, 2), {});
-  return Ring(bank, excitation, 48000);
+  return Ring(bank, impulse, 48000);
 }
 
 TEST(OscillatorBank, LoudnessOfADegeneratePairDoesNotDependOnTheAngle) {
@@ -151,7 +150,7 @@ TEST(OscillatorBank, FallsSilentAndThenAddsNothing) {
   OscillatorBank bank({.modes = {MakeMode(0, 440, -700)}}, MakeUniformShapes(1), {});
   EXPECT_TRUE(bank.silent());
   TestMix test;
-  bank.Strike(MakeUnitExcitation(), 0, 0, test.Begin());
+  bank.Strike(MakeUnitImpulse(), 0, 0, test.Begin());
   EXPECT_FALSE(bank.silent());
   EXPECT_EQ(bank.active_mode_count(), 1u);
   // 200 dB at 700 nepers a second: 0.033 s, 13 blocks.
@@ -173,7 +172,7 @@ TEST(OscillatorBank, ModesFallAsleepOneVectorAfterAnother) {
   for (uint32_t m = 0; m < 64; ++m)
     sounding.modes.push_back(MakeMode(m, 100 + 100 * m, -1.0 - 5 * m));
   OscillatorBank bank(sounding, MakeUniformShapes(64), {});
-  Ring(bank, MakeUnitExcitation(), 4800);
+  Ring(bank, MakeUnitImpulse(), 4800);
   const size_t soon = bank.active_mode_count();
   std::vector<float> sound(128);
   TestMix test;
@@ -193,13 +192,13 @@ TEST(OscillatorBank, AStrikeThatIsNotFiniteOrOffTheBodyLeavesItAsItWas) {
   BlockMix& mix = test.Begin();
   for (const float bad :
        {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), 1e38F}) {
-    Excitation excitation = MakeUnitExcitation();
-    excitation.impulse_newton_seconds[1] = bad == 1e38F ? 0 : bad;
-    excitation.impulse_newton_seconds[0] = bad;
-    EXPECT_FALSE(bank.Strike(excitation, 0, 0, mix));
+    SurfaceImpulse impulse = MakeUnitImpulse();
+    impulse.impulse_newton_seconds[1] = bad == 1e38F ? 0 : bad;
+    impulse.impulse_newton_seconds[0] = bad;
+    EXPECT_FALSE(bank.Strike(impulse, 0, 0, mix));
   }
-  Excitation off = MakeUnitExcitation();
-  off.vertices[2] = 3;
+  SurfaceImpulse off = MakeUnitImpulse();
+  off.at.vertices[2] = 3;
   EXPECT_FALSE(bank.Strike(off, 0, 0, mix));
   EXPECT_TRUE(bank.silent());
 }
@@ -209,7 +208,7 @@ TEST(OscillatorBank, GainAndShapeScaleMultiplyTheSound) {
   OscillatorBank plain({.modes = {mode}}, MakeUniformShapes(1), {});
   OscillatorBank loud({.modes = {mode}, .shape_scale = 3}, MakeUniformShapes(1), {.gain = 2});
   const double ratio =
-      Rms(Ring(loud, MakeUnitExcitation(), 4800)) / Rms(Ring(plain, MakeUnitExcitation(), 4800));
+      Rms(Ring(loud, MakeUnitImpulse(), 4800)) / Rms(Ring(plain, MakeUnitImpulse(), 4800));
   EXPECT_NEAR(ratio, 6, 1e-5);
 }
 

@@ -97,14 +97,13 @@ std::vector<float> StrikeTube(const SoundingMaterial& material, const Blow& blow
                               OscillatorBankSettings{}))
                           .value();
   const auto stream = mixer.OpenStream().value();
-  const Excitation excitation{
-      .vertices = {blow.ring, blow.ring, blow.ring},
-      .weights = {1, 0, 0},
+  const SurfaceImpulse impulse{
+      .at = {.vertices = {blow.ring, blow.ring, blow.ring}, .weights = {1, 0, 0}},
       .impulse_newton_seconds =
           {static_cast<float>(blow.impulse_newton_seconds * std::cos(blow.angle_rad)),
            static_cast<float>(blow.impulse_newton_seconds * std::sin(blow.angle_rad)), 0},
       .tau_s = static_cast<float>(blow.duration_s / 4)};
-  stream->TryPush({.bank = bank, .excitation = excitation});
+  stream->TryPush({.bank = bank, .action = impulse});
   std::vector<float> sound(96000);
   mixer.Render(sound);
   return sound;

@@ -26,9 +26,8 @@ class Held {
       : bank_(modes, MakeUniformShapes(modes.modes.size()), {.noise_seed = 7}) {}
 
   void Tie(double force_newtons, const ForceKnot& knot, size_t offset) {
-    Excitation force = MakeUnitExcitation();
-    force.impulse_newton_seconds = {static_cast<float>(force_newtons), 0, 0};
-    EXPECT_TRUE(bank_.Gather(force));
+    EXPECT_TRUE(bank_.Gather(
+        {.at = MakeUnitImpulse().at, .force_newtons = {static_cast<float>(force_newtons), 0, 0}}));
     EXPECT_TRUE(bank_.Tie(knot, offset, *mix_));
   }
 
@@ -92,7 +91,7 @@ TEST_P(AtEveryStep, AJitteringLoadIsFarBelowTheBodysOwnImpact) {
     return weight * (1 + 0.3 * std::sin(1e6 * t));  // as good as random from step to step
   });
   OscillatorBank bank(ThreeModes(), MakeUniformShapes(3), {});
-  const auto impact = Ring(bank, MakeUnitExcitation(), 48000);  // 1 kg that falls at 1 m/s
+  const auto impact = Ring(bank, MakeUnitImpulse(), 48000);  // 1 kg that falls at 1 m/s
   const double quiet_db = 20 * std::log10(PeakOf(std::span(sound).last(48000)) / PeakOf(impact));
   RecordProperty("decibels", std::to_string(quiet_db));
   EXPECT_LT(quiet_db, -60);
@@ -166,15 +165,14 @@ TEST(SustainedForce, AForceThatIsNoNumberIsRefusedAndLeavesTheBankSound) {
   OscillatorBank bank(ThreeModes(), MakeUniformShapes(3), {});
   TestMix test;
   BlockMix& mix = test.Begin();
-  Excitation force = MakeUnitExcitation();
-  force.impulse_newton_seconds[0] = std::numeric_limits<float>::infinity();
-  bank.Gather(force);
+  bank.Gather({.at = MakeUnitImpulse().at,
+               .force_newtons = {std::numeric_limits<float>::infinity(), 0, 0}});
   EXPECT_FALSE(bank.Tie({.step_s = 0.01F, .roughness = 1, .bandwidth_hz = 500}, 3, mix));
   EXPECT_TRUE(bank.RenderAdd(mix));
   std::vector<float> sound(kBlock);
   test.Finish(sound);
   EXPECT_EQ(PeakOf(sound), 0);
-  const auto ringing = Ring(bank, MakeUnitExcitation(), 4800);
+  const auto ringing = Ring(bank, MakeUnitImpulse(), 4800);
   EXPECT_GT(PeakOf(ringing), 0);
 }
 

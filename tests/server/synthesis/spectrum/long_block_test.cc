@@ -108,7 +108,7 @@ TEST_P(OnEveryTarget, GoingOverToTheSpectrumIsNotHeardWheneverTheStrikeCame) {
   for (size_t stagger = 0; stagger < BlockMix::kStaggers; ++stagger) {
     OscillatorBank bank(sounding, MakeUniformShapes(60), {});
     const size_t offset = 8 * stagger;
-    const auto sound = Ring(bank, MakeUnitExcitation(), 8192, offset, 0.5F, 128, stagger);
+    const auto sound = Ring(bank, MakeUnitImpulse(), 8192, offset, 0.5F, 128, stagger);
     EXPECT_FALSE(bank.out_of_spectrum());
     EXPECT_LT(ErrorDb(sound, sounding, 1, static_cast<double>(offset) - 0.5), -100);
   }
@@ -126,7 +126,7 @@ TEST_P(OnEveryTarget, StrikesOnABankThatRingsBySpectrumAddToIt) {
   for (size_t block = 0, next = 0; block < 250; ++block) {
     BlockMix& mix = test.Begin();
     for (; next < strikes.size() && strikes[next] / 128 == block; ++next) {
-      bank.Strike(MakeUnitExcitation(), strikes[next] % 128, 0, mix);
+      bank.Strike(MakeUnitImpulse(), strikes[next] % 128, 0, mix);
     }
     test.Render(bank, std::span(sound).subspan(128 * block, 128));
     left_spectrum |= block > 60 && bank.out_of_spectrum();
@@ -153,7 +153,7 @@ TEST_P(OnEveryTarget, ABankThatLeavesTheSpectrumSoundsOnAsItDid) {
   TestMix test;
   for (size_t block = 0; block < 40; ++block) {
     BlockMix& mix = test.Begin();
-    if (block == 0) bank.Strike(MakeUnitExcitation(), 0, 0, mix);
+    if (block == 0) bank.Strike(MakeUnitImpulse(), 0, 0, mix);
     if (block == 20) bank.LeaveSpectrum();
     test.Render(bank, std::span(sound).subspan(128 * block, 128));
   }

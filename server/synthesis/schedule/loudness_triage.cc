@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "server/synthesis/schedule/strike_triage.h"
+#include "server/synthesis/schedule/loudness_triage.h"
 
 #include <algorithm>
 #include <bit>
@@ -7,19 +7,19 @@
 
 namespace carillon {
 
-void StrikeTriage::Clear() noexcept {
+void LoudnessTriage::Clear() noexcept {
   bins_.fill({});
   all_ = {};
   first_merged_ = first_exact_ = 0;
 }
 
-size_t StrikeTriage::Bin(float loudness) noexcept {
+size_t LoudnessTriage::Bin(float loudness) noexcept {
   // What is no number is refused later; to order it, it counts as silent.
   const float positive = loudness > 0 ? loudness : 0;
   return std::min<size_t>(std::bit_cast<uint32_t>(positive) >> 20, kBins - 1);
 }
 
-void StrikeTriage::Note(float loudness, double exact_work, double merged_work) noexcept {
+void LoudnessTriage::Note(float loudness, double exact_work, double merged_work) noexcept {
   Work& bin = bins_[Bin(loudness)];
   bin.exact += exact_work;
   bin.merged += merged_work;
@@ -27,7 +27,7 @@ void StrikeTriage::Note(float loudness, double exact_work, double merged_work) n
   all_.merged += merged_work;
 }
 
-double StrikeTriage::Decide(double most_work) noexcept {
+double LoudnessTriage::Decide(double most_work) noexcept {
   first_merged_ = first_exact_ = 0;
   if (all_.exact <= most_work) return all_.exact;
   if (all_.merged <= most_work) return ShareOut(most_work, all_.merged);
@@ -40,7 +40,7 @@ double StrikeTriage::Decide(double most_work) noexcept {
 }
 
 /// All are merged; what work is left makes the loudest exact.
-double StrikeTriage::ShareOut(double most_work, double all_merged) noexcept {
+double LoudnessTriage::ShareOut(double most_work, double all_merged) noexcept {
   double work = all_merged;
   for (first_exact_ = kBins; first_exact_ > 0; --first_exact_) {
     const Work& bin = bins_[first_exact_ - 1];
@@ -50,11 +50,11 @@ double StrikeTriage::ShareOut(double most_work, double all_merged) noexcept {
   return work;
 }
 
-float StrikeTriage::shed_below() const noexcept {
+float LoudnessTriage::shed_below() const noexcept {
   return std::bit_cast<float>(static_cast<uint32_t>(first_merged_) << 20);
 }
 
-Treatment StrikeTriage::Treat(float loudness) const noexcept {
+Treatment LoudnessTriage::Treat(float loudness) const noexcept {
   const size_t bin = Bin(loudness);
   if (bin >= first_exact_) return Treatment::kExact;
   return bin >= first_merged_ ? Treatment::kMerged : Treatment::kShed;

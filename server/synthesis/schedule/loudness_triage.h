@@ -17,7 +17,7 @@ enum class Treatment : uint8_t {
 /// Chooses by loudness: the loudest strikes are exact, the next merged, the least audible shed, so
 /// that their work stays within a bound. The time it takes does not depend on how the strikes are
 /// distributed.
-class StrikeTriage {
+class LoudnessTriage {
  public:
   /// Forgets all.
   void Clear() noexcept;

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <utility>
+
+#include "server/base/spsc_ring.h"
+#include "server/synthesis/schedule/mixer_event.h"
+
+namespace carillon {
+
+/// The part of an event stream that the mixer shares: the pushing thread produces events, the
+/// rendering thread consumes them.
+struct EventQueue {
+  explicit EventQueue(size_t capacity) : events(capacity) {}
+
+  SpscRing<MixerEvent> events;
+  std::atomic<bool> closed{false};
+  std::atomic<uint64_t> accepted_count{0};
+  std::atomic<uint64_t> late_count{0};
+  std::atomic<uint64_t> dropped_count{0};
+};
+
+/// Carries events of one source, a contact stream for instance, to the mixer; one thread at a time
+/// pushes. Events pushed before the stream is destroyed are still rendered.
+class EventStream {
+ public:
+  explicit EventStream(std::shared_ptr<EventQueue> queue) : queue_(std::move(queue)) {}
+  ~EventStream() { queue_->closed.store(true, std::memory_order_release); }
+  EventStream(const EventStream&) = delete;
+  EventStream& operator=(const EventStream&) = delete;
+
+  /// False: the queue to the mixer is full and the event is lost (counted as dropped).
+  bool TryPush(const MixerEvent& event) noexcept {
+    const bool pushed = queue_->events.TryPush(event);
+    if (!pushed) queue_->dropped_count.fetch_add(1, std::memory_order_relaxed);
+    return pushed;
+  }
+
+  /// Impulses of this stream that the mixer took in time or late, and events that were lost. An
+  /// event is counted once the mixer has taken it, which happens at the next block or soon after.
+  uint64_t accepted_count() const noexcept { return queue_->accepted_count.load(); }
+  uint64_t late_count() const noexcept { return queue_->late_count.load(); }
+  uint64_t dropped_count() const noexcept { return queue_->dropped_count.load(); }
+
+ private:
+  std::shared_ptr<EventQueue> queue_;
+};
+
+}  // namespace carillon

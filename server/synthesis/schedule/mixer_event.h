@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <type_traits>
+#include <variant>
+
+namespace carillon {
+
+/// Names a bank in a mixer; a default one names none.
+struct BankId {
+  uint32_t slot = UINT32_MAX;
+  uint32_t generation = 0;
+  friend bool operator==(const BankId&, const BankId&) = default;
+};
+
+/// A point on a triangle of the sounding surface.
+struct TrianglePoint {
+  std::array<uint32_t, 3> vertices{};
+  std::array<float, 3> weights{};  ///< barycentric
+};
+
+/// An impulse at a point of the sounding surface.
+struct SurfaceImpulse {
+  TrianglePoint at{};
+  std::array<float, 3> impulse_newton_seconds{};  ///< in the object's frame
+  float tau_s = 0;  ///< standard deviation of the contact's Gaussian; zero: instantaneous
+};
+
+/// The force of one sustained contact at a point of the sounding surface. The mixer adds it to the
+/// object's whole force, which becomes effective at the object's next knot.
+struct SurfaceForce {
+  TrianglePoint at{};
+  std::array<float, 3> force_newtons{};  ///< in the object's frame
+};
+
+/// The end of a simulation step: the forces added since the previous knot are the object's whole
+/// force now. Between two knots the force is interpolated linearly.
+struct ForceKnot {
+  float step_s = 0;     ///< time since the previous knot
+  float roughness = 0;  ///< root mean square of the force's fluctuation, relative to the force
+  float bandwidth_hz =
+      0;  ///< of the fluctuation; zero: the contact does not travel, no fluctuation
+};
+
+/// A straight way to a new place.
+struct Motion {
+  std::array<float, 3> position_m{};
+  std::array<float, 3> right{1, 0, 0};  ///< unit vector to the right; only a listener's is used
+  float glide_frames = 0;               ///< duration of the way; below one: a jump
+};
+
+/// The object whose voice the bank sounds through moves.
+struct ObjectMove {
+  Motion motion{};
+};
+
+/// The listener who hears the bank's voice moves.
+struct ListenerMove {
+  Motion motion{};
+};
+
+/// One instruction to one bank, with its time: frame + fraction, in frames since the mixer began.
+/// The first audible sample is the first at or after that time; its phase accounts for the part of
+/// a frame between the two.
+struct MixerEvent {
+  using Action = std::variant<SurfaceImpulse, SurfaceForce, ForceKnot, ObjectMove, ListenerMove>;
+
+  BankId bank{};
+  uint64_t frame = 0;
+  float fraction = 0;  ///< 0 <= fraction < 1
+  Action action{};
+
+  /// Number of the first audible sample.
+  uint64_t FirstSample() const noexcept { return frame + (fraction > 0 ? 1 : 0); }
+
+  /// Frames from the event to its first audible sample.
+  float LeadFrames() const noexcept { return fraction > 0 ? 1 - fraction : 0; }
+
+  /// The impulse; null for another kind of event.
+  const SurfaceImpulse* impulse() const noexcept { return std::get_if<SurfaceImpulse>(&action); }
+};
+
+// Queues between threads copy events bytewise; each event fills one cache line.
+static_assert(std::is_trivially_copyable_v<MixerEvent>);
+static_assert(sizeof(MixerEvent) == 64);
+
+}  // namespace carillon

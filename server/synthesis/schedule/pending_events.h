@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "server/base/fixed_vector.h"
+#include "server/synthesis/schedule/mixer_event.h"
+
+namespace carillon {
+
+/// Events that wait for their block: a hash table from block number to the list of the block's
+/// events. Neither adding an event nor collecting a block depends on how many events wait. All
+/// memory is allocated by the constructor.
+class PendingEvents {
+ public:
+  PendingEvents(size_t capacity, size_t block_frame_count);
+
+  /// False: full. The event's first sample does not lie before the block that was collected last.
+  bool TryPush(const MixerEvent& event) noexcept;
+
+  /// Appends the indices of the events of the block that begins at `block_start`, in order of
+  /// arrival. Blocks are collected in ascending order. Collected events stay readable until Free.
+  void Collect(uint64_t block_start, FixedVector<uint32_t>& indices) noexcept;
+
+  /// Makes room in place of collected events.
+  void Free(std::span<const uint32_t> indices) noexcept;
+
+  const MixerEvent& operator[](uint32_t index) const noexcept { return entries_[index].event; }
+
+ private:
+  static constexpr uint32_t kNone = UINT32_MAX;
+  struct Entry {
+    MixerEvent event;
+    uint32_t next = kNone;
+  };
+  /// A linked list of entries, in order of arrival.
+  struct List {
+    uint32_t first = kNone;
+    uint32_t last = kNone;
+  };
+
+  uint32_t TakeEntry() noexcept;
+  void Append(List& list, uint32_t index) noexcept;
+
+  size_t capacity_;
+  size_t block_frame_count_;
+  std::unique_ptr<Entry[]> entries_;
+  uint32_t used_count_ = 0;  // entries that were ever used
+  uint32_t first_free_ = kNone;
+  std::vector<List> lists_;  // by block number modulo their count
+};
+
+}  // namespace carillon
