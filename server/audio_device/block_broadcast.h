@@ -12,7 +12,7 @@
 #include "absl/base/thread_annotations.h"
 #include "absl/status/statusor.h"
 #include "server/audio_device/audio_device.h"
-#include "server/audio_device/copy_ring.h"
+#include "server/audio_device/ring_buffer.h"
 #include "server/base/mutex.h"
 
 namespace carillon {
@@ -78,8 +78,8 @@ class BlockBroadcast {
 
   const DeviceFormat format_;
   const size_t queue_block_count_;
-  CopyRing<float> samples_;
-  CopyRing<uint64_t> first_frames_;
+  RingBuffer<float> samples_;
+  RingBuffer<uint64_t> first_frames_;
   Mutex mutex_;
   std::vector<Listener*> listeners_ ABSL_GUARDED_BY(mutex_);
 };

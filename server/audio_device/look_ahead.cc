@@ -15,7 +15,7 @@ LookAhead::LookAhead(const DeviceFormat& format, uint32_t block_count, RenderBlo
       block_count_(block_count),
       render_(std::move(render)),
       clock_(clock),
-      ring_(block_count * format.block_size()),
+      rendered_(block_count * format.block_size()),
       block_(format.block_size()) {}
 
 LookAhead::~LookAhead() { Stop(); }
@@ -33,7 +33,7 @@ void LookAhead::Stop() {
 }
 
 void LookAhead::Pull(std::span<float> frames) noexcept {
-  const size_t ready = ring_.Pop(frames);
+  const size_t ready = rendered_.Pop(frames);
   if (ready == frames.size()) return;
   std::ranges::fill(frames.subspan(ready), 0.0F);
   xrun_count_.fetch_add(1, std::memory_order_relaxed);
@@ -49,7 +49,7 @@ void LookAhead::Run() {
   const auto half_block =
       std::chrono::nanoseconds(500'000'000ULL * format_.block_frame_count / format_.sample_rate_hz);
   while (!stopping_) {
-    while (ring_.free_count() >= block_.size() && !stopping_) RenderOne();
+    while (rendered_.free_count() >= block_.size() && !stopping_) RenderOne();
     clock_.SleepUntil(clock_.Monotonic() + half_block);
   }
 }
@@ -58,7 +58,7 @@ void LookAhead::RenderOne() {
   const std::chrono::nanoseconds start = clock_.Monotonic();
   render_(block_);
   const std::chrono::duration<double> taken = clock_.Monotonic() - start;
-  ring_.Push(block_);
+  rendered_.Push(block_);
   const double block_s = static_cast<double>(format_.block_frame_count) / format_.sample_rate_hz;
   const double old_load = load();
   load_.store(old_load + block_s * (taken.count() / block_s - old_load), std::memory_order_relaxed);

@@ -10,7 +10,7 @@
 
 #include "absl/status/status.h"
 #include "server/audio_device/audio_device.h"
-#include "server/audio_device/copy_ring.h"
+#include "server/audio_device/ring_buffer.h"
 #include "server/base/clock.h"
 
 namespace carillon {
@@ -60,7 +60,7 @@ class LookAhead final : public FrameSource {
   const uint32_t block_count_;
   const RenderBlock render_;
   Clock& clock_;
-  CopyRing<float> ring_;
+  RingBuffer<float> rendered_;
   std::vector<float> block_;
   std::atomic<uint64_t> xrun_count_{0};
   std::atomic<uint64_t> lost_frame_count_{0};

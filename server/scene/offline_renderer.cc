@@ -24,7 +24,7 @@ constexpr float kQuiet = 1e-4F;
 constexpr double kQuietS = 0.25;
 constexpr size_t kQueueCapacity = 65536;
 
-MixerSettings SettingsOf(const OfflineSettings& settings, SectionCrew& crew) {
+MixerSettings SettingsOf(const OfflineSettings& settings, SectionThreads& threads) {
   // Nothing waits here, so a block takes however many events fall into it.
   return {.sample_rate_hz = static_cast<double>(settings.sample_rate_hz),
           .block_frame_count = OfflineRenderer::kBlockFrameCount,
@@ -33,7 +33,7 @@ MixerSettings SettingsOf(const OfflineSettings& settings, SectionCrew& crew) {
           .most_streams = 1,
           .most_pending_events = kQueueCapacity,
           .most_events_per_block = kQueueCapacity,
-          .crew = &crew};
+          .threads = &threads};
 }
 
 bool IsMove(const MixerEvent& event) {
@@ -71,8 +71,8 @@ absl::StatusOr<std::unique_ptr<OfflineRenderer>> OfflineRenderer::Make(
 OfflineRenderer::OfflineRenderer(const OfflineSettings& settings, BodyCache& bodies)
     : settings_(settings),
       bodies_(bodies),
-      crew_(settings.thread_count),
-      mixer_(SettingsOf(settings, crew_)),
+      threads_(settings.thread_count),
+      mixer_(SettingsOf(settings, threads_)),
       forces_(settings.step_s),
       pose_times_(settings.step_s) {}
 

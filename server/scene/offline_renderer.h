@@ -17,7 +17,7 @@
 #include "server/scene/sounding_body.h"
 #include "server/scene/sounding_object.h"
 #include "server/synthesis/mixer.h"
-#include "server/synthesis/render_crew.h"
+#include "server/synthesis/render_threads.h"
 
 namespace carillon {
 
@@ -110,7 +110,7 @@ class OfflineRenderer {
 
   const OfflineSettings settings_;
   BodyCache& bodies_;
-  RenderCrew crew_;
+  RenderThreads threads_;
   Mixer mixer_;
   std::unique_ptr<EventStream> stream_;
   std::map<uint32_t, SoundingObject> objects_;

@@ -269,7 +269,7 @@ void Mixer::RenderOneSection(size_t worker, size_t section, size_t frame_count) 
        .placed = std::span(placed_frames_)
                      .subspan(section * frame_count * settings_.channel_count,
                               frame_count * settings_.channel_count)},
-      desks_[worker]);
+      workspaces_[worker]);
 }
 
 void Mixer::RenderSections(std::span<float> frames) noexcept {
@@ -278,11 +278,11 @@ void Mixer::RenderSections(std::span<float> frames) noexcept {
   }
   const size_t frame_count = frames.size() / settings_.channel_count;
   const auto render = [&](size_t worker, size_t section) {
-    const InRole role(kRenderRole);  // a thread of the crew, too
+    const InRole role(kRenderRole);  // each of the threads that render sections has it
     RenderOneSection(worker, section, frame_count);
   };
-  if (settings_.crew != nullptr) {
-    settings_.crew->Render(kSectionCount, render);
+  if (settings_.threads != nullptr) {
+    settings_.threads->Render(kSectionCount, render);
   } else {
     for (size_t section = 0; section < kSectionCount; ++section) {
       RenderOneSection(0, section, frame_count);

@@ -14,14 +14,14 @@
 #include "server/base/clock.h"
 #include "server/base/fixed_vector.h"
 #include "server/base/mutex.h"
-#include "server/base/spsc_ring.h"
+#include "server/base/spsc_queue.h"
 #include "server/base/thread_role.h"
 #include "server/synthesis/bank/block_mix.h"
 #include "server/synthesis/bank/oscillator_bank.h"
 #include "server/synthesis/bank_slot.h"
 #include "server/synthesis/limiter.h"
-#include "server/synthesis/render_crew.h"
 #include "server/synthesis/render_section.h"
+#include "server/synthesis/render_threads.h"
 #include "server/synthesis/schedule/event_stream.h"
 #include "server/synthesis/schedule/loudness_triage.h"
 #include "server/synthesis/schedule/mixer_event.h"
@@ -55,7 +55,7 @@ struct MixerSettings {
   double most_load = 0.7;  ///< part of real time
   /// Who renders the sections; none: the caller alone. The sound is the same, bit for bit. It must
   /// outlive the mixer.
-  SectionCrew* crew = nullptr;
+  SectionThreads* threads = nullptr;
 };
 
 /// What a mixer has counted since it was made, and what it renders now.
@@ -199,8 +199,8 @@ class Mixer {
   std::vector<uint32_t> free_slots_ ABSL_GUARDED_BY(control_mutex_);
   std::array<size_t, kSectionCount> section_mode_counts_ ABSL_GUARDED_BY(control_mutex_){};
   std::vector<std::shared_ptr<EventQueue>> queues_ ABSL_GUARDED_BY(control_mutex_);
-  SpscRing<Command> commands_;  // produced under control_mutex_
-  SpscRing<Retired> retired_;   // consumed under control_mutex_
+  SpscQueue<Command> commands_;  // produced under control_mutex_
+  SpscQueue<Retired> retired_;   // consumed under control_mutex_
 
   uint64_t block_start_ ABSL_GUARDED_BY(kRenderRole);
   std::vector<BankSlot> slots_ ABSL_GUARDED_BY(kRenderRole);
@@ -233,8 +233,8 @@ class Mixer {
   std::array<SectionCounts, kSectionCount> section_counts_ ABSL_GUARDED_BY(kRenderRole){};
   std::vector<float> section_frames_ ABSL_GUARDED_BY(kRenderRole);
   std::vector<float> placed_frames_ ABSL_GUARDED_BY(kRenderRole);
-  std::vector<float> mixed_frames_ ABSL_GUARDED_BY(kRenderRole);  // mono
-  std::vector<RenderDesk> desks_ ABSL_GUARDED_BY(kRenderRole);    // one for each of the crew
+  std::vector<float> mixed_frames_ ABSL_GUARDED_BY(kRenderRole);          // mono
+  std::vector<RenderWorkspace> workspaces_ ABSL_GUARDED_BY(kRenderRole);  // one for each thread
   Limiter limiter_ ABSL_GUARDED_BY(kRenderRole);
 };
 

@@ -45,8 +45,8 @@ Mixer::Mixer(const MixerSettings& settings)
   assert(settings.first_frame % settings.block_frame_count == 0);
   assert(settings.most_banks <= kMostBanks);
   statistics_.frame_count = settings.first_frame;
-  const size_t worker_count = settings.crew == nullptr ? 1 : settings.crew->size();
-  for (size_t i = 0; i < worker_count; ++i) desks_.emplace_back(settings.block_frame_count);
+  const size_t worker_count = settings.threads == nullptr ? 1 : settings.threads->size();
+  for (size_t i = 0; i < worker_count; ++i) workspaces_.emplace_back(settings.block_frame_count);
   for (size_t section = 0; section < kSectionCount; ++section) {
     sections_.emplace_back(RenderSection::Settings{.block_frame_count = settings.block_frame_count,
                                                    .stagger = section,

@@ -48,7 +48,7 @@ RenderSection::RenderSection(const Settings& settings, std::span<BankSlot> slots
       mix_(settings.block_frame_count, settings.stagger) {}
 
 SectionCounts RenderSection::Render(uint64_t block_number, std::span<const DueEvent> events,
-                                    const Output& output, RenderDesk& desk) noexcept {
+                                    const Output& output, RenderWorkspace& workspace) noexcept {
   SectionCounts counts;
   const size_t placed_count = settings_.block_frame_count * settings_.channel_count;
   std::span<float> frames = output.frames;
@@ -60,7 +60,7 @@ SectionCounts RenderSection::Render(uint64_t block_number, std::span<const DueEv
       std::ranges::fill(block, 0.0F);
       continue;
     }
-    mix_.Begin(block_number + i, desk);
+    mix_.Begin(block_number + i, workspace);
     const auto later = std::ranges::find_if(events, [i](const auto& due) { return due.block > i; });
     const auto due_count = static_cast<size_t>(later - events.begin());
     Execute(events.first(due_count), counts);

@@ -50,7 +50,7 @@ class RenderSection {
   /// block, then slot, then offset. Where the counts say that nothing was placed, `placed` is
   /// untouched.
   SectionCounts Render(uint64_t block_number, std::span<const DueEvent> events,
-                       const Output& output, RenderDesk& desk) noexcept
+                       const Output& output, RenderWorkspace& workspace) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
  private:

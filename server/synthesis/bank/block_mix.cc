@@ -17,7 +17,7 @@ std::array<Spectrum, kLongBlockKinds> MakeSpectra(size_t block_frame_count,
 
 }  // namespace
 
-RenderDesk::RenderDesk(size_t block_frame_count)
+RenderWorkspace::RenderWorkspace(size_t block_frame_count)
     : spectra(MakeSpectra(block_frame_count, std::make_index_sequence<kLongBlockKinds>())) {}
 
 BlockMix::BlockMix(size_t block_frame_count, size_t stagger)
@@ -27,8 +27,8 @@ BlockMix::BlockMix(size_t block_frame_count, size_t stagger)
   }
 }
 
-void BlockMix::Begin(uint64_t block_number, RenderDesk& desk) noexcept {
-  desk_ = &desk;
+void BlockMix::Begin(uint64_t block_number, RenderWorkspace& workspace) noexcept {
+  workspace_ = &workspace;
   any_begins_ = false;
   for (size_t kind = 0; kind < kLongBlockKinds; ++kind) {
     const size_t count = long_blocks_[kind].block_count;
@@ -36,7 +36,7 @@ void BlockMix::Begin(uint64_t block_number, RenderDesk& desk) noexcept {
     used_[kind] = false;
     any_begins_ |= begins_[kind];
   }
-  desk_->lanes.Clear(long_blocks_[0].frame_count / long_blocks_[0].block_count);
+  workspace_->lanes.Clear(long_blocks_[0].frame_count / long_blocks_[0].block_count);
 }
 
 bool BlockMix::idle() const noexcept {
@@ -44,25 +44,25 @@ bool BlockMix::idle() const noexcept {
 }
 
 void BlockMix::SetApart(size_t block_frame_count) noexcept {
-  if (!apart_) desk_->lanes_apart.Clear(block_frame_count);
+  if (!apart_) workspace_->lanes_apart.Clear(block_frame_count);
   apart_ = true;
 }
 
 void BlockMix::TakeApart(std::span<float> frames) noexcept {
   std::array<float, kMostBlockFrames> apart;
   const std::span<float> block = std::span(apart).first(frames.size());
-  desk_->lanes_apart.Reduce(block);
+  workspace_->lanes_apart.Reduce(block);
   for (size_t n = 0; n < frames.size(); ++n) frames[n] += block[n];
 }
 
 void BlockMix::Finish(std::span<float> block) noexcept {
-  desk_->lanes.Reduce(block);
+  workspace_->lanes.Reduce(block);
   for (size_t kind = 0; kind < kLongBlockKinds; ++kind) {
     Rendered& rendered = rendered_[kind];
     if (begins_[kind]) {
       rendered.next = 0;
       rendered.sounding = used_[kind];
-      if (used_[kind]) desk_->spectra[kind].Transform(rendered.frames);
+      if (used_[kind]) workspace_->spectra[kind].Transform(rendered.frames);
     }
     if (!rendered.sounding) continue;
     assert(rendered.next + block.size() <= rendered.frames.size());

@@ -15,8 +15,8 @@
 namespace carillon {
 
 /// Workspace of one rendering thread, which may serve many mixes in turn.
-struct RenderDesk {
-  explicit RenderDesk(size_t block_frame_count);
+struct RenderWorkspace {
+  explicit RenderWorkspace(size_t block_frame_count);
 
   StrikeBatch batch;
   std::array<Spectrum, kLongBlockKinds> spectra;
@@ -34,7 +34,7 @@ class BlockMix {
   explicit BlockMix(size_t block_frame_count, size_t stagger = 0);
 
   /// Begins the block of this number; Begin and Finish alternate.
-  void Begin(uint64_t block_number, RenderDesk& desk) noexcept;
+  void Begin(uint64_t block_number, RenderWorkspace& workspace) noexcept;
 
   /// Writes the block.
   void Finish(std::span<float> block) noexcept;
@@ -48,14 +48,14 @@ class BlockMix {
   /// Where modes add themselves to the long block of this kind that begins.
   float* Slots(size_t kind) noexcept {
     used_[kind] = true;
-    return desk_->spectra[kind].slots();
+    return workspace_->spectra[kind].slots();
   }
 
   /// No long block is under way: without banks there is silence.
   bool idle() const noexcept;
 
   /// What rings in the time domain goes here.
-  LaneMix& lanes() noexcept { return apart_ ? desk_->lanes_apart : desk_->lanes; }
+  LaneMix& lanes() noexcept { return apart_ ? workspace_->lanes_apart : workspace_->lanes; }
 
   /// From now on that is not part of the block, until Reunite; in the middle of it nothing changes.
   void SetApart(size_t block_frame_count) noexcept;
@@ -63,7 +63,7 @@ class BlockMix {
   void TakeApart(std::span<float> frames) noexcept;
   void Reunite() noexcept { apart_ = false; }
 
-  StrikeBatch& batch() noexcept { return desk_->batch; }
+  StrikeBatch& batch() noexcept { return workspace_->batch; }
 
  private:
   /// Frames of a long block under way.
@@ -75,7 +75,7 @@ class BlockMix {
 
   std::array<LongBlock, kLongBlockKinds> long_blocks_;
   size_t stagger_;
-  RenderDesk* desk_ = nullptr;
+  RenderWorkspace* workspace_ = nullptr;
   std::array<bool, kLongBlockKinds> begins_{}, used_{};
   bool any_begins_ = false;
   std::array<Rendered, kLongBlockKinds> rendered_;

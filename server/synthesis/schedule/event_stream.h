@@ -7,7 +7,7 @@
 #include <memory>
 #include <utility>
 
-#include "server/base/spsc_ring.h"
+#include "server/base/spsc_queue.h"
 #include "server/synthesis/schedule/mixer_event.h"
 
 namespace carillon {
@@ -17,7 +17,7 @@ namespace carillon {
 struct EventQueue {
   explicit EventQueue(size_t capacity) : events(capacity) {}
 
-  SpscRing<MixerEvent> events;
+  SpscQueue<MixerEvent> events;
   std::atomic<bool> closed{false};
   std::atomic<uint64_t> accepted_count{0};
   std::atomic<uint64_t> late_count{0};

@@ -104,10 +104,10 @@ inline SoundingModes MakeWideModes() {
 class TestMix {
  public:
   explicit TestMix(size_t block_frame_count = 128, size_t stagger = 0)
-      : desk_(block_frame_count), mix_(block_frame_count, stagger) {}
+      : workspace_(block_frame_count), mix_(block_frame_count, stagger) {}
 
   BlockMix& Begin() {
-    mix_.Begin(block_number_++, desk_);
+    mix_.Begin(block_number_++, workspace_);
     return mix_;
   }
   void Finish(std::span<float> block) { mix_.Finish(block); }
@@ -118,7 +118,7 @@ class TestMix {
   }
 
  private:
-  RenderDesk desk_;
+  RenderWorkspace workspace_;
   BlockMix mix_;
   uint64_t block_number_ = 0;
 };

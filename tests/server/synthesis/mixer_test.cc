@@ -131,8 +131,8 @@ TEST_F(MixerTest, OneCallOverManyBlocksGivesTheBitsOfManyCalls) {
 
 /// Sixty objects struck all over, rendered by so many threads.
 std::vector<float> RenderBy(size_t thread_count) {
-  RenderCrew crew(thread_count);
-  Mixer mixer({.most_banks = 60, .crew = &crew});
+  RenderThreads threads(thread_count);
+  Mixer mixer({.most_banks = 60, .threads = &threads});
   const auto stream = mixer.OpenStream().value();
   for (uint32_t i = 0; i < 60; ++i) {
     SoundingModes sounding;
@@ -155,7 +155,7 @@ std::vector<float> RenderBy(size_t thread_count) {
   return sound;
 }
 
-TEST(MixerCrew, TheSoundIsTheSameBitForBitFromRunToRunAndForAnyNumberOfThreads) {
+TEST(MixerThreads, TheSoundIsTheSameBitForBitFromRunToRunAndForAnyNumberOfThreads) {
   const std::vector<float> alone = RenderBy(1);
   EXPECT_GT(Rms(alone), 0);
   for (const size_t thread_count : {1U, 2U, 3U, 7U}) EXPECT_EQ(RenderBy(thread_count), alone);

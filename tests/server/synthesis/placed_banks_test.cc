@@ -135,8 +135,8 @@ TEST(PlacedBanks, AnotherBankOnTheSameVoiceTakesOverWhileTheFirstRings) {
 }
 
 std::vector<float> RenderCrowd(size_t thread_count, size_t blocks_a_call) {
-  RenderCrew crew(thread_count);
-  Mixer mixer({.channel_count = 2, .crew = &crew});
+  RenderThreads threads(thread_count);
+  Mixer mixer({.channel_count = 2, .threads = &threads});
   const auto stream = mixer.OpenStream(65536).value();
   for (int i = 0; i < 20; ++i) {
     const Place place{.position_m = {i - 10.0, 0.1 * i, -1.0 - i}};

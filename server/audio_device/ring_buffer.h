@@ -11,10 +11,10 @@ namespace carillon {
 
 /// Plain values (frames, numbers) from one thread to one other, copied in runs, without locks.
 template <typename T>
-class CopyRing {
+class RingBuffer {
  public:
   /// `capacity` values fit.
-  explicit CopyRing(size_t capacity) : values_(capacity) {}
+  explicit RingBuffer(size_t capacity) : values_(capacity) {}
 
   size_t capacity() const { return values_.size(); }
 

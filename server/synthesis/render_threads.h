@@ -12,9 +12,9 @@
 namespace carillon {
 
 /// Renders the sections of a mixer.
-class SectionCrew {
+class SectionThreads {
  public:
-  virtual ~SectionCrew() = default;
+  virtual ~SectionThreads() = default;
 
   /// How many threads work, the caller's included.
   virtual size_t size() const noexcept = 0;
@@ -26,12 +26,12 @@ class SectionCrew {
 
 /// Threads that render together with the caller's. For offline rendering only: they wait in the
 /// kernel.
-class RenderCrew final : public SectionCrew {
+class RenderThreads final : public SectionThreads {
  public:
-  explicit RenderCrew(size_t thread_count);
-  ~RenderCrew() override;
-  RenderCrew(const RenderCrew&) = delete;
-  RenderCrew& operator=(const RenderCrew&) = delete;
+  explicit RenderThreads(size_t thread_count);
+  ~RenderThreads() override;
+  RenderThreads(const RenderThreads&) = delete;
+  RenderThreads& operator=(const RenderThreads&) = delete;
 
   size_t size() const noexcept override { return threads_.size() + 1; }
   void Render(size_t count, absl::FunctionRef<void(size_t, size_t)> render) noexcept override;

@@ -9,14 +9,14 @@ namespace carillon {
 /// A bounded queue from one producer thread to one consumer thread, which neither locks nor
 /// allocates after construction. `T` is a plain struct.
 template <typename T>
-class SpscRing {
+class SpscQueue {
  public:
-  explicit SpscRing(size_t capacity) : queue_(capacity) {}
+  explicit SpscQueue(size_t capacity) : queue_(capacity) {}
 
-  /// Producer only. False: the ring is full and `value` was not taken.
+  /// Producer only. False: the queue is full and `value` was not taken.
   bool TryPush(const T& value) noexcept { return queue_.push(value); }
 
-  /// Consumer only. False: the ring is empty and `value` is untouched.
+  /// Consumer only. False: the queue is empty and `value` is untouched.
   bool TryPop(T& value) noexcept { return queue_.pop(value); }
 
   /// Consumer only. Moves up to `most` values to `values`; returns how many.

@@ -1,24 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "server/synthesis/render_crew.h"
+#include "server/synthesis/render_threads.h"
 
 #include "server/synthesis/flush_denormals.h"
 
 namespace carillon {
 
-RenderCrew::RenderCrew(size_t thread_count) {
+RenderThreads::RenderThreads(size_t thread_count) {
   for (size_t worker = 1; worker < thread_count; ++worker) {
     threads_.emplace_back([this, worker] { Help(worker); });
   }
 }
 
-RenderCrew::~RenderCrew() {
+RenderThreads::~RenderThreads() {
   stopping_ = true;
   ++round_;
   round_.notify_all();
   for (std::thread& thread : threads_) thread.join();
 }
 
-void RenderCrew::Render(size_t count, absl::FunctionRef<void(size_t, size_t)> render) noexcept {
+void RenderThreads::Render(size_t count, absl::FunctionRef<void(size_t, size_t)> render) noexcept {
   render_ = &render;
   count_ = count;
   next_ = 0;
@@ -29,7 +29,7 @@ void RenderCrew::Render(size_t count, absl::FunctionRef<void(size_t, size_t)> re
   for (size_t left = helping_count_; left > 0; left = helping_count_) helping_count_.wait(left);
 }
 
-void RenderCrew::Help(size_t worker) {
+void RenderThreads::Help(size_t worker) {
   const FlushDenormals flush_denormals;
   for (uint32_t seen = 0;; ++seen) {
     round_.wait(seen);
@@ -39,7 +39,7 @@ void RenderCrew::Help(size_t worker) {
   }
 }
 
-void RenderCrew::Work(size_t worker) noexcept {
+void RenderThreads::Work(size_t worker) noexcept {
   for (size_t section = next_++; section < count_; section = next_++) (*render_)(worker, section);
 }
 
