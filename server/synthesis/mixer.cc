@@ -18,9 +18,9 @@ void Count(std::atomic<uint64_t>& counter, uint64_t more = 1) noexcept {
   counter.store(counter.load(std::memory_order_relaxed) + more, std::memory_order_relaxed);
 }
 
-/// Of a strike's place in the order of rendering.
-constexpr uint64_t kArrivalMask = (uint64_t{1} << 27) - 1;
-constexpr int kMergedBit = 29;
+static_assert(kSectionCount <= RenderOrder::kMostSections);
+static_assert(kBlocksTogether <= RenderOrder::kMostBlocks);
+static_assert(kMostBlockFrames <= RenderOrder::kMostGroups * kMergedFrames);
 
 /// 6 dB below what was shed in the last block.
 constexpr float kHopeless = 0.5F;
@@ -157,7 +157,7 @@ void Mixer::CollectDueEvents(size_t block_count) noexcept {
   due_events_.clear();
   rendered_work_ = 0;
   if (budget_.bounded() && ringing_work_ > budget_.most_work()) ShedBanks();
-  for (size_t block = 0; block < block_count; ++block) {
+  for (uint32_t block = 0; block < block_count; ++block) {
     const size_t first = due_.size();
     pending_.Collect(block_start_ + block * settings_.block_frame_count, due_);
     const std::span<const uint32_t> due = std::span(due_).subspan(first);
@@ -166,17 +166,14 @@ void Mixer::CollectDueEvents(size_t block_count) noexcept {
   }
   std::ranges::sort(due_order_);
   due_ends_.fill(0);
-  for (const uint64_t order : due_order_) {
-    const MixerEvent& event = pending_[due_[order & kArrivalMask]];
-    const auto block = static_cast<uint32_t>(order >> 52 & 0xFF);
-    const auto offset = static_cast<uint32_t>(event.FirstSample() - block_start_ -
-                                              block * settings_.block_frame_count);
-    due_events_.push_back({.slot = event.bank.slot,
-                           .block = block,
-                           .offset = offset,
-                           .merged = (order >> kMergedBit & 1) != 0,
-                           .event = &event});
-    due_ends_[order >> 60] = due_events_.size();
+  for (const RenderOrder& order : due_order_) {
+    const RenderOrder::Fields due = order.fields();
+    due_events_.push_back({.slot = due.slot,
+                           .block = due.block,
+                           .offset = due.offset,
+                           .merged = due.merged,
+                           .event = &pending_[due_[due.arrival]]});
+    due_ends_[due.section] = due_events_.size();
   }
 }
 
@@ -208,14 +205,14 @@ float Mixer::LoudnessOf(const SurfaceImpulse& impulse, const BankSlot& slot) noe
   return slot.loudness_of_blow * std::sqrt(squared);
 }
 
-/// Puts a block's strikes in the order of rendering: by section, block, bank and time, merged ones
-/// after exact ones within kMergedFrames, then by arrival.
-void Mixer::ChooseEvents(size_t block, std::span<const uint32_t> due) noexcept {
+/// Decides which of a block's events are rendered, and notes their places in the order of
+/// rendering.
+void Mixer::ChooseEvents(uint32_t block, std::span<const uint32_t> due) noexcept {
   const uint64_t start = block_start_ + block * settings_.block_frame_count;
-  auto place = static_cast<uint64_t>(due.data() - due_.data());
+  auto next_arrival = static_cast<uint32_t>(due.data() - due_.data());
   for (const uint32_t index : due) {
     const MixerEvent& event = pending_[index];
-    const uint64_t arrival = place++;
+    const uint32_t arrival = next_arrival++;
     BankSlot* slot = FindSlot(event.bank);
     if (slot == nullptr) {
       Count(statistics_.dropped_count);
@@ -230,12 +227,14 @@ void Mixer::ChooseEvents(size_t block, std::span<const uint32_t> due) noexcept {
       Count(statistics_.shed_count);
       continue;
     }
-    const uint64_t merged = treatment == Treatment::kMerged ? 1 : 0;
-    Count(statistics_.merged_count, merged);
-    const uint64_t offset = event.FirstSample() - start;
-    due_order_.push_back(uint64_t{slot->section} << 60 | block << 52 |
-                         uint64_t{event.bank.slot} << 36 | offset / kMergedFrames << 30 |
-                         merged << kMergedBit | offset % kMergedFrames << 27 | arrival);
+    const bool merged = treatment == Treatment::kMerged;
+    Count(statistics_.merged_count, merged ? 1 : 0);
+    due_order_.push_back(RenderOrder({.section = slot->section,
+                                      .block = block,
+                                      .slot = event.bank.slot,
+                                      .offset = static_cast<uint32_t>(event.FirstSample() - start),
+                                      .merged = merged,
+                                      .arrival = arrival}));
   }
 }
 

@@ -26,6 +26,7 @@
 #include "server/synthesis/schedule/loudness_triage.h"
 #include "server/synthesis/schedule/mixer_event.h"
 #include "server/synthesis/schedule/pending_events.h"
+#include "server/synthesis/schedule/render_order.h"
 #include "server/synthesis/schedule/work_budget.h"
 
 namespace carillon {
@@ -172,7 +173,7 @@ class Mixer {
   void Take(MixerEvent event, EventQueue& queue) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void CollectDueEvents(size_t block_count) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
-  void ChooseEvents(size_t block, std::span<const uint32_t> due) noexcept
+  void ChooseEvents(uint32_t block, std::span<const uint32_t> due) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void ShedBanks() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void DecideTreatment(std::span<const uint32_t> due) noexcept
@@ -215,7 +216,7 @@ class Mixer {
   // Of the blocks rendered together: places in pending_.
   FixedVector<uint32_t> due_ ABSL_GUARDED_BY(kRenderRole);
   // See ChooseEvents.
-  FixedVector<uint64_t> due_order_ ABSL_GUARDED_BY(kRenderRole);
+  FixedVector<RenderOrder> due_order_ ABSL_GUARDED_BY(kRenderRole);
   FixedVector<DueEvent> due_events_ ABSL_GUARDED_BY(kRenderRole);
   // Of each section, in due_events_.
   std::array<size_t, kSectionCount + 1> due_ends_ ABSL_GUARDED_BY(kRenderRole){};

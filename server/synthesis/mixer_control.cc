@@ -15,8 +15,6 @@ namespace {
 constexpr double kFadeS = 0.01;
 /// Their work for a long block costs about as much as its transform.
 constexpr size_t kModesASection = 4000;
-/// A strike's place in the order of rendering has so much room for the slot.
-[[maybe_unused]] constexpr size_t kMostBanks = 65536;
 
 }  // namespace
 
@@ -43,7 +41,8 @@ Mixer::Mixer(const MixerSettings& settings)
       limiter_(settings.sample_rate_hz, settings.channel_count) {
   assert(settings.block_frame_count > 0 && settings.block_frame_count <= kMostBlockFrames);
   assert(settings.first_frame % settings.block_frame_count == 0);
-  assert(settings.most_banks <= kMostBanks);
+  assert(settings.most_banks <= RenderOrder::kMostSlots);
+  assert(settings.most_pending_events <= RenderOrder::kMostArrivals);
   statistics_.frame_count = settings.first_frame;
   const size_t worker_count = settings.threads == nullptr ? 1 : settings.threads->size();
   for (size_t i = 0; i < worker_count; ++i) workspaces_.emplace_back(settings.block_frame_count);

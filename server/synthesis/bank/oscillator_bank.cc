@@ -24,8 +24,8 @@ bool OscillatorBank::out_of_spectrum() const noexcept {
 
 bool OscillatorBank::RenderAdd(BlockMix& mix) noexcept {
   if (silent()) return true;
-  if (!newborn_ && !force_.driving()) {
-    if (!awake_in_time_ && !mix.any_begins()) return true;
+  if (!struck() && !force_.driving()) {
+    if (ringing_ != Ringing::kInTime && !mix.any_begins()) return true;
     BeginBlock(mix);
     return RenderAddInTime(mix.lanes());
   }
@@ -34,18 +34,18 @@ bool OscillatorBank::RenderAdd(BlockMix& mix) noexcept {
 }
 
 bool OscillatorBank::RenderAddInTime(LaneMix& mix) noexcept {
-  finite_ &= ring_kernel::RingFreely(lanes_, segments_,
-                                     {.sums = Sums(mix.nodes(), block_frame_count_, mix),
-                                      .frame_count = block_frame_count_,
-                                      .silence_squared = silence_squared_});
+  block_.finite &= ring_kernel::RingFreely(lanes_, segments_,
+                                           {.sums = Sums(mix.nodes(), block_frame_count_, mix),
+                                            .frame_count = block_frame_count_,
+                                            .silence_squared = silence_squared_});
   return EndBlock();
 }
 
 bool OscillatorBank::EndBlock() noexcept {
-  begun_ = false;
-  if (!finite_) Silence();
-  if (std::exchange(changed_, false) || AwakeCounts() != counted_) CountAwake();
-  return std::exchange(finite_, true);
+  const bool finite = std::exchange(block_, {}).finite;
+  if (!finite) Silence();
+  if (std::exchange(awake_changed_, false) || AwakeCounts() != counted_) CountAwake();
+  return finite;
 }
 
 OscillatorBank::Counts OscillatorBank::AwakeCounts() const noexcept {
@@ -55,9 +55,10 @@ OscillatorBank::Counts OscillatorBank::AwakeCounts() const noexcept {
 }
 
 void OscillatorBank::BeginBlock(BlockMix& mix) noexcept {
-  if (std::exchange(begun_, true)) return;
+  if (block_.phase != Phase::kWaiting) return;
+  block_.phase = Phase::kBegun;
   for (size_t kind = 0; kind < long_segments_.size(); ++kind) {
-    if (mix.begins(kind)) finite_ &= BeginLongBlock(kind, mix);
+    if (mix.begins(kind)) block_.finite &= BeginLongBlock(kind, mix);
   }
 }
 
@@ -65,7 +66,7 @@ bool OscillatorBank::BeginLongBlock(size_t kind, BlockMix& mix) noexcept {
   LongSegment& segment = long_segments_[kind];
   const bool struck = std::exchange(segment.struck, false);
   segment.struck_streak = struck ? segment.struck_streak + 1 : 0;
-  changed_ |= segment.sounding && !segment.awake;
+  awake_changed_ |= segment.sounding && !segment.awake;
   segment.sounding = false;
   if (segment.struck_streak >= kBusyStreak || leaving_spectrum_) {
     MoveToTime(kind);
@@ -75,7 +76,7 @@ bool OscillatorBank::BeginLongBlock(size_t kind, BlockMix& mix) noexcept {
   if (!segment.awake) return true;
   const spectral_kernel::Spreading advanced =
       spectral_kernel::Spread(segment.lanes, segment.mode_count, silence_squared_, mix.Slots(kind));
-  changed_ |= advanced.fell_asleep;
+  awake_changed_ |= advanced.fell_asleep;
   segment.awake = segment.sounding = advanced.awake;
   segment.loudest_squared = advanced.loudest_squared;
   return advanced.finite;
@@ -102,7 +103,7 @@ void OscillatorBank::MoveToTime(size_t kind) noexcept {
   LongSegment& from = long_segments_[kind];
   RingingSegment& to = segments_[kind + 1];
   if (!from.awake) return;
-  changed_ = true;
+  awake_changed_ = true;
   for (const LaneRun& run : lanes_.runs) {
     if (run.segment != kind + 1) continue;
     for (size_t i = 0; i < run.range.count; ++i) {
@@ -116,7 +117,7 @@ void OscillatorBank::MoveToTime(size_t kind) noexcept {
 }
 
 void OscillatorBank::Silence() noexcept {
-  changed_ = true;
+  awake_changed_ = true;
   lanes_.Silence({0, lane_count_});
   force_.Silence();
   for (RingingSegment& segment : segments_) segment.awake_count = 0;
@@ -161,25 +162,26 @@ void OscillatorBank::CountAwake() noexcept {
   counted_ = AwakeCounts();
   active_mode_count_ = 0;
   ringing_work_ = 0;
-  any_awake_ = awake_in_time_ = false;
+  ringing_ = Ringing::kNowhere;
   auto mode_count = group_mode_counts_.begin();
   for (size_t part = 0; part < segments_.size(); ++part) {
     const RingingSegment& segment = segments_[part];
     const LongSegment* by_spectrum = part == 0 ? nullptr : &long_segments_[part - 1];
-    awake_in_time_ |= segment.awake_count > 0;
+    if (segment.awake_count > 0) ringing_ = Ringing::kInTime;
     ringing_work_ += TimeWork(segment.awake_count);
     if (by_spectrum != nullptr && by_spectrum->awake) {
       ringing_work_ += work::kSpectralLane * static_cast<double>(by_spectrum->mode_count) /
                        static_cast<double>(by_spectrum->block_count);
     }
-    if (by_spectrum != nullptr) any_awake_ |= by_spectrum->awake || by_spectrum->sounding;
+    if (by_spectrum != nullptr && (by_spectrum->awake || by_spectrum->sounding)) {
+      ringing_ = std::max(ringing_, Ringing::kInSpectrum);
+    }
     for (size_t i = 0; i < segment.lane_count; i += kMostLanes, ++mode_count) {
       const bool awake = i < segment.awake_count ||
                          (by_spectrum != nullptr && by_spectrum->lanes.awake[i / kMostLanes] != 0);
       if (awake) active_mode_count_ += *mode_count;
     }
   }
-  any_awake_ |= awake_in_time_;
 }
 
 std::string_view SimdTarget() { return ring_kernel::Target(); }

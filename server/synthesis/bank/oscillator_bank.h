@@ -108,11 +108,13 @@ class OscillatorBank {
   /// RenderAdd for a bank out of the spectrum, not struck in this block.
   bool RenderAddInTime(LaneMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
-  /// Nothing rings: rendering would cost and add nothing.
-  bool silent() const noexcept { return !newborn_ && !any_awake_ && !force_.driving(); }
+  /// True: rendering the bank would add nothing.
+  bool silent() const noexcept {
+    return !struck() && ringing_ == Ringing::kNowhere && !force_.driving();
+  }
 
   /// Modes that still ring.
-  size_t active_mode_count() const noexcept { return newborn_ ? mode_count_ : active_mode_count_; }
+  size_t active_mode_count() const noexcept { return struck() ? mode_count_ : active_mode_count_; }
 
   /// Units of work (work_budget.h) that a block takes: now, of a strike, and of what a first strike
   /// brings with it.
@@ -150,8 +152,36 @@ class OscillatorBank {
     uint32_t struck_streak = 0;  // long blocks on end in which it was struck
   };
 
+  /// How far the bank has come in the current block:
+  ///
+  ///             BeginBlock         first onset         a part must be rendered
+  ///                                                    before the block's end
+  ///   kWaiting ------------> kBegun ------------> kStruck -----------> kInParts
+  ///      ^                     |                     |                    |
+  ///      +---------------------+------ EndBlock -----+--------------------+
+  ///
+  /// A knot, or a force that drives the modes, leads from kBegun to kInParts at once. A refused
+  /// onset of a silent bank leads back to kWaiting, because a silent bank is not rendered.
+  enum class Phase : uint8_t {
+    kWaiting,
+    kBegun,    ///< the long blocks that begin with this block have begun
+    kStruck,   ///< the batch holds onsets, which are rendered at the end of the block
+    kInParts,  ///< the block is rendered up to rendered_to, from start and newborn states on
+  };
+  /// The current block.
+  struct Block {
+    Phase phase = Phase::kWaiting;
+    bool by_frames = false;  ///< all lanes go in tiles of the first kind
+    bool finite = true;
+    size_t rendered_to = 0;  ///< frames
+  };
+  /// Where any lane is awake.
+  enum class Ringing : uint8_t { kNowhere, kInSpectrum, kInTime };
+
   OscillatorBank(const LanePlan& plan, const SoundingModes& sounding, ShapeTable shapes,
                  const OscillatorBankSettings& settings);
+
+  bool struck() const noexcept { return block_.phase >= Phase::kStruck; }
 
   void BeginBlock(BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   bool BeginLongBlock(size_t kind, BlockMix& mix) noexcept;
@@ -167,6 +197,7 @@ class OscillatorBank {
   /// Strikes that were merged come after others that they may lie before: these are added later
   /// then, as they would sound there.
   size_t NotBeforeTheLast(size_t offset, const StrikeBatch& batch) const noexcept;
+  void NoteOnset(size_t offset, StrikeBatch& batch) noexcept;
   void BeginStrikes(BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void RenderStrikes(size_t end, BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void RenderDrivenStrikes(size_t end, BlockMix& mix) noexcept
@@ -195,17 +226,11 @@ class OscillatorBank {
   Counts counted_{};                        // what of them was awake when that was counted
   std::vector<LongSegment> long_segments_;  // kLongBlockKinds of them
   std::vector<uint8_t>
-      group_mode_counts_;   // modes, not companions, of kMostLanes lanes, by segment
-  bool begun_ = false;      // this block
-  bool newborn_ = false;    // struck in this block
-  bool by_frames_ = false;  // longer tiles are not used in this block
-  bool started_ = false;    // the block is rendered in parts
-  bool finite_ = true;
-  bool changed_ = false;  // which lanes are awake
-  bool any_awake_ = false;
-  bool awake_in_time_ = false;
+      group_mode_counts_;  // modes, not companions, of kMostLanes lanes, by segment
+  Block block_;
+  Ringing ringing_ = Ringing::kNowhere;
+  bool awake_changed_ = false;  // the awake lanes are to be counted again
   bool leaving_spectrum_ = false;
-  size_t rendered_to_ = 0;  // in a block with strikes
   size_t active_mode_count_ = 0;
   double ringing_work_ = 0;
   float loudness_of_blow_ = 0;

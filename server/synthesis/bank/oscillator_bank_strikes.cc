@@ -116,13 +116,14 @@ bool OscillatorBank::StrikeModes(std::span<const float> modal_impulses, size_t o
   const size_t asked = std::exchange(offset, NotBeforeTheLast(offset, batch));
   onset.lead_frames += static_cast<float>(offset - asked);
   if (batch.count == StrikeBatch::Capacity(lane_count_)) RenderStrikes(offset, mix);
-  if (!force_.driving() && !by_frames_) onset.frames_into_tiles = offset - rendered_to_;
+  if (!force_.driving() && !block_.by_frames) {
+    onset.frames_into_tiles = offset - block_.rendered_to;
+  }
   const bool finite =
       strike_kernel::Excite(lanes_, lane_count_, modal_impulses.data(), onset, batch.ahead,
                             batch.re(batch.count, lane_count_), batch.im(batch.count, lane_count_));
-  if (finite) batch.offsets[batch.count++] = offset;
-  newborn_ = newborn_ || finite;
-  begun_ = begun_ && !silent();  // a silent bank is not rendered in this block
+  if (finite) NoteOnset(offset, batch);
+  if (silent()) block_.phase = Phase::kWaiting;  // it is not rendered in this block
   return finite;
 }
 
@@ -140,22 +141,28 @@ bool OscillatorBank::Tie(const ForceKnot& knot, size_t offset, BlockMix& mix) no
   offset = NotBeforeTheLast(offset, batch);
   RenderStrikes(offset, mix);
   const bool finite = force_.Tie(knot, lanes_, batch.re(0, lane_count_), batch.im(0, lane_count_));
-  if (finite) batch.offsets[batch.count++] = offset;
-  newborn_ = newborn_ || finite || !silent_before;
-  begun_ = begun_ && !silent();
+  if (finite) {
+    NoteOnset(offset, batch);
+  } else if (silent_before) {
+    block_.phase = Phase::kWaiting;
+  }
   return finite;
 }
 
+void OscillatorBank::NoteOnset(size_t offset, StrikeBatch& batch) noexcept {
+  batch.offsets[batch.count++] = offset;
+  block_.phase = std::max(block_.phase, Phase::kStruck);
+}
+
 size_t OscillatorBank::NotBeforeTheLast(size_t offset, const StrikeBatch& batch) const noexcept {
-  return std::max(offset, batch.count > 0 ? batch.offsets[batch.count - 1] : rendered_to_);
+  return std::max(offset, batch.count > 0 ? batch.offsets[batch.count - 1] : block_.rendered_to);
 }
 
 void OscillatorBank::BeginStrikes(BlockMix& mix) noexcept {
   BeginBlock(mix);
-  if (newborn_) return;
-  mix.batch().count = rendered_to_ = 0;
-  by_frames_ = mix.batch().due_count > kMostStrikesInTiles;
-  started_ = false;
+  if (struck()) return;
+  mix.batch().count = block_.rendered_to = 0;
+  block_.by_frames = mix.batch().due_count > kMostStrikesInTiles;
 }
 
 /// The part of the block up to `end`, with what the batch holds. The nodes of a whole block are
@@ -163,10 +170,11 @@ void OscillatorBank::BeginStrikes(BlockMix& mix) noexcept {
 ring_kernel::StruckPart OscillatorBank::BeginPart(size_t end, BlockMix& mix) const noexcept {
   StrikeBatch& batch = mix.batch();
   batch.part_nodes.Clear();
-  const bool whole = rendered_to_ == 0 && end == block_frame_count_;
+  const bool whole = block_.rendered_to == 0 && end == block_frame_count_;
   NodeMix& nodes = whole ? mix.lanes().nodes() : batch.part_nodes;
-  const ring_kernel::TileSums sums = by_frames_ ? ring_kernel::TileSums{mix.lanes().lanes()}
-                                                : Sums(nodes, end - rendered_to_, mix.lanes());
+  const ring_kernel::TileSums sums = block_.by_frames
+                                         ? ring_kernel::TileSums{mix.lanes().lanes()}
+                                         : Sums(nodes, end - block_.rendered_to, mix.lanes());
   for (size_t kind = 1; kind < kTileKinds; ++kind) {
     if (sums[kind] == nullptr) continue;
     for (size_t i = 0; i < batch.count; ++i) {
@@ -174,10 +182,10 @@ ring_kernel::StruckPart OscillatorBank::BeginPart(size_t end, BlockMix& mix) con
     }
   }
   return {.sums = sums,
-          .begin = rendered_to_,
+          .begin = block_.rendered_to,
           .end = end,
-          .started = started_,
-          .by_frames = by_frames_,
+          .started = block_.phase == Phase::kInParts,
+          .by_frames = block_.by_frames,
           .batch = batch,
           .lane_count = lane_count_};
 }
@@ -204,14 +212,14 @@ void OscillatorBank::FinishPart(const ring_kernel::StruckPart& part, BlockMix& m
 
 /// Renders what must be rendered before more can happen in this block.
 void OscillatorBank::RenderStrikes(size_t end, BlockMix& mix) noexcept {
-  if (!started_) ring_kernel::Start(lanes_, lane_count_);
-  started_ = true;
+  if (block_.phase != Phase::kInParts) ring_kernel::Start(lanes_, lane_count_);
+  block_.phase = Phase::kInParts;
   if (force_.driving()) return RenderDrivenStrikes(end, mix);
   const ring_kernel::StruckPart part = BeginPart(end, mix);
   ring_kernel::RingStruck(lanes_, part);
   FinishPart(part, mix);
   mix.batch().count = 0;
-  rendered_to_ = end;
+  block_.rendered_to = end;
 }
 
 void OscillatorBank::RenderDrivenStrikes(size_t end, BlockMix& mix) noexcept {
@@ -225,18 +233,16 @@ void OscillatorBank::RenderDrivenStrikes(size_t end, BlockMix& mix) noexcept {
 }
 
 void OscillatorBank::RenderDriven(size_t end, LaneMix& mix) noexcept {
-  force_.Render(end - rendered_to_, lanes_, mix.lanes() + rendered_to_ * kMostLanes);
-  rendered_to_ = end;
+  force_.Render(end - block_.rendered_to, lanes_, mix.lanes() + block_.rendered_to * kMostLanes);
+  block_.rendered_to = end;
 }
 
 bool OscillatorBank::FinishStruck(BlockMix& mix) noexcept {
   if (force_.driving()) RenderStrikes(block_frame_count_, mix);
   const ring_kernel::StruckPart part = BeginPart(block_frame_count_, mix);
-  finite_ &= ring_kernel::FinishStruck(lanes_, segments_, part, silence_squared_);
+  block_.finite &= ring_kernel::FinishStruck(lanes_, segments_, part, silence_squared_);
   FinishPart(part, mix);
   for (LongSegment& segment : long_segments_) segment.struck = true;
-  newborn_ = false;
-  rendered_to_ = 0;
   return EndBlock();
 }
 
