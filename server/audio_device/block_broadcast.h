@@ -19,20 +19,20 @@ namespace carillon {
 
 /// Some consecutive rendered frames, interleaved.
 struct RenderedBlock {
-  /// Number of the first since the mixer began.
+  /// Number of the first frame since the mixer began.
   uint64_t first_frame = 0;
   std::vector<float> samples;
 };
 
-/// Gives every listener what the mixer renders. The render thread only copies into a ring
-/// (Publish); another thread takes the blocks out (Deliver) into a bounded queue for each listener,
-/// and one that does not read fast enough loses whole blocks.
+/// Delivers every rendered block to every listener. The render thread only copies blocks into a
+/// ring buffer (Publish). Another thread moves them to a bounded queue for each listener (Deliver).
+/// A listener that does not read fast enough loses whole blocks.
 class BlockBroadcast {
  public:
-  /// At most so many listen at once.
+  /// Most listeners at a time.
   static constexpr size_t kMaxListenerCount = 32;
 
-  /// One that listens. Destroy it before the broadcast, and not from within `wake`.
+  /// A listener. It must be destroyed before the broadcast, and not from within `wake`.
   class Listener {
    public:
     ~Listener();
@@ -55,21 +55,21 @@ class BlockBroadcast {
     mutable Mutex mutex_;
     std::deque<std::shared_ptr<const RenderedBlock>> queue_ ABSL_GUARDED_BY(mutex_);
     uint64_t lost_frame_count_ ABSL_GUARDED_BY(mutex_) = 0;
-    /// The frame that comes next when nothing is lost; unset before the first block.
+    /// First frame of the next block if none is lost; unset before the first block.
     std::optional<uint64_t> next_frame_ ABSL_GUARDED_BY(mutex_);
   };
 
-  /// Ring and queues hold `queue_block_count` blocks of `format`.
+  /// The ring buffer and each queue hold `queue_block_count` blocks of `format`.
   BlockBroadcast(const DeviceFormat& format, size_t queue_block_count);
 
-  /// Render thread: passes on a block, or, where Deliver has not kept up, leaves it out.
+  /// Called by the render thread: passes a block on, or drops it if Deliver has not kept up.
   void Publish(uint64_t first_frame, std::span<const float> block) noexcept;
 
-  /// Housekeeping thread: hands out what was published since.
+  /// Called by the housekeeping thread: hands the newly published blocks to the listeners.
   void Deliver();
 
-  /// A listener, from the next block on. `wake` is called by Deliver after blocks have come and
-  /// must not block. Errors: ResourceExhausted (TOO_MANY_LISTENERS).
+  /// Adds a listener, which gets blocks from the next one on. Deliver calls `wake`, which must not
+  /// block, after it has queued blocks. Errors: ResourceExhausted (TOO_MANY_LISTENERS).
   absl::StatusOr<std::unique_ptr<Listener>> Subscribe(std::function<void()> wake);
 
  private:

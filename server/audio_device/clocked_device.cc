@@ -20,9 +20,9 @@ absl::Status ClockedDevice::Start(FrameSource& source) {
   source_ = &source;
   stopping_ = false;
   thread_ = std::thread([this] { Run(); });
-  // A sound card does not wait for other programs either: kept from running, this thread would pull
-  // what it missed at once, faster than anybody renders. Where that is not allowed the look-ahead,
-  // which asks for the same, says so.
+  // A sound card does not wait for other programs. If this thread were kept from running, it would
+  // afterwards pull all missed blocks at once, faster than they can be rendered. A refusal is
+  // ignored here, because LookAhead makes the same request and reports the refusal.
   MakeRealtime(thread_).IgnoreError();
   return absl::OkStatus();
 }
@@ -36,7 +36,7 @@ void ClockedDevice::Run() {
   std::vector<float> block(format_.block_size());
   const uint64_t frame_count = format_.block_frame_count;
   const std::chrono::nanoseconds start = clock_.Monotonic();
-  // Due times are counted from the start, not from the last block: rounding does not add up.
+  // Due times are computed from the start, so that rounding errors do not accumulate.
   for (uint64_t frames = frame_count; !stopping_; frames += frame_count) {
     source_->Pull(block);
     if (sink_ && !sink_(block)) {

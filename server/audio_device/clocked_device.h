@@ -13,11 +13,11 @@
 
 namespace carillon {
 
-/// A device that is no sound card: a thread that pulls a block whenever the clock says that one has
-/// passed, and gives it to a sink. Missed wake-ups are caught up, so the mean rate is exact.
+/// A device without a sound card: a thread pulls a block each time the clock has advanced by a
+/// block, and gives it to a sink. It catches up after late wake-ups, so the mean rate is exact.
 class ClockedDevice final : public AudioDevice {
  public:
-  /// Takes one block; false: the device is dead and pulls no more.
+  /// Takes one block. False: the device has failed and pulls no more.
   using Sink = std::function<bool(std::span<const float>)>;
 
   /// `clock` must outlive the device.

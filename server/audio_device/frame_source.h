@@ -5,21 +5,20 @@
 
 namespace carillon {
 
-/// What a device plays: frames in order, interleaved, full scale is 1.
+/// A source of the frames that a device plays, in order and interleaved; full scale is 1.
 ///
-/// A device calls Pull on a thread of its own, again and again between Start and Stop, never from
-/// two threads at once. With a sound card that thread has a deadline of one callback, so an
-/// implementation must not
+/// Between Start and Stop a device calls Pull repeatedly on a thread of its own, never on two
+/// threads at once. With a sound card each call has a deadline, so an implementation must not
 ///  * allocate or free memory,
 ///  * lock, wait, or wake another thread,
 ///  * make a system call (read, write, sleep, log),
 ///  * throw,
-///  * compute anything whose time depends on the load: it copies what was rendered ahead.
+///  * compute anything whose time depends on the load: it only copies frames rendered ahead.
 class FrameSource {
  public:
   virtual ~FrameSource() = default;
 
-  /// Fills all of `frames`, with silence where nothing is ready.
+  /// Fills all of `frames`; frames that are not ready are silent.
   virtual void Pull(std::span<float> frames) noexcept = 0;
 };
 

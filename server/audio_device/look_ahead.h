@@ -15,14 +15,14 @@
 
 namespace carillon {
 
-/// Renders ahead of the device on a thread of its own, so that the device only copies: a ring of
-/// `block_count` blocks stands between them, which is also the latency it adds.
+/// Renders ahead of the device on a thread of its own, so that the device only copies. A ring
+/// buffer of `block_count` blocks lies between them, which is also the latency that it adds.
 ///
-/// The thread looks for room in the ring twice a block instead of being woken: waking it would be a
-/// system call in the device's callback.
+/// The thread polls the ring buffer for room twice in a block's time. Waking it would need a system
+/// call in the device's callback.
 class LookAhead final : public FrameSource {
  public:
-  /// Fills one block; called from the render thread only, and real-time safe.
+  /// Fills one block. Only the render thread calls it; it must be real-time safe.
   using RenderBlock = std::function<void(std::span<float>)>;
 
   /// `clock` must outlive this.
@@ -31,8 +31,8 @@ class LookAhead final : public FrameSource {
   LookAhead(const LookAhead&) = delete;
   LookAhead& operator=(const LookAhead&) = delete;
 
-  /// Fills the ring, then starts the thread. Not OK where the system did not grant the thread
-  /// real-time priority; it runs all the same.
+  /// Fills the ring buffer, then starts the thread. A status that is not OK means that the system
+  /// refused real-time priority; the thread runs without it.
   absl::Status Start();
 
   /// Joins the thread.
@@ -40,16 +40,16 @@ class LookAhead final : public FrameSource {
 
   void Pull(std::span<float> frames) noexcept override;
 
-  /// What the ring adds between renderer and device.
+  /// Latency of the ring buffer.
   double latency_s() const;
 
-  /// Pulls that found too little in the ring.
+  /// Number of pulls that found too few frames in the ring buffer.
   uint64_t xrun_count() const { return xrun_count_.load(std::memory_order_relaxed); }
 
-  /// Frames of silence given in their place.
+  /// Number of silent frames given instead of missing ones.
   uint64_t lost_frame_count() const { return lost_frame_count_.load(std::memory_order_relaxed); }
 
-  /// Part of real time that rendering takes, smoothed over about a second: 1 is the limit.
+  /// Fraction of real time that rendering takes, smoothed over about a second; 1 is the limit.
   double load() const { return load_.load(std::memory_order_relaxed); }
 
  private:

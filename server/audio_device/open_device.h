@@ -11,17 +11,17 @@
 
 namespace carillon {
 
-/// A device, and why it is not the one wanted.
+/// A device, and if it replaces the one asked for, the reason.
 struct OpenedDevice {
   std::unique_ptr<AudioDevice> device;
-  /// One line; empty where the device is what was asked for.
+  /// One line; empty if the device is the one that was asked for.
   std::string message;
 };
 
-/// Opens what `specification` names: "portaudio" or "portaudio:PART OF A NAME", "null" (nothing
-/// sounds, time passes), "file:PATH" (the mix as a WAV file, in real time), or "auto": a sound card
-/// where there is one, else null with the reason in `message`.
-/// Errors: InvalidArgument (INVALID_AUDIO_DEVICE), and those of the device.
+/// Opens the device that `specification` names: "portaudio" or "portaudio:PART OF A NAME", "null"
+/// (silent, in real time), "file:PATH" (a WAV file, in real time), or "auto": a sound card if there
+/// is one, else null with the reason in `message`. Errors: InvalidArgument (INVALID_AUDIO_DEVICE),
+/// and those of the device.
 absl::StatusOr<OpenedDevice> OpenDevice(absl::string_view specification, const DeviceFormat& format,
                                         Clock& clock);
 

@@ -8,10 +8,10 @@
 namespace carillon {
 namespace {
 
-/// A sound card's clock and the system's may drift apart by 0.3 ms in a second.
+/// The clocks of sound card and system may drift apart by 0.3 ms in a second, so less is no loss.
 constexpr double kLeastLossS = 0.001;
-/// JACK's loop has a bandwidth of 1/8 Hz and is of second order: of what throws it off by 1,
-/// exp(-x) (cos x - sin x) with x = 0.555 t is left, 0.52 after half a second and 0.19 after one.
+/// JACK's loop is of second order and has a bandwidth of 1/8 Hz. A unit disturbance decays as
+/// exp(-x) (cos x - sin x) with x = 0.555 t: to 0.52 after half a second and to 0.19 after one.
 constexpr double kLeftOfDecrease = 0.19 / (0.52 - 0.19);
 
 }  // namespace
@@ -24,9 +24,9 @@ void OutputClock::Restart() noexcept {
 
 void OutputClock::Count(double cycle_s, double output_s, size_t frame_count,
                         bool underflow) noexcept {
-  // Some devices of ALSA have no clock: theirs stands still.
+  // Some ALSA devices have no clock; their time stamps do not change.
   if (!begun_ || cycle_s != cycle_s_ || (underflow && !underflow_)) {
-    // Before the first cycle nothing was to be heard.
+    // An underflow before the first cycle loses nothing.
     BeginCycle(output_s * sample_rate_hz_ - static_cast<double>(given_count_), underflow && begun_);
     begun_ = true;
   }
@@ -43,7 +43,7 @@ void OutputClock::BeginCycle(double lead_frames, bool underflow) noexcept {
   }
   if (underflow) {
     xrun_count_.fetch_add(1, std::memory_order_relaxed);
-    // Of several in a row the whole is measured.
+    // Several xruns in a row are measured as one.
     if (!watching_) usual_ = std::min(least_, least_before_);
     watching_ = true;
     stretch_first_ = given_count_;

@@ -10,19 +10,21 @@ namespace carillon {
 
 /// How a device loses frames.
 enum class LossKind {
-  kAnyLength,    ///< it stands still until it is started again
-  kWholeCycles,  ///< its cycles go on without them (JACK)
+  kAnyLength,    ///< the device stops until it is restarted
+  kWholeCycles,  ///< the device skips whole cycles (JACK)
 };
 
-/// Finds from the time stamps of a device's callbacks how much of the sound was lost where the
-/// device says that it had an xrun.
+/// Computes from the time stamps of a device's callbacks how many frames were lost when the device
+/// reported an xrun.
 ///
-/// When a callback is late, so is its time stamp, and the next ones are not: nothing was lost. When
-/// frames were lost, the time at which frames are heard stays ahead of the frames given by as many.
-/// So their difference, the lead, is watched for a second: what it has gained by then is lost.
+/// The lead is the device's time in frames minus the number of frames given to it. If a callback is
+/// just late, its time stamp is late too, but the following ones are not, and the lead returns. If
+/// frames were lost, the lead stays larger by their number. So the lead is observed for a second
+/// after an xrun; its increase is the number of frames lost.
 ///
-/// JACK's stamps come from a loop that follows its cycles. Where its server itself was late, all
-/// frames waited as long and none is missing, but the loop is thrown off: a lead that dwindles.
+/// JACK computes its time stamps by a feedback loop that follows its cycles. If the server itself
+/// was late, all frames were delayed and none is missing, but the loop is disturbed: the lead
+/// increases at first and then decays.
 class OutputClock {
  public:
   OutputClock(double sample_rate_hz, LossKind kind)
@@ -30,22 +32,23 @@ class OutputClock {
         sample_rate_hz_(sample_rate_hz),
         kind_(kind) {}
 
-  /// Forgets what was before; the counts stay.
+  /// Forgets earlier callbacks; the counts stay.
   void Restart() noexcept;
 
-  /// A callback for `frame_count` frames that are heard at `output_s`. Callbacks of one cycle of
-  /// the device have the same `cycle_s` and say `underflow` alike. One thread, real-time safe.
+  /// Notes a callback for `frame_count` frames that will be heard at `output_s`. Callbacks of the
+  /// same cycle of the device have the same `cycle_s` and `underflow`. One thread calls it; it is
+  /// real-time safe.
   void Count(double cycle_s, double output_s, size_t frame_count, bool underflow) noexcept;
 
-  /// Cycles in which the device said so. Any thread.
+  /// Number of cycles in which the device reported an underflow. Any thread.
   uint64_t xrun_count() const { return xrun_count_.load(std::memory_order_relaxed); }
 
-  /// Of the longest cycle so far; 0 before the first is whole. Any thread.
+  /// Frames of the longest cycle so far; 0 before the first cycle is complete. Any thread.
   size_t longest_cycle_frames() const {
     return longest_cycle_frames_.load(std::memory_order_relaxed);
   }
 
-  /// Known a second after. Any thread.
+  /// Number of lost frames; it includes an xrun a second after it. Any thread.
   uint64_t lost_frame_count() const { return lost_frame_count_.load(std::memory_order_relaxed); }
 
  private:
@@ -53,22 +56,22 @@ class OutputClock {
 
   void BeginCycle(double lead_frames, bool underflow) noexcept;
   void EndStretch() noexcept;
-  /// `early`, `late`: what the lead has gained half a second and a second after.
+  /// `early`, `late`: increase of the lead half a second and a second after the xrun.
   double LostFrames(double early, double late) const noexcept;
 
   const uint64_t half_watch_;  ///< frames
   const double sample_rate_hz_;
   const LossKind kind_;
-  double cycle_s_ = 0;  ///< of the last callback
+  double cycle_s_ = 0;  ///< time stamp of the last callback's cycle
   bool underflow_ = false;
-  uint64_t given_count_ = 0;      ///< frames
+  uint64_t given_count_ = 0;      ///< frames given to the device
   uint64_t cycle_first_ = 0;      ///< the first frame of this cycle
-  double cycle_frame_count_ = 0;  ///< of the last whole cycle
+  double cycle_frame_count_ = 0;  ///< frames of the last whole cycle
   uint64_t stretch_first_ = 0;    ///< the first frame of this half second
   bool begun_ = false, watching_ = false;
-  /// Least lead, for some callbacks are late: of this half second, and of the one before.
+  /// Least lead of this half second and of the one before; the minimum ignores late callbacks.
   double least_ = kNever, least_before_ = kNever;
-  double usual_ = 0;  ///< lead before the xrun that is being watched
+  double usual_ = 0;  ///< lead before the xrun that is being observed
   std::atomic<size_t> longest_cycle_frames_{0};
   std::atomic<uint64_t> xrun_count_{0};
   std::atomic<uint64_t> lost_frame_count_{0};

@@ -23,12 +23,12 @@
 namespace carillon {
 namespace {
 
-/// PulseAudio behind ALSA drops out below this.
+/// With less latency, PulseAudio behind ALSA drops out.
 constexpr double kMinAlsaLatency_s = 0.020;
 constexpr int kMaxChannelCount = 2;
 
-/// Sends file descriptor 2 to nowhere while it lives: ALSA and JACK print about a hundred lines
-/// there on a machine without a sound card, whatever PortAudio is told.
+/// Redirects file descriptor 2 to /dev/null while it lives: on a machine without a sound card ALSA
+/// and JACK print about a hundred lines there, and PortAudio cannot prevent it.
 class StderrSilence {
  public:
   StderrSilence() : saved_(fcntl(STDERR_FILENO, F_DUPFD_CLOEXEC, 3)) {
@@ -92,7 +92,7 @@ absl::StatusOr<PaDeviceIndex> FindDevice(absl::string_view name) {
                  absl::StrCat("no sound device's name contains \"", name, "\"; there is ", known));
 }
 
-/// Initialised for as long as it lives; PortAudio counts nested use.
+/// Keeps PortAudio initialized while it lives; PortAudio counts nested use.
 class Library {
  public:
   Library() : error_(Pa_Initialize()) {}
@@ -142,7 +142,8 @@ class PortAudioDevice final : public AudioDevice {
   }
 
   std::string description() const override { return absl::StrCat("portaudio: ", name_); }
-  /// Of JACK's latency PortAudio leaves out the cycle that is played while the next is asked for.
+  /// PortAudio's figure for JACK does not include the cycle that is played while the next is
+  /// pulled.
   double latency_s() const override {
     if (!is_jack_) return latency_s_;
     const size_t frames =
@@ -201,7 +202,8 @@ class PortAudioDevice final : public AudioDevice {
 
   size_t channel_count() const { return static_cast<size_t>(channel_count_); }
 
-  /// A mono mix sounds on every channel: pulled into the front of `samples`, spread from the back.
+  /// A mono mix is played on every channel: it is pulled into the front of `samples` and spread
+  /// from the back.
   void Fill(std::span<float> samples) noexcept {
     if (format_.channel_count == channel_count()) return source_->Pull(samples);
     const size_t frame_count = samples.size() / channel_count();
@@ -221,8 +223,8 @@ class PortAudioDevice final : public AudioDevice {
   std::string name_;
   int channel_count_ = 1;
   bool is_jack_ = false;
-  double latency_s_ = 0;              ///< as PortAudio says
-  std::optional<OutputClock> clock_;  ///< once it is open
+  double latency_s_ = 0;              ///< as PortAudio reports it
+  std::optional<OutputClock> clock_;  ///< set once the stream is open
   bool started_ = false;
   std::atomic<bool> finished_{false};
 };

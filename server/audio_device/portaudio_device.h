@@ -11,11 +11,11 @@ namespace carillon {
 
 /// A sound card, through PortAudio (ALSA, JACK, PulseAudio's ALSA plug-in).
 ///
-/// `name`: part of the name of the device wanted, in any case ("jack", "pulse"); empty: the
-/// system's default. Each pull has exactly `format.block_frame_count` frames. Errors: NotFound
+/// `name` is a part of the wanted device's name in upper or lower case ("jack", "pulse"); empty:
+/// the system's default. Each pull has exactly `format.block_frame_count` frames. Errors: NotFound
 /// (AUDIO_DEVICE_NOT_FOUND: the message lists the devices there are), Unavailable
-/// (AUDIO_DEVICE_FAILED). What the sound libraries print while they look for devices is swallowed:
-/// it says nothing that the status does not.
+/// (AUDIO_DEVICE_FAILED). The messages that sound libraries print while they search for devices are
+/// suppressed, because the status says as much.
 absl::StatusOr<std::unique_ptr<AudioDevice>> OpenPortAudioDevice(absl::string_view name,
                                                                  const DeviceFormat& format);
 

@@ -9,7 +9,7 @@
 namespace carillon {
 namespace {
 
-/// A sound server's own threads customarily run at 10 to 70 and a kernel's interrupts at 50.
+/// Below the threads of sound servers, which usually run at 10 to 70, and kernel interrupts, at 50.
 constexpr int kPriority = 9;
 
 }  // namespace
@@ -17,7 +17,7 @@ constexpr int kPriority = 9;
 absl::Status MakeRealtime(std::thread& thread) {
   sched_param parameters{};
   parameters.sched_priority = kPriority;
-  // RESET_ON_FORK: a decomposition started by a real-time process must not inherit it.
+  // RESET_ON_FORK: a decomposition started by a real-time process must not inherit the priority.
   if (pthread_setschedparam(thread.native_handle(), SCHED_FIFO | SCHED_RESET_ON_FORK,
                             &parameters) == 0) {
     return absl::OkStatus();

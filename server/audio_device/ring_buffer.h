@@ -9,22 +9,22 @@
 
 namespace carillon {
 
-/// Plain values (frames, numbers) from one thread to one other, copied in runs, without locks.
+/// A ring buffer that carries plain values (samples, numbers) from one thread to another. Values
+/// are copied in runs, without locks.
 template <typename T>
 class RingBuffer {
  public:
-  /// `capacity` values fit.
   explicit RingBuffer(size_t capacity) : values_(capacity) {}
 
   size_t capacity() const { return values_.size(); }
 
-  /// Producer: how many values may be pushed.
+  /// Called by the producer: number of values that may be pushed.
   size_t free_count() const {
     return capacity() -
            (written_.load(std::memory_order_relaxed) - read_.load(std::memory_order_acquire));
   }
 
-  /// Producer: appends all of `values`, of which there may be at most free_count().
+  /// Called by the producer: appends `values`, at most free_count() of them.
   void Push(std::span<const T> values) noexcept {
     const size_t written = written_.load(std::memory_order_relaxed);
     const size_t begin = written % capacity();
@@ -34,7 +34,8 @@ class RingBuffer {
     written_.store(written + values.size(), std::memory_order_release);
   }
 
-  /// Consumer: moves up to values.size() values to the front of `values`; returns how many.
+  /// Called by the consumer: moves up to values.size() values to the front of `values`; returns
+  /// their number.
   size_t Pop(std::span<T> values) noexcept {
     const size_t read = read_.load(std::memory_order_relaxed);
     const size_t count = std::min(values.size(), written_.load(std::memory_order_acquire) - read);

@@ -10,9 +10,8 @@
 
 namespace carillon {
 
-/// Writes a WAV file of float32 samples (WAVE_FORMAT_EXTENSIBLE; RF64 past 4 GiB). The header
-/// is kept true while the file grows, so that a file whose writer was killed can be read up to
-/// there.
+/// Writes a WAV file of float32 samples (WAVE_FORMAT_EXTENSIBLE; RF64 beyond 4 GiB). The header is
+/// updated with each write, so that a file is readable even if its writer was killed.
 class WavWriter {
  public:
   /// Truncates or creates `path`. Errors: FailedPrecondition (AUDIO_FILE_FAILED).

@@ -7,7 +7,8 @@
 
 namespace carillon {
 
-/// Time, passed in, so that what depends on it can be tested. Safe from every thread.
+/// A source of time, passed in so that code that depends on time can be tested. All threads may use
+/// it.
 class Clock {
  public:
   virtual ~Clock() = default;

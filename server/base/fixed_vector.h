@@ -9,22 +9,22 @@
 
 namespace carillon {
 
-/// A vector that takes all its memory when it is made: what only a rendering thread fills. `T` is a
-/// plain struct.
+/// A vector of fixed capacity that allocates in its constructor only, for use on rendering threads.
+/// `T` is a plain struct.
 template <typename T>
 class FixedVector {
  public:
   explicit FixedVector(size_t capacity)
       : capacity_(capacity), values_(std::make_unique_for_overwrite<T[]>(capacity)) {}
 
-  /// There is room: more would be a mistake of ours, and is lost.
+  /// The vector must have room. A value beyond the capacity is a bug; it is discarded.
   void push_back(const T& value) noexcept {
     assert(size_ < capacity_);
     if (size_ < capacity_) values_[size_++] = value;
   }
   void clear() noexcept { size_ = 0; }
 
-  /// Takes out, in order, what `predicate` is true of.
+  /// Erases the values for which `predicate` is true; it is called once for each value, in order.
   template <typename Predicate>
   void EraseIf(Predicate predicate) noexcept {
     size_ = static_cast<size_t>(std::remove_if(begin(), end(), predicate) - begin());

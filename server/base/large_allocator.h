@@ -11,10 +11,9 @@
 
 namespace carillon {
 
-/// For arrays of many megabytes that are filled at once and read at random: from 2 MiB on in huge
-/// pages, since pages of 4 KiB cost a fault each while they are filled and a walk through the page
-/// table at each read; and a vector that grows by resize() leaves numbers as they are in memory, to
-/// be overwritten.
+/// An allocator for arrays of many megabytes that are filled once and read at random. Arrays of 2
+/// MiB and more lie in huge pages, because pages of 4 KiB cost a page fault each when they are
+/// filled and a page-table walk at most reads. resize() leaves new numbers uninitialized.
 template <typename T>
 class LargeAllocator {
  public:
@@ -22,9 +21,9 @@ class LargeAllocator {
 
   LargeAllocator() = default;
   template <typename U>
-  LargeAllocator(const LargeAllocator<U>&) {}  // NOLINT: as every allocator converts
+  LargeAllocator(const LargeAllocator<U>&) {}  // NOLINT: allocators convert implicitly
 
-  /// At least a cache line's alignment.
+  /// Memory is aligned to a cache line at least.
   T* allocate(size_t count) {
     const size_t wanted = count * sizeof(T);
     const size_t alignment = wanted < kHugePageBytes ? kLineBytes : kHugePageBytes;

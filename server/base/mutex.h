@@ -8,8 +8,8 @@
 
 namespace carillon {
 
-/// std::mutex with the annotations that clang's thread-safety analysis checks. Not absl::Mutex:
-/// ThreadSanitizer sees nothing of the locks of a library that was compiled without it.
+/// std::mutex with the annotations that clang's thread-safety analysis checks. absl::Mutex is not
+/// used, because ThreadSanitizer does not see locks in libraries that were compiled without it.
 class ABSL_LOCKABLE Mutex {
  public:
   void Lock() ABSL_EXCLUSIVE_LOCK_FUNCTION() ABSL_LOCKS_EXCLUDED(kRenderRole) { mutex_.lock(); }
@@ -19,7 +19,7 @@ class ABSL_LOCKABLE Mutex {
   std::mutex mutex_;
 };
 
-/// Holds a mutex for the length of a scope.
+/// Locks a mutex until the end of a scope.
 class ABSL_SCOPED_LOCKABLE MutexLock {
  public:
   explicit MutexLock(Mutex* mutex) ABSL_EXCLUSIVE_LOCK_FUNCTION(mutex)

@@ -14,23 +14,23 @@ struct Quaternion {
   double w = 1, x = 0, y = 0, z = 0;
 };
 
-/// Where a body is in its scene's space.
+/// Position and orientation of a body in its scene.
 struct Pose {
   Vector3 position_m{};      ///< the origin of its frame
-  Quaternion orientation{};  ///< turns a vector of its frame into one of the scene's
+  Quaternion orientation{};  ///< rotates vectors of the body's frame into the scene's frame
 };
 
-/// INVALID_ARGUMENT (INVALID_POSE: not finite, beyond 1e6 m, or a quaternion that is not of unit
-/// length to 1e-3).
+/// INVALID_ARGUMENT (INVALID_POSE) if a value is not finite, a coordinate exceeds 1e6 m, or the
+/// quaternion's length differs from 1 by more than 1e-3.
 absl::Status Validate(const Pose& pose);
 absl::Status Validate(const Quaternion& rotation);
 
-/// Of exactly unit length.
+/// The quaternion divided by its length.
 Quaternion Normalized(const Quaternion& q);
 
 Quaternion Inverse(const Quaternion& q);
 
-/// First `b`, then `a`.
+/// The rotation `b` followed by the rotation `a`.
 Quaternion Product(const Quaternion& a, const Quaternion& b);
 
 Vector3 Rotated(const Vector3& v, const Quaternion& q);

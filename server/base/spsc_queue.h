@@ -6,8 +6,8 @@
 
 namespace carillon {
 
-/// A bounded queue from one producer thread to one consumer thread, which neither locks nor
-/// allocates after construction. `T` is a plain struct.
+/// A bounded queue from one producer thread to one consumer thread. It does not lock, and allocates
+/// in its constructor only. `T` is a plain struct.
 template <typename T>
 class SpscQueue {
  public:

@@ -5,20 +5,20 @@
 
 namespace carillon {
 
-/// What a thread is there for, as a lock that costs nothing: clang's thread-safety analysis then
-/// finds a function called by the wrong kind of thread (lint/thread_roles).
-/// ABSL_EXCLUSIVE_LOCKS_REQUIRED says which role a function belongs to, ABSL_LOCKS_EXCLUDED which
-/// may not call it.
+/// The role of a thread, modelled as a lock that costs nothing, so that clang's thread-safety
+/// analysis finds functions called by the wrong kind of thread (lint/thread_roles).
+/// ABSL_EXCLUSIVE_LOCKS_REQUIRED names the role that may call a function, ABSL_LOCKS_EXCLUDED a
+/// role that may not.
 class ABSL_LOCKABLE ThreadRole {
  public:
   void Take() const ABSL_EXCLUSIVE_LOCK_FUNCTION() {}
   void Leave() const ABSL_UNLOCK_FUNCTION() {}
 };
 
-/// Renders: it neither allocates, locks, logs, throws nor calls the system.
+/// The role of rendering threads, which neither allocate, lock, log, throw nor call the system.
 inline constexpr ThreadRole kRenderRole;
 
-/// This thread has a role for the length of a scope.
+/// Gives this thread a role until the end of a scope.
 class ABSL_SCOPED_LOCKABLE InRole {
  public:
   explicit InRole(const ThreadRole& role) ABSL_EXCLUSIVE_LOCK_FUNCTION(role) : role_(role) {

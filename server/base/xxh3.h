@@ -6,7 +6,7 @@
 
 namespace carillon {
 
-/// XXH3, 64 bits, seed 0: the hash beside every stored chunk.
+/// The 64-bit XXH3 hash with seed 0, which is stored with every chunk of the database.
 uint64_t Xxh3(std::string_view bytes);
 
 }  // namespace carillon

@@ -11,7 +11,7 @@ namespace carillon {
 namespace {
 
 constexpr std::chrono::milliseconds kHousekeepingPeriod(5);
-/// A peak is noted so often, and remembered for so long.
+/// The peak is sampled every kPeakPeriod and reported as the maximum over kPeakMemory.
 constexpr std::chrono::milliseconds kPeakPeriod(50);
 constexpr std::chrono::seconds kPeakMemory(1);
 
@@ -115,7 +115,7 @@ void LiveOutput::ReplaceDeadDevice() {
   output_.device->Stop();
   earlier_xrun_count_ += output_.device->xrun_count();
   earlier_lost_frame_count_ += output_.device->lost_frame_count();
-  // The null device opens and starts whatever has happened.
+  // The null device always opens and starts.
   output_.device = std::move(OpenDevice("null", settings_.format, clock_)->device);
   output_.message =
       absl::StrCat(dead, " stopped by itself; nothing sounds until the daemon restarts");

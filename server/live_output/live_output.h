@@ -21,32 +21,33 @@
 
 namespace carillon {
 
-/// How the daemon plays.
+/// Settings of the daemon's output.
 struct OutputSettings {
   DeviceFormat format{};
   /// Blocks rendered ahead of the device.
   uint32_t look_ahead_block_count = 8;
-  /// As OpenDevice takes it.
+  /// A specification for OpenDevice.
   std::string device = "auto";
 };
 
-/// What can be told about the output at a moment.
+/// State of the output at one moment.
 struct OutputState {
   std::string device;
   std::string device_message;
-  double latency_s = 0;  ///< from the mixer to the ear as far as known
-  double load = 0;
+  double latency_s = 0;  ///< from the mixer to audible sound, as far as known
+  double load = 0;       ///< fraction of real time that rendering takes
   uint64_t xrun_count = 0;
   uint64_t lost_frame_count = 0;
-  double peak = 0;  ///< of the last second
+  double peak = 0;  ///< largest sample of the last second, before the limiter
   MixerStatistics mixer;
 };
 
-/// The mixer, made audible: rendered ahead of a device, heard by listeners, and looked after by a
-/// housekeeping thread. Safe from every thread.
+/// Plays a mixer: renders it ahead of a device, broadcasts it to listeners, and frees retired
+/// memory and replaces a failed device on a housekeeping thread. All functions may be called from
+/// any thread.
 class LiveOutput {
  public:
-  /// Takes lines for people.
+  /// Takes a line for people to read.
   using Log = std::function<void(const std::string&)>;
 
   /// Opens the device and begins to play. `clock` must outlive the output.
@@ -79,7 +80,7 @@ class LiveOutput {
   LookAhead look_ahead_;
   mutable Mutex mutex_;
   OpenedDevice output_ ABSL_GUARDED_BY(mutex_);
-  /// Of devices that died.
+  /// Counts of devices that have failed.
   uint64_t earlier_xrun_count_ ABSL_GUARDED_BY(mutex_) = 0;
   uint64_t earlier_lost_frame_count_ ABSL_GUARDED_BY(mutex_) = 0;
   struct Peak {

@@ -8,19 +8,20 @@
 
 namespace carillon {
 
-/// A place for a bank as the rendering threads see it.
+/// A bank as the rendering threads see it.
 struct BankSlot {
   OscillatorBank* bank = nullptr;
-  Voice* voice = nullptr;  ///< through which it is heard; null: as it is
+  Voice* voice = nullptr;  ///< null: the bank is heard without a position
   uint32_t generation = 0;
-  uint32_t section = 0;        ///< which one renders it
-  float loudness_of_blow = 0;  ///< the bank's
-  uint32_t pending_count = 0;  ///< strikes that wait for their time
-  bool sounding = false;       ///< is among its section's sounding banks
-  bool rendered = false;       ///< in this block
-  bool leaving = false;        ///< is to be retired when it is silent
+  uint32_t section = 0;  ///< the section that renders it
+  float loudness_per_newton_second = 0;
+  uint32_t pending_count = 0;  ///< events that wait for their block
+  bool sounding = false;       ///< among the sounding banks of its section
+  bool rendered = false;       ///< already in this block
+  bool leaving = false;        ///< retired once it is silent
   bool fading = false;
-  bool awakening = false;  ///< a strike of the block being chosen for awakes the bank
+  bool awakening =
+      false;  ///< its work of waking up is counted already in the block being chosen for
   float fade_gain = 1;
 };
 

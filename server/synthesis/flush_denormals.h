@@ -5,8 +5,8 @@
 
 namespace carillon {
 
-/// While it lives, this thread treats denormal numbers as zero (FTZ and DAZ): decaying modes would
-/// otherwise cost up to 190 times as much. Every thread that renders holds one.
+/// Makes this thread treat denormal numbers as zero (FTZ and DAZ) while the object lives. Decaying
+/// modes would otherwise cost up to 190 times as much. Every thread that renders holds one.
 class FlushDenormals {
  public:
   FlushDenormals() noexcept;

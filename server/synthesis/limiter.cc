@@ -10,7 +10,7 @@ namespace {
 constexpr float kThreshold = 0.70794578F;  // -3 dB of full scale
 constexpr double kReleaseS = 0.1;
 
-/// f(e) of the header, for e above the threshold; e = infinity gives one.
+/// f(e) as in the header, for e above the threshold; f(infinity) is one.
 float Limited(float envelope) {
   const float over = (envelope - kThreshold) / (1 - kThreshold);
   return kThreshold + (1 - kThreshold) * (1 - 1 / (1 + over));

@@ -7,14 +7,14 @@
 
 namespace carillon {
 
-/// Keeps samples within +-1. It follows the peaks of the signal, e(n) = max(|x(n)|, release
-/// e(n-1)), and above the threshold T = 10^(-3/20) applies the gain f(e)/e with
+/// Keeps samples within +-1. It tracks the signal's envelope, e(n) = max(|x(n)|, release
+/// e(n-1)), and above the threshold T = 10^(-3/20) it applies the gain f(e)/e with
 ///
 ///   f(e) = T + (1 - T) u/(1 + u),  u = (e - T)/(1 - T)
 ///
-/// whose slope is one at T and whose limit is one. Below T the samples pass bit for bit. No delay;
-/// the gain recovers with a time constant of 0.1 s. A sample that is not finite becomes zero. All
-/// channels of a frame get one gain, that of the loudest, so that nothing moves to a side.
+/// f has slope one at T and limit one. Samples below T pass unchanged. There is no delay; the gain
+/// recovers with a time constant of 0.1 s. A sample that is not finite becomes zero. All channels
+/// of a frame get the gain of the loudest, so that the stereo image does not move.
 class Limiter {
  public:
   explicit Limiter(double sample_rate_hz, size_t channel_count = 1);

@@ -22,11 +22,12 @@ static_assert(kSectionCount <= RenderOrder::kMostSections);
 static_assert(kBlocksTogether <= RenderOrder::kMostBlocks);
 static_assert(kMostBlockFrames <= RenderOrder::kMostGroups * kMergedFrames);
 
-/// 6 dB below what was shed in the last block.
-constexpr float kHopeless = 0.5F;
-constexpr uint64_t kHopelessBlocks = 8;
+/// An impulse 6 dB quieter than all that the last block rendered is shed on arrival, if it is due
+/// within this number of blocks.
+constexpr float kEarlyShedRatio = 0.5F;
+constexpr uint64_t kEarlyShedBlocks = 8;
 
-/// Of the bound, for what rings: the rest is for strikes.
+/// Part of the bound that ringing banks may take; impulses get the rest.
 constexpr double kRingingShare = 0.9;
 
 }  // namespace
@@ -47,7 +48,7 @@ void Mixer::RenderBlocks(std::span<float> frames) noexcept {
   const size_t frame_count = frames.size() / settings_.channel_count;
   const size_t block_count = frame_count / settings_.block_frame_count;
   budget_.Begin();
-  ObeyCommands();
+  ExecuteCommands();
   TakeEvents(block_count);
   CollectDueEvents(block_count);
   RenderSections(frames);
@@ -60,23 +61,24 @@ void Mixer::RenderBlocks(std::span<float> frames) noexcept {
   budget_.End(rendered_work_, static_cast<double>(block_count));
 }
 
-void Mixer::ObeyCommands() noexcept {
-  for (Command command; commands_.TryPop(command);) Obey(command);
+void Mixer::ExecuteCommands() noexcept {
+  for (Command command; commands_.TryPop(command);) Execute(command);
 }
 
-void Mixer::Obey(const Command& command) noexcept {
+void Mixer::Execute(const Command& command) noexcept {
   if (command.kind == Command::Kind::kAddStream) {
     open_queues_.push_back(command.queue);
   } else if (command.kind == Command::Kind::kAddBank) {
-    slots_[command.id.slot] = {.bank = command.bank,
-                               .voice = command.voice,
-                               .generation = command.id.generation,
-                               .section = command.section,
-                               .loudness_of_blow = command.bank->loudness_of_blow()};
+    slots_[command.id.slot] = {
+        .bank = command.bank,
+        .voice = command.voice,
+        .generation = command.id.generation,
+        .section = command.section,
+        .loudness_per_newton_second = command.bank->loudness_per_newton_second()};
     Count(statistics_.bank_count);
     if (command.voice == nullptr) return;
     ++command.voice->bank_count;
-    command.bank->LeaveSpectrum();                     // a voice has no spectrum of its own
+    command.bank->LeaveSpectrum();                     // a voice is fed in the time domain
   } else if (BankSlot* slot = FindSlot(command.id)) {  // it may have rung out before it was to fade
     if (!slot->leaving) leaving_.push_back(command.id.slot);
     slot->leaving = true;
@@ -93,7 +95,7 @@ BankSlot* Mixer::FindSlot(BankId id) noexcept {
 }
 
 void Mixer::TakeEvents(size_t block_count) noexcept {
-  // Each block begins with another stream, so that a flood in one does not starve the rest.
+  // Each block begins with another stream, so that a flood in one stream does not starve the rest.
   const size_t count = open_queues_.size();
   const size_t first = count == 0 ? 0 : block_start_ / settings_.block_frame_count % count;
   size_t budget = settings_.most_events_per_block * block_count;
@@ -110,7 +112,7 @@ void Mixer::TakeEvents(size_t block_count) noexcept {
     }
   }
   if (budget == 0) all_events_taken_ = false;
-  // Asked in this order, a queue that is closed and empty stays empty.
+  // The order of these two reads matters: a queue that is closed first and then empty stays empty.
   open_queues_.EraseIf([this](EventQueue* queue) ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole) {
     const bool done = queue->closed.load(std::memory_order_acquire) && queue->events.empty();
     if (done) SendBack({.queue = queue});
@@ -119,9 +121,9 @@ void Mixer::TakeEvents(size_t block_count) noexcept {
 }
 
 void Mixer::Take(MixerEvent event, EventQueue& queue) noexcept {
-  // A bank may have been added, and struck, since the commands of this block were obeyed.
+  // A bank may have been added, and have got events, since this block's commands were executed.
   if (FindSlot(event.bank) == nullptr) {
-    ObeyCommands();
+    ExecuteCommands();
     all_events_taken_ = false;
   }
   BankSlot* slot = FindSlot(event.bank);
@@ -131,24 +133,24 @@ void Mixer::Take(MixerEvent event, EventQueue& queue) noexcept {
     event.fraction = 0;
   }
   const bool known = slot != nullptr && !slot->fading;
-  const bool hopeless = known && IsHopeless(event, *slot);
-  if (!known || (!hopeless && !pending_.TryPush(event))) {
+  const bool shed_early = known && IsShedEarly(event, *slot);
+  if (!known || (!shed_early && !pending_.TryPush(event))) {
     Count(queue.dropped_count);
     return Count(statistics_.dropped_count);
   }
-  Count(statistics_.shed_count, hopeless ? 1 : 0);
-  if (!hopeless) ++slot->pending_count;
+  Count(statistics_.shed_count, shed_early ? 1 : 0);
+  if (!shed_early) ++slot->pending_count;
   if (event.impulse() == nullptr) return;
   Count(late ? queue.late_count : queue.accepted_count);
   Count(late ? statistics_.late_count : statistics_.accepted_count);
 }
 
-/// Far too quiet for what the last block could render, and due as soon: it is shed before it costs
-/// more.
-bool Mixer::IsHopeless(const MixerEvent& event, const BankSlot& slot) const noexcept {
-  return hopeless_below_ > 0 && event.impulse() != nullptr &&
-         event.FirstSample() < block_start_ + kHopelessBlocks * settings_.block_frame_count &&
-         LoudnessOf(*event.impulse(), slot) < hopeless_below_;
+/// Whether an impulse is so quiet that keeping and judging it would be a waste: see
+/// kEarlyShedRatio.
+bool Mixer::IsShedEarly(const MixerEvent& event, const BankSlot& slot) const noexcept {
+  return early_shed_below_ > 0 && event.impulse() != nullptr &&
+         event.FirstSample() < block_start_ + kEarlyShedBlocks * settings_.block_frame_count &&
+         LoudnessOf(*event.impulse(), slot) < early_shed_below_;
 }
 
 void Mixer::CollectDueEvents(size_t block_count) noexcept {
@@ -177,7 +179,7 @@ void Mixer::CollectDueEvents(size_t block_count) noexcept {
   }
 }
 
-/// What of a block's strikes is exact, merged or shed.
+/// Decides which impulses of a block are exact, merged or shed.
 void Mixer::DecideTreatment(std::span<const uint32_t> due) noexcept {
   triage_.Clear();
   for (const uint32_t index : due) {
@@ -192,17 +194,17 @@ void Mixer::DecideTreatment(std::span<const uint32_t> due) noexcept {
   for (const uint32_t index : due) {
     if (BankSlot* slot = FindSlot(pending_[index].bank)) slot->awakening = false;
   }
-  const double taken = work::kTakeStrike * static_cast<double>(std::exchange(taken_count_, 0));
-  const double judged = work::kJudgeStrike * static_cast<double>(due.size());
+  const double taken = work::kTakeEvent * static_cast<double>(std::exchange(taken_count_, 0));
+  const double judged = work::kChooseEvent * static_cast<double>(due.size());
   const double spent = ringing_work_ + taken + judged;
   rendered_work_ += spent + triage_.Decide(budget_.most_work() - spent);
-  hopeless_below_ = triage_.shed_below() * kHopeless;
+  early_shed_below_ = triage_.shed_below() * kEarlyShedRatio;
 }
 
 float Mixer::LoudnessOf(const SurfaceImpulse& impulse, const BankSlot& slot) noexcept {
   const auto& [x, y, z] = impulse.impulse_newton_seconds;
   const float squared = x * x + y * y + z * z;
-  return slot.loudness_of_blow * std::sqrt(squared);
+  return slot.loudness_per_newton_second * std::sqrt(squared);
 }
 
 /// Decides which of a block's events are rendered, and notes their places in the order of
@@ -238,7 +240,7 @@ void Mixer::ChooseEvents(uint32_t block, std::span<const uint32_t> due) noexcept
   }
 }
 
-/// Silences the least audible banks, until the rest can ring in time.
+/// Silences the quietest banks until the rest can be rendered in time.
 void Mixer::ShedBanks() noexcept {
   triage_.Clear();
   for (const RenderSection& section : sections_) {
@@ -259,7 +261,7 @@ void Mixer::ShedBanks() noexcept {
   }
 }
 
-void Mixer::RenderOneSection(size_t worker, size_t section, size_t frame_count) noexcept {
+void Mixer::RenderOneSection(size_t thread, size_t section, size_t frame_count) noexcept {
   const size_t begin = section == 0 ? 0 : due_ends_[section - 1];
   section_counts_[section] = sections_[section].Render(
       block_start_ / settings_.block_frame_count,
@@ -268,7 +270,7 @@ void Mixer::RenderOneSection(size_t worker, size_t section, size_t frame_count) 
        .placed = std::span(placed_frames_)
                      .subspan(section * frame_count * settings_.channel_count,
                               frame_count * settings_.channel_count)},
-      workspaces_[worker]);
+      workspaces_[thread]);
 }
 
 void Mixer::RenderSections(std::span<float> frames) noexcept {
@@ -276,9 +278,9 @@ void Mixer::RenderSections(std::span<float> frames) noexcept {
     due_ends_[section] = std::max(due_ends_[section], due_ends_[section - 1]);
   }
   const size_t frame_count = frames.size() / settings_.channel_count;
-  const auto render = [&](size_t worker, size_t section) {
+  const auto render = [&](size_t thread, size_t section) {
     const InRole role(kRenderRole);  // each of the threads that render sections has it
-    RenderOneSection(worker, section, frame_count);
+    RenderOneSection(thread, section, frame_count);
   };
   if (settings_.threads != nullptr) {
     settings_.threads->Render(kSectionCount, render);
@@ -290,7 +292,7 @@ void Mixer::RenderSections(std::span<float> frames) noexcept {
   MixSections(frames);
 }
 
-/// In order, whoever rendered them.
+/// Adds up the sections in their order, so that the sum does not depend on the threads.
 void Mixer::MixSections(std::span<float> frames) noexcept {
   const size_t frame_count = frames.size() / settings_.channel_count;
   const std::span<float> mixed =
@@ -322,7 +324,7 @@ void Mixer::RetireLeavingBanks() noexcept {
   leaving_.EraseIf([this](uint32_t index) ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole) {
     BankSlot& slot = slots_[index];
     const bool awaited = !slot.fading && (slot.pending_count > 0 || !all_events_taken_);
-    // The last bank of a voice goes when all of its sound has arrived.
+    // The last bank of a voice stays until the voice has delivered all of its delayed sound.
     const bool last_of_voice = slot.voice != nullptr && slot.voice->bank_count == 1;
     if (slot.sounding || awaited || (last_of_voice && !slot.voice->asleep())) return false;
     if (slot.voice != nullptr) --slot.voice->bank_count;
@@ -335,7 +337,8 @@ void Mixer::RetireLeavingBanks() noexcept {
 }
 
 void Mixer::SendBack(const Retired& retired) noexcept {
-  [[maybe_unused]] const bool sent = retired_.TryPush(retired);  // it has room for all there are
+  // There is room for every bank and stream.
+  [[maybe_unused]] const bool sent = retired_.TryPush(retired);
   assert(sent);
 }
 

@@ -31,57 +31,57 @@
 
 namespace carillon {
 
-/// Parts that a mixer's banks are spread over.
+/// Number of sections that a mixer's banks are spread over.
 inline constexpr size_t kSectionCount = BlockMix::kStaggers;
 
-/// Blocks that are rendered in one go where the caller asks for as many: each section renders all
-/// of them before the next does.
+/// Most blocks that each section renders before the next section begins, if the caller requests
+/// several blocks at once.
 inline constexpr size_t kBlocksTogether = 16;
 
-/// Bounds of a mixer; all memory is taken when it is made.
+/// Bounds of a mixer, which allocates all its memory in its constructor.
 struct MixerSettings {
   double sample_rate_hz = 48000;
   size_t block_frame_count = 128;  ///< at most kMostBlockFrames
-  size_t channel_count = 1;        ///< or 2: what has no voice sounds on both alike
-  uint64_t first_frame = 0;        ///< number of the first; a multiple of block_frame_count
-  size_t most_banks = 8192;        ///< those that ring out or fade included
+  size_t channel_count = 1;        ///< or 2; a bank without a voice sounds equally on both
+  uint64_t first_frame = 0;        ///< number of the first frame; a multiple of block_frame_count
+  size_t most_banks = 8192;        ///< including those that ring out or fade
   size_t most_streams = 1024;
-  size_t most_pending_events = 262144;   ///< waiting for their time
-  size_t most_events_per_block = 32768;  ///< taken from the streams; further ones wait there
-  /// Where there is a clock, a block's work is bounded, so that its deadline is kept: beyond it the
-  /// least audible strikes are merged, then shed, then banks; see MixerStatistics. Without one
-  /// nothing is, and the sound depends on nothing but what was asked for. It must outlive the
-  /// mixer.
+  size_t most_pending_events = 262144;   ///< events that wait for their block
+  size_t most_events_per_block = 32768;  ///< taken from the streams; the rest wait there
+  /// With a clock, the work of a block is bounded so that its deadline is kept: beyond the bound
+  /// the quietest impulses are merged, then shed, then the quietest banks are silenced
+  /// (MixerStatistics counts them). Without a clock nothing is left out, and the sound depends on
+  /// the events only. The clock must outlive the mixer.
   const Clock* clock = nullptr;
-  double most_load = 0.7;  ///< part of real time
-  /// Who renders the sections; none: the caller alone. The sound is the same, bit for bit. It must
-  /// outlive the mixer.
+  double most_load = 0.7;  ///< fraction of real time that rendering may take
+  /// Threads that render the sections; null: the caller's thread alone. The sound is the same bit
+  /// for bit. They must outlive the mixer.
   SectionThreads* threads = nullptr;
 };
 
-/// What a mixer has counted since it was made, and what it renders now.
+/// Counts since the mixer was made, and its present state.
 struct MixerStatistics {
-  uint64_t frame_count = 0;          ///< rendered
-  uint64_t accepted_count = 0;       ///< strikes that came in time
-  uint64_t late_count = 0;           ///< strikes that came too late and sounded at once
-  uint64_t dropped_count = 0;        ///< strikes lost: no such bank, too many, or not finite
-  uint64_t merged_count = 0;         ///< accepted strikes that were merged with their neighbours
-  uint64_t shed_count = 0;           ///< accepted strikes shed: the least audible of too many
-  uint64_t shed_bank_count = 0;      ///< banks silenced: the least audible of too many
+  uint64_t frame_count = 0;          ///< number of the next frame to be rendered
+  uint64_t accepted_count = 0;       ///< impulses that came in time
+  uint64_t late_count = 0;           ///< impulses that came too late and sounded at once
+  uint64_t dropped_count = 0;        ///< events lost: no such bank, too many, or not finite
+  uint64_t merged_count = 0;         ///< impulses merged with their neighbours
+  uint64_t shed_count = 0;           ///< impulses not rendered: the quietest of too many
+  uint64_t shed_bank_count = 0;      ///< banks silenced: the quietest of too many
   uint64_t reset_bank_count = 0;     ///< banks silenced because their state was not finite
-  uint64_t limited_frame_count = 0;  ///< frames in which the limiter worked
-  uint64_t bank_count = 0;           ///< on the mixer
-  uint64_t active_mode_count = 0;    ///< ringing
+  uint64_t limited_frame_count = 0;  ///< frames that the limiter changed
+  uint64_t bank_count = 0;           ///< banks on the mixer
+  uint64_t active_mode_count = 0;    ///< modes that ring
 };
 
 /// Renders all sounding objects into one stream of samples.
 ///
 /// Banks are spread over kSectionCount sections, whose long blocks begin in different blocks, so
-/// that the work is even.
+/// that every block takes about the same work.
 ///
-/// Threads: one at a time calls Render; any may call the rest. Nothing under Render allocates,
-/// locks, logs, throws or calls the system. The same strikes sound bit for bit the same on one SIMD
-/// target, however many blocks one call of Render covers.
+/// Threads: one thread at a time calls Render; any thread may call the other functions. Render does
+/// not allocate, lock, log, throw or call the system. On one SIMD target the same events always
+/// give the same samples bit for bit, regardless of how many blocks one call of Render covers.
 class Mixer {
  public:
   explicit Mixer(const MixerSettings& settings = {});
@@ -93,34 +93,35 @@ class Mixer {
   /// block_frame_count.
   void Render(std::span<float> frames) noexcept;
 
-  /// Puts a bank on the mixer; it can be struck when the call returns. The bank was made for this
-  /// mixer's sample rate, block and channels, and so was the voice through which it is heard, which
-  /// serves one object; without one it is heard as it is. A bank with a voice rings in the time
-  /// domain. RESOURCE_EXHAUSTED (TOO_MANY_OBJECTS).
+  /// Puts a bank on the mixer; events may be sent to it when the call returns. With a `voice`,
+  /// which serves one object, the bank is heard from the object's position and rings in the time
+  /// domain; without one it is heard without a position. Bank and voice must have been made for
+  /// this mixer's sample rate, block and channels. RESOURCE_EXHAUSTED (TOO_MANY_OBJECTS).
   absl::StatusOr<BankId> Add(std::unique_ptr<OscillatorBank> bank,
                              std::shared_ptr<Voice> voice = nullptr)
       ABSL_LOCKS_EXCLUDED(kRenderRole);
 
-  /// Takes a bank off once it is silent. The caller sends it no further strikes; those on their way
-  /// still sound.
+  /// Removes a bank once it is silent. The caller must send it no further events; events already
+  /// sent still sound.
   void LetRingOut(BankId bank) ABSL_LOCKS_EXCLUDED(kRenderRole);
 
-  /// Takes a bank off after a fade of 10 ms, which begins when its long blocks under way have
-  /// ended, within 2048 frames; strikes on their way to it are lost.
+  /// Removes a bank after a fade of 10 ms. The fade begins when the bank's current long blocks have
+  /// ended, within 2048 frames. Events already sent to the bank are lost.
   void FadeOut(BankId bank) ABSL_LOCKS_EXCLUDED(kRenderRole);
 
-  /// A new stream of strikes, of which `capacity` may wait to be taken.
+  /// Opens a stream of events; `capacity` events may wait in it until the mixer takes them.
   /// RESOURCE_EXHAUSTED (TOO_MANY_STREAMS).
   absl::StatusOr<std::unique_ptr<EventStream>> OpenStream(size_t capacity = 4096)
       ABSL_LOCKS_EXCLUDED(kRenderRole);
 
-  /// Frees what Render has retired; a housekeeping thread calls it now and then.
+  /// Frees the banks, voices and queues that Render has retired. A housekeeping thread calls it
+  /// periodically.
   void CollectGarbage() ABSL_LOCKS_EXCLUDED(kRenderRole);
 
   /// Number of the next frame to be rendered.
   uint64_t frame() const noexcept { return statistics_.frame_count.load(); }
 
-  /// Each figure is right by itself; together they may straddle a block.
+  /// Each value is correct by itself; two values may belong to different blocks.
   MixerStatistics statistics() const noexcept;
 
   /// The largest sample before the limiter since the last call.
@@ -129,7 +130,7 @@ class Mixer {
   const MixerSettings& settings() const { return settings_; }
 
  private:
-  /// From the controlling threads to the rendering one.
+  /// A message from a controlling thread to the rendering thread.
   struct Command {
     enum class Kind { kAddBank, kLetRingOut, kFadeOut, kAddStream } kind;
     BankId id{};
@@ -138,12 +139,12 @@ class Mixer {
     uint32_t section = 0;
     EventQueue* queue = nullptr;
   };
-  /// Back: a bank's slot, or a stream's queue, that Render holds no longer.
+  /// A message back: Render no longer uses this bank's slot or this stream's queue.
   struct Retired {
     BankId id{};
     EventQueue* queue = nullptr;
   };
-  /// A place for a bank as the controlling threads see it.
+  /// A bank as the controlling threads see it.
   struct OwnedBank {
     std::unique_ptr<OscillatorBank> bank;
     std::shared_ptr<Voice> voice;
@@ -165,10 +166,10 @@ class Mixer {
   uint32_t ChooseSection() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(control_mutex_);
   void Send(const Command& command) ABSL_EXCLUSIVE_LOCKS_REQUIRED(control_mutex_);
 
-  // The rest is the rendering thread's.
+  // Only the rendering thread calls and uses what follows.
   void RenderBlocks(std::span<float> frames) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
-  void ObeyCommands() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
-  void Obey(const Command& command) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  void ExecuteCommands() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  void Execute(const Command& command) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void TakeEvents(size_t block_count) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void Take(MixerEvent event, EventQueue& queue) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
@@ -180,9 +181,9 @@ class Mixer {
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   static float LoudnessOf(const SurfaceImpulse& impulse, const BankSlot& slot) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
-  bool IsHopeless(const MixerEvent& event, const BankSlot& slot) const noexcept
+  bool IsShedEarly(const MixerEvent& event, const BankSlot& slot) const noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
-  void RenderOneSection(size_t worker, size_t section, size_t frame_count) noexcept
+  void RenderOneSection(size_t thread, size_t section, size_t frame_count) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void RenderSections(std::span<float> frames) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void MixSections(std::span<float> frames) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
@@ -205,30 +206,29 @@ class Mixer {
 
   uint64_t block_start_ ABSL_GUARDED_BY(kRenderRole);
   std::vector<BankSlot> slots_ ABSL_GUARDED_BY(kRenderRole);
-  // Slots to be retired when they are silent.
+  // Slots of banks that are retired once they are silent.
   FixedVector<uint32_t> leaving_ ABSL_GUARDED_BY(kRenderRole);
   FixedVector<EventQueue*> open_queues_ ABSL_GUARDED_BY(kRenderRole);
-  // All that was pushed before the commands of this block were given: a bank let ring out may be
-  // retired, for no strike is on its way to it.
+  // True: every event pushed before the commands of this block has been taken, so no event is on
+  // its way to a bank that was let ring out, and it may be retired.
   bool all_events_taken_ ABSL_GUARDED_BY(kRenderRole) = true;
   std::array<MixerEvent, 64> taken_ ABSL_GUARDED_BY(kRenderRole){};
   PendingEvents pending_ ABSL_GUARDED_BY(kRenderRole);
-  // Of the blocks rendered together: places in pending_.
+  // Indices in pending_ of the events due in the blocks rendered together.
   FixedVector<uint32_t> due_ ABSL_GUARDED_BY(kRenderRole);
-  // See ChooseEvents.
   FixedVector<RenderOrder> due_order_ ABSL_GUARDED_BY(kRenderRole);
   FixedVector<DueEvent> due_events_ ABSL_GUARDED_BY(kRenderRole);
-  // Of each section, in due_events_.
+  // End of each section's events in due_events_.
   std::array<size_t, kSectionCount + 1> due_ends_ ABSL_GUARDED_BY(kRenderRole){};
   LoudnessTriage triage_ ABSL_GUARDED_BY(kRenderRole);
   WorkBudget budget_ ABSL_GUARDED_BY(kRenderRole);
-  // Loudness.
-  float hopeless_below_ ABSL_GUARDED_BY(kRenderRole) = 0;
-  // Strikes, for the blocks rendered together.
+  // Quieter impulses are shed on arrival; zero: none is.
+  float early_shed_below_ ABSL_GUARDED_BY(kRenderRole) = 0;
+  // Events taken for the blocks rendered together.
   size_t taken_count_ ABSL_GUARDED_BY(kRenderRole) = 0;
-  // Of the sounding banks, in the next block.
+  // Work of the sounding banks in the next block.
   double ringing_work_ ABSL_GUARDED_BY(kRenderRole) = 0;
-  // Of the blocks rendered together.
+  // Work of the blocks rendered together.
   double rendered_work_ ABSL_GUARDED_BY(kRenderRole) = 0;
   std::vector<RenderSection> sections_ ABSL_GUARDED_BY(kRenderRole);
   std::array<SectionCounts, kSectionCount> section_counts_ ABSL_GUARDED_BY(kRenderRole){};

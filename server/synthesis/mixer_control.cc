@@ -13,8 +13,8 @@ namespace carillon {
 namespace {
 
 constexpr double kFadeS = 0.01;
-/// Their work for a long block costs about as much as its transform.
-constexpr size_t kModesASection = 4000;
+/// Spreading this number of modes costs about as much as the transforms of a section.
+constexpr size_t kModesPerSection = 4000;
 
 }  // namespace
 
@@ -44,8 +44,8 @@ Mixer::Mixer(const MixerSettings& settings)
   assert(settings.most_banks <= RenderOrder::kMostSlots);
   assert(settings.most_pending_events <= RenderOrder::kMostArrivals);
   statistics_.frame_count = settings.first_frame;
-  const size_t worker_count = settings.threads == nullptr ? 1 : settings.threads->size();
-  for (size_t i = 0; i < worker_count; ++i) workspaces_.emplace_back(settings.block_frame_count);
+  const size_t thread_count = settings.threads == nullptr ? 1 : settings.threads->size();
+  for (size_t i = 0; i < thread_count; ++i) workspaces_.emplace_back(settings.block_frame_count);
   for (size_t section = 0; section < kSectionCount; ++section) {
     sections_.emplace_back(RenderSection::Settings{.block_frame_count = settings.block_frame_count,
                                                    .stagger = section,
@@ -151,11 +151,12 @@ MixerStatistics Mixer::statistics() const noexcept {
           .active_mode_count = statistics_.active_mode_count};
 }
 
-/// The least filled; few modes are spread over few sections, for each has transforms of its own.
+/// The section with the fewest modes. A mixer with few modes uses few sections, because each
+/// section pays for transforms of its own.
 uint32_t Mixer::ChooseSection() const {
   const auto begin = section_mode_counts_.begin();
   const size_t mode_count = std::accumulate(begin, section_mode_counts_.end(), size_t{0});
-  const size_t used = std::min(mode_count / kModesASection + 1, kSectionCount);
+  const size_t used = std::min(mode_count / kModesPerSection + 1, kSectionCount);
   return static_cast<uint32_t>(std::min_element(begin, begin + static_cast<ptrdiff_t>(used)) -
                                begin);
 }

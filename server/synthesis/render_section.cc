@@ -109,9 +109,9 @@ bool RenderSection::Apply(BankSlot& slot, std::span<const DueEvent> due) noexcep
   if (const SurfaceImpulse* impulse = event.impulse()) {
     return bank.Strike(*impulse, first.offset, event.LeadFrames(), mix_);
   }
-  if (const auto* force = std::get_if<SurfaceForce>(&event.action)) return bank.Gather(*force);
+  if (const auto* force = std::get_if<SurfaceForce>(&event.action)) return bank.AddForce(*force);
   if (const auto* knot = std::get_if<ForceKnot>(&event.action)) {
-    return bank.Tie(*knot, first.offset, mix_);
+    return bank.ApplyKnot(*knot, first.offset, mix_);
   }
   return Move(slot.voice, event, first.offset);
 }
@@ -122,14 +122,14 @@ void RenderSection::RenderBank(BankSlot& slot, SectionCounts& counts) noexcept {
   if (slot.voice != nullptr) mix_.SetApart(settings_.block_frame_count);
   if (!slot.bank->RenderAdd(mix_)) ++counts.reset_bank_count;
   if (slot.voice == nullptr) return;
-  Awake(*slot.voice);
+  Wake(*slot.voice);
   mix_.TakeApart(slot.voice->input());
   mix_.Reunite();
 }
 
 bool RenderSection::Move(Voice* voice, const MixerEvent& event, size_t offset) noexcept {
   if (voice == nullptr) return false;
-  Awake(*voice);
+  Wake(*voice);
   if (const auto* object = std::get_if<ObjectMove>(&event.action)) {
     voice->Move(object->motion, offset);
   } else if (const auto* listener = std::get_if<ListenerMove>(&event.action)) {
@@ -138,9 +138,9 @@ bool RenderSection::Move(Voice* voice, const MixerEvent& event, size_t offset) n
   return true;
 }
 
-void RenderSection::Awake(Voice& voice) noexcept {
+void RenderSection::Wake(Voice& voice) noexcept {
   if (!voice.asleep()) return;
-  voice.Awake();
+  voice.Wake();
   voices_.push_back(&voice);
 }
 
@@ -165,14 +165,14 @@ void RenderSection::RenderFading(BankSlot& slot, std::span<float> block,
   }
 }
 
-/// Fades those that fade, counts, and dismisses the silent.
+/// Renders fading banks, counts modes and work, and removes silent banks from sounding_.
 void RenderSection::FinishBanks(std::span<float> block, SectionCounts& counts) noexcept {
   counts.active_mode_count = 0;
   counts.ringing_work = 0;
   sounding_.EraseIf([&](uint32_t index) ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole) {
     BankSlot& slot = slots_[index];
     if (!slot.rendered) {
-      if (slot.voice != nullptr) Awake(*slot.voice);
+      if (slot.voice != nullptr) Wake(*slot.voice);
       RenderFading(slot, slot.voice != nullptr ? slot.voice->input() : block, counts);
     }
     slot.rendered = false;

@@ -14,41 +14,41 @@
 
 namespace carillon {
 
-/// What a section has counted while rendering.
+/// Counts of one call of RenderSection::Render.
 struct SectionCounts {
   uint64_t dropped_count = 0;
   uint64_t reset_bank_count = 0;
-  uint64_t active_mode_count = 0;  ///< now
-  double ringing_work = 0;  ///< units (work_budget.h) that the next block takes without strikes
-  bool placed = false;      ///< something was heard through a voice
+  uint64_t active_mode_count = 0;  ///< at the end
+  double ringing_work = 0;         ///< units of work of the next block without events
+  bool placed = false;             ///< a voice was rendered
 };
 
-/// Some of a mixer's banks, which one thread renders together; several sections may render at once.
-/// Long blocks begin in another block in each, so that their work is spread evenly.
+/// A share of a mixer's banks, rendered by one thread at a time; several sections may render at
+/// once. Each section has its own stagger of long blocks (BlockMix), so that their work is spread
+/// evenly.
 class RenderSection {
  public:
   struct Settings {
     size_t block_frame_count = 0;
-    size_t stagger = 0;     ///< see BlockMix
+    size_t stagger = 0;
     size_t most_banks = 0;  ///< in this section
-    float fade_step = 0;    ///< of a fading bank's gain in a frame
+    float fade_step = 0;    ///< by which the gain of a fading bank falls per frame
     size_t channel_count = 1;
   };
-  /// `slots` belong to the mixer; this section touches its own only.
+  /// `slots` are all slots of the mixer; the section uses those of its own banks only.
   RenderSection(const Settings& settings, std::span<BankSlot> slots);
 
-  /// Its sounding banks' slots.
+  /// Slots of the sounding banks.
   std::span<const uint32_t> sounding() const noexcept { return sounding_; }
 
-  /// Where it renders to.
+  /// Destination of the rendered sound.
   struct Output {
-    std::span<float> frames;  ///< what is heard as it is: whole blocks, mono
-    std::span<float> placed;  ///< what is heard through voices: as many, interleaved
+    std::span<float> frames;  ///< banks without a voice: whole blocks, mono
+    std::span<float> placed;  ///< voices: the same number of frames, interleaved
   };
 
-  /// Renders blocks, the first of which has this number. `events` are this section's, ascending by
-  /// block, then slot, then offset. Where the counts say that nothing was placed, `placed` is
-  /// untouched.
+  /// Renders as many blocks as `output` holds, from `block_number` on. `events` are those of this
+  /// section, in RenderOrder. `output.placed` is written only if the returned counts say `placed`.
   SectionCounts Render(uint64_t block_number, std::span<const DueEvent> events,
                        const Output& output, RenderWorkspace& workspace) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
@@ -66,13 +66,13 @@ class RenderSection {
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
   bool Move(Voice* voice, const MixerEvent& event, size_t offset) noexcept;
-  void Awake(Voice& voice) noexcept;
+  void Wake(Voice& voice) noexcept;
   void RenderVoices(std::span<float> placed, SectionCounts& counts) noexcept;
 
   Settings settings_;
   std::span<BankSlot> slots_;
-  FixedVector<uint32_t> sounding_;  // slots whose banks are not silent, in order of their awakening
-  FixedVector<Voice*> voices_;      // that are not asleep, in order of their awakening
+  FixedVector<uint32_t> sounding_;  // in order of awakening
+  FixedVector<Voice*> voices_;      // those not asleep, in order of awakening
   BlockMix mix_;
 };
 

@@ -6,8 +6,8 @@
 namespace carillon {
 
 RenderThreads::RenderThreads(size_t thread_count) {
-  for (size_t worker = 1; worker < thread_count; ++worker) {
-    threads_.emplace_back([this, worker] { Help(worker); });
+  for (size_t thread = 1; thread < thread_count; ++thread) {
+    threads_.emplace_back([this, thread] { Run(thread); });
   }
 }
 
@@ -22,25 +22,25 @@ void RenderThreads::Render(size_t count, absl::FunctionRef<void(size_t, size_t)>
   render_ = &render;
   count_ = count;
   next_ = 0;
-  helping_count_ = threads_.size();
+  busy_count_ = threads_.size();
   ++round_;
   round_.notify_all();
-  Work(0);
-  for (size_t left = helping_count_; left > 0; left = helping_count_) helping_count_.wait(left);
+  RenderSome(0);
+  for (size_t left = busy_count_; left > 0; left = busy_count_) busy_count_.wait(left);
 }
 
-void RenderThreads::Help(size_t worker) {
+void RenderThreads::Run(size_t thread) {
   const FlushDenormals flush_denormals;
   for (uint32_t seen = 0;; ++seen) {
     round_.wait(seen);
     if (stopping_) return;
-    Work(worker);
-    if (--helping_count_ == 0) helping_count_.notify_one();
+    RenderSome(thread);
+    if (--busy_count_ == 0) busy_count_.notify_one();
   }
 }
 
-void RenderThreads::Work(size_t worker) noexcept {
-  for (size_t section = next_++; section < count_; section = next_++) (*render_)(worker, section);
+void RenderThreads::RenderSome(size_t thread) noexcept {
+  for (size_t section = next_++; section < count_; section = next_++) (*render_)(thread, section);
 }
 
 }  // namespace carillon

@@ -11,21 +11,21 @@
 
 namespace carillon {
 
-/// Renders the sections of a mixer.
+/// Distributes the sections of a mixer over threads.
 class SectionThreads {
  public:
   virtual ~SectionThreads() = default;
 
-  /// How many threads work, the caller's included.
+  /// Number of threads, the caller's included.
   virtual size_t size() const noexcept = 0;
 
-  /// Calls render(worker, section) once for each section below `count`, worker below size(); no two
-  /// calls of one worker at once. Returns when all are done.
+  /// Calls render(thread, section) once for each section below `count`, with thread below size().
+  /// Calls with the same `thread` do not overlap. Returns when all calls have returned.
   virtual void Render(size_t count, absl::FunctionRef<void(size_t, size_t)> render) noexcept = 0;
 };
 
-/// Threads that render together with the caller's. For offline rendering only: they wait in the
-/// kernel.
+/// Threads that render beside the caller's. They are for offline rendering only, because they wait
+/// in the kernel.
 class RenderThreads final : public SectionThreads {
  public:
   explicit RenderThreads(size_t thread_count);
@@ -37,14 +37,14 @@ class RenderThreads final : public SectionThreads {
   void Render(size_t count, absl::FunctionRef<void(size_t, size_t)> render) noexcept override;
 
  private:
-  void Help(size_t worker);
-  void Work(size_t worker) noexcept;
+  void Run(size_t thread);
+  void RenderSome(size_t thread) noexcept;
 
   const absl::FunctionRef<void(size_t, size_t)>* render_ = nullptr;
   size_t count_ = 0;
   std::atomic<size_t> next_{0};
   std::atomic<uint32_t> round_{0};
-  std::atomic<size_t> helping_count_{0};
+  std::atomic<size_t> busy_count_{0};
   std::atomic<bool> stopping_{false};
   std::vector<std::thread> threads_;
 };

@@ -14,7 +14,7 @@
 
 namespace carillon {
 
-/// Workspace of one rendering thread, which may serve many mixes in turn.
+/// Scratch memory of one rendering thread; several mixes may use it one after the other.
 struct RenderWorkspace {
   explicit RenderWorkspace(size_t block_frame_count);
 
@@ -23,14 +23,14 @@ struct RenderWorkspace {
   LaneMix lanes, lanes_apart;
 };
 
-/// What some banks sound like together, block by block: the sum of what rings in the time domain
-/// and of the long blocks under way.
+/// The sum of some banks' sound, block by block: of the banks that ring in the time domain and of
+/// the long blocks that ring by spectrum.
 class BlockMix {
  public:
   static constexpr size_t kStaggers = 16;
 
-  /// Mixes of different stagger, 0 to kStaggers - 1, begin long blocks in different blocks: a long
-  /// block of m blocks where m divides the block's number plus stagger * m / kStaggers.
+  /// Mixes of different `stagger`, 0 to kStaggers - 1, begin long blocks in different blocks: a
+  /// long block of m blocks begins where m divides block number + stagger * m / kStaggers.
   explicit BlockMix(size_t block_frame_count, size_t stagger = 0);
 
   /// Begins the block of this number; Begin and Finish alternate.
@@ -39,34 +39,36 @@ class BlockMix {
   /// Writes the block.
   void Finish(std::span<float> block) noexcept;
 
-  /// Whether a long block of this kind begins with this block.
+  /// Whether a long block of this kind begins in this block.
   bool begins(size_t kind) const noexcept { return begins_[kind]; }
 
-  /// Whether one of any kind does.
+  /// Whether a long block of any kind begins in this block.
   bool any_begins() const noexcept { return any_begins_; }
 
-  /// Where modes add themselves to the long block of this kind that begins.
+  /// The slots (Spectrum::slots) of the long block of this kind that begins; modes are added to
+  /// them.
   float* Slots(size_t kind) noexcept {
     used_[kind] = true;
     return workspace_->spectra[kind].slots();
   }
 
-  /// No long block is under way: without banks there is silence.
+  /// Whether no long block is being played, so that the mix is silent without banks.
   bool idle() const noexcept;
 
-  /// What rings in the time domain goes here.
+  /// Banks that ring in the time domain add their sound to these lanes.
   LaneMix& lanes() noexcept { return apart_ ? workspace_->lanes_apart : workspace_->lanes; }
 
-  /// From now on that is not part of the block, until Reunite; in the middle of it nothing changes.
+  /// Redirects lanes() to a private buffer until Reunite(). Calling it again before then has no
+  /// effect.
   void SetApart(size_t block_frame_count) noexcept;
-  /// Adds what rang apart to `frames`.
+  /// Adds the sound in the private buffer to `frames`.
   void TakeApart(std::span<float> frames) noexcept;
   void Reunite() noexcept { apart_ = false; }
 
   StrikeBatch& batch() noexcept { return workspace_->batch; }
 
  private:
-  /// Frames of a long block under way.
+  /// The long block of one kind that is being played.
   struct Rendered {
     std::vector<float> frames;
     size_t next = 0;

@@ -11,8 +11,8 @@ namespace {
 
 using Complex = std::complex<double>;
 
-/// s^2/2; of a mode so damped that it is over before the contact is, where that would explode,
-/// -|s|^2/2.
+/// s^2/2. For a mode so strongly damped that it decays within the contact, where exp(s^2 tau^2/2)
+/// would explode, -|s|^2/2.
 Complex GaussianExponent(const SoundingMode& mode) {
   const Complex s(mode.decay_rate_per_s, mode.damped_rad_per_s);
   const Complex exponent = s * s / 2.0;
@@ -32,7 +32,8 @@ PlannedLane PlanLane(const SoundingMode& mode, const LanePlanSettings& settings,
           .companion = companion};
 }
 
-/// A companion is over within two periods and stays in the time domain.
+/// Adds a lane to its part. A companion stays in the time domain, because it decays within two
+/// periods.
 void Place(PlannedLane lane, size_t block_frame_count, LanePlan& plan) {
   const std::optional<size_t> kind =
       lane.companion ? std::nullopt : ChooseLongBlock(lane.log_q, block_frame_count);
@@ -40,7 +41,7 @@ void Place(PlannedLane lane, size_t block_frame_count, LanePlan& plan) {
   plan.lanes[kind ? *kind + 1 : 0].push_back(lane);
 }
 
-/// Moves the `count` lanes of a part that decay fastest to the next shorter kind of long block.
+/// Moves the `count` fastest decaying lanes of a part to the next shorter kind of long block.
 void MoveToShorter(size_t part, size_t count, size_t block_frame_count, LanePlan& plan) {
   const LongBlock shorter = MakeLongBlocks(block_frame_count)[part - 2];
   std::vector<PlannedLane>& from = plan.lanes[part];
@@ -54,8 +55,8 @@ void MoveToShorter(size_t part, size_t count, size_t block_frame_count, LanePlan
   from.erase(first, from.end());
 }
 
-/// Where a few lanes are left over from whole vectors, they cost as much as a vector in the time
-/// domain, but little more in shorter long blocks.
+/// Moves the few lanes that do not fill a vector to shorter long blocks, where they cost little
+/// more. In the time domain an incomplete vector costs as much as a full one.
 void FillVectors(size_t block_frame_count, LanePlan& plan) {
   constexpr size_t kLeastPerMoved = 4;
   for (size_t part = kLongBlockKinds; part > 1; --part) {
@@ -64,8 +65,7 @@ void FillVectors(size_t block_frame_count, LanePlan& plan) {
   }
 }
 
-/// The end of a part's whole vectors, from its begin on, whose lanes all go in tiles of this kind
-/// or longer ones.
+/// The end of the leading whole vectors of a part whose lanes all allow tiles of this kind.
 size_t EndOfTiled(const std::vector<PlannedLane>& lanes, size_t tile_kind) {
   const auto other = std::ranges::find_if(
       lanes, [=](const PlannedLane& lane) { return ChooseTile(lane.log_q) < tile_kind; });

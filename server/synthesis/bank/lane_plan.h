@@ -19,28 +19,28 @@ namespace carillon {
 struct PlannedLane {
   uint32_t column = 0;
   std::complex<double> log_q;  ///< (sigma + i omega)/rate
-  std::complex<double> start;  ///< the state after a modal impulse of one scale of the shape table
-  std::complex<double> gaussian_exponent;  ///< of the contact, for each second squared of tau^2
-  SpreadMode spread;                       ///< for the kind of long block that it rings in
+  std::complex<double> start;  ///< the state after a modal impulse of one unit of the shape table
+  std::complex<double> gaussian_exponent;  ///< of a Gaussian contact, for tau = 1 s
+  SpreadMode spread;                       ///< into the long blocks of its part
   bool companion = false;
 };
 
-/// The lanes of a bank by kind of long block, those first that stay in the time domain: these with
-/// the longest decay first, the others ascending by slot.
+/// The lanes of a bank in parts. Part 0 stays in the time domain and is sorted by descending decay
+/// time. Part 1 + k rings by spectrum in long blocks of kind k and is sorted by ascending slot.
 struct LanePlan {
   std::array<std::vector<PlannedLane>, 1 + kLongBlockKinds> lanes;
 
-  /// How many lanes the parts take, each padded to whole vectors.
+  /// Number of lanes of a part, padded to whole vectors.
   size_t PaddedCount(size_t part) const {
     return (lanes[part].size() + kMostLanes - 1) / kMostLanes * kMostLanes;
   }
 
-  /// Which of a part's lanes, padded so, are rendered in tiles of this kind: those that turn
-  /// fastest in the shortest. What stays in the time domain, being short, goes in those too.
+  /// The lanes of a padded part that are rendered in tiles of this kind: the slower a mode
+  /// oscillates, the longer its tiles. Part 0 always uses the shortest tiles.
   LaneRange Tiled(size_t part, size_t tile_kind) const;
 };
 
-/// How a body sounds in a mixer.
+/// The mixer that a bank is planned for, and the bank's gain.
 struct LanePlanSettings {
   double sample_rate_hz = 0;
   size_t block_frame_count = 0;

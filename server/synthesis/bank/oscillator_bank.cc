@@ -11,8 +11,8 @@
 namespace carillon {
 namespace {
 
-/// A bank that was struck in so many long blocks on end rings in the time domain as a whole: by
-/// spectrum it would cost that and the spectrum too.
+/// A segment that was struck in this number of consecutive long blocks stays in the time domain,
+/// where each impulse brings it back to anyway; the spectrum would be extra work.
 constexpr uint32_t kBusyStreak = 4;
 
 }  // namespace

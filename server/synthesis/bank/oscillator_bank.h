@@ -28,84 +28,88 @@ namespace carillon {
 
 struct LanePlan;
 
-/// How a bank is rendered.
+/// Settings of a bank.
 struct OscillatorBankSettings {
   double sample_rate_hz = 48000;
   size_t block_frame_count = 128;  ///< at most kMostBlockFrames
-  double gain = 1;                 ///< of this object, linear
-  uint64_t noise_seed = 0;         ///< of this object's roughness
-  double silence = 1e-7;           ///< modes that fall below this amplitude fall asleep: -140 dB
+  double gain = 1;                 ///< linear
+  uint64_t noise_seed = 0;         ///< of the roughness noise
+  double silence = 1e-7;           ///< modes below this amplitude (-140 dB) are put to sleep
 };
 
 /// All modes of one sounding object, each a decaying complex exponential (the paper, 3.4):
 ///
 ///   Z_m(n+1) = q_m Z_m(n),  q_m = exp((sigma_m + i omega_m) / sample rate),  output = sum Re Z_m
 ///
-/// A strike adds -i c_m g_m / omega_m exp(i phase_m) exp(s_m^2 tau^2 / 2) to Z_m at its time, with
-/// g_m = sum_v w_v phi_m(v) . J and s_m = sigma_m + i omega_m; the last factor is the Gaussian
-/// contact, exact once the contact is over (where sigma^2 > omega^2, exp(-|s_m|^2 tau^2 / 2)
-/// instead).
+/// An impulse J adds -i c_m g_m / omega_m exp(i phase_m) exp(s_m^2 tau^2 / 2) to Z_m at its time,
+/// with g_m = sum_v w_v phi_m(v) . J and s_m = sigma_m + i omega_m. The last factor accounts for
+/// the Gaussian contact and is exact once the contact is over (where sigma^2 > omega^2,
+/// exp(-|s_m|^2 tau^2 / 2) replaces it).
 ///
-/// What was struck rings in the time domain, SIMD across modes: float within a block, between
-/// blocks in double, which holds the error below -100 dB. At the next long block of its kind a mode
-/// goes over to the spectral form, by linearity: the state that was struck since is added to the
-/// one that rings on by spectrum, and both are the same sound. Modes too short for any long block
-/// stay in the time domain, and so does a bank that is struck all the time. Modes that fall below
-/// -140 dB of full scale fall asleep, in groups of kMostLanes.
+/// A struck mode rings in the time domain, SIMD across modes: in single precision within a block,
+/// in double between blocks, which keeps the error below -100 dB. At the next long block of its
+/// kind the mode's state is added to the state that already rings by spectrum; by linearity the sum
+/// is the same sound. Modes that decay too fast for any long block stay in the time domain, and so
+/// does a bank that is struck all the time. Modes below -140 dB of full scale are put to sleep, in
+/// groups of kMostLanes.
 ///
-/// The second mode of a degenerate pair is a cosine, which would begin with a jump: a click under a
-/// soft mallet. It comes with a companion of the same frequency and opposite sign that decays by
-/// exp(-1) in a radian: the sum, cos(omega t) (exp(sigma t) - exp((sigma - omega) t)), begins at
-/// zero with the slope of its sibling.
+/// The second mode of a degenerate pair is a cosine, which would begin with a jump and click under
+/// a soft mallet. Therefore it has a companion of the same frequency and opposite sign that decays
+/// by exp(-1) in a radian. Their sum, cos(omega t) (exp(sigma t) - exp((sigma - omega) t)), begins
+/// at zero with the slope of the pair's first mode.
 ///
-/// Made anywhere; then used by one thread at a time, which neither allocates nor locks. In each
-/// block of the mix: first the strikes, then RenderAdd, with no other bank's calls between them.
+/// Any thread may make a bank; then one thread at a time uses it, which neither allocates nor
+/// locks. In each block of the mix, impulses and knots come first and RenderAdd last, without calls
+/// to another bank in between.
 class OscillatorBank {
  public:
-  /// At most StrikeBatch::kMostBankLanes lanes and columns.
+  /// Lanes and columns may number at most StrikeBatch::kMostBankLanes each.
   OscillatorBank(const SoundingModes& sounding, const ShapeTable& shapes,
                  const OscillatorBankSettings& settings);
 
-  /// Applies an impulse at sample `offset` of the block of `mix`, `lead_frames` (0 to 1) after
-  /// it happened. Offsets within one block may not go back. False: not finite or no such vertex,
-  /// and nothing was done.
+  /// Applies an impulse, first audible at sample `offset` of the block of `mix`, `lead_frames` (0
+  /// to 1) after its time. Offsets ascend within a block. False: the impulse is not finite or names
+  /// no vertex of the body, and has no effect.
   bool Strike(const SurfaceImpulse& impulse, size_t offset, float lead_frames,
               BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
-  /// The same with the modal impulses g_m, but for the scale of the shapes, of the projected
-  /// columns (column_count() of them): what is not a single impulse on a triangle comes in here.
-  /// Tiles are this function's matter, not the caller's.
+  /// Applies modal impulses g_m, in units of the shape table's scales, one for each of the
+  /// column_count() projected columns. The caller leaves onset.frames_into_tiles at zero. False:
+  /// not finite.
   bool StrikeModes(std::span<const float> modal_impulses, size_t offset, strike_kernel::Onset onset,
                    BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
-  /// Strikes that sound as one, which costs less: each on the nearest vertex of its triangle, all
-  /// at their mean time, weighted by impulse. They are neighbours in time, and lie in this block.
+  /// Applies the impulses of `events`, which are neighbours in time within this block, as one
+  /// onset, which costs less: each at the nearest vertex of its triangle, all at their mean time
+  /// weighted by their magnitude.
   bool StrikeMerged(std::span<const DueEvent> events, BlockMix& mix) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
-  /// What strikes, one or some merged, will read.
+  /// The rows of the shape table that these events, one or several merged, will read.
   StrikeBatch::RowsAhead RowsOf(std::span<const DueEvent> events) const noexcept;
 
-  /// Adds a contact's force to that at the next knot. False: no such vertex, and nothing was done.
-  bool Gather(const SurfaceForce& force) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  /// Adds a contact's force to the whole force of the next knot. False: it names no vertex of the
+  /// body, and has no effect.
+  bool AddForce(const SurfaceForce& force) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
-  /// The sustained force has come to what was gathered, at sample `offset` as for Strike. False: it
-  /// was not finite, and is zero.
-  bool Tie(const ForceKnot& knot, size_t offset, BlockMix& mix) noexcept
+  /// Ends a step of the sustained force at sample `offset`, as for Strike: the forces added since
+  /// the previous knot are the whole force now. False: it was not finite and has been set to zero.
+  bool ApplyKnot(const ForceKnot& knot, size_t offset, BlockMix& mix) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
-  /// Adds the block to `mix`. False: the state was not finite and the bank has been silenced.
+  /// Adds the bank's block to `mix`. False: the state was not finite and the bank has been
+  /// silenced.
   bool RenderAdd(BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
-  /// From its next long blocks on the bank rings in the time domain only.
+  /// Makes the bank ring in the time domain only, from the next long block of each kind on.
   void LeaveSpectrum() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole) {
     leaving_spectrum_ = true;
   }
 
-  /// Nothing of the bank sounds in a long block that is under way or to come.
+  /// Whether the bank neither sounds in a current long block nor will in a later one.
   bool out_of_spectrum() const noexcept;
 
-  /// RenderAdd for a bank out of the spectrum, not struck in this block.
+  /// RenderAdd for a bank that is out_of_spectrum() and not struck in this block.
   bool RenderAddInTime(LaneMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
   /// True: rendering the bank would add nothing.
@@ -116,40 +120,40 @@ class OscillatorBank {
   /// Modes that still ring.
   size_t active_mode_count() const noexcept { return struck() ? mode_count_ : active_mode_count_; }
 
-  /// Units of work (work_budget.h) that a block takes: now, of a strike, and of what a first strike
-  /// brings with it.
+  /// Units of work (work_budget.h): of a block without events, of an impulse, of a merged impulse,
+  /// and of the lanes that a first impulse awakens.
   double ringing_work() const noexcept { return ringing_work_; }
   double strike_work() const noexcept;
   double merged_strike_work() const noexcept;
   double awakening_work() const noexcept;
 
-  /// How loud, about, a blow of one newton second is: root of the mean over the surface of the sum
-  /// of the modes' squared amplitudes.
-  float loudness_of_blow() const noexcept { return loudness_of_blow_; }
+  /// Approximate loudness of an impulse of one newton second: the sum of the modes' squared
+  /// amplitudes, root of its mean over the surface.
+  float loudness_per_newton_second() const noexcept { return loudness_per_newton_second_; }
 
-  /// The largest squared amplitude of a mode that rings, lately.
+  /// The largest squared amplitude of a ringing mode, as of the last block or long block.
   double loudest_squared() const noexcept;
 
-  /// Silences the bank; what of it sounds in a long block under way ends with that.
+  /// Silences the bank. Its part of a current long block sounds until that long block ends.
   void Shed() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole) { Silence(); }
 
-  /// Columns of the shape table that are projected, from the first mode's on.
+  /// Columns of the shape table that impulses are projected onto, from the first mode's column on.
   size_t column_count() const noexcept { return column_count_; }
 
-  /// Modes of the object.
+  /// All modes of the object.
   size_t mode_count() const noexcept { return mode_count_; }
 
  private:
-  /// Lanes that may ring by spectrum, in long blocks of one kind.
+  /// Lanes that can ring by spectrum, in long blocks of one kind.
   struct LongSegment {
     SpectralLanes lanes;
     size_t mode_count = 0;
-    size_t block_count = 1;  // of the mixer's in a long one
+    size_t block_count = 1;  // of the mixer, in a long block
     double loudest_squared = 0;
     bool awake = false;
-    bool sounding = false;       // in the long block under way
-    bool struck = false;         // since that began
-    uint32_t struck_streak = 0;  // long blocks on end in which it was struck
+    bool sounding = false;       // in the current long block
+    bool struck = false;         // since the current long block began
+    uint32_t struck_streak = 0;  // consecutive long blocks in which it was struck
   };
 
   /// How far the bank has come in the current block:
@@ -166,14 +170,14 @@ class OscillatorBank {
     kWaiting,
     kBegun,    ///< the long blocks that begin with this block have begun
     kStruck,   ///< the batch holds onsets, which are rendered at the end of the block
-    kInParts,  ///< the block is rendered up to rendered_to, from start and newborn states on
+    kInParts,  ///< rendered up to rendered_to, where the start and fresh states of the lanes are
   };
   /// The current block.
   struct Block {
     Phase phase = Phase::kWaiting;
-    bool by_frames = false;  ///< all lanes go in tiles of the first kind
-    bool finite = true;
-    size_t rendered_to = 0;  ///< frames
+    bool by_frames = false;  ///< all lanes use tiles of the first kind
+    bool finite = true;      ///< all states were
+    size_t rendered_to = 0;  ///< frames of the block that are rendered already
   };
   /// Where any lane is awake.
   enum class Ringing : uint8_t { kNowhere, kInSpectrum, kInTime };
@@ -192,10 +196,10 @@ class OscillatorBank {
   void AddVertex(size_t vertex, float weight, const std::array<float, 3>& vector,
                  strike_kernel::Projection& projection) const noexcept;
   void SetSegments(const LanePlan& plan);
-  void MeasureBlow(const LanePlan& plan);
+  void MeasureLoudness(const LanePlan& plan);
   double TimeWork(size_t lane_count) const noexcept;
-  /// Strikes that were merged come after others that they may lie before: these are added later
-  /// then, as they would sound there.
+  /// Delays `offset` to that of the last onset in the batch, if it lies before it: merged impulses
+  /// come after exact ones of the same group of frames.
   size_t NotBeforeTheLast(size_t offset, const StrikeBatch& batch) const noexcept;
   void NoteOnset(size_t offset, StrikeBatch& batch) noexcept;
   void BeginStrikes(BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
@@ -203,7 +207,7 @@ class OscillatorBank {
   void RenderDrivenStrikes(size_t end, BlockMix& mix) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void RenderDriven(size_t end, LaneMix& mix) noexcept;
-  /// Begins and ends what a part needs of a mix.
+  /// Prepares the sums for rendering the block up to frame `end`; FinishPart adds them to the mix.
   ring_kernel::StruckPart BeginPart(size_t end, BlockMix& mix) const noexcept;
   void FinishPart(const ring_kernel::StruckPart& part, BlockMix& mix) const noexcept;
   ring_kernel::TileSums Sums(NodeMix& nodes, size_t frame_count, LaneMix& mix) const noexcept;
@@ -223,7 +227,7 @@ class OscillatorBank {
   uint32_t first_column_;
   size_t column_count_;
   std::array<RingingSegment, kMostSegments> segments_;  // the first for the time domain only
-  Counts counted_{};                        // what of them was awake when that was counted
+  Counts counted_{};                        // awake lanes of each segment at the last CountAwake
   std::vector<LongSegment> long_segments_;  // kLongBlockKinds of them
   std::vector<uint8_t>
       group_mode_counts_;  // modes, not companions, of kMostLanes lanes, by segment
@@ -233,7 +237,7 @@ class OscillatorBank {
   bool leaving_spectrum_ = false;
   size_t active_mode_count_ = 0;
   double ringing_work_ = 0;
-  float loudness_of_blow_ = 0;
+  float loudness_per_newton_second_ = 0;
   LaneArrays lanes_;
   SustainedForce force_;
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How a bank is made, which any thread may do.
+// Making a bank, which any thread may do.
 #include <algorithm>
 #include <cassert>
 #include <cmath>
@@ -72,7 +72,7 @@ SpectralLanes MakeSpectralLanes(const std::vector<PlannedLane>& planned, size_t 
   return lanes;
 }
 
-/// Those of a run that are not padding.
+/// The planned lanes of a run, without padding.
 std::span<const PlannedLane> LanesOf(const LaneRun& run, const LanePlan& plan) {
   const std::span<const PlannedLane> planned = plan.lanes[run.segment];
   return planned.subspan(run.first_in_segment,
@@ -122,7 +122,7 @@ OscillatorBank::OscillatorBank(const LanePlan& plan, const SoundingModes& soundi
                      lowest_rad_per_s);
     }
   }
-  MeasureBlow(plan);
+  MeasureLoudness(plan);
 }
 
 void OscillatorBank::SetSegments(const LanePlan& plan) {
@@ -143,8 +143,8 @@ void OscillatorBank::SetSegments(const LanePlan& plan) {
   }
 }
 
-/// Over at most kVertices vertices, evenly.
-void OscillatorBank::MeasureBlow(const LanePlan& plan) {
+/// Samples at most about kVertices vertices, evenly spaced by index.
+void OscillatorBank::MeasureLoudness(const LanePlan& plan) {
   constexpr size_t kVertices = 32;
   const size_t stride = std::max<size_t>(shapes_.vertex_count() / kVertices, 1);
   double sum = 0;
@@ -159,8 +159,8 @@ void OscillatorBank::MeasureBlow(const LanePlan& plan) {
       }
     }
   }
-  // A blow has one direction of the three.
-  loudness_of_blow_ =
+  // The mean is over vertices and directions: an impulse has one of the three directions.
+  loudness_per_newton_second_ =
       count == 0 ? 0 : static_cast<float>(std::sqrt(sum / static_cast<double>(count)));
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What happens to a bank within a block.
+// Impulses and knots of a bank within a block.
 #include <algorithm>
 #include <cassert>
 #include <cmath>
@@ -12,8 +12,8 @@
 namespace carillon {
 namespace {
 
-/// Each strike costs more in longer tiles, of which it takes one by itself; more of them in a block
-/// than this cost more than the tiles save.
+/// In longer tiles each impulse needs a tile of its own. With more impulses in a block than this,
+/// that costs more than longer tiles save.
 constexpr size_t kMostStrikesInTiles = 8;
 
 /// The corner of the triangle that is nearest to the point.
@@ -21,7 +21,7 @@ size_t NearestCorner(const TrianglePoint& at) {
   return static_cast<size_t>(std::ranges::max_element(at.weights) - at.weights.begin());
 }
 
-/// Where an impulse or a force acts; null for another kind of event.
+/// The point at which an impulse or a force acts; null for another kind of event.
 const TrianglePoint* PointOf(const MixerEvent& event) {
   if (const SurfaceImpulse* impulse = event.impulse()) return &impulse->at;
   const auto* force = std::get_if<SurfaceForce>(&event.action);
@@ -127,20 +127,21 @@ bool OscillatorBank::StrikeModes(std::span<const float> modal_impulses, size_t o
   return finite;
 }
 
-bool OscillatorBank::Gather(const SurfaceForce& force) noexcept {
+bool OscillatorBank::AddForce(const SurfaceForce& force) noexcept {
   const std::optional<strike_kernel::Projection> projection =
       Project(force.at, force.force_newtons);
-  if (projection) force_.Gather(*projection);
+  if (projection) force_.AddForce(*projection);
   return projection.has_value();
 }
 
-bool OscillatorBank::Tie(const ForceKnot& knot, size_t offset, BlockMix& mix) noexcept {
+bool OscillatorBank::ApplyKnot(const ForceKnot& knot, size_t offset, BlockMix& mix) noexcept {
   BeginStrikes(mix);
   StrikeBatch& batch = mix.batch();
   const bool silent_before = silent();
   offset = NotBeforeTheLast(offset, batch);
   RenderStrikes(offset, mix);
-  const bool finite = force_.Tie(knot, lanes_, batch.re(0, lane_count_), batch.im(0, lane_count_));
+  const bool finite =
+      force_.ApplyKnot(knot, lanes_, batch.re(0, lane_count_), batch.im(0, lane_count_));
   if (finite) {
     NoteOnset(offset, batch);
   } else if (silent_before) {
@@ -165,8 +166,8 @@ void OscillatorBank::BeginStrikes(BlockMix& mix) noexcept {
   block_.by_frames = mix.batch().due_count > kMostStrikesInTiles;
 }
 
-/// The part of the block up to `end`, with what the batch holds. The nodes of a whole block are
-/// those of all banks, those of another part its own.
+/// A part that covers the whole block shares the mix's nodes with all banks; another part has nodes
+/// of its own.
 ring_kernel::StruckPart OscillatorBank::BeginPart(size_t end, BlockMix& mix) const noexcept {
   StrikeBatch& batch = mix.batch();
   batch.part_nodes.Clear();
@@ -210,7 +211,7 @@ void OscillatorBank::FinishPart(const ring_kernel::StruckPart& part, BlockMix& m
   }
 }
 
-/// Renders what must be rendered before more can happen in this block.
+/// Renders the block up to frame `end` with the onsets in the batch, and empties the batch.
 void OscillatorBank::RenderStrikes(size_t end, BlockMix& mix) noexcept {
   if (block_.phase != Phase::kInParts) ring_kernel::Start(lanes_, lane_count_);
   block_.phase = Phase::kInParts;

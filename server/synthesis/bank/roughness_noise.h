@@ -8,20 +8,20 @@
 namespace carillon {
 
 /// Noise of unit variance and settable bandwidth: uniform white noise through two equal one-pole
-/// low-passes, y(n) = (1 - p) x(n) + p y(n - 1) each, and a blocker of what lies below 20 Hz, so
-/// that what it moves stands still in the mean. The same seed gives the same noise.
+/// low-passes, y(n) = (1 - p) x(n) + p y(n - 1) each, and a high-pass at 20 Hz, so that its mean is
+/// zero. The same seed gives the same noise.
 class RoughnessNoise {
  public:
   explicit RoughnessNoise(uint64_t seed) noexcept : state_(Mix(seed)) {}
 
-  /// What is narrower is no noise that is heard.
+  /// The least bandwidth; narrower noise would be inaudible.
   static constexpr double kLowestHz = 20;
 
-  /// Where the spectrum has fallen by 6 dB: kLowestHz to about half of Nyquist. The noise goes on
-  /// without a jump.
+  /// Sets the frequency at which the spectrum has fallen by 6 dB: kLowestHz to about half of
+  /// Nyquist. The noise continues without a jump.
   void SetBandwidth(double bandwidth_hz, double sample_rate_hz) noexcept {
     const double pole = std::exp(-2 * std::numbers::pi * bandwidth_hz / sample_rate_hz);
-    // The variance of white noise of variance 1/3 behind the two: (1-p)^4 (1+p^2)/(1-p^2)^3 / 3.
+    // Variance of white noise of variance 1/3 after both low-passes: (1-p)^4 (1+p^2)/(1-p^2)^3 / 3.
     const double variance = (1 - pole) * (1 + pole * pole) / std::pow(1 + pole, 3) / 3;
     const auto gain = static_cast<float>(1 / std::sqrt(variance));
     for (float* state : {&first_, &second_, &mean_}) *state *= gain_ > 0 ? gain_ / gain : 1;
@@ -42,7 +42,7 @@ class RoughnessNoise {
  private:
   static constexpr uint64_t kIncrement = 0x9E3779B97F4A7C15;
 
-  /// SplitMix64: a counter, scrambled by David Stafford's variant 13 of MurmurHash3's finalizer.
+  /// SplitMix64: hashes a counter with David Stafford's variant 13 of MurmurHash3's finalizer.
   static uint64_t Mix(uint64_t x) noexcept {
     x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9;
     x = (x ^ (x >> 27)) * 0x94D049BB133111EB;

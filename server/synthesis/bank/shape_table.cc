@@ -12,12 +12,12 @@ namespace carillon {
 namespace {
 
 constexpr float kMost = std::numeric_limits<int16_t>::max();
-/// Rows begin with a cache line.
+/// Values in a cache line; rows are aligned to cache lines.
 constexpr size_t kLineValues = 32;
 
-// To the nearest integer, below 2^22: what a float of that size keeps behind 1.5 * 2^23. A table of
-// a hundred megabytes is made while an object waits for it, and std::lrint is not taken by the
-// vector.
+// Rounds a value below 2^22 to the nearest integer: adding 1.5 * 2^23 leaves the integer in the low
+// bits of the float. A table may have a hundred megabytes, and compilers do not vectorize
+// std::lrint.
 int16_t Rounded(float value) {
   constexpr float kBare = 12582912.0F;
   return static_cast<int16_t>(std::bit_cast<int32_t>(value + kBare) -
@@ -41,10 +41,10 @@ ShapeTable::ShapeTable(std::span<const float> shapes, size_t vertex_count, size_
   std::vector<float> inverses(mode_count, 0.0F);
   for (size_t mode = 0; mode < mode_count; ++mode) {
     scales_[mode] /= kMost;
-    // Below, the inverse would be infinite; such a shape is no sound.
+    // The inverse of a smaller scale would be infinite; such a shape is inaudible.
     if (scales_[mode] >= std::numeric_limits<float>::min()) inverses[mode] = 1 / scales_[mode];
   }
-  // One line more: a projection that begins within a row may read past the last.
+  // A projection that begins within the last row may read one line past it.
   auto memory = std::make_shared<std::vector<int16_t, LargeAllocator<int16_t>>>();
   memory->resize(3 * vertex_count * stride_ + kLineValues);
   int16_t* values = memory->data();

@@ -11,22 +11,22 @@
 
 namespace carillon {
 
-/// Mode shapes of one body on its sounding surface as strikes are projected with them: 16 bits a
-/// value, scaled by each mode's largest, because a flood of strikes is bounded by memory. The
-/// rounding is 101 dB below that largest value, root mean square. Copies share the values.
+/// Mode shapes of one body on its sounding surface, onto which impulses are projected. Values have
+/// 16 bits and are scaled by each mode's largest value, because projecting many impulses is limited
+/// by memory bandwidth. The rounding error is 101 dB below that largest value, root mean square.
+/// Copies share the values.
 class ShapeTable {
  public:
   ShapeTable() = default;
 
-  /// `shapes` are #V by 3 by #m, row-major: shapes[(vertex * 3 + axis) * mode_count + mode]; they
-  /// are not needed afterwards.
+  /// Copies `shapes`, #V by 3 by #m, row-major: shapes[(vertex * 3 + axis) * mode_count + mode].
   ShapeTable(std::span<const float> shapes, size_t vertex_count, size_t mode_count);
 
   size_t vertex_count() const noexcept { return vertex_count_; }
   size_t mode_count() const noexcept { return mode_count_; }
 
-  /// Values of all modes at a vertex along an axis, in units of scale(mode); readable up to the end
-  /// of the vector that the last one lies in.
+  /// Values of all modes at a vertex along an axis, in units of scale(mode). The row may be read up
+  /// to the end of the last value's SIMD vector.
   const int16_t* Row(size_t vertex, size_t axis) const noexcept {
     return values_ + (3 * vertex + axis) * stride_;
   }
@@ -42,7 +42,7 @@ class ShapeTable {
   size_t stride_ = 0;
   std::vector<float> scales_;
   std::shared_ptr<const std::vector<int16_t, LargeAllocator<int16_t>>> memory_;
-  const int16_t* values_ = nullptr;  // of memory_
+  const int16_t* values_ = nullptr;  // points into memory_
 };
 
 }  // namespace carillon

@@ -13,7 +13,7 @@ constexpr double kPi = std::numbers::pi;
 constexpr double kLn1000 = 6.907755278982137;  // 60 dB as a ratio of amplitudes
 constexpr double kIntegrationTimeS = 0.2;
 
-/// The amplitude response of A-weighting, IEC 61672-1, but for its constant.
+/// The amplitude response of A-weighting (IEC 61672-1) up to a constant factor.
 double AWeight(double frequency_hz) {
   const double f2 = frequency_hz * frequency_hz;
   return f2 * f2 /
@@ -21,7 +21,7 @@ double AWeight(double frequency_hz) {
           (f2 + 12194.0 * 12194.0));
 }
 
-/// Energy, up to a constant, of a mode's sound after a unit modal impulse.
+/// Energy of a mode's sound after a unit modal impulse, up to a constant factor.
 double Audibility(const SoundingMode& mode) {
   const double amplitude =
       mode.coupling / mode.damped_rad_per_s * AWeight(mode.damped_rad_per_s / (2 * kPi));
@@ -45,7 +45,7 @@ void KeepMostAudible(std::vector<SoundingMode>& modes, size_t most) {
   std::ranges::sort(modes, {}, &SoundingMode::column);
 }
 
-/// How far two neighbours differ in frequency, relatively; infinite where they are no pair.
+/// Relative difference of two neighbours' frequencies; infinite if they are not a pair.
 double Split(const SoundingMode& a, const SoundingMode& b, double tolerance) {
   const auto [less, more] = std::minmax(a.coupling, b.coupling);
   const double split = b.natural_frequency_hz / a.natural_frequency_hz - 1;

@@ -10,7 +10,8 @@
 
 namespace carillon {
 
-/// What turns a modal model of unit Young's modulus, density and size into a sounding object.
+/// The material and size that turn a modal model of unit Young's modulus, density and size into a
+/// sounding object.
 struct SoundingMaterial {
   double young_pa = 0;
   double density_kg_per_m3 = 0;
@@ -20,16 +21,16 @@ struct SoundingMaterial {
   std::vector<LossFactorPoint> loss_factor = {};  ///< ascending; damping added to D
 };
 
-/// Which modes may sound.
+/// Criteria for the modes that may sound.
 struct SoundingBand {
   double lowest_hz = 20;      ///< natural frequency
   double highest_hz = 20000;  ///< natural frequency; Nyquist bounds it further
   double shortest_t60_s = 0.002;
-  /// Where more modes qualify, the most audible are kept; see SelectSoundingModes.
+  /// If more modes qualify, the most audible are kept; see SelectSoundingModes.
   size_t most_modes = 800;
-  /// Neighbours whose natural frequencies differ by no more than this, relatively, and whose
-  /// couplings differ by less than a factor of two, count as a degenerate pair. Finite-element
-  /// meshes split true pairs by up to about 1e-3.
+  /// Two neighbours form a degenerate pair if their natural frequencies differ relatively by no
+  /// more than this and their couplings by less than a factor of two. Finite-element meshes split
+  /// true pairs by up to about 1e-3.
   double pair_tolerance = 2e-3;
 };
 
@@ -40,7 +41,8 @@ struct SoundingMode {
   double damped_rad_per_s = 0;  ///< omega_d
   double decay_rate_per_s = 0;  ///< sigma, not above zero
   double coupling = 0;          ///< c_m, m^2 kg^(-1/2) s^(-1)
-  /// Zero, or pi/2 for the second of a degenerate pair: phase by which it leads a sine.
+  /// The phase by which the output leads a sine: pi/2 for the second mode of a degenerate pair,
+  /// else zero.
   double output_phase_rad = 0;
 };
 
@@ -54,18 +56,18 @@ struct SoundingModes {
 double NaturalFrequencyHz(double eigenvalue, const SoundingMaterial& material);
 
 /// Applies material and size to a model's eigenvalues and couplings (each #m, ascending), and
-/// selects the modes that sound (design: physics.md 2 and 3; the paper, 3.4):
+/// selects the modes that sound (the paper, 3.4):
 ///
 ///   Lambda' = Lambda E/(rho s^2),  sigma = -(alpha1 Lambda' + alpha2 + eta Lambda'^(1/2))/2,
 ///   omega_d = sqrt(Lambda' - sigma^2),  c' = c E^(1/2) rho^(-1) s^(-1/2)
 ///
-/// with the loss factor eta at the natural frequency, this frequency in the band and below Nyquist,
-/// sigma^2 < Lambda', and T60 long enough. The two modes of a degenerate pair get a quarter period
-/// of difference in phase and share their mean frequency, decay and coupling, so that loudness does
-/// not depend on where around the body it is struck: left split by 1e-4, which is the mesh's doing,
-/// the pair of a chime would beat over seconds and differ by 2 dB. Where more than `most_modes`
-/// qualify, those are kept whose sound after a unit modal impulse has the most A-weighted energy in
-/// its first 0.2 s (about the ear's integration time).
+/// with the loss factor eta at the natural frequency. A mode sounds if its natural frequency lies
+/// in the band and below Nyquist, sigma^2 < Lambda', and T60 is long enough. The two modes of a
+/// degenerate pair share their mean frequency, decay and coupling and differ in phase by a quarter
+/// period, so that loudness does not depend on the direction around the body in which it is struck;
+/// the mesh splits the pair of a chime by about 1e-4, which would beat over seconds and make 2 dB
+/// of difference. If more than `most_modes` qualify, those are kept whose sound after a unit modal
+/// impulse has the most A-weighted energy in its first 0.2 s (about the ear's integration time).
 SoundingModes SelectSoundingModes(std::span<const double> eigenvalues,
                                   std::span<const double> couplings,
                                   const SoundingMaterial& material, double sample_rate_hz,

@@ -15,46 +15,46 @@
 
 namespace carillon {
 
-/// A force on one bank that lasts: a load, a slide, a roll (physics.md 3). Between the knots, which
-/// are the simulation's steps, the modal forces run straight (a linear B-spline, which sums to one
-/// whatever the step times), smoothed by a Gaussian of standard deviation 3 / omega of the lowest
-/// mode, so that nothing of the steps themselves is heard. Of the response only what rings free is
-/// rendered: each change of slope d adds
+/// A sustained force on one bank: a load, a slide or a roll. Between knots, which are the
+/// simulation's steps, the modal forces are interpolated linearly and smoothed by a Gaussian of
+/// standard deviation 3 / omega of the lowest mode, so that the steps themselves are inaudible.
+/// Only the free part of the response is rendered: each change of slope d adds
 ///
 ///   gain d exp(s^2 tau^2/2) / s^2
 ///
-/// to the state, the free part of the response to a ramp. The rest follows the force below the
-/// lowest mode and is no sound; so a constant force is exactly silent. Where the contact travels
-/// over a rough surface, noise multiplied onto the force drives the modes sample by sample.
+/// to the state, which is the free part of the response to a ramp. The rest of the response follows
+/// the force at frequencies below the lowest mode and is inaudible, so a constant force is exactly
+/// silent. If the contact travels over a rough surface, noise multiplied by the force drives the
+/// modes sample by sample.
 ///
-/// Made anywhere; then used by one thread at a time. Nothing but making it allocates or locks.
+/// Any thread may make it; then one thread at a time uses it. Only the constructor allocates.
 class SustainedForce {
  public:
-  /// `seed` makes the noise of this object its own.
+  /// Different seeds give different noise.
   SustainedForce(size_t lane_count, size_t column_count, double sample_rate_hz, uint64_t seed);
 
-  /// Sets what lane `lane` gains from a change of slope: `gain` and `s` are its own (1/s),
-  /// `lowest_rad_per_s` is the lowest mode's.
+  /// Sets the response of lane `lane` to a change of slope: `gain` and `s` (1/s) are of this lane,
+  /// `lowest_rad_per_s` is the lowest mode's frequency.
   void SetLane(size_t lane, std::complex<double> gain, std::complex<double> s,
                double lowest_rad_per_s);
 
-  /// Adds a contact's force to that at the next knot.
-  void Gather(const strike_kernel::Projection& projection) noexcept {
-    force_kernel::Gather(projection, arrays_.next.data());
+  /// Adds a contact's force to the whole force of the next knot.
+  void AddForce(const strike_kernel::Projection& projection) noexcept {
+    force_kernel::AddForce(projection, arrays_.next.data());
   }
 
-  /// The next knot is now: what that adds to the states, into added_re and added_im. False: the
-  /// force was not finite, and is zero, and nothing is to be added.
-  bool Tie(const ForceKnot& knot, const LaneArrays& lanes, float* added_re,
-           float* added_im) noexcept;
+  /// Ends a step, and writes the knot's contribution to the states into added_re and added_im.
+  /// False: the force was not finite; it is zero now, and nothing was written.
+  bool ApplyKnot(const ForceKnot& knot, const LaneArrays& lanes, float* added_re,
+                 float* added_im) noexcept;
 
-  /// The noise is heard: Render is to be called for every sample.
+  /// Whether noise drives the modes, so that Render must be called for every sample.
   bool driving() const noexcept { return driving_; }
 
-  /// The next samples of all lanes, driven, into `mix`, as ring_kernel::RingStruck does.
+  /// Adds the next samples of all lanes to `mix` while driving them.
   void Render(size_t frame_count, LaneArrays& lanes, float* mix) noexcept;
 
-  /// There is no force from now on.
+  /// Sets the force to zero.
   void Silence() noexcept;
 
  private:
@@ -66,10 +66,10 @@ class SustainedForce {
   float sample_rate_hz_;
   RoughnessNoise noise_;
   bool driving_ = false;
-  bool letting_go_ = false;    // no knot came: the drive goes to zero
-  float position_ = 1;         // on the way from the last knot to the next, 0 to 1
-  float advance_ = 0;          // of the position, each frame
-  size_t frames_to_hold_ = 0;  // beyond position 1, while the next knot may be late
+  bool releasing_ = false;           // the drive goes to zero
+  float position_ = 1;               // from the last knot (0) to the next (1)
+  float advance_ = 0;                // of the position per frame
+  size_t frames_until_release_ = 0;  // at position 1, until a late knot is given up
 };
 
 }  // namespace carillon

@@ -24,7 +24,7 @@ using V = hn::Vec<Floats>;
 // Far above any force, far below what the products that follow can hold.
 constexpr float kMostForce = 1e15F;
 
-void Gather(const strike_kernel::Projection& projection, float* HWY_RESTRICT next) {
+void AddForce(const strike_kernel::Projection& projection, float* HWY_RESTRICT next) {
   for (size_t row = 0; row < projection.row_count; ++row) {
     const float factor = projection.factors[row];
     const int16_t* HWY_RESTRICT shape = projection.rows[row];
@@ -66,7 +66,8 @@ void Kink(const ForceArrays& force, const LaneArrays& lanes, float* added_re, fl
   }
 }
 
-HWY_INLINE void AimPart(V position, V drive, float* HWY_RESTRICT from, float* HWY_RESTRICT to) {
+HWY_INLINE void SetDrivePart(V position, V drive, float* HWY_RESTRICT from,
+                             float* HWY_RESTRICT to) {
   const Floats d;
   const V old_from = hn::Load(d, from);
   const V old_to = hn::Load(d, to);
@@ -74,15 +75,15 @@ HWY_INLINE void AimPart(V position, V drive, float* HWY_RESTRICT from, float* HW
   hn::Store(drive, d, to);
 }
 
-void Aim(float position, float scale, const LaneArrays& lanes, ForceArrays& force) {
+void SetDrive(float position, float scale, const LaneArrays& lanes, ForceArrays& force) {
   const Floats d;
   const V share = hn::Set(d, position);
   for (size_t lane = 0; lane < force.lane_count; lane += hn::Lanes(d)) {
     const V last = hn::Mul(LoadColumns(lanes, lane, force.last.data()), hn::Set(d, scale));
-    AimPart(share, hn::Mul(last, hn::Load(d, lanes.gain_re.data() + lane)),
-            force.from_re.data() + lane, force.to_re.data() + lane);
-    AimPart(share, hn::Mul(last, hn::Load(d, lanes.gain_im.data() + lane)),
-            force.from_im.data() + lane, force.to_im.data() + lane);
+    SetDrivePart(share, hn::Mul(last, hn::Load(d, lanes.gain_re.data() + lane)),
+                 force.from_re.data() + lane, force.to_re.data() + lane);
+    SetDrivePart(share, hn::Mul(last, hn::Load(d, lanes.gain_im.data() + lane)),
+                 force.from_im.data() + lane, force.to_im.data() + lane);
   }
 }
 
@@ -118,22 +119,22 @@ void RingDriven(const ForceArrays& force, const Drive& drive, LaneArrays& lanes,
     const V from_im = hn::Load(d, force.from_im.data() + lane);
     const V to_re = hn::Load(d, force.to_re.data() + lane);
     const V to_im = hn::Load(d, force.to_im.data() + lane);
-    DrivenState all, newborn;
+    DrivenState all, fresh;
     all.Load(lanes.start_re.data() + lane, lanes.start_im.data() + lane);
-    newborn.Load(lanes.newborn_re.data() + lane, lanes.newborn_im.data() + lane);
+    fresh.Load(lanes.fresh_re.data() + lane, lanes.fresh_im.data() + lane);
     for (size_t n = 0; n < drive.frame_count; ++n) {
       const V a = hn::Set(d, drive.from_share[n]), b = hn::Set(d, drive.to_share[n]);
       const V by_re = hn::MulAdd(a, from_re, hn::Mul(b, to_re));
       const V by_im = hn::MulAdd(a, from_im, hn::Mul(b, to_im));
       all.Grow(by_re, by_im);
-      newborn.Grow(by_re, by_im);
+      fresh.Grow(by_re, by_im);
       float* HWY_RESTRICT frame = mix + n * kMostLanes;
       hn::Store(hn::Add(hn::Load(d, frame), all.re), d, frame);
       all.Step(q_re, q_im);
-      newborn.Step(q_re, q_im);
+      fresh.Step(q_re, q_im);
     }
     all.Store(lanes.start_re.data() + lane, lanes.start_im.data() + lane);
-    newborn.Store(lanes.newborn_re.data() + lane, lanes.newborn_im.data() + lane);
+    fresh.Store(lanes.fresh_re.data() + lane, lanes.fresh_im.data() + lane);
   }
 }
 
@@ -154,14 +155,14 @@ void ForceArrays::Clear() noexcept {
 }
 
 namespace force_kernel {
-HWY_EXPORT(Gather);
+HWY_EXPORT(AddForce);
 HWY_EXPORT(EndStep);
 HWY_EXPORT(Kink);
-HWY_EXPORT(Aim);
+HWY_EXPORT(SetDrive);
 HWY_EXPORT(RingDriven);
 
-void Gather(const strike_kernel::Projection& projection, float* next) noexcept {
-  HWY_DYNAMIC_DISPATCH(Gather)(projection, next);
+void AddForce(const strike_kernel::Projection& projection, float* next) noexcept {
+  HWY_DYNAMIC_DISPATCH(AddForce)(projection, next);
 }
 
 bool EndStep(float rate_hz, ForceArrays& force) noexcept {
@@ -173,8 +174,8 @@ void Kink(const ForceArrays& force, const LaneArrays& lanes, float* added_re,
   HWY_DYNAMIC_DISPATCH(Kink)(force, lanes, added_re, added_im);
 }
 
-void Aim(float position, float scale, const LaneArrays& lanes, ForceArrays& force) noexcept {
-  HWY_DYNAMIC_DISPATCH(Aim)(position, scale, lanes, force);
+void SetDrive(float position, float scale, const LaneArrays& lanes, ForceArrays& force) noexcept {
+  HWY_DYNAMIC_DISPATCH(SetDrive)(position, scale, lanes, force);
 }
 
 void RingDriven(const ForceArrays& force, const Drive& drive, LaneArrays& lanes,

@@ -8,8 +8,8 @@
 
 namespace carillon {
 
-/// The arrays of a sustained force on one bank. Columns are those that strikes are projected onto,
-/// lanes those of LaneArrays.
+/// The arrays of a sustained force on one bank. Columns are those that impulses are projected onto;
+/// lanes are those of LaneArrays.
 struct ForceArrays {
   ForceArrays(size_t lanes, size_t columns)
       : lane_count(lanes),
@@ -25,16 +25,16 @@ struct ForceArrays {
         to_re(lane_count),
         to_im(lane_count) {}
 
-  /// Zeroes all but the kinks.
+  /// Sets all but the kinks to zero.
   void Clear() noexcept;
 
   size_t lane_count, column_count;
-  /// Modal forces: those gathered for the next knot, and those at the last; how fast they changed
-  /// up to the last knot, each second, and by how much that changed there.
+  /// Modal forces by column: the sum so far for the next knot, the force at the last knot, its
+  /// slope (1/s) before the last knot, and the change of slope at the last knot.
   LaneArray<float> next, last, slope, jump;
-  /// What a change of slope by one adds to the state: gain exp(s^2 tau^2/2) / s^2.
+  /// Change of the state by a unit change of slope: gain exp(s^2 tau^2/2) / s^2.
   LaneArray<float> kink_re, kink_im;
-  /// What a fluctuation by one adds to the state in one sample, at the last knot and at the next.
+  /// Change of the state by a unit of noise in one sample, at the last knot and at the next.
   LaneArray<float> from_re, from_im, to_re, to_im;
 };
 
@@ -43,29 +43,29 @@ struct ForceArrays {
 namespace force_kernel {
 
 /// next += the modal forces of one contact.
-void Gather(const strike_kernel::Projection& projection, float* next) noexcept;
+void AddForce(const strike_kernel::Projection& projection, float* next) noexcept;
 
-/// Ends a step that lasted 1 / rate_hz: sets slope and jump, moves next to last and clears it.
-/// False: a force was not finite, and all are zero now.
+/// Ends a step of length 1 / rate_hz: sets slope and jump, moves next to last and clears next.
+/// False: a force was not finite; all forces are zero now.
 bool EndStep(float rate_hz, ForceArrays& force) noexcept;
 
-/// What the kinks of `jump` add to the states, into added_re and added_im.
+/// Writes what the changes of slope in `jump` add to the states into added_re and added_im.
 void Kink(const ForceArrays& force, const LaneArrays& lanes, float* added_re,
           float* added_im) noexcept;
 
-/// from = where the drive stands, `position` (0 to 1) of the way to `to`; to = `last` times
-/// `scale`.
-void Aim(float position, float scale, const LaneArrays& lanes, ForceArrays& force) noexcept;
+/// Starts a new stretch of the drive: from = the present drive, which is at `position` (0 to 1)
+/// between from and to; to = last * scale.
+void SetDrive(float position, float scale, const LaneArrays& lanes, ForceArrays& force) noexcept;
 
-/// How the drive runs: before sample n the states grow by from * from_share[n] + to * to_share[n].
+/// The drive of each sample: from * from_share[n] + to * to_share[n] is added to the states before
+/// sample n.
 struct Drive {
   const float* from_share = nullptr;
   const float* to_share = nullptr;
   size_t frame_count = 0;
 };
 
-/// Adds the samples of all lanes to `mix` while driving them, as ring_kernel::RingStruck does for
-/// strikes.
+/// Adds the samples of all lanes to `mix` while driving them; advances the start and fresh states.
 void RingDriven(const ForceArrays& force, const Drive& drive, LaneArrays& lanes,
                 float* mix) noexcept;
 

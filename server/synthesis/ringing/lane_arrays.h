@@ -16,7 +16,7 @@ namespace carillon {
 /// The widest vector of floats that any SIMD target uses; arrays over modes are padded to it.
 inline constexpr size_t kMostLanes = 16;
 
-/// What the nodes of a longer tile take while they are split into lanes.
+/// Floats of the nodes of a longer tile, each still split into lanes.
 inline constexpr size_t kNodeFloats = kClosedTileNodes * kMostLanes;
 
 /// A zeroed array aligned for the widest vector.
@@ -45,59 +45,70 @@ struct LaneRange {
   size_t count = 0;
 };
 
-/// Lanes of one segment that are rendered in tiles of one kind.
+/// A run: consecutive lanes of one segment that are rendered in tiles of one kind.
 struct LaneRun {
   LaneRange range;
   size_t tile_kind = 0;
   size_t segment = 0;
-  size_t first_in_segment = 0;  ///< lanes of the segment that are in runs before
+  size_t first_in_segment = 0;  ///< position of the run's first lane in its segment
 
-  /// How many of these lanes are among the first `count` of the segment.
+  /// Number of this run's lanes among the first `count` lanes of the segment.
   size_t CountOfFirst(size_t count) const {
     return std::clamp(count, first_in_segment, first_in_segment + range.count) - first_in_segment;
   }
 };
 
-/// The figures of a bank's modes as they ring in the time domain, one lane each.
+/// Coefficients and states of a bank's modes in the time domain, one lane a mode.
+///
+/// The lanes of a bank are sorted by kind of tile, longest tiles first, then by segment; a run is a
+/// piece with both in common, padded to groups of kMostLanes. Segment 0 stays in the time domain;
+/// segment 1 + k can move to long blocks of kind k. In this example two segments use tiles of 64
+/// frames, and segment 1 has lanes in all three kinds of tile:
+///
+///   tiles of      64 frames             16 frames        8 frames
+///           +------------+-----------+------------+------------+------------+
+///   runs    |  segment 1 | segment 2 |  segment 1 |  segment 0 |  segment 1 |
+///           +------------+-----------+------------+------------+------------+
+///   lanes   0            32          48           80           96          112
 struct LaneArrays {
   /// `lane_count` is a multiple of kMostLanes.
   explicit LaneArrays(size_t lane_count);
 
-  /// Where the power of lane's q is that leads to node k + 1 of its tile, the last to the next
-  /// tile: real part; its imaginary part is kMostLanes further.
+  /// Index in `powers` of the real part of a lane's power of q that advances from the tile's begin
+  /// to node k + 1, or for the last k to the next tile. The imaginary part is kMostLanes further.
   static size_t PowerIndex(size_t lane, size_t k) {
     return (lane / kMostLanes * kTileNodes + k) * 2 * kMostLanes + lane % kMostLanes;
   }
 
-  /// Places so many lanes more behind all others; in order of their tiles' kind.
+  /// Appends a run of `lane_count` lanes; runs come in order of kTileOrder.
   void Add(size_t lane_count, size_t tile_kind, size_t segment, size_t first_in_segment);
 
-  /// Zeroes the state at the start of the block.
+  /// Sets the state at the start of the block to zero.
   void Silence(LaneRange range) noexcept;
 
-  /// All lanes, by kind of tile and then by segment.
+  /// All runs, in order, and all lanes of each kind of tile.
   std::vector<LaneRun> runs;
   std::array<LaneRange, kTileKinds> by_tile;
-  /// For each kMostLanes lanes together, see PowerIndex.
+  /// Powers of q, interleaved for groups of kMostLanes lanes: see PowerIndex.
   LaneArray<float> powers;
-  /// q, and its power that leads from one tile of the first kind to the next.
+  /// q, and its power that advances by a tile of the first kind.
   LaneArray<float> q_re, q_im, step_re, step_im;
   /// q^N for a block of N frames.
   LaneArray<double> block_re, block_im;
   /// The state at the start of the block.
   LaneArray<double> re, im;
-  /// Where a block is rendered in parts: the state in single precision at the start of the next
-  /// part, and that of what was struck in this block.
+  /// If a block is rendered in parts: the state in single precision at the start of the next part,
+  /// and its fresh share, which impulses, knots and drive have added since the block began.
   LaneArray<float> start_re, start_im;
-  LaneArray<float> newborn_re, newborn_im;
+  LaneArray<float> fresh_re, fresh_im;
 
-  /// From modal impulse to state: -i exp(i phase) c / omega_d with all scales.
+  /// Modal impulse to state: -i exp(i phase) c / omega_d, times all scales.
   LaneArray<float> gain_re, gain_im;
-  /// Logarithm of q, for each frame of lead.
+  /// Logarithm of q: what a frame of lead contributes to the exponent.
   LaneArray<float> lead_re, lead_im;
-  /// s^2/2 of the Gaussian contact, for each second squared of tau^2.
+  /// s^2/2: what a Gaussian contact contributes to the exponent for each second squared of tau^2.
   LaneArray<float> tau_re, tau_im;
-  /// Where among the projected columns.
+  /// The mode's column among the projected columns.
   LaneArray<uint32_t> column;
 };
 

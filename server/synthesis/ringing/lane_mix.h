@@ -10,23 +10,23 @@
 
 namespace carillon {
 
-/// One block of sound, all but some of it still split into the lanes of a vector: all banks add to
-/// it, and lanes and nodes are summed once for all of them.
+/// One block of sound that all banks add to. Most of it is still split into SIMD lanes, or stands
+/// at the nodes of tiles; both are summed once for all banks.
 class LaneMix {
  public:
   /// Silences the first `frame_count` frames.
   void Clear(size_t frame_count) noexcept;
 
-  /// Writes the sum of all that was added into `block`, of as many frames.
+  /// Writes the sum of all that was added to `block`, which has the cleared number of frames.
   void Reduce(std::span<float> block) noexcept;
 
   /// Frame n is lanes()[n * kMostLanes] and the kMostLanes - 1 floats after it.
   float* lanes() noexcept { return lanes_.data(); }
 
-  /// Tiles from the block's begin on.
+  /// Nodes of the tiles that begin with the block.
   NodeMix& nodes() noexcept { return nodes_; }
 
-  /// What is not split, up to the end of a vector.
+  /// Samples that are not split into lanes; readable to the end of a vector.
   float* frames() noexcept { return frames_.data(); }
 
  private:

@@ -1,5 +1,5 @@
-// SPDX-License-Identifier: Apache-2.0
-// Vectors of lanes, once for each SIMD target; included by kernels only, within foreach_target.
+// SPDX-License-Identifier: Apache-2.0 SIMD vectors of lanes, compiled for each target; only kernels
+// include this, within foreach_target.
 #if defined(CARILLON_SERVER_SYNTHESIS_LANE_VECTORS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef CARILLON_SERVER_SYNTHESIS_LANE_VECTORS_INL_H_
 #undef CARILLON_SERVER_SYNTHESIS_LANE_VECTORS_INL_H_
@@ -20,13 +20,13 @@ using Doubles = hn::Repartition<double, Floats>;
 using HalfFloats = hn::Half<Floats>;
 using V = hn::Vec<Floats>;
 
-// Far above any sound, far below what a float's square can hold.
+// Far above any sound, and far below the largest float.
 constexpr float kMostSquared = 1e30F;
 
-/// The squared amplitudes of some lanes, while they advance.
+/// Collects the squared amplitudes of some lanes while they advance.
 struct Loudness {
   hn::Vec<Doubles> loudest;
-  hn::Vec<Doubles> all_small;  ///< not zero
+  hn::Vec<Doubles> all_small;  ///< zero in lanes where one was too large or NaN
 
   HWY_INLINE void Clear() {
     loudest = hn::Zero(Doubles());

@@ -9,29 +9,27 @@
 
 namespace carillon {
 
-/// Blocks are no longer than this: single-precision coefficients drift from the double state within
-/// a block.
+/// Longest block: within a block, single precision drifts from the state in double.
 inline constexpr size_t kMostBlockFrames = 256;
 
-/// Sums over modes at the nodes of tiles longer than the first kind's, still split into the lanes
-/// of a vector.
+/// Sums over modes at the nodes of tiles of the longer kinds, each still split into SIMD lanes.
 class NodeMix {
  public:
   void Clear() noexcept { used_ = {}; }
 
-  /// The nodes of this kind's tiles, the first ones of which cover `frame_count` frames; silent at
-  /// the first use. Node k of tile i is [(i * kClosedTileNodes + k) * kMostLanes].
+  /// The nodes of the tiles of this kind that cover `frame_count` frames; the first use since Clear
+  /// sets them to zero. Node k of tile i is at [(i * kClosedTileNodes + k) * kMostLanes].
   float* Use(size_t kind, size_t frame_count) noexcept;
 
-  /// Adds what the tiles sound like, of which the first of each kind begins at `begin`, to
-  /// frames[begin] to frames[end - 1]; reads as far as sum_kernel::AddTiles.
+  /// Interpolates the tiles, of which the first of each kind begins at frame `begin`, and adds them
+  /// to frames[begin] to frames[end - 1]; reads as far as sum_kernel::AddTiles.
   void AddTo(size_t begin, size_t end, float* frames) const noexcept;
 
  private:
   static constexpr std::array<size_t, kTileKinds> kMostTiles = {
       0, kMostBlockFrames / kTileFrames[1], kMostBlockFrames / kTileFrames[2]};
 
-  /// Where the nodes of a kind are.
+  /// Index of the first node of a kind.
   static constexpr std::array<size_t, kTileKinds> kFirst = {0, 0, kMostTiles[1] * kNodeFloats};
 
   std::array<bool, kTileKinds> used_{};

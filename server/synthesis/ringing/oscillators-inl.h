@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Oscillators in single precision, once for each SIMD target; see lane_vectors-inl.h.
+// Oscillators in single precision, compiled for each SIMD target; see lane_vectors-inl.h.
 #if defined(CARILLON_SERVER_SYNTHESIS_OSCILLATORS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef CARILLON_SERVER_SYNTHESIS_OSCILLATORS_INL_H_
 #undef CARILLON_SERVER_SYNTHESIS_OSCILLATORS_INL_H_
@@ -15,7 +15,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace carillon::HWY_NAMESPACE {
 
-/// Complex numbers in some vectors of lanes.
+/// One complex number in each lane of kVectors vectors.
 template <size_t kVectors>
 struct States {
   V re[kVectors], im[kVectors];
@@ -78,12 +78,12 @@ struct States {
   }
 };
 
-/// The powers of q for tiles of the first kind, of lanes that go in longer ones else.
+/// Powers of q for tiles of the first kind, for lanes that normally use longer tiles.
 template <size_t kVectors>
 struct FramePowers {
   alignas(64) float values[kVectors][2 * kTileNodes * kMostLanes];
 
-  /// As many as `frame_count` frames need.
+  /// Computes the powers that `frame_count` frames need.
   HWY_INLINE void Set(const LaneArrays& lanes, size_t lane, size_t frame_count) {
     States<kVectors> q, power, step;
     q.Load(lanes.q_re.data() + lane, lanes.q_im.data() + lane);
@@ -105,7 +105,7 @@ struct FramePowers {
   }
 };
 
-/// The oscillators of some vectors of lanes, all in tiles of one kind.
+/// The oscillators of kVectors vectors of lanes, all in tiles of one kind.
 template <size_t kVectors>
 struct Oscillators {
   using Z = States<kVectors>;
@@ -121,7 +121,7 @@ struct Oscillators {
     }
   }
 
-  /// From now on in tiles of the first kind.
+  /// Switches to tiles of the first kind.
   HWY_INLINE void Use(const FramePowers<kVectors>& frame_powers) {
     for (size_t v = 0; v < kVectors; ++v) powers[v] = frame_powers.values[v];
     tile_kind = 0;
@@ -149,7 +149,7 @@ struct Oscillators {
     Raise(Power(kTileNodes - 1), tile_count, z);
   }
 
-  /// q^frame_count, of at least one.
+  /// q^frame_count; frame_count is at least one.
   HWY_INLINE Z FramePower(size_t frame_count) const {
     Z q;
     q.Load(q_re, q_im);
@@ -158,14 +158,15 @@ struct Oscillators {
     return power;
   }
 
-  /// Renders one tile of the first kind: each sample straight from the state, then one step for all
-  /// of them.
+  /// Renders one tile of the first kind: every sample is computed from the state at the tile's
+  /// begin, then the state advances by a tile.
   HWY_INLINE void AddTile(Z& z, float* mix) const { AddNodes<kTileNodes>(z, mix); }
 
-  /// The same to the nodes of a longer tile, at its end too.
+  /// Renders the nodes of one longer tile, including the node at its end, and advances the state.
   HWY_INLINE void AddClosedTile(Z& z, float* nodes) const { AddNodes<kClosedTileNodes>(z, nodes); }
 
-  /// The first `frame_count` samples of a tile of the first kind, and the state at its end.
+  /// Renders the first `frame_count` samples of a tile of the first kind and advances the state by
+  /// as many frames.
   HWY_INLINE void AddPart(Z& z, size_t frame_count, float* HWY_RESTRICT mix) const {
     const Floats d;
     for (size_t k = 0; k < frame_count; ++k) {
@@ -185,7 +186,7 @@ struct Oscillators {
   }
 
  private:
-  /// z *= power^exponent, in as many steps as the exponent has bits.
+  /// z *= power^exponent, by repeated squaring.
   static HWY_INLINE void Raise(Z power, size_t exponent, Z& z) {
     if (exponent == 0) return;
     for (;;) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// All lanes of a bank, some vectors at a time, once for each SIMD target; see lane_vectors-inl.h.
+// Passes over all lanes of a bank, some vectors at a time, compiled for each SIMD target; see
+// lane_vectors-inl.h.
 #if defined(CARILLON_SERVER_SYNTHESIS_PASSES_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef CARILLON_SERVER_SYNTHESIS_PASSES_INL_H_
 #undef CARILLON_SERVER_SYNTHESIS_PASSES_INL_H_
@@ -15,23 +16,23 @@
 HWY_BEFORE_NAMESPACE();
 namespace carillon::HWY_NAMESPACE {
 
-// Vectors rendered together: four share the sums, which are as many loads and stores less; the
-// powers come from the cache.
-constexpr size_t kVectorsAPass = 4;
+// Vectors rendered together. Four vectors share the loads and stores of the sums; their powers come
+// from the cache.
+constexpr size_t kVectorsPerPass = 4;
 
-/// Asks for the powers of vectors one pass ahead, of as many as are rendered now and tile by tile
-/// while they are: at once, the requests would only wait for each other.
+/// Prefetches the powers of the next pass's vectors, a share with each tile of this pass: all
+/// requests at once would wait for each other.
 template <size_t kVectors>
 class Prefetching {
  public:
-  /// Behind the last lane nothing is there, which does no harm.
+  /// Prefetching past the last lane is harmless.
   HWY_INLINE Prefetching(const LaneArrays& lanes, size_t lane)
       : next_(lanes.powers.data() +
-              LaneArrays::PowerIndex(lane + kVectorsAPass * hn::MaxLanes(Floats()), 0)) {}
+              LaneArrays::PowerIndex(lane + kVectorsPerPass * hn::MaxLanes(Floats()), 0)) {}
 
-  /// The share of a tile.
+  /// Prefetches the share of one tile.
   HWY_INLINE void Step(size_t tile_kind) {
-    // Processors read lines by twos.
+    // Processors fetch cache lines in pairs.
     constexpr size_t kLines = 128 / sizeof(float);
     end_ += kPowers * kTileFrames[tile_kind] / kFrames;
     for (; next_ < end_; next_ += kLines) __builtin_prefetch(next_);
@@ -48,11 +49,11 @@ class Prefetching {
 /// How lanes are rendered.
 struct Manner {
   size_t tile_kind = 0;
-  bool by_frames = false;  ///< in tiles of the first kind all the same
-  size_t frame_count = 0;  ///< so many frames then
+  bool by_frames = false;  ///< in tiles of the first kind, whatever tile_kind is
+  size_t frame_count = 0;  ///< frames to be rendered, if by_frames
 };
 
-/// Calls ring(oscillators, ahead, lane) for some vectors.
+/// Calls ring(oscillators, prefetching, lane) for kVectors vectors from `lane` on.
 template <size_t kVectors, class RingSome>
 HWY_INLINE void ForSome(const LaneArrays& lanes, size_t lane, Manner manner, const RingSome& ring) {
   Oscillators<kVectors> oscillators(lanes, lane, manner.tile_kind);
@@ -64,7 +65,7 @@ HWY_INLINE void ForSome(const LaneArrays& lanes, size_t lane, Manner manner, con
   ring(oscillators, Prefetching<kVectors>(lanes, lane), lane);
 }
 
-/// The same for the vectors at `lane`, at most kMost.
+/// Calls ring for the `count` vectors from `lane` on, at most kMost.
 template <size_t kMost, class RingSome>
 HWY_INLINE void ForRest(const LaneArrays& lanes, size_t lane, size_t count, Manner manner,
                         const RingSome& ring) {
@@ -75,18 +76,18 @@ HWY_INLINE void ForRest(const LaneArrays& lanes, size_t lane, size_t count, Mann
   }
 }
 
-/// The same for all lanes of `range`, some vectors at a time.
+/// Calls ring for all lanes of `range`, kVectorsPerPass vectors at a time.
 template <class RingSome>
 HWY_INLINE void ForVectors(const LaneArrays& lanes, LaneRange range, Manner manner,
                            const RingSome& ring) {
-  const size_t pass = kVectorsAPass * hn::Lanes(Floats());
+  const size_t pass = kVectorsPerPass * hn::Lanes(Floats());
   const size_t end = range.first + range.count;
   size_t lane = range.first;
-  for (; lane + pass <= end; lane += pass) ForSome<kVectorsAPass>(lanes, lane, manner, ring);
-  ForRest<kVectorsAPass - 1>(lanes, lane, (end - lane) / hn::Lanes(Floats()), manner, ring);
+  for (; lane + pass <= end; lane += pass) ForSome<kVectorsPerPass>(lanes, lane, manner, ring);
+  ForRest<kVectorsPerPass - 1>(lanes, lane, (end - lane) / hn::Lanes(Floats()), manner, ring);
 }
 
-/// The same for all lanes that there are, ascending.
+/// Calls ring for all lanes of the bank, in ascending order.
 template <class RingSome>
 HWY_INLINE void ForVectors(const LaneArrays& lanes, Manner manner, const RingSome& ring) {
   for (const size_t tile_kind : kTileOrder) {

@@ -26,7 +26,7 @@ using carillon::HWY_NAMESPACE::Floats;
 using carillon::HWY_NAMESPACE::ForVectors;
 using carillon::HWY_NAMESPACE::HalfFloats;
 using carillon::HWY_NAMESPACE::kMostSquared;
-using carillon::HWY_NAMESPACE::kVectorsAPass;
+using carillon::HWY_NAMESPACE::kVectorsPerPass;
 using carillon::HWY_NAMESPACE::Loudness;
 using carillon::HWY_NAMESPACE::Manner;
 using carillon::HWY_NAMESPACE::Oscillators;
@@ -58,29 +58,29 @@ void Ring(const LaneArrays& lanes, LaneRange range, size_t tile_kind, size_t fra
              });
 }
 
-/// Vectors that are struck: what rings, and of it what is newborn.
+/// Vectors with impulses: the whole state, and its fresh share.
 template <size_t kVectors, class Ahead>
 class StruckVectors {
  public:
   using Z = States<kVectors>;
-  Z all, newborn;
+  Z all, fresh;
 
   HWY_INLINE StruckVectors(const Oscillators<kVectors>& oscillators, const Ahead& next)
       : oscillators_(oscillators), ahead_(next) {}
 
   HWY_INLINE void Load(const LaneArrays& lanes, size_t lane) {
     all.Load(lanes.start_re.data() + lane, lanes.start_im.data() + lane);
-    newborn.Load(lanes.newborn_re.data() + lane, lanes.newborn_im.data() + lane);
-    any_newborn_ = true;
+    fresh.Load(lanes.fresh_re.data() + lane, lanes.fresh_im.data() + lane);
+    any_fresh_ = true;
   }
   HWY_INLINE void Store(LaneArrays& lanes, size_t lane) const {
     all.Store(lanes.start_re.data() + lane, lanes.start_im.data() + lane);
-    newborn.Store(lanes.newborn_re.data() + lane, lanes.newborn_im.data() + lane);
+    fresh.Store(lanes.fresh_re.data() + lane, lanes.fresh_im.data() + lane);
   }
 
-  /// From part.begin to part.end, in tiles from there on.
+  /// Renders from part.begin to part.end.
   HWY_INLINE void Ring(const StruckPart& part, size_t lane) {
-    newborn_at_ = part.begin;
+    fresh_at_ = part.begin;
     if (oscillators_.tile_kind == 0) {
       RingFrames(part, lane);
     } else {
@@ -89,8 +89,8 @@ class StruckVectors {
   }
 
  private:
-  /// What is struck within a tile is rendered to the tile's end beside the rest, and is a part of
-  /// it from there on.
+  /// An impulse within a tile is rendered separately to the tile's end, and then added to the
+  /// state.
   HWY_INLINE void RingFrames(const StruckPart& part, size_t lane) {
     size_t frame = part.begin;
     size_t strike = 0;
@@ -102,16 +102,16 @@ class StruckVectors {
         Strike(part, strike, lane, frame + kTileFrames[0]);
       }
     }
-    MoveNewborn(frame);
+    AdvanceFresh(frame);
     if (const size_t rest = part.end - frame; rest > 0) {
       oscillators_.AddPart(all, rest, part.sums[0] + frame * kMostLanes);
-      newborn.Multiply(oscillators_.Power(rest - 1));
-      newborn_at_ = part.end;
+      fresh.Multiply(oscillators_.Power(rest - 1));
+      fresh_at_ = part.end;
     }
     for (; strike < part.batch.count; ++strike) Strike(part, strike, lane, part.end);
   }
 
-  /// The same in longer tiles, to nodes.
+  /// Renders like RingFrames, but to the nodes of longer tiles.
   HWY_INLINE void RingNodes(const StruckPart& part, size_t lane) {
     const size_t kind = oscillators_.tile_kind, frame_count = kTileFrames[kind];
     float* nodes = part.sums[kind];
@@ -119,7 +119,7 @@ class StruckVectors {
     for (size_t frame = part.begin; frame < part.end; frame += frame_count) {
       ahead_.Step(kind);
       const size_t tile_end = std::min(frame + frame_count, part.end);
-      Z power;  // to the part's end within a tile
+      Z power;  // advances to the part's end, if that lies within the tile
       const Z* shortened = nullptr;
       if (tile_end < frame + frame_count) {
         power = oscillators_.FramePower(tile_end - frame);
@@ -134,11 +134,11 @@ class StruckVectors {
         Join(struck, tile_end);
       }
     }
-    MoveNewborn(part.end);
+    AdvanceFresh(part.end);
     for (; strike < part.batch.count; ++strike) Join(Struck(part, strike, lane), part.end);
   }
 
-  /// A longer tile; if it is shortened, with the power that leads to its end.
+  /// Renders a longer tile. If the part ends within it, the state advances by *shortened instead.
   HWY_INLINE void AddNodes(const Z* shortened, Z& z, float* nodes) const {
     const Z begin = z;
     oscillators_.AddClosedTile(z, nodes);
@@ -147,14 +147,14 @@ class StruckVectors {
     z.Multiply(*shortened);
   }
 
-  HWY_INLINE void MoveNewborn(size_t frame) {
+  HWY_INLINE void AdvanceFresh(size_t frame) {
     const size_t tile_frames = kTileFrames[oscillators_.tile_kind];
-    if (any_newborn_) {
-      oscillators_.Advance((frame - newborn_at_) / tile_frames, newborn);
-      const size_t rest = (frame - newborn_at_) % tile_frames;
-      if (rest > 0) newborn.Multiply(oscillators_.FramePower(rest));
+    if (any_fresh_) {
+      oscillators_.Advance((frame - fresh_at_) / tile_frames, fresh);
+      const size_t rest = (frame - fresh_at_) % tile_frames;
+      if (rest > 0) fresh.Multiply(oscillators_.FramePower(rest));
     }
-    newborn_at_ = frame;
+    fresh_at_ = frame;
   }
 
   HWY_INLINE Z Struck(const StruckPart& part, size_t strike, size_t lane) const {
@@ -164,7 +164,7 @@ class StruckVectors {
     return struck;
   }
 
-  /// A strike that is heard from within the tile that ends at `tile_end`, where the states are.
+  /// Renders an impulse up to `tile_end`, the end of its tile, and adds it to the states there.
   HWY_INLINE void Strike(const StruckPart& part, size_t strike, size_t lane, size_t tile_end) {
     const size_t offset = part.batch.offsets[strike];
     Z struck = Struck(part, strike, lane);
@@ -172,18 +172,18 @@ class StruckVectors {
     Join(struck, tile_end);
   }
 
-  /// Adds what was struck to the states at `frame`.
+  /// Adds an impulse's state to the states at `frame`.
   HWY_INLINE void Join(const Z& struck, size_t frame) {
     all.Add(struck);
-    if (newborn_at_ != frame) MoveNewborn(frame);
-    newborn.Add(struck);
-    any_newborn_ = true;
+    if (fresh_at_ != frame) AdvanceFresh(frame);
+    fresh.Add(struck);
+    any_fresh_ = true;
   }
 
   const Oscillators<kVectors>& oscillators_;
   Ahead ahead_;
-  size_t newborn_at_ = 0;  // the frame of its state
-  bool any_newborn_ = false;
+  size_t fresh_at_ = 0;  // the frame at which the fresh state is
+  bool any_fresh_ = false;
 };
 
 void Start(LaneArrays& lanes, size_t lane_count) {
@@ -192,7 +192,7 @@ void Start(LaneArrays& lanes, size_t lane_count) {
     z.Load(lanes.re.data() + lane, lanes.im.data() + lane);
     z.Store(lanes.start_re.data() + lane, lanes.start_im.data() + lane);
     z.Clear();
-    z.Store(lanes.newborn_re.data() + lane, lanes.newborn_im.data() + lane);
+    z.Store(lanes.fresh_re.data() + lane, lanes.fresh_im.data() + lane);
   }
 }
 
@@ -220,13 +220,13 @@ void AddStrike(LaneArrays& lanes, size_t lane_count, const float* added_re, cons
       sum.Store(re.data() + lane, im.data() + lane);
     };
     add(lanes.start_re, lanes.start_im);
-    add(lanes.newborn_re, lanes.newborn_im);
+    add(lanes.fresh_re, lanes.fresh_im);
   }
 }
 
-/// Advances one vector in double, and adds what is newborn if there is any; returns |Z|^2.
-HWY_INLINE hn::Vec<Doubles> AdvanceVector(LaneArrays& lanes, size_t lane, const float* newborn_re,
-                                          const float* newborn_im) {
+/// Advances one vector in double and adds the fresh state unless it is null; returns |Z|^2.
+HWY_INLINE hn::Vec<Doubles> AdvanceVector(LaneArrays& lanes, size_t lane, const float* fresh_re,
+                                          const float* fresh_im) {
   const Doubles d;
   const HalfFloats df;
   const auto q_re = hn::Load(d, lanes.block_re.data() + lane);
@@ -235,16 +235,16 @@ HWY_INLINE hn::Vec<Doubles> AdvanceVector(LaneArrays& lanes, size_t lane, const 
   const auto old_im = hn::Load(d, lanes.im.data() + lane);
   auto re = hn::NegMulAdd(old_im, q_im, hn::Mul(old_re, q_re));
   auto im = hn::MulAdd(old_im, q_re, hn::Mul(old_re, q_im));
-  if (newborn_re != nullptr) {
-    re = hn::Add(re, hn::PromoteTo(d, hn::Load(df, newborn_re)));
-    im = hn::Add(im, hn::PromoteTo(d, hn::Load(df, newborn_im)));
+  if (fresh_re != nullptr) {
+    re = hn::Add(re, hn::PromoteTo(d, hn::Load(df, fresh_re)));
+    im = hn::Add(im, hn::PromoteTo(d, hn::Load(df, fresh_im)));
   }
   hn::Store(re, d, lanes.re.data() + lane);
   hn::Store(im, d, lanes.im.data() + lane);
   return hn::MulAdd(re, re, hn::Mul(im, im));
 }
 
-/// Advances groups of lanes, ascending, and finds out about the segments that they belong to.
+/// Advances groups of lanes in ascending order, and updates the segments that they belong to.
 class Advancing {
  public:
   HWY_INLINE Advancing(LaneArrays& lanes, std::span<RingingSegment> segments,
@@ -257,15 +257,15 @@ class Advancing {
     all_.Clear();
   }
 
-  /// `newborn_re` and `newborn_im` are of this group, or null.
-  HWY_INLINE void AdvanceGroup(size_t lane, const float* newborn_re, const float* newborn_im) {
+  /// `fresh_re` and `fresh_im` are the group's fresh states, or null.
+  HWY_INLINE void AdvanceGroup(size_t lane, const float* fresh_re, const float* fresh_im) {
     while (lane >= runs_.front().range.first + runs_.front().range.count) Next();
     Loudness group;
     group.Clear();
     for (size_t i = 0; i < kMostLanes; i += hn::Lanes(Doubles())) {
-      const bool newborn = newborn_re != nullptr;
-      group.Note(AdvanceVector(lanes_, lane + i, newborn ? newborn_re + i : nullptr,
-                               newborn ? newborn_im + i : nullptr));
+      const bool fresh = fresh_re != nullptr;
+      group.Note(AdvanceVector(lanes_, lane + i, fresh ? fresh_re + i : nullptr,
+                               fresh ? fresh_im + i : nullptr));
     }
     all_.Join(group);
     if (group.Above(silence_squared_)) {
@@ -321,8 +321,8 @@ bool RingFreely(LaneArrays& lanes, std::span<RingingSegment> segments, const Fre
 bool FinishStruck(LaneArrays& lanes, std::span<RingingSegment> segments, const StruckPart& part,
                   double silence_squared) {
   Advancing advancing(lanes, segments, silence_squared);
-  // Of some vectors, or as many as a group has.
-  alignas(64) float newborn_re[kVectorsAPass * kMostLanes], newborn_im[kVectorsAPass * kMostLanes];
+  // Fresh states of one pass, or of a group that takes several passes.
+  alignas(64) float fresh_re[kVectorsPerPass * kMostLanes], fresh_im[kVectorsPerPass * kMostLanes];
   ForVectors(lanes, MannerOf(part), [&](const auto& oscillators, auto ahead, size_t lane) {
     constexpr size_t kVectors = std::decay_t<decltype(oscillators)>::kCount;
     StruckVectors<kVectors, decltype(ahead)> vectors(oscillators, ahead);
@@ -330,14 +330,14 @@ bool FinishStruck(LaneArrays& lanes, std::span<RingingSegment> segments, const S
       vectors.Load(lanes, lane);
     } else {
       vectors.all.Load(lanes.re.data() + lane, lanes.im.data() + lane);
-      vectors.newborn.Clear();
+      vectors.fresh.Clear();
     }
     vectors.Ring(part, lane);
     const size_t first = lane % kMostLanes;
-    vectors.newborn.Store(newborn_re + first, newborn_im + first);
+    vectors.fresh.Store(fresh_re + first, fresh_im + first);
     const size_t end = first + kVectors * hn::Lanes(Floats());
     for (size_t group = 0; group + kMostLanes <= end; group += kMostLanes) {
-      advancing.AdvanceGroup(lane - first + group, newborn_re + group, newborn_im + group);
+      advancing.AdvanceGroup(lane - first + group, fresh_re + group, fresh_im + group);
     }
   });
   return advancing.Finish();

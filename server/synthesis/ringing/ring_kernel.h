@@ -11,26 +11,27 @@
 
 namespace carillon {
 
-/// Lanes of which the first `awake_count`, whole groups of kMostLanes, ring in the time domain.
+/// A segment of lanes. Its first `awake_count` lanes, whole groups of kMostLanes, ring in the time
+/// domain.
 struct RingingSegment {
   size_t lane_count = 0;
   size_t awake_count = 0;
-  double loudest_squared = 0;  ///< largest squared amplitude, lately
+  double loudest_squared = 0;  ///< largest squared amplitude at the end of the last block
 };
 
-/// A bank has no more segments.
+/// Most segments of a bank.
 inline constexpr size_t kMostSegments = 5;
 
-/// The inner loops of what rings in the time domain, compiled for every SIMD target and dispatched
-/// at run time. None allocates, locks or throws.
+/// The inner loops of ringing in the time domain, compiled for every SIMD target and dispatched at
+/// run time. None allocates, locks or throws.
 namespace ring_kernel {
 
-/// Where values are added, by kind of tile: of the first, those of frame n of the block at
-/// [n * kMostLanes]; of others, those of node k of tile i at
-/// [(i * kClosedTileNodes + k) * kMostLanes]; null where no lanes are rendered in that kind.
+/// Destinations of the rendered values, by kind of tile. For the first kind, frame n of the block
+/// is at [n * kMostLanes]; for the others, node k of tile i is at [(i * kClosedTileNodes + k) *
+/// kMostLanes]. Null if no lanes are rendered in that kind.
 using TileSums = std::array<float*, kTileKinds>;
 
-/// A block in which nothing is struck.
+/// A block without impulses.
 struct FreeBlock {
   TileSums sums;
   size_t frame_count = 0;
@@ -38,41 +39,41 @@ struct FreeBlock {
   double silence_squared = 0;
 };
 
-/// Adds a block of what is awake, and advances it to the next. `segments` are all there are. False:
-/// something was not finite.
+/// Renders a block of all awake lanes and advances them to the next block. `segments` are all
+/// segments of the bank. False: a state was not finite.
 bool RingFreely(LaneArrays& lanes, std::span<RingingSegment> segments,
                 const FreeBlock& block) noexcept;
 
-/// A part of a block, with the strikes that fall into it, of all lanes. Longer tiles begin anew
-/// with the part. The batch's states are those at the strikes' frames, of longer tiles at the begin
-/// of the strike's tile; to their nodes a strike is added by itself, because only what comes after
-/// it is heard (StrikeBatch::nodes).
+/// A part of a block, for all lanes, with the impulses that fall into it. Tiles begin anew with the
+/// part. The batch's states are those at the impulses' frames; in longer tiles, those at the begin
+/// of the impulse's tile. In longer tiles each impulse has nodes of its own (StrikeBatch::nodes),
+/// because only the frames after it are audible.
 struct StruckPart {
   TileSums sums;
   size_t begin = 0;  ///< frames
   size_t end = 0;
-  /// The states at `begin` are the start and newborn ones; else that of the block's start, and
-  /// nothing is newborn.
+  /// True: read the state at `begin` from start_re/fresh_re, because an earlier part was rendered.
+  /// False: this is the block's first part; read re/im, and the fresh state is zero.
   bool started = false;
-  /// All lanes go in tiles of the first kind: that is less work for many strikes.
+  /// Render all lanes in tiles of the first kind, which is less work if there are many impulses.
   bool by_frames = false;
   StrikeBatch& batch;
   size_t lane_count = 0;
 };
 
-/// Sets the start and newborn states of a block that is rendered in parts.
+/// Initializes the start and fresh states of a block that is rendered in parts.
 void Start(LaneArrays& lanes, size_t lane_count) noexcept;
 
-/// Adds a part that was started and is not the last, struck at the batch's offsets, and advances
-/// the start and newborn states to its end.
+/// Renders a part that was started and is not the block's last, with the impulses of its batch, and
+/// advances the start and fresh states to its end.
 void RingStruck(LaneArrays& lanes, const StruckPart& part) noexcept;
 
-/// Adds to the start and newborn states.
+/// Adds what an impulse contributes to the start and fresh states.
 void AddStrike(LaneArrays& lanes, size_t lane_count, const float* added_re,
                const float* added_im) noexcept;
 
-/// Adds a block's last part, and advances everything to the next block, with what is newborn.
-/// Silence and result as for RingFreely.
+/// Renders the block's last part, advances all states to the next block and adds the fresh states.
+/// `silence_squared` and the result are those of RingFreely.
 bool FinishStruck(LaneArrays& lanes, std::span<RingingSegment> segments, const StruckPart& part,
                   double silence_squared) noexcept;
 

@@ -11,20 +11,21 @@
 
 namespace carillon {
 
-/// Strikes of one bank within a block that are rendered in one pass over its lanes: what each adds
-/// to the states, and at which frame. Workspace of one rendering thread.
+/// Onsets (impulses and knots) of one bank within a block, which are rendered in one pass over the
+/// lanes: what each onset adds to the states, and at which frame. Scratch memory of one rendering
+/// thread.
 class StrikeBatch {
  public:
   static constexpr size_t kMostStrikes = 32;
-  /// A bank has no more lanes, and projects no more columns, than this.
+  /// Most lanes, and most projected columns, of a bank.
   static constexpr size_t kMostBankLanes = 16384;
 
-  /// Rows that the next strike will read: asked for while this one is worked on, because at once
-  /// they would only wait for each other.
+  /// Rows that the next impulse will read. They are prefetched bit by bit while the present impulse
+  /// is processed, because all requests at once would wait for each other.
   struct RowsAhead {
     std::array<const int16_t*, 12> rows{};
     size_t count = 0;
-    size_t value_count = 0;  ///< of each
+    size_t value_count = 0;  ///< of each row
   };
 
   StrikeBatch()
@@ -33,7 +34,7 @@ class StrikeBatch {
         im_(kMostBankLanes),
         nodes_(kMostStrikes * kNodeStride) {}
 
-  /// How many strikes of a bank of `lane_count` lanes fit.
+  /// Number of onsets that fit for a bank of `lane_count` lanes.
   static size_t Capacity(size_t lane_count) {
     return lane_count == 0 ? kMostStrikes : std::min(kMostStrikes, kMostBankLanes / lane_count);
   }
@@ -42,18 +43,17 @@ class StrikeBatch {
   float* re(size_t strike, size_t lane_count) noexcept { return re_.data() + strike * lane_count; }
   float* im(size_t strike, size_t lane_count) noexcept { return im_.data() + strike * lane_count; }
 
-  /// What the strike adds to the nodes of its tile of this kind, not the first; node k is
-  /// [k * kMostLanes].
+  /// The nodes of an onset's own tile of a longer kind; node k is at [k * kMostLanes].
   float* nodes(size_t strike, size_t tile_kind) noexcept {
     return nodes_.data() + strike * kNodeStride + (tile_kind - 1) * kNodeFloats;
   }
   static constexpr size_t kNodeStride = (kTileKinds - 1) * kNodeFloats;
 
-  /// Of a part of a block by itself.
+  /// Nodes of a part of a block that is not the whole block.
   NodeMix part_nodes;
 
   RowsAhead ahead;
-  /// Impulses in this block, of all batches, of the bank that is being struck; merged ones are one.
+  /// Impulses of the present bank in this block, in all batches; merged impulses count as one.
   size_t due_count = 0;
   size_t count = 0;
   std::array<size_t, kMostStrikes> offsets{};  ///< in the block, ascending

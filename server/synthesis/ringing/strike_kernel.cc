@@ -62,8 +62,8 @@ void Project(const Projection& projection, float* modal_impulses) {
   }
 }
 
-/// Sine and cosine at once, to 1e-7 for |angle| up to some thousands: reduced to a quarter turn in
-/// three parts (Cody and Waite), then the series of each, telescoped.
+/// Sine and cosine at once, to 1e-7 for |angle| up to some thousands: reduced to a quarter of a
+/// cycle in three parts (Cody and Waite), then the series of each, telescoped.
 HWY_INLINE void SineCosine(V angle, V& sine, V& cosine) {
   const Floats d;
   const hn::RebindToSigned<Floats> di;
@@ -87,7 +87,7 @@ HWY_INLINE void SineCosine(V angle, V& sine, V& cosine) {
   cosine = hn::Xor(hn::IfThenElse(odd, s, c), hn::BitCast(d, cosine_sign));
 }
 
-/// The same of 2^kDoublings times `angle`, which is at most a quarter turn.
+/// Sine and cosine of 2^kDoublings times `angle`, which is at most a quarter of a cycle.
 template <int kDoublings>
 HWY_INLINE void SineCosineOfMultiple(V angle, V& sine, V& cosine) {
   const Floats d;
@@ -110,7 +110,7 @@ HWY_INLINE void SineCosineOfMultiple(V angle, V& sine, V& cosine) {
   cosine = c;
 }
 
-/// exp(x): of small x, as a mode's decay within a frame or a tile is, by its series.
+/// exp(x); small x, such as a mode's decay within a frame or a tile, by its series.
 HWY_INLINE V ExpOfDecay(V x) {
   const Floats d;
   const V one = hn::Set(d, 1.0F);
@@ -128,19 +128,19 @@ HWY_INLINE V ExpOfDecay(V x) {
   return hn::MulAdd(e, x, one);
 }
 
-/// How a strike reaches the lanes' states.
+/// The ways from an impulse to the frame at which states are computed.
 enum class Reach {
-  kAtOnce,   ///< at the frame
-  kLead,     ///< up to a frame before it
-  kTile,     ///< from elsewhere in a tile, or that far
-  kContact,  ///< from anywhere, and by a contact that takes time
+  kAtOnce,   ///< the impulse lies on the frame
+  kLead,     ///< it lies less than a frame before
+  kTile,     ///< it lies at most a tile before or after
+  kContact,  ///< it lies anywhere, and its contact has a duration
 };
 
-/// How far it is to where a strike's states are wanted.
+/// The distance from an impulse to the frame at which states are computed.
 struct Way {
-  V lead_frames;  ///< negative: before the strike
+  V lead_frames;  ///< negative: that frame lies before the impulse
   V tau_squared;
-  size_t share_ahead;  ///< of the values in the rows ahead, for each vector
+  size_t share_ahead;  ///< values of each row ahead to prefetch for each vector
 };
 
 /// (re, im) *= exp(lead_frames log q + tau^2 s^2/2).
@@ -154,12 +154,12 @@ HWY_INLINE void Delay(const LaneArrays& lanes, size_t lane, const Way& way, V& r
     logarithm = hn::MulAdd(way.tau_squared, hn::Load(d, lanes.tau_re.data() + lane), logarithm);
     angle = hn::MulAdd(way.tau_squared, hn::Load(d, lanes.tau_im.data() + lane),
                        hn::Mul(way.lead_frames, angle));
-    // Below exp(-80) nothing is heard, and the angle may be too large for a sine.
+    // Factors below exp(-80) are inaudible, and their angle may be too large for SineCosine.
     const auto heard = hn::Gt(logarithm, hn::Set(d, -80.0F));
     magnitude = hn::IfThenElseZero(heard, hn::Exp(d, logarithm));
     SineCosine(hn::IfThenElseZero(heard, angle), sine, cosine);
   } else {
-    // A frame is at most half a turn, a tile less than a turn.
+    // A mode makes at most half a cycle in a frame, and less than a cycle in a tile.
     constexpr int kDoublings = kReach == Reach::kTile ? 2 : 1;
     magnitude = ExpOfDecay(logarithm);
     const V part = hn::Mul(way.lead_frames, hn::Set(d, 1.0F / (1 << kDoublings)));
@@ -172,7 +172,7 @@ HWY_INLINE void Delay(const LaneArrays& lanes, size_t lane, const Way& way, V& r
   re = rotated;
 }
 
-/// Asks for some values of all rows ahead.
+/// Prefetches `count` values, from `first` on, of all rows ahead.
 HWY_INLINE void PrefetchRows(const StrikeBatch::RowsAhead& ahead, size_t first, size_t count) {
   constexpr size_t kLineValues = 32;
   const size_t end = std::min(first + count, ahead.value_count);
@@ -182,7 +182,7 @@ HWY_INLINE void PrefetchRows(const StrikeBatch::RowsAhead& ahead, size_t first, 
   }
 }
 
-/// Whose square sums may be added up; Finite() is false of what is not a number.
+/// A sum of squares; Finite() is false if a term was NaN or too large.
 class SumOfSquares {
  public:
   HWY_INLINE SumOfSquares() : sum_(hn::Zero(Floats())) {}

@@ -23,8 +23,8 @@ using carillon::HWY_NAMESPACE::V;
 
 constexpr size_t kLanes = hn::MaxLanes(Floats());
 
-/// Of the first kCount sets of lanes, those from the kFirst-th on: kWidth neighbouring lanes of one
-/// set after another, as sums.
+/// Sums each kWidth neighbouring lanes of the sets kFirst and following; sets from kCount on count
+/// as zero.
 template <size_t kWidth, size_t kFirst, size_t kCount>
 HWY_INLINE V SumNeighbours(const float* HWY_RESTRICT lanes) {
   if constexpr (kFirst >= kCount) {
@@ -48,7 +48,7 @@ HWY_INLINE void SumEach(const float* HWY_RESTRICT lanes, float* HWY_RESTRICT sum
   if constexpr (kFirst + kLanes < kCount) SumEach<kCount, kFirst + kLanes>(lanes, sums);
 }
 
-/// Kernels add to as many lanes of a frame as their vectors have.
+/// Each frame has kMostLanes lanes, of which kernels use as many as a vector has.
 void SumLanes(const float* mix, std::span<float> block) {
   size_t n = 0;
   for (; n + kLanes <= block.size(); n += kLanes) {
@@ -59,7 +59,7 @@ void SumLanes(const float* mix, std::span<float> block) {
   }
 }
 
-/// What the nodes' sums sound like in some frames of the tile that begins at frame `first`.
+/// Interpolates the sums of a tile's nodes at frames `begin` to `end`; the tile begins at `first`.
 HWY_INLINE void AddFrames(const NodeShares& shares, const float* sums, size_t first, size_t begin,
                           size_t end, float* HWY_RESTRICT frames) {
   const Floats d;

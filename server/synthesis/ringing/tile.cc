@@ -7,17 +7,17 @@
 namespace carillon {
 namespace {
 
-/// A mode may turn by so much in half a tile, |log q| frames/2, and decay by so much in a whole
-/// one: interpolation errs by -119 dB then, by -113 dB of what decays most.
-constexpr double kMostHalfTurn = 2.4;
+/// Bounds for a mode in a tile: |log q| times half the tile's frames, and -Re log q times all of
+/// them. The interpolation error is then -119 dB, or -113 dB for the fastest decay.
+constexpr double kMostHalfTileRadians = 2.4;
 constexpr double kMostDecay = 0.5;
-/// The highest frequency of the interpolating polynomial, in the fastest mode's: it errs least so.
+/// The polynomial's highest frequency relative to the fastest mode's, chosen for the least error.
 constexpr double kHighestFrequency = 1.04;
 
 NodeShares MakeNodeShares(size_t kind) noexcept {
   constexpr double kHarmonics = double{kTileNodes} / 2;
-  const double half_step =
-      kHighestFrequency * kMostHalfTurn / (kHarmonics * static_cast<double>(kTileFrames[kind]));
+  const double half_step = kHighestFrequency * kMostHalfTileRadians /
+                           (kHarmonics * static_cast<double>(kTileFrames[kind]));
   NodeShares shares{};
   for (size_t frame = 0; frame < kTileFrames[kind]; ++frame) {
     for (size_t node = 0; node < kClosedTileNodes; ++node) {
@@ -34,7 +34,7 @@ NodeShares MakeNodeShares(size_t kind) noexcept {
   return shares;
 }
 
-/// Made before any thread renders.
+/// Computed at the program's start, before any thread renders.
 const std::array<NodeShares, kTileKinds> kShares = {NodeShares{}, MakeNodeShares(1),
                                                     MakeNodeShares(2)};
 
@@ -43,7 +43,8 @@ const std::array<NodeShares, kTileKinds> kShares = {NodeShares{}, MakeNodeShares
 size_t ChooseTile(std::complex<double> log_q) {
   for (size_t kind = kTileKinds - 1; kind > 0; --kind) {
     const auto frames = static_cast<double>(kTileFrames[kind]);
-    if (std::abs(log_q) * frames / 2 <= kMostHalfTurn && -log_q.real() * frames <= kMostDecay) {
+    if (std::abs(log_q) * frames / 2 <= kMostHalfTileRadians &&
+        -log_q.real() * frames <= kMostDecay) {
       return kind;
     }
   }

@@ -7,10 +7,16 @@
 
 namespace carillon {
 
-/// What rings in the time domain is rendered tile by tile: one state gives kTileNodes values and
-/// the next tile's state. Of the first kind of tile the values are samples. A mode that turns
-/// slowly goes in longer tiles of as many values, taken at the tile's nodes; they are added up over
-/// all modes and only then interpolated. Of these tiles the end is a node too.
+/// Ringing modes are rendered tile by tile: from the state at a tile's begin, kTileNodes values and
+/// the next tile's state are computed. In tiles of the first kind the values are the samples. Modes
+/// of low frequency use longer tiles with the same number of values, taken at Chebyshev nodes; the
+/// values are summed over all modes and interpolated once. In longer tiles the end is a node too.
+///
+///   kind 0,  8 frames  01234567|
+///   kind 1, 16 frames  012..3..4..5..678
+///   kind 2, 64 frames  0.1......2..........3...........4...........5..........6......7.8
+///
+/// A column is a frame, a digit is a node, and node 8 lies where the next tile begins.
 inline constexpr size_t kTileKinds = 3;
 inline constexpr std::array<size_t, kTileKinds> kTileFrames = {8, 16, 64};
 inline constexpr size_t kTileNodes = 8;
@@ -19,19 +25,20 @@ inline constexpr size_t kClosedTileNodes = kTileNodes + 1;
 /// The longest first.
 inline constexpr std::array<size_t, kTileKinds> kTileOrder = {2, 1, 0};
 
-/// The longest kind of tile that renders a mode to -110 dB of its amplitude at the tile's begin,
-/// which may be 4 dB above that of a strike late in the tile; `log_q` is (sigma + i omega)/rate.
-/// Within it the mode makes less than a whole turn.
+/// The longest kind of tile that renders a mode with an error below -110 dB of its amplitude at the
+/// tile's begin, which may be 4 dB above the amplitude of an impulse late in the tile. `log_q` is
+/// (sigma + i omega)/rate. Within the tile the mode makes less than a cycle.
 size_t ChooseTile(std::complex<double> log_q);
 
-/// Where a node is, in frames from the tile's begin: of longer tiles Chebyshev's points with both
-/// ends (of the second kind; Trefethen, Approximation Theory and Approximation Practice, 2).
+/// Position of a node, in frames from the tile's begin. The nodes of longer tiles are Chebyshev
+/// points of the second kind (Trefethen, Approximation Theory and Approximation Practice, chapter
+/// 2).
 double TileNode(size_t kind, size_t node);
 
-/// The share of each node's value in each frame of a tile: [node][frame], zero behind the tile's
-/// end. Interpolation is by a trigonometric polynomial (Gauss's formula; Zygmund, Trigonometric
-/// Series, X.1), which for what rings below a known frequency reaches half as far again as an
-/// algebraic one.
+/// Weights of the interpolation: the weight of each node in each frame, [node][frame], zero after
+/// the tile's end. The interpolant is a trigonometric polynomial (Gauss's formula; Zygmund,
+/// Trigonometric Series, X.1). For modes below a known frequency it allows tiles half as long again
+/// as an algebraic polynomial does.
 using NodeShares = std::array<std::array<float, 80>, kClosedTileNodes>;
 const NodeShares& GetNodeShares(size_t kind) noexcept;
 

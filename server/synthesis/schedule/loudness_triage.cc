@@ -14,7 +14,7 @@ void LoudnessTriage::Clear() noexcept {
 }
 
 size_t LoudnessTriage::Bin(float loudness) noexcept {
-  // What is no number is refused later; to order it, it counts as silent.
+  // NaN counts as silent here; the bank refuses it later.
   const float positive = loudness > 0 ? loudness : 0;
   return std::min<size_t>(std::bit_cast<uint32_t>(positive) >> 20, kBins - 1);
 }
@@ -39,7 +39,6 @@ double LoudnessTriage::Decide(double most_work) noexcept {
   return work;
 }
 
-/// All are merged; what work is left makes the loudest exact.
 double LoudnessTriage::ShareOut(double most_work, double all_merged) noexcept {
   double work = all_merged;
   for (first_exact_ = kBins; first_exact_ > 0; --first_exact_) {

@@ -7,37 +7,38 @@
 
 namespace carillon {
 
-/// What becomes of a strike in a block that has more of them than can be rendered in time.
+/// How an impulse is rendered in a block that has more impulses than can be rendered in time.
 enum class Treatment : uint8_t {
   kExact,
-  kMerged,  ///< on the nearest vertex, together with its neighbours in time
-  kShed,
+  kMerged,  ///< at the nearest vertex, as one with its neighbours in time
+  kShed,    ///< not at all
 };
 
-/// Chooses by loudness: the loudest strikes are exact, the next merged, the least audible shed, so
-/// that their work stays within a bound. The time it takes does not depend on how the strikes are
-/// distributed.
+/// Chooses the treatment of impulses by their loudness, so that their total work stays within a
+/// bound: the loudest are exact, the next are merged and the quietest are shed. It sorts into a
+/// histogram, so its time grows with the number of impulses only.
 class LoudnessTriage {
  public:
-  /// Forgets all.
+  /// Empties the histogram.
   void Clear() noexcept;
 
-  /// A strike of this loudness, which costs so much work exact or merged.
+  /// Adds an impulse: its loudness, and its work if it is rendered exactly or merged.
   void Note(float loudness, double exact_work, double merged_work) noexcept;
 
-  /// Settles the treatment of all loudnesses; returns the work of what was noted.
+  /// Settles the treatment of every loudness; returns the work of all noted impulses under it.
   double Decide(double most_work) noexcept;
 
-  /// Strikes quieter than this are shed; zero where none is.
+  /// Impulses quieter than this are shed; zero: none is.
   float shed_below() const noexcept;
 
   Treatment Treat(float loudness) const noexcept;
 
  private:
-  /// Exponent and three bits of the fraction: 0.5 to 1 dB a bin.
+  /// A bin is a float's exponent and the first three bits of its fraction: 0.5 to 1 dB wide.
   static constexpr size_t kBins = 2040;
   static size_t Bin(float loudness) noexcept;
 
+  /// Merges all impulses, then spends the remaining work on rendering the loudest exactly.
   double ShareOut(double most_work, double all_merged) noexcept;
 
   struct Work {
@@ -46,8 +47,8 @@ class LoudnessTriage {
   };
   std::array<Work, kBins> bins_;
   Work all_;
-  size_t first_merged_ = 0;  // bins from the first exact one on are exact
-  size_t first_exact_ = 0;
+  size_t first_merged_ = 0;  // bins from here to first_exact_ are merged, those below are shed
+  size_t first_exact_ = 0;   // bins from here on are exact
 };
 
 }  // namespace carillon

@@ -9,7 +9,7 @@
 
 namespace carillon {
 
-/// Where a due event stands in the order of rendering: by section, block and bank, then by time in
+/// The place of a due event in the order of rendering: by section, block and bank, then by time in
 /// groups of kMergedFrames. Within a group exact events come before merged ones, then by frame,
 /// then by arrival. All fields are packed into one key, the first field highest, because 64-bit
 /// numbers sort fastest:

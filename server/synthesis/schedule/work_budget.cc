@@ -6,10 +6,11 @@
 namespace carillon {
 namespace {
 
-/// Follows the median, so that a block in which the thread had to wait teaches little.
-constexpr double kLearningStep = 1.02;
-/// Where there was less to do than this part of the bound, the fixed costs hide the rest.
-constexpr double kWorthLearning = 0.05;
+/// Each block moves the estimate up or down by this factor. The estimate follows the median, so a
+/// block in which the thread was preempted has little effect.
+constexpr double kAdjustment = 1.02;
+/// Blocks with less work than this part of the bound are not measured: fixed costs dominate them.
+constexpr double kLeastMeasured = 0.05;
 constexpr double kLeastNsPerUnit = 0.1;
 constexpr double kMostNsPerUnit = 100;
 
@@ -23,10 +24,10 @@ void WorkBudget::Begin() noexcept {
 }
 
 void WorkBudget::End(double units, double block_count) noexcept {
-  if (clock_ == nullptr || units < kWorthLearning * most_work() * block_count) return;
+  if (clock_ == nullptr || units < kLeastMeasured * most_work() * block_count) return;
   const auto elapsed_ns = static_cast<double>((clock_->Monotonic() - begin_).count());
   const bool slower = elapsed_ns > units * ns_per_unit_;
-  ns_per_unit_ = std::clamp(slower ? ns_per_unit_ * kLearningStep : ns_per_unit_ / kLearningStep,
+  ns_per_unit_ = std::clamp(slower ? ns_per_unit_ * kAdjustment : ns_per_unit_ / kAdjustment,
                             kLeastNsPerUnit, kMostNsPerUnit);
 }
 

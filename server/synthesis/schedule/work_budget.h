@@ -7,30 +7,32 @@
 
 namespace carillon {
 
-/// What rendering costs, in units of about a nanosecond of a fast core; how long a unit takes here
-/// is learnt while rendering.
+/// Costs of rendering, in units of work. One unit takes about a nanosecond on a fast core;
+/// WorkBudget measures how long it takes on this machine.
 namespace work {
-inline constexpr double kTimeLane = 6.5;      ///< a lane in the time domain, 128 frames
+inline constexpr double kTimeLane = 6.5;      ///< a lane in the time domain, for 128 frames
 inline constexpr double kSpectralLane = 6.5;  ///< a lane in a long block
-inline constexpr double kStrikeLane = 2;      ///< a strike, each lane
-inline constexpr double kMergedLane = 0.8;    ///< a merged strike, each lane
-inline constexpr double kVoice = 3000;        ///< a voice, 128 frames
-inline constexpr double kTakeStrike = 30;     ///< to take a strike from its stream
-inline constexpr double kJudgeStrike = 70;    ///< to keep it until it is due, and to judge it
+inline constexpr double kStrikeLane = 2;      ///< an exact impulse, for each lane of its bank
+inline constexpr double kMergedLane = 0.8;    ///< a merged impulse, for each lane of its bank
+inline constexpr double kVoice = 3000;        ///< a voice, for 128 frames
+inline constexpr double kTakeEvent = 30;      ///< taking an event from its stream
+inline constexpr double kChooseEvent =
+    70;  ///< keeping an event until it is due, and choosing its treatment
 }  // namespace work
 
-/// How much work a block may have, so that its deadline is kept.
+/// Bounds the work of a block so that the block is rendered before its deadline.
 class WorkBudget {
  public:
-  /// Without a clock there is no bound. `most_load` is the part of real time that may be used.
+  /// Null `clock`: unbounded. `most_load` is the fraction of real time that rendering may use.
   WorkBudget(const Clock* clock, double block_s, double most_load);
 
   bool bounded() const noexcept { return clock_ != nullptr; }
 
-  /// Units that a block may take.
+  /// Units of work that a block may take.
   double most_work() const noexcept { return most_ns_ / ns_per_unit_; }
 
-  /// Around the rendering of `block_count` blocks, which took so many units.
+  /// Begin and End enclose the rendering of `block_count` blocks, which took `units` of work in
+  /// total; their duration updates the measured time of a unit.
   void Begin() noexcept;
   void End(double units, double block_count) noexcept;
 

@@ -15,7 +15,7 @@ void InverseTransform::Free::operator()(void* plan) const noexcept { kiss_fftr_f
 
 InverseTransform::InverseTransform(size_t size)
     : size_(size), plan_(kiss_fftr_alloc(static_cast<int>(size), 1, nullptr, nullptr)) {
-  // Other sizes than powers of two may allocate while they run.
+  // kissfft may allocate in each run for other sizes than powers of two.
   assert(std::has_single_bit(size));
   if (plan_ == nullptr) throw std::bad_alloc();
 }

@@ -12,7 +12,7 @@ namespace carillon {
 ///
 ///   x(n) = Re X_0 + 2 Re sum_{0<k<M/2} X_k exp(2 pi i k n/M) + (-1)^n Re X_{M/2}
 ///
-/// Run neither allocates nor locks; one thread at a time.
+/// Run neither allocates nor locks. One thread at a time may call it.
 class InverseTransform {
  public:
   /// `size` M is a power of two.

@@ -25,7 +25,7 @@ using carillon::HWY_NAMESPACE::kMostSquared;
 using carillon::HWY_NAMESPACE::Loudness;
 using carillon::HWY_NAMESPACE::V;
 
-// How far ahead the lanes of long blocks are asked for.
+// Groups by which the prefetching of lanes is ahead.
 constexpr size_t kGroupsAhead = 2;
 
 /// The state of a group of spectral lanes in single precision.
@@ -60,7 +60,7 @@ HWY_INLINE void AdvanceGroup(SpectralLanes& lanes, size_t group) {
   }
 }
 
-/// slot += (re + i im) * weights, complex numbers lying pairwise in the lanes.
+/// slot += (re + i im) * weights; each pair of lanes holds a complex number.
 HWY_INLINE void SpreadMode(const float* HWY_RESTRICT weights, float re, float im,
                            float* HWY_RESTRICT slot) {
 #if HWY_TARGET == HWY_SCALAR
@@ -81,8 +81,7 @@ HWY_INLINE void SpreadMode(const float* HWY_RESTRICT weights, float re, float im
 #endif
 }
 
-/// Asks for the lines of a group that will be needed soon: the figures of a large scene come from
-/// beyond the caches.
+/// Prefetches a group's data: those of a large scene do not fit into the caches.
 HWY_INLINE void PrefetchGroup(const SpectralLanes& lanes, size_t group) {
   constexpr size_t kLine = 64;
   const auto prefetch = [](const auto* first, size_t count) {

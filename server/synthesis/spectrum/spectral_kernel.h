@@ -7,17 +7,17 @@
 
 namespace carillon::spectral_kernel {
 
-/// What Spread found.
+/// Result of Spread.
 struct Spreading {
-  bool awake = false;          ///< any lane is
-  bool fell_asleep = false;    ///< some lanes did
+  bool awake = false;          ///< any lane still rings
+  bool fell_asleep = false;    ///< some lanes were put to sleep
   double loudest_squared = 0;  ///< largest squared amplitude
   bool finite = true;
 };
 
 /// Adds the first `mode_count` lanes to the slots of a spectrum and advances them by a long block.
-/// Groups of kMostLanes lanes whose squared amplitudes are all below `silence_squared` are silenced
-/// before anything is added. Compiled for every SIMD target and dispatched at run time; neither
+/// Groups of kMostLanes lanes whose squared amplitudes are all below `silence_squared` are put to
+/// sleep and not added. Compiled for every SIMD target and dispatched at run time; neither
 /// allocates, locks nor throws.
 Spreading Spread(SpectralLanes& lanes, size_t mode_count, double silence_squared,
                  float* slots) noexcept;

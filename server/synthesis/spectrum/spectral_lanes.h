@@ -10,8 +10,8 @@
 
 namespace carillon {
 
-/// The modes of a bank that ring in long blocks of one kind, ascending by slot, and padded to
-/// whole vectors.
+/// Coefficients and states of a bank's modes that ring in long blocks of one kind, sorted by
+/// ascending slot and padded to whole vectors.
 struct SpectralLanes {
   explicit SpectralLanes(size_t lane_count)
       : weights(lane_count * 2 * kSpreadBins),
@@ -22,14 +22,14 @@ struct SpectralLanes {
         im(lane_count),
         awake(lane_count / kMostLanes) {}
 
-  /// Of each lane kSpreadBins complex numbers, real part before imaginary part.
+  /// kSpreadBins complex weights for each lane, real part before imaginary part.
   LaneArray<float> weights;
   LaneArray<uint32_t> slot;
   /// q^N for a long block of N frames.
   LaneArray<double> block_re, block_im;
   /// The state at the start of the next long block.
   LaneArray<double> re, im;
-  /// Of each kMostLanes lanes: whether any is above silence.
+  /// For each group of kMostLanes lanes: whether it rings.
   std::vector<uint8_t> awake;
 };
 

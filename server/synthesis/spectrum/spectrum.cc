@@ -40,7 +40,8 @@ void Spectrum::GatherSlots() noexcept {
   auto* bins = reinterpret_cast<float*>(bins_.data());
   const size_t slot_count = SlotCount(block_.grid_size);
   constexpr size_t kFloats = 2 * kSpreadBins;
-  // Every eighth slot: they do not overlap, so that no addition waits for the one before.
+  // Every kSpreadBins-th slot: these do not overlap, so that no addition waits for the previous
+  // one.
   for (size_t first = 0; first < kSpreadBins; ++first) {
     for (size_t slot = first; slot < slot_count; slot += kSpreadBins) {
       float* from = slots_.data() + slot * kFloats;
@@ -51,8 +52,8 @@ void Spectrum::GatherSlots() noexcept {
   }
 }
 
-/// Only the real part is heard: a bin below zero or above Nyquist is the conjugate of its mirror
-/// image, and one between counts twice in the transform.
+/// Only the real part of the signal is needed: a bin below zero or above Nyquist is added to its
+/// mirror image as the conjugate. Bins strictly between count twice in the inverse transform.
 void Spectrum::Fold() noexcept {
   const size_t nyquist = block_.grid_size / 2;
   for (size_t k = 0; k <= nyquist; ++k) half_[k] = bins_[k + kMargin];

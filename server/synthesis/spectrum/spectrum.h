@@ -12,18 +12,18 @@
 
 namespace carillon {
 
-/// The spectrum of one long block under way: all modes that ring freely add to it, then it is
-/// transformed once for all of them. Neither allocates nor locks once made.
+/// The spectrum of one long block: all modes that ring freely are added to it, then it is
+/// transformed once for all of them. Only the constructor allocates; nothing locks.
 class Spectrum {
  public:
   explicit Spectrum(const LongBlock& block);
 
-  /// Slot s is slots()[2 * kSpreadBins * s] and what follows: bins s - kSpreadBins/2 and up, each
-  /// real part before imaginary part. Private to the modes that begin there, so that adding to one
-  /// never waits for adding to its neighbour.
+  /// Slot s begins at slots()[2 * kSpreadBins * s] and holds kSpreadBins bins, from bin s -
+  /// kSpreadBins/2 on, real part before imaginary part. Neighbouring slots overlap in bins but not
+  /// in memory, so that adding to one slot never waits for adding to its neighbour.
   float* slots() noexcept { return slots_.data(); }
 
-  /// Writes the frames of the long block and clears the spectrum for the next.
+  /// Writes the frames of the long block, and clears the spectrum for the next long block.
   void Transform(std::span<float> frames) noexcept;
 
  private:
@@ -32,8 +32,8 @@ class Spectrum {
 
   LongBlock block_;
   LaneArray<float> slots_;
-  std::vector<std::complex<float>> bins_;  // from -kSpreadBins/2 on
-  std::vector<std::complex<float>> half_;  // 0 to Nyquist
+  std::vector<std::complex<float>> bins_;  // from bin -kSpreadBins/2 on
+  std::vector<std::complex<float>> half_;  // bins 0 to Nyquist
   std::vector<float> samples_;
   std::vector<float> deconvolution_;
   InverseTransform transform_;

@@ -10,16 +10,16 @@
 
 namespace carillon {
 
-/// Bins that a mode adds to.
+/// Number of bins that a mode is spread over.
 inline constexpr size_t kSpreadBins = 8;
 
-/// How one mode enters the spectrum of a long block.
+/// The contribution of a mode with unit state to the spectrum of a long block.
 struct SpreadMode {
   size_t slot = 0;  ///< its first bin, plus kSpreadBins/2: never negative
   std::array<std::complex<float>, kSpreadBins> weights;
 };
 
-/// Slots of a spectrum with `grid_size` points: those of modes from zero to Nyquist.
+/// Number of slots of a spectrum with `grid_size` points, for modes from zero to Nyquist.
 constexpr size_t SlotCount(size_t grid_size) { return grid_size / 2 + kSpreadBins; }
 
 /// Type-1 non-uniform Fourier transform (Dutt and Rokhlin 1993) with the Kaiser-Bessel kernel
@@ -30,11 +30,11 @@ constexpr size_t SlotCount(size_t grid_size) { return grid_size / 2 + kSpreadBin
 ///
 ///   exp(i theta n') = sum_k phi(k - theta M/(2 pi)) exp(2 pi i k n'/M) / Phi(n'/M),
 ///
-/// phi continued to complex arguments. The weights include exp(i theta N/2), so that they multiply
-/// the state at the block's first frame.
+/// where phi is continued to complex arguments. The weights include exp(i theta N/2), so that they
+/// multiply the state at the block's first frame.
 SpreadMode MakeSpreadMode(std::complex<double> log_q, const LongBlock& block);
 
-/// 1/Phi(n'/M) for n' = -N/2 ... N/2 - 1, Phi the Fourier transform of phi.
+/// 1/Phi(n'/M) for n' = -N/2 ... N/2 - 1, where Phi is the Fourier transform of phi.
 std::vector<float> MakeDeconvolution(const LongBlock& block);
 
 }  // namespace carillon

@@ -11,7 +11,7 @@ namespace {
 
 constexpr size_t kTaps = DelayLine::kTaps;
 constexpr size_t kPhases = 512;
-/// Of the Kaiser window: side lobes 80 dB down.
+/// Shape of the Kaiser window: side lobes at -80 dB.
 constexpr double kBeta = 7.86;
 
 /// Coefficients for positions `phase`/kPhases after the middle tap, ascending in time.
@@ -30,7 +30,7 @@ PhaseTable MakePhaseTable() {
           static_cast<double>(tap) - (kTaps / 2.0 - 1) - static_cast<double>(phase) / kPhases;
       const bool whole = phase % kPhases == 0;
       const double sinc = std::sin(std::numbers::pi * x) / (std::numbers::pi * x);
-      // Exactly one sample where the position is that of one.
+      // A whole position takes exactly one sample.
       const double at_sample = std::abs(x) < 0.5 ? 1 : 0;
       table[phase][tap] = static_cast<float>(whole ? at_sample : sinc * Kaiser(x / (kTaps / 2.0)));
     }
@@ -38,7 +38,7 @@ PhaseTable MakePhaseTable() {
   return table;
 }
 
-/// Made by whoever makes the first line, never by a rendering thread.
+/// Computed when the first delay line is made, which is never on a rendering thread.
 const float* Phases() {
   static const PhaseTable table = MakePhaseTable();
   return table.front().data();

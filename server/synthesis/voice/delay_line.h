@@ -7,30 +7,31 @@
 
 namespace carillon {
 
-/// Keeps the last samples, to be read anywhere between them: a windowed sinc of kTaps samples,
-/// exact at whole delays, within -80 dB up to 0.37 of the sample rate between. Neither allocates
-/// nor locks once made.
+/// A delay line with fractional delays: a windowed sinc of kTaps samples interpolates between
+/// samples. It is exact at whole delays, and elsewhere within -80 dB up to 0.37 of the sample rate.
+/// Only the constructor allocates; nothing locks.
 class DelayLine {
  public:
   static constexpr size_t kTaps = 24;
-  /// What was written last can be read with this delay or more.
+  /// The least delay: interpolation needs half of the taps after the position.
   static constexpr double kLeastDelay = kTaps / 2.0;
 
-  /// Delays up to `longest_delay` samples, read while the last `block_frame_count` are new.
+  /// Reads may be `longest_delay` samples before any of the last `block_frame_count` samples
+  /// written.
   DelayLine(size_t longest_delay, size_t block_frame_count);
 
   void Write(std::span<const float> samples) noexcept;
 
-  /// The sample `delay` before the one that is written next.
+  /// The signal `delay` samples before the sample that is written next.
   float Read(double delay) const noexcept;
 
-  /// Samples that are kept.
+  /// Number of samples kept.
   size_t length() const noexcept { return mask_ + 1; }
 
  private:
   size_t mask_;
-  std::vector<float> samples_;  // and the first kTaps once more at the end
-  const float* phases_;         // rows of kTaps
+  std::vector<float> samples_;  // a ring buffer; the first kTaps samples are repeated at its end
+  const float* phases_;         // rows of kTaps coefficients
   size_t written_ = 0;
 };
 

@@ -9,7 +9,7 @@ namespace carillon {
 namespace {
 
 constexpr double kLagS = 0.01;
-/// So near, in metres, the smoothed place snaps to that told.
+/// Within this distance, in metres, the smoothed place snaps to the target.
 constexpr double kNear = 1e-7;
 
 }  // namespace
@@ -17,9 +17,9 @@ constexpr double kNear = 1e-7;
 Glide::Glide(const Place& place, double sample_rate_hz, size_t block_frame_count)
     : smoothing_(-std::expm1(-static_cast<double>(block_frame_count) / (kLagS * sample_rate_hz))),
       block_frame_count_(block_frame_count) {
-  std::ranges::copy(place.position_m, told_.begin());
-  std::ranges::copy(place.right, told_.begin() + 3);
-  target_ = smooth_ = told_;
+  std::ranges::copy(place.position_m, unsmoothed_.begin());
+  std::ranges::copy(place.right, unsmoothed_.begin() + 3);
+  target_ = smoothed_ = unsmoothed_;
 }
 
 void Glide::Move(const Motion& motion, size_t offset) noexcept {
@@ -30,11 +30,11 @@ void Glide::Move(const Motion& motion, size_t offset) noexcept {
   at_rest_ = false;
   frames_left_ = motion.glide_frames;
   if (frames_left_ >= 1) {
-    for (size_t i = 0; i < kAxes; ++i) step_[i] = (target_[i] - told_[i]) / frames_left_;
+    for (size_t i = 0; i < kAxes; ++i) step_[i] = (target_[i] - unsmoothed_[i]) / frames_left_;
     return;
   }
   frames_left_ = 0;
-  told_ = target_;
+  unsmoothed_ = target_;
   jumps_ = true;
 }
 
@@ -42,11 +42,11 @@ void Glide::Go(size_t frame_count) noexcept {
   if (frames_left_ == 0) return;
   const auto frames = static_cast<double>(frame_count);
   if (frames >= frames_left_) {
-    told_ = target_;
+    unsmoothed_ = target_;
     frames_left_ = 0;
     return;
   }
-  for (size_t i = 0; i < kAxes; ++i) told_[i] += frames * step_[i];
+  for (size_t i = 0; i < kAxes; ++i) unsmoothed_[i] += frames * step_[i];
   frames_left_ -= frames;
 }
 
@@ -54,20 +54,20 @@ void Glide::Advance() noexcept {
   Go(block_frame_count_ - offset_);
   offset_ = 0;
   jumped_ = std::exchange(jumps_, false);
-  if (jumped_) smooth_ = told_;
+  if (jumped_) smoothed_ = unsmoothed_;
   at_rest_ = frames_left_ == 0;
   for (size_t i = 0; i < kAxes; ++i) {
-    const double left = told_[i] - smooth_[i];
-    smooth_[i] += smoothing_ * left;
+    const double left = unsmoothed_[i] - smoothed_[i];
+    smoothed_[i] += smoothing_ * left;
     at_rest_ &= std::abs(left) < kNear;
   }
-  if (at_rest_) smooth_ = told_;
+  if (at_rest_) smoothed_ = unsmoothed_;
 }
 
 Place Glide::place() const noexcept {
   Place place;
-  std::copy_n(smooth_.begin(), 3, place.position_m.begin());
-  std::copy_n(smooth_.begin() + 3, 3, place.right.begin());
+  std::copy_n(smoothed_.begin(), 3, place.position_m.begin());
+  std::copy_n(smoothed_.begin() + 3, 3, place.right.begin());
   return place;
 }
 

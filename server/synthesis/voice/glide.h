@@ -8,30 +8,30 @@
 
 namespace carillon {
 
-/// Where something is: a point, and, of a listener, the direction to its right.
+/// A position, and for a listener the direction to the right.
 struct Place {
   std::array<double, 3> position_m{};
   std::array<double, 3> right{1, 0, 0};
 };
 
-/// The way of something that is told where to go, block by block: straight from place to place,
-/// smoothed so that its velocity does not jump either (a lag of 10 ms). At rest it is exactly where
-/// it was told. Neither allocates nor locks.
+/// The place of an object or listener that is moved by Motions, block by block. It goes straight
+/// from place to place and is smoothed, with a lag of 10 ms, so that its velocity does not jump. At
+/// rest it is exactly at the last target. Neither allocates nor locks.
 class Glide {
  public:
   Glide(const Place& place, double sample_rate_hz, size_t block_frame_count);
 
-  /// Goes to a place from sample `offset` of this block on; without a glide it jumps there. Offsets
-  /// within a block do not go back.
+  /// Starts a motion at sample `offset` of this block; glide_frames below one makes it jump.
+  /// Offsets ascend within a block.
   void Move(const Motion& motion, size_t offset) noexcept;
 
   /// Ends the block.
   void Advance() noexcept;
 
-  /// At the end of the last block.
+  /// The place at the end of the last block.
   Place place() const noexcept;
 
-  /// It jumped in the last block.
+  /// Whether it jumped in the last block.
   bool jumped() const noexcept { return jumped_; }
 
   bool at_rest() const noexcept { return at_rest_; }
@@ -42,10 +42,10 @@ class Glide {
 
   void Go(size_t frame_count) noexcept;
 
-  double smoothing_;  // how much of what is left a block takes
+  double smoothing_;  // share of the remaining distance that is covered in a block
   size_t block_frame_count_;
   size_t offset_ = 0;
-  Coordinates told_, step_{}, target_, smooth_;
+  Coordinates unsmoothed_, step_{}, target_, smoothed_;
   double frames_left_ = 0;
   bool jumps_ = false, jumped_ = false, at_rest_ = true;
 };

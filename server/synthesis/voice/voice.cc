@@ -9,9 +9,9 @@ namespace carillon {
 namespace {
 
 constexpr double kFadeS = 0.01;
-/// A delay that changes faster, in frames a frame, is a jump.
+/// A delay that changes faster, in frames per frame, is treated as a jump.
 constexpr double kFastestDelay = 0.5;
-/// Nearer than this an object comes to sound from the middle.
+/// Within this distance an object's panning moves to the middle.
 constexpr double kNearM = 0.1;
 
 size_t HistoryBlocks(const Voice::Settings& settings) {
@@ -47,7 +47,7 @@ Voice::Voice(const Settings& settings, const Place& object, const Place& listene
   heard_.fill(Hear(0));
 }
 
-/// Where the object was so many blocks before the end of the last one.
+/// Position of the object `blocks` blocks before the end of the last block.
 std::array<double, 3> Voice::PositionBefore(double blocks) const noexcept {
   const size_t count = positions_.size();
   const auto whole = std::min(static_cast<size_t>(blocks), count - 2);
@@ -58,21 +58,21 @@ std::array<double, 3> Voice::PositionBefore(double blocks) const noexcept {
           after[2] + part * (before[2] - after[2])};
 }
 
-/// At the end of the last block; `delay_frames` is about the delay.
+/// Delay and gains at the end of the last block; `delay_frames` is a first estimate of the delay.
 Voice::Heard Voice::Hear(double delay_frames) const noexcept {
   const HearingSettings& hearing = settings_.hearing;
   const Place listener = listener_.place();
   std::array<double, 3> away = Minus(positions_[newest_], listener.position_m);
   Heard heard;
   if (delayed()) {
-    const double frames_a_metre = settings_.sample_rate_hz / hearing.sound_speed_m_per_s;
+    const double frames_per_metre = settings_.sample_rate_hz / hearing.sound_speed_m_per_s;
     const double most = kLongestPropagationS * settings_.sample_rate_hz;
-    // Each round brings it nearer by the ratio of the object's speed to that of sound.
+    // Each round reduces the error by the ratio of the object's speed to the speed of sound.
     constexpr int kRounds = 5;
     for (int round = 0; round < kRounds; ++round) {
       const double blocks = delay_frames / static_cast<double>(settings_.block_frame_count);
       away = Minus(PositionBefore(blocks), listener.position_m);
-      delay_frames = std::clamp(Length(away) * frames_a_metre, DelayLine::kLeastDelay, most);
+      delay_frames = std::clamp(Length(away) * frames_per_metre, DelayLine::kLeastDelay, most);
     }
     heard.delay_frames = delay_frames;
   }
@@ -104,7 +104,7 @@ void Voice::NoteHeard() noexcept {
                  std::abs(next.delay_frames - heard_[3].delay_frames) > most_change;
   if (!jump_waits_) {
     heard_ = {heard_[1], heard_[2], heard_[3], next};
-  } else if (fade_ < 1) {  // the jump waits where it is
+  } else if (fade_ < 1) {  // the new jump waits until the present cross-fade has ended
     heard_ = {heard_[1], heard_[2], heard_[3], heard_[3]};
   } else {
     heard_before_.fill(heard_[2]);
@@ -135,7 +135,8 @@ float Voice::Sample(double delay_frames, size_t n) const noexcept {
   return line_ ? line_->Read(delay_frames + static_cast<double>(input_.size() - n)) : input_[n];
 }
 
-/// The delay is a cubic between the ends of the block, with the slopes of its neighbours there.
+/// Between the ends of the block the delay is a cubic, whose slopes there follow from the
+/// neighbouring blocks (Catmull and Rom).
 void Voice::RenderFrom(const Hearings& heard, float fade, float fade_step,
                        std::span<float> frames) noexcept {
   const size_t channels = settings_.channel_count;

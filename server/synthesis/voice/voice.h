@@ -14,7 +14,7 @@
 
 namespace carillon {
 
-/// What of its place is heard of an object.
+/// Which spatial effects apply to an object.
 struct HearingSettings {
   bool distance_gain = false;
   bool propagation_delay = false;
@@ -25,21 +25,23 @@ struct HearingSettings {
   bool any() const { return distance_gain || propagation_delay || panning; }
 };
 
-/// Propagation takes no longer.
+/// Longest propagation delay; the sound of objects farther away arrives after this time.
 inline constexpr double kLongestPropagationS = 0.6;
 
-/// Takes the sound of one object to the ears of a listener:
+/// Renders the sound of one object as a listener hears it:
 ///
 ///   gain   reference / max(r, reference)
 ///   delay  d = r/c, with r = |x(t - d) - l(t)|: from where the object was when it sounded
 ///   left, right   sqrt(2) cos(pi (1 + s)/4), sqrt(2) sin(pi (1 + s)/4), s = right . (x - l)/r
 ///
-/// each at the ends of the blocks, the delay between them a cubic without a kink, so that a moving
-/// object changes its pitch as it should and does not click; a block behind. A jump is a fade of 10
-/// ms from one place to the other. Delays are kLeastDelay samples of a DelayLine or more, so that
-/// what is nearer than 0.1 m (at 48 kHz) counts as there.
+/// These are evaluated at the ends of blocks. Between them, gains are interpolated linearly and the
+/// delay by a cubic with continuous slope, so that a moving object has the right Doppler shift and
+/// does not click. The voice is one block late. A jump is a cross-fade of 10 ms. The delay is at
+/// least DelayLine::kLeastDelay samples, so objects nearer than 0.1 m (at 48 kHz) sound as from 0.1
+/// m.
 ///
-/// Made anywhere; then used by one thread at a time, which neither allocates nor locks.
+/// Any thread may make a voice; then one thread at a time uses it, which neither allocates nor
+/// locks.
 class Voice {
  public:
   struct Settings {
@@ -51,37 +53,39 @@ class Voice {
 
   Voice(const Settings& settings, const Place& object, const Place& listener);
 
-  /// In this block, before Render.
+  /// Start motions at sample `offset` of this block; they are called before Render.
   void Move(const Motion& motion, size_t offset) noexcept { object_.Move(motion, offset); }
   void MoveListener(const Motion& motion, size_t offset) noexcept {
     listener_.Move(motion, offset);
   }
 
-  /// What the object sounds in this block: zeros to be added to.
+  /// The object's sound in this block: zeros, to which banks add themselves.
   std::span<float> input() noexcept {
     fed_ = true;
     return input_;
   }
 
-  /// Adds the block to `frames`, interleaved, and ends it.
+  /// Adds the block to `frames`, interleaved, and begins the next block.
   void Render(std::span<float> frames) noexcept;
 
-  /// Nothing is heard of it and nothing moves: no Render is needed until it moves or sounds.
+  /// Whether the voice is silent and nothing moves, so that Render need not be called until the
+  /// object moves or sounds.
   bool asleep() const noexcept { return asleep_; }
-  void Awake() noexcept { asleep_ = false; }
+  void Wake() noexcept { asleep_ = false; }
 
-  /// The mixer's: which section renders it, set when its first bank comes, and how many banks
-  /// Render knows.
+  /// State of the mixer: the section that renders the voice, set with its first bank, and the
+  /// number of its banks on the mixer.
   std::optional<uint32_t> section;
   uint32_t bank_count = 0;
 
  private:
-  /// How it is heard at one time.
+  /// Delay and gains at one time.
   struct Heard {
     double delay_frames = 0;
     std::array<float, 2> gains{};
   };
-  /// At the ends of four blocks; the sound is between the second and the third.
+  /// Values at the ends of four consecutive blocks; the rendered block lies between the second and
+  /// the third.
   using Hearings = std::array<Heard, 4>;
 
   std::array<double, 3> PositionBefore(double blocks) const noexcept;
@@ -90,7 +94,7 @@ class Voice {
   void RenderFrom(const Hearings& heard, float fade, float fade_step,
                   std::span<float> frames) noexcept;
   float Sample(double delay_frames, size_t n) const noexcept;
-  /// Nothing of what it was fed is still on its way.
+  /// Whether all of the object's sound has arrived.
   bool silent() const noexcept {
     return quiet_frame_count_ > (line_ ? line_->length() : size_t{0});
   }
@@ -98,7 +102,7 @@ class Voice {
 
   Settings settings_;
   Glide object_, listener_;
-  std::vector<std::array<double, 3>> positions_;  // at the ends of the last blocks, a ring
+  std::vector<std::array<double, 3>> positions_;  // at the ends of the last blocks, a ring buffer
   size_t newest_ = 0;
   std::vector<float> input_;
   std::optional<DelayLine> line_;

@@ -146,12 +146,12 @@ bool MakeThisThreadRealtime() {
 
 struct Result {
   std::vector<double> block_s, cpu_s;
-  uint64_t late_block_count = 0;  // not there when the next should have begun
-  uint64_t missed_count = 0;      // nor behind the blocks that the daemon renders ahead
+  uint64_t late_block_count = 0;  // finished after the next block was due
+  uint64_t missed_count = 0;      // finished later than the daemon's look-ahead allows
   bool realtime = false;
 };
 
-/// A device that takes a block of 128 frames each 2.67 ms.
+/// Renders blocks for a simulated device that takes 128 frames every 2.67 ms.
 Result RenderInTime(Mixer& mixer, const Clock& clock, double seconds) {
   Result result;
   result.realtime = MakeThisThreadRealtime();
@@ -175,8 +175,8 @@ Result RenderInTime(Mixer& mixer, const Clock& clock, double seconds) {
   return result;
 }
 
-/// What merging changes: one body struck at a twentieth of `rate`, all merged, against all exact;
-/// energy of the difference over that of the sound.
+/// The error of merging: one body gets a twentieth of `rate` impulses a second, once all merged and
+/// once all exact. Returns the energy of the difference over the energy of the exact sound.
 double MergedErrorDb(const Bodies& bodies, double rate) {
   OscillatorBank exact(bodies.modes[0], bodies.shapes[0], {});
   OscillatorBank merged(bodies.modes[0], bodies.shapes[0], {});

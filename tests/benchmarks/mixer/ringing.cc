@@ -20,8 +20,8 @@ constexpr uint32_t kModesABank = 800;
 constexpr size_t kBlock = 128;
 constexpr double kBlockS = kBlock / kTestSampleRateHz;
 
-/// Banks whose modes never fall asleep: all are rendered in every block, as others' synthesisers
-/// do.
+/// A mixer with banks whose modes are never put to sleep, so that all are rendered in every block,
+/// as other synthesizers do.
 class Stage {
  public:
   explicit Stage(size_t mode_count) : mixer_({.most_banks = mode_count / kModesABank}) {
@@ -72,14 +72,13 @@ void Report(const char* name, const Stage& stage, const std::vector<double>& blo
   std::fflush(stdout);
 }
 
-/// Small scenes are rendered longer, so that each takes about as much CPU time as other programs
-/// are given.
+/// Small scenes are rendered longer, so that every measurement takes about the same CPU time.
 double LengthS(size_t mode_count, double seconds) {
   constexpr double kLargeScene = 80'000;
   return seconds * std::max(kLargeScene / static_cast<double>(mode_count), 1.0);
 }
 
-/// Every bank is struck once a second, in turn, and rings on by spectrum.
+/// Strikes every bank once a second, one after the other, so that the banks ring by spectrum.
 void MeasureRinging(size_t mode_count, double seconds) {
   Stage stage(mode_count);
   seconds = LengthS(mode_count, seconds);
@@ -100,7 +99,7 @@ void MeasureRinging(size_t mode_count, double seconds) {
   Report("ringing", stage, block_s);
 }
 
-/// Every bank is struck in every block, between two samples.
+/// Strikes every bank in every block, between two samples.
 void MeasureStruck(size_t mode_count, double seconds) {
   Stage stage(mode_count);
   seconds = LengthS(mode_count, seconds);

@@ -41,7 +41,7 @@ class MixerTest : public testing::Test {
     return frames;
   }
 
-  /// What one strike of the bank sounds like.
+  /// The sound of one impulse on the bank.
   static double Right(size_t n, double strike_frame, double coupling = 20) {
     return ClosedForm(MakeMode(0, 440, kSigma, coupling), 1,
                       (static_cast<double>(n) - strike_frame) * kDt);
@@ -129,7 +129,7 @@ TEST_F(MixerTest, OneCallOverManyBlocksGivesTheBitsOfManyCalls) {
   EXPECT_EQ(whole, parts);
 }
 
-/// Sixty objects struck all over, rendered by so many threads.
+/// Sixty objects with impulses, rendered by `thread_count` threads.
 std::vector<float> RenderBy(size_t thread_count) {
   RenderThreads threads(thread_count);
   Mixer mixer({.most_banks = 60, .threads = &threads});

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What becomes of strikes and banks that are too many for a block.
+// Impulses and banks that are too many for a block.
 #include <gtest/gtest.h>
 
 #include <cmath>

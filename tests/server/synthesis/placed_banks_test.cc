@@ -26,7 +26,7 @@ std::unique_ptr<OscillatorBank> MakeBank() {
       OscillatorBankSettings{});
 }
 
-/// What one strike of the bank sounds like, so many frames after it.
+/// The sound of one impulse on the bank, `frames` frames after it.
 double Right(double frames) {
   return ClosedForm(MakeMode(0, kFrequencyHz, kSigma, kCoupling), 1, frames * kDt);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What happens to a bank within a block.
+// Impulses and knots of a bank within a block.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -191,9 +191,9 @@ TEST(OscillatorBankStrikes, AForceThatIsNotFiniteLeavesASilentBankAsItWas) {
   TestMix test;
   std::vector<float> block(128);
   BlockMix& mix = test.Begin();
-  EXPECT_TRUE(bank.Gather({.at = MakeUnitImpulse().at,
-                           .force_newtons = {std::numeric_limits<float>::infinity(), 0, 0}}));
-  EXPECT_FALSE(bank.Tie({.step_s = 0.01F}, 50, mix));
+  EXPECT_TRUE(bank.AddForce({.at = MakeUnitImpulse().at,
+                             .force_newtons = {std::numeric_limits<float>::infinity(), 0, 0}}));
+  EXPECT_FALSE(bank.ApplyKnot({.step_s = 0.01F}, 50, mix));
   EXPECT_TRUE(bank.silent());
   test.Finish(block);
   EXPECT_EQ(Ring(bank, MakeUnitImpulse(), 1024, 5), Ring(fresh, MakeUnitImpulse(), 1024, 5));

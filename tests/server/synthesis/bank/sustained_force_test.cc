@@ -25,10 +25,10 @@ class Held {
   explicit Held(const SoundingModes& modes)
       : bank_(modes, MakeUniformShapes(modes.modes.size()), {.noise_seed = 7}) {}
 
-  void Tie(double force_newtons, const ForceKnot& knot, size_t offset) {
-    EXPECT_TRUE(bank_.Gather(
+  void ApplyKnot(double force_newtons, const ForceKnot& knot, size_t offset) {
+    EXPECT_TRUE(bank_.AddForce(
         {.at = MakeUnitImpulse().at, .force_newtons = {static_cast<float>(force_newtons), 0, 0}}));
-    EXPECT_TRUE(bank_.Tie(knot, offset, *mix_));
+    EXPECT_TRUE(bank_.ApplyKnot(knot, offset, *mix_));
   }
 
   template <typename Force>
@@ -40,8 +40,8 @@ class Held {
     for (size_t start = 0; start < sound.size(); start += kBlock) {
       mix_ = &test_.Begin();
       for (; next_knot < start + kBlock; next_knot += step_frames) {
-        Tie(force_newtons(static_cast<double>(next_knot) / kTestSampleRateHz), knot,
-            next_knot - start);
+        ApplyKnot(force_newtons(static_cast<double>(next_knot) / kTestSampleRateHz), knot,
+                  next_knot - start);
       }
       test_.Render(bank_, std::span(sound).subspan(start, kBlock));
     }
@@ -165,9 +165,9 @@ TEST(SustainedForce, AForceThatIsNoNumberIsRefusedAndLeavesTheBankSound) {
   OscillatorBank bank(ThreeModes(), MakeUniformShapes(3), {});
   TestMix test;
   BlockMix& mix = test.Begin();
-  bank.Gather({.at = MakeUnitImpulse().at,
-               .force_newtons = {std::numeric_limits<float>::infinity(), 0, 0}});
-  EXPECT_FALSE(bank.Tie({.step_s = 0.01F, .roughness = 1, .bandwidth_hz = 500}, 3, mix));
+  bank.AddForce({.at = MakeUnitImpulse().at,
+                 .force_newtons = {std::numeric_limits<float>::infinity(), 0, 0}});
+  EXPECT_FALSE(bank.ApplyKnot({.step_s = 0.01F, .roughness = 1, .bandwidth_hz = 500}, 3, mix));
   EXPECT_TRUE(bank.RenderAdd(mix));
   std::vector<float> sound(kBlock);
   test.Finish(sound);

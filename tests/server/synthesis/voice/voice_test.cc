@@ -227,7 +227,7 @@ TEST(Voice, AJumpIsAFade) {
 
 TEST(Voice, FallsAsleepWhenAllHasArrivedAndNothingMoves) {
   Heard heard({.propagation_delay = true}, {.position_m = {100, 0, 0}}, 1);
-  heard.voice().Awake();
+  heard.voice().Wake();
   const Stereo sound = heard.Play(Click(0, 48000));
   EXPECT_NEAR(Peak(sound.left), 1, 0.3);
   std::vector<float> frames(kBlock);
@@ -236,7 +236,7 @@ TEST(Voice, FallsAsleepWhenAllHasArrivedAndNothingMoves) {
   }
   EXPECT_TRUE(heard.voice().asleep());
   heard.voice().Move(MotionTo(1, 2, 3, 4800), 0);
-  heard.voice().Awake();
+  heard.voice().Wake();
   heard.voice().Render(frames);
   EXPECT_FALSE(heard.voice().asleep());
 }
