@@ -20,8 +20,7 @@ struct BankSlot {
   bool rendered = false;       ///< already in this block
   bool leaving = false;        ///< retired once it is silent
   bool fading = false;
-  bool awakening =
-      false;  ///< its work of waking up is counted already in the block being chosen for
+  bool awakening = false;  ///< its awakening_work is counted already in the present block
   float fade_gain = 1;
 };
 

@@ -78,8 +78,9 @@ void Mixer::Execute(const Command& command) noexcept {
     Count(statistics_.bank_count);
     if (command.voice == nullptr) return;
     ++command.voice->bank_count;
-    command.bank->LeaveSpectrum();                     // a voice is fed in the time domain
-  } else if (BankSlot* slot = FindSlot(command.id)) {  // it may have rung out before it was to fade
+    // A voice is fed in the time domain.
+    command.bank->LeaveSpectrum();
+  } else if (BankSlot* slot = FindSlot(command.id)) {  // null: it rang out before it was to fade
     if (!slot->leaving) leaving_.push_back(command.id.slot);
     slot->leaving = true;
     if (command.kind != Command::Kind::kFadeOut) return;

@@ -25,7 +25,10 @@ bool OscillatorBank::out_of_spectrum() const noexcept {
 bool OscillatorBank::RenderAdd(BlockMix& mix) noexcept {
   if (silent()) return true;
   if (!struck() && !force_.driving()) {
-    if (ringing_ != Ringing::kInTime && !mix.any_begins()) return true;
+    if (ringing_ != Ringing::kInTime && !mix.any_begins()) {
+      block_.phase = Phase::kWaiting;  // a refused onset may have begun the block
+      return true;
+    }
     BeginBlock(mix);
     return RenderAddInTime(mix.lanes());
   }

@@ -229,8 +229,8 @@ class OscillatorBank {
   std::array<RingingSegment, kMostSegments> segments_;  // the first for the time domain only
   Counts counted_{};                        // awake lanes of each segment at the last CountAwake
   std::vector<LongSegment> long_segments_;  // kLongBlockKinds of them
-  std::vector<uint8_t>
-      group_mode_counts_;  // modes, not companions, of kMostLanes lanes, by segment
+  // Modes, without companions, in each group of kMostLanes lanes, by segment.
+  std::vector<uint8_t> group_mode_counts_;
   Block block_;
   Ringing ringing_ = Ringing::kNowhere;
   bool awake_changed_ = false;  // the awake lanes are to be counted again

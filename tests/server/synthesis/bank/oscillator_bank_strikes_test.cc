@@ -184,6 +184,29 @@ TEST(OscillatorBankStrikes, MergedStrikesThatAreNotFiniteLeaveItAsItWas) {
   EXPECT_EQ(block, right);
 }
 
+TEST(OscillatorBankStrikes, ARefusedImpulseLeavesABankThatRingsBySpectrumAsItWas) {
+  const SoundingModes sounding{.modes = {MakeMode(0, 440, -1)}};
+  OscillatorBank bank(sounding, MakeUniformShapes(1), {}),
+      undisturbed(sounding, MakeUniformShapes(1), {});
+  SurfaceImpulse refused = MakeUnitImpulse();
+  refused.impulse_newton_seconds[0] = std::numeric_limits<float>::infinity();
+  TestMix test, undisturbed_test;
+  std::vector<float> block(128), right(128);
+  for (size_t number = 0; number < 64; ++number) {
+    BlockMix &mix = test.Begin(), &undisturbed_mix = undisturbed_test.Begin();
+    if (number == 0) bank.Strike(MakeUnitImpulse(), 0, 0, mix);
+    if (number == 0) undisturbed.Strike(MakeUnitImpulse(), 0, 0, undisturbed_mix);
+    // Right before the mode's second long block.
+    if (number == 31) {
+      EXPECT_FALSE(bank.Strike(refused, 5, 0, mix));
+    }
+    test.Render(bank, block);
+    undisturbed_test.Render(undisturbed, right);
+    EXPECT_EQ(block, right) << number;
+  }
+  EXPECT_GT(Rms(right), 0);
+}
+
 TEST(OscillatorBankStrikes, AForceThatIsNotFiniteLeavesASilentBankAsItWas) {
   const SoundingModes sounding = MakeWideModes();
   OscillatorBank bank(sounding, MakeUniformShapes(37), {}),
