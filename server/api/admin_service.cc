@@ -2,21 +2,22 @@
 #include "server/api/admin_service.h"
 
 #include <filesystem>
-#include <fstream>
 #include <system_error>
 #include <utility>
 
+#include "absl/cleanup/cleanup.h"
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 #include "server/api/bearer_token.h"
+#include "server/api/file_pieces.h"
+#include "server/api/stream_call.h"
 #include "server/api/unary_call.h"
 #include "server/mode_database/database_admin.h"
 
 namespace carillon {
 namespace {
-
-constexpr size_t kPieceBytes = 1 << 20;
 
 v1::GetDatabaseStatsResponse ToProto(const DatabaseStats& stats) {
   v1::GetDatabaseStatsResponse proto;
@@ -42,55 +43,38 @@ bool SameSecret(absl::string_view a, absl::string_view b) {
   return difference == 0;
 }
 
-/// Makes a copy beside the database, sends it piece by piece, and removes it.
-class BackupReactor final : public grpc::ServerWriteReactor<v1::BackUpDatabaseResponse> {
+/// Copies the database to a file beside it, and sends that piece by piece.
+class BackupCall final : public ServerStream<v1::BackUpDatabaseResponse> {
  public:
-  BackupReactor(ModeDatabase& database, absl::Status allowed, WorkPool& pool)
-      : database_(database),
-        pool_(pool),
-        copy_(database.folder() / absl::StrCat("backup-", reinterpret_cast<uintptr_t>(this))) {
-    pool_.Run([this, allowed = std::move(allowed)] { Begin(allowed); });
+  BackupCall(ModeDatabase& database, absl::Status allowed, ThreadPool& pool)
+      : StreamWriter(&pool), database_(database), allowed_(std::move(allowed)) {
+    StartWriting();
   }
-
-  void OnWriteDone(bool ok) override {
-    if (!ok) return Finish(grpc::Status::CANCELLED);
-    pool_.Run([this] { SendNext(); });
-  }
-
-  void OnDone() override { delete this; }
 
  private:
-  void Begin(absl::Status status) {
-    if (status.ok()) status = BackUp(database_.database(), copy_);
-    if (!status.ok()) {
-      Remove();
-      return Finish(ToGrpcStatus(status));
-    }
-    response_.set_byte_count(std::filesystem::file_size(copy_));
-    file_.open(copy_, std::ios::binary);
-    Remove();  // open, it stays readable
-    SendNext();
+  absl::StatusOr<Supply> Fill(v1::BackUpDatabaseResponse& response) override {
+    RETURN_IF_ERROR(allowed_);
+    if (!std::exchange(begun_, true)) RETURN_IF_ERROR(Begin(response));
+    return pieces_.Next(*response.mutable_data());
   }
 
-  void SendNext() {
-    std::string& data = *response_.mutable_data();
-    data.resize(kPieceBytes);
-    file_.read(data.data(), static_cast<std::streamsize>(data.size()));
-    data.resize(static_cast<size_t>(file_.gcount()));
-    if (data.empty()) return Finish(grpc::Status::OK);
-    StartWrite(&response_);
-  }
-
-  void Remove() {
-    std::error_code ignored;
-    std::filesystem::remove(copy_, ignored);
+  absl::Status Begin(v1::BackUpDatabaseResponse& response) {
+    const std::filesystem::path copy =
+        database_.folder() / absl::StrCat("backup-", reinterpret_cast<uintptr_t>(this));
+    const absl::Cleanup remove = [&copy] {
+      std::error_code ignored;
+      std::filesystem::remove(copy, ignored);  // an open file stays readable
+    };
+    RETURN_IF_ERROR(BackUp(database_.database(), copy));
+    response.set_byte_count(std::filesystem::file_size(copy));
+    pieces_.Open(copy);
+    return absl::OkStatus();
   }
 
   ModeDatabase& database_;
-  WorkPool& pool_;
-  const std::filesystem::path copy_;
-  std::ifstream file_;
-  v1::BackUpDatabaseResponse response_;
+  const absl::Status allowed_;
+  bool begun_ = false;
+  FilePieces pieces_;
 };
 
 }  // namespace
@@ -107,31 +91,29 @@ grpc::ServerUnaryReactor* AdminService::GetDatabaseStats(grpc::CallbackServerCon
                                                          const v1::GetDatabaseStatsRequest*,
                                                          v1::GetDatabaseStatsResponse* response) {
   return Answer(context, pool_, [this, context, response] {
-    if (absl::Status status = Authorize(*context); !status.ok()) return status;
-    const absl::StatusOr<DatabaseStats> stats = ReadStats(database_.database());
-    if (stats.ok()) *response = ToProto(*stats);
-    return stats.status();
+    RETURN_IF_ERROR(Authorize(*context));
+    ASSIGN_OR_RETURN(const DatabaseStats stats, ReadStats(database_.database()));
+    *response = ToProto(stats);
+    return absl::OkStatus();
   });
 }
 
 grpc::ServerWriteReactor<v1::BackUpDatabaseResponse>* AdminService::BackUpDatabase(
     grpc::CallbackServerContext* context, const v1::BackUpDatabaseRequest*) {
-  return new BackupReactor(database_, Authorize(*context), pool_);
+  return new BackupCall(database_, Authorize(*context), pool_);
 }
 
 grpc::ServerUnaryReactor* AdminService::CollectGarbage(grpc::CallbackServerContext* context,
                                                        const v1::CollectGarbageRequest* request,
                                                        v1::CollectGarbageResponse* response) {
   return Answer(context, pool_, [this, context, request, response] {
-    if (absl::Status status = Authorize(*context); !status.ok()) return status;
-    const absl::StatusOr<Collected> collected = database_.models().Collect(request->budget_bytes());
-    if (!collected.ok()) return collected.status();
-    response->set_deleted_count(collected->model_count);
-    response->set_deleted_bytes(collected->bytes);
-    const absl::StatusOr<CollectedMeshes> meshes = database_.meshes().Collect();
-    if (!meshes.ok()) return meshes.status();
-    response->set_deleted_mesh_count(meshes->mesh_count);
-    response->set_deleted_mesh_bytes(meshes->bytes);
+    RETURN_IF_ERROR(Authorize(*context));
+    ASSIGN_OR_RETURN(const Collected models, database_.models().Collect(request->budget_bytes()));
+    response->set_deleted_count(models.model_count);
+    response->set_deleted_bytes(models.bytes);
+    ASSIGN_OR_RETURN(const CollectedMeshes meshes, database_.meshes().Collect());
+    response->set_deleted_mesh_count(meshes.mesh_count);
+    response->set_deleted_mesh_bytes(meshes.bytes);
     return absl::OkStatus();
   });
 }

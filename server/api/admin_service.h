@@ -4,7 +4,7 @@
 #include <string>
 
 #include "carillon/v1/admin_service.grpc.pb.h"
-#include "server/api/work_pool.h"
+#include "server/api/thread_pool.h"
 #include "server/mode_database/mode_database.h"
 
 namespace carillon {
@@ -13,7 +13,7 @@ namespace carillon {
 class AdminService final : public v1::AdminService::CallbackService {
  public:
   /// `token`: what callers from the network show; empty: they are refused.
-  AdminService(ModeDatabase& database, std::string token, WorkPool& pool)
+  AdminService(ModeDatabase& database, std::string token, ThreadPool& pool)
       : database_(database), token_(std::move(token)), pool_(pool) {}
 
   grpc::ServerUnaryReactor* GetDatabaseStats(grpc::CallbackServerContext* context,
@@ -30,7 +30,7 @@ class AdminService final : public v1::AdminService::CallbackService {
 
   ModeDatabase& database_;
   const std::string token_;
-  WorkPool& pool_;
+  ThreadPool& pool_;
 };
 
 }  // namespace carillon

@@ -21,7 +21,7 @@
 #include "server/api/listen_address.h"
 #include "server/api/modal_model_service.h"
 #include "server/api/scene_service.h"
-#include "server/api/work_pool.h"
+#include "server/api/thread_pool.h"
 
 namespace carillon {
 namespace {
@@ -105,8 +105,8 @@ struct ApiServer::State {
 
   absl::Status Listen(const ApiSettings& settings);
 
-  WorkPool call_pool{kCallThreadCount};
-  WorkPool render_pool{kRenderThreadCount, kRenderNiceness};
+  ThreadPool call_pool{kCallThreadCount};
+  ThreadPool render_pool{kRenderThreadCount, kRenderNiceness};
   AdminService admin;
   ModalModelService models;
   DecompositionService decompositions;

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "carillon/v1/audio_service.grpc.pb.h"
-#include "server/api/work_pool.h"
+#include "server/api/thread_pool.h"
 #include "server/live_output/live_output.h"
 #include "server/mode_database/mode_database.h"
 #include "server/scene/scene_registry.h"
@@ -18,7 +18,7 @@ class AudioService final : public v1::AudioService::CallbackService {
  public:
   /// `render_pool`: for rendering offline.
   AudioService(std::string version, LiveOutput& output, const SceneRegistry& scenes,
-               ModeDatabase& database, WorkPool& render_pool)
+               ModeDatabase& database, ThreadPool& render_pool)
       : version_(std::move(version)),
         output_(output),
         scenes_(scenes),
@@ -38,7 +38,7 @@ class AudioService final : public v1::AudioService::CallbackService {
   LiveOutput& output_;
   const SceneRegistry& scenes_;
   ModeDatabase& database_;
-  WorkPool& render_pool_;
+  ThreadPool& render_pool_;
   BodyCache render_bodies_;
   std::atomic<int> rendering_count_{0};
 };

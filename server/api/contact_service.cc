@@ -8,9 +8,10 @@
 
 #include "absl/base/thread_annotations.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 #include "server/api/contact_conversion.h"
 #include "server/api/resource_name.h"
-#include "server/api/status_conversion.h"
+#include "server/api/stream_call.h"
 #include "server/base/mutex.h"
 
 namespace carillon {
@@ -22,62 +23,47 @@ constexpr std::chrono::milliseconds kAnswerPeriod(500);
 constexpr std::chrono::milliseconds kSettlePeriod(2);
 constexpr int kMostSettlePeriods = 250;
 
-/// One contact stream. Reads one request at a time, so only one thread at a time touches `stream_`;
-/// answers are snapshots that wait until the last has gone.
-class ContactReactor final
-    : public grpc::ServerBidiReactor<v1::StreamContactsRequest, v1::StreamContactsResponse> {
+/// One contact stream. Requests are read one at a time, so only one thread at a time uses
+/// `stream_`. An answer is a snapshot; a newer one replaces the one that waits to be sent.
+class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::StreamContactsResponse> {
  public:
-  explicit ContactReactor(const ContactContext& daemon) : daemon_(daemon) { StartRead(&request_); }
-
-  void OnReadDone(bool ok) override {
-    if (!ok) {
-      daemon_.pool.Run([this] { Settle(); });
-      return;
-    }
-    if (absl::Status status = Take(); !status.ok()) return End(ToGrpcStatus(status));
-    StartRead(&request_);
+  explicit ContactCall(const ContactContext& daemon) : StreamWriter(nullptr), daemon_(daemon) {
+    StartWriting();
+    StartReading();
   }
-
-  void OnWriteDone(bool ok) override {
-    std::optional<grpc::Status> end;
-    {
-      const MutexLock lock(&mutex_);
-      writing_ = false;
-      if (!ok) waiting_.reset();
-      end = Advance();
-    }
-    if (end) Finish(*end);
-  }
-
-  void OnDone() override { delete this; }
 
  private:
-  absl::Status Take() {
-    switch (request_.request_case()) {
+  absl::Status Take(const v1::StreamContactsRequest& request) override {
+    switch (request.request_case()) {
       case v1::StreamContactsRequest::kStart:
-        return Open(request_.start());
+        return Open(request.start());
       case v1::StreamContactsRequest::kStep:
-        return Step(request_.step());
+        return Step(request.step());
       default:
         return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_STREAM",
                        "a request is neither start nor step");
     }
   }
 
+  void AllRead() override {
+    daemon_.pool.Run([this] { Settle(); });
+  }
+
+  void Refuse(const absl::Status& status) override { CloseWith(status); }
+
+  /// The reading half ends the call: reading fails when the client has gone.
+  bool ends_by_cancellation() const override { return false; }
+
   absl::Status Open(const v1::ContactStreamStart& start) {
     if (stream_) {
       return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_STREAM",
                      "the stream was started twice; open another call for another scene");
     }
-    const absl::StatusOr<uint64_t> scene = ParseSceneName(start.scene());
-    if (!scene.ok()) return scene.status();
+    ASSIGN_OR_RETURN(const uint64_t scene, ParseSceneName(start.scene()));
     ContactStreamSettings settings;
     settings.step_s = start.step_s();
     if (start.has_scheduling_delay_s()) settings.scheduling_delay_s = start.scheduling_delay_s();
-    absl::StatusOr<std::unique_ptr<ContactStream>> stream =
-        daemon_.scenes.OpenContactStream(*scene, settings);
-    if (!stream.ok()) return stream.status();
-    stream_ = *std::move(stream);
+    ASSIGN_OR_RETURN(stream_, daemon_.scenes.OpenContactStream(scene, settings));
     Answer();
     return absl::OkStatus();
   }
@@ -87,7 +73,7 @@ class ContactReactor final
       return Refusal(absl::StatusCode::kInvalidArgument, "STREAM_NOT_STARTED",
                      "the first request of a contact stream must be start");
     }
-    if (absl::Status status = stream_->BeginStep(step.time_s()); !status.ok()) return status;
+    RETURN_IF_ERROR(stream_->BeginStep(step.time_s()));
     ReadStep(
         step,
         {.move = [this](uint32_t handle, const Pose& pose) { stream_->Move(handle, pose); },
@@ -103,21 +89,43 @@ class ContactReactor final
     return absl::OkStatus();
   }
 
-  /// The client has said all: wait until the mixer has taken it, so that the last counts are whole.
+  /// Waits until the mixer has taken all impulses, so that the last counts are final.
   void Settle() {
     for (int i = 0; stream_ && !stream_->settled() && i < kMostSettlePeriods; ++i) {
       daemon_.clock.SleepUntil(daemon_.clock.Monotonic() + kSettlePeriod);
     }
     if (stream_) Answer();
-    End(grpc::Status::OK);
+    CloseWith(absl::OkStatus());
   }
 
   void Answer() {
     answer_due_ = daemon_.clock.Monotonic() + kAnswerPeriod;
     v1::StreamContactsResponse answer = Snapshot();
+    {
+      const MutexLock lock(&mutex_);
+      waiting_ = std::move(answer);
+    }
+    Wake();
+  }
+
+  /// Ends the call when the answer that waits has been sent.
+  void CloseWith(const absl::Status& status) {
+    {
+      const MutexLock lock(&mutex_);
+      end_ = status;
+    }
+    Wake();
+  }
+
+  absl::StatusOr<Supply> Fill(v1::StreamContactsResponse& response) override {
     const MutexLock lock(&mutex_);
-    waiting_ = std::move(answer);
-    Advance();  // never the end: that comes after the last answer
+    if (waiting_) {
+      response = *std::exchange(waiting_, std::nullopt);
+      return Supply::kMessage;
+    }
+    if (!end_) return Supply::kLater;
+    RETURN_IF_ERROR(*end_);
+    return Supply::kEnd;
   }
 
   v1::StreamContactsResponse Snapshot() const {
@@ -137,43 +145,19 @@ class ContactReactor final
     return answer;
   }
 
-  void End(const grpc::Status& status) {
-    std::optional<grpc::Status> end;
-    {
-      const MutexLock lock(&mutex_);
-      end_ = status;
-      end = Advance();
-    }
-    if (end) Finish(*end);
-  }
-
-  /// Sends what waits. Returns the status with which to finish where nothing is left to send: the
-  /// caller does that without the lock, as its last deed, since this may be deleted at once.
-  std::optional<grpc::Status> Advance() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
-    if (writing_) return std::nullopt;
-    if (!waiting_) return std::exchange(end_, std::nullopt);
-    answer_ = *std::exchange(waiting_, std::nullopt);
-    writing_ = true;
-    StartWrite(&answer_);
-    return std::nullopt;
-  }
-
   const ContactContext daemon_;
-  v1::StreamContactsRequest request_;
   std::unique_ptr<ContactStream> stream_;
   std::chrono::nanoseconds answer_due_{0};
   Mutex mutex_;
-  v1::StreamContactsResponse answer_;  // gRPC's while writing_
   std::optional<v1::StreamContactsResponse> waiting_ ABSL_GUARDED_BY(mutex_);
-  std::optional<grpc::Status> end_ ABSL_GUARDED_BY(mutex_);
-  bool writing_ ABSL_GUARDED_BY(mutex_) = false;
+  std::optional<absl::Status> end_ ABSL_GUARDED_BY(mutex_);
 };
 
 }  // namespace
 
 grpc::ServerBidiReactor<v1::StreamContactsRequest, v1::StreamContactsResponse>*
 ContactService::StreamContacts(grpc::CallbackServerContext*) {
-  return new ContactReactor(daemon_);
+  return new ContactCall(daemon_);
 }
 
 }  // namespace carillon

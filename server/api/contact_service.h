@@ -2,7 +2,7 @@
 #pragma once
 
 #include "carillon/v1/contact_service.grpc.pb.h"
-#include "server/api/work_pool.h"
+#include "server/api/thread_pool.h"
 #include "server/base/clock.h"
 #include "server/live_output/live_output.h"
 #include "server/scene/scene_registry.h"
@@ -14,7 +14,7 @@ struct ContactContext {
   SceneRegistry& scenes;
   LiveOutput& output;
   Clock& clock;
-  WorkPool& pool;
+  ThreadPool& pool;
 };
 
 /// carillon.v1.ContactService. What it is given must outlive it.

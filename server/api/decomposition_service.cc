@@ -7,7 +7,9 @@
 #include <utility>
 
 #include "absl/base/thread_annotations.h"
+#include "proto/cpp/status_macros.h"
 #include "server/api/resource_name.h"
+#include "server/api/stream_call.h"
 #include "server/api/unary_call.h"
 #include "server/base/mutex.h"
 
@@ -19,68 +21,45 @@ bool HasEnded(const v1::Job& job) {
          job.state() == v1::JOB_STATE_CANCELLED;
 }
 
-/// Sends a job as it changes, one message at a time. Where the client reads slowly, progress that
-/// is no longer news is left out.
-class JobWatchReactor final : public grpc::ServerWriteReactor<v1::WatchJobResponse> {
+/// Sends a job as it changes. If the client reads slowly, it gets the newest progress of each
+/// state, and of the states the newest kMostWaiting.
+class JobWatchCall final : public ServerStream<v1::WatchJobResponse> {
  public:
-  JobWatchReactor(DecompositionQueue& queue, const absl::StatusOr<std::string>& digest) {
-    absl::StatusOr<std::unique_ptr<JobWatch>> watch =
-        digest.ok() ? queue.Watch(*digest, [this](const v1::Job& job) { OnChange(job); })
-                    : digest.status();
-    const MutexLock lock(&mutex_);
-    if (watch.ok()) {
-      watch_ = *std::move(watch);
-    } else {
-      finished_ = true;
-      Finish(ToGrpcStatus(watch.status()));
+  JobWatchCall(DecompositionQueue& queue, const absl::StatusOr<std::string>& digest)
+      : StreamWriter(nullptr), watch_(digest.status()) {
+    if (digest.ok()) {
+      watch_ = queue.Watch(*digest, [this](const v1::Job& job) { OnChange(job); });
     }
+    StartWriting();
   }
-
-  void OnWriteDone(bool ok) override {
-    const MutexLock lock(&mutex_);
-    writing_ = false;
-    if (!ok || cancelled_) return End(grpc::Status::CANCELLED);
-    if (HasEnded(response_.job())) return End(grpc::Status::OK);
-    Next();
-  }
-
-  void OnCancel() override {
-    const MutexLock lock(&mutex_);
-    cancelled_ = true;
-    if (!writing_) End(grpc::Status::CANCELLED);
-  }
-
-  void OnDone() override { delete this; }
 
  private:
+  static constexpr size_t kMostWaiting = 16;
+
   void OnChange(const v1::Job& job) {
+    {
+      const MutexLock lock(&mutex_);
+      if (!waiting_.empty() && waiting_.back().state() == job.state()) waiting_.pop_back();
+      if (waiting_.size() == kMostWaiting) waiting_.pop_front();
+      waiting_.push_back(job);
+    }
+    Wake();
+  }
+
+  absl::StatusOr<Supply> Fill(v1::WatchJobResponse& response) override {
+    RETURN_IF_ERROR(watch_.status());
+    if (HasEnded(response.job())) return Supply::kEnd;
     const MutexLock lock(&mutex_);
-    if (!waiting_.empty() && waiting_.back().state() == job.state()) waiting_.pop_back();
-    waiting_.push_back(job);
-    Next();
-  }
-
-  void Next() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
-    if (writing_ || finished_ || waiting_.empty()) return;
-    *response_.mutable_job() = std::move(waiting_.front());
+    if (waiting_.empty()) return Supply::kLater;
+    *response.mutable_job() = std::move(waiting_.front());
     waiting_.pop_front();
-    writing_ = true;
-    StartWrite(&response_);
-  }
-
-  void End(const grpc::Status& status) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
-    if (std::exchange(finished_, true)) return;
-    Finish(status);
+    return Supply::kMessage;
   }
 
   Mutex mutex_;
-  v1::WatchJobResponse response_;  // gRPC's while writing_
   std::deque<v1::Job> waiting_ ABSL_GUARDED_BY(mutex_);
-  bool writing_ ABSL_GUARDED_BY(mutex_) = false;
-  bool cancelled_ ABSL_GUARDED_BY(mutex_) = false;
-  bool finished_ ABSL_GUARDED_BY(mutex_) = false;
-  /// Last, so that it ends before what OnChange touches.
-  std::unique_ptr<JobWatch> watch_;
+  /// Last, so that it is destroyed, and calls OnChange no more, before the rest.
+  absl::StatusOr<std::unique_ptr<JobWatch>> watch_;
 };
 
 }  // namespace
@@ -89,11 +68,8 @@ grpc::ServerUnaryReactor* DecompositionService::GetJob(grpc::CallbackServerConte
                                                        const v1::GetJobRequest* request,
                                                        v1::GetJobResponse* response) {
   return Answer(context, pool_, [this, request, response] {
-    const absl::StatusOr<std::string> digest = ParseJobName(request->name());
-    if (!digest.ok()) return digest.status();
-    absl::StatusOr<v1::Job> job = queue_.Get(*digest);
-    if (!job.ok()) return job.status();
-    *response->mutable_job() = *std::move(job);
+    ASSIGN_OR_RETURN(const std::string digest, ParseJobName(request->name()));
+    ASSIGN_OR_RETURN(*response->mutable_job(), queue_.Get(digest));
     return absl::OkStatus();
   });
 }
@@ -102,11 +78,10 @@ grpc::ServerUnaryReactor* DecompositionService::ListJobs(grpc::CallbackServerCon
                                                          const v1::ListJobsRequest* request,
                                                          v1::ListJobsResponse* response) {
   return Answer(context, pool_, [this, request, response] {
-    absl::StatusOr<DecompositionJobPage> page =
-        queue_.List(request->page_size(), request->page_token());
-    if (!page.ok()) return page.status();
-    for (v1::Job& job : page->jobs) *response->add_jobs() = std::move(job);
-    response->set_next_page_token(page->next_page_token);
+    ASSIGN_OR_RETURN(DecompositionJobPage page,
+                     queue_.List(request->page_size(), request->page_token()));
+    for (v1::Job& job : page.jobs) *response->add_jobs() = std::move(job);
+    response->set_next_page_token(page.next_page_token);
     return absl::OkStatus();
   });
 }
@@ -115,18 +90,15 @@ grpc::ServerUnaryReactor* DecompositionService::CancelJob(grpc::CallbackServerCo
                                                           const v1::CancelJobRequest* request,
                                                           v1::CancelJobResponse* response) {
   return Answer(context, pool_, [this, request, response] {
-    const absl::StatusOr<std::string> digest = ParseJobName(request->name());
-    if (!digest.ok()) return digest.status();
-    absl::StatusOr<v1::Job> job = queue_.Cancel(*digest);
-    if (!job.ok()) return job.status();
-    *response->mutable_job() = *std::move(job);
+    ASSIGN_OR_RETURN(const std::string digest, ParseJobName(request->name()));
+    ASSIGN_OR_RETURN(*response->mutable_job(), queue_.Cancel(digest));
     return absl::OkStatus();
   });
 }
 
 grpc::ServerWriteReactor<v1::WatchJobResponse>* DecompositionService::WatchJob(
     grpc::CallbackServerContext*, const v1::WatchJobRequest* request) {
-  return new JobWatchReactor(queue_, ParseJobName(request->name()));
+  return new JobWatchCall(queue_, ParseJobName(request->name()));
 }
 
 }  // namespace carillon

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "carillon/v1/decomposition_service.grpc.pb.h"
-#include "server/api/work_pool.h"
+#include "server/api/thread_pool.h"
 #include "server/decomposition/decomposition_queue.h"
 
 namespace carillon {
@@ -10,7 +10,7 @@ namespace carillon {
 /// carillon.v1.DecompositionService. What it is given must outlive it.
 class DecompositionService final : public v1::DecompositionService::CallbackService {
  public:
-  DecompositionService(DecompositionQueue& queue, WorkPool& pool) : queue_(queue), pool_(pool) {}
+  DecompositionService(DecompositionQueue& queue, ThreadPool& pool) : queue_(queue), pool_(pool) {}
 
   grpc::ServerUnaryReactor* GetJob(grpc::CallbackServerContext* context,
                                    const v1::GetJobRequest* request,
@@ -26,7 +26,7 @@ class DecompositionService final : public v1::DecompositionService::CallbackServ
 
  private:
   DecompositionQueue& queue_;
-  WorkPool& pool_;
+  ThreadPool& pool_;
 };
 
 }  // namespace carillon

@@ -1,35 +1,35 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/api/job_run_service.h"
 
-#include <fstream>
 #include <optional>
 #include <string>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 #include "server/api/bearer_token.h"
+#include "server/api/file_pieces.h"
 #include "server/api/read_call.h"
 #include "server/api/resource_name.h"
+#include "server/api/stream_call.h"
 #include "server/api/unary_call.h"
 
 namespace carillon {
 namespace {
-
-constexpr size_t kPieceBytes = 1 << 20;
 
 absl::Status Incomplete(absl::string_view what) {
   return Refusal(absl::StatusCode::kInvalidArgument, "RESULT_INCOMPLETE",
                  absl::StrCat(what, ": send the result again, the end last"));
 }
 
-/// Takes the records of a result, then its end.
+/// Takes the records of a result, then the end of the run.
 class ResultSink {
  public:
   ResultSink(RemoteRuns& runs, std::string token) : runs_(&runs), token_(std::move(token)) {}
 
   absl::Status Append(const v1::UploadResultRequest& request) {
-    if (absl::Status status = Begin(request.job()); !status.ok()) return status;
+    RETURN_IF_ERROR(Begin(request.job()));
     if (end_) return Drop(Incomplete("something follows the end of the run"));
     if (request.has_record()) return Drop(upload_->Append(request.record()));
     if (request.has_end()) end_ = request.end();
@@ -44,15 +44,12 @@ class ResultSink {
  private:
   absl::Status Begin(const std::string& job) {
     if (upload_) return absl::OkStatus();
-    const absl::StatusOr<std::string> digest = ParseJobName(job);
-    if (!digest.ok()) return digest.status();
-    absl::StatusOr<RunUpload> upload = runs_->BeginUpload(*digest, token_);
-    if (!upload.ok()) return upload.status();
-    upload_ = *std::move(upload);
+    ASSIGN_OR_RETURN(const std::string digest, ParseJobName(job));
+    ASSIGN_OR_RETURN(upload_, runs_->BeginUpload(digest, token_));
     return absl::OkStatus();
   }
 
-  /// Before the caller is told of a refusal, nothing of its result is there any more.
+  /// Deletes what was uploaded before the caller hears of a refusal.
   absl::Status Drop(absl::Status status) {
     if (!status.ok()) upload_.reset();
     return status;
@@ -65,64 +62,51 @@ class ResultSink {
 };
 
 /// Sends a mesh file piece by piece.
-class MeshReactor final : public grpc::ServerWriteReactor<v1::FetchMeshResponse> {
+class MeshCall final : public ServerStream<v1::FetchMeshResponse> {
  public:
-  MeshReactor(RemoteRuns& runs, std::string job, std::string token, WorkPool& pool) : pool_(pool) {
-    pool_.Run(
-        [this, &runs, job = std::move(job), token = std::move(token)] { Begin(runs, job, token); });
+  MeshCall(RemoteRuns& runs, std::string job, std::string token, ThreadPool& pool)
+      : StreamWriter(&pool), runs_(runs), job_(std::move(job)), token_(std::move(token)) {
+    StartWriting();
   }
-
-  void OnWriteDone(bool ok) override {
-    if (!ok) return Finish(grpc::Status::CANCELLED);
-    pool_.Run([this] { SendNext(); });
-  }
-
-  void OnDone() override { delete this; }
 
  private:
-  void Begin(RemoteRuns& runs, const std::string& job, const std::string& token) {
-    const absl::StatusOr<std::string> digest = ParseJobName(job);
-    if (!digest.ok()) return Finish(ToGrpcStatus(digest.status()));
-    const auto mesh = runs.Begin(*digest, token);
-    if (!mesh.ok()) return Finish(ToGrpcStatus(mesh.status()));
-    file_.open(*mesh, std::ios::binary);
-    SendNext();
+  absl::StatusOr<Supply> Fill(v1::FetchMeshResponse& response) override {
+    if (!std::exchange(begun_, true)) RETURN_IF_ERROR(Begin());
+    return mesh_.Next(*response.mutable_data());
   }
 
-  void SendNext() {
-    std::string& data = *response_.mutable_data();
-    data.resize(kPieceBytes);
-    file_.read(data.data(), static_cast<std::streamsize>(data.size()));
-    data.resize(static_cast<size_t>(file_.gcount()));
-    if (data.empty()) return Finish(grpc::Status::OK);
-    StartWrite(&response_);
+  absl::Status Begin() {
+    ASSIGN_OR_RETURN(const std::string digest, ParseJobName(job_));
+    ASSIGN_OR_RETURN(const auto path, runs_.Begin(digest, token_));
+    mesh_.Open(path);
+    return absl::OkStatus();
   }
 
-  WorkPool& pool_;
-  std::ifstream file_;
-  v1::FetchMeshResponse response_;
+  RemoteRuns& runs_;
+  const std::string job_, token_;
+  bool begun_ = false;
+  FilePieces mesh_;
 };
 
 }  // namespace
 
 grpc::ServerWriteReactor<v1::FetchMeshResponse>* JobRunService::FetchMesh(
     grpc::CallbackServerContext* context, const v1::FetchMeshRequest* request) {
-  return new MeshReactor(runs_, request->job(), BearerToken(*context), pool_);
+  return new MeshCall(runs_, request->job(), BearerToken(*context), pool_);
 }
 
 grpc::ServerUnaryReactor* JobRunService::ReportProgress(grpc::CallbackServerContext* context,
                                                         const v1::ReportProgressRequest* request,
                                                         v1::ReportProgressResponse*) {
   return Answer(context, pool_, [this, context, request] {
-    const absl::StatusOr<std::string> digest = ParseJobName(request->job());
-    if (!digest.ok()) return digest.status();
-    return runs_.Report(*digest, BearerToken(*context), request->progress());
+    ASSIGN_OR_RETURN(const std::string digest, ParseJobName(request->job()));
+    return runs_.Report(digest, BearerToken(*context), request->progress());
   });
 }
 
 grpc::ServerReadReactor<v1::UploadResultRequest>* JobRunService::UploadResult(
     grpc::CallbackServerContext* context, v1::UploadResultResponse* response) {
-  return new ReadReactor<v1::UploadResultRequest, v1::UploadResultResponse, ResultSink>(
+  return new ReadCall<v1::UploadResultRequest, v1::UploadResultResponse, ResultSink>(
       *context, *response, ResultSink(runs_, BearerToken(*context)), pool_);
 }
 

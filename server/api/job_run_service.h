@@ -2,7 +2,7 @@
 #pragma once
 
 #include "carillon/v1/job_run_service.grpc.pb.h"
-#include "server/api/work_pool.h"
+#include "server/api/thread_pool.h"
 #include "server/decomposition/remote_runs.h"
 
 namespace carillon {
@@ -10,7 +10,7 @@ namespace carillon {
 /// carillon.v1.JobRunService. What it is given must outlive it.
 class JobRunService final : public v1::JobRunService::CallbackService {
  public:
-  JobRunService(RemoteRuns& runs, WorkPool& pool) : runs_(runs), pool_(pool) {}
+  JobRunService(RemoteRuns& runs, ThreadPool& pool) : runs_(runs), pool_(pool) {}
 
   grpc::ServerWriteReactor<v1::FetchMeshResponse>* FetchMesh(
       grpc::CallbackServerContext* context, const v1::FetchMeshRequest* request) override;
@@ -22,7 +22,7 @@ class JobRunService final : public v1::JobRunService::CallbackService {
 
  private:
   RemoteRuns& runs_;
-  WorkPool& pool_;
+  ThreadPool& pool_;
 };
 
 }  // namespace carillon

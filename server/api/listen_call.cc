@@ -4,77 +4,43 @@
 #include <memory>
 #include <utility>
 
-#include "absl/base/thread_annotations.h"
+#include "absl/status/statusor.h"
 #include "server/api/sample_bytes.h"
-#include "server/api/status_conversion.h"
-#include "server/base/mutex.h"
+#include "server/api/stream_call.h"
 
 namespace carillon {
 namespace {
 
-/// Writes one block at a time; what comes meanwhile waits in the listener's bounded queue.
-class ListenCall final : public grpc::ServerWriteReactor<v1::ListenResponse> {
+/// Sends the format, then blocks. Blocks that come while one is being sent wait in the listener's
+/// bounded queue.
+class ListenCall final : public ServerStream<v1::ListenResponse> {
  public:
-  explicit ListenCall(LiveOutput& output) {
-    absl::StatusOr<std::unique_ptr<BlockBroadcast::Listener>> listener =
-        output.broadcast().Subscribe([this] { Wake(); });
-    const MutexLock lock(&mutex_);
-    if (!listener.ok()) {
-      End(ToGrpcStatus(listener.status()));
-      return;
-    }
-    listener_ = *std::move(listener);
-    response_.mutable_format()->set_sample_rate_hz(output.format().sample_rate_hz);
-    response_.mutable_format()->set_channel_count(output.format().channel_count);
-    writing_ = true;
-    StartWrite(&response_);
+  explicit ListenCall(LiveOutput& output) : StreamWriter(nullptr), format_(output.format()) {
+    listener_ = output.broadcast().Subscribe([this] { Wake(); });
+    StartWriting();
   }
-
-  void OnWriteDone(bool ok) override {
-    const MutexLock lock(&mutex_);
-    writing_ = false;
-    if (!ok || cancelled_) return End(grpc::Status::CANCELLED);
-    Next();
-  }
-
-  void OnCancel() override {
-    const MutexLock lock(&mutex_);
-    cancelled_ = true;
-    if (!writing_) End(grpc::Status::CANCELLED);
-  }
-
-  void OnDone() override { delete this; }
 
  private:
-  void Wake() {
-    const MutexLock lock(&mutex_);
-    Next();
+  absl::StatusOr<Supply> Fill(v1::ListenResponse& response) override {
+    if (!listener_.ok()) return listener_.status();
+    if (!std::exchange(format_sent_, true)) {
+      response.mutable_format()->set_sample_rate_hz(format_.sample_rate_hz);
+      response.mutable_format()->set_channel_count(format_.channel_count);
+      return Supply::kMessage;
+    }
+    const std::shared_ptr<const RenderedBlock> block = (*listener_)->TryTake();
+    if (!block) return Supply::kLater;
+    response.clear_format();
+    response.mutable_block()->set_first_frame(block->first_frame);
+    response.mutable_block()->set_samples(ToBytes(block->samples));
+    response.set_lost_frame_count((*listener_)->lost_frame_count());
+    return Supply::kMessage;
   }
 
-  void Next() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
-    if (writing_ || finished_ || !listener_) return;
-    const std::shared_ptr<const RenderedBlock> block = listener_->TryTake();
-    if (!block) return;
-    response_.clear_format();
-    response_.mutable_block()->set_first_frame(block->first_frame);
-    response_.mutable_block()->set_samples(ToBytes(block->samples));
-    response_.set_lost_frame_count(listener_->lost_frame_count());
-    writing_ = true;
-    StartWrite(&response_);
-  }
-
-  void End(const grpc::Status& status) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
-    if (std::exchange(finished_, true)) return;
-    Finish(status);
-  }
-
-  Mutex mutex_;
-  v1::ListenResponse response_;  // gRPC's while writing_
-  bool writing_ ABSL_GUARDED_BY(mutex_) = false;
-  bool cancelled_ ABSL_GUARDED_BY(mutex_) = false;
-  bool finished_ ABSL_GUARDED_BY(mutex_) = false;
-  /// Last, so that it ends before what Wake touches.
-  std::unique_ptr<BlockBroadcast::Listener> listener_ ABSL_GUARDED_BY(mutex_);
+  const DeviceFormat format_;
+  bool format_sent_ = false;
+  /// Last, so that it is destroyed, and wakes nobody any more, before the rest.
+  absl::StatusOr<std::unique_ptr<BlockBroadcast::Listener>> listener_;
 };
 
 }  // namespace

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "carillon/v1/modal_model_service.grpc.pb.h"
-#include "server/api/work_pool.h"
+#include "server/api/thread_pool.h"
 #include "server/decomposition/decomposition_queue.h"
 #include "server/mode_database/mode_database.h"
 
@@ -11,7 +11,7 @@ namespace carillon {
 /// carillon.v1.ModalModelService. What it is given must outlive it.
 class ModalModelService final : public v1::ModalModelService::CallbackService {
  public:
-  ModalModelService(ModeDatabase& database, DecompositionQueue& queue, WorkPool& pool)
+  ModalModelService(ModeDatabase& database, DecompositionQueue& queue, ThreadPool& pool)
       : database_(database), queue_(queue), pool_(pool) {}
 
   grpc::ServerReadReactor<v1::UploadMeshRequest>* UploadMesh(
@@ -48,7 +48,7 @@ class ModalModelService final : public v1::ModalModelService::CallbackService {
 
   ModeDatabase& database_;
   DecompositionQueue& queue_;
-  WorkPool& pool_;
+  ThreadPool& pool_;
 };
 
 }  // namespace carillon

@@ -8,9 +8,10 @@
 
 #include "absl/strings/strip.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 #include "server/api/read_call.h"
 #include "server/api/resource_name.h"
-#include "server/api/status_conversion.h"
+#include "server/api/stream_call.h"
 
 namespace carillon {
 namespace {
@@ -20,25 +21,22 @@ class MeshSink {
   explicit MeshSink(MeshStore& meshes) : meshes_(&meshes) {}
 
   absl::Status Append(const v1::UploadMeshRequest& request) {
-    if (absl::Status status = Begin(); !status.ok()) return status;
+    RETURN_IF_ERROR(Begin());
     return upload_->Append(request.data());
   }
 
   absl::Status Finish(v1::UploadMeshResponse& response) {
-    if (absl::Status status = Begin(); !status.ok()) return status;
-    const absl::StatusOr<StoredMesh> mesh = upload_->Finish();
-    if (!mesh.ok()) return mesh.status();
-    response.set_mesh_digest(mesh->digest);
-    response.set_byte_count(mesh->byte_count);
+    RETURN_IF_ERROR(Begin());
+    ASSIGN_OR_RETURN(const StoredMesh mesh, upload_->Finish());
+    response.set_mesh_digest(mesh.digest);
+    response.set_byte_count(mesh.byte_count);
     return absl::OkStatus();
   }
 
  private:
   absl::Status Begin() {
     if (upload_) return absl::OkStatus();
-    absl::StatusOr<MeshUpload> upload = meshes_->Begin();
-    if (!upload.ok()) return upload.status();
-    upload_ = *std::move(upload);
+    ASSIGN_OR_RETURN(upload_, meshes_->Begin());
     return absl::OkStatus();
   }
 
@@ -51,7 +49,7 @@ class ModelSink {
   explicit ModelSink(ModelStore& models) : models_(&models) {}
 
   absl::Status Append(const v1::ImportModalModelRequest& request) {
-    if (absl::Status status = Begin(request); !status.ok()) return status;
+    RETURN_IF_ERROR(Begin(request));
     return import_->Append(request.record());
   }
 
@@ -60,9 +58,9 @@ class ModelSink {
       return Refusal(absl::StatusCode::kInvalidArgument, "MODAL_MODEL_MALFORMED",
                      "no record was sent; send the header, then every chunk");
     }
-    const absl::StatusOr<ModelSummary> summary = import_->Finish();
-    if (summary.ok()) *response.mutable_modal_model() = ToProto(*summary);
-    return summary.status();
+    ASSIGN_OR_RETURN(const ModelSummary summary, import_->Finish());
+    *response.mutable_modal_model() = ToProto(summary);
+    return absl::OkStatus();
   }
 
  private:
@@ -70,9 +68,7 @@ class ModelSink {
     if (import_) return absl::OkStatus();
     absl::string_view digest = first.name();
     absl::ConsumePrefix(&digest, "modalModels/");
-    absl::StatusOr<ModelImport> import = models_->Import(std::string(digest), first.label());
-    if (!import.ok()) return import.status();
-    import_ = *std::move(import);
+    ASSIGN_OR_RETURN(import_, models_->Import(std::string(digest), first.label()));
     return absl::OkStatus();
   }
 
@@ -80,65 +76,50 @@ class ModelSink {
   std::optional<ModelImport> import_;
 };
 
-/// Sends one record after the other, each read on a thread of the pool once the last has gone.
-class ExportReactor final : public grpc::ServerWriteReactor<v1::ExportModalModelResponse> {
+/// Sends a model record by record.
+class ExportCall final : public ServerStream<v1::ExportModalModelResponse> {
  public:
-  ExportReactor(std::string name, ModelStore& models, WorkPool& pool)
-      : name_(std::move(name)), models_(models), pool_(pool) {
-    pool_.Run([this] { Begin(); });
+  ExportCall(std::string name, ModelStore& models, ThreadPool& pool)
+      : StreamWriter(&pool), name_(std::move(name)), models_(models) {
+    StartWriting();
   }
-
-  void OnWriteDone(bool ok) override {
-    if (!ok) return Finish(grpc::Status::CANCELLED);
-    pool_.Run([this] { SendNext(); });
-  }
-
-  void OnDone() override { delete this; }
 
  private:
-  void Begin() {
-    const absl::StatusOr<std::string> digest = ParseModelName(name_);
-    if (!digest.ok()) return Finish(ToGrpcStatus(digest.status()));
-    absl::StatusOr<ModelExport> begun = models_.Export(*digest);
-    if (!begun.ok()) return Finish(ToGrpcStatus(begun.status()));
-    export_ = *std::move(begun);
-    SendNext();
-  }
-
-  void SendNext() {
-    absl::StatusOr<std::optional<v1::ModalModelRecord>> record = export_->Next();
-    if (!record.ok()) return Finish(ToGrpcStatus(record.status()));
-    if (!record->has_value()) return Finish(grpc::Status::OK);
-    *response_.mutable_record() = **std::move(record);
-    StartWrite(&response_);
+  absl::StatusOr<Supply> Fill(v1::ExportModalModelResponse& response) override {
+    if (!export_) {
+      ASSIGN_OR_RETURN(const std::string digest, ParseModelName(name_));
+      ASSIGN_OR_RETURN(export_, models_.Export(digest));
+    }
+    ASSIGN_OR_RETURN(std::optional<v1::ModalModelRecord> record, export_->Next());
+    if (!record) return Supply::kEnd;
+    *response.mutable_record() = *std::move(record);
+    return Supply::kMessage;
   }
 
   const std::string name_;
   ModelStore& models_;
-  WorkPool& pool_;
   std::optional<ModelExport> export_;
-  v1::ExportModalModelResponse response_;
 };
 
 }  // namespace
 
 grpc::ServerReadReactor<v1::UploadMeshRequest>* MakeUpload(grpc::CallbackServerContext& context,
                                                            v1::UploadMeshResponse& response,
-                                                           MeshStore& meshes, WorkPool& pool) {
-  return new ReadReactor<v1::UploadMeshRequest, v1::UploadMeshResponse, MeshSink>(
+                                                           MeshStore& meshes, ThreadPool& pool) {
+  return new ReadCall<v1::UploadMeshRequest, v1::UploadMeshResponse, MeshSink>(
       context, response, MeshSink(meshes), pool);
 }
 
 grpc::ServerReadReactor<v1::ImportModalModelRequest>* MakeImport(
     grpc::CallbackServerContext& context, v1::ImportModalModelResponse& response,
-    ModelStore& models, WorkPool& pool) {
-  return new ReadReactor<v1::ImportModalModelRequest, v1::ImportModalModelResponse, ModelSink>(
+    ModelStore& models, ThreadPool& pool) {
+  return new ReadCall<v1::ImportModalModelRequest, v1::ImportModalModelResponse, ModelSink>(
       context, response, ModelSink(models), pool);
 }
 
 grpc::ServerWriteReactor<v1::ExportModalModelResponse>* MakeExport(
-    const v1::ExportModalModelRequest& request, ModelStore& models, WorkPool& pool) {
-  return new ExportReactor(request.name(), models, pool);
+    const v1::ExportModalModelRequest& request, ModelStore& models, ThreadPool& pool) {
+  return new ExportCall(request.name(), models, pool);
 }
 
 v1::ModalModelSummary ToProto(const ModelSummary& summary) {

@@ -5,7 +5,7 @@
 
 #include "absl/status/statusor.h"
 #include "carillon/v1/modal_model_service.pb.h"
-#include "server/api/work_pool.h"
+#include "server/api/thread_pool.h"
 #include "server/mode_database/mode_database.h"
 
 namespace carillon {
@@ -15,14 +15,14 @@ namespace carillon {
 
 grpc::ServerReadReactor<v1::UploadMeshRequest>* MakeUpload(grpc::CallbackServerContext& context,
                                                            v1::UploadMeshResponse& response,
-                                                           MeshStore& meshes, WorkPool& pool);
+                                                           MeshStore& meshes, ThreadPool& pool);
 
 grpc::ServerReadReactor<v1::ImportModalModelRequest>* MakeImport(
     grpc::CallbackServerContext& context, v1::ImportModalModelResponse& response,
-    ModelStore& models, WorkPool& pool);
+    ModelStore& models, ThreadPool& pool);
 
 grpc::ServerWriteReactor<v1::ExportModalModelResponse>* MakeExport(
-    const v1::ExportModalModelRequest& request, ModelStore& models, WorkPool& pool);
+    const v1::ExportModalModelRequest& request, ModelStore& models, ThreadPool& pool);
 
 v1::ModalModelSummary ToProto(const ModelSummary& summary);
 

@@ -1,45 +1,40 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <grpcpp/grpcpp.h>
-
 #include <utility>
 
 #include "absl/status/status.h"
-#include "server/api/status_conversion.h"
-#include "server/api/work_pool.h"
+#include "server/api/stream_call.h"
 
 namespace carillon {
 
-/// Reads requests into `Sink` one after the other; each is taken on a thread of the pool, since it
-/// goes to disk. `Sink` has Status Append(const Request&) and Status Finish(Response&).
+/// Reads requests into a `Sink`, which has Status Append(const Request&) and
+/// Status Finish(Response&). Both run on a thread of the pool, because they write to disk.
 template <typename Request, typename Response, typename Sink>
-class ReadReactor final : public grpc::ServerReadReactor<Request> {
+class ReadCall final : public ClientStream<Request> {
  public:
-  ReadReactor(grpc::CallbackServerContext& context, Response& response, Sink sink, WorkPool& pool)
-      : context_(context), response_(response), sink_(std::move(sink)), pool_(pool) {
-    this->StartRead(&request_);
+  ReadCall(grpc::CallbackServerContext& context, Response& response, Sink sink, ThreadPool& pool)
+      : ClientStream<Request>(&pool),
+        context_(context),
+        response_(response),
+        sink_(std::move(sink)) {
+    this->StartReading();
   }
-
-  void OnReadDone(bool ok) override {
-    pool_.Run([this, ok] { Take(ok); });
-  }
-
-  void OnDone() override { delete this; }
 
  private:
-  void Take(bool ok) {
-    if (context_.IsCancelled()) return this->Finish(grpc::Status::CANCELLED);
-    const absl::Status status = ok ? sink_.Append(request_) : sink_.Finish(response_);
-    if (!ok || !status.ok()) return this->Finish(ToGrpcStatus(status));
-    this->StartRead(&request_);
+  absl::Status Take(const Request& request) override {
+    if (context_.IsCancelled()) return absl::CancelledError("the client has gone");
+    return sink_.Append(request);
+  }
+
+  void AllRead() override {
+    if (context_.IsCancelled()) return this->End(absl::CancelledError("the client has gone"));
+    this->End(sink_.Finish(response_));
   }
 
   grpc::CallbackServerContext& context_;
   Response& response_;
   Sink sink_;
-  WorkPool& pool_;
-  Request request_;
 };
 
 }  // namespace carillon

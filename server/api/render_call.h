@@ -6,7 +6,7 @@
 #include <atomic>
 
 #include "carillon/v1/audio_service.pb.h"
-#include "server/api/work_pool.h"
+#include "server/api/thread_pool.h"
 #include "server/mode_database/model_store.h"
 #include "server/scene/sounding_body.h"
 
@@ -16,7 +16,7 @@ namespace carillon {
 struct RenderContext {
   ModelStore& models;
   BodyCache& bodies;
-  WorkPool& pool;
+  ThreadPool& pool;
   /// Render calls there are.
   std::atomic<int>& call_count;
 };

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "carillon/v1/scene_service.grpc.pb.h"
-#include "server/api/work_pool.h"
+#include "server/api/thread_pool.h"
 #include "server/mode_database/mode_database.h"
 #include "server/scene/scene_registry.h"
 
@@ -11,7 +11,7 @@ namespace carillon {
 /// carillon.v1.SceneService. What it is given must outlive it.
 class SceneService final : public v1::SceneService::CallbackService {
  public:
-  SceneService(SceneRegistry& scenes, ModeDatabase& database, WorkPool& pool)
+  SceneService(SceneRegistry& scenes, ModeDatabase& database, ThreadPool& pool)
       : scenes_(scenes), database_(database), pool_(pool) {}
 
   grpc::ServerUnaryReactor* CreateScene(grpc::CallbackServerContext* context,
@@ -39,7 +39,7 @@ class SceneService final : public v1::SceneService::CallbackService {
 
   SceneRegistry& scenes_;
   ModeDatabase& database_;
-  WorkPool& pool_;
+  ThreadPool& pool_;
 };
 
 }  // namespace carillon

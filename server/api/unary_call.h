@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "server/api/status_conversion.h"
-#include "server/api/work_pool.h"
+#include "server/api/thread_pool.h"
 
 namespace carillon {
 
@@ -14,7 +14,8 @@ namespace carillon {
 /// the pool and returns an absl::Status. gRPC keeps request and response until the call is
 /// finished.
 template <typename Work>
-grpc::ServerUnaryReactor* Answer(grpc::CallbackServerContext* context, WorkPool& pool, Work work) {
+grpc::ServerUnaryReactor* Answer(grpc::CallbackServerContext* context, ThreadPool& pool,
+                                 Work work) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
   pool.Run([reactor, work = std::move(work)] { reactor->Finish(ToGrpcStatus(work())); });
   return reactor;

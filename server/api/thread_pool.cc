@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "server/api/work_pool.h"
+#include "server/api/thread_pool.h"
 
 #include <sys/resource.h>
 #include <unistd.h>
@@ -8,18 +8,18 @@
 
 namespace carillon {
 
-WorkPool::WorkPool(int thread_count, int niceness) {
+ThreadPool::ThreadPool(int thread_count, int niceness) {
   for (int i = 0; i < thread_count; ++i) {
-    threads_.emplace_back([this, niceness] { Work(niceness); });
+    threads_.emplace_back([this, niceness] { RunTasks(niceness); });
   }
 }
 
-WorkPool::~WorkPool() {
+ThreadPool::~ThreadPool() {
   ready_.release(static_cast<ptrdiff_t>(threads_.size()));
   for (std::thread& thread : threads_) thread.join();
 }
 
-void WorkPool::Run(std::function<void()> task) {
+void ThreadPool::Run(std::function<void()> task) {
   {
     const MutexLock lock(&mutex_);
     tasks_.push_back(std::move(task));
@@ -27,14 +27,14 @@ void WorkPool::Run(std::function<void()> task) {
   ready_.release();
 }
 
-void WorkPool::Work(int niceness) {
-  // On Linux this is the niceness of the one thread.
+void ThreadPool::RunTasks(int niceness) {
+  // Linux gives each thread a niceness of its own.
   if (niceness > 0) setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), niceness);
-  while (const std::function<void()> task = Take()) task();
+  while (const std::function<void()> task = TakeTask()) task();
 }
 
-/// The oldest task; empty once there is none and the pool ends.
-std::function<void()> WorkPool::Take() {
+/// Returns the oldest task, or an empty function once the pool ends and no task is left.
+std::function<void()> ThreadPool::TakeTask() {
   ready_.acquire();
   const MutexLock lock(&mutex_);
   if (tasks_.empty()) return nullptr;

@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <grpcpp/grpcpp.h>
+
+#include <functional>
+#include <utility>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "server/api/status_conversion.h"
+#include "server/api/thread_pool.h"
+#include "server/base/mutex.h"
+
+namespace carillon {
+
+/// The parts of which every streaming call of the API is made. A call derives from ClientStream,
+/// ServerStream or BidiStream, and deletes itself when it is done. It holds one request and one
+/// response at a time, so its memory is bounded by what its subclass keeps.
+
+/// Runs the steps of a call on a thread pool, or, where there is none, on the thread that caused
+/// them.
+template <typename Reactor>
+class StreamCall : public Reactor {
+ public:
+  void OnDone() final { delete this; }
+
+ protected:
+  /// Calls whose steps may block name a `pool`, which must outlive them.
+  explicit StreamCall(ThreadPool* pool) : pool_(pool) {}
+
+  void Run(std::function<void()> step) {
+    if (pool_ == nullptr) return step();
+    pool_->Run(std::move(step));
+  }
+
+  /// Ends the call. This must be the last thing that a step does, for the call may be deleted at
+  /// once.
+  void End(const absl::Status& status) { this->Finish(ToGrpcStatus(status)); }
+
+ private:
+  ThreadPool* const pool_;
+};
+
+/// The reading half of a call: takes one request after the other.
+template <typename Reactor, typename Request>
+class StreamReader : public Reactor {
+ public:
+  void OnReadDone(bool ok) final {
+    this->Run([this, ok] { ok ? TakeRequest() : AllRead(); });
+  }
+
+ protected:
+  using Reactor::Reactor;
+
+  /// Takes a request; an error is handed to Refuse, and nothing more is read.
+  virtual absl::Status Take(const Request& request) = 0;
+
+  /// The client has sent all its requests, or has cancelled the call.
+  virtual void AllRead() = 0;
+
+  virtual void Refuse(const absl::Status& status) { this->End(status); }
+
+  /// The constructor of a call ends with it.
+  void StartReading() { this->StartRead(&request_); }
+
+ private:
+  void TakeRequest() {
+    if (const absl::Status status = Take(request_); !status.ok()) return Refuse(status);
+    this->StartRead(&request_);
+  }
+
+  Request request_;
+};
+
+/// What a call has to send at a moment.
+enum class Supply {
+  kMessage,  ///< the response that was filled in
+  kLater,    ///< nothing yet; Wake is called when there is something
+  kEnd,      ///< nothing more; the call ends with OK
+};
+
+/// The writing half of a call: sends one response after the other, each filled in when the one
+/// before has left.
+///
+/// At any time at most one thread has the turn: it fills in, has gRPC write, or ends the call. The
+/// turn is taken by StartWriting or Wake, is kept while gRPC writes, and is given back when there
+/// is nothing to send. A call that is cancelled ends with CANCELLED: at once if nobody has the
+/// turn, else by whoever has it.
+template <typename Reactor, typename Response>
+class StreamWriter : public Reactor {
+ public:
+  void OnWriteDone(bool ok) final {
+    if (!ok && ends_by_cancellation()) return this->End(Cancelled());
+    this->Run([this] { WriteNext(); });
+  }
+
+  void OnCancel() final {
+    if (!ends_by_cancellation()) return;
+    {
+      const MutexLock lock(&mutex_);
+      cancelled_ = true;
+      if (std::exchange(taken_, true)) return;
+    }
+    this->End(Cancelled());
+  }
+
+ protected:
+  using Reactor::Reactor;
+
+  /// Fills in the next response, from which the last has not been cleared. An error ends the call.
+  virtual absl::StatusOr<Supply> Fill(Response& response) = 0;
+
+  /// False: a cancelled call goes on until Fill returns kEnd or an error, because its reading half
+  /// may still be at work.
+  virtual bool ends_by_cancellation() const { return true; }
+
+  /// Sends the first response. Before, the turn belongs to the constructor, or to the reading half
+  /// of a call that writes only when all is read; that may use End instead.
+  void StartWriting() {
+    this->Run([this] { WriteNext(); });
+  }
+
+  /// There may be something to send. May be called by any thread while the call exists.
+  void Wake() {
+    {
+      const MutexLock lock(&mutex_);
+      woken_ = true;
+      if (std::exchange(taken_, true)) return;
+    }
+    this->Run([this] { WriteNext(); });
+  }
+
+ private:
+  static absl::Status Cancelled() { return absl::CancelledError("the client has gone"); }
+
+  void WriteNext() {
+    absl::StatusOr<Supply> supply = Supply::kLater;
+    do {
+      if (IsCancelled()) return this->End(Cancelled());
+      supply = Fill(response_);
+    } while (supply.ok() && *supply == Supply::kLater && !GiveBackTurn());
+    if (!supply.ok()) return this->End(supply.status());
+    if (*supply == Supply::kEnd) return this->End(absl::OkStatus());
+    if (*supply == Supply::kMessage) this->StartWrite(&response_);
+  }
+
+  bool IsCancelled() {
+    const MutexLock lock(&mutex_);
+    woken_ = false;
+    return cancelled_;
+  }
+
+  /// False: the call was woken or cancelled meanwhile, so the turn is kept.
+  bool GiveBackTurn() {
+    const MutexLock lock(&mutex_);
+    taken_ = woken_ || cancelled_;
+    return !taken_;
+  }
+
+  Response response_;  // gRPC's while it writes
+  Mutex mutex_;
+  bool taken_ ABSL_GUARDED_BY(mutex_) = true;
+  bool woken_ ABSL_GUARDED_BY(mutex_) = false;
+  bool cancelled_ ABSL_GUARDED_BY(mutex_) = false;
+};
+
+template <typename Request>
+using ClientStream = StreamReader<StreamCall<grpc::ServerReadReactor<Request>>, Request>;
+
+template <typename Response>
+using ServerStream = StreamWriter<StreamCall<grpc::ServerWriteReactor<Response>>, Response>;
+
+template <typename Request, typename Response>
+using BidiStream =
+    StreamWriter<StreamReader<StreamCall<grpc::ServerBidiReactor<Request, Response>>, Request>,
+                 Response>;
+
+}  // namespace carillon

@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/api/stream_call.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace carillon {
+namespace {
+
+using ::testing::ElementsAre;
+
+/// Stands for gRPC's reactor, and records what it is asked to do.
+class RecordingReactor {
+ public:
+  virtual ~RecordingReactor() = default;
+  virtual void OnDone() = 0;
+  virtual void OnReadDone(bool) {}
+  virtual void OnWriteDone(bool) {}
+  virtual void OnCancel() {}
+
+  void StartRead(int* request) { *request = ++read_count; }
+  void StartWrite(const std::string* response) { written.push_back(*response); }
+  void Finish(const grpc::Status& status) { ends.push_back(status.error_code()); }
+
+  int read_count = 0;
+  std::vector<std::string> written;
+  std::vector<grpc::StatusCode> ends;
+};
+
+using Writer = StreamWriter<StreamCall<RecordingReactor>, std::string>;
+
+/// Sends the messages given to it.
+class MessageCall final : public Writer {
+ public:
+  MessageCall() : Writer(nullptr) {}
+  using Writer::StartWriting;
+  using Writer::Wake;
+
+  void Send(const std::string& message) {
+    waiting.push_back(message);
+    Wake();
+  }
+
+  std::vector<std::string> waiting;
+  bool last = false;
+  absl::Status error;
+  std::function<void()> while_filling = [] {};
+
+ private:
+  absl::StatusOr<Supply> Fill(std::string& response) override {
+    const bool empty = waiting.empty();
+    while_filling();
+    if (!error.ok()) return error;
+    if (empty) return last ? Supply::kEnd : Supply::kLater;
+    response = waiting.front();
+    waiting.erase(waiting.begin());
+    return Supply::kMessage;
+  }
+};
+
+TEST(StreamWriter, WritesOneMessageAtATimeInOrder) {
+  MessageCall call;
+  call.StartWriting();
+  call.Send("a");
+  call.Send("b");
+  call.Send("c");
+  EXPECT_THAT(call.written, ElementsAre("a"));
+  call.OnWriteDone(true);
+  call.OnWriteDone(true);
+  EXPECT_THAT(call.written, ElementsAre("a", "b", "c"));
+  call.last = true;
+  call.OnWriteDone(true);
+  EXPECT_THAT(call.ends, ElementsAre(grpc::OK));
+}
+
+TEST(StreamWriter, WritesWhatComesWhileItFindsNothing) {
+  MessageCall call;
+  call.while_filling = [&call, first = true]() mutable {
+    if (std::exchange(first, false)) call.Send("late");
+  };
+  call.StartWriting();
+  EXPECT_THAT(call.written, ElementsAre("late"));
+}
+
+TEST(StreamWriter, WritesNothingBeforeItIsStarted) {
+  MessageCall call;
+  call.Send("early");
+  EXPECT_TRUE(call.written.empty());
+  call.StartWriting();
+  EXPECT_THAT(call.written, ElementsAre("early"));
+}
+
+TEST(StreamWriter, EndsWithTheErrorOfFill) {
+  MessageCall call;
+  call.error = absl::NotFoundError("gone");
+  call.StartWriting();
+  EXPECT_THAT(call.ends, ElementsAre(grpc::NOT_FOUND));
+  call.Wake();
+  call.OnCancel();
+  EXPECT_EQ(call.ends.size(), 1U);
+}
+
+TEST(StreamWriter, EndsAtOnceWhereItIsCancelledWhileItWaits) {
+  MessageCall call;
+  call.StartWriting();
+  call.OnCancel();
+  EXPECT_THAT(call.ends, ElementsAre(grpc::CANCELLED));
+  call.Send("too late");
+  EXPECT_TRUE(call.written.empty());
+  EXPECT_EQ(call.ends.size(), 1U);
+}
+
+TEST(StreamWriter, EndsAfterTheWriteDuringWhichItIsCancelled) {
+  for (const bool written : {false, true}) {
+    MessageCall call;
+    call.StartWriting();
+    call.Send("a");
+    call.OnCancel();
+    EXPECT_TRUE(call.ends.empty());
+    call.OnWriteDone(written);
+    EXPECT_THAT(call.ends, ElementsAre(grpc::CANCELLED));
+  }
+}
+
+TEST(StreamWriter, EndsWhereItIsCancelledWhileItFindsNothing) {
+  MessageCall call;
+  call.while_filling = [&call] { call.OnCancel(); };
+  call.StartWriting();
+  EXPECT_THAT(call.ends, ElementsAre(grpc::CANCELLED));
+}
+
+/// Takes numbers up to 2.
+class NumberCall final : public StreamReader<StreamCall<RecordingReactor>, int> {
+ public:
+  NumberCall() : StreamReader(nullptr) { StartReading(); }
+  std::vector<int> taken;
+  bool all_read = false;
+
+ private:
+  absl::Status Take(const int& request) override {
+    if (request > 2) return absl::OutOfRangeError("too large");
+    taken.push_back(request);
+    return absl::OkStatus();
+  }
+  void AllRead() override { all_read = true; }
+};
+
+TEST(StreamReader, TakesOneRequestAfterTheOther) {
+  NumberCall call;
+  call.OnReadDone(true);
+  call.OnReadDone(true);
+  call.OnReadDone(false);
+  EXPECT_THAT(call.taken, ElementsAre(1, 2));
+  EXPECT_TRUE(call.all_read);
+}
+
+TEST(StreamReader, EndsWithTheErrorOfTakeAndReadsNoMore) {
+  NumberCall call;
+  for (int i = 0; i < 3; ++i) call.OnReadDone(true);
+  EXPECT_THAT(call.ends, ElementsAre(grpc::OUT_OF_RANGE));
+  EXPECT_EQ(call.read_count, 3);
+  EXPECT_FALSE(call.all_read);
+}
+
+}  // namespace
+}  // namespace carillon
