@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <complex>
+#include <span>
+#include <vector>
+
+#include "precompute/radiation/acoustic_surface.h"
+#include "precompute/radiation/spherical_harmonics.h"
+#include "precompute/radiation/surface_level.h"
+
+namespace carillon::precompute {
+
+/// One mode solved on one surface.
+struct ModeField {
+  std::vector<ComplexFloat> pressure;         ///< on the surface, for dp/dn = n . phi
+  std::vector<std::complex<double>> pattern;  ///< at the directions of the grid
+  double power_integral = 0;                  ///< of |pattern|^2
+  double surface_power_db = 0;
+  double residual = 0;
+  int iterations = 0;
+};
+
+/// One mode, or two that are solved at the same wavenumber.
+struct ModeProblem {
+  double wavenumber = 0;
+  std::vector<Displacement> displacements = {};
+  std::vector<std::vector<ComplexFloat>> starts =
+      {};                   ///< first guesses of the pressures; none: zero
+  double tolerance = 1e-2;  ///< of the residual
+};
+
+/// Solves them on one surface, and finds the patterns at the directions of the grid.
+std::vector<ModeField> SolveModes(const ModeProblem& problem, const SurfaceLevel& level,
+                                  const RadiatingSurface& body, const SphereGrid& grid,
+                                  Workers& workers);
+
+/// 10 log10 of the ratio of both power integrals.
+double PowerDifferenceDb(const ModeField& a, const ModeField& b);
+
+/// Root mean square over the sphere of the difference in level, where that of `b` is within 20 dB
+/// of its strongest direction.
+double DirectionDifferenceDb(const ModeField& a, const ModeField& b, const SphereGrid& grid);
+
+}  // namespace carillon::precompute

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "precompute/radiation/acoustic_surface.h"
+#include "precompute/sparse/workers.h"
+
+namespace carillon::precompute {
+
+/// What the vertex rule misses of a pair of vertices, for the static kernel 1/(4 pi r): the exact
+/// Galerkin integrals over the triangles near each other less the vertex rule of the same. Rows are
+/// test functions.
+struct NearEntry {
+  float double_layer = 0;             ///< K
+  float single_layer = 0;             ///< V with n . n'
+  float curls = 0;                    ///< V with curl . curl'
+  std::array<float, 3> source = {};   ///< V times n': to be multiplied by the displacement
+  std::array<float, 3> adjoint = {};  ///< K' times n'
+};
+
+/// A sparse matrix of them by rows, and the exact diagonals. Holds for every wavenumber.
+struct NearCorrection {
+  std::vector<int64_t> row_begin;  ///< #vertices + 1
+  std::vector<int32_t> columns;    ///< ascending in each row
+  std::vector<NearEntry> entries;
+  /// #vertices each: exact static diagonals of K, V with n . n', and V with curl . curl'.
+  std::vector<double> double_layer, single_layer, curls;
+};
+
+NearCorrection MakeNearCorrection(const AcousticSurface& surface, Workers& workers);
+
+}  // namespace carillon::precompute

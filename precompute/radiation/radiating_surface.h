@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "precompute/mesh/surface_mesh.h"
+#include "precompute/sparse/workers.h"
+
+namespace carillon::precompute {
+
+/// The modes of a body on its surface, as a modal model has them. Nothing is copied.
+struct SurfaceModes {
+  std::span<const std::array<float, 3>> vertices;  ///< metres
+  std::span<const std::array<int32_t, 3>> triangles;
+  std::span<const double> eigenvalues;  ///< 1/s^2
+  std::span<const float> shapes;        ///< #vertices by 3 by #modes, row-major
+  size_t mode_count() const { return eigenvalues.size(); }
+};
+
+/// How one mode moves the surface.
+struct NormalMotion {
+  double energy = 0;        ///< integral of (n . phi)^2, m^2/kg
+  double wavelength_m = 0;  ///< 2 pi sqrt(2 integral f^2 / integral |grad f|^2), f = n . phi
+};
+
+/// The part of a body's surface that the air around it touches, without the walls of enclosed voids
+/// and what lies within them.
+struct RadiatingSurface {
+  SurfaceMesh mesh;
+  std::vector<int32_t> body_vertex;  ///< for each vertex that of SurfaceModes
+  Point center{};                    ///< of the box around it
+  double radius_m = 0;               ///< of the sphere around `center` that holds it
+};
+
+RadiatingSurface FindRadiatingSurface(const SurfaceModes& modes);
+
+/// Of each mode.
+std::vector<NormalMotion> NormalMotions(const SurfaceModes& modes, const RadiatingSurface& surface,
+                                        Workers& workers);
+
+}  // namespace carillon::precompute

@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "precompute/radiation/remesh_surface.h"
+
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/Polygon_mesh_processing/orient_polygon_soup.h>
+#include <CGAL/Polygon_mesh_processing/polygon_soup_to_polygon_mesh.h>
+#include <CGAL/Polygon_mesh_processing/remesh.h>
+#include <CGAL/Surface_mesh.h>
+#include <CGAL/boost/graph/Euler_operations.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "precompute/mesh/byte_stream.h"
+#include "precompute/mesh/run_in_child.h"
+#include "proto/cpp/error_reason.h"
+
+namespace carillon::precompute {
+namespace {
+
+namespace pmp = CGAL::Polygon_mesh_processing;
+using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+using HalfedgeMesh = CGAL::Surface_mesh<Kernel::Point_3>;
+
+constexpr std::chrono::seconds kMostCpu(300);
+constexpr unsigned kIterations = 3;
+/// A triangle of less than this part of edge^2 is a sliver.
+constexpr double kSliverArea = 0.03;
+constexpr int kSliverPasses = 4;
+
+HalfedgeMesh ToCgal(const SurfaceMesh& given) {
+  std::vector<Kernel::Point_3> points;
+  points.reserve(given.vertices.size());
+  for (const Point& p : given.vertices) points.emplace_back(p[0], p[1], p[2]);
+  std::vector<std::array<size_t, 3>> triangles;
+  triangles.reserve(given.triangles.size());
+  for (const auto& [a, b, c] : given.triangles) {
+    triangles.push_back({static_cast<size_t>(a), static_cast<size_t>(b), static_cast<size_t>(c)});
+  }
+  // Where surfaces touch in a vertex or an edge these are doubled.
+  pmp::orient_polygon_soup(points, triangles);
+  HalfedgeMesh mesh;
+  pmp::polygon_soup_to_polygon_mesh(points, triangles, mesh);
+  return mesh;
+}
+
+double Area(const HalfedgeMesh& mesh, HalfedgeMesh::Face_index face) {
+  const auto a = mesh.halfedge(face), b = mesh.next(a), c = mesh.next(b);
+  return std::sqrt(CGAL::squared_area(mesh.point(mesh.target(a)), mesh.point(mesh.target(b)),
+                                      mesh.point(mesh.target(c))));
+}
+
+HalfedgeMesh::Halfedge_index ShortestEdge(const HalfedgeMesh& mesh, HalfedgeMesh::Face_index face) {
+  const auto squared_length = [&](HalfedgeMesh::Halfedge_index h) {
+    return CGAL::squared_distance(mesh.point(mesh.source(h)), mesh.point(mesh.target(h)));
+  };
+  const auto first = mesh.halfedge(face);
+  return std::ranges::min({first, mesh.next(first), mesh.prev(first)}, {}, squared_length);
+}
+
+bool CollapseSlivers(HalfedgeMesh& mesh, double edge_m) {
+  bool any = false;
+  const std::vector<HalfedgeMesh::Face_index> faces(mesh.faces().begin(), mesh.faces().end());
+  for (const auto face : faces) {
+    if (mesh.is_removed(face) || Area(mesh, face) > kSliverArea * edge_m * edge_m) continue;
+    const auto edge = mesh.edge(ShortestEdge(mesh, face));
+    if (!CGAL::Euler::does_satisfy_link_condition(edge, mesh)) continue;
+    CGAL::Euler::collapse_edge(edge, mesh);
+    any = true;
+  }
+  return any;
+}
+
+/// Runs in a child: CGAL's assertions end the process.
+std::string Remesh(const SurfaceMesh& given, double edge_m) {
+  HalfedgeMesh mesh = ToCgal(given);
+  pmp::isotropic_remeshing(faces(mesh), edge_m, mesh,
+                           CGAL::parameters::number_of_iterations(kIterations));
+  for (int pass = 0; pass < kSliverPasses && CollapseSlivers(mesh, edge_m); ++pass) {
+  }
+  mesh.collect_garbage();
+  std::vector<double> coordinates;
+  for (const auto vertex : mesh.vertices()) {
+    const auto& p = mesh.point(vertex);
+    coordinates.insert(coordinates.end(), {p.x(), p.y(), p.z()});
+  }
+  std::vector<int32_t> corners;
+  for (const auto face : mesh.faces()) {
+    for (const auto vertex : mesh.vertices_around_face(mesh.halfedge(face))) {
+      corners.push_back(static_cast<int32_t>(vertex));
+    }
+  }
+  std::string bytes;
+  AppendValues<double>(bytes, coordinates);
+  AppendValues<int32_t>(bytes, corners);
+  return bytes;
+}
+
+}  // namespace
+
+absl::StatusOr<SurfaceMesh> RemeshSurface(const SurfaceMesh& given, double edge_m) {
+  const absl::StatusOr<std::string> bytes =
+      RunInChild([&] { return Remesh(given, edge_m); }, kMostCpu);
+  if (!bytes.ok()) {
+    return Refusal(absl::StatusCode::kInternal, "RADIATION_REMESHING_FAILED",
+                   absl::StrCat("the surface could not be meshed with edges of ", edge_m,
+                                " m for its radiation: the mesher was ", bytes.status().message(),
+                                ". The modal model itself is sound; use it without a transfer, or "
+                                "decompose the body with another number of nodes"));
+  }
+  const char* next = bytes->data();
+  const auto coordinates = TakeValues<double>(next);
+  const auto corners = TakeValues<int32_t>(next);
+  SurfaceMesh mesh;
+  for (size_t i = 0; i + 2 < coordinates.size(); i += 3) {
+    mesh.vertices.push_back({coordinates[i], coordinates[i + 1], coordinates[i + 2]});
+  }
+  for (size_t i = 0; i + 2 < corners.size(); i += 3) {
+    mesh.triangles.push_back({corners[i], corners[i + 1], corners[i + 2]});
+  }
+  return mesh;
+}
+
+}  // namespace carillon::precompute

@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "precompute/radiation/surface_level.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+#include "precompute/mesh/point_math.h"
+#include "precompute/radiation/remesh_surface.h"
+
+namespace carillon::precompute {
+namespace {
+
+Point Moved(const Point& p, const Point& direction, double distance) {
+  Point moved = p;
+  const double length = Norm(direction);
+  for (size_t a = 0; a < 3; ++a) moved[a] += distance / length * direction[a];
+  return moved;
+}
+
+/// The nearest place from outside the surface, so that it is one that faces outwards there.
+NearestTriangle::Place FindFacing(const SurfaceMesh& given, const NearestTriangle& index,
+                                  const Point& p, const Point& normal, double edge_m) {
+  const NearestTriangle::Place nearest = index.Find(p);
+  for (const double step : {0.0, 0.1, 0.25}) {
+    const NearestTriangle::Place place = index.Find(Moved(p, normal, step * edge_m));
+    const auto corner = CornersOf(given, static_cast<size_t>(place.triangle));
+    if (Dot(AreaNormal(corner), normal) > 0) return place;
+  }
+  return nearest;
+}
+
+SurfacePlace Weigh(const SurfaceMesh& given, const NearestTriangle::Place& place) {
+  const auto t = static_cast<size_t>(place.triangle);
+  const auto corner = CornersOf(given, t);
+  const Point normal = AreaNormal(corner);
+  SurfacePlace result{.vertices = given.triangles[t], .weights = {}};
+  for (size_t c = 0; c < 3; ++c) {
+    const Point part = AreaNormal({place.point, corner[(c + 1) % 3], corner[(c + 2) % 3]});
+    result.weights[c] = std::clamp(Dot(part, normal) / Dot(normal, normal), 0.0, 1.0);
+  }
+  const double sum = result.weights[0] + result.weights[1] + result.weights[2];
+  for (double& weight : result.weights) weight /= sum;
+  return result;
+}
+
+/// Without triangles that have no area to integrate over.
+SurfaceMesh WithoutFlat(SurfaceMesh mesh, double edge_m) {
+  constexpr double kFlat = 1e-9;
+  std::erase_if(mesh.triangles, [&](const std::array<int32_t, 3>& triangle) {
+    const Point &a = mesh.vertices[static_cast<size_t>(triangle[0])],
+                &b = mesh.vertices[static_cast<size_t>(triangle[1])],
+                &c = mesh.vertices[static_cast<size_t>(triangle[2])];
+    return Norm(AreaNormal({a, b, c})) < kFlat * edge_m * edge_m;
+  });
+  return mesh;
+}
+
+/// Drops vertices that no triangle has.
+SurfaceMesh WithoutLoose(const SurfaceMesh& mesh) {
+  SurfaceMesh result;
+  std::vector<int32_t> number(mesh.vertices.size(), -1);
+  for (std::array<int32_t, 3> triangle : mesh.triangles) {
+    for (int32_t& v : triangle) {
+      int32_t& own = number[static_cast<size_t>(v)];
+      if (own < 0) {
+        own = static_cast<int32_t>(result.vertices.size());
+        result.vertices.push_back(mesh.vertices[static_cast<size_t>(v)]);
+      }
+      v = own;
+    }
+    result.triangles.push_back(triangle);
+  }
+  return result;
+}
+
+}  // namespace
+
+std::vector<SurfacePlace> PlacesOn(const SurfaceMesh& given, const NearestTriangle& index,
+                                   const AcousticSurface& surface) {
+  std::vector<SurfacePlace> places;
+  for (size_t v = 0; v < surface.vertex_count(); ++v) {
+    places.push_back(Weigh(given, FindFacing(given, index, surface.mesh.vertices[v],
+                                             surface.area_vectors[v], surface.mean_edge_m)));
+  }
+  return places;
+}
+
+absl::StatusOr<SurfaceLevel> MakeSurfaceLevel(const RadiatingSurface& given,
+                                              const NearestTriangle& index, double edge_m,
+                                              Workers& workers) {
+  const absl::StatusOr<SurfaceMesh> remeshed = RemeshSurface(given.mesh, edge_m);
+  if (!remeshed.ok()) return remeshed.status();
+  AcousticSurface near_it = MakeAcousticSurface(WithoutLoose(WithoutFlat(*remeshed, edge_m)));
+  std::vector<SurfacePlace> places = PlacesOn(given.mesh, index, near_it);
+  SurfaceMesh on_it = std::move(near_it.mesh);
+  for (size_t v = 0; v < places.size(); ++v) {
+    Point& p = on_it.vertices[v];
+    p = {};
+    for (size_t c = 0; c < 3; ++c) {
+      const Point& corner = given.mesh.vertices[static_cast<size_t>(places[v].vertices[c])];
+      for (size_t a = 0; a < 3; ++a) p[a] += places[v].weights[c] * corner[a];
+    }
+  }
+  SurfaceLevel level{.surface = MakeAcousticSurface(WithoutFlat(std::move(on_it), edge_m)),
+                     .near = {},
+                     .places = std::move(places)};
+  level.near = MakeNearCorrection(level.surface, workers);
+  return level;
+}
+
+Displacement DisplacementOf(const SurfaceModes& modes, size_t mode, const RadiatingSurface& given,
+                            const SurfaceLevel& level) {
+  const size_t count = modes.mode_count();
+  Displacement displacement;
+  displacement.reserve(level.places.size());
+  for (const SurfacePlace& place : level.places) {
+    std::array<float, 3>& u = displacement.emplace_back();
+    for (size_t c = 0; c < 3; ++c) {
+      const auto vertex = static_cast<size_t>(place.vertices[c]);
+      const float* shape =
+          &modes.shapes[3 * count * static_cast<size_t>(given.body_vertex[vertex]) + mode];
+      for (size_t a = 0; a < 3; ++a) {
+        u[a] += static_cast<float>(place.weights[c]) * shape[a * count];
+      }
+    }
+  }
+  return displacement;
+}
+
+}  // namespace carillon::precompute

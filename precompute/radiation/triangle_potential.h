@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <array>
+
+#include "precompute/mesh/surface_mesh.h"
+
+namespace carillon::precompute {
+
+/// What a plane triangle with a density that is linear on it does at a point: one number for the
+/// hat function of each corner.
+struct TrianglePotentials {
+  std::array<double, 3> single;   ///< integral of hat / r, m
+  std::array<double, 3> doubled;  ///< integral of hat d(1/r)/dn' (n' the triangle's normal)
+};
+
+/// The potentials of one triangle in closed form (Wilton et al., IEEE Trans. Antennas Propag. 32,
+/// 1984; Graglia, ibid. 41, 1993). The triangle must have an area.
+class TrianglePotential {
+ public:
+  explicit TrianglePotential(const std::array<Point, 3>& corner);
+
+  /// At `x`, which may lie on the triangle but not on the line of an edge within that edge. In the
+  /// plane of the triangle the double layer is its mean over both sides, zero.
+  TrianglePotentials At(const Point& x) const;
+
+ private:
+  struct Edge {
+    Point from;
+    Point along;    ///< of length one
+    Point outward;  ///< in the plane, of length one
+    double length_m;
+  };
+  std::array<Edge, 3> edges_;      ///< edge e faces corner e
+  std::array<Point, 3> gradient_;  ///< of the hat functions, 1/m
+  std::array<Point, 3> corner_;
+  Point normal_;
+};
+
+}  // namespace carillon::precompute
