@@ -5,7 +5,7 @@ import pathlib
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-TOP_FOLDERS = ("proto", "server", "precompute", "client_sdk", "tests", "deploy", ".ci")
+TOP_FOLDERS = ("proto", "server", "precompute", "client_sdk", "docs", "tests", "deploy", ".ci")
 CXX_SUFFIXES = (".cc", ".h")
 NOT_OURS = {"__pycache__", "node_modules"}
 
