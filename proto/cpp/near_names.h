@@ -8,9 +8,8 @@
 
 namespace carillon {
 
-/// The names closest to what was written by number of letters to change, add or leave out, in
-/// either case; a name with underscores is as close as the closest of its words. None where more
-/// than a third of the letters differ.
+/// The names with the least edit distance to `written`, ignoring case. The distance of a name with
+/// underscores is that of its closest word. Empty if more than a third of the letters differ.
 std::vector<std::string> NearNames(std::string_view written, std::span<const std::string> names);
 
 }  // namespace carillon
