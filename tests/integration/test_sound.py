@@ -49,7 +49,7 @@ class StruckBody(DaemonTest):
 
     def modes(self, young_pa=meshes.YOUNG_PA, density_kg_per_m3=meshes.DENSITY,
               alpha1_s=meshes.ALPHA1_S, alpha2_per_s=0.0, size=1.0):
-        """(damped frequencies in Hz, decay rates in 1/s) of the model, by physics.md's formulas."""
+        """(damped frequencies in Hz, decay rates in 1/s) of the model, as in docs/physics.md, 2."""
         scaled = self.eigenvalues * young_pa / (density_kg_per_m3 * size**2)
         sigma = -(alpha1_s * scaled + alpha2_per_s) / 2
         return numpy.sqrt(scaled - sigma**2) / (2 * math.pi), sigma

@@ -56,7 +56,7 @@ struct SoundingModes {
 double NaturalFrequencyHz(double eigenvalue, const SoundingMaterial& material);
 
 /// Applies material and size to a model's eigenvalues and couplings (each #m, ascending), and
-/// selects the modes that sound (the paper, 3.4):
+/// selects the modes that sound (docs/physics.md, 2 and 3; the paper, 3.4):
 ///
 ///   Lambda' = Lambda E/(rho s^2),  sigma = -(alpha1 Lambda' + alpha2 + eta Lambda'^(1/2))/2,
 ///   omega_d = sqrt(Lambda' - sigma^2),  c' = c E^(1/2) rho^(-1) s^(-1/2)

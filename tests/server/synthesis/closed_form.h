@@ -50,7 +50,8 @@ inline SoundingMode MakeMode(uint32_t column, double frequency_hz, double decay_
           .coupling = coupling};
 }
 
-/// The closed form of one mode's sound `time_s` after an impulse with modal impulse `g`, in
+/// The closed form of one mode's sound `time_s` after an impulse with modal impulse `g`
+/// (docs/physics.md, 3), in
 /// samples, with the Gaussian contact's factor and, for the second of a pair, its companion.
 inline double ClosedForm(const SoundingMode& mode, double g, double time_s, double tau_s = 0) {
   if (time_s < 0) return 0;

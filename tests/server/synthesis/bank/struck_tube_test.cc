@@ -198,7 +198,7 @@ void ExpectChange(SoundingMaterial changed, double pitch, double level) {
   EXPECT_NEAR(ratio, level, 0.01 * level);
 }
 
-// Level is c phi / omega: physics.md 2 and 3.
+// Level is c phi / omega: docs/physics.md, 2 and 3.
 TEST(StruckTube, FourTimesAsStiffSoundsAnOctaveHigherAndAsLoud) {
   SoundingMaterial stiff = kAluminum;
   stiff.young_pa *= 4;
