@@ -10,20 +10,21 @@
 namespace carillon::precompute {
 
 /// Stiffness and mass of a body; unknown 3 i + a is component a of the displacement of the i-th
-/// node that can move.
+/// node that is not fixed.
 struct SystemMatrices {
   using Sparse = Eigen::SparseMatrix<double>;
 
   /// #U by #U, N/m, symmetric: the lower triangle only.
   Sparse K;
-  /// #U by #U, kg, symmetric positive definite: the lower triangle only. Components do not mix.
+  /// #U by #U, kg, symmetric positive definite: the lower triangle only. It does not couple
+  /// different components.
   Sparse M;
 
   Eigen::Index unknown_count() const { return K.rows(); }
 };
 
-/// Assembles the matrices of a body; the elements' order is that of the mesh (4 or 10 nodes). Held
-/// nodes have no unknowns. Every element must have positive volume.
+/// Assembles the matrices of a body from elements of 4 or 10 nodes. Fixed nodes have no unknowns.
+/// Every element must have positive volume.
 SystemMatrices Assemble(const TetMesh& mesh, const ElasticConstants& elastic,
                         double density_kg_per_m3, MassSharing sharing);
 

@@ -10,7 +10,7 @@ namespace carillon::precompute {
 /// How an element's mass is shared among its nodes.
 enum class MassSharing { kConsistent, kLumped };
 
-/// What a straight-sided tetrahedron's matrices depend on.
+/// The geometry that determines the matrices of a straight-sided tetrahedron.
 struct TetGeometry {
   /// Row i is the gradient of corner i's barycentric coordinate, 1/m: the first three columns of
   /// the paper's beta (O'Brien et al. 2002, 3.3).

@@ -6,7 +6,7 @@ namespace {
 
 using Sparse = SystemMatrices::Sparse;
 
-/// Of each unknown its new number; -1 for one left out.
+/// The new number of each unknown; -1 for one that is left out.
 std::vector<int> Renumber(Eigen::Index unknown_count, const std::vector<int32_t>& moving) {
   std::vector<int> number(static_cast<size_t>(unknown_count), -1);
   int next = 0;

@@ -9,16 +9,17 @@
 
 namespace carillon::precompute {
 
-/// The nodes of a mesh that are not held, ascending: the order of the unknowns.
+/// The nodes of a mesh that are not fixed, ascending. The unknowns are in this order.
 std::vector<int32_t> MovingNodes(const TetMesh& mesh);
 
-/// The places of some nodes, metres.
+/// The positions of `nodes`, metres.
 std::vector<Point> PlacesOf(const std::vector<int32_t>& nodes, const TetMesh& mesh);
 
-/// The rows and columns of the moving nodes, of matrices of all nodes.
+/// Restricts matrices of all nodes to the rows and columns of the moving nodes.
 SystemMatrices Restricted(const SystemMatrices& system, const std::vector<int32_t>& moving);
 
-/// Vectors of moving nodes (columns) as those of all `node_count` nodes: zero where they are held.
+/// Extends vectors (columns) of the moving nodes to all `node_count` nodes, with zeros at fixed
+/// nodes.
 Eigen::MatrixXd Extended(const Eigen::MatrixXd& vectors, const std::vector<int32_t>& moving,
                          size_t node_count);
 

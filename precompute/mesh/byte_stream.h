@@ -9,7 +9,8 @@
 
 namespace carillon::precompute {
 
-/// Appends the count of plain values and the values, for TakeValues in the same program.
+/// Appends the number of plain values and the values themselves. TakeValues of the same program
+/// reads them.
 template <typename T>
 void AppendValues(std::string& bytes, std::span<const T> values) {
   const size_t count = values.size();
@@ -17,7 +18,7 @@ void AppendValues(std::string& bytes, std::span<const T> values) {
   bytes.append(reinterpret_cast<const char*>(values.data()), values.size_bytes());
 }
 
-/// Takes off what AppendValues appended.
+/// Reads values written by AppendValues and advances `bytes` behind them.
 template <typename T>
 std::vector<T> TakeValues(const char*& bytes) {
   size_t count = 0;

@@ -190,7 +190,7 @@ class Holder {
 
   using Edges = absl::flat_hash_set<std::pair<int32_t, int32_t>>;
 
-  /// A group that marks nodes means the part of the boundary between them.
+  /// A group of nodes stands for the part of the boundary between these nodes.
   void AddEdgesBetweenPoints(const MeshGroup& group, Edges& edges) const {
     absl::flat_hash_set<int32_t> points;
     for (const auto& corners : group.simplices) {

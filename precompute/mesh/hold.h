@@ -13,36 +13,36 @@
 
 namespace carillon::precompute {
 
-/// Vertices by their numbers, see MeshNames: the node nearest to each, and all of a given triangle
-/// or edge whose corners are held.
+/// Vertices by their numbers, see MeshNames. The nearest node of each is fixed, and so are all
+/// nodes of a given triangle or edge whose corners are all listed.
 struct HeldVertices {
   std::vector<int64_t> numbers;
 };
 
-/// What lies in a plane or behind it, away from its normal.
+/// All nodes in a plane or behind it, that is on the side opposite to its normal.
 struct HeldPlane {
   Point point_m;
   Point normal;  ///< of any length above zero
 };
 
-/// What lies in a box or on it.
+/// All nodes in a box or on its surface.
 struct HeldBox {
   Point low_m;
   Point high_m;
 };
 
-/// A group that the file names.
+/// A group of the mesh file.
 struct HeldGroup {
   std::string name;
 };
 
 using Fixture = std::variant<HeldVertices, HeldPlane, HeldBox, HeldGroup>;
 
-/// Fills `mesh.held` with the nodes that the fixtures hold, mid-side nodes too; places count as one
-/// within a millionth of the body's diagonal.
+/// Applies boundary conditions: fills `mesh.held` with the nodes in the regions of the fixtures,
+/// including mid-side nodes. The tolerance of a region is a millionth of the body's diagonal.
 /// `given`: the surface to which the boundary of `mesh` refers.
 ///
-/// Errors: NO_VERTEX_HELD (by one of the fixtures), ALL_VERTICES_HELD, GROUP_UNKNOWN.
+/// Errors: NO_VERTEX_HELD (a fixture contains no node), ALL_VERTICES_HELD, GROUP_UNKNOWN.
 absl::Status Hold(const std::vector<Fixture>& fixtures, const SurfaceMesh& given,
                   const MeshNames& names, TetMesh& mesh);
 

@@ -3,7 +3,7 @@
 
 namespace carillon::precompute {
 
-/// Largest surface taken: above it checking and meshing no longer end within minutes.
+/// Largest surface accepted: larger ones take more than minutes to check and to mesh.
 inline constexpr int kMaxSurfaceTriangles = 1'000'000;
 
 /// Largest tetrahedral mesh, corner and mid-side nodes: its factorization needs some 100 GB.

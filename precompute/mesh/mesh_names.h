@@ -13,25 +13,25 @@
 
 namespace carillon::precompute {
 
-/// A part of a body that its file names.
+/// A named part of a mesh file.
 struct MeshGroup {
   std::string name;
-  /// Of a surface: its triangles, as given.
+  /// For a surface: indices of its triangles, as given.
   std::vector<int32_t> triangles = {};
-  /// Of tetrahedra: its points, edges, faces and elements, each by the nodes at its corners; -1
-  /// past the last.
+  /// For tetrahedra: its points, edges, faces and elements, each by the nodes at its corners,
+  /// filled up with -1.
   std::vector<std::array<int32_t, 4>> simplices = {};
 };
 
-/// By what a mesh file and its user call parts of the body.
+/// The names and numbers by which a mesh file identifies parts of the body.
 struct MeshNames {
-  /// Place of each vertex, by its number: of a surface from 0 in the order of the file (STL has
-  /// none), of tetrahedra as the file numbers its nodes.
+  /// Position of each vertex, by its number. Vertices of a surface are counted from 0 in the order
+  /// of the file (STL has none); nodes of tetrahedra have the file's numbers.
   absl::flat_hash_map<int64_t, Point> vertices = {};
   std::vector<MeshGroup> groups = {};
 };
 
-/// What a mesh file holds: a surface still to be filled, or a mesh of tetrahedra ready for use.
+/// The content of a mesh file: a surface still to be filled, or a mesh of tetrahedra ready for use.
 using Mesh = std::variant<SurfaceMesh, TetMesh>;
 
 struct NamedMesh {

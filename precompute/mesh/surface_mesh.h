@@ -9,8 +9,8 @@ namespace carillon::precompute {
 
 using Point = std::array<double, 3>;
 
-/// A surface as it was given: vertices in metres; triangles counter-clockwise seen from outside
-/// (from inside, where the whole surface was given inside out).
+/// A surface: vertices in metres, and triangles counter-clockwise seen from outside. The triangles
+/// of a surface that was given inside out are clockwise.
 struct SurfaceMesh {
   std::vector<Point> vertices;
   std::vector<std::array<int32_t, 3>> triangles;

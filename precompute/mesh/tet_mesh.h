@@ -34,7 +34,7 @@ struct TetMesh {
   /// volume, then the mid-side nodes of edges 0-1, 1-2, 2-0, 0-3, 1-3, 2-3.
   std::vector<int32_t> elements;
   std::vector<BoundaryFace> boundary;
-  /// Nodes that cannot move, ascending; none: the body is free.
+  /// Fixed nodes, ascending. Empty: the body is free.
   std::vector<int32_t> held = {};
 
   size_t element_count() const { return elements.size() / static_cast<size_t>(nodes_per_element); }

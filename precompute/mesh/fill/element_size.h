@@ -5,8 +5,8 @@
 
 namespace carillon::precompute {
 
-/// How coarse a surface is: the longest edge of its triangles, in the mean over their area. Errors
-/// of frequencies go with a power of it. In the unit of the vertices.
+/// The element size of a surface: the longest edge of each triangle, averaged over the area, in the
+/// unit of the vertices. Frequency errors are proportional to a power of it.
 double Grain(const SurfaceMesh& surface);
 
 }  // namespace carillon::precompute

@@ -23,7 +23,7 @@
 namespace carillon::precompute {
 namespace {
 
-/// The largest meshes that are taken need a minute.
+/// The largest accepted meshes need a minute.
 constexpr std::chrono::seconds kMostCpu(600);
 constexpr int kTetgenOutOfMemory = 1;  // what terminatetetgen throws
 
@@ -34,7 +34,7 @@ absl::Status Failed(absl::string_view what) {
                               "triangles, or give a mesh of tetrahedra (Gmsh, MSH 2.2)"));
 }
 
-/// What TetGen made, as it comes from the child.
+/// TetGen's mesh, as the child process sends it.
 struct Filling {
   int error = 0;
   std::vector<double> coordinates;       // three a node
@@ -76,7 +76,7 @@ std::string RunTetgen(const FillRequest& request) {
   DescribeSurface(request.surface, in);
   DescribeCavities(request.cavities, in);
   // Piecewise linear complex, quality, volume bound, indices from zero, quiet; keep the surface.
-  // What is plane but for single precision is plane.
+  // Facets that are plane within single precision count as plane.
   std::string switches = request.keep_surface ? "pqazT1e-6QY" : "pqazT1e-6Q";
   // Radius to edge up to 3 instead of 2.
   if (request.cautious) switches = request.keep_surface ? "pq3azT1e-6QY" : "pq3azT1e-6Q";
@@ -150,9 +150,9 @@ bool IsFlat(const std::vector<Point>& nodes, const int32_t* corners) {
   return TetVolume(p[0], p[1], p[2], p[3]) < kFlat * longest * longest * longest;
 }
 
-/// Takes off flat tetrahedra with two faces on the boundary, which the mesher lays on faces that
-/// are plane but for the rounding of single precision: their nodes would hang in the air. The other
-/// two faces take their place.
+/// Removes flat tetrahedra with two faces on the boundary. The mesher puts them on faces that are
+/// plane except for rounding in single precision, and they would add nodes almost without
+/// stiffness. The other two faces of the tetrahedron become boundary faces.
 void PeelFlatTetrahedra(TetMesh& mesh, GivenTriangles& given) {
   absl::flat_hash_map<Corners, int> use_count;
   const size_t count = mesh.elements.size() / 4;

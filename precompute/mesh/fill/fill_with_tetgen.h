@@ -10,25 +10,25 @@
 
 namespace carillon::precompute {
 
-/// A closed surface of about unit size and what is wanted of the tetrahedra inside.
+/// A closed surface of about unit size, and requirements on the tetrahedra inside it.
 struct FillRequest {
   const RefinedSurface& surface;
   /// A point in each cavity.
   std::vector<Point> cavities;
-  /// No tetrahedron is larger, in units of the surface cubed.
+  /// Largest volume of a tetrahedron, in the surface's unit of length cubed.
   double max_volume;
-  /// Adds no vertex on the surface.
+  /// Whether to add no vertices on the surface.
   bool keep_surface;
-  /// Adds at most so many vertices.
+  /// Largest number of vertices to add.
   int max_added_nodes;
-  /// For a surface that the mesher came to grief over: tolerates more in the surface and asks for
-  /// less in the shape of the tetrahedra.
+  /// For a surface on which the mesher failed: it tolerates larger defects of the surface and worse
+  /// shapes of the tetrahedra.
   bool cautious = false;
 };
 
-/// Fills the surface with 4-node tetrahedra, in a process of its own: TetGen crashes on input it
-/// does not like. Each boundary face names its given triangle. Errors:
-/// MESH_TETRAHEDRALIZATION_FAILED, OUT_OF_MEMORY.
+/// Fills the surface with 4-node tetrahedra, in a child process because TetGen crashes on some
+/// inputs. Each boundary face stores its given triangle. Errors: MESH_TETRAHEDRALIZATION_FAILED,
+/// OUT_OF_MEMORY.
 absl::StatusOr<TetMesh> FillWithTetgen(const FillRequest& request);
 
 }  // namespace carillon::precompute

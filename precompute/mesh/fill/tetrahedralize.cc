@@ -22,9 +22,10 @@
 namespace carillon::precompute {
 namespace {
 
-// An automatic mesh has edges of at most a twentieth of the body's length, and elements at most so
-// many times as long as the wall is thick, as far as these two bounds on elements allow: enough for
-// the first bending mode of a compact body within 1 %, few enough to be solved in seconds.
+// An automatic mesh has edges of at most a twentieth of the body's length, and elements whose
+// length is at most a fixed multiple of the wall's thickness, unless that would exceed these two
+// limits on the number of elements. This finds the first bending mode of a compact body within 1 %
+// and can be solved in seconds.
 constexpr double kEdgesAlongBody = 20;
 constexpr double kEdgesPerThickness = 8;
 constexpr double kMinElements = 1'500;
@@ -41,7 +42,8 @@ constexpr int kNodesPerCorner = 8;  // about, of a solid with mid-side nodes
 constexpr int kMaxCorrections = 3;
 constexpr double kTargetTolerance = 0.2;
 
-// The count of nodes goes with a power of the edge between two (on the surface) and three (inside).
+// The number of nodes is proportional to a power of the edge length between -2 (on the surface) and
+// -3 (inside).
 constexpr double kEdgeByNodes = 1 / 2.5;
 constexpr int kMaxEdgeSteps = 8;
 constexpr double kCoarsestToGrain = 2.5;
@@ -80,8 +82,8 @@ Extent Measure(const SurfaceMesh& surface, const std::vector<Shell>& shells) {
   return extent;
 }
 
-/// Elements to expect with edges of length `edge`: regular tetrahedra inside, or, where the wall is
-/// thinner than an edge, one layer of three for each two triangles of both its sides.
+/// Estimated number of elements with edges of length `edge`: regular tetrahedra inside, or, if the
+/// wall is thinner than an edge, one layer of three elements for each pair of opposite triangles.
 double ExpectedElements(const Extent& extent, double edge) {
   const double inside = extent.volume * 6 * std::sqrt(2.0) / (edge * edge * edge);
   const double on_surface = 1.5 * extent.area * 4 / (std::sqrt(3.0) * edge * edge);
@@ -177,8 +179,8 @@ class Filler {
   }
 
  private:
-  /// Narrow triangles are cut into many more than their area suggests: then longer edges must do,
-  /// up to those that still let the body bend.
+  /// Narrow triangles are split into many more parts than their area suggests. In that case longer
+  /// edges are used, up to the longest with which the body can still bend.
   double CoarserOnNarrowTriangles(double edge) const {
     const auto count = [&](double longest) {
       return RefineSurface(surface_, longest).surface.triangles.size();
@@ -190,7 +192,8 @@ class Filler {
     return edge;
   }
 
-  /// Nodes to expect: those of the refined surface, and inside of what is deeper than half an edge.
+  /// Estimated number of nodes: those of the refined surface, and those inside the part of the body
+  /// that is deeper than half an edge.
   double ExpectedNodes(double edge) const {
     const SurfaceMesh surface = RefineSurface(surface_, LongestOnSurface(edge)).surface;
     const double deep = std::max(extent_.volume - extent_.area * edge / 2, 0.0);
@@ -208,7 +211,7 @@ class Filler {
     return edge;
   }
 
-  /// By what is expected, then by how far that was off.
+  /// First by the estimate, then corrected by the error of the estimate.
   absl::StatusOr<TetMesh> FillToTarget() const {
     const double target = settings_.target_node_count;
     double edge = EdgeForNodes(target, EdgeForElements(extent_, 4 * target));
@@ -224,15 +227,15 @@ class Filler {
     return mesh;
   }
 
-  /// Inside elements may be as long as the longest on the surface: where the surface is finer than
-  /// it need be, the inside is not.
+  /// Elements inside may be as long as the longest edge on the surface, so that a surface finer
+  /// than necessary does not refine the inside.
   absl::StatusOr<TetMesh> FillToGrain(double grain) const {
     const double edge = EdgeForGrain(grain);
     return FillWithEdge(edge, kLongestToMeanEdge * edge);
   }
 
-  /// The longest edge with which the surface is no coarser than `grain`. All sides of a surface of
-  /// few triangles are cut at once, so it may come out finer.
+  /// The longest edge with which the element size of the surface is at most `grain`. All edges of a
+  /// surface of few triangles are split at once, so that the result may be finer.
   double EdgeForGrain(double grain) const {
     double fine = grain, coarse = kCoarsestToGrain * grain;
     for (int step = 0; step < kMaxEdgeSteps; ++step) {

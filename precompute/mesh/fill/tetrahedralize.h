@@ -10,11 +10,12 @@
 namespace carillon::precompute {
 
 struct MeshingSettings {
-  /// Keep the vertices of the surface and add none on it; unset: decided from the surface.
+  /// Whether to keep the vertices of the surface and add none on it; unset: it is chosen from the
+  /// surface.
   std::optional<bool> keep_surface = std::nullopt;
-  /// About how many corner nodes the mesh should have; zero: decided from the surface.
+  /// Approximate number of corner nodes of the mesh; zero: it is chosen from the surface.
   int target_node_count = 0;
-  /// How coarse the mesh may be on its surface, as Grain() measures it, in metres; zero: no matter.
+  /// Largest element size on the surface, as Grain() measures it, metres; zero: no limit.
   double grain_m = 0;
   /// 4 or 10. Mid-side nodes lie on straight edges.
   int nodes_per_element = 10;
@@ -23,8 +24,8 @@ struct MeshingSettings {
 };
 
 /// Fills a surface that CheckSurface accepted with tetrahedra; cavities stay empty. Each face of
-/// the mesh's boundary names the given triangle it lies on. The mesher runs in a child process, so
-/// that input it crashes on is refused like any other.
+/// the mesh's boundary stores the given triangle that it lies on. The mesher runs in a child
+/// process, so that a crash of the mesher is an ordinary error.
 ///
 /// Errors: MESH_TETRAHEDRALIZATION_FAILED, MESH_TOO_LARGE, OUT_OF_MEMORY.
 absl::StatusOr<TetMesh> Tetrahedralize(const SurfaceMesh& surface, const MeshingSettings& settings);

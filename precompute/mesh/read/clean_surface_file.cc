@@ -44,7 +44,7 @@ absl::Status AppendPoint(const TextLines& lines, Words words, std::string& out) 
                      absl::StrCat("line ", lines.number(), ": a vertex has the coordinate ",
                                   ToAbsl(word), ": give it finite coordinates"));
     }
-    // Written anew: assimp passes over a vertex with a number like ".5".
+    // The vertex is written again, because assimp ignores a vertex with a number like ".5".
     absl::StrAppendFormat(&out, " %.17g", *x);
   }
   out += '\n';

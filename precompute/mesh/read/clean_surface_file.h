@@ -7,9 +7,9 @@
 
 namespace carillon::precompute {
 
-/// Refuses what assimp would silently clamp, repair or read past the end of, and returns the file
-/// with only what belongs to the surface (assimp groups the faces of an OBJ file by its objects,
-/// and knows no comments in OFF).
+/// Refuses files whose faults assimp would silently clamp, repair or read past the end of. Returns
+/// the file reduced to its surface, because assimp groups the faces of an OBJ file by its objects
+/// and does not accept comments in OFF.
 ///
 /// `format`: "obj", "off", "ply" or "stl" (returned as it is: assimp hides nothing there).
 /// Errors: MESH_UNREADABLE, MESH_NOT_FINITE, MESH_INDEX_OUT_OF_RANGE, each with the line;

@@ -13,15 +13,15 @@
 
 namespace carillon::precompute {
 
-/// What a file of nodes and elements says, not yet checked; nodes are named by their numbers in the
-/// file.
+/// The unchecked content of a file of nodes and elements. Nodes are identified by their numbers in
+/// the file.
 struct ElementFile {
-  /// Points, edges, faces and elements that belong together.
+  /// A named group of points, edges, faces and elements.
   struct Group {
     std::string name;
-    /// Numbers of the nodes at the corners of each; kNoNode past the last.
+    /// Numbers of the nodes at the corners of each, filled up with kNoNode.
     std::vector<std::array<int64_t, 4>> simplices;
-    /// Which of `triangles`.
+    /// Indices into `triangles`.
     std::vector<int32_t> triangles;
   };
   static constexpr int64_t kNoNode = std::numeric_limits<int64_t>::min();
@@ -45,7 +45,7 @@ struct ElementFile {
   Group& Named(const std::string& name);
 };
 
-/// Errors: MESH_TOO_LARGE, where there are more nodes than can be taken.
+/// Errors: MESH_TOO_LARGE, if there are more nodes than the limit.
 absl::Status CheckNodeCountOfFile(size_t count);
 
 /// The error MESH_ELEMENT_UNSUPPORTED of a file that has `what`.

@@ -16,7 +16,7 @@ absl::Status Malformed(absl::string_view section) {
                               "again, by \"gmsh -format msh41\""));
 }
 
-/// Adds so many numbers to `values`; memory grows only with what the file holds.
+/// Adds `count` numbers to `values`. Memory grows only with the numbers actually in the file.
 template <typename T>
 bool TakeMany(uint64_t count, NumberStream& stream, std::vector<T>& values) {
   for (uint64_t i = 0; i < count; ++i) {
@@ -40,7 +40,8 @@ absl::Status Gmsh41Sections::ReadEntities(NumberStream& stream) {
   return absl::OkStatus();
 }
 
-/// Its number, its place or its box, its physical groups, and what bounds it.
+/// An entity: its number, its position or bounding box, its physical groups, and the entities that
+/// bound it.
 bool Gmsh41Sections::ReadEntity(int dimension, NumberStream& stream) {
   int32_t number = 0;
   std::vector<double> place;

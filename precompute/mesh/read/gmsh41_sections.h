@@ -12,15 +12,14 @@
 
 namespace carillon::precompute {
 
-/// The sections of a file of MSH 4.1 that differ from those of 2.2. Each reads `stream` from behind
-/// its name on.
-/// https://gmsh.info/doc/texinfo/gmsh.html#MSH-file-format
+/// Readers of the sections in which MSH 4.1 differs from 2.2. Each function reads `stream` from the
+/// position behind the name of its section. https://gmsh.info/doc/texinfo/gmsh.html#MSH-file-format
 /// Errors: MESH_UNREADABLE, MESH_TOO_LARGE, MESH_ELEMENT_UNSUPPORTED.
 class Gmsh41Sections {
  public:
   explicit Gmsh41Sections(GmshElements& elements) : elements_(elements) {}
 
-  /// Which physical groups the points, curves, surfaces and volumes of the geometry are in.
+  /// Reads the physical groups of the points, curves, surfaces and volumes of the geometry.
   absl::Status ReadEntities(NumberStream& stream);
   absl::Status ReadNodes(NumberStream& stream);
   absl::Status ReadElements(NumberStream& stream);

@@ -28,9 +28,9 @@ absl::Status UnknownGmshKind(int type);
 
 /// Elements of a Gmsh file of any version, as they are read.
 struct GmshElements {
-  /// Adds an element to the file and to its physical groups: by their names, or by their numbers
-  /// where these have none and do not number volumes (whose numbers stand for materials). Zero is
-  /// no group.
+  /// Adds an element to the file and to its physical groups: by their names, or by their numbers if
+  /// they have no name and do not contain volumes (numbers of volumes stand for materials). Zero
+  /// means no group.
   absl::Status Add(const GmshKind& kind, std::span<const int32_t> physicals,
                    std::span<const int64_t> nodes);
 

@@ -156,7 +156,7 @@ class Parser {
     return 1;
   }
 
-  /// A header of type, number of elements and number of tags, then so many elements.
+  /// A header of type, number of elements and number of tags, followed by the elements.
   absl::StatusOr<size_t> ReadBinaryElements() {
     std::array<int32_t, 3> header;
     if (!Take(std::span(header)) || header[1] < 1 || header[2] < 0) {

@@ -46,7 +46,7 @@ NodeOfNumber NumberNodes(const ElementFile& file) {
   return node_of_number;
 }
 
-/// Nodes by their index into `file.nodes`, of elements of so many nodes each.
+/// The nodes of elements, as indices into `file.nodes`.
 absl::StatusOr<std::vector<int32_t>> FindNodes(std::span<const int64_t> numbers, size_t of_each,
                                                absl::string_view element,
                                                const NodeOfNumber& node_of_number) {
@@ -65,7 +65,8 @@ absl::StatusOr<std::vector<int32_t>> FindNodes(std::span<const int64_t> numbers,
   return nodes;
 }
 
-/// Leaves out the nodes that no element has; returns the new index of each, -1 for one left out.
+/// Drops the nodes that belong to no element. Returns the new index of each node, -1 for a dropped
+/// one.
 std::vector<int32_t> DropUnusedNodes(TetMesh& mesh) {
   std::vector<int32_t> new_index(mesh.nodes.size(), -1);
   for (const int32_t node : mesh.elements) new_index[static_cast<size_t>(node)] = 0;
@@ -80,7 +81,7 @@ std::vector<int32_t> DropUnusedNodes(TetMesh& mesh) {
   return new_index;
 }
 
-/// What the file calls the nodes that are left; a simplex with another node is passed over.
+/// The names of the remaining nodes. A simplex with a dropped node is ignored.
 MeshNames NamesOf(const ElementFile& file, const NodeOfNumber& node_of_number,
                   const std::vector<int32_t>& new_index, const TetMesh& mesh) {
   const auto index_of = [&](int64_t number) {

@@ -7,9 +7,9 @@
 
 namespace carillon::precompute {
 
-/// Checks the tetrahedra of a file and finds their boundary; of a file without any makes a surface
-/// of its triangles. Nodes that no tetrahedron has are passed over; the others keep their order.
-/// Tetrahedra given mirrored are turned.
+/// Checks the tetrahedra of a file and finds their boundary. If the file has no tetrahedra, makes a
+/// surface from its triangles. Nodes that belong to no tetrahedron are dropped; the others keep
+/// their order. Mirrored tetrahedra are reoriented.
 ///
 /// Errors: MESH_NOT_FINITE, MESH_INDEX_OUT_OF_RANGE, MESH_EMPTY, MESH_ZERO_VOLUME,
 /// MESH_MIDSIDE_NODE_MISPLACED, MESH_NOT_MANIFOLD, MESH_SEVERAL_PIECES.

@@ -14,7 +14,7 @@
 namespace carillon::precompute {
 namespace {
 
-/// What a section lists: nodes of each entry, and how many of them are corners.
+/// The layout of a section: the number of nodes of each entry, and how many of them are corners.
 struct Kind {
   std::string_view keyword;
   int dimension;
@@ -67,7 +67,7 @@ class Parser {
         count > 0) {
       return UnsupportedElements(absl::string_view(keyword.data(), keyword.size()));
     }
-    // Of another section everything up to the next keyword.
+    // Skips any other section up to the next keyword.
     for (std::string_view word = stream_.PeekWord();
          !word.empty() && std::isalpha(static_cast<unsigned char>(word[0])) == 0;
          word = stream_.PeekWord()) {
@@ -121,8 +121,8 @@ class Parser {
     return absl::OkStatus();
   }
 
-  /// Of first order alone; a curved one by its corners, because Medit's surfaces are for looking
-  /// at.
+  /// Adds a triangle of first order. A curved triangle is represented by its corners, because Medit
+  /// uses surfaces for display only.
   void AddFace(int64_t reference, const std::vector<int64_t>& n) {
     const std::vector<std::string> names = Names(2, reference);
     const std::array<std::array<int64_t, 3>, 1> first = {{{n[0], n[1], n[2]}}};
@@ -136,13 +136,13 @@ class Parser {
     file_.AddToGroups(Names(dimension, reference), corners);
   }
 
-  /// Names that tell the kinds apart until all are known.
+  /// Names that distinguish the kinds until all groups are known.
   static std::vector<std::string> Names(int dimension, int64_t reference) {
     if (reference == 0) return {};
     return {absl::StrCat(dimension, " ", reference)};
   }
 
-  /// Of the groups of one number only that of the highest dimension stays.
+  /// Keeps only the group of the highest dimension among the groups with one number.
   void ChooseGroups() {
     std::ranges::sort(file_.groups, std::greater<>(), &ElementFile::Group::name);
     std::vector<ElementFile::Group> chosen;

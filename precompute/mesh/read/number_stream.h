@@ -15,7 +15,7 @@ class NumberStream {
  public:
   NumberStream(std::string_view bytes, bool is_binary) : rest_(bytes), is_binary_(is_binary) {}
 
-  /// False, where the next is no such number, or nothing is left.
+  /// Returns false if the next word is not such a number, or at the end.
   template <typename T>
   bool Take(T& value) {
     if (is_binary_) return TakeBytes(value);
@@ -32,14 +32,14 @@ class NumberStream {
     return true;
   }
 
-  /// Of a text the next word; empty at the end.
+  /// Takes the next word of a text; empty at the end.
   std::string_view NextWord() {
     const std::string_view word = PeekWord();
     rest_.remove_prefix(word.size());
     return word;
   }
 
-  /// The word that comes next.
+  /// Returns the next word without taking it.
   std::string_view PeekWord() {
     SkipBlanks();
     return rest_.substr(0, std::min(rest_.find_first_of(" \t\r\v\f\n#"), rest_.size()));

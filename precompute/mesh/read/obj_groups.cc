@@ -11,7 +11,7 @@ namespace {
 
 using Words = std::vector<std::string_view>;
 
-/// The groups that the faces to come belong to, and those seen.
+/// The groups of the following faces, and all groups seen so far.
 class Groups {
  public:
   /// "g one two": a face may be in several groups.
@@ -25,7 +25,7 @@ class Groups {
     if (words.size() > 1) in_object_.push_back(Find(words[1]));
   }
 
-  /// A polygon of so many corners, which is split into triangles.
+  /// Adds a polygon of `corner_count` corners, which is split into triangles.
   void AddFace(size_t corner_count) {
     if (corner_count < 3) return;
     for (size_t i = 2; i < corner_count; ++i, ++next_triangle_) {

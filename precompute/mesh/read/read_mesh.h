@@ -8,11 +8,12 @@
 
 namespace carillon::precompute {
 
-/// The bytes of a mesh file; of TetGen's pair the .node file followed by the .ele file, whichever
-/// is named, where they are not in one file already. Errors: MESH_FILE_NOT_READABLE, MESH_EMPTY.
+/// Returns the bytes of a mesh file. For TetGen's pair of files it returns the .node file followed
+/// by the .ele file, whichever of them is named, unless one file contains both already. Errors:
+/// MESH_FILE_NOT_READABLE, MESH_EMPTY.
 absl::StatusOr<std::string> ReadMeshFile(const std::string& path, const std::string& format);
 
-/// Reads the mesh file at `path`, and what it calls its parts.
+/// Reads the mesh file at `path` with the names of its parts.
 ///
 /// `format`: "obj", "ply", "stl", "off" (a surface; polygons are split into triangles, otherwise
 /// triangles keep their order and count; vertices at the same place become one), "msh" (Gmsh

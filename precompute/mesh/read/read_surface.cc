@@ -107,7 +107,7 @@ Point ToPoint(std::span<const std::string_view> words) {
   return p;
 }
 
-/// Vertices in the order of the file, of which assimp makes others (OBJ, OFF) but for PLY.
+/// Vertices in the order of the file; assimp changes them for OBJ and OFF files but not for PLY.
 absl::flat_hash_map<int64_t, Point> NumberVertices(const aiScene& scene, const std::string& clean,
                                                    const std::string& format) {
   absl::flat_hash_map<int64_t, Point> vertices;

@@ -8,8 +8,8 @@
 
 namespace carillon::precompute {
 
-/// Reads a surface from the bytes of a file, in the file's unit, and what it calls its parts.
-/// Coordinates have the 24 bits of assimp's numbers.
+/// Reads a surface, in the file's unit, and the names of its parts from the bytes of a file.
+/// Coordinates have single precision, as assimp's numbers have.
 ///
 /// `format`: "obj", "ply", "stl" or "off".
 /// Errors: MESH_EMPTY, MESH_UNREADABLE, MESH_NOT_FINITE, MESH_INDEX_OUT_OF_RANGE.

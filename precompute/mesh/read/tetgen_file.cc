@@ -10,8 +10,8 @@
 namespace carillon::precompute {
 namespace {
 
-/// Where TetGen writes the mid-side nodes of the edges in the order of TetMesh, of a tetrahedron of
-/// ten nodes.
+/// Positions at which TetGen writes the mid-side nodes of a ten-node tetrahedron, in the order of
+/// TetMesh's edges.
 constexpr std::array<size_t, 6> kMidsides = {6, 7, 9, 5, 8, 4};
 
 class Parser {

@@ -54,10 +54,10 @@ class TextLines {
     return words;
   }
 
-  /// Of the line returned last, from 1.
+  /// Number of the line returned last, counted from 1.
   int number() const { return number_; }
 
-  /// What follows the line returned last.
+  /// The text behind the line returned last.
   std::string_view rest() const { return rest_; }
   void Skip(size_t bytes) { rest_.remove_prefix(bytes); }
 
@@ -73,7 +73,8 @@ class TextLines {
   int number_ = 0;
 };
 
-/// The next line of an OBJ file, with those that a '\' at its end continues.
+/// Reads the next line of an OBJ file, joined with the lines that continue it after a '\' at the
+/// end.
 inline bool NextObjLine(TextLines& lines, std::string& joined) {
   std::string_view line;
   if (!lines.Next(line)) return false;
@@ -85,7 +86,7 @@ inline bool NextObjLine(TextLines& lines, std::string& joined) {
   return true;
 }
 
-/// The number that `word` is, as a whole ("1e-3", "-inf"); nothing if it is none.
+/// Converts the whole word to a number ("1e-3", "-inf"); nullopt if it is not a number.
 template <typename T>
 std::optional<T> ToNumber(std::string_view word) {
   if (word.starts_with('+')) word.remove_prefix(1);

@@ -96,7 +96,8 @@ absl::Status CheckDuplicates(const SurfaceMesh& surface) {
                              ": keep one shell of those that are there twice"));
 }
 
-/// How often an edge, seen from its smaller vertex to its larger, is run along and against.
+/// Number of triangles that use an edge from its smaller to its larger vertex, and in the opposite
+/// direction.
 struct EdgeUse {
   int along = 0;
   int against = 0;
@@ -118,7 +119,7 @@ EdgeUses CountEdges(const SurfaceMesh& surface) {
   return uses;
 }
 
-/// The first of those edges that fit, in the order of their vertices, and how many there are.
+/// The first matching edge in the order of the vertices, and the number of matching edges.
 struct BadEdges {
   size_t count = 0;
   std::pair<int32_t, int32_t> first;
@@ -168,8 +169,8 @@ absl::Status CheckEdges(const SurfaceMesh& surface) {
   return absl::OkStatus();
 }
 
-/// Least volume of a body, as a part of the cube around it: a metre of foil a tenth of a micrometre
-/// thick has a hundred thousand times as much.
+/// Smallest accepted volume of a body, relative to the cube around it. A square metre of foil a
+/// tenth of a micrometre thick has a hundred thousand times this volume.
 constexpr double kMinVolumePart = 1e-12;
 
 absl::Status CheckVolume(const SurfaceMesh& surface, const std::vector<Shell>& shells) {

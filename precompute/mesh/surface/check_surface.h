@@ -9,14 +9,14 @@
 
 namespace carillon::precompute {
 
-/// Refuses a surface that does not bound one solid body, which the mesher would crash on or fill
-/// wrongly. Nothing is repaired: triangles and their vertices stay as given, because contacts name
-/// them. A surface that is inside out as a whole is accepted with a warning.
+/// Refuses a surface that does not bound one solid body; on such a surface the mesher would crash
+/// or make a wrong mesh. CheckSurface repairs nothing, because contacts refer to the triangles as
+/// given. A surface that is inside out as a whole is accepted with a warning.
 ///
-/// Result: what the user should know though the surface is accepted.
-/// Errors: MESH_EMPTY, MESH_TOO_LARGE, MESH_INDEX_OUT_OF_RANGE, MESH_NOT_FINITE,
-/// MESH_DEGENERATE_TRIANGLE, MESH_DUPLICATE_SHELL, MESH_NOT_MANIFOLD, MESH_NOT_CLOSED,
-/// MESH_NOT_ORIENTED, MESH_ZERO_VOLUME, MESH_SELF_INTERSECTING, MESH_SEVERAL_PIECES.
+/// Returns warnings for the user about an accepted surface. Errors: MESH_EMPTY, MESH_TOO_LARGE,
+/// MESH_INDEX_OUT_OF_RANGE, MESH_NOT_FINITE, MESH_DEGENERATE_TRIANGLE, MESH_DUPLICATE_SHELL,
+/// MESH_NOT_MANIFOLD, MESH_NOT_CLOSED, MESH_NOT_ORIENTED, MESH_ZERO_VOLUME, MESH_SELF_INTERSECTING,
+/// MESH_SEVERAL_PIECES.
 absl::StatusOr<std::vector<std::string>> CheckSurface(const SurfaceMesh& surface);
 
 }  // namespace carillon::precompute

@@ -9,7 +9,7 @@
 
 namespace carillon::precompute {
 
-/// What keeps a closed surface from being the boundary of a solid.
+/// A defect because of which a closed surface is not the boundary of a solid.
 struct SurfaceDefect {
   enum class Kind {
     kFlatTriangle,     ///< `first` has its corners on one line
@@ -22,7 +22,7 @@ struct SurfaceDefect {
 };
 
 /// The first such defect of a closed, oriented surface whose edges have two triangles each, found
-/// with exact predicates; collapsed triangles are passed over.
+/// with exact predicates. Collapsed triangles are ignored.
 std::optional<SurfaceDefect> FindSelfIntersection(const SurfaceMesh& surface);
 
 }  // namespace carillon::precompute

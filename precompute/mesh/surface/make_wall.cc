@@ -19,15 +19,15 @@
 namespace carillon::precompute {
 namespace {
 
-/// Voxels along the diagonal, and in a wall: between them the distance is linear, which an
-/// isosurface far from edges follows exactly.
+/// Numbers of voxels along the diagonal and across a wall. The distance is interpolated linearly
+/// between voxels, which is exact for an isosurface far from edges.
 constexpr double kVoxelsAcross = 120;
 constexpr double kVoxelsInWall = 1.5;
 constexpr double kMostVoxelsAcross = 1000;
-/// A halved voxel is tried so often where an isosurface is not sound.
+/// Number of attempts with half the voxel size, after an isosurface that fails the checks.
 constexpr int kMostHalvings = 2;
-/// How far OpenVDB may merge the isosurface's polygons, 0 to 1: at this a ball keeps its volume to
-/// half a percent.
+/// Degree to which OpenVDB may merge the isosurface's polygons, 0 to 1. With this value a ball
+/// keeps its volume within half a percent.
 constexpr float kFlatness = 0.01F;
 
 absl::Status Impossible(const std::string& what) {
@@ -57,7 +57,8 @@ openvdb::FloatGrid::Ptr DistanceGrid(const SurfaceMesh& surface, double voxel, d
       mesh, *openvdb::math::Transform::createLinearTransform(1), width, width, flags);
 }
 
-/// Where the distance is `level_m`; counter-clockwise seen from the side of greater distance.
+/// The isosurface at distance `level_m`; its triangles are counter-clockwise seen from the side of
+/// greater distance.
 SurfaceMesh Isosurface(const openvdb::FloatGrid& distance, double voxel, double level_m) {
   std::vector<openvdb::Vec3s> points;
   std::vector<openvdb::Vec3I> triangles;

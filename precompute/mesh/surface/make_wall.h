@@ -15,8 +15,8 @@ namespace carillon::precompute {
 /// too thin beside the body.
 absl::StatusOr<MendedSurface> HollowOut(const SurfaceMesh& surface, double wall_m);
 
-/// Gives an open sheet, any soup of triangles, the thickness `wall_m`: all that lies within half of
-/// it, an isosurface of the distance.
+/// Thickens an open sheet, which may be any soup of triangles, to `wall_m`: the result is the
+/// isosurface of the distance at half of that thickness.
 ///
 /// Errors: MESH_WALL_IMPOSSIBLE: the wall is too thin or too thick beside the sheet.
 absl::StatusOr<MendedSurface> Thicken(const SurfaceMesh& sheet, double wall_m);

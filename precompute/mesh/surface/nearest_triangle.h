@@ -8,8 +8,8 @@
 
 namespace carillon::precompute {
 
-/// Finds the nearest place of a surface, which may be any soup of triangles, one at least of which
-/// has an extent.
+/// Finds the nearest point of a surface, which may be any soup of triangles with at least one
+/// triangle of positive area.
 class NearestTriangle {
  public:
   explicit NearestTriangle(const SurfaceMesh& surface);

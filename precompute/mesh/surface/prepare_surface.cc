@@ -22,7 +22,8 @@ bool Is(const absl::Status& status, absl::string_view reason) {
   return ToErrorInfo(status).reason() == reason;
 }
 
-/// What no repair can know: there is no surface, or no number, or several bodies.
+/// Errors that repair cannot correct: no surface, coordinates that are not finite, or several
+/// bodies.
 bool BeyondRepair(const absl::Status& status) {
   for (const char* reason : {"MESH_EMPTY", "MESH_TOO_LARGE", "MESH_INDEX_OUT_OF_RANGE",
                              "MESH_NOT_FINITE", "MESH_SEVERAL_PIECES"}) {
@@ -44,7 +45,7 @@ std::vector<int32_t> NearestGiven(const SurfaceMesh& surface, const SurfaceMesh&
   return nearest;
 }
 
-/// The surface mended until it passes the checks; adds what was done to `warnings`.
+/// Repairs the surface until it passes the checks, and describes the repairs in `warnings`.
 absl::StatusOr<SurfaceMesh> Repair(const SurfaceMesh& given, Warnings& warnings) {
   MendedSurface mended = MendSoup(given);
   const absl::StatusOr<Warnings> sound = CheckSurface(mended.surface);

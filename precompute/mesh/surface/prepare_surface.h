@@ -10,7 +10,7 @@
 
 namespace carillon::precompute {
 
-/// What may be changed of a surface before it is filled.
+/// The changes that may be made to a surface before it is filled.
 struct PreparationSettings {
   bool repair = false;  ///< mend what CheckSurface would refuse
   double wall_m = 0;    ///< above zero: hollow it out, or thicken an open sheet
@@ -19,13 +19,15 @@ struct PreparationSettings {
 /// A surface ready to be filled.
 struct PreparedSurface {
   SurfaceMesh surface;
-  /// For each triangle that of the surface as given on which it lies, or which is nearest.
+  /// For each triangle, the triangle of the surface as given that it lies on or that is nearest to
+  /// it.
   std::vector<int32_t> given_triangle;
   std::vector<std::string> warnings;
 };
 
-/// Checks a surface and, where the settings allow, mends it: gently first, then by wrapping it.
-/// Then gives it its wall. Errors: those of CheckSurface, MESH_REPAIR_FAILED, MESH_WALL_IMPOSSIBLE.
+/// Checks a surface. If the settings allow it, repairs a faulty surface, first without changing its
+/// shape and then by wrapping it. Then makes the wall. Errors: those of CheckSurface,
+/// MESH_REPAIR_FAILED, MESH_WALL_IMPOSSIBLE.
 absl::StatusOr<PreparedSurface> PrepareSurface(const SurfaceMesh& given,
                                                const PreparationSettings& settings);
 

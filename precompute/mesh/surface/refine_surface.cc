@@ -99,8 +99,8 @@ class Refiner {
     MakeDelaunay();
   }
 
-  /// Where as many parts lie on both sides, or one more on the second, of the fewest equal ones
-  /// that are short enough.
+  /// The point that divides the smallest sufficient number of equal parts into two halves; an odd
+  /// part belongs to the second half.
   Point SplitPoint(const Edge& edge) const {
     const Point &a = Vertex(edge.first), &b = Vertex(edge.second);
     const double parts = std::ceil(Distance(a, b) / (kPartLength * max_edge_m_) - kRounding);
@@ -162,10 +162,11 @@ class Refiner {
     }
   }
 
-  // Below it, rounding in a square cell could flip its diagonal for ever.
+  // Below this difference, rounding in a square cell could flip its diagonal again and again.
   static constexpr double kFlipTolerance = 1e-9;
 
-  // Parts leave room for the diagonals between the cuts of a narrow triangle.
+  // Parts are shorter than the limit by this factor, because the diagonals between the cuts of a
+  // narrow triangle are longer than the parts.
   static constexpr double kPartLength = 0.93;
   static constexpr double kRounding = 1e-9;  // makes no part more
 

@@ -8,17 +8,16 @@
 
 namespace carillon::precompute {
 
-/// A surface made sound, and in words what was done to it.
+/// A repaired surface, and descriptions of the repairs.
 struct MendedSurface {
   SurfaceMesh surface;
   std::vector<std::string> remarks;
 };
 
-/// Mends what can be mended without changing the shape: joins vertices that lie within a millionth
-/// of the diagonal, drops triangles without extent and those that lie on others, closes
-/// the seams and T-junctions that this leaves and holes with a rim shorter than a fifth of the
-/// diagonal, turns triangles so that they agree and bound a
-/// volume. The result may still have faults; CheckSurface says.
+/// Repairs a surface without changing its shape: joins vertices that lie within a millionth of the
+/// diagonal, drops triangles without area and duplicates, closes the seams and T-junctions that
+/// this leaves, closes holes with a rim shorter than a fifth of the diagonal, and orients triangles
+/// consistently and outward. The result may still have defects, which CheckSurface finds.
 MendedSurface MendSoup(const SurfaceMesh& given);
 
 }  // namespace carillon::precompute

@@ -9,11 +9,11 @@
 
 namespace carillon::precompute {
 
-/// Whether two corners are the same vertex. Such a triangle closes no gap and opens none: it keeps
-/// its place in the surface and is otherwise passed over.
+/// Whether two corners are the same vertex. Such a triangle neither closes nor opens a gap; it
+/// keeps its index in the surface and is ignored otherwise.
 bool IsCollapsed(const std::array<int32_t, 3>& triangle);
 
-/// Triangles that hang together by their edges.
+/// Triangles that are connected by their edges.
 struct Shell {
   std::vector<int32_t> triangles;
   /// m^3; negative where the triangles turn clockwise seen from outside. Meaningless if open.
@@ -23,8 +23,9 @@ struct Shell {
 /// The shells of a surface, the one of greatest volume first.
 std::vector<Shell> FindShells(const SurfaceMesh& surface);
 
-/// How often a closed shell wraps around `point`: 0 outside, 1 inside (-1 where it is inside out).
-/// Van Oosterom and Strackee, The solid angle of a plane triangle, IEEE Trans. Biomed. Eng. 1983.
+/// The winding number of a closed shell around `point`: 0 outside, 1 inside, -1 inside a shell that
+/// is inside out. Van Oosterom and Strackee, The solid angle of a plane triangle, IEEE Trans.
+/// Biomed. Eng. 1983.
 double WindingNumber(const SurfaceMesh& surface, const Shell& shell, const Point& point);
 
 /// A point inside a closed shell that does not cross itself.

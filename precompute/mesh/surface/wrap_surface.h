@@ -7,10 +7,10 @@
 
 namespace carillon::precompute {
 
-/// Wraps any soup of triangles as if shrunk onto it from outside (Portaneri, Rouxel-Labbe, Hemmer,
-/// Cohen-Steiner and Alliez, Alpha wrapping with an offset, SIGGRAPH 2022): closes gaps and holes
-/// narrower than a hundredth of the diagonal of the box around it, unites parts that overlap, drops
-/// what is inside. The remark states the greatest distance between the two surfaces either way.
+/// Wraps a soup of triangles with a closed surface (Portaneri, Rouxel-Labbe, Hemmer, Cohen-Steiner
+/// and Alliez, Alpha wrapping with an offset, SIGGRAPH 2022): closes gaps and holes narrower than a
+/// hundredth of the diagonal of the box around it, unites parts that overlap, drops what is inside.
+/// The remark states the greatest distance between the two surfaces in both directions.
 ///
 /// Errors: MESH_NOT_CLOSED where nothing is inside (an open sheet), MESH_REPAIR_FAILED.
 absl::StatusOr<MendedSurface> WrapSurface(const SurfaceMesh& given);
