@@ -17,16 +17,17 @@ using SmallBlock = Eigen::Matrix<double, kBlockWidth, kBlockWidth, Eigen::RowMaj
 template <typename Real>
 using SmallBlockOf = Eigen::Matrix<Real, kBlockWidth, kBlockWidth, Eigen::RowMajor>;
 
-/// kBlockWidth vectors as the kernels take them: a row an unknown, in elimination order.
+/// kBlockWidth vectors in the kernels' layout: one row for each unknown, in elimination order.
 template <typename Real>
 using VectorBlockOf = Eigen::Matrix<Real, Eigen::Dynamic, kBlockWidth, Eigen::RowMajor>;
 using VectorBlock = VectorBlockOf<double>;
 
-/// What a block has of each block of a basis, in the basis' order.
+/// The coefficients of a block with respect to each block of a basis, in the order of the basis.
 using Coefficients = std::vector<SmallBlock>;
 
-/// Vectors in blocks: the Q of a block Krylov method. Products go through the rows in stretches
-/// that stay in the first-level cache while all blocks pass by, so that the basis is read once.
+/// The basis Q of a block Krylov method, stored in blocks of vectors. Products process a stretch of
+/// rows for all blocks before the next stretch. A stretch fits into the first-level cache, so that
+/// the basis is read once.
 template <typename Real>
 class BlockBasis {
  public:

@@ -11,15 +11,15 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-/// Rows that are packed for a matrix product, which stay in the second-level cache.
+/// Number of rows packed for a matrix product; they fit into the second-level cache.
 constexpr int64_t kStretch = 256;
 
-/// Columns of a lower triangle that one product makes.
+/// Number of columns of a lower triangle that one product computes.
 constexpr Index kStrip = 64;
 
 Index VectorCount(const VectorBlocks& x) { return static_cast<Index>(x.size()) * kBlockWidth; }
 
-/// Rows first ... first + count - 1 of all vectors, a column of `packed` a row.
+/// Packs rows first ... first + count - 1 of all vectors; each row becomes a column of `packed`.
 void Pack(const VectorBlocks& x, int64_t first, int64_t count, MatrixXd& packed) {
   for (size_t b = 0; b < x.size(); ++b) {
     const double* from = x[b].data() + first * kBlockWidth;
@@ -40,7 +40,7 @@ void Unpack(const MatrixXd& packed, int64_t first, int64_t count, VectorBlocks& 
   }
 }
 
-/// gram -= x^T y, of vectors packed.
+/// gram -= x^T y for packed vectors.
 void SubtractGram(const MatrixXd& x, const MatrixXd& y, int64_t count, MatrixXd& gram) {
   const Index n = gram.rows();
   const auto ld = static_cast<int>(n);

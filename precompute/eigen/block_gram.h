@@ -12,10 +12,11 @@ namespace carillon::precompute {
 /// Vectors in blocks of kBlockWidth, all of one length.
 using VectorBlocks = std::vector<VectorBlock>;
 
-/// x^T y where that is symmetric: its lower triangle, the upper one is zero or anything.
+/// The lower triangle of x^T y, which must be symmetric. The upper triangle of the result is
+/// undefined.
 Eigen::MatrixXd Gram(const VectorBlocks& x, const VectorBlocks& y, Workers& workers);
 
-/// x := x V, V square of as many columns as x has vectors.
+/// x := x V. V is square and has as many columns as x has vectors.
 void Rotate(const Eigen::MatrixXd& V, Workers& workers, VectorBlocks& x);
 
 }  // namespace carillon::precompute

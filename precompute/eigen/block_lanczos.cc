@@ -46,8 +46,8 @@ bool LanczosRecurrence<Real>::Step() {
   basis_.Append(std::move(next_));
   below_.emplace_back(R_);
   operator_.Apply(mass_is_identity_ ? basis_.back(0) : mass_times_, next_, done());
-  // The recurrence takes the large parts out first, so that what is left loses no digits when it is
-  // made orthogonal to everything.
+  // The recurrence removes the large components first, so that the remainder loses no digits when
+  // it is orthogonalized against the whole basis.
   const SmallBlock H = BlockBasis<Real>::Dot(basis_.back(0), MassTimes(next_), workers_);
   basis_.SubtractBlock(0, H, next_);
   if (basis_.size() > kBlockWidth) basis_.SubtractBlock(1, R_.transpose(), next_);

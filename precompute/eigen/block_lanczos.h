@@ -17,34 +17,34 @@ namespace carillon::precompute {
 ///
 ///     OP q_j = q_{j-1} R_j^T + q_j H_j + q_{j+1} R_{j+1},   OP = -shift (K - shift M)^-1 M,
 ///
-/// in the inner product of M, kept orthogonal to the deflated vectors. Eigenvalues of OP lie
-/// between 0 and 1, that of a mode at theta = shift / (shift - Lambda).
+/// in the inner product of M, kept orthogonal to the deflated vectors. The eigenvalues of OP lie
+/// between 0 and 1; a mode has theta = shift / (shift - Lambda).
 template <typename Real>
 class LanczosRecurrence {
  public:
   using Block = VectorBlockOf<Real>;
 
-  /// `deflated`: at most kBlockWidth vectors, M-orthonormal, in elimination order; `foreseen`: the
-  /// size at which the iteration will end, about. All but the number outlive it.
+  /// `deflated`: at most kBlockWidth vectors, M-orthonormal, in elimination order. `expected_size`:
+  /// the predicted size of the basis at the end. The objects referred to must outlive this one.
   LanczosRecurrence(const NodeMatrix& A, const MultifrontalCholesky<Real>& factor, double shift,
                     const Eigen::MatrixXd& deflated, double foreseen, Workers& workers);
 
-  /// Begins with random vectors, seeded: a body gives the same model each time.
+  /// Starts with random vectors from a fixed seed, so that a body gives the same model each time.
   bool Start();
 
-  /// Adds one block to the basis and to T. False: the Krylov space is exhausted in the precision of
-  /// Real.
+  /// Adds one block to the basis and to T. Returns false if the Krylov space is exhausted in the
+  /// precision of Real.
   bool Step();
 
   int size() const { return basis_.size(); }
   double solve_error() const { return operator_.error(); }
-  /// The part of the iteration that is done, about.
+  /// Estimated fraction of the iteration that is done.
   double done() const { return std::min(1.0, size() / foreseen_); }
 
   /// The projection of OP on the basis, block-tridiagonal, size() square.
   Eigen::MatrixXd T() const;
 
-  /// |R s|, by which OP y - theta y is off for a Ritz vector y = Q s; `last`: the last kBlockWidth
+  /// |R s|, the norm of OP y - theta y for a Ritz vector y = Q s. `last`: the last kBlockWidth
   /// components of s.
   double Remainder(const Eigen::Ref<const Eigen::VectorXd>& last) const {
     return (R_ * last).norm();

@@ -22,29 +22,30 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// On |OP y - theta y| / theta. Refinement takes the rest away.
+/// Limit of |OP y - theta y| / theta. Refinement removes the remaining error.
 constexpr double kTolerance = 1e-6;
 
-/// Ritz vectors to refine beyond those wanted, at least: float mixes modes with their neighbours,
-/// and refinement unmixes only what it is given.
+/// Least number of Ritz vectors to refine beyond the wanted ones. Rounding in float mixes
+/// neighbouring modes, and refinement separates only modes among the vectors that it is given.
 constexpr Index kGuards = 4;
 
-/// The shift, as a part of the highest eigenvalue wanted: 5 kHz for a band to 20 kHz. The count of
-/// iterations hardly depends on it, and a larger one spares digits.
+/// The shift, as a part of the highest eigenvalue wanted: 5 kHz for a band to 20 kHz. The number of
+/// iterations hardly depends on it, and a larger shift loses fewer digits.
 constexpr double kShift = -0.0625;
 
-/// Part of the solution's time that is the iteration's, about.
+/// Approximate fraction of the solution's time that the iteration takes.
 constexpr double kIterationPart = 0.6;
 
-/// Corrections before K and M are projected for the first time. Where solves are this far off, one
-/// correction gains little as long as modes are mixed with each other, which the projection mends.
+/// Numbers of corrections before K and M are projected for the first time. If solves have a larger
+/// error than this limit, one correction gains little until the projection has separated modes that
+/// are mixed with each other.
 constexpr int kFirstSteps = 2;
 constexpr double kLargeSolveError = 5e-4;
 
-/// Eigenvalues below this part of the shift are zero but for rounding.
+/// Eigenvalues below this fraction of the shift are zero except for rounding.
 constexpr double kFreeMotion = 1e-7;
 
-/// Vectors `x` of the user's unknowns as those of NodeMatrix, and back.
+/// Converts vectors `x` of the user's unknowns to those of NodeMatrix, and back.
 MatrixXd ToNodeOrder(const MatrixXd& x, const OrderedSystem& ordered) {
   MatrixXd y(x.rows(), x.cols());
   for (size_t i = 0; i < ordered.fronts.order.size(); ++i) {
@@ -71,7 +72,7 @@ void FromNodeOrder(const VectorBlocks& y, const OrderedSystem& ordered, Workers&
   });
 }
 
-/// The Ritz pairs of a recurrence, of the lowest Lambda first.
+/// The Ritz pairs of a recurrence, in ascending order of Lambda.
 struct RitzPairs {
   MatrixXd coordinates;
   int converged_count = 0;
@@ -106,8 +107,8 @@ absl::StatusOr<RitzPairs> Iterate(LanczosRecurrence<Real>& recurrence, Index wan
   RitzPairs pairs;
   bool open = recurrence.Start();
   progress(0);
-  // Looking costs the cube of the size; from three halves on, two more vectors make about one more
-  // pair.
+  // The cost of a convergence test grows with the cube of the basis size. From three halves of the
+  // wanted number on, two more vectors give about one more converged pair.
   for (Index look = 3 * wanted / 2 + 3 * kBlockWidth; pairs.converged_count < wanted;) {
     if (!open || recurrence.size() + kBlockWidth > largest) {
       return NotConverged(pairs.converged_count, wanted);
@@ -159,7 +160,7 @@ absl::StatusOr<Modes> BlockLanczosEigensolver::Solve(const SystemMatrices& syste
   Workers workers(ThreadCount());
   absl::StatusOr<RefinedModes> bent =
       SolveIn<float>(ordered_, rigid, shift, wanted, workers, progress);
-  // What float cannot resolve, as on elements that are nearly flat, double may.
+  // Double precision may succeed where float fails, for example with elements that are nearly flat.
   if (!bent.ok()) bent = SolveIn<double>(ordered_, rigid, shift, wanted, workers, progress);
   if (!bent.ok()) return bent.status();
   Modes modes;

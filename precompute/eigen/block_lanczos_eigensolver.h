@@ -10,12 +10,12 @@ namespace carillon::precompute {
 
 /// Block Lanczos with shift-invert and full re-orthogonalization (Grimes, Lewis and Simon 1994):
 /// the Krylov space of (K - shift M)^-1 M, kBlockWidth vectors at a time, kept orthogonal to the
-/// rigid-body modes, which are known in closed form. Blocks make it fast (one pass over the factor
-/// serves sixteen solves) and find degenerate modes whole.
+/// rigid-body modes, which are known in closed form. Blocks make it fast, because one pass over the
+/// factor serves sixteen solves, and they find all modes of a degenerate group.
 class BlockLanczosEigensolver : public Eigensolver {
  public:
-  /// `ordered`: of the system to be solved; outlives the solver. `rigid`: the
-  /// rigid-body modes, #U by at most six, M-orthonormal.
+  /// `ordered`: the system to be solved in elimination order; it must outlive the solver. `rigid`:
+  /// the rigid-body modes, #U by at most six, M-orthonormal.
   BlockLanczosEigensolver(const OrderedSystem& ordered, const Eigen::MatrixXd& rigid)
       : ordered_(ordered), rigid_(rigid) {}
 

@@ -92,7 +92,7 @@ struct CholeskyFactor::Insides {
 
   cholmod_common common;
   cholmod_factor* factor = nullptr;
-  cholmod_dense* solution = nullptr;  // kept from call to call, so that CHOLMOD need not allocate
+  cholmod_dense* solution = nullptr;  // reused by later calls, so that CHOLMOD need not allocate
   cholmod_dense* workspace = nullptr;
   cholmod_dense* scratch = nullptr;
   std::vector<int> order;

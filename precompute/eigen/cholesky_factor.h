@@ -24,7 +24,7 @@ class CholeskyFactor {
   void SolveL(Eigen::Ref<Eigen::MatrixXd> X) const;
   /// X := L^-T X, with rows in pivot order.
   void SolveLTransposed(Eigen::Ref<Eigen::MatrixXd> X) const;
-  /// Element k is the unknown eliminated k-th; a refinement of the order given.
+  /// Element k is the unknown eliminated k-th. The order refines the given one.
   const std::vector<int>& order() const;
 
  private:

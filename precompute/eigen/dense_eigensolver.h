@@ -5,8 +5,9 @@
 
 namespace carillon::precompute {
 
-/// LAPACK's divide and conquer on full matrices: for small bodies, and where a good part of all
-/// modes is wanted. Memory and time grow with the square and the cube of the unknowns.
+/// LAPACK's divide-and-conquer solver on full matrices, for small bodies and for requests of a
+/// large part of all modes. Memory grows with the square and time with the cube of the number of
+/// unknowns.
 class DenseEigensolver : public Eigensolver {
  public:
   absl::StatusOr<Modes> Solve(const SystemMatrices& system, const ModeRequest& request,

@@ -15,24 +15,24 @@ struct Modes {
   Eigen::MatrixXd shapes;       ///< #U by #modes, phi^T M phi = 1
 };
 
-/// The lowest modes of a system, wanted whole: rigid-body modes included.
+/// A request for the lowest modes of a system, including rigid-body modes.
 struct ModeRequest {
-  /// How many; at most as many as there are unknowns.
+  /// Number of modes, at most the number of unknowns.
   int count;
-  /// An upper bound of about the size of the highest eigenvalue wanted; sets the scale of shifts.
+  /// An upper bound near the highest eigenvalue wanted. It sets the scale of shifts.
   double eigenvalue_limit;
 };
 
-/// Called with the estimated part of the iteration that is done, 0 to 1.
+/// Called with the estimated fraction of the iteration that is done, 0 to 1.
 using SolveProgress = std::function<void(double)>;
 
-/// Finds the lowest modes of a body. Nothing is promised about modes missed: callers verify.
+/// Finds the lowest modes of a body. A solver may miss modes; callers must verify the result.
 class Eigensolver {
  public:
   virtual ~Eigensolver() = default;
 
-  /// Exactly `request.count` modes.
-  /// Errors: VERIFICATION_FAILED (did not converge), OUT_OF_MEMORY, MESH_TOO_LARGE.
+  /// Returns exactly `request.count` modes. Errors: VERIFICATION_FAILED (did not converge),
+  /// OUT_OF_MEMORY, MESH_TOO_LARGE.
   virtual absl::StatusOr<Modes> Solve(const SystemMatrices& system, const ModeRequest& request,
                                       const SolveProgress& progress) = 0;
 };

@@ -5,16 +5,17 @@
 
 namespace carillon::precompute {
 
-// What is left of blocks of vectors x with their products K x and M x, one pass over memory each,
-// chosen at run time for the machine. Blocks: `rows` by kBlockWidth, row-major, three rows a node.
-// `energy`, `mass`, `quotient`, `residual` and `scale`: kBlockWidth numbers, one a vector.
+// Kernels for residuals of blocks of vectors x with their products K x and M x. Each makes one pass
+// over memory, and its variant for the machine is chosen at run time. Blocks: `rows` by
+// kBlockWidth, row-major, three rows a node. `energy`, `mass`, `quotient`, `residual` and `scale`:
+// kBlockWidth numbers, one a vector.
 
 /// energy += x . elastic, mass += x . inertial
 void AddRayleighSums(const double* x, const double* elastic, const double* inertial, int64_t rows,
                      double* energy, double* mass);
 
-/// residual += |D^1/2 (elastic - inertial quotient)|^2, scale += |D^1/2 inertial|^2: D^1/2 takes
-/// products back to the user's unknowns; `root_mass`, see NodeMatrix.
+/// residual += |D^1/2 (elastic - inertial quotient)|^2, scale += |D^1/2 inertial|^2: D^1/2 converts
+/// products to the user's unknowns; for `root_mass` see NodeMatrix.
 void AddResidualSums(const double* quotient, const double* root_mass, const double* elastic,
                      const double* inertial, int64_t nodes, double* residual, double* scale);
 
@@ -23,8 +24,8 @@ template <typename Real>
 void StoreResidual(const double* quotient, const double* elastic, const double* inertial,
                    int64_t rows, int64_t stride, Real* out);
 
-/// out = right - (elastic - shift inertial): what a solve for `right` leaves; all of `count`
-/// numbers.
+/// out = right - (elastic - shift inertial), the residual of a solve for `right`. All arrays have
+/// `count` numbers.
 template <typename Real>
 void StoreSolveResidual(const Real* right, const double* elastic, const Real* inertial,
                         double shift, int64_t count, Real* out);

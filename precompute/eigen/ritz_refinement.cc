@@ -22,16 +22,19 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// On |K phi - Lambda M phi| / |Lambda M phi|, Euclidean, in the unknowns of the user.
+/// Limit of |K phi - Lambda M phi| / |Lambda M phi| in the Euclidean norm, in the unknowns of the
+/// user.
 constexpr double kTolerance = 8e-7;
 
 constexpr int kMaxRounds = 6;
 
-/// After so many rounds, only vectors are left that hold something of modes not much above their
-/// own, which each correction lessens by a third or so: two cost less than another projection.
+/// After this many rounds the remaining error lies in modes just above the wanted ones. One
+/// correction removes about a third of it, so that two corrections are cheaper than another
+/// projection.
 constexpr int kQuickRounds = 2;
 
-/// Of what is left to do when a round begins, about; of a round the corrections.
+/// Approximate fraction of the remaining work that one round does, and the fraction of a round that
+/// the corrections take.
 constexpr double kRoundPart = 0.8;
 constexpr double kCorrectionPart = 0.7;
 
@@ -70,8 +73,8 @@ class Refinement {
     });
   }
 
-  /// Corrects every block of vectors `steps` times, unless the wanted vectors of it are good
-  /// already. What a vector takes up of the others Project takes out.
+  /// Corrects every block of vectors `steps` times, unless its wanted vectors are accurate already.
+  /// Project removes the components of other modes that a correction adds.
   void Correct(int steps) {
     const std::vector<size_t> bad = BadBlocks();
     const size_t width = GroupWidth(bad.size());
@@ -97,7 +100,7 @@ class Refinement {
     return true;
   }
 
-  /// The largest residual of those wanted.
+  /// The largest residual of the wanted modes.
   double LargestResidual() {
     residuals_.resize(static_cast<Index>(x_.size()) * kBlockWidth);
     ForBlocks([&](size_t b) {
@@ -109,7 +112,7 @@ class Refinement {
     return residuals_.head(wanted_).maxCoeff();
   }
 
-  /// Whether the residuals of those wanted are as small as rounding lets them be.
+  /// Whether the residuals of the wanted modes are as small as rounding allows.
   bool IsExhausted() const {
     for (Index m = 0; m < wanted_; ++m) {
       const double rounding = ResidualOfRounding(stiffest_, eigenvalues_[m]);
@@ -133,7 +136,8 @@ class Refinement {
 
   const VectorBlock& Inertial(size_t b) const { return A_.mass_is_identity ? x_[b] : inertial_[b]; }
 
-  /// Before residuals are known all; then those with a vector that is wanted and not good.
+  /// All blocks until residuals are known; afterwards the blocks with a wanted vector that is not
+  /// accurate yet.
   std::vector<size_t> BadBlocks() const {
     std::vector<size_t> bad;
     for (size_t b = 0; b < x_.size(); ++b) {
@@ -146,7 +150,8 @@ class Refinement {
     return bad;
   }
 
-  /// Two blocks at once read a factor in float once; each thread should have some.
+  /// Two blocks at once share one pass over a factor in float, as long as each thread has enough
+  /// blocks.
   size_t GroupWidth(size_t blocks) const {
     const auto threads = static_cast<size_t>(workers_.count());
     return std::is_same_v<Real, float> && blocks >= 2 * threads ? 2 : 1;
@@ -166,7 +171,7 @@ class Refinement {
     quotients_[b] = energy / mass;
   }
 
-  /// `change`: room for all blocks, side by side in each row.
+  /// `change`: memory for the changes of all blocks, side by side in each row.
   void CorrectBlocks(std::span<const size_t> blocks, Real* change) {
     const auto stride = static_cast<int64_t>(blocks.size()) * kBlockWidth;
     for (size_t i = 0; i < blocks.size(); ++i) {

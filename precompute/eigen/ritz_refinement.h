@@ -15,26 +15,29 @@
 namespace carillon::precompute {
 
 struct RefinementPlan {
-  Eigen::Index wanted;  ///< the lowest of the rough ones
-  int first_steps;      ///< corrections before K and M are projected for the first time
-  /// Vectors with Rayleigh quotients below this bend nothing; their residuals have no measure.
+  Eigen::Index wanted;  ///< number of modes wanted, the lowest of the rough ones
+  int first_steps;      ///< number of corrections before the first projection of K and M
+  /// Vectors with Rayleigh quotients below this are rigid-body motions; their relative residuals
+  /// are not defined.
   double free_motion;
 };
 
-/// In elimination order, scaled as NodeMatrix is; the last block may hold more than is wanted.
+/// Modes in elimination order, scaled as NodeMatrix is. The last block may have more vectors than
+/// wanted.
 struct RefinedModes {
   Eigen::VectorXd eigenvalues;
   VectorBlocks shapes;
 };
 
-/// Makes good modes, in double precision, of rough ones found with a factor in Real: each is
-/// corrected by x -= (K - shift M)^-1 (K - rho M) x, one step of inverse iteration in which the
-/// factor acts on the residual only, so that its rounding fades; then K and M are projected on all
-/// of them (Rayleigh and Ritz), in double. Repeated until residuals are small.
+/// Refines rough modes, found with a factor in Real, to double precision. Each vector is corrected
+/// by x -= (K - shift M)^-1 (K - rho M) x, a step of inverse iteration in which the factor acts on
+/// the residual only, so that the factor's rounding errors vanish. Then K and M are projected on
+/// all vectors in double precision (Rayleigh-Ritz). Both steps are repeated until the residuals are
+/// small.
 ///
-/// `rough`: in elimination order; the last blocks may hold more than is wanted; each is given back
-/// as it is taken. `deflated`: as for LanczosRecurrence. `progress` is called in this thread.
-/// Errors: VERIFICATION_FAILED where residuals stay large.
+/// `rough`: vectors in elimination order, in which the last blocks may have more than wanted; each
+/// block is freed as soon as it has been read. `deflated`: as for LanczosRecurrence. `progress` is
+/// called in this thread. Errors: VERIFICATION_FAILED if residuals stay large.
 template <typename Real>
 absl::StatusOr<RefinedModes> RefineModes(const NodeMatrix& A,
                                          const MultifrontalCholesky<Real>& factor,

@@ -9,10 +9,10 @@
 namespace carillon::precompute {
 namespace {
 
-/// Measured: with solves that are off by 1e-5 (bunnies) a seventh of the iteration suffices for
-/// residuals of 4e-7 after two corrections, with 1e-4 to 1.4e-3 (tubes, quadratic elements) three
-/// fifths to three quarters are needed; with less, the modes hold something of those above that
-/// corrections hardly take away.
+/// Measured: with a relative error of a solve of 1e-5 (bunnies), refining in a seventh of the
+/// iteration suffices for residuals of 4e-7 after two corrections. With 1e-4 to 1.4e-3 (tubes,
+/// quadratic elements) three fifths to three quarters are needed. With less, the modes contain
+/// components of higher modes that corrections hardly remove.
 constexpr double kSmallSolveError = 1.5e-5;
 constexpr double kRefinedPart = 0.15;
 constexpr double kRefinedPartOfCoarse = 0.75;
@@ -42,8 +42,8 @@ void ShiftInvert<Real>::Apply(const Block& x, Block& y, double done) {
   }
 }
 
-/// Solves for the residual of solution_ for the right-hand side x: solution_ becomes its
-/// improvement, y_ what it was.
+/// Solves for the residual of solution_ with right-hand side x. Afterwards solution_ is the
+/// improvement, and y_ is the previous solution.
 template <typename Real>
 void ShiftInvert<Real>::Refine(const Block& x) {
   elastic_.resize(x.rows(), kBlockWidth);

@@ -8,11 +8,12 @@
 
 namespace carillon::precompute {
 
-/// y = -shift (K - shift M)^-1 x, by a factor in Real. A factor in float is as good as one for
-/// another stiffness nearby, whose modes are others: so solves are followed by one for their
-/// residual in double, in the first part of an iteration. How long that part is the error of the
-/// first solve decides: a Krylov method may err the more the nearer it is to its end (Simoncini and
-/// Szyld 2003), because what converged lies in the vectors before.
+/// y = -shift (K - shift M)^-1 x, with a factor in Real. A factor in float equals the exact factor
+/// of a slightly different stiffness, which has different modes. In the first part of an iteration
+/// each solve is therefore followed by a solve for its residual, computed in double. The error of
+/// the first solve determines the length of that part: a Krylov method tolerates larger errors the
+/// nearer it is to its end (Simoncini and Szyld 2003), because converged directions already lie in
+/// the basis.
 template <typename Real>
 class ShiftInvert {
  public:
@@ -21,10 +22,11 @@ class ShiftInvert {
   ShiftInvert(const NodeMatrix& A, const MultifrontalCholesky<Real>& factor,
               const MassRows<Real>& mass, double shift, Workers& workers);
 
-  /// x and y, in elimination order, may be one; `done`: the part of the iteration that is.
+  /// x and y are in elimination order and may be the same object. `done`: the fraction of
+  /// the iteration that is done.
   void Apply(const Block& x, Block& y, double done);
 
-  /// By how much the first solve was off, relatively; 0 in double.
+  /// Relative error of the first solve; 0 in double.
   double error() const { return error_; }
 
  private:
@@ -35,7 +37,7 @@ class ShiftInvert {
   const MassRows<Real>& mass_;
   double shift_;
   Workers& workers_;
-  double refined_part_ = 1;  ///< of the iteration
+  double refined_part_ = 1;  ///< fraction of the iteration in which solves are refined
   double error_ = 0;
   Block solution_;
   Block y_;

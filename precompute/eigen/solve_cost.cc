@@ -17,16 +17,16 @@ namespace {
 constexpr size_t kDouble = sizeof(double);
 constexpr size_t kFloat = sizeof(float);
 
-/// Numbers of an update matrix that are in memory, about: those of its lower triangle, and in each
-/// column half a page above it.
+/// Approximate number of entries of an update matrix that occupy memory: its lower triangle, and
+/// half a page above it in each column.
 size_t UpdateNumbers(const FrontalStructure& fronts, int s) {
   constexpr size_t kHalfPage = 512;
   const auto n = static_cast<size_t>(fronts.update_count(s));
   return n * (n + 1) / 2 + n * std::min(n / 2, kHalfPage);
 }
 
-/// Numbers that factorizing holds at once beside the factor: a stack for each thread, or the update
-/// matrices that wait for the fronts above, and the panel of one front.
+/// Number of entries in memory during a factorization, beside the factor: a stack for each thread,
+/// or the update matrices that wait for the fronts above, and the panel of one front.
 size_t FrontNumbers(const FrontalStructure& fronts, int thread_count) {
   size_t waiting = 0;
   size_t stack = 0;
@@ -50,13 +50,14 @@ size_t FrontNumbers(const FrontalStructure& fronts, int thread_count) {
 
 size_t MatrixBytes(const NodeMatrix& A) {
   const size_t entries = A.row.size();
-  // As assembled (nine numbers with their rows and three masses) and as NodeMatrix.
+  // Memory of the matrices as assembled (nine numbers with their rows, and three masses) and as
+  // NodeMatrix.
   return entries * (9 + 3) * (kDouble + sizeof(int32_t)) +
          entries * (10 * kDouble + sizeof(int32_t));
 }
 
-/// Blocks of vectors, counted in float, that the iteration holds beside its basis, and the
-/// refinement of modes beside them, in all and for each thread.
+/// Number of blocks of vectors, counted in float, that the iteration needs beside its basis and the
+/// refinement beside the modes, in total and for each thread.
 constexpr size_t kIterationBlocks = 8;
 constexpr size_t kRefinementBlocks = 4;
 constexpr size_t kRefinementBlocksOfThread = 2;
@@ -64,18 +65,19 @@ constexpr size_t kRefinementBlocksOfThread = 2;
 /// Rigid-body modes, their momenta, and the modes in elimination order.
 constexpr size_t kRigidVectors = 18;
 
-/// Measured on two tubes and two bunnies, linear and quadratic, within a third: operations a second
-/// of factorizations in double and float and of products with the basis, bytes of the factor a
-/// second in solves with sixteen right-hand sides.
+/// Speeds measured on two tubes and two bunnies, linear and quadratic, accurate to a third:
+/// operations per second of factorizations in double and in float and of products with the basis,
+/// and bytes of the factor per second in solves with sixteen right-hand sides.
 constexpr double kDoubleRate = 40e9;
 constexpr double kFloatRate = 70e9;
 constexpr double kOrthogonalRate = 45e9;
 constexpr double kSolveRate = 9e9;
-/// Solves of a step of the iteration, and of a block of modes refined, two of which go together.
+/// Number of solves in a step of the iteration, and in refining a block of modes, where two blocks
+/// share a pass.
 constexpr double kSolvesOfStep = 1.3;
 constexpr double kSolvesOfRefinement = 1.2;
-/// Seconds that refining and verifying a mode take beside, and its coupling and estimated error,
-/// for each unknown.
+/// Further seconds for each mode and unknown: for refining and verifying, and for couplings and
+/// error estimates.
 constexpr double kRefineSeconds = 30e-9;
 constexpr double kVerifySeconds = 12e-9;
 constexpr double kModelSeconds = 100e-9;

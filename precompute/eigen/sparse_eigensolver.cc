@@ -55,7 +55,7 @@ class InverseOperator {
     Eigen::Map<Eigen::VectorXd> y(y_out, rows());
     y.noalias() = M_ * work_;
     factor_.SolveL(y);
-    // Restarts are not foreseen by the estimate: it approaches 1 and never gets there.
+    // The estimate does not include restarts: it approaches 1 without reaching it.
     const double work = static_cast<double>(++count_) / expected_count_;
     progress_(work < 0.5 ? work : 1 - 0.25 / work);
   }

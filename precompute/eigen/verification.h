@@ -8,38 +8,39 @@
 
 namespace carillon::precompute {
 
-/// The proof that goes with a set of deformation modes.
+/// The results of verifying a set of deformation modes.
 struct Verification {
   /// Largest |K phi - Lambda M phi| / |Lambda M phi|, Euclidean.
   double max_residual = 0;
   /// Largest |phi_i^T M phi_j - delta_ij|, rigid-body modes included.
   double max_orthogonality_error = 0;
   int rigid_mode_count = 0;
-  /// Eigenvalues below sturm_eigenvalue by inertia: rigid_mode_count plus the modes found.
+  /// Number of eigenvalues below sturm_eigenvalue by inertia. It must equal rigid_mode_count plus
+  /// the number of modes found.
   int sturm_count = 0;
   double sturm_eigenvalue = 0;
 };
 
-/// Residuals above this, and above what rounding leaves, are no solution; the error of an
-/// eigenvalue is its square.
+/// A mode whose residual is above this limit and above the rounding error is refused. The relative
+/// error of an eigenvalue is of the order of the residual squared.
 inline constexpr double kMaxResidual = 1e-5;
 inline constexpr double kMaxOrthogonalityError = 1e-7;
 
-/// The residual, as above, that rounding leaves of an exact mode: the product with K errs by digits
-/// of its stiffest node, which on a slender body is 1e12 times as stiff as the lowest mode. Counted
-/// up to a thousandth only.
+/// The residual that an exact mode has because of rounding. The product with K has an error
+/// relative to its stiffest node, which on a slender body is 1e12 times as stiff as the lowest
+/// mode. The result is at most a thousandth.
 double ResidualOfRounding(double stiffest, double eigenvalue);
 
 /// The largest diagonal entry of K over that of M.
 double StiffestNode(const NodeMatrix& A);
 
-/// What is measured of modes.
+/// Measured properties of modes.
 struct Measurement {
-  Eigen::VectorXd residuals;  ///< |K phi - Lambda M phi| / |Lambda M phi| of each, if not rigid
+  Eigen::VectorXd residuals;  ///< |K phi - Lambda M phi| / |Lambda M phi| of each deformation mode
   Eigen::MatrixXd gram;       ///< phi_i^T M phi_j
 };
 
-/// `order`: of the nodes in A, see MakeNodeMatrix.
+/// `order`: the order of the nodes in A, see MakeNodeMatrix.
 Measurement Measure(const NodeMatrix& A, const std::vector<int32_t>& order, const Modes& modes,
                     Workers& workers);
 
@@ -50,11 +51,11 @@ double OrthogonalityError(const Eigen::MatrixXd& gram);
 using BlockRow = Eigen::Array<double, 1, kBlockWidth>;
 
 /// |D^1/2 (elastic - inertial Lambda)| / |D^1/2 inertial Lambda| of each column of the products K x
-/// and M x: D^1/2 takes them back to the user's unknowns.
+/// and M x. D^1/2 converts them to the user's unknowns.
 BlockRow RelativeResiduals(const NodeMatrix& A, const VectorBlock& elastic,
                            const VectorBlock& inertial, const BlockRow& eigenvalues);
 
-/// The same from the matrices as assembled.
+/// The same quantities computed from the matrices as assembled.
 Eigen::VectorXd Residuals(const SystemMatrices& system, const Modes& modes);
 double OrthogonalityError(const SystemMatrices& system, const Eigen::MatrixXd& shapes);
 

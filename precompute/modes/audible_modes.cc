@@ -34,7 +34,7 @@ void Pick(const std::vector<size_t>& kept, std::vector<T>& values) {
   values.resize(kept.size());
 }
 
-/// Of each row of `mode_count` numbers those kept.
+/// The kept numbers of each row of `mode_count` numbers.
 void PickColumns(const std::vector<size_t>& kept, size_t mode_count, std::vector<float>& rows) {
   size_t to = 0;
   for (size_t row = 0; row < rows.size(); row += mode_count) {
@@ -61,7 +61,7 @@ void KeepMostAudible(int count, ModalModel& model) {
   const std::vector<double> audibilities = Audibilities(model);
   std::vector<size_t> kept(found);
   std::iota(kept.begin(), kept.end(), 0);
-  // Equals, by frequency: the same mesh gives the same model.
+  // Equally audible modes are ordered by frequency, so that the same mesh gives the same model.
   std::ranges::stable_sort(kept, std::greater(), [&](size_t m) { return audibilities[m]; });
   const double least = audibilities[kept[wanted - 1]] / audibilities[kept[0]];
   const double lost = audibilities[kept[wanted]] / audibilities[kept[0]];

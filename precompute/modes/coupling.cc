@@ -38,7 +38,7 @@ std::vector<Facet> Facets(const TetMesh& mesh, const SoundingSurface& surface) {
 }  // namespace
 
 double IntegralOfAbsolute(double area, double f0, double f1, double f2) {
-  // Makes f0 the corner whose sign is alone, if any.
+  // Makes f0 the corner whose sign differs from the two others, if there is one.
   if (std::signbit(f1) != std::signbit(f2)) {
     std::swap(f0, std::signbit(f0) == std::signbit(f1) ? f2 : f1);
   }
@@ -52,7 +52,7 @@ double IntegralOfAbsolute(double area, double f0, double f1, double f2) {
 Eigen::VectorXd Couplings(const TetMesh& mesh, const SoundingSurface& surface, const Modes& modes) {
   const std::vector<Facet> facets = Facets(mesh, surface);
   Eigen::VectorXd integrals = Eigen::VectorXd::Zero(modes.eigenvalues.size());
-  // Mode by mode: its shape lies together in memory.
+  // The outer loop is over modes, because the shape of a mode is contiguous in memory.
   for (Eigen::Index m = 0; m < integrals.size(); ++m) {
     const auto shape = modes.shapes.col(m);
     for (const Facet& facet : facets) {

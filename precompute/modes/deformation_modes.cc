@@ -23,14 +23,16 @@
 namespace carillon::precompute {
 namespace {
 
-/// Tries to find as many modes as were counted, each with more room for those missed.
+/// Number of attempts to find all modes that were counted; each attempt searches for more vectors
+/// than the one before.
 constexpr int kMaxAttempts = 3;
 
-/// Below this part of the limit, and within rounding of the stiffest node, a mode bends nothing.
+/// A mode with an eigenvalue below this fraction of the limit, and within the rounding error of the
+/// stiffest node, is a rigid-body mode.
 constexpr double kFreeMotion = 1e-9;
 constexpr double kRounding = 1e-12;
 
-/// Of the dense solver, for the cube of the unknowns: see PrefersDense.
+/// Time of the dense solver for each cube of an unknown; see PrefersDense.
 constexpr double kDenseSeconds = 1.4e-10;
 
 absl::Status VerificationFailed(const std::string& what) {
@@ -38,7 +40,8 @@ absl::Status VerificationFailed(const std::string& what) {
                  absl::StrCat(what, "; no model was made; another number of nodes may do"));
 }
 
-/// Keeps the modes named, ascending, in the memory that they have: shapes fill gigabytes.
+/// Keeps the modes with these indices (ascending). It works in place, because shapes fill
+/// gigabytes.
 void Keep(const std::vector<Eigen::Index>& which, Modes& modes) {
   for (size_t k = 0; k < which.size(); ++k) {
     const auto to = static_cast<Eigen::Index>(k);
@@ -51,8 +54,8 @@ void Keep(const std::vector<Eigen::Index>& which, Modes& modes) {
   modes.shapes.conservativeResize(Eigen::NoChange, count);
 }
 
-/// Makes the first of the large components of each shape positive, so that a mesh gives one answer;
-/// in a symmetric body several are largest but for rounding.
+/// Makes the first of the large components of each shape positive, so that the sign of a shape is
+/// unique. In a symmetric body several components are largest within rounding.
 void FixSigns(Eigen::MatrixXd& shapes) {
   for (Eigen::Index m = 0; m < shapes.cols(); ++m) {
     auto shape = shapes.col(m);
@@ -75,8 +78,8 @@ absl::Status TooManyModes(int count, int limit) {
                               "; lower the band's upper frequency", keep));
 }
 
-/// Elastic waves in a volume (Weyl): the fewest that a body is likely to have; at a Poisson's ratio
-/// of 0.3, unit Young's modulus and density.
+/// Weyl's law for elastic waves in a volume, at a Poisson's ratio of 0.3 and unit Young's modulus
+/// and density: a probable lower bound of the number of modes.
 int GuessModeCount(const SystemMatrices& system, double limit) {
   const Eigen::VectorXd ones = Eigen::VectorXd::Ones(system.unknown_count());
   const double volume = ones.dot(system.M.selfadjointView<Eigen::Lower>() * ones) / 3;
@@ -84,7 +87,7 @@ int GuessModeCount(const SystemMatrices& system, double limit) {
       std::min<double>(0.153 * volume * std::pow(limit, 1.5), kMaxFoundModeCount));
 }
 
-/// One solution: counts, solves and verifies.
+/// One solution: it counts the modes, solves for them and verifies them.
 class Solution {
  public:
   Solution(const SystemMatrices& system, OrderedSystem ordered, const std::vector<Point>& nodes,
@@ -98,7 +101,7 @@ class Solution {
         rigid_momenta_(system.M.selfadjointView<Eigen::Lower>() * rigid_),
         workers_(ThreadCount()) {}
 
-  /// Of a free body six.
+  /// Number of rigid-body modes; six for a free body.
   int rigid_mode_count() const { return static_cast<int>(rigid_.cols()); }
 
   absl::StatusOr<int> CountBelow(double limit) const {
@@ -132,10 +135,10 @@ class Solution {
     });
   }
 
-  /// An upper bound of the lowest deformation mode, of its size.
+  /// An upper bound near the lowest deformation eigenvalue.
   double BoundOfLowest() const { return LowestEigenvalueBound(nodes_, system_, options_.held); }
 
-  /// Splits rigid-body modes off, checks everything but completeness.
+  /// Separates rigid-body modes, and makes all checks except the one for completeness.
   absl::StatusOr<DeformationModes> Verify(Modes all, double limit) const {
     watch_(SolveStage::kVerify, 0);
     DeformationModes result;
@@ -177,7 +180,7 @@ class Solution {
     return std::make_unique<BlockLanczosEigensolver>(ordered_, rigid_);
   }
 
-  /// What shapes have of the rigid-body modes: #rigid by #shapes.
+  /// Components of shapes along the rigid-body modes: #rigid by #shapes.
   Eigen::MatrixXd InRigid(const Eigen::MatrixXd& shapes) const {
     const auto rows = static_cast<int>(shapes.rows());
     const auto rigid = static_cast<int>(rigid_momenta_.cols());
@@ -240,7 +243,8 @@ class Solution {
   mutable Workers workers_;
 };
 
-/// No mode lies below the limit: says where the lowest one is, at the price of one factorization.
+/// Handles a body without a mode below the limit: finds its lowest mode with one more
+/// factorization.
 absl::StatusOr<DeformationModes> FindLowest(const Solution& solution, double limit) {
   const double above = solution.BoundOfLowest();
   absl::StatusOr<Modes> lowest = solution.SolveLowest(solution.rigid_mode_count() + 1, above);

@@ -13,8 +13,8 @@
 
 namespace carillon::precompute {
 
-/// Every deformation mode of a body below an eigenvalue, verified; its rigid-body modes (six, fewer
-/// where it is held) are left to the simulator.
+/// All verified deformation modes of a body below an eigenvalue. Its rigid-body modes (six, or
+/// fewer for a fixed body) are left to the simulator.
 struct DeformationModes {
   Modes modes;
   Eigen::VectorXd residuals;  ///< relative, of each mode
@@ -24,27 +24,29 @@ struct DeformationModes {
   double lowest_eigenvalue = 0;
 };
 
-/// More modes than this are refused: as many never sound at once, and their shapes fill gigabytes.
+/// Largest number of modes of a model. More modes never sound at once, and their shapes would fill
+/// gigabytes.
 inline constexpr int kMaxModeCount = 5000;
-/// As many may be found where only the most audible are kept.
+/// Largest number of modes that may be found if only the most audible ones are kept.
 inline constexpr int kMaxFoundModeCount = 20'000;
 
-/// What a solution is at: it counts the modes first, which belongs to their proof.
+/// The stages of a solution. Counting the modes comes first and belongs to kVerify.
 enum class SolveStage { kFactor, kSolve, kVerify };
 
-/// Told of every stage and of the part of it that is done, 0 to 1.
+/// Called with the current stage and the fraction of it that is done, 0 to 1.
 using SolveWatch = std::function<void(SolveStage, double)>;
 
 struct SolveOptions {
-  std::vector<Point> held = {};  ///< of the nodes that are held
+  std::vector<Point> held = {};  ///< positions of the fixed nodes
   int max_mode_count = kMaxModeCount;
-  /// Told of the cost before the modes are counted, from a guess of their number, and after.
+  /// Called with the predicted cost before the modes are counted, based on a guess of their number,
+  /// and again afterwards.
   std::function<void(const SolveCost&)> on_cost = [](const SolveCost&) {};
 };
 
 /// Finds all deformation modes below `eigenvalue_limit`. Their number is counted first, by inertia,
-/// so that the solver knows when it has them all; where the limit agrees with an eigenvalue to
-/// nearly all digits it is raised by a hair.
+/// so that the solver knows when it has found all of them. If the limit agrees with an eigenvalue
+/// to nearly all digits, it is raised slightly.
 ///
 /// `nodes`: positions, in the order of the unknowns.
 /// Errors: BODY_IN_SEVERAL_PIECES, TOO_MANY_MODES, MEMORY_TOO_SMALL (before it is taken),
@@ -55,14 +57,14 @@ absl::StatusOr<DeformationModes> SolveDeformationModes(const SystemMatrices& sys
                                                        const SolveWatch& watch,
                                                        const SolveOptions& options = {});
 
-/// The same of the body whose matrices Assemble made, which says what is held; the shapes have all
-/// its nodes, and are zero where they are held.
+/// The same for the body `mesh`, from which Assemble made the matrices. The shapes have all nodes
+/// and are zero at fixed nodes.
 absl::StatusOr<DeformationModes> SolveDeformationModes(const SystemMatrices& system,
                                                        const TetMesh& mesh, double eigenvalue_limit,
                                                        const SolveWatch& watch,
                                                        SolveOptions options = {});
 
-/// True where the dense solver is the faster one, by measurement.
+/// Whether the dense solver is faster, by measurement.
 bool PrefersDense(Eigen::Index unknown_count, int mode_count);
 
 }  // namespace carillon::precompute

@@ -16,20 +16,22 @@
 namespace carillon::precompute {
 namespace {
 
-/// One row for each unknown, so that an element's rows lie together.
+/// One row for each unknown, so that the rows of an element are close in memory.
 using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-/// Barycentric coordinates, and the derivatives of a function by them.
+/// Barycentric coordinates, and derivatives with respect to them.
 using Barycentric = Eigen::Vector4d;
 
-/// What C of the header is, by order of the elements.
+/// The constant C of the header, for each order of elements.
 constexpr double kLinearConstant = 1.3;
 constexpr double kQuadraticConstant = 1.8;
-/// Part of an eigenvalue that may be error; beyond it the mesh says nothing about the mode.
+/// Largest fraction of an eigenvalue that may be error; beyond it the mesh gives no information
+/// about the mode.
 constexpr double kMostError = 0.99;
 
-/// The residuals of some modes at a time, of at least so many, take so much memory, or as many
-/// times as much as the shapes: less than the solution took beside them.
+/// Residuals are computed in batches: at least kFewestModesAtATime modes, and otherwise as many as
+/// fit into max(kResidualBytes, kTimesShapes * size of the shapes), which is less than the solution
+/// needed beside the shapes.
 constexpr size_t kResidualBytes = size_t{512} << 20U;
 constexpr size_t kTimesShapes = 2;
 constexpr size_t kFewestModesAtATime = 8;
@@ -63,8 +65,8 @@ std::vector<Value> BaseFunctions(const Barycentric& at, int node_count) {
   return functions;
 }
 
-/// What the next order adds: to linear elements 4 L_a L_b on each edge; to quadratic ones
-/// L_a L_b (L_a - L_b) on each edge, L_a L_b L_c on each face.
+/// The functions that the next order adds: for linear elements 4 L_a L_b on each edge; for
+/// quadratic ones L_a L_b (L_a - L_b) on each edge, L_a L_b L_c on each face.
 std::vector<Value> AddedFunctions(const Barycentric& at, int node_count) {
   std::vector<Value> functions;
   for (const auto& [a, b] : kTetEdges) {
@@ -157,7 +159,7 @@ class Places {
     for (const auto& [nodes, number] : numbers) nodes_[static_cast<size_t>(number)] = nodes;
   }
 
-  /// For each place whether it is held: all its corners are.
+  /// For each edge or face, whether it is fixed, that is whether all its corners are.
   std::vector<bool> HeldWith(const TetMesh& mesh) const {
     std::vector<bool> node_is_held(mesh.nodes.size());
     for (const int32_t node : mesh.held) node_is_held[static_cast<size_t>(node)] = true;
@@ -173,8 +175,8 @@ class Places {
   size_t count() const { return nodes_.size(); }
   size_t added() const { return added_; }
   int32_t Of(size_t element, size_t i) const { return number_[element * added_ + i]; }
-  /// An odd function on an edge changes its sign with the edge's direction; that of a linear
-  /// element is even.
+  /// An odd function on an edge changes its sign with the edge's direction. The function of a
+  /// linear element is even.
   double Sign(size_t element, size_t i) const {
     return added_ == 6 ? 1.0 : static_cast<double>(sign_[element * added_ + i]);
   }
@@ -202,7 +204,7 @@ TetGeometry GeometryOf(const TetMesh& mesh, const int32_t* element) {
   return MakeTetGeometry(corners);
 }
 
-/// Adds up over the elements what belongs to each place.
+/// Sums the contributions of the elements to each edge and face.
 class Estimator {
  public:
   Estimator(const TetMesh& mesh, const ElasticConstants& elastic)
@@ -222,8 +224,9 @@ class Estimator {
     }
   }
 
-  /// How many modes each of the threads had best treat at a time: all in one pass over the elements
-  /// by one thread, where there is the memory, because most of a pass is spent on the elements.
+  /// The best number of modes for each thread in one pass over the elements. If memory allows, one
+  /// thread takes all modes in one pass, because most of the time of a pass is spent on the
+  /// elements.
   Eigen::Index ModesAtATime(const Eigen::MatrixXd& shapes, int thread_count) const {
     const size_t bytes_of_mode = 3 * sizeof(double) * places_.count();
     const size_t shape_bytes = sizeof(double) * static_cast<size_t>(shapes.size());
@@ -249,7 +252,7 @@ class Estimator {
     }
     Eigen::VectorXd sums = Eigen::VectorXd::Zero(shapes.cols());
     for (size_t b = 0; b < places_.count(); ++b) {
-      if (held_[b]) continue;  // its residual is what holds it
+      if (held_[b]) continue;  // its residual is the reaction force
       const auto r = residuals.middleRows<3>(3 * static_cast<Eigen::Index>(b));
       sums += r.cwiseProduct(stiffness_[b].inverse() * r).colwise().sum().transpose();
     }
@@ -257,7 +260,8 @@ class Estimator {
   }
 
  private:
-  /// What the added functions of an element see of the modes: a(b, phi) - m(b, phi) Lambda.
+  /// The residuals of the modes for the added functions of an element: a(b, phi) - m(b, phi)
+  /// Lambda.
   struct ElementResidual {
     ElementResidual(Eigen::Index added, Eigen::Index unknowns, Eigen::Index mode_count)
         : stiffness(added, unknowns),
@@ -330,7 +334,7 @@ Eigen::VectorXd EstimateFrequencyErrors(const TetMesh& mesh, const ElasticConsta
         modes.eigenvalues.segment(first, count), modes.shapes.middleCols(first, count));
     const Eigen::ArrayXd relative =
         constant * corrections.array() / modes.eigenvalues.segment(first, count).array();
-    // A frequency goes with the root of its eigenvalue.
+    // A frequency is proportional to the square root of its eigenvalue.
     errors.segment(first, count) = (1 - relative.min(kMostError)).sqrt().inverse() - 1;
   });
   return errors;

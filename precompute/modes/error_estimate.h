@@ -9,23 +9,24 @@
 
 namespace carillon::precompute {
 
-/// How far each mode's frequency is too high for the coarseness of the mesh, relatively: an
-/// estimate.
+/// Estimates the relative error of each mode's frequency that is due to the mesh; the computed
+/// frequency is too high.
 ///
-/// What elements one order higher would add is tested, edge by edge and (quadratic elements) face
-/// by face, with the hierarchical function b of that edge or face (Bank and Smith, A posteriori
-/// error estimates based on hierarchical bases, SIAM J. Numer. Anal. 30, 1993):
+/// The residual of each mode is tested with the functions that elements one order higher would add:
+/// the hierarchical function b of each edge and (quadratic elements) of each face (Bank and Smith,
+/// A posteriori error estimates based on hierarchical bases, SIAM J. Numer. Anal. 30, 1993):
 ///
 ///     r_b = a(b, phi) - Lambda m(b, phi),   delta Lambda ~ C sum_b r_b^T a(b, b)^-1 r_b
 ///
-/// which sees the locking of thin walls, where averaged stresses do not. C is fitted to a bar, a
-/// block, a plate and a tube so that it seldom says too little where the error is a few percent or
-/// less; walls of linear elements that are off by half or more are off by more than it says. The
-/// body is the polyhedron of its mesh: how well that follows a curved original is not in it.
+/// This detects the locking of thin walls, which estimates by averaged stresses do not. C is fitted
+/// to a bar, a block, a plate and a tube so that the estimate is rarely too small for errors of a
+/// few percent or less. For walls of linear elements with errors of half or more the estimate is
+/// too small. The body is the polyhedron of its mesh; the difference to a curved original is not
+/// part of the estimate.
 ///
-/// `elastic` is that of the matrices the modes were solved from, for unit density; a consistent
-/// mass is assumed. Shapes have all nodes; where the mesh is held nothing is added. Result: one
-/// number a mode, 0.01 for one percent.
+/// `elastic`: the constants of the matrices from which the modes were computed, for unit density. A
+/// consistent mass is assumed. Shapes have all nodes; fixed edges and faces add nothing. Result:
+/// one number for each mode, 0.01 for one percent.
 Eigen::VectorXd EstimateFrequencyErrors(const TetMesh& mesh, const ElasticConstants& elastic,
                                         const Modes& modes);
 

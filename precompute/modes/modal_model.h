@@ -13,17 +13,18 @@
 
 namespace carillon::precompute {
 
-/// What is kept of a decomposition, for unit Young's modulus and unit density.
+/// The result of a decomposition, for unit Young's modulus and unit density.
 struct ModalModel {
   int node_count = 0;
   int element_count = 0;
   double volume_m3 = 0;
   double complete_to_eigenvalue = 0;
-  /// The lowest deformation mode of the body, held or (where it is the first beyond) not.
+  /// The lowest deformation eigenvalue of the body, also if it lies above the limit and is not in
+  /// the model.
   double lowest_eigenvalue = 0;
   Verification verification;
   int left_out_mode_count = 0;  ///< found, but not kept: see KeepMostAudible
-  /// What the user should know though it stopped nothing.
+  /// Warnings for the user.
   std::vector<std::string> warnings;
 
   std::vector<double> eigenvalues;  ///< #modes, ascending, 1/s^2
@@ -49,8 +50,8 @@ struct ModalModel {
   }
 };
 
-/// `given`: the surface as given, to which the boundary of `mesh` refers. `elastic`: of the
-/// matrices.
+/// `given`: the surface as given, to which the boundary of `mesh` refers. `elastic`: the constants
+/// of the matrices.
 ModalModel MakeModalModel(const TetMesh& mesh, const SurfaceMesh& given,
                           const ElasticConstants& elastic, const DeformationModes& solution);
 

@@ -14,17 +14,17 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-/// Motions of the places held smaller than this, as a part of the largest, are rounding.
+/// Motions of the fixed nodes smaller than this fraction of the largest are rounding errors.
 constexpr double kRankTolerance = 1e-6;
 
-/// So many of the places held say how far away the rest of the body is.
+/// Largest number of fixed nodes used to compute the distance of other nodes.
 constexpr size_t kMaxDistanceSamples = 256;
 
 Eigen::Map<const Eigen::Matrix3Xd> Positions(const std::vector<Point>& nodes) {
   return {nodes.front().data(), 3, static_cast<Index>(nodes.size())};
 }
 
-/// Where the nodes are, and half their extent.
+/// The centre of the nodes, and half their extent.
 struct Frame {
   explicit Frame(const std::vector<Point>& nodes)
       : centroid(Positions(nodes).rowwise().mean()),
@@ -50,8 +50,8 @@ MatrixXd Motions(const std::vector<Point>& nodes, const Frame& frame) {
   return motions;
 }
 
-/// What to combine of the six motions so that the places held stay where they are: 6 by the number
-/// of such motions.
+/// The combinations of the six motions that do not move the fixed nodes: 6 by the number of
+/// combinations.
 MatrixXd FreeCombinations(const std::vector<Point>& held, const Frame& frame) {
   if (held.empty()) return MatrixXd::Identity(6, 6);
   const MatrixXd motions = Motions(held, frame);
@@ -62,7 +62,8 @@ MatrixXd FreeCombinations(const std::vector<Point>& held, const Frame& frame) {
   return gram.eigenvectors().leftCols(count);
 }
 
-/// For each node its distance to what is held, as a part of the body's size; one without.
+/// The distance of each node to the nearest fixed node, relative to the body's size; one if no node
+/// is fixed.
 Eigen::VectorXd Weights(const std::vector<Point>& nodes, const std::vector<Point>& held,
                         double size) {
   Eigen::VectorXd weights = Eigen::VectorXd::Ones(static_cast<Index>(nodes.size()));
@@ -79,7 +80,7 @@ Eigen::VectorXd Weights(const std::vector<Point>& nodes, const std::vector<Point
   return weights;
 }
 
-/// Displacements that are polynomials of second degree times the distance to what is held.
+/// Displacements that are polynomials of second degree times the distance to the fixed nodes.
 MatrixXd PolynomialFields(const std::vector<Point>& nodes, const std::vector<Point>& held) {
   const Frame frame(nodes);
   const Eigen::VectorXd weights = Weights(nodes, held, frame.size);
@@ -115,14 +116,14 @@ MatrixXd RigidBodyModes(const std::vector<Point>& nodes, const SystemMatrices& s
 double LowestEigenvalueBound(const std::vector<Point>& nodes, const SystemMatrices& system,
                              const std::vector<Point>& held) {
   MatrixXd fields = PolynomialFields(nodes, held);
-  Index rigid_count = 6;  // polynomials all, where the body is free
+  Index rigid_count = 6;  // for a free body they are polynomials of first degree
   if (!held.empty()) {
     const MatrixXd rigid = RigidBodyModes(nodes, system, held);
     rigid_count = rigid.cols();
     fields.conservativeResize(Eigen::NoChange, 30 + rigid_count);
     fields.rightCols(rigid_count) = rigid;
   }
-  // On a handful of nodes the fields are dependent.
+  // With very few nodes the fields are dependent.
   if (system.unknown_count() < 2 * fields.cols()) {
     return (system.K.diagonal().array() / system.M.diagonal().array()).maxCoeff();
   }

@@ -23,7 +23,8 @@ namespace carillon::precompute::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// Numbers ahead that are asked for: prefetchers of the machine stop at the end of each page.
+/// Distance of the software prefetch, in numbers: hardware prefetchers stop at the end of each
+/// page.
 constexpr int kAhead = 384;
 
 template <typename Real>

@@ -18,7 +18,8 @@ template <typename Real>
 void RowMultiply(const Real* m, const int32_t* columns, int count, const Real* x, Real* y);
 
 /// product = a^T b, kBlockWidth square, row-major; a and b: `rows` by kBlockWidth, row-major. A few
-/// hundred rows at a time stay in the first-level cache, and lose little when summed in float.
+/// hundred rows at a time fit into the first-level cache, and their sums lose little precision in
+/// float.
 template <typename Real>
 void BlockDot(const Real* a, const Real* b, int64_t rows, Real* product);
 

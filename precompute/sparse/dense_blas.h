@@ -6,7 +6,7 @@
 
 namespace carillon::precompute::blas {
 
-// The few dense kernels of a front, for both precisions. Column-major throughout.
+// The dense kernels that a front needs, in both precisions. Column-major throughout.
 
 /// A = L L^T, lower. Returns whether A was positive definite.
 inline bool Cholesky(int n, double* A, int ld) {

@@ -12,13 +12,13 @@
 namespace carillon::precompute {
 namespace {
 
-/// Columns eliminated at once; fewer where a pivot among them is negative.
+/// Number of columns eliminated at once, and the smaller number for a block with a negative pivot.
 constexpr int kPanel = 96;
 constexpr int kSignedPanel = 24;
 /// Rows of the panel that one thread takes.
 constexpr int kGrain = 16;
 
-/// Columns of the panel with negative pivots.
+/// Indices of the panel's columns with negative pivots.
 using Columns = std::vector<int>;
 
 template <typename Real>
@@ -52,7 +52,7 @@ class Eliminator {
     return front_.panel.data() + static_cast<ptrdiff_t>(column) * height() + row;
   }
 
-  /// `keep`: the block stays as it was where it is not positive definite.
+  /// `keep`: whether a block that is not positive definite stays unchanged.
   Elimination FactorizeBlock(int k, int width, bool keep) {
     std::vector<Real> copy;
     for (int c = k; keep && c < k + width; ++c) {

@@ -25,10 +25,10 @@ enum class Elimination {
   kVanishing,    ///< a pivot whose sign is rounding
 };
 
-/// Turns the panel into L, and what it leaves of the update matrix, by A = L S L^T with signs S on
-/// the diagonal: a Cholesky factorization but for the columns of negative pivots, which are few.
-/// `negative`: where it is null, none is allowed; else their number is added to it. Pivots up to
-/// `smallest` vanish.
+/// Turns the panel into L, and subtracts its part from the update matrix: A = L S L^T with signs S
+/// on the diagonal. This is a Cholesky factorization except for the few columns with negative
+/// pivots. `negative`: if null, negative pivots are not allowed; otherwise their number is added to
+/// it. Pivots up to `smallest` count as vanishing.
 template <typename Real>
 Elimination Eliminate(Front<Real>& front, Real smallest, Workers& workers, int* negative);
 

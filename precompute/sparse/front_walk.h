@@ -19,13 +19,13 @@
 
 namespace carillon::precompute {
 
-/// Told of the part of a work that is done, 0 to 1.
+/// Called with the finished fraction of a task, 0 to 1.
 using PartDone = std::function<void(double)>;
 
 /// Walks the supernodes from the leaves to the roots: assembles each front from A and from the
-/// update matrices of its children, and hands it to `visit(s, front, workers)`. Subtrees go
-/// side by side, each in one thread with its update matrices on a stack; the fronts above them
-/// follow one by one, each shared by all threads.
+/// update matrices of its children, and passes it to `visit(s, front, workers)`. Subtrees are
+/// processed in parallel, each by one thread with its update matrices on a stack. The fronts above
+/// the subtrees follow one by one, and all threads share each of them.
 template <typename Real, typename Visit>
 class FrontWalk {
  public:
@@ -91,8 +91,8 @@ class FrontWalk {
     return failure;
   }
 
-  /// The update matrices of children lie on top of the stack when their parent comes; its own is
-  /// made above them and then moved to their place.
+  /// When a parent is processed, the update matrices of its children are on top of the stack. Its
+  /// own update matrix is made above them and then moved to their place.
   absl::Status RunSubtree(const Subtree& subtree, Real* stack, Assembler& assembler,
                           Workers& alone);
 
@@ -104,7 +104,7 @@ class FrontWalk {
     return largest;
   }
 
-  /// Lower triangles of columns; `to` may lie where `from` does, or before.
+  /// Moves the lower triangle of an update matrix; `to` may equal `from` or precede it.
   static void MoveUpdate(const Real* from, ptrdiff_t columns, Real* to) {
     for (ptrdiff_t j = 0; j < columns; ++j) {
       std::memmove(to + j * (columns + 1), from + j * (columns + 1),
@@ -157,8 +157,8 @@ class FrontWalk {
       }
     }
 
-    /// The column of the front, indexed by row of the front (for update columns rows below the
-    /// pivots only).
+    /// A column of the front, indexed by the front's rows; columns of the update matrix have only
+    /// rows below the pivots.
     Real* Column(int c) {
       if (c < front_.pivots) return &front_.panel[static_cast<size_t>(c) * front_.height()];
       return front_.update + static_cast<ptrdiff_t>(c - front_.pivots) * front_.updates -

@@ -93,7 +93,7 @@ void CountFlops(FrontalStructure& fronts) {
   }
 }
 
-/// What the stack of a subtree holds at most, see FrontWalk.
+/// The largest size of a subtree's stack, see FrontWalk.
 size_t StackSize(const FrontalStructure& fronts, int begin, int end) {
   const auto update_size = [&](int s) {
     const auto updates = static_cast<size_t>(fronts.update_count(s));

@@ -14,11 +14,11 @@ namespace carillon::precompute {
 struct Subtree {
   int begin = 0;
   int end = 0;
-  /// Numbers that the update matrices of its supernodes need at most at once.
+  /// Most numbers that the update matrices of its supernodes take at the same time.
   size_t stack_size = 0;
 };
 
-/// The supernodes of a Cholesky factorization, by node (each stands for three unknowns).
+/// The supernodes of a Cholesky factorization, in terms of nodes; each node has three unknowns.
 struct FrontalStructure {
   /// Elimination order: order[i] is the node eliminated i-th. Nested dissection of the node graph.
   std::vector<int32_t> order;
@@ -28,17 +28,19 @@ struct FrontalStructure {
   /// pivots first, ascending, numbered in elimination order.
   std::vector<int64_t> row_start;
   std::vector<int32_t> rows;
-  /// #supernodes: the supernode that takes the update matrix of s; -1 at a root. Supernodes are in
-  /// postorder: a subtree is contiguous, and the children of s are the roots of the subtrees that
-  /// end before s.
+  /// #supernodes: the supernode to whose front the update matrix of s is added; -1 at a root.
+  /// Supernodes are in postorder: a subtree is contiguous, and the children of s are the roots of
+  /// the subtrees that end before s.
   std::vector<int32_t> parent;
-  /// #supernodes + 1, and all children by parent, ascending.
+  /// #supernodes + 1: the children of s are child[child_start[s] .. child_start[s + 1] - 1],
+  /// ascending.
   std::vector<int32_t> child_start;
   std::vector<int32_t> child;
-  /// #supernodes: multiply-adds of each, three unknowns a node, and their sum.
+  /// #supernodes: multiply-adds of each supernode with three unknowns a node, and their sum.
   std::vector<double> flops;
   double factor_flops = 0;
-  /// Subtrees of little work each, for threads, and the supernodes above them, ascending.
+  /// Subtrees with little work each, which single threads process, and the supernodes above all
+  /// subtrees, ascending.
   std::vector<Subtree> subtrees;
   std::vector<int32_t> top;
 
@@ -59,8 +61,8 @@ struct FrontalStructure {
   int update_count(int s) const { return height(s) - pivot_count(s); }
 };
 
-/// Orders the graph of nodes (a third the size of the graph of unknowns, and METIS finds better
-/// separators in it) and finds the supernodes, with CHOLMOD's symbolic analysis.
+/// Orders the graph of nodes and finds the supernodes with CHOLMOD's symbolic analysis. The graph
+/// of nodes is a third the size of the graph of unknowns, and METIS finds better separators in it.
 /// Errors: RESOURCE_EXHAUSTED.
 absl::StatusOr<FrontalStructure> AnalyzeFronts(const Eigen::SparseMatrix<double>& K);
 

@@ -94,7 +94,8 @@ absl::StatusOr<MultifrontalCholesky<Real>> MultifrontalCholesky<Real>::Factorize
 
 namespace {
 
-/// A diagonal tile may be half full: its rows are copied out and back, absent ones zero.
+/// A diagonal tile may be half full. Its rows are copied to a full tile and back; absent rows are
+/// zero.
 template <int kWidth, typename Real, typename Solve>
 void WithTileRows(Real* x, int rows, const Solve& solve) {
   if (rows >= kTileRows) {
@@ -107,10 +108,10 @@ void WithTileRows(Real* x, int rows, const Solve& solve) {
   std::copy(copy.begin(), copy.begin() + rows * kWidth, x);
 }
 
-/// Tiles whose triangle one thread solves while the others wait.
+/// Number of tiles whose triangle one thread solves while the others wait.
 constexpr int kGroup = 32;
 
-/// Numbers of a front from which on it is worth to wake other threads for it.
+/// Smallest size of a front, in numbers, for which waking other threads is worthwhile.
 constexpr size_t kShared = 200'000;
 
 }  // namespace
@@ -126,8 +127,9 @@ class MultifrontalCholesky<Real>::Substitution {
   Substitution(const MultifrontalCholesky& factor, Real* x)
       : factor_(factor), fronts_(*factor.fronts_), x_(x) {}
 
-  /// Where a thread finds the rows of nodes: those from `end` on, of the top, in `above`, because
-  /// several subtrees add to them; a tile's second node may be missing, then it is `scratch`.
+  /// Gives a thread the rows of nodes. Rows of nodes from `end` on, which belong to the top, are in
+  /// `above`, because several subtrees add to them. `scratch` stands for the missing second node of
+  /// a tile.
   struct Rows {
     int end = 0;
     Real* above = nullptr;
@@ -178,7 +180,7 @@ class MultifrontalCholesky<Real>::Substitution {
     });
   }
 
-  /// Columns are shared out, because all tiles add to all of them.
+  /// Threads take different columns, because all tiles add to all columns.
   void Backward(int s, Workers& workers) const {
     const int pivots = fronts_.pivot_count(s);
     Real* pivot = At(fronts_.first_pivot[s]);

@@ -26,7 +26,7 @@ class MultifrontalCholesky {
   /// Overwrites x, 3 #nodes by kBlockWidth, row-major, in elimination order, by its solution.
   void Solve(Real* x, Workers& workers) const;
 
-  /// The same of x with kWideBlock columns, by one thread.
+  /// Solves for kWideBlock columns with one thread.
   void SolveWide(Real* x) const requires std::is_same_v<Real, float>;
 
   size_t stored_bytes() const { return tile_start_.back() * sizeof(Real); }
@@ -38,11 +38,11 @@ class MultifrontalCholesky {
   const FrontalStructure* fronts_ = nullptr;
   std::unique_ptr<Real[]> tiles_;   // written whole by the factorization: not zeroed before
   std::vector<size_t> tile_start_;  ///< #supernodes + 1, into tiles_
-  std::vector<int32_t> top_nodes_;  ///< eliminated by the fronts above all subtrees
+  std::vector<int32_t> top_nodes_;  ///< the nodes eliminated by the fronts above all subtrees
   std::vector<int32_t> top_index_;  ///< #nodes: place in top_nodes_, or -1
 };
 
-/// Numbers that a factor stores.
+/// The number of matrix entries that a factor stores.
 size_t FactorNumbers(const FrontalStructure& fronts);
 
 }  // namespace carillon::precompute

@@ -96,7 +96,7 @@ NodeMatrix MakeNodeMatrix(const Sparse& K, const Sparse& M, const std::vector<in
       pj = position[static_cast<size_t>(j)];
       block = &A.stiffness[entry(std::max(pi, pj), std::min(pi, pj)) * 9];
     }
-    // A block below the diagonal before the re-ordering may stand above it now.
+    // Reordering may move a block from below the diagonal to above it.
     if (pi >= pj) block[3 * a + b] = value;
     if (pi <= pj) block[3 * b + a] = value;
   });

@@ -9,10 +9,10 @@
 
 namespace carillon::precompute {
 
-/// Vectors that the block solver handles at once: two AVX-512 registers of doubles a row.
+/// Number of vectors in a block of the solver: two AVX-512 registers of doubles for each row.
 inline constexpr int kBlockWidth = 16;
 
-/// A matrix m (x) I3 by rows, both triangles.
+/// A matrix m (x) I3, stored by rows with both triangles.
 template <typename Real>
 struct MassRows {
   std::vector<int32_t> start;  ///< #nodes + 1
@@ -34,7 +34,7 @@ struct NodeMatrix {
   bool mass_is_identity = false;
 };
 
-/// Where each node of an order stands in it.
+/// The inverse permutation: the position of each node in `order`.
 std::vector<int32_t> Inverse(const std::vector<int32_t>& order);
 
 /// Re-orders K and M (3n by 3n, lower triangles) to `order`: node order[i] becomes i.

@@ -52,10 +52,11 @@ Adjacency MakeAdjacency(const SystemMatrices::Sparse& K) {
   return graph;
 }
 
-/// Nodes in pairs, each with the one that it is coupled to most of those left; -1: none was left.
+/// Nodes in pairs: each node is paired with the remaining node to which it is coupled most
+/// strongly; -1 if none remained.
 struct Pairs {
   std::vector<std::pair<idx_t, idx_t>> nodes;
-  std::vector<idx_t> number;  ///< of the pair that each node is in
+  std::vector<idx_t> number;  ///< the pair of each node
 };
 
 Pairs FindPairs(const Adjacency& graph) {
@@ -101,7 +102,7 @@ Adjacency Contract(const Adjacency& graph, const Pairs& pairs) {
   return coarse;
 }
 
-/// Nested dissection; `weights`: of the nodes, empty: all alike.
+/// Nested dissection. `weights`: weights of the nodes; empty: all equal.
 std::vector<idx_t> Dissect(Adjacency& graph, std::vector<idx_t> weights) {
   idx_t node_count = graph.node_count();
   std::vector<idx_t> order(static_cast<size_t>(node_count));
@@ -128,7 +129,7 @@ std::vector<int> OrderUnknowns(const SystemMatrices& system) {
 }
 
 std::vector<int> OrderThinWall(const SystemMatrices::Sparse& K) {
-  // Of a wall one element thick 0.3, of a solid 0.7.
+  // This ratio is about 0.3 for a wall one element thick and 0.7 for a solid.
   constexpr double kMostEdgesLeft = 0.4;
   const Adjacency graph = MakeAdjacency(K);
   const Pairs pairs = FindPairs(graph);

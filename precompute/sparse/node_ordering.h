@@ -8,13 +8,14 @@
 namespace carillon::precompute {
 
 /// Pivot order of the unknowns that keeps factors sparse: element k is the unknown eliminated k-th.
-/// Nested dissection of the graph of nodes, a third the size of that of the unknowns, whose three
-/// components then follow one another.
+/// It is a nested dissection of the graph of nodes, which is a third the size of the graph of
+/// unknowns; the three unknowns of a node follow one another.
 std::vector<int> OrderUnknowns(const SystemMatrices& system);
 
-/// Such an order of the nodes of a body whose walls are mostly one element thick, with the two
-/// nodes of each place of the wall taken as one: found in less than half the time, and as sparse.
-/// Empty where the body is another.
+/// An order of the nodes of a body whose walls are mostly one element thick. Each pair of nodes
+/// across the wall counts as one vertex of the graph, so that the order is found in less than half
+/// the time; the factor is as sparse. Returns an empty order if the mesh is not mostly one element
+/// thick.
 std::vector<int> OrderThinWall(const SystemMatrices::Sparse& K);
 
 }  // namespace carillon::precompute

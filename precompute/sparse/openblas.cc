@@ -14,7 +14,7 @@ namespace carillon::precompute {
 
 namespace {
 
-/// One for the process, as OpenBLAS' own.
+/// The process has one thread count, as OpenBLAS has.
 std::atomic<int> thread_count = 1;
 
 }  // namespace
@@ -23,8 +23,8 @@ void SetThreadCount(int count) {
   const int processors = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   thread_count = count > 0 ? count : processors;
   openblas_set_num_threads(1);
-  // Blocks of vectors come and go by the hundred: their memory is kept, because the kernel clears
-  // every page that it hands out.
+  // Hundreds of blocks of vectors are allocated and freed. Their memory is kept in the process,
+  // because the kernel clears every page that it provides.
   mallopt(M_MMAP_THRESHOLD, 32 << 20);
   mallopt(M_TRIM_THRESHOLD, 512 << 20);
 }

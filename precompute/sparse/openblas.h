@@ -7,8 +7,8 @@ namespace carillon::precompute {
 void SetThreadCount(int count);
 int ThreadCount();
 
-/// While it lives dense kernels share their work among threads of their own; otherwise they run in
-/// the thread that calls them, so that our threads may call them side by side.
+/// While an object of this class lives, OpenBLAS uses threads of its own. Otherwise its kernels run
+/// in the calling thread, so that several threads may call them in parallel.
 class ScopedBlasThreads {
  public:
   explicit ScopedBlasThreads(int count);
@@ -17,11 +17,11 @@ class ScopedBlasThreads {
   ScopedBlasThreads& operator=(const ScopedBlasThreads&) = delete;
 };
 
-/// OpenBLAS chooses its kernels by the model number of the processor, and takes the oldest (SSE3)
-/// where it does not know the number, as Debian 12's version does with most processors made since:
-/// a factorization then takes three times as long. Returns the value of OPENBLAS_CORETYPE that
-/// suits the instructions of this processor, or nullptr where OpenBLAS chose well or the variable
-/// is set already. It is read when a process starts.
+/// OpenBLAS chooses its kernels by the model number of the processor. For an unknown number it
+/// takes the oldest kernels (SSE3), and a factorization takes three times as long; Debian 12's
+/// version does not know most newer processors. Returns the value of OPENBLAS_CORETYPE that suits
+/// the instructions of this processor, or nullptr if OpenBLAS chose well or the variable is already
+/// set. OpenBLAS reads the variable when a process starts.
 const char* BetterOpenBlasCore();
 
 }  // namespace carillon::precompute

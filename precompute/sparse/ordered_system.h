@@ -8,8 +8,8 @@
 
 namespace carillon::precompute {
 
-/// K and M in elimination order with the supernodes of their factorizations: made once, used for
-/// every factorization of K - shift M.
+/// K and M in elimination order, with the supernodes of their factorizations. One ordered system
+/// serves every factorization of K - shift M.
 struct OrderedSystem {
   FrontalStructure fronts;
   NodeMatrix matrix;

@@ -21,8 +21,8 @@ namespace carillon::precompute::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// Numbers ahead that are asked for: prefetchers of the machine stop at the end of each page, and a
-/// factor fills many.
+/// Distance of the software prefetch, in numbers: hardware prefetchers stop at the end of each
+/// page, and a factor fills many pages.
 constexpr int kAhead = 768;
 
 template <typename Real, int kWidth>
@@ -32,7 +32,8 @@ HWY_INLINE void Forward(const Real* HWY_RESTRICT tile, int column_count, const R
   using V = hn::Vec<Lanes<Real>>;
   constexpr int kLanes = LaneCount<Real>();
   constexpr int kVectors = Chunk<Real, kWidth>() / kLanes;
-  // Sums of one vector a row are six chains, too few to keep two units busy: twice as many, then.
+  // Sums of one vector for each row form six dependency chains, too few for two multiply-add units.
+  // Twelve chains are used instead.
   constexpr int kSets = kVectors == 1 ? 2 : 1;
   for (int c = 0; c < kWidth; c += Chunk<Real, kWidth>()) {
     V sum[kSets][kTileRows][kVectors];

@@ -8,7 +8,7 @@ namespace carillon::precompute {
 /// Rows of a packed panel that one tile holds: two nodes.
 inline constexpr int kTileRows = 6;
 
-/// Right-hand sides for which a factor in float is read once where there are as many.
+/// Number of right-hand sides that one pass over a factor in float can serve.
 inline constexpr int kWideBlock = 2 * kBlockWidth;
 
 /// One tile of a packed panel times kWidth right-hand sides, chosen at run time for the machine:

@@ -47,12 +47,12 @@ void Workers::Try(const std::function<void(int)>& work, int index) {
   }
 }
 
-void Workers::ForParts(int64_t n, int64_t grain,
+void Workers::ForParts(int64_t n, int64_t unit,
                        const std::function<void(int64_t, int64_t, int)>& visit) {
-  const int64_t grains = (n + grain - 1) / grain;
+  const int64_t units = (n + unit - 1) / unit;
   Run([&](int t) {
-    const int64_t begin = grains * t / count() * grain;
-    const int64_t end = std::min(n, grains * (t + 1) / count() * grain);
+    const int64_t begin = units * t / count() * unit;
+    const int64_t end = std::min(n, units * (t + 1) / count() * unit);
     if (begin < end) visit(begin, end, t);
   });
 }
