@@ -11,18 +11,19 @@
 namespace carillon::precompute {
 namespace {
 
-/// Of the error of a frequency over the grain: four in the limit of quadratic elements, less where
-/// walls are thin and elements as long as they are thick.
+/// Power of the element size to which the frequency error is proportional: four in the limit of
+/// quadratic elements, less where walls are thin and elements as long as they are thick.
 constexpr double kErrorPower = 2.4, kLeastErrorPower = 1.5, kMostErrorPower = 4;
 constexpr double kTimePower = 1.6, kMemoryPower = 1.4;
-/// Of the nodes of a wall, whose factor hardly fills in: a bowl of 18,000 and 100,000 nodes.
+/// Power of the node count for walls, whose factor has little fill-in: measured on a bowl of 18,000
+/// and 100,000 nodes.
 constexpr double kThinTimePower = 1.1;
-/// Of the accuracy and the budgets wanted, so that the next round is rarely one too few.
+/// Fraction of the accuracy and the budgets to aim for, so that one more round rarely is necessary.
 constexpr double kMargin = 0.8;
-/// Of the nodes from round to round.
+/// Growth of the number of nodes from one round to the next.
 constexpr double kLeastGrowth = 1.15, kMostGrowth = 6;
 constexpr size_t kMostRounds = 6;
-/// Of the grain, below which a mesh was not refined.
+/// Ratio of the element sizes of two rounds above which the mesh counts as not refined.
 constexpr double kSameGrain = 0.97;
 
 double ErrorPower(const std::vector<Round>& rounds) {

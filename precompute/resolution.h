@@ -20,7 +20,7 @@ struct ResolutionGoal {
 struct Round {
   double grain_m = 0;      ///< of its surface, as Grain() measures it
   double node_count = 0;   ///< mid-side nodes, too
-  bool thin = false;       ///< nodes grow with the second power of 1 / grain, not with the third
+  bool thin = false;       ///< number of nodes ~ element_size^-2, not ^-3
   double worst_error = 0;  ///< zero: it has no mode
   double cpu_s = 0;
   double peak_bytes = 0;
@@ -29,21 +29,21 @@ struct Round {
 /// Corner nodes of the mesh to begin with.
 inline constexpr int kFirstCornerNodeCount = 1500;
 
-/// Grain in metres of the next mesh to try, or none where the last one is good enough, or the best
-/// that the goal allows. Errors fall with a power of the grain that the last two rounds show; time
-/// and memory grow with powers of the nodes that solids show.
+/// Element size in metres of the next mesh to try; none if the last mesh is good enough, or the
+/// best that the goal allows. The last two rounds show the power of the element size with which
+/// errors fall. Time and memory grow with powers of the number of nodes, measured on solids.
 std::optional<double> NextGrain(const ResolutionGoal& goal, const std::vector<Round>& rounds);
 
-/// How many times as long as `last` a round with that grain will take.
+/// Predicted time of a round with this element size, relative to the round `last`.
 double TimeGrowth(const Round& last, double grain_m);
 
-/// What a user is told of each budget that was overrun; nothing where both were kept to. The first
-/// round is solved whatever it takes, and later ones are only foretold.
+/// Warnings for the user about each budget that was exceeded. The first round is solved whatever it
+/// costs, and the cost of later rounds is only predicted.
 std::vector<std::string> OverrunWarnings(const ResolutionGoal& goal, double used_s,
                                          double used_bytes);
 
-/// What the rounds after the first one will take, in times of it, before its errors are known; and
-/// those after a later one, which is meant to be the last.
+/// Predicted time of all later rounds, relative to the current one: for the first round, whose
+/// errors are not known yet, and for a later round, which should be the last.
 inline constexpr double kLaterRoundsAfterFirst = 6, kLaterRounds = 0.1;
 
 }  // namespace carillon::precompute

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Finds the phrases of words.toml in pages, in comments of headers and of the contract, and in errors.
 
-Code is not read: neither code blocks and `quoted code` of pages nor names with an underscore.
+Code is not read: code blocks, `quoted code`, calls like Code(), and names with an underscore.
 """
 
 import bisect
@@ -15,6 +15,7 @@ import project
 LIST = "deploy/lint/words.toml"
 COMMENT = re.compile(r"^\s*//+\s?(?!.*SPDX|\s*clang-format|\s*NOLINT)(.*)$")
 LITERAL = re.compile(r'"((?:[^"\\]|\\.)*)"')
+QUOTED = re.compile(r"`[^`]*`|\b\w+\(\)")
 BULLET = re.compile(r"\s*(?:[*+-]|\d+\.|#+)\s")
 
 
@@ -33,7 +34,7 @@ def page_lines(text):
             blank = False
             if BULLET.match(line) or line.startswith("|"):
                 yield number, None
-            plain = re.sub(r"`[^`]*`", "`code`", line.strip())
+            plain = QUOTED.sub("`code`", line.strip())
             yield number, re.sub(r"\]\([^)]*\)", "]", plain).replace("*", "")
 
 
@@ -41,7 +42,7 @@ def comment_lines(text):
     """(line number, text) of // comments; None where a comment ends."""
     for number, line in enumerate(text.splitlines(), start=1):
         comment = COMMENT.match(line)
-        yield number, (comment.group(1).strip() or None) if comment else None
+        yield number, QUOTED.sub("`code`", comment.group(1).strip()) or None if comment else None
 
 
 def error_lines(text):

@@ -14,10 +14,10 @@ using Eigen::MatrixXd;
 template <typename Real>
 LanczosRecurrence<Real>::LanczosRecurrence(const NodeMatrix& A,
                                            const MultifrontalCholesky<Real>& factor, double shift,
-                                           const MatrixXd& deflated, double foreseen,
+                                           const MatrixXd& deflated, double expected_size,
                                            Workers& workers)
     : workers_(workers),
-      foreseen_(foreseen),
+      expected_size_(expected_size),
       mass_(MakeMassRows<Real>(A)),
       operator_(A, factor, mass_, shift, workers),
       mass_is_identity_(A.mass_is_identity),

@@ -27,7 +27,7 @@ class LanczosRecurrence {
   /// `deflated`: at most kBlockWidth vectors, M-orthonormal, in elimination order. `expected_size`:
   /// the predicted size of the basis at the end. The objects referred to must outlive this one.
   LanczosRecurrence(const NodeMatrix& A, const MultifrontalCholesky<Real>& factor, double shift,
-                    const Eigen::MatrixXd& deflated, double foreseen, Workers& workers);
+                    const Eigen::MatrixXd& deflated, double expected_size, Workers& workers);
 
   /// Starts with random vectors from a fixed seed, so that a body gives the same model each time.
   bool Start();
@@ -39,7 +39,7 @@ class LanczosRecurrence {
   int size() const { return basis_.size(); }
   double solve_error() const { return operator_.error(); }
   /// Estimated fraction of the iteration that is done.
-  double done() const { return std::min(1.0, size() / foreseen_); }
+  double done() const { return std::min(1.0, size() / expected_size_); }
 
   /// The projection of OP on the basis, block-tridiagonal, size() square.
   Eigen::MatrixXd T() const;
@@ -60,7 +60,7 @@ class LanczosRecurrence {
   void TimesRight(const SmallBlock& u, Block& x);
 
   Workers& workers_;
-  double foreseen_;
+  double expected_size_;
   MassRows<Real> mass_;
   ShiftInvert<Real> operator_;
   bool mass_is_identity_;

@@ -133,8 +133,9 @@ absl::StatusOr<RefinedModes> SolveIn(const OrderedSystem& ordered, const MatrixX
   std::vector<VectorBlockOf<Real>> rough;
   int first_steps = 1;
   {
-    const double foreseen = PredictBasisSize(static_cast<int>(wanted));
-    LanczosRecurrence<Real> recurrence(ordered.matrix, *factor, shift, rigid, foreseen, workers);
+    const double expected_size = PredictBasisSize(static_cast<int>(wanted));
+    LanczosRecurrence<Real> recurrence(ordered.matrix, *factor, shift, rigid, expected_size,
+                                       workers);
     const Index largest = std::min<Index>(
         3 * static_cast<Index>(ordered.matrix.node_count) - rigid.cols(), 10 * wanted + 500);
     const absl::StatusOr<RitzPairs> pairs = Iterate(recurrence, wanted, largest, progress);

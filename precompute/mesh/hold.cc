@@ -27,9 +27,9 @@ double DistanceToSegment(const Point& p, const Point& a, const Point& b) {
   return Distance(p, {a[0] + t * along[0], a[1] + t * along[1], a[2] + t * along[2]});
 }
 
-absl::Status NothingHeld(absl::string_view by, absl::string_view repair) {
+absl::Status NoNodeFixed(absl::string_view by, absl::string_view repair) {
   return Refusal(absl::StatusCode::kInvalidArgument, "NO_VERTEX_HELD",
-                 absl::StrCat("no node of the body is held by ", by, ": ", repair));
+                 absl::StrCat("no node of the body is fixed by ", by, ": ", repair));
 }
 
 /// Finds the node nearest to a place.
@@ -71,28 +71,28 @@ class NearestNode {
 };
 
 /// Marks nodes, fixture by fixture.
-class Holder {
+class FixedNodeFinder {
  public:
-  Holder(const SurfaceMesh& given, const MeshNames& names, const TetMesh& mesh)
+  FixedNodeFinder(const SurfaceMesh& given, const MeshNames& names, const TetMesh& mesh)
       : given_(given),
         names_(names),
         mesh_(mesh),
         tolerance_m_(kTolerance * Diagonal(mesh.nodes)),
-        is_held_(mesh.nodes.size()) {}
+        is_fixed_(mesh.nodes.size()) {}
 
   absl::Status operator()(const HeldPlane& plane) {
     const double length = Norm(plane.normal);
-    HoldWhere([&](const Point& p) {
+    FixWhere([&](const Point& p) {
       return Dot(Difference(p, plane.point_m), plane.normal) <= tolerance_m_ * length;
     });
     if (any_) return absl::OkStatus();
-    return NothingHeld("the plane",
+    return NoNodeFixed("the plane",
                        "it leaves all of the body on the side of its normal; move its point, in "
-                       "metres, or turn its normal, which points to what is free");
+                       "metres, or turn its normal, which points to the free side");
   }
 
   absl::Status operator()(const HeldBox& box) {
-    HoldWhere([&](const Point& p) {
+    FixWhere([&](const Point& p) {
       bool inside = true;
       for (size_t x = 0; x < 3; ++x) {
         inside =
@@ -101,7 +101,7 @@ class Holder {
       return inside;
     });
     if (any_) return absl::OkStatus();
-    return NothingHeld("the box",
+    return NoNodeFixed("the box",
                        "it lies beside the body or between its nodes; its corners are "
                        "in metres, of the body as large as its unit makes it");
   }
@@ -115,18 +115,19 @@ class Holder {
       places.insert(found->second);
       Mark(nearest.Find(found->second));
     }
-    HoldBetween(places);
+    FixBetween(places);
     return absl::OkStatus();
   }
 
   absl::Status operator()(const HeldGroup& asked) {
     const auto group = std::ranges::find(names_.groups, asked.name, &MeshGroup::name);
     if (group == names_.groups.end()) return NoSuchGroup(asked.name);
-    HoldTriangles(*group);
-    HoldSimplices(*group);
+    FixTriangles(*group);
+    FixSimplices(*group);
     if (any_) return absl::OkStatus();
-    return NothingHeld(absl::StrCat("the group \"", asked.name, "\""),
-                       "nothing of it bounds the body; name another group, a plane or a box");
+    return NoNodeFixed(
+        absl::StrCat("the group \"", asked.name, "\""),
+        "no part of it is on the boundary of the body; name another group, a plane or a box");
   }
 
   absl::Status Take(const Fixture& fixture) {
@@ -135,14 +136,14 @@ class Holder {
   }
 
   absl::StatusOr<std::vector<int32_t>> Nodes() const {
-    if (std::ranges::all_of(is_held_, [](bool held) { return held; })) {
+    if (std::ranges::all_of(is_fixed_, [](bool fixed) { return fixed; })) {
       return Refusal(absl::StatusCode::kInvalidArgument, "ALL_VERTICES_HELD",
-                     "all nodes of the body are held, so that nothing can sound: hold less of it "
-                     "(the normal of a plane points to what is free)");
+                     "all nodes of the body are fixed, so that nothing can vibrate: fix less of it "
+                     "(the normal of a plane points to the free side)");
     }
     std::vector<int32_t> nodes;
-    for (size_t n = 0; n < is_held_.size(); ++n) {
-      if (is_held_[n]) nodes.push_back(static_cast<int32_t>(n));
+    for (size_t n = 0; n < is_fixed_.size(); ++n) {
+      if (is_fixed_[n]) nodes.push_back(static_cast<int32_t>(n));
     }
     return nodes;
   }
@@ -150,19 +151,19 @@ class Holder {
  private:
   void Mark(int32_t node) {
     if (node < 0) return;
-    is_held_[static_cast<size_t>(node)] = true;
+    is_fixed_[static_cast<size_t>(node)] = true;
     any_ = true;
   }
 
   template <typename Condition>
-  void HoldWhere(const Condition& holds) {
+  void FixWhere(const Condition& holds) {
     for (size_t n = 0; n < mesh_.nodes.size(); ++n) {
       if (holds(mesh_.nodes[n])) Mark(static_cast<int32_t>(n));
     }
   }
 
   /// Nodes on given triangles and edges whose corners are all among `places`.
-  void HoldBetween(const absl::flat_hash_set<Point>& places) {
+  void FixBetween(const absl::flat_hash_set<Point>& places) {
     for (const BoundaryFace& face : mesh_.boundary) {
       std::vector<Point> corners;
       for (const int32_t v : given_.triangles[static_cast<size_t>(face.given_triangle)]) {
@@ -180,7 +181,7 @@ class Holder {
     }
   }
 
-  void HoldTriangles(const MeshGroup& group) {
+  void FixTriangles(const MeshGroup& group) {
     const absl::flat_hash_set<int32_t> triangles(group.triangles.begin(), group.triangles.end());
     for (const BoundaryFace& face : mesh_.boundary) {
       if (!triangles.contains(face.given_triangle)) continue;
@@ -206,7 +207,7 @@ class Holder {
 
   /// Corners, and the mid-side nodes of the edges between the corners of one simplex, or between
   /// points.
-  void HoldSimplices(const MeshGroup& group) {
+  void FixSimplices(const MeshGroup& group) {
     Edges edges;
     for (const auto& corners : group.simplices) {
       for (size_t i = 0; i < corners.size() && corners[i] >= 0; ++i) {
@@ -227,8 +228,8 @@ class Holder {
 
   absl::Status NoSuchVertex(int64_t number) const {
     if (names_.vertices.empty()) {
-      return NothingHeld(absl::StrCat("vertex ", number),
-                         "files of this format do not number vertices; hold a plane or a box");
+      return NoNodeFixed(absl::StrCat("vertex ", number),
+                         "files of this format do not number vertices; fix a plane or a box");
     }
     int64_t least = number, most = number;
     bool first = true;
@@ -237,7 +238,7 @@ class Holder {
       most = first ? n : std::max(most, n);
       first = false;
     }
-    return NothingHeld(absl::StrCat("vertex ", number),
+    return NoNodeFixed(absl::StrCat("vertex ", number),
                        absl::StrCat("the numbers of the file go from ", least, " to ", most));
   }
 
@@ -250,7 +251,7 @@ class Holder {
         absl::StrJoin(known.begin(), known.begin() + static_cast<ptrdiff_t>(told), ", ");
     return Refusal(absl::StatusCode::kInvalidArgument, "GROUP_UNKNOWN",
                    absl::StrCat("the mesh file has no group \"", name, "\": ",
-                                known.empty() ? "it names none; hold a plane or a box"
+                                known.empty() ? "it names none; fix a plane or a box"
                                               : absl::StrCat("it has ", list,
                                                              told < known.size() ? ", ..." : "")));
   }
@@ -259,8 +260,8 @@ class Holder {
   const MeshNames& names_;
   const TetMesh& mesh_;
   double tolerance_m_;
-  std::vector<bool> is_held_;
-  bool any_ = false;  // whether the fixture at hand holds a node
+  std::vector<bool> is_fixed_;
+  bool any_ = false;  // whether the current fixture has fixed a node
 };
 
 }  // namespace
@@ -269,11 +270,11 @@ absl::Status Hold(const std::vector<Fixture>& fixtures, const SurfaceMesh& given
                   const MeshNames& names, TetMesh& mesh) {
   mesh.held.clear();
   if (fixtures.empty()) return absl::OkStatus();
-  Holder holder(given, names, mesh);
+  FixedNodeFinder finder(given, names, mesh);
   for (const Fixture& fixture : fixtures) {
-    if (absl::Status status = holder.Take(fixture); !status.ok()) return status;
+    if (absl::Status status = finder.Take(fixture); !status.ok()) return status;
   }
-  absl::StatusOr<std::vector<int32_t>> nodes = holder.Nodes();
+  absl::StatusOr<std::vector<int32_t>> nodes = finder.Nodes();
   if (!nodes.ok()) return nodes.status();
   mesh.held = *std::move(nodes);
   return absl::OkStatus();

@@ -215,7 +215,7 @@ class Solution {
                                 "in one piece",
                                 options_.held.empty()
                                     ? " in six"
-                                    : absl::StrCat(" held as this one in ", rigid_mode_count()),
+                                    : absl::StrCat(" fixed as this one in ", rigid_mode_count()),
                                 ": parts of it are separate, or hang together by an "
                                 "edge or a point only; join them, or make each a body of its own"));
   }

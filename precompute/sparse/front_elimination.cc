@@ -16,7 +16,7 @@ namespace {
 constexpr int kPanel = 96;
 constexpr int kSignedPanel = 24;
 /// Rows of the panel that one thread takes.
-constexpr int kGrain = 16;
+constexpr int kRowsTogether = 16;
 
 /// Indices of the panel's columns with negative pivots.
 using Columns = std::vector<int>;
@@ -96,7 +96,7 @@ class Eliminator {
   /// The rows below a diagonal block: B L^-T S.
   void SolveBelow(int k, int width, const Columns& negative) {
     const int first = k + width;
-    workers_.ForParts(height() - first, kGrain, [&](int64_t begin, int64_t end, int) {
+    workers_.ForParts(height() - first, kRowsTogether, [&](int64_t begin, int64_t end, int) {
       const auto rows = static_cast<int>(end - begin);
       Real* below = At(first + static_cast<int>(begin), k);
       blas::SolveRight(rows, width, At(k, k), height(), below, height());

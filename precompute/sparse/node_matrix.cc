@@ -153,8 +153,8 @@ MassRows<Real> MakeMassRows(const NodeMatrix& A) {
 template <typename Real>
 void MultiplyMass(const MassRows<Real>& M, Workers& workers, const Real* x, Real* y) {
   constexpr ptrdiff_t kNode = 3 * kBlockWidth;
-  constexpr int64_t kGrain = 64;
-  workers.ForParts(static_cast<int64_t>(M.start.size()) - 1, kGrain,
+  constexpr int64_t kRowsTogether = 64;
+  workers.ForParts(static_cast<int64_t>(M.start.size()) - 1, kRowsTogether,
                    [&](int64_t begin, int64_t end, int) {
                      for (auto i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
                        const auto first = static_cast<size_t>(M.start[i]);

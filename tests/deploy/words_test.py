@@ -39,6 +39,10 @@ only_in = ["precompute/*"]
         self.write("proto/a.proto", "// To mend it.\n")
         self.found("proto/a.proto:1", "server/a.h:2")
 
+    def test_names_in_a_comment_are_not_read(self):
+        self.write("server/a.h", "/// Calls `mend`, mend() and mend_all.\n")
+        self.found()
+
     def test_a_phrase_across_two_lines_is_found_where_it_is_about_that_folder(self):
         self.write("precompute/a.h", "// The grain of\n// the mesh.\n")
         self.write("server/a.h", "// The grain of\n// the mesh.\n")

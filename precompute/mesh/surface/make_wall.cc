@@ -110,13 +110,13 @@ absl::StatusOr<Grid> ChooseGrid(const SurfaceMesh& surface, double wall_m) {
                       wall_m, diagonal, diagonal / kMostVoxelsAcross * kVoxelsInWall));
 }
 
-MendedSurface Made(SurfaceMesh surface, const std::string& remark) {
+RepairedSurface Made(SurfaceMesh surface, const std::string& remark) {
   return {std::move(surface), {remark}};
 }
 
 }  // namespace
 
-absl::StatusOr<MendedSurface> HollowOut(const SurfaceMesh& surface, double wall_m) {
+absl::StatusOr<RepairedSurface> HollowOut(const SurfaceMesh& surface, double wall_m) {
   absl::StatusOr<Grid> grid = ChooseGrid(surface, wall_m);
   if (!grid.ok()) return grid.status();
   absl::Status unsound;
@@ -145,7 +145,7 @@ absl::StatusOr<MendedSurface> HollowOut(const SurfaceMesh& surface, double wall_
                                     std::string(unsound.message())));
 }
 
-absl::StatusOr<MendedSurface> Thicken(const SurfaceMesh& sheet, double wall_m) {
+absl::StatusOr<RepairedSurface> Thicken(const SurfaceMesh& sheet, double wall_m) {
   absl::StatusOr<Grid> grid = ChooseGrid(sheet, wall_m);
   if (!grid.ok()) return grid.status();
   absl::Status unsound;

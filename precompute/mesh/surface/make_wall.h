@@ -13,12 +13,12 @@ namespace carillon::precompute {
 ///
 /// Errors: MESH_WALL_IMPOSSIBLE: the body is nowhere thicker than twice the wall, or the wall is
 /// too thin beside the body.
-absl::StatusOr<MendedSurface> HollowOut(const SurfaceMesh& surface, double wall_m);
+absl::StatusOr<RepairedSurface> HollowOut(const SurfaceMesh& surface, double wall_m);
 
 /// Thickens an open sheet, which may be any soup of triangles, to `wall_m`: the result is the
 /// isosurface of the distance at half of that thickness.
 ///
 /// Errors: MESH_WALL_IMPOSSIBLE: the wall is too thin or too thick beside the sheet.
-absl::StatusOr<MendedSurface> Thicken(const SurfaceMesh& sheet, double wall_m);
+absl::StatusOr<RepairedSurface> Thicken(const SurfaceMesh& sheet, double wall_m);
 
 }  // namespace carillon::precompute

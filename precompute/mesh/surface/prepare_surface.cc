@@ -47,22 +47,22 @@ std::vector<int32_t> NearestGiven(const SurfaceMesh& surface, const SurfaceMesh&
 
 /// Repairs the surface until it passes the checks, and describes the repairs in `warnings`.
 absl::StatusOr<SurfaceMesh> Repair(const SurfaceMesh& given, Warnings& warnings) {
-  MendedSurface mended = MendSoup(given);
-  const absl::StatusOr<Warnings> sound = CheckSurface(mended.surface);
+  RepairedSurface repaired = RepairSoup(given);
+  const absl::StatusOr<Warnings> sound = CheckSurface(repaired.surface);
   if (sound.ok()) {
-    AddTo(warnings, mended.remarks);
+    AddTo(warnings, repaired.remarks);
     AddTo(warnings, *sound);
-    return std::move(mended.surface);
+    return std::move(repaired.surface);
   }
   if (BeyondRepair(sound.status())) return sound.status();
-  absl::StatusOr<MendedSurface> wrapped = WrapSurface(mended.surface);
+  absl::StatusOr<RepairedSurface> wrapped = WrapSurface(repaired.surface);
   if (!wrapped.ok()) return wrapped.status();
   AddTo(warnings, wrapped->remarks);
   return std::move(wrapped->surface);
 }
 
-absl::StatusOr<MendedSurface> WithWall(const SurfaceMesh& surface, const absl::Status& sound,
-                                       double wall_m) {
+absl::StatusOr<RepairedSurface> WithWall(const SurfaceMesh& surface, const absl::Status& sound,
+                                         double wall_m) {
   return sound.ok() ? HollowOut(surface, wall_m) : Thicken(surface, wall_m);
 }
 
@@ -84,7 +84,7 @@ absl::StatusOr<PreparedSurface> PrepareSurface(const SurfaceMesh& given,
   const bool thickens = settings.wall_m > 0 && Is(sound, "MESH_NOT_CLOSED");
   if (!sound.ok() && !thickens) return sound;
   if (settings.wall_m > 0) {
-    absl::StatusOr<MendedSurface> walled = WithWall(prepared.surface, sound, settings.wall_m);
+    absl::StatusOr<RepairedSurface> walled = WithWall(prepared.surface, sound, settings.wall_m);
     if (!walled.ok()) return walled.status();
     prepared.surface = std::move(walled->surface);
     AddTo(prepared.warnings, walled->remarks);

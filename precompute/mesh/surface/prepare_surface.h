@@ -12,7 +12,7 @@ namespace carillon::precompute {
 
 /// The changes that may be made to a surface before it is filled.
 struct PreparationSettings {
-  bool repair = false;  ///< mend what CheckSurface would refuse
+  bool repair = false;  ///< repair a surface that CheckSurface would refuse
   double wall_m = 0;    ///< above zero: hollow it out, or thicken an open sheet
 };
 

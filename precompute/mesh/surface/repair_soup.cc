@@ -272,15 +272,15 @@ bool Closed(const SurfaceMesh& surface) {
 
 }  // namespace
 
-MendedSurface MendSoup(const SurfaceMesh& given) {
-  MendedSurface mended;
+RepairedSurface RepairSoup(const SurfaceMesh& given) {
+  RepairedSurface repaired;
   const auto remark = [&](size_t count, absl::string_view what) {
-    if (count > 0) mended.remarks.push_back(absl::StrCat("repaired: ", count, " ", what));
+    if (count > 0) repaired.remarks.push_back(absl::StrCat("repaired: ", count, " ", what));
   };
   const double diagonal = given.vertices.empty() ? 0 : Diagonal(given.vertices);
   if (!(diagonal > 0)) return {given, {}};
   const double tolerance = kWeldPart * diagonal;
-  SurfaceMesh& surface = mended.surface;
+  SurfaceMesh& surface = repaired.surface;
   surface = Weld(given, tolerance);
   remark(given.vertices.size() - surface.vertices.size(), "vertices joined with others");
   remark(DropCollapsed(surface), "triangles without extent dropped");
@@ -300,7 +300,7 @@ MendedSurface MendSoup(const SurfaceMesh& given) {
   if (Closed(surface) && FindShells(surface).size() <= kMostShells) {
     remark(TurnShells(surface), "shells turned round");
   }
-  return mended;
+  return repaired;
 }
 
 }  // namespace carillon::precompute

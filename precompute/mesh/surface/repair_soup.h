@@ -9,7 +9,7 @@
 namespace carillon::precompute {
 
 /// A repaired surface, and descriptions of the repairs.
-struct MendedSurface {
+struct RepairedSurface {
   SurfaceMesh surface;
   std::vector<std::string> remarks;
 };
@@ -18,6 +18,6 @@ struct MendedSurface {
 /// diagonal, drops triangles without area and duplicates, closes the seams and T-junctions that
 /// this leaves, closes holes with a rim shorter than a fifth of the diagonal, and orients triangles
 /// consistently and outward. The result may still have defects, which CheckSurface finds.
-MendedSurface MendSoup(const SurfaceMesh& given);
+RepairedSurface RepairSoup(const SurfaceMesh& given);
 
 }  // namespace carillon::precompute

@@ -36,7 +36,7 @@ constexpr std::chrono::seconds kMostCpu(300);
 absl::Status Failed(absl::string_view what) {
   return Refusal(absl::StatusCode::kInvalidArgument, "MESH_REPAIR_FAILED",
                  absl::StrCat("the surface could not be repaired: ", what,
-                              ". Mend it in a mesh editor, or give a mesh of tetrahedra"));
+                              ". Repair it in a mesh editor, or give a mesh of tetrahedra"));
 }
 
 /// Runs in the child: CGAL's assertions end the process.
@@ -180,7 +180,7 @@ std::string Remark(const SurfaceMesh& wrap, const SurfaceMesh& given, const Near
 
 }  // namespace
 
-absl::StatusOr<MendedSurface> WrapSurface(const SurfaceMesh& given) {
+absl::StatusOr<RepairedSurface> WrapSurface(const SurfaceMesh& given) {
   const double diagonal = Diagonal(given.vertices);
   if (!(diagonal > 0)) return Failed("it has no extent");
   const absl::StatusOr<std::string> bytes =
@@ -201,7 +201,7 @@ absl::StatusOr<MendedSurface> WrapSurface(const SurfaceMesh& given) {
   for (const double part : {1.0, 0.5, 0.0}) {
     SurfaceMesh drawn = DrawnBack(wrap, index, offset, part);
     const absl::Status sound = CheckSurface(drawn).status();
-    if (sound.ok()) return MendedSurface{drawn, {Remark(drawn, given, index, diagonal)}};
+    if (sound.ok()) return RepairedSurface{drawn, {Remark(drawn, given, index, diagonal)}};
     if (part == 0) return sound;
   }
   return Failed("its wrap is not sound");

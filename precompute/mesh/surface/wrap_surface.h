@@ -13,6 +13,6 @@ namespace carillon::precompute {
 /// The remark states the greatest distance between the two surfaces in both directions.
 ///
 /// Errors: MESH_NOT_CLOSED where nothing is inside (an open sheet), MESH_REPAIR_FAILED.
-absl::StatusOr<MendedSurface> WrapSurface(const SurfaceMesh& given);
+absl::StatusOr<RepairedSurface> WrapSurface(const SurfaceMesh& given);
 
 }  // namespace carillon::precompute

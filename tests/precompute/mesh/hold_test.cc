@@ -65,7 +65,7 @@ TEST_F(HoldTest, PlaneHoldsWhatLiesInItAndBehindIt) {
   // A thousandth of the body's size away is away.
   Held(box, "msh", {HeldPlane{{-0.001, 0, 0}, {1, 0, 0}}});
   EXPECT_THAT(status.ToString(),
-              HasSubstr("NO_VERTEX_HELD: no node of the body is held by the plane"));
+              HasSubstr("NO_VERTEX_HELD: no node of the body is fixed by the plane"));
 }
 
 TEST_F(HoldTest, BoxHoldsWhatLiesInItAndOnIt) {
@@ -75,7 +75,7 @@ TEST_F(HoldTest, BoxHoldsWhatLiesInItAndOnIt) {
             NodesWhere(mesh, [](const Point& p) { return p[0] >= 0.5 && p[1] <= 0.25; }));
   Held(box, "msh", {HeldBox{{0.1, 0.1, 0.1}, {0.11, 0.11, 0.11}}});
   EXPECT_THAT(status.ToString(),
-              HasSubstr("NO_VERTEX_HELD: no node of the body is held by the box"));
+              HasSubstr("NO_VERTEX_HELD: no node of the body is fixed by the box"));
 }
 
 TEST_F(HoldTest, VertexHoldsItsNode) {
@@ -121,7 +121,7 @@ TEST_F(HoldTest, VerticesOfTetrahedraHaveTheNumbersOfTheFile) {
   EXPECT_THAT(mesh.held, ::testing::ElementsAre(0, 9));
   Held(ToTextGmsh(box), "msh", {HeldVertices{{10}}});
   EXPECT_THAT(status.ToString(),
-              HasSubstr("NO_VERTEX_HELD: no node of the body is held by vertex 10: the numbers of "
+              HasSubstr("NO_VERTEX_HELD: no node of the body is fixed by vertex 10: the numbers of "
                         "the file go from 11 to 55"));
 }
 
@@ -153,7 +153,7 @@ TEST_F(HoldTest, GroupThatIsNotThereIsRefusedWithThoseThatAre) {
   EXPECT_THAT(status.ToString(), HasSubstr("GROUP_UNKNOWN: the mesh file has no group \"bottom\": "
                                            "it has base, body, ends, top"));
   Held(ToBinaryStl(MakeBoxSurface(kSize)), "stl", {HeldGroup{"base"}});
-  EXPECT_THAT(status.ToString(), HasSubstr("it names none; hold a plane or a box"));
+  EXPECT_THAT(status.ToString(), HasSubstr("it names none; fix a plane or a box"));
 }
 
 /// A box of ten-node tetrahedra, of which the triangles at z = 0 have a physical group of this tag.

@@ -104,7 +104,7 @@ TEST(PrepareSurface, BodiesApartAreNotJoined) {
               HasSubstr("MESH_SEVERAL_PIECES"));
 }
 
-TEST(MendSoup, ATJunctionIsCutAndASeamClosed) {
+TEST(RepairSoup, ATJunctionIsCutAndASeamClosed) {
   SurfaceMesh box = MakeBoxSurface({1, 1, 1});
   // The first triangle's first edge gets a vertex that its neighbour does not have.
   const auto [a, b, c] = box.triangles[0];
@@ -114,9 +114,9 @@ TEST(MendSoup, ATJunctionIsCutAndASeamClosed) {
   box.triangles[0] = {a, middle, c};
   box.triangles.push_back({middle, b, c});
   EXPECT_THAT(CheckSurface(box).status().ToString(), HasSubstr("MESH_NOT_CLOSED"));
-  const MendedSurface mended = MendSoup(box);
-  EXPECT_TRUE(CheckSurface(mended.surface).ok());
-  EXPECT_EQ(mended.surface.triangles.size(), 14U);
+  const RepairedSurface repaired = RepairSoup(box);
+  EXPECT_TRUE(CheckSurface(repaired.surface).ok());
+  EXPECT_EQ(repaired.surface.triangles.size(), 14U);
 }
 
 }  // namespace
