@@ -7,11 +7,11 @@
 
 namespace carillon {
 
-/// The daemon's folder, held by one daemon at a time for as long as this lives (and no longer,
-/// however it ends: the lock is the kernel's).
+/// The daemon's folder. One daemon at a time has it, for the lifetime of this object: the kernel
+/// releases the lock however the process ends.
 class DataDirectory {
  public:
-  /// Makes the folder, for its owner only, where it is not there.
+  /// Makes the folder, readable by its owner only, unless it exists.
   /// Errors: FailedPrecondition (DATA_DIRECTORY_IN_USE, DATA_DIRECTORY_UNUSABLE).
   static absl::StatusOr<DataDirectory> Open(const std::filesystem::path& path);
   ~DataDirectory();

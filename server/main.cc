@@ -34,7 +34,7 @@ namespace {
 
 constexpr char kVersion[] = CARILLON_VERSION;
 
-/// One line a message, on stderr; stdout is for what programs read.
+/// Logs go to stderr, one line a message; stdout is left to output that programs read.
 void SetUpLog() {
   spdlog::set_default_logger(spdlog::stderr_logger_mt("carillond"));
   spdlog::set_pattern("%Y-%m-%dT%H:%M:%S.%e%z %l: %v");
@@ -49,7 +49,7 @@ sigset_t BlockStopSignals() {
   sigaddset(&signals, SIGTERM);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   signal(SIGPIPE, SIG_IGN);
-  signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error like a full disk
+  signal(SIGXFSZ, SIG_IGN);  // writing beyond a file-size limit then fails like a full disk
   return signals;
 }
 
@@ -78,7 +78,7 @@ void CollectUnusedMeshes(ModeDatabase& database) {
 void LogOutput(const LiveOutput& output) {
   const OutputState state = output.state();
   if (!state.device_message.empty()) spdlog::warn("no sound: {}", state.device_message);
-  spdlog::info("plays on {} at {} Hz, {:.1f} ms from mixer to ear", state.device,
+  spdlog::info("plays on {} at {} Hz with an output latency of {:.1f} ms", state.device,
                output.format().sample_rate_hz, state.latency_s * 1000);
 }
 
@@ -150,8 +150,8 @@ ApiSettings ApiSettingsOf(const Options& options) {
           .version = kVersion};
 }
 
-/// Runs until a signal comes. Rooms are made in the order in which they need each other, and go in
-/// the reverse.
+/// Serves until a stop signal arrives. Each part is made after the parts that it uses and destroyed
+/// before them.
 absl::Status Run(const Options& options) {
   const sigset_t stop_signals = BlockStopSignals();
   SystemClock clock;
@@ -186,8 +186,8 @@ absl::Status Run(const Options& options) {
   return absl::OkStatus();
 }
 
-/// `carillond db ...`.
-absl::Status LookAfterDatabase(const CommandLine& command) {
+/// Runs `carillond db check|repair|restore`.
+absl::Status RunDatabaseCommand(const CommandLine& command) {
   const absl::StatusOr<DataDirectory> directory =
       DataDirectory::Open(command.options.data_directory);
   if (!directory.ok()) return directory.status();
@@ -204,7 +204,7 @@ absl::Status LookAfterDatabase(const CommandLine& command) {
   std::cout << finding_count << (finding_count == 1 ? " fault" : " faults") << std::endl;
   if (command.database_command == "repair" || finding_count == 0) return absl::OkStatus();
   return Refusal(absl::StatusCode::kDataLoss, "DATABASE_CORRUPT",
-                 "the faults above were found: `carillond db repair` keeps what is whole");
+                 "the faults above were found: `carillond db repair` keeps all undamaged rows");
 }
 
 int Main(int argc, const char* const* argv) {
@@ -213,7 +213,7 @@ int Main(int argc, const char* const* argv) {
   if (command.ok() && !command->run) return command->exit_status;
   const absl::Status status = !command.ok()                       ? command.status()
                               : command->database_command.empty() ? Run(command->options)
-                                                                  : LookAfterDatabase(*command);
+                                                                  : RunDatabaseCommand(*command);
   if (status.ok()) return 0;
   spdlog::error("{}", std::string(status.message()));
   return 1;

@@ -24,7 +24,7 @@ std::string Environment(const char* name) {
   return value == nullptr ? "" : value;
 }
 
-/// $STATE_DIRECTORY as systemd sets it, else as the XDG base directories have it.
+/// $STATE_DIRECTORY, which systemd sets; otherwise the state folder of the XDG base directories.
 std::string DefaultDataDirectory() {
   if (std::string state = Environment("STATE_DIRECTORY"); !state.empty()) return state;
   if (const std::string xdg = Environment("XDG_STATE_HOME"); !xdg.empty()) return xdg + "/carillon";
@@ -36,7 +36,7 @@ std::string DefaultAddress() {
   return runtime.empty() ? DefaultServerAddress() : "unix:" + runtime + "/carillond.sock";
 }
 
-/// A program in the daemon's own folder.
+/// The path of a program in the folder of this executable.
 std::string Beside(const char* name) {
   return std::filesystem::read_symlink("/proc/self/exe").replace_filename(name);
 }
@@ -50,7 +50,7 @@ Options Defaults() {
   return options;
 }
 
-/// One value of the configuration file into `target`.
+/// Stores one value of the configuration file in `target`.
 template <typename T>
 absl::Status ReadValue(const std::string& key, const toml::node& node, T& target) {
   if (const auto value = node.value<T>()) {
@@ -98,8 +98,9 @@ absl::Status ReadKey(const std::string& key, const toml::node& node, Options& op
   if (key == "tls_certificate") return ReadValue(key, node, options.tls_certificate_file);
   if (key == "admin_token_file") return ReadValue(key, node, options.admin_token_file);
   if (key == "tls_key") return ReadValue(key, node, options.tls_key_file);
-  return InvalidConfiguration(absl::StrCat("there is no setting \"", key,
-                                           "\"; settings are named as the flags, with _ for -"));
+  return InvalidConfiguration(
+      absl::StrCat("there is no setting \"", key,
+                   "\"; a setting has the name of its flag, with _ in place of -"));
 }
 
 absl::Status ReadFile(const std::string& path, Options& options) {
@@ -150,7 +151,7 @@ absl::Status Check(const Options& options) {
   }
   if (options.addresses.empty()) return InvalidConfiguration("--listen names no address");
   if (options.tls_certificate_file.empty() != options.tls_key_file.empty()) {
-    return InvalidConfiguration("--tls-certificate and --tls-key belong together");
+    return InvalidConfiguration("--tls-certificate and --tls-key must be given together");
   }
   return absl::OkStatus();
 }
@@ -159,83 +160,90 @@ void AddFlags(CLI::App& app, Options& options) {
   app.add_option("--data-dir", options.data_directory, "folder of the database")
       ->capture_default_str();
   app.add_option("--listen", options.addresses,
-                 "unix:PATH or HOST:PORT (0: a free one); repeatable")
+                 "address to serve: unix:PATH or HOST:PORT (port 0: any free port); repeatable")
       ->take_all()
       ->capture_default_str();
   app.add_option("--audio-device", options.audio_device,
-                 "auto, portaudio[:NAME], null or file:PATH")
+                 "sound output: auto, portaudio[:NAME], null or file:PATH")
       ->capture_default_str();
-  app.add_option("--sample-rate", options.sample_rate_hz, "frames a second")->capture_default_str();
-  app.add_option("--channels", options.channel_count, "1: mono, 2: stereo")->capture_default_str();
-  app.add_option("--block-frames", options.block_frame_count, "frames rendered at a time")
+  app.add_option("--sample-rate", options.sample_rate_hz, "frames per second")
+      ->capture_default_str();
+  app.add_option("--channels", options.channel_count, "1 for mono, 2 for stereo")
+      ->capture_default_str();
+  app.add_option("--block-frames", options.block_frame_count, "frames in a rendered block")
       ->capture_default_str();
   app.add_option("--look-ahead-blocks", options.look_ahead_block_count,
                  "blocks rendered ahead of the device")
       ->capture_default_str();
   app.add_option("--workers", options.worker_count,
-                 "decompositions at a time; 0: half of the processors")
+                 "decompositions that run at a time; 0: half of the processors")
       ->capture_default_str();
   app.add_option("--memory-budget-mib", options.memory_budget_mib,
                  "memory of all decompositions together; 0: half of the machine's")
       ->capture_default_str();
   app.add_option("--job-memory-mib", options.job_memory_mib,
-                 "memory of one decomposition; 0: all of the budget")
+                 "memory of one decomposition; 0: the whole budget")
       ->capture_default_str();
   app.add_option("--job-time", options.job_time_s, "seconds that a decomposition may take")
       ->capture_default_str();
   app.add_option("--stall-time", options.stall_time_s,
-                 "seconds that a decomposition may give no sign of life")
+                 "seconds without an event after which a decomposition is ended")
       ->capture_default_str();
-  app.add_option("--queue-limit", options.queue_limit, "decompositions that may wait")
+  app.add_option("--queue-limit", options.queue_limit, "decompositions that may wait at a time")
       ->capture_default_str();
   app.add_option(
          "--model-budget-mib", options.model_budget_mib,
-         "room for stored models; the least recently sounded ones go, but never the newest, those "
-         "that sound or pinned ones; 0: no limit")
+         "space for stored models: beyond it the least recently sounded models are deleted, but "
+         "never the newest, a sounding or a pinned one; 0: no limit")
       ->capture_default_str();
   app.add_option("--executor", options.executor,
-                 "where decompositions run: local, or slurm (the cluster of the Slurm commands)")
+                 "where decompositions run: local, or slurm (the cluster that sbatch submits to)")
       ->capture_default_str();
   app.add_option("--slurm-dir", options.slurm_directory,
-                 "folder that every node of the cluster sees [in the data folder]");
-  app.add_option("--slurm-partition", options.slurm_partition, "[the cluster's default]");
+                 "folder that every node of the cluster can read and write [in the data folder]");
+  app.add_option("--slurm-partition", options.slurm_partition,
+                 "partition for the jobs [the cluster's default]");
   app.add_option("--slurm-upload", options.slurm_upload,
-                 "HOST:PORT of this daemon, as the nodes reach it: they fetch meshes and bring "
-                 "results there, and share no folder");
-  app.add_option("--slurm-client", options.slurm_client, "the program `carillon`, on every node")
+                 "HOST:PORT at which the nodes reach this daemon: they fetch meshes from there and "
+                 "upload results to it, and need no shared folder");
+  app.add_option("--slurm-client", options.slurm_client,
+                 "path of the program `carillon` on every node")
       ->capture_default_str();
   app.add_option("--slurm-tls-roots", options.slurm_tls_roots,
-                 "PEM file, on every node, that vouches for this daemon's TLS certificate");
-  app.add_option("--precompute", options.precompute_program, "the program that decomposes")
+                 "path on every node of a PEM file with the root of this daemon's TLS certificate");
+  app.add_option("--precompute", options.precompute_program,
+                 "path of the program that computes decompositions")
       ->capture_default_str();
-  app.add_option("--tls-certificate", options.tls_certificate_file, "PEM file, for TCP");
-  app.add_option("--tls-key", options.tls_key_file, "PEM file, for TCP");
+  app.add_option("--tls-certificate", options.tls_certificate_file,
+                 "PEM file with the certificate for TCP");
+  app.add_option("--tls-key", options.tls_key_file, "PEM file with its private key");
   app.add_option("--admin-token-file", options.admin_token_file,
-                 "file with the token of administrators who call over TCP");
+                 "file with the token that administrators show over TCP");
 }
 
 /// "db check|repair|restore FILE".
 void AddDatabaseCommands(CLI::App& app, CommandLine& command) {
-  CLI::App& db = *app.add_subcommand("db", "look after the database while no daemon runs");
+  CLI::App& db = *app.add_subcommand("db", "check or repair the database while no daemon runs");
   db.require_subcommand(1);
   const auto add = [&](const char* name, const char* description) {
     CLI::App* const sub = db.add_subcommand(name, description);
     sub->callback([&command, name] { command.database_command = name; });
     return sub;
   };
-  add("check", "check structure and every hash; exit status 1 where something is wrong");
-  add("repair", "keep what is whole in a new file, and the old one beside it");
-  add("restore", "put a backup in its place")
+  add("check", "check the structure and every hash; exit status 1 if anything is damaged");
+  add("repair", "copy all undamaged rows into a new file and keep the old one beside it");
+  add("restore", "replace the database by a backup")
       ->add_option("FILE", command.backup_file, "made by `carillon db backup`")
       ->required();
 }
 
-/// Parses into `options`. Nothing where the program is to run; else its exit status.
+/// Parses the flags into `command`. Absent if the program is to run; otherwise its exit status.
 std::optional<int> ParseFlags(int argc, const char* const* argv, const std::string& version,
                               std::string& configuration, CommandLine& command) {
   CLI::App app("Makes rigid-body simulations audible.", "carillond");
   app.set_version_flag("--version", "carillond " + version);
-  app.add_option("--config", configuration, "TOML file; its keys are the flags, with _ for -");
+  app.add_option("--config", configuration,
+                 "TOML file whose keys are the flags, with _ in place of -");
   AddFlags(app, command.options);
   AddDatabaseCommands(app, command);
   try {
@@ -252,7 +260,7 @@ absl::StatusOr<CommandLine> ReadCommandLine(int argc, const char* const* argv,
                                             const std::string& version) {
   CommandLine command{.options = Defaults()};
   std::string configuration;
-  // Once for the name of the file, and once more over what the file says.
+  // The flags are parsed twice: for the name of the file, and to override the file's settings.
   for (const bool with_file : {false, true}) {
     if (with_file) {
       if (configuration.empty()) break;

@@ -142,7 +142,7 @@ Notice ActiveJobs::CompleteWatch(const std::string& digest, Notice watch, const 
   if (const auto job = jobs_.find(digest); job != jobs_.end()) {
     return {std::move(watch.watchers), ViewOf(job->second), ++version_};
   }
-  // With the version of the beginning: whatever was announced since is newer.
+  // The notice keeps the version of the registration: any change announced since is newer.
   watch.job = stored;
   if (HasEnded(stored.state())) EraseWatcher(digest, watch.watchers.front());
   return watch;

@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::array kSurfaceFormats = {"obj", "ply", "stl", "off"};
 constexpr uint32_t kCoarseCornerCount = 300;
-/// Corners beyond which quadratic elements are not quick.
+/// Meshes with more corners than this take long with quadratic elements.
 constexpr double kFineSurface = 1500;
 constexpr size_t kMaxLabelBytes = 200;
 

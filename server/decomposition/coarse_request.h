@@ -9,10 +9,10 @@
 
 namespace carillon {
 
-/// What a resolved request with coarse_first is to have first: the same body with a mesh of few
-/// nodes, whatever accuracy or budget was asked for, and of linear elements where the surface
-/// itself is fine, to go by the file's size. It has a name of its own, as any request. Nothing
-/// where that would not be quicker, or the file may hold tetrahedra, which cannot be made fewer.
+/// The request for the coarse model that a resolved request with coarse_first gets first: the same
+/// body with a mesh of few nodes, without accuracy or budget, and with linear elements if the size
+/// of the file suggests a fine surface. It has a digest of its own. Absent if the coarse model
+/// would not be quicker, or if the file may hold tetrahedra, whose number is given.
 std::optional<v1::CreateModalModelRequest> CoarseRequest(
     const v1::CreateModalModelRequest& resolved, uint64_t mesh_bytes);
 

@@ -64,7 +64,7 @@ bool IsDeterministic(const Outcome& outcome) {
 
 Verdict VerdictOfReport(const std::string& reason) {
   if (IsOneOf<2>(reason, {"OUT_OF_MEMORY", "MEMORY_TOO_SMALL"})) return Verdict::kOutOfMemory;
-  // Another attempt may well succeed.
+  // These do not depend on the request, so another attempt may succeed.
   if (IsOneOf<4>(reason, {"INTERNAL", "OUTPUT_NOT_WRITABLE", "MESH_FILE_NOT_READABLE",
                           "WORKER_NOT_FOUND"})) {
     return Verdict::kCrashed;
@@ -85,9 +85,10 @@ bool HasEnded(v1::JobState state) {
 v1::ErrorInfo GaveUp(uint32_t start_count) {
   return ToErrorInfo(Refusal(
       absl::StatusCode::kInternal, "DECOMPOSITION_GIVEN_UP",
-      absl::StrCat("the daemon was killed ", start_count,
-                   " times while it computed this: see the system's log for want of memory, and "
-                   "create the model again")));
+      absl::StrCat(
+          "the daemon was killed ", start_count,
+          " times during this decomposition: look for a lack of memory in the system's log, and "
+          "create the model again")));
 }
 
 }  // namespace carillon

@@ -11,36 +11,36 @@
 
 namespace carillon {
 
-/// What follows from how a decomposition ended: rules without state.
+/// Rules, without state, for the consequences of a decomposition's end.
 
 v1::Job ToJob(const JobRecord& record);
 
-/// What a job asked for. Errors: DataLoss (DATABASE_CORRUPT).
+/// The request of a job. Errors: DataLoss (DATABASE_CORRUPT).
 absl::StatusOr<v1::CreateModalModelRequest> ParseRequest(const JobRecord& record);
 
-/// Whether both want the same eigenvalues.
+/// Whether both requests want the same band of eigenvalues.
 bool SameHints(const v1::CreateModalModelRequest& a, const v1::CreateModalModelRequest& b);
 
-/// Whether a refusal has to do with the band, so that other hints may have other luck.
+/// Whether a refusal depends on the band, so that a request with other hints may succeed.
 bool DependsOnHints(const std::string& reason);
 
-/// Whether the job has failed for a reason that would come again with this request.
+/// Whether the job has failed for a reason that would recur with this request.
 bool WouldFailAgain(const JobRecord& record, const v1::CreateModalModelRequest& request);
 
-/// Whether another way of computing may end better: the mesher or the worker came to grief.
+/// Whether another way of computing may succeed, because the mesher or the worker crashed.
 bool DependsOnWay(const Outcome& outcome);
 
-/// Whether the same request would end so again, whatever the machine does meanwhile.
+/// Whether the same request would end in the same way again on any machine.
 bool IsDeterministic(const Outcome& outcome);
 
-/// What a worker's own report of failure means.
+/// The verdict on a worker that reported an error with this reason.
 Verdict VerdictOfReport(const std::string& reason);
 
 v1::JobState StateOf(Verdict verdict);
 
 bool HasEnded(v1::JobState state);
 
-/// What follows after a daemon died under the job so often that it may be the job's doing.
+/// The error of a job during which the daemon was killed so often that the job may be the cause.
 v1::ErrorInfo GaveUp(uint32_t start_count);
 
 }  // namespace carillon

@@ -149,7 +149,7 @@ class LocalExecutor final : public Executor {
     workers_.clear();
   }
 
-  // False when it is time to stop.
+  // Returns false when the executor stops.
   bool TakeCommands() {
     std::vector<PreparedTask> starts;
     std::vector<std::string> cancels;

@@ -12,7 +12,8 @@ bool IsOfTetrahedra(const std::string& format) {
   return format == "msh" || format == "mesh" || format == "node";
 }
 
-// A closed surface has two triangles a vertex; text as most programs write it, else binary.
+// Bytes of a mesh file for each vertex. A closed surface has two triangles a vertex; OBJ is taken
+// for text, the other surface formats for binary.
 double BytesAVertex(const std::string& format) {
   if (format == "obj") return 90;
   if (format == "stl") return 100;
@@ -20,7 +21,7 @@ double BytesAVertex(const std::string& format) {
   return 60;
 }
 
-// Corners and mid-sides, a corner.
+// Nodes of a quadratic mesh for each corner: the corner and its share of the mid-side nodes.
 constexpr double kQuadraticNodesACorner = 7.5;
 constexpr double kFewestCorners = 600;
 constexpr double kCornersAVertex = 2;  // those inside, too

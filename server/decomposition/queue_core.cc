@@ -73,7 +73,7 @@ absl::Status QueueCore::TakeUpJob(JobRecord record, Notices& notices) {
     return absl::OkStatus();
   }
   const uint32_t start_count = std::exchange(record.start_count, 0);
-  // Succeeded: the daemon was killed after it stored the model and before it stored the job's end.
+  // A satisfied job has its model: the daemon was killed before it stored the job's end.
   record.state = satisfied.ok() && *satisfied ? v1::JOB_STATE_SUCCEEDED : v1::JOB_STATE_FAILED;
   if (!satisfied.ok()) record.error = ToErrorInfo(satisfied.status());
   if (satisfied.ok() && !*satisfied) {
@@ -225,13 +225,13 @@ void QueueCore::Enqueue(JobRecord record, v1::CreateModalModelRequest request,
 }
 
 absl::StatusOr<v1::Job> QueueCore::Get(const std::string& digest) {
-  // In this order: a job leaves the memory only after its end is stored.
+  // The memory is read first, because a job leaves it only after its end is stored.
   if (auto active = jobs_.View(digest)) return *std::move(active);
   return FindStored(digest);
 }
 
 absl::StatusOr<DecompositionJobPage> QueueCore::List(int page_size, const std::string& page_token) {
-  // As they stand now, before the database is read: a job seen running is not listed as queued.
+  // The memory is read first: a job that a client has seen running is not listed as queued then.
   std::map<std::string, v1::Job> active = jobs_.ViewAll();
   const absl::StatusOr<JobPage> records = database_.jobs().List(page_size, page_token);
   if (!records.ok()) return records.status();
@@ -301,7 +301,7 @@ void QueueCore::EndQueued(const JobRecord& record, Notices& notices) {
 }
 
 absl::Status QueueCore::Watch(const std::string& digest, const std::shared_ptr<Watcher>& watcher) {
-  // Registered before the database is read, so that no change falls in between.
+  // The watcher is registered before the database is read, so that it misses no change.
   Notice first = jobs_.Watch(digest, watcher);
   if (first.job.name().empty()) {
     const absl::StatusOr<v1::Job> stored = FindStored(digest);

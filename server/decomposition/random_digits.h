@@ -9,7 +9,7 @@
 
 namespace carillon {
 
-/// Hexadecimal digits that nobody can guess, eight for each word, from the system's own source.
+/// Unpredictable hexadecimal digits from the system's random source, eight for each word.
 inline std::string RandomDigits(int word_count) {
   std::random_device random;
   std::string digits;

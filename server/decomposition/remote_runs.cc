@@ -39,7 +39,7 @@ absl::Status NotWritable(const std::filesystem::path& file) {
                               ": free space there"));
 }
 
-/// On the disk. Also for folders.
+/// Writes the content of a file or a folder to the disk.
 bool Sync(const std::filesystem::path& path) {
   const int descriptor = open(path.c_str(), O_RDONLY | O_CLOEXEC);
   if (descriptor < 0) return false;
@@ -116,7 +116,7 @@ absl::Status RunUpload::Finish(const v1::RunEnd& end) {
   const MutexLock lock(&state_->runs.mutex_);
   const auto folder = state_->runs.FolderOf(state_->digest, state_->token);
   if (!folder.ok()) return folder.status();
-  // A link can be made once: of several runs of one job, one ends it.
+  // The link can be made once, so one of several runs ends the job.
   if (link(ending.c_str(), (*folder / "end").c_str()) != 0) {
     return errno == EEXIST ? Used(state_->digest) : NotWritable(*folder / "end");
   }
@@ -180,7 +180,7 @@ absl::Status RemoteRuns::Report(const std::string& digest, const std::string& to
   const MutexLock lock(&mutex_);
   const auto folder = FolderOf(digest, token);
   if (!folder.ok()) return folder.status();
-  // Never a half of it under the name that is read.
+  // A rename, so that a reader never finds half of the content.
   const std::filesystem::path written = *folder / "reported";
   std::error_code error;
   if (Write(written, Delimited(event))) {

@@ -19,8 +19,8 @@ namespace carillon {
 
 class RemoteRuns;
 
-/// The result of one run as it arrives. Nothing is kept of one that does not come to its end. One
-/// thread at a time.
+/// Receives the result of one run. A result that does not arrive completely is dropped. One thread
+/// at a time.
 class RunUpload {
  public:
   RunUpload(RunUpload&&) noexcept;
@@ -31,7 +31,8 @@ class RunUpload {
   /// ResourceExhausted (DATABASE_FULL).
   absl::Status Append(const v1::ModalModelRecord& record);
 
-  /// Ends the run: its result is on the disk and counts, and its token is used up. Call once, last.
+  /// Ends the run: its result is on the disk and is accepted, and its token is invalid from now on.
+  /// Call once, last.
   /// Errors: those of Append and of RemoteRuns.
   absl::Status Finish(const v1::RunEnd& end);
 
@@ -43,24 +44,24 @@ class RunUpload {
   std::unique_ptr<State> state_;
 };
 
-/// Runs of jobs on machines that share no folder with this one. Each shows a token, of which only
-/// the hash is kept: of one job, of one submission of it, for as long as that runs, and for one
-/// result. What runs bring goes into the job's folder, as slurm_task.h describes it. Every call
-/// with a token: PermissionDenied (JOB_TOKEN_WRONG), FailedPrecondition (JOB_TOKEN_EXPIRED,
-/// JOB_TOKEN_USED). Safe from every thread.
+/// Runs of jobs on machines that share no folder with this one. Each run shows a token, of which
+/// the daemon keeps only the hash. A token is valid for one submission of one job, until that has
+/// ended or has delivered a result. Results go into the job's folder, which slurm_task.h describes.
+/// Errors of every call with a token: PermissionDenied (JOB_TOKEN_WRONG), FailedPrecondition
+/// (JOB_TOKEN_EXPIRED, JOB_TOKEN_USED). Safe from every thread.
 class RemoteRuns {
  public:
   /// A token that nobody can guess.
   static std::string NewToken();
 
-  /// What is kept of a token, bound to its job.
+  /// The hash that the daemon keeps of a token, bound to its job.
   static std::string HashOf(const std::string& digest, const std::string& token);
 
-  /// Lets the run in that has the token with that hash, and no other of the job from now on.
+  /// Admits the run whose token has that hash, and from now on no other run of the job.
   void Admit(const std::string& digest, const std::filesystem::path& folder,
              const std::string& token_hash);
 
-  /// Lets no run of the job in any more.
+  /// Admits no run of the job any more.
   void Dismiss(const std::string& digest);
 
   /// Counts a run as begun. Returns the file with its mesh.

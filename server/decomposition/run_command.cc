@@ -43,7 +43,7 @@ class MemoryFile {
   int descriptor_;
 };
 
-/// Whether there is something to read, or the end, before the deadline.
+/// Whether bytes or the end of the output arrive before the deadline.
 bool AwaitOutput(const Pipe& pipe, steady_clock::time_point deadline) {
   while (true) {
     const auto left =

@@ -6,14 +6,14 @@
 
 namespace carillon {
 
-/// What a command printed, to both of its streams, and whether its exit status was zero.
+/// The result of a command: its output on both streams, and whether its exit status was zero.
 struct CommandResult {
   bool success = false;
   std::string output;
 };
 
-/// Runs a program of the search path to its end, with `input` on its standard input; one that takes
-/// over half a minute is killed.
+/// Runs a program of the search path to its end, with `input` on its standard input. It is killed
+/// after half a minute.
 CommandResult RunCommand(const std::vector<std::string>& command, const std::string& input = "");
 
 }  // namespace carillon

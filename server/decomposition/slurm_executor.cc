@@ -25,8 +25,8 @@
 namespace carillon {
 namespace {
 
-// Looks at a job that has left the queue before it is given up for lost: its last words may still
-// be on their way through the shared folder.
+// A job that has left the queue is taken for lost after more checks than this: its result may still
+// be on its way through the shared folder.
 constexpr int kLooksBeforeLost = 2;
 
 class SlurmExecutor final : public Executor {
@@ -46,7 +46,7 @@ class SlurmExecutor final : public Executor {
 
   int worker_count() const override { return options_.job_count; }
 
-  // Memory is reserved by Slurm.
+  // Slurm reserves the memory.
   uint64_t memory_budget_bytes() const override { return std::numeric_limits<uint64_t>::max() / 2; }
 
   void Start(DecompositionTask task) override {
@@ -129,8 +129,8 @@ class SlurmExecutor final : public Executor {
     }
   }
 
-  // The folder goes after the model is stored, or never if the daemon dies before: then the next
-  // one finds the end again.
+  // The folder is removed after the model is stored. If the daemon dies before, the next one finds
+  // the end in the folder again.
   void End(std::list<Tracked>::iterator tracked, const Outcome& outcome) {
     const SlurmTask task = std::move(tracked->task);
     tasks_.erase(tracked);
@@ -139,7 +139,7 @@ class SlurmExecutor final : public Executor {
     ended_.insert(task.job().name);
   }
 
-  // A second run of what has ended, or one that a controller takes to run still.
+  // Cancels second runs of ended jobs, and ended jobs that the controller believes to run.
   void CancelWhatIsLeft(const SlurmJobs& jobs) {
     for (const Tracked& tracked : tasks_) ended_.erase(tracked.task.job().name);
     for (const auto& [key, state] : jobs) {
@@ -148,10 +148,10 @@ class SlurmExecutor final : public Executor {
     ended_.clear();
   }
 
-  // What has neither ended nor is in the queue is submitted, or submitted again.
+  // Submits the jobs that have neither ended nor are in the queue.
   void Reconcile() {
     const std::optional<SlurmJobs> jobs = ReadSqueue();
-    if (!jobs.has_value()) return;  // the controller is down: nothing is known, nothing done
+    if (!jobs.has_value()) return;  // the controller is down and no state is known
     CancelWhatIsLeft(*jobs);
     for (auto tracked = tasks_.begin(); tracked != tasks_.end();) {
       const auto here = tracked++;
@@ -168,9 +168,10 @@ class SlurmExecutor final : public Executor {
     }
   }
 
-  // Not in the queue: never submitted, forgotten by the controller, or ended just now.
+  // The job is not in the queue: it was never submitted, the controller forgot it, or it ended
+  // just now.
   void SubmitUnlessEnded(std::list<Tracked>::iterator tracked) {
-    if (tracked->task.TakeEnd().has_value()) return;  // it is collected next time
+    if (tracked->task.TakeEnd().has_value()) return;  // CollectEnded takes it next time
     JudgeLoss(tracked, ReadSacct(tracked->task.job().name, tracked->task.job().ticket));
   }
 
@@ -182,7 +183,8 @@ class SlurmExecutor final : public Executor {
     } else {
       tracked->looks_in_vain = 0;
       if (state == SlurmState::kStuck) CancelByName(tracked->task.job().name);
-      // Where there is none to submit, for want of space perhaps, the next look tries again.
+      // If the submission cannot be prepared, perhaps because the disk is full, the next check
+      // tries again.
       if (const auto job = tracked->task.NextSubmission(); job.ok()) Submit(*job);
     }
   }

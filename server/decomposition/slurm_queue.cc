@@ -13,8 +13,8 @@
 namespace carillon {
 namespace {
 
-// A controller that forgot a job gives its number to another, and a node on which the first still
-// runs refuses the second, which is then held. A job that people hold is another matter.
+// Slurm's reason for a job that its node refused: a controller that forgot a job has given the
+// number to this one, and the first still runs on the node. Jobs held by people have other reasons.
 constexpr char kRefusedByNode[] = "launch failed requeued held";
 
 SlurmState StateOf(absl::string_view word, absl::string_view reason) {
@@ -25,8 +25,7 @@ SlurmState StateOf(absl::string_view word, absl::string_view reason) {
     if (word == alive) return SlurmState::kWaitsOrRuns;
   }
   if (word == "COMPLETED") return SlurmState::kCompleted;
-  // A job that left no word of its own was killed: by the watch over memory, which older Slurms
-  // call a failure.
+  // A job without a result was killed for its use of memory, which older Slurms report as FAILED.
   if (word == "OUT_OF_MEMORY" || word == "FAILED") return SlurmState::kOutOfMemory;
   if (word == "TIMEOUT" || word == "DEADLINE") return SlurmState::kTimeout;
   if (absl::StartsWith(word, "CANCELLED")) return SlurmState::kCancelled;

@@ -8,18 +8,18 @@
 
 namespace carillon {
 
-/// What Slurm knows of the jobs of one name and ticket.
+/// Slurm's state of the jobs of one name and ticket.
 enum class SlurmState {
   kWaitsOrRuns,
   kCompleted,
   kOutOfMemory,
   kTimeout,
   kCancelled,
-  kLost,   ///< its node failed, or something else that another run may be spared
-  kStuck,  ///< its node refused it, and it is held until somebody releases it
+  kLost,   ///< ended by a failed node or another cause that may not recur
+  kStuck,  ///< refused by its node, and held until it is released
 };
 
-/// A job as it is submitted. The ticket tells this submission's jobs from older ones of the name.
+/// A job to submit. The ticket distinguishes this submission from older ones of the same name.
 struct SlurmJob {
   std::string name;
   std::string ticket;
@@ -30,22 +30,22 @@ struct SlurmJob {
   int64_t time_limit_s = 0;
 };
 
-/// By name and ticket; of several jobs of one, the state that leaves most hope.
+/// States by name and ticket. If several jobs share these, the state nearest to success counts.
 using SlurmJobs = std::map<std::pair<std::string, std::string>, SlurmState>;
 
-/// What `squeue` prints for its format "%j|%k|%T|%r", or sacct without the reason, for the tests.
+/// Parses the output of `squeue` in the format "%j|%k|%T|%r", or of sacct, which lacks the reason.
 SlurmJobs ParseSqueue(const std::string& output);
 
-/// All jobs in the queue and those that ended lately; absent where the controller does not answer.
+/// All jobs in the queue and those that ended lately; absent if the controller does not answer.
 std::optional<SlurmJobs> ReadSqueue();
 
-/// What accounting knows of a job that the queue has forgotten; absent where there is none.
+/// The accounting's state of a job that the queue has forgotten; absent if it has no record.
 std::optional<SlurmState> ReadSacct(const std::string& name, const std::string& ticket);
 
-/// Whether the controller says that it has taken the job. It may have, even if not.
+/// Submits the job. False does not exclude that the controller took it: its answer may be lost.
 bool Submit(const SlurmJob& job);
 
-/// Cancels every job of a name, if the controller answers.
+/// Cancels every job of a name if the controller answers.
 void CancelByName(const std::string& name);
 
 }  // namespace carillon

@@ -13,13 +13,13 @@
 
 namespace carillon {
 
-/// Somebody who is told of a job's changes: in order, one call at a time, none after Close.
+/// A function that is told of a job's changes: in order, one call at a time, none after Close.
 class Watcher {
  public:
   explicit Watcher(std::function<void(const v1::Job&)> on_change)
       : on_change_(std::move(on_change)) {}
 
-  /// Tells it of `job`, unless something newer has been told. Versions count from 1.
+  /// Calls the function with `job`, unless it was told a newer version. Versions count from 1.
   void Tell(const v1::Job& job, uint64_t version) {
     const RecursiveMutexLock lock(&mutex_);
     if (closed_ || version <= told_) return;
@@ -27,7 +27,7 @@ class Watcher {
     on_change_(job);
   }
 
-  /// Returns when no call runs and none will.
+  /// Returns when no call is running; none follows.
   void Close() {
     const RecursiveMutexLock lock(&mutex_);
     closed_ = true;
@@ -41,7 +41,7 @@ class Watcher {
   const std::function<void(const v1::Job&)> on_change_;
 };
 
-/// A change to be told once no lock is held.
+/// A change of a job, to be told to its watchers when no lock is held.
 struct Notice {
   std::vector<std::shared_ptr<Watcher>> watchers;
   v1::Job job;

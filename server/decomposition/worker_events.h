@@ -11,14 +11,14 @@
 
 namespace carillon {
 
-/// Cuts the bytes of a worker's event pipe into events (protobuf's delimited form). A worker chews
-/// strangers' data and may write anything: nothing here grows beyond one event.
+/// Splits the bytes of a worker's event pipe into events (protobuf's delimited form). A worker
+/// reads untrusted files and may write anything, so the reader buffers one event at most.
 class WorkerEventReader {
  public:
   static constexpr uint32_t kMaxEventBytes = 64 << 10;
 
   /// Calls `on_event` for each event that `bytes` completes.
-  /// Errors: DataLoss (WORKER_GARBAGE). After an error the reader is of no further use.
+  /// Errors: DataLoss (WORKER_GARBAGE). The reader cannot be used after an error.
   absl::Status Feed(std::string_view bytes,
                     absl::FunctionRef<void(const v1::WorkerEvent&)> on_event);
 
@@ -26,7 +26,7 @@ class WorkerEventReader {
   std::string pending_;
 };
 
-/// An event as the pipe has it.
+/// The bytes of an event on the pipe.
 std::string Delimited(const v1::WorkerEvent& event);
 
 }  // namespace carillon

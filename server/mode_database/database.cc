@@ -17,7 +17,7 @@ absl::StatusOr<std::unique_ptr<SqliteConnection>> Connect(const std::filesystem:
   const absl::Status status =
       (*connection)
           ->RunScript(
-              // Large pages for large blobs; a file that is there keeps its own.
+              // Large pages suit large blobs. An existing file keeps its page size.
               "PRAGMA page_size = 65536; PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL; "
               "PRAGMA foreign_keys = ON;");
   if (!status.ok()) return status;
@@ -36,7 +36,7 @@ absl::Status InTransaction(SqliteConnection& connection, const char* begin,
   if (!status.ok()) return status;
   status = body(connection);
   if (status.ok()) status = connection.Run("COMMIT");
-  // Some errors (a full disk) have rolled back already: nothing is lost if this one fails.
+  // Some errors, such as a full disk, have rolled back already; then this one fails harmlessly.
   if (!status.ok()) connection.Run("ROLLBACK").IgnoreError();
   return status;
 }

@@ -21,17 +21,17 @@ class Database {
   /// As ModeDatabase::Open.
   static absl::StatusOr<std::unique_ptr<Database>> Open(const std::filesystem::path& file);
 
-  /// Runs `body` in one transaction, committed and on the disk when this returns OK, rolled back
-  /// when `body` fails.
+  /// Runs `body` in one transaction. It is committed and on the disk when this returns OK, and
+  /// rolled back if `body` fails.
   absl::Status Write(absl::FunctionRef<absl::Status(SqliteConnection&)> body);
 
   /// Runs `body` on one snapshot of the database.
   absl::Status Read(absl::FunctionRef<absl::Status(SqliteConnection&)> body);
 
-  /// Runs `body` on a connection for what cannot be within a transaction.
+  /// Runs `body` on a connection of its own, for statements that SQLite refuses in a transaction.
   absl::Status ReadOutsideTransaction(absl::FunctionRef<absl::Status(SqliteConnection&)> body);
 
-  /// Where files that wait for a transaction belong: on the same disk.
+  /// The folder for files that wait for a transaction: it is on the same disk.
   std::filesystem::path folder() const { return file_.parent_path(); }
 
  private:

@@ -13,7 +13,7 @@ namespace carillon {
 
 class Database;
 
-/// What a database holds, in numbers; see DatabaseStats in admin_service.proto.
+/// The counts and sizes of a database's content; see DatabaseStats in admin_service.proto.
 struct DatabaseStats {
   uint64_t model_count = 0;
   uint64_t model_bytes = 0;
@@ -29,28 +29,27 @@ struct DatabaseStats {
 
 absl::StatusOr<DatabaseStats> ReadStats(Database& database);
 
-/// Copies the database as it stands at one moment into a new file (SQLite's online backup); writers
-/// go on meanwhile. Errors: ResourceExhausted (DATABASE_FULL), FailedPrecondition
-/// (DATABASE_UNUSABLE).
+/// Copies one snapshot of the database into a new file (SQLite's online backup) while writers go
+/// on. Errors: ResourceExhausted (DATABASE_FULL), FailedPrecondition (DATABASE_UNUSABLE).
 absl::Status BackUp(Database& database, const std::filesystem::path& copy);
 
-/// What a check has found, a line each; nothing where all is well.
+/// Takes the faults that a check has found, a line for each.
 using OnFinding = std::function<void(const std::string& line)>;
 
 /// The calls below work on a file that no daemon has open.
 
-/// Looks at everything: SQLite's structure, every hash of every model, every mesh's digest, every
-/// intent. Writes nothing. Errors: as ModeDatabase::Open; DataLoss (DATABASE_CORRUPT) where the
-/// structure is beyond reading.
+/// Checks SQLite's structure, every hash of every model, the digest of every mesh and every job.
+/// Writes nothing. Errors: as ModeDatabase::Open; DataLoss (DATABASE_CORRUPT) if the structure
+/// cannot be read.
 absl::Status CheckDatabase(const std::filesystem::path& file, const OnFinding& on_finding);
 
-/// Brings everything that is whole into a new database, which takes the old one's place; that is
-/// kept beside it under the name `file`.damaged. What is left out goes to `on_finding`.
+/// Copies every undamaged model, mesh and job into a new database, which replaces the old one; the
+/// old one is kept as `file`.damaged. `on_finding` is told of each row that is left out.
 /// Errors: FailedPrecondition (DATABASE_UNUSABLE), ResourceExhausted (DATABASE_FULL).
 absl::Status RepairDatabase(const std::filesystem::path& file, const OnFinding& on_finding);
 
-/// Puts a copy that BackUp made in the database's place; what was there is kept under the name
-/// `file`.replaced. The copy is checked before. Errors: NotFound (FILE_NOT_FOUND), DataLoss
+/// Replaces the database by a copy that BackUp made, after a check of the copy. The old database is
+/// kept as `file`.replaced. Errors: NotFound (FILE_NOT_FOUND), DataLoss
 /// (DATABASE_CORRUPT), FailedPrecondition (SCHEMA_TOO_NEW).
 absl::Status RestoreDatabase(const std::filesystem::path& file, const std::filesystem::path& copy);
 

@@ -13,10 +13,10 @@
 
 namespace carillon {
 
-/// Reading what a damaged database still holds.
+/// Reads the readable part of a damaged database.
 
-/// The digests in table `table`, as many as can be read, from either end; what cannot be read is
-/// told to `on_finding`.
+/// The digests in `table` that can be read from its begin and from its end. `on_finding` is told of
+/// an error in between.
 inline std::vector<std::string> Names(Database& database, const std::string& table,
                                       const std::function<void(const std::string&)>& on_finding) {
   std::vector<std::string> names;
@@ -29,7 +29,7 @@ inline std::vector<std::string> Names(Database& database, const std::string& tab
   });
   if (status.ok()) return names;
   on_finding(table + ": " + std::string(status.message()));
-  // Backwards as far as that goes.
+  // The rows behind the error are read backwards from the end.
   std::vector<std::string> from_the_end;
   database
       .Read([&](SqliteConnection& connection) {
@@ -44,7 +44,7 @@ inline std::vector<std::string> Names(Database& database, const std::string& tab
   return names;
 }
 
-/// The bytes of a mesh, piece by piece, unchecked.
+/// Calls `on_bytes` for each piece of a mesh, without a check of its digest.
 inline absl::Status ReadMesh(Database& database, const std::string& digest,
                              absl::FunctionRef<absl::Status(std::string_view)> on_bytes) {
   return database.Read([&](SqliteConnection& connection) {

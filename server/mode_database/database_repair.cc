@@ -26,7 +26,7 @@ absl::Status CannotMove(const std::filesystem::path& file, const std::error_code
                               "): see that this user may write in its folder"));
 }
 
-// The file with its log, where it has one.
+// Moves the database file and its write-ahead log, if there is one.
 absl::Status Move(const std::filesystem::path& from, const std::filesystem::path& to) {
   std::error_code error;
   for (const char* suffix : {"", "-wal"}) {
@@ -101,7 +101,7 @@ absl::Status CopyJob(Database& from, Database& to, const std::string& digest) {
   return JobStore(to).Put(**job);
 }
 
-// A full disk ends the whole; damage only leaves out what is damaged.
+// A full disk ends the repair; a damaged row is only left out.
 absl::Status CopyWhole(Database& from, Database& to, const OnFinding& on_finding) {
   struct Kind {
     const char* table;

@@ -20,7 +20,7 @@ constexpr char kSelectRows[] =
     "SELECT number, digest, label, state, remembered, created_unix_ms, priority, start_count, way, "
     "peak_bytes, xxh3 IS NULL, xxh3, error, request FROM jobs ";
 
-// Of all that is stored, so that no bit of an intent can change unseen.
+// The hash covers every column, so that no bit of a job can change unnoticed.
 int64_t RowHash(const JobRecord& job, std::string_view error) {
   std::string text =
       absl::StrCat(job.digest, " ", static_cast<int>(job.state), " ", job.remembered ? 1 : 0, " ",
@@ -101,7 +101,7 @@ absl::StatusOr<std::optional<JobRecord>> JobStore::Find(const std::string& diges
 absl::StatusOr<std::vector<JobRecord>> JobStore::Unfinished() {
   std::vector<JobRecord> jobs;
   const absl::Status status = database_->Read([&](SqliteConnection& connection) {
-    // All rows are looked at: a state that has changed on the disk would hide its job.
+    // Every row is read, because a state that has changed on the disk would hide its job.
     return connection.Query(absl::StrCat(kSelectRows, "ORDER BY number").c_str(), {},
                             [&](const SqlRow& row) {
                               JobRecord job = ParseRow(row);

@@ -17,17 +17,17 @@ class Database;
 /// A decomposition job as it is stored.
 struct JobRecord {
   std::string digest{};   ///< the modal model's
-  std::string request{};  ///< what was asked for; bytes whose meaning belongs to the caller
+  std::string request{};  ///< serialized by the caller, who alone interprets it
   std::string label{};
   v1::JobState state = v1::JOB_STATE_QUEUED;
   v1::ErrorInfo error{};    ///< while `state` is JOB_STATE_FAILED
-  bool remembered = false;  ///< the failure would come again: it is not tried again
+  bool remembered = false;  ///< the same request would fail again, so it is not run again
   int64_t created_unix_ms = 0;
   int32_t priority = 0;      ///< higher starts first
-  uint32_t start_count = 0;  ///< starts of a worker since it was last asked for, that saw no end
-  uint32_t way = 0;          ///< how it is computed: 0 as asked, above that another way
-  uint64_t peak_bytes = 0;   ///< most memory that its worker took, once it ran
-  /// The row has changed on the disk: only its digest is right, `state` and `error` say so.
+  uint32_t start_count = 0;  ///< workers started since the last submit that have not ended
+  uint32_t way = 0;          ///< 0: computed as requested; above: by another way, see kWayCount
+  uint64_t peak_bytes = 0;   ///< peak memory of its worker; 0: none has ended yet
+  /// The row has changed on the disk: only `digest` is right, and `state` and `error` report it.
   bool damaged = false;
 };
 
@@ -36,7 +36,7 @@ struct JobPage {
   std::string next_page_token;  ///< empty: this was the last page
 };
 
-/// Decomposition jobs by digest: the intent that outlives the daemon. Safe from every thread.
+/// Decomposition jobs by digest, so that they outlive the daemon. Safe from every thread.
 class JobStore {
  public:
   explicit JobStore(Database& database) : database_(&database) {}
@@ -55,7 +55,7 @@ class JobStore {
   /// Deleting a job that is not there is no error.
   absl::Status Delete(const std::string& digest);
 
-  /// A figure that is learnt from jobs, under a name; absent before it was first stored.
+  /// A named value that the daemon learnt from jobs; absent until it is first stored.
   absl::StatusOr<std::optional<std::string>> Fact(const std::string& name);
   absl::Status PutFact(const std::string& name, const std::string& value);
 

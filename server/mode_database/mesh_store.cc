@@ -55,7 +55,8 @@ absl::Status Insert(SqliteConnection& connection, const StoredMesh& mesh, int64_
   return status;
 }
 
-/// Calls `on_mesh` with the mesh of each model and each job. A row that cannot be read has none.
+/// Calls `on_mesh` with the mesh of each model and each job. A row that cannot be read is
+/// skipped.
 absl::Status ForEachReference(SqliteConnection& connection,
                               absl::FunctionRef<void(const std::string&)> on_mesh) {
   absl::Status status = connection.Query("SELECT header FROM models", {}, [&](const SqlRow& row) {
@@ -186,7 +187,7 @@ absl::Status MeshStore::WriteFile(const std::string& digest, const std::filesyst
   });
   if (!status.ok()) return status;
   if (sha.Finish() == digest) return absl::OkStatus();
-  // Out of the way, so that an upload stores it anew.
+  // The damaged mesh is deleted, so that an upload stores it again.
   status = database_->Write([&](SqliteConnection& connection) {
     return connection.Run("DELETE FROM meshes WHERE digest = ?", {digest});
   });

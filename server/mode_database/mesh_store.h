@@ -23,11 +23,11 @@ struct StoredMesh {
   uint64_t byte_count = 0;
 };
 
-/// A mesh file that arrives in pieces. It waits in a nameless file beside the database, so that
-/// neither memory nor a transaction is held by a slow sender. One thread at a time.
+/// A mesh file that arrives in pieces. The pieces are collected in a nameless file beside the
+/// database, so that a slow sender occupies neither memory nor a transaction. One thread at a time.
 class MeshUpload {
  public:
-  /// The next bytes. Errors: ResourceExhausted (MESH_TOO_LARGE: over 256 MiB in all).
+  /// Appends the next bytes. Errors: ResourceExhausted (MESH_TOO_LARGE: over 256 MiB in all).
   absl::Status Append(std::string_view bytes);
 
   /// Stores the mesh, durably, unless it is stored already. Call once, last.
@@ -57,8 +57,8 @@ class MeshStore {
  public:
   static constexpr uint64_t kMaxByteCount = 256ULL << 20;
 
-  /// A mesh that nothing refers to is kept so long after it was last uploaded: its model may yet be
-  /// asked for.
+  /// A mesh that no model and no job refers to is kept this long after its last upload, because a
+  /// request for its model may follow.
   static constexpr std::chrono::hours kUnusedLife{24};
 
   MeshStore(Database& database, const Clock& clock) : database_(&database), clock_(&clock) {}

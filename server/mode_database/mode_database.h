@@ -14,8 +14,8 @@ namespace carillon {
 
 class Database;
 
-/// The daemon's memory: meshes, modal models and jobs in one SQLite file. What a call has
-/// acknowledged survives kill -9 and power failure (WAL, synchronous=FULL). Safe from every thread.
+/// Meshes, modal models and jobs in one SQLite file. A change survives kill -9 and power failure
+/// once its call has returned OK (WAL, synchronous=FULL). Safe from every thread.
 class ModeDatabase {
  public:
   /// Opens the file, or makes it, and brings an older schema up to date in one transaction.
@@ -30,7 +30,7 @@ class ModeDatabase {
   ModelStore& models() { return models_; }
   JobStore& jobs() { return jobs_; }
   Database& database() { return *database_; }  ///< for database_admin.h
-  /// The folder of the file: for files that belong beside it.
+  /// The folder of the database file, for other files of the daemon.
   std::filesystem::path folder() const;
 
  private:

@@ -13,7 +13,7 @@
 
 namespace carillon {
 
-/// A piece of an array, as ModalModelChunk, whose bytes lie elsewhere.
+/// A ModalModelChunk that refers to bytes of its caller.
 struct ChunkView {
   uint32_t array = 0;
   uint64_t offset = 0;
@@ -23,17 +23,18 @@ struct ChunkView {
 
 /// Checks a stored model record by record: hashes, the order and completeness of the chunks, that
 /// the arrays of format version 1 are there with consistent shapes, that numbers are finite,
-/// eigenvalues positive and ascending, and indices in range. What passes cannot hurt a reader.
+/// eigenvalues positive and ascending, and indices in range. A reader of a model that passes needs
+/// no further checks.
 class ModelChecker {
  public:
   /// Errors: InvalidArgument (MODAL_MODEL_MALFORMED), DataLoss (MODAL_MODEL_CORRUPT: a hash is
-  /// wrong). After an error the checker is of no further use.
+  /// wrong). The checker cannot be used after an error.
   absl::Status Check(const v1::ModalModelRecord& record);
 
   /// As Check of a record with that chunk, after the header.
   absl::Status CheckChunk(const ChunkView& chunk);
 
-  /// Whether every byte of every array has come. Errors: InvalidArgument (MODAL_MODEL_MALFORMED).
+  /// Checks that every array is complete. Errors: InvalidArgument (MODAL_MODEL_MALFORMED).
   absl::Status Finish() const;
 
   const v1::ModalModelHeader& header() const { return header_; }
@@ -51,7 +52,7 @@ class ModelChecker {
   v1::ModalModelHeader header_;
   std::vector<uint64_t> byte_counts_;    ///< of each array
   std::map<char, uint64_t> dimensions_;  ///< 'V', 'T', 'm', 'G', 'H' of modal_model.proto
-  int array_ = 0;                        ///< whose chunks come now
+  int array_ = 0;                        ///< the array whose chunks come now
   uint64_t offset_ = 0;                  ///< of the next chunk
   double last_eigenvalue_ = 0;
 };

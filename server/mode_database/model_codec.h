@@ -16,15 +16,15 @@
 
 namespace carillon {
 
-/// The stored form of a modal model (proto/carillon/v1/modal_model.proto) in and out of memory.
+/// Reads and writes the stored form of a modal model (proto/carillon/v1/modal_model.proto).
 
-/// Records of a file in protobuf's delimited form, one by one. One thread at a time.
+/// Reads the records of a file in protobuf's delimited form, one by one. One thread at a time.
 class ModelFileReader {
  public:
   /// Errors: NotFound (FILE_NOT_FOUND).
   static absl::StatusOr<ModelFileReader> Open(const std::filesystem::path& file);
 
-  /// Reads on from where `descriptor` stands, which stays the caller's.
+  /// Reads from the present position of `descriptor`, which the caller closes.
   explicit ModelFileReader(int descriptor);
   ModelFileReader(ModelFileReader&&) noexcept;
   ModelFileReader& operator=(ModelFileReader&&) noexcept;
@@ -38,10 +38,10 @@ class ModelFileReader {
   std::unique_ptr<State> state_;
 };
 
-/// One record as it stands in a file: its length as a varint, then its bytes.
+/// The bytes of a record in a file: its length as a varint, then the record.
 std::string Delimited(const v1::ModalModelRecord& record);
 
-/// Makes the model in memory from its records, checking each.
+/// Builds a model from its records and checks each of them.
 class ModelDecoder {
  public:
   /// Errors: as ModelChecker::Check.
@@ -65,8 +65,8 @@ class ModelDecoder {
 };
 
 /// Hands the records of `model` to `sink` in order and stops at its first error, which is returned.
-/// `header` gives what the model itself does not hold; its arrays and mode count are filled in.
-/// `residuals` (#m) stand beside the eigenvalues.
+/// `header` supplies the fields that the model lacks; its arrays and mode count are filled in.
+/// `residuals` (#m) belong to the eigenvalues.
 absl::Status EncodeModel(const ModalModel& model, v1::ModalModelHeader header,
                          const std::vector<double>& residuals,
                          absl::FunctionRef<absl::Status(const v1::ModalModelRecord&)> sink);

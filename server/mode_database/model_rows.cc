@@ -155,7 +155,7 @@ absl::StatusOr<ModalModel> ReadModel(SqliteConnection& connection, const ModelSu
                      if (bad.ok()) bad = decoder.AppendChunk(chunk);
                      return bad;
                    });
-  // A disk that cannot be read now is no proof that the model is damaged.
+  // An error in reading does not prove that the model is damaged.
   if (bad.ok() && !status.ok() && !absl::IsDataLoss(status)) return status;
   if (!status.ok()) return ModelCorrupt(summary.digest, status.message());
   absl::StatusOr<ModalModel> model = decoder.Finish(summary.digest);

@@ -15,16 +15,16 @@
 
 namespace carillon {
 
-/// The rows of a modal model, within a transaction of the caller's. Errors of what is read:
-/// NotFound (MODAL_MODEL_NOT_FOUND), DataLoss (MODAL_MODEL_CORRUPT).
+/// The rows of a modal model, within a transaction of the caller. Every function that reads them
+/// can fail with NotFound (MODAL_MODEL_NOT_FOUND), DataLoss (MODAL_MODEL_CORRUPT).
 
 absl::Status ModelNotFound(const std::string& digest);
 absl::Status ModelCorrupt(const std::string& digest, absl::string_view what);
 
 absl::StatusOr<ModelSummary> SelectModel(SqliteConnection& connection, const std::string& digest);
 
-/// Newest first: at most `limit` below revision `below`. A row that is damaged goes to `on_damaged`
-/// with its digest instead.
+/// Calls `on_model` for at most `limit` models below revision `below`, newest first, and
+/// `on_damaged` with the digest of each row that is damaged.
 absl::Status SelectModels(SqliteConnection& connection, const ModelFilter& filter, int64_t below,
                           int64_t limit, absl::FunctionRef<void(ModelSummary)> on_model,
                           absl::FunctionRef<void(std::string, absl::Status)> on_damaged);
@@ -37,13 +37,13 @@ absl::Status SelectChunks(SqliteConnection& connection, int64_t revision, int64_
 /// The whole model, every hash checked.
 absl::StatusOr<ModalModel> ReadModel(SqliteConnection& connection, const ModelSummary& summary);
 
-/// Reads and checks every record and inserts it in the place of an older revision, whose label
-/// stays and whose being pinned does. Fills in `summary`.
+/// Reads and checks every record and inserts the model as a new revision, which keeps the label and
+/// the pin of the revision that it replaces. Fills in `summary`.
 absl::Status InsertModel(SqliteConnection& connection, ModelFileReader& records,
                          ModelSummary& summary);
 
-/// Inserts the model that `summary` describes once more under another digest, with all its chunks
-/// as they are. Changes what is of the revision in `summary`.
+/// Inserts a copy of the model that `summary` describes under another digest, with unchanged
+/// chunks. `summary` then describes the copy.
 absl::Status InsertCopy(SqliteConnection& connection, const std::string& digest,
                         ModelSummary& summary);
 

@@ -141,7 +141,7 @@ void ModelStore::ListenToQuarantine(OnQuarantine on_quarantine) {
   on_quarantine_ = std::move(on_quarantine);
 }
 
-// Returns `why`, or what kept the model out of quarantine.
+// Returns `why`, or the error that kept the model out of quarantine.
 absl::Status ModelStore::Quarantine(const std::string& digest, const absl::Status& why) {
   bool news = false;
   absl::Status status = database_->Write([&](SqliteConnection& connection) {
@@ -284,7 +284,7 @@ absl::StatusOr<ModelPage> ModelStore::List(const ModelFilter& filter, int page_s
   });
   if (!status.ok()) return status;
   for (const auto& [digest, why] : damaged) Quarantine(digest, why).IgnoreError();
-  // A page with damaged ones is shorter, yet not the last.
+  // Damaged models are left out of the page, which makes it shorter but not the last one.
   if (std::ssize(page.models) + std::ssize(damaged) == range->size && !page.models.empty()) {
     page.next_page_token = absl::StrCat(page.models.back().revision);
   }

@@ -66,7 +66,7 @@ struct Collected {
 /// Room for stored models.
 struct ModelBudget {
   uint64_t bytes = 0;  ///< of all their arrays; 0: no limit
-  /// What people should know of a collection. Called on any thread.
+  /// Takes log lines about collections. Called on any thread.
   std::function<void(const std::string& line)> log = [](const std::string&) {};
 };
 
@@ -100,8 +100,8 @@ class ModelImport {
   std::unique_ptr<State> state_;
 };
 
-/// Sends a model record by record, exactly as it was stored. Holds no transaction in between: a
-/// model that is replaced meanwhile ends the export. One thread at a time.
+/// Reads a stored model record by record, byte for byte. No transaction stays open between two
+/// records, so an export ends with an error if the model is replaced. One thread at a time.
 class ModelExport {
  public:
   /// The next record; nullopt after the last. Errors: DataLoss (MODAL_MODEL_CORRUPT, and the model
@@ -123,8 +123,8 @@ class ModelExport {
 
 /// Modal models by digest. Safe from every thread.
 ///
-/// A model found damaged goes into quarantine: its rows stay as they are, for whoever wants to know
-/// what happened, but every call answers MODAL_MODEL_CORRUPT until it is stored anew.
+/// A model found damaged goes into quarantine: its rows stay unchanged for an analysis of the
+/// damage, but every call answers MODAL_MODEL_CORRUPT until the model is stored again.
 class ModelStore {
  public:
   /// Called once for each model that goes into quarantine, with no lock of the store held.
@@ -132,38 +132,38 @@ class ModelStore {
 
   ModelStore(Database& database, const Clock& clock) : database_(&database), clock_(&clock) {}
 
-  /// From now on each model that is stored is followed by a collection. Before any other call.
+  /// From now on a collection follows each model that is stored. Call before any other call.
   void KeepWithin(ModelBudget budget) { budget_ = std::move(budget); }
 
-  /// Replaces the listener; the old one neither runs nor will run afterwards.
+  /// Replaces the listener. The old one is not running when this returns and is never called again.
   void ListenToQuarantine(OnQuarantine on_quarantine);
 
-  /// Stores the model of a file in the stored form, in one transaction, durable on return; replaces
-  /// an older revision of the same digest, whose label stays. Checked before: every hash, that all
-  /// arrays are complete and of consistent shape, indices in range, numbers finite.
+  /// Stores the model of a file in the stored form, in one transaction, durable on return. Replaces
+  /// an older revision of the same digest and keeps its label. The model is checked first: every
+  /// hash, complete arrays of consistent shape, indices in range, finite numbers.
   /// Errors: InvalidArgument (MODAL_MODEL_MALFORMED), DataLoss (MODAL_MODEL_CORRUPT).
   absl::StatusOr<ModelSummary> PutFile(const std::string& digest, const std::string& label,
                                        const std::filesystem::path& file);
 
-  /// Stores the model of `from` under `to` as well, with its hashes as they are, unless there is
-  /// one of that name, damaged or not; one transaction, durable on return. Errors: NotFound
+  /// Stores a copy of the model `from` under `to`, with unchanged hashes, unless a model of that
+  /// digest is stored, damaged or not; one transaction, durable on return. Errors: NotFound
   /// (MODAL_MODEL_NOT_FOUND), DataLoss (MODAL_MODEL_CORRUPT).
   absl::Status CopyIfAbsent(const std::string& from, const std::string& to,
                             const std::string& label);
 
-  /// An empty `digest`: that of the records, as they stand in a file.
+  /// If `digest` is empty, the model is named by the SHA-256 of its file.
   /// Errors: InvalidArgument (INVALID_NAME: not a digest).
   absl::StatusOr<ModelImport> Import(const std::string& digest, const std::string& label);
 
   /// Errors: NotFound (MODAL_MODEL_NOT_FOUND).
   absl::StatusOr<ModelExport> Export(const std::string& digest);
 
-  /// The whole model; in memory once however many objects hold it.
+  /// The whole model. All objects share one copy in memory.
   /// Errors: NotFound (MODAL_MODEL_NOT_FOUND), DataLoss (MODAL_MODEL_CORRUPT: a hash is wrong, and
   /// the model goes into quarantine).
   absl::StatusOr<std::shared_ptr<const ModalModel>> Find(const std::string& digest);
 
-  /// As Find, and the model counts as having sounded now, for garbage collection.
+  /// As Find; collections also count the model as having sounded now.
   absl::StatusOr<std::shared_ptr<const ModalModel>> FindToSound(const std::string& digest);
 
   /// Errors: NotFound (MODAL_MODEL_NOT_FOUND), DataLoss (MODAL_MODEL_CORRUPT).
@@ -204,11 +204,11 @@ class ModelStore {
   Database* database_;
   const Clock* clock_;
   ModelBudget budget_;
-  // Held while a model is read, so that two objects of one model cannot read it twice.
+  // Locked while a model is read, so that two objects of one model do not both read it.
   Mutex cache_mutex_;
   std::map<std::string, Cached> cache_ ABSL_GUARDED_BY(cache_mutex_);
-  // When models sounded, until the next collection writes it down: what begins to sound must not
-  // wait for the disk.
+  // When models sounded last. The next collection stores it, because an object that begins to sound
+  // must not wait for the disk.
   std::map<std::string, int64_t> sounded_ ABSL_GUARDED_BY(cache_mutex_);
   Mutex listener_mutex_;
   OnQuarantine on_quarantine_ ABSL_GUARDED_BY(listener_mutex_);

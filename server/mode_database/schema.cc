@@ -9,12 +9,12 @@
 namespace carillon {
 namespace {
 
-// Element v - 1 leads from version v - 1 to v. What has shipped is never edited, only followed.
+// Element v - 1 leads from version v - 1 to v. A released migration is never edited: changes are
+// appended.
 //
-// Every hash is an XXH3 whose 64 bits are read as a signed integer. Blobs come last in their rows,
-// so that the columns before them are read without them. A model that is replaced gets a new
-// revision; tags belong to its name and stay. The hash of a job is of its whole row; NULL where an
-// older program wrote it.
+// Every hash is an XXH3 whose 64 bits are stored as a signed integer. Blobs are the last columns,
+// so that the columns before them are read without them. The hash of a job covers its whole row and
+// is NULL if an older program wrote it.
 constexpr std::array kMigrations = {R"sql(
   CREATE TABLE meshes (
     digest TEXT PRIMARY KEY,

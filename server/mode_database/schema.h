@@ -4,6 +4,25 @@
 #include "absl/status/status.h"
 #include "server/mode_database/sqlite_connection.h"
 
+// The tables, with their keys left of the bar:
+//
+//   jobs          number | digest  label  state  priority  way  error  xxh3  request ...
+//                            :                                                  :
+//   model_tags       tag + digest                                               : mesh_digest
+//                            :                                                  :
+//   models      revision | digest  label  pinned  quarantined  header ...       :
+//                  ^                                              :             :
+//   model_chunks revision + number | array  byte_offset  xxh3  data             :
+//                                                                 : mesh_digest :
+//                                                     meshes      digest | byte_count ...
+//                                                                   ^
+//                                                     mesh_chunks digest + byte_offset | data
+//   facts           name | value
+//
+// An arrow is a foreign key: chunks are deleted with the row that owns them. A dotted line joins
+// equal values without a foreign key: one digest names a job, its model and the model's tags, so
+// that tags stay when a new revision replaces the model.
+
 namespace carillon {
 
 /// Brings the schema of an open transaction up to date, version by version (PRAGMA user_version).

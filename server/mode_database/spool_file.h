@@ -12,8 +12,8 @@
 
 namespace carillon {
 
-/// A nameless file for what arrives slowly and is stored at once; gone with the object, or with the
-/// process. One thread at a time.
+/// A nameless temporary file. It collects data that arrives slowly and is stored in one
+/// transaction; it is deleted with the object or with the process. One thread at a time.
 class SpoolFile {
  public:
   /// Errors: FailedPrecondition (DATABASE_UNUSABLE: the folder cannot be written).

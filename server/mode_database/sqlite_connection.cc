@@ -47,7 +47,7 @@ absl::Status ToStatus(const SQLite::Exception& error) {
   }
 }
 
-// Where the library's exceptions stop.
+// Turns the library's exceptions into statuses. None leaves this file.
 template <typename Body>
 absl::Status Guarded(Body body) {
   try {
@@ -145,7 +145,7 @@ absl::Status SqliteConnection::BackUpTo(const std::filesystem::path& copy) {
   return Guarded([&] {
     SQLite::Database target(copy.string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE,
                             kBusyTimeoutMs);
-    // All in one step, which is one snapshot: writers append to the log meanwhile.
+    // One step copies one snapshot, while writers append to the log.
     SQLite::Backup(target, state_->database).executeStep(-1);
     return absl::OkStatus();
   });

@@ -15,14 +15,14 @@
 
 namespace carillon {
 
-/// Bytes, where a plain string would be stored as text.
+/// A parameter that is stored as bytes; a plain string is stored as text.
 struct SqlBlob {
   std::string_view bytes;
 };
 
 using SqlParameter = std::variant<int64_t, std::string_view, SqlBlob>;
 
-/// The row that a query stands at. Columns count from 0.
+/// The present row of a query. Columns count from 0.
 class SqlRow {
  public:
   virtual ~SqlRow() = default;
@@ -37,7 +37,7 @@ class SqlRow {
 /// or Internal (DATABASE_ERROR).
 class SqliteConnection {
  public:
-  /// Opens the file, made if it is not there; waits up to 10 s where it is locked.
+  /// Opens the file and makes it unless it exists; waits up to 10 s for a lock of another process.
   static absl::StatusOr<std::unique_ptr<SqliteConnection>> Open(const std::filesystem::path& file);
   ~SqliteConnection();
 
@@ -51,7 +51,7 @@ class SqliteConnection {
   absl::Status Query(const char* sql, std::initializer_list<SqlParameter> parameters,
                      absl::FunctionRef<absl::Status(const SqlRow&)> on_row);
 
-  /// Writes a copy of the database as it stands now into a new file. Outside a transaction.
+  /// Copies one snapshot of the database into a new file. Must be called outside a transaction.
   absl::Status BackUpTo(const std::filesystem::path& copy);
 
   /// Rows that the last statement changed.
