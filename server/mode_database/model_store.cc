@@ -235,7 +235,7 @@ absl::StatusOr<std::shared_ptr<const ModalModel>> ModelStore::FindToSound(
 absl::StatusOr<std::shared_ptr<const ModalModel>> ModelStore::Load(const std::string& digest) {
   MutexLock lock(&cache_mutex_);
   std::shared_ptr<const ModalModel> model;
-  const absl::Status status = database_->Read([&](SqliteConnection& connection) {
+  const auto load = [&](SqliteConnection& connection) ABSL_EXCLUSIVE_LOCKS_REQUIRED(cache_mutex_) {
     const absl::StatusOr<ModelSummary> row = SelectModel(connection, digest);
     if (!row.ok()) return row.status();
     Cached& cached = cache_[digest];
@@ -246,7 +246,8 @@ absl::StatusOr<std::shared_ptr<const ModalModel>> ModelStore::Load(const std::st
     model = std::make_shared<const ModalModel>(*std::move(read));
     cached = {row->revision, model};
     return absl::OkStatus();
-  });
+  };
+  const absl::Status status = database_->Read(load);
   std::erase_if(cache_, [](const auto& entry) { return entry.second.model.expired(); });
   if (!status.ok()) return status;
   return model;
@@ -327,32 +328,34 @@ absl::StatusOr<Collected> ModelStore::Collect(uint64_t budget_bytes, const std::
   };
   MutexLock lock(&cache_mutex_);
   Collected collected;
-  const absl::Status status = database_->Write([&](SqliteConnection& connection) {
-    absl::Status written = WriteSounded(connection);
-    if (!written.ok()) return written;
-    std::vector<Candidate> oldest_first;
-    uint64_t total_bytes = 0;
-    written = connection.Query(
-        "SELECT digest, stored_bytes, pinned FROM models "
-        "ORDER BY max(sounded_unix_ms, created_unix_ms), revision",
-        {}, [&](const SqlRow& row) {
-          const auto bytes = static_cast<uint64_t>(row.Int(1));
-          const auto cached = cache_.find(row.Text(0));
-          const bool in_memory = cached != cache_.end() && !cached->second.model.expired();
-          const bool stays = row.Int(2) != 0 || in_memory || row.Text(0) == spared;
-          oldest_first.push_back({row.Text(0), bytes, stays});
-          total_bytes += bytes;
-          return absl::OkStatus();
-        });
-    for (const Candidate& model : oldest_first) {
-      if (!written.ok() || total_bytes <= budget_bytes) break;
-      if (model.stays) continue;
-      written = DeleteModelRows(connection, model.digest);
-      total_bytes -= model.bytes;
-      collected = {collected.model_count + 1, collected.bytes + model.bytes};
-    }
-    return written;
-  });
+  const auto collect =
+      [&](SqliteConnection& connection) ABSL_EXCLUSIVE_LOCKS_REQUIRED(cache_mutex_) {
+        absl::Status written = WriteSounded(connection);
+        if (!written.ok()) return written;
+        std::vector<Candidate> oldest_first;
+        uint64_t total_bytes = 0;
+        written = connection.Query(
+            "SELECT digest, stored_bytes, pinned FROM models "
+            "ORDER BY max(sounded_unix_ms, created_unix_ms), revision",
+            {}, [&](const SqlRow& row) ABSL_EXCLUSIVE_LOCKS_REQUIRED(cache_mutex_) {
+              const auto bytes = static_cast<uint64_t>(row.Int(1));
+              const auto cached = cache_.find(row.Text(0));
+              const bool in_memory = cached != cache_.end() && !cached->second.model.expired();
+              const bool stays = row.Int(2) != 0 || in_memory || row.Text(0) == spared;
+              oldest_first.push_back({row.Text(0), bytes, stays});
+              total_bytes += bytes;
+              return absl::OkStatus();
+            });
+        for (const Candidate& model : oldest_first) {
+          if (!written.ok() || total_bytes <= budget_bytes) break;
+          if (model.stays) continue;
+          written = DeleteModelRows(connection, model.digest);
+          total_bytes -= model.bytes;
+          collected = {collected.model_count + 1, collected.bytes + model.bytes};
+        }
+        return written;
+      };
+  const absl::Status status = database_->Write(collect);
   if (!status.ok()) return status;
   sounded_.clear();
   return collected;

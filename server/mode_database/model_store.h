@@ -199,7 +199,8 @@ class ModelStore {
   absl::StatusOr<std::shared_ptr<const ModalModel>> Load(const std::string& digest);
   absl::StatusOr<ModelSummary> Store(ModelFileReader records, ModelSummary summary);
   absl::Status Quarantine(const std::string& digest, const absl::Status& why);
-  absl::Status WriteSounded(SqliteConnection& connection);
+  absl::Status WriteSounded(SqliteConnection& connection)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(cache_mutex_);
 
   Database* database_;
   const Clock* clock_;
