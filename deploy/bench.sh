@@ -16,6 +16,6 @@ if [[ ! -f $benchmark/run.py ]]; then
 fi
 shift
 
-"$root/deploy/setup.sh" "$benchmark/packages.txt"
-"$root/deploy/build.sh" release
+"$root/deploy/setup.sh" programs tests "$benchmark/packages.txt"
+"$root/deploy/build.sh" release -DCARILLON_TESTS=ON -DCARILLON_BENCHMARKS=ON
 exec /usr/bin/python3 "$benchmark/run.py" --build "$root/build/release" "$@"

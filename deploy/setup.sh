@@ -1,17 +1,22 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 #
-# deploy/setup.sh [LIST...]
+# deploy/setup.sh LIST...
 #
-# Installs what is missing of deploy/packages.txt, and of the further lists of packages given, from
-# Debian as this machine's apt is set up, and buf, from the npm registry. Calls neither when nothing is
-# missing.
+# Installs what is missing of the packages in the given lists, from Debian as this machine's apt is set up. A list is
+# one of deploy/packages/ (programs, tests, lint) or a file. With `lint` it also installs buf, from the npm registry.
+# Calls neither registry when nothing is missing.
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 # shellcheck source=deploy/environment.sh
 source "$root/deploy/environment.sh"
 
-lists=("$root/deploy/packages.txt" "$@")
+lists=()
+with_buf=
+for list in "$@"; do
+  if [[ $list == lint ]]; then with_buf=yes; fi
+  if [[ $list == */* ]]; then lists+=("$list"); else lists+=("$root/deploy/packages/$list.txt"); fi
+done
 
 missing_packages() {
   local -A installed=()
@@ -21,8 +26,6 @@ missing_packages() {
   while read -r name; do
     [[ -n ${installed[$name]:-} ]] || printf '%s\n' "$name"
   done < <(sed -e 's/#.*//' -e '/^ *$/d' "${lists[@]}")
-  # Any npm will do, and others than Debian's bring it inside their nodejs.
-  [[ -x $CARILLON_BUF ]] || command -v npm >/dev/null || printf 'npm\n'
 }
 
 as_root() {
@@ -49,8 +52,13 @@ install_buf() {
   local folder=${CARILLON_BUF%/node_modules/*}
   mkdir -p "$folder"
   cp "$root"/deploy/buf/package{,-lock}.json "$folder"
-  # npm ci checks the digests in the lock file.
-  (cd "$folder" && npm ci --ignore-scripts --no-audit --no-fund --loglevel=error </dev/null)
+  # npm knows how this machine reaches the registry. Debian's brings 339 packages, so where there is none, one archive
+  # is fetched without it. Both check the digests in the lock file.
+  if command -v npm >/dev/null; then
+    (cd "$folder" && npm ci --ignore-scripts --no-audit --no-fund --loglevel=error </dev/null)
+  else
+    /usr/bin/python3 "$root/deploy/buf/fetch.py" "$root/deploy/buf/package-lock.json" "$folder"
+  fi
   # Each platform's buf is optional to npm, so it does not mind when none could be had.
   [[ -x $CARILLON_BUF ]] || {
     printf 'setup: npm could not get buf; "npm ping" tells whether it reaches its registry\n' >&2
@@ -60,4 +68,4 @@ install_buf() {
 
 mapfile -t missing < <(missing_packages)
 if ((${#missing[@]})); then install_packages "${missing[@]}"; fi
-[[ -x $CARILLON_BUF ]] || install_buf
+if [[ -n $with_buf && ! -x $CARILLON_BUF ]]; then install_buf; fi

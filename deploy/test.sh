@@ -1,37 +1,51 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 #
-# deploy/test.sh [--preset release|dev|asan|tsan] [ARGUMENTS OF ctest...]
+# deploy/test.sh [--preset release|dev|asan|tsan] [ROOM...] [ARGUMENTS OF ctest...]
 #
 # Installs what is missing, builds, and runs the tests: all of them, lint too; under asan all but
 # lint, with more time; under tsan those of the audio path, without the sound server, which was compiled
-# without the sanitizer.
+# without the sanitizer. A ROOM is a folder of tests/ or one test in it, such as server/synthesis or
+# server/synthesis/mixer_test: only what its tests need is built, and only they run.
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 # shellcheck source=deploy/environment.sh
 source "$root/deploy/environment.sh"
 
 # The rooms whose threads meet the audio thread.
-audio_path='server_(base|excitation|synthesis|scene|audio_device)'
+audio_path=(server/{base,excitation,synthesis,scene,audio_device})
 
 preset=release
 case ${1:-} in
   --preset) preset=${2:?test.sh: --preset needs a name} && shift 2 ;;
   --preset=*) preset=${1#--preset=} && shift ;;
 esac
+rooms=()
+while [[ ${1:-} =~ ^[a-z] ]]; do rooms+=("${1%/}") && shift; done
 
-targets=()
-selection=()
+lists=(programs tests)
+excluded=
 case $preset in
-  asan) selection=(--label-exclude lint) ;;
+  asan) excluded=lint ;;
   tsan)
-    selection=(--label-exclude "lint|device" --tests-regex "^${audio_path//_/\/}/")
-    "$root/deploy/build.sh" "$preset" carillon_messages
-    mapfile -t targets < <(cmake --build --preset "$preset" --target help |
-      sed -nE "s/^(${audio_path}_[a-z0-9_]*): phony$/\1/p")
+    excluded="lint|device"
+    ((${#rooms[@]})) || rooms=("${audio_path[@]}")
     ;;
 esac
-"$root/deploy/build.sh" "$preset" "${targets[@]}"
+if [[ -z $excluded ]] && { ((${#rooms[@]} == 0)) || [[ " ${rooms[*]} " == *" deploy"* ]]; }; then lists+=(lint); fi
+
+# The targets tests_ROOM are made by carillon_needs in deploy/cmake/CarillonRoom.cmake.
+targets=()
+selection=()
+if [[ -n $excluded ]]; then selection+=(--label-exclude "$excluded"); fi
+if ((${#rooms[@]})); then
+  for room in "${rooms[@]}"; do
+    if [[ -d $root/tests/$room ]]; then targets+=("tests_${room//\//_}"); else targets+=("${room//\//_}"); fi
+  done
+  selection+=(--tests-regex "^($(IFS='|' && printf '%s' "${rooms[*]}"))([/.]|\$)")
+fi
+"$root/deploy/setup.sh" "${lists[@]}"
+"$root/deploy/build.sh" "$preset" -DCARILLON_TESTS=ON "${targets[@]}"
 
 suppressions=$root/deploy/sanitizers
 export ASAN_OPTIONS=${ASAN_OPTIONS-detect_stack_use_after_return=1}
@@ -47,4 +61,5 @@ if [[ $preset == ?san && $bits -gt 28 ]] && setarch --addr-no-randomize true 2>/
 fi
 
 cd "$root"
-exec "${launcher[@]}" ctest --preset "$preset" --parallel "$(nproc)" "${selection[@]}" "$@"
+exec "${launcher[@]}" /usr/bin/python3 -B deploy/run_tests.py "build/$preset" --preset "$preset" \
+  --parallel "$(nproc)" "${selection[@]}" "$@"

@@ -20,7 +20,25 @@ function(carillon_program name)
   target_link_libraries(${name} PRIVATE carillon_warnings ${ROOM_DEPENDS} ${ROOM_LIBRARIES})
 endfunction()
 
-# carillon_test(synthesis/mixer_test SOURCES mixer_test.cc [DEPENDS ...] [LIBRARIES ...] [LABELS ...])
+# carillon_needs(server/synthesis/mixer_test carillond ...)
+#
+# What the tests of a folder need: tests_server_synthesis and tests_server build the targets given. deploy/test.sh
+# FOLDER builds such a target.
+function(carillon_needs test)
+  cmake_path(GET test PARENT_PATH folder)
+  while(folder)
+    string(REPLACE "/" "_" target tests_${folder})
+    if(NOT TARGET ${target})
+      add_custom_target(${target})
+    endif()
+    if(ARGN)
+      add_dependencies(${target} ${ARGN})
+    endif()
+    cmake_path(GET folder PARENT_PATH folder)
+  endwhile()
+endfunction()
+
+# carillon_test(server/synthesis/mixer_test SOURCES mixer_test.cc [DEPENDS ...] [LIBRARIES ...] [LABELS ...])
 #
 # A GoogleTest program, one CTest test a TEST(); slow programs name TIMEOUT in seconds (default 120).
 function(carillon_test name)
@@ -32,6 +50,7 @@ function(carillon_test name)
   list(TRANSFORM ROOM_DEPENDS PREPEND carillon_)
   target_link_libraries(${target} PRIVATE carillon_warnings ${ROOM_DEPENDS} ${ROOM_LIBRARIES}
                         GTest::gmock_main)
+  carillon_needs(${name} ${target})
   if(NOT ROOM_TIMEOUT)
     set(ROOM_TIMEOUT 120)
   endif()

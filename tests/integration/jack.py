@@ -26,7 +26,7 @@ class Jack:
 
     def __init__(self, period_frames=PERIOD_FRAMES, log=os.devnull):
         if shutil.which("jackd") is None:
-            raise unittest.SkipTest("jackd is not installed")
+            raise AssertionError("jackd is not installed: deploy/setup.sh tests")
         self.environment = dict(os.environ, JACK_DEFAULT_SERVER=f"carillon-test-{os.getpid()}",
                                 JACK_NO_AUDIO_RESERVATION="1", JACK_NO_START_SERVER="1")
         with open(log, "wb") as output:

@@ -2,12 +2,13 @@
 """Decompositions on a Slurm cluster of this machine, whose daemons are killed under them.
 
 CARILLON_SLURM_BODIES says how many bodies (40 is the whole campaign), CARILLON_SEED repeats one.
-Needs slurm-wlm and munge, and root; skipped where no cluster can be started.
+Needs slurm-wlm and munge, and root; skipped where no cluster can be started with them.
 """
 
 import os
 import pathlib
 import random
+import shutil
 import signal
 import socket
 import sqlite3
@@ -81,6 +82,9 @@ class Cluster:
 class SlurmTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
+        for program in ("slurmctld", "slurmd", "munged"):
+            if shutil.which(program, path="/usr/sbin:/usr/bin") is None:
+                raise AssertionError(f"{program} is not installed: deploy/setup.sh tests")
         scratch = tempfile.TemporaryDirectory(prefix="carillon-slurm-")
         cls.addClassCleanup(scratch.cleanup)
         cls.cluster = Cluster(pathlib.Path(scratch.name))

@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <filesystem>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -93,8 +94,14 @@ std::vector<float> ReadWav(const std::string& path) {
 }
 
 TEST(JackDevice, PlaysBitForBitWhatListenersHear) {
+  for (const char* program : {"/usr/bin/jackd", "/usr/bin/jack_capture"}) {
+    ASSERT_TRUE(std::filesystem::exists(program))
+        << program << " is not installed: deploy/setup.sh tests";
+  }
   const JackServer jack;
-  if (!jack.runs()) GTEST_SKIP() << "jackd cannot run here: not installed, or no shared memory";
+  if (!jack.runs()) {
+    GTEST_SKIP() << "jackd cannot run here: no shared memory, or no real-time priority";
+  }
   const TemporaryFolder folder;
   SystemClock clock;
   const auto output = LiveOutput::Start({.device = "portaudio:JACK Audio Connection Kit"}, clock,

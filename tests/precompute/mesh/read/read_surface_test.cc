@@ -219,7 +219,8 @@ TEST_F(ReadSurfaceTest, WordsInPlaceOfNumbersAreRefusedWithTheirLine) {
 
 TEST_F(ReadSurfaceTest, TheBunnyWhoseFilledHolesCrossItIsRefusedBeforeTheMesherCrashes) {
   const char* path = "/usr/share/glmark2/models/bunny.obj";
-  if (!std::filesystem::exists(path)) GTEST_SKIP() << "glmark2-data is not installed";
+  ASSERT_TRUE(std::filesystem::exists(path))
+      << "glmark2-data is not installed: deploy/setup.sh tests";
   const absl::StatusOr<NamedMesh> bunny = ReadMesh(path, "obj", 1);
   ASSERT_TRUE(bunny.ok()) << bunny.status();
   const auto& surface = std::get<SurfaceMesh>(bunny->mesh);
