@@ -4,7 +4,9 @@
 # third-party targets, which stay inside (PRIVATE). All includes start at the root of the project.
 function(carillon_room name)
   cmake_parse_arguments(ROOM "" "" "SOURCES;DEPENDS;LIBRARIES" ${ARGN})
-  add_library(carillon_${name} STATIC ${ROOM_SOURCES})
+  # The headers of the folder too, so that editors see them.
+  file(GLOB headers CONFIGURE_DEPENDS *.h)
+  add_library(carillon_${name} STATIC ${ROOM_SOURCES} ${headers})
   target_include_directories(carillon_${name} PUBLIC ${PROJECT_SOURCE_DIR})
   list(TRANSFORM ROOM_DEPENDS PREPEND carillon_)
   target_link_libraries(carillon_${name} PUBLIC ${ROOM_DEPENDS} absl::status absl::statusor
