@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "carillon/client.h"
 #include "client_sdk/cli/material_figures.h"
 #include "client_sdk/cli/quantity.h"
 #include "client_sdk/cli/stop_signal.h"
-#include "client_sdk/cpp/client.h"
 
 namespace carillon::cli {
 

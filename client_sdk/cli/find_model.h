@@ -4,7 +4,7 @@
 #include <string>
 
 #include "absl/status/statusor.h"
-#include "client_sdk/cpp/client.h"
+#include "carillon/client.h"
 
 namespace carillon::cli {
 

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "absl/status/status.h"
-#include "client_sdk/cpp/client.h"
+#include "carillon/client.h"
 #include "proto/cpp/server_address.h"
 
 namespace carillon::cli {

@@ -7,7 +7,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "client_sdk/cpp/audio.h"
+#include "carillon/audio.h"
 
 namespace carillon::cli {
 

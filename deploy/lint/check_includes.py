@@ -18,6 +18,12 @@ class Rules:
         self.libraries = table["libraries"]
         self.system_headers = set(table["system_headers"])
         self.targets = table["targets"]
+        self.include_roots = table["include_roots"]
+
+    def file_of(self, root, header):
+        """The path from `root` of an included file of the project; other headers as they are."""
+        inside = (f"{folder}/{header}" for folder in self.include_roots)
+        return next((path for path in inside if (root / path).is_file()), header)
 
     def room_of(self, name):
         """The room with the longest name that `name`, a path from the root, lies in."""
@@ -62,7 +68,7 @@ def check_sources(root, rules):
             continue
         for number, line in enumerate(path.read_text().splitlines(), start=1):
             if found := INCLUDE.match(line):
-                if problem := rules.problem(name, room, found[2]):
+                if problem := rules.problem(name, room, rules.file_of(root, found[2])):
                     yield f"{name}:{number}: {problem}"
 
 

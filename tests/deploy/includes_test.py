@@ -30,6 +30,19 @@ class Includes(TreeTest):
         self.assert_found(check_includes.check(self.root), "precompute/codec.cc:1",
                           "client_sdk/cpp/client.cc:1")
 
+    def test_a_header_of_an_include_root_belongs_to_the_room_that_holds_it(self):
+        self.write("client_sdk/cpp/include/carillon/client.h", '#include <grpcpp/channel.h>\n')
+        self.write("client_sdk/cli/main.cc", '#include "carillon/client.h"\n')
+        self.write("server/main.cc", '#include "carillon/client.h"\n')
+        self.assert_found(
+            check_includes.check(self.root), "server/main.cc:1: server may not include client_sdk/cpp/include/carillon/client.h",
+            "grpc (grpcpp/channel.h) may appear in")
+
+    def test_the_inside_of_the_sdk_is_refused_to_its_users(self):
+        self.assert_found(
+            self.check_file("client_sdk/cli/main.cc", '"client_sdk/cpp/internal/stubs.h"'),
+            "client_sdk/cli may not include client_sdk/cpp/internal/stubs.h")
+
     def test_grpc_in_precompute_is_refused_generated_or_not(self):
         self.assert_found(
             self.check_file("precompute/decompose.cc", "<grpcpp/grpcpp.h>",

@@ -20,7 +20,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "client_sdk/cpp/client.h"
+#include "carillon/client.h"
 #include "tests/integration/jack_capture.h"
 
 namespace carillon {

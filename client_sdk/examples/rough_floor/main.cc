@@ -7,7 +7,7 @@
 #include <string>
 
 #include "absl/strings/str_format.h"
-#include "client_sdk/cpp/contact_trace.h"
+#include "carillon/contact_trace.h"
 #include "client_sdk/examples/rough_floor/rough_floor.h"
 #include "proto/cpp/error_reason.h"
 

@@ -14,7 +14,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
-#include "client_sdk/cpp/client.h"
+#include "carillon/client.h"
 #include "client_sdk/examples/wind_chimes/tubes.h"
 #include "client_sdk/examples/wind_chimes/wind_chimes.h"
 #include "proto/cpp/error_reason.h"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // What a client does without a daemon; tests/integration has the rest, with one.
-#include "client_sdk/cpp/client.h"
+#include "carillon/client.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

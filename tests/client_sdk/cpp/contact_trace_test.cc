@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "client_sdk/cpp/contact_trace.h"
+#include "carillon/contact_trace.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "client_sdk/cpp/rpc_status.h"
+#include "client_sdk/cpp/internal/rpc_status.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

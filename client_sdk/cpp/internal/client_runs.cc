@@ -7,11 +7,11 @@
 #include <fstream>
 #include <utility>
 
-#include "client_sdk/cpp/authorize.h"
-#include "client_sdk/cpp/client.h"
-#include "client_sdk/cpp/model_file.h"
-#include "client_sdk/cpp/rpc_status.h"
-#include "client_sdk/cpp/stubs.h"
+#include "carillon/client.h"
+#include "client_sdk/cpp/internal/authorize.h"
+#include "client_sdk/cpp/internal/model_file.h"
+#include "client_sdk/cpp/internal/rpc_status.h"
+#include "client_sdk/cpp/internal/stubs.h"
 
 namespace carillon::client {
 namespace {

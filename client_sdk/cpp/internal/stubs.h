@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 
+#include "carillon/client.h"
 #include "carillon/v1/admin_service.grpc.pb.h"
 #include "carillon/v1/audio_service.grpc.pb.h"
 #include "carillon/v1/contact_service.grpc.pb.h"
@@ -13,7 +14,6 @@
 #include "carillon/v1/job_run_service.grpc.pb.h"
 #include "carillon/v1/modal_model_service.grpc.pb.h"
 #include "carillon/v1/scene_service.grpc.pb.h"
-#include "client_sdk/cpp/client.h"
 
 namespace carillon::client {
 

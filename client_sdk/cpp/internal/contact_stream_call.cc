@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "client_sdk/cpp/contact_stream_call.h"
+#include "client_sdk/cpp/internal/contact_stream_call.h"
 
 #include <grpcpp/client_context.h>
 #include <grpcpp/support/client_callback.h>
@@ -10,7 +10,7 @@
 
 #include "absl/base/thread_annotations.h"
 #include "absl/synchronization/mutex.h"
-#include "client_sdk/cpp/rpc_status.h"
+#include "client_sdk/cpp/internal/rpc_status.h"
 #include "proto/cpp/error_reason.h"
 
 namespace carillon::client {

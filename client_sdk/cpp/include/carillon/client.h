@@ -9,6 +9,9 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
+#include "carillon/audio.h"
+#include "carillon/contact_stream.h"
+#include "carillon/contact_trace.h"
 #include "carillon/v1/admin_service.pb.h"
 #include "carillon/v1/audio_service.pb.h"
 #include "carillon/v1/contact_service.pb.h"
@@ -16,9 +19,6 @@
 #include "carillon/v1/job_run_service.pb.h"
 #include "carillon/v1/modal_model_service.pb.h"
 #include "carillon/v1/scene_service.pb.h"
-#include "client_sdk/cpp/audio.h"
-#include "client_sdk/cpp/contact_stream.h"
-#include "client_sdk/cpp/contact_trace.h"
 
 namespace carillon::client {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "client_sdk/cpp/rpc_status.h"
+#include "client_sdk/cpp/internal/rpc_status.h"
 
 #include "absl/strings/str_cat.h"
 #include "carillon/v1/error.pb.h"

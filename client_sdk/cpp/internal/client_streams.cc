@@ -9,9 +9,9 @@
 #include <thread>
 #include <utility>
 
-#include "client_sdk/cpp/client.h"
-#include "client_sdk/cpp/rpc_status.h"
-#include "client_sdk/cpp/stubs.h"
+#include "carillon/client.h"
+#include "client_sdk/cpp/internal/rpc_status.h"
+#include "client_sdk/cpp/internal/stubs.h"
 #include "proto/cpp/error_reason.h"
 
 namespace carillon::client {

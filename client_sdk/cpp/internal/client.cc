@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "client_sdk/cpp/client.h"
+#include "carillon/client.h"
 
 #include <grpcpp/client_context.h>
 #include <grpcpp/create_channel.h>
@@ -9,9 +9,9 @@
 #include <memory>
 #include <utility>
 
-#include "client_sdk/cpp/contact_stream_call.h"
-#include "client_sdk/cpp/rpc_status.h"
-#include "client_sdk/cpp/stubs.h"
+#include "client_sdk/cpp/internal/contact_stream_call.h"
+#include "client_sdk/cpp/internal/rpc_status.h"
+#include "client_sdk/cpp/internal/stubs.h"
 
 namespace carillon::client {
 namespace {

@@ -5,8 +5,8 @@
 #include <string>
 
 #include "absl/status/statusor.h"
+#include "carillon/contact_stream.h"
 #include "carillon/v1/contact_service.grpc.pb.h"
-#include "client_sdk/cpp/contact_stream.h"
 
 namespace carillon::client {
 

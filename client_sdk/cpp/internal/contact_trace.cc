@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "client_sdk/cpp/contact_trace.h"
+#include "carillon/contact_trace.h"
 
 #include <google/protobuf/util/delimited_message_util.h>
 
