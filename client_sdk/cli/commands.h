@@ -14,7 +14,7 @@
 
 namespace carillon::cli {
 
-/// What `carillon model create` asks for.
+/// The options of `carillon model create`.
 struct CreateModelOptions {
   std::string file;
   std::string format;  ///< empty: the file name's suffix
@@ -41,32 +41,31 @@ struct CreateModelOptions {
   bool wait = false;
 };
 
-/// What `carillon model export` writes, and where to.
+/// The options of `carillon model export`.
 struct ExportOptions {
   std::string model;
-  std::string file;          ///< empty: the digest, with the format's suffix, here
+  std::string file;          ///< empty: the digest with the suffix of the format
   std::string format;        ///< empty: by the file's suffix
-  MaterialFigures material;  ///< for a glTF, which holds what a body of one material sounds like
+  MaterialFigures material;  ///< for a glTF, which describes a body of one material
 };
 
-/// What `carillon model import` reads.
+/// The options of `carillon model import`.
 struct ImportOptions {
   std::string file;
-  std::string format;  ///< empty: by the file's suffix
-  std::string label;   ///< empty: the name that a glTF gives, or none
-  std::string pick;    ///< of the models of a glTF: its name or number, or the name of a node
-  MaterialFigures
-      material;  ///< of which a glTF's model was computed, where it does not say so itself
+  std::string format;        ///< empty: by the file's suffix
+  std::string label;         ///< empty: the name that a glTF gives, or none
+  std::string pick;          ///< a model of a glTF: its name or number, or the name of a node
+  MaterialFigures material;  ///< overrides the material that a glTF states
 };
 
-/// What `carillon job run` runs.
+/// The options of `carillon job run`.
 struct RunJobOptions {
   std::string digest;
   std::string token;
   std::vector<std::string> command;
 };
 
-/// What `carillon strike` strikes, and how.
+/// The options of `carillon strike`.
 struct StrikeOptions {
   std::string model;
   MaterialFigures material;
@@ -78,13 +77,13 @@ struct StrikeOptions {
   std::optional<double> seconds;  ///< absent: until the longest mode is 60 dB down, 30 s at most
 };
 
-/// Where `carillon listen` puts what it hears.
+/// The options of `carillon listen`.
 struct ListenOptions {
   std::string out;                ///< empty: raw samples to stdout
   std::optional<double> seconds;  ///< absent: until the program is stopped
 };
 
-/// What `carillon render` renders.
+/// The options of `carillon render`.
 struct RenderOptions {
   std::string trace;
   std::string out;
@@ -93,11 +92,13 @@ struct RenderOptions {
   double tail_s = 0;
 };
 
-/// The commands. Each prints its result to stdout (as JSON where `json`) and returns its error.
+/// The commands. Each prints its result to stdout, as JSON if `json` is true, and returns its
+/// error.
 absl::Status ShowStatus(const client::Client& daemon, const std::string& server, bool json);
 absl::Status CreateModel(const client::Client& daemon, const CreateModelOptions& options,
                          bool json);
-/// All that match `filter`, or, where it has a page size, that page and where to go on.
+/// Lists all models that match `filter`. If `filter` has a page size, lists that page only and
+/// prints the token of the next one.
 absl::Status ListModels(const client::Client& daemon, const v1::ListModalModelsRequest& filter,
                         bool json);
 absl::Status UpdateModel(const client::Client& daemon, const std::string& text,
@@ -106,16 +107,17 @@ absl::Status ExportModel(const client::Client& daemon, const ExportOptions& opti
 absl::Status ImportModel(const client::Client& daemon, const ImportOptions& options, bool json);
 absl::Status ShowDatabaseStats(const client::Client& daemon, bool json);
 absl::Status CollectGarbage(const client::Client& daemon, uint64_t budget_mib, bool json);
-/// `text` is a name, a label or the first digits of a digest. With the frequencies that `figures`
-/// give, where there are any.
+/// Shows the model that `text` means: a name, a label or the first digits of a digest. If `figures`
+/// name a material, shows the frequencies and decay rates of the modes too.
 absl::Status ShowModel(const client::Client& daemon, const std::string& text,
                        const MaterialFigures& figures, bool json);
 absl::Status DeleteModel(const client::Client& daemon, const std::string& text);
 absl::Status WatchJob(const client::Client& daemon, const std::string& text, bool json);
-/// Fetches the mesh of a job as the file "mesh" in a folder of its own, runs the command there,
-/// tells its progress (WorkerEvent on descriptor 3), and brings the file "model" or the error. A
-/// daemon that does not answer is asked again for ten minutes. Errors: those of JobRunService,
-/// Internal (OUTPUT_NOT_WRITABLE: no folder), Cancelled (RUN_STOPPED).
+/// Runs a decomposition for the daemon on this machine. Fetches the mesh of the job as the file
+/// "mesh" into a new folder, runs the command there, reports its progress (WorkerEvent on
+/// descriptor 3), and uploads the file "model" or the error. Calls that find no daemon are repeated
+/// for ten minutes. Errors: those of JobRunService, Internal (OUTPUT_NOT_WRITABLE: the folder
+/// cannot be made), Cancelled (RUN_STOPPED).
 absl::Status RunJob(const client::Client& daemon, const RunJobOptions& options,
                     const StopSignal& stop);
 absl::Status Strike(const client::Client& daemon, const StrikeOptions& options,

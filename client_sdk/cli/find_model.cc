@@ -14,12 +14,12 @@ namespace {
 constexpr absl::string_view kModels = "modalModels/";
 constexpr absl::string_view kJobs = "jobs/";
 
-/// What people call the things searched for, and where they are listed.
+/// The words for the kind of thing that is searched for.
 struct Wording {
   absl::string_view prefix, not_found, ambiguous, noun;
 };
 
-/// The one of `items` (each with name and label) that `text` means.
+/// Returns the name of the one of `items` that `text` means.
 template <class Item>
 absl::StatusOr<std::string> Choose(const std::vector<Item>& items, const std::string& text,
                                    const Wording& wording) {

@@ -62,7 +62,7 @@ std::string RoughTime(double seconds) {
                         : absl::StrFormat("%.1f h", seconds / 3600);
 }
 
-/// The bar, redrawn in place; the job's label before it.
+/// Redraws the line of the bar, which begins with the label of the job.
 void DrawBar(const v1::Job& job) {
   const int filled = static_cast<int>(std::lround(Fraction(job) * kBarWidth));
   absl::FPrintF(stderr, "\r\033[K%s  [%s%s]  %s", job.label(), std::string(filled, '#'),

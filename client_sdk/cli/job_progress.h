@@ -8,11 +8,11 @@
 
 namespace carillon::cli {
 
-/// "52 %  solving, 38120 nodes, 12 modes": how far a job is, in words.
+/// Returns the progress of a job as text, such as "52 %  solving, 38120 nodes, 12 modes".
 std::string ProgressText(const v1::Job& job);
 
-/// Follows a job to its end (Client::WatchJob) and shows its progress on stderr: a bar on a
-/// terminal, elsewhere a line for each phase.
+/// Waits until a job ends (Client::WatchJob), and shows its progress on stderr: as a bar on a
+/// terminal, otherwise as a line for each phase.
 absl::StatusOr<v1::Job> WatchWithProgress(const client::Client& daemon, const std::string& name);
 
 }  // namespace carillon::cli

@@ -11,7 +11,7 @@
 namespace carillon::cli {
 namespace {
 
-/// Takes blocks until so many seconds are heard, somebody stops it, or nobody takes them.
+/// Writes blocks until the time is over, a signal arrives, or the reader of stdout has gone.
 class Recorder {
  public:
   Recorder(const ListenOptions& options, const StopSignal& stop) : options_(options), stop_(stop) {}
@@ -70,7 +70,7 @@ class Recorder {
 
 absl::Status Listen(const client::Client& daemon, const ListenOptions& options,
                     const StopSignal& stop) {
-  // A pipe whose reader has gone is an ordinary end.
+  // A reader of stdout that closes its pipe ends the recording without an error.
   std::signal(SIGPIPE, SIG_IGN);
   Recorder recorder(options, stop);
   const absl::Status heard =

@@ -9,7 +9,8 @@
 
 namespace carillon::cli {
 
-/// A material as the command line gives it: a name, figures over it, or figures alone.
+/// A material as the command line gives it: a named material, figures that override those of the
+/// named material, or figures alone.
 struct MaterialFigures {
   std::string preset;
   std::optional<double> young_pa;
@@ -19,12 +20,13 @@ struct MaterialFigures {
   std::optional<double> density_kg_per_m3;
   std::optional<double> alpha1_s;
   std::optional<double> alpha2_per_s;
-  std::string loss_factor;  ///< as ReadLossFactor takes it; empty: none
+  std::string loss_factor;  ///< text for ReadLossFactor; empty: none
 };
 
-/// The contract's form. Lamé's constants become E = mu (3 lambda + 2 mu)/(lambda + mu) and
-/// nu = lambda/(2 (lambda + mu)). Errors: InvalidArgument (INVALID_MATERIAL): one Lamé constant
-/// alone, or beside Young's modulus or Poisson's ratio.
+/// Converts the figures to the message of the contract. Lamé's constants become
+/// E = mu (3 lambda + 2 mu)/(lambda + mu) and nu = lambda/(2 (lambda + mu)). Errors:
+/// InvalidArgument (INVALID_MATERIAL) if only one of Lamé's constants is given, or if they are
+/// given together with Young's modulus or Poisson's ratio.
 absl::StatusOr<v1::Material> ToMaterial(const MaterialFigures& figures);
 
 }  // namespace carillon::cli

@@ -9,7 +9,8 @@ class App;
 
 namespace carillon::cli {
 
-/// The options of a command that name a material. Both must outlive the parsing.
+/// Adds the options that describe a material to a command. `app` and `material` must outlive the
+/// parsing.
 void AddMaterial(CLI::App& app, MaterialFigures& material);
 
 }  // namespace carillon::cli

@@ -53,7 +53,7 @@ std::string Format(const CreateModelOptions& options) {
   return format == "ele" ? "node" : format;
 }
 
-/// What TetGen writes into two files goes to the daemon as one.
+/// Reads a mesh file. The two files that TetGen writes go to the daemon as one.
 absl::StatusOr<std::string> ReadAllOfMesh(const CreateModelOptions& options) {
   const std::filesystem::path path(options.file);
   const auto elements = std::filesystem::path(path).replace_extension(".ele");
@@ -149,7 +149,8 @@ void PrintRow(const v1::ModalModelSummary& model) {
                model.label());
 }
 
-/// The modes as `material` makes them: Lambda = eigenvalue E/rho.
+/// Prints the frequencies and decay rates of the modes for `material`, with Lambda = eigenvalue
+/// E/rho.
 void PrintModes(const v1::ModalModelSummary& model, const v1::Material& material) {
   absl::PrintF("\n%5s %14s %14s %12s %9s\n", "mode", "natural Hz", "damped Hz", "decay 1/s",
                "T60 s");

@@ -47,7 +47,7 @@ bool IsGiven(const v1::Material& material) {
          material.has_alpha2_per_s() || material.loss_factor_size() > 0;
 }
 
-/// The material of the command line, which only a glTF has a use for.
+/// Returns the material of the command line, which only a glTF needs.
 absl::StatusOr<v1::Material> MaterialFor(const std::string& format,
                                          const MaterialFigures& figures) {
   absl::StatusOr<v1::Material> material = ToMaterial(figures);
@@ -99,13 +99,13 @@ absl::StatusOr<v1::ModalModelSummary> Store(const client::Client& daemon, const 
   return daemon.ImportModalModel(send, "", label);
 }
 
-/// What an import has made.
+/// The result of an import.
 struct Imported {
   v1::ModalModelSummary summary;
-  std::string sounds_with;  ///< the options of a material, where the file says one
+  std::string sounds_with;  ///< the options of a material, if the file states one
 };
 
-/// The options that make a material.
+/// Returns the command-line options of a material.
 std::string OptionsOf(const v1::Material& material) {
   std::string options =
       absl::StrFormat("--young %.9g --poisson %.9g --density %.9g --alpha1 %.9g --alpha2 %.9g",
@@ -142,11 +142,12 @@ absl::StatusOr<Imported> ImportNpz(const client::Client& daemon, const ImportOpt
   return Imported{.summary = *std::move(summary), .sounds_with = ""};
 }
 
-/// A file whose name is a digest keeps that name: nothing in it has been rounded.
+/// Imports a file in the stored form. If its name is a digest, the model gets that name, because
+/// the stored form rounds nothing.
 absl::StatusOr<Imported> ImportStored(const client::Client& daemon, const ImportOptions& options) {
   const std::string stem = std::filesystem::path(options.file).stem();
   const std::string name = IsDigest(stem) ? absl::StrCat("modalModels/", stem) : "";
-  auto summary = daemon.ImportModalModel(options.file, name, options.label);
+  auto summary = daemon.ImportModalModelFile(options.file, name, options.label);
   if (!summary.ok()) return summary.status();
   return Imported{.summary = *std::move(summary), .sounds_with = ""};
 }
@@ -164,7 +165,7 @@ absl::Status ExportModel(const client::Client& daemon, const ExportOptions& opti
                                : options.file;
   absl::Status status = IsGltf(format) ? WriteGltf(daemon, *name, file, *material, format == "glb")
                         : format == "npz" ? WriteNpz(daemon, *name, file)
-                                          : daemon.ExportModalModel(*name, file);
+                                          : daemon.ExportModalModelFile(*name, file);
   if (status.ok()) absl::PrintF("%s\n", file);
   return status;
 }
@@ -182,7 +183,8 @@ absl::Status ImportModel(const client::Client& daemon, const ImportOptions& opti
     absl::FPrintF(stderr, "carillon: %s\n", warning);
   }
   if (!imported->sounds_with.empty()) {
-    absl::FPrintF(stderr, "carillon: sounds as the file says with %s\n", imported->sounds_with);
+    absl::FPrintF(stderr, "carillon: the model sounds as the file says with %s\n",
+                  imported->sounds_with);
   }
   if (json) {
     PrintJson(imported->summary);

@@ -18,7 +18,8 @@
 namespace carillon::cli {
 namespace {
 
-/// An option whose text `parse` takes apart, for `take`; `form` says what the text must be.
+/// Adds an option whose text `parse` converts to the value that `take` gets. `form` describes the
+/// text in the message about a wrong one.
 template <class T, class Take>
 void AddParsed(CLI::App& app, const std::string& name,
                std::optional<T> (*parse)(const std::string&), const std::string& form,
@@ -33,7 +34,7 @@ void AddParsed(CLI::App& app, const std::string& name,
       description);
 }
 
-/// "LO:HI" into two frequencies.
+/// Parses "LO:HI" as two frequencies.
 CLI::Validator Band(CreateModelOptions& options) {
   return CLI::Validator(
       [&options](std::string& text) -> std::string {
@@ -50,7 +51,7 @@ CLI::Validator Band(CreateModelOptions& options) {
 void AddModelCreate(CLI::App& app, Program& program) {
   auto options = std::make_shared<CreateModelOptions>();
   auto band = std::make_shared<std::string>("20:20000");
-  CLI::App& create = *app.add_subcommand("create", "compute the modal model of a mesh file");
+  CLI::App& create = *app.add_subcommand("create", "Compute the modal model of a mesh file");
   create
       .add_option("file", options->file,
                   "surface (OBJ, PLY, STL, OFF) or tetrahedra (Gmsh MSH, Medit, TetGen)")
@@ -103,7 +104,7 @@ void AddModelCreate(CLI::App& app, Program& program) {
   AddMaterial(create, options->material);
   create.callback([&program, options, band] {
     program.command = [&program, options] {
-      return CreateModel(program.Daemon(), *options, program.json);
+      return CreateModel(*program.Daemon(), *options, program.json);
     };
   });
 }
@@ -111,22 +112,28 @@ void AddModelCreate(CLI::App& app, Program& program) {
 void AddModelShow(CLI::App& app, Program& program) {
   auto model = std::make_shared<std::string>();
   auto material = std::make_shared<MaterialFigures>();
-  CLI::App& show = *app.add_subcommand("show", "show a model; with a material, its frequencies");
-  show.add_option("model", *model, "name, label, or first digits of the digest")->required();
+  CLI::App& show = *app.add_subcommand(
+      "show", "Show a model and, with a material, its frequencies and decay rates");
+  show.add_option("model", *model,
+                  "The name, the label, or the first digits of the digest of a model")
+      ->required();
   AddMaterial(show, *material);
   show.callback([&program, model, material] {
     program.command = [&program, model, material] {
-      return ShowModel(program.Daemon(), *model, *material, program.json);
+      return ShowModel(*program.Daemon(), *model, *material, program.json);
     };
   });
 }
 
 void AddModelDelete(CLI::App& app, Program& program) {
   auto model = std::make_shared<std::string>();
-  CLI::App& command = *app.add_subcommand("delete", "delete a model");
-  command.add_option("model", *model, "name, label, or first digits of the digest")->required();
+  CLI::App& command = *app.add_subcommand("delete", "Delete a model");
+  command
+      .add_option("model", *model,
+                  "The name, the label, or the first digits of the digest of a model")
+      ->required();
   command.callback([&program, model] {
-    program.command = [&program, model] { return DeleteModel(program.Daemon(), *model); };
+    program.command = [&program, model] { return DeleteModel(*program.Daemon(), *model); };
   });
 }
 
@@ -137,46 +144,46 @@ void AddSizes(CLI::App& list, const std::shared_ptr<v1::ListModalModelsRequest>&
   constexpr double kMostMib = 1 << 30;
   list.add_option_function<double>(
           "--min-mib", [filter](double mib) { filter->set_min_stored_bytes(Bytes(mib)); },
-          "only those of at least so many MiB")
+          "List only models of at least this size, MiB")
       ->check(CLI::Range(0.0, kMostMib));
   list.add_option_function<double>(
           "--max-mib",
           // Zero would be no limit.
           [filter](double mib) { filter->set_max_stored_bytes(std::max<uint64_t>(1, Bytes(mib))); },
-          "only those of at most so many MiB")
+          "List only models of at most this size, MiB")
       ->check(CLI::Range(0.0, kMostMib));
 }
 
 void AddTimes(CLI::App& list, const std::shared_ptr<v1::ListModalModelsRequest>& filter) {
   const std::string form = "a date, or a date and a time, such as 2026-11-21 or 2026-11-21T14:30";
-  AddParsed(list, "--since", ParseTimeUnixMs, form, "only those stored at or after this time",
+  AddParsed(list, "--since", ParseTimeUnixMs, form, "List only models stored at or after this time",
             [filter](int64_t ms) { filter->set_created_since_unix_ms(ms); });
-  AddParsed(list, "--before", ParseTimeUnixMs, form, "only those stored before this time",
+  AddParsed(list, "--before", ParseTimeUnixMs, form, "List only models stored before this time",
             [filter](int64_t ms) { filter->set_created_before_unix_ms(ms); });
 }
 
 void AddModelList(CLI::App& app, Program& program) {
   auto filter = std::make_shared<v1::ListModalModelsRequest>();
-  CLI::App& list = *app.add_subcommand("list", "list the models, newest first");
+  CLI::App& list = *app.add_subcommand("list", "List the models, newest first");
   list.add_option_function<std::string>(
       "--label", [filter](const std::string& text) { filter->set_label_contains(text); },
-      "only those whose label contains this, in any case");
+      "List only models whose label contains this text, in upper or lower case");
   list.add_option_function<std::string>(
       "--tag", [filter](const std::string& text) { filter->set_tag(text); },
-      "only those with this tag");
+      "List only models with this tag");
   AddSizes(list, filter);
   AddTimes(list, filter);
   list.add_option_function<int>(
           "--page-size", [filter](int count) { filter->set_page_size(count); },
-          "at most so many, and where to go on [all]")
+          "List at most this many models, and print the token of the next page [all]")
       ->check(CLI::Range(1, 1000));
   list.add_option_function<std::string>(
           "--page-token", [filter](const std::string& token) { filter->set_page_token(token); },
-          "go on there")
+          "List the page with this token")
       ->needs("--page-size");
   list.callback([&program, filter] {
     program.command = [&program, filter] {
-      return ListModels(program.Daemon(), *filter, program.json);
+      return ListModels(*program.Daemon(), *filter, program.json);
     };
   });
 }
@@ -184,69 +191,73 @@ void AddModelList(CLI::App& app, Program& program) {
 void AddModelTag(CLI::App& app, Program& program) {
   auto model = std::make_shared<std::string>();
   auto change = std::make_shared<v1::UpdateModalModelRequest>();
-  CLI::App& tag = *app.add_subcommand("tag", "label, tag or pin a model");
-  tag.add_option("model", *model, "name, label, or first digits of the digest")->required();
+  CLI::App& tag = *app.add_subcommand("tag", "Label, tag or pin a model");
+  tag.add_option("model", *model,
+                 "The name, the label, or the first digits of the digest of a model")
+      ->required();
   tag.add_option_function<std::string>(
-      "--label", [change](const std::string& text) { change->set_label(text); }, "its new label");
+      "--label", [change](const std::string& text) { change->set_label(text); }, "The new label");
   tag.add_option_function<std::vector<std::string>>(
       "--add",
       [change](const std::vector<std::string>& tags) {
         change->mutable_add_tags()->Assign(tags.begin(), tags.end());
       },
-      "tags to add");
+      "The tags to add");
   tag.add_option_function<std::vector<std::string>>(
       "--remove",
       [change](const std::vector<std::string>& tags) {
         change->mutable_remove_tags()->Assign(tags.begin(), tags.end());
       },
-      "tags to take away");
+      "The tags to remove");
   tag.add_flag_function(
       "--pin,!--unpin", [change](int64_t count) { change->set_pinned(count > 0); },
-      "garbage collection leaves it alone, or does not");
+      "Keep the model from garbage collection, or no longer");
   tag.callback([&program, model, change] {
     program.command = [&program, model, change] {
-      return UpdateModel(program.Daemon(), *model, *change, program.json);
+      return UpdateModel(*program.Daemon(), *model, *change, program.json);
     };
   });
 }
 
-/// How a model lies in a file.
+/// Adds the option for the format of a model file.
 void AddFileFormat(CLI::App& app, std::string& format) {
-  app.add_option("--format", format, "how it lies in the file [the file's suffix, else model]")
+  app.add_option("--format", format, "The format of the file [by its suffix, otherwise model]")
       ->check(CLI::IsMember({"model", "glb", "gltf", "npz"}));
 }
 
 void AddModelExport(CLI::App& app, Program& program) {
   auto options = std::make_shared<ExportOptions>();
   CLI::App& command = *app.add_subcommand(
-      "export", "write a model to a file: as it is stored, as glTF, or for NumPy");
-  command.add_option("model", options->model, "name, label, or first digits of the digest")
+      "export", "Write a model to a file in its stored form, as glTF, or for NumPy");
+  command
+      .add_option("model", options->model,
+                  "The name, the label, or the first digits of the digest of a model")
       ->required();
   command.add_option("--out", options->file,
-                     "where to: FILE.model, .glb, .gltf or .npz [its digest, with .model]");
+                     "The file to write: .model, .glb, .gltf or .npz [the digest with .model]");
   AddFileFormat(command, options->format);
   AddMaterial(command, options->material);
   command.callback([&program, options] {
-    program.command = [&program, options] { return ExportModel(program.Daemon(), *options); };
+    program.command = [&program, options] { return ExportModel(*program.Daemon(), *options); };
   });
 }
 
 void AddModelImport(CLI::App& app, Program& program) {
   auto options = std::make_shared<ImportOptions>();
-  CLI::App& command = *app.add_subcommand("import", "store the model of a file");
+  CLI::App& command = *app.add_subcommand("import", "Store the model of a file");
   command
-      .add_option(
-          "file", options->file,
-          "written by export or by carillon-precompute, a glTF with modal models, or a .npz")
+      .add_option("file", options->file,
+                  "A file of export or carillon-precompute, a glTF with modal models, or a .npz")
       ->required();
   AddFileFormat(command, options->format);
-  command.add_option("--label", options->label, "name for people [a glTF's own]");
-  command.add_option("--pick", options->pick,
-                     "of several models of a glTF: its name or number, or a node's name");
+  command.add_option("--label", options->label, "The label [the name in a glTF]");
+  command.add_option(
+      "--pick", options->pick,
+      "A model of a glTF that has several: its name or number, or the name of a node");
   AddMaterial(command, options->material);
   command.callback([&program, options] {
     program.command = [&program, options] {
-      return ImportModel(program.Daemon(), *options, program.json);
+      return ImportModel(*program.Daemon(), *options, program.json);
     };
   });
 }
@@ -254,7 +265,8 @@ void AddModelImport(CLI::App& app, Program& program) {
 }  // namespace
 
 void AddModel(CLI::App& app, Program& program) {
-  CLI::App& model = *app.add_subcommand("model", "modal models")->require_subcommand(1);
+  CLI::App& model =
+      *app.add_subcommand("model", "Create, list and move modal models")->require_subcommand(1);
   AddModelCreate(model, program);
   AddModelList(model, program);
   AddModelShow(model, program);

@@ -9,7 +9,8 @@ class App;
 
 namespace carillon::cli {
 
-/// `carillon model ...`: each of its commands sets `program.command`.
+/// Adds `carillon model` and its commands. The command that the user chooses sets
+/// `program.command`.
 void AddModel(CLI::App& app, Program& program);
 
 }  // namespace carillon::cli

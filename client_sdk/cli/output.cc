@@ -26,7 +26,7 @@ void PrintJson(const google::protobuf::Message& message) {
   options.preserve_proto_field_names = true;
   options.always_print_primitive_fields = true;
   std::string json;
-  // Our messages hold no Any and no timestamp, so nothing in them can fail to print.
+  // These messages have no Any and no timestamp, so the conversion cannot fail.
   (void)google::protobuf::util::MessageToJsonString(message, &json, options);
   absl::PrintF("%s\n", json);
 }

@@ -12,13 +12,13 @@ namespace carillon::cli {
 /// Exit codes of the program.
 enum ExitCode { kDone = 0, kRefused = 1, kUsage = 2, kNoServer = 3 };
 
-/// Prints "carillon: REASON: message" to stderr where `status` is an error; returns the exit code.
+/// Prints "carillon: REASON: message" to stderr if `status` is an error. Returns the exit code.
 int Report(const absl::Status& status);
 
-/// Prints `message` to stdout as one line of protobuf's JSON, with the names of the .proto.
+/// Prints `message` to stdout as one line of protobuf's JSON, with the field names of the .proto.
 void PrintJson(const google::protobuf::Message& message);
 
-/// Linear full-scale amplitude as text, "-6.0 dBFS" or "silence".
+/// Returns a linear amplitude (full scale is 1) as text, such as "-6.0 dBFS" or "silence".
 std::string Decibels(double amplitude);
 
 }  // namespace carillon::cli

@@ -4,6 +4,7 @@
 #include <fstream>
 #include <functional>
 #include <iterator>
+#include <memory>
 #include <string>
 
 #include "absl/status/status.h"
@@ -12,8 +13,8 @@
 
 namespace carillon::cli {
 
-/// What all commands share: where the daemon is, how to print, and the one command that the command
-/// line chose.
+/// The state that all commands share: the address of the daemon, the form of the output, and the
+/// command that the command line chose.
 struct Program {
   std::string server = DefaultServerAddress();
   std::string tls_roots_file;
@@ -21,14 +22,12 @@ struct Program {
   bool json = false;
   std::function<absl::Status()> command;
 
-  client::Client Daemon() const {
-    client::Client daemon(server, TlsRoots());
-    daemon.SetAdminToken(admin_token);
-    return daemon;
+  std::unique_ptr<client::Client> Daemon() const {
+    return client::Connect(server, {.tls_roots_pem = TlsRoots(), .admin_token = admin_token});
   }
 
  private:
-  /// A Unix socket has no TLS.
+  /// Returns the certificates of the file; none for a Unix socket, which has no TLS.
   std::string TlsRoots() const {
     if (server.rfind("unix:", 0) == 0) return "";
     std::ifstream file(tls_roots_file, std::ios::binary);

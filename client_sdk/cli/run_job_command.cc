@@ -34,11 +34,12 @@ constexpr double kFirstPause_s = 0.5;
 constexpr double kLongestPause_s = 10;
 
 absl::Status Stopped() {
-  return Refusal(absl::StatusCode::kCancelled, "RUN_STOPPED",
-                 "the run was told to stop and brings no result: none needed");
+  return Refusal(
+      absl::StatusCode::kCancelled, "RUN_STOPPED",
+      "a signal stopped the run, which uploads no result; start it again if the result is needed");
 }
 
-/// A folder of this run alone, gone with it.
+/// A temporary folder of this run; the destructor deletes it.
 class RunFolder {
  public:
   static absl::StatusOr<RunFolder> Make() {
@@ -47,7 +48,7 @@ class RunFolder {
         absl::StrCat(temporary == nullptr ? "/tmp" : temporary, "/carillon-run-XXXXXX");
     if (mkdtemp(path.data()) != nullptr) return RunFolder(path);
     return Refusal(absl::StatusCode::kInternal, "OUTPUT_NOT_WRITABLE",
-                   absl::StrCat(path, " cannot be made: name a folder with room in $TMPDIR"));
+                   absl::StrCat(path, " cannot be made; set $TMPDIR to a folder with free space"));
   }
   RunFolder(RunFolder&& other) noexcept { path_.swap(other.path_); }
   RunFolder& operator=(RunFolder&&) = delete;
@@ -64,7 +65,7 @@ class RunFolder {
   std::filesystem::path path_;
 };
 
-/// Calls again while no daemon answers: it may be starting anew.
+/// Repeats the call while no daemon answers, because the daemon may be restarting.
 absl::Status Patiently(const StopSignal& stop, const std::function<absl::Status()>& call) {
   const auto deadline = steady_clock::now() + kPatience;
   for (double pause_s = kFirstPause_s;; pause_s = std::min(2 * pause_s, kLongestPause_s)) {

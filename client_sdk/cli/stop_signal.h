@@ -6,7 +6,8 @@
 
 namespace carillon::cli {
 
-/// Holds back SIGINT and SIGTERM, so that a command can tidy up; make it before any thread starts.
+/// Blocks SIGINT and SIGTERM, so that a command can clean up before it ends. Construct it before
+/// any thread starts.
 class StopSignal {
  public:
   StopSignal() {
@@ -16,7 +17,7 @@ class StopSignal {
     pthread_sigmask(SIG_BLOCK, &signals_, nullptr);
   }
 
-  /// Waits so long; true as soon as somebody wants the program to stop.
+  /// Waits for one of the signals. Returns true as soon as it arrives, false after `seconds`.
   bool ArrivesWithin(double seconds) const {
     timespec timeout = {};
     timeout.tv_sec = static_cast<time_t>(seconds);

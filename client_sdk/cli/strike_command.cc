@@ -15,8 +15,9 @@ namespace {
 constexpr double kLongestSound = 30;  // seconds
 constexpr double kStep = 0.001;       // seconds; there is one step only
 
-/// Until the mode that decays slowest is 60 dB down, T60 = ln(1000)/sigma: the lowest, or, with a
-/// loss factor, one at a point of its table or the highest.
+/// Returns the time until the mode that decays slowest has decayed by 60 dB, T60 = ln(1000)/sigma.
+/// That mode is the lowest one or, with a loss factor, one near a point of its table or the
+/// highest.
 double SoundingSeconds(const v1::SoundingObject& object) {
   const v1::Material& material = object.material();
   double sigma = DecayRatePerS(material, object.lowest_frequency_hz());
@@ -50,7 +51,7 @@ absl::StatusOr<v1::SoundingObject> AddObject(const client::Client& daemon, const
   return daemon.AddObject(request);
 }
 
-/// The strike is sent with no delay: it sounds on arrival.
+/// Sends the strike with no scheduling delay, so that it sounds on arrival.
 absl::Status SendImpulse(const client::Client& daemon, const std::string& scene, uint32_t handle,
                          const StrikeOptions& options) {
   v1::ContactStreamStart start;
@@ -93,7 +94,7 @@ absl::Status StrikeIn(const client::Client& daemon, const std::string& scene,
 
 absl::Status Strike(const client::Client& daemon, const StrikeOptions& options,
                     const StopSignal& stop, bool json) {
-  const auto scene = daemon.CreateScene();
+  const auto scene = daemon.CreateScene({});
   if (!scene.ok()) return scene.status();
   const absl::Status struck = StrikeIn(daemon, *scene, options, stop, json);
   const absl::Status deleted = daemon.DeleteScene(*scene);

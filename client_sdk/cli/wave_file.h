@@ -11,7 +11,7 @@
 
 namespace carillon::cli {
 
-/// A WAV file of 24-bit samples that grows block by block.
+/// Writes a WAV file of 24-bit samples block by block.
 class WaveFile {
  public:
   /// Errors: Internal (OUTPUT_NOT_WRITABLE).

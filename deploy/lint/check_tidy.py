@@ -44,6 +44,8 @@ class Reader:
             one = queue.pop()
             if one.startswith("carillon/v1/"):
                 one = "proto/" + re.sub(r"(\.grpc)?\.pb\.h$", ".proto", one)
+            elif one.startswith("carillon/"):
+                one = "client_sdk/cpp/include/" + one
             if one not in seen and (text := self.text(one)) is not None:
                 seen.add(one)
                 queue += INCLUDE.findall(text)

@@ -245,8 +245,9 @@ void Print(const Arguments& arguments, const std::vector<Stream>& streams,
 }
 
 absl::Status Measure(const Arguments& arguments) {
-  const client::Client daemon(arguments.server);
-  const auto scene = daemon.CreateScene();
+  const std::unique_ptr<client::Client> connection = client::Connect(arguments.server);
+  const client::Client& daemon = *connection;
+  const auto scene = daemon.CreateScene({});
   if (!scene.ok()) return scene.status();
   const auto object = AddObject(daemon, *scene, arguments.model);
   if (!object.ok()) return object.status();

@@ -7,7 +7,7 @@
 
 namespace carillon::client {
 
-/// Shows the token, where there is one.
+/// Adds the token to the call unless it is empty.
 inline void Authorize(grpc::ClientContext& context, const std::string& token) {
   if (!token.empty()) context.AddMetadata("authorization", "Bearer " + token);
 }

@@ -1,83 +1,35 @@
 // SPDX-License-Identifier: Apache-2.0
+//
+// The base class of all clients: what a fake does not override, and the calls made of others.
 #include "carillon/client.h"
 
-#include <grpcpp/client_context.h>
-#include <grpcpp/create_channel.h>
-#include <grpcpp/security/credentials.h>
+#include <google/protobuf/util/delimited_message_util.h>
 
-#include <chrono>
-#include <memory>
+#include <fstream>
 #include <utility>
 
-#include "client_sdk/cpp/internal/contact_stream_call.h"
-#include "client_sdk/cpp/internal/rpc_status.h"
-#include "client_sdk/cpp/internal/stubs.h"
+#include "absl/strings/str_cat.h"
+#include "client_sdk/cpp/internal/grpc_client.h"
+#include "client_sdk/cpp/internal/model_file.h"
+#include "proto/cpp/error_reason.h"
+#include "proto/cpp/server_address.h"
 
 namespace carillon::client {
 namespace {
 
-/// No call that answers once needs so long; reading a large model from the disk comes nearest.
-constexpr auto kCallTimeout = std::chrono::seconds(60);
 constexpr int kPageSize = 1000;
 
-/// Calls `stub.*method` and returns its response.
-template <class Stub, class Request, class Response>
-absl::StatusOr<Response> Call(Stub& stub, const std::string& server,
-                              grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&,
-                                                           Response*),
-                              const Request& request) {
-  grpc::ClientContext context;
-  context.set_deadline(std::chrono::system_clock::now() + kCallTimeout);
-  Response response;
-  const absl::Status status = FromRpc((stub.*method)(&context, request, &response), server);
-  if (!status.ok()) return status;
-  return response;
-}
-
-std::shared_ptr<grpc::ChannelCredentials> CredentialsFor(const std::string& tls_roots_pem) {
-  if (tls_roots_pem.empty()) return grpc::InsecureChannelCredentials();
-  grpc::SslCredentialsOptions options;
-  options.pem_root_certs = tls_roots_pem;
-  return grpc::SslCredentials(options);
-}
-
-template <class Request>
-Request Named(const std::string& name) {
-  Request request;
-  request.set_name(name);
-  return request;
+absl::Status NotOverridden(absl::string_view method) {
+  return absl::UnimplementedError(absl::StrCat("this client does not override Client::", method));
 }
 
 }  // namespace
 
-Client::Client(const std::string& server, const std::string& tls_roots_pem)
-    : stubs_(std::make_unique<Stubs>(server,
-                                     grpc::CreateChannel(server, CredentialsFor(tls_roots_pem)))) {}
-Client::Client(Client&&) noexcept = default;
-Client& Client::operator=(Client&&) noexcept = default;
-Client::~Client() = default;
-
-absl::StatusOr<v1::Job> Client::CreateModalModel(const v1::CreateModalModelRequest& request) const {
-  auto response =
-      Call(stubs_->models, stubs_->server, &v1::ModalModelService::Stub::CreateModalModel, request);
-  if (!response.ok()) return response.status();
-  return std::move(*response->mutable_job());
+std::unique_ptr<Client> Connect(const std::string& server, const ConnectOptions& options) {
+  return std::make_unique<GrpcClient>(server.empty() ? DefaultServerAddress() : server, options);
 }
 
-absl::StatusOr<v1::ModalModelSummary> Client::GetModalModel(const std::string& name) const {
-  auto response = Call(stubs_->models, stubs_->server, &v1::ModalModelService::Stub::GetModalModel,
-                       Named<v1::GetModalModelRequest>(name));
-  if (!response.ok()) return response.status();
-  return std::move(*response->mutable_modal_model());
-}
-
-absl::StatusOr<v1::ModalModelSummary> Client::UpdateModalModel(
-    const v1::UpdateModalModelRequest& request) const {
-  auto response =
-      Call(stubs_->models, stubs_->server, &v1::ModalModelService::Stub::UpdateModalModel, request);
-  if (!response.ok()) return response.status();
-  return std::move(*response->mutable_modal_model());
-}
+v1::ErrorInfo ToErrorInfo(const absl::Status& status) { return carillon::ToErrorInfo(status); }
 
 absl::StatusOr<std::vector<v1::ModalModelSummary>> Client::ListModalModels(
     const v1::ListModalModelsRequest& filter) const {
@@ -94,40 +46,12 @@ absl::StatusOr<std::vector<v1::ModalModelSummary>> Client::ListModalModels(
   return models;
 }
 
-absl::StatusOr<v1::ListModalModelsResponse> Client::ListModalModelsPage(
-    const v1::ListModalModelsRequest& request) const {
-  return Call(stubs_->models, stubs_->server, &v1::ModalModelService::Stub::ListModalModels,
-              request);
-}
-
-absl::Status Client::DeleteModalModel(const std::string& name) const {
-  return Call(stubs_->models, stubs_->server, &v1::ModalModelService::Stub::DeleteModalModel,
-              Named<v1::DeleteModalModelRequest>(name))
-      .status();
-}
-
-absl::StatusOr<std::vector<v1::CatalogueMaterial>> Client::ListMaterials() const {
-  auto response = Call(stubs_->models, stubs_->server, &v1::ModalModelService::Stub::ListMaterials,
-                       v1::ListMaterialsRequest());
-  if (!response.ok()) return response.status();
-  return std::vector<v1::CatalogueMaterial>(response->materials().begin(),
-                                            response->materials().end());
-}
-
-absl::StatusOr<v1::Job> Client::GetJob(const std::string& name) const {
-  auto response = Call(stubs_->decompositions, stubs_->server,
-                       &v1::DecompositionService::Stub::GetJob, Named<v1::GetJobRequest>(name));
-  if (!response.ok()) return response.status();
-  return std::move(*response->mutable_job());
-}
-
 absl::StatusOr<std::vector<v1::Job>> Client::ListJobs() const {
   std::vector<v1::Job> jobs;
   v1::ListJobsRequest request;
   request.set_page_size(kPageSize);
   do {
-    auto page = Call(stubs_->decompositions, stubs_->server,
-                     &v1::DecompositionService::Stub::ListJobs, request);
+    auto page = ListJobsPage(request);
     if (!page.ok()) return page.status();
     for (auto& job : *page->mutable_jobs()) jobs.push_back(std::move(job));
     request.set_page_token(page->next_page_token());
@@ -135,60 +59,138 @@ absl::StatusOr<std::vector<v1::Job>> Client::ListJobs() const {
   return jobs;
 }
 
-absl::StatusOr<v1::Job> Client::CancelJob(const std::string& name) const {
-  auto response =
-      Call(stubs_->decompositions, stubs_->server, &v1::DecompositionService::Stub::CancelJob,
-           Named<v1::CancelJobRequest>(name));
-  if (!response.ok()) return response.status();
-  return std::move(*response->mutable_job());
+absl::Status Client::ExportModalModelFile(const std::string& name, const std::string& file) const {
+  std::ofstream out(file, std::ios::binary);
+  if (!out) return NotWritable(file);
+  absl::Status status = ExportModalModel(name, [&](const v1::ModalModelRecord& record) {
+    google::protobuf::util::SerializeDelimitedToOstream(record, &out);
+    return out ? absl::OkStatus() : NotWritable(file);
+  });
+  out.close();
+  if (status.ok() && !out) status = NotWritable(file);
+  return status;
 }
 
-absl::StatusOr<std::string> Client::CreateScene(const v1::CreateSceneRequest& request) const {
-  auto response =
-      Call(stubs_->scenes, stubs_->server, &v1::SceneService::Stub::CreateScene, request);
-  if (!response.ok()) return response.status();
-  return response->name();
+absl::StatusOr<v1::ModalModelSummary> Client::ImportModalModelFile(const std::string& file,
+                                                                   const std::string& name,
+                                                                   const std::string& label) const {
+  return ImportModalModel([&](const RecordSink& sink) { return ReadRecords(file, sink); }, name,
+                          label);
 }
 
-absl::Status Client::DeleteScene(const std::string& name) const {
-  return Call(stubs_->scenes, stubs_->server, &v1::SceneService::Stub::DeleteScene,
-              Named<v1::DeleteSceneRequest>(name))
-      .status();
+absl::StatusOr<std::string> Client::UploadMesh(absl::string_view) const {
+  return NotOverridden("UploadMesh");
 }
 
-absl::StatusOr<v1::SoundingObject> Client::AddObject(const v1::AddObjectRequest& request) const {
-  auto response = Call(stubs_->scenes, stubs_->server, &v1::SceneService::Stub::AddObject, request);
-  if (!response.ok()) return response.status();
-  return std::move(*response->mutable_object());
+absl::StatusOr<v1::Job> Client::CreateModalModel(const v1::CreateModalModelRequest&) const {
+  return NotOverridden("CreateModalModel");
 }
 
-absl::StatusOr<v1::SoundingObject> Client::UpdateObject(
-    const v1::UpdateObjectRequest& request) const {
-  auto response =
-      Call(stubs_->scenes, stubs_->server, &v1::SceneService::Stub::UpdateObject, request);
-  if (!response.ok()) return response.status();
-  return std::move(*response->mutable_object());
+absl::StatusOr<v1::ModalModelSummary> Client::GetModalModel(const std::string&) const {
+  return NotOverridden("GetModalModel");
 }
 
-absl::Status Client::RemoveObject(const std::string& name) const {
-  return Call(stubs_->scenes, stubs_->server, &v1::SceneService::Stub::RemoveObject,
-              Named<v1::RemoveObjectRequest>(name))
-      .status();
+absl::StatusOr<v1::ListModalModelsResponse> Client::ListModalModelsPage(
+    const v1::ListModalModelsRequest&) const {
+  return NotOverridden("ListModalModelsPage");
 }
 
-absl::Status Client::UpdateListener(const v1::UpdateListenerRequest& request) const {
-  return Call(stubs_->scenes, stubs_->server, &v1::SceneService::Stub::UpdateListener, request)
-      .status();
+absl::StatusOr<v1::ModalModelSummary> Client::UpdateModalModel(
+    const v1::UpdateModalModelRequest&) const {
+  return NotOverridden("UpdateModalModel");
+}
+
+absl::Status Client::ExportModalModel(const std::string&, const RecordSink&) const {
+  return NotOverridden("ExportModalModel");
+}
+
+absl::StatusOr<v1::ModalModelSummary> Client::ImportModalModel(
+    const std::function<absl::Status(const RecordSink&)>&, const std::string&,
+    const std::string&) const {
+  return NotOverridden("ImportModalModel");
+}
+
+absl::Status Client::DeleteModalModel(const std::string&) const {
+  return NotOverridden("DeleteModalModel");
+}
+
+absl::StatusOr<std::vector<v1::CatalogueMaterial>> Client::ListMaterials() const {
+  return NotOverridden("ListMaterials");
+}
+
+absl::StatusOr<v1::Job> Client::GetJob(const std::string&) const { return NotOverridden("GetJob"); }
+
+absl::StatusOr<v1::ListJobsResponse> Client::ListJobsPage(const v1::ListJobsRequest&) const {
+  return NotOverridden("ListJobsPage");
+}
+
+absl::StatusOr<v1::Job> Client::CancelJob(const std::string&) const {
+  return NotOverridden("CancelJob");
+}
+
+absl::StatusOr<v1::Job> Client::WatchJob(const std::string&,
+                                         const std::function<void(const v1::Job&)>&) const {
+  return NotOverridden("WatchJob");
+}
+
+absl::StatusOr<std::string> Client::CreateScene(const v1::CreateSceneRequest&) const {
+  return NotOverridden("CreateScene");
+}
+
+absl::Status Client::DeleteScene(const std::string&) const { return NotOverridden("DeleteScene"); }
+
+absl::StatusOr<v1::SoundingObject> Client::AddObject(const v1::AddObjectRequest&) const {
+  return NotOverridden("AddObject");
+}
+
+absl::StatusOr<v1::SoundingObject> Client::UpdateObject(const v1::UpdateObjectRequest&) const {
+  return NotOverridden("UpdateObject");
+}
+
+absl::Status Client::RemoveObject(const std::string&) const {
+  return NotOverridden("RemoveObject");
+}
+
+absl::Status Client::UpdateListener(const v1::UpdateListenerRequest&) const {
+  return NotOverridden("UpdateListener");
 }
 
 absl::StatusOr<std::unique_ptr<ContactStream>> Client::StreamContacts(
-    const v1::ContactStreamStart& start) const {
-  return OpenContactStream(stubs_->contacts, stubs_->server, start);
+    const v1::ContactStreamStart&) const {
+  return NotOverridden("StreamContacts");
 }
 
-absl::StatusOr<v1::GetMixerResponse> Client::GetMixer() const {
-  return Call(stubs_->audio, stubs_->server, &v1::AudioService::Stub::GetMixer,
-              v1::GetMixerRequest());
+absl::Status Client::Listen(const AudioCallback&) const { return NotOverridden("Listen"); }
+
+absl::StatusOr<v1::RenderSummary> Client::Render(const v1::RenderSettings&, ContactTraceReader&,
+                                                 const AudioCallback&) const {
+  return NotOverridden("Render");
+}
+
+absl::StatusOr<v1::GetMixerResponse> Client::GetMixer() const { return NotOverridden("GetMixer"); }
+
+absl::Status Client::FetchMesh(const JobRun&, const std::string&) const {
+  return NotOverridden("FetchMesh");
+}
+
+absl::Status Client::ReportProgress(const JobRun&, const v1::Progress&) const {
+  return NotOverridden("ReportProgress");
+}
+
+absl::Status Client::UploadResult(const JobRun&, const v1::RunEnd&, const std::string&) const {
+  return NotOverridden("UploadResult");
+}
+
+absl::StatusOr<v1::GetDatabaseStatsResponse> Client::GetDatabaseStats() const {
+  return NotOverridden("GetDatabaseStats");
+}
+
+absl::Status Client::BackUpDatabase(const std::string&) const {
+  return NotOverridden("BackUpDatabase");
+}
+
+absl::StatusOr<v1::CollectGarbageResponse> Client::CollectGarbage(uint64_t) const {
+  return NotOverridden("CollectGarbage");
 }
 
 }  // namespace carillon::client

@@ -16,11 +16,12 @@
 namespace carillon::client {
 namespace {
 
-/// The call, driven by gRPC's reactions.
+/// A call of StreamContacts, driven by gRPC's reactor.
 ///
-/// At most one write is under way, the front of `queue_`; the next starts when it is done. A hold
-/// keeps gRPC from ending the call between writes that Send starts; it is given back once, when no
-/// further write may come. The answers' read is always under way until the daemon ends the stream.
+/// At most one write is in progress, that of the front of `queue_`; the next one starts when it is
+/// done. Because Send() starts writes from outside the reactor, a hold keeps gRPC from ending the
+/// call between two writes; the hold is released once, when no further write can start. A read of
+/// the next answer is always in progress until the daemon ends the stream.
 class ContactStreamCall final
     : public ContactStream,
       public grpc::ClientBidiReactor<v1::StreamContactsRequest, v1::StreamContactsResponse> {
@@ -57,8 +58,8 @@ class ContactStreamCall final
     }
     if (queue_.size() >= kMaxQueuedSteps) {
       return Refusal(absl::StatusCode::kResourceExhausted, "CONTACT_QUEUE_FULL",
-                     "the network takes fewer steps than the simulation sends; this step is lost: "
-                     "send fewer, or nearer to the daemon");
+                     "the step was dropped, because the network is slower than the simulation; "
+                     "send fewer steps, or run nearer to the daemon");
     }
     *queue_.emplace_back().mutable_step() = std::move(step);
     if (queue_.size() == 1) StartWrite(&queue_.front());
@@ -122,7 +123,7 @@ class ContactStreamCall final
   absl::Status EndedLocked() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
     if (!status_->ok()) return *status_;
     return Refusal(absl::StatusCode::kFailedPrecondition, "CONTACT_STREAM_ENDED",
-                   "the stream has been finished; open another");
+                   "the stream has ended; open another one");
   }
 
   bool Done() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) { return status_.has_value(); }
@@ -130,7 +131,7 @@ class ContactStreamCall final
 
   const std::string server_;
   grpc::ClientContext context_;
-  v1::StreamContactsResponse answer_;  ///< belongs to the read under way
+  v1::StreamContactsResponse answer_;  ///< belongs to the read in progress
   mutable absl::Mutex mutex_;
   std::deque<v1::StreamContactsRequest> queue_ ABSL_GUARDED_BY(mutex_);
   v1::StreamContactsResponse report_ ABSL_GUARDED_BY(mutex_);

@@ -10,7 +10,7 @@
 
 namespace carillon::client {
 
-/// Opens StreamContacts on `stub` and waits for the first answer; `server` is for messages.
+/// Opens StreamContacts on `stub` and waits for the first answer. Error messages name `server`.
 absl::StatusOr<std::unique_ptr<ContactStream>> OpenContactStream(
     v1::ContactService::Stub& stub, const std::string& server, const v1::ContactStreamStart& start);
 

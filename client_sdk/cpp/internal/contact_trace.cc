@@ -14,7 +14,8 @@ namespace carillon::client {
 namespace {
 
 constexpr uint32_t kFormatVersion = 1;
-/// A step of a million impulses is below it; a foreign file's first bytes are mostly above.
+/// A step of a million impulses is shorter. The first bytes of a file of another format are mostly
+/// a greater length.
 constexpr uint64_t kMaxRecordBytes = 64 << 20;
 
 enum class Length { kRead, kEndOfFile, kCutOff, kTooLong };

@@ -16,8 +16,10 @@ constexpr int kMaxRecordBytes = 2 << 20;
 }  // namespace
 
 absl::Status NotWritable(const std::string& file) {
-  return Refusal(absl::StatusCode::kInternal, "OUTPUT_NOT_WRITABLE",
-                 absl::StrCat(file, " cannot be written: see its folder, its rights and the room"));
+  return Refusal(
+      absl::StatusCode::kInternal, "OUTPUT_NOT_WRITABLE",
+      absl::StrCat(file,
+                   " cannot be written; check its folder, its permissions and the free space"));
 }
 
 absl::Status ReadRecords(const std::string& file,
@@ -25,7 +27,7 @@ absl::Status ReadRecords(const std::string& file,
   const int descriptor = open(file.c_str(), O_RDONLY | O_CLOEXEC);
   if (descriptor < 0) {
     return Refusal(absl::StatusCode::kNotFound, "FILE_NOT_FOUND",
-                   absl::StrCat(file, " cannot be read: see its name and rights"));
+                   absl::StrCat(file, " cannot be read; check its name and its permissions"));
   }
   google::protobuf::io::FileInputStream in(descriptor, kMaxRecordBytes);
   in.SetCloseOnDelete(true);
@@ -34,8 +36,9 @@ absl::Status ReadRecords(const std::string& file,
     v1::ModalModelRecord record;
     if (!google::protobuf::util::ParseDelimitedFromZeroCopyStream(&record, &in, &at_end)) {
       if (at_end) return absl::OkStatus();
-      return Refusal(absl::StatusCode::kInvalidArgument, "MODAL_MODEL_MALFORMED",
-                     "the file is not a sequence of modal model records, or is cut short");
+      return Refusal(
+          absl::StatusCode::kInvalidArgument, "MODAL_MODEL_MALFORMED",
+          absl::StrCat(file, " is not a whole file of modal model records; export it again"));
     }
     if (absl::Status status = sink(record); !status.ok()) return status;
   }

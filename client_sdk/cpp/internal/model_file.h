@@ -9,11 +9,12 @@
 
 namespace carillon::client {
 
-/// Internal (OUTPUT_NOT_WRITABLE).
+/// Returns Internal (OUTPUT_NOT_WRITABLE) for a file that cannot be written.
 absl::Status NotWritable(const std::string& file);
 
-/// Hands the records of a file in the stored form to `sink`, whose error is returned. Errors also:
-/// NotFound (FILE_NOT_FOUND), InvalidArgument (MODAL_MODEL_MALFORMED).
+/// Passes the records of a file in the stored form to `sink`, and returns the error of `sink` if
+/// there is one. Further errors: NotFound (FILE_NOT_FOUND), InvalidArgument
+/// (MODAL_MODEL_MALFORMED).
 absl::Status ReadRecords(const std::string& file,
                          absl::FunctionRef<absl::Status(const v1::ModalModelRecord&)> sink);
 

@@ -9,8 +9,9 @@
 
 namespace carillon::client {
 
-/// The refusal that a call to `server` ended with: from the rich status in its trailing metadata
-/// (carillon.v1.StatusDetails), or, where none answered, SERVER_UNAVAILABLE or SERVER_TIMEOUT.
+/// Converts the status of a call to `server` into a refusal. The reason comes from the rich status
+/// in the trailing metadata (carillon.v1.StatusDetails); if no daemon answered, it is
+/// SERVER_UNAVAILABLE or SERVER_TIMEOUT.
 absl::Status FromRpc(const grpc::Status& status, const std::string& server);
 
 }  // namespace carillon::client

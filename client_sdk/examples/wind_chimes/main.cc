@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Wind chimes in a rigid-body simulation, heard through Carillon: what a simulator has to do.
+// Makes wind chimes in a rigid-body simulation audible, and shows what a simulator has to do.
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <memory>
 #include <optional>
 #include <string>
 #include <thread>
@@ -49,7 +50,7 @@ absl::Status WriteMeshes(const std::string& folder) {
   return absl::OkStatus();
 }
 
-/// The daemon's side of the simulation: a scene of six chimes that is gone when this is.
+/// The daemon's side of the simulation: a scene of six chimes, which the destructor deletes.
 class LiveScene {
  public:
   static absl::StatusOr<std::unique_ptr<LiveScene>> Open(const PlayOptions& options) {
@@ -61,17 +62,17 @@ class LiveScene {
 
   ~LiveScene() {
     stream_.reset();
-    if (!scene_.empty()) (void)client_.DeleteScene(scene_);
+    if (!scene_.empty()) (void)client_->DeleteScene(scene_);
   }
 
   absl::Status Send(const v1::ContactStep& step) { return stream_->Send(step); }
   absl::StatusOr<v1::StreamContactsResponse> Finish() { return stream_->Finish(); }
 
  private:
-  explicit LiveScene(const std::string& server) : client_(server) {}
+  explicit LiveScene(const std::string& server) : client_(client::Connect(server)) {}
 
   absl::Status Fill(const PlayOptions& options) {
-    auto scene = client_.CreateScene();
+    auto scene = client_->CreateScene({});
     if (!scene.ok()) return scene.status();
     scene_ = *scene;
     for (size_t i = 0; i < options.models.size(); ++i) {
@@ -81,18 +82,18 @@ class LiveScene {
       request.mutable_material()->set_preset(kMaterial);
       request.set_gain(options.gain);
       request.set_handle(static_cast<uint32_t>(i + 1));
-      if (const auto added = client_.AddObject(request); !added.ok()) return added.status();
+      if (const auto added = client_->AddObject(request); !added.ok()) return added.status();
     }
     v1::ContactStreamStart start;
     start.set_scene(scene_);
     start.set_step_s(WindChimes::kStep_s);
-    auto stream = client_.StreamContacts(start);
+    auto stream = client_->StreamContacts(start);
     if (!stream.ok()) return stream.status();
     stream_ = *std::move(stream);
     return absl::OkStatus();
   }
 
-  client::Client client_;
+  std::unique_ptr<client::Client> client_;
   std::string scene_;
   std::unique_ptr<client::ContactStream> stream_;
 };
@@ -140,19 +141,19 @@ absl::Status Play(const PlayOptions& options) {
   }
 
   WindChimes chimes(options.seed);
-  int strike_count = 0;
+  int contact_count = 0;
   const auto start = std::chrono::steady_clock::now();
   const int step_count = static_cast<int>(options.seconds / WindChimes::kStep_s);
   for (int i = 0; i < step_count; ++i) {
     const v1::ContactStep step = chimes.Step();
-    strike_count += step.impulses_size();
-    if (trace && step.impulses_size() > 0) trace->Write(step);
+    contact_count += step.contacts_size();
+    if (trace) trace->Write(step);
     if (!live) continue;
-    // The simulation is ahead of its own time by what this step took; real time is kept here.
+    // The simulation of a step takes less time than the step, so the loop waits for real time.
     std::this_thread::sleep_until(start + i * std::chrono::duration<double>(WindChimes::kStep_s));
     if (absl::Status sent = live->Send(step); !sent.ok()) return sent;
   }
-  absl::PrintF("%d strikes in %.1f s\n", strike_count, options.seconds);
+  absl::PrintF("%d contacts in %.1f s\n", contact_count, options.seconds);
 
   if (trace) {
     if (absl::Status closed = trace->Close(); !closed.ok()) return closed;
@@ -171,24 +172,30 @@ int Report(const absl::Status& status) {
 }
 
 int Main(int argc, char** argv) {
-  CLI::App app("Wind chimes in a rigid-body simulation, heard through Carillon.");
+  CLI::App app("Plays wind chimes in a rigid-body simulation through Carillon.");
   app.require_subcommand(1);
 
   std::string folder;
-  CLI::App& meshes = *app.add_subcommand("meshes", "write the six tubes as OBJ, named after notes");
-  meshes.add_option("folder", folder, "where to")->required()->check(CLI::ExistingDirectory);
+  CLI::App& meshes = *app.add_subcommand(
+      "meshes", "Write the meshes of the six tubes as OBJ files with the names of their notes");
+  meshes.add_option("folder", folder, "The folder to write to")
+      ->required()
+      ->check(CLI::ExistingDirectory);
 
   PlayOptions options;
-  CLI::App& play = *app.add_subcommand("play", "simulate, and send each contact as it happens");
-  play.add_option("models", options.models, "modal models of the tubes, longest first")
+  CLI::App& play =
+      *app.add_subcommand("play", "Simulate the chimes, and send each contact as it happens");
+  play.add_option("models", options.models, "The modal models of the tubes, longest first")
       ->required()
       ->expected(static_cast<int>(kTubes.size()));
-  play.add_option("--server", options.server, "unix:PATH or HOST:PORT")->capture_default_str();
-  play.add_option("--seconds", options.seconds, "how long")->capture_default_str();
-  play.add_option("--seed", options.seed, "of the wind")->capture_default_str();
-  play.add_option("--gain", options.gain, "linear gain of every chime")->capture_default_str();
-  play.add_option("--trace", options.trace, "record the contacts to this file");
-  play.add_flag("--offline", options.offline, "record only, as fast as possible, with no daemon");
+  play.add_option("--server", options.server, "The address of the daemon: unix:PATH or HOST:PORT")
+      ->capture_default_str();
+  play.add_option("--seconds", options.seconds, "The simulated time, s")->capture_default_str();
+  play.add_option("--seed", options.seed, "The seed of the wind")->capture_default_str();
+  play.add_option("--gain", options.gain, "The linear gain of every chime")->capture_default_str();
+  play.add_option("--trace", options.trace, "Record the contacts to this contact trace");
+  play.add_flag("--offline", options.offline,
+                "Only record, as fast as possible and without a daemon");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -13,16 +13,16 @@ using testing::HasSubstr;
 
 class ClientWithoutDaemon : public testing::Test {
  protected:
-  const Client client_{"unix:/proc/no/such/socket"};
+  const std::unique_ptr<Client> client_ = Connect("unix:/proc/no/such/socket");
 };
 
 TEST_F(ClientWithoutDaemon, IsToldSoByEveryKindOfCall) {
   const auto unavailable = HasSubstr("SERVER_UNAVAILABLE: ");
-  EXPECT_THAT(client_.GetMixer().status().ToString(), unavailable);
-  EXPECT_THAT(client_.UploadMesh("v 0 0 0").status().ToString(), unavailable);
-  EXPECT_THAT(client_.WatchJob("jobs/a", nullptr).status().ToString(), unavailable);
-  EXPECT_THAT(client_.Listen([](const AudioBlock&) { return true; }).ToString(), unavailable);
-  EXPECT_THAT(client_.StreamContacts({}).status().ToString(), unavailable);
+  EXPECT_THAT(client_->GetMixer().status().ToString(), unavailable);
+  EXPECT_THAT(client_->UploadMesh("v 0 0 0").status().ToString(), unavailable);
+  EXPECT_THAT(client_->WatchJob("jobs/a", nullptr).status().ToString(), unavailable);
+  EXPECT_THAT(client_->Listen([](const AudioBlock&) { return true; }).ToString(), unavailable);
+  EXPECT_THAT(client_->StreamContacts({}).status().ToString(), unavailable);
 }
 
 }  // namespace

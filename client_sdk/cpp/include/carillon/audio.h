@@ -7,19 +7,21 @@
 
 namespace carillon::client {
 
-/// Some consecutive frames of a stream.
+/// Consecutive frames of rendered sound. A frame holds one sample for each channel.
 struct AudioBlock {
   uint32_t sample_rate_hz = 0;
   uint32_t channel_count = 0;
-  /// Number of the first frame since the daemon, or the rendering, began.
+  /// The number of frames rendered before this block since the daemon, or the offline rendering,
+  /// began.
   uint64_t first_frame = 0;
-  /// Frames this listener has lost so far because it did not read fast enough; zero when rendering.
+  /// The number of frames that this listener has missed so far because it read too slowly. It is
+  /// zero in an offline rendering.
   uint64_t lost_frame_count = 0;
-  /// Interleaved, full scale is 1; valid during the callback only.
+  /// The samples, interleaved by channel; full scale is 1. They are valid during the callback only.
   std::span<const float> samples;
 };
 
-/// Gets every block in order; false ends the stream.
+/// Receives the blocks in order. Returning false ends the stream.
 using AudioCallback = std::function<bool(const AudioBlock&)>;
 
 }  // namespace carillon::client

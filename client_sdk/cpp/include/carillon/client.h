@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <string>
@@ -16,114 +17,204 @@
 #include "carillon/v1/audio_service.pb.h"
 #include "carillon/v1/contact_service.pb.h"
 #include "carillon/v1/decomposition_service.pb.h"
+#include "carillon/v1/error.pb.h"
 #include "carillon/v1/job_run_service.pb.h"
 #include "carillon/v1/modal_model_service.pb.h"
 #include "carillon/v1/scene_service.pb.h"
 
 namespace carillon::client {
 
-/// One run of a job on a machine of a cluster: what JobRunService asks for.
+/// Identifies one run of a decomposition job on a machine of a cluster to the daemon.
 struct JobRun {
-  std::string job;  ///< "jobs/{digest}"
-  std::string token;
+  std::string job;    ///< "jobs/{digest}"
+  std::string token;  ///< the token that the daemon gave to the batch job
 };
 
-/// The daemon, seen from outside: its calls, as proto/carillon/v1/*_service.proto describes them.
+/// The calls of a Carillon daemon. The files proto/carillon/v1/*_service.proto, which are installed
+/// with this header, describe each call, its limits and the units of its fields.
 ///
-/// Every error is a refusal "REASON: message" with its figures (proto/cpp/error_reason.h takes it
-/// apart): those the daemon gives, and SERVER_UNAVAILABLE where none answers. Every method may be
-/// called from every thread.
+/// Connect() makes a client of a real daemon. Code that takes a `const Client&` can be tested
+/// without one: derive a fake or a gmock class from Client and override the calls that the test
+/// needs. The base class answers every other call with UNIMPLEMENTED.
+///
+/// Errors: a failed call returns a status whose message is "REASON: text for people"; ToErrorInfo()
+/// takes it apart. proto/README.md lists the reasons that the daemon gives. In addition, every call
+/// can return UNAVAILABLE (SERVER_UNAVAILABLE) if no daemon answers, and a call that transfers no
+/// stream and no file can return DEADLINE_EXCEEDED (SERVER_TIMEOUT) after 60 seconds.
+///
+/// Threads: any number of threads may call the methods of one client at the same time. A call
+/// blocks its thread until the daemon has answered. Callbacks run on the calling thread.
 class Client {
  public:
-  /// `server` is "unix:PATH" or "HOST:PORT". Connects at the first call, and again when the daemon
-  /// comes back. `tls_roots_pem`: certificates that vouch for a daemon with TLS; empty: without
-  /// TLS.
-  explicit Client(const std::string& server, const std::string& tls_roots_pem = "");
-  Client(Client&&) noexcept;
-  Client& operator=(Client&&) noexcept;
-  ~Client();
+  virtual ~Client() = default;
 
-  /// Stores a mesh file; returns its digest for CreateModalModel.
-  absl::StatusOr<std::string> UploadMesh(absl::string_view bytes) const;
-  absl::StatusOr<v1::Job> CreateModalModel(const v1::CreateModalModelRequest& request) const;
-  absl::StatusOr<v1::ModalModelSummary> GetModalModel(const std::string& name) const;
-  /// Newest first, without their eigenvalues: all, or those that match `filter`, whose page is
-  /// ignored.
+  /// Receives the records of a stored modal model in order. An error that it returns ends the
+  /// transfer.
+  using RecordSink = std::function<absl::Status(const v1::ModalModelRecord&)>;
+
+  // Modal models.
+
+  /// Stores the bytes of a mesh file and returns their digest, which CreateModalModel takes.
+  virtual absl::StatusOr<std::string> UploadMesh(absl::string_view bytes) const;
+
+  /// Asks for the decomposition of a stored mesh and returns the job at once; WatchJob waits for
+  /// its end. The daemon computes each request once, however often it is sent.
+  virtual absl::StatusOr<v1::Job> CreateModalModel(
+      const v1::CreateModalModelRequest& request) const;
+
+  /// Returns the stored model "modalModels/{digest}" with its eigenvalues.
+  virtual absl::StatusOr<v1::ModalModelSummary> GetModalModel(const std::string& name) const;
+
+  /// Returns one page of the stored models, newest first, and the token of the next page. The
+  /// summaries have no eigenvalues.
+  virtual absl::StatusOr<v1::ListModalModelsResponse> ListModalModelsPage(
+      const v1::ListModalModelsRequest& request) const;
+
+  /// Returns all stored models that match `filter`, newest first, by calling ListModalModelsPage
+  /// for each page. The page size and the page token of `filter` are ignored.
   absl::StatusOr<std::vector<v1::ModalModelSummary>> ListModalModels(
       const v1::ListModalModelsRequest& filter = {}) const;
-  /// One page of them, and the token of the next.
-  absl::StatusOr<v1::ListModalModelsResponse> ListModalModelsPage(
-      const v1::ListModalModelsRequest& request) const;
-  absl::StatusOr<v1::ModalModelSummary> UpdateModalModel(
+
+  /// Changes the label, the tags or the pin of a model.
+  virtual absl::StatusOr<v1::ModalModelSummary> UpdateModalModel(
       const v1::UpdateModalModelRequest& request) const;
-  /// Takes the records of a model's stored form, one by one; its error ends the transfer.
-  using RecordSink = std::function<absl::Status(const v1::ModalModelRecord&)>;
-  /// Hands the records of a model to `sink`, whose error is returned.
-  absl::Status ExportModalModel(const std::string& name, const RecordSink& sink) const;
-  /// Stores the model whose records `send` gives to the sink that it gets; an error of `send` is
-  /// returned, and nothing stored. `name`: as below.
-  absl::StatusOr<v1::ModalModelSummary> ImportModalModel(
+
+  /// Passes the records of a stored model to `sink`, and returns the error of `sink` if there is
+  /// one.
+  virtual absl::Status ExportModalModel(const std::string& name, const RecordSink& sink) const;
+
+  /// Writes a stored model to a file that ImportModalModelFile reads.
+  /// Further errors: INTERNAL (OUTPUT_NOT_WRITABLE).
+  absl::Status ExportModalModelFile(const std::string& name, const std::string& file) const;
+
+  /// Stores the model whose records `send` passes to the sink that it is given. If `send` returns
+  /// an error, this error is returned and nothing is stored. `name` is "modalModels/{digest}"; if
+  /// it is empty, the daemon names the model after its content.
+  virtual absl::StatusOr<v1::ModalModelSummary> ImportModalModel(
       const std::function<absl::Status(const RecordSink&)>& send, const std::string& name,
       const std::string& label) const;
-  /// Writes a model to a file in the stored form. Errors also: Internal (OUTPUT_NOT_WRITABLE).
-  absl::Status ExportModalModel(const std::string& name, const std::string& file) const;
-  /// Stores the model of a file in the stored form. `name`: "modalModels/{digest}", or empty: named
-  /// after its content. Errors also: NotFound (FILE_NOT_FOUND), InvalidArgument
-  /// (MODAL_MODEL_MALFORMED).
-  absl::StatusOr<v1::ModalModelSummary> ImportModalModel(const std::string& file,
-                                                         const std::string& name,
-                                                         const std::string& label) const;
-  absl::Status DeleteModalModel(const std::string& name) const;
-  absl::StatusOr<std::vector<v1::CatalogueMaterial>> ListMaterials() const;
 
-  absl::StatusOr<v1::Job> GetJob(const std::string& name) const;
-  /// All of them, newest first.
+  /// Stores the model of a file that ExportModalModelFile or carillon-precompute wrote; `name` and
+  /// `label` are those of ImportModalModel.
+  /// Further errors: NOT_FOUND (FILE_NOT_FOUND), INVALID_ARGUMENT (MODAL_MODEL_MALFORMED).
+  absl::StatusOr<v1::ModalModelSummary> ImportModalModelFile(const std::string& file,
+                                                             const std::string& name,
+                                                             const std::string& label) const;
+
+  /// Deletes a stored model and its job. Objects that sound with the model keep it.
+  virtual absl::Status DeleteModalModel(const std::string& name) const;
+
+  /// Returns the named materials that a v1::Material can refer to.
+  virtual absl::StatusOr<std::vector<v1::CatalogueMaterial>> ListMaterials() const;
+
+  // Decomposition jobs.
+
+  /// Returns the job "jobs/{digest}".
+  virtual absl::StatusOr<v1::Job> GetJob(const std::string& name) const;
+
+  /// Returns one page of the jobs, newest first, and the token of the next page.
+  virtual absl::StatusOr<v1::ListJobsResponse> ListJobsPage(
+      const v1::ListJobsRequest& request) const;
+
+  /// Returns all jobs, newest first, by calling ListJobsPage for each page.
   absl::StatusOr<std::vector<v1::Job>> ListJobs() const;
-  absl::StatusOr<v1::Job> CancelJob(const std::string& name) const;
-  /// Follows a job to its end. `on_change`, if any, gets its state at once and after every change.
-  /// Returns the job once it has succeeded; where it failed, its error; CANCELLED (JOB_CANCELLED).
-  absl::StatusOr<v1::Job> WatchJob(const std::string& name,
-                                   const std::function<void(const v1::Job&)>& on_change) const;
 
-  /// Returns "scenes/{id}".
-  absl::StatusOr<std::string> CreateScene(const v1::CreateSceneRequest& request = {}) const;
-  absl::Status DeleteScene(const std::string& name) const;
-  absl::StatusOr<v1::SoundingObject> AddObject(const v1::AddObjectRequest& request) const;
-  absl::StatusOr<v1::SoundingObject> UpdateObject(const v1::UpdateObjectRequest& request) const;
-  absl::Status RemoveObject(const std::string& name) const;
-  absl::Status UpdateListener(const v1::UpdateListenerRequest& request) const;
+  /// Cancels a job that has not ended.
+  virtual absl::StatusOr<v1::Job> CancelJob(const std::string& name) const;
 
-  /// Opens a contact stream and waits for the daemon's first answer.
-  absl::StatusOr<std::unique_ptr<ContactStream>> StreamContacts(
+  /// Waits until a job ends and returns it if it has succeeded; if it has failed, returns the
+  /// error of the decomposition. `on_change` may be null; otherwise it receives the job at once
+  /// and after every change.
+  /// Further errors: CANCELLED (JOB_CANCELLED).
+  virtual absl::StatusOr<v1::Job> WatchJob(
+      const std::string& name, const std::function<void(const v1::Job&)>& on_change) const;
+
+  // Scenes and their sounding objects.
+
+  /// Creates a scene and returns its name, "scenes/{id}".
+  virtual absl::StatusOr<std::string> CreateScene(const v1::CreateSceneRequest& request) const;
+
+  /// Fades out the objects of a scene and deletes it. A scene outlives the client that created it.
+  virtual absl::Status DeleteScene(const std::string& name) const;
+
+  /// Adds an object that sounds with a stored model to a scene. Contacts refer to the object by its
+  /// handle, which the caller may choose.
+  virtual absl::StatusOr<v1::SoundingObject> AddObject(const v1::AddObjectRequest& request) const;
+
+  /// Changes the material, the size, the gain or the pose of an object while it sounds.
+  virtual absl::StatusOr<v1::SoundingObject> UpdateObject(
+      const v1::UpdateObjectRequest& request) const;
+
+  /// Fades out the object "scenes/{id}/objects/{handle}" and removes it from its scene.
+  virtual absl::Status RemoveObject(const std::string& name) const;
+
+  /// Moves the listener of a scene.
+  virtual absl::Status UpdateListener(const v1::UpdateListenerRequest& request) const;
+
+  /// Opens a contact stream to a scene and waits for the daemon's first answer.
+  virtual absl::StatusOr<std::unique_ptr<ContactStream>> StreamContacts(
       const v1::ContactStreamStart& start) const;
 
-  /// Hears what the mixer renders until `on_block` returns false (then OK) or the daemon ends it.
-  absl::Status Listen(const AudioCallback& on_block) const;
-  /// Renders what `trace` still holds, as fast as the daemon can. `on_block` returning false:
-  /// CANCELLED (RENDERING_STOPPED).
-  absl::StatusOr<v1::RenderSummary> Render(const v1::RenderSettings& settings,
-                                           ContactTraceReader& trace,
-                                           const AudioCallback& on_block) const;
-  absl::StatusOr<v1::GetMixerResponse> GetMixer() const;
+  // Sound.
 
-  /// Begins a run and writes its mesh to a file. Errors also: Internal (OUTPUT_NOT_WRITABLE).
-  absl::Status FetchMesh(const JobRun& run, const std::string& file) const;
-  absl::Status ReportProgress(const JobRun& run, const v1::Progress& progress) const;
-  /// Ends a run: with the model of a file in the stored form, unless `model_file` is empty. Errors
-  /// also: NotFound (FILE_NOT_FOUND), InvalidArgument (MODAL_MODEL_MALFORMED).
-  absl::Status UploadResult(const JobRun& run, const v1::RunEnd& end,
-                            const std::string& model_file) const;
+  /// Passes the sound of the mixer to `on_block` until `on_block` returns false; then returns OK.
+  virtual absl::Status Listen(const AudioCallback& on_block) const;
 
-  /// What the calls of an administrator show over TCP; a Unix socket needs none.
-  void SetAdminToken(const std::string& token);
-  absl::StatusOr<v1::GetDatabaseStatsResponse> GetDatabaseStats() const;
-  /// Writes a copy of the daemon's database to a file. Errors also: Internal (OUTPUT_NOT_WRITABLE).
-  absl::Status BackUpDatabase(const std::string& file) const;
-  absl::StatusOr<v1::CollectGarbageResponse> CollectGarbage(uint64_t budget_bytes) const;
+  /// Renders the rest of `trace` offline, as fast as the daemon can, and passes the sound to
+  /// `on_block`. Further errors: those of ContactTraceReader::Next; CANCELLED (RENDERING_STOPPED)
+  /// if `on_block` returned false.
+  virtual absl::StatusOr<v1::RenderSummary> Render(const v1::RenderSettings& settings,
+                                                   ContactTraceReader& trace,
+                                                   const AudioCallback& on_block) const;
 
- private:
-  struct Stubs;
-  std::unique_ptr<Stubs> stubs_;
+  /// Returns the state of the mixer and the audio device.
+  virtual absl::StatusOr<v1::GetMixerResponse> GetMixer() const;
+
+  // Runs of decomposition jobs on the machines of a cluster.
+
+  /// Begins a run and writes the mesh of its job to a file.
+  /// Further errors: INTERNAL (OUTPUT_NOT_WRITABLE).
+  virtual absl::Status FetchMesh(const JobRun& run, const std::string& file) const;
+
+  /// Tells the daemon how far a run has come. Gives up after 2 seconds, so that a run does not
+  /// wait for its own report.
+  virtual absl::Status ReportProgress(const JobRun& run, const v1::Progress& progress) const;
+
+  /// Ends a run. Sends the model of `model_file`, in the stored form, unless that name is empty.
+  /// Further errors: NOT_FOUND (FILE_NOT_FOUND), INVALID_ARGUMENT (MODAL_MODEL_MALFORMED).
+  virtual absl::Status UploadResult(const JobRun& run, const v1::RunEnd& end,
+                                    const std::string& model_file) const;
+
+  // Administration; over TCP these calls need ConnectOptions::admin_token.
+
+  /// Returns the size and the contents of the daemon's database.
+  virtual absl::StatusOr<v1::GetDatabaseStatsResponse> GetDatabaseStats() const;
+
+  /// Writes a consistent copy of the daemon's database to a file.
+  /// Further errors: INTERNAL (OUTPUT_NOT_WRITABLE), DATA_LOSS.
+  virtual absl::Status BackUpDatabase(const std::string& file) const;
+
+  /// Deletes the models that sounded least recently until the others take at most `budget_bytes`.
+  virtual absl::StatusOr<v1::CollectGarbageResponse> CollectGarbage(uint64_t budget_bytes) const;
 };
+
+/// What Connect() may need beyond an address.
+struct ConnectOptions {
+  /// PEM certificates of the authorities that vouch for a daemon with TLS. If it is empty, the
+  /// connection is not encrypted.
+  std::string tls_roots_pem;
+  /// The token of an administrator, for the administrative calls over TCP.
+  std::string admin_token;
+};
+
+/// Returns a client of the daemon at `server`: "unix:PATH" or "HOST:PORT". If `server` is empty,
+/// the address is $CARILLON_SERVER or, without that variable, the Unix socket on which the daemon
+/// listens by default. Returns at once: the connection is made by the first call, and made again
+/// after the daemon has been restarted.
+std::unique_ptr<Client> Connect(const std::string& server = "", const ConnectOptions& options = {});
+
+/// Returns the reason, the text and the figures of an error that this library has returned; the
+/// reason of any other error is "INTERNAL".
+v1::ErrorInfo ToErrorInfo(const absl::Status& status);
 
 }  // namespace carillon::client

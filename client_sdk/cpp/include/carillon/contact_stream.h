@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
+
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "carillon/v1/contact.pb.h"
@@ -8,24 +10,31 @@
 
 namespace carillon::client {
 
-/// Contacts on their way to a scene while a simulation runs; Client::StreamContacts opens one.
-/// One thread sends; the network's work is done by gRPC's own threads, so a step never waits for
-/// the daemon. Destroying an unfinished stream abandons what is still queued.
+/// Sends the contacts of a running simulation to a scene. Client::StreamContacts opens a stream.
+/// The interface is abstract, so that tests can pass a fake.
+///
+/// Threads: one thread at a time may call the methods. Send() never waits for the daemon: the
+/// threads of the network library do the sending. The destructor of a stream without Finish()
+/// cancels the stream and drops the steps that have not been sent.
 class ContactStream {
  public:
-  /// Steps that may wait for the network.
+  /// The largest number of steps that may wait for the network.
   static constexpr size_t kMaxQueuedSteps = 4096;
 
   virtual ~ContactStream() = default;
 
-  /// Queues one simulation step and returns at once. Errors: what ended the stream, or
-  /// RESOURCE_EXHAUSTED (CONTACT_QUEUE_FULL), and the step is lost.
+  /// Queues one simulation step and returns at once. If the stream has ended, returns the error
+  /// that ended it, or FAILED_PRECONDITION (CONTACT_STREAM_ENDED) after Finish(). If
+  /// kMaxQueuedSteps steps are waiting, drops `step` and returns RESOURCE_EXHAUSTED
+  /// (CONTACT_QUEUE_FULL).
   virtual absl::Status Send(v1::ContactStep step) = 0;
 
-  /// The newest answer: delays, and counts since the start.
+  /// Returns the newest answer of the daemon: the delays in seconds, and counts since the stream
+  /// was opened.
   virtual v1::StreamContactsResponse Report() const = 0;
 
-  /// Sends what is queued, ends the stream and returns the daemon's last answer. Call it once.
+  /// Sends the steps that are waiting, ends the stream, and returns the daemon's last answer or the
+  /// error that ended the stream. Call it once.
   virtual absl::StatusOr<v1::StreamContactsResponse> Finish() = 0;
 };
 

@@ -1,30 +1,38 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <fstream>
 #include <optional>
 #include <string>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+#include "carillon/v1/contact.pb.h"
 #include "carillon/v1/contact_trace.pb.h"
 
 namespace carillon::client {
 
-/// Writes a contact trace file (proto/carillon/v1/contact_trace.proto).
+/// Writes a contact trace: a file of the contacts of a simulation, which Client::Render or the
+/// command `carillon render` turns into sound later. proto/carillon/v1/contact_trace.proto
+/// describes the file. One thread at a time may use a writer.
 class ContactTraceWriter {
  public:
-  /// Begins the file with `header`, whose format_version it fills in.
-  /// Errors: Internal (OUTPUT_NOT_WRITABLE).
+  /// Creates the file, or truncates it, and writes `header` with the format version of this
+  /// library. Errors: INTERNAL (OUTPUT_NOT_WRITABLE).
   static absl::StatusOr<ContactTraceWriter> Create(const std::string& path,
                                                    v1::ContactTraceHeader header);
 
-  /// All objects before the first step, steps in order of time. An error of the file shows in
-  /// Close.
+  /// Appends an object. All objects must be written before the first step. Close() reports an error
+  /// of the file.
   void Write(const v1::ContactTraceObject& object);
+
+  /// Appends a simulation step. Steps must be written in the order of their times. Close() reports
+  /// an error of the file.
   void Write(const v1::ContactStep& step);
 
-  /// Errors: Internal (OUTPUT_NOT_WRITABLE): a write failed since the beginning.
+  /// Completes the file. Errors: INTERNAL (OUTPUT_NOT_WRITABLE) if any write has failed.
   absl::Status Close();
 
  private:
@@ -35,17 +43,18 @@ class ContactTraceWriter {
   std::ofstream file_;
 };
 
-/// Reads a contact trace file record by record.
+/// Reads a contact trace record by record. One thread at a time may use a reader.
 class ContactTraceReader {
  public:
-  /// Reads the header. Errors: NotFound (FILE_NOT_FOUND); InvalidArgument (TRACE_MALFORMED): it is
-  /// no contact trace; Unimplemented (TRACE_TOO_NEW).
+  /// Opens the file and reads its header. Errors: NOT_FOUND (FILE_NOT_FOUND), INVALID_ARGUMENT
+  /// (TRACE_MALFORMED) if the file is not a contact trace, UNIMPLEMENTED (TRACE_TOO_NEW) if a newer
+  /// version of Carillon wrote it.
   static absl::StatusOr<ContactTraceReader> Open(const std::string& path);
 
   const v1::ContactTraceHeader& header() const { return header_; }
 
-  /// The next object or step; empty after the last.
-  /// Errors: InvalidArgument (TRACE_MALFORMED): the file ends within a record or is no trace.
+  /// Returns the next object or step, or nullopt after the last one. Errors: INVALID_ARGUMENT
+  /// (TRACE_MALFORMED) if the next bytes are not a whole record.
   absl::StatusOr<std::optional<v1::ContactTraceRecord>> Next();
 
  private:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The calls of Client that stream.
+// The calls that upload a mesh, follow a job, and transfer sound.
 #include <grpcpp/client_context.h>
 
 #include <bit>
@@ -9,20 +9,19 @@
 #include <thread>
 #include <utility>
 
-#include "carillon/client.h"
+#include "client_sdk/cpp/internal/grpc_client.h"
 #include "client_sdk/cpp/internal/rpc_status.h"
-#include "client_sdk/cpp/internal/stubs.h"
 #include "proto/cpp/error_reason.h"
 
 namespace carillon::client {
 namespace {
 
-/// What the contract allows in one message.
+/// The largest piece of a mesh that the contract allows in one message.
 constexpr size_t kUploadPieceBytes = 1 << 20;
 
 static_assert(std::endian::native == std::endian::little, "samples come in little endian");
 
-/// The samples of `block`, copied to floats.
+/// Converts the messages of a stream to blocks. A block is valid until the next call of Read().
 class BlockReader {
  public:
   void SetFormat(const v1::AudioFormat& format) {
@@ -46,7 +45,7 @@ class BlockReader {
 
 using RenderCall = grpc::ClientReaderWriter<v1::RenderRequest, v1::RenderResponse>;
 
-/// Sends settings and trace; an error of the trace cancels the call.
+/// Sends the settings and the trace. An error of the trace cancels the call.
 absl::Status SendTrace(const v1::RenderSettings& settings, ContactTraceReader& trace,
                        grpc::ClientContext& context, RenderCall& call) {
   v1::RenderRequest request;
@@ -91,7 +90,7 @@ Rendering ReceiveSound(const AudioCallback& on_block, grpc::ClientContext& conte
 
 }  // namespace
 
-absl::StatusOr<std::string> Client::UploadMesh(absl::string_view bytes) const {
+absl::StatusOr<std::string> GrpcClient::UploadMesh(absl::string_view bytes) const {
   grpc::ClientContext context;
   v1::UploadMeshResponse response;
   const auto writer = stubs_->models.UploadMesh(&context, &response);
@@ -106,7 +105,7 @@ absl::StatusOr<std::string> Client::UploadMesh(absl::string_view bytes) const {
   return response.mesh_digest();
 }
 
-absl::StatusOr<v1::Job> Client::WatchJob(
+absl::StatusOr<v1::Job> GrpcClient::WatchJob(
     const std::string& name, const std::function<void(const v1::Job&)>& on_change) const {
   grpc::ClientContext context;
   v1::WatchJobRequest request;
@@ -124,12 +123,12 @@ absl::StatusOr<v1::Job> Client::WatchJob(
   }
   if (job.state() == v1::JOB_STATE_CANCELLED) {
     return Refusal(absl::StatusCode::kCancelled, "JOB_CANCELLED",
-                   "somebody cancelled the decomposition; ask for the model again");
+                   "the decomposition was cancelled; create the model again");
   }
   return job;
 }
 
-absl::Status Client::Listen(const AudioCallback& on_block) const {
+absl::Status GrpcClient::Listen(const AudioCallback& on_block) const {
   grpc::ClientContext context;
   const auto stream = stubs_->audio.Listen(&context, v1::ListenRequest());
   BlockReader reader;
@@ -145,12 +144,12 @@ absl::Status Client::Listen(const AudioCallback& on_block) const {
   return stopped ? absl::OkStatus() : FromRpc(status, stubs_->server);
 }
 
-absl::StatusOr<v1::RenderSummary> Client::Render(const v1::RenderSettings& settings,
-                                                 ContactTraceReader& trace,
-                                                 const AudioCallback& on_block) const {
+absl::StatusOr<v1::RenderSummary> GrpcClient::Render(const v1::RenderSettings& settings,
+                                                     ContactTraceReader& trace,
+                                                     const AudioCallback& on_block) const {
   grpc::ClientContext context;
   const auto call = stubs_->audio.Render(&context);
-  // Two threads, because the daemon may send sound before it has the whole trace.
+  // A second thread sends, because the daemon may send sound before it has the whole trace.
   absl::Status sent;
   std::jthread sender([&] { sent = SendTrace(settings, trace, context, *call); });
   const Rendering rendering = ReceiveSound(on_block, context, *call);
@@ -159,7 +158,7 @@ absl::StatusOr<v1::RenderSummary> Client::Render(const v1::RenderSettings& setti
   if (!sent.ok()) return sent;
   if (rendering.stopped) {
     return Refusal(absl::StatusCode::kCancelled, "RENDERING_STOPPED",
-                   "the receiver of the sound wanted no more");
+                   "the callback that receives the sound has stopped the rendering");
   }
   if (!status.ok()) return FromRpc(status, stubs_->server);
   if (!rendering.summary) return absl::DataLossError("the daemon ended without a summary");

@@ -1,18 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The calls of Client that move files, and those of administrators.
-#include <google/protobuf/util/delimited_message_util.h>
+// The calls that transfer models and files, and those of administrators.
 #include <grpcpp/client_context.h>
 
 #include <chrono>
 #include <fstream>
 #include <utility>
 
-#include "carillon/client.h"
 #include "client_sdk/cpp/internal/authorize.h"
+#include "client_sdk/cpp/internal/grpc_client.h"
 #include "client_sdk/cpp/internal/model_file.h"
 #include "client_sdk/cpp/internal/rpc_status.h"
-#include "client_sdk/cpp/internal/stubs.h"
 
 namespace carillon::client {
 namespace {
@@ -21,7 +19,7 @@ constexpr auto kCallTimeout = std::chrono::seconds(60);
 
 }  // namespace
 
-absl::Status Client::ExportModalModel(const std::string& name, const RecordSink& sink) const {
+absl::Status GrpcClient::ExportModalModel(const std::string& name, const RecordSink& sink) const {
   grpc::ClientContext context;
   v1::ExportModalModelRequest request;
   request.set_name(name);
@@ -34,19 +32,7 @@ absl::Status Client::ExportModalModel(const std::string& name, const RecordSink&
   return taken.ok() ? status : taken;
 }
 
-absl::Status Client::ExportModalModel(const std::string& name, const std::string& file) const {
-  std::ofstream out(file, std::ios::binary);
-  if (!out) return NotWritable(file);
-  absl::Status status = ExportModalModel(name, [&](const v1::ModalModelRecord& record) {
-    google::protobuf::util::SerializeDelimitedToOstream(record, &out);
-    return out ? absl::OkStatus() : NotWritable(file);
-  });
-  out.close();
-  if (status.ok() && !out) status = NotWritable(file);
-  return status;
-}
-
-absl::StatusOr<v1::ModalModelSummary> Client::ImportModalModel(
+absl::StatusOr<v1::ModalModelSummary> GrpcClient::ImportModalModel(
     const std::function<absl::Status(const RecordSink&)>& send, const std::string& name,
     const std::string& label) const {
   grpc::ClientContext context;
@@ -71,16 +57,7 @@ absl::StatusOr<v1::ModalModelSummary> Client::ImportModalModel(
   return std::move(*response.mutable_modal_model());
 }
 
-absl::StatusOr<v1::ModalModelSummary> Client::ImportModalModel(const std::string& file,
-                                                               const std::string& name,
-                                                               const std::string& label) const {
-  return ImportModalModel([&](const RecordSink& sink) { return ReadRecords(file, sink); }, name,
-                          label);
-}
-
-void Client::SetAdminToken(const std::string& token) { stubs_->admin_token = token; }
-
-absl::StatusOr<v1::GetDatabaseStatsResponse> Client::GetDatabaseStats() const {
+absl::StatusOr<v1::GetDatabaseStatsResponse> GrpcClient::GetDatabaseStats() const {
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() + kCallTimeout);
   Authorize(context, stubs_->admin_token);
@@ -91,7 +68,7 @@ absl::StatusOr<v1::GetDatabaseStatsResponse> Client::GetDatabaseStats() const {
   return response;
 }
 
-absl::Status Client::BackUpDatabase(const std::string& file) const {
+absl::Status GrpcClient::BackUpDatabase(const std::string& file) const {
   std::ofstream out(file, std::ios::binary);
   if (!out) return NotWritable(file);
   grpc::ClientContext context;
@@ -115,7 +92,7 @@ absl::Status Client::BackUpDatabase(const std::string& file) const {
   return status;
 }
 
-absl::StatusOr<v1::CollectGarbageResponse> Client::CollectGarbage(uint64_t budget_bytes) const {
+absl::StatusOr<v1::CollectGarbageResponse> GrpcClient::CollectGarbage(uint64_t budget_bytes) const {
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() + kCallTimeout);
   Authorize(context, stubs_->admin_token);

@@ -1,27 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The calls of Client for runs of jobs on other machines.
+// The calls for runs of decomposition jobs on other machines.
 #include <grpcpp/client_context.h>
 
 #include <chrono>
 #include <fstream>
 #include <utility>
 
-#include "carillon/client.h"
 #include "client_sdk/cpp/internal/authorize.h"
+#include "client_sdk/cpp/internal/grpc_client.h"
 #include "client_sdk/cpp/internal/model_file.h"
 #include "client_sdk/cpp/internal/rpc_status.h"
-#include "client_sdk/cpp/internal/stubs.h"
 
 namespace carillon::client {
 namespace {
 
-/// Progress is news for so long: the run must not wait for it.
+/// A run must not wait long for the report of its progress.
 constexpr auto kReportTimeout = std::chrono::seconds(2);
 
 }  // namespace
 
-absl::Status Client::FetchMesh(const JobRun& run, const std::string& file) const {
+absl::Status GrpcClient::FetchMesh(const JobRun& run, const std::string& file) const {
   std::ofstream out(file, std::ios::binary);
   if (!out) return NotWritable(file);
   grpc::ClientContext context;
@@ -37,7 +36,7 @@ absl::Status Client::FetchMesh(const JobRun& run, const std::string& file) const
   return out ? status : NotWritable(file);
 }
 
-absl::Status Client::ReportProgress(const JobRun& run, const v1::Progress& progress) const {
+absl::Status GrpcClient::ReportProgress(const JobRun& run, const v1::Progress& progress) const {
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() + kReportTimeout);
   Authorize(context, run.token);
@@ -48,8 +47,8 @@ absl::Status Client::ReportProgress(const JobRun& run, const v1::Progress& progr
   return FromRpc(stubs_->job_runs.ReportProgress(&context, request, &response), stubs_->server);
 }
 
-absl::Status Client::UploadResult(const JobRun& run, const v1::RunEnd& end,
-                                  const std::string& model_file) const {
+absl::Status GrpcClient::UploadResult(const JobRun& run, const v1::RunEnd& end,
+                                      const std::string& model_file) const {
   grpc::ClientContext context;
   Authorize(context, run.token);
   v1::UploadResultResponse response;

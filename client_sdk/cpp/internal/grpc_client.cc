@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client_sdk/cpp/internal/grpc_client.h"
+
+#include <grpcpp/client_context.h>
+#include <grpcpp/create_channel.h>
+#include <grpcpp/security/credentials.h>
+
+#include <chrono>
+#include <memory>
+#include <utility>
+
+#include "client_sdk/cpp/internal/contact_stream_call.h"
+#include "client_sdk/cpp/internal/rpc_status.h"
+
+namespace carillon::client {
+namespace {
+
+/// Far above the time of any call with one answer; the slowest reads a large model from the disk.
+constexpr auto kCallTimeout = std::chrono::seconds(60);
+
+/// Calls `stub.*method` and returns its response.
+template <class Stub, class Request, class Response>
+absl::StatusOr<Response> Call(Stub& stub, const std::string& server,
+                              grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&,
+                                                           Response*),
+                              const Request& request) {
+  grpc::ClientContext context;
+  context.set_deadline(std::chrono::system_clock::now() + kCallTimeout);
+  Response response;
+  const absl::Status status = FromRpc((stub.*method)(&context, request, &response), server);
+  if (!status.ok()) return status;
+  return response;
+}
+
+std::shared_ptr<grpc::ChannelCredentials> CredentialsFor(const std::string& tls_roots_pem) {
+  if (tls_roots_pem.empty()) return grpc::InsecureChannelCredentials();
+  grpc::SslCredentialsOptions options;
+  options.pem_root_certs = tls_roots_pem;
+  return grpc::SslCredentials(options);
+}
+
+template <class Request>
+Request Named(const std::string& name) {
+  Request request;
+  request.set_name(name);
+  return request;
+}
+
+}  // namespace
+
+GrpcClient::GrpcClient(const std::string& server, const ConnectOptions& options)
+    : stubs_(std::make_unique<Stubs>(
+          server, options.admin_token,
+          grpc::CreateChannel(server, CredentialsFor(options.tls_roots_pem)))) {}
+
+absl::StatusOr<v1::Job> GrpcClient::CreateModalModel(
+    const v1::CreateModalModelRequest& request) const {
+  auto response =
+      Call(stubs_->models, stubs_->server, &v1::ModalModelService::Stub::CreateModalModel, request);
+  if (!response.ok()) return response.status();
+  return std::move(*response->mutable_job());
+}
+
+absl::StatusOr<v1::ModalModelSummary> GrpcClient::GetModalModel(const std::string& name) const {
+  auto response = Call(stubs_->models, stubs_->server, &v1::ModalModelService::Stub::GetModalModel,
+                       Named<v1::GetModalModelRequest>(name));
+  if (!response.ok()) return response.status();
+  return std::move(*response->mutable_modal_model());
+}
+
+absl::StatusOr<v1::ModalModelSummary> GrpcClient::UpdateModalModel(
+    const v1::UpdateModalModelRequest& request) const {
+  auto response =
+      Call(stubs_->models, stubs_->server, &v1::ModalModelService::Stub::UpdateModalModel, request);
+  if (!response.ok()) return response.status();
+  return std::move(*response->mutable_modal_model());
+}
+
+absl::StatusOr<v1::ListModalModelsResponse> GrpcClient::ListModalModelsPage(
+    const v1::ListModalModelsRequest& request) const {
+  return Call(stubs_->models, stubs_->server, &v1::ModalModelService::Stub::ListModalModels,
+              request);
+}
+
+absl::Status GrpcClient::DeleteModalModel(const std::string& name) const {
+  return Call(stubs_->models, stubs_->server, &v1::ModalModelService::Stub::DeleteModalModel,
+              Named<v1::DeleteModalModelRequest>(name))
+      .status();
+}
+
+absl::StatusOr<std::vector<v1::CatalogueMaterial>> GrpcClient::ListMaterials() const {
+  auto response = Call(stubs_->models, stubs_->server, &v1::ModalModelService::Stub::ListMaterials,
+                       v1::ListMaterialsRequest());
+  if (!response.ok()) return response.status();
+  return std::vector<v1::CatalogueMaterial>(response->materials().begin(),
+                                            response->materials().end());
+}
+
+absl::StatusOr<v1::Job> GrpcClient::GetJob(const std::string& name) const {
+  auto response = Call(stubs_->decompositions, stubs_->server,
+                       &v1::DecompositionService::Stub::GetJob, Named<v1::GetJobRequest>(name));
+  if (!response.ok()) return response.status();
+  return std::move(*response->mutable_job());
+}
+
+absl::StatusOr<v1::ListJobsResponse> GrpcClient::ListJobsPage(
+    const v1::ListJobsRequest& request) const {
+  return Call(stubs_->decompositions, stubs_->server, &v1::DecompositionService::Stub::ListJobs,
+              request);
+}
+
+absl::StatusOr<v1::Job> GrpcClient::CancelJob(const std::string& name) const {
+  auto response =
+      Call(stubs_->decompositions, stubs_->server, &v1::DecompositionService::Stub::CancelJob,
+           Named<v1::CancelJobRequest>(name));
+  if (!response.ok()) return response.status();
+  return std::move(*response->mutable_job());
+}
+
+absl::StatusOr<std::string> GrpcClient::CreateScene(const v1::CreateSceneRequest& request) const {
+  auto response =
+      Call(stubs_->scenes, stubs_->server, &v1::SceneService::Stub::CreateScene, request);
+  if (!response.ok()) return response.status();
+  return response->name();
+}
+
+absl::Status GrpcClient::DeleteScene(const std::string& name) const {
+  return Call(stubs_->scenes, stubs_->server, &v1::SceneService::Stub::DeleteScene,
+              Named<v1::DeleteSceneRequest>(name))
+      .status();
+}
+
+absl::StatusOr<v1::SoundingObject> GrpcClient::AddObject(
+    const v1::AddObjectRequest& request) const {
+  auto response = Call(stubs_->scenes, stubs_->server, &v1::SceneService::Stub::AddObject, request);
+  if (!response.ok()) return response.status();
+  return std::move(*response->mutable_object());
+}
+
+absl::StatusOr<v1::SoundingObject> GrpcClient::UpdateObject(
+    const v1::UpdateObjectRequest& request) const {
+  auto response =
+      Call(stubs_->scenes, stubs_->server, &v1::SceneService::Stub::UpdateObject, request);
+  if (!response.ok()) return response.status();
+  return std::move(*response->mutable_object());
+}
+
+absl::Status GrpcClient::RemoveObject(const std::string& name) const {
+  return Call(stubs_->scenes, stubs_->server, &v1::SceneService::Stub::RemoveObject,
+              Named<v1::RemoveObjectRequest>(name))
+      .status();
+}
+
+absl::Status GrpcClient::UpdateListener(const v1::UpdateListenerRequest& request) const {
+  return Call(stubs_->scenes, stubs_->server, &v1::SceneService::Stub::UpdateListener, request)
+      .status();
+}
+
+absl::StatusOr<std::unique_ptr<ContactStream>> GrpcClient::StreamContacts(
+    const v1::ContactStreamStart& start) const {
+  return OpenContactStream(stubs_->contacts, stubs_->server, start);
+}
+
+absl::StatusOr<v1::GetMixerResponse> GrpcClient::GetMixer() const {
+  return Call(stubs_->audio, stubs_->server, &v1::AudioService::Stub::GetMixer,
+              v1::GetMixerRequest());
+}
+
+}  // namespace carillon::client

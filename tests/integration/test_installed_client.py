@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The C++ client as users get it: installed, found by CMake and pkg-config, and sounding."""
+
+import os
+import pathlib
+import re
+import shlex
+import subprocess
+import unittest
+
+import numpy
+
+import meshes
+from carillon.v1 import material_pb2
+from daemon import ROOT, DaemonTest
+
+BUILD = pathlib.Path(os.environ["CARILLON_BUILD_DIR"])
+EXAMPLE = ROOT / "client_sdk/examples/strike"
+# Whatever else a build of the daemon looks for.
+NOT_FOR_THE_CLIENT = ("PkgConfig", "GTest", "benchmark", "CLI11", "nlohmann_json", "spdlog", "tomlplusplus",
+                      "SQLite3", "SQLiteCpp", "Eigen3", "CGAL", "embree", "hwy", "assimp", "OpenVDB")
+
+
+def run(*command, **options):
+    return subprocess.run([str(word) for word in command], check=True, capture_output=True, text=True,
+                          **options)
+
+
+class InstalledClientTest(DaemonTest):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.prefix = cls.folder / "prefix"
+        run("cmake", "--install", BUILD, "--component", "sdk", "--prefix", cls.prefix)
+        cls.model = cls.client.wait(cls.client.create(
+            meshes.bowl(), "obj", material=material_pb2.Material(preset="bell_bronze")))
+
+    def assert_strikes(self, program):
+        """Runs `program`, and listens to the daemon meanwhile."""
+        strikes = []
+        heard = self.client.listen(2.0, on_start=lambda: strikes.append(subprocess.Popen(
+            [program, self.model], env={**os.environ, "CARILLON_SERVER": self.daemon.server},
+            stdout=subprocess.PIPE, text=True)))
+        said, _ = strikes[0].communicate(timeout=60)
+        self.assertEqual(strikes[0].returncode, 0)
+        self.assertRegex(said, r"\baccepted_count: 1\b")
+        self.assertGreater(numpy.abs(numpy.array(heard.samples)).max(), 1e-3)
+
+    def test_a_project_that_finds_the_package_strikes_a_running_daemon(self):
+        build = self.folder / "cmake"
+        run("cmake", "-G", "Ninja", "-S", EXAMPLE, "-B", build, f"-DCMAKE_PREFIX_PATH={self.prefix}")
+        run("cmake", "--build", build)
+        self.assert_strikes(build / "strike")
+
+    def test_pkg_config_says_how_to_compile_and_link(self):
+        flags = run("pkg-config", "--cflags", "--libs", "carillon-client",
+                    env={**os.environ, "PKG_CONFIG_PATH": str(next(self.prefix.glob("lib*/**/pkgconfig")))})
+        program = self.folder / "strike"
+        run("c++", "-std=c++20", EXAMPLE / "main.cc", "-o", program, *shlex.split(flags.stdout))
+        self.assert_strikes(program)
+
+    def test_an_older_minor_version_is_not_taken_for_this_one(self):
+        project = self.folder / "older"
+        project.mkdir()
+        (project / "CMakeLists.txt").write_text(
+            "cmake_minimum_required(VERSION 3.25)\nproject(older NONE)\n"
+            "find_package(carillon 0.0 CONFIG)\nmessage(\"found: ${carillon_FOUND}\")\n")
+        said = run("cmake", "-S", project, "-B", project / "build", f"-DCMAKE_PREFIX_PATH={self.prefix}")
+        self.assertIn("found: 0", said.stderr)
+
+    def test_installed_headers_know_nothing_of_grpc_and_of_this_tree(self):
+        headers = list((self.prefix / "include").rglob("*.h"))
+        self.assertIn(self.prefix / "include/carillon/client.h", headers)
+        for header in headers:
+            for included in re.findall(r'#include ["<]([^">]+)', header.read_text()):
+                self.assertFalse(included.startswith(("grpc", "proto/", "client_sdk/")),
+                                 f"{header} includes {included}")
+
+    def test_the_client_alone_needs_nothing_but_grpc_protobuf_and_absl(self):
+        refused = [f"-DCMAKE_DISABLE_FIND_PACKAGE_{package}=ON" for package in NOT_FOR_THE_CLIENT]
+        run("cmake", "--preset", "client", "-B", self.folder / "alone", *refused, cwd=ROOT)
+        targets = run("cmake", "--build", self.folder / "alone", "--target", "help").stdout
+        self.assertIn("carillon_client:", targets)
+        for other in ("carillond:", "carillon-precompute:", "carillon:"):
+            self.assertNotIn(f"\n{other}", targets)
+
+
+if __name__ == "__main__":
+    unittest.main()
