@@ -4,57 +4,48 @@
 #include <ode/ode.h>
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <deque>
-#include <map>
 
 #include "carillon/v1/contact.pb.h"
+#include "client_sdk/adapters/contact_rows.h"
 
 namespace carillon::adapters {
 
-/// Reads all contacts of an ODE world with the speed at which they travel: blows, loads, slides and
-/// rolls, which the daemon tells apart.
+/// Reads the contacts of an ODE world as the engine reports them, with the speed at which each
+/// travels over the surfaces. The daemon tells blows, loads, slides and rolls apart.
 class OdeContacts {
  public:
-  struct Settings {
-    double roughness_depth = 0.5;  ///< as for carillon.v1.Roughness
-    double grain_m = 0.001;
-    double duration_s = 0.0005;  ///< of a blow
-  };
+  explicit OdeContacts(const ContactSettings& settings) : rows_(settings) {}
 
-  explicit OdeContacts(const Settings& settings) : settings_(settings) {}
+  /// Lets `body` sound as the object `handle` of the scene from now on. The frame of the body must
+  /// be that of its modal model.
+  void AddObject(dBodyID body, uint32_t handle) { rows_.AddObject(body, handle); }
 
-  /// From now on `body` is heard under `handle`. Its frame must be that of its modal model.
-  void AddObject(dBodyID body, uint32_t handle) { handles_[body] = handle; }
-
-  /// Call it from the near callback for each contact joint, once it is attached; it sets the
-  /// joint's feedback.
+  /// Remembers a contact joint and sets its feedback. Call it from the near callback for each
+  /// contact joint, after the joint has been attached.
   void Add(dJointID joint, const dContactGeom& geometry);
 
-  /// Appends the contacts of the step of `step_s` that has just been solved, and forgets them: call
-  /// it after dWorldStep or dWorldQuickStep, before the joints go. A contact of two objects is one
-  /// row with a second object.
+  /// Appends the contacts of the step of `step_s` seconds that has just been solved, and forgets
+  /// them. Call it after dWorldStep or dWorldQuickStep, before the joints are destroyed.
   void Read(double step_s, v1::ContactStep& step);
 
-  /// Appends where the objects are; heard in a scene that has a carillon.v1.Hearing.
+  /// Appends the poses of the objects, which matter in a scene with a carillon.v1.Hearing.
   void ReadPoses(v1::ContactStep& step) const;
 
  private:
-  using Vector = std::array<double, 3>;
   struct Contact {
     std::array<dBodyID, 2> bodies{};  // null: the world
-    std::array<Vector, 2> local_point{};
+    std::array<Vector, 2> local_points{};
     Vector normal{}, point{};
     dJointFeedback feedback{};
   };
 
-  void Append(const Contact& contact, size_t side, double step_s, v1::ContactStep& step);
-  static double TravelSpeed(const Contact& contact);
+  static ContactSide SideOf(const Contact& contact, size_t side);
 
-  Settings settings_;
-  std::map<dBodyID, uint32_t> handles_;
-  std::map<dBodyID, uint32_t> partners_;  // every body met, numbered
-  std::deque<Contact> contacts_;          // ODE writes into their feedback
+  ContactRows rows_;
+  std::deque<Contact> contacts_;  // ODE writes into their feedback
 };
 
 }  // namespace carillon::adapters

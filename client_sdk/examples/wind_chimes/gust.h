@@ -6,7 +6,8 @@
 
 namespace carillon::wind_chimes {
 
-/// Wind at one place: gusts of wandering strength and direction that are the same for one seed.
+/// The wind at one place: a gust whose strength and direction wander. The same seed gives the same
+/// gust.
 class Gust {
  public:
   explicit Gust(uint64_t seed);
@@ -16,8 +17,8 @@ class Gust {
     double y_m_per_s;
   };
 
-  /// The wind at a time, seconds. It rises within the first seconds and dies down from
-  /// `kCalmAfter_s` on.
+  /// Returns the velocity of the wind at a time in seconds. The wind rises during the first seconds
+  /// and falls after `kCalmAfter_s`.
   Velocity At(double time_s) const;
 
   static constexpr double kCalmAfter_s = 14;

@@ -3,9 +3,12 @@
 
 namespace carillon::wind_chimes {
 
-/// How long two elastic bodies touch in an impact, seconds: T = 2.87 (m^2/(R E^2 v))^(1/5)
-/// (Johnson, Contact Mechanics, section 11.4), with reduced mass m in kg, reduced radius of
-/// curvature R in m, contact modulus E in Pa and speed of approach v in m/s.
+/// Returns the duration of the impact of two elastic bodies in seconds,
+///
+///   T = 2.87 (m^2/(R E^2 v))^(1/5)
+///
+/// (Johnson, Contact Mechanics, section 11.4), with the reduced mass m in kg, the reduced radius of
+/// curvature R in m, the contact modulus E in Pa and the speed of approach v in m/s.
 double HertzDuration(double mass_kg, double radius_m, double modulus_pa, double speed_m_per_s);
 
 }  // namespace carillon::wind_chimes

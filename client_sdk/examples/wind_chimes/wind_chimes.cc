@@ -3,12 +3,13 @@
 
 #include <btBulletDynamicsCommon.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <utility>
 #include <vector>
 
-#include "client_sdk/adapters/bullet_strikes.h"
+#include "client_sdk/adapters/bullet_contacts.h"
 #include "client_sdk/examples/wind_chimes/gust.h"
 #include "client_sdk/examples/wind_chimes/hertz.h"
 #include "client_sdk/examples/wind_chimes/tubes.h"
@@ -16,16 +17,15 @@
 namespace carillon::wind_chimes {
 namespace {
 
-constexpr double kSubstep_s = WindChimes::kStep_s / WindChimes::kSubsteps;
-
-// The tubes hang on a circle, their centres at one height, each at a node of its first bending mode
-// (22.4 % of the length from the end), where the thread takes the least from the sound.
+// The tubes hang on a circle, with their centres at one height. A thread holds each tube at a node
+// of its first bending mode (22.4 % of the length from the end), where it damps the sound least.
 constexpr double kCircleRadius_m = 0.062;
 constexpr double kTubeCentre_z_m = -0.40;
 constexpr double kNodeFromEnd = 0.224;
 
-// A wooden ball between them, a little below their middles, so that modes without a motion of the
-// middle sound too; below it the sail that catches the wind.
+// The clapper is a wooden ball between the tubes. It hangs a little below their middles, so that it
+// also excites modes that have a node there. Below the clapper hangs the sail that catches the
+// wind.
 constexpr double kClapperRadius_m = 0.030;
 constexpr double kClapper_z_m = -0.44;
 constexpr double kClapperMass_kg = 0.050;
@@ -37,11 +37,13 @@ constexpr double kThreadMass_kg = 0.002;
 constexpr double kAir_kg_per_m3 = 1.2;
 constexpr double kDrag = 1.2;  // coefficient of a flat plate
 
-// Of maple, across the grain, on aluminum.
+// The contact modulus is that of maple, across the grain, on aluminum.
 constexpr double kContactModulus_pa = 1.4e9;
 constexpr double kContactRadius_m = 1 / (1 / kClapperRadius_m + 1 / kOuterRadius_m);
 constexpr double kTubeRestitution = 0.9;
 constexpr double kClapperRestitution = 0.65;  // Bullet takes the product
+// Slower contacts are loads, for which the duration does not matter.
+constexpr double kSlowestImpact_m_per_s = 0.001;
 
 double TubeMass(const Tube& tube) {
   const double inner = kOuterRadius_m - kWall_m;
@@ -49,7 +51,7 @@ double TubeMass(const Tube& tube) {
          tube.length_m;
 }
 
-/// Of a hollow cylinder about its own axis z.
+/// The moments of inertia of a hollow cylinder with the axis z.
 btVector3 TubeInertia(const Tube& tube) {
   const double inner = kOuterRadius_m - kWall_m;
   const double squares = kOuterRadius_m * kOuterRadius_m + inner * inner;
@@ -58,31 +60,38 @@ btVector3 TubeInertia(const Tube& tube) {
   return {across, across, mass * squares / 2};
 }
 
-/// Duration of an impact with impulse J: the speed of approach is J/(m (1 + e)).
-double ContactDuration(const btCollisionObject& a, const btCollisionObject& b, double impulse) {
-  const double mass =
-      1 / (btRigidBody::upcast(&a)->getInvMass() + btRigidBody::upcast(&b)->getInvMass());
-  const double restitution = a.getRestitution() * b.getRestitution();
-  return HertzDuration(mass, kContactRadius_m, kContactModulus_pa,
-                       impulse / (mass * (1 + restitution)));
+/// The duration of an impact of a tube with the clapper, or with another tube, with the impulse J.
+/// The speed of approach is J/(m (1 + e)) with the reduced mass m and the coefficient of
+/// restitution e.
+double ContactDuration(const v1::EngineContact& contact) {
+  const bool on_tube = contact.has_second();
+  const double other_mass =
+      on_tube ? TubeMass(kTubes[contact.second().object() - 1]) : kClapperMass_kg;
+  const double mass = 1 / (1 / TubeMass(kTubes[contact.object() - 1]) + 1 / other_mass);
+  const double restitution = kTubeRestitution * (on_tube ? kTubeRestitution : kClapperRestitution);
+  const v1::Vec3& impulse = contact.impulse_newton_seconds();
+  const double speed =
+      std::max(std::hypot(impulse.x(), impulse.y(), impulse.z()) / (mass * (1 + restitution)),
+               kSlowestImpact_m_per_s);
+  return HertzDuration(mass, kContactRadius_m, kContactModulus_pa, speed);
 }
 
 }  // namespace
 
-/// Owns all that Bullet only points to.
+/// Owns the objects to which Bullet only points.
 class WindChimes::World {
  public:
   explicit World(uint64_t seed)
       : gust_(seed),
         dispatcher_(&configuration_),
         world_(&dispatcher_, &broadphase_, &solver_, &configuration_),
-        strikes_({.duration_s = ContactDuration}) {
+        contacts_({.roughness_depth = 0}) {
     world_.setGravity({0, 0, -9.81});
     world_.getSolverInfo().m_numIterations = 50;
-    // Bullet's default takes the bounce from everything slower than 0.2 m/s.
+    // By default Bullet lets no contact bounce that is slower than 0.2 m/s.
     world_.getSolverInfo().m_restitutionVelocityThreshold = 0.01;
-    world_.setInternalTickCallback(BeforeSubstep, this, /*isPreTick=*/true);
-    world_.setInternalTickCallback(AfterSubstep, this, /*isPreTick=*/false);
+    world_.setInternalTickCallback(BeforeStep, this, /*isPreTick=*/true);
+    world_.setInternalTickCallback(AfterStep, this, /*isPreTick=*/false);
     for (size_t i = 0; i < kTubes.size(); ++i) HangTube(i);
     HangClapper();
   }
@@ -95,30 +104,33 @@ class WindChimes::World {
   v1::ContactStep Step() {
     step_ = v1::ContactStep();
     step_.set_time_s(static_cast<double>(step_count_++) * kStep_s);
-    for (substep_ = 0; substep_ < kSubsteps; ++substep_) world_.stepSimulation(kSubstep_s, 0);
+    world_.stepSimulation(kStep_s, 0);
+    for (v1::EngineContact& contact : *step_.mutable_contacts()) {
+      contact.set_duration_s(ContactDuration(contact));
+    }
     return std::move(step_);
   }
 
  private:
-  static void BeforeSubstep(btDynamicsWorld* world, btScalar) {
+  static void BeforeStep(btDynamicsWorld* world, btScalar) {
     static_cast<World*>(world->getWorldUserInfo())->BlowOnSail();
   }
 
-  static void AfterSubstep(btDynamicsWorld* world, btScalar) {
-    static_cast<World*>(world->getWorldUserInfo())->ReadStrikes();
+  static void AfterStep(btDynamicsWorld* world, btScalar) {
+    static_cast<World*>(world->getWorldUserInfo())->ReadContacts();
   }
 
-  /// F = rho/2 c A |v| v, with v the wind relative to the sail.
+  /// Applies the drag F = rho/2 c A |v| v, where v is the velocity of the wind relative to the
+  /// sail.
   void BlowOnSail() {
-    const double time = step_.time_s() + substep_ * kSubstep_s;
-    const Gust::Velocity wind = gust_.At(time);
+    const Gust::Velocity wind = gust_.At(step_.time_s());
     const btVector3 relative =
         btVector3(wind.x_m_per_s, wind.y_m_per_s, 0) - sail_->getLinearVelocity();
     const double area = kSailSide_m * kSailSide_m;
     sail_->applyCentralForce(relative * (kAir_kg_per_m3 / 2 * kDrag * area * relative.length()));
   }
 
-  void ReadStrikes() { strikes_.Read(dispatcher_, substep_ * kSubstep_s, step_); }
+  void ReadContacts() { contacts_.Read(dispatcher_, step_); }
 
   btRigidBody& AddBody(std::unique_ptr<btCollisionShape> shape, double mass,
                        const btVector3& inertia, const btVector3& centre, bool collides) {
@@ -160,8 +172,8 @@ class WindChimes::World {
     constraints_.push_back(std::move(constraint));
   }
 
-  /// A thread between two points one above the other: a light rod that touches nothing, so that
-  /// what hangs on it swings as a pendulum does, and turns about its upper end too.
+  /// Adds a thread between two points, one above the other. It is a light rod that touches nothing;
+  /// a body that hangs on it swings as a double pendulum.
   btRigidBody& AddThread(const btVector3& top, const btVector3& bottom) {
     const double length = (top - bottom).length();
     return AddSolid(std::make_unique<btCapsuleShapeZ>(0.002, length), kThreadMass_kg,
@@ -179,7 +191,7 @@ class WindChimes::World {
     shape->setMargin(0.001);
     btRigidBody& body = AddBody(std::move(shape), TubeMass(tube), TubeInertia(tube), centre, true);
     body.setRestitution(kTubeRestitution);
-    strikes_.AddObject(body, static_cast<uint32_t>(index + 1));
+    contacts_.AddObject(body, static_cast<uint32_t>(index + 1));
     btRigidBody& thread = AddThread(axis, node);
     Pin(thread, axis);
     Pin(thread, body, node);
@@ -209,11 +221,10 @@ class WindChimes::World {
   std::vector<std::unique_ptr<btCollisionShape>> shapes_;
   std::vector<std::unique_ptr<btRigidBody>> bodies_;
   std::vector<std::unique_ptr<btTypedConstraint>> constraints_;
-  adapters::BulletStrikes strikes_;
+  adapters::BulletContacts contacts_;
   btRigidBody* sail_ = nullptr;
   v1::ContactStep step_;
   uint64_t step_count_ = 0;
-  int substep_ = 0;
 };
 
 WindChimes::WindChimes(uint64_t seed) : world_(std::make_unique<World>(seed)) {}

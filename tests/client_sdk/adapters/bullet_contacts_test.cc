@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <numbers>
 
 namespace carillon::adapters {
@@ -69,6 +70,28 @@ TEST_F(BulletContactsTest, AContactOfTwoObjectsIsOneRowWithASecondObject) {
   // Back from there.
   EXPECT_NEAR(std::abs(contact.second().rotation().z()), std::numbers::sqrt2 / 2, 1e-6);
   EXPECT_GT(contact.second().rotation().w() * contact.second().rotation().z(), 0);
+}
+
+TEST_F(BulletContactsTest, ImpulsesAreTheChangeOfMomentumWithFrictionInTheFrameOfTheBody) {
+  contacts_.AddObject(left_, 9);
+  // Off centre, so that friction takes part; turned, so that the frames of body and world differ.
+  right_.getWorldTransform().setOrigin({0.097F, 0.03F, 0});
+  left_.getWorldTransform().setRotation({btVector3(1, 2, 3), 0.7F});
+  btVector3 sum(0, 0, 0);
+  for (int i = 0; i < 10; ++i) {
+    step_.Clear();
+    world_.stepSimulation(0.001F, 0);
+    for (const v1::EngineContact& contact : step_.contacts()) {
+      EXPECT_FALSE(contact.has_second());
+      const v1::Vec3& impulse = contact.impulse_newton_seconds();
+      sum +=
+          left_.getWorldTransform().getBasis() * btVector3(impulse.x(), impulse.y(), impulse.z());
+    }
+  }
+  const btVector3 change = left_.getLinearVelocity() - btVector3(1, 0, 0);  // of 1 kg
+  ASSERT_LT(change.x(), -0.1);
+  ASSERT_GT(std::abs(change.y()), 0.01);
+  EXPECT_LT((sum - change).length(), 1e-9);
 }
 
 TEST_F(BulletContactsTest, PosesAreThoseOfTheBodies) {
