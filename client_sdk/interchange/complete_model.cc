@@ -27,9 +27,10 @@ Vector Cross(const Vector& a, const Vector& b) {
 
 double Dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
-/// The mean of |f| over a triangle, f linear with these values at its corners. Where one corner has
-/// a sign of its own, f vanishes along a line that cuts that corner off: the mean of f there is a
-/// third of its value, and the area the product of the two parts of the edges.
+/// Returns the mean of |f| over a triangle on which f is linear with these values at its corners.
+/// If one corner has another sign than the two others, f vanishes along a line that cuts this
+/// corner off. The mean of f over the part cut off is a third of its value at the corner, and the
+/// relative area of that part is the product of the relative lengths of its two edges.
 double MeanOfAbsolute(double a, double b, double c) {
   const double mean = (a + b + c) / 3;
   const double least = std::min({a, b, c});
@@ -50,7 +51,7 @@ std::vector<double> Couplings(const StoredModel& model) {
   for (size_t t = 0; t < model.triangle_count(); ++t) {
     const uint32_t* const corner = &model.triangles[3 * t];
     const Vector origin = VertexOf(model, corner[0]);
-    // The normal, twice the area long.
+    // The normal, whose length is twice the area.
     const Vector normal = Cross(Difference(VertexOf(model, corner[1]), origin),
                                 Difference(VertexOf(model, corner[2]), origin));
     const auto flow = [&](uint32_t vertex, size_t mode) {
@@ -66,7 +67,8 @@ std::vector<double> Couplings(const StoredModel& model) {
   return couplings;
 }
 
-/// By the divergence theorem, m^3; of no meaning where the surface is not closed.
+/// Returns the volume in m^3 by the divergence theorem. It is meaningless if the surface is not
+/// closed.
 double EnclosedVolume(const StoredModel& model) {
   double volume = 0;
   for (size_t t = 0; t < model.triangle_count(); ++t) {
@@ -77,7 +79,7 @@ double EnclosedVolume(const StoredModel& model) {
   return volume / 6;
 }
 
-/// Makes the sounding surface the one given as well, triangle by triangle.
+/// Makes the sounding surface the surface as given, triangle by triangle.
 void GiveSoundingSurface(StoredModel& model) {
   model.given_vertices = model.vertices;
   model.given_triangles = model.triangles;
@@ -93,7 +95,7 @@ absl::Status Complete(StoredModel& model) {
     model.residuals.assign(model.mode_count(), header.verification().max_residual());
   }
   if (model.given_triangle.empty()) GiveSoundingSurface(model);
-  // Of the right size, so that everything else is checked before it is used.
+  // The array has the right size, so that Validate() checks the others before they are used.
   const bool coupled = !model.couplings.empty();
   if (!coupled) model.couplings.assign(model.mode_count(), 0.0);
   absl::Status status = Validate(model);

@@ -6,10 +6,11 @@
 
 namespace carillon::interchange {
 
-/// Makes what a file of another format may leave out, and checks the whole: the surface as given
-/// (the sounding surface), the residuals (the largest that the header states), the couplings, the
-/// volume, and the eigenvalue up to which it is complete (the last). Estimated errors that are not
-/// one a mode are dropped. Errors: as Validate.
+/// Adds the parts of a model that a file of another format may leave out, and checks the model. The
+/// surface as given becomes the sounding surface, each residual the largest that the header states,
+/// and the eigenvalue up to which the model is complete the last one; couplings and volume are
+/// computed. Estimated errors are dropped unless there is one for each mode. Errors: those of
+/// Validate().
 absl::Status Complete(StoredModel& model);
 
 }  // namespace carillon::interchange

@@ -14,7 +14,7 @@ namespace {
 constexpr size_t kMostPoints = 256;
 constexpr double kSameFrequency = 1e-6;  // relative
 constexpr double kUnheardPerS = 1e-3;
-// The least and the greatest that material.proto allows.
+// The least and the greatest value that material.proto allows.
 constexpr double kLeastLossFactor = 1e-9, kGreatestLossFactor = 2 - 1e-9;
 
 double Omega(const DampedMode& mode) { return 2 * std::numbers::pi * mode.natural_hz; }
@@ -25,8 +25,8 @@ struct Rayleigh {
   double alpha2_per_s = 0;
 };
 
-/// The nearest by relative deviation, neither figure negative: least squares of
-/// x alpha1 + y alpha2 = 1 with x = omega^2/(2 d), y = 1/(2 d).
+/// Returns the damping with the least relative deviation and no negative figure: the least squares
+/// of x alpha1 + y alpha2 = 1 with x = omega^2/(2 d), y = 1/(2 d).
 Rayleigh FitRayleigh(const std::vector<DampedMode>& modes) {
   double xx = 0, xy = 0, yy = 0, x1 = 0, y1 = 0;
   for (const DampedMode& mode : modes) {
@@ -41,7 +41,7 @@ Rayleigh FitRayleigh(const std::vector<DampedMode>& modes) {
   }
   if (yy == 0) return {};
   const double determinant = xx * yy - xy * xy;
-  // One mode, or modes of one frequency, do not tell the two figures apart.
+  // One mode, or modes of one frequency, do not determine both figures.
   if (determinant > 1e-12 * xx * yy) {
     const Rayleigh both = {.alpha1_s = (x1 * yy - y1 * xy) / determinant,
                            .alpha2_per_s = (y1 * xx - x1 * xy) / determinant};
@@ -68,7 +68,7 @@ std::vector<LossFactorPoint> LossFactors(std::vector<DampedMode> modes) {
   return points;
 }
 
-/// As many as a material may have, the first and the last among them.
+/// Returns as many of the points as a material may have, among them the first and the last.
 std::vector<LossFactorPoint> Thinned(const std::vector<LossFactorPoint>& points) {
   if (points.size() <= kMostPoints) return points;
   std::vector<LossFactorPoint> kept;
@@ -81,7 +81,7 @@ std::vector<LossFactorPoint> Thinned(const std::vector<LossFactorPoint>& points)
 }  // namespace
 
 void FitDamping(const std::vector<DampedMode>& modes, v1::Material& material) {
-  // What is absent is zero.
+  // An absent figure is zero.
   material.set_alpha1_s(material.alpha1_s());
   material.set_alpha2_per_s(material.alpha2_per_s());
   if (DampingError(modes, material) <= kSameDamping) return;

@@ -7,22 +7,23 @@
 
 namespace carillon::interchange {
 
-/// How one mode decays: as exp(-d t).
+/// A mode that decays as exp(-d t).
 struct DampedMode {
   double natural_hz = 0;
   double decay_per_s = 0;  ///< d
 };
 
-/// Gives `material` the damping that makes the modes decay as they do: its own where that does so
-/// within a hundredth, else the nearest in proportion to stiffness and mass, else a loss factor
-/// at each of the modes, or at 256 of them.
+/// Gives `material` a damping with which the modes decay at their rates within kSameDamping. It
+/// keeps its own damping if that is near enough. Otherwise it gets the best damping proportional to
+/// stiffness and mass, and if that is not near enough, a loss factor at the frequency of each mode,
+/// or at those of 256 modes.
 void FitDamping(const std::vector<DampedMode>& modes, v1::Material& material);
 
-/// How far the decay rates that `material` gives are off, at most, as a share of the greater rate.
-/// Differences that take over a thousand seconds to be heard do not count.
+/// Returns the largest error of the decay rates that `material` gives, relative to the greater of
+/// both rates. Differences that become audible only after a thousand seconds do not count.
 double DampingError(const std::vector<DampedMode>& modes, const v1::Material& material);
 
-/// What differs no more than this is the same damping: a hundredth.
+/// The relative error of a decay rate up to which two dampings count as the same.
 inline constexpr double kSameDamping = 0.01;
 
 }  // namespace carillon::interchange

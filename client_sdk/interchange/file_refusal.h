@@ -6,17 +6,19 @@
 
 namespace carillon::interchange {
 
-/// The file breaks the rules of its format, or is damaged: InvalidArgument (MODEL_FILE_MALFORMED).
+/// Refuses a file that breaks the rules of its format or is damaged: InvalidArgument
+/// (MODEL_FILE_MALFORMED).
 absl::Status Malformed(absl::string_view what);
 
-/// The file is whole, but lacks what a modal model needs: InvalidArgument (MODEL_FILE_INCOMPLETE).
-/// `repair` says how to add it.
+/// Refuses a file that is whole but lacks a part of a modal model: InvalidArgument
+/// (MODEL_FILE_INCOMPLETE). `repair` says how to add that part.
 absl::Status Incomplete(absl::string_view what, absl::string_view repair);
 
-/// More than the format or the reader holds: ResourceExhausted (MODEL_FILE_TOO_LARGE).
+/// Refuses a file that is larger than its format or the reader allows: ResourceExhausted
+/// (MODEL_FILE_TOO_LARGE).
 absl::Status TooLarge(absl::string_view what);
 
-/// The memory did not suffice for the file: ResourceExhausted (OUT_OF_MEMORY).
+/// Refuses a file for which the memory did not suffice: ResourceExhausted (OUT_OF_MEMORY).
 absl::Status OutOfMemory(absl::string_view path);
 
 }  // namespace carillon::interchange

@@ -17,10 +17,10 @@ namespace {
 
 using nlohmann::json;
 
-// Types of components, by glTF's numbers.
+// The types of components, as glTF numbers them.
 constexpr uint64_t kByte = 5121, kShort = 5123, kInt = 5125, kFloat = 5126;
 
-/// Bytes of an accessor's pieces in a buffer.
+/// The bytes of the elements of an accessor in a buffer.
 struct Pieces {
   std::string_view bytes;  ///< from the first piece on
   uint64_t component = 0;
@@ -46,8 +46,8 @@ uint64_t Or(const json& value, uint64_t absent) {
   return value.is_null() ? absent : Whole(value).value_or(UINT64_MAX);
 }
 
-/// `count` pieces of `size` bytes, `stride` apart, within `bytes` from `offset` on? Without
-/// overflow.
+/// Returns whether `count` elements of `size` bytes at the distance `stride` lie within `bytes`
+/// from `offset` on. The check does not overflow.
 bool Fits(uint64_t bytes, uint64_t offset, uint64_t count, uint64_t stride, uint64_t size) {
   if (offset > bytes || size > bytes - offset || stride == 0) return false;
   return (count - 1) <= (bytes - offset - size) / stride;
@@ -117,7 +117,7 @@ std::vector<uint32_t> Widen(const Pieces& pieces) {
   return numbers;
 }
 
-/// The least (or greatest) of each component of vectors.
+/// Returns the least (or the greatest) value of each component of vectors.
 template <class Better>
 json Extreme(const std::vector<float>& numbers, Better better) {
   json extreme = {numbers[0], numbers[1], numbers[2]};
@@ -183,7 +183,7 @@ size_t AccessorWriter::Add(const std::vector<uint32_t>& numbers, Target target) 
 }
 
 size_t AccessorWriter::AddView(const void* data, size_t byte_count, Target target) {
-  // All arrays hold numbers of four bytes, so each begins where glTF wants it.
+  // All arrays hold numbers of four bytes, so each begins at a multiple of four, as glTF demands.
   json view = {{"buffer", 0}, {"byteOffset", bytes_.size()}, {"byteLength", byte_count}};
   if (target != Target::kNone) view["target"] = static_cast<int>(target);
   bytes_.append(static_cast<const char*>(data), byte_count);

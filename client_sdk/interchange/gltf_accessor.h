@@ -11,24 +11,27 @@
 
 namespace carillon::interchange {
 
-/// The numbers of the accessor whose index `property` is; `name` is for errors. "VEC3" gives three
-/// a piece. Errors: InvalidArgument (MODEL_FILE_MALFORMED), and those of GltfDocument::Buffer.
+/// Reads the floats of the accessor with the index `property`. An accessor of the type "VEC3" has
+/// three numbers for each element. Error messages call it `name`. Errors: InvalidArgument
+/// (MODEL_FILE_MALFORMED), and those of GltfDocument::Buffer.
 absl::StatusOr<std::vector<float>> ReadFloats(GltfDocument& file, const nlohmann::json& property,
                                               const std::string& name, const std::string& type);
 
-/// Likewise of whole numbers of 8, 16 or 32 bits.
+/// Reads the unsigned integers, of 8, 16 or 32 bits, of the accessor with the index `property`.
+/// Errors: those of ReadFloats.
 absl::StatusOr<std::vector<uint32_t>> ReadIndices(GltfDocument& file,
                                                   const nlohmann::json& property,
                                                   const std::string& name);
 
-/// Collects arrays in one buffer, with their accessors and buffer views.
+/// Collects arrays in one buffer, and describes them by accessors and buffer views.
 class AccessorWriter {
  public:
-  /// What a buffer view is for, by glTF's numbers.
+  /// The purpose of a buffer view, as glTF numbers it.
   enum class Target { kNone = 0, kVertices = 34962, kIndices = 34963 };
 
-  /// Adds "SCALAR" or "VEC3" floats; with the least and the greatest of each component where they
-  /// are vertices, as glTF demands. Returns the index of the accessor.
+  /// Adds floats of the type "SCALAR" or "VEC3", and returns the index of the accessor. For
+  /// vertices the accessor states the least and the greatest value of each component, which glTF
+  /// demands.
   size_t Add(const std::vector<float>& numbers, const std::string& type,
              Target target = Target::kNone);
   size_t Add(const std::vector<uint32_t>& numbers, Target target = Target::kNone);

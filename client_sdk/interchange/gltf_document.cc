@@ -51,10 +51,10 @@ absl::StatusOr<std::string> ReadFile(const std::string& path) {
     if (file.is_open() && !file.bad()) return bytes;
   }
   return Refusal(absl::StatusCode::kNotFound, "FILE_NOT_FOUND",
-                 absl::StrCat(path, " cannot be read: see its name and rights"));
+                 absl::StrCat(path, " cannot be read; check its name and its permissions"));
 }
 
-/// The pieces of a binary file.
+/// The chunks of a binary file.
 struct Chunks {
   std::string_view json;
   std::optional<std::string_view> binary;
@@ -94,8 +94,8 @@ std::optional<std::string> Unescape(absl::string_view uri) {
   return text;
 }
 
-/// The path of a file named by a relative URI; nullopt where it leaves the folder. Strangers' files
-/// must not make us read others.
+/// Returns the path of a file that a relative URI names, or nullopt if the path leaves the folder.
+/// An untrusted asset must not make this program read other files.
 std::optional<std::string> FileWithin(const std::string& folder, const std::string& uri) {
   const std::optional<std::string> name = Unescape(uri);
   if (!name || name->empty() || absl::StrContains(uri, ":")) return std::nullopt;
@@ -133,7 +133,7 @@ absl::StatusOr<GltfDocument> GltfDocument::Read(const std::string& path) {
     text = chunks->json;
     if (chunks->binary) document.binary_ = std::string(*chunks->binary);
   }
-  // What lies deeper is left out, lest it exhaust the stack of those who walk through.
+  // Deeper values are left out, so that recursive functions do not exhaust the stack.
   const auto shallow = [](int depth, json::parse_event_t, json&) { return depth <= kMostDepth; };
   document.root_ = json::parse(text, shallow, false);
   if (document.root_.is_discarded()) return Malformed("the glTF file is no JSON, or is cut short");
@@ -196,8 +196,10 @@ absl::Status WriteGltf(const std::string& path, json asset, std::string_view buf
     const std::string text = asset.dump(1, ' ', false, json::error_handler_t::replace);
     if (WriteWhole(path, {text})) return absl::OkStatus();
   }
-  return Refusal(absl::StatusCode::kInternal, "OUTPUT_NOT_WRITABLE",
-                 absl::StrCat(path, " cannot be written: see its folder, its rights and the room"));
+  return Refusal(
+      absl::StatusCode::kInternal, "OUTPUT_NOT_WRITABLE",
+      absl::StrCat(path,
+                   " cannot be written; check its folder, its permissions and the free space"));
 }
 
 const json& Member(const json& object, const char* key) {

@@ -13,8 +13,8 @@
 
 namespace carillon::interchange {
 
-/// A glTF 2.0 asset that is read, text or binary. Buffers are read when first asked for, so that
-/// textures never are. One thread at a time.
+/// Reads a glTF 2.0 asset, text or binary. A buffer is read when it is first asked for, so that
+/// textures are never read. One thread at a time may use a document.
 class GltfDocument {
  public:
   /// Errors: NotFound (FILE_NOT_FOUND), InvalidArgument (MODEL_FILE_MALFORMED).
@@ -22,8 +22,9 @@ class GltfDocument {
 
   const nlohmann::json& root() const { return root_; }
 
-  /// The bytes of buffer `index`: of the binary file, of a data URI, or of a file in the same
-  /// folder or below. Valid as long as the document. Errors: as Read.
+  /// Returns the bytes of the buffer `index`, from the binary file, a data URI, or a file in the
+  /// folder of the asset or below it. They are valid as long as the document. Errors: those of
+  /// Read().
   absl::StatusOr<std::string_view> Buffer(uint64_t index);
 
  private:
@@ -35,23 +36,23 @@ class GltfDocument {
   std::map<uint64_t, std::string> buffers_;
 };
 
-/// Writes an asset of one buffer, whose description is added: as one binary file, or as text with
-/// the buffer in a data URI. Under another name first, so that `path` never holds half of it.
-/// Errors: Internal (OUTPUT_NOT_WRITABLE), ResourceExhausted (MODEL_FILE_TOO_LARGE: a binary file
-/// over 4 GiB).
+/// Writes an asset with one buffer, and adds the description of the buffer to the asset. The result
+/// is one binary file, or a text with the buffer in a data URI. The file gets the name `path` when
+/// it is complete. Errors: Internal (OUTPUT_NOT_WRITABLE), ResourceExhausted (MODEL_FILE_TOO_LARGE:
+/// a binary file over 4 GiB).
 absl::Status WriteGltf(const std::string& path, nlohmann::json asset, std::string_view buffer,
                        bool binary);
 
-/// The member of an object; a null where there is none, or no object.
+/// Returns the member `key` of `object`, or a null if there is none or `object` is no object.
 const nlohmann::json& Member(const nlohmann::json& object, const char* key);
 
-/// A whole number that is not negative, or nullopt.
+/// Returns `value` if it is a whole number that is not negative, otherwise nullopt.
 std::optional<uint64_t> Whole(const nlohmann::json& value);
 
-/// A finite number, or nullopt.
+/// Returns `value` if it is a finite number, otherwise nullopt.
 std::optional<double> Number(const nlohmann::json& value);
 
-/// A text, or an empty one.
+/// Returns `value` if it is a text, otherwise an empty text.
 std::string Text(const nlohmann::json& value);
 
 }  // namespace carillon::interchange

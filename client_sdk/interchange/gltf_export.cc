@@ -22,7 +22,7 @@ using nlohmann::json;
 constexpr double kHighestHeardHz = 20000;
 constexpr double kPoissonTolerance = 1e-4;
 
-/// A mode as the material makes it.
+/// A mode with the frequency and the decay rate that the material gives it.
 struct SoundingMode {
   size_t column = 0;
   double frequency_hz = 0;  ///< damped
@@ -40,7 +40,7 @@ std::vector<double> ShapeNorms(const StoredModel& model) {
   return squares;
 }
 
-/// The draft wants the most audible modes first, for those who render only some.
+/// Orders modes by audibility, as the draft demands for programs that render only some of them.
 bool Precedes(const SoundingMode& a, const SoundingMode& b) {
   const bool a_heard = a.frequency_hz <= kHighestHeardHz;
   const bool b_heard = b.frequency_hz <= kHighestHeardHz;
@@ -63,7 +63,7 @@ std::vector<SoundingMode> SoundingModes(const StoredModel& model, const v1::Mate
   return modes;
 }
 
-/// Mode by mode, each a vector a vertex, for that density.
+/// Returns the shapes for this density, mode by mode, with one vector for each vertex.
 std::vector<float> Shapes(const StoredModel& model, const std::vector<SoundingMode>& modes,
                           double density_kg_per_m3) {
   const double scale = 1 / std::sqrt(density_kg_per_m3);
@@ -85,7 +85,7 @@ std::vector<float> Each(const std::vector<SoundingMode>& modes, double SoundingM
   return figures;
 }
 
-/// The header as it is true of the modes that are written, ordered by frequency.
+/// Returns the header for the modes that are written, ordered by frequency.
 v1::ModalModelHeader HeaderOf(const StoredModel& model, const std::vector<SoundingMode>& modes) {
   v1::ModalModelHeader header = model.header;
   header.set_mode_count(static_cast<uint32_t>(modes.size()));
@@ -106,7 +106,7 @@ json MaterialOf(const v1::Material& material, const std::string& name) {
   json result = {{"density", material.density_kg_per_m3()},
                  {"youngsModulus", material.young_pa()},
                  {"poissonRatio", material.poisson_ratio()}};
-  // Two figures do not say what a loss factor does; then the decay rates stand alone.
+  // Two figures cannot express a loss factor; then the file has the decay rates only.
   if (material.loss_factor_size() == 0) {
     result["alpha"] = material.alpha2_per_s();
     result["beta"] = material.alpha1_s();

@@ -30,7 +30,7 @@ using nlohmann::json;
 constexpr double kPoissonTolerance = 1e-4;
 constexpr double kOmegaPerHz = 2 * std::numbers::pi;
 
-/// The arrays of a modal model as they lie in the file.
+/// The arrays of a modal model in the order of the file.
 struct GltfModes {
   std::vector<float> frequencies_hz;
   std::vector<float> decay_rates_per_s;
@@ -94,7 +94,8 @@ absl::StatusOr<GltfModes> ReadModes(GltfDocument& file, const json& model) {
   return modes;
 }
 
-/// Figures of the file where `given` has none. Damping stays open where neither has it.
+/// Returns `given` with the figures of the file added where it has none. If neither has a damping,
+/// the result has none.
 absl::StatusOr<v1::Material> MaterialOf(const GltfDocument& file, const json& model,
                                         const v1::Material& given) {
   const json& materials =
@@ -142,7 +143,7 @@ std::vector<DampedMode> Damped(const GltfModes& modes) {
   return damped;
 }
 
-/// Makes the material damp as the decay rates say; warns where it cannot.
+/// Gives the material a damping that fits the decay rates, and adds a warning if there is none.
 void SetDamping(const std::vector<DampedMode>& modes, v1::Material& material,
                 v1::ModalModelHeader& header) {
   FitDamping(modes, material);
@@ -154,8 +155,8 @@ void SetDamping(const std::vector<DampedMode>& modes, v1::Material& material,
                       100 * off));
 }
 
-/// Eigenvalues for unit material, ascending, and shapes with their modes in that order: those of
-/// `points`, one for each vertex.
+/// Sets the eigenvalues for unit material, ascending, and the shapes with their modes in that
+/// order. The shape at a vertex is that at its point in `points`.
 void SetModes(const GltfModes& modes, const std::vector<DampedMode>& damped,
               const std::vector<uint32_t>& points, const v1::Material& material,
               StoredModel& model) {
@@ -178,9 +179,9 @@ void SetModes(const GltfModes& modes, const std::vector<DampedMode>& damped,
   }
 }
 
-/// The sounding surface: the triangles between the sample points, or else the mesh of the node,
-/// each of whose vertices moves as the nearest sample point, as the draft has it. Returns the
-/// sample point of each vertex.
+/// Reads the sounding surface: the triangles between the sample points or, without them, the mesh
+/// of the node, each vertex of which moves like the nearest sample point, as the draft demands.
+/// Returns the sample point of each vertex.
 absl::StatusOr<std::vector<uint32_t>> SetSurface(GltfDocument& file, const ChosenModel& chosen,
                                                  const GltfModes& modes, StoredModel& model) {
   std::vector<uint32_t> points(modes.point_count());
@@ -204,8 +205,8 @@ absl::StatusOr<std::vector<uint32_t>> SetSurface(GltfDocument& file, const Chose
   return points;
 }
 
-/// The surface as given, where a Carillon wrote the file and nobody has changed it since; else it
-/// is left out.
+/// Reads the surface as given if Carillon wrote the file and no program has changed it since;
+/// otherwise leaves it out.
 void SetGivenSurface(GltfDocument& file, const ChosenModel& chosen, StoredModel& model) {
   const json& ours = Member(Member(Member(*chosen.model, "extras"), "carillon"), "givenTriangle");
   if (ours.is_null() || !chosen.mesh) return;
@@ -220,7 +221,8 @@ void SetGivenSurface(GltfDocument& file, const ChosenModel& chosen, StoredModel&
   for (float& x : model.given_vertices) x = static_cast<float>(x * chosen.metres_per_unit);
 }
 
-/// A name of at most 200 bytes, as labels are; no character is cut.
+/// Returns the longest beginning of a name that has at most 200 bytes, the limit of labels, and no
+/// incomplete character.
 std::string ShortText(const json& value) {
   std::string text = Text(value);
   size_t size = std::min<size_t>(text.size(), 200);
@@ -229,7 +231,7 @@ std::string ShortText(const json& value) {
   return text;
 }
 
-/// The header that a Carillon wrote, where it is still true; else what the file says of itself.
+/// Returns the header that Carillon wrote if it is still true; otherwise makes one from the file.
 v1::ModalModelHeader HeaderOf(const GltfDocument& file, const ChosenModel& chosen,
                               const GltfModes& modes, const v1::Material& material) {
   const json& ours = Member(Member(Member(*chosen.model, "extras"), "carillon"), "header");

@@ -27,7 +27,7 @@ struct SoundingNode {
   uint64_t model = 0;
 };
 
-/// What of a list of a glTF there is; an empty one where there is none.
+/// Returns a list of the glTF, which is empty if the file has none.
 const json& List(const json& object, const char* key) {
   static const json empty = json::array();
   const json& list = Member(object, key);
@@ -49,7 +49,8 @@ std::vector<SoundingNode> SoundingNodes(const json& nodes) {
   return found;
 }
 
-/// The number of the model that `pick` means; a node's name leaves only that node.
+/// Returns the number of the model that `pick` means. If `pick` is the name of a node, only that
+/// node remains.
 absl::StatusOr<uint64_t> Pick(const json& models, const json& nodes, const std::string& pick,
                               std::vector<SoundingNode>& sounding) {
   if (pick.empty() && models.size() == 1) return 0;
@@ -87,7 +88,7 @@ std::optional<std::vector<double>> Numbers(const json& list, size_t count) {
   return numbers;
 }
 
-/// The three columns that a quaternion (x, y, z, w) turns the axes into, by its length squared.
+/// Returns the rotation matrix of a quaternion (x, y, z, w), multiplied by its squared length.
 Matrix Turn(const std::vector<double>& q) {
   const double x = q[0], y = q[1], z = q[2], w = q[3];
   return {{{w * w + x * x - y * y - z * z, 2 * (x * y + w * z), 2 * (x * z - w * y)},
@@ -126,7 +127,7 @@ Matrix Product(const Matrix& a, const Matrix& b) {
   return product;
 }
 
-/// The factor by which a matrix scales every direction; nullopt where directions differ.
+/// Returns the factor by which a matrix scales all directions, or nullopt if directions differ.
 std::optional<double> UniformScale(const Matrix& matrix) {
   const auto dot = [&](size_t a, size_t b) {
     return matrix[a][0] * matrix[b][0] + matrix[a][1] * matrix[b][1] + matrix[a][2] * matrix[b][2];
@@ -142,7 +143,7 @@ std::optional<double> UniformScale(const Matrix& matrix) {
   return std::sqrt(square);
 }
 
-/// The parent of each node, or the number of nodes for those that have none.
+/// Returns the parent of each node; for a node without one, the number of nodes.
 std::vector<uint64_t> Parents(const json& nodes) {
   std::vector<uint64_t> parents(nodes.size(), nodes.size());
   for (uint64_t i = 0; i < nodes.size(); ++i) {

@@ -12,17 +12,18 @@
 
 namespace carillon::interchange {
 
-/// One modal model of a glTF, and how large the body is that it describes.
+/// A modal model of a glTF, and the scale of the body that it describes.
 struct ChosenModel {
   const nlohmann::json* model = nullptr;
-  /// Metres in a unit of its positions: the scale of the nodes that sound with it.
+  /// The number of metres in a unit of its positions, from the scale of the nodes that sound with
+  /// the model.
   double metres_per_unit = 1;
-  std::optional<uint64_t> mesh;  ///< of such a node
+  std::optional<uint64_t> mesh;  ///< the mesh of such a node
 };
 
-/// Chooses by `pick`, as ReadGltfModel does. Errors: InvalidArgument (MODEL_FILE_INCOMPLETE: there
-/// is none; MODEL_FILE_AMBIGUOUS: there are several, or its nodes differ in scale;
-/// MODEL_FILE_MALFORMED).
+/// Chooses a model by the `pick` of ReadGltfModel. Errors: InvalidArgument (MODEL_FILE_INCOMPLETE:
+/// there is no such model; MODEL_FILE_AMBIGUOUS: there are several, or the nodes of the model
+/// differ in scale; MODEL_FILE_MALFORMED).
 absl::StatusOr<ChosenModel> ChooseModel(const GltfDocument& file, const std::string& pick);
 
 }  // namespace carillon::interchange

@@ -43,8 +43,8 @@ double SquaredDistance(const float* a, const float* b) {
   return x * x + y * y + z * z;
 }
 
-/// The nearest point to `place` of those in `order`, which ascend by x: outwards from its own x
-/// until x alone is further away than the best.
+/// Returns the point nearest to `place`. The points in `order` ascend by x; the search goes
+/// outwards from the x of `place` until the distance in x alone exceeds the least distance found.
 uint32_t Nearest(const std::vector<float>& points, const std::vector<uint32_t>& order,
                  const float* place) {
   const auto x = [&](uint32_t point) { return points[3 * size_t{point}]; };

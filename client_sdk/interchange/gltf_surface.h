@@ -10,22 +10,22 @@
 
 namespace carillon::interchange {
 
-/// Vertices (three floats each) and triangles (three indices each, all of them in range).
+/// A surface: three floats for each vertex, and three indices, all in range, for each triangle.
 struct GltfSurface {
   std::vector<float> vertices;
   std::vector<uint32_t> triangles;
 };
 
-/// The triangles of a mesh, one primitive after the other. Errors: InvalidArgument
-/// (MODEL_FILE_MALFORMED, MODEL_FILE_INCOMPLETE: it has no triangles).
+/// Reads the triangles of all primitives of a mesh, one primitive after the other. Errors:
+/// InvalidArgument (MODEL_FILE_MALFORMED; MODEL_FILE_INCOMPLETE: the mesh has no triangles).
 absl::StatusOr<GltfSurface> ReadMesh(GltfDocument& file, uint64_t mesh);
 
-/// Whether there are triangles, three indices each, of so many vertices. Errors: InvalidArgument
-/// (MODEL_FILE_MALFORMED).
+/// Checks that there are triangles, and that each has three indices below `vertex_count`. Errors:
+/// InvalidArgument (MODEL_FILE_MALFORMED).
 absl::Status CheckTriangles(const std::vector<uint32_t>& triangles, size_t vertex_count);
 
-/// For each of `places`, the index of the nearest of `points` (three finite floats each, at least
-/// one of them).
+/// Returns for each of `places` the index of the nearest of `points`. A point and a place are three
+/// finite floats each, and there is at least one point.
 std::vector<uint32_t> NearestPoints(const std::vector<float>& points,
                                     const std::vector<float>& places);
 

@@ -10,7 +10,7 @@ std::string ToJson(v1::ModalModelHeader header) {
   google::protobuf::util::JsonPrintOptions options;
   options.preserve_proto_field_names = true;
   std::string json;
-  // It holds no Any and no timestamp, so nothing in it can fail to print.
+  // The header has no Any and no timestamp, so the conversion cannot fail.
   static_cast<void>(google::protobuf::util::MessageToJsonString(header, &json, options));
   return json;
 }

@@ -8,10 +8,11 @@
 
 namespace carillon::interchange {
 
-/// The header as JSON with the names of the .proto, without what the arrays beside it say.
+/// Returns the header as JSON with the field names of the .proto, without the fields that describe
+/// the arrays.
 std::string ToJson(v1::ModalModelHeader header);
 
-/// nullopt for what is no such header. Names of a later version are left out.
+/// Returns nullopt if the text is not such a header. Fields of a later version are left out.
 std::optional<v1::ModalModelHeader> HeaderFromJson(const std::string& json);
 
 }  // namespace carillon::interchange

@@ -10,13 +10,14 @@
 
 namespace carillon::interchange {
 
-/// Puts a model together from the records that a daemon sends, which has checked their hashes.
+/// Assembles a model from the records that a daemon sends. The daemon has checked their hashes.
 class ModelAssembler {
  public:
-  /// Errors: InvalidArgument (MODEL_FILE_MALFORMED), after which it is of no further use.
+  /// Takes the next record. After an error the assembler is of no further use. Errors:
+  /// InvalidArgument (MODEL_FILE_MALFORMED).
   absl::Status Append(const v1::ModalModelRecord& record);
 
-  /// Call once, last. Errors: as Validate.
+  /// Returns the model. Call it once, after the last record. Errors: those of Validate().
   absl::StatusOr<StoredModel> Finish();
 
  private:
@@ -25,7 +26,8 @@ class ModelAssembler {
   StoredModel model_;
 };
 
-/// Hands the records of `model` to `sink` in order and stops at its first error, which is returned.
+/// Passes the records of `model` to `sink` in order. Stops at the first error of `sink` and returns
+/// it.
 absl::Status SendRecords(const StoredModel& model,
                          const std::function<absl::Status(const v1::ModalModelRecord&)>& sink);
 

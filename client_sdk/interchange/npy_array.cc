@@ -29,7 +29,7 @@ absl::Status Bad(const std::string& name, absl::string_view what) {
   return Malformed(absl::StrCat("array \"", name, "\" ", what));
 }
 
-/// What follows `key` in the header's text, a Python dictionary.
+/// Returns the text after `key` in the text of the header, which is a Python dictionary.
 std::optional<absl::string_view> After(absl::string_view text, absl::string_view key) {
   const size_t at = text.find(absl::StrCat("'", key, "'"));
   if (at == absl::string_view::npos) return std::nullopt;
@@ -38,7 +38,7 @@ std::optional<absl::string_view> After(absl::string_view text, absl::string_view
   return absl::StripLeadingAsciiWhitespace(rest.substr(1));
 }
 
-/// The part of `text` between `open`, with which it must begin, and the next `close`.
+/// Returns the part of `text` between `open`, with which the text must begin, and the next `close`.
 std::optional<absl::string_view> Between(std::optional<absl::string_view> text, char open,
                                          char close) {
   if (!text || text->empty() || text->front() != open) return std::nullopt;
@@ -57,7 +57,7 @@ std::optional<std::vector<uint64_t>> ParseShape(absl::string_view text) {
   return shape;
 }
 
-/// Bytes of one number, zero for a type of which nothing is read.
+/// Returns the bytes of one number, or zero for a type that is not supported.
 uint64_t ItemBytes(const std::string& type) {
   uint64_t size = 0;
   if (type.size() < 3 || !absl::SimpleAtoi(type.substr(2), &size) || size > kMostItemBytes)
@@ -69,7 +69,7 @@ uint64_t ItemBytes(const std::string& type) {
   return number ? size : 0;
 }
 
-/// Bytes that the whole array takes; nullopt where that is beyond all memory.
+/// Returns the bytes of the whole array, or nullopt if they exceed the address space.
 std::optional<uint64_t> ByteCount(uint64_t item_bytes, const std::vector<uint64_t>& shape) {
   uint64_t count = item_bytes;
   for (const uint64_t size : shape) {
@@ -79,7 +79,7 @@ std::optional<uint64_t> ByteCount(uint64_t item_bytes, const std::vector<uint64_
   return count;
 }
 
-/// From column-major to row-major: the last index of the shape runs fastest in `turned`.
+/// Transposes from column-major to row-major order: in `turned` the last index runs fastest.
 std::string Turned(std::string_view bytes, const std::vector<uint64_t>& shape, uint64_t item) {
   std::string turned;
   turned.reserve(bytes.size());
@@ -98,7 +98,7 @@ std::string Turned(std::string_view bytes, const std::vector<uint64_t>& shape, u
   return turned;
 }
 
-/// The length of the header's text, and where the text begins.
+/// The length and the beginning of the text of the header.
 struct HeaderPlace {
   size_t begin = 0;
   size_t length = 0;

@@ -32,7 +32,8 @@ absl::StatusOr<std::optional<NpyArray>> ReadArray(const ZipReader& archive,
   return *std::move(array);
 }
 
-/// Reads the arrays that are there, each of the shape that its letters and the arrays before say.
+/// Reads the arrays of the file. The shape of each must agree with its letters and with the arrays
+/// before it.
 class ArrayReader {
  public:
   explicit ArrayReader(const ZipReader& archive) : archive_(archive) {}

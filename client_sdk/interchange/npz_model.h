@@ -9,16 +9,17 @@
 
 namespace carillon::interchange {
 
-/// A modal model as NumPy's .npz: each array of the stored form under its own name, with its own
-/// type and shape, and "header", a text: the header as JSON. README.md here has the table.
+/// A modal model in NumPy's .npz format: each array of the stored form under its own name, with its
+/// own type and shape, and a text "header" that is the header as JSON. README.md in this folder has
+/// the table.
 
-/// Errors: Internal (OUTPUT_NOT_WRITABLE).
+/// Writes a model. Errors: Internal (OUTPUT_NOT_WRITABLE).
 absl::Status WriteNpz(const std::string& path, const StoredModel& model);
 
-/// Needs "eigenvalues", "vertices", "triangles", "shapes", and "header" or else "poisson_ratio", a
-/// number; what else is missing is made of these. Errors: NotFound (FILE_NOT_FOUND),
-/// InvalidArgument (MODEL_FILE_MALFORMED, MODEL_FILE_INCOMPLETE), ResourceExhausted
-/// (MODEL_FILE_TOO_LARGE, OUT_OF_MEMORY).
+/// Reads a model. The file needs "eigenvalues", "vertices", "triangles", "shapes", and either
+/// "header" or the number "poisson_ratio"; Complete() adds the other parts. Errors: NotFound
+/// (FILE_NOT_FOUND), InvalidArgument (MODEL_FILE_MALFORMED, MODEL_FILE_INCOMPLETE),
+/// ResourceExhausted (MODEL_FILE_TOO_LARGE, OUT_OF_MEMORY).
 absl::StatusOr<StoredModel> ReadNpz(const std::string& path);
 
 }  // namespace carillon::interchange

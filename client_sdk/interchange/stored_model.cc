@@ -46,7 +46,7 @@ absl::Status CheckIndices(const char* name, const std::vector<uint32_t>& indices
 absl::Status CheckSizes(const StoredModel& model) {
   absl::Status status = absl::OkStatus();
   VisitArrays(model, [&](const char* name, const auto& numbers, const char* dimensions) {
-    // Zero where a size is zero, or where the product is beyond all memory.
+    // The expected number is zero if a size is zero or if the product overflows.
     uint64_t expected = 1;
     for (const uint64_t size : Shape(model, dimensions)) {
       const bool fits = size > 0 && expected <= std::numeric_limits<uint64_t>::max() / size;

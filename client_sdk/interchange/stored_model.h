@@ -10,11 +10,12 @@
 
 namespace carillon::interchange {
 
-/// A modal model in memory as proto/carillon/v1/modal_model.proto stores it: unit Young's modulus
-/// and density. Arrays are flat and row-major, with #V vertices and #T triangles of the sounding
-/// surface, #G and #H of the surface as given, #m modes.
+/// A modal model in memory, in the form in which proto/carillon/v1/modal_model.proto stores it,
+/// with Young's modulus and density of one. Arrays are flat and row-major. There are #m modes, #V
+/// vertices and #T triangles of the sounding surface, and #G vertices and #H triangles of the
+/// surface as given.
 struct StoredModel {
-  /// All but what the arrays say: `arrays` and `mode_count` are filled in where it is written.
+  /// The header without `arrays` and `mode_count`, which the writers fill in.
   v1::ModalModelHeader header;
   std::vector<double> eigenvalues;        ///< #m, ascending
   std::vector<double> residuals;          ///< #m
@@ -31,8 +32,8 @@ struct StoredModel {
   size_t triangle_count() const { return triangles.size() / 3; }
 };
 
-/// Calls `visit(name, numbers, dimensions)` for each array of format version 1 in its order. Each
-/// letter of `dimensions` is one of modal_model.proto, or '3'.
+/// Calls `visit(name, numbers, dimensions)` for each array of format version 1, in the order of the
+/// format. Each letter of `dimensions` is one that modal_model.proto uses, or '3'.
 template <class Model, class Visitor>
 void VisitArrays(Model& model, Visitor visit) {
   visit("eigenvalues", model.eigenvalues, "m");
@@ -46,11 +47,12 @@ void VisitArrays(Model& model, Visitor visit) {
   visit("shapes", model.shapes, "V3m");
 }
 
-/// The sizes that the letters of VisitArrays stand for.
+/// Returns the sizes for which the letters of VisitArrays stand.
 std::vector<uint64_t> Shape(const StoredModel& model, std::string_view dimensions);
 
-/// Whether the arrays fit together, numbers are finite, eigenvalues positive and ascending, and
-/// indices in range. Errors: InvalidArgument (MODEL_FILE_MALFORMED).
+/// Checks that the sizes of the arrays agree, that numbers are finite, that eigenvalues are
+/// positive and ascending, and that indices are in range. Errors: InvalidArgument
+/// (MODEL_FILE_MALFORMED).
 absl::Status Validate(const StoredModel& model);
 
 }  // namespace carillon::interchange

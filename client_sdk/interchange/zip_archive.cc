@@ -31,13 +31,14 @@ std::string Words(int error) {
 }
 
 absl::Status NotWritable(const std::string& path, const std::string& why) {
-  return Refusal(absl::StatusCode::kInternal, "OUTPUT_NOT_WRITABLE",
-                 absl::StrCat(path, ": ", why, "; see its folder, its rights and the room"));
+  return Refusal(
+      absl::StatusCode::kInternal, "OUTPUT_NOT_WRITABLE",
+      absl::StrCat(path, ": ", why, "; check its folder, its permissions and the free space"));
 }
 
-/// Adds an entry whose bytes stay the caller's.
+/// Adds an entry, whose bytes the caller keeps alive until the archive is closed.
 bool Add(zip_t* archive, const ZipEntry& entry) {
-  // libzip reads of fragments only, and takes no const.
+  // libzip reads fragments only, and takes pointers to non-const bytes.
   std::array<zip_buffer_fragment_t, 2> pieces = {
       {{reinterpret_cast<zip_uint8_t*>(const_cast<char*>(entry.head.data())), entry.head.size()},
        {reinterpret_cast<zip_uint8_t*>(const_cast<char*>(entry.body.data())), entry.body.size()}}};
@@ -49,7 +50,7 @@ bool Add(zip_t* archive, const ZipEntry& entry) {
     return false;
   }
   const auto place = static_cast<zip_uint64_t>(index);
-  // The same model gives the same bytes, whenever it is written: the format's first day.
+  // All entries have the first day of the format, so that a model gives the same bytes at any time.
   constexpr zip_uint16_t kFirstDay = (1U << 5U) | 1U;
   return zip_set_file_compression(archive, place, ZIP_CM_STORE, 0) == 0 &&
          zip_file_set_dostime(archive, place, 0, kFirstDay, 0) == 0;
@@ -73,9 +74,9 @@ absl::StatusOr<ZipReader> ZipReader::Open(const std::string& path) {
     return ZipReader(std::make_unique<State>(State{std::unique_ptr<zip_t, Discard>(archive)}));
   }
   if (error == ZIP_ER_NOENT || error == ZIP_ER_OPEN || error == ZIP_ER_READ) {
-    return Refusal(
-        absl::StatusCode::kNotFound, "FILE_NOT_FOUND",
-        absl::StrCat(path, " cannot be read (", Words(error), "): see its name and rights"));
+    return Refusal(absl::StatusCode::kNotFound, "FILE_NOT_FOUND",
+                   absl::StrCat(path, " cannot be read (", Words(error),
+                                "); check its name and its permissions"));
   }
   return Malformed(absl::StrCat(path, " is no .npz file, or is cut short (", Words(error), ")"));
 }
@@ -88,7 +89,7 @@ absl::StatusOr<std::optional<std::string>> ZipReader::Read(const std::string& na
       zip_fopen_index(archive, static_cast<zip_uint64_t>(index), 0));
   std::string bytes;
   zip_int64_t got = file == nullptr ? -1 : 1;
-  // Piece by piece: the size that the archive states may be a lie.
+  // The file is read piece by piece, because the size that the archive states may be wrong.
   while (got > 0 && bytes.size() <= kMostBytes) {
     const size_t before = bytes.size();
     bytes.resize(before + kPieceBytes);
@@ -108,7 +109,7 @@ absl::Status WriteZip(const std::string& path, const std::vector<ZipEntry>& entr
   const bool added = std::ranges::all_of(
       entries, [&](const ZipEntry& entry) { return Add(archive.get(), entry); });
   if (added && zip_close(archive.get()) == 0) {
-    // Closing has freed it.
+    // zip_close() has freed the archive.
     static_cast<void>(archive.release());
     return absl::OkStatus();
   }

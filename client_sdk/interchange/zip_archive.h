@@ -12,7 +12,7 @@
 
 namespace carillon::interchange {
 
-/// A zip file that is read. One thread at a time.
+/// Reads a zip file. One thread at a time may use a reader.
 class ZipReader {
  public:
   /// Errors: NotFound (FILE_NOT_FOUND), InvalidArgument (MODEL_FILE_MALFORMED).
@@ -21,8 +21,9 @@ class ZipReader {
   ZipReader& operator=(ZipReader&&) noexcept;
   ~ZipReader();
 
-  /// A file in it; nullopt where there is none of that name. Errors: InvalidArgument
-  /// (MODEL_FILE_MALFORMED: damaged), ResourceExhausted (MODEL_FILE_TOO_LARGE: over 4 GiB).
+  /// Returns the file `name` of the archive, or nullopt if there is none. Errors: InvalidArgument
+  /// (MODEL_FILE_MALFORMED: the file is damaged), ResourceExhausted (MODEL_FILE_TOO_LARGE: the file
+  /// is larger than 4 GiB).
   absl::StatusOr<std::optional<std::string>> Read(const std::string& name) const;
 
  private:
@@ -32,15 +33,15 @@ class ZipReader {
   std::unique_ptr<State> state_;
 };
 
-/// A file to be put into a zip file: two pieces of memory, one after the other.
+/// A file to be written into a zip file. Its content is `head` followed by `body`.
 struct ZipEntry {
   std::string name;
   std::string head;
   std::string_view body;
 };
 
-/// Writes a zip file without compression, under another name first, so that `path` never holds half
-/// of it. Errors: Internal (OUTPUT_NOT_WRITABLE).
+/// Writes a zip file without compression. The file gets the name `path` when it is complete.
+/// Errors: Internal (OUTPUT_NOT_WRITABLE).
 absl::Status WriteZip(const std::string& path, const std::vector<ZipEntry>& entries);
 
 }  // namespace carillon::interchange

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What lies, slides or rolls on a rough floor in Bullet or in ODE, recorded as a contact trace: how
-// a simulator hands on contacts of which it does not know whether they are blows or loads.
+// Records a contact trace of a body that rests, slides or rolls on a rough floor in Bullet or in
+// ODE. It shows how a simulator sends its contacts as the engine reports them, blows and loads
+// alike.
 #include <CLI/CLI.hpp>
 #include <map>
 #include <string>
@@ -41,22 +42,22 @@ absl::Status Record(const Options& options) {
 }
 
 int Main(int argc, char** argv) {
-  CLI::App app("A box or a bowl on a rough floor, as a contact trace.");
+  CLI::App app("Records a contact trace of a box or a bowl on a rough floor.");
   Options options;
   const std::map<std::string, Scene> scenes = {
       {"rest", Scene::kRest}, {"drag", Scene::kDrag}, {"roll", Scene::kRoll}};
-  app.add_option("trace", options.trace, "file to write")->required();
-  app.add_option("--model", options.model, "modal model of the box or bowl")->required();
-  app.add_option("--material", options.material, "what it is made of")->capture_default_str();
-  app.add_option("--engine", options.engine, "the engine")
+  app.add_option("trace", options.trace, "The contact trace to write")->required();
+  app.add_option("--model", options.model, "The modal model of the box or the bowl")->required();
+  app.add_option("--material", options.material, "The material of the body")->capture_default_str();
+  app.add_option("--engine", options.engine, "The physics engine")
       ->check(CLI::IsMember({"bullet", "ode"}))
       ->capture_default_str();
-  app.add_option("--scene", options.scene, "rest, drag or roll")
+  app.add_option("--scene", options.scene, "The motion: rest, drag or roll")
       ->transform(CLI::CheckedTransformer(scenes));
-  app.add_option("--rate", options.rate_hz, "steps a second")
+  app.add_option("--rate", options.rate_hz, "The number of simulation steps in a second")
       ->check(CLI::Range(20.0, 10000.0))
       ->capture_default_str();
-  app.add_option("--seconds", options.seconds, "how long")->capture_default_str();
+  app.add_option("--seconds", options.seconds, "The simulated time, s")->capture_default_str();
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -9,30 +9,30 @@
 
 namespace carillon::rough_floor {
 
-/// What happens on the floor.
+/// The motion on the floor.
 enum class Scene {
-  kRest,  ///< a box falls from 5 cm and lies there
-  kDrag,  ///< the same, and after two seconds it is dragged along at 0.5 m/s for two
-  kRoll,  ///< a bowl, tilted, rolls about on its outside
+  kRest,  ///< a box falls from 5 cm and comes to rest
+  kDrag,  ///< the same box is dragged at 0.5 m/s between the second and the fourth second
+  kRoll,  ///< a tilted bowl rolls on its outside
 };
 
 inline constexpr double kDropHeight_m = 0.05;
 inline constexpr double kDragStart_s = 2, kDragEnd_s = 4, kDragSpeed_m_per_s = 0.5;
 inline constexpr double kTilt_rad = 1.1, kRollSpin_rad_per_s = 9;
 
-/// What lies on the floor; its frame's origin is its centre of mass.
+/// The body on the floor. The origin of its frame is its centre of mass.
 struct Body {
   std::array<double, 3> box_m{0.20, 0.14, 0.03};  ///< sides
-  /// Of the bowl, half a thin sphere that opens along +z: the middle of the sphere is at half its
-  /// radius above the origin, m R^2 (2/3 about z, 5/12 across) its moments of inertia.
+  /// The bowl is half a thin sphere that opens along +z. The centre of the sphere is half a radius
+  /// above the origin. The moments of inertia are 2/3 m R^2 about z and 5/12 m R^2 about x and y.
   double bowl_radius_m = 0.08;
   double mass_kg = 2;
 };
 
-/// One step of a simulation, of which object 1 is the body.
+/// Advances a simulation by one step and returns its contacts. The body is the object 1.
 using Simulation = std::function<v1::ContactStep()>;
 
-/// The scene in Bullet, and in ODE, with steps of `step_s`.
+/// Simulates the scene in Bullet or in ODE with steps of `step_s` seconds.
 Simulation SimulateInBullet(Scene scene, const Body& body, double step_s);
 Simulation SimulateInOde(Scene scene, const Body& body, double step_s);
 
