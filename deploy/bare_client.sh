@@ -22,7 +22,7 @@ trap clean_up EXIT
 
 # The tree has the network of this machine, so it reaches the loopback interface.
 "$bin/carillond" --data-dir "$scratch/data" --listen 127.0.0.1:0 --audio-device null >"$scratch/said" &
-started+=($!)
+started=("$!" "${started[@]}")  # the last one started ends first
 for _ in {1..100}; do
   if grep -q '^listening on ' "$scratch/said"; then break; fi
   sleep 0.1
@@ -50,7 +50,7 @@ model=$("$bin/carillon" model create "$scratch/bar.obj" --material bell_bronze -
 
 # Until it is struck, the daemon plays nothing but zeros.
 "$bin/carillon" listen | tr -d '\0' >"$scratch/sound" &
-started+=($!)
+started=("$!" "${started[@]}")  # the last one started ends first
 "$root/deploy/bare_debian.sh" ./deploy/client.sh \
   "cmake -G Ninja -S client_sdk/examples/strike -B build/strike && cmake --build build/strike" \
   "CARILLON_SERVER=$CARILLON_SERVER build/strike/strike $model"

@@ -35,6 +35,8 @@ git -c safe.directory="$root" -C "$root" archive HEAD | tar -x -C "$tree/src/car
 
 # The way to the registries is the machine's affair, so it is taken from there.
 cp /etc/resolv.conf "$tree/etc/"
+# An installed Debian knows its own name.
+printf '127.0.0.1 localhost %s\n' "$(hostname -s)" >"$tree/etc/hosts"
 registries=()
 if command -v npm >/dev/null; then
   registries+=(npm_config_registry="$(npm config get registry --loglevel=silent)")

@@ -11,8 +11,9 @@ if [[ -z ${HOME:-} || ! -w $HOME ]]; then
   mkdir -p "$HOME"
 fi
 
-# Checkouts in different folders share compiled objects.
-export CCACHE_BASEDIR=${CCACHE_BASEDIR-$root} CCACHE_NOHASHDIR=1
+# Checkouts in different folders share compiled objects. What is not there yet is compiled at once: without this ccache
+# would run the preprocessor first, which costs a tenth of a build from nothing.
+export CCACHE_BASEDIR=${CCACHE_BASEDIR-$root} CCACHE_NOHASHDIR=1 CCACHE_DEPEND=1
 
 # Caches that outlive a checkout.
 export CARILLON_CACHE=${XDG_CACHE_HOME:-$HOME/.cache}/carillon

@@ -40,7 +40,10 @@ selection=()
 if [[ -n $excluded ]]; then selection+=(--label-exclude "$excluded"); fi
 if ((${#rooms[@]})); then
   for room in "${rooms[@]}"; do
-    if [[ -d $root/tests/$room ]]; then targets+=("tests_${room//\//_}"); else targets+=("${room//\//_}"); fi
+    folder=$room
+    [[ -d $root/tests/$room ]] || folder=$(dirname "$room")
+    # A test in C++ is a program of its own; one in Python needs what its folder does.
+    if [[ -f $root/tests/$room.cc ]]; then targets+=("${room//\//_}"); else targets+=("tests_${folder//\//_}"); fi
   done
   selection+=(--tests-regex "^($(IFS='|' && printf '%s' "${rooms[*]}"))([/.]|\$)")
 fi

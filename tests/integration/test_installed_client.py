@@ -17,7 +17,7 @@ from daemon import ROOT, DaemonTest
 BUILD = pathlib.Path(os.environ["CARILLON_BUILD_DIR"])
 EXAMPLE = ROOT / "client_sdk/examples/strike"
 # Whatever else a build of the daemon looks for.
-NOT_FOR_THE_CLIENT = ("PkgConfig", "GTest", "benchmark", "CLI11", "nlohmann_json", "spdlog", "tomlplusplus",
+NOT_FOR_THE_CLIENT = ("GTest", "benchmark", "CLI11", "nlohmann_json", "spdlog", "tomlplusplus",
                       "SQLite3", "SQLiteCpp", "Eigen3", "CGAL", "embree", "hwy", "assimp", "OpenVDB")
 
 
