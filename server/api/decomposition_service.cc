@@ -26,9 +26,11 @@ bool HasEnded(const v1::Job& job) {
 class JobWatchCall final : public ServerStream<v1::WatchJobResponse> {
  public:
   JobWatchCall(DecompositionQueue& queue, const absl::StatusOr<std::string>& digest)
-      : StreamWriter(nullptr), watch_(digest.status()) {
+      : StreamWriter(nullptr) {
     if (digest.ok()) {
       watch_ = queue.Watch(*digest, [this](const v1::Job& job) { OnChange(job); });
+    } else {
+      watch_ = digest.status();
     }
     StartWriting();
   }
