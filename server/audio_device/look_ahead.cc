@@ -15,8 +15,7 @@ LookAhead::LookAhead(const DeviceFormat& format, uint32_t block_count, RenderBlo
       block_count_(block_count),
       render_(std::move(render)),
       clock_(clock),
-      rendered_(block_count * format.block_size()),
-      block_(format.block_size()) {}
+      rendered_(block_count * format.block_size()) {}
 
 LookAhead::~LookAhead() { Stop(); }
 
@@ -49,16 +48,17 @@ void LookAhead::Run() {
   const auto half_block =
       std::chrono::nanoseconds(500'000'000ULL * format_.block_frame_count / format_.sample_rate_hz);
   while (!stopping_) {
-    while (rendered_.free_count() >= block_.size() && !stopping_) RenderOne();
+    while (rendered_.free_count() >= format_.block_size() && !stopping_) RenderOne();
     clock_.SleepUntil(clock_.Monotonic() + half_block);
   }
 }
 
 void LookAhead::RenderOne() {
   const std::chrono::nanoseconds start = clock_.Monotonic();
-  render_(block_);
+  const std::span<float> block = rendered_.Next(format_.block_size());
+  render_(block);
   const std::chrono::duration<double> taken = clock_.Monotonic() - start;
-  rendered_.Push(block_);
+  rendered_.Commit(block.size());
   const double block_s = static_cast<double>(format_.block_frame_count) / format_.sample_rate_hz;
   const double old_load = load();
   load_.store(old_load + block_s * (taken.count() / block_s - old_load), std::memory_order_relaxed);

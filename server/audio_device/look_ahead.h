@@ -6,7 +6,6 @@
 #include <functional>
 #include <span>
 #include <thread>
-#include <vector>
 
 #include "absl/status/status.h"
 #include "server/audio_device/audio_device.h"
@@ -61,7 +60,6 @@ class LookAhead final : public FrameSource {
   const RenderBlock render_;
   Clock& clock_;
   RingBuffer<float> rendered_;
-  std::vector<float> block_;
   std::atomic<uint64_t> xrun_count_{0};
   std::atomic<uint64_t> lost_frame_count_{0};
   std::atomic<double> load_{0};

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cassert>
 #include <cstddef>
 #include <span>
 #include <vector>
@@ -32,6 +33,19 @@ class RingBuffer {
     std::copy_n(values.data(), first, values_.data() + begin);
     std::copy_n(values.data() + first, values.size() - first, values_.data());
     written_.store(written + values.size(), std::memory_order_release);
+  }
+
+  /// Called by a producer that always appends the same number of values, of which the capacity is a
+  /// multiple: the place of the next `count` values, at most free_count(). They are appended by
+  /// Commit once they have been written there.
+  std::span<T> Next(size_t count) noexcept {
+    const size_t begin = written_.load(std::memory_order_relaxed) % capacity();
+    assert(begin + count <= capacity());
+    return std::span(values_).subspan(begin, count);
+  }
+
+  void Commit(size_t count) noexcept {
+    written_.store(written_.load(std::memory_order_relaxed) + count, std::memory_order_release);
   }
 
   /// Called by the consumer: moves up to values.size() values to the front of `values`; returns

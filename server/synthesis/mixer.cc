@@ -121,7 +121,7 @@ void Mixer::TakeEvents(size_t block_count) noexcept {
   });
 }
 
-void Mixer::Take(MixerEvent event, EventQueue& queue) noexcept {
+void Mixer::Take(MixerEvent& event, EventQueue& queue) noexcept {
   // A bank may have been added, and have got events, since this block's commands were executed.
   if (FindSlot(event.bank) == nullptr) {
     ExecuteCommands();

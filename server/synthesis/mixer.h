@@ -171,7 +171,8 @@ class Mixer {
   void ExecuteCommands() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void Execute(const Command& command) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void TakeEvents(size_t block_count) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
-  void Take(MixerEvent event, EventQueue& queue) noexcept
+  /// Takes an event from a queue. A late event is moved to the beginning of the block.
+  void Take(MixerEvent& event, EventQueue& queue) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void CollectDueEvents(size_t block_count) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void ChooseEvents(uint32_t block, std::span<const uint32_t> due) noexcept
