@@ -34,7 +34,7 @@ v1::GetDatabaseStatsResponse ToProto(const DatabaseStats& stats) {
   return proto;
 }
 
-/// Whether two secrets are the same, in a time that does not tell where they differ.
+/// Compares two secrets in a time that does not depend on where they differ.
 bool SameSecret(absl::string_view a, absl::string_view b) {
   unsigned difference = a.size() == b.size() ? 0 : 1;
   for (size_t i = 0; i < a.size() && i < b.size(); ++i) {

@@ -9,10 +9,10 @@
 
 namespace carillon {
 
-/// carillon.v1.AdminService. What it is given must outlive it.
+/// carillon.v1.AdminService. The constructor's references must outlive the service.
 class AdminService final : public v1::AdminService::CallbackService {
  public:
-  /// `token`: what callers from the network show; empty: they are refused.
+  /// `token`: the token that callers from the network must send; empty: they are refused.
   AdminService(ModeDatabase& database, std::string token, ThreadPool& pool)
       : database_(database), token_(std::move(token)), pool_(pool) {}
 

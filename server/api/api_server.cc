@@ -13,6 +13,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 #include "server/api/admin_service.h"
 #include "server/api/audio_service.h"
 #include "server/api/contact_service.h"
@@ -27,7 +28,7 @@ namespace carillon {
 namespace {
 
 constexpr int kCallThreadCount = 4;
-/// Rendering offline stands back behind everything that is heard now.
+/// Offline rendering has a lower priority than all that is heard live.
 constexpr int kRenderThreadCount = 2;
 constexpr int kRenderNiceness = 10;
 constexpr size_t kShortestToken = 16;
@@ -61,12 +62,10 @@ absl::StatusOr<std::shared_ptr<grpc::ServerCredentials>> TcpCredentials(
   if (settings.tls_certificate_file.empty() && settings.tls_key_file.empty()) {
     return grpc::InsecureServerCredentials();
   }
-  absl::StatusOr<std::string> certificate = ReadFile(settings.tls_certificate_file);
-  if (!certificate.ok()) return certificate.status();
-  absl::StatusOr<std::string> key = ReadFile(settings.tls_key_file);
-  if (!key.ok()) return key.status();
+  ASSIGN_OR_RETURN(std::string certificate, ReadFile(settings.tls_certificate_file));
+  ASSIGN_OR_RETURN(std::string key, ReadFile(settings.tls_key_file));
   grpc::SslServerCredentialsOptions options;
-  options.pem_key_cert_pairs.push_back({*std::move(key), *std::move(certificate)});
+  options.pem_key_cert_pairs.push_back({std::move(key), std::move(certificate)});
   return grpc::SslServerCredentials(options);
 }
 
@@ -74,16 +73,15 @@ absl::StatusOr<std::deque<ListenAddress>> ParseAddresses(const ApiSettings& sett
   const bool tls = !settings.tls_certificate_file.empty();
   std::deque<ListenAddress> addresses;
   for (const std::string& text : settings.addresses) {
-    absl::StatusOr<ListenAddress> address = ParseListenAddress(text);
-    if (!address.ok()) return address.status();
-    if (!address->is_local() && !tls) {
+    ASSIGN_OR_RETURN(ListenAddress address, ParseListenAddress(text));
+    if (!address.is_local() && !tls) {
       return Unready("TLS_REQUIRED",
                      absl::StrCat(text,
                                   " can be reached from the network, and everybody there could use "
                                   "the daemon; give --tls-certificate and --tls-key, or listen on "
                                   "127.0.0.1 or a Unix socket"));
     }
-    addresses.push_back(*std::move(address));
+    addresses.push_back(std::move(address));
   }
   return addresses;
 }
@@ -119,20 +117,18 @@ struct ApiServer::State {
 };
 
 absl::Status ApiServer::State::Listen(const ApiSettings& settings) {
-  absl::StatusOr<std::deque<ListenAddress>> parsed = ParseAddresses(settings);
-  if (!parsed.ok()) return parsed.status();
-  const absl::StatusOr<std::shared_ptr<grpc::ServerCredentials>> tcp_credentials =
-      TcpCredentials(settings);
-  if (!tcp_credentials.ok()) return tcp_credentials.status();
+  ASSIGN_OR_RETURN(std::deque<ListenAddress> parsed, ParseAddresses(settings));
+  ASSIGN_OR_RETURN(const std::shared_ptr<grpc::ServerCredentials> tcp_credentials,
+                   TcpCredentials(settings));
   grpc::ServerBuilder builder;
-  // Otherwise a second daemon would share the port, and each would get half of the calls.
+  // With SO_REUSEPORT a second daemon would share the port, and each would get half of the calls.
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
-  for (ListenAddress& address : *parsed) {
+  for (ListenAddress& address : parsed) {
     if (address.is_unix()) {
-      if (absl::Status status = PrepareSocket(address.socket_path); !status.ok()) return status;
+      RETURN_IF_ERROR(PrepareSocket(address.socket_path));
       builder.AddListeningPort(address.ToString(), grpc::InsecureServerCredentials());
     } else {
-      builder.AddListeningPort(address.ToString(), *tcp_credentials, &address.port);
+      builder.AddListeningPort(address.ToString(), tcp_credentials, &address.port);
     }
   }
   for (grpc::Service* service : std::initializer_list<grpc::Service*>{
@@ -145,7 +141,7 @@ absl::Status ApiServer::State::Listen(const ApiSettings& settings) {
                    "cannot listen: an address is in use, not this machine's, or the TLS files do "
                    "not belong together; see the line before");
   }
-  for (const ListenAddress& address : *parsed) addresses.push_back(address.ToString());
+  for (const ListenAddress& address : parsed) addresses.push_back(address.ToString());
   return absl::OkStatus();
 }
 
@@ -153,10 +149,9 @@ absl::StatusOr<std::unique_ptr<ApiServer>> ApiServer::Start(const ApiSettings& s
                                                             const ServedRooms& rooms) {
   grpc::EnableDefaultHealthCheckService(true);
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();
-  absl::StatusOr<std::string> admin_token = ReadToken(settings.admin_token_file);
-  if (!admin_token.ok()) return admin_token.status();
-  auto state = std::make_unique<State>(settings, rooms, *std::move(admin_token));
-  if (absl::Status status = state->Listen(settings); !status.ok()) return status;
+  ASSIGN_OR_RETURN(std::string admin_token, ReadToken(settings.admin_token_file));
+  auto state = std::make_unique<State>(settings, rooms, std::move(admin_token));
+  RETURN_IF_ERROR(state->Listen(settings));
   return std::unique_ptr<ApiServer>(new ApiServer(std::move(state)));
 }
 

@@ -15,21 +15,21 @@
 
 namespace carillon {
 
-/// Where and how to serve.
+/// The addresses at which the server listens, and the files that protect them.
 struct ApiSettings {
   /// "unix:PATH" or "HOST:PORT" (port 0: any that is free).
   std::vector<std::string> addresses;
-  /// PEM files for all TCP addresses; empty: without TLS, on this machine's own addresses only.
+  /// PEM files for all TCP addresses; empty: no TLS, and only addresses of this machine.
   std::string tls_certificate_file;
   std::string tls_key_file;
-  /// A file whose first line lets callers from the network do what administrators may; empty: only
-  /// those on a Unix socket may.
+  /// The first line of this file is the token with which callers from the network become
+  /// administrators; empty: only callers on a Unix socket are administrators.
   std::string admin_token_file{};
-  /// Of the daemon.
+  /// Version of the daemon.
   std::string version;
 };
 
-/// What is served; all of it must outlive the server.
+/// The rooms that the server serves. All of them must outlive it.
 struct ServedRooms {
   ModeDatabase& database;
   DecompositionQueue& decompositions;
@@ -42,18 +42,18 @@ struct ServedRooms {
 /// All services of carillon.v1, health and reflection.
 class ApiServer {
  public:
-  /// Serves once it returns. Errors: InvalidArgument (INVALID_ADDRESS), FailedPrecondition
-  /// (TLS_REQUIRED: a network address without TLS, TLS_UNUSABLE, ADMIN_TOKEN_UNUSABLE,
-  /// ADDRESS_IN_USE, LISTEN_FAILED).
+  /// Starts to serve; calls are answered when it returns. Errors: InvalidArgument
+  /// (INVALID_ADDRESS), FailedPrecondition (TLS_REQUIRED: a network address without TLS,
+  /// TLS_UNUSABLE, ADMIN_TOKEN_UNUSABLE, ADDRESS_IN_USE, LISTEN_FAILED).
   static absl::StatusOr<std::unique_ptr<ApiServer>> Start(const ApiSettings& settings,
                                                           const ServedRooms& rooms);
 
-  /// Ends all calls, those that stream by cancelling them, and waits for them.
+  /// Cancels the streaming calls, and waits until all calls have ended.
   ~ApiServer();
   ApiServer(const ApiServer&) = delete;
   ApiServer& operator=(const ApiServer&) = delete;
 
-  /// As in the settings, with the port that was chosen.
+  /// The addresses of the settings, with the ports that were chosen.
   const std::vector<std::string>& addresses() const;
 
  private:

@@ -13,10 +13,10 @@
 
 namespace carillon {
 
-/// carillon.v1.AudioService. What it is given must outlive it.
+/// carillon.v1.AudioService. The constructor's references must outlive the service.
 class AudioService final : public v1::AudioService::CallbackService {
  public:
-  /// `render_pool`: for rendering offline.
+  /// `render_pool`: the threads that render offline.
   AudioService(std::string version, LiveOutput& output, const SceneRegistry& scenes,
                ModeDatabase& database, ThreadPool& render_pool)
       : version_(std::move(version)),

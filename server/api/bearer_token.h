@@ -7,7 +7,8 @@
 
 namespace carillon {
 
-/// What a caller shows in the metadata "authorization" as "Bearer TOKEN"; empty: nothing.
+/// Returns the token that a caller sends in the metadata "authorization" as "Bearer TOKEN"; empty
+/// if the caller sends none.
 std::string BearerToken(const grpc::CallbackServerContext& context);
 
 }  // namespace carillon

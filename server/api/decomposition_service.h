@@ -7,7 +7,7 @@
 
 namespace carillon {
 
-/// carillon.v1.DecompositionService. What it is given must outlive it.
+/// carillon.v1.DecompositionService. The constructor's references must outlive the service.
 class DecompositionService final : public v1::DecompositionService::CallbackService {
  public:
   DecompositionService(DecompositionQueue& queue, ThreadPool& pool) : queue_(queue), pool_(pool) {}

@@ -7,7 +7,7 @@
 
 namespace carillon {
 
-/// carillon.v1.JobRunService. What it is given must outlive it.
+/// carillon.v1.JobRunService. The constructor's references must outlive the service.
 class JobRunService final : public v1::JobRunService::CallbackService {
  public:
   JobRunService(RemoteRuns& runs, ThreadPool& pool) : runs_(runs), pool_(pool) {}

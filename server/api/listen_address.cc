@@ -21,10 +21,11 @@ namespace carillon {
 namespace {
 
 absl::Status InvalidAddress(absl::string_view text) {
-  return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_ADDRESS",
-                 absl::StrCat("\"", text,
-                              "\" is no address; say unix:PATH, HOST:PORT or [HOST]:PORT, with a "
-                              "path of at most 107 bytes"));
+  return Refusal(
+      absl::StatusCode::kInvalidArgument, "INVALID_ADDRESS",
+      absl::StrCat("\"", text,
+                   "\" is not an address; write unix:PATH, HOST:PORT or [HOST]:PORT, with a "
+                   "path of at most 107 bytes"));
 }
 
 absl::StatusOr<ListenAddress> ParseTcp(absl::string_view text) {
@@ -42,7 +43,7 @@ absl::StatusOr<ListenAddress> ParseTcp(absl::string_view text) {
   return address;
 }
 
-/// Whether somebody answers at the socket.
+/// Whether a server answers at the socket.
 bool IsServed(const std::string& path) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;

@@ -8,26 +8,26 @@
 
 namespace carillon {
 
-/// Where to listen.
+/// An address at which the server listens.
 struct ListenAddress {
-  /// Of a Unix socket; empty for TCP.
+  /// Path of a Unix socket; empty for TCP.
   std::string socket_path;
-  /// Of TCP, without brackets.
+  /// Host of a TCP address, without brackets.
   std::string host;
   int port = 0;
 
   bool is_unix() const { return !socket_path.empty(); }
-  /// Reachable from this machine only.
+  /// Whether only this machine can reach the address.
   bool is_local() const;
-  /// As written: "unix:PATH", "HOST:PORT" or "[HOST]:PORT".
+  /// The address as text: "unix:PATH", "HOST:PORT" or "[HOST]:PORT".
   std::string ToString() const;
 };
 
 /// Errors: InvalidArgument (INVALID_ADDRESS).
 absl::StatusOr<ListenAddress> ParseListenAddress(absl::string_view text);
 
-/// Makes the folder of a Unix socket, for its owner only, and sees that no living daemon holds the
-/// socket. Errors: FailedPrecondition (LISTEN_FAILED, ADDRESS_IN_USE).
+/// Makes the folder of a Unix socket, for its owner only, and checks that no running daemon serves
+/// the socket. Errors: FailedPrecondition (LISTEN_FAILED, ADDRESS_IN_USE).
 absl::Status PrepareSocket(const std::string& path);
 
 }  // namespace carillon

@@ -8,7 +8,8 @@
 
 namespace carillon {
 
-/// AudioService.Listen: deletes itself when the call is done. `output` must outlive the call.
+/// Makes a call of AudioService.Listen, which deletes itself when it is done. `output` must outlive
+/// it.
 grpc::ServerWriteReactor<v1::ListenResponse>* MakeListenCall(LiveOutput& output);
 
 }  // namespace carillon

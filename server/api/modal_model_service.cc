@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "proto/cpp/material_catalogue.h"
+#include "proto/cpp/status_macros.h"
 #include "server/api/model_transfer.h"
 #include "server/api/resource_name.h"
 #include "server/api/unary_call.h"
@@ -38,9 +39,7 @@ grpc::ServerUnaryReactor* ModalModelService::CreateModalModel(
     grpc::CallbackServerContext* context, const v1::CreateModalModelRequest* request,
     v1::CreateModalModelResponse* response) {
   return Answer(context, pool_, [this, request, response] {
-    absl::StatusOr<v1::Job> job = queue_.Submit(*request);
-    if (!job.ok()) return job.status();
-    *response->mutable_job() = *std::move(job);
+    ASSIGN_OR_RETURN(*response->mutable_job(), queue_.Submit(*request));
     return absl::OkStatus();
   });
 }
@@ -67,8 +66,8 @@ grpc::ServerUnaryReactor* ModalModelService::DeleteModalModel(
     grpc::CallbackServerContext* context, const v1::DeleteModalModelRequest* request,
     v1::DeleteModalModelResponse*) {
   return Answer(context, pool_, [this, request] {
-    const absl::StatusOr<std::string> digest = ParseModelName(request->name());
-    return digest.ok() ? queue_.DeleteModel(*digest) : digest.status();
+    ASSIGN_OR_RETURN(const std::string digest, ParseModelName(request->name()));
+    return queue_.DeleteModel(digest);
   });
 }
 
@@ -93,39 +92,34 @@ grpc::ServerUnaryReactor* ModalModelService::ListMaterials(grpc::CallbackServerC
 
 absl::Status ModalModelService::Get(const v1::GetModalModelRequest& request,
                                     v1::GetModalModelResponse& response) {
-  const absl::StatusOr<std::string> digest = ParseModelName(request.name());
-  if (!digest.ok()) return digest.status();
-  const absl::StatusOr<std::vector<double>> eigenvalues = database_.models().Eigenvalues(*digest);
-  if (!eigenvalues.ok()) return eigenvalues.status();
-  const absl::StatusOr<ModelSummary> summary = database_.models().Summary(*digest);
-  if (!summary.ok()) return summary.status();
-  *response.mutable_modal_model() = ToProto(*summary);
-  response.mutable_modal_model()->mutable_eigenvalues()->Add(eigenvalues->begin(),
-                                                             eigenvalues->end());
+  ASSIGN_OR_RETURN(const std::string digest, ParseModelName(request.name()));
+  ASSIGN_OR_RETURN(const std::vector<double> eigenvalues, database_.models().Eigenvalues(digest));
+  ASSIGN_OR_RETURN(const ModelSummary summary, database_.models().Summary(digest));
+  *response.mutable_modal_model() = ToProto(summary);
+  response.mutable_modal_model()->mutable_eigenvalues()->Add(eigenvalues.begin(),
+                                                             eigenvalues.end());
   return absl::OkStatus();
 }
 
 absl::Status ModalModelService::Update(const v1::UpdateModalModelRequest& request,
                                        v1::UpdateModalModelResponse& response) {
-  const absl::StatusOr<std::string> digest = ParseModelName(request.name());
-  if (!digest.ok()) return digest.status();
+  ASSIGN_OR_RETURN(const std::string digest, ParseModelName(request.name()));
   ModelChange change{.add_tags = {request.add_tags().begin(), request.add_tags().end()},
                      .remove_tags = {request.remove_tags().begin(), request.remove_tags().end()}};
   if (request.has_label()) change.label = request.label();
   if (request.has_pinned()) change.pinned = request.pinned();
-  const absl::StatusOr<ModelSummary> summary = database_.models().Update(*digest, change);
-  if (!summary.ok()) return summary.status();
-  *response.mutable_modal_model() = ToProto(*summary);
+  ASSIGN_OR_RETURN(const ModelSummary summary, database_.models().Update(digest, change));
+  *response.mutable_modal_model() = ToProto(summary);
   return absl::OkStatus();
 }
 
 absl::Status ModalModelService::List(const v1::ListModalModelsRequest& request,
                                      v1::ListModalModelsResponse& response) {
-  const absl::StatusOr<ModelPage> page =
-      database_.models().List(FilterOf(request), request.page_size(), request.page_token());
-  if (!page.ok()) return page.status();
-  for (const ModelSummary& summary : page->models) *response.add_modal_models() = ToProto(summary);
-  response.set_next_page_token(page->next_page_token);
+  ASSIGN_OR_RETURN(
+      const ModelPage page,
+      database_.models().List(FilterOf(request), request.page_size(), request.page_token()));
+  for (const ModelSummary& summary : page.models) *response.add_modal_models() = ToProto(summary);
+  response.set_next_page_token(page.next_page_token);
   return absl::OkStatus();
 }
 

@@ -8,7 +8,7 @@
 
 namespace carillon {
 
-/// carillon.v1.ModalModelService. What it is given must outlive it.
+/// carillon.v1.ModalModelService. The constructor's references must outlive the service.
 class ModalModelService final : public v1::ModalModelService::CallbackService {
  public:
   ModalModelService(ModeDatabase& database, DecompositionQueue& queue, ThreadPool& pool)

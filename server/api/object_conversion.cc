@@ -2,6 +2,7 @@
 #include "server/api/object_conversion.h"
 
 #include "proto/cpp/material_catalogue.h"
+#include "proto/cpp/status_macros.h"
 #include "server/api/pose_conversion.h"
 #include "server/api/resource_name.h"
 
@@ -37,20 +38,18 @@ v1::Material ToProto(const ObjectProperties& properties, double model_poisson_ra
 
 absl::StatusOr<ObjectProperties> ToObjectProperties(const v1::Material& material, double size,
                                                     std::optional<double> gain) {
-  const absl::StatusOr<v1::Material> resolved = ResolveMaterial(material);
-  if (!resolved.ok()) return resolved.status();
-  return ObjectProperties{.material = ToSoundingMaterial(*resolved, size == 0 ? 1 : size),
-                          .poisson_ratio = PoissonRatio(*resolved),
+  ASSIGN_OR_RETURN(const v1::Material resolved, ResolveMaterial(material));
+  return ObjectProperties{.material = ToSoundingMaterial(resolved, size == 0 ? 1 : size),
+                          .poisson_ratio = PoissonRatio(resolved),
                           .gain = gain.value_or(1)};
 }
 
 absl::StatusOr<ObjectChange> ToObjectChange(const v1::UpdateObjectRequest& request) {
   ObjectChange change;
   if (request.has_material()) {
-    const absl::StatusOr<v1::Material> resolved = ResolveMaterial(request.material());
-    if (!resolved.ok()) return resolved.status();
-    change.material = ToSoundingMaterial(*resolved, 1);
-    change.poisson_ratio = PoissonRatio(*resolved);
+    ASSIGN_OR_RETURN(const v1::Material resolved, ResolveMaterial(request.material()));
+    change.material = ToSoundingMaterial(resolved, 1);
+    change.poisson_ratio = PoissonRatio(resolved);
   }
   if (request.has_size()) change.size = request.size();
   if (request.has_gain()) change.gain = request.gain();

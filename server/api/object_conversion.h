@@ -11,8 +11,8 @@
 
 namespace carillon {
 
-/// A material resolved to its figures, a size (zero: 1) and a gain (absent: 1).
-/// Errors: those of ResolveMaterial.
+/// Resolves a material to its figures, and fills in the defaults of size (zero: 1) and gain
+/// (absent: 1). Errors: those of ResolveMaterial.
 absl::StatusOr<ObjectProperties> ToObjectProperties(const v1::Material& material, double size,
                                                     std::optional<double> gain);
 

@@ -8,13 +8,13 @@
 
 namespace carillon {
 
-/// As given: Validate says whether it is a rotation.
+/// Converts without a check; Validate tells whether the numbers are a rotation.
 Quaternion FromProto(const v1::Quaternion& proto);
 Pose FromProto(const v1::Pose& proto);
 
 v1::Pose ToProto(const Pose& pose);
 
-/// As given, zeros being the contract's defaults.
+/// Converts without a check. Zeros are replaced by the contract's defaults.
 SceneSpace ToSceneSpace(const v1::Hearing& hearing, const v1::Pose& listener);
 
 }  // namespace carillon

@@ -12,17 +12,17 @@
 
 namespace carillon {
 
-/// What rendering offline needs of the daemon.
+/// The parts of the daemon that offline rendering uses.
 struct RenderContext {
   ModelStore& models;
   BodyCache& bodies;
   ThreadPool& pool;
-  /// Render calls there are.
+  /// Number of Render calls that run now.
   std::atomic<int>& call_count;
 };
 
-/// AudioService.Render: deletes itself when the call is done. What `daemon` names must outlive the
-/// call.
+/// Makes a call of AudioService.Render, which deletes itself when it is done. The parts of `daemon`
+/// must outlive it.
 grpc::ServerBidiReactor<v1::RenderRequest, v1::RenderResponse>* MakeRenderCall(
     const RenderContext& daemon);
 

@@ -5,6 +5,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/strip.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon {
 namespace {
@@ -40,9 +41,8 @@ absl::StatusOr<ObjectName> ParseObjectName(absl::string_view name) {
   if (separator == absl::string_view::npos) {
     return NotAName("OBJECT_NOT_FOUND", name, "scenes/{id}/objects/{handle}");
   }
-  const absl::StatusOr<uint64_t> scene = ParseSceneName(name.substr(0, separator));
-  if (!scene.ok()) return scene.status();
-  ObjectName object{.scene = *scene};
+  ASSIGN_OR_RETURN(const uint64_t scene, ParseSceneName(name.substr(0, separator)));
+  ObjectName object{.scene = scene};
   if (absl::SimpleAtoi(name.substr(separator + 9), &object.handle)) return object;
   return NotAName("OBJECT_NOT_FOUND", name, "scenes/{id}/objects/{handle}");
 }

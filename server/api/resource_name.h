@@ -9,13 +9,13 @@
 
 namespace carillon {
 
-/// "modalModels/{digest}" to the digest. Errors: NotFound (MODAL_MODEL_NOT_FOUND).
+/// Returns the digest of "modalModels/{digest}". Errors: NotFound (MODAL_MODEL_NOT_FOUND).
 absl::StatusOr<std::string> ParseModelName(absl::string_view name);
 
-/// "jobs/{digest}" to the digest. Errors: NotFound (JOB_NOT_FOUND).
+/// Returns the digest of "jobs/{digest}". Errors: NotFound (JOB_NOT_FOUND).
 absl::StatusOr<std::string> ParseJobName(absl::string_view name);
 
-/// "scenes/{id}" to the id. Errors: NotFound (SCENE_NOT_FOUND).
+/// Returns the id of "scenes/{id}". Errors: NotFound (SCENE_NOT_FOUND).
 absl::StatusOr<uint64_t> ParseSceneName(absl::string_view name);
 
 struct ObjectName {
@@ -23,7 +23,8 @@ struct ObjectName {
   uint32_t handle = 0;
 };
 
-/// "scenes/{id}/objects/{handle}". Errors: NotFound (SCENE_NOT_FOUND, OBJECT_NOT_FOUND).
+/// Returns the parts of "scenes/{id}/objects/{handle}". Errors: NotFound (SCENE_NOT_FOUND,
+/// OBJECT_NOT_FOUND).
 absl::StatusOr<ObjectName> ParseObjectName(absl::string_view name);
 
 std::string ModelName(absl::string_view digest);

@@ -7,7 +7,7 @@
 
 namespace carillon {
 
-/// Samples as the contract sends them: IEEE 754 binary32, little endian.
+/// Returns samples in the encoding of the contract: IEEE 754 binary32, little endian.
 inline std::string ToBytes(std::span<const float> samples) {
   static_assert(std::endian::native == std::endian::little, "add a byte swap for this machine");
   return {reinterpret_cast<const char*>(samples.data()), samples.size_bytes()};

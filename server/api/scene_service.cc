@@ -4,7 +4,9 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
+#include "proto/cpp/status_macros.h"
 #include "server/api/object_conversion.h"
 #include "server/api/pose_conversion.h"
 #include "server/api/resource_name.h"
@@ -16,10 +18,10 @@ grpc::ServerUnaryReactor* SceneService::CreateScene(grpc::CallbackServerContext*
                                                     const v1::CreateSceneRequest* request,
                                                     v1::CreateSceneResponse* response) {
   return Answer(context, pool_, [this, request, response] {
-    const absl::StatusOr<uint64_t> scene =
-        scenes_.CreateScene(ToSceneSpace(request->hearing(), request->listener()));
-    if (scene.ok()) response->set_name(SceneName(*scene));
-    return scene.status();
+    ASSIGN_OR_RETURN(const uint64_t scene,
+                     scenes_.CreateScene(ToSceneSpace(request->hearing(), request->listener())));
+    response->set_name(SceneName(scene));
+    return absl::OkStatus();
   });
 }
 
@@ -27,8 +29,8 @@ grpc::ServerUnaryReactor* SceneService::DeleteScene(grpc::CallbackServerContext*
                                                     const v1::DeleteSceneRequest* request,
                                                     v1::DeleteSceneResponse*) {
   return Answer(context, pool_, [this, request] {
-    const absl::StatusOr<uint64_t> scene = ParseSceneName(request->name());
-    return scene.ok() ? scenes_.DeleteScene(*scene) : scene.status();
+    ASSIGN_OR_RETURN(const uint64_t scene, ParseSceneName(request->name()));
+    return scenes_.DeleteScene(scene);
   });
 }
 
@@ -48,8 +50,8 @@ grpc::ServerUnaryReactor* SceneService::RemoveObject(grpc::CallbackServerContext
                                                      const v1::RemoveObjectRequest* request,
                                                      v1::RemoveObjectResponse*) {
   return Answer(context, pool_, [this, request] {
-    const absl::StatusOr<ObjectName> name = ParseObjectName(request->name());
-    return name.ok() ? scenes_.RemoveObject(name->scene, name->handle) : name.status();
+    ASSIGN_OR_RETURN(const ObjectName name, ParseObjectName(request->name()));
+    return scenes_.RemoveObject(name.scene, name.handle);
   });
 }
 
@@ -57,42 +59,34 @@ grpc::ServerUnaryReactor* SceneService::UpdateListener(grpc::CallbackServerConte
                                                        const v1::UpdateListenerRequest* request,
                                                        v1::UpdateListenerResponse*) {
   return Answer(context, pool_, [this, request] {
-    const absl::StatusOr<uint64_t> scene = ParseSceneName(request->scene());
-    if (!scene.ok()) return scene.status();
-    return scenes_.UpdateListener(*scene, FromProto(request->pose()), request->glide_s());
+    ASSIGN_OR_RETURN(const uint64_t scene, ParseSceneName(request->scene()));
+    return scenes_.UpdateListener(scene, FromProto(request->pose()), request->glide_s());
   });
 }
 
 absl::Status SceneService::Add(const v1::AddObjectRequest& request,
                                v1::AddObjectResponse& response) {
-  const absl::StatusOr<uint64_t> scene = ParseSceneName(request.scene());
-  if (!scene.ok()) return scene.status();
-  const absl::StatusOr<std::string> digest = ParseModelName(request.modal_model());
-  if (!digest.ok()) return digest.status();
-  absl::StatusOr<ObjectProperties> properties =
+  ASSIGN_OR_RETURN(const uint64_t scene, ParseSceneName(request.scene()));
+  ASSIGN_OR_RETURN(const std::string digest, ParseModelName(request.modal_model()));
+  ASSIGN_OR_RETURN(
+      ObjectProperties properties,
       ToObjectProperties(request.material(), request.size(),
-                         request.has_gain() ? std::optional(request.gain()) : std::nullopt);
-  if (!properties.ok()) return properties.status();
-  if (request.has_pose()) properties->pose = FromProto(request.pose());
-  absl::StatusOr<std::shared_ptr<const ModalModel>> model = database_.models().FindToSound(*digest);
-  if (!model.ok()) return model.status();
-  const absl::StatusOr<PlacedObject> placed =
-      scenes_.AddObject(*scene, request.handle(), *std::move(model), *properties);
-  if (!placed.ok()) return placed.status();
-  *response.mutable_object() = ToProto(*scene, *placed);
+                         request.has_gain() ? std::optional(request.gain()) : std::nullopt));
+  if (request.has_pose()) properties.pose = FromProto(request.pose());
+  ASSIGN_OR_RETURN(std::shared_ptr<const ModalModel> model, database_.models().FindToSound(digest));
+  ASSIGN_OR_RETURN(const PlacedObject placed,
+                   scenes_.AddObject(scene, request.handle(), std::move(model), properties));
+  *response.mutable_object() = ToProto(scene, placed);
   return absl::OkStatus();
 }
 
 absl::Status SceneService::Update(const v1::UpdateObjectRequest& request,
                                   v1::UpdateObjectResponse& response) {
-  const absl::StatusOr<ObjectName> name = ParseObjectName(request.name());
-  if (!name.ok()) return name.status();
-  const absl::StatusOr<ObjectChange> change = ToObjectChange(request);
-  if (!change.ok()) return change.status();
-  const absl::StatusOr<PlacedObject> placed =
-      scenes_.UpdateObject(name->scene, name->handle, *change);
-  if (!placed.ok()) return placed.status();
-  *response.mutable_object() = ToProto(name->scene, *placed);
+  ASSIGN_OR_RETURN(const ObjectName name, ParseObjectName(request.name()));
+  ASSIGN_OR_RETURN(const ObjectChange change, ToObjectChange(request));
+  ASSIGN_OR_RETURN(const PlacedObject placed,
+                   scenes_.UpdateObject(name.scene, name.handle, change));
+  *response.mutable_object() = ToProto(name.scene, placed);
   return absl::OkStatus();
 }
 

@@ -8,7 +8,7 @@
 
 namespace carillon {
 
-/// carillon.v1.SceneService. What it is given must outlive it.
+/// carillon.v1.SceneService. The constructor's references must outlive the service.
 class SceneService final : public v1::SceneService::CallbackService {
  public:
   SceneService(SceneRegistry& scenes, ModeDatabase& database, ThreadPool& pool)

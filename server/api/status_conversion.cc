@@ -15,7 +15,7 @@ grpc::Status ToGrpcStatus(const absl::Status& status) {
   details.set_code(static_cast<int>(status.code()));
   details.set_message(message);
   details.add_details()->PackFrom(ToErrorInfo(status));
-  // absl's codes are gRPC's.
+  // absl and gRPC use the same numbers for the same codes.
   return {static_cast<grpc::StatusCode>(status.code()), message, details.SerializeAsString()};
 }
 

@@ -7,8 +7,8 @@
 
 namespace carillon {
 
-/// The gRPC status of `status`: same code and message; its details are a serialized
-/// carillon.v1.StatusDetails with reason, message and figures, which travel as
+/// Converts `status` to a gRPC status of the same code and message. The details of the gRPC status
+/// are a serialized carillon.v1.StatusDetails with reason, message and figures, which gRPC sends as
 /// "grpc-status-details-bin".
 grpc::Status ToGrpcStatus(const absl::Status& status);
 

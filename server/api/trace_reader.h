@@ -12,7 +12,7 @@
 
 namespace carillon {
 
-/// Makes a renderer from the requests of one Render call.
+/// Makes an offline renderer from the requests of one Render call.
 class TraceReader {
  public:
   static constexpr uint64_t kMaxImpulseCount = 4'000'000;
@@ -24,7 +24,8 @@ class TraceReader {
   /// OfflineRenderer.
   absl::Status Take(const v1::RenderRequest& request);
 
-  /// Once all is read: the renderer. Errors: InvalidArgument (TRACE_MALFORMED: nothing was sent).
+  /// Returns the renderer after the last request. Errors: InvalidArgument (TRACE_MALFORMED: nothing
+  /// was sent).
   absl::StatusOr<std::unique_ptr<OfflineRenderer>> Finish();
 
   uint32_t sample_rate_hz() const { return settings_->sample_rate_hz; }

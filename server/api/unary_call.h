@@ -10,8 +10,8 @@
 
 namespace carillon {
 
-/// Answers a call with one request and one response: `work()` fills in the response on a thread of
-/// the pool and returns an absl::Status. gRPC keeps request and response until the call is
+/// Answers a call with one request and one response. `work()` runs on a thread of the pool, fills
+/// in the response and returns an absl::Status. gRPC keeps request and response until the call is
 /// finished.
 template <typename Work>
 grpc::ServerUnaryReactor* Answer(grpc::CallbackServerContext* context, ThreadPool& pool,

@@ -7,11 +7,12 @@
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon {
 namespace {
 
-/// And no component beyond `most`.
+/// Whether every component is a number and no component is larger than `most`.
 bool Finite(const std::array<double, 3>& vector, double most = std::numeric_limits<double>::max()) {
   return std::ranges::all_of(vector, [most](double x) { return std::abs(x) <= most; });
 }
@@ -58,11 +59,11 @@ absl::Status ValidateWeights(const std::array<double, 3>& weights) {
 }
 
 absl::Status Validate(const ContactImpulse& contact) {
-  // Strikes are rendered in single precision.
+  // Impulses are rendered in single precision.
   if (!Finite(contact.impulse_newton_seconds, std::numeric_limits<float>::max())) {
     return Invalid(
         "IMPULSE_NOT_FINITE",
-        "the impulse has a component that is no finite number, or beyond 3.4e38: send N s in "
+        "the impulse has a component that is not a finite number, or is beyond 3.4e38: send N s in "
         "the object's frame");
   }
   if (!(contact.duration_s >= 0 && contact.duration_s <= kLongestContactS)) {
@@ -70,7 +71,7 @@ absl::Status Validate(const ContactImpulse& contact) {
                    absl::StrCat("a contact of ", contact.duration_s,
                                 " s: the duration must lie from 0 to ", kLongestContactS, " s"));
   }
-  if (absl::Status status = ValidateHertz(contact); !status.ok()) return status;
+  RETURN_IF_ERROR(ValidateHertz(contact));
   if (const auto* point = std::get_if<Point>(&contact.location)) return ValidatePoint(*point);
   return ValidateWeights(std::get<SurfacePoint>(contact.location).weights);
 }

@@ -7,7 +7,7 @@
 namespace carillon {
 namespace {
 
-/// Resting contacts of the usual engines jitter by less.
+/// The jitter of resting contacts in common engines stays below this factor.
 constexpr double kUsualFactor = 3;
 
 }  // namespace

@@ -6,24 +6,26 @@
 
 namespace carillon {
 
-/// Tells blows from loads in what an engine reports of one pair of bodies, step by step.
+/// Divides the impulses that an engine reports for one pair of bodies, step by step, into blows and
+/// loads.
 ///
-/// Engines give the load of a resting contact as an impulse in every step, and it jitters; a blow
-/// is an impulse in one step or a few. Of a step's force, what exceeds three times the usual is
-/// blow, where the usual is the greater of the median and the mean over the last steps, those
-/// without contact included: a body that comes from flight has no usual force and strikes with all
-/// it has, one that rests with a jitter does not strike.
+/// Engines report the load of a resting contact as an impulse in every step, and this impulse
+/// jitters; a blow is an impulse in one step or a few. The part of a step's force that exceeds
+/// three times the usual force is a blow. The usual force is the greater of the median and the mean
+/// over the last steps, including steps without contact. So a body that comes from flight has no
+/// usual force and strikes with its whole impulse, whereas a body that rests with a jitter does not
+/// strike.
 class LoadTracker {
  public:
   /// Takes the next step's impulse, zero or more, of a step of `step_s` seconds, above zero.
   /// Returns the part of it that is a blow, 0 to 1.
   double Next(double impulse_newton_seconds, double step_s);
 
-  /// Nothing has happened for so long that a new tracker would do the same.
+  /// True if all remembered steps were without contact: a new tracker would behave alike.
   bool idle() const;
 
  private:
-  /// Steps that are remembered; what is usual follows a change after half of them.
+  /// Number of remembered steps; the usual force follows a change after half of them.
   static constexpr size_t kStepCount = 8;
 
   double Usual() const;

@@ -12,6 +12,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 #include "server/excitation/closest_point.h"
 
 namespace carillon {
@@ -65,11 +66,11 @@ Point Interpolate(const std::array<Point, 3>& corners, const std::array<double, 
   return point;
 }
 
-/// What Embree hands to the callback for each triangle near enough.
+/// The state of a query, which Embree hands to the callback for each triangle near enough.
 struct Search {
   const LocatorSurfaces& surfaces;
   const Point& point;
-  std::optional<uint32_t> given_triangle;  // only triangles that lie on it
+  std::optional<uint32_t> given_triangle;  // if set, only triangles that lie on it count
   uint32_t triangle = 0;
   ClosestPoint closest{.squared_distance_m2 = std::numeric_limits<double>::infinity()};
 };
@@ -99,10 +100,10 @@ void CopyToBuffer(RTCGeometry geometry, RTCBufferType type, RTCFormat format,
 
 }  // namespace
 
-/// Embree's objects, and the surfaces they were made from.
+/// Embree's objects, and the surfaces from which they were made.
 struct SurfaceLocator::Index {
   explicit Index(const LocatorSurfaces& of)
-      // Its builder would start a thread on each core, beside the audio.
+      // By default Embree builds with a thread on each core, which would disturb the audio.
       : surfaces(of), device(rtcNewDevice("threads=1,user_threads=1")), scene(rtcNewScene(device)) {
     rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
     const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
@@ -121,7 +122,7 @@ struct SurfaceLocator::Index {
   Index(const Index&) = delete;
   Index& operator=(const Index&) = delete;
 
-  /// False: no triangle lies on the given one.
+  /// Returns false if no triangle lies on the given triangle.
   bool Run(Search& search) const {
     RTCPointQuery query{.x = static_cast<float>(search.point[0]),
                         .y = static_cast<float>(search.point[1]),
@@ -152,7 +153,7 @@ SurfaceLocator::~SurfaceLocator() = default;
 
 absl::StatusOr<std::unique_ptr<SurfaceLocator>> SurfaceLocator::Make(
     const LocatorSurfaces& surfaces) {
-  if (const absl::Status status = Check(surfaces); !status.ok()) return status;
+  RETURN_IF_ERROR(Check(surfaces));
   auto index = std::make_unique<Index>(surfaces);
   if (const RTCError error = rtcGetDeviceError(index->device); error != RTC_ERROR_NONE) {
     return absl::InternalError(absl::StrCat("INTERNAL: the index of ", surfaces.triangles.size(),
@@ -163,7 +164,7 @@ absl::StatusOr<std::unique_ptr<SurfaceLocator>> SurfaceLocator::Make(
 }
 
 absl::StatusOr<LocatedPoint> SurfaceLocator::Nearest(const Point& point) const {
-  if (const absl::Status status = ValidatePoint(point); !status.ok()) return status;
+  RETURN_IF_ERROR(ValidatePoint(point));
   Search search{.surfaces = index_->surfaces, .point = point, .given_triangle = std::nullopt};
   if (index_->Run(search)) return index_->Describe(search);
   return Refusal(
@@ -173,7 +174,7 @@ absl::StatusOr<LocatedPoint> SurfaceLocator::Nearest(const Point& point) const {
 }
 
 absl::StatusOr<LocatedPoint> SurfaceLocator::OnGivenTriangle(const SurfacePoint& at) const {
-  if (const absl::Status status = ValidateWeights(at.weights); !status.ok()) return status;
+  RETURN_IF_ERROR(ValidateWeights(at.weights));
   const LocatorSurfaces& surfaces = index_->surfaces;
   if (at.triangle >= surfaces.given_triangles.size()) {
     return Refusal(
@@ -185,7 +186,7 @@ absl::StatusOr<LocatedPoint> SurfaceLocator::OnGivenTriangle(const SurfacePoint&
       Corners(surfaces.given_vertices, surfaces.given_triangles[at.triangle]), at.weights);
   Search search{.surfaces = surfaces, .point = point, .given_triangle = at.triangle};
   if (index_->Run(search)) return index_->Describe(search);
-  return Nearest(point);  // repairs may have left nothing of that triangle
+  return Nearest(point);  // a repair of the surface may have removed that triangle
 }
 
 }  // namespace carillon

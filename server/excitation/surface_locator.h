@@ -11,9 +11,9 @@
 
 namespace carillon {
 
-/// The surfaces of one body: the sounding surface (#V vertices in metres, #T triangles, and for
-/// each the triangle of the given surface on which it lies), and the surface as given. They must
-/// outlive the locator.
+/// The two surfaces of one body: the sounding surface (#V vertices in metres, #T triangles, and for
+/// each triangle the triangle of the given surface on which it lies), and the surface as given.
+/// Both must outlive the locator.
 struct LocatorSurfaces {
   std::span<const std::array<float, 3>> vertices;
   std::span<const std::array<uint32_t, 3>> triangles;
@@ -27,23 +27,24 @@ struct LocatedPoint {
   uint32_t triangle = 0;
   std::array<uint32_t, 3> vertices{};
   std::array<double, 3> weights{};  ///< barycentric
-  double distance_m = 0;            ///< from the point asked for
+  double distance_m = 0;            ///< from the point of the query
 };
 
-/// Finds where on the sounding surface a contact acts. Queries may run on any threads at once, but
-/// not on one that renders.
+/// Finds the point of the sounding surface at which a contact acts. Several threads may query at
+/// once, but no thread that renders may.
 class SurfaceLocator {
  public:
   /// INVALID_ARGUMENT (SURFACE_MALFORMED): no triangle, or an index out of range.
   static absl::StatusOr<std::unique_ptr<SurfaceLocator>> Make(const LocatorSurfaces& surfaces);
   ~SurfaceLocator();
 
-  /// The point of the sounding surface nearest to `point`, which is in the model's frame and size,
-  /// metres. INVALID_ARGUMENT (POINT_NOT_FINITE, POINT_TOO_FAR).
+  /// Returns the point of the sounding surface nearest to `point`, which is in the model's frame
+  /// and size, metres. INVALID_ARGUMENT (POINT_NOT_FINITE, POINT_TOO_FAR).
   absl::StatusOr<LocatedPoint> Nearest(const Point& point) const;
 
-  /// The point of the sounding surface at a point of a given triangle; triangles that lie on that
-  /// given triangle are preferred. INVALID_ARGUMENT (TRIANGLE_OUT_OF_RANGE, INVALID_WEIGHTS).
+  /// Returns the point of the sounding surface at a point of a given triangle. Triangles that lie
+  /// on that given triangle are preferred. INVALID_ARGUMENT (TRIANGLE_OUT_OF_RANGE,
+  /// INVALID_WEIGHTS).
   absl::StatusOr<LocatedPoint> OnGivenTriangle(const SurfacePoint& at) const;
 
  private:
