@@ -18,7 +18,8 @@ void PrintSummary(const RenderOptions& options, const v1::RenderSummary& summary
                static_cast<double>(summary.frame_count()) / sample_rate_hz,
                summary.accepted_count(), Decibels(summary.peak()));
   if (summary.rejected_count() > 0) {
-    absl::PrintF("%d impulses could not be used\n", summary.rejected_count());
+    absl::PrintF("%d impulses could not be used; the newest: %s: %s\n", summary.rejected_count(),
+                 summary.last_rejection().reason(), summary.last_rejection().message());
   }
   if (summary.limited_frame_count() > 0) {
     absl::PrintF("the limiter worked in %d frames; smaller gains would avoid it\n",

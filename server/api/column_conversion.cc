@@ -20,7 +20,7 @@ Vector3 ToArray(const Numbers<Number>& column, int row) {
   return {column[3 * row], column[3 * row + 1], column[3 * row + 2]};
 }
 
-/// None where all four are zero, or where the column is empty.
+/// Absent if all four numbers are zero, or if the column is empty.
 std::optional<Quaternion> ToRotation(const Numbers<float>& column, int row) {
   if (column.empty()) return std::nullopt;
   const Quaternion q{column[4 * row], column[4 * row + 1], column[4 * row + 2],
@@ -29,7 +29,7 @@ std::optional<Quaternion> ToRotation(const Numbers<float>& column, int row) {
   return q;
 }
 
-/// How many numbers a column has, and how many it should.
+/// The number of a column's numbers, and what it should be.
 struct ColumnSize {
   absl::string_view name;
   int size = 0;
@@ -50,7 +50,16 @@ absl::Status CheckSizes(std::initializer_list<ColumnSize> columns) {
   return absl::OkStatus();
 }
 
-absl::Status CheckSizes(const v1::ImpulseColumns& columns) {
+std::optional<SecondObject> ToSecond(const v1::ImpulseColumns& columns, int row) {
+  if (columns.second_object().empty() || columns.second_object(row) == 0) return std::nullopt;
+  return SecondObject{.handle = columns.second_object(row),
+                      .location = ToArray(columns.second_point_m(), row),
+                      .rotation = ToRotation(columns.second_rotation(), row)};
+}
+
+}  // namespace
+
+absl::Status Validate(const v1::ImpulseColumns& columns) {
   const int count = columns.object_size();
   const int seconds = columns.second_object_size();
   return CheckSizes({{"point_m", columns.point_m_size(), count, 3},
@@ -62,54 +71,32 @@ absl::Status CheckSizes(const v1::ImpulseColumns& columns) {
                      {"second_rotation", columns.second_rotation_size(), seconds, 4, true}});
 }
 
-absl::Status CheckSizes(const v1::PoseColumns& columns) {
+absl::Status Validate(const v1::PoseColumns& columns) {
   const int count = columns.object_size();
   return CheckSizes({{"position_m", columns.position_m_size(), count, 3},
                      {"orientation", columns.orientation_size(), count, 4, true}});
 }
 
-std::optional<SecondObject> ToSecond(const v1::ImpulseColumns& columns, int row) {
-  if (columns.second_object().empty() || columns.second_object(row) == 0) return std::nullopt;
-  return SecondObject{.handle = columns.second_object(row),
-                      .location = ToArray(columns.second_point_m(), row),
-                      .rotation = ToRotation(columns.second_rotation(), row)};
-}
-
-ObjectImpulse ToImpulse(const v1::ImpulseColumns& columns, int row) {
-  return {.handle = columns.object(row),
-          .time_offset_s = columns.time_offset_s().empty() ? 0 : columns.time_offset_s(row),
-          .impulse = {.location = ToArray(columns.point_m(), row),
-                      .impulse_newton_seconds = ToArray(columns.impulse_newton_seconds(), row),
-                      .duration_s = columns.duration_s().empty() ? 0 : columns.duration_s(row)},
-          .second = ToSecond(columns, row)};
-}
-
-/// As rows are counted: once for each object of a contact.
-uint64_t CountRejected(const v1::ImpulseColumns& columns) {
+uint64_t CountContacts(const v1::ImpulseColumns& columns) {
   const auto& seconds = columns.second_object();
   const auto none = std::count(seconds.begin(), seconds.end(), 0U);
   return static_cast<uint64_t>(columns.object_size() + seconds.size() - none);
 }
 
-}  // namespace
-
-void ReadColumns(const v1::ImpulseColumns& columns, const ContactSink& sink) {
-  if (absl::Status status = CheckSizes(columns); !status.ok()) {
-    return sink.reject(std::max<uint64_t>(1, CountRejected(columns)), std::move(status));
-  }
-  for (int row = 0; row < columns.object_size(); ++row) sink.strike(ToImpulse(columns, row));
+ObjectImpulse ReadRow(const v1::ImpulseColumns& columns, int row) {
+  return {.contact = {.handle = columns.object(row),
+                      .impulse = {.location = ToArray(columns.point_m(), row),
+                                  .impulse_newton_seconds =
+                                      ToArray(columns.impulse_newton_seconds(), row),
+                                  .duration_s =
+                                      columns.duration_s().empty() ? 0 : columns.duration_s(row)},
+                      .second = ToSecond(columns, row)},
+          .time_offset_s = columns.time_offset_s().empty() ? 0 : columns.time_offset_s(row)};
 }
 
-void ReadColumns(const v1::PoseColumns& columns, const ContactSink& sink) {
-  if (absl::Status status = CheckSizes(columns); !status.ok()) {
-    const auto count = static_cast<uint64_t>(columns.object_size());
-    return sink.reject(std::max<uint64_t>(1, count), std::move(status));
-  }
-  for (int row = 0; row < columns.object_size(); ++row) {
-    sink.move(columns.object(row),
-              {.position_m = ToArray(columns.position_m(), row),
-               .orientation = ToRotation(columns.orientation(), row).value_or(Quaternion{})});
-  }
+Pose ReadRow(const v1::PoseColumns& columns, int row) {
+  return {.position_m = ToArray(columns.position_m(), row),
+          .orientation = ToRotation(columns.orientation(), row).value_or(Quaternion{})};
 }
 
 }  // namespace carillon

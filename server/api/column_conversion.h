@@ -1,13 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
+
+#include "absl/status/status.h"
 #include "carillon/v1/contact.pb.h"
-#include "server/api/contact_conversion.h"
+#include "server/scene/object_contact.h"
 
 namespace carillon {
 
-/// Give `sink` what columns hold, or reject it whole (COLUMNS_MISMATCHED).
-void ReadColumns(const v1::ImpulseColumns& columns, const ContactSink& sink);
-void ReadColumns(const v1::PoseColumns& columns, const ContactSink& sink);
+/// Whether columns have numbers for each of their objects. Errors: InvalidArgument
+/// (COLUMNS_MISMATCHED).
+absl::Status Validate(const v1::ImpulseColumns& columns);
+absl::Status Validate(const v1::PoseColumns& columns);
+
+/// Contacts, counted once for each object, of columns that need not be valid.
+uint64_t CountContacts(const v1::ImpulseColumns& columns);
+
+/// Reads a row of valid columns.
+ObjectImpulse ReadRow(const v1::ImpulseColumns& columns, int row);
+Pose ReadRow(const v1::PoseColumns& columns, int row);
 
 }  // namespace carillon

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/api/contact_conversion.h"
 
-#include <optional>
+#include <algorithm>
+#include <utility>
 #include <variant>
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 #include "server/api/column_conversion.h"
 #include "server/api/pose_conversion.h"
 
@@ -19,7 +21,7 @@ SurfacePoint ToSurfacePoint(const v1::SurfacePoint& point) {
           .weights = {1 - point.weight1() - point.weight2(), point.weight1(), point.weight2()}};
 }
 
-/// Where a row's contact acts.
+/// Returns the location of a row's contact.
 template <typename Row>
 absl::StatusOr<std::variant<Point, SurfacePoint>> FromLocation(const Row& row) {
   if (row.has_point_m()) return ToArray(row.point_m());
@@ -29,25 +31,18 @@ absl::StatusOr<std::variant<Point, SurfacePoint>> FromLocation(const Row& row) {
       absl::StrCat("a contact on object ", row.object(), " has neither point_m nor surface_point"));
 }
 
-/// What all kinds of contacts have.
-struct CommonContact {
-  ContactImpulse impulse;
-  std::optional<SecondObject> second;
-};
-
+/// Fills in what all kinds of contacts have. `vector` is an impulse or a force.
 template <typename Row>
-absl::StatusOr<CommonContact> FromCommon(const Row& row, const v1::Vec3& vector) {
-  const auto location = FromLocation(row);
-  if (!location.ok()) return location.status();
-  CommonContact contact;
-  contact.impulse.location = *location;
+absl::Status ReadContact(const Row& row, const v1::Vec3& vector, ObjectContact& contact) {
+  ASSIGN_OR_RETURN(contact.impulse.location, FromLocation(row));
+  contact.handle = row.object();
   contact.impulse.impulse_newton_seconds = ToArray(vector);
-  if (!row.has_second()) return contact;
-  const auto second = FromLocation(row.second());
-  if (!second.ok()) return second.status();
-  contact.second = {.handle = row.second().object(), .location = *second};
-  if (row.second().has_rotation()) contact.second->rotation = FromProto(row.second().rotation());
-  return contact;
+  if (!row.has_second()) return absl::OkStatus();
+  SecondObject& second = contact.second.emplace();
+  ASSIGN_OR_RETURN(second.location, FromLocation(row.second()));
+  second.handle = row.second().object();
+  if (row.second().has_rotation()) second.rotation = FromProto(row.second().rotation());
+  return absl::OkStatus();
 }
 
 HertzContact FromProto(const v1::HertzContact& hertz) {
@@ -66,58 +61,72 @@ Roughness FromProto(const v1::Roughness& proto) {
   return roughness;
 }
 
-absl::StatusOr<ObjectImpulse> FromRow(const v1::Impulse& row) {
-  absl::StatusOr<CommonContact> contact = FromCommon(row, row.impulse_newton_seconds());
-  if (!contact.ok()) return contact.status();
-  contact->impulse.duration_s = row.duration_s();
-  if (row.has_hertz()) contact->impulse.hertz = FromProto(row.hertz());
-  return ObjectImpulse{.handle = row.object(),
-                       .time_offset_s = row.time_offset_s(),
-                       .impulse = contact->impulse,
-                       .second = contact->second};
+absl::Status ReadInto(const v1::Impulse& row, ObjectImpulse& impulse) {
+  RETURN_IF_ERROR(ReadContact(row, row.impulse_newton_seconds(), impulse.contact));
+  impulse.contact.impulse.duration_s = row.duration_s();
+  if (row.has_hertz()) impulse.contact.impulse.hertz = FromProto(row.hertz());
+  impulse.time_offset_s = row.time_offset_s();
+  return absl::OkStatus();
 }
 
-absl::StatusOr<ObjectForce> FromRow(const v1::SustainedContact& row) {
-  const absl::StatusOr<CommonContact> contact = FromCommon(row, row.force_newtons());
-  if (!contact.ok()) return contact.status();
-  return ObjectForce{.handle = row.object(),
-                     .force = contact->impulse,
-                     .roughness = FromProto(row.roughness()),
-                     .second = contact->second};
+absl::Status ReadInto(const v1::SustainedContact& row, ObjectForce& force) {
+  RETURN_IF_ERROR(ReadContact(row, row.force_newtons(), force.contact));
+  force.roughness = FromProto(row.roughness());
+  return absl::OkStatus();
 }
 
-absl::StatusOr<ObjectTouch> FromRow(const v1::EngineContact& row) {
-  absl::StatusOr<CommonContact> contact = FromCommon(row, row.impulse_newton_seconds());
-  if (!contact.ok()) return contact.status();
-  contact->impulse.duration_s = row.duration_s();
-  return ObjectTouch{.handle = row.object(),
-                     .partner = row.partner(),
-                     .impulse = contact->impulse,
-                     .roughness = FromProto(row.roughness()),
-                     .second = contact->second};
+absl::Status ReadInto(const v1::EngineContact& row, ObjectTouch& touch) {
+  RETURN_IF_ERROR(ReadContact(row, row.impulse_newton_seconds(), touch.contact));
+  touch.contact.impulse.duration_s = row.duration_s();
+  touch.partner = row.partner();
+  touch.roughness = FromProto(row.roughness());
+  return absl::OkStatus();
 }
 
-template <typename Rows, typename Use>
-void ForEachRow(const Rows& rows, const Use& use, const ContactSink& sink) {
+/// Gives each row to `take`, one of the intake's methods.
+template <typename Contact, typename Rows>
+void ReadRows(const Rows& rows, ContactIntake& intake,
+              void (ContactIntake::*take)(const Contact&)) {
   for (const auto& row : rows) {
-    if (const auto contact = FromRow(row); contact.ok()) {
-      use(*contact);
+    Contact contact;
+    if (absl::Status status = ReadInto(row, contact); status.ok()) {
+      (intake.*take)(contact);
     } else {
-      sink.reject(row.has_second() ? 2 : 1, contact.status());
+      intake.Reject(row.has_second() ? 2 : 1, std::move(status));
     }
+  }
+}
+
+void ReadColumns(const v1::ImpulseColumns& columns, ContactIntake& intake) {
+  if (absl::Status status = Validate(columns); !status.ok()) {
+    return intake.Reject(std::max<uint64_t>(1, CountContacts(columns)), std::move(status));
+  }
+  for (int row = 0; row < columns.object_size(); ++row) intake.Strike(ReadRow(columns, row));
+}
+
+void ReadColumns(const v1::PoseColumns& columns, ContactIntake& intake) {
+  if (absl::Status status = Validate(columns); !status.ok()) {
+    const auto count = static_cast<uint64_t>(columns.object_size());
+    return intake.Reject(std::max<uint64_t>(1, count), std::move(status));
+  }
+  for (int row = 0; row < columns.object_size(); ++row) {
+    intake.Move(columns.object(row), ReadRow(columns, row));
   }
 }
 
 }  // namespace
 
-void ReadStep(const v1::ContactStep& step, const ContactSink& sink) {
-  for (const v1::ObjectPose& row : step.poses()) sink.move(row.object(), FromProto(row.pose()));
-  ReadColumns(step.pose_columns(), sink);
-  if (step.has_listener()) sink.move_listener(FromProto(step.listener()));
-  ForEachRow(step.impulses(), sink.strike, sink);
-  ReadColumns(step.columns(), sink);
-  ForEachRow(step.sustained(), sink.hold, sink);
-  ForEachRow(step.contacts(), sink.touch, sink);
+absl::Status ReadStep(const v1::ContactStep& step, ContactIntake& intake) {
+  RETURN_IF_ERROR(intake.BeginStep(step.time_s()));
+  for (const v1::ObjectPose& row : step.poses()) intake.Move(row.object(), FromProto(row.pose()));
+  ReadColumns(step.pose_columns(), intake);
+  if (step.has_listener()) intake.MoveListener(FromProto(step.listener()));
+  ReadRows(step.impulses(), intake, &ContactIntake::Strike);
+  ReadColumns(step.columns(), intake);
+  ReadRows(step.sustained(), intake, &ContactIntake::Hold);
+  ReadRows(step.contacts(), intake, &ContactIntake::Touch);
+  intake.EndStep();
+  return absl::OkStatus();
 }
 
 }  // namespace carillon

@@ -17,9 +17,10 @@
 namespace carillon {
 namespace {
 
-/// Half of what the contract promises.
+/// Half of the period that the contract promises.
 constexpr std::chrono::milliseconds kAnswerPeriod(500);
-/// The mixer takes what was pushed within a block; waiting ends if it does not render at all.
+/// The mixer takes impulses within a block. Waiting ends after kMostSettlePeriods if the mixer does
+/// not render at all.
 constexpr std::chrono::milliseconds kSettlePeriod(2);
 constexpr int kMostSettlePeriods = 250;
 
@@ -73,17 +74,7 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
       return Refusal(absl::StatusCode::kInvalidArgument, "STREAM_NOT_STARTED",
                      "the first request of a contact stream must be start");
     }
-    RETURN_IF_ERROR(stream_->BeginStep(step.time_s()));
-    ReadStep(
-        step,
-        {.move = [this](uint32_t handle, const Pose& pose) { stream_->Move(handle, pose); },
-         .move_listener = [this](const Pose& pose) { stream_->MoveListener(pose); },
-         .strike = [this](const ObjectImpulse& impulse) { stream_->Strike(impulse); },
-         .hold = [this](const ObjectForce& force) { stream_->Hold(force); },
-         .touch = [this](const ObjectTouch& touch) { stream_->Touch(touch); },
-         .reject = [this](uint64_t count,
-                          absl::Status reason) { stream_->Reject(count, std::move(reason)); }});
-    stream_->EndStep();
+    RETURN_IF_ERROR(ReadStep(step, stream_->intake()));
     const bool first = stream_->counts().step_count == 1;
     if (first || daemon_.clock.Monotonic() >= answer_due_) Answer();
     return absl::OkStatus();

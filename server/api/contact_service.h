@@ -9,7 +9,7 @@
 
 namespace carillon {
 
-/// What a contact stream needs of the daemon.
+/// The parts of the daemon that a contact stream uses.
 struct ContactContext {
   SceneRegistry& scenes;
   LiveOutput& output;
@@ -17,7 +17,7 @@ struct ContactContext {
   ThreadPool& pool;
 };
 
-/// carillon.v1.ContactService. What it is given must outlive it.
+/// carillon.v1.ContactService. The constructor's references must outlive the service.
 class ContactService final : public v1::ContactService::CallbackService {
  public:
   explicit ContactService(const ContactContext& daemon) : daemon_(daemon) {}

@@ -72,6 +72,9 @@ class RenderCall final : public BidiStream<v1::RenderRequest, v1::RenderResponse
     summary.set_frame_count(rendered.frame_count);
     summary.set_accepted_count(rendered.accepted_count);
     summary.set_rejected_count(rendered.rejected_count);
+    if (!rendered.last_rejection.ok()) {
+      *summary.mutable_last_rejection() = ToErrorInfo(rendered.last_rejection);
+    }
     summary.set_peak(rendered.peak);
     summary.set_limited_frame_count(rendered.limited_frame_count);
   }

@@ -7,6 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 #include "server/api/contact_conversion.h"
 #include "server/api/object_conversion.h"
 #include "server/api/pose_conversion.h"
@@ -69,12 +70,9 @@ absl::Status TraceReader::TakeHeader(const v1::ContactTraceHeader& header) {
   if (header.step_s() > 0 && header.step_s() <= 1) settings_->step_s = header.step_s();
   settings_->space = ToSceneSpace(header.hearing(), header.listener());
   if (header.has_clock()) {
-    if (absl::Status status = TakeClock(header.clock()); !status.ok()) return status;
+    RETURN_IF_ERROR(TakeClock(header.clock()));
   }
-  absl::StatusOr<std::unique_ptr<OfflineRenderer>> renderer =
-      OfflineRenderer::Make(*settings_, bodies_);
-  if (!renderer.ok()) return renderer.status();
-  renderer_ = *std::move(renderer);
+  ASSIGN_OR_RETURN(renderer_, OfflineRenderer::Make(*settings_, bodies_));
   return absl::OkStatus();
 }
 
@@ -98,17 +96,15 @@ absl::Status TraceReader::TakeClock(const v1::ContactTraceClock& clock) {
 }
 
 absl::Status TraceReader::TakeObject(const v1::ContactTraceObject& object) {
-  const absl::StatusOr<std::string> digest = ParseModelName(object.modal_model());
-  if (!digest.ok()) return digest.status();
-  absl::StatusOr<ObjectProperties> properties =
+  ASSIGN_OR_RETURN(const std::string digest, ParseModelName(object.modal_model()));
+  ASSIGN_OR_RETURN(
+      ObjectProperties properties,
       ToObjectProperties(object.material(), object.size(),
-                         object.has_gain() ? std::optional(object.gain()) : std::nullopt);
-  if (!properties.ok()) return properties.status();
-  if (object.has_pose()) properties->pose = FromProto(object.pose());
-  absl::StatusOr<std::shared_ptr<const ModalModel>> model = models_.FindToSound(*digest);
-  if (!model.ok()) return model.status();
+                         object.has_gain() ? std::optional(object.gain()) : std::nullopt));
+  if (object.has_pose()) properties.pose = FromProto(object.pose());
+  ASSIGN_OR_RETURN(std::shared_ptr<const ModalModel> model, models_.FindToSound(digest));
   ++object_count_;
-  return renderer_->AddObject(object.handle(), *std::move(model), *properties);
+  return renderer_->AddObject(object.handle(), std::move(model), properties);
 }
 
 absl::Status TraceReader::TakeStep(const v1::ContactStep& step) {
@@ -122,23 +118,14 @@ absl::Status TraceReader::TakeStep(const v1::ContactStep& step) {
   impulse_count_ += static_cast<uint64_t>(step.impulses_size() + step.columns().object_size() +
                                           step.sustained_size() + step.contacts_size() +
                                           step.poses_size() + step.pose_columns().object_size());
-  // Each object hears of the listener's.
+  // A pose of the listener gives an event for each object.
   if (step.has_listener()) impulse_count_ += object_count_;
   if (impulse_count_ > kMaxImpulseCount) {
     return Refusal(absl::StatusCode::kResourceExhausted, "TRACE_TOO_LARGE",
                    absl::StrCat("the trace has over ", kMaxImpulseCount,
                                 " impulses and poses; render it in pieces"));
   }
-  renderer_->BeginStep(time_s_);
-  ReadStep(step,
-           {.move = [this](uint32_t handle, const Pose& pose) { renderer_->Move(handle, pose); },
-            .move_listener = [this](const Pose& pose) { renderer_->MoveListener(pose); },
-            .strike = [this](const ObjectImpulse& impulse) { renderer_->Strike(impulse); },
-            .hold = [this](const ObjectForce& force) { renderer_->Hold(force); },
-            .touch = [this](const ObjectTouch& touch) { renderer_->Touch(touch); },
-            .reject = [this](uint64_t count, const absl::Status&) { renderer_->Reject(count); }});
-  renderer_->EndStep();
-  return absl::OkStatus();
+  return ReadStep(step, renderer_->intake());
 }
 
 }  // namespace carillon

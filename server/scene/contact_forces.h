@@ -7,55 +7,44 @@
 #include <utility>
 #include <vector>
 
-#include "absl/functional/function_ref.h"
 #include "server/excitation/contact.h"
 #include "server/excitation/load_tracker.h"
-#include "server/scene/sounding_object.h"
+#include "server/scene/felt_contact.h"
+#include "server/scene/object_contact.h"
 #include "server/synthesis/schedule/mixer_event.h"
 
 namespace carillon {
 
-/// A force that lasts on an object of the scene.
-struct ObjectForce {
+/// An action on an object at a simulation time.
+struct ForceEvent {
   uint32_t handle = 0;
-  ContactImpulse force;  ///< newtons for newton seconds
-  Roughness roughness;
-  std::optional<SecondObject> second = std::nullopt;
+  MixerEvent::Action action{};
+  double time_s = 0;
 };
 
-/// A contact of an object of which it is not known whether it is a blow or a load.
-struct ObjectTouch {
-  uint32_t handle = 0;
-  uint32_t partner = 0;      ///< names the other body
-  ContactImpulse impulse{};  ///< of the whole step
-  Roughness roughness{};
-  std::optional<SecondObject> second = std::nullopt;
-};
-
-/// Turns the lasting contacts of one simulation, step by step, into what the mixer understands: for
-/// each object that has some the forces, then a knot; and strikes where a contact was a blow. One
-/// thread at a time.
+/// Turns the lasting contacts of one simulation into events of the mixer. Each step gives, for each
+/// object under a force, the object's forces and then a knot; a contact that was a blow gives an
+/// impulse, too. One thread at a time.
 class ContactForces {
  public:
-  /// Takes what happens to an object at a simulation time.
-  using Push =
-      absl::FunctionRef<void(uint32_t handle, const MixerEvent::Action& action, double time_s)>;
+  using Events = std::vector<ForceEvent>;
 
   /// `step_s`: the simulator's step, seconds.
   explicit ContactForces(double step_s) : nominal_step_s_(step_s) {}
 
-  /// Begins the step at simulation time `time_s`, not before the last. Where steps were left out,
-  /// forces ended there.
-  void Begin(double time_s, Push push);
+  /// Begins the step at simulation time `time_s`, which is not before the last step's. If steps
+  /// were left out, the forces ended with the last step, and the events that end them are returned.
+  Events Begin(double time_s);
 
-  /// A force of this step, in newtons where the contact says newton seconds.
+  /// Adds a force to this step, with newtons in place of newton seconds.
   void Add(const FeltContact& force, const Roughness& roughness);
 
-  /// A contact of this step that is a blow or a load, N s.
+  /// Adds a contact to this step that may be a blow or a load. `impulse` is what the objects of
+  /// `touch` feel.
   void Touch(const ObjectTouch& touch, const FeltContact& impulse);
 
-  /// Ends the step.
-  void End(Push push);
+  /// Ends the step and returns its events.
+  Events End();
 
  private:
   struct Force {
@@ -75,10 +64,12 @@ class ContactForces {
     std::vector<PairTouch> touches;  // of this step
   };
 
+  void End(Events& events);
   /// Adds an impulse times `per_second` as a force of this step.
   void Add(const Felt& felt, double per_second, const Roughness& roughness);
-  void Divide(Pair& pair, Push push);
-  static ForceKnot Tie(const std::vector<Force>& forces, double step_s);
+  /// Divides the touches of a pair into blows, which become events, and loads, which become forces.
+  void Divide(Pair& pair, Events& events);
+  static ForceKnot MakeKnot(const std::vector<Force>& forces, double step_s);
 
   double nominal_step_s_;
   double step_s_ = 0;  // since the step before

@@ -8,7 +8,7 @@
 
 namespace carillon {
 
-/// How simulation time is mapped to a mixer's frames.
+/// Maps simulation time to the frames of a mixer.
 struct TimeMapping {
   uint64_t first_frame = 0;
   double first_time_s = 0;  ///< simulation time at that frame

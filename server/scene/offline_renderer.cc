@@ -3,12 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 #include <variant>
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 #include "server/synthesis/flush_denormals.h"
 
 namespace carillon {
@@ -20,12 +20,13 @@ constexpr double kLongestTailS = 120;
 constexpr double kLongestOpenTailS = 60;
 /// -80 dB of full scale.
 constexpr float kQuiet = 1e-4F;
-/// So long must it stay quiet: two close modes beat, and are silent together for a while.
+/// The sound must stay quiet for this time, because two close modes beat and are silent together
+/// for a while.
 constexpr double kQuietS = 0.25;
 constexpr size_t kQueueCapacity = 65536;
 
 MixerSettings SettingsOf(const OfflineSettings& settings, SectionThreads& threads) {
-  // Nothing waits here, so a block takes however many events fall into it.
+  // Nobody waits for an offline block, so a block takes all events that fall into it.
   return {.sample_rate_hz = static_cast<double>(settings.sample_rate_hz),
           .block_frame_count = OfflineRenderer::kBlockFrameCount,
           .channel_count = settings.channel_count,
@@ -34,6 +35,13 @@ MixerSettings SettingsOf(const OfflineSettings& settings, SectionThreads& thread
           .most_pending_events = kQueueCapacity,
           .most_events_per_block = kQueueCapacity,
           .threads = &threads};
+}
+
+IntakeSettings IntakeSettingsOf(const OfflineSettings& settings) {
+  return {.sample_rate_hz = static_cast<double>(settings.sample_rate_hz),
+          .step_s = settings.step_s,
+          .mapping = settings.mapping,
+          .most_ahead_s = OfflineRenderer::kMaxTimeS - settings.mapping.first_time_s};
 }
 
 bool IsMove(const MixerEvent& event) {
@@ -60,11 +68,9 @@ absl::StatusOr<std::unique_ptr<OfflineRenderer>> OfflineRenderer::Make(
         absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
         absl::StrCat("channel_count is ", settings.channel_count, "; it must be 1 or 2"));
   }
-  if (absl::Status status = Validate(settings.space); !status.ok()) return status;
+  RETURN_IF_ERROR(Validate(settings.space));
   std::unique_ptr<OfflineRenderer> renderer(new OfflineRenderer(settings, bodies));
-  absl::StatusOr<std::unique_ptr<EventStream>> stream = renderer->mixer_.OpenStream(kQueueCapacity);
-  if (!stream.ok()) return stream.status();
-  renderer->stream_ = *std::move(stream);
+  ASSIGN_OR_RETURN(renderer->stream_, renderer->mixer_.OpenStream(kQueueCapacity));
   return renderer;
 }
 
@@ -73,114 +79,26 @@ OfflineRenderer::OfflineRenderer(const OfflineSettings& settings, BodyCache& bod
       bodies_(bodies),
       threads_(settings.thread_count),
       mixer_(SettingsOf(settings, threads_)),
-      forces_(settings.step_s),
-      pose_times_(settings.step_s) {}
+      scene_("the trace", settings.space),
+      target_(settings.mapping.first_frame),
+      intake_(scene_, target_, IntakeSettingsOf(settings)) {}
 
 absl::Status OfflineRenderer::AddObject(uint32_t handle, std::shared_ptr<const ModalModel> model,
                                         const ObjectProperties& properties) {
-  if (objects_.contains(handle)) {
-    return Refusal(absl::StatusCode::kAlreadyExists, "OBJECT_EXISTS",
-                   absl::StrCat("the trace has two objects ", handle));
-  }
-  absl::StatusOr<std::shared_ptr<const SoundingBody>> body = bodies_.Get(std::move(model));
-  if (!body.ok()) return body.status();
-  absl::StatusOr<SoundingObject> object =
-      MakeSoundingObject(*std::move(body), properties, mixer_,
-                         MakeVoice(settings_.space, properties.pose, mixer_.settings()));
-  if (!object.ok()) return object.status();
-  objects_.emplace(handle, *std::move(object));
-  return absl::OkStatus();
-}
-
-void OfflineRenderer::Strike(const ObjectImpulse& impulse) {
-  if (!TryStrike(impulse).ok()) Reject(impulse.second ? 2 : 1);
-}
-
-absl::Status OfflineRenderer::TryStrike(const ObjectImpulse& impulse) {
-  const double due_s = step_time_s_ + impulse.time_offset_s;
-  if (!(impulse.time_offset_s >= 0 && due_s >= settings_.mapping.first_time_s &&
-        due_s <= kMaxTimeS)) {
-    return absl::InvalidArgumentError("no such time");
-  }
-  const absl::StatusOr<FeltContact> contact =
-      Locate(impulse.handle, impulse.impulse, impulse.second);
-  if (!contact.ok()) return contact.status();
-  for (const Felt& felt : contact->all()) {
-    Push(felt.bank, felt.impulse, due_s);
-  }
-  return absl::OkStatus();
-}
-
-void OfflineRenderer::BeginStep(double time_s) {
-  step_time_s_ = time_s;
-  forces_.Begin(time_s, [this](auto... force) { PushForce(force...); });
-}
-
-void OfflineRenderer::Hold(const ObjectForce& force) {
-  const absl::StatusOr<FeltContact> felt = Locate(force.handle, force.force, force.second);
-  if (!felt.ok() || !Validate(force.roughness).ok()) return Reject(force.second ? 2 : 1);
-  forces_.Add(*felt, force.roughness);
-}
-
-void OfflineRenderer::Touch(const ObjectTouch& touch) {
-  const absl::StatusOr<FeltContact> felt = Locate(touch.handle, touch.impulse, touch.second);
-  if (!felt.ok() || !Validate(touch.roughness).ok()) return Reject(touch.second ? 2 : 1);
-  forces_.Touch(touch, *felt);
-}
-
-void OfflineRenderer::Move(uint32_t handle, const Pose& pose) {
-  const auto found = objects_.find(handle);
-  if (found == objects_.end() || !Validate(pose).ok()) return Reject(1);
-  SoundingObject& object = found->second;
-  object.properties.pose = pose;
-  if (object.voice == nullptr) return;
-  const double glide_s = pose_times_.GlideS(handle, step_time_s_);
-  Push(object.bank, ObjectMove{MotionTo(pose, glide_s * settings_.sample_rate_hz)},
-       step_time_s_ - glide_s);
-}
-
-void OfflineRenderer::MoveListener(const Pose& pose) {
-  if (!Validate(pose).ok()) return Reject(1);
-  const double glide_s = pose_times_.GlideS(std::nullopt, step_time_s_);
-  for (const auto& [handle, object] : objects_) {
-    if (object.voice == nullptr) continue;
-    Push(object.bank, ListenerMove{MotionTo(pose, glide_s * settings_.sample_rate_hz)},
-         step_time_s_ - glide_s);
-  }
-}
-
-void OfflineRenderer::EndStep() {
-  forces_.End([this](auto... force) { PushForce(force...); });
-}
-
-void OfflineRenderer::PushForce(uint32_t handle, const MixerEvent::Action& action, double time_s) {
-  Push(objects_.at(handle).bank, action, time_s);
-}
-
-absl::StatusOr<FeltContact> OfflineRenderer::Locate(
-    uint32_t handle, const ContactImpulse& contact,
-    const std::optional<SecondObject>& second) const {
-  const auto found = objects_.find(handle);
-  const auto other = second ? objects_.find(second->handle) : found;
-  if (found == objects_.end() || other == objects_.end()) {
-    return absl::InvalidArgumentError("no such object");
-  }
-  return second ? Feel(contact, handle, found->second, *second, other->second)
-                : Feel(contact, handle, found->second);
-}
-
-void OfflineRenderer::Push(BankId bank, const MixerEvent::Action& action, double time_s) {
-  MixerEvent event{.bank = bank, .action = action};
-  SetFrame(event, settings_.mapping.FrameOf(time_s, settings_.sample_rate_hz));
-  events_.push_back(event);
+  RETURN_IF_ERROR(scene_.CheckFree(handle));
+  ASSIGN_OR_RETURN(std::shared_ptr<const SoundingBody> body, bodies_.Get(std::move(model)));
+  auto voice = MakeVoice(settings_.space, properties.pose, mixer_.settings());
+  ASSIGN_OR_RETURN(SoundingObject object,
+                   MakeSoundingObject(std::move(body), properties, mixer_, std::move(voice)));
+  return scene_.Insert(handle, std::move(object));
 }
 
 size_t OfflineRenderer::Render(std::span<float> samples) {
   if (!begun_) {
-    // Events of one sample keep their order, as when they come live.
-    std::ranges::stable_sort(events_, {}, &MixerEvent::FirstSample);
-    const auto last = std::find_if_not(events_.rbegin(), events_.rend(), IsMove);
-    contact_count_ = static_cast<size_t>(events_.rend() - last);
+    // Events of one sample keep their order, as they do live.
+    std::ranges::stable_sort(events(), {}, &MixerEvent::FirstSample);
+    const auto last = std::find_if_not(events().rbegin(), events().rend(), IsMove);
+    contact_count_ = static_cast<size_t>(events().rend() - last);
   }
   begun_ = true;
   const FlushDenormals flush;
@@ -191,7 +109,8 @@ size_t OfflineRenderer::Render(std::span<float> samples) {
   return count;
 }
 
-/// Renders some of `samples`; returns how many frames count.
+/// Renders blocks into the front of `samples`; returns the number of frames that belong to the
+/// sound.
 size_t OfflineRenderer::RenderBlocks(std::span<float> samples) {
   const size_t block_size = kBlockFrameCount * settings_.channel_count;
   const size_t block_count = CountBlocks(samples.size() / block_size);
@@ -213,20 +132,22 @@ size_t OfflineRenderer::RenderBlocks(std::span<float> samples) {
   const MixerStatistics statistics = mixer_.statistics();
   summary_.frame_count += count;
   summary_.accepted_count = statistics.accepted_count + statistics.late_count;
+  summary_.rejected_count = intake_.rejected_count();
+  summary_.last_rejection = intake_.last_rejection();
   summary_.limited_frame_count = statistics.limited_frame_count;
   summary_.peak = std::max(summary_.peak, mixer_.TakePeak());
   return count;
 }
 
-/// How many blocks are rendered together: not past the end, nor more than whose strikes the queue
-/// holds.
+/// Returns the number of blocks to render together: no block lies past the end, and the queue holds
+/// the events of all of them.
 size_t OfflineRenderer::CountBlocks(size_t most) const {
   const uint64_t first = mixer_.frame();
   const uint64_t left = EndFrame() - std::min(first, EndFrame());
   size_t count = std::min<size_t>({most, kBlocksTogether, left / kBlockFrameCount + 1});
   const size_t full = pushed_count_ + kQueueCapacity / 2;
-  while (count > 1 && full < events_.size() &&
-         events_[full].FirstSample() < first + count * kBlockFrameCount) {
+  while (count > 1 && full < events().size() &&
+         events()[full].FirstSample() < first + count * kBlockFrameCount) {
     --count;
   }
   return count;
@@ -234,14 +155,18 @@ size_t OfflineRenderer::CountBlocks(size_t most) const {
 
 uint64_t OfflineRenderer::EndFrame() const {
   const uint64_t last = contact_count_ == 0 ? settings_.mapping.first_frame
-                                            : events_[contact_count_ - 1].FirstSample();
+                                            : events()[contact_count_ - 1].FirstSample();
   const double tail_s = settings_.tail_s > 0 ? settings_.tail_s : kLongestOpenTailS;
   return last + static_cast<uint64_t>(std::ceil(tail_s * settings_.sample_rate_hz));
 }
 
 void OfflineRenderer::PushEventsBefore(uint64_t frame) {
-  while (pushed_count_ < events_.size() && events_[pushed_count_].FirstSample() < frame) {
-    if (!stream_->TryPush(events_[pushed_count_])) Reject(1);
+  while (pushed_count_ < events().size() && events()[pushed_count_].FirstSample() < frame) {
+    if (!stream_->TryPush(events()[pushed_count_])) {
+      intake_.Reject(1, Refusal(absl::StatusCode::kResourceExhausted, "TRACE_TOO_LARGE",
+                                absl::StrCat("over ", kQueueCapacity,
+                                             " events fall into one block; render fewer objects")));
+    }
     ++pushed_count_;
   }
 }
@@ -253,7 +178,7 @@ bool OfflineRenderer::TailEnded(std::span<const float> block) {
          static_cast<double>(quiet_frame_count_) >= QuietS() * settings_.sample_rate_hz;
 }
 
-/// What is on its way may still arrive.
+/// Sound that was made may still be on its way to the listener.
 double OfflineRenderer::QuietS() const {
   return kQuietS + (settings_.space.hearing.propagation_delay ? kLongestPropagationS : 0);
 }

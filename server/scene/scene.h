@@ -3,10 +3,9 @@
 
 #include <cstdint>
 #include <map>
-#include <optional>
+#include <string>
 
 #include "absl/base/thread_annotations.h"
-#include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "server/base/mutex.h"
@@ -15,62 +14,62 @@
 
 namespace carillon {
 
-/// The objects that one client makes sound together. Safe from every thread; a contact uses
-/// it under its lock, and what takes an object off the mixer waits for that, so that no strike is
-/// sent to a bank that has been given up.
+/// The objects that one client makes sound together. Safe from every thread.
+///
+/// A contact holds mutex() from the look-up of an object until its events are pushed. An object's
+/// bank is taken off the mixer only after the object was removed under the same mutex, so no event
+/// is sent to a bank that has been given up.
 class Scene {
  public:
-  explicit Scene(uint64_t id, const SceneSpace& space = {}) : id_(id), space_(space) {}
+  /// `name` is used in error messages.
+  explicit Scene(std::string name, const SceneSpace& space = {})
+      : name_(std::move(name)), space_(space) {}
 
-  uint64_t id() const { return id_; }
+  Mutex& mutex() const ABSL_LOCK_RETURNED(mutex_) { return mutex_; }
 
-  /// How it is heard, and where the listener is, as told last.
+  /// Errors: NotFound (SCENE_NOT_FOUND: it was deleted meanwhile, OBJECT_NOT_FOUND).
+  absl::StatusOr<const SoundingObject*> Find(uint32_t handle) const
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+
+  /// Notes the pose of an object, and returns the object.
+  /// Errors: InvalidArgument (INVALID_POSE), and those of Find.
+  absl::StatusOr<const SoundingObject*> Move(uint32_t handle, const Pose& pose)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+
+  /// Notes the pose of the listener, and returns all objects.
+  /// Errors: InvalidArgument (INVALID_POSE), NotFound (SCENE_NOT_FOUND).
+  absl::StatusOr<const std::map<uint32_t, SoundingObject>*> MoveListener(const Pose& pose)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+
+  /// How the scene is heard, with the newest pose of the listener.
   SceneSpace space() const;
 
-  /// Notes where an object is, and calls `use` with it.
-  /// Errors: InvalidArgument (INVALID_POSE), NotFound (SCENE_NOT_FOUND, OBJECT_NOT_FOUND).
-  absl::Status Move(uint32_t handle, const Pose& pose,
-                    absl::FunctionRef<void(const SoundingObject&)> use);
+  /// Returns a copy of an object. Errors: those of Find.
+  absl::StatusOr<SoundingObject> Copy(uint32_t handle) const;
 
-  /// Notes where the listener is, and calls `use` with each object whose place is heard.
-  /// Errors: InvalidArgument (INVALID_POSE), NotFound (SCENE_NOT_FOUND).
-  absl::Status MoveListener(const Pose& pose, absl::FunctionRef<void(const SoundingObject&)> use);
+  /// Errors: AlreadyExists (OBJECT_EXISTS: an object has this handle).
+  absl::Status CheckFree(uint32_t handle) const;
 
-  /// Calls `use` with the object while no change can happen.
-  /// Errors: NotFound (SCENE_NOT_FOUND: deleted meanwhile, OBJECT_NOT_FOUND), and those of `use`.
-  absl::Status Use(uint32_t handle,
-                   absl::FunctionRef<absl::Status(const SoundingObject&)> use) const;
-
-  /// The same with two objects.
-  absl::Status Use(
-      uint32_t first, uint32_t second,
-      absl::FunctionRef<absl::Status(const SoundingObject&, const SoundingObject&)> use) const;
-
-  /// Errors: NotFound (SCENE_NOT_FOUND, OBJECT_NOT_FOUND).
-  absl::StatusOr<SoundingObject> Find(uint32_t handle) const;
-
-  /// `handle` where it is free, or one that is when it is zero.
-  /// Errors: AlreadyExists (OBJECT_EXISTS).
-  absl::StatusOr<uint32_t> ChooseHandle(uint32_t handle) const;
+  /// The smallest handle above zero that no object has.
+  uint32_t FreeHandle() const;
 
   /// Errors: NotFound (SCENE_NOT_FOUND), AlreadyExists (OBJECT_EXISTS).
   absl::Status Insert(uint32_t handle, SoundingObject object);
 
-  /// Puts `object` in the place of another and returns that one.
+  /// Puts `object` in the place of another and returns the other. Errors: those of Find.
   absl::StatusOr<SoundingObject> Replace(uint32_t handle, SoundingObject object);
 
-  /// Takes an object out and returns it.
+  /// Takes an object out and returns it. Errors: those of Find.
   absl::StatusOr<SoundingObject> Remove(uint32_t handle);
 
-  /// Takes all objects out; from now on the scene takes nothing.
+  /// Takes all objects out. From then on every call returns SCENE_NOT_FOUND.
   std::map<uint32_t, SoundingObject> Close();
 
  private:
-  absl::StatusOr<std::map<uint32_t, SoundingObject>::const_iterator> Locate(uint32_t handle) const
-      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  absl::Status SceneNotFound() const;
+  absl::Status CheckOpen() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  absl::Status ObjectExists(uint32_t handle) const;
 
-  const uint64_t id_;
+  const std::string name_;
   mutable Mutex mutex_;
   SceneSpace space_ ABSL_GUARDED_BY(mutex_);
   std::map<uint32_t, SoundingObject> objects_ ABSL_GUARDED_BY(mutex_);

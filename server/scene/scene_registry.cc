@@ -5,6 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon {
 namespace {
@@ -38,21 +39,20 @@ absl::Status ValidateGlide(double glide_s) {
 }  // namespace
 
 absl::StatusOr<uint64_t> SceneRegistry::CreateScene(const SceneSpace& space) {
-  if (absl::Status status = Validate(space); !status.ok()) return status;
+  RETURN_IF_ERROR(Validate(space));
   const MutexLock lock(&mutex_);
   if (scenes_.size() >= kMaxSceneCount) {
     return TooMany("TOO_MANY_SCENES", kMaxSceneCount, "scenes");
   }
   const uint64_t id = next_scene_++;
-  scenes_[id] = std::make_shared<Scene>(id, space);
+  scenes_[id] = std::make_shared<Scene>(absl::StrCat("scenes/", id), space);
   return id;
 }
 
 absl::Status SceneRegistry::DeleteScene(uint64_t scene) {
   const MutexLock change_lock(&change_mutex_);
-  absl::StatusOr<std::shared_ptr<Scene>> found = FindScene(scene);
-  if (!found.ok()) return found.status();
-  const std::map<uint32_t, SoundingObject> objects = (*found)->Close();
+  ASSIGN_OR_RETURN(const std::shared_ptr<Scene> found, FindScene(scene));
+  const std::map<uint32_t, SoundingObject> objects = found->Close();
   for (const auto& [handle, object] : objects) mixer_.FadeOut(object.bank);
   const MutexLock lock(&mutex_);
   scenes_.erase(scene);
@@ -64,79 +64,67 @@ absl::StatusOr<PlacedObject> SceneRegistry::AddObject(uint64_t scene, uint32_t h
                                                       std::shared_ptr<const ModalModel> model,
                                                       const ObjectProperties& properties) {
   const MutexLock change_lock(&change_mutex_);
-  const absl::StatusOr<std::shared_ptr<Scene>> found = FindScene(scene);
-  if (!found.ok()) return found.status();
-  const absl::StatusOr<uint32_t> chosen = (*found)->ChooseHandle(handle);
-  if (!chosen.ok()) return chosen.status();
+  ASSIGN_OR_RETURN(const std::shared_ptr<Scene> found, FindScene(scene));
+  RETURN_IF_ERROR(found->CheckFree(handle));
   if (object_count() >= kMaxObjectCount) {
     return TooMany("TOO_MANY_OBJECTS", kMaxObjectCount, "objects");
   }
-  absl::StatusOr<std::shared_ptr<const SoundingBody>> body = bodies_.Get(std::move(model));
-  if (!body.ok()) return body.status();
-  absl::StatusOr<SoundingObject> object =
-      MakeSoundingObject(*std::move(body), properties, mixer_,
-                         MakeVoice((*found)->space(), properties.pose, mixer_.settings()));
-  if (!object.ok()) return object.status();
-  // Nothing can be in its way: every change holds change_mutex_.
-  (*found)->Insert(*chosen, *object).IgnoreError();
+  ASSIGN_OR_RETURN(std::shared_ptr<const SoundingBody> body, bodies_.Get(std::move(model)));
+  auto voice = MakeVoice(found->space(), properties.pose, mixer_.settings());
+  ASSIGN_OR_RETURN(SoundingObject object,
+                   MakeSoundingObject(std::move(body), properties, mixer_, std::move(voice)));
+  const uint32_t chosen = handle != 0 ? handle : found->FreeHandle();
+  // This cannot fail, because every change of the scene holds change_mutex_.
+  found->Insert(chosen, object).IgnoreError();
   const MutexLock lock(&mutex_);
   ++object_count_;
-  return PlacedObject{.handle = *chosen, .object = *std::move(object)};
+  return PlacedObject{.handle = chosen, .object = std::move(object)};
 }
 
 absl::StatusOr<PlacedObject> SceneRegistry::UpdateObject(uint64_t scene, uint32_t handle,
                                                          const ObjectChange& change) {
   const MutexLock change_lock(&change_mutex_);
-  const absl::StatusOr<std::shared_ptr<Scene>> found = FindScene(scene);
-  if (!found.ok()) return found.status();
-  if (absl::Status status = ValidateGlide(change.glide_s); !status.ok()) return status;
-  if (change.pose) {
-    if (absl::Status status = Validate(*change.pose); !status.ok()) return status;
-  }
-  const absl::StatusOr<SoundingObject> old = (*found)->Find(handle);
-  if (!old.ok()) return old.status();
+  ASSIGN_OR_RETURN(const std::shared_ptr<Scene> found, FindScene(scene));
+  RETURN_IF_ERROR(ValidateGlide(change.glide_s));
+  if (change.pose) RETURN_IF_ERROR(Validate(*change.pose));
+  ASSIGN_OR_RETURN(const SoundingObject old, found->Copy(handle));
   if (change.material || change.size || change.gain) {
-    absl::StatusOr<SoundingObject> object =
-        MakeSoundingObject(old->body, Changed(old->properties, change), mixer_, old->voice);
-    if (!object.ok()) return object.status();
-    (*found)->Replace(handle, *std::move(object)).IgnoreError();
-    mixer_.LetRingOut(old->bank);
+    ASSIGN_OR_RETURN(
+        SoundingObject object,
+        MakeSoundingObject(old.body, Changed(old.properties, change), mixer_, old.voice));
+    found->Replace(handle, std::move(object)).IgnoreError();
+    mixer_.LetRingOut(old.bank);
   }
   if (change.pose) {
-    if (absl::Status status = OpenMoves(); !status.ok()) return status;
-    (*found)
-        ->Move(handle, *change.pose,
-               [&](const SoundingObject& object) ABSL_EXCLUSIVE_LOCKS_REQUIRED(change_mutex_) {
-                 SendMove(object, ObjectMove{MotionOf(*change.pose, change.glide_s)});
-               })
-        .IgnoreError();
+    RETURN_IF_ERROR(OpenMoves());
+    const MutexLock lock(&found->mutex());
+    ASSIGN_OR_RETURN(const SoundingObject* object, found->Move(handle, *change.pose));
+    SendMove(*object, ObjectMove{MotionOf(*change.pose, change.glide_s)});
   }
-  absl::StatusOr<SoundingObject> object = (*found)->Find(handle);
-  if (!object.ok()) return object.status();
-  return PlacedObject{.handle = handle, .object = *std::move(object)};
+  ASSIGN_OR_RETURN(SoundingObject object, found->Copy(handle));
+  return PlacedObject{.handle = handle, .object = std::move(object)};
 }
 
 absl::Status SceneRegistry::UpdateListener(uint64_t scene, const Pose& pose, double glide_s) {
   const MutexLock change_lock(&change_mutex_);
-  const absl::StatusOr<std::shared_ptr<Scene>> found = FindScene(scene);
-  if (!found.ok()) return found.status();
-  if (absl::Status status = ValidateGlide(glide_s); !status.ok()) return status;
-  if (absl::Status status = OpenMoves(); !status.ok()) return status;
-  return (*found)->MoveListener(
-      pose, [&](const SoundingObject& object) ABSL_EXCLUSIVE_LOCKS_REQUIRED(change_mutex_) {
-        SendMove(object, ListenerMove{MotionOf(pose, glide_s)});
-      });
+  ASSIGN_OR_RETURN(const std::shared_ptr<Scene> found, FindScene(scene));
+  RETURN_IF_ERROR(ValidateGlide(glide_s));
+  RETURN_IF_ERROR(OpenMoves());
+  const MutexLock lock(&found->mutex());
+  ASSIGN_OR_RETURN(const auto* objects, found->MoveListener(pose));
+  for (const auto& [handle, object] : *objects) {
+    SendMove(object, ListenerMove{MotionOf(pose, glide_s)});
+  }
+  return absl::OkStatus();
 }
 
 absl::Status SceneRegistry::OpenMoves() {
   if (moves_ != nullptr) return absl::OkStatus();
-  absl::StatusOr<std::unique_ptr<EventStream>> moves = mixer_.OpenStream(kMaxObjectCount);
-  if (!moves.ok()) return moves.status();
-  moves_ = *std::move(moves);
+  ASSIGN_OR_RETURN(moves_, mixer_.OpenStream(kMaxObjectCount));
   return absl::OkStatus();
 }
 
-/// Of time zero: it comes at once.
+/// The event has time zero, so it takes effect at once.
 void SceneRegistry::SendMove(const SoundingObject& object, const MixerEvent::Action& move) {
   if (object.voice != nullptr) moves_->TryPush({.bank = object.bank, .action = move});
 }
@@ -147,11 +135,9 @@ Motion SceneRegistry::MotionOf(const Pose& pose, double glide_s) const {
 
 absl::Status SceneRegistry::RemoveObject(uint64_t scene, uint32_t handle) {
   const MutexLock change_lock(&change_mutex_);
-  const absl::StatusOr<std::shared_ptr<Scene>> found = FindScene(scene);
-  if (!found.ok()) return found.status();
-  const absl::StatusOr<SoundingObject> removed = (*found)->Remove(handle);
-  if (!removed.ok()) return removed.status();
-  mixer_.FadeOut(removed->bank);
+  ASSIGN_OR_RETURN(const std::shared_ptr<Scene> found, FindScene(scene));
+  ASSIGN_OR_RETURN(const SoundingObject removed, found->Remove(handle));
+  mixer_.FadeOut(removed.bank);
   const MutexLock lock(&mutex_);
   --object_count_;
   return absl::OkStatus();
@@ -159,9 +145,8 @@ absl::Status SceneRegistry::RemoveObject(uint64_t scene, uint32_t handle) {
 
 absl::StatusOr<std::unique_ptr<ContactStream>> SceneRegistry::OpenContactStream(
     uint64_t scene, const ContactStreamSettings& settings) {
-  absl::StatusOr<std::shared_ptr<Scene>> found = FindScene(scene);
-  if (!found.ok()) return found.status();
-  return ContactStream::Make(*std::move(found), mixer_, settings);
+  ASSIGN_OR_RETURN(std::shared_ptr<Scene> found, FindScene(scene));
+  return ContactStream::Make(std::move(found), mixer_, settings);
 }
 
 size_t SceneRegistry::object_count() const {

@@ -21,15 +21,15 @@ struct PlacedObject {
   SoundingObject object;
 };
 
-/// What changes in an object; the rest stays.
+/// A change of an object. Absent properties stay as they are.
 struct ObjectChange {
-  /// Without its size.
+  /// The size in it is ignored.
   std::optional<SoundingMaterial> material;
-  std::optional<double> poisson_ratio;  ///< of that material
+  std::optional<double> poisson_ratio;  ///< Poisson's ratio of that material
   std::optional<double> size;
   std::optional<double> gain;
   std::optional<Pose> pose;
-  double glide_s = 0;  ///< on the way there, 0 to 10; zero: it jumps
+  double glide_s = 0;  ///< duration of the way to the pose, 0 to 10; zero: the object jumps
 };
 
 /// All scenes of the daemon, on one mixer. Safe from every thread.
@@ -41,26 +41,27 @@ class SceneRegistry {
   /// `mixer` must outlive the registry.
   explicit SceneRegistry(Mixer& mixer) : mixer_(mixer) {}
 
-  /// A new scene's id. Errors: ResourceExhausted (TOO_MANY_SCENES), and those of Validate.
+  /// Returns the id of a new scene. Errors: ResourceExhausted (TOO_MANY_SCENES), and those of
+  /// Validate.
   absl::StatusOr<uint64_t> CreateScene(const SceneSpace& space = {});
 
   /// Fades out the scene's objects. Errors: NotFound (SCENE_NOT_FOUND).
   absl::Status DeleteScene(uint64_t scene);
 
-  /// Makes an object; a `handle` of zero: one is chosen. Errors: NotFound (SCENE_NOT_FOUND),
-  /// AlreadyExists (OBJECT_EXISTS), ResourceExhausted (TOO_MANY_OBJECTS), and those of
-  /// MakeSoundingObject.
+  /// Makes an object. If `handle` is zero, a free handle is chosen. Errors: NotFound
+  /// (SCENE_NOT_FOUND), AlreadyExists (OBJECT_EXISTS), ResourceExhausted (TOO_MANY_OBJECTS), and
+  /// those of MakeSoundingObject.
   absl::StatusOr<PlacedObject> AddObject(uint64_t scene, uint32_t handle,
                                          std::shared_ptr<const ModalModel> model,
                                          const ObjectProperties& properties);
 
-  /// Where more than the pose changes, a new bank takes the strikes from now on; the old one rings
-  /// out. Errors: NotFound (SCENE_NOT_FOUND, OBJECT_NOT_FOUND), InvalidArgument (INVALID_GLIDE),
-  /// and those of MakeSoundingObject.
+  /// Changes an object. If more than the pose changes, a new oscillator bank takes the impulses
+  /// from now on, and the old bank rings out. Errors: NotFound (SCENE_NOT_FOUND, OBJECT_NOT_FOUND),
+  /// InvalidArgument (INVALID_GLIDE), and those of MakeSoundingObject.
   absl::StatusOr<PlacedObject> UpdateObject(uint64_t scene, uint32_t handle,
                                             const ObjectChange& change);
 
-  /// The listener goes to `pose`, in `glide_s` as for objects. Errors: NotFound (SCENE_NOT_FOUND),
+  /// Moves the listener to `pose`; `glide_s` is as for objects. Errors: NotFound (SCENE_NOT_FOUND),
   /// InvalidArgument (INVALID_POSE, INVALID_GLIDE).
   absl::Status UpdateListener(uint64_t scene, const Pose& pose, double glide_s);
 
@@ -72,7 +73,7 @@ class SceneRegistry {
   absl::StatusOr<std::unique_ptr<ContactStream>> OpenContactStream(
       uint64_t scene, const ContactStreamSettings& settings);
 
-  /// In all scenes.
+  /// Number of objects in all scenes.
   size_t object_count() const;
 
  private:
@@ -84,10 +85,10 @@ class SceneRegistry {
 
   Mixer& mixer_;
   BodyCache bodies_;
-  /// Held while objects come, change and go, so that limits are exact and two changes of one object
-  /// do not undo each other. Contacts do not take it.
+  /// Held while objects are added, changed and removed, so that limits are exact and two changes of
+  /// one object do not undo each other. Contacts do not take it.
   Mutex change_mutex_;
-  /// For moves that no contact stream brings; opened when there is one.
+  /// Carries moves that come by a call and not in a contact stream; opened by the first move.
   std::unique_ptr<EventStream> moves_ ABSL_GUARDED_BY(change_mutex_);
   mutable Mutex mutex_ ABSL_ACQUIRED_AFTER(change_mutex_);
   std::map<uint64_t, std::shared_ptr<Scene>> scenes_ ABSL_GUARDED_BY(mutex_);

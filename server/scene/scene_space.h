@@ -13,30 +13,31 @@
 
 namespace carillon {
 
-/// How a scene is heard, and from where at first.
+/// The spatial effects of a scene, and the pose of its listener.
 struct SceneSpace {
   HearingSettings hearing;
-  Pose listener;  ///< looks along its frame's -z; x is to its right
+  Pose listener;  ///< the listener looks along -z of this frame; x points to the right
 };
 
 /// Errors: InvalidArgument (INVALID_HEARING, INVALID_POSE).
 absl::Status Validate(const SceneSpace& space);
 
-/// For an object at `pose`, or at the origin; null where its place is not heard.
+/// Makes the voice of an object at `pose`, or at the origin. Returns null for a scene without
+/// spatial effects.
 std::shared_ptr<Voice> MakeVoice(const SceneSpace& space, const std::optional<Pose>& pose,
                                  const MixerSettings& mixer);
 
 /// The motion of an object or of the listener to `pose`.
 Motion MotionTo(const Pose& pose, double glide_frames);
 
-/// How long what moves is on its way from pose to pose: one simulation goes step by step, so at
-/// most a step.
+/// Computes how long an object or the listener takes from one pose to the next. A simulation
+/// advances step by step, so this is at most a step.
 class PoseTimes {
  public:
   explicit PoseTimes(double step_s) : step_s_(step_s) {}
 
-  /// Seconds before `time_s` at which the way to the pose of that time begins; zero: a jump.
-  /// `handle` is an object's; none: the listener's.
+  /// Returns the time, in seconds before `time_s`, at which the way to the pose of that time
+  /// begins; zero: a jump. `handle` names an object; absent: the listener.
   double GlideS(std::optional<uint32_t> handle, double time_s);
 
  private:

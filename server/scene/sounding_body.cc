@@ -4,12 +4,14 @@
 #include <future>
 #include <utility>
 
+#include "proto/cpp/status_macros.h"
+
 namespace carillon {
 namespace {
 
 absl::StatusOr<std::shared_ptr<const SoundingBody>> MakeBody(
     std::shared_ptr<const ModalModel> model) {
-  // Side by side: somebody waits for the object.
+  // The two parts are made at the same time, because a client waits for the object.
   auto indexing = std::async([&model] {
     return SurfaceLocator::Make({.vertices = model->vertices,
                                  .triangles = model->triangles,
@@ -18,10 +20,9 @@ absl::StatusOr<std::shared_ptr<const SoundingBody>> MakeBody(
                                  .given_triangles = model->given_triangles});
   });
   ShapeTable shapes(model->shapes, model->vertices.size(), model->mode_count());
-  absl::StatusOr<std::unique_ptr<SurfaceLocator>> locator = indexing.get();
-  if (!locator.ok()) return locator.status();
+  ASSIGN_OR_RETURN(std::unique_ptr<SurfaceLocator> locator, indexing.get());
   return std::make_shared<const SoundingBody>(SoundingBody{
-      .model = std::move(model), .shapes = std::move(shapes), .locator = *std::move(locator)});
+      .model = std::move(model), .shapes = std::move(shapes), .locator = std::move(locator)});
 }
 
 }  // namespace

@@ -13,15 +13,16 @@
 
 namespace carillon {
 
-/// A modal model, its shapes as strikes are projected with them, and the index that finds points on
-/// its surface; shared by all objects of that shape.
+/// A modal model, its mode shapes as a table for projecting impulses, and the index that finds
+/// points on its surface. All objects of one shape share a body.
 struct SoundingBody {
   std::shared_ptr<const ModalModel> model;
   ShapeTable shapes;
   std::unique_ptr<const SurfaceLocator> locator;
 };
 
-/// Makes the body of a model once, for as long as anybody holds it. Safe from every thread.
+/// Makes the body of a model once, and finds it again while any object uses it. Safe from every
+/// thread.
 class BodyCache {
  public:
   /// Errors: InvalidArgument (SURFACE_MALFORMED).

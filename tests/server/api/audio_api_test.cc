@@ -368,6 +368,8 @@ TEST_F(AudioApi, ImpulsesThatCannotBeUsedAreCountedAndTheRestIsRendered) {
   ASSERT_TRUE(rendering.status.ok());
   EXPECT_EQ(rendering.summary.accepted_count(), 1U);
   EXPECT_EQ(rendering.summary.rejected_count(), 1U);
+  EXPECT_EQ(rendering.summary.last_rejection().reason(), "OBJECT_NOT_FOUND");
+  EXPECT_FALSE(Render(Trace()).summary.has_last_rejection());
 }
 
 TEST_F(AudioApi, TheMixerSaysHowItPlays) {

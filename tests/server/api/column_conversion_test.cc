@@ -10,13 +10,14 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "server/api/contact_conversion.h"
 
 namespace carillon {
 namespace {
 
 using testing::HasSubstr;
 
-/// What a step held.
+/// The rows of a step, and what an intake of a scene without objects rejects of it.
 struct Told {
   std::vector<ObjectImpulse> impulses;
   std::vector<Pose> poses;
@@ -24,18 +25,27 @@ struct Told {
   std::string rejection;
 };
 
+class NoTarget final : public EventTarget {
+ public:
+  uint64_t frame() const override { return 0; }
+  void Push(const MixerEvent&) override {}
+};
+
 Told Read(const v1::ContactStep& step) {
   Told told;
-  ReadStep(step, {.move = [&](uint32_t, const Pose& pose) { told.poses.push_back(pose); },
-                  .move_listener = [](const Pose&) {},
-                  .strike = [&](const ObjectImpulse& it) { told.impulses.push_back(it); },
-                  .hold = [](const ObjectForce&) {},
-                  .touch = [](const ObjectTouch&) {},
-                  .reject =
-                      [&](uint64_t count, const absl::Status& why) {
-                        told.rejected_count += count;
-                        told.rejection = why.ToString();
-                      }});
+  for (int row = 0; row < step.columns().object_size() && Validate(step.columns()).ok(); ++row) {
+    told.impulses.push_back(ReadRow(step.columns(), row));
+  }
+  const v1::PoseColumns& poses = step.pose_columns();
+  for (int row = 0; row < poses.object_size() && Validate(poses).ok(); ++row) {
+    told.poses.push_back(ReadRow(poses, row));
+  }
+  Scene scene("an empty scene");
+  NoTarget target;
+  ContactIntake intake(scene, target, {.step_s = 0.01});
+  EXPECT_TRUE(ReadStep(step, intake).ok());
+  told.rejected_count = intake.rejected_count();
+  told.rejection = intake.last_rejection().ToString();
   return told;
 }
 
@@ -74,29 +84,30 @@ v1::ContactStep TwoPoses() {
 TEST(Columns, AContactHasASecondObjectWhereItsHandleIsNotZero) {
   const Told told = Read(ThreeImpulses());
   ASSERT_EQ(told.impulses.size(), 3U);
-  ASSERT_TRUE(told.impulses[0].second.has_value());
-  EXPECT_EQ(told.impulses[0].second->handle, 7U);
-  EXPECT_EQ(std::get<Point>(told.impulses[0].second->location), (Point{7, 8, 9}));
-  ASSERT_TRUE(told.impulses[0].second->rotation.has_value());
-  EXPECT_EQ(told.impulses[0].second->rotation->y, 1);
-  EXPECT_FALSE(told.impulses[1].second.has_value());
-  EXPECT_EQ(told.impulses[2].second->handle, 8U);
-  EXPECT_FALSE(told.impulses[2].second->rotation.has_value());  // four zeros: as the poses say
+  ASSERT_TRUE(told.impulses[0].contact.second.has_value());
+  EXPECT_EQ(told.impulses[0].contact.second->handle, 7U);
+  EXPECT_EQ(std::get<Point>(told.impulses[0].contact.second->location), (Point{7, 8, 9}));
+  ASSERT_TRUE(told.impulses[0].contact.second->rotation.has_value());
+  EXPECT_EQ(told.impulses[0].contact.second->rotation->y, 1);
+  EXPECT_FALSE(told.impulses[1].contact.second.has_value());
+  EXPECT_EQ(told.impulses[2].contact.second->handle, 8U);
+  EXPECT_FALSE(
+      told.impulses[2].contact.second->rotation.has_value());  // four zeros: as the poses say
 }
 
 TEST(Columns, WhatMayBeEmptyIsNone) {
   v1::ContactStep step = ThreeImpulses();
   v1::ImpulseColumns& columns = *step.mutable_columns();
   columns.clear_second_rotation();
-  EXPECT_FALSE(Read(step).impulses[0].second->rotation.has_value());
+  EXPECT_FALSE(Read(step).impulses[0].contact.second->rotation.has_value());
   columns.clear_second_object();
   columns.clear_second_point_m();
   columns.clear_duration_s();
   columns.clear_time_offset_s();
   const Told told = Read(step);
   ASSERT_EQ(told.impulses.size(), 3U);
-  EXPECT_FALSE(told.impulses[0].second.has_value());
-  EXPECT_EQ(told.impulses[0].impulse.duration_s, 0);
+  EXPECT_FALSE(told.impulses[0].contact.second.has_value());
+  EXPECT_EQ(told.impulses[0].contact.impulse.duration_s, 0);
 }
 
 TEST(Columns, PosesAreTurnedWhereTheColumnSaysSo) {

@@ -78,8 +78,8 @@ void StrikeForAWhile(SceneRegistry& scenes) {
   ASSERT_TRUE(scenes.AddObject(scene, 1, SmallModel(), SmallProperties()).ok());
   const auto stream = *scenes.OpenContactStream(scene, {.step_s = 0.1});
   for (int step = 0; step < 60; ++step) {
-    ASSERT_TRUE(stream->BeginStep(0.1 * step).ok());
-    stream->Strike(SmallImpulse(1, 0.5 + 0.01 * step));
+    ASSERT_TRUE(stream->intake().BeginStep(0.1 * step).ok());
+    stream->intake().Strike(SmallImpulse(1, 0.5 + 0.01 * step));
   }
 }
 

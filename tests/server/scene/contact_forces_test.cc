@@ -15,14 +15,10 @@ constexpr double kStepS = 0.01;
 constexpr SurfaceImpulse kTen{.at = {.weights = {1, 0, 0}}, .impulse_newton_seconds = {0, 0, 10}};
 
 FeltContact FeltBy(uint32_t handle, const SurfaceImpulse& impulse) {
-  return {.by = {Felt{.handle = handle, .impulse = impulse}}, .count = 1};
+  return {.by = {Felt{.handle = handle, .event = {.action = impulse}}}, .count = 1};
 }
 
-struct Pushed {
-  uint32_t handle;
-  MixerEvent::Action action;
-  double time_s;
-
+struct Pushed : ForceEvent {
   bool IsKnot() const { return std::holds_alternative<ForceKnot>(action); }
   /// Along z, in newton seconds; none where this is no impulse.
   std::optional<float> Impulse() const {
@@ -42,12 +38,9 @@ class ContactForcesTest : public testing::Test {
   template <typename Add>
   std::vector<Pushed> Step(double time_s, const Add& add) {
     std::vector<Pushed> pushed;
-    const auto push = [&](uint32_t handle, const MixerEvent::Action& action, double at_s) {
-      pushed.push_back({handle, action, at_s});
-    };
-    forces_.Begin(time_s, push);
+    for (const ForceEvent& event : forces_.Begin(time_s)) pushed.push_back({event});
     add();
-    forces_.End(push);
+    for (const ForceEvent& event : forces_.End()) pushed.push_back({event});
     return pushed;
   }
 
@@ -74,10 +67,11 @@ TEST_F(ContactForcesTest, GivesEachObjectItsForcesAndThenAKnot) {
 
 TEST_F(ContactForcesTest, WhatIsABlowToOneObjectOfAPairIsABlowToBoth) {
   FeltContact impulse = FeltBy(3, kTen);
-  impulse.by[1] = {.handle = 4, .impulse = kTen};
-  impulse.by[1].impulse.impulse_newton_seconds[2] = -10;
+  SurfaceImpulse opposite = kTen;
+  opposite.impulse_newton_seconds[2] = -10;
+  impulse.by[1] = {.handle = 4, .event = {.action = opposite}};
   impulse.count = 2;
-  const ObjectTouch touch{.handle = 3, .partner = 9};
+  const ObjectTouch touch{.contact = {.handle = 3}, .partner = 9};
   const auto pushed = Step(0, [&] { forces_.Touch(touch, impulse); });
   std::map<uint32_t, float> struck;
   for (const Pushed& push : pushed) {
@@ -120,8 +114,7 @@ TEST_F(ContactForcesTest, OfATouchThePartThatIsABlowStrikesAndTheRestIsAForce) {
     return [this, newton_seconds] {
       SurfaceImpulse impulse = kTen;
       impulse.impulse_newton_seconds[2] = static_cast<float>(newton_seconds);
-      forces_.Touch({.handle = 3, .partner = 9, .impulse = {}, .roughness = {}},
-                    FeltBy(3, impulse));
+      forces_.Touch({.contact = {.handle = 3}, .partner = 9}, FeltBy(3, impulse));
     };
   };
   auto pushed = Step(0, touch(1));  // from flight
@@ -137,8 +130,7 @@ TEST_F(ContactForcesTest, OfATouchThePartThatIsABlowStrikesAndTheRestIsAForce) {
 
 TEST_F(ContactForcesTest, AnotherPartnerIsAnotherPair) {
   const auto touch = [this](uint32_t partner) {
-    forces_.Touch({.handle = 3, .partner = partner, .impulse = {}, .roughness = {}},
-                  FeltBy(3, kTen));
+    forces_.Touch({.contact = {.handle = 3}, .partner = partner}, FeltBy(3, kTen));
   };
   for (int i = 0; i < 20; ++i) Step(i * kStepS, [&] { touch(1); });
   const auto pushed = Step(20 * kStepS, [&] {

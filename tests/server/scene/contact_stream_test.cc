@@ -9,6 +9,7 @@
 #include <limits>
 #include <vector>
 
+#include "server/scene/felt_contact.h"
 #include "server/scene/scene_registry.h"
 #include "tests/server/scene/small_model.h"
 
@@ -51,9 +52,9 @@ class ContactStreamTest : public testing::Test {
 TEST_F(ContactStreamTest, AContactSoundsAtTheFirstStepsArrivalPlusItsTimePlusTheDelay) {
   Render(640);  // the first step arrives at frame 640
   const auto stream = Open(0.02);
-  ASSERT_TRUE(stream->BeginStep(100.0).ok());  // this simulation starts at 100 s
-  ASSERT_TRUE(stream->BeginStep(100.5).ok());
-  stream->Strike(SmallImpulse(1, 1, 0.25));
+  ASSERT_TRUE(stream->intake().BeginStep(100.0).ok());  // this simulation starts at 100 s
+  ASSERT_TRUE(stream->intake().BeginStep(100.5).ok());
+  stream->intake().Strike(SmallImpulse(1, 1, 0.25));
   const double expected = (0.5 + 0.25 + 0.02) * kRate;
   EXPECT_EQ(Onset(Render(40000)), expected + 1);  // sin(0) is silent
 }
@@ -61,15 +62,15 @@ TEST_F(ContactStreamTest, AContactSoundsAtTheFirstStepsArrivalPlusItsTimePlusThe
 /// On object 1, by object 2 at the same place of its own.
 ObjectImpulse PairImpulse(const std::optional<Quaternion>& rotation = std::nullopt) {
   ObjectImpulse impulse = SmallImpulse(1);
-  impulse.second = {.handle = 2, .location = Point{0, 0, 0}, .rotation = rotation};
+  impulse.contact.second = {.handle = 2, .location = Point{0, 0, 0}, .rotation = rotation};
   return impulse;
 }
 
 TEST_F(ContactStreamTest, TheSecondObjectOfAContactFeelsTheOpposite) {
   ASSERT_TRUE(scenes_.AddObject(scene_, 2, SmallModel(), SmallProperties()).ok());
   const auto stream = Open(0);
-  ASSERT_TRUE(stream->BeginStep(0).ok());
-  stream->Strike(PairImpulse());
+  ASSERT_TRUE(stream->intake().BeginStep(0).ok());
+  stream->intake().Strike(PairImpulse());
   // Two equal bodies, struck at once with opposite impulses: nothing is left but rounding, 100 dB
   // below one of them.
   for (const float sample : Render(4800)) EXPECT_LT(std::abs(sample), 2e-7);
@@ -79,17 +80,17 @@ TEST_F(ContactStreamTest, TheSecondObjectOfAContactFeelsTheOpposite) {
 TEST_F(ContactStreamTest, TheImpulseOnTheSecondObjectIsTurnedIntoItsFrame) {
   ASSERT_TRUE(scenes_.AddObject(scene_, 2, SmallModel(), SmallProperties()).ok());
   const auto stream = Open(0);
-  ASSERT_TRUE(stream->BeginStep(0).ok());
+  ASSERT_TRUE(stream->intake().BeginStep(0).ok());
   // Half a turn about z: what was opposite is alike, and both sound as one struck twice as hard.
-  stream->Strike(PairImpulse(Quaternion{.w = 0, .z = 1}));
+  stream->intake().Strike(PairImpulse(Quaternion{.w = 0, .z = 1}));
   const std::vector<float> both = Render(4800);
   Mixer alone;
   SceneRegistry scenes(alone);
   const uint64_t scene = *scenes.CreateScene();
   ASSERT_TRUE(scenes.AddObject(scene, 1, SmallModel(), SmallProperties()).ok());
   const auto other = *scenes.OpenContactStream(scene, {.step_s = 0.01, .scheduling_delay_s = 0});
-  ASSERT_TRUE(other->BeginStep(0).ok());
-  other->Strike(SmallImpulse(1, 2));
+  ASSERT_TRUE(other->intake().BeginStep(0).ok());
+  other->intake().Strike(SmallImpulse(1, 2));
   std::vector<float> twice(4864);
   alone.Render(twice);
   for (size_t n = 0; n < both.size(); ++n) EXPECT_NEAR(both[n], twice[n], 1e-6) << n;
@@ -97,12 +98,12 @@ TEST_F(ContactStreamTest, TheImpulseOnTheSecondObjectIsTurnedIntoItsFrame) {
 
 TEST_F(ContactStreamTest, AContactWithAnUnknownSecondObjectIsRejectedForBoth) {
   const auto stream = Open(0);
-  ASSERT_TRUE(stream->BeginStep(0).ok());
-  stream->Strike(PairImpulse());
+  ASSERT_TRUE(stream->intake().BeginStep(0).ok());
+  stream->intake().Strike(PairImpulse());
   EXPECT_EQ(stream->counts().rejected_count, 2U);
   EXPECT_THAT(stream->last_rejection().ToString(), HasSubstr("OBJECT_NOT_FOUND"));
   ASSERT_TRUE(scenes_.AddObject(scene_, 2, SmallModel(), SmallProperties()).ok());
-  stream->Strike(PairImpulse(Quaternion{.w = 2}));
+  stream->intake().Strike(PairImpulse(Quaternion{.w = 2}));
   EXPECT_EQ(stream->counts().rejected_count, 4U);
   EXPECT_THAT(stream->last_rejection().ToString(), HasSubstr("INVALID_POSE"));
   EXPECT_EQ(Onset(Render(4800)), 4800U);
@@ -114,36 +115,38 @@ TEST_F(ContactStreamTest, AnElasticCollisionOfTwoObjectsLastsAsLongForBothByBoth
   ASSERT_TRUE(scenes_.AddObject(scene_, 2, SmallModel(), SmallProperties()).ok());
   ASSERT_TRUE(scenes_.AddObject(scene_, 3, SmallModel(), soft).ok());
   const auto feel = [&](uint32_t first, uint32_t second) {
-    ContactImpulse impulse = SmallImpulse(first).impulse;
-    impulse.hertz = {.reduced_mass_kg = 0.1, .reduced_radius_m = 0.02, .approach_speed_m_per_s = 1};
-    const auto placed = [&](uint32_t handle) {
-      return scenes_.UpdateObject(scene_, handle, {})->object;
-    };
-    return *Feel(impulse, first, placed(first), {.handle = second, .location = Point{0, 0, 0}},
-                 placed(second));
+    ObjectContact contact = SmallImpulse(first).contact;
+    contact.impulse.hertz = {
+        .reduced_mass_kg = 0.1, .reduced_radius_m = 0.02, .approach_speed_m_per_s = 1};
+    contact.second = {.handle = second, .location = Point{0, 0, 0}};
+    const SoundingObject object = scenes_.UpdateObject(scene_, first, {})->object;
+    const SoundingObject other = scenes_.UpdateObject(scene_, second, {})->object;
+    FeltContact felt;
+    EXPECT_TRUE(Feel(contact, object, &other, felt).ok());
+    return felt;
   };
   const FeltContact hard = feel(1, 2), mixed = feel(1, 3), reversed = feel(3, 1);
-  EXPECT_EQ(hard.by[0].impulse.tau_s, hard.by[1].impulse.tau_s);
-  EXPECT_EQ(mixed.by[0].impulse.tau_s, mixed.by[1].impulse.tau_s);
-  EXPECT_FLOAT_EQ(mixed.by[0].impulse.tau_s, reversed.by[0].impulse.tau_s);
+  EXPECT_EQ(hard.by[0].impulse().tau_s, hard.by[1].impulse().tau_s);
+  EXPECT_EQ(mixed.by[0].impulse().tau_s, mixed.by[1].impulse().tau_s);
+  EXPECT_FLOAT_EQ(mixed.by[0].impulse().tau_s, reversed.by[0].impulse().tau_s);
   // 1/E goes from 2 to 1 + 100 of its unit, and the duration is its power 2/5.
-  EXPECT_NEAR(mixed.by[0].impulse.tau_s / hard.by[0].impulse.tau_s, std::pow(50.5, 0.4), 1e-4);
+  EXPECT_NEAR(mixed.by[0].impulse().tau_s / hard.by[0].impulse().tau_s, std::pow(50.5, 0.4), 1e-4);
 }
 
 TEST_F(ContactStreamTest, AnImpulseBetweenTwoFramesIsFirstHeardAtTheLater) {
   const auto stream = Open(0.02);
-  ASSERT_TRUE(stream->BeginStep(0).ok());
-  stream->Strike(SmallImpulse(1, 1, 0.5 / kRate));
+  ASSERT_TRUE(stream->intake().BeginStep(0).ok());
+  stream->intake().Strike(SmallImpulse(1, 1, 0.5 / kRate));
   EXPECT_EQ(Onset(Render(4800)), 0.02 * kRate + 1);
 }
 
 TEST_F(ContactStreamTest, WhatComesTooLateSoundsAtOnceAndIsCounted) {
   const auto stream = Open(0.01);
-  ASSERT_TRUE(stream->BeginStep(0).ok());
+  ASSERT_TRUE(stream->intake().BeginStep(0).ok());
   Render(4800);  // 0.1 s pass, but the simulator comes to 0.05 s only
-  ASSERT_TRUE(stream->BeginStep(0.05).ok());
-  stream->Strike(SmallImpulse(1));
-  stream->Strike(SmallImpulse(1, 1, 1));
+  ASSERT_TRUE(stream->intake().BeginStep(0.05).ok());
+  stream->intake().Strike(SmallImpulse(1));
+  stream->intake().Strike(SmallImpulse(1, 1, 1));
   EXPECT_LE(Onset(Render(kBlock)), 1U);
   EXPECT_EQ(stream->counts().late_count, 1U);
   EXPECT_EQ(stream->counts().accepted_count, 1U);
@@ -157,9 +160,9 @@ TEST_F(ContactStreamTest, TheDelayIsOneStepOneBlockAndFiveMillisecondsUnlessGive
 
 TEST_F(ContactStreamTest, AFullQueueDropsAndCounts) {
   const auto stream = Open(0.01);
-  ASSERT_TRUE(stream->BeginStep(0).ok());
+  ASSERT_TRUE(stream->intake().BeginStep(0).ok());
   constexpr uint64_t kCount = 20000;
-  for (uint64_t i = 0; i < kCount; ++i) stream->Strike(SmallImpulse(1, 1e-6));
+  for (uint64_t i = 0; i < kCount; ++i) stream->intake().Strike(SmallImpulse(1, 1e-6));
   EXPECT_FALSE(stream->settled());
   Render(100 * kBlock);  // the mixer takes a bounded number of strikes a block
   const ContactCounts counts = stream->counts();
@@ -172,14 +175,14 @@ TEST_F(ContactStreamTest, AFullQueueDropsAndCounts) {
 
 TEST_F(ContactStreamTest, AnImpulseThatCannotBeUsedIsRejectedWithItsReasonAndTheRestSounds) {
   const auto stream = Open(0.01);
-  ASSERT_TRUE(stream->BeginStep(0).ok());
+  ASSERT_TRUE(stream->intake().BeginStep(0).ok());
   const double nan = std::numeric_limits<double>::quiet_NaN();
   ObjectImpulse off_surface = SmallImpulse(1);
-  off_surface.impulse.location = SurfacePoint{.triangle = 4};
+  off_surface.contact.impulse.location = SurfacePoint{.triangle = 4};
   ObjectImpulse nowhere = SmallImpulse(1);
-  nowhere.impulse.location = Point{nan, 0, 0};
+  nowhere.contact.impulse.location = Point{nan, 0, 0};
   ObjectImpulse endless = SmallImpulse(1);
-  endless.impulse.duration_s = 0.2;
+  endless.contact.impulse.duration_s = 0.2;
   const std::vector<std::pair<ObjectImpulse, const char*>> cases = {
       {SmallImpulse(9), "OBJECT_NOT_FOUND: "},
       {SmallImpulse(1, nan), "IMPULSE_NOT_FINITE: "},
@@ -191,10 +194,10 @@ TEST_F(ContactStreamTest, AnImpulseThatCannotBeUsedIsRejectedWithItsReasonAndThe
       {SmallImpulse(1, 1, 61), "TIME_TOO_FAR_AHEAD: "},
   };
   for (const auto& [impulse, reason] : cases) {
-    stream->Strike(impulse);
+    stream->intake().Strike(impulse);
     EXPECT_THAT(stream->last_rejection().ToString(), HasSubstr(reason));
   }
-  stream->Strike(SmallImpulse(1));
+  stream->intake().Strike(SmallImpulse(1));
   EXPECT_LT(Onset(Render(4800)), 4800U);
   EXPECT_EQ(stream->counts().rejected_count, cases.size());
   EXPECT_EQ(stream->counts().accepted_count, 1U);
@@ -202,18 +205,18 @@ TEST_F(ContactStreamTest, AnImpulseThatCannotBeUsedIsRejectedWithItsReasonAndThe
 
 TEST_F(ContactStreamTest, OutlivesItsScene) {
   const auto stream = Open(0.01);
-  ASSERT_TRUE(stream->BeginStep(0).ok());
+  ASSERT_TRUE(stream->intake().BeginStep(0).ok());
   ASSERT_TRUE(scenes_.DeleteScene(scene_).ok());
-  stream->Strike(SmallImpulse(1));
+  stream->intake().Strike(SmallImpulse(1));
   EXPECT_THAT(stream->last_rejection().ToString(), HasSubstr("SCENE_NOT_FOUND: "));
 }
 
 TEST_F(ContactStreamTest, RefusesATimeThatGoesBackOrIsNone) {
   const auto stream = Open(0.01);
-  ASSERT_TRUE(stream->BeginStep(1).ok());
-  ASSERT_TRUE(stream->BeginStep(1).ok());
+  ASSERT_TRUE(stream->intake().BeginStep(1).ok());
+  ASSERT_TRUE(stream->intake().BeginStep(1).ok());
   for (const double time_s : {0.5, std::nan(""), std::numeric_limits<double>::infinity()}) {
-    const absl::Status status = stream->BeginStep(time_s);
+    const absl::Status status = stream->intake().BeginStep(time_s);
     EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
     EXPECT_THAT(status.ToString(), HasSubstr("INVALID_STREAM: "));
   }

@@ -30,9 +30,9 @@ void StrikeAll(auto&& strike) {
 }
 
 void StrikeAt(OfflineRenderer& renderer, double time_s, const ObjectImpulse& impulse) {
-  renderer.BeginStep(time_s);
-  renderer.Strike(impulse);
-  renderer.EndStep();
+  ASSERT_TRUE(renderer.intake().BeginStep(time_s).ok());
+  renderer.intake().Strike(impulse);
+  renderer.intake().EndStep();
 }
 
 class OfflineRendererTest : public testing::Test {
@@ -89,8 +89,8 @@ TEST_F(OfflineRendererTest, IsBitForBitWhatTheLiveMixerRenders) {
   EXPECT_EQ(stream->first_frame(), std::nullopt);
   std::unique_ptr<OfflineRenderer> renderer;
   StrikeAll([&](double time_s, const ObjectImpulse& impulse) {
-    ASSERT_TRUE(stream->BeginStep(time_s).ok());
-    stream->Strike(impulse);
+    ASSERT_TRUE(stream->intake().BeginStep(time_s).ok());
+    stream->intake().Strike(impulse);
     if (!renderer) renderer = Make(0.5, {.first_frame = *stream->first_frame(), .delay_s = 0.0071});
     StrikeAt(*renderer, time_s, impulse);
   });
@@ -107,10 +107,9 @@ constexpr HearingSettings kAllHeard{
     .distance_gain = true, .propagation_delay = true, .panning = true};
 
 /// One object circles, the listener walks and turns, and is struck on the way.
-template <typename Target>
-void MoveAt(Target& target, double time_s) {
-  target.Move(1, {.position_m = {3 * std::cos(2 * time_s), 0, 3 * std::sin(2 * time_s)}});
-  target.MoveListener({.position_m = {0, time_s, 0}, .orientation = Normalized({1, 0, time_s, 0})});
+void MoveAt(ContactIntake& intake, double time_s) {
+  intake.Move(1, {.position_m = {3 * std::cos(2 * time_s), 0, 3 * std::sin(2 * time_s)}});
+  intake.MoveListener({.position_m = {0, time_s, 0}, .orientation = Normalized({1, 0, time_s, 0})});
 }
 
 std::vector<float> RenderPlaced(size_t thread_count, const TimeMapping& mapping,
@@ -128,11 +127,11 @@ std::vector<float> RenderPlaced(size_t thread_count, const TimeMapping& mapping,
   }
   double last_s = -1;
   StrikeAll([&](double time_s, const ObjectImpulse& impulse) {
-    renderer->BeginStep(time_s);
-    if (time_s > last_s) MoveAt(*renderer, time_s);
+    EXPECT_TRUE(renderer->intake().BeginStep(time_s).ok());
+    if (time_s > last_s) MoveAt(renderer->intake(), time_s);
     last_s = time_s;
-    renderer->Strike(impulse);
-    renderer->EndStep();
+    renderer->intake().Strike(impulse);
+    renderer->intake().EndStep();
   });
   std::vector<float> sound(size_t{2} * 48000 * 3);
   sound.resize(2 * renderer->Render(sound));
@@ -155,10 +154,10 @@ TEST_F(OfflineRendererTest, PlacesAreHeardBitForBitAsLiveAndForAnyNumberOfThread
       *scenes.OpenContactStream(scene, {.step_s = 0.0137, .scheduling_delay_s = 0.0271});
   double last_s = -1;
   StrikeAll([&](double time_s, const ObjectImpulse& impulse) {
-    ASSERT_TRUE(stream->BeginStep(time_s).ok());
-    if (time_s > last_s) MoveAt(*stream, time_s);
+    ASSERT_TRUE(stream->intake().BeginStep(time_s).ok());
+    if (time_s > last_s) MoveAt(stream->intake(), time_s);
     last_s = time_s;
-    stream->Strike(impulse);
+    stream->intake().Strike(impulse);
   });
   const TimeMapping mapping{.first_frame = *stream->first_frame(), .delay_s = 0.0271};
   const std::vector<float> offline = RenderPlaced(1, mapping, bodies_);
@@ -202,10 +201,11 @@ TEST_F(OfflineRendererTest, CountsWhatSoundedAndWhatCouldNotBeUsed) {
   StrikeAt(*renderer, 0, SmallImpulse(1));
   StrikeAt(*renderer, 0, SmallImpulse(7));                // no such object
   StrikeAt(*renderer, 0, SmallImpulse(1, std::nan("")));  // no number
-  StrikeAt(*renderer, -1, SmallImpulse(1));               // before the beginning
+  EXPECT_FALSE(renderer->intake().BeginStep(-1).ok());    // before the beginning
   const std::vector<float> sound = RenderAll(*renderer, 8);
   EXPECT_EQ(renderer->summary().accepted_count, 1U);
-  EXPECT_EQ(renderer->summary().rejected_count, 3U);
+  EXPECT_EQ(renderer->summary().rejected_count, 2U);
+  EXPECT_THAT(renderer->summary().last_rejection.ToString(), HasSubstr("IMPULSE_NOT_FINITE: "));
   float peak = 0;
   for (const float sample : sound) peak = std::max(peak, std::abs(sample));
   EXPECT_EQ(renderer->summary().peak, peak);  // the limiter did not work

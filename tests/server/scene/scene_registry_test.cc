@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "proto/cpp/error_reason.h"
+#include "server/scene/felt_contact.h"
 #include "tests/server/scene/small_model.h"
 
 namespace carillon {
@@ -28,8 +29,8 @@ class Stage {
 
   void Strike(uint32_t handle) {
     const auto stream = *scenes.OpenContactStream(scene, {.step_s = 0.01, .scheduling_delay_s = 0});
-    ASSERT_TRUE(stream->BeginStep(0).ok());
-    stream->Strike(SmallImpulse(handle));
+    ASSERT_TRUE(stream->intake().BeginStep(0).ok());
+    stream->intake().Strike(SmallImpulse(handle));
     ASSERT_EQ(stream->counts().rejected_count, 0U);
   }
 
@@ -232,8 +233,8 @@ TEST(SceneRegistry, AnObjectThatRingsIsHeardWhereItGoesAndFromWhereTheListenerGo
   properties.pose = Pose{.position_m = {-1, 0, 0}};
   const uint32_t handle = scenes.AddObject(scene, 0, SmallModel(), properties)->handle;
   const auto stream = *scenes.OpenContactStream(scene, {.step_s = 0.01, .scheduling_delay_s = 0});
-  ASSERT_TRUE(stream->BeginStep(0).ok());
-  stream->Strike(SmallImpulse(handle));
+  ASSERT_TRUE(stream->intake().BeginStep(0).ok());
+  stream->intake().Strike(SmallImpulse(handle));
   std::vector<float> sound(2 * 1280);
   const auto render = [&] {
     mixer.Render(sound);
@@ -301,12 +302,15 @@ TEST(SoundingObject, APointIsInMetresOfTheObjectAsLargeAsItIs) {
   ObjectProperties properties = SmallProperties();
   properties.material.size = 3;
   const PlacedObject placed = *stage.scenes.AddObject(stage.scene, 0, SmallModel(), properties);
-  ContactImpulse impulse = SmallImpulse(1).impulse;
-  impulse.location = Point{0, 0.15, 0};  // half way up an edge of 0.3 m, from vertex 0 to vertex 2
-  const SurfaceImpulse felt = *LocateImpulse(placed.object, impulse);
+  ObjectContact contact = SmallImpulse(1).contact;
+  // Half way up an edge of 0.3 m, from vertex 0 to vertex 2.
+  contact.impulse.location = Point{0, 0.15, 0};
+  FeltContact felt;
+  ASSERT_TRUE(Feel(contact, placed.object, nullptr, felt).ok());
+  const TrianglePoint& at = felt.by[0].impulse().at;
   for (size_t corner = 0; corner < 3; ++corner) {
-    const uint32_t vertex = felt.at.vertices[corner];
-    EXPECT_NEAR(felt.at.weights[corner], vertex == 0 || vertex == 2 ? 0.5 : 0, 1e-6);
+    const uint32_t vertex = at.vertices[corner];
+    EXPECT_NEAR(at.weights[corner], vertex == 0 || vertex == 2 ? 0.5 : 0, 1e-6);
   }
 }
 

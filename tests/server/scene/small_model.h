@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "server/mode_database/modal_model.h"
-#include "server/scene/contact_stream.h"
+#include "server/scene/object_contact.h"
 #include "server/scene/sounding_object.h"
 
 namespace carillon {
@@ -54,10 +54,10 @@ inline std::shared_ptr<const ModalModel> SmallModel() {
 inline ObjectImpulse SmallImpulse(uint32_t handle, double newton_seconds = 1,
                                   double time_offset_s = 0) {
   ObjectImpulse impulse;
-  impulse.handle = handle;
   impulse.time_offset_s = time_offset_s;
-  impulse.impulse.location = Point{0, 0, 0};
-  impulse.impulse.impulse_newton_seconds = {newton_seconds, 0, 0};
+  impulse.contact.handle = handle;
+  impulse.contact.impulse.location = Point{0, 0, 0};
+  impulse.contact.impulse.impulse_newton_seconds = {newton_seconds, 0, 0};
   return impulse;
 }
 
