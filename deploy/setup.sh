@@ -4,7 +4,8 @@
 # deploy/setup.sh LIST...
 #
 # Installs what is missing of the packages in the given lists, from Debian as this machine's apt is set up. A list is
-# one of deploy/packages/ (programs, tests, lint, client) or a file. With `lint` it also installs buf, from the npm registry.
+# one of deploy/packages/ (programs, tests, lint, client) or a file. With `lint` it also installs buf, from the npm
+# registry.
 # Calls neither registry when nothing is missing.
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)

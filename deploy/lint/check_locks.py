@@ -9,7 +9,8 @@ import re
 import project
 
 THE_WRAPPERS = ("server/base/mutex.h", "server/base/recursive_mutex.h")
-STANDARD = r"\bstd::(?:\w*mutex|lock_guard|unique_lock|scoped_lock|shared_lock|condition_variable\w*)\b|\bpthread_mutex_\w+"
+STANDARD = (r"\bstd::(?:\w*mutex|lock_guard|unique_lock|scoped_lock|shared_lock|condition_variable\w*)\b"
+            r"|\bpthread_mutex_\w+")
 ABSEIL = r"\babsl::\w*Mutex\w*\b"
 # What each folder does not take, and what it takes instead.
 RULES = (("server/", re.compile(f"{STANDARD}|{ABSEIL}"), f"Mutex of {THE_WRAPPERS[0]}"),

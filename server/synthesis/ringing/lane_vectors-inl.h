@@ -1,5 +1,7 @@
-// SPDX-License-Identifier: Apache-2.0 SIMD vectors of lanes, compiled for each target; only kernels
-// include this, within foreach_target.
+// SPDX-License-Identifier: Apache-2.0
+
+// SIMD vectors of lanes, compiled for each target. Only kernels include this file, within
+// foreach_target.
 #if defined(CARILLON_SERVER_SYNTHESIS_LANE_VECTORS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef CARILLON_SERVER_SYNTHESIS_LANE_VECTORS_INL_H_
 #undef CARILLON_SERVER_SYNTHESIS_LANE_VECTORS_INL_H_
