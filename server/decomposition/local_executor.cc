@@ -128,12 +128,13 @@ class LocalExecutor final : public Executor {
     const std::filesystem::path folder =
         options_.directory / absl::StrCat(task.digest, "-", ++folder_count_);
     absl::StatusOr<PreparedTask> prepared = PreparedTask::Make(task, folder);
+    const absl::Status status = prepared.status();
     {
       MutexLock lock(&mutex_);
       preparing_.erase(task.digest);
-      if (prepared.ok()) starts_.push_back(*std::move(prepared));
+      if (status.ok()) starts_.push_back(*std::move(prepared));
     }
-    if (!prepared.ok()) task.on_end({Verdict::kCrashed, ToErrorInfo(prepared.status()), {}});
+    if (!status.ok()) task.on_end({Verdict::kCrashed, ToErrorInfo(status), {}});
     Wake();
   }
 
