@@ -39,7 +39,7 @@ struct Options {
   std::string admin_token_file;
 };
 
-/// What the program does after it has read its command line.
+/// The parsed command line, which decides the program's next action.
 struct CommandLine {
   Options options;
   bool run = false;  ///< false: end with exit_status, after --help, --version or a wrong flag

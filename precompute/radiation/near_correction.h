@@ -10,9 +10,9 @@
 
 namespace carillon::precompute {
 
-/// What the vertex rule misses of a pair of vertices, for the static kernel 1/(4 pi r): the exact
-/// Galerkin integrals over the triangles near each other less the vertex rule of the same. Rows are
-/// test functions.
+/// The error of the vertex rule for a pair of vertices and the static kernel 1/(4 pi r): the exact
+/// Galerkin integrals over triangles that are near each other, minus the vertex rule for the same
+/// triangles. Rows are test functions.
 struct NearEntry {
   float double_layer = 0;             ///< K
   float single_layer = 0;             ///< V with n . n'

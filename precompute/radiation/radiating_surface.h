@@ -26,8 +26,8 @@ struct NormalMotion {
   double wavelength_m = 0;  ///< 2 pi sqrt(2 integral f^2 / integral |grad f|^2), f = n . phi
 };
 
-/// The part of a body's surface that the air around it touches, without the walls of enclosed voids
-/// and what lies within them.
+/// The part of a body's surface that touches the surrounding air, without the walls of enclosed
+/// voids and surfaces inside them.
 struct RadiatingSurface {
   SurfaceMesh mesh;
   std::vector<int32_t> body_vertex;  ///< for each vertex that of SurfaceModes
@@ -37,7 +37,7 @@ struct RadiatingSurface {
 
 RadiatingSurface FindRadiatingSurface(const SurfaceModes& modes);
 
-/// Of each mode.
+/// The motion of each mode along the surface's normals.
 std::vector<NormalMotion> NormalMotions(const SurfaceModes& modes, const RadiatingSurface& surface,
                                         Workers& workers);
 

@@ -22,7 +22,7 @@ struct SurfacePlace {
   std::array<double, 3> weights;  ///< they sum to one
 };
 
-/// The radiating surface in triangles of one size, and what is computed of it once.
+/// The radiating surface in triangles of one size, with the quantities computed once for it.
 struct SurfaceLevel {
   AcousticSurface surface;
   NearCorrection near;

@@ -7,8 +7,8 @@
 
 namespace carillon::precompute {
 
-/// What a plane triangle with a density that is linear on it does at a point: one number for the
-/// hat function of each corner.
+/// The potentials of a plane triangle with a linear density at a point: one number for the hat
+/// function of each corner.
 struct TrianglePotentials {
   std::array<double, 3> single;   ///< integral of hat / r, m
   std::array<double, 3> doubled;  ///< integral of hat d(1/r)/dn' (n' the triangle's normal)

@@ -74,7 +74,7 @@ class StreamReader : public Reactor {
   Request request_;
 };
 
-/// What a call has to send at a moment.
+/// Whether a call has a message to send at a moment.
 enum class Supply {
   kMessage,  ///< the response that was filled in
   kLater,    ///< nothing yet; Wake is called when there is something

@@ -16,7 +16,7 @@ namespace carillon {
 absl::StatusOr<v1::CreateModalModelRequest> ResolveRequest(
     const v1::CreateModalModelRequest& request);
 
-/// What names the modal model of a resolved request: its text form, one "key value" a line, in this
+/// The text that names the modal model of a resolved request: one "key value" a line, in this
 /// order. Two requests have the same model exactly if they have the same text; the hints (material,
 /// size, frequencies) and the label are not part of it.
 ///

@@ -11,7 +11,7 @@
 
 namespace carillon {
 
-/// What the model stored under a job's digest is worth to a resolved request.
+/// Functions that compare the model stored under a job's digest with a resolved request.
 
 /// Whether the stored model is complete up to the eigenvalue that the request wants, or up to where
 /// an earlier job (`record`) that wanted as much could go. Errors: those of ModelStore::Summary but

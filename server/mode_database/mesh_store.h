@@ -46,7 +46,7 @@ class MeshUpload {
   uint64_t byte_count_ = 0;
 };
 
-/// What a collection of garbage deleted.
+/// The mesh files that a collection of garbage deleted.
 struct CollectedMeshes {
   uint64_t mesh_count = 0;
   uint64_t bytes = 0;

@@ -37,7 +37,7 @@ struct OfflineSettings {
   size_t thread_count = std::max(std::thread::hardware_concurrency(), 1U);
 };
 
-/// What has been rendered.
+/// The result of an offline rendering.
 struct OfflineSummary {
   uint64_t frame_count = 0;
   uint64_t accepted_count = 0;

@@ -166,7 +166,7 @@ struct Oscillators {
   HWY_INLINE void AddClosedTile(Z& z, float* nodes) const { AddNodes<kClosedTileNodes>(z, nodes); }
 
   /// Renders the first `frame_count` samples of a tile of the first kind and advances the state by
-  /// as many frames.
+  /// `frame_count` frames.
   HWY_INLINE void AddPart(Z& z, size_t frame_count, float* HWY_RESTRICT mix) const {
     const Floats d;
     for (size_t k = 0; k < frame_count; ++k) {
