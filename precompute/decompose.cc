@@ -21,8 +21,12 @@
 #include "precompute/mesh/surface/prepare_surface.h"
 #include "precompute/modes/audible_modes.h"
 #include "precompute/modes/deformation_modes.h"
+#include "precompute/modes/solver_comparison.h"
 #include "precompute/phase_clock.h"
+#include "precompute/resolution.h"
+#include "precompute/worker_request.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::precompute {
 namespace {
@@ -41,20 +45,19 @@ struct Fillable {
   MeshNames names;
 };
 
-absl::StatusOr<Body> FillSurface(const Fillable& surface, const DecompositionSettings& settings) {
-  absl::StatusOr<TetMesh> mesh = Tetrahedralize(surface.prepared.surface, settings.meshing);
-  if (!mesh.ok()) return mesh.status();
-  for (BoundaryFace& face : mesh->boundary) {
+absl::StatusOr<Body> FillSurface(const Fillable& surface, const MeshingSettings& meshing,
+                                 const v1::WorkerRequest& request) {
+  ASSIGN_OR_RETURN(TetMesh mesh, Tetrahedralize(surface.prepared.surface, meshing));
+  for (BoundaryFace& face : mesh.boundary) {
     face.given_triangle = surface.prepared.given_triangle[static_cast<size_t>(face.given_triangle)];
   }
-  absl::Status status = Hold(settings.fixtures, surface.given, surface.names, *mesh);
-  if (!status.ok()) return status;
-  return Body{surface.given, *std::move(mesh), surface.prepared.warnings};
+  RETURN_IF_ERROR(Hold(FixturesOf(request), surface.given, surface.names, mesh));
+  return Body{surface.given, std::move(mesh), surface.prepared.warnings};
 }
 
 absl::StatusOr<Body> TakeTetrahedra(TetMesh mesh, const MeshNames& names,
-                                    const DecompositionSettings& settings) {
-  const int nodes_per_element = settings.meshing.nodes_per_element;
+                                    const v1::WorkerRequest& request) {
+  const int nodes_per_element = MeshingOf(request).nodes_per_element;
   if (mesh.nodes_per_element > nodes_per_element) {
     return Refusal(
         absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
@@ -63,52 +66,49 @@ absl::StatusOr<Body> TakeTetrahedra(TetMesh mesh, const MeshNames& names,
   }
   SurfaceMesh given = BoundarySurface(mesh);
   if (mesh.nodes_per_element < nodes_per_element) AddMidsideNodes(mesh);
-  absl::Status status = Hold(settings.fixtures, given, names, mesh);
-  if (!status.ok()) return status;
+  RETURN_IF_ERROR(Hold(FixturesOf(request), given, names, mesh));
   return Body{std::move(given), std::move(mesh), {}};
 }
 
 /// A surface to be filled, or a mesh of tetrahedra as it is.
 using Input = std::variant<Fillable, Body>;
 
-absl::StatusOr<Input> ReadInput(const MeshFile& file, const DecompositionSettings& settings,
+absl::StatusOr<Input> ReadInput(const std::string& bytes, const v1::WorkerRequest& request,
                                 DecompositionObserver& observer) {
-  observer.OnProgress(Phase::kRead, 0);
-  absl::StatusOr<NamedMesh> read = ReadMesh(file.path, file.format, file.metres_per_unit);
-  if (!read.ok()) return read.status();
-  observer.OnProgress(Phase::kMesh, 0);
-  if (auto* tetrahedra = std::get_if<TetMesh>(&read->mesh)) {
-    absl::StatusOr<Body> body = TakeTetrahedra(std::move(*tetrahedra), read->names, settings);
-    if (!body.ok()) return body.status();
-    return *std::move(body);
+  observer.OnProgress(v1::PHASE_READ, 0);
+  const v1::DecompositionSettings& settings = request.settings();
+  ASSIGN_OR_RETURN(NamedMesh read,
+                   ParseMesh(bytes, request.mesh_format(), settings.metres_per_unit()));
+  observer.OnProgress(v1::PHASE_MESH, 0);
+  if (auto* tetrahedra = std::get_if<TetMesh>(&read.mesh)) {
+    return TakeTetrahedra(std::move(*tetrahedra), read.names, request);
   }
-  auto& given = std::get<SurfaceMesh>(read->mesh);
-  absl::StatusOr<PreparedSurface> prepared = PrepareSurface(given, settings.preparation);
-  if (!prepared.ok()) return prepared.status();
-  return Fillable{std::move(given), *std::move(prepared), std::move(read->names)};
+  auto& given = std::get<SurfaceMesh>(read.mesh);
+  ASSIGN_OR_RETURN(PreparedSurface prepared,
+                   PrepareSurface(given, {.repair = settings.mesh().repair(),
+                                          .wall_m = settings.mesh().wall_m()}));
+  return Fillable{std::move(given), std::move(prepared), std::move(read.names)};
 }
 
-absl::Status SaveMatrices(const SystemMatrices& system, const DecompositionSettings& settings) {
-  if (settings.matrices_folder.empty()) return absl::OkStatus();
-  if (absl::Status status = WriteMatrixMarket(absl::StrCat(settings.matrices_folder, "/K.mtx"),
-                                              system.K, settings.use.young_pa);
-      !status.ok()) {
-    return status;
-  }
-  return WriteMatrixMarket(absl::StrCat(settings.matrices_folder, "/M.mtx"), system.M,
-                           settings.use.density_kg_per_m3);
+absl::Status SaveMatrices(const SystemMatrices& system, const v1::WorkerRequest& request) {
+  const std::string& folder = request.matrices_folder();
+  if (folder.empty()) return absl::OkStatus();
+  RETURN_IF_ERROR(
+      WriteMatrixMarket(absl::StrCat(folder, "/K.mtx"), system.K, request.material().young_pa()));
+  return WriteMatrixMarket(absl::StrCat(folder, "/M.mtx"), system.M,
+                           request.material().density_kg_per_m3());
 }
 
-Phase PhaseOf(SolveStage stage) {
+v1::Phase PhaseOf(SolveStage stage) {
   switch (stage) {
     case SolveStage::kFactor:
-      return Phase::kFactor;
+      return v1::PHASE_FACTOR;
     case SolveStage::kSolve:
-      return Phase::kSolve;
+      return v1::PHASE_SOLVE;
     case SolveStage::kVerify:
-      return Phase::kVerify;
+      return v1::PHASE_VERIFY;
   }
-  return Phase::kSolve;
+  return v1::PHASE_SOLVE;
 }
 
 absl::Status CheckBand(const ModalModel& model, const IntendedUse& use) {
@@ -129,36 +129,66 @@ absl::Status CheckBand(const ModalModel& model, const IntendedUse& use) {
 
 /// What takes time after the matrices.
 std::vector<PlannedStep> PlanOf(const SolveCost& cost) {
-  return {{.phase = Phase::kVerify, .predicted_s = cost.count_s},
-          {.phase = Phase::kFactor, .predicted_s = cost.factor_s},
-          {.phase = Phase::kSolve, .predicted_s = cost.solve_s},
-          {.phase = Phase::kVerify, .predicted_s = cost.verify_s},
-          {.phase = Phase::kWrite, .predicted_s = cost.model_s}};
+  return {{.phase = v1::PHASE_VERIFY, .predicted_s = cost.count_s},
+          {.phase = v1::PHASE_FACTOR, .predicted_s = cost.factor_s},
+          {.phase = v1::PHASE_SOLVE, .predicted_s = cost.solve_s},
+          {.phase = v1::PHASE_VERIFY, .predicted_s = cost.verify_s},
+          {.phase = v1::PHASE_WRITE, .predicted_s = cost.model_s}};
 }
 
-SolveOptions OptionsOf(const DecompositionSettings& settings, DecompositionObserver& observer) {
-  return {.max_mode_count = settings.keep_mode_count > 0 ? kMaxFoundModeCount : kMaxModeCount,
+SolveOptions OptionsOf(v1::Solver solver, const v1::WorkerRequest& request,
+                       DecompositionObserver& observer) {
+  return {.solver = ToSolverChoice(solver),
+          .max_mode_count =
+              request.settings().keep_mode_count() > 0 ? kMaxFoundModeCount : kMaxModeCount,
           .on_cost = [&observer](const SolveCost& cost) { observer.OnPlan(PlanOf(cost)); }};
 }
 
-/// One body solved whole.
-absl::StatusOr<ModalModel> Solve(const Body& body, const DecompositionSettings& settings,
-                                 DecompositionObserver& observer) {
-  observer.OnMesh(body.mesh.nodes.size(), body.mesh.element_count());
-  observer.OnProgress(Phase::kAssemble, 0);
-  const ElasticConstants elastic{.young_pa = 1, .poisson_ratio = settings.poisson_ratio};
-  const SystemMatrices system = Assemble(body.mesh, elastic, 1, settings.mass);
-  if (absl::Status status = SaveMatrices(system, settings); !status.ok()) return status;
-
-  const absl::StatusOr<DeformationModes> solution = SolveDeformationModes(
-      system, body.mesh, settings.use.UnitEigenvalue(settings.use.high_hz),
+absl::StatusOr<DeformationModes> FindModes(const SystemMatrices& system, const TetMesh& mesh,
+                                           v1::Solver solver, const v1::WorkerRequest& request,
+                                           DecompositionObserver& observer) {
+  const IntendedUse use = UseOf(request);
+  return SolveDeformationModes(
+      system, mesh, use.UnitEigenvalue(use.high_hz),
       [&](SolveStage stage, double done) { observer.OnProgress(PhaseOf(stage), done); },
-      OptionsOf(settings, observer));
-  if (!solution.ok()) return solution.status();
-  observer.OnProgress(Phase::kWrite, 0);
-  ModalModel model = MakeModalModel(body.mesh, body.given, elastic, *solution);
+      OptionsOf(solver, request, observer));
+}
+
+/// The opinion of the solver that the request checks with. Where that one fails, the comparison
+/// says why: the modes that were found remain right.
+SolverComparison CheckWithOther(const SystemMatrices& system, const TetMesh& mesh,
+                                const Modes& modes, const v1::WorkerRequest& request,
+                                DecompositionObserver& observer) {
+  const v1::Solver other = request.settings().check_with();
+  const absl::StatusOr<DeformationModes> second = FindModes(system, mesh, other, request, observer);
+  SolverComparison result;
+  if (second.ok()) result = CompareSolutions(system, mesh, modes, second->modes);
+  result.failure = std::string(second.status().message());
+  result.solver = other == v1::SOLVER_SPECTRA ? "Spectra" : "block Lanczos";
+  return result;
+}
+
+/// One body solved whole.
+absl::StatusOr<ModalModel> Solve(const Body& body, const v1::WorkerRequest& request,
+                                 DecompositionObserver& observer) {
+  const v1::DecompositionSettings& settings = request.settings();
+  observer.OnMesh(body.mesh.nodes.size());
+  observer.OnProgress(v1::PHASE_ASSEMBLE, 0);
+  const ElasticConstants elastic{.young_pa = 1, .poisson_ratio = settings.poisson_ratio()};
+  const SystemMatrices system = Assemble(body.mesh, elastic, 1, MassSharingOf(request));
+  RETURN_IF_ERROR(SaveMatrices(system, request));
+  ASSIGN_OR_RETURN(const DeformationModes solution,
+                   FindModes(system, body.mesh, settings.solver(), request, observer));
+  std::optional<SolverComparison> comparison;
+  if (settings.check_with() != v1::SOLVER_UNSPECIFIED) {
+    comparison = CheckWithOther(system, body.mesh, solution.modes, request, observer);
+  }
+  observer.OnProgress(v1::PHASE_WRITE, 0);
+  ModalModel model = MakeModalModel(body.mesh, body.given, elastic, solution);
   model.warnings = body.warnings;
-  KeepMostAudible(settings.keep_mode_count, model);
+  if (comparison) model.warnings.push_back(comparison->Text());
+  model.comparison = std::move(comparison);
+  KeepMostAudible(static_cast<int>(settings.keep_mode_count()), model);
   return model;
 }
 
@@ -186,29 +216,30 @@ Round Describe(const TetMesh& mesh, const ModalModel& model, double cpu_s) {
 }
 
 /// Fills and solves a surface finer and finer until the goal is met.
-absl::StatusOr<ModalModel> SolveToGoal(const Fillable& surface, DecompositionSettings settings,
+absl::StatusOr<ModalModel> SolveToGoal(const Fillable& surface, const v1::WorkerRequest& request,
                                        DecompositionObserver& observer) {
-  MeshingSettings& meshing = settings.meshing;
-  if (settings.resolution.given() && meshing.target_node_count == 0) {
+  const ResolutionGoal goal = GoalOf(request);
+  MeshingSettings meshing = MeshingOf(request);
+  if (goal.given() && meshing.target_node_count == 0) {
     meshing.target_node_count = kFirstCornerNodeCount;
   }
   std::vector<Round> rounds;
-  RoundForecast forecast{.later_rounds = settings.resolution.given() ? kLaterRoundsAfterFirst : 0};
+  RoundForecast forecast{.later_rounds = goal.given() ? kLaterRoundsAfterFirst : 0};
   absl::StatusOr<ModalModel> best = absl::UnknownError("");
   while (true) {
     const PhaseClock::Times begun = PhaseClock::Now();
     observer.OnRound(forecast);
-    observer.OnProgress(Phase::kMesh, 0);
-    const absl::StatusOr<Body> body = FillSurface(surface, settings);
-    // A finer mesh that cannot be had takes nothing from the coarser one.
+    observer.OnProgress(v1::PHASE_MESH, 0);
+    const absl::StatusOr<Body> body = FillSurface(surface, meshing, request);
+    // A finer mesh that cannot be made takes nothing from the coarser one.
     if (!body.ok() && best.ok()) return best;
     if (!body.ok()) return body.status();
-    absl::StatusOr<ModalModel> model = Solve(*body, settings, observer);
+    absl::StatusOr<ModalModel> model = Solve(*body, request, observer);
     if (!model.ok() && best.ok()) return best;
-    if (!model.ok() || !settings.resolution.given()) return model;
+    if (!model.ok() || !goal.given()) return model;
     const PhaseClock::Times ended = PhaseClock::Now();
     rounds.push_back(Describe(body->mesh, *model, ended.cpu_seconds - begun.cpu_seconds));
-    const std::optional<double> next = NextGrain(settings.resolution, rounds);
+    const std::optional<double> next = NextGrain(goal, rounds);
     if (!next) return model;
     best = std::move(model);
     meshing.grain_m = *next;
@@ -226,24 +257,24 @@ void WarnOfAccuracy(const ResolutionGoal& goal, ModalModel& model) {
       100 * goal.accuracy, 100 * reached));
 }
 
+void WarnOfOverruns(const ResolutionGoal& goal, double used_s, ModalModel& model) {
+  std::ranges::move(OverrunWarnings(goal, used_s, PeakBytes()), std::back_inserter(model.warnings));
+}
+
 }  // namespace
 
-absl::StatusOr<ModalModel> Decompose(const MeshFile& file, const DecompositionSettings& settings,
+absl::StatusOr<ModalModel> Decompose(std::string mesh_bytes, const v1::WorkerRequest& request,
                                      DecompositionObserver& observer) {
   const double begun_cpu_s = PhaseClock::Now().cpu_seconds;
-  const absl::StatusOr<Input> input = ReadInput(file, settings, observer);
-  if (!input.ok()) return input.status();
-  const auto* surface = std::get_if<Fillable>(&*input);
-  absl::StatusOr<ModalModel> model = surface != nullptr
-                                         ? SolveToGoal(*surface, settings, observer)
-                                         : Solve(std::get<Body>(*input), settings, observer);
-  if (!model.ok()) return model;
-  if (absl::Status status = CheckBand(*model, settings.use); !status.ok()) return status;
-  WarnOfAccuracy(settings.resolution, *model);
-  const double used_s = PhaseClock::Now().cpu_seconds - begun_cpu_s;
-  std::ranges::move(OverrunWarnings(settings.resolution, used_s, PeakBytes()),
-                    std::back_inserter(model->warnings));
-  observer.OnModes(model->eigenvalues.size());
+  ASSIGN_OR_RETURN(const Input input, ReadInput(std::exchange(mesh_bytes, {}), request, observer));
+  const auto* surface = std::get_if<Fillable>(&input);
+  ASSIGN_OR_RETURN(ModalModel model, surface != nullptr
+                                         ? SolveToGoal(*surface, request, observer)
+                                         : Solve(std::get<Body>(input), request, observer));
+  RETURN_IF_ERROR(CheckBand(model, UseOf(request)));
+  WarnOfAccuracy(GoalOf(request), model);
+  WarnOfOverruns(GoalOf(request), PhaseClock::Now().cpu_seconds - begun_cpu_s, model);
+  observer.OnModes(model.eigenvalues.size());
   return model;
 }
 

@@ -4,16 +4,13 @@
 #include <cstddef>
 #include <vector>
 
+#include "carillon/v1/decomposition.pb.h"
+
 namespace carillon::precompute {
 
-/// The steps of a decomposition. The proof (kVerify) begins before the factorization, with the
-/// count of the modes; all but the first may repeat.
-enum class Phase { kRead, kMesh, kAssemble, kFactor, kSolve, kVerify, kWrite };
-inline constexpr size_t kPhaseCount = 7;
-
-/// A step to come.
+/// A step to come. All phases but the first may repeat.
 struct PlannedStep {
-  Phase phase;
+  v1::Phase phase;
   double predicted_s = 0;  ///< on the machine that predictions are made for
 };
 
@@ -28,13 +25,13 @@ class DecompositionObserver {
  public:
   virtual ~DecompositionObserver() = default;
   /// `fraction`: estimated part of the phase that is done, 0 to 1.
-  virtual void OnProgress(Phase phase, double fraction) = 0;
+  virtual void OnProgress(v1::Phase phase, double fraction) = 0;
   /// Another mesh is about to be made and solved.
   virtual void OnRound(const RoundForecast& forecast) = 0;
   /// The steps of this round from the count on; told again once more is known.
   virtual void OnPlan(const std::vector<PlannedStep>& steps) = 0;
-  /// Corner and mid-side nodes, once known.
-  virtual void OnMesh(size_t node_count, size_t element_count) = 0;
+  /// The mesh has this many nodes, corners and mid-sides.
+  virtual void OnMesh(size_t node_count) = 0;
   /// Verified modes, once known.
   virtual void OnModes(size_t mode_count) = 0;
 };

@@ -6,8 +6,8 @@
 
 namespace carillon::precompute {
 
-/// A fixture of the contract, which FixtureText accepts, and back.
+/// A fixture of the contract in the one form that ParseFixture gives it: a plane's normal has
+/// length one, and a box its least corner first.
 Fixture FromProto(const v1::Fixture& said);
-v1::Fixture ToProto(const Fixture& fixture);
 
 }  // namespace carillon::precompute

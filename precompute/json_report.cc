@@ -24,8 +24,8 @@ int64_t PeakMemoryBytes() {
 
 Json PhaseTimes(const PhaseClock& clock) {
   Json phases = Json::array();
-  for (size_t k = 0; k < kPhaseCount; ++k) {
-    const auto phase = static_cast<Phase>(k);
+  for (int k = v1::PHASE_READ; k <= v1::PHASE_WRITE; ++k) {
+    const auto phase = static_cast<v1::Phase>(k);
     const PhaseClock::Times& times = clock.Of(phase);
     phases.push_back({{"name", PhaseName(phase)},
                       {"seconds", times.seconds},
@@ -48,19 +48,30 @@ Json ModesInBand(const ModalModel& model, const IntendedUse& use) {
   return modes;
 }
 
+Json Check(const SolverComparison& comparison) {
+  if (!comparison.failure.empty()) {
+    return {{"solver", comparison.solver}, {"failure", comparison.failure}};
+  }
+  return {{"solver", comparison.solver},
+          {"mode_count", comparison.other_mode_count},
+          {"largest_frequency_difference", comparison.largest_frequency_difference},
+          {"least_mac", comparison.least_mac}};
+}
+
 }  // namespace
 
 std::string JsonReport(const ModalModel& model, const IntendedUse& use,
                        const ProgressReporter& reporter) {
-  const Json report = {{"nodes", model.node_count},
-                       {"elements", model.element_count},
-                       {"unknowns", 3 * int64_t{model.node_count}},
-                       {"peak_memory_bytes", PeakMemoryBytes()},
-                       {"phases", PhaseTimes(reporter.clock())},
-                       {"left_out_modes", model.left_out_mode_count},
-                       {"accuracy", model.WorstError()},
-                       {"warnings", model.warnings},
-                       {"modes", ModesInBand(model, use)}};
+  Json report = {{"nodes", model.node_count},
+                 {"elements", model.element_count},
+                 {"unknowns", 3 * int64_t{model.node_count}},
+                 {"peak_memory_bytes", PeakMemoryBytes()},
+                 {"phases", PhaseTimes(reporter.clock())},
+                 {"left_out_modes", model.left_out_mode_count},
+                 {"accuracy", model.WorstError()},
+                 {"warnings", model.warnings},
+                 {"modes", ModesInBand(model, use)}};
+  if (model.comparison) report["check"] = Check(*model.comparison);
   return report.dump(2);
 }
 

@@ -10,8 +10,9 @@
 
 namespace carillon::precompute {
 
-/// The object that --json prints: nodes, elements, unknowns, peak_memory_bytes, phases, modes left
-/// out, warnings, and of the modes held those in the band of `use`.
+/// The object that --json prints: nodes, elements, unknowns, peak_memory_bytes, phases, the count
+/// of modes left out, warnings, the modes of the model that lie in the band of `use`, and with
+/// --check-with the comparison of the solvers ("check").
 std::string JsonReport(const ModalModel& model, const IntendedUse& use,
                        const ProgressReporter& reporter);
 

@@ -6,9 +6,12 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <string>
 #include <string_view>
+#include <utility>
 
 #include "precompute/command_line.h"
+#include "precompute/decompose.h"
 #include "precompute/json_report.h"
 #include "precompute/mesh/read/read_mesh.h"
 #include "precompute/modal_model_codec.h"
@@ -17,7 +20,9 @@
 #include "precompute/sha256.h"
 #include "precompute/sparse/openblas.h"
 #include "precompute/worker_events.h"
+#include "precompute/worker_request.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::precompute {
 namespace {
@@ -25,21 +30,16 @@ namespace {
 constexpr std::chrono::milliseconds kProgressInterval(250);
 
 absl::StatusOr<ModalModel> DecomposeAndWrite(const CommandLine& asked, ProgressReporter& reporter) {
-  const absl::StatusOr<std::string> bytes = ReadMeshFile(asked.mesh.path, asked.mesh.format);
-  if (!bytes.ok()) return bytes.status();
-  const std::string digest = Sha256Hex(*bytes);
-  absl::StatusOr<ModalModel> model = Decompose(asked.mesh, asked.settings, reporter);
-  if (!model.ok()) return model;
-  const ModelOrigin origin{.mesh_digest = digest, .settings = ToProto(asked.mesh, asked.settings)};
-  if (absl::Status status = WriteModalModel(asked.output, *model, origin); !status.ok()) {
-    return status;
-  }
-  reporter.OnProgress(Phase::kWrite, 1);
+  ASSIGN_OR_RETURN(std::string mesh, ReadMeshFile(asked.mesh_file, asked.request.mesh_format()));
+  const ModelOrigin origin{.mesh_digest = Sha256Hex(mesh), .settings = asked.request.settings()};
+  ASSIGN_OR_RETURN(ModalModel model, Decompose(std::move(mesh), asked.request, reporter));
+  RETURN_IF_ERROR(WriteModalModel(asked.output, model, origin));
+  reporter.OnProgress(v1::PHASE_WRITE, 1);
   return model;
 }
 
 void PrintSummary(const ModalModel& model, const CommandLine& asked) {
-  const IntendedUse& use = asked.settings.use;
+  const IntendedUse use = UseOf(asked.request);
   std::printf("%zu modes from %.2f to %.2f Hz, %d nodes, written to %s\n", model.eigenvalues.size(),
               use.FrequencyHz(model.eigenvalues.front()), use.FrequencyHz(model.eigenvalues.back()),
               model.node_count, asked.output.c_str());
@@ -64,15 +64,15 @@ int Run(const CommandLine& asked) {
   {
     const ProgressBar bar;
     ProgressReporter reporter(
-        [&](const ProgressState& state) {
-          events.SendProgress(state);
-          bar.Draw(state);
+        [&](const v1::Progress& progress) {
+          events.SendProgress(progress);
+          bar.Draw(progress);
         },
         kProgressInterval);
     model = DecomposeAndWrite(asked, reporter);
     reporter.Stop();
     if (model.ok() && asked.json) {
-      std::puts(JsonReport(*model, asked.settings.use, reporter).c_str());
+      std::puts(JsonReport(*model, UseOf(asked.request), reporter).c_str());
     }
   }
   if (!model.ok()) return Refuse(model.status(), asked.json, events);

@@ -13,37 +13,24 @@
 #include <span>
 
 #include "absl/strings/str_cat.h"
-#include "precompute/fixture_codec.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/model_format.h"
 
 static_assert(std::endian::native == std::endian::little, "arrays are stored little endian");
 
 namespace carillon::precompute {
 namespace {
 
-constexpr double kBytesPerGib = 1024.0 * 1024 * 1024;
-
 using google::protobuf::io::FileOutputStream;
 using google::protobuf::util::SerializeDelimitedToZeroCopyStream;
 
-constexpr uint32_t kFormatVersion = 1;
-constexpr size_t kMaxChunkBytes = 1 << 20;
 constexpr char kSolver[] = "carillon-precompute " CARILLON_VERSION;
 
-/// One array: its descriptor and its bytes, which the model owns.
-struct StoredArray {
-  v1::ArrayDescriptor descriptor;
-  std::span<const std::byte> bytes;
-};
+using Bytes = std::span<const std::byte>;
 
 template <typename T>
-StoredArray Describe(const char* name, v1::ElementType type, std::vector<uint64_t> shape,
-                     const std::vector<T>& values) {
-  StoredArray array{.descriptor = {}, .bytes = std::as_bytes(std::span(values))};
-  array.descriptor.set_name(name);
-  array.descriptor.set_type(type);
-  array.descriptor.mutable_shape()->Assign(shape.begin(), shape.end());
-  return array;
+Bytes BytesOf(const std::vector<T>& values) {
+  return std::as_bytes(std::span(values));
 }
 
 std::vector<std::array<float, 3>> ToFloat(const std::vector<Point>& points) {
@@ -55,24 +42,20 @@ std::vector<std::array<float, 3>> ToFloat(const std::vector<Point>& points) {
   return result;
 }
 
-std::vector<StoredArray> Arrays(const ModalModel& model,
-                                const std::vector<std::array<float, 3>>& given_vertices) {
-  using enum v1::ElementType;
-  const uint64_t modes = model.eigenvalues.size();
-  const uint64_t vertices = model.vertices.size();
-  const uint64_t triangles = model.triangles.size();
-  const uint64_t given_triangles = model.given.triangles.size();
-  return {
-      Describe("eigenvalues", ELEMENT_TYPE_FLOAT64, {modes}, model.eigenvalues),
-      Describe("residuals", ELEMENT_TYPE_FLOAT64, {modes}, model.residuals),
-      Describe("couplings", ELEMENT_TYPE_FLOAT64, {modes}, model.couplings),
-      Describe("vertices", ELEMENT_TYPE_FLOAT32, {vertices, 3}, model.vertices),
-      Describe("triangles", ELEMENT_TYPE_UINT32, {triangles, 3}, model.triangles),
-      Describe("given_triangle", ELEMENT_TYPE_UINT32, {triangles}, model.given_triangle),
-      Describe("given_vertices", ELEMENT_TYPE_FLOAT32, {given_vertices.size(), 3}, given_vertices),
-      Describe("given_triangles", ELEMENT_TYPE_UINT32, {given_triangles, 3}, model.given.triangles),
-      Describe("shapes", ELEMENT_TYPE_FLOAT32, {vertices, 3, modes}, model.shapes),
-  };
+/// The numbers of each of kModelArrays, which the arguments own.
+std::array<Bytes, kModelArrayCount> Arrays(
+    const ModalModel& model, const std::vector<std::array<float, 3>>& given_vertices) {
+  return {BytesOf(model.eigenvalues), BytesOf(model.residuals),       BytesOf(model.couplings),
+          BytesOf(model.vertices),    BytesOf(model.triangles),       BytesOf(model.given_triangle),
+          BytesOf(given_vertices),    BytesOf(model.given.triangles), BytesOf(model.shapes)};
+}
+
+ModelSizes SizesOf(const ModalModel& model) {
+  return {.modes = model.eigenvalues.size(),
+          .vertices = model.vertices.size(),
+          .triangles = model.triangles.size(),
+          .given_vertices = model.given.vertices.size(),
+          .given_triangles = model.given.triangles.size()};
 }
 
 v1::Verification ToProto(const Verification& proof) {
@@ -85,11 +68,10 @@ v1::Verification ToProto(const Verification& proof) {
   return result;
 }
 
-v1::ModalModelRecord MakeHeader(const ModalModel& model, const ModelOrigin& origin,
-                                const std::vector<StoredArray>& arrays) {
+v1::ModalModelRecord MakeHeader(const ModalModel& model, const ModelOrigin& origin) {
   v1::ModalModelRecord record;
   v1::ModalModelHeader& header = *record.mutable_header();
-  header.set_format_version(kFormatVersion);
+  header.set_format_version(kModelFormatVersion);
   header.set_solver(kSolver);
   *header.mutable_settings() = origin.settings;
   header.set_mesh_digest(origin.mesh_digest);
@@ -100,7 +82,9 @@ v1::ModalModelRecord MakeHeader(const ModalModel& model, const ModelOrigin& orig
   header.set_volume_m3(model.volume_m3);
   header.set_left_out_mode_count(static_cast<uint32_t>(model.left_out_mode_count));
   *header.mutable_verification() = ToProto(model.verification);
-  for (const StoredArray& array : arrays) *header.add_arrays() = array.descriptor;
+  for (const ArraySpec& spec : kModelArrays) {
+    *header.add_arrays() = DescribeArray(spec, SizesOf(model));
+  }
   for (const std::string& warning : model.warnings) header.add_warnings(warning);
   for (const double error : model.estimated_errors) {
     header.add_estimated_errors(static_cast<float>(error));
@@ -108,10 +92,9 @@ v1::ModalModelRecord MakeHeader(const ModalModel& model, const ModelOrigin& orig
   return record;
 }
 
-bool WriteChunks(const StoredArray& array, uint32_t index, FileOutputStream& file) {
-  for (size_t offset = 0; offset < array.bytes.size(); offset += kMaxChunkBytes) {
-    const auto piece =
-        array.bytes.subspan(offset, std::min(kMaxChunkBytes, array.bytes.size() - offset));
+bool WriteChunks(Bytes bytes, uint32_t index, FileOutputStream& file) {
+  for (size_t offset = 0; offset < bytes.size(); offset += kMaxModelChunkBytes) {
+    const auto piece = bytes.subspan(offset, std::min(kMaxModelChunkBytes, bytes.size() - offset));
     v1::ModalModelRecord record;
     v1::ModalModelChunk& chunk = *record.mutable_chunk();
     chunk.set_array(index);
@@ -125,7 +108,7 @@ bool WriteChunks(const StoredArray& array, uint32_t index, FileOutputStream& fil
 
 /// Writes all records and brings them to the disk.
 bool WriteRecords(int descriptor, const v1::ModalModelRecord& header,
-                  const std::vector<StoredArray>& arrays) {
+                  const std::array<Bytes, kModelArrayCount>& arrays) {
   FileOutputStream file(descriptor);
   bool ok = SerializeDelimitedToZeroCopyStream(header, &file);
   for (size_t i = 0; i < arrays.size() && ok; ++i) {
@@ -137,34 +120,13 @@ bool WriteRecords(int descriptor, const v1::ModalModelRecord& header,
 
 }  // namespace
 
-v1::DecompositionSettings ToProto(const MeshFile& file, const DecompositionSettings& settings) {
-  v1::DecompositionSettings result;
-  result.set_poisson_ratio(settings.poisson_ratio);
-  result.set_element(settings.meshing.nodes_per_element == 4 ? v1::ELEMENT_LINEAR
-                                                             : v1::ELEMENT_QUADRATIC);
-  result.set_mass_matrix(settings.mass == MassSharing::kLumped ? v1::MASS_MATRIX_LUMPED
-                                                               : v1::MASS_MATRIX_CONSISTENT);
-  result.set_metres_per_unit(file.metres_per_unit);
-  v1::MeshSettings& mesh = *result.mutable_mesh();
-  if (settings.meshing.keep_surface) mesh.set_keep_surface(*settings.meshing.keep_surface);
-  mesh.set_repair(settings.preparation.repair);
-  mesh.set_wall_m(settings.preparation.wall_m);
-  mesh.set_accuracy(settings.resolution.accuracy);
-  mesh.set_budget_s(settings.resolution.budget_s);
-  mesh.set_budget_gib(settings.resolution.budget_bytes / kBytesPerGib);
-  mesh.set_target_node_count(static_cast<uint32_t>(settings.meshing.target_node_count));
-  result.set_keep_mode_count(static_cast<uint32_t>(settings.keep_mode_count));
-  for (const Fixture& fixture : settings.fixtures) *result.add_fixtures() = ToProto(fixture);
-  return result;
-}
-
 absl::Status WriteModalModel(const std::string& path, const ModalModel& model,
                              const ModelOrigin& origin) {
   const std::vector<std::array<float, 3>> given_vertices = ToFloat(model.given.vertices);
-  const std::vector<StoredArray> arrays = Arrays(model, given_vertices);
+  const std::array<Bytes, kModelArrayCount> arrays = Arrays(model, given_vertices);
   const std::string temporary = absl::StrCat(path, ".partial-", getpid());
   const int descriptor = open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-  if (descriptor >= 0 && WriteRecords(descriptor, MakeHeader(model, origin, arrays), arrays) &&
+  if (descriptor >= 0 && WriteRecords(descriptor, MakeHeader(model, origin), arrays) &&
       std::rename(temporary.c_str(), path.c_str()) == 0) {
     return absl::OkStatus();
   }

@@ -5,18 +5,15 @@
 
 #include "absl/status/status.h"
 #include "carillon/v1/modal_model.pb.h"
-#include "precompute/decompose.h"
+#include "precompute/modes/modal_model.h"
 
 namespace carillon::precompute {
 
 /// What the header says beside the model itself.
 struct ModelOrigin {
-  std::string mesh_digest;  ///< SHA-256 of the mesh file
-  v1::DecompositionSettings settings;
+  std::string mesh_digest;             ///< SHA-256 of the mesh file
+  v1::DecompositionSettings settings;  ///< every default filled in
 };
-
-/// The settings in their stored form, every default filled in.
-v1::DecompositionSettings ToProto(const MeshFile& file, const DecompositionSettings& settings);
 
 /// Writes the stored form (proto/carillon/v1/modal_model.proto): to a temporary name beside `path`,
 /// then renamed, so that `path` never holds half a model.

@@ -19,13 +19,13 @@ double CpuSeconds(int who) {
 
 }  // namespace
 
-std::string_view PhaseName(Phase phase) {
-  constexpr std::array<std::string_view, kPhaseCount> kNames = {
-      "read", "mesh", "assemble", "factor", "solve", "verify", "write"};
+std::string_view PhaseName(v1::Phase phase) {
+  constexpr std::array<std::string_view, kPhaseCount + 1> kNames = {
+      "", "read", "mesh", "assemble", "factor", "solve", "verify", "write"};
   return kNames[static_cast<size_t>(phase)];
 }
 
-void PhaseClock::Enter(Phase phase) {
+void PhaseClock::Enter(v1::Phase phase) {
   Stop();
   phase_ = phase;
 }

@@ -9,7 +9,9 @@
 namespace carillon::precompute {
 
 /// The name that users see: "read", "mesh", ...
-std::string_view PhaseName(Phase phase);
+std::string_view PhaseName(v1::Phase phase);
+
+inline constexpr size_t kPhaseCount = v1::PHASE_WRITE;  ///< the phases from v1::PHASE_READ on
 
 /// Adds up how long each phase took.
 class PhaseClock {
@@ -22,16 +24,16 @@ class PhaseClock {
   PhaseClock() : last_(Now()) {}
 
   /// Ends the phase under way and begins `phase`.
-  void Enter(Phase phase);
+  void Enter(v1::Phase phase);
   /// Ends the phase under way.
   void Stop();
   /// The clocks' state, of which differences are times.
   static Times Now();
-  const Times& Of(Phase phase) const { return times_[static_cast<size_t>(phase)]; }
+  const Times& Of(v1::Phase phase) const { return times_[static_cast<size_t>(phase)]; }
 
  private:
-  std::array<Times, kPhaseCount> times_;
-  Phase phase_ = Phase::kRead;
+  std::array<Times, kPhaseCount + 1> times_;  // that of PHASE_UNSPECIFIED stays zero
+  v1::Phase phase_ = v1::PHASE_READ;
   Times last_;
 };
 

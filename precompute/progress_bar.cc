@@ -7,6 +7,7 @@
 #include <string>
 
 #include "absl/strings/str_format.h"
+#include "precompute/phase_clock.h"
 
 namespace carillon::precompute {
 namespace {
@@ -28,16 +29,18 @@ ProgressBar::~ProgressBar() {
   if (on_terminal_) std::fputs(kEraseLine, stderr);
 }
 
-void ProgressBar::Draw(const ProgressState& state) const {
+void ProgressBar::Draw(const v1::Progress& progress) const {
   if (!on_terminal_) return;
-  const auto done = static_cast<size_t>(state.fraction * kWidth);
+  const auto done = static_cast<size_t>(progress.fraction() * kWidth);
   const std::string bar = std::string(done, '#') + std::string(kWidth - done, '.');
-  std::fprintf(stderr, "%s[%s] %3.0f %% %s", kEraseLine, bar.c_str(), 100 * state.fraction,
-               std::string(PhaseName(state.phase)).c_str());
-  if (state.node_count > 0) std::fprintf(stderr, ", %zu nodes", state.node_count);
-  if (state.mode_count > 0) std::fprintf(stderr, ", %zu modes", state.mode_count);
-  if (state.remaining_s) {
-    std::fprintf(stderr, ", %s left", RoughTime(*state.remaining_s).c_str());
+  std::fprintf(stderr, "%s[%s] %3.0f %% %s", kEraseLine, bar.c_str(), 100 * progress.fraction(),
+               std::string(PhaseName(progress.phase())).c_str());
+  if (progress.node_count() > 0) std::fprintf(stderr, ", %u nodes", progress.node_count());
+  if (progress.converged_mode_count() > 0) {
+    std::fprintf(stderr, ", %u modes", progress.converged_mode_count());
+  }
+  if (progress.remaining_s() > 0) {
+    std::fprintf(stderr, ", %s left", RoughTime(progress.remaining_s()).c_str());
   }
   std::fflush(stderr);
 }

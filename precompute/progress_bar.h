@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
-#include "precompute/progress_reporter.h"
+#include "carillon/v1/decomposition.pb.h"
 
 namespace carillon::precompute {
 
@@ -14,7 +14,7 @@ class ProgressBar {
   ProgressBar(const ProgressBar&) = delete;
   ProgressBar& operator=(const ProgressBar&) = delete;
 
-  void Draw(const ProgressState& state) const;
+  void Draw(const v1::Progress& progress) const;
 
  private:
   bool on_terminal_;

@@ -2,6 +2,7 @@
 #include "precompute/progress_reporter.h"
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 
 namespace carillon::precompute {
@@ -11,31 +12,34 @@ namespace {
 constexpr double kMostBeforeCount = 0.15;
 
 /// Of the whole work, about, before anybody knows how much there is.
-double FractionByPhase(Phase phase) {
-  if (phase == Phase::kRead) return 0;
-  return phase == Phase::kMesh ? 0.01 : 0.05;
+double FractionByPhase(v1::Phase phase) {
+  if (phase == v1::PHASE_READ) return 0;
+  return phase == v1::PHASE_MESH ? 0.01 : 0.05;
 }
 
 }  // namespace
 
-ProgressReporter::ProgressReporter(std::function<void(const ProgressState&)> show,
+ProgressReporter::ProgressReporter(std::function<void(const v1::Progress&)> show,
                                    std::chrono::milliseconds interval)
-    : show_(std::move(show)), interval_(interval), thread_([this] { Run(); }) {}
+    : show_(std::move(show)), interval_(interval) {
+  state_.set_phase(v1::PHASE_READ);
+  thread_ = std::thread([this] { Run(); });
+}
 
 ProgressReporter::~ProgressReporter() { Stop(); }
 
-void ProgressReporter::OnProgress(Phase phase, double fraction) {
+void ProgressReporter::OnProgress(v1::Phase phase, double fraction) {
   const std::lock_guard lock(mutex_);
-  if (phase != state_.phase) clock_.Enter(phase);
-  state_.phase = phase;
-  state_.fraction = std::max(state_.fraction, FractionByPhase(phase));
-  counted_ = counted_ || phase == Phase::kFactor || phase == Phase::kSolve;
+  if (phase != state_.phase()) clock_.Enter(phase);
+  state_.set_phase(phase);
+  state_.set_fraction(std::max(state_.fraction(), FractionByPhase(phase)));
+  counted_ = counted_ || phase == v1::PHASE_FACTOR || phase == v1::PHASE_SOLVE;
   remaining_.Progress(Now(), phase, fraction);
   Estimate();
-  if (phase != Phase::kWrite || fraction < 1) return;
+  if (phase != v1::PHASE_WRITE || fraction < 1) return;
   remaining_ = {};
-  state_.remaining_s.reset();
-  state_.fraction = 1;
+  state_.clear_remaining_s();
+  state_.set_fraction(1);
 }
 
 void ProgressReporter::OnRound(const RoundForecast& forecast) {
@@ -50,24 +54,24 @@ void ProgressReporter::OnPlan(const std::vector<PlannedStep>& steps) {
 
 void ProgressReporter::Estimate() {
   const double now_s = Now();
-  state_.remaining_s = remaining_.Seconds(now_s);
-  if (!state_.remaining_s) return;
-  const double whole_s = std::max(now_s + *state_.remaining_s, 1e-9);
-  const double done = now_s / whole_s;
-  state_.fraction = std::max(state_.fraction, counted_ ? done : std::min(done, kMostBeforeCount));
+  const std::optional<double> remaining_s = remaining_.Seconds(now_s);
+  state_.set_remaining_s(remaining_s.value_or(0));
+  if (!remaining_s) return;
+  const double done = now_s / std::max(now_s + *remaining_s, 1e-9);
+  state_.set_fraction(
+      std::max(state_.fraction(), counted_ ? done : std::min(done, kMostBeforeCount)));
 }
 
 double ProgressReporter::Now() const { return PhaseClock::Now().seconds - begun_s_; }
 
-void ProgressReporter::OnMesh(size_t node_count, size_t element_count) {
+void ProgressReporter::OnMesh(size_t node_count) {
   const std::lock_guard lock(mutex_);
-  state_.node_count = node_count;
-  state_.element_count = element_count;
+  state_.set_node_count(static_cast<uint32_t>(node_count));
 }
 
 void ProgressReporter::OnModes(size_t mode_count) {
   const std::lock_guard lock(mutex_);
-  state_.mode_count = mode_count;
+  state_.set_converged_mode_count(static_cast<uint32_t>(mode_count));
 }
 
 void ProgressReporter::Stop() {
@@ -81,7 +85,7 @@ void ProgressReporter::Stop() {
   thread_.join();
 }
 
-ProgressState ProgressReporter::state() const {
+v1::Progress ProgressReporter::state() const {
   const std::lock_guard lock(mutex_);
   return state_;
 }
@@ -90,7 +94,7 @@ void ProgressReporter::Run() {
   std::unique_lock lock(mutex_);
   while (true) {
     Estimate();
-    const ProgressState state = state_;
+    const v1::Progress state = state_;
     const bool last = stopping_;
     lock.unlock();
     show_(state);

@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <functional>
 #include <mutex>
-#include <optional>
 #include <thread>
 
 #include "precompute/decomposition_observer.h"
@@ -15,35 +14,25 @@
 
 namespace carillon::precompute {
 
-/// How far a decomposition is.
-struct ProgressState {
-  Phase phase = Phase::kRead;
-  double fraction = 0;  ///< of the whole work, estimated; never goes back
-  std::optional<double> remaining_s = {};
-  size_t node_count = 0;
-  size_t element_count = 0;
-  size_t mode_count = 0;
-};
-
 /// Keeps the state of a decomposition and shows it at a steady rate from a thread of its own, so
 /// that a long factorization is known to live.
 class ProgressReporter : public DecompositionObserver {
  public:
   /// `show` is called in the reporter's thread only, every `interval` and once at the end.
-  ProgressReporter(std::function<void(const ProgressState&)> show,
+  ProgressReporter(std::function<void(const v1::Progress&)> show,
                    std::chrono::milliseconds interval);
   ~ProgressReporter() override;
 
-  void OnProgress(Phase phase, double fraction) override;
+  void OnProgress(v1::Phase phase, double fraction) override;
   void OnRound(const RoundForecast& forecast) override;
   void OnPlan(const std::vector<PlannedStep>& steps) override;
-  void OnMesh(size_t node_count, size_t element_count) override;
+  void OnMesh(size_t node_count) override;
   void OnModes(size_t mode_count) override;
 
   /// Shows the last state and ends the thread.
   void Stop();
 
-  ProgressState state() const;
+  v1::Progress state() const;
   /// Only after Stop.
   const PhaseClock& clock() const { return clock_; }
 
@@ -53,11 +42,11 @@ class ProgressReporter : public DecompositionObserver {
   /// Brings fraction and remaining time up to date; mutex_ is held.
   void Estimate();
 
-  std::function<void(const ProgressState&)> show_;
+  std::function<void(const v1::Progress&)> show_;
   std::chrono::milliseconds interval_;
   mutable std::mutex mutex_;
   std::condition_variable wake_;
-  ProgressState state_;
+  v1::Progress state_;
   bool stopping_ = false;
   PhaseClock clock_;
   double begun_s_ = PhaseClock::Now().seconds;

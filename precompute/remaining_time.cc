@@ -33,7 +33,7 @@ void RemainingTime::Plan(double now_s, std::vector<PlannedStep> steps) {
   fraction_ = 0;
 }
 
-void RemainingTime::Progress(double now_s, Phase phase, double fraction) {
+void RemainingTime::Progress(double now_s, v1::Phase phase, double fraction) {
   if (steps_.empty()) return;
   if (!under_way_ || current() == nullptr || current()->phase != phase) {
     const auto is_it = [phase](const PlannedStep& step) { return step.phase == phase; };

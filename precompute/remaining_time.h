@@ -18,7 +18,7 @@ class RemainingTime {
   /// The steps of this round after its matrices, as far as they are not done yet.
   void Plan(double now_s, std::vector<PlannedStep> steps);
   /// `fraction` of the phase is done, 0 to 1; zero also where nobody knows.
-  void Progress(double now_s, Phase phase, double fraction);
+  void Progress(double now_s, v1::Phase phase, double fraction);
 
   /// Nothing where neither a plan nor a forecast is there.
   std::optional<double> Seconds(double now_s) const;

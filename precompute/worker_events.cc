@@ -3,7 +3,6 @@
 
 #include <google/protobuf/util/delimited_message_util.h>
 
-#include "carillon/v1/decomposition.pb.h"
 #include "proto/cpp/error_reason.h"
 
 namespace carillon::precompute {
@@ -16,14 +15,9 @@ void Send(int descriptor, const v1::WorkerEvent& event) {
 
 }  // namespace
 
-void WorkerEvents::SendProgress(const ProgressState& state) const {
+void WorkerEvents::SendProgress(const v1::Progress& progress) const {
   v1::WorkerEvent event;
-  v1::Progress& progress = *event.mutable_progress();
-  progress.set_phase(static_cast<v1::Phase>(static_cast<int>(state.phase) + v1::PHASE_READ));
-  progress.set_fraction(state.fraction);
-  progress.set_remaining_s(state.remaining_s.value_or(0));
-  progress.set_node_count(static_cast<uint32_t>(state.node_count));
-  progress.set_converged_mode_count(static_cast<uint32_t>(state.mode_count));
+  *event.mutable_progress() = progress;
   Send(descriptor_, event);
 }
 

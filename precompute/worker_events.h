@@ -2,7 +2,7 @@
 #pragma once
 
 #include "absl/status/status.h"
-#include "precompute/progress_reporter.h"
+#include "carillon/v1/decomposition.pb.h"
 
 namespace carillon::precompute {
 
@@ -14,7 +14,7 @@ class WorkerEvents {
   /// `descriptor`: below zero says nothing to nobody.
   explicit WorkerEvents(int descriptor) : descriptor_(descriptor) {}
 
-  void SendProgress(const ProgressState& state) const;
+  void SendProgress(const v1::Progress& progress) const;
   void SendError(const absl::Status& status) const;
 
  private:

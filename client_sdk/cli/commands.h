@@ -9,7 +9,6 @@
 #include "absl/status/status.h"
 #include "carillon/client.h"
 #include "client_sdk/cli/material_figures.h"
-#include "client_sdk/cli/quantity.h"
 #include "client_sdk/cli/stop_signal.h"
 
 namespace carillon::cli {
@@ -20,24 +19,14 @@ struct CreateModelOptions {
   std::string format;  ///< empty: the file name's suffix
   MaterialFigures material;
   std::string label;  ///< empty: the file name without its suffix
-  std::string unit = "m";
-  std::string element = "quadratic";
-  std::string mass = "consistent";
+  v1::DecompositionSettings settings;
   double size = 1;
   double min_frequency_hz = 20;
   double max_frequency_hz = 20000;
-  std::optional<bool> keep_surface;
-  uint32_t target_node_count = 0;
-  uint32_t keep_mode_count = 0;
   bool coarse_first = false;
   int32_t priority = 0;
   double time_limit_s = 0;
   uint64_t memory_limit_mib = 0;
-  bool repair = false;
-  double wall_m = 0;
-  double accuracy = 0;
-  Budget budget;
-  std::vector<std::string> fixtures;  ///< as ParseFixture reads them
   bool wait = false;
 };
 
@@ -114,10 +103,11 @@ absl::Status ShowModel(const client::Client& daemon, const std::string& text,
 absl::Status DeleteModel(const client::Client& daemon, const std::string& text);
 absl::Status WatchJob(const client::Client& daemon, const std::string& text, bool json);
 /// Runs a decomposition for the daemon on this machine. Fetches the mesh of the job as the file
-/// "mesh" into a new folder, runs the command there, reports its progress (WorkerEvent on
-/// descriptor 3), and uploads the file "model" or the error. Calls that find no daemon are repeated
-/// for ten minutes. Errors: those of JobRunService, Internal (OUTPUT_NOT_WRITABLE: the folder
-/// cannot be made), Cancelled (RUN_STOPPED).
+/// "mesh" into a new folder, writes the standard input to the file "request" beside it, runs the
+/// command there, reports its progress (WorkerEvent on descriptor 3), and uploads the file "model"
+/// or the error. Calls that find no daemon are repeated for ten minutes. Errors: those of
+/// JobRunService, Internal (OUTPUT_NOT_WRITABLE: the folder cannot be made), Cancelled
+/// (RUN_STOPPED).
 absl::Status RunJob(const client::Client& daemon, const RunJobOptions& options,
                     const StopSignal& stop);
 absl::Status Strike(const client::Client& daemon, const StrikeOptions& options,

@@ -25,14 +25,6 @@
 namespace carillon::cli {
 namespace {
 
-/// Metres in one unit of the mesh file; the command line allows no other unit.
-double MetresPerUnit(const std::string& unit) {
-  if (unit == "mm") return 1e-3;
-  if (unit == "cm") return 1e-2;
-  if (unit == "in") return 0.0254;
-  return 1;
-}
-
 absl::StatusOr<std::string> ReadMesh(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   std::string bytes;
@@ -67,23 +59,6 @@ absl::StatusOr<std::string> ReadAllOfMesh(const CreateModelOptions& options) {
   return absl::StrCat(*nodes, nodes->ends_with('\n') ? "" : "\n", *rest);
 }
 
-v1::DecompositionSettings Settings(const CreateModelOptions& options) {
-  v1::DecompositionSettings settings;
-  settings.set_element(options.element == "linear" ? v1::ELEMENT_LINEAR : v1::ELEMENT_QUADRATIC);
-  settings.set_mass_matrix(options.mass == "lumped" ? v1::MASS_MATRIX_LUMPED
-                                                    : v1::MASS_MATRIX_CONSISTENT);
-  settings.set_metres_per_unit(MetresPerUnit(options.unit));
-  if (options.keep_surface) settings.mutable_mesh()->set_keep_surface(*options.keep_surface);
-  settings.mutable_mesh()->set_target_node_count(options.target_node_count);
-  settings.set_keep_mode_count(options.keep_mode_count);
-  settings.mutable_mesh()->set_repair(options.repair);
-  settings.mutable_mesh()->set_wall_m(options.wall_m);
-  settings.mutable_mesh()->set_accuracy(options.accuracy);
-  settings.mutable_mesh()->set_budget_s(options.budget.seconds);
-  settings.mutable_mesh()->set_budget_gib(options.budget.gib);
-  return settings;
-}
-
 absl::StatusOr<v1::CreateModalModelRequest> MakeRequest(const CreateModelOptions& options,
                                                         std::string mesh_digest) {
   auto material = ToMaterial(options.material);
@@ -91,13 +66,8 @@ absl::StatusOr<v1::CreateModalModelRequest> MakeRequest(const CreateModelOptions
   v1::CreateModalModelRequest request;
   request.set_mesh_digest(std::move(mesh_digest));
   request.set_mesh_format(Format(options));
-  *request.mutable_settings() = Settings(options);
+  *request.mutable_settings() = options.settings;
   request.set_coarse_first(options.coarse_first);
-  for (const std::string& text : options.fixtures) {
-    const auto fixture = ParseFixture(text);
-    if (!fixture.ok()) return fixture.status();
-    *request.mutable_settings()->add_fixtures() = *fixture;
-  }
   *request.mutable_material() = *std::move(material);
   request.set_size(options.size);
   request.set_min_frequency_hz(options.min_frequency_hz);

@@ -14,6 +14,7 @@
 #include "client_sdk/cli/commands.h"
 #include "client_sdk/cli/material_options.h"
 #include "client_sdk/cli/quantity.h"
+#include "proto/cpp/settings_options.h"
 
 namespace carillon::cli {
 namespace {
@@ -59,49 +60,19 @@ void AddModelCreate(CLI::App& app, Program& program) {
   create.add_option("--format", options->format,
                     "obj, ply, stl, off, msh, mesh or node [the file's suffix]");
   create.add_option("--label", options->label, "name for people [the file's name]");
-  create.add_option("--unit", options->unit, "length unit of the file")
-      ->check(CLI::IsMember({"m", "mm", "cm", "in"}))
-      ->capture_default_str();
-  create.add_option("--element", options->element, "order of the element")
-      ->check(CLI::IsMember({"linear", "quadratic"}))
-      ->capture_default_str();
-  create.add_option("--mass", options->mass, "mass matrix")
-      ->check(CLI::IsMember({"lumped", "consistent"}))
-      ->capture_default_str();
   create.add_option("--size", options->size,
                     "size it is meant to sound with, relative to the file");
   create.add_option("--band", *band, "frequencies wanted, Hz")
       ->check(Band(*options))
       ->capture_default_str();
-  create.add_flag("--keep-surface,!--refine-surface", options->keep_surface,
-                  "add no vertices on the surface, or do [decided from the surface]");
-  create.add_option("--nodes", options->target_node_count, "about so many corner nodes");
-  AddParsed(create, "--accuracy", ParseShare, "above zero, such as 1% or 0.01",
-            "so fine a mesh that no mode is off by more, such as 1%",
-            [options](double share) { options->accuracy = share; });
-  AddParsed(create, "--budget", ParseBudget, "seconds, or seconds:GiB, such as 60 or 60:4",
-            "SECONDS[:GIB] of processor time and memory: as fine a mesh as they allow",
-            [options](const Budget& budget) { options->budget = budget; });
-  create.add_option("--keep", options->keep_mode_count,
-                    "keep only so many modes, the most audible; for bodies of more than 5000");
   create.add_flag("--coarse-first", options->coarse_first,
                   "first a model of few nodes, under the same name, to sound with meanwhile");
   create.add_option("--priority", options->priority, "-100 to 100: higher ones start first");
   create.add_option("--time-limit", options->time_limit_s, "give up after so many seconds");
   create.add_option("--memory-limit-mib", options->memory_limit_mib, "memory that it may take");
-  create.add_flag("--repair", options->repair, "mend a surface that is no closed body");
-  create
-      .add_option("--wall", options->wall_m,
-                  "hollow out, or thicken an open sheet, to so many metres")
-      ->check(CLI::PositiveNumber);
-  create
-      .add_option(
-          "--fix", options->fixtures,
-          "hold the body; repeat it for more: plane:X,Y,Z/NX,NY,NZ (and behind it; the normal "
-          "points to what is free), box:X,Y,Z/X,Y,Z, vertices:I,J,... or group:NAME, in metres")
-      ->allow_extra_args(false);
   create.add_flag("--wait", options->wait, "show the progress and end with the job");
   AddMaterial(create, options->material);
+  AddSettingsOptions(create, options->settings);
   create.callback([&program, options, band] {
     program.command = [&program, options] {
       return CreateModel(*program.Daemon(), *options, program.json);

@@ -9,7 +9,9 @@
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <functional>
+#include <iostream>
 #include <string>
 #include <system_error>
 #include <thread>
@@ -20,6 +22,7 @@
 #include "client_sdk/cli/commands.h"
 #include "proto/cpp/child_process.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::cli {
 namespace {
@@ -64,6 +67,18 @@ class RunFolder {
   explicit RunFolder(std::filesystem::path path) : path_(std::move(path)) {}
   std::filesystem::path path_;
 };
+
+/// Copies the standard input, which is the request for the command, to a file.
+absl::Status SaveStandardInput(const std::string& path) {
+  std::ofstream file(path, std::ios::binary);
+  if (isatty(STDIN_FILENO) == 0 && std::cin.peek() != std::char_traits<char>::eof()) {
+    file << std::cin.rdbuf();
+  }
+  file.close();
+  if (!file.fail()) return absl::OkStatus();
+  return Refusal(absl::StatusCode::kInternal, "OUTPUT_NOT_WRITABLE",
+                 absl::StrCat(path, " cannot be written: name a folder with room in $TMPDIR"));
+}
 
 /// Repeats the call while no daemon answers, because the daemon may be restarting.
 absl::Status Patiently(const StopSignal& stop, const std::function<absl::Status()>& call) {
@@ -155,6 +170,7 @@ absl::Status RunJob(const client::Client& daemon, const RunJobOptions& options,
   const client::JobRun run{.job = absl::StrCat("jobs/", options.digest), .token = options.token};
   const absl::StatusOr<RunFolder> folder = RunFolder::Make();
   if (!folder.ok()) return folder.status();
+  RETURN_IF_ERROR(SaveStandardInput(folder->File("request")));
   absl::Status fetched =
       Patiently(stop, [&] { return daemon.FetchMesh(run, folder->File("mesh")); });
   if (!fetched.ok()) return fetched;

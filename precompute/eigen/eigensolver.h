@@ -23,6 +23,10 @@ struct ModeRequest {
   double eigenvalue_limit;
 };
 
+/// The solvers that a user can choose from. Block Lanczos leaves small bodies, and those of which a
+/// large part of all modes is wanted, to LAPACK's dense solver.
+enum class SolverChoice { kBlockLanczos, kSpectra };
+
 /// Called with the estimated fraction of the iteration that is done, 0 to 1.
 using SolveProgress = std::function<void(double)>;
 

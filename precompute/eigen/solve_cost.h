@@ -29,6 +29,12 @@ double PredictBasisSize(int mode_count);
 /// `mode_count`: rigid-body modes included.
 SolveCost PredictSolveCost(const OrderedSystem& ordered, int mode_count, int thread_count);
 
+/// Returns the number of vectors in Spectra's basis between two restarts.
+inline int SpectraBasisSize(int mode_count) { return 2 * mode_count + 30; }
+
+/// Predicts the cost of SparseEigensolver, which is Spectra with CHOLMOD.
+SolveCost PredictSpectraCost(const OrderedSystem& ordered, int mode_count, int thread_count);
+
 /// Errors: MEMORY_TOO_SMALL with the figures needed_bytes and available_bytes, if the machine has
 /// less memory available than `cost` needs beyond the matrices.
 absl::Status CheckMemory(const SolveCost& cost);

@@ -10,7 +10,9 @@
 
 #include "absl/strings/str_cat.h"
 #include "precompute/eigen/cholesky_factor.h"
+#include "precompute/eigen/solve_cost.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::precompute {
 namespace {
@@ -75,6 +77,13 @@ absl::Status NotConverged(int count) {
                               " modes did not converge; another number of nodes may do"));
 }
 
+absl::Status TooFewUnknowns(const SystemMatrices& system, int count) {
+  return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
+                 absl::StrCat("Spectra cannot find ", count, " modes of ", system.unknown_count(),
+                              " unknowns: it needs more unknowns than modes; use the solver "
+                              "block-lanczos, more nodes, or a lower band"));
+}
+
 /// phi = P^T L^-T y, M-normalised.
 Modes MakeModes(const CholeskyFactor& factor, const Sparse& mass, double shift,
                 const Eigen::VectorXd& nu, Eigen::MatrixXd y) {
@@ -93,19 +102,20 @@ Modes MakeModes(const CholeskyFactor& factor, const Sparse& mass, double shift,
 absl::StatusOr<Modes> SparseEigensolver::Solve(const SystemMatrices& system,
                                                const ModeRequest& request,
                                                const SolveProgress& progress) {
+  if (request.count >= system.unknown_count()) return TooFewUnknowns(system, request.count);
   const double shift = kRelativeShift * request.eigenvalue_limit;
   const Sparse shifted = system.K - shift * system.M;
-  const absl::StatusOr<CholeskyFactor> factor = CholeskyFactor::Make(shifted, order_);
-  if (!factor.ok()) return factor.status();
+  ASSIGN_OR_RETURN(const CholeskyFactor factor, CholeskyFactor::Make(shifted, order_));
   progress(0);
-  const int basis = std::min(static_cast<int>(system.unknown_count()), 2 * request.count + 30);
+  const int basis =
+      std::min(static_cast<int>(system.unknown_count()), SpectraBasisSize(request.count));
   try {
-    InverseOperator inverse(*factor, system.M, progress, basis + request.count);
+    InverseOperator inverse(factor, system.M, progress, basis + request.count);
     Spectra::SymEigsSolver<InverseOperator> lanczos(inverse, request.count, basis);
     lanczos.init();
     lanczos.compute(Spectra::SortRule::LargestAlge, kMaxRestarts, kTolerance);
     if (lanczos.info() != Spectra::CompInfo::Successful) return NotConverged(request.count);
-    return MakeModes(*factor, system.M, shift, lanczos.eigenvalues(), lanczos.eigenvectors());
+    return MakeModes(factor, system.M, shift, lanczos.eigenvalues(), lanczos.eigenvectors());
   } catch (const std::bad_alloc&) {
     return Refusal(
         absl::StatusCode::kResourceExhausted, "OUT_OF_MEMORY",

@@ -54,6 +54,16 @@ std::vector<double> Audibilities(const ModalModel& model) {
   return result;
 }
 
+void KeepModes(const std::vector<size_t>& kept, ModalModel& model) {
+  const size_t found = model.eigenvalues.size();
+  PickColumns(kept, found, model.shapes);
+  for (auto* values :
+       {&model.eigenvalues, &model.residuals, &model.couplings, &model.estimated_errors}) {
+    Pick(kept, *values);
+  }
+  model.left_out_mode_count += static_cast<int>(found - kept.size());
+}
+
 void KeepMostAudible(int count, ModalModel& model) {
   const size_t found = model.eigenvalues.size();
   const auto wanted = static_cast<size_t>(count);
@@ -67,12 +77,7 @@ void KeepMostAudible(int count, ModalModel& model) {
   const double lost = audibilities[kept[wanted]] / audibilities[kept[0]];
   kept.resize(wanted);
   std::ranges::sort(kept);
-  PickColumns(kept, found, model.shapes);
-  for (auto* values :
-       {&model.eigenvalues, &model.residuals, &model.couplings, &model.estimated_errors}) {
-    Pick(kept, *values);
-  }
-  model.left_out_mode_count = static_cast<int>(found - wanted);
+  KeepModes(kept, model);
   model.warnings.push_back(absl::StrFormat(
       "of %d modes the %d most audible were kept and %d left out: those kept go down to %.1f dB "
       "below the loudest, those left out begin at %.1f dB",

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include "precompute/modes/modal_model.h"
@@ -13,6 +14,9 @@ namespace carillon::precompute {
 /// of all modes by the same factor. Damping and the sensitivity of the ear are not considered,
 /// because they depend on the material.
 std::vector<double> Audibilities(const ModalModel& model);
+
+/// Keeps these modes of a model, given by their indices in ascending order.
+void KeepModes(const std::vector<size_t>& kept, ModalModel& model);
 
 /// Keeps only the `count` most audible modes and adds a warning to the model. Zero: keeps all
 /// modes.

@@ -12,6 +12,7 @@
 #include "precompute/eigen/block_lanczos_eigensolver.h"
 #include "precompute/eigen/dense_eigensolver.h"
 #include "precompute/eigen/solve_cost.h"
+#include "precompute/eigen/sparse_eigensolver.h"
 #include "precompute/fem/held_nodes.h"
 #include "precompute/modes/rigid_body.h"
 #include "precompute/sparse/dense_blas.h"
@@ -19,6 +20,7 @@
 #include "precompute/sparse/openblas.h"
 #include "precompute/sparse/workers.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::precompute {
 namespace {
@@ -87,6 +89,15 @@ int GuessModeCount(const SystemMatrices& system, double limit) {
       std::min<double>(0.153 * volume * std::pow(limit, 1.5), kMaxFoundModeCount));
 }
 
+/// Returns the unknowns of the nodes in the order of the nodes, three for each.
+std::vector<int> UnknownsOf(const std::vector<int32_t>& nodes) {
+  std::vector<int> unknowns;
+  for (const int32_t node : nodes) {
+    for (int a = 0; a < 3; ++a) unknowns.push_back(3 * node + a);
+  }
+  return unknowns;
+}
+
 /// One solution: it counts the modes, solves for them and verifies them.
 class Solution {
  public:
@@ -123,10 +134,9 @@ class Solution {
 
   absl::StatusOr<Modes> SolveLowest(int count, double limit) const {
     const SolveCost cost = Cost(count);
-    if (absl::Status status = CheckMemory(cost); !status.ok()) return status;
+    RETURN_IF_ERROR(CheckMemory(cost));
     options_.on_cost(cost);
-    const bool dense = PrefersDense(system_.unknown_count(), count);
-    watch_(dense ? SolveStage::kSolve : SolveStage::kFactor, 0);
+    watch_(IsDense(count) ? SolveStage::kSolve : SolveStage::kFactor, 0);
     const ModeRequest request{
         .count = static_cast<int>(std::min<Eigen::Index>(count, system_.unknown_count())),
         .eigenvalue_limit = limit};
@@ -161,22 +171,33 @@ class Solution {
       result.lowest_eigenvalue = result.modes.eigenvalues[0];
       result.verification.max_residual = result.residuals.maxCoeff();
     }
-    if (absl::Status status = Check(result.verification); !status.ok()) return status;
-    if (absl::Status status = CheckResiduals(result); !status.ok()) return status;
+    RETURN_IF_ERROR(Check(result.verification));
+    RETURN_IF_ERROR(CheckResiduals(result));
     return result;
   }
 
  private:
+  bool IsDense(int count) const {
+    return options_.solver == SolverChoice::kBlockLanczos &&
+           PrefersDense(system_.unknown_count(), count);
+  }
+
   SolveCost Cost(int count) const {
+    if (options_.solver == SolverChoice::kSpectra) {
+      return PredictSpectraCost(ordered_, count, ThreadCount());
+    }
     SolveCost cost = PredictSolveCost(ordered_, count, ThreadCount());
-    if (!PrefersDense(system_.unknown_count(), count)) return cost;
+    if (!IsDense(count)) return cost;
     cost.factor_s = 0;
     cost.solve_s = kDenseSeconds * std::pow(static_cast<double>(system_.unknown_count()), 3);
     return cost;
   }
 
   std::unique_ptr<Eigensolver> MakeSolver(int count) const {
-    if (PrefersDense(system_.unknown_count(), count)) return std::make_unique<DenseEigensolver>();
+    if (options_.solver == SolverChoice::kSpectra) {
+      return std::make_unique<SparseEigensolver>(UnknownsOf(ordered_.fronts.order));
+    }
+    if (IsDense(count)) return std::make_unique<DenseEigensolver>();
     return std::make_unique<BlockLanczosEigensolver>(ordered_, rigid_);
   }
 
@@ -247,13 +268,11 @@ class Solution {
 /// factorization.
 absl::StatusOr<DeformationModes> FindLowest(const Solution& solution, double limit) {
   const double above = solution.BoundOfLowest();
-  absl::StatusOr<Modes> lowest = solution.SolveLowest(solution.rigid_mode_count() + 1, above);
-  if (!lowest.ok()) return lowest.status();
-  absl::StatusOr<DeformationModes> result = solution.Verify(*std::move(lowest), above);
-  if (!result.ok()) return result;
-  result->modes = {};
-  result->residuals.resize(0);
-  result->complete_to_eigenvalue = limit;
+  ASSIGN_OR_RETURN(Modes lowest, solution.SolveLowest(solution.rigid_mode_count() + 1, above));
+  ASSIGN_OR_RETURN(DeformationModes result, solution.Verify(std::move(lowest), above));
+  result.modes = {};
+  result.residuals.resize(0);
+  result.complete_to_eigenvalue = limit;
   return result;
 }
 
@@ -264,11 +283,9 @@ absl::StatusOr<DeformationModes> SolveDeformationModes(const SystemMatrices& sys
                                                        double eigenvalue_limit,
                                                        const SolveWatch& watch,
                                                        const SolveOptions& options) {
-  absl::StatusOr<OrderedSystem> ordered = OrderedSystem::Make(system);
-  if (!ordered.ok()) return ordered.status();
-  const SolveCost least = PredictSolveCost(*ordered, 1, ThreadCount());
-  if (absl::Status status = CheckMemory(least); !status.ok()) return status;
-  const Solution solution(system, *std::move(ordered), nodes, watch, options);
+  ASSIGN_OR_RETURN(OrderedSystem ordered, OrderedSystem::Make(system));
+  RETURN_IF_ERROR(CheckMemory(PredictSolveCost(ordered, 1, ThreadCount())));
+  const Solution solution(system, std::move(ordered), nodes, watch, options);
   absl::Status failure;
   for (int attempt = 0; attempt < kMaxAttempts; ++attempt) {
     const double limit = eigenvalue_limit * (1 + 1e-4 * attempt);
@@ -279,22 +296,19 @@ absl::StatusOr<DeformationModes> SolveDeformationModes(const SystemMatrices& sys
     }
     if (!count.ok()) return count.status();
     if (*count == solution.rigid_mode_count()) return FindLowest(solution, limit);
-    absl::StatusOr<Modes> all = solution.SolveLowest(*count + 4 * attempt, limit);
-    if (!all.ok()) return all.status();
-    std::vector<Eigen::Index> below(
-        static_cast<size_t>((all->eigenvalues.array() < limit).count()));
+    ASSIGN_OR_RETURN(Modes all, solution.SolveLowest(*count + 4 * attempt, limit));
+    std::vector<Eigen::Index> below(static_cast<size_t>((all.eigenvalues.array() < limit).count()));
     std::iota(below.begin(), below.end(), 0);
     if (static_cast<int>(below.size()) != *count) {
       failure =
           VerificationFailed("not all modes that were counted below the limit could be found");
       continue;
     }
-    Keep(below, *all);
-    absl::StatusOr<DeformationModes> result = solution.Verify(*std::move(all), limit);
-    if (!result.ok()) return result;
-    result->verification.sturm_count = *count;
-    result->verification.sturm_eigenvalue = limit;
-    result->complete_to_eigenvalue = limit;
+    Keep(below, all);
+    ASSIGN_OR_RETURN(DeformationModes result, solution.Verify(std::move(all), limit));
+    result.verification.sturm_count = *count;
+    result.verification.sturm_eigenvalue = limit;
+    result.complete_to_eigenvalue = limit;
     return result;
   }
   return failure;
@@ -309,10 +323,10 @@ absl::StatusOr<DeformationModes> SolveDeformationModes(const SystemMatrices& sys
     return SolveDeformationModes(system, mesh.nodes, eigenvalue_limit, watch, options);
   }
   const std::vector<int32_t> moving = MovingNodes(mesh);
-  absl::StatusOr<DeformationModes> result =
-      SolveDeformationModes(system, PlacesOf(moving, mesh), eigenvalue_limit, watch, options);
-  if (!result.ok()) return result;
-  result->modes.shapes = Extended(result->modes.shapes, moving, mesh.nodes.size());
+  ASSIGN_OR_RETURN(
+      DeformationModes result,
+      SolveDeformationModes(system, PlacesOf(moving, mesh), eigenvalue_limit, watch, options));
+  result.modes.shapes = Extended(result.modes.shapes, moving, mesh.nodes.size());
   return result;
 }
 

@@ -37,6 +37,7 @@ enum class SolveStage { kFactor, kSolve, kVerify };
 using SolveWatch = std::function<void(SolveStage, double)>;
 
 struct SolveOptions {
+  SolverChoice solver = SolverChoice::kBlockLanczos;
   std::vector<Point> held = {};  ///< positions of the fixed nodes
   int max_mode_count = kMaxModeCount;
   /// Called with the predicted cost before the modes are counted, based on a guess of their number,
@@ -50,7 +51,8 @@ struct SolveOptions {
 ///
 /// `nodes`: positions, in the order of the unknowns.
 /// Errors: BODY_IN_SEVERAL_PIECES, TOO_MANY_MODES, MEMORY_TOO_SMALL (before it is taken),
-/// OUT_OF_MEMORY, MESH_TOO_LARGE, VERIFICATION_FAILED.
+/// OUT_OF_MEMORY, MESH_TOO_LARGE, VERIFICATION_FAILED; with SolverChoice::kSpectra INVALID_SETTINGS
+/// (more modes than it can find of so few unknowns).
 absl::StatusOr<DeformationModes> SolveDeformationModes(const SystemMatrices& system,
                                                        const std::vector<Point>& nodes,
                                                        double eigenvalue_limit,

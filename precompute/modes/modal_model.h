@@ -4,12 +4,14 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "precompute/mesh/surface_mesh.h"
 #include "precompute/mesh/tet_mesh.h"
 #include "precompute/modes/deformation_modes.h"
+#include "precompute/modes/solver_comparison.h"
 
 namespace carillon::precompute {
 
@@ -23,6 +25,8 @@ struct ModalModel {
   /// the model.
   double lowest_eigenvalue = 0;
   Verification verification;
+  /// Set where another solver was asked for its opinion.
+  std::optional<SolverComparison> comparison;
   int left_out_mode_count = 0;  ///< found, but not kept: see KeepMostAudible
   /// Warnings for the user.
   std::vector<std::string> warnings;

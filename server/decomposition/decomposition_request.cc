@@ -5,14 +5,13 @@
 #include <array>
 #include <cmath>
 #include <numbers>
-#include <set>
 
 #include "absl/strings/str_cat.h"
+#include "proto/cpp/decomposition_settings.h"
 #include "proto/cpp/error_reason.h"
-#include "proto/cpp/fixture_text.h"
 #include "proto/cpp/material_catalogue.h"
+#include "proto/cpp/status_macros.h"
 #include "server/base/sha256.h"
-#include "server/decomposition/shortest_decimal.h"
 
 namespace carillon {
 namespace {
@@ -20,9 +19,6 @@ namespace {
 constexpr std::array kFormats = {"obj", "ply", "stl", "off", "msh", "mesh", "node"};
 constexpr size_t kMaxLabelBytes = 200;
 constexpr int kMostPriority = 100;
-constexpr int kMostFixtures = 16;
-constexpr uint32_t kMostKept = 5000;
-constexpr double kPoissonSteps = 1e4;  // of one
 
 absl::Status Invalid(absl::string_view what) {
   return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS", what);
@@ -38,42 +34,6 @@ absl::Status CheckMesh(const v1::CreateModalModelRequest& request) {
     return Refusal(
         absl::StatusCode::kNotFound, "MESH_NOT_FOUND",
         "mesh_digest is not 64 lower-case hexadecimal digits: give what UploadMesh answered");
-  }
-  return absl::OkStatus();
-}
-
-absl::Status CheckSettings(const v1::DecompositionSettings& settings) {
-  if (!(settings.poisson_ratio() > -1 && settings.poisson_ratio() < 0.5)) {
-    return Invalid(
-        absl::StrCat("poisson_ratio is ", settings.poisson_ratio(),
-                     " after rounding to 1e-4; it must be greater than -1 and less than 0.5"));
-  }
-  if (!(std::isfinite(settings.metres_per_unit()) && settings.metres_per_unit() > 0)) {
-    return Invalid(absl::StrCat("metres_per_unit is ", settings.metres_per_unit(),
-                                "; it must be greater than zero"));
-  }
-  if (!(std::isfinite(settings.mesh().wall_m()) && settings.mesh().wall_m() >= 0)) {
-    return Invalid(
-        absl::StrCat("wall_m is ", settings.mesh().wall_m(), "; it must be zero or more"));
-  }
-  for (const double figure :
-       {settings.mesh().accuracy(), settings.mesh().budget_s(), settings.mesh().budget_gib()}) {
-    if (std::isfinite(figure) && figure >= 0) continue;
-    return Invalid(absl::StrCat("an accuracy or budget is ", figure, "; it must be zero or more"));
-  }
-  for (const v1::Fixture& fixture : settings.fixtures()) {
-    if (const auto text = FixtureText(fixture); !text.ok()) return text.status();
-  }
-  if (settings.fixtures_size() > kMostFixtures) {
-    return Invalid(absl::StrCat("there are ", settings.fixtures_size(), " fixtures; at most ",
-                                kMostFixtures, " are taken: hold a group, or a larger box"));
-  }
-  if (settings.keep_mode_count() > kMostKept) {
-    return Invalid(absl::StrCat("keep_mode_count is ", settings.keep_mode_count(),
-                                "; it must be at most ", kMostKept));
-  }
-  if (!v1::Element_IsValid(settings.element()) || !v1::MassMatrix_IsValid(settings.mass_matrix())) {
-    return Invalid("element or mass_matrix has a value that this daemon does not know");
   }
   return absl::OkStatus();
 }
@@ -103,74 +63,36 @@ absl::Status CheckHints(const v1::CreateModalModelRequest& request) {
   return absl::OkStatus();
 }
 
+/// A Poisson's ratio of exactly zero means the material's.
 void FillIn(v1::DecompositionSettings& settings, const v1::Material& material) {
   const double poisson =
       settings.poisson_ratio() == 0 ? material.poisson_ratio() : settings.poisson_ratio();
-  settings.set_poisson_ratio(std::round(poisson * kPoissonSteps) / kPoissonSteps);
-  if (settings.element() == v1::ELEMENT_UNSPECIFIED) settings.set_element(v1::ELEMENT_QUADRATIC);
-  if (settings.mass_matrix() == v1::MASS_MATRIX_UNSPECIFIED) {
-    settings.set_mass_matrix(v1::MASS_MATRIX_CONSISTENT);
-  }
-  if (settings.metres_per_unit() == 0) settings.set_metres_per_unit(1);
-}
-
-absl::string_view KeepSurface(const v1::MeshSettings& mesh) {
-  if (!mesh.has_keep_surface()) return "auto";
-  return mesh.keep_surface() ? "yes" : "no";
+  settings.set_poisson_ratio(RoundedPoissonRatio(poisson));
+  FillInDefaults(settings);
 }
 
 }  // namespace
 
 absl::StatusOr<v1::CreateModalModelRequest> ResolveRequest(
     const v1::CreateModalModelRequest& request) {
-  absl::Status status = CheckMesh(request);
-  if (!status.ok()) return status;
-  const absl::StatusOr<v1::Material> material = ResolveMaterial(request.material());
-  if (!material.ok()) return material.status();
+  RETURN_IF_ERROR(CheckMesh(request));
+  ASSIGN_OR_RETURN(const v1::Material material, ResolveMaterial(request.material()));
   v1::CreateModalModelRequest resolved = request;
-  *resolved.mutable_material() = *material;
-  FillIn(*resolved.mutable_settings(), *material);
+  *resolved.mutable_material() = material;
+  FillIn(*resolved.mutable_settings(), material);
   if (resolved.size() == 0) resolved.set_size(1);
   if (resolved.max_frequency_hz() == 0) resolved.set_max_frequency_hz(20'000);
   if (resolved.min_frequency_hz() == 0) resolved.set_min_frequency_hz(20);
-  status = CheckSettings(resolved.settings());
-  if (status.ok()) status = CheckHints(resolved);
-  if (!status.ok()) return status;
+  RETURN_IF_ERROR(CheckSettings(resolved.settings()));
+  RETURN_IF_ERROR(CheckHints(resolved));
   return resolved;
 }
 
 std::string CanonicalText(const v1::CreateModalModelRequest& resolved) {
-  const v1::DecompositionSettings& settings = resolved.settings();
-  std::string text = absl::StrCat(
-      "carillon-decomposition 1\n",             //
-      "mesh ", resolved.mesh_digest(), "\n",    //
-      "format ", resolved.mesh_format(), "\n",  //
-      "poisson_1e-4 ", std::lround(settings.poisson_ratio() * kPoissonSteps), "\n", "element ",
-      settings.element() == v1::ELEMENT_LINEAR ? "linear" : "quadratic", "\n", "mass ",
-      settings.mass_matrix() == v1::MASS_MATRIX_LUMPED ? "lumped" : "consistent", "\n",
-      "metres_per_unit ", ShortestDecimal(settings.metres_per_unit()), "\n", "keep_surface ",
-      KeepSurface(settings.mesh()), "\n", "target_node_count ", settings.mesh().target_node_count(),
-      "\n");
-  // What came later is named only where it is used, so that a model keeps its name.
-  const v1::MeshSettings& mesh = settings.mesh();
-  if (mesh.repair()) absl::StrAppend(&text, "repair yes\n");
-  if (mesh.wall_m() > 0) absl::StrAppend(&text, "wall_m ", ShortestDecimal(mesh.wall_m()), "\n");
-  if (mesh.accuracy() > 0) {
-    absl::StrAppend(&text, "accuracy ", ShortestDecimal(mesh.accuracy()), "\n");
-  }
-  if (mesh.budget_s() > 0 || mesh.budget_gib() > 0) {
-    absl::StrAppend(&text, "budget ", ShortestDecimal(mesh.budget_s()), " ",
-                    ShortestDecimal(mesh.budget_gib()), "\n");
-  }
-  if (settings.keep_mode_count() > 0) {
-    absl::StrAppend(&text, "keep ", settings.keep_mode_count(), "\n");
-  }
-  std::set<std::string> fixtures;
-  for (const v1::Fixture& fixture : settings.fixtures()) {
-    fixtures.insert(FixtureText(fixture).value_or(""));
-  }
-  for (const std::string& fixture : fixtures) absl::StrAppend(&text, "fix ", fixture, "\n");
-  return text;
+  return absl::StrCat("carillon-decomposition 1\n",             //
+                      "mesh ", resolved.mesh_digest(), "\n",    //
+                      "format ", resolved.mesh_format(), "\n",  //
+                      SettingsText(resolved.settings()));
 }
 
 std::string RequestDigest(const v1::CreateModalModelRequest& resolved) {

@@ -23,18 +23,7 @@ absl::StatusOr<v1::CreateModalModelRequest> ResolveRequest(
 ///     carillon-decomposition 1
 ///     mesh <SHA-256 of the mesh file>
 ///     format <obj|ply|stl|off|msh|mesh|node>
-///     poisson_1e-4 <Poisson's ratio in units of 1e-4, an integer>
-///     element <linear|quadratic>
-///     mass <lumped|consistent>
-///     metres_per_unit <shortest decimal that reads back as the same double>
-///     keep_surface <auto|yes|no>
-///     target_node_count <integer; 0: decided from the surface>
-///     repair yes            (only where it is set)
-///     wall_m <shortest decimal, metres>   (only where it is above zero)
-///     accuracy <shortest decimal>         (only where it is above zero)
-///     budget <seconds> <GiB>              (only where one is above zero)
-///     keep <integer>                      (only where it is above zero)
-///     fix <FixtureText>                   (one for each, in alphabetical order, each once)
+///     ...      the lines of SettingsText
 std::string CanonicalText(const v1::CreateModalModelRequest& resolved);
 
 /// SHA-256 of CanonicalText.

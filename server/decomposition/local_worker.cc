@@ -10,6 +10,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 #include "server/decomposition/job_rules.h"
 #include "server/decomposition/memory_estimate.h"
 #include "server/decomposition/worker_command.h"
@@ -94,7 +95,8 @@ absl::StatusOr<PreparedTask> PreparedTask::Make(DecompositionTask task,
                                 "): see that this user may write there"));
   }
   ScratchFolder folder(path);
-  if (const absl::Status status = task.write_mesh(folder / "mesh"); !status.ok()) return status;
+  RETURN_IF_ERROR(task.write_mesh(folder / "mesh"));
+  RETURN_IF_ERROR(WriteWorkerRequest(task.request, task.way, folder / "request"));
   return PreparedTask{std::move(task), std::move(folder)};
 }
 
@@ -103,14 +105,15 @@ absl::StatusOr<LocalWorker> LocalWorker::Start(PreparedTask prepared,
                                                const WorkerShare& share, const WorkerLimits& limits,
                                                nanoseconds now) {
   const ScratchFolder& folder = prepared.folder;
-  const WorkerPlace place{program, folder / "mesh", folder / "model", share.thread_count};
+  const WorkerPlace place{program, folder / "mesh", folder / "request", folder / "model",
+                          share.thread_count};
   const WorkerLimits own = limits.For(prepared.task.request);
   absl::StatusOr<Pipe> events = MakePipe();
   absl::StatusOr<Pipe> errors = MakePipe();
   if (!events.ok()) return events.status();
   if (!errors.ok()) return errors.status();
   absl::StatusOr<ChildProcess> process =
-      ChildProcess::Start({.words = WorkerCommand(prepared.task.request, prepared.task.way, place),
+      ChildProcess::Start({.words = WorkerCommand(place),
                            .errors = errors->write_end(),
                            .events = events->write_end(),
                            .worker_processor_count = share.processor_count});

@@ -13,6 +13,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_replace.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 #include "server/decomposition/job_rules.h"
 #include "server/decomposition/random_digits.h"
 #include "server/decomposition/worker_command.h"
@@ -23,8 +24,9 @@ namespace {
 
 // A run that vanishes without a word three times is taken to crash.
 constexpr int kMostRuns = 3;
-constexpr int kTicketWords = 2;  // of 32 bits
-constexpr int kSignalled = 128;  // what a shell adds to the number of a signal
+constexpr int kTicketWords = 2;                     // of 32 bits
+constexpr char kEndOfRequest[] = "END_OF_REQUEST";  // no line of protobuf's text form is so
+constexpr int kSignalled = 128;                     // what a shell adds to the number of a signal
 constexpr int kKilled = kSignalled + 9;
 
 std::string ReadFile(const std::filesystem::path& file) {
@@ -76,15 +78,16 @@ exit 0
 )");
 }
 
-// The client fetches the mesh, runs the command beside it and brings the model; Slurm shows a
-// script to its owner alone.
-std::string ScriptThatUploads(const SlurmUpload& upload, const std::string& digest,
-                              const std::string& token, const std::vector<std::string>& command) {
+// The client fetches the mesh, runs the command beside it and brings the model. It takes
+// the request from its standard input, which is the rest of this script, and puts it into the file
+// "request" beside the mesh. Slurm shows a script to its owner alone.
+std::string ScriptThatUploads(const SlurmUpload& upload, const std::string& call,
+                              const std::string& token, const std::string& request) {
   return absl::StrCat("#!/bin/sh\nexport CARILLON_SERVER=", Quoted(upload.address),
                       "\nexport CARILLON_TLS_ROOTS=", Quoted(upload.tls_roots_file),
                       "\nexport CARILLON_JOB_TOKEN=", Quoted(token), "\nexec ",
-                      Quoted(upload.client.string()), " job run ", digest, " --", Joined(command),
-                      "\n");
+                      Quoted(upload.client.string()), " job run ", call, " <<'", kEndOfRequest,
+                      "'\n", request, kEndOfRequest, "\n");
 }
 
 /// The file "ticket".
@@ -137,9 +140,9 @@ absl::StatusOr<SlurmTask> SlurmTask::Prepare(DecompositionTask task,
                                              RemoteRuns& runs) {
   SlurmTask result(std::move(task), options, runs);
   const DecompositionTask& own = result.task_;
-  const std::string request = absl::StrCat(own.way, "\n", own.request.SerializeAsString());
+  const std::string request = WorkerRequestFile(own.request, own.way);
   if (ReadFile(result.folder_ / "request") != request || ReadTicket(result.folder_).name.empty()) {
-    if (const absl::Status status = result.MakeFolder(request); !status.ok()) return status;
+    RETURN_IF_ERROR(result.MakeFolder(request));
   }
   const uint64_t reserved =
       std::min({std::max<uint64_t>(2 * own.estimate_bytes, 256 << 20), options.memory_limit_bytes,
@@ -165,7 +168,7 @@ absl::Status SlurmTask::MakeFolder(const std::string& request) {
   if (!std::filesystem::create_directories(folder_, error)) {
     return Unusable(folder_, error.message());
   }
-  if (absl::Status status = task_.write_mesh(folder_ / "mesh"); !status.ok()) return status;
+  RETURN_IF_ERROR(task_.write_mesh(folder_ / "mesh"));
   if (!WriteFile(folder_ / "request", request) ||
       !WriteFile(folder_ / "ticket", RandomDigits(kTicketWords))) {
     return Unusable(folder_, "a file cannot be written");
@@ -184,14 +187,16 @@ absl::StatusOr<SlurmJob> SlurmTask::NextSubmission() {
   if (uploads()) runs_->Admit(task_.digest, folder_, hash);
   const bool shared = !uploads();
   const std::vector<std::string> command =
-      WorkerCommand(task_.request, task_.way,
-                    {.program = options_->program,
+      WorkerCommand({.program = options_->program,
                      .mesh_file = shared ? folder_ / "mesh" : "mesh",
+                     .request_file = shared ? folder_ / "request" : "request",
                      .model_file = shared ? "@model@" : "model",
                      .thread_count = options_->threads_per_job});
   SlurmJob job = job_;
   job.script = shared ? ScriptInFolder(folder_, command)
-                      : ScriptThatUploads(options_->upload, task_.digest, token, command);
+                      : ScriptThatUploads(options_->upload,
+                                          absl::StrCat(task_.digest, " --", Joined(command)), token,
+                                          ReadFile(folder_ / "request"));
   return job;
 }
 

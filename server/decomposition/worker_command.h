@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "absl/status/status.h"
 #include "carillon/v1/modal_model_service.pb.h"
 
 namespace carillon {
@@ -14,6 +15,7 @@ namespace carillon {
 struct WorkerPlace {
   std::filesystem::path program;
   std::filesystem::path mesh_file;
+  std::filesystem::path request_file;
   std::filesystem::path model_file;
   int thread_count = 1;
 };
@@ -22,9 +24,15 @@ struct WorkerPlace {
 /// repaired, too.
 constexpr uint32_t kWayCount = 3;
 
-/// The command line of carillon-precompute for a resolved request, computed in way `way` (below
-/// kWayCount); it reports to descriptor 3.
-std::vector<std::string> WorkerCommand(const v1::CreateModalModelRequest& resolved, uint32_t way,
-                                       const WorkerPlace& place);
+/// What carillon-precompute is to compute for a resolved request in way `way` (below kWayCount): a
+/// v1::WorkerRequest in protobuf's text form.
+std::string WorkerRequestFile(const v1::CreateModalModelRequest& resolved, uint32_t way);
+
+/// Writes WorkerRequestFile to `file`. Errors: FailedPrecondition (DATABASE_UNUSABLE).
+absl::Status WriteWorkerRequest(const v1::CreateModalModelRequest& resolved, uint32_t way,
+                                const std::filesystem::path& file);
+
+/// The command line of carillon-precompute, which reports to descriptor 3.
+std::vector<std::string> WorkerCommand(const WorkerPlace& place);
 
 }  // namespace carillon

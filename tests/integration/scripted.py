@@ -16,9 +16,10 @@ mesh=$1
 for option; do
   case $option in
     --out=*) out=${{option#--out=}} ;;
-    --nodes=*) nodes=${{option#--nodes=}} ;;
+    --request=*) request=${{option#--request=}} ;;
   esac
 done
+nodes=$(sed -n 's/^ *target_node_count: //p' "$request")
 {body}
 """
 

@@ -134,6 +134,58 @@ TEST_F(CarillonPrecomputeTest, JsonHasEveryKey) {
   }
 }
 
+TEST_F(CarillonPrecomputeTest, ARequestFileAndFlagsMakeTheSameModel) {
+  const std::string flags = std::string(kSteel) + " --unit mm --element linear --nodes 100 " +
+                            "--fix plane:0,0,0/1,0,0 --band 20:60000 --solver spectra";
+  ASSERT_EQ(Run(bar + " --out " + model + flags).exit_status, 0) << OnStandardError();
+  const std::string request = folder + "/request";
+  std::ofstream(request) << R"(
+      mesh_format: "obj"
+      settings { poisson_ratio: 0.3 element: ELEMENT_LINEAR metres_per_unit: 0.001
+                 mesh { target_node_count: 100 } solver: SOLVER_SPECTRA
+                 fixtures { plane { point_m {} normal { x: 7 } } } }
+      material { young_pa: 210e9 density_kg_per_m3: 7850 }
+      min_frequency_hz: 20 max_frequency_hz: 60000)";
+  const std::string other = folder + "/other.modes";
+  ASSERT_EQ(Run(bar + " --out " + other + " --request " + request).exit_status, 0)
+      << OnStandardError();
+  const auto by_flags = ReadRecords(model);
+  const auto by_request = ReadRecords(other);
+  ASSERT_EQ(by_flags.size(), by_request.size());
+  for (size_t i = 1; i < by_flags.size(); ++i) {
+    EXPECT_EQ(by_flags[i].SerializeAsString(), by_request[i].SerializeAsString()) << i;
+  }
+  EXPECT_EQ(by_request[0].header().settings().solver(), v1::SOLVER_SPECTRA);
+  EXPECT_EQ(by_request[0].header().settings().mass_matrix(), v1::MASS_MATRIX_CONSISTENT);
+}
+
+TEST_F(CarillonPrecomputeTest, ARequestFileIsCheckedAndReplacesTheFlags) {
+  const std::string request = folder + "/request";
+  const auto reason = [&](const std::string& text, const std::string& more = "") {
+    std::ofstream(request) << text;
+    return ReasonOf(Run(bar + " --out " + model + " --json --request " + request + more));
+  };
+  EXPECT_EQ(reason("mesh_format: 7"), "INVALID_SETTINGS");
+  EXPECT_EQ(reason("settings { poisson_ratio: nan }"), "INVALID_SETTINGS");
+  EXPECT_EQ(reason("mesh_format: \"obj\""), "INVALID_SETTINGS") << "without a material";
+  EXPECT_EQ(reason("mesh_format: \"obj\"", " --keep 3"), "INVALID_SETTINGS");
+  EXPECT_EQ(reason("mesh_format: \"obj\"", " --material brass"), "INVALID_SETTINGS");
+}
+
+TEST_F(CarillonPrecomputeTest, CheckWithSpectraSaysHowFarApartTheSolversAre) {
+  const Result result = Run(bar + " --out " + model + " --unit mm --nodes 150 --json" + kSteel +
+                            " --band 20:60000 --fix vertices:0 --check-with spectra");
+  ASSERT_EQ(result.exit_status, 0) << result.output;
+  const Json report = Json::parse(result.output);
+  const Json& check = report.at("check");
+  EXPECT_EQ(check.at("solver"), "Spectra");
+  EXPECT_EQ(check.at("mode_count"), report.at("modes").size());
+  EXPECT_LT(check.at("largest_frequency_difference"), 1e-8);  // the square of a residual
+  EXPECT_GT(check.at("least_mac"), 1 - 1e-6);
+  EXPECT_THAT(report.at("warnings").back().get<std::string>(),
+              StartsWith("checked with Spectra: it found "));
+}
+
 TEST_F(CarillonPrecomputeTest, SaysInWordsThatABudgetWasOverrun) {
   const Result result = RunBar(std::string(kSteel) + " --budget 0.001:0.001");
   ASSERT_EQ(result.exit_status, 0) << result.output;

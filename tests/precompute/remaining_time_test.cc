@@ -7,11 +7,11 @@ namespace carillon::precompute {
 namespace {
 
 // As a body of some size: 10 s counting, 5 s factoring, 80 s solving, 5 s checking, 20 s coupling.
-const std::vector<PlannedStep> kSteps = {{Phase::kVerify, 10},
-                                         {Phase::kFactor, 5},
-                                         {Phase::kSolve, 80},
-                                         {Phase::kVerify, 5},
-                                         {Phase::kWrite, 20}};
+const std::vector<PlannedStep> kSteps = {{v1::PHASE_VERIFY, 10},
+                                         {v1::PHASE_FACTOR, 5},
+                                         {v1::PHASE_SOLVE, 80},
+                                         {v1::PHASE_VERIFY, 5},
+                                         {v1::PHASE_WRITE, 20}};
 
 /// Goes through all steps on a machine that takes `slowness` seconds for a predicted one; calls
 /// `look` with the time and the true remaining time at the end of each, before the next begins.
@@ -33,7 +33,7 @@ TEST(RemainingTime, IsNotKnownBeforeThereIsAPlan) {
   RemainingTime remaining;
   EXPECT_FALSE(remaining.Seconds(0).has_value());
   remaining.BeginRound(1, {});
-  remaining.Progress(2, Phase::kMesh, 0);
+  remaining.Progress(2, v1::PHASE_MESH, 0);
   EXPECT_FALSE(remaining.Seconds(3).has_value());
 }
 
@@ -70,7 +70,7 @@ TEST(RemainingTime, FallsBySecondsWithinAPhaseThatReportsNothing) {
   RemainingTime remaining;
   remaining.BeginRound(0, {});
   remaining.Plan(0, kSteps);
-  remaining.Progress(0, Phase::kVerify, 0);
+  remaining.Progress(0, v1::PHASE_VERIFY, 0);
   EXPECT_DOUBLE_EQ(remaining.Seconds(4).value(), 116);
   // It takes longer than foreseen: never over before its end.
   EXPECT_DOUBLE_EQ(remaining.Seconds(50).value(), 110.5);
@@ -80,8 +80,8 @@ TEST(RemainingTime, WhatIsReportedWithinAPhaseCorrectsItAtOnce) {
   RemainingTime remaining;
   remaining.BeginRound(0, {});
   remaining.Plan(0, kSteps);
-  remaining.Progress(0, Phase::kVerify, 0);
-  remaining.Progress(15, Phase::kVerify, 0.5);
+  remaining.Progress(0, v1::PHASE_VERIFY, 0);
+  remaining.Progress(15, v1::PHASE_VERIFY, 0.5);
   // Three times as slow as predicted: 345 s are left.
   EXPECT_NEAR(remaining.Seconds(15).value(), 345, 0.02 * 345);
 }
@@ -90,8 +90,8 @@ TEST(RemainingTime, FallsBySecondsAfterTheLastReportOfAPhase) {
   RemainingTime remaining;
   remaining.BeginRound(0, {});
   remaining.Plan(0, kSteps);
-  remaining.Progress(0, Phase::kVerify, 0);
-  remaining.Progress(5, Phase::kVerify, 0.5);
+  remaining.Progress(0, v1::PHASE_VERIFY, 0);
+  remaining.Progress(5, v1::PHASE_VERIFY, 0.5);
   EXPECT_DOUBLE_EQ(remaining.Seconds(5).value(), 115);
   EXPECT_DOUBLE_EQ(remaining.Seconds(8).value(), 112);
   // Silence is no news of the machine's speed.
@@ -102,12 +102,12 @@ TEST(RemainingTime, ANewPlanKeepsTheMeasuredSpeed) {
   RemainingTime remaining;
   remaining.BeginRound(0, {});
   remaining.Plan(0, kSteps);
-  remaining.Progress(0, Phase::kVerify, 0);
-  remaining.Progress(20, Phase::kVerify, 1);
+  remaining.Progress(0, v1::PHASE_VERIFY, 0);
+  remaining.Progress(20, v1::PHASE_VERIFY, 1);
   std::vector<PlannedStep> more = kSteps;
   more[2].predicted_s = 400;
   remaining.Plan(20, more);
-  remaining.Progress(20, Phase::kFactor, 0);
+  remaining.Progress(20, v1::PHASE_FACTOR, 0);
   EXPECT_NEAR(remaining.Seconds(20).value(), 2 * (5 + 400 + 5 + 20), 5);
 }
 
@@ -119,7 +119,7 @@ TEST(RemainingTime, CountsTheRoundsThatAreToFollow) {
   });
   remaining.BeginRound(120, {.expected_s = 300});
   EXPECT_DOUBLE_EQ(remaining.Seconds(120).value(), 300);
-  remaining.Progress(130, Phase::kMesh, 0);
+  remaining.Progress(130, v1::PHASE_MESH, 0);
   EXPECT_DOUBLE_EQ(remaining.Seconds(140).value(), 280);
 }
 
@@ -127,9 +127,9 @@ TEST(RemainingTime, TheRoundBeforeTellsMoreThanThePlanUntilTheModesAreCounted) {
   RemainingTime remaining;
   remaining.BeginRound(0, {.expected_s = 300});
   remaining.Plan(10, kSteps);
-  remaining.Progress(10, Phase::kVerify, 0);
+  remaining.Progress(10, v1::PHASE_VERIFY, 0);
   EXPECT_DOUBLE_EQ(remaining.Seconds(10).value(), 290);
-  remaining.Progress(20, Phase::kFactor, 0);
+  remaining.Progress(20, v1::PHASE_FACTOR, 0);
   EXPECT_DOUBLE_EQ(remaining.Seconds(20).value(), 110);
 }
 
@@ -137,11 +137,11 @@ TEST(RemainingTime, StepsOfASecondAttemptCountAgain) {
   RemainingTime remaining;
   remaining.BeginRound(0, {});
   remaining.Plan(0, kSteps);
-  remaining.Progress(0, Phase::kVerify, 0);
-  remaining.Progress(10, Phase::kFactor, 0);
-  remaining.Progress(15, Phase::kSolve, 0);
-  remaining.Progress(95, Phase::kVerify, 0);
-  remaining.Progress(105, Phase::kFactor, 0);
+  remaining.Progress(0, v1::PHASE_VERIFY, 0);
+  remaining.Progress(10, v1::PHASE_FACTOR, 0);
+  remaining.Progress(15, v1::PHASE_SOLVE, 0);
+  remaining.Progress(95, v1::PHASE_VERIFY, 0);
+  remaining.Progress(105, v1::PHASE_FACTOR, 0);
   EXPECT_NEAR(remaining.Seconds(105).value(), 110, 8);
 }
 

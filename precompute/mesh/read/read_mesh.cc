@@ -17,6 +17,7 @@
 #include "precompute/mesh/read/read_surface.h"
 #include "precompute/mesh/read/tetgen_file.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::precompute {
 namespace {
@@ -58,9 +59,8 @@ absl::StatusOr<ElementFile> ParseElements(const std::string& bytes, const std::s
 }
 
 absl::StatusOr<NamedMesh> ReadElements(const std::string& bytes, const std::string& format) {
-  absl::StatusOr<ElementFile> file = ParseElements(bytes, format);
-  if (!file.ok()) return file.status();
-  return MakeMesh(*std::move(file));
+  ASSIGN_OR_RETURN(ElementFile file, ParseElements(bytes, format));
+  return MakeMesh(std::move(file));
 }
 
 }  // namespace
@@ -70,19 +70,17 @@ absl::StatusOr<std::string> ReadMeshFile(const std::string& path, const std::str
   if (format != "node" || (file.extension() != ".node" && file.extension() != ".ele")) {
     return ReadFile(path);
   }
-  absl::StatusOr<std::string> nodes =
-      ReadFile(std::filesystem::path(file).replace_extension(".node"));
-  if (!nodes.ok()) return nodes;
+  ASSIGN_OR_RETURN(std::string nodes,
+                   ReadFile(std::filesystem::path(file).replace_extension(".node")));
   const std::filesystem::path elements = std::filesystem::path(file).replace_extension(".ele");
   // They may stand in one file already.
   if (!std::filesystem::exists(elements)) return nodes;
-  const absl::StatusOr<std::string> rest = ReadFile(elements);
-  if (!rest.ok()) return rest.status();
-  return absl::StrCat(*nodes, nodes->ends_with('\n') ? "" : "\n", *rest);
+  ASSIGN_OR_RETURN(const std::string rest, ReadFile(elements));
+  return absl::StrCat(nodes, nodes.ends_with('\n') ? "" : "\n", rest);
 }
 
-absl::StatusOr<NamedMesh> ReadMesh(const std::string& path, const std::string& format,
-                                   double metres_per_unit) {
+absl::StatusOr<NamedMesh> ParseMesh(const std::string& bytes, const std::string& format,
+                                    double metres_per_unit) {
   const bool is_surface = IsSurfaceFormat(format);
   if (!is_surface && format != "msh" && format != "mesh" && format != "node") {
     return Refusal(
@@ -91,13 +89,16 @@ absl::StatusOr<NamedMesh> ReadMesh(const std::string& path, const std::string& f
                      "\": give obj, ply, stl or off (a surface), msh (Gmsh), mesh (Medit) "
                      "or node (TetGen)"));
   }
-  const absl::StatusOr<std::string> bytes = ReadMeshFile(path, format);
-  if (!bytes.ok()) return bytes.status();
-  absl::StatusOr<NamedMesh> named =
-      is_surface ? ReadSurface(*bytes, format) : ReadElements(*bytes, format);
-  if (!named.ok()) return named.status();
-  Scale(*named, metres_per_unit);
+  ASSIGN_OR_RETURN(NamedMesh named,
+                   is_surface ? ReadSurface(bytes, format) : ReadElements(bytes, format));
+  Scale(named, metres_per_unit);
   return named;
+}
+
+absl::StatusOr<NamedMesh> ReadMesh(const std::string& path, const std::string& format,
+                                   double metres_per_unit) {
+  ASSIGN_OR_RETURN(const std::string bytes, ReadMeshFile(path, format));
+  return ParseMesh(bytes, format, metres_per_unit);
 }
 
 }  // namespace carillon::precompute

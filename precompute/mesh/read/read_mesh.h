@@ -13,7 +13,7 @@ namespace carillon::precompute {
 /// MESH_FILE_NOT_READABLE, MESH_EMPTY.
 absl::StatusOr<std::string> ReadMeshFile(const std::string& path, const std::string& format);
 
-/// Reads the mesh file at `path` with the names of its parts.
+/// Parses the bytes that ReadMeshFile returned into a mesh with the names of its parts.
 ///
 /// `format`: "obj", "ply", "stl", "off" (a surface; polygons are split into triangles, otherwise
 /// triangles keep their order and count; vertices at the same place become one), "msh" (Gmsh
@@ -21,9 +21,13 @@ absl::StatusOr<std::string> ReadMeshFile(const std::string& path, const std::str
 /// tetrahedra, whose boundary is filled in, or without any the triangles as a surface.
 /// `metres_per_unit`: length of one unit of the file.
 ///
-/// Errors: MESH_FORMAT_UNKNOWN, MESH_FILE_NOT_READABLE, MESH_EMPTY, MESH_UNREADABLE,
-/// MESH_NOT_FINITE, MESH_INDEX_OUT_OF_RANGE, MESH_TOO_LARGE, MESH_ELEMENT_UNSUPPORTED,
-/// MESH_ZERO_VOLUME, MESH_MIDSIDE_NODE_MISPLACED, MESH_SEVERAL_PIECES, MESH_NOT_MANIFOLD.
+/// Errors: MESH_FORMAT_UNKNOWN, MESH_UNREADABLE, MESH_NOT_FINITE, MESH_INDEX_OUT_OF_RANGE,
+/// MESH_TOO_LARGE, MESH_ELEMENT_UNSUPPORTED, MESH_ZERO_VOLUME, MESH_MIDSIDE_NODE_MISPLACED,
+/// MESH_SEVERAL_PIECES, MESH_NOT_MANIFOLD.
+absl::StatusOr<NamedMesh> ParseMesh(const std::string& bytes, const std::string& format,
+                                    double metres_per_unit);
+
+/// ReadMeshFile, then ParseMesh.
 absl::StatusOr<NamedMesh> ReadMesh(const std::string& path, const std::string& format,
                                    double metres_per_unit);
 

@@ -8,24 +8,6 @@
 namespace carillon::cli {
 namespace {
 
-TEST(Quantity, AShareIsAPercentageOrAFraction) {
-  EXPECT_EQ(ParseShare("1%"), 0.01);
-  EXPECT_EQ(ParseShare("0.01"), 0.01);
-  EXPECT_EQ(ParseShare("2.5%"), 0.025);
-  for (const char* text : {"", "%", "0", "0%", "-1%", "nan", "inf", "one", "1%%", "1 %x"}) {
-    EXPECT_FALSE(ParseShare(text)) << text;
-  }
-}
-
-TEST(Quantity, ABudgetIsSecondsAndPerhapsGib) {
-  EXPECT_EQ(ParseBudget("60")->seconds, 60);
-  EXPECT_EQ(ParseBudget("60")->gib, 0);
-  EXPECT_EQ(ParseBudget("0:1.5")->gib, 1.5);
-  for (const char* text : {"", ":", "60:", ":4", "60:4:1", "-1", "60:-4", "nan", "1e999"}) {
-    EXPECT_FALSE(ParseBudget(text)) << text;
-  }
-}
-
 TEST(Quantity, ATimeWithAZoneIsThatMoment) {
   EXPECT_EQ(ParseTimeUnixMs("1970-01-01T00:00:01Z"), 1000);
   EXPECT_EQ(ParseTimeUnixMs("1970-01-01T02:00:00+02:00"), 0);

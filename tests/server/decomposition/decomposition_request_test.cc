@@ -51,6 +51,48 @@ TEST(DecompositionRequest, TheCanonicalTextIsTheDocumentedOne) {
                 "target_node_count 0\n");
 }
 
+// The text as every earlier version made it: a model that is stored keeps its name.
+TEST(DecompositionRequest, ModelsKeepTheirNames) {
+  Request request = Aluminum();
+  v1::DecompositionSettings& settings = *request.mutable_settings();
+  settings.set_poisson_ratio(-0.25);
+  settings.set_element(v1::ELEMENT_LINEAR);
+  settings.set_mass_matrix(v1::MASS_MATRIX_LUMPED);
+  settings.set_metres_per_unit(0.0254);
+  settings.mutable_mesh()->set_keep_surface(false);
+  settings.mutable_mesh()->set_target_node_count(500);
+  settings.mutable_mesh()->set_repair(true);
+  settings.mutable_mesh()->set_wall_m(0.003);
+  settings.mutable_mesh()->set_accuracy(0.01);
+  settings.mutable_mesh()->set_budget_s(60);
+  settings.mutable_mesh()->set_budget_gib(1.5);
+  settings.set_keep_mode_count(2000);
+  settings.set_solver(v1::SOLVER_BLOCK_LANCZOS);
+  settings.add_fixtures()->set_group("rim");
+  settings.add_fixtures()->mutable_vertices()->add_indices(3);
+  EXPECT_EQ(CanonicalText(*ResolveRequest(request)),
+            "carillon-decomposition 1\n"
+            "mesh " +
+                Sha256Hex("mesh") +
+                "\n"
+                "format obj\n"
+                "poisson_1e-4 -2500\n"
+                "element linear\n"
+                "mass lumped\n"
+                "metres_per_unit 0.0254\n"
+                "keep_surface no\n"
+                "target_node_count 500\n"
+                "repair yes\n"
+                "wall_m 0.003\n"
+                "accuracy 0.01\n"
+                "budget 60 1.5\n"
+                "keep 2000\n"
+                "fix group:rim\n"
+                "fix vertices:3\n");
+  EXPECT_EQ(Digest(Aluminum()), "5b3ae2ca1bd5bfd03248657bbb9fd591ef3bcd67c8da19a6ecda716501c2a45a");
+  EXPECT_EQ(Digest(request), "9bb5c442dd49d749643201224c506c4c70d09f90edff823058d4213708f5b0ac");
+}
+
 TEST(DecompositionRequest, WhatIsLeftOutMeansTheDefault) {
   Request given = Aluminum();
   v1::DecompositionSettings& settings = *given.mutable_settings();
@@ -96,6 +138,8 @@ TEST(DecompositionRequest, EverySettingIsPartOfTheName) {
       [](Request& r) { r.mutable_settings()->mutable_mesh()->set_keep_surface(true); },
       [](Request& r) { r.mutable_settings()->mutable_mesh()->set_keep_surface(false); },
       [](Request& r) { r.mutable_settings()->mutable_mesh()->set_target_node_count(500); },
+      [](Request& r) { r.mutable_settings()->set_solver(v1::SOLVER_SPECTRA); },
+      [](Request& r) { r.mutable_settings()->set_check_with(v1::SOLVER_SPECTRA); },
       [](Request& r) { r.mutable_settings()->add_fixtures()->set_group("base"); },
       [](Request& r) { r.mutable_settings()->add_fixtures()->set_group("rim"); },
       [](Request& r) { r.mutable_settings()->add_fixtures()->mutable_vertices()->add_indices(0); }};

@@ -46,9 +46,10 @@ mesh=$1
 for option; do
   case $option in
     --out=*) out=${option#--out=} ;;
-    --band=*) band=${option#--band=} ;;
+    --request=*) request=${option#--request=} ;;
   esac
 done
+band=$(sed -n 's/^m[inax]*_frequency_hz: //p' "$request" | paste -sd :)
 )",
                                                  body, "\n"));
   std::filesystem::permissions(folder / "worker.new", std::filesystem::perms::owner_all);

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+//
+// Spectra as a second opinion on block Lanczos.
+#include "precompute/modes/solver_comparison.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "precompute/mesh/boundary.h"
+#include "precompute/mesh/hold.h"
+#include "tests/precompute/test_meshes.h"
+
+namespace carillon::precompute {
+namespace {
+
+using ::testing::HasSubstr;
+
+const SolveWatch kSilent = [](SolveStage, double) {};
+constexpr ElasticConstants kElastic{.young_pa = 1, .poisson_ratio = 0.3};
+
+/// A tube, whose bending modes come in pairs of one frequency, free or clamped at one end.
+TetMesh TubeMesh(int nodes_per_element, bool clamped) {
+  TetMesh mesh = MakeTetTube({.around = 12, .along = 20}, nodes_per_element);
+  if (!clamped) return mesh;
+  const absl::Status status =
+      Hold({HeldPlane{{0, 0, 0}, {0, 0, 1}}}, BoundarySurface(mesh), {}, mesh);
+  EXPECT_TRUE(status.ok()) << status;
+  return mesh;
+}
+
+absl::StatusOr<DeformationModes> Solve(const SystemMatrices& system, const TetMesh& mesh,
+                                       double limit, SolverChoice solver) {
+  return SolveDeformationModes(system, mesh, limit, kSilent, {.solver = solver});
+}
+
+struct SolverComparisonTest : ::testing::TestWithParam<std::tuple<int, MassSharing, bool>> {};
+
+TEST_P(SolverComparisonTest, BothSolversFindTheSameModes) {
+  const auto& [nodes_per_element, mass, clamped] = GetParam();
+  const TetMesh mesh = TubeMesh(nodes_per_element, clamped);
+  const SystemMatrices system = Assemble(mesh, kElastic, 1, mass);
+  constexpr double kLimit = 0.3;
+  const auto lanczos = Solve(system, mesh, kLimit, SolverChoice::kBlockLanczos);
+  const auto spectra = Solve(system, mesh, kLimit, SolverChoice::kSpectra);
+  ASSERT_TRUE(lanczos.ok()) << lanczos.status();
+  ASSERT_TRUE(spectra.ok()) << spectra.status();
+  const SolverComparison comparison =
+      CompareSolutions(system, mesh, lanczos->modes, spectra->modes);
+  EXPECT_GT(comparison.mode_count, 5);
+  EXPECT_EQ(comparison.mode_count, comparison.other_mode_count);
+  // The error of a frequency is about the square of its residual, which is below 1e-5.
+  EXPECT_LT(comparison.largest_frequency_difference, 1e-8);
+  // Residuals of 1e-5 over gaps of 1e-3 turn a shape by 1e-2 at most.
+  EXPECT_GT(comparison.least_mac, 1 - 1e-4);
+}
+
+INSTANTIATE_TEST_SUITE_P(Bodies, SolverComparisonTest,
+                         ::testing::Combine(::testing::Values(4, 10),
+                                            ::testing::Values(MassSharing::kConsistent,
+                                                              MassSharing::kLumped),
+                                            ::testing::Bool()));
+
+struct SelfComparisonTest : ::testing::Test {
+  TetMesh mesh = TubeMesh(4, false);
+  SystemMatrices system = Assemble(mesh, kElastic, 1, MassSharing::kConsistent);
+  Modes modes = Solve(system, mesh, 0.3, SolverChoice::kBlockLanczos)->modes;
+};
+
+TEST_F(SelfComparisonTest, APairOfOneFrequencyMayBeTurnedWithinItself) {
+  Modes turned = modes;
+  // The first two modes are a pair; any orthonormal combinations of them are modes.
+  ASSERT_LT(modes.eigenvalues[1] / modes.eigenvalues[0] - 1, 1e-6);
+  turned.shapes.col(0) = std::cos(1.0) * modes.shapes.col(0) + std::sin(1.0) * modes.shapes.col(1);
+  turned.shapes.col(1) = std::cos(1.0) * modes.shapes.col(1) - std::sin(1.0) * modes.shapes.col(0);
+  EXPECT_NEAR(CompareSolutions(system, mesh, modes, turned).least_mac, 1, 1e-9);
+}
+
+TEST_F(SelfComparisonTest, AShapeOfAnotherModeIsSeen) {
+  Modes wrong = modes;
+  wrong.shapes.col(0) = modes.shapes.rightCols<1>();
+  EXPECT_NEAR(CompareSolutions(system, mesh, modes, wrong).least_mac, 0, 1e-6);
+}
+
+TEST_F(SelfComparisonTest, TheLargestDifferenceOfAFrequencyIsSeen) {
+  Modes off = modes;
+  off.eigenvalues[3] *= 1.02 * 1.02;
+  EXPECT_NEAR(CompareSolutions(system, mesh, modes, off).largest_frequency_difference, 0.02, 1e-9);
+}
+
+TEST(Spectra, RefusesMoreModesThanItCanFind) {
+  const TetMesh mesh = MakeTetBox({1, 1, 1}, {1, 1, 1}, 4);
+  const SystemMatrices system = Assemble(mesh, kElastic, 1, MassSharing::kConsistent);
+  const auto refused = Solve(system, mesh, 1e6, SolverChoice::kSpectra);
+  EXPECT_THAT(refused.status().ToString(),
+              HasSubstr("INVALID_SETTINGS: Spectra cannot find 24 modes of 24 unknowns"));
+}
+
+}  // namespace
+}  // namespace carillon::precompute
