@@ -17,8 +17,6 @@ static_assert(std::endian::native == std::endian::little, "arrays are stored lit
 namespace carillon::interchange {
 namespace {
 
-constexpr size_t kMaxChunkBytes = 1 << 20;
-
 v1::ElementType TypeOf(double) { return v1::ELEMENT_TYPE_FLOAT64; }
 v1::ElementType TypeOf(float) { return v1::ELEMENT_TYPE_FLOAT32; }
 v1::ElementType TypeOf(uint32_t) { return v1::ELEMENT_TYPE_UINT32; }
@@ -37,7 +35,7 @@ v1::ModalModelRecord HeaderRecord(const StoredModel& model) {
   v1::ModalModelRecord record;
   v1::ModalModelHeader& header = *record.mutable_header();
   header = model.header;
-  header.set_format_version(1);
+  header.set_format_version(kModelFormatVersion);
   header.set_mode_count(static_cast<uint32_t>(model.mode_count()));
   header.clear_arrays();
   VisitArrays(model, [&]<class T>(const char* name, const std::vector<T>&, const char* dimensions) {
@@ -95,8 +93,8 @@ absl::Status SendRecords(const StoredModel& model,
   VisitArrays(model, [&](const char*, const auto& numbers, const char*) {
     const std::string_view bytes(reinterpret_cast<const char*>(numbers.data()),
                                  numbers.size() * sizeof(numbers[0]));
-    for (size_t at = 0; status.ok() && at < bytes.size(); at += kMaxChunkBytes) {
-      status = sink(ChunkRecord(index, at, bytes.substr(at, kMaxChunkBytes)));
+    for (size_t at = 0; status.ok() && at < bytes.size(); at += kMaxModelChunkBytes) {
+      status = sink(ChunkRecord(index, at, bytes.substr(at, kMaxModelChunkBytes)));
     }
     ++index;
   });

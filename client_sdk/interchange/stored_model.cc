@@ -12,20 +12,12 @@ namespace carillon::interchange {
 namespace {
 
 uint64_t Size(const StoredModel& model, char dimension) {
-  switch (dimension) {
-    case 'm':
-      return model.mode_count();
-    case 'V':
-      return model.vertex_count();
-    case 'T':
-      return model.triangle_count();
-    case 'G':
-      return model.given_vertices.size() / 3;
-    case 'H':
-      return model.given_triangles.size() / 3;
-    default:
-      return 3;
-  }
+  const ModelSizes sizes{.modes = model.mode_count(),
+                         .vertices = model.vertex_count(),
+                         .triangles = model.triangle_count(),
+                         .given_vertices = model.given_vertices.size() / 3,
+                         .given_triangles = model.given_triangles.size() / 3};
+  return sizes.Of(dimension);
 }
 
 template <class T>

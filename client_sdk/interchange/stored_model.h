@@ -7,6 +7,7 @@
 
 #include "absl/status/status.h"
 #include "carillon/v1/modal_model.pb.h"
+#include "proto/cpp/model_format.h"
 
 namespace carillon::interchange {
 
@@ -32,19 +33,24 @@ struct StoredModel {
   size_t triangle_count() const { return triangles.size() / 3; }
 };
 
-/// Calls `visit(name, numbers, dimensions)` for each array of format version 1, in the order of the
-/// format. Each letter of `dimensions` is one that modal_model.proto uses, or '3'.
+/// Calls `visit(name, numbers, dimensions)` for each of kModelArrays in its order. Each letter of
+/// `dimensions` is one of ModelSizes, or '3'.
 template <class Model, class Visitor>
 void VisitArrays(Model& model, Visitor visit) {
-  visit("eigenvalues", model.eigenvalues, "m");
-  visit("residuals", model.residuals, "m");
-  visit("couplings", model.couplings, "m");
-  visit("vertices", model.vertices, "V3");
-  visit("triangles", model.triangles, "T3");
-  visit("given_triangle", model.given_triangle, "T");
-  visit("given_vertices", model.given_vertices, "G3");
-  visit("given_triangles", model.given_triangles, "H3");
-  visit("shapes", model.shapes, "V3m");
+  size_t index = 0;
+  const auto next = [&](auto& numbers) {
+    const ArraySpec& spec = kModelArrays[index++];
+    visit(spec.name, numbers, spec.shape);
+  };
+  next(model.eigenvalues);
+  next(model.residuals);
+  next(model.couplings);
+  next(model.vertices);
+  next(model.triangles);
+  next(model.given_triangle);
+  next(model.given_vertices);
+  next(model.given_triangles);
+  next(model.shapes);
 }
 
 /// Returns the sizes for which the letters of VisitArrays stand.

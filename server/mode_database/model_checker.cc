@@ -8,38 +8,18 @@
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/model_format.h"
 #include "server/base/xxh3.h"
 
 namespace carillon {
 namespace {
 
-constexpr size_t kMaxChunkBytes = 1 << 20;
 constexpr uint64_t kMaxDimension = 1ULL << 32;
 constexpr uint64_t kMaxArrayBytes = 1ULL << 40;
 
-// An array of format version 1. Each dimension is a letter of modal_model.proto, or '3'.
-struct ArraySpec {
-  const char* name;
-  v1::ElementType type;
-  const char* shape;
-  char index_bound;  // for indices: what they count, else 0
-};
-
-constexpr std::array kArrays = {
-    ArraySpec{"eigenvalues", v1::ELEMENT_TYPE_FLOAT64, "m", 0},
-    ArraySpec{"residuals", v1::ELEMENT_TYPE_FLOAT64, "m", 0},
-    ArraySpec{"couplings", v1::ELEMENT_TYPE_FLOAT64, "m", 0},
-    ArraySpec{"vertices", v1::ELEMENT_TYPE_FLOAT32, "V3", 0},
-    ArraySpec{"triangles", v1::ELEMENT_TYPE_UINT32, "T3", 'V'},
-    ArraySpec{"given_triangle", v1::ELEMENT_TYPE_UINT32, "T", 'H'},
-    ArraySpec{"given_vertices", v1::ELEMENT_TYPE_FLOAT32, "G3", 0},
-    ArraySpec{"given_triangles", v1::ELEMENT_TYPE_UINT32, "H3", 'G'},
-    ArraySpec{"shapes", v1::ELEMENT_TYPE_FLOAT32, "V3m", 0},
-};
-
 const ArraySpec* FindSpec(const std::string& name) {
-  const auto spec = std::ranges::find_if(kArrays, [&](const auto& s) { return s.name == name; });
-  return spec == kArrays.end() ? nullptr : &*spec;
+  const size_t index = ModelArrayIndex(name);
+  return index == kModelArrayCount ? nullptr : &kModelArrays[index];
 }
 
 uint64_t ElementBytes(v1::ElementType type) {
@@ -101,7 +81,7 @@ absl::Status ModelChecker::Check(const v1::ModalModelRecord& record) {
 }
 
 absl::Status ModelChecker::CheckHeader(const v1::ModalModelHeader& header) {
-  if (header.format_version() != 1) {
+  if (header.format_version() != kModelFormatVersion) {
     return Malformed(absl::StrCat("it has format version ", header.format_version()));
   }
   const double poisson = header.settings().poisson_ratio();
@@ -117,7 +97,7 @@ absl::Status ModelChecker::CheckHeader(const v1::ModalModelHeader& header) {
     absl::Status status = CheckArray(array);
     if (!status.ok()) return status;
   }
-  for (const ArraySpec& spec : kArrays) {
+  for (const ArraySpec& spec : kModelArrays) {
     const auto named = [&](const v1::ArrayDescriptor& array) { return array.name() == spec.name; };
     if (std::ranges::count_if(header.arrays(), named) != 1) {
       return Malformed(absl::StrCat("it needs one array \"", spec.name, "\""));
@@ -166,7 +146,7 @@ absl::Status ModelChecker::CheckChunk(const ChunkView& chunk) {
     return Malformed(absl::StrCat("a chunk is missing or out of order: byte ", offset_,
                                   " of array \"", array.name(), "\" should follow"));
   }
-  if (data.empty() || data.size() > kMaxChunkBytes ||
+  if (data.empty() || data.size() > kMaxModelChunkBytes ||
       data.size() % ElementBytes(array.type()) != 0 ||
       data.size() > byte_counts_[static_cast<size_t>(array_)] - offset_) {
     return Malformed(absl::StrCat("a chunk of array \"", array.name(), "\" has a wrong size, ",

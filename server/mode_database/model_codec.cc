@@ -15,12 +15,12 @@
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/model_format.h"
 #include "server/base/xxh3.h"
 
 namespace carillon {
 namespace {
 
-constexpr size_t kMaxChunkBytes = 1 << 20;
 constexpr uint32_t kMaxRecordBytes = 2 << 20;  // a chunk, or a header with many warnings
 
 absl::Status Truncated() {
@@ -29,36 +29,28 @@ absl::Status Truncated() {
       "the file is not a sequence of modal model records, or is cut short: copy it again");
 }
 
-// Where an array of the stored form lies in the model in memory: for the writing and the reading of
-// all arrays by one table.
-struct Field {
-  const char* name;
-  v1::ElementType type;
-  std::vector<uint64_t> shape;
-  std::string_view bytes;
-};
-
 template <typename Vector>
 std::string_view Bytes(const Vector& values) {
   return {reinterpret_cast<const char*>(values.data()),
           values.size() * sizeof(typename Vector::value_type)};
 }
 
-std::array<Field, 9> Fields(const ModalModel& model, const std::vector<double>& residuals) {
-  const uint64_t m = model.eigenvalues.size();
-  const uint64_t v = model.vertices.size();
-  const uint64_t t = model.triangles.size();
-  const uint64_t g = model.given_vertices.size();
-  const uint64_t h = model.given_triangles.size();
-  return {{{"eigenvalues", v1::ELEMENT_TYPE_FLOAT64, {m}, Bytes(model.eigenvalues)},
-           {"residuals", v1::ELEMENT_TYPE_FLOAT64, {m}, Bytes(residuals)},
-           {"couplings", v1::ELEMENT_TYPE_FLOAT64, {m}, Bytes(model.couplings)},
-           {"vertices", v1::ELEMENT_TYPE_FLOAT32, {v, 3}, Bytes(model.vertices)},
-           {"triangles", v1::ELEMENT_TYPE_UINT32, {t, 3}, Bytes(model.triangles)},
-           {"given_triangle", v1::ELEMENT_TYPE_UINT32, {t}, Bytes(model.given_triangle)},
-           {"given_vertices", v1::ELEMENT_TYPE_FLOAT32, {g, 3}, Bytes(model.given_vertices)},
-           {"given_triangles", v1::ELEMENT_TYPE_UINT32, {h, 3}, Bytes(model.given_triangles)},
-           {"shapes", v1::ELEMENT_TYPE_FLOAT32, {v, 3, m}, Bytes(model.shapes)}}};
+// The numbers of each of kModelArrays.
+std::array<std::string_view, kModelArrayCount> Fields(const ModalModel& model,
+                                                      const std::vector<double>& residuals) {
+  return {Bytes(model.eigenvalues),    Bytes(residuals),
+          Bytes(model.couplings),      Bytes(model.vertices),
+          Bytes(model.triangles),      Bytes(model.given_triangle),
+          Bytes(model.given_vertices), Bytes(model.given_triangles),
+          Bytes(model.shapes)};
+}
+
+ModelSizes SizesOf(const ModalModel& model) {
+  return {.modes = model.eigenvalues.size(),
+          .vertices = model.vertices.size(),
+          .triangles = model.triangles.size(),
+          .given_vertices = model.given_vertices.size(),
+          .given_triangles = model.given_triangles.size()};
 }
 
 template <typename Vector>
@@ -81,14 +73,9 @@ char* Destination(ModalModel& model, const v1::ArrayDescriptor& array) {
   return nullptr;
 }
 
-v1::ModalModelRecord HeaderRecord(const std::array<Field, 9>& fields, v1::ModalModelHeader header) {
+v1::ModalModelRecord HeaderRecord(const ModelSizes& sizes, v1::ModalModelHeader header) {
   header.clear_arrays();
-  for (const Field& field : fields) {
-    v1::ArrayDescriptor& array = *header.add_arrays();
-    array.set_name(field.name);
-    array.set_type(field.type);
-    array.mutable_shape()->Assign(field.shape.begin(), field.shape.end());
-  }
+  for (const ArraySpec& spec : kModelArrays) *header.add_arrays() = DescribeArray(spec, sizes);
   v1::ModalModelRecord record;
   *record.mutable_header() = std::move(header);
   return record;
@@ -190,12 +177,12 @@ absl::Status EncodeModel(const ModalModel& model, v1::ModalModelHeader header,
                          const std::vector<double>& residuals,
                          absl::FunctionRef<absl::Status(const v1::ModalModelRecord&)> sink) {
   header.set_mode_count(static_cast<uint32_t>(model.mode_count()));
-  const std::array<Field, 9> fields = Fields(model, residuals);
-  absl::Status status = sink(HeaderRecord(fields, std::move(header)));
+  const auto fields = Fields(model, residuals);
+  absl::Status status = sink(HeaderRecord(SizesOf(model), std::move(header)));
   for (size_t i = 0; status.ok() && i < fields.size(); ++i) {
-    const std::string_view bytes = fields[i].bytes;
-    for (size_t offset = 0; status.ok() && offset < bytes.size(); offset += kMaxChunkBytes) {
-      const std::string_view data = bytes.substr(offset, kMaxChunkBytes);
+    const std::string_view bytes = fields[i];
+    for (size_t offset = 0; status.ok() && offset < bytes.size(); offset += kMaxModelChunkBytes) {
+      const std::string_view data = bytes.substr(offset, kMaxModelChunkBytes);
       v1::ModalModelRecord record;
       v1::ModalModelChunk& chunk = *record.mutable_chunk();
       chunk.set_array(static_cast<uint32_t>(i));
