@@ -4,6 +4,7 @@
 #include <sys/resource.h>
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <optional>
 #include <utility>
@@ -257,6 +258,33 @@ void WarnOfAccuracy(const ResolutionGoal& goal, ModalModel& model) {
       100 * goal.accuracy, 100 * reached));
 }
 
+/// Leaves out the modes whose estimated error is above the limit that the request sets.
+absl::Status LeaveOutInaccurate(const v1::WorkerRequest& request, ModalModel& model) {
+  const double limit = request.settings().max_frequency_error();
+  std::vector<size_t> kept;
+  std::vector<size_t> left_out;
+  for (size_t m = 0; m < model.eigenvalues.size(); ++m) {
+    (model.estimated_errors[m] > limit ? left_out : kept).push_back(m);
+  }
+  if (!(limit > 0) || left_out.empty()) return absl::OkStatus();
+  if (kept.empty()) {
+    return Refusal(absl::StatusCode::kFailedPrecondition, "ACCURACY_NOT_REACHED",
+                   absl::StrFormat("all %d modes are estimated to be off by more than the %.3g %% "
+                                   "allowed, the best by %.3g %%; allow more, or ask for a finer "
+                                   "mesh (nodes, accuracy or budget)",
+                                   left_out.size(), 100 * limit,
+                                   100 * *std::ranges::min_element(model.estimated_errors)));
+  }
+  const double lowest = model.eigenvalues[left_out.front()];
+  model.warnings.push_back(absl::StrFormat(
+      "%d modes, the lowest at %.5g Hz, were left out because they are estimated to be off by more "
+      "than the %.3g %% allowed; a finer mesh (nodes, accuracy or budget) keeps them",
+      left_out.size(), UseOf(request).FrequencyHz(lowest), 100 * limit));
+  model.complete_to_eigenvalue = std::min(model.complete_to_eigenvalue, std::nextafter(lowest, 0));
+  KeepModes(kept, model);
+  return absl::OkStatus();
+}
+
 void WarnOfOverruns(const ResolutionGoal& goal, double used_s, ModalModel& model) {
   std::ranges::move(OverrunWarnings(goal, used_s, PeakBytes()), std::back_inserter(model.warnings));
 }
@@ -273,6 +301,7 @@ absl::StatusOr<ModalModel> Decompose(std::string mesh_bytes, const v1::WorkerReq
                                          : Solve(std::get<Body>(input), request, observer));
   RETURN_IF_ERROR(CheckBand(model, UseOf(request)));
   WarnOfAccuracy(GoalOf(request), model);
+  RETURN_IF_ERROR(LeaveOutInaccurate(request, model));
   WarnOfOverruns(GoalOf(request), PhaseClock::Now().cpu_seconds - begun_cpu_s, model);
   observer.OnModes(model.eigenvalues.size());
   return model;

@@ -24,10 +24,12 @@ absl::Status Invalid(absl::string_view what) {
 /// Checks the settings that may be zero or any finite number above.
 absl::Status CheckFigures(const v1::DecompositionSettings& settings) {
   const v1::MeshSettings& mesh = settings.mesh();
-  const std::pair<const char*, double> figures[] = {{"wall_m", mesh.wall_m()},
-                                                    {"accuracy", mesh.accuracy()},
-                                                    {"budget_s", mesh.budget_s()},
-                                                    {"budget_gib", mesh.budget_gib()}};
+  const std::pair<const char*, double> figures[] = {
+      {"wall_m", mesh.wall_m()},
+      {"accuracy", mesh.accuracy()},
+      {"budget_s", mesh.budget_s()},
+      {"budget_gib", mesh.budget_gib()},
+      {"max_frequency_error", settings.max_frequency_error()}};
   for (const auto& [name, figure] : figures) {
     if (std::isfinite(figure) && figure >= 0) continue;
     return Invalid(absl::StrCat(name, " is ", figure, "; it must be zero or more"));
@@ -77,6 +79,8 @@ std::string LaterLines(const v1::DecompositionSettings& settings) {
   add(mesh.budget_s() > 0 || mesh.budget_gib() > 0, "budget ", ShortestDecimal(mesh.budget_s()),
       " ", ShortestDecimal(mesh.budget_gib()));
   add(settings.keep_mode_count() > 0, "keep ", settings.keep_mode_count());
+  add(settings.max_frequency_error() > 0, "max_frequency_error ",
+      ShortestDecimal(settings.max_frequency_error()));
   add(settings.solver() == v1::SOLVER_SPECTRA, "solver ", SolverName(settings.solver()));
   add(settings.check_with() != v1::SOLVER_UNSPECIFIED, "check_with ",
       SolverName(settings.check_with()));

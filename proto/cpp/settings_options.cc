@@ -114,6 +114,9 @@ void AddModes(CLI::App& app, Settings& settings) {
          "bodies of more than 5000 modes")
       ->check(CLI::Range(0, kMaxKeptModeCount))
       ->group(kSettingsGroup);
+  AddParsed(app, "--max-frequency-error", ParseShare, "above zero, such as 2% or 0.02",
+            "leave out modes whose frequency is estimated to be off by more, such as 2% or 0.02",
+            [&](double share) { settings.set_max_frequency_error(share); });
   const std::map<std::string, v1::Solver> solvers = {{"block-lanczos", v1::SOLVER_BLOCK_LANCZOS},
                                                      {"spectra", v1::SOLVER_SPECTRA}};
   AddChoice<v1::Solver>(app, "--solver", solvers,

@@ -11,6 +11,7 @@
 #include <xxhash.h>
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -184,6 +185,37 @@ TEST_F(CarillonPrecomputeTest, CheckWithSpectraSaysHowFarApartTheSolversAre) {
   EXPECT_GT(check.at("least_mac"), 1 - 1e-6);
   EXPECT_THAT(report.at("warnings").back().get<std::string>(),
               StartsWith("checked with Spectra: it found "));
+}
+
+TEST_F(CarillonPrecomputeTest, LeavesModesOutThatAreOffByMoreThanAllowed) {
+  const std::string options = std::string(kSteel) + " --band 20:60000";
+  const Json all = Json::parse(RunBar(options).output);
+  std::vector<double> errors;
+  for (const Json& mode : all.at("modes")) errors.push_back(mode.at("estimated_error"));
+  std::ranges::sort(errors);
+  const double limit = (errors[1] + errors[2]) / 2;  // two of the modes are better
+  const Json some =
+      Json::parse(RunBar(options + " --max-frequency-error " + std::to_string(limit)).output);
+  ASSERT_EQ(some.at("modes").size(), 2U);
+  EXPECT_EQ(some.at("left_out_modes"), errors.size() - 2);
+  for (const Json& mode : some.at("modes")) EXPECT_LE(mode.at("estimated_error"), limit);
+  EXPECT_THAT(some.at("warnings").back().get<std::string>(),
+              StartsWith(std::to_string(errors.size() - 2) + " modes, the lowest at "));
+  // The model is complete to just below the lowest mode left out, and its proof still counts all.
+  const v1::ModalModelHeader header = ReadRecords(model)[0].header();
+  const auto lowest_left_out = std::ranges::find_if(
+      all.at("modes"), [&](const Json& mode) { return mode.at("estimated_error") > limit; });
+  const double omega = 2 * std::numbers::pi * lowest_left_out->at("frequency_hz").get<double>();
+  EXPECT_NEAR(header.complete_to_eigenvalue() * 210e9 / 7850, omega * omega, 1e-9 * omega * omega);
+  EXPECT_LT(header.complete_to_eigenvalue() * 210e9 / 7850, omega * omega * (1 + 1e-15));
+  EXPECT_EQ(header.verification().sturm_count(), header.verification().rigid_mode_count() +
+                                                     header.mode_count() +
+                                                     header.left_out_mode_count());
+}
+
+TEST_F(CarillonPrecomputeTest, RefusesABodyOfWhichNoModeIsAsAccurateAsWanted) {
+  EXPECT_EQ(ReasonOf(RunBar(std::string(kSteel) + " --max-frequency-error 0.0001%")),
+            "ACCURACY_NOT_REACHED");
 }
 
 TEST_F(CarillonPrecomputeTest, SaysInWordsThatABudgetWasOverrun) {

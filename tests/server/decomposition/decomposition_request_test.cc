@@ -140,6 +140,7 @@ TEST(DecompositionRequest, EverySettingIsPartOfTheName) {
       [](Request& r) { r.mutable_settings()->mutable_mesh()->set_target_node_count(500); },
       [](Request& r) { r.mutable_settings()->set_solver(v1::SOLVER_SPECTRA); },
       [](Request& r) { r.mutable_settings()->set_check_with(v1::SOLVER_SPECTRA); },
+      [](Request& r) { r.mutable_settings()->set_max_frequency_error(0.02); },
       [](Request& r) { r.mutable_settings()->add_fixtures()->set_group("base"); },
       [](Request& r) { r.mutable_settings()->add_fixtures()->set_group("rim"); },
       [](Request& r) { r.mutable_settings()->add_fixtures()->mutable_vertices()->add_indices(0); }};
