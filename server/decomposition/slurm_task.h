@@ -17,9 +17,9 @@ namespace carillon {
 
 /// One decomposition in a folder that the cluster shares, or that RemoteRuns fills for it:
 ///
-///     ticket     what this submission is known by, and the hash of its token where it has one
-///     request    v1::WorkerRequest as text: where it differs from what is asked for now, the
-///                folder is made anew
+///     ticket     the name of this submission, and the hash of its token if it has one
+///     request    v1::WorkerRequest as text; if it differs from the current request, the folder is
+///                made anew
 ///     mesh
 ///     begun.R    a run R has begun        events.R   what it reported
 ///     log.R      its standard error       model.R    its result
