@@ -16,7 +16,10 @@ using Quaternion = std::array<double, 4>;  ///< w, x, y, z
 struct ContactSettings {
   double roughness_depth = 0.5;  ///< as in carillon.v1.Roughness
   double grain_m = 0.001;        ///< as in carillon.v1.Roughness
-  double duration_s = 0.0005;    ///< how long a blow lasts
+  /// How long an impact lasts. The default is that of a hard contact: by Hertz, steel of some grams
+  /// touches steel or ceramic for 0.06 to 0.09 ms, wood for 0.4 ms, rubber for 4 ms. A longer
+  /// contact excites nothing above about 1.4 / duration.
+  double duration_s = 0.0001;
 };
 
 /// One body of a contact; a body that is not dynamic stands still.
