@@ -84,6 +84,18 @@ class InstalledClientTest(DaemonTest):
         for other in ("carillond:", "carillon-precompute:", "carillon:"):
             self.assertNotIn(f"\n{other}", targets)
 
+    def test_a_project_that_adds_this_one_as_a_folder_gets_the_client_alone(self):
+        project = self.folder / "outer"
+        project.mkdir()
+        (project / "CMakeLists.txt").write_text(
+            "cmake_minimum_required(VERSION 3.25)\nproject(outer LANGUAGES C CXX)\n"
+            f"add_subdirectory({ROOT} carillon)\nadd_executable(strike {EXAMPLE}/main.cc)\n"
+            "target_link_libraries(strike PRIVATE carillon::client)\n")
+        run("cmake", "-G", "Ninja", "-S", project, "-B", project / "build")
+        targets = run("cmake", "--build", project / "build", "--target", "help").stdout
+        self.assertIn("\ncarillon_client:", targets)
+        self.assertNotIn("\ncarillond:", targets)
+
 
 if __name__ == "__main__":
     unittest.main()
