@@ -16,6 +16,7 @@
 
 #include "absl/status/status.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 #include "server/api/api_server.h"
 #include "server/base/clock.h"
 #include "server/data_directory.h"
@@ -126,11 +127,10 @@ absl::StatusOr<std::unique_ptr<DecompositionQueue>> MakeQueue(const Options& opt
                                                               ModeDatabase& database,
                                                               const Clock& clock,
                                                               RemoteRuns& runs) {
-  absl::StatusOr<std::unique_ptr<Executor>> executor =
-      MakeExecutor(options, directory, clock, runs);
-  if (!executor.ok()) return executor.status();
+  ASSIGN_OR_RETURN(std::unique_ptr<Executor> executor,
+                   MakeExecutor(options, directory, clock, runs));
   return DecompositionQueue::Make(
-      database, *std::move(executor), clock,
+      database, std::move(executor), clock,
       {.max_queued_count = static_cast<size_t>(options.queue_limit), .log = LogWarning});
 }
 
@@ -155,32 +155,27 @@ ApiSettings ApiSettingsOf(const Options& options) {
 absl::Status Run(const Options& options) {
   const sigset_t stop_signals = BlockStopSignals();
   SystemClock clock;
-  const absl::StatusOr<DataDirectory> directory = DataDirectory::Open(options.data_directory);
-  if (!directory.ok()) return directory.status();
-  const absl::StatusOr<std::unique_ptr<ModeDatabase>> database =
-      ModeDatabase::Open(directory->database_file(), clock);
-  if (!database.ok()) return database.status();
-  (*database)->models().KeepWithin(
+  ASSIGN_OR_RETURN(const DataDirectory directory, DataDirectory::Open(options.data_directory));
+  ASSIGN_OR_RETURN(const std::unique_ptr<ModeDatabase> database,
+                   ModeDatabase::Open(directory.database_file(), clock));
+  database->models().KeepWithin(
       {.bytes = static_cast<uint64_t>(options.model_budget_mib) << 20U, .log = LogWarning});
-  CollectUnusedMeshes(**database);
+  CollectUnusedMeshes(*database);
   RemoteRuns runs;
-  const absl::StatusOr<std::unique_ptr<DecompositionQueue>> decompositions =
-      MakeQueue(options, *directory, **database, clock, runs);
-  if (!decompositions.ok()) return decompositions.status();
-  const absl::StatusOr<std::unique_ptr<LiveOutput>> output =
-      LiveOutput::Start(OutputSettingsOf(options), clock, LogWarning);
-  if (!output.ok()) return output.status();
-  SceneRegistry scenes((*output)->mixer());
-  const absl::StatusOr<std::unique_ptr<ApiServer>> server =
-      ApiServer::Start(ApiSettingsOf(options), {.database = **database,
-                                                .decompositions = **decompositions,
-                                                .runs = runs,
-                                                .scenes = scenes,
-                                                .output = **output,
-                                                .clock = clock});
-  if (!server.ok()) return server.status();
-  LogOutput(**output);
-  AnnounceReady(**server);
+  ASSIGN_OR_RETURN(const std::unique_ptr<DecompositionQueue> decompositions,
+                   MakeQueue(options, directory, *database, clock, runs));
+  ASSIGN_OR_RETURN(const std::unique_ptr<LiveOutput> output,
+                   LiveOutput::Start(OutputSettingsOf(options), clock, LogWarning));
+  SceneRegistry scenes(output->mixer());
+  ASSIGN_OR_RETURN(const std::unique_ptr<ApiServer> server,
+                   ApiServer::Start(ApiSettingsOf(options), {.database = *database,
+                                                             .decompositions = *decompositions,
+                                                             .runs = runs,
+                                                             .scenes = scenes,
+                                                             .output = *output,
+                                                             .clock = clock}));
+  LogOutput(*output);
+  AnnounceReady(*server);
   WaitForStop(stop_signals);
   sd_notify(0, "STOPPING=1");
   return absl::OkStatus();
@@ -188,19 +183,17 @@ absl::Status Run(const Options& options) {
 
 /// Runs `carillond db check|repair|restore`.
 absl::Status RunDatabaseCommand(const CommandLine& command) {
-  const absl::StatusOr<DataDirectory> directory =
-      DataDirectory::Open(command.options.data_directory);
-  if (!directory.ok()) return directory.status();
+  ASSIGN_OR_RETURN(const DataDirectory directory,
+                   DataDirectory::Open(command.options.data_directory));
   int finding_count = 0;
   const auto on_finding = [&](const std::string& line) {
     ++finding_count;
     std::cout << line << std::endl;
   };
-  const std::filesystem::path file = directory->database_file();
+  const std::filesystem::path file = directory.database_file();
   if (command.database_command == "restore") return RestoreDatabase(file, command.backup_file);
-  absl::Status status = command.database_command == "check" ? CheckDatabase(file, on_finding)
-                                                            : RepairDatabase(file, on_finding);
-  if (!status.ok()) return status;
+  RETURN_IF_ERROR(command.database_command == "check" ? CheckDatabase(file, on_finding)
+                                                      : RepairDatabase(file, on_finding));
   std::cout << finding_count << (finding_count == 1 ? " fault" : " faults") << std::endl;
   if (command.database_command == "repair" || finding_count == 0) return absl::OkStatus();
   return Refusal(absl::StatusCode::kDataLoss, "DATABASE_CORRUPT",

@@ -11,6 +11,7 @@
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/server_address.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon {
 namespace {
@@ -65,10 +66,7 @@ absl::Status ReadAddresses(const toml::node& node, std::vector<std::string>& add
   const toml::array* array = node.as_array();
   if (array == nullptr) return ReadValue("listen", node, addresses.emplace_back());
   for (const toml::node& element : *array) {
-    if (absl::Status status = ReadValue("listen", element, addresses.emplace_back());
-        !status.ok()) {
-      return status;
-    }
+    RETURN_IF_ERROR(ReadValue("listen", element, addresses.emplace_back()));
   }
   return absl::OkStatus();
 }
@@ -107,9 +105,7 @@ absl::Status ReadFile(const std::string& path, Options& options) {
   try {
     const toml::table table = toml::parse_file(path);
     for (const auto& [key, node] : table) {
-      if (absl::Status status = ReadKey(std::string(key.str()), node, options); !status.ok()) {
-        return status;
-      }
+      RETURN_IF_ERROR(ReadKey(std::string(key.str()), node, options));
     }
   } catch (const toml::parse_error& error) {
     return InvalidConfiguration(
@@ -265,16 +261,14 @@ absl::StatusOr<CommandLine> ReadCommandLine(int argc, const char* const* argv,
     if (with_file) {
       if (configuration.empty()) break;
       command.options = Defaults();
-      if (absl::Status status = ReadFile(configuration, command.options); !status.ok()) {
-        return status;
-      }
+      RETURN_IF_ERROR(ReadFile(configuration, command.options));
     }
     if (const auto exit_status = ParseFlags(argc, argv, version, configuration, command)) {
       command.exit_status = *exit_status;
       return command;
     }
   }
-  if (absl::Status status = Check(command.options); !status.ok()) return status;
+  RETURN_IF_ERROR(Check(command.options));
   command.run = true;
   return command;
 }

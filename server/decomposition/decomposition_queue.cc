@@ -3,6 +3,7 @@
 
 #include <utility>
 
+#include "proto/cpp/status_macros.h"
 #include "server/decomposition/queue_core.h"
 
 namespace carillon {
@@ -61,7 +62,7 @@ absl::StatusOr<v1::Job> DecompositionQueue::Cancel(const std::string& digest) {
 absl::StatusOr<std::unique_ptr<JobWatch>> DecompositionQueue::Watch(
     const std::string& digest, std::function<void(const v1::Job&)> on_change) {
   auto watcher = std::make_shared<Watcher>(std::move(on_change));
-  if (const absl::Status status = core_->Watch(digest, watcher); !status.ok()) return status;
+  RETURN_IF_ERROR(core_->Watch(digest, watcher));
   return std::make_unique<carillon::Watch>(core_, digest, std::move(watcher));
 }
 

@@ -22,6 +22,7 @@
 #include "absl/base/thread_annotations.h"
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 #include "server/base/mutex.h"
 #include "server/decomposition/local_worker.h"
 
@@ -266,7 +267,7 @@ absl::StatusOr<std::unique_ptr<Executor>> MakeLocalExecutor(const LocalExecutorO
                    absl::StrCat(options.program.string(),
                                 " cannot be executed: install carillon-precompute, or name it"));
   }
-  if (const absl::Status status = PrepareDirectory(options.directory); !status.ok()) return status;
+  RETURN_IF_ERROR(PrepareDirectory(options.directory));
   LocalExecutorOptions filled = options;
   filled.program = std::filesystem::absolute(options.program);
   if (filled.worker_count == 0) {

@@ -58,9 +58,8 @@ std::string LogSentence(std::string log) {
 }
 
 absl::StatusOr<Pipe> MakePipe() {
-  absl::StatusOr<Pipe> pipe = Pipe::Make();
-  if (!pipe.ok()) return pipe.status();
-  if (absl::Status status = pipe->DoNotWait(); !status.ok()) return status;
+  ASSIGN_OR_RETURN(Pipe pipe, Pipe::Make());
+  RETURN_IF_ERROR(pipe.DoNotWait());
   return pipe;
 }
 
@@ -108,20 +107,17 @@ absl::StatusOr<LocalWorker> LocalWorker::Start(PreparedTask prepared,
   const WorkerPlace place{program, folder / "mesh", folder / "request", folder / "model",
                           share.thread_count};
   const WorkerLimits own = limits.For(prepared.task.request);
-  absl::StatusOr<Pipe> events = MakePipe();
-  absl::StatusOr<Pipe> errors = MakePipe();
-  if (!events.ok()) return events.status();
-  if (!errors.ok()) return errors.status();
-  absl::StatusOr<ChildProcess> process =
-      ChildProcess::Start({.words = WorkerCommand(place),
-                           .errors = errors->write_end(),
-                           .events = events->write_end(),
-                           .worker_processor_count = share.processor_count});
-  if (!process.ok()) return process.status();
-  events->CloseWriteEnd();
-  errors->CloseWriteEnd();
-  return LocalWorker(std::move(prepared), *std::move(events), *std::move(errors),
-                     *std::move(process), own, now);
+  ASSIGN_OR_RETURN(Pipe events, MakePipe());
+  ASSIGN_OR_RETURN(Pipe errors, MakePipe());
+  ASSIGN_OR_RETURN(ChildProcess process,
+                   ChildProcess::Start({.words = WorkerCommand(place),
+                                        .errors = errors.write_end(),
+                                        .events = events.write_end(),
+                                        .worker_processor_count = share.processor_count}));
+  events.CloseWriteEnd();
+  errors.CloseWriteEnd();
+  return LocalWorker(std::move(prepared), std::move(events), std::move(errors), std::move(process),
+                     own, now);
 }
 
 void LocalWorker::Read(nanoseconds now) {

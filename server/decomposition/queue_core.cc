@@ -9,6 +9,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 #include "server/decomposition/coarse_request.h"
 #include "server/decomposition/decomposition_request.h"
 #include "server/decomposition/job_rules.h"
@@ -42,17 +43,16 @@ void TellAll(const std::vector<Notice>& notices) {
 }  // namespace
 
 absl::Status QueueCore::TakeUp() {
-  const auto records = database_.jobs().Unfinished();
-  if (!records.ok()) return records.status();
+  ASSIGN_OR_RETURN(const auto records, database_.jobs().Unfinished());
   Notices notices;  // nobody watches yet
   database_.models().ListenToQuarantine(
       [this](const std::string& digest, const absl::Status& why) { OnQuarantine(digest, why); });
   runs_.RecallExperience();
   MutexLock lock(&runs_.writer());
-  for (const JobRecord& record : *records) {
+  for (const JobRecord& record : records) {
     // A coarse model's job may have been queued already, by the job that waits for it.
     if (jobs_.Contains(record.digest)) continue;
-    if (absl::Status status = TakeUpJob(record, notices); !status.ok()) return status;
+    RETURN_IF_ERROR(TakeUpJob(record, notices));
   }
   runs_.StartWhatFits(notices);
   return absl::OkStatus();
@@ -89,16 +89,15 @@ void QueueCore::Stop() {
 }
 
 absl::StatusOr<v1::Job> QueueCore::Submit(const v1::CreateModalModelRequest& request) {
-  const absl::StatusOr<v1::CreateModalModelRequest> resolved = ResolveRequest(request);
-  if (!resolved.ok()) return resolved.status();
-  const std::string digest = RequestDigest(*resolved);
+  ASSIGN_OR_RETURN(const v1::CreateModalModelRequest resolved, ResolveRequest(request));
+  const std::string digest = RequestDigest(resolved);
   Notices notices;
   absl::StatusOr<v1::Job> job;
   {
     MutexLock lock(&runs_.writer());
     const std::optional<ActiveJob> active = jobs_.Find(digest);
-    job = active.has_value() ? SubmitAgain(*active, *resolved)
-                             : SubmitNew(digest, *resolved, notices);
+    job =
+        active.has_value() ? SubmitAgain(*active, resolved) : SubmitNew(digest, resolved, notices);
   }
   TellAll(notices);
   return job;
@@ -107,37 +106,34 @@ absl::StatusOr<v1::Job> QueueCore::Submit(const v1::CreateModalModelRequest& req
 absl::StatusOr<v1::Job> QueueCore::SubmitNew(const std::string& digest,
                                              const v1::CreateModalModelRequest& request,
                                              Notices& notices) {
-  const absl::StatusOr<std::optional<JobRecord>> known = database_.jobs().Find(digest);
-  if (!known.ok()) return known.status();
-  const absl::StatusOr<bool> satisfied = IsSatisfied(database_.models(), digest, *known, request);
-  if (!satisfied.ok()) return satisfied.status();
-  if (known->has_value() && (*satisfied ? (*known)->state == v1::JOB_STATE_SUCCEEDED
-                                        : WouldFailAgain(**known, request))) {
+  ASSIGN_OR_RETURN(const std::optional<JobRecord> known, database_.jobs().Find(digest));
+  ASSIGN_OR_RETURN(const bool satisfied, IsSatisfied(database_.models(), digest, known, request));
+  if (known.has_value() &&
+      (satisfied ? known->state == v1::JOB_STATE_SUCCEEDED : WouldFailAgain(*known, request))) {
     // The record stays unchanged: its request tells how far the model was computed.
-    return ToJob(**known);
+    return ToJob(*known);
   }
-  if (!*satisfied) {
-    if (absl::Status status = CheckAcceptable(request); !status.ok()) return status;
+  if (!satisfied) {
+    RETURN_IF_ERROR(CheckAcceptable(request));
   }
   // The coarse job is stored first. A daemon that takes up this job then finds the coarse one.
-  std::string coarse = *satisfied ? "" : StartCoarse(digest, request, notices);
+  std::string coarse = satisfied ? "" : StartCoarse(digest, request, notices);
   JobRecord record{.digest = digest,
                    .request = request.SerializeAsString(),
                    .label = request.label(),
-                   .state = *satisfied ? v1::JOB_STATE_SUCCEEDED : v1::JOB_STATE_QUEUED,
+                   .state = satisfied ? v1::JOB_STATE_SUCCEEDED : v1::JOB_STATE_QUEUED,
                    .created_unix_ms = clock_.UnixMs(),
                    .priority = request.priority()};
-  if (known->has_value()) record.peak_bytes = (*known)->peak_bytes;
-  if (const absl::Status status = database_.jobs().Put(record); !status.ok()) return status;
-  if (*satisfied) return ToJob(record);
+  if (known.has_value()) record.peak_bytes = known->peak_bytes;
+  RETURN_IF_ERROR(database_.jobs().Put(record));
+  if (satisfied) return ToJob(record);
   Enqueue(std::move(record), request, std::move(coarse));
   runs_.StartWhatFits(notices);
   return Get(digest);
 }
 
 absl::Status QueueCore::CheckAcceptable(const v1::CreateModalModelRequest& request) {
-  const auto mesh = database_.meshes().Find(request.mesh_digest());
-  if (!mesh.ok()) return mesh.status();
+  RETURN_IF_ERROR(database_.meshes().Find(request.mesh_digest()).status());
   const size_t count = jobs_.queued_count();
   if (count < settings_.max_queued_count) return absl::OkStatus();
   return QueueFull(count, runs_.retry_after_s());
@@ -173,7 +169,7 @@ absl::StatusOr<v1::Job> QueueCore::SubmitAgain(const ActiveJob& active,
   record.state = v1::JOB_STATE_QUEUED;
   record.priority = std::max(record.priority, request.priority());
   if (wanted_no_more || farther) record.request = request.SerializeAsString();
-  if (const absl::Status status = database_.jobs().Put(record); !status.ok()) return status;
+  RETURN_IF_ERROR(database_.jobs().Put(record));
   return jobs_
       .Change(digest,
               [&](ActiveJob& job) {
@@ -233,11 +229,10 @@ absl::StatusOr<v1::Job> QueueCore::Get(const std::string& digest) {
 absl::StatusOr<DecompositionJobPage> QueueCore::List(int page_size, const std::string& page_token) {
   // The memory is read first: a job that a client has seen running is not listed as queued then.
   std::map<std::string, v1::Job> active = jobs_.ViewAll();
-  const absl::StatusOr<JobPage> records = database_.jobs().List(page_size, page_token);
-  if (!records.ok()) return records.status();
+  ASSIGN_OR_RETURN(const JobPage records, database_.jobs().List(page_size, page_token));
   DecompositionJobPage page;
-  page.next_page_token = records->next_page_token;
-  for (const JobRecord& record : records->jobs) {
+  page.next_page_token = records.next_page_token;
+  for (const JobRecord& record : records.jobs) {
     const auto job = active.find(record.digest);
     page.jobs.push_back(job == active.end() ? ToJob(record) : std::move(job->second));
   }
@@ -255,7 +250,7 @@ absl::StatusOr<v1::Job> QueueCore::Cancel(const std::string& digest) {
     if (active->running.has_value()) runs_.Cancel(digest);
     record = active->record;
     record.state = v1::JOB_STATE_CANCELLED;
-    if (const absl::Status status = database_.jobs().Put(record); !status.ok()) return status;
+    RETURN_IF_ERROR(database_.jobs().Put(record));
     if (active->running.has_value()) {
       return jobs_
           .Change(digest,
@@ -275,7 +270,7 @@ absl::Status QueueCore::DeleteModel(const std::string& digest) {
   Notices notices;
   {
     MutexLock lock(&runs_.writer());
-    if (absl::Status status = database_.models().Delete(digest); !status.ok()) return status;
+    RETURN_IF_ERROR(database_.models().Delete(digest));
     std::optional<ActiveJob> active = jobs_.Find(digest);
     if (!active.has_value()) return absl::OkStatus();
     active->record.state = v1::JOB_STATE_CANCELLED;
@@ -320,10 +315,9 @@ void QueueCore::Forget(const std::string& digest, const std::shared_ptr<Watcher>
 }
 
 absl::StatusOr<v1::Job> QueueCore::FindStored(const std::string& digest) {
-  const absl::StatusOr<std::optional<JobRecord>> record = database_.jobs().Find(digest);
-  if (!record.ok()) return record.status();
-  if (!record->has_value()) return NotFound(digest);
-  return ToJob(**record);
+  ASSIGN_OR_RETURN(const std::optional<JobRecord> record, database_.jobs().Find(digest));
+  if (!record.has_value()) return NotFound(digest);
+  return ToJob(*record);
 }
 
 }  // namespace carillon

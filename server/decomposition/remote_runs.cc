@@ -11,6 +11,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 #include "server/base/sha256.h"
 #include "server/decomposition/random_digits.h"
 #include "server/decomposition/worker_events.h"
@@ -92,7 +93,7 @@ RunUpload& RunUpload::operator=(RunUpload&&) noexcept = default;
 RunUpload::~RunUpload() = default;
 
 absl::Status RunUpload::Append(const v1::ModalModelRecord& record) {
-  if (absl::Status status = state_->checker.Check(record); !status.ok()) return status;
+  RETURN_IF_ERROR(state_->checker.Check(record));
   const std::filesystem::path file = state_->File("model");
   if (!state_->model.is_open()) state_->model.open(file, std::ios::binary);
   state_->model << Delimited(record);
@@ -101,7 +102,7 @@ absl::Status RunUpload::Append(const v1::ModalModelRecord& record) {
 
 absl::Status RunUpload::Finish(const v1::RunEnd& end) {
   if (end.exit_status() == 0 && !end.has_error()) {
-    if (absl::Status status = state_->checker.Finish(); !status.ok()) return status;
+    RETURN_IF_ERROR(state_->checker.Finish());
     state_->model.close();
     if (!state_->model || !Sync(state_->File("model"))) return NotWritable(state_->File("model"));
   }
@@ -114,14 +115,13 @@ absl::Status RunUpload::Finish(const v1::RunEnd& end) {
     return NotWritable(ending);
   }
   const MutexLock lock(&state_->runs.mutex_);
-  const auto folder = state_->runs.FolderOf(state_->digest, state_->token);
-  if (!folder.ok()) return folder.status();
+  ASSIGN_OR_RETURN(const auto folder, state_->runs.FolderOf(state_->digest, state_->token));
   // The link can be made once, so one of several runs ends the job.
-  if (link(ending.c_str(), (*folder / "end").c_str()) != 0) {
-    return errno == EEXIST ? Used(state_->digest) : NotWritable(*folder / "end");
+  if (link(ending.c_str(), (folder / "end").c_str()) != 0) {
+    return errno == EEXIST ? Used(state_->digest) : NotWritable(folder / "end");
   }
   state_->kept = true;
-  Sync(*folder);
+  Sync(folder);
   return absl::OkStatus();
 }
 
@@ -166,11 +166,10 @@ absl::StatusOr<std::filesystem::path> RemoteRuns::FolderOf(const std::string& di
 absl::StatusOr<std::filesystem::path> RemoteRuns::Begin(const std::string& digest,
                                                         const std::string& token) {
   const MutexLock lock(&mutex_);
-  const auto folder = FolderOf(digest, token);
-  if (!folder.ok()) return folder.status();
-  const std::filesystem::path begun = *folder / absl::StrCat("begun.", RandomDigits(2));
+  ASSIGN_OR_RETURN(const auto folder, FolderOf(digest, token));
+  const std::filesystem::path begun = folder / absl::StrCat("begun.", RandomDigits(2));
   if (!Write(begun, "")) return NotWritable(begun);
-  return *folder / "mesh";
+  return folder / "mesh";
 }
 
 absl::Status RemoteRuns::Report(const std::string& digest, const std::string& token,
@@ -178,13 +177,12 @@ absl::Status RemoteRuns::Report(const std::string& digest, const std::string& to
   v1::WorkerEvent event;
   *event.mutable_progress() = progress;
   const MutexLock lock(&mutex_);
-  const auto folder = FolderOf(digest, token);
-  if (!folder.ok()) return folder.status();
+  ASSIGN_OR_RETURN(const auto folder, FolderOf(digest, token));
   // A rename, so that a reader never finds half of the content.
-  const std::filesystem::path written = *folder / "reported";
+  const std::filesystem::path written = folder / "reported";
   std::error_code error;
   if (Write(written, Delimited(event))) {
-    std::filesystem::rename(written, *folder / "events.reported", error);
+    std::filesystem::rename(written, folder / "events.reported", error);
     if (!error) return absl::OkStatus();
   }
   return NotWritable(written);
@@ -193,9 +191,8 @@ absl::Status RemoteRuns::Report(const std::string& digest, const std::string& to
 absl::StatusOr<RunUpload> RemoteRuns::BeginUpload(const std::string& digest,
                                                   const std::string& token) {
   const MutexLock lock(&mutex_);
-  auto folder = FolderOf(digest, token);
-  if (!folder.ok()) return folder.status();
-  return RunUpload(std::make_unique<RunUpload::State>(*this, digest, token, *folder));
+  ASSIGN_OR_RETURN(auto folder, FolderOf(digest, token));
+  return RunUpload(std::make_unique<RunUpload::State>(*this, digest, token, folder));
 }
 
 }  // namespace carillon

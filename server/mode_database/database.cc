@@ -6,16 +6,16 @@
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 #include "server/mode_database/schema.h"
 
 namespace carillon {
 namespace {
 
 absl::StatusOr<std::unique_ptr<SqliteConnection>> Connect(const std::filesystem::path& file) {
-  auto connection = SqliteConnection::Open(file);
-  if (!connection.ok()) return connection.status();
+  ASSIGN_OR_RETURN(auto connection, SqliteConnection::Open(file));
   const absl::Status status =
-      (*connection)
+      (connection)
           ->RunScript(
               // Large pages suit large blobs. An existing file keeps its page size.
               "PRAGMA page_size = 65536; PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL; "
@@ -54,9 +54,8 @@ absl::StatusOr<std::unique_ptr<Database>> Database::Open(const std::filesystem::
     return Unusable(absolute, connection.status().message());
   }
   if (!connection.ok()) return connection.status();
-  const absl::Status migrated = InTransaction(**connection, "BEGIN IMMEDIATE",
-                                              [](SqliteConnection& c) { return Migrate(c); });
-  if (!migrated.ok()) return migrated;
+  RETURN_IF_ERROR(InTransaction(**connection, "BEGIN IMMEDIATE",
+                                [](SqliteConnection& c) { return Migrate(c); }));
   return std::unique_ptr<Database>(new Database(absolute, *std::move(connection)));
 }
 
@@ -66,11 +65,10 @@ absl::Status Database::Write(absl::FunctionRef<absl::Status(SqliteConnection&)> 
 }
 
 absl::Status Database::Read(absl::FunctionRef<absl::Status(SqliteConnection&)> body) {
-  auto reader = TakeReader();
-  if (!reader.ok()) return reader.status();
-  absl::Status status = InTransaction(**reader, "BEGIN DEFERRED", body);
+  ASSIGN_OR_RETURN(auto reader, TakeReader());
+  absl::Status status = InTransaction(*reader, "BEGIN DEFERRED", body);
   MutexLock lock(&readers_mutex_);
-  idle_readers_.push_back(*std::move(reader));
+  idle_readers_.push_back(std::move(reader));
   return status;
 }
 

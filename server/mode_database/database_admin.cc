@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "proto/cpp/status_macros.h"
 #include "server/base/clock.h"
 #include "server/base/sha256.h"
 #include "server/mode_database/database.h"
@@ -111,11 +112,10 @@ absl::Status CheckJobs(Database& database, const OnFinding& on_finding) {
 
 absl::StatusOr<DatabaseStats> ReadStats(Database& database) {
   DatabaseStats stats;
-  const absl::Status status = database.Read([&](SqliteConnection& connection) {
+  RETURN_IF_ERROR(database.Read([&](SqliteConnection& connection) {
     absl::Status counted = CountRows(connection, stats);
     return counted.ok() ? CountPages(connection, stats) : counted;
-  });
-  if (!status.ok()) return status;
+  }));
   return stats;
 }
 
@@ -125,11 +125,9 @@ absl::Status BackUp(Database& database, const std::filesystem::path& copy) {
 }
 
 absl::Status CheckDatabase(const std::filesystem::path& file, const OnFinding& on_finding) {
-  const absl::StatusOr<std::unique_ptr<Database>> database = Database::Open(file);
-  if (!database.ok()) return database.status();
+  ASSIGN_OR_RETURN(const std::unique_ptr<Database> database, Database::Open(file));
   for (const auto check : {CheckStructure, CheckModels, CheckMeshes, CheckJobs}) {
-    absl::Status status = check(**database, on_finding);
-    if (!status.ok()) return status;
+    RETURN_IF_ERROR(check(*database, on_finding));
   }
   return absl::OkStatus();
 }

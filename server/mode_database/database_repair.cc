@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 #include "server/base/clock.h"
 #include "server/base/sha256.h"
 #include "server/mode_database/database.h"
@@ -53,26 +54,21 @@ absl::Status CopyModel(Database& from, Database& to, const std::string& digest) 
   const SystemClock clock;
   ModelStore source(from, clock);
   ModelStore target(to, clock);
-  absl::StatusOr<ModelExport> records = source.Export(digest);
-  if (!records.ok()) return records.status();
-  const absl::StatusOr<ModelSummary> summary = source.Summary(digest);
-  if (!summary.ok()) return summary.status();
-  absl::StatusOr<ModelImport> copy = target.Import(digest, summary->label);
-  if (!copy.ok()) return copy.status();
+  ASSIGN_OR_RETURN(ModelExport records, source.Export(digest));
+  ASSIGN_OR_RETURN(const ModelSummary summary, source.Summary(digest));
+  ASSIGN_OR_RETURN(ModelImport copy, target.Import(digest, summary.label));
   while (true) {
-    const auto record = records->Next();
-    if (!record.ok()) return record.status();
-    if (!record->has_value()) break;
-    if (absl::Status status = copy->Append(**record); !status.ok()) return status;
+    ASSIGN_OR_RETURN(const auto record, records.Next());
+    if (!record.has_value()) break;
+    RETURN_IF_ERROR(copy.Append(*record));
   }
-  if (const auto stored = copy->Finish(); !stored.ok()) return stored.status();
-  const auto updated =
-      target.Update(digest, {.add_tags = summary->tags, .pinned = summary->pinned});
-  if (!updated.ok()) return updated.status();
+  if (const auto stored = copy.Finish(); !stored.ok()) return stored.status();
+  RETURN_IF_ERROR(
+      target.Update(digest, {.add_tags = summary.tags, .pinned = summary.pinned}).status());
   return to.Write([&](SqliteConnection& connection) {
     return connection.Run(
         "UPDATE models SET created_unix_ms = ?, sounded_unix_ms = ? WHERE digest = ?",
-        {summary->created_unix_ms, summary->sounded_unix_ms, digest});
+        {summary.created_unix_ms, summary.sounded_unix_ms, digest});
   });
 }
 
@@ -87,18 +83,16 @@ absl::Status CopyMesh(Database& from, Database& to, const std::string& digest) {
                    absl::StrCat("the mesh ", digest, " has changed on the disk: upload it again"));
   }
   const SystemClock clock;
-  absl::StatusOr<MeshUpload> copy = MeshStore(to, clock).Begin();
-  if (!copy.ok()) return copy.status();
-  status = ReadMesh(from, digest, [&](std::string_view bytes) { return copy->Append(bytes); });
-  return status.ok() ? copy->Finish().status() : status;
+  ASSIGN_OR_RETURN(MeshUpload copy, MeshStore(to, clock).Begin());
+  status = ReadMesh(from, digest, [&](std::string_view bytes) { return copy.Append(bytes); });
+  return status.ok() ? copy.Finish().status() : status;
 }
 
 absl::Status CopyJob(Database& from, Database& to, const std::string& digest) {
-  const auto job = JobStore(from).Find(digest);
-  if (!job.ok()) return job.status();
-  if (!job->has_value()) return absl::OkStatus();
-  if ((*job)->damaged) return FromErrorInfo(absl::StatusCode::kDataLoss, (*job)->error);
-  return JobStore(to).Put(**job);
+  ASSIGN_OR_RETURN(const auto job, JobStore(from).Find(digest));
+  if (!job.has_value()) return absl::OkStatus();
+  if (job->damaged) return FromErrorInfo(absl::StatusCode::kDataLoss, job->error);
+  return JobStore(to).Put(*job);
 }
 
 // A full disk ends the repair; a damaged row is only left out.
@@ -124,14 +118,11 @@ absl::Status RepairDatabase(const std::filesystem::path& file, const OnFinding& 
   const std::filesystem::path fresh = file.string() + ".repaired";
   Remove(fresh);
   {
-    const absl::StatusOr<std::unique_ptr<Database>> from = Database::Open(file);
-    if (!from.ok()) return from.status();
-    const absl::StatusOr<std::unique_ptr<Database>> to = Database::Open(fresh);
-    if (!to.ok()) return to.status();
-    absl::Status status = CopyWhole(**from, **to, on_finding);
-    if (!status.ok()) return status;
+    ASSIGN_OR_RETURN(const std::unique_ptr<Database> from, Database::Open(file));
+    ASSIGN_OR_RETURN(const std::unique_ptr<Database> to, Database::Open(fresh));
+    RETURN_IF_ERROR(CopyWhole(*from, *to, on_finding));
   }
-  if (absl::Status status = Move(file, file.string() + ".damaged"); !status.ok()) return status;
+  RETURN_IF_ERROR(Move(file, file.string() + ".damaged"));
   return Move(fresh, file);
 }
 

@@ -9,6 +9,7 @@
 #include "absl/functional/function_ref.h"
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 #include "server/base/xxh3.h"
 #include "server/mode_database/database.h"
 #include "server/mode_database/page_token.h"
@@ -87,20 +88,19 @@ absl::Status JobStore::Put(const JobRecord& job) {
 
 absl::StatusOr<std::optional<JobRecord>> JobStore::Find(const std::string& digest) {
   std::optional<JobRecord> job;
-  const absl::Status status = database_->Read([&](SqliteConnection& connection) {
+  RETURN_IF_ERROR(database_->Read([&](SqliteConnection& connection) {
     return connection.Query(absl::StrCat(kSelectRows, "WHERE digest = ?").c_str(), {digest},
                             [&](const SqlRow& row) {
                               job = ParseRow(row);
                               return absl::OkStatus();
                             });
-  });
-  if (!status.ok()) return status;
+  }));
   return job;
 }
 
 absl::StatusOr<std::vector<JobRecord>> JobStore::Unfinished() {
   std::vector<JobRecord> jobs;
-  const absl::Status status = database_->Read([&](SqliteConnection& connection) {
+  RETURN_IF_ERROR(database_->Read([&](SqliteConnection& connection) {
     // Every row is read, because a state that has changed on the disk would hide its job.
     return connection.Query(absl::StrCat(kSelectRows, "ORDER BY number").c_str(), {},
                             [&](const SqlRow& row) {
@@ -111,26 +111,23 @@ absl::StatusOr<std::vector<JobRecord>> JobStore::Unfinished() {
                               }
                               return absl::OkStatus();
                             });
-  });
-  if (!status.ok()) return status;
+  }));
   return jobs;
 }
 
 absl::StatusOr<JobPage> JobStore::List(int page_size, const std::string& page_token) {
-  const absl::StatusOr<PageRange> range = ParsePage(page_size, page_token);
-  if (!range.ok()) return range.status();
+  ASSIGN_OR_RETURN(const PageRange range, ParsePage(page_size, page_token));
   JobPage page;
-  const absl::Status status = database_->Read([&](SqliteConnection& connection) {
+  RETURN_IF_ERROR(database_->Read([&](SqliteConnection& connection) {
     return connection.Query(
         absl::StrCat(kSelectRows, "WHERE number < ? ORDER BY number DESC LIMIT ?").c_str(),
-        {range->below, range->size}, [&](const SqlRow& row) {
+        {range.below, range.size}, [&](const SqlRow& row) {
           page.next_page_token = absl::StrCat(row.Int(0));
           page.jobs.push_back(ParseRow(row));
           return absl::OkStatus();
         });
-  });
-  if (!status.ok()) return status;
-  if (std::ssize(page.jobs) < range->size) page.next_page_token.clear();
+  }));
+  if (std::ssize(page.jobs) < range.size) page.next_page_token.clear();
   return page;
 }
 
@@ -142,14 +139,13 @@ absl::Status JobStore::Delete(const std::string& digest) {
 
 absl::StatusOr<std::optional<std::string>> JobStore::Fact(const std::string& name) {
   std::optional<std::string> value;
-  const absl::Status status = database_->Read([&](SqliteConnection& connection) {
+  RETURN_IF_ERROR(database_->Read([&](SqliteConnection& connection) {
     return connection.Query("SELECT value FROM facts WHERE name = ?", {name},
                             [&](const SqlRow& row) {
                               value = row.Text(0);
                               return absl::OkStatus();
                             });
-  });
-  if (!status.ok()) return status;
+  }));
   return value;
 }
 

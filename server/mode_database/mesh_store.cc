@@ -15,6 +15,7 @@
 #include "carillon/v1/modal_model.pb.h"
 #include "carillon/v1/modal_model_service.pb.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 #include "server/mode_database/database.h"
 
 namespace carillon {
@@ -25,20 +26,18 @@ constexpr size_t kChunkBytes = 1 << 20;
 absl::StatusOr<std::optional<StoredMesh>> Select(SqliteConnection& connection,
                                                  const std::string& digest) {
   std::optional<StoredMesh> mesh;
-  const absl::Status status = connection.Query(
-      "SELECT byte_count FROM meshes WHERE digest = ?", {digest}, [&](const SqlRow& row) {
-        mesh = StoredMesh{digest, static_cast<uint64_t>(row.Int(0))};
-        return absl::OkStatus();
-      });
-  if (!status.ok()) return status;
+  RETURN_IF_ERROR(connection.Query("SELECT byte_count FROM meshes WHERE digest = ?", {digest},
+                                   [&](const SqlRow& row) {
+                                     mesh = StoredMesh{digest, static_cast<uint64_t>(row.Int(0))};
+                                     return absl::OkStatus();
+                                   }));
   return mesh;
 }
 
 absl::Status Insert(SqliteConnection& connection, const StoredMesh& mesh, int64_t unix_ms,
                     SpoolFile& file) {
-  const auto known = Select(connection, mesh.digest);
-  if (!known.ok()) return known.status();
-  if (known->has_value()) {
+  ASSIGN_OR_RETURN(const auto known, Select(connection, mesh.digest));
+  if (known.has_value()) {
     return connection.Run("UPDATE meshes SET uploaded_unix_ms = ? WHERE digest = ?",
                           {unix_ms, mesh.digest});
   }
@@ -47,10 +46,9 @@ absl::Status Insert(SqliteConnection& connection, const StoredMesh& mesh, int64_
                      {mesh.digest, static_cast<int64_t>(mesh.byte_count), unix_ms});
   if (status.ok()) status = file.Rewind();
   for (uint64_t offset = 0; status.ok() && offset < mesh.byte_count; offset += kChunkBytes) {
-    const absl::StatusOr<std::string> bytes = file.Read(kChunkBytes);
-    if (!bytes.ok()) return bytes.status();
+    ASSIGN_OR_RETURN(const std::string bytes, file.Read(kChunkBytes));
     status = connection.Run("INSERT INTO mesh_chunks (digest, byte_offset, data) VALUES (?, ?, ?)",
-                            {mesh.digest, static_cast<int64_t>(offset), SqlBlob{*bytes}});
+                            {mesh.digest, static_cast<int64_t>(offset), SqlBlob{bytes}});
   }
   return status;
 }
@@ -59,15 +57,14 @@ absl::Status Insert(SqliteConnection& connection, const StoredMesh& mesh, int64_
 /// skipped.
 absl::Status ForEachReference(SqliteConnection& connection,
                               absl::FunctionRef<void(const std::string&)> on_mesh) {
-  absl::Status status = connection.Query("SELECT header FROM models", {}, [&](const SqlRow& row) {
+  RETURN_IF_ERROR(connection.Query("SELECT header FROM models", {}, [&](const SqlRow& row) {
     v1::ModalModelHeader header;
     const std::string_view bytes = row.Blob(0);
     if (header.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) {
       on_mesh(header.mesh_digest());
     }
     return absl::OkStatus();
-  });
-  if (!status.ok()) return status;
+  }));
   return connection.Query("SELECT request FROM jobs", {}, [&](const SqlRow& row) {
     v1::CreateModalModelRequest request;
     const std::string_view bytes = row.Blob(0);
@@ -138,43 +135,36 @@ absl::StatusOr<StoredMesh> MeshUpload::Finish() {
                    "the mesh file has no bytes: send its content");
   }
   const StoredMesh mesh{digest_.Finish(), byte_count_};
-  const absl::Status status = database_->Write([&](SqliteConnection& connection) {
+  RETURN_IF_ERROR(database_->Write([&](SqliteConnection& connection) {
     return Insert(connection, mesh, clock_->UnixMs(), file_);
-  });
-  if (!status.ok()) return status;
+  }));
   return mesh;
 }
 
 absl::StatusOr<MeshUpload> MeshStore::Begin() {
-  absl::StatusOr<SpoolFile> file = SpoolFile::Make(database_->folder());
-  if (!file.ok()) return file.status();
-  return MeshUpload(*database_, *clock_, *std::move(file));
+  ASSIGN_OR_RETURN(SpoolFile file, SpoolFile::Make(database_->folder()));
+  return MeshUpload(*database_, *clock_, std::move(file));
 }
 
 absl::StatusOr<StoredMesh> MeshStore::Put(std::string_view bytes) {
-  absl::StatusOr<MeshUpload> upload = Begin();
-  if (!upload.ok()) return upload.status();
-  const absl::Status status = upload->Append(bytes);
-  if (!status.ok()) return status;
-  return upload->Finish();
+  ASSIGN_OR_RETURN(MeshUpload upload, Begin());
+  RETURN_IF_ERROR(upload.Append(bytes));
+  return upload.Finish();
 }
 
 absl::StatusOr<StoredMesh> MeshStore::Find(const std::string& digest) {
   std::optional<StoredMesh> mesh;
-  const absl::Status status = database_->Read([&](SqliteConnection& connection) {
-    auto found = Select(connection, digest);
-    if (!found.ok()) return found.status();
-    mesh = *std::move(found);
+  RETURN_IF_ERROR(database_->Read([&](SqliteConnection& connection) {
+    ASSIGN_OR_RETURN(auto found, Select(connection, digest));
+    mesh = std::move(found);
     return absl::OkStatus();
-  });
-  if (!status.ok()) return status;
+  }));
   if (!mesh.has_value()) return NotFound(digest);
   return *mesh;
 }
 
 absl::Status MeshStore::WriteFile(const std::string& digest, const std::filesystem::path& file) {
-  const absl::StatusOr<StoredMesh> mesh = Find(digest);
-  if (!mesh.ok()) return mesh.status();
+  ASSIGN_OR_RETURN(const StoredMesh mesh, Find(digest));
   NewFile out(file);
   if (!out.is_open()) return CannotWrite(file);
   Sha256 sha;
@@ -201,7 +191,7 @@ absl::StatusOr<CollectedMeshes> MeshStore::Collect() {
   const int64_t before =
       clock_->UnixMs() - std::chrono::milliseconds(MeshStore::kUnusedLife).count();
   CollectedMeshes collected;
-  const absl::Status status = database_->Write([&](SqliteConnection& connection) {
+  RETURN_IF_ERROR(database_->Write([&](SqliteConnection& connection) {
     std::map<std::string, uint64_t> unused;
     absl::Status done =
         connection.Query("SELECT digest, byte_count FROM meshes WHERE uploaded_unix_ms <= ?",
@@ -216,8 +206,7 @@ absl::StatusOr<CollectedMeshes> MeshStore::Collect() {
       collected = {collected.mesh_count + 1, collected.bytes + bytes};
     }
     return done;
-  });
-  if (!status.ok()) return status;
+  }));
   return collected;
 }
 

@@ -3,15 +3,15 @@
 
 #include <utility>
 
+#include "proto/cpp/status_macros.h"
 #include "server/mode_database/database.h"
 
 namespace carillon {
 
 absl::StatusOr<std::unique_ptr<ModeDatabase>> ModeDatabase::Open(const std::filesystem::path& file,
                                                                  const Clock& clock) {
-  absl::StatusOr<std::unique_ptr<Database>> database = Database::Open(file);
-  if (!database.ok()) return database.status();
-  return std::unique_ptr<ModeDatabase>(new ModeDatabase(*std::move(database), clock));
+  ASSIGN_OR_RETURN(std::unique_ptr<Database> database, Database::Open(file));
+  return std::unique_ptr<ModeDatabase>(new ModeDatabase(std::move(database), clock));
 }
 
 ModeDatabase::ModeDatabase(std::unique_ptr<Database> database, const Clock& clock)

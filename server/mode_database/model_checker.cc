@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/model_format.h"
+#include "proto/cpp/status_macros.h"
 #include "server/base/xxh3.h"
 
 namespace carillon {
@@ -94,8 +95,7 @@ absl::Status ModelChecker::CheckHeader(const v1::ModalModelHeader& header) {
   dimensions_['3'] = 3;
   dimensions_['m'] = header.mode_count();
   for (const v1::ArrayDescriptor& array : header.arrays()) {
-    absl::Status status = CheckArray(array);
-    if (!status.ok()) return status;
+    RETURN_IF_ERROR(CheckArray(array));
   }
   for (const ArraySpec& spec : kModelArrays) {
     const auto named = [&](const v1::ArrayDescriptor& array) { return array.name() == spec.name; };
@@ -158,8 +158,7 @@ absl::Status ModelChecker::CheckChunk(const ChunkView& chunk) {
                                 " is wrong, so its bytes have changed since they were computed: "
                                 "decompose the mesh again, or import the model from a copy"));
   }
-  absl::Status status = CheckNumbers(array, data);
-  if (!status.ok()) return status;
+  RETURN_IF_ERROR(CheckNumbers(array, data));
   offset_ += data.size();
   if (offset_ == byte_counts_[static_cast<size_t>(array_)]) {
     ++array_;

@@ -16,6 +16,7 @@
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/model_format.h"
+#include "proto/cpp/status_macros.h"
 #include "server/base/xxh3.h"
 
 namespace carillon {
@@ -135,8 +136,7 @@ std::string Delimited(const v1::ModalModelRecord& record) {
 }
 
 absl::Status ModelDecoder::Append(const v1::ModalModelRecord& record) {
-  absl::Status status = checker_.Check(record);
-  if (!status.ok()) return status;
+  RETURN_IF_ERROR(checker_.Check(record));
   if (record.has_header()) {
     MakeRoom(record.header());
   } else {
@@ -167,8 +167,7 @@ void ModelDecoder::MakeRoom(const v1::ModalModelHeader& header) {
 }
 
 absl::StatusOr<ModalModel> ModelDecoder::Finish(const std::string& digest) {
-  const absl::Status status = checker_.Finish();
-  if (!status.ok()) return status;
+  RETURN_IF_ERROR(checker_.Finish());
   model_.digest = digest;
   return std::move(model_);
 }
@@ -197,15 +196,12 @@ absl::Status EncodeModel(const ModalModel& model, v1::ModalModelHeader header,
 
 absl::StatusOr<ModalModel> ReadModelFile(const std::filesystem::path& file,
                                          const std::string& digest) {
-  absl::StatusOr<ModelFileReader> reader = ModelFileReader::Open(file);
-  if (!reader.ok()) return reader.status();
+  ASSIGN_OR_RETURN(ModelFileReader reader, ModelFileReader::Open(file));
   ModelDecoder decoder;
   while (true) {
-    const auto record = reader->Next();
-    if (!record.ok()) return record.status();
-    if (!record->has_value()) return decoder.Finish(digest);
-    const absl::Status status = decoder.Append(**record);
-    if (!status.ok()) return status;
+    ASSIGN_OR_RETURN(const auto record, reader.Next());
+    if (!record.has_value()) return decoder.Finish(digest);
+    RETURN_IF_ERROR(decoder.Append(*record));
   }
 }
 

@@ -7,6 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 #include "server/base/xxh3.h"
 #include "server/mode_database/model_checker.h"
 
@@ -168,16 +169,15 @@ absl::Status InsertModel(SqliteConnection& connection, ModelFileReader& records,
   absl::Status status = RemoveOldRevision(connection, summary);
   ModelChecker checker;
   for (int64_t number = -1; status.ok(); ++number) {
-    const auto record = records.Next();
-    if (!record.ok()) return record.status();
-    if (!record->has_value()) {
+    ASSIGN_OR_RETURN(const auto record, records.Next());
+    if (!record.has_value()) {
       status = checker.Finish();
       return status.ok() ? SelectTags(connection, summary) : status;
     }
-    status = checker.Check(**record);
+    status = checker.Check(*record);
     if (!status.ok()) return status;
     if (number >= 0) {
-      status = InsertChunk(connection, summary.revision, number, (*record)->chunk());
+      status = InsertChunk(connection, summary.revision, number, record->chunk());
       continue;
     }
     summary.header = checker.header();
@@ -195,7 +195,7 @@ absl::Status InsertCopy(SqliteConnection& connection, const std::string& digest,
   summary.pinned = false;
   summary.sounded_unix_ms = 0;
   summary.tags.clear();
-  if (absl::Status status = InsertHeader(connection, summary); !status.ok()) return status;
+  RETURN_IF_ERROR(InsertHeader(connection, summary));
   summary.revision = connection.last_row_id();
   return connection.Run(
       "INSERT INTO model_chunks (revision, number, array, byte_offset, xxh3, data) "

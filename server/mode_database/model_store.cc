@@ -8,6 +8,7 @@
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 #include "server/base/sha256.h"
 #include "server/base/xxh3.h"
 #include "server/mode_database/database.h"
@@ -88,8 +89,7 @@ ModelImport& ModelImport::operator=(ModelImport&&) noexcept = default;
 ModelImport::~ModelImport() = default;
 
 absl::Status ModelImport::Append(const v1::ModalModelRecord& record) {
-  absl::Status status = state_->checker.Check(record);
-  if (!status.ok()) return status;
+  RETURN_IF_ERROR(state_->checker.Check(record));
   const std::string bytes = Delimited(record);
   state_->sha.Update(bytes);
   return state_->file.Append(bytes);
@@ -112,7 +112,7 @@ absl::StatusOr<std::optional<v1::ModalModelRecord>> ModelExport::Next() {
   }
   if (next_chunk_ == chunk_count_) return std::nullopt;
   std::optional<v1::ModalModelRecord> record;
-  const absl::Status status = database_->Read([&](SqliteConnection& connection) {
+  RETURN_IF_ERROR(database_->Read([&](SqliteConnection& connection) {
     return SelectChunks(connection, summary_.revision, next_chunk_, 1, [&](const ChunkView& view) {
       v1::ModalModelChunk& chunk = *record.emplace().mutable_chunk();
       chunk.set_array(view.array);
@@ -121,8 +121,7 @@ absl::StatusOr<std::optional<v1::ModalModelRecord>> ModelExport::Next() {
       chunk.set_data(view.data.data(), view.data.size());
       return absl::OkStatus();
     });
-  });
-  if (!status.ok()) return status;
+  }));
   if (!record.has_value()) {
     return Refusal(absl::StatusCode::kAborted, "MODAL_MODEL_REPLACED",
                    "the model was replaced or deleted while it was read: export it again");
@@ -144,13 +143,12 @@ void ModelStore::ListenToQuarantine(OnQuarantine on_quarantine) {
 // Returns `why`, or the error that kept the model out of quarantine.
 absl::Status ModelStore::Quarantine(const std::string& digest, const absl::Status& why) {
   bool news = false;
-  absl::Status status = database_->Write([&](SqliteConnection& connection) {
+  RETURN_IF_ERROR(database_->Write([&](SqliteConnection& connection) {
     absl::Status marked = connection.Run(
         "UPDATE models SET quarantined = 1 WHERE digest = ? AND quarantined = 0", {digest});
     news = connection.changed_row_count() > 0;
     return marked;
-  });
-  if (!status.ok()) return status;
+  }));
   MutexLock lock(&listener_mutex_);
   if (news && on_quarantine_) on_quarantine_(digest, why);
   return why;
@@ -174,47 +172,42 @@ absl::StatusOr<ModelSummary> ModelStore::Store(ModelFileReader records, ModelSum
 absl::StatusOr<ModelSummary> ModelStore::PutFile(const std::string& digest,
                                                  const std::string& label,
                                                  const std::filesystem::path& file) {
-  if (const absl::Status status = CheckName(digest); !status.ok()) return status;
-  absl::StatusOr<ModelFileReader> records = ModelFileReader::Open(file);
-  if (!records.ok()) return records.status();
-  return Store(*std::move(records), Named(digest, label));
+  RETURN_IF_ERROR(CheckName(digest));
+  ASSIGN_OR_RETURN(ModelFileReader records, ModelFileReader::Open(file));
+  return Store(std::move(records), Named(digest, label));
 }
 
 absl::Status ModelStore::CopyIfAbsent(const std::string& from, const std::string& to,
                                       const std::string& label) {
-  if (absl::Status status = CheckName(to); !status.ok()) return status;
+  RETURN_IF_ERROR(CheckName(to));
   return database_->Write([&](SqliteConnection& connection) {
-    absl::StatusOr<ModelSummary> summary = SelectModel(connection, from);
-    if (!summary.ok()) return summary.status();
+    ASSIGN_OR_RETURN(ModelSummary summary, SelectModel(connection, from));
     const absl::StatusOr<ModelSummary> there = SelectModel(connection, to);
     if (!absl::IsNotFound(there.status())) return there.status();
-    summary->label = label.substr(0, kMaxLabelBytes);
-    summary->created_unix_ms = clock_->UnixMs();
-    return InsertCopy(connection, to, *summary);
+    summary.label = label.substr(0, kMaxLabelBytes);
+    summary.created_unix_ms = clock_->UnixMs();
+    return InsertCopy(connection, to, summary);
   });
 }
 
 absl::StatusOr<ModelImport> ModelStore::Import(const std::string& digest,
                                                const std::string& label) {
   if (const absl::Status status = CheckName(digest); !digest.empty() && !status.ok()) return status;
-  absl::StatusOr<SpoolFile> file = SpoolFile::Make(database_->folder());
-  if (!file.ok()) return file.status();
+  ASSIGN_OR_RETURN(SpoolFile file, SpoolFile::Make(database_->folder()));
   return ModelImport(std::make_unique<ModelImport::State>(
-      ModelImport::State{*this, *std::move(file), Named(digest, label), {}, {}}));
+      ModelImport::State{*this, std::move(file), Named(digest, label), {}, {}}));
 }
 
 absl::StatusOr<ModelExport> ModelStore::Export(const std::string& digest) {
-  absl::StatusOr<ModelSummary> summary = Summary(digest);
-  if (!summary.ok()) return summary.status();
-  ModelExport result(*database_, *this, *std::move(summary));
-  const absl::Status status = database_->Read([&](SqliteConnection& connection) {
+  ASSIGN_OR_RETURN(ModelSummary summary, Summary(digest));
+  ModelExport result(*database_, *this, std::move(summary));
+  RETURN_IF_ERROR(database_->Read([&](SqliteConnection& connection) {
     return connection.Query("SELECT count(*) FROM model_chunks WHERE revision = ?",
                             {result.summary_.revision}, [&](const SqlRow& count) {
                               result.chunk_count_ = count.Int(0);
                               return absl::OkStatus();
                             });
-  });
-  if (!status.ok()) return status;
+  }));
   return result;
 }
 
@@ -236,15 +229,13 @@ absl::StatusOr<std::shared_ptr<const ModalModel>> ModelStore::Load(const std::st
   MutexLock lock(&cache_mutex_);
   std::shared_ptr<const ModalModel> model;
   const auto load = [&](SqliteConnection& connection) ABSL_EXCLUSIVE_LOCKS_REQUIRED(cache_mutex_) {
-    const absl::StatusOr<ModelSummary> row = SelectModel(connection, digest);
-    if (!row.ok()) return row.status();
+    ASSIGN_OR_RETURN(const ModelSummary row, SelectModel(connection, digest));
     Cached& cached = cache_[digest];
-    model = cached.revision == row->revision ? cached.model.lock() : nullptr;
+    model = cached.revision == row.revision ? cached.model.lock() : nullptr;
     if (model != nullptr) return absl::OkStatus();
-    absl::StatusOr<ModalModel> read = ReadModel(connection, *row);
-    if (!read.ok()) return read.status();
-    model = std::make_shared<const ModalModel>(*std::move(read));
-    cached = {row->revision, model};
+    ASSIGN_OR_RETURN(ModalModel read, ReadModel(connection, row));
+    model = std::make_shared<const ModalModel>(std::move(read));
+    cached = {row.revision, model};
     return absl::OkStatus();
   };
   const absl::Status status = database_->Read(load);
@@ -255,38 +246,34 @@ absl::StatusOr<std::shared_ptr<const ModalModel>> ModelStore::Load(const std::st
 
 absl::StatusOr<ModelSummary> ModelStore::Summary(const std::string& digest) {
   absl::StatusOr<ModelSummary> summary = ModelNotFound(digest);
-  const absl::Status status = database_->Read([&](SqliteConnection& connection) {
+  RETURN_IF_ERROR(database_->Read([&](SqliteConnection& connection) {
     summary = SelectModel(connection, digest);
     return summary.status();
-  });
-  if (!status.ok()) return status;
+  }));
   return summary;
 }
 
 absl::StatusOr<std::vector<double>> ModelStore::Eigenvalues(const std::string& digest) {
-  const auto model = Find(digest);
-  if (!model.ok()) return model.status();
-  return (*model)->eigenvalues;
+  ASSIGN_OR_RETURN(const auto model, Find(digest));
+  return model->eigenvalues;
 }
 
 absl::StatusOr<ModelPage> ModelStore::List(const ModelFilter& filter, int page_size,
                                            const std::string& page_token) {
-  const absl::StatusOr<PageRange> range = ParsePage(page_size, page_token);
-  if (!range.ok()) return range.status();
+  ASSIGN_OR_RETURN(const PageRange range, ParsePage(page_size, page_token));
   ModelPage page;
   std::vector<std::pair<std::string, absl::Status>> damaged;
-  const absl::Status status = database_->Read([&](SqliteConnection& connection) {
+  RETURN_IF_ERROR(database_->Read([&](SqliteConnection& connection) {
     return SelectModels(
-        connection, filter, range->below, range->size,
+        connection, filter, range.below, range.size,
         [&](ModelSummary model) { page.models.push_back(std::move(model)); },
         [&](std::string digest, absl::Status why) {
           damaged.emplace_back(std::move(digest), std::move(why));
         });
-  });
-  if (!status.ok()) return status;
+  }));
   for (const auto& [digest, why] : damaged) Quarantine(digest, why).IgnoreError();
   // Damaged models are left out of the page, which makes it shorter but not the last one.
-  if (std::ssize(page.models) + std::ssize(damaged) == range->size && !page.models.empty()) {
+  if (std::ssize(page.models) + std::ssize(damaged) == range.size && !page.models.empty()) {
     page.next_page_token = absl::StrCat(page.models.back().revision);
   }
   return page;
@@ -295,13 +282,12 @@ absl::StatusOr<ModelPage> ModelStore::List(const ModelFilter& filter, int page_s
 absl::StatusOr<ModelSummary> ModelStore::Update(const std::string& digest,
                                                 const ModelChange& change) {
   absl::StatusOr<ModelSummary> summary = ModelNotFound(digest);
-  const absl::Status status = database_->Write([&](SqliteConnection& connection) {
+  RETURN_IF_ERROR(database_->Write([&](SqliteConnection& connection) {
     summary = SelectModel(connection, digest);
     absl::Status changed = summary.ok() ? Apply(connection, digest, change) : summary.status();
     if (changed.ok()) summary = SelectModel(connection, digest);
     return changed.ok() ? summary.status() : changed;
-  });
-  if (!status.ok()) return status;
+  }));
   return summary;
 }
 
@@ -355,8 +341,7 @@ absl::StatusOr<Collected> ModelStore::Collect(uint64_t budget_bytes, const std::
         }
         return written;
       };
-  const absl::Status status = database_->Write(collect);
-  if (!status.ok()) return status;
+  RETURN_IF_ERROR(database_->Write(collect));
   sounded_.clear();
   return collected;
 }

@@ -5,6 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon {
 namespace {
@@ -83,27 +84,25 @@ constexpr std::array kMigrations = {R"sql(
 
 absl::StatusOr<int64_t> Version(SqliteConnection& connection) {
   int64_t version = 0;
-  const absl::Status status = connection.Query("PRAGMA user_version", {}, [&](const SqlRow& row) {
+  RETURN_IF_ERROR(connection.Query("PRAGMA user_version", {}, [&](const SqlRow& row) {
     version = row.Int(0);
     return absl::OkStatus();
-  });
-  if (!status.ok()) return status;
+  }));
   return version;
 }
 
 }  // namespace
 
 absl::Status Migrate(SqliteConnection& connection) {
-  const absl::StatusOr<int64_t> version = Version(connection);
-  if (!version.ok()) return version.status();
+  ASSIGN_OR_RETURN(const int64_t version, Version(connection));
   constexpr auto kNewest = static_cast<int64_t>(kMigrations.size());
-  if (*version > kNewest) {
+  if (version > kNewest) {
     return Refusal(absl::StatusCode::kFailedPrecondition, "SCHEMA_TOO_NEW",
-                   absl::StrCat("the database has schema version ", *version,
+                   absl::StrCat("the database has schema version ", version,
                                 ", this program knows versions up to ", kNewest,
                                 ": install the newer Carillon, or name another folder"));
   }
-  for (int64_t v = *version; v < kNewest; ++v) {
+  for (int64_t v = version; v < kNewest; ++v) {
     absl::Status status = connection.RunScript(kMigrations[static_cast<size_t>(v)]);
     if (status.ok()) {
       status = connection.RunScript(absl::StrCat("PRAGMA user_version = ", v + 1).c_str());

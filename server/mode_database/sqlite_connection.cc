@@ -9,6 +9,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon {
 namespace {
@@ -102,11 +103,10 @@ SqliteConnection::~SqliteConnection() = default;
 absl::StatusOr<std::unique_ptr<SqliteConnection>> SqliteConnection::Open(
     const std::filesystem::path& file) {
   std::unique_ptr<State> state;
-  const absl::Status status = Guarded([&] {
+  RETURN_IF_ERROR(Guarded([&] {
     state = std::make_unique<State>(file.string());
     return absl::OkStatus();
-  });
-  if (!status.ok()) return status;
+  }));
   return std::unique_ptr<SqliteConnection>(new SqliteConnection(std::move(state)));
 }
 
@@ -134,8 +134,7 @@ absl::Status SqliteConnection::Query(const char* sql,
     SQLite::Statement statement(state_->database, sql);
     Bind(statement, parameters);
     while (statement.executeStep()) {
-      absl::Status status = on_row(Row(statement));
-      if (!status.ok()) return status;
+      RETURN_IF_ERROR(on_row(Row(statement)));
     }
     return absl::OkStatus();
   });
