@@ -8,8 +8,8 @@
 
 namespace carillon {
 
-/// Makes a call of AudioService.Listen, which deletes itself when it is done. `output` must outlive
-/// it.
+/// Makes the server's side of one call of AudioService.Listen. The returned reactor deletes itself
+/// when the call ends. `output` must outlive it.
 grpc::ServerWriteReactor<v1::ListenResponse>* MakeListenCall(LiveOutput& output);
 
 }  // namespace carillon

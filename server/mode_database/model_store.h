@@ -169,7 +169,7 @@ class ModelStore {
   /// Errors: NotFound (MODAL_MODEL_NOT_FOUND), DataLoss (MODAL_MODEL_CORRUPT).
   absl::StatusOr<ModelSummary> Summary(const std::string& digest);
 
-  /// Eigenvalues for unit material, ascending. Errors as for Find.
+  /// Eigenvalues for a Young's modulus of 1 Pa and 1 kg/m^3, ascending. Errors: those of Find.
   absl::StatusOr<std::vector<double>> Eigenvalues(const std::string& digest);
 
   /// Newest first. `page_size` 0: 100; at most 1000. Errors: InvalidArgument (INVALID_PAGE).

@@ -65,9 +65,9 @@ class ContactForces {
   };
 
   void End(Events& events);
-  /// Adds an impulse times `per_second` as a force of this step.
+  /// Adds the impulse of `felt` times `per_second` as a force of this step.
   void Add(const Felt& felt, double per_second, const Roughness& roughness);
-  /// Divides the touches of a pair into blows, which become events, and loads, which become forces.
+  /// Sends the touches of two bodies on: impacts as impulses, loads (see LoadTracker) as forces.
   void Divide(Pair& pair, Events& events);
   static ForceKnot MakeKnot(const std::vector<Force>& forces, double step_s);
 

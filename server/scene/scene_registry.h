@@ -23,7 +23,7 @@ struct PlacedObject {
 
 /// A change of an object. Absent properties stay as they are.
 struct ObjectChange {
-  /// The size in it is ignored.
+  /// Replaces the material except for its size, for which there is `size` below.
   std::optional<SoundingMaterial> material;
   std::optional<double> poisson_ratio;  ///< Poisson's ratio of that material
   std::optional<double> size;

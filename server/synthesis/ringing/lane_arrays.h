@@ -97,8 +97,8 @@ struct LaneArrays {
   LaneArray<double> block_re, block_im;
   /// The state at the start of the block.
   LaneArray<double> re, im;
-  /// If a block is rendered in parts: the state in single precision at the start of the next part,
-  /// and its fresh share, which impulses, knots and drive have added since the block began.
+  /// For a block rendered in parts: `start` is the whole state at the start of the next part, in
+  /// single precision; `fresh` is the part of it that impulses and forces added in this block.
   LaneArray<float> start_re, start_im;
   LaneArray<float> fresh_re, fresh_im;
 
