@@ -8,6 +8,6 @@ namespace carillon::precompute {
 
 /// A fixture of the contract in the one form that ParseFixture gives it: a plane's normal has
 /// length one, and a box its least corner first.
-Fixture FromProto(const v1::Fixture& said);
+Fixture FromProto(const v1::Fixture& given);
 
 }  // namespace carillon::precompute

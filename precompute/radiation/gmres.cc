@@ -156,6 +156,7 @@ std::vector<GmresSolution> SolveGmres(const ApplyMatrix& apply,
     for (size_t i = 0; i < open.size(); ++i) open[i]->Extend(std::move(products[i]));
   }
   std::vector<GmresSolution> solutions;
+  solutions.reserve(spaces.size());
   for (const Krylov& space : spaces) {
     solutions.push_back({.x = space.Solution(diagonal),
                          .residual = space.residual(),

@@ -120,8 +120,8 @@ class NearAssembly {
           const auto& corners = surface_.mesh.triangles[static_cast<size_t>(other)];
           row.insert(row.end(), corners.begin(), corners.end());
         }
-        std::ranges::sort(row);
-        row.erase(std::ranges::unique(row).begin(), row.end());
+        std::sort(row.begin(), row.end());
+        row.erase(std::unique(row.begin(), row.end()), row.end());
       }
     }
     result_.row_begin.push_back(0);

@@ -59,8 +59,9 @@ HalfedgeMesh::Halfedge_index ShortestEdge(const HalfedgeMesh& mesh, HalfedgeMesh
   const auto squared_length = [&](HalfedgeMesh::Halfedge_index h) {
     return CGAL::squared_distance(mesh.point(mesh.source(h)), mesh.point(mesh.target(h)));
   };
+  const auto shorter = [&](auto a, auto b) { return squared_length(a) < squared_length(b); };
   const auto first = mesh.halfedge(face);
-  return std::ranges::min({first, mesh.next(first), mesh.prev(first)}, {}, squared_length);
+  return std::min({first, mesh.next(first), mesh.prev(first)}, shorter);
 }
 
 bool CollapseSlivers(HalfedgeMesh& mesh, double edge_m) {

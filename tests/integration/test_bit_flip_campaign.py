@@ -85,7 +85,7 @@ class BitFlipCampaign(unittest.TestCase):
             self.assertEqual(self.exported(model), self.records)
         self.assertEqual(found, FLIP_COUNT)
         log = (self.folder / "log").read_text()
-        logged = log.count("it is computed again")
+        logged = log.count("the model is computed again")
         self.assertEqual(logged, FLIP_COUNT)
         runs = len((self.folder / "runs").read_text().splitlines())
         self.assertEqual(runs, MODEL_COUNT + FLIP_COUNT)

@@ -145,7 +145,7 @@ TEST_F(CarillonPrecomputeTest, ARequestFileAndFlagsMakeTheSameModel) {
       settings { poisson_ratio: 0.3 element: ELEMENT_LINEAR metres_per_unit: 0.001
                  mesh { target_node_count: 100 } solver: SOLVER_SPECTRA
                  fixtures { plane { point_m {} normal { x: 7 } } } }
-      material { young_pa: 210e9 density_kg_per_m3: 7850 }
+      material { young_pa: 210e9 density_kg_per_m3: 7850 alpha1_s: 0 alpha2_per_s: 1 }
       min_frequency_hz: 20 max_frequency_hz: 60000)";
   const std::string other = folder + "/other.modes";
   ASSERT_EQ(Run(bar + " --out " + other + " --request " + request).exit_status, 0)

@@ -41,7 +41,7 @@ TEST_P(SolverComparisonTest, BothSolversFindTheSameModes) {
   const auto& [nodes_per_element, mass, clamped] = GetParam();
   const TetMesh mesh = TubeMesh(nodes_per_element, clamped);
   const SystemMatrices system = Assemble(mesh, kElastic, 1, mass);
-  constexpr double kLimit = 0.3;
+  constexpr double kLimit = 40;
   const auto lanczos = Solve(system, mesh, kLimit, SolverChoice::kBlockLanczos);
   const auto spectra = Solve(system, mesh, kLimit, SolverChoice::kSpectra);
   ASSERT_TRUE(lanczos.ok()) << lanczos.status();
@@ -50,8 +50,9 @@ TEST_P(SolverComparisonTest, BothSolversFindTheSameModes) {
       CompareSolutions(system, mesh, lanczos->modes, spectra->modes);
   EXPECT_GT(comparison.mode_count, 5);
   EXPECT_EQ(comparison.mode_count, comparison.other_mode_count);
-  // The error of a frequency is about the square of its residual, which is below 1e-5.
-  EXPECT_LT(comparison.largest_frequency_difference, 1e-8);
+  // The error of a frequency is at most the square of its relative residual, 1e-5, over the relative
+  // gap to its neighbours, 1e-3.
+  EXPECT_LT(comparison.largest_frequency_difference, 1e-7);
   // Residuals of 1e-5 over gaps of 1e-3 turn a shape by 1e-2 at most.
   EXPECT_GT(comparison.least_mac, 1 - 1e-4);
 }
@@ -65,7 +66,7 @@ INSTANTIATE_TEST_SUITE_P(Bodies, SolverComparisonTest,
 struct SelfComparisonTest : ::testing::Test {
   TetMesh mesh = TubeMesh(4, false);
   SystemMatrices system = Assemble(mesh, kElastic, 1, MassSharing::kConsistent);
-  Modes modes = Solve(system, mesh, 0.3, SolverChoice::kBlockLanczos)->modes;
+  Modes modes = Solve(system, mesh, 40, SolverChoice::kBlockLanczos)->modes;
 };
 
 TEST_F(SelfComparisonTest, APairOfOneFrequencyMayBeTurnedWithinItself) {
@@ -85,6 +86,7 @@ TEST_F(SelfComparisonTest, AShapeOfAnotherModeIsSeen) {
 
 TEST_F(SelfComparisonTest, TheLargestDifferenceOfAFrequencyIsSeen) {
   Modes off = modes;
+  ASSERT_GT(modes.eigenvalues.size(), 4);
   off.eigenvalues[3] *= 1.02 * 1.02;
   EXPECT_NEAR(CompareSolutions(system, mesh, modes, off).largest_frequency_difference, 0.02, 1e-9);
 }

@@ -27,7 +27,6 @@ constexpr std::chrono::seconds kDeadline(60);
 // A worker for 1 node writes its model once it is let through gate1, one for 2 nodes reports
 // progress each time it is let through gate2.
 constexpr char kWork[] = R"(
-for option; do nodes=${nodes}$(echo $option | sed -n 's/^--nodes=//p'); done
 case $nodes in
   1) read line <"$here/gate1" ;;
   2) read line <"$here/gate2"; cat "$here/events" >&3; read line <"$here/gate2" ;;
@@ -77,7 +76,7 @@ class BusyDiskTest : public ::testing::Test {
                                        .worker_count = 2};
     queue_ = *DecompositionQueue::Make(*database_, *MakeLocalExecutor(options, clock_), clock_);
   }
-  ~BusyDiskTest() override { FaultyDisk::ReleaseWrites(); }
+  void TearDown() override { FaultyDisk::ReleaseWrites(); }
 
   v1::CreateModalModelRequest Request(uint32_t node_count) {
     v1::CreateModalModelRequest request = SampleRequest(mesh_);

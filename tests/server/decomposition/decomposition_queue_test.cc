@@ -236,7 +236,7 @@ TEST_F(DecompositionQueueTest, ABodyWithoutModesInTheBandIsTriedAgainInAnotherBa
 }
 
 TEST_F(DecompositionQueueTest, ACrashIsTriedAnotherWay) {
-  MakeQueue(absl::StrCat(kCount, "case \"$*\" in *--cautious*) ", kSucceed,
+  MakeQueue(absl::StrCat(kCount, "case $(cat \"$request\") in *cautious:\\ true*) ", kSucceed,
                          ";; *) kill -SEGV $$;; esac"));
   const v1::Job job = SubmitAndAwaitEnd(Request(20'000));
   EXPECT_EQ(job.state(), v1::JOB_STATE_SUCCEEDED);
@@ -274,8 +274,7 @@ TEST_F(DecompositionQueueTest, AJobUnderWhichTheDaemonDiesAgainAndAgainIsGivenUp
 
 TEST_F(DecompositionQueueTest, AHigherPriorityStartsFirstAndMayBeGivenLater) {
   const Gate gate(folder_ / "gate");
-  MakeQueue(absl::StrCat("for o; do case $o in --nodes=*) echo ${o#--nodes=} >>\"$here/order\";; ",
-                         "esac; done\n", kWaitAtGate, kSucceed));
+  MakeQueue(absl::StrCat("echo $nodes >>\"$here/order\"\n", kWaitAtGate, kSucceed));
   const auto with_priority = [&](uint32_t nodes, int priority) {
     auto request = Request(20'000, nodes);
     request.set_priority(priority);

@@ -37,7 +37,8 @@ inline std::string ErrorBytes(const std::string& reason) {
 }
 
 /// Writes a shell script that stands for carillon-precompute. It finds the mesh in $mesh, the file
-/// to write in $out, the band in $band, and its own files in $here; descriptor 3 takes events.
+/// to write in $out, the request in $request, its band in $band and its number of nodes in $nodes,
+/// and its own files in $here; descriptor 3 takes events.
 inline std::filesystem::path WriteWorkerScript(const std::filesystem::path& folder,
                                                const std::string& body) {
   std::filesystem::path script = folder / "worker.sh";
@@ -50,6 +51,7 @@ for option; do
   esac
 done
 band=$(sed -n 's/^m[inax]*_frequency_hz: //p' "$request" | paste -sd :)
+nodes=$(sed -n 's/^ *target_node_count: //p' "$request")
 )",
                                                  body, "\n"));
   std::filesystem::permissions(folder / "worker.new", std::filesystem::perms::owner_all);
