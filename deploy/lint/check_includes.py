@@ -18,7 +18,7 @@ class Rules:
         self.libraries = table["libraries"]
         self.system_headers = set(table["system_headers"])
         self.targets = table["targets"]
-        self.include_roots = table["include_roots"]
+        self.include_roots = table.get("include_roots", [])
 
     def file_of(self, root, header):
         """The path from `root` of an included file of the project; other headers as they are."""

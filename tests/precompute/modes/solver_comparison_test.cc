@@ -50,8 +50,8 @@ TEST_P(SolverComparisonTest, BothSolversFindTheSameModes) {
       CompareSolutions(system, mesh, lanczos->modes, spectra->modes);
   EXPECT_GT(comparison.mode_count, 5);
   EXPECT_EQ(comparison.mode_count, comparison.other_mode_count);
-  // The error of a frequency is at most the square of its relative residual, 1e-5, over the relative
-  // gap to its neighbours, 1e-3.
+  // The error of a frequency is at most the square of its relative residual, 1e-5, over the
+  // relative gap to its neighbours, 1e-3.
   EXPECT_LT(comparison.largest_frequency_difference, 1e-7);
   // Residuals of 1e-5 over gaps of 1e-3 turn a shape by 1e-2 at most.
   EXPECT_GT(comparison.least_mac, 1 - 1e-4);
