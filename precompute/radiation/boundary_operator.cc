@@ -168,10 +168,10 @@ std::vector<std::vector<ComplexFloat>> BoundaryOperator::RightSides(
       for (auto e = static_cast<size_t>(near_.row_begin[v]);
            e < static_cast<size_t>(near_.row_begin[v + 1]); ++e) {
         const NearEntry& entry = near_.entries[e];
-        const auto& u = displacements[s][static_cast<size_t>(near_.columns[e])];
+        const auto column = static_cast<size_t>(near_.columns[e]);
         for (size_t a = 0; a < 3; ++a) {
-          right[v] += std::complex<double>(entry.source[a], eta_ * entry.adjoint[a]) *
-                      static_cast<double>(u[a]);
+          right[v] += static_cast<double>(entry.source[a] * displacements[s][column][a]);
+          right[column] += eta * static_cast<double>(entry.adjoint[a] * displacements[s][v][a]);
         }
       }
     }

@@ -20,8 +20,8 @@ constexpr double kFourPi = 4 * std::numbers::pi;
 /// In mean edges, between the middles of two triangles: nearer pairs are integrated exactly, with
 /// ever finer outer rules.
 constexpr double kNear = 2.5;
-constexpr double kNearMedium = 1.8;
-constexpr double kNearFine = 1.2;
+constexpr double kNearMedium = 1.5;
+constexpr double kNearFine = 0.8;
 
 using Block = std::array<std::array<double, 3>, 3>;
 
@@ -73,6 +73,8 @@ class NearAssembly {
       const auto corner = CornersOf(surface.mesh, t);
       middles_.push_back(MiddleOf(corner));
       potentials_.emplace_back(corner);
+      auto& curls = curls_.emplace_back();
+      for (size_t c = 0; c < 3; ++c) curls[c] = CurlOfHat(surface, t, c);
     }
   }
 
@@ -192,15 +194,14 @@ class NearAssembly {
       for (size_t b = 0; b < 3; ++b) {
         const double single = exact.single[a][b] - lumped.single[a][b];
         const double doubled = exact.doubled[a][b] - lumped.doubled[a][b];
-        const double curls = Dot(CurlOfHat(surface_, outer, a), CurlOfHat(surface_, inner, b));
+        const double curls = Dot(curls_[outer][a], curls_[inner][b]);
         NearEntry& entry = EntryAt(rows[a], columns[b], part);
-        NearEntry& turned = EntryAt(columns[b], rows[a], part);
         entry.double_layer += static_cast<float>(doubled);
         entry.single_layer += static_cast<float>(normals * single);
         entry.curls += static_cast<float>(curls * (single_sum - lumped_sum));
         for (size_t i = 0; i < 3; ++i) {
           entry.source[i] += static_cast<float>(n_inner[i] * single);
-          turned.adjoint[i] += static_cast<float>(n_outer[i] * doubled);
+          entry.adjoint[i] += static_cast<float>(n_outer[i] * doubled);
         }
         if (rows[a] != columns[b]) continue;
         const auto v = static_cast<size_t>(rows[a]);
@@ -248,6 +249,7 @@ class NearAssembly {
   Workers& workers_;
   std::vector<Point> middles_;
   std::vector<TrianglePotential> potentials_;
+  std::vector<std::array<Point, 3>> curls_;  ///< of the hats of each triangle
   std::vector<std::vector<int32_t>> near_;
   NearCorrection result_;
 };

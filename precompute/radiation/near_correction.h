@@ -18,7 +18,7 @@ struct NearEntry {
   float single_layer = 0;             ///< V with n . n'
   float curls = 0;                    ///< V with curl . curl'
   std::array<float, 3> source = {};   ///< V times n': to be multiplied by the displacement
-  std::array<float, 3> adjoint = {};  ///< K' times n'
+  std::array<float, 3> adjoint = {};  ///< K' times n', of the place with row and column swapped
 };
 
 /// A sparse matrix of them by rows, and the exact diagonals. Holds for every wavenumber.

@@ -9,6 +9,7 @@
 #include <map>
 #include <numbers>
 #include <span>
+#include <tuple>
 #include <utility>
 
 #include "precompute/mesh/point_math.h"
@@ -24,8 +25,8 @@ namespace {
 
 /// The coarsest surface that a mode is tried on: edges to a wavelength in air and on the body, and
 /// to the radius of the sphere around it.
-constexpr double kEdgesPerAirWave = 3;
-constexpr double kEdgesPerBodyWave = 4;
+constexpr double kEdgesPerAirWave = 2.2;
+constexpr double kEdgesPerBodyWave = 3;
 constexpr double kEdgesPerRadius = 9;
 /// Levels are made with edges of radius / kEdgesPerRadius * 2^(-level / 2).
 constexpr int kFinestLevel = 8;
@@ -35,8 +36,10 @@ constexpr double kMostVertices = 40000;
 constexpr double kDirectionGoal = 3;
 /// Modes whose wavenumbers differ by less, relatively, are solved at their mean.
 constexpr double kPairWidth = 2e-3;
-/// What is said of a mode that was solved on one surface only.
+/// What is said of a mode that was solved on one surface only, where fewer than so many were solved
+/// on two.
 constexpr double kUncheckedErrorDb = 6;
+constexpr size_t kFewestChecked = 8;
 /// Nothing is known better than what the solver's tolerance and the far pattern's order leave.
 constexpr double kLeastErrorDb = 0.05;
 /// Harmonics weaker than this part of a mode's strongest, in power, are not kept.
@@ -116,19 +119,19 @@ class TransferSolver {
   }
 
   absl::StatusOr<Transfer> Solve() && {
-    // All modes once on coarse surfaces, in the order of what they would radiate at an efficiency
-    // of one; then on finer ones, in the order of what they do radiate.
-    std::ranges::stable_sort(groups_, std::ranges::greater{}, &Group::loudness);
+    // All modes once on coarse surfaces, then on finer ones until the goal is met.
+    Sort();
     for (Group& group : groups_) {
       if (!IsAffordable(group)) continue;
       if (absl::Status status = SolveNext(group); !status.ok()) return status;
     }
-    std::ranges::stable_sort(groups_, std::ranges::greater{}, &Group::loudness);
+    Sort();
     for (Group& group : groups_) {
       while (NeedsMore(group) && IsAffordable(group)) {
         if (absl::Status status = SolveNext(group); !status.ok()) return status;
       }
     }
+    EstimateUnchecked();
     for (const Group& group : groups_) {
       for (size_t s = 0; s < group.fields.size(); ++s) KeepHarmonics(group, s);
     }
@@ -137,6 +140,33 @@ class TransferSolver {
   }
 
  private:
+  /// Low modes first, which need the coarsest surfaces and ring longest; among those of one surface
+  /// the loudest, as far as that is known.
+  void Sort() {
+    std::ranges::stable_sort(groups_, [](const Group& a, const Group& b) {
+      return std::tuple(a.next_level(), -a.loudness) < std::tuple(b.next_level(), -b.loudness);
+    });
+  }
+
+  /// Gives each mode that was solved on one surface only the largest error that the first surface
+  /// had among the modes that were solved on two.
+  void EstimateUnchecked() {
+    if (first_differences_db_.size() < kFewestChecked) return;
+    double power_db = 0;
+    double direction_db = 0;
+    for (const auto& [power, direction] : first_differences_db_) {
+      power_db = std::max(power_db, power);
+      direction_db = std::max(direction_db, direction);
+    }
+    for (const Group& group : groups_) {
+      if (group.solved_count != 1) continue;
+      for (const size_t m : group.modes) {
+        transfer_.modes[m].power_error_db = power_db;
+        transfer_.modes[m].direction_error_db = direction_db;
+      }
+    }
+  }
+
   double Wavenumber(size_t m) const {
     return settings_.speed_ratio * std::sqrt(std::max(0.0, modes_.eigenvalues[m]));
   }
@@ -145,6 +175,7 @@ class TransferSolver {
     for (size_t m = 0; m < modes_.mode_count(); ++m) {
       const double k = Wavenumber(m);
       if (k < settings_.least_wavenumber || k > settings_.greatest_wavenumber || !(k > 0)) continue;
+      transfer_.modes[m].in_band = true;
       const double before = groups_.empty() ? 0 : groups_.back().wavenumber;
       if (!groups_.empty() && groups_.back().modes.size() == 1 && k - before < kPairWidth * k) {
         groups_.back().modes.push_back(m);
@@ -168,7 +199,7 @@ class TransferSolver {
       edge_m = std::min(edge_m, motions_[m].wavelength_m / kEdgesPerBodyWave);
     }
     const double finer = 2 * std::log2(EdgeOf(0) / edge_m);
-    return std::clamp(static_cast<int>(std::ceil(finer)), 0, kFinestLevel - 1);
+    return std::clamp(static_cast<int>(std::round(finer)), 0, kFinestLevel - 1);
   }
 
   double EdgeOf(int level) const {
@@ -284,6 +315,9 @@ class TransferSolver {
         const double direction = DirectionDifferenceDb(group.fields[s], fields[s], grid);
         mode.power_error_db = std::max(kLeastErrorDb, power);
         mode.direction_error_db = std::max(kDirectionGoal * kLeastErrorDb, direction);
+        if (group.solved_count == 1) {
+          first_differences_db_.emplace_back(mode.power_error_db, mode.direction_error_db);
+        }
       }
       group.error_db =
           std::max({group.error_db, mode.power_error_db, mode.direction_error_db / kDirectionGoal});
@@ -324,6 +358,8 @@ class TransferSolver {
   std::vector<NormalMotion> motions_;
   std::map<int, MadeLevel> levels_;
   std::vector<Group> groups_;
+  /// In power and direction, between the first two surfaces of each mode.
+  std::vector<std::pair<double, double>> first_differences_db_;
   Transfer transfer_;
   double whole_pairs_ = 0, done_pairs_ = 0;
   double measured_s_ = 0, measured_pairs_ = 0;

@@ -39,6 +39,7 @@ struct RadiationSettings {
 /// c_lm h_l(k r) Y_lm(direction), c_lm = k i^(l + 1) P_lm, with r from Transfer::center and Y_lm of
 /// RealHarmonics.
 struct ModeRadiation {
+  bool in_band = false;  ///< was wanted
   bool computed = false;
   double wavenumber = 0;                   ///< 1/m
   double power_integral = 0;               ///< I: integral of |P|^2 over all directions, m^4/kg
@@ -76,9 +77,9 @@ void ExpandPattern(std::span<const std::complex<double>> pattern, const SphereGr
 /// Told the part of the work that is done, estimated, 0 to 1.
 using RadiationProgress = std::function<void(double fraction)>;
 
-/// Solves for the radiation of each mode at its own wavenumber, the loudest first. Each mode is
-/// solved on two surfaces at least, one 1.41 times as fine as the other; their difference is the
-/// error estimate.
+/// Solves for the radiation of each mode at its own wavenumber, the lowest and loudest first. Each
+/// mode is solved on two surfaces at least, one 1.41 times as fine as the other; their difference
+/// is the error estimate.
 ///
 /// Errors: those of MakeSurfaceLevel.
 absl::StatusOr<Transfer> ComputeTransfer(const SurfaceModes& modes,

@@ -41,12 +41,19 @@ TrianglePotential::TrianglePotential(const std::array<Point, 3>& corner) : corne
   }
 }
 
+double TrianglePotential::SolidAngle(const Point& x) const {
+  const Point a = Difference(corner_[0], x), b = Difference(corner_[1], x);
+  const Point c = Difference(corner_[2], x);
+  const double la = std::sqrt(Dot(a, a)), lb = std::sqrt(Dot(b, b)), lc = std::sqrt(Dot(c, c));
+  const double cosine_part = la * lb * lc + Dot(a, b) * lc + Dot(b, c) * la + Dot(c, a) * lb;
+  return 2 * std::atan2(std::abs(Dot(a, Cross(b, c))), cosine_part);
+}
+
 TrianglePotentials TrianglePotential::At(const Point& x) const {
   const double height = Dot(Difference(x, corner_[0]), normal_);
-  double integral = 0;     // of 1/r
-  double solid_angle = 0;  // without its sign
-  Point first_moment{};    // integral of (y - foot)/r
-  Point edge_logs{};       // sum of outward normals times integrals of 1/r along the edges
+  double integral = 0;   // of 1/r
+  Point first_moment{};  // integral of (y - foot)/r
+  Point edge_logs{};     // sum of outward normals times integrals of 1/r along the edges
   for (const Edge& edge : edges_) {
     const Point from_x = Difference(edge.from, x);
     const double s0 = Dot(from_x, edge.along), s1 = s0 + edge.length_m;
@@ -54,17 +61,13 @@ TrianglePotentials TrianglePotential::At(const Point& x) const {
     const double line_squared = t * t + height * height;
     const double r0 = std::sqrt(line_squared + s0 * s0), r1 = std::sqrt(line_squared + s1 * s1);
     const double log = LogAlong(s0, s1, r0, r1);
-    const double low = std::abs(height);
-    if (t != 0) {
-      solid_angle +=
-          std::atan2(t * s1, line_squared + low * r1) - std::atan2(t * s0, line_squared + low * r0);
-    }
     integral += t * log;
     AddScaled(edge.outward, 0.5 * (line_squared * log + s1 * r1 - s0 * r0), first_moment);
     AddScaled(edge.outward, log, edge_logs);
   }
+  const double solid_angle = height == 0 ? 0 : SolidAngle(x);
   integral -= std::abs(height) * solid_angle;
-  const double signed_angle = height == 0 ? 0 : std::copysign(solid_angle, height);
+  const double signed_angle = std::copysign(solid_angle, height);
   TrianglePotentials result{};
   for (size_t c = 0; c < 3; ++c) {
     // The hat function at the foot of x: one at its corner, and linear.

@@ -25,6 +25,9 @@ class TrianglePotential {
   TrianglePotentials At(const Point& x) const;
 
  private:
+  /// That the triangle takes up seen from x, without a sign (van Oosterom and Strackee 1983).
+  double SolidAngle(const Point& x) const;
+
   struct Edge {
     Point from;
     Point along;    ///< of length one
