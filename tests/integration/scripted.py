@@ -20,13 +20,15 @@ for option; do
   esac
 done
 nodes=$(sed -n 's/^ *target_node_count: //p' "$request")
+max_frequency_hz=$(sed -n 's/^ *max_frequency_hz: //p' "$request")
 {body}
 """
 
 
 def worker(folder, body):
     """A program for --precompute. Its script finds the mesh in $mesh, the file to write in $out, the
-    number of nodes asked for in $nodes, and its own files in $here; descriptor 3 takes events."""
+    number of nodes asked for in $nodes, the highest frequency asked for in $max_frequency_hz, and its
+    own files in $here; descriptor 3 takes events."""
     path = pathlib.Path(folder) / "worker.sh"
     path.write_text(OPTIONS.format(here=folder, body=body))
     path.chmod(0o700)
