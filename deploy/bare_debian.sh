@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 #
-# deploy/bare_debian.sh [COMMAND...]
+# deploy/bare_debian.sh [--copy FOLDER] [COMMAND...]
 #
-# Makes a bare Debian 12 in a temporary folder, copies the committed checkout into it and runs the
-# commands there, by default README's two: ./deploy/test.sh and ./deploy/demo.sh. Needs root (or to be
-# in a container that lets one mount) and the package mmdebstrap. Leaves nothing behind.
+# Makes a bare Debian 12 in a temporary folder, copies the committed checkout (or, instead of it, the content of FOLDER)
+# into it and runs the commands there, by default README's two: ./deploy/test.sh and ./deploy/demo.sh. Needs root (or to
+# be in a container that lets one mount) and the package mmdebstrap. Leaves nothing behind.
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 
@@ -14,6 +14,8 @@ if [[ -z ${CARILLON_BARE_INSIDE:-} ]]; then
   exec env CARILLON_BARE_INSIDE=1 unshare --mount --pid --fork --kill-child --propagation private "$0" "$@"
 fi
 
+copied=
+if [[ ${1:-} == --copy ]]; then copied=${2:?bare_debian.sh: --copy needs a folder} && shift 2; fi
 if (($# == 0)); then set -- ./deploy/test.sh ./deploy/demo.sh; fi
 tree=$(mktemp --directory --tmpdir="${TMPDIR:-/var/tmp}" carillon-bare-XXXXXX)
 # What runs here is all below this script, the first process of its namespace.
@@ -31,7 +33,11 @@ apt-get indextargets --format '$(ORIGIN) deb $(REPO_URI) $(RELEASE) main' 'Creat
   sed -n 's/^Debian \(deb .* bookworm.*\)$/\1/p' | sort -u |
   mmdebstrap --quiet --variant=minbase bookworm "$tree" -
 mkdir -p "$tree/src/carillon"
-git -c safe.directory="$root" -C "$root" archive HEAD | tar -x -C "$tree/src/carillon"
+if [[ -n $copied ]]; then
+  cp -r "$copied/." "$tree/src/carillon"
+else
+  git -c safe.directory="$root" -C "$root" archive HEAD | tar -x -C "$tree/src/carillon"
+fi
 
 # The way to the registries is the machine's affair, so it is taken from there.
 cp /etc/resolv.conf "$tree/etc/"

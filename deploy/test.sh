@@ -23,7 +23,7 @@ esac
 rooms=()
 while [[ ${1:-} =~ ^[a-z] ]]; do rooms+=("${1%/}") && shift; done
 
-lists=(programs tests)
+lists=(programs tests packages)
 excluded=
 case $preset in
   asan) excluded=lint ;;

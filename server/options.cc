@@ -37,6 +37,13 @@ std::string DefaultAddress() {
   return runtime.empty() ? DefaultServerAddress() : "unix:" + runtime + "/carillond.sock";
 }
 
+/// carillond.toml in $CONFIGURATION_DIRECTORY, which systemd sets; empty if there is no such file.
+std::string DefaultConfiguration() {
+  const std::string folder = Environment("CONFIGURATION_DIRECTORY");
+  const std::filesystem::path file = std::filesystem::path(folder) / "carillond.toml";
+  return !folder.empty() && std::filesystem::exists(file) ? file.string() : "";
+}
+
 /// The path of a program in the folder of this executable.
 std::string Beside(const char* name) {
   return std::filesystem::read_symlink("/proc/self/exe").replace_filename(name);
@@ -239,7 +246,8 @@ std::optional<int> ParseFlags(int argc, const char* const* argv, const std::stri
   CLI::App app("Makes rigid-body simulations audible.", "carillond");
   app.set_version_flag("--version", "carillond " + version);
   app.add_option("--config", configuration,
-                 "TOML file whose keys are the flags, with _ in place of -");
+                 "TOML file whose keys are the flags, with _ in place of - "
+                 "[carillond.toml in $CONFIGURATION_DIRECTORY]");
   AddFlags(app, command.options);
   AddDatabaseCommands(app, command);
   try {
@@ -255,7 +263,7 @@ std::optional<int> ParseFlags(int argc, const char* const* argv, const std::stri
 absl::StatusOr<CommandLine> ReadCommandLine(int argc, const char* const* argv,
                                             const std::string& version) {
   CommandLine command{.options = Defaults()};
-  std::string configuration;
+  std::string configuration = DefaultConfiguration();
   // The flags are parsed twice: for the name of the file, and to override the file's settings.
   for (const bool with_file : {false, true}) {
     if (with_file) {

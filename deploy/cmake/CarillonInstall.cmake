@@ -1,4 +1,8 @@
 # cmake --install: the C++ client (component sdk), the programs (server, precompute, cli), and what to read (doc).
+# Debian's compilers, CMake and pkg-config search the folder of the architecture, also under /usr/local.
+if(EXISTS /etc/debian_version AND CMAKE_LIBRARY_ARCHITECTURE AND "${CMAKE_INSTALL_LIBDIR}" MATCHES "^(lib)?$")
+  set(CMAKE_INSTALL_LIBDIR lib/${CMAKE_LIBRARY_ARCHITECTURE} CACHE PATH "Folder of libraries below the prefix" FORCE)
+endif()
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 

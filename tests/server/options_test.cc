@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstdlib>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -44,6 +46,19 @@ TEST_F(OptionsFile, FlagsWinOverTheFileAndTheFileOverTheDefaults) {
   EXPECT_EQ(command->options.block_frame_count, 256U);
   EXPECT_EQ(command->options.channel_count, 2U);
   EXPECT_EQ(command->options.audio_device, "auto");
+}
+
+TEST_F(OptionsFile, TheFileInTheConfigurationDirectoryIsReadIfNoOtherIsNamed) {
+  const std::filesystem::path file = Write("sample_rate = 44100\n");
+  setenv("CONFIGURATION_DIRECTORY", file.parent_path().c_str(), 1);
+  const absl::StatusOr<CommandLine> with_file = Read({});
+  setenv("CONFIGURATION_DIRECTORY", "/nonexistent", 1);
+  const absl::StatusOr<CommandLine> without_file = Read({});
+  unsetenv("CONFIGURATION_DIRECTORY");
+  ASSERT_TRUE(with_file.ok()) << with_file.status();
+  EXPECT_EQ(with_file->options.sample_rate_hz, 44100U);
+  ASSERT_TRUE(without_file.ok()) << without_file.status();
+  EXPECT_EQ(without_file->options.sample_rate_hz, 48000U);
 }
 
 TEST_F(OptionsFile, ListenMayBeGivenMoreThanOnceAndReplacesTheFiles) {

@@ -1,0 +1,105 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+#
+# Runs as root in a bare Debian that nothing else uses, in a folder with the packages of the version before in before/
+# and those of this one in now/: installs, uses, upgrades, removes and purges them, and fails where one does not work.
+set -euo pipefail
+export DEBIAN_FRONTEND=noninteractive LC_ALL=C.UTF-8
+export CARILLON_SERVER=unix:/run/carillon/carillond.sock
+settings=/etc/carillon/carillond.toml
+daemon=
+
+fail() {
+  printf 'use_packages: %s\n' "$*" >&2
+  if [[ -e daemon.log ]]; then cat daemon.log >&2; fi
+  exit 1
+}
+
+run_apt() { apt-get -q -y -o Dpkg::Use-Pty=0 -o Acquire::Retries=3 "$@" >apt.log 2>&1 || fail "$(cat apt.log)"; }
+
+install_packages() { run_apt install --no-install-recommends "$@"; }
+
+setting() { sed -n "s/^$1=//p" /lib/systemd/system/carillond.service; }
+
+# The tree has no systemd that runs, so this does what the unit says.
+start_daemon() {
+  install -d -o carillon -g carillon -m "$(setting StateDirectoryMode)" "/var/lib/$(setting StateDirectory)"
+  install -d -o carillon -g carillon -m "$(setting RuntimeDirectoryMode)" "/run/$(setting RuntimeDirectory)"
+  local -a words
+  rm -f daemon.out
+  read -ra words <<<"$(setting ExecStart)"
+  setpriv --reuid="$(setting User)" --regid="$(setting User)" --init-groups --no-new-privs \
+    env -i STATE_DIRECTORY=/var/lib/carillon RUNTIME_DIRECTORY=/run/carillon CONFIGURATION_DIRECTORY=/etc/carillon \
+    "${words[@]}" >daemon.out 2>>daemon.log &
+  daemon=$!
+  for _ in {1..100}; do
+    if grep -qs '^listening on ' daemon.out; then return; fi
+    sleep 0.1
+  done
+  fail "carillond does not start"
+}
+
+stop_daemon() {
+  kill "$daemon"
+  wait "$daemon" || fail "carillond ended with $?"
+}
+
+hear_a_strike() {
+  carillon listen --seconds 2 --out heard.wav &
+  local listener=$!
+  sleep 0.5
+  carillon strike bar --material bell_bronze --point 0.1,0.008,0.01 --impulse 0,0,-0.01 --duration 0.0001 --seconds 1
+  wait "$listener"
+  # A second of silence in 24 bits is nothing but zeros; a bronze bar rings for longer.
+  (($(tail -c +100 heard.wav | tr -d '\0' | wc -c) > 50000)) || fail "the strike is not in heard.wav"
+}
+
+cat >bar.obj <<'BAR'
+v 0 0 0
+v 0.2 0 0
+v 0.2 0.016 0
+v 0 0.016 0
+v 0 0 0.01
+v 0.2 0 0.01
+v 0.2 0.016 0.01
+v 0 0.016 0.01
+f 4 3 2 1
+f 5 6 7 8
+f 1 2 6 5
+f 2 3 7 6
+f 3 4 8 7
+f 4 1 5 8
+BAR
+
+run_apt update
+install_packages ./before/*.deb
+getent passwd carillon >/dev/null || fail "there is no user carillon"
+start_daemon
+carillon model create bar.obj --material bell_bronze --wait
+stop_daemon
+
+# A setting of the administrator survives the upgrade, and so do the models.
+echo 'sample_rate = 44100' >>"$settings"
+install_packages ./now/*.deb
+[[ $(dpkg-query -W -f '${Version}' carillond) == "$(cd now && echo carillond_*.deb | cut -d _ -f 2)" ]] ||
+  fail "the upgrade left the version before"
+grep -q '^sample_rate = 44100$' "$settings" || fail "the upgrade replaced $settings"
+start_daemon
+carillon status | grep -q 44100 || fail "carillond does not read $settings"
+[[ $(carillon model list | wc -l) == 1 ]] || fail "the upgrade lost the model"
+hear_a_strike
+carillon model create bar.obj --label again --material bell_bronze --accuracy 5 --wait
+stop_daemon
+
+for document in carillon-precompute/{copyright,SOURCE} carillond/copyright carillon/README.md; do
+  [[ -s /usr/share/doc/$document ]] || fail "/usr/share/doc/$document is missing"
+done
+grep -q 'AFFERO' /usr/share/doc/carillon-precompute/copyright || fail "the AGPL is missing"
+
+packages=(carillond carillon-precompute carillon libcarillon-dev)
+run_apt remove "${packages[@]}"
+[[ ! -e /usr/bin/carillond && ! -e /lib/systemd/system/carillond.service ]] || fail "remove left programs"
+[[ -e $settings && -e /var/lib/carillon/carillon.db ]] || fail "remove deleted settings or models"
+run_apt purge "${packages[@]}"
+[[ ! -e /etc/carillon && ! -e /var/lib/carillon ]] || fail "purge left settings or models"
+printf 'use_packages: installed, upgraded, heard, removed and purged\n'
