@@ -54,6 +54,18 @@ hear_a_strike() {
   (($(tail -c +100 heard.wav | tr -d '\0' | wc -c) > 50000)) || fail "the strike is not in heard.wav"
 }
 
+strike_in_python() {
+  python3 - <<'PYTHON' || fail "the Python package does not sound"
+import carillon
+
+with carillon.connect() as c:
+    bar = c.create_model("bar.obj", material="bell_bronze")
+    heard = bar.render_strike(point=(0.1, 0.008, 0.01), impulse=(0, 0, -0.01), seconds=1)
+    heard.save("python.wav")
+    assert abs(heard.loudest_frequency_hz() / bar.frequencies()[0] - 1) < 0.01
+PYTHON
+}
+
 cat >bar.obj <<'BAR'
 v 0 0 0
 v 0.2 0 0
@@ -88,6 +100,7 @@ start_daemon
 carillon status | grep -q 44100 || fail "carillond does not read $settings"
 [[ $(carillon model list | wc -l) == 1 ]] || fail "the upgrade lost the model"
 hear_a_strike
+strike_in_python
 carillon model create bar.obj --label again --material bell_bronze --accuracy 5 --wait
 stop_daemon
 
@@ -96,7 +109,7 @@ for document in carillon-precompute/{copyright,SOURCE} carillond/copyright caril
 done
 grep -q 'AFFERO' /usr/share/doc/carillon-precompute/copyright || fail "the AGPL is missing"
 
-packages=(carillond carillon-precompute carillon libcarillon-dev)
+packages=(carillond carillon-precompute carillon libcarillon-dev python3-carillon)
 run_apt remove "${packages[@]}"
 [[ ! -e /usr/bin/carillond && ! -e /lib/systemd/system/carillond.service ]] || fail "remove left programs"
 [[ -e $settings && -e /var/lib/carillon/carillon.db ]] || fail "remove deleted settings or models"

@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The client for asyncio.
+
+    async with carillon.aio.connect() as c:
+        bell = await c.create_model("bell.obj", material="bell_bronze")
+        sound = await c.render_strike(bell, point=(0, 0, 0.1), impulse=(0, 0, -0.01))
+
+Each call runs on a thread of its own, so that the event loop never waits. A task that is cancelled cancels its call.
+Methods that do not wait, such as ContactStream.step, are called as they are.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextvars
+import os
+from collections.abc import AsyncIterator, Callable
+from typing import Any, Optional, TypeVar
+
+from carillon import client
+from carillon.jobs import Job
+from carillon.materials import Material
+from carillon.models import Model
+from carillon.scenes import ContactStream, Scene, SoundingObject
+from carillon.sound import Sound
+from carillon.traces import Trace
+from carillon.v1 import audio_service_pb2, contact_service_pb2, material_pb2
+
+Result = TypeVar("Result")
+
+
+def connect(server: Optional[str] = None, *, tls_roots: str | os.PathLike[str] | None = None) -> AsyncClient:
+    """Connects as carillon.connect does."""
+    return AsyncClient(client.connect(server, tls_roots=tls_roots))
+
+
+async def in_thread(function: Callable[..., Result], *arguments: Any, **named: Any) -> Result:
+    """Calls a function of the client on a thread. If the task is cancelled, so are the calls of the function that
+    stream, and the others end by themselves."""
+    calls: list[Any] = []
+    context = contextvars.copy_context()
+    context.run(client.running_calls.set, calls)
+    work = asyncio.get_running_loop().run_in_executor(None, lambda: context.run(function, *arguments, **named))
+    try:
+        return await asyncio.shield(work)
+    except asyncio.CancelledError:
+        for call in calls:
+            call.cancel()
+        await asyncio.wait([work])
+        work.exception()
+        raise
+
+
+class AsyncClient:
+    """A connection. `sync` is the client that it calls; what has no method here is called by in_thread."""
+
+    def __init__(self, sync: client.Client):
+        self.sync = sync
+
+    async def status(self) -> audio_service_pb2.GetMixerResponse:
+        return await in_thread(self.sync.status)
+
+    async def create_job(self, mesh: Any, material: Material, **request: Any) -> Job:
+        return await in_thread(self.sync.create_job, mesh, material, **request)
+
+    async def wait(self, job: Job, progress_bar: Any = False) -> Model:
+        """Follows a job to its end. `progress_bar` as for Job.wait, and is called on another thread."""
+        return await in_thread(job.wait, progress_bar)
+
+    async def create_model(self, mesh: Any, material: Material, **request: Any) -> Model:
+        return await in_thread(self.sync.create_model, mesh, material, **{"progress_bar": False, **request})
+
+    async def model(self, text: str, material: Optional[Material] = None) -> Model:
+        return await in_thread(self.sync.model, text, material)
+
+    async def models(self, **filters: Any) -> AsyncIterator[Model]:
+        found = self.sync.models(**filters)
+        while model := await in_thread(lambda: next(found, None)):
+            yield model
+
+    async def materials(self) -> dict[str, material_pb2.Material]:
+        return await in_thread(lambda: self.sync.materials)
+
+    async def scene(self, **settings: Any) -> AsyncScene:
+        return AsyncScene(await in_thread(self.sync.scene, **settings))
+
+    async def render(self, trace: Trace | str | os.PathLike[str], **settings: Any) -> Sound:
+        return await in_thread(self.sync.render, trace, **settings)
+
+    async def render_strike(self, model: Model, **strike: Any) -> Sound:
+        """Renders a strike; see Model.render_strike."""
+        return await in_thread(model.render_strike, **strike)
+
+    async def listen(self, seconds: float) -> Sound:
+        return await in_thread(self.sync.listen, seconds)
+
+    async def __aenter__(self) -> AsyncClient:
+        return self
+
+    async def __aexit__(self, *_: Any) -> None:
+        self.sync.close()
+
+
+class AsyncScene:
+    """A scene; as a context manager it is deleted at the end."""
+
+    def __init__(self, sync: Scene):
+        self.sync = sync
+
+    async def add(self, model: Model | str, material: Optional[Material] = None, **settings: Any) -> SoundingObject:
+        return await in_thread(self.sync.add, model, material, **settings)
+
+    async def strike(self, item: SoundingObject, point: Any, impulse: Any, duration: Optional[float] = None) -> None:
+        await in_thread(item.strike, point, impulse, duration)
+
+    def stream(self, step: float, delay: Optional[float] = None) -> AsyncContactStream:
+        return AsyncContactStream(self.sync.stream(step, delay))
+
+    async def delete(self) -> None:
+        await in_thread(self.sync.delete)
+
+    async def __aenter__(self) -> AsyncScene:
+        return self
+
+    async def __aexit__(self, *_: Any) -> None:
+        await self.delete()
+
+
+class AsyncContactStream:
+    """A stream of contacts: `step` and `report` are those of ContactStream, and do not wait."""
+
+    def __init__(self, sync: ContactStream):
+        self.sync = sync
+        self.step = sync.step
+
+    @property
+    def report(self) -> contact_service_pb2.StreamContactsResponse:
+        return self.sync.report
+
+    async def __aenter__(self) -> AsyncContactStream:
+        return self
+
+    async def __aexit__(self, kind: Any, *rest: Any) -> None:
+        await in_thread(self.sync.__exit__, kind, *rest)
+
+
+__all__ = ["AsyncClient", "AsyncContactStream", "AsyncScene", "connect", "in_thread"]

@@ -1,0 +1,264 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The connection to a daemon."""
+
+from __future__ import annotations
+
+import contextlib
+import contextvars
+import functools
+import os
+import pathlib
+import threading
+from collections.abc import Iterable, Iterator
+from typing import Any, Optional
+
+import grpc
+import numpy
+
+from carillon import errors, meshes, progress
+from carillon.address import default_server
+from carillon.contacts import PoseLike, to_pose
+from carillon.jobs import Job
+from carillon.materials import Material, resolved, to_message
+from carillon.models import Model
+from carillon.scenes import Scene
+from carillon.sound import Sound
+from carillon.traces import Trace
+from carillon.v1 import (
+    audio_service_pb2, audio_service_pb2_grpc, contact_service_pb2_grpc, decomposition_service_pb2,
+    decomposition_service_pb2_grpc, hearing_pb2, material_pb2, modal_model_pb2, modal_model_service_pb2,
+    modal_model_service_pb2_grpc, scene_service_pb2, scene_service_pb2_grpc)
+
+PIECE_BYTES = 1 << 20
+
+# The calls that carillon.aio cancels when its task is cancelled.
+running_calls: contextvars.ContextVar[Optional[list[Any]]] = contextvars.ContextVar("running_calls", default=None)
+
+
+def connect(server: Optional[str] = None, *, tls_roots: str | os.PathLike[str] | None = None) -> Client:
+    """Connects to a daemon: "unix:PATH" or "HOST:PORT", by default where default_server() says. `tls_roots` is the
+    PEM file with the certificates that vouch for a daemon with TLS."""
+    return Client(server or default_server(), tls_roots)
+
+
+class Client:
+    """A connection, as a context manager closed at the end. The attributes *_stub are the services of the contract,
+    for calls that have no method here."""
+
+    def __init__(self, server: str, tls_roots: str | os.PathLike[str] | None = None):
+        self.server = server
+        options = [("grpc.max_receive_message_length", -1)]
+        if tls_roots is None:
+            self._channel = grpc.insecure_channel(server, options)
+        else:
+            credentials = grpc.ssl_channel_credentials(pathlib.Path(tls_roots).read_bytes())
+            self._channel = grpc.secure_channel(server, credentials, options)
+        self.models_stub = modal_model_service_pb2_grpc.ModalModelServiceStub(self._channel)
+        self.jobs_stub = decomposition_service_pb2_grpc.DecompositionServiceStub(self._channel)
+        self.scenes_stub = scene_service_pb2_grpc.SceneServiceStub(self._channel)
+        self.contacts_stub = contact_service_pb2_grpc.ContactServiceStub(self._channel)
+        self.audio_stub = audio_service_pb2_grpc.AudioServiceStub(self._channel)
+
+    def status(self) -> audio_service_pb2.GetMixerResponse:
+        """Returns the state of the daemon's mixer and output."""
+        with errors.translated(self.server):
+            return self.audio_stub.GetMixer(audio_service_pb2.GetMixerRequest())
+
+    def upload(self, mesh: Any) -> str:
+        """Stores a mesh (see carillon.meshes.to_mesh_file). Returns its digest."""
+        data = meshes.to_mesh_file(mesh).data
+        pieces = (modal_model_service_pb2.UploadMeshRequest(data=data[i:i + PIECE_BYTES])
+                  for i in range(0, len(data), PIECE_BYTES))
+        with errors.translated(self.server):
+            return self.models_stub.UploadMesh(pieces).mesh_digest
+
+    def create_job(self, mesh: Any, material: Material, *, label: Optional[str] = None,
+                   settings: Optional[modal_model_pb2.DecompositionSettings] = None, **request: Any) -> Job:
+        """Asks for the model of a mesh and does not wait for it. `request` has other fields of
+        CreateModalModelRequest, such as size, max_frequency_hz, priority or coarse_first."""
+        file = meshes.to_mesh_file(mesh)
+        message = modal_model_service_pb2.CreateModalModelRequest(
+            mesh_digest=self.upload(file), mesh_format=file.format, material=to_message(material),
+            label=file.label if label is None else label, settings=settings, **request)
+        with errors.translated(self.server):
+            return Job(self, self.models_stub.CreateModalModel(message).job, material)
+
+    def create_model(self, mesh: Any, material: Material, *, progress_bar: progress.Progress = None,
+                     **request: Any) -> Model:
+        """Returns the model of a mesh, which is computed if the daemon does not have it. `mesh` is a file, a pair
+        (vertices, triangles), or an object of trimesh or Open3D; `request` as for create_job."""
+        return self.create_job(mesh, material, **request).wait(progress_bar)
+
+    def model(self, text: str, material: Optional[Material] = None) -> Model:
+        """Returns the model that the text means: a name, a label, or the first digits of a digest."""
+        name = text if text.startswith("modalModels/") else self._find(text).name
+        with errors.translated(self.server):
+            answer = self.models_stub.GetModalModel(modal_model_service_pb2.GetModalModelRequest(name=name))
+        return Model(self, answer.modal_model, material)
+
+    def models(self, **filters: Any) -> Iterator[Model]:
+        """Yields the models that match, newest first, a page at a time; filters are fields of
+        ListModalModelsRequest, such as label_contains or tag."""
+        request = modal_model_service_pb2.ListModalModelsRequest(**filters)
+        while True:
+            with errors.translated(self.server):
+                page = self.models_stub.ListModalModels(request)
+            yield from (Model(self, summary) for summary in page.modal_models)
+            if not page.next_page_token:
+                return
+            request.page_token = page.next_page_token
+
+    def jobs(self) -> Iterator[Job]:
+        """Yields all jobs, newest first."""
+        request = decomposition_service_pb2.ListJobsRequest()
+        while True:
+            with errors.translated(self.server):
+                page = self.jobs_stub.ListJobs(request)
+            yield from (Job(self, job) for job in page.jobs)
+            if not page.next_page_token:
+                return
+            request.page_token = page.next_page_token
+
+    @functools.cached_property
+    def materials(self) -> dict[str, material_pb2.Material]:
+        """The catalogue of materials by name."""
+        with errors.translated(self.server):
+            answer = self.models_stub.ListMaterials(modal_model_service_pb2.ListMaterialsRequest())
+        return {item.name: item.material for item in answer.materials}
+
+    def resolve(self, material: Material) -> material_pb2.Material:
+        """Replaces the name of a material by its figures."""
+        message = to_message(material)
+        if message.preset and message.preset not in self.materials:
+            raise errors.CarillonError("UNKNOWN_MATERIAL", f"there is no material \"{message.preset}\"; "
+                                       "Client.materials has all of them")
+        return resolved(message, self.materials)
+
+    def scene(self, *, hearing: Optional[hearing_pb2.Hearing] = None, listener: Optional[PoseLike] = None) -> Scene:
+        """Makes an empty scene."""
+        request = scene_service_pb2.CreateSceneRequest(
+            hearing=hearing, listener=None if listener is None else to_pose(listener))
+        with errors.translated(self.server):
+            return Scene(self, self.scenes_stub.CreateScene(request).name)
+
+    def render(self, trace: Trace | str | os.PathLike[str], **settings: Any) -> Sound:
+        """Renders a trace, or a .contacts file, faster than real time. `settings` are fields of RenderSettings:
+        sample_rate_hz, channel_count and tail_s."""
+        records = (trace if isinstance(trace, Trace) else Trace.read(trace)).records()
+        return self._render(records, audio_service_pb2.RenderSettings(**settings))
+
+    def listen(self, seconds: float) -> Sound:
+        """Records what the daemon plays."""
+        with self.recording() as record:
+            return record.take(seconds)
+
+    @contextlib.contextmanager
+    def recording(self) -> Iterator[Recording]:
+        """Records what the daemon plays within the block, from its first line on."""
+        with errors.translated(self.server):
+            answers = self.audio_stub.Listen(audio_service_pb2.ListenRequest())
+            with self.cancellable(answers):
+                record = Recording(answers)
+                try:
+                    yield record
+                finally:
+                    record.stop()
+
+    @contextlib.contextmanager
+    def cancellable(self, call: Any) -> Iterator[None]:
+        """Cancels a call at the end of the block, and lets carillon.aio cancel it before."""
+        calls = running_calls.get()
+        if calls is not None:
+            calls.append(call)
+        try:
+            yield
+        finally:
+            call.cancel()
+
+    def close(self) -> None:
+        self._channel.close()
+
+    def _find(self, text: str) -> Model:
+        found = [model for model in self.models()
+                 if model.label == text or model.name.removeprefix("modalModels/").startswith(text)]
+        if len(found) == 1:
+            return found[0]
+        if found:
+            raise errors.CarillonError("MODAL_MODEL_AMBIGUOUS", f"'{text}' means {len(found)} of the models, for "
+                                       f"instance {found[0].name} and {found[1].name}; give more digits of the digest")
+        raise errors.CarillonError("MODAL_MODEL_NOT_FOUND", f"no model has the label '{text}' or begins with these "
+                                   "digits")
+
+    def _render(self, records: Iterable[Any], settings: audio_service_pb2.RenderSettings) -> Sound:
+        request = audio_service_pb2.RenderRequest
+
+        def requests() -> Iterator[audio_service_pb2.RenderRequest]:
+            yield request(settings=settings)
+            yield from (request(record=record) for record in records)
+
+        blocks, rate_hz, channels = [], 0, 1
+        with errors.translated(self.server):
+            answers = self.audio_stub.Render(requests())
+            with self.cancellable(answers):
+                for answer in answers:
+                    kind = answer.WhichOneof("response")
+                    if kind == "format":
+                        rate_hz, channels = answer.format.sample_rate_hz, answer.format.channel_count
+                    elif kind == "block":
+                        blocks.append(answer.block.samples)
+                    elif answer.summary.rejected_count:
+                        raise errors.from_info(answer.summary.last_rejection)
+        return Sound(numpy.frombuffer(b"".join(blocks), "<f4").reshape(-1, channels), rate_hz)
+
+    def __enter__(self) -> Client:
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        self.close()
+
+
+class Recording:
+    """What the daemon plays; a thread collects it. `sound` is what was heard so far."""
+
+    def __init__(self, answers: Any):
+        self._answers = answers
+        self._format = next(answers).format
+        self._blocks: list[bytes] = []
+        self._frame_count = self._lost = 0
+        self._error: Optional[grpc.RpcError] = None
+        self._more = threading.Condition()
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    @property
+    def sound(self) -> Sound:
+        with self._more:
+            samples = numpy.frombuffer(b"".join(self._blocks), "<f4")
+        return Sound(samples.reshape(-1, self._format.channel_count), self._format.sample_rate_hz, self._lost)
+
+    def take(self, seconds: float) -> Sound:
+        """Waits until this much of the sound since the beginning was heard, and returns it."""
+        wanted = int(seconds * self._format.sample_rate_hz)
+        with self._more:
+            self._more.wait_for(lambda: self._frame_count >= wanted or self._error)
+        if self._error:
+            raise self._error
+        heard = self.sound
+        return Sound(heard.samples[:wanted], heard.sample_rate_hz, heard.lost_frame_count)
+
+    def stop(self) -> None:
+        self._answers.cancel()
+        self._reader.join()
+
+    def _read(self) -> None:
+        try:
+            for answer in self._answers:
+                with self._more:
+                    self._blocks.append(answer.block.samples)
+                    self._frame_count += len(answer.block.samples) // (4 * self._format.channel_count)
+                    self._lost = answer.lost_frame_count
+                    self._more.notify_all()
+        except grpc.RpcError as error:
+            with self._more:
+                self._error = error
+                self._more.notify_all()

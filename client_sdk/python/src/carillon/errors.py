@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Refusals of the daemon as exceptions."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+
+import grpc
+
+from carillon.v1 import error_pb2
+
+DETAILS_KEY = "grpc-status-details-bin"
+
+
+class CarillonError(Exception):
+    """A refusal. `reason` is stable and one of proto/README.md's; `message` is a sentence that says what was wrong,
+    where, and how to repair it; `metadata` has figures that belong to the reason."""
+
+    def __init__(self, reason: str, message: str, metadata: dict[str, str] | None = None):
+        super().__init__(f"{reason}: {message}")
+        self.reason = reason
+        self.message = message
+        self.metadata = metadata or {}
+
+
+class ServerUnavailable(CarillonError):
+    """No daemon answers at the address."""
+
+
+def from_info(info: error_pb2.ErrorInfo) -> CarillonError:
+    return CarillonError(info.reason, info.message, dict(info.metadata))
+
+
+def from_rpc(error: grpc.RpcError, server: str) -> CarillonError:
+    """Converts the error of a call; its rich status is in the trailing metadata."""
+    for key, value in error.trailing_metadata() or ():
+        if key == DETAILS_KEY:
+            info = error_pb2.ErrorInfo()
+            details = error_pb2.StatusDetails.FromString(value)
+            if any(detail.Unpack(info) for detail in details.details):
+                return from_info(info)
+    if error.code() == grpc.StatusCode.UNAVAILABLE:
+        return ServerUnavailable("SERVER_UNAVAILABLE", f"no daemon answers at {server}: {error.details()}; start "
+                                 "carillond, or give the address where it listens")
+    return CarillonError(error.code().name, error.details() or "")
+
+
+@contextlib.contextmanager
+def translated(server: str) -> Iterator[None]:
+    """Raises the errors of calls within the block as CarillonError."""
+    try:
+        yield
+    except grpc.RpcError as error:
+        raise from_rpc(error, server) from error

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Decomposition jobs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+
+from carillon import errors, progress
+from carillon.materials import Material
+from carillon.v1 import decomposition_pb2, decomposition_service_pb2
+
+if TYPE_CHECKING:
+    from carillon.client import Client
+    from carillon.models import Model
+
+
+class Job:
+    """A decomposition that waits, runs or has ended. `message` is its newest known state."""
+
+    def __init__(self, client: Client, message: decomposition_pb2.Job, material: Material | None = None):
+        self._client = client
+        self._material = material
+        self.message = message
+
+    @property
+    def name(self) -> str:
+        return self.message.name
+
+    @property
+    def state(self) -> str:
+        """"queued", "running", "succeeded", "failed" or "cancelled"."""
+        return decomposition_pb2.JobState.Name(self.message.state).removeprefix("JOB_STATE_").lower()
+
+    def wait(self, progress_bar: progress.Progress = None) -> Model:
+        """Follows the job to its end and returns its model. Raises CarillonError if it fails."""
+        on_progress, close = progress.observer(progress_bar)
+        with errors.translated(self._client.server):
+            watch = self._client.jobs_stub.WatchJob(decomposition_service_pb2.WatchJobRequest(name=self.name))
+            try:
+                with self._client.cancellable(watch):
+                    for answer in watch:
+                        self.message = answer.job
+                        on_progress(answer.job)
+            finally:
+                close()
+        if self.message.state == decomposition_pb2.JOB_STATE_CANCELLED:
+            raise errors.CarillonError("JOB_CANCELLED", f"{self.name} was cancelled; create the model again")
+        if self.message.state != decomposition_pb2.JOB_STATE_SUCCEEDED:
+            raise errors.from_info(self.message.error)
+        return self._client.model(self.message.modal_model, material=self._material)
+
+    def cancel(self) -> None:
+        """Cancels the job; one that has ended stays as it is."""
+        request = decomposition_service_pb2.CancelJobRequest(name=self.name)
+        with errors.translated(self._client.server):
+            self.message = self._client.jobs_stub.CancelJob(request).job
+
+    def refresh(self) -> Job:
+        """Asks the daemon for the newest state."""
+        request = decomposition_service_pb2.GetJobRequest(name=self.name)
+        with errors.translated(self._client.server):
+            self.message = self._client.jobs_stub.GetJob(request).job
+        return self
+
+    def __repr__(self) -> str:
+        return f"<Job {self.message.label or self.name}: {self.state}, {self.message.progress.fraction:.0%}>"

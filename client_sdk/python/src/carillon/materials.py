@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Materials, and the frequencies and decay rates that they give the modes of a model."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Optional, Union
+
+import numpy
+
+from carillon import errors
+from carillon.v1 import material_pb2
+
+if TYPE_CHECKING:
+    from carillon.models import Model
+
+Material = Union[str, material_pb2.Material]
+
+
+def material(preset: str = "", *, loss_factor: float | dict[float, float] | None = None,
+             **figures: Any) -> material_pb2.Material:
+    """Makes a material: a named one, figures that override those of the named one, or figures alone.
+
+    `figures` are young_pa, poisson_ratio, density_kg_per_m3, alpha1_s and alpha2_per_s. `loss_factor` is a number, or a
+    table from the frequency in Hz to the loss factor there.
+    """
+    made = material_pb2.Material(preset=preset, **figures)
+    if loss_factor is not None:
+        table = loss_factor if isinstance(loss_factor, dict) else {1000.0: loss_factor}
+        for frequency_hz, value in sorted(table.items()):
+            made.loss_factor.add(frequency_hz=frequency_hz, loss_factor=value)
+    return made
+
+
+def to_message(given: Material) -> material_pb2.Material:
+    return material_pb2.Material(preset=given) if isinstance(given, str) else given
+
+
+def named(model: Model | str, given: Optional[Material]) -> tuple[str, material_pb2.Material]:
+    """Returns the name of a model, and the material to sound with: the one given, or else the one that the model was
+    asked for with."""
+    name = model if isinstance(model, str) else model.name
+    chosen = given if given is not None or isinstance(model, str) else model.material
+    if chosen is None:
+        raise errors.CarillonError("INVALID_MATERIAL", f"no material is known for {name}; give one, such as "
+                                   "material=\"bell_bronze\"")
+    return name, to_message(chosen)
+
+
+def resolved(given: material_pb2.Material, catalogue: dict[str, material_pb2.Material]) -> material_pb2.Material:
+    """Replaces the name of a material by the figures of the catalogue, which the given figures override."""
+    if not given.preset:
+        return given
+    made = material_pb2.Material()
+    made.CopyFrom(catalogue[given.preset])
+    if given.loss_factor:
+        del made.loss_factor[:]
+    made.MergeFrom(given)
+    made.preset = ""
+    return made
+
+
+def loss_factor_at(given: material_pb2.Material, frequency_hz: numpy.ndarray) -> numpy.ndarray:
+    """Interpolates log eta linearly over log frequency; eta is constant outside the table."""
+    if not given.loss_factor:
+        return numpy.zeros_like(frequency_hz)
+    table = numpy.log([(point.frequency_hz, point.loss_factor) for point in given.loss_factor])
+    return numpy.exp(numpy.interp(numpy.log(frequency_hz), table[:, 0], table[:, 1]))
+
+
+def modes_of(eigenvalues: numpy.ndarray, given: material_pb2.Material,
+             size: float) -> tuple[numpy.ndarray, numpy.ndarray]:
+    """Returns the damped frequencies, Hz, and the decay rates, 1/s, of a body of this material and size relative to
+    the model. An overdamped mode has frequency zero. See docs/physics.md."""
+    omega = numpy.sqrt(eigenvalues * given.young_pa / given.density_kg_per_m3) / size
+    eta = loss_factor_at(given, omega / (2 * numpy.pi))
+    decay = (given.alpha1_s * omega**2 + given.alpha2_per_s + eta * omega) / 2
+    return numpy.sqrt(numpy.maximum(0, omega**2 - decay**2)) / (2 * numpy.pi), decay

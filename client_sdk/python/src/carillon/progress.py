@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Shows the progress of a decomposition: by tqdm where it is installed and somebody watches."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from typing import Any, Optional, Union
+
+from carillon.v1 import decomposition_pb2
+
+OnProgress = Callable[[decomposition_pb2.Job], None]
+Progress = Union[None, bool, OnProgress]
+
+
+def phase_name(job: decomposition_pb2.Job) -> str:
+    return decomposition_pb2.Phase.Name(job.progress.phase).removeprefix("PHASE_").lower()
+
+
+def _is_watched() -> bool:
+    return "ipykernel" in sys.modules or sys.stderr.isatty()
+
+
+class ProgressBar:
+    """A bar of tqdm; nothing where tqdm is missing."""
+
+    def __init__(self) -> None:
+        try:
+            from tqdm.auto import tqdm
+        except ImportError:
+            self._bar: Optional[Any] = None
+        else:
+            self._bar = tqdm(total=100, unit="%", bar_format="{desc:<24}{percentage:3.0f}%|{bar}| {elapsed}")
+
+    def __call__(self, job: decomposition_pb2.Job) -> None:
+        if self._bar is None:
+            return
+        done = job.state == decomposition_pb2.JOB_STATE_SUCCEEDED
+        self._bar.n = 100 if done else round(100 * job.progress.fraction)
+        self._bar.set_description(f"{job.label} {'done' if done else phase_name(job)}")
+
+    def close(self) -> None:
+        if self._bar is not None:
+            self._bar.close()
+
+
+def observer(progress: Progress) -> tuple[OnProgress, Callable[[], None]]:
+    """Returns the function to call for each state of a job, and the one to call at the end. `progress` is such a
+    function, True for a bar, False for none, and None for a bar if stderr is a terminal or a notebook."""
+    if callable(progress):
+        return progress, lambda: None
+    if progress or (progress is None and _is_watched()):
+        bar = ProgressBar()
+        return bar, bar.close
+    return lambda job: None, lambda: None

@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Scenes, the objects that sound in them, and the stream of contacts from a running simulation."""
+
+from __future__ import annotations
+
+import queue
+import threading
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, Optional
+
+import grpc
+
+from carillon import contacts, errors, materials
+from carillon.contacts import Array, Impulses, PoseLike
+from carillon.v1 import contact_pb2, contact_service_pb2, scene_service_pb2
+
+if TYPE_CHECKING:
+    from carillon.client import Client
+    from carillon.models import Model
+
+# Steps that may wait for the network before the oldest is dropped.
+MOST_WAITING = 4096
+
+
+class SoundingObject:
+    """An object of a scene. It stands for its handle wherever handles are wanted: int(object)."""
+
+    def __init__(self, scene: Scene, message: scene_service_pb2.SoundingObject):
+        self._scene = scene
+        self.message = message
+
+    @property
+    def name(self) -> str:
+        return self.message.name
+
+    @property
+    def handle(self) -> int:
+        return self.message.handle
+
+    __int__ = __index__ = lambda self: self.message.handle
+
+    def strike(self, point: Array, impulse: Array, duration: Optional[float] = None) -> None:
+        """Strikes the object now: the point in metres and the impulse in newton seconds, both in the object's own
+        frame; `duration` of the contact in seconds. Raises CarillonError if the strike is refused."""
+        with self._scene.stream(step=0.001, delay=0) as stream:
+            stream.step(0.0, impulses=Impulses(self, point, impulse, durations=duration))
+        if stream.report.rejected_count:
+            raise errors.from_info(stream.report.last_rejection)
+
+    def update(self, *, material: Optional[materials.Material] = None, size: Optional[float] = None,
+               gain: Optional[float] = None, pose: Optional[PoseLike] = None, glide: float = 0) -> None:
+        """Changes what is given; a pose is reached after `glide` seconds."""
+        request = scene_service_pb2.UpdateObjectRequest(
+            name=self.name, material=None if material is None else materials.to_message(material), size=size, gain=gain,
+            pose=None if pose is None else contacts.to_pose(pose), glide_s=glide)
+        client = self._scene.client
+        with errors.translated(client.server):
+            self.message = client.scenes_stub.UpdateObject(request).object
+
+    def remove(self) -> None:
+        """Fades the object out and removes it."""
+        client = self._scene.client
+        with errors.translated(client.server):
+            client.scenes_stub.RemoveObject(scene_service_pb2.RemoveObjectRequest(name=self.name))
+
+    def __repr__(self) -> str:
+        item = self.message
+        return (f"<SoundingObject {item.handle}: {item.sounding_mode_count} modes, {item.lowest_frequency_hz:.1f} to "
+                f"{item.highest_frequency_hz:.1f} Hz>")
+
+
+class Scene:
+    """A scene of the daemon; as a context manager it is deleted at the end."""
+
+    def __init__(self, client: Client, name: str):
+        self.client = client
+        self.name = name
+
+    def add(self, model: Model | str, material: Optional[materials.Material] = None, *, size: float = 1,
+            gain: float = 1, pose: Optional[PoseLike] = None, handle: int = 0) -> SoundingObject:
+        """Adds an object, ready to be struck. Without a material it gets the one that the model was asked for with."""
+        name, message = materials.named(model, material)
+        request = scene_service_pb2.AddObjectRequest(
+            scene=self.name, modal_model=name, material=message, size=size, gain=gain, handle=handle,
+            pose=None if pose is None else contacts.to_pose(pose))
+        with errors.translated(self.client.server):
+            return SoundingObject(self, self.client.scenes_stub.AddObject(request).object)
+
+    def move_listener(self, pose: PoseLike, glide: float = 0) -> None:
+        """Moves the listener, within `glide` seconds."""
+        request = scene_service_pb2.UpdateListenerRequest(scene=self.name, pose=contacts.to_pose(pose), glide_s=glide)
+        with errors.translated(self.client.server):
+            self.client.scenes_stub.UpdateListener(request)
+
+    def stream(self, step: float, delay: Optional[float] = None) -> ContactStream:
+        """Opens a stream for the contacts of a simulation whose steps last `step` seconds."""
+        return ContactStream(self, step, delay)
+
+    def delete(self) -> None:
+        """Deletes the scene and fades out its objects."""
+        with errors.translated(self.client.server):
+            self.client.scenes_stub.DeleteScene(scene_service_pb2.DeleteSceneRequest(name=self.name))
+
+    def __enter__(self) -> Scene:
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        self.delete()
+
+
+class ContactStream:
+    """Sends the contacts of each step without waiting for the daemon: a thread sends them, and another reads the
+    answers. `report` is the newest answer, with the counts so far; `dropped_step_count` steps were not sent, because
+    more than 4096 waited."""
+
+    def __init__(self, scene: Scene, step: float, delay: Optional[float]):
+        self._server = scene.client.server
+        self._requests: queue.SimpleQueue[Optional[contact_service_pb2.StreamContactsRequest]] = queue.SimpleQueue()
+        self._error: Optional[grpc.RpcError] = None
+        self.report: contact_service_pb2.StreamContactsResponse = contact_service_pb2.StreamContactsResponse()
+        self.dropped_step_count = 0
+        start = contact_service_pb2.ContactStreamStart(scene=scene.name, step_s=step, scheduling_delay_s=delay)
+        self._requests.put(contact_service_pb2.StreamContactsRequest(start=start))
+        self._answers = scene.client.contacts_stub.StreamContacts(self._sent())
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def step(self, time: float, **content: Any) -> None:
+        """Sends a step at a simulation time, seconds. `content` is any of contacts (Contacts, what an engine reports,
+        in every step), impulses (Impulses), poses (Poses) and listener (a pose)."""
+        self.send(contacts.make_step(time, **content))
+
+    def send(self, step: contact_pb2.ContactStep) -> None:
+        """Sends a message of contact.proto. Raises CarillonError if the stream has failed."""
+        if self._error:
+            raise errors.from_rpc(self._error, self._server)
+        if self._requests.qsize() >= MOST_WAITING:
+            self._requests.get()
+            self.dropped_step_count += 1
+        self._requests.put(contact_service_pb2.StreamContactsRequest(step=step))
+
+    def close(self) -> contact_service_pb2.StreamContactsResponse:
+        """Waits until the daemon has taken all steps. Returns the last report."""
+        self._requests.put(None)
+        self._reader.join()
+        if self._error:
+            raise errors.from_rpc(self._error, self._server)
+        return self.report
+
+    def _sent(self) -> Iterator[contact_service_pb2.StreamContactsRequest]:
+        while (request := self._requests.get()) is not None:
+            yield request
+
+    def _read(self) -> None:
+        try:
+            for answer in self._answers:
+                self.report = answer
+        except grpc.RpcError as error:
+            self._error = error
+            self._requests.put(None)  # ends the thread that sends
+
+    def __enter__(self) -> ContactStream:
+        return self
+
+    def __exit__(self, kind: Any, *_: Any) -> None:
+        if kind is not None:
+            self._answers.cancel()
+            self._reader.join()
+        else:
+            self.close()

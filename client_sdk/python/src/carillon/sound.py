@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Sound as an array, which can be saved, played in a notebook, measured and plotted."""
+
+from __future__ import annotations
+
+import base64
+import dataclasses
+import io
+import os
+import wave
+from typing import Any
+
+import numpy
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Sound:
+    """Frames x channels of float32; full scale is 1. `lost_frame_count` frames were not received."""
+
+    samples: numpy.ndarray
+    sample_rate_hz: int
+    lost_frame_count: int = 0
+
+    @property
+    def seconds(self) -> float:
+        return len(self.samples) / self.sample_rate_hz
+
+    @property
+    def peak(self) -> float:
+        return float(numpy.abs(self.samples).max(initial=0))
+
+    @property
+    def mono(self) -> numpy.ndarray:
+        """The mean of the channels."""
+        mean: numpy.ndarray = self.samples.mean(axis=1)
+        return mean
+
+    def normalized(self, peak: float = 0.9) -> Sound:
+        """Returns the sound with this peak; silence stays silent."""
+        return dataclasses.replace(self, samples=self.samples * (peak / self.peak if self.peak else 1))
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes a WAV file of 24-bit samples; samples beyond full scale are clipped."""
+        with open(path, "wb") as file:
+            file.write(self.wave_bytes())
+
+    def wave_bytes(self) -> bytes:
+        words = numpy.rint(numpy.clip(self.samples, -1, 1) * (2**23 - 1)).astype("<i4")
+        file = io.BytesIO()
+        with wave.open(file, "wb") as out:
+            out.setnchannels(self.samples.shape[1])
+            out.setsampwidth(3)
+            out.setframerate(self.sample_rate_hz)
+            out.writeframes(words.view(numpy.uint8).reshape(-1, 4)[:, :3].tobytes())
+        return file.getvalue()
+
+    def spectrum(self) -> tuple[numpy.ndarray, numpy.ndarray]:
+        """Returns frequencies, Hz, and magnitudes of the mean of the channels under the falling half of Blackman's
+        window, which suits a sound that begins with a strike."""
+        count = len(self.samples)
+        magnitude = numpy.abs(numpy.fft.rfft(self.mono * numpy.blackman(2 * count)[count:]))
+        return numpy.fft.rfftfreq(count, 1 / self.sample_rate_hz), magnitude
+
+    def loudest_frequency_hz(self) -> float:
+        """Returns the frequency of the highest peak of the spectrum."""
+        frequencies, magnitude = self.spectrum()
+        return float(frequencies[numpy.argmax(magnitude)])
+
+    def plot(self, axes: Any = None) -> Any:
+        """Draws the waveform; needs matplotlib. Returns its axes."""
+        from carillon import plots
+        return plots.plot_sound(self, axes)
+
+    def plot_spectrum(self, axes: Any = None) -> Any:
+        """Draws the spectrum in decibels; needs matplotlib. Returns its axes."""
+        from carillon import plots
+        return plots.plot_spectrum(self, axes)
+
+    def _repr_html_(self) -> str:
+        """A player for notebooks."""
+        data = base64.b64encode(self.wave_bytes()).decode()
+        return (f'<figure><audio controls src="data:audio/wav;base64,{data}"></audio><figcaption>{self.seconds:.2f} s, '
+                f"{self.sample_rate_hz} Hz, peak {self.peak:.3f}</figcaption></figure>")

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Contact traces: recorded simulations that are rendered later (.contacts files)."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, BinaryIO, Optional
+
+from google.protobuf.message import DecodeError
+
+from carillon import contacts, materials
+from carillon.errors import CarillonError
+from carillon.v1 import contact_pb2, contact_trace_pb2, hearing_pb2
+
+if TYPE_CHECKING:
+    from carillon.models import Model
+
+FORMAT_VERSION = 1
+
+
+class Trace:
+    """A trace in memory: `header`, `objects` and `steps` are the messages of contact_trace.proto."""
+
+    def __init__(self, step: float = 0, *, simulator: str = "", hearing: Optional[hearing_pb2.Hearing] = None,
+                 listener: Optional[contacts.PoseLike] = None):
+        self.header = contact_trace_pb2.ContactTraceHeader(
+            format_version=FORMAT_VERSION, simulator=simulator, step_s=step, hearing=hearing,
+            listener=None if listener is None else contacts.to_pose(listener))
+        self.objects: list[contact_trace_pb2.ContactTraceObject] = []
+        self.steps: list[contact_pb2.ContactStep] = []
+
+    def add(self, model: Model | str, material: Optional[materials.Material] = None, *, size: float = 1,
+            gain: float = 1, pose: Optional[contacts.PoseLike] = None, label: str = "",
+            handle: Optional[int] = None) -> int:
+        """Adds an object, which is there from the beginning. Returns its handle."""
+        handle = handle or 1 + max((item.handle for item in self.objects), default=0)
+        name, message = materials.named(model, material)
+        self.objects.append(contact_trace_pb2.ContactTraceObject(
+            handle=handle, modal_model=name, material=message, size=size, gain=gain, label=label,
+            pose=None if pose is None else contacts.to_pose(pose)))
+        return handle
+
+    def step(self, time: float, **content: Any) -> None:
+        """Adds a step; `content` as for ContactStream.step. Times must not go back."""
+        if self.steps and time < self.steps[-1].time_s:
+            raise ValueError(f"time goes back from {self.steps[-1].time_s} to {time} s; add the steps in order")
+        self.steps.append(contacts.make_step(time, **content))
+
+    def records(self) -> Iterator[contact_trace_pb2.ContactTraceRecord]:
+        """The header, the objects, then the steps."""
+        record = contact_trace_pb2.ContactTraceRecord
+        yield record(header=self.header)
+        yield from (record(object=item) for item in self.objects)
+        yield from (record(step=item) for item in self.steps)
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Writes a .contacts file."""
+        with open(path, "wb") as file:
+            for record in self.records():
+                data = record.SerializeToString(deterministic=True)
+                file.write(_varint(len(data)) + data)
+
+    @classmethod
+    def read(cls, path: str | os.PathLike[str]) -> Trace:
+        """Reads a .contacts file. Raises CarillonError (TRACE_MALFORMED)."""
+        trace = cls()
+        with open(path, "rb") as file:
+            for number, record in enumerate(_read_records(file, str(path))):
+                kind = record.WhichOneof("record")
+                if (number == 0) != (kind == "header"):
+                    raise CarillonError("TRACE_MALFORMED", f"{path}: record {number} must"
+                                        f"{'' if number == 0 else ' not'} be a header")
+                if kind == "header":
+                    trace.header = record.header
+                elif kind == "object":
+                    trace.objects.append(record.object)
+                else:
+                    trace.steps.append(record.step)
+        if trace.header.format_version > FORMAT_VERSION:
+            raise CarillonError("TRACE_MALFORMED", f"{path} has format version {trace.header.format_version}; this "
+                                f"program reads {FORMAT_VERSION}")
+        return trace
+
+
+def _varint(number: int) -> bytes:
+    out = bytearray()
+    while number > 0x7F:
+        out.append(number & 0x7F | 0x80)
+        number >>= 7
+    return bytes([*out, number])
+
+
+def _read_varint(file: BinaryIO) -> Optional[int]:
+    """Returns None at the end of the file."""
+    value = shift = 0
+    while byte := file.read(1):
+        value |= (byte[0] & 0x7F) << shift
+        if byte[0] < 0x80:
+            return value
+        shift += 7
+    if shift:
+        raise EOFError
+    return None
+
+
+def _read_records(file: BinaryIO, path: str) -> Iterator[contact_trace_pb2.ContactTraceRecord]:
+    number = 0
+    try:
+        while (size := _read_varint(file)) is not None:
+            data = file.read(size)
+            if len(data) < size:
+                raise EOFError
+            yield contact_trace_pb2.ContactTraceRecord.FromString(data)
+            number += 1
+    except (EOFError, DecodeError) as error:
+        raise CarillonError("TRACE_MALFORMED", f"{path}: record {number} is cut off or damaged; write the trace "
+                            "again") from error

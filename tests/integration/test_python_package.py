@@ -1,0 +1,232 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The Python package against the real daemon: models, strikes, streams, traces, asyncio and refusals."""
+
+import asyncio
+import types
+import unittest
+
+import numpy
+
+import carillon
+import meshes
+import sound
+from carillon.v1 import contact_pb2
+from daemon import DaemonTest
+
+BAR = meshes.box(meshes.BAR_SIZE)
+POINT, IMPULSE, DURATION_S = (0.0, 0.008, 0.010), (0, 0, -0.002), 1e-4
+LOWEST_HZ = meshes.bar_first_bending_hz()
+
+
+class PackageTest(DaemonTest):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.c = carillon.connect(cls.daemon.server)
+        cls.addClassCleanup(cls.c.close)
+        cls.model = cls.c.create_model(BAR, meshes.MATERIAL, label="bar")
+
+    def assert_rings(self, heard, tolerance=0.01):
+        self.assertGreater(heard.peak, 1e-3)
+        self.assertAlmostEqual(heard.loudest_frequency_hz() / LOWEST_HZ, 1, delta=tolerance)
+
+
+class ModelsTest(PackageTest):
+    def test_frequencies_of_a_model_match_beam_theory(self):
+        self.assertAlmostEqual(self.model.frequencies()[0] / LOWEST_HZ, 1, delta=0.01)
+        # Twice the size rings an octave lower, but for the damping, which lowers high modes a little.
+        numpy.testing.assert_allclose(2 * self.model.frequencies(size=2), self.model.frequencies(), rtol=1e-4)
+
+    def test_a_loss_factor_of_the_caller_sets_the_decay(self):
+        lossy = carillon.material(meshes.MATERIAL, loss_factor={100: 1e-3, 1e5: 1e-3}, alpha1_s=0, alpha2_per_s=0)
+        frequencies, decays = self.model.modes(lossy)
+        numpy.testing.assert_allclose(decays, 1e-3 * numpy.pi * frequencies, rtol=1e-5)
+
+    def test_mode_shapes_are_mass_normalised(self):
+        arrays = self.model.arrays
+        self.assertEqual(arrays["shapes"].shape, (len(arrays["vertices"]), 3, self.model.mode_count))
+        self.assertLess(arrays["triangles"].max(), len(arrays["vertices"]))
+        # The end of a free beam moves twice the root mean square: phi^2 V = 4 for unit density.
+        corner = numpy.linalg.norm(arrays["vertices"] - numpy.array(POINT), axis=1).argmin()
+        end = arrays["shapes"][corner, 2, 0]**2 * numpy.prod(meshes.BAR_SIZE)
+        self.assertAlmostEqual(end, 4, delta=0.1)
+
+    def test_a_mesh_is_the_same_as_a_file_as_arrays_and_as_the_object_of_a_library(self):
+        file = self.folder / "bar.obj"
+        file.write_bytes(carillon.meshes.to_mesh_file(BAR).data)
+        vertices, faces = map(numpy.array, BAR)
+        for mesh in (file, (vertices, faces), types.SimpleNamespace(vertices=vertices, faces=faces),
+                     types.SimpleNamespace(vertices=BAR[0], triangles=BAR[1])):
+            self.assertEqual(self.c.create_model(mesh, meshes.MATERIAL).name, self.model.name)
+        with self.assertRaisesRegex(TypeError, "int is no mesh"):
+            self.c.upload(7)
+
+    def test_models_are_found_by_label_digits_and_filter(self):
+        digits = self.model.name.removeprefix("modalModels/")[:10]
+        for text in ("bar", digits, self.model.name):
+            self.assertEqual(self.c.model(text).name, self.model.name)
+        self.assertEqual([model.name for model in self.c.models(label_contains="BA")], [self.model.name])
+        self.assertEqual(list(self.c.models(tag="nothing")), [])
+        with self.assertRaises(carillon.CarillonError) as refused:
+            self.c.model("bell")
+        self.assertEqual(refused.exception.reason, "MODAL_MODEL_NOT_FOUND")
+
+    def test_progress_is_told_to_a_function(self):
+        states = []
+        self.c.create_model(BAR, meshes.MATERIAL, max_frequency_hz=12000, label="again", progress_bar=states.append,
+                            settings=carillon.v1.modal_model_pb2.DecompositionSettings(metres_per_unit=1.01))
+        fractions = [job.progress.fraction for job in states[:-1]]
+        self.assertGreater(len(states), 1)
+        self.assertEqual(fractions, sorted(fractions))
+
+    def test_a_job_can_be_cancelled(self):
+        settings = carillon.v1.modal_model_pb2.DecompositionSettings(
+            mesh=carillon.v1.modal_model_pb2.MeshSettings(target_node_count=60000))
+        job = self.c.create_job(BAR, meshes.MATERIAL, settings=settings)
+        job.cancel()
+        with self.assertRaises(carillon.CarillonError) as refused:
+            job.wait()
+        self.assertEqual(job.refresh().state, "cancelled")
+        self.assertEqual(refused.exception.reason, "JOB_CANCELLED")
+
+    def test_refusals_have_the_reason_of_the_contract(self):
+        with self.assertRaises(carillon.CarillonError) as refused:
+            self.c.create_model(([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)]), meshes.MATERIAL)
+        self.assertEqual(refused.exception.reason, "MESH_NOT_CLOSED")
+        self.assertIn("open edges", refused.exception.message)
+        with self.assertRaises(carillon.CarillonError) as unknown:
+            self.c.create_model(BAR, "chime_aluminium")
+        self.assertEqual(unknown.exception.reason, "UNKNOWN_MATERIAL")
+        with self.assertRaises(carillon.ServerUnavailable):
+            carillon.connect(f"unix:{self.folder}/nobody").status()
+
+    def test_a_notebook_shows_models_and_plays_sounds(self):
+        self.assertIn(f"<td>{self.model.name}</td>", self.model._repr_html_())
+        heard = self.model.render_strike(POINT, IMPULSE, seconds=0.1)
+        self.assertIn('<audio controls src="data:audio/wav;base64,UklGR', heard._repr_html_())
+
+
+class SoundTest(PackageTest):
+    def test_a_rendered_strike_rings_at_the_lowest_bending_mode_and_is_the_same_again(self):
+        once = self.model.render_strike(POINT, IMPULSE, duration=DURATION_S, seconds=1)
+        self.assert_rings(once)
+        numpy.testing.assert_array_equal(
+            self.model.render_strike(POINT, IMPULSE, duration=DURATION_S, seconds=1).samples, once.samples)
+
+    def test_a_live_strike_is_heard(self):
+        with self.c.scene() as scene:
+            bar = scene.add(self.model)
+            with self.c.recording() as record:
+                bar.strike(POINT, IMPULSE, DURATION_S)
+                heard = record.take(1.5)
+        self.assertEqual(heard.samples.shape, (72000, 1))
+        self.assert_rings(heard)
+
+    def test_a_saved_sound_reads_back(self):
+        heard = self.model.render_strike(POINT, IMPULSE, seconds=0.2)
+        heard.save(self.folder / "strike.wav")
+        numpy.testing.assert_allclose(sound.read_wave(self.folder / "strike.wav"), heard.samples, atol=2**-23)
+
+    def test_a_strike_that_is_refused_raises(self):
+        with self.c.scene() as scene:
+            bar = scene.add(self.model)
+            with self.assertRaises(carillon.CarillonError) as refused:
+                bar.strike(POINT, (0, 0, float("nan")))
+        self.assertEqual(refused.exception.reason, "IMPULSE_NOT_FINITE")
+
+    def test_contacts_of_a_stream_are_counted_and_poses_taken(self):
+        with self.c.scene() as scene:
+            bars = [scene.add(self.model, pose=((i, 0, 0), (1, 0, 0, 0))) for i in range(2)]
+            with scene.stream(step=1 / 240) as stream:
+                for i in range(24):
+                    contacts = carillon.Contacts(bars, [POINT, POINT], [IMPULSE, IMPULSE], partners=[7, 8])
+                    stream.step(i / 240, contacts=contacts,
+                                impulses=carillon.Impulses(bars[0], POINT, IMPULSE, durations=DURATION_S),
+                                poses=carillon.Poses(bars, [(i, 0, 0), (i, 1, 0)]))
+        self.assertEqual((stream.report.step_count, stream.report.rejected_count), (24, 0))
+        self.assertGreaterEqual(stream.report.accepted_count + stream.report.late_count, 24)
+
+    def test_a_stream_that_failed_raises_at_its_next_step(self):
+        scene = self.c.scene()
+        scene.delete()
+        stream = scene.stream(step=0.01)
+        with self.assertRaises(carillon.CarillonError) as refused:
+            stream.close()
+        self.assertEqual(refused.exception.reason, "SCENE_NOT_FOUND")
+
+    def test_a_trace_is_written_read_and_rendered(self):
+        trace = carillon.Trace(1 / 60, simulator="test")
+        bar = trace.add(self.model, label="bar")
+        trace.step(0.0, impulses=carillon.Impulses(bar, POINT, IMPULSE, durations=DURATION_S))
+        trace.step(0.5, contacts=carillon.Contacts([bar], [POINT], [IMPULSE]))
+        file = self.folder / "trace.contacts"
+        trace.write(file)
+        self.assertEqual(list(carillon.Trace.read(file).records()), list(trace.records()))
+        heard = self.c.render(file, tail_s=1.0, channel_count=2)
+        self.assertEqual(heard.samples.shape[1], 2)
+        self.assert_rings(heard)
+        file.write_bytes(file.read_bytes()[:-3])
+        with self.assertRaises(carillon.CarillonError) as refused:
+            carillon.Trace.read(file)
+        self.assertEqual(refused.exception.reason, "TRACE_MALFORMED")
+
+
+class AioTest(PackageTest):
+    def test_a_strike_is_heard_while_the_event_loop_goes_on(self):
+        async def strike():
+            async with carillon.aio.connect(self.daemon.server) as c, await c.scene() as scene:
+                model = await c.create_model(BAR, meshes.MATERIAL)
+                bar = await scene.add(model)
+                listening = asyncio.create_task(c.listen(1.5))
+                turns = 0
+                while not listening.done():
+                    await asyncio.sleep(0.1)
+                    turns += 1
+                    if turns == 3:
+                        await scene.strike(bar, POINT, IMPULSE, DURATION_S)
+                self.assertGreater(turns, 3)
+                self.assertEqual([found.name async for found in c.models(label_contains="bar")], [model.name])
+                async with scene.stream(step=0.01) as stream:
+                    stream.step(0.0, impulses=carillon.Impulses(bar, POINT, IMPULSE))
+                self.assertEqual(stream.report.step_count, 1)
+                return listening.result()
+
+        self.assert_rings(asyncio.run(strike()))
+
+    def test_a_cancelled_task_ends_its_call(self):
+        async def cancel():
+            async with carillon.aio.connect(self.daemon.server) as c:
+                listening = asyncio.create_task(c.listen(3600))
+                await asyncio.sleep(0.3)
+                listening.cancel()
+                with self.assertRaises(asyncio.CancelledError):
+                    await listening
+
+        asyncio.run(cancel())
+
+
+class ValuesTest(unittest.TestCase):
+    def test_a_pose_is_a_position_a_pair_or_a_matrix(self):
+        quarter = numpy.array([[0, -1, 0, 1], [1, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]])
+        pose = carillon.contacts.to_pose(quarter)
+        half = 0.5**0.5
+        numpy.testing.assert_allclose([pose.orientation.w, pose.orientation.x, pose.orientation.y, pose.orientation.z],
+                                      [half, 0, 0, half], atol=1e-12)
+        self.assertEqual(pose.position_m, contact_pb2.Vec3(x=1, y=2, z=3))
+        self.assertEqual(carillon.contacts.to_pose((1, 2, 3)), contact_pb2.Pose(position_m=pose.position_m))
+
+    def test_columns_that_do_not_fit_are_refused_before_they_are_sent(self):
+        with self.assertRaisesRegex(ValueError, "must be N x 3"):
+            carillon.contacts.make_step(0, contacts=carillon.Contacts(1, [(0, 0)], [(0, 0)]))
+        with self.assertRaisesRegex(ValueError, "2 points and 1 impulses"):
+            carillon.contacts.make_step(0, impulses=carillon.Impulses(1, [(0, 0, 0)] * 2, [(0, 0, 1)]))
+
+    def test_time_does_not_go_back_in_a_trace(self):
+        trace = carillon.Trace()
+        trace.step(1.0)
+        with self.assertRaisesRegex(ValueError, "goes back"):
+            trace.step(0.5)
+
+
+if __name__ == "__main__":
+    unittest.main()
