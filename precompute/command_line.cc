@@ -34,7 +34,7 @@ struct Options {
 constexpr char kMaterialGroup[] = "Material";
 constexpr char kUseGroup[] = "Intended use";
 
-absl::Status Invalid(absl::string_view message) {
+absl::Status InvalidOption(absl::string_view message) {
   return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS", message);
 }
 
@@ -121,10 +121,10 @@ void AddOptions(CLI::App& app, Options& options, CommandLine& result) {
 /// Young's modulus and Poisson's ratio, from either pair of constants.
 absl::Status SetElasticity(const Options& options, v1::Material& material) {
   if (options.lambda_pa.has_value() != options.mu_pa.has_value()) {
-    return Invalid("--lame-lambda and --lame-mu belong together; give both");
+    return InvalidOption("--lame-lambda and --lame-mu belong together; give both");
   }
   if (options.lambda_pa && (options.young_pa || options.poisson_ratio)) {
-    return Invalid(
+    return InvalidOption(
         "--lame-lambda and --lame-mu say the same as --young and --poisson; give one pair");
   }
   if (options.lambda_pa) {
@@ -157,7 +157,7 @@ absl::StatusOr<v1::Material> MakeMaterial(const Options& options) {
   }
   if (options.material.empty() && !(material.has_young_pa() && material.has_poisson_ratio() &&
                                     material.has_density_kg_per_m3())) {
-    return Invalid(
+    return InvalidOption(
         "no material: give --material NAME, or --young, --poisson (or --lame-lambda, "
         "--lame-mu) and --density");
   }
@@ -175,9 +175,9 @@ absl::Status SetBand(const std::string& band, v1::WorkerRequest& request) {
   if (two_numbers && low_hz >= 0 && low_hz < high_hz && std::isfinite(high_hz)) {
     return absl::OkStatus();
   }
-  return Invalid(absl::StrCat("--band is \"", band,
-                              "\"; it must be two frequencies in Hz, the lower "
-                              "first, such as 20:20000"));
+  return InvalidOption(absl::StrCat("--band is \"", band,
+                                    "\"; it must be two frequencies in Hz, the lower "
+                                    "first, such as 20:20000"));
 }
 
 std::string FormatOf(const std::string& format, const std::string& file) {
@@ -217,7 +217,8 @@ absl::StatusOr<CommandLine> ParseCommandLine(int argc, const char* const* argv) 
     version.message = absl::StrCat(CARILLON_VERSION, "\n");
     return version;
   } catch (const CLI::Error& error) {
-    return Invalid(absl::StrCat(error.what(), "; carillon-precompute --help lists the options"));
+    return InvalidOption(
+        absl::StrCat(error.what(), "; carillon-precompute --help lists the options"));
   }
   ASSIGN_OR_RETURN(result.request,
                    MakeRequest(options, result.mesh_file, std::move(result.request)));

@@ -9,19 +9,21 @@
 
 namespace carillon::precompute {
 
-/// What a user asked carillon-precompute for.
+/// The parsed command line of carillon-precompute.
 struct CommandLine {
   std::string mesh_file;
   std::string output;
-  v1::WorkerRequest request;  ///< completed
+  v1::WorkerRequest request;  ///< with every default filled in
   bool json = false;
-  int event_descriptor = -1;  ///< below zero: none
-  int thread_count = 0;       ///< zero: one for each processor
-  /// Help or version to be printed instead of anything else.
+  int event_descriptor = -1;  ///< the worker writes its events there; below zero: nowhere
+  int thread_count = 0;       ///< zero: one thread for each processor
+  /// The help or the version. If it is set, the program prints it and does nothing else.
   std::optional<std::string> message;
 };
 
-/// The flags fill a v1::WorkerRequest, or --request names a file that holds one.
+/// Parses the command line. The flags fill a v1::WorkerRequest, or --request names a file that
+/// contains one.
+///
 /// Errors: INVALID_SETTINGS (options that are unknown, malformed, missing or contradict each
 /// other), UNKNOWN_MATERIAL, INVALID_MATERIAL.
 absl::StatusOr<CommandLine> ParseCommandLine(int argc, const char* const* argv);

@@ -52,7 +52,7 @@ absl::StatusOr<Body> FillSurface(const Fillable& surface, const MeshingSettings&
   for (BoundaryFace& face : mesh.boundary) {
     face.given_triangle = surface.prepared.given_triangle[static_cast<size_t>(face.given_triangle)];
   }
-  RETURN_IF_ERROR(Hold(FixturesOf(request), surface.given, surface.names, mesh));
+  RETURN_IF_ERROR(FixNodes(FixturesOf(request), surface.given, surface.names, mesh));
   return Body{surface.given, std::move(mesh), surface.prepared.warnings};
 }
 
@@ -67,7 +67,7 @@ absl::StatusOr<Body> TakeTetrahedra(TetMesh mesh, const MeshNames& names,
   }
   SurfaceMesh given = BoundarySurface(mesh);
   if (mesh.nodes_per_element < nodes_per_element) AddMidsideNodes(mesh);
-  RETURN_IF_ERROR(Hold(FixturesOf(request), given, names, mesh));
+  RETURN_IF_ERROR(FixNodes(FixturesOf(request), given, names, mesh));
   return Body{std::move(given), std::move(mesh), {}};
 }
 
@@ -208,7 +208,7 @@ Round Describe(const TetMesh& mesh, const ModalModel& model, double cpu_s) {
   const double count = static_cast<double>(mesh.nodes.size());
   const double corners_on_boundary = static_cast<double>(mesh.boundary.size()) / 2;
   const double nodes_per_corner = mesh.nodes_per_element == 10 ? kNodesPerCorner : 1;
-  return {.grain_m = Grain(BoundarySurface(mesh)),
+  return {.element_size_m = SurfaceElementSize(BoundarySurface(mesh)),
           .node_count = count,
           .thin = nodes_per_corner * corners_on_boundary > kThin * count,
           .worst_error = model.WorstError(),
@@ -240,10 +240,10 @@ absl::StatusOr<ModalModel> SolveToGoal(const Fillable& surface, const v1::Worker
     if (!model.ok() || !goal.given()) return model;
     const PhaseClock::Times ended = PhaseClock::Now();
     rounds.push_back(Describe(body->mesh, *model, ended.cpu_seconds - begun.cpu_seconds));
-    const std::optional<double> next = NextGrain(goal, rounds);
+    const std::optional<double> next = NextElementSize(goal, rounds);
     if (!next) return model;
     best = std::move(model);
-    meshing.grain_m = *next;
+    meshing.element_size_m = *next;
     forecast = {.expected_s = (ended.seconds - begun.seconds) * TimeGrowth(rounds.back(), *next),
                 .later_rounds = kLaterRounds};
   }

@@ -10,15 +10,15 @@
 
 namespace carillon::precompute {
 
-/// From a mesh file's bytes to the modal model of the body, with every deformation mode up to the
-/// top of the band that the request names. `request` is completed (see worker_request.h). With an
-/// accuracy or a budget a surface is filled and solved again, finer each time, until the goal is
-/// met or as far as it allows; the model's warnings say where the accuracy asked for was not
-/// reached, or a budget was overrun.
+/// Computes the modal model of a body from the bytes of a mesh file. The model has every
+/// deformation mode up to the top of the band that the request names. `request` has all defaults
+/// filled in (see worker_request.h). If the request has an accuracy or a budget, the surface is
+/// filled and solved again with finer meshes until the accuracy is reached or the budget is spent.
+/// The model's warnings say if the accuracy was not reached or the budget was exceeded.
 ///
-/// Errors: those of ParseMesh, CheckSurface, Tetrahedralize, Hold and SolveDeformationModes;
+/// Errors: those of ParseMesh, CheckSurface, Tetrahedralize, FixNodes and SolveDeformationModes;
 /// NO_MODE_IN_BAND with the figure first_mode_hz; INVALID_SETTINGS (linear elements asked of a mesh
-/// of ten-node ones); OUTPUT_NOT_WRITABLE. The mesher may also crash the process.
+/// of ten-node ones); OUTPUT_NOT_WRITABLE. The mesh generator may also crash the process.
 absl::StatusOr<ModalModel> Decompose(std::string mesh_bytes, const v1::WorkerRequest& request,
                                      DecompositionObserver& observer);
 

@@ -8,31 +8,33 @@
 
 namespace carillon::precompute {
 
-/// A step to come. All phases but the first may repeat.
+/// A step that is still to be done. All phases but the first may repeat.
 struct PlannedStep {
   v1::Phase phase;
-  double predicted_s = 0;  ///< on the machine that predictions are made for
+  double predicted_s = 0;  ///< on the machine for which the cost model was measured
 };
 
-/// What is known of a mesh before it is made and solved, and of finer ones after it.
+/// The predicted time of a round, which makes and solves one mesh, and of the rounds after it,
+/// which make finer meshes.
 struct RoundForecast {
-  double expected_s = 0;    ///< by the clock; zero: not known
-  double later_rounds = 0;  ///< what the rounds after it will take, in times of this one
+  double expected_s = 0;    ///< wall time of this round; zero: not known
+  double later_rounds = 0;  ///< time of all later rounds, as a multiple of this round's
 };
 
-/// Told how a decomposition goes on, in the thread that does it.
+/// Is told about the progress of a decomposition, in the thread that does the work.
 class DecompositionObserver {
  public:
   virtual ~DecompositionObserver() = default;
-  /// `fraction`: estimated part of the phase that is done, 0 to 1.
+  /// `fraction` is the estimated part of the phase that is done, 0 to 1.
   virtual void OnProgress(v1::Phase phase, double fraction) = 0;
-  /// Another mesh is about to be made and solved.
+  /// A round begins: another mesh is about to be made and solved.
   virtual void OnRound(const RoundForecast& forecast) = 0;
-  /// The steps of this round from the count on; told again once more is known.
+  /// `steps` are those of this round from the counting of modes on. The call is repeated when the
+  /// prediction becomes more precise.
   virtual void OnPlan(const std::vector<PlannedStep>& steps) = 0;
-  /// The mesh has this many nodes, corners and mid-sides.
+  /// The mesh has `node_count` nodes, counting corners and mid-sides.
   virtual void OnMesh(size_t node_count) = 0;
-  /// Verified modes, once known.
+  /// The solver has verified `mode_count` modes.
   virtual void OnModes(size_t mode_count) = 0;
 };
 

@@ -14,13 +14,13 @@ Fixture FromProto(const v1::Fixture& given) {
   // A fixture that FixtureText has no text for was refused before it came here.
   const v1::Fixture said = ParseFixture(FixtureText(given).value_or("")).value_or(given);
   if (said.has_vertices()) {
-    return HeldVertices{{said.vertices().indices().begin(), said.vertices().indices().end()}};
+    return FixedVertices{{said.vertices().indices().begin(), said.vertices().indices().end()}};
   }
   if (said.has_plane()) {
-    return HeldPlane{ToPoint(said.plane().point_m()), ToPoint(said.plane().normal())};
+    return FixedPlane{ToPoint(said.plane().point_m()), ToPoint(said.plane().normal())};
   }
-  if (said.has_box()) return HeldBox{ToPoint(said.box().low_m()), ToPoint(said.box().high_m())};
-  return HeldGroup{said.group()};
+  if (said.has_box()) return FixedBox{ToPoint(said.box().low_m()), ToPoint(said.box().high_m())};
+  return FixedGroup{said.group()};
 }
 
 }  // namespace carillon::precompute

@@ -7,27 +7,30 @@
 
 namespace carillon::precompute {
 
-/// What a body is meant to be when it sounds; tells how far up to compute and what to report. None
-/// of it goes into the modal model, which is for unit Young's modulus, density and size.
+/// The material and the size that a body will have when it sounds, and the band of frequencies that
+/// are wanted. They determine up to which frequency modes are computed, and the figures in the
+/// report. The modal model does not depend on them: it is for unit Young's modulus, density and
+/// size.
 struct IntendedUse {
   double young_pa;
   double density_kg_per_m3;
   double alpha1_s = 0;  ///< Rayleigh damping D = alpha1 K + alpha2 M
   double alpha2_per_s = 0;
   double size = 1;     ///< relative to the mesh
-  double low_hz = 20;  ///< the band of natural frequencies wanted
+  double low_hz = 20;  ///< lower end of the wanted band of natural frequencies
   double high_hz = 20000;
   std::vector<LossFactorPoint> loss_factor = {};  ///< ascending; damping added to D
 
-  /// Lambda (unit material and size) -> Lambda E / (rho s^2), 1/s^2.
+  /// Returns Lambda E / (rho s^2), 1/s^2, for an eigenvalue Lambda of unit material and size.
   double Eigenvalue(double unit_eigenvalue) const;
-  /// The natural frequency that a unit eigenvalue has in this use.
+  /// Returns the natural frequency of an eigenvalue of unit material and size.
   double FrequencyHz(double unit_eigenvalue) const;
-  /// The inverse of FrequencyHz.
+  /// Returns the eigenvalue of unit material and size for a natural frequency.
   double UnitEigenvalue(double frequency_hz) const;
-  /// sigma = -(alpha1 Lambda + alpha2 + eta omega) / 2, 1/s, with the loss factor eta at omega.
+  /// Returns sigma = -(alpha1 Lambda + alpha2 + eta omega) / 2, 1/s, with the loss factor eta at
+  /// omega.
   double DecayRatePerS(double unit_eigenvalue) const;
-  /// sqrt(Lambda - sigma^2) / (2 pi); zero for an overdamped mode.
+  /// Returns sqrt(Lambda - sigma^2) / (2 pi), or zero for an overdamped mode.
   double DampedFrequencyHz(double unit_eigenvalue) const;
 };
 

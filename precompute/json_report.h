@@ -10,13 +10,14 @@
 
 namespace carillon::precompute {
 
-/// The object that --json prints: nodes, elements, unknowns, peak_memory_bytes, phases, the count
-/// of modes left out, warnings, the modes of the model that lie in the band of `use`, and with
-/// --check-with the comparison of the solvers ("check").
+/// Returns the object that --json prints: nodes, elements, unknowns, peak_memory_bytes, phases, the
+/// count of modes left out, warnings, the modes of the model that lie in the band of `use`, and
+/// with --check-with the comparison of the solvers ("check").
 std::string JsonReport(const ModalModel& model, const IntendedUse& use,
                        const ProgressReporter& reporter);
 
-/// The object that --json prints of a refusal: error, with reason, message and figures.
+/// Returns the object that --json prints when a request is refused: "error", with reason, message
+/// and figures.
 std::string JsonError(const absl::Status& status);
 
 }  // namespace carillon::precompute

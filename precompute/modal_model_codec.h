@@ -9,14 +9,15 @@
 
 namespace carillon::precompute {
 
-/// What the header says beside the model itself.
+/// The mesh file and the settings of which a model was made; they stand in the header of its file.
 struct ModelOrigin {
   std::string mesh_digest;             ///< SHA-256 of the mesh file
-  v1::DecompositionSettings settings;  ///< every default filled in
+  v1::DecompositionSettings settings;  ///< with every default filled in
 };
 
-/// Writes the stored form (proto/carillon/v1/modal_model.proto): to a temporary name beside `path`,
-/// then renamed, so that `path` never holds half a model.
+/// Writes the stored form (see proto/carillon/v1/modal_model.proto) under a temporary name beside
+/// `path` and renames it, so that `path` never contains half a model.
+///
 /// Errors: Internal OUTPUT_NOT_WRITABLE.
 absl::Status WriteModalModel(const std::string& path, const ModalModel& model,
                              const ModelOrigin& origin);

@@ -15,10 +15,10 @@
 namespace carillon::precompute {
 
 /// Keeps the state of a decomposition and shows it at a steady rate from a thread of its own, so
-/// that a long factorization is known to live.
+/// that a user sees that a long factorization is still running.
 class ProgressReporter : public DecompositionObserver {
  public:
-  /// `show` is called in the reporter's thread only, every `interval` and once at the end.
+  /// The reporter's thread calls `show` every `interval` and once at the end.
   ProgressReporter(std::function<void(const v1::Progress&)> show,
                    std::chrono::milliseconds interval);
   ~ProgressReporter() override;
@@ -33,13 +33,13 @@ class ProgressReporter : public DecompositionObserver {
   void Stop();
 
   v1::Progress state() const;
-  /// Only after Stop.
+  /// May be called after Stop only.
   const PhaseClock& clock() const { return clock_; }
 
  private:
   void Run();
   double Now() const;
-  /// Brings fraction and remaining time up to date; mutex_ is held.
+  /// Updates the fraction and the remaining time. The caller has locked mutex_.
   void Estimate();
 
   std::function<void(const v1::Progress&)> show_;
@@ -51,7 +51,7 @@ class ProgressReporter : public DecompositionObserver {
   PhaseClock clock_;
   double begun_s_ = PhaseClock::Now().seconds;
   RemainingTime remaining_;
-  bool counted_ = false;  ///< how many modes there are is known
+  bool counted_ = false;  ///< the number of modes is known
   std::thread thread_;
 };
 

@@ -24,15 +24,15 @@ constexpr double kMargin = 0.8;
 constexpr double kLeastGrowth = 1.15, kMostGrowth = 6;
 constexpr size_t kMostRounds = 6;
 /// Ratio of the element sizes of two rounds above which the mesh counts as not refined.
-constexpr double kSameGrain = 0.97;
+constexpr double kSameSize = 0.97;
 
 double ErrorPower(const std::vector<Round>& rounds) {
   if (rounds.size() < 2) return kErrorPower;
   const Round& last = rounds.back();
   const Round& before = rounds[rounds.size() - 2];
   if (before.worst_error == 0 || last.worst_error == 0) return kErrorPower;
-  const double power =
-      std::log(before.worst_error / last.worst_error) / std::log(before.grain_m / last.grain_m);
+  const double power = std::log(before.worst_error / last.worst_error) /
+                       std::log(before.element_size_m / last.element_size_m);
   return std::clamp(power, kLeastErrorPower, kMostErrorPower);
 }
 
@@ -54,7 +54,7 @@ double AffordableGrowth(const ResolutionGoal& goal, const std::vector<Round>& ro
 
 bool Refined(const std::vector<Round>& rounds) {
   return rounds.size() < 2 ||
-         rounds.back().grain_m < kSameGrain * rounds[rounds.size() - 2].grain_m;
+         rounds.back().element_size_m < kSameSize * rounds[rounds.size() - 2].element_size_m;
 }
 
 std::string Overrun(const char* what, double asked, double used) {
@@ -70,12 +70,13 @@ double Dimension(const Round& round) { return round.thin ? 2 : 3; }
 
 }  // namespace
 
-double TimeGrowth(const Round& last, double grain_m) {
-  const double nodes = std::pow(last.grain_m / grain_m, Dimension(last));
+double TimeGrowth(const Round& last, double element_size_m) {
+  const double nodes = std::pow(last.element_size_m / element_size_m, Dimension(last));
   return std::pow(nodes, last.thin ? kThinTimePower : kTimePower);
 }
 
-std::optional<double> NextGrain(const ResolutionGoal& goal, const std::vector<Round>& rounds) {
+std::optional<double> NextElementSize(const ResolutionGoal& goal,
+                                      const std::vector<Round>& rounds) {
   const Round& last = rounds.back();
   if (rounds.size() >= kMostRounds || !Refined(rounds)) return std::nullopt;
   if (goal.accuracy > 0 && last.worst_error > 0 && last.worst_error <= goal.accuracy) {
@@ -90,7 +91,7 @@ std::optional<double> NextGrain(const ResolutionGoal& goal, const std::vector<Ro
     growth = std::min(growth, std::pow(finer, dimension));
   }
   if (growth < kLeastGrowth) return std::nullopt;
-  return last.grain_m * std::pow(growth, -1 / dimension);
+  return last.element_size_m * std::pow(growth, -1 / dimension);
 }
 
 std::vector<std::string> OverrunWarnings(const ResolutionGoal& goal, double used_s,

@@ -18,10 +18,10 @@ struct ResolutionGoal {
 
 /// A mesh that was solved, what it cost, and how well it did.
 struct Round {
-  double grain_m = 0;      ///< of its surface, as Grain() measures it
-  double node_count = 0;   ///< mid-side nodes, too
-  bool thin = false;       ///< number of nodes ~ element_size^-2, not ^-3
-  double worst_error = 0;  ///< zero: it has no mode
+  double element_size_m = 0;  ///< of its surface, as SurfaceElementSize() measures it
+  double node_count = 0;      ///< mid-side nodes, too
+  bool thin = false;          ///< number of nodes ~ element_size^-2, not ^-3
+  double worst_error = 0;     ///< zero: it has no mode
   double cpu_s = 0;
   double peak_bytes = 0;
 };
@@ -32,10 +32,10 @@ inline constexpr int kFirstCornerNodeCount = 1500;
 /// Element size in metres of the next mesh to try; none if the last mesh is good enough, or the
 /// best that the goal allows. The last two rounds show the power of the element size with which
 /// errors fall. Time and memory grow with powers of the number of nodes, measured on solids.
-std::optional<double> NextGrain(const ResolutionGoal& goal, const std::vector<Round>& rounds);
+std::optional<double> NextElementSize(const ResolutionGoal& goal, const std::vector<Round>& rounds);
 
 /// Predicted time of a round with this element size, relative to the round `last`.
-double TimeGrowth(const Round& last, double grain_m);
+double TimeGrowth(const Round& last, double element_size_m);
 
 /// Warnings for the user about each budget that was exceeded. The first round is solved whatever it
 /// costs, and the cost of later rounds is only predicted.

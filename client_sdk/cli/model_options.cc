@@ -7,33 +7,17 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "client_sdk/cli/commands.h"
 #include "client_sdk/cli/material_options.h"
 #include "client_sdk/cli/quantity.h"
+#include "proto/cpp/parsed_option.h"
 #include "proto/cpp/settings_options.h"
 
 namespace carillon::cli {
 namespace {
-
-/// Adds an option whose text `parse` converts to the value that `take` gets. `form` describes the
-/// text in the message about a wrong one.
-template <class T, class Take>
-void AddParsed(CLI::App& app, const std::string& name,
-               std::optional<T> (*parse)(const std::string&), const std::string& form,
-               const std::string& description, Take take) {
-  app.add_option_function<std::string>(
-      name,
-      [=](const std::string& text) {
-        const std::optional<T> value = parse(text);
-        if (!value) throw CLI::ValidationError(name, "\"" + text + "\" must be " + form);
-        take(*value);
-      },
-      description);
-}
 
 /// Parses "LO:HI" as two frequencies.
 CLI::Validator Band(CreateModelOptions& options) {

@@ -14,6 +14,7 @@
 #include "precompute/sparse/openblas.h"
 #include "precompute/sparse/workers.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::precompute {
 namespace {
@@ -127,25 +128,23 @@ template <typename Real>
 absl::StatusOr<RefinedModes> SolveIn(const OrderedSystem& ordered, const MatrixXd& rigid,
                                      double shift, Index wanted, Workers& workers,
                                      const SolveProgress& progress) {
-  const auto factor = MultifrontalCholesky<Real>::Factorize(ordered.fronts, ordered.matrix, shift,
-                                                            workers, nullptr);
-  if (!factor.ok()) return factor.status();
+  ASSIGN_OR_RETURN(const auto factor, MultifrontalCholesky<Real>::Factorize(
+                                          ordered.fronts, ordered.matrix, shift, workers, nullptr));
   std::vector<VectorBlockOf<Real>> rough;
   int first_steps = 1;
   {
     const double expected_size = PredictBasisSize(static_cast<int>(wanted));
-    LanczosRecurrence<Real> recurrence(ordered.matrix, *factor, shift, rigid, expected_size,
+    LanczosRecurrence<Real> recurrence(ordered.matrix, factor, shift, rigid, expected_size,
                                        workers);
     const Index largest = std::min<Index>(
         3 * static_cast<Index>(ordered.matrix.node_count) - rigid.cols(), 10 * wanted + 500);
-    const absl::StatusOr<RitzPairs> pairs = Iterate(recurrence, wanted, largest, progress);
-    if (!pairs.ok()) return pairs.status();
-    rough = recurrence.Combine(pairs->coordinates);
+    ASSIGN_OR_RETURN(const RitzPairs pairs, Iterate(recurrence, wanted, largest, progress));
+    rough = recurrence.Combine(pairs.coordinates);
     const double error = recurrence.solve_error();
     if (error > 0 && error < kLargeSolveError) first_steps = kFirstSteps;
   }
   return RefineModes(
-      ordered.matrix, *factor, rigid, std::move(rough),
+      ordered.matrix, factor, rigid, std::move(rough),
       {.wanted = wanted, .first_steps = first_steps, .free_motion = -kFreeMotion * shift}, workers,
       [&](double done) { progress(kIterationPart + (1 - kIterationPart) * done); });
 }

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::precompute {
 namespace {
@@ -105,7 +106,7 @@ CholeskyFactor::~CholeskyFactor() = default;
 absl::StatusOr<CholeskyFactor> CholeskyFactor::Make(const SystemMatrices::Sparse& lower,
                                                     const std::vector<int>& order) {
   auto insides = std::make_unique<Insides>();
-  if (absl::Status status = insides->Factor(lower, order); !status.ok()) return status;
+  RETURN_IF_ERROR(insides->Factor(lower, order));
   return CholeskyFactor(std::move(insides));
 }
 

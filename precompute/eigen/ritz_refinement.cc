@@ -24,7 +24,7 @@ using Eigen::VectorXd;
 
 /// Limit of |K phi - Lambda M phi| / |Lambda M phi| in the Euclidean norm, in the unknowns of the
 /// user.
-constexpr double kTolerance = 8e-7;
+constexpr double kRefinedTolerance = 8e-7;
 
 constexpr int kMaxRounds = 6;
 
@@ -116,7 +116,7 @@ class Refinement {
   bool IsExhausted() const {
     for (Index m = 0; m < wanted_; ++m) {
       const double rounding = ResidualOfRounding(stiffest_, eigenvalues_[m]);
-      if (!(residuals_[m] <= std::max(kTolerance, rounding))) return false;
+      if (!(residuals_[m] <= std::max(kRefinedTolerance, rounding))) return false;
     }
     return true;
   }
@@ -143,8 +143,9 @@ class Refinement {
     for (size_t b = 0; b < x_.size(); ++b) {
       const Index first = static_cast<Index>(b) * kBlockWidth;
       const Index count = std::clamp<Index>(wanted_ - first, 0, kBlockWidth);
-      const bool good = residuals_.size() != 0 &&
-                        (count == 0 || residuals_.segment(first, count).maxCoeff() <= kTolerance);
+      const bool good =
+          residuals_.size() != 0 &&
+          (count == 0 || residuals_.segment(first, count).maxCoeff() <= kRefinedTolerance);
       if (!good) bad.push_back(b);
     }
     return bad;
@@ -201,9 +202,9 @@ class Refinement {
   void Subtract(const Real* change, int64_t stride, size_t b) {
     SmallBlock deflated = SmallBlock::Zero();
     SmallBlock h;
-    constexpr Index kStretch = 256;
-    for (Index i = 0; i < rows_; i += kStretch) {
-      const Index count = std::min(kStretch, rows_ - i);
+    constexpr Index kRows = 256;
+    for (Index i = 0; i < rows_; i += kRows) {
+      const Index count = std::min(kRows, rows_ - i);
       double* x = x_[b].data() + i * kBlockWidth;
       SubtractChange(change + i * stride, stride, count, x);
       BlockDot(deflated_momenta_.data() + i * kBlockWidth, x, count, h.data());
@@ -250,7 +251,7 @@ absl::StatusOr<RefinedModes> RefineModes(const NodeMatrix& A,
     progress(1 - left * (1 - kRoundPart * kCorrectionPart));
     if (!refinement.Project()) break;
     const double before = std::exchange(residual, refinement.LargestResidual());
-    if (residual <= kTolerance) return refinement.Result();
+    if (residual <= kRefinedTolerance) return refinement.Result();
     if (refinement.IsExhausted() && (residual > before / 2 || round + 1 == kMaxRounds)) {
       return refinement.Result();
     }

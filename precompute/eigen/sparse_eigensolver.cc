@@ -24,7 +24,7 @@ using Permutation = Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int
 /// does not depend on it within a factor of ten of frequency.
 constexpr double kRelativeShift = -0.01;
 
-constexpr double kTolerance = 1e-9;
+constexpr double kSpectraTolerance = 1e-9;
 constexpr int kMaxRestarts = 100;
 
 /// The permutation that brings unknowns into pivot order: row k of P x is x[order[k]].
@@ -113,7 +113,7 @@ absl::StatusOr<Modes> SparseEigensolver::Solve(const SystemMatrices& system,
     InverseOperator inverse(factor, system.M, progress, basis + request.count);
     Spectra::SymEigsSolver<InverseOperator> lanczos(inverse, request.count, basis);
     lanczos.init();
-    lanczos.compute(Spectra::SortRule::LargestAlge, kMaxRestarts, kTolerance);
+    lanczos.compute(Spectra::SortRule::LargestAlge, kMaxRestarts, kSpectraTolerance);
     if (lanczos.info() != Spectra::CompInfo::Successful) return NotConverged(request.count);
     return MakeModes(factor, system.M, shift, lanczos.eigenvalues(), lanczos.eigenvectors());
   } catch (const std::bad_alloc&) {

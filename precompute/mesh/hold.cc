@@ -13,6 +13,7 @@
 #include "absl/strings/str_join.h"
 #include "precompute/mesh/point_math.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::precompute {
 namespace {
@@ -80,7 +81,7 @@ class FixedNodeFinder {
         tolerance_m_(kTolerance * Diagonal(mesh.nodes)),
         is_fixed_(mesh.nodes.size()) {}
 
-  absl::Status operator()(const HeldPlane& plane) {
+  absl::Status operator()(const FixedPlane& plane) {
     const double length = Norm(plane.normal);
     FixWhere([&](const Point& p) {
       return Dot(Difference(p, plane.point_m), plane.normal) <= tolerance_m_ * length;
@@ -91,7 +92,7 @@ class FixedNodeFinder {
                        "metres, or turn its normal, which points to the free side");
   }
 
-  absl::Status operator()(const HeldBox& box) {
+  absl::Status operator()(const FixedBox& box) {
     FixWhere([&](const Point& p) {
       bool inside = true;
       for (size_t x = 0; x < 3; ++x) {
@@ -106,7 +107,7 @@ class FixedNodeFinder {
                        "in metres, of the body as large as its unit makes it");
   }
 
-  absl::Status operator()(const HeldVertices& vertices) {
+  absl::Status operator()(const FixedVertices& vertices) {
     absl::flat_hash_set<Point> places;
     const NearestNode nearest(mesh_.nodes);
     for (const int64_t number : vertices.numbers) {
@@ -119,7 +120,7 @@ class FixedNodeFinder {
     return absl::OkStatus();
   }
 
-  absl::Status operator()(const HeldGroup& asked) {
+  absl::Status operator()(const FixedGroup& asked) {
     const auto group = std::ranges::find(names_.groups, asked.name, &MeshGroup::name);
     if (group == names_.groups.end()) return NoSuchGroup(asked.name);
     FixTriangles(*group);
@@ -266,17 +267,15 @@ class FixedNodeFinder {
 
 }  // namespace
 
-absl::Status Hold(const std::vector<Fixture>& fixtures, const SurfaceMesh& given,
-                  const MeshNames& names, TetMesh& mesh) {
+absl::Status FixNodes(const std::vector<Fixture>& fixtures, const SurfaceMesh& given,
+                      const MeshNames& names, TetMesh& mesh) {
   mesh.held.clear();
   if (fixtures.empty()) return absl::OkStatus();
   FixedNodeFinder finder(given, names, mesh);
   for (const Fixture& fixture : fixtures) {
-    if (absl::Status status = finder.Take(fixture); !status.ok()) return status;
+    RETURN_IF_ERROR(finder.Take(fixture));
   }
-  absl::StatusOr<std::vector<int32_t>> nodes = finder.Nodes();
-  if (!nodes.ok()) return nodes.status();
-  mesh.held = *std::move(nodes);
+  ASSIGN_OR_RETURN(mesh.held, finder.Nodes());
   return absl::OkStatus();
 }
 

@@ -15,35 +15,35 @@ namespace carillon::precompute {
 
 /// Vertices by their numbers, see MeshNames. The nearest node of each is fixed, and so are all
 /// nodes of a given triangle or edge whose corners are all listed.
-struct HeldVertices {
+struct FixedVertices {
   std::vector<int64_t> numbers;
 };
 
 /// All nodes in a plane or behind it, that is on the side opposite to its normal.
-struct HeldPlane {
+struct FixedPlane {
   Point point_m;
   Point normal;  ///< of any length above zero
 };
 
 /// All nodes in a box or on its surface.
-struct HeldBox {
+struct FixedBox {
   Point low_m;
   Point high_m;
 };
 
 /// A group of the mesh file.
-struct HeldGroup {
+struct FixedGroup {
   std::string name;
 };
 
-using Fixture = std::variant<HeldVertices, HeldPlane, HeldBox, HeldGroup>;
+using Fixture = std::variant<FixedVertices, FixedPlane, FixedBox, FixedGroup>;
 
 /// Applies boundary conditions: fills `mesh.held` with the nodes in the regions of the fixtures,
 /// including mid-side nodes. The tolerance of a region is a millionth of the body's diagonal.
 /// `given`: the surface to which the boundary of `mesh` refers.
 ///
 /// Errors: NO_VERTEX_HELD (a fixture contains no node), ALL_VERTICES_HELD, GROUP_UNKNOWN.
-absl::Status Hold(const std::vector<Fixture>& fixtures, const SurfaceMesh& given,
-                  const MeshNames& names, TetMesh& mesh);
+absl::Status FixNodes(const std::vector<Fixture>& fixtures, const SurfaceMesh& given,
+                      const MeshNames& names, TetMesh& mesh);
 
 }  // namespace carillon::precompute

@@ -16,6 +16,7 @@
 #include "precompute/sparse/frontal_structure.h"
 #include "precompute/sparse/node_matrix.h"
 #include "precompute/sparse/workers.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::precompute {
 
@@ -208,7 +209,7 @@ absl::Status FrontWalk<Real, Visit>::RunSubtree(const Subtree& subtree, Real* st
                                                 Assembler& assembler, Workers& alone) {
   Real* top = stack;
   for (int s = subtree.begin; s < subtree.end; ++s) {
-    if (absl::Status status = assembler.Process(s, top, alone); !status.ok()) return status;
+    RETURN_IF_ERROR(assembler.Process(s, top, alone));
     Real* base = top;
     for (const int child : fronts_.children(s)) base -= UpdateSize(child);
     MoveUpdate(top, fronts_.update_count(s), base);

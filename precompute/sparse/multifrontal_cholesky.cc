@@ -9,6 +9,7 @@
 #include "precompute/sparse/front_elimination.h"
 #include "precompute/sparse/tile_kernels.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::precompute {
 namespace {
@@ -88,7 +89,7 @@ absl::StatusOr<MultifrontalCholesky<Real>> MultifrontalCholesky<Real>::Factorize
     return absl::OkStatus();
   };
   FrontWalk<Real, decltype(eliminate)> walk(fronts, A, shift, eliminate, workers);
-  if (absl::Status status = walk.Run(progress); !status.ok()) return status;
+  RETURN_IF_ERROR(walk.Run(progress));
   return factor;
 }
 

@@ -8,6 +8,7 @@
 #include "precompute/sparse/front_elimination.h"
 #include "precompute/sparse/front_walk.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::precompute {
 namespace {
@@ -36,7 +37,7 @@ absl::StatusOr<int> CountEigenvaluesBelow(const FrontalStructure& fronts, const 
     return result == Elimination::kDone ? absl::OkStatus() : VanishingPivot();
   };
   FrontWalk<double, decltype(eliminate)> walk(fronts, A, shift, eliminate, workers);
-  if (absl::Status status = walk.Run(progress); !status.ok()) return status;
+  RETURN_IF_ERROR(walk.Run(progress));
   return negative;
 }
 

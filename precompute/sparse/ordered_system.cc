@@ -3,13 +3,14 @@
 
 #include <utility>
 
+#include "proto/cpp/status_macros.h"
+
 namespace carillon::precompute {
 
 absl::StatusOr<OrderedSystem> OrderedSystem::Make(const SystemMatrices& system) {
-  absl::StatusOr<FrontalStructure> fronts = AnalyzeFronts(system.K);
-  if (!fronts.ok()) return fronts.status();
-  NodeMatrix matrix = MakeNodeMatrix(system.K, system.M, fronts->order);
-  return OrderedSystem{.fronts = *std::move(fronts), .matrix = std::move(matrix)};
+  ASSIGN_OR_RETURN(FrontalStructure fronts, AnalyzeFronts(system.K));
+  NodeMatrix matrix = MakeNodeMatrix(system.K, system.M, fronts.order);
+  return OrderedSystem{.fronts = std::move(fronts), .matrix = std::move(matrix)};
 }
 
 }  // namespace carillon::precompute

@@ -8,29 +8,13 @@
 
 #include "proto/cpp/decomposition_settings.h"
 #include "proto/cpp/fixture_text.h"
+#include "proto/cpp/parsed_option.h"
 #include "proto/cpp/quantity.h"
 
 namespace carillon {
 namespace {
 
 using Settings = v1::DecompositionSettings;
-
-/// Adds an option whose text `parse` turns into a value for `take`; `form` says what the text must
-/// be.
-template <class T, class Take>
-void AddParsed(CLI::App& app, const std::string& name,
-               std::optional<T> (*parse)(const std::string&), const std::string& form,
-               const std::string& description, Take take) {
-  app.add_option_function<std::string>(
-         name,
-         [=](const std::string& text) {
-           const std::optional<T> value = parse(text);
-           if (!value) throw CLI::ValidationError(name, "\"" + text + "\" must be " + form);
-           take(*value);
-         },
-         description)
-      ->group(kSettingsGroup);
-}
 
 /// Adds an option that takes one of some words, each of which stands for a value.
 template <class T, class Take>
@@ -45,7 +29,8 @@ void AddChoice(CLI::App& app, const std::string& name, const std::map<std::strin
 void AddBody(CLI::App& app, Settings& settings) {
   AddParsed(app, "--unit", ParseUnitM, "m, mm, cm, in, or a number of metres above zero",
             "unit of the file's coordinates: m, mm, cm, in, or a number of metres [m]",
-            [&](double metres) { settings.set_metres_per_unit(metres); });
+            [&](double metres) { settings.set_metres_per_unit(metres); })
+      ->group(kSettingsGroup);
   app.add_flag_function(
          "--repair", [&](int64_t) { settings.mutable_mesh()->set_repair(true); },
          "repair a surface that does not bound one body: gently first, else by wrapping it; the "
@@ -54,7 +39,8 @@ void AddBody(CLI::App& app, Settings& settings) {
   AddParsed(app, "--wall", ParseLengthM, "a length above zero, such as 3mm or 0.003",
             "hollow the body out to a wall of this thickness, or thicken an open sheet: a number "
             "with m, mm, cm or in, or of metres",
-            [&](double metres) { settings.mutable_mesh()->set_wall_m(metres); });
+            [&](double metres) { settings.mutable_mesh()->set_wall_m(metres); })
+      ->group(kSettingsGroup);
   app.add_option_function<std::string>(
          "--fix",
          [&](const std::string& text) {
@@ -90,13 +76,15 @@ void AddMesh(CLI::App& app, Settings& settings) {
       ->group(kSettingsGroup);
   AddParsed(app, "--accuracy", ParseShare, "above zero, such as 1% or 0.01",
             "mesh so finely that no mode is estimated to be off by more, such as 1% or 0.01",
-            [&](double share) { settings.mutable_mesh()->set_accuracy(share); });
+            [&](double share) { settings.mutable_mesh()->set_accuracy(share); })
+      ->group(kSettingsGroup);
   AddParsed(app, "--budget", ParseBudget, "seconds, or seconds:GiB, such as 60 or 60:4",
             "SECONDS[:GIB] of processor time and memory: mesh as finely as they allow",
             [&](const Budget& budget) {
               settings.mutable_mesh()->set_budget_s(budget.seconds);
               settings.mutable_mesh()->set_budget_gib(budget.gib);
-            });
+            })
+      ->group(kSettingsGroup);
   AddChoice<v1::Element>(app, "--element",
                          {{"linear", v1::ELEMENT_LINEAR}, {"quadratic", v1::ELEMENT_QUADRATIC}},
                          "order of the elements [quadratic]",
@@ -116,7 +104,8 @@ void AddModes(CLI::App& app, Settings& settings) {
       ->group(kSettingsGroup);
   AddParsed(app, "--max-frequency-error", ParseShare, "above zero, such as 2% or 0.02",
             "leave out modes whose frequency is estimated to be off by more, such as 2% or 0.02",
-            [&](double share) { settings.set_max_frequency_error(share); });
+            [&](double share) { settings.set_max_frequency_error(share); })
+      ->group(kSettingsGroup);
   const std::map<std::string, v1::Solver> solvers = {{"block-lanczos", v1::SOLVER_BLOCK_LANCZOS},
                                                      {"spectra", v1::SOLVER_SPECTRA}};
   AddChoice<v1::Solver>(app, "--solver", solvers,

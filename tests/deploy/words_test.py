@@ -13,7 +13,6 @@ class Words(TreeTest):
         super().setUp()
         self.write(WORDS, r'''
 not_read = ["tests/*"]
-not_clean_yet = ["server/old/*"]
 [[phrases]]
 phrase = '\bmends?\b'
 better = "repair"
@@ -54,7 +53,6 @@ only_in = ["precompute/*"]
         self.found("server/a.cc:2")
 
     def test_files_that_are_listed_are_not_read(self):
-        self.write("server/old/a.h", "// It mends.\n")
         self.write("tests/a.h", "// It mends.\n")
         self.found()
 

@@ -22,7 +22,7 @@ constexpr double kSide = 0.02;
 
 TetMesh Cantilever(const std::array<int, 3>& cells, int nodes_per_element) {
   TetMesh mesh = MakeTetBox({kLength, kSide, kSide}, cells, nodes_per_element);
-  EXPECT_TRUE(Hold({HeldPlane{{0, 0, 0}, {1, 0, 0}}}, BoundarySurface(mesh), {}, mesh).ok());
+  EXPECT_TRUE(FixNodes({FixedPlane{{0, 0, 0}, {1, 0, 0}}}, BoundarySurface(mesh), {}, mesh).ok());
   return mesh;
 }
 
@@ -109,7 +109,7 @@ TEST_F(CantileverTest, LinearElementsConvergeToItFromAbove) {
 TEST(SlenderCantilever, IsSolvedAsWellAsRoundingLetsIt) {
   constexpr double kThickness = 0.004;
   TetMesh mesh = MakeTetBox({1, kThickness, kThickness}, {250, 1, 1}, 10);
-  ASSERT_TRUE(Hold({HeldPlane{{0, 0, 0}, {1, 0, 0}}}, BoundarySurface(mesh), {}, mesh).ok());
+  ASSERT_TRUE(FixNodes({FixedPlane{{0, 0, 0}, {1, 0, 0}}}, BoundarySurface(mesh), {}, mesh).ok());
   const DeformationModes modes = ModesOf(mesh, kSteel, kDensity, 400);
   const FreeBeam beam = RectangularBeam(1, kThickness, kThickness, kSteel.poisson_ratio);
   ASSERT_GE(modes.modes.eigenvalues.size(), 12);

@@ -11,9 +11,9 @@ namespace {
 
 using ::testing::StartsWith;
 
-/// A round with a grain of so many millimetres.
-Round Solved(double grain_mm, double worst_error) {
-  return {.grain_m = 1e-3 * grain_mm,
+/// A round with the given element size.
+Round Solved(double element_size_mm, double worst_error) {
+  return {.element_size_m = 1e-3 * element_size_mm,
           .node_count = 10'000,
           .thin = true,
           .worst_error = worst_error,
@@ -22,11 +22,11 @@ Round Solved(double grain_mm, double worst_error) {
 }
 
 TEST(Resolution, StopsWhereTheAccuracyIsReached) {
-  EXPECT_FALSE(NextGrain({.accuracy = 0.01}, {Solved(4, 0.009)}));
+  EXPECT_FALSE(NextElementSize({.accuracy = 0.01}, {Solved(4, 0.009)}));
 }
 
 TEST(Resolution, GoesOnAsFarAsTheErrorNeeds) {
-  const auto next = NextGrain({.accuracy = 0.01}, {Solved(4, 0.02)});
+  const auto next = NextElementSize({.accuracy = 0.01}, {Solved(4, 0.02)});
   ASSERT_TRUE(next);
   EXPECT_GT(*next, 4e-3 / 2);
   EXPECT_LT(*next, 4e-3 / 1.2);
@@ -34,8 +34,8 @@ TEST(Resolution, GoesOnAsFarAsTheErrorNeeds) {
 
 TEST(Resolution, LearnsFromTwoRoundsHowFastTheErrorFalls) {
   const ResolutionGoal goal{.accuracy = 0.01};
-  const auto slow = NextGrain(goal, {Solved(8, 0.06), Solved(4, 0.02)});
-  const auto fast = NextGrain(goal, {Solved(8, 0.2), Solved(4, 0.02)});
+  const auto slow = NextElementSize(goal, {Solved(8, 0.06), Solved(4, 0.02)});
+  const auto fast = NextElementSize(goal, {Solved(8, 0.2), Solved(4, 0.02)});
   ASSERT_TRUE(slow && fast);
   EXPECT_LT(*slow, *fast);
 }
@@ -43,22 +43,22 @@ TEST(Resolution, LearnsFromTwoRoundsHowFastTheErrorFalls) {
 TEST(Resolution, RefinesWallsFurtherThanSolidsInAStep) {
   Round solid = Solved(4, 0.5);
   solid.thin = false;
-  const auto wall = NextGrain({.accuracy = 0.01}, {Solved(4, 0.5)});
-  const auto inside = NextGrain({.accuracy = 0.01}, {solid});
+  const auto wall = NextElementSize({.accuracy = 0.01}, {Solved(4, 0.5)});
+  const auto inside = NextElementSize({.accuracy = 0.01}, {solid});
   ASSERT_TRUE(wall && inside);
   EXPECT_LT(*wall, *inside);
 }
 
 TEST(Resolution, EndsWhereTheMeshCannotBeRefined) {
-  EXPECT_FALSE(NextGrain({.accuracy = 0.01}, {Solved(4, 0.02), Solved(4, 0.02)}));
+  EXPECT_FALSE(NextElementSize({.accuracy = 0.01}, {Solved(4, 0.02), Solved(4, 0.02)}));
 }
 
 TEST(Resolution, KeepsToItsBudgets) {
   Round dear = Solved(4, 0.5);
   dear.cpu_s = 9;
-  EXPECT_FALSE(NextGrain({.accuracy = 0.01, .budget_s = 10}, {dear}));
-  EXPECT_FALSE(NextGrain({.budget_bytes = 1e8}, {Solved(4, 0.5)}));
-  const auto next = NextGrain({.budget_s = 60}, {Solved(4, 0.5)});
+  EXPECT_FALSE(NextElementSize({.accuracy = 0.01, .budget_s = 10}, {dear}));
+  EXPECT_FALSE(NextElementSize({.budget_bytes = 1e8}, {Solved(4, 0.5)}));
+  const auto next = NextElementSize({.budget_s = 60}, {Solved(4, 0.5)});
   ASSERT_TRUE(next);
   EXPECT_LT(*next, 4e-3 / 1.4);
 }
@@ -79,18 +79,19 @@ TEST(Resolution, ABudgetThatWasOverrunIsSaidWithWhatWasUsed) {
 
 TEST(Resolution, EndsAfterSomeRounds) {
   std::vector<Round> rounds;
-  for (const double grain_mm : {32, 16, 8, 4, 2}) rounds.push_back(Solved(grain_mm, 0.5));
-  EXPECT_TRUE(NextGrain({.accuracy = 1e-9}, rounds));
+  for (const double element_size_mm : {32, 16, 8, 4, 2})
+    rounds.push_back(Solved(element_size_mm, 0.5));
+  EXPECT_TRUE(NextElementSize({.accuracy = 1e-9}, rounds));
   rounds.push_back(Solved(1, 0.5));
-  EXPECT_FALSE(NextGrain({.accuracy = 1e-9}, rounds));
+  EXPECT_FALSE(NextElementSize({.accuracy = 1e-9}, rounds));
 }
 
 TEST(TimeGrowth, IsThatOfTheNodesAndMore) {
-  const Round wall{.grain_m = 0.002, .thin = true};
+  const Round wall{.element_size_m = 0.002, .thin = true};
   EXPECT_DOUBLE_EQ(TimeGrowth(wall, 0.002), 1);
-  // Half the grain: four times the nodes of a wall, eight times those of a solid.
+  // Half the element size: four times the nodes of a wall, eight times those of a solid.
   EXPECT_GT(TimeGrowth(wall, 0.001), 4);
-  EXPECT_GT(TimeGrowth({.grain_m = 0.002, .thin = false}, 0.001), 8);
+  EXPECT_GT(TimeGrowth({.element_size_m = 0.002, .thin = false}, 0.001), 8);
 }
 
 }  // namespace

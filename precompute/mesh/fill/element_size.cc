@@ -8,7 +8,7 @@
 
 namespace carillon::precompute {
 
-double Grain(const SurfaceMesh& surface) {
+double SurfaceElementSize(const SurfaceMesh& surface) {
   double area = 0, sum = 0;
   for (size_t t = 0; t < surface.triangles.size(); ++t) {
     const auto [a, b, c] = CornersOf(surface, t);

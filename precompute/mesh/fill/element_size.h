@@ -7,6 +7,6 @@ namespace carillon::precompute {
 
 /// The element size of a surface: the longest edge of each triangle, averaged over the area, in the
 /// unit of the vertices. Frequency errors are proportional to a power of it.
-double Grain(const SurfaceMesh& surface);
+double SurfaceElementSize(const SurfaceMesh& surface);
 
 }  // namespace carillon::precompute

@@ -19,6 +19,7 @@
 #include "precompute/mesh/point_math.h"
 #include "precompute/mesh/run_in_child.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::precompute {
 namespace {
@@ -210,8 +211,8 @@ absl::StatusOr<TetMesh> MakeMesh(const Filling& filling) {
   mesh.elements = filling.corners;
   GivenTriangles given = GivenTrianglesOfFaces(filling);
   PeelFlatTetrahedra(mesh, given);
-  if (absl::Status status = FindBoundary(mesh); !status.ok()) return status;
-  if (absl::Status status = NameGivenTriangles(given, mesh); !status.ok()) return status;
+  RETURN_IF_ERROR(FindBoundary(mesh));
+  RETURN_IF_ERROR(NameGivenTriangles(given, mesh));
   return mesh;
 }
 

@@ -18,6 +18,7 @@
 #include "precompute/mesh/surface/refine_surface.h"
 #include "precompute/mesh/surface/surface_shells.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::precompute {
 namespace {
@@ -46,7 +47,7 @@ constexpr double kTargetTolerance = 0.2;
 // -3 (inside).
 constexpr double kEdgeByNodes = 1 / 2.5;
 constexpr int kMaxEdgeSteps = 8;
-constexpr double kCoarsestToGrain = 2.5;
+constexpr double kCoarsestToElementSize = 2.5;
 constexpr double kNodesPerCubedEdge = 2;  // as TetGen fills solids
 
 /// Where a surface lies and how large it is; scale * (p - low) is within the unit box.
@@ -173,7 +174,7 @@ class Filler {
         extent_(Measure(surface_, shells_)) {}
 
   absl::StatusOr<TetMesh> Fill() const {
-    if (settings_.grain_m != 0) return FillToGrain(settings_.grain_m * scale_);
+    if (settings_.element_size_m != 0) return FillToElementSize(settings_.element_size_m * scale_);
     if (settings_.target_node_count != 0) return FillToTarget();
     return FillWithEdge(CoarserOnNarrowTriangles(AutomaticEdge(extent_)));
   }
@@ -229,18 +230,20 @@ class Filler {
 
   /// Elements inside may be as long as the longest edge on the surface, so that a surface finer
   /// than necessary does not refine the inside.
-  absl::StatusOr<TetMesh> FillToGrain(double grain) const {
-    const double edge = EdgeForGrain(grain);
+  absl::StatusOr<TetMesh> FillToElementSize(double element_size) const {
+    const double edge = EdgeForElementSize(element_size);
     return FillWithEdge(edge, kLongestToMeanEdge * edge);
   }
 
-  /// The longest edge with which the element size of the surface is at most `grain`. All edges of a
-  /// surface of few triangles are split at once, so that the result may be finer.
-  double EdgeForGrain(double grain) const {
-    double fine = grain, coarse = kCoarsestToGrain * grain;
+  /// The longest edge with which the element size of the surface is at most `element_size`. All
+  /// edges of a surface of few triangles are split at once, so that the result may be finer.
+  double EdgeForElementSize(double element_size) const {
+    double fine = element_size, coarse = kCoarsestToElementSize * element_size;
     for (int step = 0; step < kMaxEdgeSteps; ++step) {
       const double middle = std::sqrt(fine * coarse);
-      (Grain(RefineSurface(surface_, middle).surface) <= grain ? fine : coarse) = middle;
+      (SurfaceElementSize(RefineSurface(surface_, middle).surface) <= element_size ? fine
+                                                                                   : coarse) =
+          middle;
     }
     return fine / kLongestToMeanEdge;
   }
@@ -268,9 +271,8 @@ class Filler {
   }
 
   absl::StatusOr<TetMesh> FillAndCheck(const FillRequest& request) const {
-    absl::StatusOr<TetMesh> mesh = FillWithTetgen(request);
-    if (!mesh.ok()) return mesh;
-    if (absl::Status status = CheckVolumes(*mesh, extent_.volume); !status.ok()) return status;
+    ASSIGN_OR_RETURN(TetMesh mesh, FillWithTetgen(request));
+    RETURN_IF_ERROR(CheckVolumes(mesh, extent_.volume));
     return mesh;
   }
 
@@ -286,17 +288,13 @@ class Filler {
 absl::StatusOr<TetMesh> Tetrahedralize(const SurfaceMesh& surface,
                                        const MeshingSettings& settings) {
   const double target = settings.target_node_count;
-  if (absl::Status status = CheckNodeCount(target * NodesPerCorner(settings)); !status.ok()) {
-    return status;
-  }
+  RETURN_IF_ERROR(CheckNodeCount(target * NodesPerCorner(settings)));
   const UnitBox box = FindUnitBox(surface);
   const SurfaceMesh unit_surface = ToUnitBox(surface, box);
-  absl::StatusOr<TetMesh> mesh = Filler(unit_surface, box.scale, settings).Fill();
-  if (!mesh.ok()) return mesh;
-  FromUnitBox(*mesh, box);
-  if (settings.nodes_per_element == 10) AddMidsideNodes(*mesh);
-  absl::Status status = CheckNodeCount(static_cast<double>(mesh->nodes.size()));
-  if (!status.ok()) return status;
+  ASSIGN_OR_RETURN(TetMesh mesh, Filler(unit_surface, box.scale, settings).Fill());
+  FromUnitBox(mesh, box);
+  if (settings.nodes_per_element == 10) AddMidsideNodes(mesh);
+  RETURN_IF_ERROR(CheckNodeCount(static_cast<double>(mesh.nodes.size())));
   return mesh;
 }
 

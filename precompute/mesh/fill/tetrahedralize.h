@@ -15,8 +15,9 @@ struct MeshingSettings {
   std::optional<bool> keep_surface = std::nullopt;
   /// Approximate number of corner nodes of the mesh; zero: it is chosen from the surface.
   int target_node_count = 0;
-  /// Largest element size on the surface, as Grain() measures it, metres; zero: no limit.
-  double grain_m = 0;
+  /// Largest element size on the surface, as SurfaceElementSize() measures it, metres; zero: no
+  /// limit.
+  double element_size_m = 0;
   /// 4 or 10. Mid-side nodes lie on straight edges.
   int nodes_per_element = 10;
   /// As FillRequest::cautious.

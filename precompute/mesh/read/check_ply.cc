@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "precompute/mesh/read/clean_surface_file.h"
 #include "precompute/mesh/read/text_lines.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::precompute {
 namespace {
@@ -162,12 +163,11 @@ absl::Status CheckHasSurface(const Header& header, const TextLines& lines) {
 
 absl::Status CheckPly(const std::string& bytes) {
   TextLines lines(bytes);
-  const absl::StatusOr<Header> header = ReadHeader(lines);
-  if (!header.ok()) return header.status();
-  if (absl::Status status = CheckHasSurface(*header, lines); !status.ok()) return status;
-  if (header->format == "ascii") return CheckText(*header, lines);
-  if (header->format == "binary_little_endian" || header->format == "binary_big_endian") {
-    return CheckBinary(*header, lines);
+  ASSIGN_OR_RETURN(const Header header, ReadHeader(lines));
+  RETURN_IF_ERROR(CheckHasSurface(header, lines));
+  if (header.format == "ascii") return CheckText(header, lines);
+  if (header.format == "binary_little_endian" || header.format == "binary_big_endian") {
+    return CheckBinary(header, lines);
   }
   return lines.Unreadable(
       "its format is neither ascii nor binary_little_endian nor binary_big_endian");

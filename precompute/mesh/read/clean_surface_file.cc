@@ -12,6 +12,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "precompute/mesh/read/text_lines.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::precompute {
 namespace {
@@ -96,13 +97,12 @@ absl::StatusOr<std::string> CleanObj(const std::string& bytes) {
     const Words arguments = Words(words).subspan(1);
     if (words[0] == "v") {
       clean += 'v';
-      if (absl::Status status = AppendPoint(lines, arguments, clean); !status.ok()) return status;
+      RETURN_IF_ERROR(AppendPoint(lines, arguments, clean));
       ++vertex_count;
     } else if (words[0] == "f") {
-      absl::StatusOr<ObjFace> face = ReadObjFace(lines, arguments, vertex_count);
-      if (!face.ok()) return face.status();
+      ASSIGN_OR_RETURN(ObjFace face, ReadObjFace(lines, arguments, vertex_count));
       // Points and lines bound nothing.
-      if (face->indices.size() >= 3) faces.push_back(*std::move(face));
+      if (face.indices.size() >= 3) faces.push_back(std::move(face));
     }
   }
   if (vertex_count == 0) {
@@ -112,7 +112,7 @@ absl::StatusOr<std::string> CleanObj(const std::string& bytes) {
   }
   if (faces.empty()) return NoFaces();
   for (const ObjFace& face : faces) {
-    if (absl::Status status = AppendObjFace(face, vertex_count, clean); !status.ok()) return status;
+    RETURN_IF_ERROR(AppendObjFace(face, vertex_count, clean));
   }
   return clean;
 }
@@ -136,7 +136,7 @@ absl::StatusOr<std::string> CleanOff(const std::string& bytes) {
   for (size_t v = 0; v < *vertex_count; ++v) {
     words = lines.NextWords();
     if (words.empty()) return lines.Unreadable(absl::StrCat("the file ends at vertex ", v));
-    if (absl::Status status = AppendPoint(lines, words, clean); !status.ok()) return status;
+    RETURN_IF_ERROR(AppendPoint(lines, words, clean));
   }
   for (size_t f = 0; f < *face_count; ++f) {
     words = lines.NextWords();
@@ -163,7 +163,7 @@ absl::StatusOr<std::string> CleanSurfaceFile(const std::string& bytes, const std
   if (format == "obj") return CleanObj(bytes);
   if (format == "off") return CleanOff(bytes);
   if (format == "ply") {
-    if (absl::Status status = CheckPly(bytes); !status.ok()) return status;
+    RETURN_IF_ERROR(CheckPly(bytes));
   }
   if (format == "stl" && bytes.size() == kBinaryStlHeader) return NoFaces();
   return bytes;

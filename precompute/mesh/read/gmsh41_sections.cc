@@ -5,6 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::precompute {
 namespace {
@@ -58,9 +59,9 @@ bool Gmsh41Sections::ReadEntity(int dimension, NumberStream& stream) {
 absl::Status Gmsh41Sections::ReadNodes(NumberStream& stream) {
   std::array<uint64_t, 4> header{};  // blocks, nodes, least and greatest number
   if (!stream.TakeAll(header)) return Malformed("nodes");
-  if (absl::Status status = CheckNodeCountOfFile(header[1]); !status.ok()) return status;
+  RETURN_IF_ERROR(CheckNodeCountOfFile(header[1]));
   for (uint64_t block = 0; block < header[0]; ++block) {
-    if (absl::Status status = ReadNodeBlock(stream); !status.ok()) return status;
+    RETURN_IF_ERROR(ReadNodeBlock(stream));
   }
   return absl::OkStatus();
 }
@@ -75,7 +76,7 @@ absl::Status Gmsh41Sections::ReadNodeBlock(NumberStream& stream) {
     return Malformed("nodes");
   }
   ElementFile& file = elements_.file;
-  if (absl::Status status = CheckNodeCountOfFile(count); !status.ok()) return status;
+  RETURN_IF_ERROR(CheckNodeCountOfFile(count));
   if (!TakeMany(count, stream, numbers)) return Malformed("nodes");
   const int parameter_count = entity[2] != 0 ? entity[0] : 0;
   for (const uint64_t number : numbers) {
@@ -95,7 +96,7 @@ absl::Status Gmsh41Sections::ReadElements(NumberStream& stream) {
   std::array<uint64_t, 4> header{};  // blocks, elements, least and greatest number
   if (!stream.TakeAll(header)) return Malformed("elements");
   for (uint64_t block = 0; block < header[0]; ++block) {
-    if (absl::Status status = ReadElementBlock(stream); !status.ok()) return status;
+    RETURN_IF_ERROR(ReadElementBlock(stream));
   }
   return absl::OkStatus();
 }
@@ -112,7 +113,7 @@ absl::Status Gmsh41Sections::ReadElementBlock(NumberStream& stream) {
   for (uint64_t i = 0; i < count; ++i) {
     if (!stream.TakeAll(figures)) return Malformed("elements");
     for (size_t n = 0; n < nodes.size(); ++n) nodes[n] = static_cast<int64_t>(figures[n + 1]);
-    if (absl::Status status = elements_.Add(*kind, physicals, nodes); !status.ok()) return status;
+    RETURN_IF_ERROR(elements_.Add(*kind, physicals, nodes));
   }
   return absl::OkStatus();
 }

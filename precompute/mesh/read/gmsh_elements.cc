@@ -13,16 +13,16 @@ namespace {
 
 constexpr int kTriangle3 = 2, kTriangle6 = 9, kTetrahedron10 = 11;
 
-constexpr std::array<GmshKind, 10> kKinds = {{{15, 0, 1, 1},
-                                              {1, 1, 2, 2},
-                                              {8, 1, 3, 2},
-                                              {kTriangle3, 2, 3, 3},
-                                              {kTriangle6, 2, 6, 3},
-                                              {3, 2, 4, 4},
-                                              {10, 2, 9, 4},
-                                              {16, 2, 8, 4},
-                                              {4, 3, 4, 4},
-                                              {kTetrahedron10, 3, 10, 4}}};
+constexpr std::array<GmshKind, 10> kGmshKinds = {{{15, 0, 1, 1},
+                                                  {1, 1, 2, 2},
+                                                  {8, 1, 3, 2},
+                                                  {kTriangle3, 2, 3, 3},
+                                                  {kTriangle6, 2, 6, 3},
+                                                  {3, 2, 4, 4},
+                                                  {10, 2, 9, 4},
+                                                  {16, 2, 8, 4},
+                                                  {4, 3, 4, 4},
+                                                  {kTetrahedron10, 3, 10, 4}}};
 
 /// A face as triangles, by the positions of their corners among its nodes.
 std::span<const std::array<size_t, 3>> Pieces(int type) {
@@ -38,8 +38,8 @@ std::span<const std::array<size_t, 3>> Pieces(int type) {
 }  // namespace
 
 const GmshKind* FindGmshKind(int type) {
-  const auto* kind = std::ranges::find(kKinds, type, &GmshKind::type);
-  return kind == kKinds.end() ? nullptr : kind;
+  const auto* kind = std::ranges::find(kGmshKinds, type, &GmshKind::type);
+  return kind == kGmshKinds.end() ? nullptr : kind;
 }
 
 absl::Status UnknownGmshKind(int type) {

@@ -16,13 +16,14 @@
 #include "precompute/mesh/read/gmsh_elements.h"
 #include "precompute/mesh/read/text_lines.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::precompute {
 namespace {
 
-class Parser {
+class GmshParser {
  public:
-  explicit Parser(const std::string& bytes) : lines_(bytes) {}
+  explicit GmshParser(const std::string& bytes) : lines_(bytes) {}
 
   absl::StatusOr<ElementFile> Parse() && {
     std::string_view line;
@@ -103,10 +104,9 @@ class Parser {
   }
 
   absl::Status ReadNodes() {
-    const absl::StatusOr<size_t> count = ReadCount();
-    if (!count.ok()) return count.status();
-    if (absl::Status status = CheckNodeCountOfFile(*count); !status.ok()) return status;
-    for (size_t i = 0; i < *count; ++i) {
+    ASSIGN_OR_RETURN(const size_t count, ReadCount());
+    RETURN_IF_ERROR(CheckNodeCountOfFile(count));
+    for (size_t i = 0; i < count; ++i) {
       int32_t number = 0;
       Point p;
       if (is_binary_) {
@@ -127,12 +127,10 @@ class Parser {
   }
 
   absl::Status ReadElements() {
-    const absl::StatusOr<size_t> count = ReadCount();
-    if (!count.ok()) return count.status();
-    for (size_t i = 0; i < *count;) {
-      const absl::StatusOr<size_t> read = is_binary_ ? ReadBinaryElements() : ReadTextElement();
-      if (!read.ok()) return read.status();
-      i += *read;
+    ASSIGN_OR_RETURN(const size_t count, ReadCount());
+    for (size_t i = 0; i < count;) {
+      ASSIGN_OR_RETURN(const size_t read, is_binary_ ? ReadBinaryElements() : ReadTextElement());
+      i += read;
     }
     return absl::OkStatus();
   }
@@ -169,8 +167,7 @@ class Parser {
     for (int32_t i = 0; i < header[1]; ++i) {
       if (!Take(std::span(figures))) return Unreadable("the elements end too early");
       const int32_t physical = first > 1 ? figures[1] : 0;
-      absl::Status status = AddElement(*kind, physical, std::span(figures).subspan(first));
-      if (!status.ok()) return status;
+      RETURN_IF_ERROR(AddElement(*kind, physical, std::span(figures).subspan(first)));
     }
     return static_cast<size_t>(header[1]);
   }
@@ -205,6 +202,8 @@ class Parser {
 
 }  // namespace
 
-absl::StatusOr<ElementFile> ParseGmsh(const std::string& bytes) { return Parser(bytes).Parse(); }
+absl::StatusOr<ElementFile> ParseGmsh(const std::string& bytes) {
+  return GmshParser(bytes).Parse();
+}
 
 }  // namespace carillon::precompute

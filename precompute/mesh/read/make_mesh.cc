@@ -17,6 +17,7 @@
 #include "precompute/mesh/point_math.h"
 #include "precompute/mesh/read/merge_vertices.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::precompute {
 namespace {
@@ -204,16 +205,16 @@ absl::Status CheckOnePiece(const TetMesh& mesh) {
 }
 
 absl::StatusOr<NamedMesh> MakeTetrahedra(ElementFile& file, const NodeOfNumber& node_of_number) {
-  absl::StatusOr<std::vector<int32_t>> elements = FindNodes(
-      file.elements, static_cast<size_t>(file.nodes_per_element), "tetrahedron", node_of_number);
-  if (!elements.ok()) return elements.status();
-  TetMesh mesh{std::move(file.nodes), file.nodes_per_element, *std::move(elements), {}};
+  ASSIGN_OR_RETURN(std::vector<int32_t> elements,
+                   FindNodes(file.elements, static_cast<size_t>(file.nodes_per_element),
+                             "tetrahedron", node_of_number));
+  TetMesh mesh{std::move(file.nodes), file.nodes_per_element, std::move(elements), {}};
   const std::vector<int32_t> new_index = DropUnusedNodes(mesh);
-  if (absl::Status status = OrientElements(mesh); !status.ok()) return status;
+  RETURN_IF_ERROR(OrientElements(mesh));
   for (const auto check : {CheckMidsideNodes, CheckOnePiece}) {
-    if (absl::Status status = check(mesh); !status.ok()) return status;
+    RETURN_IF_ERROR(check(mesh));
   }
-  if (absl::Status status = FindBoundary(mesh); !status.ok()) return status;
+  RETURN_IF_ERROR(FindBoundary(mesh));
   MeshNames names = NamesOf(file, node_of_number, new_index, mesh);
   return NamedMesh{std::move(mesh), std::move(names)};
 }
@@ -221,12 +222,11 @@ absl::StatusOr<NamedMesh> MakeTetrahedra(ElementFile& file, const NodeOfNumber& 
 /// A file of triangles alone, whose groups are of triangles, too.
 absl::StatusOr<NamedMesh> MakeSurface(const ElementFile& file, const NodeOfNumber& node_of_number) {
   const std::span<const int64_t> numbers(file.triangles.front().data(), 3 * file.triangles.size());
-  const absl::StatusOr<std::vector<int32_t>> nodes =
-      FindNodes(numbers, 3, "triangle", node_of_number);
-  if (!nodes.ok()) return nodes.status();
+  ASSIGN_OR_RETURN(const std::vector<int32_t> nodes,
+                   FindNodes(numbers, 3, "triangle", node_of_number));
   std::vector<std::array<Point, 3>> triangles(file.triangles.size());
-  for (size_t i = 0; i < nodes->size(); ++i) {
-    triangles[i / 3][i % 3] = file.nodes[static_cast<size_t>((*nodes)[i])];
+  for (size_t i = 0; i < nodes.size(); ++i) {
+    triangles[i / 3][i % 3] = file.nodes[static_cast<size_t>(nodes[i])];
   }
   NamedMesh named{MergeVertices(triangles)};
   for (size_t n = 0; n < file.nodes.size(); ++n) {
@@ -241,7 +241,7 @@ absl::StatusOr<NamedMesh> MakeSurface(const ElementFile& file, const NodeOfNumbe
 }  // namespace
 
 absl::StatusOr<NamedMesh> MakeMesh(ElementFile file) {
-  if (absl::Status status = CheckFinite(file); !status.ok()) return status;
+  RETURN_IF_ERROR(CheckFinite(file));
   const NodeOfNumber node_of_number = NumberNodes(file);
   if (!file.elements.empty()) return MakeTetrahedra(file, node_of_number);
   if (!file.triangles.empty()) return MakeSurface(file, node_of_number);

@@ -10,39 +10,40 @@
 #include "absl/strings/str_cat.h"
 #include "precompute/mesh/read/number_stream.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::precompute {
 namespace {
 
 /// The layout of a section: the number of nodes of each entry, and how many of them are corners.
-struct Kind {
+struct MeditKind {
   std::string_view keyword;
   int dimension;
   size_t node_count;
   size_t corner_count;
 };
 
-constexpr std::array<Kind, 7> kKinds = {{{"Edges", 1, 2, 2},
-                                         {"EdgesP2", 1, 3, 2},
-                                         {"Triangles", 2, 3, 3},
-                                         {"TrianglesP2", 2, 6, 3},
-                                         {"Quadrilaterals", 2, 4, 4},
-                                         {"Tetrahedra", 3, 4, 4},
-                                         {"TetrahedraP2", 3, 10, 4}}};
+constexpr std::array<MeditKind, 7> kMeditKinds = {{{"Edges", 1, 2, 2},
+                                                   {"EdgesP2", 1, 3, 2},
+                                                   {"Triangles", 2, 3, 3},
+                                                   {"TrianglesP2", 2, 6, 3},
+                                                   {"Quadrilaterals", 2, 4, 4},
+                                                   {"Tetrahedra", 3, 4, 4},
+                                                   {"TetrahedraP2", 3, 10, 4}}};
 
 /// Elements that fill volume and are no tetrahedra.
 constexpr std::array<std::string_view, 6> kOtherVolumes = {
     "Hexahedra", "HexahedraQ2", "Prisms", "PrismsP2", "Pyramids", "PyramidsP2"};
 
-class Parser {
+class MeditParser {
  public:
-  explicit Parser(const std::string& bytes) : bytes_(bytes), stream_(bytes, false) {}
+  explicit MeditParser(const std::string& bytes) : bytes_(bytes), stream_(bytes, false) {}
 
   absl::StatusOr<ElementFile> Parse() && {
     if (stream_.NextWord() != "MeshVersionFormatted") return Unreadable("it is no text of Medit");
     for (std::string_view word = stream_.NextWord(); !word.empty() && word != "End";
          word = stream_.NextWord()) {
-      if (absl::Status status = ReadSection(word); !status.ok()) return status;
+      RETURN_IF_ERROR(ReadSection(word));
     }
     ChooseGroups();
     return std::move(file_);
@@ -60,8 +61,8 @@ class Parser {
   absl::Status ReadSection(std::string_view keyword) {
     if (keyword == "Dimension") return ReadDimension();
     if (keyword == "Vertices") return ReadVertices();
-    const auto* kind = std::ranges::find(kKinds, keyword, &Kind::keyword);
-    if (kind != kKinds.end()) return ReadElements(*kind);
+    const auto* kind = std::ranges::find(kMeditKinds, keyword, &MeditKind::keyword);
+    if (kind != kMeditKinds.end()) return ReadElements(*kind);
     uint64_t count = 0;
     if (std::ranges::find(kOtherVolumes, keyword) != kOtherVolumes.end() && stream_.Take(count) &&
         count > 0) {
@@ -85,7 +86,7 @@ class Parser {
   absl::Status ReadVertices() {
     uint64_t count = 0;
     if (!stream_.Take(count)) return Unreadable("no number of vertices");
-    if (absl::Status status = CheckNodeCountOfFile(count); !status.ok()) return status;
+    RETURN_IF_ERROR(CheckNodeCountOfFile(count));
     for (uint64_t i = 0; i < count; ++i) {
       Point p{};
       int64_t reference = 0;
@@ -100,7 +101,7 @@ class Parser {
     return absl::OkStatus();
   }
 
-  absl::Status ReadElements(const Kind& kind) {
+  absl::Status ReadElements(const MeditKind& kind) {
     uint64_t count = 0;
     if (!stream_.Take(count)) return Unreadable("no number of elements");
     std::vector<int64_t> nodes(kind.node_count);
@@ -112,7 +113,7 @@ class Parser {
                                        " (nodes, then the reference)"));
       }
       if (kind.dimension == 3) {
-        if (absl::Status status = file_.AddTetrahedron(nodes); !status.ok()) return status;
+        RETURN_IF_ERROR(file_.AddTetrahedron(nodes));
         continue;
       }
       AddTo(kind.dimension, reference, std::span(nodes).first(kind.corner_count));
@@ -162,6 +163,8 @@ class Parser {
 
 }  // namespace
 
-absl::StatusOr<ElementFile> ParseMedit(const std::string& bytes) { return Parser(bytes).Parse(); }
+absl::StatusOr<ElementFile> ParseMedit(const std::string& bytes) {
+  return MeditParser(bytes).Parse();
+}
 
 }  // namespace carillon::precompute

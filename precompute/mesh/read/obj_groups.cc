@@ -9,18 +9,18 @@
 namespace carillon::precompute {
 namespace {
 
-using Words = std::vector<std::string_view>;
+using LineWords = std::vector<std::string_view>;
 
 /// The groups of the following faces, and all groups seen so far.
 class Groups {
  public:
   /// "g one two": a face may be in several groups.
-  void EnterGroups(const Words& words) {
+  void EnterGroups(const LineWords& words) {
     in_groups_.clear();
     for (size_t i = 1; i < words.size(); ++i) in_groups_.push_back(Find(words[i]));
   }
 
-  void EnterObject(const Words& words) {
+  void EnterObject(const LineWords& words) {
     in_object_.clear();
     if (words.size() > 1) in_object_.push_back(Find(words[1]));
   }
@@ -61,7 +61,7 @@ std::vector<MeshGroup> ObjGroups(const std::string& bytes) {
   Groups groups;
   std::string line;
   for (TextLines lines(bytes); NextObjLine(lines, line);) {
-    const Words words = TextLines::Words(std::string_view(line).substr(0, line.find('#')));
+    const LineWords words = TextLines::Words(std::string_view(line).substr(0, line.find('#')));
     if (words.empty()) continue;
     if (words[0] == "g") groups.EnterGroups(words);
     if (words[0] == "o") groups.EnterObject(words);

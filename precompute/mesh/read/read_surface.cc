@@ -22,19 +22,21 @@
 #include "precompute/mesh/read/obj_groups.h"
 #include "precompute/mesh/read/text_lines.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::precompute {
 namespace {
 
 using Triangles = std::vector<std::array<Point, 3>>;
 
-absl::Status Refuse(absl::string_view reason, absl::string_view message) {
+absl::Status RefuseSurface(absl::string_view reason, absl::string_view message) {
   return Refusal(absl::StatusCode::kInvalidArgument, reason, message);
 }
 
 absl::Status Unreadable(absl::string_view format, absl::string_view what) {
-  return Refuse("MESH_UNREADABLE", absl::StrCat("the file cannot be read as ", format, ": ", what,
-                                                ". Name its right format, or export it again"));
+  return RefuseSurface("MESH_UNREADABLE",
+                       absl::StrCat("the file cannot be read as ", format, ": ", what,
+                                    ". Name its right format, or export it again"));
 }
 
 std::span<aiMesh* const> Meshes(const aiScene& scene) { return {scene.mMeshes, scene.mNumMeshes}; }
@@ -48,10 +50,10 @@ absl::Status CheckIndices(const aiScene& scene) {
     for (const aiFace& face : Faces(*mesh)) {
       for (const unsigned index : std::span(face.mIndices, face.mNumIndices)) {
         if (index < mesh->mNumVertices) continue;
-        return Refuse("MESH_INDEX_OUT_OF_RANGE",
-                      absl::StrCat("face ", face_number, " names vertex ",
-                                   static_cast<int32_t>(index), " of ", mesh->mNumVertices,
-                                   " (counted from zero): export the mesh again"));
+        return RefuseSurface("MESH_INDEX_OUT_OF_RANGE",
+                             absl::StrCat("face ", face_number, " names vertex ",
+                                          static_cast<int32_t>(index), " of ", mesh->mNumVertices,
+                                          " (counted from zero): export the mesh again"));
       }
       ++face_number;
     }
@@ -64,9 +66,10 @@ absl::Status CheckFinite(const aiScene& scene) {
   for (const aiMesh* mesh : Meshes(scene)) {
     for (const aiVector3D& p : std::span(mesh->mVertices, mesh->mNumVertices)) {
       if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
-        return Refuse("MESH_NOT_FINITE",
-                      absl::StrCat("vertex ", vertex_number, " (counted from zero) lies at (", p.x,
-                                   ", ", p.y, ", ", p.z, "): give it finite coordinates"));
+        return RefuseSurface(
+            "MESH_NOT_FINITE",
+            absl::StrCat("vertex ", vertex_number, " (counted from zero) lies at (", p.x, ", ", p.y,
+                         ", ", p.z, "): give it finite coordinates"));
       }
       ++vertex_number;
     }
@@ -136,20 +139,19 @@ absl::flat_hash_map<int64_t, Point> NumberVertices(const aiScene& scene, const s
 }  // namespace
 
 absl::StatusOr<NamedMesh> ReadSurface(const std::string& bytes, const std::string& format) {
-  const absl::StatusOr<std::string> clean = CleanSurfaceFile(bytes, format);
-  if (!clean.ok()) return clean.status();
+  ASSIGN_OR_RETURN(const std::string clean, CleanSurfaceFile(bytes, format));
   Assimp::Importer importer;
-  const aiScene* scene =
-      importer.ReadFileFromMemory(clean->data(), clean->size(), 0, format.c_str());
+  const aiScene* scene = importer.ReadFileFromMemory(clean.data(), clean.size(), 0, format.c_str());
   if (scene == nullptr) return Unreadable(format, importer.GetErrorString());
-  if (absl::Status status = CheckIndices(*scene); !status.ok()) return status;
-  if (absl::Status status = CheckFinite(*scene); !status.ok()) return status;
+  RETURN_IF_ERROR(CheckIndices(*scene));
+  RETURN_IF_ERROR(CheckFinite(*scene));
   const size_t expected = CountTriangles(*scene);
   if (expected == 0) {
-    return Refuse("MESH_EMPTY", "the file has no faces: export the body as triangles or polygons");
+    return RefuseSurface("MESH_EMPTY",
+                         "the file has no faces: export the body as triangles or polygons");
   }
   MeshNames names;
-  names.vertices = NumberVertices(*scene, *clean, format);
+  names.vertices = NumberVertices(*scene, clean, format);
   scene = importer.ApplyPostProcessing(aiProcess_Triangulate);
   if (scene == nullptr) return Unreadable(format, importer.GetErrorString());
   const Triangles triangles = CollectTriangles(*scene);

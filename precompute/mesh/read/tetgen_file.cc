@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "precompute/mesh/read/text_lines.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::precompute {
 namespace {
@@ -14,13 +15,13 @@ namespace {
 /// TetMesh's edges.
 constexpr std::array<size_t, 6> kMidsides = {6, 7, 9, 5, 8, 4};
 
-class Parser {
+class TetgenParser {
  public:
-  explicit Parser(const std::string& bytes) : lines_(bytes) {}
+  explicit TetgenParser(const std::string& bytes) : lines_(bytes) {}
 
   absl::StatusOr<ElementFile> Parse() && {
-    for (const auto read : {&Parser::ReadNodes, &Parser::ReadElements}) {
-      if (absl::Status status = (this->*read)(); !status.ok()) return status;
+    for (const auto read : {&TetgenParser::ReadNodes, &TetgenParser::ReadElements}) {
+      RETURN_IF_ERROR((this->*read)());
     }
     return std::move(file_);
   }
@@ -41,16 +42,14 @@ class Parser {
 
   /// "nodes dimension attributes markers", then "number x y z attributes marker" each.
   absl::Status ReadNodes() {
-    const auto header = NextFigures(1, "no number of nodes, with which a .node file begins");
-    if (!header.ok()) return header.status();
-    const int64_t count = header->front();
-    if (count < 1 || (header->size() > 1 && (*header)[1] != 3)) {
+    ASSIGN_OR_RETURN(const auto header,
+                     NextFigures(1, "no number of nodes, with which a .node file begins"));
+    const int64_t count = header.front();
+    if (count < 1 || (header.size() > 1 && header[1] != 3)) {
       return lines_.Unreadable("no nodes in three dimensions");
     }
-    if (absl::Status status = CheckNodeCountOfFile(static_cast<size_t>(count)); !status.ok()) {
-      return status;
-    }
-    const bool has_markers = header->size() > 3 && (*header)[3] > 0;
+    RETURN_IF_ERROR(CheckNodeCountOfFile(static_cast<size_t>(count)));
+    const bool has_markers = header.size() > 3 && header[3] > 0;
     for (int64_t i = 0; i < count; ++i) {
       if (!ReadNode(has_markers)) {
         return lines_.Unreadable(has_markers ? "no node (\"number x y z [attributes] marker\")"
@@ -83,18 +82,19 @@ class Parser {
 
   /// "tetrahedra nodes-of-each attributes", then "number nodes attributes" each.
   absl::Status ReadElements() {
-    const auto header = NextFigures(
-        2, "no numbers of tetrahedra and of their nodes, with which a .ele file begins");
-    if (!header.ok()) return header.status();
-    const int64_t node_count = (*header)[1];
+    ASSIGN_OR_RETURN(
+        const auto header,
+        NextFigures(2,
+                    "no numbers of tetrahedra and of their nodes, with which a .ele file begins"));
+    const int64_t node_count = header[1];
     if (node_count != 4 && node_count != 10) {
       return UnsupportedElements(absl::StrCat("tetrahedra of ", node_count, " nodes"));
     }
-    for (int64_t i = 0; i < header->front(); ++i) {
-      const auto figures = NextFigures(static_cast<size_t>(node_count) + 1,
-                                       "no tetrahedron (\"number nodes [attribute]\")");
-      if (!figures.ok()) return figures.status();
-      if (absl::Status status = AddTetrahedron(*figures, node_count); !status.ok()) return status;
+    for (int64_t i = 0; i < header.front(); ++i) {
+      ASSIGN_OR_RETURN(const auto figures,
+                       NextFigures(static_cast<size_t>(node_count) + 1,
+                                   "no tetrahedron (\"number nodes [attribute]\")"));
+      RETURN_IF_ERROR(AddTetrahedron(figures, node_count));
     }
     return absl::OkStatus();
   }
@@ -113,6 +113,8 @@ class Parser {
 
 }  // namespace
 
-absl::StatusOr<ElementFile> ParseTetgen(const std::string& bytes) { return Parser(bytes).Parse(); }
+absl::StatusOr<ElementFile> ParseTetgen(const std::string& bytes) {
+  return TetgenParser(bytes).Parse();
+}
 
 }  // namespace carillon::precompute

@@ -17,6 +17,7 @@
 #include "precompute/mesh/surface/find_self_intersection.h"
 #include "precompute/mesh/surface/surface_shells.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::precompute {
 namespace {
@@ -250,7 +251,8 @@ absl::Status CheckNesting(const SurfaceMesh& surface, const std::vector<Shell>& 
   return absl::OkStatus();
 }
 
-std::vector<std::string> Warnings(const SurfaceMesh& surface, const std::vector<Shell>& shells) {
+std::vector<std::string> FindWarnings(const SurfaceMesh& surface,
+                                      const std::vector<Shell>& shells) {
   std::vector<std::string> warnings;
   const auto collapsed = std::ranges::count_if(surface.triangles, IsCollapsed);
   if (collapsed > 0) {
@@ -267,13 +269,13 @@ std::vector<std::string> Warnings(const SurfaceMesh& surface, const std::vector<
 
 absl::StatusOr<std::vector<std::string>> CheckSurface(const SurfaceMesh& surface) {
   for (const auto check : {CheckSize, CheckIndices, CheckFinite, CheckDuplicates, CheckEdges}) {
-    if (absl::Status status = check(surface); !status.ok()) return status;
+    RETURN_IF_ERROR(check(surface));
   }
   const std::vector<Shell> shells = FindShells(surface);
-  if (absl::Status status = CheckVolume(surface, shells); !status.ok()) return status;
-  if (absl::Status status = CheckCrossings(surface); !status.ok()) return status;
-  if (absl::Status status = CheckNesting(surface, shells); !status.ok()) return status;
-  return Warnings(surface, shells);
+  RETURN_IF_ERROR(CheckVolume(surface, shells));
+  RETURN_IF_ERROR(CheckCrossings(surface));
+  RETURN_IF_ERROR(CheckNesting(surface, shells));
+  return FindWarnings(surface, shells);
 }
 
 }  // namespace carillon::precompute

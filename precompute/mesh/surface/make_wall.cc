@@ -15,6 +15,7 @@
 #include "precompute/mesh/surface/check_surface.h"
 #include "precompute/mesh/surface/surface_shells.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::precompute {
 namespace {
@@ -117,12 +118,11 @@ RepairedSurface Made(SurfaceMesh surface, const std::string& remark) {
 }  // namespace
 
 absl::StatusOr<RepairedSurface> HollowOut(const SurfaceMesh& surface, double wall_m) {
-  absl::StatusOr<Grid> grid = ChooseGrid(surface, wall_m);
-  if (!grid.ok()) return grid.status();
+  ASSIGN_OR_RETURN(Grid grid, ChooseGrid(surface, wall_m));
   absl::Status unsound;
-  for (int halvings = 0; halvings <= kMostHalvings; ++halvings, grid->voxel /= 2) {
-    const auto distance = DistanceGrid(surface, grid->voxel, wall_m, /*has_inside=*/true);
-    SurfaceMesh inner = Isosurface(*distance, grid->voxel, -wall_m);
+  for (int halvings = 0; halvings <= kMostHalvings; ++halvings, grid.voxel /= 2) {
+    const auto distance = DistanceGrid(surface, grid.voxel, wall_m, /*has_inside=*/true);
+    SurfaceMesh inner = Isosurface(*distance, grid.voxel, -wall_m);
     if (inner.triangles.empty()) {
       return Impossible(absl::StrFormat(
           "the body is nowhere thicker than twice a wall of %g m: give a thinner wall, or none",
@@ -146,12 +146,11 @@ absl::StatusOr<RepairedSurface> HollowOut(const SurfaceMesh& surface, double wal
 }
 
 absl::StatusOr<RepairedSurface> Thicken(const SurfaceMesh& sheet, double wall_m) {
-  absl::StatusOr<Grid> grid = ChooseGrid(sheet, wall_m);
-  if (!grid.ok()) return grid.status();
+  ASSIGN_OR_RETURN(Grid grid, ChooseGrid(sheet, wall_m));
   absl::Status unsound;
-  for (int halvings = 0; halvings <= kMostHalvings; ++halvings, grid->voxel /= 2) {
-    const auto distance = DistanceGrid(sheet, grid->voxel, wall_m, /*has_inside=*/false);
-    SurfaceMesh shell = Isosurface(*distance, grid->voxel, wall_m / 2);
+  for (int halvings = 0; halvings <= kMostHalvings; ++halvings, grid.voxel /= 2) {
+    const auto distance = DistanceGrid(sheet, grid.voxel, wall_m, /*has_inside=*/false);
+    SurfaceMesh shell = Isosurface(*distance, grid.voxel, wall_m / 2);
     Turn(shell, /*outward=*/true);
     unsound = CheckSurface(shell).status();
     if (unsound.ok()) {

@@ -13,12 +13,12 @@
 namespace carillon::precompute {
 namespace {
 
-using Kernel = CGAL::Simple_cartesian<double>;
-using Triangles = std::vector<Kernel::Triangle_3>;
-using Primitive = CGAL::AABB_triangle_primitive<Kernel, Triangles::const_iterator>;
-using Tree = CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>>;
+using TreeKernel = CGAL::Simple_cartesian<double>;
+using Triangles = std::vector<TreeKernel::Triangle_3>;
+using Primitive = CGAL::AABB_triangle_primitive<TreeKernel, Triangles::const_iterator>;
+using Tree = CGAL::AABB_tree<CGAL::AABB_traits<TreeKernel, Primitive>>;
 
-Kernel::Point_3 ToCgal(const Point& p) { return {p[0], p[1], p[2]}; }
+TreeKernel::Point_3 ToCgal(const Point& p) { return {p[0], p[1], p[2]}; }
 
 }  // namespace
 
@@ -31,7 +31,7 @@ struct NearestTriangle::Index {
 NearestTriangle::NearestTriangle(const SurfaceMesh& surface) : index_(std::make_unique<Index>()) {
   for (size_t t = 0; t < surface.triangles.size(); ++t) {
     const auto [a, b, c] = CornersOf(surface, t);
-    const Kernel::Triangle_3 triangle(ToCgal(a), ToCgal(b), ToCgal(c));
+    const TreeKernel::Triangle_3 triangle(ToCgal(a), ToCgal(b), ToCgal(c));
     if (triangle.is_degenerate()) continue;
     index_->triangles.push_back(triangle);
     index_->numbers.push_back(static_cast<int32_t>(t));

@@ -12,6 +12,7 @@
 #include "precompute/mesh/surface/repair_soup.h"
 #include "precompute/mesh/surface/wrap_surface.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::precompute {
 namespace {
@@ -55,10 +56,9 @@ absl::StatusOr<SurfaceMesh> Repair(const SurfaceMesh& given, Warnings& warnings)
     return std::move(repaired.surface);
   }
   if (BeyondRepair(sound.status())) return sound.status();
-  absl::StatusOr<RepairedSurface> wrapped = WrapSurface(repaired.surface);
-  if (!wrapped.ok()) return wrapped.status();
-  AddTo(warnings, wrapped->remarks);
-  return std::move(wrapped->surface);
+  ASSIGN_OR_RETURN(RepairedSurface wrapped, WrapSurface(repaired.surface));
+  AddTo(warnings, wrapped.remarks);
+  return std::move(wrapped.surface);
 }
 
 absl::StatusOr<RepairedSurface> WithWall(const SurfaceMesh& surface, const absl::Status& sound,
@@ -84,10 +84,9 @@ absl::StatusOr<PreparedSurface> PrepareSurface(const SurfaceMesh& given,
   const bool thickens = settings.wall_m > 0 && Is(sound, "MESH_NOT_CLOSED");
   if (!sound.ok() && !thickens) return sound;
   if (settings.wall_m > 0) {
-    absl::StatusOr<RepairedSurface> walled = WithWall(prepared.surface, sound, settings.wall_m);
-    if (!walled.ok()) return walled.status();
-    prepared.surface = std::move(walled->surface);
-    AddTo(prepared.warnings, walled->remarks);
+    ASSIGN_OR_RETURN(RepairedSurface walled, WithWall(prepared.surface, sound, settings.wall_m));
+    prepared.surface = std::move(walled.surface);
+    AddTo(prepared.warnings, walled.remarks);
   }
   prepared.given_triangle.resize(given.triangles.size());
   std::iota(prepared.given_triangle.begin(), prepared.given_triangle.end(), 0);

@@ -12,7 +12,8 @@ import bodies
 import numpy
 
 ACCURACY = .01
-# Times the nodes, the first for which memory suffices: 4 is half the grain of a wall, whose error falls by about five.
+# Times the nodes, the first for which memory suffices: 4 is half the element size in a wall, which divides its error
+# by about five.
 FINER, MOST_NODES = (4, 3, 2), 150_000
 # Below it the finer mesh's own error counts.
 SMALLEST_ERROR = 1e-3

@@ -49,7 +49,7 @@ class HoldTest : public ReadMeshTest {
       mesh = std::get<TetMesh>(named->mesh);
       given = BoundarySurface(mesh);
     }
-    status = Hold(fixtures, given, named->names, mesh);
+    status = FixNodes(fixtures, given, named->names, mesh);
     return mesh;
   }
 
@@ -58,22 +58,22 @@ class HoldTest : public ReadMeshTest {
 
 TEST_F(HoldTest, PlaneHoldsWhatLiesInItAndBehindIt) {
   const std::string box = ToTextGmsh(MakeTetBox(kSize, {4, 2, 2}, 10));
-  const TetMesh face = Held(box, "msh", {HeldPlane{{0, 9, 9}, {3, 0, 0}}});
+  const TetMesh face = Held(box, "msh", {FixedPlane{{0, 9, 9}, {3, 0, 0}}});
   EXPECT_EQ(face.held, NodesWhere(face, [](const Point& p) { return p[0] == 0; }));
-  const TetMesh half = Held(box, "msh", {HeldPlane{{0.5, 0, 0}, {-1, 0, 0}}});
+  const TetMesh half = Held(box, "msh", {FixedPlane{{0.5, 0, 0}, {-1, 0, 0}}});
   EXPECT_EQ(half.held, NodesWhere(half, [](const Point& p) { return p[0] >= 0.5; }));
   // A thousandth of the body's size away is away.
-  Held(box, "msh", {HeldPlane{{-0.001, 0, 0}, {1, 0, 0}}});
+  Held(box, "msh", {FixedPlane{{-0.001, 0, 0}, {1, 0, 0}}});
   EXPECT_THAT(status.ToString(),
               HasSubstr("NO_VERTEX_HELD: no node of the body is fixed by the plane"));
 }
 
 TEST_F(HoldTest, BoxHoldsWhatLiesInItAndOnIt) {
   const std::string box = ToTextGmsh(MakeTetBox(kSize, {4, 2, 2}, 10));
-  const TetMesh mesh = Held(box, "msh", {HeldBox{{0.5, 0, 0}, {2, 0.25, 2}}});
+  const TetMesh mesh = Held(box, "msh", {FixedBox{{0.5, 0, 0}, {2, 0.25, 2}}});
   EXPECT_EQ(mesh.held,
             NodesWhere(mesh, [](const Point& p) { return p[0] >= 0.5 && p[1] <= 0.25; }));
-  Held(box, "msh", {HeldBox{{0.1, 0.1, 0.1}, {0.11, 0.11, 0.11}}});
+  Held(box, "msh", {FixedBox{{0.1, 0.1, 0.1}, {0.11, 0.11, 0.11}}});
   EXPECT_THAT(status.ToString(),
               HasSubstr("NO_VERTEX_HELD: no node of the body is fixed by the box"));
 }
@@ -86,7 +86,7 @@ TEST_F(HoldTest, VertexHoldsItsNode) {
                                                              : ToBinaryPly(surface);
     for (size_t v = 0; v < surface.vertices.size(); ++v) {
       const Point& at = surface.vertices[v];
-      const TetMesh mesh = Held(bytes, format, {HeldVertices{{static_cast<int64_t>(v)}}});
+      const TetMesh mesh = Held(bytes, format, {FixedVertices{{static_cast<int64_t>(v)}}});
       ASSERT_TRUE(status.ok()) << status;
       EXPECT_EQ(mesh.held, NodesWhere(mesh,
                                       [&](const Point& p) {
@@ -106,10 +106,10 @@ TEST_F(HoldTest, VerticesHoldAllOfATriangleAndAnEdgeBetweenThem) {
     if (p[2] == 0) bottom.push_back(static_cast<int64_t>(v));
     if (p[2] == 0 && p[1] == 0) edge.push_back(static_cast<int64_t>(v));
   }
-  const TetMesh face = Held(ToObj(surface), "obj", {HeldVertices{bottom}});
+  const TetMesh face = Held(ToObj(surface), "obj", {FixedVertices{bottom}});
   EXPECT_EQ(face.held, NodesWhere(face, [](const Point& p) { return Near(p[2], 0); }));
   EXPECT_GT(face.held.size(), 20u);
-  const TetMesh line = Held(ToObj(surface), "obj", {HeldVertices{edge}});
+  const TetMesh line = Held(ToObj(surface), "obj", {FixedVertices{edge}});
   EXPECT_EQ(line.held,
             NodesWhere(line, [](const Point& p) { return Near(p[2], 0) && Near(p[1], 0); }));
   EXPECT_GT(line.held.size(), 4u);
@@ -117,16 +117,16 @@ TEST_F(HoldTest, VerticesHoldAllOfATriangleAndAnEdgeBetweenThem) {
 
 TEST_F(HoldTest, VerticesOfTetrahedraHaveTheNumbersOfTheFile) {
   const TetMesh box = MakeTetBox(kSize, {4, 2, 2}, 4);
-  const TetMesh mesh = Held(ToTextGmsh(box), "msh", {HeldVertices{{11, 20}}});
+  const TetMesh mesh = Held(ToTextGmsh(box), "msh", {FixedVertices{{11, 20}}});
   EXPECT_THAT(mesh.held, ::testing::ElementsAre(0, 9));
-  Held(ToTextGmsh(box), "msh", {HeldVertices{{10}}});
+  Held(ToTextGmsh(box), "msh", {FixedVertices{{10}}});
   EXPECT_THAT(status.ToString(),
               HasSubstr("NO_VERTEX_HELD: no node of the body is fixed by vertex 10: the numbers of "
                         "the file go from 11 to 55"));
 }
 
 TEST_F(HoldTest, VerticesOfAFormatThatNumbersNoneAreRefused) {
-  Held(ToBinaryStl(MakeBoxSurface(kSize)), "stl", {HeldVertices{{0}}});
+  Held(ToBinaryStl(MakeBoxSurface(kSize)), "stl", {FixedVertices{{0}}});
   EXPECT_THAT(status.ToString(), HasSubstr("files of this format do not number vertices"));
 }
 
@@ -137,22 +137,22 @@ constexpr char kGroupedObj[] =
     "g ends\nf 2 3 7 6\nf 4 1 5 8\n";
 
 TEST_F(HoldTest, GroupOfAnObjFileHoldsItsFaces) {
-  const TetMesh base = Held(kGroupedObj, "obj", {HeldGroup{"base"}});
+  const TetMesh base = Held(kGroupedObj, "obj", {FixedGroup{"base"}});
   EXPECT_EQ(base.held, NodesWhere(base, [](const Point& p) { return Near(p[2], 0); }));
-  const TetMesh ends = Held(kGroupedObj, "obj", {HeldGroup{"ends"}});
+  const TetMesh ends = Held(kGroupedObj, "obj", {FixedGroup{"ends"}});
   EXPECT_EQ(ends.held, NodesWhere(ends, [](const Point& p) {
               return Near(p[2], 0) || Near(p[0], 0) || Near(p[0], 1);
             }));
-  const TetMesh both = Held(kGroupedObj, "obj", {HeldGroup{"base"}, HeldGroup{"top"}});
+  const TetMesh both = Held(kGroupedObj, "obj", {FixedGroup{"base"}, FixedGroup{"top"}});
   EXPECT_EQ(both.held,
             NodesWhere(both, [](const Point& p) { return Near(p[2], 0) || Near(p[2], 0.25); }));
 }
 
 TEST_F(HoldTest, GroupThatIsNotThereIsRefusedWithThoseThatAre) {
-  Held(kGroupedObj, "obj", {HeldGroup{"bottom"}});
+  Held(kGroupedObj, "obj", {FixedGroup{"bottom"}});
   EXPECT_THAT(status.ToString(), HasSubstr("GROUP_UNKNOWN: the mesh file has no group \"bottom\": "
                                            "it has base, body, ends, top"));
-  Held(ToBinaryStl(MakeBoxSurface(kSize)), "stl", {HeldGroup{"base"}});
+  Held(ToBinaryStl(MakeBoxSurface(kSize)), "stl", {FixedGroup{"base"}});
   EXPECT_THAT(status.ToString(), HasSubstr("it names none; fix a plane or a box"));
 }
 
@@ -174,20 +174,20 @@ std::string GmshWithABase(const std::string& physical_names) {
 TEST_F(HoldTest, PhysicalGroupHoldsItsElementsWithTheirMidsideNodes) {
   const auto base = [](const Point& p) { return p[2] == 0; };
   const TetMesh named =
-      Held(GmshWithABase("2\n3 7 \"body\"\n2 9 \"the base\"\n"), "msh", {HeldGroup{"the base"}});
+      Held(GmshWithABase("2\n3 7 \"body\"\n2 9 \"the base\"\n"), "msh", {FixedGroup{"the base"}});
   ASSERT_TRUE(status.ok()) << status;
   EXPECT_EQ(named.held, NodesWhere(named, base));
-  const TetMesh numbered = Held(GmshWithABase("1\n3 7 \"body\"\n"), "msh", {HeldGroup{"9"}});
+  const TetMesh numbered = Held(GmshWithABase("1\n3 7 \"body\"\n"), "msh", {FixedGroup{"9"}});
   EXPECT_EQ(numbered.held, NodesWhere(numbered, base));
-  Held(GmshWithABase("0\n"), "msh", {HeldGroup{"7"}});
+  Held(GmshWithABase("0\n"), "msh", {FixedGroup{"7"}});
   EXPECT_THAT(status.ToString(), HasSubstr("it has 5, 9")) << "a volume's number is a material's";
 }
 
 TEST_F(HoldTest, BodyHeldAllOverIsRefused) {
   const std::string box = ToTextGmsh(MakeTetBox(kSize, {2, 1, 1}, 4));
-  Held(box, "msh", {HeldPlane{{0.6, 0, 0}, {1, 0, 0}}, HeldPlane{{0.6, 0, 0}, {-1, 0, 0}}});
+  Held(box, "msh", {FixedPlane{{0.6, 0, 0}, {1, 0, 0}}, FixedPlane{{0.6, 0, 0}, {-1, 0, 0}}});
   EXPECT_THAT(status.ToString(), HasSubstr("ALL_VERTICES_HELD: "));
-  Held(box, "msh", {HeldGroup{"body"}});
+  Held(box, "msh", {FixedGroup{"body"}});
   EXPECT_THAT(status.ToString(), HasSubstr("ALL_VERTICES_HELD: "));
 }
 

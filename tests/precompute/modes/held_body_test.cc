@@ -29,15 +29,15 @@ struct Holding {
   int rigid_mode_count;
 };
 
-const Holding kPoint{"Point", {HeldBox{{0, 0, 0}, {0, 0, 0}}}, 3};
-const Holding kTwoPoints{"TwoPoints", {HeldBox{{0, 0, 0}, {0, 0, 0}}, HeldBox{kSize, kSize}}, 1};
-const Holding kLine{"Line", {HeldBox{{0, 0, 0}, {1, 0, 0}}}, 1};
-const Holding kFace{"Face", {HeldPlane{{0, 0, 0}, {2, 0, 0}}}, 0};
-const Holding kMiddle{"Middle", {HeldBox{{0.3, 0, 0}, {0.7, 1, 1}}}, 0};
+const Holding kPoint{"Point", {FixedBox{{0, 0, 0}, {0, 0, 0}}}, 3};
+const Holding kTwoPoints{"TwoPoints", {FixedBox{{0, 0, 0}, {0, 0, 0}}, FixedBox{kSize, kSize}}, 1};
+const Holding kLine{"Line", {FixedBox{{0, 0, 0}, {1, 0, 0}}}, 1};
+const Holding kFace{"Face", {FixedPlane{{0, 0, 0}, {2, 0, 0}}}, 0};
+const Holding kMiddle{"Middle", {FixedBox{{0.3, 0, 0}, {0.7, 1, 1}}}, 0};
 
 TetMesh HeldBoxMesh(const Holding& holding, const std::array<int, 3>& cells, int nodes) {
   TetMesh mesh = MakeTetBox(kSize, cells, nodes);
-  const absl::Status status = Hold(holding.fixtures, BoundarySurface(mesh), {}, mesh);
+  const absl::Status status = FixNodes(holding.fixtures, BoundarySurface(mesh), {}, mesh);
   EXPECT_TRUE(status.ok()) << status;
   return mesh;
 }

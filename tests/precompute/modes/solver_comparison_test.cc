@@ -25,7 +25,7 @@ TetMesh TubeMesh(int nodes_per_element, bool clamped) {
   TetMesh mesh = MakeTetTube({.around = 12, .along = 20}, nodes_per_element);
   if (!clamped) return mesh;
   const absl::Status status =
-      Hold({HeldPlane{{0, 0, 0}, {0, 0, 1}}}, BoundarySurface(mesh), {}, mesh);
+      FixNodes({FixedPlane{{0, 0, 0}, {0, 0, 1}}}, BoundarySurface(mesh), {}, mesh);
   EXPECT_TRUE(status.ok()) << status;
   return mesh;
 }
