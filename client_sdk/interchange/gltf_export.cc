@@ -20,7 +20,6 @@ namespace {
 using nlohmann::json;
 
 constexpr double kHighestHeardHz = 20000;
-constexpr double kPoissonTolerance = 1e-4;
 
 /// A mode with the frequency and the decay rate that the material gives it.
 struct SoundingMode {

@@ -27,7 +27,6 @@ namespace {
 
 using nlohmann::json;
 
-constexpr double kPoissonTolerance = 1e-4;
 constexpr double kOmegaPerHz = 2 * std::numbers::pi;
 
 /// The arrays of a modal model in the order of the file.

@@ -20,12 +20,12 @@ static_assert(std::endian::native == std::endian::little, "arrays are read as th
 namespace carillon::interchange {
 namespace {
 
-constexpr char kMagic[] = "\x93NUMPY";
+constexpr char kNpyMagic[] = "\x93NUMPY";
 constexpr size_t kMagicBytes = 6;
 constexpr size_t kAlignment = 64;
 constexpr uint64_t kMostItemBytes = 1 << 24;  // of a text
 
-absl::Status Bad(const std::string& name, absl::string_view what) {
+absl::Status BadArray(const std::string& name, absl::string_view what) {
   return Malformed(absl::StrCat("array \"", name, "\" ", what));
 }
 
@@ -105,7 +105,7 @@ struct HeaderPlace {
 };
 
 std::optional<HeaderPlace> FindHeader(std::string_view file) {
-  if (file.size() < 12 || file.substr(0, kMagicBytes) != std::string_view(kMagic, kMagicBytes)) {
+  if (file.size() < 12 || file.substr(0, kMagicBytes) != std::string_view(kNpyMagic, kMagicBytes)) {
     return std::nullopt;
   }
   HeaderPlace place;
@@ -136,7 +136,7 @@ absl::Status ToFloats(const std::string& name, const NpyArray& array, std::vecto
   } else if (array.type == "<f8") {
     Convert<double>(array.bytes, numbers);
   } else {
-    return Bad(name, absl::StrCat("holds '", array.type, "' where '<f8' or '<f4' should be"));
+    return BadArray(name, absl::StrCat("holds '", array.type, "' where '<f8' or '<f4' should be"));
   }
   return absl::OkStatus();
 }
@@ -150,7 +150,7 @@ absl::Status ToIndices(const std::string& name, const NpyArray& array,
   numbers.reserve(wide.size());
   for (const From number : wide) {
     if (number < 0 || static_cast<uint64_t>(number) > std::numeric_limits<uint32_t>::max()) {
-      return Bad(name, absl::StrCat("holds ", number, ", which is no index"));
+      return BadArray(name, absl::StrCat("holds ", number, ", which is no index"));
     }
     numbers.push_back(static_cast<uint32_t>(number));
   }
@@ -178,7 +178,7 @@ std::string NpyHeader(const std::string& type, const std::vector<uint64_t>& shap
   const size_t before = kMagicBytes + 4;
   text.append(kAlignment - (before + text.size() + 1) % kAlignment, ' ');
   text.push_back('\n');
-  std::string header(kMagic, kMagicBytes);
+  std::string header(kNpyMagic, kMagicBytes);
   header.append(
       {'\1', '\0', static_cast<char>(text.size() & 0xffU), static_cast<char>(text.size() >> 8U)});
   return header + text;
@@ -186,24 +186,24 @@ std::string NpyHeader(const std::string& type, const std::vector<uint64_t>& shap
 
 absl::StatusOr<NpyArray> ParseNpy(const std::string& name, std::string_view file) {
   const std::optional<HeaderPlace> place = FindHeader(file);
-  if (!place) return Bad(name, "is no .npy file, or is cut short");
+  if (!place) return BadArray(name, "is no .npy file, or is cut short");
   const absl::string_view text(file.data() + place->begin, place->length);
   const auto type = Between(After(text, "descr"), '\'', '\'');
   const auto dimensions = Between(After(text, "shape"), '(', ')');
   const auto order = After(text, "fortran_order");
   const auto shape = ParseShape(dimensions.value_or("?"));
-  if (!type || !shape || !order) return Bad(name, "has a header that is none");
+  if (!type || !shape || !order) return BadArray(name, "has a header that is none");
   NpyArray array{.type = std::string(*type), .shape = *shape, .bytes = {}};
   const uint64_t item = ItemBytes(array.type);
   if (item == 0) {
-    return Bad(name, absl::StrCat("holds '", array.type,
-                                  "', of which nothing is read; store floats as "
-                                  "'<f4' or '<f8', indices as '<u4', '<i4', '<u8' or '<i8'"));
+    return BadArray(name, absl::StrCat("holds '", array.type,
+                                       "', of which nothing is read; store floats as "
+                                       "'<f4' or '<f8', indices as '<u4', '<i4', '<u8' or '<i8'"));
   }
   const std::string_view numbers = file.substr(place->begin + place->length);
   if (ByteCount(item, *shape) != numbers.size()) {
-    return Bad(name, absl::StrCat("of shape (", absl::StrJoin(*shape, ", "), ") and type '",
-                                  array.type, "' has ", numbers.size(), " bytes"));
+    return BadArray(name, absl::StrCat("of shape (", absl::StrJoin(*shape, ", "), ") and type '",
+                                       array.type, "' has ", numbers.size(), " bytes"));
   }
   const bool turned = absl::StartsWith(*order, "True") && shape->size() > 1;
   array.bytes = turned ? Turned(numbers, *shape, item) : std::string(numbers);
@@ -226,13 +226,13 @@ absl::Status ToNumbers(const std::string& name, const NpyArray& array,
   if (array.type == "<i4") return ToIndices<int32_t>(name, array, numbers);
   if (array.type == "<u8") return ToIndices<uint64_t>(name, array, numbers);
   if (array.type == "<i8") return ToIndices<int64_t>(name, array, numbers);
-  return Bad(name, absl::StrCat("holds '", array.type, "' where integers should be"));
+  return BadArray(name, absl::StrCat("holds '", array.type, "' where integers should be"));
 }
 
 absl::StatusOr<std::string> ToText(const std::string& name, const NpyArray& array) {
   const bool bytes = absl::StartsWith(array.type, "|S");
   if (!array.shape.empty() || !(bytes || absl::StartsWith(array.type, "<U"))) {
-    return Bad(name, "must be a single text");
+    return BadArray(name, "must be a single text");
   }
   if (bytes) return array.bytes.substr(0, array.bytes.find('\0'));
   std::vector<uint32_t> codes;
@@ -240,7 +240,7 @@ absl::StatusOr<std::string> ToText(const std::string& name, const NpyArray& arra
   std::string text;
   for (const uint32_t code : codes) {
     if (code == 0) break;
-    if (code > 0x10ffff) return Bad(name, "holds what is no character");
+    if (code > 0x10ffff) return BadArray(name, "holds what is no character");
     AppendUtf8(code, text);
   }
   return text;

@@ -18,9 +18,9 @@
 namespace carillon::interchange {
 namespace {
 
-const char* TypeOf(double) { return "<f8"; }
-const char* TypeOf(float) { return "<f4"; }
-const char* TypeOf(uint32_t) { return "<u4"; }
+const char* NpyTypeOf(double) { return "<f8"; }
+const char* NpyTypeOf(float) { return "<f4"; }
+const char* NpyTypeOf(uint32_t) { return "<u4"; }
 
 absl::StatusOr<std::optional<NpyArray>> ReadArray(const ZipReader& archive,
                                                   const std::string& name) {
@@ -136,7 +136,7 @@ absl::Status WriteNpz(const std::string& path, const StoredModel& model) {
       model, [&]<class T>(const char* name, const std::vector<T>& numbers, const char* dimensions) {
         entries.push_back(
             {.name = absl::StrCat(name, ".npy"),
-             .head = NpyHeader(TypeOf(T()), Shape(model, dimensions)),
+             .head = NpyHeader(NpyTypeOf(T()), Shape(model, dimensions)),
              .body = {reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(T)}});
       });
   const std::string header = ToJson(model.header);

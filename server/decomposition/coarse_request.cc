@@ -7,6 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "server/decomposition/memory_estimate.h"
+#include "server/mode_database/model_store.h"
 
 namespace carillon {
 namespace {
@@ -15,7 +16,6 @@ constexpr std::array kSurfaceFormats = {"obj", "ply", "stl", "off"};
 constexpr uint32_t kCoarseCornerCount = 300;
 /// Meshes with more corners than this take long with quadratic elements.
 constexpr double kFineSurface = 1500;
-constexpr size_t kMaxLabelBytes = 200;
 
 std::string CoarseLabel(const std::string& label) {
   const std::string coarse = absl::StrCat(label, " (coarse)");

@@ -12,12 +12,12 @@
 #include "proto/cpp/material_catalogue.h"
 #include "proto/cpp/status_macros.h"
 #include "server/base/sha256.h"
+#include "server/mode_database/model_store.h"
 
 namespace carillon {
 namespace {
 
 constexpr std::array kFormats = {"obj", "ply", "stl", "off", "msh", "mesh", "node"};
-constexpr size_t kMaxLabelBytes = 200;
 constexpr int kMostPriority = 100;
 
 absl::Status Invalid(absl::string_view what) {

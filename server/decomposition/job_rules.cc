@@ -82,6 +82,10 @@ bool HasEnded(v1::JobState state) {
          state == v1::JOB_STATE_CANCELLED;
 }
 
+v1::ErrorInfo InternalError(absl::string_view reason, absl::string_view message) {
+  return ToErrorInfo(Refusal(absl::StatusCode::kInternal, reason, message));
+}
+
 v1::ErrorInfo GaveUp(uint32_t start_count) {
   return ToErrorInfo(Refusal(
       absl::StatusCode::kInternal, "DECOMPOSITION_GIVEN_UP",

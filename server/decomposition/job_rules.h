@@ -40,6 +40,9 @@ v1::JobState StateOf(Verdict verdict);
 
 bool HasEnded(v1::JobState state);
 
+/// An error with the given reason whose cause lies on the server's side.
+v1::ErrorInfo InternalError(absl::string_view reason, absl::string_view message);
+
 /// The error of a job during which the daemon was killed so often that the job may be the cause.
 v1::ErrorInfo GaveUp(uint32_t start_count);
 

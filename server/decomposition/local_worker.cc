@@ -27,16 +27,12 @@ constexpr size_t kLogBytes = 4 << 10;
 constexpr uint64_t kFreeEventBytes = 1 << 20;
 constexpr uint64_t kEventBytesPerS = 64 << 10;
 
-v1::ErrorInfo Error(absl::string_view reason, absl::string_view message) {
-  return ToErrorInfo(Refusal(absl::StatusCode::kInternal, reason, message));
-}
-
 int64_t Seconds(nanoseconds time) {
   return std::chrono::duration_cast<std::chrono::seconds>(time).count();
 }
 
 v1::ErrorInfo OutOfMemory(absl::string_view what) {
-  return Error(
+  return InternalError(
       "OUT_OF_MEMORY",
       absl::StrCat("the decomposition ", what,
                    ": ask for fewer nodes or a lower maximal frequency, or give the daemon "
@@ -129,9 +125,10 @@ void LocalWorker::Read(nanoseconds now) {
   if (!status.ok()) {
     Kill(Verdict::kCrashed, ToErrorInfo(status));
   } else if (event_byte_count_ > kFreeEventBytes + seconds * kEventBytesPerS) {
-    Kill(Verdict::kCrashed, Error("WORKER_GARBAGE",
-                                  "the decomposing process floods its event pipe: this is a fault "
-                                  "in it; report it with the mesh"));
+    Kill(Verdict::kCrashed,
+         InternalError("WORKER_GARBAGE",
+                       "the decomposing process floods its event pipe: this is a fault "
+                       "in it; report it with the mesh"));
   }
   log_ += error_pipe_.Read(kReadBytes);
   if (log_.size() > kLogBytes) log_.erase(0, log_.size() - kLogBytes);
@@ -164,16 +161,17 @@ uint64_t LocalWorker::Enforce(nanoseconds now) {
                                   WouldNeed(node_count_))));
   } else if (now - started_ > limits_.time) {
     Kill(Verdict::kTimeout,
-         Error("TIMEOUT",
-               absl::StrCat("the decomposition took more than its ", Seconds(limits_.time),
-                            " s: ask for fewer nodes or a lower maximal frequency, or "
-                            "give it more time")));
+         InternalError("TIMEOUT",
+                       absl::StrCat("the decomposition took more than its ", Seconds(limits_.time),
+                                    " s: ask for fewer nodes or a lower maximal frequency, or "
+                                    "give it more time")));
   } else if (now - last_event_ > limits_.stall) {
     Kill(Verdict::kStalled,
-         Error("WORKER_STALLED", absl::StrCat("the decomposing process gave no sign of life for ",
-                                              Seconds(limits_.stall),
-                                              " s: try again; if it stalls again, report it with "
-                                              "the mesh")));
+         InternalError("WORKER_STALLED",
+                       absl::StrCat("the decomposing process gave no sign of life for ",
+                                    Seconds(limits_.stall),
+                                    " s: try again; if it stalls again, report it with "
+                                    "the mesh")));
   }
   return resident_bytes;
 }
@@ -219,10 +217,11 @@ Outcome LocalWorker::JudgeFailure(const ProcessEnd& end) const {
     return {VerdictOfReport(reported_->reason()), *reported_, {}};
   }
   return {Verdict::kCrashed,
-          Error("WORKER_CRASHED",
-                absl::StrCat("the decomposing process ended by ",
-                             end.exited ? "exit status " : "signal ", end.status, LogSentence(log_),
-                             ": check the mesh for faults such as crossing or doubled triangles")),
+          InternalError(
+              "WORKER_CRASHED",
+              absl::StrCat("the decomposing process ended by ",
+                           end.exited ? "exit status " : "signal ", end.status, LogSentence(log_),
+                           ": check the mesh for faults such as crossing or doubled triangles")),
           {}};
 }
 

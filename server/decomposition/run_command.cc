@@ -17,7 +17,7 @@ namespace {
 using std::chrono::steady_clock;
 
 constexpr std::chrono::seconds kPatience(30);
-constexpr size_t kReadBytes = 64 << 10;
+constexpr size_t kReplyBytes = 64 << 10;
 
 /// A file in memory that is gone with the object.
 class MemoryFile {
@@ -73,7 +73,7 @@ CommandResult RunCommand(const std::vector<std::string>& command, const std::str
       child->Kill();
       break;
     }
-    result.output += output->Read(kReadBytes);
+    result.output += output->Read(kReplyBytes);
   }
   const ProcessEnd end = child->Wait();
   result.success = end.exited && end.status == 0;

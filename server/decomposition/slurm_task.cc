@@ -111,26 +111,24 @@ std::vector<v1::WorkerEvent> ReadEvents(const std::filesystem::path& file) {
   return events;
 }
 
-v1::ErrorInfo Error(absl::string_view reason, absl::string_view message) {
-  return ToErrorInfo(Refusal(absl::StatusCode::kInternal, reason, message));
-}
-
 Outcome Failure(Verdict verdict, v1::ErrorInfo error) { return {verdict, std::move(error), {}}; }
 
-Outcome OutOfMemory(uint64_t limit_bytes) {
-  return Failure(Verdict::kOutOfMemory,
-                 Error("OUT_OF_MEMORY",
-                       absl::StrCat("the decomposition took more than the ", limit_bytes >> 20U,
-                                    " MiB reserved for it: ask for fewer nodes or a lower maximal "
-                                    "frequency, or give it more memory")));
+Outcome OutOfItsMemory(uint64_t limit_bytes) {
+  return Failure(
+      Verdict::kOutOfMemory,
+      InternalError("OUT_OF_MEMORY",
+                    absl::StrCat("the decomposition took more than the ", limit_bytes >> 20U,
+                                 " MiB reserved for it: ask for fewer nodes or a lower maximal "
+                                 "frequency, or give it more memory")));
 }
 
 Outcome Crashed(absl::string_view how) {
   return Failure(
       Verdict::kCrashed,
-      Error("WORKER_CRASHED",
-            absl::StrCat("the decomposing process ", how,
-                         ": check the mesh for faults such as crossing or doubled triangles")));
+      InternalError(
+          "WORKER_CRASHED",
+          absl::StrCat("the decomposing process ", how,
+                       ": check the mesh for faults such as crossing or doubled triangles")));
 }
 
 }  // namespace
@@ -250,22 +248,23 @@ std::optional<Outcome> SlurmTask::TakeEnd() const {
   if (reported != events.end()) {
     return Failure(VerdictOfReport(reported->error().reason()), reported->error());
   }
-  if (status == kKilled) return OutOfMemory(job_.memory_bytes);
+  if (status == kKilled) return OutOfItsMemory(job_.memory_bytes);
   return Crashed(status > kSignalled ? absl::StrCat("ended by signal ", status - kSignalled)
                                      : absl::StrCat("ended by exit status ", status));
 }
 
 std::optional<Outcome> SlurmTask::JudgeLoss(std::optional<SlurmState> state) const {
   if (state == SlurmState::kOutOfMemory && RunCount() == 0) {
-    return Failure(Verdict::kCrashed, Error("WORKER_NOT_STARTED", NotBegun()));
+    return Failure(Verdict::kCrashed, InternalError("WORKER_NOT_STARTED", NotBegun()));
   }
-  if (state == SlurmState::kOutOfMemory) return OutOfMemory(job_.memory_bytes);
+  if (state == SlurmState::kOutOfMemory) return OutOfItsMemory(job_.memory_bytes);
   if (state == SlurmState::kTimeout) {
     return Failure(
         Verdict::kTimeout,
-        Error("TIMEOUT", absl::StrCat("the decomposition took more than its ", job_.time_limit_s,
-                                      " s: ask for fewer nodes or a lower maximal "
-                                      "frequency, or give it more time")));
+        InternalError("TIMEOUT",
+                      absl::StrCat("the decomposition took more than its ", job_.time_limit_s,
+                                   " s: ask for fewer nodes or a lower maximal "
+                                   "frequency, or give it more time")));
   }
   if (state == SlurmState::kCancelled) return Failure(Verdict::kCancelled, {});
   if (RunCount() >= kMostRuns) return Crashed("vanished from the cluster three times");

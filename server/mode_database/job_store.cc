@@ -17,7 +17,7 @@
 namespace carillon {
 namespace {
 
-constexpr char kSelectRows[] =
+constexpr char kSelectJobs[] =
     "SELECT number, digest, label, state, remembered, created_unix_ms, priority, start_count, way, "
     "peak_bytes, xxh3 IS NULL, xxh3, error, request FROM jobs ";
 
@@ -44,7 +44,7 @@ JobRecord Damaged(const JobRecord& job) {
   return damaged;
 }
 
-JobRecord ParseRow(const SqlRow& row) {
+JobRecord ParseJob(const SqlRow& row) {
   JobRecord job{.digest = row.Text(1),
                 .request = std::string(row.Blob(13)),
                 .label = row.Text(2),
@@ -89,9 +89,9 @@ absl::Status JobStore::Put(const JobRecord& job) {
 absl::StatusOr<std::optional<JobRecord>> JobStore::Find(const std::string& digest) {
   std::optional<JobRecord> job;
   RETURN_IF_ERROR(database_->Read([&](SqliteConnection& connection) {
-    return connection.Query(absl::StrCat(kSelectRows, "WHERE digest = ?").c_str(), {digest},
+    return connection.Query(absl::StrCat(kSelectJobs, "WHERE digest = ?").c_str(), {digest},
                             [&](const SqlRow& row) {
-                              job = ParseRow(row);
+                              job = ParseJob(row);
                               return absl::OkStatus();
                             });
   }));
@@ -102,9 +102,9 @@ absl::StatusOr<std::vector<JobRecord>> JobStore::Unfinished() {
   std::vector<JobRecord> jobs;
   RETURN_IF_ERROR(database_->Read([&](SqliteConnection& connection) {
     // Every row is read, because a state that has changed on the disk would hide its job.
-    return connection.Query(absl::StrCat(kSelectRows, "ORDER BY number").c_str(), {},
+    return connection.Query(absl::StrCat(kSelectJobs, "ORDER BY number").c_str(), {},
                             [&](const SqlRow& row) {
-                              JobRecord job = ParseRow(row);
+                              JobRecord job = ParseJob(row);
                               if (job.damaged || job.state == v1::JOB_STATE_QUEUED ||
                                   job.state == v1::JOB_STATE_RUNNING) {
                                 jobs.push_back(std::move(job));
@@ -120,10 +120,10 @@ absl::StatusOr<JobPage> JobStore::List(int page_size, const std::string& page_to
   JobPage page;
   RETURN_IF_ERROR(database_->Read([&](SqliteConnection& connection) {
     return connection.Query(
-        absl::StrCat(kSelectRows, "WHERE number < ? ORDER BY number DESC LIMIT ?").c_str(),
+        absl::StrCat(kSelectJobs, "WHERE number < ? ORDER BY number DESC LIMIT ?").c_str(),
         {range.below, range.size}, [&](const SqlRow& row) {
           page.next_page_token = absl::StrCat(row.Int(0));
-          page.jobs.push_back(ParseRow(row));
+          page.jobs.push_back(ParseJob(row));
           return absl::OkStatus();
         });
   }));

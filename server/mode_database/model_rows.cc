@@ -14,11 +14,11 @@
 namespace carillon {
 namespace {
 
-constexpr char kSelectRows[] =
+constexpr char kSelectModels[] =
     "SELECT revision, digest, label, stored_bytes, created_unix_ms, pinned, sounded_unix_ms, "
     "quarantined, header_xxh3, header FROM models ";
 
-absl::StatusOr<ModelSummary> ParseRow(const SqlRow& row) {
+absl::StatusOr<ModelSummary> ParseModel(const SqlRow& row) {
   ModelSummary model{.digest = row.Text(1),
                      .label = row.Text(2),
                      .stored_bytes = static_cast<uint64_t>(row.Int(3)),
@@ -92,9 +92,9 @@ absl::Status ModelCorrupt(const std::string& digest, absl::string_view what) {
 
 absl::StatusOr<ModelSummary> SelectModel(SqliteConnection& connection, const std::string& digest) {
   absl::StatusOr<ModelSummary> model = ModelNotFound(digest);
-  absl::Status status = connection.Query(absl::StrCat(kSelectRows, "WHERE digest = ?").c_str(),
+  absl::Status status = connection.Query(absl::StrCat(kSelectModels, "WHERE digest = ?").c_str(),
                                          {digest}, [&](const SqlRow& row) {
-                                           model = ParseRow(row);
+                                           model = ParseModel(row);
                                            return model.status();
                                          });
   if (status.ok() && model.ok()) status = SelectTags(connection, *model);
@@ -107,7 +107,7 @@ absl::Status SelectModels(SqliteConnection& connection, const ModelFilter& filte
                           absl::FunctionRef<void(std::string, absl::Status)> on_damaged) {
   std::vector<ModelSummary> models;
   absl::Status status = connection.Query(
-      absl::StrCat(kSelectRows,
+      absl::StrCat(kSelectModels,
                    "WHERE revision < ?1 AND quarantined = 0 "
                    "AND (?2 = '' OR instr(lower(label), lower(?2)) > 0) "
                    "AND (?3 = '' OR digest IN (SELECT digest FROM model_tags WHERE tag = ?3)) "
@@ -118,7 +118,7 @@ absl::Status SelectModels(SqliteConnection& connection, const ModelFilter& filte
       {below, filter.label_contains, filter.tag, filter.min_stored_bytes, filter.max_stored_bytes,
        filter.created_since_unix_ms, filter.created_before_unix_ms, limit},
       [&](const SqlRow& row) {
-        absl::StatusOr<ModelSummary> model = ParseRow(row);
+        absl::StatusOr<ModelSummary> model = ParseModel(row);
         if (model.ok()) {
           models.push_back(*std::move(model));
         } else {

@@ -20,7 +20,6 @@
 namespace carillon {
 namespace {
 
-constexpr size_t kMaxLabelBytes = 200;
 constexpr size_t kMaxTagBytes = 64;
 
 absl::Status CheckName(const std::string& digest) {

@@ -26,6 +26,9 @@ class Database;
 class ModelFileReader;
 class SqliteConnection;
 
+/// A label is cut to this length.
+inline constexpr size_t kMaxLabelBytes = 200;
+
 /// A modal model without its arrays.
 struct ModelSummary {
   std::string digest{};

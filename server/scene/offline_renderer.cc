@@ -23,7 +23,7 @@ constexpr float kQuiet = 1e-4F;
 /// The sound must stay quiet for this time, because two close modes beat and are silent together
 /// for a while.
 constexpr double kQuietS = 0.25;
-constexpr size_t kQueueCapacity = 65536;
+constexpr size_t kOfflineQueueCapacity = 65536;
 
 MixerSettings SettingsOf(const OfflineSettings& settings, SectionThreads& threads) {
   // Nobody waits for an offline block, so a block takes all events that fall into it.
@@ -32,8 +32,8 @@ MixerSettings SettingsOf(const OfflineSettings& settings, SectionThreads& thread
           .channel_count = settings.channel_count,
           .first_frame = settings.mapping.first_frame,
           .most_streams = 1,
-          .most_pending_events = kQueueCapacity,
-          .most_events_per_block = kQueueCapacity,
+          .most_pending_events = kOfflineQueueCapacity,
+          .most_events_per_block = kOfflineQueueCapacity,
           .threads = &threads};
 }
 
@@ -70,7 +70,7 @@ absl::StatusOr<std::unique_ptr<OfflineRenderer>> OfflineRenderer::Make(
   }
   RETURN_IF_ERROR(Validate(settings.space));
   std::unique_ptr<OfflineRenderer> renderer(new OfflineRenderer(settings, bodies));
-  ASSIGN_OR_RETURN(renderer->stream_, renderer->mixer_.OpenStream(kQueueCapacity));
+  ASSIGN_OR_RETURN(renderer->stream_, renderer->mixer_.OpenStream(kOfflineQueueCapacity));
   return renderer;
 }
 
@@ -145,7 +145,7 @@ size_t OfflineRenderer::CountBlocks(size_t most) const {
   const uint64_t first = mixer_.frame();
   const uint64_t left = EndFrame() - std::min(first, EndFrame());
   size_t count = std::min<size_t>({most, kBlocksTogether, left / kBlockFrameCount + 1});
-  const size_t full = pushed_count_ + kQueueCapacity / 2;
+  const size_t full = pushed_count_ + kOfflineQueueCapacity / 2;
   while (count > 1 && full < events().size() &&
          events()[full].FirstSample() < first + count * kBlockFrameCount) {
     --count;
@@ -164,7 +164,7 @@ void OfflineRenderer::PushEventsBefore(uint64_t frame) {
   while (pushed_count_ < events().size() && events()[pushed_count_].FirstSample() < frame) {
     if (!stream_->TryPush(events()[pushed_count_])) {
       intake_.Reject(1, Refusal(absl::StatusCode::kResourceExhausted, "TRACE_TOO_LARGE",
-                                absl::StrCat("over ", kQueueCapacity,
+                                absl::StrCat("over ", kOfflineQueueCapacity,
                                              " events fall into one block; render fewer objects")));
     }
     ++pushed_count_;

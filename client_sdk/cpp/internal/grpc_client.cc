@@ -15,9 +15,6 @@
 namespace carillon::client {
 namespace {
 
-/// Far above the time of any call with one answer; the slowest reads a large model from the disk.
-constexpr auto kCallTimeout = std::chrono::seconds(60);
-
 /// Calls `stub.*method` and returns its response.
 template <class Stub, class Request, class Response>
 absl::StatusOr<Response> Call(Stub& stub, const std::string& server,

@@ -3,6 +3,7 @@
 
 #include <grpcpp/channel.h>
 
+#include <chrono>
 #include <memory>
 #include <string>
 #include <utility>
@@ -18,6 +19,9 @@
 #include "carillon/v1/scene_service.grpc.pb.h"
 
 namespace carillon::client {
+
+/// Far above the time of any call with one answer; the slowest reads a large model from the disk.
+inline constexpr auto kCallTimeout = std::chrono::seconds(60);
 
 /// The client that talks to a daemon: one gRPC channel, and one stub for each service.
 class GrpcClient final : public Client {

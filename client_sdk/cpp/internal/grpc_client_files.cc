@@ -13,12 +13,6 @@
 #include "client_sdk/cpp/internal/rpc_status.h"
 
 namespace carillon::client {
-namespace {
-
-constexpr auto kCallTimeout = std::chrono::seconds(60);
-
-}  // namespace
-
 absl::Status GrpcClient::ExportModalModel(const std::string& name, const RecordSink& sink) const {
   grpc::ClientContext context;
   v1::ExportModalModelRequest request;

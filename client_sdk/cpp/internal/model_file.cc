@@ -11,7 +11,7 @@
 namespace carillon::client {
 namespace {
 
-constexpr int kMaxRecordBytes = 2 << 20;
+constexpr int kReadBytes = 2 << 20;
 
 }  // namespace
 
@@ -29,7 +29,7 @@ absl::Status ReadRecords(const std::string& file,
     return Refusal(absl::StatusCode::kNotFound, "FILE_NOT_FOUND",
                    absl::StrCat(file, " cannot be read; check its name and its permissions"));
   }
-  google::protobuf::io::FileInputStream in(descriptor, kMaxRecordBytes);
+  google::protobuf::io::FileInputStream in(descriptor, kReadBytes);
   in.SetCloseOnDelete(true);
   while (true) {
     bool at_end = false;

@@ -20,9 +20,9 @@ void InitializeOde() {
 
 dReal Real(double x) { return static_cast<dReal>(x); }
 
-class World {
+class OdeWorld {
  public:
-  World(Scene scene, const Body& body, double step_s)
+  OdeWorld(Scene scene, const Body& body, double step_s)
       : scene_(scene), step_s_(step_s), contacts_({}) {
     dWorldSetGravity(world_, 0, 0, Real(-9.81));
     // The engine's manual: soft enough for a contact to stay.
@@ -36,13 +36,13 @@ class World {
     }
     contacts_.AddObject(body_, 1);
   }
-  ~World() {
+  ~OdeWorld() {
     dJointGroupDestroy(joints_);
     dSpaceDestroy(space_);
     dWorldDestroy(world_);
   }
-  World(const World&) = delete;
-  World& operator=(const World&) = delete;
+  OdeWorld(const OdeWorld&) = delete;
+  OdeWorld& operator=(const OdeWorld&) = delete;
 
   v1::ContactStep Step() {
     v1::ContactStep step;
@@ -51,7 +51,7 @@ class World {
     if (scene_ == Scene::kDrag && time_s > kDragStart_s && time_s < kDragEnd_s) {
       dBodySetLinearVel(body_, Real(kDragSpeed_m_per_s), 0, dBodyGetLinearVel(body_)[2]);
     }
-    dSpaceCollide(space_, this, &World::Near);
+    dSpaceCollide(space_, this, &OdeWorld::Near);
     dWorldStep(world_, Real(step_s_));
     contacts_.Read(step_s_, step);
     dJointGroupEmpty(joints_);
@@ -87,7 +87,7 @@ class World {
   }
 
   static void Near(void* data, dGeomID a, dGeomID b) {
-    auto& self = *static_cast<World*>(data);
+    auto& self = *static_cast<OdeWorld*>(data);
     constexpr int kMost = 8;
     std::array<dContactGeom, kMost> points;
     const int count = dCollide(a, b, kMost, points.data(), sizeof(dContactGeom));
@@ -118,7 +118,7 @@ class World {
 
 Simulation SimulateInOde(Scene scene, const Body& body, double step_s) {
   InitializeOde();
-  return [world = std::make_shared<World>(scene, body, step_s)] { return world->Step(); };
+  return [world = std::make_shared<OdeWorld>(scene, body, step_s)] { return world->Step(); };
 }
 
 }  // namespace carillon::rough_floor
