@@ -7,13 +7,12 @@ Usage: check_thread_roles.py BUILD_FOLDER [FILE...]
 """
 
 import concurrent.futures
-import json
 import os
 import pathlib
-import shlex
 import subprocess
 import sys
 
+import compilation
 import project
 
 ROOMS = ("server/base/", "server/mode_database/", "server/decomposition/", "server/synthesis/", "server/audio_device/",
@@ -21,38 +20,37 @@ ROOMS = ("server/base/", "server/mode_database/", "server/decomposition/", "serv
 # Compiled once for each SIMD target, and without a lock or a role: minutes for nothing.
 KERNELS = ("server/synthesis/ringing/force_kernel.cc", "server/synthesis/ringing/ring_kernel.cc",
            "server/synthesis/ringing/strike_kernel.cc", "server/synthesis/spectrum/spectral_kernel.cc")
-KEPT = ("-I", "-isystem", "-D", "-std")
+KEPT = ("-I", "-D", "-std")
 
 
-def flags_of(command):
-    words = shlex.split(command)
-    for word, following in zip(words, words[1:] + [""]):
-        if word.startswith(KEPT):
+def flags_of(source):
+    words = source.arguments
+    for word, following in zip(words, words[1:] + ("",)):
+        if word == "-isystem":
+            yield from (word, following)
+        elif word.startswith(KEPT):
             yield word
-            if word in ("-I", "-isystem"):
-                yield following
 
 
-def analyse(entry):
+def analyse(batch):
     run = subprocess.run(
-        ["clang++", "-fsyntax-only", "-Wno-everything", "-Werror=thread-safety", *flags_of(entry["command"]),
-         entry["file"]], cwd=entry["directory"], capture_output=True, text=True)
+        ["clang++", "-fsyntax-only", "-Wno-everything", "-Werror=thread-safety", *flags_of(batch[0]), "-x", "c++", "-"],
+        input=compilation.text_of(project.ROOT, batch), capture_output=True, text=True)
     return run.stderr if run.returncode else ""
 
 
 def main():
-    entries = json.loads((pathlib.Path(sys.argv[1]) / "compile_commands.json").read_text())
+    sources = compilation.sources(project.ROOT, pathlib.Path(sys.argv[1]).resolve())
     if len(sys.argv) > 2:
-        like = next(entry for entry in entries if entry["file"].endswith("server/synthesis/mixer.cc"))
-        entries = [dict(like, file=str(pathlib.Path(name).resolve())) for name in sys.argv[2:]]
+        like = next(source for source in sources if source.name == "server/synthesis/mixer.cc")
+        sources = [like._replace(name=str(pathlib.Path(name).resolve())) for name in sys.argv[2:]]
     else:
-        names = {entry["file"]: os.path.relpath(entry["file"], project.ROOT) for entry in entries}
-        entries = [entry for entry in entries
-                   if names[entry["file"]].startswith(ROOMS) and names[entry["file"]] not in KERNELS]
+        sources = [source for source in sources if source.name.startswith(ROOMS) and source.name not in KERNELS]
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
-        problems = [text for text in pool.map(analyse, entries) if text]
-    print("".join(problems) + f"{len(problems)} problems in {len(entries)} files")
-    return 1 if problems or not entries else 0
+        found = pool.map(lambda batch: compilation.findings(batch, analyse), compilation.batches(project.ROOT, sources))
+        problems = [text for batch in found for _, text in batch]
+    print("".join(problems) + f"{len(problems)} problems in {len(sources)} files")
+    return 1 if problems or not sources else 0
 
 
 if __name__ == "__main__":

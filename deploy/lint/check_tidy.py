@@ -3,20 +3,22 @@
 """Runs clang-tidy on every source file that has changed since it last passed.
 
 A file has changed if its text, that of a header of ours that it includes, directly or not, its compile
-command or .clang-tidy has. What passed is remembered in $CARILLON_CACHE, for all checkouts alike.
+command or .clang-tidy has. What passed is remembered in $CARILLON_CACHE, for all checkouts alike. Changed files are
+checked a dozen at a time, so that the headers of libraries are read once for all of them.
 
 Usage: check_tidy.py BUILD_FOLDER [ROOT]
 """
 
 import concurrent.futures
 import hashlib
-import json
 import os
 import pathlib
 import re
 import subprocess
 import sys
+import tempfile
 
+import compilation
 import project
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*"([^"]+)"', re.M)
@@ -52,31 +54,28 @@ class Reader:
         return sorted(seen)
 
 
-def digest_of(reader, name, entry, version):
+def digest_of(reader, source, version):
     digest = hashlib.sha256((version + reader.text(".clang-tidy")).encode())
-    arguments = entry.get("command") or " ".join(entry["arguments"])
-    digest.update(arguments.replace(str(reader.root), "").encode())
-    for one in reader.with_headers(name):
+    digest.update(" ".join(source.arguments).replace(str(reader.root), "").encode())
+    for one in reader.with_headers(source.name):
         digest.update(f"\0{one}\0{reader.text(one)}".encode())
     return digest.hexdigest()
 
 
-def entries(root, build):
-    """(name, entry of the compilation database) of each source file of ours."""
-    for entry in json.loads((build / "compile_commands.json").read_text()):
-        path = pathlib.Path(entry["directory"], entry["file"]).resolve()
-        if path.is_relative_to(root) and not path.is_relative_to(build):
-            yield str(path.relative_to(root)), entry
-
-
-def tidy(root, build, name):
-    result = subprocess.run(
-        ["clang-tidy", "--quiet", "-p", str(build), f"--header-filter=^{re.escape(str(root))}/"
-         f"({'|'.join(project.TOP_FOLDERS)})/", name],
-        cwd=root, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, check=False)
+def tidy(root, batch):
+    """What clang-tidy finds in a batch and in the headers of ours that it includes; None if nothing."""
+    with tempfile.TemporaryDirectory(prefix="carillon-tidy-") as folder:
+        file = root / batch[0].name
+        if len(batch) > 1:
+            file = pathlib.Path(folder, "batch.cc")
+            file.write_text(compilation.text_of(root, batch))
+        result = subprocess.run(
+            ["clang-tidy", "--quiet", f"--config-file={root}/.clang-tidy", f"--header-filter=^{re.escape(str(root))}/"
+             f"({'|'.join(project.TOP_FOLDERS)})/", file, "--", *batch[0].arguments],
+            cwd=root, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, check=False)
     if result.returncode == 0:
         return None
-    return result.stdout.replace(f"{root}/", "") or f"{name}: clang-tidy failed without a word"
+    return result.stdout.replace(f"{root}/", "") or f"{batch[0].name}: clang-tidy failed without a word"
 
 
 def check(root, build):
@@ -84,17 +83,19 @@ def check(root, build):
     cache = pathlib.Path(os.environ.get("CARILLON_CACHE", DEFAULT_CACHE)) / "clang-tidy"
     cache.mkdir(parents=True, exist_ok=True)
     version = subprocess.run(["clang-tidy", "--version"], capture_output=True, text=True, check=True)
-    passed = {name: cache / digest_of(reader, name, entry, version.stdout)
-              for name, entry in entries(root, build)}
-    changed = [name for name, mark in passed.items() if not mark.exists()]
+    sources = compilation.sources(root, build)
+    passed = {source: cache / digest_of(reader, source, version.stdout) for source in sources}
+    changed = [source for source, mark in passed.items() if not mark.exists()]
     print(f"{len(changed)} of {len(passed)} files to check")
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
-        running = {pool.submit(tidy, root, build, name): name for name in changed}
+        running = {pool.submit(compilation.findings, batch, lambda part: tidy(root, part)): batch
+                   for batch in compilation.batches(root, changed)}
         for done in concurrent.futures.as_completed(running):
-            if problem := done.result():
-                yield problem
-            else:
-                passed[running[done]].touch()
+            failed = dict(done.result())
+            for source in running[done]:
+                if source not in failed:
+                    passed[source].touch()
+            yield from failed.values()
 
 
 if __name__ == "__main__":

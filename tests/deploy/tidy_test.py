@@ -3,10 +3,12 @@ import contextlib
 import io
 import json
 import os
+import pathlib
 import unittest
 
 from tree import TreeTest
 import check_tidy
+import compilation
 
 
 class Tidy(TreeTest):
@@ -17,9 +19,13 @@ class Tidy(TreeTest):
         os.environ["CARILLON_CACHE"] = str(self.root / "cache")
         self.write("server/a.h", "#pragma once\ninline int Twice(int x) { return 2 * x; }\n")
         self.write("server/a.cc", '#include "server/a.h"\nint Four() { return Twice(2); }\n')
+        self.compile("server/a.cc")
+
+    def compile(self, *names):
+        """Makes the compilation database of a build that compiles the files of these names."""
         self.write("build/compile_commands.json", json.dumps([{
-            "directory": str(self.root / "build"), "file": str(self.root / "server/a.cc"),
-            "command": f"c++ -std=c++20 -I{self.root} -c {self.root}/server/a.cc"}]))
+            "directory": str(self.root / "build"), "file": str(self.root / name),
+            "command": f"c++ -std=c++20 -I{self.root} -c {self.root / name}"} for name in names]))
 
     def check(self):
         """The problems, and how many files were looked at."""
@@ -48,6 +54,46 @@ class Tidy(TreeTest):
             }""")
         for _ in range(2):
             self.assert_found(self.check()[0], "[bugprone-use-after-move")
+
+    def test_of_files_read_together_the_one_at_fault_is_named_and_checked_again(self):
+        self.compile("server/a.cc", "server/b.cc")
+        self.write("server/b.cc", "int badlyNamed() { return 5; }\n")
+        problems, count = self.check()
+        self.assertEqual(count, 2)
+        self.assert_found(problems, "server/b.cc:1:5: error: invalid case style for function 'badlyNamed'")
+        self.assertEqual(self.check()[1], 1)
+
+    def test_files_that_define_the_same_name_pass(self):
+        self.compile("server/a.cc", "server/b.cc")
+        for name in "ab":
+            self.write(f"server/{name}.cc",
+                       f"static int Same() {{ return 1; }}\nint Of{name.upper()}() {{ return Same(); }}\n")
+        self.assertEqual(self.check(), ([], 2))
+        self.assertEqual(self.check(), ([], 0))
+
+    def test_the_files_of_a_file_that_the_build_made_of_several_are_checked(self):
+        self.write("server/b.cc", "int badlyNamed() { return 5; }\n")
+        self.write("build/x.dir/Unity/unity_0.cxx", "".join(f'#include "{self.root}/server/{x}.cc"\n' for x in "ab"))
+        self.compile("build/x.dir/Unity/unity_0.cxx")
+        problems, count = self.check()
+        self.assertEqual(count, 2)
+        self.assert_found(problems, "badlyNamed")
+
+
+class Batches(TreeTest):
+    def batches(self, **texts):
+        for name, text in texts.items():
+            self.write(f"server/{name}.cc", text)
+        sources = [compilation.Source(f"server/{name}.cc", ("-O1",)) for name in texts]
+        return [[pathlib.Path(source.name).stem for source in batch]
+                for batch in compilation.batches(self.root, sources)]
+
+    def test_files_whose_own_names_clash_are_apart(self):
+        own = "namespace {\nconstexpr double kStep = 1;\n}  // namespace\n"
+        self.assertEqual(self.batches(a=own, b="int F();\n", c=own), [["b", "a"], ["c"]])
+
+    def test_a_file_that_includes_itself_is_alone(self):
+        self.assertEqual(self.batches(a="", ring_kernel="", z=""), [["z", "a"], ["ring_kernel"]])
 
 
 if __name__ == "__main__":
