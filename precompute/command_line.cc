@@ -33,6 +33,7 @@ struct Options {
 
 constexpr char kMaterialGroup[] = "Material";
 constexpr char kUseGroup[] = "Intended use";
+constexpr char kRadiationGroup[] = "Radiation";
 
 absl::Status InvalidOption(absl::string_view message) {
   return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS", message);
@@ -88,13 +89,38 @@ void AddUseOptions(CLI::App& app, Options& options, v1::WorkerRequest& request) 
       ->group(kUseGroup);
 }
 
+void AddRadiationOptions(CLI::App& app, v1::WorkerRequest& request) {
+  app.add_flag_function(
+         "--transfer", [&](int64_t) { request.mutable_transfer(); },
+         "Compute how each mode radiates into the air, too, for the material's speed of sound: "
+         "power, directions, decay by radiation")
+      ->group(kRadiationGroup);
+  app.add_flag_function(
+         "--radiate", [&](int64_t) { request.set_radiate_stored_model(true); },
+         "IN is a stored modal model; compute how its modes radiate, and nothing else")
+      ->group(kRadiationGroup);
+  app.add_option_function<double>(
+         "--transfer-accuracy",
+         [&](double accuracy_db) { request.mutable_transfer()->set_accuracy_db(accuracy_db); },
+         "Estimated error of each mode's radiated power that is good enough, dB [2]")
+      ->check(CLI::Range(0.06, 20.0))
+      ->group(kRadiationGroup);
+  app.add_option_function<double>(
+         "--transfer-budget",
+         [&](double budget_s) { request.mutable_transfer()->set_budget_s(budget_s); },
+         "Seconds of processor time after which no further mode is begun; low modes come first, "
+         "then the loudest [as long as the modes took, 20 at least]")
+      ->check(CLI::PositiveNumber)
+      ->group(kRadiationGroup);
+}
+
 /// Adds --request, which stands for all options of the groups above.
 void AddRequestFile(CLI::App& app, Options& options) {
   CLI::Option* const file = app.add_option(
       "--request", options.request_file,
       "File with a carillon.v1.WorkerRequest in protobuf's text form; it replaces all options of "
-      "the groups Material, Decomposition and Intended use");
-  for (const char* group : {kMaterialGroup, kSettingsGroup, kUseGroup}) {
+      "the groups Material, Decomposition, Intended use and Radiation");
+  for (const char* group : {kMaterialGroup, kSettingsGroup, kUseGroup, kRadiationGroup}) {
     const auto in_group = [&](const CLI::Option* option) { return option->get_group() == group; };
     for (CLI::Option* option : app.get_options(in_group)) file->excludes(option);
   }
@@ -102,13 +128,19 @@ void AddRequestFile(CLI::App& app, Options& options) {
 
 void AddOptions(CLI::App& app, Options& options, CommandLine& result) {
   app.add_option(
-         "IN", result.mesh_file,
-         "Mesh file: a closed surface, or tetrahedra (msh, mesh, node with the ele beside it)")
+         "IN", result.input,
+         "Mesh file: a closed surface, or tetrahedra (msh, mesh, node with the ele beside it); "
+         "with --radiate a stored modal model")
       ->required();
-  app.add_option("--out", result.output, "Where to write the modal model")->required();
+  app.add_option("--out", result.output,
+                 "Where to write the modal model, or the radiation with --radiate")
+      ->required();
+  app.add_option("--transfer-out", result.transfer_output,
+                 "Where to write the radiation with --transfer [OUT.transfer]");
   AddMaterialOptions(app, options);
   AddSettingsOptions(app, *result.request.mutable_settings());
   AddUseOptions(app, options, result.request);
+  AddRadiationOptions(app, result.request);
   AddRequestFile(app, options);
   app.add_flag("--json", result.json, "Print one JSON object");
   app.add_option("--threads", result.thread_count, "Threads (default: one a processor)")
@@ -220,8 +252,11 @@ absl::StatusOr<CommandLine> ParseCommandLine(int argc, const char* const* argv) 
     return InvalidOption(
         absl::StrCat(error.what(), "; carillon-precompute --help lists the options"));
   }
-  ASSIGN_OR_RETURN(result.request,
-                   MakeRequest(options, result.mesh_file, std::move(result.request)));
+  ASSIGN_OR_RETURN(result.request, MakeRequest(options, result.input, std::move(result.request)));
+  if (result.request.radiate_stored_model()) result.transfer_output = result.output;
+  if (result.transfer_output.empty()) {
+    result.transfer_output = absl::StrCat(result.output, ".transfer");
+  }
   return result;
 }
 

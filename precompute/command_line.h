@@ -11,9 +11,10 @@ namespace carillon::precompute {
 
 /// The parsed command line of carillon-precompute.
 struct CommandLine {
-  std::string mesh_file;
+  std::string input;  ///< a mesh, or a stored model where request.radiate_stored_model()
   std::string output;
-  v1::WorkerRequest request;  ///< with every default filled in
+  std::string transfer_output;  ///< where the radiation beside the modes goes
+  v1::WorkerRequest request;    ///< with every default filled in
   bool json = false;
   int event_descriptor = -1;  ///< the worker writes its events there; below zero: nowhere
   int thread_count = 0;       ///< zero: one thread for each processor

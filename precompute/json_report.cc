@@ -4,7 +4,9 @@
 #include <sys/resource.h>
 
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
+#include <numbers>
 
 #include "proto/cpp/error_reason.h"
 
@@ -24,7 +26,7 @@ int64_t PeakMemoryBytes() {
 
 Json PhaseTimes(const PhaseClock& clock) {
   Json phases = Json::array();
-  for (int k = v1::PHASE_READ; k <= v1::PHASE_WRITE; ++k) {
+  for (int k = v1::PHASE_READ; k <= v1::PHASE_RADIATE; ++k) {
     const auto phase = static_cast<v1::Phase>(k);
     const PhaseClock::Times& times = clock.Of(phase);
     phases.push_back({{"name", PhaseName(phase)},
@@ -34,7 +36,39 @@ Json PhaseTimes(const PhaseClock& clock) {
   return phases;
 }
 
-Json ModesInBand(const ModalModel& model, const IntendedUse& use) {
+/// For the material and size of `use`; see transfer.proto for the scaling.
+Json Radiation(const ModeRadiation& mode, const Air& air, double omega, const IntendedUse& use) {
+  if (!mode.computed) return {{"computed", false}};
+  const double power_integral = mode.power_integral * use.size / use.density_kg_per_m3;
+  return {{"computed", true},
+          {"efficiency", mode.efficiency()},
+          {"decay_rate_per_s", mode.DecayRatePerS(air) / (use.density_kg_per_m3 * use.size)},
+          // Pa at 1 m for a modal displacement of 1 m kg^(1/2), peaks.
+          {"pressure_at_1m_pa", air.density_kg_per_m3 * omega * omega *
+                                    std::sqrt(power_integral / (4 * std::numbers::pi))},
+          {"power_error_db", mode.power_error_db},
+          {"direction_error_db", mode.direction_error_db},
+          {"order", mode.order},
+          {"harmonics", mode.index.size()},
+          {"vertices", mode.vertex_count},
+          {"edge_m", mode.edge_m},
+          {"iterations", mode.iterations},
+          {"residual", mode.residual},
+          {"surface_power_db", mode.surface_power_db}};
+}
+
+Json RadiationSummary(const Transfer& transfer) {
+  return {{"speed_ratio", transfer.settings.speed_ratio},
+          {"center_m", transfer.center},
+          {"radius_m", transfer.radius_m},
+          {"cpu_seconds", transfer.cpu_s},
+          {"accuracy_db", transfer.settings.goal_db},
+          {"budget_s", transfer.settings.budget_cpu_s},
+          {"modes_wanted", std::ranges::count_if(transfer.modes, &ModeRadiation::in_band)},
+          {"modes_computed", std::ranges::count_if(transfer.modes, &ModeRadiation::computed)}};
+}
+
+Json ModesInBand(const ModalModel& model, const Transfer* transfer, const IntendedUse& use) {
   Json modes = Json::array();
   for (size_t m = 0; m < model.eigenvalues.size(); ++m) {
     const double eigenvalue = model.eigenvalues[m];
@@ -44,6 +78,12 @@ Json ModesInBand(const ModalModel& model, const IntendedUse& use) {
                      {"decay_rate_per_s", use.DecayRatePerS(eigenvalue)},
                      {"residual", model.residuals[m]},
                      {"estimated_error", model.estimated_errors[m]}});
+    if (transfer == nullptr) continue;
+    const double omega = std::sqrt(std::max(0.0, use.Eigenvalue(eigenvalue)));
+    // c' = c E^(1/2) rho^-1 size^-(1/2), as modal_model.proto says.
+    modes.back()["coupling"] =
+        model.couplings[m] * std::sqrt(use.young_pa / use.size) / use.density_kg_per_m3;
+    modes.back()["radiation"] = Radiation(transfer->modes[m], transfer->settings.air, omega, use);
   }
   return modes;
 }
@@ -60,7 +100,7 @@ Json Check(const SolverComparison& comparison) {
 
 }  // namespace
 
-std::string JsonReport(const ModalModel& model, const IntendedUse& use,
+std::string JsonReport(const ModalModel& model, const Transfer* transfer, const IntendedUse& use,
                        const ProgressReporter& reporter) {
   Json report = {{"nodes", model.node_count},
                  {"elements", model.element_count},
@@ -70,8 +110,9 @@ std::string JsonReport(const ModalModel& model, const IntendedUse& use,
                  {"left_out_modes", model.left_out_mode_count},
                  {"accuracy", model.WorstError()},
                  {"warnings", model.warnings},
-                 {"modes", ModesInBand(model, use)}};
+                 {"modes", ModesInBand(model, transfer, use)}};
   if (model.comparison) report["check"] = Check(*model.comparison);
+  if (transfer != nullptr) report["radiation"] = RadiationSummary(*transfer);
   return report.dump(2);
 }
 

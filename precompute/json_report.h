@@ -7,13 +7,15 @@
 #include "precompute/intended_use.h"
 #include "precompute/modes/modal_model.h"
 #include "precompute/progress_reporter.h"
+#include "precompute/radiation/transfer.h"
 
 namespace carillon::precompute {
 
 /// Returns the object that --json prints: nodes, elements, unknowns, peak_memory_bytes, phases, the
 /// count of modes left out, warnings, the modes of the model that lie in the band of `use`, and
-/// with --check-with the comparison of the solvers ("check").
-std::string JsonReport(const ModalModel& model, const IntendedUse& use,
+/// with --check-with the comparison of the solvers ("check"). Where `transfer` is not null, also how
+/// each mode radiates ("radiation").
+std::string JsonReport(const ModalModel& model, const Transfer* transfer, const IntendedUse& use,
                        const ProgressReporter& reporter);
 
 /// Returns the object that --json prints when a request is refused: "error", with reason, message

@@ -6,6 +6,7 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -15,10 +16,14 @@
 #include "precompute/json_report.h"
 #include "precompute/mesh/read/read_mesh.h"
 #include "precompute/modal_model_codec.h"
+#include "precompute/phase_clock.h"
 #include "precompute/progress_bar.h"
 #include "precompute/progress_reporter.h"
+#include "precompute/radiate.h"
+#include "precompute/read_modal_model.h"
 #include "precompute/sha256.h"
 #include "precompute/sparse/openblas.h"
+#include "precompute/transfer_codec.h"
 #include "precompute/worker_events.h"
 #include "precompute/worker_request.h"
 #include "proto/cpp/error_reason.h"
@@ -29,16 +34,46 @@ namespace {
 
 constexpr std::chrono::milliseconds kProgressInterval(250);
 
-absl::StatusOr<ModalModel> DecomposeAndWrite(const CommandLine& asked, ProgressReporter& reporter) {
-  ASSIGN_OR_RETURN(std::string mesh, ReadMeshFile(asked.mesh_file, asked.request.mesh_format()));
-  const ModelOrigin origin{.mesh_digest = Sha256Hex(mesh), .settings = asked.request.settings()};
+struct Result {
+  StoredModel stored;
+  std::optional<Transfer> transfer;
+};
+
+absl::StatusOr<StoredModel> DecomposeAndWrite(const CommandLine& asked,
+                                              ProgressReporter& reporter) {
+  ASSIGN_OR_RETURN(std::string mesh, ReadMeshFile(asked.input, asked.request.mesh_format()));
+  ModelOrigin origin{.mesh_digest = Sha256Hex(mesh), .settings = asked.request.settings()};
   ASSIGN_OR_RETURN(ModalModel model, Decompose(std::move(mesh), asked.request, reporter));
   RETURN_IF_ERROR(WriteModalModel(asked.output, model, origin));
-  reporter.OnProgress(v1::PHASE_WRITE, 1);
-  return model;
+  return StoredModel{std::move(model), std::move(origin)};
 }
 
-void PrintSummary(const ModalModel& model, const CommandLine& asked) {
+/// Computes the modes, or reads them where the input is a stored model; then their radiation, where
+/// it is wanted.
+absl::StatusOr<Result> Compute(const CommandLine& asked, ProgressReporter& reporter) {
+  const bool stored = asked.request.radiate_stored_model();
+  const double begun_cpu_s = PhaseClock::Now().cpu_seconds;
+  Result result;
+  ASSIGN_OR_RETURN(result.stored,
+                   stored ? ReadModalModel(asked.input) : DecomposeAndWrite(asked, reporter));
+  if (asked.request.has_transfer()) {
+    const double modes_cpu_s = stored ? 0 : PhaseClock::Now().cpu_seconds - begun_cpu_s;
+    ASSIGN_OR_RETURN(result.transfer,
+                     Radiate(result.stored.model, asked.request, modes_cpu_s, reporter));
+    RETURN_IF_ERROR(WriteTransfer(asked.transfer_output, *result.transfer, result.stored));
+  }
+  reporter.OnProgress(v1::PHASE_WRITE, 1);
+  return result;
+}
+
+void PrintRadiation(const Transfer& transfer, const std::string& output) {
+  const auto computed = std::ranges::count_if(transfer.modes, &ModeRadiation::computed);
+  const auto wanted = std::ranges::count_if(transfer.modes, &ModeRadiation::in_band);
+  std::printf("radiation of %td of %td modes in %.1f s of processor time, written to %s\n",
+              computed, wanted, transfer.cpu_s, output.c_str());
+}
+
+void PrintModes(const ModalModel& model, const CommandLine& asked) {
   const IntendedUse use = UseOf(asked.request);
   std::printf("%zu modes from %.2f to %.2f Hz, %d nodes, written to %s\n", model.eigenvalues.size(),
               use.FrequencyHz(model.eigenvalues.front()), use.FrequencyHz(model.eigenvalues.back()),
@@ -46,6 +81,11 @@ void PrintSummary(const ModalModel& model, const CommandLine& asked) {
   for (const std::string& warning : model.warnings) {
     std::fprintf(stderr, "warning: %s\n", warning.c_str());
   }
+}
+
+void PrintSummary(const Result& result, const CommandLine& asked) {
+  if (!asked.request.radiate_stored_model()) PrintModes(result.stored.model, asked);
+  if (result.transfer) PrintRadiation(*result.transfer, asked.transfer_output);
 }
 
 int Refuse(const absl::Status& status, bool json, const WorkerEvents& events) {
@@ -60,7 +100,7 @@ int Refuse(const absl::Status& status, bool json, const WorkerEvents& events) {
 int Run(const CommandLine& asked) {
   SetThreadCount(asked.thread_count);
   const WorkerEvents events(asked.event_descriptor);
-  absl::StatusOr<ModalModel> model = absl::UnknownError("not computed");
+  absl::StatusOr<Result> result = absl::UnknownError("not computed");
   {
     const ProgressBar bar;
     ProgressReporter reporter(
@@ -69,14 +109,15 @@ int Run(const CommandLine& asked) {
           bar.Draw(progress);
         },
         kProgressInterval);
-    model = DecomposeAndWrite(asked, reporter);
+    result = Compute(asked, reporter);
     reporter.Stop();
-    if (model.ok() && asked.json) {
-      std::puts(JsonReport(*model, UseOf(asked.request), reporter).c_str());
+    if (result.ok() && asked.json) {
+      const Transfer* transfer = result->transfer ? &*result->transfer : nullptr;
+      std::puts(JsonReport(result->stored.model, transfer, UseOf(asked.request), reporter).c_str());
     }
   }
-  if (!model.ok()) return Refuse(model.status(), asked.json, events);
-  if (!asked.json) PrintSummary(*model, asked);
+  if (!result.ok()) return Refuse(result.status(), asked.json, events);
+  if (!asked.json) PrintSummary(*result, asked);
   return EXIT_SUCCESS;
 }
 

@@ -1,19 +1,10 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "precompute/modal_model_codec.h"
 
-#include <fcntl.h>
-#include <google/protobuf/io/zero_copy_stream_impl.h>
-#include <google/protobuf/util/delimited_message_util.h>
-#include <unistd.h>
-#include <xxhash.h>
-
-#include <algorithm>
 #include <bit>
-#include <cstdio>
 #include <span>
 
-#include "absl/strings/str_cat.h"
-#include "proto/cpp/error_reason.h"
+#include "precompute/record_file.h"
 #include "proto/cpp/model_format.h"
 
 static_assert(std::endian::native == std::endian::little, "arrays are stored little endian");
@@ -21,17 +12,7 @@ static_assert(std::endian::native == std::endian::little, "arrays are stored lit
 namespace carillon::precompute {
 namespace {
 
-using google::protobuf::io::FileOutputStream;
-using google::protobuf::util::SerializeDelimitedToZeroCopyStream;
-
 constexpr char kSolver[] = "carillon-precompute " CARILLON_VERSION;
-
-using Bytes = std::span<const std::byte>;
-
-template <typename T>
-Bytes BytesOf(const std::vector<T>& values) {
-  return std::as_bytes(std::span(values));
-}
 
 std::vector<std::array<float, 3>> ToFloat(const std::vector<Point>& points) {
   std::vector<std::array<float, 3>> result;
@@ -92,49 +73,13 @@ v1::ModalModelRecord MakeHeader(const ModalModel& model, const ModelOrigin& orig
   return record;
 }
 
-bool WriteChunks(Bytes bytes, uint32_t index, FileOutputStream& file) {
-  for (size_t offset = 0; offset < bytes.size(); offset += kMaxModelChunkBytes) {
-    const auto piece = bytes.subspan(offset, std::min(kMaxModelChunkBytes, bytes.size() - offset));
-    v1::ModalModelRecord record;
-    v1::ModalModelChunk& chunk = *record.mutable_chunk();
-    chunk.set_array(index);
-    chunk.set_offset(offset);
-    chunk.set_data(piece.data(), piece.size());
-    chunk.set_xxh3(XXH3_64bits(piece.data(), piece.size()));
-    if (!SerializeDelimitedToZeroCopyStream(record, &file)) return false;
-  }
-  return true;
-}
-
-/// Writes all records and brings them to the disk.
-bool WriteRecords(int descriptor, const v1::ModalModelRecord& header,
-                  const std::array<Bytes, kModelArrayCount>& arrays) {
-  FileOutputStream file(descriptor);
-  bool ok = SerializeDelimitedToZeroCopyStream(header, &file);
-  for (size_t i = 0; i < arrays.size() && ok; ++i) {
-    ok = WriteChunks(arrays[i], static_cast<uint32_t>(i), file);
-  }
-  ok = ok && file.Flush() && fsync(descriptor) == 0;
-  return file.Close() && ok;
-}
-
 }  // namespace
 
 absl::Status WriteModalModel(const std::string& path, const ModalModel& model,
                              const ModelOrigin& origin) {
   const std::vector<std::array<float, 3>> given_vertices = ToFloat(model.given.vertices);
   const std::array<Bytes, kModelArrayCount> arrays = Arrays(model, given_vertices);
-  const std::string temporary = absl::StrCat(path, ".partial-", getpid());
-  const int descriptor = open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-  if (descriptor >= 0 && WriteRecords(descriptor, MakeHeader(model, origin), arrays) &&
-      std::rename(temporary.c_str(), path.c_str()) == 0) {
-    return absl::OkStatus();
-  }
-  unlink(temporary.c_str());
-  return Refusal(absl::StatusCode::kInternal, "OUTPUT_NOT_WRITABLE",
-                 absl::StrCat("\"", path,
-                              "\" cannot be written; check that its folder exists, is "
-                              "writable and has room"));
+  return WriteRecordFile(path, MakeHeader(model, origin), arrays);
 }
 
 }  // namespace carillon::precompute

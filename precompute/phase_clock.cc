@@ -21,7 +21,7 @@ double CpuSeconds(int who) {
 
 std::string_view PhaseName(v1::Phase phase) {
   constexpr std::array<std::string_view, kPhaseCount + 1> kNames = {
-      "", "read", "mesh", "assemble", "factor", "solve", "verify", "write"};
+      "", "read", "mesh", "assemble", "factor", "solve", "verify", "write", "radiate"};
   return kNames[static_cast<size_t>(phase)];
 }
 

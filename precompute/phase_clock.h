@@ -11,7 +11,7 @@ namespace carillon::precompute {
 /// The name that users see: "read", "mesh", ...
 std::string_view PhaseName(v1::Phase phase);
 
-inline constexpr size_t kPhaseCount = v1::PHASE_WRITE;  ///< the phases from v1::PHASE_READ on
+inline constexpr size_t kPhaseCount = v1::PHASE_RADIATE;  ///< the phases from v1::PHASE_READ on
 
 /// Adds up how long each phase took.
 class PhaseClock {

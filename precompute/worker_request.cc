@@ -18,10 +18,22 @@ namespace carillon::precompute {
 namespace {
 
 constexpr double kBytesPerGib = 1024.0 * 1024 * 1024;
+constexpr double kUsualAccuracyDb = 2;
 constexpr double kHighestHz = 20'000;  // where the request names none
 
 absl::Status Invalid(absl::string_view what) {
   return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS", what);
+}
+
+absl::Status CheckTransfer(const v1::TransferSettings& transfer) {
+  const double accuracy_db = transfer.accuracy_db();
+  if (accuracy_db != 0 && !(accuracy_db >= 0.06 && accuracy_db <= 20)) {
+    return Invalid(absl::StrCat("the accuracy of the radiation is ", accuracy_db,
+                                " dB; it must be from 0.06 to 20 dB"));
+  }
+  if (transfer.budget_s() >= 0 && std::isfinite(transfer.budget_s())) return absl::OkStatus();
+  return Invalid(absl::StrCat("the processor time for the radiation is ", transfer.budget_s(),
+                              " s; it must be finite and not below zero"));
 }
 
 absl::Status CheckUse(const v1::WorkerRequest& request) {
@@ -35,6 +47,7 @@ absl::Status CheckUse(const v1::WorkerRequest& request) {
                                 request.max_frequency_hz(),
                                 " Hz; it must rise from zero or more to a finite frequency"));
   }
+  RETURN_IF_ERROR(CheckTransfer(request.transfer()));
   if (request.material().has_young_pa() && request.material().has_density_kg_per_m3()) {
     return absl::OkStatus();
   }
@@ -47,8 +60,12 @@ absl::StatusOr<v1::WorkerRequest> Complete(v1::WorkerRequest request) {
   FillInDefaults(*request.mutable_settings());
   if (request.size() == 0) request.set_size(1);
   if (request.max_frequency_hz() == 0) request.set_max_frequency_hz(kHighestHz);
-  RETURN_IF_ERROR(CheckSettings(request.settings()));
+  if (!request.radiate_stored_model()) RETURN_IF_ERROR(CheckSettings(request.settings()));
   RETURN_IF_ERROR(CheckUse(request));
+  const bool radiate = request.has_transfer() || request.radiate_stored_model();
+  if (radiate && request.transfer().accuracy_db() == 0) {
+    request.mutable_transfer()->set_accuracy_db(kUsualAccuracyDb);
+  }
   ASSIGN_OR_RETURN(*request.mutable_material(), ResolveMaterial(request.material()));
   return request;
 }

@@ -32,6 +32,8 @@ absl::string_view PhaseName(v1::Phase phase) {
       return "verifying";
     case v1::PHASE_WRITE:
       return "writing";
+    case v1::PHASE_RADIATE:
+      return "radiating";
     default:
       return "starting";
   }

@@ -81,12 +81,12 @@ class NearAssembly {
   NearCorrection Make() && {
     FindNear();
     MakePattern();
-    // Each thread adds up in entries of its own.
+    // Each thread adds up in entries of its own, and always the same triangles, so that two runs
+    // round alike.
     std::vector<NearCorrection> parts(static_cast<size_t>(workers_.count()), result_);
-    std::atomic<size_t> next = 0;
     workers_.Run([&](int thread) {
       NearCorrection& part = parts[static_cast<size_t>(thread)];
-      for (size_t outer = next++; outer < near_.size(); outer = next++) {
+      for (auto outer = static_cast<size_t>(thread); outer < near_.size(); outer += parts.size()) {
         for (const int32_t inner : near_[outer]) {
           AddPair(outer, static_cast<size_t>(inner), part);
         }

@@ -70,7 +70,9 @@ struct ModelSizes {
   }
 };
 
-inline v1::ArrayDescriptor DescribeArray(const ArraySpec& spec, const ModelSizes& sizes) {
+/// Sizes: ModelSizes, or another struct that says how long each dimension is.
+template <class Sizes>
+v1::ArrayDescriptor DescribeArray(const ArraySpec& spec, const Sizes& sizes) {
   v1::ArrayDescriptor array;
   array.set_name(spec.name);
   array.set_type(spec.type);

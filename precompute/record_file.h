@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "carillon/v1/modal_model.pb.h"
+#include "carillon/v1/transfer.pb.h"
+
+namespace carillon::precompute {
+
+using Bytes = std::span<const std::byte>;
+
+template <class T>
+Bytes BytesOf(const std::vector<T>& values) {
+  return std::as_bytes(std::span(values));
+}
+
+/// Writes the header and then the arrays in chunks, in protobuf's delimited form, each chunk with
+/// its hash: to a temporary name beside `path`, flushed to the disk and renamed, so that `path`
+/// never holds half a result. Record: v1::ModalModelRecord or v1::TransferRecord.
+/// Errors: Internal OUTPUT_NOT_WRITABLE.
+template <class Record>
+absl::Status WriteRecordFile(const std::string& path, const Record& header,
+                             std::span<const Bytes> arrays);
+
+/// Passes each record of a stored modal model to `take`, in order, after checking the hash of a
+/// chunk. Stops at the first error of `take` and returns it.
+/// Errors: NotFound FILE_NOT_FOUND, InvalidArgument MODAL_MODEL_MALFORMED, DataLoss
+/// MODAL_MODEL_CORRUPT.
+absl::Status ReadModelRecords(const std::string& path,
+                              const std::function<absl::Status(v1::ModalModelRecord&)>& take);
+
+}  // namespace carillon::precompute
