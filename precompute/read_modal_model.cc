@@ -37,6 +37,8 @@ class ModelReader {
 
   absl::Status Take(v1::ModalModelRecord& record) {
     if (record.has_header()) return TakeHeader(record.header());
+    // Transfers may follow the model in an exported file.
+    if (record.record_case() == v1::ModalModelRecord::kTransfer) return absl::OkStatus();
     return TakeChunk(record.chunk());
   }
 

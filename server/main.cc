@@ -14,6 +14,7 @@
 #include <string>
 #include <utility>
 
+#include "absl/cleanup/cleanup.h"
 #include "absl/status/status.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
@@ -129,9 +130,10 @@ absl::StatusOr<std::unique_ptr<DecompositionQueue>> MakeQueue(const Options& opt
                                                               RemoteRuns& runs) {
   ASSIGN_OR_RETURN(std::unique_ptr<Executor> executor,
                    MakeExecutor(options, directory, clock, runs));
-  return DecompositionQueue::Make(
-      database, std::move(executor), clock,
-      {.max_queued_count = static_cast<size_t>(options.queue_limit), .log = LogWarning});
+  return DecompositionQueue::Make(database, std::move(executor), clock,
+                                  {.max_queued_count = static_cast<size_t>(options.queue_limit),
+                                   .transfers = options.transfers,
+                                   .log = LogWarning});
 }
 
 OutputSettings OutputSettingsOf(const Options& options) {
@@ -166,7 +168,10 @@ absl::Status Run(const Options& options) {
                    MakeQueue(options, directory, *database, clock, runs));
   ASSIGN_OR_RETURN(const std::unique_ptr<LiveOutput> output,
                    LiveOutput::Start(OutputSettingsOf(options), clock, LogWarning));
-  SceneRegistry scenes(output->mixer());
+  SceneRegistry scenes(output->mixer(), &database->transfers());
+  database->transfers().Listen(
+      [&scenes](const std::string& model_digest) { scenes.TakeOverTransfers(model_digest); });
+  const absl::Cleanup listen_no_more = [&database] { database->transfers().Listen(nullptr); };
   ASSIGN_OR_RETURN(const std::unique_ptr<ApiServer> server,
                    ApiServer::Start(ApiSettingsOf(options), {.database = *database,
                                                              .decompositions = *decompositions,

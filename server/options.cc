@@ -92,6 +92,7 @@ absl::Status ReadKey(const std::string& key, const toml::node& node, Options& op
   if (key == "job_time") return ReadValue(key, node, options.job_time_s);
   if (key == "stall_time") return ReadValue(key, node, options.stall_time_s);
   if (key == "queue_limit") return ReadValue(key, node, options.queue_limit);
+  if (key == "transfers") return ReadValue(key, node, options.transfers);
   if (key == "model_budget_mib") return ReadValue(key, node, options.model_budget_mib);
   if (key == "executor") return ReadValue(key, node, options.executor);
   if (key == "slurm_dir") return ReadValue(key, node, options.slurm_directory);
@@ -191,6 +192,9 @@ void AddFlags(CLI::App& app, Options& options) {
       ->capture_default_str();
   app.add_option("--stall-time", options.stall_time_s,
                  "seconds without an event after which a decomposition is ended")
+      ->capture_default_str();
+  app.add_flag("--transfers,!--no-transfers", options.transfers,
+               "compute how the modes of each new model radiate, in a job that follows the model's")
       ->capture_default_str();
   app.add_option("--queue-limit", options.queue_limit, "decompositions that may wait at a time")
       ->capture_default_str();

@@ -25,6 +25,7 @@ struct Options {
   double job_time_s = 21600;
   double stall_time_s = 60;        ///< without an event of the worker
   int64_t queue_limit = 1024;      ///< jobs that wait at a time
+  bool transfers = true;           ///< compute the transfer of each model after it
   int64_t model_budget_mib = 0;    ///< of stored models; 0: without limit
   std::string executor = "local";  ///< or "slurm"
   std::string slurm_directory;     ///< shared with the nodes; empty: "slurm" in the data folder

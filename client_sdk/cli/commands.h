@@ -24,9 +24,20 @@ struct CreateModelOptions {
   double min_frequency_hz = 20;
   double max_frequency_hz = 20000;
   bool coarse_first = false;
+  bool without_transfer = false;
   int32_t priority = 0;
   double time_limit_s = 0;
   uint64_t memory_limit_mib = 0;
+  bool wait = false;
+};
+
+/// The options of `carillon transfer create`.
+struct CreateTransferOptions {
+  std::string model;
+  MaterialFigures material;
+  double size = 1;
+  double accuracy_db = 0;
+  double budget_s = 0;
   bool wait = false;
 };
 
@@ -63,6 +74,7 @@ struct StrikeOptions {
   double duration_s = 0;
   double size = 1;
   double gain = 1;
+  bool paper_coupling = false;
   std::optional<double> seconds;  ///< absent: until the longest mode is 60 dB down, 30 s at most
 };
 
@@ -86,6 +98,8 @@ struct RenderOptions {
 absl::Status ShowStatus(const client::Client& daemon, const std::string& server, bool json);
 absl::Status CreateModel(const client::Client& daemon, const CreateModelOptions& options,
                          bool json);
+absl::Status CreateTransfer(const client::Client& daemon, const CreateTransferOptions& options,
+                            bool json);
 /// Lists all models that match `filter`. If `filter` has a page size, lists that page only and
 /// prints the token of the next one.
 absl::Status ListModels(const client::Client& daemon, const v1::ListModalModelsRequest& filter,

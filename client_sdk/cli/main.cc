@@ -81,6 +81,29 @@ void AddJob(CLI::App& app, Program& program) {
   });
 }
 
+void AddTransfer(CLI::App& app, Program& program) {
+  auto options = std::make_shared<CreateTransferOptions>();
+  CLI::App& transfer = *app.add_subcommand("transfer", "Compute how the modes of models radiate")
+                            ->require_subcommand(1);
+  CLI::App& create = *transfer.add_subcommand(
+      "create", "Compute the radiation of a stored model for a material, and store it");
+  create
+      .add_option("model", options->model,
+                  "The name, the label, or the first digits of the digest of a model")
+      ->required();
+  create.add_option("--size", options->size, "The size relative to that of the model");
+  create.add_option("--accuracy", options->accuracy_db,
+                    "The error of each mode's power that is small enough, dB [2]");
+  create.add_option("--budget", options->budget_s, "The processor time to spend, s [20]");
+  create.add_flag("--wait", options->wait, "Wait until it is stored");
+  AddMaterial(create, options->material);
+  create.callback([&program, options] {
+    program.command = [&program, options] {
+      return CreateTransfer(*program.Daemon(), *options, program.json);
+    };
+  });
+}
+
 void AddStrike(CLI::App& app, Program& program) {
   auto options = std::make_shared<StrikeOptions>();
   CLI::App& strike = *app.add_subcommand("strike", "Strike a model once and let it ring");
@@ -101,6 +124,8 @@ void AddStrike(CLI::App& app, Program& program) {
   strike.add_option("--duration", options->duration_s, "The duration of the contact, s");
   strike.add_option("--size", options->size, "The size relative to that of the model");
   strike.add_option("--gain", options->gain, "The linear gain");
+  strike.add_flag("--paper-coupling", options->paper_coupling,
+                  "Sound by the paper's coupling though a transfer is stored");
   strike.add_option("--seconds", options->seconds,
                     "The time to ring, s [until the sound has decayed by 60 dB]");
   AddMaterial(strike, options->material);
@@ -170,6 +195,7 @@ int Main(int argc, char** argv) {
   AddStatus(app, program);
   AddDatabase(app, program);
   AddModel(app, program);
+  AddTransfer(app, program);
   AddJob(app, program);
   AddStrike(app, program);
   AddListen(app, program);

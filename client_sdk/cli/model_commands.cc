@@ -68,6 +68,7 @@ absl::StatusOr<v1::CreateModalModelRequest> MakeRequest(const CreateModelOptions
   request.set_mesh_format(Format(options));
   *request.mutable_settings() = options.settings;
   request.set_coarse_first(options.coarse_first);
+  request.set_without_transfer(options.without_transfer);
   *request.mutable_material() = *std::move(material);
   request.set_size(options.size);
   request.set_min_frequency_hz(options.min_frequency_hz);
@@ -82,6 +83,16 @@ absl::StatusOr<v1::CreateModalModelRequest> MakeRequest(const CreateModelOptions
 
 const char* ElementName(v1::Element element) {
   return element == v1::ELEMENT_LINEAR ? "linear" : "quadratic";
+}
+
+void PrintTransfer(const v1::TransferSummary& transfer) {
+  const v1::TransferHeader& header = transfer.header();
+  absl::PrintF(
+      "transfer   for %.0f m/s in the material: %d of %d modes, power to %.1f dB, %d bytes\n",
+      header.speed_ratio() * header.sound_speed_m_per_s(), header.computed_mode_count(),
+      header.wanted_mode_count(), header.verification().max_power_error_db(),
+      transfer.stored_bytes());
+  for (const std::string& warning : header.warnings()) absl::PrintF("warning    %s\n", warning);
 }
 
 void PrintSummary(const v1::ModalModelSummary& model) {
@@ -105,6 +116,7 @@ void PrintSummary(const v1::ModalModelSummary& model) {
     absl::PrintF("accuracy   %.2g %%, as estimated of the worst mode\n",
                  100 * *std::ranges::max_element(header.estimated_errors()));
   }
+  for (const v1::TransferSummary& transfer : model.transfers()) PrintTransfer(transfer);
   for (const std::string& warning : header.warnings()) absl::PrintF("warning    %s\n", warning);
 }
 
@@ -151,6 +163,29 @@ absl::Status CreateModel(const client::Client& daemon, const CreateModelOptions&
     PrintJson(*job);
   } else {
     absl::PrintF("%s\n", job->modal_model());
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CreateTransfer(const client::Client& daemon, const CreateTransferOptions& options,
+                            bool json) {
+  const auto model = FindModel(daemon, options.model);
+  if (!model.ok()) return model.status();
+  const auto material = ToMaterial(options.material);
+  if (!material.ok()) return material.status();
+  v1::CreateTransferRequest request;
+  request.set_modal_model(*model);
+  *request.mutable_material() = *material;
+  request.set_size(options.size);
+  request.mutable_settings()->set_accuracy_db(options.accuracy_db);
+  request.mutable_settings()->set_budget_s(options.budget_s);
+  auto job = daemon.CreateTransfer(request);
+  if (job.ok() && options.wait) job = WatchWithProgress(daemon, job->name());
+  if (!job.ok()) return job.status();
+  if (json) {
+    PrintJson(*job);
+  } else {
+    absl::PrintF("%s\n", job->name());
   }
   return absl::OkStatus();
 }

@@ -49,6 +49,8 @@ void AddModelCreate(CLI::App& app, Program& program) {
   create.add_option("--band", *band, "frequencies wanted, Hz")
       ->check(Band(*options))
       ->capture_default_str();
+  create.add_flag("--without-transfer", options->without_transfer,
+                  "Do not compute how the modes radiate afterwards");
   create.add_flag("--coarse-first", options->coarse_first,
                   "first a model of few nodes, under the same name, to sound with meanwhile");
   create.add_option("--priority", options->priority, "-100 to 100: higher ones start first");

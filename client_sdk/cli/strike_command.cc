@@ -48,6 +48,7 @@ absl::StatusOr<v1::SoundingObject> AddObject(const client::Client& daemon, const
   *request.mutable_material() = *material;
   request.set_size(options.size);
   request.set_gain(options.gain);
+  if (options.paper_coupling) request.set_radiation(v1::RADIATION_MODEL_PAPER_COUPLING);
   return daemon.AddObject(request);
 }
 
@@ -82,8 +83,10 @@ absl::Status StrikeIn(const client::Client& daemon, const std::string& scene,
   if (json) {
     PrintJson(*object);
   } else {
-    absl::PrintF("%d modes sound, %.2f to %.2f Hz\n", object->sounding_mode_count(),
-                 object->lowest_frequency_hz(), object->highest_frequency_hz());
+    const bool paper = object->radiation() == v1::RADIATION_MODEL_PAPER_COUPLING;
+    absl::PrintF("%d modes sound, %.2f to %.2f Hz, by %s\n", object->sounding_mode_count(),
+                 object->lowest_frequency_hz(), object->highest_frequency_hz(),
+                 paper ? "the paper's coupling" : "their radiated power");
   }
   std::fflush(stdout);
   (void)stop.ArrivesWithin(options.seconds.value_or(SoundingSeconds(*object)));

@@ -62,7 +62,8 @@ v1::ModalModelRecord ChunkRecord(uint32_t array, size_t offset, std::string_view
 
 absl::Status ModelAssembler::Append(const v1::ModalModelRecord& record) {
   if (record.has_chunk()) return AppendChunk(record.chunk());
-  model_.header = record.header();
+  // Transfers may follow the model; other formats have no place for them.
+  if (record.has_header()) model_.header = record.header();
   return absl::OkStatus();
 }
 

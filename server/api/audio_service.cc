@@ -14,7 +14,7 @@ grpc::ServerWriteReactor<v1::ListenResponse>* AudioService::Listen(grpc::Callbac
 
 grpc::ServerBidiReactor<v1::RenderRequest, v1::RenderResponse>* AudioService::Render(
     grpc::CallbackServerContext*) {
-  return MakeRenderCall({.models = database_.models(),
+  return MakeRenderCall({.database = database_,
                          .bodies = render_bodies_,
                          .pool = render_pool_,
                          .call_count = rendering_count_});

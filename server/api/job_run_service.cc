@@ -32,6 +32,7 @@ class ResultSink {
     RETURN_IF_ERROR(Begin(request.job()));
     if (end_) return Drop(Incomplete("something follows the end of the run"));
     if (request.has_record()) return Drop(upload_->Append(request.record()));
+    if (request.has_transfer()) return Drop(upload_->Append(request.transfer()));
     if (request.has_end()) end_ = request.end();
     return absl::OkStatus();
   }

@@ -44,6 +44,16 @@ grpc::ServerUnaryReactor* ModalModelService::CreateModalModel(
   });
 }
 
+grpc::ServerUnaryReactor* ModalModelService::CreateTransfer(
+    grpc::CallbackServerContext* context, const v1::CreateTransferRequest* request,
+    v1::CreateTransferResponse* response) {
+  return Answer(context, pool_, [this, request, response] {
+    ASSIGN_OR_RETURN(const std::string digest, ParseModelName(request->modal_model()));
+    ASSIGN_OR_RETURN(*response->mutable_job(), queue_.SubmitTransfer(digest, *request));
+    return absl::OkStatus();
+  });
+}
+
 grpc::ServerUnaryReactor* ModalModelService::GetModalModel(grpc::CallbackServerContext* context,
                                                            const v1::GetModalModelRequest* request,
                                                            v1::GetModalModelResponse* response) {
@@ -73,12 +83,12 @@ grpc::ServerUnaryReactor* ModalModelService::DeleteModalModel(
 
 grpc::ServerReadReactor<v1::ImportModalModelRequest>* ModalModelService::ImportModalModel(
     grpc::CallbackServerContext* context, v1::ImportModalModelResponse* response) {
-  return MakeImport(*context, *response, database_.models(), pool_);
+  return MakeImport(*context, *response, database_, pool_);
 }
 
 grpc::ServerWriteReactor<v1::ExportModalModelResponse>* ModalModelService::ExportModalModel(
     grpc::CallbackServerContext*, const v1::ExportModalModelRequest* request) {
-  return MakeExport(*request, database_.models(), pool_);
+  return MakeExport(*request, database_, pool_);
 }
 
 grpc::ServerUnaryReactor* ModalModelService::ListMaterials(grpc::CallbackServerContext* context,
@@ -98,6 +108,13 @@ absl::Status ModalModelService::Get(const v1::GetModalModelRequest& request,
   *response.mutable_modal_model() = ToProto(summary);
   response.mutable_modal_model()->mutable_eigenvalues()->Add(eigenvalues.begin(),
                                                              eigenvalues.end());
+  ASSIGN_OR_RETURN(const auto transfers, database_.transfers().List(digest));
+  for (const TransferSummary& transfer : transfers) {
+    v1::TransferSummary& proto = *response.mutable_modal_model()->add_transfers();
+    *proto.mutable_header() = transfer.header;
+    proto.set_stored_bytes(transfer.stored_bytes);
+    proto.set_created_unix_ms(transfer.created_unix_ms);
+  }
   return absl::OkStatus();
 }
 

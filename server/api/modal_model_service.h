@@ -19,6 +19,9 @@ class ModalModelService final : public v1::ModalModelService::CallbackService {
   grpc::ServerUnaryReactor* CreateModalModel(grpc::CallbackServerContext* context,
                                              const v1::CreateModalModelRequest* request,
                                              v1::CreateModalModelResponse* response) override;
+  grpc::ServerUnaryReactor* CreateTransfer(grpc::CallbackServerContext* context,
+                                           const v1::CreateTransferRequest* request,
+                                           v1::CreateTransferResponse* response) override;
   grpc::ServerUnaryReactor* GetModalModel(grpc::CallbackServerContext* context,
                                           const v1::GetModalModelRequest* request,
                                           v1::GetModalModelResponse* response) override;

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/api/model_transfer.h"
 
+#include <deque>
 #include <memory>
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/strip.h"
 #include "proto/cpp/error_reason.h"
@@ -46,10 +48,13 @@ class MeshSink {
 
 class ModelSink {
  public:
-  explicit ModelSink(ModelStore& models) : models_(&models) {}
+  explicit ModelSink(ModeDatabase& database) : database_(&database) {}
 
   absl::Status Append(const v1::ImportModalModelRequest& request) {
     RETURN_IF_ERROR(Begin(request));
+    if (request.record().record_case() == v1::ModalModelRecord::kTransfer) {
+      return AppendTransfer(request.record().transfer());
+    }
     return import_->Append(request.record());
   }
 
@@ -58,7 +63,15 @@ class ModelSink {
       return Refusal(absl::StatusCode::kInvalidArgument, "MODAL_MODEL_MALFORMED",
                      "no record was sent; send the header, then every chunk");
     }
+    std::vector<StoredTransfer> checked;
+    for (std::string& bytes : transfers_) {
+      ASSIGN_OR_RETURN(StoredTransfer transfer, StoredTransfer::Parse(std::move(bytes)));
+      checked.push_back(std::move(transfer));
+    }
     ASSIGN_OR_RETURN(const ModelSummary summary, import_->Finish());
+    for (const StoredTransfer& transfer : checked) {
+      RETURN_IF_ERROR(database_->transfers().Put(summary.digest, transfer).status());
+    }
     *response.mutable_modal_model() = ToProto(summary);
     return absl::OkStatus();
   }
@@ -68,37 +81,73 @@ class ModelSink {
     if (import_) return absl::OkStatus();
     absl::string_view digest = first.name();
     absl::ConsumePrefix(&digest, "modalModels/");
-    ASSIGN_OR_RETURN(import_, models_->Import(std::string(digest), first.label()));
+    ASSIGN_OR_RETURN(import_, database_->models().Import(std::string(digest), first.label()));
     return absl::OkStatus();
   }
 
-  ModelStore* models_;
+  /// A header begins the next transfer.
+  absl::Status AppendTransfer(const std::string& serialized) {
+    v1::TransferRecord record;
+    const bool parsed = record.ParseFromString(serialized);
+    if (parsed && record.has_header()) transfers_.emplace_back();
+    transfer_bytes_ += serialized.size();
+    if (!parsed || transfers_.empty() || transfer_bytes_ > kMostTransferBytes) {
+      return Refusal(
+          absl::StatusCode::kInvalidArgument, "TRANSFER_MALFORMED",
+          "a record of a transfer cannot be read, comes before its header, or is one too "
+          "many: export the model again");
+    }
+    transfers_.back() += Delimited(record);
+    return absl::OkStatus();
+  }
+
+  static constexpr size_t kMostTransferBytes = size_t{1} << 30U;
+
+  ModeDatabase* database_;
   std::optional<ModelImport> import_;
+  std::vector<std::string> transfers_;  // in the stored form
+  size_t transfer_bytes_ = 0;
 };
 
-/// Sends a model record by record.
+/// Sends a model, then its transfers, record by record.
 class ExportCall final : public ServerStream<v1::ExportModalModelResponse> {
  public:
-  ExportCall(std::string name, ModelStore& models, ThreadPool& pool)
-      : StreamWriter(&pool), name_(std::move(name)), models_(models) {
+  ExportCall(const v1::ExportModalModelRequest& request, ModeDatabase& database, ThreadPool& pool)
+      : StreamWriter(&pool), request_(request), database_(database) {
     StartWriting();
   }
 
  private:
   absl::StatusOr<Supply> Fill(v1::ExportModalModelResponse& response) override {
-    if (!export_) {
-      ASSIGN_OR_RETURN(const std::string digest, ParseModelName(name_));
-      ASSIGN_OR_RETURN(export_, models_.Export(digest));
-    }
+    if (!export_) RETURN_IF_ERROR(Begin());
     ASSIGN_OR_RETURN(std::optional<v1::ModalModelRecord> record, export_->Next());
-    if (!record) return Supply::kEnd;
-    *response.mutable_record() = *std::move(record);
+    if (record) {
+      *response.mutable_record() = *std::move(record);
+      return Supply::kMessage;
+    }
+    if (transfers_.empty()) return Supply::kEnd;
+    response.mutable_record()->set_transfer(transfers_.front().SerializeAsString());
+    transfers_.pop_front();
     return Supply::kMessage;
   }
 
-  const std::string name_;
-  ModelStore& models_;
+  absl::Status Begin() {
+    ASSIGN_OR_RETURN(const std::string digest, ParseModelName(request_.name()));
+    ASSIGN_OR_RETURN(export_, database_.models().Export(digest));
+    if (!request_.transfers()) return absl::OkStatus();
+    ASSIGN_OR_RETURN(const auto transfers, database_.transfers().Read(digest));
+    for (const StoredTransfer& transfer : transfers) {
+      for (v1::TransferRecord& record : transfer.Records()) {
+        transfers_.push_back(std::move(record));
+      }
+    }
+    return absl::OkStatus();
+  }
+
+  const v1::ExportModalModelRequest request_;
+  ModeDatabase& database_;
   std::optional<ModelExport> export_;
+  std::deque<v1::TransferRecord> transfers_;
 };
 
 }  // namespace
@@ -112,14 +161,14 @@ grpc::ServerReadReactor<v1::UploadMeshRequest>* MakeUpload(grpc::CallbackServerC
 
 grpc::ServerReadReactor<v1::ImportModalModelRequest>* MakeImport(
     grpc::CallbackServerContext& context, v1::ImportModalModelResponse& response,
-    ModelStore& models, ThreadPool& pool) {
+    ModeDatabase& database, ThreadPool& pool) {
   return new ReadCall<v1::ImportModalModelRequest, v1::ImportModalModelResponse, ModelSink>(
-      context, response, ModelSink(models), pool);
+      context, response, ModelSink(database), pool);
 }
 
 grpc::ServerWriteReactor<v1::ExportModalModelResponse>* MakeExport(
-    const v1::ExportModalModelRequest& request, ModelStore& models, ThreadPool& pool) {
-  return new ExportCall(request.name(), models, pool);
+    const v1::ExportModalModelRequest& request, ModeDatabase& database, ThreadPool& pool) {
+  return new ExportCall(request, database, pool);
 }
 
 v1::ModalModelSummary ToProto(const ModelSummary& summary) {

@@ -19,10 +19,10 @@ grpc::ServerReadReactor<v1::UploadMeshRequest>* MakeUpload(grpc::CallbackServerC
 
 grpc::ServerReadReactor<v1::ImportModalModelRequest>* MakeImport(
     grpc::CallbackServerContext& context, v1::ImportModalModelResponse& response,
-    ModelStore& models, ThreadPool& pool);
+    ModeDatabase& database, ThreadPool& pool);
 
 grpc::ServerWriteReactor<v1::ExportModalModelResponse>* MakeExport(
-    const v1::ExportModalModelRequest& request, ModelStore& models, ThreadPool& pool);
+    const v1::ExportModalModelRequest& request, ModeDatabase& database, ThreadPool& pool);
 
 v1::ModalModelSummary ToProto(const ModelSummary& summary);
 

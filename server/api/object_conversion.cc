@@ -44,6 +44,17 @@ absl::StatusOr<ObjectProperties> ToObjectProperties(const v1::Material& material
                           .gain = gain.value_or(1)};
 }
 
+RadiationModel FromProto(v1::RadiationModel radiation) {
+  switch (radiation) {
+    case v1::RADIATION_MODEL_PAPER_COUPLING:
+      return RadiationModel::kPaperCoupling;
+    case v1::RADIATION_MODEL_RADIATED_POWER:
+      return RadiationModel::kRadiatedPower;
+    default:
+      return RadiationModel::kDefault;
+  }
+}
+
 absl::StatusOr<ObjectChange> ToObjectChange(const v1::UpdateObjectRequest& request) {
   ObjectChange change;
   if (request.has_material()) {
@@ -54,6 +65,9 @@ absl::StatusOr<ObjectChange> ToObjectChange(const v1::UpdateObjectRequest& reque
   if (request.has_size()) change.size = request.size();
   if (request.has_gain()) change.gain = request.gain();
   if (request.has_pose()) change.pose = FromProto(request.pose());
+  if (request.radiation() != v1::RADIATION_MODEL_UNSPECIFIED) {
+    change.radiation = FromProto(request.radiation());
+  }
   change.glide_s = request.glide_s();
   return change;
 }
@@ -71,6 +85,8 @@ v1::SoundingObject ToProto(uint64_t scene, const PlacedObject& placed) {
   proto.set_lowest_frequency_hz(object.lowest_frequency_hz);
   proto.set_highest_frequency_hz(object.highest_frequency_hz);
   if (object.complete_to_hz) proto.set_complete_to_hz(*object.complete_to_hz);
+  proto.set_radiation(object.transfer == nullptr ? v1::RADIATION_MODEL_PAPER_COUPLING
+                                                 : v1::RADIATION_MODEL_RADIATED_POWER);
   if (object.properties.pose) *proto.mutable_pose() = ToProto(*object.properties.pose);
   return proto;
 }

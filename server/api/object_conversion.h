@@ -6,6 +6,7 @@
 
 #include "absl/status/statusor.h"
 #include "carillon/v1/material.pb.h"
+#include "carillon/v1/radiation.pb.h"
 #include "carillon/v1/scene_service.pb.h"
 #include "server/scene/scene_registry.h"
 
@@ -15,6 +16,8 @@ namespace carillon {
 /// (absent: 1). Errors: those of ResolveMaterial.
 absl::StatusOr<ObjectProperties> ToObjectProperties(const v1::Material& material, double size,
                                                     std::optional<double> gain);
+
+RadiationModel FromProto(v1::RadiationModel radiation);
 
 /// Errors: those of ResolveMaterial.
 absl::StatusOr<ObjectChange> ToObjectChange(const v1::UpdateObjectRequest& request);

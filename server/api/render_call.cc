@@ -26,7 +26,7 @@ class RenderCall final : public BidiStream<v1::RenderRequest, v1::RenderResponse
   explicit RenderCall(const RenderContext& daemon)
       : StreamWriter(&daemon.pool),
         call_count_(daemon.call_count),
-        reader_(daemon.models, daemon.bodies) {
+        reader_(daemon.database, daemon.bodies) {
     if (++call_count_ <= kMaxCallCount) {
       StartReading();
       return;

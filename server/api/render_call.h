@@ -7,14 +7,14 @@
 
 #include "carillon/v1/audio_service.pb.h"
 #include "server/api/thread_pool.h"
-#include "server/mode_database/model_store.h"
+#include "server/mode_database/mode_database.h"
 #include "server/scene/sounding_body.h"
 
 namespace carillon {
 
 /// The parts of the daemon that offline rendering uses.
 struct RenderContext {
-  ModelStore& models;
+  ModeDatabase& database;
   BodyCache& bodies;
   ThreadPool& pool;
   /// Number of Render calls that run now.

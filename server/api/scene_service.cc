@@ -73,6 +73,7 @@ absl::Status SceneService::Add(const v1::AddObjectRequest& request,
       ToObjectProperties(request.material(), request.size(),
                          request.has_gain() ? std::optional(request.gain()) : std::nullopt));
   if (request.has_pose()) properties.pose = FromProto(request.pose());
+  properties.radiation = FromProto(request.radiation());
   ASSIGN_OR_RETURN(std::shared_ptr<const ModalModel> model, database_.models().FindToSound(digest));
   ASSIGN_OR_RETURN(const PlacedObject placed,
                    scenes_.AddObject(scene, request.handle(), std::move(model), properties));

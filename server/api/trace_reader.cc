@@ -72,7 +72,7 @@ absl::Status TraceReader::TakeHeader(const v1::ContactTraceHeader& header) {
   if (header.has_clock()) {
     RETURN_IF_ERROR(TakeClock(header.clock()));
   }
-  ASSIGN_OR_RETURN(renderer_, OfflineRenderer::Make(*settings_, bodies_));
+  ASSIGN_OR_RETURN(renderer_, OfflineRenderer::Make(*settings_, bodies_, &database_.transfers()));
   return absl::OkStatus();
 }
 
@@ -102,7 +102,8 @@ absl::Status TraceReader::TakeObject(const v1::ContactTraceObject& object) {
       ToObjectProperties(object.material(), object.size(),
                          object.has_gain() ? std::optional(object.gain()) : std::nullopt));
   if (object.has_pose()) properties.pose = FromProto(object.pose());
-  ASSIGN_OR_RETURN(std::shared_ptr<const ModalModel> model, models_.FindToSound(digest));
+  properties.radiation = FromProto(object.radiation());
+  ASSIGN_OR_RETURN(std::shared_ptr<const ModalModel> model, database_.models().FindToSound(digest));
   ++object_count_;
   return renderer_->AddObject(object.handle(), std::move(model), properties);
 }

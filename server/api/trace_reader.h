@@ -7,7 +7,7 @@
 
 #include "absl/status/statusor.h"
 #include "carillon/v1/audio_service.pb.h"
-#include "server/mode_database/model_store.h"
+#include "server/mode_database/mode_database.h"
 #include "server/scene/offline_renderer.h"
 
 namespace carillon {
@@ -17,7 +17,7 @@ class TraceReader {
  public:
   static constexpr uint64_t kMaxImpulseCount = 4'000'000;
 
-  TraceReader(ModelStore& models, BodyCache& bodies) : models_(models), bodies_(bodies) {}
+  TraceReader(ModeDatabase& database, BodyCache& bodies) : database_(database), bodies_(bodies) {}
 
   /// Errors: InvalidArgument (TRACE_MALFORMED, and those of the objects' materials),
   /// ResourceExhausted (TRACE_TOO_LARGE), NotFound (MODAL_MODEL_NOT_FOUND), and those of
@@ -39,7 +39,7 @@ class TraceReader {
   absl::Status TakeObject(const v1::ContactTraceObject& object);
   absl::Status TakeStep(const v1::ContactStep& step);
 
-  ModelStore& models_;
+  ModeDatabase& database_;
   BodyCache& bodies_;
   std::optional<OfflineSettings> settings_;
   std::unique_ptr<OfflineRenderer> renderer_;  // once there is a header

@@ -34,6 +34,15 @@ std::vector<ActiveJob> ActiveJobs::Running() {
   return running;
 }
 
+std::vector<std::string> ActiveJobs::TransfersOf(const std::string& model) {
+  MutexLock lock(&mutex_);
+  std::vector<std::string> digests;
+  for (const auto& [digest, job] : jobs_) {
+    if (job.record.transfer_of == model) digests.push_back(digest);
+  }
+  return digests;
+}
+
 std::vector<std::string> ActiveJobs::WaitingFor(const std::string& coarse) {
   MutexLock lock(&mutex_);
   std::vector<std::string> digests;
@@ -60,7 +69,8 @@ std::map<std::string, v1::Job> ActiveJobs::ViewAll() {
 void ActiveJobs::Add(ActiveJob job) {
   MutexLock lock(&mutex_);
   job.estimate_bytes =
-      job.record.peak_bytes > 0 ? job.record.peak_bytes : experience_.Corrected(job.guess_bytes);
+      job.record.transfer_of.empty() ? experience_.Corrected(job.guess_bytes) : job.guess_bytes;
+  if (job.record.peak_bytes > 0) job.estimate_bytes = job.record.peak_bytes;
   const std::string digest = job.record.digest;
   Enqueue(jobs_.emplace(digest, std::move(job)).first->second);
 }

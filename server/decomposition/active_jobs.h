@@ -56,6 +56,8 @@ class ActiveJobs {
   bool Contains(const std::string& digest);
   size_t queued_count();
   std::vector<ActiveJob> Running();
+  /// Digests of the jobs that compute transfers of the model.
+  std::vector<std::string> TransfersOf(const std::string& model);
   /// Digests of the jobs that wait for the coarse model's job `coarse`.
   std::vector<std::string> WaitingFor(const std::string& coarse);
 
@@ -65,7 +67,7 @@ class ActiveJobs {
   std::map<std::string, v1::Job> ViewAll();
 
   /// Appends a job to the queue, behind those of its priority. Its memory is predicted from
-  /// `guess_bytes`, or known from an earlier run.
+  /// `guess_bytes`, which experience corrects for decompositions, or known from an earlier run.
   void Add(ActiveJob job);
 
   /// Applies `change` to a job. A waiting job moves to the place in the queue that it then has.

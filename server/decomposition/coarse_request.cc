@@ -33,6 +33,7 @@ std::optional<v1::CreateModalModelRequest> CoarseRequest(
   if (asked > 0 && asked <= kCoarseCornerCount) return std::nullopt;
   v1::CreateModalModelRequest coarse = resolved;
   coarse.set_coarse_first(false);
+  coarse.set_without_transfer(true);
   coarse.set_label(CoarseLabel(resolved.label()));
   v1::MeshSettings& mesh = *coarse.mutable_settings()->mutable_mesh();
   mesh.clear_accuracy();

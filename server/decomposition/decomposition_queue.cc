@@ -46,6 +46,11 @@ absl::StatusOr<v1::Job> DecompositionQueue::Submit(const v1::CreateModalModelReq
   return core_->Submit(request);
 }
 
+absl::StatusOr<v1::Job> DecompositionQueue::SubmitTransfer(
+    const std::string& model, const v1::CreateTransferRequest& request) {
+  return core_->SubmitTransfer(model, request);
+}
+
 absl::StatusOr<v1::Job> DecompositionQueue::Get(const std::string& digest) {
   return core_->Get(digest);
 }

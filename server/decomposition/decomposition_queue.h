@@ -28,6 +28,8 @@ class JobWatch {
 
 struct QueueSettings {
   size_t max_queued_count = 1024;
+  /// Whether a transfer is computed of each model after it, unless the request leaves it out.
+  bool transfers = false;
   /// Takes log lines about events that no caller is told of. Called on any thread.
   std::function<void(const std::string& line)> log = [](const std::string&) {};
 };
@@ -37,9 +39,9 @@ struct DecompositionJobPage {
   std::string next_page_token;  ///< empty: this was the last page
 };
 
-/// Decomposition jobs. Each body is computed once, however many requests ask for it, and an
-/// accepted job is computed even if the daemon dies in between. Get, List and Watch do not wait
-/// while the database writes. Safe from every thread.
+/// Jobs that compute modal models and their transfers. Each is computed once, however many requests
+/// ask for it, and an accepted job is computed even if the daemon dies in between. Get, List and
+/// Watch do not wait while the database writes. Safe from every thread.
 class DecompositionQueue {
  public:
   /// Queues the unfinished jobs of an earlier run of the daemon. `database` and `clock` must
@@ -59,6 +61,13 @@ class DecompositionQueue {
   /// Errors: those of ResolveRequest, NotFound (MESH_NOT_FOUND), ResourceExhausted (QUEUE_FULL).
   absl::StatusOr<v1::Job> Submit(const v1::CreateModalModelRequest& request);
 
+  /// Requests a transfer of the stored model `model`. The job has succeeded at once if a transfer
+  /// is stored that serves the request. The rest is as for Submit. Errors: InvalidArgument
+  /// (INVALID_SETTINGS, UNKNOWN_MATERIAL, INVALID_MATERIAL), NotFound (MODAL_MODEL_NOT_FOUND),
+  /// ResourceExhausted (QUEUE_FULL).
+  absl::StatusOr<v1::Job> SubmitTransfer(const std::string& model,
+                                         const v1::CreateTransferRequest& request);
+
   /// Errors: NotFound (JOB_NOT_FOUND).
   absl::StatusOr<v1::Job> Get(const std::string& digest);
 
@@ -76,7 +85,8 @@ class DecompositionQueue {
   absl::StatusOr<std::unique_ptr<JobWatch>> Watch(const std::string& digest,
                                                   std::function<void(const v1::Job&)> on_change);
 
-  /// Deletes the model of that digest and its job, which is cancelled if it has not ended.
+  /// Deletes the model of that digest, its transfers and their jobs, which are cancelled if they
+  /// have not ended.
   /// Errors: NotFound (MODAL_MODEL_NOT_FOUND).
   absl::Status DeleteModel(const std::string& digest);
 

@@ -19,6 +19,8 @@ namespace {
 
 constexpr std::array kFormats = {"obj", "ply", "stl", "off", "msh", "mesh", "node"};
 constexpr int kMostPriority = 100;
+constexpr double kLeastTransferDb = 0.06;
+constexpr double kMostTransferDb = 20;
 
 absl::Status Invalid(absl::string_view what) {
   return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS", what);
@@ -56,6 +58,16 @@ absl::Status CheckHints(const v1::CreateModalModelRequest& request) {
     return Invalid(
         absl::StrCat("time_limit_s is ", request.time_limit_s(), "; it must be zero or more"));
   }
+  const v1::TransferSettings& transfer = request.transfer();
+  const bool accurate =
+      transfer.accuracy_db() == 0 ||
+      (transfer.accuracy_db() >= kLeastTransferDb && transfer.accuracy_db() <= kMostTransferDb);
+  if (!accurate || !(std::isfinite(transfer.budget_s()) && transfer.budget_s() >= 0)) {
+    return Invalid(absl::StrCat("the transfer's accuracy_db is ", transfer.accuracy_db(),
+                                " and its budget_s ", transfer.budget_s(), "; they must be ",
+                                kLeastTransferDb, " to ", kMostTransferDb,
+                                " dB and zero seconds or more"));
+  }
   if (request.label().size() > kMaxLabelBytes) {
     return Invalid(absl::StrCat("label has ", request.label().size(), " bytes; at most ",
                                 kMaxLabelBytes, " are kept"));
@@ -76,16 +88,19 @@ void FillIn(v1::DecompositionSettings& settings, const v1::Material& material) {
 absl::StatusOr<v1::CreateModalModelRequest> ResolveRequest(
     const v1::CreateModalModelRequest& request) {
   RETURN_IF_ERROR(CheckMesh(request));
-  ASSIGN_OR_RETURN(const v1::Material material, ResolveMaterial(request.material()));
   v1::CreateModalModelRequest resolved = request;
-  *resolved.mutable_material() = material;
-  FillIn(*resolved.mutable_settings(), material);
-  if (resolved.size() == 0) resolved.set_size(1);
-  if (resolved.max_frequency_hz() == 0) resolved.set_max_frequency_hz(20'000);
-  if (resolved.min_frequency_hz() == 0) resolved.set_min_frequency_hz(20);
+  RETURN_IF_ERROR(ResolveUse(resolved));
+  FillIn(*resolved.mutable_settings(), resolved.material());
   RETURN_IF_ERROR(CheckSettings(resolved.settings()));
-  RETURN_IF_ERROR(CheckHints(resolved));
   return resolved;
+}
+
+absl::Status ResolveUse(v1::CreateModalModelRequest& request) {
+  ASSIGN_OR_RETURN(*request.mutable_material(), ResolveMaterial(request.material()));
+  if (request.size() == 0) request.set_size(1);
+  if (request.max_frequency_hz() == 0) request.set_max_frequency_hz(20'000);
+  if (request.min_frequency_hz() == 0) request.set_min_frequency_hz(20);
+  return CheckHints(request);
 }
 
 std::string CanonicalText(const v1::CreateModalModelRequest& resolved) {

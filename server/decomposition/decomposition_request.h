@@ -16,6 +16,11 @@ namespace carillon {
 absl::StatusOr<v1::CreateModalModelRequest> ResolveRequest(
     const v1::CreateModalModelRequest& request);
 
+/// Fills in and checks everything in a request but its mesh and its settings: material, size, band,
+/// priority, limits, label and the settings of the transfer. Errors: InvalidArgument
+/// (INVALID_SETTINGS, UNKNOWN_MATERIAL, INVALID_MATERIAL).
+absl::Status ResolveUse(v1::CreateModalModelRequest& request);
+
 /// The text that names the modal model of a resolved request: one "key value" a line, in this
 /// order. Two requests have the same model exactly if they have the same text; the hints (material,
 /// size, frequencies) and the label are not part of it.

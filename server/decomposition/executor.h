@@ -13,7 +13,7 @@
 
 namespace carillon {
 
-/// How a decomposition ended.
+/// How a task ended.
 enum class Verdict {
   kOk,
   kBadInput,  ///< the worker refused the request and would refuse it again
@@ -34,20 +34,22 @@ struct Outcome {
   bool crowded = false;
 };
 
-/// One decomposition to run. The functions are called on threads of the executor, one call for a
-/// task at a time. A limit of the request applies if it is below the executor's own.
+/// One decomposition to run, or one transfer to compute. The functions are called on threads of the
+/// executor, one call for a task at a time. A limit of the request applies if it is below the
+/// executor's own.
 struct DecompositionTask {
-  std::string digest;  ///< names the task; at most one task of a digest runs at a time
+  std::string digest;     ///< names the task; at most one task of a digest runs at a time
+  bool radiates = false;  ///< computes the transfer of a stored model, not a model
   v1::CreateModalModelRequest request;  ///< resolved
   uint32_t way = 0;                     ///< as JobRecord::way
   uint64_t estimate_bytes = 0;          ///< predicted memory
-  /// Writes the mesh to the file that the worker reads.
-  std::function<absl::Status(const std::filesystem::path& file)> write_mesh;
+  /// Writes the mesh, or the stored model, to the file that the worker reads.
+  std::function<absl::Status(const std::filesystem::path& file)> write_input;
   std::function<void(const v1::Progress&)> on_progress;
   std::function<void(const Outcome&)> on_end;  ///< once, last
 };
 
-/// Runs decompositions, in processes of this machine or on a cluster. The destructor ends running
+/// Runs tasks, in processes of this machine or on a cluster. The destructor ends running
 /// tasks without a call of on_end. Safe from every thread.
 class Executor {
  public:

@@ -21,7 +21,9 @@ bool IsOneOf(const std::string& reason, const std::array<const char*, N>& reason
 v1::Job ToJob(const JobRecord& record) {
   v1::Job job;
   job.set_name(absl::StrCat("jobs/", record.digest));
-  job.set_modal_model(absl::StrCat("modalModels/", record.digest));
+  const bool radiates = !record.transfer_of.empty();
+  job.set_modal_model(absl::StrCat("modalModels/", radiates ? record.transfer_of : record.digest));
+  job.set_kind(radiates ? v1::JOB_KIND_TRANSFER : v1::JOB_KIND_DECOMPOSITION);
   job.set_state(record.state);
   if (record.state == v1::JOB_STATE_FAILED) *job.mutable_error() = record.error;
   job.set_label(record.label);
@@ -29,6 +31,16 @@ v1::Job ToJob(const JobRecord& record) {
   job.set_way(record.way);
   job.set_memory_bytes(record.peak_bytes);
   return job;
+}
+
+JobRecord NewRecord(const WantedJob& wanted, int64_t now_unix_ms) {
+  return {.digest = wanted.digest,
+          .transfer_of = wanted.transfer_of,
+          .request = wanted.request.SerializeAsString(),
+          .label = wanted.request.label(),
+          .state = v1::JOB_STATE_QUEUED,
+          .created_unix_ms = now_unix_ms,
+          .priority = wanted.request.priority()};
 }
 
 absl::StatusOr<v1::CreateModalModelRequest> ParseRequest(const JobRecord& record) {

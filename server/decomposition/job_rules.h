@@ -1,19 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 #include "absl/status/statusor.h"
 #include "carillon/v1/decomposition.pb.h"
 #include "carillon/v1/modal_model_service.pb.h"
 #include "server/decomposition/executor.h"
+#include "server/decomposition/wanted_job.h"
 #include "server/mode_database/job_store.h"
 
 namespace carillon {
 
-/// Rules, without state, for the consequences of a decomposition's end.
+/// Rules, without state, for the consequences of a job's end.
 
 v1::Job ToJob(const JobRecord& record);
+
+/// The record of a job that waits to run for the first time.
+JobRecord NewRecord(const WantedJob& wanted, int64_t now_unix_ms);
 
 /// The request of a job. Errors: DataLoss (DATABASE_CORRUPT).
 absl::StatusOr<v1::CreateModalModelRequest> ParseRequest(const JobRecord& record);

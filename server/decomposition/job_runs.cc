@@ -10,7 +10,9 @@
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 #include "server/decomposition/job_rules.h"
+#include "server/decomposition/memory_estimate.h"
 #include "server/decomposition/stored_model.h"
+#include "server/decomposition/wanted_job.h"
 #include "server/decomposition/worker_command.h"
 
 namespace carillon {
@@ -18,15 +20,32 @@ namespace {
 
 constexpr char kCorrectionFact[] = "memory_correction";
 constexpr double kWeightOfNewestRun = 0.1;
+// Processor time that a transfer may take: as long as its model took, within these bounds.
+constexpr double kLeastTransferBudgetS = 20;
+constexpr double kMostTransferBudgetS = 600;
+// A transfer holds the model's shapes as double numbers, and the fields on surfaces of some ten
+// thousand vertices.
+constexpr uint64_t kTransferBytes = uint64_t{256} << 20U;
+constexpr uint64_t kTransferTimesModel = 4;
+
+uint64_t GuessBytes(ModeDatabase& database, const JobRecord& record,
+                    const v1::CreateModalModelRequest& request) {
+  if (!record.transfer_of.empty()) {
+    const auto model = database.models().Summary(record.transfer_of);
+    return kTransferBytes + (model.ok() ? kTransferTimesModel * model->stored_bytes : 0);
+  }
+  const auto mesh = database.meshes().Find(request.mesh_digest());
+  return MemoryOfNodes(GuessNodeCount(request, mesh.ok() ? mesh->byte_count : 0));
+}
 
 }  // namespace
 
 JobRuns::JobRuns(ModeDatabase& database, std::unique_ptr<Executor> executor, const Clock& clock,
-                 ActiveJobs& jobs, std::function<void(const std::string& line)> log)
+                 ActiveJobs& jobs, QueueSettings settings)
     : database_(database),
       clock_(clock),
       jobs_(jobs),
-      log_(std::move(log)),
+      settings_(std::move(settings)),
       executor_(std::move(executor)),
       capacity_{executor_->worker_count(), executor_->memory_budget_bytes()} {}
 
@@ -50,6 +69,41 @@ void JobRuns::Stop() {
     }
   }
   executor_.reset();
+}
+
+void JobRuns::Enqueue(JobRecord record, v1::CreateModalModelRequest request,
+                      std::string waits_for) {
+  record.state = v1::JOB_STATE_QUEUED;
+  const bool coarse_ready = HasCoarseModel(database_.models(), record.digest, request);
+  const uint64_t guess_bytes = GuessBytes(database_, record, request);
+  jobs_.Add({.record = std::move(record),
+             .request = std::move(request),
+             .waits_for = std::move(waits_for),
+             .coarse_ready = coarse_ready,
+             .guess_bytes = guess_bytes});
+}
+
+// The transfer's job is stored before the end of the model's, so that a daemon that is killed in
+// between finds it.
+void JobRuns::FollowByTransfer(const ActiveJob& model, double run_s) {
+  if (!settings_.transfers || !model.record.transfer_of.empty() ||
+      model.running->without_transfer()) {
+    return;
+  }
+  WantedJob wanted = WantedTransfer(model.record.digest, *model.running);
+  v1::TransferSettings& transfer = *wanted.request.mutable_transfer();
+  if (transfer.budget_s() == 0) {
+    transfer.set_budget_s(std::clamp(run_s, kLeastTransferBudgetS, kMostTransferBudgetS));
+  }
+  if (jobs_.Contains(wanted.digest)) {
+    // It runs on an older revision of the model.
+    jobs_.Change(wanted.digest, [](ActiveJob& job) { job.again = job.running.has_value(); });
+    return;
+  }
+  JobRecord record = NewRecord(wanted, clock_.UnixMs());
+  const absl::Status stored = database_.jobs().Put(record);
+  if (!stored.ok()) return settings_.log(std::string(stored.message()));
+  Enqueue(std::move(record), std::move(wanted.request));
 }
 
 void JobRuns::StartWhatFits(Notices& notices) {
@@ -82,16 +136,21 @@ void JobRuns::ReleaseWaiting(const std::string& coarse, Notices& notices) {
 
 DecompositionTask JobRuns::MakeTask(const ActiveJob& job) {
   const std::string& digest = job.record.digest;
-  return {.digest = digest,
-          .request = job.request,
-          .way = job.record.way,
-          .estimate_bytes = job.estimate_bytes,
-          .write_mesh =
-              [this, mesh = job.request.mesh_digest()](const std::filesystem::path& file) {
-                return database_.meshes().WriteFile(mesh, file);
-              },
-          .on_progress = [this, digest](const v1::Progress& p) { jobs_.Report(digest, p).Tell(); },
-          .on_end = [this, digest](const Outcome& outcome) { OnEnd(digest, outcome); }};
+  const bool radiates = !job.record.transfer_of.empty();
+  return {
+      .digest = digest,
+      .radiates = radiates,
+      .request = job.request,
+      .way = job.record.way,
+      .estimate_bytes = job.estimate_bytes,
+      .write_input =
+          [this, radiates, from = radiates ? job.record.transfer_of : job.request.mesh_digest()](
+              const std::filesystem::path& file) {
+            return radiates ? WriteModelFile(database_.models(), from, file)
+                            : database_.meshes().WriteFile(from, file);
+          },
+      .on_progress = [this, digest](const v1::Progress& p) { jobs_.Report(digest, p).Tell(); },
+      .on_end = [this, digest](const Outcome& outcome) { OnEnd(digest, outcome); }};
 }
 
 void JobRuns::OnEnd(const std::string& digest, const Outcome& outcome) {
@@ -100,7 +159,7 @@ void JobRuns::OnEnd(const std::string& digest, const Outcome& outcome) {
   {
     MutexLock lock(&writer_);
     ActiveJob job = jobs_.EndRun(digest);
-    LearnFrom(job, result);
+    const double run_s = LearnFrom(job, result);
     // Fails if the model was deleted before it was stored: then there is none.
     if (job.deleted) database_.models().Delete(digest).IgnoreError();
     job.record.start_count = 0;
@@ -108,6 +167,7 @@ void JobRuns::OnEnd(const std::string& digest, const Outcome& outcome) {
       job.again = job.deleted = false;
       notices.push_back(jobs_.QueueAgain(std::move(job)));
     } else {
+      if (result.verdict == Verdict::kOk && !job.deleted) FollowByTransfer(job, run_s);
       notices.push_back(Finish(std::move(job.record), result, job.deleted));
       ReleaseWaiting(digest, notices);
     }
@@ -116,15 +176,18 @@ void JobRuns::OnEnd(const std::string& digest, const Outcome& outcome) {
   for (const Notice& notice : notices) notice.Tell();
 }
 
-// Puts the model into the database, without the writer's lock. An error in storing it is then the
-// outcome of the job.
+// Puts the model or the transfer into the database, without the writer's lock. An error in storing
+// it is then the outcome of the job.
 Outcome JobRuns::Store(const std::string& digest, const Outcome& outcome) {
   if (outcome.verdict != Verdict::kOk) return outcome;
   const std::optional<ActiveJob> job = jobs_.Find(digest);
   if (job->deleted) return {Verdict::kCancelled, {}, {}};
-  const auto stored = database_.models().PutFile(digest, job->record.label, outcome.model_file);
+  const absl::Status stored =
+      job->record.transfer_of.empty()
+          ? database_.models().PutFile(digest, job->record.label, outcome.model_file).status()
+          : database_.transfers().PutFile(job->record.transfer_of, outcome.model_file).status();
   if (stored.ok()) return outcome;
-  return {Verdict::kCrashed, ToErrorInfo(stored.status()), {}};
+  return {Verdict::kCrashed, ToErrorInfo(stored), {}};
 }
 
 bool JobRuns::RunsAgain(ActiveJob& job, const Outcome& result) const {
@@ -135,10 +198,11 @@ bool JobRuns::RunsAgain(ActiveJob& job, const Outcome& result) const {
     job.estimate_bytes = std::max(2 * job.estimate_bytes, result.peak_bytes * 3 / 2);
     return true;
   }
-  if (DependsOnWay(result) && job.record.way + 1 < kWayCount) {
+  const bool radiates = !job.record.transfer_of.empty();
+  if (!radiates && DependsOnWay(result) && job.record.way + 1 < kWayCount) {
     ++job.record.way;
-    log_(absl::StrCat("jobs/", job.record.digest, " is computed another way after ",
-                      result.error.message()));
+    settings_.log(absl::StrCat("jobs/", job.record.digest, " is computed another way after ",
+                               result.error.message()));
     return true;
   }
   if (SameHints(job.request, *job.running)) return false;
@@ -156,13 +220,15 @@ Notice JobRuns::Finish(JobRecord record, const Outcome& result, bool deleted) {
   return jobs_.Remove(record.digest, ToJob(record));
 }
 
-void JobRuns::LearnFrom(ActiveJob& job, const Outcome& result) {
+double JobRuns::LearnFrom(ActiveJob& job, const Outcome& result) {
   job.record.peak_bytes = std::max(job.record.peak_bytes, result.peak_bytes);
   const double run_s = std::chrono::duration<double>(clock_.Monotonic() - job.started).count();
   mean_run_s_ += kWeightOfNewestRun * (run_s - mean_run_s_);
-  if (result.verdict != Verdict::kOk || result.peak_bytes == 0) return;
+  const bool tells = result.verdict == Verdict::kOk && result.peak_bytes > 0;
+  if (!tells || !job.record.transfer_of.empty()) return run_s;
   const double correction = jobs_.Learn(job.guess_bytes, result.peak_bytes);
   database_.jobs().PutFact(kCorrectionFact, absl::StrCat(correction)).IgnoreError();
+  return run_s;
 }
 
 }  // namespace carillon

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -10,6 +9,7 @@
 #include "server/base/clock.h"
 #include "server/base/mutex.h"
 #include "server/decomposition/active_jobs.h"
+#include "server/decomposition/decomposition_queue.h"
 #include "server/decomposition/executor.h"
 #include "server/decomposition/watcher.h"
 #include "server/mode_database/mode_database.h"
@@ -21,10 +21,9 @@ class JobRuns {
  public:
   using Notices = std::vector<Notice>;
 
-  /// `log` takes a line for people and may be called on any thread. `database`, `clock` and `jobs`
-  /// must outlive the object.
+  /// `database`, `clock` and `jobs` must outlive the object.
   JobRuns(ModeDatabase& database, std::unique_ptr<Executor> executor, const Clock& clock,
-          ActiveJobs& jobs, std::function<void(const std::string& line)> log);
+          ActiveJobs& jobs, QueueSettings settings);
 
   /// Held by the one thread that writes jobs into the database and into `jobs`, also while it waits
   /// for the disk. Readers never take it.
@@ -35,6 +34,10 @@ class JobRuns {
 
   /// Ends the running workers; no job changes afterwards.
   void Stop();
+
+  /// Adds a job, whose record is stored already, to the queue; `waits_for` is as in ActiveJob.
+  void Enqueue(JobRecord record, v1::CreateModalModelRequest request, std::string waits_for = {})
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
 
   /// Starts jobs while workers and memory are free.
   void StartWhatFits(Notices& notices) ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
@@ -56,15 +59,17 @@ class JobRuns {
   DecompositionTask MakeTask(const ActiveJob& job);
   void OnEnd(const std::string& digest, const Outcome& outcome);
   Outcome Store(const std::string& digest, const Outcome& outcome);
+  void FollowByTransfer(const ActiveJob& model, double run_s)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
   bool RunsAgain(ActiveJob& job, const Outcome& result) const;
   Notice Finish(JobRecord record, const Outcome& result, bool deleted)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
-  void LearnFrom(ActiveJob& job, const Outcome& result) ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
+  double LearnFrom(ActiveJob& job, const Outcome& result) ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
 
   ModeDatabase& database_;
   const Clock& clock_;
   ActiveJobs& jobs_;
-  const std::function<void(const std::string& line)> log_;
+  const QueueSettings settings_;
   Mutex writer_;
   bool stopping_ ABSL_GUARDED_BY(writer_) = false;
   double mean_run_s_ ABSL_GUARDED_BY(writer_) = 10;  // until a run has ended

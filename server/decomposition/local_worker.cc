@@ -90,8 +90,8 @@ absl::StatusOr<PreparedTask> PreparedTask::Make(DecompositionTask task,
                                 "): see that this user may write there"));
   }
   ScratchFolder folder(path);
-  RETURN_IF_ERROR(task.write_mesh(folder / "mesh"));
-  RETURN_IF_ERROR(WriteWorkerRequest(task.request, task.way, folder / "request"));
+  RETURN_IF_ERROR(task.write_input(folder / "mesh"));
+  RETURN_IF_ERROR(WriteWorkerRequest(task, folder / "request"));
   return PreparedTask{std::move(task), std::move(folder)};
 }
 

@@ -64,16 +64,19 @@ absl::Status QueueCore::TakeUpJob(JobRecord record, Notices& notices) {
     return database_.jobs().Put(record);
   }
   auto request = ParseRequest(record);
+  const WantedJob wanted{.digest = record.digest,
+                         .request = request.value_or(v1::CreateModalModelRequest()),
+                         .transfer_of = record.transfer_of};
   const absl::StatusOr<bool> satisfied =
-      request.ok() ? IsSatisfied(database_.models(), record.digest, std::nullopt, *request)
-                   : request.status();
+      request.ok() ? IsSatisfied(database_, wanted, std::nullopt) : request.status();
   if (satisfied.ok() && !*satisfied && record.start_count < kMostStarts) {
     std::string coarse = StartCoarse(record.digest, *request, notices);
-    Enqueue(std::move(record), *std::move(request), std::move(coarse));
+    runs_.Enqueue(std::move(record), *std::move(request), std::move(coarse));
     return absl::OkStatus();
   }
   const uint32_t start_count = std::exchange(record.start_count, 0);
-  // A satisfied job has its model: the daemon was killed before it stored the job's end.
+  // A satisfied job has its result: the daemon was killed before it stored the job's end.
+  if (satisfied.ok() && *satisfied) FollowByTransfer(wanted, notices);
   record.state = satisfied.ok() && *satisfied ? v1::JOB_STATE_SUCCEEDED : v1::JOB_STATE_FAILED;
   if (!satisfied.ok()) record.error = ToErrorInfo(satisfied.status());
   if (satisfied.ok() && !*satisfied) {
@@ -90,50 +93,72 @@ void QueueCore::Stop() {
 
 absl::StatusOr<v1::Job> QueueCore::Submit(const v1::CreateModalModelRequest& request) {
   ASSIGN_OR_RETURN(const v1::CreateModalModelRequest resolved, ResolveRequest(request));
-  const std::string digest = RequestDigest(resolved);
+  const WantedJob wanted = WantedModel(resolved);
   Notices notices;
   absl::StatusOr<v1::Job> job;
   {
     MutexLock lock(&runs_.writer());
-    const std::optional<ActiveJob> active = jobs_.Find(digest);
-    job =
-        active.has_value() ? SubmitAgain(*active, resolved) : SubmitNew(digest, resolved, notices);
+    job = SubmitAny(wanted, notices);
+    if (job.ok() && job->state() == v1::JOB_STATE_SUCCEEDED) FollowByTransfer(wanted, notices);
   }
   TellAll(notices);
   return job;
 }
 
-absl::StatusOr<v1::Job> QueueCore::SubmitNew(const std::string& digest,
-                                             const v1::CreateModalModelRequest& request,
-                                             Notices& notices) {
+absl::StatusOr<v1::Job> QueueCore::SubmitTransfer(const std::string& model,
+                                                  const v1::CreateTransferRequest& request) {
+  ASSIGN_OR_RETURN(const WantedJob wanted, WantedTransfer(model, request));
+  Notices notices;
+  absl::StatusOr<v1::Job> job;
+  {
+    MutexLock lock(&runs_.writer());
+    job = SubmitAny(wanted, notices);
+  }
+  TellAll(notices);
+  return job;
+}
+
+absl::StatusOr<v1::Job> QueueCore::SubmitAny(const WantedJob& wanted, Notices& notices) {
+  const std::optional<ActiveJob> active = jobs_.Find(wanted.digest);
+  return active.has_value() ? SubmitAgain(*active, wanted.request) : SubmitNew(wanted, notices);
+}
+
+// The model of a request is stored: its transfer is asked for, too. Without room in the queue the
+// next request for the model asks again.
+void QueueCore::FollowByTransfer(const WantedJob& model, Notices& notices) {
+  const bool wanted = settings_.transfers && !model.request.without_transfer();
+  if (!wanted || !model.transfer_of.empty()) return;
+  SubmitAny(WantedTransfer(model.digest, model.request), notices).status().IgnoreError();
+}
+
+absl::StatusOr<v1::Job> QueueCore::SubmitNew(const WantedJob& wanted, Notices& notices) {
+  const auto& [digest, request, transfer_of] = wanted;
   ASSIGN_OR_RETURN(const std::optional<JobRecord> known, database_.jobs().Find(digest));
-  ASSIGN_OR_RETURN(const bool satisfied, IsSatisfied(database_.models(), digest, known, request));
+  ASSIGN_OR_RETURN(const bool satisfied, IsSatisfied(database_, wanted, known));
   if (known.has_value() &&
       (satisfied ? known->state == v1::JOB_STATE_SUCCEEDED : WouldFailAgain(*known, request))) {
     // The record stays unchanged: its request tells how far the model was computed.
     return ToJob(*known);
   }
   if (!satisfied) {
-    RETURN_IF_ERROR(CheckAcceptable(request));
+    RETURN_IF_ERROR(CheckAcceptable(wanted));
   }
   // The coarse job is stored first. A daemon that takes up this job then finds the coarse one.
   std::string coarse = satisfied ? "" : StartCoarse(digest, request, notices);
-  JobRecord record{.digest = digest,
-                   .request = request.SerializeAsString(),
-                   .label = request.label(),
-                   .state = satisfied ? v1::JOB_STATE_SUCCEEDED : v1::JOB_STATE_QUEUED,
-                   .created_unix_ms = clock_.UnixMs(),
-                   .priority = request.priority()};
+  JobRecord record = NewRecord(wanted, clock_.UnixMs());
+  if (satisfied) record.state = v1::JOB_STATE_SUCCEEDED;
   if (known.has_value()) record.peak_bytes = known->peak_bytes;
   RETURN_IF_ERROR(database_.jobs().Put(record));
   if (satisfied) return ToJob(record);
-  Enqueue(std::move(record), request, std::move(coarse));
+  runs_.Enqueue(std::move(record), request, std::move(coarse));
   runs_.StartWhatFits(notices);
   return Get(digest);
 }
 
-absl::Status QueueCore::CheckAcceptable(const v1::CreateModalModelRequest& request) {
-  RETURN_IF_ERROR(database_.meshes().Find(request.mesh_digest()).status());
+absl::Status QueueCore::CheckAcceptable(const WantedJob& wanted) {
+  if (wanted.transfer_of.empty()) {
+    RETURN_IF_ERROR(database_.meshes().Find(wanted.request.mesh_digest()).status());
+  }
   const size_t count = jobs_.queued_count();
   if (count < settings_.max_queued_count) return absl::OkStatus();
   return QueueFull(count, runs_.retry_after_s());
@@ -149,7 +174,7 @@ std::string QueueCore::StartCoarse(const std::string& digest,
   if (!coarse.has_value()) return "";
   std::string coarse_digest = RequestDigest(*coarse);
   if (!jobs_.Contains(coarse_digest)) {
-    SubmitNew(coarse_digest, *coarse, notices).status().IgnoreError();
+    SubmitNew(WantedModel(*coarse), notices).status().IgnoreError();
   }
   if (jobs_.Contains(coarse_digest)) return coarse_digest;
   database_.models().CopyIfAbsent(coarse_digest, digest, request.label()).IgnoreError();
@@ -201,23 +226,9 @@ bool QueueCore::ComputeAgain(const std::string& digest, Notices& notices) {
   if (!request.ok()) return false;
   (*record)->state = v1::JOB_STATE_QUEUED;
   if (!database_.jobs().Put(**record).ok()) return false;
-  Enqueue(**std::move(record), *std::move(request));
+  runs_.Enqueue(**std::move(record), *std::move(request));
   runs_.StartWhatFits(notices);
   return true;
-}
-
-void QueueCore::Enqueue(JobRecord record, v1::CreateModalModelRequest request,
-                        std::string waits_for) {
-  record.state = v1::JOB_STATE_QUEUED;
-  const auto mesh = database_.meshes().Find(request.mesh_digest());
-  const uint64_t mesh_bytes = mesh.ok() ? mesh->byte_count : 0;
-  const bool coarse_ready = HasCoarseModel(database_.models(), record.digest, request);
-  const uint64_t guess_bytes = MemoryOfNodes(GuessNodeCount(request, mesh_bytes));
-  jobs_.Add({.record = std::move(record),
-             .request = std::move(request),
-             .waits_for = std::move(waits_for),
-             .coarse_ready = coarse_ready,
-             .guess_bytes = guess_bytes});
 }
 
 absl::StatusOr<v1::Job> QueueCore::Get(const std::string& digest) {
@@ -271,22 +282,25 @@ absl::Status QueueCore::DeleteModel(const std::string& digest) {
   {
     MutexLock lock(&runs_.writer());
     RETURN_IF_ERROR(database_.models().Delete(digest));
-    std::optional<ActiveJob> active = jobs_.Find(digest);
-    if (!active.has_value()) return absl::OkStatus();
-    active->record.state = v1::JOB_STATE_CANCELLED;
-    if (!active->running.has_value()) {
-      EndQueued(active->record, notices);
-    } else {
-      runs_.Cancel(digest);
-      jobs_.Change(digest, [&](ActiveJob& job) {
-        job.record.state = v1::JOB_STATE_CANCELLED;
-        job.deleted = true;
-        job.again = false;
-      });
-    }
+    for (const std::string& transfer : jobs_.TransfersOf(digest)) Drop(transfer, notices);
+    Drop(digest, notices);
   }
   TellAll(notices);
   return absl::OkStatus();
+}
+
+// Ends a job that waits or runs and whose row is no longer in the database.
+void QueueCore::Drop(const std::string& digest, Notices& notices) {
+  std::optional<ActiveJob> active = jobs_.Find(digest);
+  if (!active.has_value()) return;
+  active->record.state = v1::JOB_STATE_CANCELLED;
+  if (!active->running.has_value()) return EndQueued(active->record, notices);
+  runs_.Cancel(digest);
+  jobs_.Change(digest, [&](ActiveJob& job) {
+    job.record.state = v1::JOB_STATE_CANCELLED;
+    job.deleted = true;
+    job.again = false;
+  });
 }
 
 void QueueCore::EndQueued(const JobRecord& record, Notices& notices) {

@@ -15,6 +15,7 @@
 #include "server/decomposition/decomposition_queue.h"
 #include "server/decomposition/executor.h"
 #include "server/decomposition/job_runs.h"
+#include "server/decomposition/wanted_job.h"
 #include "server/decomposition/watcher.h"
 #include "server/mode_database/mode_database.h"
 
@@ -36,7 +37,7 @@ class QueueCore {
       : database_(database),
         clock_(clock),
         settings_(std::move(settings)),
-        runs_(database, std::move(executor), clock, jobs_, settings_.log) {}
+        runs_(database, std::move(executor), clock, jobs_, settings_) {}
 
   /// Queues the unfinished jobs of an earlier run of the daemon.
   absl::Status TakeUp();
@@ -44,6 +45,8 @@ class QueueCore {
   void Stop();
 
   absl::StatusOr<v1::Job> Submit(const v1::CreateModalModelRequest& request);
+  absl::StatusOr<v1::Job> SubmitTransfer(const std::string& model,
+                                         const v1::CreateTransferRequest& request);
   absl::StatusOr<v1::Job> Get(const std::string& digest);
   absl::StatusOr<DecompositionJobPage> List(int page_size, const std::string& page_token);
   absl::StatusOr<v1::Job> Cancel(const std::string& digest);
@@ -56,20 +59,23 @@ class QueueCore {
 
   absl::Status TakeUpJob(JobRecord record, Notices& notices)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
-  absl::StatusOr<v1::Job> SubmitNew(const std::string& digest,
-                                    const v1::CreateModalModelRequest& request, Notices& notices)
+  absl::StatusOr<v1::Job> SubmitAny(const WantedJob& wanted, Notices& notices)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
-  absl::Status CheckAcceptable(const v1::CreateModalModelRequest& request)
+  absl::StatusOr<v1::Job> SubmitNew(const WantedJob& wanted, Notices& notices)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
+  void FollowByTransfer(const WantedJob& model, Notices& notices)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
+  absl::Status CheckAcceptable(const WantedJob& wanted)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
   absl::StatusOr<v1::Job> SubmitAgain(const ActiveJob& active,
                                       const v1::CreateModalModelRequest& request)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
   std::string StartCoarse(const std::string& digest, const v1::CreateModalModelRequest& request,
                           Notices& notices) ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
-  void Enqueue(JobRecord record, v1::CreateModalModelRequest request, std::string waits_for = {})
-      ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
   void OnQuarantine(const std::string& digest, const absl::Status& why);
   bool ComputeAgain(const std::string& digest, Notices& notices)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
+  void Drop(const std::string& digest, Notices& notices)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
   void EndQueued(const JobRecord& record, Notices& notices)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());

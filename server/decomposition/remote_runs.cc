@@ -17,6 +17,7 @@
 #include "server/decomposition/worker_events.h"
 #include "server/mode_database/model_checker.h"
 #include "server/mode_database/model_codec.h"
+#include "server/mode_database/transfer_codec.h"
 
 namespace carillon {
 namespace {
@@ -73,6 +74,7 @@ struct RunUpload::State {
   std::string run = RandomDigits(2);
   ModelChecker checker{};
   std::ofstream model{};
+  bool is_transfer = false;
   bool kept = false;
 
   std::filesystem::path File(absl::string_view kind) const {
@@ -94,16 +96,30 @@ RunUpload::~RunUpload() = default;
 
 absl::Status RunUpload::Append(const v1::ModalModelRecord& record) {
   RETURN_IF_ERROR(state_->checker.Check(record));
+  return WriteResult(Delimited(record));
+}
+
+absl::Status RunUpload::Append(const v1::TransferRecord& record) {
+  state_->is_transfer = true;
+  return WriteResult(Delimited(record));
+}
+
+absl::Status RunUpload::WriteResult(const std::string& bytes) {
   const std::filesystem::path file = state_->File("model");
   if (!state_->model.is_open()) state_->model.open(file, std::ios::binary);
-  state_->model << Delimited(record);
+  state_->model << bytes;
   return state_->model ? absl::OkStatus() : NotWritable(file);
+}
+
+absl::Status RunUpload::CheckWhole() const {
+  state_->model.close();
+  return state_->is_transfer ? StoredTransfer::ReadFile(state_->File("model")).status()
+                             : state_->checker.Finish();
 }
 
 absl::Status RunUpload::Finish(const v1::RunEnd& end) {
   if (end.exit_status() == 0 && !end.has_error()) {
-    RETURN_IF_ERROR(state_->checker.Finish());
-    state_->model.close();
+    RETURN_IF_ERROR(CheckWhole());
     if (!state_->model || !Sync(state_->File("model"))) return NotWritable(state_->File("model"));
   }
   v1::WorkerEvent event;

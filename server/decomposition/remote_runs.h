@@ -13,6 +13,7 @@
 #include "carillon/v1/decomposition.pb.h"
 #include "carillon/v1/job_run_service.pb.h"
 #include "carillon/v1/modal_model.pb.h"
+#include "carillon/v1/transfer.pb.h"
 #include "server/base/mutex.h"
 
 namespace carillon {
@@ -31,15 +32,22 @@ class RunUpload {
   /// ResourceExhausted (DATABASE_FULL).
   absl::Status Append(const v1::ModalModelRecord& record);
 
+  /// Append for the result of a job that computes a transfer. Errors: ResourceExhausted
+  /// (DATABASE_FULL).
+  absl::Status Append(const v1::TransferRecord& record);
+
   /// Ends the run: its result is on the disk and is accepted, and its token is invalid from now on.
   /// Call once, last.
-  /// Errors: those of Append and of RemoteRuns.
+  /// Errors: those of Append and of RemoteRuns, InvalidArgument (TRANSFER_MALFORMED), DataLoss
+  /// (TRANSFER_CORRUPT).
   absl::Status Finish(const v1::RunEnd& end);
 
  private:
   friend class RemoteRuns;
   struct State;
   explicit RunUpload(std::unique_ptr<State> state);
+  absl::Status WriteResult(const std::string& bytes);
+  absl::Status CheckWhole() const;
 
   std::unique_ptr<State> state_;
 };

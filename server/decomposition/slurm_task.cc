@@ -138,7 +138,7 @@ absl::StatusOr<SlurmTask> SlurmTask::Prepare(DecompositionTask task,
                                              RemoteRuns& runs) {
   SlurmTask result(std::move(task), options, runs);
   const DecompositionTask& own = result.task_;
-  const std::string request = WorkerRequestFile(own.request, own.way);
+  const std::string request = WorkerRequestFile(own);
   if (ReadFile(result.folder_ / "request") != request || ReadTicket(result.folder_).name.empty()) {
     RETURN_IF_ERROR(result.MakeFolder(request));
   }
@@ -166,7 +166,7 @@ absl::Status SlurmTask::MakeFolder(const std::string& request) {
   if (!std::filesystem::create_directories(folder_, error)) {
     return Unusable(folder_, error.message());
   }
-  RETURN_IF_ERROR(task_.write_mesh(folder_ / "mesh"));
+  RETURN_IF_ERROR(task_.write_input(folder_ / "mesh"));
   if (!WriteFile(folder_ / "request", request) ||
       !WriteFile(folder_ / "ticket", RandomDigits(kTicketWords))) {
     return Unusable(folder_, "a file cannot be written");

@@ -29,7 +29,7 @@ namespace carillon {
 class SlurmTask {
  public:
   /// Makes the folder, or takes up one with the same request that an earlier daemon left.
-  /// Errors: those of write_mesh, FailedPrecondition (DATABASE_UNUSABLE).
+  /// Errors: those of write_input, FailedPrecondition (DATABASE_UNUSABLE).
   static absl::StatusOr<SlurmTask> Prepare(DecompositionTask task,
                                            const SlurmExecutorOptions& options, RemoteRuns& runs);
 

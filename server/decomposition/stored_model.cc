@@ -1,9 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/decomposition/stored_model.h"
 
+#include <algorithm>
+#include <fstream>
+
+#include "absl/strings/str_cat.h"
+#include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 #include "server/decomposition/coarse_request.h"
 #include "server/decomposition/decomposition_request.h"
 #include "server/decomposition/job_rules.h"
+#include "server/mode_database/model_codec.h"
 
 namespace carillon {
 namespace {
@@ -11,6 +18,31 @@ namespace {
 // An eigenvalue goes to the worker as a decimal number in the worker's own units and comes back, so
 // its last bits may differ.
 constexpr double kRelativeTolerance = 1e-9;
+
+// Materials of one step of the speed ratio differ by this in their eigenvalues.
+constexpr double kStepTolerance = 0.03;
+constexpr double kUsualAccuracyDb = 2;
+
+bool IsAsExact(const v1::TransferHeader& stored, const v1::TransferSettings& wanted) {
+  const double wanted_db = wanted.accuracy_db() > 0 ? wanted.accuracy_db() : kUsualAccuracyDb;
+  const bool whole = stored.computed_mode_count() == stored.wanted_mode_count();
+  return stored.transfer_settings().accuracy_db() <= wanted_db &&
+         (whole || stored.transfer_settings().budget_s() >= wanted.budget_s());
+}
+
+absl::StatusOr<bool> HasTransfer(ModeDatabase& database, const WantedJob& wanted,
+                                 const std::optional<JobRecord>& record) {
+  ASSIGN_OR_RETURN(const auto stored, database.transfers().List(wanted.transfer_of));
+  const bool exact =
+      std::any_of(stored.begin(), stored.end(), [&](const TransferSummary& transfer) {
+        return SpeedStep(transfer.header.speed_ratio()) == SpeedStepOf(wanted.request) &&
+               IsAsExact(transfer.header, wanted.request.transfer());
+      });
+  if (!exact || !record.has_value()) return exact;
+  const auto ran = ParseRequest(*record);
+  return ran.ok() &&
+         WantedEigenvalue(*ran) >= WantedEigenvalue(wanted.request) * (1 - kStepTolerance);
+}
 
 }  // namespace
 
@@ -28,10 +60,33 @@ absl::StatusOr<bool> IsSatisfied(ModelStore& models, const std::string& digest,
   return ran.ok() && WantedEigenvalue(*ran) >= wanted;
 }
 
+absl::StatusOr<bool> IsSatisfied(ModeDatabase& database, const WantedJob& wanted,
+                                 const std::optional<JobRecord>& record) {
+  return wanted.transfer_of.empty()
+             ? IsSatisfied(database.models(), wanted.digest, record, wanted.request)
+             : HasTransfer(database, wanted, record);
+}
+
 bool HasCoarseModel(ModelStore& models, const std::string& digest,
                     const v1::CreateModalModelRequest& request) {
   const absl::StatusOr<ModelSummary> model = models.Summary(digest);
   return model.ok() && IsCoarseOf(model->header, request);
+}
+
+absl::Status WriteModelFile(ModelStore& models, const std::string& digest,
+                            const std::filesystem::path& file) {
+  ASSIGN_OR_RETURN(ModelExport records, models.Export(digest));
+  std::ofstream out(file, std::ios::binary);
+  while (true) {
+    ASSIGN_OR_RETURN(const auto record, records.Next());
+    if (!record.has_value()) break;
+    out << Delimited(*record);
+  }
+  out.close();
+  if (!out.fail()) return absl::OkStatus();
+  return Refusal(
+      absl::StatusCode::kResourceExhausted, "DATABASE_FULL",
+      absl::StrCat("the model file ", file.string(), " cannot be written: free space there"));
 }
 
 }  // namespace carillon

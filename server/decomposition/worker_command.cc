@@ -9,23 +9,28 @@
 
 namespace carillon {
 
-std::string WorkerRequestFile(const v1::CreateModalModelRequest& resolved, uint32_t way) {
+std::string WorkerRequestFile(const DecompositionTask& task) {
+  const v1::CreateModalModelRequest& resolved = task.request;
   v1::WorkerRequest request;
-  request.set_mesh_format(resolved.mesh_format());
-  *request.mutable_settings() = resolved.settings();
+  if (task.radiates) {
+    request.set_radiate_stored_model(true);
+    *request.mutable_transfer() = resolved.transfer();
+  } else {
+    request.set_mesh_format(resolved.mesh_format());
+    *request.mutable_settings() = resolved.settings();
+    request.set_cautious(task.way >= 1);
+    if (task.way >= 2) request.mutable_settings()->mutable_mesh()->set_repair(true);
+  }
   *request.mutable_material() = resolved.material();
   request.set_size(resolved.size());
   request.set_min_frequency_hz(resolved.min_frequency_hz());
   request.set_max_frequency_hz(resolved.max_frequency_hz());
-  request.set_cautious(way >= 1);
-  if (way >= 2) request.mutable_settings()->mutable_mesh()->set_repair(true);
   return WorkerRequestText(request);
 }
 
-absl::Status WriteWorkerRequest(const v1::CreateModalModelRequest& resolved, uint32_t way,
-                                const std::filesystem::path& file) {
+absl::Status WriteWorkerRequest(const DecompositionTask& task, const std::filesystem::path& file) {
   std::ofstream out(file, std::ios::binary);
-  out << WorkerRequestFile(resolved, way);
+  out << WorkerRequestFile(task);
   out.close();
   if (!out.fail()) return absl::OkStatus();
   return Refusal(absl::StatusCode::kFailedPrecondition, "DATABASE_UNUSABLE",

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "absl/status/status.h"
-#include "carillon/v1/modal_model_service.pb.h"
+#include "server/decomposition/executor.h"
 
 namespace carillon {
 
@@ -24,13 +24,12 @@ struct WorkerPlace {
 /// repaired, too.
 constexpr uint32_t kWayCount = 3;
 
-/// What carillon-precompute is to compute for a resolved request in way `way` (below kWayCount): a
+/// What carillon-precompute is to compute for a task, in its way (below kWayCount): a
 /// v1::WorkerRequest in protobuf's text form.
-std::string WorkerRequestFile(const v1::CreateModalModelRequest& resolved, uint32_t way);
+std::string WorkerRequestFile(const DecompositionTask& task);
 
 /// Writes WorkerRequestFile to `file`. Errors: FailedPrecondition (DATABASE_UNUSABLE).
-absl::Status WriteWorkerRequest(const v1::CreateModalModelRequest& resolved, uint32_t way,
-                                const std::filesystem::path& file);
+absl::Status WriteWorkerRequest(const DecompositionTask& task, const std::filesystem::path& file);
 
 /// The command line of carillon-precompute, which reports to descriptor 3.
 std::vector<std::string> WorkerCommand(const WorkerPlace& place);

@@ -14,6 +14,7 @@
 #include "server/mode_database/job_store.h"
 #include "server/mode_database/model_rows.h"
 #include "server/mode_database/sqlite_connection.h"
+#include "server/mode_database/transfer_store.h"
 
 namespace carillon {
 namespace {
@@ -81,6 +82,28 @@ absl::Status CheckModels(Database& database, const OnFinding& on_finding) {
   return absl::OkStatus();
 }
 
+absl::Status CheckTransfers(Database& database, const OnFinding& on_finding) {
+  const SystemClock clock;
+  TransferStore transfers(database, clock);
+  for (const std::string& digest : Names(database, "models", on_finding)) {
+    uint64_t row_count = 0;
+    const absl::Status counted = database.Read([&](SqliteConnection& connection) {
+      return connection.Query(
+          "SELECT count(*) FROM transfers JOIN models USING (revision) WHERE digest = ?", {digest},
+          [&](const SqlRow& row) {
+            row_count = static_cast<uint64_t>(row.Int(0));
+            return absl::OkStatus();
+          });
+    });
+    if (counted.ok() && row_count == 0) continue;
+    const auto whole = transfers.Read(digest);
+    if (!counted.ok() || !whole.ok() || whole->size() != row_count) {
+      on_finding(absl::StrCat("a transfer of modalModels/", digest, " has changed on the disk"));
+    }
+  }
+  return absl::OkStatus();
+}
+
 absl::Status CheckMeshes(Database& database, const OnFinding& on_finding) {
   for (const std::string& digest : Names(database, "meshes", on_finding)) {
     Sha256 sha;
@@ -126,7 +149,7 @@ absl::Status BackUp(Database& database, const std::filesystem::path& copy) {
 
 absl::Status CheckDatabase(const std::filesystem::path& file, const OnFinding& on_finding) {
   ASSIGN_OR_RETURN(const std::unique_ptr<Database> database, Database::Open(file));
-  for (const auto check : {CheckStructure, CheckModels, CheckMeshes, CheckJobs}) {
+  for (const auto check : {CheckStructure, CheckModels, CheckTransfers, CheckMeshes, CheckJobs}) {
     RETURN_IF_ERROR(check(*database, on_finding));
   }
   return absl::OkStatus();

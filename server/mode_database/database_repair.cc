@@ -17,6 +17,7 @@
 #include "server/mode_database/model_rows.h"
 #include "server/mode_database/model_store.h"
 #include "server/mode_database/sqlite_connection.h"
+#include "server/mode_database/transfer_store.h"
 
 namespace carillon {
 namespace {
@@ -50,6 +51,17 @@ void Remove(const std::filesystem::path& file) {
   }
 }
 
+// Transfers that have changed on the disk are left out: they can be computed again.
+absl::Status CopyTransfers(Database& from, Database& to, const std::string& model_digest) {
+  const SystemClock clock;
+  ASSIGN_OR_RETURN(const auto transfers, TransferStore(from, clock).Read(model_digest));
+  TransferStore target(to, clock);
+  for (const StoredTransfer& transfer : transfers) {
+    RETURN_IF_ERROR(target.Put(model_digest, transfer).status());
+  }
+  return absl::OkStatus();
+}
+
 absl::Status CopyModel(Database& from, Database& to, const std::string& digest) {
   const SystemClock clock;
   ModelStore source(from, clock);
@@ -65,6 +77,7 @@ absl::Status CopyModel(Database& from, Database& to, const std::string& digest) 
   if (const auto stored = copy.Finish(); !stored.ok()) return stored.status();
   RETURN_IF_ERROR(
       target.Update(digest, {.add_tags = summary.tags, .pinned = summary.pinned}).status());
+  RETURN_IF_ERROR(CopyTransfers(from, to, digest));
   return to.Write([&](SqliteConnection& connection) {
     return connection.Run(
         "UPDATE models SET created_unix_ms = ?, sounded_unix_ms = ? WHERE digest = ?",

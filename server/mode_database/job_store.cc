@@ -19,7 +19,7 @@ namespace {
 
 constexpr char kSelectJobs[] =
     "SELECT number, digest, label, state, remembered, created_unix_ms, priority, start_count, way, "
-    "peak_bytes, xxh3 IS NULL, xxh3, error, request FROM jobs ";
+    "peak_bytes, xxh3 IS NULL, xxh3, error, request, transfer_of FROM jobs ";
 
 // The hash covers every column, so that no bit of a job can change unnoticed.
 int64_t RowHash(const JobRecord& job, std::string_view error) {
@@ -27,7 +27,7 @@ int64_t RowHash(const JobRecord& job, std::string_view error) {
       absl::StrCat(job.digest, " ", static_cast<int>(job.state), " ", job.remembered ? 1 : 0, " ",
                    job.created_unix_ms, " ", job.priority, " ", job.start_count, " ", job.way, " ",
                    job.peak_bytes, " ", job.label.size(), " ", error.size(), " ");
-  text.append(job.label).append(error).append(job.request);
+  text.append(job.label).append(error).append(job.request).append(job.transfer_of);
   return std::bit_cast<int64_t>(Xxh3(text));
 }
 
@@ -46,6 +46,7 @@ JobRecord Damaged(const JobRecord& job) {
 
 JobRecord ParseJob(const SqlRow& row) {
   JobRecord job{.digest = row.Text(1),
+                .transfer_of = row.Text(14),
                 .request = std::string(row.Blob(13)),
                 .label = row.Text(2),
                 .state = static_cast<v1::JobState>(row.Int(3)),
@@ -71,18 +72,18 @@ absl::Status JobStore::Put(const JobRecord& job) {
   return database_->Write([&](SqliteConnection& connection) {
     return connection.Run(
         "INSERT INTO jobs (digest, label, state, remembered, created_unix_ms, priority, "
-        "start_count, way, peak_bytes, xxh3, error, request) "
-        "VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (digest) DO UPDATE SET "
+        "start_count, way, peak_bytes, xxh3, error, request, transfer_of) "
+        "VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (digest) DO UPDATE SET "
         "label = excluded.label, state = excluded.state, remembered = excluded.remembered, "
         "created_unix_ms = excluded.created_unix_ms, priority = excluded.priority, "
         "start_count = excluded.start_count, way = excluded.way, "
         "peak_bytes = excluded.peak_bytes, xxh3 = excluded.xxh3, error = excluded.error, "
-        "request = excluded.request",
+        "request = excluded.request, transfer_of = excluded.transfer_of",
         {job.digest, job.label, static_cast<int64_t>(job.state),
          static_cast<int64_t>(job.remembered ? 1 : 0), job.created_unix_ms,
          static_cast<int64_t>(job.priority), static_cast<int64_t>(job.start_count),
          static_cast<int64_t>(job.way), static_cast<int64_t>(job.peak_bytes), RowHash(job, error),
-         SqlBlob{error}, SqlBlob{job.request}});
+         SqlBlob{error}, SqlBlob{job.request}, job.transfer_of});
   });
 }
 

@@ -14,9 +14,11 @@ namespace carillon {
 
 class Database;
 
-/// A decomposition job as it is stored.
+/// A job as it is stored.
 struct JobRecord {
-  std::string digest{};   ///< the modal model's
+  std::string digest{};  ///< the modal model's, or of a job that computes a transfer its own
+  /// Digest of the modal model whose transfer the job computes; empty: it computes a model.
+  std::string transfer_of{};
   std::string request{};  ///< serialized by the caller, who alone interprets it
   std::string label{};
   v1::JobState state = v1::JOB_STATE_QUEUED;
@@ -36,7 +38,7 @@ struct JobPage {
   std::string next_page_token;  ///< empty: this was the last page
 };
 
-/// Decomposition jobs by digest, so that they outlive the daemon. Safe from every thread.
+/// Jobs by digest, so that they outlive the daemon. Safe from every thread.
 class JobStore {
  public:
   explicit JobStore(Database& database) : database_(&database) {}

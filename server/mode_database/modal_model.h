@@ -15,6 +15,7 @@ namespace carillon {
 /// shared by all objects that sound with it.
 struct ModalModel {
   std::string digest;
+  int64_t revision = 0;  ///< as it is stored; see ModelSummary
   double poisson_ratio = 0;
   /// The model has every deformation mode up to this eigenvalue.
   double complete_to_eigenvalue = 0;

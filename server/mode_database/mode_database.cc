@@ -18,6 +18,7 @@ ModeDatabase::ModeDatabase(std::unique_ptr<Database> database, const Clock& cloc
     : database_(std::move(database)),
       meshes_(*database_, clock),
       models_(*database_, clock),
+      transfers_(*database_, clock),
       jobs_(*database_) {}
 
 std::filesystem::path ModeDatabase::folder() const { return database_->folder(); }

@@ -9,13 +9,14 @@
 #include "server/mode_database/job_store.h"
 #include "server/mode_database/mesh_store.h"
 #include "server/mode_database/model_store.h"
+#include "server/mode_database/transfer_store.h"
 
 namespace carillon {
 
 class Database;
 
-/// Meshes, modal models and jobs in one SQLite file. A change survives kill -9 and power failure
-/// once its call has returned OK (WAL, synchronous=FULL). Safe from every thread.
+/// Meshes, modal models, transfers and jobs in one SQLite file. A change survives kill -9 and power
+/// failure once its call has returned OK (WAL, synchronous=FULL). Safe from every thread.
 class ModeDatabase {
  public:
   /// Opens the file, or makes it, and brings an older schema up to date in one transaction.
@@ -28,6 +29,7 @@ class ModeDatabase {
 
   MeshStore& meshes() { return meshes_; }
   ModelStore& models() { return models_; }
+  TransferStore& transfers() { return transfers_; }
   JobStore& jobs() { return jobs_; }
   Database& database() { return *database_; }  ///< for database_admin.h
   /// The folder of the database file, for other files of the daemon.
@@ -39,6 +41,7 @@ class ModeDatabase {
   std::unique_ptr<Database> database_;
   MeshStore meshes_;
   ModelStore models_;
+  TransferStore transfers_;
   JobStore jobs_;
 };
 

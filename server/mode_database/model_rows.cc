@@ -207,7 +207,9 @@ absl::Status DeleteModelRows(SqliteConnection& connection, const std::string& di
   absl::Status status = connection.Run("DELETE FROM models WHERE digest = ?", {digest});
   if (status.ok() && connection.changed_row_count() == 0) return ModelNotFound(digest);
   if (status.ok()) status = connection.Run("DELETE FROM model_tags WHERE digest = ?", {digest});
-  if (status.ok()) status = connection.Run("DELETE FROM jobs WHERE digest = ?", {digest});
+  if (status.ok()) {
+    status = connection.Run("DELETE FROM jobs WHERE digest = ?1 OR transfer_of = ?1", {digest});
+  }
   return status;
 }
 

@@ -233,6 +233,7 @@ absl::StatusOr<std::shared_ptr<const ModalModel>> ModelStore::Load(const std::st
     model = cached.revision == row.revision ? cached.model.lock() : nullptr;
     if (model != nullptr) return absl::OkStatus();
     ASSIGN_OR_RETURN(ModalModel read, ReadModel(connection, row));
+    read.revision = row.revision;
     model = std::make_shared<const ModalModel>(std::move(read));
     cached = {row.revision, model};
     return absl::OkStatus();
@@ -320,7 +321,8 @@ absl::StatusOr<Collected> ModelStore::Collect(uint64_t budget_bytes, const std::
         std::vector<Candidate> oldest_first;
         uint64_t total_bytes = 0;
         written = connection.Query(
-            "SELECT digest, stored_bytes, pinned FROM models "
+            "SELECT digest, stored_bytes + (SELECT coalesce(sum(transfers.stored_bytes), 0) "
+            "FROM transfers WHERE transfers.revision = models.revision), pinned FROM models "
             "ORDER BY max(sounded_unix_ms, created_unix_ms), revision",
             {}, [&](const SqlRow& row) ABSL_EXCLUSIVE_LOCKS_REQUIRED(cache_mutex_) {
               const auto bytes = static_cast<uint64_t>(row.Int(1));

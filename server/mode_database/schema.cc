@@ -80,6 +80,20 @@ constexpr std::array kMigrations = {R"sql(
 )sql",
                                     R"sql(
   ALTER TABLE meshes ADD COLUMN uploaded_unix_ms INTEGER NOT NULL DEFAULT 0;
+)sql",
+                                    R"sql(
+  CREATE TABLE transfers (
+    revision INTEGER NOT NULL REFERENCES models ON DELETE CASCADE,
+    speed INTEGER NOT NULL,
+    stored_bytes INTEGER NOT NULL,
+    created_unix_ms INTEGER NOT NULL,
+    header_xxh3 INTEGER NOT NULL,
+    xxh3 INTEGER NOT NULL,
+    header BLOB NOT NULL,
+    data BLOB NOT NULL,
+    PRIMARY KEY (revision, speed)
+  ) STRICT;
+  ALTER TABLE jobs ADD COLUMN transfer_of TEXT NOT NULL DEFAULT '';
 )sql"};
 
 absl::StatusOr<int64_t> Version(SqliteConnection& connection) {

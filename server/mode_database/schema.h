@@ -13,15 +13,17 @@
 //   models      revision | digest  label  pinned  quarantined  header ...       :
 //                  ^                                              :             :
 //   model_chunks revision + number | array  byte_offset  xxh3  data             :
+//   transfers    revision + speed | stored_bytes  header  xxh3  data  :         :
 //                                                                 : mesh_digest :
 //                                                     meshes      digest | byte_count ...
 //                                                                   ^
 //                                                     mesh_chunks digest + byte_offset | data
 //   facts           name | value
 //
-// An arrow is a foreign key: chunks are deleted with the row that owns them. A dotted line joins
-// equal values without a foreign key: one digest names a job, its model and the model's tags, so
-// that tags stay when a new revision replaces the model.
+// An arrow is a foreign key: chunks and transfers are deleted with the row that owns them. A dotted
+// line joins equal values without a foreign key: one digest names a job, its model and the model's
+// tags, so that tags stay when a new revision replaces the model. The digest of a job that computes
+// a transfer names the job alone; jobs.transfer_of is the digest of its model.
 
 namespace carillon {
 

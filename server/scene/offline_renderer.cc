@@ -52,7 +52,7 @@ bool IsMove(const MixerEvent& event) {
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<OfflineRenderer>> OfflineRenderer::Make(
-    const OfflineSettings& settings, BodyCache& bodies) {
+    const OfflineSettings& settings, BodyCache& bodies, TransferStore* transfers) {
   if (settings.sample_rate_hz < kLowestRateHz || settings.sample_rate_hz > kHighestRateHz) {
     return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
                    absl::StrCat("sample_rate_hz is ", settings.sample_rate_hz, "; it must be ",
@@ -69,14 +69,16 @@ absl::StatusOr<std::unique_ptr<OfflineRenderer>> OfflineRenderer::Make(
         absl::StrCat("channel_count is ", settings.channel_count, "; it must be 1 or 2"));
   }
   RETURN_IF_ERROR(Validate(settings.space));
-  std::unique_ptr<OfflineRenderer> renderer(new OfflineRenderer(settings, bodies));
+  std::unique_ptr<OfflineRenderer> renderer(new OfflineRenderer(settings, bodies, transfers));
   ASSIGN_OR_RETURN(renderer->stream_, renderer->mixer_.OpenStream(kOfflineQueueCapacity));
   return renderer;
 }
 
-OfflineRenderer::OfflineRenderer(const OfflineSettings& settings, BodyCache& bodies)
+OfflineRenderer::OfflineRenderer(const OfflineSettings& settings, BodyCache& bodies,
+                                 TransferStore* transfers)
     : settings_(settings),
       bodies_(bodies),
+      transfers_(transfers),
       threads_(settings.thread_count),
       mixer_(SettingsOf(settings, threads_)),
       scene_("the trace", settings.space),
@@ -88,8 +90,8 @@ absl::Status OfflineRenderer::AddObject(uint32_t handle, std::shared_ptr<const M
   RETURN_IF_ERROR(scene_.CheckFree(handle));
   ASSIGN_OR_RETURN(std::shared_ptr<const SoundingBody> body, bodies_.Get(std::move(model)));
   auto voice = MakeVoice(settings_.space, properties.pose, mixer_.settings());
-  ASSIGN_OR_RETURN(SoundingObject object,
-                   MakeSoundingObject(std::move(body), properties, mixer_, std::move(voice)));
+  ASSIGN_OR_RETURN(SoundingObject object, MakeSoundingObject(std::move(body), properties, mixer_,
+                                                             std::move(voice), transfers_));
   return scene_.Insert(handle, std::move(object));
 }
 

@@ -58,10 +58,11 @@ class OfflineRenderer {
   /// Impulses later than this are rejected.
   static constexpr double kMaxTimeS = 86400;
 
-  /// `bodies` must outlive the renderer. Errors: InvalidArgument (INVALID_SETTINGS,
-  /// INVALID_HEARING, INVALID_POSE).
+  /// `bodies` and `transfers` (null: none are stored) must outlive the renderer. Errors:
+  /// InvalidArgument (INVALID_SETTINGS, INVALID_HEARING, INVALID_POSE).
   static absl::StatusOr<std::unique_ptr<OfflineRenderer>> Make(const OfflineSettings& settings,
-                                                               BodyCache& bodies);
+                                                               BodyCache& bodies,
+                                                               TransferStore* transfers = nullptr);
 
   /// Errors: AlreadyExists (OBJECT_EXISTS), and those of MakeSoundingObject.
   absl::Status AddObject(uint32_t handle, std::shared_ptr<const ModalModel> model,
@@ -91,7 +92,7 @@ class OfflineRenderer {
     const uint64_t first_frame_;
   };
 
-  OfflineRenderer(const OfflineSettings& settings, BodyCache& bodies);
+  OfflineRenderer(const OfflineSettings& settings, BodyCache& bodies, TransferStore* transfers);
 
   std::vector<MixerEvent>& events() { return target_.events; }
   const std::vector<MixerEvent>& events() const { return target_.events; }
@@ -104,6 +105,7 @@ class OfflineRenderer {
 
   const OfflineSettings settings_;
   BodyCache& bodies_;
+  TransferStore* transfers_;
   RenderThreads threads_;
   Mixer mixer_;
   std::unique_ptr<EventStream> stream_;

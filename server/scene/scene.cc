@@ -43,6 +43,11 @@ absl::StatusOr<SoundingObject> Scene::Copy(uint32_t handle) const {
   return *object;
 }
 
+std::map<uint32_t, SoundingObject> Scene::CopyAll() const {
+  const MutexLock lock(&mutex_);
+  return objects_;
+}
+
 absl::Status Scene::CheckFree(uint32_t handle) const {
   const MutexLock lock(&mutex_);
   return objects_.contains(handle) ? ObjectExists(handle) : absl::OkStatus();

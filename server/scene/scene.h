@@ -47,6 +47,9 @@ class Scene {
   /// Returns a copy of an object. Errors: those of Find.
   absl::StatusOr<SoundingObject> Copy(uint32_t handle) const;
 
+  /// Returns a copy of every object by its handle; none once the scene was deleted.
+  std::map<uint32_t, SoundingObject> CopyAll() const;
+
   /// Errors: AlreadyExists (OBJECT_EXISTS: an object has this handle).
   absl::Status CheckFree(uint32_t handle) const;
 

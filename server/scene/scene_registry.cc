@@ -2,6 +2,7 @@
 #include "server/scene/scene_registry.h"
 
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
@@ -25,6 +26,7 @@ ObjectProperties Changed(ObjectProperties properties, const ObjectChange& change
   }
   if (change.size) properties.material.size = *change.size;
   if (change.gain) properties.gain = *change.gain;
+  if (change.radiation) properties.radiation = *change.radiation;
   if (change.pose) properties.pose = change.pose;
   return properties;
 }
@@ -71,8 +73,8 @@ absl::StatusOr<PlacedObject> SceneRegistry::AddObject(uint64_t scene, uint32_t h
   }
   ASSIGN_OR_RETURN(std::shared_ptr<const SoundingBody> body, bodies_.Get(std::move(model)));
   auto voice = MakeVoice(found->space(), properties.pose, mixer_.settings());
-  ASSIGN_OR_RETURN(SoundingObject object,
-                   MakeSoundingObject(std::move(body), properties, mixer_, std::move(voice)));
+  ASSIGN_OR_RETURN(SoundingObject object, MakeSoundingObject(std::move(body), properties, mixer_,
+                                                             std::move(voice), transfers_));
   const uint32_t chosen = handle != 0 ? handle : found->FreeHandle();
   // This cannot fail, because every change of the scene holds change_mutex_.
   found->Insert(chosen, object).IgnoreError();
@@ -88,10 +90,8 @@ absl::StatusOr<PlacedObject> SceneRegistry::UpdateObject(uint64_t scene, uint32_
   RETURN_IF_ERROR(ValidateGlide(change.glide_s));
   if (change.pose) RETURN_IF_ERROR(Validate(*change.pose));
   ASSIGN_OR_RETURN(const SoundingObject old, found->Copy(handle));
-  if (change.material || change.size || change.gain) {
-    ASSIGN_OR_RETURN(
-        SoundingObject object,
-        MakeSoundingObject(old.body, Changed(old.properties, change), mixer_, old.voice));
+  if (change.material || change.size || change.gain || change.radiation) {
+    ASSIGN_OR_RETURN(SoundingObject object, Remake(old, Changed(old.properties, change)));
     found->Replace(handle, std::move(object)).IgnoreError();
     mixer_.LetRingOut(old.bank);
   }
@@ -103,6 +103,33 @@ absl::StatusOr<PlacedObject> SceneRegistry::UpdateObject(uint64_t scene, uint32_
   }
   ASSIGN_OR_RETURN(SoundingObject object, found->Copy(handle));
   return PlacedObject{.handle = handle, .object = std::move(object)};
+}
+
+void SceneRegistry::TakeOverTransfers(const std::string& model_digest) {
+  const MutexLock change_lock(&change_mutex_);
+  std::vector<std::shared_ptr<Scene>> scenes;
+  {
+    const MutexLock lock(&mutex_);
+    for (const auto& [id, scene] : scenes_) scenes.push_back(scene);
+  }
+  for (const std::shared_ptr<Scene>& scene : scenes) {
+    for (const auto& [handle, old] : scene->CopyAll()) {
+      const ModalModel& model = *old.body->model;
+      if (model.digest != model_digest) continue;
+      const auto transfer = ChooseTransfer(model, old.properties, transfers_);
+      if (!transfer.ok() || *transfer == old.transfer) continue;
+      // An object that cannot be made anew, as for want of room on the mixer, stays as it is.
+      absl::StatusOr<SoundingObject> object = Remake(old, old.properties);
+      if (!object.ok()) continue;
+      scene->Replace(handle, *std::move(object)).IgnoreError();
+      mixer_.LetRingOut(old.bank);
+    }
+  }
+}
+
+absl::StatusOr<SoundingObject> SceneRegistry::Remake(const SoundingObject& old,
+                                                     const ObjectProperties& properties) {
+  return MakeSoundingObject(old.body, properties, mixer_, old.voice, transfers_);
 }
 
 absl::Status SceneRegistry::UpdateListener(uint64_t scene, const Pose& pose, double glide_s) {

@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <string>
 
 #include "absl/base/thread_annotations.h"
 #include "absl/status/statusor.h"
@@ -29,6 +30,7 @@ struct ObjectChange {
   std::optional<double> size;
   std::optional<double> gain;
   std::optional<Pose> pose;
+  std::optional<RadiationModel> radiation;
   double glide_s = 0;  ///< duration of the way to the pose, 0 to 10; zero: the object jumps
 };
 
@@ -38,8 +40,9 @@ class SceneRegistry {
   static constexpr size_t kMaxSceneCount = 64;
   static constexpr size_t kMaxObjectCount = 4096;
 
-  /// `mixer` must outlive the registry.
-  explicit SceneRegistry(Mixer& mixer) : mixer_(mixer) {}
+  /// `mixer` and `transfers` (null: none are stored) must outlive the registry.
+  explicit SceneRegistry(Mixer& mixer, TransferStore* transfers = nullptr)
+      : mixer_(mixer), transfers_(transfers) {}
 
   /// Returns the id of a new scene. Errors: ResourceExhausted (TOO_MANY_SCENES), and those of
   /// Validate.
@@ -61,6 +64,10 @@ class SceneRegistry {
   absl::StatusOr<PlacedObject> UpdateObject(uint64_t scene, uint32_t handle,
                                             const ObjectChange& change);
 
+  /// Makes objects with this model sound by the transfer that fits them best now. A new oscillator
+  /// bank takes the impulses from now on, and the old bank rings out.
+  void TakeOverTransfers(const std::string& model_digest);
+
   /// Moves the listener to `pose`; `glide_s` is as for objects. Errors: NotFound (SCENE_NOT_FOUND),
   /// InvalidArgument (INVALID_POSE, INVALID_GLIDE).
   absl::Status UpdateListener(uint64_t scene, const Pose& pose, double glide_s);
@@ -78,12 +85,16 @@ class SceneRegistry {
 
  private:
   absl::StatusOr<std::shared_ptr<Scene>> FindScene(uint64_t scene) const;
+  absl::StatusOr<SoundingObject> Remake(const SoundingObject& old,
+                                        const ObjectProperties& properties)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(change_mutex_);
   absl::Status OpenMoves() ABSL_EXCLUSIVE_LOCKS_REQUIRED(change_mutex_);
   void SendMove(const SoundingObject& object, const MixerEvent::Action& move)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(change_mutex_);
   Motion MotionOf(const Pose& pose, double glide_s) const;
 
   Mixer& mixer_;
+  TransferStore* transfers_;
   BodyCache bodies_;
   /// Held while objects are added, changed and removed, so that limits are exact and two changes of
   /// one object do not undo each other. Contacts do not take it.

@@ -63,6 +63,13 @@ absl::Status NoModeInBand(const ModalModel& model, const SoundingMaterial& mater
   return status;
 }
 
+Radiation RadiationOf(const Transfer* transfer) {
+  if (transfer == nullptr) return {};
+  return {.power_integrals = transfer->power_integrals,
+          .air_density_kg_per_m3 = transfer->air_density_kg_per_m3,
+          .sound_speed_m_per_s = transfer->sound_speed_m_per_s};
+}
+
 /// Returns the frequency up to which the model is complete, unless that is the top of the band.
 std::optional<double> CompleteTo(const ModalModel& model, const SoundingMaterial& material,
                                  double top_hz) {
@@ -75,15 +82,33 @@ std::optional<double> CompleteTo(const ModalModel& model, const SoundingMaterial
 
 }  // namespace
 
+absl::StatusOr<std::shared_ptr<const Transfer>> ChooseTransfer(const ModalModel& model,
+                                                               const ObjectProperties& properties,
+                                                               TransferStore* transfers) {
+  if (properties.radiation == RadiationModel::kPaperCoupling) return nullptr;
+  const SoundingMaterial& material = properties.material;
+  const double speed_m_per_s = std::sqrt(material.young_pa / material.density_kg_per_m3);
+  auto transfer = transfers == nullptr ? nullptr : transfers->Find(model, speed_m_per_s);
+  if (transfer != nullptr || properties.radiation == RadiationModel::kDefault) return transfer;
+  return Refusal(absl::StatusCode::kFailedPrecondition, "TRANSFER_NOT_FOUND",
+                 absl::StrCat("no transfer is stored of modalModels/", model.digest,
+                              " for a material in which sound travels at ", speed_m_per_s,
+                              " m/s: ask for it with CreateTransfer and let its job succeed"));
+}
+
 absl::StatusOr<SoundingObject> MakeSoundingObject(std::shared_ptr<const SoundingBody> body,
                                                   const ObjectProperties& properties, Mixer& mixer,
-                                                  std::shared_ptr<Voice> voice) {
+                                                  std::shared_ptr<Voice> voice,
+                                                  TransferStore* transfers) {
   const ModalModel& model = *body->model;
   RETURN_IF_ERROR(Check(model, properties));
   const SoundingBand band;
   const MixerSettings& settings = mixer.settings();
-  const SoundingModes sounding = SelectSoundingModes(
-      model.eigenvalues, model.couplings, properties.material, settings.sample_rate_hz, band);
+  ASSIGN_OR_RETURN(std::shared_ptr<const Transfer> transfer,
+                   ChooseTransfer(model, properties, transfers));
+  const ModeTable table{model.eigenvalues, model.couplings, RadiationOf(transfer.get())};
+  const SoundingModes sounding =
+      SelectSoundingModes(table, properties.material, settings.sample_rate_hz, band);
   if (sounding.modes.empty()) return NoModeInBand(model, properties.material, band);
   auto oscillators = std::make_unique<OscillatorBank>(
       sounding, body->shapes,
@@ -99,7 +124,8 @@ absl::StatusOr<SoundingObject> MakeSoundingObject(std::shared_ptr<const Sounding
                         .highest_frequency_hz = sounding.modes.back().natural_frequency_hz,
                         .complete_to_hz = CompleteTo(model, properties.material, top_hz),
                         .bank = bank,
-                        .voice = std::move(voice)};
+                        .voice = std::move(voice),
+                        .transfer = std::move(transfer)};
 }
 
 }  // namespace carillon

@@ -7,6 +7,9 @@
 
 #include "absl/status/statusor.h"
 #include "server/base/pose.h"
+#include "server/mode_database/modal_model.h"
+#include "server/mode_database/transfer.h"
+#include "server/mode_database/transfer_store.h"
 #include "server/scene/sounding_body.h"
 #include "server/synthesis/bank/oscillator_bank.h"
 #include "server/synthesis/bank/sounding_modes.h"
@@ -16,13 +19,21 @@
 
 namespace carillon {
 
-/// Material, loudness and place of an object.
+/// How the motion of an object's surface becomes sound.
+enum class RadiationModel {
+  kDefault,        ///< kRadiatedPower if a transfer is stored, otherwise kPaperCoupling
+  kPaperCoupling,  ///< every mode radiates as well as a plane wave does, without damping by it
+  kRadiatedPower,  ///< each mode radiates, and is damped, by the power of a stored transfer
+};
+
+/// Material, loudness, place and radiation of an object.
 struct ObjectProperties {
   SoundingMaterial material;  ///< with the size relative to the model's
   /// Poisson's ratio of the material; if it is given, it must agree with the model's.
   std::optional<double> poisson_ratio;
   double gain = 1;                          ///< linear
   std::optional<Pose> pose = std::nullopt;  ///< the newest that was told
+  RadiationModel radiation = RadiationModel::kDefault;
 };
 
 /// An object that sounds. Its oscillator bank belongs to a mixer.
@@ -37,15 +48,25 @@ struct SoundingObject {
   std::optional<double> complete_to_hz;
   BankId bank;
   std::shared_ptr<Voice> voice = nullptr;  ///< null in a scene without spatial audio
+  /// How its modes radiate; null: by the paper's coupling.
+  std::shared_ptr<const Transfer> transfer = nullptr;
 };
+
+/// The transfer with which an object sounds, as its properties ask; null: by the paper's coupling.
+/// `transfers` may be null: none is stored.
+/// Errors: FailedPrecondition (TRANSFER_NOT_FOUND).
+absl::StatusOr<std::shared_ptr<const Transfer>> ChooseTransfer(const ModalModel& model,
+                                                               const ObjectProperties& properties,
+                                                               TransferStore* transfers);
 
 /// Applies material and size to a model and puts its bank, heard through `voice`, on `mixer`.
 /// Errors: InvalidArgument (INVALID_OBJECT: size or gain out of range; INVALID_POSE),
 /// FailedPrecondition
 /// (POISSON_RATIO_DIFFERS, NO_MODE_IN_BAND with the figure first_mode_hz), ResourceExhausted
-/// (TOO_MANY_OBJECTS).
+/// (TOO_MANY_OBJECTS), and those of ChooseTransfer.
 absl::StatusOr<SoundingObject> MakeSoundingObject(std::shared_ptr<const SoundingBody> body,
                                                   const ObjectProperties& properties, Mixer& mixer,
-                                                  std::shared_ptr<Voice> voice = nullptr);
+                                                  std::shared_ptr<Voice> voice = nullptr,
+                                                  TransferStore* transfers = nullptr);
 
 }  // namespace carillon

@@ -15,7 +15,8 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 
 class Daemon:
-    """carillond on a Unix socket within `folder`, without a sound device unless `arguments` name one."""
+    """carillond on a Unix socket within `folder`, without a sound device and without transfers, which would change
+    the levels of what sounds, unless `arguments` ask for them."""
 
     def __init__(self, folder, *arguments, environment=None):
         self.environment = environment
@@ -30,7 +31,8 @@ class Daemon:
         with open(self.folder / "log", "ab") as log:
             self.process = subprocess.Popen(
                 [BIN / "carillond", "--data-dir", self.folder / "data", "--listen", self.server,
-                 *([] if "--audio-device" in self.arguments else ["--audio-device", "null"]), *self.arguments],
+                 *([] if "--audio-device" in self.arguments else ["--audio-device", "null"]),
+                 *([] if "--transfers" in self.arguments else ["--no-transfers"]), *self.arguments],
                 stdout=subprocess.PIPE, stderr=log, text=True, env=self.environment)
         address_count = 1 + self.arguments.count("--listen")
         self.listening = [self.process.stdout.readline() for _ in range(address_count)]

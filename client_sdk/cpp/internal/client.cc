@@ -86,6 +86,10 @@ absl::StatusOr<v1::Job> Client::CreateModalModel(const v1::CreateModalModelReque
   return NotOverridden("CreateModalModel");
 }
 
+absl::StatusOr<v1::Job> Client::CreateTransfer(const v1::CreateTransferRequest&) const {
+  return NotOverridden("CreateTransfer");
+}
+
 absl::StatusOr<v1::ModalModelSummary> Client::GetModalModel(const std::string&) const {
   return NotOverridden("GetModalModel");
 }

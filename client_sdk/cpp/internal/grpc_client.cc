@@ -58,6 +58,13 @@ absl::StatusOr<v1::Job> GrpcClient::CreateModalModel(
   return std::move(*response->mutable_job());
 }
 
+absl::StatusOr<v1::Job> GrpcClient::CreateTransfer(const v1::CreateTransferRequest& request) const {
+  auto response =
+      Call(stubs_->models, stubs_->server, &v1::ModalModelService::Stub::CreateTransfer, request);
+  if (!response.ok()) return response.status();
+  return std::move(*response->mutable_job());
+}
+
 absl::StatusOr<v1::ModalModelSummary> GrpcClient::GetModalModel(const std::string& name) const {
   auto response = Call(stubs_->models, stubs_->server, &v1::ModalModelService::Stub::GetModalModel,
                        Named<v1::GetModalModelRequest>(name));

@@ -31,6 +31,7 @@ class GrpcClient final : public Client {
   absl::StatusOr<std::string> UploadMesh(absl::string_view bytes) const override;
   absl::StatusOr<v1::Job> CreateModalModel(
       const v1::CreateModalModelRequest& request) const override;
+  absl::StatusOr<v1::Job> CreateTransfer(const v1::CreateTransferRequest& request) const override;
   absl::StatusOr<v1::ModalModelSummary> GetModalModel(const std::string& name) const override;
   absl::StatusOr<v1::ListModalModelsResponse> ListModalModelsPage(
       const v1::ListModalModelsRequest& request) const override;

@@ -17,6 +17,7 @@ absl::Status GrpcClient::ExportModalModel(const std::string& name, const RecordS
   grpc::ClientContext context;
   v1::ExportModalModelRequest request;
   request.set_name(name);
+  request.set_transfers(true);
   const auto reader = stubs_->models.ExportModalModel(&context, request);
   v1::ExportModalModelResponse response;
   absl::Status taken = absl::OkStatus();

@@ -57,12 +57,20 @@ absl::Status GrpcClient::UploadResult(const JobRun& run, const v1::RunEnd& end,
   request.set_job(run.job);
   bool open = true;
   absl::Status sent;
-  if (!model_file.empty()) {
+  const auto send = [&] {
+    open = writer->Write(request);
+    request.clear_job();
+    return open ? absl::OkStatus() : absl::CancelledError();  // Finish tells why
+  };
+  if (HoldsTransfer(model_file)) {
+    sent = ReadTransferRecords(model_file, [&](const v1::TransferRecord& record) {
+      *request.mutable_transfer() = record;
+      return send();
+    });
+  } else if (!model_file.empty()) {
     sent = ReadRecords(model_file, [&](const v1::ModalModelRecord& record) {
       *request.mutable_record() = record;
-      open = writer->Write(request);
-      request.clear_job();
-      return open ? absl::OkStatus() : absl::CancelledError();  // Finish tells why
+      return send();
     });
   }
   *request.mutable_end() = end;

@@ -13,6 +13,29 @@ namespace {
 
 constexpr int kReadBytes = 2 << 20;
 
+template <typename Record>
+absl::Status ReadDelimited(const std::string& file,
+                           absl::FunctionRef<absl::Status(const Record&)> sink) {
+  const int descriptor = open(file.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor < 0) {
+    return Refusal(absl::StatusCode::kNotFound, "FILE_NOT_FOUND",
+                   absl::StrCat(file, " cannot be read; check its name and its permissions"));
+  }
+  google::protobuf::io::FileInputStream in(descriptor, kReadBytes);
+  in.SetCloseOnDelete(true);
+  while (true) {
+    bool at_end = false;
+    Record record;
+    if (!google::protobuf::util::ParseDelimitedFromZeroCopyStream(&record, &in, &at_end)) {
+      if (at_end) return absl::OkStatus();
+      return Refusal(
+          absl::StatusCode::kInvalidArgument, "MODAL_MODEL_MALFORMED",
+          absl::StrCat(file, " is not a whole file of modal model records; export it again"));
+    }
+    if (absl::Status status = sink(record); !status.ok()) return status;
+  }
+}
+
 }  // namespace
 
 absl::Status NotWritable(const std::string& file) {
@@ -24,24 +47,21 @@ absl::Status NotWritable(const std::string& file) {
 
 absl::Status ReadRecords(const std::string& file,
                          absl::FunctionRef<absl::Status(const v1::ModalModelRecord&)> sink) {
-  const int descriptor = open(file.c_str(), O_RDONLY | O_CLOEXEC);
-  if (descriptor < 0) {
-    return Refusal(absl::StatusCode::kNotFound, "FILE_NOT_FOUND",
-                   absl::StrCat(file, " cannot be read; check its name and its permissions"));
-  }
-  google::protobuf::io::FileInputStream in(descriptor, kReadBytes);
-  in.SetCloseOnDelete(true);
-  while (true) {
-    bool at_end = false;
-    v1::ModalModelRecord record;
-    if (!google::protobuf::util::ParseDelimitedFromZeroCopyStream(&record, &in, &at_end)) {
-      if (at_end) return absl::OkStatus();
-      return Refusal(
-          absl::StatusCode::kInvalidArgument, "MODAL_MODEL_MALFORMED",
-          absl::StrCat(file, " is not a whole file of modal model records; export it again"));
-    }
-    if (absl::Status status = sink(record); !status.ok()) return status;
-  }
+  return ReadDelimited<v1::ModalModelRecord>(file, sink);
+}
+
+absl::Status ReadTransferRecords(const std::string& file,
+                                 absl::FunctionRef<absl::Status(const v1::TransferRecord&)> sink) {
+  return ReadDelimited<v1::TransferRecord>(file, sink);
+}
+
+bool HoldsTransfer(const std::string& file) {
+  bool holds = false;
+  ReadTransferRecords(file, [&](const v1::TransferRecord& first) {
+    holds = first.header().air_density_kg_per_m3() > 0;
+    return absl::CancelledError();  // no further record is read
+  }).IgnoreError();
+  return holds;
 }
 
 }  // namespace carillon::client

@@ -6,6 +6,7 @@
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "carillon/v1/modal_model.pb.h"
+#include "carillon/v1/transfer.pb.h"
 
 namespace carillon::client {
 
@@ -17,5 +18,12 @@ absl::Status NotWritable(const std::string& file);
 /// (MODAL_MODEL_MALFORMED).
 absl::Status ReadRecords(const std::string& file,
                          absl::FunctionRef<absl::Status(const v1::ModalModelRecord&)> sink);
+
+/// The same for a file of a transfer.
+absl::Status ReadTransferRecords(const std::string& file,
+                                 absl::FunctionRef<absl::Status(const v1::TransferRecord&)> sink);
+
+/// Whether a file begins with the header of a transfer, which alone states the density of air.
+bool HoldsTransfer(const std::string& file);
 
 }  // namespace carillon::client

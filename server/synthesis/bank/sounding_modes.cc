@@ -5,6 +5,9 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <span>
+
+#include "server/synthesis/bank/level.h"
 
 namespace carillon {
 namespace {
@@ -60,6 +63,27 @@ void ShareMean(SoundingMode& first, SoundingMode& second) {
   }
 }
 
+/// What the air does to a mode.
+struct RadiatingMode {
+  double coupling = 0;     ///< as SoundingMode::coupling
+  double decay_per_s = 0;  ///< by radiation
+};
+
+/// `eigenvalue` is that of mode `m` with material and size.
+RadiatingMode RadiationOf(const ModeTable& table, size_t m, double eigenvalue,
+                          const SoundingMaterial& material) {
+  const Radiation& radiation = table.radiation;
+  if (radiation.power_integrals.empty()) {
+    return {.coupling = table.couplings[m] * std::sqrt(material.young_pa / material.size) /
+                        material.density_kg_per_m3};
+  }
+  const double integral =
+      double{radiation.power_integrals[m]} * material.size / material.density_kg_per_m3;
+  const double displaced = radiation.air_density_kg_per_m3 * eigenvalue;
+  return {.coupling = displaced * std::sqrt(integral / (4 * kPi)) / kPascalsPerVolumeVelocity,
+          .decay_per_s = displaced * integral / (2 * radiation.sound_speed_m_per_s)};
+}
+
 /// Pairs the closest neighbours first: an ovalling mode of a tube may lie between two pairs.
 void PairDegenerate(std::vector<SoundingMode>& modes, double tolerance) {
   std::vector<SoundingMode*> single;
@@ -86,26 +110,25 @@ double NaturalFrequencyHz(double eigenvalue, const SoundingMaterial& material) {
          (2 * kPi * material.size);
 }
 
-SoundingModes SelectSoundingModes(std::span<const double> eigenvalues,
-                                  std::span<const double> couplings,
-                                  const SoundingMaterial& material, double sample_rate_hz,
-                                  const SoundingBand& band) {
+SoundingModes SelectSoundingModes(const ModeTable& table, const SoundingMaterial& material,
+                                  double sample_rate_hz, const SoundingBand& band) {
   SoundingModes sounding;
   sounding.shape_scale = 1 / std::sqrt(material.density_kg_per_m3 * std::pow(material.size, 3));
-  const double coupling_scale =
-      std::sqrt(material.young_pa / material.size) / material.density_kg_per_m3;
-  for (size_t m = 0; m < eigenvalues.size(); ++m) {
-    const double natural_hz = NaturalFrequencyHz(eigenvalues[m], material);
+  for (size_t m = 0; m < table.eigenvalues.size(); ++m) {
+    const double natural_hz = NaturalFrequencyHz(table.eigenvalues[m], material);
     const double eigenvalue = std::pow(2 * kPi * natural_hz, 2);
     const double eta = LossFactorAt(material.loss_factor, natural_hz);
+    const RadiatingMode radiating = RadiationOf(table, m, eigenvalue, material);
     const double sigma =
-        -(material.alpha1_s * eigenvalue + material.alpha2_per_s + eta * std::sqrt(eigenvalue)) / 2;
+        -(material.alpha1_s * eigenvalue + material.alpha2_per_s + eta * std::sqrt(eigenvalue)) /
+            2 -
+        radiating.decay_per_s;
     if (!Sounds(natural_hz, eigenvalue, sigma, sample_rate_hz / 2, band)) continue;
     sounding.modes.push_back({.column = static_cast<uint32_t>(m),
                               .natural_frequency_hz = natural_hz,
                               .damped_rad_per_s = std::sqrt(eigenvalue - sigma * sigma),
                               .decay_rate_per_s = sigma,
-                              .coupling = couplings[m] * coupling_scale});
+                              .coupling = radiating.coupling});
   }
   PairDegenerate(sounding.modes, band.pair_tolerance);
   KeepMostAudible(sounding.modes, band.most_modes);

@@ -3,10 +3,10 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <span>
 #include <vector>
 
 #include "proto/cpp/loss_factor.h"
+#include "server/synthesis/bank/radiation.h"
 
 namespace carillon {
 
@@ -40,7 +40,9 @@ struct SoundingMode {
   double natural_frequency_hz = 0;
   double damped_rad_per_s = 0;  ///< omega_d
   double decay_rate_per_s = 0;  ///< sigma, not above zero
-  double coupling = 0;          ///< c_m, m^2 kg^(-1/2) s^(-1)
+  /// The pressure at 1 m is kPascalsPerVolumeVelocity times this times the modal displacement,
+  /// m^2 kg^(-1/2) s^(-1): the paper's c_m, or what radiates the mode's true power.
+  double coupling = 0;
   /// The phase by which the output leads a sine: pi/2 for the second mode of a degenerate pair,
   /// else zero.
   double output_phase_rad = 0;
@@ -55,22 +57,26 @@ struct SoundingModes {
 /// sqrt(Lambda E / (rho s^2)) / (2 pi), Hz, of an `eigenvalue` of the model.
 double NaturalFrequencyHz(double eigenvalue, const SoundingMaterial& material);
 
-/// Applies material and size to a model's eigenvalues and couplings (each #m, ascending), and
-/// selects the modes that sound (docs/physics.md, 2 and 3; the paper, 3.4):
+/// Applies material and size to a model's modes, and selects those that sound (docs/physics.md, 2
+/// and 3; the paper, 3.4):
 ///
 ///   Lambda' = Lambda E/(rho s^2),  sigma = -(alpha1 Lambda' + alpha2 + eta Lambda'^(1/2))/2,
 ///   omega_d = sqrt(Lambda' - sigma^2),  c' = c E^(1/2) rho^(-1) s^(-1/2)
 ///
-/// with the loss factor eta at the natural frequency. A mode sounds if its natural frequency lies
+/// with the loss factor eta at the natural frequency. If the radiation is known, with I' = I s/rho,
+///
+///   sigma' = sigma - rho_air Lambda' I'/(2 c),  c' kPascalsPerVolumeVelocity = rho_air Lambda'
+///   (I'/(4 pi))^(1/2)
+///
+/// so that the mode loses the power W that it radiates, and the pressure at 1 m is that of W
+/// radiated in all directions alike. A mode sounds if its natural frequency lies
 /// in the band and below Nyquist, sigma^2 < Lambda', and T60 is long enough. The two modes of a
 /// degenerate pair share their mean frequency, decay and coupling and differ in phase by a quarter
 /// period, so that loudness does not depend on the direction around the body in which it is struck;
 /// the mesh splits the pair of a chime by about 1e-4, which would beat over seconds and make 2 dB
 /// of difference. If more than `most_modes` qualify, those are kept whose sound after a unit modal
 /// impulse has the most A-weighted energy in its first 0.2 s (about the ear's integration time).
-SoundingModes SelectSoundingModes(std::span<const double> eigenvalues,
-                                  std::span<const double> couplings,
-                                  const SoundingMaterial& material, double sample_rate_hz,
-                                  const SoundingBand& band = {});
+SoundingModes SelectSoundingModes(const ModeTable& table, const SoundingMaterial& material,
+                                  double sample_rate_hz, const SoundingBand& band = {});
 
 }  // namespace carillon

@@ -52,7 +52,7 @@ class LocalExecutorTest : public ::testing::Test {
     executor_->Start({.digest = digest,
                       .request = request_,
                       .way = 0,
-                      .write_mesh =
+                      .write_input =
                           [](const std::filesystem::path& file) {
                             WriteBytes(file, "solid");
                             return absl::OkStatus();
@@ -259,7 +259,7 @@ TEST_F(LocalExecutorTest, AMeshThatCannotBeBroughtEndsTheTask) {
       {.digest = digest_,
        .request = {},
        .way = 0,
-       .write_mesh = [](const auto&) { return absl::DataLossError("MESH_CORRUPT: x"); },
+       .write_input = [](const auto&) { return absl::DataLossError("MESH_CORRUPT: x"); },
        .on_progress = [](const v1::Progress&) {},
        .on_end = [&](const Outcome& outcome) { ended.set_value(outcome); }});
   EXPECT_EQ(ended.get_future().get().error.reason(), "MESH_CORRUPT");

@@ -62,6 +62,10 @@ class Client {
   virtual absl::StatusOr<v1::Job> CreateModalModel(
       const v1::CreateModalModelRequest& request) const;
 
+  /// Asks how the modes of a stored model radiate from a body of some material, and returns the job
+  /// at once.
+  virtual absl::StatusOr<v1::Job> CreateTransfer(const v1::CreateTransferRequest& request) const;
+
   /// Returns the stored model "modalModels/{digest}" with its eigenvalues.
   virtual absl::StatusOr<v1::ModalModelSummary> GetModalModel(const std::string& name) const;
 
@@ -79,8 +83,8 @@ class Client {
   virtual absl::StatusOr<v1::ModalModelSummary> UpdateModalModel(
       const v1::UpdateModalModelRequest& request) const;
 
-  /// Passes the records of a stored model to `sink`, and returns the error of `sink` if there is
-  /// one.
+  /// Passes the records of a stored model and its transfers to `sink`, and returns the error of
+  /// `sink` if there is one.
   virtual absl::Status ExportModalModel(const std::string& name, const RecordSink& sink) const;
 
   /// Writes a stored model to a file that ImportModalModelFile reads.
@@ -180,7 +184,8 @@ class Client {
   /// wait for its own report.
   virtual absl::Status ReportProgress(const JobRun& run, const v1::Progress& progress) const;
 
-  /// Ends a run. Sends the model of `model_file`, in the stored form, unless that name is empty.
+  /// Ends a run. Sends the model or the transfer of `model_file`, in the stored form, unless that
+  /// name is empty.
   /// Further errors: NOT_FOUND (FILE_NOT_FOUND), INVALID_ARGUMENT (MODAL_MODEL_MALFORMED).
   virtual absl::Status UploadResult(const JobRun& run, const v1::RunEnd& end,
                                     const std::string& model_file) const;

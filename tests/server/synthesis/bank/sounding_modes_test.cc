@@ -7,6 +7,8 @@
 #include <numbers>
 #include <vector>
 
+#include "server/synthesis/bank/level.h"
+
 namespace carillon {
 namespace {
 
@@ -30,7 +32,7 @@ std::vector<double> EigenvaluesFor(std::vector<double> frequencies_hz,
 SoundingModes Select(const std::vector<double>& eigenvalues, const SoundingMaterial& material,
                      const SoundingBand& band = {}) {
   const std::vector<double> couplings(eigenvalues.size(), 1.0);
-  return SelectSoundingModes(eigenvalues, couplings, material, 48000, band);
+  return SelectSoundingModes({eigenvalues, couplings}, material, 48000, band);
 }
 
 TEST(SoundingModes, FrequencyDecayAndDampedFrequencyFollowTheRayleighDamping) {
@@ -133,7 +135,7 @@ TEST(SoundingModes, ModesOutsideTheBandAreDropped) {
 TEST(SoundingModes, NyquistBoundsTheBand) {
   const auto eigenvalues = EigenvaluesFor({10000, 11026}, kChime);
   const std::vector<double> couplings(2, 1.0);
-  EXPECT_EQ(SelectSoundingModes(eigenvalues, couplings, kChime, 22050).modes.size(), 1u);
+  EXPECT_EQ(SelectSoundingModes({eigenvalues, couplings}, kChime, 22050).modes.size(), 1u);
 }
 
 TEST(SoundingModes, OverdampedModesAreDroppedThoughTheirFrequencyIsInTheBand) {
@@ -142,7 +144,7 @@ TEST(SoundingModes, OverdampedModesAreDroppedThoughTheirFrequencyIsInTheBand) {
       .young_pa = 2.8e8, .density_kg_per_m3 = 550, .alpha1_s = 8e-6, .alpha2_per_s = 50};
   const auto eigenvalues = EigenvaluesFor({4600, 4700, 39000, 40000}, wood);
   EXPECT_EQ(Select(eigenvalues, wood).modes.size(), 1u);
-  const SoundingModes all = SelectSoundingModes(eigenvalues, std::vector(4, 1.0), wood, 192000,
+  const SoundingModes all = SelectSoundingModes({eigenvalues, std::vector(4, 1.0)}, wood, 192000,
                                                 {.highest_hz = 1e6, .shortest_t60_s = 0});
   EXPECT_EQ(all.modes.size(), 3u);
 }
@@ -151,7 +153,7 @@ TEST(SoundingModes, OfTooManyTheMostAudibleAreKeptInTheOrderOfTheModel) {
   const auto eigenvalues = EigenvaluesFor({100, 200, 400, 800, 1600, 3200}, kChime);
   const std::vector<double> couplings{1, 1e6, 2, 1e6, 1e6, 3};
   const SoundingModes sounding =
-      SelectSoundingModes(eigenvalues, couplings, kChime, 48000, {.most_modes = 3});
+      SelectSoundingModes({eigenvalues, couplings}, kChime, 48000, {.most_modes = 3});
   ASSERT_EQ(sounding.modes.size(), 3u);
   EXPECT_EQ(sounding.modes[0].column, 1u);
   EXPECT_EQ(sounding.modes[1].column, 3u);
@@ -161,7 +163,7 @@ TEST(SoundingModes, OfTooManyTheMostAudibleAreKeptInTheOrderOfTheModel) {
 TEST(SoundingModes, TheTwoOfADegeneratePairShareAllButAQuarterPeriod) {
   const auto eigenvalues = EigenvaluesFor({587.0, 587.5, 1500}, kChime);
   const std::vector<double> couplings{3, 4, 5};
-  const auto modes = SelectSoundingModes(eigenvalues, couplings, kChime, 48000).modes;
+  const auto modes = SelectSoundingModes({eigenvalues, couplings}, kChime, 48000).modes;
   ASSERT_EQ(modes.size(), 3u);
   EXPECT_EQ(modes[0].coupling, modes[1].coupling);
   EXPECT_EQ(modes[0].damped_rad_per_s, modes[1].damped_rad_per_s);
@@ -186,9 +188,59 @@ TEST(SoundingModes, NeighboursThatRadiateDifferentlyAreNoPair) {
   // A torsional mode that happens to lie beside a bending one.
   const auto eigenvalues = EigenvaluesFor({587.0, 587.1}, kChime);
   const std::vector<double> couplings{3, 0.01};
-  const auto modes = SelectSoundingModes(eigenvalues, couplings, kChime, 48000).modes;
+  const auto modes = SelectSoundingModes({eigenvalues, couplings}, kChime, 48000).modes;
   EXPECT_NEAR(modes[0].natural_frequency_hz, 587.0, 1e-9);
   EXPECT_EQ(modes[1].output_phase_rad, 0);
+}
+
+/// Radiation of modes with these power integrals, into the air of the defaults.
+SoundingModes SelectRadiating(const std::vector<double>& eigenvalues,
+                              const std::vector<float>& integrals,
+                              const SoundingMaterial& material) {
+  const std::vector<double> couplings(eigenvalues.size(), 1.0);
+  return SelectSoundingModes({eigenvalues, couplings, {.power_integrals = integrals}}, material,
+                             48000);
+}
+
+TEST(SoundingModes, AModeLosesThePowerThatItsSoundCarriesAway) {
+  const Radiation air;
+  const std::vector<double> eigenvalues = EigenvaluesFor({440, 3000}, kChime);
+  const SoundingModes still = Select(eigenvalues, kChime);
+  const SoundingModes radiating = SelectRadiating(eigenvalues, {3.0F, 0.2F}, kChime);
+  for (size_t m = 0; m < 2; ++m) {
+    const SoundingMode& mode = radiating.modes.at(m);
+    // With modal velocity 1 the mode has the energy 1/2 and the displacement 1/omega.
+    const double omega = 2 * kPi * mode.natural_frequency_hz;
+    const double pressure_pa = kPascalsPerVolumeVelocity * mode.coupling / omega;  // at 1 m
+    const double intensity =
+        pressure_pa * pressure_pa / (2 * air.air_density_kg_per_m3 * air.sound_speed_m_per_s);
+    const double loss_per_s = still.modes.at(m).decay_rate_per_s - mode.decay_rate_per_s;
+    EXPECT_NEAR(loss_per_s, 4 * kPi * intensity, 1e-9 * loss_per_s);
+    EXPECT_GT(loss_per_s, 0);
+  }
+}
+
+TEST(SoundingModes, RadiationScalesWithDensityAndSizeAtOneSpeedRatio) {
+  const std::vector<double> eigenvalues = EigenvaluesFor({1000}, kChime);
+  SoundingMaterial lossless = kChime;
+  lossless.alpha1_s = 0;
+  SoundingMaterial other = lossless;
+  other.young_pa *= 3;
+  other.density_kg_per_m3 *= 3;
+  other.size = 2;
+  const SoundingMode before = SelectRadiating(eigenvalues, {1.0F}, lossless).modes.at(0);
+  const SoundingMode after = SelectRadiating(eigenvalues, {1.0F}, other).modes.at(0);
+  EXPECT_NEAR(after.decay_rate_per_s / before.decay_rate_per_s, 1 / (3 * 2.0), 1e-12);
+  // rho0 omega^2 (I g / rho)^(1/2), with omega halved.
+  EXPECT_NEAR(after.coupling / before.coupling, 0.25 * std::sqrt(2 / 3.0), 1e-12);
+}
+
+TEST(SoundingModes, AModeThatRadiatesAwayWithinTwoMillisecondsDoesNotSound) {
+  const std::vector<double> eigenvalues = EigenvaluesFor({1000, 2000}, kChime);
+  const double weight = 1.204 * std::pow(2 * kPi * 2000, 2) / (2 * 343) / kChime.density_kg_per_m3;
+  const auto lost_in_2_ms = static_cast<float>(std::log(1000) / 0.002 / weight);
+  EXPECT_EQ(SelectRadiating(eigenvalues, {0, 0.9F * lost_in_2_ms}, kChime).modes.size(), 2u);
+  EXPECT_EQ(SelectRadiating(eigenvalues, {0, 1.1F * lost_in_2_ms}, kChime).modes.size(), 1u);
 }
 
 TEST(SoundingModes, AnEigenvalueThatIsNotANumberDoesNotSound) {

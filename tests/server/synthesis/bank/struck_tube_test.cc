@@ -77,7 +77,7 @@ constexpr SoundingMaterial kAluminum{
 
 SoundingModes SelectTube(const SoundingMaterial& material) {
   const Tube tube;
-  return SelectSoundingModes(tube.eigenvalues, tube.couplings, material, kTestSampleRateHz);
+  return SelectSoundingModes({tube.eigenvalues, tube.couplings}, material, kTestSampleRateHz);
 }
 
 struct Blow {

@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/mode_database/transfer_codec.h"
+
+#include <google/protobuf/io/coded_stream.h>
+#include <google/protobuf/io/zero_copy_stream_impl_lite.h>
+#include <google/protobuf/util/delimited_message_util.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <optional>
+#include <string_view>
+#include <utility>
+
+#include "absl/functional/function_ref.h"
+#include "absl/strings/str_cat.h"
+#include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
+#include "server/base/xxh3.h"
+
+namespace carillon {
+namespace {
+
+constexpr uint64_t kMostHarmonics = uint64_t{1} << 28;
+
+/// Indices into kTransferArrays.
+enum : size_t { kEigenvalues, kStates, kPowerIntegrals, kNormalEnergies, kFirst = 7, kHarmonics };
+
+absl::Status Malformed(absl::string_view what) {
+  return Refusal(absl::StatusCode::kInvalidArgument, "TRANSFER_MALFORMED",
+                 absl::StrCat("the stored transfer is not of format version 1: ", what,
+                              "; write it anew with carillon-precompute or by an export"));
+}
+
+absl::Status ForEachRecord(const std::string& bytes,
+                           absl::FunctionRef<absl::Status(const v1::TransferRecord&)> on_record) {
+  google::protobuf::io::ArrayInputStream stream(bytes.data(), static_cast<int>(bytes.size()));
+  v1::TransferRecord record;
+  bool at_end = false;
+  while (google::protobuf::util::ParseDelimitedFromZeroCopyStream(&record, &stream, &at_end)) {
+    RETURN_IF_ERROR(on_record(record));
+    record.Clear();
+  }
+  return at_end ? absl::OkStatus() : Malformed("it ends within a record");
+}
+
+TransferSizes SizesOf(const v1::TransferHeader& header) {
+  TransferSizes sizes{.modes = header.mode_count(), .harmonics = 0};
+  for (const v1::ArrayDescriptor& array : header.arrays()) {
+    if (array.name() == kTransferArrays[kHarmonics].name && array.shape_size() == 1) {
+      sizes.harmonics = array.shape(0);
+    }
+  }
+  return sizes;
+}
+
+uint64_t ArrayBytes(const ArraySpec& spec, const TransferSizes& sizes) {
+  uint64_t bytes = spec.type == v1::ELEMENT_TYPE_FLOAT64 ? sizeof(double) : sizeof(float);
+  for (const char dimension : std::string_view(spec.shape)) bytes *= sizes.Of(dimension);
+  return bytes;
+}
+
+bool IsPositive(double value) { return std::isfinite(value) && value > 0; }
+
+template <typename T>
+bool AreFinite(const std::vector<T>& values) {
+  return std::all_of(values.begin(), values.end(), [](T value) { return std::isfinite(value); });
+}
+
+/// Gives each mode that was not computed the efficiency k^2 I / (normal energy) of the nearest one
+/// that was.
+void EstimateMissing(const std::vector<double>& eigenvalues, const std::vector<uint32_t>& states,
+                     const std::vector<float>& normal_energies, std::vector<float>& integrals) {
+  const auto computed = [&](size_t m) {
+    return states[m] == static_cast<uint32_t>(RadiationState::kComputed) && normal_energies[m] > 0;
+  };
+  const size_t count = eigenvalues.size();
+  for (size_t m = 0; m < count; ++m) {
+    if (states[m] == static_cast<uint32_t>(RadiationState::kComputed)) continue;
+    std::optional<size_t> nearest;
+    for (size_t i = 0; i < count; ++i) {
+      const auto distance = [&](size_t n) {
+        return std::abs(std::log(eigenvalues[n] / eigenvalues[m]));
+      };
+      if (computed(i) && (!nearest || distance(i) < distance(*nearest))) nearest = i;
+    }
+    if (!nearest) continue;
+    integrals[m] =
+        static_cast<float>(double{integrals[*nearest]} * eigenvalues[*nearest] /
+                           normal_energies[*nearest] * normal_energies[m] / eigenvalues[m]);
+  }
+}
+
+}  // namespace
+
+absl::StatusOr<StoredTransfer> StoredTransfer::Parse(std::string bytes) {
+  StoredTransfer transfer;
+  transfer.bytes_ = std::move(bytes);
+  RETURN_IF_ERROR(transfer.ParseRecords());
+  RETURN_IF_ERROR(transfer.CheckNumbers());
+  return transfer;
+}
+
+absl::StatusOr<StoredTransfer> StoredTransfer::ReadFile(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  if (!in) {
+    return Refusal(absl::StatusCode::kNotFound, "FILE_NOT_FOUND",
+                   absl::StrCat(file.string(), " cannot be read: see its name and rights"));
+  }
+  return Parse({std::istreambuf_iterator<char>(in), {}});
+}
+
+absl::Status StoredTransfer::ParseRecords() {
+  bool begun = false;
+  RETURN_IF_ERROR(ForEachRecord(bytes_, [&](const v1::TransferRecord& record) -> absl::Status {
+    if (begun) {
+      return record.has_chunk() ? TakeChunk(record.chunk())
+                                : Malformed("a record after the header is not a chunk");
+    }
+    if (!record.has_header()) return Malformed("its first record is not a header");
+    begun = true;
+    header_ = record.header();
+    return CheckHeader();
+  }));
+  if (!begun) return Malformed("it is empty");
+  const TransferSizes sizes = SizesOf(header_);
+  for (size_t i = 0; i < kTransferArrayCount; ++i) {
+    if (arrays_[i].size() != ArrayBytes(kTransferArrays[i], sizes)) {
+      return Malformed(absl::StrCat("it ends within array \"", kTransferArrays[i].name, "\""));
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::Status StoredTransfer::CheckHeader() {
+  if (header_.format_version() != kTransferFormatVersion) {
+    return Malformed(absl::StrCat("it has format version ", header_.format_version()));
+  }
+  if (!IsPositive(header_.speed_ratio()) || !IsPositive(header_.sound_speed_m_per_s()) ||
+      !IsPositive(header_.air_density_kg_per_m3()) || header_.mode_count() == 0) {
+    return Malformed("its header has no modes, or a speed or density that is not above zero");
+  }
+  const TransferSizes sizes = SizesOf(header_);
+  if (sizes.harmonics > kMostHarmonics || header_.arrays_size() != int{kTransferArrayCount}) {
+    return Malformed("it has too many harmonics, or other arrays");
+  }
+  for (size_t i = 0; i < kTransferArrayCount; ++i) {
+    const v1::ArrayDescriptor wanted = DescribeArray(kTransferArrays[i], sizes);
+    const v1::ArrayDescriptor& array = header_.arrays(static_cast<int>(i));
+    if (array.SerializeAsString() != wanted.SerializeAsString()) {
+      return Malformed(absl::StrCat("type or shape of array \"", wanted.name(), "\" is wrong"));
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::Status StoredTransfer::TakeChunk(const v1::ModalModelChunk& chunk) {
+  if (chunk.array() >= kTransferArrayCount) return Malformed("a chunk is of no array");
+  std::string& array = arrays_[chunk.array()];
+  const char* name = kTransferArrays[chunk.array()].name;
+  const uint64_t whole = ArrayBytes(kTransferArrays[chunk.array()], SizesOf(header_));
+  if (chunk.offset() != array.size() || chunk.data().size() > whole - array.size()) {
+    return Malformed(absl::StrCat("a chunk of array \"", name, "\" is out of order or too long"));
+  }
+  if (Xxh3(chunk.data()) != chunk.xxh3()) {
+    return Refusal(
+        absl::StatusCode::kDataLoss, "TRANSFER_CORRUPT",
+        absl::StrCat("the hash of array \"", name, "\" at byte ", chunk.offset(),
+                     " of a transfer is wrong, so its bytes have changed since they were "
+                     "computed: compute it again, or import it from a copy"));
+  }
+  array.append(chunk.data());
+  return absl::OkStatus();
+}
+
+absl::Status StoredTransfer::CheckNumbers() const {
+  const TransferSizes sizes = SizesOf(header_);
+  bool good = true;
+  for (size_t i = 0; i < kTransferArrayCount; ++i) {
+    good =
+        good && (kTransferArrays[i].type != v1::ELEMENT_TYPE_FLOAT32 || AreFinite(Array<float>(i)));
+  }
+  const std::vector<double> eigenvalues = Eigenvalues();
+  good = good && AreFinite(eigenvalues) && eigenvalues.front() > 0 &&
+         std::ranges::is_sorted(eigenvalues);
+  for (const size_t i : {kPowerIntegrals, kNormalEnergies}) {
+    good = good && std::ranges::all_of(Array<float>(i), [](float value) { return value >= 0; });
+  }
+  const std::vector<uint32_t> first = Array<uint32_t>(kFirst);
+  good = good && first.front() == 0 && first.back() == sizes.harmonics &&
+         std::ranges::is_sorted(first);
+  if (good) return absl::OkStatus();
+  return Malformed("a number is not finite, out of range or out of order");
+}
+
+template <typename T>
+std::vector<T> StoredTransfer::Array(size_t index) const {
+  std::vector<T> values(arrays_[index].size() / sizeof(T));
+  if (!values.empty()) std::memcpy(values.data(), arrays_[index].data(), arrays_[index].size());
+  return values;
+}
+
+std::vector<double> StoredTransfer::Eigenvalues() const { return Array<double>(kEigenvalues); }
+
+Transfer StoredTransfer::Decode() const {
+  Transfer transfer{.speed_ratio = header_.speed_ratio(),
+                    .sound_speed_m_per_s = header_.sound_speed_m_per_s(),
+                    .air_density_kg_per_m3 = header_.air_density_kg_per_m3(),
+                    .power_integrals = Array<float>(kPowerIntegrals)};
+  EstimateMissing(Eigenvalues(), Array<uint32_t>(kStates), Array<float>(kNormalEnergies),
+                  transfer.power_integrals);
+  return transfer;
+}
+
+std::vector<v1::TransferRecord> StoredTransfer::Records() const {
+  std::vector<v1::TransferRecord> records;
+  ForEachRecord(bytes_, [&](const v1::TransferRecord& record) {
+    records.push_back(record);
+    return absl::OkStatus();
+  }).IgnoreError();
+  return records;
+}
+
+std::string Delimited(const v1::TransferRecord& record) {
+  std::string bytes;
+  {
+    google::protobuf::io::StringOutputStream stream(&bytes);
+    google::protobuf::util::SerializeDelimitedToZeroCopyStream(record, &stream);
+  }
+  return bytes;
+}
+
+}  // namespace carillon

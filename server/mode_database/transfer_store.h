@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "carillon/v1/transfer.pb.h"
+#include "server/base/clock.h"
+#include "server/base/mutex.h"
+#include "server/mode_database/modal_model.h"
+#include "server/mode_database/transfer.h"
+#include "server/mode_database/transfer_codec.h"
+
+namespace carillon {
+
+class Database;
+
+/// A stored transfer without its arrays.
+struct TransferSummary {
+  v1::TransferHeader header{};
+  uint64_t stored_bytes = 0;
+  int64_t created_unix_ms = 0;
+};
+
+/// Speed of sound in the air of speed ratios, m/s.
+inline constexpr double kSoundSpeedInAirMPerS = 343;
+
+/// The number under which transfers of nearly the same speed ratio s are stored: ln s in steps of
+/// one percent.
+int64_t SpeedStep(double speed_ratio);
+
+/// How the stored modal models radiate, by model and speed ratio. A transfer belongs to one
+/// revision of a model and is deleted with it. Safe from every thread.
+///
+/// A transfer whose bytes have changed on the disk is left out by every call; it can be computed
+/// again.
+class TransferStore {
+ public:
+  /// A transfer serves every material whose ln s differs by no more from its own: 2 dB of power.
+  static constexpr double kSpeedTolerance = 0.05;
+
+  /// Called after each transfer that is stored, with no lock of the database held.
+  using OnStored = std::function<void(const std::string& model_digest)>;
+
+  TransferStore(Database& database, const Clock& clock) : database_(&database), clock_(&clock) {}
+
+  /// Replaces the listener. The old one is not running when this returns and is never called again.
+  void Listen(OnStored on_stored);
+
+  /// Stores a transfer of the model, durably; replaces one of the same step of the speed ratio.
+  /// Errors: NotFound (MODAL_MODEL_NOT_FOUND), InvalidArgument (TRANSFER_MALFORMED: its modes are
+  /// not the model's).
+  absl::StatusOr<TransferSummary> Put(const std::string& model_digest,
+                                      const StoredTransfer& transfer);
+
+  /// Put of a file. Further errors: those of StoredTransfer::ReadFile.
+  absl::StatusOr<TransferSummary> PutFile(const std::string& model_digest,
+                                          const std::filesystem::path& file);
+
+  /// The transfers of a model by ascending speed ratio.
+  absl::StatusOr<std::vector<TransferSummary>> List(const std::string& model_digest);
+
+  /// The same, whole.
+  absl::StatusOr<std::vector<StoredTransfer>> Read(const std::string& model_digest);
+
+  /// The transfer of this revision of the model that is nearest to a material in which sound
+  /// travels at sqrt(E / rho) = `material_m_per_s`; null: none is within the tolerance. All objects
+  /// share one copy in memory.
+  std::shared_ptr<const Transfer> Find(const ModalModel& model, double material_m_per_s);
+
+ private:
+  using Key = std::pair<int64_t, int64_t>;  // revision, step of the speed ratio
+
+  Database* database_;
+  const Clock* clock_;
+  Mutex listener_mutex_;
+  OnStored on_stored_ ABSL_GUARDED_BY(listener_mutex_);
+  Mutex cache_mutex_;
+  std::map<Key, std::pair<int64_t, std::weak_ptr<const Transfer>>> cache_
+      ABSL_GUARDED_BY(cache_mutex_);  // with the hash of its bytes
+};
+
+}  // namespace carillon

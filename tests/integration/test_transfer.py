@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The radiation of the modes is computed after the model, through a kill, and what sounds takes it over."""
+
+import math
+import pathlib
+import tempfile
+import unittest
+
+import numpy
+
+import meshes
+import scripted
+import sound
+from carillon.v1 import (contact_pb2, contact_trace_pb2, decomposition_pb2, decomposition_service_pb2, material_pb2,
+                         radiation_pb2, scene_service_pb2, transfer_pb2)
+from daemon import BIN, Daemon
+
+MATERIAL = material_pb2.Material(preset=meshes.MATERIAL)
+AIR_DENSITY, SOUND_SPEED = 1.204, 343
+# The paper's coupling becomes a pressure by rho omega / (4 pi r) at 1 kHz and 1 m.
+PASCALS_PER_COUPLING = AIR_DENSITY * 2000 * math.pi / (4 * math.pi)
+# The transfer waits until it may be computed.
+WORKER = """
+if grep -q radiate_stored_model "$request"; then
+  echo transfer >>"$here/runs"
+  while [ ! -e "$here/enough" ]; do printf '\\002\\012\\000' >&3; sleep 0.05; done
+fi
+exec BIN/carillon-precompute "$@"
+""".replace("BIN", str(BIN))
+
+
+class TransferTest(unittest.TestCase):
+    def setUp(self):
+        scratch = tempfile.TemporaryDirectory(prefix="carillon-")
+        self.addCleanup(scratch.cleanup)
+        self.folder = pathlib.Path(scratch.name)
+        self.daemon = Daemon(self.folder, "--transfers", "--precompute", scripted.worker(self.folder, WORKER))
+        self.addCleanup(self.daemon.stop)
+        self.client = self.daemon.client()
+
+    def transfer_job(self):
+        """The job that computes a transfer, as it stands now."""
+        jobs = self.client.jobs.ListJobs(decomposition_service_pb2.ListJobsRequest()).jobs
+        found = [job for job in jobs if job.kind == decomposition_pb2.JOB_KIND_TRANSFER]
+        self.assertEqual(len(found), 1)
+        return found[0]
+
+    def await_transfer(self):
+        """Returns the job of the transfer when it has ended."""
+        request = decomposition_service_pb2.WatchJobRequest(name=self.transfer_job().name)
+        *_, last = self.client.jobs.WatchJob(request)
+        return last.job
+
+    def add_object(self, model):
+        """The name of an object in a scene of its own, and how it radiates."""
+        scene = self.client.scenes.CreateScene(scene_service_pb2.CreateSceneRequest()).name
+        added = self.client.scenes.AddObject(scene_service_pb2.AddObjectRequest(
+            scene=scene, modal_model=model, material=MATERIAL)).object
+        return added.name, added.radiation
+
+    def render(self, model, radiation):
+        """The bar struck across its broad side at an end."""
+        length, width, height = meshes.BAR_SIZE
+        placed = contact_trace_pb2.ContactTraceObject(
+            handle=1, modal_model=model, material=MATERIAL, radiation=radiation)
+        step = contact_pb2.ContactStep(time_s=0, impulses=[
+            sound.impulse((length, width, height), (0, 0.3e-3, -1e-3))])
+        samples, _ = sound.render(self.daemon, [placed], [step], 0.5)
+        return samples
+
+    def arrays(self, model):
+        """The numbers of the model and of its transfer by name, out of an exported file."""
+        file = self.folder / "exported.model"
+        self.daemon.command("model", "export", model, "--out", file)
+        types = {1: numpy.float32, 2: numpy.float64, 3: numpy.uint32}
+        described, data = [], {}
+        for record in scripted.read_records(file):
+            if record.HasField("transfer"):
+                record = transfer_pb2.TransferRecord.FromString(record.transfer)
+            if record.HasField("header"):
+                described = record.header.arrays
+            else:
+                array = described[record.chunk.array]
+                data.setdefault(array.name, []).append(
+                    numpy.frombuffer(record.chunk.data, types[array.type]))
+        return {name: numpy.concatenate(pieces) for name, pieces in data.items()}
+
+    def test_levels_and_decays_change_as_the_transfer_says_through_a_kill(self):
+        model = self.client.wait(self.client.create(meshes.bar(), "obj", material=MATERIAL, max_frequency_hz=8000))
+        self.assertEqual(self.transfer_job().modal_model, model)
+        name, radiation = self.add_object(model)
+        self.assertEqual(radiation, radiation_pb2.RADIATION_MODEL_PAPER_COUPLING)
+        before = self.render(model, radiation_pb2.RADIATION_MODEL_UNSPECIFIED)
+
+        self.daemon.kill()
+        self.daemon.start()
+        self.client = self.daemon.client()
+        name, radiation = self.add_object(model)
+        self.assertEqual(radiation, radiation_pb2.RADIATION_MODEL_PAPER_COUPLING)
+        (self.folder / "enough").touch()
+        self.assertEqual(self.await_transfer().state, decomposition_pb2.JOB_STATE_SUCCEEDED)
+        taken_over = self.client.scenes.UpdateObject(scene_service_pb2.UpdateObjectRequest(name=name)).object
+        self.assertEqual(taken_over.radiation, radiation_pb2.RADIATION_MODEL_RADIATED_POWER)
+        self.assertIn("transfer   for 503", self.daemon.command("model", "show", model).stdout)
+
+        after = self.render(model, radiation_pb2.RADIATION_MODEL_UNSPECIFIED)
+        self.assert_changed_by(self.arrays(model), before, after)
+        numpy.testing.assert_array_equal(
+            self.render(model, radiation_pb2.RADIATION_MODEL_PAPER_COUPLING), before)
+
+        self.daemon.stop()
+        self.daemon.start()
+        self.client = self.daemon.client()
+        self.assertEqual(self.add_object(model)[1], radiation_pb2.RADIATION_MODEL_RADIATED_POWER)
+        self.assertEqual((self.folder / "runs").read_text().split(), ["transfer"] * 2)
+
+    def assert_changed_by(self, arrays, before, after):
+        changes_db = []
+        for m in range(3):
+            omega2 = arrays["eigenvalues"][m] * meshes.YOUNG_PA / meshes.DENSITY
+            integral = arrays["power_integrals"][m] / meshes.DENSITY
+            coupling = arrays["couplings"][m] * math.sqrt(meshes.YOUNG_PA) / meshes.DENSITY
+            ratio = AIR_DENSITY * omega2 * math.sqrt(integral / (4 * math.pi)) / (PASCALS_PER_COUPLING * coupling)
+            frequency = math.sqrt(omega2) / (2 * math.pi)
+            old, new = (sound.measure(samples, frequency, 0.1, 0.4) for samples in (before, after))
+            changes_db.append(20 * math.log10(ratio))
+            # 24-bit samples of quiet modes leave some hundredths of a decibel.
+            self.assertAlmostEqual(20 * math.log10(new.amplitude / old.amplitude), changes_db[-1], delta=0.1)
+            decay = AIR_DENSITY * omega2 * integral / (2 * SOUND_SPEED)
+            self.assertAlmostEqual(old.decay_per_s - new.decay_per_s, decay, delta=0.05)
+        # The lowest bending mode of so slender a bar hardly radiates.
+        self.assertLess(changes_db[0], changes_db[2])
+
+    def test_an_export_brings_the_transfer_to_another_daemon(self):
+        (self.folder / "enough").touch()
+        model = self.client.wait(self.client.create(meshes.bar(), "obj", material=MATERIAL, max_frequency_hz=8000))
+        self.await_transfer()
+        self.daemon.command("model", "export", model, "--out", self.folder / "bar.model")
+        other_folder = self.folder / "other"
+        other_folder.mkdir()
+        other = Daemon(other_folder)
+        self.addCleanup(other.stop)
+        imported = other.command("model", "import", self.folder / "bar.model").stdout.strip()
+        self.assertIn("transfer   for", other.command("model", "show", imported).stdout)
+        self.client = other.client()
+        self.assertEqual(self.add_object(imported)[1], radiation_pb2.RADIATION_MODEL_RADIATED_POWER)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,245 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Jobs that compute the transfers of models.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cmath>
+#include <condition_variable>
+#include <mutex>
+
+#include "proto/cpp/material_catalogue.h"
+#include "server/decomposition/decomposition_queue.h"
+#include "server/decomposition/decomposition_request.h"
+#include "server/decomposition/local_executor.h"
+#include "server/decomposition/wanted_job.h"
+#include "tests/server/decomposition/scripted_worker.h"
+#include "tests/server/mode_database/sample_transfer.h"
+
+namespace carillon {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+constexpr std::chrono::seconds kDeadline(60);
+
+// Writes down what is asked for.
+constexpr char kKind[] = R"(
+kind=model
+grep -q radiate_stored_model "$request" && kind=transfer
+cp "$mesh" "$here/input.$kind"
+cp "$request" "$here/request.$kind"
+echo $kind >>"$here/runs"
+)";
+constexpr char kSucceed[] = "cp \"$here/$kind\" \"$out\"\n";
+constexpr char kTransferWaits[] = "case $kind in transfer) read line <\"$here/gate\";; esac\n";
+
+/// Waits for the end of a job that is there.
+class Ending {
+ public:
+  Ending(DecompositionQueue& queue, const std::string& digest) {
+    auto watch = queue.Watch(digest, [this](const v1::Job& news) {
+      const std::lock_guard lock(mutex_);
+      job_ = news;
+      changed_.notify_all();
+    });
+    EXPECT_TRUE(watch.ok()) << watch.status();
+    if (watch.ok()) watch_ = *std::move(watch);
+  }
+
+  v1::Job Await() {
+    std::unique_lock lock(mutex_);
+    EXPECT_TRUE(changed_.wait_for(
+        lock, kDeadline, [this] { return !watch_ || job_.state() >= v1::JOB_STATE_SUCCEEDED; }));
+    return job_;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  v1::Job job_;
+  std::unique_ptr<JobWatch> watch_;
+};
+
+class TransferJobTest : public ::testing::Test {
+ protected:
+  TransferJobTest() {
+    Open();
+    request_ = SampleRequest(database_->meshes().Put("solid")->digest);
+    request_.set_label("bowl");
+    const v1::CreateModalModelRequest resolved = *ResolveRequest(request_);
+    digest_ = RequestDigest(resolved);
+    transfer_ = WantedTransfer(digest_, resolved).digest;
+    ModalModel model = SampleModel(3, 4);
+    model.complete_to_eigenvalue = WantedEigenvalue(resolved);
+    WriteRecords(folder_ / "model", SampleRecords(model));
+    const v1::Material& material = resolved.material();
+    const double speed = std::sqrt(material.young_pa() / material.density_kg_per_m3());
+    WriteBytes(folder_ / "transfer", SampleTransferBytes(model, {.speed_ratio = speed / 343,
+                                                                 .power_integrals = {1, 2, 3}}));
+  }
+
+  void Open() {
+    queue_.reset();
+    database_.reset();
+    database_ = *ModeDatabase::Open(folder_ / "carillon.db", clock_);
+  }
+
+  void MakeQueue(const std::string& script, bool transfers = true) {
+    queue_.reset();
+    options_.program = WriteWorkerScript(folder_.path(), absl::StrCat(kKind, script));
+    options_.directory = folder_ / "running";
+    queue_ = *DecompositionQueue::Make(*database_, *MakeLocalExecutor(options_, clock_), clock_,
+                                       {.transfers = transfers});
+  }
+
+  void Submit() {
+    const auto job = queue_->Submit(request_);
+    ASSERT_TRUE(job.ok()) << job.status();
+  }
+
+  v1::Job AwaitEnd(const std::string& digest) { return Ending(*queue_, digest).Await(); }
+
+  size_t TransferCount() {
+    const auto transfers = database_->transfers().List(digest_);
+    return transfers.ok() ? transfers->size() : 0;
+  }
+
+  std::string Runs() { return ReadBytes(folder_ / "runs"); }
+
+  TemporaryFolder folder_;
+  SystemClock clock_;
+  LocalExecutorOptions options_{.worker_count = 1};
+  v1::CreateModalModelRequest request_;
+  std::string digest_, transfer_;  // of the two jobs
+  std::unique_ptr<ModeDatabase> database_;
+  std::unique_ptr<DecompositionQueue> queue_;
+};
+
+TEST_F(TransferJobTest, FollowsTheModelAndReadsItsStoredForm) {
+  MakeQueue(kSucceed);
+  Submit();
+  EXPECT_EQ(AwaitEnd(digest_).kind(), v1::JOB_KIND_DECOMPOSITION);
+  const v1::Job job = AwaitEnd(transfer_);
+  EXPECT_EQ(job.state(), v1::JOB_STATE_SUCCEEDED) << job.error().message();
+  EXPECT_EQ(job.kind(), v1::JOB_KIND_TRANSFER);
+  EXPECT_EQ(job.modal_model(), absl::StrCat("modalModels/", digest_));
+  EXPECT_EQ(job.label(), "bowl (transfer)");
+  EXPECT_EQ(TransferCount(), 1U);
+  EXPECT_EQ(Runs(), "model\ntransfer\n");
+  EXPECT_EQ(ReadBytes(folder_ / "input.transfer"), ReadBytes(folder_ / "model"));
+  EXPECT_THAT(ReadBytes(folder_ / "request.transfer"), HasSubstr("budget_s: 20"));
+  EXPECT_THAT(ReadBytes(folder_ / "request.model"), Not(HasSubstr("transfer")));
+}
+
+TEST_F(TransferJobTest, IsLeftOutWhereTheRequestOrTheDaemonSaysSo) {
+  MakeQueue(kSucceed, false);
+  Submit();
+  AwaitEnd(digest_);
+  MakeQueue(kSucceed);
+  request_.set_without_transfer(true);
+  Submit();
+  EXPECT_FALSE(queue_->Get(transfer_).ok());
+  request_.set_without_transfer(false);
+  Submit();  // for a model that is stored
+  EXPECT_EQ(AwaitEnd(transfer_).state(), v1::JOB_STATE_SUCCEEDED);
+  EXPECT_EQ(Runs(), "model\ntransfer\n");
+}
+
+TEST_F(TransferJobTest, IsComputedOnceForAllMaterialsOfOneSpeedOfSound) {
+  MakeQueue(kSucceed, false);
+  Submit();
+  AwaitEnd(digest_);
+  v1::CreateTransferRequest wanted;
+  wanted.mutable_material()->set_preset("chime_aluminum");
+  ASSERT_TRUE(queue_->SubmitTransfer(digest_, wanted).ok());
+  EXPECT_EQ(AwaitEnd(transfer_).state(), v1::JOB_STATE_SUCCEEDED);
+  *wanted.mutable_material() = *ResolveMaterial(wanted.material());
+  wanted.mutable_material()->set_young_pa(2 * wanted.material().young_pa());
+  wanted.mutable_material()->set_density_kg_per_m3(2 * wanted.material().density_kg_per_m3());
+  const auto again = queue_->SubmitTransfer(digest_, wanted);
+  ASSERT_TRUE(again.ok()) << again.status();
+  EXPECT_EQ(again->state(), v1::JOB_STATE_SUCCEEDED);
+  EXPECT_EQ(Runs(), "model\ntransfer\n");
+  wanted.mutable_settings()->set_accuracy_db(0.5);
+  ASSERT_TRUE(queue_->SubmitTransfer(digest_, wanted).ok());
+  AwaitEnd(transfer_);
+  EXPECT_EQ(Runs(), "model\ntransfer\ntransfer\n") << "a more exact one is another computation";
+}
+
+TEST_F(TransferJobTest, RefusesAModelThatIsNotStoredAndSettingsThatAreNone) {
+  MakeQueue(kSucceed);
+  v1::CreateTransferRequest wanted;
+  wanted.mutable_material()->set_preset("chime_aluminum");
+  EXPECT_THAT(queue_->SubmitTransfer(digest_, wanted).status().ToString(),
+              HasSubstr("MODAL_MODEL_NOT_FOUND"));
+  wanted.mutable_settings()->set_accuracy_db(0.01);
+  EXPECT_THAT(queue_->SubmitTransfer(digest_, wanted).status().ToString(),
+              HasSubstr("INVALID_SETTINGS"));
+}
+
+TEST_F(TransferJobTest, GoesOnAfterTheDaemonEndedDuringIt) {
+  const Gate gate(folder_ / "gate");
+  MakeQueue(absl::StrCat(kTransferWaits, kSucceed));
+  Submit();
+  AwaitEnd(digest_);
+  queue_.reset();
+  EXPECT_EQ(TransferCount(), 0U);
+  Open();
+  MakeQueue(kSucceed);
+  EXPECT_EQ(AwaitEnd(transfer_).state(), v1::JOB_STATE_SUCCEEDED);
+  EXPECT_EQ(TransferCount(), 1U);
+}
+
+TEST_F(TransferJobTest, IsMadeForAModelThatWasStoredJustBeforeTheDaemonDied) {
+  ASSERT_TRUE(database_->models().PutFile(digest_, "bowl", folder_ / "model").ok());
+  const std::string request = ResolveRequest(request_)->SerializeAsString();
+  ASSERT_TRUE(database_->jobs().Put({.digest = digest_, .request = request}).ok());
+  MakeQueue(kSucceed);
+  EXPECT_EQ(AwaitEnd(digest_).state(), v1::JOB_STATE_SUCCEEDED);
+  EXPECT_EQ(AwaitEnd(transfer_).state(), v1::JOB_STATE_SUCCEEDED);
+  EXPECT_EQ(Runs(), "transfer\n");
+}
+
+TEST_F(TransferJobTest, EndsWithItsModel) {
+  const Gate gate(folder_ / "gate");
+  MakeQueue(absl::StrCat(kTransferWaits, kSucceed));
+  Submit();
+  AwaitEnd(digest_);
+  Ending ending(*queue_, transfer_);
+  ASSERT_TRUE(queue_->DeleteModel(digest_).ok());
+  EXPECT_EQ(ending.Await().state(), v1::JOB_STATE_CANCELLED);
+  EXPECT_FALSE(queue_->Get(transfer_).ok());
+  Open();
+  EXPECT_TRUE(database_->jobs().Unfinished()->empty());
+}
+
+TEST_F(TransferJobTest, CanBeCancelledAndAskedForAgain) {
+  const Gate gate(folder_ / "gate");
+  MakeQueue(absl::StrCat(kTransferWaits, kSucceed));
+  Submit();
+  AwaitEnd(digest_);
+  ASSERT_TRUE(queue_->Cancel(transfer_).ok());
+  EXPECT_EQ(AwaitEnd(transfer_).state(), v1::JOB_STATE_CANCELLED);
+  EXPECT_EQ(TransferCount(), 0U);
+  gate.Open();
+  Submit();
+  EXPECT_EQ(AwaitEnd(transfer_).state(), v1::JOB_STATE_SUCCEEDED);
+}
+
+TEST_F(TransferJobTest, ATransferOfOtherModesIsAFailureAndNotStored) {
+  MakeQueue("case $kind in transfer) kind=other;; esac\n" + std::string(kSucceed));
+  WriteBytes(folder_ / "other",
+             SampleTransferBytes(SampleModel(2, 4), {.power_integrals = {1, 2}}));
+  Submit();
+  EXPECT_EQ(AwaitEnd(digest_).state(), v1::JOB_STATE_SUCCEEDED);
+  const v1::Job job = AwaitEnd(transfer_);
+  EXPECT_EQ(job.state(), v1::JOB_STATE_FAILED);
+  EXPECT_EQ(job.error().reason(), "TRANSFER_MALFORMED");
+  EXPECT_EQ(TransferCount(), 0U);
+}
+
+}  // namespace
+}  // namespace carillon

@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/mode_database/transfer_store.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "server/mode_database/database_admin.h"
+#include "server/mode_database/mode_database.h"
+#include "tests/server/mode_database/sample_model.h"
+#include "tests/server/mode_database/sample_transfer.h"
+
+namespace carillon {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::Pointwise;
+
+constexpr double kSoundSpeed = 343;
+
+class TransferStoreTest : public ::testing::Test {
+ protected:
+  TransferStoreTest() { Reopen(); }
+
+  void Reopen() {
+    database_.reset();
+    database_ = *ModeDatabase::Open(file_, clock_);
+  }
+
+  void PutModel(const ModalModel& model) {
+    WriteRecords(folder_ / "model", SampleRecords(model));
+    ASSERT_TRUE(database_->models().PutFile(digest_, "", folder_ / "model").ok());
+  }
+
+  absl::Status Put(const ModalModel& model, double speed_ratio, float integral = 2) {
+    const std::vector<float> integrals(model.mode_count(), integral);
+    return database_->transfers()
+        .Put(digest_,
+             SampleTransfer(model, {.speed_ratio = speed_ratio, .power_integrals = integrals}))
+        .status();
+  }
+
+  /// The power integral of the first mode for a material of this speed ratio; 0: no transfer.
+  float Found(double speed_ratio) {
+    const auto model = database_->models().Find(digest_);
+    const auto transfer = database_->transfers().Find(**model, speed_ratio * kSoundSpeed);
+    return transfer == nullptr ? 0 : transfer->power_integrals.front();
+  }
+
+  TemporaryFolder folder_;
+  SystemClock clock_;
+  const std::filesystem::path file_ = folder_ / "carillon.db";
+  const std::string digest_ = std::string(64, 'a');
+  const ModalModel model_ = SampleModel(3, 4);
+  std::unique_ptr<ModeDatabase> database_;
+};
+
+TEST_F(TransferStoreTest, TheNearestTransferServesMaterialsWithinFivePercent) {
+  PutModel(model_);
+  ASSERT_TRUE(Put(model_, 10, 2).ok());
+  ASSERT_TRUE(Put(model_, 10.6, 3).ok());
+  EXPECT_EQ(Found(10.1), 2);
+  EXPECT_EQ(Found(10.5), 3);
+  EXPECT_EQ(Found(11.1), 3);
+  EXPECT_EQ(Found(11.3), 0);
+  EXPECT_EQ(Found(9.4), 0);
+}
+
+TEST_F(TransferStoreTest, TransfersOutliveTheDaemonAndGoWithTheRevisionOfTheirModel) {
+  PutModel(model_);
+  ASSERT_TRUE(Put(model_, 10).ok());
+  Reopen();
+  EXPECT_EQ(Found(10), 2);
+  EXPECT_EQ(database_->transfers().List(digest_)->size(), 1U);
+  const auto old = *database_->models().Find(digest_);
+  PutModel(SampleModel(4, 4));
+  EXPECT_EQ(Found(10), 0) << "the new revision has other modes";
+  EXPECT_EQ(database_->transfers().Find(*old, 10 * kSoundSpeed), nullptr);
+  EXPECT_TRUE(database_->transfers().List(digest_)->empty());
+}
+
+TEST_F(TransferStoreTest, ObjectsShareOneCopyAndTheListenerHearsOfEachTransfer) {
+  PutModel(model_);
+  std::vector<std::string> heard;
+  database_->transfers().Listen([&](const std::string& digest) { heard.push_back(digest); });
+  ASSERT_TRUE(Put(model_, 10, 2).ok());
+  const auto model = *database_->models().Find(digest_);
+  const auto first = database_->transfers().Find(*model, 10 * kSoundSpeed);
+  EXPECT_EQ(database_->transfers().Find(*model, 10.02 * kSoundSpeed), first);
+  ASSERT_TRUE(Put(model_, 10.01, 5).ok());  // of the same step: it replaces the first
+  EXPECT_EQ(Found(10), 5);
+  EXPECT_EQ(first->power_integrals.front(), 2) << "what sounds keeps its transfer";
+  EXPECT_THAT(heard, ElementsAre(digest_, digest_));
+}
+
+TEST_F(TransferStoreTest, RefusesATransferOfOtherModes) {
+  EXPECT_THAT(Put(model_, 10).ToString(), HasSubstr("MODAL_MODEL_NOT_FOUND"));
+  PutModel(model_);
+  ModalModel other = model_;
+  other.eigenvalues.back() += 1e-9;
+  EXPECT_THAT(Put(other, 10).ToString(), HasSubstr("TRANSFER_MALFORMED"));
+  EXPECT_TRUE(database_->transfers().List(digest_)->empty());
+}
+
+TEST_F(TransferStoreTest, ATransferThatChangedOnTheDiskIsLeftOutAndReported) {
+  PutModel(model_);
+  ASSERT_TRUE(Put(model_, 10, 1.2345678F).ok());
+  database_.reset();  // all of the log goes into the file
+  std::string content = ReadBytes(file_);
+  const float integral = 1.2345678F;
+  const size_t at = content.find(std::string(reinterpret_cast<const char*>(&integral), 4));
+  ASSERT_NE(at, std::string::npos);
+  content[at] ^= 1;
+  WriteBytes(file_, content);
+  std::vector<std::string> findings;
+  const auto note = [&](const std::string& finding) { findings.push_back(finding); };
+  ASSERT_TRUE(CheckDatabase(file_, note).ok());
+  EXPECT_THAT(findings, ElementsAre(HasSubstr("a transfer of modalModels/")));
+  Reopen();
+  EXPECT_EQ(Found(10), 0);
+  ASSERT_TRUE(Put(model_, 10, 2).ok());
+  EXPECT_EQ(Found(10), 2);
+}
+
+TEST_F(TransferStoreTest, ARepairKeepsTransfers) {
+  PutModel(model_);
+  ASSERT_TRUE(Put(model_, 10).ok());
+  database_.reset();
+  ASSERT_TRUE(RepairDatabase(file_, [](const std::string&) {}).ok());
+  Reopen();
+  EXPECT_EQ(Found(10), 2);
+}
+
+TEST_F(TransferStoreTest, CollectionCountsTransfersWithTheirModel) {
+  PutModel(model_);
+  const uint64_t model_bytes = database_->models().Summary(digest_)->stored_bytes;
+  ASSERT_TRUE(Put(model_, 10).ok());
+  const uint64_t bytes = model_bytes + database_->transfers().List(digest_)->front().stored_bytes;
+  EXPECT_EQ(database_->models().Collect(bytes)->model_count, 0U);
+  EXPECT_EQ(database_->models().Collect(bytes - 1)->bytes, bytes);
+}
+
+TEST(StoredTransfer, AModeThatWasNotComputedHasTheEfficiencyOfTheNearestOneThatWas) {
+  ModalModel model = SampleModel(3, 4);
+  model.eigenvalues = {100, 400, 900};
+  const Transfer transfer =
+      SampleTransfer(
+          model, {.states = {1, 1, 2}, .power_integrals = {8, 3, 0}, .normal_energies = {1, 2, 6}})
+          .Decode();
+  // Efficiency is proportional to eigenvalue * integral / energy: 400 * 3 / 2 = 900 * I / 6.
+  EXPECT_THAT(transfer.power_integrals, Pointwise(testing::FloatNear(1e-6F), {8.0F, 3.0F, 4.0F}));
+}
+
+TEST(StoredTransfer, EveryDamageIsRefused) {
+  const ModalModel model = SampleModel(3, 4);
+  const float integral = 1.2345678F;
+  const std::string whole = SampleTransferBytes(model, {.power_integrals = {1, integral, 3}});
+  ASSERT_TRUE(StoredTransfer::Parse(whole).ok());
+  for (size_t length = 0; length < whole.size(); ++length) {
+    EXPECT_FALSE(StoredTransfer::Parse(whole.substr(0, length)).ok()) << length;
+  }
+  EXPECT_THAT(StoredTransfer::Parse(SampleTransferBytes(model, {.power_integrals = {1, -2, 3}}))
+                  .status()
+                  .ToString(),
+              HasSubstr("TRANSFER_MALFORMED"));
+  std::string changed = whole;
+  changed[changed.find(std::string(reinterpret_cast<const char*>(&integral), 4)) + 2] ^= 1;
+  EXPECT_THAT(StoredTransfer::Parse(changed).status().ToString(), HasSubstr("TRANSFER_CORRUPT"));
+}
+
+}  // namespace
+}  // namespace carillon

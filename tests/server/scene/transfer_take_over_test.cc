@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Objects that sound with a stored transfer.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "server/mode_database/mode_database.h"
+#include "server/scene/scene_registry.h"
+#include "tests/server/mode_database/sample_model.h"
+#include "tests/server/mode_database/sample_transfer.h"
+#include "tests/server/scene/small_model.h"
+
+namespace carillon {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr size_t kBlock = 128;
+
+double Peak(const std::vector<float>& sound) {
+  double peak = 0;
+  for (const float sample : sound) peak = std::max(peak, std::abs(double{sample}));
+  return peak;
+}
+
+/// SmallModel in a database, and a stage whose objects sound with the transfers there.
+class TransferStage {
+ public:
+  TransferStage() {
+    WriteRecords(folder / "model", SampleRecords(*SmallModel()));
+    EXPECT_TRUE(database->models().PutFile(SmallModel()->digest, "", folder / "model").ok());
+    database->transfers().Listen([this](const std::string& d) { scenes.TakeOverTransfers(d); });
+  }
+  ~TransferStage() { database->transfers().Listen(nullptr); }
+
+  PlacedObject Add(RadiationModel radiation = RadiationModel::kDefault) {
+    ObjectProperties properties = SmallProperties();
+    properties.radiation = radiation;
+    return *scenes.AddObject(scene, 0, *database->models().Find(SmallModel()->digest), properties);
+  }
+
+  void Store(std::vector<float> integrals) {
+    const double speed_m_per_s = std::sqrt(kTestYoungPa / kTestDensityKgPerM3);
+    const auto stored = database->transfers().Put(
+        SmallModel()->digest,
+        SampleTransfer(*SmallModel(), {.speed_ratio = speed_m_per_s / 343,
+                                       .power_integrals = std::move(integrals)}));
+    EXPECT_TRUE(stored.ok()) << stored.status();
+  }
+
+  std::vector<float> Render(size_t block_count) {
+    std::vector<float> sound(block_count * kBlock);
+    mixer.Render(sound);
+    return sound;
+  }
+
+  void Strike(uint32_t handle) {
+    const auto stream = *scenes.OpenContactStream(scene, {.step_s = 0.01, .scheduling_delay_s = 0});
+    ASSERT_TRUE(stream->intake().BeginStep(0).ok());
+    stream->intake().Strike(SmallImpulse(handle));
+    ASSERT_EQ(stream->counts().rejected_count, 0U);
+  }
+
+  TemporaryFolder folder;
+  SystemClock clock;
+  std::unique_ptr<ModeDatabase> database = *ModeDatabase::Open(folder / "carillon.db", clock);
+  Mixer mixer{MixerSettings{.sample_rate_hz = 48000, .block_frame_count = kBlock}};
+  SceneRegistry scenes{mixer, &database->transfers()};
+  uint64_t scene = *scenes.CreateScene();
+};
+
+TEST(TransferTakeOver, AnObjectTakesOverATransferThatComesWhileItSounds) {
+  TransferStage stage;
+  const uint32_t handle = stage.Add().handle;
+  const uint32_t paper = stage.Add(RadiationModel::kPaperCoupling).handle;
+  EXPECT_EQ(stage.Add().object.transfer, nullptr);
+  stage.Strike(handle);
+  const double by_coupling = Peak(stage.Render(100));
+  stage.Store({0, 0, 0});  // no mode radiates
+  const auto quiet = *stage.scenes.UpdateObject(stage.scene, handle, {});
+  EXPECT_NE(quiet.object.transfer, nullptr);
+  stage.Strike(handle);
+  // What rings goes on without a step: the modes together move by 0.11 of their peak in a sample.
+  const std::vector<float> rest = stage.Render(1000);
+  EXPECT_GT(Peak(rest), 0);
+  EXPECT_LT(Peak(rest), by_coupling);
+  for (size_t i = 1; i < rest.size(); ++i) {
+    ASSERT_LT(std::abs(rest[i] - rest[i - 1]), 0.15 * by_coupling) << i;
+  }
+  stage.Render(10000);
+  stage.Strike(handle);
+  EXPECT_EQ(Peak(stage.Render(100)), 0) << "the old bank has rung out, and the new one is silent";
+  stage.Strike(paper);
+  EXPECT_NEAR(Peak(stage.Render(100)), by_coupling, 1e-3 * by_coupling);
+}
+
+TEST(TransferTakeOver, RadiatedPowerIsRefusedUntilATransferIsStored) {
+  TransferStage stage;
+  ObjectProperties properties = SmallProperties();
+  properties.radiation = RadiationModel::kRadiatedPower;
+  const auto model = *stage.database->models().Find(SmallModel()->digest);
+  const auto add = [&] {
+    return stage.scenes.AddObject(stage.scene, 0, model, properties).status();
+  };
+  EXPECT_THAT(add().ToString(), HasSubstr("TRANSFER_NOT_FOUND: "));
+  stage.Store({1, 1, 1});
+  EXPECT_TRUE(add().ok());
+  properties.material.young_pa *= 1.3;  // sound travels 14 percent faster
+  EXPECT_THAT(add().ToString(), HasSubstr("TRANSFER_NOT_FOUND: "));
+}
+
+TEST(TransferTakeOver, RadiationDampsAnObject) {
+  TransferStage stage;
+  stage.Store({0, 0, 0});
+  const auto undamped = stage.Add().object;
+  EXPECT_EQ(undamped.mode_count, 3U);
+  stage.Store({0, 0, 3e7F});  // the highest mode loses all within 2 ms
+  EXPECT_EQ(stage.Add().object.mode_count, 2U);
+}
+
+}  // namespace
+}  // namespace carillon
