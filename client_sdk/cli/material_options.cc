@@ -23,10 +23,11 @@ void AddMaterial(CLI::App& app, MaterialFigures& material) {
   AddFigure(app, "--lame-lambda", material.lame_lambda_pa, "Lame's first constant, Pa");
   AddFigure(app, "--lame-mu", material.lame_mu_pa, "Lame's second constant, Pa");
   AddFigure(app, "--density", material.density_kg_per_m3, "Density, kg/m^3");
-  AddFigure(app, "--alpha1", material.alpha1_s, "Damping proportional to stiffness, s");
+  AddFigure(app, "--alpha1", material.alpha1_s,
+            "Damping in proportion to stiffness, s; it replaces a loss factor");
   AddFigure(app, "--alpha2", material.alpha2_per_s, "Damping proportional to mass, 1/s");
   app.add_option("--loss-factor", material.loss_factor,
-                 "Additional damping by a loss factor: ETA, or HZ:ETA,HZ:ETA,...")
+                 "Damping by a loss factor: ETA, or HZ:ETA,HZ:ETA,...")
       ->group("Material");
 }
 

@@ -38,6 +38,14 @@ absl::StatusOr<v1::Material> FindPreset(const std::string& name) {
       absl::StrJoin(known, ", "), ", or give the figures themselves"));
 }
 
+/// Lets the damping that is asked for replace the loss factor of the preset. Without this, a
+/// loss factor would be appended to the points of the preset, and Rayleigh damping added to it.
+void DropReplacedLossFactor(const v1::Material& asked, v1::Material& preset) {
+  if (asked.loss_factor_size() > 0 || asked.has_alpha1_s() || asked.has_alpha2_per_s()) {
+    preset.clear_loss_factor();
+  }
+}
+
 absl::Status OutOfRange(const char* field, double value, const char* range) {
   return absl::InvalidArgumentError(
       absl::StrCat("INVALID_MATERIAL: ", field, " is ", value, "; it must be ", range));
@@ -100,6 +108,7 @@ absl::StatusOr<v1::Material> ResolveMaterial(const v1::Material& material) {
     absl::StatusOr<v1::Material> preset = FindPreset(material.preset());
     if (!preset.ok()) return preset.status();
     resolved = *std::move(preset);
+    DropReplacedLossFactor(material, resolved);
   }
   resolved.MergeFrom(material);
   resolved.clear_preset();

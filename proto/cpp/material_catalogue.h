@@ -15,6 +15,7 @@ namespace carillon {
 const v1::MaterialCatalogue& Materials();
 
 /// A material with every figure present and no preset: `material` over the preset that it names.
+/// Damping of either law replaces the loss factor of the preset.
 /// Checks that the figures are finite and within the ranges that material.proto states.
 /// Errors: InvalidArgument, its message beginning "UNKNOWN_MATERIAL: " (no such preset; the message
 /// lists the presets, the nearest first) or "INVALID_MATERIAL: " (a figure missing or out of
