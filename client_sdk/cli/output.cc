@@ -36,4 +36,8 @@ std::string Decibels(double amplitude) {
   return absl::StrFormat("%.1f dBFS", 20 * std::log10(amplitude));
 }
 
+std::string Loudness(bool present, double lufs) {
+  return present ? absl::StrFormat("%.1f LUFS", lufs) : "silence";
+}
+
 }  // namespace carillon::cli

@@ -21,4 +21,7 @@ void PrintJson(const google::protobuf::Message& message);
 /// Returns a linear amplitude (full scale is 1) as text, such as "-6.0 dBFS" or "silence".
 std::string Decibels(double amplitude);
 
+/// Returns a loudness as text, such as "-23.0 LUFS", or "silence" if there is none.
+std::string Loudness(bool present, double lufs);
+
 }  // namespace carillon::cli

@@ -17,6 +17,10 @@ void PrintSummary(const RenderOptions& options, const v1::RenderSummary& summary
   absl::PrintF("%s: %.2f s, %d impulses, peak %s\n", options.out,
                static_cast<double>(summary.frame_count()) / sample_rate_hz,
                summary.accepted_count(), Decibels(summary.peak()));
+  absl::PrintF("%.3g Pa, true peak %s, whole sound %s, loudest 0.4 s %s\n", summary.peak_pa(),
+               Decibels(summary.true_peak()),
+               Loudness(summary.has_integrated_lufs(), summary.integrated_lufs()),
+               Loudness(summary.has_loudest_momentary_lufs(), summary.loudest_momentary_lufs()));
   if (summary.rejected_count() > 0) {
     absl::PrintF("%d impulses could not be used; the newest: %s: %s\n", summary.rejected_count(),
                  summary.last_rejection().reason(), summary.last_rejection().message());

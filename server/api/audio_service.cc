@@ -3,6 +3,7 @@
 
 #include "server/api/listen_call.h"
 #include "server/api/render_call.h"
+#include "server/synthesis/bank/level.h"
 #include "server/synthesis/bank/oscillator_bank.h"
 
 namespace carillon {
@@ -38,6 +39,9 @@ grpc::ServerUnaryReactor* AudioService::GetMixer(grpc::CallbackServerContext* co
   response->set_lost_frame_count(state.lost_frame_count);
   response->set_limited_frame_count(state.mixer.limited_frame_count);
   response->set_peak(state.peak);
+  response->set_peak_pa(state.peak * kFullScalePa);
+  if (state.momentary_lufs) response->set_momentary_lufs(*state.momentary_lufs);
+  if (state.short_term_lufs) response->set_short_term_lufs(*state.short_term_lufs);
   response->set_device_message(state.device_message);
   response->set_simd_target(std::string(SimdTarget()));
   response->set_merged_impulse_count(state.mixer.merged_count);

@@ -2,6 +2,7 @@
 #include "server/api/render_call.h"
 
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -10,6 +11,8 @@
 #include "server/api/sample_bytes.h"
 #include "server/api/stream_call.h"
 #include "server/api/trace_reader.h"
+#include "server/loudness/loudness_meter.h"
+#include "server/synthesis/bank/level.h"
 
 namespace carillon {
 namespace {
@@ -44,6 +47,7 @@ class RenderCall final : public BidiStream<v1::RenderRequest, v1::RenderResponse
     absl::StatusOr<std::unique_ptr<OfflineRenderer>> renderer = reader_.Finish();
     if (!renderer.ok()) return End(renderer.status());
     renderer_ = *std::move(renderer);
+    loudness_.emplace(reader_.sample_rate_hz(), reader_.channel_count());
     StartWriting();
   }
 
@@ -58,9 +62,11 @@ class RenderCall final : public BidiStream<v1::RenderRequest, v1::RenderResponse
     const uint64_t first_frame = renderer_->summary().frame_count;
     const size_t count = renderer_->Render(samples_);
     if (count > 0) {
+      const std::span<const float> block =
+          std::span(samples_).first(count * reader_.channel_count());
+      loudness_->Add(block);
       response.mutable_block()->set_first_frame(first_frame);
-      response.mutable_block()->set_samples(
-          ToBytes(std::span(samples_).first(count * reader_.channel_count())));
+      response.mutable_block()->set_samples(ToBytes(block));
     } else {
       FillSummary(*response.mutable_summary());
     }
@@ -77,11 +83,18 @@ class RenderCall final : public BidiStream<v1::RenderRequest, v1::RenderResponse
     }
     summary.set_peak(rendered.peak);
     summary.set_limited_frame_count(rendered.limited_frame_count);
+    summary.set_peak_pa(rendered.peak * kFullScalePa);
+    summary.set_true_peak(loudness_->true_peak());
+    if (const auto lufs = loudness_->integrated()) summary.set_integrated_lufs(*lufs);
+    if (const auto lufs = loudness_->loudest_momentary()) {
+      summary.set_loudest_momentary_lufs(*lufs);
+    }
   }
 
   std::atomic<int>& call_count_;
   TraceReader reader_;
   std::unique_ptr<OfflineRenderer> renderer_;
+  std::optional<LoudnessMeter> loudness_;
   std::vector<float> samples_;
 };
 

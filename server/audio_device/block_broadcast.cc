@@ -51,11 +51,12 @@ void BlockBroadcast::Publish(uint64_t first_frame, std::span<const float> block)
   first_frames_.Push({&first_frame, 1});
 }
 
-void BlockBroadcast::Deliver() {
+void BlockBroadcast::Deliver(absl::FunctionRef<void(const RenderedBlock&)> observe) {
   const MutexLock lock(&mutex_);
   bool any = false;
   while (const std::shared_ptr<const RenderedBlock> block = TryTakePublished()) {
     for (Listener* listener : listeners_) listener->Offer(block, queue_block_count_);
+    observe(*block);
     any = true;
   }
   if (!any) return;

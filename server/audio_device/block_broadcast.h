@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "absl/base/thread_annotations.h"
+#include "absl/functional/function_ref.h"
 #include "absl/status/statusor.h"
 #include "server/audio_device/audio_device.h"
 #include "server/audio_device/ring_buffer.h"
@@ -65,8 +66,9 @@ class BlockBroadcast {
   /// Called by the render thread: passes a block on, or drops it if Deliver has not kept up.
   void Publish(uint64_t first_frame, std::span<const float> block) noexcept;
 
-  /// Called by the housekeeping thread: hands the newly published blocks to the listeners.
-  void Deliver();
+  /// Called by the housekeeping thread: hands the newly published blocks to the listeners, and
+  /// calls `observe`, which must not use the broadcast, with each.
+  void Deliver(absl::FunctionRef<void(const RenderedBlock&)> observe = [](const RenderedBlock&) {});
 
   /// Adds a listener, which gets blocks from the next one on. Deliver calls `wake`, which must not
   /// block, after it has queued blocks. Errors: ResourceExhausted (TOO_MANY_LISTENERS).

@@ -11,8 +11,8 @@ namespace carillon {
 namespace {
 
 constexpr std::chrono::milliseconds kHousekeepingPeriod(5);
-/// The peak is sampled every kPeakPeriod and reported as the maximum over kPeakMemory.
-constexpr std::chrono::milliseconds kPeakPeriod(50);
+/// Peak and loudness are sampled every kLevelPeriod; the peak is the maximum over kPeakMemory.
+constexpr std::chrono::milliseconds kLevelPeriod(50);
 constexpr std::chrono::seconds kPeakMemory(1);
 
 size_t BlocksPerSecond(const DeviceFormat& format) {
@@ -43,7 +43,8 @@ LiveOutput::LiveOutput(const OutputSettings& settings, Clock& clock, Log log)
       broadcast_(settings.format, BlocksPerSecond(settings.format)),
       look_ahead_(
           settings.format, settings.look_ahead_block_count,
-          [this](std::span<float> block) { RenderBlock(block); }, clock) {}
+          [this](std::span<float> block) { RenderBlock(block); }, clock),
+      loudness_(settings.format.sample_rate_hz, settings.format.channel_count) {}
 
 LiveOutput::~LiveOutput() {
   stopping_ = true;
@@ -84,28 +85,32 @@ OutputState LiveOutput::state() const {
   state.lost_frame_count =
       look_ahead_.lost_frame_count() + earlier_lost_frame_count_ + device.lost_frame_count();
   for (const Peak& peak : peaks_) state.peak = std::max(state.peak, peak.value);
+  state.momentary_lufs = momentary_lufs_;
+  state.short_term_lufs = short_term_lufs_;
   return state;
 }
 
 void LiveOutput::KeepHouse() {
-  std::chrono::nanoseconds peak_due = clock_.Monotonic();
+  std::chrono::nanoseconds levels_due = clock_.Monotonic();
   while (!stopping_) {
-    broadcast_.Deliver();
+    broadcast_.Deliver([this](const RenderedBlock& block) { loudness_.Add(block.samples); });
     mixer_.CollectGarbage();
     ReplaceDeadDevice();
-    if (clock_.Monotonic() >= peak_due) {
-      NotePeak();
-      peak_due += kPeakPeriod;
+    if (clock_.Monotonic() >= levels_due) {
+      NoteLevels();
+      levels_due += kLevelPeriod;
     }
     clock_.SleepUntil(clock_.Monotonic() + kHousekeepingPeriod);
   }
 }
 
-void LiveOutput::NotePeak() {
+void LiveOutput::NoteLevels() {
   const std::chrono::nanoseconds now = clock_.Monotonic();
   const MutexLock lock(&mutex_);
   peaks_.push_back({.time = now, .value = mixer_.TakePeak()});
   while (peaks_.front().time < now - kPeakMemory) peaks_.pop_front();
+  momentary_lufs_ = loudness_.momentary();
+  short_term_lufs_ = loudness_.short_term();
 }
 
 void LiveOutput::ReplaceDeadDevice() {

@@ -7,6 +7,7 @@
 #include <deque>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
 
@@ -17,6 +18,7 @@
 #include "server/audio_device/open_device.h"
 #include "server/base/clock.h"
 #include "server/base/mutex.h"
+#include "server/loudness/loudness_meter.h"
 #include "server/synthesis/mixer.h"
 
 namespace carillon {
@@ -38,7 +40,9 @@ struct OutputState {
   double load = 0;       ///< fraction of real time that rendering takes
   uint64_t xrun_count = 0;
   uint64_t lost_frame_count = 0;
-  double peak = 0;  ///< largest sample of the last second, before the limiter
+  double peak = 0;                        ///< largest sample of the last second, before the limiter
+  std::optional<double> momentary_lufs;   ///< loudness of the last 400 ms; unset for silence
+  std::optional<double> short_term_lufs;  ///< loudness of the last 3 s; unset for silence
   MixerStatistics mixer;
 };
 
@@ -69,7 +73,7 @@ class LiveOutput {
   absl::Status Open();
   void RenderBlock(std::span<float> block);
   void KeepHouse();
-  void NotePeak();
+  void NoteLevels();
   void ReplaceDeadDevice();
 
   const OutputSettings settings_;
@@ -88,6 +92,9 @@ class LiveOutput {
     double value;
   };
   std::deque<Peak> peaks_ ABSL_GUARDED_BY(mutex_);
+  std::optional<double> momentary_lufs_ ABSL_GUARDED_BY(mutex_);
+  std::optional<double> short_term_lufs_ ABSL_GUARDED_BY(mutex_);
+  LoudnessMeter loudness_;  ///< used by the housekeeping thread alone
   std::atomic<bool> stopping_{false};
   std::thread housekeeper_;
 };

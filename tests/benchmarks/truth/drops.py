@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Five bodies dropped on a hard floor, by the laws of version 0.1 and by those of today."""
+
+import dataclasses
+import math
+import pathlib
+import random
+
+import numpy
+
+import catalogue
+import likeness
+import programs
+import rings
+
+HEIGHT_M, GRAVITY_M_PER_S2 = 0.3, 9.81
+BOUNCE_COUNT, RESTITUTION = 6, 0.5
+RADIATION_ACCURACY_DB = 2.0
+SOFT_S = 5e-4  # the duration of every contact up to version 0.1, where nobody gave one
+
+
+@dataclasses.dataclass
+class Body:
+    name: str
+    surface: callable  # (vertices, triangles)
+    material: str
+    volume_m3: float
+    rayleigh_eta: float  # the loss factor at 1 kHz of the Rayleigh damping that the material had
+    wall_m: float = None  # hollow
+
+
+@dataclasses.dataclass
+class Drop:
+    """What was heard of a body."""
+
+    name: str
+    sound: object
+    summary: dict
+
+    def silent(self):
+        """Below the smallest step of the file's 24 bits."""
+        return not self.sound.any()
+
+    def octaves_db(self):
+        return likeness.octave_levels_db(self.sound, rings.RATE_HZ)
+
+    def ring_s(self):
+        """Time from the loudest millisecond until the sound stays 40 dB below it."""
+        count = len(self.sound) // 48
+        level = (self.sound[:48 * count].reshape(count, 48)**2).mean(axis=1)
+        audible = (level > 1e-4 * level.max()).nonzero()[0]
+        return float(audible[-1] - level.argmax()) / 1000
+
+
+def tumbler():
+    """A drinking glass, 70 mm wide and 100 mm high, its wall 2 mm and its bottom 5 mm."""
+    import bodies
+
+    rim = numpy.linspace(0, 0.1, 17)
+    outer = [(r, 0) for r in numpy.linspace(0, 0.035, 6)] + [(0.035, z) for z in rim[1:]]
+    inner = [(0.033, z) for z in numpy.linspace(0.1, 0.005, 16)]
+    return bodies.lathe(outer + inner + [(r, 0.005) for r in numpy.linspace(0.033, 0, 6)[1:]], 48)
+
+
+def box(*size_m):
+    import bodies
+
+    return bodies.box(size_m, (1, 1, 1))
+
+
+def bowl():
+    import bodies
+
+    return bodies.bowl(0.08, 0.004, 48, 12)
+
+
+def hollow(wall_m, *size_m):
+    return math.prod(size_m) - math.prod(side - 2 * wall_m for side in size_m)
+
+
+BODIES = (Body("steel box", lambda: box(0.10, 0.07, 0.05), "structural_steel", hollow(0.0015, 0.10, 0.07, 0.05), 2e-4,
+               wall_m=0.0015),
+          Body("wooden block", lambda: box(0.12, 0.06, 0.04), "oak", 0.12 * 0.06 * 0.04, 0.01),
+          Body("ceramic bowl", bowl, "porcelain", 2 * math.pi * 0.078**2 * 0.004, 1e-3),
+          Body("glass", tumbler, "soda_lime_glass", math.pi * (0.035**2 * 0.1 - 0.033**2 * 0.095), 1e-3),
+          Body("plastic box", lambda: box(0.10, 0.07, 0.03), "abs", hollow(0.0025, 0.10, 0.07, 0.03), 0.025,
+               wall_m=0.0025))
+
+
+def rayleigh(eta):
+    """Half of the loss factor at 1 kHz from each term."""
+    omega = 2 * math.pi * 1000
+    return {"alpha1_s": eta / (2 * omega), "alpha2_per_s": eta * omega / 2}
+
+
+def blows(surface, mass_kg, duration_s):
+    """The bounces: each meets the floor with another vertex, the same in each run, and a third of the mass."""
+    vertices = [tuple(map(float, vertex)) for vertex in surface[0]]
+    centre = [(min(side) + max(side)) / 2 for side in zip(*vertices)]
+    found, time_s, speed = [], 0.0, math.sqrt(2 * GRAVITY_M_PER_S2 * HEIGHT_M)
+    for point in random.Random(1).choices(vertices, k=BOUNCE_COUNT):
+        impulse = mass_kg / 3 * speed * (1 + RESTITUTION)
+        inwards = [c - x for x, c in zip(point, centre)]
+        found.append(programs.Blow(point, tuple(impulse * x / math.hypot(*inwards) for x in inwards), duration_s,
+                                   time_s))
+        speed *= RESTITUTION
+        time_s += 2 * speed / GRAVITY_M_PER_S2
+    return found
+
+
+def decompose(folder, body):
+    """The body's model file."""
+    import bodies
+
+    stem = pathlib.Path(folder) / body.name.replace(" ", "-")
+    bodies.write_obj(stem.with_suffix(".obj"), *body.surface())
+    wall = ["--wall", body.wall_m] if body.wall_m else []
+    programs.decompose(stem.with_suffix(".obj"), stem.with_suffix(".model"), "--material", body.material, *wall)
+    return stem.with_suffix(".model")
+
+
+def hear(studio, model_file, body, before):
+    """The Drop by the laws of version 0.1 (Rayleigh damping, soft contacts, the paper's coupling) or of today."""
+    model = studio.import_model(model_file)
+    material = catalogue.read()[body.material]
+    figures = {"young_pa": material.young_pa, "density_kg_per_m3": material.density_kg_per_m3,
+               **(rayleigh(body.rayleigh_eta) if before else programs.loss_factor(material.loss_factor))}
+    radiates = not before and studio.radiate(model, figures, RADIATION_ACCURACY_DB)
+    heard = programs.Heard(model, figures, paper_coupling=not radiates, gaussian=before)
+    mass_kg = body.volume_m3 * material.density_kg_per_m3
+    sound, summary = studio.render(heard, blows(body.surface(), mass_kg, SOFT_S if before else None), 0)
+    return Drop(body.name, sound, summary)

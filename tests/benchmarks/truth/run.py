@@ -1,0 +1,141 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: Apache-2.0
+"""How true Carillon sounds: materials beside recorded bodies, a recorded bar, five drops.
+
+    run.py --build BUILD [--recordings FOLDER] [--parts materials,loudness,bar,drops] [--pictures FOLDER]
+           [--before BUILD]
+
+Prints Markdown tables and draws spectrograms. With --before the drops by the laws of version 0.1 are rendered by the
+programs of another build folder. deploy/truth.sh installs what this needs.
+"""
+
+import argparse
+import contextlib
+import pathlib
+import tempfile
+
+import bar
+import drops
+import likeness
+import loudness
+import materials
+import pictures
+import programs
+import rings
+
+
+def arguments():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--build", type=pathlib.Path, required=True)
+    parser.add_argument("--recordings", type=pathlib.Path)
+    parser.add_argument("--parts", default="materials,loudness,bar,drops")
+    parser.add_argument("--pictures", type=pathlib.Path)
+    parser.add_argument("--before", type=pathlib.Path)
+    return parser.parse_args()
+
+
+def print_table(lines):
+    print("\n".join(lines), end="\n\n", flush=True)
+
+
+def show_materials(_):
+    for title, lines in materials.tables().items():
+        print(f"## {title}\n")
+        print_table(lines)
+
+
+@contextlib.contextmanager
+def studio(build=None):
+    """A daemon, and a folder for meshes and models."""
+    with tempfile.TemporaryDirectory(prefix="carillon-") as folder:
+        with programs.Studio(folder, build and build / "bin") as opened:
+            yield opened, pathlib.Path(folder)
+
+
+def show_loudness(_):
+    print("## Loudness by mode: radiation over the paper's coupling\n")
+    if not loudness.can_radiate():
+        print("skipped: this carillon-precompute cannot compute radiation\n")
+        return
+    print("\n".join(materials.head(*loudness.HEAD)))
+    with tempfile.TemporaryDirectory(prefix="carillon-") as folder:
+        for body in loudness.six_bodies():
+            difference = loudness.measure(pathlib.Path(folder), body)
+            print(materials.row(body.name, body.material, *difference.line()), flush=True)
+    print()
+
+
+def fit_lines(young_pa, found):
+    yield (f"E {young_pa / 1e9:.1f} GPa, nu {found.poisson_ratio:.4f}; {len(found.pairs)} frequencies within "
+           f"{100 * found.error:.3f} % r.m.s.\n")
+    yield from materials.head("recorded, Hz", "fitted, Hz", "difference, %")
+    for ring, mode in found.pairs:
+        yield materials.row(f"{ring:.1f}", f"{mode:.1f}", f"{100 * (mode / ring - 1):+.3f}")
+
+
+def result_line(result, recorded):
+    factor = bar.decay_factor(recorded, result.decays)
+    decays = [f"{result.decays[hz]:.3g}" if hz in result.decays else "-" for hz in bar.HIGH_HZ]
+    return materials.row(result.name, f"{result.mrstft:.2f}", f"{result.octaves_db:.1f}",
+                         "-" if factor is None else f"{factor:.2f}", *decays,
+                         "x".join(f"{1000 * x:.1f}" for x in result.point_m[:2]))
+
+
+def show_bar(options):
+    path = options.recordings and options.recordings / bar.RECORDING
+    if not path or not path.exists():
+        print(f"## The recorded bar\n\nskipped: {bar.RECORDING} is not in {options.recordings}; give the folder that "
+              "has it\n")
+        return
+    whole = rings.read(path)
+    recording = whole[:int(bar.SPAN_S * rings.RATE_HZ)]
+    found = {hz: rings.ring_near(whole, hz) for hz in bar.HIGH_HZ}
+    recorded = {hz: ring.decay_per_s for hz, ring in found.items() if ring}
+    print("## The recorded bar\n")
+    with studio() as (opened, folder):
+        young_pa, fit = bar.fit_material(folder, rings.rings(whole))
+        print_table(fit_lines(young_pa, fit))
+        print("\n".join(materials.head("", "MRSTFT", "octaves, dB", "decays, factor",
+                                   *(f"{hz} Hz, 1/s" for hz in bar.HIGH_HZ), "struck at, mm")
+                    + [materials.row("recording", "", "", "", *(f"{recorded[hz]:.3g}" for hz in bar.HIGH_HZ), "")]))
+        results = []
+        for variant in bar.variants(opened, folder, young_pa, fit.poisson_ratio):
+            results.append(bar.measure(opened, recording, variant))
+            print(result_line(results[-1], recorded), flush=True)
+        print()
+    pictures.draw([("recording", recording)] + [(result.name, result.sound) for result in results],
+                  options.pictures / "bar.png", bar.SPAN_S)
+
+
+def drop_line(when, drop):
+    summary = drop.summary
+    if drop.silent():
+        return materials.row(drop.name, when, "silent", *[""] * (len(likeness.OCTAVES_HZ) + 2))
+    return materials.row(drop.name, when, f"{float(summary['peak']) * 20:.2g}",
+                         *(f"{db:.0f}" for db in drop.octaves_db()), f"{drop.ring_s():.2f}",
+                         f"{summary['loudest_momentary_lufs']:.1f}" if "loudest_momentary_lufs" in summary else "-")
+
+
+def show_drops(options):
+    print("## Five drops\n")
+    print("\n".join(materials.head("body", "laws", "peak, Pa", *(f"{hz // 1000} kHz, dB" for hz in likeness.OCTAVES_HZ),
+                               "40 dB down after, s", "loudest 0.4 s, LUFS")))
+    with studio(options.before) as (old, _), studio() as (new, folder):
+        pairs = []
+        for body in drops.BODIES:
+            model_file = drops.decompose(folder, body)
+            before = drops.hear(old, model_file, body, before=True)
+            after = drops.hear(new, model_file, body, before=False)
+            pairs += [(f"{body.name}, before", before.sound), (f"{body.name}, now", after.sound)]
+            print(drop_line("before", before), drop_line("now", after), sep="\n", flush=True)
+    print()
+    pictures.draw(pairs, options.pictures / "drops.png", 1.0, columns=2)
+
+
+if __name__ == "__main__":
+    options = arguments()
+    options.pictures = options.pictures or options.build / "truth"
+    options.pictures.mkdir(parents=True, exist_ok=True)
+    programs.use(options.build)
+    for part in options.parts.split(","):
+        {"materials": show_materials, "loudness": show_loudness, "bar": show_bar, "drops": show_drops}[part](options)

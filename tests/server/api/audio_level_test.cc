@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "tests/server/api/served_daemon.h"
+
+namespace carillon {
+namespace {
+
+class AudioLevel : public ServedDaemon {
+ protected:
+  /// The summary of a rendering of one object that is struck once along x.
+  v1::RenderSummary RenderStrike(double newton_seconds) {
+    grpc::ClientContext context;
+    const auto stream = audio->Render(&context);
+    v1::RenderRequest request;
+    request.mutable_settings()->set_tail_s(0.6);
+    stream->Write(request);
+    request.mutable_record()->mutable_header()->set_format_version(1);
+    stream->Write(request);
+    v1::ContactTraceObject& object = *request.mutable_record()->mutable_object();
+    object.set_handle(1);
+    object.set_modal_model(ImportSmallModel());
+    *object.mutable_material() = SmallMaterial();
+    stream->Write(request);
+    v1::Impulse& impulse = *request.mutable_record()->mutable_step()->add_impulses() = Strike(1);
+    impulse.mutable_impulse_newton_seconds()->set_x(newton_seconds);
+    stream->Write(request);
+    stream->WritesDone();
+    v1::RenderResponse response;
+    while (stream->Read(&response)) {
+    }
+    EXPECT_TRUE(stream->Finish().ok());
+    return response.summary();
+  }
+
+  void StrikeLive(const std::string& scene) {
+    grpc::ClientContext context;
+    const auto stream = contacts->StreamContacts(&context);
+    v1::StreamContactsRequest request;
+    request.mutable_start()->set_scene(scene);
+    stream->Write(request);
+    *request.mutable_step()->add_impulses() = Strike(1);
+    stream->Write(request);
+    stream->WritesDone();
+    v1::StreamContactsResponse answer;
+    while (stream->Read(&answer)) {
+    }
+    EXPECT_TRUE(stream->Finish().ok());
+  }
+
+  v1::GetMixerResponse Mixer() {
+    grpc::ClientContext context;
+    v1::GetMixerResponse mixer;
+    EXPECT_TRUE(audio->GetMixer(&context, {}, &mixer).ok());
+    return mixer;
+  }
+};
+
+TEST_F(AudioLevel, ARenderingStatesPressureAndLoudness) {
+  const v1::RenderSummary once = RenderStrike(1);
+  EXPECT_GT(once.peak(), 0.001);
+  EXPECT_DOUBLE_EQ(once.peak_pa(), 20 * once.peak());
+  EXPECT_GE(once.true_peak(), 0.99 * once.peak());
+  ASSERT_TRUE(once.has_integrated_lufs() && once.has_loudest_momentary_lufs());
+  EXPECT_GE(once.loudest_momentary_lufs(), once.integrated_lufs() - 0.1);
+  // Half of the impulse is 6.02 dB less.
+  const v1::RenderSummary half = RenderStrike(0.5);
+  EXPECT_NEAR(once.loudest_momentary_lufs() - half.loudest_momentary_lufs(), 6.02, 0.01);
+}
+
+TEST_F(AudioLevel, ARenderingOfNextToNothingHasNoLoudness) {
+  const v1::RenderSummary summary = RenderStrike(1e-9);
+  EXPECT_FALSE(summary.has_integrated_lufs() || summary.has_loudest_momentary_lufs());
+}
+
+TEST_F(AudioLevel, TheMixerStatesTheLoudnessOfWhatItPlays) {
+  v1::GetMixerResponse mixer = Mixer();
+  EXPECT_FALSE(mixer.has_momentary_lufs() || mixer.has_short_term_lufs());
+  const std::string scene = CreateScene();
+  v1::AddObjectResponse added;
+  ASSERT_TRUE(Add(SmallObject(scene), added).ok());
+  StrikeLive(scene);
+  while (!mixer.has_momentary_lufs()) mixer = Mixer();
+  EXPECT_GT(mixer.momentary_lufs(), -70);
+  EXPECT_GT(mixer.peak_pa(), 0);
+}
+
+}  // namespace
+}  // namespace carillon
