@@ -9,9 +9,12 @@
 
 #include <chrono>
 #include <cstdint>
+#include <cstdlib>
+#include <functional>
 #include <iostream>
 #include <memory>
 #include <string>
+#include <thread>
 #include <utility>
 
 #include "absl/cleanup/cleanup.h"
@@ -35,6 +38,10 @@ namespace carillon {
 namespace {
 
 constexpr char kVersion[] = CARILLON_VERSION;
+constexpr std::chrono::milliseconds kStopLimit(4500);
+
+/// Reads the command line and the configuration file once more.
+using ReadOptions = std::function<absl::StatusOr<CommandLine>()>;
 
 /// Logs go to stderr, one line a message; stdout is left to output that programs read.
 void SetUpLog() {
@@ -43,22 +50,37 @@ void SetUpLog() {
   spdlog::flush_on(spdlog::level::info);
 }
 
-/// The signals that end the daemon; blocked in every thread, so that only WaitForStop sees them.
-sigset_t BlockStopSignals() {
+/// The signals that the daemon acts on; blocked in every thread, so that only WaitForStop sees
+/// them.
+sigset_t BlockSignals() {
   sigset_t signals;
   sigemptyset(&signals);
-  sigaddset(&signals, SIGINT);
-  sigaddset(&signals, SIGTERM);
+  for (const int signal_number : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&signals, signal_number);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  for (const int signal_number : {SIGUSR1, SIGUSR2}) signal(signal_number, SIG_IGN);
   signal(SIGPIPE, SIG_IGN);
   signal(SIGXFSZ, SIG_IGN);  // writing beyond a file-size limit then fails like a full disk
   return signals;
 }
 
-void WaitForStop(const sigset_t& signals) {
+/// Returns on SIGINT and SIGTERM; each SIGHUP calls `reload`.
+void WaitForStop(const sigset_t& signals, const std::function<void()>& reload) {
   int received = 0;
-  sigwait(&signals, &received);
+  while (sigwait(&signals, &received) != 0 || received == SIGHUP) {
+    if (received == SIGHUP) reload();
+  }
   spdlog::info("stopping on {}", received == SIGINT ? "SIGINT" : "SIGTERM");
+}
+
+/// Ends the process if it has not stopped within 4.5 s, for instance because a call computes.
+/// Nothing that was acknowledged is lost: the database is written as for a loss of power.
+void LimitStop() {
+  std::thread([] {
+    std::this_thread::sleep_for(kStopLimit);
+    spdlog::warn("calls still run {} ms after the signal to stop, and are cut off",
+                 kStopLimit.count());
+    std::_Exit(EXIT_SUCCESS);
+  }).detach();
 }
 
 void AnnounceReady(const ApiServer& server) {
@@ -79,7 +101,6 @@ void CollectUnusedMeshes(ModeDatabase& database) {
 
 void LogOutput(const LiveOutput& output) {
   const OutputState state = output.state();
-  if (!state.device_message.empty()) spdlog::warn("no sound: {}", state.device_message);
   spdlog::info("plays on {} at {} Hz with an output latency of {:.1f} ms", state.device,
                output.format().sample_rate_hz, state.latency_s * 1000);
 }
@@ -141,7 +162,8 @@ OutputSettings OutputSettingsOf(const Options& options) {
                      .block_frame_count = options.block_frame_count,
                      .channel_count = options.channel_count},
           .look_ahead_block_count = options.look_ahead_block_count,
-          .device = options.audio_device};
+          .device = options.audio_device,
+          .device_program = options.audio_program};
 }
 
 ApiSettings ApiSettingsOf(const Options& options) {
@@ -152,10 +174,32 @@ ApiSettings ApiSettingsOf(const Options& options) {
           .version = kVersion};
 }
 
+/// Applies the settings that can change while the daemon runs; says which cannot.
+void Reload(const ReadOptions& read_options, Options& options, ApiServer& server) {
+  sd_notify(0, "RELOADING=1");
+  const absl::StatusOr<CommandLine> read = read_options();
+  absl::Status status = read.status();
+  if (status.ok()) status = server.Reload(ApiSettingsOf(read->options));
+  if (status.ok()) {
+    Options unchangeable = read->options;
+    unchangeable.admin_token_file = options.admin_token_file;
+    if (!(unchangeable == options)) {
+      spdlog::warn(
+          "some changed settings need a restart: a reload takes only the administrators' token "
+          "into account");
+    }
+    options.admin_token_file = read->options.admin_token_file;
+    spdlog::info("the configuration was read again");
+  } else {
+    spdlog::error("nothing was changed by the reload: {}", std::string(status.message()));
+  }
+  sd_notify(0, "READY=1");
+}
+
 /// Serves until a stop signal arrives. Each part is made after the parts that it uses and destroyed
 /// before them.
-absl::Status Run(const Options& options) {
-  const sigset_t stop_signals = BlockStopSignals();
+absl::Status Run(Options options, const ReadOptions& read_options) {
+  const sigset_t signals = BlockSignals();
   SystemClock clock;
   ASSIGN_OR_RETURN(const DataDirectory directory, DataDirectory::Open(options.data_directory));
   ASSIGN_OR_RETURN(const std::unique_ptr<ModeDatabase> database,
@@ -181,8 +225,10 @@ absl::Status Run(const Options& options) {
                                                              .clock = clock}));
   LogOutput(*output);
   AnnounceReady(*server);
-  WaitForStop(stop_signals);
+  WaitForStop(signals, [&] { Reload(read_options, options, *server); });
   sd_notify(0, "STOPPING=1");
+  LimitStop();
+  output->FadeOut();
   return absl::OkStatus();
 }
 
@@ -207,11 +253,13 @@ absl::Status RunDatabaseCommand(const CommandLine& command) {
 
 int Main(int argc, const char* const* argv) {
   SetUpLog();
-  const absl::StatusOr<CommandLine> command = ReadCommandLine(argc, argv, kVersion);
+  const ReadOptions read_options = [=] { return ReadCommandLine(argc, argv, kVersion); };
+  const absl::StatusOr<CommandLine> command = read_options();
   if (command.ok() && !command->run) return command->exit_status;
-  const absl::Status status = !command.ok()                       ? command.status()
-                              : command->database_command.empty() ? Run(command->options)
-                                                                  : RunDatabaseCommand(*command);
+  const absl::Status status = !command.ok() ? command.status()
+                              : command->database_command.empty()
+                                  ? Run(command->options, read_options)
+                                  : RunDatabaseCommand(*command);
   if (status.ok()) return 0;
   spdlog::error("{}", std::string(status.message()));
   return 1;

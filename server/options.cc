@@ -54,6 +54,7 @@ Options Defaults() {
   options.data_directory = DefaultDataDirectory();
   options.addresses = {DefaultAddress()};
   options.precompute_program = Beside("carillon-precompute");
+  options.audio_program = Beside("carillon-audio");
   options.slurm_client = Beside("carillon");
   return options;
 }
@@ -101,6 +102,7 @@ absl::Status ReadKey(const std::string& key, const toml::node& node, Options& op
   if (key == "slurm_client") return ReadValue(key, node, options.slurm_client);
   if (key == "slurm_tls_roots") return ReadValue(key, node, options.slurm_tls_roots);
   if (key == "precompute") return ReadValue(key, node, options.precompute_program);
+  if (key == "audio_program") return ReadValue(key, node, options.audio_program);
   if (key == "tls_certificate") return ReadValue(key, node, options.tls_certificate_file);
   if (key == "admin_token_file") return ReadValue(key, node, options.admin_token_file);
   if (key == "tls_key") return ReadValue(key, node, options.tls_key_file);
@@ -220,6 +222,9 @@ void AddFlags(CLI::App& app, Options& options) {
                  "path on every node of a PEM file with the root of this daemon's TLS certificate");
   app.add_option("--precompute", options.precompute_program,
                  "path of the program that computes decompositions")
+      ->capture_default_str();
+  app.add_option("--audio-program", options.audio_program,
+                 "path of the program that opens sound cards")
       ->capture_default_str();
   app.add_option("--tls-certificate", options.tls_certificate_file,
                  "PEM file with the certificate for TCP");

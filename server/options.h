@@ -35,9 +35,12 @@ struct Options {
   std::string slurm_client;        ///< path of `carillon` on every node
   std::string slurm_tls_roots;     ///< path of a PEM file on every node
   std::string precompute_program;  ///< path of carillon-precompute
+  std::string audio_program;       ///< path of carillon-audio
   std::string tls_certificate_file;
   std::string tls_key_file;
   std::string admin_token_file;
+
+  bool operator==(const Options&) const = default;
 };
 
 /// The parsed command line, which decides the program's next action.

@@ -79,8 +79,14 @@ class BackupCall final : public ServerStream<v1::BackUpDatabaseResponse> {
 
 }  // namespace
 
+void AdminService::set_token(std::string token) {
+  const MutexLock lock(&mutex_);
+  token_ = std::move(token);
+}
+
 absl::Status AdminService::Authorize(const grpc::CallbackServerContext& context) const {
   if (absl::StartsWith(context.peer(), "unix:")) return absl::OkStatus();
+  const MutexLock lock(&mutex_);
   if (!token_.empty() && SameSecret(BearerToken(context), token_)) return absl::OkStatus();
   return Refusal(absl::StatusCode::kPermissionDenied, "ADMINISTRATOR_ONLY",
                  "this call is for administrators: come through the daemon's Unix socket, or show "

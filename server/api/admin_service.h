@@ -3,8 +3,10 @@
 
 #include <string>
 
+#include "absl/base/thread_annotations.h"
 #include "carillon/v1/admin_service.grpc.pb.h"
 #include "server/api/thread_pool.h"
+#include "server/base/mutex.h"
 #include "server/mode_database/mode_database.h"
 
 namespace carillon {
@@ -15,6 +17,9 @@ class AdminService final : public v1::AdminService::CallbackService {
   /// `token`: the token that callers from the network must send; empty: they are refused.
   AdminService(ModeDatabase& database, std::string token, ThreadPool& pool)
       : database_(database), token_(std::move(token)), pool_(pool) {}
+
+  /// Replaces the token.
+  void set_token(std::string token);
 
   grpc::ServerUnaryReactor* GetDatabaseStats(grpc::CallbackServerContext* context,
                                              const v1::GetDatabaseStatsRequest* request,
@@ -29,7 +34,8 @@ class AdminService final : public v1::AdminService::CallbackService {
   absl::Status Authorize(const grpc::CallbackServerContext& context) const;
 
   ModeDatabase& database_;
-  const std::string token_;
+  mutable Mutex mutex_;
+  std::string token_ ABSL_GUARDED_BY(mutex_);
   ThreadPool& pool_;
 };
 

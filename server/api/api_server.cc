@@ -99,7 +99,8 @@ struct ApiServer::State {
                   .output = rooms.output,
                   .clock = rooms.clock,
                   .pool = call_pool}),
-        audio(settings.version, rooms.output, rooms.scenes, rooms.database, render_pool) {}
+        audio(settings.version, rooms.output, rooms.scenes, rooms.database, render_pool),
+        output(rooms.output) {}
 
   absl::Status Listen(const ApiSettings& settings);
 
@@ -112,6 +113,7 @@ struct ApiServer::State {
   SceneService scenes;
   ContactService contacts;
   AudioService audio;
+  LiveOutput& output;
   std::unique_ptr<grpc::Server> server;
   std::vector<std::string> addresses;
 };
@@ -152,12 +154,22 @@ absl::StatusOr<std::unique_ptr<ApiServer>> ApiServer::Start(const ApiSettings& s
   ASSIGN_OR_RETURN(std::string admin_token, ReadToken(settings.admin_token_file));
   auto state = std::make_unique<State>(settings, rooms, std::move(admin_token));
   RETURN_IF_ERROR(state->Listen(settings));
+  rooms.output.ObserveDevice([health = state->server->GetHealthCheckService()](bool plays) {
+    health->SetServingStatus(v1::AudioService::service_full_name(), plays);
+  });
   return std::unique_ptr<ApiServer>(new ApiServer(std::move(state)));
+}
+
+absl::Status ApiServer::Reload(const ApiSettings& settings) {
+  ASSIGN_OR_RETURN(std::string admin_token, ReadToken(settings.admin_token_file));
+  state_->admin.set_token(std::move(admin_token));
+  return absl::OkStatus();
 }
 
 ApiServer::ApiServer(std::unique_ptr<State> state) : state_(std::move(state)) {}
 
 ApiServer::~ApiServer() {
+  state_->output.ObserveDevice(nullptr);
   state_->server->Shutdown(std::chrono::system_clock::now() + kGracePeriod);
   state_->server->Wait();
 }

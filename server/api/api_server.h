@@ -39,7 +39,9 @@ struct ServedRooms {
   Clock& clock;
 };
 
-/// All services of carillon.v1, health and reflection.
+/// All services of carillon.v1, health and reflection. The health of carillon.v1.AudioService is
+/// NOT_SERVING while the wanted sound device does not play; that of the whole server ("") is
+/// SERVING.
 class ApiServer {
  public:
   /// Starts to serve; calls are answered when it returns. Errors: InvalidArgument
@@ -48,10 +50,14 @@ class ApiServer {
   static absl::StatusOr<std::unique_ptr<ApiServer>> Start(const ApiSettings& settings,
                                                           const ServedRooms& rooms);
 
-  /// Cancels the streaming calls, and waits until all calls have ended.
+  /// Cancels all calls, and waits until their steps have ended.
   ~ApiServer();
   ApiServer(const ApiServer&) = delete;
   ApiServer& operator=(const ApiServer&) = delete;
+
+  /// Reads the administrators' token anew. Errors: those of Start about it; nothing is changed
+  /// then.
+  absl::Status Reload(const ApiSettings& settings);
 
   /// The addresses of the settings, with the ports that were chosen.
   const std::vector<std::string>& addresses() const;

@@ -24,13 +24,14 @@ struct DeviceFormat {
 /// A device that plays sound. A new kind of device is a new implementation of this interface and a
 /// line in open_device.cc.
 ///
-/// One thread calls Start, Stop and the destructor; any thread may call the other functions.
+/// One thread calls Start, Check, Stop and the destructor; any thread may call the others.
 class AudioDevice {
  public:
   /// Stops the device.
   virtual ~AudioDevice() = default;
 
-  /// Begins to pull from `source`, which must live until Stop has returned.
+  /// Begins to pull from `source`, which must live until Stop has returned. It is quick: whatever
+  /// takes time is done when the device is opened.
   virtual absl::Status Start(FrameSource& source) = 0;
 
   /// Ends pulling: after it has returned, the source is not used again. It may be called twice.
@@ -43,8 +44,9 @@ class AudioDevice {
   /// on.
   virtual double latency_s() const = 0;
 
-  /// False once a started device has failed (its server went away, its disk is full).
-  virtual bool alive() const = 0;
+  /// OK while the device plays. Unavailable: it has failed (its server went away), and must be
+  /// replaced. Another error: it loses frames at present (its disk is full), but keeps trying.
+  virtual absl::Status Check() = 0;
 
   /// Number of times that the device itself reported missed frames; its source's xruns are not
   /// included.

@@ -32,6 +32,18 @@ void ClockedDevice::Stop() {
   if (thread_.joinable()) thread_.join();
 }
 
+absl::Status ClockedDevice::Check() {
+  const MutexLock lock(&mutex_);
+  return state_;
+}
+
+void ClockedDevice::GiveToSink(std::span<const float> block) {
+  absl::Status status = sink_(block);
+  if (!status.ok()) lost_frame_count_ += format_.block_frame_count;
+  const MutexLock lock(&mutex_);
+  state_ = std::move(status);
+}
+
 void ClockedDevice::Run() {
   std::vector<float> block(format_.block_size());
   const uint64_t frame_count = format_.block_frame_count;
@@ -39,10 +51,7 @@ void ClockedDevice::Run() {
   // Due times are computed from the start, so that rounding errors do not accumulate.
   for (uint64_t frames = frame_count; !stopping_; frames += frame_count) {
     source_->Pull(block);
-    if (sink_ && !sink_(block)) {
-      alive_ = false;
-      return;
-    }
+    if (sink_) GiveToSink(block);
     clock_.SleepUntil(start +
                       std::chrono::nanoseconds(frames * 1'000'000'000 / format_.sample_rate_hz));
   }

@@ -8,8 +8,10 @@
 #include <thread>
 #include <vector>
 
+#include "absl/base/thread_annotations.h"
 #include "server/audio_device/audio_device.h"
 #include "server/base/clock.h"
+#include "server/base/mutex.h"
 
 namespace carillon {
 
@@ -17,8 +19,8 @@ namespace carillon {
 /// block, and gives it to a sink. It catches up after late wake-ups, so the mean rate is exact.
 class ClockedDevice final : public AudioDevice {
  public:
-  /// Takes one block. False: the device has failed and pulls no more.
-  using Sink = std::function<bool(std::span<const float>)>;
+  /// Takes one block. After an error the block is lost, and the next one is given to the sink.
+  using Sink = std::function<absl::Status(std::span<const float>)>;
 
   /// `clock` must outlive the device.
   ClockedDevice(std::string description, const DeviceFormat& format, Clock& clock, Sink sink);
@@ -28,19 +30,25 @@ class ClockedDevice final : public AudioDevice {
   void Stop() override;
   std::string description() const override { return description_; }
   double latency_s() const override { return 0; }
-  bool alive() const override { return alive_.load(std::memory_order_relaxed); }
+  absl::Status Check() override;
   uint64_t xrun_count() const override { return 0; }
-  uint64_t lost_frame_count() const override { return 0; }
+  uint64_t lost_frame_count() const override {
+    return lost_frame_count_.load(std::memory_order_relaxed);
+  }
 
  private:
   void Run();
+  void GiveToSink(std::span<const float> block);
 
   const std::string description_;
   const DeviceFormat format_;
   Clock& clock_;
   const Sink sink_;
   FrameSource* source_ = nullptr;
-  std::atomic<bool> alive_{true};
+  std::atomic<uint64_t> lost_frame_count_{0};
+  Mutex mutex_;
+  /// Whether the sink took the newest block.
+  absl::Status state_ ABSL_GUARDED_BY(mutex_);
   std::atomic<bool> stopping_{false};
   std::thread thread_;
 };

@@ -20,6 +20,10 @@ class FrameSource {
 
   /// Fills all of `frames`; frames that are not ready are silent.
   virtual void Pull(std::span<float> frames) noexcept = 0;
+
+  /// Descriptor of the memory from which another process can pull the same frames (see FrameRing);
+  /// -1 if there is none.
+  virtual int shared_memory() const { return -1; }
 };
 
 }  // namespace carillon

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/audio_device/look_ahead.h"
 
-#include <algorithm>
 #include <chrono>
 #include <utility>
 
@@ -15,7 +14,7 @@ LookAhead::LookAhead(const DeviceFormat& format, uint32_t block_count, RenderBlo
       block_count_(block_count),
       render_(std::move(render)),
       clock_(clock),
-      rendered_(block_count * format.block_size()) {}
+      rendered_(format, block_count) {}
 
 LookAhead::~LookAhead() { Stop(); }
 
@@ -31,15 +30,6 @@ void LookAhead::Stop() {
   if (thread_.joinable()) thread_.join();
 }
 
-void LookAhead::Pull(std::span<float> frames) noexcept {
-  const size_t ready = rendered_.Pop(frames);
-  if (ready == frames.size()) return;
-  std::ranges::fill(frames.subspan(ready), 0.0F);
-  xrun_count_.fetch_add(1, std::memory_order_relaxed);
-  lost_frame_count_.fetch_add((frames.size() - ready) / format_.channel_count,
-                              std::memory_order_relaxed);
-}
-
 double LookAhead::latency_s() const {
   return static_cast<double>(block_count_) * format_.block_frame_count / format_.sample_rate_hz;
 }
@@ -48,17 +38,17 @@ void LookAhead::Run() {
   const auto half_block =
       std::chrono::nanoseconds(500'000'000ULL * format_.block_frame_count / format_.sample_rate_hz);
   while (!stopping_) {
-    while (rendered_.free_count() >= format_.block_size() && !stopping_) RenderOne();
+    while (rendered_.frames().free_count() >= format_.block_size() && !stopping_) RenderOne();
     clock_.SleepUntil(clock_.Monotonic() + half_block);
   }
 }
 
 void LookAhead::RenderOne() {
   const std::chrono::nanoseconds start = clock_.Monotonic();
-  const std::span<float> block = rendered_.Next(format_.block_size());
+  const std::span<float> block = rendered_.frames().Next(format_.block_size());
   render_(block);
   const std::chrono::duration<double> taken = clock_.Monotonic() - start;
-  rendered_.Commit(block.size());
+  rendered_.frames().Commit(block.size());
   const double block_s = static_cast<double>(format_.block_frame_count) / format_.sample_rate_hz;
   const double old_load = load();
   load_.store(old_load + block_s * (taken.count() / block_s - old_load), std::memory_order_relaxed);

@@ -9,7 +9,7 @@
 
 #include "absl/status/status.h"
 #include "server/audio_device/audio_device.h"
-#include "server/audio_device/ring_buffer.h"
+#include "server/audio_device/frame_ring.h"
 #include "server/base/clock.h"
 
 namespace carillon {
@@ -19,14 +19,14 @@ namespace carillon {
 ///
 /// The thread polls the ring buffer for room twice in a block's time. Waking it would need a system
 /// call in the device's callback.
-class LookAhead final : public FrameSource {
+class LookAhead final {
  public:
   /// Fills one block. Only the render thread calls it; it must be real-time safe.
   using RenderBlock = std::function<void(std::span<float>)>;
 
   /// `clock` must outlive this.
   LookAhead(const DeviceFormat& format, uint32_t block_count, RenderBlock render, Clock& clock);
-  ~LookAhead() override;
+  ~LookAhead();
   LookAhead(const LookAhead&) = delete;
   LookAhead& operator=(const LookAhead&) = delete;
 
@@ -37,16 +37,17 @@ class LookAhead final : public FrameSource {
   /// Joins the thread.
   void Stop();
 
-  void Pull(std::span<float> frames) noexcept override;
+  /// The frames that the device pulls.
+  FrameSource& source() { return rendered_; }
 
   /// Latency of the ring buffer.
   double latency_s() const;
 
   /// Number of pulls that found too few frames in the ring buffer.
-  uint64_t xrun_count() const { return xrun_count_.load(std::memory_order_relaxed); }
+  uint64_t xrun_count() const { return rendered_.xrun_count(); }
 
   /// Number of silent frames given instead of missing ones.
-  uint64_t lost_frame_count() const { return lost_frame_count_.load(std::memory_order_relaxed); }
+  uint64_t lost_frame_count() const { return rendered_.lost_frame_count(); }
 
   /// Fraction of real time that rendering takes, smoothed over about a second; 1 is the limit.
   double load() const { return load_.load(std::memory_order_relaxed); }
@@ -59,9 +60,7 @@ class LookAhead final : public FrameSource {
   const uint32_t block_count_;
   const RenderBlock render_;
   Clock& clock_;
-  RingBuffer<float> rendered_;
-  std::atomic<uint64_t> xrun_count_{0};
-  std::atomic<uint64_t> lost_frame_count_{0};
+  FrameRing rendered_;
   std::atomic<double> load_{0};
   std::atomic<bool> stopping_{false};
   std::thread thread_;

@@ -4,18 +4,15 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
 #include "absl/strings/strip.h"
 #include "proto/cpp/error_reason.h"
 #include "server/audio_device/clocked_device.h"
-#include "server/audio_device/portaudio_device.h"
+#include "server/audio_device/device_process.h"
 #include "server/audio_device/wav_writer.h"
 
 namespace carillon {
 namespace {
-
-std::unique_ptr<AudioDevice> OpenNullDevice(const DeviceFormat& format, Clock& clock) {
-  return std::make_unique<ClockedDevice>("null", format, clock, nullptr);
-}
 
 absl::StatusOr<std::unique_ptr<AudioDevice>> OpenFileDevice(absl::string_view path,
                                                             const DeviceFormat& format,
@@ -26,35 +23,33 @@ absl::StatusOr<std::unique_ptr<AudioDevice>> OpenFileDevice(absl::string_view pa
   auto writer = std::make_shared<WavWriter>(*std::move(made));
   return std::make_unique<ClockedDevice>(
       absl::StrCat("file: ", path), format, clock,
-      [writer](std::span<const float> block) { return writer->Write(block).ok(); });
+      [writer](std::span<const float> block) { return writer->Write(block); });
 }
 
-absl::StatusOr<std::unique_ptr<AudioDevice>> OpenNamed(absl::string_view specification,
-                                                       const DeviceFormat& format, Clock& clock) {
+}  // namespace
+
+std::unique_ptr<AudioDevice> OpenNullDevice(const DeviceFormat& format, Clock& clock) {
+  return std::make_unique<ClockedDevice>("null", format, clock, nullptr);
+}
+
+absl::StatusOr<std::unique_ptr<AudioDevice>> OpenDevice(const DeviceSettings& settings,
+                                                        Clock& clock) {
+  const absl::string_view specification = settings.specification;
   absl::string_view rest = specification;
-  if (specification == "null") return OpenNullDevice(format, clock);
-  if (specification == "portaudio") return OpenPortAudioDevice("", format);
-  if (absl::ConsumePrefix(&rest, "portaudio:")) return OpenPortAudioDevice(rest, format);
+  if (specification == "null") return OpenNullDevice(settings.format, clock);
+  if (specification == "auto" || specification == "portaudio") {
+    return OpenDeviceProcess(settings.program, "", settings.format, clock);
+  }
+  if (absl::ConsumePrefix(&rest, "portaudio:")) {
+    return OpenDeviceProcess(settings.program, rest, settings.format, clock);
+  }
   if (absl::ConsumePrefix(&rest, "file:") && !rest.empty()) {
-    return OpenFileDevice(rest, format, clock);
+    return OpenFileDevice(rest, settings.format, clock);
   }
   return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_AUDIO_DEVICE",
                  absl::StrCat("\"", specification,
                               "\" names no audio device; say auto, portaudio, portaudio:NAME, null "
                               "or file:PATH"));
-}
-
-}  // namespace
-
-absl::StatusOr<OpenedDevice> OpenDevice(absl::string_view specification, const DeviceFormat& format,
-                                        Clock& clock) {
-  const bool automatic = specification == "auto";
-  absl::StatusOr<std::unique_ptr<AudioDevice>> device =
-      OpenNamed(automatic ? "portaudio" : specification, format, clock);
-  if (device.ok()) return OpenedDevice{.device = *std::move(device), .message = ""};
-  if (!automatic) return device.status();
-  return OpenedDevice{.device = OpenNullDevice(format, clock),
-                      .message = ToErrorInfo(device.status()).message()};
 }
 
 }  // namespace carillon

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/audio_device/portaudio_device.h"
 
-#include <fcntl.h>
 #include <portaudio.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -26,29 +24,8 @@ namespace {
 /// With less latency, PulseAudio behind ALSA drops out.
 constexpr double kMinAlsaLatency_s = 0.020;
 constexpr int kMaxChannelCount = 2;
-
-/// Redirects file descriptor 2 to /dev/null while it lives: on a machine without a sound card ALSA
-/// and JACK print about a hundred lines there, and PortAudio cannot prevent it.
-class StderrSilence {
- public:
-  StderrSilence() : saved_(fcntl(STDERR_FILENO, F_DUPFD_CLOEXEC, 3)) {
-    const int nowhere = open("/dev/null", O_WRONLY | O_CLOEXEC);
-    if (nowhere >= 0) {
-      dup2(nowhere, STDERR_FILENO);
-      close(nowhere);
-    }
-  }
-  ~StderrSilence() {
-    if (saved_ < 0) return;
-    dup2(saved_, STDERR_FILENO);
-    close(saved_);
-  }
-  StderrSilence(const StderrSilence&) = delete;
-  StderrSilence& operator=(const StderrSilence&) = delete;
-
- private:
-  int saved_;
-};
+/// Checks without a pull after which a device counts as gone: at one every 20 ms, a second.
+constexpr int kMaxIdleCheckCount = 50;
 
 absl::Status Failed(absl::string_view what, PaError error) {
   return Refusal(absl::StatusCode::kUnavailable, "AUDIO_DEVICE_FAILED",
@@ -113,7 +90,6 @@ class PortAudioDevice final : public AudioDevice {
   ~PortAudioDevice() override { Stop(); }
 
   absl::Status Open(absl::string_view name) {
-    const StderrSilence silence;
     library_ = std::make_unique<Library>();
     if (library_->error() != paNoError) return Failed("PortAudio", library_->error());
     absl::StatusOr<PaDeviceIndex> device = FindDevice(name);
@@ -128,17 +104,14 @@ class PortAudioDevice final : public AudioDevice {
     if (const PaError error = Pa_StartStream(stream_); error != paNoError) {
       return Failed(name_, error);
     }
-    started_ = true;
     return absl::OkStatus();
   }
 
   void Stop() override {
     if (stream_ == nullptr) return;
-    const StderrSilence silence;
     Pa_AbortStream(stream_);
     Pa_CloseStream(stream_);
     stream_ = nullptr;
-    started_ = false;
   }
 
   std::string description() const override { return absl::StrCat("portaudio: ", name_); }
@@ -150,11 +123,26 @@ class PortAudioDevice final : public AudioDevice {
         std::max<size_t>(clock_->longest_cycle_frames(), format_.block_frame_count);
     return latency_s_ + static_cast<double>(frames) / format_.sample_rate_hz;
   }
-  bool alive() const override { return !started_ || !finished_.load(std::memory_order_relaxed); }
+  absl::Status Check() override {
+    // A stream of JACK ends without a call of Finished when its server ends.
+    if (finished_.load(std::memory_order_relaxed) || Pa_IsStreamActive(stream_) != 1) {
+      return Gone("it has stopped; its sound server has ended, or the device is gone");
+    }
+    const uint64_t pull_count = pull_count_.load(std::memory_order_relaxed);
+    idle_check_count_ = pull_count == checked_pull_count_ ? idle_check_count_ + 1 : 0;
+    checked_pull_count_ = pull_count;
+    if (idle_check_count_ < kMaxIdleCheckCount) return absl::OkStatus();
+    return Gone("it asks for no sound any more; its sound server hangs, or the device is gone");
+  }
   uint64_t xrun_count() const override { return clock_->xrun_count(); }
   uint64_t lost_frame_count() const override { return clock_->lost_frame_count(); }
 
  private:
+  absl::Status Gone(absl::string_view why) const {
+    return Refusal(absl::StatusCode::kUnavailable, "AUDIO_DEVICE_FAILED",
+                   absl::StrCat(description(), ": ", why));
+  }
+
   absl::Status OpenStream(PaDeviceIndex index) {
     const PaDeviceInfo* device = Pa_GetDeviceInfo(index);
     const PaHostApiTypeId api = Pa_GetHostApiInfo(device->hostApi)->type;
@@ -192,6 +180,7 @@ class PortAudioDevice final : public AudioDevice {
     auto* device = static_cast<PortAudioDevice*>(self);
     device->clock_->Count(time->currentTime, time->outputBufferDacTime, frame_count,
                           (flags & paOutputUnderflow) != 0);
+    device->pull_count_.fetch_add(1, std::memory_order_relaxed);
     device->Fill({static_cast<float*>(output), frame_count * device->channel_count()});
     return paContinue;
   }
@@ -225,8 +214,10 @@ class PortAudioDevice final : public AudioDevice {
   bool is_jack_ = false;
   double latency_s_ = 0;              ///< as PortAudio reports it
   std::optional<OutputClock> clock_;  ///< set once the stream is open
-  bool started_ = false;
   std::atomic<bool> finished_{false};
+  std::atomic<uint64_t> pull_count_{0};
+  uint64_t checked_pull_count_ = 0;  ///< at the last Check
+  int idle_check_count_ = 0;         ///< since the last pull
 };
 
 }  // namespace

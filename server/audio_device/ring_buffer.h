@@ -10,61 +10,86 @@
 
 namespace carillon {
 
-/// A ring buffer that carries plain values (samples, numbers) from one thread to another. Values
-/// are copied in runs, without locks.
+/// The numbers of values that were ever pushed to and popped from a ring buffer.
+struct RingCounts {
+  alignas(64) std::atomic<size_t> written{0};
+  alignas(64) std::atomic<size_t> read{0};
+};
+
+/// A ring buffer over memory that somebody else owns. It carries plain values (samples, numbers)
+/// from one thread, or process, to another. Values are copied in runs, without locks.
 template <typename T>
-class RingBuffer {
+class RingView {
  public:
-  explicit RingBuffer(size_t capacity) : values_(capacity) {}
+  RingView(std::span<T> values, RingCounts& counts) : values_(values), counts_(&counts) {}
 
   size_t capacity() const { return values_.size(); }
 
   /// Called by the producer: number of values that may be pushed.
   size_t free_count() const {
-    return capacity() -
-           (written_.load(std::memory_order_relaxed) - read_.load(std::memory_order_acquire));
+    return capacity() - (counts_->written.load(std::memory_order_relaxed) -
+                         counts_->read.load(std::memory_order_acquire));
   }
 
   /// Called by the producer: appends `values`, at most free_count() of them.
   void Push(std::span<const T> values) noexcept {
-    const size_t written = written_.load(std::memory_order_relaxed);
+    const size_t written = counts_->written.load(std::memory_order_relaxed);
     const size_t begin = written % capacity();
     const size_t first = std::min(values.size(), capacity() - begin);
     std::copy_n(values.data(), first, values_.data() + begin);
     std::copy_n(values.data() + first, values.size() - first, values_.data());
-    written_.store(written + values.size(), std::memory_order_release);
+    counts_->written.store(written + values.size(), std::memory_order_release);
   }
 
   /// Called by a producer that always appends the same number of values, of which the capacity is a
   /// multiple: the place of the next `count` values, at most free_count(). They are appended by
   /// Commit once they have been written there.
   std::span<T> Next(size_t count) noexcept {
-    const size_t begin = written_.load(std::memory_order_relaxed) % capacity();
+    const size_t begin = counts_->written.load(std::memory_order_relaxed) % capacity();
     assert(begin + count <= capacity());
-    return std::span(values_).subspan(begin, count);
+    return values_.subspan(begin, count);
   }
 
   void Commit(size_t count) noexcept {
-    written_.store(written_.load(std::memory_order_relaxed) + count, std::memory_order_release);
+    counts_->written.store(counts_->written.load(std::memory_order_relaxed) + count,
+                           std::memory_order_release);
   }
 
   /// Called by the consumer: moves up to values.size() values to the front of `values`; returns
   /// their number.
   size_t Pop(std::span<T> values) noexcept {
-    const size_t read = read_.load(std::memory_order_relaxed);
-    const size_t count = std::min(values.size(), written_.load(std::memory_order_acquire) - read);
+    const size_t read = counts_->read.load(std::memory_order_relaxed);
+    const size_t count =
+        std::min(values.size(), counts_->written.load(std::memory_order_acquire) - read);
     const size_t begin = read % capacity();
     const size_t first = std::min(count, capacity() - begin);
     std::copy_n(values_.data() + begin, first, values.data());
     std::copy_n(values_.data(), count - first, values.data() + first);
-    read_.store(read + count, std::memory_order_release);
+    counts_->read.store(read + count, std::memory_order_release);
     return count;
   }
 
  private:
-  std::vector<T> values_;
-  alignas(64) std::atomic<size_t> written_{0};
-  alignas(64) std::atomic<size_t> read_{0};
+  std::span<T> values_;
+  RingCounts* counts_;
+};
+
+template <typename T>
+struct RingStorage {
+  explicit RingStorage(size_t capacity) : values(capacity) {}
+
+  std::vector<T> values;
+  RingCounts counts;
+};
+
+/// A ring buffer in memory of its own.
+template <typename T>
+class RingBuffer : private RingStorage<T>, public RingView<T> {
+ public:
+  explicit RingBuffer(size_t capacity)
+      : RingStorage<T>(capacity), RingView<T>(RingStorage<T>::values, RingStorage<T>::counts) {}
+  RingBuffer(const RingBuffer&) = delete;
+  RingBuffer& operator=(const RingBuffer&) = delete;
 };
 
 }  // namespace carillon

@@ -3,6 +3,7 @@
 
 #include <sndfile.h>
 
+#include <cstdio>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -39,10 +40,16 @@ absl::StatusOr<WavWriter> WavWriter::Make(const std::string& path, uint32_t samp
 
 absl::Status WavWriter::Write(std::span<const float> frames) {
   const auto count = static_cast<sf_count_t>(frames.size() / channel_count_);
-  if (sf_writef_float(Cast(file_.get()), frames.data(), count) == count) return absl::OkStatus();
-  return Refusal(
-      absl::StatusCode::kDataLoss, "AUDIO_FILE_FAILED",
-      absl::StrCat("cannot write on to \"", path_, "\": ", sf_strerror(Cast(file_.get()))));
+  SNDFILE* const file = Cast(file_.get());
+  if (failed_) sf_seek(file, frame_count_, SEEK_SET);  // over a frame that was written in part
+  failed_ = sf_writef_float(file, frames.data(), count) != count;
+  if (!failed_) {
+    frame_count_ += count;
+    return absl::OkStatus();
+  }
+  return Refusal(absl::StatusCode::kDataLoss, "AUDIO_FILE_FAILED",
+                 absl::StrCat("cannot write on to \"", path_, "\": ", sf_strerror(file),
+                              "; its sound is lost until there is space again"));
 }
 
 }  // namespace carillon

@@ -19,7 +19,7 @@ class WavWriter {
                                         uint32_t channel_count);
 
   /// Appends frames, interleaved. Errors: DataLoss (AUDIO_FILE_FAILED), for instance because the
-  /// disk is full.
+  /// disk is full. The frames are then left out, and the next ones follow those written before.
   absl::Status Write(std::span<const float> frames);
 
  private:
@@ -33,6 +33,8 @@ class WavWriter {
   File file_;
   std::string path_;
   uint32_t channel_count_;
+  int64_t frame_count_ = 0;  ///< written completely
+  bool failed_ = false;      ///< the newest frames were not written completely
 };
 
 }  // namespace carillon

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "absl/strings/str_cat.h"
+#include "proto/cpp/status_macros.h"
 #include "server/synthesis/flush_denormals.h"
 
 namespace carillon {
@@ -14,6 +14,8 @@ constexpr std::chrono::milliseconds kHousekeepingPeriod(5);
 /// Peak and loudness are sampled every kLevelPeriod; the peak is the maximum over kPeakMemory.
 constexpr std::chrono::milliseconds kLevelPeriod(50);
 constexpr std::chrono::seconds kPeakMemory(1);
+/// A fade takes 50 ms and the latency of the device; a device that is stuck must not delay a stop.
+constexpr std::chrono::milliseconds kLongestFade(500);
 
 size_t BlocksPerSecond(const DeviceFormat& format) {
   return format.sample_rate_hz / format.block_frame_count + 1;
@@ -44,23 +46,22 @@ LiveOutput::LiveOutput(const OutputSettings& settings, Clock& clock, Log log)
       look_ahead_(
           settings.format, settings.look_ahead_block_count,
           [this](std::span<float> block) { RenderBlock(block); }, clock),
+      final_fade_(settings.format),
       loudness_(settings.format.sample_rate_hz, settings.format.channel_count) {}
 
 LiveOutput::~LiveOutput() {
   stopping_ = true;
   if (housekeeper_.joinable()) housekeeper_.join();
-  const MutexLock lock(&mutex_);
-  if (output_.device) output_.device->Stop();
+  keeper_.reset();
   look_ahead_.Stop();
 }
 
 absl::Status LiveOutput::Open() {
-  const MutexLock lock(&mutex_);
-  absl::StatusOr<OpenedDevice> opened = OpenDevice(settings_.device, settings_.format, clock_);
-  if (!opened.ok()) return opened.status();
-  output_ = *std::move(opened);
   if (absl::Status status = look_ahead_.Start(); !status.ok()) log_(std::string(status.message()));
-  if (absl::Status status = output_.device->Start(look_ahead_); !status.ok()) return status;
+  ASSIGN_OR_RETURN(keeper_, DeviceKeeper::Start({.specification = settings_.device,
+                                                 .format = settings_.format,
+                                                 .program = settings_.device_program},
+                                                look_ahead_.source(), clock_, log_));
   housekeeper_ = std::thread([this] { KeepHouse(); });
   return absl::OkStatus();
 }
@@ -69,6 +70,7 @@ void LiveOutput::RenderBlock(std::span<float> block) {
   const FlushDenormals flush;
   const uint64_t first_frame = mixer_.frame();
   mixer_.Render(block);
+  final_fade_.Apply(block);
   broadcast_.Publish(first_frame, block);
 }
 
@@ -76,18 +78,29 @@ OutputState LiveOutput::state() const {
   OutputState state;
   state.load = look_ahead_.load();
   state.mixer = mixer_.statistics();
+  const DeviceState device = keeper_->state();
+  state.device = device.description;
+  state.device_message = device.message;
+  state.latency_s = look_ahead_.latency_s() + device.latency_s;
+  state.xrun_count = look_ahead_.xrun_count() + device.xrun_count;
+  state.lost_frame_count = look_ahead_.lost_frame_count() + device.lost_frame_count;
   const MutexLock lock(&mutex_);
-  const AudioDevice& device = *output_.device;
-  state.device = device.description();
-  state.device_message = output_.message;
-  state.latency_s = look_ahead_.latency_s() + device.latency_s();
-  state.xrun_count = look_ahead_.xrun_count() + earlier_xrun_count_ + device.xrun_count();
-  state.lost_frame_count =
-      look_ahead_.lost_frame_count() + earlier_lost_frame_count_ + device.lost_frame_count();
   for (const Peak& peak : peaks_) state.peak = std::max(state.peak, peak.value);
   state.momentary_lufs = momentary_lufs_;
   state.short_term_lufs = short_term_lufs_;
   return state;
+}
+
+void LiveOutput::FadeOut() {
+  final_fade_.Begin();
+  const std::chrono::nanoseconds longest = clock_.Monotonic() + kLongestFade;
+  while (!final_fade_.ended() && clock_.Monotonic() < longest) {
+    clock_.SleepUntil(clock_.Monotonic() + kHousekeepingPeriod);
+  }
+  const auto latency = std::chrono::duration<double>(state().latency_s);
+  const auto drained =
+      clock_.Monotonic() + std::chrono::duration_cast<std::chrono::nanoseconds>(latency);
+  clock_.SleepUntil(std::min(drained, longest));
 }
 
 void LiveOutput::KeepHouse() {
@@ -95,7 +108,6 @@ void LiveOutput::KeepHouse() {
   while (!stopping_) {
     broadcast_.Deliver([this](const RenderedBlock& block) { loudness_.Add(block.samples); });
     mixer_.CollectGarbage();
-    ReplaceDeadDevice();
     if (clock_.Monotonic() >= levels_due) {
       NoteLevels();
       levels_due += kLevelPeriod;
@@ -111,21 +123,6 @@ void LiveOutput::NoteLevels() {
   while (peaks_.front().time < now - kPeakMemory) peaks_.pop_front();
   momentary_lufs_ = loudness_.momentary();
   short_term_lufs_ = loudness_.short_term();
-}
-
-void LiveOutput::ReplaceDeadDevice() {
-  const MutexLock lock(&mutex_);
-  if (output_.device->alive()) return;
-  const std::string dead = output_.device->description();
-  output_.device->Stop();
-  earlier_xrun_count_ += output_.device->xrun_count();
-  earlier_lost_frame_count_ += output_.device->lost_frame_count();
-  // The null device always opens and starts.
-  output_.device = std::move(OpenDevice("null", settings_.format, clock_)->device);
-  output_.message =
-      absl::StrCat(dead, " stopped by itself; nothing sounds until the daemon restarts");
-  output_.device->Start(look_ahead_).IgnoreError();
-  log_(output_.message);
 }
 
 }  // namespace carillon

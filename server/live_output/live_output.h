@@ -5,19 +5,20 @@
 #include <chrono>
 #include <cstdint>
 #include <deque>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 
 #include "absl/base/thread_annotations.h"
 #include "absl/status/statusor.h"
 #include "server/audio_device/block_broadcast.h"
 #include "server/audio_device/look_ahead.h"
-#include "server/audio_device/open_device.h"
 #include "server/base/clock.h"
 #include "server/base/mutex.h"
+#include "server/live_output/device_keeper.h"
+#include "server/live_output/final_fade.h"
 #include "server/loudness/loudness_meter.h"
 #include "server/synthesis/mixer.h"
 
@@ -28,16 +29,18 @@ struct OutputSettings {
   DeviceFormat format{};
   /// Blocks rendered ahead of the device.
   uint32_t look_ahead_block_count = 8;
-  /// A specification for OpenDevice.
+  /// See DeviceSettings.
   std::string device = "auto";
+  /// Path of carillon-audio, which opens sound cards.
+  std::string device_program{};
 };
 
 /// State of the output at one moment.
 struct OutputState {
   std::string device;
-  std::string device_message;
-  double latency_s = 0;  ///< from the mixer to audible sound, as far as known
-  double load = 0;       ///< fraction of real time that rendering takes
+  std::string device_message;  ///< one line on what is wrong with it; empty: nothing
+  double latency_s = 0;        ///< from the mixer to audible sound, as far as known
+  double load = 0;             ///< fraction of real time that rendering takes
   uint64_t xrun_count = 0;
   uint64_t lost_frame_count = 0;
   double peak = 0;                        ///< largest sample of the last second, before the limiter
@@ -46,16 +49,16 @@ struct OutputState {
   MixerStatistics mixer;
 };
 
-/// Plays a mixer: renders it ahead of a device, broadcasts it to listeners, and frees retired
-/// memory and replaces a failed device on a housekeeping thread. All functions may be called from
+/// Plays a mixer: renders it ahead of a device that a DeviceKeeper keeps playing, broadcasts it to
+/// listeners, and frees retired memory on a housekeeping thread. All functions may be called from
 /// any thread.
 class LiveOutput {
  public:
   /// Takes a line for people to read.
-  using Log = std::function<void(const std::string&)>;
+  using Log = DeviceKeeper::Log;
 
   /// Opens the device and begins to play. `clock` must outlive the output.
-  /// Errors: those of OpenDevice and of the device's Start.
+  /// Errors: those of DeviceKeeper::Start.
   static absl::StatusOr<std::unique_ptr<LiveOutput>> Start(const OutputSettings& settings,
                                                            Clock& clock, Log log);
   ~LiveOutput();
@@ -67,6 +70,14 @@ class LiveOutput {
   const DeviceFormat& format() const { return settings_.format; }
   OutputState state() const;
 
+  /// Calls `observer` now, and whenever the wanted device begins or ceases to play, until it is
+  /// replaced by a null one.
+  void ObserveDevice(DeviceKeeper::Observer observer) { keeper_->Observe(std::move(observer)); }
+
+  /// Lets the sound fade to silence within 50 ms, and returns when the device has played that. The
+  /// output stays silent.
+  void FadeOut();
+
  private:
   LiveOutput(const OutputSettings& settings, Clock& clock, Log log);
 
@@ -74,7 +85,6 @@ class LiveOutput {
   void RenderBlock(std::span<float> block);
   void KeepHouse();
   void NoteLevels();
-  void ReplaceDeadDevice();
 
   const OutputSettings settings_;
   Clock& clock_;
@@ -82,11 +92,9 @@ class LiveOutput {
   Mixer mixer_;
   BlockBroadcast broadcast_;
   LookAhead look_ahead_;
+  FinalFade final_fade_;
+  std::unique_ptr<DeviceKeeper> keeper_;
   mutable Mutex mutex_;
-  OpenedDevice output_ ABSL_GUARDED_BY(mutex_);
-  /// Counts of devices that have failed.
-  uint64_t earlier_xrun_count_ ABSL_GUARDED_BY(mutex_) = 0;
-  uint64_t earlier_lost_frame_count_ ABSL_GUARDED_BY(mutex_) = 0;
   struct Peak {
     std::chrono::nanoseconds time;
     double value;

@@ -8,6 +8,8 @@ import subprocess
 import tempfile
 import unittest
 
+import grpc
+
 import strike
 
 BIN = pathlib.Path(os.environ["CARILLON_BIN_DIR"])
@@ -41,6 +43,12 @@ class Daemon:
 
     def client(self):
         return strike.Client(self.server)
+
+    def health(self, service=""):
+        """Of the whole server, or of one service: "SERVING" or "NOT_SERVING", as grpc.health.v1 says."""
+        check = grpc.insecure_channel(self.server).unary_unary("/grpc.health.v1.Health/Check")
+        with_field = bytes([10, len(service)]) + service.encode() if service else b""
+        return ("UNKNOWN", "SERVING", "NOT_SERVING")[check(with_field)[1]]
 
     def kill(self):
         """As when the power fails, for this process."""

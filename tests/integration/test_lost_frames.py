@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the daemon counts as lost is what a JACK capture misses: cycles in which the daemon was stopped."""
+"""What the daemon counts as lost is what a JACK capture misses: cycles in which its process for sound was stopped."""
 
 import json
+import os
 import pathlib
 import signal
 import subprocess
@@ -38,6 +39,11 @@ class LostFramesTest(unittest.TestCase):
         self.assertEqual(recorder.stdout.readline(), "recording\n")
         return recorder
 
+    def sound_process(self):
+        """carillon-audio, which the daemon has started."""
+        daemon = self.daemon.process.pid
+        return int(pathlib.Path(f"/proc/{daemon}/task/{daemon}/children").read_text().split()[0])
+
     def let_pass(self, seconds):
         """Of the sound."""
         end = self.mixer().frame_count + seconds * jack.RATE
@@ -49,9 +55,9 @@ class LostFramesTest(unittest.TestCase):
         self.let_pass(1.2)  # what the capture's arrival cost is known
         before = self.mixer()
         for stop_s in STOPS_S:
-            self.daemon.process.send_signal(signal.SIGSTOP)
+            os.kill(self.sound_process(), signal.SIGSTOP)
             time.sleep(stop_s)
-            self.daemon.process.send_signal(signal.SIGCONT)
+            os.kill(self.sound_process(), signal.SIGCONT)
             self.let_pass(1.2)
         after = self.mixer()
         printed, _ = recorder.communicate()  # which ends its standard input

@@ -5,6 +5,7 @@
 
 #include <latch>
 #include <numeric>
+#include <thread>
 #include <vector>
 
 #include "tests/server/audio_device/manual_clock.h"
@@ -52,8 +53,10 @@ TEST(ClockedDevice, GivesItsSinkEveryFrameInOrder) {
   std::vector<float> heard;
   ClockedDevice device("sink", {.sample_rate_hz = 48000, .block_frame_count = 64}, clock,
                        [&heard](std::span<const float> block) {
-                         heard.insert(heard.end(), block.begin(), block.end());
-                         return heard.size() < 50 * 64;
+                         if (heard.size() < 50 * 64) {
+                           heard.insert(heard.end(), block.begin(), block.end());
+                         }
+                         return absl::OkStatus();
                        });
   ASSERT_TRUE(device.Start(source).ok());
   source.done.wait();
@@ -62,19 +65,26 @@ TEST(ClockedDevice, GivesItsSinkEveryFrameInOrder) {
   for (size_t i = 0; i < heard.size(); ++i) EXPECT_EQ(heard[i], static_cast<float>(i));
 }
 
-TEST(ClockedDevice, IsDeadOnceItsSinkDeclines) {
+TEST(ClockedDevice, CountsTheFramesThatItsSinkRefusesAndGoesOn) {
   ManualClock clock;
-  RampSource source(clock, 1);
-  std::latch declined{1};
-  ClockedDevice device("sink", {}, clock, [&declined](std::span<const float>) {
-    declined.count_down();
-    return false;
+  RampSource source(clock, 1000);
+  int given_count = 0;
+  std::latch refused{1};
+  std::latch taken{1};
+  ClockedDevice device("sink", {.block_frame_count = 64}, clock, [&](std::span<const float>) {
+    if (++given_count == 10) refused.wait();
+    if (given_count == 11) taken.count_down();
+    return given_count < 10 ? absl::DataLossError("full") : absl::OkStatus();
   });
-  EXPECT_TRUE(device.alive());
+  EXPECT_TRUE(device.Check().ok());
   ASSERT_TRUE(device.Start(source).ok());
-  declined.wait();
+  while (device.lost_frame_count() < 9 * 64) std::this_thread::yield();
+  EXPECT_EQ(device.Check(), absl::DataLossError("full"));
+  refused.count_down();
+  taken.wait();
   device.Stop();
-  EXPECT_FALSE(device.alive());
+  EXPECT_TRUE(device.Check().ok());
+  EXPECT_EQ(device.lost_frame_count(), 9U * 64);
 }
 
 }  // namespace

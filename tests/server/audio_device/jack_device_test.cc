@@ -93,6 +93,9 @@ std::vector<float> ReadWav(const std::string& path) {
   return samples;
 }
 
+const OutputSettings kSettings{.device = "portaudio:JACK Audio Connection Kit",
+                               .device_program = CARILLON_AUDIO_PROGRAM};
+
 TEST(JackDevice, PlaysBitForBitWhatListenersHear) {
   for (const char* program : {"/usr/bin/jackd", "/usr/bin/jack_capture"}) {
     ASSERT_TRUE(std::filesystem::exists(program))
@@ -104,8 +107,7 @@ TEST(JackDevice, PlaysBitForBitWhatListenersHear) {
   }
   const TemporaryFolder folder;
   SystemClock clock;
-  const auto output = LiveOutput::Start({.device = "portaudio:JACK Audio Connection Kit"}, clock,
-                                        [](const std::string&) {});
+  const auto output = LiveOutput::Start(kSettings, clock, [](const std::string&) {});
   ASSERT_TRUE(output.ok()) << output.status();
   EXPECT_THAT((*output)->state().device, testing::HasSubstr("JACK"));
   // The look-ahead, and the two periods that JACK says lie between its clients and the ear.

@@ -32,7 +32,7 @@ TEST(LookAhead, IsFullBeforeTheFirstPull) {
   look_ahead.Start().IgnoreError();
   look_ahead.Stop();
   std::vector<float> frames(64);
-  look_ahead.Pull(frames);
+  look_ahead.source().Pull(frames);
   for (size_t i = 0; i < frames.size(); ++i) EXPECT_EQ(frames[i], static_cast<float>(i + 1));
   EXPECT_EQ(look_ahead.xrun_count(), 0U);
 }
@@ -43,9 +43,10 @@ TEST(LookAhead, CountsWhatItCouldNotGiveAndGivesSilence) {
   look_ahead.Start().IgnoreError();
   look_ahead.Stop();
   std::vector<float> frames(64);
-  look_ahead.Pull(frames);
+  look_ahead.source().Pull(frames);
   std::vector<float> rest(100, 7.0F);
-  while (look_ahead.xrun_count() == 0) look_ahead.Pull(rest);  // the thread may have run once more
+  while (look_ahead.xrun_count() == 0)
+    look_ahead.source().Pull(rest);  // the thread may have run once more
   EXPECT_EQ(rest.back(), 0.0F);
   EXPECT_EQ(look_ahead.xrun_count(), 1U);
   EXPECT_GT(look_ahead.lost_frame_count(), 0U);
@@ -60,7 +61,7 @@ TEST(LookAhead, LosesNoFrameBetweenRendererAndDevice) {
   std::vector<float> frames(24);
   while (heard.size() < 4800) {
     const uint64_t lost = look_ahead.lost_frame_count();
-    look_ahead.Pull(frames);
+    look_ahead.source().Pull(frames);
     const size_t given = frames.size() - (look_ahead.lost_frame_count() - lost);
     heard.insert(heard.end(), frames.begin(), frames.begin() + static_cast<ptrdiff_t>(given));
   }
@@ -77,10 +78,11 @@ TEST(LookAhead, InStereoCountsFramesNotSamples) {
   look_ahead.Start().IgnoreError();
   look_ahead.Stop();
   std::vector<float> samples(2 * 64);
-  look_ahead.Pull(samples);
+  look_ahead.source().Pull(samples);
   EXPECT_EQ(samples.back(), 128);
   std::vector<float> rest(2 * 100);
-  while (look_ahead.xrun_count() == 0) look_ahead.Pull(rest);  // the thread may have run once more
+  while (look_ahead.xrun_count() == 0)
+    look_ahead.source().Pull(rest);  // the thread may have run once more
   EXPECT_LE(look_ahead.lost_frame_count(), 100U);
 }
 

@@ -29,6 +29,12 @@ class OneOverN final : public FrameSource {
   uint32_t count_ = 0;
 };
 
+absl::StatusOr<std::unique_ptr<AudioDevice>> Open(const std::string& specification, Clock& clock) {
+  return OpenDevice(
+      {.specification = specification, .format = kFormat, .program = CARILLON_AUDIO_PROGRAM},
+      clock);
+}
+
 struct Wav {
   SF_INFO info{};
   std::vector<float> samples;
@@ -53,12 +59,12 @@ TEST(OpenDevice, FileDeviceWritesTheSamplesBitForBit) {
   ManualClock clock;
   OneOverN source;
   {
-    absl::StatusOr<OpenedDevice> opened = OpenDevice("file:" + path, kFormat, clock);
-    ASSERT_TRUE(opened.ok()) << opened.status();
-    EXPECT_EQ(opened->device->description(), "file: " + path);
-    ASSERT_TRUE(opened->device->Start(source).ok());
+    const absl::StatusOr<std::unique_ptr<AudioDevice>> device = Open("file:" + path, clock);
+    ASSERT_TRUE(device.ok()) << device.status();
+    EXPECT_EQ((*device)->description(), "file: " + path);
+    ASSERT_TRUE((*device)->Start(source).ok());
     source.enough.wait();
-    opened->device->Stop();
+    (*device)->Stop();
   }
   const Wav wav = ReadWav(path);
   std::filesystem::remove(path);
@@ -73,15 +79,14 @@ TEST(OpenDevice, FileDeviceWritesTheSamplesBitForBit) {
 
 TEST(OpenDevice, RefusesAFileThatCannotBeWritten) {
   ManualClock clock;
-  const absl::Status status =
-      OpenDevice("file:/nonexistent/folder/out.wav", kFormat, clock).status();
+  const absl::Status status = Open("file:/nonexistent/folder/out.wav", clock).status();
   EXPECT_THAT(status.ToString(), testing::HasSubstr("AUDIO_FILE_FAILED: "));
 }
 
 TEST(OpenDevice, RefusesWhatNamesNoDevice) {
   ManualClock clock;
   for (const char* specification : {"", "speaker", "file:", "nullish"}) {
-    const absl::Status status = OpenDevice(specification, kFormat, clock).status();
+    const absl::Status status = Open(specification, clock).status();
     EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument) << specification;
     EXPECT_THAT(status.ToString(), testing::HasSubstr("INVALID_AUDIO_DEVICE: "));
   }
@@ -90,17 +95,25 @@ TEST(OpenDevice, RefusesWhatNamesNoDevice) {
 TEST(OpenDevice, RefusesASoundCardThatIsNotThereAndPrintsNothing) {
   ManualClock clock;
   testing::internal::CaptureStderr();
-  const absl::Status status = OpenDevice("portaudio:no such sound card", kFormat, clock).status();
+  const absl::Status status = Open("portaudio:no such sound card", clock).status();
   EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
   EXPECT_EQ(status.code(), absl::StatusCode::kNotFound);
   EXPECT_THAT(status.ToString(), testing::HasSubstr("AUDIO_DEVICE_NOT_FOUND: "));
 }
 
-TEST(OpenDevice, AutoIsEitherASoundCardOrNullWithAReason) {
+TEST(OpenDevice, RefusesASoundCardWithoutTheProgramThatOpensIt) {
   ManualClock clock;
-  absl::StatusOr<OpenedDevice> opened = OpenDevice("auto", kFormat, clock);
-  ASSERT_TRUE(opened.ok()) << opened.status();
-  EXPECT_EQ(opened->device->description() == "null", !opened->message.empty());
+  const absl::Status status =
+      OpenDevice({.specification = "auto", .program = "/nonexistent"}, clock).status();
+  EXPECT_THAT(status.ToString(), testing::HasSubstr("WORKER_NOT_FOUND: "));
+}
+
+TEST(OpenDevice, GivesUpAProgramThatDoesNotAnswer) {
+  SystemClock clock;
+  const absl::Status status =
+      OpenDevice({.specification = "portaudio:300", .program = "/bin/sleep"}, clock).status();
+  EXPECT_EQ(status.code(), absl::StatusCode::kUnavailable);
+  EXPECT_THAT(status.ToString(), testing::HasSubstr("AUDIO_DEVICE_FAILED: "));
 }
 
 }  // namespace

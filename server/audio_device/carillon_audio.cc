@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// carillon-audio NAME SAMPLE_RATE BLOCK_FRAMES CHANNELS: the sound card's process of carillond,
+// which starts it. It opens the device through PortAudio, plays the frames that the daemon renders
+// into shared memory, and tells the daemon about the device; see device_report.h.
+
+#include <poll.h>
+#include <signal.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <array>
+#include <chrono>
+#include <cstdlib>
+#include <cstring>
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <thread>
+#include <utility>
+
+#include "absl/status/status.h"
+#include "absl/strings/numbers.h"
+#include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
+#include "server/audio_device/device_report.h"
+#include "server/audio_device/frame_ring.h"
+#include "server/audio_device/portaudio_device.h"
+
+namespace carillon {
+namespace {
+
+using State = DeviceReport::State;
+
+constexpr int kPeriod_ms = 20;
+constexpr std::chrono::seconds kEndLimit(1);
+
+/// Ends this process a second after the daemon has closed its end of the socket, also if a call of
+/// PortAudio waits for ever.
+void EndWithDaemon() {
+  std::thread([] {
+    pollfd daemon{kDaemonSocket, POLLRDHUP, 0};
+    while (poll(&daemon, 1, -1) <= 0) {
+    }
+    std::this_thread::sleep_for(kEndLimit);
+    _exit(EXIT_FAILURE);
+  }).detach();
+}
+
+void Send(const DeviceReport& report) {
+  // A report that finds the socket full is dropped: the next one says the same.
+  send(kDaemonSocket, &report, sizeof report, MSG_DONTWAIT | MSG_NOSIGNAL);
+}
+
+void Send(State state, const AudioDevice& device) {
+  DeviceReport report{.state = state,
+                      .latency_s = device.latency_s(),
+                      .xrun_count = device.xrun_count(),
+                      .lost_frame_count = device.lost_frame_count()};
+  report.set_text(device.description());
+  Send(report);
+}
+
+void Send(const absl::Status& failure) {
+  DeviceReport report{.state = State::kFailed, .code = failure.code()};
+  report.set_text(failure.message());
+  Send(report);
+}
+
+/// Waits for the daemon to ask for sound. Absent: the daemon has no use for it any more.
+std::optional<int> ReceiveDescriptor() {
+  char byte = 0;
+  iovec piece{&byte, 1};
+  alignas(cmsghdr) std::array<char, CMSG_SPACE(sizeof(int))> control{};
+  msghdr message{};
+  message.msg_iov = &piece;
+  message.msg_iovlen = 1;
+  message.msg_control = control.data();
+  message.msg_controllen = control.size();
+  if (recvmsg(kDaemonSocket, &message, MSG_CMSG_CLOEXEC) != 1) return std::nullopt;
+  const cmsghdr* const header = CMSG_FIRSTHDR(&message);
+  if (header == nullptr || header->cmsg_type != SCM_RIGHTS) return std::nullopt;
+  int descriptor = -1;
+  std::memcpy(&descriptor, CMSG_DATA(header), sizeof descriptor);
+  return descriptor;
+}
+
+/// Waits for one period. False: the daemon has closed its end.
+bool DaemonListens() {
+  pollfd daemon{kDaemonSocket, POLLRDHUP, 0};
+  return poll(&daemon, 1, kPeriod_ms) <= 0;
+}
+
+absl::Status Play(AudioDevice& device, FrameRing& ring) {
+  RETURN_IF_ERROR(device.Start(ring));
+  do {
+    RETURN_IF_ERROR(device.Check());
+    Send(State::kPlaying, device);
+  } while (DaemonListens());
+  return absl::OkStatus();
+}
+
+absl::Status Serve(absl::string_view name, const DeviceFormat& format) {
+  ASSIGN_OR_RETURN(const std::unique_ptr<AudioDevice> device, OpenPortAudioDevice(name, format));
+  Send(State::kOpen, *device);
+  const std::optional<int> memory = ReceiveDescriptor();
+  if (!memory) return absl::OkStatus();
+  ASSIGN_OR_RETURN(const std::unique_ptr<FrameRing> ring, FrameRing::Map(*memory));
+  const absl::Status status = Play(*device, *ring);
+  // Sent here, because PortAudio may wait for ever when the device is closed.
+  if (!status.ok()) Send(status);
+  device->Stop();
+  return absl::OkStatus();
+}
+
+std::optional<DeviceFormat> ParseFormat(const char* const* words) {
+  DeviceFormat format;
+  if (!absl::SimpleAtoi(words[0], &format.sample_rate_hz) ||
+      !absl::SimpleAtoi(words[1], &format.block_frame_count) ||
+      !absl::SimpleAtoi(words[2], &format.channel_count)) {
+    return std::nullopt;
+  }
+  return format;
+}
+
+int Main(int argc, const char* const* argv) {
+  const std::optional<DeviceFormat> format = argc == 5 ? ParseFormat(argv + 2) : std::nullopt;
+  if (!format) {
+    std::cerr << "carillon-audio is started by carillond\n";
+    return 2;
+  }
+  // The daemon says when the sound ends; a signal to both processes must not end it before.
+  signal(SIGINT, SIG_IGN);
+  signal(SIGTERM, SIG_IGN);
+  signal(SIGHUP, SIG_IGN);
+  EndWithDaemon();
+  const absl::Status status = Serve(argv[1], *format);
+  if (!status.ok()) Send(status);
+  return status.ok() ? EXIT_SUCCESS : EXIT_FAILURE;
+}
+
+}  // namespace
+}  // namespace carillon
+
+int main(int argc, char** argv) { return carillon::Main(argc, argv); }

@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/live_output/device_keeper.h"
+
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
+
+namespace carillon {
+namespace {
+
+constexpr std::chrono::milliseconds kCheckPeriod(20);
+/// A server that has come back sounds at most this, and the time to open it, later.
+constexpr std::chrono::milliseconds kTryPeriod(500);
+
+/// Whether a device that cannot be opened may appear later. A file that cannot be written, or a
+/// specification without meaning, is an error of the configuration.
+bool MayAppear(const absl::Status& status) {
+  return absl::IsNotFound(status) || absl::IsUnavailable(status) ||
+         absl::IsResourceExhausted(status);
+}
+
+std::string NoSound(const absl::Status& status) {
+  return absl::StrCat("no sound: ", ToErrorInfo(status).message());
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<DeviceKeeper>> DeviceKeeper::Start(const DeviceSettings& settings,
+                                                                  FrameSource& source, Clock& clock,
+                                                                  Log log) {
+  std::unique_ptr<DeviceKeeper> keeper(new DeviceKeeper(settings, source, clock, std::move(log)));
+  RETURN_IF_ERROR(keeper->Begin());
+  return keeper;
+}
+
+DeviceKeeper::DeviceKeeper(const DeviceSettings& settings, FrameSource& source, Clock& clock,
+                           Log log)
+    : settings_(settings),
+      source_(source),
+      clock_(clock),
+      log_(std::move(log)),
+      missed_(settings.specification != "auto") {}
+
+DeviceKeeper::~DeviceKeeper() {
+  stopping_ = true;
+  if (thread_.joinable()) thread_.join();
+  const MutexLock lock(&mutex_);
+  if (device_) device_->Stop();
+}
+
+absl::Status DeviceKeeper::Begin() {
+  absl::StatusOr<std::unique_ptr<AudioDevice>> wanted = OpenDevice(settings_, clock_);
+  absl::Status status = wanted.status();
+  if (status.ok()) status = (*wanted)->Start(source_);
+  if (!status.ok() && !MayAppear(status)) return status;
+  if (status.ok()) {
+    Install(*std::move(wanted), true);
+  } else {
+    std::unique_ptr<AudioDevice> null = OpenNullDevice(settings_.format, clock_);
+    RETURN_IF_ERROR(null->Start(source_));
+    Install(std::move(null), false);
+    Note(NoSound(status));
+  }
+  thread_ = std::thread([this] { Run(); });
+  return absl::OkStatus();
+}
+
+DeviceState DeviceKeeper::state() const {
+  const MutexLock lock(&mutex_);
+  return {.description = device_->description(),
+          .message = message_,
+          .plays = plays(),
+          .latency_s = device_->latency_s(),
+          .xrun_count = earlier_xrun_count_ + device_->xrun_count(),
+          .lost_frame_count = earlier_lost_frame_count_ + device_->lost_frame_count()};
+}
+
+void DeviceKeeper::Observe(Observer observer) {
+  const bool plays = state().plays;
+  const MutexLock lock(&observer_mutex_);
+  observer_ = std::move(observer);
+  if (observer_) observer_(plays);
+}
+
+void DeviceKeeper::Run() {
+  while (!stopping_) {
+    CheckDevice();
+    clock_.SleepUntil(clock_.Monotonic() + kCheckPeriod);
+  }
+}
+
+void DeviceKeeper::CheckDevice() {
+  absl::Status status;
+  bool wanted = false;
+  {
+    const MutexLock lock(&mutex_);
+    status = device_->Check();
+    wanted = wanted_;
+  }
+  if (!wanted) return TryWanted();
+  if (absl::IsUnavailable(status)) PlayOnNull();
+  Note(status.ok() ? "" : ToErrorInfo(status).message());
+}
+
+void DeviceKeeper::PlayOnNull() {
+  std::unique_ptr<AudioDevice> null = OpenNullDevice(settings_.format, clock_);
+  StopDevice();
+  null->Start(source_).IgnoreError();  // it always starts
+  Install(std::move(null), false);
+}
+
+void DeviceKeeper::TryWanted() {
+  if (clock_.Monotonic() < next_try_) return;
+  absl::StatusOr<std::unique_ptr<AudioDevice>> device = OpenDevice(settings_, clock_);
+  next_try_ = clock_.Monotonic() + kTryPeriod;
+  if (!device.ok()) {
+    const MutexLock lock(&mutex_);
+    message_ = NoSound(device.status());  // not logged: it may change with each attempt
+    return;
+  }
+  StopDevice();
+  if (const absl::Status status = (*device)->Start(source_); status.ok()) {
+    Install(*std::move(device), true);
+    Note("");
+  } else {
+    device->reset();
+    PlayOnNull();
+  }
+}
+
+/// Two devices never pull from the source at the same time, so the old one stops first.
+void DeviceKeeper::StopDevice() {
+  AudioDevice* device = nullptr;
+  {
+    const MutexLock lock(&mutex_);
+    device = device_.get();
+  }
+  device
+      ->Stop();  // without the lock: it takes up to half a second, and only this thread replaces it
+}
+
+void DeviceKeeper::Install(std::unique_ptr<AudioDevice> device, bool wanted) {
+  const MutexLock lock(&mutex_);
+  if (device_) {
+    earlier_xrun_count_ += device_->xrun_count();
+    earlier_lost_frame_count_ += device_->lost_frame_count();
+  }
+  device_ = std::move(device);
+  wanted_ = wanted;
+  missed_ |= wanted;
+}
+
+/// Notes what is wrong, or with an empty message that nothing is; a change is logged.
+void DeviceKeeper::Note(const std::string& message) {
+  std::string line;
+  bool plays_now = false;
+  {
+    const MutexLock lock(&mutex_);
+    if (message == message_) return;
+    message_ = message;
+    line = message.empty() ? absl::StrCat(device_->description(), " plays again") : message;
+    plays_now = plays();
+  }
+  log_(line);
+  const MutexLock lock(&observer_mutex_);
+  if (observer_) observer_(plays_now);
+}
+
+}  // namespace carillon

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/status/statusor.h"
+#include "server/audio_device/frame_source.h"
+#include "server/audio_device/open_device.h"
+#include "server/base/clock.h"
+#include "server/base/mutex.h"
+
+namespace carillon {
+
+/// Whether a wanted device plays, and since when it does not.
+struct DeviceState {
+  std::string description;  ///< of the device that pulls at present
+  std::string message;      ///< one line on what is wrong; empty: nothing
+  /// The wanted device pulls, and takes every frame; or the wanted device is "auto", and there has
+  /// never been a sound card.
+  bool plays = true;
+  double latency_s = 0;
+  uint64_t xrun_count = 0;  ///< of all devices so far
+  uint64_t lost_frame_count = 0;
+};
+
+/// Plays a source on the wanted device. While that device is away, the null device pulls from the
+/// source, so that time goes on, and the wanted device is opened again twice a second.
+///
+///     wanted device plays --Check fails--> null pulls --opened and started--> wanted device plays
+///
+/// A thread of its own does this, because opening a device may take seconds.
+class DeviceKeeper {
+ public:
+  /// Takes a line for people to read.
+  using Log = std::function<void(const std::string&)>;
+  /// Is told whether the wanted device plays, each time that this changes.
+  using Observer = std::function<void(bool plays)>;
+
+  /// Plays `source`, which must outlive the keeper, as `clock` must. A sound card that is not there
+  /// is waited for. Errors: InvalidArgument (INVALID_AUDIO_DEVICE), FailedPrecondition
+  /// (AUDIO_FILE_FAILED, WORKER_NOT_FOUND).
+  static absl::StatusOr<std::unique_ptr<DeviceKeeper>> Start(const DeviceSettings& settings,
+                                                             FrameSource& source, Clock& clock,
+                                                             Log log);
+
+  /// Stops the device, within 5 s.
+  ~DeviceKeeper();
+  DeviceKeeper(const DeviceKeeper&) = delete;
+  DeviceKeeper& operator=(const DeviceKeeper&) = delete;
+
+  DeviceState state() const;
+
+  /// Calls `observer` now, and whenever its argument changes, until it is replaced by a null one.
+  void Observe(Observer observer);
+
+ private:
+  DeviceKeeper(const DeviceSettings& settings, FrameSource& source, Clock& clock, Log log);
+
+  absl::Status Begin();
+  void Run();
+  void CheckDevice();
+  void PlayOnNull();
+  void TryWanted();
+  void StopDevice();
+  void Install(std::unique_ptr<AudioDevice> device, bool wanted);
+  void Note(const std::string& message);
+  bool plays() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+    return !missed_ || (wanted_ && message_.empty());
+  }
+
+  const DeviceSettings settings_;
+  FrameSource& source_;
+  Clock& clock_;
+  const Log log_;
+  std::chrono::nanoseconds next_try_{0};
+  mutable Mutex mutex_;
+  /// Only the keeper's thread changes it.
+  std::unique_ptr<AudioDevice> device_ ABSL_GUARDED_BY(mutex_);
+  bool wanted_ ABSL_GUARDED_BY(mutex_) = false;  ///< device_ is the wanted one, not null
+  /// Silence is a fault: a device was named, or "auto" has found one before.
+  bool missed_ ABSL_GUARDED_BY(mutex_);
+  std::string message_ ABSL_GUARDED_BY(mutex_);
+  /// Counts of devices that were replaced.
+  uint64_t earlier_xrun_count_ ABSL_GUARDED_BY(mutex_) = 0;
+  uint64_t earlier_lost_frame_count_ ABSL_GUARDED_BY(mutex_) = 0;
+  Mutex observer_mutex_;
+  Observer observer_ ABSL_GUARDED_BY(observer_mutex_);
+  std::atomic<bool> stopping_{false};
+  std::thread thread_;
+};
+
+}  // namespace carillon

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <span>
+
+#include "server/audio_device/audio_device.h"
+
+namespace carillon {
+
+/// The end of the sound when the daemon stops: 50 ms of a raised cosine, then silence, because a
+/// cut is heard as a click.
+class FinalFade {
+ public:
+  explicit FinalFade(const DeviceFormat& format);
+
+  /// Begins the fade. Any thread.
+  void Begin() noexcept { begun_.store(true, std::memory_order_relaxed); }
+
+  /// Whether a silent block has been rendered. Any thread.
+  bool ended() const noexcept { return ended_.load(std::memory_order_relaxed); }
+
+  /// Called by the render thread with each block; it is real-time safe.
+  void Apply(std::span<float> block) noexcept;
+
+ private:
+  double Gain() const noexcept;
+
+  const size_t channel_count_;
+  const double frame_count_;  ///< of the fade
+  double frame_ = 0;          ///< next frame of the fade
+  std::atomic<bool> begun_{false};
+  std::atomic<bool> ended_{false};
+};
+
+}  // namespace carillon

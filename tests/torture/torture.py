@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the programs of this folder share. Each runs short as a test, and long by deploy/torture.sh."""
+
+import contextlib
+import os
+import threading
+import time
+
+import meshes
+from carillon.v1 import audio_service_pb2, contact_pb2, contact_service_pb2, material_pb2, scene_service_pb2
+
+LONG = os.environ.get("CARILLON_TORTURE") == "long"
+
+
+def rounds(short, long):
+    return long if LONG else short
+
+
+def wait_until(condition, limit_s):
+    """Seconds until the condition was true; fails beyond the limit."""
+    begin_s = time.monotonic()
+    while not condition():
+        if time.monotonic() - begin_s > limit_s:
+            raise AssertionError(f"not within {limit_s} s")
+        time.sleep(0.01)
+    return time.monotonic() - begin_s
+
+
+class SoundingScene:
+    """A bar that is struck twenty times a second, by one stream of contacts, and one listener, until `stop`."""
+
+    PERIOD_S = 0.05
+
+    def __init__(self, daemon):
+        self.client = daemon.client()
+        self.model = self.client.wait(self.client.create(
+            meshes.bar(), "obj", material=material_pb2.Material(preset=meshes.MATERIAL)))
+        self.scene = self.client.scenes.CreateScene(scene_service_pb2.CreateSceneRequest()).name
+        self.handle = self.client.scenes.AddObject(scene_service_pb2.AddObjectRequest(
+            scene=self.scene, modal_model=self.model,
+            material=material_pb2.Material(preset=meshes.MATERIAL))).object.handle
+        self.stopped = threading.Event()
+        self.answer = contact_service_pb2.StreamContactsResponse()
+        self.heard = audio_service_pb2.ListenResponse()
+        self.loudest = 0.0
+        self.threads = [threading.Thread(target=self._strike), threading.Thread(target=self._listen)]
+        for thread in self.threads:
+            thread.start()
+
+    def _requests(self):
+        request = contact_service_pb2.StreamContactsRequest
+        yield request(start=contact_service_pb2.ContactStreamStart(scene=self.scene, step_s=self.PERIOD_S))
+        begin_s = time.monotonic()
+        step = 0
+        while not self.stopped.wait(max(0.0, begin_s + step * self.PERIOD_S - time.monotonic())):
+            impulse = contact_pb2.Impulse(
+                object=self.handle, point_m=contact_pb2.Vec3(z=meshes.BAR_SIZE[2]),
+                impulse_newton_seconds=contact_pb2.Vec3(z=-0.001))
+            yield request(step=contact_pb2.ContactStep(time_s=step * self.PERIOD_S, impulses=[impulse]))
+            step += 1
+
+    def _strike(self):
+        with contextlib.suppress(Exception):  # the daemon may stop first
+            for self.answer in self.client.contacts.StreamContacts(self._requests()):
+                pass
+
+    def _listen(self):
+        with contextlib.suppress(Exception):
+            for self.heard in self.client.audio.Listen(audio_service_pb2.ListenRequest()):
+                if self.stopped.is_set():
+                    return
+
+    def mixer(self):
+        return self.client.audio.GetMixer(audio_service_pb2.GetMixerRequest())
+
+    def stop(self):
+        self.stopped.set()
+        for thread in self.threads:
+            thread.join()
