@@ -19,5 +19,5 @@ trap 'rm -rf "$scratch"' EXIT
 
 "$root/deploy/package.sh" --version 0.0.1 --built "$build" "$scratch/before"
 "$root/deploy/package.sh" --built "$build" "$scratch/now"
-cp "$root/tests/deploy/use_packages.sh" "$scratch"
+cp "$root"/tests/deploy/{use_packages.sh,type_page.py} "$scratch"
 "$root/deploy/bare_debian.sh" --copy "$scratch" ./use_packages.sh

@@ -10,6 +10,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/manual_page.h"
 #include "proto/cpp/server_address.h"
 #include "proto/cpp/status_macros.h"
 
@@ -257,6 +258,7 @@ std::optional<int> ParseFlags(int argc, const char* const* argv, const std::stri
   app.add_option("--config", configuration,
                  "TOML file whose keys are the flags, with _ in place of - "
                  "[carillond.toml in $CONFIGURATION_DIRECTORY]");
+  AddManualFlag(app, 8, version);
   AddFlags(app, command.options);
   AddDatabaseCommands(app, command);
   try {

@@ -8,6 +8,7 @@
 
 #include "absl/status/status.h"
 #include "carillon/client.h"
+#include "client_sdk/cli/example_bodies.h"
 #include "client_sdk/cli/material_figures.h"
 #include "client_sdk/cli/stop_signal.h"
 
@@ -15,7 +16,7 @@ namespace carillon::cli {
 
 /// The options of `carillon model create`.
 struct CreateModelOptions {
-  std::string file;
+  std::vector<std::string> files;
   std::string format;  ///< empty: the file name's suffix
   MaterialFigures material;
   std::string label;  ///< empty: the file name without its suffix
@@ -28,7 +29,7 @@ struct CreateModelOptions {
   int32_t priority = 0;
   double time_limit_s = 0;
   uint64_t memory_limit_mib = 0;
-  bool wait = false;
+  bool wait = false;  ///< end with the jobs, and show their progress
 };
 
 /// The options of `carillon transfer create`.
@@ -87,10 +88,13 @@ struct ListenOptions {
 /// The options of `carillon render`.
 struct RenderOptions {
   std::string trace;
-  std::string out;
+  std::string out;  ///< "-": stdout
   uint32_t sample_rate_hz = 48000;
   uint32_t channel_count = 1;
   double tail_s = 0;
+  double gain = 1;         ///< factor of every sample
+  bool normalize = false;  ///< scale the sound to a peak of 0.9 of full scale, before `gain`
+  int bits = 24;           ///< of a sample: 16, 24, or 32 for floating point
 };
 
 /// The commands. Each prints its result to stdout, as JSON if `json` is true, and returns its
@@ -115,6 +119,18 @@ absl::Status CollectGarbage(const client::Client& daemon, uint64_t budget_mib, b
 absl::Status ShowModel(const client::Client& daemon, const std::string& text,
                        const MaterialFigures& figures, bool json);
 absl::Status DeleteModel(const client::Client& daemon, const std::string& text);
+absl::Status ListJobs(const client::Client& daemon, bool json);
+absl::Status ShowJob(const client::Client& daemon, const std::string& text, bool json);
+absl::Status CancelJob(const client::Client& daemon, const std::string& text);
+absl::Status ListMaterials(const client::Client& daemon, bool json);
+absl::Status ShowMaterial(const client::Client& daemon, const std::string& name, bool json);
+/// Lists the scenes and their objects.
+absl::Status ListScenes(const client::Client& daemon, bool json);
+/// Deletes a scene, which `text` names as "scenes/7" or "7".
+absl::Status DeleteScene(const client::Client& daemon, const std::string& text);
+/// Writes the OBJ file of an example; `path` may be empty for the name of the example. Errors:
+/// Internal (OUTPUT_NOT_WRITABLE).
+absl::Status WriteExample(const Example& example, const std::string& path);
 absl::Status WatchJob(const client::Client& daemon, const std::string& text, bool json);
 /// Runs a decomposition for the daemon on this machine. Fetches the mesh of the job as the file
 /// "mesh" into a new folder, writes the standard input to the file "request" beside it, runs the

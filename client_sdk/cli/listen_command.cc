@@ -36,7 +36,8 @@ class Recorder {
                     block.sample_rate_hz, block.channel_count);
       return;
     }
-    auto file = WaveFile::Create(options_.out, block.sample_rate_hz, block.channel_count);
+    auto file = WaveFile::Create(options_.out, {.sample_rate_hz = block.sample_rate_hz,
+                                                .channel_count = block.channel_count});
     status_ = file.status();
     if (file.ok()) file_ = *std::move(file);
   }

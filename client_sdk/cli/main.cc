@@ -2,14 +2,18 @@
 //
 // The command line of `carillon`.
 #include <CLI/CLI.hpp>
+#include <iostream>
 #include <memory>
 #include <string>
 
 #include "client_sdk/cli/commands.h"
+#include "client_sdk/cli/completion_options.h"
+#include "client_sdk/cli/list_options.h"
 #include "client_sdk/cli/material_options.h"
 #include "client_sdk/cli/model_options.h"
 #include "client_sdk/cli/output.h"
 #include "client_sdk/cli/program.h"
+#include "proto/cpp/manual_page.h"
 
 namespace carillon::cli {
 namespace {
@@ -53,34 +57,6 @@ void AddDatabase(CLI::App& app, Program& program) {
   });
 }
 
-void AddJob(CLI::App& app, Program& program) {
-  auto name = std::make_shared<std::string>();
-  CLI::App& job =
-      *app.add_subcommand("job", "Follow and run decomposition jobs")->require_subcommand(1);
-  CLI::App& watch = *job.add_subcommand("watch", "Show the progress of a job until it ends");
-  watch.add_option("job", *name, "The name, the label, or the first digits of the digest of a job")
-      ->required();
-  watch.callback([&program, name] {
-    program.command = [&program, name] { return WatchJob(*program.Daemon(), *name, program.json); };
-  });
-  auto options = std::make_shared<RunJobOptions>();
-  CLI::App& run = *job.add_subcommand(
-      "run", "Run a job of the daemon on this machine; the batch jobs of a cluster call it");
-  run.add_option("digest", options->digest, "The digest of the job")->required();
-  run.add_option("command", options->command,
-                 "The command that reads the file mesh and writes the file model")
-      ->required();
-  run.add_option("--token", options->token, "The token of this run [$CARILLON_JOB_TOKEN]")
-      ->envname("CARILLON_JOB_TOKEN")
-      ->required();
-  run.callback([&program, options] {
-    program.command = [&program, options] {
-      const StopSignal stop;
-      return RunJob(*program.Daemon(), *options, stop);
-    };
-  });
-}
-
 void AddTransfer(CLI::App& app, Program& program) {
   auto options = std::make_shared<CreateTransferOptions>();
   CLI::App& transfer = *app.add_subcommand("transfer", "Compute how the modes of models radiate")
@@ -113,12 +89,12 @@ void AddStrike(CLI::App& app, Program& program) {
       ->required();
   strike
       .add_option("--point", options->point_m,
-                  "The struck point: X,Y,Z in the frame of the object, m")
+                  "The struck point: X,Y,Z or X Y Z in the frame of the object, m")
       ->delimiter(',')
       ->required();
   strike
       .add_option("--impulse", options->impulse_newton_seconds,
-                  "The impulse on the object: X,Y,Z in its frame, N s")
+                  "The impulse on the object: X,Y,Z or X Y Z in its frame, N s")
       ->delimiter(',')
       ->required();
   strike.add_option("--duration", options->duration_s, "The duration of the contact, s");
@@ -145,7 +121,7 @@ void AddListen(CLI::App& app, Program& program) {
   listen
       .add_option("--seconds", options->seconds,
                   "The time to record, s [until the program is stopped]")
-      ->check(CLI::NonNegativeNumber);
+      ->check(CLI::Range(0.0, 1e9));
   listen.callback([&program, options] {
     program.command = [&program, options] {
       const StopSignal stop;
@@ -158,7 +134,15 @@ void AddRender(CLI::App& app, Program& program) {
   auto options = std::make_shared<RenderOptions>();
   CLI::App& render = *app.add_subcommand("render", "Render a contact trace to a WAV file");
   render.add_option("trace", options->trace, "The contact trace (.contacts)")->required();
-  render.add_option("--out", options->out, "The WAV file to write")->required();
+  render.add_option("--out", options->out, "The WAV file to write, or - for stdout")->required();
+  render.add_option("--gain", options->gain, "The factor of every sample")
+      ->check(CLI::Range(0.0, 1e6));
+  render.add_flag("--normalize", options->normalize,
+                  "Scale the sound to a peak of 0.9 of full scale");
+  render
+      .add_option("--bits", options->bits, "The size of a sample: 16, 24, or 32 for floating point")
+      ->check(CLI::IsMember({16, 24, 32}))
+      ->capture_default_str();
   render.add_option("--sample-rate", options->sample_rate_hz, "The sample rate, Hz")
       ->capture_default_str();
   render
@@ -175,10 +159,7 @@ void AddRender(CLI::App& app, Program& program) {
   });
 }
 
-int Main(int argc, char** argv) {
-  Program program;
-  CLI::App app("Controls the daemon carillond, which makes rigid-body simulations audible.",
-               "carillon");
+void AddProgramOptions(CLI::App& app, Program& program) {
   app.add_option("--server", program.server,
                  "The address of the daemon: unix:PATH or HOST:PORT [$CARILLON_SERVER]")
       ->capture_default_str();
@@ -188,22 +169,41 @@ int Main(int argc, char** argv) {
       ->envname("CARILLON_TLS_ROOTS")
       ->check(CLI::ExistingFile);
   app.add_flag("--json", program.json, "Print the results as JSON");
+  app.set_version_flag("--version", "carillon " CARILLON_VERSION);
+  AddManualFlag(app, 1, CARILLON_VERSION);
   app.require_subcommand(1)->fallthrough();
   app.footer(
       "Exit codes: 0 for success; 1 if the daemon refuses the command, and stderr says why; 2 if "
       "the command line is wrong; 3 if no daemon answers.");
+}
+
+int Main(int argc, char** argv) {
+  Program program;
+  CLI::App app("Controls the daemon carillond, which makes rigid-body simulations audible.",
+               "carillon");
+  AddProgramOptions(app, program);
   AddStatus(app, program);
   AddDatabase(app, program);
   AddModel(app, program);
   AddTransfer(app, program);
   AddJob(app, program);
+  AddMaterials(app, program);
+  AddScenes(app, program);
   AddStrike(app, program);
   AddListen(app, program);
   AddRender(app, program);
+  AddExample(app, program);
+  AddCompletion(app, program);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? kDone : kUsage;
+    if (error.get_exit_code() == 0) return app.exit(error);
+    if (const std::string unknown = UnknownWord(app, argc, argv); !unknown.empty()) {
+      std::cerr << "carillon: " << unknown << '\n';
+    } else {
+      app.exit(error);
+    }
+    return kUsage;
   }
   return Report(program.command());
 }

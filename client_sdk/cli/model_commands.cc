@@ -8,6 +8,7 @@
 #include <iterator>
 #include <numbers>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
@@ -21,6 +22,7 @@
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/fixture_text.h"
 #include "proto/cpp/material_catalogue.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::cli {
 namespace {
@@ -38,19 +40,20 @@ absl::StatusOr<std::string> ReadMesh(const std::string& path) {
                               "; check the file's name"));
 }
 
-std::string Format(const CreateModelOptions& options) {
+std::string Format(const CreateModelOptions& options, const std::string& file) {
   if (!options.format.empty()) return options.format;
-  const std::string suffix = std::filesystem::path(options.file).extension();
+  const std::string suffix = std::filesystem::path(file).extension();
   const std::string format = absl::AsciiStrToLower(absl::StripPrefix(suffix, "."));
   return format == "ele" ? "node" : format;
 }
 
 /// Reads a mesh file. The two files that TetGen writes go to the daemon as one.
-absl::StatusOr<std::string> ReadAllOfMesh(const CreateModelOptions& options) {
-  const std::filesystem::path path(options.file);
+absl::StatusOr<std::string> ReadAllOfMesh(const CreateModelOptions& options,
+                                          const std::string& file) {
+  const std::filesystem::path path(file);
   const auto elements = std::filesystem::path(path).replace_extension(".ele");
-  const bool pair = Format(options) == "node" && std::filesystem::exists(elements);
-  if (!pair) return ReadMesh(options.file);
+  const bool pair = Format(options, file) == "node" && std::filesystem::exists(elements);
+  if (!pair) return ReadMesh(file);
   absl::StatusOr<std::string> nodes =
       ReadMesh(std::filesystem::path(path).replace_extension(".node"));
   const absl::StatusOr<std::string> rest = ReadMesh(elements);
@@ -60,12 +63,13 @@ absl::StatusOr<std::string> ReadAllOfMesh(const CreateModelOptions& options) {
 }
 
 absl::StatusOr<v1::CreateModalModelRequest> MakeRequest(const CreateModelOptions& options,
+                                                        const std::string& file,
                                                         std::string mesh_digest) {
   auto material = ToMaterial(options.material);
   if (!material.ok()) return material.status();
   v1::CreateModalModelRequest request;
   request.set_mesh_digest(std::move(mesh_digest));
-  request.set_mesh_format(Format(options));
+  request.set_mesh_format(Format(options, file));
   *request.mutable_settings() = options.settings;
   request.set_coarse_first(options.coarse_first);
   request.set_without_transfer(options.without_transfer);
@@ -76,7 +80,7 @@ absl::StatusOr<v1::CreateModalModelRequest> MakeRequest(const CreateModelOptions
   request.set_priority(options.priority);
   request.set_time_limit_s(options.time_limit_s);
   request.set_memory_limit_bytes(options.memory_limit_mib << 20U);
-  request.set_label(options.label.empty() ? std::filesystem::path(options.file).stem().string()
+  request.set_label(options.label.empty() ? std::filesystem::path(file).stem().string()
                                           : options.label);
   return request;
 }
@@ -146,18 +150,20 @@ void PrintModes(const v1::ModalModelSummary& model, const v1::Material& material
   }
 }
 
-}  // namespace
+/// Asks for the model of one file.
+absl::StatusOr<v1::Job> RequestModel(const client::Client& daemon,
+                                     const CreateModelOptions& options, const std::string& file) {
+  ASSIGN_OR_RETURN(const std::string bytes, ReadAllOfMesh(options, file));
+  ASSIGN_OR_RETURN(std::string digest, daemon.UploadMesh(bytes));
+  ASSIGN_OR_RETURN(const v1::CreateModalModelRequest request,
+                   MakeRequest(options, file, std::move(digest)));
+  return daemon.CreateModalModel(request);
+}
 
-absl::Status CreateModel(const client::Client& daemon, const CreateModelOptions& options,
-                         bool json) {
-  const auto bytes = ReadAllOfMesh(options);
-  if (!bytes.ok()) return bytes.status();
-  auto digest = daemon.UploadMesh(*bytes);
-  if (!digest.ok()) return digest.status();
-  const auto request = MakeRequest(options, *std::move(digest));
-  if (!request.ok()) return request.status();
-  auto job = daemon.CreateModalModel(*request);
-  if (job.ok() && options.wait) job = WatchWithProgress(daemon, job->name());
+/// Waits for a job if the options say so, and prints it.
+absl::Status Conclude(const client::Client& daemon, absl::StatusOr<v1::Job> job, bool wait,
+                      bool json) {
+  if (job.ok() && wait) job = WatchWithProgress(daemon, job->name());
   if (!job.ok()) return job.status();
   if (json) {
     PrintJson(*job);
@@ -165,6 +171,33 @@ absl::Status CreateModel(const client::Client& daemon, const CreateModelOptions&
     absl::PrintF("%s\n", job->modal_model());
   }
   return absl::OkStatus();
+}
+
+/// Removes what a list of models need not tell; `carillon model show` tells it.
+void Shorten(v1::ModalModelSummary& model) {
+  model.mutable_header()->clear_settings();
+  model.mutable_header()->clear_verification();
+  model.mutable_header()->clear_arrays();
+  model.mutable_header()->clear_estimated_errors();
+}
+
+}  // namespace
+
+absl::Status CreateModel(const client::Client& daemon, const CreateModelOptions& options,
+                         bool json) {
+  // All are requested before the first is waited for, so that they are computed side by side.
+  std::vector<absl::StatusOr<v1::Job>> jobs;
+  for (const std::string& file : options.files) {
+    jobs.push_back(RequestModel(daemon, options, file));
+  }
+  absl::Status first_error;
+  for (absl::StatusOr<v1::Job>& job : jobs) {
+    const absl::Status ended = Conclude(daemon, std::move(job), options.wait, json);
+    if (ended.ok()) continue;
+    if (!first_error.ok()) (void)Report(first_error);
+    first_error = ended;
+  }
+  return first_error;
 }
 
 absl::Status CreateTransfer(const client::Client& daemon, const CreateTransferOptions& options,
@@ -203,6 +236,7 @@ absl::Status ListModels(const client::Client& daemon, const v1::ListModalModelsR
     for (auto& model : *models) *list.add_modal_models() = std::move(model);
   }
   if (json) {
+    for (v1::ModalModelSummary& model : *list.mutable_modal_models()) Shorten(model);
     PrintJson(list);
     return absl::OkStatus();
   }

@@ -3,6 +3,8 @@
 // The command line of `carillon model`.
 #include "client_sdk/cli/model_options.h"
 
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
@@ -38,12 +40,12 @@ void AddModelCreate(CLI::App& app, Program& program) {
   auto band = std::make_shared<std::string>("20:20000");
   CLI::App& create = *app.add_subcommand("create", "Compute the modal model of a mesh file");
   create
-      .add_option("file", options->file,
-                  "surface (OBJ, PLY, STL, OFF) or tetrahedra (Gmsh MSH, Medit, TetGen)")
+      .add_option("file", options->files,
+                  "surfaces (OBJ, PLY, STL, OFF) or tetrahedra (Gmsh MSH, Medit, TetGen)")
       ->required();
   create.add_option("--format", options->format,
                     "obj, ply, stl, off, msh, mesh or node [the file's suffix]");
-  create.add_option("--label", options->label, "name for people [the file's name]");
+  create.add_option("--label", options->label, "name for people of a single file [its name]");
   create.add_option("--size", options->size,
                     "size it is meant to sound with, relative to the file");
   create.add_option("--band", *band, "frequencies wanted, Hz")
@@ -56,10 +58,15 @@ void AddModelCreate(CLI::App& app, Program& program) {
   create.add_option("--priority", options->priority, "-100 to 100: higher ones start first");
   create.add_option("--time-limit", options->time_limit_s, "give up after so many seconds");
   create.add_option("--memory-limit-mib", options->memory_limit_mib, "memory that it may take");
-  create.add_flag("--wait", options->wait, "show the progress and end with the job");
+  options->wait = isatty(STDERR_FILENO) != 0;
+  create.add_flag("--wait,!--no-wait", options->wait,
+                  "show the progress and end with the jobs [on a terminal]");
   AddMaterial(create, options->material);
   AddSettingsOptions(create, options->settings);
   create.callback([&program, options, band] {
+    if (options->files.size() > 1 && !options->label.empty()) {
+      throw CLI::ValidationError("--label", "several files would get the same label");
+    }
     program.command = [&program, options] {
       return CreateModel(*program.Daemon(), *options, program.json);
     };

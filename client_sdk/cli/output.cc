@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "client_sdk/cli/output.h"
 
-#include <google/protobuf/util/json_util.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 
 #include "absl/strings/str_format.h"
+#include "client_sdk/cli/message_json.h"
 #include "proto/cpp/error_reason.h"
 
 namespace carillon::cli {
@@ -22,13 +21,7 @@ int Report(const absl::Status& status) {
 }
 
 void PrintJson(const google::protobuf::Message& message) {
-  google::protobuf::util::JsonPrintOptions options;
-  options.preserve_proto_field_names = true;
-  options.always_print_primitive_fields = true;
-  std::string json;
-  // These messages have no Any and no timestamp, so the conversion cannot fail.
-  (void)google::protobuf::util::MessageToJsonString(message, &json, options);
-  absl::PrintF("%s\n", json);
+  absl::PrintF("%s\n", MessageJson(message));
 }
 
 std::string Decibels(double amplitude) {

@@ -15,7 +15,7 @@ enum ExitCode { kDone = 0, kRefused = 1, kUsage = 2, kNoServer = 3 };
 /// Prints "carillon: REASON: message" to stderr if `status` is an error. Returns the exit code.
 int Report(const absl::Status& status);
 
-/// Prints `message` to stdout as one line of protobuf's JSON, with the field names of the .proto.
+/// Prints `message` to stdout as one line of JSON; see MessageJson.
 void PrintJson(const google::protobuf::Message& message);
 
 /// Returns a linear amplitude (full scale is 1) as text, such as "-6.0 dBFS" or "silence".

@@ -16,7 +16,7 @@ namespace carillon::cli {
 /// The state that all commands share: the address of the daemon, the form of the output, and the
 /// command that the command line chose.
 struct Program {
-  std::string server = DefaultServerAddress();
+  std::string server = ReachableServerAddress();
   std::string tls_roots_file;
   std::string admin_token;
   bool json = false;

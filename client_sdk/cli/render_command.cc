@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
@@ -8,28 +12,75 @@
 #include "client_sdk/cli/output.h"
 #include "client_sdk/cli/wave_file.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::cli {
 namespace {
 
 void PrintSummary(const RenderOptions& options, const v1::RenderSummary& summary,
                   uint32_t sample_rate_hz) {
-  absl::PrintF("%s: %.2f s, %d impulses, peak %s\n", options.out,
-               static_cast<double>(summary.frame_count()) / sample_rate_hz,
-               summary.accepted_count(), Decibels(summary.peak()));
-  absl::PrintF("%.3g Pa, true peak %s, whole sound %s, loudest 0.4 s %s\n", summary.peak_pa(),
-               Decibels(summary.true_peak()),
-               Loudness(summary.has_integrated_lufs(), summary.integrated_lufs()),
-               Loudness(summary.has_loudest_momentary_lufs(), summary.loudest_momentary_lufs()));
+  std::FILE* const out = options.out == "-" ? stderr : stdout;
+  absl::FPrintF(out, "%s: %.2f s, %d impulses, peak %s\n", options.out,
+                static_cast<double>(summary.frame_count()) / sample_rate_hz,
+                summary.accepted_count(), Decibels(summary.peak()));
+  absl::FPrintF(out, "%.3g Pa, true peak %s, whole sound %s, loudest 0.4 s %s\n",
+                summary.peak_pa(), Decibels(summary.true_peak()),
+                Loudness(summary.has_integrated_lufs(), summary.integrated_lufs()),
+                Loudness(summary.has_loudest_momentary_lufs(), summary.loudest_momentary_lufs()));
   if (summary.rejected_count() > 0) {
-    absl::PrintF("%d impulses could not be used; the newest: %s: %s\n", summary.rejected_count(),
-                 summary.last_rejection().reason(), summary.last_rejection().message());
+    absl::FPrintF(out, "%d impulses could not be used; the newest: %s: %s\n",
+                  summary.rejected_count(), summary.last_rejection().reason(),
+                  summary.last_rejection().message());
   }
   if (summary.limited_frame_count() > 0) {
-    absl::PrintF("the limiter worked in %d frames; smaller gains would avoid it\n",
-                 summary.limited_frame_count());
+    absl::FPrintF(out, "the limiter worked in %d frames; smaller gains would avoid it\n",
+                  summary.limited_frame_count());
   }
 }
+
+/// Writes the blocks of a rendering to a file, or collects them first if their peak must be known.
+class RenderedFile {
+ public:
+  explicit RenderedFile(const RenderOptions& options) : options_(options) {}
+
+  /// Returns false after an error.
+  bool Take(const client::AudioBlock& block) {
+    if (!file_) {
+      auto file = WaveFile::Create(options_.out, {.sample_rate_hz = block.sample_rate_hz,
+                                                  .channel_count = block.channel_count,
+                                                  .bits = options_.bits});
+      status_ = file.status();
+      if (file.ok()) file_ = *std::move(file);
+    }
+    samples_.insert(samples_.end(), block.samples.begin(), block.samples.end());
+    if (!options_.normalize && status_.ok()) Write(1);
+    return status_.ok();
+  }
+
+  /// Completes the file.
+  absl::Status Finish() {
+    constexpr float kPeak = 0.9F;
+    float peak = 0;
+    for (const float sample : samples_) peak = std::max(peak, std::abs(sample));
+    if (options_.normalize) Write(peak > 0 ? kPeak / peak : 1);
+    return status_.ok() && file_ ? file_->Finish() : status_;
+  }
+
+  bool begun() const { return file_.has_value(); }
+  const absl::Status& status() const { return status_; }
+
+ private:
+  void Write(float factor) {
+    for (float& sample : samples_) sample *= factor * static_cast<float>(options_.gain);
+    status_ = file_->Write(samples_);
+    samples_.clear();
+  }
+
+  const RenderOptions& options_;
+  std::optional<WaveFile> file_;
+  std::vector<float> samples_;
+  absl::Status status_;
+};
 
 }  // namespace
 
@@ -41,27 +92,19 @@ absl::Status Render(const client::Client& daemon, const RenderOptions& options, 
   settings.set_channel_count(options.channel_count);
   settings.set_tail_s(options.tail_s);
 
-  std::optional<WaveFile> file;
-  absl::Status written;
-  const auto write = [&](const client::AudioBlock& block) {
-    if (!file) {
-      auto created = WaveFile::Create(options.out, block.sample_rate_hz, block.channel_count);
-      written = created.status();
-      if (created.ok()) file = *std::move(created);
-    }
-    if (written.ok()) written = file->Write(block.samples);
-    return written.ok();
-  };
-  const auto summary = daemon.Render(settings, *trace, write);
-  if (!written.ok()) return written;
+  RenderedFile file(options);
+  const auto summary = daemon.Render(
+      settings, *trace, [&](const client::AudioBlock& block) { return file.Take(block); });
+  RETURN_IF_ERROR(file.status());
   if (!summary.ok()) return summary.status();
-  if (!file) {
+  RETURN_IF_ERROR(file.Finish());
+  if (!file.begun()) {
     return Refusal(absl::StatusCode::kInvalidArgument, "TRACE_EMPTY",
                    absl::StrCat(options.trace,
                                 ": holds no contact, so there is nothing to hear; "
                                 "record a simulation in which something is struck"));
   }
-  if (json) {
+  if (json && options.out != "-") {
     PrintJson(*summary);
   } else {
     PrintSummary(options, *summary, options.sample_rate_hz);

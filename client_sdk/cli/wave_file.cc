@@ -1,6 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "client_sdk/cli/wave_file.h"
 
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
 #include <sndfile.hh>
 #include <utility>
 
@@ -15,11 +22,20 @@ absl::Status NotWritable(const std::string& path, const char* why) {
                  absl::StrCat(path, ": ", why, "; choose another file"));
 }
 
+int SampleForm(int bits) {
+  return bits == 16 ? SF_FORMAT_PCM_16 : bits == 32 ? SF_FORMAT_FLOAT : SF_FORMAT_PCM_24;
+}
+
 }  // namespace
 
 struct WaveFile::Sound {
   std::string path;
+  int memory;  ///< descriptor of the file in memory that goes to stdout; -1: none
   SndfileHandle file;
+
+  ~Sound() {
+    if (memory >= 0) close(memory);
+  }
 };
 
 WaveFile::WaveFile(std::unique_ptr<Sound> sound) : sound_(std::move(sound)) {}
@@ -27,13 +43,35 @@ WaveFile::WaveFile(WaveFile&&) noexcept = default;
 WaveFile& WaveFile::operator=(WaveFile&&) noexcept = default;
 WaveFile::~WaveFile() = default;
 
-absl::StatusOr<WaveFile> WaveFile::Create(const std::string& path, uint32_t sample_rate_hz,
-                                          uint32_t channel_count) {
-  SndfileHandle file(path, SFM_WRITE, SF_FORMAT_WAV | SF_FORMAT_PCM_24,
-                     static_cast<int>(channel_count), static_cast<int>(sample_rate_hz));
+absl::StatusOr<WaveFile> WaveFile::Create(const std::string& path, const WaveFormat& format) {
+  const int memory = path == "-" ? memfd_create("wave", MFD_CLOEXEC) : -1;
+  if (path == "-" && memory < 0) return NotWritable(path, std::strerror(errno));
+  const int form = SF_FORMAT_WAV | SampleForm(format.bits);
+  const int channels = static_cast<int>(format.channel_count);
+  const int rate = static_cast<int>(format.sample_rate_hz);
+  auto sound = std::make_unique<Sound>();
+  sound->path = path;
+  sound->memory = memory;
+  sound->file = memory < 0 ? SndfileHandle(path, SFM_WRITE, form, channels, rate)
+                           : SndfileHandle(memory, false, SFM_WRITE, form, channels, rate);
   // Its conversion to bool says nothing about the file.
-  if (file.error() != SF_ERR_NO_ERROR) return NotWritable(path, file.strError());
-  return WaveFile(std::make_unique<Sound>(Sound{path, file}));
+  if (sound->file.error() != SF_ERR_NO_ERROR) return NotWritable(path, sound->file.strError());
+  return WaveFile(std::move(sound));
+}
+
+absl::Status WaveFile::Finish() {
+  sound_->file = SndfileHandle();
+  if (sound_->memory < 0) return absl::OkStatus();
+  lseek(sound_->memory, 0, SEEK_SET);
+  std::array<char, 65536> piece;
+  for (ssize_t count; (count = read(sound_->memory, piece.data(), piece.size())) > 0;) {
+    const auto size = static_cast<size_t>(count);
+    if (std::fwrite(piece.data(), 1, size, stdout) != size) {
+      return NotWritable(sound_->path, std::strerror(errno));
+    }
+  }
+  return std::fflush(stdout) == 0 ? absl::OkStatus()
+                                  : NotWritable(sound_->path, std::strerror(errno));
 }
 
 absl::Status WaveFile::Write(std::span<const float> samples) {

@@ -11,12 +11,18 @@
 
 namespace carillon::cli {
 
-/// Writes a WAV file of 24-bit samples block by block.
+/// The layout of the samples of a WAV file.
+struct WaveFormat {
+  uint32_t sample_rate_hz = 48000;
+  uint32_t channel_count = 1;
+  int bits = 24;  ///< 16 or 24; 32 for floating point
+};
+
+/// Writes a WAV file block by block.
 class WaveFile {
  public:
-  /// Errors: Internal (OUTPUT_NOT_WRITABLE).
-  static absl::StatusOr<WaveFile> Create(const std::string& path, uint32_t sample_rate_hz,
-                                         uint32_t channel_count);
+  /// `path` "-" is stdout. Errors: Internal (OUTPUT_NOT_WRITABLE).
+  static absl::StatusOr<WaveFile> Create(const std::string& path, const WaveFormat& format);
   WaveFile(WaveFile&&) noexcept;
   WaveFile& operator=(WaveFile&&) noexcept;
   /// Completes the file.
@@ -24,6 +30,10 @@ class WaveFile {
 
   /// Appends interleaved samples. Errors: Internal (OUTPUT_NOT_WRITABLE).
   absl::Status Write(std::span<const float> samples);
+
+  /// Completes the file. On stdout nothing appears before, because the length comes first in the
+  /// file. Errors: Internal (OUTPUT_NOT_WRITABLE).
+  absl::Status Finish();
 
  private:
   struct Sound;

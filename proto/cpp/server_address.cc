@@ -26,4 +26,15 @@ std::string DefaultServerAddress() {
   return "unix:" + folder + "/carillond.sock";
 }
 
+std::string ReachableServerAddress() {
+  constexpr std::string_view kPrefix = "unix:";
+  constexpr std::string_view kSystem = "unix:/run/carillon/carillond.sock";
+  const auto exists = [&](std::string_view address) {
+    return access(std::string(address.substr(kPrefix.size())).c_str(), F_OK) == 0;
+  };
+  const std::string own = DefaultServerAddress();
+  const bool named = !Environment("CARILLON_SERVER").empty();
+  return named || exists(own) || !exists(kSystem) ? own : std::string(kSystem);
+}
+
 }  // namespace carillon

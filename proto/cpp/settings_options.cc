@@ -72,7 +72,7 @@ void AddMesh(CLI::App& app, Settings& settings) {
   app.add_option_function<uint32_t>(
          "--nodes", [&](uint32_t count) { settings.mutable_mesh()->set_target_node_count(count); },
          "about this many corner nodes [decided from the surface]")
-      ->check(CLI::NonNegativeNumber)
+      ->check(CLI::Range(0, 100'000'000))
       ->group(kSettingsGroup);
   AddParsed(app, "--accuracy", ParseShare, "above zero, such as 1% or 0.01",
             "mesh so finely that no mode is estimated to be off by more, such as 1% or 0.01",

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "proto/cpp/status_macros.h"
 #include "server/api/object_conversion.h"
@@ -31,6 +32,30 @@ grpc::ServerUnaryReactor* SceneService::DeleteScene(grpc::CallbackServerContext*
   return Answer(context, pool_, [this, request] {
     ASSIGN_OR_RETURN(const uint64_t scene, ParseSceneName(request->name()));
     return scenes_.DeleteScene(scene);
+  });
+}
+
+grpc::ServerUnaryReactor* SceneService::ListScenes(grpc::CallbackServerContext* context,
+                                                   const v1::ListScenesRequest*,
+                                                   v1::ListScenesResponse* response) {
+  return Answer(context, pool_, [this, response] {
+    for (const SceneRegistry::SceneEntry& entry : scenes_.ListScenes()) {
+      v1::Scene& scene = *response->add_scenes();
+      scene.set_name(SceneName(entry.scene));
+      scene.set_object_count(static_cast<uint32_t>(entry.object_count));
+    }
+    return absl::OkStatus();
+  });
+}
+
+grpc::ServerUnaryReactor* SceneService::ListObjects(grpc::CallbackServerContext* context,
+                                                    const v1::ListObjectsRequest* request,
+                                                    v1::ListObjectsResponse* response) {
+  return Answer(context, pool_, [this, request, response] {
+    ASSIGN_OR_RETURN(const uint64_t scene, ParseSceneName(request->scene()));
+    ASSIGN_OR_RETURN(const std::vector<PlacedObject> objects, scenes_.ListObjects(scene));
+    for (const PlacedObject& placed : objects) *response->add_objects() = ToProto(scene, placed);
+    return absl::OkStatus();
   });
 }
 

@@ -20,6 +20,12 @@ class SceneService final : public v1::SceneService::CallbackService {
   grpc::ServerUnaryReactor* DeleteScene(grpc::CallbackServerContext* context,
                                         const v1::DeleteSceneRequest* request,
                                         v1::DeleteSceneResponse* response) override;
+  grpc::ServerUnaryReactor* ListScenes(grpc::CallbackServerContext* context,
+                                       const v1::ListScenesRequest* request,
+                                       v1::ListScenesResponse* response) override;
+  grpc::ServerUnaryReactor* ListObjects(grpc::CallbackServerContext* context,
+                                        const v1::ListObjectsRequest* request,
+                                        v1::ListObjectsResponse* response) override;
   grpc::ServerUnaryReactor* AddObject(grpc::CallbackServerContext* context,
                                       const v1::AddObjectRequest* request,
                                       v1::AddObjectResponse* response) override;

@@ -62,6 +62,28 @@ absl::Status SceneRegistry::DeleteScene(uint64_t scene) {
   return absl::OkStatus();
 }
 
+std::vector<SceneRegistry::SceneEntry> SceneRegistry::ListScenes() const {
+  std::map<uint64_t, std::shared_ptr<Scene>> scenes;
+  {
+    const MutexLock lock(&mutex_);
+    scenes = scenes_;
+  }
+  std::vector<SceneEntry> entries;
+  for (const auto& [id, scene] : scenes) {
+    entries.push_back({.scene = id, .object_count = scene->CopyAll().size()});
+  }
+  return entries;
+}
+
+absl::StatusOr<std::vector<PlacedObject>> SceneRegistry::ListObjects(uint64_t scene) const {
+  ASSIGN_OR_RETURN(const std::shared_ptr<Scene> found, FindScene(scene));
+  std::vector<PlacedObject> placed;
+  for (auto& [handle, object] : found->CopyAll()) {
+    placed.push_back({.handle = handle, .object = object});
+  }
+  return placed;
+}
+
 absl::StatusOr<PlacedObject> SceneRegistry::AddObject(uint64_t scene, uint32_t handle,
                                                       std::shared_ptr<const ModalModel> model,
                                                       const ObjectProperties& properties) {

@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "absl/base/thread_annotations.h"
 #include "absl/status/statusor.h"
@@ -50,6 +51,18 @@ class SceneRegistry {
 
   /// Fades out the scene's objects. Errors: NotFound (SCENE_NOT_FOUND).
   absl::Status DeleteScene(uint64_t scene);
+
+  /// A scene in a list of all.
+  struct SceneEntry {
+    uint64_t scene = 0;
+    size_t object_count = 0;
+  };
+
+  /// Returns all scenes, the oldest first.
+  std::vector<SceneEntry> ListScenes() const;
+
+  /// Returns the objects of a scene by their handles. Errors: NotFound (SCENE_NOT_FOUND).
+  absl::StatusOr<std::vector<PlacedObject>> ListObjects(uint64_t scene) const;
 
   /// Makes an object. If `handle` is zero, a free handle is chosen. Errors: NotFound
   /// (SCENE_NOT_FOUND), AlreadyExists (OBJECT_EXISTS), ResourceExhausted (TOO_MANY_OBJECTS), and

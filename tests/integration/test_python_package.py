@@ -146,6 +146,12 @@ class SoundTest(PackageTest):
         self.assertEqual((stream.report.step_count, stream.report.rejected_count), (24, 0))
         self.assertGreaterEqual(stream.report.accepted_count + stream.report.late_count, 24)
 
+    def test_scenes_and_their_objects_are_listed(self):
+        with self.c.scene() as scene:
+            scene.add(self.model, handle=9)
+            self.assertIn(scene.name, [found.name for found in self.c.scenes()])
+            self.assertEqual([item.handle for item in scene.objects()], [9])
+
     def test_a_stream_that_failed_raises_at_its_next_step(self):
         scene = self.c.scene()
         scene.delete()

@@ -31,10 +31,19 @@ class TlsTest(unittest.TestCase):
         done = self.status("--tls-roots", self.certificate)
         self.assertEqual(done.returncode, 0, done.stderr)
 
-    def test_without_roots_it_gets_no_answer(self):
+    def test_without_roots_it_says_that_the_daemon_may_want_tls(self):
         done = self.status()
         self.assertEqual(done.returncode, 3)
-        self.assertIn("SERVER_UNAVAILABLE", done.stderr)
+        self.assertRegex(done.stderr, "SERVER_UNAVAILABLE: .*closed the connection.*TLS.*--tls-roots")
+
+    def test_roots_that_do_not_vouch_for_the_daemon_are_a_mistake_of_tls(self):
+        other = self.folder / "other.pem"
+        subprocess.run(["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes",
+                        "-subj", "/CN=other", "-days", "2", "-keyout", self.folder / "other.key", "-out", other],
+                       check=True, capture_output=True)
+        done = self.status("--tls-roots", other)
+        self.assertEqual(done.returncode, 3)
+        self.assertRegex(done.stderr, "SERVER_UNAVAILABLE: TLS with .*failed.*certificate")
 
 
 if __name__ == "__main__":

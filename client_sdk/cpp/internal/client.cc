@@ -26,7 +26,7 @@ absl::Status NotOverridden(absl::string_view method) {
 }  // namespace
 
 std::unique_ptr<Client> Connect(const std::string& server, const ConnectOptions& options) {
-  return std::make_unique<GrpcClient>(server.empty() ? DefaultServerAddress() : server, options);
+  return std::make_unique<GrpcClient>(server.empty() ? ReachableServerAddress() : server, options);
 }
 
 v1::ErrorInfo ToErrorInfo(const absl::Status& status) { return carillon::ToErrorInfo(status); }
@@ -142,6 +142,14 @@ absl::StatusOr<std::string> Client::CreateScene(const v1::CreateSceneRequest&) c
 }
 
 absl::Status Client::DeleteScene(const std::string&) const { return NotOverridden("DeleteScene"); }
+
+absl::StatusOr<std::vector<v1::Scene>> Client::ListScenes() const {
+  return NotOverridden("ListScenes");
+}
+
+absl::StatusOr<std::vector<v1::SoundingObject>> Client::ListObjects(const std::string&) const {
+  return NotOverridden("ListObjects");
+}
 
 absl::StatusOr<v1::SoundingObject> Client::AddObject(const v1::AddObjectRequest&) const {
   return NotOverridden("AddObject");

@@ -134,6 +134,23 @@ absl::Status GrpcClient::DeleteScene(const std::string& name) const {
       .status();
 }
 
+absl::StatusOr<std::vector<v1::Scene>> GrpcClient::ListScenes() const {
+  auto response = Call(stubs_->scenes, stubs_->server, &v1::SceneService::Stub::ListScenes,
+                       v1::ListScenesRequest());
+  if (!response.ok()) return response.status();
+  return std::vector<v1::Scene>(response->scenes().begin(), response->scenes().end());
+}
+
+absl::StatusOr<std::vector<v1::SoundingObject>> GrpcClient::ListObjects(
+    const std::string& scene) const {
+  v1::ListObjectsRequest request;
+  request.set_scene(scene);
+  auto response =
+      Call(stubs_->scenes, stubs_->server, &v1::SceneService::Stub::ListObjects, request);
+  if (!response.ok()) return response.status();
+  return std::vector<v1::SoundingObject>(response->objects().begin(), response->objects().end());
+}
+
 absl::StatusOr<v1::SoundingObject> GrpcClient::AddObject(
     const v1::AddObjectRequest& request) const {
   auto response = Call(stubs_->scenes, stubs_->server, &v1::SceneService::Stub::AddObject, request);

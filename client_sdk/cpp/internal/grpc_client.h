@@ -53,6 +53,9 @@ class GrpcClient final : public Client {
 
   absl::StatusOr<std::string> CreateScene(const v1::CreateSceneRequest& request) const override;
   absl::Status DeleteScene(const std::string& name) const override;
+  absl::StatusOr<std::vector<v1::Scene>> ListScenes() const override;
+  absl::StatusOr<std::vector<v1::SoundingObject>> ListObjects(
+      const std::string& scene) const override;
   absl::StatusOr<v1::SoundingObject> AddObject(const v1::AddObjectRequest& request) const override;
   absl::StatusOr<v1::SoundingObject> UpdateObject(
       const v1::UpdateObjectRequest& request) const override;

@@ -1,11 +1,37 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "client_sdk/cpp/internal/rpc_status.h"
 
+#include "absl/strings/ascii.h"
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "carillon/v1/error.pb.h"
 #include "proto/cpp/error_reason.h"
 
 namespace carillon::client {
+namespace {
+
+/// Says how to repair a connection that failed. gRPC reports mistakes of TLS only within its text.
+std::string WhyUnavailable(const std::string& text, const std::string& server) {
+  const std::string lower = absl::AsciiStrToLower(text);
+  const bool tls = absl::StrContains(lower, "ssl") || absl::StrContains(lower, "certificate");
+  const bool closed = absl::StrContains(text, "Socket closed") ||
+                      absl::StrContains(text, "Connection reset") ||
+                      absl::StrContains(text, "Broken pipe");
+  if (tls) {
+    return absl::StrCat("TLS with ", server, " failed (", text,
+                        "); check that the daemon there has a TLS certificate for this address, "
+                        "and that the roots given vouch for it");
+  }
+  if (closed && !absl::StartsWith(server, "unix:")) {
+    return absl::StrCat("the program at ", server, " closed the connection (", text,
+                        "); if it is a daemon with TLS, give the roots that vouch for it "
+                        "(--tls-roots)");
+  }
+  return absl::StrCat("no carillond answers at ", server, " (", text,
+                      "); start it there, or name another address");
+}
+
+}  // namespace
 
 absl::Status FromRpc(const grpc::Status& status, const std::string& server) {
   if (status.ok()) return absl::OkStatus();
@@ -18,9 +44,7 @@ absl::Status FromRpc(const grpc::Status& status, const std::string& server) {
     }
   }
   if (code == absl::StatusCode::kUnavailable) {
-    return Refusal(code, "SERVER_UNAVAILABLE",
-                   absl::StrCat("no carillond answers at ", server, " (", status.error_message(),
-                                "); start it there, or name another address"));
+    return Refusal(code, "SERVER_UNAVAILABLE", WhyUnavailable(status.error_message(), server));
   }
   if (code == absl::StatusCode::kDeadlineExceeded) {
     return Refusal(code, "SERVER_TIMEOUT",

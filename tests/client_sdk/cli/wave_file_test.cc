@@ -17,7 +17,7 @@ TEST(WaveFile, HoldsEverySampleWithin24Bits) {
   const std::string path = testing::TempDir() + "HoldsEverySampleWithin24Bits.wav";
   const std::vector<float> samples = {0.0F, 0.5F, -0.5F, 0.25F, -1.0F, 1e-5F};
   {
-    auto file = WaveFile::Create(path, 48000, 2);
+    auto file = WaveFile::Create(path, {.sample_rate_hz = 48000, .channel_count = 2});
     ASSERT_TRUE(file.ok()) << file.status();
     ASSERT_TRUE(file->Write(samples).ok());
   }
@@ -35,7 +35,7 @@ TEST(WaveFile, HoldsEverySampleWithin24Bits) {
 }
 
 TEST(WaveFile, SaysWhyItCannotBeWritten) {
-  EXPECT_THAT(WaveFile::Create("/proc/no/such.wav", 48000, 2).status().ToString(),
+  EXPECT_THAT(WaveFile::Create("/proc/no/such.wav", {}).status().ToString(),
               testing::HasSubstr("OUTPUT_NOT_WRITABLE: /proc/no/such.wav"));
 }
 

@@ -141,6 +141,13 @@ class Client {
   /// Fades out the objects of a scene and deletes it. A scene outlives the client that created it.
   virtual absl::Status DeleteScene(const std::string& name) const;
 
+  /// Returns all scenes of the daemon, the oldest first.
+  virtual absl::StatusOr<std::vector<v1::Scene>> ListScenes() const;
+
+  /// Returns the objects of a scene by their handles.
+  virtual absl::StatusOr<std::vector<v1::SoundingObject>> ListObjects(
+      const std::string& scene) const;
+
   /// Adds an object that sounds with a stored model to a scene. Contacts refer to the object by its
   /// handle, which the caller may choose.
   virtual absl::StatusOr<v1::SoundingObject> AddObject(const v1::AddObjectRequest& request) const;

@@ -141,6 +141,12 @@ class Client:
         with errors.translated(self.server):
             return Scene(self, self.scenes_stub.CreateScene(request).name)
 
+    def scenes(self) -> list[Scene]:
+        """Returns all scenes of the daemon, the oldest first."""
+        with errors.translated(self.server):
+            answer = self.scenes_stub.ListScenes(scene_service_pb2.ListScenesRequest())
+        return [Scene(self, item.name) for item in answer.scenes]
+
     def render(self, trace: Trace | str | os.PathLike[str], **settings: Any) -> Sound:
         """Renders a trace, or a .contacts file, faster than real time. `settings` are fields of RenderSettings:
         sample_rate_hz, channel_count and tail_s."""

@@ -86,6 +86,12 @@ class Scene:
         with errors.translated(self.client.server):
             return SoundingObject(self, self.client.scenes_stub.AddObject(request).object)
 
+    def objects(self) -> list[SoundingObject]:
+        """Returns the objects of the scene by their handles."""
+        with errors.translated(self.client.server):
+            answer = self.client.scenes_stub.ListObjects(scene_service_pb2.ListObjectsRequest(scene=self.name))
+        return [SoundingObject(self, item) for item in answer.objects]
+
     def move_listener(self, pose: PoseLike, glide: float = 0) -> None:
         """Moves the listener, within `glide` seconds."""
         request = scene_service_pb2.UpdateListenerRequest(scene=self.name, pose=contacts.to_pose(pose), glide_s=glide)

@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The commands that show and end jobs, materials and scenes, and that write the examples.
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+
+#include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "absl/strings/strip.h"
+#include "client_sdk/cli/commands.h"
+#include "client_sdk/cli/example_bodies.h"
+#include "client_sdk/cli/find_model.h"
+#include "client_sdk/cli/job_progress.h"
+#include "client_sdk/cli/output.h"
+#include "proto/cpp/error_reason.h"
+#include "proto/cpp/material_catalogue.h"
+#include "proto/cpp/status_macros.h"
+
+namespace carillon::cli {
+namespace {
+
+std::string SceneNamed(const std::string& text) {
+  return absl::StartsWith(text, "scenes/") ? text : absl::StrCat("scenes/", text);
+}
+
+void PrintObject(const v1::SoundingObject& object) {
+  absl::PrintF("  %-6d %-12s  %4d modes  %8.1f to %.1f Hz  size %.4g  gain %.4g\n", object.handle(),
+               absl::StripPrefix(object.modal_model(), "modalModels/").substr(0, 12),
+               object.sounding_mode_count(), object.lowest_frequency_hz(),
+               object.highest_frequency_hz(), object.size(), object.gain());
+}
+
+}  // namespace
+
+absl::Status ListJobs(const client::Client& daemon, bool json) {
+  ASSIGN_OR_RETURN(const std::vector<v1::Job> jobs, daemon.ListJobs());
+  v1::ListJobsResponse list;
+  list.mutable_jobs()->Assign(jobs.begin(), jobs.end());
+  if (json) {
+    PrintJson(list);
+    return absl::OkStatus();
+  }
+  for (const v1::Job& job : jobs) {
+    absl::PrintF("%s  %s  %s\n", absl::StripPrefix(job.name(), "jobs/").substr(0, 12),
+                 ProgressText(job), job.label());
+  }
+  return absl::OkStatus();
+}
+
+absl::Status ShowJob(const client::Client& daemon, const std::string& text, bool json) {
+  ASSIGN_OR_RETURN(const std::string name, FindJob(daemon, text));
+  ASSIGN_OR_RETURN(const v1::Job job, daemon.GetJob(name));
+  if (json) {
+    PrintJson(job);
+    return absl::OkStatus();
+  }
+  absl::PrintF(
+      "%s\nlabel      %s\nstate      %s\nmodel      %s\npriority   %d\nmemory     %.1f MiB\n",
+      job.name(), job.label(), ProgressText(job), job.modal_model(), job.priority(),
+      static_cast<double>(job.memory_bytes()) / (1 << 20));
+  if (job.has_error())
+    absl::PrintF("error      %s: %s\n", job.error().reason(), job.error().message());
+  return absl::OkStatus();
+}
+
+absl::Status CancelJob(const client::Client& daemon, const std::string& text) {
+  ASSIGN_OR_RETURN(const std::string name, FindJob(daemon, text));
+  return daemon.CancelJob(name).status();
+}
+
+absl::Status ListMaterials(const client::Client& daemon, bool json) {
+  ASSIGN_OR_RETURN(const std::vector<v1::CatalogueMaterial> materials, daemon.ListMaterials());
+  v1::ListMaterialsResponse list;
+  list.mutable_materials()->Assign(materials.begin(), materials.end());
+  if (json) {
+    PrintJson(list);
+    return absl::OkStatus();
+  }
+  for (const v1::CatalogueMaterial& item : materials) {
+    absl::PrintF("%-18s %7.4g GPa  %6.5g kg/m^3\n", item.name(), item.material().young_pa() / 1e9,
+                 item.material().density_kg_per_m3());
+  }
+  return absl::OkStatus();
+}
+
+absl::Status ShowMaterial(const client::Client& daemon, const std::string& name, bool json) {
+  ASSIGN_OR_RETURN(const std::vector<v1::CatalogueMaterial> materials, daemon.ListMaterials());
+  for (const v1::CatalogueMaterial& item : materials) {
+    if (item.name() != name) continue;
+    if (json) {
+      PrintJson(item);
+      return absl::OkStatus();
+    }
+    const v1::Material& material = item.material();
+    absl::PrintF("%s\nyoung      %.6g Pa\npoisson    %.4g\ndensity    %.6g kg/m^3\n", name,
+                 material.young_pa(), material.poisson_ratio(), material.density_kg_per_m3());
+    absl::PrintF("alpha1     %.4g s\nalpha2     %.4g 1/s\n", material.alpha1_s(),
+                 material.alpha2_per_s());
+    for (const v1::LossFactorPoint& point : material.loss_factor()) {
+      absl::PrintF("loss       %.4g at %.6g Hz\n", point.loss_factor(), point.frequency_hz());
+    }
+    absl::PrintF("source     %s\n", item.source());
+    return absl::OkStatus();
+  }
+  v1::Material unknown;
+  unknown.set_preset(name);
+  // Its error names the nearest materials.
+  return ResolveMaterial(unknown).status();
+}
+
+absl::Status ListScenes(const client::Client& daemon, bool json) {
+  ASSIGN_OR_RETURN(const std::vector<v1::Scene> scenes, daemon.ListScenes());
+  v1::ListScenesResponse list;
+  list.mutable_scenes()->Assign(scenes.begin(), scenes.end());
+  if (json) {
+    PrintJson(list);
+    return absl::OkStatus();
+  }
+  for (const v1::Scene& scene : scenes) {
+    absl::PrintF("%s  %d objects\n", scene.name(), scene.object_count());
+    const auto objects = daemon.ListObjects(scene.name());
+    // A scene may be deleted meanwhile.
+    if (!objects.ok()) continue;
+    for (const v1::SoundingObject& object : *objects) PrintObject(object);
+  }
+  return absl::OkStatus();
+}
+
+absl::Status DeleteScene(const client::Client& daemon, const std::string& text) {
+  return daemon.DeleteScene(SceneNamed(text));
+}
+
+absl::Status WriteExample(const Example& example, const std::string& path) {
+  const std::string file = path.empty() ? example.name + ".obj" : path;
+  std::ofstream out(file, std::ios::binary);
+  out << ObjText(example);
+  out.close();
+  if (!out) {
+    return Refusal(absl::StatusCode::kInternal, "OUTPUT_NOT_WRITABLE",
+                   absl::StrCat(file, ": ", std::strerror(errno), "; choose another file"));
+  }
+  absl::PrintF("%s\n", file);
+  // To stderr, so that stdout is the name alone.
+  absl::FPrintF(stderr, "%s is %s. It sounds with:\n", file, example.description);
+  absl::FPrintF(stderr, "  carillon model create %s --material %s\n", file, example.material);
+  absl::FPrintF(stderr, "  carillon strike %s --material %s %s\n", example.name, example.material,
+                example.strike);
+  return absl::OkStatus();
+}
+
+}  // namespace carillon::cli

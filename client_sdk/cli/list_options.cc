@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The command lines of `carillon job`, `carillon material`, `carillon scene` and `carillon
+// example`.
+#include "client_sdk/cli/list_options.h"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "client_sdk/cli/commands.h"
+
+namespace carillon::cli {
+namespace {
+
+/// Adds the command that runs a job on this machine.
+void AddJobRun(CLI::App& job, Program& program) {
+  auto options = std::make_shared<RunJobOptions>();
+  CLI::App& run = *job.add_subcommand(
+      "run", "Run a job of the daemon on this machine; the batch jobs of a cluster call it");
+  run.add_option("digest", options->digest, "The digest of the job")->required();
+  run.add_option("command", options->command,
+                 "The command that reads the file mesh and writes the file model")
+      ->required();
+  run.add_option("--token", options->token, "The token of this run [$CARILLON_JOB_TOKEN]")
+      ->envname("CARILLON_JOB_TOKEN")
+      ->required();
+  run.callback([&program, options] {
+    program.command = [&program, options] {
+      const StopSignal stop;
+      return RunJob(*program.Daemon(), *options, stop);
+    };
+  });
+}
+
+/// Adds a command about one thing, which `description` says how to name.
+template <class Run>
+void AddAbout(CLI::App& parent, const std::string& name, const std::string& text,
+              const std::string& description, Run run) {
+  auto thing = std::make_shared<std::string>();
+  CLI::App& command = *parent.add_subcommand(name, text);
+  command.add_option(parent.get_name(), *thing, description)->required();
+  command.callback([run, thing] { run(*thing); });
+}
+
+}  // namespace
+
+void AddJob(CLI::App& app, Program& program) {
+  CLI::App& job = *app.add_subcommand("job", "List, follow, cancel and run decomposition jobs")
+                       ->require_subcommand(1);
+  job.add_subcommand("list", "List the jobs, newest first")->callback([&program] {
+    program.command = [&program] { return ListJobs(*program.Daemon(), program.json); };
+  });
+  const std::string named = "The name, the label, or the first digits of the digest of a job";
+  AddAbout(job, "show", "Show a job", named, [&program](const std::string& text) {
+    program.command = [&program, text] { return ShowJob(*program.Daemon(), text, program.json); };
+  });
+  AddAbout(job, "watch", "Show the progress of a job until it ends", named,
+           [&program](const std::string& text) {
+             program.command = [&program, text] {
+               return WatchJob(*program.Daemon(), text, program.json);
+             };
+           });
+  AddAbout(job, "cancel", "Cancel a job that has not ended", named,
+           [&program](const std::string& text) {
+             program.command = [&program, text] { return CancelJob(*program.Daemon(), text); };
+           });
+  AddJobRun(job, program);
+}
+
+void AddMaterials(CLI::App& app, Program& program) {
+  CLI::App& material =
+      *app.add_subcommand("material", "Show the named materials")->require_subcommand(1);
+  material.add_subcommand("list", "List the materials")->callback([&program] {
+    program.command = [&program] { return ListMaterials(*program.Daemon(), program.json); };
+  });
+  AddAbout(material, "show", "Show the figures of a material and their source",
+           "The name of a material", [&program](const std::string& text) {
+             program.command = [&program, text] {
+               return ShowMaterial(*program.Daemon(), text, program.json);
+             };
+           });
+}
+
+void AddScenes(CLI::App& app, Program& program) {
+  CLI::App& scene = *app.add_subcommand("scene", "List and delete scenes")->require_subcommand(1);
+  scene.add_subcommand("list", "List the scenes and their objects")->callback([&program] {
+    program.command = [&program] { return ListScenes(*program.Daemon(), program.json); };
+  });
+  AddAbout(scene, "delete", "Fade out the objects of a scene and delete it",
+           "The name or the number of a scene", [&program](const std::string& text) {
+             program.command = [&program, text] { return DeleteScene(*program.Daemon(), text); };
+           });
+}
+
+void AddExample(CLI::App& app, Program& program) {
+  auto name = std::make_shared<std::string>();
+  auto out = std::make_shared<std::string>();
+  std::vector<std::string> names;
+  for (const Example& example : Examples()) names.push_back(example.name);
+  CLI::App& command = *app.add_subcommand("example", "Write the mesh file of a body to try");
+  command.add_option("name", *name, "bell, bowl, bar or chime")
+      ->required()
+      ->check(CLI::IsMember(names));
+  command.add_option("--out", *out, "The OBJ file to write [NAME.obj]");
+  command.callback([&program, name, out] {
+    program.command = [name, out] {
+      return WriteExample(*std::ranges::find(Examples(), *name, &Example::name), *out);
+    };
+  });
+}
+
+}  // namespace carillon::cli

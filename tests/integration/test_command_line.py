@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The command line as people and scripts use it, against the real daemon."""
+
+import json
+import re
+import shutil
+import subprocess
+import unittest
+
+import numpy
+
+import meshes
+import sound
+from carillon.v1 import contact_pb2, contact_trace_pb2, material_pb2, scene_service_pb2
+from daemon import BIN, ROOT, DaemonTest
+
+MATERIAL = material_pb2.Material(preset=meshes.MATERIAL)
+
+
+def carillon(*arguments, **options):
+    return subprocess.run([BIN / "carillon", *map(str, arguments)], capture_output=True, text=True, check=False,
+                          **options)
+
+
+class CommandLineTest(DaemonTest):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        (cls.folder / "bar.obj").write_bytes(meshes.bar())
+        cls.model = cls.run_command("model", "create", cls.folder / "bar.obj", "--material", meshes.MATERIAL, "--wait")
+
+    @classmethod
+    def run_command(cls, *arguments):
+        return cls.daemon.command(*arguments).stdout.strip()
+
+    def json_of(self, *arguments):
+        return json.loads(self.run_command("--json", *arguments))
+
+
+class ListsTest(CommandLineTest):
+    def test_numbers_of_64_bits_are_numbers_in_json(self):
+        shown = self.json_of("model", "show", "bar")
+        for name in ("stored_bytes", "created_unix_ms", "revision"):
+            self.assertIsInstance(shown[name], int)
+        self.assertEqual(shown["label"], "bar")
+        self.assertIsInstance(shown["eigenvalues"][0], float)
+        self.assertEqual(shown["header"]["settings"]["element"], "ELEMENT_QUADRATIC")
+
+    def test_a_listed_model_takes_less_than_two_kilobytes(self):
+        listed = self.json_of("model", "list")["modal_models"]
+        self.assertEqual([model["name"] for model in listed], [self.model])
+        self.assertLess(len(json.dumps(listed)), 2000)
+        shown = self.json_of("model", "show", "bar")
+        self.assertEqual(listed[0]["header"]["mode_count"], shown["header"]["mode_count"])
+
+    def test_jobs_are_listed_shown_and_cancelled(self):
+        self.assertIn("bar", [job["label"] for job in self.json_of("job", "list")["jobs"]])
+        self.assertIn("done", self.run_command("job", "show", "bar"))
+        self.run_command("model", "create", self.folder / "bar.obj", "--material", meshes.MATERIAL, "--nodes", 60000,
+                         "--label", "long", "--no-wait")
+        self.run_command("job", "cancel", "long")
+        ended = self.daemon.command("job", "watch", "long", check=False)
+        self.assertIn("JOB_CANCELLED", ended.stderr)
+
+    def test_materials_are_listed_and_shown_with_their_source(self):
+        self.assertRegex(self.run_command("material", "list"), r"(?m)^bell_bronze +\d+ GPa +\d+ kg/m\^3$")
+        self.assertRegex(self.run_command("material", "show", "bell_bronze"), r"source +\w")
+        unknown = self.daemon.command("material", "show", "bell_bronce", check=False)
+        self.assertRegex(unknown.stderr, "UNKNOWN_MATERIAL: .*bell_bronze")
+
+    def test_scenes_are_listed_with_their_objects_and_deleted(self):
+        scene = self.client.scenes.CreateScene(scene_service_pb2.CreateSceneRequest()).name
+        self.client.scenes.AddObject(scene_service_pb2.AddObjectRequest(
+            scene=scene, modal_model=self.model, material=MATERIAL, handle=5))
+        self.assertIn({"name": scene, "object_count": 1}, self.json_of("scene", "list")["scenes"])
+        self.assertRegex(self.run_command("scene", "list"), rf"(?m){scene}  1 objects\n  5 ")
+        self.run_command("scene", "delete", scene.removeprefix("scenes/"))
+        self.assertNotIn(scene, self.run_command("scene", "list"))
+
+
+class ExampleTest(CommandLineTest):
+    def test_each_example_is_a_body_that_sounds_as_its_hint_says(self):
+        files = []
+        for name in ("bell", "bowl", "bar", "chime"):
+            file = self.folder / "examples" / f"{name}.obj"
+            file.parent.mkdir(exist_ok=True)
+            written = self.daemon.command("example", name, "--out", file)
+            self.assertEqual(written.stdout, f"{file}\n")
+            hints = re.findall(r"(?m)^  carillon (.*)$", written.stderr)
+            self.assertEqual([hint.split()[0] for hint in hints], ["model", "strike"])
+            created = self.run_command(*hints[0].split(), "--wait")
+            heard = self.client.listen(1.0, on_start=lambda hint=hints[1]: self.run_command(
+                "strike", created, *hint.split()[2:], "--seconds", "0.1"))
+            self.assertGreater(max(map(abs, heard.samples)), 1e-3, name)
+            files.append(file)
+        # All are there already, so that one command for all returns at once.
+        self.assertEqual(len(self.run_command("model", "create", *files, "--material", "bell_bronze").split()), 4)
+
+
+class RenderTest(CommandLineTest):
+    def setUp(self):
+        impulse = sound.impulse((0, 0.008, 0.010), (0, 0, -0.002), duration_s=1e-4)
+        item = contact_trace_pb2.ContactTraceObject(handle=1, modal_model=self.model, material=MATERIAL)
+        self.trace = self.folder / "trace.contacts"
+        sound.write_trace(self.trace, [item], [contact_pb2.ContactStep(time_s=0, impulses=[impulse])])
+
+    def render(self, *options):
+        out = self.folder / "out.wav"
+        self.run_command("render", self.trace, "--out", out, "--tail", 0.3, *options)
+        return out
+
+    def test_gain_and_normalizing_scale_the_sound(self):
+        plain = sound.read_wave(self.render())
+        numpy.testing.assert_allclose(sound.read_wave(self.render("--gain", 0.5)), plain / 2, atol=2e-7)
+        self.assertAlmostEqual(numpy.abs(sound.read_wave(self.render("--normalize"))).max(), 0.9, delta=1e-4)
+
+    def test_samples_have_the_size_asked_for(self):
+        header = {bits: self.render("--bits", bits).read_bytes()[:40] for bits in (16, 24, 32)}
+        for bits, start in header.items():
+            self.assertEqual(int.from_bytes(start[34:36], "little"), bits)
+
+    def test_a_dash_writes_the_file_to_stdout(self):
+        file = self.render().read_bytes()
+        done = subprocess.run([BIN / "carillon", "--server", self.daemon.server, "render", self.trace, "--out", "-",
+                               "--tail", "0.3"], capture_output=True, check=True)
+        self.assertEqual(done.stdout, file)
+
+
+class StrikeTest(CommandLineTest):
+    def test_a_vector_is_one_word_or_three(self):
+        for vectors in (("--point", "0,0.008,0.01", "--impulse", "0,0,-0.01"),
+                        ("--point", "0", "0.008", "0.01", "--impulse", "0", "0", "-0.01")):
+            struck = self.daemon.command("strike", "bar", "--material", meshes.MATERIAL, *vectors, "--seconds", "0.01")
+            self.assertIn("modes sound", struck.stdout)
+
+
+class WithoutDaemonTest(unittest.TestCase):
+    def test_a_command_or_an_option_that_is_not_there_names_the_nearest(self):
+        for words, expected in ((("modal", "list"), "no command 'modal'; did you mean 'model'?"),
+                                (("model", "lst"), "no command 'lst'; did you mean 'list'?"),
+                                (("model", "create", "a.obj", "--materal", "oak"),
+                                 "no option '--materal'; did you mean '--material'?"),
+                                (("strike", "bell", "--point", "0,0,0", "--impulze", "0,0,1"),
+                                 "no option '--impulze'; did you mean '--impulse'?"),
+                                (("xyzzy",), "no command 'xyzzy'; run with --help for all")):
+            done = carillon(*words)
+            self.assertEqual(done.returncode, 2)
+            self.assertEqual(done.stderr, f"carillon: there is {expected}\n")
+
+    def test_messages_about_numbers_are_short(self):
+        for words in (("model", "create", "a.obj", "--nodes", "-3"), ("listen", "--seconds", "-3"),
+                      ("model", "create", "a.obj", "--wall", "-3mm")):
+            done = carillon(*words)
+            self.assertEqual(done.returncode, 2)
+            self.assertNotRegex(done.stderr, r"\d{30}")
+
+    def test_a_wall_in_millimetres_is_understood(self):
+        done = carillon("--server", "unix:/nonexistent", "model", "create", ROOT / "README.md", "--wall", "3mm")
+        self.assertIn("SERVER_UNAVAILABLE", done.stderr)
+
+    def test_the_version_is_that_of_the_project(self):
+        version = re.search(r"project\(carillon VERSION ([\d.]+)", (ROOT / "CMakeLists.txt").read_text())[1]
+        self.assertEqual(carillon("--version").stdout, f"carillon {version}\n")
+
+    def test_manual_pages_have_the_texts_of_help_and_no_mistakes(self):
+        for program in ("carillon", "carillond", "carillon-precompute"):
+            page = subprocess.run([BIN / program, "--man"], capture_output=True, text=True, check=True).stdout
+            done = subprocess.run(["groff", "-man", "-Tutf8", "-ww", "-P-cbou"], input=page, capture_output=True,
+                                  text=True, check=True)
+            self.assertEqual(done.stderr, "")
+            described = re.findall(r"(?m)^  --(\w+)", subprocess.run(
+                [BIN / program, "--help"], capture_output=True, text=True, check=True).stdout)
+            for option in set(described) - {"help"}:
+                self.assertIn(f"--{option}", done.stdout)
+
+    def test_the_manual_page_shows_how_to_call_each_command(self):
+        self.assertIn(r"\fBcarillon model create\fR [\fIOPTIONS\fR] \fIFILE\fR...", carillon("--man").stdout)
+
+    def test_bash_completes_commands_and_options(self):
+        def complete(line):
+            words = line.split(" ")
+            script = carillon("completion", "bash").stdout + (
+                f"COMP_WORDS=({' '.join(repr(word) for word in words)}); COMP_CWORD={len(words) - 1}\n"
+                '_carillon; printf "%s\\n" "${COMPREPLY[@]}"\n')
+            return subprocess.run(["bash", "-c", script], capture_output=True, text=True, check=True).stdout.split()
+
+        self.assertEqual(complete("carillon mo"), ["model"])
+        self.assertEqual(complete("carillon model cr"), ["create"])
+        self.assertEqual(complete("carillon --json model create bell.obj --mat"), ["--material"])
+        self.assertIn("scene", complete("carillon "))
+
+    def test_the_scripts_of_other_shells_are_correct(self):
+        for shell, check in (("zsh", "-n"), ("fish", "--no-execute")):
+            self.assertIsNotNone(shutil.which(shell))
+            subprocess.run([shell, check, "/dev/stdin"], input=carillon("completion", shell).stdout, text=True,
+                           check=True, capture_output=True)
+
+
+if __name__ == "__main__":
+    unittest.main()
