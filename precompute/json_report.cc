@@ -57,6 +57,21 @@ Json Radiation(const ModeRadiation& mode, const Air& air, double omega, const In
           {"surface_power_db", mode.surface_power_db}};
 }
 
+/// For unit density and the size of the mesh.
+Json RigidBody(const RigidRadiation& rigid) {
+  Json motions = Json::array();
+  for (const RigidRadiation::Motion& motion : rigid.motions) {
+    motions.push_back({{"radius_m", motion.radius_m},
+                       {"strengths", motion.strengths},
+                       {"error_db", motion.error_db}});
+  }
+  return {{"volume_m3", rigid.mass.volume_m3},
+          {"center_of_mass_m", rigid.mass.center_of_mass},
+          {"inertia_kg_m2", rigid.mass.inertia},
+          {"wavenumbers", rigid.wavenumbers},
+          {"motions", motions}};
+}
+
 Json RadiationSummary(const Transfer& transfer) {
   return {{"speed_ratio", transfer.settings.speed_ratio},
           {"center_m", transfer.center},
@@ -64,6 +79,7 @@ Json RadiationSummary(const Transfer& transfer) {
           {"cpu_seconds", transfer.cpu_s},
           {"accuracy_db", transfer.settings.goal_db},
           {"budget_s", transfer.settings.budget_cpu_s},
+          {"rigid_body", RigidBody(transfer.rigid)},
           {"modes_wanted", std::ranges::count_if(transfer.modes, &ModeRadiation::in_band)},
           {"modes_computed", std::ranges::count_if(transfer.modes, &ModeRadiation::computed)}};
 }

@@ -29,7 +29,23 @@ struct TransferArrays {
   std::vector<float> power_integrals, normal_energies, power_errors_db, direction_errors_db;
   std::vector<uint32_t> orders, first, harmonics;
   std::vector<std::complex<float>> coefficients;
+  std::vector<double> rigid_wavenumbers;
+  std::vector<float> rigid_power_integrals, rigid_radii, rigid_strengths, rigid_errors_db;
 };
+
+void AddRigid(const RigidRadiation& rigid, TransferArrays& arrays) {
+  arrays.rigid_wavenumbers = rigid.wavenumbers;
+  for (const RigidRadiation::Motion& motion : rigid.motions) {
+    for (const double power : motion.power_integrals) {
+      arrays.rigid_power_integrals.push_back(static_cast<float>(power));
+    }
+    arrays.rigid_radii.push_back(static_cast<float>(motion.radius_m));
+    for (const double strength : motion.strengths) {
+      arrays.rigid_strengths.push_back(static_cast<float>(strength));
+    }
+    arrays.rigid_errors_db.push_back(static_cast<float>(motion.error_db));
+  }
+}
 
 RadiationState StateOf(const ModeRadiation& mode) {
   if (!mode.in_band) return RadiationState::kOutsideBand;
@@ -51,16 +67,43 @@ TransferArrays MakeArrays(const Transfer& transfer, const ModalModel& model) {
     arrays.coefficients.insert(arrays.coefficients.end(), mode.value.begin(), mode.value.end());
     arrays.first.push_back(static_cast<uint32_t>(arrays.harmonics.size()));
   }
+  AddRigid(transfer.rigid, arrays);
   return arrays;
 }
 
 /// In the order of kTransferArrays.
 std::array<Bytes, kTransferArrayCount> AllBytes(const TransferArrays& arrays) {
-  return {BytesOf(arrays.eigenvalues),     BytesOf(arrays.states),
-          BytesOf(arrays.power_integrals), BytesOf(arrays.normal_energies),
-          BytesOf(arrays.power_errors_db), BytesOf(arrays.direction_errors_db),
-          BytesOf(arrays.orders),          BytesOf(arrays.first),
-          BytesOf(arrays.harmonics),       BytesOf(arrays.coefficients)};
+  return {BytesOf(arrays.eigenvalues),
+          BytesOf(arrays.states),
+          BytesOf(arrays.power_integrals),
+          BytesOf(arrays.normal_energies),
+          BytesOf(arrays.power_errors_db),
+          BytesOf(arrays.direction_errors_db),
+          BytesOf(arrays.orders),
+          BytesOf(arrays.first),
+          BytesOf(arrays.harmonics),
+          BytesOf(arrays.coefficients),
+          BytesOf(arrays.rigid_wavenumbers),
+          BytesOf(arrays.rigid_power_integrals),
+          BytesOf(arrays.rigid_radii),
+          BytesOf(arrays.rigid_strengths),
+          BytesOf(arrays.rigid_errors_db)};
+}
+
+v1::Vec3 ToProto(const Point& point) {
+  v1::Vec3 result;
+  result.set_x(point[0]);
+  result.set_y(point[1]);
+  result.set_z(point[2]);
+  return result;
+}
+
+v1::RigidBody ToProto(const MassProperties& mass) {
+  v1::RigidBody body;
+  body.set_volume_m3(mass.volume_m3);
+  *body.mutable_center_of_mass_m() = ToProto(mass.center_of_mass);
+  for (const double value : mass.inertia) body.add_inertia_kg_m2(value);
+  return body;
 }
 
 v1::TransferVerification Verify(const Transfer& transfer) {
@@ -116,12 +159,13 @@ v1::TransferRecord MakeHeader(const Transfer& transfer, const ModelOrigin& origi
   header.set_speed_ratio(transfer.settings.speed_ratio);
   header.set_sound_speed_m_per_s(transfer.settings.air.sound_speed_m_per_s);
   header.set_air_density_kg_per_m3(transfer.settings.air.density_kg_per_m3);
-  header.mutable_center_m()->set_x(transfer.center[0]);
-  header.mutable_center_m()->set_y(transfer.center[1]);
-  header.mutable_center_m()->set_z(transfer.center[2]);
+  *header.mutable_center_m() = ToProto(transfer.center);
+  *header.mutable_rigid_body() = ToProto(transfer.rigid.mass);
   header.set_radius_m(transfer.radius_m);
   *header.mutable_verification() = Verify(transfer);
-  const TransferSizes sizes{.modes = transfer.modes.size(), .harmonics = arrays.harmonics.size()};
+  const TransferSizes sizes{.modes = transfer.modes.size(),
+                            .harmonics = arrays.harmonics.size(),
+                            .wavenumbers = arrays.rigid_wavenumbers.size()};
   for (const ArraySpec& spec : kTransferArrays) *header.add_arrays() = DescribeArray(spec, sizes);
   header.mutable_transfer_settings()->set_accuracy_db(transfer.settings.goal_db);
   header.mutable_transfer_settings()->set_budget_s(transfer.settings.budget_cpu_s);

@@ -75,6 +75,49 @@ SurfaceMesh WithoutLoose(const SurfaceMesh& mesh) {
   return result;
 }
 
+/// How far the given surface lies outside the middle of the edge between two corners of a
+/// triangle. Zero where that is no matter of curvature, as at a rim that the edge cuts off.
+double GapAt(const SurfaceMesh& given, const NearestTriangle& index, const Point& a, const Point& b,
+             const Point& normal) {
+  constexpr double kMostGap = 0.2;  // of the edge; that of a circle of five corners
+  const double edge_m = Distance(a, b);
+  Point middle{};
+  for (size_t i = 0; i < 3; ++i) middle[i] = (a[i] + b[i]) / 2;
+  const Point place = FindFacing(given, index, middle, normal, edge_m).point;
+  const double gap_m = Dot(Difference(place, middle), normal) / Norm(normal);
+  return std::abs(gap_m) < kMostGap * edge_m ? gap_m : 0;
+}
+
+/// Moves the vertices, which lie on the given surface, along their normals so far that the flat
+/// triangles between them enclose the volume that the given surface does there. Otherwise a tube
+/// would be narrower by its chords, and its air would resonate elsewhere.
+void KeepVolume(const SurfaceMesh& given, const NearestTriangle& index, SurfaceMesh& mesh) {
+  std::vector<Point> normals(mesh.vertices.size());
+  std::vector<double> areas(mesh.vertices.size());
+  std::vector<double> volumes(mesh.vertices.size());
+  for (size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const auto corner = CornersOf(mesh, t);
+    const Point normal = AreaNormal(corner);
+    double gap_m = 0;  // the mean of a parabola that is zero at the corners
+    for (size_t c = 0; c < 3; ++c) {
+      gap_m += GapAt(given, index, corner[c], corner[(c + 1) % 3], normal) / 3;
+    }
+    for (const int32_t v : mesh.triangles[t]) {
+      const auto i = static_cast<size_t>(v);
+      for (size_t a = 0; a < 3; ++a) normals[i][a] += normal[a];
+      areas[i] += Norm(normal);
+      volumes[i] += Norm(normal) * gap_m;
+    }
+  }
+  for (size_t i = 0; i < mesh.vertices.size(); ++i) {
+    // Where the normals differ, a step along their mean sweeps less volume than the areas say.
+    const double swept = Norm(normals[i]);
+    if (swept > 0.5 * areas[i]) {
+      mesh.vertices[i] = Moved(mesh.vertices[i], normals[i], volumes[i] / swept);
+    }
+  }
+}
+
 }  // namespace
 
 std::vector<SurfacePlace> PlacesOn(const SurfaceMesh& given, const NearestTriangle& index,
@@ -103,9 +146,10 @@ absl::StatusOr<SurfaceLevel> MakeSurfaceLevel(const RadiatingSurface& given,
       for (size_t a = 0; a < 3; ++a) p[a] += places[v].weights[c] * corner[a];
     }
   }
-  SurfaceLevel level{.surface = MakeAcousticSurface(WithoutFlat(std::move(on_it), edge_m)),
-                     .near = {},
-                     .places = std::move(places)};
+  on_it = WithoutFlat(std::move(on_it), edge_m);
+  KeepVolume(given.mesh, index, on_it);
+  SurfaceLevel level{
+      .surface = MakeAcousticSurface(std::move(on_it)), .near = {}, .places = std::move(places)};
   level.near = MakeNearCorrection(level.surface, workers);
   return level;
 }

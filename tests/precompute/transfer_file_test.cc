@@ -153,6 +153,27 @@ TEST_F(TransferFileTest, KeepsThePowerOfEachModeInItsHarmonics) {
   }
 }
 
+TEST_F(TransferFileTest, HoldsTheMassOfTheBodyAndItsRigidMotions) {
+  Run("");
+  const StoredTransfer stored = ReadTransfer(folder + "/bar.modes.transfer");
+  const auto& body = stored.header.rigid_body();
+  EXPECT_NEAR(body.volume_m3() / (0.1 * 0.02 * 0.012), 1, 1e-4);
+  EXPECT_NEAR(body.center_of_mass_m().x(), 0.05, 1e-5);
+  EXPECT_NEAR(body.inertia_kg_m2(2) / (body.volume_m3() * (0.01 + 0.0004) / 12), 1, 1e-3);
+  const auto radii = stored.Values<float>("rigid_radii");
+  const auto strengths = stored.Values<float>("rigid_strengths");
+  ASSERT_EQ(radii.size(), 6U);
+  ASSERT_EQ(strengths.size(), 54U);
+  EXPECT_EQ(stored.Values<float>("rigid_power_integrals").size(),
+            6 * stored.Values<double>("rigid_wavenumbers").size());
+  // A thin bar moves more air across its broad side: a^3 s of the l = 1 harmonics along y and z.
+  const auto dipole = [&](size_t motion, size_t harmonic) {
+    return std::abs(std::pow(radii[motion], 3) * strengths[9 * motion + harmonic]);
+  };
+  EXPECT_GT(dipole(2, 2), dipole(1, 1));
+  EXPECT_GT(dipole(1, 1), dipole(0, 3));
+}
+
 TEST_F(TransferFileTest, SaysWhatItsBudgetLeftOut) {
   const Json report = Run("--transfer-budget 0.001");
   EXPECT_EQ(report.at("radiation").at("modes_computed"), 0);

@@ -7,17 +7,15 @@
 #include <cmath>
 #include <complex>
 #include <cstddef>
-#include <numbers>
 
-#include "precompute/mesh/point_math.h"
 #include "precompute/radiation/gmres.h"
+#include "tests/precompute/radiation/dense_equation.h"
 #include "tests/precompute/radiation/spheres.h"
 
 namespace carillon::precompute {
 namespace {
 
 using Complex = std::complex<double>;
-constexpr double kFourPi = 4 * std::numbers::pi;
 
 /// A squeezed sphere, so that nothing is symmetric.
 SurfaceMesh MakeEgg() {
@@ -25,93 +23,6 @@ SurfaceMesh MakeEgg() {
   for (Point& p : egg.vertices) p = {p[0], 0.6 * p[1] + 0.2 * p[0], 0.8 * p[2] * (1 + 0.2 * p[0])};
   return egg;
 }
-
-/// The left side of the equation as a matrix, added up in double without any of the kernels.
-class DenseEquation {
- public:
-  DenseEquation(const AcousticSurface& surface, const NearCorrection& near, double k, double radius)
-      : surface_(surface), near_(near), k_(k), eta_(0, 1 / std::max(k, 1 / radius)) {
-    const auto n = static_cast<Eigen::Index>(surface.vertex_count());
-    matrix = Eigen::MatrixXcd::Zero(n, n);
-    AddMass();
-    AddNear();
-    AddLumped();
-  }
-
-  Eigen::MatrixXcd matrix;
-
- private:
-  void AddMass() {
-    for (size_t t = 0; t < surface_.mesh.triangles.size(); ++t) {
-      const double weight = Norm(surface_.triangle_area_vectors[t]) / 24;
-      for (const int32_t a : surface_.mesh.triangles[t]) {
-        for (const int32_t b : surface_.mesh.triangles[t])
-          matrix(a, b) += weight * (a == b ? 2 : 1);
-      }
-    }
-  }
-
-  void AddNear() {
-    for (size_t v = 0; v < surface_.vertex_count(); ++v) {
-      for (auto e = static_cast<size_t>(near_.row_begin[v]);
-           e < static_cast<size_t>(near_.row_begin[v + 1]); ++e) {
-        const NearEntry& entry = near_.entries[e];
-        matrix(static_cast<Eigen::Index>(v), near_.columns[e]) +=
-            -static_cast<double>(entry.double_layer) +
-            eta_ * (entry.curls - k_ * k_ * static_cast<double>(entry.single_layer));
-      }
-    }
-  }
-
-  void AddLumped() {
-    const Eigen::Index n = matrix.rows();
-    Eigen::MatrixXcd green(n, n);
-    for (Eigen::Index i = 0; i < n; ++i) {
-      for (Eigen::Index j = 0; j < n; ++j) green(i, j) = AddPair(i, j);
-    }
-    for (const Eigen::MatrixXd& curl : CurlMatrices()) {
-      matrix += eta_ * curl.transpose() * green * curl;
-    }
-  }
-
-  /// Adds K and the normals' part of N, and returns G.
-  Complex AddPair(Eigen::Index i, Eigen::Index j) {
-    const auto a = static_cast<size_t>(i), b = static_cast<size_t>(j);
-    const Point e = Difference(surface_.mesh.vertices[b], surface_.mesh.vertices[a]);
-    const double r = Norm(e);
-    const Complex ik(0, k_);
-    const Complex green = i == j ? ik / kFourPi : std::exp(ik * r) / (kFourPi * r);
-    if (i != j) {
-      matrix(i, j) -=
-          surface_.areas[a] * Dot(surface_.area_vectors[b], e) / r * green * (ik - 1 / r);
-    }
-    matrix(i, j) -=
-        eta_ * k_ * k_ * Dot(surface_.area_vectors[a], surface_.area_vectors[b]) * green;
-    return green;
-  }
-
-  /// Of each component: from the values at the vertices to their lumped curls.
-  std::array<Eigen::MatrixXd, 3> CurlMatrices() const {
-    std::array<Eigen::MatrixXd, 3> curls;
-    for (auto& curl : curls) curl = Eigen::MatrixXd::Zero(matrix.rows(), matrix.cols());
-    for (size_t t = 0; t < surface_.mesh.triangles.size(); ++t) {
-      const auto& corner = surface_.mesh.triangles[t];
-      for (size_t c = 0; c < 3; ++c) {
-        const Point hat = CurlOfHat(surface_, t, c);
-        const double weight = Norm(surface_.triangle_area_vectors[t]) / 3;
-        for (const int32_t at : corner) {
-          for (size_t a = 0; a < 3; ++a) curls[a](at, corner[c]) += weight * hat[a];
-        }
-      }
-    }
-    return curls;
-  }
-
-  const AcousticSurface& surface_;
-  const NearCorrection& near_;
-  double k_;
-  Complex eta_;
-};
 
 std::vector<ComplexFloat> RandomPressure(Eigen::Index n, unsigned seed) {
   std::srand(seed);
@@ -128,18 +39,18 @@ struct BoundaryOperatorTest : ::testing::TestWithParam<double> {
   Workers workers{2};
   AcousticSurface surface = MakeAcousticSurface(MakeEgg());
   NearCorrection near = MakeNearCorrection(surface, workers);
-  DenseEquation dense{surface, near, GetParam(), 1};
+  Eigen::MatrixXcd dense = AssembleDense(surface, near, GetParam(), 1);
   BoundaryOperator sweeps{surface, near, {0.1, 0, 0}, 1, GetParam()};
 };
 
 TEST_P(BoundaryOperatorTest, IsTheAssembledMatrixToSinglePrecision) {
-  const std::vector<std::vector<ComplexFloat>> pressures = {RandomPressure(dense.matrix.rows(), 1),
-                                                            RandomPressure(dense.matrix.rows(), 2)};
+  const std::vector<std::vector<ComplexFloat>> pressures = {RandomPressure(dense.rows(), 1),
+                                                            RandomPressure(dense.rows(), 2)};
   for (const size_t sides : {1U, 2U}) {
     std::vector<std::vector<ComplexFloat>> results(sides);
     sweeps.Apply(std::span(pressures).first(sides), results, workers);
     for (size_t s = 0; s < sides; ++s) {
-      const Eigen::VectorXcd exact = dense.matrix * ToEigen(pressures[s]);
+      const Eigen::VectorXcd exact = dense * ToEigen(pressures[s]);
       EXPECT_LT((ToEigen(results[s]) - exact).norm(), 1e-6 * exact.norm()) << "side " << s;
     }
   }
@@ -151,7 +62,7 @@ TEST_P(BoundaryOperatorTest, GmresFindsTheSolutionOfTheDenseFactorization) {
   const auto solution =
       SolveGmres([&](auto inputs, auto results) { sweeps.Apply(inputs, results, workers); },
                  sweeps.Diagonal(), right_sides, {}, {.tolerance = 2e-3});
-  const Eigen::VectorXcd exact = dense.matrix.partialPivLu().solve(ToEigen(right_sides[0]));
+  const Eigen::VectorXcd exact = dense.partialPivLu().solve(ToEigen(right_sides[0]));
   EXPECT_LT((ToEigen(solution[0].x) - exact).norm(), 0.01 * exact.norm());
   EXPECT_LT(solution[0].iterations, 20);
 }

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "precompute/radiation/mode_solver.h"
+
+namespace carillon::precompute {
+
+/// Modes solved together, and the best that is known of them so far.
+struct ModeGroup {
+  std::vector<size_t> modes;  ///< one or two
+  double wavenumber = 0;
+  double loudness = 0;  ///< by what is known of it; only its order counts
+  int first_level = 0;
+  int solved_count = 0;           ///< levels from the first on that it was solved on
+  std::vector<ModeField> fields;  ///< of the finest of them
+  double error_db = 0;            ///< the worst of its modes; an error of directions counts a third
+
+  int next_level() const { return first_level + solved_count; }
+};
+
+/// The modes whose wavenumbers lie between the bounds. Neighbours with almost the same wavenumber,
+/// such as a degenerate pair, make one group.
+std::vector<ModeGroup> GroupModes(std::span<const double> wavenumbers, double least,
+                                  double greatest);
+
+/// Low modes first, which need the coarsest surfaces and ring longest; among those of one surface
+/// the loudest, as far as that is known.
+void SortByNeed(std::vector<ModeGroup>& groups);
+
+}  // namespace carillon::precompute

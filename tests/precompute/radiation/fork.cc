@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "tests/precompute/radiation/fork.h"
+
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+
+#include "precompute/mesh/point_math.h"
+#include "tests/precompute/test_meshes.h"
+
+namespace carillon::precompute {
+namespace {
+
+/// A bar about the x axis with tines' thickness, turned to lie along z.
+SurfaceMesh MakeTine() {
+  constexpr double kThicknessM = 0.0055;
+  SurfaceMesh tine = MakeRodSurface(kThicknessM / 2, Fork::kLengthM, 10, 40);
+  for (Point& p : tine.vertices) p = {p[1], p[2], p[0]};
+  return tine;
+}
+
+}  // namespace
+
+Fork MakeFork() {
+  constexpr double kBetweenM = 0.018;  // middle to middle
+  Fork fork;
+  AddShell(fork.mesh, MakeTine(), {kBetweenM / 2, 0, 0});
+  AddShell(fork.mesh, MakeTine(), {-kBetweenM / 2, 0, 0});
+  for (const Point& p : fork.mesh.vertices) {
+    const double up = std::pow(p[2] / Fork::kLengthM, 2);
+    fork.motion.push_back({static_cast<float>(std::copysign(up, p[0])), 0, 0});
+  }
+  return fork;
+}
+
+std::complex<double> PressureAt(const Point& place, const AcousticSurface& surface,
+                                double wavenumber, std::span<const ComplexFloat> p,
+                                const Displacement& motion) {
+  std::complex<double> sum = 0;
+  const std::complex<double> ik(0, wavenumber);
+  for (size_t v = 0; v < surface.vertex_count(); ++v) {
+    const Point e = Difference(surface.mesh.vertices[v], place);
+    const double r = Norm(e);
+    const std::complex<double> green = std::exp(ik * r) / (4 * std::numbers::pi * r);
+    const Point& n = surface.area_vectors[v];
+    const double q = n[0] * motion[v][0] + n[1] * motion[v][1] + n[2] * motion[v][2];
+    sum += std::complex<double>(p[v]) * green * (ik - 1 / r) * (Dot(n, e) / r) - green * q;
+  }
+  return sum;
+}
+
+}  // namespace carillon::precompute

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "precompute/radiation/surface_level.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "precompute/mesh/point_math.h"
+#include "tests/precompute/radiation/spheres.h"
+#include "tests/precompute/test_meshes.h"
+
+namespace carillon::precompute {
+namespace {
+
+double VolumeOf(const SurfaceMesh& mesh) {
+  double volume = 0;
+  for (size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const auto [a, b, c] = CornersOf(mesh, t);
+    volume -= TetVolume(a, b, c, {0, 0, 0});
+  }
+  return volume;
+}
+
+SurfaceLevel MakeLevel(const SurfaceMesh& mesh, double edge_m) {
+  RadiatingSurface body;
+  body.mesh = mesh;
+  body.radius_m = 1;
+  Workers workers(2);
+  absl::StatusOr<SurfaceLevel> level =
+      MakeSurfaceLevel(body, NearestTriangle(mesh), edge_m, workers);
+  EXPECT_TRUE(level.ok()) << level.status();
+  return *std::move(level);
+}
+
+// Triangles of 0.3 between places on an ellipsoid cut off 3 % of its volume.
+TEST(SurfaceLevel, KeepsTheVolumeOfACurvedBody) {
+  SurfaceMesh mesh = MakeIcosphere(1, 5);
+  for (Point& p : mesh.vertices) p = {p[0], 0.6 * p[1], 0.8 * p[2]};
+  const SurfaceLevel level = MakeLevel(mesh, 0.3);
+  EXPECT_LT(level.surface.vertex_count(), 300U);
+  EXPECT_NEAR(VolumeOf(level.surface.mesh) / VolumeOf(mesh), 1, 0.004);
+}
+
+TEST(SurfaceLevel, LeavesAFlatBodyAsItIs) {
+  const SurfaceMesh mesh = MakeBoxSurface({1, 0.6, 0.4});
+  const SurfaceLevel level = MakeLevel(mesh, 0.1);
+  for (const Point& p : level.surface.mesh.vertices) {
+    const double inside = std::min({p[0], 1 - p[0], p[1], 0.6 - p[1], p[2], 0.4 - p[2]});
+    EXPECT_LT(std::abs(inside), 0.02);
+  }
+}
+
+}  // namespace
+}  // namespace carillon::precompute
