@@ -113,7 +113,8 @@ absl::Status UpdateModel(const client::Client& daemon, const std::string& text,
 absl::Status ExportModel(const client::Client& daemon, const ExportOptions& options);
 absl::Status ImportModel(const client::Client& daemon, const ImportOptions& options, bool json);
 absl::Status ShowDatabaseStats(const client::Client& daemon, bool json);
-absl::Status CollectGarbage(const client::Client& daemon, uint64_t budget_mib, bool json);
+absl::Status CollectGarbage(const client::Client& daemon, const v1::CollectGarbageRequest& request,
+                            bool json);
 /// Shows the model that `text` means: a name, a label or the first digits of a digest. If `figures`
 /// name a material, shows the frequencies and decay rates of the modes too.
 absl::Status ShowModel(const client::Client& daemon, const std::string& text,

@@ -44,14 +44,16 @@ absl::Status ShowDatabaseStats(const client::Client& daemon, bool json) {
   return absl::OkStatus();
 }
 
-absl::Status CollectGarbage(const client::Client& daemon, uint64_t budget_mib, bool json) {
-  const auto collected = daemon.CollectGarbage(budget_mib << 20U);
+absl::Status CollectGarbage(const client::Client& daemon, const v1::CollectGarbageRequest& request,
+                            bool json) {
+  const auto collected = daemon.CollectGarbage(request);
   if (!collected.ok()) return collected.status();
   if (json) {
     PrintJson(*collected);
   } else {
-    absl::PrintF("%d models deleted, %.1f MiB; %d meshes without a model or job, %.1f MiB\n",
-                 collected->deleted_count(), static_cast<double>(collected->deleted_bytes()) / kMib,
+    absl::PrintF("%d models %sdeleted, %.1f MiB; %d meshes without a model or job, %.1f MiB\n",
+                 collected->deleted_count(), request.dry_run() ? "would be " : "",
+                 static_cast<double>(collected->deleted_bytes()) / kMib,
                  collected->deleted_mesh_count(),
                  static_cast<double>(collected->deleted_mesh_bytes()) / kMib);
   }

@@ -47,12 +47,23 @@ void AddDatabase(CLI::App& app, Program& program) {
   });
   CLI::App& collect =
       *db.add_subcommand("collect", "Delete the models that sounded least recently");
-  collect
+  auto delete_unpinned = std::make_shared<bool>(false);
+  auto dry_run = std::make_shared<bool>(false);
+  CLI::Option_group& budget = *collect.add_option_group("budget");
+  budget
       .add_option("--budget-mib", *budget_mib, "The size that the remaining models may have, MiB")
-      ->required();
-  collect.callback([&program, budget_mib] {
-    program.command = [&program, budget_mib] {
-      return CollectGarbage(*program.Daemon(), *budget_mib, program.json);
+      ->check(CLI::Range(uint64_t{1}, uint64_t{1} << 40U));
+  budget.add_flag("--delete-unpinned", *delete_unpinned,
+                  "Delete every model that is neither pinned nor sounding");
+  budget.require_option(1);
+  collect.add_flag("--dry-run", *dry_run, "Only say what would be deleted");
+  collect.callback([&program, budget_mib, delete_unpinned, dry_run] {
+    program.command = [&program, budget_mib, delete_unpinned, dry_run] {
+      v1::CollectGarbageRequest request;
+      request.set_budget_bytes(*budget_mib << 20U);
+      request.set_delete_unpinned(*delete_unpinned);
+      request.set_dry_run(*dry_run);
+      return CollectGarbage(*program.Daemon(), request, program.json);
     };
   });
 }

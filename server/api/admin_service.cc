@@ -114,10 +114,17 @@ grpc::ServerUnaryReactor* AdminService::CollectGarbage(grpc::CallbackServerConte
                                                        v1::CollectGarbageResponse* response) {
   return Answer(context, pool_, [this, context, request, response] {
     RETURN_IF_ERROR(Authorize(*context));
-    ASSIGN_OR_RETURN(const Collected models, database_.models().Collect(request->budget_bytes()));
+    if ((request->budget_bytes() == 0) != request->delete_unpinned()) {
+      return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_BUDGET",
+                     "set either budget_bytes above zero, or delete_unpinned to delete every model "
+                     "that is neither pinned nor sounding");
+    }
+    ASSIGN_OR_RETURN(
+        const Collected models,
+        database_.models().Collect(request->budget_bytes(), {.dry_run = request->dry_run()}));
     response->set_deleted_count(models.model_count);
     response->set_deleted_bytes(models.bytes);
-    ASSIGN_OR_RETURN(const CollectedMeshes meshes, database_.meshes().Collect());
+    ASSIGN_OR_RETURN(const CollectedMeshes meshes, database_.meshes().Collect(request->dry_run()));
     response->set_deleted_mesh_count(meshes.mesh_count);
     response->set_deleted_mesh_bytes(meshes.bytes);
     return absl::OkStatus();

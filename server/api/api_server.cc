@@ -16,6 +16,7 @@
 #include "proto/cpp/status_macros.h"
 #include "server/api/admin_service.h"
 #include "server/api/audio_service.h"
+#include "server/api/connection_gate.h"
 #include "server/api/contact_service.h"
 #include "server/api/decomposition_service.h"
 #include "server/api/job_run_service.h"
@@ -33,6 +34,17 @@ constexpr int kRenderThreadCount = 2;
 constexpr int kRenderNiceness = 10;
 constexpr size_t kShortestToken = 16;
 constexpr std::chrono::milliseconds kGracePeriod(500);
+/// Further calls wait in the client until one has ended.
+constexpr int kMaxCallsOfConnection = 256;
+/// Time in which a new connection must have sent its HTTP/2 settings, and with TLS its handshake.
+constexpr int kHandshakeLimit_ms = 5'000;
+/// A connection without traffic is asked after the first time whether its client lives, and closed
+/// after the second.
+constexpr int kKeepalive_ms = 30'000;
+constexpr int kKeepaliveAnswer_ms = 10'000;
+constexpr int kMaxMetadataBytes = 16 << 10;
+/// Memory of all connections; beyond it gRPC refuses calls and connections.
+constexpr size_t kClientMemoryBytes = size_t{512} << 20U;
 
 absl::Status Unready(absl::string_view reason, absl::string_view message) {
   return Refusal(absl::StatusCode::kFailedPrecondition, reason, message);
@@ -86,6 +98,34 @@ absl::StatusOr<std::deque<ListenAddress>> ParseAddresses(const ApiSettings& sett
   return addresses;
 }
 
+/// Hands connections to gRPC.
+class GrpcTaker final : public ConnectionTaker {
+ public:
+  using Acceptor = grpc::experimental::ExternalConnectionAcceptor;
+  explicit GrpcTaker(std::unique_ptr<Acceptor> acceptor) : acceptor_(std::move(acceptor)) {}
+
+  void Take(int connection) override {
+    Acceptor::NewConnectionParameters parameters;
+    parameters.fd = connection;
+    acceptor_->HandleNewConnection(&parameters);
+  }
+
+ private:
+  const std::unique_ptr<Acceptor> acceptor_;
+};
+
+/// Bounds what one connection, and all together, can take.
+void LimitClients(grpc::ServerBuilder& builder) {
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, kMaxCallsOfConnection);
+  builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, kHandshakeLimit_ms);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepalive_ms);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveAnswer_ms);
+  builder.AddChannelArgument(GRPC_ARG_MAX_METADATA_SIZE, kMaxMetadataBytes);
+  grpc::ResourceQuota quota("clients");
+  quota.Resize(kClientMemoryBytes);
+  builder.SetResourceQuota(quota);
+}
+
 }  // namespace
 
 struct ApiServer::State {
@@ -115,6 +155,7 @@ struct ApiServer::State {
   AudioService audio;
   LiveOutput& output;
   std::unique_ptr<grpc::Server> server;
+  ConnectionGate gate{RaiseConnectionLimit()};
   std::vector<std::string> addresses;
 };
 
@@ -123,15 +164,12 @@ absl::Status ApiServer::State::Listen(const ApiSettings& settings) {
   ASSIGN_OR_RETURN(const std::shared_ptr<grpc::ServerCredentials> tcp_credentials,
                    TcpCredentials(settings));
   grpc::ServerBuilder builder;
-  // With SO_REUSEPORT a second daemon would share the port, and each would get half of the calls.
-  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
+  LimitClients(builder);
   for (ListenAddress& address : parsed) {
-    if (address.is_unix()) {
-      RETURN_IF_ERROR(PrepareSocket(address.socket_path));
-      builder.AddListeningPort(address.ToString(), grpc::InsecureServerCredentials());
-    } else {
-      builder.AddListeningPort(address.ToString(), tcp_credentials, &address.port);
-    }
+    auto acceptor = builder.experimental().AddExternalConnectionAcceptor(
+        grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD,
+        address.is_unix() ? grpc::InsecureServerCredentials() : tcp_credentials);
+    RETURN_IF_ERROR(gate.Listen(address, std::make_unique<GrpcTaker>(std::move(acceptor))));
   }
   for (grpc::Service* service : std::initializer_list<grpc::Service*>{
            &admin, &models, &decompositions, &job_runs, &scenes, &contacts, &audio}) {
@@ -140,9 +178,9 @@ absl::Status ApiServer::State::Listen(const ApiSettings& settings) {
   server = builder.BuildAndStart();
   if (!server) {
     return Unready("LISTEN_FAILED",
-                   "cannot listen: an address is in use, not this machine's, or the TLS files do "
-                   "not belong together; see the line before");
+                   "cannot serve: the TLS files do not belong together; see the line before");
   }
+  gate.Open();
   for (const ListenAddress& address : parsed) addresses.push_back(address.ToString());
   return absl::OkStatus();
 }

@@ -16,6 +16,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/strip.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon {
 namespace {
@@ -55,6 +56,24 @@ bool IsServed(const std::string& path) {
   return served;
 }
 
+/// The mode of a socket in a folder.
+absl::StatusOr<mode_t> SocketMode(const std::filesystem::path& folder) {
+  struct stat status {};
+  if (stat(folder.c_str(), &status) != 0) {
+    return Refusal(absl::StatusCode::kFailedPrecondition, "LISTEN_FAILED",
+                   absl::StrCat("cannot read the folder \"", folder.string(),
+                                "\": ", std::generic_category().message(errno)));
+  }
+  const bool own = status.st_uid == geteuid() || status.st_uid == 0;
+  const bool replaceable = (status.st_mode & 0022U) != 0 && (status.st_mode & S_ISVTX) == 0;
+  if (own && !replaceable) return (status.st_mode & 0017U) == 0010U ? 0660 : 0600;
+  return Refusal(absl::StatusCode::kFailedPrecondition, "SOCKET_FOLDER_UNSAFE",
+                 absl::StrCat("other users could put a socket of theirs into \"", folder.string(),
+                              own ? "\", which they may write to" : "\", which one of them owns",
+                              ": name a folder of your own with --listen unix:PATH, or remove this "
+                              "one"));
+}
+
 }  // namespace
 
 bool ListenAddress::is_local() const {
@@ -77,7 +96,7 @@ absl::StatusOr<ListenAddress> ParseListenAddress(absl::string_view text) {
   return address;
 }
 
-absl::Status PrepareSocket(const std::string& path) {
+absl::StatusOr<mode_t> PrepareSocket(const std::string& path) {
   const std::filesystem::path folder = std::filesystem::absolute(path).parent_path();
   std::error_code error;
   std::filesystem::create_directories(folder.parent_path(), error);
@@ -86,12 +105,14 @@ absl::Status PrepareSocket(const std::string& path) {
                    absl::StrCat("cannot make the folder \"", folder.string(),
                                 "\": ", std::generic_category().message(errno)));
   }
+  ASSIGN_OR_RETURN(const mode_t mode, SocketMode(folder));
   if (IsServed(path)) {
     return Refusal(absl::StatusCode::kFailedPrecondition, "ADDRESS_IN_USE",
                    absl::StrCat("a daemon serves unix:", path,
                                 " already; stop it or choose another --listen"));
   }
-  return absl::OkStatus();
+  std::filesystem::remove(path, error);  // a daemon that was killed leaves its socket
+  return mode;
 }
 
 }  // namespace carillon

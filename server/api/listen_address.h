@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <sys/types.h>
+
 #include <string>
 
 #include "absl/status/statusor.h"
@@ -26,8 +28,11 @@ struct ListenAddress {
 /// Errors: InvalidArgument (INVALID_ADDRESS).
 absl::StatusOr<ListenAddress> ParseListenAddress(absl::string_view text);
 
-/// Makes the folder of a Unix socket, for its owner only, and checks that no running daemon serves
-/// the socket. Errors: FailedPrecondition (LISTEN_FAILED, ADDRESS_IN_USE).
-absl::Status PrepareSocket(const std::string& path);
+/// Makes the folder of a Unix socket, for its owner only, unless it exists; removes a socket that
+/// no running daemon serves; and returns the mode that the new socket is to have: 0660 where only a
+/// group may enter the folder, else 0600. Errors: FailedPrecondition (LISTEN_FAILED,
+/// ADDRESS_IN_USE, SOCKET_FOLDER_UNSAFE: another user owns the folder, or could replace the socket
+/// in it).
+absl::StatusOr<mode_t> PrepareSocket(const std::string& path);
 
 }  // namespace carillon

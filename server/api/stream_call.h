@@ -9,6 +9,8 @@
 #include "absl/base/thread_annotations.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "proto/cpp/error_reason.h"
+#include "server/api/exception_barrier.h"
 #include "server/api/status_conversion.h"
 #include "server/api/thread_pool.h"
 #include "server/base/mutex.h"
@@ -48,7 +50,10 @@ template <typename Reactor, typename Request>
 class StreamReader : public Reactor {
  public:
   void OnReadDone(bool ok) final {
-    this->Run([this, ok] { ok ? TakeRequest() : AllRead(); });
+    this->Run([this, ok] {
+      const absl::Status status = WithoutExceptions([&] { return ok ? TakeRequest() : TakeEnd(); });
+      if (!status.ok()) Refuse(status);
+    });
   }
 
  protected:
@@ -63,12 +68,34 @@ class StreamReader : public Reactor {
   virtual void Refuse(const absl::Status& status) { this->End(status); }
 
   /// The constructor of a call ends with it.
-  void StartReading() { this->StartRead(&request_); }
+  void StartReading() { ReadNext(); }
 
  private:
-  void TakeRequest() {
-    if (const absl::Status status = Take(request_); !status.ok()) return Refuse(status);
+  /// No field on the wire can have this number.
+  static constexpr int kUnread = 0;
+
+  void ReadNext() {
+    request_.GetReflection()->MutableUnknownFields(&request_)->AddVarint(kUnread, 0);
     this->StartRead(&request_);
+  }
+
+  absl::Status TakeRequest() {
+    absl::Status status = Take(request_);
+    if (status.ok()) ReadNext();
+    return status;
+  }
+
+  /// gRPC reports a message that it cannot parse as the end of the requests. But parsing clears the
+  /// request first, and with it the mark of ReadNext.
+  absl::Status TakeEnd() {
+    const auto& unknown = request_.GetReflection()->GetUnknownFields(request_);
+    if (unknown.empty() || unknown.field(unknown.field_count() - 1).number() != kUnread) {
+      return Refusal(absl::StatusCode::kInvalidArgument, "REQUEST_MALFORMED",
+                     "a message of the stream cannot be parsed: send messages of the type that the "
+                     "contract names");
+    }
+    AllRead();
+    return absl::OkStatus();
   }
 
   Request request_;
@@ -139,7 +166,7 @@ class StreamWriter : public Reactor {
     absl::StatusOr<Supply> supply = Supply::kLater;
     do {
       if (IsCancelled()) return this->End(Cancelled());
-      supply = Fill(response_);
+      supply = WithoutExceptions([this] { return Fill(response_); });
     } while (supply.ok() && *supply == Supply::kLater && !GiveBackTurn());
     if (!supply.ok()) return this->End(supply.status());
     if (*supply == Supply::kEnd) return this->End(absl::OkStatus());

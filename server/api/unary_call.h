@@ -5,6 +5,7 @@
 
 #include <utility>
 
+#include "server/api/exception_barrier.h"
 #include "server/api/status_conversion.h"
 #include "server/api/thread_pool.h"
 
@@ -17,7 +18,9 @@ template <typename Work>
 grpc::ServerUnaryReactor* Answer(grpc::CallbackServerContext* context, ThreadPool& pool,
                                  Work work) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  pool.Run([reactor, work = std::move(work)] { reactor->Finish(ToGrpcStatus(work())); });
+  pool.Run([reactor, work = std::move(work)] {
+    reactor->Finish(ToGrpcStatus(WithoutExceptions(work)));
+  });
   return reactor;
 }
 

@@ -187,7 +187,7 @@ absl::Status MeshStore::WriteFile(const std::string& digest, const std::filesyst
                               " has changed on the disk: upload it again, and check the disk"));
 }
 
-absl::StatusOr<CollectedMeshes> MeshStore::Collect() {
+absl::StatusOr<CollectedMeshes> MeshStore::Collect(bool dry_run) {
   const int64_t before =
       clock_->UnixMs() - std::chrono::milliseconds(MeshStore::kUnusedLife).count();
   CollectedMeshes collected;
@@ -202,7 +202,8 @@ absl::StatusOr<CollectedMeshes> MeshStore::Collect() {
     if (!done.ok() || unused.empty()) return done;
     done = ForEachReference(connection, [&](const std::string& mesh) { unused.erase(mesh); });
     for (const auto& [digest, bytes] : unused) {
-      if (done.ok()) done = connection.Run("DELETE FROM meshes WHERE digest = ?", {digest});
+      if (done.ok() && !dry_run)
+        done = connection.Run("DELETE FROM meshes WHERE digest = ?", {digest});
       collected = {collected.mesh_count + 1, collected.bytes + bytes};
     }
     return done;

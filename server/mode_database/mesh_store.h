@@ -76,8 +76,9 @@ class MeshStore {
   /// digest; it is deleted, so that it can be stored anew).
   absl::Status WriteFile(const std::string& digest, const std::filesystem::path& file);
 
-  /// Deletes meshes that no model and no job refers to, a day after their last upload.
-  absl::StatusOr<CollectedMeshes> Collect();
+  /// Deletes meshes that no model and no job refers to, a day after their last upload; a dry run
+  /// only counts them.
+  absl::StatusOr<CollectedMeshes> Collect(bool dry_run = false);
 
  private:
   Database* database_;

@@ -16,6 +16,7 @@
 #include "server/mode_database/model_rows.h"
 #include "server/mode_database/page_token.h"
 #include "server/mode_database/spool_file.h"
+#include "server/mode_database/whole_letters.h"
 
 namespace carillon {
 namespace {
@@ -43,7 +44,7 @@ absl::Status CheckTag(const std::string& tag) {
 ModelSummary Named(const std::string& digest, const std::string& label) {
   ModelSummary summary;
   summary.digest = digest;
-  summary.label = label.substr(0, kMaxLabelBytes);
+  summary.label = WholeLetters(label, kMaxLabelBytes);
   return summary;
 }
 
@@ -52,7 +53,7 @@ absl::Status Apply(SqliteConnection& connection, const std::string& digest,
   absl::Status status;
   if (change.label.has_value()) {
     status = connection.Run("UPDATE models SET label = ? WHERE digest = ?",
-                            {change.label->substr(0, kMaxLabelBytes), digest});
+                            {WholeLetters(*change.label, kMaxLabelBytes), digest});
   }
   if (status.ok() && change.pinned.has_value()) {
     status = connection.Run("UPDATE models SET pinned = ? WHERE digest = ?",
@@ -159,7 +160,7 @@ absl::StatusOr<ModelSummary> ModelStore::Store(ModelFileReader records, ModelSum
       [&](SqliteConnection& connection) { return InsertModel(connection, records, summary); });
   if (!status.ok()) return status;
   if (budget_.bytes == 0) return summary;
-  const absl::StatusOr<Collected> collected = Collect(budget_.bytes, summary.digest);
+  const absl::StatusOr<Collected> collected = Collect(budget_.bytes, {.spared = summary.digest});
   if (!collected.ok()) {
     budget_.log(std::string(collected.status().message()));
   } else if (collected->model_count > 0) {
@@ -183,7 +184,7 @@ absl::Status ModelStore::CopyIfAbsent(const std::string& from, const std::string
     ASSIGN_OR_RETURN(ModelSummary summary, SelectModel(connection, from));
     const absl::StatusOr<ModelSummary> there = SelectModel(connection, to);
     if (!absl::IsNotFound(there.status())) return there.status();
-    summary.label = label.substr(0, kMaxLabelBytes);
+    summary.label = WholeLetters(label, kMaxLabelBytes);
     summary.created_unix_ms = clock_->UnixMs();
     return InsertCopy(connection, to, summary);
   });
@@ -306,7 +307,8 @@ absl::Status ModelStore::WriteSounded(SqliteConnection& connection) {
   return status;
 }
 
-absl::StatusOr<Collected> ModelStore::Collect(uint64_t budget_bytes, const std::string& spared) {
+absl::StatusOr<Collected> ModelStore::Collect(uint64_t budget_bytes,
+                                              const CollectSettings& settings) {
   struct Candidate {
     std::string digest;
     uint64_t bytes = 0;
@@ -328,7 +330,7 @@ absl::StatusOr<Collected> ModelStore::Collect(uint64_t budget_bytes, const std::
               const auto bytes = static_cast<uint64_t>(row.Int(1));
               const auto cached = cache_.find(row.Text(0));
               const bool in_memory = cached != cache_.end() && !cached->second.model.expired();
-              const bool stays = row.Int(2) != 0 || in_memory || row.Text(0) == spared;
+              const bool stays = row.Int(2) != 0 || in_memory || row.Text(0) == settings.spared;
               oldest_first.push_back({row.Text(0), bytes, stays});
               total_bytes += bytes;
               return absl::OkStatus();
@@ -336,7 +338,7 @@ absl::StatusOr<Collected> ModelStore::Collect(uint64_t budget_bytes, const std::
         for (const Candidate& model : oldest_first) {
           if (!written.ok() || total_bytes <= budget_bytes) break;
           if (model.stays) continue;
-          written = DeleteModelRows(connection, model.digest);
+          if (!settings.dry_run) written = DeleteModelRows(connection, model.digest);
           total_bytes -= model.bytes;
           collected = {collected.model_count + 1, collected.bytes + model.bytes};
         }

@@ -66,6 +66,13 @@ struct Collected {
   uint64_t bytes = 0;
 };
 
+/// How garbage is collected.
+struct CollectSettings {
+  /// Digest of a model that was just stored: it stays until something newer needs the room.
+  std::string spared{};
+  bool dry_run = false;  ///< only counts what would be deleted
+};
+
 /// Room for stored models.
 struct ModelBudget {
   uint64_t bytes = 0;  ///< of all their arrays; 0: no limit
@@ -188,8 +195,8 @@ class ModelStore {
 
   /// Deletes models with their jobs, least recently sounded (or, never sounded, stored) first,
   /// until the arrays of those left fit into `budget_bytes`. Pinned ones and those in memory stay,
-  /// and `spared`: a model that was just stored, until something newer needs the room.
-  absl::StatusOr<Collected> Collect(uint64_t budget_bytes, const std::string& spared = "");
+  /// and the spared one.
+  absl::StatusOr<Collected> Collect(uint64_t budget_bytes, const CollectSettings& settings = {});
 
  private:
   friend class ModelExport;

@@ -20,8 +20,9 @@ class Daemon:
     """carillond on a Unix socket within `folder`, without a sound device and without transfers, which would change
     the levels of what sounds, unless `arguments` ask for them."""
 
-    def __init__(self, folder, *arguments, environment=None):
+    def __init__(self, folder, *arguments, environment=None, prefix=()):
         self.environment = environment
+        self.prefix = prefix
         self.folder = pathlib.Path(folder)
         self.arguments = [str(argument) for argument in arguments]
         self.server = f"unix:{self.folder}/socket"
@@ -32,7 +33,7 @@ class Daemon:
         """Returns once it listens."""
         with open(self.folder / "log", "ab") as log:
             self.process = subprocess.Popen(
-                [BIN / "carillond", "--data-dir", self.folder / "data", "--listen", self.server,
+                [*self.prefix, BIN / "carillond", "--data-dir", self.folder / "data", "--listen", self.server,
                  *([] if "--audio-device" in self.arguments else ["--audio-device", "null"]),
                  *([] if "--transfers" in self.arguments else ["--no-transfers"]), *self.arguments],
                 stdout=subprocess.PIPE, stderr=log, text=True, env=self.environment)

@@ -201,7 +201,8 @@ absl::Status Client::BackUpDatabase(const std::string&) const {
   return NotOverridden("BackUpDatabase");
 }
 
-absl::StatusOr<v1::CollectGarbageResponse> Client::CollectGarbage(uint64_t) const {
+absl::StatusOr<v1::CollectGarbageResponse> Client::CollectGarbage(
+    const v1::CollectGarbageRequest&) const {
   return NotOverridden("CollectGarbage");
 }
 

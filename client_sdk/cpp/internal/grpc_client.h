@@ -77,7 +77,8 @@ class GrpcClient final : public Client {
 
   absl::StatusOr<v1::GetDatabaseStatsResponse> GetDatabaseStats() const override;
   absl::Status BackUpDatabase(const std::string& file) const override;
-  absl::StatusOr<v1::CollectGarbageResponse> CollectGarbage(uint64_t budget_bytes) const override;
+  absl::StatusOr<v1::CollectGarbageResponse> CollectGarbage(
+      const v1::CollectGarbageRequest& request) const override;
 
  private:
   struct Stubs {

@@ -87,12 +87,11 @@ absl::Status GrpcClient::BackUpDatabase(const std::string& file) const {
   return status;
 }
 
-absl::StatusOr<v1::CollectGarbageResponse> GrpcClient::CollectGarbage(uint64_t budget_bytes) const {
+absl::StatusOr<v1::CollectGarbageResponse> GrpcClient::CollectGarbage(
+    const v1::CollectGarbageRequest& request) const {
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() + kCallTimeout);
   Authorize(context, stubs_->admin_token);
-  v1::CollectGarbageRequest request;
-  request.set_budget_bytes(budget_bytes);
   v1::CollectGarbageResponse response;
   const absl::Status status =
       FromRpc(stubs_->admin.CollectGarbage(&context, request, &response), stubs_->server);

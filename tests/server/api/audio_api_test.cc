@@ -389,7 +389,7 @@ TEST_F(AudioApi, TheMixerSaysHowItPlays) {
 }
 
 TEST_F(AudioApi, ASecondDaemonOnTheSameSocketIsRefused) {
-  EXPECT_THAT(PrepareSocket(address().substr(5)).ToString(),
+  EXPECT_THAT(PrepareSocket(address().substr(5)).status().ToString(),
               testing::HasSubstr("ADDRESS_IN_USE: "));
 }
 

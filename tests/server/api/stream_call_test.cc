@@ -2,9 +2,11 @@
 #include "server/api/stream_call.h"
 
 #include <gmock/gmock.h>
+#include <google/protobuf/wrappers.pb.h>
 #include <gtest/gtest.h>
 
 #include <functional>
+#include <new>
 #include <string>
 #include <vector>
 
@@ -12,6 +14,8 @@ namespace carillon {
 namespace {
 
 using ::testing::ElementsAre;
+
+using Number = google::protobuf::Int32Value;
 
 /// Stands for gRPC's reactor, and records what it is asked to do.
 class RecordingReactor {
@@ -22,11 +26,21 @@ class RecordingReactor {
   virtual void OnWriteDone(bool) {}
   virtual void OnCancel() {}
 
-  void StartRead(int* request) { *request = ++read_count; }
+  void StartRead(Number* request) {
+    ++read_count;
+    reading = request;
+  }
   void StartWrite(const std::string* response) { written.push_back(*response); }
   void Finish(const grpc::Status& status) { ends.push_back(status.error_code()); }
 
+  /// Parses the next message, as gRPC does before OnReadDone.
+  void Parse(bool well_formed) {
+    reading->Clear();
+    if (well_formed) reading->set_value(read_count);
+  }
+
   int read_count = 0;
+  Number* reading = nullptr;
   std::vector<std::string> written;
   std::vector<grpc::StatusCode> ends;
 };
@@ -134,16 +148,23 @@ TEST(StreamWriter, EndsWhereItIsCancelledWhileItFindsNothing) {
 }
 
 /// Takes numbers up to 2.
-class NumberCall final : public StreamReader<StreamCall<RecordingReactor>, int> {
+class NumberCall final : public StreamReader<StreamCall<RecordingReactor>, Number> {
  public:
   NumberCall() : StreamReader(nullptr) { StartReading(); }
   std::vector<int> taken;
   bool all_read = false;
+  bool throws = false;
+
+  void Receive() {
+    Parse(true);
+    OnReadDone(true);
+  }
 
  private:
-  absl::Status Take(const int& request) override {
-    if (request > 2) return absl::OutOfRangeError("too large");
-    taken.push_back(request);
+  absl::Status Take(const Number& request) override {
+    if (request.value() > 2) return absl::OutOfRangeError("too large");
+    if (request.value() == 2 && throws) throw std::bad_alloc();
+    taken.push_back(request.value());
     return absl::OkStatus();
   }
   void AllRead() override { all_read = true; }
@@ -151,8 +172,8 @@ class NumberCall final : public StreamReader<StreamCall<RecordingReactor>, int> 
 
 TEST(StreamReader, TakesOneRequestAfterTheOther) {
   NumberCall call;
-  call.OnReadDone(true);
-  call.OnReadDone(true);
+  call.Receive();
+  call.Receive();
   call.OnReadDone(false);
   EXPECT_THAT(call.taken, ElementsAre(1, 2));
   EXPECT_TRUE(call.all_read);
@@ -160,10 +181,29 @@ TEST(StreamReader, TakesOneRequestAfterTheOther) {
 
 TEST(StreamReader, EndsWithTheErrorOfTakeAndReadsNoMore) {
   NumberCall call;
-  for (int i = 0; i < 3; ++i) call.OnReadDone(true);
+  for (int i = 0; i < 3; ++i) call.Receive();
   EXPECT_THAT(call.ends, ElementsAre(grpc::OUT_OF_RANGE));
   EXPECT_EQ(call.read_count, 3);
   EXPECT_FALSE(call.all_read);
+}
+
+TEST(StreamReader, RefusesAMessageThatCannotBeParsedInsteadOfTakingItForTheEnd) {
+  for (const int read_before : {0, 2}) {
+    NumberCall call;
+    for (int i = 0; i < read_before; ++i) call.Receive();
+    call.Parse(false);
+    call.OnReadDone(false);
+    EXPECT_THAT(call.ends, ElementsAre(grpc::INVALID_ARGUMENT));
+    EXPECT_FALSE(call.all_read);
+  }
+}
+
+TEST(StreamReader, EndsWithAnErrorWhereMemoryIsMissing) {
+  NumberCall call;
+  call.throws = true;
+  call.Receive();
+  call.Receive();
+  EXPECT_THAT(call.ends, ElementsAre(grpc::RESOURCE_EXHAUSTED));
 }
 
 }  // namespace

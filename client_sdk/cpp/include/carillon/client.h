@@ -206,8 +206,10 @@ class Client {
   /// Further errors: INTERNAL (OUTPUT_NOT_WRITABLE), DATA_LOSS.
   virtual absl::Status BackUpDatabase(const std::string& file) const;
 
-  /// Deletes the models that sounded least recently until the others take at most `budget_bytes`.
-  virtual absl::StatusOr<v1::CollectGarbageResponse> CollectGarbage(uint64_t budget_bytes) const;
+  /// Deletes the models that sounded least recently until the others fit into the request's budget.
+  /// Further errors: INVALID_ARGUMENT (INVALID_BUDGET).
+  virtual absl::StatusOr<v1::CollectGarbageResponse> CollectGarbage(
+      const v1::CollectGarbageRequest& request) const;
 };
 
 /// What Connect() may need beyond an address.

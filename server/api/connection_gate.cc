@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/api/connection_gate.h"
+
+#include <netdb.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+#include <system_error>
+#include <utility>
+
+#include "absl/cleanup/cleanup.h"
+#include "absl/strings/str_cat.h"
+#include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
+
+namespace carillon {
+namespace {
+
+constexpr size_t kMaxConnectionCount = 4096;
+/// Descriptors that the database, decompositions and devices may need beside the connections.
+constexpr size_t kOwnDescriptorCount = 256;
+constexpr int kBacklog = 1024;
+/// Pause after an accept that failed for want of descriptors or memory.
+constexpr std::chrono::milliseconds kPause(50);
+
+absl::Status Failed(const ListenAddress& address, int error) {
+  const bool in_use = error == EADDRINUSE;
+  return Refusal(absl::StatusCode::kFailedPrecondition, in_use ? "ADDRESS_IN_USE" : "LISTEN_FAILED",
+                 absl::StrCat("cannot listen on ", address.ToString(), ": ",
+                              std::generic_category().message(error), "; choose another --listen"));
+}
+
+/// A socket that is bound to an address and listens, or -1 with errno.
+int Bind(const sockaddr* address, socklen_t size) {
+  const int made = socket(address->sa_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+  if (made < 0) return -1;
+  const int yes = 1;
+  const int no = 0;
+  if (address->sa_family == AF_INET6) {
+    setsockopt(made, IPPROTO_IPV6, IPV6_V6ONLY, &no, sizeof no);
+  }
+  if (address->sa_family == AF_UNIX) {
+    fchmod(made, 0600);  // nobody else can connect before the mode is decided
+  } else {
+    setsockopt(made, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+    setsockopt(made, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);  // of the connections too
+  }
+  if (bind(made, address, size) == 0 && listen(made, kBacklog) == 0) return made;
+  const int error = errno;
+  close(made);
+  errno = error;
+  return -1;
+}
+
+int PortOf(int bound) {
+  sockaddr_storage address{};
+  socklen_t size = sizeof address;
+  getsockname(bound, reinterpret_cast<sockaddr*>(&address), &size);
+  // The port has the same place in the addresses of both families.
+  return ntohs(reinterpret_cast<const sockaddr_in*>(&address)->sin_port);
+}
+
+/// The inode of an open descriptor; 0 if it is closed.
+ino_t InodeOf(int descriptor) {
+  struct stat status {};
+  return fstat(descriptor, &status) == 0 ? status.st_ino : 0;
+}
+
+}  // namespace
+
+ConnectionGate::ConnectionGate(size_t max_connection_count)
+    : max_connection_count_(max_connection_count), stop_(eventfd(0, EFD_CLOEXEC)) {}
+
+ConnectionGate::~ConnectionGate() {
+  eventfd_write(stop_, 1);
+  if (thread_.joinable()) thread_.join();
+  for (const Door& door : doors_) close(door.socket);
+  for (const std::string& path : socket_paths_) unlink(path.c_str());
+  close(stop_);
+}
+
+absl::Status ConnectionGate::Listen(ListenAddress& address,
+                                    std::unique_ptr<ConnectionTaker> taker) {
+  RETURN_IF_ERROR(address.is_unix() ? ListenUnix(address, *taker) : ListenTcp(address, *taker));
+  takers_.push_back(std::move(taker));
+  return absl::OkStatus();
+}
+
+absl::Status ConnectionGate::ListenUnix(const ListenAddress& address, ConnectionTaker& taker) {
+  ASSIGN_OR_RETURN(const mode_t mode, PrepareSocket(address.socket_path));
+  sockaddr_un name{};
+  name.sun_family = AF_UNIX;
+  std::strncpy(name.sun_path, address.socket_path.c_str(), sizeof(name.sun_path) - 1);
+  const int bound = Bind(reinterpret_cast<const sockaddr*>(&name), sizeof name);
+  if (bound < 0) return Failed(address, errno);
+  doors_.push_back({bound, &taker});
+  socket_paths_.push_back(address.socket_path);
+  if (chmod(address.socket_path.c_str(), mode) != 0) return Failed(address, errno);
+  return absl::OkStatus();
+}
+
+absl::Status ConnectionGate::ListenTcp(ListenAddress& address, ConnectionTaker& taker) {
+  addrinfo hints{};
+  hints.ai_flags = AI_PASSIVE | AI_NUMERICSERV;
+  hints.ai_socktype = SOCK_STREAM;
+  addrinfo* found = nullptr;
+  const int error = getaddrinfo(address.host.c_str(), "0", &hints, &found);
+  if (error != 0) return Failed(address, error == EAI_SYSTEM ? errno : EADDRNOTAVAIL);
+  const absl::Cleanup free_found = [found] { freeaddrinfo(found); };
+  int last_error = EADDRNOTAVAIL;
+  bool bound_any = false;
+  for (addrinfo* each = found; each != nullptr; each = each->ai_next) {
+    // The port has the same place in the addresses of both families.
+    reinterpret_cast<sockaddr_in*>(each->ai_addr)->sin_port =
+        htons(static_cast<uint16_t>(address.port));
+    const int bound = Bind(each->ai_addr, each->ai_addrlen);
+    if (bound < 0) {
+      last_error = errno;
+      continue;
+    }
+    doors_.push_back({bound, &taker});
+    address.port = PortOf(bound);
+    bound_any = true;
+  }
+  return bound_any ? absl::OkStatus() : Failed(address, last_error);
+}
+
+void ConnectionGate::Open() {
+  thread_ = std::thread([this] { Run(); });
+}
+
+void ConnectionGate::Run() {
+  std::vector<pollfd> awaited{{stop_, POLLIN, 0}};
+  for (const Door& door : doors_) awaited.push_back({door.socket, POLLIN, 0});
+  while (poll(awaited.data(), awaited.size(), -1) < 0 || (awaited[0].revents & POLLIN) == 0) {
+    for (size_t i = 0; i < doors_.size(); ++i) {
+      if ((awaited[i + 1].revents & POLLIN) != 0) Accept(doors_[i]);
+    }
+  }
+}
+
+/// Accepts one connection, so that no address waits for another.
+void ConnectionGate::Accept(const Door& door) {
+  const int connection = accept4(door.socket, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
+  if (connection < 0) {
+    if (errno != EAGAIN && errno != ECONNABORTED && errno != EINTR) {
+      std::this_thread::sleep_for(kPause);
+    }
+    return;
+  }
+  connections_.erase(connection);
+  if (!HasRoom()) {
+    close(connection);
+    return;
+  }
+  connections_[connection] = InodeOf(connection);
+  door.taker->Take(connection);
+}
+
+bool ConnectionGate::HasRoom() {
+  if (connections_.size() < max_connection_count_) return true;
+  std::erase_if(connections_, [](const auto& each) { return InodeOf(each.first) != each.second; });
+  return connections_.size() < max_connection_count_;
+}
+
+size_t RaiseConnectionLimit() {
+  rlimit limit{};
+  getrlimit(RLIMIT_NOFILE, &limit);
+  limit.rlim_cur = std::min<rlim_t>(limit.rlim_max, kMaxConnectionCount + kOwnDescriptorCount);
+  rlimit now{};
+  getrlimit(RLIMIT_NOFILE, &now);
+  if (now.rlim_cur < limit.rlim_cur && setrlimit(RLIMIT_NOFILE, &limit) == 0) now = limit;
+  const size_t count = now.rlim_cur;
+  if (count < 2 * kOwnDescriptorCount) return count / 2;
+  return std::min(kMaxConnectionCount, count - kOwnDescriptorCount);
+}
+
+}  // namespace carillon

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <sys/types.h>
+
+#include <cstddef>
+#include <map>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "server/api/listen_address.h"
+
+namespace carillon {
+
+/// Takes an accepted connection, which it closes when it has ended.
+class ConnectionTaker {
+ public:
+  virtual ~ConnectionTaker() = default;
+  virtual void Take(int connection) = 0;
+};
+
+/// Accepts connections in place of gRPC, whose own listener stops for ever when no descriptor is
+/// left (CVE-2023-4785). Beyond a limit, which leaves descriptors for the daemon's other work, a
+/// connection is closed at once.
+class ConnectionGate {
+ public:
+  explicit ConnectionGate(size_t max_connection_count);
+
+  /// Joins the thread, and closes and removes the sockets. Connections that were taken stay.
+  ~ConnectionGate();
+  ConnectionGate(const ConnectionGate&) = delete;
+  ConnectionGate& operator=(const ConnectionGate&) = delete;
+
+  /// Binds the address, whose port is set if it was 0. Its connections are handed to `taker` once
+  /// the gate is open. Errors: FailedPrecondition (LISTEN_FAILED, ADDRESS_IN_USE).
+  absl::Status Listen(ListenAddress& address, std::unique_ptr<ConnectionTaker> taker);
+
+  /// Begins to accept.
+  void Open();
+
+ private:
+  struct Door {
+    int socket;
+    ConnectionTaker* taker;
+  };
+
+  absl::Status ListenUnix(const ListenAddress& address, ConnectionTaker& taker);
+  absl::Status ListenTcp(ListenAddress& address, ConnectionTaker& taker);
+  void Run();
+  void Accept(const Door& door);
+  bool HasRoom();
+
+  const size_t max_connection_count_;
+  std::vector<std::unique_ptr<ConnectionTaker>> takers_;
+  std::vector<Door> doors_;
+  std::vector<std::string> socket_paths_;
+  /// Open connections, as far as known: descriptor and the inode of its socket. Whoever took a
+  /// connection closes it without a word; its descriptor then has no inode, or another.
+  std::map<int, ino_t> connections_;
+  int stop_;  ///< becomes readable when the gate is to end
+  std::thread thread_;
+};
+
+/// Raises the limit of this process's descriptors as far as the system lets it; returns the number
+/// of connections that may be open at a time.
+size_t RaiseConnectionLimit();
+
+}  // namespace carillon

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/api/connection_gate.h"
+
+#include <arpa/inet.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <optional>
+#include <semaphore>
+#include <string>
+#include <utility>
+
+#include "tests/server/mode_database/sample_model.h"
+
+namespace carillon {
+namespace {
+
+/// Keeps connections open until it is told to close them.
+class Keeper final : public ConnectionTaker {
+ public:
+  explicit Keeper(std::counting_semaphore<>& taken) : taken_(taken) {}
+  void Take(int connection) override {
+    newest = connection;
+    taken_.release();
+  }
+  int newest = -1;
+
+ private:
+  std::counting_semaphore<>& taken_;
+};
+
+class ConnectionGateTest : public testing::Test {
+ protected:
+  /// Listens on a free port, and lets `count` connections in at a time.
+  void Open(size_t count) {
+    gate_.emplace(count);
+    auto keeper = std::make_unique<Keeper>(taken_);
+    keeper_ = keeper.get();
+    address_ = *ParseListenAddress("127.0.0.1:0");
+    ASSERT_TRUE(gate_->Listen(address_, std::move(keeper)).ok());
+    ASSERT_NE(address_.port, 0);
+    gate_->Open();
+  }
+
+  int Connect() const {
+    sockaddr_in to{};
+    to.sin_family = AF_INET;
+    to.sin_port = htons(static_cast<uint16_t>(address_.port));
+    to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    const int made = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    EXPECT_EQ(connect(made, reinterpret_cast<const sockaddr*>(&to), sizeof to), 0);
+    return made;
+  }
+
+  /// The daemon's end was closed.
+  static bool IsClosed(int connection) {
+    char byte = 0;
+    return recv(connection, &byte, 1, 0) <= 0;
+  }
+
+  std::counting_semaphore<> taken_{0};
+  Keeper* keeper_ = nullptr;
+  ListenAddress address_;
+  std::optional<ConnectionGate> gate_;
+};
+
+TEST_F(ConnectionGateTest, ClosesConnectionsBeyondItsLimitAndAcceptsAgainWhenOneHasEnded) {
+  Open(2);
+  for (int i = 0; i < 2; ++i) {
+    Connect();
+    taken_.acquire();
+  }
+  EXPECT_TRUE(IsClosed(Connect()));
+  close(keeper_->newest);
+  Connect();
+  taken_.acquire();
+  EXPECT_TRUE(IsClosed(Connect()));
+}
+
+TEST_F(ConnectionGateTest, RefusesAPortThatIsInUse) {
+  Open(1);
+  ConnectionGate second(1);
+  const absl::Status status = second.Listen(address_, std::make_unique<Keeper>(taken_));
+  EXPECT_THAT(status.ToString(), testing::HasSubstr("ADDRESS_IN_USE: "));
+}
+
+TEST_F(ConnectionGateTest, AUnixSocketIsItsOwnersUnlessOnlyAGroupMayEnterItsFolder) {
+  for (const auto& [folder_mode, socket_mode] :
+       {std::pair{0700U, 0600U}, {0755U, 0600U}, {0750U, 0660U}}) {
+    const TemporaryFolder folder;
+    ASSERT_EQ(chmod(folder.path().c_str(), folder_mode), 0);
+    ConnectionGate gate(1);
+    ListenAddress address{.socket_path = folder / "socket", .host = ""};
+    ASSERT_TRUE(gate.Listen(address, std::make_unique<Keeper>(taken_)).ok());
+    struct stat status {};
+    ASSERT_EQ(stat((folder / "socket").c_str(), &status), 0);
+    EXPECT_EQ(status.st_mode & 0777U, socket_mode);
+  }
+}
+
+TEST_F(ConnectionGateTest, RefusesAFolderInWhichOthersCouldReplaceTheSocket) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(chmod(folder.path().c_str(), 0777), 0);
+  ConnectionGate gate(1);
+  ListenAddress address{.socket_path = folder / "socket", .host = ""};
+  const absl::Status status = gate.Listen(address, std::make_unique<Keeper>(taken_));
+  EXPECT_THAT(status.ToString(), testing::HasSubstr("SOCKET_FOLDER_UNSAFE: "));
+  ASSERT_EQ(chmod(folder.path().c_str(), 01777), 0);  // as /tmp has it
+  EXPECT_TRUE(gate.Listen(address, std::make_unique<Keeper>(taken_)).ok());
+}
+
+}  // namespace
+}  // namespace carillon

@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Connections that say nothing, or too much, do not keep others out for long."""
+
+import contextlib
+import pathlib
+import resource
+import socket
+import subprocess
+import tempfile
+import time
+import unittest
+
+import grpc
+
+import torture
+from carillon.v1 import audio_service_pb2
+from daemon import BIN, Daemon
+
+DESCRIPTORS = 1024
+ACCEPTED_AGAIN_S = 1.0 if torture.LONG else 30.0
+# After this time the daemon closes connections that have not sent their HTTP/2 settings.
+HANDSHAKE_S = 5.0
+
+
+class ConnectionTest(unittest.TestCase):
+    def setUp(self):
+        scratch = tempfile.TemporaryDirectory(prefix="carillon-")
+        self.addCleanup(scratch.cleanup)
+        self.folder = pathlib.Path(scratch.name)
+
+    def serve(self, *arguments):
+        """A daemon whose limit of descriptors cannot be raised."""
+        soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (min(hard, 4096), hard))
+        self.addCleanup(resource.setrlimit, resource.RLIMIT_NOFILE, (soft, hard))
+        self.daemon = Daemon(self.folder, "--listen", "127.0.0.1:0", *arguments,
+                             prefix=("prlimit", f"--nofile={DESCRIPTORS}:{DESCRIPTORS}"))
+        self.addCleanup(self.daemon.kill)
+        self.port = int(self.daemon.listening[1].rsplit(":", 1)[1])
+
+    def answers(self, address):
+        channel = grpc.insecure_channel(address, options=[("grpc.use_local_subchannel_pool", 1)])
+        with contextlib.closing(channel), contextlib.suppress(grpc.RpcError):
+            call = channel.unary_unary("/carillon.v1.AudioService/GetMixer",
+                                       audio_service_pb2.GetMixerRequest.SerializeToString,
+                                       audio_service_pb2.GetMixerResponse.FromString)
+            call(audio_service_pb2.GetMixerRequest(), timeout=2)
+            return True
+        return False
+
+    def silent(self, family, address, count):
+        """Connections that send nothing; some of them are refused."""
+        made = []
+        for _ in range(count):
+            connection = socket.socket(family, socket.SOCK_STREAM)
+            connection.settimeout(2)
+            with contextlib.suppress(OSError):
+                connection.connect(address)
+            made.append(connection)
+        return made
+
+    def addresses(self):
+        return ((socket.AF_UNIX, str(self.folder / "socket"), self.daemon.server),
+                (socket.AF_INET, ("127.0.0.1", self.port), f"127.0.0.1:{self.port}"))
+
+    def test_the_listener_accepts_again_when_silent_connections_are_closed(self):
+        self.serve()
+        for family, address, server in self.addresses():
+            for _ in range(torture.rounds(1, 20)):
+                with self.subTest(server=server):
+                    silent = self.silent(family, address, 1100)
+                    for connection in silent:
+                        connection.close()
+                    again_s = torture.wait_until(lambda server=server: self.answers(server), ACCEPTED_AGAIN_S)
+                    print(f"{server}: accepts {again_s:.2f} s after 1,100 silent connections", flush=True)
+
+    def test_silent_connections_are_closed_after_a_while(self):
+        self.serve()
+        silent = self.silent(socket.AF_INET, ("127.0.0.1", self.port), 1100)
+        waited_s = torture.wait_until(lambda: self.answers(f"127.0.0.1:{self.port}"),
+                                      HANDSHAKE_S + ACCEPTED_AGAIN_S + 4)
+        print(f"accepts {waited_s:.2f} s after 1,100 connections that stay silent", flush=True)
+        for connection in silent:
+            connection.close()
+
+    def test_tls_accepts_again_too(self):
+        certificate, key = self.folder / "certificate.pem", self.folder / "key.pem"
+        subprocess.run(["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes",
+                        "-subj", "/CN=carillon", "-addext", "subjectAltName=IP:127.0.0.1", "-days", "2",
+                        "-keyout", key, "-out", certificate], check=True, capture_output=True)
+        self.serve("--tls-certificate", certificate, "--tls-key", key)
+        for connection in self.silent(socket.AF_INET, ("127.0.0.1", self.port), 1100):
+            connection.close()
+
+        def answers():
+            return subprocess.run([BIN / "carillon", "--server", f"127.0.0.1:{self.port}", "--tls-roots", certificate,
+                                   "status"], capture_output=True, check=False, timeout=60).returncode == 0
+        torture.wait_until(answers, ACCEPTED_AGAIN_S + 1)
+
+    def test_many_calls_at_once_on_one_connection_are_answered_in_bounded_memory(self):
+        self.serve()
+        self.assertTrue(self.answers(self.daemon.server))
+        before_mib = self.resident_mib()
+        count = torture.rounds(2_000, 20_000)
+        client = self.daemon.client()
+        begin_s = time.monotonic()
+        calls = [client.audio.GetMixer.future(audio_service_pb2.GetMixerRequest()) for _ in range(count)]
+        most_mib = before_mib
+        for call in calls:
+            call.result()
+            most_mib = max(most_mib, self.resident_mib()) if call is calls[len(calls) // 2] else most_mib
+        print(f"{count} calls at once: {time.monotonic() - begin_s:.1f} s, {before_mib:.0f} MiB before, "
+              f"{most_mib:.0f} MiB amid, {self.resident_mib():.0f} MiB after", flush=True)
+        self.assertLess(self.resident_mib() - before_mib, 100)
+
+    def resident_mib(self):
+        statm = pathlib.Path(f"/proc/{self.daemon.process.pid}/statm").read_text().split()
+        return int(statm[1]) * resource.getpagesize() / 2**20
+
+
+if __name__ == "__main__":
+    unittest.main()
