@@ -256,13 +256,17 @@ int Main(int argc, const char* const* argv) {
   const ReadOptions read_options = [=] { return ReadCommandLine(argc, argv, kVersion); };
   const absl::StatusOr<CommandLine> command = read_options();
   if (command.ok() && !command->run) return command->exit_status;
+  if (command.ok() && command->only_check) {
+    std::cout << "the configuration is valid" << std::endl;
+    return EXIT_SUCCESS;
+  }
   const absl::Status status = !command.ok() ? command.status()
                               : command->database_command.empty()
                                   ? Run(command->options, read_options)
                                   : RunDatabaseCommand(*command);
   if (status.ok()) return 0;
   spdlog::error("{}", std::string(status.message()));
-  return 1;
+  return command.ok() ? EXIT_FAILURE : kWrongUsage;
 }
 
 }  // namespace

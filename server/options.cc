@@ -8,7 +8,9 @@
 #include <filesystem>
 #include <type_traits>
 
+#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/manual_page.h"
 #include "proto/cpp/server_address.h"
@@ -116,7 +118,11 @@ absl::Status ReadFile(const std::string& path, Options& options) {
   try {
     const toml::table table = toml::parse_file(path);
     for (const auto& [key, node] : table) {
-      RETURN_IF_ERROR(ReadKey(std::string(key.str()), node, options));
+      if (const absl::Status status = ReadKey(std::string(key.str()), node, options);
+          !status.ok()) {
+        return InvalidConfiguration(absl::StrCat(path, " line ", key.source().begin.line, ": ",
+                                                 ToErrorInfo(status).message()));
+      }
     }
   } catch (const toml::parse_error& error) {
     return InvalidConfiguration(
@@ -137,6 +143,13 @@ absl::Status CheckRange(absl::string_view what, T value, std::type_identity_t<T>
       absl::StrCat(what, " is ", value, "; it must be ", least, " to ", most));
 }
 
+bool IsHostAndPort(absl::string_view text) {
+  const size_t colon = text.rfind(':');
+  int port = 0;
+  return colon != absl::string_view::npos && colon > 0 &&
+         absl::SimpleAtoi(text.substr(colon + 1), &port) && port > 0 && port < 65536;
+}
+
 absl::Status Check(const Options& options) {
   for (const absl::Status& status :
        {CheckRange("--sample-rate", options.sample_rate_hz, 8000, 192000),
@@ -155,6 +168,11 @@ absl::Status Check(const Options& options) {
   if (options.executor != "local" && options.executor != "slurm") {
     return InvalidConfiguration(
         absl::StrCat("--executor is \"", options.executor, "\"; it must be local or slurm"));
+  }
+  if (options.data_directory.empty()) return InvalidConfiguration("--data-dir names no folder");
+  if (!options.slurm_upload.empty() && !IsHostAndPort(options.slurm_upload)) {
+    return InvalidConfiguration(absl::StrCat("--slurm-upload is \"", options.slurm_upload,
+                                             "\"; it must be HOST:PORT, as the nodes reach it"));
   }
   if (options.addresses.empty()) return InvalidConfiguration("--listen names no address");
   if (options.tls_certificate_file.empty() != options.tls_key_file.empty()) {
@@ -261,10 +279,12 @@ std::optional<int> ParseFlags(int argc, const char* const* argv, const std::stri
   AddManualFlag(app, 8, version);
   AddFlags(app, command.options);
   AddDatabaseCommands(app, command);
+  app.add_flag("--check-config", command.only_check,
+               "check the configuration, say what is wrong, and end");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error);
+    return app.exit(error) == 0 ? 0 : kWrongUsage;
   }
   return std::nullopt;
 }

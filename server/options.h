@@ -43,6 +43,9 @@ struct Options {
   bool operator==(const Options&) const = default;
 };
 
+/// Exit status after an error in the command line or in the configuration file.
+inline constexpr int kWrongUsage = 2;
+
 /// The parsed command line, which decides the program's next action.
 struct CommandLine {
   Options options;
@@ -51,6 +54,7 @@ struct CommandLine {
   /// have open.
   std::string database_command{};
   std::string backup_file{};  ///< for "restore"
+  bool only_check = false;    ///< with --check-config: end after the configuration was read
   int exit_status = 0;
 };
 

@@ -81,11 +81,24 @@ TEST_F(OptionsFile, WhatTheFileMayNotSayIsRefusedByName) {
   expect("listen = []\n", "--listen");
   expect("tls_key = \"key.pem\"\n", "--tls-certificate");
   expect("a = \n", "line 1");
+  expect("workers = 1\nsample_rate = \"high\"\n", "line 2: sample_rate");
+  expect("data_dir = \"\"\n", "--data-dir");
+  for (const char* address : {"head", ":1", "head:", "head:0", "head:65536"}) {
+    expect((std::string("slurm_upload = \"") + address + "\"\n").c_str(), "--slurm-upload");
+  }
 }
 
 TEST(Options, AFileThatIsNotThereIsRefused) {
   EXPECT_THAT(Read({"--config", "/nonexistent.toml"}).status().ToString(),
               HasSubstr("INVALID_CONFIGURATION: "));
+}
+
+TEST_F(OptionsFile, CheckConfigReadsTheFileAndSaysSo) {
+  const absl::StatusOr<CommandLine> command =
+      Read({"--config", Write("workers = 1\n"), "--check-config"});
+  ASSERT_TRUE(command.ok()) << command.status();
+  EXPECT_TRUE(command->only_check);
+  EXPECT_FALSE(Read({"--config", Write("workers = -1\n"), "--check-config"}).ok());
 }
 
 TEST(Options, VersionAndUnknownFlagsDoNotRun) {
@@ -98,7 +111,7 @@ TEST(Options, VersionAndUnknownFlagsDoNotRun) {
   EXPECT_FALSE(version->run);
   EXPECT_EQ(version->exit_status, 0);
   EXPECT_FALSE(unknown->run);
-  EXPECT_NE(unknown->exit_status, 0);
+  EXPECT_EQ(unknown->exit_status, 2);
 }
 
 }  // namespace
