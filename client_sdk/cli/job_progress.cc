@@ -65,7 +65,7 @@ std::string RoughTime(double seconds) {
 }
 
 /// Redraws the line of the bar, which begins with the label of the job.
-void DrawBar(const v1::Job& job) {
+void DrawProgressBar(const v1::Job& job) {
   const int filled = static_cast<int>(std::lround(Fraction(job) * kBarWidth));
   absl::FPrintF(stderr, "\r\033[K%s  [%s%s]  %s", job.label(), std::string(filled, '#'),
                 std::string(kBarWidth - filled, '.'), ProgressText(job));
@@ -92,7 +92,7 @@ absl::StatusOr<v1::Job> WatchWithProgress(const client::Client& daemon, const st
   absl::string_view shown;
   auto job = daemon.WatchJob(name, [&](const v1::Job& state) {
     if (terminal) {
-      DrawBar(state);
+      DrawProgressBar(state);
     } else if (Activity(state) != shown) {
       shown = Activity(state);
       absl::FPrintF(stderr, "%s  %s\n", state.label(), ProgressText(state));

@@ -15,13 +15,13 @@
 namespace carillon {
 namespace {
 
-constexpr char kCatalogueText[] =
+constexpr char kMaterialsText[] =
 #include "materials.inc"
     ;
 
-v1::MaterialCatalogue ParseCatalogue() {
+v1::MaterialCatalogue ParseMaterials() {
   v1::MaterialCatalogue catalogue;
-  if (!google::protobuf::TextFormat::ParseFromString(kCatalogueText, &catalogue)) std::abort();
+  if (!google::protobuf::TextFormat::ParseFromString(kMaterialsText, &catalogue)) std::abort();
   return catalogue;
 }
 
@@ -98,7 +98,7 @@ absl::Status Check(const v1::Material& m) {
 }  // namespace
 
 const v1::MaterialCatalogue& Materials() {
-  static const v1::MaterialCatalogue catalogue = ParseCatalogue();
+  static const v1::MaterialCatalogue catalogue = ParseMaterials();
   return catalogue;
 }
 

@@ -8,7 +8,9 @@ namespace {
 
 Point operator-(const Point& a, const Point& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
 
-double Dot(const Point& a, const Point& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+double DotProduct(const Point& a, const Point& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
 
 using Weights = std::array<double, 3>;
 
@@ -16,11 +18,11 @@ Weights FindWeights(const std::array<Point, 3>& corners, const Point& point) {
   const auto& [a, b, c] = corners;
   const Point ab = b - a, ac = c - a;
   const Point ap = point - a, bp = point - b, cp = point - c;
-  const double d1 = Dot(ab, ap), d2 = Dot(ac, ap);
+  const double d1 = DotProduct(ab, ap), d2 = DotProduct(ac, ap);
   if (d1 <= 0 && d2 <= 0) return {1, 0, 0};
-  const double d3 = Dot(ab, bp), d4 = Dot(ac, bp);
+  const double d3 = DotProduct(ab, bp), d4 = DotProduct(ac, bp);
   if (d3 >= 0 && d4 <= d3) return {0, 1, 0};
-  const double d5 = Dot(ab, cp), d6 = Dot(ac, cp);
+  const double d5 = DotProduct(ab, cp), d6 = DotProduct(ac, cp);
   if (d6 >= 0 && d5 <= d6) return {0, 0, 1};
   const double vc = d1 * d4 - d3 * d2;
   if (vc <= 0 && d1 > 0 && d3 < 0) return {1 - d1 / (d1 - d3), d1 / (d1 - d3), 0};

@@ -24,8 +24,9 @@ namespace carillon {
 namespace {
 
 using std::chrono::nanoseconds;
-constexpr size_t kBodies = 20, kVertices = 10'000, kModes = 800, kStreams = 4, kBlock = 128;
-constexpr double kBlockS = kBlock / kTestSampleRateHz;
+constexpr size_t kBodies = 20, kVertices = 10'000, kFloodModes = 800, kStreams = 4,
+                 kFloodBlock = 128;
+constexpr double kFloodBlockS = kFloodBlock / kTestSampleRateHz;
 /// The daemon's default.
 constexpr size_t kLookAheadBlocks = 8;
 constexpr double kGoldenAngle = 2.399963229728653;
@@ -42,33 +43,33 @@ std::array<double, 3> VertexAt(size_t i) {
 ShapeTable MakeWaves(uint64_t body) {
   std::mt19937 random(static_cast<uint32_t>(body));
   std::normal_distribution<float> normal;
-  std::vector<float> values(3 * kVertices * kModes);
-  std::vector<std::array<float, 7>> waves(kModes);
-  for (size_t m = 0; m < kModes; ++m) {
+  std::vector<float> values(3 * kVertices * kFloodModes);
+  std::vector<std::array<float, 7>> waves(kFloodModes);
+  for (size_t m = 0; m < kFloodModes; ++m) {
     for (float& x : waves[m]) x = normal(random);
     const float length = std::hypot(waves[m][0], waves[m][1], waves[m][2]);
     for (size_t i = 0; i < 3; ++i) waves[m][i] *= std::sqrt(static_cast<float>(m) + 1) / length;
   }
   for (size_t v = 0; v < kVertices; ++v) {
     const auto at = VertexAt(v);
-    for (size_t m = 0; m < kModes; ++m) {
+    for (size_t m = 0; m < kFloodModes; ++m) {
       const auto& w = waves[m];
       const float wave =
           std::sin(w[0] * static_cast<float>(at[0]) + w[1] * static_cast<float>(at[1]) +
                    w[2] * static_cast<float>(at[2]) + w[6]);
       for (size_t axis = 0; axis < 3; ++axis) {
-        values[(3 * v + axis) * kModes + m] = wave * w[3 + axis];
+        values[(3 * v + axis) * kFloodModes + m] = wave * w[3 + axis];
       }
     }
   }
-  return MakeShapes(values, kModes);
+  return MakeShapes(values, kFloodModes);
 }
 
 SoundingModes MakeBodyModes(uint64_t body) {
   std::mt19937 random(static_cast<uint32_t>(body) + 1000);
   std::uniform_real_distribution<double> uniform;
   SoundingModes sounding;
-  for (uint32_t m = 0; m < kModes; ++m) {
+  for (uint32_t m = 0; m < kFloodModes; ++m) {
     const double frequency_hz = 150 + 22.0 * m + 15 * uniform(random);
     const double t60_s = 0.3 * std::pow(10.0, uniform(random));
     sounding.modes.push_back(MakeMode(m, frequency_hz, -std::log(1000.0) / t60_s, 1e-3));
@@ -95,7 +96,7 @@ class Impulses {
 
   MixerEvent Next() {
     MixerEvent event = events_[next_++ % events_.size()];
-    event.frame = random_() % kBlock;
+    event.frame = random_() % kFloodBlock;
     body_ = random_() % kBodies;
     return event;
   }
@@ -124,15 +125,15 @@ void Flood(Mixer& mixer, const std::vector<BankId>& banks, double rate,
   std::vector<std::unique_ptr<EventStream>> streams;
   for (size_t i = 0; i < kStreams; ++i) streams.push_back(mixer.OpenStream(1 << 17).value());
   Impulses impulses(7);
-  uint64_t block = mixer.frame() / kBlock;
+  uint64_t block = mixer.frame() / kFloodBlock;
   double due = 0;
   for (; !done; std::this_thread::sleep_for(std::chrono::microseconds(300))) {
     // The impulses of a block are pushed two blocks ahead of it.
-    for (; block <= mixer.frame() / kBlock + 2; ++block) {
-      for (due += rate * kBlockS; due >= 1; --due) {
+    for (; block <= mixer.frame() / kFloodBlock + 2; ++block) {
+      for (due += rate * kFloodBlockS; due >= 1; --due) {
         MixerEvent event = impulses.Next();
         event.bank = banks[impulses.body()];
-        event.frame += block * kBlock;
+        event.frame += block * kFloodBlock;
         streams[static_cast<size_t>(due) % kStreams]->TryPush(event);
       }
     }
@@ -155,11 +156,11 @@ struct Result {
 Result RenderInTime(Mixer& mixer, const Clock& clock, double seconds) {
   Result result;
   result.realtime = MakeThisThreadRealtime();
-  std::vector<float> block(kBlock);
-  const auto block_count = static_cast<size_t>(seconds / kBlockS);
+  std::vector<float> block(kFloodBlock);
+  const auto block_count = static_cast<size_t>(seconds / kFloodBlockS);
   const nanoseconds start = clock.Monotonic();
   const auto due = [start](size_t i) {
-    return start + nanoseconds(int64_t(1e9 * kBlockS * double(i)));
+    return start + nanoseconds(int64_t(1e9 * kFloodBlockS * double(i)));
   };
   for (size_t i = 0; i < block_count; ++i) {
     while (clock.Monotonic() < due(i)) std::this_thread::sleep_for(due(i) - clock.Monotonic());
@@ -182,9 +183,9 @@ double MergedErrorDb(const Bodies& bodies, double rate) {
   OscillatorBank merged(bodies.modes[0], bodies.shapes[0], {});
   TestMix exact_mix, merged_mix;
   Impulses impulses(3);
-  const auto count = static_cast<size_t>(rate / kBodies * kBlockS);
+  const auto count = static_cast<size_t>(rate / kBodies * kFloodBlockS);
   double error = 0, energy = 0;
-  std::vector<float> a(kBlock), b(kBlock);
+  std::vector<float> a(kFloodBlock), b(kFloodBlock);
   for (size_t block = 0; block < 200; ++block) {
     std::vector<MixerEvent> events(count);
     for (MixerEvent& event : events) event = impulses.Next();
@@ -205,7 +206,7 @@ double MergedErrorDb(const Bodies& bodies, double rate) {
     }
     exact_mix.Render(exact, a);
     merged_mix.Render(merged, b);
-    for (size_t n = 0; n < kBlock; ++n) {
+    for (size_t n = 0; n < kFloodBlock; ++n) {
       error += std::pow(double{a[n]} - b[n], 2);
       energy += std::pow(double{a[n]}, 2);
     }
@@ -232,7 +233,7 @@ void MeasureRate(const Bodies& bodies, double rate, double seconds) {
   client.join();
   const MixerStatistics s = mixer.statistics();
   double load = 0;
-  for (const double cpu : result.cpu_s) load += cpu / kBlockS;
+  for (const double cpu : result.cpu_s) load += cpu / kFloodBlockS;
   const auto per_s = [seconds](uint64_t count) { return static_cast<double>(count) / seconds; };
   std::printf(
       "{\"what\": \"flood\", \"rate\": %.0f, \"seconds\": %.0f, \"realtime\": %s, "
