@@ -4,10 +4,11 @@
 
 Usage: run_tests.py BUILD_FOLDER ARGUMENTS OF ctest...
 
-The summary counts every test once, by its last run, and names those that were run again. A test of the real-time
+The summary names the time of each room, counts every test once, by its last run, and names those that were run again. A test of the real-time
 path skips itself where the machine was too busy to judge, so one that is skipped in both runs is named, too.
 """
 
+import collections
 import pathlib
 import re
 import subprocess
@@ -16,6 +17,19 @@ import xml.etree.ElementTree as xml
 
 # More failures than this are not the machine's.
 MOST_RUN_AGAIN = 20
+
+
+def room_of(test):
+    """The folder of a test's file: server/scene of server/scene/scene_test.Scene.IsEmpty."""
+    return test.split(".")[0].rpartition("/")[0] or test
+
+
+def seconds_by_room(report):
+    """A line with the time that the tests of each room took, longest first."""
+    seconds = collections.Counter()
+    for case in xml.parse(report).iter("testcase"):
+        seconds[room_of(case.get("name"))] += float(case.get("time"))
+    return "seconds of each room: " + ", ".join(f"{room} {time:.0f}" for room, time in seconds.most_common())
 
 
 def run(arguments, report):
@@ -48,11 +62,12 @@ def main():
     again = sorted(name for name, state in states.items() if state in ("fail", "notrun"))
     if not states or len(again) > MOST_RUN_AGAIN:
         sys.exit(code or 1)
+    times = seconds_by_room(folder / "tests.xml")
     if again:
         preset = arguments[arguments.index("--preset"):][:2] if "--preset" in arguments else []
         later, _ = run([*preset, "--parallel", "1", "--tests-regex", exactly(again)], folder / "tests_again.xml")
         states |= later
-    print("\n".join(["", *summary(states, again)]))
+    print("\n".join(["", times, *summary(states, again)]))
     sys.exit(1 if "fail" in states.values() else 0)
 
 

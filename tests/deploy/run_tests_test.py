@@ -51,6 +51,10 @@ class RunTests(TreeTest):
         code, lines = self.run_tests("--tests-regex", "shy")
         self.assertEqual((code, lines[-2]), (0, "1 skipped: room/shy(1)"))
 
+    def test_the_time_of_each_room_is_printed(self):
+        _, lines = self.run_tests("--tests-regex", "good")
+        self.assertRegex(lines[-2], r"^seconds of each room: room \d+$")
+
     def test_no_test_at_all_is_a_failure(self):
         self.assertNotEqual(self.run_tests("--tests-regex", "nothing")[0], 0)
 
