@@ -40,6 +40,7 @@ class AudioLevel : public ServedDaemon {
     const auto stream = contacts->StreamContacts(&context);
     v1::StreamContactsRequest request;
     request.mutable_start()->set_scene(scene);
+    request.mutable_start()->set_step_s(0.01);
     stream->Write(request);
     *request.mutable_step()->add_impulses() = Strike(1);
     stream->Write(request);
@@ -47,7 +48,8 @@ class AudioLevel : public ServedDaemon {
     v1::StreamContactsResponse answer;
     while (stream->Read(&answer)) {
     }
-    EXPECT_TRUE(stream->Finish().ok());
+    ASSERT_TRUE(stream->Finish().ok());
+    ASSERT_EQ(answer.accepted_count(), 1U);
   }
 
   v1::GetMixerResponse Mixer() {
@@ -81,7 +83,7 @@ TEST_F(AudioLevel, TheMixerStatesTheLoudnessOfWhatItPlays) {
   const std::string scene = CreateScene();
   v1::AddObjectResponse added;
   ASSERT_TRUE(Add(SmallObject(scene), added).ok());
-  StrikeLive(scene);
+  ASSERT_NO_FATAL_FAILURE(StrikeLive(scene));
   while (!mixer.has_momentary_lufs()) mixer = Mixer();
   EXPECT_GT(mixer.momentary_lufs(), -70);
   EXPECT_GT(mixer.peak_pa(), 0);
