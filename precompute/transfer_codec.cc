@@ -29,23 +29,7 @@ struct TransferArrays {
   std::vector<float> power_integrals, normal_energies, power_errors_db, direction_errors_db;
   std::vector<uint32_t> orders, first, harmonics;
   std::vector<std::complex<float>> coefficients;
-  std::vector<double> rigid_wavenumbers;
-  std::vector<float> rigid_power_integrals, rigid_radii, rigid_strengths, rigid_errors_db;
 };
-
-void AddRigid(const RigidRadiation& rigid, TransferArrays& arrays) {
-  arrays.rigid_wavenumbers = rigid.wavenumbers;
-  for (const RigidRadiation::Motion& motion : rigid.motions) {
-    for (const double power : motion.power_integrals) {
-      arrays.rigid_power_integrals.push_back(static_cast<float>(power));
-    }
-    arrays.rigid_radii.push_back(static_cast<float>(motion.radius_m));
-    for (const double strength : motion.strengths) {
-      arrays.rigid_strengths.push_back(static_cast<float>(strength));
-    }
-    arrays.rigid_errors_db.push_back(static_cast<float>(motion.error_db));
-  }
-}
 
 RadiationState StateOf(const ModeRadiation& mode) {
   if (!mode.in_band) return RadiationState::kOutsideBand;
@@ -67,27 +51,16 @@ TransferArrays MakeArrays(const Transfer& transfer, const ModalModel& model) {
     arrays.coefficients.insert(arrays.coefficients.end(), mode.value.begin(), mode.value.end());
     arrays.first.push_back(static_cast<uint32_t>(arrays.harmonics.size()));
   }
-  AddRigid(transfer.rigid, arrays);
   return arrays;
 }
 
 /// In the order of kTransferArrays.
 std::array<Bytes, kTransferArrayCount> AllBytes(const TransferArrays& arrays) {
-  return {BytesOf(arrays.eigenvalues),
-          BytesOf(arrays.states),
-          BytesOf(arrays.power_integrals),
-          BytesOf(arrays.normal_energies),
-          BytesOf(arrays.power_errors_db),
-          BytesOf(arrays.direction_errors_db),
-          BytesOf(arrays.orders),
-          BytesOf(arrays.first),
-          BytesOf(arrays.harmonics),
-          BytesOf(arrays.coefficients),
-          BytesOf(arrays.rigid_wavenumbers),
-          BytesOf(arrays.rigid_power_integrals),
-          BytesOf(arrays.rigid_radii),
-          BytesOf(arrays.rigid_strengths),
-          BytesOf(arrays.rigid_errors_db)};
+  return {BytesOf(arrays.eigenvalues),     BytesOf(arrays.states),
+          BytesOf(arrays.power_integrals), BytesOf(arrays.normal_energies),
+          BytesOf(arrays.power_errors_db), BytesOf(arrays.direction_errors_db),
+          BytesOf(arrays.orders),          BytesOf(arrays.first),
+          BytesOf(arrays.harmonics),       BytesOf(arrays.coefficients)};
 }
 
 v1::Vec3 ToProto(const Point& point) {
@@ -98,11 +71,21 @@ v1::Vec3 ToProto(const Point& point) {
   return result;
 }
 
-v1::RigidBody ToProto(const MassProperties& mass) {
+v1::RigidBody ToProto(const RigidRadiation& rigid) {
   v1::RigidBody body;
-  body.set_volume_m3(mass.volume_m3);
-  *body.mutable_center_of_mass_m() = ToProto(mass.center_of_mass);
-  for (const double value : mass.inertia) body.add_inertia_kg_m2(value);
+  body.set_volume_m3(rigid.mass.volume_m3);
+  *body.mutable_center_of_mass_m() = ToProto(rigid.mass.center_of_mass);
+  for (const double value : rigid.mass.inertia) body.add_inertia_kg_m2(value);
+  body.mutable_wavenumbers()->Assign(rigid.wavenumbers.begin(), rigid.wavenumbers.end());
+  if (rigid.wavenumbers.empty()) return body;
+  for (const RigidRadiation::Motion& from : rigid.motions) {
+    v1::RigidMotion& motion = *body.add_motions();
+    motion.set_radius_m(from.radius_m);
+    motion.mutable_strengths()->Assign(from.strengths.begin(), from.strengths.end());
+    motion.mutable_power_integrals()->Assign(from.power_integrals.begin(),
+                                             from.power_integrals.end());
+    motion.set_error_db(from.error_db);
+  }
   return body;
 }
 
@@ -160,12 +143,10 @@ v1::TransferRecord MakeHeader(const Transfer& transfer, const ModelOrigin& origi
   header.set_sound_speed_m_per_s(transfer.settings.air.sound_speed_m_per_s);
   header.set_air_density_kg_per_m3(transfer.settings.air.density_kg_per_m3);
   *header.mutable_center_m() = ToProto(transfer.center);
-  *header.mutable_rigid_body() = ToProto(transfer.rigid.mass);
+  *header.mutable_rigid_body() = ToProto(transfer.rigid);
   header.set_radius_m(transfer.radius_m);
   *header.mutable_verification() = Verify(transfer);
-  const TransferSizes sizes{.modes = transfer.modes.size(),
-                            .harmonics = arrays.harmonics.size(),
-                            .wavenumbers = arrays.rigid_wavenumbers.size()};
+  const TransferSizes sizes{.modes = transfer.modes.size(), .harmonics = arrays.harmonics.size()};
   for (const ArraySpec& spec : kTransferArrays) *header.add_arrays() = DescribeArray(spec, sizes);
   header.mutable_transfer_settings()->set_accuracy_db(transfer.settings.goal_db);
   header.mutable_transfer_settings()->set_budget_s(transfer.settings.budget_cpu_s);

@@ -26,11 +26,6 @@ inline constexpr std::array kTransferArrays = {
     ArraySpec{"first", v1::ELEMENT_TYPE_UINT32, "M"},
     ArraySpec{"harmonics", v1::ELEMENT_TYPE_UINT32, "n"},
     ArraySpec{"coefficients", v1::ELEMENT_TYPE_FLOAT32, "n2"},
-    ArraySpec{"rigid_wavenumbers", v1::ELEMENT_TYPE_FLOAT64, "w"},
-    ArraySpec{"rigid_power_integrals", v1::ELEMENT_TYPE_FLOAT32, "6w"},
-    ArraySpec{"rigid_radii", v1::ELEMENT_TYPE_FLOAT32, "6"},
-    ArraySpec{"rigid_strengths", v1::ELEMENT_TYPE_FLOAT32, "69"},
-    ArraySpec{"rigid_errors_db", v1::ELEMENT_TYPE_FLOAT32, "6"},
 };
 inline constexpr size_t kTransferArrayCount = kTransferArrays.size();
 
@@ -39,9 +34,8 @@ enum class RadiationState : uint32_t { kOutsideBand = 0, kComputed = 1, kOutOfTi
 
 /// How long the dimensions of a transfer are.
 struct TransferSizes {
-  uint64_t modes;            ///< 'm'; 'M' is one more
-  uint64_t harmonics;        ///< 'n', kept of all modes together
-  uint64_t wavenumbers = 0;  ///< 'w', at which the rigid motions were solved
+  uint64_t modes;      ///< 'm'; 'M' is one more
+  uint64_t harmonics;  ///< 'n', kept of all modes together
 
   constexpr uint64_t Of(char dimension) const {
     switch (dimension) {
@@ -51,10 +45,8 @@ struct TransferSizes {
         return modes + 1;
       case 'n':
         return harmonics;
-      case 'w':
-        return wavenumbers;
       default:
-        return static_cast<uint64_t>(dimension - '0');
+        return 2;
     }
   }
 };

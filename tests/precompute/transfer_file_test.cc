@@ -160,15 +160,15 @@ TEST_F(TransferFileTest, HoldsTheMassOfTheBodyAndItsRigidMotions) {
   EXPECT_NEAR(body.volume_m3() / (0.1 * 0.02 * 0.012), 1, 1e-4);
   EXPECT_NEAR(body.center_of_mass_m().x(), 0.05, 1e-5);
   EXPECT_NEAR(body.inertia_kg_m2(2) / (body.volume_m3() * (0.01 + 0.0004) / 12), 1, 1e-3);
-  const auto radii = stored.Values<float>("rigid_radii");
-  const auto strengths = stored.Values<float>("rigid_strengths");
-  ASSERT_EQ(radii.size(), 6U);
-  ASSERT_EQ(strengths.size(), 54U);
-  EXPECT_EQ(stored.Values<float>("rigid_power_integrals").size(),
-            6 * stored.Values<double>("rigid_wavenumbers").size());
-  // A thin bar moves more air across its broad side: a^3 s of the l = 1 harmonics along y and z.
-  const auto dipole = [&](size_t motion, size_t harmonic) {
-    return std::abs(std::pow(radii[motion], 3) * strengths[9 * motion + harmonic]);
+  ASSERT_EQ(body.motions_size(), 6);
+  for (const auto& motion : body.motions()) {
+    EXPECT_EQ(motion.strengths_size(), 9);
+    EXPECT_EQ(motion.power_integrals_size(), body.wavenumbers_size());
+  }
+  // A flat bar moves more air across its broad side: a^3 s of the l = 1 harmonics.
+  const auto dipole = [&](int motion, int harmonic) {
+    const auto& sphere = body.motions(motion);
+    return std::abs(std::pow(sphere.radius_m(), 3) * sphere.strengths(harmonic));
   };
   EXPECT_GT(dipole(2, 2), dipole(1, 1));
   EXPECT_GT(dipole(1, 1), dipole(0, 3));
