@@ -3,8 +3,6 @@
 // radiation_spheres exact: spheres of every order to 6 against the closed form.
 // radiation_spheres dense: the equation solved by sweeps and GMRES beside its assembled matrix,
 // factorized, in one thread. Both print a Markdown table.
-#include "tests/precompute/radiation/spheres.h"
-
 #include <sys/resource.h>
 
 #include <Eigen/Dense>
@@ -22,6 +20,7 @@
 #include "precompute/radiation/mode_solver.h"
 #include "precompute/radiation/solve_time.h"
 #include "tests/precompute/radiation/dense_equation.h"
+#include "tests/precompute/radiation/spheres.h"
 
 namespace carillon::precompute {
 namespace {
