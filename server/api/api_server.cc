@@ -9,6 +9,7 @@
 #include <deque>
 #include <fstream>
 #include <iterator>
+#include <optional>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -42,7 +43,6 @@ constexpr int kHandshakeLimit_ms = 5'000;
 /// after the second.
 constexpr int kKeepalive_ms = 30'000;
 constexpr int kKeepaliveAnswer_ms = 10'000;
-constexpr int kMaxMetadataBytes = 16 << 10;
 /// Memory of all connections; beyond it gRPC refuses calls and connections.
 constexpr size_t kClientMemoryBytes = size_t{512} << 20U;
 
@@ -120,7 +120,6 @@ void LimitClients(grpc::ServerBuilder& builder) {
   builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, kHandshakeLimit_ms);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepalive_ms);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveAnswer_ms);
-  builder.AddChannelArgument(GRPC_ARG_MAX_METADATA_SIZE, kMaxMetadataBytes);
   grpc::ResourceQuota quota("clients");
   quota.Resize(kClientMemoryBytes);
   builder.SetResourceQuota(quota);
@@ -155,7 +154,7 @@ struct ApiServer::State {
   AudioService audio;
   LiveOutput& output;
   std::unique_ptr<grpc::Server> server;
-  ConnectionGate gate{RaiseConnectionLimit()};
+  std::optional<ConnectionGate> gate;
   std::vector<std::string> addresses;
 };
 
@@ -165,11 +164,12 @@ absl::Status ApiServer::State::Listen(const ApiSettings& settings) {
                    TcpCredentials(settings));
   grpc::ServerBuilder builder;
   LimitClients(builder);
+  gate.emplace(RaiseConnectionLimit());
   for (ListenAddress& address : parsed) {
     auto acceptor = builder.experimental().AddExternalConnectionAcceptor(
         grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD,
         address.is_unix() ? grpc::InsecureServerCredentials() : tcp_credentials);
-    RETURN_IF_ERROR(gate.Listen(address, std::make_unique<GrpcTaker>(std::move(acceptor))));
+    RETURN_IF_ERROR(gate->Listen(address, std::make_unique<GrpcTaker>(std::move(acceptor))));
   }
   for (grpc::Service* service : std::initializer_list<grpc::Service*>{
            &admin, &models, &decompositions, &job_runs, &scenes, &contacts, &audio}) {
@@ -180,7 +180,7 @@ absl::Status ApiServer::State::Listen(const ApiSettings& settings) {
     return Unready("LISTEN_FAILED",
                    "cannot serve: the TLS files do not belong together; see the line before");
   }
-  gate.Open();
+  gate->Open();
   for (const ListenAddress& address : parsed) addresses.push_back(address.ToString());
   return absl::OkStatus();
 }
@@ -207,6 +207,7 @@ absl::Status ApiServer::Reload(const ApiSettings& settings) {
 ApiServer::ApiServer(std::unique_ptr<State> state) : state_(std::move(state)) {}
 
 ApiServer::~ApiServer() {
+  state_->gate.reset();
   state_->output.ObserveDevice(nullptr);
   state_->server->Shutdown(std::chrono::system_clock::now() + kGracePeriod);
   state_->server->Wait();

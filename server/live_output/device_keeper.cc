@@ -78,10 +78,9 @@ DeviceState DeviceKeeper::state() const {
 }
 
 void DeviceKeeper::Observe(Observer observer) {
-  const bool plays = state().plays;
   const MutexLock lock(&observer_mutex_);
   observer_ = std::move(observer);
-  if (observer_) observer_(plays);
+  if (observer_) observer_(state().plays);
 }
 
 void DeviceKeeper::Run() {
