@@ -32,6 +32,7 @@ ContactSide SideOf(const btCollisionObject& object, const btVector3& local_point
   side.velocity_m_per_s = ToArray(body->getVelocityInLocalPoint(arm));
   side.angular_velocity_rad_per_s = ToArray(body->getAngularVelocity());
   side.lever_m = btFabs(arm.dot(normal));
+  if (body->getInvMass() > 0) side.mass_kg = 1 / body->getInvMass();
   return side;
 }
 

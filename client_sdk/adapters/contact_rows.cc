@@ -77,15 +77,22 @@ void ContactRows::Append(const ContactReport& contact, v1::ContactStep& step) {
   row.set_partner(PartnerNumber(other.body));
   Set(*row.mutable_point_m(), first.point_m);
   Set(*row.mutable_impulse_newton_seconds(), Rotate(Inverse(first.orientation), impulse));
-  row.set_duration_s(settings_.duration_s);
+  if (settings_.duration_s) row.set_duration_s(*settings_.duration_s);
   row.mutable_roughness()->set_travel_speed_m_per_s(TravelSpeed(contact));
   row.mutable_roughness()->set_depth(settings_.roughness_depth);
-  row.mutable_roughness()->set_grain_m(settings_.grain_m);
-  if (!has_0 || !has_1) return;
+  row.mutable_roughness()->set_irregularity_length_m(settings_.irregularity_length_m);
+  if (!has_0 || !has_1) return Describe(other, *row.mutable_hertz());
   v1::SecondObject& second = *row.mutable_second();
   second.set_object(swapped ? heard_0->second : heard_1->second);
   Set(*second.mutable_point_m(), other.point_m);
   Set(*second.mutable_rotation(), Times(Inverse(other.orientation), first.orientation));
+}
+
+void ContactRows::Describe(const ContactSide& silent, v1::HertzContact& hertz) const {
+  // Of a reduced mass, a body this heavy is no part.
+  constexpr double kImmovableMass_kg = 1e6;
+  hertz.set_striker(settings_.striker);
+  hertz.set_striker_mass_kg(silent.mass_kg.value_or(kImmovableMass_kg));
 }
 
 void ContactRows::AppendPose(const void* body, const Vector& position_m,

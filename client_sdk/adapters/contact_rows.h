@@ -4,6 +4,8 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <optional>
+#include <string>
 
 #include "carillon/v1/contact.pb.h"
 
@@ -14,12 +16,14 @@ using Quaternion = std::array<double, 4>;  ///< w, x, y, z
 
 /// The properties of contacts that an engine does not know.
 struct ContactSettings {
-  double roughness_depth = 0.5;  ///< as in carillon.v1.Roughness
-  double grain_m = 0.001;        ///< as in carillon.v1.Roughness
-  /// How long an impact lasts. The default is that of a hard contact: by Hertz, steel of some grams
-  /// touches steel or ceramic for 0.06 to 0.09 ms, wood for 0.4 ms, rubber for 4 ms. A longer
-  /// contact excites nothing above about 1.4 / duration.
-  double duration_s = 0.0001;
+  double roughness_depth = 0.5;          ///< as in carillon.v1.Roughness
+  double irregularity_length_m = 0.001;  ///< as in carillon.v1.Roughness
+  /// The name in the catalogue of strikers, such as "wood", of bodies without a sound.
+  /// Empty: steel.
+  std::string striker{};
+  /// How long an impact lasts. Absent: as long as an elastic collision of the two bodies, which the
+  /// daemon computes.
+  std::optional<double> duration_s = std::nullopt;
 };
 
 /// One body of a contact; a body that is not dynamic stands still.
@@ -30,6 +34,8 @@ struct ContactSide {
   Vector velocity_m_per_s{};            ///< of the body's material at the contact, in the world
   Vector angular_velocity_rad_per_s{};  ///< in the world
   double lever_m = 0;  ///< from the contact to the centre of mass, along the normal
+  /// Mass of a dynamic body; any other body does not move.
+  std::optional<double> mass_kg = std::nullopt;
 };
 
 /// A contact of two bodies as an engine reports it for one step.
@@ -62,6 +68,8 @@ class ContactRows {
 
  private:
   uint32_t PartnerNumber(const void* body);
+  /// Describes the body without a sound as a striker.
+  void Describe(const ContactSide& silent, v1::HertzContact& hertz) const;
 
   ContactSettings settings_;
   std::map<const void*, uint32_t> handles_;

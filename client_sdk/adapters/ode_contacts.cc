@@ -57,12 +57,16 @@ ContactSide OdeContacts::SideOf(const Contact& contact, size_t side) {
   const Vector centre = ToArray(dBodyGetPosition(body));
   double lever_m = 0;
   for (size_t i = 0; i < 3; ++i) lever_m += (contact.point[i] - centre[i]) * contact.normal[i];
+  dMass mass;
+  dBodyGetMass(body, &mass);
+  const bool moves = dBodyIsKinematic(body) == 0;
   return {.body = body,
           .point_m = contact.local_points[side],
           .orientation = ToQuaternion(dBodyGetQuaternion(body)),
           .velocity_m_per_s = ToArray(velocity),
           .angular_velocity_rad_per_s = ToArray(dBodyGetAngularVel(body)),
-          .lever_m = std::abs(lever_m)};
+          .lever_m = std::abs(lever_m),
+          .mass_kg = moves ? std::optional<double>(mass.mass) : std::nullopt};
 }
 
 void OdeContacts::ReadPoses(v1::ContactStep& step) const {

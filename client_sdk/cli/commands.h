@@ -72,7 +72,8 @@ struct StrikeOptions {
   MaterialFigures material;
   std::array<double, 3> point_m = {};
   std::array<double, 3> impulse_newton_seconds = {};
-  double duration_s = 0;
+  std::optional<double> duration_s;  ///< absent: as long as an elastic collision
+  std::string striker;               ///< empty: steel
   double size = 1;
   double gain = 1;
   bool paper_coupling = false;

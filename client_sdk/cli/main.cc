@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 
+#include "absl/strings/str_cat.h"
 #include "client_sdk/cli/commands.h"
 #include "client_sdk/cli/completion_options.h"
 #include "client_sdk/cli/list_options.h"
@@ -14,6 +15,7 @@
 #include "client_sdk/cli/output.h"
 #include "client_sdk/cli/program.h"
 #include "proto/cpp/manual_page.h"
+#include "proto/cpp/striker_catalogue.h"
 
 namespace carillon::cli {
 namespace {
@@ -108,7 +110,14 @@ void AddStrike(CLI::App& app, Program& program) {
                   "The impulse on the object: X,Y,Z or X Y Z in its frame, N s")
       ->delimiter(',')
       ->required();
-  strike.add_option("--duration", options->duration_s, "The duration of the contact, s");
+  CLI::Option* striker =
+      strike
+          .add_option("--striker", options->striker, absl::StrCat("What strikes: ", StrikerNames()))
+          ->default_str("steel");
+  strike
+      .add_option("--duration", options->duration_s,
+                  "The duration of the contact, s [that of an elastic collision with the striker]")
+      ->excludes(striker);
   strike.add_option("--size", options->size, "The size relative to that of the model");
   strike.add_option("--gain", options->gain, "The linear gain");
   strike.add_flag("--paper-coupling", options->paper_coupling,

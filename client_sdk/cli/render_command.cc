@@ -32,6 +32,14 @@ void PrintSummary(const RenderOptions& options, const v1::RenderSummary& summary
                   summary.rejected_count(), summary.last_rejection().reason(),
                   summary.last_rejection().message());
   }
+  const v1::ContactFindings& findings = summary.findings();
+  if (findings.distant_point_count() > 0) {
+    absl::PrintF("%d points of contact are far from their object's surface, up to %.3g m\n",
+                 findings.distant_point_count(), findings.largest_distance_m());
+  }
+  if (findings.zero_impulse_count() > 0) {
+    absl::PrintF("%d contacts have no impulse\n", findings.zero_impulse_count());
+  }
   if (summary.limited_frame_count() > 0) {
     absl::FPrintF(out, "the limiter worked in %d frames; smaller gains would avoid it\n",
                   summary.limited_frame_count());

@@ -66,7 +66,8 @@ absl::Status SendImpulse(const client::Client& daemon, const std::string& scene,
   impulse.set_object(handle);
   Set(*impulse.mutable_point_m(), options.point_m);
   Set(*impulse.mutable_impulse_newton_seconds(), options.impulse_newton_seconds);
-  impulse.set_duration_s(options.duration_s);
+  if (options.duration_s) impulse.set_duration_s(*options.duration_s);
+  impulse.mutable_hertz()->set_striker(options.striker);
   if (absl::Status sent = (*stream)->Send(std::move(step)); !sent.ok()) return sent;
   const auto report = (*stream)->Finish();
   if (!report.ok()) return report.status();

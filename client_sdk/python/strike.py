@@ -159,7 +159,7 @@ def strike_and_listen(client, model, options):
         impulse = contact_pb2.Impulse(
             object=added.object.handle, point_m=contact_pb2.Vec3(**dict(zip("xyz", options.point))),
             impulse_newton_seconds=contact_pb2.Vec3(**dict(zip("xyz", options.impulse))),
-            duration_s=options.duration)
+            duration_s=options.duration, hertz=contact_pb2.HertzContact(striker=options.striker))
         print(f"{added.object.sounding_mode_count} modes sound, the lowest at "
               f"{added.object.lowest_frequency_hz:.2f} Hz")
         return client.listen(options.seconds, on_start=lambda: client.strike(scene, [impulse]))
@@ -200,7 +200,10 @@ def main():
     parser.add_argument("mesh", type=pathlib.Path, help="surface in metres: OBJ, PLY, STL or OFF")
     parser.add_argument("--point", type=vector, required=True, help="where: x,y,z in m")
     parser.add_argument("--impulse", type=vector, required=True, help="how hard: x,y,z in N s")
-    parser.add_argument("--duration", type=float, default=0.0003, help="of the contact, s")
+    parser.add_argument("--striker", default="steel",
+                        help="steel, wood, rubber, felt or fingertip (default: %(default)s)")
+    parser.add_argument("--duration", type=float,
+                        help="of the contact, s (default: that of an elastic collision)")
     parser.add_argument("--at", type=vector, help="where it is: x,y,z in m from a listener who looks "
                         "along -z; to the right of him is +x")
     parser.add_argument("--material", default="chime_aluminum")

@@ -57,6 +57,11 @@ std::optional<SecondObject> ToSecond(const v1::ImpulseColumns& columns, int row)
                       .rotation = ToRotation(columns.second_rotation(), row)};
 }
 
+std::optional<double> ToDuration(const v1::ImpulseColumns& columns, int row) {
+  if (columns.duration_s().empty() || columns.duration_s(row) < 0) return std::nullopt;
+  return columns.duration_s(row);
+}
+
 }  // namespace
 
 absl::Status Validate(const v1::ImpulseColumns& columns) {
@@ -69,6 +74,15 @@ absl::Status Validate(const v1::ImpulseColumns& columns) {
                      {"second_object", seconds, count, 1, true},
                      {"second_point_m", columns.second_point_m_size(), seconds, 3},
                      {"second_rotation", columns.second_rotation_size(), seconds, 4, true}});
+}
+
+absl::Status Validate(const v1::EngineContactColumns& columns) {
+  absl::Status status = Validate(columns.impulses());
+  const int count = columns.impulses().object_size();
+  status.Update(
+      CheckSizes({{"partner", columns.partner_size(), count, 1, true},
+                  {"travel_speed_m_per_s", columns.travel_speed_m_per_s_size(), count, 1, true}}));
+  return status;
 }
 
 absl::Status Validate(const v1::PoseColumns& columns) {
@@ -88,10 +102,24 @@ ObjectImpulse ReadRow(const v1::ImpulseColumns& columns, int row) {
                       .impulse = {.location = ToArray(columns.point_m(), row),
                                   .impulse_newton_seconds =
                                       ToArray(columns.impulse_newton_seconds(), row),
-                                  .duration_s =
-                                      columns.duration_s().empty() ? 0 : columns.duration_s(row)},
+                                  .duration_s = ToDuration(columns, row)},
                       .second = ToSecond(columns, row)},
           .time_offset_s = columns.time_offset_s().empty() ? 0 : columns.time_offset_s(row)};
+}
+
+ObjectTouch ReadRow(const v1::EngineContactColumns& columns, int row) {
+  ObjectImpulse impulse = ReadRow(columns.impulses(), row);
+  ObjectTouch touch{.contact = impulse.contact,
+                    .partner = columns.partner().empty() ? 0 : columns.partner(row),
+                    .time_offset_s = impulse.time_offset_s};
+  if (!columns.travel_speed_m_per_s().empty()) {
+    touch.roughness.travel_speed_m_per_s = columns.travel_speed_m_per_s(row);
+  }
+  touch.roughness.depth = columns.depth();
+  if (columns.irregularity_length_m() != 0) {
+    touch.roughness.irregularity_length_m = columns.irregularity_length_m();
+  }
+  return touch;
 }
 
 Pose ReadRow(const v1::PoseColumns& columns, int row) {

@@ -9,6 +9,7 @@
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 #include "server/api/column_conversion.h"
+#include "server/api/hertz_conversion.h"
 #include "server/api/pose_conversion.h"
 
 namespace carillon {
@@ -45,26 +46,30 @@ absl::Status ReadContact(const Row& row, const v1::Vec3& vector, ObjectContact& 
   return absl::OkStatus();
 }
 
-HertzContact FromProto(const v1::HertzContact& hertz) {
-  return {.reduced_mass_kg = hertz.reduced_mass_kg(),
-          .reduced_radius_m = hertz.reduced_radius_m(),
-          .approach_speed_m_per_s = hertz.approach_speed_m_per_s(),
-          .striker_young_pa = hertz.striker_young_pa(),
-          .striker_poisson_ratio = hertz.striker_poisson_ratio()};
-}
-
 Roughness FromProto(const v1::Roughness& proto) {
   Roughness roughness;
   roughness.travel_speed_m_per_s = proto.travel_speed_m_per_s();
   roughness.depth = proto.depth();
-  if (proto.grain_m() != 0) roughness.grain_m = proto.grain_m();
+  if (proto.irregularity_length_m() != 0) {
+    roughness.irregularity_length_m = proto.irregularity_length_m();
+  }
   return roughness;
+}
+
+/// Reads how long a contact lasts, or what is known of the collision.
+template <typename Row>
+absl::Status ReadDuration(const Row& row, ContactImpulse& impulse) {
+  if (row.has_duration_s()) {
+    impulse.duration_s = row.duration_s();
+  } else if (row.has_hertz()) {
+    ASSIGN_OR_RETURN(impulse.hertz, ToHertzContact(row.hertz()));
+  }
+  return absl::OkStatus();
 }
 
 absl::Status ReadInto(const v1::Impulse& row, ObjectImpulse& impulse) {
   RETURN_IF_ERROR(ReadContact(row, row.impulse_newton_seconds(), impulse.contact));
-  impulse.contact.impulse.duration_s = row.duration_s();
-  if (row.has_hertz()) impulse.contact.impulse.hertz = FromProto(row.hertz());
+  RETURN_IF_ERROR(ReadDuration(row, impulse.contact.impulse));
   impulse.time_offset_s = row.time_offset_s();
   return absl::OkStatus();
 }
@@ -77,7 +82,8 @@ absl::Status ReadInto(const v1::SustainedContact& row, ObjectForce& force) {
 
 absl::Status ReadInto(const v1::EngineContact& row, ObjectTouch& touch) {
   RETURN_IF_ERROR(ReadContact(row, row.impulse_newton_seconds(), touch.contact));
-  touch.contact.impulse.duration_s = row.duration_s();
+  RETURN_IF_ERROR(ReadDuration(row, touch.contact.impulse));
+  touch.time_offset_s = row.time_offset_s();
   touch.partner = row.partner();
   touch.roughness = FromProto(row.roughness());
   return absl::OkStatus();
@@ -97,11 +103,22 @@ void ReadRows(const Rows& rows, ContactIntake& intake,
   }
 }
 
-void ReadColumns(const v1::ImpulseColumns& columns, ContactIntake& intake) {
-  if (absl::Status status = Validate(columns); !status.ok()) {
-    return intake.Reject(std::max<uint64_t>(1, CountContacts(columns)), std::move(status));
+/// Gives each row of columns to `take`, with the duration of an elastic collision where none is
+/// stated.
+template <typename Contact, typename Columns>
+void ReadColumns(const Columns& columns, const v1::ImpulseColumns& impulses, ContactIntake& intake,
+                 void (ContactIntake::*take)(const Contact&)) {
+  absl::Status status = Validate(columns);
+  const absl::StatusOr<HertzContact> hertz = ToHertzContact(impulses.hertz());
+  status.Update(hertz.status());
+  if (!status.ok()) {
+    return intake.Reject(std::max<uint64_t>(1, CountContacts(impulses)), std::move(status));
   }
-  for (int row = 0; row < columns.object_size(); ++row) intake.Strike(ReadRow(columns, row));
+  for (int row = 0; row < impulses.object_size(); ++row) {
+    Contact contact = ReadRow(columns, row);
+    contact.contact.impulse.hertz = *hertz;
+    (intake.*take)(contact);
+  }
 }
 
 void ReadColumns(const v1::PoseColumns& columns, ContactIntake& intake) {
@@ -116,15 +133,33 @@ void ReadColumns(const v1::PoseColumns& columns, ContactIntake& intake) {
 
 }  // namespace
 
+ContactReading ToContactReading(v1::Frame frame, v1::PulseShape pulse_shape) {
+  return {.scene_frame = frame == v1::FRAME_SCENE,
+          .gaussian_pulses = pulse_shape == v1::PULSE_SHAPE_GAUSSIAN};
+}
+
+v1::ContactFindings ToProto(const IntakeFindings& findings) {
+  v1::ContactFindings proto;
+  proto.set_blow_count(findings.engine.blow_count);
+  proto.set_load_count(findings.engine.load_count);
+  proto.set_distant_point_count(findings.distant_point_count);
+  proto.set_largest_distance_m(findings.largest_distance_m);
+  proto.set_zero_impulse_count(findings.zero_impulse_count);
+  proto.set_too_large_impulse_count(findings.too_large_impulse_count);
+  return proto;
+}
+
 absl::Status ReadStep(const v1::ContactStep& step, ContactIntake& intake) {
   RETURN_IF_ERROR(intake.BeginStep(step.time_s()));
   for (const v1::ObjectPose& row : step.poses()) intake.Move(row.object(), FromProto(row.pose()));
   ReadColumns(step.pose_columns(), intake);
   if (step.has_listener()) intake.MoveListener(FromProto(step.listener()));
   ReadRows(step.impulses(), intake, &ContactIntake::Strike);
-  ReadColumns(step.columns(), intake);
+  ReadColumns(step.columns(), step.columns(), intake, &ContactIntake::Strike);
   ReadRows(step.sustained(), intake, &ContactIntake::Hold);
   ReadRows(step.contacts(), intake, &ContactIntake::Touch);
+  ReadColumns(step.contact_columns(), step.contact_columns().impulses(), intake,
+              &ContactIntake::Touch);
   intake.EndStep();
   return absl::OkStatus();
 }

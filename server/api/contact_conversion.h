@@ -7,6 +7,11 @@
 
 namespace carillon {
 
+/// The conventions of a stream or of a trace.
+ContactReading ToContactReading(v1::Frame frame, v1::PulseShape pulse_shape);
+
+v1::ContactFindings ToProto(const IntakeFindings& findings);
+
 /// Gives `intake` a whole step: poses, impulses, forces, then engine contacts; of each, rows before
 /// columns. Rows that cannot be read count as rejected (LOCATION_MISSING, COLUMNS_MISMATCHED).
 /// Errors: those of ContactIntake::BeginStep.

@@ -47,6 +47,7 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
   }
 
   void AllRead() override {
+    if (stream_) stream_->intake().Finish();
     daemon_.pool.Run([this] { Settle(); });
   }
 
@@ -64,6 +65,7 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
     ContactStreamSettings settings;
     settings.step_s = start.step_s();
     if (start.has_scheduling_delay_s()) settings.scheduling_delay_s = start.scheduling_delay_s();
+    settings.reading = ToContactReading(start.frame(), start.pulse_shape());
     ASSIGN_OR_RETURN(stream_, daemon_.scenes.OpenContactStream(scene, settings));
     Answer();
     return absl::OkStatus();
@@ -133,6 +135,7 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
     if (!stream_->last_rejection().ok()) {
       *answer.mutable_last_rejection() = ToErrorInfo(stream_->last_rejection());
     }
+    *answer.mutable_findings() = ToProto(stream_->findings());
     return answer;
   }
 

@@ -8,6 +8,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "server/api/contact_conversion.h"
 #include "server/api/sample_bytes.h"
 #include "server/api/stream_call.h"
 #include "server/api/trace_reader.h"
@@ -81,6 +82,7 @@ class RenderCall final : public BidiStream<v1::RenderRequest, v1::RenderResponse
     if (!rendered.last_rejection.ok()) {
       *summary.mutable_last_rejection() = ToErrorInfo(rendered.last_rejection);
     }
+    *summary.mutable_findings() = ToProto(rendered.findings);
     summary.set_peak(rendered.peak);
     summary.set_limited_frame_count(rendered.limited_frame_count);
     summary.set_peak_pa(rendered.peak * kFullScalePa);

@@ -69,6 +69,7 @@ absl::Status TraceReader::TakeHeader(const v1::ContactTraceHeader& header) {
   }
   if (header.step_s() > 0 && header.step_s() <= 1) settings_->step_s = header.step_s();
   settings_->space = ToSceneSpace(header.hearing(), header.listener());
+  settings_->reading = ToContactReading(header.frame(), header.pulse_shape());
   if (header.has_clock()) {
     RETURN_IF_ERROR(TakeClock(header.clock()));
   }
@@ -118,6 +119,7 @@ absl::Status TraceReader::TakeStep(const v1::ContactStep& step) {
   time_s_ = step.time_s();
   impulse_count_ += static_cast<uint64_t>(step.impulses_size() + step.columns().object_size() +
                                           step.sustained_size() + step.contacts_size() +
+                                          step.contact_columns().impulses().object_size() +
                                           step.poses_size() + step.pose_columns().object_size());
   // A pose of the listener gives an event for each object.
   if (step.has_listener()) impulse_count_ += object_count_;

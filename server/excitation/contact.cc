@@ -23,19 +23,19 @@ absl::Status Invalid(absl::string_view reason, absl::string_view message) {
 
 bool Positive(double x) { return std::isfinite(x) && x > 0; }
 
-absl::Status ValidateHertz(const ContactImpulse& contact) {
-  if (!contact.hertz) return absl::OkStatus();
-  const HertzContact& hertz = *contact.hertz;
-  if (Positive(hertz.reduced_mass_kg) && Positive(hertz.reduced_radius_m) &&
-      Positive(hertz.approach_speed_m_per_s) && std::isfinite(hertz.striker_young_pa) &&
-      hertz.striker_young_pa >= 0 && std::abs(hertz.striker_poisson_ratio) < 1 &&
-      hertz.striker_poisson_ratio < 0.5) {
+absl::Status Validate(const HertzContact& hertz) {
+  const auto positive = [](const std::optional<double>& x) { return !x || Positive(*x); };
+  const double poisson = hertz.striker_poisson_ratio.value_or(0);
+  if (positive(hertz.reduced_mass_kg) && positive(hertz.reduced_radius_m) &&
+      positive(hertz.approach_speed_m_per_s) && positive(hertz.striker_young_pa) &&
+      positive(hertz.striker_mass_kg) && positive(hertz.striker_radius_m) && poisson > -1 &&
+      poisson < 0.5) {
     return absl::OkStatus();
   }
   return Invalid(
       "INVALID_HERTZ_CONTACT",
-      "reduced mass, reduced radius and approach speed must be above zero, the striker's "
-      "Young's modulus zero or more, its Poisson's ratio above -1 and below 0.5");
+      "masses, radii, the approach speed and the striker's Young's modulus must be above "
+      "zero, its Poisson's ratio above -1 and below 0.5; leave out what is not known");
 }
 
 }  // namespace
@@ -66,12 +66,13 @@ absl::Status Validate(const ContactImpulse& contact) {
         "the impulse has a component that is not a finite number, or is beyond 3.4e38: send N s in "
         "the object's frame");
   }
-  if (!(contact.duration_s >= 0 && contact.duration_s <= kLongestContactS)) {
+  const double duration_s = contact.duration_s.value_or(0);
+  if (!(duration_s >= 0 && duration_s <= kLongestContactS)) {
     return Invalid("INVALID_DURATION",
-                   absl::StrCat("a contact of ", contact.duration_s,
-                                " s: the duration must lie from 0 to ", kLongestContactS, " s"));
+                   absl::StrCat("a contact of ", duration_s, " s: the duration must lie from 0 to ",
+                                kLongestContactS, " s, or be absent"));
   }
-  RETURN_IF_ERROR(ValidateHertz(contact));
+  RETURN_IF_ERROR(Validate(contact.hertz));
   if (const auto* point = std::get_if<Point>(&contact.location)) return ValidatePoint(*point);
   return ValidateWeights(std::get<SurfacePoint>(contact.location).weights);
 }
@@ -79,30 +80,16 @@ absl::Status Validate(const ContactImpulse& contact) {
 absl::Status Validate(const Roughness& roughness) {
   constexpr double kDeepest = 10;
   if (std::isfinite(roughness.travel_speed_m_per_s) && roughness.travel_speed_m_per_s >= 0 &&
-      roughness.depth >= 0 && roughness.depth <= kDeepest && Positive(roughness.grain_m)) {
+      roughness.depth >= 0 && roughness.depth <= kDeepest &&
+      Positive(roughness.irregularity_length_m)) {
     return absl::OkStatus();
   }
-  return Invalid("INVALID_ROUGHNESS",
-                 absl::StrCat("a roughness of depth ", roughness.depth, ", grain ",
-                              roughness.grain_m, " m, travelled at ",
-                              roughness.travel_speed_m_per_s, " m/s: the depth must be 0 to ",
-                              kDeepest, ", the grain above zero, the speed zero or more"));
-}
-
-double HertzDurationS(const HertzContact& contact, double young_pa, double poisson_ratio) {
-  const auto compliance = [](double young, double poisson) {
-    return (1 - poisson * poisson) / young;
-  };
-  const double own = compliance(young_pa, poisson_ratio);
-  const double striker = contact.striker_young_pa > 0
-                             ? compliance(contact.striker_young_pa, contact.striker_poisson_ratio)
-                             : own;
-  const double modulus = 1 / (own + striker);
-  const double mass = contact.reduced_mass_kg;
-  return 2.87 * std::pow(mass * mass /
-                             (contact.reduced_radius_m * modulus * modulus *
-                              contact.approach_speed_m_per_s),
-                         0.2);
+  return Invalid(
+      "INVALID_ROUGHNESS",
+      absl::StrCat("a roughness of depth ", roughness.depth, ", irregularities of ",
+                   roughness.irregularity_length_m, " m, travelled at ",
+                   roughness.travel_speed_m_per_s, " m/s: the depth must be 0 to ", kDeepest,
+                   ", the length of the irregularities above zero, the speed zero or more"));
 }
 
 }  // namespace carillon

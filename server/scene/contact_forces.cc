@@ -4,12 +4,18 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 namespace carillon {
 namespace {
 
 /// After the last force one knot brings the force down to zero, and one ends the slope.
 constexpr int kKnotsToEnd = 2;
+/// An engine's steps have one length, or nearly.
+constexpr double kLongestStep = 1.5;
+constexpr double kLongestBlowS = 0.04;
+/// A force that stays the same for this time is a load.
+constexpr double kLoadS = 0.01;
 
 std::array<float, 3> Scaled(std::array<float, 3> vector, double factor) {
   for (float& component : vector) component *= static_cast<float>(factor);
@@ -23,10 +29,9 @@ double Magnitude(const std::array<float, 3>& vector) {
 }  // namespace
 
 ContactForces::Events ContactForces::Begin(double time_s) {
-  // An engine's steps have one length, or nearly.
-  constexpr double kLongestStep = 1.5;
   Events events;
-  for (int i = 0; i < kKnotsToEnd && time_s_ && !objects_.empty(); ++i) {
+  follows_ = time_s_ && time_s - *time_s_ <= kLongestStep * nominal_step_s_;
+  for (int i = 0; i < kKnotsToEnd && time_s_ && (!objects_.empty() || gathers()); ++i) {
     if (time_s - *time_s_ <= kLongestStep * nominal_step_s_) break;
     step_s_ = nominal_step_s_;
     *time_s_ += step_s_;
@@ -50,7 +55,8 @@ void ContactForces::Add(const Felt& felt, double per_second, const Roughness& ro
 }
 
 void ContactForces::Touch(const ObjectTouch& touch, const FeltContact& impulse) {
-  pairs_[{touch.contact.handle, touch.partner}].touches.push_back({impulse, touch.roughness});
+  pairs_[{touch.contact.handle, touch.partner}].touches.push_back(
+      {impulse, touch.roughness, touch.time_offset_s});
 }
 
 ContactForces::Events ContactForces::End() {
@@ -61,7 +67,8 @@ ContactForces::Events ContactForces::End() {
 
 void ContactForces::End(Events& events) {
   for (auto& [key, pair] : pairs_) Divide(pair, events);
-  std::erase_if(pairs_, [](const auto& pair) { return pair.second.load.idle(); });
+  std::erase_if(pairs_,
+                [](const auto& pair) { return pair.second.load.idle() && !pair.second.blow; });
   for (auto& [handle, object] : objects_) {
     for (const Force& force : object.forces) events.push_back({handle, force.force, *time_s_});
     events.push_back({handle, MakeKnot(object.forces, step_s_), *time_s_});
@@ -72,23 +79,82 @@ void ContactForces::End(Events& events) {
                 [](const auto& object) { return object.second.steps_without >= kKnotsToEnd; });
 }
 
+ContactForces::Events ContactForces::Finish() {
+  Events events;
+  for (auto& [key, pair] : pairs_) {
+    if (pair.blow) SendBlow(*std::exchange(pair.blow, std::nullopt), 0, events);
+  }
+  return events;
+}
+
+bool ContactForces::gathers() const {
+  return std::ranges::any_of(pairs_, [](const auto& pair) { return pair.second.blow.has_value(); });
+}
+
 void ContactForces::Divide(Pair& pair, Events& events) {
   double impulse = 0;
   for (const PairTouch& touch : pair.touches) {
     impulse += Magnitude(touch.impulse.by[0].impulse().impulse_newton_seconds);
   }
-  const double blow = pair.load.Next(impulse, step_s_);
+  const double force = impulse / step_s_;
+  double share = pair.load.Next(impulse, step_s_);  // of the impulse, above the load
+  if (pair.blow) share = force > 0 ? std::max(1 - pair.blow->load_newtons / force, 0.0) : 0;
+  double remains = 0;
+  if (pair.blow && IsOver(*pair.blow, force, share * impulse, remains)) {
+    SendBlow(*std::exchange(pair.blow, std::nullopt), remains, events);
+    share = 0;
+  } else if (share > 0) {
+    if (!pair.blow) pair.blow = {.load_newtons = (1 - share) * force, .begin_s = *time_s_};
+    Gather(pair, force, share * impulse);
+    if (!follows_) SendBlow(*std::exchange(pair.blow, std::nullopt), 0, events);
+  }
+  counts_.load_count += share > 0 ? 0 : pair.touches.size();
   for (const PairTouch& touch : pair.touches) {
-    for (const Felt& felt : touch.impulse.all()) {
-      if (blow > 0) {
-        SurfaceImpulse part = felt.impulse();
-        part.impulse_newton_seconds = Scaled(part.impulse_newton_seconds, blow);
-        events.push_back({felt.handle, part, *time_s_});
-      }
-      Add(felt, (1 - blow) / step_s_, touch.roughness);
-    }
+    for (const Felt& felt : touch.impulse.all()) Add(felt, (1 - share) / step_s_, touch.roughness);
   }
   pair.touches.clear();
+}
+
+void ContactForces::Gather(Pair& pair, double force_newtons, double impulse) const {
+  Blow& blow = *pair.blow;
+  blow.impulses.push_back(impulse);
+  blow.forces.push_back(force_newtons);
+  if (impulse <= blow.greatest) return;
+  blow.greatest = impulse;
+  blow.touches = pair.touches;
+}
+
+bool ContactForces::IsOver(const Blow& blow, double force_newtons, double impulse,
+                           double& remains) const {
+  if (impulse <= blow.greatest / 4) return true;
+  remains = force_newtons;
+  if (*time_s_ - blow.begin_s >= kLongestBlowS) return true;
+  const auto steps = static_cast<size_t>(std::ceil(kLoadS / step_s_));
+  if (impulse > blow.greatest / 2 || blow.forces.size() < steps + 1) return false;
+  return force_newtons >= 0.75 * *(blow.forces.end() - static_cast<ptrdiff_t>(steps));
+}
+
+void ContactForces::SendBlow(const Blow& blow, double remains_newtons, Events& events) {
+  const double excess = std::max(remains_newtons - blow.load_newtons, 0.0) * step_s_;
+  double impulse = 0;
+  for (const double step : blow.impulses) impulse += std::max(step - excess, 0.0);
+  if (!(impulse > 0)) return;
+  ++counts_.blow_count;
+  double whole = 0;
+  for (const PairTouch& touch : blow.touches) {
+    whole += Magnitude(touch.impulse.by[0].impulse().impulse_newton_seconds);
+  }
+  const double scale = impulse / whole;
+  for (const PairTouch& touch : blow.touches) {
+    const double longer =
+        touch.impulse.duration_follows_impulse ? std::pow(scale, kDurationPower) : 1;
+    for (const Felt& felt : touch.impulse.all()) {
+      SurfaceImpulse part = felt.impulse();
+      part.impulse_newton_seconds = Scaled(part.impulse_newton_seconds, scale);
+      part.pulse = part.pulse.Lasting(static_cast<float>(part.pulse.duration_s() * longer));
+      events.push_back({felt.handle, part, *time_s_ + touch.time_offset_s});
+    }
+  }
 }
 
 ForceKnot ContactForces::MakeKnot(const std::vector<Force>& forces, double step_s) {
@@ -98,7 +164,8 @@ ForceKnot ContactForces::MakeKnot(const std::vector<Force>& forces, double step_
     const bool travels = roughness.travel_speed_m_per_s > 0;
     load += share;
     fluctuation += travels ? share * roughness.depth : 0;
-    bandwidth += share * roughness.depth * roughness.travel_speed_m_per_s / roughness.grain_m;
+    bandwidth +=
+        share * roughness.depth * roughness.travel_speed_m_per_s / roughness.irregularity_length_m;
   }
   ForceKnot knot{.step_s = static_cast<float>(step_s)};
   if (fluctuation > 0) {

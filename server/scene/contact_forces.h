@@ -15,6 +15,12 @@
 
 namespace carillon {
 
+/// The numbers of an engine's contacts by what they turned out to be.
+struct BlowCounts {
+  uint64_t blow_count = 0;  ///< blows, each of one step or of several
+  uint64_t load_count = 0;  ///< contacts that were wholly loads, in each step
+};
+
 /// An action on an object at a simulation time.
 struct ForceEvent {
   uint32_t handle = 0;
@@ -25,6 +31,21 @@ struct ForceEvent {
 /// Turns the lasting contacts of one simulation into events of the mixer. Each step gives, for each
 /// object under a force, the object's forces and then a knot; a contact that was a blow gives an
 /// impulse, too. One thread at a time.
+///
+/// Engines with soft contacts spread a blow over several steps. While steps follow each other
+/// without a gap, the steps of a blow are gathered into one impulse, which is sent at the step in
+/// which the blow turns out to be over:
+///
+///     force   |      . .                the blow is over when
+///             |    .     .              * the force above the load has fallen to a quarter of its
+///             |   .       .               greatest value, or
+///             |  .         |            * it stays at less than half of that for 10 ms, or
+///      load   |............|......      * 40 ms have passed.
+///             +------------+------ t    In the last two cases the force that remains is a load,
+///             begin        over         and counts for nothing in the blow.
+///
+/// A client that sends only steps with contacts does not wait: the first step after a gap is a blow
+/// by itself.
 class ContactForces {
  public:
   using Events = std::vector<ForceEvent>;
@@ -46,6 +67,11 @@ class ContactForces {
   /// Ends the step and returns its events.
   Events End();
 
+  /// Ends the simulation: returns the blows that are not over yet.
+  Events Finish();
+
+  const BlowCounts& counts() const { return counts_; }
+
  private:
   struct Force {
     SurfaceForce force;
@@ -58,17 +84,35 @@ class ContactForces {
   struct PairTouch {
     FeltContact impulse;
     Roughness roughness;
+    double time_offset_s = 0;
+  };
+  /// The steps of a blow that is not over yet.
+  struct Blow {
+    double load_newtons = 0;  // before the blow
+    double begin_s = 0;
+    std::vector<double> impulses{};    // above the load, N s, of each step
+    std::vector<double> forces{};      // whole, newtons, of each step
+    std::vector<PairTouch> touches{};  // of the step with the greatest impulse
+    double greatest = 0;               // the greatest of `impulses`
   };
   struct Pair {
     LoadTracker load;
     std::vector<PairTouch> touches;  // of this step
+    std::optional<Blow> blow;
   };
 
   void End(Events& events);
   /// Adds the impulse of `felt` times `per_second` as a force of this step.
   void Add(const Felt& felt, double per_second, const Roughness& roughness);
-  /// Sends the touches of two bodies on: impacts as impulses, loads (see LoadTracker) as forces.
+  /// Sends the touches of two bodies on: blows as impulses, loads (see LoadTracker) as forces.
   void Divide(Pair& pair, Events& events);
+  /// Adds a step's force and the impulse above the load to the pair's blow.
+  void Gather(Pair& pair, double force_newtons, double impulse) const;
+  /// Whether the blow is over in this step, whose force and impulse above the load are given. If a
+  /// load remains, `remains` is set to its force.
+  bool IsOver(const Blow& blow, double force_newtons, double impulse, double& remains) const;
+  void SendBlow(const Blow& blow, double remains_newtons, Events& events);
+  bool gathers() const;
   static ForceKnot MakeKnot(const std::vector<Force>& forces, double step_s);
 
   double nominal_step_s_;
@@ -76,6 +120,8 @@ class ContactForces {
   std::optional<double> time_s_;
   std::map<uint32_t, Object> objects_;
   std::map<std::pair<uint32_t, uint32_t>, Pair> pairs_;
+  bool follows_ = false;  // this step follows the one before without a gap
+  BlowCounts counts_;
 };
 
 }  // namespace carillon

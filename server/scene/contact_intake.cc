@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/scene/contact_intake.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
+#include <variant>
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 #include "server/scene/felt_contact.h"
+#include "server/scene/scene_frame.h"
 
 namespace carillon {
 namespace {
@@ -53,7 +56,8 @@ absl::Status ContactIntake::TryStrike(const ObjectImpulse& impulse) {
   ASSIGN_OR_RETURN(const double frame, FrameOfImpulse(impulse.time_offset_s));
   FeltContact felt;
   const MutexLock lock(&scene_.mutex());
-  RETURN_IF_ERROR(Locate(impulse.contact, felt));
+  RETURN_IF_ERROR(Locate(impulse.contact, 1, felt));
+  NoteZero(impulse.contact);
   impulse_count_ += felt.count;
   for (Felt& one : felt.all()) Push(one.event, frame);
   return absl::OkStatus();
@@ -67,7 +71,7 @@ absl::Status ContactIntake::TryHold(const ObjectForce& force) {
   RETURN_IF_ERROR(Validate(force.roughness));
   FeltContact felt;
   const MutexLock lock(&scene_.mutex());
-  RETURN_IF_ERROR(Locate(force.contact, felt));
+  RETURN_IF_ERROR(Locate(force.contact, settings_.step_s, felt));
   forces_.Add(felt, force.roughness);
   return absl::OkStatus();
 }
@@ -78,9 +82,11 @@ void ContactIntake::Touch(const ObjectTouch& touch) {
 
 absl::Status ContactIntake::TryTouch(const ObjectTouch& touch) {
   RETURN_IF_ERROR(Validate(touch.roughness));
+  RETURN_IF_ERROR(FrameOfImpulse(touch.time_offset_s).status());
   FeltContact felt;
   const MutexLock lock(&scene_.mutex());
-  RETURN_IF_ERROR(Locate(touch.contact, felt));
+  RETURN_IF_ERROR(Locate(touch.contact, 1, felt));
+  NoteZero(touch.contact);
   forces_.Touch(touch, felt);
   return absl::OkStatus();
 }
@@ -115,6 +121,8 @@ absl::Status ContactIntake::TryMoveListener(const Pose& pose) {
 
 void ContactIntake::EndStep() { Push(forces_.End()); }
 
+void ContactIntake::Finish() { Push(forces_.Finish()); }
+
 void ContactIntake::Reject(uint64_t count, absl::Status reason) {
   rejected_count_ += count;
   last_rejection_ = std::move(reason);
@@ -124,11 +132,52 @@ void ContactIntake::Note(uint64_t count, absl::Status verdict) {
   if (!verdict.ok()) Reject(count, std::move(verdict));
 }
 
-absl::Status ContactIntake::Locate(const ObjectContact& contact, FeltContact& felt) const {
+absl::Status ContactIntake::Locate(const ObjectContact& contact, double seconds,
+                                   FeltContact& felt) {
   ASSIGN_OR_RETURN(const SoundingObject* object, scene_.Find(contact.handle));
-  if (!contact.second) return Feel(contact, *object, nullptr, felt);
-  ASSIGN_OR_RETURN(const SoundingObject* second, scene_.Find(contact.second->handle));
-  return Feel(contact, *object, second, felt);
+  const SoundingObject* second = nullptr;
+  if (contact.second) {
+    ASSIGN_OR_RETURN(second, scene_.Find(contact.second->handle));
+  }
+  RETURN_IF_ERROR(settings_.reading.scene_frame
+                      ? Feel(FromSceneFrame(contact, *object, second), *object, second, felt)
+                      : Feel(contact, *object, second, felt));
+  if (settings_.reading.gaussian_pulses) {
+    for (Felt& one : felt.all()) {
+      auto& impulse = std::get<SurfaceImpulse>(one.event.action);
+      impulse.pulse = Pulse::Gaussian(impulse.pulse.duration_s());
+    }
+  }
+  return Examine(felt, seconds);
+}
+
+absl::Status ContactIntake::Examine(const FeltContact& felt, double seconds) {
+  constexpr double kDistantShare = 0.05;
+  const auto& [x, y, z] = felt.by[0].impulse().impulse_newton_seconds;
+  const double impulse = std::hypot(double{x}, double{y}, double{z}) * seconds;
+  for (const Felt& one : felt.all()) {
+    findings_.largest_distance_m = std::max(findings_.largest_distance_m, one.distance_m);
+    if (one.distance_m > kDistantShare * one.extent_m) ++findings_.distant_point_count;
+    if (impulse <= one.largest_newton_seconds) continue;
+    ++findings_.too_large_impulse_count;
+    return Invalid("IMPULSE_TOO_LARGE",
+                   absl::StrCat("an impulse of ", impulse, " N s on object ", one.handle,
+                                ": it may be at most ", one.largest_newton_seconds,
+                                ", ten times the object's mass times the speed of sound in its "
+                                "material; send newton seconds, and check the object's size"));
+  }
+  return absl::OkStatus();
+}
+
+void ContactIntake::NoteZero(const ObjectContact& contact) {
+  const auto& [x, y, z] = contact.impulse.impulse_newton_seconds;
+  if (x == 0 && y == 0 && z == 0) ++findings_.zero_impulse_count;
+}
+
+IntakeFindings ContactIntake::findings() const {
+  IntakeFindings findings = findings_;
+  findings.engine = forces_.counts();
+  return findings;
 }
 
 void ContactIntake::Push(const ContactForces::Events& events) {

@@ -26,6 +26,12 @@ class EventTarget {
   virtual void Push(const MixerEvent& event) = 0;
 };
 
+/// How the contacts of a simulation are to be read.
+struct ContactReading {
+  bool scene_frame = false;      ///< points and impulses are in the scene's frame
+  bool gaussian_pulses = false;  ///< instead of raised cosines
+};
+
 /// How an intake maps simulation time to frames.
 struct IntakeSettings {
   double sample_rate_hz = 48000;
@@ -35,6 +41,16 @@ struct IntakeSettings {
   /// lies at the target's frame when the step comes.
   std::optional<TimeMapping> mapping = std::nullopt;
   double most_ahead_s = 60;  ///< limit of TIME_TOO_FAR_AHEAD, not counting the delay
+  ContactReading reading{};
+};
+
+/// Findings of an intake about contacts.
+struct IntakeFindings {
+  BlowCounts engine{};
+  uint64_t distant_point_count = 0;      ///< farther than 5 % of the object's extent
+  double largest_distance_m = 0;         ///< of a point from its object's surface
+  uint64_t zero_impulse_count = 0;       ///< contacts without an impulse
+  uint64_t too_large_impulse_count = 0;  ///< rejected
 };
 
 /// Takes all that a client reports of one simulation, checks it, locates it on the objects of a
@@ -68,6 +84,9 @@ class ContactIntake {
   /// Ends the step: all its forces have been reported.
   void EndStep();
 
+  /// Ends the simulation: blows that an engine spreads over steps are over now.
+  void Finish();
+
   /// Counts `count` contacts that could not be used.
   void Reject(uint64_t count, absl::Status reason);
 
@@ -78,6 +97,7 @@ class ContactIntake {
   uint64_t rejected_count() const { return rejected_count_; }
   /// Why the newest rejected contact could not be used; OK if none was rejected.
   const absl::Status& last_rejection() const { return last_rejection_; }
+  IntakeFindings findings() const;
 
  private:
   absl::Status TryStrike(const ObjectImpulse& impulse);
@@ -86,8 +106,13 @@ class ContactIntake {
   absl::Status TryMove(uint32_t handle, const Pose& pose);
   absl::Status TryMoveListener(const Pose& pose);
   void Note(uint64_t count, absl::Status verdict);
-  absl::Status Locate(const ObjectContact& contact, FeltContact& felt) const
+  /// Finds the objects of a contact and what they feel. `seconds`: one for an impulse, the step for
+  /// a force.
+  absl::Status Locate(const ObjectContact& contact, double seconds, FeltContact& felt)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(scene_.mutex());
+  /// Notes what is strange about a contact, and refuses one that no body bears.
+  absl::Status Examine(const FeltContact& felt, double seconds);
+  void NoteZero(const ObjectContact& contact);
   void Push(const ContactForces::Events& events);
   void Push(MixerEvent& event, double frame);
   absl::StatusOr<double> FrameOfImpulse(double time_offset_s) const;
@@ -104,6 +129,7 @@ class ContactIntake {
   uint64_t impulse_count_ = 0;
   uint64_t rejected_count_ = 0;
   absl::Status last_rejection_;
+  IntakeFindings findings_;
 };
 
 }  // namespace carillon

@@ -43,7 +43,8 @@ absl::StatusOr<std::unique_ptr<ContactStream>> ContactStream::Make(
   ASSIGN_OR_RETURN(std::unique_ptr<EventStream> events, mixer.OpenStream(kQueueCapacity));
   const IntakeSettings intake{.sample_rate_hz = mixer.settings().sample_rate_hz,
                               .step_s = settings.step_s,
-                              .delay_s = delay_s};
+                              .delay_s = delay_s,
+                              .reading = settings.reading};
   return std::unique_ptr<ContactStream>(
       new ContactStream(std::move(scene), mixer, intake, std::move(events)));
 }

@@ -18,6 +18,7 @@ struct ContactStreamSettings {
   double step_s = 0;  ///< the simulator's step: above 0, at most 1
   /// 0 to 10; absent: one step, one block and 5 ms for the network.
   std::optional<double> scheduling_delay_s = std::nullopt;
+  ContactReading reading{};
 };
 
 /// The numbers of a stream's steps, and of its impulses by what became of them.
@@ -38,6 +39,8 @@ class ContactStream {
   static absl::StatusOr<std::unique_ptr<ContactStream>> Make(std::shared_ptr<Scene> scene,
                                                              Mixer& mixer,
                                                              const ContactStreamSettings& settings);
+
+  IntakeFindings findings() const { return intake_.findings(); }
 
   /// Takes the reports of the simulator.
   ContactIntake& intake() { return intake_; }

@@ -2,26 +2,14 @@
 #include "server/scene/felt_contact.h"
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
+#include <limits>
 
 #include "proto/cpp/status_macros.h"
 
 namespace carillon {
 namespace {
-
-/// How long `object` and its striker touch.
-double DurationS(const SoundingObject& object, const ContactImpulse& impulse,
-                 const SoundingObject* striker) {
-  if (!impulse.hertz) return impulse.duration_s;
-  HertzContact hertz = *impulse.hertz;
-  if (hertz.striker_young_pa == 0 && striker != nullptr) {
-    hertz.striker_young_pa = striker->properties.material.young_pa;
-    hertz.striker_poisson_ratio = striker->body->model->poisson_ratio;
-  }
-  return std::min(
-      HertzDurationS(hertz, object.properties.material.young_pa, object.body->model->poisson_ratio),
-      kLongestContactS);
-}
 
 absl::StatusOr<LocatedPoint> Locate(const SoundingObject& object,
                                     const std::variant<Point, SurfacePoint>& location) {
@@ -43,46 +31,90 @@ Quaternion RotationBetween(const SoundingObject& from, const SoundingObject& to)
   return Product(Inverse(orientation(to)), orientation(from));
 }
 
-absl::Status FillIn(const SoundingObject& object, const ContactImpulse& impulse,
-                    const SoundingObject* striker, SurfaceImpulse& felt) {
-  RETURN_IF_ERROR(Validate(impulse));
-  ASSIGN_OR_RETURN(const LocatedPoint& located, Locate(object, impulse.location));
+double MassKg(const SoundingObject& object) {
+  const SoundingMaterial& material = object.properties.material;
+  const double volume = object.body->volume_m3 * material.size * material.size * material.size;
+  return volume > 0 ? volume * material.density_kg_per_m3 : std::numeric_limits<double>::infinity();
+}
+
+/// The object as one of two bodies that collide at `located`.
+ElasticBody ElasticBodyAt(const SoundingObject& object, const LocatedPoint& located) {
+  const ModalModel& model = *object.body->model;
+  Point point{};
+  for (size_t i = 0; i < 3; ++i) {
+    const std::array<float, 3>& vertex = model.vertices[located.vertices[i]];
+    for (size_t axis = 0; axis < 3; ++axis) point[axis] += located.weights[i] * vertex[axis];
+  }
+  return {.young_pa = object.properties.material.young_pa,
+          .poisson_ratio = model.poisson_ratio,
+          .mass_kg = MassKg(object),
+          .curvature_per_m = object.body->curvature.At(model.given_triangle[located.triangle],
+                                                       point, object.properties.material.size)};
+}
+
+double Magnitude(const Vector3& vector) { return std::hypot(vector[0], vector[1], vector[2]); }
+
+/// Fills in the impulse on one object, without its pulse.
+void FillIn(const SoundingObject& object, const LocatedPoint& located, const Vector3& impulse,
+            Felt& felt) {
   const auto narrow = [](double x) { return static_cast<float>(x); };
-  felt.at.vertices = located.vertices;
-  std::ranges::transform(located.weights, felt.at.weights.begin(), narrow);
-  std::ranges::transform(impulse.impulse_newton_seconds, felt.impulse_newton_seconds.begin(),
-                         narrow);
-  felt.tau_s = narrow(GaussianTauS(DurationS(object, impulse, striker)));
-  return absl::OkStatus();
+  SurfaceImpulse surface{.at = {.vertices = located.vertices}};
+  std::ranges::transform(located.weights, surface.at.weights.begin(), narrow);
+  std::ranges::transform(impulse, surface.impulse_newton_seconds.begin(), narrow);
+  felt.event = {.bank = object.bank, .action = surface};
+  const SoundingMaterial& material = object.properties.material;
+  felt.distance_m = located.distance_m * material.size;
+  felt.extent_m = object.body->extent_m * material.size;
+  felt.largest_newton_seconds =
+      10 * MassKg(object) * std::sqrt(material.young_pa / material.density_kg_per_m3);
+}
+
+void SetDuration(double duration_s, FeltContact& felt) {
+  for (Felt& one : felt.all()) {
+    std::get<SurfaceImpulse>(one.event.action).pulse =
+        Pulse::RaisedCosine(static_cast<float>(duration_s));
+  }
 }
 
 /// Fills in the opposite impulse, which the second object feels for as long as the first does.
-absl::Status FeelOpposite(const ObjectContact& contact, const SoundingObject& object,
-                          const SoundingObject& second, FeltContact& felt) {
+void FeelOpposite(const ObjectContact& contact, const SoundingObject& object,
+                  const SoundingObject& second, const LocatedPoint& located, FeltContact& felt) {
   const Quaternion rotation = contact.second->rotation.value_or(RotationBetween(object, second));
-  const Vector3 turned = Rotated(contact.impulse.impulse_newton_seconds, Normalized(rotation));
-  ContactImpulse opposite{.location = contact.second->location};
-  std::ranges::transform(turned, opposite.impulse_newton_seconds.begin(), std::negate());
-  felt.by[1] = {.handle = contact.second->handle, .event = {.bank = second.bank}};
-  auto& impulse = std::get<SurfaceImpulse>(felt.by[1].event.action);
-  RETURN_IF_ERROR(FillIn(second, opposite, nullptr, impulse));
-  impulse.tau_s = felt.by[0].impulse().tau_s;
+  Vector3 opposite = Rotated(contact.impulse.impulse_newton_seconds, Normalized(rotation));
+  std::ranges::transform(opposite, opposite.begin(), std::negate());
+  felt.by[1].handle = contact.second->handle;
   felt.count = 2;
-  return absl::OkStatus();
+  FillIn(second, located, opposite, felt.by[1]);
 }
 
 }  // namespace
 
 absl::Status Feel(const ObjectContact& contact, const SoundingObject& object,
                   const SoundingObject* second, FeltContact& felt) {
+  const ContactImpulse& impulse = contact.impulse;
   if (second != nullptr && contact.second->rotation) {
     RETURN_IF_ERROR(Validate(*contact.second->rotation));
   }
-  felt.by[0] = {.handle = contact.handle, .event = {.bank = object.bank}};
-  auto& impulse = std::get<SurfaceImpulse>(felt.by[0].event.action);
-  RETURN_IF_ERROR(FillIn(object, contact.impulse, second, impulse));
+  RETURN_IF_ERROR(Validate(impulse));
+  ASSIGN_OR_RETURN(const LocatedPoint& located, Locate(object, impulse.location));
+  felt.by[0].handle = contact.handle;
   felt.count = 1;
-  return second == nullptr ? absl::OkStatus() : FeelOpposite(contact, object, *second, felt);
+  FillIn(object, located, impulse.impulse_newton_seconds, felt.by[0]);
+  ElasticBody striker = kSteelTip;
+  if (second != nullptr) {
+    ASSIGN_OR_RETURN(const LocatedPoint& opposite, Locate(*second, contact.second->location));
+    FeelOpposite(contact, object, *second, opposite, felt);
+    striker = ElasticBodyAt(*second, opposite);
+  }
+  if (impulse.duration_s) {
+    SetDuration(*impulse.duration_s, felt);
+    return absl::OkStatus();
+  }
+  felt.duration_follows_impulse = !impulse.hertz.approach_speed_m_per_s;
+  SetDuration(HertzDurationS(ElasticBodyAt(object, located), striker, impulse.hertz,
+                             Magnitude(impulse.impulse_newton_seconds)),
+              felt);
+  return absl::OkStatus();
 }
 
 }  // namespace carillon

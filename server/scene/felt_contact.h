@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <variant>
 
@@ -17,7 +18,12 @@ namespace carillon {
 /// The impulse that one object feels of a contact, as the event that its bank gets.
 struct Felt {
   uint32_t handle = 0;
-  MixerEvent event{};  ///< a SurfaceImpulse; its time is set when it is sent
+  MixerEvent event{};     ///< a SurfaceImpulse; its time is set when it is sent
+  double distance_m = 0;  ///< from the point that was told to the surface
+  double extent_m = 0;    ///< of the object
+  /// An impulse that makes the whole object ten times as fast as sound travels in its material. No
+  /// body bears even a tenth of it.
+  double largest_newton_seconds = std::numeric_limits<double>::infinity();
 
   const SurfaceImpulse& impulse() const { return std::get<SurfaceImpulse>(event.action); }
 };
@@ -26,14 +32,20 @@ struct Felt {
 struct FeltContact {
   std::array<Felt, 2> by{};
   size_t count = 0;
+  /// Whether the duration was computed from the impulse, so that a greater one has a shorter
+  /// contact.
+  bool duration_follows_impulse = false;
 
   std::span<Felt> all() { return std::span(by).first(count); }
   std::span<const Felt> all() const { return std::span(by).first(count); }
 };
 
+/// The time of an elastic collision goes with this power of the impulse.
+inline constexpr double kDurationPower = -0.2;
+
 /// Fills in the impulses that `object`, and in a contact of two `second`, feel of `contact`. Points
-/// are in metres of the object at its size. If the contact is that of elastic bodies and names no
-/// striker, each object is the other's striker, and a single object meets one of its own material.
+/// are in metres of the object at its size. Where the contact states no duration, it is that of the
+/// collision of `object` with `second` or, without one, with the tip of a steel hammer.
 /// Errors: InvalidArgument (INVALID_POSE: the rotation between the objects, and those of Validate
 /// and of SurfaceLocator).
 absl::Status Feel(const ObjectContact& contact, const SoundingObject& object,

@@ -44,6 +44,7 @@ struct ObjectTouch {
   ObjectContact contact{};  ///< the impulse is that of the whole step
   uint32_t partner = 0;     ///< names the other body
   Roughness roughness{};
+  double time_offset_s = 0;  ///< of a blow
 };
 
 }  // namespace carillon

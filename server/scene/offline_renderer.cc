@@ -41,7 +41,8 @@ IntakeSettings IntakeSettingsOf(const OfflineSettings& settings) {
   return {.sample_rate_hz = static_cast<double>(settings.sample_rate_hz),
           .step_s = settings.step_s,
           .mapping = settings.mapping,
-          .most_ahead_s = OfflineRenderer::kMaxTimeS - settings.mapping.first_time_s};
+          .most_ahead_s = OfflineRenderer::kMaxTimeS - settings.mapping.first_time_s,
+          .reading = settings.reading};
 }
 
 bool IsMove(const MixerEvent& event) {
@@ -97,6 +98,7 @@ absl::Status OfflineRenderer::AddObject(uint32_t handle, std::shared_ptr<const M
 
 size_t OfflineRenderer::Render(std::span<float> samples) {
   if (!begun_) {
+    intake_.Finish();
     // Events of one sample keep their order, as they do live.
     std::ranges::stable_sort(events(), {}, &MixerEvent::FirstSample);
     const auto last = std::find_if_not(events().rbegin(), events().rend(), IsMove);
@@ -136,6 +138,7 @@ size_t OfflineRenderer::RenderBlocks(std::span<float> samples) {
   summary_.accepted_count = statistics.accepted_count + statistics.late_count;
   summary_.rejected_count = intake_.rejected_count();
   summary_.last_rejection = intake_.last_rejection();
+  summary_.findings = intake_.findings();
   summary_.limited_frame_count = statistics.limited_frame_count;
   summary_.peak = std::max(summary_.peak, mixer_.TakePeak());
   return count;

@@ -30,6 +30,7 @@ struct OfflineSettings {
   /// The simulator's step, seconds, above 0 and at most 1.
   double step_s = 1.0 / 60;
   SceneSpace space{};
+  ContactReading reading{};
   /// The mapping by which the trace was heard live. Rendering begins at its first frame, a multiple
   /// of OfflineRenderer::kBlockFrameCount.
   TimeMapping mapping{};
@@ -45,6 +46,7 @@ struct OfflineSummary {
   absl::Status last_rejection;  ///< why the newest of those was rejected; OK if none was
   double peak = 0;              ///< before the limiter
   uint64_t limited_frame_count = 0;
+  IntakeFindings findings;
 };
 
 /// Renders a recorded simulation with a mixer of its own, as fast as possible and bit for bit the

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "proto/cpp/status_macros.h"
+#include "server/excitation/surface_measures.h"
 
 namespace carillon {
 namespace {
@@ -21,8 +22,14 @@ absl::StatusOr<std::shared_ptr<const SoundingBody>> MakeBody(
   });
   ShapeTable shapes(model->shapes, model->vertices.size(), model->mode_count());
   ASSIGN_OR_RETURN(std::unique_ptr<SurfaceLocator> locator, indexing.get());
-  return std::make_shared<const SoundingBody>(SoundingBody{
-      .model = std::move(model), .shapes = std::move(shapes), .locator = std::move(locator)});
+  const ModalModel& of = *model;
+  return std::make_shared<const SoundingBody>(
+      SoundingBody{.model = std::move(model),
+                   .shapes = std::move(shapes),
+                   .locator = std::move(locator),
+                   .curvature = SurfaceCurvature(of.given_vertices, of.given_triangles),
+                   .volume_m3 = VolumeM3(of.vertices, of.triangles),
+                   .extent_m = ExtentM(of.vertices)});
 }
 
 }  // namespace

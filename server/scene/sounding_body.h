@@ -7,6 +7,7 @@
 #include "absl/base/thread_annotations.h"
 #include "absl/status/statusor.h"
 #include "server/base/mutex.h"
+#include "server/excitation/surface_curvature.h"
 #include "server/excitation/surface_locator.h"
 #include "server/mode_database/modal_model.h"
 #include "server/synthesis/bank/shape_table.h"
@@ -19,6 +20,9 @@ struct SoundingBody {
   std::shared_ptr<const ModalModel> model;
   ShapeTable shapes;
   std::unique_ptr<const SurfaceLocator> locator;
+  SurfaceCurvature curvature;  ///< of the surface as given
+  double volume_m3 = 0;        ///< at the model's size; zero: unknown
+  double extent_m = 0;         ///< the diagonal of the bounding box at the model's size
 };
 
 /// Makes the body of a model once, and finds it again while any object uses it. Safe from every

@@ -71,7 +71,7 @@ TEST(MixerRealtime, RenderNeitherAllocatesNorFreesNorLocks) {
     if (i % 3 == 0) move.action = ListenerMove{motion};
     stream->TryPush(move);
     SurfaceImpulse impulse = MakeUnitImpulse();
-    impulse.tau_s = 1e-4F;
+    impulse.pulse = Pulse::RaisedCosine(4e-4F);
     if (i % 7 == 0) impulse.impulse_newton_seconds[0] = std::numeric_limits<float>::quiet_NaN();
     // In time, between samples, late, and, while the heap is full, too many.
     for (uint64_t k = 0; k < 8; ++k) {

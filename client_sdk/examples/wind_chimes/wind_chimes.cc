@@ -11,7 +11,6 @@
 
 #include "client_sdk/adapters/bullet_contacts.h"
 #include "client_sdk/examples/wind_chimes/gust.h"
-#include "client_sdk/examples/wind_chimes/hertz.h"
 #include "client_sdk/examples/wind_chimes/tubes.h"
 
 namespace carillon::wind_chimes {
@@ -37,13 +36,8 @@ constexpr double kThreadMass_kg = 0.002;
 constexpr double kAir_kg_per_m3 = 1.2;
 constexpr double kDrag = 1.2;  // coefficient of a flat plate
 
-// The contact modulus is that of maple, across the grain, on aluminum.
-constexpr double kContactModulus_pa = 1.4e9;
-constexpr double kContactRadius_m = 1 / (1 / kClapperRadius_m + 1 / kOuterRadius_m);
 constexpr double kTubeRestitution = 0.9;
 constexpr double kClapperRestitution = 0.65;  // Bullet takes the product
-// Slower contacts are loads, for which the duration does not matter.
-constexpr double kSlowestImpact_m_per_s = 0.001;
 
 double TubeMass(const Tube& tube) {
   const double inner = kOuterRadius_m - kWall_m;
@@ -60,22 +54,6 @@ btVector3 TubeInertia(const Tube& tube) {
   return {across, across, mass * squares / 2};
 }
 
-/// The duration of an impact of a tube with the clapper, or with another tube, with the impulse J.
-/// The speed of approach is J/(m (1 + e)) with the reduced mass m and the coefficient of
-/// restitution e.
-double ContactDuration(const v1::EngineContact& contact) {
-  const bool on_tube = contact.has_second();
-  const double other_mass =
-      on_tube ? TubeMass(kTubes[contact.second().object() - 1]) : kClapperMass_kg;
-  const double mass = 1 / (1 / TubeMass(kTubes[contact.object() - 1]) + 1 / other_mass);
-  const double restitution = kTubeRestitution * (on_tube ? kTubeRestitution : kClapperRestitution);
-  const v1::Vec3& impulse = contact.impulse_newton_seconds();
-  const double speed =
-      std::max(std::hypot(impulse.x(), impulse.y(), impulse.z()) / (mass * (1 + restitution)),
-               kSlowestImpact_m_per_s);
-  return HertzDuration(mass, kContactRadius_m, kContactModulus_pa, speed);
-}
-
 }  // namespace
 
 /// Owns the objects to which Bullet only points.
@@ -85,7 +63,7 @@ class WindChimes::World {
       : gust_(seed),
         dispatcher_(&configuration_),
         world_(&dispatcher_, &broadphase_, &solver_, &configuration_),
-        contacts_({.roughness_depth = 0}) {
+        contacts_({.roughness_depth = 0, .striker = "wood"}) {
     world_.setGravity({0, 0, -9.81});
     world_.getSolverInfo().m_numIterations = 50;
     // By default Bullet lets no contact bounce that is slower than 0.2 m/s.
@@ -106,7 +84,7 @@ class WindChimes::World {
     step_.set_time_s(static_cast<double>(step_count_++) * kStep_s);
     world_.stepSimulation(kStep_s, 0);
     for (v1::EngineContact& contact : *step_.mutable_contacts()) {
-      contact.set_duration_s(ContactDuration(contact));
+      if (!contact.has_second()) contact.mutable_hertz()->set_striker_radius_m(kClapperRadius_m);
     }
     return std::move(step_);
   }

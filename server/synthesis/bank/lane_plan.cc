@@ -11,12 +11,11 @@ namespace {
 
 using Complex = std::complex<double>;
 
-/// s^2/2. For a mode so strongly damped that it decays within the contact, where exp(s^2 tau^2/2)
-/// would explode, -|s|^2/2.
-Complex GaussianExponent(const SoundingMode& mode) {
+/// s = sigma + i omega. For a mode so strongly damped that sigma^2 > omega^2, where the factor
+/// exp(s^2 tau^2/2) of a Gaussian would explode, i |s|.
+Complex ContactS(const SoundingMode& mode) {
   const Complex s(mode.decay_rate_per_s, mode.damped_rad_per_s);
-  const Complex exponent = s * s / 2.0;
-  return exponent.real() < 0 ? exponent : -std::norm(s) / 2;
+  return -s.real() < s.imag() ? s : Complex(0, std::abs(s));
 }
 
 PlannedLane PlanLane(const SoundingMode& mode, const LanePlanSettings& settings, double gain,
@@ -27,7 +26,7 @@ PlannedLane PlanLane(const SoundingMode& mode, const LanePlanSettings& settings,
           .start = std::polar((companion ? -gain : gain) * mode.coupling / mode.damped_rad_per_s,
                               mode.output_phase_rad) *
                    Complex(0, -1),
-          .gaussian_exponent = GaussianExponent(mode),
+          .contact_s = ContactS(mode),
           .spread = {},
           .companion = companion};
 }

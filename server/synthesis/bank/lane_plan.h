@@ -20,8 +20,8 @@ struct PlannedLane {
   uint32_t column = 0;
   std::complex<double> log_q;  ///< (sigma + i omega)/rate
   std::complex<double> start;  ///< the state after a modal impulse of one unit of the shape table
-  std::complex<double> gaussian_exponent;  ///< of a Gaussian contact, for tau = 1 s
-  SpreadMode spread;                       ///< into the long blocks of its part
+  std::complex<double> contact_s;  ///< sigma + i omega, 1/s, for the factor of a contact
+  SpreadMode spread;               ///< into the long blocks of its part
   bool companion = false;
 };
 

@@ -52,7 +52,7 @@ void WriteLane(const PlannedLane& planned, uint32_t first_column, size_t block_f
   lanes.block_im[lane] = block.imag();
   Set(lanes.gain_re, lanes.gain_im, lane, planned.start);
   Set(lanes.lead_re, lanes.lead_im, lane, planned.log_q);
-  Set(lanes.tau_re, lanes.tau_im, lane, planned.gaussian_exponent);
+  Set(lanes.contact_re, lanes.contact_im, lane, planned.contact_s);
   lanes.column[lane] = planned.column - first_column;
 }
 

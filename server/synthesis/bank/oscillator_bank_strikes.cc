@@ -32,6 +32,12 @@ double Norm(const std::array<float, 3>& vector) {
   return std::hypot(vector[0], vector[1], vector[2]);
 }
 
+strike_kernel::Onset OnsetOf(float lead_frames, Pulse pulse) {
+  return {.lead_frames = lead_frames,
+          .gaussian_tau_s = pulse.gaussian() ? pulse.duration_s() / 4 : 0,
+          .cosine_duration_s = pulse.gaussian() ? 0 : pulse.duration_s()};
+}
+
 }  // namespace
 
 std::optional<strike_kernel::Projection> OscillatorBank::Project(
@@ -71,7 +77,8 @@ StrikeBatch::RowsAhead OscillatorBank::RowsOf(std::span<const DueEvent> events) 
 bool OscillatorBank::StrikeMerged(std::span<const DueEvent> events, BlockMix& mix) noexcept {
   float* modal_impulses = mix.batch().modal_impulses();
   strike_kernel::Projection projection{.column_count = column_count_};
-  double weight_sum = 0, time_sum = 0, tau_squared_sum = 0;
+  double weight_sum = 0, time_sum = 0, variance_sum = 0, most_weight = 0;
+  Pulse shape;
   for (const DueEvent& due : events) {
     const SurfaceImpulse* impulse = due.event->impulse();
     assert(impulse != nullptr);
@@ -80,7 +87,9 @@ bool OscillatorBank::StrikeMerged(std::span<const DueEvent> events, BlockMix& mi
     const double weight = Norm(impulse->impulse_newton_seconds);
     weight_sum += weight;
     time_sum += weight * (due.offset - double{due.event->LeadFrames()});
-    tau_squared_sum += weight * impulse->tau_s * impulse->tau_s;
+    variance_sum += weight * impulse->pulse.variance_s2();
+    if (weight > most_weight) shape = impulse->pulse;
+    most_weight = std::max(most_weight, weight);
     AddVertex(nearest, 1, impulse->impulse_newton_seconds, projection);
     if (projection.row_count < projection.rows.size()) continue;
     strike_kernel::Project(projection, modal_impulses);
@@ -91,10 +100,9 @@ bool OscillatorBank::StrikeMerged(std::span<const DueEvent> events, BlockMix& mi
   if (projection.row_count > 0) strike_kernel::Project(projection, modal_impulses);
   const double time = time_sum / weight_sum;
   const double offset = std::max(std::ceil(time), 0.0);
+  const Pulse pulse = Pulse::OfVariance(static_cast<float>(variance_sum / weight_sum), shape);
   return StrikeModes({modal_impulses, column_count_}, static_cast<size_t>(offset),
-                     {.lead_frames = static_cast<float>(offset - time),
-                      .tau_s = static_cast<float>(std::sqrt(tau_squared_sum / weight_sum))},
-                     mix);
+                     OnsetOf(static_cast<float>(offset - time), pulse), mix);
 }
 
 bool OscillatorBank::Strike(const SurfaceImpulse& impulse, size_t offset, float lead_frames,
@@ -104,8 +112,8 @@ bool OscillatorBank::Strike(const SurfaceImpulse& impulse, size_t offset, float 
   if (!projection) return false;
   float* modal_impulses = mix.batch().modal_impulses();
   strike_kernel::Project(*projection, modal_impulses);
-  return StrikeModes({modal_impulses, column_count_}, offset,
-                     {.lead_frames = lead_frames, .tau_s = impulse.tau_s}, mix);
+  return StrikeModes({modal_impulses, column_count_}, offset, OnsetOf(lead_frames, impulse.pulse),
+                     mix);
 }
 
 bool OscillatorBank::StrikeModes(std::span<const float> modal_impulses, size_t offset,

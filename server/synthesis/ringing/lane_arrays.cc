@@ -23,8 +23,8 @@ LaneArrays::LaneArrays(size_t lane_count)
       gain_im(lane_count),
       lead_re(lane_count),
       lead_im(lane_count),
-      tau_re(lane_count),
-      tau_im(lane_count),
+      contact_re(lane_count),
+      contact_im(lane_count),
       column(lane_count) {}
 
 void LaneArrays::Add(size_t lane_count, size_t tile_kind, size_t segment, size_t first_in_segment) {

@@ -106,8 +106,8 @@ struct LaneArrays {
   LaneArray<float> gain_re, gain_im;
   /// Logarithm of q: what a frame of lead contributes to the exponent.
   LaneArray<float> lead_re, lead_im;
-  /// s^2/2: what a Gaussian contact contributes to the exponent for each second squared of tau^2.
-  LaneArray<float> tau_re, tau_im;
+  /// s = sigma + i omega of the lane's mode, 1/s, from which a contact's factor is computed.
+  LaneArray<float> contact_re, contact_im;
   /// The mode's column among the projected columns.
   LaneArray<uint32_t> column;
 };

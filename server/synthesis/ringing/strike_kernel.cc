@@ -130,18 +130,108 @@ HWY_INLINE V ExpOfDecay(V x) {
 
 /// The ways from an impulse to the frame at which states are computed.
 enum class Reach {
-  kAtOnce,   ///< the impulse lies on the frame
-  kLead,     ///< it lies less than a frame before
-  kTile,     ///< it lies at most a tile before or after
-  kContact,  ///< it lies anywhere, and its contact has a duration
+  kAtOnce,    ///< the impulse lies on the frame
+  kLead,      ///< it lies less than a frame before
+  kTile,      ///< it lies at most a tile before or after
+  kAnywhere,  ///< it lies anywhere, and may be a Gaussian
 };
 
 /// The distance from an impulse to the frame at which states are computed.
 struct Way {
-  V lead_frames;  ///< negative: that frame lies before the impulse
-  V tau_squared;
+  V lead_frames;       ///< negative: that frame lies before the impulse
+  V tau_squared;       ///< of a Gaussian; zero: another pulse
+  V half_duration;     ///< of a raised cosine
   size_t share_ahead;  ///< values of each row ahead to prefetch for each vector
 };
+
+/// (re, im) *= (by_re, by_im).
+HWY_INLINE void Multiply(V by_re, V by_im, V& re, V& im) {
+  const V product = hn::NegMulAdd(im, by_im, hn::Mul(re, by_re));
+  im = hn::MulAdd(im, by_re, hn::Mul(re, by_im));
+  re = product;
+}
+
+/// The factor sinh(x)/x / (1 + (x/pi)^2) of a raised cosine, x = a + iy, for a from -1/4 to 0 and y
+/// from 0 to 9.5: to 1.1e-6. It is an entire function of x^2; this polynomial in
+/// z = 1 + x^2/45.2 was fitted to it. A polynomial with real coefficients c at z = u + iv is
+/// c0 + z b1 - |z|^2 b2 with b_k = c_k + 2u b_(k+1) - |z|^2 b_(k+2).
+HWY_INLINE void NearCosineFactor(V a, V y, V& factor_re, V& factor_im) {
+  constexpr float kCoefficients[] = {-0.0176949706F, 0.0948894173F,  0.30952841F,
+                                     0.331442714F,   0.190311119F,   0.0695937276F,
+                                     0.0178977884F,  0.00353869121F, 0.000492737105F};
+  constexpr int kDegree = 8;
+  constexpr float kPerCentre = 1 / 45.2F;
+  const Floats d;
+  const V u =
+      hn::MulAdd(hn::NegMulAdd(y, y, hn::Mul(a, a)), hn::Set(d, kPerCentre), hn::Set(d, 1.0F));
+  const V v = hn::Mul(hn::Mul(a, y), hn::Set(d, 2 * kPerCentre));
+  const V twice = hn::Add(u, u);
+  const V square = hn::MulAdd(u, u, hn::Mul(v, v));
+  V later = hn::Set(d, kCoefficients[kDegree]);
+  V b = hn::MulAdd(twice, later, hn::Set(d, kCoefficients[kDegree - 1]));
+#pragma GCC unroll 8
+  for (int k = kDegree - 2; k > 0; --k) {
+    const V next = hn::NegMulAdd(square, later, hn::MulAdd(twice, b, hn::Set(d, kCoefficients[k])));
+    later = b;
+    b = next;
+  }
+  factor_re = hn::NegMulAdd(square, later, hn::MulAdd(u, b, hn::Set(d, kCoefficients[0])));
+  factor_im = hn::Mul(v, b);
+}
+
+/// The same for a from -2 to 0 and any y above zero. At x = i pi, where the factor is 1/2,
+/// numerator and denominator vanish together, so that pi - y is computed to the last bit.
+HWY_INLINE void CosineFactor(V a, V y, V& factor_re, V& factor_im) {
+  const Floats d;
+  const V t = hn::Mul(a, a);
+  V sinh = hn::MulAdd(t, hn::Set(d, 1.0F / 39916800), hn::Set(d, 1.0F / 362880));
+  sinh = hn::MulAdd(sinh, t, hn::Set(d, 1.0F / 5040));
+  sinh = hn::MulAdd(sinh, t, hn::Set(d, 1.0F / 120));
+  sinh = hn::MulAdd(sinh, t, hn::Set(d, 1.0F / 6));
+  sinh = hn::MulAdd(hn::Mul(sinh, t), a, a);
+  V cosh = hn::MulAdd(t, hn::Set(d, 1.0F / 479001600), hn::Set(d, 1.0F / 3628800));
+  cosh = hn::MulAdd(cosh, t, hn::Set(d, 1.0F / 40320));
+  cosh = hn::MulAdd(cosh, t, hn::Set(d, 1.0F / 720));
+  cosh = hn::MulAdd(cosh, t, hn::Set(d, 1.0F / 24));
+  cosh = hn::MulAdd(cosh, t, hn::Set(d, 0.5F));
+  cosh = hn::MulAdd(cosh, t, hn::Set(d, 1.0F));
+  V sine, cosine;
+  SineCosine(y, sine, cosine);
+  const V over_re = hn::Mul(sinh, cosine), over_im = hn::Mul(cosh, sine);
+  // pi^2 + x^2 = u + iv, and the denominator x (u + iv)/pi^2 = under.
+  constexpr float kPi = 3.14159274F, kPiRest = -8.74227766e-8F, kPerPiSquared = 0.101321184F;
+  const V to_pi = hn::Add(hn::Sub(hn::Set(d, kPi), y), hn::Set(d, kPiRest));
+  const V u = hn::Mul(hn::MulAdd(to_pi, hn::Add(hn::Set(d, kPi), y), t), hn::Set(d, kPerPiSquared));
+  const V v = hn::Mul(hn::Mul(a, y), hn::Set(d, 2 * kPerPiSquared));
+  const V under_re = hn::NegMulAdd(y, v, hn::Mul(a, u));
+  const V under_im = hn::MulAdd(y, u, hn::Mul(a, v));
+  const V scale =
+      hn::Div(hn::Set(d, 1.0F), hn::MulAdd(under_re, under_re, hn::Mul(under_im, under_im)));
+  factor_re = hn::Mul(hn::MulAdd(over_re, under_re, hn::Mul(over_im, under_im)), scale);
+  factor_im = hn::Mul(hn::NegMulAdd(over_re, under_im, hn::Mul(over_im, under_re)), scale);
+}
+
+/// (re, im) *= the factor of a raised cosine of duration T, with x = s T/2.
+HWY_INLINE void SpreadOverCosine(const LaneArrays& lanes, size_t lane, V half_duration, V& re,
+                                 V& im) {
+  const Floats d;
+  // A mode that decays further than that between the middle and the end of its contact is inaudible
+  // then, and the factor would make it loud before.
+  constexpr float kMostDecay = 2;
+  const V a = hn::Max(hn::Mul(half_duration, hn::Load(d, lanes.contact_re.data() + lane)),
+                      hn::Set(d, -kMostDecay));
+  // The bound keeps 0/0 out of lanes that hold no mode.
+  const V y = hn::Max(hn::Mul(half_duration, hn::Load(d, lanes.contact_im.data() + lane)),
+                      hn::Set(d, 1e-15F));
+  V factor_re, factor_im;
+  const auto near = hn::And(hn::Le(y, hn::Set(d, 9.5F)), hn::Ge(a, hn::Set(d, -0.25F)));
+  if (HWY_LIKELY(hn::AllTrue(d, near))) {
+    NearCosineFactor(a, y, factor_re, factor_im);
+  } else {
+    CosineFactor(a, y, factor_re, factor_im);
+  }
+  Multiply(factor_re, factor_im, re, im);
+}
 
 /// (re, im) *= exp(lead_frames log q + tau^2 s^2/2).
 template <Reach kReach>
@@ -150,10 +240,13 @@ HWY_INLINE void Delay(const LaneArrays& lanes, size_t lane, const Way& way, V& r
   V logarithm = hn::Mul(way.lead_frames, hn::Load(d, lanes.lead_re.data() + lane));
   V angle = hn::Load(d, lanes.lead_im.data() + lane);
   V magnitude, sine, cosine;
-  if constexpr (kReach == Reach::kContact) {
-    logarithm = hn::MulAdd(way.tau_squared, hn::Load(d, lanes.tau_re.data() + lane), logarithm);
-    angle = hn::MulAdd(way.tau_squared, hn::Load(d, lanes.tau_im.data() + lane),
-                       hn::Mul(way.lead_frames, angle));
+  if constexpr (kReach == Reach::kAnywhere) {
+    const V sigma = hn::Load(d, lanes.contact_re.data() + lane);
+    const V omega = hn::Load(d, lanes.contact_im.data() + lane);
+    const V half_square =
+        hn::Mul(hn::Mul(hn::Sub(sigma, omega), hn::Add(sigma, omega)), hn::Set(d, 0.5F));
+    logarithm = hn::MulAdd(way.tau_squared, half_square, logarithm);
+    angle = hn::MulAdd(way.tau_squared, hn::Mul(sigma, omega), hn::Mul(way.lead_frames, angle));
     // Factors below exp(-80) are inaudible, and their angle may be too large for SineCosine.
     const auto heard = hn::Gt(logarithm, hn::Set(d, -80.0F));
     magnitude = hn::IfThenElseZero(heard, hn::Exp(d, logarithm));
@@ -165,11 +258,7 @@ HWY_INLINE void Delay(const LaneArrays& lanes, size_t lane, const Way& way, V& r
     const V part = hn::Mul(way.lead_frames, hn::Set(d, 1.0F / (1 << kDoublings)));
     SineCosineOfMultiple<kDoublings>(hn::Mul(part, angle), sine, cosine);
   }
-  const V factor_re = hn::Mul(magnitude, cosine);
-  const V factor_im = hn::Mul(magnitude, sine);
-  const V rotated = hn::NegMulAdd(im, factor_im, hn::Mul(re, factor_re));
-  im = hn::MulAdd(im, factor_re, hn::Mul(re, factor_im));
-  re = rotated;
+  Multiply(hn::Mul(magnitude, cosine), hn::Mul(magnitude, sine), re, im);
 }
 
 /// Prefetches `count` values, from `first` on, of all rows ahead.
@@ -195,7 +284,7 @@ class SumOfSquares {
   V sum_;
 };
 
-template <Reach kReach>
+template <Reach kReach, bool kCosine>
 void ExciteLanes(const LaneArrays& lanes, LaneRange range, const float* modal_impulses,
                  const Way& way, const StrikeBatch::RowsAhead& ahead, SumOfSquares& sum,
                  float* HWY_RESTRICT added_re, float* HWY_RESTRICT added_im) {
@@ -208,6 +297,7 @@ void ExciteLanes(const LaneArrays& lanes, LaneRange range, const float* modal_im
     const V g = hn::GatherIndex(d, modal_impulses, column);
     V re = hn::Mul(g, hn::Load(d, lanes.gain_re.data() + lane));
     V im = hn::Mul(g, hn::Load(d, lanes.gain_im.data() + lane));
+    if constexpr (kCosine) SpreadOverCosine(lanes, lane, way.half_duration, re, im);
     if constexpr (kReach != Reach::kAtOnce) Delay<kReach>(lanes, lane, way, re, im);
     hn::Store(re, d, added_re + lane);
     hn::Store(im, d, added_im + lane);
@@ -215,20 +305,29 @@ void ExciteLanes(const LaneArrays& lanes, LaneRange range, const float* modal_im
   }
 }
 
+template <bool kCosine>
+auto ChooseExcite(bool anywhere, size_t back, float lead_frames) {
+  return anywhere          ? ExciteLanes<Reach::kAnywhere, kCosine>
+         : back > 0        ? ExciteLanes<Reach::kTile, kCosine>
+         : lead_frames > 0 ? ExciteLanes<Reach::kLead, kCosine>
+                           : ExciteLanes<Reach::kAtOnce, kCosine>;
+}
+
 bool Excite(const LaneArrays& lanes, size_t lane_count, const float* modal_impulses,
             const Onset& onset, const StrikeBatch::RowsAhead& ahead, float* added_re,
             float* added_im) {
   const Floats d;
+  const float tau_s = onset.gaussian_tau_s, duration_s = onset.cosine_duration_s;
+  const bool anywhere = tau_s > 0 || onset.lead_frames > 1;
   const size_t share = ahead.value_count * hn::Lanes(d) / std::max<size_t>(lane_count, 1) + 1;
   SumOfSquares sum;
   for (const size_t tile_kind : kTileOrder) {
     const size_t back = tile_kind == 0 ? 0 : onset.frames_into_tiles % kTileFrames[tile_kind];
     const float lead_frames = onset.lead_frames - static_cast<float>(back);
-    const Way way{hn::Set(d, lead_frames), hn::Set(d, onset.tau_s * onset.tau_s), share};
-    const auto excite = onset.tau_s > 0 || onset.lead_frames > 1 ? ExciteLanes<Reach::kContact>
-                        : back > 0                               ? ExciteLanes<Reach::kTile>
-                        : lead_frames > 0                        ? ExciteLanes<Reach::kLead>
-                                                                 : ExciteLanes<Reach::kAtOnce>;
+    const Way way{hn::Set(d, lead_frames), hn::Set(d, tau_s * tau_s), hn::Set(d, duration_s / 2),
+                  share};
+    const auto excite = duration_s > 0 ? ChooseExcite<true>(anywhere, back, lead_frames)
+                                       : ChooseExcite<false>(anywhere, back, lead_frames);
     excite(lanes, lanes.by_tile[tile_kind], modal_impulses, way, ahead, sum, added_re, added_im);
   }
   return sum.Finite();

@@ -29,8 +29,9 @@ void Project(const Projection& projection, float* modal_impulses) noexcept;
 
 /// The onset of modal impulses in time.
 struct Onset {
-  float lead_frames = 0;  ///< from the impulse to its first audible sample
-  float tau_s = 0;        ///< standard deviation of the Gaussian contact
+  float lead_frames = 0;        ///< from the impulse to its first audible sample
+  float gaussian_tau_s = 0;     ///< standard deviation of a Gaussian contact; zero: another one
+  float cosine_duration_s = 0;  ///< of a contact with the pulse of a raised cosine; zero: another
   /// Frames from the begin of the part's first tile (tile.h) to the onset. Zero: states are
   /// computed at the onset's frame in longer tiles too.
   size_t frames_into_tiles = 0;

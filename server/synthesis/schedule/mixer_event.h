@@ -6,6 +6,8 @@
 #include <type_traits>
 #include <variant>
 
+#include "server/synthesis/schedule/pulse.h"
+
 namespace carillon {
 
 /// Names a bank in a mixer; a default one names none.
@@ -25,7 +27,7 @@ struct TrianglePoint {
 struct SurfaceImpulse {
   TrianglePoint at{};
   std::array<float, 3> impulse_newton_seconds{};  ///< in the object's frame
-  float tau_s = 0;  ///< standard deviation of the contact's Gaussian; zero: instantaneous
+  Pulse pulse{};
 };
 
 /// The force of one sustained contact at a point of the sounding surface. The mixer adds it to the

@@ -35,11 +35,13 @@ class Stage {
     }
   }
 
-  void Strike(size_t bank, uint64_t offset) {
+  void Strike(size_t bank, uint64_t offset, Pulse pulse = {}) {
+    SurfaceImpulse impulse = MakeUnitImpulse();
+    impulse.pulse = pulse;
     stream_->TryPush({.bank = banks_[bank % banks_.size()],
                       .frame = mixer_.frame() + offset,
                       .fraction = 0.5F,
-                      .action = MakeUnitImpulse()});
+                      .action = impulse});
   }
 
   /// CPU seconds of one block.
@@ -100,19 +102,19 @@ void MeasureRinging(size_t mode_count, double seconds) {
 }
 
 /// Strikes every bank in every block, between two samples.
-void MeasureStruck(size_t mode_count, double seconds) {
+void MeasureStruck(const char* name, size_t mode_count, double seconds, Pulse pulse) {
   Stage stage(mode_count);
   seconds = LengthS(mode_count, seconds);
   std::vector<double> block_s;
   const int warm_up = 64;  // until all banks have left the spectrum
   for (int block = 0; block < warm_up + seconds / kBlockS; ++block) {
     for (size_t bank = 0; bank < stage.bank_count(); ++bank) {
-      stage.Strike(bank, (bank * 37 + static_cast<size_t>(block) * 11) % kBlock);
+      stage.Strike(bank, (bank * 37 + static_cast<size_t>(block) * 11) % kBlock, pulse);
     }
     const double s = stage.Render();
     if (block >= warm_up) block_s.push_back(s);
   }
-  Report("struck", stage, block_s);
+  Report(name, stage, block_s);
 }
 
 }  // namespace
@@ -127,7 +129,12 @@ int MeasureStruck(const Arguments& arguments) {
   const double seconds = arguments.empty() ? 3 : std::atof(arguments[0].c_str());
   std::vector<size_t> counts = {800, 8'000, 80'000};
   if (arguments.size() > 1) counts = {std::stoul(arguments[1])};
-  for (const size_t modes : counts) MeasureStruck(modes, seconds);
+  for (const size_t modes : counts) {
+    MeasureStruck("struck", modes, seconds, {});
+    MeasureStruck("struck for 0.1 ms", modes, seconds, Pulse::RaisedCosine(1e-4F));
+    MeasureStruck("struck for 0.4 ms", modes, seconds, Pulse::RaisedCosine(4e-4F));
+    MeasureStruck("struck for 0.1 ms, Gaussian", modes, seconds, Pulse::Gaussian(1e-4F));
+  }
   return EXIT_SUCCESS;
 }
 

@@ -155,5 +155,43 @@ TEST(Columns, AColumnOfPosesOfAnotherLengthRejectsAllAndIsNamed) {
   EXPECT_EQ(Read(step).rejected_count, 1U);
 }
 
+TEST(ColumnConversion, EngineContactsHaveTheColumnsOfImpulsesAndTheirOwn) {
+  v1::EngineContactColumns columns;
+  *columns.mutable_impulses() = ThreeImpulses().columns();
+  columns.set_depth(0.4);
+  for (const uint32_t partner : {4U, 5U, 6U}) {
+    columns.add_partner(partner);
+    columns.add_travel_speed_m_per_s(static_cast<float>(partner) / 2);
+  }
+  ASSERT_TRUE(Validate(columns).ok());
+  const ObjectTouch touch = ReadRow(columns, 2);
+  EXPECT_EQ(touch.contact.second->handle, 8U);
+  EXPECT_FLOAT_EQ(static_cast<float>(touch.time_offset_s), 0.002F);
+  EXPECT_EQ(touch.partner, 6U);
+  EXPECT_EQ(touch.roughness.travel_speed_m_per_s, 3);
+  EXPECT_EQ(touch.roughness.depth, 0.4);
+  EXPECT_EQ(touch.roughness.irregularity_length_m, 0.001);
+  columns.mutable_partner()->RemoveLast();
+  EXPECT_THAT(Validate(columns).ToString(), HasSubstr("COLUMNS_MISMATCHED: the column partner"));
+  v1::ContactStep step;
+  *step.mutable_contact_columns() = columns;
+  EXPECT_EQ(Read(step).rejected_count, 5U);  // three objects and two second ones
+}
+
+TEST(ColumnConversion, ADurationBelowZeroIsAbsentAndAStrikerHoldsForAll) {
+  v1::ContactStep step = ThreeImpulses();
+  step.mutable_columns()->set_duration_s(1, -1);
+  step.mutable_columns()->set_duration_s(2, 0);
+  const Told told = Read(step);
+  EXPECT_FLOAT_EQ(static_cast<float>(told.impulses[0].contact.impulse.duration_s.value()), 0.001F);
+  EXPECT_EQ(told.impulses[1].contact.impulse.duration_s, std::nullopt);
+  EXPECT_EQ(told.impulses[2].contact.impulse.duration_s, 0);
+  step.mutable_columns()->clear_duration_s();
+  EXPECT_EQ(Read(step).impulses[2].contact.impulse.duration_s, std::nullopt);
+  step.mutable_columns()->mutable_hertz()->set_striker("stel");
+  EXPECT_THAT(Read(step).rejection, HasSubstr("UNKNOWN_STRIKER"));
+  EXPECT_THAT(Read(step).rejection, HasSubstr("the nearest is steel"));
+}
+
 }  // namespace
 }  // namespace carillon

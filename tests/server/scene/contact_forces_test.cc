@@ -3,7 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <map>
+#include <numbers>
 #include <optional>
 #include <variant>
 #include <vector>
@@ -101,7 +104,8 @@ TEST_F(ContactForcesTest, EndsAForceWhereStepsWereLeftOut) {
 
 TEST_F(ContactForcesTest, ARoughnessIsWeighedByItsForce) {
   const auto pushed = Step(0, [&] {
-    forces_.Add(FeltBy(3, kTen), {.travel_speed_m_per_s = 2, .depth = 0.4, .grain_m = 0.001});
+    forces_.Add(FeltBy(3, kTen),
+                {.travel_speed_m_per_s = 2, .depth = 0.4, .irregularity_length_m = 0.001});
     forces_.Add(FeltBy(3, kTen), {});  // rests
   });
   const auto& knot = std::get<ForceKnot>(pushed.back().action);
@@ -123,9 +127,14 @@ TEST_F(ContactForcesTest, OfATouchThePartThatIsABlowStrikesAndTheRestIsAForce) {
   ASSERT_EQ(pushed.size(), 2U);
   EXPECT_FLOAT_EQ(pushed[0].Force().value_or(0), 10);  // 0.1 N s in 0.01 s
   pushed = Step(20 * kStepS, touch(3));
+  ASSERT_EQ(pushed.size(), 2U);
+  EXPECT_FLOAT_EQ(pushed[0].Force().value_or(0), 30);
+  pushed = Step(21 * kStepS, touch(0.1));  // the blow is over
   ASSERT_EQ(pushed.size(), 3U);
   EXPECT_FLOAT_EQ(pushed[0].Impulse().value_or(0), 2.7F);
-  EXPECT_FLOAT_EQ(pushed[1].Force().value_or(0), 30);
+  EXPECT_EQ(pushed[0].time_s, 21 * kStepS);
+  EXPECT_EQ(forces_.counts().blow_count, 2U);
+  EXPECT_EQ(forces_.counts().load_count, 20U);
 }
 
 TEST_F(ContactForcesTest, AnotherPartnerIsAnotherPair) {
@@ -137,7 +146,82 @@ TEST_F(ContactForcesTest, AnotherPartnerIsAnotherPair) {
     touch(1);
     touch(2);
   });
-  EXPECT_TRUE(pushed[0].Impulse());
+  EXPECT_FALSE(pushed[0].Impulse());
+  EXPECT_TRUE(Nothing(21 * kStepS)[0].Impulse());
+}
+
+TEST_F(ContactForcesTest, ABlowThatIsNotOverIsSentAtTheEnd) {
+  Nothing(0);
+  Step(kStepS, [&] { forces_.Touch({.contact = {.handle = 3}}, FeltBy(3, kTen)); });
+  const auto last = forces_.Finish();
+  ASSERT_EQ(last.size(), 1U);
+  EXPECT_EQ(std::get<SurfaceImpulse>(last[0].action).impulse_newton_seconds[2], 10);
+  EXPECT_TRUE(forces_.Finish().empty());
+}
+
+/// A body falls on another with an impulse of 1 N s, of which an engine with soft contacts reports
+/// half a sine of `length_s` that begins `phase` steps before a step, and then rests with 1 N.
+std::vector<Pushed> Fall(double rate_hz, double length_s, double phase) {
+  constexpr double kPi = std::numbers::pi;
+  ContactForces forces(1 / rate_hz);
+  std::vector<Pushed> pushed;
+  const auto until = [&](double time_s) {  // the part of the impulse up to that time
+    return (1 - std::cos(kPi * std::clamp(time_s / length_s, 0.0, 1.0))) / 2;
+  };
+  for (int step = 0; step < 0.5 * rate_hz; ++step) {
+    const double begin_s = (step - 10 + phase) / rate_hz, end_s = begin_s + 1 / rate_hz;
+    const double rests = end_s > length_s ? 1 / rate_hz : 0;
+    SurfaceImpulse impulse = kTen;
+    impulse.impulse_newton_seconds[2] = static_cast<float>(until(end_s) - until(begin_s) + rests);
+    for (const ForceEvent& event : forces.Begin(step / rate_hz)) pushed.push_back({event});
+    if (end_s > 0) {
+      FeltContact felt = FeltBy(3, impulse);
+      felt.duration_follows_impulse = true;
+      std::get<SurfaceImpulse>(felt.by[0].event.action).pulse =
+          Pulse::RaisedCosine(static_cast<float>(
+              1e-4 * std::pow(double{impulse.impulse_newton_seconds[2]}, kDurationPower)));
+      forces.Touch({.contact = {.handle = 3}}, felt);
+    }
+    for (const ForceEvent& event : forces.End()) pushed.push_back({event});
+  }
+  return pushed;
+}
+
+TEST(ContactForces, AFallIsOneBlowOfItsImpulseAndLengthAtEveryStepOfTheEngine) {
+  for (const double rate_hz : {60.0, 240.0, 1000.0}) {
+    for (const double length_s : {0.002, 0.008, 0.02, 0.03}) {
+      for (const double phase : {0.0, 0.3, 0.7}) {
+        double sum = 0, largest = 0, duration_s = 0;
+        for (const Pushed& push : Fall(rate_hz, length_s, phase)) {
+          if (!push.Impulse()) continue;
+          sum += *push.Impulse();
+          if (*push.Impulse() < largest) continue;
+          largest = *push.Impulse();
+          duration_s = std::get<SurfaceImpulse>(push.action).pulse.duration_s();
+        }
+        // Nearly all of it is one blow; the first step of the load may count for it.
+        EXPECT_NEAR(20 * std::log10(largest), 0, 1) << rate_hz << " Hz, " << length_s << " s";
+        EXPECT_LT(sum - largest, 0.1);
+        EXPECT_NEAR(duration_s, 1e-4, 1e-5);
+      }
+    }
+  }
+}
+
+TEST(ContactForces, ABodyThatIsPutDownGentlyDoesNotStrike) {
+  for (const double rate_hz : {240.0, 1000.0}) {
+    ContactForces forces(1 / rate_hz);
+    double struck = 0;
+    for (int step = 0; step < 0.3 * rate_hz; ++step) {
+      SurfaceImpulse impulse = kTen;
+      const double newtons = std::clamp((step - 10) / rate_hz / 0.02, 0.0, 1.0);
+      impulse.impulse_newton_seconds[2] = static_cast<float>(newtons / rate_hz);
+      forces.Begin(step / rate_hz);
+      if (newtons > 0) forces.Touch({.contact = {.handle = 3}}, FeltBy(3, impulse));
+      for (const ForceEvent& event : forces.End()) struck += Pushed{event}.Impulse().value_or(0);
+    }
+    EXPECT_LT(struck, 1e-3) << rate_hz;  // newton seconds; the first step alone would be 0.004
+  }
 }
 
 }  // namespace

@@ -18,6 +18,7 @@
 namespace carillon {
 namespace {
 
+using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
@@ -80,7 +81,8 @@ std::vector<Report> Reports() {
       Spoilt([](auto& it) { it.contact.impulse.location = SurfacePoint{.triangle = 4}; },
              "TRIANGLE_OUT_OF_RANGE"),
       Spoilt([](auto& it) { it.contact.impulse.duration_s = 0.2; }, "INVALID_DURATION"),
-      Spoilt([](auto& it) { it.contact.impulse.hertz.emplace(); }, "INVALID_HERTZ_CONTACT"),
+      Spoilt([](auto& it) { it.contact.impulse.hertz.reduced_mass_kg = 0; },
+             "INVALID_HERTZ_CONTACT"),
       Spoilt([&](auto& it) { it.contact.second = second; }, ""),
       Spoilt([](auto& it) { it.contact.second = {.handle = 9, .location = Point{}}; },
              "OBJECT_NOT_FOUND", 2),
@@ -155,6 +157,7 @@ TEST(ContactIntake, LiveAndOfflineGiveTheSameVerdictsForTheSameReasons) {
     EXPECT_EQ(ReasonOf(live.statuses[i]), ReasonOf(offline.statuses[i]));
   }
   std::vector<float> sound(size_t{48000} * 2);
+  stream->intake().Finish();
   renderer->Render(sound);
   mixer.Render(std::span(sound).first(OfflineRenderer::kBlockFrameCount * 700));
   EXPECT_EQ(renderer->summary().rejected_count, stream->counts().rejected_count);
@@ -197,6 +200,111 @@ TEST(ContactIntake, CountsTheImpulsesThatItHandsOn) {
   intake.EndStep();
   EXPECT_EQ(target.events.size(), 4U);
   EXPECT_TRUE(intake.last_rejection().ok());
+}
+
+/// A scene with two objects, and the events that an intake of it hands on.
+class ReadingTest : public testing::Test {
+ protected:
+  ReadingTest() {
+    for (const uint32_t handle : {1U, 2U}) {
+      const auto placed = scenes_.AddObject(registered_, handle, SmallModel(), SmallProperties());
+      EXPECT_TRUE(scene_.Insert(handle, placed->object).ok());
+    }
+  }
+
+  ContactIntake Open(const ContactReading& reading) {
+    ContactIntake intake(scene_, target_, {.step_s = kStepS, .reading = reading});
+    EXPECT_TRUE(intake.BeginStep(0).ok());
+    return intake;
+  }
+
+  const SurfaceImpulse& Newest(size_t back = 0) const {
+    return *target_.events.at(target_.events.size() - 1 - back).impulse();
+  }
+
+  Mixer mixer_;
+  SceneRegistry scenes_{mixer_};
+  Scene scene_{"a scene"};
+  const uint64_t registered_ = *scenes_.CreateScene();
+  RecordingTarget target_;
+};
+
+TEST_F(ReadingTest, PointsAndImpulsesOfTheScenesFrameAreTurnedIntoTheObjects) {
+  ContactIntake own = Open({}), shared = Open({.scene_frame = true});
+  const Quaternion about_z{.w = std::sqrt(0.5), .z = std::sqrt(0.5)};  // x becomes y
+  const Quaternion about_x{.w = std::sqrt(0.5), .x = std::sqrt(0.5)};  // y becomes z
+  shared.Move(1, {.position_m = {5, 6, 7}, .orientation = about_z});
+  shared.Move(2, {.position_m = {4, 6, 7}, .orientation = about_x});
+  ObjectImpulse impulse = SmallImpulse(1);
+  impulse.contact.impulse.location = Point{0.02, 0.03, 0};
+  impulse.contact.impulse.impulse_newton_seconds = {1, 2, 3};
+  impulse.contact.second = {.handle = 2, .location = Point{0, 0.01, 0.05}};
+  own.Strike(impulse);
+  const SurfaceImpulse first = Newest(1), second = Newest();
+  impulse.contact.impulse.location = Point{5 - 0.03, 6 + 0.02, 7};
+  impulse.contact.impulse.impulse_newton_seconds = {-2, 1, 3};
+  impulse.contact.second->location = Point{4, 6 - 0.05, 7 + 0.01};
+  impulse.contact.second->rotation = Quaternion{};  // ignored
+  shared.Strike(impulse);
+  ASSERT_EQ(target_.events.size(), 4U);
+  for (size_t i = 0; i < 3; ++i) {
+    EXPECT_NEAR(Newest(1).at.weights[i], first.at.weights[i], 1e-6);
+    EXPECT_NEAR(Newest().at.weights[i], second.at.weights[i], 1e-6);
+    EXPECT_NEAR(Newest(1).impulse_newton_seconds[i], first.impulse_newton_seconds[i], 1e-6);
+    EXPECT_NEAR(Newest().impulse_newton_seconds[i], second.impulse_newton_seconds[i], 1e-6);
+  }
+}
+
+TEST_F(ReadingTest, AContactWithoutADurationIsElasticAndHasTheStreamsPulse) {
+  ContactIntake cosine = Open({}), gaussian = Open({.gaussian_pulses = true});
+  ObjectImpulse impulse = SmallImpulse(1, 0.02);
+  impulse.contact.impulse.duration_s = std::nullopt;
+  cosine.Strike(impulse);
+  const Pulse hard = Newest().pulse;
+  EXPECT_FALSE(hard.gaussian());
+  EXPECT_GT(hard.duration_s(), 3e-5);
+  EXPECT_LT(hard.duration_s(), 3e-4);
+  gaussian.Strike(impulse);
+  EXPECT_EQ(Newest().pulse, Pulse::Gaussian(hard.duration_s()));
+  impulse.contact.impulse.hertz.striker_young_pa = 4e6;
+  cosine.Strike(impulse);
+  EXPECT_GT(Newest().pulse.duration_s(), 10 * hard.duration_s());
+  // A second object strikes with all of its 0.45 kg.
+  impulse.contact.impulse.hertz = {};
+  impulse.contact.second = {.handle = 2, .location = Point{0, 0, 0}};
+  cosine.Strike(impulse);
+  EXPECT_GT(Newest().pulse.duration_s(), 2 * hard.duration_s());
+  EXPECT_EQ(Newest().pulse, Newest(1).pulse);
+}
+
+TEST_F(ReadingTest, WhatIsStrangeAboutContactsIsCountedAndWhatNoBodyBearsIsRefused) {
+  ContactIntake intake = Open({});
+  ObjectImpulse distant = SmallImpulse(1);
+  distant.contact.impulse.location = Point{-0.3, 0, 0};
+  intake.Strike(distant);
+  intake.Strike(SmallImpulse(1, 0));
+  EXPECT_EQ(target_.events.size(), 2U);
+  // 0.45 kg, sound at 5.1 km/s.
+  intake.Strike(SmallImpulse(1, 2.2e4));
+  EXPECT_TRUE(intake.last_rejection().ok());
+  intake.Strike(SmallImpulse(1, 2.4e4));
+  EXPECT_THAT(intake.last_rejection().ToString(), HasSubstr("IMPULSE_TOO_LARGE: "));
+  intake.Hold({.contact = SmallImpulse(1, 1e20).contact});
+  intake.Touch({.contact = SmallImpulse(1, 1e20).contact});
+  intake.Touch({.contact = SmallImpulse(1).contact, .time_offset_s = -1});
+  EXPECT_THAT(intake.last_rejection().ToString(), HasSubstr("INVALID_TIME_OFFSET: "));
+  intake.Touch({.contact = SmallImpulse(1).contact, .time_offset_s = 0.003});
+  intake.EndStep();
+  const IntakeFindings findings = intake.findings();
+  EXPECT_EQ(findings.distant_point_count, 1U);
+  EXPECT_NEAR(findings.largest_distance_m, 0.3, 1e-6);
+  EXPECT_EQ(findings.zero_impulse_count, 1U);
+  EXPECT_EQ(findings.too_large_impulse_count, 3U);
+  EXPECT_EQ(findings.engine.blow_count, 1U);
+  EXPECT_EQ(intake.rejected_count(), 4U);
+  bool offset = false;
+  for (const MixerEvent& event : target_.events) offset |= event.frame == 144;
+  EXPECT_TRUE(offset);  // the blow, 3 ms after the step
 }
 
 }  // namespace

@@ -50,7 +50,7 @@ inline std::shared_ptr<const ModalModel> SmallModel() {
   return model;
 }
 
-/// `newton_seconds` along x at the origin of object `handle`.
+/// `newton_seconds` along x at the origin of object `handle`, in an instant.
 inline ObjectImpulse SmallImpulse(uint32_t handle, double newton_seconds = 1,
                                   double time_offset_s = 0) {
   ObjectImpulse impulse;
@@ -58,6 +58,7 @@ inline ObjectImpulse SmallImpulse(uint32_t handle, double newton_seconds = 1,
   impulse.contact.handle = handle;
   impulse.contact.impulse.location = Point{0, 0, 0};
   impulse.contact.impulse.impulse_newton_seconds = {newton_seconds, 0, 0};
+  impulse.contact.impulse.duration_s = 0;
   return impulse;
 }
 

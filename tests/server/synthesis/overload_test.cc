@@ -208,7 +208,7 @@ TEST(Overload, WhateverStrikesComeWhatLeavesIsFiniteAndWithinFullScale) {
         const TrianglePoint at{.vertices = {vertex(), vertex(), vertex()},
                                .weights = {any(), any(), any()}};
         if (const size_t kind = random() % 3; kind == 0) {
-          event.action = SurfaceImpulse{at, {any(), any(), any()}, any()};
+          event.action = SurfaceImpulse{at, {any(), any(), any()}, Pulse::RaisedCosine(any())};
         } else if (kind == 1) {
           event.action = SurfaceForce{at, {any(), any(), any()}};
         } else {

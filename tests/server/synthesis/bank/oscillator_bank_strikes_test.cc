@@ -131,10 +131,10 @@ TEST_P(OnEveryTarget, AContactThatTakesTimeRingsInTilesOfAllKinds) {
   for (const size_t offset : {0U, 50U, 127U}) {
     OscillatorBank bank(sounding, MakeUniformShapes(sounding.modes.size()), {});
     SurfaceImpulse impulse = MakeUnitImpulse();
-    impulse.tau_s = 1e-4F;
+    impulse.pulse = Pulse::Gaussian(4e-4F);
     const auto sound = Ring(bank, impulse, 1024, offset, 0.25F);
     EXPECT_LT(ErrorDb(std::vector(sound.begin() + static_cast<ptrdiff_t>(offset), sound.end()),
-                      sounding, 1, -0.25, impulse.tau_s),
+                      sounding, 1, -0.25, 1e-4F),
               -110)
         << offset;
   }
@@ -227,7 +227,7 @@ TEST(OscillatorBankStrikes, AGaussianContactIsTheConvolutionWithAGaussian) {
       .modes = {MakeMode(0, 180, -60, 3), MakeMode(1, 700, -400, 4), MakeMode(2, 1500, -30, 5)}};
   const double tau_s = 0.25e-3;
   SurfaceImpulse impulse = MakeUnitImpulse();
-  impulse.tau_s = static_cast<float>(tau_s);
+  impulse.pulse = Pulse::Gaussian(static_cast<float>(4 * tau_s));
   OscillatorBank bank(sounding, MakeUniformShapes(3), {});
   const size_t offset = 100;
   const auto sound = Ring(bank, impulse, 4096, offset);
@@ -255,7 +255,7 @@ TEST(OscillatorBankStrikes, ALongContactNeverMakesAModeLouder) {
   SurfaceImpulse impulse = MakeUnitImpulse();
   OscillatorBank hard(sounding, MakeUniformShapes(1), {});
   const double hard_rms = Rms(Ring(hard, impulse, 4096));
-  impulse.tau_s = 0.025F;
+  impulse.pulse = Pulse::Gaussian(0.1F);
   OscillatorBank soft(sounding, MakeUniformShapes(1), {});
   EXPECT_LT(Rms(Ring(soft, impulse, 4096)), 2 * hard_rms);
 }

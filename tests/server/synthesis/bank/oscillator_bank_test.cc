@@ -104,7 +104,7 @@ TEST(OscillatorBank, PitchAndDecayAreThoseOfTheModes) {
 }
 
 /// The two modes of a degenerate pair, struck radially at `angle`.
-std::vector<float> StrikePair(double angle, double tau_s) {
+std::vector<float> StrikePair(double angle, double duration_s) {
   std::vector<float> values(18, 0.0F);
   for (size_t vertex = 0; vertex < 3; ++vertex) {
     values[6 * vertex] = 1;      // mode 0 moves along x
@@ -116,7 +116,7 @@ std::vector<float> StrikePair(double angle, double tau_s) {
   SurfaceImpulse impulse = MakeUnitImpulse();
   impulse.impulse_newton_seconds = {static_cast<float>(std::cos(angle)),
                                     static_cast<float>(std::sin(angle)), 0};
-  impulse.tau_s = static_cast<float>(tau_s);
+  impulse.pulse = Pulse::RaisedCosine(static_cast<float>(duration_s));
   OscillatorBank bank(sounding, MakeShapes(values, 2), {});
   return Ring(bank, impulse, 48000);
 }
@@ -135,8 +135,8 @@ TEST(OscillatorBank, TheCosineOfADegeneratePairBeginsWithoutAClick) {
   // The largest second difference of a sine of amplitude A and step w = omega dt is A w^2, and A w
   // at its onset, where the slope begins. A bare cosine would begin with A, 13 times as much.
   const double step = 2 * kPi * 587.33 * kDt;
-  for (const double tau_s : {0.0, 0.5e-3}) {
-    const auto sound = StrikePair(kPi / 2, tau_s);
+  for (const double duration_s : {0.0, 2e-3}) {
+    const auto sound = StrikePair(kPi / 2, duration_s);
     const double amplitude = *std::ranges::max_element(sound);
     double roughest = std::abs(sound[0]);
     for (size_t n = 2; n < 4800; ++n) {

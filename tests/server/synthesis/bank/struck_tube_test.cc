@@ -102,7 +102,7 @@ std::vector<float> StrikeTube(const SoundingMaterial& material, const Blow& blow
       .impulse_newton_seconds =
           {static_cast<float>(blow.impulse_newton_seconds * std::cos(blow.angle_rad)),
            static_cast<float>(blow.impulse_newton_seconds * std::sin(blow.angle_rad)), 0},
-      .tau_s = static_cast<float>(blow.duration_s / 4)};
+      .pulse = Pulse::Gaussian(static_cast<float>(blow.duration_s))};
   stream->TryPush({.bank = bank, .action = impulse});
   std::vector<float> sound(96000);
   mixer.Render(sound);

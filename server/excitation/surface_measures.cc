@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/excitation/surface_measures.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace carillon {
+
+double VolumeM3(std::span<const std::array<float, 3>> vertices,
+                std::span<const std::array<uint32_t, 3>> triangles) {
+  double sum = 0;
+  if (triangles.empty()) return 0;
+  // Volumes of tetrahedra are taken from a vertex of the surface, where they cancel best.
+  const std::array<float, 3>& origin = vertices[triangles[0][0]];
+  const auto from_origin = [&](uint32_t vertex) {
+    std::array<double, 3> v{};
+    for (size_t i = 0; i < 3; ++i) v[i] = double{vertices[vertex][i]} - double{origin[i]};
+    return v;
+  };
+  for (const std::array<uint32_t, 3>& triangle : triangles) {
+    const auto a = from_origin(triangle[0]), b = from_origin(triangle[1]),
+               c = from_origin(triangle[2]);
+    sum += a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) +
+           a[2] * (b[0] * c[1] - b[1] * c[0]);
+  }
+  return std::abs(sum) / 6;
+}
+
+double ExtentM(std::span<const std::array<float, 3>> vertices) {
+  double square = 0;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    double least = std::numeric_limits<double>::infinity(), most = -least;
+    for (const std::array<float, 3>& vertex : vertices) {
+      least = std::min(least, double{vertex[axis]});
+      most = std::max(most, double{vertex[axis]});
+    }
+    if (most > least) square += (most - least) * (most - least);
+  }
+  return std::sqrt(square);
+}
+
+}  // namespace carillon

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+namespace carillon {
+
+/// The volume inside a closed surface, m^3, of #V vertices in metres and #T triangles; zero for a
+/// surface that encloses none.
+double VolumeM3(std::span<const std::array<float, 3>> vertices,
+                std::span<const std::array<uint32_t, 3>> triangles);
+
+/// The diagonal of the bounding box, metres.
+double ExtentM(std::span<const std::array<float, 3>> vertices);
+
+}  // namespace carillon
