@@ -23,10 +23,12 @@
 namespace carillon {
 namespace {
 
-constexpr uint64_t kMostHarmonics = uint64_t{1} << 28;
+constexpr uint64_t kMostArrayBytes = uint64_t{1} << 30;
 
 /// Indices into kTransferArrays.
 enum : size_t { kEigenvalues, kStates, kPowerIntegrals, kNormalEnergies, kFirst = 7, kHarmonics };
+static_assert(std::string_view(kTransferArrays[kFirst].name) == "first");
+static_assert(std::string_view(kTransferArrays[kHarmonics].name) == "harmonics");
 
 absl::Status Malformed(absl::string_view what) {
   return Refusal(absl::StatusCode::kInvalidArgument, "TRANSFER_MALFORMED",
@@ -56,9 +58,14 @@ TransferSizes SizesOf(const v1::TransferHeader& header) {
   return sizes;
 }
 
-uint64_t ArrayBytes(const ArraySpec& spec, const TransferSizes& sizes) {
-  uint64_t bytes = spec.type == v1::ELEMENT_TYPE_FLOAT64 ? sizeof(double) : sizeof(float);
-  for (const char dimension : std::string_view(spec.shape)) bytes *= sizes.Of(dimension);
+/// The bytes of an array; more than kMostArrayBytes: it has no type or is too large.
+uint64_t ArrayBytes(const v1::ArrayDescriptor& array) {
+  uint64_t bytes = array.type() == v1::ELEMENT_TYPE_FLOAT64 ? sizeof(double) : sizeof(float);
+  if (array.type() == v1::ELEMENT_TYPE_UNSPECIFIED) return kMostArrayBytes + 1;
+  for (const uint64_t size : array.shape()) {
+    if (size > kMostArrayBytes || bytes * size > kMostArrayBytes) return kMostArrayBytes + 1;
+    bytes *= size;
+  }
   return bytes;
 }
 
@@ -125,10 +132,10 @@ absl::Status StoredTransfer::ParseRecords() {
     return CheckHeader();
   }));
   if (!begun) return Malformed("it is empty");
-  const TransferSizes sizes = SizesOf(header_);
-  for (size_t i = 0; i < kTransferArrayCount; ++i) {
-    if (arrays_[i].size() != ArrayBytes(kTransferArrays[i], sizes)) {
-      return Malformed(absl::StrCat("it ends within array \"", kTransferArrays[i].name, "\""));
+  for (size_t i = 0; i < arrays_.size(); ++i) {
+    const v1::ArrayDescriptor& array = header_.arrays(static_cast<int>(i));
+    if (arrays_[i].size() != ArrayBytes(array)) {
+      return Malformed(absl::StrCat("it ends within array \"", array.name(), "\""));
     }
   }
   return absl::OkStatus();
@@ -142,25 +149,38 @@ absl::Status StoredTransfer::CheckHeader() {
       !IsPositive(header_.air_density_kg_per_m3()) || header_.mode_count() == 0) {
     return Malformed("its header has no modes, or a speed or density that is not above zero");
   }
-  const TransferSizes sizes = SizesOf(header_);
-  if (sizes.harmonics > kMostHarmonics || header_.arrays_size() != int{kTransferArrayCount}) {
-    return Malformed("it has too many harmonics, or other arrays");
-  }
-  for (size_t i = 0; i < kTransferArrayCount; ++i) {
-    const v1::ArrayDescriptor wanted = DescribeArray(kTransferArrays[i], sizes);
-    const v1::ArrayDescriptor& array = header_.arrays(static_cast<int>(i));
-    if (array.SerializeAsString() != wanted.SerializeAsString()) {
-      return Malformed(absl::StrCat("type or shape of array \"", wanted.name(), "\" is wrong"));
+  for (const v1::ArrayDescriptor& array : header_.arrays()) {
+    if (ArrayBytes(array) > kMostArrayBytes) {
+      return Malformed(absl::StrCat("array \"", array.name(), "\" has no type or too much"));
     }
+  }
+  arrays_.resize(static_cast<size_t>(header_.arrays_size()));
+  return FindArrays();
+}
+
+absl::Status StoredTransfer::FindArrays() {
+  const TransferSizes sizes = SizesOf(header_);
+  for (size_t i = 0; i < kReadArrayCount; ++i) {
+    const v1::ArrayDescriptor wanted = DescribeArray(kTransferArrays[i], sizes);
+    const auto found = std::find_if(
+        header_.arrays().begin(), header_.arrays().end(),
+        [&](const v1::ArrayDescriptor& array) { return array.name() == wanted.name(); });
+    if (found == header_.arrays().end() ||
+        found->SerializeAsString() != wanted.SerializeAsString()) {
+      return Malformed(
+          absl::StrCat("array \"", wanted.name(), "\" is missing or of another type or shape"));
+    }
+    place_[i] = static_cast<size_t>(found - header_.arrays().begin());
   }
   return absl::OkStatus();
 }
 
 absl::Status StoredTransfer::TakeChunk(const v1::ModalModelChunk& chunk) {
-  if (chunk.array() >= kTransferArrayCount) return Malformed("a chunk is of no array");
+  if (chunk.array() >= arrays_.size()) return Malformed("a chunk is of no array");
   std::string& array = arrays_[chunk.array()];
-  const char* name = kTransferArrays[chunk.array()].name;
-  const uint64_t whole = ArrayBytes(kTransferArrays[chunk.array()], SizesOf(header_));
+  const v1::ArrayDescriptor& descriptor = header_.arrays(static_cast<int>(chunk.array()));
+  const std::string& name = descriptor.name();
+  const uint64_t whole = ArrayBytes(descriptor);
   if (chunk.offset() != array.size() || chunk.data().size() > whole - array.size()) {
     return Malformed(absl::StrCat("a chunk of array \"", name, "\" is out of order or too long"));
   }
@@ -178,7 +198,7 @@ absl::Status StoredTransfer::TakeChunk(const v1::ModalModelChunk& chunk) {
 absl::Status StoredTransfer::CheckNumbers() const {
   const TransferSizes sizes = SizesOf(header_);
   bool good = true;
-  for (size_t i = 0; i < kTransferArrayCount; ++i) {
+  for (size_t i = 0; i < kReadArrayCount; ++i) {
     good =
         good && (kTransferArrays[i].type != v1::ELEMENT_TYPE_FLOAT32 || AreFinite(Array<float>(i)));
   }
@@ -197,8 +217,9 @@ absl::Status StoredTransfer::CheckNumbers() const {
 
 template <typename T>
 std::vector<T> StoredTransfer::Array(size_t index) const {
-  std::vector<T> values(arrays_[index].size() / sizeof(T));
-  if (!values.empty()) std::memcpy(values.data(), arrays_[index].data(), arrays_[index].size());
+  const std::string& bytes = arrays_[place_[index]];
+  std::vector<T> values(bytes.size() / sizeof(T));
+  if (!values.empty()) std::memcpy(values.data(), bytes.data(), bytes.size());
   return values;
 }
 

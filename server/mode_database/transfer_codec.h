@@ -26,6 +26,10 @@ class StoredTransfer {
   /// Errors: NotFound (FILE_NOT_FOUND), and those of Parse.
   static absl::StatusOr<StoredTransfer> ReadFile(const std::filesystem::path& file);
 
+  /// The arrays that the server reads: the first ones of kTransferArrays. Others, of a later minor
+  /// version, are kept with the bytes and only checked by their hashes.
+  static constexpr size_t kReadArrayCount = 10;
+
   const v1::TransferHeader& header() const { return header_; }
   const std::string& bytes() const { return bytes_; }
   /// The eigenvalues of the modal model, unit material, ascending.
@@ -37,6 +41,7 @@ class StoredTransfer {
  private:
   absl::Status ParseRecords();
   absl::Status CheckHeader();
+  absl::Status FindArrays();
   absl::Status TakeChunk(const v1::ModalModelChunk& chunk);
   absl::Status CheckNumbers() const;
   template <typename T>
@@ -44,7 +49,8 @@ class StoredTransfer {
 
   v1::TransferHeader header_;
   std::string bytes_;
-  std::array<std::string, kTransferArrayCount> arrays_;  ///< as in kTransferArrays
+  std::vector<std::string> arrays_;              ///< as in the header
+  std::array<size_t, kReadArrayCount> place_{};  ///< in arrays_, of each of kTransferArrays
 };
 
 /// The bytes of a record in a file: its length as a varint, then the record.

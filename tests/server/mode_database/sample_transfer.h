@@ -2,8 +2,10 @@
 #pragma once
 
 #include <cstdint>
+#include <iterator>
 #include <numeric>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "proto/cpp/transfer_format.h"
@@ -44,6 +46,14 @@ inline v1::TransferHeader SampleTransferHeader(uint32_t mode_count, double speed
   return header;
 }
 
+/// The bytes of an array of zeros.
+inline std::string Zeros(const TransferSizes& sizes, size_t array) {
+  const ArraySpec& spec = kTransferArrays[array];
+  uint64_t bytes = spec.type == v1::ELEMENT_TYPE_FLOAT64 ? 8 : 4;
+  for (const char dimension : std::string_view(spec.shape)) bytes *= sizes.Of(dimension);
+  return std::string(bytes, '\0');
+}
+
 /// The stored form of a transfer of `model`, each mode with one harmonic.
 inline std::string SampleTransferBytes(const ModalModel& model, SampleRadiation radiation) {
   const auto modes = static_cast<uint32_t>(model.mode_count());
@@ -65,12 +75,15 @@ inline std::string SampleTransferBytes(const ModalModel& model, SampleRadiation 
                                 BytesOf(std::vector(size_t{2} * modes, 1.0F))};
   v1::TransferRecord record;
   *record.mutable_header() = SampleTransferHeader(modes, radiation.speed_ratio);
+  const TransferSizes all_sizes{.modes = modes, .harmonics = modes};
   std::string all = Delimited(record);
   for (uint32_t i = 0; i < kTransferArrayCount; ++i) {
+    const std::string data = i < std::size(arrays) ? arrays[i] : Zeros(all_sizes, i);
+    if (data.empty()) continue;
     v1::ModalModelChunk& chunk = *record.mutable_chunk();
     chunk.set_array(i);
-    chunk.set_data(arrays[i]);
-    chunk.set_xxh3(Xxh3(arrays[i]));
+    chunk.set_data(data);
+    chunk.set_xxh3(Xxh3(data));
     all += Delimited(record);
   }
   return all;
