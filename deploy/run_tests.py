@@ -4,8 +4,9 @@
 
 Usage: run_tests.py BUILD_FOLDER ARGUMENTS OF ctest...
 
-The summary names the time of each room, counts every test once, by its last run, and names those that were run again. A test of the real-time
-path skips itself where the machine was too busy to judge, so one that is skipped in both runs is named, too.
+The summary has the time of each room's tests, counts every test once, by its last run, and names those that were run
+again. A test of the real-time path skips itself where the machine was too busy to judge, so one that is skipped in
+both runs is named, too.
 """
 
 import collections
