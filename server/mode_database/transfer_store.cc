@@ -27,7 +27,8 @@ struct TransferRow {
 
 /// The rows of a revision of a model by ascending speed ratio, without those whose header has
 /// changed on the disk.
-absl::StatusOr<std::vector<TransferRow>> SelectRows(SqliteConnection& connection, int64_t revision) {
+absl::StatusOr<std::vector<TransferRow>> SelectRows(SqliteConnection& connection,
+                                                    int64_t revision) {
   std::vector<TransferRow> rows;
   RETURN_IF_ERROR(connection.Query(
       "SELECT speed, stored_bytes, created_unix_ms, header_xxh3, xxh3, header FROM transfers "
