@@ -22,7 +22,7 @@ using Harmonics = std::array<Complex, kRigidHarmonicCount>;
 /// Ends of the wavenumbers: edges of the level to the shortest wave, and shortest to longest wave.
 constexpr double kEdgesPerWave = 2.5;
 constexpr double kRange = 60;
-constexpr double kTolerance = 1e-2;
+constexpr double kTolerance = 2e-2;
 /// Radii that are tried, in parts of that of the sphere around the body.
 constexpr double kLeastRadius = 0.02;
 constexpr double kGreatestRadius = 1.25;

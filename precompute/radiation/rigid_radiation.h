@@ -19,7 +19,7 @@ inline constexpr size_t kRigidMotionCount = 6;
 /// The harmonics of orders 0, 1 and 2, by which the equivalent spheres move.
 inline constexpr size_t kRigidHarmonicCount = 9;
 /// Wavenumbers at which they are solved.
-inline constexpr size_t kRigidWavenumberCount = 12;
+inline constexpr size_t kRigidWavenumberCount = 8;
 
 /// How a body radiates that one blow accelerates as a whole: acceleration noise (Chadwick, Zheng
 /// and James, "Precomputed acceleration noise for improved rigid-body sound", 2012).
