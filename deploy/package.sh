@@ -5,7 +5,7 @@
 #
 # Builds the release preset and makes Debian packages of it in FOLDER, by default build/packages, with the archive of
 # the source that belongs to them. VERSION is that of CMakeLists.txt unless it is given. lintian checks the packages of
-# the project's own version, and its errors and warnings fail the script. With --built, the programs are taken from the
+# the project's own version, and its errors fail the script. With --built, the programs are taken from the
 # folder BUILD as they are, and no package is installed for building them.
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
@@ -55,6 +55,6 @@ dpkg-buildpackage --build=binary --no-sign --no-check-builddeps >"$scratch/log" 
   cat "$scratch/log" >&2
   exit 1
 }
-[[ $version != "$own_version" ]] || lintian --fail-on error,warning --tag-display-limit 0 "$scratch"/*.deb
+[[ $version != "$own_version" ]] || lintian --fail-on error --tag-display-limit 0 "$scratch"/*.deb
 cp "$scratch"/*.deb "$folder"
 printf 'package: %s\n' "$folder"/*_"$version"_*.deb "$folder/carillon_$version.tar.xz"
