@@ -23,7 +23,7 @@ esac
 rooms=()
 while [[ ${1:-} =~ ^[a-z] ]]; do rooms+=("${1%/}") && shift; done
 
-lists=(programs tests packages)
+lists=(programs tests)
 excluded=
 case $preset in
   asan) excluded=lint ;;
@@ -37,6 +37,12 @@ if [[ -z $excluded ]] && { ((${#rooms[@]} == 0)) || [[ " ${rooms[*]} " == *" dep
 # The targets tests_ROOM are made by carillon_needs in deploy/cmake/CarillonRoom.cmake.
 targets=()
 selection=()
+# Packages are made and tried in a bare Debian only when their test is named: that takes minutes, and the network.
+if [[ " ${rooms[*]} " == *" deploy/bare_packages "* ]]; then
+  lists+=(packages)
+else
+  excluded="${excluded:+$excluded|}packages"
+fi
 if [[ -n $excluded ]]; then selection+=(--label-exclude "$excluded"); fi
 if ((${#rooms[@]})); then
   for room in "${rooms[@]}"; do

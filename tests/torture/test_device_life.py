@@ -31,7 +31,7 @@ class DeviceLifeTest(unittest.TestCase):
     def setUp(self):
         scratch = tempfile.TemporaryDirectory(prefix="carillon-")
         self.addCleanup(scratch.cleanup)
-        self.folder = pathlib.Path(scratch.name)
+        self.folder = self.scratch = pathlib.Path(scratch.name)
 
     def serve(self, device, environment=None):
         self.daemon = Daemon(self.folder, "--audio-device", device, environment=environment)
@@ -105,6 +105,8 @@ class DeviceLifeTest(unittest.TestCase):
     def test_a_server_that_starts_after_the_daemon_is_used(self):
         for device in ("auto", sound_servers.JackServer.DEVICE):
             with self.subTest(device=device):
+                # Each daemon has its own socket, since gRPC would offer the old connection for the same one.
+                self.folder = pathlib.Path(tempfile.mkdtemp(dir=self.scratch))
                 server = sound_servers.JackServer(self.folder)
                 self.serve(device, server.environment)
                 self.assertEqual(self.scene.mixer().device, "null")

@@ -312,6 +312,7 @@ TEST_F(AudioApi, WhatIsNoTraceIsRefused) {
 
 TEST_F(AudioApi, ATraceThatWasHeardLiveBeginsAtItsFirstStep) {
   Requests heard = Trace();
+  heard[3].mutable_record()->mutable_step()->mutable_impulses(0)->set_duration_s(0);
   v1::ContactTraceClock& clock = *heard[1].mutable_record()->mutable_header()->mutable_clock();
   clock.set_first_frame(1280);
   clock.set_first_time_s(0.25);

@@ -107,7 +107,7 @@ TEST(Columns, WhatMayBeEmptyIsNone) {
   const Told told = Read(step);
   ASSERT_EQ(told.impulses.size(), 3U);
   EXPECT_FALSE(told.impulses[0].contact.second.has_value());
-  EXPECT_EQ(told.impulses[0].contact.impulse.duration_s, 0);
+  EXPECT_FALSE(told.impulses[0].contact.impulse.duration_s.has_value());
 }
 
 TEST(Columns, PosesAreTurnedWhereTheColumnSaysSo) {

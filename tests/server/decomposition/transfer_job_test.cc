@@ -8,6 +8,7 @@
 #include <cmath>
 #include <condition_variable>
 #include <mutex>
+#include <thread>
 
 #include "proto/cpp/material_catalogue.h"
 #include "server/decomposition/decomposition_queue.h"
@@ -109,6 +110,15 @@ class TransferJobTest : public ::testing::Test {
 
   std::string Runs() { return ReadBytes(folder_ / "runs"); }
 
+  /// Waits until the workers of `runs` have begun.
+  void AwaitRuns(const std::string& runs) {
+    const auto end = std::chrono::steady_clock::now() + kDeadline;
+    while (Runs() != runs && std::chrono::steady_clock::now() < end) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    ASSERT_EQ(Runs(), runs);
+  }
+
   TemporaryFolder folder_;
   SystemClock clock_;
   LocalExecutorOptions options_{.worker_count = 1};
@@ -209,6 +219,7 @@ TEST_F(TransferJobTest, EndsWithItsModel) {
   Submit();
   AwaitEnd(digest_);
   Ending ending(*queue_, transfer_);
+  AwaitRuns("model\ntransfer\n");
   ASSERT_TRUE(queue_->DeleteModel(digest_).ok());
   EXPECT_EQ(ending.Await().state(), v1::JOB_STATE_CANCELLED);
   EXPECT_FALSE(queue_->Get(transfer_).ok());

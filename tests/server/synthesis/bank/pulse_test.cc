@@ -151,7 +151,7 @@ TEST(Pulse, OfMergedImpulsesAreTheirMean) {
   mean.pulse = Pulse::RaisedCosine(std::sqrt(5e-8F));
   OscillatorBank other(sounding, MakeUniformShapes(2), {});
   const auto right = Ring(other, mean, 128, 8);
-  for (size_t n = 0; n < sound.size(); ++n) EXPECT_NEAR(sound[n], right[n], 1e-9) << n;
+  for (size_t n = 0; n < sound.size(); ++n) EXPECT_NEAR(sound[n], right[n], 1e-8) << n;
 }
 
 }  // namespace
