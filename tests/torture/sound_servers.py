@@ -35,6 +35,12 @@ class Server:
         self.process.send_signal(number)
         self.process.wait()
 
+    def close(self):
+        """Ends it as its user would."""
+        if self.process is not None and self.process.poll() is None:
+            self.process.send_signal(signal.SIGCONT)
+            self.kill(signal.SIGTERM)
+
     def await_ready(self):
         raise NotImplementedError
 
@@ -55,6 +61,12 @@ class JackServer(Server):
     def await_ready(self):
         subprocess.run(["jack_wait", "-w", "-t", "10"], env=self.environment, check=True,
                        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+    def close(self):
+        """A jackd that was killed keeps one of the machine's eight places until its name is used again."""
+        if self.process.poll() is not None:
+            self.start()
+        super().close()
 
     def recording(self):
         file = self.log.parent / "recording.float32"
