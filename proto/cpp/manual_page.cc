@@ -80,14 +80,22 @@ std::string Commands(const CLI::App& app, const std::string& path) {
 }  // namespace
 
 std::vector<const CLI::Option*> ListedOptions(const CLI::App& app) {
-  return app.get_options([](const CLI::Option* option) {
+  std::vector<const CLI::Option*> options = app.get_options([](const CLI::Option* option) {
     return !option->get_positional() && !option->get_group().empty() &&
            option->get_lnames() != std::vector<std::string>{"help"};
   });
+  // CLI11 keeps a group of options as a command without a name.
+  for (const CLI::App* group :
+       app.get_subcommands([](const CLI::App* command) { return command->get_name().empty(); })) {
+    for (const CLI::Option* option : ListedOptions(*group)) options.push_back(option);
+  }
+  return options;
 }
 
 std::vector<const CLI::App*> ListedCommands(const CLI::App& app) {
-  return app.get_subcommands([](const CLI::App* command) { return !command->get_group().empty(); });
+  return app.get_subcommands([](const CLI::App* command) {
+    return !command->get_group().empty() && !command->get_name().empty();
+  });
 }
 
 std::string ManualPage(const CLI::App& app, int section, const std::string& version) {
