@@ -71,7 +71,7 @@ done
 for model in "${models[@]}"; do "$bin/carillon" job watch "$model" >/dev/null; done
 
 printf '\nSwinging them for %s s, every contact streamed as it happens:\n' "$seconds"
-"$bin/carillon-wind-chimes" play "${models[@]}" --seconds "$seconds" --seed "$seed" --trace "$trace"
+"$bin/carillon-wind-chimes" play --gain 0.5 "${models[@]}" --seconds "$seconds" --seed "$seed" --trace "$trace"
 
 printf '\nThe same contacts, rendered offline:\n'
 "$bin/carillon" render "$trace" --out "$wav"
