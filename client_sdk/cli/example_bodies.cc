@@ -132,7 +132,7 @@ ExampleBody DrawChime() {
 }  // namespace
 
 const std::vector<Example>& Examples() {
-  static const auto* const kExamples = new std::vector<Example>{
+  static const auto* const examples = new std::vector<Example>{
       {"bell", "a bronze bell, 12 cm wide", "bell_bronze",
        "--point 0.06,0,0.005 --impulse=-0.02,0,0", DrawBell},
       {"bowl", "a porcelain bowl, 16 cm wide", "porcelain",
@@ -141,7 +141,7 @@ const std::vector<Example>& Examples() {
        "--point 0.1,0.015,0.008 --impulse 0,0,-0.02", DrawBar},
       {"chime", "an aluminum tube of a wind chime, 40 cm long", "chime_aluminum",
        "--point 0.0125,0,0 --impulse=-0.01,0,0", DrawChime}};
-  return *kExamples;
+  return *examples;
 }
 
 std::string ObjText(const Example& example) {

@@ -99,7 +99,7 @@ std::vector<const CLI::App*> ListedCommands(const CLI::App& app) {
 }
 
 std::string ManualPage(const CLI::App& app, int section, const std::string& version) {
-  const std::string name = app.get_name();
+  const std::string& name = app.get_name();
   const std::string commands = Commands(app, name);
   std::string page = absl::StrCat(
       ".TH ", absl::AsciiStrToUpper(name), " ", section, " \"\" \"Carillon ", version,

@@ -69,6 +69,7 @@ std::vector<SceneRegistry::SceneEntry> SceneRegistry::ListScenes() const {
     scenes = scenes_;
   }
   std::vector<SceneEntry> entries;
+  entries.reserve(scenes.size());
   for (const auto& [id, scene] : scenes) {
     entries.push_back({.scene = id, .object_count = scene->CopyAll().size()});
   }
