@@ -10,6 +10,12 @@ import unittest
 
 import jack
 
+# JACK's clock is the instrument here. Its dummy driver is off by less than 50 ppm; a machine that stops for a while
+# stops the driver too, which then misses no cycle but tells times that are wrong by as long.
+MOST_CLOCK_PPM = 200
+ATTEMPTS = 3
+
+
 class LatencyTest(unittest.TestCase):
     # Of JACK: the daemon's block.
     period_frames = jack.PERIOD_FRAMES
@@ -22,14 +28,17 @@ class LatencyTest(unittest.TestCase):
         cls.addClassCleanup(cls.measurement.stop)
 
     def measure(self, way):
-        found = self.measurement.measure(way, streams=2, strikes=40)
-        print(f"{way}: stated {found['stated_ms']:.2f} ms, "
-              f"measured {found['least_ms']:.2f} to {found['most_ms']:.2f} ms; "
-              f"{found['late']} of {found['strikes']} late", flush=True)
-        missed, xruns = found["missed_cycles"], found["xruns"]
-        if missed + xruns > 0:
-            self.skipTest(f"too busy for sound here: {missed} cycles of JACK missed, {xruns} xruns of the daemon")
-        return found
+        for _ in range(ATTEMPTS):
+            found = self.measurement.measure(way, streams=2, strikes=40)
+            print(f"{way}: stated {found['stated_ms']:.2f} ms, "
+                  f"measured {found['least_ms']:.2f} to {found['most_ms']:.2f} ms; "
+                  f"{found['late']} of {found['strikes']} late; JACK's clock off by {found['clock_ppm']:.0f} ppm",
+                  flush=True)
+            missed, xruns = found["missed_cycles"], found["xruns"]
+            if missed + xruns == 0 and abs(found["clock_ppm"]) <= MOST_CLOCK_PPM:
+                return found
+        self.skipTest(f"too busy for sound here: {missed} cycles of JACK missed, {xruns} xruns of the daemon, "
+                      f"JACK's clock off by {found['clock_ppm']:.0f} ppm")
 
     def assert_as_stated(self, found):
         # All that came in time lie where the daemon says, to the sample; what did not is counted, and may run
@@ -41,10 +50,8 @@ class LatencyTest(unittest.TestCase):
         # None sounds before it has been sent, nor, beyond what is stated, later than the first step took to
         # arrive, rounded up to a block.
         self.assertGreaterEqual(found["least_ms"], found["delay_ms"])
-        # JACK's own cycles may come late by two before it counts one as missed. More is the machine's delay of the
-        # first step, which no test may judge by the clock.
-        if found["most_over_ms"] > 3 * 1000 * self.period_frames / jack.RATE:
-            self.skipTest(f"too busy for sound here: the first step took {found['most_over_ms']:.0f} ms to arrive")
+        # JACK's own cycles may come late by two before it counts one as missed.
+        self.assertLessEqual(found["most_over_ms"], 3 * 1000 * self.period_frames / jack.RATE)
 
     def test_a_strike_of_now_sounds_when_the_daemon_states(self):
         self.assert_as_stated(self.measure("stream"))
