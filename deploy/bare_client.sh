@@ -30,22 +30,7 @@ done
 CARILLON_SERVER=$(sed -n 's/^listening on //p' "$scratch/said")
 export CARILLON_SERVER
 
-cat >"$scratch/bar.obj" <<'BAR'
-v 0 0 0
-v 0.2 0 0
-v 0.2 0.016 0
-v 0 0.016 0
-v 0 0 0.01
-v 0.2 0 0.01
-v 0.2 0.016 0.01
-v 0 0.016 0.01
-f 4 3 2 1
-f 5 6 7 8
-f 1 2 6 5
-f 2 3 7 6
-f 3 4 8 7
-f 4 1 5 8
-BAR
+"$bin/carillon" example bar --out "$scratch/bar.obj"
 model=$("$bin/carillon" model create "$scratch/bar.obj" --material bell_bronze --wait)
 
 # Until it is struck, the daemon plays nothing but zeros.

@@ -129,7 +129,8 @@ class ModelReader {
   absl::Status TakeChunk(const v1::ModalModelChunk& chunk) {
     if (!has_header_) return Malformed("has no header");
     const size_t i = chunk.array();
-    if (i >= kModelArrayCount) return absl::OkStatus();  // of a writer that knows more arrays
+    // A newer writer may have added arrays that this reader does not know.
+    if (i >= kModelArrayCount) return absl::OkStatus();
     const std::string& data = chunk.data();
     if (chunk.offset() != read_bytes_[i] || data.size() > arrays_[i].size() - read_bytes_[i]) {
       return Malformed(absl::StrCat("has a chunk of \"", kModelArrays[i].name, "\" out of place"));

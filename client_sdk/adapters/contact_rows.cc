@@ -89,7 +89,7 @@ void ContactRows::Append(const ContactReport& contact, v1::ContactStep& step) {
 }
 
 void ContactRows::Describe(const ContactSide& silent, v1::HertzContact& hertz) const {
-  // Of a reduced mass, a body this heavy is no part.
+  // A striker of this mass changes the reduced mass of no real body.
   constexpr double kImmovableMass_kg = 1e6;
   hertz.set_striker(settings_.striker);
   hertz.set_striker_mass_kg(silent.mass_kg.value_or(kImmovableMass_kg));

@@ -44,7 +44,8 @@ Profile Smooth(const Profile& points, int pieces) {
 /// and the radius to the right.
 ExampleBody Lathe(const Profile& profile, uint32_t around, bool closed) {
   ExampleBody body;
-  std::vector<uint32_t> first;  // of each ring; a point on the axis is one vertex
+  // The first vertex of each ring. A point on the axis is a ring of one vertex.
+  std::vector<uint32_t> first;
   for (const ProfilePoint& point : profile) {
     first.push_back(static_cast<uint32_t>(body.vertices.size()));
     const uint32_t count = point.radius_m > 0 ? around : 1;

@@ -160,15 +160,21 @@ absl::StatusOr<v1::Job> RequestModel(const client::Client& daemon,
   return daemon.CreateModalModel(request);
 }
 
-/// Waits for a job if the options say so, and prints it.
-absl::Status Conclude(const client::Client& daemon, absl::StatusOr<v1::Job> job, bool wait,
-                      bool json) {
-  if (job.ok() && wait) job = WatchWithProgress(daemon, job->name());
+/// Whether a command waits for its job, and how it prints it.
+struct Conclusion {
+  bool wait;
+  bool json;
+  const std::string& (v1::Job::*name)() const;  ///< what is printed where JSON is not asked for
+};
+
+absl::Status Conclude(const client::Client& daemon, absl::StatusOr<v1::Job> job,
+                      const Conclusion& conclusion) {
+  if (job.ok() && conclusion.wait) job = WatchWithProgress(daemon, job->name());
   if (!job.ok()) return job.status();
-  if (json) {
+  if (conclusion.json) {
     PrintJson(*job);
   } else {
-    absl::PrintF("%s\n", job->modal_model());
+    absl::PrintF("%s\n", ((*job).*conclusion.name)());
   }
   return absl::OkStatus();
 }
@@ -192,7 +198,9 @@ absl::Status CreateModel(const client::Client& daemon, const CreateModelOptions&
   }
   absl::Status first_error;
   for (absl::StatusOr<v1::Job>& job : jobs) {
-    const absl::Status ended = Conclude(daemon, std::move(job), options.wait, json);
+    const absl::Status ended =
+        Conclude(daemon, std::move(job),
+                 {.wait = options.wait, .json = json, .name = &v1::Job::modal_model});
     if (ended.ok()) continue;
     if (!first_error.ok()) (void)Report(first_error);
     first_error = ended;
@@ -212,15 +220,8 @@ absl::Status CreateTransfer(const client::Client& daemon, const CreateTransferOp
   request.set_size(options.size);
   request.mutable_settings()->set_accuracy_db(options.accuracy_db);
   request.mutable_settings()->set_budget_s(options.budget_s);
-  auto job = daemon.CreateTransfer(request);
-  if (job.ok() && options.wait) job = WatchWithProgress(daemon, job->name());
-  if (!job.ok()) return job.status();
-  if (json) {
-    PrintJson(*job);
-  } else {
-    absl::PrintF("%s\n", job->name());
-  }
-  return absl::OkStatus();
+  return Conclude(daemon, daemon.CreateTransfer(request),
+                  {.wait = options.wait, .json = json, .name = &v1::Job::name});
 }
 
 absl::Status ListModels(const client::Client& daemon, const v1::ListModalModelsRequest& filter,

@@ -112,3 +112,20 @@ function(carillon_test name)
   gtest_discover_tests(${target} TEST_PREFIX "${name}." DISCOVERY_MODE PRE_TEST
                        PROPERTIES TIMEOUT ${ROOM_TIMEOUT} LABELS "${ROOM_LABELS}")
 endfunction()
+
+# carillon_program_tests(integration test_latency test_rest...)
+#
+# Files of Python in a folder of tests/ that run the real programs, one CTest test a file.
+function(carillon_program_tests room)
+  set(python ${CMAKE_BINARY_DIR}/client_sdk/python ${PROJECT_SOURCE_DIR}/client_sdk/python
+             ${PROJECT_SOURCE_DIR}/tests/integration)
+  list(JOIN python ":" python)
+  foreach(name ${ARGN})
+    add_test(NAME ${room}/${name}
+             COMMAND /usr/bin/python3 -m unittest --verbose ${name}
+             WORKING_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR})
+    set_tests_properties(${room}/${name} PROPERTIES
+      LABELS ${room} TIMEOUT 600
+      ENVIRONMENT "PYTHONPATH=${python};PYTHONDONTWRITEBYTECODE=1;CARILLON_BIN_DIR=${CMAKE_RUNTIME_OUTPUT_DIRECTORY};CARILLON_BUILD_DIR=${CMAKE_BINARY_DIR}")
+  endforeach()
+endfunction()

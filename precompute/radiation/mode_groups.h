@@ -13,7 +13,7 @@ namespace carillon::precompute {
 struct ModeGroup {
   std::vector<size_t> modes;  ///< one or two
   double wavenumber = 0;
-  double loudness = 0;  ///< by what is known of it; only its order counts
+  double loudness = 0;  ///< an estimate, by which groups are ordered
   int first_level = 0;
   int solved_count = 0;           ///< levels from the first on that it was solved on
   std::vector<ModeField> fields;  ///< of the finest of them

@@ -89,7 +89,7 @@ double FitStrengths(const std::vector<Solved>& solved, double radius_m,
   return left;
 }
 
-/// Of the power that the sphere radiates, over the wavenumbers.
+/// Returns the error of the equivalent sphere's power, dB, root mean square over the wavenumbers.
 double ErrorDb(const std::vector<Solved>& solved, const RigidRadiation::Motion& motion) {
   double sum = 0;
   for (const Solved& at : solved) {

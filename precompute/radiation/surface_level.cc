@@ -79,7 +79,8 @@ SurfaceMesh WithoutLoose(const SurfaceMesh& mesh) {
 /// triangle. Zero where that is no matter of curvature, as at a rim that the edge cuts off.
 double GapAt(const SurfaceMesh& given, const NearestTriangle& index, const Point& a, const Point& b,
              const Point& normal) {
-  constexpr double kMostGap = 0.2;  // of the edge; that of a circle of five corners
+  // In parts of the edge. A circle that is drawn with five corners has this gap.
+  constexpr double kMostGap = 0.2;
   const double edge_m = Distance(a, b);
   Point middle{};
   for (size_t i = 0; i < 3; ++i) middle[i] = (a[i] + b[i]) / 2;

@@ -50,7 +50,7 @@ double SurfaceLevels::VertexCountOf(int level) const {
   if (const auto made = levels_.find(level); made != levels_.end()) {
     return static_cast<double>(made->second.level.surface.vertex_count());
   }
-  // Half as many as there are equilateral triangles in the area.
+  // A closed surface has half as many vertices as triangles; these are about equilateral.
   return area_m2_ / (std::sqrt(3.0) / 2 * EdgeOf(level) * EdgeOf(level));
 }
 

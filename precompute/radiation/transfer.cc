@@ -180,7 +180,8 @@ class TransferSolver {
     const SphereGrid grid(PatternOrder(group.wavenumber, body_.radius_m));
     std::vector<ModeField> fields =
         SolveModes(ProblemOf(group, *made), made->level, body_, grid, workers_);
-    double sweeps = 2;  // of the right side and of the far pattern
+    // The right side and the far pattern take a sweep each.
+    double sweeps = 2;
     for (const ModeField& field : fields) sweeps = std::max(sweeps, field.iterations + 2.0);
     const double pairs = PairsOf(group, group.next_level());
     time_.TakeSolution(CpuSeconds() - begun_s, pairs * sweeps);

@@ -12,7 +12,7 @@
 namespace carillon {
 namespace {
 
-/// Returns a text such that man(7) prints it as it is.
+/// Escapes what man(7) would take for a command, so that it prints the text as it is.
 std::string Plain(const std::string& text) {
   std::string plain = absl::StrReplaceAll(text, {{"\\", "\\e"}, {"-", "\\-"}});
   if (plain.starts_with('.') || plain.starts_with('\'')) plain.insert(0, "\\&");

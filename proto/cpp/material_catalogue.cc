@@ -9,7 +9,6 @@
 
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_join.h"
 #include "proto/cpp/near_names.h"
 
 namespace carillon {
@@ -31,11 +30,7 @@ absl::StatusOr<v1::Material> FindPreset(const std::string& name) {
     if (entry.name() == name) return entry.material();
     known.push_back(entry.name());
   }
-  const std::vector<std::string> near = NearNames(name, known);
-  return absl::InvalidArgumentError(absl::StrCat(
-      "UNKNOWN_MATERIAL: no material is named \"", name, "\"",
-      near.empty() ? "" : ", the nearest is ", absl::StrJoin(near, " or "), "; name one of ",
-      absl::StrJoin(known, ", "), ", or give the figures themselves"));
+  return UnknownName("UNKNOWN_MATERIAL", "material", name, known);
 }
 
 /// Lets the damping that is asked for replace the loss factor of the preset. Without this, a

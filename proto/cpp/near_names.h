@@ -6,10 +6,18 @@
 #include <string_view>
 #include <vector>
 
+#include "absl/status/status.h"
+#include "absl/strings/string_view.h"
+
 namespace carillon {
 
 /// The names with the least edit distance to `written`, ignoring case. The distance of a name with
 /// underscores is that of its closest word. Empty if more than a third of the letters differ.
 std::vector<std::string> NearNames(std::string_view written, std::span<const std::string> names);
+
+/// Returns `REASON: no KIND is named "NAME"` as an InvalidArgument, with the nearest of the known
+/// names and all of them.
+absl::Status UnknownName(absl::string_view reason, absl::string_view kind, const std::string& name,
+                         std::span<const std::string> known);
 
 }  // namespace carillon

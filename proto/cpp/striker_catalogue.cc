@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "absl/status/status.h"
-#include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "proto/cpp/near_names.h"
 
@@ -45,11 +44,7 @@ absl::StatusOr<v1::CatalogueStriker> FindStriker(const std::string& name) {
   for (const v1::CatalogueStriker& striker : Strikers().strikers()) {
     if (striker.name() == name) return striker;
   }
-  const std::vector<std::string> near = NearNames(name, Names());
-  return absl::InvalidArgumentError(
-      absl::StrCat("UNKNOWN_STRIKER: no striker is named \"", name, "\"",
-                   near.empty() ? "" : ", the nearest is ", absl::StrJoin(near, " or "),
-                   "; name one of ", StrikerNames(), ", or give the figures themselves"));
+  return UnknownName("UNKNOWN_STRIKER", "striker", name, Names());
 }
 
 }  // namespace carillon

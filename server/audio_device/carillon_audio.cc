@@ -9,10 +9,8 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include <array>
 #include <chrono>
 #include <cstdlib>
-#include <cstring>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -23,6 +21,7 @@
 #include "absl/strings/numbers.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
+#include "server/audio_device/descriptor_message.h"
 #include "server/audio_device/device_report.h"
 #include "server/audio_device/frame_ring.h"
 #include "server/audio_device/portaudio_device.h"
@@ -67,24 +66,6 @@ void Send(const absl::Status& failure) {
   Send(report);
 }
 
-/// Waits for the daemon to ask for sound. Absent: the daemon has no use for it any more.
-std::optional<int> ReceiveDescriptor() {
-  char byte = 0;
-  iovec piece{&byte, 1};
-  alignas(cmsghdr) std::array<char, CMSG_SPACE(sizeof(int))> control{};
-  msghdr message{};
-  message.msg_iov = &piece;
-  message.msg_iovlen = 1;
-  message.msg_control = control.data();
-  message.msg_controllen = control.size();
-  if (recvmsg(kDaemonSocket, &message, MSG_CMSG_CLOEXEC) != 1) return std::nullopt;
-  const cmsghdr* const header = CMSG_FIRSTHDR(&message);
-  if (header == nullptr || header->cmsg_type != SCM_RIGHTS) return std::nullopt;
-  int descriptor = -1;
-  std::memcpy(&descriptor, CMSG_DATA(header), sizeof descriptor);
-  return descriptor;
-}
-
 /// Waits for one period. False: the daemon has closed its end.
 bool DaemonListens() {
   pollfd daemon{kDaemonSocket, POLLRDHUP, 0};
@@ -103,7 +84,8 @@ absl::Status Play(AudioDevice& device, FrameRing& ring) {
 absl::Status Serve(absl::string_view name, const DeviceFormat& format) {
   ASSIGN_OR_RETURN(const std::unique_ptr<AudioDevice> device, OpenPortAudioDevice(name, format));
   Send(State::kOpen, *device);
-  const std::optional<int> memory = ReceiveDescriptor();
+  // The daemon asks for sound, or has no use for it any more.
+  const std::optional<int> memory = ReceiveDescriptor(kDaemonSocket);
   if (!memory) return absl::OkStatus();
   ASSIGN_OR_RETURN(const std::unique_ptr<FrameRing> ring, FrameRing::Map(*memory));
   const absl::Status status = Play(*device, *ring);

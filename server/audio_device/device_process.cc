@@ -17,6 +17,7 @@
 #include "proto/cpp/child_process.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
+#include "server/audio_device/descriptor_message.h"
 #include "server/audio_device/device_report.h"
 
 namespace carillon {
@@ -61,23 +62,7 @@ class ReportSocket {
     return report;
   }
 
-  /// Sends one byte and a copy of a descriptor.
-  bool Send(int sent_descriptor) const {
-    char byte = 0;
-    iovec piece{&byte, 1};
-    alignas(cmsghdr) std::array<char, CMSG_SPACE(sizeof(int))> control{};
-    msghdr message{};
-    message.msg_iov = &piece;
-    message.msg_iovlen = 1;
-    message.msg_control = control.data();
-    message.msg_controllen = control.size();
-    cmsghdr* const header = CMSG_FIRSTHDR(&message);
-    header->cmsg_level = SOL_SOCKET;
-    header->cmsg_type = SCM_RIGHTS;
-    header->cmsg_len = CMSG_LEN(sizeof(int));
-    std::memcpy(CMSG_DATA(header), &sent_descriptor, sizeof sent_descriptor);
-    return sendmsg(descriptor_, &message, MSG_NOSIGNAL) == 1;
-  }
+  bool Send(int sent_descriptor) const { return SendDescriptor(descriptor_, sent_descriptor); }
 
  private:
   int descriptor_;

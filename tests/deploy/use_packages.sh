@@ -48,28 +48,13 @@ hear_a_strike() {
   carillon listen --seconds 2 --out heard.wav &
   local listener=$!
   sleep 0.5
-  carillon strike bar --material bell_bronze --point 0.1,0.008,0.01 --impulse 0,0,-0.01 --duration 0.0001 --seconds 1
+  carillon strike bar --material bell_bronze --point 0.1,0.015,0.008 --impulse 0,0,-0.01 --duration 0.0001 --seconds 1
   wait "$listener"
   # A second of silence in 24 bits is nothing but zeros; a bronze bar rings for longer.
   (($(tail -c +100 heard.wav | tr -d '\0' | wc -c) > 50000)) || fail "the strike is not in heard.wav"
 }
 
-cat >bar.obj <<'BAR'
-v 0 0 0
-v 0.2 0 0
-v 0.2 0.016 0
-v 0 0.016 0
-v 0 0 0.01
-v 0.2 0 0.01
-v 0.2 0.016 0.01
-v 0 0.016 0.01
-f 4 3 2 1
-f 5 6 7 8
-f 1 2 6 5
-f 2 3 7 6
-f 3 4 8 7
-f 4 1 5 8
-BAR
+carillon example bar
 
 run_apt update
 install_packages ./before/*.deb
