@@ -33,6 +33,9 @@ case $preset in
     ;;
 esac
 if [[ -z $excluded ]] && { ((${#rooms[@]} == 0)) || [[ " ${rooms[*]} " == *" deploy"* ]]; }; then lists+=(lint); fi
+if [[ -z $excluded || $preset == asan ]] && { ((${#rooms[@]} == 0)) || [[ " ${rooms[*]} " == *" proto"* ]]; }; then
+  lists+=(languages)
+fi
 
 # The targets tests_ROOM are made by carillon_needs in deploy/cmake/CarillonRoom.cmake.
 targets=()

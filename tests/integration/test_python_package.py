@@ -177,6 +177,110 @@ class SoundTest(PackageTest):
         self.assertEqual(refused.exception.reason, "TRACE_MALFORMED")
 
 
+class ContactsTest(PackageTest):
+    """What the columns of a step mean, by the sound of traces."""
+
+    def rendered(self, *steps, object_count=1, poses=(), step=1 / 240, **settings):
+        """The sound of steps (time, content) on `object_count` bars, of which `poses` has the poses."""
+        trace = carillon.Trace(step, **settings)
+        for i in range(object_count):
+            trace.add(self.model, pose=poses[i] if poses else None)
+        for time, content in steps:
+            trace.step(time, **content)
+        return self.c.render(trace, tail_s=0.3)
+
+    def assert_same(self, one, other):
+        self.assertGreater(one.peak, 1e-4)
+        numpy.testing.assert_array_equal(one.samples, other.samples)
+
+    def test_contacts_sound_as_the_same_in_rows(self):
+        trace = carillon.Trace(1 / 240)
+        bar = trace.add(self.model)
+        for i in range(3):
+            step = contact_pb2.ContactStep(time_s=i / 240)
+            step.contacts.add(object=bar, partner=7, point_m=carillon.contacts.vector(numpy.float32(POINT)),
+                              impulse_newton_seconds=carillon.contacts.vector(numpy.float32(IMPULSE)))
+            trace.steps.append(step)
+        contacts = carillon.Contacts(1, [POINT], [IMPULSE], partners=[7])
+        self.assert_same(self.rendered(*((i / 240, {"contacts": contacts}) for i in range(3))),
+                         self.c.render(trace, tail_s=0.3))
+
+    def test_an_offset_delays_a_strike_within_its_step(self):
+        def strike(**columns):
+            return {"impulses": carillon.Impulses(1, POINT, IMPULSE, durations=DURATION_S, **columns)}
+        self.assert_same(self.rendered((0.25, strike())), self.rendered((0.0, strike(time_offsets=0.25))))
+
+    def test_the_frame_of_the_scene_is_turned_into_that_of_the_object(self):
+        half = 0.5**0.5
+        pose = ((1, 2, 3), (half, 0, 0, half))  # a quarter turn about z: x of the object is y of the scene
+        x, y, z = POINT
+        own = self.rendered((0.0, {"impulses": carillon.Impulses(1, POINT, (0, 1e-3, -2e-3), durations=DURATION_S)}))
+        scene = self.rendered((0.0, {"impulses": carillon.Impulses(1, (1 - y, 2 + x, 3 + z), (-1e-3, 0, -2e-3),
+                                                                   durations=DURATION_S)}),
+                              poses=[pose], frame="scene")
+        numpy.testing.assert_allclose(scene.samples, own.samples, atol=1e-5 * own.peak)
+
+    def test_a_second_object_is_struck_too(self):
+        def strike(**columns):
+            return {"impulses": carillon.Impulses(1, POINT, IMPULSE, durations=DURATION_S, **columns)}
+        x, y, _ = POINT
+        bottom = (x, y, 0)
+        alone = self.rendered((0.0, strike()), object_count=2)
+        both = self.rendered((0.0, strike(second_objects=2, second_points=bottom)), object_count=2)
+        self.assertGreater(numpy.abs(both.samples - alone.samples).max(), 0.1 * alone.peak)
+        # Upside down: the second bar is struck as the first one is, so that the sound is twice as loud.
+        turned = self.rendered((0.0, strike(second_objects=2, second_points=POINT, second_rotations=(0, 1, 0, 0))),
+                               object_count=2)
+        numpy.testing.assert_allclose(turned.samples, 2 * alone.samples, atol=1e-4 * alone.peak)
+
+    def test_the_striker_sets_how_bright_a_strike_is(self):
+        def share_above_8_khz(**strike):
+            frequencies, magnitude = self.model.render_strike(POINT, IMPULSE, seconds=0.3, **strike).spectrum()
+            return numpy.square(magnitude[frequencies > 8000]).sum() / numpy.square(magnitude).sum()
+        self.assertLess(share_above_8_khz(striker="wood"), 0.5 * share_above_8_khz(striker="steel"))
+        heavy = carillon.striker("wood", mass_kg=0.2)
+        self.assertLess(share_above_8_khz(striker=heavy), share_above_8_khz(striker="wood"))
+        # Steel is what the daemon takes where nothing is known, and NaN is a duration that is not known.
+        self.assert_same(self.model.render_strike(POINT, IMPULSE, seconds=0.3, striker="steel"),
+                         self.model.render_strike(POINT, IMPULSE, seconds=0.3, duration=numpy.nan))
+        with self.assertRaises(carillon.CarillonError) as refused:
+            self.model.render_strike(POINT, IMPULSE, striker="marshmallow")
+        self.assertEqual(refused.exception.reason, "UNKNOWN_STRIKER")
+
+    def test_a_force_that_ends_suddenly_is_heard(self):
+        def steps(newtons):
+            force = carillon.Forces(1, [POINT], [(0, 0, -newtons)])
+            return [(i * 1e-4, {"forces": force}) for i in range(10)] + [(10e-4, {}), (11e-4, {})]
+        loud = self.rendered(*steps(10), step=1e-4)
+        self.assertGreater(loud.peak, 1e-5)
+        quiet = self.rendered(*steps(5), step=1e-4)
+        numpy.testing.assert_allclose(loud.samples, 2 * quiet.samples, atol=1e-3 * loud.peak)
+
+    def test_findings_tell_of_points_away_from_the_surface(self):
+        far = {"contacts": carillon.Contacts(1, [(0, 0, 1)], [IMPULSE])}
+        with self.assertWarnsRegex(carillon.ContactWarning, r"1 contacts lie up to 0\.99 m away"):
+            findings = self.rendered((0.0, far), (0.01, {})).summary.findings
+        self.assertEqual((findings.distant_point_count, findings.blow_count), (1, 1))
+        self.assertAlmostEqual(findings.largest_distance_m, 0.99, delta=1e-6)
+        with self.c.scene() as scene, self.assertWarns(carillon.ContactWarning):
+            scene.add(self.model, handle=1)
+            with scene.stream(step=1 / 240) as stream:
+                stream.step(0.0, **far)
+        self.assertEqual(stream.findings.distant_point_count, 1)
+
+    def test_an_impulse_that_no_body_bears_is_refused(self):
+        enormous = (0, 0, -1e9)
+        with self.c.scene() as scene:
+            bar = scene.add(self.model)
+            with self.assertRaises(carillon.CarillonError) as refused:
+                bar.strike(POINT, enormous)
+            self.assertEqual(refused.exception.reason, "IMPULSE_TOO_LARGE")
+            with self.assertWarnsRegex(carillon.ContactWarning, "IMPULSE_TOO_LARGE"), scene.stream(1 / 240) as stream:
+                stream.step(0.0, contacts=carillon.Contacts(bar, [POINT, POINT], [enormous, IMPULSE]))
+            self.assertEqual(stream.rejection.reason, "IMPULSE_TOO_LARGE")
+            self.assertEqual(stream.findings.too_large_impulse_count, 1)
+
+
 class AioTest(PackageTest):
     def test_a_strike_is_heard_while_the_event_loop_goes_on(self):
         async def strike():
@@ -195,6 +299,10 @@ class AioTest(PackageTest):
                 async with scene.stream(step=0.01) as stream:
                     stream.step(0.0, impulses=carillon.Impulses(bar, POINT, IMPULSE))
                 self.assertEqual(stream.report.step_count, 1)
+                self.assertIsNone(stream.rejection)
+                self.assertEqual([item.handle for item in await scene.objects()], [bar.handle])
+                self.assertIn(scene.sync.name, [found.sync.name for found in await c.scenes()])
+                await scene.remove(bar)
                 return listening.result()
 
         self.assert_rings(asyncio.run(strike()))

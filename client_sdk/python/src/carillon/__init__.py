@@ -15,8 +15,8 @@ whose `reason` programs can act upon.
 from carillon import aio
 from carillon.address import default_server
 from carillon.client import Client, connect
-from carillon.contacts import Contacts, Impulses, Poses
-from carillon.errors import CarillonError, ServerUnavailable
+from carillon.contacts import Contacts, Forces, Impulses, Poses, striker
+from carillon.errors import CarillonError, ContactWarning, ServerUnavailable
 from carillon.jobs import Job
 from carillon.materials import material
 from carillon.meshes import MeshFile
@@ -26,6 +26,6 @@ from carillon.sound import Sound
 from carillon.traces import Trace
 from carillon.version import __version__
 
-__all__ = ["CarillonError", "Client", "ContactStream", "Contacts", "Impulses", "Job", "MeshFile", "Model", "Poses",
-           "Scene", "ServerUnavailable", "Sound", "SoundingObject", "Trace", "__version__", "aio", "connect",
-           "default_server", "material"]
+__all__ = ["CarillonError", "Client", "ContactStream", "ContactWarning", "Contacts", "Forces", "Impulses", "Job",
+           "MeshFile", "Model", "Poses", "Scene", "ServerUnavailable", "Sound", "SoundingObject", "Trace",
+           "__version__", "aio", "connect", "default_server", "material", "striker"]

@@ -18,13 +18,15 @@ from collections.abc import AsyncIterator, Callable
 from typing import Any, Optional, TypeVar
 
 from carillon import client
+from carillon.contacts import PoseLike, Striker
+from carillon.errors import CarillonError
 from carillon.jobs import Job
 from carillon.materials import Material
 from carillon.models import Model
 from carillon.scenes import ContactStream, Scene, SoundingObject
 from carillon.sound import Sound
 from carillon.traces import Trace
-from carillon.v1 import audio_service_pb2, contact_service_pb2, material_pb2
+from carillon.v1 import audio_service_pb2, contact_pb2, contact_service_pb2, material_pb2
 
 Result = TypeVar("Result")
 
@@ -84,6 +86,9 @@ class AsyncClient:
     async def scene(self, **settings: Any) -> AsyncScene:
         return AsyncScene(await in_thread(self.sync.scene, **settings))
 
+    async def scenes(self) -> list[AsyncScene]:
+        return [AsyncScene(found) for found in await in_thread(self.sync.scenes)]
+
     async def render(self, trace: Trace | str | os.PathLike[str], **settings: Any) -> Sound:
         return await in_thread(self.sync.render, trace, **settings)
 
@@ -110,11 +115,26 @@ class AsyncScene:
     async def add(self, model: Model | str, material: Optional[Material] = None, **settings: Any) -> SoundingObject:
         return await in_thread(self.sync.add, model, material, **settings)
 
-    async def strike(self, item: SoundingObject, point: Any, impulse: Any, duration: Optional[float] = None) -> None:
-        await in_thread(item.strike, point, impulse, duration)
+    async def strike(self, item: SoundingObject, point: Any, impulse: Any, duration: Optional[float] = None, *,
+                     striker: Striker = None) -> None:
+        await in_thread(item.strike, point, impulse, duration, striker=striker)
 
-    def stream(self, step: float, delay: Optional[float] = None) -> AsyncContactStream:
-        return AsyncContactStream(self.sync.stream(step, delay))
+    async def update(self, item: SoundingObject, **changes: Any) -> None:
+        """Changes an object; see SoundingObject.update."""
+        await in_thread(item.update, **changes)
+
+    async def remove(self, item: SoundingObject) -> None:
+        await in_thread(item.remove)
+
+    async def objects(self) -> list[SoundingObject]:
+        return await in_thread(self.sync.objects)
+
+    async def move_listener(self, pose: PoseLike, glide: float = 0) -> None:
+        await in_thread(self.sync.move_listener, pose, glide)
+
+    def stream(self, step: float, delay: Optional[float] = None, **settings: Any) -> AsyncContactStream:
+        """Opens a stream; `settings` as for Scene.stream."""
+        return AsyncContactStream(self.sync.stream(step, delay, **settings))
 
     async def delete(self) -> None:
         await in_thread(self.sync.delete)
@@ -127,7 +147,8 @@ class AsyncScene:
 
 
 class AsyncContactStream:
-    """A stream of contacts: `step` and `report` are those of ContactStream, and do not wait."""
+    """A stream of contacts: `step`, `report`, `findings` and `rejection` are those of ContactStream, and do not
+    wait."""
 
     def __init__(self, sync: ContactStream):
         self.sync = sync
@@ -136,6 +157,14 @@ class AsyncContactStream:
     @property
     def report(self) -> contact_service_pb2.StreamContactsResponse:
         return self.sync.report
+
+    @property
+    def findings(self) -> contact_pb2.ContactFindings:
+        return self.sync.findings
+
+    @property
+    def rejection(self) -> Optional[CarillonError]:
+        return self.sync.rejection
 
     async def __aenter__(self) -> AsyncContactStream:
         return self

@@ -25,9 +25,9 @@ from carillon.scenes import Scene
 from carillon.sound import Sound
 from carillon.traces import Trace
 from carillon.v1 import (
-    audio_service_pb2, audio_service_pb2_grpc, contact_service_pb2_grpc, decomposition_service_pb2,
-    decomposition_service_pb2_grpc, hearing_pb2, material_pb2, modal_model_pb2, modal_model_service_pb2,
-    modal_model_service_pb2_grpc, scene_service_pb2, scene_service_pb2_grpc)
+    admin_service_pb2_grpc, audio_service_pb2, audio_service_pb2_grpc, contact_service_pb2_grpc,
+    decomposition_service_pb2, decomposition_service_pb2_grpc, hearing_pb2, material_pb2, modal_model_pb2,
+    modal_model_service_pb2, modal_model_service_pb2_grpc, scene_service_pb2, scene_service_pb2_grpc)
 
 PIECE_BYTES = 1 << 20
 
@@ -58,6 +58,7 @@ class Client:
         self.scenes_stub = scene_service_pb2_grpc.SceneServiceStub(self._channel)
         self.contacts_stub = contact_service_pb2_grpc.ContactServiceStub(self._channel)
         self.audio_stub = audio_service_pb2_grpc.AudioServiceStub(self._channel)
+        self.admin_stub = admin_service_pb2_grpc.AdminServiceStub(self._channel)
 
     def status(self) -> audio_service_pb2.GetMixerResponse:
         """Returns the state of the daemon's mixer and output."""
@@ -149,7 +150,7 @@ class Client:
 
     def render(self, trace: Trace | str | os.PathLike[str], **settings: Any) -> Sound:
         """Renders a trace, or a .contacts file, faster than real time. `settings` are fields of RenderSettings:
-        sample_rate_hz, channel_count and tail_s."""
+        sample_rate_hz, channel_count and tail_s. Raises CarillonError if a contact is rejected."""
         records = (trace if isinstance(trace, Trace) else Trace.read(trace)).records()
         return self._render(records, audio_service_pb2.RenderSettings(**settings))
 
@@ -202,7 +203,7 @@ class Client:
             yield request(settings=settings)
             yield from (request(record=record) for record in records)
 
-        blocks, rate_hz, channels = [], 0, 1
+        blocks, rate_hz, channels, summary = [], 0, 1, audio_service_pb2.RenderSummary()
         with errors.translated(self.server):
             answers = self.audio_stub.Render(requests())
             with self.cancellable(answers):
@@ -212,9 +213,13 @@ class Client:
                         rate_hz, channels = answer.format.sample_rate_hz, answer.format.channel_count
                     elif kind == "block":
                         blocks.append(answer.block.samples)
-                    elif answer.summary.rejected_count:
-                        raise errors.from_info(answer.summary.last_rejection)
-        return Sound(numpy.frombuffer(b"".join(blocks), "<f4").reshape(-1, channels), rate_hz)
+                    else:
+                        summary = answer.summary
+        if summary.rejected_count:
+            raise errors.from_info(summary.last_rejection)
+        errors.warn_of_contacts(summary.findings)
+        samples = numpy.frombuffer(b"".join(blocks), "<f4").reshape(-1, channels)
+        return Sound(samples, rate_hz, summary=summary)
 
     def __enter__(self) -> Client:
         return self

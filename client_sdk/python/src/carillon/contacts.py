@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, Optional, Union
+from typing import Any, Literal, Optional, Union
 
 import numpy
 import numpy.typing
@@ -13,14 +13,23 @@ from carillon.v1 import contact_pb2
 
 Array = numpy.typing.ArrayLike
 PoseLike = Union[contact_pb2.Pose, Array, tuple[Array, Array]]
+Striker = Union[None, str, contact_pb2.HertzContact]
+Frame = Literal["object", "scene"]
+PulseShape = Literal["raised_cosine", "gaussian"]
+
+# A duration that is below zero in a column is absent.
+ABSENT = -1.0
 
 
 @dataclasses.dataclass
 class Impulses:
     """Strikes, such as those of a hammer. All N rows belong together; a column that is None has its default.
 
-    `objects` has the struck objects or their handles, `points` (N x 3, metres) and `impulses` (N x 3, newton seconds)
-    are in the object's own frame, `durations` are seconds.
+    `objects` has the struck objects or their handles; one object stands for all rows. `points` (N x 3, metres) and
+    `impulses` (N x 3, newton seconds) are in the frame of the stream, by default each object's own. `durations` are
+    seconds; NaN leaves one to the daemon, which computes it from the object and from `striker`. `time_offsets` are
+    seconds from the step's time to the strike. `second_objects` has the objects that struck, zero for none;
+    `second_rotations` (N x 4, quaternions w, x, y, z) rotate from the first object's frame into the second's.
     """
 
     objects: Any
@@ -30,15 +39,37 @@ class Impulses:
     time_offsets: Optional[Array] = None
     second_objects: Any = None
     second_points: Optional[Array] = None
+    second_rotations: Optional[Array] = None
+    striker: Striker = None
 
 
 @dataclasses.dataclass
 class Contacts(Impulses):
     """Contacts as an engine reports them, all of one step: `impulses` are over the whole step, also at rest. The
     daemon separates impacts from loads for each pair of object and partner; `partners` are any numbers that name the
-    other bodies."""
+    other bodies. `travel_speeds` (m/s) with which a contact slides or rolls make it sound rough, by `roughness_depth`
+    and `irregularity_length` (metres), as Roughness in contact.proto says."""
 
     partners: Any = None
+    travel_speeds: Optional[Array] = None
+    roughness_depth: float = 0
+    irregularity_length: float = 0
+
+
+@dataclasses.dataclass
+class Forces:
+    """Sustained forces, of a simulator that separates loads from impacts itself: `forces` (N x 3, newtons) at the
+    step's time. The other columns are those of Contacts."""
+
+    objects: Any
+    points: Array
+    forces: Array
+    second_objects: Any = None
+    second_points: Optional[Array] = None
+    second_rotations: Optional[Array] = None
+    travel_speeds: Optional[Array] = None
+    roughness_depth: float = 0
+    irregularity_length: float = 0
 
 
 @dataclasses.dataclass
@@ -48,6 +79,27 @@ class Poses:
     objects: Any
     positions: Array
     orientations: Optional[Array] = None
+
+
+def striker(name: str = "", **figures: float) -> contact_pb2.HertzContact:
+    """Describes the body that strikes: a named one, such as "wood", figures that override those of the named one, or
+    figures alone. They are mass_kg, radius_m, young_pa and poisson_ratio of the striker, approach_speed_m_per_s,
+    reduced_mass_kg and reduced_radius_m."""
+    own = {f"striker_{key}" if key in ("mass_kg", "radius_m", "young_pa", "poisson_ratio") else key: value
+           for key, value in figures.items()}
+    return contact_pb2.HertzContact(striker=name, **own)
+
+
+def to_hertz(given: Striker) -> Optional[contact_pb2.HertzContact]:
+    return contact_pb2.HertzContact(striker=given) if isinstance(given, str) else given
+
+
+def to_frame(name: Optional[Frame]) -> contact_pb2.Frame:
+    return contact_pb2.Frame.Value(f"FRAME_{(name or 'unspecified').upper()}")
+
+
+def to_pulse_shape(name: Optional[PulseShape]) -> contact_pb2.PulseShape:
+    return contact_pb2.PulseShape.Value(f"PULSE_SHAPE_{(name or 'unspecified').upper()}")
 
 
 def vector(values: Array) -> contact_pb2.Vec3:
@@ -102,43 +154,83 @@ def _numbers(values: Array, count: int) -> numpy.ndarray:
     return numpy.broadcast_to(numpy.asarray(values, dtype=float), (count,))
 
 
+def _pairs(points: Array, vectors: Array, name: str) -> tuple[numpy.ndarray, numpy.ndarray]:
+    """The points, and the impulses or forces there, as tables of equal length."""
+    places, values = _rows(points, "points"), _rows(vectors, name)
+    if len(places) != len(values):
+        raise ValueError(f"there are {len(places)} points and {len(values)} {name}; each contact needs one of both")
+    return places, values
+
+
 def fill_impulse_columns(columns: contact_pb2.ImpulseColumns, given: Impulses) -> int:
     """Copies the rows into the message and returns their number."""
-    points = _rows(given.points, "points")
-    impulses = _rows(given.impulses, "impulses")
-    if len(points) != len(impulses):
-        raise ValueError(f"there are {len(points)} points and {len(impulses)} impulses; each contact needs one of both")
+    points, impulses = _pairs(given.points, given.impulses, "impulses")
     count = len(points)
     columns.object.extend(handles_of(given.objects, count).tolist())
     columns.point_m.extend(points.ravel().tolist())
     columns.impulse_newton_seconds.extend(impulses.ravel().tolist())
     if given.durations is not None:
-        columns.duration_s.extend(_numbers(given.durations, count).tolist())
+        durations = _numbers(given.durations, count)
+        columns.duration_s.extend(numpy.where(numpy.isnan(durations), ABSENT, durations).tolist())
     if given.time_offsets is not None:
         columns.time_offset_s.extend(_numbers(given.time_offsets, count).tolist())
     if given.second_objects is not None:
-        columns.second_object.extend(handles_of(given.second_objects, count).tolist())
-        seconds = _rows(given.second_points if given.second_points is not None else (), "second_points")
-        columns.second_point_m.extend(seconds.ravel().tolist())
+        _fill_second_columns(columns, given, count)
+    if given.striker is not None:
+        columns.hertz.CopyFrom(to_hertz(given.striker))
     return count
+
+
+def _fill_second_columns(columns: contact_pb2.ImpulseColumns, given: Union[Impulses, Forces], count: int) -> None:
+    if given.second_points is None:
+        raise ValueError("second_objects without second_points: each contact needs a point on its second object")
+    columns.second_object.extend(handles_of(given.second_objects, count).tolist())
+    columns.second_point_m.extend(_rows(given.second_points, "second_points").ravel().tolist())
+    if given.second_rotations is not None:
+        columns.second_rotation.extend(_rows(given.second_rotations, "second_rotations", 4).ravel().tolist())
 
 
 def add_contacts(step: contact_pb2.ContactStep, given: Contacts) -> int:
     """Adds an engine's contacts to a step and returns their number."""
-    columns = contact_pb2.ImpulseColumns()
-    count = fill_impulse_columns(columns, given)
-    partners = handles_of(given.partners if given.partners is not None else 0, count)
-    for i, (x, y, z) in enumerate(zip(columns.point_m[0::3], columns.point_m[1::3], columns.point_m[2::3])):
-        contact = step.contacts.add(object=columns.object[i], partner=int(partners[i]))
-        contact.point_m.x, contact.point_m.y, contact.point_m.z = x, y, z
-        impulse = contact.impulse_newton_seconds
-        impulse.x, impulse.y, impulse.z = columns.impulse_newton_seconds[3 * i:3 * i + 3]
-        if columns.duration_s:
-            contact.duration_s = columns.duration_s[i]
-        if columns.second_object and columns.second_object[i]:
-            contact.second.object = columns.second_object[i]
-            contact.second.point_m.CopyFrom(vector(columns.second_point_m[3 * i:3 * i + 3]))
+    columns = step.contact_columns
+    count = fill_impulse_columns(columns.impulses, given)
+    if given.partners is not None:
+        columns.partner.extend(handles_of(given.partners, count).tolist())
+    if given.travel_speeds is not None:
+        columns.travel_speed_m_per_s.extend(_numbers(given.travel_speeds, count).tolist())
+    columns.depth = given.roughness_depth
+    columns.irregularity_length_m = given.irregularity_length
     return count
+
+
+def add_forces(step: contact_pb2.ContactStep, given: Forces) -> int:
+    """Adds sustained forces to a step and returns their number."""
+    points, forces = _pairs(given.points, given.forces, "forces")
+    count = len(points)
+    second = contact_pb2.ImpulseColumns()
+    if given.second_objects is not None:
+        _fill_second_columns(second, given, count)
+    handles = handles_of(given.objects, count)
+    speeds = _numbers(0 if given.travel_speeds is None else given.travel_speeds, count)
+    for i in range(count):
+        contact = step.sustained.add(object=int(handles[i]), point_m=vector(points[i]), force_newtons=vector(forces[i]))
+        if speeds[i]:
+            contact.roughness.CopyFrom(contact_pb2.Roughness(
+                travel_speed_m_per_s=speeds[i], depth=given.roughness_depth,
+                irregularity_length_m=given.irregularity_length))
+        if second.second_object and second.second_object[i]:
+            contact.second.CopyFrom(_second_object(second, i))
+    return count
+
+
+def _second_object(columns: contact_pb2.ImpulseColumns, i: int) -> contact_pb2.SecondObject:
+    """Row i of the columns of second objects."""
+    made = contact_pb2.SecondObject(object=columns.second_object[i],
+                                    point_m=vector(columns.second_point_m[3 * i:3 * i + 3]))
+    w, x, y, z = columns.second_rotation[4 * i:4 * i + 4] or (0, 0, 0, 0)
+    if w or x or y or z:
+        made.rotation.CopyFrom(contact_pb2.Quaternion(w=w, x=x, y=y, z=z))
+    return made
 
 
 def add_poses(step: contact_pb2.ContactStep, given: Poses) -> None:
@@ -150,13 +242,16 @@ def add_poses(step: contact_pb2.ContactStep, given: Poses) -> None:
 
 
 def make_step(time: float, *, contacts: Optional[Contacts] = None, impulses: Optional[Impulses] = None,
-              poses: Optional[Poses] = None, listener: Optional[PoseLike] = None) -> contact_pb2.ContactStep:
+              forces: Optional[Forces] = None, poses: Optional[Poses] = None,
+              listener: Optional[PoseLike] = None) -> contact_pb2.ContactStep:
     """Makes the message of the step at a simulation time, seconds."""
     step = contact_pb2.ContactStep(time_s=time)
     if contacts is not None:
         add_contacts(step, contacts)
     if impulses is not None:
         fill_impulse_columns(step.columns, impulses)
+    if forces is not None:
+        add_forces(step, forces)
     if poses is not None:
         add_poses(step, poses)
     if listener is not None:

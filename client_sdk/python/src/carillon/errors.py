@@ -4,11 +4,12 @@
 from __future__ import annotations
 
 import contextlib
+import warnings
 from collections.abc import Iterator
 
 import grpc
 
-from carillon.v1 import error_pb2
+from carillon.v1 import contact_pb2, error_pb2
 
 DETAILS_KEY = "grpc-status-details-bin"
 
@@ -26,6 +27,22 @@ class CarillonError(Exception):
 
 class ServerUnavailable(CarillonError):
     """No daemon answers at the address."""
+
+
+class ContactWarning(UserWarning):
+    """Contacts were rejected, or lie far from the surfaces of their objects."""
+
+
+def warn_of_contacts(findings: contact_pb2.ContactFindings, rejected_count: int = 0,
+                     last_rejection: error_pb2.ErrorInfo | None = None) -> None:
+    """Warns of what is probably a mistake of the caller."""
+    if rejected_count and last_rejection is not None:
+        warnings.warn(f"{rejected_count} contacts were rejected, the last one with {last_rejection.reason}: "
+                      f"{last_rejection.message}", ContactWarning, stacklevel=3)
+    if findings.distant_point_count:
+        warnings.warn(f"{findings.distant_point_count} contacts lie up to {findings.largest_distance_m:.3g} m away "
+                      "from the surfaces of their objects and sound at the nearest points; give points in metres, in "
+                      "the frame of the stream", ContactWarning, stacklevel=3)
 
 
 def from_info(info: error_pb2.ErrorInfo) -> CarillonError:

@@ -3,17 +3,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Optional, Union
+from typing import TYPE_CHECKING, Any, Literal, Optional, Union
 
 import numpy
 
 from carillon import errors
-from carillon.v1 import material_pb2
+from carillon.v1 import material_pb2, radiation_pb2
 
 if TYPE_CHECKING:
     from carillon.models import Model
 
 Material = Union[str, material_pb2.Material]
+Radiation = Literal["paper_coupling", "radiated_power"]
 
 
 def material(preset: str = "", *, loss_factor: float | dict[float, float] | None = None,
@@ -33,6 +34,10 @@ def material(preset: str = "", *, loss_factor: float | dict[float, float] | None
 
 def to_message(given: Material) -> material_pb2.Material:
     return material_pb2.Material(preset=given) if isinstance(given, str) else given
+
+
+def to_radiation(name: Optional[Radiation]) -> radiation_pb2.RadiationModel:
+    return radiation_pb2.RadiationModel.Value(f"RADIATION_MODEL_{(name or 'unspecified').upper()}")
 
 
 def named(model: Model | str, given: Optional[Material]) -> tuple[str, material_pb2.Material]:

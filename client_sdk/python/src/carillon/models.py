@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Optional
 import numpy
 
 from carillon import errors, materials
-from carillon.contacts import Array, Impulses
+from carillon.contacts import Array, Impulses, Striker
 from carillon.sound import Sound
 from carillon.traces import Trace
 from carillon.v1 import modal_model_pb2, modal_model_service_pb2
@@ -85,13 +85,14 @@ class Model:
                 for i, array in enumerate(header.arrays)}
 
     def render_strike(self, point: Array, impulse: Array, material: Optional[materials.Material] = None, *,
-                      duration: Optional[float] = None, size: float = 1, gain: float = 1, seconds: float = 0,
-                      sample_rate_hz: int = 48000) -> Sound:
-        """Renders one strike without a scene and faster than real time, the same samples each time. `seconds` zero
-        means until the sound has died away."""
+                      duration: Optional[float] = None, striker: Striker = None, size: float = 1, gain: float = 1,
+                      seconds: float = 0, sample_rate_hz: int = 48000) -> Sound:
+        """Renders one strike without a scene and faster than real time, the same samples each time. `duration` is that
+        of the contact, in seconds; without it the `striker`, such as "wood", determines it. `seconds` zero means until
+        the sound has died away."""
         trace = Trace(simulator="carillon (Python)")
         body = trace.add(self, material, size=size, gain=gain)
-        trace.step(0.0, impulses=Impulses(body, point, impulse, durations=duration))
+        trace.step(0.0, impulses=Impulses(body, point, impulse, durations=duration, striker=striker))
         return self._client.render(trace, tail_s=seconds, sample_rate_hz=sample_rate_hz)
 
     def update(self, *, label: Optional[str] = None, add_tags: tuple[str, ...] = (),

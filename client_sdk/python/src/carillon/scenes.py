@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Optional
 import grpc
 
 from carillon import contacts, errors, materials
-from carillon.contacts import Array, Impulses, PoseLike
+from carillon.contacts import Array, Contacts, Forces, Impulses, PoseLike, Poses, make_step
 from carillon.v1 import contact_pb2, contact_service_pb2, scene_service_pb2
 
 if TYPE_CHECKING:
@@ -39,20 +39,25 @@ class SoundingObject:
 
     __int__ = __index__ = lambda self: self.message.handle
 
-    def strike(self, point: Array, impulse: Array, duration: Optional[float] = None) -> None:
+    def strike(self, point: Array, impulse: Array, duration: Optional[float] = None, *,
+               striker: contacts.Striker = None) -> None:
         """Strikes the object now: the point in metres and the impulse in newton seconds, both in the object's own
-        frame; `duration` of the contact in seconds. Raises CarillonError if the strike is refused."""
-        with self._scene.stream(step=0.001, delay=0) as stream:
-            stream.step(0.0, impulses=Impulses(self, point, impulse, durations=duration))
-        if stream.report.rejected_count:
-            raise errors.from_info(stream.report.last_rejection)
+        frame; `duration` of the contact in seconds, or the `striker`, such as "wood". Raises CarillonError if the
+        strike is refused."""
+        stream = self._scene.stream(step=0.001, delay=0)
+        stream.step(0.0, impulses=Impulses(self, point, impulse, durations=duration, striker=striker))
+        stream.close(warn=False)
+        if stream.rejection:
+            raise stream.rejection
 
     def update(self, *, material: Optional[materials.Material] = None, size: Optional[float] = None,
-               gain: Optional[float] = None, pose: Optional[PoseLike] = None, glide: float = 0) -> None:
+               gain: Optional[float] = None, pose: Optional[PoseLike] = None, glide: float = 0,
+               radiation: Optional[materials.Radiation] = None) -> None:
         """Changes what is given; a pose is reached after `glide` seconds."""
         request = scene_service_pb2.UpdateObjectRequest(
             name=self.name, material=None if material is None else materials.to_message(material), size=size, gain=gain,
-            pose=None if pose is None else contacts.to_pose(pose), glide_s=glide)
+            pose=None if pose is None else contacts.to_pose(pose), glide_s=glide,
+            radiation=materials.to_radiation(radiation))
         client = self._scene.client
         with errors.translated(client.server):
             self.message = client.scenes_stub.UpdateObject(request).object
@@ -77,12 +82,13 @@ class Scene:
         self.name = name
 
     def add(self, model: Model | str, material: Optional[materials.Material] = None, *, size: float = 1,
-            gain: float = 1, pose: Optional[PoseLike] = None, handle: int = 0) -> SoundingObject:
+            gain: float = 1, pose: Optional[PoseLike] = None, handle: int = 0,
+            radiation: Optional[materials.Radiation] = None) -> SoundingObject:
         """Adds an object, ready to be struck. Without a material it gets the one that the model was asked for with."""
         name, message = materials.named(model, material)
         request = scene_service_pb2.AddObjectRequest(
             scene=self.name, modal_model=name, material=message, size=size, gain=gain, handle=handle,
-            pose=None if pose is None else contacts.to_pose(pose))
+            pose=None if pose is None else contacts.to_pose(pose), radiation=materials.to_radiation(radiation))
         with errors.translated(self.client.server):
             return SoundingObject(self, self.client.scenes_stub.AddObject(request).object)
 
@@ -98,9 +104,14 @@ class Scene:
         with errors.translated(self.client.server):
             self.client.scenes_stub.UpdateListener(request)
 
-    def stream(self, step: float, delay: Optional[float] = None) -> ContactStream:
-        """Opens a stream for the contacts of a simulation whose steps last `step` seconds."""
-        return ContactStream(self, step, delay)
+    def stream(self, step: float, delay: Optional[float] = None, *, frame: Optional[contacts.Frame] = None,
+               pulse_shape: Optional[contacts.PulseShape] = None) -> ContactStream:
+        """Opens a stream for the contacts of a simulation whose steps last `step` seconds. They sound `delay` seconds
+        later, by default as soon as the network allows without jitter. `frame` "scene" means that points and impulses
+        are in the scene's frame: the daemon turns them into the objects' by their poses, which the steps send."""
+        return ContactStream(self, contact_service_pb2.ContactStreamStart(
+            scene=self.name, step_s=step, scheduling_delay_s=delay, frame=contacts.to_frame(frame),
+            pulse_shape=contacts.to_pulse_shape(pulse_shape)))
 
     def delete(self) -> None:
         """Deletes the scene and fades out its objects."""
@@ -117,24 +128,36 @@ class Scene:
 class ContactStream:
     """Sends the contacts of each step without waiting for the daemon: a thread sends them, and another reads the
     answers. `report` is the newest answer, with the counts so far; `dropped_step_count` steps were not sent, because
-    more than 4096 waited."""
+    more than 4096 waited. At the end of the block a ContactWarning tells of contacts that were rejected or lie far from
+    their objects."""
 
-    def __init__(self, scene: Scene, step: float, delay: Optional[float]):
+    def __init__(self, scene: Scene, start: contact_service_pb2.ContactStreamStart):
         self._server = scene.client.server
         self._requests: queue.SimpleQueue[Optional[contact_service_pb2.StreamContactsRequest]] = queue.SimpleQueue()
         self._error: Optional[grpc.RpcError] = None
         self.report: contact_service_pb2.StreamContactsResponse = contact_service_pb2.StreamContactsResponse()
         self.dropped_step_count = 0
-        start = contact_service_pb2.ContactStreamStart(scene=scene.name, step_s=step, scheduling_delay_s=delay)
         self._requests.put(contact_service_pb2.StreamContactsRequest(start=start))
         self._answers = scene.client.contacts_stub.StreamContacts(self._sent())
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 
-    def step(self, time: float, **content: Any) -> None:
-        """Sends a step at a simulation time, seconds. `content` is any of contacts (Contacts, what an engine reports,
-        in every step), impulses (Impulses), poses (Poses) and listener (a pose)."""
-        self.send(contacts.make_step(time, **content))
+    @property
+    def findings(self) -> contact_pb2.ContactFindings:
+        """What the daemon found out about the contacts so far, such as blow_count and distant_point_count."""
+        return self.report.findings
+
+    @property
+    def rejection(self) -> Optional[errors.CarillonError]:
+        """Why the newest rejected contact was rejected; None if none was so far."""
+        return errors.from_info(self.report.last_rejection) if self.report.rejected_count else None
+
+    def step(self, time: float, *, contacts: Optional[Contacts] = None, impulses: Optional[Impulses] = None,
+             forces: Optional[Forces] = None, poses: Optional[Poses] = None,
+             listener: Optional[PoseLike] = None) -> None:
+        """Sends a step at a simulation time, seconds: the contacts that an engine reports, in every step; strikes;
+        loads of a simulator that knows them; poses of objects, and of the listener."""
+        self.send(make_step(time, contacts=contacts, impulses=impulses, forces=forces, poses=poses, listener=listener))
 
     def send(self, step: contact_pb2.ContactStep) -> None:
         """Sends a message of contact.proto. Raises CarillonError if the stream has failed."""
@@ -145,12 +168,14 @@ class ContactStream:
             self.dropped_step_count += 1
         self._requests.put(contact_service_pb2.StreamContactsRequest(step=step))
 
-    def close(self) -> contact_service_pb2.StreamContactsResponse:
+    def close(self, warn: bool = True) -> contact_service_pb2.StreamContactsResponse:
         """Waits until the daemon has taken all steps. Returns the last report."""
         self._requests.put(None)
         self._reader.join()
         if self._error:
             raise errors.from_rpc(self._error, self._server)
+        if warn:
+            errors.warn_of_contacts(self.findings, self.report.rejected_count, self.report.last_rejection)
         return self.report
 
     def _sent(self) -> Iterator[contact_service_pb2.StreamContactsRequest]:

@@ -8,18 +8,22 @@ import dataclasses
 import io
 import os
 import wave
-from typing import Any
+from typing import Any, Optional
 
 import numpy
+
+from carillon.v1 import audio_service_pb2
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Sound:
-    """Frames x channels of float32; full scale is 1. `lost_frame_count` frames were not received."""
+    """Frames x channels of float32; full scale is 1. `lost_frame_count` frames were not received. `summary` has
+    what the daemon measured while it rendered the sound offline: loudness, pressure, findings about the contacts."""
 
     samples: numpy.ndarray
     sample_rate_hz: int
     lost_frame_count: int = 0
+    summary: Optional[audio_service_pb2.RenderSummary] = None
 
     @property
     def seconds(self) -> float:

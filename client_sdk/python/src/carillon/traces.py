@@ -5,11 +5,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, BinaryIO, Optional
+from typing import TYPE_CHECKING, BinaryIO, Optional
 
 from google.protobuf.message import DecodeError
 
 from carillon import contacts, materials
+from carillon.contacts import Contacts, Forces, Impulses, PoseLike, Poses, make_step
 from carillon.errors import CarillonError
 from carillon.v1 import contact_pb2, contact_trace_pb2, hearing_pb2
 
@@ -23,29 +24,34 @@ class Trace:
     """A trace in memory: `header`, `objects` and `steps` are the messages of contact_trace.proto."""
 
     def __init__(self, step: float = 0, *, simulator: str = "", hearing: Optional[hearing_pb2.Hearing] = None,
-                 listener: Optional[contacts.PoseLike] = None):
+                 listener: Optional[PoseLike] = None, frame: Optional[contacts.Frame] = None,
+                 pulse_shape: Optional[contacts.PulseShape] = None):
         self.header = contact_trace_pb2.ContactTraceHeader(
             format_version=FORMAT_VERSION, simulator=simulator, step_s=step, hearing=hearing,
-            listener=None if listener is None else contacts.to_pose(listener))
+            listener=None if listener is None else contacts.to_pose(listener), frame=contacts.to_frame(frame),
+            pulse_shape=contacts.to_pulse_shape(pulse_shape))
         self.objects: list[contact_trace_pb2.ContactTraceObject] = []
         self.steps: list[contact_pb2.ContactStep] = []
 
     def add(self, model: Model | str, material: Optional[materials.Material] = None, *, size: float = 1,
-            gain: float = 1, pose: Optional[contacts.PoseLike] = None, label: str = "",
-            handle: Optional[int] = None) -> int:
+            gain: float = 1, pose: Optional[PoseLike] = None, label: str = "", handle: Optional[int] = None,
+            radiation: Optional[materials.Radiation] = None) -> int:
         """Adds an object, which is there from the beginning. Returns its handle."""
         handle = handle or 1 + max((item.handle for item in self.objects), default=0)
         name, message = materials.named(model, material)
         self.objects.append(contact_trace_pb2.ContactTraceObject(
             handle=handle, modal_model=name, material=message, size=size, gain=gain, label=label,
-            pose=None if pose is None else contacts.to_pose(pose)))
+            pose=None if pose is None else contacts.to_pose(pose), radiation=materials.to_radiation(radiation)))
         return handle
 
-    def step(self, time: float, **content: Any) -> None:
-        """Adds a step; `content` as for ContactStream.step. Times must not go back."""
+    def step(self, time: float, *, contacts: Optional[Contacts] = None, impulses: Optional[Impulses] = None,
+             forces: Optional[Forces] = None, poses: Optional[Poses] = None,
+             listener: Optional[PoseLike] = None) -> None:
+        """Adds a step, as ContactStream.step sends one. Times must not go back."""
         if self.steps and time < self.steps[-1].time_s:
             raise ValueError(f"time goes back from {self.steps[-1].time_s} to {time} s; add the steps in order")
-        self.steps.append(contacts.make_step(time, **content))
+        self.steps.append(make_step(time, contacts=contacts, impulses=impulses, forces=forces, poses=poses,
+                                    listener=listener))
 
     def records(self) -> Iterator[contact_trace_pb2.ContactTraceRecord]:
         """The header, the objects, then the steps."""
