@@ -57,7 +57,7 @@ Json Radiation(const ModeRadiation& mode, const Air& air, double omega, const In
           {"surface_power_db", mode.surface_power_db}};
 }
 
-/// For unit density and the size of the mesh.
+/// The figures hold for unit density and the size of the mesh.
 Json RigidBody(const RigidRadiation& rigid) {
   Json motions = Json::array();
   for (const RigidRadiation::Motion& motion : rigid.motions) {

@@ -11,7 +11,7 @@ namespace {
 /// Until the modes are counted there may be many more of them than guessed.
 constexpr double kMostBeforeCount = 0.15;
 
-/// Of the whole work, about, before anybody knows how much there is.
+/// The part of the whole work that is taken for done in a phase whose amount of work is unknown.
 double FractionByPhase(v1::Phase phase) {
   if (phase == v1::PHASE_READ) return 0;
   return phase == v1::PHASE_MESH ? 0.01 : 0.05;

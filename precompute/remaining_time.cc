@@ -10,7 +10,7 @@ namespace {
 /// So much of the prediction is taken on trust, so that the first milliseconds measured do not
 /// decide.
 constexpr double kTrust_s = 0.05;
-/// Of what is open by the last report: a step is never over before its end.
+/// Passing time alone completes at most this part of the step that the last report left open.
 constexpr double kMostByTime = 0.95;
 
 }  // namespace

@@ -36,7 +36,7 @@ double ErrorPower(const std::vector<Round>& rounds) {
   return std::clamp(power, kLeastErrorPower, kMostErrorPower);
 }
 
-/// By how much the nodes may grow before the budget is used up.
+/// The factor by which the nodes may grow before the budget is used up.
 double AffordableGrowth(const ResolutionGoal& goal, const std::vector<Round>& rounds) {
   double growth = std::numeric_limits<double>::infinity();
   const Round& last = rounds.back();
@@ -65,7 +65,7 @@ std::string Overrun(const char* what, double asked, double used) {
       asked, what, used);
 }
 
-/// Of the space that elements of one size fill.
+/// The number of dimensions in which smaller elements become more numerous.
 double Dimension(const Round& round) { return round.thin ? 2 : 3; }
 
 }  // namespace

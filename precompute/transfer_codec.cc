@@ -54,7 +54,7 @@ TransferArrays MakeArrays(const Transfer& transfer, const ModalModel& model) {
   return arrays;
 }
 
-/// In the order of kTransferArrays.
+/// The arrays follow the order of kTransferArrays.
 std::array<Bytes, kTransferArrayCount> AllBytes(const TransferArrays& arrays) {
   return {BytesOf(arrays.eigenvalues),     BytesOf(arrays.states),
           BytesOf(arrays.power_integrals), BytesOf(arrays.normal_energies),

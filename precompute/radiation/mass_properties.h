@@ -18,7 +18,7 @@ struct MassProperties {
   std::array<double, 6> inertia{};
 };
 
-/// By the divergence theorem over a closed surface, walls of voids included.
+/// Integrates by the divergence theorem over a closed surface, walls of voids included.
 MassProperties ComputeMassProperties(std::span<const std::array<float, 3>> vertices,
                                      std::span<const std::array<int32_t, 3>> triangles);
 

@@ -45,7 +45,7 @@ SurfacePlace Weigh(const SurfaceMesh& given, const NearestTriangle::Place& place
   return result;
 }
 
-/// Without triangles that have no area to integrate over.
+/// Returns the surface without the triangles that have no area to integrate over.
 SurfaceMesh WithoutFlat(SurfaceMesh mesh, double edge_m) {
   constexpr double kFlat = 1e-9;
   std::erase_if(mesh.triangles, [&](const std::array<int32_t, 3>& triangle) {

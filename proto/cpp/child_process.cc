@@ -239,7 +239,7 @@ std::optional<ProcessEnd> ChildProcess::Reap() {
   if (waitid(P_PID, id, &end, WEXITED | WNOHANG | WNOWAIT) == 0 && end.si_pid == 0) {
     return std::nullopt;
   }
-  // Before the process is reaped: until then no other process can get the number of the group.
+  // This comes before the process is reaped, while no other process can get the group's number.
   if (leads_group_) Kill();
   const bool reaped = waitid(P_PID, id, &end, WEXITED) == 0;
   pid_ = -1;

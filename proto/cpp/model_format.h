@@ -23,7 +23,7 @@ struct ArraySpec {
   char index_bound = 0;  ///< of indices: the dimension that they count; 0: these are no indices
 };
 
-/// In the order in which they are stored.
+/// The arrays in the order in which they are stored.
 inline constexpr std::array kModelArrays = {
     ArraySpec{"eigenvalues", v1::ELEMENT_TYPE_FLOAT64, "m"},
     ArraySpec{"residuals", v1::ELEMENT_TYPE_FLOAT64, "m"},

@@ -14,7 +14,7 @@ namespace carillon {
 
 inline constexpr uint32_t kTransferFormatVersion = 1;
 
-/// In the order in which they are stored; the letters are those of TransferSizes.
+/// The arrays in the order in which they are stored; the letters are those of TransferSizes.
 inline constexpr std::array kTransferArrays = {
     ArraySpec{"eigenvalues", v1::ELEMENT_TYPE_FLOAT64, "m"},
     ArraySpec{"states", v1::ELEMENT_TYPE_UINT32, "m"},

@@ -13,7 +13,7 @@ from carillon.v1 import material_pb2
 from daemon import BIN, Daemon
 
 PROGRAMS = pathlib.Path(os.environ.get("CARILLON_TEST_PROGRAMS", BIN.parent / "tests"))
-# In full, for ALSA may have a device "jack" too.
+# ALSA may have a device "jack" too, so this is the full name.
 DEVICE = "portaudio:JACK Audio Connection Kit"
 PORT = "PortAudio:out_0"
 PERIOD_FRAMES = 128

@@ -167,7 +167,7 @@ class DatabaseCommandsTest(unittest.TestCase):
     def test_a_damaged_backup_is_refused_and_nothing_is_changed(self):
         backup = self.folder / "backup.db"
         self.run_command("db", "backup", backup)
-        # Of what is stored: one of a page's unused bytes would be no damage.
+        # This byte belongs to what is stored. A change of a page's unused bytes would be no damage.
         self.flip_a_bit("backup.db")
         self.daemon.stop()
         self.assertIn("DATABASE_CORRUPT", self.offline("restore", backup).stderr)

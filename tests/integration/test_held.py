@@ -12,7 +12,7 @@ from carillon.v1 import contact_pb2, contact_trace_pb2, material_pb2
 from daemon import DaemonTest
 
 LENGTH, WIDTH, HEIGHT = meshes.BAR_SIZE
-# Behind x = 0: the end of the bar.
+# The plane x = 0 lies at the end of the bar.
 CLAMP = "plane:0,0,0/1,0,0"
 
 

@@ -17,7 +17,7 @@ ATTEMPTS = 3
 
 
 class LatencyTest(unittest.TestCase):
-    # Of JACK: the daemon's block.
+    # JACK's period, here as long as the daemon's block.
     period_frames = jack.PERIOD_FRAMES
 
     @classmethod

@@ -21,7 +21,7 @@ class SessionTest(unittest.TestCase):
             self.addCleanup(played.stop)
             found = played.run(SECONDS or 8)
         print(found, flush=True)
-        # Of the daemon's xruns those count that cost a frame: JACK tells of every cycle that was late, its own too.
+        # Only xruns that cost a frame count. JACK also tells of cycles in which it was late itself.
         missed = found["missed_cycles"] + found["lost_frames"] + found["late"] + found["merged_or_shed"]
         if missed > 0 and not (SECONDS and found["realtime"]):
             self.skipTest("too busy for sound here, or no real-time priority: something was missed")

@@ -54,7 +54,7 @@ struct RingTest : ::testing::Test {
     return result;
   }
 
-  /// Turned by one cell the mesh is itself, so that pairs are degenerate but for rounding.
+  /// A turn by one cell maps the mesh onto itself, so pairs are degenerate but for rounding.
   static constexpr double kSplit = 1e-8;
 
   static inline TetMesh mesh;

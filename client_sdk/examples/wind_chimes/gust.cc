@@ -15,7 +15,8 @@ constexpr double kRise_s = 1.5;
 constexpr double kFall_s = 3;
 constexpr double kWander_rad = 2.5;
 
-/// From 0 to 1; the standard's distributions may differ between libraries, its engines do not.
+/// Returns a number from 0 to 1. The standard's engines give the same numbers with every library,
+/// its distributions do not.
 double Uniform(std::mt19937_64& engine) { return static_cast<double>(engine() >> 11) * 0x1p-53; }
 
 template <class Waves>

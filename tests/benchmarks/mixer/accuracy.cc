@@ -22,7 +22,7 @@ using Complex = std::complex<double>;
 constexpr uint32_t kModes = 800;
 constexpr float kShape = 0.02F;  // so that the limiter sleeps
 
-/// In frames: now and then, close together, and as the modes ring out.
+/// Frames of the strikes: some far apart, some close together, some while the modes ring out.
 const std::vector<double> kStrikes = {10.25, 4000, 30000.5, 30001, 30100.75, 100000, 260000.125};
 
 std::vector<float> Render(size_t frame_count) {

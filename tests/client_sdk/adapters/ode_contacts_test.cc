@@ -26,7 +26,7 @@ class OdeContactsTest : public testing::Test {
     dWorldDestroy(world_);
   }
 
-  /// Of 1 kg; turned by `angle` about z.
+  /// Makes a body of 1 kg, turned by `angle` about z.
   dBodyID AddBall(double x, double speed, double angle = 0) {
     dBodyID body = dBodyCreate(world_);
     dMass mass;

@@ -45,7 +45,8 @@ Mesh TubeMesh(const Tube& tube) {
   return ReadObj(out.str());
 }
 
-/// By the divergence theorem; positive where triangles are counter-clockwise from outside.
+/// Integrates by the divergence theorem; positive where triangles are counter-clockwise from
+/// outside.
 double Volume(const Mesh& mesh) {
   double sum = 0;
   for (const auto& f : mesh.triangles) {

@@ -85,7 +85,7 @@ class DenseEquation {
     return green;
   }
 
-  /// Of each component: from the values at the vertices to their lumped curls.
+  /// For each component, the matrix from the values at the vertices to their lumped curls.
   std::array<SparseMatrix, 3> CurlMatrices() const {
     std::array<std::vector<Eigen::Triplet<double>>, 3> entries;
     for (size_t t = 0; t < surface_.mesh.triangles.size(); ++t) {

@@ -46,7 +46,7 @@ TEST(MassProperties, OfAnEllipsoidAreThoseOfTheClosedForm) {
   for (size_t i = 3; i < 6; ++i) EXPECT_NEAR(mass.inertia[i], 0, 1e-4 * volume);
 }
 
-// With axes on a diagonal: x = y moves more mass than x = -y.
+// The axes lie on a diagonal: x = y moves more mass than x = -y.
 TEST(MassProperties, ProductsOfInertiaAreNegativeIntegrals) {
   SurfaceMesh mesh = MakeIcosphere(1, 3);
   for (Point& p : mesh.vertices) p = {p[0] + 0.5 * p[1], p[1], p[2]};

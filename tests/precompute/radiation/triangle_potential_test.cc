@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::array<Point, 3> kCorners = {{{0, 0, 0}, {1, 0.1, 0.2}, {0.3, 0.9, -0.1}}};
 
-/// By the fine rule on n^2 parts of the triangle.
+/// Integrates by the fine rule on n^2 parts of the triangle.
 TrianglePotentials Sampled(const Point& x, int n) {
   TrianglePotentials sum{};
   const Point area_normal = AreaNormal(kCorners);

@@ -139,7 +139,7 @@ TEST(ResolveMaterial, UnknownPresetNamesTheNearest) {
   expect("Brass", "brass");
   expect("bras", "brass");
   expect("mapple", "maple");
-  // By one word of the name.
+  // One word of the name suffices.
   expect("steel", "structural_steel or felt_damped_steel");
   expect("aluminium", "chime_aluminum or shelf_aluminum or aluminum_6061");
 }

@@ -46,7 +46,8 @@ TEST_F(ReadElementsTest, LengthsAreInMetres) {
   }
 }
 
-// Of vertices whose reference triangles have, too, there is no group: meshers number corners so.
+// Vertices make no group of their own where the triangles beside them have the same number, because
+// meshers number corners so.
 TEST_F(ReadElementsTest, ReferencesOfMeditAreGroups) {
   const absl::StatusOr<NamedMesh> read = ReadNamed(ToMedit(Box(4)), "mesh");
   ASSERT_TRUE(read.ok()) << read.status();

@@ -64,7 +64,7 @@ TEST(Tile, AtItsNodesAValueIsItself) {
   for (const size_t kind : {1U, 2U}) {
     EXPECT_EQ(TileNode(kind, 0), 0);
     EXPECT_DOUBLE_EQ(TileNode(kind, kTileNodes), static_cast<double>(kTileFrames[kind]));
-    // Of the nodes at frames: the first and the middle one.
+    // The first and the middle one of the nodes that lie at frames.
     const auto middle = static_cast<size_t>(std::lround(TileNode(kind, kTileNodes / 2)));
     for (size_t node = 0; node < kClosedTileNodes; ++node) {
       EXPECT_NEAR(GetNodeShares(kind)[node][0], node == 0 ? 1 : 0, 1e-7);

@@ -81,7 +81,7 @@ double Peak(const std::vector<float>& sound) {
   return std::abs(*std::ranges::max_element(sound, {}, [](float x) { return std::abs(x); }));
 }
 
-/// From the zeros it crosses upwards in [begin, end).
+/// Measures the frequency by the zeros that the sound crosses upwards in [begin, end).
 double FrequencyHz(const std::vector<float>& sound, size_t begin, size_t end) {
   std::vector<double> crossings;
   for (size_t n = begin; n + 1 < end; ++n) {
