@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
+#include <fcntl.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -97,6 +100,25 @@ int Refuse(const absl::Status& status, bool json, const WorkerEvents& events) {
   return EXIT_FAILURE;
 }
 
+/// Opens the standard streams that are closed, because files opened later would take their numbers.
+/// What is written to a standard output that was closed fails.
+void OpenStandardStreams() {
+  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (fcntl(stream, F_GETFD) >= 0) continue;
+    if (open(stream == STDOUT_FILENO ? "/dev/full" : "/dev/null", O_RDWR) != stream) std::abort();
+  }
+}
+
+/// Brings what was printed to standard output.
+int FinishOutput() {
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return EXIT_SUCCESS;
+  std::fprintf(stderr,
+               "carillon-precompute: OUTPUT_NOT_WRITABLE: standard output cannot be written: %s; "
+               "files that were asked for are complete\n",
+               std::strerror(errno));
+  return EXIT_FAILURE;
+}
+
 int Run(const CommandLine& asked) {
   SetThreadCount(asked.thread_count);
   const WorkerEvents events(asked.event_descriptor);
@@ -118,7 +140,7 @@ int Run(const CommandLine& asked) {
   }
   if (!result.ok()) return Refuse(result.status(), asked.json, events);
   if (!asked.json) PrintSummary(*result, asked);
-  return EXIT_SUCCESS;
+  return FinishOutput();
 }
 
 /// Starts over with the environment that makes OpenBLAS fast; goes on as it is where that fails.
@@ -129,6 +151,7 @@ void RestartWithFastBlas(char** argv) {
 }
 
 int Main(int argc, char** argv) {
+  OpenStandardStreams();
   RestartWithFastBlas(argv);
   std::signal(SIGPIPE, SIG_IGN);
   const absl::StatusOr<CommandLine> asked = ParseCommandLine(argc, argv);
@@ -140,7 +163,7 @@ int Main(int argc, char** argv) {
   }
   if (asked->message) {
     std::fputs(asked->message->c_str(), stdout);
-    return EXIT_SUCCESS;
+    return FinishOutput();
   }
   return Run(*asked);
 }

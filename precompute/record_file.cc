@@ -8,7 +8,10 @@
 #include <xxhash.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cstdio>
+#include <filesystem>
+#include <system_error>
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
@@ -38,15 +41,17 @@ bool WriteChunks(Bytes bytes, uint32_t index, FileOutputStream& file) {
   return true;
 }
 
-/// Writes all records and brings them to the disk.
+/// Writes all records and brings them to the disk, where there is one; closes the descriptor.
 template <class Record>
 bool WriteRecords(int descriptor, const Record& header, std::span<const Bytes> arrays) {
+  if (descriptor < 0) return false;
   FileOutputStream file(descriptor);
   bool ok = SerializeDelimitedToZeroCopyStream(header, &file);
   for (size_t i = 0; i < arrays.size() && ok; ++i) {
     ok = WriteChunks<Record>(arrays[i], static_cast<uint32_t>(i), file);
   }
-  ok = ok && file.Flush() && fsync(descriptor) == 0;
+  // A pipe and most devices have nothing to bring to a disk.
+  ok = ok && file.Flush() && (fsync(descriptor) == 0 || errno == EINVAL);
   return file.Close() && ok;
 }
 
@@ -63,13 +68,23 @@ absl::Status CheckHash(const v1::ModalModelRecord& record) {
 template <class Record>
 absl::Status WriteRecordFile(const std::string& path, const Record& header,
                              std::span<const Bytes> arrays) {
-  const std::string temporary = absl::StrCat(path, ".partial-", getpid());
-  const int descriptor = open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-  if (descriptor >= 0 && WriteRecords(descriptor, header, arrays) &&
-      std::rename(temporary.c_str(), path.c_str()) == 0) {
-    return absl::OkStatus();
+  std::error_code error;
+  // A symbolic link stays, and what it names is replaced.
+  const std::filesystem::path linked = std::filesystem::canonical(path, error);
+  const std::string target = error ? path : linked.string();
+  const auto write = [&](const std::string& name, int flags) {
+    return WriteRecords(open(name.c_str(), O_WRONLY | O_CLOEXEC | flags, 0666), header, arrays);
+  };
+  if (std::filesystem::exists(target, error) && !std::filesystem::is_regular_file(target, error)) {
+    if (write(target, 0)) return absl::OkStatus();
+  } else {
+    const std::string temporary = absl::StrCat(target, ".partial-", getpid());
+    if (write(temporary, O_CREAT | O_TRUNC) &&
+        std::rename(temporary.c_str(), target.c_str()) == 0) {
+      return absl::OkStatus();
+    }
+    unlink(temporary.c_str());
   }
-  unlink(temporary.c_str());
   return Refusal(absl::StatusCode::kInternal, "OUTPUT_NOT_WRITABLE",
                  absl::StrCat("\"", path,
                               "\" cannot be written; check that its folder exists, is "

@@ -20,6 +20,8 @@ namespace {
 constexpr double kBytesPerGib = 1024.0 * 1024 * 1024;
 constexpr double kUsualAccuracyDb = 2;
 constexpr double kHighestHz = 20'000;  // where the request names none
+// No body that can be meshed has a mode as high as this.
+constexpr double kMostHz = 1e9;
 
 absl::Status Invalid(absl::string_view what) {
   return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS", what);
@@ -42,10 +44,10 @@ absl::Status CheckUse(const v1::WorkerRequest& request) {
   }
   if (!(request.min_frequency_hz() >= 0 &&
         request.min_frequency_hz() < request.max_frequency_hz() &&
-        std::isfinite(request.max_frequency_hz()))) {
+        request.max_frequency_hz() <= kMostHz)) {
     return Invalid(absl::StrCat("the band is ", request.min_frequency_hz(), " to ",
                                 request.max_frequency_hz(),
-                                " Hz; it must rise from zero or more to a finite frequency"));
+                                " Hz; it must rise from zero or more to at most 1e9 Hz"));
   }
   RETURN_IF_ERROR(CheckTransfer(request.transfer()));
   if (request.material().has_young_pa() && request.material().has_density_kg_per_m3()) {

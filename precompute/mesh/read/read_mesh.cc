@@ -5,7 +5,6 @@
 #include <array>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <utility>
 #include <vector>
 
@@ -22,14 +21,35 @@
 namespace carillon::precompute {
 namespace {
 
+constexpr size_t kMostMeshBytes = size_t{256} << 20;
+constexpr size_t kReadPiece = size_t{1} << 20;
 constexpr std::array<const char*, 4> kSurfaceFormats = {"obj", "ply", "stl", "off"};
+
+/// Reads at most `limit` bytes from the file's place on. The file may be a pipe, which knows no
+/// length.
+std::string ReadUpTo(std::ifstream& file, size_t limit) {
+  std::string bytes;
+  while (file && bytes.size() < limit) {
+    const size_t read = bytes.size();
+    bytes.resize(std::min(limit, read + kReadPiece));
+    file.read(bytes.data() + read, static_cast<std::streamsize>(bytes.size() - read));
+    bytes.resize(read + static_cast<size_t>(file.gcount()));
+  }
+  return bytes;
+}
 
 absl::StatusOr<std::string> ReadFile(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
-  std::string bytes{std::istreambuf_iterator<char>(file), {}};
+  std::string bytes = ReadUpTo(file, kMostMeshBytes + 1);
   if (!file.is_open() || file.bad()) {
     return Refusal(absl::StatusCode::kNotFound, "MESH_FILE_NOT_READABLE",
-                   absl::StrCat(path, " cannot be read: check its name and its permissions"));
+                   absl::StrCat(path,
+                                " cannot be read: check that it is a file, its name and its "
+                                "permissions"));
+  }
+  if (bytes.size() > kMostMeshBytes) {
+    return Refusal(absl::StatusCode::kResourceExhausted, "MESH_TOO_LARGE",
+                   absl::StrCat(path, " has more than 256 MiB: simplify the body's surface"));
   }
   if (bytes.empty()) {
     return Refusal(absl::StatusCode::kInvalidArgument, "MESH_EMPTY",

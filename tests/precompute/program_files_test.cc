@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+//
+// The files that carillon-precompute reads and writes.
+#include <sys/stat.h>
+#include <xxhash.h>
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <numbers>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "tests/precompute/carillon_precompute_run.h"
+
+namespace carillon::precompute {
+namespace {
+
+using ::testing::ElementsAre;
+using ProgramFilesTest = CarillonPrecomputeTest;
+
+TEST_F(ProgramFilesTest, ModelFileIsTheStoredForm) {
+  const Json report = Json::parse(RunBar(kSteel).output);
+  const std::vector<v1::ModalModelRecord> records = ReadRecords(model);
+  ASSERT_GT(records.size(), 1u);
+  const v1::ModalModelHeader& header = records[0].header();
+  EXPECT_EQ(header.format_version(), 1u);
+  EXPECT_EQ(header.mode_count(), report.at("modes").size());
+  EXPECT_EQ(header.settings().element(), v1::ELEMENT_LINEAR);
+  EXPECT_EQ(header.settings().metres_per_unit(), 0.001);
+  EXPECT_EQ(header.mesh_digest().size(), 64u);
+  EXPECT_NEAR(header.volume_m3(), 0.1 * 0.02 * 0.012, 1e-12);
+  EXPECT_EQ(header.verification().sturm_count(), 6 + header.mode_count());
+  std::vector<std::string> arrays(static_cast<size_t>(header.arrays_size()));
+  for (size_t k = 1; k < records.size(); ++k) {
+    const v1::ModalModelChunk& chunk = records[k].chunk();
+    EXPECT_LE(chunk.data().size(), size_t{1} << 20);
+    EXPECT_EQ(chunk.xxh3(), XXH3_64bits(chunk.data().data(), chunk.data().size()));
+    EXPECT_EQ(chunk.offset(), arrays[chunk.array()].size());
+    arrays[chunk.array()] += chunk.data();
+  }
+  std::vector<std::string> names;
+  for (int i = 0; i < header.arrays_size(); ++i) {
+    const v1::ArrayDescriptor& array = header.arrays(i);
+    names.push_back(array.name());
+    size_t bytes = array.type() == v1::ELEMENT_TYPE_FLOAT64 ? 8 : 4;
+    for (const uint64_t extent : array.shape()) bytes *= extent;
+    EXPECT_EQ(arrays[static_cast<size_t>(i)].size(), bytes) << array.name();
+  }
+  EXPECT_THAT(names, ElementsAre("eigenvalues", "residuals", "couplings", "vertices", "triangles",
+                                 "given_triangle", "given_vertices", "given_triangles", "shapes"));
+  double first = 0;
+  std::memcpy(&first, arrays[0].data(), sizeof first);
+  EXPECT_NEAR(std::sqrt(first * 210e9 / 7850) / (2 * std::numbers::pi),
+              report.at("modes")[0].at("frequency_hz").get<double>(), 1e-6);
+}
+
+TEST_F(ProgramFilesTest, MatricesAreThoseSolved) {
+  const Json report = Json::parse(RunBar(std::string(kSteel) + " --matrices " + folder).output);
+  const auto read = [&](const std::string& name) {
+    std::ifstream file(folder + "/" + name);
+    std::string banner;
+    std::getline(file, banner);
+    EXPECT_EQ(banner, "%%MatrixMarket matrix coordinate real symmetric");
+    Eigen::Index rows = 0, columns = 0, entries = 0, row = 0, column = 0;
+    file >> rows >> columns >> entries;
+    Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(rows, columns);
+    double value = 0;
+    while (file >> row >> column >> value) {
+      matrix(row - 1, column - 1) = matrix(column - 1, row - 1) = value;
+    }
+    return matrix;
+  };
+  const Eigen::MatrixXd K = read("K.mtx");
+  const Eigen::MatrixXd M = read("M.mtx");
+  ASSERT_EQ(K.rows(), report.at("unknowns"));
+  EXPECT_NEAR(M.sum(), 3 * 7850 * 0.1 * 0.02 * 0.012, 1e-9);
+  const Eigen::VectorXd eigenvalues =
+      Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd>(K, M, Eigen::EigenvaluesOnly)
+          .eigenvalues();
+  EXPECT_NEAR(std::sqrt(eigenvalues[6]) / (2 * std::numbers::pi),
+              report.at("modes")[0].at("frequency_hz").get<double>(), 1e-3);
+}
+
+TEST_F(ProgramFilesTest, FilesThatAreNotThereAreRefused) {
+  EXPECT_EQ(ReasonOf(Run(folder + "/none.obj --out " + model + " --material brass --json")),
+            "MESH_FILE_NOT_READABLE");
+  EXPECT_EQ(ReasonOf(Run(bar + " --unit mm --element linear --nodes 100 --material brass --json "
+                               "--out /nowhere/bar.modes")),
+            "OUTPUT_NOT_WRITABLE");
+}
+
+TEST_F(ProgramFilesTest, WhatIsNoFileOfAMeshIsRefused) {
+  const std::string rest = " --out " + model + " --format obj --material brass --json";
+  EXPECT_EQ(ReasonOf(Run(folder + rest)), "MESH_FILE_NOT_READABLE");
+  EXPECT_EQ(ReasonOf(Run("/dev/zero" + rest)), "MESH_TOO_LARGE");
+}
+
+TEST_F(ProgramFilesTest, AMeshMayComeFromAPipe) {
+  const std::string pipe = folder + "/pipe";
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  std::thread writer([&] { WriteBar(pipe); });
+  EXPECT_EQ(Run(pipe + " --out " + model + " --format obj --unit mm --nodes 100 --json" + kSteel)
+                .exit_status,
+            0);
+  writer.join();
+  EXPECT_TRUE(std::filesystem::exists(model));
+}
+
+TEST_F(ProgramFilesTest, ADeviceIsWrittenToAndALinkStays) {
+  const std::string pipe = folder + "/pipe";
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  std::vector<v1::ModalModelRecord> records;
+  std::thread reader([&] { records = ReadRecords(pipe); });
+  const std::string small = bar + " --unit mm --element linear --nodes 100 --json" + kSteel;
+  EXPECT_EQ(Run(small + " --out " + pipe).exit_status, 0);
+  reader.join();
+  EXPECT_FALSE(records.empty());
+  EXPECT_TRUE(std::filesystem::is_fifo(pipe));
+  const std::string link = folder + "/link";
+  std::ofstream(folder + "/target").close();
+  std::filesystem::create_symlink("target", link);
+  EXPECT_EQ(Run(small + " --out " + link).exit_status, 0);
+  EXPECT_TRUE(std::filesystem::is_symlink(link));
+  EXPECT_GT(std::filesystem::file_size(folder + "/target"), 0);
+}
+
+TEST_F(ProgramFilesTest, AReportThatCannotBeWrittenIsAnError) {
+  for (const char* output : {" >/dev/full", " >&-"}) {
+    for (const char* form : {" --json", ""}) {
+      const std::string command = bar + " --out " + model + " --unit mm --nodes 100" + kSteel +
+                                  form + " --threads 1" + output;
+      // Run adds its own options behind a comment sign.
+      EXPECT_NE(Run(command + " #").exit_status, 0) << command;
+      EXPECT_FALSE(ReadRecords(model).empty());
+    }
+  }
+}
+
+}  // namespace
+}  // namespace carillon::precompute
