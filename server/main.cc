@@ -168,10 +168,21 @@ OutputSettings OutputSettingsOf(const Options& options) {
 
 ApiSettings ApiSettingsOf(const Options& options) {
   return {.addresses = options.addresses,
-          .tls_certificate_file = options.tls_certificate_file,
-          .tls_key_file = options.tls_key_file,
-          .admin_token_file = options.admin_token_file,
+          .tls = {.certificate = options.tls_certificate_file,
+                  .key = options.tls_key_file,
+                  .client_roots = options.tls_client_roots_file},
+          .access_file = options.access_file,
           .version = kVersion};
+}
+
+/// The present settings with those of `read` that can change while the daemon runs.
+Options WithReloadable(Options present, const Options& read) {
+  for (std::string Options::*const file :
+       {&Options::tls_certificate_file, &Options::tls_key_file, &Options::tls_client_roots_file,
+        &Options::access_file}) {
+    if ((present.*file).empty() == (read.*file).empty()) present.*file = read.*file;
+  }
+  return present;
 }
 
 /// Applies the settings that can change while the daemon runs; says which cannot.
@@ -179,17 +190,19 @@ void Reload(const ReadOptions& read_options, Options& options, ApiServer& server
   sd_notify(0, "RELOADING=1");
   const absl::StatusOr<CommandLine> read = read_options();
   absl::Status status = read.status();
-  if (status.ok()) status = server.Reload(ApiSettingsOf(read->options));
+  Options changed = options;
   if (status.ok()) {
-    Options unchangeable = read->options;
-    unchangeable.admin_token_file = options.admin_token_file;
-    if (!(unchangeable == options)) {
+    changed = WithReloadable(options, read->options);
+    status = server.Reload(ApiSettingsOf(changed));
+  }
+  if (status.ok()) {
+    if (!(changed == read->options)) {
       spdlog::warn(
-          "some changed settings need a restart: a reload takes only the administrators' token "
-          "into account");
+          "some changed settings need a restart: a reload takes only the access file and the TLS "
+          "files into account, and does not begin or end the use of one");
     }
-    options.admin_token_file = read->options.admin_token_file;
-    spdlog::info("the configuration was read again");
+    options = changed;
+    spdlog::info("the configuration, the access file and the TLS files were read again");
   } else {
     spdlog::error("nothing was changed by the reload: {}", std::string(status.message()));
   }
@@ -222,7 +235,8 @@ absl::Status Run(Options options, const ReadOptions& read_options) {
                                                              .runs = runs,
                                                              .scenes = scenes,
                                                              .output = *output,
-                                                             .clock = clock}));
+                                                             .clock = clock,
+                                                             .log = LogWarning}));
   LogOutput(*output);
   AnnounceReady(*server);
   WaitForStop(signals, [&] { Reload(read_options, options, *server); });

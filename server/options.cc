@@ -107,7 +107,8 @@ absl::Status ReadKey(const std::string& key, const toml::node& node, Options& op
   if (key == "precompute") return ReadValue(key, node, options.precompute_program);
   if (key == "audio_program") return ReadValue(key, node, options.audio_program);
   if (key == "tls_certificate") return ReadValue(key, node, options.tls_certificate_file);
-  if (key == "admin_token_file") return ReadValue(key, node, options.admin_token_file);
+  if (key == "tls_client_roots") return ReadValue(key, node, options.tls_client_roots_file);
+  if (key == "access_file") return ReadValue(key, node, options.access_file);
   if (key == "tls_key") return ReadValue(key, node, options.tls_key_file);
   return InvalidConfiguration(
       absl::StrCat("there is no setting \"", key,
@@ -177,6 +178,9 @@ absl::Status Check(const Options& options) {
   if (options.addresses.empty()) return InvalidConfiguration("--listen names no address");
   if (options.tls_certificate_file.empty() != options.tls_key_file.empty()) {
     return InvalidConfiguration("--tls-certificate and --tls-key must be given together");
+  }
+  if (options.tls_certificate_file.empty() && !options.tls_client_roots_file.empty()) {
+    return InvalidConfiguration("--tls-client-roots needs --tls-certificate and --tls-key");
   }
   return absl::OkStatus();
 }
@@ -248,8 +252,10 @@ void AddFlags(CLI::App& app, Options& options) {
   app.add_option("--tls-certificate", options.tls_certificate_file,
                  "PEM file with the certificate for TCP");
   app.add_option("--tls-key", options.tls_key_file, "PEM file with its private key");
-  app.add_option("--admin-token-file", options.admin_token_file,
-                 "file with the token that administrators show over TCP");
+  app.add_option("--tls-client-roots", options.tls_client_roots_file,
+                 "PEM file with the authorities that vouch for clients' certificates");
+  app.add_option("--access-file", options.access_file,
+                 "file that says who may do what over TCP, by tokens and clients' certificates");
 }
 
 /// "db check|repair|restore FILE".

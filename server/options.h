@@ -38,7 +38,8 @@ struct Options {
   std::string audio_program;       ///< path of carillon-audio
   std::string tls_certificate_file;
   std::string tls_key_file;
-  std::string admin_token_file;
+  std::string tls_client_roots_file;
+  std::string access_file;  ///< who may do what over TCP
 
   bool operator==(const Options&) const = default;
 };

@@ -35,9 +35,6 @@ void AddDatabase(CLI::App& app, Program& program) {
   CLI::App& db =
       *app.add_subcommand("db", "Look after the database of the daemon (for administrators)");
   db.require_subcommand(1);
-  db.add_option("--token", program.admin_token,
-                "The token of an administrator, which is needed over TCP")
-      ->envname("CARILLON_ADMIN_TOKEN");
   db.add_subcommand("stats", "Show the number and the size of models, meshes and jobs")
       ->callback([&program] {
         program.command = [&program] { return ShowDatabaseStats(*program.Daemon(), program.json); };
@@ -187,6 +184,22 @@ void AddProgramOptions(CLI::App& app, Program& program) {
                  "The PEM file with the certificates that vouch for a daemon with TLS "
                  "[$CARILLON_TLS_ROOTS]")
       ->envname("CARILLON_TLS_ROOTS")
+      ->check(CLI::ExistingFile);
+  app.add_option("--tls-certificate", program.tls_certificate_file,
+                 "The PEM file with the certificate by which the daemon knows you "
+                 "[$CARILLON_TLS_CERTIFICATE]")
+      ->envname("CARILLON_TLS_CERTIFICATE")
+      ->check(CLI::ExistingFile);
+  app.add_option("--tls-key", program.tls_key_file,
+                 "The PEM file with the private key of that certificate [$CARILLON_TLS_KEY]")
+      ->envname("CARILLON_TLS_KEY")
+      ->check(CLI::ExistingFile);
+  app.add_option("--token", program.token,
+                 "The token by which the daemon knows you over TCP [$CARILLON_TOKEN]")
+      ->envname("CARILLON_TOKEN");
+  app.add_option("--token-file", program.token_file,
+                 "The file whose first line is that token [$CARILLON_TOKEN_FILE]")
+      ->envname("CARILLON_TOKEN_FILE")
       ->check(CLI::ExistingFile);
   app.add_flag("--json", program.json, "Print the results as JSON");
   app.set_version_flag("--version", "carillon " CARILLON_VERSION);

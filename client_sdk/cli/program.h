@@ -18,20 +18,35 @@ namespace carillon::cli {
 struct Program {
   std::string server = ReachableServerAddress();
   std::string tls_roots_file;
-  std::string admin_token;
+  std::string tls_certificate_file;
+  std::string tls_key_file;
+  std::string token;
+  std::string token_file;
   bool json = false;
   std::function<absl::Status()> command;
 
   std::unique_ptr<client::Client> Daemon() const {
-    return client::Connect(server, {.tls_roots_pem = TlsRoots(), .admin_token = admin_token});
+    return client::Connect(server, {.tls_roots_pem = ForTls(tls_roots_file),
+                                    .tls_certificate_pem = ForTls(tls_certificate_file),
+                                    .tls_key_pem = ForTls(tls_key_file),
+                                    .token = Token()});
   }
 
  private:
-  /// Returns the certificates of the file; none for a Unix socket, which has no TLS.
-  std::string TlsRoots() const {
+  /// Returns the content of the file; nothing for a Unix socket, which has no TLS.
+  std::string ForTls(const std::string& path) const {
     if (server.rfind("unix:", 0) == 0) return "";
-    std::ifstream file(tls_roots_file, std::ios::binary);
+    std::ifstream file(path, std::ios::binary);
     return {std::istreambuf_iterator<char>(file), {}};
+  }
+
+  /// The first line of the token's file if one is named, else the token.
+  std::string Token() const {
+    if (token_file.empty()) return token;
+    std::ifstream file(token_file);
+    std::string line;
+    std::getline(file, line);
+    return line;
   }
 };
 

@@ -6,11 +6,9 @@
 #include <utility>
 
 #include "absl/cleanup/cleanup.h"
-#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
-#include "server/api/bearer_token.h"
 #include "server/api/file_pieces.h"
 #include "server/api/stream_call.h"
 #include "server/api/unary_call.h"
@@ -34,26 +32,15 @@ v1::GetDatabaseStatsResponse ToProto(const DatabaseStats& stats) {
   return proto;
 }
 
-/// Compares two secrets in a time that does not depend on where they differ.
-bool SameSecret(absl::string_view a, absl::string_view b) {
-  unsigned difference = a.size() == b.size() ? 0 : 1;
-  for (size_t i = 0; i < a.size() && i < b.size(); ++i) {
-    difference |= static_cast<unsigned char>(a[i]) ^ static_cast<unsigned char>(b[i]);
-  }
-  return difference == 0;
-}
-
 /// Copies the database to a file beside it, and sends that piece by piece.
 class BackupCall final : public ServerStream<v1::BackUpDatabaseResponse> {
  public:
-  BackupCall(ModeDatabase& database, absl::Status allowed, ThreadPool& pool)
-      : StreamWriter(&pool), database_(database), allowed_(std::move(allowed)) {
+  BackupCall(ModeDatabase& database, ThreadPool& pool) : StreamWriter(&pool), database_(database) {
     StartWriting();
   }
 
  private:
   absl::StatusOr<Supply> Fill(v1::BackUpDatabaseResponse& response) override {
-    RETURN_IF_ERROR(allowed_);
     if (!std::exchange(begun_, true)) RETURN_IF_ERROR(Begin(response));
     return pieces_.Next(*response.mutable_data());
   }
@@ -72,32 +59,16 @@ class BackupCall final : public ServerStream<v1::BackUpDatabaseResponse> {
   }
 
   ModeDatabase& database_;
-  const absl::Status allowed_;
   bool begun_ = false;
   FilePieces pieces_;
 };
 
 }  // namespace
 
-void AdminService::set_token(std::string token) {
-  const MutexLock lock(&mutex_);
-  token_ = std::move(token);
-}
-
-absl::Status AdminService::Authorize(const grpc::CallbackServerContext& context) const {
-  if (absl::StartsWith(context.peer(), "unix:")) return absl::OkStatus();
-  const MutexLock lock(&mutex_);
-  if (!token_.empty() && SameSecret(BearerToken(context), token_)) return absl::OkStatus();
-  return Refusal(absl::StatusCode::kPermissionDenied, "ADMINISTRATOR_ONLY",
-                 "this call is for administrators: come through the daemon's Unix socket, or show "
-                 "the token of its --admin-token-file");
-}
-
 grpc::ServerUnaryReactor* AdminService::GetDatabaseStats(grpc::CallbackServerContext* context,
                                                          const v1::GetDatabaseStatsRequest*,
                                                          v1::GetDatabaseStatsResponse* response) {
-  return Answer(context, pool_, [this, context, response] {
-    RETURN_IF_ERROR(Authorize(*context));
+  return Answer(context, reception_, Role::kAdminister, [this, response] {
     ASSIGN_OR_RETURN(const DatabaseStats stats, ReadStats(database_.database()));
     *response = ToProto(stats);
     return absl::OkStatus();
@@ -106,14 +77,16 @@ grpc::ServerUnaryReactor* AdminService::GetDatabaseStats(grpc::CallbackServerCon
 
 grpc::ServerWriteReactor<v1::BackUpDatabaseResponse>* AdminService::BackUpDatabase(
     grpc::CallbackServerContext* context, const v1::BackUpDatabaseRequest*) {
-  return new BackupCall(database_, Authorize(*context), pool_);
+  return Open(*context, reception_, Role::kAdminister,
+              [this]() -> grpc::ServerWriteReactor<v1::BackUpDatabaseResponse>* {
+                return new BackupCall(database_, reception_.pool);
+              });
 }
 
 grpc::ServerUnaryReactor* AdminService::CollectGarbage(grpc::CallbackServerContext* context,
                                                        const v1::CollectGarbageRequest* request,
                                                        v1::CollectGarbageResponse* response) {
-  return Answer(context, pool_, [this, context, request, response] {
-    RETURN_IF_ERROR(Authorize(*context));
+  return Answer(context, reception_, Role::kAdminister, [this, request, response] {
     if ((request->budget_bytes() == 0) != request->delete_unpinned()) {
       return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_BUDGET",
                      "set either budget_bytes above zero, or delete_unpinned to delete every model "

@@ -7,24 +7,26 @@
 
 #include <chrono>
 #include <deque>
-#include <fstream>
-#include <iterator>
 #include <optional>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
+#include "server/api/access_control.h"
 #include "server/api/admin_service.h"
 #include "server/api/audio_service.h"
 #include "server/api/connection_gate.h"
 #include "server/api/contact_service.h"
 #include "server/api/decomposition_service.h"
+#include "server/api/grpc_log.h"
 #include "server/api/job_run_service.h"
 #include "server/api/listen_address.h"
 #include "server/api/modal_model_service.h"
+#include "server/api/scene_owners.h"
 #include "server/api/scene_service.h"
 #include "server/api/thread_pool.h"
+#include "server/api/tls_credentials.h"
 
 namespace carillon {
 namespace {
@@ -33,7 +35,6 @@ constexpr int kCallThreadCount = 4;
 /// Offline rendering has a lower priority than all that is heard live.
 constexpr int kRenderThreadCount = 2;
 constexpr int kRenderNiceness = 10;
-constexpr size_t kShortestToken = 16;
 constexpr std::chrono::milliseconds kGracePeriod(500);
 /// Further calls wait in the client until one has ended.
 constexpr int kMaxCallsOfConnection = 256;
@@ -50,48 +51,27 @@ absl::Status Unready(absl::string_view reason, absl::string_view message) {
   return Refusal(absl::StatusCode::kFailedPrecondition, reason, message);
 }
 
-absl::StatusOr<std::string> ReadFile(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::string content{std::istreambuf_iterator<char>(file), {}};
-  if (!file || content.empty()) {
-    return Unready("TLS_UNUSABLE", absl::StrCat("cannot read \"", path, "\""));
-  }
-  return content;
-}
-
-absl::StatusOr<std::string> ReadToken(const std::string& path) {
-  if (path.empty()) return std::string();
-  std::ifstream file(path);
-  std::string token;
-  if (std::getline(file, token) && token.size() >= kShortestToken) return token;
-  return Unready("ADMIN_TOKEN_UNUSABLE",
-                 absl::StrCat("cannot read a token of at least ", kShortestToken,
-                              " characters from \"", path, "\""));
-}
-
-absl::StatusOr<std::shared_ptr<grpc::ServerCredentials>> TcpCredentials(
-    const ApiSettings& settings) {
-  if (settings.tls_certificate_file.empty() && settings.tls_key_file.empty()) {
-    return grpc::InsecureServerCredentials();
-  }
-  ASSIGN_OR_RETURN(std::string certificate, ReadFile(settings.tls_certificate_file));
-  ASSIGN_OR_RETURN(std::string key, ReadFile(settings.tls_key_file));
-  grpc::SslServerCredentialsOptions options;
-  options.pem_key_cert_pairs.push_back({std::move(key), std::move(certificate)});
-  return grpc::SslServerCredentials(options);
+absl::StatusOr<AccessTable> ReadAccess(const ApiSettings& settings) {
+  if (settings.access_file.empty()) return AccessTable::ForThisMachine();
+  return AccessTable::Read(settings.access_file);
 }
 
 absl::StatusOr<std::deque<ListenAddress>> ParseAddresses(const ApiSettings& settings) {
-  const bool tls = !settings.tls_certificate_file.empty();
   std::deque<ListenAddress> addresses;
   for (const std::string& text : settings.addresses) {
     ASSIGN_OR_RETURN(ListenAddress address, ParseListenAddress(text));
-    if (!address.is_local() && !tls) {
+    if (!address.is_local() && settings.tls.certificate.empty()) {
       return Unready("TLS_REQUIRED",
                      absl::StrCat(text,
                                   " can be reached from the network, and everybody there could use "
                                   "the daemon; give --tls-certificate and --tls-key, or listen on "
                                   "127.0.0.1 or a Unix socket"));
+    }
+    if (!address.is_local() && settings.access_file.empty()) {
+      return Unready("ACCESS_FILE_REQUIRED",
+                     absl::StrCat(text,
+                                  " can be reached from the network; say who may do what there: "
+                                  "give --access-file"));
     }
     addresses.push_back(std::move(address));
   }
@@ -128,21 +108,29 @@ void LimitClients(grpc::ServerBuilder& builder) {
 }  // namespace
 
 struct ApiServer::State {
-  State(const ApiSettings& settings, const ServedRooms& rooms, std::string admin_token)
-      : admin(rooms.database, std::move(admin_token), call_pool),
-        models(rooms.database, rooms.decompositions, call_pool),
-        decompositions(rooms.decompositions, call_pool),
+  State(const ApiSettings& settings, const ServedRooms& rooms, AccessTable table)
+      : grpc_log(rooms.clock, rooms.log),
+        access(std::move(table), rooms.clock, rooms.log),
+        admin(rooms.database, {access, call_pool}),
+        models(rooms.database, rooms.decompositions, {access, call_pool}),
+        decompositions(rooms.decompositions, {access, call_pool}),
         job_runs(rooms.runs, call_pool),
-        scenes(rooms.scenes, rooms.database, call_pool),
+        scenes(rooms.scenes, owners, rooms.database, {access, call_pool}),
         contacts({.scenes = rooms.scenes,
                   .output = rooms.output,
                   .clock = rooms.clock,
-                  .pool = call_pool}),
-        audio(settings.version, rooms.output, rooms.scenes, rooms.database, render_pool),
+                  .owners = owners,
+                  .reception = {access, call_pool}}),
+        audio(settings.version, rooms.output, rooms.scenes, rooms.database, {access, render_pool}),
         output(rooms.output) {}
 
   absl::Status Listen(const ApiSettings& settings);
+  absl::StatusOr<std::shared_ptr<grpc::ServerCredentials>> Credentials(const ListenAddress& address,
+                                                                       const ApiSettings& settings);
 
+  GrpcLog grpc_log;
+  AccessControl access;
+  SceneOwners owners{access};
   ThreadPool call_pool{kCallThreadCount};
   ThreadPool render_pool{kRenderThreadCount, kRenderNiceness};
   AdminService admin;
@@ -153,22 +141,33 @@ struct ApiServer::State {
   ContactService contacts;
   AudioService audio;
   LiveOutput& output;
+  /// Those of each TCP address.
+  std::vector<std::shared_ptr<TlsCredentials>> tls;
   std::unique_ptr<grpc::Server> server;
   std::optional<ConnectionGate> gate;
   std::vector<std::string> addresses;
 };
 
+absl::StatusOr<std::shared_ptr<grpc::ServerCredentials>> ApiServer::State::Credentials(
+    const ListenAddress& address, const ApiSettings& settings) {
+  if (address.is_unix() || settings.tls.certificate.empty()) {
+    return grpc::InsecureServerCredentials();
+  }
+  ASSIGN_OR_RETURN(TlsFiles files, ReadTlsFiles(settings.tls));
+  tls.push_back(std::make_shared<TlsCredentials>(std::move(files)));
+  return tls.back();
+}
+
 absl::Status ApiServer::State::Listen(const ApiSettings& settings) {
   ASSIGN_OR_RETURN(std::deque<ListenAddress> parsed, ParseAddresses(settings));
-  ASSIGN_OR_RETURN(const std::shared_ptr<grpc::ServerCredentials> tcp_credentials,
-                   TcpCredentials(settings));
   grpc::ServerBuilder builder;
   LimitClients(builder);
   gate.emplace(RaiseConnectionLimit());
   for (ListenAddress& address : parsed) {
+    ASSIGN_OR_RETURN(const std::shared_ptr<grpc::ServerCredentials> credentials,
+                     Credentials(address, settings));
     auto acceptor = builder.experimental().AddExternalConnectionAcceptor(
-        grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD,
-        address.is_unix() ? grpc::InsecureServerCredentials() : tcp_credentials);
+        grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD, credentials);
     RETURN_IF_ERROR(gate->Listen(address, std::make_unique<GrpcTaker>(std::move(acceptor))));
   }
   for (grpc::Service* service : std::initializer_list<grpc::Service*>{
@@ -178,7 +177,7 @@ absl::Status ApiServer::State::Listen(const ApiSettings& settings) {
   server = builder.BuildAndStart();
   if (!server) {
     return Unready("LISTEN_FAILED",
-                   "cannot serve: the TLS files do not belong together; see the line before");
+                   "cannot serve: gRPC does not take the TLS files; see the line before");
   }
   gate->Open();
   for (const ListenAddress& address : parsed) addresses.push_back(address.ToString());
@@ -189,8 +188,8 @@ absl::StatusOr<std::unique_ptr<ApiServer>> ApiServer::Start(const ApiSettings& s
                                                             const ServedRooms& rooms) {
   grpc::EnableDefaultHealthCheckService(true);
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();
-  ASSIGN_OR_RETURN(std::string admin_token, ReadToken(settings.admin_token_file));
-  auto state = std::make_unique<State>(settings, rooms, std::move(admin_token));
+  ASSIGN_OR_RETURN(AccessTable table, ReadAccess(settings));
+  auto state = std::make_unique<State>(settings, rooms, std::move(table));
   RETURN_IF_ERROR(state->Listen(settings));
   rooms.output.ObserveDevice([health = state->server->GetHealthCheckService()](bool plays) {
     health->SetServingStatus(v1::AudioService::service_full_name(), plays);
@@ -199,8 +198,13 @@ absl::StatusOr<std::unique_ptr<ApiServer>> ApiServer::Start(const ApiSettings& s
 }
 
 absl::Status ApiServer::Reload(const ApiSettings& settings) {
-  ASSIGN_OR_RETURN(std::string admin_token, ReadToken(settings.admin_token_file));
-  state_->admin.set_token(std::move(admin_token));
+  ASSIGN_OR_RETURN(AccessTable table, ReadAccess(settings));
+  TlsFiles files;
+  if (!state_->tls.empty()) {
+    ASSIGN_OR_RETURN(files, ReadTlsFiles(settings.tls));
+  }
+  for (const auto& credentials : state_->tls) credentials->Replace(files);
+  state_->access.Replace(std::move(table));
   return absl::OkStatus();
 }
 

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "server/api/tls_files.h"
 #include "server/base/clock.h"
 #include "server/decomposition/decomposition_queue.h"
 #include "server/decomposition/remote_runs.h"
@@ -20,11 +22,10 @@ struct ApiSettings {
   /// "unix:PATH" or "HOST:PORT" (port 0: any that is free).
   std::vector<std::string> addresses;
   /// PEM files for all TCP addresses; empty: no TLS, and only addresses of this machine.
-  std::string tls_certificate_file;
-  std::string tls_key_file;
-  /// The first line of this file is the token with which callers from the network become
-  /// administrators; empty: only callers on a Unix socket are administrators.
-  std::string admin_token_file{};
+  TlsPaths tls{};
+  /// Who may do what over TCP; see AccessTable. Empty: only addresses of this machine, from which
+  /// anybody may do all but administer.
+  std::string access_file{};
   /// Version of the daemon.
   std::string version;
 };
@@ -37,6 +38,7 @@ struct ServedRooms {
   SceneRegistry& scenes;
   LiveOutput& output;
   Clock& clock;
+  std::function<void(const std::string& line)> log;  ///< of warnings
 };
 
 /// All services of carillon.v1, health and reflection. The health of carillon.v1.AudioService is
@@ -45,8 +47,8 @@ struct ServedRooms {
 class ApiServer {
  public:
   /// Starts to serve; calls are answered when it returns. Errors: InvalidArgument
-  /// (INVALID_ADDRESS), FailedPrecondition (TLS_REQUIRED: a network address without TLS,
-  /// TLS_UNUSABLE, ADMIN_TOKEN_UNUSABLE, ADDRESS_IN_USE, LISTEN_FAILED).
+  /// (INVALID_ADDRESS), FailedPrecondition (TLS_REQUIRED, ACCESS_FILE_REQUIRED: a network address
+  /// without either, TLS_UNUSABLE, ACCESS_FILE_UNUSABLE, ADDRESS_IN_USE, LISTEN_FAILED).
   static absl::StatusOr<std::unique_ptr<ApiServer>> Start(const ApiSettings& settings,
                                                           const ServedRooms& rooms);
 
@@ -55,8 +57,8 @@ class ApiServer {
   ApiServer(const ApiServer&) = delete;
   ApiServer& operator=(const ApiServer&) = delete;
 
-  /// Reads the administrators' token anew. Errors: those of Start about it; nothing is changed
-  /// then.
+  /// Reads the access file and the TLS files anew; connections and calls go on. Errors: those of
+  /// Start about them; nothing is changed then.
   absl::Status Reload(const ApiSettings& settings);
 
   /// The addresses of the settings, with the ports that were chosen.

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "carillon/v1/audio_service.grpc.pb.h"
-#include "server/api/thread_pool.h"
+#include "server/api/reception.h"
 #include "server/live_output/live_output.h"
 #include "server/mode_database/mode_database.h"
 #include "server/scene/scene_registry.h"
@@ -16,14 +16,14 @@ namespace carillon {
 /// carillon.v1.AudioService. The constructor's references must outlive the service.
 class AudioService final : public v1::AudioService::CallbackService {
  public:
-  /// `render_pool`: the threads that render offline.
+  /// The pool of `reception` has the threads that render offline.
   AudioService(std::string version, LiveOutput& output, const SceneRegistry& scenes,
-               ModeDatabase& database, ThreadPool& render_pool)
+               ModeDatabase& database, const Reception& reception)
       : version_(std::move(version)),
         output_(output),
         scenes_(scenes),
         database_(database),
-        render_pool_(render_pool) {}
+        reception_(reception) {}
 
   grpc::ServerWriteReactor<v1::ListenResponse>* Listen(grpc::CallbackServerContext* context,
                                                        const v1::ListenRequest* request) override;
@@ -34,11 +34,13 @@ class AudioService final : public v1::AudioService::CallbackService {
                                      v1::GetMixerResponse* response) override;
 
  private:
+  void Describe(v1::GetMixerResponse& mixer) const;
+
   const std::string version_;
   LiveOutput& output_;
   const SceneRegistry& scenes_;
   ModeDatabase& database_;
-  ThreadPool& render_pool_;
+  const Reception reception_;
   BodyCache render_bodies_;
   std::atomic<int> rendering_count_{0};
 };

@@ -28,7 +28,9 @@ constexpr int kMostSettlePeriods = 250;
 /// `stream_`. An answer is a snapshot; a newer one replaces the one that waits to be sent.
 class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::StreamContactsResponse> {
  public:
-  explicit ContactCall(const ContactContext& daemon) : StreamWriter(nullptr), daemon_(daemon) {
+  ContactCall(const ContactContext& daemon, const grpc::CallbackServerContext& context,
+              Principal caller)
+      : StreamWriter(nullptr), daemon_(daemon), context_(context), caller_(std::move(caller)) {
     StartWriting();
     StartReading();
   }
@@ -48,7 +50,7 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
 
   void AllRead() override {
     if (stream_) stream_->intake().Finish();
-    daemon_.pool.Run([this] { Settle(); });
+    daemon_.reception.pool.Run([this] { Settle(); });
   }
 
   void Refuse(const absl::Status& status) override { CloseWith(status); }
@@ -62,6 +64,7 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
                      "the stream was started twice; open another call for another scene");
     }
     ASSIGN_OR_RETURN(const uint64_t scene, ParseSceneName(start.scene()));
+    RETURN_IF_ERROR(daemon_.owners.Check(context_, caller_, scene));
     ContactStreamSettings settings;
     settings.step_s = start.step_s();
     if (start.has_scheduling_delay_s()) settings.scheduling_delay_s = start.scheduling_delay_s();
@@ -140,6 +143,8 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
   }
 
   const ContactContext daemon_;
+  const grpc::CallbackServerContext& context_;
+  const Principal caller_;
   std::unique_ptr<ContactStream> stream_;
   std::chrono::nanoseconds answer_due_{0};
   Mutex mutex_;
@@ -150,8 +155,11 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
 }  // namespace
 
 grpc::ServerBidiReactor<v1::StreamContactsRequest, v1::StreamContactsResponse>*
-ContactService::StreamContacts(grpc::CallbackServerContext*) {
-  return new ContactCall(daemon_);
+ContactService::StreamContacts(grpc::CallbackServerContext* context) {
+  absl::StatusOr<Principal> caller = daemon_.reception.access.Admit(*context, Role::kStrike);
+  if (caller.ok()) return new ContactCall(daemon_, *context, *std::move(caller));
+  using Reactor = grpc::ServerBidiReactor<v1::StreamContactsRequest, v1::StreamContactsResponse>;
+  return new RefusedCall<Reactor>(caller.status());
 }
 
 }  // namespace carillon

@@ -2,7 +2,8 @@
 #pragma once
 
 #include "carillon/v1/contact_service.grpc.pb.h"
-#include "server/api/thread_pool.h"
+#include "server/api/reception.h"
+#include "server/api/scene_owners.h"
 #include "server/base/clock.h"
 #include "server/live_output/live_output.h"
 #include "server/scene/scene_registry.h"
@@ -14,7 +15,8 @@ struct ContactContext {
   SceneRegistry& scenes;
   LiveOutput& output;
   Clock& clock;
-  ThreadPool& pool;
+  SceneOwners& owners;
+  Reception reception;
 };
 
 /// carillon.v1.ContactService. The constructor's references must outlive the service.

@@ -69,7 +69,7 @@ class JobWatchCall final : public ServerStream<v1::WatchJobResponse> {
 grpc::ServerUnaryReactor* DecompositionService::GetJob(grpc::CallbackServerContext* context,
                                                        const v1::GetJobRequest* request,
                                                        v1::GetJobResponse* response) {
-  return Answer(context, pool_, [this, request, response] {
+  return Answer(context, reception_, Role::kAny, [this, request, response] {
     ASSIGN_OR_RETURN(const std::string digest, ParseJobName(request->name()));
     ASSIGN_OR_RETURN(*response->mutable_job(), queue_.Get(digest));
     return absl::OkStatus();
@@ -79,7 +79,7 @@ grpc::ServerUnaryReactor* DecompositionService::GetJob(grpc::CallbackServerConte
 grpc::ServerUnaryReactor* DecompositionService::ListJobs(grpc::CallbackServerContext* context,
                                                          const v1::ListJobsRequest* request,
                                                          v1::ListJobsResponse* response) {
-  return Answer(context, pool_, [this, request, response] {
+  return Answer(context, reception_, Role::kAny, [this, request, response] {
     ASSIGN_OR_RETURN(DecompositionJobPage page,
                      queue_.List(request->page_size(), request->page_token()));
     for (v1::Job& job : page.jobs) *response->add_jobs() = std::move(job);
@@ -91,7 +91,7 @@ grpc::ServerUnaryReactor* DecompositionService::ListJobs(grpc::CallbackServerCon
 grpc::ServerUnaryReactor* DecompositionService::CancelJob(grpc::CallbackServerContext* context,
                                                           const v1::CancelJobRequest* request,
                                                           v1::CancelJobResponse* response) {
-  return Answer(context, pool_, [this, request, response] {
+  return Answer(context, reception_, Role::kSubmit, [this, request, response] {
     ASSIGN_OR_RETURN(const std::string digest, ParseJobName(request->name()));
     ASSIGN_OR_RETURN(*response->mutable_job(), queue_.Cancel(digest));
     return absl::OkStatus();
@@ -99,8 +99,11 @@ grpc::ServerUnaryReactor* DecompositionService::CancelJob(grpc::CallbackServerCo
 }
 
 grpc::ServerWriteReactor<v1::WatchJobResponse>* DecompositionService::WatchJob(
-    grpc::CallbackServerContext*, const v1::WatchJobRequest* request) {
-  return new JobWatchCall(queue_, ParseJobName(request->name()));
+    grpc::CallbackServerContext* context, const v1::WatchJobRequest* request) {
+  return Open(*context, reception_, Role::kAny,
+              [this, request]() -> grpc::ServerWriteReactor<v1::WatchJobResponse>* {
+                return new JobWatchCall(queue_, ParseJobName(request->name()));
+              });
 }
 
 }  // namespace carillon

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "carillon/v1/decomposition_service.grpc.pb.h"
-#include "server/api/thread_pool.h"
+#include "server/api/reception.h"
 #include "server/decomposition/decomposition_queue.h"
 
 namespace carillon {
@@ -10,7 +10,8 @@ namespace carillon {
 /// carillon.v1.DecompositionService. The constructor's references must outlive the service.
 class DecompositionService final : public v1::DecompositionService::CallbackService {
  public:
-  DecompositionService(DecompositionQueue& queue, ThreadPool& pool) : queue_(queue), pool_(pool) {}
+  DecompositionService(DecompositionQueue& queue, const Reception& reception)
+      : queue_(queue), reception_(reception) {}
 
   grpc::ServerUnaryReactor* GetJob(grpc::CallbackServerContext* context,
                                    const v1::GetJobRequest* request,
@@ -26,7 +27,7 @@ class DecompositionService final : public v1::DecompositionService::CallbackServ
 
  private:
   DecompositionQueue& queue_;
-  ThreadPool& pool_;
+  const Reception reception_;
 };
 
 }  // namespace carillon

@@ -32,13 +32,14 @@ ModelFilter FilterOf(const v1::ListModalModelsRequest& request) {
 
 grpc::ServerReadReactor<v1::UploadMeshRequest>* ModalModelService::UploadMesh(
     grpc::CallbackServerContext* context, v1::UploadMeshResponse* response) {
-  return MakeUpload(*context, *response, database_.meshes(), pool_);
+  return Open(*context, reception_, Role::kSubmit,
+              [&] { return MakeUpload(*context, *response, database_.meshes(), reception_.pool); });
 }
 
 grpc::ServerUnaryReactor* ModalModelService::CreateModalModel(
     grpc::CallbackServerContext* context, const v1::CreateModalModelRequest* request,
     v1::CreateModalModelResponse* response) {
-  return Answer(context, pool_, [this, request, response] {
+  return Answer(context, reception_, Role::kSubmit, [this, request, response] {
     ASSIGN_OR_RETURN(*response->mutable_job(), queue_.Submit(*request));
     return absl::OkStatus();
   });
@@ -47,7 +48,7 @@ grpc::ServerUnaryReactor* ModalModelService::CreateModalModel(
 grpc::ServerUnaryReactor* ModalModelService::CreateTransfer(
     grpc::CallbackServerContext* context, const v1::CreateTransferRequest* request,
     v1::CreateTransferResponse* response) {
-  return Answer(context, pool_, [this, request, response] {
+  return Answer(context, reception_, Role::kSubmit, [this, request, response] {
     ASSIGN_OR_RETURN(const std::string digest, ParseModelName(request->modal_model()));
     ASSIGN_OR_RETURN(*response->mutable_job(), queue_.SubmitTransfer(digest, *request));
     return absl::OkStatus();
@@ -57,25 +58,28 @@ grpc::ServerUnaryReactor* ModalModelService::CreateTransfer(
 grpc::ServerUnaryReactor* ModalModelService::GetModalModel(grpc::CallbackServerContext* context,
                                                            const v1::GetModalModelRequest* request,
                                                            v1::GetModalModelResponse* response) {
-  return Answer(context, pool_, [this, request, response] { return Get(*request, *response); });
+  return Answer(context, reception_, Role::kAny,
+                [this, request, response] { return Get(*request, *response); });
 }
 
 grpc::ServerUnaryReactor* ModalModelService::ListModalModels(
     grpc::CallbackServerContext* context, const v1::ListModalModelsRequest* request,
     v1::ListModalModelsResponse* response) {
-  return Answer(context, pool_, [this, request, response] { return List(*request, *response); });
+  return Answer(context, reception_, Role::kAny,
+                [this, request, response] { return List(*request, *response); });
 }
 
 grpc::ServerUnaryReactor* ModalModelService::UpdateModalModel(
     grpc::CallbackServerContext* context, const v1::UpdateModalModelRequest* request,
     v1::UpdateModalModelResponse* response) {
-  return Answer(context, pool_, [this, request, response] { return Update(*request, *response); });
+  return Answer(context, reception_, Role::kSubmit,
+                [this, request, response] { return Update(*request, *response); });
 }
 
 grpc::ServerUnaryReactor* ModalModelService::DeleteModalModel(
     grpc::CallbackServerContext* context, const v1::DeleteModalModelRequest* request,
     v1::DeleteModalModelResponse*) {
-  return Answer(context, pool_, [this, request] {
+  return Answer(context, reception_, Role::kAdminister, [this, request] {
     ASSIGN_OR_RETURN(const std::string digest, ParseModelName(request->name()));
     return queue_.DeleteModel(digest);
   });
@@ -83,18 +87,20 @@ grpc::ServerUnaryReactor* ModalModelService::DeleteModalModel(
 
 grpc::ServerReadReactor<v1::ImportModalModelRequest>* ModalModelService::ImportModalModel(
     grpc::CallbackServerContext* context, v1::ImportModalModelResponse* response) {
-  return MakeImport(*context, *response, database_, pool_);
+  return Open(*context, reception_, Role::kSubmit,
+              [&] { return MakeImport(*context, *response, database_, reception_.pool); });
 }
 
 grpc::ServerWriteReactor<v1::ExportModalModelResponse>* ModalModelService::ExportModalModel(
-    grpc::CallbackServerContext*, const v1::ExportModalModelRequest* request) {
-  return MakeExport(*request, database_, pool_);
+    grpc::CallbackServerContext* context, const v1::ExportModalModelRequest* request) {
+  return Open(*context, reception_, Role::kSubmit,
+              [&] { return MakeExport(*request, database_, reception_.pool); });
 }
 
 grpc::ServerUnaryReactor* ModalModelService::ListMaterials(grpc::CallbackServerContext* context,
                                                            const v1::ListMaterialsRequest*,
                                                            v1::ListMaterialsResponse* response) {
-  return Answer(context, pool_, [response] {
+  return Answer(context, reception_, Role::kAny, [response] {
     *response->mutable_materials() = Materials().materials();
     return absl::OkStatus();
   });

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "carillon/v1/modal_model_service.grpc.pb.h"
-#include "server/api/thread_pool.h"
+#include "server/api/reception.h"
 #include "server/decomposition/decomposition_queue.h"
 #include "server/mode_database/mode_database.h"
 
@@ -11,8 +11,8 @@ namespace carillon {
 /// carillon.v1.ModalModelService. The constructor's references must outlive the service.
 class ModalModelService final : public v1::ModalModelService::CallbackService {
  public:
-  ModalModelService(ModeDatabase& database, DecompositionQueue& queue, ThreadPool& pool)
-      : database_(database), queue_(queue), pool_(pool) {}
+  ModalModelService(ModeDatabase& database, DecompositionQueue& queue, const Reception& reception)
+      : database_(database), queue_(queue), reception_(reception) {}
 
   grpc::ServerReadReactor<v1::UploadMeshRequest>* UploadMesh(
       grpc::CallbackServerContext* context, v1::UploadMeshResponse* response) override;
@@ -51,7 +51,7 @@ class ModalModelService final : public v1::ModalModelService::CallbackService {
 
   ModeDatabase& database_;
   DecompositionQueue& queue_;
-  ThreadPool& pool_;
+  const Reception reception_;
 };
 
 }  // namespace carillon

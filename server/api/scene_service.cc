@@ -10,7 +10,6 @@
 #include "proto/cpp/status_macros.h"
 #include "server/api/object_conversion.h"
 #include "server/api/pose_conversion.h"
-#include "server/api/resource_name.h"
 #include "server/api/unary_call.h"
 
 namespace carillon {
@@ -18,28 +17,35 @@ namespace carillon {
 grpc::ServerUnaryReactor* SceneService::CreateScene(grpc::CallbackServerContext* context,
                                                     const v1::CreateSceneRequest* request,
                                                     v1::CreateSceneResponse* response) {
-  return Answer(context, pool_, [this, request, response] {
-    ASSIGN_OR_RETURN(const uint64_t scene,
-                     scenes_.CreateScene(ToSceneSpace(request->hearing(), request->listener())));
-    response->set_name(SceneName(scene));
-    return absl::OkStatus();
-  });
+  return Answer(
+      context, reception_, Role::kStrike, [this, request, response](const Principal& caller) {
+        ASSIGN_OR_RETURN(const uint64_t scene, scenes_.CreateScene(ToSceneSpace(
+                                                   request->hearing(), request->listener())));
+        owners_.Add(scene, caller.name);
+        response->set_name(SceneName(scene));
+        return absl::OkStatus();
+      });
 }
 
 grpc::ServerUnaryReactor* SceneService::DeleteScene(grpc::CallbackServerContext* context,
                                                     const v1::DeleteSceneRequest* request,
                                                     v1::DeleteSceneResponse*) {
-  return Answer(context, pool_, [this, request] {
-    ASSIGN_OR_RETURN(const uint64_t scene, ParseSceneName(request->name()));
-    return scenes_.DeleteScene(scene);
-  });
+  return Answer(context, reception_, Role::kStrike,
+                [this, context, request](const Principal& caller) {
+                  ASSIGN_OR_RETURN(const uint64_t scene, ParseSceneName(request->name()));
+                  RETURN_IF_ERROR(owners_.Check(*context, caller, scene));
+                  RETURN_IF_ERROR(scenes_.DeleteScene(scene));
+                  owners_.Remove(scene);
+                  return absl::OkStatus();
+                });
 }
 
 grpc::ServerUnaryReactor* SceneService::ListScenes(grpc::CallbackServerContext* context,
                                                    const v1::ListScenesRequest*,
                                                    v1::ListScenesResponse* response) {
-  return Answer(context, pool_, [this, response] {
+  return Answer(context, reception_, Role::kStrike, [this, response](const Principal& caller) {
     for (const SceneRegistry::SceneEntry& entry : scenes_.ListScenes()) {
+      if (!owners_.Owns(caller, entry.scene)) continue;
       v1::Scene& scene = *response->add_scenes();
       scene.set_name(SceneName(entry.scene));
       scene.set_object_count(static_cast<uint32_t>(entry.object_count));
@@ -51,47 +57,64 @@ grpc::ServerUnaryReactor* SceneService::ListScenes(grpc::CallbackServerContext* 
 grpc::ServerUnaryReactor* SceneService::ListObjects(grpc::CallbackServerContext* context,
                                                     const v1::ListObjectsRequest* request,
                                                     v1::ListObjectsResponse* response) {
-  return Answer(context, pool_, [this, request, response] {
-    ASSIGN_OR_RETURN(const uint64_t scene, ParseSceneName(request->scene()));
-    ASSIGN_OR_RETURN(const std::vector<PlacedObject> objects, scenes_.ListObjects(scene));
-    for (const PlacedObject& placed : objects) *response->add_objects() = ToProto(scene, placed);
-    return absl::OkStatus();
-  });
+  return Answer(context, reception_, Role::kStrike,
+                [this, context, request, response](const Principal& caller) {
+                  ASSIGN_OR_RETURN(const uint64_t scene, ParseSceneName(request->scene()));
+                  RETURN_IF_ERROR(owners_.Check(*context, caller, scene));
+                  ASSIGN_OR_RETURN(const std::vector<PlacedObject> objects,
+                                   scenes_.ListObjects(scene));
+                  for (const PlacedObject& placed : objects)
+                    *response->add_objects() = ToProto(scene, placed);
+                  return absl::OkStatus();
+                });
 }
 
 grpc::ServerUnaryReactor* SceneService::AddObject(grpc::CallbackServerContext* context,
                                                   const v1::AddObjectRequest* request,
                                                   v1::AddObjectResponse* response) {
-  return Answer(context, pool_, [this, request, response] { return Add(*request, *response); });
+  return Answer(context, reception_, Role::kStrike,
+                [this, context, request, response](const Principal& caller) {
+                  ASSIGN_OR_RETURN(const uint64_t scene, ParseSceneName(request->scene()));
+                  RETURN_IF_ERROR(owners_.Check(*context, caller, scene));
+                  return Add(scene, *request, *response);
+                });
 }
 
 grpc::ServerUnaryReactor* SceneService::UpdateObject(grpc::CallbackServerContext* context,
                                                      const v1::UpdateObjectRequest* request,
                                                      v1::UpdateObjectResponse* response) {
-  return Answer(context, pool_, [this, request, response] { return Update(*request, *response); });
+  return Answer(context, reception_, Role::kStrike,
+                [this, context, request, response](const Principal& caller) {
+                  ASSIGN_OR_RETURN(const ObjectName name, ParseObjectName(request->name()));
+                  RETURN_IF_ERROR(owners_.Check(*context, caller, name.scene));
+                  return Update(name, *request, *response);
+                });
 }
 
 grpc::ServerUnaryReactor* SceneService::RemoveObject(grpc::CallbackServerContext* context,
                                                      const v1::RemoveObjectRequest* request,
                                                      v1::RemoveObjectResponse*) {
-  return Answer(context, pool_, [this, request] {
-    ASSIGN_OR_RETURN(const ObjectName name, ParseObjectName(request->name()));
-    return scenes_.RemoveObject(name.scene, name.handle);
-  });
+  return Answer(context, reception_, Role::kStrike,
+                [this, context, request](const Principal& caller) {
+                  ASSIGN_OR_RETURN(const ObjectName name, ParseObjectName(request->name()));
+                  RETURN_IF_ERROR(owners_.Check(*context, caller, name.scene));
+                  return scenes_.RemoveObject(name.scene, name.handle);
+                });
 }
 
 grpc::ServerUnaryReactor* SceneService::UpdateListener(grpc::CallbackServerContext* context,
                                                        const v1::UpdateListenerRequest* request,
                                                        v1::UpdateListenerResponse*) {
-  return Answer(context, pool_, [this, request] {
-    ASSIGN_OR_RETURN(const uint64_t scene, ParseSceneName(request->scene()));
-    return scenes_.UpdateListener(scene, FromProto(request->pose()), request->glide_s());
-  });
+  return Answer(
+      context, reception_, Role::kStrike, [this, context, request](const Principal& caller) {
+        ASSIGN_OR_RETURN(const uint64_t scene, ParseSceneName(request->scene()));
+        RETURN_IF_ERROR(owners_.Check(*context, caller, scene));
+        return scenes_.UpdateListener(scene, FromProto(request->pose()), request->glide_s());
+      });
 }
 
-absl::Status SceneService::Add(const v1::AddObjectRequest& request,
+absl::Status SceneService::Add(uint64_t scene, const v1::AddObjectRequest& request,
                                v1::AddObjectResponse& response) {
-  ASSIGN_OR_RETURN(const uint64_t scene, ParseSceneName(request.scene()));
   ASSIGN_OR_RETURN(const std::string digest, ParseModelName(request.modal_model()));
   ASSIGN_OR_RETURN(
       ObjectProperties properties,
@@ -106,9 +129,8 @@ absl::Status SceneService::Add(const v1::AddObjectRequest& request,
   return absl::OkStatus();
 }
 
-absl::Status SceneService::Update(const v1::UpdateObjectRequest& request,
+absl::Status SceneService::Update(const ObjectName& name, const v1::UpdateObjectRequest& request,
                                   v1::UpdateObjectResponse& response) {
-  ASSIGN_OR_RETURN(const ObjectName name, ParseObjectName(request.name()));
   ASSIGN_OR_RETURN(const ObjectChange change, ToObjectChange(request));
   ASSIGN_OR_RETURN(const PlacedObject placed,
                    scenes_.UpdateObject(name.scene, name.handle, change));

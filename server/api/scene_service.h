@@ -2,7 +2,9 @@
 #pragma once
 
 #include "carillon/v1/scene_service.grpc.pb.h"
-#include "server/api/thread_pool.h"
+#include "server/api/reception.h"
+#include "server/api/resource_name.h"
+#include "server/api/scene_owners.h"
 #include "server/mode_database/mode_database.h"
 #include "server/scene/scene_registry.h"
 
@@ -11,8 +13,9 @@ namespace carillon {
 /// carillon.v1.SceneService. The constructor's references must outlive the service.
 class SceneService final : public v1::SceneService::CallbackService {
  public:
-  SceneService(SceneRegistry& scenes, ModeDatabase& database, ThreadPool& pool)
-      : scenes_(scenes), database_(database), pool_(pool) {}
+  SceneService(SceneRegistry& scenes, SceneOwners& owners, ModeDatabase& database,
+               const Reception& reception)
+      : scenes_(scenes), owners_(owners), database_(database), reception_(reception) {}
 
   grpc::ServerUnaryReactor* CreateScene(grpc::CallbackServerContext* context,
                                         const v1::CreateSceneRequest* request,
@@ -40,12 +43,15 @@ class SceneService final : public v1::SceneService::CallbackService {
                                            v1::UpdateListenerResponse* response) override;
 
  private:
-  absl::Status Add(const v1::AddObjectRequest& request, v1::AddObjectResponse& response);
-  absl::Status Update(const v1::UpdateObjectRequest& request, v1::UpdateObjectResponse& response);
+  absl::Status Add(uint64_t scene, const v1::AddObjectRequest& request,
+                   v1::AddObjectResponse& response);
+  absl::Status Update(const ObjectName& name, const v1::UpdateObjectRequest& request,
+                      v1::UpdateObjectResponse& response);
 
   SceneRegistry& scenes_;
+  SceneOwners& owners_;
   ModeDatabase& database_;
-  ThreadPool& pool_;
+  const Reception reception_;
 };
 
 }  // namespace carillon

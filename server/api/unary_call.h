@@ -3,11 +3,12 @@
 
 #include <grpcpp/grpcpp.h>
 
+#include <type_traits>
 #include <utility>
 
 #include "server/api/exception_barrier.h"
+#include "server/api/reception.h"
 #include "server/api/status_conversion.h"
-#include "server/api/thread_pool.h"
 
 namespace carillon {
 
@@ -22,6 +23,24 @@ grpc::ServerUnaryReactor* Answer(grpc::CallbackServerContext* context, ThreadPoo
     reactor->Finish(ToGrpcStatus(WithoutExceptions(work)));
   });
   return reactor;
+}
+
+/// As above, if the caller has the role; its work may be `work(const Principal&)`.
+template <typename Work>
+grpc::ServerUnaryReactor* Answer(grpc::CallbackServerContext* context, const Reception& reception,
+                                 Role role, Work work) {
+  absl::StatusOr<Principal> caller = reception.access.Admit(*context, role);
+  if (!caller.ok()) {
+    grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+    reactor->Finish(ToGrpcStatus(caller.status()));
+    return reactor;
+  }
+  if constexpr (std::is_invocable_v<const Work&, const Principal&>) {
+    return Answer(context, reception.pool,
+                  [caller = *std::move(caller), work = std::move(work)] { return work(caller); });
+  } else {
+    return Answer(context, reception.pool, std::move(work));
+  }
 }
 
 }  // namespace carillon

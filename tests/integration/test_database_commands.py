@@ -2,6 +2,7 @@
 """The commands that look after stored models, with a running daemon and without."""
 
 import datetime
+import hashlib
 import json
 import pathlib
 import sqlite3
@@ -29,9 +30,10 @@ class DatabaseCommandsTest(unittest.TestCase):
         scratch = tempfile.TemporaryDirectory(prefix="carillon-")
         self.addCleanup(scratch.cleanup)
         self.folder = pathlib.Path(scratch.name)
-        (self.folder / "token").write_text("a token for this test\n")
-        self.daemon = Daemon(self.folder, "--listen", "127.0.0.1:0", "--admin-token-file",
-                             self.folder / "token")
+        access = self.folder / "access"
+        access.touch(0o600)
+        access.write_text(f"keeper administer sha256:{hashlib.sha256(b'a token for this test').hexdigest()}\n")
+        self.daemon = Daemon(self.folder, "--listen", "127.0.0.1:0", "--access-file", access)
         self.addCleanup(lambda: self.daemon.stop())
         self.name = self.run_command("model", "import", self.model_file, "--label", "bar").strip()
 
@@ -178,10 +180,11 @@ class DatabaseCommandsTest(unittest.TestCase):
         address = next(line.split()[-1] for line in self.daemon.listening if "127.0.0.1" in line)
         admin = admin_service_pb2_grpc.AdminServiceStub(grpc.insecure_channel(address))
         request = admin_service_pb2.GetDatabaseStatsRequest()
-        for metadata in ((), (("authorization", "Bearer another token"),)):
+        for metadata, reason in (((), "CREDENTIAL_MISSING"),
+                                 ((("authorization", "Bearer another token"),), "TOKEN_WRONG")):
             with self.assertRaises(grpc.RpcError) as refused:
                 admin.GetDatabaseStats(request, metadata=metadata)
-            self.assertEqual(strike.refusal(refused.exception).info.reason, "ADMINISTRATOR_ONLY")
+            self.assertEqual(strike.refusal(refused.exception).info.reason, reason)
         shown = (("authorization", "Bearer a token for this test"),)
         self.assertEqual(admin.GetDatabaseStats(request, metadata=shown).model_count, 1)
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Signals: a stop ends within five seconds whatever the clients do, and fades; other signals do not end the daemon."""
 
+import hashlib
 import pathlib
 import signal
 import tempfile
@@ -84,20 +85,24 @@ class StopTest(unittest.TestCase):
         self.assertLess(loudest[-2], 0.15 * before)
 
     def test_other_signals_do_not_end_it_and_sighup_reads_the_token_again(self):
-        token = self.folder / "token"
-        token.write_text("the first of two tokens\n")
+        access = self.folder / "access"
+        access.touch(0o600)
+
+        def write(token):
+            access.write_text(f"keeper administer sha256:{hashlib.sha256(token.encode()).hexdigest()}\n")
+        write("the first of two tokens")
         configuration = self.folder / "carillond.toml"
-        configuration.write_text(f'admin_token_file = "{token}"\n')
+        configuration.write_text(f'access_file = "{access}"\n')
         self.serve("--config", configuration, "--listen", "127.0.0.1:0")
         address = self.daemon.listening[1].split()[-1]
         for number in (signal.SIGUSR1, signal.SIGUSR2, signal.SIGHUP):
             self.daemon.process.send_signal(number)
         self.assertEqual(self.is_admitted(address, "the first of two tokens"), True)
-        token.write_text("the second of two tokens\n")
+        write("the second of two tokens")
         self.daemon.process.send_signal(signal.SIGHUP)
         torture.wait_until(lambda: self.is_admitted(address, "the second of two tokens"), 30.0)
         self.assertEqual(self.is_admitted(address, "the first of two tokens"), False)
-        configuration.write_text("admin_token_file = 7\n")
+        configuration.write_text("access_file = 7\n")
         self.daemon.process.send_signal(signal.SIGHUP)
         torture.wait_until(lambda: "nothing was changed" in (self.folder / "log").read_text(), 30.0)
         self.assertEqual(self.is_admitted(address, "the second of two tokens"), True)

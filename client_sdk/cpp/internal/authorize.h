@@ -3,13 +3,19 @@
 
 #include <grpcpp/client_context.h>
 
+#include <algorithm>
 #include <string>
 
 namespace carillon::client {
 
-/// Adds the token to the call unless it is empty.
+/// Whether the text can be sent as metadata: printable ASCII.
+inline bool IsSendable(const std::string& token) {
+  return std::all_of(token.begin(), token.end(), [](char c) { return c > ' ' && c <= '~'; });
+}
+
+/// Adds the token to the call unless it is empty, or no token at all.
 inline void Authorize(grpc::ClientContext& context, const std::string& token) {
-  if (!token.empty()) context.AddMetadata("authorization", "Bearer " + token);
+  if (!token.empty() && IsSendable(token)) context.AddMetadata("authorization", "Bearer " + token);
 }
 
 }  // namespace carillon::client

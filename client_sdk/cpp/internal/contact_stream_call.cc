@@ -10,6 +10,7 @@
 
 #include "absl/base/thread_annotations.h"
 #include "absl/synchronization/mutex.h"
+#include "client_sdk/cpp/internal/authorize.h"
 #include "client_sdk/cpp/internal/rpc_status.h"
 #include "proto/cpp/error_reason.h"
 
@@ -26,7 +27,9 @@ class ContactStreamCall final
     : public ContactStream,
       public grpc::ClientBidiReactor<v1::StreamContactsRequest, v1::StreamContactsResponse> {
  public:
-  explicit ContactStreamCall(std::string server) : server_(std::move(server)) {}
+  ContactStreamCall(std::string server, const std::string& token) : server_(std::move(server)) {
+    Authorize(context_, token);
+  }
 
   ~ContactStreamCall() override {
     context_.TryCancel();
@@ -145,9 +148,9 @@ class ContactStreamCall final
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<ContactStream>> OpenContactStream(
-    v1::ContactService::Stub& stub, const std::string& server,
+    v1::ContactService::Stub& stub, const std::string& server, const std::string& token,
     const v1::ContactStreamStart& start) {
-  auto call = std::make_unique<ContactStreamCall>(server);
+  auto call = std::make_unique<ContactStreamCall>(server, token);
   if (const absl::Status status = call->Open(stub, start); !status.ok()) return status;
   return call;
 }

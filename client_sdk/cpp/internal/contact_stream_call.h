@@ -10,8 +10,10 @@
 
 namespace carillon::client {
 
-/// Opens StreamContacts on `stub` and waits for the first answer. Error messages name `server`.
+/// Opens StreamContacts on `stub` with the client's token, and waits for the first answer. Error
+/// messages name `server`.
 absl::StatusOr<std::unique_ptr<ContactStream>> OpenContactStream(
-    v1::ContactService::Stub& stub, const std::string& server, const v1::ContactStreamStart& start);
+    v1::ContactService::Stub& stub, const std::string& server, const std::string& token,
+    const v1::ContactStreamStart& start);
 
 }  // namespace carillon::client

@@ -6,34 +6,45 @@
 #include <grpcpp/security/credentials.h>
 
 #include <chrono>
+#include <cstdlib>
 #include <memory>
 #include <utility>
 
+#include "client_sdk/cpp/internal/authorize.h"
 #include "client_sdk/cpp/internal/contact_stream_call.h"
 #include "client_sdk/cpp/internal/rpc_status.h"
 
 namespace carillon::client {
 namespace {
 
-/// Calls `stub.*method` and returns its response.
-template <class Stub, class Request, class Response>
-absl::StatusOr<Response> Call(Stub& stub, const std::string& server,
+/// Calls `stub.*method` of the daemon that `stubs` belong to, and returns its response.
+template <class Stubs, class Stub, class Request, class Response>
+absl::StatusOr<Response> Call(const Stubs& stubs, Stub& stub,
                               grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&,
                                                            Response*),
                               const Request& request) {
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() + kCallTimeout);
+  Authorize(context, stubs.token);
   Response response;
-  const absl::Status status = FromRpc((stub.*method)(&context, request, &response), server);
+  const absl::Status status = FromRpc((stub.*method)(&context, request, &response), stubs.server);
   if (!status.ok()) return status;
   return response;
 }
 
-std::shared_ptr<grpc::ChannelCredentials> CredentialsFor(const std::string& tls_roots_pem) {
-  if (tls_roots_pem.empty()) return grpc::InsecureChannelCredentials();
-  grpc::SslCredentialsOptions options;
-  options.pem_root_certs = tls_roots_pem;
-  return grpc::SslCredentials(options);
+std::shared_ptr<grpc::ChannelCredentials> CredentialsFor(const ConnectOptions& options) {
+  if (options.tls_roots_pem.empty()) return grpc::InsecureChannelCredentials();
+  grpc::SslCredentialsOptions ssl;
+  ssl.pem_root_certs = options.tls_roots_pem;
+  ssl.pem_cert_chain = options.tls_certificate_pem;
+  ssl.pem_private_key = options.tls_key_pem;
+  return grpc::SslCredentials(ssl);
+}
+
+std::string TokenOf(const ConnectOptions& options) {
+  if (!options.token.empty()) return options.token;
+  const char* token = std::getenv("CARILLON_TOKEN");
+  return token == nullptr ? "" : token;
 }
 
 template <class Request>
@@ -46,27 +57,26 @@ Request Named(const std::string& name) {
 }  // namespace
 
 GrpcClient::GrpcClient(const std::string& server, const ConnectOptions& options)
-    : stubs_(std::make_unique<Stubs>(
-          server, options.admin_token,
-          grpc::CreateChannel(server, CredentialsFor(options.tls_roots_pem)))) {}
+    : stubs_(std::make_unique<Stubs>(server, TokenOf(options),
+                                     grpc::CreateChannel(server, CredentialsFor(options)))) {}
 
 absl::StatusOr<v1::Job> GrpcClient::CreateModalModel(
     const v1::CreateModalModelRequest& request) const {
   auto response =
-      Call(stubs_->models, stubs_->server, &v1::ModalModelService::Stub::CreateModalModel, request);
+      Call(*stubs_, stubs_->models, &v1::ModalModelService::Stub::CreateModalModel, request);
   if (!response.ok()) return response.status();
   return std::move(*response->mutable_job());
 }
 
 absl::StatusOr<v1::Job> GrpcClient::CreateTransfer(const v1::CreateTransferRequest& request) const {
   auto response =
-      Call(stubs_->models, stubs_->server, &v1::ModalModelService::Stub::CreateTransfer, request);
+      Call(*stubs_, stubs_->models, &v1::ModalModelService::Stub::CreateTransfer, request);
   if (!response.ok()) return response.status();
   return std::move(*response->mutable_job());
 }
 
 absl::StatusOr<v1::ModalModelSummary> GrpcClient::GetModalModel(const std::string& name) const {
-  auto response = Call(stubs_->models, stubs_->server, &v1::ModalModelService::Stub::GetModalModel,
+  auto response = Call(*stubs_, stubs_->models, &v1::ModalModelService::Stub::GetModalModel,
                        Named<v1::GetModalModelRequest>(name));
   if (!response.ok()) return response.status();
   return std::move(*response->mutable_modal_model());
@@ -75,25 +85,24 @@ absl::StatusOr<v1::ModalModelSummary> GrpcClient::GetModalModel(const std::strin
 absl::StatusOr<v1::ModalModelSummary> GrpcClient::UpdateModalModel(
     const v1::UpdateModalModelRequest& request) const {
   auto response =
-      Call(stubs_->models, stubs_->server, &v1::ModalModelService::Stub::UpdateModalModel, request);
+      Call(*stubs_, stubs_->models, &v1::ModalModelService::Stub::UpdateModalModel, request);
   if (!response.ok()) return response.status();
   return std::move(*response->mutable_modal_model());
 }
 
 absl::StatusOr<v1::ListModalModelsResponse> GrpcClient::ListModalModelsPage(
     const v1::ListModalModelsRequest& request) const {
-  return Call(stubs_->models, stubs_->server, &v1::ModalModelService::Stub::ListModalModels,
-              request);
+  return Call(*stubs_, stubs_->models, &v1::ModalModelService::Stub::ListModalModels, request);
 }
 
 absl::Status GrpcClient::DeleteModalModel(const std::string& name) const {
-  return Call(stubs_->models, stubs_->server, &v1::ModalModelService::Stub::DeleteModalModel,
+  return Call(*stubs_, stubs_->models, &v1::ModalModelService::Stub::DeleteModalModel,
               Named<v1::DeleteModalModelRequest>(name))
       .status();
 }
 
 absl::StatusOr<std::vector<v1::CatalogueMaterial>> GrpcClient::ListMaterials() const {
-  auto response = Call(stubs_->models, stubs_->server, &v1::ModalModelService::Stub::ListMaterials,
+  auto response = Call(*stubs_, stubs_->models, &v1::ModalModelService::Stub::ListMaterials,
                        v1::ListMaterialsRequest());
   if (!response.ok()) return response.status();
   return std::vector<v1::CatalogueMaterial>(response->materials().begin(),
@@ -101,42 +110,39 @@ absl::StatusOr<std::vector<v1::CatalogueMaterial>> GrpcClient::ListMaterials() c
 }
 
 absl::StatusOr<v1::Job> GrpcClient::GetJob(const std::string& name) const {
-  auto response = Call(stubs_->decompositions, stubs_->server,
-                       &v1::DecompositionService::Stub::GetJob, Named<v1::GetJobRequest>(name));
+  auto response = Call(*stubs_, stubs_->decompositions, &v1::DecompositionService::Stub::GetJob,
+                       Named<v1::GetJobRequest>(name));
   if (!response.ok()) return response.status();
   return std::move(*response->mutable_job());
 }
 
 absl::StatusOr<v1::ListJobsResponse> GrpcClient::ListJobsPage(
     const v1::ListJobsRequest& request) const {
-  return Call(stubs_->decompositions, stubs_->server, &v1::DecompositionService::Stub::ListJobs,
-              request);
+  return Call(*stubs_, stubs_->decompositions, &v1::DecompositionService::Stub::ListJobs, request);
 }
 
 absl::StatusOr<v1::Job> GrpcClient::CancelJob(const std::string& name) const {
-  auto response =
-      Call(stubs_->decompositions, stubs_->server, &v1::DecompositionService::Stub::CancelJob,
-           Named<v1::CancelJobRequest>(name));
+  auto response = Call(*stubs_, stubs_->decompositions, &v1::DecompositionService::Stub::CancelJob,
+                       Named<v1::CancelJobRequest>(name));
   if (!response.ok()) return response.status();
   return std::move(*response->mutable_job());
 }
 
 absl::StatusOr<std::string> GrpcClient::CreateScene(const v1::CreateSceneRequest& request) const {
-  auto response =
-      Call(stubs_->scenes, stubs_->server, &v1::SceneService::Stub::CreateScene, request);
+  auto response = Call(*stubs_, stubs_->scenes, &v1::SceneService::Stub::CreateScene, request);
   if (!response.ok()) return response.status();
   return response->name();
 }
 
 absl::Status GrpcClient::DeleteScene(const std::string& name) const {
-  return Call(stubs_->scenes, stubs_->server, &v1::SceneService::Stub::DeleteScene,
+  return Call(*stubs_, stubs_->scenes, &v1::SceneService::Stub::DeleteScene,
               Named<v1::DeleteSceneRequest>(name))
       .status();
 }
 
 absl::StatusOr<std::vector<v1::Scene>> GrpcClient::ListScenes() const {
-  auto response = Call(stubs_->scenes, stubs_->server, &v1::SceneService::Stub::ListScenes,
-                       v1::ListScenesRequest());
+  auto response =
+      Call(*stubs_, stubs_->scenes, &v1::SceneService::Stub::ListScenes, v1::ListScenesRequest());
   if (!response.ok()) return response.status();
   return std::vector<v1::Scene>(response->scenes().begin(), response->scenes().end());
 }
@@ -145,46 +151,42 @@ absl::StatusOr<std::vector<v1::SoundingObject>> GrpcClient::ListObjects(
     const std::string& scene) const {
   v1::ListObjectsRequest request;
   request.set_scene(scene);
-  auto response =
-      Call(stubs_->scenes, stubs_->server, &v1::SceneService::Stub::ListObjects, request);
+  auto response = Call(*stubs_, stubs_->scenes, &v1::SceneService::Stub::ListObjects, request);
   if (!response.ok()) return response.status();
   return std::vector<v1::SoundingObject>(response->objects().begin(), response->objects().end());
 }
 
 absl::StatusOr<v1::SoundingObject> GrpcClient::AddObject(
     const v1::AddObjectRequest& request) const {
-  auto response = Call(stubs_->scenes, stubs_->server, &v1::SceneService::Stub::AddObject, request);
+  auto response = Call(*stubs_, stubs_->scenes, &v1::SceneService::Stub::AddObject, request);
   if (!response.ok()) return response.status();
   return std::move(*response->mutable_object());
 }
 
 absl::StatusOr<v1::SoundingObject> GrpcClient::UpdateObject(
     const v1::UpdateObjectRequest& request) const {
-  auto response =
-      Call(stubs_->scenes, stubs_->server, &v1::SceneService::Stub::UpdateObject, request);
+  auto response = Call(*stubs_, stubs_->scenes, &v1::SceneService::Stub::UpdateObject, request);
   if (!response.ok()) return response.status();
   return std::move(*response->mutable_object());
 }
 
 absl::Status GrpcClient::RemoveObject(const std::string& name) const {
-  return Call(stubs_->scenes, stubs_->server, &v1::SceneService::Stub::RemoveObject,
+  return Call(*stubs_, stubs_->scenes, &v1::SceneService::Stub::RemoveObject,
               Named<v1::RemoveObjectRequest>(name))
       .status();
 }
 
 absl::Status GrpcClient::UpdateListener(const v1::UpdateListenerRequest& request) const {
-  return Call(stubs_->scenes, stubs_->server, &v1::SceneService::Stub::UpdateListener, request)
-      .status();
+  return Call(*stubs_, stubs_->scenes, &v1::SceneService::Stub::UpdateListener, request).status();
 }
 
 absl::StatusOr<std::unique_ptr<ContactStream>> GrpcClient::StreamContacts(
     const v1::ContactStreamStart& start) const {
-  return OpenContactStream(stubs_->contacts, stubs_->server, start);
+  return OpenContactStream(stubs_->contacts, stubs_->server, stubs_->token, start);
 }
 
 absl::StatusOr<v1::GetMixerResponse> GrpcClient::GetMixer() const {
-  return Call(stubs_->audio, stubs_->server, &v1::AudioService::Stub::GetMixer,
-              v1::GetMixerRequest());
+  return Call(*stubs_, stubs_->audio, &v1::AudioService::Stub::GetMixer, v1::GetMixerRequest());
 }
 
 }  // namespace carillon::client

@@ -82,9 +82,10 @@ class GrpcClient final : public Client {
 
  private:
   struct Stubs {
-    Stubs(std::string address, std::string token, const std::shared_ptr<grpc::Channel>& channel)
+    Stubs(std::string address, std::string shown_token,
+          const std::shared_ptr<grpc::Channel>& channel)
         : server(std::move(address)),
-          admin_token(std::move(token)),
+          token(std::move(shown_token)),
           models(channel),
           decompositions(channel),
           scenes(channel),
@@ -94,7 +95,7 @@ class GrpcClient final : public Client {
           job_runs(channel) {}
 
     const std::string server;
-    const std::string admin_token;
+    const std::string token;
     v1::ModalModelService::Stub models;
     v1::DecompositionService::Stub decompositions;
     v1::SceneService::Stub scenes;

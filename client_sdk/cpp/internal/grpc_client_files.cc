@@ -15,6 +15,7 @@
 namespace carillon::client {
 absl::Status GrpcClient::ExportModalModel(const std::string& name, const RecordSink& sink) const {
   grpc::ClientContext context;
+  Authorize(context, stubs_->token);
   v1::ExportModalModelRequest request;
   request.set_name(name);
   request.set_transfers(true);
@@ -31,6 +32,7 @@ absl::StatusOr<v1::ModalModelSummary> GrpcClient::ImportModalModel(
     const std::function<absl::Status(const RecordSink&)>& send, const std::string& name,
     const std::string& label) const {
   grpc::ClientContext context;
+  Authorize(context, stubs_->token);
   v1::ImportModalModelResponse response;
   const auto writer = stubs_->models.ImportModalModel(&context, &response);
   v1::ImportModalModelRequest request;
@@ -54,8 +56,8 @@ absl::StatusOr<v1::ModalModelSummary> GrpcClient::ImportModalModel(
 
 absl::StatusOr<v1::GetDatabaseStatsResponse> GrpcClient::GetDatabaseStats() const {
   grpc::ClientContext context;
+  Authorize(context, stubs_->token);
   context.set_deadline(std::chrono::system_clock::now() + kCallTimeout);
-  Authorize(context, stubs_->admin_token);
   v1::GetDatabaseStatsResponse response;
   const absl::Status status =
       FromRpc(stubs_->admin.GetDatabaseStats(&context, {}, &response), stubs_->server);
@@ -67,7 +69,7 @@ absl::Status GrpcClient::BackUpDatabase(const std::string& file) const {
   std::ofstream out(file, std::ios::binary);
   if (!out) return NotWritable(file);
   grpc::ClientContext context;
-  Authorize(context, stubs_->admin_token);
+  Authorize(context, stubs_->token);
   const auto reader = stubs_->admin.BackUpDatabase(&context, {});
   v1::BackUpDatabaseResponse response;
   uint64_t byte_count = 0;
@@ -90,8 +92,8 @@ absl::Status GrpcClient::BackUpDatabase(const std::string& file) const {
 absl::StatusOr<v1::CollectGarbageResponse> GrpcClient::CollectGarbage(
     const v1::CollectGarbageRequest& request) const {
   grpc::ClientContext context;
+  Authorize(context, stubs_->token);
   context.set_deadline(std::chrono::system_clock::now() + kCallTimeout);
-  Authorize(context, stubs_->admin_token);
   v1::CollectGarbageResponse response;
   const absl::Status status =
       FromRpc(stubs_->admin.CollectGarbage(&context, request, &response), stubs_->server);

@@ -9,6 +9,7 @@
 #include <thread>
 #include <utility>
 
+#include "client_sdk/cpp/internal/authorize.h"
 #include "client_sdk/cpp/internal/grpc_client.h"
 #include "client_sdk/cpp/internal/rpc_status.h"
 #include "proto/cpp/error_reason.h"
@@ -92,6 +93,7 @@ Rendering ReceiveSound(const AudioCallback& on_block, grpc::ClientContext& conte
 
 absl::StatusOr<std::string> GrpcClient::UploadMesh(absl::string_view bytes) const {
   grpc::ClientContext context;
+  Authorize(context, stubs_->token);
   v1::UploadMeshResponse response;
   const auto writer = stubs_->models.UploadMesh(&context, &response);
   v1::UploadMeshRequest request;
@@ -108,6 +110,7 @@ absl::StatusOr<std::string> GrpcClient::UploadMesh(absl::string_view bytes) cons
 absl::StatusOr<v1::Job> GrpcClient::WatchJob(
     const std::string& name, const std::function<void(const v1::Job&)>& on_change) const {
   grpc::ClientContext context;
+  Authorize(context, stubs_->token);
   v1::WatchJobRequest request;
   request.set_name(name);
   const auto reader = stubs_->decompositions.WatchJob(&context, request);
@@ -130,6 +133,7 @@ absl::StatusOr<v1::Job> GrpcClient::WatchJob(
 
 absl::Status GrpcClient::Listen(const AudioCallback& on_block) const {
   grpc::ClientContext context;
+  Authorize(context, stubs_->token);
   const auto stream = stubs_->audio.Listen(&context, v1::ListenRequest());
   BlockReader reader;
   v1::ListenResponse response;
@@ -148,6 +152,7 @@ absl::StatusOr<v1::RenderSummary> GrpcClient::Render(const v1::RenderSettings& s
                                                      ContactTraceReader& trace,
                                                      const AudioCallback& on_block) const {
   grpc::ClientContext context;
+  Authorize(context, stubs_->token);
   const auto call = stubs_->audio.Render(&context);
   // A second thread sends, because the daemon may send sound before it has the whole trace.
   absl::Status sent;

@@ -28,16 +28,14 @@ namespace carillon {
 class ServedDaemon : public testing::Test {
  protected:
   ServedDaemon() {
-    server_ = *ApiServer::Start({.addresses = {address_},
-                                 .tls_certificate_file = "",
-                                 .tls_key_file = "",
-                                 .version = "test"},
+    server_ = *ApiServer::Start({.addresses = {address_}, .version = "test"},
                                 {.database = *database_,
                                  .decompositions = *queue_,
                                  .runs = runs_,
                                  .scenes = scenes_,
                                  .output = *output_,
-                                 .clock = clock_});
+                                 .clock = clock_,
+                                 .log = [](const std::string&) {}});
     channel_ = grpc::CreateChannel(address_, grpc::InsecureChannelCredentials());
     models = v1::ModalModelService::NewStub(channel_);
     jobs = v1::DecompositionService::NewStub(channel_);

@@ -197,7 +197,7 @@ class Client {
   virtual absl::Status UploadResult(const JobRun& run, const v1::RunEnd& end,
                                     const std::string& model_file) const;
 
-  // Administration; over TCP these calls need ConnectOptions::admin_token.
+  // Administration; over TCP these calls need the role "administer".
 
   /// Returns the size and the contents of the daemon's database.
   virtual absl::StatusOr<v1::GetDatabaseStatsResponse> GetDatabaseStats() const;
@@ -217,8 +217,13 @@ struct ConnectOptions {
   /// PEM certificates of the authorities that vouch for a daemon with TLS. If it is empty, the
   /// connection is not encrypted.
   std::string tls_roots_pem;
-  /// The token of an administrator, for the administrative calls over TCP.
-  std::string admin_token;
+  /// The PEM certificate by which the daemon knows this client, and its private key. Both may be
+  /// empty.
+  std::string tls_certificate_pem;
+  std::string tls_key_pem;
+  /// The token by which the daemon knows this client over TCP. If it is empty, $CARILLON_TOKEN is
+  /// taken.
+  std::string token;
 };
 
 /// Returns a client of the daemon at `server`: "unix:PATH" or "HOST:PORT". If `server` is empty,

@@ -31,9 +31,10 @@ from carillon.v1 import audio_service_pb2, contact_pb2, contact_service_pb2, mat
 Result = TypeVar("Result")
 
 
-def connect(server: Optional[str] = None, *, tls_roots: str | os.PathLike[str] | None = None) -> AsyncClient:
+def connect(server: Optional[str] = None, *, tls_roots: str | os.PathLike[str] | None = None,
+            **credentials: Any) -> AsyncClient:
     """Connects as carillon.connect does."""
-    return AsyncClient(client.connect(server, tls_roots=tls_roots))
+    return AsyncClient(client.connect(server, tls_roots=tls_roots, **credentials))
 
 
 async def in_thread(function: Callable[..., Result], *arguments: Any, **named: Any) -> Result:

@@ -17,6 +17,7 @@ import numpy
 
 from carillon import errors, meshes, progress
 from carillon.address import default_server
+from carillon.authorization import authorized
 from carillon.contacts import PoseLike, to_pose
 from carillon.jobs import Job
 from carillon.materials import Material, resolved, to_message
@@ -35,24 +36,31 @@ PIECE_BYTES = 1 << 20
 running_calls: contextvars.ContextVar[Optional[list[Any]]] = contextvars.ContextVar("running_calls", default=None)
 
 
-def connect(server: Optional[str] = None, *, tls_roots: str | os.PathLike[str] | None = None) -> Client:
+def connect(server: Optional[str] = None, *, tls_roots: str | os.PathLike[str] | None = None,
+            **credentials: Any) -> Client:
     """Connects to a daemon: "unix:PATH" or "HOST:PORT", by default where default_server() says. `tls_roots` is the
-    PEM file with the certificates that vouch for a daemon with TLS."""
-    return Client(server or default_server(), tls_roots)
+    PEM file with the certificates that vouch for a daemon with TLS. Over TCP the daemon may want to know the caller, by
+    `token` (default: $CARILLON_TOKEN), or by the PEM files `tls_certificate` and `tls_key`."""
+    return Client(server or default_server(), tls_roots, **credentials)
 
 
 class Client:
     """A connection, as a context manager closed at the end. The attributes *_stub are the services of the contract,
     for calls that have no method here."""
 
-    def __init__(self, server: str, tls_roots: str | os.PathLike[str] | None = None):
+    def __init__(self, server: str, tls_roots: str | os.PathLike[str] | None = None, *, token: Optional[str] = None,
+                 tls_certificate: str | os.PathLike[str] | None = None,
+                 tls_key: str | os.PathLike[str] | None = None):
         self.server = server
         options = [("grpc.max_receive_message_length", -1)]
         if tls_roots is None:
             self._channel = grpc.insecure_channel(server, options)
         else:
-            credentials = grpc.ssl_channel_credentials(pathlib.Path(tls_roots).read_bytes())
+            roots, key, certificate = (path and pathlib.Path(path).read_bytes()
+                                       for path in (tls_roots, tls_key, tls_certificate))
+            credentials = grpc.ssl_channel_credentials(roots, key, certificate)
             self._channel = grpc.secure_channel(server, credentials, options)
+        self._channel = authorized(self._channel, token or os.environ.get("CARILLON_TOKEN"))
         self.models_stub = modal_model_service_pb2_grpc.ModalModelServiceStub(self._channel)
         self.jobs_stub = decomposition_service_pb2_grpc.DecompositionServiceStub(self._channel)
         self.scenes_stub = scene_service_pb2_grpc.SceneServiceStub(self._channel)

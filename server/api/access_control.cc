@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/api/access_control.h"
+
+#include <grpc/grpc_security_constants.h>
+
+#include <utility>
+#include <vector>
+
+#include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
+#include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
+#include "server/api/bearer_token.h"
+
+namespace carillon {
+namespace {
+
+constexpr unsigned kEveryRole = ~0U;
+
+/// The alternative names of the client's certificate; its common name if it has none. A certificate
+/// is here only if an authority of --tls-client-roots vouches for it.
+std::vector<std::string> CertificateNames(const grpc::CallbackServerContext& context) {
+  std::vector<std::string> names;
+  const auto identity = context.auth_context();
+  if (!identity) return names;
+  for (const char* property : {GRPC_X509_SAN_PROPERTY_NAME, GRPC_X509_CN_PROPERTY_NAME}) {
+    for (const grpc::string_ref& name : identity->FindPropertyValues(property)) {
+      names.emplace_back(name.data(), name.size());
+    }
+    if (!names.empty()) break;
+  }
+  return names;
+}
+
+absl::Status WrongToken() {
+  return Refusal(absl::StatusCode::kUnauthenticated, "TOKEN_WRONG",
+                 "the daemon's access file has no such token: ask its administrator for one");
+}
+
+absl::Status TooManyFailures() {
+  return Refusal(absl::StatusCode::kResourceExhausted, "TOO_MANY_FAILURES",
+                 "too many wrong tokens came from this address: try again in some seconds");
+}
+
+absl::Status MissingRole(const Principal& principal, Role role, bool is_anybody) {
+  const std::string needed = role == Role::kAny
+                                 ? "This call is for callers that the daemon knows"
+                                 : absl::StrCat("This call needs the role ", RoleName(role));
+  if (is_anybody) {
+    return Refusal(absl::StatusCode::kUnauthenticated, "CREDENTIAL_MISSING",
+                   absl::StrCat(needed,
+                                ": send a token of the daemon's access file in the metadata "
+                                "\"authorization: Bearer TOKEN\", show a client certificate that "
+                                "it names, or come through the daemon's Unix socket"));
+  }
+  return Refusal(absl::StatusCode::kPermissionDenied, "ROLE_MISSING",
+                 absl::StrCat(needed, ", which ", principal.name,
+                              " has not: ask the daemon's administrator to add it to the access "
+                              "file"));
+}
+
+}  // namespace
+
+AccessControl::AccessControl(AccessTable table, const Clock& clock, LimitedLog::Sink log)
+    : table_(std::make_shared<const AccessTable>(std::move(table))),
+      guesses_(clock),
+      log_(clock, std::move(log)) {}
+
+void AccessControl::Replace(AccessTable table) {
+  auto replacement = std::make_shared<const AccessTable>(std::move(table));
+  const MutexLock lock(&mutex_);
+  table_ = std::move(replacement);
+}
+
+std::shared_ptr<const AccessTable> AccessControl::table() const {
+  const MutexLock lock(&mutex_);
+  return table_;
+}
+
+absl::StatusOr<Principal> AccessControl::Admit(const grpc::CallbackServerContext& context,
+                                               Role role) {
+  absl::StatusOr<Principal> principal = Identify(context);
+  if (!principal.ok()) return Refuse(context, principal.status());
+  if (principal->has(role)) return principal;
+  const bool is_anybody = principal->name == table()->anybody().name;
+  return Refuse(context, MissingRole(*principal, role, is_anybody));
+}
+
+absl::StatusOr<Principal> AccessControl::Identify(const grpc::CallbackServerContext& context) {
+  const std::string peer = context.peer();
+  if (absl::StartsWith(peer, "unix:")) return Principal{.name = "local", .roles = kEveryRole};
+  const std::shared_ptr<const AccessTable> table = this->table();
+  const Principal* found = nullptr;
+  if (const std::string token = BearerToken(context); !token.empty()) {
+    found = table->FindToken(token);
+    if (found == nullptr) return guesses_.TakeWrong(peer) ? WrongToken() : TooManyFailures();
+    if (!guesses_.TakeRight(peer, found->name)) return TooManyFailures();
+    return *found;
+  }
+  found = table->FindCertificate(CertificateNames(context));
+  return found == nullptr ? table->anybody() : *found;
+}
+
+absl::Status AccessControl::Refuse(const grpc::CallbackServerContext& context,
+                                   absl::Status status) {
+  log_.Warn(absl::StrCat("a call from ", context.peer(), " was refused: ", status.message()));
+  return status;
+}
+
+}  // namespace carillon

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <grpcpp/grpcpp.h>
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/status/statusor.h"
+#include "server/api/access_table.h"
+#include "server/api/guess_limiter.h"
+#include "server/api/limited_log.h"
+#include "server/base/clock.h"
+#include "server/base/mutex.h"
+
+namespace carillon {
+
+/// Decides who may call what. Whoever comes through a Unix socket has every role; callers over TCP
+/// have those that the table gives to their token or certificate. Refusals are logged. Safe from
+/// every thread.
+class AccessControl {
+ public:
+  /// `clock` must outlive this.
+  AccessControl(AccessTable table, const Clock& clock, LimitedLog::Sink log);
+
+  /// Replaces the table. Calls that run go on.
+  void Replace(AccessTable table);
+
+  /// The caller, if it has the role. Errors: Unauthenticated (CREDENTIAL_MISSING, TOKEN_WRONG),
+  /// PermissionDenied (ROLE_MISSING), ResourceExhausted (TOO_MANY_FAILURES).
+  absl::StatusOr<Principal> Admit(const grpc::CallbackServerContext& context, Role role);
+
+  /// Logs that the caller was refused for `status`, and returns it.
+  absl::Status Refuse(const grpc::CallbackServerContext& context, absl::Status status);
+
+ private:
+  absl::StatusOr<Principal> Identify(const grpc::CallbackServerContext& context);
+  std::shared_ptr<const AccessTable> table() const;
+
+  mutable Mutex mutex_;
+  std::shared_ptr<const AccessTable> table_ ABSL_GUARDED_BY(mutex_);
+  GuessLimiter guesses_;
+  LimitedLog log_;
+};
+
+}  // namespace carillon

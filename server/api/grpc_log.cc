@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/api/grpc_log.h"
+
+#include <grpc/support/log.h>
+
+#include <utility>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/strings/str_cat.h"
+#include "server/base/mutex.h"
+
+namespace carillon {
+namespace {
+
+Mutex log_mutex;
+LimitedLog* present_log ABSL_GUARDED_BY(log_mutex) = nullptr;
+
+void Log(gpr_log_func_args* message) {
+  if (message->severity != GPR_LOG_SEVERITY_ERROR) return;
+  const MutexLock lock(&log_mutex);
+  if (present_log != nullptr) present_log->Warn(absl::StrCat("gRPC: ", message->message));
+}
+
+}  // namespace
+
+GrpcLog::GrpcLog(const Clock& clock, LimitedLog::Sink sink) : log_(clock, std::move(sink)) {
+  const MutexLock lock(&log_mutex);
+  present_log = &log_;
+  gpr_set_log_function(Log);
+}
+
+GrpcLog::~GrpcLog() {
+  const MutexLock lock(&log_mutex);
+  present_log = nullptr;
+}
+
+}  // namespace carillon

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <string>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/strings/string_view.h"
+#include "server/base/clock.h"
+#include "server/base/mutex.h"
+
+namespace carillon {
+
+/// A budget that refills with time: some at once, then one a second.
+class Allowance {
+ public:
+  explicit Allowance(double most) : most_(most), left_(most) {}
+
+  /// Takes one; false if none is left.
+  bool Take(std::chrono::nanoseconds now);
+
+  /// Whether one is left.
+  bool Has(std::chrono::nanoseconds now);
+
+  /// Whether nothing has been taken lately.
+  bool IsFull(std::chrono::nanoseconds now);
+
+ private:
+  void Refill(std::chrono::nanoseconds now);
+
+  double most_;
+  double left_;
+  std::chrono::nanoseconds refilled_{0};
+};
+
+/// A log that untrusted clients cannot flood: twenty lines at once, then one a second. Lines beyond are
+/// counted, and the count is a line before the next. Bytes that are not printable ASCII are
+/// escaped, and lines are cut at 400 bytes. Safe from every thread.
+class LimitedLog {
+ public:
+  using Sink = std::function<void(const std::string&)>;
+
+  /// `clock` must outlive the log.
+  LimitedLog(const Clock& clock, Sink sink) : clock_(clock), sink_(std::move(sink)) {}
+
+  /// Says how many lines were left out.
+  ~LimitedLog();
+  LimitedLog(const LimitedLog&) = delete;
+  LimitedLog& operator=(const LimitedLog&) = delete;
+
+  void Warn(absl::string_view line);
+
+ private:
+  void SayWhatWasLeftOut() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+
+  const Clock& clock_;
+  const Sink sink_;
+  Mutex mutex_;
+  Allowance lines_ ABSL_GUARDED_BY(mutex_){20};
+  uint64_t left_out_count_ ABSL_GUARDED_BY(mutex_) = 0;
+};
+
+}  // namespace carillon

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <grpcpp/grpcpp.h>
+
+#include <type_traits>
+
+#include "server/api/access_control.h"
+#include "server/api/stream_call.h"
+#include "server/api/thread_pool.h"
+
+namespace carillon {
+
+/// What every call passes before its work begins.
+struct Reception {
+  AccessControl& access;
+  ThreadPool& pool;
+};
+
+/// A call that ends before it has begun.
+template <typename Reactor>
+class RefusedCall final : public StreamCall<Reactor> {
+ public:
+  explicit RefusedCall(const absl::Status& status) : StreamCall<Reactor>(nullptr) {
+    this->End(status);
+  }
+};
+
+/// Returns the reactor of a streaming call that `make()` makes, if the caller has the role.
+template <typename Make>
+auto Open(const grpc::CallbackServerContext& context, const Reception& reception, Role role,
+          Make make) -> decltype(make()) {
+  const absl::Status admitted = reception.access.Admit(context, role).status();
+  if (admitted.ok()) return make();
+  return new RefusedCall<std::remove_pointer_t<decltype(make())>>(admitted);
+}
+
+}  // namespace carillon

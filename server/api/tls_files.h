@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+#include "absl/status/statusor.h"
+
+namespace carillon {
+
+/// The PEM files for TCP addresses.
+struct TlsPaths {
+  std::string certificate;  ///< empty: no TLS
+  std::string key;
+  std::string client_roots;  ///< empty: clients are not asked for certificates
+
+  bool operator==(const TlsPaths&) const = default;
+};
+
+/// The content of those files.
+struct TlsFiles {
+  std::string certificate_pem;
+  std::string key_pem;
+  std::string client_roots_pem;
+
+  bool operator==(const TlsFiles&) const = default;
+};
+
+/// Reads and checks the files. Errors: FailedPrecondition (TLS_UNUSABLE: a file cannot be read, is
+/// not PEM, the certificate has expired or is not valid yet, the key is another one's, or others
+/// may read or change it).
+absl::StatusOr<TlsFiles> ReadTlsFiles(const TlsPaths& paths);
+
+}  // namespace carillon
