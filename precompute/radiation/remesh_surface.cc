@@ -2,6 +2,7 @@
 #include "precompute/radiation/remesh_surface.h"
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/Polygon_mesh_processing/detect_features.h>
 #include <CGAL/Polygon_mesh_processing/orient_polygon_soup.h>
 #include <CGAL/Polygon_mesh_processing/polygon_soup_to_polygon_mesh.h>
 #include <CGAL/Polygon_mesh_processing/remesh.h>
@@ -29,6 +30,9 @@ using HalfedgeMesh = CGAL::Surface_mesh<Kernel::Point_3>;
 
 constexpr std::chrono::seconds kMostCpu(300);
 constexpr unsigned kIterations = 3;
+/// Edges between faces that differ by more are edges of the body, and not of facets of a round
+/// surface.
+constexpr double kSharpDegrees = 50;
 /// A triangle of less than this part of edge^2 is a sliver.
 constexpr double kSliverArea = 0.03;
 constexpr int kSliverPasses = 4;
@@ -80,8 +84,13 @@ bool CollapseSlivers(HalfedgeMesh& mesh, double edge_m) {
 /// Runs in a child: CGAL's assertions end the process.
 std::string Remesh(const SurfaceMesh& given, double edge_m) {
   HalfedgeMesh mesh = ToCgal(given);
-  pmp::isotropic_remeshing(faces(mesh), edge_m, mesh,
-                           CGAL::parameters::number_of_iterations(kIterations));
+  // Triangles that cut off the edges of the body, such as the rim of a bell, would make it smaller
+  // by a part of an edge, and radiate too little.
+  auto sharp = mesh.add_property_map<HalfedgeMesh::Edge_index, bool>("e:sharp", false).first;
+  pmp::detect_sharp_edges(mesh, kSharpDegrees, sharp);
+  pmp::isotropic_remeshing(
+      faces(mesh), edge_m, mesh,
+      CGAL::parameters::number_of_iterations(kIterations).edge_is_constrained_map(sharp));
   for (int pass = 0; pass < kSliverPasses && CollapseSlivers(mesh, edge_m); ++pass) {
   }
   mesh.collect_garbage();

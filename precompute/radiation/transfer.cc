@@ -31,6 +31,10 @@ constexpr double kDirectionGoal = 3;
 /// kFewestChecked modes were solved on two.
 constexpr double kUncheckedErrorDb = 6;
 constexpr size_t kFewestChecked = 8;
+/// The error stated for each unit of the difference between two surfaces, of which the finer one
+/// counts. Differences fall to 0.5 from one surface to the next, but to 0.9 near a resonance of the
+/// air inside the body, as long as the surface is coarse.
+constexpr double kErrorPerDifference = 1.4;
 /// The least error that is stated: the solver's tolerance and the far pattern's order leave it.
 constexpr double kLeastErrorDb = 0.05;
 /// Applications of the operator that a solution takes, about, where none was counted.
@@ -226,9 +230,11 @@ class TransferSolver {
 
   static ErrorDb DifferenceOf(const ModeField& before, const ModeField& field,
                               const SphereGrid& grid) {
-    return {.power = std::max(kLeastErrorDb, std::abs(PowerDifferenceDb(before, field))),
-            .direction = std::max(kDirectionGoal * kLeastErrorDb,
-                                  DirectionDifferenceDb(before, field, grid))};
+    return {
+        .power = std::max(kLeastErrorDb,
+                          kErrorPerDifference * std::abs(PowerDifferenceDb(before, field))),
+        .direction = std::max(kDirectionGoal * kLeastErrorDb,
+                              kErrorPerDifference * DirectionDifferenceDb(before, field, grid))};
   }
 
   /// Gives each mode that was solved on one surface only the largest error that the first surface

@@ -9,6 +9,7 @@ import statistics
 import catalogue
 import fit
 import likeness
+import microphone
 import programs
 import rings
 
@@ -27,7 +28,9 @@ HIGH_HZ = (6879, 7020, 10947, 11306, 15350, 16719)
 # The catalogue up to version 0.1: a loss factor of 2e-4 at 1 kHz, half of it from each of Rayleigh's terms.
 RAYLEIGH = {"alpha1_s": 1.592e-8, "alpha2_per_s": 0.6283}
 SOFT_S, HARD_S = 4e-4, 5e-5
-RADIATION_ACCURACY_DB = 0.3
+RADIATION_ACCURACY_DB, RADIATION_BUDGET_S = 0.3, 120
+# That of a hammer of 20 g that meets the bar at 1 m/s. The daemon's own contact is the shorter, the harder the blow.
+IMPULSE_NEWTON_SECONDS = 0.03
 
 
 @dataclasses.dataclass
@@ -37,12 +40,14 @@ class Variant:
     name: str
     heard: programs.Heard
     duration_s: float  # None: the daemon's own choice
+    microphones: microphone.Microphones = None  # None: the mean over all directions at 1 m
 
 
 @dataclasses.dataclass
 class Result:
     name: str
     point_m: tuple
+    microphone: tuple  # distance, polar angle, azimuth; None: the mean over all directions
     mrstft: float
     octaves_db: float
     decays: dict  # decay rate by the Hz of HIGH_HZ, of those that can be measured
@@ -86,7 +91,7 @@ def places():
 
 def strike(studio, variant, point_m):
     """The bar struck once, downwards."""
-    blow = programs.Blow(point_m, (0, 0, -0.002), variant.duration_s)
+    blow = programs.Blow(point_m, (0, 0, -IMPULSE_NEWTON_SECONDS), variant.duration_s)
     return studio.render(variant.heard, [blow], SPAN_S)
 
 
@@ -108,12 +113,16 @@ def variants(studio, folder, young_pa, poisson_ratio):
     name = model(young_pa, poisson_ratio)
     yield Variant("and E and nu fitted", heard(name, young_pa, RAYLEIGH), HARD_S)
     yield Variant("and the catalogue's loss factor", heard(name, young_pa, own_loss), HARD_S)
-    if not studio.radiate(name, heard(name, young_pa, own_loss).material, RADIATION_ACCURACY_DB):
+    material = heard(name, young_pa, own_loss).material
+    if not studio.radiate(name, material, "--accuracy", RADIATION_ACCURACY_DB, "--budget", RADIATION_BUDGET_S):
         print("these programs cannot compute radiation: the rest of the table is missing")
         return
     yield Variant("and radiation", heard(name, young_pa, own_loss, paper_coupling=False), HARD_S)
-    yield Variant("and the daemon's own contact",
-                  heard(name, young_pa, own_loss, paper_coupling=False, gaussian=False), None)
+    own = heard(name, young_pa, own_loss, paper_coupling=False, gaussian=False)
+    yield Variant("and the daemon's own contact", own, None)
+    transfer = microphone.read(studio.export(name))
+    yield Variant("and a microphone near by", own, None,
+                  microphone.Microphones(transfer, preset, young_pa, DENSITY_KG_PER_M3))
 
 
 def decays_of(sound):
@@ -123,14 +132,24 @@ def decays_of(sound):
             if ring and abs(ring.hz / hz - 1) < fit.FITTED and ring.decay_per_s > 0}
 
 
-def measure(studio, recording, variant):
-    """The Result for the strike that resembles the recording most: its place is not known."""
-    best = None
+def takes(studio, variant):
+    """Yields (point, microphone, sound, summary) of each strike that is tried: its place is not known."""
     for point_m in places():
         sound, summary = strike(studio, variant, point_m)
+        if not variant.microphones:
+            yield point_m, None, sound, summary
+            continue
+        for place, heard in variant.microphones.hear(sound):
+            yield point_m, tuple(place), heard, summary
+
+
+def measure(studio, recording, variant):
+    """The Result for the strike, and the microphone, that resemble the recording most."""
+    best = None
+    for point_m, place, sound, summary in takes(studio, variant):
         distance = likeness.mrstft(recording, sound)
         if best is None or distance < best.mrstft:
-            best = Result(variant.name, point_m, distance, 0, {}, sound, summary)
+            best = Result(variant.name, point_m, place, distance, 0, {}, sound, summary)
     best.octaves_db = likeness.octave_error_db(recording, best.sound, rings.RATE_HZ)
     best.decays = decays_of(best.sound)
     return best

@@ -15,7 +15,6 @@ import rings
 
 HEIGHT_M, GRAVITY_M_PER_S2 = 0.3, 9.81
 BOUNCE_COUNT, RESTITUTION = 6, 0.5
-RADIATION_ACCURACY_DB = 2.0
 SOFT_S = 5e-4  # the duration of every contact up to version 0.1, where nobody gave one
 
 
@@ -125,7 +124,7 @@ def hear(studio, model_file, body, before):
     material = catalogue.read()[body.material]
     figures = {"young_pa": material.young_pa, "density_kg_per_m3": material.density_kg_per_m3,
                **(rayleigh(body.rayleigh_eta) if before else programs.loss_factor(material.loss_factor))}
-    radiates = not before and studio.radiate(model, figures, RADIATION_ACCURACY_DB)
+    radiates = not before and studio.radiate(model, figures)
     heard = programs.Heard(model, figures, paper_coupling=not radiates, gaussian=before)
     mass_kg = body.volume_m3 * material.density_kg_per_m3
     sound, summary = studio.render(heard, blows(body.surface(), mass_kg, SOFT_S if before else None), 0)

@@ -124,14 +124,19 @@ class Studio:
         """Stores a model file (.model or .npz); its name."""
         return json.loads(self.command("--json", "model", "import", path))["name"]
 
-    def radiate(self, model, material, accuracy_db):
+    def radiate(self, model, material, *options):
         """Computes how a stored model radiates; False where the programs cannot."""
         if not knows("contact_trace", "ContactTraceObject", "radiation"):
             return False
         figures = ["--young", material["young_pa"], "--density", material["density_kg_per_m3"], "--loss-factor", 1e-3]
-        self.command("transfer", "create", model.split("/")[-1], *figures, "--accuracy", accuracy_db, "--budget", 120,
-                     "--wait")
+        self.command("transfer", "create", model.split("/")[-1], *figures, *options, "--wait")
         return True
+
+    def export(self, model):
+        """A file with a stored model and its transfers."""
+        out = self.daemon.folder / "exported.model"
+        self.command("model", "export", model.split("/")[-1], "--out", out)
+        return out
 
     def render(self, heard, blows, tail_s):
         """What is heard of one body at 48 kHz: (samples, summary)."""

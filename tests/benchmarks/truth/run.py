@@ -11,6 +11,7 @@ programs of another build folder. deploy/truth.sh installs what this needs.
 
 import argparse
 import contextlib
+import math
 import pathlib
 import tempfile
 
@@ -78,7 +79,14 @@ def result_line(result, recorded):
     decays = [f"{result.decays[hz]:.3g}" if hz in result.decays else "-" for hz in bar.HIGH_HZ]
     return materials.row(result.name, f"{result.mrstft:.2f}", f"{result.octaves_db:.1f}",
                          "-" if factor is None else f"{factor:.2f}", *decays,
-                         "x".join(f"{1000 * x:.1f}" for x in result.point_m[:2]))
+                         "x".join(f"{1000 * x:.1f}" for x in result.point_m[:2]), microphone_words(result.microphone))
+
+
+def microphone_words(place):
+    if place is None:
+        return "mean of all directions"
+    distance_m, polar, azimuth = place
+    return f"{100 * distance_m:.0f} cm, {math.degrees(polar):.0f} / {math.degrees(azimuth):.0f} degrees"
 
 
 def show_bar(options):
@@ -96,8 +104,8 @@ def show_bar(options):
         young_pa, fit = bar.fit_material(folder, rings.rings(whole))
         print_table(fit_lines(young_pa, fit))
         print("\n".join(materials.head("", "MRSTFT", "octaves, dB", "decays, factor",
-                                   *(f"{hz} Hz, 1/s" for hz in bar.HIGH_HZ), "struck at, mm")
-                    + [materials.row("recording", "", "", "", *(f"{recorded[hz]:.3g}" for hz in bar.HIGH_HZ), "")]))
+                                   *(f"{hz} Hz, 1/s" for hz in bar.HIGH_HZ), "struck at, mm", "microphone")
+                    + [materials.row("recording", "", "", "", *(f"{recorded[hz]:.3g}" for hz in bar.HIGH_HZ), "", "")]))
         results = []
         for variant in bar.variants(opened, folder, young_pa, fit.poisson_ratio):
             results.append(bar.measure(opened, recording, variant))

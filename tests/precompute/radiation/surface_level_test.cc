@@ -50,5 +50,12 @@ TEST(SurfaceLevel, LeavesAFlatBodyAsItIs) {
   }
 }
 
+// The rim of a bell and the edges of a bar are finer than the triangles of their coarse surfaces.
+TEST(SurfaceLevel, KeepsEdgesThatAreFinerThanItsTriangles) {
+  const SurfaceMesh mesh = MakeBoxSurface({1, 0.6, 0.04});
+  const SurfaceLevel level = MakeLevel(mesh, 0.1);
+  EXPECT_NEAR(VolumeOf(level.surface.mesh) / VolumeOf(mesh), 1, 1e-3);
+}
+
 }  // namespace
 }  // namespace carillon::precompute
