@@ -4,8 +4,8 @@
 # deploy/setup.sh LIST...
 #
 # Installs what is missing of the packages in the given lists, from Debian as this machine's apt is set up. A list is
-# one of deploy/packages/ (programs, tests, lint, client) or a file. With `lint` it also installs buf, from the npm
-# registry.
+# one of deploy/packages/ (programs, tests, languages, packages, lint, client) or a file. With `lint` it also installs
+# buf, with `tests` or `packages` what the client for Node needs, both from the npm registry.
 # Calls neither registry when nothing is missing.
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
@@ -14,8 +14,12 @@ source "$root/deploy/environment.sh"
 
 lists=()
 with_buf=
+with_node=
 for list in "$@"; do
-  if [[ $list == lint ]]; then with_buf=yes; fi
+  case $list in
+    lint) with_buf=yes ;;
+    tests | packages) with_node=yes ;;
+  esac
   if [[ $list == */* ]]; then lists+=("$list"); else lists+=("$root/deploy/packages/$list.txt"); fi
 done
 
@@ -48,25 +52,30 @@ install_packages() {
   as_root "${apt[@]}" install --no-install-recommends "$@" </dev/null
 }
 
-install_buf() {
-  printf 'setup: installing buf\n'
-  local folder=${CARILLON_BUF%/node_modules/*}
-  mkdir -p "$folder"
-  cp "$root"/deploy/buf/package{,-lock}.json "$folder"
-  # npm knows how this machine reaches the registry. Debian's brings 339 packages, so where there is none, one archive
-  # is fetched without it. Both check the digests in the lock file.
+# install_from_npm SOURCE FOLDER PROBE: installs what SOURCE/package-lock.json names into FOLDER, which then has PROBE.
+install_from_npm() {
+  printf 'setup: installing what %s/package-lock.json names\n' "${1#"$root/"}"
+  mkdir -p "$2"
+  cp "$1"/package{,-lock}.json "$2"
+  # npm knows how this machine reaches the registry. Debian's brings 339 packages, so where there is none, the archives
+  # are fetched without it. Both check the digests in the lock file.
   if command -v npm >/dev/null; then
-    (cd "$folder" && npm ci --ignore-scripts --no-audit --no-fund --loglevel=error </dev/null)
+    (cd "$2" && npm ci --ignore-scripts --no-audit --no-fund --loglevel=error </dev/null)
   else
-    /usr/bin/python3 "$root/deploy/buf/fetch.py" "$root/deploy/buf/package-lock.json" "$folder"
+    /usr/bin/python3 "$root/deploy/buf/fetch.py" "$1/package-lock.json" "$2"
   fi
-  # Each platform's buf is optional to npm, so it does not mind when none could be had.
-  [[ -x $CARILLON_BUF ]] || {
-    printf 'setup: npm could not get buf; "npm ping" tells whether it reaches its registry\n' >&2
+  # A package for one platform is optional to npm, so it does not mind when none could be had.
+  [[ -e $3 ]] || {
+    printf 'setup: npm could not get %s; "npm ping" tells whether it reaches its registry\n' "${3##*/}" >&2
     return 1
   }
 }
 
 mapfile -t missing < <(missing_packages)
 if ((${#missing[@]})); then install_packages "${missing[@]}"; fi
-if [[ -n $with_buf && ! -x $CARILLON_BUF ]]; then install_buf; fi
+if [[ -n $with_buf && ! -x $CARILLON_BUF ]]; then
+  install_from_npm "$root/deploy/buf" "${CARILLON_BUF%/node_modules/*}" "$CARILLON_BUF"
+fi
+if [[ -n $with_node && ! -e $CARILLON_NODE_MODULES/@grpc/grpc-js ]]; then
+  install_from_npm "$root/client_sdk/node" "${CARILLON_NODE_MODULES%/*}" "$CARILLON_NODE_MODULES/@grpc/grpc-js"
+fi

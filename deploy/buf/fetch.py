@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""Fetches this machine's package of a package-lock.json from the npm registry, without npm.
+"""Fetches the packages of a package-lock.json from the npm registry, without npm: all but those of other machines.
 
 Usage: fetch.py PACKAGE_LOCK FOLDER
 
@@ -71,8 +71,8 @@ def main():
     npm = settings()
     packages = json.loads(pathlib.Path(sys.argv[1]).read_text())["packages"]
     for path, package in packages.items():
-        if CPU.get(platform.machine()) in package.get("cpu", ()):
-            asked = request(npm, path.removeprefix("node_modules/"), package["version"])
+        if path and CPU.get(platform.machine()) in package.get("cpu", CPU.values()):
+            asked = request(npm, path.rpartition("node_modules/")[2], package["version"])
             try:
                 archive = opener(npm).open(asked, timeout=300).read()
             except OSError as error:

@@ -5,7 +5,7 @@
 import project
 
 COPYLEFT_FOLDERS = ("precompute/", "tests/precompute/")
-SUFFIXES = (".cc", ".h", ".py", ".sh", ".proto")
+SUFFIXES = (".cc", ".h", ".py", ".sh", ".proto", ".js", ".ts")
 
 
 def licence_of(name):

@@ -56,7 +56,8 @@ class Fetch(TreeTest):
         self.write("lock.json", json.dumps({"packages": {
             "": {},
             "node_modules/@maker/tool": {"version": "1.2.3", "integrity": integrity, "cpu": [CPU]},
-            "node_modules/@maker/other": {"version": "1.2.3", "integrity": integrity, "cpu": ["mips"]}}}))
+            "node_modules/@maker/other": {"version": "1.2.3", "integrity": integrity, "cpu": ["mips"]},
+            "node_modules/a/node_modules/@maker/tool": {"version": "1.2.3", "integrity": integrity}}}))
         self.write(".npmrc", f"registry=http://{self.host}/npm/\n//{self.host}/npm/:_authToken=secret\n")
         environment = {name: value for name, value in os.environ.items()
                        if not name.lower().startswith("npm_config") and "proxy" not in name.lower()}
@@ -67,8 +68,9 @@ class Fetch(TreeTest):
     def test_a_package_comes_from_the_registry_of_npmrc_with_its_token(self):
         done = self.fetch(Registry.archive)
         self.assertEqual(done.returncode, 0, done.stderr)
-        files = [path for path in (self.root / "got").rglob("*") if path.is_file()]
-        self.assertEqual(files, [self.root / "got/node_modules/@maker/tool/bin/tool"])
+        files = sorted(path for path in (self.root / "got").rglob("*") if path.is_file())
+        self.assertEqual(files, [self.root / "got" / folder / "@maker/tool/bin/tool"
+                                 for folder in ("node_modules", "node_modules/a/node_modules")])
         self.assertEqual(files[0].read_text(), "works")
 
     def test_another_digest_is_refused_and_nothing_is_unpacked(self):

@@ -80,7 +80,7 @@ stop_daemon
 # Each page of ten minutes is typed as printed, in a folder of its own.
 start_daemon
 install_packages python3
-for page in ten_minutes_{python,cpp,any_language}.md; do
+for page in ten_minutes_{python,cpp,node,any_language}.md; do
   mkdir -p "pages/$page"
   (cd "pages/$page" && env -u CARILLON_SERVER ../../type_page.py "/usr/share/doc/carillon/docs/$page" ../../now) ||
     fail "$page does not work as printed"
@@ -92,7 +92,7 @@ for document in carillon-precompute/{copyright,SOURCE} carillond/copyright caril
 done
 grep -q 'AFFERO' /usr/share/doc/carillon-precompute/copyright || fail "the AGPL is missing"
 
-packages=(carillond carillon-precompute carillon libcarillon-dev python3-carillon)
+packages=(carillond carillon-precompute carillon libcarillon-dev node-carillon python3-carillon)
 run_apt remove "${packages[@]}"
 [[ ! -e /usr/bin/carillond && ! -e /lib/systemd/system/carillond.service ]] || fail "remove left programs"
 [[ -e $settings && -e /var/lib/carillon/carillon.db ]] || fail "remove deleted settings or models"

@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: Apache-2.0
+'use strict';
+
+const fs = require('fs');
+const grpc = require('@grpc/grpc-js');
+const { defaultServer } = require('./address');
+const { given, toPose } = require('./contacts');
+const { services } = require('./contract');
+const { CarillonError, fromCall, fromInfo } = require('./errors');
+const { toMaterial } = require('./materials');
+const { toMeshFile } = require('./meshes');
+const { Model } = require('./models');
+const { Scene } = require('./scenes');
+const { Sound, samplesOf } = require('./sound');
+const { Trace } = require('./traces');
+
+const PIECE_BYTES = 1 << 20;
+
+/**
+ * Connects to a daemon: "unix:PATH" or "HOST:PORT", by default where defaultServer() says. `tlsRoots` is the PEM file
+ * with the certificates that vouch for a daemon with TLS.
+ */
+function connect(server, { tlsRoots } = {}) {
+  return new Client(server ?? defaultServer(), tlsRoots);
+}
+
+/** A connection. Its process can end when it is closed. */
+class Client {
+  constructor(server, tlsRoots) {
+    this.server = server;
+    this.credentials = tlsRoots ? grpc.credentials.createSsl(fs.readFileSync(tlsRoots))
+      : grpc.credentials.createInsecure();
+    this.stubs = new Map();
+  }
+
+  /** The client of a service of the contract that grpc-js makes, for calls that have no method here. */
+  stub(service) {
+    if (!this.stubs.has(service)) {
+      const options = { 'grpc.max_receive_message_length': -1 };
+      this.stubs.set(service, new services[service](this.server, this.credentials, options));
+    }
+    return this.stubs.get(service);
+  }
+
+  /** Calls a method that takes one message and answers one. */
+  call(service, method, request) {
+    return new Promise((resolve, reject) => {
+      this.stub(service)[method](request, (error, answer) => {
+        if (error) reject(fromCall(error, this.server));
+        else resolve(answer);
+      });
+    });
+  }
+
+  /** Yields the answers of a stream. Its errors are those of this package. */
+  async* answers(stream) {
+    try {
+      yield* stream;
+    } catch (error) {
+      throw fromCall(error, this.server);
+    } finally {
+      stream.cancel();
+    }
+  }
+
+  /** Returns the state of the daemon's mixer and output. */
+  status() {
+    return this.call('AudioService', 'GetMixer', {});
+  }
+
+  /** Stores a mesh, a file or { vertices, triangles }. Returns its digest. */
+  async upload(mesh) {
+    return this.uploadFile(await toMeshFile(mesh));
+  }
+
+  uploadFile(file) {
+    return new Promise((resolve, reject) => {
+      const stream = this.stub('ModalModelService').UploadMesh((error, answer) => {
+        if (error) reject(fromCall(error, this.server));
+        else resolve(answer.mesh_digest);
+      });
+      for (let at = 0; at < file.data.length; at += PIECE_BYTES) {
+        stream.write({ data: file.data.subarray(at, at + PIECE_BYTES) });
+      }
+      stream.end();
+    });
+  }
+
+  /**
+   * Returns the model of a mesh, which is computed if the daemon does not have it. `request` has other fields of
+   * CreateModalModelRequest, such as size, settings, max_frequency_hz or priority.
+   */
+  async createModel(mesh, { material, label, onProgress = () => {}, ...request }) {
+    const file = await toMeshFile(mesh);
+    const { job } = await this.call('ModalModelService', 'CreateModalModel', { ...request,
+      mesh_digest: await this.uploadFile(file), mesh_format: file.format, material: toMaterial(material),
+      label: label ?? file.label });
+    return this.model((await this.watch(job, onProgress)).modal_model, material);
+  }
+
+  /** Follows a job to its end and returns its last state. Throws CarillonError if it fails. */
+  async watch(job, onProgress = () => {}) {
+    let newest = job;
+    for await (const answer of this.answers(this.stub('DecompositionService').WatchJob({ name: job.name }))) {
+      newest = answer.job;
+      onProgress(newest);
+    }
+    if (newest.state === 'JOB_STATE_CANCELLED') {
+      throw new CarillonError('JOB_CANCELLED', `${newest.name} was cancelled; create the model again`);
+    }
+    if (newest.state !== 'JOB_STATE_SUCCEEDED') throw fromInfo(newest.error);
+    return newest;
+  }
+
+  /** Returns the model of a name, "modalModels/{digest}". */
+  async model(name, material) {
+    const answer = await this.call('ModalModelService', 'GetModalModel', { name });
+    return new Model(this, answer.modal_model, material);
+  }
+
+  /** Yields the models that match, newest first; filters are fields of ListModalModelsRequest. */
+  async* models(filters = {}) {
+    for (let page_token = ''; ;) {
+      const page = await this.call('ModalModelService', 'ListModalModels', { ...filters, page_token });
+      for (const summary of page.modal_models) yield new Model(this, summary);
+      page_token = page.next_page_token;
+      if (!page_token) return;
+    }
+  }
+
+  /** Makes an empty scene. */
+  async createScene({ hearing, listener } = {}) {
+    const request = { ...given('hearing', hearing), ...given('listener', toPose(listener)) };
+    return new Scene(this, (await this.call('SceneService', 'CreateScene', request)).name);
+  }
+
+  /** Returns all scenes of the daemon, the oldest first. */
+  async scenes() {
+    return (await this.call('SceneService', 'ListScenes', {})).scenes.map((scene) => new Scene(this, scene.name));
+  }
+
+  /**
+   * Renders a trace, or a .contacts file, faster than real time. `settings` are fields of RenderSettings. Throws
+   * CarillonError if a contact is rejected.
+   */
+  async render(trace, settings = {}) {
+    const records = (trace instanceof Trace ? trace : await Trace.read(trace)).records();
+    const stream = this.stub('AudioService').Render();
+    stream.write({ settings });
+    for (const record of records) stream.write({ record });
+    stream.end();
+    const pieces = [];
+    let format;
+    let summary;
+    for await (const answer of this.answers(stream)) {
+      if (answer.response === 'format') format = answer.format;
+      else if (answer.response === 'block') pieces.push(answer.block.samples);
+      else summary = answer.summary;
+    }
+    if (summary.rejected_count) throw fromInfo(summary.last_rejection);
+    return new Sound(samplesOf(pieces), format.sample_rate_hz, format.channel_count, summary);
+  }
+
+  /** Begins to record what the daemon plays. Returns once it does. */
+  async listen() {
+    const answers = this.answers(this.stub('AudioService').Listen({}));
+    const { value } = await answers.next();
+    return new Recording(answers, value.format);
+  }
+
+  close() {
+    for (const stub of this.stubs.values()) stub.close();
+  }
+}
+
+/** What the daemon plays, from the call of Client.listen on. */
+class Recording {
+  constructor(answers, format) {
+    this.answers = answers;
+    this.format = format;
+  }
+
+  /** Waits until this much of the sound since the beginning was heard, ends the recording, and returns the sound. */
+  async take(seconds) {
+    const { sample_rate_hz: rateHz, channel_count: channelCount } = this.format;
+    const wanted = Math.floor(seconds * rateHz) * channelCount;
+    const pieces = [];
+    let count = 0;
+    while (count < wanted) {
+      const { value, done } = await this.answers.next();
+      if (done) break;
+      pieces.push(value.block.samples);
+      count += value.block.samples.length / 4;
+    }
+    await this.answers.return();
+    return new Sound(samplesOf(pieces).subarray(0, wanted), rateHz, channelCount);
+  }
+}
+
+module.exports = { Client, connect };

@@ -1,0 +1,246 @@
+// SPDX-License-Identifier: Apache-2.0
+/** The types of the package. Those of the contract's messages, below ../types, are generated when it is packed. */
+
+import type { ContactFindings__Output } from '../types/carillon/v1/ContactFindings';
+import type { ContactStep } from '../types/carillon/v1/ContactStep';
+import type { ContactTraceHeader } from '../types/carillon/v1/ContactTraceHeader';
+import type { ContactTraceObject } from '../types/carillon/v1/ContactTraceObject';
+import type { ContactTraceRecord } from '../types/carillon/v1/ContactTraceRecord';
+import type { CreateModalModelRequest } from '../types/carillon/v1/CreateModalModelRequest';
+import type { GetMixerResponse__Output } from '../types/carillon/v1/GetMixerResponse';
+import type { Hearing } from '../types/carillon/v1/Hearing';
+import type { HertzContact } from '../types/carillon/v1/HertzContact';
+import type { Job__Output } from '../types/carillon/v1/Job';
+import type { ListModalModelsRequest } from '../types/carillon/v1/ListModalModelsRequest';
+import type { Material as MaterialMessage } from '../types/carillon/v1/Material';
+import type { ModalModelSummary__Output } from '../types/carillon/v1/ModalModelSummary';
+import type { RenderSettings } from '../types/carillon/v1/RenderSettings';
+import type { RenderSummary__Output } from '../types/carillon/v1/RenderSummary';
+import type { Roughness } from '../types/carillon/v1/Roughness';
+import type { SoundingObject__Output } from '../types/carillon/v1/SoundingObject';
+import type { StreamContactsResponse__Output } from '../types/carillon/v1/StreamContactsResponse';
+
+/** x, y, z in metres or newton seconds. */
+export type Vector = ArrayLike<number>;
+/** w, x, y, z. */
+export type Rotation = ArrayLike<number>;
+/** Rows of numbers, flat or an array each. */
+export type Table = ArrayLike<number> | ArrayLike<ArrayLike<number>>;
+export type Pose = Vector | { position: Vector; orientation?: Rotation };
+/** A name of the catalogue, such as "bell_bronze", or figures. */
+export type Material = string | MaterialMessage;
+/** A name of the catalogue, such as "wood", or figures. */
+export type Striker = string | HertzContact;
+export type Radiation = 'paper_coupling' | 'radiated_power';
+export type ObjectLike = number | SoundingObject;
+/** A file, or metres and indices that count from zero. */
+export type Mesh = string | { vertices: Table; triangles: Table };
+
+/** One strike: metres and newton seconds, in the object's own frame; without a duration the striker determines it. */
+export interface Strike {
+  point: Vector;
+  impulse: Vector;
+  /** Seconds. */
+  duration?: number;
+  striker?: Striker;
+}
+
+/** One impulse of a step. */
+export interface ImpulseRow extends Strike {
+  object: ObjectLike;
+  /** Seconds from the step's time. */
+  timeOffset?: number;
+  second?: { object: ObjectLike; point: Vector; rotation?: Rotation };
+}
+
+/** One contact as an engine reports it: the impulse over the whole step, also at rest. */
+export interface ContactRow extends ImpulseRow {
+  /** Any number that names the other body. */
+  partner?: number;
+  roughness?: Roughness;
+}
+
+/** A sustained force of a simulator that separates loads from impacts itself. */
+export interface ForceRow {
+  object: ObjectLike;
+  point: Vector;
+  /** Newtons. */
+  force: Vector;
+  roughness?: Roughness;
+  second?: { object: ObjectLike; point: Vector; rotation?: Rotation };
+}
+
+/** Impulses as columns. One object, or one number, stands for all rows. */
+export interface ImpulseColumns {
+  objects: ObjectLike | ArrayLike<ObjectLike>;
+  points: Table;
+  impulses: Table;
+  /** Seconds; NaN leaves one to the daemon. */
+  durations?: number | ArrayLike<number>;
+  timeOffsets?: number | ArrayLike<number>;
+  secondObjects?: ObjectLike | ArrayLike<ObjectLike>;
+  secondPoints?: Table;
+  secondRotations?: Table;
+  striker?: Striker;
+}
+
+/** An engine's contacts as columns. */
+export interface ContactColumns extends ImpulseColumns {
+  partners?: number | ArrayLike<number>;
+  travelSpeeds?: number | ArrayLike<number>;
+  roughnessDepth?: number;
+  irregularityLength?: number;
+}
+
+/** What a step holds. */
+export interface StepContent {
+  /** What an engine reports, in every step. */
+  contacts?: ContactRow[] | ContactColumns;
+  /** Strikes. */
+  impulses?: ImpulseRow[] | ImpulseColumns;
+  forces?: ForceRow[];
+  poses?: { objects: ObjectLike | ArrayLike<ObjectLike>; positions: Table; orientations?: Table };
+  listener?: Pose;
+}
+
+export interface StreamSettings {
+  /** The frame of points and impulses: each object's own, or that of the scene, in which the poses are. */
+  frame?: 'object' | 'scene';
+  pulseShape?: 'raised_cosine' | 'gaussian';
+}
+
+export interface ObjectSettings {
+  material?: Material;
+  size?: number;
+  gain?: number;
+  pose?: Pose;
+  handle?: number;
+  radiation?: Radiation;
+}
+
+/** A refusal. `reason` is stable and one of proto/README.md's; `metadata` has figures that belong to it. */
+export class CarillonError extends Error {
+  constructor(reason: string, text: string, metadata?: Record<string, string>);
+  readonly reason: string;
+  readonly metadata: Record<string, string>;
+}
+
+/** No daemon answers at the address. */
+export class ServerUnavailable extends CarillonError {}
+
+/** Samples interleaved by channel; full scale is 1. */
+export class Sound {
+  readonly samples: Float32Array;
+  readonly sampleRateHz: number;
+  readonly channelCount: number;
+  /** What the daemon measured while it rendered the sound offline. */
+  readonly summary?: RenderSummary__Output;
+  readonly seconds: number;
+  readonly peak: number;
+  /** Writes a WAV file of 24-bit samples. */
+  save(path: string): Promise<void>;
+  waveBytes(): Buffer;
+}
+
+/** A modal model in the daemon's database. */
+export class Model {
+  readonly summary: ModalModelSummary__Output;
+  readonly material?: Material;
+  readonly name: string;
+  readonly label: string;
+  readonly modeCount: number;
+  /** Renders one strike, the same samples each time. `seconds` zero means until the sound has died away. */
+  renderStrike(strike: Strike & {
+    material?: Material; size?: number; gain?: number; seconds?: number; sampleRateHz?: number;
+  }): Promise<Sound>;
+}
+
+/** A recorded simulation. */
+export class Trace {
+  constructor(settings?: StreamSettings & { step?: number; simulator?: string; hearing?: Hearing; listener?: Pose });
+  header: ContactTraceHeader;
+  objects: ContactTraceObject[];
+  steps: ContactStep[];
+  /** Adds an object, which is there from the beginning. Returns its handle. */
+  add(model: Model | string, settings?: ObjectSettings & { label?: string }): number;
+  /** Adds a step. Times must not go back. */
+  step(time: number, content?: StepContent): void;
+  records(): Generator<ContactTraceRecord>;
+  bytes(): Buffer;
+  /** Writes a .contacts file. */
+  write(path: string): Promise<void>;
+  static read(path: string): Promise<Trace>;
+}
+
+/** An object of a scene. It may be given wherever handles are wanted. */
+export class SoundingObject {
+  readonly message: SoundingObject__Output;
+  readonly name: string;
+  readonly handle: number;
+  /** Strikes the object now. Throws CarillonError if the strike is refused. */
+  strike(strike: Strike): Promise<void>;
+  update(changes: Omit<ObjectSettings, 'handle'> & { glide?: number }): Promise<void>;
+  remove(): Promise<void>;
+}
+
+/** A scene of the daemon. It lasts until it is deleted. */
+export class Scene {
+  constructor(client: Client, name: string);
+  readonly name: string;
+  /** Adds an object. Without a material it gets the one that the model was asked for with. */
+  add(model: Model | string, settings?: ObjectSettings): Promise<SoundingObject>;
+  objects(): Promise<SoundingObject[]>;
+  moveListener(pose: Pose, glide?: number): Promise<void>;
+  /** Opens a stream for a simulation whose steps last `step` seconds, to sound `delay` seconds later. */
+  stream(settings: StreamSettings & { step: number; delay?: number }): ContactStream;
+  delete(): Promise<void>;
+}
+
+/** Sends the contacts of each step. */
+export class ContactStream {
+  /** The daemon's newest answer, with the counts so far. */
+  readonly report?: StreamContactsResponse__Output;
+  /** Steps that were not sent, because 4096 waited. */
+  readonly droppedStepCount: number;
+  readonly findings?: ContactFindings__Output;
+  /** Why the newest rejected contact was rejected. */
+  readonly rejection?: CarillonError;
+  /** Sends a step. The promise gives the network a turn. */
+  step(time: number, content?: StepContent): Promise<void>;
+  /** Waits until the daemon has taken all steps. Returns the last report. */
+  close(): Promise<StreamContactsResponse__Output>;
+}
+
+/** What the daemon plays, from the call of Client.listen on. */
+export class Recording {
+  /** Waits until this much was heard, ends the recording, and returns the sound. */
+  take(seconds: number): Promise<Sound>;
+}
+
+/** A connection. */
+export class Client {
+  readonly server: string;
+  status(): Promise<GetMixerResponse__Output>;
+  /** Stores a mesh. Returns its digest. */
+  upload(mesh: Mesh): Promise<string>;
+  /** Returns the model of a mesh, which is computed if the daemon does not have it. */
+  createModel(mesh: Mesh, request: Omit<CreateModalModelRequest, 'material' | 'mesh_digest' | 'mesh_format'> & {
+    material: Material; onProgress?: (job: Job__Output) => void;
+  }): Promise<Model>;
+  model(name: string, material?: Material): Promise<Model>;
+  models(filters?: ListModalModelsRequest): AsyncGenerator<Model>;
+  createScene(settings?: { hearing?: Hearing; listener?: Pose }): Promise<Scene>;
+  scenes(): Promise<Scene[]>;
+  /** Renders a trace or a .contacts file. Throws CarillonError if a contact is rejected. */
+  render(trace: Trace | string, settings?: RenderSettings): Promise<Sound>;
+  /** Begins to record what the daemon plays. Returns once it does. */
+  listen(): Promise<Recording>;
+  /** Calls a method of the contract that takes one message and answers one, such as "SceneService", "ListScenes". */
+  call(service: string, method: string, request: object): Promise<any>;
+  close(): void;
+}
+
+/** Connects to a daemon: "unix:PATH" or "HOST:PORT"; `tlsRoots` is a PEM file. */
+export function connect(server?: string, options?: { tlsRoots?: string }): Client;
+/** The address where the daemon listens unless somebody says otherwise. */
+export function defaultServer(): string;

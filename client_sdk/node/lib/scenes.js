@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+'use strict';
+
+const { given, makeStep, present, toPose } = require('./contacts');
+const { fromCall, fromInfo } = require('./errors');
+const { named, toMaterial, toRadiation } = require('./materials');
+const { streamSettings } = require('./traces');
+
+// Steps that may wait for the network before further ones are dropped.
+const MOST_WAITING = 4096;
+
+/** An object of a scene. It may be given wherever handles are wanted. */
+class SoundingObject {
+  constructor(scene, message) {
+    this.scene = scene;
+    this.message = message;
+  }
+
+  get name() {
+    return this.message.name;
+  }
+
+  get handle() {
+    return this.message.handle;
+  }
+
+  /** Strikes the object now. Throws CarillonError if the strike is refused. */
+  async strike({ point, impulse, duration, striker }) {
+    const stream = this.scene.stream({ step: 0.001, delay: 0 });
+    stream.step(0, { impulses: [{ object: this, point, impulse, duration, striker }] });
+    await stream.close();
+    if (stream.rejection) throw stream.rejection;
+  }
+
+  /** Changes what is given; a pose is reached after `glide` seconds. */
+  async update({ material, size, gain, pose, glide = 0, radiation }) {
+    const request = { name: this.name, glide_s: glide, ...given('material', material && toMaterial(material)),
+      ...given('size', size), ...given('gain', gain), ...given('pose', toPose(pose)),
+      ...present({ radiation: toRadiation(radiation) }) };
+    this.message = (await this.scene.client.call('SceneService', 'UpdateObject', request)).object;
+  }
+
+  /** Fades the object out and removes it. */
+  async remove() {
+    await this.scene.client.call('SceneService', 'RemoveObject', { name: this.name });
+  }
+}
+
+/** A scene of the daemon. It lasts until it is deleted. */
+class Scene {
+  constructor(client, name) {
+    this.client = client;
+    this.name = name;
+  }
+
+  /** Adds an object, ready to be struck. Without a material it gets the one that the model was asked for with. */
+  async add(model, { material, size, gain, pose, handle, radiation } = {}) {
+    const request = { scene: this.name, ...named(model, material), ...present({ size, handle }), ...given('gain', gain),
+      ...given('pose', toPose(pose)), ...present({ radiation: toRadiation(radiation) }) };
+    return new SoundingObject(this, (await this.client.call('SceneService', 'AddObject', request)).object);
+  }
+
+  /** Returns the objects of the scene by their handles. */
+  async objects() {
+    const answer = await this.client.call('SceneService', 'ListObjects', { scene: this.name });
+    return answer.objects.map((object) => new SoundingObject(this, object));
+  }
+
+  /** Moves the listener, within `glide` seconds. */
+  async moveListener(pose, glide = 0) {
+    await this.client.call('SceneService', 'UpdateListener', { scene: this.name, pose: toPose(pose), glide_s: glide });
+  }
+
+  /** Opens a stream for the contacts of a simulation whose steps last `step` seconds. */
+  stream({ step, delay, ...settings }) {
+    return new ContactStream(this, { scene: this.name, step_s: step, ...given('scheduling_delay_s', delay),
+      ...streamSettings(settings) });
+  }
+
+  /** Deletes the scene and fades out its objects. */
+  async delete() {
+    await this.client.call('SceneService', 'DeleteScene', { name: this.name });
+  }
+}
+
+/**
+ * Sends the contacts of each step. `report` is the daemon's newest answer, with the counts so far; `droppedStepCount`
+ * steps were not sent, because 4096 waited.
+ */
+class ContactStream {
+  constructor(scene, start) {
+    this.report = undefined;
+    this.droppedStepCount = 0;
+    this.error = undefined;
+    const { client } = scene;
+    this.call = client.stub('ContactService').StreamContacts();
+    this.ended = new Promise((resolve) => {
+      this.call.on('data', (answer) => { this.report = answer; });
+      this.call.on('error', (error) => { this.error = fromCall(error, client.server); });
+      this.call.on('close', resolve);
+    });
+    this.call.write({ start });
+  }
+
+  /** What the daemon found out about the contacts so far, such as blow_count and distant_point_count. */
+  get findings() {
+    return this.report?.findings ?? undefined;
+  }
+
+  /** Why the newest rejected contact was rejected; undefined if none was so far. */
+  get rejection() {
+    return this.report?.rejected_count ? fromInfo(this.report.last_rejection) : undefined;
+  }
+
+  /**
+   * Sends a step at a simulation time, seconds. Throws CarillonError if the stream has failed. The promise gives the
+   * network a turn: a loop that never awaits anything sends nothing before it ends.
+   */
+  step(time, content) {
+    if (this.error) throw this.error;
+    if (this.call.writableLength >= MOST_WAITING) this.droppedStepCount += 1;
+    else this.call.write({ step: makeStep(time, content) });
+    return new Promise(setImmediate);
+  }
+
+  /** Waits until the daemon has taken all steps. Returns the last report. */
+  async close() {
+    this.call.end();
+    await this.ended;
+    if (this.error) throw this.error;
+    return this.report;
+  }
+}
+
+module.exports = { ContactStream, Scene, SoundingObject };

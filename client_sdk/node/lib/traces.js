@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+'use strict';
+
+const fs = require('fs/promises');
+const { given, makeStep, present, toPose } = require('./contacts');
+const { message } = require('./contract');
+const { CarillonError } = require('./errors');
+const { named, toRadiation } = require('./materials');
+
+const FORMAT_VERSION = 1;
+
+/** "scene" becomes FRAME_SCENE, "gaussian" PULSE_SHAPE_GAUSSIAN. */
+function streamSettings({ frame, pulseShape }) {
+  return present({ frame: frame && `FRAME_${frame.toUpperCase()}`,
+    pulse_shape: pulseShape && `PULSE_SHAPE_${pulseShape.toUpperCase()}` });
+}
+
+/** A recorded simulation: `header`, `objects` and `steps` are the messages of contact_trace.proto. */
+class Trace {
+  constructor({ step, simulator, hearing, listener, ...settings } = {}) {
+    this.header = { format_version: FORMAT_VERSION, ...present({ simulator, step_s: step }),
+      ...given('hearing', hearing), ...given('listener', toPose(listener)), ...streamSettings(settings) };
+    this.objects = [];
+    this.steps = [];
+  }
+
+  /** Adds an object, which is there from the beginning. Returns its handle. */
+  add(model, { material, size = 1, gain = 1, pose, label, handle, radiation } = {}) {
+    const own = handle ?? 1 + this.objects.reduce((most, object) => Math.max(most, object.handle), 0);
+    this.objects.push({ handle: own, ...named(model, material), size, gain, ...present({ label }),
+      ...given('pose', toPose(pose)), ...present({ radiation: toRadiation(radiation) }) });
+    return own;
+  }
+
+  /** Adds a step, as ContactStream.step sends one. Times must not go back. */
+  step(time, content) {
+    const last = this.steps.at(-1)?.time_s ?? 0;
+    if (this.steps.length && time < last) {
+      throw new RangeError(`time goes back from ${last} to ${time} s; add the steps in order`);
+    }
+    this.steps.push(makeStep(time, content));
+  }
+
+  /** The header, the objects, then the steps, each a ContactTraceRecord. */
+  * records() {
+    yield { header: this.header };
+    for (const object of this.objects) yield { object };
+    for (const step of this.steps) yield { step };
+  }
+
+  /** The bytes of a .contacts file. */
+  bytes() {
+    const pieces = [];
+    for (const record of this.records()) {
+      const data = message('ContactTraceRecord').serialize(record);
+      pieces.push(varint(data.length), data);
+    }
+    return Buffer.concat(pieces);
+  }
+
+  /** Writes a .contacts file. */
+  async write(path) {
+    await fs.writeFile(path, this.bytes());
+  }
+
+  /** Reads a .contacts file. Throws CarillonError (TRACE_MALFORMED). */
+  static async read(path) {
+    const trace = new Trace();
+    const bytes = await fs.readFile(path);
+    let number = 0;
+    for (const record of readRecords(bytes, path)) {
+      if ((number === 0) !== (record.record === 'header')) {
+        throw new CarillonError('TRACE_MALFORMED', `${path}: record ${number} must${number ? ' not' : ''} be a header`);
+      }
+      if (record.record === 'header') trace.header = record.header;
+      else if (record.record === 'object') trace.objects.push(record.object);
+      else trace.steps.push(record.step);
+      number += 1;
+    }
+    if (number === 0) throw new CarillonError('TRACE_MALFORMED', `${path} is empty; write the trace again`);
+    return trace;
+  }
+}
+
+function varint(number) {
+  const bytes = [];
+  let rest = number;
+  for (; rest > 0x7f; rest = Math.floor(rest / 128)) bytes.push((rest & 0x7f) | 0x80);
+  return Buffer.from([...bytes, rest]);
+}
+
+function* readRecords(bytes, path) {
+  for (let at = 0, number = 0; at < bytes.length; number += 1) {
+    let size = 0;
+    let factor = 1;
+    do {
+      size += (bytes[at] & 0x7f) * factor;
+      factor *= 128;
+      at += 1;
+    } while (bytes[at - 1] > 0x7f);
+    let record;
+    try {
+      record = at + size <= bytes.length && message('ContactTraceRecord').deserialize(bytes.subarray(at, at + size));
+    } catch (error) {
+      record = undefined; // It is no message of this type.
+    }
+    if (!record) {
+      throw new CarillonError('TRACE_MALFORMED', `${path}: record ${number} is cut off or damaged; write the trace ` +
+        'again');
+    }
+    at += size;
+    yield record;
+  }
+}
+
+module.exports = { Trace, streamSettings };

@@ -1,0 +1,76 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: Apache-2.0
+"""The package for Node as it is distributed: an archive that works alone, and types that TypeScript believes."""
+
+import json
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import tarfile
+import tempfile
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+MODULES = pathlib.Path(os.environ["CARILLON_NODE_MODULES"])
+VERSION = re.search(r"project\(carillon VERSION ([\d.]+)", (ROOT / "CMakeLists.txt").read_text())[1]
+
+
+def run(*words, **options):
+    done = subprocess.run([str(word) for word in words], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+                          check=False, **options)
+    return done.returncode, done.stdout
+
+
+class DistributionTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        scratch = tempfile.TemporaryDirectory(prefix="carillon-")
+        cls.addClassCleanup(scratch.cleanup)
+        cls.folder = pathlib.Path(scratch.name)
+        code, said = run(sys.executable, ROOT / "client_sdk/node/pack.py", MODULES, cls.folder)
+        if code:
+            raise AssertionError(said)
+        # As npm would install it: the archive unpacked, beside what it depends on.
+        cls.modules = cls.folder / "node_modules"
+        cls.modules.mkdir()
+        with tarfile.open(cls.folder / f"carillon-{VERSION}.tgz") as tar:
+            tar.extractall(cls.folder / "unpacked")
+        (cls.folder / "unpacked/package").rename(cls.modules / "carillon")
+        for module in MODULES.iterdir():
+            (cls.modules / module.name).symlink_to(module)
+
+    def assert_prints(self, expected, *words):
+        code, said = run(*words, cwd=self.folder)
+        self.assertEqual((code, said.strip()), (0, expected))
+
+    def test_it_has_the_version_of_the_project_and_needs_what_its_lock_names(self):
+        lock = json.loads((ROOT / "client_sdk/node/package-lock.json").read_text())["packages"]
+        package = json.loads((self.modules / "carillon/package.json").read_text())
+        self.assertEqual((package["version"], lock[""]["version"]), (VERSION, VERSION))
+        for name in package["dependencies"]:
+            self.assertIn(f"node_modules/{name}", lock)
+
+    def test_it_loads_by_require_and_by_import(self):
+        code = "connect('unix:/nowhere').status().catch((error) => console.log(error.reason))"
+        self.assert_prints("SERVER_UNAVAILABLE", "node", "-e", f"const {{ connect }} = require('carillon'); {code}")
+        self.assert_prints("SERVER_UNAVAILABLE", "node", "--input-type=module", "-e",
+                           f"import {{ connect }} from 'carillon'; {code}")
+
+    def test_types_accept_a_program_that_is_right_and_refuse_those_that_are_wrong(self):
+        (self.folder / "right.ts").write_text(pathlib.Path(__file__).with_name("usage.ts").read_text())
+        wrong = ("c.createModel('a.obj', {})", "c.createScene({ hearing: { panning: 7 } })",
+                 "new carillon.Trace().step(0, { contacts: [{ object: 1, point: [0, 0, 0] }] })",
+                 "new carillon.Trace({ frame: 'world' })")
+        for i, text in enumerate(wrong):
+            (self.folder / f"wrong{i}.ts").write_text(
+                f"import * as carillon from 'carillon'; const c = carillon.connect(); {text};")
+        _, said = run("node", MODULES / "typescript/bin/tsc", "--noEmit", "--strict", "--target", "es2022", "--module",
+                      "node16", "--types", "node", *sorted(self.folder.glob("*.ts")), cwd=self.folder)
+        faults = re.findall(r"(?m)^(\S+)\(\d+,\d+\): error", said)
+        self.assertEqual(sorted(set(faults)), [f"wrong{i}.ts" for i in range(len(wrong))], said)
+
+
+if __name__ == "__main__":
+    unittest.main()

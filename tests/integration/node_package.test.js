@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+'use strict';
+
+const assert = require('node:assert/strict');
+const fs = require('node:fs/promises');
+const path = require('node:path');
+const { after, before, test } = require('node:test');
+const carillon = require('carillon');
+
+const POINT = [0, 0.008, 0.01];
+const IMPULSE = [0, 0, -0.002];
+const STRIKE = { point: POINT, impulse: IMPULSE, duration: 1e-4 };
+const FOLDER = path.dirname(process.env.CARILLON_TEST_BAR);
+const BAR = process.env.CARILLON_TEST_BAR;
+const material = process.env.CARILLON_TEST_MATERIAL;
+
+let c;
+let model;
+
+before(async () => {
+  c = carillon.connect();
+  model = await c.createModel(BAR, { material });
+});
+
+after(() => c.close());
+
+async function withScene(use) {
+  const scene = await c.createScene();
+  try {
+    return await use(scene);
+  } finally {
+    await scene.delete();
+  }
+}
+
+/** The sound of steps [time, content] on `count` bars. */
+function rendered(steps, { count = 1, poses = [], ...settings } = {}) {
+  const trace = new carillon.Trace({ step: 1 / 240, ...settings });
+  for (let i = 0; i < count; i += 1) trace.add(model, { pose: poses[i] });
+  for (const [time, content] of steps) trace.step(time, content);
+  return c.render(trace, { tail_s: 0.3 });
+}
+
+function loudestHz({ samples, sampleRateHz }) {
+  const count = 1 << 14;
+  let best = { power: 0, hz: 0 };
+  for (let bin = 1; bin < 2000; bin += 1) {
+    let re = 0;
+    let im = 0;
+    for (let i = 0; i < count; i += 1) {
+      re += samples[i] * Math.cos((2 * Math.PI * bin * i) / count);
+      im += samples[i] * Math.sin((2 * Math.PI * bin * i) / count);
+    }
+    if (re * re + im * im > best.power) best = { power: re * re + im * im, hz: (bin * sampleRateHz) / count };
+  }
+  return best.hz;
+}
+
+test('a mesh of arrays is a model of the same modes as its file', async () => {
+  const text = await fs.readFile(BAR, 'utf8');
+  const rows = (kind) => text.split('\n').filter((line) => line.startsWith(kind))
+    .map((line) => line.split(' ').slice(1).map(Number));
+  const triangles = rows('f ').map((row) => row.map((i) => i - 1));
+  const states = [];
+  const same = await c.createModel({ vertices: rows('v '), triangles }, {
+    material, label: 'arrays', onProgress: (job) => states.push(job.state) });
+  assert.equal(same.modeCount, model.modeCount);
+  assert.equal(states.at(-1), 'JOB_STATE_SUCCEEDED');
+  const found = [];
+  for await (const one of c.models({ label_contains: 'arr' })) found.push(one.name);
+  assert.deepEqual(found, same.name === model.name ? found : [same.name]);
+});
+
+test('a rendered strike rings at the lowest bending mode, and is the same again', async () => {
+  const once = await model.renderStrike({ ...STRIKE, seconds: 1 });
+  const again = await model.renderStrike({ ...STRIKE, seconds: 1 });
+  assert.ok(once.peak > 1e-3);
+  assert.deepEqual(again.samples, once.samples);
+  const lowest = Math.sqrt(model.summary.eigenvalues[0] * 6.835179e10 / 2700) / (2 * Math.PI);
+  assert.ok(Math.abs(loudestHz(once) / lowest - 1) < 0.01, `${loudestHz(once)} Hz, not ${lowest}`);
+  const file = path.join(FOLDER, 'node.wav');
+  await once.save(file);
+  assert.equal((await fs.stat(file)).size, 44 + 3 * once.samples.length);
+});
+
+test('a live strike is heard', async () => {
+  const heard = await withScene(async (scene) => {
+    const bar = await scene.add(model);
+    const record = await c.listen();
+    await bar.strike(STRIKE);
+    return record.take(1.5);
+  });
+  assert.equal(heard.samples.length, 72000);
+  assert.ok(heard.peak > 1e-3);
+});
+
+test('contacts in rows sound as the same in columns', async () => {
+  // Numbers that a float holds exactly, because columns are floats.
+  const [point, impulse] = [POINT, IMPULSE].map((values) => Array.from(Float32Array.from(values)));
+  const rows = [{ object: 1, point, impulse, partner: 7 }];
+  const columns = { objects: 1, points: Float32Array.from(POINT), impulses: [IMPULSE], partners: [7] };
+  const [one, other] = await Promise.all([rows, columns].map((contacts) => rendered(
+    [0, 1, 2].map((i) => [i / 240, { contacts }]))));
+  assert.ok(one.peak > 1e-4);
+  assert.deepEqual(one.samples, other.samples);
+});
+
+test('points in the frame of the scene are turned into that of the object', async () => {
+  const own = await rendered([[0, { impulses: [{ object: 1, ...STRIKE }] }]]);
+  const half = Math.SQRT1_2; // a quarter turn about z: x of the object is y of the scene
+  const [x, y, z] = POINT;
+  const turned = { object: 1, ...STRIKE, point: [1 - y, 2 + x, 3 + z] };
+  const scene = await rendered([[0, { impulses: [turned] }]], { frame: 'scene',
+    poses: [{ position: [1, 2, 3], orientation: [half, 0, 0, half] }] });
+  assert.ok(own.samples.every((sample, i) => Math.abs(sample - scene.samples[i]) < 1e-5 * own.peak));
+});
+
+test('a stream counts, and tells what was wrong', async () => {
+  await withScene(async (scene) => {
+    const bars = [await scene.add(model), await scene.add(model)];
+    const stream = scene.stream({ step: 1 / 240 });
+    for (let i = 0; i < 24; i += 1) {
+      await stream.step(i / 240, {
+        contacts: { objects: bars, points: [POINT, POINT], impulses: [IMPULSE, IMPULSE], partners: [1, 2] },
+        poses: { objects: bars, positions: [[i, 0, 0], [i, 1, 0]] },
+      });
+    }
+    await stream.step(0.1, { impulses: [{ object: bars[0], point: POINT, impulse: [0, 0, -1e9] }] });
+    await stream.step(0.1, { impulses: [{ object: bars[0], point: [0, 0, 1], impulse: IMPULSE }] });
+    const report = await stream.close();
+    assert.equal(report.step_count, 26);
+    assert.equal(report.rejected_count, 1);
+    assert.equal(stream.rejection.reason, 'IMPULSE_TOO_LARGE');
+    assert.equal(stream.findings.distant_point_count, 1);
+    assert.ok(stream.findings.load_count > 0);
+    assert.deepEqual((await scene.objects()).map((bar) => bar.handle), bars.map((bar) => bar.handle));
+  });
+});
+
+test('refusals have the reason of the contract', async () => {
+  const open = { vertices: [[0, 0, 0], [1, 0, 0], [0, 1, 0]], triangles: [[0, 1, 2]] };
+  await assert.rejects(c.createModel(open, { material }), { reason: 'MESH_NOT_CLOSED' });
+  await assert.rejects(c.createModel(BAR, { material: 'chime_aluminium' }), { reason: 'UNKNOWN_MATERIAL' });
+  await assert.rejects(model.renderStrike({ ...STRIKE, duration: undefined, striker: 'marshmallow' }),
+    { reason: 'UNKNOWN_STRIKER' });
+  await withScene(async (scene) => {
+    const bar = await scene.add(model);
+    await assert.rejects(bar.strike({ point: POINT, impulse: [0, 0, NaN] }), { reason: 'IMPULSE_NOT_FINITE' });
+  });
+  const gone = await c.createScene();
+  await gone.delete();
+  await assert.rejects(gone.stream({ step: 0.01 }).close(), { reason: 'SCENE_NOT_FOUND' });
+  await assert.rejects(carillon.connect(`unix:${FOLDER}/nobody`).status(), carillon.ServerUnavailable);
+});
+
+test('a trace is written and read, and a damaged one is refused', async () => {
+  const trace = new carillon.Trace({ step: 1 / 60, simulator: 'test' });
+  trace.add(model);
+  trace.step(0, { impulses: [{ object: 1, ...STRIKE }] });
+  const file = path.join(FOLDER, 'node.contacts');
+  await trace.write(file);
+  const [one, other] = [await c.render(trace, { tail_s: 0.2 }), await c.render(file, { tail_s: 0.2 })];
+  assert.ok(one.peak > 1e-3);
+  assert.deepEqual(one.samples, other.samples);
+  await fs.writeFile(file, trace.bytes().subarray(0, -3));
+  await assert.rejects(carillon.Trace.read(file), { reason: 'TRACE_MALFORMED' });
+  assert.throws(() => trace.step(-1), /goes back/);
+  assert.throws(() => trace.step(1, { contacts: { objects: 1, points: [0, 0], impulses: [0, 0] } }), /3 a contact/);
+});
