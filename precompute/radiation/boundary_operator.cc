@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <numbers>
+#include <utility>
 
 #include "precompute/mesh/point_math.h"
 
@@ -98,7 +99,10 @@ void BoundaryOperator::Apply(std::span<const std::vector<ComplexFloat>> pressure
     }
     AddCurlTests(surface_, field, ComplexFloat(0, static_cast<float>(eta_)), result);
     AddMass(pressures[s], result);
-    AddNear(pressures[s], result);
+    workers.ForParts(static_cast<int64_t>(size()), kSweepGrain,
+                     [&](int64_t begin, int64_t end, int) {
+                       AddNear(pressures[s], {begin, end}, result);
+                     });
   }
 }
 
@@ -115,11 +119,11 @@ void BoundaryOperator::AddMass(std::span<const ComplexFloat> p,
   }
 }
 
-void BoundaryOperator::AddNear(std::span<const ComplexFloat> p,
+void BoundaryOperator::AddNear(std::span<const ComplexFloat> p, std::pair<int64_t, int64_t> rows,
                                std::span<ComplexFloat> result) const {
   const auto eta = static_cast<float>(eta_);
   const auto normals = static_cast<float>(eta_ * wavenumber_ * wavenumber_);
-  for (size_t v = 0; v < size(); ++v) {
+  for (auto v = static_cast<size_t>(rows.first); v < static_cast<size_t>(rows.second); ++v) {
     ComplexFloat sum = 0;
     for (auto e = static_cast<size_t>(near_.row_begin[v]);
          e < static_cast<size_t>(near_.row_begin[v + 1]); ++e) {

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "precompute/radiation/acoustic_surface.h"
@@ -43,7 +45,9 @@ class BoundaryOperator {
   std::vector<ComplexFloat> Diagonal() const;
 
  private:
-  void AddNear(std::span<const ComplexFloat> p, std::span<ComplexFloat> result) const;
+  /// To the results of the rows from first to before second.
+  void AddNear(std::span<const ComplexFloat> p, std::pair<int64_t, int64_t> rows,
+               std::span<ComplexFloat> result) const;
   void AddMass(std::span<const ComplexFloat> p, std::span<ComplexFloat> result) const;
 
   const AcousticSurface& surface_;

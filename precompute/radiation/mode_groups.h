@@ -14,6 +14,9 @@ struct ModeGroup {
   std::vector<size_t> modes;  ///< one or two
   double wavenumber = 0;
   double loudness = 0;  ///< an estimate, by which groups are ordered
+  /// The modes move the surface along its normals so little, as torsion does, that they are all but
+  /// silent.
+  bool silent = true;
   int first_level = 0;
   int solved_count = 0;           ///< levels from the first on that it was solved on
   std::vector<ModeField> fields;  ///< of the finest of them

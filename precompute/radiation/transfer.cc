@@ -23,7 +23,8 @@ namespace {
 constexpr double kEdgesPerAirWave = 2.2;
 constexpr double kEdgesPerBodyWave = 3;
 /// A mode that moves the surface along its normals with less than this part of the median mode's
-/// energy, such as torsion, is all but silent: only the wave in air decides on its surface.
+/// energy, such as torsion, is all but silent: only the wave in air decides on its surface, and two
+/// surfaces suffice.
 constexpr double kWeakEnergy = 1e-2;
 /// Directions may be off by this many times the error that the power may have.
 constexpr double kDirectionGoal = 3;
@@ -32,9 +33,9 @@ constexpr double kDirectionGoal = 3;
 constexpr double kUncheckedErrorDb = 6;
 constexpr size_t kFewestChecked = 8;
 /// The error stated for each unit of the difference between two surfaces, of which the finer one
-/// counts. Differences fall to 0.5 from one surface to the next, but to 0.9 near a resonance of the
-/// air inside the body, as long as the surface is coarse.
-constexpr double kErrorPerDifference = 1.4;
+/// counts. Differences fall to 0.5 from one surface to the next, which would be 1, but near a
+/// resonance of the air inside the body they do not as long as the surface is coarse.
+constexpr double kErrorPerDifference = 1.7;
 /// The least error that is stated: the solver's tolerance and the far pattern's order leave it.
 constexpr double kLeastErrorDb = 0.05;
 /// Applications of the operator that a solution takes, about, where none was counted.
@@ -127,6 +128,7 @@ class TransferSolver {
     for (const size_t m : group.modes) {
       transfer_.modes[m].in_band = true;
       if (motions_[m].energy > weak) {
+        group.silent = false;
         edge_m = std::min(edge_m, motions_[m].wavelength_m / kEdgesPerBodyWave);
       }
       group.loudness = std::max(group.loudness, motions_[m].energy * motions_[m].energy);
@@ -153,7 +155,8 @@ class TransferSolver {
   }
 
   bool NeedsMore(const ModeGroup& group) const {
-    return group.solved_count < 2 || group.error_db > settings_.goal_db;
+    if (group.solved_count < 2) return true;
+    return group.error_db > settings_.goal_db && !group.silent;
   }
 
   absl::StatusOr<const SurfaceLevels::Made*> LevelAt(int level) {
