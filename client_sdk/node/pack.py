@@ -8,6 +8,7 @@ NODE_MODULES has what package-lock.json names; deploy/setup.sh installs it. FOLD
 carillon, and as an archive that "npm install" takes.
 """
 
+import gzip
 import json
 import pathlib
 import shutil
@@ -35,13 +36,13 @@ def make_folder(modules, package):
 
 
 def archive(package, path):
-    """Writes what "npm pack" would: all files in a folder named package."""
+    """Writes what "npm pack" would, all files in a folder named package; the same bytes each time."""
     def plain(member):
         member.uid = member.gid = member.mtime = 0
         member.uname = member.gname = ""
         return member
 
-    with tarfile.open(path, "w:gz") as tar:
+    with gzip.GzipFile(path, "wb", mtime=0) as packed, tarfile.open(fileobj=packed, mode="w") as tar:
         tar.add(package, "package", filter=plain)
 
 

@@ -329,6 +329,20 @@ class ValuesTest(unittest.TestCase):
         self.assertEqual(pose.position_m, contact_pb2.Vec3(x=1, y=2, z=3))
         self.assertEqual(carillon.contacts.to_pose((1, 2, 3)), contact_pb2.Pose(position_m=pose.position_m))
 
+    def test_columns_are_the_numbers_that_were_given(self):
+        generator = numpy.random.default_rng(7)
+        # Handles of each length that a varint can have, and their neighbours.
+        handles = numpy.array([0, 1, *(2**bits + i for bits in (7, 14, 21, 28) for i in (-1, 0)), 2**32 - 1])
+        points, impulses = generator.normal(size=(2, len(handles), 3))
+        step = carillon.contacts.make_step(1, contacts=carillon.Contacts(handles, points, impulses, partners=handles),
+                                           poses=carillon.Poses(handles, points))
+        columns = step.contact_columns
+        self.assertEqual(list(columns.impulses.object), handles.tolist())
+        self.assertEqual(list(columns.partner), handles.tolist())
+        self.assertEqual(list(columns.impulses.point_m), points.astype("f4").ravel().tolist())
+        self.assertEqual(list(columns.impulses.impulse_newton_seconds), impulses.astype("f4").ravel().tolist())
+        self.assertEqual(list(step.pose_columns.position_m), points.ravel().tolist())
+
     def test_columns_that_do_not_fit_are_refused_before_they_are_sent(self):
         with self.assertRaisesRegex(ValueError, "must be N x 3"):
             carillon.contacts.make_step(0, contacts=carillon.Contacts(1, [(0, 0)], [(0, 0)]))

@@ -69,6 +69,11 @@ class ContactStreamCall final
     return absl::OkStatus();
   }
 
+  size_t WaitingStepCount() const override {
+    absl::MutexLock lock(&mutex_);
+    return queue_.size();
+  }
+
   v1::StreamContactsResponse Report() const override {
     absl::MutexLock lock(&mutex_);
     return report_;

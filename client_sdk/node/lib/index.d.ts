@@ -202,6 +202,8 @@ export class ContactStream {
   readonly report?: StreamContactsResponse__Output;
   /** Steps that were not sent, because 4096 waited. */
   readonly droppedStepCount: number;
+  /** How many steps wait for the network. */
+  readonly waitingStepCount: number;
   readonly findings?: ContactFindings__Output;
   /** Why the newest rejected contact was rejected. */
   readonly rejection?: CarillonError;

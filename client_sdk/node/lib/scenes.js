@@ -112,6 +112,11 @@ class ContactStream {
     return this.report?.rejected_count ? fromInfo(this.report.last_rejection) : undefined;
   }
 
+  /** How many steps wait for the network. */
+  get waitingStepCount() {
+    return this.call.writableLength;
+  }
+
   /**
    * Sends a step at a simulation time, seconds. Throws CarillonError if the stream has failed. The promise gives the
    * network a turn: a loop that never awaits anything sends nothing before it ends.

@@ -29,6 +29,9 @@ class ContactStream {
   /// (CONTACT_QUEUE_FULL).
   virtual absl::Status Send(v1::ContactStep step) = 0;
 
+  /// Returns the number of steps that wait for the network.
+  virtual size_t WaitingStepCount() const { return 0; }
+
   /// Returns the newest answer of the daemon: the delays in seconds, and counts since the stream
   /// was opened.
   virtual v1::StreamContactsResponse Report() const = 0;

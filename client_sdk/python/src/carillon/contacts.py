@@ -9,6 +9,7 @@ from typing import Any, Literal, Optional, Union
 import numpy
 import numpy.typing
 
+from carillon.columns import append
 from carillon.v1 import contact_pb2
 
 Array = numpy.typing.ArrayLike
@@ -166,14 +167,12 @@ def fill_impulse_columns(columns: contact_pb2.ImpulseColumns, given: Impulses) -
     """Copies the rows into the message and returns their number."""
     points, impulses = _pairs(given.points, given.impulses, "impulses")
     count = len(points)
-    columns.object.extend(handles_of(given.objects, count).tolist())
-    columns.point_m.extend(points.ravel().tolist())
-    columns.impulse_newton_seconds.extend(impulses.ravel().tolist())
+    append(columns, object=handles_of(given.objects, count), point_m=points, impulse_newton_seconds=impulses)
     if given.durations is not None:
         durations = _numbers(given.durations, count)
-        columns.duration_s.extend(numpy.where(numpy.isnan(durations), ABSENT, durations).tolist())
+        append(columns, duration_s=numpy.where(numpy.isnan(durations), ABSENT, durations))
     if given.time_offsets is not None:
-        columns.time_offset_s.extend(_numbers(given.time_offsets, count).tolist())
+        append(columns, time_offset_s=_numbers(given.time_offsets, count))
     if given.second_objects is not None:
         _fill_second_columns(columns, given, count)
     if given.striker is not None:
@@ -184,10 +183,10 @@ def fill_impulse_columns(columns: contact_pb2.ImpulseColumns, given: Impulses) -
 def _fill_second_columns(columns: contact_pb2.ImpulseColumns, given: Union[Impulses, Forces], count: int) -> None:
     if given.second_points is None:
         raise ValueError("second_objects without second_points: each contact needs a point on its second object")
-    columns.second_object.extend(handles_of(given.second_objects, count).tolist())
-    columns.second_point_m.extend(_rows(given.second_points, "second_points").ravel().tolist())
+    append(columns, second_object=handles_of(given.second_objects, count),
+           second_point_m=_rows(given.second_points, "second_points"))
     if given.second_rotations is not None:
-        columns.second_rotation.extend(_rows(given.second_rotations, "second_rotations", 4).ravel().tolist())
+        append(columns, second_rotation=_rows(given.second_rotations, "second_rotations", 4))
 
 
 def add_contacts(step: contact_pb2.ContactStep, given: Contacts) -> int:
@@ -195,9 +194,9 @@ def add_contacts(step: contact_pb2.ContactStep, given: Contacts) -> int:
     columns = step.contact_columns
     count = fill_impulse_columns(columns.impulses, given)
     if given.partners is not None:
-        columns.partner.extend(handles_of(given.partners, count).tolist())
+        append(columns, partner=handles_of(given.partners, count))
     if given.travel_speeds is not None:
-        columns.travel_speed_m_per_s.extend(_numbers(given.travel_speeds, count).tolist())
+        append(columns, travel_speed_m_per_s=_numbers(given.travel_speeds, count))
     columns.depth = given.roughness_depth
     columns.irregularity_length_m = given.irregularity_length
     return count
@@ -235,10 +234,9 @@ def _second_object(columns: contact_pb2.ImpulseColumns, i: int) -> contact_pb2.S
 
 def add_poses(step: contact_pb2.ContactStep, given: Poses) -> None:
     positions = _rows(given.positions, "positions")
-    step.pose_columns.object.extend(handles_of(given.objects, len(positions)).tolist())
-    step.pose_columns.position_m.extend(positions.ravel().tolist())
+    append(step.pose_columns, object=handles_of(given.objects, len(positions)), position_m=positions)
     if given.orientations is not None:
-        step.pose_columns.orientation.extend(_rows(given.orientations, "orientations", 4).ravel().tolist())
+        append(step.pose_columns, orientation=_rows(given.orientations, "orientations", 4))
 
 
 def make_step(time: float, *, contacts: Optional[Contacts] = None, impulses: Optional[Impulses] = None,

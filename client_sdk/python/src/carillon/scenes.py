@@ -152,6 +152,11 @@ class ContactStream:
         """Why the newest rejected contact was rejected; None if none was so far."""
         return errors.from_info(self.report.last_rejection) if self.report.rejected_count else None
 
+    @property
+    def waiting_step_count(self) -> int:
+        """How many steps wait for the network."""
+        return self._requests.qsize()
+
     def step(self, time: float, *, contacts: Optional[Contacts] = None, impulses: Optional[Impulses] = None,
              forces: Optional[Forces] = None, poses: Optional[Poses] = None,
              listener: Optional[PoseLike] = None) -> None:

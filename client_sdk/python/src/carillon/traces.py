@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, BinaryIO, Optional
 from google.protobuf.message import DecodeError
 
 from carillon import contacts, materials
+from carillon.columns import varint
 from carillon.contacts import Contacts, Forces, Impulses, PoseLike, Poses, make_step
 from carillon.errors import CarillonError
 from carillon.v1 import contact_pb2, contact_trace_pb2, hearing_pb2
@@ -65,7 +66,7 @@ class Trace:
         with open(path, "wb") as file:
             for record in self.records():
                 data = record.SerializeToString(deterministic=True)
-                file.write(_varint(len(data)) + data)
+                file.write(varint(len(data)) + data)
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Trace:
@@ -87,14 +88,6 @@ class Trace:
             raise CarillonError("TRACE_MALFORMED", f"{path} has format version {trace.header.format_version}; this "
                                 f"program reads {FORMAT_VERSION}")
         return trace
-
-
-def _varint(number: int) -> bytes:
-    out = bytearray()
-    while number > 0x7F:
-        out.append(number & 0x7F | 0x80)
-        number >>= 7
-    return bytes([*out, number])
 
 
 def _read_varint(file: BinaryIO) -> Optional[int]:

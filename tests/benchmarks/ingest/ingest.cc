@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Sends impulses to a scene as fast as the daemon takes them, or at a rate, and prints the counts.
+// Usage: ingest SERVER SCENE rows|columns IMPULSES_A_MESSAGE SECONDS DELAY_S MESSAGES_A_SECOND
+// The scene's objects have the handles 1 to 16. Zero messages a second: as fast as possible.
+
+#include <carillon/client.h>
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstdlib>
+#include <iostream>
+#include <memory>
+#include <string>
+#include <thread>
+
+namespace {
+
+using std::chrono::steady_clock;
+
+constexpr uint32_t kObjectCount = 16;
+constexpr std::array<float, 3> kPointM = {0, 0.008F, 0.01F};
+constexpr std::array<float, 3> kImpulseNewtonSeconds = {0, 0, -1e-5F};
+constexpr float kDurationS = 1e-3F;
+// Steps that may wait before the sender rests; the client would refuse them at 4096.
+constexpr size_t kMostWaiting = 256;
+
+struct Options {
+  bool columns = false;
+  uint32_t impulse_count = 1;
+  double seconds = 1;
+  double messages_per_second = 0;
+};
+
+void AddColumns(uint32_t count, carillon::v1::ImpulseColumns& columns) {
+  for (uint32_t i = 0; i < count; ++i) {
+    columns.add_object(1 + i % kObjectCount);
+    columns.mutable_point_m()->Add(kPointM.begin(), kPointM.end());
+    columns.mutable_impulse_newton_seconds()->Add(kImpulseNewtonSeconds.begin(),
+                                                  kImpulseNewtonSeconds.end());
+    columns.add_duration_s(kDurationS);
+  }
+}
+
+void AddRow(uint32_t i, carillon::v1::ContactStep& step) {
+  carillon::v1::Impulse& impulse = *step.add_impulses();
+  impulse.set_object(1 + i % kObjectCount);
+  impulse.mutable_point_m()->set_y(kPointM[1]);
+  impulse.mutable_point_m()->set_z(kPointM[2]);
+  impulse.mutable_impulse_newton_seconds()->set_z(kImpulseNewtonSeconds[2]);
+  impulse.set_duration_s(kDurationS);
+}
+
+carillon::v1::ContactStep MakeStep(double time_s, const Options& options) {
+  carillon::v1::ContactStep step;
+  step.set_time_s(time_s);
+  if (options.columns) AddColumns(options.impulse_count, *step.mutable_columns());
+  for (uint32_t i = 0; !options.columns && i < options.impulse_count; ++i) AddRow(i, step);
+  return step;
+}
+
+void SendAll(const Options& options, carillon::client::ContactStream& stream) {
+  const steady_clock::time_point begin = steady_clock::now();
+  const auto elapsed_s = [begin] {
+    return std::chrono::duration<double>(steady_clock::now() - begin).count();
+  };
+  for (uint64_t number = 0; elapsed_s() < options.seconds; ++number) {
+    if (options.messages_per_second > 0) {
+      const std::chrono::duration<double> due(static_cast<double>(number) /
+                                              options.messages_per_second);
+      std::this_thread::sleep_until(begin +
+                                    std::chrono::duration_cast<steady_clock::duration>(due));
+    }
+    while (stream.WaitingStepCount() >= kMostWaiting) {
+      std::this_thread::sleep_for(std::chrono::microseconds(200));
+    }
+    if (!stream.Send(MakeStep(elapsed_s(), options)).ok()) return;
+  }
+}
+
+double Seconds(const timeval& time) {
+  return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+}
+
+double CpuS() {
+  rusage used{};
+  getrusage(RUSAGE_SELF, &used);
+  return Seconds(used.ru_utime) + Seconds(used.ru_stime);
+}
+
+int Run(const std::string& server, const carillon::v1::ContactStreamStart& start,
+        const Options& options) {
+  const auto client = carillon::client::Connect(server);
+  auto stream = client->StreamContacts(start);
+  if (!stream.ok()) return 1;
+  const double cpu_before_s = CpuS();
+  const steady_clock::time_point begin = steady_clock::now();
+  SendAll(options, **stream);
+  const auto report = (*stream)->Finish();
+  if (!report.ok()) return 1;
+  const std::chrono::duration<double> seconds = steady_clock::now() - begin;
+  std::cout << "{\"seconds\": " << seconds.count() << ", \"cpu_s\": " << CpuS() - cpu_before_s
+            << ", \"accepted\": " << report->accepted_count()
+            << ", \"late\": " << report->late_count()
+            << ", \"dropped\": " << report->dropped_count()
+            << ", \"rejected\": " << report->rejected_count()
+            << ", \"steps\": " << report->step_count() << "}\n";
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 8) return 2;
+  carillon::v1::ContactStreamStart start;
+  start.set_scene(argv[2]);
+  start.set_step_s(1e-3);
+  start.set_scheduling_delay_s(std::atof(argv[6]));
+  Options options;
+  options.columns = argv[3] == std::string("columns");
+  options.impulse_count = static_cast<uint32_t>(std::atoi(argv[4]));
+  options.seconds = std::atof(argv[5]);
+  options.messages_per_second = std::atof(argv[7]);
+  return Run(argv[1], start, options);
+}
