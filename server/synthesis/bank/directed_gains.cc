@@ -157,6 +157,7 @@ DirectedGains::Number DirectedGains::FarPattern(size_t first, size_t end) const 
 DirectedGains::Number DirectedGains::NearPattern(size_t first, size_t end,
                                                  double kr) const noexcept {
   Number sum, before{.re = 1}, factor{.re = 1};  // f_(l-1) and f_l
+  const double per_kr = 1 / kr;
   for (size_t l = 0, i = first; i < end; ++l) {
     size_t next = i;
     while (next < end && directivity_.harmonics[next] < (l + 1) * (l + 1)) ++next;
@@ -164,7 +165,7 @@ DirectedGains::Number DirectedGains::NearPattern(size_t first, size_t end,
     i = next;
     sum.re += factor.re * part.re - factor.im * part.im;
     sum.im += factor.re * part.im + factor.im * part.re;
-    const double rise = static_cast<double>(2 * l + 1) / kr;
+    const double rise = static_cast<double>(2 * l + 1) * per_kr;
     before = std::exchange(
         factor, {.re = before.re - rise * factor.im, .im = before.im + rise * factor.re});
   }
