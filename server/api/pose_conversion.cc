@@ -31,7 +31,9 @@ v1::Pose ToProto(const Pose& pose) {
 SceneSpace ToSceneSpace(const v1::Hearing& hearing, const v1::Pose& listener) {
   SceneSpace space{.hearing = {.distance_gain = hearing.distance_gain(),
                                .propagation_delay = hearing.propagation_delay(),
-                               .panning = hearing.panning()},
+                               .panning = hearing.panning(),
+                               .directivity = hearing.directivity(),
+                               .near_field = hearing.near_field()},
                    .listener = FromProto(listener)};
   if (hearing.reference_distance_m() != 0) {
     space.hearing.reference_distance_m = hearing.reference_distance_m();

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <vector>
 
 namespace carillon {
@@ -14,6 +16,14 @@ struct Transfer {
   /// #m: integral of each mode's squared far pattern over all directions, m^4/kg, for unit density
   /// and size. A mode that was not computed has the efficiency of the nearest one that was.
   std::vector<float> power_integrals;
+  std::array<double, 3> center_m{};  ///< from which directions are measured, in the body's frame
+  double radius_m = 0;               ///< of the sphere about the centre that encloses the body
+  /// #m + 1: mode i has the harmonics first[i] to first[i + 1] - 1; none if it was not computed.
+  std::vector<uint32_t> first;
+  std::vector<uint32_t> harmonics;  ///< l^2 + l + m, ascending in each mode
+  /// The coefficients (-i)^(l + 1) c_lm of the far pattern, scaled so that the sum of their squared
+  /// magnitudes is one for each mode.
+  std::vector<float> pattern_re{}, pattern_im{};
 };
 
 }  // namespace carillon

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <cstring>
 #include <fstream>
 #include <iterator>
@@ -26,9 +27,20 @@ namespace {
 constexpr uint64_t kMostArrayBytes = uint64_t{1} << 30;
 
 /// Indices into kTransferArrays.
-enum : size_t { kEigenvalues, kStates, kPowerIntegrals, kNormalEnergies, kFirst = 7, kHarmonics };
+enum : size_t {
+  kEigenvalues,
+  kStates,
+  kPowerIntegrals,
+  kNormalEnergies,
+  kFirst = 7,
+  kHarmonics,
+  kCoefficients
+};
 static_assert(std::string_view(kTransferArrays[kFirst].name) == "first");
 static_assert(std::string_view(kTransferArrays[kHarmonics].name) == "harmonics");
+static_assert(std::string_view(kTransferArrays[kCoefficients].name) == "coefficients");
+/// The least index l^2 + l + m of an order that no transfer has: 600 harmonics around a body.
+constexpr uint32_t kLeastBadHarmonic = 601 * 601;
 
 absl::Status Malformed(absl::string_view what) {
   return Refusal(absl::StatusCode::kInvalidArgument, "TRANSFER_MALFORMED",
@@ -97,6 +109,41 @@ void EstimateMissing(const std::vector<double>& eigenvalues, const std::vector<u
     integrals[m] =
         static_cast<float>(double{integrals[*nearest]} * eigenvalues[*nearest] /
                            normal_energies[*nearest] * normal_energies[m] / eigenvalues[m]);
+  }
+}
+
+/// Whether each mode's harmonics ascend and are of possible orders.
+bool AreHarmonics(const std::vector<uint32_t>& first, const std::vector<uint32_t>& harmonics) {
+  for (size_t m = 0; m + 1 < first.size(); ++m) {
+    for (size_t i = first[m]; i < first[m + 1]; ++i) {
+      if (harmonics[i] >= kLeastBadHarmonic) return false;
+      if (i > first[m] && harmonics[i] <= harmonics[i - 1]) return false;
+    }
+  }
+  return true;
+}
+
+/// Turns the coefficients c_lm into those of the far pattern, of unit power.
+void SetPatterns(const std::vector<float>& coefficients, Transfer& transfer) {
+  const size_t count = transfer.harmonics.size();
+  transfer.pattern_re.resize(count);
+  transfer.pattern_im.resize(count);
+  for (size_t m = 0; m + 1 < transfer.first.size(); ++m) {
+    const size_t end = transfer.first[m + 1];
+    double square = 0;
+    for (size_t i = 2 * transfer.first[m]; i < 2 * end; ++i) {
+      square += double{coefficients[i]} * coefficients[i];
+    }
+    const double scale = square > 0 ? 1 / std::sqrt(square) : 0;
+    for (size_t i = transfer.first[m]; i < end; ++i) {
+      const auto order = static_cast<int>(std::sqrt(static_cast<double>(transfer.harmonics[i])));
+      constexpr std::complex<double> kTurns[] = {{1, 0}, {0, -1}, {-1, 0}, {0, 1}};  // (-i)^n
+      const std::complex<double> pattern =
+          scale * kTurns[(order + 1) % 4] *
+          std::complex<double>(coefficients[2 * i], coefficients[2 * i + 1]);
+      transfer.pattern_re[i] = static_cast<float>(pattern.real());
+      transfer.pattern_im[i] = static_cast<float>(pattern.imag());
+    }
   }
 }
 
@@ -210,7 +257,7 @@ absl::Status StoredTransfer::CheckNumbers() const {
   }
   const std::vector<uint32_t> first = Array<uint32_t>(kFirst);
   good = good && first.front() == 0 && first.back() == sizes.harmonics &&
-         std::ranges::is_sorted(first);
+         std::ranges::is_sorted(first) && AreHarmonics(first, Array<uint32_t>(kHarmonics));
   if (good) return absl::OkStatus();
   return Malformed("a number is not finite, out of range or out of order");
 }
@@ -226,10 +273,16 @@ std::vector<T> StoredTransfer::Array(size_t index) const {
 std::vector<double> StoredTransfer::Eigenvalues() const { return Array<double>(kEigenvalues); }
 
 Transfer StoredTransfer::Decode() const {
-  Transfer transfer{.speed_ratio = header_.speed_ratio(),
-                    .sound_speed_m_per_s = header_.sound_speed_m_per_s(),
-                    .air_density_kg_per_m3 = header_.air_density_kg_per_m3(),
-                    .power_integrals = Array<float>(kPowerIntegrals)};
+  Transfer transfer{
+      .speed_ratio = header_.speed_ratio(),
+      .sound_speed_m_per_s = header_.sound_speed_m_per_s(),
+      .air_density_kg_per_m3 = header_.air_density_kg_per_m3(),
+      .power_integrals = Array<float>(kPowerIntegrals),
+      .center_m = {header_.center_m().x(), header_.center_m().y(), header_.center_m().z()},
+      .radius_m = header_.radius_m(),
+      .first = Array<uint32_t>(kFirst),
+      .harmonics = Array<uint32_t>(kHarmonics)};
+  SetPatterns(Array<float>(kCoefficients), transfer);
   EstimateMissing(Eigenvalues(), Array<uint32_t>(kStates), Array<float>(kNormalEnergies),
                   transfer.power_integrals);
   return transfer;

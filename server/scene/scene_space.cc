@@ -16,12 +16,19 @@ absl::Status InRange(absl::string_view what, double value, double least, double 
 }
 
 Place PlaceOf(const Pose& pose) {
-  return {.position_m = pose.position_m, .right = Rotated({1, 0, 0}, Normalized(pose.orientation))};
+  const Quaternion orientation = Normalized(pose.orientation);
+  return {.position_m = pose.position_m,
+          .right = Rotated({1, 0, 0}, orientation),
+          .orientation = orientation};
 }
 
 }  // namespace
 
 absl::Status Validate(const SceneSpace& space) {
+  if (space.hearing.near_field && !space.hearing.directivity) {
+    return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_HEARING",
+                   "near_field needs directivity, whose gains it changes: set both");
+  }
   absl::Status status =
       InRange("reference_distance_m", space.hearing.reference_distance_m, 0.01, 1000);
   if (!status.ok()) return status;
@@ -45,6 +52,10 @@ Motion MotionTo(const Pose& pose, double glide_frames) {
   const auto narrow = [](double x) { return static_cast<float>(x); };
   std::ranges::transform(place.position_m, motion.position_m.begin(), narrow);
   std::ranges::transform(place.right, motion.right.begin(), narrow);
+  const Quaternion& q = place.orientation;
+  const double sign = q.w < 0 ? -1 : 1;
+  std::ranges::transform(std::array{sign * q.x, sign * q.y, sign * q.z}, motion.orientation.begin(),
+                         narrow);
   return motion;
 }
 

@@ -70,6 +70,23 @@ Radiation RadiationOf(const Transfer* transfer) {
           .sound_speed_m_per_s = transfer->sound_speed_m_per_s};
 }
 
+/// The directions of an object that is heard through `voice`; absent: it radiates equally in all of
+/// them.
+std::optional<HeardDirectivity> DirectivityOf(const std::shared_ptr<const Transfer>& transfer,
+                                              const Voice* voice, double size) {
+  if (transfer == nullptr || voice == nullptr || !voice->hearing().directivity) return std::nullopt;
+  return HeardDirectivity{.directivity = {.first = transfer->first,
+                                          .harmonics = transfer->harmonics,
+                                          .pattern_re = transfer->pattern_re,
+                                          .pattern_im = transfer->pattern_im,
+                                          .center_m = transfer->center_m,
+                                          .radius_m = transfer->radius_m,
+                                          .owner = transfer},
+                          .size = size,
+                          .sound_speed_m_per_s = transfer->sound_speed_m_per_s,
+                          .near_field = voice->hearing().near_field};
+}
+
 /// Returns the frequency up to which the model is complete, unless that is the top of the band.
 std::optional<double> CompleteTo(const ModalModel& model, const SoundingMaterial& material,
                                  double top_hz) {
@@ -102,10 +119,11 @@ absl::StatusOr<SoundingObject> MakeSoundingObject(std::shared_ptr<const Sounding
                                                   TransferStore* transfers) {
   const ModalModel& model = *body->model;
   RETURN_IF_ERROR(Check(model, properties));
-  const SoundingBand band;
   const MixerSettings& settings = mixer.settings();
   ASSIGN_OR_RETURN(std::shared_ptr<const Transfer> transfer,
                    ChooseTransfer(model, properties, transfers));
+  auto directivity = DirectivityOf(transfer, voice.get(), properties.material.size);
+  const SoundingBand band{.directed = directivity.has_value()};
   const ModeTable table{model.eigenvalues, model.couplings, RadiationOf(transfer.get())};
   const SoundingModes sounding =
       SelectSoundingModes(table, properties.material, settings.sample_rate_hz, band);
@@ -114,7 +132,8 @@ absl::StatusOr<SoundingObject> MakeSoundingObject(std::shared_ptr<const Sounding
       sounding, body->shapes,
       OscillatorBankSettings{.sample_rate_hz = settings.sample_rate_hz,
                              .block_frame_count = settings.block_frame_count,
-                             .gain = properties.gain});
+                             .gain = properties.gain,
+                             .directivity = std::move(directivity)});
   ASSIGN_OR_RETURN(const BankId bank, mixer.Add(std::move(oscillators), voice));
   const double top_hz = std::min(band.highest_hz, settings.sample_rate_hz / 2);
   return SoundingObject{.body = std::move(body),

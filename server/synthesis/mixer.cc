@@ -80,6 +80,9 @@ void Mixer::Execute(const Command& command) noexcept {
     ++command.voice->bank_count;
     // A voice is fed in the time domain.
     command.bank->LeaveSpectrum();
+    if (const DirectedGains* gains = command.bank->gains()) {
+      command.voice->SetCenter(gains->center_m());
+    }
   } else if (BankSlot* slot = FindSlot(command.id)) {  // null: it rang out before it was to fade
     if (!slot->leaving) leaving_.push_back(command.id.slot);
     slot->leaving = true;

@@ -105,6 +105,7 @@ bool RenderSection::Apply(BankSlot& slot, std::span<const DueEvent> due) noexcep
   const DueEvent& first = due.front();
   const MixerEvent& event = *first.event;
   OscillatorBank& bank = *slot.bank;
+  if (CanAwaken(event)) SetGains(slot);
   if (first.merged) return bank.StrikeMerged(due, mix_);
   if (const SurfaceImpulse* impulse = event.impulse()) {
     return bank.Strike(*impulse, first.offset, event.LeadFrames(), mix_);
@@ -120,11 +121,18 @@ void RenderSection::RenderBank(BankSlot& slot, SectionCounts& counts) noexcept {
   if (slot.rendered || (slot.fading && slot.bank->out_of_spectrum())) return;
   slot.rendered = true;
   if (slot.voice != nullptr) mix_.SetApart(settings_.block_frame_count);
+  SetGains(slot);
   if (!slot.bank->RenderAdd(mix_)) ++counts.reset_bank_count;
   if (slot.voice == nullptr) return;
   Wake(*slot.voice);
   mix_.TakeApart(slot.voice->input());
   mix_.Reunite();
+}
+
+void RenderSection::SetGains(BankSlot& slot) noexcept {
+  DirectedGains* gains = slot.bank->gains();
+  if (slot.voice == nullptr || gains == nullptr) return;
+  gains->BeginBlock(mix_.block_number(), slot.voice->BearingOfListener());
 }
 
 bool RenderSection::Move(Voice* voice, const MixerEvent& event, size_t offset) noexcept {
@@ -156,7 +164,8 @@ void RenderSection::RenderFading(BankSlot& slot, std::span<float> block,
                                  SectionCounts& counts) noexcept {
   std::array<float, kMostBlockFrames> faded{};
   mix_.SetApart(block.size());
-  if (!slot.bank->RenderAddInTime(mix_.lanes())) ++counts.reset_bank_count;
+  SetGains(slot);
+  if (!slot.bank->RenderAddInTime(mix_)) ++counts.reset_bank_count;
   mix_.TakeApart(std::span(faded).first(block.size()));
   mix_.Reunite();
   for (size_t n = 0; n < block.size(); ++n) {

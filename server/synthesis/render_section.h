@@ -65,6 +65,8 @@ class RenderSection {
   void FinishBanks(std::span<float> block, SectionCounts& counts) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
+  /// Turns the gains of a bank with directivity towards the listener, once in a block.
+  void SetGains(BankSlot& slot) noexcept;
   bool Move(Voice* voice, const MixerEvent& event, size_t offset) noexcept;
   void Wake(Voice& voice) noexcept;
   void RenderVoices(std::span<float> placed, SectionCounts& counts) noexcept;

@@ -22,11 +22,11 @@ def impulse(point, force, handle=1, duration_s=0.0):
         duration_s=duration_s)
 
 
-def write_trace(path, objects, steps, step_s=0.01):
+def write_trace(path, objects, steps, step_s=0.01, **header_fields):
     """A trace as any simulator would write it: each record after its length."""
     record = contact_trace_pb2.ContactTraceRecord
     header = contact_trace_pb2.ContactTraceHeader(format_version=1, simulator="test",
-                                                  step_s=step_s)
+                                                  step_s=step_s, **header_fields)
     records = [record(header=header)]
     records += [record(object=o) for o in objects]
     records += [record(step=s) for s in steps]
@@ -46,10 +46,10 @@ def read_wave(path):
     return words.view("<i4").reshape(-1, channels) / 2**31
 
 
-def render(daemon, objects, steps, tail_s):
+def render(daemon, objects, steps, tail_s, **header_fields):
     """Renders through the command line; (samples of the first channel, summary)."""
     trace, out = daemon.folder / "trace.contacts", daemon.folder / "trace.wav"
-    write_trace(trace, objects, steps)
+    write_trace(trace, objects, steps, **header_fields)
     printed = daemon.command("--json", "render", trace, "--out", out, "--sample-rate", RATE,
                              "--tail", tail_s)
     return read_wave(out)[:, 0], json.loads(printed.stdout)

@@ -11,8 +11,8 @@ import numpy
 import meshes
 import scripted
 import sound
-from carillon.v1 import (contact_pb2, contact_trace_pb2, decomposition_pb2, decomposition_service_pb2, material_pb2,
-                         radiation_pb2, scene_service_pb2, transfer_pb2)
+from carillon.v1 import (contact_pb2, contact_trace_pb2, decomposition_pb2, decomposition_service_pb2, hearing_pb2,
+                         material_pb2, radiation_pb2, scene_service_pb2, transfer_pb2)
 from daemon import BIN, Daemon
 
 MATERIAL = material_pb2.Material(preset=meshes.MATERIAL)
@@ -27,6 +27,35 @@ if grep -q radiate_stored_model "$request"; then
 fi
 exec BIN/carillon-precompute "$@"
 """.replace("BIN", str(BIN))
+
+
+def real_harmonic(order, m, direction):
+    """Y_lm of transfer.proto."""
+    x, y, z = direction
+    turn = complex(x, y) ** abs(m)
+    legendre = numpy.polynomial.legendre.Legendre.basis(order).deriv(abs(m))(z)
+    scale = math.sqrt((2 * order + 1) / (4 * math.pi) * math.factorial(order - abs(m)) / math.factorial(order + abs(m)))
+    return scale * legendre * (1 if m == 0 else math.sqrt(2) * (turn.real if m > 0 else turn.imag))
+
+
+def hankel(order, x):
+    """h_l of the first kind, by its finite sum."""
+    return (-1j) ** (order + 1) * numpy.exp(1j * x) / x * sum(
+        (1j / (2 * x)) ** k * math.factorial(order + k) / (math.factorial(k) * math.factorial(order - k))
+        for k in range(order + 1))
+
+
+def relative_pressure(arrays, mode, kr, direction):
+    """|sum of c_lm h_l Y_lm|, relative to the same power radiated equally in all directions."""
+    kept = range(arrays["first"][mode], arrays["first"][mode + 1])
+    pairs = arrays["coefficients"].reshape(-1, 2)
+    total, squares = 0, 0
+    for i in kept:
+        order = math.isqrt(int(arrays["harmonics"][i]))
+        m = int(arrays["harmonics"][i]) - order * order - order
+        total += complex(*pairs[i]) * hankel(order, kr) * real_harmonic(order, m, direction)
+        squares += pairs[i] @ pairs[i]
+    return abs(total) * kr * math.sqrt(4 * math.pi / squares)
 
 
 class TransferTest(unittest.TestCase):
@@ -58,18 +87,18 @@ class TransferTest(unittest.TestCase):
             scene=scene, modal_model=model, material=MATERIAL)).object
         return added.name, added.radiation
 
-    def render(self, model, radiation):
+    def render(self, model, radiation, **header_fields):
         """The bar struck across its broad side at an end."""
         length, width, height = meshes.BAR_SIZE
         placed = contact_trace_pb2.ContactTraceObject(
             handle=1, modal_model=model, material=MATERIAL, radiation=radiation)
         step = contact_pb2.ContactStep(time_s=0, impulses=[
             sound.impulse((length, width, height), (0, 0.3e-3, -1e-3))])
-        samples, _ = sound.render(self.daemon, [placed], [step], 0.5)
+        samples, _ = sound.render(self.daemon, [placed], [step], 0.5, **header_fields)
         return samples
 
     def arrays(self, model):
-        """The numbers of the model and of its transfer by name, out of an exported file."""
+        """The numbers of the model and of its transfer by name, out of an exported file, and the transfer's centre."""
         file = self.folder / "exported.model"
         self.daemon.command("model", "export", model, "--out", file)
         types = {1: numpy.float32, 2: numpy.float64, 3: numpy.uint32}
@@ -79,6 +108,9 @@ class TransferTest(unittest.TestCase):
                 record = transfer_pb2.TransferRecord.FromString(record.transfer)
             if record.HasField("header"):
                 described = record.header.arrays
+                if isinstance(record, transfer_pb2.TransferRecord):
+                    center = record.header.center_m
+                    data["center_m"] = [numpy.array([center.x, center.y, center.z])]
             else:
                 array = described[record.chunk.array]
                 data.setdefault(array.name, []).append(
@@ -130,6 +162,32 @@ class TransferTest(unittest.TestCase):
             self.assertAlmostEqual(old.decay_per_s - new.decay_per_s, decay, delta=0.05)
         # The lowest bending mode of so slender a bar hardly radiates.
         self.assertLess(changes_db[0], changes_db[2])
+
+    def test_a_bar_is_heard_from_each_direction_as_its_sound_field_says_near_and_far(self):
+        (self.folder / "enough").touch()
+        model = self.client.wait(self.client.create(meshes.bar(), "obj", material=MATERIAL, max_frequency_hz=8000))
+        self.await_transfer()
+        arrays = self.arrays(model)
+        power = radiation_pb2.RADIATION_MODEL_RADIATED_POWER
+        everywhere = self.render(model, power)
+        hearing = hearing_pb2.Hearing(directivity=True, near_field=True)
+        for distance_m in (0.15, 30):
+            for theta, phi in ((0.4, 0.2), (1.1, 1.4), (2.5, -2.0)):
+                direction = numpy.array([math.sin(theta) * math.cos(phi), math.sin(theta) * math.sin(phi),
+                                         math.cos(theta)])
+                x, y, z = arrays["center_m"] + distance_m * direction
+                listener = contact_pb2.Pose(position_m=contact_pb2.Vec3(x=x, y=y, z=z))
+                heard = self.render(model, power, hearing=hearing, listener=listener)
+                for m in range(3):
+                    self.assert_heard(arrays, m, distance_m, direction, heard, everywhere)
+
+    def assert_heard(self, arrays, m, distance_m, direction, heard, everywhere):
+        omega = math.sqrt(arrays["eigenvalues"][m] * meshes.YOUNG_PA / meshes.DENSITY)
+        gain = relative_pressure(arrays, m, omega / SOUND_SPEED * distance_m, direction)
+        old, new = (sound.measure(samples, omega / (2 * math.pi), 0.1, 0.4) for samples in (everywhere, heard))
+        if gain > 0.3:  # what is quieter drowns in the rounding of 24-bit samples
+            self.assertAlmostEqual(20 * math.log10(new.amplitude / old.amplitude), 20 * math.log10(gain), delta=0.1,
+                                   msg=f"mode {m} at {distance_m} m, {direction}")
 
     def test_an_export_brings_the_transfer_to_another_daemon(self):
         (self.folder / "enough").touch()

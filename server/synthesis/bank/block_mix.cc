@@ -29,6 +29,7 @@ BlockMix::BlockMix(size_t block_frame_count, size_t stagger)
 
 void BlockMix::Begin(uint64_t block_number, RenderWorkspace& workspace) noexcept {
   workspace_ = &workspace;
+  block_number_ = block_number;
   any_begins_ = false;
   for (size_t kind = 0; kind < kLongBlockKinds; ++kind) {
     const size_t count = long_blocks_[kind].block_count;
@@ -45,13 +46,28 @@ bool BlockMix::idle() const noexcept {
 
 void BlockMix::SetApart(size_t block_frame_count) noexcept {
   if (!apart_) workspace_->lanes_apart.Clear(block_frame_count);
+  if (!apart_) fades_ = false;
   apart_ = true;
+}
+
+LaneMix& BlockMix::fading(size_t block_frame_count) noexcept {
+  assert(apart_);
+  if (!std::exchange(fades_, true)) workspace_->lanes_fading.Clear(block_frame_count);
+  return workspace_->lanes_fading;
 }
 
 void BlockMix::TakeApart(std::span<float> frames) noexcept {
   std::array<float, kMostBlockFrames> apart;
   const std::span<float> block = std::span(apart).first(frames.size());
   workspace_->lanes_apart.Reduce(block);
+  if (fades_) {
+    std::array<float, kMostBlockFrames> fading;
+    workspace_->lanes_fading.Reduce(std::span(fading).first(frames.size()));
+    const float step = 1 / static_cast<float>(frames.size());
+    for (size_t n = 0; n < frames.size(); ++n) {
+      block[n] = fading[n] + static_cast<float>(n) * step * (block[n] - fading[n]);
+    }
+  }
   for (size_t n = 0; n < frames.size(); ++n) frames[n] += block[n];
 }
 

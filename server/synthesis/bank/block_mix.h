@@ -20,7 +20,7 @@ struct RenderWorkspace {
 
   StrikeBatch batch;
   std::array<Spectrum, kLongBlockKinds> spectra;
-  LaneMix lanes, lanes_apart;
+  LaneMix lanes, lanes_apart, lanes_fading, lanes_unheard;
 };
 
 /// The sum of some banks' sound, block by block: of the banks that ring in the time domain and of
@@ -38,6 +38,9 @@ class BlockMix {
 
   /// Writes the block.
   void Finish(std::span<float> block) noexcept;
+
+  /// Number of the block.
+  uint64_t block_number() const noexcept { return block_number_; }
 
   /// Whether a long block of this kind begins in this block.
   bool begins(size_t kind) const noexcept { return begins_[kind]; }
@@ -61,7 +64,14 @@ class BlockMix {
   /// Redirects lanes() to a private buffer until Reunite(). Calling it again before then has no
   /// effect.
   void SetApart(size_t block_frame_count) noexcept;
-  /// Adds the sound in the private buffer to `frames`.
+  /// A second private buffer while the bank is apart: its sound is faded out over the block, while
+  /// that of lanes() is faded in. Without a call, lanes() sounds at its full level.
+  LaneMix& fading(size_t block_frame_count) noexcept;
+
+  /// Takes sound that is rendered for the sake of the states only.
+  LaneMix& unheard() noexcept { return workspace_->lanes_unheard; }
+
+  /// Adds the sound in the private buffers to `frames`.
   void TakeApart(std::span<float> frames) noexcept;
   void Reunite() noexcept { apart_ = false; }
 
@@ -78,10 +88,11 @@ class BlockMix {
   std::array<LongBlock, kLongBlockKinds> long_blocks_;
   size_t stagger_;
   RenderWorkspace* workspace_ = nullptr;
+  uint64_t block_number_ = 0;
   std::array<bool, kLongBlockKinds> begins_{}, used_{};
   bool any_begins_ = false;
   std::array<Rendered, kLongBlockKinds> rendered_;
-  bool apart_ = false;
+  bool apart_ = false, fades_ = false;
 };
 
 }  // namespace carillon

@@ -91,7 +91,7 @@ LanePlan PlanLanes(const SoundingModes& sounding, const ShapeTable& shapes,
     const double gain = sounding.shape_scale * kSamplesPerVolumeVelocity * settings.gain *
                         double{shapes.scale(mode.column)};
     Place(PlanLane(mode, settings, gain, false), settings.block_frame_count, plan);
-    if (mode.output_phase_rad == 0) continue;
+    if (mode.output_phase_rad == 0 && !settings.directed) continue;
     Place(PlanLane(mode, settings, gain, true), settings.block_frame_count, plan);
   }
   FillVectors(settings.block_frame_count, plan);

@@ -45,6 +45,7 @@ struct LanePlanSettings {
   double sample_rate_hz = 0;
   size_t block_frame_count = 0;
   double gain = 1;
+  bool directed = false;  ///< every mode has a companion, because its gain may have any phase
 };
 
 LanePlan PlanLanes(const SoundingModes& sounding, const ShapeTable& shapes,

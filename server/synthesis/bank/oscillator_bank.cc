@@ -30,17 +30,23 @@ bool OscillatorBank::RenderAdd(BlockMix& mix) noexcept {
       return true;
     }
     BeginBlock(mix);
-    return RenderAddInTime(mix.lanes());
+    return RenderAddInTime(mix);
   }
   BeginStrikes(mix);
   return FinishStruck(mix);
 }
 
-bool OscillatorBank::RenderAddInTime(LaneMix& mix) noexcept {
-  block_.finite &= ring_kernel::RingFreely(lanes_, segments_,
-                                           {.sums = Sums(mix.nodes(), block_frame_count_, mix),
-                                            .frame_count = block_frame_count_,
-                                            .silence_squared = silence_squared_});
+bool OscillatorBank::RenderAddInTime(BlockMix& mix) noexcept {
+  const auto output = [this](LaneMix& lanes, const ring_kernel::Gains& gains) {
+    return ring_kernel::Output{.sums = Sums(lanes.nodes(), block_frame_count_, lanes),
+                               .gains = gains};
+  };
+  ring_kernel::FreeBlock block{
+      .output = output(mix.lanes(), gains_ ? gains_->at_end() : ring_kernel::Gains{}),
+      .frame_count = block_frame_count_,
+      .silence_squared = silence_squared_};
+  if (gains_move()) block.second = output(mix.fading(block_frame_count_), gains_->at_begin());
+  block_.finite &= ring_kernel::RingFreely(lanes_, segments_, block);
   return EndBlock();
 }
 
@@ -132,6 +138,12 @@ void OscillatorBank::Silence() noexcept {
   }
 }
 
+double OscillatorBank::ringing_work() const noexcept {
+  if (gains_ == nullptr) return ringing_work_;
+  // While the gains move, the lanes are rendered twice.
+  return 2 * ringing_work_ + work::kDirectedTerm * static_cast<double>(gains_->terms_per_block());
+}
+
 double OscillatorBank::strike_work() const noexcept {
   return work::kStrikeLane * static_cast<double>(lane_count_);
 }
@@ -143,7 +155,9 @@ double OscillatorBank::merged_strike_work() const noexcept {
 double OscillatorBank::awakening_work() const noexcept {
   size_t asleep_count = lane_count_;
   for (const RingingSegment& segment : segments_) asleep_count -= segment.awake_count;
-  return TimeWork(asleep_count);
+  if (gains_ == nullptr) return TimeWork(asleep_count);
+  return 2 * TimeWork(asleep_count) +
+         work::kDirectedTerm * static_cast<double>(gains_->term_count());
 }
 
 double OscillatorBank::TimeWork(size_t lane_count) const noexcept {

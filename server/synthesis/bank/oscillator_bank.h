@@ -13,6 +13,7 @@
 #include "absl/base/thread_annotations.h"
 #include "server/base/thread_role.h"
 #include "server/synthesis/bank/block_mix.h"
+#include "server/synthesis/bank/directed_gains.h"
 #include "server/synthesis/bank/shape_table.h"
 #include "server/synthesis/bank/sounding_modes.h"
 #include "server/synthesis/bank/sustained_force.h"
@@ -35,11 +36,19 @@ struct OscillatorBankSettings {
   double gain = 1;                 ///< linear
   uint64_t noise_seed = 0;         ///< of the roughness noise
   double silence = 1e-7;           ///< modes below this amplitude (-140 dB) are put to sleep
+  /// The directions in which the modes radiate. With them the bank must be rendered apart
+  /// (BlockMix), and rings in the time domain only; absent: in all directions equally.
+  std::optional<HeardDirectivity> directivity = std::nullopt;
 };
 
 /// All modes of one sounding object, each a decaying complex exponential (the paper, 3.4):
 ///
 ///   Z_m(n+1) = q_m Z_m(n),  q_m = exp((sigma_m + i omega_m) / sample rate),  output = sum Re Z_m
+///
+/// or, for a bank with directivity, output = sum Re (gain_m Z_m) with the gains of DirectedGains.
+/// While the gains move, the states are rendered twice, with the gains of the block's begin and of
+/// its end, and one rendering fades into the other. A block with impulses is rendered once more for
+/// the sake of the states alone.
 ///
 /// An impulse J adds -i c_m g_m / omega_m exp(i phase_m) exp(s_m^2 tau^2 / 2) to Z_m at its time,
 /// with g_m = sum_v w_v phi_m(v) . J and s_m = sigma_m + i omega_m. The last factor accounts for
@@ -56,7 +65,8 @@ struct OscillatorBankSettings {
 /// The second mode of a degenerate pair is a cosine, which would begin with a jump and click under
 /// a soft mallet. Therefore it has a companion of the same frequency and opposite sign that decays
 /// by exp(-1) in a radian. Their sum, cos(omega t) (exp(sigma t) - exp((sigma - omega) t)), begins
-/// at zero with the slope of the pair's first mode.
+/// at zero with the slope of the pair's first mode. In a bank with directivity each mode has such a
+/// companion.
 ///
 /// Any thread may make a bank; then one thread at a time uses it, which neither allocates nor
 /// locks. In each block of the mix, impulses and knots come first and RenderAdd last, without calls
@@ -110,7 +120,11 @@ class OscillatorBank {
   bool out_of_spectrum() const noexcept;
 
   /// RenderAdd for a bank that is out_of_spectrum() and not struck in this block.
-  bool RenderAddInTime(LaneMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  bool RenderAddInTime(BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+
+  /// The gains towards the listener; null: it radiates equally in all directions. BeginBlock is to
+  /// be called for them in each block, before impulses, knots and RenderAdd.
+  DirectedGains* gains() noexcept { return gains_.get(); }
 
   /// True: rendering the bank would add nothing.
   bool silent() const noexcept {
@@ -122,7 +136,7 @@ class OscillatorBank {
 
   /// Units of work (work_budget.h): of a block without events, of an impulse, of a merged impulse,
   /// and of the lanes that a first impulse awakens.
-  double ringing_work() const noexcept { return ringing_work_; }
+  double ringing_work() const noexcept;
   double strike_work() const noexcept;
   double merged_strike_work() const noexcept;
   double awakening_work() const noexcept;
@@ -198,6 +212,9 @@ class OscillatorBank {
   void SetSegments(const LanePlan& plan);
   void MeasureLoudness(const LanePlan& plan);
   double TimeWork(size_t lane_count) const noexcept;
+  void SetDirectivity(const SoundingModes& sounding, const LanePlan& plan,
+                      const OscillatorBankSettings& settings);
+  bool gains_move() const noexcept { return gains_ != nullptr && gains_->moving(); }
   /// Delays `offset` to that of the last onset in the batch, if it lies before it: merged impulses
   /// come after exact ones of the same group of frames.
   size_t NotBeforeTheLast(size_t offset, const StrikeBatch& batch) const noexcept;
@@ -206,10 +223,16 @@ class OscillatorBank {
   void RenderStrikes(size_t end, BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void RenderDrivenStrikes(size_t end, BlockMix& mix) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
-  void RenderDriven(size_t end, LaneMix& mix) noexcept;
-  /// Prepares the sums for rendering the block up to frame `end`; FinishPart adds them to the mix.
-  ring_kernel::StruckPart BeginPart(size_t end, BlockMix& mix) const noexcept;
-  void FinishPart(const ring_kernel::StruckPart& part, BlockMix& mix) const noexcept;
+  void RenderDriven(size_t end, BlockMix& mix) noexcept;
+  /// Renders the block up to frame `end` with the gains, and leaves the states as they are.
+  void HearStruck(size_t end, BlockMix& mix) noexcept;
+  /// Takes the rendering that advances the states: unheard if there are gains.
+  LaneMix& Advanced(BlockMix& mix) const noexcept {
+    return gains_ == nullptr ? mix.lanes() : mix.unheard();
+  }
+  /// Prepares the sums for rendering the block up to frame `end`; FinishPart adds them to `lanes`.
+  ring_kernel::StruckPart BeginPart(size_t end, StrikeBatch& batch, LaneMix& lanes) const noexcept;
+  void FinishPart(const ring_kernel::StruckPart& part, LaneMix& lanes) const noexcept;
   ring_kernel::TileSums Sums(NodeMix& nodes, size_t frame_count, LaneMix& mix) const noexcept;
   bool FinishStruck(BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   bool EndBlock() noexcept;
@@ -240,6 +263,7 @@ class OscillatorBank {
   float loudness_per_newton_second_ = 0;
   LaneArrays lanes_;
   SustainedForce force_;
+  std::unique_ptr<DirectedGains> gains_;
 };
 
 /// The SIMD target in use on this machine ("AVX3", "AVX2", "SSE4", "NEON", ...).

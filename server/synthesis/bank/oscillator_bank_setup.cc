@@ -4,6 +4,7 @@
 #include <cassert>
 #include <cmath>
 #include <complex>
+#include <numbers>
 #include <utility>
 
 #include "server/synthesis/bank/lane_plan.h"
@@ -13,6 +14,9 @@ namespace carillon {
 namespace {
 
 using Complex = std::complex<double>;
+
+/// The shortest time in which gains change: that of a voice's cross-fade after a jump.
+constexpr double kGainPeriodS = 0.01;
 
 uint32_t FirstColumn(const SoundingModes& sounding) {
   return sounding.modes.empty() ? 0 : sounding.modes.front().column;
@@ -86,7 +90,8 @@ OscillatorBank::OscillatorBank(const SoundingModes& sounding, const ShapeTable& 
     : OscillatorBank(PlanLanes(sounding, shapes,
                                {.sample_rate_hz = settings.sample_rate_hz,
                                 .block_frame_count = settings.block_frame_count,
-                                .gain = settings.gain}),
+                                .gain = settings.gain,
+                                .directed = settings.directivity.has_value()}),
                      sounding, shapes, settings) {}
 
 OscillatorBank::OscillatorBank(const LanePlan& plan, const SoundingModes& sounding,
@@ -123,6 +128,29 @@ OscillatorBank::OscillatorBank(const LanePlan& plan, const SoundingModes& soundi
     }
   }
   MeasureLoudness(plan);
+  if (settings.directivity) SetDirectivity(sounding, plan, settings);
+}
+
+void OscillatorBank::SetDirectivity(const SoundingModes& sounding, const LanePlan& plan,
+                                    const OscillatorBankSettings& settings) {
+  std::vector<DirectedGains::Mode> modes;
+  for (const SoundingMode& mode : sounding.modes) {
+    modes.push_back({.column = mode.column,
+                     .wavenumber = 2 * std::numbers::pi * mode.natural_frequency_hz /
+                                   settings.directivity->sound_speed_m_per_s});
+  }
+  for (const LaneRun& run : lanes_.runs) {
+    size_t lane = run.range.first;
+    for (const PlannedLane& planned : LanesOf(run, plan)) {
+      const auto mode =
+          std::ranges::lower_bound(modes, planned.column, {}, &DirectedGains::Mode::column);
+      (planned.companion ? mode->companion_lane : mode->lane) = lane++;
+    }
+  }
+  const auto period = static_cast<size_t>(kGainPeriodS * settings.sample_rate_hz);
+  gains_ =
+      std::make_unique<DirectedGains>(*settings.directivity, std::move(modes),
+                                      DirectedGains::Size{lane_count_, period, block_frame_count_});
 }
 
 void OscillatorBank::SetSegments(const LanePlan& plan) {

@@ -176,14 +176,14 @@ void OscillatorBank::BeginStrikes(BlockMix& mix) noexcept {
 
 /// A part that covers the whole block shares the mix's nodes with all banks; another part has nodes
 /// of its own.
-ring_kernel::StruckPart OscillatorBank::BeginPart(size_t end, BlockMix& mix) const noexcept {
-  StrikeBatch& batch = mix.batch();
+ring_kernel::StruckPart OscillatorBank::BeginPart(size_t end, StrikeBatch& batch,
+                                                  LaneMix& lanes) const noexcept {
   batch.part_nodes.Clear();
   const bool whole = block_.rendered_to == 0 && end == block_frame_count_;
-  NodeMix& nodes = whole ? mix.lanes().nodes() : batch.part_nodes;
+  NodeMix& nodes = whole ? lanes.nodes() : batch.part_nodes;
   const ring_kernel::TileSums sums = block_.by_frames
-                                         ? ring_kernel::TileSums{mix.lanes().lanes()}
-                                         : Sums(nodes, end - block_.rendered_to, mix.lanes());
+                                         ? ring_kernel::TileSums{lanes.lanes()}
+                                         : Sums(nodes, end - block_.rendered_to, lanes);
   for (size_t kind = 1; kind < kTileKinds; ++kind) {
     if (sums[kind] == nullptr) continue;
     for (size_t i = 0; i < batch.count; ++i) {
@@ -208,8 +208,9 @@ ring_kernel::TileSums OscillatorBank::Sums(NodeMix& nodes, size_t frame_count,
   return sums;
 }
 
-void OscillatorBank::FinishPart(const ring_kernel::StruckPart& part, BlockMix& mix) const noexcept {
-  float* frames = mix.lanes().frames();
+void OscillatorBank::FinishPart(const ring_kernel::StruckPart& part,
+                                LaneMix& lanes) const noexcept {
+  float* frames = lanes.frames();
   part.batch.part_nodes.AddTo(part.begin, part.end, frames);
   for (size_t kind = 1; kind < kTileKinds; ++kind) {
     if (part.sums[kind] == nullptr) continue;
@@ -224,33 +225,56 @@ void OscillatorBank::RenderStrikes(size_t end, BlockMix& mix) noexcept {
   if (block_.phase != Phase::kInParts) ring_kernel::Start(lanes_, lane_count_);
   block_.phase = Phase::kInParts;
   if (force_.driving()) return RenderDrivenStrikes(end, mix);
-  const ring_kernel::StruckPart part = BeginPart(end, mix);
+  HearStruck(end, mix);
+  const ring_kernel::StruckPart part = BeginPart(end, mix.batch(), Advanced(mix));
   ring_kernel::RingStruck(lanes_, part);
-  FinishPart(part, mix);
+  FinishPart(part, Advanced(mix));
   mix.batch().count = 0;
   block_.rendered_to = end;
+}
+
+void OscillatorBank::HearStruck(size_t end, BlockMix& mix) noexcept {
+  if (gains_ == nullptr) return;
+  mix.unheard().Clear(block_frame_count_);
+  if (end == block_.rendered_to) return;
+  const auto hear = [&](LaneMix& lanes, const ring_kernel::Gains& gains) {
+    ring_kernel::StruckPart part = BeginPart(end, mix.batch(), lanes);
+    part.gains = gains;
+    ring_kernel::HearStruck(lanes_, part);
+    FinishPart(part, lanes);
+  };
+  hear(mix.lanes(), gains_->at_end());
+  if (gains_move()) hear(mix.fading(block_frame_count_), gains_->at_begin());
 }
 
 void OscillatorBank::RenderDrivenStrikes(size_t end, BlockMix& mix) noexcept {
   StrikeBatch& batch = mix.batch();
   for (size_t i = 0; i < batch.count; ++i) {
-    RenderDriven(batch.offsets[i], mix.lanes());
+    RenderDriven(batch.offsets[i], mix);
     ring_kernel::AddStrike(lanes_, lane_count_, batch.re(i, lane_count_), batch.im(i, lane_count_));
   }
   batch.count = 0;
-  RenderDriven(end, mix.lanes());
+  RenderDriven(end, mix);
 }
 
-void OscillatorBank::RenderDriven(size_t end, LaneMix& mix) noexcept {
-  force_.Render(end - block_.rendered_to, lanes_, mix.lanes() + block_.rendered_to * kMostLanes);
+void OscillatorBank::RenderDriven(size_t end, BlockMix& mix) noexcept {
+  const size_t first = block_.rendered_to * kMostLanes;
+  force_kernel::DrivenOutput output{.mix = mix.lanes().lanes() + first};
+  if (gains_ != nullptr) output.gains = gains_->at_end();
+  if (gains_move()) {
+    output.second_mix = mix.fading(block_frame_count_).lanes() + first;
+    output.second_gains = gains_->at_begin();
+  }
+  force_.Render(end - block_.rendered_to, lanes_, output);
   block_.rendered_to = end;
 }
 
 bool OscillatorBank::FinishStruck(BlockMix& mix) noexcept {
   if (force_.driving()) RenderStrikes(block_frame_count_, mix);
-  const ring_kernel::StruckPart part = BeginPart(block_frame_count_, mix);
+  HearStruck(block_frame_count_, mix);
+  const ring_kernel::StruckPart part = BeginPart(block_frame_count_, mix.batch(), Advanced(mix));
   block_.finite &= ring_kernel::FinishStruck(lanes_, segments_, part, silence_squared_);
-  FinishPart(part, mix);
+  FinishPart(part, Advanced(mix));
   for (LongSegment& segment : long_segments_) segment.struck = true;
   return EndBlock();
 }

@@ -1,9 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
+#include <cstdint>
+#include <memory>
 #include <span>
 
 namespace carillon {
+
+/// The directions in which the modes of a model radiate. The arrays are those of `owner`.
+struct Directivity {
+  /// #m + 1: mode i has the harmonics first[i] to first[i + 1] - 1. Without harmonics it radiates
+  /// equally in all directions.
+  std::span<const uint32_t> first = {};
+  std::span<const uint32_t> harmonics = {};  ///< l^2 + l + m, ascending in each mode
+  /// The far pattern's coefficients (-i)^(l + 1) c_lm, scaled so that the sum of their squared
+  /// magnitudes is one for each mode.
+  std::span<const float> pattern_re = {}, pattern_im = {};
+  std::array<double, 3> center_m{};  ///< from which directions are measured, in the body's frame
+  double radius_m = 0;               ///< of the sphere about the centre that encloses the body
+  std::shared_ptr<const void> owner = nullptr;
+};
 
 /// How the modes of a model radiate into air (proto/carillon/v1/transfer.proto). The arrays are the
 /// caller's.

@@ -55,12 +55,17 @@ double Split(const SoundingMode& a, const SoundingMode& b, double tolerance) {
   return split <= tolerance && more < 2 * less ? split : std::numeric_limits<double>::infinity();
 }
 
-void ShareMean(SoundingMode& first, SoundingMode& second) {
-  for (double SoundingMode::*figure :
-       {&SoundingMode::natural_frequency_hz, &SoundingMode::damped_rad_per_s,
-        &SoundingMode::decay_rate_per_s, &SoundingMode::coupling}) {
-    first.*figure = second.*figure = (first.*figure + second.*figure) / 2;
-  }
+void ShareMean(double SoundingMode::*figure, SoundingMode& first, SoundingMode& second) {
+  first.*figure = second.*figure = (first.*figure + second.*figure) / 2;
+}
+
+void MakePair(bool directed, SoundingMode& first, SoundingMode& second) {
+  ShareMean(&SoundingMode::natural_frequency_hz, first, second);
+  ShareMean(&SoundingMode::damped_rad_per_s, first, second);
+  ShareMean(&SoundingMode::decay_rate_per_s, first, second);
+  if (directed) return;
+  ShareMean(&SoundingMode::coupling, first, second);
+  second.output_phase_rad = kPi / 2;
 }
 
 /// What the air does to a mode.
@@ -85,20 +90,19 @@ RadiatingMode RadiationOf(const ModeTable& table, size_t m, double eigenvalue,
 }
 
 /// Pairs the closest neighbours first: an ovalling mode of a tube may lie between two pairs.
-void PairDegenerate(std::vector<SoundingMode>& modes, double tolerance) {
+void PairDegenerate(std::vector<SoundingMode>& modes, const SoundingBand& band) {
   std::vector<SoundingMode*> single;
   single.reserve(modes.size());
   for (SoundingMode& mode : modes) single.push_back(&mode);
   while (single.size() > 1) {
     std::vector<double> splits;
     for (size_t i = 0; i + 1 < single.size(); ++i) {
-      splits.push_back(Split(*single[i], *single[i + 1], tolerance));
+      splits.push_back(Split(*single[i], *single[i + 1], band.pair_tolerance));
     }
     const auto closest = std::ranges::min_element(splits);
     if (std::isinf(*closest)) return;
     const auto first = single.begin() + (closest - splits.begin());
-    ShareMean(**first, **(first + 1));
-    (*(first + 1))->output_phase_rad = kPi / 2;
+    MakePair(band.directed, **first, **(first + 1));
     single.erase(first, first + 2);
   }
 }
@@ -130,7 +134,7 @@ SoundingModes SelectSoundingModes(const ModeTable& table, const SoundingMaterial
                               .decay_rate_per_s = sigma,
                               .coupling = radiating.coupling});
   }
-  PairDegenerate(sounding.modes, band.pair_tolerance);
+  PairDegenerate(sounding.modes, band);
   KeepMostAudible(sounding.modes, band.most_modes);
   return sounding;
 }

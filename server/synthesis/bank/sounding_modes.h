@@ -32,6 +32,9 @@ struct SoundingBand {
   /// more than this and their couplings by less than a factor of two. Finite-element meshes split
   /// true pairs by up to about 1e-3.
   double pair_tolerance = 2e-3;
+  /// The two modes of a degenerate pair have directions of their own and keep their couplings and
+  /// phases; they share their mean frequency and decay only.
+  bool directed = false;
 };
 
 /// One mode of a body of a given material and size.

@@ -51,12 +51,13 @@ bool SustainedForce::ApplyKnot(const ForceKnot& knot, const LaneArrays& lanes, f
   return finite;
 }
 
-void SustainedForce::Render(size_t frame_count, LaneArrays& lanes, float* mix) noexcept {
+void SustainedForce::Render(size_t frame_count, LaneArrays& lanes,
+                            const force_kernel::DrivenOutput& output) noexcept {
   Shares from, to;
   NextShares(frame_count, from, to);
   force_kernel::RingDriven(
       arrays_, {.from_share = from.data(), .to_share = to.data(), .frame_count = frame_count},
-      lanes, mix);
+      lanes, output);
   if (position_ < 1 || frames_until_release_ > 0) return;
   if (releasing_) {
     driving_ = false;

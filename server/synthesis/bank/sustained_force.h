@@ -52,8 +52,9 @@ class SustainedForce {
   /// Whether noise drives the modes, so that Render must be called for every sample.
   bool driving() const noexcept { return driving_; }
 
-  /// Adds the next samples of all lanes to `mix` while driving them.
-  void Render(size_t frame_count, LaneArrays& lanes, float* mix) noexcept;
+  /// Adds the next samples of all lanes to the output while driving them.
+  void Render(size_t frame_count, LaneArrays& lanes,
+              const force_kernel::DrivenOutput& output) noexcept;
 
   /// Sets the force to zero.
   void Silence() noexcept;

@@ -110,7 +110,36 @@ struct DrivenState {
   }
 };
 
-void RingDriven(const ForceArrays& force, const Drive& drive, LaneArrays& lanes, float* mix) {
+/// Adds the real part of gain * state to a frame.
+struct DrivenGain {
+  V re, im;
+  float* mix;
+
+  HWY_INLINE DrivenGain(const ring_kernel::Gains& gains, float* to, size_t lane)
+      : re(hn::Load(Floats(), gains.re + lane)), im(hn::Load(Floats(), gains.im + lane)), mix(to) {}
+  HWY_INLINE void Add(size_t n, const DrivenState& state) const {
+    const Floats d;
+    float* HWY_RESTRICT frame = mix + n * kMostLanes;
+    const V sum = hn::MulAdd(state.re, re, hn::Load(d, frame));
+    hn::Store(hn::NegMulAdd(state.im, im, sum), d, frame);
+  }
+};
+
+/// Adds the state itself to a frame.
+struct NoDrivenGain {
+  float* mix;
+
+  HWY_INLINE void Add(size_t n, const DrivenState& state) const {
+    const Floats d;
+    float* HWY_RESTRICT frame = mix + n * kMostLanes;
+    hn::Store(hn::Add(hn::Load(d, frame), state.re), d, frame);
+  }
+};
+
+/// `make_outputs`(lane) has a member Add(frame, state).
+template <class MakeOutputs>
+HWY_INLINE void RingDrivenTo(const ForceArrays& force, const Drive& drive, LaneArrays& lanes,
+                             const MakeOutputs& make_outputs) {
   const Floats d;
   for (size_t lane = 0; lane < force.lane_count; lane += hn::Lanes(d)) {
     const V q_re = hn::Load(d, lanes.q_re.data() + lane);
@@ -119,6 +148,7 @@ void RingDriven(const ForceArrays& force, const Drive& drive, LaneArrays& lanes,
     const V from_im = hn::Load(d, force.from_im.data() + lane);
     const V to_re = hn::Load(d, force.to_re.data() + lane);
     const V to_im = hn::Load(d, force.to_im.data() + lane);
+    const auto outputs = make_outputs(lane);
     DrivenState all, fresh;
     all.Load(lanes.start_re.data() + lane, lanes.start_im.data() + lane);
     fresh.Load(lanes.fresh_re.data() + lane, lanes.fresh_im.data() + lane);
@@ -128,13 +158,36 @@ void RingDriven(const ForceArrays& force, const Drive& drive, LaneArrays& lanes,
       const V by_im = hn::MulAdd(a, from_im, hn::Mul(b, to_im));
       all.Grow(by_re, by_im);
       fresh.Grow(by_re, by_im);
-      float* HWY_RESTRICT frame = mix + n * kMostLanes;
-      hn::Store(hn::Add(hn::Load(d, frame), all.re), d, frame);
+      outputs.Add(n, all);
       all.Step(q_re, q_im);
       fresh.Step(q_re, q_im);
     }
     all.Store(lanes.start_re.data() + lane, lanes.start_im.data() + lane);
     fresh.Store(lanes.fresh_re.data() + lane, lanes.fresh_im.data() + lane);
+  }
+}
+
+struct BothDrivenGains {
+  DrivenGain first, second;
+
+  HWY_INLINE void Add(size_t n, const DrivenState& state) const {
+    first.Add(n, state);
+    second.Add(n, state);
+  }
+};
+
+void RingDriven(const ForceArrays& force, const Drive& drive, LaneArrays& lanes,
+                const DrivenOutput& output) {
+  if (output.gains.re == nullptr) {
+    RingDrivenTo(force, drive, lanes, [&](size_t) { return NoDrivenGain{output.mix}; });
+  } else if (output.second_mix == nullptr) {
+    RingDrivenTo(force, drive, lanes,
+                 [&](size_t lane) { return DrivenGain(output.gains, output.mix, lane); });
+  } else {
+    RingDrivenTo(force, drive, lanes, [&](size_t lane) {
+      return BothDrivenGains{DrivenGain(output.gains, output.mix, lane),
+                             DrivenGain(output.second_gains, output.second_mix, lane)};
+    });
   }
 }
 
@@ -179,8 +232,8 @@ void SetDrive(float position, float scale, const LaneArrays& lanes, ForceArrays&
 }
 
 void RingDriven(const ForceArrays& force, const Drive& drive, LaneArrays& lanes,
-                float* mix) noexcept {
-  HWY_DYNAMIC_DISPATCH(RingDriven)(force, drive, lanes, mix);
+                const DrivenOutput& output) noexcept {
+  HWY_DYNAMIC_DISPATCH(RingDriven)(force, drive, lanes, output);
 }
 
 }  // namespace force_kernel

@@ -4,6 +4,7 @@
 #include <cstddef>
 
 #include "server/synthesis/ringing/lane_arrays.h"
+#include "server/synthesis/ringing/ring_kernel.h"
 #include "server/synthesis/ringing/strike_kernel.h"
 
 namespace carillon {
@@ -65,9 +66,19 @@ struct Drive {
   size_t frame_count = 0;
 };
 
-/// Adds the samples of all lanes to `mix` while driving them; advances the start and fresh states.
+/// Where the driven lanes are rendered to, frame by frame, and with which gains.
+struct DrivenOutput {
+  float* mix = nullptr;
+  ring_kernel::Gains gains{};
+  /// A second rendering of the same states with other gains; null: none.
+  float* second_mix = nullptr;
+  ring_kernel::Gains second_gains{};
+};
+
+/// Adds the samples of all lanes to the output while driving them; advances the start and fresh
+/// states.
 void RingDriven(const ForceArrays& force, const Drive& drive, LaneArrays& lanes,
-                float* mix) noexcept;
+                const DrivenOutput& output) noexcept;
 
 }  // namespace force_kernel
 }  // namespace carillon

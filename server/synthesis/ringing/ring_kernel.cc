@@ -12,6 +12,7 @@
 #include "server/synthesis/ringing/lane_vectors-inl.h"
 #include "server/synthesis/ringing/oscillators-inl.h"
 #include "server/synthesis/ringing/passes-inl.h"
+#include "server/synthesis/ringing/struck_vectors-inl.h"
 // clang-format on
 
 #include <algorithm>
@@ -21,6 +22,7 @@ HWY_BEFORE_NAMESPACE();
 namespace carillon::ring_kernel {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
+using carillon::HWY_NAMESPACE::ApplyGains;
 using carillon::HWY_NAMESPACE::Doubles;
 using carillon::HWY_NAMESPACE::Floats;
 using carillon::HWY_NAMESPACE::ForVectors;
@@ -29,18 +31,19 @@ using carillon::HWY_NAMESPACE::kMostSquared;
 using carillon::HWY_NAMESPACE::kVectorsPerPass;
 using carillon::HWY_NAMESPACE::Loudness;
 using carillon::HWY_NAMESPACE::Manner;
-using carillon::HWY_NAMESPACE::Oscillators;
 using carillon::HWY_NAMESPACE::States;
+using carillon::HWY_NAMESPACE::StruckVectors;
 using carillon::HWY_NAMESPACE::V;
 
 void Ring(const LaneArrays& lanes, LaneRange range, size_t tile_kind, size_t frame_count,
-          const TileSums& sums) {
+          const Output& output) {
   ForVectors(lanes, range, {.tile_kind = tile_kind},
              [&](const auto& oscillators, auto ahead, size_t lane) {
                typename std::decay_t<decltype(oscillators)>::Z z;
                z.Load(lanes.re.data() + lane, lanes.im.data() + lane);
+               ApplyGains(output.gains, lane, z);
                const size_t kind = oscillators.tile_kind;
-               float* sum = sums[kind];
+               float* sum = output.sums[kind];
                if (kind > 0) {
                  for (size_t frame = 0; frame < frame_count; frame += kTileFrames[kind]) {
                    ahead.Step(kind);
@@ -57,134 +60,6 @@ void Ring(const LaneArrays& lanes, LaneRange range, size_t tile_kind, size_t fra
                oscillators.AddPart(z, frame_count - frame, sum + frame * kMostLanes);
              });
 }
-
-/// Vectors with impulses: the whole state, and its fresh share.
-template <size_t kVectors, class Ahead>
-class StruckVectors {
- public:
-  using Z = States<kVectors>;
-  Z all, fresh;
-
-  HWY_INLINE StruckVectors(const Oscillators<kVectors>& oscillators, const Ahead& next)
-      : oscillators_(oscillators), ahead_(next) {}
-
-  HWY_INLINE void Load(const LaneArrays& lanes, size_t lane) {
-    all.Load(lanes.start_re.data() + lane, lanes.start_im.data() + lane);
-    fresh.Load(lanes.fresh_re.data() + lane, lanes.fresh_im.data() + lane);
-    any_fresh_ = true;
-  }
-  HWY_INLINE void Store(LaneArrays& lanes, size_t lane) const {
-    all.Store(lanes.start_re.data() + lane, lanes.start_im.data() + lane);
-    fresh.Store(lanes.fresh_re.data() + lane, lanes.fresh_im.data() + lane);
-  }
-
-  /// Renders from part.begin to part.end.
-  HWY_INLINE void Ring(const StruckPart& part, size_t lane) {
-    fresh_at_ = part.begin;
-    if (oscillators_.tile_kind == 0) {
-      RingFrames(part, lane);
-    } else {
-      RingNodes(part, lane);
-    }
-  }
-
- private:
-  /// An impulse within a tile is rendered separately to the tile's end, and then added to the
-  /// state.
-  HWY_INLINE void RingFrames(const StruckPart& part, size_t lane) {
-    size_t frame = part.begin;
-    size_t strike = 0;
-    for (; frame + kTileFrames[0] <= part.end; frame += kTileFrames[0]) {
-      ahead_.Step(0);
-      oscillators_.AddTile(all, part.sums[0] + frame * kMostLanes);
-      for (; strike < part.batch.count && part.batch.offsets[strike] < frame + kTileFrames[0];
-           ++strike) {
-        Strike(part, strike, lane, frame + kTileFrames[0]);
-      }
-    }
-    AdvanceFresh(frame);
-    if (const size_t rest = part.end - frame; rest > 0) {
-      oscillators_.AddPart(all, rest, part.sums[0] + frame * kMostLanes);
-      fresh.Multiply(oscillators_.Power(rest - 1));
-      fresh_at_ = part.end;
-    }
-    for (; strike < part.batch.count; ++strike) Strike(part, strike, lane, part.end);
-  }
-
-  /// Renders like RingFrames, but to the nodes of longer tiles.
-  HWY_INLINE void RingNodes(const StruckPart& part, size_t lane) {
-    const size_t kind = oscillators_.tile_kind, frame_count = kTileFrames[kind];
-    float* nodes = part.sums[kind];
-    size_t strike = 0;
-    for (size_t frame = part.begin; frame < part.end; frame += frame_count) {
-      ahead_.Step(kind);
-      const size_t tile_end = std::min(frame + frame_count, part.end);
-      Z power;  // advances to the part's end, if that lies within the tile
-      const Z* shortened = nullptr;
-      if (tile_end < frame + frame_count) {
-        power = oscillators_.FramePower(tile_end - frame);
-        shortened = &power;
-      }
-      AddNodes(shortened, all, nodes);
-      nodes += kNodeFloats;
-      for (; strike < part.batch.count && part.batch.offsets[strike] < frame + frame_count;
-           ++strike) {
-        Z struck = Struck(part, strike, lane);
-        AddNodes(shortened, struck, part.batch.nodes(strike, kind));
-        Join(struck, tile_end);
-      }
-    }
-    AdvanceFresh(part.end);
-    for (; strike < part.batch.count; ++strike) Join(Struck(part, strike, lane), part.end);
-  }
-
-  /// Renders a longer tile. If the part ends within it, the state advances by *shortened instead.
-  HWY_INLINE void AddNodes(const Z* shortened, Z& z, float* nodes) const {
-    const Z begin = z;
-    oscillators_.AddClosedTile(z, nodes);
-    if (shortened == nullptr) return;
-    z = begin;
-    z.Multiply(*shortened);
-  }
-
-  HWY_INLINE void AdvanceFresh(size_t frame) {
-    const size_t tile_frames = kTileFrames[oscillators_.tile_kind];
-    if (any_fresh_) {
-      oscillators_.Advance((frame - fresh_at_) / tile_frames, fresh);
-      const size_t rest = (frame - fresh_at_) % tile_frames;
-      if (rest > 0) fresh.Multiply(oscillators_.FramePower(rest));
-    }
-    fresh_at_ = frame;
-  }
-
-  HWY_INLINE Z Struck(const StruckPart& part, size_t strike, size_t lane) const {
-    Z struck;
-    struck.Load(part.batch.re(strike, part.lane_count) + lane,
-                part.batch.im(strike, part.lane_count) + lane);
-    return struck;
-  }
-
-  /// Renders an impulse up to `tile_end`, the end of its tile, and adds it to the states there.
-  HWY_INLINE void Strike(const StruckPart& part, size_t strike, size_t lane, size_t tile_end) {
-    const size_t offset = part.batch.offsets[strike];
-    Z struck = Struck(part, strike, lane);
-    oscillators_.AddPart(struck, tile_end - offset, part.sums[0] + offset * kMostLanes);
-    Join(struck, tile_end);
-  }
-
-  /// Adds an impulse's state to the states at `frame`.
-  HWY_INLINE void Join(const Z& struck, size_t frame) {
-    all.Add(struck);
-    if (fresh_at_ != frame) AdvanceFresh(frame);
-    fresh.Add(struck);
-    any_fresh_ = true;
-  }
-
-  const Oscillators<kVectors>& oscillators_;
-  Ahead ahead_;
-  size_t fresh_at_ = 0;  // the frame at which the fresh state is
-  bool any_fresh_ = false;
-};
 
 void Start(LaneArrays& lanes, size_t lane_count) {
   for (size_t lane = 0; lane < lane_count; lane += hn::Lanes(Floats())) {
@@ -208,6 +83,24 @@ void RingStruck(LaneArrays& lanes, const StruckPart& part) {
     vectors.Ring(part, lane);
     vectors.Store(lanes, lane);
   });
+}
+
+void HearStruck(const LaneArrays& lanes, const StruckPart& part) {
+  const auto hear = [&](const auto& re, const auto& im) {
+    ForVectors(lanes, MannerOf(part), [&](const auto& oscillators, auto ahead, size_t lane) {
+      constexpr size_t kVectors = std::decay_t<decltype(oscillators)>::kCount;
+      StruckVectors<kVectors, decltype(ahead)> vectors(oscillators, ahead);
+      vectors.all.Load(re.data() + lane, im.data() + lane);
+      ApplyGains(part.gains, lane, vectors.all);
+      vectors.fresh.Clear();
+      vectors.Ring(part, lane);
+    });
+  };
+  if (part.started) {
+    hear(lanes.start_re, lanes.start_im);
+  } else {
+    hear(lanes.re, lanes.im);
+  }
 }
 
 void AddStrike(LaneArrays& lanes, size_t lane_count, const float* added_re, const float* added_im) {
@@ -310,7 +203,10 @@ bool RingFreely(LaneArrays& lanes, std::span<RingingSegment> segments, const Fre
   Advancing advancing(lanes, segments, block.silence_squared);
   for (const LaneRun& run : lanes.runs) {
     const LaneRange awake{run.range.first, run.CountOfFirst(awake_counts[run.segment])};
-    Ring(lanes, awake, run.tile_kind, block.frame_count, block.sums);
+    Ring(lanes, awake, run.tile_kind, block.frame_count, block.output);
+    if (block.second.sums[0] != nullptr) {
+      Ring(lanes, awake, run.tile_kind, block.frame_count, block.second);
+    }
     for (size_t group = 0; group < awake.count; group += kMostLanes) {
       advancing.AdvanceGroup(awake.first + group, nullptr, nullptr);
     }
@@ -354,6 +250,7 @@ namespace carillon::ring_kernel {
 HWY_EXPORT(RingFreely);
 HWY_EXPORT(Start);
 HWY_EXPORT(RingStruck);
+HWY_EXPORT(HearStruck);
 HWY_EXPORT(AddStrike);
 HWY_EXPORT(FinishStruck);
 HWY_EXPORT(Target);
@@ -369,6 +266,10 @@ void Start(LaneArrays& lanes, size_t lane_count) noexcept {
 
 void RingStruck(LaneArrays& lanes, const StruckPart& part) noexcept {
   HWY_DYNAMIC_DISPATCH(RingStruck)(lanes, part);
+}
+
+void HearStruck(const LaneArrays& lanes, const StruckPart& part) noexcept {
+  HWY_DYNAMIC_DISPATCH(HearStruck)(lanes, part);
 }
 
 void AddStrike(LaneArrays& lanes, size_t lane_count, const float* added_re,

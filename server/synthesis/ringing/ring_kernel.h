@@ -31,9 +31,24 @@ namespace ring_kernel {
 /// kMostLanes]. Null if no lanes are rendered in that kind.
 using TileSums = std::array<float*, kTileKinds>;
 
+/// Complex gains by which the states of all lanes are multiplied before they are rendered; null:
+/// the states themselves are rendered.
+struct Gains {
+  const float* re = nullptr;
+  const float* im = nullptr;
+};
+
+/// Where the lanes are rendered to, and with which gains.
+struct Output {
+  TileSums sums{};
+  Gains gains{};
+};
+
 /// A block without impulses.
 struct FreeBlock {
-  TileSums sums;
+  Output output;
+  /// A second rendering of the same states with other gains; without sums: none.
+  Output second{};
   size_t frame_count = 0;
   /// Groups of lanes whose squared amplitudes are all below this are silenced.
   double silence_squared = 0;
@@ -50,6 +65,7 @@ bool RingFreely(LaneArrays& lanes, std::span<RingingSegment> segments,
 /// because only the frames after it are audible.
 struct StruckPart {
   TileSums sums;
+  Gains gains{};     ///< for HearStruck only
   size_t begin = 0;  ///< frames
   size_t end = 0;
   /// True: read the state at `begin` from start_re/fresh_re, because an earlier part was rendered.
@@ -67,6 +83,9 @@ void Start(LaneArrays& lanes, size_t lane_count) noexcept;
 /// Renders a part that was started and is not the block's last, with the impulses of its batch, and
 /// advances the start and fresh states to its end.
 void RingStruck(LaneArrays& lanes, const StruckPart& part) noexcept;
+
+/// Renders a part with its gains, and leaves all states as they are.
+void HearStruck(const LaneArrays& lanes, const StruckPart& part) noexcept;
 
 /// Adds what an impulse contributes to the start and fresh states.
 void AddStrike(LaneArrays& lanes, size_t lane_count, const float* added_re,

@@ -50,7 +50,10 @@ struct ForceKnot {
 struct Motion {
   std::array<float, 3> position_m{};
   std::array<float, 3> right{1, 0, 0};  ///< unit vector to the right; only a listener's is used
-  float glide_frames = 0;               ///< duration of the way; below one: a jump
+  /// x, y and z of the unit quaternion, with w not negative, that rotates vectors of the body's
+  /// frame into the scene's; only an object's is used.
+  std::array<float, 3> orientation{};
+  float glide_frames = 0;  ///< duration of the way; below one: a jump
 };
 
 /// The object whose voice the bank sounds through moves.

@@ -4,14 +4,16 @@
 #include <array>
 #include <cstddef>
 
+#include "server/base/pose.h"
 #include "server/synthesis/schedule/mixer_event.h"
 
 namespace carillon {
 
-/// A position, and for a listener the direction to the right.
+/// A position, for a listener the direction to the right, and for an object its orientation.
 struct Place {
   std::array<double, 3> position_m{};
   std::array<double, 3> right{1, 0, 0};
+  Quaternion orientation{};  ///< rotates vectors of the object's frame into the scene's
 };
 
 /// The place of an object or listener that is moved by Motions, block by block. It goes straight
@@ -29,7 +31,11 @@ class Glide {
   void Advance() noexcept;
 
   /// The place at the end of the last block.
-  Place place() const noexcept;
+  Place place() const noexcept { return PlaceAt(smoothed_); }
+
+  /// The place at the begin of this block, as far as its motions are known: that of the end of the
+  /// last block, or the target of a jump.
+  Place begin() const noexcept { return PlaceAt(jumps_ ? unsmoothed_ : smoothed_); }
 
   /// Whether it jumped in the last block.
   bool jumped() const noexcept { return jumped_; }
@@ -37,9 +43,10 @@ class Glide {
   bool at_rest() const noexcept { return at_rest_; }
 
  private:
-  static constexpr size_t kAxes = 6;  // of position, then of right
+  static constexpr size_t kAxes = 10;  // of position, then of right, then of orientation
   using Coordinates = std::array<double, kAxes>;
 
+  static Place PlaceAt(const Coordinates& coordinates) noexcept;
   void Go(size_t frame_count) noexcept;
 
   double smoothing_;  // share of the remaining distance that is covered in a block

@@ -47,6 +47,30 @@ Voice::Voice(const Settings& settings, const Place& object, const Place& listene
   heard_.fill(Hear(0));
 }
 
+void Voice::SetCenter(const Vector3& center_m) noexcept {
+  if (center_m == center_m_) return;
+  center_m_ = center_m;
+  std::ranges::fill(positions_, SoundAt(object_.place()));
+  jump_waits_ = true;
+}
+
+Bearing Voice::BearingOfListener() const noexcept {
+  const Place object = object_.begin();
+  const Vector3 away = Minus(listener_.begin().position_m, SoundAt(object));
+  Bearing bearing{.distance_m = Length(away)};
+  if (bearing.distance_m == 0) return bearing;
+  bearing.direction = Rotated(away, Inverse(object.orientation));
+  for (double& coordinate : bearing.direction) coordinate /= bearing.distance_m;
+  return bearing;
+}
+
+std::array<double, 3> Voice::SoundAt(const Place& object) const noexcept {
+  if (center_m_ == Vector3{}) return object.position_m;
+  const Vector3 center = Rotated(center_m_, object.orientation);
+  return {object.position_m[0] + center[0], object.position_m[1] + center[1],
+          object.position_m[2] + center[2]};
+}
+
 /// Position of the object `blocks` blocks before the end of the last block.
 std::array<double, 3> Voice::PositionBefore(double blocks) const noexcept {
   const size_t count = positions_.size();
@@ -95,7 +119,7 @@ void Voice::NoteHeard() noexcept {
   object_.Advance();
   listener_.Advance();
   newest_ = (newest_ + 1) % positions_.size();
-  positions_[newest_] = object_.place().position_m;
+  positions_[newest_] = SoundAt(object_.place());
   if (object_.jumped()) std::ranges::fill(positions_, positions_[newest_]);
   const double trend = 2 * heard_[3].delay_frames - heard_[2].delay_frames;
   const Heard next = Hear(trend);

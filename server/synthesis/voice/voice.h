@@ -8,6 +8,8 @@
 #include <span>
 #include <vector>
 
+#include "server/base/pose.h"
+#include "server/synthesis/schedule/bearing.h"
 #include "server/synthesis/schedule/mixer_event.h"
 #include "server/synthesis/voice/delay_line.h"
 #include "server/synthesis/voice/glide.h"
@@ -19,10 +21,12 @@ struct HearingSettings {
   bool distance_gain = false;
   bool propagation_delay = false;
   bool panning = false;
+  bool directivity = false;  ///< modes sound as loud as they radiate towards the listener
+  bool near_field = false;   ///< with directivity: as the sound field is at the listener's distance
   double reference_distance_m = 1;
   double sound_speed_m_per_s = 343;
 
-  bool any() const { return distance_gain || propagation_delay || panning; }
+  bool any() const { return distance_gain || propagation_delay || panning || directivity; }
 };
 
 /// Longest propagation delay; the sound of objects farther away arrives after this time.
@@ -59,6 +63,15 @@ class Voice {
     listener_.Move(motion, offset);
   }
 
+  /// Makes a point of the object's frame the place of its sound, in place of the frame's origin.
+  void SetCenter(const Vector3& center_m) noexcept;
+
+  /// Where the listener is at the begin of this block, seen from the place of the object's sound.
+  /// The gains of the last block hold for the same time, because the voice is one block late.
+  Bearing BearingOfListener() const noexcept;
+
+  const HearingSettings& hearing() const noexcept { return settings_.hearing; }
+
   /// The object's sound in this block: zeros, to which banks add themselves.
   std::span<float> input() noexcept {
     fed_ = true;
@@ -88,6 +101,7 @@ class Voice {
   /// the third.
   using Hearings = std::array<Heard, 4>;
 
+  std::array<double, 3> SoundAt(const Place& object) const noexcept;
   std::array<double, 3> PositionBefore(double blocks) const noexcept;
   Heard Hear(double delay_frames) const noexcept;
   void NoteHeard() noexcept;
@@ -102,6 +116,7 @@ class Voice {
 
   Settings settings_;
   Glide object_, listener_;
+  Vector3 center_m_{};                            // in the object's frame
   std::vector<std::array<double, 3>> positions_;  // at the ends of the last blocks, a ring buffer
   size_t newest_ = 0;
   std::vector<float> input_;

@@ -13,6 +13,8 @@ using Arguments = std::vector<std::string>;
 int MeasureRinging(const Arguments& arguments);
 /// SECONDS of sound a measurement, MODES; without, several numbers of modes.
 int MeasureStruck(const Arguments& arguments);
+/// SECONDS of sound a measurement.
+int MeasureDirected(const Arguments& arguments);
 /// SECONDS of sound.
 int MeasureAccuracy(const Arguments& arguments);
 /// SECONDS, IMPULSES_PER_SECOND; without that, three rates.

@@ -27,7 +27,7 @@ import supercollider_peer
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[2]
-PARTS = ("ringing", "accuracy", "flood", "latency", "session")
+PARTS = ("ringing", "directed", "accuracy", "flood", "latency", "session")
 
 
 def carillon(build, *arguments, most_target=None):
@@ -90,6 +90,14 @@ def ringing(options, folder):
         what = {"ringing": "ringing freely", "struck": "every bank struck in every block"}[what]
         row(f"Carillon {target}, {what}", f"{count:,.0f}", f"{statistics.median(loads):.1%}",
             f"{statistics.median(rates):,.0f}", f"{statistics.median(times):.1f}", f"{min(times):.1f} ... {max(times):.1f}")
+
+
+def directed(options, _folder):
+    print("\n## Objects with a place, and with directions\n\n| what | objects x modes | harmonics | load of one core | "
+          "slowest hundredth of the blocks, ms |\n| --- | --- | --- | --- | --- |")
+    for result in carillon(options.build, "directed", options.seconds):
+        row(result["what"], f"{result['objects']} x {result['modes']}", f"{result['harmonics']:,}",
+            f"{result['load']:.2%}", f"{result['p99_block_ms']:.3f}")
 
 
 def accuracy(options, folder):
@@ -189,7 +197,7 @@ def main():
     print(f"load average before: {os.getloadavg()[0]:.1f}", flush=True)
     for part in options.parts:
         with tempfile.TemporaryDirectory() as folder:
-            run = {"ringing": ringing, "accuracy": accuracy, "flood": flood, "latency": latency, "session": session}
+            run = {"ringing": ringing, "directed": directed, "accuracy": accuracy, "flood": flood, "latency": latency, "session": session}
             run[part](options, pathlib.Path(folder))
     print(f"\nload average after: {os.getloadavg()[0]:.1f}")
     return 0

@@ -21,6 +21,7 @@ struct SampleRadiation {
   std::vector<uint32_t> states{};  ///< empty: all computed
   std::vector<float> power_integrals{};
   std::vector<float> normal_energies{};  ///< empty: all one
+  std::vector<uint32_t> harmonics{};     ///< one of each mode; empty: l = 0
 };
 
 template <typename T>
@@ -63,6 +64,7 @@ inline std::string SampleTransferBytes(const ModalModel& model, SampleRadiation 
   std::iota(first.begin(), first.end(), 0U);
   const std::string errors = BytesOf(std::vector(modes, 0.5F));
   const std::string zeros = BytesOf(std::vector(modes, 0U));
+  if (radiation.harmonics.empty()) radiation.harmonics.assign(modes, 0);
   const std::string arrays[] = {BytesOf(model.eigenvalues),
                                 BytesOf(radiation.states),
                                 BytesOf(radiation.power_integrals),
@@ -71,7 +73,7 @@ inline std::string SampleTransferBytes(const ModalModel& model, SampleRadiation 
                                 errors,
                                 zeros,
                                 BytesOf(first),
-                                zeros,
+                                BytesOf(radiation.harmonics),
                                 BytesOf(std::vector(size_t{2} * modes, 1.0F))};
   v1::TransferRecord record;
   *record.mutable_header() = SampleTransferHeader(modes, radiation.speed_ratio);

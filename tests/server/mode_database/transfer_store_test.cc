@@ -153,6 +153,27 @@ TEST(StoredTransfer, AModeThatWasNotComputedHasTheEfficiencyOfTheNearestOneThatW
   EXPECT_THAT(transfer.power_integrals, Pointwise(testing::FloatNear(1e-6F), {8.0F, 3.0F, 4.0F}));
 }
 
+TEST(StoredTransfer, PatternsAreTheCoefficientsFarAwayOfUnitPower) {
+  const Transfer transfer =
+      SampleTransfer(SampleModel(3, 4), {.power_integrals = {1, 2, 3}, .harmonics = {0, 2, 8}})
+          .Decode();
+  EXPECT_THAT(transfer.first, testing::ElementsAre(0, 1, 2, 3));
+  EXPECT_THAT(transfer.harmonics, testing::ElementsAre(0, 2, 8));
+  // (1 + i)/sqrt(2), times -i, -1 and i for l = 0, 1 and 2.
+  const float part = std::sqrt(0.5F);
+  EXPECT_THAT(transfer.pattern_re, Pointwise(testing::FloatNear(1e-6F), {part, -part, -part}));
+  EXPECT_THAT(transfer.pattern_im, Pointwise(testing::FloatNear(1e-6F), {-part, -part, part}));
+}
+
+TEST(StoredTransfer, AnImpossibleHarmonicIsRefused) {
+  EXPECT_THAT(StoredTransfer::Parse(
+                  SampleTransferBytes(SampleModel(3, 4), {.power_integrals = {1, 2, 3},
+                                                          .harmonics = {0, UINT32_MAX, 0}}))
+                  .status()
+                  .ToString(),
+              HasSubstr("TRANSFER_MALFORMED"));
+}
+
 TEST(StoredTransfer, EveryDamageIsRefused) {
   const ModalModel model = SampleModel(3, 4);
   const float integral = 1.2345678F;

@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+
+namespace carillon {
+
+/// Where the listener is, seen from an object.
+struct Bearing {
+  std::array<double, 3> direction{0, 0, 1};  ///< unit vector in the object's frame
+  double distance_m = 1;
+};
+
+}  // namespace carillon
