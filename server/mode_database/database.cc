@@ -14,16 +14,18 @@
 namespace carillon {
 namespace {
 
-absl::StatusOr<std::unique_ptr<SqliteConnection>> Connect(const std::filesystem::path& file) {
+// Large pages suit large blobs. An existing file keeps its page size.
+constexpr char kReader[] = "PRAGMA page_size = 65536;";
+// This makes a new file one that can shrink. On an existing file it is a write, for which another
+// connection would wait, so that readers do without.
+constexpr char kWriter[] = "PRAGMA page_size = 65536; PRAGMA auto_vacuum = INCREMENTAL;";
+
+absl::StatusOr<std::unique_ptr<SqliteConnection>> Connect(const std::filesystem::path& file,
+                                                          const char* first = kReader) {
   ASSIGN_OR_RETURN(auto connection, SqliteConnection::Open(file));
-  const absl::Status status = (connection)
-                                  ->RunScript(
-                                      // Large pages suit large blobs. An existing file keeps its
-                                      // page size and whether it can shrink.
-                                      "PRAGMA page_size = 65536; PRAGMA auto_vacuum = INCREMENTAL; "
-                                      "PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL; "
-                                      "PRAGMA foreign_keys = ON;");
-  if (!status.ok()) return status;
+  RETURN_IF_ERROR(connection->RunScript(first));
+  RETURN_IF_ERROR(connection->RunScript(
+      "PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL; PRAGMA foreign_keys = ON;"));
   return connection;
 }
 
@@ -60,7 +62,7 @@ absl::StatusOr<std::unique_ptr<Database>> Database::Open(const std::filesystem::
   std::error_code error;
   std::filesystem::create_directories(absolute.parent_path(), error);
   if (error) return Unusable(absolute, error.message());
-  auto connection = Connect(absolute);
+  auto connection = Connect(absolute, kWriter);
   if (!connection.ok() &&
       (absl::IsInternal(connection.status()) || absl::IsFailedPrecondition(connection.status()))) {
     return Unusable(absolute, connection.status().message());

@@ -123,6 +123,18 @@ TEST_F(DatabaseFilesTest, TheFileShrinksAfterDeletions) {
   EXPECT_TRUE(Has("new"));
 }
 
+TEST_F(DatabaseFilesTest, AReaderConnectsWhileAChangeIsBeingMade) {
+  Database& database = database_->database();
+  const auto nothing = [](SqliteConnection&) { return absl::OkStatus(); };
+  const absl::Status written = database.Write([&](SqliteConnection& writer) {
+    const absl::Status changed = writer.Run("UPDATE models SET label = 'changed'");
+    // Each of the readers is a new connection.
+    return changed.ok() ? database.Read([&](SqliteConnection&) { return database.Read(nothing); })
+                        : changed;
+  });
+  EXPECT_TRUE(written.ok()) << written;
+}
+
 TEST_F(DatabaseFilesTest, UnfinishedBackupsAreRemovedAtTheStart) {
   const std::filesystem::path unfinished = NewBackupFile(file_);
   const std::filesystem::path other = folder_ / "backup-2026";
