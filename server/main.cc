@@ -29,7 +29,9 @@
 #include "server/decomposition/remote_runs.h"
 #include "server/decomposition/slurm_executor.h"
 #include "server/live_output/live_output.h"
+#include "server/mode_database/database.h"
 #include "server/mode_database/database_admin.h"
+#include "server/mode_database/database_keeper.h"
 #include "server/mode_database/mode_database.h"
 #include "server/options.h"
 #include "server/scene/scene_registry.h"
@@ -97,6 +99,12 @@ void CollectUnusedMeshes(ModeDatabase& database) {
   if (!collected.ok()) return LogWarning(std::string(collected.status().message()));
   if (collected->mesh_count == 0) return;
   spdlog::info("{} meshes that no model or job refers to were deleted", collected->mesh_count);
+}
+
+void LogMissingChanges(const Database& database) {
+  if (const std::string missing = database.MissingChanges(); !missing.empty()) {
+    spdlog::error("{}", missing);
+  }
 }
 
 void LogOutput(const LiveOutput& output) {
@@ -219,6 +227,7 @@ absl::Status Run(Options options, const ReadOptions& read_options) {
                    ModeDatabase::Open(directory.database_file(), clock));
   database->models().KeepWithin(
       {.bytes = static_cast<uint64_t>(options.model_budget_mib) << 20U, .log = LogWarning});
+  LogMissingChanges(database->database());
   CollectUnusedMeshes(*database);
   RemoteRuns runs;
   ASSIGN_OR_RETURN(const std::unique_ptr<DecompositionQueue> decompositions,
@@ -237,6 +246,10 @@ absl::Status Run(Options options, const ReadOptions& read_options) {
                                                              .output = *output,
                                                              .clock = clock,
                                                              .log = LogWarning}));
+  const DatabaseKeeper keeper(database->database(), [&server](const absl::Status& files) {
+    server->ShowDatabaseHealth(files.ok());
+    if (!files.ok()) spdlog::error("{}", std::string(files.message()));
+  });
   LogOutput(*output);
   AnnounceReady(*server);
   WaitForStop(signals, [&] { Reload(read_options, options, *server); });

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <type_traits>
 
+#include "absl/strings/match.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
@@ -274,6 +275,17 @@ void AddDatabaseCommands(CLI::App& app, CommandLine& command) {
       ->required();
 }
 
+/// A flag that ends in "=" would take the next flag for its value.
+absl::Status CheckValues(int argc, const char* const* argv) {
+  for (int i = 1; i < argc; ++i) {
+    const absl::string_view word = argv[i];
+    if (absl::StartsWith(word, "--") && word.find('=') == word.size() - 1) {
+      return InvalidConfiguration(absl::StrCat("nothing follows ", word, " in the command line"));
+    }
+  }
+  return absl::OkStatus();
+}
+
 /// Parses the flags into `command`. Absent if the program is to run; otherwise its exit status.
 std::optional<int> ParseFlags(int argc, const char* const* argv, const std::string& version,
                               std::string& configuration, CommandLine& command) {
@@ -299,6 +311,7 @@ std::optional<int> ParseFlags(int argc, const char* const* argv, const std::stri
 
 absl::StatusOr<CommandLine> ReadCommandLine(int argc, const char* const* argv,
                                             const std::string& version) {
+  RETURN_IF_ERROR(CheckValues(argc, argv));
   CommandLine command{.options = Defaults()};
   std::string configuration = DefaultConfiguration();
   // The flags are parsed twice: for the name of the file, and to override the file's settings.

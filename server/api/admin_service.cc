@@ -12,6 +12,7 @@
 #include "server/api/file_pieces.h"
 #include "server/api/stream_call.h"
 #include "server/api/unary_call.h"
+#include "server/mode_database/database.h"
 #include "server/mode_database/database_admin.h"
 
 namespace carillon {
@@ -46,8 +47,7 @@ class BackupCall final : public ServerStream<v1::BackUpDatabaseResponse> {
   }
 
   absl::Status Begin(v1::BackUpDatabaseResponse& response) {
-    const std::filesystem::path copy =
-        database_.folder() / absl::StrCat("backup-", reinterpret_cast<uintptr_t>(this));
+    const std::filesystem::path copy = NewBackupFile(database_.database().file());
     const absl::Cleanup remove = [&copy] {
       std::error_code ignored;
       std::filesystem::remove(copy, ignored);  // an open file stays readable

@@ -208,6 +208,12 @@ absl::Status ApiServer::Reload(const ApiSettings& settings) {
   return absl::OkStatus();
 }
 
+void ApiServer::ShowDatabaseHealth(bool stores) {
+  grpc::HealthCheckServiceInterface& health = *state_->server->GetHealthCheckService();
+  health.SetServingStatus(v1::ModalModelService::service_full_name(), stores);
+  health.SetServingStatus(v1::DecompositionService::service_full_name(), stores);
+}
+
 ApiServer::ApiServer(std::unique_ptr<State> state) : state_(std::move(state)) {}
 
 ApiServer::~ApiServer() {

@@ -61,6 +61,9 @@ class ApiServer {
   /// Start about them; nothing is changed then.
   absl::Status Reload(const ApiSettings& settings);
 
+  /// Makes carillon.v1.ModalModelService and carillon.v1.DecompositionService healthy or not.
+  void ShowDatabaseHealth(bool stores);
+
   /// The addresses of the settings, with the ports that were chosen.
   const std::vector<std::string>& addresses() const;
 

@@ -34,8 +34,8 @@ class Allowance {
   std::chrono::nanoseconds refilled_{0};
 };
 
-/// A log that untrusted clients cannot flood: twenty lines at once, then one a second. Lines beyond are
-/// counted, and the count is a line before the next. Bytes that are not printable ASCII are
+/// A log that untrusted clients cannot flood: twenty lines at once, then one a second. Lines beyond
+/// are counted, and the count is a line before the next. Bytes that are not printable ASCII are
 /// escaped, and lines are cut at 400 bytes. Safe from every thread.
 class LimitedLog {
  public:

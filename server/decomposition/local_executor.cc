@@ -24,6 +24,7 @@
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 #include "server/base/mutex.h"
+#include "server/base/physical_memory.h"
 #include "server/decomposition/local_worker.h"
 
 namespace carillon {
@@ -251,11 +252,6 @@ absl::Status PrepareDirectory(const std::filesystem::path& directory) {
   return Refusal(absl::StatusCode::kFailedPrecondition, "DATABASE_UNUSABLE",
                  absl::StrCat("the folder ", directory.string(), " cannot be made (",
                               error.message(), "): name one that this user may write"));
-}
-
-uint64_t PhysicalBytes() {
-  return static_cast<uint64_t>(sysconf(_SC_PHYS_PAGES)) *
-         static_cast<uint64_t>(sysconf(_SC_PAGESIZE));
 }
 
 }  // namespace

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/mode_database/database.h"
 
+#include <algorithm>
+#include <string>
 #include <system_error>
 #include <utility>
 
@@ -12,16 +14,28 @@
 namespace carillon {
 namespace {
 
-absl::StatusOr<std::unique_ptr<SqliteConnection>> Connect(const std::filesystem::path& file) {
+// Large pages suit large blobs. An existing file keeps its page size.
+constexpr char kReader[] = "PRAGMA page_size = 65536;";
+// This makes a new file one that can shrink. On an existing file it is a write, for which another
+// connection would wait, so that readers do without.
+constexpr char kWriter[] = "PRAGMA page_size = 65536; PRAGMA auto_vacuum = INCREMENTAL;";
+
+absl::StatusOr<std::unique_ptr<SqliteConnection>> Connect(const std::filesystem::path& file,
+                                                          const char* first = kReader) {
   ASSIGN_OR_RETURN(auto connection, SqliteConnection::Open(file));
-  const absl::Status status =
-      (connection)
-          ->RunScript(
-              // Large pages suit large blobs. An existing file keeps its page size.
-              "PRAGMA page_size = 65536; PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL; "
-              "PRAGMA foreign_keys = ON;");
-  if (!status.ok()) return status;
+  RETURN_IF_ERROR(connection->RunScript(first));
+  RETURN_IF_ERROR(connection->RunScript(
+      "PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL; PRAGMA foreign_keys = ON;"));
   return connection;
+}
+
+absl::StatusOr<int64_t> Figure(SqliteConnection& connection, const char* sql) {
+  int64_t figure = 0;
+  RETURN_IF_ERROR(connection.Query(sql, {}, [&](const SqlRow& row) {
+    figure = row.Int(0);
+    return absl::OkStatus();
+  }));
+  return figure;
 }
 
 absl::Status Unusable(const std::filesystem::path& file, absl::string_view why) {
@@ -48,7 +62,7 @@ absl::StatusOr<std::unique_ptr<Database>> Database::Open(const std::filesystem::
   std::error_code error;
   std::filesystem::create_directories(absolute.parent_path(), error);
   if (error) return Unusable(absolute, error.message());
-  auto connection = Connect(absolute);
+  auto connection = Connect(absolute, kWriter);
   if (!connection.ok() &&
       (absl::IsInternal(connection.status()) || absl::IsFailedPrecondition(connection.status()))) {
     return Unusable(absolute, connection.status().message());
@@ -56,12 +70,77 @@ absl::StatusOr<std::unique_ptr<Database>> Database::Open(const std::filesystem::
   if (!connection.ok()) return connection.status();
   RETURN_IF_ERROR(InTransaction(**connection, "BEGIN IMMEDIATE",
                                 [](SqliteConnection& c) { return Migrate(c); }));
-  return std::unique_ptr<Database>(new Database(absolute, *std::move(connection)));
+  std::unique_ptr<Database> database(new Database(absolute, *std::move(connection)));
+  RETURN_IF_ERROR(database->ReadChangeCount());
+  return database;
+}
+
+absl::Status Database::ReadChangeCount() {
+  const MutexLock lock(&writer_mutex_);
+  ASSIGN_OR_RETURN(change_count_,
+                   Figure(*writer_, "SELECT value FROM facts WHERE name = 'change_count'"));
+  missing_change_count_ = std::max<int64_t>(0, change_count_file_.Read() - change_count_);
+  return files_.Remember();
+}
+
+std::string Database::MissingChanges() const {
+  if (missing_change_count_ == 0) return "";
+  return absl::StrCat(
+      missing_change_count_, " changes that were acknowledged are missing in ", file_.string(),
+      ": somebody removed its -wal file, or put an older file in its place; put the "
+      "right files back, or run carillond db restore");
 }
 
 absl::Status Database::Write(absl::FunctionRef<absl::Status(SqliteConnection&)> body) {
   MutexLock lock(&writer_mutex_);
-  return InTransaction(*writer_, "BEGIN IMMEDIATE", body);
+  return WriteLocked(body);
+}
+
+absl::Status Database::WriteToFree(absl::FunctionRef<absl::Status(SqliteConnection&)> body) {
+  const auto has_no_room = [](const absl::Status& status) {
+    return absl::IsResourceExhausted(status) || absl::IsUnavailable(status);
+  };
+  MutexLock lock(&writer_mutex_);
+  absl::Status status = WriteLocked(body);
+  if (!has_no_room(status)) return status;
+  // After a checkpoint the log is written from its beginning again.
+  Figure(*writer_, "PRAGMA wal_checkpoint(RESTART)").status().IgnoreError();
+  status = WriteLocked(body);
+  if (!has_no_room(status)) return status;
+  reserve_.Release();
+  return WriteLocked(body);
+}
+
+absl::Status Database::WriteLocked(absl::FunctionRef<absl::Status(SqliteConnection&)> body) {
+  RETURN_IF_ERROR(files_.Check());
+  const int64_t row_count = writer_->total_changed_row_count();
+  int64_t change_count = change_count_;
+  RETURN_IF_ERROR(InTransaction(*writer_, "BEGIN IMMEDIATE", [&](SqliteConnection& connection) {
+    RETURN_IF_ERROR(body(connection));
+    if (connection.total_changed_row_count() == row_count) return absl::OkStatus();
+    return connection.Run("INSERT OR REPLACE INTO facts (name, value) VALUES ('change_count', ?)",
+                          {std::to_string(++change_count)});
+  }));
+  RETURN_IF_ERROR(files_.Remember());
+  if (change_count != change_count_) change_count_file_.Write(change_count);
+  change_count_ = change_count;
+  return absl::OkStatus();
+}
+
+absl::Status Database::Tidy() {
+  constexpr int64_t kLeastFreePages = 64;
+  MutexLock lock(&writer_mutex_);
+  RETURN_IF_ERROR(files_.Check());
+  reserve_.Take();
+  ASSIGN_OR_RETURN(const int64_t can_shrink, Figure(*writer_, "PRAGMA auto_vacuum"));
+  ASSIGN_OR_RETURN(const int64_t free_count, Figure(*writer_, "PRAGMA freelist_count"));
+  ASSIGN_OR_RETURN(const int64_t page_count, Figure(*writer_, "PRAGMA page_count"));
+  if (can_shrink == 0 || free_count < kLeastFreePages || free_count * 4 < page_count) {
+    return absl::OkStatus();
+  }
+  RETURN_IF_ERROR(writer_->RunScript("PRAGMA incremental_vacuum(256)"));
+  RETURN_IF_ERROR(Figure(*writer_, "PRAGMA wal_checkpoint(PASSIVE)").status());
+  return files_.Remember();
 }
 
 absl::Status Database::Read(absl::FunctionRef<absl::Status(SqliteConnection&)> body) {
@@ -74,6 +153,7 @@ absl::Status Database::Read(absl::FunctionRef<absl::Status(SqliteConnection&)> b
 
 absl::Status Database::ReadOutsideTransaction(
     absl::FunctionRef<absl::Status(SqliteConnection&)> body) {
+  RETURN_IF_ERROR(files_.Check());  // SQLite would make a new file
   auto connection = Connect(file_);
   return connection.ok() ? body(**connection) : connection.status();
 }
@@ -87,6 +167,7 @@ absl::StatusOr<std::unique_ptr<SqliteConnection>> Database::TakeReader() {
       return reader;
     }
   }
+  RETURN_IF_ERROR(files_.Check());
   return Connect(file_);
 }
 

@@ -149,6 +149,7 @@ absl::Status BackUp(Database& database, const std::filesystem::path& copy) {
 
 absl::Status CheckDatabase(const std::filesystem::path& file, const OnFinding& on_finding) {
   ASSIGN_OR_RETURN(const std::unique_ptr<Database> database, Database::Open(file));
+  if (const std::string missing = database->MissingChanges(); !missing.empty()) on_finding(missing);
   for (const auto check : {CheckStructure, CheckModels, CheckTransfers, CheckMeshes, CheckJobs}) {
     RETURN_IF_ERROR(check(*database, on_finding));
   }

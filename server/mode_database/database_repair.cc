@@ -28,10 +28,10 @@ absl::Status CannotMove(const std::filesystem::path& file, const std::error_code
                               "): see that this user may write in its folder"));
 }
 
-// Moves the database file and its write-ahead log, if there is one.
+// Moves the database file, its write-ahead log and its count of changes, if there are any.
 absl::Status Move(const std::filesystem::path& from, const std::filesystem::path& to) {
   std::error_code error;
-  for (const char* suffix : {"", "-wal"}) {
+  for (const char* suffix : {"", "-wal", "-count"}) {
     const std::filesystem::path source = from.string() + suffix;
     if (std::filesystem::exists(source)) {
       std::filesystem::rename(source, to.string() + suffix, error);
@@ -46,7 +46,7 @@ absl::Status Move(const std::filesystem::path& from, const std::filesystem::path
 
 void Remove(const std::filesystem::path& file) {
   std::error_code ignored;
-  for (const char* suffix : {"", "-wal", "-shm"}) {
+  for (const char* suffix : {"", "-wal", "-shm", "-count"}) {
     std::filesystem::remove(file.string() + suffix, ignored);
   }
 }

@@ -191,7 +191,8 @@ absl::StatusOr<CollectedMeshes> MeshStore::Collect(bool dry_run) {
   const int64_t before =
       clock_->UnixMs() - std::chrono::milliseconds(MeshStore::kUnusedLife).count();
   CollectedMeshes collected;
-  RETURN_IF_ERROR(database_->Write([&](SqliteConnection& connection) {
+  RETURN_IF_ERROR(database_->WriteToFree([&](SqliteConnection& connection) {
+    collected = {};
     std::map<std::string, uint64_t> unused;
     absl::Status done =
         connection.Query("SELECT digest, byte_count FROM meshes WHERE uploaded_unix_ms <= ?",

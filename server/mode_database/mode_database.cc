@@ -11,6 +11,7 @@ namespace carillon {
 absl::StatusOr<std::unique_ptr<ModeDatabase>> ModeDatabase::Open(const std::filesystem::path& file,
                                                                  const Clock& clock) {
   ASSIGN_OR_RETURN(std::unique_ptr<Database> database, Database::Open(file));
+  RemoveUnfinishedBackups(database->file());
   return std::unique_ptr<ModeDatabase>(new ModeDatabase(std::move(database), clock));
 }
 

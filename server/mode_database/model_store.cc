@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
+#include "server/base/physical_memory.h"
 #include "server/base/sha256.h"
 #include "server/base/xxh3.h"
 #include "server/mode_database/database.h"
@@ -73,6 +74,19 @@ absl::Status Apply(SqliteConnection& connection, const std::string& digest,
   return status;
 }
 
+/// A model is read into memory whole when it sounds.
+absl::Status CheckSize(uint64_t array_bytes) {
+  const uint64_t most_bytes = PhysicalBytes() / 2;
+  if (array_bytes <= most_bytes) return absl::OkStatus();
+  return Refusal(absl::StatusCode::kResourceExhausted, "MODAL_MODEL_TOO_LARGE",
+                 absl::StrCat("the arrays of the model have ", array_bytes,
+                              " bytes; half of the "
+                              "memory here is ",
+                              most_bytes,
+                              ": keep fewer modes, or a coarser "
+                              "surface"));
+}
+
 }  // namespace
 
 struct ModelImport::State {
@@ -90,6 +104,9 @@ ModelImport::~ModelImport() = default;
 
 absl::Status ModelImport::Append(const v1::ModalModelRecord& record) {
   RETURN_IF_ERROR(state_->checker.Check(record));
+  if (record.has_header()) {
+    RETURN_IF_ERROR(CheckSize(state_->checker.array_bytes()));
+  }
   const std::string bytes = Delimited(record);
   state_->sha.Update(bytes);
   return state_->file.Append(bytes);
@@ -293,7 +310,7 @@ absl::StatusOr<ModelSummary> ModelStore::Update(const std::string& digest,
 }
 
 absl::Status ModelStore::Delete(const std::string& digest) {
-  return database_->Write(
+  return database_->WriteToFree(
       [&](SqliteConnection& connection) { return DeleteModelRows(connection, digest); });
 }
 
@@ -318,11 +335,11 @@ absl::StatusOr<Collected> ModelStore::Collect(uint64_t budget_bytes,
   Collected collected;
   const auto collect =
       [&](SqliteConnection& connection) ABSL_EXCLUSIVE_LOCKS_REQUIRED(cache_mutex_) {
-        absl::Status written = WriteSounded(connection);
-        if (!written.ok()) return written;
+        collected = {};
+        RETURN_IF_ERROR(WriteSounded(connection));
         std::vector<Candidate> oldest_first;
         uint64_t total_bytes = 0;
-        written = connection.Query(
+        absl::Status written = connection.Query(
             "SELECT digest, stored_bytes + (SELECT coalesce(sum(transfers.stored_bytes), 0) "
             "FROM transfers WHERE transfers.revision = models.revision), pinned FROM models "
             "ORDER BY max(sounded_unix_ms, created_unix_ms), revision",
@@ -344,7 +361,7 @@ absl::StatusOr<Collected> ModelStore::Collect(uint64_t budget_bytes,
         }
         return written;
       };
-  RETURN_IF_ERROR(database_->Write(collect));
+  RETURN_IF_ERROR(database_->WriteToFree(collect));
   sounded_.clear();
   return collected;
 }

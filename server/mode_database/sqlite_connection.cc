@@ -152,6 +152,10 @@ absl::Status SqliteConnection::BackUpTo(const std::filesystem::path& copy) {
 
 int64_t SqliteConnection::changed_row_count() const { return state_->database.getChanges(); }
 
+int64_t SqliteConnection::total_changed_row_count() const {
+  return state_->database.getTotalChanges();
+}
+
 int64_t SqliteConnection::last_row_id() const { return state_->database.getLastInsertRowid(); }
 
 }  // namespace carillon

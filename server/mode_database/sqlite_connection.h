@@ -57,6 +57,9 @@ class SqliteConnection {
   /// Rows that the last statement changed.
   int64_t changed_row_count() const;
 
+  /// Rows that all statements of this connection changed.
+  int64_t total_changed_row_count() const;
+
   /// Key of the row inserted last.
   int64_t last_row_id() const;
 

@@ -101,6 +101,13 @@ TEST_F(OptionsFile, CheckConfigReadsTheFileAndSaysSo) {
   EXPECT_FALSE(Read({"--config", Write("workers = -1\n"), "--check-config"}).ok());
 }
 
+TEST(Options, AFlagWithoutAValueDoesNotTakeTheNextFlagForIt) {
+  EXPECT_THAT(Read({"--data-dir=", "--check-config"}).status().ToString(),
+              testing::AllOf(HasSubstr("INVALID_CONFIGURATION: "), HasSubstr("--data-dir=")));
+  EXPECT_THAT(Read({"--data-dir", "", "--check-config"}).status().ToString(),
+              HasSubstr("INVALID_CONFIGURATION: "));
+}
+
 TEST(Options, VersionAndUnknownFlagsDoNotRun) {
   testing::internal::CaptureStdout();
   testing::internal::CaptureStderr();

@@ -321,6 +321,19 @@ TEST_F(ModeDatabaseTest, CollectionTakesTheLeastRecentlySoundedAndNeverThePinned
   EXPECT_TRUE(database_->models().Find(c).ok());
 }
 
+TEST_F(ModeDatabaseTest, AModelLargerThanTheMemoryIsRefusedByItsHeader) {
+  constexpr uint64_t kVertexCount = 7;
+  v1::ModalModelRecord record = SampleRecords(SampleModel(20, kVertexCount)).front();
+  for (v1::ArrayDescriptor& array : *record.mutable_header()->mutable_arrays()) {
+    for (uint64_t& size : *array.mutable_shape()) {
+      if (size == kVertexCount) size = uint64_t{1} << 32U;
+    }
+  }
+  auto import = database_->models().Import(b_, "");
+  ASSERT_TRUE(import.ok());
+  EXPECT_THAT(import->Append(record).ToString(), HasSubstr("MODAL_MODEL_TOO_LARGE: "));
+}
+
 TEST_F(ModeDatabaseTest, AModelJustStoredStaysUntilANewerOneNeedsTheRoom) {
   database_->models().KeepWithin({.bytes = 1});
   ASSERT_TRUE(Put(a_, SampleModel(10, 100)).ok());

@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/mode_database/database_files.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <array>
+#include <atomic>
+#include <charconv>
+#include <string>
+#include <system_error>
+
+#include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "proto/cpp/error_reason.h"
+
+namespace carillon {
+namespace {
+
+constexpr off_t kReserveBytes = 16 << 20;
+/// The reserve is not taken from a disk that has less than this.
+constexpr uintmax_t kLeastFreeBytes = 4 * kReserveBytes;
+constexpr char kBackupSuffix[] = "-backup-";
+
+std::filesystem::path LogOf(const std::filesystem::path& file) { return file.string() + "-wal"; }
+
+std::filesystem::path CountOf(const std::filesystem::path& file) {
+  return file.string() + "-count";
+}
+
+}  // namespace
+
+std::optional<DatabaseFiles::Seen> DatabaseFiles::Look(const std::filesystem::path& file) {
+  struct stat status {};
+  if (stat(file.c_str(), &status) != 0) return std::nullopt;
+  return Seen{.device = status.st_dev, .inode = status.st_ino, .byte_count = status.st_size};
+}
+
+bool DatabaseFiles::IsSame(const std::optional<Seen>& before, const std::optional<Seen>& now) {
+  if (!before) return true;
+  return now && now->device == before->device && now->inode == before->inode;
+}
+
+bool DatabaseFiles::IsWhole(const std::optional<Seen>& before, const std::optional<Seen>& now) {
+  return IsSame(before, now) && (!before || now->byte_count >= before->byte_count);
+}
+
+absl::Status DatabaseFiles::Remember() {
+  const MutexLock lock(&mutex_);
+  const std::optional<Seen> database = Look(file_);
+  const std::optional<Seen> log = Look(LogOf(file_));
+  lost_ = lost_ || !IsSame(database_, database) || !IsSame(log_, log);
+  database_ = database;
+  log_ = log;
+  return Judge();
+}
+
+absl::Status DatabaseFiles::Check() {
+  const MutexLock lock(&mutex_);
+  lost_ = lost_ || !IsWhole(database_, Look(file_)) || !IsWhole(log_, Look(LogOf(file_)));
+  return Judge();
+}
+
+absl::Status DatabaseFiles::Judge() const {
+  if (!lost_) return absl::OkStatus();
+  return Refusal(absl::StatusCode::kFailedPrecondition, "DATABASE_LOST",
+                 absl::StrCat("somebody removed, replaced or truncated ", file_.string(),
+                              " or its -wal file while the daemon ran, so that nothing can be "
+                              "stored any more: stop the daemon, put the files back or run "
+                              "carillond db restore, and start it again"));
+}
+
+ChangeCount::ChangeCount(const std::filesystem::path& file)
+    : descriptor_(open(CountOf(file).c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600)) {}
+
+ChangeCount::~ChangeCount() {
+  if (descriptor_ >= 0) close(descriptor_);
+}
+
+int64_t ChangeCount::Read() const {
+  std::array<char, 20> text{};
+  const ssize_t size = pread(descriptor_, text.data(), text.size(), 0);
+  int64_t count = 0;
+  if (size > 0) std::from_chars(text.data(), text.data() + size, count);
+  return count;
+}
+
+/// A count that cannot be written stays behind, which does no harm.
+void ChangeCount::Write(int64_t count) const {
+  const std::string text = absl::StrFormat("%-19d\n", count);
+  [[maybe_unused]] const ssize_t written = pwrite(descriptor_, text.data(), text.size(), 0);
+}
+
+DiskReserve::DiskReserve(const std::filesystem::path& file) : file_(file.string() + "-reserve") {}
+
+void DiskReserve::Take() const {
+  std::error_code error;
+  if (std::filesystem::exists(file_, error)) return;
+  const std::filesystem::space_info space = std::filesystem::space(file_.parent_path(), error);
+  if (error || space.available < kLeastFreeBytes) return;
+  const int made = open(file_.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
+  if (made < 0) return;
+  if (posix_fallocate(made, 0, kReserveBytes) != 0) Release();
+  close(made);
+}
+
+void DiskReserve::Release() const {
+  std::error_code ignored;
+  std::filesystem::remove(file_, ignored);
+}
+
+std::filesystem::path NewBackupFile(const std::filesystem::path& file) {
+  static std::atomic<int> count = 0;
+  return absl::StrCat(file.string(), kBackupSuffix, ++count);
+}
+
+void RemoveUnfinishedBackups(const std::filesystem::path& file) {
+  const std::string prefix = file.filename().string() + kBackupSuffix;
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(file.parent_path(), error)) {
+    if (!absl::StartsWith(entry.path().filename().string(), prefix)) continue;
+    std::filesystem::remove(entry.path(), error);
+  }
+}
+
+}  // namespace carillon

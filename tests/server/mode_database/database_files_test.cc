@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Somebody else changes the files of a database.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <fstream>
+#include <functional>
+#include <semaphore>
+#include <string>
+
+#include "server/base/sha256.h"
+#include "server/mode_database/database.h"
+#include "server/mode_database/database_keeper.h"
+#include "server/mode_database/mode_database.h"
+#include "tests/server/mode_database/sample_model.h"
+
+namespace carillon {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+class DatabaseFilesTest : public ::testing::Test {
+ protected:
+  DatabaseFilesTest() {
+    WriteRecords(folder_ / "model", SampleRecords(SampleModel(20, 100)));
+    Open();
+    EXPECT_TRUE(Put("kept").ok());
+  }
+
+  void Open() {
+    database_.reset();
+    database_ = *ModeDatabase::Open(file_, clock_);
+  }
+
+  absl::Status Put(const std::string& name) {
+    return database_->models().PutFile(Sha256Hex(name), name, folder_ / "model").status();
+  }
+
+  bool Has(const std::string& name) { return database_->models().Find(Sha256Hex(name)).ok(); }
+
+  /// After `harm` nothing is acknowledged any more, and nothing new appears in the file's place.
+  void ExpectLost(const std::function<void()>& harm) {
+    harm();
+    EXPECT_THAT(Put("new").ToString(), HasSubstr("DATABASE_LOST: "));
+    EXPECT_THAT(database_->meshes().Put("solid").status().ToString(), HasSubstr("DATABASE_LOST: "));
+    EXPECT_THAT(database_->models().Delete(Sha256Hex("kept")).ToString(),
+                HasSubstr("DATABASE_LOST: "));
+    EXPECT_FALSE(database_->database().CheckFiles().ok());
+  }
+
+  TemporaryFolder folder_;
+  const std::filesystem::path file_ = folder_ / "carillon.db";
+  const std::filesystem::path log_ = folder_ / "carillon.db-wal";
+  SystemClock clock_;
+  std::unique_ptr<ModeDatabase> database_;
+};
+
+TEST_F(DatabaseFilesTest, AfterTheFileWasRemovedNothingIsAcknowledgedAndNoOtherIsMade) {
+  ExpectLost([&] { std::filesystem::remove(file_); });
+  EXPECT_FALSE(database_->database()
+                   .ReadOutsideTransaction([](SqliteConnection&) { return absl::OkStatus(); })
+                   .ok());
+  EXPECT_FALSE(std::filesystem::exists(file_));
+}
+
+TEST_F(DatabaseFilesTest, AfterTheFileWasReplacedNothingIsAcknowledged) {
+  ExpectLost([&] {
+    std::filesystem::copy_file(file_, folder_ / "copy");
+    std::filesystem::rename(folder_ / "copy", file_);
+  });
+}
+
+TEST_F(DatabaseFilesTest, AfterTheFileWasTruncatedNothingIsAcknowledged) {
+  ExpectLost([&] { std::filesystem::resize_file(file_, 0); });
+}
+
+TEST_F(DatabaseFilesTest, AfterTheLogWasRemovedOrTruncatedNothingIsAcknowledged) {
+  ExpectLost([&] { std::filesystem::resize_file(log_, 100); });
+  ExpectLost([&] { std::filesystem::remove(log_); });
+}
+
+TEST_F(DatabaseFilesTest, ALogThatWasRemovedWhileNoDaemonRanIsNoticed) {
+  for (int i = 0; i < 20; ++i) ASSERT_TRUE(Put(std::to_string(i)).ok());
+  // As after a kill: the file and its log, without the checkpoint of a good end.
+  TemporaryFolder killed;
+  for (const char* suffix : {"", "-wal", "-count"}) {
+    std::filesystem::copy_file(file_.string() + suffix,
+                               killed / (std::string("carillon.db") + suffix));
+  }
+  const std::filesystem::path file = killed / "carillon.db";
+  EXPECT_THAT((*ModeDatabase::Open(file, clock_))->database().MissingChanges(), IsEmpty());
+  std::filesystem::copy_file(file_, file, std::filesystem::copy_options::overwrite_existing);
+  const auto opened = ModeDatabase::Open(file, clock_);
+  ASSERT_TRUE(opened.ok());
+  EXPECT_THAT((*opened)->database().MissingChanges(),
+              testing::ContainsRegex("^2[0-9] changes that were acknowledged are missing"));
+}
+
+TEST_F(DatabaseFilesTest, AfterAGoodEndNothingIsMissing) {
+  Open();
+  EXPECT_THAT(database_->database().MissingChanges(), IsEmpty());
+  EXPECT_TRUE(Has("kept"));
+  EXPECT_TRUE(Put("new").ok());
+}
+
+TEST_F(DatabaseFilesTest, TheFileShrinksAfterDeletions) {
+  WriteRecords(folder_ / "model", SampleRecords(SampleModel(200, 5000)));
+  for (int i = 0; i < 8; ++i) ASSERT_TRUE(Put(std::to_string(i)).ok());
+  Open();
+  const uintmax_t before = std::filesystem::file_size(file_);
+  for (int i = 0; i < 8; ++i) {
+    ASSERT_TRUE(database_->models().Delete(Sha256Hex(std::to_string(i))).ok());
+  }
+  for (int i = 0; i < 10; ++i) ASSERT_TRUE(database_->database().Tidy().ok());
+  EXPECT_LT(std::filesystem::file_size(file_), before / 2);
+  EXPECT_TRUE(Has("kept"));
+  EXPECT_TRUE(Put("new").ok());
+  Open();
+  EXPECT_TRUE(Has("new"));
+}
+
+TEST_F(DatabaseFilesTest, AReaderConnectsWhileAChangeIsBeingMade) {
+  Database& database = database_->database();
+  const auto nothing = [](SqliteConnection&) { return absl::OkStatus(); };
+  const absl::Status written = database.Write([&](SqliteConnection& writer) {
+    const absl::Status changed = writer.Run("UPDATE models SET label = 'changed'");
+    // Each of the readers is a new connection.
+    return changed.ok() ? database.Read([&](SqliteConnection&) { return database.Read(nothing); })
+                        : changed;
+  });
+  EXPECT_TRUE(written.ok()) << written;
+}
+
+TEST_F(DatabaseFilesTest, UnfinishedBackupsAreRemovedAtTheStart) {
+  const std::filesystem::path unfinished = NewBackupFile(file_);
+  const std::filesystem::path other = folder_ / "backup-2026";
+  for (const auto& path : {unfinished, other}) std::ofstream(path) << "x";
+  Open();
+  EXPECT_FALSE(std::filesystem::exists(unfinished));
+  EXPECT_TRUE(std::filesystem::exists(other));
+}
+
+TEST_F(DatabaseFilesTest, TheKeeperTellsWhenTheFilesAreLost) {
+  std::binary_semaphore good{0};
+  std::binary_semaphore lost{0};
+  const DatabaseKeeper keeper(database_->database(), [&](const absl::Status& files) {
+    (files.ok() ? good : lost).release();
+  });
+  good.acquire();
+  std::filesystem::remove(file_);
+  lost.acquire();
+}
+
+}  // namespace
+}  // namespace carillon
