@@ -19,6 +19,8 @@ MATERIAL = material_pb2.Material(preset=meshes.MATERIAL)
 AIR_DENSITY, SOUND_SPEED = 1.204, 343
 # The paper's coupling becomes a pressure by rho omega / (4 pi r) at 1 kHz and 1 m.
 PASCALS_PER_COUPLING = AIR_DENSITY * 2000 * math.pi / (4 * math.pi)
+# A gain that keeps quiet modes above the rounding of 24-bit samples, and the bar below the limiter.
+LOUD = 20
 # The transfer waits until it may be computed.
 WORKER = """
 if grep -q radiate_stored_model "$request"; then
@@ -87,11 +89,11 @@ class TransferTest(unittest.TestCase):
             scene=scene, modal_model=model, material=MATERIAL)).object
         return added.name, added.radiation
 
-    def render(self, model, radiation, **header_fields):
+    def render(self, model, radiation, gain=1, **header_fields):
         """The bar struck across its broad side at an end."""
         length, width, height = meshes.BAR_SIZE
         placed = contact_trace_pb2.ContactTraceObject(
-            handle=1, modal_model=model, material=MATERIAL, radiation=radiation)
+            handle=1, modal_model=model, material=MATERIAL, radiation=radiation, gain=gain)
         step = contact_pb2.ContactStep(time_s=0, impulses=[
             sound.impulse((length, width, height), (0, 0.3e-3, -1e-3))])
         samples, _ = sound.render(self.daemon, [placed], [step], 0.5, **header_fields)
@@ -163,13 +165,10 @@ class TransferTest(unittest.TestCase):
         # The lowest bending mode of so slender a bar hardly radiates.
         self.assertLess(changes_db[0], changes_db[2])
 
-    def test_a_bar_is_heard_from_each_direction_as_its_sound_field_says_near_and_far(self):
-        (self.folder / "enough").touch()
-        model = self.client.wait(self.client.create(meshes.bar(), "obj", material=MATERIAL, max_frequency_hz=8000))
-        self.await_transfer()
+    def assert_heard_from_each_direction_as_the_sound_field_is(self, model):
         arrays = self.arrays(model)
         power = radiation_pb2.RADIATION_MODEL_RADIATED_POWER
-        everywhere = self.render(model, power)
+        everywhere = self.render(model, power, LOUD)
         hearing = hearing_pb2.Hearing(directivity=True, near_field=True)
         for distance_m in (0.15, 30):
             for theta, phi in ((0.4, 0.2), (1.1, 1.4), (2.5, -2.0)):
@@ -177,7 +176,7 @@ class TransferTest(unittest.TestCase):
                                          math.cos(theta)])
                 x, y, z = arrays["center_m"] + distance_m * direction
                 listener = contact_pb2.Pose(position_m=contact_pb2.Vec3(x=x, y=y, z=z))
-                heard = self.render(model, power, hearing=hearing, listener=listener)
+                heard = self.render(model, power, LOUD, hearing=hearing, listener=listener)
                 for m in range(3):
                     self.assert_heard(arrays, m, distance_m, direction, heard, everywhere)
 
@@ -185,14 +184,15 @@ class TransferTest(unittest.TestCase):
         omega = math.sqrt(arrays["eigenvalues"][m] * meshes.YOUNG_PA / meshes.DENSITY)
         gain = relative_pressure(arrays, m, omega / SOUND_SPEED * distance_m, direction)
         old, new = (sound.measure(samples, omega / (2 * math.pi), 0.1, 0.4) for samples in (everywhere, heard))
-        if gain > 0.3:  # what is quieter drowns in the rounding of 24-bit samples
+        if gain > 0.1:  # what is quieter drowns in the rounding of 24-bit samples
             self.assertAlmostEqual(20 * math.log10(new.amplitude / old.amplitude), 20 * math.log10(gain), delta=0.1,
                                    msg=f"mode {m} at {distance_m} m, {direction}")
 
-    def test_an_export_brings_the_transfer_to_another_daemon(self):
+    def test_directions_are_heard_and_an_export_brings_the_transfer_to_another_daemon(self):
         (self.folder / "enough").touch()
         model = self.client.wait(self.client.create(meshes.bar(), "obj", material=MATERIAL, max_frequency_hz=8000))
         self.await_transfer()
+        self.assert_heard_from_each_direction_as_the_sound_field_is(model)
         self.daemon.command("model", "export", model, "--out", self.folder / "bar.model")
         other_folder = self.folder / "other"
         other_folder.mkdir()
