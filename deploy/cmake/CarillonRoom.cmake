@@ -120,12 +120,15 @@ function(carillon_program_tests room)
   set(python ${CMAKE_BINARY_DIR}/client_sdk/python ${PROJECT_SOURCE_DIR}/client_sdk/python
              ${PROJECT_SOURCE_DIR}/tests/integration)
   list(JOIN python ":" python)
+  set(environment
+    PYTHONPATH=${python}
+    PYTHONDONTWRITEBYTECODE=1
+    CARILLON_BIN_DIR=${CMAKE_RUNTIME_OUTPUT_DIRECTORY}
+    CARILLON_BUILD_DIR=${CMAKE_BINARY_DIR})
   foreach(name ${ARGN})
     add_test(NAME ${room}/${name}
              COMMAND /usr/bin/python3 -m unittest --verbose ${name}
              WORKING_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR})
-    set_tests_properties(${room}/${name} PROPERTIES
-      LABELS ${room} TIMEOUT 600
-      ENVIRONMENT "PYTHONPATH=${python};PYTHONDONTWRITEBYTECODE=1;CARILLON_BIN_DIR=${CMAKE_RUNTIME_OUTPUT_DIRECTORY};CARILLON_BUILD_DIR=${CMAKE_BINARY_DIR}")
+    set_tests_properties(${room}/${name} PROPERTIES LABELS ${room} TIMEOUT 600 ENVIRONMENT "${environment}")
   endforeach()
 endfunction()
