@@ -92,6 +92,7 @@ Complex RelativePressure(const std::vector<Harmonic>& harmonics, double kr, cons
 
 std::vector<SoundingMode> ModesAt(const std::vector<double>& frequencies_hz, double sigma) {
   std::vector<SoundingMode> modes;
+  modes.reserve(frequencies_hz.size());
   for (const double hz : frequencies_hz) {
     modes.push_back(MakeMode(static_cast<uint32_t>(modes.size()), hz, sigma, kCoupling));
   }
