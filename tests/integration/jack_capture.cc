@@ -114,6 +114,17 @@ double JackCapture::TimeOf(uint64_t frame) const {
   return cycle.begin_s + static_cast<double>(frame - cycle.first_frame) / sample_rate_hz_;
 }
 
+double JackCapture::ClockErrorS() const {
+  double least_s = INFINITY, most_s = -INFINITY;
+  for (size_t i = 0; i < cycle_count_; ++i) {
+    const double lead_s =
+        cycles_[i].begin_s - static_cast<double>(cycles_[i].first_frame) / sample_rate_hz_;
+    least_s = std::min(least_s, lead_s);
+    most_s = std::max(most_s, lead_s);
+  }
+  return cycle_count_ == 0 ? 0 : most_s - least_s;
+}
+
 double JackCapture::ClockPpm() const {
   if (cycle_count_ < 2) return 0;
   const Cycle& last = cycles_[cycle_count_ - 1];

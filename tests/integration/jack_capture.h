@@ -47,6 +47,10 @@ class JackCapture {
   /// By how much JACK's clock ran fast against CLOCK_MONOTONIC, parts in a million.
   double ClockPpm() const;
 
+  /// How far JACK's clock strayed from one of constant rate within the recording, seconds: a server
+  /// that stood still and caught up has missed no cycle, but told wrong times meanwhile.
+  double ClockErrorS() const;
+
   /// Cycles that JACK or this client missed since Start returned.
   uint64_t missed_count() const { return missed_count_.load(); }
 
