@@ -88,7 +88,7 @@ absl::StatusOr<Principal> AccessControl::Admit(const grpc::CallbackServerContext
 
 absl::StatusOr<Principal> AccessControl::Identify(const grpc::CallbackServerContext& context) {
   const std::string peer = context.peer();
-  if (absl::StartsWith(peer, "unix:")) return Principal{.name = "local", .roles = kEveryRole};
+  if (absl::StartsWith(peer, "unix:")) return Principal{.name = kLocalCaller, .roles = kEveryRole};
   const std::shared_ptr<const AccessTable> table = this->table();
   const Principal* found = nullptr;
   if (const std::string token = BearerToken(context); !token.empty()) {

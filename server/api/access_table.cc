@@ -63,6 +63,7 @@ absl::string_view RoleName(Role role) {
 
 AccessTable AccessTable::ForThisMachine() {
   AccessTable table;
+  table.anybody_.name = kLocalCaller;
   for (const Role role : {Role::kListen, Role::kStrike, Role::kSubmit}) {
     table.anybody_.roles |= static_cast<unsigned>(role);
   }

@@ -31,11 +31,15 @@ struct Principal {
   }
 };
 
+/// The name of every caller that comes through the Unix socket.
+inline constexpr char kLocalCaller[] = "local";
+
 /// The callers that come over TCP, by the tokens and certificates that they show. It keeps only the
 /// SHA-256 of tokens.
 class AccessTable {
  public:
-  /// The table of a daemon without a file: anybody may do all but administer.
+  /// The table of a daemon without a file: anybody may do all but administer, as the caller
+  /// kLocalCaller, so that scenes made over TCP and over the Unix socket are open to both.
   static AccessTable ForThisMachine();
 
   /// Reads lines of the form "NAME ROLES CREDENTIAL". ROLES are separated by commas; CREDENTIAL is

@@ -55,6 +55,20 @@ def methods_of_contract():
                 yield f"/{service.full_name}/{method.name}"
 
 
+class NoAccessFileTest(unittest.TestCase):
+    def test_a_scene_is_open_to_the_unix_socket_and_to_tcp_alike(self):
+        with tempfile.TemporaryDirectory(prefix="carillon-") as folder:
+            daemon = Daemon(pathlib.Path(folder), "--listen", "127.0.0.1:0")
+            self.addCleanup(daemon.stop)
+            servers = (daemon.server, daemon.listening[-1].split()[-1])
+            for maker, user in (servers, servers[::-1]):
+                with grpc.insecure_channel(maker) as made, grpc.insecure_channel(user) as used:
+                    scene = scene_service_pb2_grpc.SceneServiceStub(made).CreateScene(
+                        scene_service_pb2.CreateSceneRequest()).name
+                    scene_service_pb2_grpc.SceneServiceStub(used).DeleteScene(
+                        scene_service_pb2.DeleteSceneRequest(name=scene))
+
+
 class AccessTest(unittest.TestCase):
     def setUp(self):
         scratch = tempfile.TemporaryDirectory(prefix="carillon-")
