@@ -101,7 +101,7 @@ int Refuse(const absl::Status& status, bool json, const WorkerEvents& events) {
 }
 
 /// Opens the standard streams that are closed, because files opened later would take their numbers.
-/// What is written to a standard output that was closed fails.
+/// A standard output that was closed refuses every byte.
 void OpenStandardStreams() {
   for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
     if (fcntl(stream, F_GETFD) >= 0) continue;
@@ -109,7 +109,7 @@ void OpenStandardStreams() {
   }
 }
 
-/// Brings what was printed to standard output.
+/// Flushes standard output. Returns the exit status of the program.
 int FinishOutput() {
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return EXIT_SUCCESS;
   std::fprintf(stderr,

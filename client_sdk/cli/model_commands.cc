@@ -164,7 +164,8 @@ absl::StatusOr<v1::Job> RequestModel(const client::Client& daemon,
 struct Conclusion {
   bool wait;
   bool json;
-  const std::string& (v1::Job::*name)() const;  ///< what is printed where JSON is not asked for
+  /// Returns the name that the command prints if it prints no JSON.
+  const std::string& (v1::Job::*name)() const;
 };
 
 absl::Status Conclude(const client::Client& daemon, absl::StatusOr<v1::Job> job,

@@ -12,7 +12,7 @@
 namespace carillon {
 namespace {
 
-/// Escapes what man(7) would take for a command, so that it prints the text as it is.
+/// Escapes the characters that man(7) takes for commands.
 std::string Plain(const std::string& text) {
   std::string plain = absl::StrReplaceAll(text, {{"\\", "\\e"}, {"-", "\\-"}});
   if (plain.starts_with('.') || plain.starts_with('\'')) plain.insert(0, "\\&");

@@ -54,7 +54,8 @@ int Bind(const sockaddr* address, socklen_t size) {
     fchmod(made, 0600);  // nobody else can connect before the mode is decided
   } else {
     setsockopt(made, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
-    setsockopt(made, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);  // of the connections too
+    // Accepted connections inherit this option.
+    setsockopt(made, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
   }
   if (bind(made, address, size) == 0 && listen(made, kBacklog) == 0) return made;
   const int error = errno;

@@ -64,8 +64,8 @@ class ConnectionGate {
   std::thread thread_;
 };
 
-/// Raises the limit of this process's descriptors as far as the system lets it; returns the number
-/// of connections that may be open at a time.
+/// Raises this process's limit of open descriptors as far as the system allows. Returns how many
+/// connections the process may then hold open at a time.
 size_t RaiseConnectionLimit();
 
 }  // namespace carillon

@@ -56,7 +56,7 @@ Roughness FromProto(const v1::Roughness& proto) {
   return roughness;
 }
 
-/// Reads how long a contact lasts, or what is known of the collision.
+/// Reads the duration of a contact, or the figures of the collision that the duration follows from.
 template <typename Row>
 absl::Status ReadDuration(const Row& row, ContactImpulse& impulse) {
   if (row.has_duration_s()) {

@@ -63,8 +63,7 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
       return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_STREAM",
                      "the stream was started twice; open another call for another scene");
     }
-    ASSIGN_OR_RETURN(const uint64_t scene, ParseSceneName(start.scene()));
-    RETURN_IF_ERROR(daemon_.owners.Check(context_, caller_, scene));
+    ASSIGN_OR_RETURN(const uint64_t scene, daemon_.owners.Parse(context_, caller_, start.scene()));
     ContactStreamSettings settings;
     settings.step_s = start.step_s();
     if (start.has_scheduling_delay_s()) settings.scheduling_delay_s = start.scheduling_delay_s();

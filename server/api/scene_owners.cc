@@ -3,6 +3,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 #include "server/api/resource_name.h"
 
 namespace carillon {
@@ -22,6 +23,13 @@ bool SceneOwners::Owns(const Principal& caller, uint64_t scene) const {
   const MutexLock lock(&mutex_);
   const auto owner = owners_.find(scene);
   return owner == owners_.end() || owner->second == caller.name;
+}
+
+absl::StatusOr<uint64_t> SceneOwners::Parse(const grpc::CallbackServerContext& context,
+                                            const Principal& caller, absl::string_view name) const {
+  ASSIGN_OR_RETURN(const uint64_t scene, ParseSceneName(name));
+  RETURN_IF_ERROR(Check(context, caller, scene));
+  return scene;
 }
 
 absl::Status SceneOwners::Check(const grpc::CallbackServerContext& context, const Principal& caller,

@@ -7,6 +7,8 @@
 
 #include "absl/base/thread_annotations.h"
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
 #include "server/api/access_control.h"
 #include "server/base/mutex.h"
 
@@ -25,6 +27,11 @@ class SceneOwners {
   /// a scene that does not exist, to be told so. Errors: PermissionDenied (SCENE_OF_ANOTHER).
   absl::Status Check(const grpc::CallbackServerContext& context, const Principal& caller,
                      uint64_t scene) const;
+
+  /// Returns the scene of this name if the caller may use it. Errors: those of ParseSceneName and
+  /// Check.
+  absl::StatusOr<uint64_t> Parse(const grpc::CallbackServerContext& context,
+                                 const Principal& caller, absl::string_view name) const;
 
   /// Whether the caller may use the scene.
   bool Owns(const Principal& caller, uint64_t scene) const;

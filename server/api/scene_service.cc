@@ -30,14 +30,13 @@ grpc::ServerUnaryReactor* SceneService::CreateScene(grpc::CallbackServerContext*
 grpc::ServerUnaryReactor* SceneService::DeleteScene(grpc::CallbackServerContext* context,
                                                     const v1::DeleteSceneRequest* request,
                                                     v1::DeleteSceneResponse*) {
-  return Answer(context, reception_, Role::kStrike,
-                [this, context, request](const Principal& caller) {
-                  ASSIGN_OR_RETURN(const uint64_t scene, ParseSceneName(request->name()));
-                  RETURN_IF_ERROR(owners_.Check(*context, caller, scene));
-                  RETURN_IF_ERROR(scenes_.DeleteScene(scene));
-                  owners_.Remove(scene);
-                  return absl::OkStatus();
-                });
+  return Answer(
+      context, reception_, Role::kStrike, [this, context, request](const Principal& caller) {
+        ASSIGN_OR_RETURN(const uint64_t scene, owners_.Parse(*context, caller, request->name()));
+        RETURN_IF_ERROR(scenes_.DeleteScene(scene));
+        owners_.Remove(scene);
+        return absl::OkStatus();
+      });
 }
 
 grpc::ServerUnaryReactor* SceneService::ListScenes(grpc::CallbackServerContext* context,
@@ -57,16 +56,15 @@ grpc::ServerUnaryReactor* SceneService::ListScenes(grpc::CallbackServerContext* 
 grpc::ServerUnaryReactor* SceneService::ListObjects(grpc::CallbackServerContext* context,
                                                     const v1::ListObjectsRequest* request,
                                                     v1::ListObjectsResponse* response) {
-  return Answer(context, reception_, Role::kStrike,
-                [this, context, request, response](const Principal& caller) {
-                  ASSIGN_OR_RETURN(const uint64_t scene, ParseSceneName(request->scene()));
-                  RETURN_IF_ERROR(owners_.Check(*context, caller, scene));
-                  ASSIGN_OR_RETURN(const std::vector<PlacedObject> objects,
-                                   scenes_.ListObjects(scene));
-                  for (const PlacedObject& placed : objects)
-                    *response->add_objects() = ToProto(scene, placed);
-                  return absl::OkStatus();
-                });
+  return Answer(
+      context, reception_, Role::kStrike,
+      [this, context, request, response](const Principal& caller) {
+        ASSIGN_OR_RETURN(const uint64_t scene, owners_.Parse(*context, caller, request->scene()));
+        ASSIGN_OR_RETURN(const std::vector<PlacedObject> objects, scenes_.ListObjects(scene));
+        for (const PlacedObject& placed : objects)
+          *response->add_objects() = ToProto(scene, placed);
+        return absl::OkStatus();
+      });
 }
 
 grpc::ServerUnaryReactor* SceneService::AddObject(grpc::CallbackServerContext* context,
@@ -74,8 +72,8 @@ grpc::ServerUnaryReactor* SceneService::AddObject(grpc::CallbackServerContext* c
                                                   v1::AddObjectResponse* response) {
   return Answer(context, reception_, Role::kStrike,
                 [this, context, request, response](const Principal& caller) {
-                  ASSIGN_OR_RETURN(const uint64_t scene, ParseSceneName(request->scene()));
-                  RETURN_IF_ERROR(owners_.Check(*context, caller, scene));
+                  ASSIGN_OR_RETURN(const uint64_t scene,
+                                   owners_.Parse(*context, caller, request->scene()));
                   return Add(scene, *request, *response);
                 });
 }
@@ -107,8 +105,7 @@ grpc::ServerUnaryReactor* SceneService::UpdateListener(grpc::CallbackServerConte
                                                        v1::UpdateListenerResponse*) {
   return Answer(
       context, reception_, Role::kStrike, [this, context, request](const Principal& caller) {
-        ASSIGN_OR_RETURN(const uint64_t scene, ParseSceneName(request->scene()));
-        RETURN_IF_ERROR(owners_.Check(*context, caller, scene));
+        ASSIGN_OR_RETURN(const uint64_t scene, owners_.Parse(*context, caller, request->scene()));
         return scenes_.UpdateListener(scene, FromProto(request->pose()), request->glide_s());
       });
 }

@@ -150,7 +150,7 @@ class Facets {
 
   std::span<const std::array<float, 3>> vertices_;
   std::span<const std::array<uint32_t, 3>> triangles_;
-  std::vector<Point> normals_;  // of unit length
+  std::vector<Point> normals_;  // unit vectors
   double volume_ = 0;           // six times, and below zero where the triangles look inwards
   std::vector<Integral> integrals_;
   std::vector<std::array<uint32_t, 2>> neighbours_;  // across edges that are not sharp

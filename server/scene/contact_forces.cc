@@ -97,7 +97,8 @@ void ContactForces::Divide(Pair& pair, Events& events) {
     impulse += Magnitude(touch.impulse.by[0].impulse().impulse_newton_seconds);
   }
   const double force = impulse / step_s_;
-  double share = pair.load.Next(impulse, step_s_);  // of the impulse, above the load
+  // The part of the impulse that exceeds the load.
+  double share = pair.load.Next(impulse, step_s_);
   if (pair.blow) share = force > 0 ? std::max(1 - pair.blow->load_newtons / force, 0.0) : 0;
   double remains = 0;
   if (pair.blow && IsOver(*pair.blow, force, share * impulse, remains)) {

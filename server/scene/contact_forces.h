@@ -92,7 +92,7 @@ class ContactForces {
     double begin_s = 0;
     std::vector<double> impulses{};    // above the load, N s, of each step
     std::vector<double> forces{};      // whole, newtons, of each step
-    std::vector<PairTouch> touches{};  // of the step with the greatest impulse
+    std::vector<PairTouch> touches{};  // those of the step with the greatest impulse
     double greatest = 0;               // the greatest of `impulses`
   };
   struct Pair {

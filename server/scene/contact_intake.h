@@ -110,7 +110,7 @@ class ContactIntake {
   /// a force.
   absl::Status Locate(const ObjectContact& contact, double seconds, FeltContact& felt)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(scene_.mutex());
-  /// Notes what is strange about a contact, and refuses one that no body bears.
+  /// Counts the findings about a contact. Errors: InvalidArgument (IMPULSE_TOO_LARGE).
   absl::Status Examine(const FeltContact& felt, double seconds);
   void NoteZero(const ObjectContact& contact);
   void Push(const ContactForces::Events& events);

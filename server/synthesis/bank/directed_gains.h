@@ -116,7 +116,7 @@ class DirectedGains {
   size_t term_count_ = 0;
   size_t period_ = 1;  // blocks
   LaneGains begin_, end_, target_, next_;
-  Bearing bearing_;  // of the gains computed last
+  Bearing bearing_;  // the newest gains belong to this bearing
   uint64_t block_number_ = UINT64_MAX - 1;
   size_t block_of_period_ = 0;
   size_t computed_mode_count_ = 0, computed_term_count_ = 0;  // of next_
