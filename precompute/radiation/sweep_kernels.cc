@@ -27,8 +27,7 @@ constexpr int64_t kSourceChunk = 512;
 constexpr float kPi = 3.14159265358979F;
 
 /// Vectors of targets at once: as many sums as fit into registers beside what is worked with.
-#if HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_SSE4 || HWY_TARGET == HWY_SSSE3 || \
-    HWY_TARGET == HWY_SSE2
+#if HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_SSE4 || HWY_TARGET == HWY_SSE2
 constexpr int kVectorsOneSide = 1;
 #else
 constexpr int kVectorsOneSide = 2;
@@ -84,8 +83,7 @@ HWY_INLINE Pair Between(V x, V y, V z, const float* source) {
   const V guess = hn::ApproximateReciprocalSqrt(square);
   const V half = hn::Mul(hn::Mul(square, hn::Set(d, 0.5F)), guess);
   pair.inverse = hn::Mul(guess, hn::NegMulAdd(half, guess, hn::Set(d, 1.5F)));
-#if HWY_TARGET == HWY_NEON || HWY_TARGET == HWY_SSE4 || HWY_TARGET == HWY_SSSE3 || \
-    HWY_TARGET == HWY_SSE2
+#if HWY_TARGET == HWY_NEON || HWY_TARGET == HWY_SSE4 || HWY_TARGET == HWY_SSE2
   // The guess of these targets may have eight good bits only, so a second step is needed.
   const V again = hn::Mul(hn::Mul(square, hn::Set(d, 0.5F)), pair.inverse);
   pair.inverse = hn::Mul(pair.inverse, hn::NegMulAdd(again, pair.inverse, hn::Set(d, 1.5F)));

@@ -7,7 +7,7 @@
 
 #include "proto/cpp/material_catalogue.h"
 #include "proto/cpp/status_macros.h"
-#include "server/api/model_transfer.h"
+#include "server/api/model_streams.h"
 #include "server/api/resource_name.h"
 #include "server/api/unary_call.h"
 

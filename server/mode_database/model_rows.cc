@@ -10,7 +10,7 @@
 #include "proto/cpp/status_macros.h"
 #include "server/base/xxh3.h"
 #include "server/mode_database/model_checker.h"
-#include "server/mode_database/whole_letters.h"
+#include "server/mode_database/utf8_prefix.h"
 
 namespace carillon {
 namespace {
@@ -22,7 +22,7 @@ constexpr char kSelectModels[] =
 absl::StatusOr<ModelSummary> ParseModel(const SqlRow& row) {
   ModelSummary model{.digest = row.Text(1),
                      // Older versions cut labels within letters.
-                     .label = WholeLetters(row.Text(2), row.Text(2).size()),
+                     .label = Utf8Prefix(row.Text(2), row.Text(2).size()),
                      .stored_bytes = static_cast<uint64_t>(row.Int(3)),
                      .created_unix_ms = row.Int(4),
                      .revision = row.Int(0),

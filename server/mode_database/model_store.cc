@@ -17,7 +17,7 @@
 #include "server/mode_database/model_rows.h"
 #include "server/mode_database/page_token.h"
 #include "server/mode_database/spool_file.h"
-#include "server/mode_database/whole_letters.h"
+#include "server/mode_database/utf8_prefix.h"
 
 namespace carillon {
 namespace {
@@ -45,7 +45,7 @@ absl::Status CheckTag(const std::string& tag) {
 ModelSummary Named(const std::string& digest, const std::string& label) {
   ModelSummary summary;
   summary.digest = digest;
-  summary.label = WholeLetters(label, kMaxLabelBytes);
+  summary.label = Utf8Prefix(label, kMaxLabelBytes);
   return summary;
 }
 
@@ -54,7 +54,7 @@ absl::Status Apply(SqliteConnection& connection, const std::string& digest,
   absl::Status status;
   if (change.label.has_value()) {
     status = connection.Run("UPDATE models SET label = ? WHERE digest = ?",
-                            {WholeLetters(*change.label, kMaxLabelBytes), digest});
+                            {Utf8Prefix(*change.label, kMaxLabelBytes), digest});
   }
   if (status.ok() && change.pinned.has_value()) {
     status = connection.Run("UPDATE models SET pinned = ? WHERE digest = ?",
@@ -201,7 +201,7 @@ absl::Status ModelStore::CopyIfAbsent(const std::string& from, const std::string
     ASSIGN_OR_RETURN(ModelSummary summary, SelectModel(connection, from));
     const absl::StatusOr<ModelSummary> there = SelectModel(connection, to);
     if (!absl::IsNotFound(there.status())) return there.status();
-    summary.label = WholeLetters(label, kMaxLabelBytes);
+    summary.label = Utf8Prefix(label, kMaxLabelBytes);
     summary.created_unix_ms = clock_->UnixMs();
     return InsertCopy(connection, to, summary);
   });

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "server/api/model_transfer.h"
+#include "server/api/model_streams.h"
 
 #include <deque>
 #include <memory>

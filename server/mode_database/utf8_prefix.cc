@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "server/mode_database/whole_letters.h"
+#include "server/mode_database/utf8_prefix.h"
 
 namespace carillon {
 namespace {
@@ -15,7 +15,7 @@ bool Continues(char byte) { return (static_cast<unsigned char>(byte) & 0xC0U) ==
 
 }  // namespace
 
-std::string WholeLetters(std::string_view text, size_t max_bytes) {
+std::string Utf8Prefix(std::string_view text, size_t max_bytes) {
   text = text.substr(0, max_bytes);
   size_t last = text.size();
   while (last > 0 && Continues(text[last - 1])) --last;
