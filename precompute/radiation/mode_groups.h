@@ -9,7 +9,7 @@
 
 namespace carillon::precompute {
 
-/// Modes solved together, and the best that is known of them so far.
+/// Modes that are solved together, and their best result so far.
 struct ModeGroup {
   std::vector<size_t> modes;  ///< one or two
   double wavenumber = 0;
@@ -18,9 +18,9 @@ struct ModeGroup {
   /// silent.
   bool silent = true;
   int first_level = 0;
-  int solved_count = 0;           ///< levels from the first on that it was solved on
-  std::vector<ModeField> fields;  ///< of the finest of them
-  double error_db = 0;            ///< the worst of its modes; an error of directions counts a third
+  int solved_count = 0;           ///< levels, from the first on, on which the group was solved
+  std::vector<ModeField> fields;  ///< the sound fields on the finest of these levels, one a mode
+  double error_db = 0;            ///< of the worst mode; an error of directions counts a third
 
   int next_level() const { return first_level + solved_count; }
 };

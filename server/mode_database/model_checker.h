@@ -31,7 +31,7 @@ class ModelChecker {
   /// wrong). The checker cannot be used after an error.
   absl::Status Check(const v1::ModalModelRecord& record);
 
-  /// As Check of a record with that chunk, after the header.
+  /// Checks a chunk that follows the header, without a record around it. Errors: as those of Check.
   absl::Status CheckChunk(const ChunkView& chunk);
 
   /// Checks that every array is complete. Errors: InvalidArgument (MODAL_MODEL_MALFORMED).
