@@ -7,8 +7,6 @@
 
 #include "precompute/sparse/node_matrix.h"
 
-// The kernels keep arrays of vectors in registers, which scalable vectors do not allow.
-#define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "precompute/sparse/block_kernels.cc"
 // foreach_target.h includes this file once for each target, and must come first.

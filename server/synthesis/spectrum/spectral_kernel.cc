@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/synthesis/spectrum/spectral_kernel.h"
 
-// Vectors of unknown size cannot be kept in arrays, and kMostLanes bounds them.
-#define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "server/synthesis/spectrum/spectral_kernel.cc"
 // foreach_target.h includes this file once for each target, and must come first.
