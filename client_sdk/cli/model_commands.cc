@@ -99,6 +99,15 @@ void PrintTransfer(const v1::TransferSummary& transfer) {
   for (const std::string& warning : header.warnings()) absl::PrintF("warning    %s\n", warning);
 }
 
+/// Returns the name of a material, or its figures where it has none.
+std::string MaterialText(const v1::Material& material) {
+  v1::Material figures = material;
+  figures.clear_preset();
+  const std::string text = figures.ShortDebugString();
+  if (material.preset().empty()) return text;
+  return text.empty() ? material.preset() : absl::StrCat(material.preset(), " with ", text);
+}
+
 void PrintSummary(const v1::ModalModelSummary& model) {
   const v1::ModalModelHeader& header = model.header();
   const v1::Verification& proof = header.verification();
@@ -110,6 +119,7 @@ void PrintSummary(const v1::ModalModelSummary& model) {
                header.element_count(), ElementName(header.settings().element()),
                header.volume_m3());
   absl::PrintF("poisson    %.4f\n", header.settings().poisson_ratio());
+  if (model.has_material()) absl::PrintF("material   %s\n", MaterialText(model.material()));
   for (const v1::Fixture& fixture : header.settings().fixtures()) {
     absl::PrintF("held       %s\n", FixtureText(fixture).value_or("?"));
   }
@@ -261,8 +271,10 @@ absl::Status ShowModel(const client::Client& daemon, const std::string& text,
   }
   const auto given = ToMaterial(figures);
   if (!given.ok()) return given.status();
-  const bool has_material = !given->preset().empty() || given->has_young_pa();
-  const auto material = has_material ? ResolveMaterial(*given) : *given;
+  const bool is_given = !given->preset().empty() || given->has_young_pa();
+  const v1::Material& chosen = is_given ? *given : model->material();
+  const bool has_material = is_given || model->has_material();
+  const auto material = has_material ? ResolveMaterial(chosen) : chosen;
   if (!material.ok()) return material.status();
   PrintSummary(*model);
   if (has_material) PrintModes(*model, *material);

@@ -155,7 +155,7 @@ void AddModelList(CLI::App& app, Program& program) {
 void AddModelTag(CLI::App& app, Program& program) {
   auto model = std::make_shared<std::string>();
   auto change = std::make_shared<v1::UpdateModalModelRequest>();
-  CLI::App& tag = *app.add_subcommand("tag", "Label, tag or pin a model");
+  CLI::App& tag = *app.add_subcommand("tag", "Label, tag or pin a model, or set its material");
   tag.add_option("model", *model,
                  "The name, the label, or the first digits of the digest of a model")
       ->required();
@@ -176,6 +176,10 @@ void AddModelTag(CLI::App& app, Program& program) {
   tag.add_flag_function(
       "--pin,!--unpin", [change](int64_t count) { change->set_pinned(count > 0); },
       "Keep the model from garbage collection, or no longer");
+  tag.add_option_function<std::string>(
+      "--material",
+      [change](const std::string& name) { change->mutable_material()->set_preset(name); },
+      "The named material of objects that name none");
   tag.callback([&program, model, change] {
     program.command = [&program, model, change] {
       return UpdateModel(*program.Daemon(), *model, *change, program.json);

@@ -45,7 +45,7 @@ absl::StatusOr<v1::SoundingObject> AddObject(const client::Client& daemon, const
   v1::AddObjectRequest request;
   request.set_scene(scene);
   request.set_modal_model(*model);
-  *request.mutable_material() = *material;
+  if (material->ByteSizeLong() > 0) *request.mutable_material() = *material;
   request.set_size(options.size);
   request.set_gain(options.gain);
   if (options.paper_coupling) request.set_radiation(v1::RADIATION_MODEL_PAPER_COUPLING);

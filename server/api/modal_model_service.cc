@@ -8,6 +8,7 @@
 #include "proto/cpp/material_catalogue.h"
 #include "proto/cpp/status_macros.h"
 #include "server/api/model_streams.h"
+#include "server/api/object_conversion.h"
 #include "server/api/resource_name.h"
 #include "server/api/unary_call.h"
 
@@ -50,7 +51,10 @@ grpc::ServerUnaryReactor* ModalModelService::CreateTransfer(
     v1::CreateTransferResponse* response) {
   return Answer(context, reception_, Role::kSubmit, [this, request, response] {
     ASSIGN_OR_RETURN(const std::string digest, ParseModelName(request->modal_model()));
-    ASSIGN_OR_RETURN(*response->mutable_job(), queue_.SubmitTransfer(digest, *request));
+    v1::CreateTransferRequest whole = *request;
+    ASSIGN_OR_RETURN(*whole.mutable_material(),
+                     MaterialOrModels(request->material(), digest, database_.models()));
+    ASSIGN_OR_RETURN(*response->mutable_job(), queue_.SubmitTransfer(digest, whole));
     return absl::OkStatus();
   });
 }
@@ -131,6 +135,10 @@ absl::Status ModalModelService::Update(const v1::UpdateModalModelRequest& reques
                      .remove_tags = {request.remove_tags().begin(), request.remove_tags().end()}};
   if (request.has_label()) change.label = request.label();
   if (request.has_pinned()) change.pinned = request.pinned();
+  if (request.has_material()) {
+    RETURN_IF_ERROR(ResolveMaterial(request.material()).status());
+    change.material = request.material();
+  }
   ASSIGN_OR_RETURN(const ModelSummary summary, database_.models().Update(digest, change));
   *response.mutable_modal_model() = ToProto(summary);
   return absl::OkStatus();

@@ -182,6 +182,7 @@ v1::ModalModelSummary ToProto(const ModelSummary& summary) {
   proto.mutable_tags()->Assign(summary.tags.begin(), summary.tags.end());
   proto.set_pinned(summary.pinned);
   proto.set_sounded_unix_ms(summary.sounded_unix_ms);
+  if (summary.material.has_value()) *proto.mutable_material() = *summary.material;
   return proto;
 }
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/api/object_conversion.h"
 
+#include "absl/strings/str_cat.h"
+#include "proto/cpp/error_reason.h"
 #include "proto/cpp/material_catalogue.h"
 #include "proto/cpp/status_macros.h"
 #include "server/api/pose_conversion.h"
@@ -42,6 +44,19 @@ absl::StatusOr<ObjectProperties> ToObjectProperties(const v1::Material& material
   return ObjectProperties{.material = ToSoundingMaterial(resolved, size == 0 ? 1 : size),
                           .poisson_ratio = PoissonRatio(resolved),
                           .gain = gain.value_or(1)};
+}
+
+absl::StatusOr<v1::Material> MaterialOrModels(const v1::Material& asked, const std::string& digest,
+                                              ModelStore& models) {
+  if (asked.ByteSizeLong() > 0) return asked;
+  ASSIGN_OR_RETURN(const std::optional<v1::Material> remembered, models.Material(digest));
+  if (remembered.has_value()) return *remembered;
+  // A model that is not there says so itself.
+  RETURN_IF_ERROR(models.Summary(digest).status());
+  return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_MATERIAL",
+                 absl::StrCat(ModelName(digest),
+                              " was not made with a material here: name one for the object, or set "
+                              "the model's (UpdateModalModel, carillon model tag --material)"));
 }
 
 RadiationModel FromProto(v1::RadiationModel radiation) {

@@ -113,9 +113,11 @@ grpc::ServerUnaryReactor* SceneService::UpdateListener(grpc::CallbackServerConte
 absl::Status SceneService::Add(uint64_t scene, const v1::AddObjectRequest& request,
                                v1::AddObjectResponse& response) {
   ASSIGN_OR_RETURN(const std::string digest, ParseModelName(request.modal_model()));
+  ASSIGN_OR_RETURN(const v1::Material material,
+                   MaterialOrModels(request.material(), digest, database_.models()));
   ASSIGN_OR_RETURN(
       ObjectProperties properties,
-      ToObjectProperties(request.material(), request.size(),
+      ToObjectProperties(material, request.size(),
                          request.has_gain() ? std::optional(request.gain()) : std::nullopt));
   if (request.has_pose()) properties.pose = FromProto(request.pose());
   properties.radiation = FromProto(request.radiation());

@@ -98,9 +98,11 @@ absl::Status TraceReader::TakeClock(const v1::ContactTraceClock& clock) {
 
 absl::Status TraceReader::TakeObject(const v1::ContactTraceObject& object) {
   ASSIGN_OR_RETURN(const std::string digest, ParseModelName(object.modal_model()));
+  ASSIGN_OR_RETURN(const v1::Material material,
+                   MaterialOrModels(object.material(), digest, database_.models()));
   ASSIGN_OR_RETURN(
       ObjectProperties properties,
-      ToObjectProperties(object.material(), object.size(),
+      ToObjectProperties(material, object.size(),
                          object.has_gain() ? std::optional(object.gain()) : std::nullopt));
   if (object.has_pose()) properties.pose = FromProto(object.pose());
   properties.radiation = FromProto(object.radiation());

@@ -102,6 +102,15 @@ absl::StatusOr<v1::Job> QueueCore::Submit(const v1::CreateModalModelRequest& req
     if (job.ok() && job->state() == v1::JOB_STATE_SUCCEEDED) FollowByTransfer(wanted, notices);
   }
   TellAll(notices);
+  RETURN_IF_ERROR(job.status());
+  // Objects without a material of their own get the one that was asked for, with its name.
+  v1::Material material = request.material();
+  const double poisson_ratio = resolved.settings().poisson_ratio();
+  if (resolved.material().has_poisson_ratio() &&
+      resolved.material().poisson_ratio() != poisson_ratio) {
+    material.set_poisson_ratio(poisson_ratio);
+  }
+  RETURN_IF_ERROR(database_.models().RememberMaterial(wanted.digest, material));
   return job;
 }
 

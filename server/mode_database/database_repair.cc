@@ -75,8 +75,11 @@ absl::Status CopyModel(Database& from, Database& to, const std::string& digest) 
     RETURN_IF_ERROR(copy.Append(*record));
   }
   if (const auto stored = copy.Finish(); !stored.ok()) return stored.status();
-  RETURN_IF_ERROR(
-      target.Update(digest, {.add_tags = summary.tags, .pinned = summary.pinned}).status());
+  RETURN_IF_ERROR(target
+                      .Update(digest, {.add_tags = summary.tags,
+                                       .pinned = summary.pinned,
+                                       .material = summary.material})
+                      .status());
   RETURN_IF_ERROR(CopyTransfers(from, to, digest));
   return to.Write([&](SqliteConnection& connection) {
     return connection.Run(

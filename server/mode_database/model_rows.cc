@@ -45,6 +45,12 @@ absl::Status SelectTags(SqliteConnection& connection, ModelSummary& model) {
                           });
 }
 
+absl::Status SelectTagsAndMaterial(SqliteConnection& connection, ModelSummary& model) {
+  RETURN_IF_ERROR(SelectTags(connection, model));
+  ASSIGN_OR_RETURN(model.material, SelectMaterial(connection, model.digest));
+  return absl::OkStatus();
+}
+
 absl::Status InsertHeader(SqliteConnection& connection, const ModelSummary& summary) {
   const std::string header = summary.header.SerializeAsString();
   return connection.Run(
@@ -92,6 +98,34 @@ absl::Status ModelCorrupt(const std::string& digest, absl::string_view what) {
                               "import it from a copy"));
 }
 
+absl::StatusOr<std::optional<v1::Material>> SelectMaterial(SqliteConnection& connection,
+                                                           const std::string& digest) {
+  std::optional<v1::Material> material;
+  RETURN_IF_ERROR(
+      connection.Query("SELECT xxh3, material FROM model_materials WHERE digest = ?", {digest},
+                       [&](const SqlRow& row) {
+                         // A damaged row is as good as none: the next request for the model writes
+                         // it again.
+                         const std::string_view bytes = row.Blob(1);
+                         v1::Material read;
+                         if (std::bit_cast<int64_t>(Xxh3(bytes)) == row.Int(0) &&
+                             read.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) {
+                           material = std::move(read);
+                         }
+                         return absl::OkStatus();
+                       }));
+  return material;
+}
+
+absl::Status StoreMaterial(SqliteConnection& connection, const std::string& digest,
+                           const v1::Material& material) {
+  const std::string bytes = material.SerializeAsString();
+  return connection.Run(
+      "INSERT INTO model_materials (digest, xxh3, material) VALUES (?, ?, ?) ON CONFLICT (digest) "
+      "DO UPDATE SET xxh3 = excluded.xxh3, material = excluded.material",
+      {digest, std::bit_cast<int64_t>(Xxh3(bytes)), SqlBlob{bytes}});
+}
+
 absl::StatusOr<ModelSummary> SelectModel(SqliteConnection& connection, const std::string& digest) {
   absl::StatusOr<ModelSummary> model = ModelNotFound(digest);
   absl::Status status = connection.Query(absl::StrCat(kSelectModels, "WHERE digest = ?").c_str(),
@@ -99,7 +133,7 @@ absl::StatusOr<ModelSummary> SelectModel(SqliteConnection& connection, const std
                                            model = ParseModel(row);
                                            return model.status();
                                          });
-  if (status.ok() && model.ok()) status = SelectTags(connection, *model);
+  if (status.ok() && model.ok()) status = SelectTagsAndMaterial(connection, *model);
   if (!status.ok()) return status;
   return model;
 }
@@ -129,7 +163,7 @@ absl::Status SelectModels(SqliteConnection& connection, const ModelFilter& filte
         return absl::OkStatus();
       });
   for (ModelSummary& model : models) {
-    if (status.ok()) status = SelectTags(connection, model);
+    if (status.ok()) status = SelectTagsAndMaterial(connection, model);
     if (status.ok()) on_model(std::move(model));
   }
   return status;
@@ -209,6 +243,9 @@ absl::Status DeleteModelRows(SqliteConnection& connection, const std::string& di
   absl::Status status = connection.Run("DELETE FROM models WHERE digest = ?", {digest});
   if (status.ok() && connection.changed_row_count() == 0) return ModelNotFound(digest);
   if (status.ok()) status = connection.Run("DELETE FROM model_tags WHERE digest = ?", {digest});
+  if (status.ok()) {
+    status = connection.Run("DELETE FROM model_materials WHERE digest = ?", {digest});
+  }
   if (status.ok()) {
     status = connection.Run("DELETE FROM jobs WHERE digest = ?1 OR transfer_of = ?1", {digest});
   }

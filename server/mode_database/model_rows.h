@@ -2,11 +2,13 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "carillon/v1/material.pb.h"
 #include "carillon/v1/modal_model.pb.h"
 #include "server/mode_database/modal_model.h"
 #include "server/mode_database/model_codec.h"
@@ -29,6 +31,14 @@ absl::Status SelectModels(SqliteConnection& connection, const ModelFilter& filte
                           int64_t limit, absl::FunctionRef<void(ModelSummary)> on_model,
                           absl::FunctionRef<void(std::string, absl::Status)> on_damaged);
 
+/// The material remembered for the model of this digest; absent: there is none, or its row is
+/// damaged.
+absl::StatusOr<std::optional<v1::Material>> SelectMaterial(SqliteConnection& connection,
+                                                           const std::string& digest);
+
+absl::Status StoreMaterial(SqliteConnection& connection, const std::string& digest,
+                           const v1::Material& material);
+
 /// Calls `on_chunk` for the chunks numbered from `first` on, at most `limit`.
 absl::Status SelectChunks(SqliteConnection& connection, int64_t revision, int64_t first,
                           int64_t limit,
@@ -47,7 +57,7 @@ absl::Status InsertModel(SqliteConnection& connection, ModelFileReader& records,
 absl::Status InsertCopy(SqliteConnection& connection, const std::string& digest,
                         ModelSummary& summary);
 
-/// Deletes model, tags and job. Errors: NotFound (MODAL_MODEL_NOT_FOUND).
+/// Deletes model, tags, material and job. Errors: NotFound (MODAL_MODEL_NOT_FOUND).
 absl::Status DeleteModelRows(SqliteConnection& connection, const std::string& digest);
 
 }  // namespace carillon

@@ -60,6 +60,9 @@ absl::Status Apply(SqliteConnection& connection, const std::string& digest,
     status = connection.Run("UPDATE models SET pinned = ? WHERE digest = ?",
                             {static_cast<int64_t>(*change.pinned), digest});
   }
+  if (status.ok() && change.material.has_value()) {
+    status = StoreMaterial(connection, digest, *change.material);
+  }
   for (const std::string& tag : change.add_tags) {
     if (status.ok()) status = CheckTag(tag);
     if (status.ok()) {
@@ -295,6 +298,24 @@ absl::StatusOr<ModelPage> ModelStore::List(const ModelFilter& filter, int page_s
     page.next_page_token = absl::StrCat(page.models.back().revision);
   }
   return page;
+}
+
+absl::Status ModelStore::RememberMaterial(const std::string& digest, const v1::Material& material) {
+  ASSIGN_OR_RETURN(const std::optional<v1::Material> known, Material(digest));
+  // A request that is repeated waits for no disk.
+  const std::string bytes = material.SerializeAsString();
+  if (known.has_value() && known->SerializeAsString() == bytes) return absl::OkStatus();
+  return database_->Write(
+      [&](SqliteConnection& connection) { return StoreMaterial(connection, digest, material); });
+}
+
+absl::StatusOr<std::optional<v1::Material>> ModelStore::Material(const std::string& digest) {
+  std::optional<v1::Material> material;
+  RETURN_IF_ERROR(database_->Read([&](SqliteConnection& connection) {
+    ASSIGN_OR_RETURN(material, SelectMaterial(connection, digest));
+    return absl::OkStatus();
+  }));
+  return material;
 }
 
 absl::StatusOr<ModelSummary> ModelStore::Update(const std::string& digest,

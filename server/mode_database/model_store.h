@@ -15,6 +15,7 @@
 #include "absl/base/thread_annotations.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "carillon/v1/material.pb.h"
 #include "carillon/v1/modal_model.pb.h"
 #include "server/base/clock.h"
 #include "server/base/mutex.h"
@@ -40,6 +41,8 @@ struct ModelSummary {
   bool pinned = false;   ///< garbage collection leaves it alone
   int64_t sounded_unix_ms = 0;
   std::vector<std::string> tags{};  ///< ascending
+  /// The material that it was last asked for with; absent: it was imported.
+  std::optional<v1::Material> material{};
 };
 
 /// Which models to list: those that match all of it.
@@ -58,6 +61,7 @@ struct ModelChange {
   std::vector<std::string> add_tags{};
   std::vector<std::string> remove_tags{};
   std::optional<bool> pinned{};
+  std::optional<v1::Material> material{};
 };
 
 /// What garbage collection has done.
@@ -186,11 +190,18 @@ class ModelStore {
   absl::StatusOr<ModelPage> List(const ModelFilter& filter, int page_size,
                                  const std::string& page_token);
 
+  /// Keeps the material for the model of this digest, stored already or to be stored; it replaces
+  /// an older one. Durable on return.
+  absl::Status RememberMaterial(const std::string& digest, const v1::Material& material);
+
+  /// The remembered material; absent: there is none.
+  absl::StatusOr<std::optional<v1::Material>> Material(const std::string& digest);
+
   /// Errors: NotFound (MODAL_MODEL_NOT_FOUND), InvalidArgument (INVALID_TAG), DataLoss
   /// (MODAL_MODEL_CORRUPT).
   absl::StatusOr<ModelSummary> Update(const std::string& digest, const ModelChange& change);
 
-  /// Deletes a model, its tags and its job. Errors: NotFound (MODAL_MODEL_NOT_FOUND).
+  /// Deletes a model, its tags, its material and its job. Errors: NotFound (MODAL_MODEL_NOT_FOUND).
   absl::Status Delete(const std::string& digest);
 
   /// Deletes models with their jobs, least recently sounded (or, never sounded, stored) first,

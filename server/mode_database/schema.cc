@@ -94,6 +94,13 @@ constexpr std::array kMigrations = {R"sql(
     PRIMARY KEY (revision, speed)
   ) STRICT;
   ALTER TABLE jobs ADD COLUMN transfer_of TEXT NOT NULL DEFAULT '';
+)sql",
+                                    R"sql(
+  CREATE TABLE model_materials (
+    digest TEXT PRIMARY KEY,
+    xxh3 INTEGER NOT NULL,
+    material BLOB NOT NULL
+  ) STRICT, WITHOUT ROWID;
 )sql"};
 
 absl::StatusOr<int64_t> Version(SqliteConnection& connection) {

@@ -9,6 +9,7 @@
 //   jobs          number | digest  label  state  priority  way  error  xxh3  request ...
 //                            :                                                  :
 //   model_tags       tag + digest                                               : mesh_digest
+//   model_materials        digest | xxh3  material                              :
 //                            :                                                  :
 //   models      revision | digest  label  pinned  quarantined  header ...       :
 //                  ^                                              :             :
@@ -21,9 +22,9 @@
 //   facts           name | value
 //
 // An arrow is a foreign key: chunks and transfers are deleted with the row that owns them. A dotted
-// line joins equal values without a foreign key: one digest names a job, its model and the model's
-// tags, so that tags stay when a new revision replaces the model. The digest of a job that computes
-// a transfer names the job alone; jobs.transfer_of is the digest of its model.
+// line joins equal values without a foreign key: one digest names a job, its model, and the model's
+// tags and material, which therefore stay when a new revision replaces the model. The digest of a
+// job that computes a transfer names the job alone; jobs.transfer_of is the digest of its model.
 
 namespace carillon {
 

@@ -115,14 +115,14 @@ class Client {
   /** Returns the model of a name, "modalModels/{digest}". */
   async model(name, material) {
     const answer = await this.call('ModalModelService', 'GetModalModel', { name });
-    return new Model(this, answer.modal_model, material);
+    return new Model(this, answer.modal_model, material ?? answer.modal_model.material ?? undefined);
   }
 
   /** Yields the models that match, newest first; filters are fields of ListModalModelsRequest. */
   async* models(filters = {}) {
     for (let page_token = ''; ;) {
       const page = await this.call('ModalModelService', 'ListModalModels', { ...filters, page_token });
-      for (const summary of page.modal_models) yield new Model(this, summary);
+      for (const summary of page.modal_models) yield new Model(this, summary, summary.material ?? undefined);
       page_token = page.next_page_token;
       if (!page_token) return;
     }

@@ -4,7 +4,7 @@
 const { Trace } = require('./traces');
 
 /**
- * A modal model in the daemon's database. `material` is the one that it was asked for with, if this client knows it;
+ * A modal model in the daemon's database. `material` is the one that it was made with, undefined if it was imported;
  * `summary` is the message that describes the model.
  */
 class Model {

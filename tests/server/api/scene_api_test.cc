@@ -96,6 +96,26 @@ TEST_F(SceneApi, AnObjectStatesHowItSounds) {
   EXPECT_FALSE(object.has_complete_to_hz());
 }
 
+TEST_F(SceneApi, AnObjectWithoutAMaterialGetsTheOneOfItsModel) {
+  v1::AddObjectRequest request = SmallObject(CreateScene());
+  request.clear_material();
+  v1::AddObjectResponse response;
+  ExpectRefused(Add(request, response), grpc::INVALID_ARGUMENT, "INVALID_MATERIAL");
+  v1::UpdateModalModelRequest change;
+  change.set_name(request.modal_model());
+  *change.mutable_material() = SmallMaterial();
+  v1::UpdateModalModelResponse changed;
+  ASSERT_TRUE(Call(*models, &v1::ModalModelService::Stub::UpdateModalModel, change, changed).ok());
+  EXPECT_EQ(changed.modal_model().material().young_pa(), SmallMaterial().young_pa());
+  ASSERT_TRUE(Add(request, response).ok());
+  EXPECT_NEAR(response.object().lowest_frequency_hz(), 440, 1e-9);
+  change.mutable_material()->set_preset("cheese");
+  ExpectRefused(Call(*models, &v1::ModalModelService::Stub::UpdateModalModel, change, changed),
+                grpc::INVALID_ARGUMENT, "UNKNOWN_MATERIAL");
+  request.set_modal_model("modalModels/" + std::string(64, '0'));
+  ExpectRefused(Add(request, response), grpc::NOT_FOUND, "MODAL_MODEL_NOT_FOUND");
+}
+
 TEST_F(SceneApi, AnUpdateAnswersWithTheObjectAsItIsNow) {
   v1::AddObjectResponse added;
   ASSERT_TRUE(Add(SmallObject(CreateScene()), added).ok());

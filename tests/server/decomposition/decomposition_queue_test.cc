@@ -177,6 +177,20 @@ TEST_F(DecompositionQueueTest, AKnownModelSucceedsAtOnceAfterARestart) {
   EXPECT_EQ(Submit(Request(5'000)).name(), done.name());
 }
 
+TEST_F(DecompositionQueueTest, AModelRemembersTheMaterialThatItWasLastAskedForWith) {
+  MakeQueue(kSucceed);
+  v1::CreateModalModelRequest request = Request(20'000);
+  request.mutable_settings()->set_poisson_ratio(0.25);
+  const v1::Job done = SubmitAndAwaitEnd(request);
+  request.mutable_material()->set_preset("steel");
+  ASSERT_EQ(Submit(request).name(), done.name());
+  const auto material = database_->models().Material(DigestOf(done));
+  ASSERT_TRUE(material.ok() && material->has_value()) << material.status();
+  EXPECT_EQ((*material)->preset(), "steel");
+  // The ratio of the model, since the ratio of steel is another and would be refused.
+  EXPECT_EQ((*material)->poisson_ratio(), 0.25);
+}
+
 TEST_F(DecompositionQueueTest, AModelThatIsNotCompleteFarEnoughIsComputedAgain) {
   MakeQueue(absl::StrCat(kCount, kSucceed));
   const v1::Job first = SubmitAndAwaitEnd(Request(10'000));

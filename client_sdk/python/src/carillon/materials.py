@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, Literal, Optional, Union
 
 import numpy
 
-from carillon import errors
 from carillon.v1 import material_pb2, radiation_pb2
 
 if TYPE_CHECKING:
@@ -40,15 +39,12 @@ def to_radiation(name: Optional[Radiation]) -> radiation_pb2.RadiationModel:
     return radiation_pb2.RadiationModel.Value(f"RADIATION_MODEL_{(name or 'unspecified').upper()}")
 
 
-def named(model: Model | str, given: Optional[Material]) -> tuple[str, material_pb2.Material]:
+def named(model: Model | str, given: Optional[Material]) -> tuple[str, Optional[material_pb2.Material]]:
     """Returns the name of a model, and the material to sound with: the one given, or else the one that the model was
-    asked for with."""
+    asked for with. None leaves the choice to the daemon, which remembers it, too."""
     name = model if isinstance(model, str) else model.name
     chosen = given if given is not None or isinstance(model, str) else model.material
-    if chosen is None:
-        raise errors.CarillonError("INVALID_MATERIAL", f"no material is known for {name}; give one, such as "
-                                   "material=\"bell_bronze\"")
-    return name, to_message(chosen)
+    return name, None if chosen is None else to_message(chosen)
 
 
 def resolved(given: material_pb2.Material, catalogue: dict[str, material_pb2.Material]) -> material_pb2.Material:

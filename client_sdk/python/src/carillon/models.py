@@ -23,14 +23,14 @@ NUMPY_TYPES = {modal_model_pb2.ELEMENT_TYPE_FLOAT32: "<f4", modal_model_pb2.ELEM
 
 
 class Model:
-    """A modal model in the daemon's database. `material` is the one that it was asked for with, if this client knows
-    it, and the default of the methods below. `summary` is the message that describes the model."""
+    """A modal model in the daemon's database. `material` is the one that it was made with, the default of the methods
+    below; None if it was imported. `summary` is the message that describes the model."""
 
     def __init__(self, client: Client, summary: modal_model_service_pb2.ModalModelSummary,
                  material: Optional[materials.Material] = None):
         self._client = client
         self.summary = summary
-        self.material = material
+        self.material = summary.material if material is None and summary.HasField("material") else material
 
     @property
     def name(self) -> str:
@@ -60,6 +60,9 @@ class Model:
               size: float = 1) -> tuple[numpy.ndarray, numpy.ndarray]:
         """Returns the damped frequencies, Hz, and the decay rates, 1/s, of the modes."""
         message = materials.named(self, material)[1]
+        if message is None:
+            raise errors.CarillonError("INVALID_MATERIAL", f"{self.name} was not made with a material here; give one, "
+                                       "such as material=\"bell_bronze\"")
         return materials.modes_of(self.eigenvalues, self._client.resolve(message), size)
 
     def frequencies(self, material: Optional[materials.Material] = None, size: float = 1) -> numpy.ndarray:
