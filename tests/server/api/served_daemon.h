@@ -7,6 +7,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "carillon/v1/audio_service.grpc.pb.h"
 #include "carillon/v1/contact_service.grpc.pb.h"
@@ -27,15 +28,18 @@ namespace carillon {
 /// decompositions fail: the worker is a program that only exits.
 class ServedDaemon : public testing::Test {
  protected:
-  ServedDaemon() {
-    server_ = *ApiServer::Start({.addresses = {address_}, .version = "test"},
-                                {.database = *database_,
-                                 .decompositions = *queue_,
-                                 .runs = runs_,
-                                 .scenes = scenes_,
-                                 .output = *output_,
-                                 .clock = clock_,
-                                 .log = [](const std::string&) {}});
+  /// Of `settings`, the addresses and the version are set here; `more` are further addresses.
+  explicit ServedDaemon(ApiSettings settings = {}, const std::vector<std::string>& more = {}) {
+    settings.addresses = {address_};
+    settings.addresses.insert(settings.addresses.end(), more.begin(), more.end());
+    settings.version = "test";
+    server_ = *ApiServer::Start(settings, {.database = *database_,
+                                           .decompositions = *queue_,
+                                           .runs = runs_,
+                                           .scenes = scenes_,
+                                           .output = *output_,
+                                           .clock = clock_,
+                                           .log = [](const std::string&) {}});
     channel_ = grpc::CreateChannel(address_, grpc::InsecureChannelCredentials());
     models = v1::ModalModelService::NewStub(channel_);
     jobs = v1::DecompositionService::NewStub(channel_);
@@ -124,6 +128,8 @@ class ServedDaemon : public testing::Test {
   RemoteRuns& runs() { return runs_; }
   std::filesystem::path folder() const { return folder_ / ""; }
   const std::string& address() const { return address_; }
+  const std::vector<std::string>& addresses() const { return server_->addresses(); }
+  const ApiServer& server() const { return *server_; }
 
  private:
   std::unique_ptr<DecompositionQueue> MakeQueue() {
