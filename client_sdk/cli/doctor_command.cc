@@ -143,17 +143,12 @@ void CheckSlurm(Findings& findings) {
                "runs, and deploy/slurm");
 }
 
-bool IsThisMachine(absl::string_view server) {
-  return absl::StartsWith(server, "unix:") || absl::StartsWith(server, "localhost:") ||
-         absl::StartsWith(server, "127.") || absl::StartsWith(server, "[::1]");
-}
-
 void CheckTls(const Program& program, Findings& findings) {
   if (!program.tls_roots_file.empty() && !absl::StartsWith(program.server, "unix:")) {
     return findings.Good(
         "tls", absl::StrCat("the daemon's certificate is vouched for by ", program.tls_roots_file));
   }
-  if (IsThisMachine(program.server)) return findings.Good("tls", "not needed on this machine");
+  if (IsOnThisMachine(program.server)) return findings.Good("tls", "not needed on this machine");
   findings.Bad("tls",
                "without --tls-roots the network reads along, and tokens are sent for all to see: "
                "name the certificate that vouches for the daemon");

@@ -17,6 +17,7 @@
 #include "carillon/v1/modal_model_service.grpc.pb.h"
 #include "carillon/v1/scene_service.grpc.pb.h"
 #include "server/api/api_server.h"
+#include "server/base/mutex.h"
 #include "server/decomposition/local_executor.h"
 #include "server/live_output/live_output.h"
 #include "tests/server/mode_database/sample_model.h"
@@ -39,7 +40,7 @@ class ServedDaemon : public testing::Test {
                                            .scenes = scenes_,
                                            .output = *output_,
                                            .clock = clock_,
-                                           .log = [](const std::string&) {}});
+                                           .log = [this](const std::string& line) { Note(line); }});
     channel_ = grpc::CreateChannel(address_, grpc::InsecureChannelCredentials());
     models = v1::ModalModelService::NewStub(channel_);
     jobs = v1::DecompositionService::NewStub(channel_);
@@ -130,6 +131,11 @@ class ServedDaemon : public testing::Test {
   const std::string& address() const { return address_; }
   const std::vector<std::string>& addresses() const { return server_->addresses(); }
   const ApiServer& server() const { return *server_; }
+  /// The warnings so far, a line each.
+  std::string log() {
+    const MutexLock lock(&log_mutex_);
+    return log_;
+  }
 
  private:
   std::unique_ptr<DecompositionQueue> MakeQueue() {
@@ -139,6 +145,13 @@ class ServedDaemon : public testing::Test {
     return *DecompositionQueue::Make(*database_, *MakeLocalExecutor(options, clock_), clock_);
   }
 
+  void Note(const std::string& line) {
+    const MutexLock lock(&log_mutex_);
+    log_ += line + "\n";
+  }
+
+  Mutex log_mutex_;
+  std::string log_;
   TemporaryFolder folder_;
   std::string address_ = "unix:" + (folder_ / "socket").string();
   SystemClock clock_;
