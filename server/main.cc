@@ -6,6 +6,7 @@
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 #include <systemd/sd-daemon.h>
+#include <unistd.h>
 
 #include <chrono>
 #include <cstdint>
@@ -226,6 +227,11 @@ void Reload(const ReadOptions& read_options, Options& options, ApiServer& server
   sd_notify(0, "READY=1");
 }
 
+/// Whether the program that computes decompositions is there; a cluster has its own.
+bool CanDecompose(const Options& options) {
+  return options.executor != "local" || access(options.precompute_program.c_str(), X_OK) == 0;
+}
+
 /// Null if no metrics are wanted.
 absl::StatusOr<std::unique_ptr<MetricsServer>> StartMetrics(const Options& options,
                                                             const MeasuredRooms& rooms) {
@@ -233,8 +239,26 @@ absl::StatusOr<std::unique_ptr<MetricsServer>> StartMetrics(const Options& optio
   return MetricsServer::Start(options.metrics_address, [rooms] { return ReadMetrics(rooms); });
 }
 
-/// Serves until a stop signal arrives. Each part is made after the parts that it uses and destroyed
-/// before them.
+/// Serves until a stop signal arrives, and lets the sound fade out.
+absl::Status Serve(const MeasuredRooms& rooms, Options& options, const ReadOptions& read_options,
+                   const sigset_t& signals) {
+  ASSIGN_OR_RETURN(const std::unique_ptr<MetricsServer> metrics, StartMetrics(options, rooms));
+  const DatabaseKeeper keeper(rooms.database.database(), [&rooms](const absl::Status& files) {
+    rooms.server.ShowDatabaseHealth(files.ok());
+    if (!files.ok()) spdlog::error("{}", std::string(files.message()));
+  });
+  LogOutput(rooms.output);
+  AnnounceReady(rooms.server);
+  const Watchdog watchdog(rooms.output);
+  WaitForStop(signals, [&] { Reload(read_options, options, rooms.server); });
+  sd_notify(0, "STOPPING=1");
+  LimitStop();
+  rooms.output.FadeOut();
+  return absl::OkStatus();
+}
+
+/// Makes the parts of the daemon, and serves. Each part is made after the parts that it uses and
+/// destroyed before them.
 absl::Status Run(Options options, const ReadOptions& read_options) {
   const sigset_t signals = BlockSignals();
   SystemClock clock;
@@ -261,26 +285,17 @@ absl::Status Run(Options options, const ReadOptions& read_options) {
                                                              .scenes = scenes,
                                                              .output = *output,
                                                              .clock = clock,
-                                                             .log = LogWarning}));
-  const DatabaseKeeper keeper(database->database(), [&server](const absl::Status& files) {
-    server->ShowDatabaseHealth(files.ok());
-    if (!files.ok()) spdlog::error("{}", std::string(files.message()));
-  });
-  ASSIGN_OR_RETURN(const std::unique_ptr<MetricsServer> metrics,
-                   StartMetrics(options, {.version = kVersion,
-                                          .output = *output,
-                                          .scenes = scenes,
-                                          .decompositions = *decompositions,
-                                          .database = *database,
-                                          .server = *server}));
-  LogOutput(*output);
-  AnnounceReady(*server);
-  const Watchdog watchdog(*output);
-  WaitForStop(signals, [&] { Reload(read_options, options, *server); });
-  sd_notify(0, "STOPPING=1");
-  LimitStop();
-  output->FadeOut();
-  return absl::OkStatus();
+                                                             .log = LogWarning,
+                                                             .can_decompose = [options] {
+                                                               return CanDecompose(options);
+                                                             }}));
+  return Serve({.version = kVersion,
+                .output = *output,
+                .scenes = scenes,
+                .decompositions = *decompositions,
+                .database = *database,
+                .server = *server},
+               options, read_options, signals);
 }
 
 /// Runs `carillond db check|repair|restore`.

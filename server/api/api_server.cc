@@ -5,6 +5,7 @@
 #include <grpcpp/grpcpp.h>
 #include <grpcpp/health_check_service_interface.h>
 
+#include <atomic>
 #include <chrono>
 #include <deque>
 #include <optional>
@@ -148,6 +149,14 @@ struct ApiServer::State {
     return connection == "unix:" || gate->IsOpen(connection);
   }
 
+  /// Says on the service of decompositions whether they can run, when that has changed.
+  void ShowWorkers(bool can) {
+    if (can_decompose.exchange(can) == can) return;
+    server->GetHealthCheckService()->SetServingStatus(v1::DecompositionService::service_full_name(),
+                                                      stores && can);
+    if (!can) client_log.Warn("decompositions cannot run: their program is missing");
+  }
+
   GrpcLog grpc_log;
   LimitedLog client_log;
   AccessControl access;
@@ -171,6 +180,8 @@ struct ApiServer::State {
   std::unique_ptr<grpc::Server> server;
   std::optional<ConnectionGate> gate;
   std::optional<ClientKeeper> keeper;
+  std::atomic<bool> stores{true};
+  std::atomic<bool> can_decompose{true};
   std::vector<std::string> addresses;
 };
 
@@ -222,7 +233,9 @@ absl::StatusOr<std::unique_ptr<ApiServer>> ApiServer::Start(const ApiSettings& s
       .owners = state->owners,
       .idle_calls = state->idle_calls,
       .idle_limit = Duration(settings.rendering_idle_s),
-      .log = [log = &state->client_log](const std::string& line) { log->Warn(line); }});
+      .log = [log = &state->client_log](const std::string& line) { log->Warn(line); },
+      .tick = [state = state.get(),
+               can_decompose = rooms.can_decompose] { state->ShowWorkers(can_decompose()); }});
   rooms.output.ObserveDevice([health = state->server->GetHealthCheckService()](bool plays) {
     health->SetServingStatus(v1::AudioService::service_full_name(), plays);
   });
@@ -243,7 +256,9 @@ absl::Status ApiServer::Reload(const ApiSettings& settings) {
 void ApiServer::ShowDatabaseHealth(bool stores) {
   grpc::HealthCheckServiceInterface& health = *state_->server->GetHealthCheckService();
   health.SetServingStatus(v1::ModalModelService::service_full_name(), stores);
-  health.SetServingStatus(v1::DecompositionService::service_full_name(), stores);
+  state_->stores = stores;
+  health.SetServingStatus(v1::DecompositionService::service_full_name(),
+                          stores && state_->can_decompose);
 }
 
 ApiServer::ApiServer(std::unique_ptr<State> state) : state_(std::move(state)) {}

@@ -47,9 +47,11 @@ struct ServedRooms {
   LiveOutput& output;
   Clock& clock;
   std::function<void(const std::string& line)> log;  ///< of warnings
+  /// Whether decompositions can run; asked several times a second.
+  std::function<bool()> can_decompose = [] { return true; };
 };
 
-/// What clients hold at one moment.
+/// Numbers of the places that clients hold at one moment.
 struct ClientCounts {
   size_t connections = 0;
   size_t contact_streams = 0;
@@ -77,7 +79,8 @@ class ApiServer {
   /// Start about them; nothing is changed then.
   absl::Status Reload(const ApiSettings& settings);
 
-  /// Makes carillon.v1.ModalModelService and carillon.v1.DecompositionService healthy or not.
+  /// Makes carillon.v1.ModalModelService healthy or not. carillon.v1.DecompositionService is
+  /// healthy if that one is and decompositions can run.
   void ShowDatabaseHealth(bool stores);
 
   ClientCounts clients() const;

@@ -30,6 +30,7 @@ void ClientKeeper::Run() {
       if (ended) kept_.log(absl::StrCat(SceneName(scene), " has ended: its clients have gone"));
     }
     kept_.idle_calls.EndIdle(kept_.idle_limit);
+    kept_.tick();
   }
 }
 

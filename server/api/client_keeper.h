@@ -25,6 +25,7 @@ class ClientKeeper {
     IdleCalls& idle_calls;
     std::chrono::nanoseconds idle_limit;
     Log log;
+    std::function<void()> tick;  ///< called several times a second
   };
 
   /// The parts of `kept` must outlive the keeper.

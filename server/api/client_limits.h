@@ -13,7 +13,7 @@
 
 namespace carillon {
 
-/// What clients hold for a while, of which the daemon has a bounded number.
+/// The kinds of places that clients hold for a while; the daemon has a bounded number of each.
 enum class Holding { kScene, kContactStream, kListener, kRendering };
 inline constexpr size_t kHoldingCount = 4;
 

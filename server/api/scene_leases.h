@@ -17,7 +17,7 @@
 
 namespace carillon {
 
-/// What a lease says about its scene.
+/// The state of the lease of one scene.
 struct LeaseState {
   bool keep = false;                  ///< the scene lasts until somebody deletes it
   size_t connection_count = 0;        ///< open connections that have used the scene
