@@ -6,6 +6,7 @@
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 #include <systemd/sd-daemon.h>
+#include <unistd.h>
 
 #include <chrono>
 #include <cstdint>
@@ -22,19 +23,23 @@
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 #include "server/api/api_server.h"
+#include "server/api/client_limits.h"
 #include "server/base/clock.h"
+#include "server/daemon_metrics.h"
 #include "server/data_directory.h"
 #include "server/decomposition/decomposition_queue.h"
 #include "server/decomposition/local_executor.h"
 #include "server/decomposition/remote_runs.h"
 #include "server/decomposition/slurm_executor.h"
 #include "server/live_output/live_output.h"
+#include "server/metrics/metrics_server.h"
 #include "server/mode_database/database.h"
 #include "server/mode_database/database_admin.h"
 #include "server/mode_database/database_keeper.h"
 #include "server/mode_database/mode_database.h"
 #include "server/options.h"
 #include "server/scene/scene_registry.h"
+#include "server/watchdog.h"
 
 namespace carillon {
 namespace {
@@ -159,10 +164,13 @@ absl::StatusOr<std::unique_ptr<DecompositionQueue>> MakeQueue(const Options& opt
                                                               RemoteRuns& runs) {
   ASSIGN_OR_RETURN(std::unique_ptr<Executor> executor,
                    MakeExecutor(options, directory, clock, runs));
-  return DecompositionQueue::Make(database, std::move(executor), clock,
-                                  {.max_queued_count = static_cast<size_t>(options.queue_limit),
-                                   .transfers = options.transfers,
-                                   .log = LogWarning});
+  return DecompositionQueue::Make(
+      database, std::move(executor), clock,
+      {.max_queued_count = static_cast<size_t>(options.queue_limit),
+       .max_queued_count_of_client =
+           ClientLimits::ShareOf(static_cast<size_t>(options.queue_limit), options.client_share),
+       .transfers = options.transfers,
+       .log = LogWarning});
 }
 
 OutputSettings OutputSettingsOf(const Options& options) {
@@ -180,7 +188,9 @@ ApiSettings ApiSettingsOf(const Options& options) {
                   .key = options.tls_key_file,
                   .client_roots = options.tls_client_roots_file},
           .access_file = options.access_file,
-          .version = kVersion};
+          .version = kVersion,
+          .scene_grace_s = options.scene_grace_s,
+          .client_share = options.client_share};
 }
 
 /// The present settings with those of `read` that can change while the daemon runs.
@@ -217,8 +227,38 @@ void Reload(const ReadOptions& read_options, Options& options, ApiServer& server
   sd_notify(0, "READY=1");
 }
 
-/// Serves until a stop signal arrives. Each part is made after the parts that it uses and destroyed
-/// before them.
+/// Whether the program that computes decompositions is there; a cluster has its own.
+bool CanDecompose(const Options& options) {
+  return options.executor != "local" || access(options.precompute_program.c_str(), X_OK) == 0;
+}
+
+/// Null if no metrics are wanted.
+absl::StatusOr<std::unique_ptr<MetricsServer>> StartMetrics(const Options& options,
+                                                            const MeasuredRooms& rooms) {
+  if (options.metrics_address.empty()) return nullptr;
+  return MetricsServer::Start(options.metrics_address, [rooms] { return ReadMetrics(rooms); });
+}
+
+/// Serves until a stop signal arrives, and lets the sound fade out.
+absl::Status Serve(const MeasuredRooms& rooms, Options& options, const ReadOptions& read_options,
+                   const sigset_t& signals) {
+  ASSIGN_OR_RETURN(const std::unique_ptr<MetricsServer> metrics, StartMetrics(options, rooms));
+  const DatabaseKeeper keeper(rooms.database.database(), [&rooms](const absl::Status& files) {
+    rooms.server.ShowDatabaseHealth(files.ok());
+    if (!files.ok()) spdlog::error("{}", std::string(files.message()));
+  });
+  LogOutput(rooms.output);
+  AnnounceReady(rooms.server);
+  const Watchdog watchdog(rooms.output);
+  WaitForStop(signals, [&] { Reload(read_options, options, rooms.server); });
+  sd_notify(0, "STOPPING=1");
+  LimitStop();
+  rooms.output.FadeOut();
+  return absl::OkStatus();
+}
+
+/// Makes the parts of the daemon, and serves. Each part is made after the parts that it uses and
+/// destroyed before them.
 absl::Status Run(Options options, const ReadOptions& read_options) {
   const sigset_t signals = BlockSignals();
   SystemClock clock;
@@ -245,18 +285,17 @@ absl::Status Run(Options options, const ReadOptions& read_options) {
                                                              .scenes = scenes,
                                                              .output = *output,
                                                              .clock = clock,
-                                                             .log = LogWarning}));
-  const DatabaseKeeper keeper(database->database(), [&server](const absl::Status& files) {
-    server->ShowDatabaseHealth(files.ok());
-    if (!files.ok()) spdlog::error("{}", std::string(files.message()));
-  });
-  LogOutput(*output);
-  AnnounceReady(*server);
-  WaitForStop(signals, [&] { Reload(read_options, options, *server); });
-  sd_notify(0, "STOPPING=1");
-  LimitStop();
-  output->FadeOut();
-  return absl::OkStatus();
+                                                             .log = LogWarning,
+                                                             .can_decompose = [options] {
+                                                               return CanDecompose(options);
+                                                             }}));
+  return Serve({.version = kVersion,
+                .output = *output,
+                .scenes = scenes,
+                .decompositions = *decompositions,
+                .database = *database,
+                .server = *server},
+               options, read_options, signals);
 }
 
 /// Runs `carillond db check|repair|restore`.
@@ -283,6 +322,10 @@ int Main(int argc, const char* const* argv) {
   const ReadOptions read_options = [=] { return ReadCommandLine(argc, argv, kVersion); };
   const absl::StatusOr<CommandLine> command = read_options();
   if (command.ok() && !command->run) return command->exit_status;
+  if (command.ok() && command->only_print) {
+    std::cout << PrintConfiguration(command->options);
+    return EXIT_SUCCESS;
+  }
   if (command.ok() && command->only_check) {
     std::cout << "the configuration is valid" << std::endl;
     return EXIT_SUCCESS;

@@ -6,6 +6,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdlib>
 #include <filesystem>
+#include <sstream>
 #include <type_traits>
 
 #include "absl/strings/match.h"
@@ -63,9 +64,44 @@ Options Defaults() {
   return options;
 }
 
+/// Calls visit(key, setting) for each setting of the configuration file.
+template <typename SomeOptions, typename Visit>
+void VisitSettings(SomeOptions& options, const Visit& visit) {
+  visit("listen", options.addresses);
+  visit("data_dir", options.data_directory);
+  visit("access_file", options.access_file);
+  visit("tls_certificate", options.tls_certificate_file);
+  visit("tls_key", options.tls_key_file);
+  visit("tls_client_roots", options.tls_client_roots_file);
+  visit("audio_device", options.audio_device);
+  visit("audio_program", options.audio_program);
+  visit("sample_rate", options.sample_rate_hz);
+  visit("channels", options.channel_count);
+  visit("block_frames", options.block_frame_count);
+  visit("look_ahead_blocks", options.look_ahead_block_count);
+  visit("scene_grace", options.scene_grace_s);
+  visit("client_share", options.client_share);
+  visit("metrics", options.metrics_address);
+  visit("workers", options.worker_count);
+  visit("memory_budget_mib", options.memory_budget_mib);
+  visit("job_memory_mib", options.job_memory_mib);
+  visit("job_time", options.job_time_s);
+  visit("stall_time", options.stall_time_s);
+  visit("queue_limit", options.queue_limit);
+  visit("transfers", options.transfers);
+  visit("model_budget_mib", options.model_budget_mib);
+  visit("precompute", options.precompute_program);
+  visit("executor", options.executor);
+  visit("slurm_dir", options.slurm_directory);
+  visit("slurm_partition", options.slurm_partition);
+  visit("slurm_upload", options.slurm_upload);
+  visit("slurm_client", options.slurm_client);
+  visit("slurm_tls_roots", options.slurm_tls_roots);
+}
+
 /// Stores one value of the configuration file in `target`.
 template <typename T>
-absl::Status ReadValue(const std::string& key, const toml::node& node, T& target) {
+absl::Status ReadValue(absl::string_view key, const toml::node& node, T& target) {
   if (const auto value = node.value<T>()) {
     target = *value;
     return absl::OkStatus();
@@ -73,47 +109,25 @@ absl::Status ReadValue(const std::string& key, const toml::node& node, T& target
   return InvalidConfiguration(absl::StrCat(key, " has a value of the wrong type or size"));
 }
 
-absl::Status ReadAddresses(const toml::node& node, std::vector<std::string>& addresses) {
-  addresses.clear();
+absl::Status ReadValue(absl::string_view key, const toml::node& node,
+                       std::vector<std::string>& texts) {
+  texts.clear();
   const toml::array* array = node.as_array();
-  if (array == nullptr) return ReadValue("listen", node, addresses.emplace_back());
+  if (array == nullptr) return ReadValue(key, node, texts.emplace_back());
   for (const toml::node& element : *array) {
-    RETURN_IF_ERROR(ReadValue("listen", element, addresses.emplace_back()));
+    RETURN_IF_ERROR(ReadValue(key, element, texts.emplace_back()));
   }
   return absl::OkStatus();
 }
 
 absl::Status ReadKey(const std::string& key, const toml::node& node, Options& options) {
-  if (key == "data_dir") return ReadValue(key, node, options.data_directory);
-  if (key == "listen") return ReadAddresses(node, options.addresses);
-  if (key == "audio_device") return ReadValue(key, node, options.audio_device);
-  if (key == "sample_rate") return ReadValue(key, node, options.sample_rate_hz);
-  if (key == "channels") return ReadValue(key, node, options.channel_count);
-  if (key == "block_frames") return ReadValue(key, node, options.block_frame_count);
-  if (key == "look_ahead_blocks") return ReadValue(key, node, options.look_ahead_block_count);
-  if (key == "workers") return ReadValue(key, node, options.worker_count);
-  if (key == "memory_budget_mib") return ReadValue(key, node, options.memory_budget_mib);
-  if (key == "job_memory_mib") return ReadValue(key, node, options.job_memory_mib);
-  if (key == "job_time") return ReadValue(key, node, options.job_time_s);
-  if (key == "stall_time") return ReadValue(key, node, options.stall_time_s);
-  if (key == "queue_limit") return ReadValue(key, node, options.queue_limit);
-  if (key == "transfers") return ReadValue(key, node, options.transfers);
-  if (key == "model_budget_mib") return ReadValue(key, node, options.model_budget_mib);
-  if (key == "executor") return ReadValue(key, node, options.executor);
-  if (key == "slurm_dir") return ReadValue(key, node, options.slurm_directory);
-  if (key == "slurm_partition") return ReadValue(key, node, options.slurm_partition);
-  if (key == "slurm_upload") return ReadValue(key, node, options.slurm_upload);
-  if (key == "slurm_client") return ReadValue(key, node, options.slurm_client);
-  if (key == "slurm_tls_roots") return ReadValue(key, node, options.slurm_tls_roots);
-  if (key == "precompute") return ReadValue(key, node, options.precompute_program);
-  if (key == "audio_program") return ReadValue(key, node, options.audio_program);
-  if (key == "tls_certificate") return ReadValue(key, node, options.tls_certificate_file);
-  if (key == "tls_client_roots") return ReadValue(key, node, options.tls_client_roots_file);
-  if (key == "access_file") return ReadValue(key, node, options.access_file);
-  if (key == "tls_key") return ReadValue(key, node, options.tls_key_file);
-  return InvalidConfiguration(
+  absl::Status status = InvalidConfiguration(
       absl::StrCat("there is no setting \"", key,
                    "\"; a setting has the name of its flag, with _ in place of -"));
+  VisitSettings(options, [&](absl::string_view name, auto& target) {
+    if (name == key) status = ReadValue(key, node, target);
+  });
+  return status;
 }
 
 absl::Status ReadFile(const std::string& path, Options& options) {
@@ -163,6 +177,8 @@ absl::Status Check(const Options& options) {
         CheckRange("--job-memory-mib", options.job_memory_mib, 0, kMostMib),
         CheckRange("--job-time", options.job_time_s, 0.1, kMostSeconds),
         CheckRange("--stall-time", options.stall_time_s, 0.1, kMostSeconds),
+        CheckRange("--scene-grace", options.scene_grace_s, 0, kMostSeconds),
+        CheckRange("--client-share", options.client_share, 0.001, 1),
         CheckRange("--queue-limit", options.queue_limit, 1, 1'000'000),
         CheckRange("--model-budget-mib", options.model_budget_mib, 0, kMostMib)}) {
     if (!status.ok()) return status;
@@ -175,6 +191,10 @@ absl::Status Check(const Options& options) {
   if (!options.slurm_upload.empty() && !IsHostAndPort(options.slurm_upload)) {
     return InvalidConfiguration(absl::StrCat("--slurm-upload is \"", options.slurm_upload,
                                              "\"; it must be HOST:PORT, as the nodes reach it"));
+  }
+  if (!options.metrics_address.empty() && !IsHostAndPort(options.metrics_address)) {
+    return InvalidConfiguration(absl::StrCat("--metrics is \"", options.metrics_address,
+                                             "\"; it must be HOST:PORT, as 127.0.0.1:9464"));
   }
   if (options.addresses.empty()) return InvalidConfiguration("--listen names no address");
   if (options.tls_certificate_file.empty() != options.tls_key_file.empty()) {
@@ -222,6 +242,16 @@ void AddFlags(CLI::App& app, Options& options) {
   app.add_flag("--transfers,!--no-transfers", options.transfers,
                "compute how the modes of each new model radiate, in a job that follows the model's")
       ->capture_default_str();
+  app.add_option(
+         "--scene-grace", options.scene_grace_s,
+         "seconds for which a scene whose connections were all closed waits for its clients")
+      ->capture_default_str();
+  app.add_option("--client-share", options.client_share,
+                 "share of all scenes, streams, listeners, renderings and waiting jobs that one "
+                 "client may have, 0.001 to 1")
+      ->capture_default_str();
+  app.add_option("--metrics", options.metrics_address,
+                 "HOST:PORT at which Prometheus reads metrics, by HTTP without TLS [nowhere]");
   app.add_option("--queue-limit", options.queue_limit, "decompositions that may wait at a time")
       ->capture_default_str();
   app.add_option(
@@ -297,6 +327,8 @@ std::optional<int> ParseFlags(int argc, const char* const* argv, const std::stri
   AddManualFlag(app, 8, version);
   AddFlags(app, command.options);
   AddDatabaseCommands(app, command);
+  app.add_flag("--print-config", command.only_print,
+               "print the settings in force, as a configuration file, and end");
   app.add_flag("--check-config", command.only_check,
                "check the configuration, say what is wrong, and end");
   try {
@@ -329,6 +361,25 @@ absl::StatusOr<CommandLine> ReadCommandLine(int argc, const char* const* argv,
   RETURN_IF_ERROR(Check(command.options));
   command.run = true;
   return command;
+}
+
+std::string PrintConfiguration(const Options& options) {
+  std::ostringstream text;
+  VisitSettings(options, [&text](const char* key, const auto& setting) {
+    using Setting = std::decay_t<decltype(setting)>;
+    toml::table line;
+    if constexpr (std::is_same_v<Setting, std::vector<std::string>>) {
+      toml::array array;
+      for (const std::string& element : setting) array.push_back(element);
+      line.insert(key, std::move(array));
+    } else if constexpr (std::is_integral_v<Setting> && !std::is_same_v<Setting, bool>) {
+      line.insert(key, static_cast<int64_t>(setting));
+    } else {
+      line.insert(key, setting);
+    }
+    text << line << "\n";
+  });
+  return text.str();
 }
 
 }  // namespace carillon

@@ -39,7 +39,10 @@ struct Options {
   std::string tls_certificate_file;
   std::string tls_key_file;
   std::string tls_client_roots_file;
-  std::string access_file;  ///< who may do what over TCP
+  std::string access_file;      ///< who may do what over TCP
+  double scene_grace_s = 60;    ///< for which a scene waits for its clients
+  double client_share = 0.5;    ///< of what all clients may hold, for one
+  std::string metrics_address;  ///< HOST:PORT for Prometheus; empty: none
 
   bool operator==(const Options&) const = default;
 };
@@ -56,6 +59,7 @@ struct CommandLine {
   std::string database_command{};
   std::string backup_file{};  ///< for "restore"
   bool only_check = false;    ///< with --check-config: end after the configuration was read
+  bool only_print = false;    ///< with --print-config: print the settings in force, and end
   int exit_status = 0;
 };
 
@@ -64,5 +68,8 @@ struct CommandLine {
 /// a value is out of range).
 absl::StatusOr<CommandLine> ReadCommandLine(int argc, const char* const* argv,
                                             const std::string& version);
+
+/// The settings as a configuration file.
+std::string PrintConfiguration(const Options& options);
 
 }  // namespace carillon

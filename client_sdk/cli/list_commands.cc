@@ -32,6 +32,12 @@ void PrintObject(const v1::SoundingObject& object) {
                object.highest_frequency_hz(), object.size(), object.gain());
 }
 
+std::string LeaseText(const v1::Scene& scene) {
+  if (scene.keep()) return "kept";
+  if (scene.has_ends_in_s()) return absl::StrFormat("ends in %.0f s", scene.ends_in_s());
+  return absl::StrCat(scene.connection_count(), " connections");
+}
+
 }  // namespace
 
 absl::Status ListJobs(const client::Client& daemon, bool json) {
@@ -119,7 +125,7 @@ absl::Status ListScenes(const client::Client& daemon, bool json) {
     return absl::OkStatus();
   }
   for (const v1::Scene& scene : scenes) {
-    absl::PrintF("%s  %d objects\n", scene.name(), scene.object_count());
+    absl::PrintF("%s  %d objects  %s\n", scene.name(), scene.object_count(), LeaseText(scene));
     const auto objects = daemon.ListObjects(scene.name());
     // A scene may be deleted meanwhile.
     if (!objects.ok()) continue;

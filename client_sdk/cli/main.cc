@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "client_sdk/cli/commands.h"
 #include "client_sdk/cli/completion_options.h"
+#include "client_sdk/cli/doctor_command.h"
 #include "client_sdk/cli/list_options.h"
 #include "client_sdk/cli/material_options.h"
 #include "client_sdk/cli/model_options.h"
@@ -88,6 +89,12 @@ void AddTransfer(CLI::App& app, Program& program) {
       return CreateTransfer(*program.Daemon(), *options, program.json);
     };
   });
+}
+
+void AddDoctor(CLI::App& app, Program& program) {
+  CLI::App& doctor = *app.add_subcommand(
+      "doctor", "Look at the daemon and this machine, and say what is wrong and what to do");
+  doctor.callback([&program] { program.command = [&program] { return Diagnose(program); }; });
 }
 
 void AddStrike(CLI::App& app, Program& program) {
@@ -216,6 +223,7 @@ int Main(int argc, char** argv) {
                "carillon");
   AddProgramOptions(app, program);
   AddStatus(app, program);
+  AddDoctor(app, program);
   AddDatabase(app, program);
   AddModel(app, program);
   AddTransfer(app, program);

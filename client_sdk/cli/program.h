@@ -3,6 +3,7 @@
 
 #include <fstream>
 #include <functional>
+#include <iostream>
 #include <iterator>
 #include <memory>
 #include <string>
@@ -26,6 +27,10 @@ struct Program {
   std::function<absl::Status()> command;
 
   std::unique_ptr<client::Client> Daemon() const {
+    if (!Token().empty() && tls_roots_file.empty() && !IsOnThisMachine(server)) {
+      std::cerr << "carillon: the token is sent without TLS, for the network to read: name the "
+                   "daemon's certificate with --tls-roots\n";
+    }
     return client::Connect(server, {.tls_roots_pem = ForTls(tls_roots_file),
                                     .tls_certificate_pem = ForTls(tls_certificate_file),
                                     .tls_key_pem = ForTls(tls_key_file),

@@ -46,11 +46,27 @@ def refusal(error):
     return Refused(info)
 
 
+class Bearer(grpc.UnaryUnaryClientInterceptor, grpc.UnaryStreamClientInterceptor,
+             grpc.StreamUnaryClientInterceptor, grpc.StreamStreamClientInterceptor):
+    """Sends the token by which the daemon knows a caller over TCP with each call."""
+
+    def __init__(self, token):
+        self.item = ("authorization", f"Bearer {token}")
+
+    def intercept(self, proceed, details, request):
+        return proceed(details._replace(metadata=[*(details.metadata or ()), self.item]), request)
+
+    intercept_unary_unary = intercept_unary_stream = intercept
+    intercept_stream_unary = intercept_stream_stream = intercept
+
+
 class Client:
     """One channel, a stub for each service."""
 
     def __init__(self, server):
         channel = grpc.insecure_channel(server)
+        if token := os.environ.get("CARILLON_TOKEN"):
+            channel = grpc.intercept_channel(channel, Bearer(token))
         self.models = modal_model_service_pb2_grpc.ModalModelServiceStub(channel)
         self.jobs = decomposition_service_pb2_grpc.DecompositionServiceStub(channel)
         self.scenes = scene_service_pb2_grpc.SceneServiceStub(channel)

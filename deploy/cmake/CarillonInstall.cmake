@@ -42,6 +42,8 @@ if(CARILLON_SERVER)
   install(TARGETS carillond carillon-audio RUNTIME COMPONENT server)
   install(FILES ${CMAKE_BINARY_DIR}/man/carillond.8 TYPE MAN RENAME man8/carillond.8 COMPONENT server)
   install(FILES deploy/systemd/carillond.service DESTINATION lib/systemd/system COMPONENT server)
+  install(FILES deploy/prometheus/alerts.yml deploy/prometheus/grafana_dashboard.json
+          DESTINATION ${CMAKE_INSTALL_DATADIR}/carillon/prometheus COMPONENT server)
   install(FILES deploy/systemd/carillon.sysusers.conf DESTINATION lib/sysusers.d RENAME carillon.conf COMPONENT server)
 endif()
 if(CARILLON_PRECOMPUTE)

@@ -37,4 +37,11 @@ std::string ReachableServerAddress() {
   return named || exists(own) || !exists(kSystem) ? own : std::string(kSystem);
 }
 
+bool IsOnThisMachine(const std::string& address) {
+  for (const char* prefix : {"unix:", "localhost:", "127.", "[::1]:"}) {
+    if (address.rfind(prefix, 0) == 0) return true;
+  }
+  return false;
+}
+
 }  // namespace carillon

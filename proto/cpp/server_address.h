@@ -15,4 +15,7 @@ std::string DefaultServerAddress();
 /// one.
 std::string ReachableServerAddress();
 
+/// Whether nobody beyond this machine can read what is sent to the address.
+bool IsOnThisMachine(const std::string& address);
+
 }  // namespace carillon

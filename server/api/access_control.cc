@@ -81,6 +81,8 @@ absl::StatusOr<Principal> AccessControl::Admit(const grpc::CallbackServerContext
                                                Role role) {
   absl::StatusOr<Principal> principal = Identify(context);
   if (!principal.ok()) return Refuse(context, principal.status());
+  principal->connection = context.peer();
+  principal->client = ClientOf(*principal);
   if (principal->has(role)) return principal;
   const bool is_anybody = principal->name == table()->anybody().name;
   return Refuse(context, MissingRole(*principal, role, is_anybody));
@@ -99,6 +101,12 @@ absl::StatusOr<Principal> AccessControl::Identify(const grpc::CallbackServerCont
   }
   found = table->FindCertificate(CertificateNames(context));
   return found == nullptr ? table->anybody() : *found;
+}
+
+std::string AccessControl::ClientOf(const Principal& caller) const {
+  if (caller.name == kLocalCaller) return caller.connection;
+  if (caller.name == table()->anybody().name) return AddressOfPeer(caller.connection);
+  return caller.name;
 }
 
 absl::Status AccessControl::Refuse(const grpc::CallbackServerContext& context,

@@ -38,6 +38,7 @@ class AccessControl {
  private:
   absl::StatusOr<Principal> Identify(const grpc::CallbackServerContext& context);
   std::shared_ptr<const AccessTable> table() const;
+  std::string ClientOf(const Principal& caller) const;
 
   mutable Mutex mutex_;
   std::shared_ptr<const AccessTable> table_ ABSL_GUARDED_BY(mutex_);

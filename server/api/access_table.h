@@ -24,7 +24,11 @@ absl::string_view RoleName(Role role);
 /// A caller whom the daemon knows.
 struct Principal {
   std::string name;
-  unsigned roles = 0;  ///< bits of Role
+  unsigned roles = 0;        ///< bits of Role
+  std::string connection{};  ///< of this call, as gRPC names its peer
+  /// Whose share of scenes, streams and jobs it uses: the caller, if it has shown a credential;
+  /// else the connection, or, where the network reaches the daemon, the address that it comes from.
+  std::string client{};
 
   bool has(Role role) const {
     return role == Role::kAny ? roles != 0 : (roles & static_cast<unsigned>(role)) != 0;

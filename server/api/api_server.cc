@@ -5,6 +5,7 @@
 #include <grpcpp/grpcpp.h>
 #include <grpcpp/health_check_service_interface.h>
 
+#include <atomic>
 #include <chrono>
 #include <deque>
 #include <optional>
@@ -16,13 +17,18 @@
 #include "server/api/access_control.h"
 #include "server/api/admin_service.h"
 #include "server/api/audio_service.h"
+#include "server/api/client_keeper.h"
+#include "server/api/client_limits.h"
 #include "server/api/connection_gate.h"
 #include "server/api/contact_service.h"
 #include "server/api/decomposition_service.h"
 #include "server/api/grpc_log.h"
+#include "server/api/idle_calls.h"
 #include "server/api/job_run_service.h"
+#include "server/api/limited_log.h"
 #include "server/api/listen_address.h"
 #include "server/api/modal_model_service.h"
+#include "server/api/scene_leases.h"
 #include "server/api/scene_owners.h"
 #include "server/api/scene_service.h"
 #include "server/api/thread_pool.h"
@@ -46,6 +52,11 @@ constexpr int kKeepalive_ms = 30'000;
 constexpr int kKeepaliveAnswer_ms = 10'000;
 /// Memory of all connections; beyond it gRPC refuses calls and connections.
 constexpr size_t kClientMemoryBytes = size_t{512} << 20U;
+
+std::chrono::nanoseconds Duration(double seconds) {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(
+      std::chrono::duration<double>(seconds));
+}
 
 absl::Status Unready(absl::string_view reason, absl::string_view message) {
   return Refusal(absl::StatusCode::kFailedPrecondition, reason, message);
@@ -110,29 +121,52 @@ void LimitClients(grpc::ServerBuilder& builder) {
 struct ApiServer::State {
   State(const ApiSettings& settings, const ServedRooms& rooms, AccessTable table)
       : grpc_log(rooms.clock, rooms.log),
+        client_log(rooms.clock, rooms.log),
         access(std::move(table), rooms.clock, rooms.log),
-        admin(rooms.database, {access, call_pool}),
-        models(rooms.database, rooms.decompositions, {access, call_pool}),
-        decompositions(rooms.decompositions, {access, call_pool}),
-        job_runs(rooms.runs, call_pool),
-        scenes(rooms.scenes, owners, rooms.database, {access, call_pool}),
+        limits(settings.client_share),
+        leases(rooms.clock, Duration(settings.scene_grace_s),
+               [this](const std::string& connection) { return IsOpen(connection); }),
+        admin(rooms.database, reception),
+        models(rooms.database, rooms.decompositions, reception),
+        decompositions(rooms.decompositions, reception),
+        job_runs(rooms.runs, access, call_pool),
+        scenes(rooms.scenes, owners, rooms.database, reception),
         contacts({.scenes = rooms.scenes,
                   .output = rooms.output,
                   .clock = rooms.clock,
                   .owners = owners,
-                  .reception = {access, call_pool}}),
-        audio(settings.version, rooms.output, rooms.scenes, rooms.database, {access, render_pool}),
+                  .reception = reception}),
+        audio(settings.version, rooms.output, rooms.scenes, rooms.database, rooms.clock, idle_calls,
+              {access, limits, render_pool}),
         output(rooms.output) {}
 
   absl::Status Listen(const ApiSettings& settings);
   absl::StatusOr<std::shared_ptr<grpc::ServerCredentials>> Credentials(const ListenAddress& address,
                                                                        const ApiSettings& settings);
 
+  /// A connection without a name of its own counts as open for ever.
+  bool IsOpen(const std::string& connection) const {
+    return connection == "unix:" || gate->IsOpen(connection);
+  }
+
+  /// Says on the service of decompositions whether they can run, when that has changed.
+  void ShowWorkers(bool can) {
+    if (can_decompose.exchange(can) == can) return;
+    server->GetHealthCheckService()->SetServingStatus(v1::DecompositionService::service_full_name(),
+                                                      stores && can);
+    if (!can) client_log.Warn("decompositions cannot run: their program is missing");
+  }
+
   GrpcLog grpc_log;
+  LimitedLog client_log;
   AccessControl access;
-  SceneOwners owners{access};
+  ClientLimits limits;
+  SceneLeases leases;
+  SceneOwners owners{access, leases};
+  IdleCalls idle_calls;
   ThreadPool call_pool{kCallThreadCount};
   ThreadPool render_pool{kRenderThreadCount, kRenderNiceness};
+  const Reception reception{access, limits, call_pool};
   AdminService admin;
   ModalModelService models;
   DecompositionService decompositions;
@@ -145,6 +179,9 @@ struct ApiServer::State {
   std::vector<std::shared_ptr<TlsCredentials>> tls;
   std::unique_ptr<grpc::Server> server;
   std::optional<ConnectionGate> gate;
+  std::optional<ClientKeeper> keeper;
+  std::atomic<bool> stores{true};
+  std::atomic<bool> can_decompose{true};
   std::vector<std::string> addresses;
 };
 
@@ -191,6 +228,14 @@ absl::StatusOr<std::unique_ptr<ApiServer>> ApiServer::Start(const ApiSettings& s
   ASSIGN_OR_RETURN(AccessTable table, ReadAccess(settings));
   auto state = std::make_unique<State>(settings, rooms, std::move(table));
   RETURN_IF_ERROR(state->Listen(settings));
+  state->keeper.emplace(ClientKeeper::Kept{
+      .scenes = rooms.scenes,
+      .owners = state->owners,
+      .idle_calls = state->idle_calls,
+      .idle_limit = Duration(settings.rendering_idle_s),
+      .log = [log = &state->client_log](const std::string& line) { log->Warn(line); },
+      .tick = [state = state.get(),
+               can_decompose = rooms.can_decompose] { state->ShowWorkers(can_decompose()); }});
   rooms.output.ObserveDevice([health = state->server->GetHealthCheckService()](bool plays) {
     health->SetServingStatus(v1::AudioService::service_full_name(), plays);
   });
@@ -211,16 +256,27 @@ absl::Status ApiServer::Reload(const ApiSettings& settings) {
 void ApiServer::ShowDatabaseHealth(bool stores) {
   grpc::HealthCheckServiceInterface& health = *state_->server->GetHealthCheckService();
   health.SetServingStatus(v1::ModalModelService::service_full_name(), stores);
-  health.SetServingStatus(v1::DecompositionService::service_full_name(), stores);
+  state_->stores = stores;
+  health.SetServingStatus(v1::DecompositionService::service_full_name(),
+                          stores && state_->can_decompose);
 }
 
 ApiServer::ApiServer(std::unique_ptr<State> state) : state_(std::move(state)) {}
 
 ApiServer::~ApiServer() {
-  state_->gate.reset();
+  state_->gate->Close();
+  state_->keeper.reset();
   state_->output.ObserveDevice(nullptr);
   state_->server->Shutdown(std::chrono::system_clock::now() + kGracePeriod);
   state_->server->Wait();
+}
+
+ClientCounts ApiServer::clients() const {
+  const ClientLimits& limits = state_->limits;
+  return {.connections = state_->gate->open_count(),
+          .contact_streams = limits.count(Holding::kContactStream),
+          .listeners = limits.count(Holding::kListener),
+          .renderings = limits.count(Holding::kRendering)};
 }
 
 const std::vector<std::string>& ApiServer::addresses() const { return state_->addresses; }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <memory>
 #include <string>
@@ -28,6 +29,13 @@ struct ApiSettings {
   std::string access_file{};
   /// Version of the daemon.
   std::string version;
+  /// Seconds for which a scene waits for its clients to come back.
+  double scene_grace_s = 60;
+  /// Share of all scenes, streams, listeners and renderings that one client may hold; above 0, at
+  /// most 1.
+  double client_share = 0.5;
+  /// Seconds after which a rendering is ended whose client neither sends nor reads.
+  double rendering_idle_s = 60;
 };
 
 /// The rooms that the server serves. All of them must outlive it.
@@ -39,6 +47,16 @@ struct ServedRooms {
   LiveOutput& output;
   Clock& clock;
   std::function<void(const std::string& line)> log;  ///< of warnings
+  /// Whether decompositions can run; asked several times a second.
+  std::function<bool()> can_decompose = [] { return true; };
+};
+
+/// Numbers of the places that clients hold at one moment.
+struct ClientCounts {
+  size_t connections = 0;
+  size_t contact_streams = 0;
+  size_t listeners = 0;
+  size_t renderings = 0;
 };
 
 /// All services of carillon.v1, health and reflection. The health of carillon.v1.AudioService is
@@ -61,8 +79,11 @@ class ApiServer {
   /// Start about them; nothing is changed then.
   absl::Status Reload(const ApiSettings& settings);
 
-  /// Makes carillon.v1.ModalModelService and carillon.v1.DecompositionService healthy or not.
+  /// Makes carillon.v1.ModalModelService healthy or not. carillon.v1.DecompositionService is
+  /// healthy if that one is and decompositions can run.
   void ShowDatabaseHealth(bool stores);
+
+  ClientCounts clients() const;
 
   /// The addresses of the settings, with the ports that were chosen.
   const std::vector<std::string>& addresses() const;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/api/audio_service.h"
 
+#include <utility>
+
 #include "server/api/listen_call.h"
 #include "server/api/render_call.h"
 #include "server/api/status_conversion.h"
@@ -11,17 +13,24 @@ namespace carillon {
 
 grpc::ServerWriteReactor<v1::ListenResponse>* AudioService::Listen(
     grpc::CallbackServerContext* context, const v1::ListenRequest*) {
-  return Open(*context, reception_, Role::kListen, [this] { return MakeListenCall(output_); });
+  return Open(*context, reception_, Role::kListen, Holding::kListener,
+              [this](const Principal&, ClientPlace place) {
+                return MakeListenCall(output_, std::move(place));
+              });
 }
 
 grpc::ServerBidiReactor<v1::RenderRequest, v1::RenderResponse>* AudioService::Render(
     grpc::CallbackServerContext* context) {
-  return Open(*context, reception_, Role::kStrike, [this] {
-    return MakeRenderCall({.database = database_,
-                           .bodies = render_bodies_,
-                           .pool = reception_.pool,
-                           .call_count = rendering_count_});
-  });
+  return Open(*context, reception_, Role::kStrike, Holding::kRendering,
+              [this, context](const Principal&, ClientPlace place) {
+                return MakeRenderCall({.database = database_,
+                                       .bodies = render_bodies_,
+                                       .pool = reception_.pool,
+                                       .call_count = rendering_count_,
+                                       .clock = clock_,
+                                       .idle_calls = idle_calls_},
+                                      *context, std::move(place));
+              });
 }
 
 grpc::ServerUnaryReactor* AudioService::GetMixer(grpc::CallbackServerContext* context,

@@ -5,7 +5,9 @@
 #include <string>
 
 #include "carillon/v1/audio_service.grpc.pb.h"
+#include "server/api/idle_calls.h"
 #include "server/api/reception.h"
+#include "server/base/clock.h"
 #include "server/live_output/live_output.h"
 #include "server/mode_database/mode_database.h"
 #include "server/scene/scene_registry.h"
@@ -18,11 +20,14 @@ class AudioService final : public v1::AudioService::CallbackService {
  public:
   /// The pool of `reception` has the threads that render offline.
   AudioService(std::string version, LiveOutput& output, const SceneRegistry& scenes,
-               ModeDatabase& database, const Reception& reception)
+               ModeDatabase& database, const Clock& clock, IdleCalls& idle_calls,
+               const Reception& reception)
       : version_(std::move(version)),
         output_(output),
         scenes_(scenes),
         database_(database),
+        clock_(clock),
+        idle_calls_(idle_calls),
         reception_(reception) {}
 
   grpc::ServerWriteReactor<v1::ListenResponse>* Listen(grpc::CallbackServerContext* context,
@@ -40,6 +45,8 @@ class AudioService final : public v1::AudioService::CallbackService {
   LiveOutput& output_;
   const SceneRegistry& scenes_;
   ModeDatabase& database_;
+  const Clock& clock_;
+  IdleCalls& idle_calls_;
   const Reception reception_;
   BodyCache render_bodies_;
   std::atomic<int> rendering_count_{0};

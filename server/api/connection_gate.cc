@@ -23,6 +23,7 @@
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
+#include "server/api/peer_name.h"
 
 namespace carillon {
 namespace {
@@ -84,11 +85,17 @@ ConnectionGate::ConnectionGate(size_t max_connection_count)
     : max_connection_count_(max_connection_count), stop_(eventfd(0, EFD_CLOEXEC)) {}
 
 ConnectionGate::~ConnectionGate() {
+  Close();
+  close(stop_);
+}
+
+void ConnectionGate::Close() {
   eventfd_write(stop_, 1);
   if (thread_.joinable()) thread_.join();
   for (const Door& door : doors_) close(door.socket);
   for (const std::string& path : socket_paths_) unlink(path.c_str());
-  close(stop_);
+  doors_.clear();
+  socket_paths_.clear();
 }
 
 absl::Status ConnectionGate::Listen(ListenAddress& address,
@@ -153,26 +160,47 @@ void ConnectionGate::Run() {
 
 /// Accepts one connection, so that no address waits for another.
 void ConnectionGate::Accept(const Door& door) {
-  const int connection = accept4(door.socket, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
+  sockaddr_storage address{};
+  socklen_t size = sizeof address;
+  const int connection = accept4(door.socket, reinterpret_cast<sockaddr*>(&address), &size,
+                                 SOCK_NONBLOCK | SOCK_CLOEXEC);
   if (connection < 0) {
     if (errno != EAGAIN && errno != ECONNABORTED && errno != EINTR) {
       std::this_thread::sleep_for(kPause);
     }
     return;
   }
-  connections_.erase(connection);
-  if (!HasRoom()) {
+  const std::string peer = PeerNameOf(connection, address, ++accepted_count_);
+  if (!Admit(peer, {.descriptor = connection, .inode = InodeOf(connection)})) {
     close(connection);
     return;
   }
-  connections_[connection] = InodeOf(connection);
+  const NamedPeer named(peer);
   door.taker->Take(connection);
 }
 
-bool ConnectionGate::HasRoom() {
-  if (connections_.size() < max_connection_count_) return true;
-  std::erase_if(connections_, [](const auto& each) { return InodeOf(each.first) != each.second; });
-  return connections_.size() < max_connection_count_;
+bool ConnectionGate::Connection::is_open() const { return InodeOf(descriptor) == inode; }
+
+bool ConnectionGate::Admit(const std::string& peer, const Connection& connection) {
+  const MutexLock lock(&mutex_);
+  if (connections_.size() >= max_connection_count_) {
+    std::erase_if(connections_, [](const auto& each) { return !each.second.is_open(); });
+  }
+  if (connections_.size() >= max_connection_count_) return false;
+  connections_.insert_or_assign(peer, connection);
+  return true;
+}
+
+bool ConnectionGate::IsOpen(const std::string& peer) const {
+  const MutexLock lock(&mutex_);
+  const auto found = connections_.find(peer);
+  return found != connections_.end() && found->second.is_open();
+}
+
+size_t ConnectionGate::open_count() const {
+  const MutexLock lock(&mutex_);
+  return static_cast<size_t>(
+      std::ranges::count_if(connections_, [](const auto& each) { return each.second.is_open(); }));
 }
 
 size_t RaiseConnectionLimit() {

@@ -4,14 +4,17 @@
 #include <sys/types.h>
 
 #include <cstddef>
+#include <cstdint>
 #include <map>
 #include <memory>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "absl/base/thread_annotations.h"
 #include "absl/status/statusor.h"
 #include "server/api/listen_address.h"
+#include "server/base/mutex.h"
 
 namespace carillon {
 
@@ -29,7 +32,6 @@ class ConnectionGate {
  public:
   explicit ConnectionGate(size_t max_connection_count);
 
-  /// Joins the thread, and closes and removes the sockets. Connections that were taken stay.
   ~ConnectionGate();
   ConnectionGate(const ConnectionGate&) = delete;
   ConnectionGate& operator=(const ConnectionGate&) = delete;
@@ -41,25 +43,44 @@ class ConnectionGate {
   /// Begins to accept.
   void Open();
 
+  /// Joins the thread, and closes and removes the sockets. Connections that were taken stay.
+  void Close();
+
+  /// Whether the connection of this name, as calls see it (ServerContext::peer), is open. Any
+  /// thread.
+  bool IsOpen(const std::string& peer) const;
+
+  /// Number of connections that are open. Any thread.
+  size_t open_count() const;
+
  private:
   struct Door {
     int socket;
     ConnectionTaker* taker;
+  };
+  /// Whoever took a connection closes it without a word; its descriptor then has no inode, or
+  /// another.
+  struct Connection {
+    int descriptor;
+    ino_t inode;
+    bool is_open() const;
   };
 
   absl::Status ListenUnix(const ListenAddress& address, ConnectionTaker& taker);
   absl::Status ListenTcp(ListenAddress& address, ConnectionTaker& taker);
   void Run();
   void Accept(const Door& door);
-  bool HasRoom();
+  /// Whether another connection may be open at a time; if so, notes this one by its peer.
+  bool Admit(const std::string& peer, const Connection& connection);
 
   const size_t max_connection_count_;
   std::vector<std::unique_ptr<ConnectionTaker>> takers_;
   std::vector<Door> doors_;
   std::vector<std::string> socket_paths_;
-  /// Open connections, as far as known: descriptor and the inode of its socket. Whoever took a
-  /// connection closes it without a word; its descriptor then has no inode, or another.
-  std::map<int, ino_t> connections_;
+  uint64_t accepted_count_ = 0;
+  mutable Mutex mutex_;
+  /// By peer; some may have been closed.
+  std::map<std::string, Connection> connections_ ABSL_GUARDED_BY(mutex_);
   int stop_;  ///< becomes readable when the gate is to end
   std::thread thread_;
 };

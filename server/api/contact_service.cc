@@ -29,8 +29,12 @@ constexpr int kMostSettlePeriods = 250;
 class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::StreamContactsResponse> {
  public:
   ContactCall(const ContactContext& daemon, const grpc::CallbackServerContext& context,
-              Principal caller)
-      : StreamWriter(nullptr), daemon_(daemon), context_(context), caller_(std::move(caller)) {
+              Principal caller, ClientPlace place)
+      : StreamWriter(nullptr),
+        daemon_(daemon),
+        context_(context),
+        caller_(std::move(caller)),
+        place_(std::move(place)) {
     StartWriting();
     StartReading();
   }
@@ -144,6 +148,7 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
   const ContactContext daemon_;
   const grpc::CallbackServerContext& context_;
   const Principal caller_;
+  const ClientPlace place_;
   std::unique_ptr<ContactStream> stream_;
   std::chrono::nanoseconds answer_due_{0};
   Mutex mutex_;
@@ -155,10 +160,11 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
 
 grpc::ServerBidiReactor<v1::StreamContactsRequest, v1::StreamContactsResponse>*
 ContactService::StreamContacts(grpc::CallbackServerContext* context) {
-  absl::StatusOr<Principal> caller = daemon_.reception.access.Admit(*context, Role::kStrike);
-  if (caller.ok()) return new ContactCall(daemon_, *context, *std::move(caller));
   using Reactor = grpc::ServerBidiReactor<v1::StreamContactsRequest, v1::StreamContactsResponse>;
-  return new RefusedCall<Reactor>(caller.status());
+  return Open(*context, daemon_.reception, Role::kStrike, Holding::kContactStream,
+              [&](const Principal& caller, ClientPlace place) -> Reactor* {
+                return new ContactCall(daemon_, *context, caller, std::move(place));
+              });
 }
 
 }  // namespace carillon

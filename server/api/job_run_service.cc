@@ -23,10 +23,30 @@ absl::Status Incomplete(absl::string_view what) {
                  absl::StrCat(what, ": send the result again, the end last"));
 }
 
+/// Somebody who calls with the token of a run. Wrong tokens are logged.
+class RunCaller {
+ public:
+  RunCaller(AccessControl& access, const grpc::CallbackServerContext& context)
+      : access_(&access), context_(&context), token_(BearerToken(context)) {}
+
+  const std::string& token() const { return token_; }
+
+  /// Logs the refusal of the token, if `status` is one, and returns it.
+  absl::Status Note(absl::Status status) const {
+    if (!absl::IsPermissionDenied(status)) return status;
+    return access_->Refuse(*context_, std::move(status));
+  }
+
+ private:
+  AccessControl* access_;
+  const grpc::CallbackServerContext* context_;
+  std::string token_;
+};
+
 /// Takes the records of a result, then the end of the run.
 class ResultSink {
  public:
-  ResultSink(RemoteRuns& runs, std::string token) : runs_(&runs), token_(std::move(token)) {}
+  ResultSink(RemoteRuns& runs, RunCaller caller) : runs_(&runs), caller_(std::move(caller)) {}
 
   absl::Status Append(const v1::UploadResultRequest& request) {
     RETURN_IF_ERROR(Begin(request.job()));
@@ -46,7 +66,9 @@ class ResultSink {
   absl::Status Begin(const std::string& job) {
     if (upload_) return absl::OkStatus();
     ASSIGN_OR_RETURN(const std::string digest, ParseJobName(job));
-    ASSIGN_OR_RETURN(upload_, runs_->BeginUpload(digest, token_));
+    auto upload = runs_->BeginUpload(digest, caller_.token());
+    if (!upload.ok()) return caller_.Note(upload.status());
+    upload_ = *std::move(upload);
     return absl::OkStatus();
   }
 
@@ -57,7 +79,7 @@ class ResultSink {
   }
 
   RemoteRuns* runs_;
-  std::string token_;
+  RunCaller caller_;
   std::optional<RunUpload> upload_;
   std::optional<v1::RunEnd> end_;
 };
@@ -65,8 +87,8 @@ class ResultSink {
 /// Sends a mesh file piece by piece.
 class MeshCall final : public ServerStream<v1::FetchMeshResponse> {
  public:
-  MeshCall(RemoteRuns& runs, std::string job, std::string token, ThreadPool& pool)
-      : StreamWriter(&pool), runs_(runs), job_(std::move(job)), token_(std::move(token)) {
+  MeshCall(RemoteRuns& runs, std::string job, RunCaller caller, ThreadPool& pool)
+      : StreamWriter(&pool), runs_(runs), job_(std::move(job)), caller_(std::move(caller)) {
     StartWriting();
   }
 
@@ -78,13 +100,15 @@ class MeshCall final : public ServerStream<v1::FetchMeshResponse> {
 
   absl::Status Begin() {
     ASSIGN_OR_RETURN(const std::string digest, ParseJobName(job_));
-    ASSIGN_OR_RETURN(const auto path, runs_.Begin(digest, token_));
-    mesh_.Open(path);
+    const auto path = runs_.Begin(digest, caller_.token());
+    if (!path.ok()) return caller_.Note(path.status());
+    mesh_.Open(*path);
     return absl::OkStatus();
   }
 
   RemoteRuns& runs_;
-  const std::string job_, token_;
+  const std::string job_;
+  const RunCaller caller_;
   bool begun_ = false;
   FilePieces mesh_;
 };
@@ -93,22 +117,22 @@ class MeshCall final : public ServerStream<v1::FetchMeshResponse> {
 
 grpc::ServerWriteReactor<v1::FetchMeshResponse>* JobRunService::FetchMesh(
     grpc::CallbackServerContext* context, const v1::FetchMeshRequest* request) {
-  return new MeshCall(runs_, request->job(), BearerToken(*context), pool_);
+  return new MeshCall(runs_, request->job(), RunCaller(access_, *context), pool_);
 }
 
 grpc::ServerUnaryReactor* JobRunService::ReportProgress(grpc::CallbackServerContext* context,
                                                         const v1::ReportProgressRequest* request,
                                                         v1::ReportProgressResponse*) {
-  return Answer(context, pool_, [this, context, request] {
+  return Answer(context, pool_, [this, request, caller = RunCaller(access_, *context)] {
     ASSIGN_OR_RETURN(const std::string digest, ParseJobName(request->job()));
-    return runs_.Report(digest, BearerToken(*context), request->progress());
+    return caller.Note(runs_.Report(digest, caller.token(), request->progress()));
   });
 }
 
 grpc::ServerReadReactor<v1::UploadResultRequest>* JobRunService::UploadResult(
     grpc::CallbackServerContext* context, v1::UploadResultResponse* response) {
   return new ReadCall<v1::UploadResultRequest, v1::UploadResultResponse, ResultSink>(
-      *context, *response, ResultSink(runs_, BearerToken(*context)), pool_);
+      *context, *response, ResultSink(runs_, RunCaller(access_, *context)), pool_);
 }
 
 }  // namespace carillon

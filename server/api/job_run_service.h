@@ -2,6 +2,7 @@
 #pragma once
 
 #include "carillon/v1/job_run_service.grpc.pb.h"
+#include "server/api/access_control.h"
 #include "server/api/thread_pool.h"
 #include "server/decomposition/remote_runs.h"
 
@@ -10,7 +11,9 @@ namespace carillon {
 /// carillon.v1.JobRunService. The constructor's references must outlive the service.
 class JobRunService final : public v1::JobRunService::CallbackService {
  public:
-  JobRunService(RemoteRuns& runs, ThreadPool& pool) : runs_(runs), pool_(pool) {}
+  /// `access` logs wrong tokens.
+  JobRunService(RemoteRuns& runs, AccessControl& access, ThreadPool& pool)
+      : runs_(runs), access_(access), pool_(pool) {}
 
   grpc::ServerWriteReactor<v1::FetchMeshResponse>* FetchMesh(
       grpc::CallbackServerContext* context, const v1::FetchMeshRequest* request) override;
@@ -22,6 +25,7 @@ class JobRunService final : public v1::JobRunService::CallbackService {
 
  private:
   RemoteRuns& runs_;
+  AccessControl& access_;
   ThreadPool& pool_;
 };
 

@@ -15,7 +15,8 @@ namespace {
 /// bounded queue.
 class ListenCall final : public ServerStream<v1::ListenResponse> {
  public:
-  explicit ListenCall(LiveOutput& output) : StreamWriter(nullptr), format_(output.format()) {
+  ListenCall(LiveOutput& output, ClientPlace place)
+      : StreamWriter(nullptr), place_(std::move(place)), format_(output.format()) {
     listener_ = output.broadcast().Subscribe([this] { Wake(); });
     StartWriting();
   }
@@ -37,6 +38,7 @@ class ListenCall final : public ServerStream<v1::ListenResponse> {
     return Supply::kMessage;
   }
 
+  const ClientPlace place_;
   const DeviceFormat format_;
   bool format_sent_ = false;
   /// Last, so that it is destroyed, and wakes nobody any more, before the rest.
@@ -45,8 +47,9 @@ class ListenCall final : public ServerStream<v1::ListenResponse> {
 
 }  // namespace
 
-grpc::ServerWriteReactor<v1::ListenResponse>* MakeListenCall(LiveOutput& output) {
-  return new ListenCall(output);
+grpc::ServerWriteReactor<v1::ListenResponse>* MakeListenCall(LiveOutput& output,
+                                                             ClientPlace place) {
+  return new ListenCall(output, std::move(place));
 }
 
 }  // namespace carillon

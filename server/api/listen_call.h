@@ -4,12 +4,13 @@
 #include <grpcpp/grpcpp.h>
 
 #include "carillon/v1/audio_service.pb.h"
+#include "server/api/client_limits.h"
 #include "server/live_output/live_output.h"
 
 namespace carillon {
 
 /// Makes the server's side of one call of AudioService.Listen. The returned reactor deletes itself
-/// when the call ends. `output` must outlive it.
-grpc::ServerWriteReactor<v1::ListenResponse>* MakeListenCall(LiveOutput& output);
+/// when the call ends; it holds `place`. `output` must outlive it.
+grpc::ServerWriteReactor<v1::ListenResponse>* MakeListenCall(LiveOutput& output, ClientPlace place);
 
 }  // namespace carillon

@@ -40,23 +40,26 @@ grpc::ServerReadReactor<v1::UploadMeshRequest>* ModalModelService::UploadMesh(
 grpc::ServerUnaryReactor* ModalModelService::CreateModalModel(
     grpc::CallbackServerContext* context, const v1::CreateModalModelRequest* request,
     v1::CreateModalModelResponse* response) {
-  return Answer(context, reception_, Role::kSubmit, [this, request, response] {
-    ASSIGN_OR_RETURN(*response->mutable_job(), queue_.Submit(*request));
-    return absl::OkStatus();
-  });
+  return Answer(
+      context, reception_, Role::kSubmit, [this, request, response](const Principal& caller) {
+        ASSIGN_OR_RETURN(*response->mutable_job(), queue_.Submit(*request, caller.client));
+        return absl::OkStatus();
+      });
 }
 
 grpc::ServerUnaryReactor* ModalModelService::CreateTransfer(
     grpc::CallbackServerContext* context, const v1::CreateTransferRequest* request,
     v1::CreateTransferResponse* response) {
-  return Answer(context, reception_, Role::kSubmit, [this, request, response] {
-    ASSIGN_OR_RETURN(const std::string digest, ParseModelName(request->modal_model()));
-    v1::CreateTransferRequest whole = *request;
-    ASSIGN_OR_RETURN(*whole.mutable_material(),
-                     MaterialOrModels(request->material(), digest, database_.models()));
-    ASSIGN_OR_RETURN(*response->mutable_job(), queue_.SubmitTransfer(digest, whole));
-    return absl::OkStatus();
-  });
+  return Answer(
+      context, reception_, Role::kSubmit, [this, request, response](const Principal& caller) {
+        ASSIGN_OR_RETURN(const std::string digest, ParseModelName(request->modal_model()));
+        v1::CreateTransferRequest whole = *request;
+        ASSIGN_OR_RETURN(*whole.mutable_material(),
+                         MaterialOrModels(request->material(), digest, database_.models()));
+        ASSIGN_OR_RETURN(*response->mutable_job(),
+                         queue_.SubmitTransfer(digest, whole, caller.client));
+        return absl::OkStatus();
+      });
 }
 
 grpc::ServerUnaryReactor* ModalModelService::GetModalModel(grpc::CallbackServerContext* context,

@@ -6,6 +6,7 @@
 #include <type_traits>
 
 #include "server/api/access_control.h"
+#include "server/api/client_limits.h"
 #include "server/api/stream_call.h"
 #include "server/api/thread_pool.h"
 
@@ -14,6 +15,7 @@ namespace carillon {
 /// What every call passes before its work begins.
 struct Reception {
   AccessControl& access;
+  ClientLimits& limits;
   ThreadPool& pool;
 };
 
@@ -33,6 +35,19 @@ auto Open(const grpc::CallbackServerContext& context, const Reception& reception
   const absl::Status admitted = reception.access.Admit(context, role).status();
   if (admitted.ok()) return make();
   return new RefusedCall<std::remove_pointer_t<decltype(make())>>(admitted);
+}
+
+/// As above; the call holds a place of its client, which `make(caller, place)` takes.
+template <typename Make>
+auto Open(const grpc::CallbackServerContext& context, const Reception& reception, Role role,
+          Holding holding, Make make) -> decltype(make(Principal(), ClientPlace())) {
+  using Reactor = std::remove_pointer_t<decltype(make(Principal(), ClientPlace()))>;
+  const absl::StatusOr<Principal> caller = reception.access.Admit(context, role);
+  if (!caller.ok()) return new RefusedCall<Reactor>(caller.status());
+  absl::StatusOr<ClientPlace> place = reception.limits.Take(holding, caller->client);
+  if (!place.ok())
+    return new RefusedCall<Reactor>(reception.access.Refuse(context, place.status()));
+  return make(*caller, *std::move(place));
 }
 
 }  // namespace carillon

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/api/render_call.h"
 
+#include <atomic>
+#include <chrono>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -8,6 +10,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 #include "server/api/contact_conversion.h"
 #include "server/api/sample_bytes.h"
 #include "server/api/stream_call.h"
@@ -18,33 +21,60 @@
 namespace carillon {
 namespace {
 
-constexpr int kMaxCallCount = 8;
 /// 64 blocks, or 32 KiB: large enough for few messages, and small enough that the thread soon
 /// serves the next call.
 constexpr size_t kFramesPerMessage = 64 * OfflineRenderer::kBlockFrameCount;
 
 /// Reads the whole trace, then renders and sends one message after the other. A message is rendered
 /// when the one before has left, so a client that reads slowly holds neither a thread nor memory.
-class RenderCall final : public BidiStream<v1::RenderRequest, v1::RenderResponse> {
+class RenderCall final : public BidiStream<v1::RenderRequest, v1::RenderResponse>, public IdleCall {
  public:
-  explicit RenderCall(const RenderContext& daemon)
+  RenderCall(const RenderContext& daemon, grpc::CallbackServerContext& context, ClientPlace place)
       : StreamWriter(&daemon.pool),
+        place_(std::move(place)),
+        context_(context),
         call_count_(daemon.call_count),
+        idle_calls_(daemon.idle_calls),
+        wait_(daemon.clock),
         reader_(daemon.database, daemon.bodies) {
-    if (++call_count_ <= kMaxCallCount) {
+    if (++call_count_ <= static_cast<int>(kMaxRenderingCount)) {
+      idle_calls_.Add(*this);
       StartReading();
       return;
     }
-    End(Refusal(
-        absl::StatusCode::kResourceExhausted, "TOO_MANY_RENDERINGS",
-        absl::StrCat(kMaxCallCount, " traces are being rendered; try again when one is done")));
+    End(Refusal(absl::StatusCode::kResourceExhausted, "TOO_MANY_RENDERINGS",
+                absl::StrCat(kMaxRenderingCount,
+                             " traces are being rendered; try again when one is done")));
   }
-  ~RenderCall() override { --call_count_; }
+  ~RenderCall() override {
+    idle_calls_.Remove(*this);
+    --call_count_;
+  }
+
+  void EndIfIdle(std::chrono::nanoseconds limit) override {
+    if (!wait_.EndIfLonger(limit)) return;
+    // A message that is being sent cannot be followed by the end.
+    if (writes_) return context_.TryCancel();
+    End(Refusal(absl::StatusCode::kDeadlineExceeded, "RENDERING_IDLE",
+                absl::StrCat("nothing was sent for ", std::chrono::duration<double>(limit).count(),
+                             " s: send the trace without pauses")));
+  }
 
  private:
-  absl::Status Take(const v1::RenderRequest& request) override { return reader_.Take(request); }
+  absl::Status Take(const v1::RenderRequest& request) override {
+    if (!wait_.Resume()) return absl::CancelledError();  // Refuse leaves it
+    RETURN_IF_ERROR(reader_.Take(request));
+    wait_.Begin();
+    return absl::OkStatus();
+  }
+
+  void Refuse(const absl::Status& status) override {
+    if (wait_.Resume()) End(status);
+  }
 
   void AllRead() override {
+    if (!wait_.Resume()) return;
+    writes_ = true;
     absl::StatusOr<std::unique_ptr<OfflineRenderer>> renderer = reader_.Finish();
     if (!renderer.ok()) return End(renderer.status());
     renderer_ = *std::move(renderer);
@@ -53,6 +83,13 @@ class RenderCall final : public BidiStream<v1::RenderRequest, v1::RenderResponse
   }
 
   absl::StatusOr<Supply> Fill(v1::RenderResponse& response) override {
+    if (!wait_.Resume()) return absl::CancelledError("the client has not read for too long");
+    absl::StatusOr<Supply> supply = FillNext(response);
+    wait_.Begin();
+    return supply;
+  }
+
+  absl::StatusOr<Supply> FillNext(v1::RenderResponse& response) {
     if (response.has_summary()) return Supply::kEnd;
     if (samples_.empty()) {
       samples_.resize(kFramesPerMessage * reader_.channel_count());
@@ -93,7 +130,12 @@ class RenderCall final : public BidiStream<v1::RenderRequest, v1::RenderResponse
     }
   }
 
+  const ClientPlace place_;
+  grpc::CallbackServerContext& context_;
   std::atomic<int>& call_count_;
+  IdleCalls& idle_calls_;
+  ClientWait wait_;
+  std::atomic<bool> writes_{false};
   TraceReader reader_;
   std::unique_ptr<OfflineRenderer> renderer_;
   std::optional<LoudnessMeter> loudness_;
@@ -103,8 +145,8 @@ class RenderCall final : public BidiStream<v1::RenderRequest, v1::RenderResponse
 }  // namespace
 
 grpc::ServerBidiReactor<v1::RenderRequest, v1::RenderResponse>* MakeRenderCall(
-    const RenderContext& daemon) {
-  return new RenderCall(daemon);
+    const RenderContext& daemon, grpc::CallbackServerContext& context, ClientPlace place) {
+  return new RenderCall(daemon, context, std::move(place));
 }
 
 }  // namespace carillon

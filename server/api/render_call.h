@@ -6,7 +6,10 @@
 #include <atomic>
 
 #include "carillon/v1/audio_service.pb.h"
+#include "server/api/client_limits.h"
+#include "server/api/idle_calls.h"
 #include "server/api/thread_pool.h"
+#include "server/base/clock.h"
 #include "server/mode_database/mode_database.h"
 #include "server/scene/sounding_body.h"
 
@@ -19,11 +22,13 @@ struct RenderContext {
   ThreadPool& pool;
   /// Number of Render calls that run now.
   std::atomic<int>& call_count;
+  const Clock& clock;
+  IdleCalls& idle_calls;
 };
 
-/// Makes a call of AudioService.Render, which deletes itself when it is done. The parts of `daemon`
-/// must outlive it.
+/// Makes a call of AudioService.Render, which holds `place` and deletes itself when it is done. It
+/// is one of the idle calls of `daemon`, whose parts must outlive it.
 grpc::ServerBidiReactor<v1::RenderRequest, v1::RenderResponse>* MakeRenderCall(
-    const RenderContext& daemon);
+    const RenderContext& daemon, grpc::CallbackServerContext& context, ClientPlace place);
 
 }  // namespace carillon

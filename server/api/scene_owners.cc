@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/api/scene_owners.h"
 
+#include <utility>
+
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
@@ -8,33 +10,47 @@
 
 namespace carillon {
 
-void SceneOwners::Add(uint64_t scene, const std::string& owner) {
+void SceneOwners::Add(uint64_t scene, const Principal& owner, ClientPlace place, bool keep) {
+  leases_.Begin(scene, owner.connection, keep);
   const MutexLock lock(&mutex_);
-  owners_[scene] = owner;
+  owners_[scene] = {.name = owner.name, .client = owner.client, .place = std::move(place)};
 }
 
 void SceneOwners::Remove(uint64_t scene) {
+  leases_.End(scene);
   const MutexLock lock(&mutex_);
   owners_.erase(scene);
+}
+
+std::optional<uint64_t> SceneOwners::LongestAbandoned(const std::optional<std::string>& client) {
+  return leases_.LongestAbandoned([&](uint64_t scene) {
+    const MutexLock lock(&mutex_);
+    const auto owner = owners_.find(scene);
+    return !client || (owner != owners_.end() && owner->second.client == *client);
+  });
 }
 
 bool SceneOwners::Owns(const Principal& caller, uint64_t scene) const {
   if (caller.has(Role::kAdminister)) return true;
   const MutexLock lock(&mutex_);
   const auto owner = owners_.find(scene);
-  return owner == owners_.end() || owner->second == caller.name;
+  return owner == owners_.end() || owner->second.name == caller.name;
 }
 
 absl::StatusOr<uint64_t> SceneOwners::Parse(const grpc::CallbackServerContext& context,
-                                            const Principal& caller, absl::string_view name) const {
+                                            const Principal& caller, absl::string_view name,
+                                            SceneCall call) const {
   ASSIGN_OR_RETURN(const uint64_t scene, ParseSceneName(name));
-  RETURN_IF_ERROR(Check(context, caller, scene));
+  RETURN_IF_ERROR(Check(context, caller, scene, call));
   return scene;
 }
 
 absl::Status SceneOwners::Check(const grpc::CallbackServerContext& context, const Principal& caller,
-                                uint64_t scene) const {
-  if (Owns(caller, scene)) return absl::OkStatus();
+                                uint64_t scene, SceneCall call) const {
+  if (Owns(caller, scene)) {
+    if (call == SceneCall::kUses) leases_.Use(scene, caller.connection);
+    return absl::OkStatus();
+  }
   return access_.Refuse(
       context, Refusal(absl::StatusCode::kPermissionDenied, "SCENE_OF_ANOTHER",
                        absl::StrCat(SceneName(scene), " belongs to another caller than ",

@@ -17,14 +17,12 @@ namespace carillon {
 grpc::ServerUnaryReactor* SceneService::CreateScene(grpc::CallbackServerContext* context,
                                                     const v1::CreateSceneRequest* request,
                                                     v1::CreateSceneResponse* response) {
-  return Answer(
-      context, reception_, Role::kStrike, [this, request, response](const Principal& caller) {
-        ASSIGN_OR_RETURN(const uint64_t scene, scenes_.CreateScene(ToSceneSpace(
-                                                   request->hearing(), request->listener())));
-        owners_.Add(scene, caller.name);
-        response->set_name(SceneName(scene));
-        return absl::OkStatus();
-      });
+  return Answer(context, reception_, Role::kStrike,
+                [this, context, request, response](const Principal& caller) {
+                  ASSIGN_OR_RETURN(const uint64_t scene, Create(*context, caller, *request));
+                  response->set_name(SceneName(scene));
+                  return absl::OkStatus();
+                });
 }
 
 grpc::ServerUnaryReactor* SceneService::DeleteScene(grpc::CallbackServerContext* context,
@@ -48,6 +46,10 @@ grpc::ServerUnaryReactor* SceneService::ListScenes(grpc::CallbackServerContext* 
       v1::Scene& scene = *response->add_scenes();
       scene.set_name(SceneName(entry.scene));
       scene.set_object_count(static_cast<uint32_t>(entry.object_count));
+      const LeaseState lease = owners_.leases().StateOf(entry.scene);
+      scene.set_keep(lease.keep);
+      scene.set_connection_count(static_cast<uint32_t>(lease.connection_count));
+      if (lease.ends_in_s) scene.set_ends_in_s(*lease.ends_in_s);
     }
     return absl::OkStatus();
   });
@@ -59,7 +61,8 @@ grpc::ServerUnaryReactor* SceneService::ListObjects(grpc::CallbackServerContext*
   return Answer(
       context, reception_, Role::kStrike,
       [this, context, request, response](const Principal& caller) {
-        ASSIGN_OR_RETURN(const uint64_t scene, owners_.Parse(*context, caller, request->scene()));
+        ASSIGN_OR_RETURN(const uint64_t scene,
+                         owners_.Parse(*context, caller, request->scene(), SceneCall::kLooks));
         ASSIGN_OR_RETURN(const std::vector<PlacedObject> objects, scenes_.ListObjects(scene));
         for (const PlacedObject& placed : objects)
           *response->add_objects() = ToProto(scene, placed);
@@ -108,6 +111,32 @@ grpc::ServerUnaryReactor* SceneService::UpdateListener(grpc::CallbackServerConte
         ASSIGN_OR_RETURN(const uint64_t scene, owners_.Parse(*context, caller, request->scene()));
         return scenes_.UpdateListener(scene, FromProto(request->pose()), request->glide_s());
       });
+}
+
+absl::StatusOr<uint64_t> SceneService::Create(const grpc::CallbackServerContext& context,
+                                              const Principal& caller,
+                                              const v1::CreateSceneRequest& request) {
+  const SceneSpace space = ToSceneSpace(request.hearing(), request.listener());
+  absl::StatusOr<ClientPlace> place = reception_.limits.Take(Holding::kScene, caller.client);
+  if (!place.ok() && EndAbandoned(caller.client)) {
+    place = reception_.limits.Take(Holding::kScene, caller.client);
+  }
+  if (!place.ok()) return reception_.access.Refuse(context, place.status());
+  absl::StatusOr<uint64_t> scene = scenes_.CreateScene(space);
+  if (absl::IsResourceExhausted(scene.status()) && EndAbandoned(std::nullopt)) {
+    scene = scenes_.CreateScene(space);
+  }
+  RETURN_IF_ERROR(scene.status());
+  owners_.Add(*scene, caller, *std::move(place), request.keep());
+  return scene;
+}
+
+bool SceneService::EndAbandoned(const std::optional<std::string>& client) {
+  const std::optional<uint64_t> abandoned = owners_.LongestAbandoned(client);
+  if (!abandoned) return false;
+  scenes_.DeleteScene(*abandoned).IgnoreError();
+  owners_.Remove(*abandoned);
+  return true;
 }
 
 absl::Status SceneService::Add(uint64_t scene, const v1::AddObjectRequest& request,

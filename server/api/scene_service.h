@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
+#include <optional>
+#include <string>
+
 #include "carillon/v1/scene_service.grpc.pb.h"
 #include "server/api/reception.h"
 #include "server/api/resource_name.h"
@@ -43,6 +47,11 @@ class SceneService final : public v1::SceneService::CallbackService {
                                            v1::UpdateListenerResponse* response) override;
 
  private:
+  absl::StatusOr<uint64_t> Create(const grpc::CallbackServerContext& context,
+                                  const Principal& caller, const v1::CreateSceneRequest& request);
+  /// Ends the scene, of one client's or of all, that was abandoned for the longest time; false:
+  /// none is.
+  bool EndAbandoned(const std::optional<std::string>& client);
   absl::Status Add(uint64_t scene, const v1::AddObjectRequest& request,
                    v1::AddObjectResponse& response);
   absl::Status Update(const ObjectName& name, const v1::UpdateObjectRequest& request,

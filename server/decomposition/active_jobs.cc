@@ -7,6 +7,11 @@
 #include "server/decomposition/job_rules.h"
 
 namespace carillon {
+namespace {
+
+constexpr size_t kMostRememberedClients = 4096;
+
+}  // namespace
 
 std::optional<ActiveJob> ActiveJobs::Find(const std::string& digest) {
   MutexLock lock(&mutex_);
@@ -22,7 +27,22 @@ bool ActiveJobs::Contains(const std::string& digest) {
 
 size_t ActiveJobs::queued_count() {
   MutexLock lock(&mutex_);
-  return queue_.size();
+  size_t count = 0;
+  for (const auto& [client, queue] : queues_) count += queue.size();
+  return count;
+}
+
+size_t ActiveJobs::queued_count(const std::string& client) {
+  MutexLock lock(&mutex_);
+  const auto queue = queues_.find(client);
+  return queue == queues_.end() ? 0 : queue->second.size();
+}
+
+ActiveJobs::Counts ActiveJobs::CountStates() {
+  MutexLock lock(&mutex_);
+  const auto running = static_cast<size_t>(
+      std::ranges::count_if(jobs_, [](const auto& job) { return job.second.running.has_value(); }));
+  return {.queued = jobs_.size() - running, .running = running};
 }
 
 std::vector<ActiveJob> ActiveJobs::Running() {
@@ -78,16 +98,16 @@ void ActiveJobs::Add(ActiveJob job) {
 Notice ActiveJobs::Change(const std::string& digest, absl::FunctionRef<void(ActiveJob&)> change) {
   MutexLock lock(&mutex_);
   ActiveJob& job = jobs_.at(digest);
-  queue_.erase(PlaceOf(job));
+  Dequeue(job);
   change(job);
-  if (!job.running.has_value() && job.waits_for.empty()) queue_.insert(PlaceOf(job));
+  if (!job.running.has_value() && job.waits_for.empty()) queues_[job.client].insert(PlaceOf(job));
   return Announce(job);
 }
 
 Notice ActiveJobs::Remove(const std::string& digest, const v1::Job& last) {
   MutexLock lock(&mutex_);
   const auto job = jobs_.find(digest);
-  queue_.erase(PlaceOf(job->second));
+  Dequeue(job->second);
   jobs_.erase(job);
   Notice notice{{}, last, ++version_};
   if (auto watchers = watchers_.extract(digest)) notice.watchers = std::move(watchers.mapped());
@@ -97,11 +117,13 @@ Notice ActiveJobs::Remove(const std::string& digest, const v1::Job& last) {
 std::optional<ActiveJob> ActiveJobs::BeginRun(const Capacity& capacity,
                                               std::chrono::nanoseconds now) {
   MutexLock lock(&mutex_);
-  if (queue_.empty() || running_count_ >= capacity.worker_count) return std::nullopt;
-  ActiveJob& job = jobs_.at(std::get<std::string>(*queue_.begin()));
+  if (queues_.empty() || running_count_ >= capacity.worker_count) return std::nullopt;
+  const std::set<Place>& queue = NextClient()->second;
+  ActiveJob& job = jobs_.at(std::get<std::string>(*queue.begin()));
   const bool fits = reserved_bytes_ + job.estimate_bytes <= capacity.memory_bytes;
   if (!fits && running_count_ > 0) return std::nullopt;
-  queue_.erase(queue_.begin());
+  Dequeue(job);
+  NoteStart(job.client);
   ++running_count_;
   Reserve(job, job.estimate_bytes);
   job.running = job.request;
@@ -195,7 +217,30 @@ Notice ActiveJobs::Announce(const ActiveJob& job) {
 
 void ActiveJobs::Enqueue(ActiveJob& job) {
   job.number = ++last_number_;
-  if (job.waits_for.empty()) queue_.insert(PlaceOf(job));
+  if (job.waits_for.empty()) queues_[job.client].insert(PlaceOf(job));
+}
+
+void ActiveJobs::Dequeue(const ActiveJob& job) {
+  const auto queue = queues_.find(job.client);
+  if (queue == queues_.end()) return;
+  queue->second.erase(PlaceOf(job));
+  if (queue->second.empty()) queues_.erase(queue);
+}
+
+ActiveJobs::Queues::iterator ActiveJobs::NextClient() {
+  const auto newest_start = [this](const auto& queue) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+    const auto start = starts_.find(queue.first);
+    return start == starts_.end() ? 0 : start->second;
+  };
+  return std::ranges::min_element(queues_, {}, newest_start);
+}
+
+void ActiveJobs::NoteStart(const std::string& client) {
+  starts_[client] = ++start_count_;
+  if (starts_.size() <= kMostRememberedClients) return;
+  // Whoever started longest ago counts as new when it comes again.
+  starts_.erase(
+      std::ranges::min_element(starts_, {}, [](const auto& start) { return start.second; }));
 }
 
 void ActiveJobs::Reserve(ActiveJob& job, uint64_t bytes) {

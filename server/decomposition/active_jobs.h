@@ -29,6 +29,8 @@ struct ActiveJob {
   v1::CreateModalModelRequest request;                   ///< the farthest reaching one so far
   std::optional<v1::CreateModalModelRequest> running{};  ///< the request that its run was given
   v1::Progress progress{};                               ///< of the run
+  /// The client that asked for it; empty: asked for before the daemon started.
+  std::string client{};
   std::string waits_for{};      ///< digest of the coarse model's job, until that has ended
   bool coarse_ready = false;    ///< a coarse model is stored under the job's digest
   bool again = false;           ///< submitted after a cancel: it runs once more after this run
@@ -55,6 +57,14 @@ class ActiveJobs {
   std::optional<ActiveJob> Find(const std::string& digest);
   bool Contains(const std::string& digest);
   size_t queued_count();
+  /// Queued jobs of one client.
+  size_t queued_count(const std::string& client);
+  /// Numbers of jobs that wait and that run.
+  struct Counts {
+    size_t queued = 0;
+    size_t running = 0;
+  };
+  Counts CountStates();
   std::vector<ActiveJob> Running();
   /// Digests of the jobs that compute transfers of the model.
   std::vector<std::string> TransfersOf(const std::string& model);
@@ -66,8 +76,9 @@ class ActiveJobs {
   /// All jobs as clients see them at one moment, by digest.
   std::map<std::string, v1::Job> ViewAll();
 
-  /// Appends a job to the queue, behind those of its priority. Its memory is predicted from
-  /// `guess_bytes`, which experience corrects for decompositions, or known from an earlier run.
+  /// Appends a job to its client's queue, behind those of its priority. Its memory is predicted
+  /// from `guess_bytes`, which experience corrects for decompositions, or known from an earlier
+  /// run.
   void Add(ActiveJob job);
 
   /// Applies `change` to a job. A waiting job moves to the place in the queue that it then has.
@@ -76,9 +87,10 @@ class ActiveJobs {
   /// Removes a job; `last` is what its watchers are told.
   Notice Remove(const std::string& digest, const v1::Job& last);
 
-  /// Marks the first job of the queue as running if a worker and the memory for it are free. No
-  /// other job overtakes it, because small jobs could delay a large one for ever. A job that does
-  /// not fit into the budget at all runs alone.
+  /// Marks the next job as running if a worker and the memory for it are free. It is the first of
+  /// the client whose newest start is the longest ago, so that clients take turns whatever the
+  /// priorities of their jobs. No other job overtakes it, because small jobs could delay a large
+  /// one for ever. A job that does not fit into the budget at all runs alone.
   std::optional<ActiveJob> BeginRun(const Capacity& capacity, std::chrono::nanoseconds now);
 
   /// Records the progress of a run. The node count of the mesh, once it is known, predicts the
@@ -105,20 +117,29 @@ class ActiveJobs {
   double Learn(uint64_t guess_bytes, uint64_t peak_bytes);
 
  private:
-  /// In the queue: by priority, highest first, then by number.
+  /// In a client's queue: by priority, highest first, then by number.
   using Place = std::tuple<int32_t, uint64_t, std::string>;
+  using Queues = std::map<std::string, std::set<Place>>;
 
   static Place PlaceOf(const ActiveJob& job);
   static v1::Job ViewOf(const ActiveJob& job);
   Notice Announce(const ActiveJob& job) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void Enqueue(ActiveJob& job) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void Dequeue(const ActiveJob& job) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  /// The client whose turn it is; there are queued jobs.
+  Queues::iterator NextClient() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void NoteStart(const std::string& client) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void Reserve(ActiveJob& job, uint64_t bytes) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void EraseWatcher(const std::string& digest, const std::shared_ptr<Watcher>& watcher)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   Mutex mutex_;
   std::map<std::string, ActiveJob> jobs_ ABSL_GUARDED_BY(mutex_);
-  std::set<Place> queue_ ABSL_GUARDED_BY(mutex_);
+  /// By client; none is empty.
+  Queues queues_ ABSL_GUARDED_BY(mutex_);
+  /// Number of each client's newest start, of those that are remembered.
+  std::map<std::string, uint64_t> starts_ ABSL_GUARDED_BY(mutex_);
+  uint64_t start_count_ ABSL_GUARDED_BY(mutex_) = 0;
   std::map<std::string, std::vector<std::shared_ptr<Watcher>>> watchers_ ABSL_GUARDED_BY(mutex_);
   uint64_t last_number_ ABSL_GUARDED_BY(mutex_) = 0;
   uint64_t version_ ABSL_GUARDED_BY(mutex_) = 0;

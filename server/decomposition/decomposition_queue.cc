@@ -42,14 +42,18 @@ absl::StatusOr<std::unique_ptr<DecompositionQueue>> DecompositionQueue::Make(
   return std::unique_ptr<DecompositionQueue>(new DecompositionQueue(std::move(core)));
 }
 
-absl::StatusOr<v1::Job> DecompositionQueue::Submit(const v1::CreateModalModelRequest& request) {
-  return core_->Submit(request);
+absl::StatusOr<v1::Job> DecompositionQueue::Submit(const v1::CreateModalModelRequest& request,
+                                                   const std::string& client) {
+  return core_->Submit(request, client);
 }
 
-absl::StatusOr<v1::Job> DecompositionQueue::SubmitTransfer(
-    const std::string& model, const v1::CreateTransferRequest& request) {
-  return core_->SubmitTransfer(model, request);
+absl::StatusOr<v1::Job> DecompositionQueue::SubmitTransfer(const std::string& model,
+                                                           const v1::CreateTransferRequest& request,
+                                                           const std::string& client) {
+  return core_->SubmitTransfer(model, request, client);
 }
+
+DecompositionQueue::Counts DecompositionQueue::counts() { return core_->counts(); }
 
 absl::StatusOr<v1::Job> DecompositionQueue::Get(const std::string& digest) {
   return core_->Get(digest);

@@ -28,6 +28,7 @@ class JobWatch {
 
 struct QueueSettings {
   size_t max_queued_count = 1024;
+  size_t max_queued_count_of_client = 512;
   /// Whether a transfer is computed of each model after it, unless the request leaves it out.
   bool transfers = false;
   /// Takes log lines about events that no caller is told of. Called on any thread.
@@ -58,15 +59,29 @@ class DecompositionQueue {
   /// hints want; otherwise the model is computed again and replaced. A job that waits or runs is
   /// returned, extended if this request wants more. A job that failed for a reason that would recur
   /// has failed at once; after a crash, a stall, a time-out or a lack of memory it is queued again.
-  /// Errors: those of ResolveRequest, NotFound (MESH_NOT_FOUND), ResourceExhausted (QUEUE_FULL).
-  absl::StatusOr<v1::Job> Submit(const v1::CreateModalModelRequest& request);
+  /// Errors: those of ResolveRequest, NotFound (MESH_NOT_FOUND), ResourceExhausted (QUEUE_FULL,
+  /// CLIENT_LIMIT_REACHED).
+  /// Clients, named by `client`, take turns. A job that several ask for is the first one's.
+  absl::StatusOr<v1::Job> Submit(const v1::CreateModalModelRequest& request,
+                                 const std::string& client = {});
 
   /// Requests a transfer of the stored model `model`. The job has succeeded at once if a transfer
   /// is stored that serves the request. The rest is as for Submit. Errors: InvalidArgument
   /// (INVALID_SETTINGS, UNKNOWN_MATERIAL, INVALID_MATERIAL), NotFound (MODAL_MODEL_NOT_FOUND),
-  /// ResourceExhausted (QUEUE_FULL).
+  /// ResourceExhausted (QUEUE_FULL, CLIENT_LIMIT_REACHED).
   absl::StatusOr<v1::Job> SubmitTransfer(const std::string& model,
-                                         const v1::CreateTransferRequest& request);
+                                         const v1::CreateTransferRequest& request,
+                                         const std::string& client = {});
+
+  /// Jobs that wait and run, and those that have ended since this was made.
+  struct Counts {
+    size_t queued = 0;
+    size_t running = 0;
+    uint64_t succeeded = 0;
+    uint64_t failed = 0;
+    uint64_t cancelled = 0;
+  };
+  Counts counts();
 
   /// Errors: NotFound (JOB_NOT_FOUND).
   absl::StatusOr<v1::Job> Get(const std::string& digest);

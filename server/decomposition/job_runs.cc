@@ -71,14 +71,14 @@ void JobRuns::Stop() {
   executor_.reset();
 }
 
-void JobRuns::Enqueue(JobRecord record, v1::CreateModalModelRequest request,
-                      std::string waits_for) {
+void JobRuns::Enqueue(JobRecord record, v1::CreateModalModelRequest request, JobOrigin origin) {
   record.state = v1::JOB_STATE_QUEUED;
   const bool coarse_ready = HasCoarseModel(database_.models(), record.digest, request);
   const uint64_t guess_bytes = GuessBytes(database_, record, request);
   jobs_.Add({.record = std::move(record),
              .request = std::move(request),
-             .waits_for = std::move(waits_for),
+             .client = std::move(origin.client),
+             .waits_for = std::move(origin.waits_for),
              .coarse_ready = coarse_ready,
              .guess_bytes = guess_bytes});
 }
@@ -103,7 +103,7 @@ void JobRuns::FollowByTransfer(const ActiveJob& model, double run_s) {
   JobRecord record = NewRecord(wanted, clock_.UnixMs());
   const absl::Status stored = database_.jobs().Put(record);
   if (!stored.ok()) return settings_.log(std::string(stored.message()));
-  Enqueue(std::move(record), std::move(wanted.request));
+  Enqueue(std::move(record), std::move(wanted.request), {.client = model.client});
 }
 
 void JobRuns::StartWhatFits(Notices& notices) {
@@ -210,8 +210,21 @@ bool JobRuns::RunsAgain(ActiveJob& job, const Outcome& result) const {
   return result.verdict == Verdict::kOk;
 }
 
+DecompositionQueue::Counts JobRuns::ended() {
+  const MutexLock lock(&ended_mutex_);
+  return ended_;
+}
+
+void JobRuns::CountEnd(v1::JobState state) {
+  const MutexLock lock(&ended_mutex_);
+  ended_.succeeded += state == v1::JOB_STATE_SUCCEEDED ? 1 : 0;
+  ended_.failed += state == v1::JOB_STATE_FAILED ? 1 : 0;
+  ended_.cancelled += state == v1::JOB_STATE_CANCELLED ? 1 : 0;
+}
+
 Notice JobRuns::Finish(JobRecord record, const Outcome& result, bool deleted) {
   record.state = StateOf(result.verdict);
+  CountEnd(record.state);
   record.remembered = IsDeterministic(result);
   if (record.state == v1::JOB_STATE_FAILED) record.error = result.error;
   // If the end cannot be stored, the row still says queued, and the next start of the daemon ends

@@ -16,6 +16,12 @@
 
 namespace carillon {
 
+/// Two fields of ActiveJob.
+struct JobOrigin {
+  std::string client{};
+  std::string waits_for{};
+};
+
 /// Starts queued jobs on the executor, stores their results and decides what follows from them.
 class JobRuns {
  public:
@@ -35,8 +41,8 @@ class JobRuns {
   /// Ends the running workers; no job changes afterwards.
   void Stop();
 
-  /// Adds a job, whose record is stored already, to the queue; `waits_for` is as in ActiveJob.
-  void Enqueue(JobRecord record, v1::CreateModalModelRequest request, std::string waits_for = {})
+  /// Adds a job, whose record is stored already, to the queue.
+  void Enqueue(JobRecord record, v1::CreateModalModelRequest request, JobOrigin origin = {})
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
 
   /// Starts jobs while workers and memory are free.
@@ -50,6 +56,9 @@ class JobRuns {
   void ReleaseWaiting(const std::string& coarse, Notices& notices)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
 
+  /// Runs that have ended, by what became of their jobs.
+  DecompositionQueue::Counts ended();
+
   /// Mean time until a place in a full queue becomes free, in seconds.
   double retry_after_s() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_) {
     return mean_run_s_ / capacity_.worker_count;
@@ -62,6 +71,7 @@ class JobRuns {
   void FollowByTransfer(const ActiveJob& model, double run_s)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
   bool RunsAgain(ActiveJob& job, const Outcome& result) const;
+  void CountEnd(v1::JobState state);
   Notice Finish(JobRecord record, const Outcome& result, bool deleted)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
   double LearnFrom(ActiveJob& job, const Outcome& result) ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
@@ -71,8 +81,10 @@ class JobRuns {
   ActiveJobs& jobs_;
   const QueueSettings settings_;
   Mutex writer_;
+  Mutex ended_mutex_ ABSL_ACQUIRED_AFTER(writer_);
   bool stopping_ ABSL_GUARDED_BY(writer_) = false;
   double mean_run_s_ ABSL_GUARDED_BY(writer_) = 10;  // until a run has ended
+  DecompositionQueue::Counts ended_ ABSL_GUARDED_BY(ended_mutex_);
   std::unique_ptr<Executor> executor_;
   const ActiveJobs::Capacity capacity_;
 };

@@ -36,6 +36,12 @@ absl::Status QueueFull(size_t count, double retry_after_s) {
   return status;
 }
 
+absl::Status ClientQueueFull(size_t count, size_t whole) {
+  return Refusal(absl::StatusCode::kResourceExhausted, "CLIENT_LIMIT_REACHED",
+                 absl::StrCat(count, " decompositions of this client wait already, its share of ",
+                              whole, ": wait until some have run"));
+}
+
 void TellAll(const std::vector<Notice>& notices) {
   for (const Notice& notice : notices) notice.Tell();
 }
@@ -70,8 +76,8 @@ absl::Status QueueCore::TakeUpJob(JobRecord record, Notices& notices) {
   const absl::StatusOr<bool> satisfied =
       request.ok() ? IsSatisfied(database_, wanted, std::nullopt) : request.status();
   if (satisfied.ok() && !*satisfied && record.start_count < kMostStarts) {
-    std::string coarse = StartCoarse(record.digest, *request, notices);
-    runs_.Enqueue(std::move(record), *std::move(request), std::move(coarse));
+    std::string coarse = StartCoarse(wanted, notices);
+    runs_.Enqueue(std::move(record), *std::move(request), {.waits_for = std::move(coarse)});
     return absl::OkStatus();
   }
   const uint32_t start_count = std::exchange(record.start_count, 0);
@@ -91,9 +97,11 @@ void QueueCore::Stop() {
   runs_.Stop();
 }
 
-absl::StatusOr<v1::Job> QueueCore::Submit(const v1::CreateModalModelRequest& request) {
+absl::StatusOr<v1::Job> QueueCore::Submit(const v1::CreateModalModelRequest& request,
+                                          const std::string& client) {
   ASSIGN_OR_RETURN(const v1::CreateModalModelRequest resolved, ResolveRequest(request));
-  const WantedJob wanted = WantedModel(resolved);
+  WantedJob wanted = WantedModel(resolved);
+  wanted.client = client;
   Notices notices;
   absl::StatusOr<v1::Job> job;
   {
@@ -115,8 +123,10 @@ absl::StatusOr<v1::Job> QueueCore::Submit(const v1::CreateModalModelRequest& req
 }
 
 absl::StatusOr<v1::Job> QueueCore::SubmitTransfer(const std::string& model,
-                                                  const v1::CreateTransferRequest& request) {
-  ASSIGN_OR_RETURN(const WantedJob wanted, WantedTransfer(model, request));
+                                                  const v1::CreateTransferRequest& request,
+                                                  const std::string& client) {
+  ASSIGN_OR_RETURN(WantedJob wanted, WantedTransfer(model, request));
+  wanted.client = client;
   Notices notices;
   absl::StatusOr<v1::Job> job;
   {
@@ -137,11 +147,13 @@ absl::StatusOr<v1::Job> QueueCore::SubmitAny(const WantedJob& wanted, Notices& n
 void QueueCore::FollowByTransfer(const WantedJob& model, Notices& notices) {
   const bool wanted = settings_.transfers && !model.request.without_transfer();
   if (!wanted || !model.transfer_of.empty()) return;
-  SubmitAny(WantedTransfer(model.digest, model.request), notices).status().IgnoreError();
+  WantedJob transfer = WantedTransfer(model.digest, model.request);
+  transfer.client = model.client;
+  SubmitAny(transfer, notices).status().IgnoreError();
 }
 
 absl::StatusOr<v1::Job> QueueCore::SubmitNew(const WantedJob& wanted, Notices& notices) {
-  const auto& [digest, request, transfer_of] = wanted;
+  const auto& [digest, request, transfer_of, client] = wanted;
   ASSIGN_OR_RETURN(const std::optional<JobRecord> known, database_.jobs().Find(digest));
   ASSIGN_OR_RETURN(const bool satisfied, IsSatisfied(database_, wanted, known));
   if (known.has_value() &&
@@ -153,13 +165,13 @@ absl::StatusOr<v1::Job> QueueCore::SubmitNew(const WantedJob& wanted, Notices& n
     RETURN_IF_ERROR(CheckAcceptable(wanted));
   }
   // The coarse job is stored first. A daemon that takes up this job then finds the coarse one.
-  std::string coarse = satisfied ? "" : StartCoarse(digest, request, notices);
+  std::string coarse = satisfied ? "" : StartCoarse(wanted, notices);
   JobRecord record = NewRecord(wanted, clock_.UnixMs());
   if (satisfied) record.state = v1::JOB_STATE_SUCCEEDED;
   if (known.has_value()) record.peak_bytes = known->peak_bytes;
   RETURN_IF_ERROR(database_.jobs().Put(record));
   if (satisfied) return ToJob(record);
-  runs_.Enqueue(std::move(record), request, std::move(coarse));
+  runs_.Enqueue(std::move(record), request, {.client = client, .waits_for = std::move(coarse)});
   runs_.StartWhatFits(notices);
   return Get(digest);
 }
@@ -168,6 +180,10 @@ absl::Status QueueCore::CheckAcceptable(const WantedJob& wanted) {
   if (wanted.transfer_of.empty()) {
     RETURN_IF_ERROR(database_.meshes().Find(wanted.request.mesh_digest()).status());
   }
+  const size_t own_count = jobs_.queued_count(wanted.client);
+  if (own_count >= settings_.max_queued_count_of_client) {
+    return ClientQueueFull(own_count, settings_.max_queued_count);
+  }
   const size_t count = jobs_.queued_count();
   if (count < settings_.max_queued_count) return absl::OkStatus();
   return QueueFull(count, runs_.retry_after_s());
@@ -175,15 +191,18 @@ absl::Status QueueCore::CheckAcceptable(const WantedJob& wanted) {
 
 // The digest of the coarse model's job that the request has to wait for; empty if there is none. A
 // request whose coarse model cannot be computed gets the fine one only.
-std::string QueueCore::StartCoarse(const std::string& digest,
-                                   const v1::CreateModalModelRequest& request, Notices& notices) {
+std::string QueueCore::StartCoarse(const WantedJob& fine, Notices& notices) {
+  const v1::CreateModalModelRequest& request = fine.request;
+  const std::string& digest = fine.digest;
   if (!request.coarse_first() || database_.models().Summary(digest).ok()) return "";
   const auto mesh = database_.meshes().Find(request.mesh_digest());
   const auto coarse = CoarseRequest(request, mesh.ok() ? mesh->byte_count : 0);
   if (!coarse.has_value()) return "";
   std::string coarse_digest = RequestDigest(*coarse);
   if (!jobs_.Contains(coarse_digest)) {
-    SubmitNew(WantedModel(*coarse), notices).status().IgnoreError();
+    WantedJob wanted = WantedModel(*coarse);
+    wanted.client = fine.client;
+    SubmitNew(wanted, notices).status().IgnoreError();
   }
   if (jobs_.Contains(coarse_digest)) return coarse_digest;
   database_.models().CopyIfAbsent(coarse_digest, digest, request.label()).IgnoreError();
@@ -238,6 +257,14 @@ bool QueueCore::ComputeAgain(const std::string& digest, Notices& notices) {
   runs_.Enqueue(**std::move(record), *std::move(request));
   runs_.StartWhatFits(notices);
   return true;
+}
+
+DecompositionQueue::Counts QueueCore::counts() {
+  const ActiveJobs::Counts now = jobs_.CountStates();
+  DecompositionQueue::Counts counts = runs_.ended();
+  counts.queued = now.queued;
+  counts.running = now.running;
+  return counts;
 }
 
 absl::StatusOr<v1::Job> QueueCore::Get(const std::string& digest) {

@@ -44,9 +44,12 @@ class QueueCore {
   /// Ends running workers; no watcher is told of a change afterwards.
   void Stop();
 
-  absl::StatusOr<v1::Job> Submit(const v1::CreateModalModelRequest& request);
+  absl::StatusOr<v1::Job> Submit(const v1::CreateModalModelRequest& request,
+                                 const std::string& client);
   absl::StatusOr<v1::Job> SubmitTransfer(const std::string& model,
-                                         const v1::CreateTransferRequest& request);
+                                         const v1::CreateTransferRequest& request,
+                                         const std::string& client);
+  DecompositionQueue::Counts counts();
   absl::StatusOr<v1::Job> Get(const std::string& digest);
   absl::StatusOr<DecompositionJobPage> List(int page_size, const std::string& page_token);
   absl::StatusOr<v1::Job> Cancel(const std::string& digest);
@@ -70,8 +73,8 @@ class QueueCore {
   absl::StatusOr<v1::Job> SubmitAgain(const ActiveJob& active,
                                       const v1::CreateModalModelRequest& request)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
-  std::string StartCoarse(const std::string& digest, const v1::CreateModalModelRequest& request,
-                          Notices& notices) ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
+  std::string StartCoarse(const WantedJob& fine, Notices& notices)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
   void OnQuarantine(const std::string& digest, const absl::Status& why);
   bool ComputeAgain(const std::string& digest, Notices& notices)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());

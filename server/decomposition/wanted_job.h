@@ -15,6 +15,7 @@ struct WantedJob {
   /// Resolved. A transfer has the use that the body is meant for: material, size, band and limits.
   v1::CreateModalModelRequest request;
   std::string transfer_of{};  ///< as JobRecord::transfer_of
+  std::string client{};       ///< who asked; see ActiveJob
 };
 
 /// The decomposition that a resolved request asks for.

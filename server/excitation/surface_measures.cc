@@ -7,6 +7,23 @@
 
 namespace carillon {
 
+double AreaM2(std::span<const std::array<float, 3>> vertices,
+              std::span<const std::array<uint32_t, 3>> triangles) {
+  double sum = 0;
+  for (const std::array<uint32_t, 3>& triangle : triangles) {
+    std::array<std::array<double, 3>, 2> edges{};
+    for (size_t i = 0; i < 3; ++i) {
+      edges[0][i] = double{vertices[triangle[1]][i]} - double{vertices[triangle[0]][i]};
+      edges[1][i] = double{vertices[triangle[2]][i]} - double{vertices[triangle[0]][i]};
+    }
+    const auto& [a, b] = edges;
+    sum += std::hypot(a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2],
+                      a[0] * b[1] - a[1] * b[0]) /
+           2;
+  }
+  return sum;
+}
+
 double VolumeM3(std::span<const std::array<float, 3>> vertices,
                 std::span<const std::array<uint32_t, 3>> triangles) {
   double sum = 0;

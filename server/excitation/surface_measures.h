@@ -12,6 +12,10 @@ namespace carillon {
 double VolumeM3(std::span<const std::array<float, 3>> vertices,
                 std::span<const std::array<uint32_t, 3>> triangles);
 
+/// The area of the triangles, m^2.
+double AreaM2(std::span<const std::array<float, 3>> vertices,
+              std::span<const std::array<uint32_t, 3>> triangles);
+
 /// The diagonal of the bounding box, metres.
 double ExtentM(std::span<const std::array<float, 3>> vertices);
 

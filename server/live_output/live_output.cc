@@ -80,6 +80,7 @@ OutputState LiveOutput::state() const {
   state.mixer = mixer_.statistics();
   const DeviceState device = keeper_->state();
   state.device = device.description;
+  state.device_plays = device.plays;
   state.device_message = device.message;
   state.latency_s = look_ahead_.latency_s() + device.latency_s;
   state.xrun_count = look_ahead_.xrun_count() + device.xrun_count;

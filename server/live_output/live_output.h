@@ -38,6 +38,7 @@ struct OutputSettings {
 /// State of the output at one moment.
 struct OutputState {
   std::string device;
+  bool device_plays = true;    ///< as DeviceState::plays
   std::string device_message;  ///< one line on what is wrong with it; empty: nothing
   double latency_s = 0;        ///< from the mixer to audible sound, as far as known
   double load = 0;             ///< fraction of real time that rendering takes

@@ -125,6 +125,7 @@ void ContactIntake::Finish() { Push(forces_.Finish()); }
 
 void ContactIntake::Reject(uint64_t count, absl::Status reason) {
   rejected_count_ += count;
+  if (settings_.rejections != nullptr) settings_.rejections->Add(count, reason);
   last_rejection_ = std::move(reason);
 }
 

@@ -9,6 +9,7 @@
 #include "server/scene/contact_forces.h"
 #include "server/scene/frame_time.h"
 #include "server/scene/object_contact.h"
+#include "server/scene/rejection_counts.h"
 #include "server/scene/scene.h"
 #include "server/scene/scene_space.h"
 #include "server/synthesis/schedule/mixer_event.h"
@@ -42,6 +43,9 @@ struct IntakeSettings {
   std::optional<TimeMapping> mapping = std::nullopt;
   double most_ahead_s = 60;  ///< limit of TIME_TOO_FAR_AHEAD, not counting the delay
   ContactReading reading{};
+  /// Counts rejected contacts, too, by reason; null: nobody wants to know. It must outlive the
+  /// intake.
+  RejectionCounts* rejections = nullptr;
 };
 
 /// Findings of an intake about contacts.

@@ -44,7 +44,8 @@ absl::StatusOr<std::unique_ptr<ContactStream>> ContactStream::Make(
   const IntakeSettings intake{.sample_rate_hz = mixer.settings().sample_rate_hz,
                               .step_s = settings.step_s,
                               .delay_s = delay_s,
-                              .reading = settings.reading};
+                              .reading = settings.reading,
+                              .rejections = settings.rejections};
   return std::unique_ptr<ContactStream>(
       new ContactStream(std::move(scene), mixer, intake, std::move(events)));
 }

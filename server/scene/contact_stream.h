@@ -19,6 +19,7 @@ struct ContactStreamSettings {
   /// 0 to 10; absent: one step, one block and 5 ms for the network.
   std::optional<double> scheduling_delay_s = std::nullopt;
   ContactReading reading{};
+  RejectionCounts* rejections = nullptr;  ///< as in IntakeSettings
 };
 
 /// The numbers of a stream's steps, and of its impulses by what became of them.

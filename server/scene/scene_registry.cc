@@ -196,12 +196,19 @@ absl::Status SceneRegistry::RemoveObject(uint64_t scene, uint32_t handle) {
 absl::StatusOr<std::unique_ptr<ContactStream>> SceneRegistry::OpenContactStream(
     uint64_t scene, const ContactStreamSettings& settings) {
   ASSIGN_OR_RETURN(std::shared_ptr<Scene> found, FindScene(scene));
-  return ContactStream::Make(std::move(found), mixer_, settings);
+  ContactStreamSettings counted = settings;
+  counted.rejections = &rejections_;
+  return ContactStream::Make(std::move(found), mixer_, counted);
 }
 
 size_t SceneRegistry::object_count() const {
   const MutexLock lock(&mutex_);
   return object_count_;
+}
+
+size_t SceneRegistry::scene_count() const {
+  const MutexLock lock(&mutex_);
+  return scenes_.size();
 }
 
 absl::StatusOr<std::shared_ptr<Scene>> SceneRegistry::FindScene(uint64_t scene) const {

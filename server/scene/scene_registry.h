@@ -12,6 +12,7 @@
 #include "absl/status/statusor.h"
 #include "server/base/mutex.h"
 #include "server/scene/contact_stream.h"
+#include "server/scene/rejection_counts.h"
 #include "server/scene/scene.h"
 #include "server/scene/sounding_body.h"
 
@@ -38,7 +39,7 @@ struct ObjectChange {
 /// All scenes of the daemon, on one mixer. Safe from every thread.
 class SceneRegistry {
  public:
-  static constexpr size_t kMaxSceneCount = 64;
+  static constexpr size_t kMaxSceneCount = 512;
   static constexpr size_t kMaxObjectCount = 4096;
 
   /// `mixer` and `transfers` (null: none are stored) must outlive the registry.
@@ -96,6 +97,11 @@ class SceneRegistry {
   /// Number of objects in all scenes.
   size_t object_count() const;
 
+  size_t scene_count() const;
+
+  /// Contacts of all streams that were rejected.
+  const RejectionCounts& rejections() const { return rejections_; }
+
  private:
   absl::StatusOr<std::shared_ptr<Scene>> FindScene(uint64_t scene) const;
   absl::StatusOr<SoundingObject> Remake(const SoundingObject& old,
@@ -109,6 +115,7 @@ class SceneRegistry {
   Mixer& mixer_;
   TransferStore* transfers_;
   BodyCache bodies_;
+  RejectionCounts rejections_;
   /// Held while objects are added, changed and removed, so that limits are exact and two changes of
   /// one object do not undo each other. Contacts do not take it.
   Mutex change_mutex_;

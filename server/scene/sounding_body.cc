@@ -1,14 +1,47 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/scene/sounding_body.h"
 
+#include <algorithm>
+#include <cmath>
 #include <future>
 #include <utility>
 
+#include "absl/strings/str_cat.h"
+#include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 #include "server/excitation/surface_measures.h"
 
 namespace carillon {
 namespace {
+
+/// A mode moves no part of a body as far as it would move a part of this share of the mass that
+/// vibrated alone.
+constexpr double kLeastMassShare = 1e-8;
+
+absl::Status NotPhysical(absl::string_view what, double value, double most) {
+  return Refusal(
+      absl::StatusCode::kFailedPrecondition, "SHAPES_NOT_PHYSICAL",
+      absl::StrCat("the modal model has ", what, " of ", value,
+                   ", but a body of its size has at most ", most, ": compute or export it again"));
+}
+
+/// Checks the model against its own mass, which is its volume, because models are stored for unit
+/// density. Mode shapes have unit modal mass.
+absl::Status CheckShapes(const ModalModel& model) {
+  const double volume_m3 = VolumeM3(model.vertices, model.triangles);
+  if (!(volume_m3 > 0)) return absl::OkStatus();  // the surface is open
+  const double most = 1 / std::sqrt(kLeastMassShare * volume_m3);
+  float largest = 0;
+  for (const float shape : model.shapes) largest = std::max(largest, std::abs(shape));
+  if (!(largest <= most)) return NotPhysical("a mode shape", largest, most);
+  const double most_coupling = most * AreaM2(model.vertices, model.triangles);
+  for (const double coupling : model.couplings) {
+    if (!(std::abs(coupling) <= most_coupling)) {
+      return NotPhysical("a coupling", coupling, most_coupling);
+    }
+  }
+  return absl::OkStatus();
+}
 
 absl::StatusOr<std::shared_ptr<const SoundingBody>> MakeBody(
     std::shared_ptr<const ModalModel> model) {
@@ -22,6 +55,7 @@ absl::StatusOr<std::shared_ptr<const SoundingBody>> MakeBody(
   });
   ShapeTable shapes(model->shapes, model->vertices.size(), model->mode_count());
   ASSIGN_OR_RETURN(std::unique_ptr<SurfaceLocator> locator, indexing.get());
+  RETURN_IF_ERROR(CheckShapes(*model));
   const ModalModel& of = *model;
   return std::make_shared<const SoundingBody>(
       SoundingBody{.model = std::move(model),

@@ -29,7 +29,7 @@ struct SoundingBody {
 /// thread.
 class BodyCache {
  public:
-  /// Errors: InvalidArgument (SURFACE_MALFORMED).
+  /// Errors: InvalidArgument (SURFACE_MALFORMED), FailedPrecondition (SHAPES_NOT_PHYSICAL).
   absl::StatusOr<std::shared_ptr<const SoundingBody>> Get(std::shared_ptr<const ModalModel> model);
 
  private:

@@ -9,6 +9,8 @@ namespace {
 
 constexpr float kThreshold = 0.70794578F;  // -3 dB of full scale
 constexpr double kReleaseS = 0.1;
+/// 30 dB above full scale.
+constexpr float kMost = 32;
 
 /// f(e) as in the header, for e above the threshold; f(infinity) is one.
 float Limited(float envelope) {
@@ -30,6 +32,7 @@ uint64_t Limiter::Apply(std::span<float> block) noexcept {
     for (float& sample : block.first(channel_count_)) {
       finite &= std::isfinite(sample);
       if (!std::isfinite(sample)) sample = 0;
+      sample = std::clamp(sample, -kMost, kMost);
       peak = std::max(peak, std::abs(sample));
     }
     envelope_ = std::max(peak, release_ * envelope_);

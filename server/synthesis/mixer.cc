@@ -310,6 +310,7 @@ void Mixer::MixSections(std::span<float> frames) noexcept {
     const SectionCounts& counts = section_counts_[section];
     Count(statistics_.dropped_count, counts.dropped_count);
     Count(statistics_.reset_bank_count, counts.reset_bank_count);
+    Count(statistics_.bounded_bank_count, counts.bounded_bank_count);
     active_mode_count += counts.active_mode_count;
     ringing_work_ += counts.ringing_work;
   }

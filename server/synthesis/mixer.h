@@ -69,6 +69,7 @@ struct MixerStatistics {
   uint64_t shed_count = 0;           ///< impulses not rendered: the quietest of too many
   uint64_t shed_bank_count = 0;      ///< banks silenced: the quietest of too many
   uint64_t reset_bank_count = 0;     ///< banks silenced because their state was not finite
+  uint64_t bounded_bank_count = 0;   ///< blocks in which a bank was lowered: kMostAmplitude
   uint64_t limited_frame_count = 0;  ///< frames that the limiter changed
   uint64_t bank_count = 0;           ///< banks on the mixer
   uint64_t active_mode_count = 0;    ///< modes that ring
@@ -124,6 +125,9 @@ class Mixer {
   /// Each value is correct by itself; two values may belong to different blocks.
   MixerStatistics statistics() const noexcept;
 
+  /// Number of modes on the mixer.
+  size_t mode_count() ABSL_LOCKS_EXCLUDED(kRenderRole);
+
   /// The largest sample before the limiter since the last call.
   double TakePeak() noexcept { return peak_.exchange(0, std::memory_order_relaxed); }
 
@@ -158,7 +162,7 @@ class Mixer {
     std::atomic<uint64_t> frame_count{0};
     std::atomic<uint64_t> accepted_count{0}, late_count{0}, dropped_count{0};
     std::atomic<uint64_t> merged_count{0}, shed_count{0}, shed_bank_count{0};
-    std::atomic<uint64_t> reset_bank_count{0}, limited_frame_count{0};
+    std::atomic<uint64_t> reset_bank_count{0}, bounded_bank_count{0}, limited_frame_count{0};
     std::atomic<uint64_t> bank_count{0}, active_mode_count{0};
   };
 

@@ -146,9 +146,15 @@ MixerStatistics Mixer::statistics() const noexcept {
           .shed_count = statistics_.shed_count,
           .shed_bank_count = statistics_.shed_bank_count,
           .reset_bank_count = statistics_.reset_bank_count,
+          .bounded_bank_count = statistics_.bounded_bank_count,
           .limited_frame_count = statistics_.limited_frame_count,
           .bank_count = statistics_.bank_count,
           .active_mode_count = statistics_.active_mode_count};
+}
+
+size_t Mixer::mode_count() {
+  const MutexLock lock(&control_mutex_);
+  return std::accumulate(section_mode_counts_.begin(), section_mode_counts_.end(), size_t{0});
 }
 
 /// The section with the fewest modes. A mixer with few modes uses few sections, because each

@@ -185,6 +185,7 @@ void RenderSection::FinishBanks(std::span<float> block, SectionCounts& counts) n
       RenderFading(slot, slot.voice != nullptr ? slot.voice->input() : block, counts);
     }
     slot.rendered = false;
+    if (slot.bank->BoundLoudness()) ++counts.bounded_bank_count;
     counts.active_mode_count += slot.bank->active_mode_count();
     counts.ringing_work += slot.bank->ringing_work();
     slot.sounding = !slot.bank->silent() && slot.fade_gain > 0;

@@ -18,9 +18,10 @@ namespace carillon {
 struct SectionCounts {
   uint64_t dropped_count = 0;
   uint64_t reset_bank_count = 0;
-  uint64_t active_mode_count = 0;  ///< at the end
-  double ringing_work = 0;         ///< units of work of the next block without events
-  bool placed = false;             ///< a voice was rendered
+  uint64_t bounded_bank_count = 0;  ///< banks lowered because a mode was beyond all bounds
+  uint64_t active_mode_count = 0;   ///< at the end
+  double ringing_work = 0;          ///< units of work of the next block without events
+  bool placed = false;              ///< a voice was rendered
 };
 
 /// A share of a mixer's banks, rendered by one thread at a time; several sections may render at

@@ -83,6 +83,9 @@ TEST_F(OptionsFile, WhatTheFileMayNotSayIsRefusedByName) {
   expect("a = \n", "line 1");
   expect("workers = 1\nsample_rate = \"high\"\n", "line 2: sample_rate");
   expect("data_dir = \"\"\n", "--data-dir");
+  expect("scene_grace = -1\n", "--scene-grace");
+  expect("client_share = 0\n", "--client-share");
+  expect("metrics = \"9464\"\n", "--metrics");
   for (const char* address : {"head", ":1", "head:", "head:0", "head:65536"}) {
     expect((std::string("slurm_upload = \"") + address + "\"\n").c_str(), "--slurm-upload");
   }
@@ -99,6 +102,19 @@ TEST_F(OptionsFile, CheckConfigReadsTheFileAndSaysSo) {
   ASSERT_TRUE(command.ok()) << command.status();
   EXPECT_TRUE(command->only_check);
   EXPECT_FALSE(Read({"--config", Write("workers = -1\n"), "--check-config"}).ok());
+}
+
+TEST_F(OptionsFile, WhatIsPrintedReadsBackAsTheSameSettings) {
+  const absl::StatusOr<CommandLine> command =
+      Read({"--print-config", "--listen", "unix:/a \"b\"", "--listen", "127.0.0.1:1", "--workers",
+            "3", "--no-transfers", "--client-share", "0.25", "--metrics", "127.0.0.1:9464"});
+  ASSERT_TRUE(command.ok()) << command.status();
+  EXPECT_TRUE(command->only_print);
+  const std::string printed = PrintConfiguration(command->options);
+  EXPECT_THAT(printed, HasSubstr("\ntransfers = false\n"));
+  const absl::StatusOr<CommandLine> again = Read({"--config", Write(printed)});
+  ASSERT_TRUE(again.ok()) << again.status();
+  EXPECT_EQ(again->options, command->options);
 }
 
 TEST(Options, AFlagWithoutAValueDoesNotTakeTheNextFlagForIt) {

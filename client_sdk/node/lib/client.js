@@ -128,9 +128,9 @@ class Client {
     }
   }
 
-  /** Makes an empty scene. */
-  async createScene({ hearing, listener } = {}) {
-    const request = { ...given('hearing', hearing), ...given('listener', toPose(listener)) };
+  /** Makes an empty scene. It ends by itself a minute after its clients, unless `keep` is true. */
+  async createScene({ hearing, listener, keep = false } = {}) {
+    const request = { ...given('hearing', hearing), ...given('listener', toPose(listener)), keep };
     return new Scene(this, (await this.call('SceneService', 'CreateScene', request)).name);
   }
 

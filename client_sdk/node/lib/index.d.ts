@@ -231,7 +231,7 @@ export class Client {
   }): Promise<Model>;
   model(name: string, material?: Material): Promise<Model>;
   models(filters?: ListModalModelsRequest): AsyncGenerator<Model>;
-  createScene(settings?: { hearing?: Hearing; listener?: Pose }): Promise<Scene>;
+  createScene(settings?: { hearing?: Hearing; listener?: Pose; keep?: boolean }): Promise<Scene>;
   scenes(): Promise<Scene[]>;
   /** Renders a trace or a .contacts file. Throws CarillonError if a contact is rejected. */
   render(trace: Trace | string, settings?: RenderSettings): Promise<Sound>;

@@ -3,6 +3,7 @@
 #include "server/synthesis/bank/oscillator_bank.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "server/synthesis/schedule/work_budget.h"
@@ -136,6 +137,24 @@ void OscillatorBank::Silence() noexcept {
     std::ranges::fill(segment.lanes.awake, uint8_t{0});
     segment.awake = segment.sounding = false;
   }
+}
+
+bool OscillatorBank::BoundLoudness() noexcept {
+  const double loudest = loudest_squared();
+  if (!(loudest > kMostAmplitude * kMostAmplitude)) return false;
+  const double factor = kMostAmplitude / std::sqrt(loudest);
+  const auto lower = [factor](LaneArray<double>& states, size_t count) {
+    for (size_t i = 0; i < count; ++i) states[i] *= factor;
+  };
+  lower(lanes_.re, lane_count_);
+  lower(lanes_.im, lane_count_);
+  for (RingingSegment& segment : segments_) segment.loudest_squared *= factor * factor;
+  for (LongSegment& segment : long_segments_) {
+    lower(segment.lanes.re, segment.lanes.awake.size() * kMostLanes);
+    lower(segment.lanes.im, segment.lanes.awake.size() * kMostLanes);
+    segment.loudest_squared *= factor * factor;
+  }
+  return true;
 }
 
 double OscillatorBank::ringing_work() const noexcept {

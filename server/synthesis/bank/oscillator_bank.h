@@ -29,6 +29,11 @@ namespace carillon {
 
 struct LanePlan;
 
+/// The largest amplitude that a mode may have: 24 dB above full scale, 144 dB SPL at the reference
+/// distance. One object that is struck beyond all measure, or whose model is wrong, must not drive
+/// the limiter so far that the others are not heard until it has decayed.
+inline constexpr double kMostAmplitude = 16;
+
 /// Settings of a bank.
 struct OscillatorBankSettings {
   double sample_rate_hz = 48000;
@@ -147,6 +152,10 @@ class OscillatorBank {
 
   /// The largest squared amplitude of a ringing mode, as of the last block or long block.
   double loudest_squared() const noexcept;
+
+  /// Lowers the bank if a mode is louder than kMostAmplitude; false: none is. Its part of a current
+  /// long block is heard as it is until that long block ends.
+  bool BoundLoudness() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
   /// Silences the bank. Its part of a current long block sounds until that long block ends.
   void Shed() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole) { Silence(); }

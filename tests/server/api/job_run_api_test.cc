@@ -104,6 +104,13 @@ TEST_F(JobRunApi, OnlyTheTokenOfThatJobOpensIt) {
     ExpectRefused(Report(shown), grpc::PERMISSION_DENIED, "JOB_TOKEN_WRONG");
     ExpectRefused(Upload(shown, records.size()), grpc::PERMISSION_DENIED, "JOB_TOKEN_WRONG");
   }
+  const std::string logged = log();
+  int line_count = 0;
+  for (size_t at = logged.find("JOB_TOKEN_WRONG"); at != std::string::npos;
+       at = logged.find("JOB_TOKEN_WRONG", at + 1)) {
+    ++line_count;
+  }
+  EXPECT_EQ(line_count, 9) << logged;
   EXPECT_EQ(bytes, "");
   EXPECT_THAT(Files(), UnorderedElementsAre("mesh"));
 }

@@ -7,6 +7,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "carillon/v1/audio_service.grpc.pb.h"
 #include "carillon/v1/contact_service.grpc.pb.h"
@@ -16,6 +17,7 @@
 #include "carillon/v1/modal_model_service.grpc.pb.h"
 #include "carillon/v1/scene_service.grpc.pb.h"
 #include "server/api/api_server.h"
+#include "server/base/mutex.h"
 #include "server/decomposition/local_executor.h"
 #include "server/live_output/live_output.h"
 #include "tests/server/mode_database/sample_model.h"
@@ -27,15 +29,18 @@ namespace carillon {
 /// decompositions fail: the worker is a program that only exits.
 class ServedDaemon : public testing::Test {
  protected:
-  ServedDaemon() {
-    server_ = *ApiServer::Start({.addresses = {address_}, .version = "test"},
-                                {.database = *database_,
-                                 .decompositions = *queue_,
-                                 .runs = runs_,
-                                 .scenes = scenes_,
-                                 .output = *output_,
-                                 .clock = clock_,
-                                 .log = [](const std::string&) {}});
+  /// Of `settings`, the addresses and the version are set here; `more` are further addresses.
+  explicit ServedDaemon(ApiSettings settings = {}, const std::vector<std::string>& more = {}) {
+    settings.addresses = {address_};
+    settings.addresses.insert(settings.addresses.end(), more.begin(), more.end());
+    settings.version = "test";
+    server_ = *ApiServer::Start(settings, {.database = *database_,
+                                           .decompositions = *queue_,
+                                           .runs = runs_,
+                                           .scenes = scenes_,
+                                           .output = *output_,
+                                           .clock = clock_,
+                                           .log = [this](const std::string& line) { Note(line); }});
     channel_ = grpc::CreateChannel(address_, grpc::InsecureChannelCredentials());
     models = v1::ModalModelService::NewStub(channel_);
     jobs = v1::DecompositionService::NewStub(channel_);
@@ -124,6 +129,13 @@ class ServedDaemon : public testing::Test {
   RemoteRuns& runs() { return runs_; }
   std::filesystem::path folder() const { return folder_ / ""; }
   const std::string& address() const { return address_; }
+  const std::vector<std::string>& addresses() const { return server_->addresses(); }
+  const ApiServer& server() const { return *server_; }
+  /// The warnings so far, a line each.
+  std::string log() {
+    const MutexLock lock(&log_mutex_);
+    return log_;
+  }
 
  private:
   std::unique_ptr<DecompositionQueue> MakeQueue() {
@@ -133,6 +145,13 @@ class ServedDaemon : public testing::Test {
     return *DecompositionQueue::Make(*database_, *MakeLocalExecutor(options, clock_), clock_);
   }
 
+  void Note(const std::string& line) {
+    const MutexLock lock(&log_mutex_);
+    log_ += line + "\n";
+  }
+
+  Mutex log_mutex_;
+  std::string log_;
   TemporaryFolder folder_;
   std::string address_ = "unix:" + (folder_ / "socket").string();
   SystemClock clock_;

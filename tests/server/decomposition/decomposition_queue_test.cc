@@ -309,6 +309,47 @@ TEST_F(DecompositionQueueTest, AHigherPriorityStartsFirstAndMayBeGivenLater) {
   EXPECT_EQ(ReadBytes(folder_ / "order"), "1\n5\n4\n3\n2\n");
 }
 
+TEST_F(DecompositionQueueTest, ClientsTakeTurnsWhateverThePrioritiesOfTheirJobs) {
+  const Gate gate(folder_ / "gate");
+  MakeQueue(absl::StrCat("echo $nodes >>\"$here/order\"\n", kWaitAtGate, kSucceed));
+  const auto submit = [&](const std::string& client, uint32_t nodes, int priority) {
+    auto request = Request(20'000, nodes);
+    request.set_priority(priority);
+    const absl::StatusOr<v1::Job> job = queue_->Submit(request, client);
+    EXPECT_TRUE(job.ok()) << job.status();
+    return job.value_or(v1::Job());
+  };
+  Diary first;
+  const auto watch = Watch(submit("greedy", 1, 100), first);
+  first.Await(v1::JOB_STATE_RUNNING);
+  submit("greedy", 2, 100);
+  submit("greedy", 3, 100);
+  const v1::Job last = submit("greedy", 4, 100);
+  submit("modest", 5, 0);
+  submit("other", 6, -1);
+  submit("modest", 7, 1);
+  Diary diary;
+  const auto watch_last = Watch(last, diary);
+  for (int i = 0; i < 7; ++i) gate.Open();
+  diary.AwaitEnd();
+  EXPECT_EQ(ReadBytes(folder_ / "order"), "1\n7\n6\n2\n5\n3\n4\n");
+}
+
+TEST_F(DecompositionQueueTest, OneClientsJobsDoNotFillTheQueue) {
+  const Gate gate(folder_ / "gate");
+  settings_.max_queued_count = 4;
+  settings_.max_queued_count_of_client = 2;
+  MakeQueue(absl::StrCat(kWaitAtGate, kSucceed));
+  for (const uint32_t nodes : {1U, 2U, 3U}) {
+    ASSERT_TRUE(queue_->Submit(Request(20'000, nodes), "greedy").ok()) << nodes;
+  }
+  EXPECT_EQ(queue_->counts().queued, 2U);
+  EXPECT_EQ(queue_->counts().running, 1U);
+  EXPECT_THAT(queue_->Submit(Request(20'000, 4), "greedy").status().ToString(),
+              testing::HasSubstr("CLIENT_LIMIT_REACHED: "));
+  EXPECT_TRUE(queue_->Submit(Request(20'000, 4), "modest").ok());
+}
+
 TEST_F(DecompositionQueueTest, NoMoreRunAtATimeThanAreEstimatedToFitIntoTheMemory) {
   options_.worker_count = 4;
   options_.memory_budget_bytes = 100 << 20;  // the smallest body is estimated to take 70 MB

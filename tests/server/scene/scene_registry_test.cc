@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "proto/cpp/error_reason.h"
@@ -105,6 +106,26 @@ TEST(SceneRegistry, RefusesSizesAndGainsOutOfRange) {
     EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument) << size << " " << gain;
     EXPECT_THAT(status.ToString(), HasSubstr("INVALID_OBJECT: "));
   }
+}
+
+TEST(SceneRegistry, RefusesShapesAndCouplingsThatNoBodyOfTheSizeHas) {
+  Stage stage;
+  const auto add = [&](const ModalModel& model) {
+    return stage.scenes
+        .AddObject(stage.scene, 0, std::make_shared<ModalModel>(model), SmallProperties())
+        .status();
+  };
+  // A part of 1e-8 of the mass may vibrate alone. The mass is the volume: 0.1^3 / 6.
+  const auto most = static_cast<float>(1 / std::sqrt(1e-8 * 1e-3 / 6));
+  ModalModel model = *SmallModel();
+  for (const float shape : {1.01F * most, -3e38F, std::numeric_limits<float>::infinity()}) {
+    model.shapes[5] = shape;
+    EXPECT_THAT(add(model).ToString(), HasSubstr("SHAPES_NOT_PHYSICAL: ")) << shape;
+  }
+  model.shapes[5] = 0.99F * most;
+  EXPECT_TRUE(add(model).ok());
+  model.couplings[1] = 1e300;
+  EXPECT_THAT(add(model).ToString(), HasSubstr("SHAPES_NOT_PHYSICAL: "));
 }
 
 TEST(SceneRegistry, HandlesAreTheClientsOrTheLowestThatIsFree) {

@@ -57,6 +57,16 @@ TEST(Limiter, TheGainRecoversWithinASecond) {
   EXPECT_EQ(soft.back(), 0.1F);
 }
 
+TEST(Limiter, TheGainRecoversWithinHalfASecondOfAnything) {
+  for (const float peak : {32.0F, 1e6F, std::numeric_limits<float>::max()}) {
+    std::vector<float> loud(100, peak), soft(48000, 0.1F);
+    Limiter limiter(48000);
+    limiter.Apply(loud);
+    EXPECT_NEAR(static_cast<double>(limiter.Apply(soft)), 48000 * 0.1 * std::log(32 / 0.70795), 10)
+        << peak;
+  }
+}
+
 TEST(Limiter, AllChannelsOfAFrameGetTheGainOfTheLoudest) {
   Limiter limiter(48000, 2);
   std::vector<float> frames = {2, 0.5F, 0.1F, -4, 0, 0.25F};

@@ -62,6 +62,26 @@ TEST_F(MixerTest, AStrikeSoundsFromItsFrameOn) {
   EXPECT_EQ(stream_->late_count(), 0u);
 }
 
+TEST_F(MixerTest, ABlowBeyondAllBoundsIsLoweredWithinABlock) {
+  Strike(bank_, 0, 0, 1);
+  Render(1);
+  const double ordinary = mixer_.TakePeak();
+  ASSERT_LT(ordinary, kMostAmplitude);
+  Render(1);
+  EXPECT_EQ(mixer_.statistics().bounded_bank_count, 0u);
+  Strike(bank_, 256, 0, static_cast<float>(1e12 / ordinary));
+  Render(1);
+  EXPECT_GT(mixer_.TakePeak(), 1e11);
+  EXPECT_EQ(mixer_.statistics().bounded_bank_count, 1u);
+  Render(1);
+  EXPECT_NEAR(mixer_.TakePeak(), kMostAmplitude, 0.1 * kMostAmplitude);
+  const auto later = Render(1000);
+  EXPECT_EQ(mixer_.statistics().bounded_bank_count, 1u);
+  EXPECT_EQ(mixer_.statistics().reset_bank_count, 0u);
+  // It decays from there as from any blow: 16 exp(-30 t).
+  EXPECT_LT(std::abs(later.back()), 1e-6);
+}
+
 TEST_F(MixerTest, AStrikeBetweenTheLastSampleOfABlockAndTheNextBelongsToTheNext) {
   Strike(bank_, 127, 0.5F);
   const auto frames = Render(2);

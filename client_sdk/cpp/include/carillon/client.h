@@ -138,7 +138,8 @@ class Client {
   /// Creates a scene and returns its name, "scenes/{id}".
   virtual absl::StatusOr<std::string> CreateScene(const v1::CreateSceneRequest& request) const;
 
-  /// Fades out the objects of a scene and deletes it. A scene outlives the client that created it.
+  /// Fades out the objects of a scene and deletes it. A scene that was not made with `keep` ends by
+  /// itself a minute after the connections that have used it.
   virtual absl::Status DeleteScene(const std::string& name) const;
 
   /// Returns all scenes of the daemon, the oldest first.

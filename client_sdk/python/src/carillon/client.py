@@ -143,10 +143,11 @@ class Client:
                                        "Client.materials has all of them")
         return resolved(message, self.materials)
 
-    def scene(self, *, hearing: Optional[hearing_pb2.Hearing] = None, listener: Optional[PoseLike] = None) -> Scene:
-        """Makes an empty scene."""
+    def scene(self, *, hearing: Optional[hearing_pb2.Hearing] = None, listener: Optional[PoseLike] = None,
+              keep: bool = False) -> Scene:
+        """Makes an empty scene. It ends by itself a minute after its clients, unless `keep` is true."""
         request = scene_service_pb2.CreateSceneRequest(
-            hearing=hearing, listener=None if listener is None else to_pose(listener))
+            hearing=hearing, listener=None if listener is None else to_pose(listener), keep=keep)
         with errors.translated(self.server):
             return Scene(self, self.scenes_stub.CreateScene(request).name)
 

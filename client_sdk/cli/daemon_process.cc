@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client_sdk/cli/daemon_process.h"
+
+#include <sched.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <system_error>
+#include <vector>
+
+#include "absl/cleanup/cleanup.h"
+#include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_split.h"
+#include "proto/cpp/error_reason.h"
+
+namespace carillon::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string WhatToDo(int error) {
+  switch (error) {
+    case ENOENT:
+      return "start carillond, or name its address with --server or CARILLON_SERVER";
+    case ECONNREFUSED:
+      return "the daemon has died: start carillond again";
+    case EACCES:
+    case EPERM:
+      return "this user may not use the socket: for a daemon of the system, join the group "
+             "carillon "
+             "and log in again";
+    default:
+      return "see the address and its folder";
+  }
+}
+
+std::string Read(const fs::path& path) {
+  std::ifstream file(path);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+/// The scheduling policy in a thread's line of /proc; see proc(5).
+std::optional<int> PolicyIn(const std::string& stat) {
+  constexpr size_t kPolicyAfterName = 39;
+  const std::vector<std::string> fields = absl::StrSplit(stat.substr(stat.rfind(')') + 1), ' ');
+  int policy = 0;
+  if (fields.size() <= kPolicyAfterName) return std::nullopt;
+  if (!absl::SimpleAtoi(fields[kPolicyAfterName], &policy)) return std::nullopt;
+  return policy;
+}
+
+}  // namespace
+
+absl::StatusOr<pid_t> ProcessAt(const std::string& socket_path) {
+  sockaddr_un name{};
+  name.sun_family = AF_UNIX;
+  socket_path.copy(name.sun_path, sizeof(name.sun_path) - 1);
+  const int made = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  const absl::Cleanup close_socket = [made] { close(made); };
+  ucred credentials{};
+  socklen_t size = sizeof credentials;
+  if (connect(made, reinterpret_cast<const sockaddr*>(&name), sizeof name) != 0 ||
+      getsockopt(made, SOL_SOCKET, SO_PEERCRED, &credentials, &size) != 0) {
+    const int error = errno;
+    return Refusal(absl::StatusCode::kUnavailable, "SERVER_UNAVAILABLE",
+                   absl::StrCat("nobody listens at ", socket_path, " (",
+                                std::generic_category().message(error), "): ", WhatToDo(error)));
+  }
+  return credentials.pid;
+}
+
+std::optional<bool> HasRealtimeThread(pid_t process) {
+  std::optional<bool> found;
+  std::error_code error;
+  for (const auto& thread :
+       fs::directory_iterator(absl::StrCat("/proc/", process, "/task"), error)) {
+    const std::optional<int> policy = PolicyIn(Read(thread.path() / "stat"));
+    if (policy) found = found.value_or(false) || *policy == SCHED_FIFO || *policy == SCHED_RR;
+  }
+  return found;
+}
+
+std::optional<uint64_t> DescriptorLimit(pid_t process) {
+  for (const absl::string_view line :
+       absl::StrSplit(Read(absl::StrCat("/proc/", process, "/limits")), '\n')) {
+    const std::vector<std::string> words = absl::StrSplit(line, ' ', absl::SkipEmpty());
+    if (words.size() < 4 || words[1] != "open" || words[2] != "files") continue;
+    uint64_t limit = std::numeric_limits<uint64_t>::max();
+    return words[3] == "unlimited" || absl::SimpleAtoi(words[3], &limit) ? std::optional(limit)
+                                                                         : std::nullopt;
+  }
+  return std::nullopt;
+}
+
+}  // namespace carillon::cli

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <sys/types.h>
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "absl/status/statusor.h"
+
+namespace carillon::cli {
+
+/// The process that listens at a Unix socket. Errors: Unavailable (SERVER_UNAVAILABLE: nobody does,
+/// and why).
+absl::StatusOr<pid_t> ProcessAt(const std::string& socket_path);
+
+/// Whether a thread of the process has real-time priority; absent: this user may not see that.
+std::optional<bool> HasRealtimeThread(pid_t process);
+
+/// How many descriptors the process may have open; absent: this user may not see that.
+std::optional<uint64_t> DescriptorLimit(pid_t process);
+
+}  // namespace carillon::cli

@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client_sdk/cli/doctor_command.h"
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "absl/strings/strip.h"
+#include "client_sdk/cli/daemon_process.h"
+#include "proto/cpp/child_process.h"
+#include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
+
+namespace carillon::cli {
+namespace {
+
+constexpr uint64_t kEnoughDescriptors = 1024;
+constexpr double kHighLoad = 0.7;
+
+/// What was found, a line for each thing.
+class Findings {
+ public:
+  void Good(const char* subject, const std::string& text) { Print("ok   ", subject, text); }
+  void Bad(const char* subject, const std::string& text) {
+    Print("FAULT", subject, text);
+    ++fault_count_;
+  }
+  void Unknown(const char* subject, const std::string& text) { Print("?    ", subject, text); }
+  int fault_count() const { return fault_count_; }
+
+ private:
+  static void Print(const char* verdict, const char* subject, const std::string& text) {
+    absl::PrintF("%s  %-10s  %s\n", verdict, subject, text);
+  }
+
+  int fault_count_ = 0;
+};
+
+std::string Text(const absl::Status& status) { return std::string(status.message()); }
+
+void CheckProcess(const Program& program, Findings& findings) {
+  absl::string_view path = program.server;
+  if (!absl::ConsumePrefix(&path, "unix:")) {
+    return findings.Unknown("real time", "run this on the daemon's machine, over its Unix socket");
+  }
+  const absl::StatusOr<pid_t> process = ProcessAt(std::string(path));
+  if (!process.ok()) return findings.Bad("socket", Text(process.status()));
+  const std::optional<bool> realtime = HasRealtimeThread(*process);
+  if (!realtime) {
+    findings.Unknown("real time", "this user cannot see the daemon's threads");
+  } else if (*realtime) {
+    findings.Good("real time", "the render thread has real-time priority");
+  } else {
+    findings.Bad("real time",
+                 "the render thread has no real-time priority, and may drop out on a busy machine: "
+                 "set LimitRTPRIO= in its unit, or rtprio in /etc/security/limits.conf");
+  }
+  const std::optional<uint64_t> limit = DescriptorLimit(*process);
+  if (!limit) return;
+  if (*limit >= kEnoughDescriptors) {
+    return findings.Good("limits", absl::StrCat(*limit, " descriptors"));
+  }
+  findings.Bad("limits", absl::StrCat("the daemon may open ", *limit,
+                                      " descriptors, a connection needs one: raise LimitNOFILE="));
+}
+
+void CheckSound(const v1::GetMixerResponse& mixer, Findings& findings) {
+  if (!mixer.device_message().empty()) {
+    findings.Bad("sound", absl::StrCat("plays on ", mixer.device(), ": ", mixer.device_message()));
+  } else if (mixer.device() == "null") {
+    findings.Unknown("sound", "plays on null, to nobody but `carillon listen`: see --audio-device");
+  } else {
+    findings.Good("sound", absl::StrFormat("plays on %s, %.1f ms behind", mixer.device(),
+                                           1e3 * mixer.output_latency_s()));
+  }
+  const std::string load =
+      absl::StrFormat("rendering takes %.0f %% of the time, %d frames were lost",
+                      100 * mixer.load(), mixer.lost_frame_count());
+  if (mixer.load() > kHighLoad) {
+    return findings.Bad("load", load + ": use fewer objects, or a faster processor");
+  }
+  if (mixer.lost_frame_count() > 0) {
+    return findings.Bad("load", load + ": raise --look-ahead-blocks, or see real time above");
+  }
+  findings.Good("load", load);
+}
+
+void CheckDatabase(const client::Client& daemon, Findings& findings) {
+  const auto stats = daemon.GetDatabaseStats();
+  if (!stats.ok() && absl::IsPermissionDenied(stats.status())) {
+    return findings.Unknown("database", Text(stats.status()));
+  }
+  if (!stats.ok()) return findings.Bad("database", Text(stats.status()));
+  const std::string content =
+      absl::StrCat(stats->model_count(), " models, ", stats->file_bytes() >> 20U, " MiB");
+  if (stats->quarantined_count() == 0) return findings.Good("database", content);
+  findings.Bad("database",
+               absl::StrCat(content, ", ", stats->quarantined_count(),
+                            " models are damaged: check the disk, and run `carillond db "
+                            "check` while the daemon is stopped"));
+}
+
+/// Runs a program for at most five seconds. Whether it ended well.
+bool Succeeds(const std::vector<std::string>& command) {
+  ChildCommand child{.words = {"timeout", "5"}};
+  child.words.insert(child.words.end(), command.begin(), command.end());
+  absl::StatusOr<ChildProcess> process = ChildProcess::Start(child);
+  if (!process.ok()) return false;
+  const ProcessEnd end = process->Wait();
+  return end.exited && end.status == 0;
+}
+
+void CheckWorkers(const client::Client& daemon, Findings& findings) {
+  const std::filesystem::path beside =
+      std::filesystem::read_symlink("/proc/self/exe").replace_filename("carillon-precompute");
+  if (Succeeds({beside, "--version"}) || Succeeds({"carillon-precompute", "--version"})) {
+    findings.Good("workers", "carillon-precompute runs");
+  } else {
+    findings.Bad("workers",
+                 absl::StrCat("carillon-precompute does not run, neither as ", beside.string(),
+                              " nor from PATH: install it, or models cannot be computed"));
+  }
+  const auto jobs = daemon.ListJobs();
+  if (!jobs.ok()) return;
+  for (const v1::Job& job : *jobs) {
+    if (!absl::StartsWith(job.error().reason(), "WORKER_")) continue;
+    return findings.Bad("jobs", absl::StrCat(job.name(), " failed: ", job.error().message()));
+  }
+}
+
+void CheckSlurm(Findings& findings) {
+  if (!Succeeds({"sh", "-c", "command -v sinfo >&2"})) {
+    return findings.Good("slurm", "not installed here: decompositions run on this machine");
+  }
+  if (Succeeds({"sinfo", "--noheader"})) return findings.Good("slurm", "the cluster answers");
+  findings.Bad("slurm",
+               "sinfo does not answer: with --executor slurm no job would run; see that slurmctld "
+               "runs, and deploy/slurm");
+}
+
+void CheckTls(const Program& program, Findings& findings) {
+  if (!program.tls_roots_file.empty() && !absl::StartsWith(program.server, "unix:")) {
+    return findings.Good(
+        "tls", absl::StrCat("the daemon's certificate is vouched for by ", program.tls_roots_file));
+  }
+  if (IsOnThisMachine(program.server)) return findings.Good("tls", "not needed on this machine");
+  findings.Bad("tls",
+               "without --tls-roots the network reads along, and tokens are sent for all to see: "
+               "name the certificate that vouches for the daemon");
+}
+
+absl::Status Conclude(const Findings& findings) {
+  if (findings.fault_count() == 0) return absl::OkStatus();
+  return Refusal(
+      absl::StatusCode::kFailedPrecondition, "FAULTS_FOUND",
+      absl::StrCat(findings.fault_count(), " things are wrong, and each says its repair"));
+}
+
+}  // namespace
+
+absl::Status Diagnose(const Program& program) {
+  Findings findings;
+  const auto daemon = program.Daemon();
+  const auto mixer = daemon->GetMixer();
+  CheckProcess(program, findings);
+  CheckSlurm(findings);
+  if (!mixer.ok()) {
+    findings.Bad("daemon", Text(mixer.status()));
+    return Conclude(findings);
+  }
+  const bool same = mixer->version() == CARILLON_VERSION;
+  const std::string version = absl::StrCat("carillond ", mixer->version(), " at ", program.server);
+  same ? findings.Good("daemon", version)
+       : findings.Bad("daemon", absl::StrCat(version, ", but this is carillon ", CARILLON_VERSION,
+                                             ": restart the daemon after an upgrade"));
+  CheckSound(*mixer, findings);
+  CheckDatabase(*daemon, findings);
+  CheckWorkers(*daemon, findings);
+  CheckTls(program, findings);
+  return Conclude(findings);
+}
+
+}  // namespace carillon::cli

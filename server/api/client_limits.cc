@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/api/client_limits.h"
+
+#include <algorithm>
+
+#include "absl/strings/str_cat.h"
+#include "proto/cpp/error_reason.h"
+#include "server/audio_device/block_broadcast.h"
+#include "server/scene/scene_registry.h"
+#include "server/synthesis/mixer.h"
+
+namespace carillon {
+namespace {
+
+struct Bound {
+  const char* name;
+  size_t whole;  ///< of all clients together
+};
+
+Bound BoundOf(Holding holding) {
+  switch (holding) {
+    case Holding::kScene:
+      return {"scenes", SceneRegistry::kMaxSceneCount};
+    case Holding::kContactStream:
+      return {"contact streams", MixerSettings().most_streams};
+    case Holding::kListener:
+      return {"listeners", BlockBroadcast::kMaxListenerCount};
+    case Holding::kRendering:
+      break;
+  }
+  return {"renderings", kMaxRenderingCount};
+}
+
+}  // namespace
+
+ClientPlace::~ClientPlace() {
+  if (limits_ != nullptr) limits_->GiveBack(holding_, client_);
+}
+
+size_t ClientLimits::ShareOf(size_t whole, double share) {
+  return std::max<size_t>(1, static_cast<size_t>(static_cast<double>(whole) * share));
+}
+
+absl::StatusOr<ClientPlace> ClientLimits::Take(Holding holding, const std::string& client) {
+  const Bound bound = BoundOf(holding);
+  const size_t most = ShareOf(bound.whole, share_);
+  const MutexLock lock(&mutex_);
+  size_t& count = held_[static_cast<size_t>(holding)][client];
+  if (count >= most) {
+    return Refusal(absl::StatusCode::kResourceExhausted, "CLIENT_LIMIT_REACHED",
+                   absl::StrCat("this client has ", count, " ", bound.name,
+                                " already, its share of ", bound.whole, ": end some first"));
+  }
+  ++count;
+  return ClientPlace(*this, holding, client);
+}
+
+size_t ClientLimits::count(Holding holding) const {
+  const MutexLock lock(&mutex_);
+  size_t sum = 0;
+  for (const auto& [client, count] : held_[static_cast<size_t>(holding)]) sum += count;
+  return sum;
+}
+
+void ClientLimits::GiveBack(Holding holding, const std::string& client) {
+  const MutexLock lock(&mutex_);
+  auto& held = held_[static_cast<size_t>(holding)];
+  const auto found = held.find(client);
+  if (--found->second == 0) held.erase(found);
+}
+
+}  // namespace carillon

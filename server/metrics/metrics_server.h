@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+
+namespace carillon {
+
+/// One number of a metric, with at most one label.
+struct MetricValue {
+  std::string label{};  ///< value of the metric's label; empty if it has none
+  double value = 0;
+};
+
+/// A metric, named as Prometheus recommends: with its unit, and "_total" if it only grows.
+struct Metric {
+  enum class Kind { kGauge, kCounter };
+  std::string name;
+  std::string help;
+  Kind kind = Kind::kGauge;
+  std::string label_name{};  ///< empty: no label
+  std::vector<MetricValue> values{};
+};
+
+/// Serves metrics to Prometheus, at /metrics of an address of its own, by HTTP without TLS.
+class MetricsServer {
+ public:
+  /// Returns the metrics of this moment; called on the server's threads, for each request.
+  using Read = std::function<std::vector<Metric>()>;
+
+  /// `address` is HOST:PORT. Errors: FailedPrecondition (LISTEN_FAILED).
+  static absl::StatusOr<std::unique_ptr<MetricsServer>> Start(const std::string& address,
+                                                              Read read);
+  virtual ~MetricsServer() = default;
+  MetricsServer(const MetricsServer&) = delete;
+  MetricsServer& operator=(const MetricsServer&) = delete;
+
+ protected:
+  MetricsServer() = default;
+};
+
+}  // namespace carillon

@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tests/server/api/served_daemon.h"
+
+namespace carillon {
+namespace {
+
+/// A daemon that waits a short while for clients, and is served over TCP, too.
+class ClientApi : public ServedDaemon {
+ protected:
+  ClientApi()
+      : ServedDaemon({.scene_grace_s = 0.2, .client_share = 0.25, .rendering_idle_s = 0.2},
+                     {"127.0.0.1:0", "[::1]:0"}) {}
+
+  /// A connection of its own to one of the daemon's addresses.
+  static std::shared_ptr<grpc::Channel> Connect(const std::string& address) {
+    grpc::ChannelArguments arguments;
+    arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
+    return grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
+  }
+
+  static std::string CreateSceneOn(const std::shared_ptr<grpc::Channel>& channel,
+                                   const v1::CreateSceneRequest& request = {}) {
+    const auto stub = v1::SceneService::NewStub(channel);
+    v1::CreateSceneResponse response;
+    const grpc::Status status =
+        Call(*stub, &v1::SceneService::Stub::CreateScene, request, response);
+    return status.ok() ? response.name() : ErrorOf(status).reason();
+  }
+
+  std::optional<v1::Scene> FindScene(const std::string& name) {
+    v1::ListScenesResponse response;
+    EXPECT_TRUE(Call(*scenes, &v1::SceneService::Stub::ListScenes, {}, response).ok());
+    for (const v1::Scene& scene : response.scenes()) {
+      if (scene.name() == name) return scene;
+    }
+    return std::nullopt;
+  }
+};
+
+TEST_F(ClientApi, ASceneEndsAfterItsConnectionOverAnyKindOfAddress) {
+  for (const std::string& address : addresses()) {
+    auto channel = Connect(address);
+    auto other = Connect(address);
+    const std::string kept = CreateSceneOn(other);
+    const std::string scene = CreateSceneOn(channel);
+    EXPECT_EQ(FindScene(scene)->connection_count(), 1U) << address;
+    EXPECT_FALSE(FindScene(scene)->has_ends_in_s());
+    channel.reset();
+    bool waited = false;
+    for (auto found = FindScene(scene); found; found = FindScene(scene)) {
+      waited |= found->has_ends_in_s() && found->ends_in_s() <= 0.2;
+    }
+    EXPECT_TRUE(waited) << address;
+    EXPECT_EQ(FindScene(kept)->connection_count(), 1U) << address;
+  }
+}
+
+TEST_F(ClientApi, ASceneThatIsToBeKeptOutlivesItsConnection) {
+  auto channel = Connect(address());
+  v1::CreateSceneRequest request;
+  request.set_keep(true);
+  const std::string kept = CreateSceneOn(channel, request);
+  const std::string other = CreateSceneOn(channel);
+  channel.reset();
+  while (FindScene(other)) {
+  }
+  ASSERT_TRUE(FindScene(kept));
+  EXPECT_TRUE(FindScene(kept)->keep());
+  EXPECT_EQ(FindScene(kept)->connection_count(), 0U);
+  EXPECT_FALSE(FindScene(kept)->has_ends_in_s());
+}
+
+TEST_F(ClientApi, OneClientHasAShareOfAllScenesAndOthersHaveTheirs) {
+  const auto greedy = Connect(address());
+  for (size_t i = 0; i < SceneRegistry::kMaxSceneCount / 4; ++i) {
+    ASSERT_THAT(CreateSceneOn(greedy), testing::StartsWith("scenes/")) << i;
+  }
+  EXPECT_EQ(CreateSceneOn(greedy), "CLIENT_LIMIT_REACHED");
+  EXPECT_THAT(CreateSceneOn(Connect(address())), testing::StartsWith("scenes/"));
+}
+
+TEST_F(ClientApi, ARenderingWhoseClientSaysNothingEnds) {
+  grpc::ClientContext context;
+  const auto call = audio->Render(&context);
+  v1::RenderRequest request;
+  request.mutable_settings()->set_sample_rate_hz(48000);
+  call->Write(request);
+  v1::RenderResponse response;
+  EXPECT_FALSE(call->Read(&response));
+  ExpectRefused(call->Finish(), grpc::DEADLINE_EXCEEDED, "RENDERING_IDLE");
+  EXPECT_EQ(server().clients().renderings, 0U);
+}
+
+TEST_F(ClientApi, RenderingsThatSayNothingLeaveRoomForOthers) {
+  const auto silent = Connect(address());
+  const auto stub = v1::AudioService::NewStub(silent);
+  std::vector<
+      std::pair<std::unique_ptr<grpc::ClientContext>,
+                std::unique_ptr<grpc::ClientReaderWriter<v1::RenderRequest, v1::RenderResponse>>>>
+      calls;
+  for (int i = 0; i < 3; ++i) {
+    auto context = std::make_unique<grpc::ClientContext>();
+    auto call = stub->Render(context.get());
+    calls.emplace_back(std::move(context), std::move(call));
+  }
+  std::vector<std::string> reasons;
+  for (auto& [context, call] : calls) {
+    v1::RenderResponse response;
+    while (call->Read(&response)) {
+    }
+    reasons.push_back(ErrorOf(call->Finish()).reason());
+  }
+  EXPECT_THAT(reasons, testing::UnorderedElementsAre("RENDERING_IDLE", "RENDERING_IDLE",
+                                                     "CLIENT_LIMIT_REACHED"));
+}
+
+}  // namespace
+}  // namespace carillon
