@@ -26,3 +26,5 @@ buf_lock=$(sha256sum "$root/deploy/buf/package-lock.json" | cut -c 1-16)
 export CARILLON_BUF=$CARILLON_CACHE/buf-$buf_lock/node_modules/@bufbuild/$buf_package/bin/buf
 node_lock=$(sha256sum "$root/client_sdk/node/package-lock.json" | cut -c 1-16)
 export CARILLON_NODE_MODULES=$CARILLON_CACHE/node-$node_lock/node_modules
+engines_lock=$(sha256sum "$root/client_sdk/adapters/package-lock.json" | cut -c 1-16)
+export CARILLON_ENGINE_MODULES=$CARILLON_CACHE/engines-$engines_lock/node_modules

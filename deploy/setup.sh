@@ -4,8 +4,9 @@
 # deploy/setup.sh LIST...
 #
 # Installs what is missing of the packages in the given lists, from Debian as this machine's apt is set up. A list is
-# one of deploy/packages/ (programs, tests, languages, packages, lint, client) or a file. With `lint` it also installs
-# buf, with `tests` or `packages` what the client for Node needs, both from the npm registry.
+# one of deploy/packages/ (programs, engines, tests, languages, packages, lint, client) or a file. With `lint` it also installs
+# buf, with `tests` or `packages` what the client for Node needs, with `tests` or `engines` the engines that run in
+# Node, all from the npm registry.
 # Calls neither registry when nothing is missing.
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
@@ -15,10 +16,12 @@ source "$root/deploy/environment.sh"
 lists=()
 with_buf=
 with_node=
+with_engines=
 for list in "$@"; do
   case $list in
     lint) with_buf=yes ;;
-    tests | packages) with_node=yes ;;
+    tests | engines) with_node=yes with_engines=yes ;;
+    packages) with_node=yes ;;
   esac
   if [[ $list == */* ]]; then lists+=("$list"); else lists+=("$root/deploy/packages/$list.txt"); fi
 done
@@ -78,4 +81,7 @@ if [[ -n $with_buf && ! -x $CARILLON_BUF ]]; then
 fi
 if [[ -n $with_node && ! -e $CARILLON_NODE_MODULES/@grpc/grpc-js ]]; then
   install_from_npm "$root/client_sdk/node" "${CARILLON_NODE_MODULES%/*}" "$CARILLON_NODE_MODULES/@grpc/grpc-js"
+fi
+if [[ -n $with_engines && ! -e $CARILLON_ENGINE_MODULES/@babylonjs/havok ]]; then
+  install_from_npm "$root/client_sdk/adapters" "${CARILLON_ENGINE_MODULES%/*}" "$CARILLON_ENGINE_MODULES/@babylonjs/havok"
 fi

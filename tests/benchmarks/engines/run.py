@@ -1,0 +1,138 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: Apache-2.0
+"""One fall in five engines at three rates of steps: how loud it comes out, as a table.
+
+Each number is a level relative to the median of all engines and rates of its scene: of a fall and of a collision the
+energy of the first blow, of a roll and of a slide the mean power. Beside it stand, where they belong: the greatest
+sample at rest relative to the greatest of all, and how far lines at the step rate stand out of a roll or a slide.
+"""
+
+import argparse
+import json
+import os
+import pathlib
+import statistics
+import sys
+import tempfile
+
+import numpy
+
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+RATES_HZ = (60, 240, 1000)
+SAMPLE_RATE_HZ = 48000
+# Scene: simulated seconds, and the window of what travels.
+SECONDS = {"corner": 3.0, "collision": 1.0, "roll": 2.0, "slide": 2.0}
+TRAVELS_S = {"roll": (0.5, 1.8), "slide": (0.15, 0.85)}
+BLOW_S = 0.06
+LIMITS_DB = {"corner": 3, "collision": 3, "roll": 4, "slide": 4}
+REST_DB, LINES_DB = -100, 3
+
+
+def decibels(ratio):
+    return 10 * numpy.log10(ratio + 1e-30)
+
+
+def between(samples, begin_s, end_s):
+    return samples[int(begin_s * SAMPLE_RATE_HZ):int(end_s * SAMPLE_RATE_HZ)]
+
+
+def blow_energy(samples):
+    """Of the first blow: from where the sound begins on, for so long that no engine's second one is in it."""
+    begin = int(numpy.argmax(numpy.abs(samples) > 0.01 * numpy.abs(samples).max()))
+    return numpy.sum(numpy.square(samples[begin:begin + int(BLOW_S * SAMPLE_RATE_HZ)])) / SAMPLE_RATE_HZ
+
+
+def lines_db(samples, rate_hz):
+    """The mean level at the multiples of the step rate over that beside them."""
+    size = SAMPLE_RATE_HZ // 10  # bins of 10 Hz
+    pieces = samples[:len(samples) // size * size].reshape(-1, size) * numpy.hanning(size)
+    power = numpy.mean(numpy.abs(numpy.fft.rfft(pieces))**2, axis=0)
+    at = numpy.arange(rate_hz // 10, len(power) - 4, rate_hz // 10)
+    at = at[at > 5]
+    beside = numpy.mean([numpy.log(power[at + offset]) for offset in (-3, -2, 2, 3)], axis=0)
+    return float(10 / numpy.log(10) * numpy.mean(numpy.log(power[at]) - beside))
+
+
+def measure(name, samples, rate_hz):
+    """The level in decibels, and what stands beside it."""
+    if name in TRAVELS_S:
+        travels = between(samples, *TRAVELS_S[name])
+        return {"level_db": decibels(numpy.mean(numpy.square(travels))), "lines_db": lines_db(travels, rate_hz)}
+    measured = {"level_db": decibels(blow_energy(samples))}
+    if name == "corner":
+        rest = numpy.abs(between(samples, SECONDS[name] - 0.4, SECONDS[name])).max()
+        measured["rest_db"] = 2 * decibels(rest / numpy.abs(samples).max())
+    return measured
+
+
+def is_right(name, measured):
+    return (abs(measured["relative_db"]) <= LIMITS_DB[name] and measured.get("rest_db", REST_DB) <= REST_DB
+            and measured.get("lines_db", 0) < LINES_DB)
+
+
+def cell(name, measured):
+    text = f"{measured['relative_db']:+.1f}"
+    if "rest_db" in measured:
+        text += f" (rest {measured['rest_db']:.0f})"
+    if "lines_db" in measured:
+        text += f" (lines {measured['lines_db']:+.1f})"
+    return text if is_right(name, measured) else f"**{text}**"
+
+
+def print_table(name, table):
+    level = statistics.median(one["level_db"] for one in table.values())
+    for measured in table.values():
+        measured["relative_db"] = measured["level_db"] - level
+    print(f"\n{name}: dB of the median; bold is beyond {LIMITS_DB[name]} dB, rests above {REST_DB} dB, or has lines\n")
+    engines = dict.fromkeys(engine for engine, _ in table)
+    rates = dict.fromkeys(rate for _, rate in table)
+    print("| engine | " + " | ".join(f"{rate} Hz" for rate in rates) + " |")
+    print("| --- " * (1 + len(rates)) + "|")
+    for engine in engines:
+        print(f"| {engine} | " + " | ".join(cell(name, table[engine, rate]) for rate in rates) + " |", flush=True)
+    return sum(not is_right(name, measured) for measured in table.values())
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--build", type=pathlib.Path, default=ROOT / "build/release")
+    parser.add_argument("--scenes", nargs="*", default=list(SECONDS), choices=list(SECONDS))
+    parser.add_argument("--engines", nargs="*", help="all unless named")
+    parser.add_argument("--rates", nargs="*", type=int, default=RATES_HZ)
+    parser.add_argument("--keep", type=pathlib.Path, help="a folder that keeps traces and sounds")
+    options = parser.parse_args()
+    build = options.build.resolve()
+    sys.path[:0] = map(str, (build / "client_sdk/python", ROOT / "client_sdk/python", ROOT / "tests/integration",
+                             ROOT / "client_sdk/examples/falls"))
+    os.environ.update(CARILLON_BIN_DIR=str(build / "bin"), CARILLON_BUILD_DIR=str(build))
+    # They need the paths above.
+    import carillon
+    import falls
+    from daemon import Daemon
+    wrong = 0
+    with tempfile.TemporaryDirectory(prefix="carillon-") as name:
+        folder = options.keep or pathlib.Path(name)
+        folder.mkdir(parents=True, exist_ok=True)
+        daemon = Daemon(pathlib.Path(name))
+        try:
+            with carillon.connect(daemon.server) as client:
+                for scene_name in options.scenes:
+                    scene = falls.create_models(client, json.loads((falls.SCENES / f"{scene_name}.json").read_text()))
+                    table = {}
+                    for engine in options.engines or falls.ENGINES:
+                        for rate in options.rates:
+                            trace = folder / f"{scene_name}-{engine}-{rate}.contacts"
+                            falls.record(engine, scene, trace, rate=rate, seconds=SECONDS[scene_name], build=build)
+                            sound = client.render(trace, sample_rate_hz=SAMPLE_RATE_HZ, tail_s=1)
+                            if options.keep:
+                                sound.save(trace.with_suffix(".wav"))
+                            table[engine, rate] = measure(scene_name, sound.mono, rate)
+                    wrong += print_table(scene_name, table)
+        finally:
+            daemon.stop()
+    print(f"\n{wrong} numbers are beyond the limits")
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
