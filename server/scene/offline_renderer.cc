@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
+#include "server/scene/scene_volumes.h"
 #include "server/synthesis/flush_denormals.h"
 
 namespace carillon {
@@ -31,9 +32,11 @@ MixerSettings SettingsOf(const OfflineSettings& settings, SectionThreads& thread
           .block_frame_count = OfflineRenderer::kBlockFrameCount,
           .channel_count = settings.channel_count,
           .first_frame = settings.mapping.first_frame,
+          .most_buses = 1,
           .most_streams = 1,
           .most_pending_events = kOfflineQueueCapacity,
           .most_events_per_block = kOfflineQueueCapacity,
+          .gain = settings.gain,
           .threads = &threads};
 }
 
@@ -69,6 +72,7 @@ absl::StatusOr<std::unique_ptr<OfflineRenderer>> OfflineRenderer::Make(
         absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
         absl::StrCat("channel_count is ", settings.channel_count, "; it must be 1 or 2"));
   }
+  RETURN_IF_ERROR(ValidateGain(settings.gain));
   RETURN_IF_ERROR(Validate(settings.space));
   std::unique_ptr<OfflineRenderer> renderer(new OfflineRenderer(settings, bodies, transfers));
   ASSIGN_OR_RETURN(renderer->stream_, renderer->mixer_.OpenStream(kOfflineQueueCapacity));
@@ -91,7 +95,7 @@ absl::Status OfflineRenderer::AddObject(uint32_t handle, std::shared_ptr<const M
   RETURN_IF_ERROR(scene_.CheckFree(handle));
   ASSIGN_OR_RETURN(std::shared_ptr<const SoundingBody> body, bodies_.Get(std::move(model)));
   auto voice = MakeVoice(settings_.space, properties.pose, mixer_.settings());
-  ASSIGN_OR_RETURN(SoundingObject object, MakeSoundingObject(std::move(body), properties, mixer_,
+  ASSIGN_OR_RETURN(SoundingObject object, MakeSoundingObject(std::move(body), properties, {mixer_},
                                                              std::move(voice), transfers_));
   return scene_.Insert(handle, std::move(object));
 }

@@ -27,6 +27,7 @@ struct OfflineSettings {
   /// Length of the sound after the last contact; zero: until it stays below -80 dB of full scale,
   /// at most 60 s.
   double tail_s = 0;
+  double gain = 1;  ///< of the whole sound, before the limiter
   /// The simulator's step, seconds, above 0 and at most 1.
   double step_s = 1.0 / 60;
   SceneSpace space{};
@@ -61,7 +62,7 @@ class OfflineRenderer {
   static constexpr double kMaxTimeS = 86400;
 
   /// `bodies` and `transfers` (null: none are stored) must outlive the renderer. Errors:
-  /// InvalidArgument (INVALID_SETTINGS, INVALID_HEARING, INVALID_POSE).
+  /// InvalidArgument (INVALID_SETTINGS, INVALID_GAIN, INVALID_HEARING, INVALID_POSE).
   static absl::StatusOr<std::unique_ptr<OfflineRenderer>> Make(const OfflineSettings& settings,
                                                                BodyCache& bodies,
                                                                TransferStore* transfers = nullptr);

@@ -21,9 +21,11 @@ namespace carillon {
 /// is sent to a bank that has been given up.
 class Scene {
  public:
-  /// `name` is used in error messages.
-  explicit Scene(std::string name, const SceneSpace& space = {})
-      : name_(std::move(name)), space_(space) {}
+  /// `name` is used in error messages. The objects sound through `bus`.
+  explicit Scene(std::string name, const SceneSpace& space = {}, BusId bus = {})
+      : name_(std::move(name)), bus_(bus), space_(space) {}
+
+  BusId bus() const { return bus_; }
 
   Mutex& mutex() const ABSL_LOCK_RETURNED(mutex_) { return mutex_; }
 
@@ -73,6 +75,7 @@ class Scene {
   absl::Status ObjectExists(uint32_t handle) const;
 
   const std::string name_;
+  const BusId bus_;
   mutable Mutex mutex_;
   SceneSpace space_ ABSL_GUARDED_BY(mutex_);
   std::map<uint32_t, SoundingObject> objects_ ABSL_GUARDED_BY(mutex_);

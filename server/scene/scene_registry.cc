@@ -40,14 +40,16 @@ absl::Status ValidateGlide(double glide_s) {
 
 }  // namespace
 
-absl::StatusOr<uint64_t> SceneRegistry::CreateScene(const SceneSpace& space) {
+absl::StatusOr<uint64_t> SceneRegistry::CreateScene(const SceneSpace& space, double gain,
+                                                    const std::string& owner) {
   RETURN_IF_ERROR(Validate(space));
   const MutexLock lock(&mutex_);
   if (scenes_.size() >= kMaxSceneCount) {
     return TooMany("TOO_MANY_SCENES", kMaxSceneCount, "scenes");
   }
   const uint64_t id = next_scene_++;
-  scenes_[id] = std::make_shared<Scene>(absl::StrCat("scenes/", id), space);
+  ASSIGN_OR_RETURN(const BusId bus, volumes_.Open(id, owner, gain));
+  scenes_[id] = std::make_shared<Scene>(absl::StrCat("scenes/", id), space, bus);
   return id;
 }
 
@@ -56,6 +58,7 @@ absl::Status SceneRegistry::DeleteScene(uint64_t scene) {
   ASSIGN_OR_RETURN(const std::shared_ptr<Scene> found, FindScene(scene));
   const std::map<uint32_t, SoundingObject> objects = found->Close();
   for (const auto& [handle, object] : objects) mixer_.FadeOut(object.bank);
+  volumes_.Close(scene);
   const MutexLock lock(&mutex_);
   scenes_.erase(scene);
   object_count_ -= objects.size();
@@ -71,9 +74,37 @@ std::vector<SceneRegistry::SceneEntry> SceneRegistry::ListScenes() const {
   std::vector<SceneEntry> entries;
   entries.reserve(scenes.size());
   for (const auto& [id, scene] : scenes) {
-    entries.push_back({.scene = id, .object_count = scene->CopyAll().size()});
+    entries.push_back(EntryOf(id, *scene));
   }
   return entries;
+}
+
+SceneRegistry::SceneEntry SceneRegistry::EntryOf(uint64_t id, const Scene& scene) const {
+  return {.scene = id,
+          .object_count = scene.CopyAll().size(),
+          .volume = volumes_.volume(id),
+          .state = mixer_.State(scene.bus())};
+}
+
+absl::StatusOr<SceneRegistry::SceneEntry> SceneRegistry::GetScene(uint64_t scene) const {
+  ASSIGN_OR_RETURN(const std::shared_ptr<Scene> found, FindScene(scene));
+  return EntryOf(scene, *found);
+}
+
+absl::Status SceneRegistry::ChangeVolume(uint64_t scene, const SceneVolumeChange& change) {
+  RETURN_IF_ERROR(FindScene(scene).status());
+  return volumes_.Change(scene, change);
+}
+
+absl::Status SceneRegistry::Stop(uint64_t scene) {
+  ASSIGN_OR_RETURN(const BusId bus, BusOf(scene));
+  mixer_.Stop(bus);
+  return absl::OkStatus();
+}
+
+absl::StatusOr<BusId> SceneRegistry::BusOf(uint64_t scene) const {
+  ASSIGN_OR_RETURN(const std::shared_ptr<Scene> found, FindScene(scene));
+  return found->bus();
 }
 
 absl::StatusOr<std::vector<PlacedObject>> SceneRegistry::ListObjects(uint64_t scene) const {
@@ -96,8 +127,9 @@ absl::StatusOr<PlacedObject> SceneRegistry::AddObject(uint64_t scene, uint32_t h
   }
   ASSIGN_OR_RETURN(std::shared_ptr<const SoundingBody> body, bodies_.Get(std::move(model)));
   auto voice = MakeVoice(found->space(), properties.pose, mixer_.settings());
-  ASSIGN_OR_RETURN(SoundingObject object, MakeSoundingObject(std::move(body), properties, mixer_,
-                                                             std::move(voice), transfers_));
+  ASSIGN_OR_RETURN(SoundingObject object,
+                   MakeSoundingObject(std::move(body), properties, {mixer_, found->bus()},
+                                      std::move(voice), transfers_));
   const uint32_t chosen = handle != 0 ? handle : found->FreeHandle();
   // This cannot fail, because every change of the scene holds change_mutex_.
   found->Insert(chosen, object).IgnoreError();
@@ -152,7 +184,7 @@ void SceneRegistry::TakeOverTransfers(const std::string& model_digest) {
 
 absl::StatusOr<SoundingObject> SceneRegistry::Remake(const SoundingObject& old,
                                                      const ObjectProperties& properties) {
-  return MakeSoundingObject(old.body, properties, mixer_, old.voice, transfers_);
+  return MakeSoundingObject(old.body, properties, {mixer_, old.bus}, old.voice, transfers_);
 }
 
 absl::Status SceneRegistry::UpdateListener(uint64_t scene, const Pose& pose, double glide_s) {

@@ -14,6 +14,7 @@
 #include "server/scene/contact_stream.h"
 #include "server/scene/rejection_counts.h"
 #include "server/scene/scene.h"
+#include "server/scene/scene_volumes.h"
 #include "server/scene/sounding_body.h"
 
 namespace carillon {
@@ -44,11 +45,12 @@ class SceneRegistry {
 
   /// `mixer` and `transfers` (null: none are stored) must outlive the registry.
   explicit SceneRegistry(Mixer& mixer, TransferStore* transfers = nullptr)
-      : mixer_(mixer), transfers_(transfers) {}
+      : mixer_(mixer), transfers_(transfers), volumes_(mixer) {}
 
   /// Returns the id of a new scene. Errors: ResourceExhausted (TOO_MANY_SCENES), and those of
-  /// Validate.
-  absl::StatusOr<uint64_t> CreateScene(const SceneSpace& space = {});
+  /// Validate and ValidateGain.
+  absl::StatusOr<uint64_t> CreateScene(const SceneSpace& space = {}, double gain = 1,
+                                       const std::string& owner = "");
 
   /// Fades out the scene's objects. Errors: NotFound (SCENE_NOT_FOUND).
   absl::Status DeleteScene(uint64_t scene);
@@ -57,10 +59,26 @@ class SceneRegistry {
   struct SceneEntry {
     uint64_t scene = 0;
     size_t object_count = 0;
+    SceneVolume volume{};
+    BusState state{};
   };
 
   /// Returns all scenes, the oldest first.
   std::vector<SceneEntry> ListScenes() const;
+
+  /// Errors: NotFound (SCENE_NOT_FOUND).
+  absl::StatusOr<SceneEntry> GetScene(uint64_t scene) const;
+
+  /// The volume glides within 30 ms. Errors: NotFound (SCENE_NOT_FOUND), InvalidArgument
+  /// (INVALID_GAIN).
+  absl::Status ChangeVolume(uint64_t scene, const SceneVolumeChange& change);
+
+  /// Fades all that sounds in a scene out within 30 ms; contacts that come later sound. Errors:
+  /// NotFound (SCENE_NOT_FOUND).
+  absl::Status Stop(uint64_t scene);
+
+  /// The bus that the objects of a scene sound through. Errors: NotFound (SCENE_NOT_FOUND).
+  absl::StatusOr<BusId> BusOf(uint64_t scene) const;
 
   /// Returns the objects of a scene by their handles. Errors: NotFound (SCENE_NOT_FOUND).
   absl::StatusOr<std::vector<PlacedObject>> ListObjects(uint64_t scene) const;
@@ -104,6 +122,7 @@ class SceneRegistry {
 
  private:
   absl::StatusOr<std::shared_ptr<Scene>> FindScene(uint64_t scene) const;
+  SceneEntry EntryOf(uint64_t id, const Scene& scene) const;
   absl::StatusOr<SoundingObject> Remake(const SoundingObject& old,
                                         const ObjectProperties& properties)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(change_mutex_);
@@ -116,6 +135,7 @@ class SceneRegistry {
   TransferStore* transfers_;
   BodyCache bodies_;
   RejectionCounts rejections_;
+  SceneVolumes volumes_;
   /// Held while objects are added, changed and removed, so that limits are exact and two changes of
   /// one object do not undo each other. Contacts do not take it.
   Mutex change_mutex_;

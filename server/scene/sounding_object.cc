@@ -114,12 +114,13 @@ absl::StatusOr<std::shared_ptr<const Transfer>> ChooseTransfer(const ModalModel&
 }
 
 absl::StatusOr<SoundingObject> MakeSoundingObject(std::shared_ptr<const SoundingBody> body,
-                                                  const ObjectProperties& properties, Mixer& mixer,
+                                                  const ObjectProperties& properties,
+                                                  const MixerBus& output,
                                                   std::shared_ptr<Voice> voice,
                                                   TransferStore* transfers) {
   const ModalModel& model = *body->model;
   RETURN_IF_ERROR(Check(model, properties));
-  const MixerSettings& settings = mixer.settings();
+  const MixerSettings& settings = output.mixer.settings();
   ASSIGN_OR_RETURN(std::shared_ptr<const Transfer> transfer,
                    ChooseTransfer(model, properties, transfers));
   auto directivity = DirectivityOf(transfer, voice.get(), properties.material.size);
@@ -134,7 +135,7 @@ absl::StatusOr<SoundingObject> MakeSoundingObject(std::shared_ptr<const Sounding
                              .block_frame_count = settings.block_frame_count,
                              .gain = properties.gain,
                              .directivity = std::move(directivity)});
-  ASSIGN_OR_RETURN(const BankId bank, mixer.Add(std::move(oscillators), voice));
+  ASSIGN_OR_RETURN(const BankId bank, output.mixer.Add(std::move(oscillators), voice, output.bus));
   const double top_hz = std::min(band.highest_hz, settings.sample_rate_hz / 2);
   return SoundingObject{.body = std::move(body),
                         .properties = properties,
@@ -143,6 +144,7 @@ absl::StatusOr<SoundingObject> MakeSoundingObject(std::shared_ptr<const Sounding
                         .highest_frequency_hz = sounding.modes.back().natural_frequency_hz,
                         .complete_to_hz = CompleteTo(model, properties.material, top_hz),
                         .bank = bank,
+                        .bus = output.bus,
                         .voice = std::move(voice),
                         .transfer = std::move(transfer)};
 }

@@ -47,6 +47,7 @@ struct SoundingObject {
   /// the band.
   std::optional<double> complete_to_hz;
   BankId bank;
+  BusId bus{};                             ///< of the bank
   std::shared_ptr<Voice> voice = nullptr;  ///< null in a scene without spatial audio
   /// How its modes radiate; null: by the paper's coupling.
   std::shared_ptr<const Transfer> transfer = nullptr;
@@ -59,13 +60,20 @@ absl::StatusOr<std::shared_ptr<const Transfer>> ChooseTransfer(const ModalModel&
                                                                const ObjectProperties& properties,
                                                                TransferStore* transfers);
 
-/// Applies material and size to a model and puts its bank, heard through `voice`, on `mixer`.
+/// A bus of a mixer.
+struct MixerBus {
+  Mixer& mixer;
+  BusId bus{};
+};
+
+/// Applies material and size to a model and puts its bank, heard through `voice`, on a bus.
 /// Errors: InvalidArgument (INVALID_OBJECT: size or gain out of range; INVALID_POSE),
 /// FailedPrecondition
 /// (POISSON_RATIO_DIFFERS, NO_MODE_IN_BAND with the figure first_mode_hz), ResourceExhausted
 /// (TOO_MANY_OBJECTS), and those of ChooseTransfer.
 absl::StatusOr<SoundingObject> MakeSoundingObject(std::shared_ptr<const SoundingBody> body,
-                                                  const ObjectProperties& properties, Mixer& mixer,
+                                                  const ObjectProperties& properties,
+                                                  const MixerBus& output,
                                                   std::shared_ptr<Voice> voice = nullptr,
                                                   TransferStore* transfers = nullptr);
 

@@ -14,6 +14,7 @@ struct BankSlot {
   Voice* voice = nullptr;  ///< null: the bank is heard without a position
   uint32_t generation = 0;
   uint32_t section = 0;  ///< the section that renders it
+  uint32_t bus = 0;      ///< of that section
   float loudness_per_newton_second = 0;
   uint32_t pending_count = 0;  ///< events that wait for their block
   bool sounding = false;       ///< among the sounding banks of its section

@@ -18,7 +18,7 @@ void Count(std::atomic<uint64_t>& counter, uint64_t more = 1) noexcept {
   counter.store(counter.load(std::memory_order_relaxed) + more, std::memory_order_relaxed);
 }
 
-static_assert(kSectionCount <= RenderOrder::kMostSections);
+static_assert(kMostBuses * kSectionCount <= RenderOrder::kMostSections);
 static_assert(kBlocksTogether <= RenderOrder::kMostBlocks);
 static_assert(kMostBlockFrames <= RenderOrder::kMostGroups * kMergedFrames);
 
@@ -49,9 +49,12 @@ void Mixer::RenderBlocks(std::span<float> frames) noexcept {
   const size_t block_count = frame_count / settings_.block_frame_count;
   budget_.Begin();
   ExecuteCommands();
+  ListenToControl();
   TakeEvents(block_count);
   CollectDueEvents(block_count);
-  RenderSections(frames);
+  RenderSections(frame_count);
+  MixBuses(frames);
+  EndStops();
   pending_.Free(due_);
   RetireLeavingBanks();
   NotePeak(frames);
@@ -69,11 +72,13 @@ void Mixer::Execute(const Command& command) noexcept {
   if (command.kind == Command::Kind::kAddStream) {
     open_queues_.push_back(command.queue);
   } else if (command.kind == Command::Kind::kAddBank) {
+    if (command.opened != nullptr) OpenSection(command.section, command.opened);
     slots_[command.id.slot] = {
         .bank = command.bank,
         .voice = command.voice,
         .generation = command.id.generation,
         .section = command.section,
+        .bus = static_cast<uint32_t>(command.section / kSectionCount),
         .loudness_per_newton_second = command.bank->loudness_per_newton_second()};
     Count(statistics_.bank_count);
     if (command.voice == nullptr) return;
@@ -138,7 +143,7 @@ void Mixer::Take(MixerEvent& event, EventQueue& queue) noexcept {
   }
   const bool known = slot != nullptr && !slot->fading;
   const bool shed_early = known && IsShedEarly(event, *slot);
-  if (!known || (!shed_early && !pending_.TryPush(event))) {
+  if (!known || (!shed_early && !pending_.TryPush(event, buses_[slot->bus]->stop_count))) {
     Count(queue.dropped_count);
     return Count(statistics_.dropped_count);
   }
@@ -162,6 +167,7 @@ void Mixer::CollectDueEvents(size_t block_count) noexcept {
   due_order_.clear();
   due_events_.clear();
   rendered_work_ = 0;
+  for (const uint32_t section : open_sections_) sections_[section]->due = {};
   if (budget_.bounded() && ringing_work_ > budget_.most_work()) ShedBanks();
   for (uint32_t block = 0; block < block_count; ++block) {
     const size_t first = due_.size();
@@ -171,7 +177,6 @@ void Mixer::CollectDueEvents(size_t block_count) noexcept {
     ChooseEvents(block, due);
   }
   std::ranges::sort(due_order_);
-  due_ends_.fill(0);
   for (const RenderOrder& order : due_order_) {
     const RenderOrder::Fields due = order.fields();
     due_events_.push_back({.slot = due.slot,
@@ -179,7 +184,8 @@ void Mixer::CollectDueEvents(size_t block_count) noexcept {
                            .offset = due.offset,
                            .merged = due.merged,
                            .event = &pending_[due_[due.arrival]]});
-    due_ends_[due.section] = due_events_.size();
+    std::span<const DueEvent>& section = sections_[due.section]->due;
+    section = std::span(due_events_).last(section.size() + 1);
   }
 }
 
@@ -205,10 +211,15 @@ void Mixer::DecideTreatment(std::span<const uint32_t> due) noexcept {
   early_shed_below_ = triage_.shed_below() * kEarlyShedRatio;
 }
 
-float Mixer::LoudnessOf(const SurfaceImpulse& impulse, const BankSlot& slot) noexcept {
+float Mixer::LoudnessOf(const SurfaceImpulse& impulse, const BankSlot& slot) const noexcept {
   const auto& [x, y, z] = impulse.impulse_newton_seconds;
   const float squared = x * x + y * y + z * z;
-  return slot.loudness_per_newton_second * std::sqrt(squared);
+  return buses_[slot.bus]->fader.target() * slot.loudness_per_newton_second * std::sqrt(squared);
+}
+
+double Mixer::LoudestSquared(uint32_t slot) const noexcept {
+  const double gain = buses_[slots_[slot].bus]->fader.target();
+  return gain * gain * slots_[slot].bank->loudest_squared();
 }
 
 /// Decides which of a block's events are rendered, and notes their places in the order of
@@ -225,6 +236,10 @@ void Mixer::ChooseEvents(uint32_t block, std::span<const uint32_t> due) noexcept
       continue;
     }
     --slot->pending_count;
+    // A bus that was stopped renders no impulse that came before.
+    if (event.impulse() != nullptr && pending_.tag(index) != buses_[slot->bus]->stop_count) {
+      continue;
+    }
     Treatment treatment = Treatment::kExact;
     if (budget_.bounded() && event.impulse() != nullptr) {
       treatment = triage_.Treat(LoudnessOf(*event.impulse(), *slot));
@@ -247,81 +262,42 @@ void Mixer::ChooseEvents(uint32_t block, std::span<const uint32_t> due) noexcept
 /// Silences the quietest banks until the rest can be rendered in time.
 void Mixer::ShedBanks() noexcept {
   triage_.Clear();
-  for (const RenderSection& section : sections_) {
-    for (const uint32_t index : section.sounding()) {
+  for (const uint32_t section : open_sections_) {
+    for (const uint32_t index : sections_[section]->section.sounding()) {
       const OscillatorBank& bank = *slots_[index].bank;
-      triage_.Note(static_cast<float>(bank.loudest_squared()), bank.ringing_work(),
+      triage_.Note(static_cast<float>(LoudestSquared(index)), bank.ringing_work(),
                    bank.ringing_work());
     }
   }
   ringing_work_ = triage_.Decide(kRingingShare * budget_.most_work());
-  for (const RenderSection& section : sections_) {
-    for (const uint32_t index : section.sounding()) {
-      OscillatorBank& bank = *slots_[index].bank;
-      if (triage_.Treat(static_cast<float>(bank.loudest_squared())) != Treatment::kShed) continue;
-      bank.Shed();
+  for (const uint32_t section : open_sections_) {
+    for (const uint32_t index : sections_[section]->section.sounding()) {
+      if (triage_.Treat(static_cast<float>(LoudestSquared(index))) != Treatment::kShed) continue;
+      slots_[index].bank->Shed();
       Count(statistics_.shed_bank_count);
     }
   }
 }
 
-void Mixer::RenderOneSection(size_t thread, size_t section, size_t frame_count) noexcept {
-  const size_t begin = section == 0 ? 0 : due_ends_[section - 1];
-  section_counts_[section] = sections_[section].Render(
-      block_start_ / settings_.block_frame_count,
-      std::span(due_events_).subspan(begin, due_ends_[section] - begin),
-      {.frames = std::span(section_frames_).subspan(section * frame_count, frame_count),
-       .placed = std::span(placed_frames_)
-                     .subspan(section * frame_count * settings_.channel_count,
-                              frame_count * settings_.channel_count)},
+void Mixer::RenderOneSection(size_t thread, MixedSection& mixed, size_t frame_count) noexcept {
+  mixed.counts = mixed.section.Render(
+      block_start_ / settings_.block_frame_count, mixed.due,
+      {.frames = std::span(mixed.frames).first(frame_count),
+       .placed = std::span(mixed.placed).first(frame_count * settings_.channel_count)},
       workspaces_[thread]);
 }
 
-void Mixer::RenderSections(std::span<float> frames) noexcept {
-  for (size_t section = 1; section < kSectionCount; ++section) {
-    due_ends_[section] = std::max(due_ends_[section], due_ends_[section - 1]);
-  }
-  const size_t frame_count = frames.size() / settings_.channel_count;
-  const auto render = [&](size_t thread, size_t section) {
+void Mixer::RenderSections(size_t frame_count) noexcept {
+  const auto render = [&](size_t thread, size_t index) {
     const InRole role(kRenderRole);  // each of the threads that render sections has it
-    RenderOneSection(thread, section, frame_count);
+    RenderOneSection(thread, *sections_[open_sections_[index]], frame_count);
   };
   if (settings_.threads != nullptr) {
-    settings_.threads->Render(kSectionCount, render);
+    settings_.threads->Render(open_sections_.size(), render);
   } else {
-    for (size_t section = 0; section < kSectionCount; ++section) {
-      RenderOneSection(0, section, frame_count);
+    for (const uint32_t section : open_sections_) {
+      RenderOneSection(0, *sections_[section], frame_count);
     }
-  }
-  MixSections(frames);
-}
-
-/// Adds up the sections in their order, so that the sum does not depend on the threads.
-void Mixer::MixSections(std::span<float> frames) noexcept {
-  const size_t frame_count = frames.size() / settings_.channel_count;
-  const std::span<float> mixed =
-      settings_.channel_count == 1 ? frames : std::span(mixed_frames_).first(frame_count);
-  std::ranges::fill(mixed, 0.0F);
-  uint64_t active_mode_count = 0;
-  ringing_work_ = 0;
-  for (size_t section = 0; section < kSectionCount; ++section) {
-    const float* rendered = section_frames_.data() + section * frame_count;
-    for (size_t n = 0; n < frame_count; ++n) mixed[n] += rendered[n];
-    const SectionCounts& counts = section_counts_[section];
-    Count(statistics_.dropped_count, counts.dropped_count);
-    Count(statistics_.reset_bank_count, counts.reset_bank_count);
-    Count(statistics_.bounded_bank_count, counts.bounded_bank_count);
-    active_mode_count += counts.active_mode_count;
-    ringing_work_ += counts.ringing_work;
-  }
-  statistics_.active_mode_count.store(active_mode_count, std::memory_order_relaxed);
-  if (settings_.channel_count == 2) {
-    for (size_t n = 0; n < frame_count; ++n) frames[2 * n] = frames[2 * n + 1] = mixed[n];
-  }
-  for (size_t section = 0; section < kSectionCount; ++section) {
-    if (!section_counts_[section].placed) continue;
-    const float* placed = placed_frames_.data() + section * frames.size();
-    for (size_t n = 0; n < frames.size(); ++n) frames[n] += placed[n];
   }
 }
 

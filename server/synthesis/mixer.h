@@ -19,6 +19,8 @@
 #include "server/synthesis/bank/block_mix.h"
 #include "server/synthesis/bank/oscillator_bank.h"
 #include "server/synthesis/bank_slot.h"
+#include "server/synthesis/bus.h"
+#include "server/synthesis/fader.h"
 #include "server/synthesis/limiter.h"
 #include "server/synthesis/render_section.h"
 #include "server/synthesis/render_threads.h"
@@ -31,8 +33,11 @@
 
 namespace carillon {
 
-/// Number of sections that a mixer's banks are spread over.
+/// Number of sections that the banks of one bus are spread over.
 inline constexpr size_t kSectionCount = BlockMix::kStaggers;
+
+/// Most buses of a mixer, the default one included.
+inline constexpr size_t kMostBuses = 512;
 
 /// Most blocks that each section renders before the next section begins, if the caller requests
 /// several blocks at once.
@@ -45,6 +50,7 @@ struct MixerSettings {
   size_t channel_count = 1;        ///< or 2; a bank without a voice sounds equally on both
   uint64_t first_frame = 0;        ///< number of the first frame; a multiple of block_frame_count
   size_t most_banks = 8192;        ///< including those that ring out or fade
+  size_t most_buses = kMostBuses;
   size_t most_streams = 1024;
   size_t most_pending_events = 262144;   ///< events that wait for their block
   size_t most_events_per_block = 32768;  ///< taken from the streams; the rest wait there
@@ -54,6 +60,7 @@ struct MixerSettings {
   /// the events only. The clock must outlive the mixer.
   const Clock* clock = nullptr;
   double most_load = 0.7;  ///< fraction of real time that rendering may take
+  double gain = 1;         ///< of all buses together, before the limiter
   /// Threads that render the sections; null: the caller's thread alone. The sound is the same bit
   /// for bit. They must outlive the mixer.
   SectionThreads* threads = nullptr;
@@ -75,10 +82,20 @@ struct MixerStatistics {
   uint64_t active_mode_count = 0;    ///< modes that ring
 };
 
+/// What a bus sounds like now.
+struct BusState {
+  uint64_t active_mode_count = 0;  ///< modes that ring
+  float peak = 0;                  ///< the largest sample of late; it falls by 40 dB a second
+};
+
 /// Renders all sounding objects into one stream of samples.
 ///
-/// Banks are spread over kSectionCount sections, whose long blocks begin in different blocks, so
-/// that every block takes about the same work.
+///     banks --> sections --> gain of a bus --+
+///     banks --> sections --> gain of a bus --+--> gain of all --> limiter --> samples
+///
+/// Each bank belongs to a bus. The banks of a bus are spread over up to kSectionCount sections,
+/// whose long blocks begin in different blocks, so that every block takes about the same work. A
+/// bus sounds the same bit for bit whatever the other buses do, as long as no work is left out.
 ///
 /// Threads: one thread at a time calls Render; any thread may call the other functions. Render does
 /// not allocate, lock, log, throw or call the system. On one SIMD target the same events always
@@ -99,8 +116,34 @@ class Mixer {
   /// domain; without one it is heard without a position. Bank and voice must have been made for
   /// this mixer's sample rate, block and channels. RESOURCE_EXHAUSTED (TOO_MANY_OBJECTS).
   absl::StatusOr<BankId> Add(std::unique_ptr<OscillatorBank> bank,
-                             std::shared_ptr<Voice> voice = nullptr)
+                             std::shared_ptr<Voice> voice = nullptr, BusId bus = {})
       ABSL_LOCKS_EXCLUDED(kRenderRole);
+
+  /// Opens a bus. RESOURCE_EXHAUSTED (TOO_MANY_SCENES: it has most_buses).
+  absl::StatusOr<BusId> OpenBus(double gain = 1) ABSL_LOCKS_EXCLUDED(kRenderRole);
+
+  /// Gives a bus up. The caller adds no bank to it any more; its banks still sound until they are
+  /// removed.
+  void CloseBus(BusId bus) ABSL_LOCKS_EXCLUDED(kRenderRole);
+
+  /// Lets the gain of a bus, or of all, glide to a value of zero or more within 30 ms, without a
+  /// click.
+  void SetGain(BusId bus, double gain);
+  void SetGain(double gain) { master_gain_ = static_cast<float>(gain); }
+  double gain() const { return master_gain_; }
+
+  /// Fades a bus out within 30 ms, and ends all that rings in it then. Impulses that came before
+  /// the end of the fade are not heard any more; later ones sound. Sustained forces stay.
+  void Stop(BusId bus);
+
+  /// Lets `listener` hear a bus; null: nobody does. The listener must live as long as the mixer.
+  void Tap(BusId bus, BusListener* listener);
+
+  BusState State(BusId bus) const;
+
+  /// The part of the order in which a bus begins its long blocks: 0 to kSectionCount - 1. Two buses
+  /// of the same stagger render the same events to the same bits.
+  static size_t Stagger(BusId bus);
 
   /// Removes a bank once it is silent. The caller must send it no further events; events already
   /// sent still sound.
@@ -141,6 +184,7 @@ class Mixer {
     OscillatorBank* bank = nullptr;
     Voice* voice = nullptr;
     uint32_t section = 0;
+    MixedSection* opened = nullptr;  // that section, if this bank is the first that it ever has
     EventQueue* queue = nullptr;
   };
   /// A message back: Render no longer uses this bank's slot or this stream's queue.
@@ -158,6 +202,12 @@ class Mixer {
     bool leaving = false;
     bool fading = false;
   };
+  /// A bus as the controlling threads see it.
+  struct OwnedBus {
+    std::array<size_t, kSectionCount> mode_counts{};  // of each section
+    size_t bank_count = 0;
+    bool open = false;
+  };
   struct Counters {
     std::atomic<uint64_t> frame_count{0};
     std::atomic<uint64_t> accepted_count{0}, late_count{0}, dropped_count{0};
@@ -167,7 +217,9 @@ class Mixer {
   };
 
   OwnedBank* Find(BankId id) ABSL_EXCLUSIVE_LOCKS_REQUIRED(control_mutex_);
-  uint32_t ChooseSection() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(control_mutex_);
+  uint32_t ChooseSection(BusId bus) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(control_mutex_);
+  /// Makes a section if there is none of this number; null: it was made before.
+  MixedSection* MakeSection(uint32_t section) ABSL_EXCLUSIVE_LOCKS_REQUIRED(control_mutex_);
   void Send(const Command& command) ABSL_EXCLUSIVE_LOCKS_REQUIRED(control_mutex_);
 
   // Only the rendering thread calls and uses what follows.
@@ -184,14 +236,26 @@ class Mixer {
   void ShedBanks() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void DecideTreatment(std::span<const uint32_t> due) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
-  static float LoudnessOf(const SurfaceImpulse& impulse, const BankSlot& slot) noexcept
+  float LoudnessOf(const SurfaceImpulse& impulse, const BankSlot& slot) const noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  double LoudestSquared(uint32_t slot) const noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   bool IsShedEarly(const MixerEvent& event, const BankSlot& slot) const noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
-  void RenderOneSection(size_t thread, size_t section, size_t frame_count) noexcept
+  void RenderOneSection(size_t thread, MixedSection& mixed, size_t frame_count) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
-  void RenderSections(std::span<float> frames) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
-  void MixSections(std::span<float> frames) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  void RenderSections(size_t frame_count) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  void OpenSection(uint32_t section, MixedSection* opened) noexcept
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  void ListenToControl() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  void MixBuses(std::span<float> frames) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  /// Adds the sections' sound, in their order, to that of all buses.
+  void MixBus(uint32_t bus, std::span<const uint32_t> sections, size_t frame_count) noexcept
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  void CountSection(const SectionCounts& counts) noexcept
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  void ApplyGains(Bus& bus, size_t frame_count) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  void LetHear(Bus& bus, size_t frame_count) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  void EndStops() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void RetireLeavingBanks() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void SendBack(const Retired& retired) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void NotePeak(std::span<const float> block) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
@@ -200,11 +264,14 @@ class Mixer {
   const MixerSettings settings_;
   Counters statistics_;
   std::atomic<float> peak_{0};
+  std::atomic<float> master_gain_{1};
+  const std::vector<std::unique_ptr<Bus>> buses_;
 
   Mutex control_mutex_;
   std::vector<OwnedBank> owned_ ABSL_GUARDED_BY(control_mutex_);
   std::vector<uint32_t> free_slots_ ABSL_GUARDED_BY(control_mutex_);
-  std::array<size_t, kSectionCount> section_mode_counts_ ABSL_GUARDED_BY(control_mutex_){};
+  std::vector<OwnedBus> owned_buses_ ABSL_GUARDED_BY(control_mutex_);
+  std::vector<std::unique_ptr<MixedSection>> owned_sections_ ABSL_GUARDED_BY(control_mutex_);
   std::vector<std::shared_ptr<EventQueue>> queues_ ABSL_GUARDED_BY(control_mutex_);
   SpscQueue<Command> commands_;  // produced under control_mutex_
   SpscQueue<Retired> retired_;   // consumed under control_mutex_
@@ -223,8 +290,6 @@ class Mixer {
   FixedVector<uint32_t> due_ ABSL_GUARDED_BY(kRenderRole);
   FixedVector<RenderOrder> due_order_ ABSL_GUARDED_BY(kRenderRole);
   FixedVector<DueEvent> due_events_ ABSL_GUARDED_BY(kRenderRole);
-  // End of each section's events in due_events_.
-  std::array<size_t, kSectionCount + 1> due_ends_ ABSL_GUARDED_BY(kRenderRole){};
   LoudnessTriage triage_ ABSL_GUARDED_BY(kRenderRole);
   WorkBudget budget_ ABSL_GUARDED_BY(kRenderRole);
   // Quieter impulses are shed on arrival; zero: none is.
@@ -235,12 +300,18 @@ class Mixer {
   double ringing_work_ ABSL_GUARDED_BY(kRenderRole) = 0;
   // Work of the blocks rendered together.
   double rendered_work_ ABSL_GUARDED_BY(kRenderRole) = 0;
-  std::vector<RenderSection> sections_ ABSL_GUARDED_BY(kRenderRole);
-  std::array<SectionCounts, kSectionCount> section_counts_ ABSL_GUARDED_BY(kRenderRole){};
-  std::vector<float> section_frames_ ABSL_GUARDED_BY(kRenderRole);
-  std::vector<float> placed_frames_ ABSL_GUARDED_BY(kRenderRole);
+  std::vector<MixedSection*> sections_ ABSL_GUARDED_BY(kRenderRole);  // null: not made yet
+  // Numbers of the sections that were made, ascending: the sections of a bus are neighbours.
+  FixedVector<uint32_t> open_sections_ ABSL_GUARDED_BY(kRenderRole);
+  uint64_t active_mode_count_ ABSL_GUARDED_BY(kRenderRole) = 0;
+  // Of the blocks rendered together: a bus's gains and sound, and the sound of all buses.
+  std::vector<float> gains_ ABSL_GUARDED_BY(kRenderRole);
+  std::vector<float> bus_frames_ ABSL_GUARDED_BY(kRenderRole);            // mono
+  std::vector<float> bus_placed_ ABSL_GUARDED_BY(kRenderRole);            // interleaved
   std::vector<float> mixed_frames_ ABSL_GUARDED_BY(kRenderRole);          // mono
+  std::vector<float> mixed_placed_ ABSL_GUARDED_BY(kRenderRole);          // interleaved
   std::vector<RenderWorkspace> workspaces_ ABSL_GUARDED_BY(kRenderRole);  // one for each thread
+  Fader master_ ABSL_GUARDED_BY(kRenderRole);
   Limiter limiter_ ABSL_GUARDED_BY(kRenderRole);
 };
 

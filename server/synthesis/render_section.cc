@@ -50,13 +50,14 @@ RenderSection::RenderSection(const Settings& settings, std::span<BankSlot> slots
 SectionCounts RenderSection::Render(uint64_t block_number, std::span<const DueEvent> events,
                                     const Output& output, RenderWorkspace& workspace) noexcept {
   SectionCounts counts;
+  counts.sounded = !idle() || !events.empty();
+  if (!counts.sounded) return counts;
   const size_t placed_count = settings_.block_frame_count * settings_.channel_count;
   std::span<float> frames = output.frames;
   for (uint32_t i = 0; !frames.empty(); ++i) {
     const std::span<float> block = frames.first(settings_.block_frame_count);
     frames = frames.subspan(block.size());
-    if (sounding_.empty() && voices_.empty() && mix_.idle() &&
-        (events.empty() || events.front().block > i)) {
+    if (idle() && (events.empty() || events.front().block > i)) {
       std::ranges::fill(block, 0.0F);
       continue;
     }
@@ -99,6 +100,12 @@ void RenderSection::Execute(std::span<const DueEvent> events, SectionCounts& cou
     if (!same_bank && slot.sounding) RenderBank(slot, counts);
     if (!same_bank) mix_.Reunite();
   }
+}
+
+void RenderSection::Silence() noexcept {
+  mix_.Silence();
+  for (const uint32_t index : sounding_) slots_[index].bank->Hush();
+  for (Voice* voice : voices_) voice->Silence();
 }
 
 bool RenderSection::Apply(BankSlot& slot, std::span<const DueEvent> due) noexcept {

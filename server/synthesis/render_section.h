@@ -21,6 +21,7 @@ struct SectionCounts {
   uint64_t bounded_bank_count = 0;  ///< banks lowered because a mode was beyond all bounds
   uint64_t active_mode_count = 0;   ///< at the end
   double ringing_work = 0;          ///< units of work of the next block without events
+  bool sounded = false;             ///< anything was rendered: without it, the frames are unwritten
   bool placed = false;              ///< a voice was rendered
 };
 
@@ -49,12 +50,17 @@ class RenderSection {
   };
 
   /// Renders as many blocks as `output` holds, from `block_number` on. `events` are those of this
-  /// section, in RenderOrder. `output.placed` is written only if the returned counts say `placed`.
+  /// section, in RenderOrder. `output.frames` is written only if the returned counts say `sounded`,
+  /// `output.placed` only if they say `placed`.
   SectionCounts Render(uint64_t block_number, std::span<const DueEvent> events,
                        const Output& output, RenderWorkspace& workspace) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
+  /// Ends all sound at once, that which is still on its way to the listener included.
+  void Silence() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+
  private:
+  bool idle() const noexcept { return sounding_.empty() && voices_.empty() && mix_.idle(); }
   void Execute(std::span<const DueEvent> events, SectionCounts& counts) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   bool Apply(BankSlot& slot, std::span<const DueEvent> due) noexcept

@@ -44,6 +44,10 @@ bool BlockMix::idle() const noexcept {
   return std::ranges::none_of(rendered_, &Rendered::sounding);
 }
 
+void BlockMix::Silence() noexcept {
+  for (Rendered& rendered : rendered_) rendered.sounding = false;
+}
+
 void BlockMix::SetApart(size_t block_frame_count) noexcept {
   if (!apart_) workspace_->lanes_apart.Clear(block_frame_count);
   if (!apart_) fades_ = false;

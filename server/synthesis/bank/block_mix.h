@@ -39,6 +39,9 @@ class BlockMix {
   /// Writes the block.
   void Finish(std::span<float> block) noexcept;
 
+  /// Ends the long blocks that are being played. Called between Finish and Begin.
+  void Silence() noexcept;
+
   /// Number of the block.
   uint64_t block_number() const noexcept { return block_number_; }
 

@@ -127,9 +127,13 @@ void OscillatorBank::MoveToTime(size_t kind) noexcept {
 }
 
 void OscillatorBank::Silence() noexcept {
+  SilenceLanes();
+  force_.Silence();
+}
+
+void OscillatorBank::SilenceLanes() noexcept {
   awake_changed_ = true;
   lanes_.Silence({0, lane_count_});
-  force_.Silence();
   for (RingingSegment& segment : segments_) segment.awake_count = 0;
   for (LongSegment& segment : long_segments_) {
     std::fill_n(segment.lanes.re.data(), segment.lanes.awake.size() * kMostLanes, 0.0);

@@ -160,6 +160,10 @@ class OscillatorBank {
   /// Silences the bank. Its part of a current long block sounds until that long block ends.
   void Shed() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole) { Silence(); }
 
+  /// Ends all that rings, between two blocks of a mix whose long blocks end, too. Sustained forces
+  /// stay as they are, so that a load that rests does not sound anew.
+  void Hush() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole) { SilenceLanes(); }
+
   /// Columns of the shape table that impulses are projected onto, from the first mode's column on.
   size_t column_count() const noexcept { return column_count_; }
 
@@ -249,6 +253,7 @@ class OscillatorBank {
   using Counts = std::array<size_t, kMostSegments>;
   Counts AwakeCounts() const noexcept;
   void Silence() noexcept;
+  void SilenceLanes() noexcept;
   void CountAwake() noexcept;
 
   ShapeTable shapes_;

@@ -20,10 +20,11 @@ PendingEvents::PendingEvents(size_t capacity, size_t block_frame_count)
   assert(capacity < kNone);
 }
 
-bool PendingEvents::TryPush(const MixerEvent& event) noexcept {
+bool PendingEvents::TryPush(const MixerEvent& event, uint32_t tag) noexcept {
   const uint32_t index = TakeEntry();
   if (index == kNone) return false;
   entries_[index].event = event;
+  entries_[index].tag = tag;
   Append(lists_[event.FirstSample() / block_frame_count_ % kListCount], index);
   return true;
 }

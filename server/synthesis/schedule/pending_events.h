@@ -20,7 +20,8 @@ class PendingEvents {
   PendingEvents(size_t capacity, size_t block_frame_count);
 
   /// False: full. The event's first sample does not lie before the block that was collected last.
-  bool TryPush(const MixerEvent& event) noexcept;
+  /// `tag` is any number that the caller wants to find again.
+  bool TryPush(const MixerEvent& event, uint32_t tag = 0) noexcept;
 
   /// Appends the indices of the events of the block that begins at `block_start`, in order of
   /// arrival. Blocks are collected in ascending order. Collected events stay readable until Free.
@@ -30,12 +31,14 @@ class PendingEvents {
   void Free(std::span<const uint32_t> indices) noexcept;
 
   const MixerEvent& operator[](uint32_t index) const noexcept { return entries_[index].event; }
+  uint32_t tag(uint32_t index) const noexcept { return entries_[index].tag; }
 
  private:
   static constexpr uint32_t kNone = UINT32_MAX;
   struct Entry {
     MixerEvent event;
     uint32_t next = kNone;
+    uint32_t tag = 0;
   };
   /// A linked list of entries, in order of arrival.
   struct List {

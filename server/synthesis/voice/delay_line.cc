@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/synthesis/voice/delay_line.h"
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
@@ -66,8 +67,18 @@ float DelayLine::Read(double delay) const noexcept {
   const auto part = static_cast<float>(phase - static_cast<double>(row));
   const float* below = phases_ + row * kTaps;
   const float* above = below + kTaps;
-  const size_t first = (written_ - static_cast<size_t>(whole) - (kTaps / 2 - 1)) & mask_;
-  const float* samples = samples_.data() + first;
+  // Below zero before the line was full once.
+  const auto begin =
+      static_cast<ptrdiff_t>(written_ - static_cast<size_t>(whole) - (kTaps / 2 - 1));
+  const auto silent = static_cast<size_t>(std::clamp<ptrdiff_t>(
+      static_cast<ptrdiff_t>(silent_count_) - begin, 0, static_cast<ptrdiff_t>(kTaps)));
+  const float* samples = samples_.data() + (static_cast<size_t>(begin) & mask_);
+  std::array<float, kTaps> heard;
+  if (silent > 0) {
+    std::fill_n(heard.begin(), silent, 0.0F);
+    std::copy(samples + silent, samples + kTaps, heard.data() + silent);
+    samples = heard.data();
+  }
   std::array<float, 4> sum{};
   for (size_t tap = 0; tap < kTaps; tap += 4) {
     for (size_t i = 0; i < 4; ++i) {

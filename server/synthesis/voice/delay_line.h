@@ -22,6 +22,9 @@ class DelayLine {
 
   void Write(std::span<const float> samples) noexcept;
 
+  /// Makes all samples zero that were written so far, without touching them.
+  void Silence() noexcept { silent_count_ = written_; }
+
   /// The signal `delay` samples before the sample that is written next.
   float Read(double delay) const noexcept;
 
@@ -33,6 +36,7 @@ class DelayLine {
   std::vector<float> samples_;  // a ring buffer; the first kTaps samples are repeated at its end
   const float* phases_;         // rows of kTaps coefficients
   size_t written_ = 0;
+  size_t silent_count_ = 0;  // of the samples written first, those that count as zero
 };
 
 }  // namespace carillon

@@ -155,6 +155,12 @@ void Voice::Render(std::span<float> frames) noexcept {
   fed_ = false;
 }
 
+void Voice::Silence() noexcept {
+  std::ranges::fill(input_, 0.0F);
+  fed_ = false;
+  if (line_) line_->Silence();
+}
+
 float Voice::Sample(double delay_frames, size_t n) const noexcept {
   return line_ ? line_->Read(delay_frames + static_cast<double>(input_.size() - n)) : input_[n];
 }

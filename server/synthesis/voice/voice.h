@@ -81,6 +81,9 @@ class Voice {
   /// Adds the block to `frames`, interleaved, and begins the next block.
   void Render(std::span<float> frames) noexcept;
 
+  /// Ends the sound that is on its way to the listener, between two blocks.
+  void Silence() noexcept;
+
   /// Whether the voice is silent and nothing moves, so that Render need not be called until the
   /// object moves or sounds.
   bool asleep() const noexcept { return asleep_; }

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "server/synthesis/fader.h"
+#include "server/synthesis/render_section.h"
+
+namespace carillon {
+
+/// Names a bus of a mixer: banks that share a gain. The default one is always there.
+struct BusId {
+  uint32_t index = 0;
+  friend bool operator==(const BusId&, const BusId&) = default;
+};
+
+/// Hears the sound of one bus.
+class BusListener {
+ public:
+  virtual ~BusListener() = default;
+
+  /// Takes a block of the bus, after its gain, interleaved. The rendering thread calls it: it must
+  /// not allocate, lock, log, throw or call the system.
+  virtual void Hear(uint64_t first_frame, std::span<const float> block) noexcept = 0;
+};
+
+/// One section of a bus with the sound that it has rendered last.
+struct MixedSection {
+  MixedSection(const RenderSection::Settings& settings, std::span<BankSlot> slots,
+               size_t most_frames)
+      : section(settings, slots),
+        frames(most_frames),
+        placed(most_frames * settings.channel_count) {}
+
+  RenderSection section;
+  std::vector<float> frames;  // banks without a voice, mono
+  std::vector<float> placed;  // voices, interleaved
+  std::span<const DueEvent> due{};
+  SectionCounts counts;
+};
+
+/// A bus as the rendering thread sees it, with what the controlling threads tell it.
+struct Bus {
+  explicit Bus(double sample_rate_hz) : fader(sample_rate_hz), stop(sample_rate_hz) {}
+
+  // Controlling threads write these.
+  std::atomic<float> gain{1};
+  std::atomic<bool> jumps{false};  ///< to the gain, without a glide
+  std::atomic<uint32_t> stops_asked{0};
+  std::atomic<BusListener*> listener{nullptr};
+
+  // The rendering thread writes these.
+  std::atomic<uint64_t> active_mode_count{0};
+  std::atomic<float> peak{0};
+
+  // Only the rendering thread uses what follows.
+  Fader fader;
+  /// Falls to zero when the bus is to be silenced, and is one again when it is silent.
+  Fader stop;
+  /// Events that came before the last stop are not rendered.
+  uint32_t stop_count = 0;
+
+  /// Takes what the controlling threads told.
+  void Listen() noexcept {
+    const float target = gain.load(std::memory_order_relaxed);
+    if (jumps.exchange(false, std::memory_order_acquire)) fader.JumpTo(target);
+    fader.GlideTo(target);
+    const uint32_t asked = stops_asked.load(std::memory_order_acquire);
+    if (asked == stop_count) return;
+    stop_count = asked;
+    stop.GlideTo(0);
+  }
+};
+
+}  // namespace carillon

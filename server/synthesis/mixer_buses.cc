@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: Apache-2.0
+// The buses of the mixer as the rendering thread mixes them: nothing here allocates, locks, logs,
+// throws or calls the system.
+#include <algorithm>
+#include <cmath>
+
+#include "server/synthesis/mixer.h"
+
+namespace carillon {
+namespace {
+
+void AddTo(std::span<const float> more, std::span<float> sum) noexcept {
+  for (size_t n = 0; n < sum.size(); ++n) sum[n] += more[n];
+}
+
+/// Multiplies each frame, which has `channels` samples, by its gain.
+void Multiply(std::span<const float> gains, size_t channels, std::span<float> frames) noexcept {
+  for (size_t n = 0; n < frames.size(); ++n) frames[n] *= gains[n / channels];
+}
+
+/// Writes frames that have the same sample in each channel.
+void Spread(std::span<const float> mono, size_t channels, std::span<float> frames) noexcept {
+  for (size_t n = 0; n < frames.size(); ++n) frames[n] = mono[n / channels];
+}
+
+float Largest(std::span<const float> samples) noexcept {
+  float largest = 0;
+  for (const float sample : samples) largest = std::max(largest, std::abs(sample));
+  return largest;
+}
+
+/// The time in which a shown peak falls by a factor of e: 40 dB in a second.
+constexpr double kPeakFallS = 0.217;
+
+}  // namespace
+
+void Mixer::OpenSection(uint32_t section, MixedSection* opened) noexcept {
+  sections_[section] = opened;
+  // Nothing rings on the bus yet that an earlier stop could mean.
+  Bus& bus = *buses_[section / kSectionCount];
+  const bool is_first = std::ranges::none_of(open_sections_, [section](uint32_t other) {
+    return other / kSectionCount == section / kSectionCount;
+  });
+  if (is_first) bus.stop_count = bus.stops_asked.load(std::memory_order_relaxed);
+  open_sections_.push_back(section);
+  std::ranges::sort(open_sections_);
+}
+
+void Mixer::ListenToControl() noexcept {
+  master_.GlideTo(master_gain_.load(std::memory_order_relaxed));
+  const Bus* last = nullptr;
+  for (const uint32_t section : open_sections_) {
+    Bus& bus = *buses_[section / kSectionCount];
+    if (&bus != last) bus.Listen();
+    last = &bus;
+  }
+}
+
+void Mixer::MixBuses(std::span<float> frames) noexcept {
+  const size_t channels = settings_.channel_count;
+  const size_t frame_count = frames.size() / channels;
+  std::ranges::fill(std::span(mixed_frames_).first(frame_count), 0.0F);
+  std::ranges::fill(std::span(mixed_placed_).first(frames.size()), 0.0F);
+  active_mode_count_ = 0;
+  ringing_work_ = 0;
+  for (auto first = open_sections_.begin(); first != open_sections_.end();) {
+    const auto bus = static_cast<uint32_t>(*first / kSectionCount);
+    const auto last = std::find_if(first, open_sections_.end(), [bus](uint32_t section) {
+      return section / kSectionCount != bus;
+    });
+    MixBus(bus, {first, last}, frame_count);
+    first = last;
+  }
+  statistics_.active_mode_count.store(active_mode_count_, std::memory_order_relaxed);
+  Spread(mixed_frames_, channels, frames);
+  AddTo(mixed_placed_, frames);
+  if (master_.neutral()) return;
+  const std::span<float> gains = std::span(gains_).first(frame_count);
+  std::ranges::fill(gains, 1.0F);
+  master_.Multiply(gains);
+  Multiply(gains, channels, frames);
+}
+
+void Mixer::MixBus(uint32_t index, std::span<const uint32_t> sections,
+                   size_t frame_count) noexcept {
+  Bus& bus = *buses_[index];
+  const std::span<float> frames = std::span(bus_frames_).first(frame_count);
+  const std::span<float> placed =
+      std::span(bus_placed_).first(frame_count * settings_.channel_count);
+  std::ranges::fill(frames, 0.0F);
+  std::ranges::fill(placed, 0.0F);
+  bool sounded = false;
+  uint64_t active_mode_count = 0;
+  for (const uint32_t number : sections) {
+    const MixedSection& section = *sections_[number];
+    CountSection(section.counts);
+    active_mode_count += section.counts.active_mode_count;
+    sounded |= section.counts.sounded;
+    if (section.counts.sounded) AddTo(section.frames, frames);
+    if (section.counts.placed) AddTo(section.placed, placed);
+  }
+  active_mode_count_ += active_mode_count;
+  bus.active_mode_count.store(active_mode_count, std::memory_order_relaxed);
+  ApplyGains(bus, frame_count);
+  LetHear(bus, frame_count);
+  const double seconds = static_cast<double>(frame_count) / settings_.sample_rate_hz;
+  const float fallen = bus.peak.load(std::memory_order_relaxed) *
+                       static_cast<float>(std::exp(-seconds / kPeakFallS));
+  bus.peak.store(std::max({fallen, Largest(frames), Largest(placed)}), std::memory_order_relaxed);
+  if (!sounded) return;
+  AddTo(frames, std::span(mixed_frames_).first(frames.size()));
+  AddTo(placed, std::span(mixed_placed_).first(placed.size()));
+}
+
+void Mixer::CountSection(const SectionCounts& counts) noexcept {
+  const auto count = [](std::atomic<uint64_t>& counter, uint64_t more) {
+    counter.store(counter.load(std::memory_order_relaxed) + more, std::memory_order_relaxed);
+  };
+  count(statistics_.dropped_count, counts.dropped_count);
+  count(statistics_.reset_bank_count, counts.reset_bank_count);
+  count(statistics_.bounded_bank_count, counts.bounded_bank_count);
+  ringing_work_ += counts.ringing_work;
+}
+
+void Mixer::ApplyGains(Bus& bus, size_t frame_count) noexcept {
+  if (bus.fader.neutral() && bus.stop.neutral()) return;
+  const std::span<float> gains = std::span(gains_).first(frame_count);
+  std::ranges::fill(gains, 1.0F);
+  bus.fader.Multiply(gains);
+  bus.stop.Multiply(gains);
+  const size_t channels = settings_.channel_count;
+  Multiply(gains, 1, std::span(bus_frames_).first(frame_count));
+  Multiply(gains, channels, std::span(bus_placed_).first(frame_count * channels));
+}
+
+void Mixer::LetHear(Bus& bus, size_t frame_count) noexcept {
+  BusListener* const listener = bus.listener.load(std::memory_order_acquire);
+  if (listener == nullptr) return;
+  const size_t channels = settings_.channel_count;
+  const size_t block = settings_.block_frame_count;
+  std::array<float, 2 * kMostBlockFrames> heard;
+  const std::span<float> frames = std::span(heard).first(block * channels);
+  for (size_t first = 0; first < frame_count; first += block) {
+    Spread(std::span(bus_frames_).subspan(first), channels, frames);
+    AddTo(std::span(bus_placed_).subspan(first * channels), frames);
+    listener->Hear(block_start_ + first, frames);
+  }
+}
+
+/// Silences the buses that have faded out, and gives them their gain back.
+void Mixer::EndStops() noexcept {
+  for (const uint32_t section : open_sections_) {
+    Bus& bus = *buses_[section / kSectionCount];
+    if (bus.stop.target() == 0 && bus.stop.resting()) sections_[section]->section.Silence();
+  }
+  for (const uint32_t section : open_sections_) {
+    Bus& bus = *buses_[section / kSectionCount];
+    if (bus.stop.target() == 0 && bus.stop.resting()) bus.stop.JumpTo(1);
+  }
+}
+
+}  // namespace carillon
