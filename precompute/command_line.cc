@@ -69,7 +69,8 @@ void SetSize(double size, v1::WorkerRequest& request) {
 void AddUseOptions(CLI::App& app, Options& options, v1::WorkerRequest& request) {
   app.add_option(
          "--format", options.format,
-         "obj, ply, stl, off, msh (Gmsh), mesh (Medit) or node (TetGen; default: by the suffix)")
+         "obj, ply, stl, off, glb, gltf, msh (Gmsh), mesh (Medit), node (TetGen) or inp (Abaqus, "
+         "CalculiX; default: by the suffix)")
       ->group(kUseGroup);
   app.add_option_function<double>(
          "--size", [&](double size) { SetSize(size, request); },
@@ -130,7 +131,7 @@ void AddRequestFile(CLI::App& app, Options& options) {
 void AddOptions(CLI::App& app, Options& options, CommandLine& result) {
   app.add_option(
          "IN", result.input,
-         "Mesh file: a closed surface, or tetrahedra (msh, mesh, node with the ele beside it); "
+         "Mesh file: a closed surface, or tetrahedra (msh, mesh, inp, node with the ele beside it); "
          "with --radiate a stored modal model")
       ->required();
   app.add_option("--out", result.output,

@@ -14,6 +14,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "precompute/fem/assembly.h"
+#include "precompute/fem/curved_element.h"
 #include "precompute/fem/matrix_market.h"
 #include "precompute/mesh/boundary.h"
 #include "precompute/mesh/fill/element_size.h"
@@ -65,6 +66,7 @@ absl::StatusOr<Body> TakeTetrahedra(TetMesh mesh, const MeshNames& names,
         "the mesh has tetrahedra of ten nodes, which linear elements have no use for; ask "
         "for quadratic elements, or give a mesh of four-node tetrahedra");
   }
+  RETURN_IF_ERROR(CheckCurvedElements(mesh));
   SurfaceMesh given = BoundarySurface(mesh);
   if (mesh.nodes_per_element < nodes_per_element) AddMidsideNodes(mesh);
   RETURN_IF_ERROR(FixNodes(FixturesOf(request), given, names, mesh));

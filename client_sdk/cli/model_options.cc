@@ -40,11 +40,13 @@ void AddModelCreate(CLI::App& app, Program& program) {
   auto band = std::make_shared<std::string>("20:20000");
   CLI::App& create = *app.add_subcommand("create", "Compute the modal model of a mesh file");
   create
-      .add_option("file", options->files,
-                  "surfaces (OBJ, PLY, STL, OFF) or tetrahedra (Gmsh MSH, Medit, TetGen)")
+      .add_option(
+          "file", options->files,
+          "surfaces (OBJ, PLY, STL, OFF, glTF) or tetrahedra (Gmsh MSH, Medit, TetGen, Abaqus or "
+          "CalculiX INP)")
       ->required();
   create.add_option("--format", options->format,
-                    "obj, ply, stl, off, msh, mesh or node [the file's suffix]");
+                    "obj, ply, stl, off, glb, gltf, msh, mesh, node or inp [the file's suffix]");
   create.add_option("--label", options->label, "name for people of a single file [its name]");
   create.add_option("--size", options->size,
                     "size it is meant to sound with, relative to the file");

@@ -6,7 +6,9 @@
 #include <span>
 #include <vector>
 
+#include "precompute/fem/curved_element.h"
 #include "precompute/fem/held_nodes.h"
+#include "precompute/mesh/curved_edges.h"
 
 namespace carillon::precompute {
 namespace {
@@ -181,8 +183,14 @@ SystemMatrices Assemble(const TetMesh& mesh, const ElasticConstants& elastic,
                         .M = MakeDiagonalBlockPattern(graph, sharing == MassSharing::kLumped)};
   const LameConstants lame = ToLame(elastic);
   for (size_t e = 0; e < mesh.element_count(); ++e) {
-    const TetGeometry geometry = GeometryOf(mesh, e);
     const std::span<const int32_t> nodes = ElementNodes(mesh, e);
+    if (IsCurved(mesh, e)) {
+      const TenNodes places = NodesOf(mesh, e);
+      AddElement(graph, nodes, MakeCurvedStiffness(places, lame),
+                 MakeCurvedMass(places, density_kg_per_m3, sharing), system);
+      continue;
+    }
+    const TetGeometry geometry = GeometryOf(mesh, e);
     if (mesh.nodes_per_element == 4) {
       AddElement(graph, nodes, MakeLinearStiffness(geometry, lame),
                  MakeLinearMass(geometry.volume_m3, density_kg_per_m3, sharing), system);
@@ -197,7 +205,9 @@ SystemMatrices Assemble(const TetMesh& mesh, const ElasticConstants& elastic,
 
 double VolumeM3(const TetMesh& mesh) {
   double volume = 0;
-  for (size_t e = 0; e < mesh.element_count(); ++e) volume += GeometryOf(mesh, e).volume_m3;
+  for (size_t e = 0; e < mesh.element_count(); ++e) {
+    volume += IsCurved(mesh, e) ? CurvedVolumeM3(NodesOf(mesh, e)) : GeometryOf(mesh, e).volume_m3;
+  }
   return volume;
 }
 

@@ -23,8 +23,9 @@ struct SystemMatrices {
   Eigen::Index unknown_count() const { return K.rows(); }
 };
 
-/// Assembles the matrices of a body from elements of 4 or 10 nodes. Fixed nodes have no unknowns.
-/// Every element must have positive volume.
+/// Assembles the matrices of a body from elements of 4 or 10 nodes; those with curved edges are
+/// isoparametric. Fixed nodes have no unknowns. Every element must have positive volume, and pass
+/// CheckCurvedElements.
 SystemMatrices Assemble(const TetMesh& mesh, const ElasticConstants& elastic,
                         double density_kg_per_m3, MassSharing sharing);
 

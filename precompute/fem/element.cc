@@ -17,25 +17,6 @@ constexpr std::array<std::pair<int, int>, 6> kEdges = {
 constexpr double kNear = 0.58541019662496845446;
 constexpr double kFar = 0.13819660112501051518;
 
-/// The block of two nodes whose gradients' outer product, integrated, is `c` (c_ab = g_ia g_jb).
-Eigen::Matrix3d StiffnessBlock(const Eigen::Matrix3d& c, const LameConstants& lame) {
-  Eigen::Matrix3d block = lame.lambda_pa * c + lame.mu_pa * c.transpose();
-  block.diagonal().array() += lame.mu_pa * c.trace();
-  return block;
-}
-
-/// Gradients of the ten shape functions at a point: corners L(2L - 1), mid-sides 4 L_i L_j.
-Eigen::Matrix<double, 10, 3> QuadraticGradients(const Eigen::Matrix<double, 4, 3>& g,
-                                                const Eigen::Vector4d& barycentric) {
-  Eigen::Matrix<double, 10, 3> gradients;
-  for (int i = 0; i < 4; ++i) gradients.row(i) = (4 * barycentric[i] - 1) * g.row(i);
-  for (int e = 0; e < 6; ++e) {
-    const auto [i, j] = kEdges[static_cast<size_t>(e)];
-    gradients.row(4 + e) = 4 * (barycentric[i] * g.row(j) + barycentric[j] * g.row(i));
-  }
-  return gradients;
-}
-
 /// The integral of N_i N_j over a tetrahedron of volume 420.
 int QuadraticMassNumerator(int i, int j) {
   if (i < 4 && j < 4) return i == j ? 6 : 1;
@@ -59,6 +40,33 @@ QuadraticMass MakeUnitQuadraticMass() {
 }
 
 }  // namespace
+
+Eigen::Matrix3d StiffnessBlock(const Eigen::Matrix3d& c, const LameConstants& lame) {
+  Eigen::Matrix3d block = lame.lambda_pa * c + lame.mu_pa * c.transpose();
+  block.diagonal().array() += lame.mu_pa * c.trace();
+  return block;
+}
+
+Eigen::Matrix<double, 10, 1> QuadraticValues(const Eigen::Vector4d& barycentric) {
+  Eigen::Matrix<double, 10, 1> values;
+  values.head<4>() = barycentric.array() * (2 * barycentric.array() - 1);
+  for (int e = 0; e < 6; ++e) {
+    const auto [i, j] = kEdges[static_cast<size_t>(e)];
+    values[4 + e] = 4 * barycentric[i] * barycentric[j];
+  }
+  return values;
+}
+
+Eigen::Matrix<double, 10, 3> QuadraticGradients(const Eigen::Matrix<double, 4, 3>& g,
+                                                const Eigen::Vector4d& barycentric) {
+  Eigen::Matrix<double, 10, 3> gradients;
+  for (int i = 0; i < 4; ++i) gradients.row(i) = (4 * barycentric[i] - 1) * g.row(i);
+  for (int e = 0; e < 6; ++e) {
+    const auto [i, j] = kEdges[static_cast<size_t>(e)];
+    gradients.row(4 + e) = 4 * (barycentric[i] * g.row(j) + barycentric[j] * g.row(i));
+  }
+  return gradients;
+}
 
 TetGeometry MakeTetGeometry(const Eigen::Matrix<double, 3, 4>& corners) {
   Eigen::Matrix3d edges;

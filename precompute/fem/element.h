@@ -26,6 +26,17 @@ using LinearMass = Eigen::Matrix<double, 4, 4>;
 using QuadraticStiffness = Eigen::Matrix<double, 30, 30>;
 using QuadraticMass = Eigen::Matrix<double, 10, 10>;
 
+/// The block of two nodes whose gradients' outer product, integrated, is `c` (c_ab = g_ia g_jb).
+Eigen::Matrix3d StiffnessBlock(const Eigen::Matrix3d& c, const LameConstants& lame);
+
+/// The ten shape functions of the quadratic tetrahedron at a point: corners L(2L - 1), mid-sides
+/// 4 L_i L_j.
+Eigen::Matrix<double, 10, 1> QuadraticValues(const Eigen::Vector4d& barycentric);
+
+/// Their gradients (rows), from those of the barycentric coordinates (rows of `g`).
+Eigen::Matrix<double, 10, 3> QuadraticGradients(const Eigen::Matrix<double, 4, 3>& g,
+                                                const Eigen::Vector4d& barycentric);
+
 /// Stiffness of the four-node tetrahedron, N/m; unknown 3 i + a is component a of node i.
 ///
 ///     k[ij]ab = vol (lambda beta_ia beta_jb + mu beta_ib beta_ja + mu delta_ab beta_i . beta_j)

@@ -2,11 +2,14 @@
 #include "precompute/modes/coupling.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
 #include <utility>
 #include <vector>
+
+#include "precompute/mesh/curved_edges.h"
 
 namespace carillon::precompute {
 namespace {
@@ -18,9 +21,64 @@ struct Facet {
   std::array<Eigen::Index, 3> row;  ///< of the shapes, of its corners' first components
 };
 
+/// A triangle of a curved face. The product of the face's two tangents changes along it; `normal`
+/// has it at each corner, and the area is that in the face's own coordinates.
+struct CurvedFacet {
+  std::array<Eigen::Vector3d, 3> normal;
+  std::array<Eigen::Index, 3> row;
+};
+
+/// Area of a quarter of the triangle (0, 0), (1, 0), (0, 1).
+constexpr double kQuarterArea = 0.125;
+
+/// For each triangle, the face of the boundary that it is a part of.
+const BoundaryFace& FaceOf(const TetMesh& mesh, const SoundingSurface& surface, size_t triangle) {
+  return mesh.boundary[triangle * mesh.boundary.size() / surface.triangles.size()];
+}
+
+/// The product of the tangents of a six-node face at its node `at`: the derivatives of its shape
+/// functions by two of the three barycentric coordinates, the third one giving way.
+Eigen::Vector3d NormalAt(const TetMesh& mesh, const BoundaryFace& face, size_t at) {
+  Eigen::Vector3d barycentric = Eigen::Vector3d::Zero();
+  for (const size_t corner : {at % 3, at < 3 ? at : (at + 1) % 3}) {
+    barycentric[static_cast<Eigen::Index>(corner)] = at < 3 ? 1 : 0.5;
+  }
+  Eigen::Matrix3d derivatives = Eigen::Matrix3d::Zero();  // by each barycentric coordinate
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    const Eigen::Index j = (i + 1) % 3;
+    const auto place = [&](Eigen::Index n) {
+      return Eigen::Vector3d::Map(
+          mesh.nodes[static_cast<size_t>(face.nodes[static_cast<size_t>(n)])].data());
+    };
+    derivatives.col(i) += (4 * barycentric[i] - 1) * place(i) + 4 * barycentric[j] * place(3 + i);
+    derivatives.col(j) += 4 * barycentric[i] * place(3 + i);
+  }
+  const Eigen::Vector3d along = derivatives.col(1) - derivatives.col(0);
+  return along.cross(derivatives.col(2) - derivatives.col(0));
+}
+
+std::vector<CurvedFacet> CurvedFacets(const TetMesh& mesh, const SoundingSurface& surface) {
+  std::vector<CurvedFacet> facets;
+  for (size_t t = 0; t < surface.triangles.size(); ++t) {
+    const BoundaryFace& face = FaceOf(mesh, surface, t);
+    if (!IsCurved(mesh, face)) continue;
+    CurvedFacet& facet = facets.emplace_back();
+    for (size_t i = 0; i < 3; ++i) {
+      const int32_t node = surface.nodes[static_cast<size_t>(surface.triangles[t][i])];
+      facet.row[i] = 3 * Eigen::Index{node};
+      const auto at = static_cast<size_t>(std::ranges::find(face.nodes, node) - face.nodes.begin());
+      facet.normal[i] = NormalAt(mesh, face, at);
+    }
+  }
+  return facets;
+}
+
+/// Those of the straight faces.
 std::vector<Facet> Facets(const TetMesh& mesh, const SoundingSurface& surface) {
   std::vector<Facet> facets;
-  for (const auto& triangle : surface.triangles) {
+  for (size_t t = 0; t < surface.triangles.size(); ++t) {
+    if (IsCurved(mesh, FaceOf(mesh, surface, t))) continue;
+    const auto& triangle = surface.triangles[t];
     std::array<Eigen::Index, 3> row{};
     std::array<Eigen::Vector3d, 3> at;
     for (size_t i = 0; i < 3; ++i) {
@@ -51,6 +109,7 @@ double IntegralOfAbsolute(double area, double f0, double f1, double f2) {
 
 Eigen::VectorXd Couplings(const TetMesh& mesh, const SoundingSurface& surface, const Modes& modes) {
   const std::vector<Facet> facets = Facets(mesh, surface);
+  const std::vector<CurvedFacet> curved = CurvedFacets(mesh, surface);
   Eigen::VectorXd integrals = Eigen::VectorXd::Zero(modes.eigenvalues.size());
   // The outer loop is over modes, because the shape of a mode is contiguous in memory.
   for (Eigen::Index m = 0; m < integrals.size(); ++m) {
@@ -61,6 +120,13 @@ Eigen::VectorXd Couplings(const TetMesh& mesh, const SoundingSurface& surface, c
       };
       integrals[m] +=
           IntegralOfAbsolute(facet.area, along_normal(0), along_normal(1), along_normal(2));
+    }
+    for (const CurvedFacet& facet : curved) {
+      const auto along_normal = [&](size_t corner) {
+        return facet.normal[corner].dot(shape.segment<3>(facet.row[corner]));
+      };
+      integrals[m] +=
+          IntegralOfAbsolute(kQuarterArea, along_normal(0), along_normal(1), along_normal(2));
     }
   }
   return integrals.cwiseProduct(modes.eigenvalues.cwiseMax(0).cwiseSqrt());

@@ -8,7 +8,11 @@
 #include <vector>
 
 #include "absl/container/flat_hash_map.h"
+#include "precompute/fem/curved_element.h"
 #include "precompute/fem/element.h"
+#include "precompute/mesh/curved_edges.h"
+#include "precompute/modes/added_functions.h"
+#include "precompute/modes/curved_integrals.h"
 #include "precompute/sparse/dense_blas.h"
 #include "precompute/sparse/openblas.h"
 #include "precompute/sparse/workers.h"
@@ -19,7 +23,6 @@ namespace {
 /// One row for each unknown, so that the rows of an element are close in memory.
 using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-/// Barycentric coordinates, and derivatives with respect to them.
 using Barycentric = Eigen::Vector4d;
 
 /// The constant C of the header, for each order of elements.
@@ -36,60 +39,13 @@ constexpr size_t kResidualBytes = size_t{512} << 20U;
 constexpr size_t kTimesShapes = 2;
 constexpr size_t kFewestModesAtATime = 8;
 
-struct Value {
-  double value;
-  Barycentric derivative;
-};
-
-Value Product(const Value& f, const Value& g) {
-  return {f.value * g.value, f.value * g.derivative + g.value * f.derivative};
-}
-
-Value Coordinate(const Barycentric& at, int i) { return {at[i], Barycentric::Unit(i)}; }
-
-/// The element's own shape functions, in the order of TetMesh.
-std::vector<Value> BaseFunctions(const Barycentric& at, int node_count) {
-  std::vector<Value> functions;
-  for (int i = 0; i < 4; ++i) {
-    Value f = Coordinate(at, i);
-    if (node_count == 10) {
-      f = Product(f, {2 * at[i] - 1, 2 * Barycentric::Unit(i)});
-    }
-    functions.push_back(f);
-  }
-  if (node_count == 4) return functions;
-  for (const auto& [a, b] : kTetEdges) {
-    Value f = Product(Coordinate(at, a), Coordinate(at, b));
-    functions.push_back({4 * f.value, 4 * f.derivative});
-  }
-  return functions;
-}
-
-/// The functions that the next order adds: for linear elements 4 L_a L_b on each edge; for
-/// quadratic ones L_a L_b (L_a - L_b) on each edge, L_a L_b L_c on each face.
-std::vector<Value> AddedFunctions(const Barycentric& at, int node_count) {
-  std::vector<Value> functions;
-  for (const auto& [a, b] : kTetEdges) {
-    Value f = Product(Coordinate(at, a), Coordinate(at, b));
-    if (node_count == 10) {
-      f = Product(f, {at[a] - at[b], Barycentric::Unit(a) - Barycentric::Unit(b)});
-    }
-    functions.push_back(f);
-  }
-  if (node_count == 4) return functions;
-  for (const auto& [a, b, c] : kTetFaces) {
-    functions.push_back(Product(Product(Coordinate(at, a), Coordinate(at, b)), Coordinate(at, c)));
-  }
-  return functions;
-}
-
 /// Integrals over the reference tetrahedron, of volume one, of products of two sets of functions.
 class ReferenceIntegrals {
  public:
   explicit ReferenceIntegrals(int node_count) {
     ForEachPoint([&](const Barycentric& at, double weight) {
-      const std::vector<Value> base = BaseFunctions(at, node_count);
-      const std::vector<Value> added = AddedFunctions(at, node_count);
+      const std::vector<FunctionAt> base = BaseFunctions(at, node_count);
+      const std::vector<FunctionAt> added = AddedFunctions(at, node_count);
       mixed.resize(added.size() * base.size(), Eigen::Matrix4d::Zero());
       own.resize(added.size(), Eigen::Matrix4d::Zero());
       if (mass.size() == 0) mass.setZero(Eigen::Index(added.size()), Eigen::Index(base.size()));
@@ -216,6 +172,10 @@ class Estimator {
         held_(places_.HeldWith(mesh)),
         stiffness_(places_.count(), Eigen::Matrix3d::Zero()) {
     for (size_t e = 0; e < mesh_.element_count(); ++e) {
+      if (IsCurved(mesh_, e)) {
+        AddCurved(e);
+        continue;
+      }
       const TetGeometry geometry = GeometryOf(mesh_, Element(e));
       for (size_t i = 0; i < places_.added(); ++i) {
         stiffness_[static_cast<size_t>(places_.Of(e, i))] +=
@@ -292,7 +252,27 @@ class Estimator {
 
   const int32_t* Element(size_t e) const { return &mesh_.elements[e * nodes_]; }
 
+  void AddCurved(size_t e) {
+    const Eigen::Matrix<double, 3, 30> own = curved_.OfAdded(NodesOf(mesh_, e), lame_);
+    for (size_t i = 0; i < places_.added(); ++i) {
+      stiffness_[static_cast<size_t>(places_.Of(e, i))] +=
+          own.middleCols<3>(static_cast<Eigen::Index>(3 * i));
+    }
+  }
+
+  void FillCurved(size_t e, const RowMatrix& shapes, ElementResidual& element) const {
+    const CurvedIntegrals::Mixed mixed = curved_.OfBoth(NodesOf(mesh_, e), lame_);
+    element.stiffness = mixed.stiffness;
+    for (Eigen::Index n = 0; n < 10; ++n) {
+      element.shapes.middleRows<3>(3 * n) = shapes.middleRows<3>(3 * Eigen::Index{Element(e)[n]});
+      for (Eigen::Index i = 0; i < 10; ++i) {
+        element.mass.block<3, 3>(3 * i, 3 * n).diagonal().setConstant(mixed.mass(i, n));
+      }
+    }
+  }
+
   void Fill(size_t e, const RowMatrix& shapes, ElementResidual& element) const {
+    if (IsCurved(mesh_, e)) return FillCurved(e, shapes, element);
     const TetGeometry geometry = GeometryOf(mesh_, Element(e));
     for (size_t n = 0; n < nodes_; ++n) {
       const auto column = static_cast<Eigen::Index>(3 * n);
@@ -313,6 +293,7 @@ class Estimator {
   const LameConstants lame_;
   const size_t nodes_;
   const ReferenceIntegrals integrals_;
+  const CurvedIntegrals curved_;
   const Places places_;
   const std::vector<bool> held_;
   std::vector<Eigen::Matrix3d> stiffness_;  // a(b, b) of each place

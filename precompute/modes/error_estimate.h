@@ -21,8 +21,8 @@ namespace carillon::precompute {
 /// This detects the locking of thin walls, which estimates by averaged stresses do not. C is fitted
 /// to a bar, a block, a plate and a tube so that the estimate is rarely too small for errors of a
 /// few percent or less. For walls of linear elements with errors of half or more the estimate is
-/// too small. The body is the polyhedron of its mesh; the difference to a curved original is not
-/// part of the estimate.
+/// too small. The body is that of its mesh, curved elements included; the difference to an original
+/// with other curves is not part of the estimate.
 ///
 /// `elastic`: the constants of the matrices from which the modes were computed, for unit density. A
 /// consistent mass is assumed. Shapes have all nodes; fixed edges and faces add nothing. Result:

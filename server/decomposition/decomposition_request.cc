@@ -17,7 +17,8 @@
 namespace carillon {
 namespace {
 
-constexpr std::array kFormats = {"obj", "ply", "stl", "off", "msh", "mesh", "node"};
+constexpr std::array kFormats = {"obj",  "ply", "stl",  "off",  "glb",
+                                 "gltf", "msh", "mesh", "node", "inp"};
 constexpr int kMostPriority = 100;
 constexpr double kLeastTransferDb = 0.06;
 constexpr double kMostTransferDb = 20;
@@ -30,7 +31,7 @@ absl::Status CheckMesh(const v1::CreateModalModelRequest& request) {
   if (std::ranges::find(kFormats, request.mesh_format()) == kFormats.end()) {
     return Refusal(absl::StatusCode::kInvalidArgument, "MESH_FORMAT_UNKNOWN",
                    absl::StrCat("mesh_format is \"", request.mesh_format(),
-                                "\"; name one of obj, ply, stl, off, msh, mesh, node"));
+                                "\"; name one of obj, ply, stl, off, glb, gltf, msh, mesh, node, inp"));
   }
   if (!IsSha256Hex(request.mesh_digest())) {
     return Refusal(

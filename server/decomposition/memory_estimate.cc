@@ -9,13 +9,13 @@ namespace carillon {
 namespace {
 
 bool IsOfTetrahedra(const std::string& format) {
-  return format == "msh" || format == "mesh" || format == "node";
+  return format == "msh" || format == "mesh" || format == "node" || format == "inp";
 }
 
 // Bytes of a mesh file for each vertex. A closed surface has two triangles a vertex; OBJ is taken
 // for text, the other surface formats for binary.
 double BytesAVertex(const std::string& format) {
-  if (format == "obj") return 90;
+  if (format == "obj" || format == "gltf") return 90;
   if (format == "stl") return 100;
   if (IsOfTetrahedra(format)) return 250;  // a vertex of tetrahedra, of which there are five each
   return 60;

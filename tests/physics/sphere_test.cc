@@ -37,6 +37,19 @@ TEST(Sphere, TenLowestModesAreThoseOfLamb) {
   for (size_t m = 5; m < 10; ++m) EXPECT_NEAR(etas[m] / LowestSpheroidalEta(0.25), 1, 0.01) << m;
 }
 
+// With sides that follow the sphere R is the sphere's own radius.
+TEST(Sphere, CurvedElementsFindItsModesWithinATwentiethOfAPerCent) {
+  const TetMesh mesh = MakeTetSphere(1, 500, true);
+  EXPECT_NEAR(static_cast<double>(mesh.nodes.size()), 5000, 1000);
+  const double shear_speed = std::sqrt(ToLame(kElastic).mu_pa);
+  const std::vector<double> hz = FrequenciesHz(ModesOf(mesh, kElastic, 1, 0.285));
+  ASSERT_EQ(hz.size(), 10u);
+  for (size_t m = 0; m < hz.size(); ++m) {
+    const double eta = m < 5 ? LowestTorsionalEta() : LowestSpheroidalEta(0.25);
+    EXPECT_NEAR(2 * std::numbers::pi * hz[m] / shear_speed / eta, 1, 5e-4) << m;
+  }
+}
+
 // Tabulated by Lamb and many after him for a Poisson's ratio of 1/4: 0.7961 pi and 0.8403 pi.
 TEST(Sphere, FrequencyEquationsHaveTheRootsTabulated) {
   EXPECT_NEAR(LowestTorsionalEta() / std::numbers::pi, 0.7961, 1e-4);

@@ -12,6 +12,7 @@
 
 #include "precompute/mesh/boundary.h"
 #include "precompute/mesh/fill/midside_nodes.h"
+#include "precompute/mesh/fill/tetrahedralize.h"
 
 namespace carillon::precompute {
 namespace {
@@ -138,6 +139,23 @@ SurfaceMesh MakeSphereSurface(double radius_m, int halvings) {
     for (double& x : p) x *= radius_m;
   }
   return sphere;
+}
+
+TetMesh MakeTetSphere(double radius_m, int corner_count, bool curved) {
+  const int halvings = corner_count < 300 ? 2 : 3;
+  absl::StatusOr<TetMesh> filled =
+      Tetrahedralize(MakeSphereSurface(radius_m, halvings),
+                     {.keep_surface = true, .target_node_count = corner_count});
+  if (!filled.ok()) std::abort();
+  if (!curved) return *std::move(filled);
+  for (const BoundaryFace& face : filled->boundary) {
+    for (const int32_t node : face.nodes) {
+      Point& p = filled->nodes[static_cast<size_t>(node)];
+      const double length = std::hypot(p[0], p[1], p[2]);
+      for (double& x : p) x *= radius_m / length;
+    }
+  }
+  return *std::move(filled);
 }
 
 SurfaceMesh MakeRodSurface(double radius_m, double length_m, int around, int along) {

@@ -38,6 +38,10 @@ TetMesh MakeTetBox(const Point& size_m, const std::array<int, 3>& cells, int nod
 /// A sphere about the origin: an octahedron whose edges are halved `halvings` times.
 SurfaceMesh MakeSphereSurface(double radius_m, int halvings);
 
+/// A ball about the origin, filled with some `corner_count` corners and ten-node tetrahedra; with
+/// `curved` the mid-side nodes of its surface lie on the sphere.
+TetMesh MakeTetSphere(double radius_m, int corner_count, bool curved);
+
 /// A round bar about the x axis, from x = 0: a polygon of `around` corners with the circle's area,
 /// cut `along` times; its ends are fans.
 SurfaceMesh MakeRodSurface(double radius_m, double length_m, int around, int along);

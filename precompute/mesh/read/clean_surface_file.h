@@ -11,7 +11,8 @@ namespace carillon::precompute {
 /// the file reduced to its surface, because assimp groups the faces of an OBJ file by its objects
 /// and does not accept comments in OFF.
 ///
-/// `format`: "obj", "off", "ply" or "stl" (returned as it is: assimp hides nothing there).
+/// `format`: "obj", "off", "ply", or "stl", "glb" or "gltf" (returned as they are: assimp hides
+/// nothing there).
 /// Errors: MESH_UNREADABLE, MESH_NOT_FINITE, MESH_INDEX_OUT_OF_RANGE, each with the line;
 /// MESH_EMPTY.
 absl::StatusOr<std::string> CleanSurfaceFile(const std::string& bytes, const std::string& format);

@@ -138,6 +138,10 @@ absl::Status OrientElements(TetMesh& mesh) {
   return absl::OkStatus();
 }
 
+/// Distance of a mid-side node from the middle of its edge, in lengths of the edge: that of a third
+/// of a circle is 0.29.
+constexpr double kMostCurved = 0.35;
+
 /// In another order of the nodes a mid-side node would be a whole edge away from its place.
 absl::Status CheckMidsideNodes(const TetMesh& mesh) {
   if (mesh.nodes_per_element != 10) return absl::OkStatus();
@@ -149,12 +153,12 @@ absl::Status CheckMidsideNodes(const TetMesh& mesh) {
       const Point a = at(static_cast<size_t>(kTetEdges[edge][0]));
       const Point b = at(static_cast<size_t>(kTetEdges[edge][1]));
       const Point middle = {(a[0] + b[0]) / 2, (a[1] + b[1]) / 2, (a[2] + b[2]) / 2};
-      if (Distance(at(4 + edge), middle) < Distance(a, b) / 4) continue;
+      if (Distance(at(4 + edge), middle) < kMostCurved * Distance(a, b)) continue;
       return Refuse(
           "MESH_MIDSIDE_NODE_MISPLACED",
           absl::StrCat("tetrahedron ", e,
                        " (counted from zero) has a mid-side node more "
-                       "than a quarter of its edge from the middle, near (",
+                       "than 0.35 of its edge from the middle, near (",
                        middle[0], ", ", middle[1], ", ", middle[2],
                        "): write the nodes in the order of the format, or curve elements less"));
     }

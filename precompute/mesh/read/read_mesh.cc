@@ -11,6 +11,7 @@
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
 #include "precompute/mesh/read/gmsh_file.h"
+#include "precompute/mesh/read/inp_file.h"
 #include "precompute/mesh/read/make_mesh.h"
 #include "precompute/mesh/read/medit_file.h"
 #include "precompute/mesh/read/read_surface.h"
@@ -23,7 +24,8 @@ namespace {
 
 constexpr size_t kMostMeshBytes = size_t{256} << 20;
 constexpr size_t kReadPiece = size_t{1} << 20;
-constexpr std::array<const char*, 4> kSurfaceFormats = {"obj", "ply", "stl", "off"};
+constexpr std::array<const char*, 6> kSurfaceFormats = {"obj", "ply", "stl", "off", "glb", "gltf"};
+constexpr std::array<const char*, 4> kElementFormats = {"msh", "mesh", "node", "inp"};
 
 /// Reads at most `limit` bytes from the file's place on. The file may be a pipe, which knows no
 /// length.
@@ -73,8 +75,13 @@ bool IsSurfaceFormat(const std::string& format) {
   return std::ranges::find(kSurfaceFormats, format) != kSurfaceFormats.end();
 }
 
+bool IsElementFormat(const std::string& format) {
+  return std::ranges::find(kElementFormats, format) != kElementFormats.end();
+}
+
 absl::StatusOr<ElementFile> ParseElements(const std::string& bytes, const std::string& format) {
   if (format == "msh") return ParseGmsh(bytes);
+  if (format == "inp") return ParseInp(bytes);
   return format == "mesh" ? ParseMedit(bytes) : ParseTetgen(bytes);
 }
 
@@ -102,12 +109,12 @@ absl::StatusOr<std::string> ReadMeshFile(const std::string& path, const std::str
 absl::StatusOr<NamedMesh> ParseMesh(const std::string& bytes, const std::string& format,
                                     double metres_per_unit) {
   const bool is_surface = IsSurfaceFormat(format);
-  if (!is_surface && format != "msh" && format != "mesh" && format != "node") {
+  if (!is_surface && !IsElementFormat(format)) {
     return Refusal(
         absl::StatusCode::kInvalidArgument, "MESH_FORMAT_UNKNOWN",
         absl::StrCat("there is no mesh format \"", format,
-                     "\": give obj, ply, stl or off (a surface), msh (Gmsh), mesh (Medit) "
-                     "or node (TetGen)"));
+                     "\": give obj, ply, stl, off, glb or gltf (a surface), msh (Gmsh), mesh "
+                     "(Medit), node (TetGen) or inp (Abaqus, CalculiX)"));
   }
   ASSIGN_OR_RETURN(NamedMesh named,
                    is_surface ? ReadSurface(bytes, format) : ReadElements(bytes, format));

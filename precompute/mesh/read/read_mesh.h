@@ -15,11 +15,11 @@ absl::StatusOr<std::string> ReadMeshFile(const std::string& path, const std::str
 
 /// Parses the bytes that ReadMeshFile returned into a mesh with the names of its parts.
 ///
-/// `format`: "obj", "ply", "stl", "off" (a surface; polygons are split into triangles, otherwise
-/// triangles keep their order and count; vertices at the same place become one), "msh" (Gmsh
-/// MSH 2.2 or 4.1), "mesh" (Medit, text) or "node" (TetGen's .node and .ele): 4- or 10-node
-/// tetrahedra, whose boundary is filled in, or without any the triangles as a surface.
-/// `metres_per_unit`: length of one unit of the file.
+/// `format`: "obj", "ply", "stl", "off", "glb", "gltf" (a surface; polygons are split into
+/// triangles, otherwise triangles keep their order and count; vertices at the same place become
+/// one), "msh" (Gmsh MSH 2.2 or 4.1), "mesh" (Medit, text), "node" (TetGen's .node and .ele) or
+/// "inp" (Abaqus, CalculiX): 4- or 10-node tetrahedra, whose boundary is filled in, or without any
+/// the triangles as a surface. `metres_per_unit`: length of one unit of the file.
 ///
 /// Errors: MESH_FORMAT_UNKNOWN, MESH_UNREADABLE, MESH_NOT_FINITE, MESH_INDEX_OUT_OF_RANGE,
 /// MESH_TOO_LARGE, MESH_ELEMENT_UNSUPPORTED, MESH_ZERO_VOLUME, MESH_MIDSIDE_NODE_MISPLACED,

@@ -77,6 +77,8 @@ absl::Status CheckFinite(const aiScene& scene) {
   return absl::OkStatus();
 }
 
+bool IsGltf(const std::string& format) { return format == "glb" || format == "gltf"; }
+
 /// Triangles that the polygons of the file must give.
 size_t CountTriangles(const aiScene& scene) {
   size_t count = 0;
@@ -152,7 +154,9 @@ absl::StatusOr<NamedMesh> ReadSurface(const std::string& bytes, const std::strin
   }
   MeshNames names;
   names.vertices = NumberVertices(*scene, clean, format);
-  scene = importer.ApplyPostProcessing(aiProcess_Triangulate);
+  // Only glTF places the parts of a body in a scene.
+  const unsigned place = IsGltf(format) ? unsigned{aiProcess_PreTransformVertices} : 0;
+  scene = importer.ApplyPostProcessing(aiProcess_Triangulate | place);
   if (scene == nullptr) return Unreadable(format, importer.GetErrorString());
   const Triangles triangles = CollectTriangles(*scene);
   if (triangles.size() != expected) {

@@ -5,6 +5,7 @@
 Each part prints a Markdown table:
   compare   SciPy, SLEPc and Spectra on the same matrices: CPU seconds, residuals
   calculix  CalculiX on the same meshes: frequencies
+  curved    CalculiX, SciPy and Lamb on curved ten-node meshes of Gmsh: frequencies
   growth    time and memory over the number of nodes, up to a million with --full
   table1    the sizes of the paper's Table 1, beside its times
   accuracy  --accuracy 1% on five bodies: estimated and true errors of every mode
@@ -22,6 +23,7 @@ import tempfile
 import accuracy
 import calculix
 import compare
+import curved
 import growth
 import table1
 
@@ -48,6 +50,7 @@ def fair_environment():
 
 
 PARTS = {"compare": compare.compare, "calculix": calculix.compare_frequencies,
+         "curved": curved.curved,
          "table1": table1.table1, "growth": growth.growth, "accuracy": accuracy.accuracy}
 
 

@@ -311,6 +311,34 @@ std::string ToMedit(const TetMesh& mesh) {
   return text + "End\n";
 }
 
+std::string ToInp(const TetMesh& mesh) {
+  const auto stride = static_cast<size_t>(mesh.nodes_per_element);
+  std::string text = "*Heading\n of a test\n** Nodes\n*NODE\n";
+  for (size_t n = 0; n < mesh.nodes.size(); ++n) {
+    const Point& p = mesh.nodes[n];
+    absl::StrAppendFormat(&text, "%d, %.17g, %.17g,%.17g\n", static_cast<int>(n) + 11, p[0], p[1],
+                          p[2]);
+  }
+  absl::StrAppend(&text, "*Element, type=", stride == 10 ? "STRI65" : "S3R", ", ELSET=skin\n");
+  size_t number = 0;
+  for (const BoundaryFace& face : mesh.boundary) {
+    absl::StrAppend(&text, ++number);
+    for (const int32_t node : face.nodes) {
+      if (node >= 0) absl::StrAppend(&text, ", ", node + 11);
+    }
+    text += '\n';
+  }
+  absl::StrAppend(&text, "*ELEMENT,\n TYPE=C3D", stride, ", ELSET=\"the body\"\n");
+  for (size_t e = 0; e < mesh.element_count(); ++e) {
+    absl::StrAppend(&text, ++number);
+    for (size_t i = 0; i < stride; ++i) {
+      absl::StrAppend(&text, i == 2 ? ",\n " : ",", mesh.elements[e * stride + i] + 11);
+    }
+    text += '\n';
+  }
+  return text + "*NSET, NSET=tip\n11\n*ELSET, ELSET=two, GENERATE\n1, 2, 1\n*SOLID SECTION\n1.,\n";
+}
+
 std::string ToTetgen(const TetMesh& mesh, int first) {
   const auto stride = static_cast<size_t>(mesh.nodes_per_element);
   std::string text = absl::StrCat("# of a test\n", mesh.nodes.size(), " 3 1 1\n");

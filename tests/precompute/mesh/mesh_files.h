@@ -26,6 +26,11 @@ std::string ToBinaryGmsh(const TetMesh& mesh);
 std::string ToTextGmsh41(const TetMesh& mesh);
 std::string ToBinaryGmsh41(const TetMesh& mesh);
 
+/// Abaqus' .inp: nodes numbered from 11, some elements over two lines, the boundary as the shells
+/// of the set "skin" (and those of its first two faces of "two"), and the first node as the set
+/// "tip".
+std::string ToInp(const TetMesh& mesh);
+
 /// Medit's .mesh, the boundary with reference 5, vertices with references 5 and (the first) 9.
 std::string ToMedit(const TetMesh& mesh);
 

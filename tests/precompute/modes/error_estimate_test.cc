@@ -57,5 +57,21 @@ TEST_P(EstimateTest, IsNearTheTrueErrorAndSeldomBelowIt) {
   }
 }
 
+TEST(EstimateOfCurvedElements, IsNearTheTrueErrorAndSeldomBelowIt) {
+  constexpr double kLimit = 4;
+  const DeformationModes fine = Solve(MakeTetSphere(1, 700, true), kLimit);
+  const TetMesh mesh = MakeTetSphere(1, 150, true);
+  const DeformationModes coarse = Solve(mesh, kLimit * 1.1);
+  const Eigen::VectorXd errors = EstimateFrequencyErrors(mesh, kElastic, coarse.modes);
+  ASSERT_GE(fine.modes.eigenvalues.size(), 10);
+  for (Eigen::Index m = 0; m < 10; ++m) {
+    const double right = std::sqrt(coarse.modes.eigenvalues[m] / fine.modes.eigenvalues[m]) - 1;
+    EXPECT_GT(right, 1e-4);
+    // The constant of the estimate is fitted to straight elements.
+    EXPECT_GT(errors[m], 0.7 * right) << "mode " << m << ", in truth " << right;
+    EXPECT_LT(errors[m], 3 * right) << "mode " << m << ", in truth " << right;
+  }
+}
+
 }  // namespace
 }  // namespace carillon::precompute

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 //
-// Tetrahedra as Medit and TetGen write them.
+// Tetrahedra as Medit, TetGen, Abaqus and CalculiX write them.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -33,6 +33,7 @@ TEST_F(ReadElementsTest, GiveTheMeshThatWasWritten) {
     ExpectSame(ReadTetsOf(ToMedit(box), "mesh"), box);
     ExpectSame(ReadTetsOf(ToTetgen(box, 0), "node"), box);
     ExpectSame(ReadTetsOf(ToTetgen(box, 1), "node"), box);
+    ExpectSame(ReadTetsOf(ToInp(box), "inp"), box);
   }
 }
 
@@ -64,6 +65,56 @@ TEST_F(ReadElementsTest, BoundaryMarkersOfTetgenAreGroups) {
   ASSERT_EQ(read->names.groups.size(), 1u);
   EXPECT_EQ(read->names.groups[0].name, "5");
   EXPECT_EQ(read->names.groups[0].simplices.size(), 2u);
+}
+
+TEST_F(ReadElementsTest, SetsOfAbaqusAreGroups) {
+  const absl::StatusOr<NamedMesh> read = ReadNamed(ToInp(Box(10)), "inp");
+  ASSERT_TRUE(read.ok()) << read.status();
+  const std::vector<MeshGroup>& groups = read->names.groups;
+  std::vector<std::string> names;
+  for (const MeshGroup& group : groups) names.push_back(group.name);
+  ASSERT_THAT(names, ElementsAre("skin", "the body", "tip", "two"));
+  EXPECT_EQ(groups[0].simplices.size(), Box(10).boundary.size());
+  EXPECT_EQ(groups[1].simplices.size(), Box(10).element_count());
+  EXPECT_THAT(groups[2].simplices, ElementsAre(std::array{0, -1, -1, -1}));
+  EXPECT_THAT(groups[3].simplices, ElementsAre(groups[0].simplices[0], groups[0].simplices[1]));
+}
+
+TEST_F(ReadElementsTest, ShellsOfAbaqusAloneAreASurface) {
+  const absl::StatusOr<NamedMesh> read = ReadNamed(
+      "*NODE\n1, 0,0,0\n2, 1,0,0\n3, 1,1,0\n4, 0,1,0\n5, 0,0,1.\n*ELEMENT, TYPE=S4, ELSET=Base\n"
+      "1, 1,4,3,2\n*ELEMENT, TYPE=S3\n2,1,2,5\n3,2,3,5\n4,3,4,5\n5,4,1,5\n*ELSET, ELSET=LID\n"
+      "2, 3\nbase\n",
+      "inp");
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_EQ(std::get<SurfaceMesh>(read->mesh).triangles.size(), 6u);
+  ASSERT_EQ(read->names.groups.size(), 2u);
+  EXPECT_THAT(read->names.groups[0].triangles, ElementsAre(0, 1));
+  EXPECT_THAT(read->names.groups[1].triangles, ElementsAre(2, 3, 0, 1));
+}
+
+TEST_F(ReadElementsTest, BadInpFilesAreRefusedWithTheLine) {
+  const std::string nodes = "*NODE\n1, 0,0,0\n2, 1,0,0\n3, 0,1,0\n4, 0,0,1\n";
+  const std::vector<std::pair<std::string, const char*>> cases = {
+      {"Dear Carillon,\n", "MESH_EMPTY: "},
+      {"*NODE\n1, 0, zero, 0\n", "MESH_UNREADABLE: line 2: no node (\"number, x, y, z\")"},
+      {"*NODE\n,\n", "line 2: no node"},
+      {nodes + "*ELEMENT, TYPE=C3D8\n",
+       "MESH_ELEMENT_UNSUPPORTED: the file has elements of type C3D8"},
+      {nodes + "*ELEMENT, TYPE=C3D4\n1, 1,2,3,4,1\n", "line 7: element 1 has too many nodes"},
+      {nodes + "*ELEMENT, TYPE=C3D4\n1, 1,2,3\n*STEP\n", "element 1 has too few nodes"},
+      {nodes + "*ELEMENT, TYPE=C3D4\n1, 1,2,3", "element 1 has too few nodes"},
+      {nodes + "*ELEMENT, TYPE=C3D4\n1, 1,2,3,x\n", "line 7: no element"},
+      {nodes + "*ELEMENT, TYPE=C3D4\n1, 1,2,3,9\n", "MESH_INDEX_OUT_OF_RANGE: tetrahedron 0"},
+      {nodes + "*NSET, NSET=a, GENERATE\n1, 1000000000000\n", "line 7: no range of a set"},
+      {nodes + "*INCLUDE, INPUT=more.inp\n", "line 6: it has *INCLUDE"},
+      {"*PART, NAME=a\n*END PART\n*PART, NAME=b\n", "line 3: it has a second *PART"},
+      {"*NODE, INPUT=more.inp\n", "line 1: it has INPUT="},
+      {nodes, "MESH_EMPTY: "},
+  };
+  for (const auto& [file, message] : cases) {
+    EXPECT_THAT(Refused(file, "inp"), HasSubstr(message)) << file;
+  }
 }
 
 TEST_F(ReadElementsTest, MeditTrianglesAloneAreASurface) {

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+
+#include "absl/status/status.h"
+#include "precompute/fem/element.h"
+#include "precompute/fem/material.h"
+#include "precompute/mesh/tet_mesh.h"
+
+namespace carillon::precompute {
+
+/// The isoparametric tetrahedron: its ten shape functions map the reference tetrahedron to the
+/// body, so that its edges and faces are curved. The reference coordinates are the barycentric ones
+/// of corners 1, 2 and 3.
+
+/// The positions of an element's nodes (columns, metres), in the order of TetMesh.
+using TenNodes = Eigen::Matrix<double, 3, 10>;
+
+/// Derivatives (rows) of the barycentric coordinates with respect to the reference coordinates.
+Eigen::Matrix<double, 4, 3> ReferenceGradients();
+
+TenNodes NodesOf(const TetMesh& mesh, size_t element);
+
+/// The stiffness, N/m, by the rule of degree five: exact where the element is straight.
+QuadraticStiffness MakeCurvedStiffness(const TenNodes& nodes, const LameConstants& lame);
+
+/// The mass, kg, the same for each component, exact. Lumped by diagonal scaling, as
+/// MakeQuadraticMass.
+QuadraticMass MakeCurvedMass(const TenNodes& nodes, double density_kg_per_m3, MassSharing sharing);
+
+/// Volume, m^3, exact.
+double CurvedVolumeM3(const TenNodes& nodes);
+
+/// Checks that no curved element of the mesh is turned inside out: the determinant of its Jacobian
+/// is positive at all quadrature points.
+/// Errors: MESH_ELEMENT_INVERTED with the element's number.
+absl::Status CheckCurvedElements(const TetMesh& mesh);
+
+}  // namespace carillon::precompute
