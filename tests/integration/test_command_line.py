@@ -85,8 +85,9 @@ class ListsTest(CommandLineTest):
         scene = self.client.scenes.CreateScene(scene_service_pb2.CreateSceneRequest()).name
         self.client.scenes.AddObject(scene_service_pb2.AddObjectRequest(
             scene=scene, modal_model=self.model, material=MATERIAL, handle=5))
-        self.assertIn({"name": scene, "object_count": 1}, self.json_of("scene", "list")["scenes"])
-        self.assertRegex(self.run_command("scene", "list"), rf"(?m){scene}  1 objects\n  5 ")
+        listed = {each["name"]: each["object_count"] for each in self.json_of("scene", "list")["scenes"]}
+        self.assertEqual(listed[scene], 1)
+        self.assertRegex(self.run_command("scene", "list"), rf"(?m){scene}  1 objects  .*1 connections.*\n  5 ")
         self.run_command("scene", "delete", scene.removeprefix("scenes/"))
         self.assertNotIn(scene, self.run_command("scene", "list"))
 
