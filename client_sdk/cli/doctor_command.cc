@@ -92,7 +92,7 @@ void CheckSound(const v1::GetMixerResponse& mixer, Findings& findings) {
 
 void CheckDatabase(const client::Client& daemon, Findings& findings) {
   const auto stats = daemon.GetDatabaseStats();
-  if (!stats.ok() && absl::IsPermissionDenied(stats.status())) {
+  if (absl::IsPermissionDenied(stats.status()) || absl::IsUnauthenticated(stats.status())) {
     return findings.Unknown("database", Text(stats.status()));
   }
   if (!stats.ok()) return findings.Bad("database", Text(stats.status()));
@@ -138,9 +138,9 @@ void CheckSlurm(Findings& findings) {
     return findings.Good("slurm", "not installed here: decompositions run on this machine");
   }
   if (Succeeds({"sinfo", "--noheader"})) return findings.Good("slurm", "the cluster answers");
-  findings.Bad("slurm",
-               "sinfo does not answer: with --executor slurm no job would run; see that slurmctld "
-               "runs, and deploy/slurm");
+  findings.Unknown("slurm",
+                   "sinfo does not answer: a daemon with --executor slurm could run no job; see "
+                   "that slurmctld runs");
 }
 
 void CheckTls(const Program& program, Findings& findings) {
@@ -156,9 +156,9 @@ void CheckTls(const Program& program, Findings& findings) {
 
 absl::Status Conclude(const Findings& findings) {
   if (findings.fault_count() == 0) return absl::OkStatus();
-  return Refusal(
-      absl::StatusCode::kFailedPrecondition, "FAULTS_FOUND",
-      absl::StrCat(findings.fault_count(), " things are wrong, and each says its repair"));
+  return Refusal(absl::StatusCode::kFailedPrecondition, "FAULTS_FOUND",
+                 absl::StrCat("see the lines that begin with FAULT, of which there are ",
+                              findings.fault_count()));
 }
 
 }  // namespace

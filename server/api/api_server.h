@@ -21,14 +21,14 @@ namespace carillon {
 /// The addresses at which the server listens, and the files that protect them.
 struct ApiSettings {
   /// "unix:PATH" or "HOST:PORT" (port 0: any that is free).
-  std::vector<std::string> addresses;
+  std::vector<std::string> addresses{};
   /// PEM files for all TCP addresses; empty: no TLS, and only addresses of this machine.
   TlsPaths tls{};
   /// Who may do what over TCP; see AccessTable. Empty: only addresses of this machine, from which
   /// anybody may do all but administer.
   std::string access_file{};
   /// Version of the daemon.
-  std::string version;
+  std::string version{};
   /// Seconds for which a scene waits for its clients to come back.
   double scene_grace_s = 60;
   /// Share of all scenes, streams, listeners and renderings that one client may hold; above 0, at

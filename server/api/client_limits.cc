@@ -46,7 +46,7 @@ absl::StatusOr<ClientPlace> ClientLimits::Take(Holding holding, const std::strin
   const size_t most = ShareOf(bound.whole, share_);
   const MutexLock lock(&mutex_);
   size_t& count = held_[static_cast<size_t>(holding)][client];
-  if (count >= most) {
+  if (share_ < 1 && count >= most) {
     return Refusal(absl::StatusCode::kResourceExhausted, "CLIENT_LIMIT_REACHED",
                    absl::StrCat("this client has ", count, " ", bound.name,
                                 " already, its share of ", bound.whole, ": end some first"));

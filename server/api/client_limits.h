@@ -47,7 +47,8 @@ class ClientPlace {
 /// out all others. Safe from every thread.
 class ClientLimits {
  public:
-  /// `share` is above 0 and at most 1; a client may always hold one of each.
+  /// `share` is above 0; a client may always hold one of each. With 1 a client has no limit of its
+  /// own.
   explicit ClientLimits(double share) : share_(share) {}
 
   /// Errors: ResourceExhausted (CLIENT_LIMIT_REACHED). The place must not outlive this.

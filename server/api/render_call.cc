@@ -62,18 +62,14 @@ class RenderCall final : public BidiStream<v1::RenderRequest, v1::RenderResponse
 
  private:
   absl::Status Take(const v1::RenderRequest& request) override {
-    if (!wait_.Resume()) return absl::CancelledError();  // Refuse leaves it
     RETURN_IF_ERROR(reader_.Take(request));
     wait_.Begin();
     return absl::OkStatus();
   }
 
-  void Refuse(const absl::Status& status) override {
-    if (wait_.Resume()) End(status);
-  }
+  bool GoesOn() override { return wait_.Resume(); }
 
   void AllRead() override {
-    if (!wait_.Resume()) return;
     writes_ = true;
     absl::StatusOr<std::unique_ptr<OfflineRenderer>> renderer = reader_.Finish();
     if (!renderer.ok()) return End(renderer.status());

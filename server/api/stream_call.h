@@ -50,6 +50,7 @@ template <typename Reactor, typename Request>
 class StreamReader : public Reactor {
  public:
   void OnReadDone(bool ok) final {
+    if (!GoesOn()) return;
     this->Run([this, ok] {
       const absl::Status status = WithoutExceptions([&] { return ok ? TakeRequest() : TakeEnd(); });
       if (!status.ok()) Refuse(status);
@@ -66,6 +67,10 @@ class StreamReader : public Reactor {
   virtual void AllRead() = 0;
 
   virtual void Refuse(const absl::Status& status) { this->End(status); }
+
+  /// False: the call was ended while it waited for a request. It may be deleted as soon as this
+  /// returns, so that nothing may be left to the pool. Called on gRPC's threads.
+  virtual bool GoesOn() { return true; }
 
   /// The constructor of a call ends with it.
   void StartReading() { ReadNext(); }

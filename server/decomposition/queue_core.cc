@@ -180,13 +180,11 @@ absl::Status QueueCore::CheckAcceptable(const WantedJob& wanted) {
   if (wanted.transfer_of.empty()) {
     RETURN_IF_ERROR(database_.meshes().Find(wanted.request.mesh_digest()).status());
   }
-  const size_t own_count = jobs_.queued_count(wanted.client);
-  if (own_count >= settings_.max_queued_count_of_client) {
-    return ClientQueueFull(own_count, settings_.max_queued_count);
-  }
   const size_t count = jobs_.queued_count();
-  if (count < settings_.max_queued_count) return absl::OkStatus();
-  return QueueFull(count, runs_.retry_after_s());
+  if (count >= settings_.max_queued_count) return QueueFull(count, runs_.retry_after_s());
+  const size_t own_count = jobs_.queued_count(wanted.client);
+  if (own_count < settings_.max_queued_count_of_client) return absl::OkStatus();
+  return ClientQueueFull(own_count, settings_.max_queued_count);
 }
 
 // The digest of the coarse model's job that the request has to wait for; empty if there is none. A

@@ -46,13 +46,12 @@ class Readings final : public prometheus::Collectable {
 
 class ExposedMetrics final : public MetricsServer {
  public:
-  /// Two threads, and requests that must come within two seconds: whoever connects and says nothing
-  /// does not keep Prometheus out for long.
+  /// Eight threads, and requests that must come within half a second: whoever connects and says
+  /// nothing does not keep Prometheus out for long.
   ExposedMetrics(const std::string& address, Read read)
       : readings_(std::make_shared<Readings>(std::move(read))),
-        exposer_(std::vector<std::string>{"listening_ports", address, "num_threads", "2",
-                                          "request_timeout_ms", "2000", "enable_keep_alive",
-                                          "no"}) {
+        exposer_(std::vector<std::string>{"listening_ports", address, "num_threads", "8",
+                                          "request_timeout_ms", "500", "enable_keep_alive", "no"}) {
     exposer_.RegisterCollectable(readings_);
   }
 

@@ -62,6 +62,19 @@ class ListsTest(CommandLineTest):
         ended = self.daemon.command("job", "watch", "long", check=False)
         self.assertIn("JOB_CANCELLED", ended.stderr)
 
+    def test_the_doctor_finds_no_fault_with_a_daemon_and_says_what_to_do_without_one(self):
+        healthy = self.daemon.command("doctor", check=False)
+        self.assertIn("carillond", healthy.stdout)
+        # This machine may grant no real-time priority; everything else is as it should be.
+        faults = [line for line in healthy.stdout.splitlines() if line.startswith("FAULT") and "real time" not in line]
+        self.assertEqual(faults, [])
+        self.assertIn("ok     database", healthy.stdout)
+        self.assertIn("ok     workers", healthy.stdout)
+        nobody = carillon("--server", f"unix:{self.folder}/nobody", "doctor")
+        self.assertEqual(nobody.returncode, 1)
+        self.assertRegex(nobody.stdout, "FAULT  socket .* start carillond")
+        self.assertTrue(nobody.stderr.startswith("carillon: FAULTS_FOUND: "))
+
     def test_materials_are_listed_and_shown_with_their_source(self):
         self.assertRegex(self.run_command("material", "list"), r"(?m)^bell_bronze +\d+ GPa +\d+ kg/m\^3$")
         self.assertRegex(self.run_command("material", "show", "bell_bronze"), r"source +\w")
@@ -72,8 +85,9 @@ class ListsTest(CommandLineTest):
         scene = self.client.scenes.CreateScene(scene_service_pb2.CreateSceneRequest()).name
         self.client.scenes.AddObject(scene_service_pb2.AddObjectRequest(
             scene=scene, modal_model=self.model, material=MATERIAL, handle=5))
-        self.assertIn({"name": scene, "object_count": 1}, self.json_of("scene", "list")["scenes"])
-        self.assertRegex(self.run_command("scene", "list"), rf"(?m){scene}  1 objects\n  5 ")
+        listed = {each["name"]: each["object_count"] for each in self.json_of("scene", "list")["scenes"]}
+        self.assertEqual(listed[scene], 1)
+        self.assertRegex(self.run_command("scene", "list"), rf"(?m){scene}  1 objects  .*1 connections.*\n  5 ")
         self.run_command("scene", "delete", scene.removeprefix("scenes/"))
         self.assertNotIn(scene, self.run_command("scene", "list"))
 

@@ -30,7 +30,8 @@ namespace carillon {
 class ServedDaemon : public testing::Test {
  protected:
   /// Of `settings`, the addresses and the version are set here; `more` are further addresses.
-  explicit ServedDaemon(ApiSettings settings = {}, const std::vector<std::string>& more = {}) {
+  explicit ServedDaemon(ApiSettings settings = {.client_share = 1},
+                        const std::vector<std::string>& more = {}) {
     settings.addresses = {address_};
     settings.addresses.insert(settings.addresses.end(), more.begin(), more.end());
     settings.version = "test";
