@@ -1,12 +1,14 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 #
-# deploy/bench.sh decomposition|mixer|database|ingest|radiation [ARGUMENTS OF tests/benchmarks/NAME/run.py...]
+# deploy/bench.sh decomposition|mixer|database|engines|ingest|radiation [ARGUMENTS OF tests/benchmarks/NAME/run.py...]
 #
 # Installs what is missing, the programs compared with too, builds, runs all of them in turn on the
 # same input, and prints one table.
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+# shellcheck source=deploy/environment.sh
+source "$root/deploy/environment.sh"
 benchmark=$root/tests/benchmarks/${1:-}
 if [[ ! -f $benchmark/run.py ]]; then
   printf 'usage: %s NAME [ARGUMENTS...], with NAME one of:' "$0" >&2

@@ -3,6 +3,7 @@
 
 /** Vectors are arrays [x, y, z] in the world's frame, quaternions arrays [w, x, y, z]. */
 const minus = (a, b) => a.map((x, i) => x - b[i]);
+const plus = (a, b) => a.map((x, i) => x + b[i]);
 const times = (a, factor) => a.map((x) => x * factor);
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
@@ -22,15 +23,20 @@ function velocityAt(body, point) {
   return body.velocity.map((v, i) => v + turning[i]);
 }
 
+/** The velocity of the first body's surface over the second's. */
+function slipAt({ first, second, point, normal }) {
+  return tangential(minus(velocityAt(first, point), velocityAt(second, point)), normal);
+}
+
 /**
  * Speed at which a contact travels over the surfaces: in a slide that of one surface over the other; in a roll that of
  * the point of contact, which moves at omega R over a body whose centre of mass is at the distance R.
  */
-function travelSpeed(first, second, point, normal) {
-  const slip = minus(velocityAt(first, point), velocityAt(second, point));
+function travelSpeed(contact) {
+  const { first, second, point, normal } = contact;
   const roll = minus(first.angularVelocity ?? [0, 0, 0], second.angularVelocity ?? [0, 0, 0]);
   const lever = (body) => (body.centre ? Math.abs(dot(minus(point, body.centre), normal)) : 0);
-  return length(tangential(slip, normal)) + length(tangential(roll, normal)) * Math.max(lever(first), lever(second));
+  return length(slipAt(contact)) + length(tangential(roll, normal)) * Math.max(lever(first), lever(second));
 }
 
 /**
@@ -56,20 +62,21 @@ class ContactRows {
 
   /**
    * Returns the rows of one contact, in which `impulse` acts on the first body over the step: none where neither body
-   * sounds. If both do, the one with the lower handle is the object.
+   * sounds. If both do, the one with the lower handle is the object. `pointOnSecond` is `point` unless it is given.
    */
-  rows({ first, second, point, normal, impulse }) {
+  rows({ first, second, point, pointOnSecond = point, normal, impulse }) {
     const [one, other] = [this.handles.get(first.key), this.handles.get(second.key)];
     if (one === undefined && other === undefined) return [];
     if (one === undefined || other < one) {
-      return this.rows({ first: second, second: first, point, normal, impulse: times(impulse, -1) });
+      return this.rows({ first: second, second: first, point: pointOnSecond, pointOnSecond: point,
+        normal, impulse: times(impulse, -1) });
     }
     const row = { object: one, partner: this.partnerNumber(second.key), point, impulse };
     if (this.settings.roughness) {
-      const travel = travelSpeed(first, second, point, normal);
+      const travel = travelSpeed({ first, second, point, normal });
       row.roughness = { ...this.settings.roughness, travel_speed_m_per_s: travel };
     }
-    if (other !== undefined) return [{ ...row, second: { object: other, point } }];
+    if (other !== undefined) return [{ ...row, second: { object: other, point: pointOnSecond } }];
     const striker = { striker: this.settings.striker ?? '', striker_mass_kg: second.massKg ?? IMMOVABLE_KG };
     return [{ ...row, striker }];
   }
@@ -83,14 +90,32 @@ class ContactRows {
 }
 
 /**
- * Friction of Coulomb on the first body, for engines that report impulses along the normal alone: against the slip, and
- * no greater than what stops it.
+ * Friction of contacts, for engines that report impulses along the normal alone. Each contact is { first, second, point,
+ * normal, along, friction }, with `normal` pointing towards the first body and `along` the impulse on it. What the step
+ * added to the momentum of a body, less gravity and the impulses along the normals, is friction, which its contacts
+ * share as they share the load; none exceeds Coulomb's. Returns the contacts with their whole `impulse`.
  */
-function frictionImpulse({ first, second, point, normal }, normalImpulse, friction) {
-  const slip = tangential(minus(velocityAt(first, point), velocityAt(second, point)), normal);
-  const speed = length(slip);
-  const stops = speed * reducedMassKg(first, second);
-  return speed > 0 ? times(slip, -Math.min(friction * normalImpulse, stops) / speed) : [0, 0, 0];
+function withFriction(contacts, before, gravity, stepS) {
+  const loads = new Map();
+  for (const { first, second, normal, along } of contacts) {
+    for (const [body, sign] of [[first, 1], [second, -1]]) {
+      const load = loads.get(body.key) ?? { along: 0, normal: [0, 0, 0] };
+      loads.set(body.key, { along: load.along + along, normal: plus(load.normal, times(normal, sign * along)) });
+    }
+  }
+  return contacts.map((contact) => {
+    const { first, second, normal, along, friction } = contact;
+    const isFirst = (first.massKg ?? Infinity) <= (second.massKg ?? Infinity);
+    const body = isFirst ? first : second;
+    const earlier = before.get(body.key);
+    if (!earlier || !body.massKg) return { ...contact, impulse: times(normal, along) };
+    const gained = minus(minus(body.velocity, earlier.velocity), times(gravity, stepS));
+    const load = loads.get(body.key);
+    const rest = tangential(minus(times(gained, body.massKg), load.normal), normal);
+    const across = times(rest, (isFirst ? 1 : -1) * along / load.along);
+    const excess = Math.max(1, length(across) / (friction * along || Infinity));
+    return { ...contact, impulse: plus(times(normal, along), times(across, friction ? 1 / excess : 0)) };
+  });
 }
 
 function reducedMassKg(first, second) {
@@ -107,4 +132,4 @@ function collisionImpulse({ first, second, point, normal, restitution = 0 }) {
   return approach > 0 ? (1 + restitution) * approach * reducedMassKg(first, second) : 0;
 }
 
-module.exports = { ContactRows, collisionImpulse, frictionImpulse, times };
+module.exports = { ContactRows, collisionImpulse, reducedMassKg, slipAt, times, withFriction };

@@ -1,17 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 'use strict';
 
-const { ContactRows, collisionImpulse, frictionImpulse, times } = require('./contact_rows');
+const { ContactRows, collisionImpulse, times, withFriction } = require('./contact_rows');
 
 /**
  * Reads the collision events of a Havok world. Open the stream or trace with frame 'scene', and let each body that
- * sounds raise events: HP_Body_SetEventMask(body, HavokContacts.eventMask(havok)).
+ * sounds raise events: HP_Body_SetEventMask(body, HavokContacts.eventMask(havok)). `settings` has `friction`,
+ * `restitution` and `gravity` of the world beside what ContactRows takes.
  */
 class HavokContacts {
   constructor(havok, settings = {}) {
     this.havok = havok;
     this.friction = settings.friction ?? 0;
     this.restitution = settings.restitution ?? 0;
+    this.gravity = settings.gravity ?? [0, 0, 0];
     this.contactRows = new ContactRows(settings);
     this.before = new Map(); // Bodies as they were after the step before.
   }
@@ -27,10 +29,12 @@ class HavokContacts {
     this.before.set(body[0], this.bodyOf(body));
   }
 
-  /** Returns what a step of a stream or trace takes. Call it after HP_World_Step(). */
-  read(world) {
+  /** Returns what a step of a stream or trace takes. Call it after HP_World_Step(world, stepS). */
+  read(world, stepS) {
     const events = this.events(world);
-    const contacts = events.flatMap((event) => this.readEvent(event, isSilent(event, events)));
+    const found = events.flatMap((event) => this.readEvent(event, isSilent(event, events)));
+    const contacts = withFriction(found, this.before, this.gravity, stepS)
+      .flatMap((contact) => this.contactRows.rows(contact));
     for (const key of this.before.keys()) this.before.set(key, this.bodyOf([key]));
     return { contacts, poses: this.contactRows.poses((key) => this.poseOf([key])) };
   }
@@ -50,15 +54,12 @@ class HavokContacts {
     return found;
   }
 
-  /** Each event has the normal on both bodies, along which the impulse acts, without friction. */
+  /** Each event has the normal out of both bodies, against which the impulse acts, without friction. */
   readEvent({ one, other, impulse }, silent) {
     const [first, second] = [this.bodyOf(one[0]), this.bodyOf(other[0])];
-    const [point, normal] = [[...one[3]], [...one[4]]];
+    const [point, normal] = [[...one[3]], times(one[4], -1)];
     const along = silent ? this.derived(one[0], other[0], point, normal) : impulse;
-    if (!(along > 0)) return [];
-    const across = frictionImpulse({ first, second, point, normal }, along, this.friction);
-    const whole = times(normal, along).map((x, axis) => x + across[axis]);
-    return this.contactRows.rows({ first, second, point, normal, impulse: whole });
+    return along > 0 ? [{ first, second, point, normal, along, friction: this.friction }] : [];
   }
 
   /** The impulse of a collision that Havok reports with zero, from the velocities before the step. */

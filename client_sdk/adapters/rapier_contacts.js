@@ -1,23 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
 'use strict';
 
-const { ContactRows, frictionImpulse, times } = require('./contact_rows');
+const { ContactRows, times, withFriction } = require('./contact_rows');
 
 const vector = ({ x, y, z }) => [x, y, z];
 
 /**
  * Reads the contacts of a Rapier world. Open the stream or trace with frame 'scene'. Rapier's impulses of friction have
- * no direction, so that friction is taken to act against the slip.
+ * no direction, so that friction is read out of the momentum of the bodies.
  */
 class RapierContacts {
   constructor(settings = {}) {
     this.contactRows = new ContactRows(settings);
+    this.bodies = new Map();
+    this.before = new Map(); // Bodies as they were after the step before.
   }
 
   /** Lets a RigidBody sound as the object with this handle; its frame must be that of its modal model. */
   addObject(body, handle) {
     this.contactRows.addObject(body.handle, handle);
-    this.bodies = (this.bodies ?? new Map()).set(body.handle, body);
+    this.bodies.set(body.handle, body);
+    this.before.set(body.handle, describe(body));
   }
 
   /** Returns what a step of a stream or trace takes. Call it after world.step(). */
@@ -29,21 +32,27 @@ class RapierContacts {
         contacts.push(...this.readManifold(manifold, ...(flipped ? [other, collider] : [collider, other])));
       });
     }));
-    return { contacts, poses: this.contactRows.poses((key) => this.poseOf(this.bodies.get(key))) };
+    const { x, y, z } = world.gravity;
+    const rows = withFriction(contacts, this.before, [x, y, z], world.timestep)
+      .flatMap((contact) => this.contactRows.rows(contact));
+    for (const [key, body] of this.bodies) this.before.set(key, describe(body));
+    return { contacts: rows, poses: this.contactRows.poses((key) => this.poseOf(this.bodies.get(key))) };
   }
 
-  /** The normal points from the first collider to the second. */
+  /**
+   * Rapier's normal points from the first collider to the second. Where both have moved on, each has a point of its
+   * own.
+   */
   readManifold(manifold, collider, other) {
-    const [first, second] = [bodyOf(collider), bodyOf(other)];
+    const [first, second] = [describe(collider.parent()), describe(other.parent())];
     const normal = times(vector(manifold.normal()), -1);
     const contacts = [];
     for (let i = 0; i < manifold.numContacts(); i += 1) {
       const along = manifold.contactImpulse(i);
       if (!(along > 0)) continue;
       const point = worldPoint(collider, manifold.localContactPoint1(i));
-      const across = frictionImpulse({ first, second, point, normal }, along, manifold.friction());
-      const impulse = times(normal, along).map((x, axis) => x + across[axis]);
-      contacts.push(...this.contactRows.rows({ first, second, point, normal, impulse }));
+      const pointOnSecond = worldPoint(other, manifold.localContactPoint2(i));
+      contacts.push({ first, second, point, pointOnSecond, normal, along, friction: manifold.friction() });
     }
     return contacts;
   }
@@ -54,8 +63,7 @@ class RapierContacts {
   }
 }
 
-function bodyOf(collider) {
-  const body = collider.parent();
+function describe(body) {
   if (!body || !body.isDynamic()) return { key: body ? body.handle : -1 };
   return { key: body.handle, massKg: body.mass(), centre: vector(body.worldCom()), velocity: vector(body.linvel()),
     angularVelocity: vector(body.angvel()) };

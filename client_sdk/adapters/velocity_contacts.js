@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 'use strict';
 
-const { ContactRows, collisionImpulse, frictionImpulse, times } = require('./contact_rows');
+const { ContactRows, collisionImpulse, reducedMassKg, slipAt, times } = require('./contact_rows');
 
 /**
  * Contacts of an engine that tells which bodies met, and their velocities, but no impulses: they follow from masses and
@@ -25,7 +25,7 @@ class VelocityContacts {
     return collisions.flatMap((collision) => {
       const along = collisionImpulse(collision);
       if (!along) return [];
-      const across = frictionImpulse(collision, along, collision.friction ?? 0);
+      const across = frictionImpulse(collision, along);
       const impulse = times(collision.normal, along).map((x, i) => x + across[i]);
       return this.contactRows.rows({ ...collision, impulse });
     });
@@ -35,6 +35,14 @@ class VelocityContacts {
   poses(poseOf) {
     return this.contactRows.poses(poseOf);
   }
+}
+
+/** Coulomb's friction on the first body: against the slip, and no greater than what stops it. */
+function frictionImpulse(collision, along) {
+  const slip = slipAt(collision);
+  const speed = Math.hypot(...slip);
+  const most = Math.min((collision.friction ?? 0) * along, speed * reducedMassKg(collision.first, collision.second));
+  return speed > 0 ? times(slip, -most / speed) : [0, 0, 0];
 }
 
 module.exports = { VelocityContacts };

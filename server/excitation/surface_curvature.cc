@@ -164,7 +164,7 @@ SurfaceCurvature::SurfaceCurvature(std::span<const std::array<float, 3>> vertice
     : vertices_(vertices), triangles_(triangles) {
   Facets facets(vertices, triangles);
   curvature_per_m_ = facets.MeanCurvatures();
-  sharp_edges_ = std::move(facets.sharp());
+  sharp_sides_ = std::move(facets.sharp());
 }
 
 double SurfaceCurvature::At(uint32_t triangle, const Point& point, double size) const {
@@ -175,12 +175,27 @@ double SurfaceCurvature::At(uint32_t triangle, const Point& point, double size) 
   if (triangle >= triangles_.size()) return 0;
   double sharp = 0;
   for (size_t side = 0; side < 3; ++side) {
-    if ((sharp_edges_[triangle] >> side & 1) == 0) continue;
+    if ((sharp_sides_[triangle] >> side & 1) == 0) continue;
     if (DistanceFromSegment(point, corner(side), corner(side + 1)) * size > kEdgeRadiusM) continue;
     sharp += 0.5 / kEdgeRadiusM;
   }
   const double round = curvature_per_m_[triangle] / size;
   return std::clamp(std::max(round, sharp), -1 / kEdgeRadiusM, 1 / kEdgeRadiusM);
+}
+
+std::vector<std::array<uint32_t, 2>> SurfaceCurvature::sharp_edges() const {
+  std::vector<std::array<uint32_t, 2>> edges;
+  for (size_t t = 0; t < triangles_.size(); ++t) {
+    for (size_t side = 0; side < 3; ++side) {
+      if ((sharp_sides_[t] >> side & 1) == 0) continue;
+      const auto [low, high] = std::minmax({triangles_[t][side], triangles_[t][(side + 1) % 3]});
+      edges.push_back({low, high});
+    }
+  }
+  std::ranges::sort(edges);
+  const auto doubled = std::ranges::unique(edges);
+  edges.erase(doubled.begin(), doubled.end());
+  return edges;
 }
 
 }  // namespace carillon

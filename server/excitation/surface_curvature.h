@@ -32,11 +32,14 @@ class SurfaceCurvature {
   /// surface, 1/m; above zero where the body bulges. `point` is on the surface at its own size.
   double At(uint32_t triangle, const Point& point, double size) const;
 
+  /// The sharp edges as pairs of vertices, each once.
+  std::vector<std::array<uint32_t, 2>> sharp_edges() const;
+
  private:
   std::span<const std::array<float, 3>> vertices_;
   std::span<const std::array<uint32_t, 3>> triangles_;
   std::vector<float> curvature_per_m_;  // #T
-  std::vector<uint8_t> sharp_edges_;    // #T: bit i is the edge from corner i to the next
+  std::vector<uint8_t> sharp_sides_;    // #T: bit i is the edge from corner i to the next
 };
 
 }  // namespace carillon

@@ -84,9 +84,11 @@ absl::Status ContactIntake::TryTouch(const ObjectTouch& touch) {
   RETURN_IF_ERROR(Validate(touch.roughness));
   RETURN_IF_ERROR(FrameOfImpulse(touch.time_offset_s).status());
   FeltContact felt;
+  ObjectContact contact = touch.contact;
+  contact.found_by_engine = true;
   const MutexLock lock(&scene_.mutex());
-  RETURN_IF_ERROR(Locate(touch.contact, 1, felt));
-  NoteZero(touch.contact);
+  RETURN_IF_ERROR(Locate(contact, 1, felt));
+  NoteZero(contact);
   forces_.Touch(touch, felt);
   return absl::OkStatus();
 }

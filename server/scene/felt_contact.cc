@@ -22,6 +22,23 @@ absl::StatusOr<LocatedPoint> Locate(const SoundingObject& object,
   return locator.Nearest(point);
 }
 
+/// As Locate; but where an engine has found the contact beneath an edge, the contact is on the
+/// edge.
+absl::StatusOr<LocatedPoint> LocateEngines(const SoundingObject& object,
+                                           const std::variant<Point, SurfacePoint>& location,
+                                           const Vector3& impulse) {
+  ASSIGN_OR_RETURN(const LocatedPoint& nearest, Locate(object, location));
+  if (!std::holds_alternative<Point>(location)) return nearest;
+  Point point = std::get<Point>(location);
+  for (double& coordinate : point) coordinate /= object.properties.material.size;
+  const std::optional<Point> edge =
+      object.body->edges.Protruding(point, nearest.distance_m, impulse);
+  if (!edge) return nearest;
+  ASSIGN_OR_RETURN(LocatedPoint on_edge, object.body->locator->Nearest(*edge));
+  on_edge.distance_m = nearest.distance_m;
+  return on_edge;
+}
+
 /// Returns the rotation from the frame of `from` into that of `to` that their poses say.
 Quaternion RotationBetween(const SoundingObject& from, const SoundingObject& to) {
   const auto orientation = [](const SoundingObject& object) {
@@ -76,15 +93,13 @@ void SetDuration(double duration_s, FeltContact& felt) {
   }
 }
 
-/// Fills in the opposite impulse, which the second object feels for as long as the first does.
-void FeelOpposite(const ObjectContact& contact, const SoundingObject& object,
-                  const SoundingObject& second, const LocatedPoint& located, FeltContact& felt) {
+/// The opposite impulse in the frame of the second object.
+Vector3 OppositeImpulse(const ObjectContact& contact, const SoundingObject& object,
+                        const SoundingObject& second) {
   const Quaternion rotation = contact.second->rotation.value_or(RotationBetween(object, second));
   Vector3 opposite = Rotated(contact.impulse.impulse_newton_seconds, Normalized(rotation));
   std::ranges::transform(opposite, opposite.begin(), std::negate());
-  felt.by[1].handle = contact.second->handle;
-  felt.count = 2;
-  FillIn(second, located, opposite, felt.by[1]);
+  return opposite;
 }
 
 }  // namespace
@@ -96,15 +111,23 @@ absl::Status Feel(const ObjectContact& contact, const SoundingObject& object,
     RETURN_IF_ERROR(Validate(*contact.second->rotation));
   }
   RETURN_IF_ERROR(Validate(impulse));
-  ASSIGN_OR_RETURN(const LocatedPoint& located, Locate(object, impulse.location));
+  const auto locate = [&](const SoundingObject& of, const auto& location, const Vector3& felt_by) {
+    return contact.found_by_engine ? LocateEngines(of, location, felt_by) : Locate(of, location);
+  };
+  ASSIGN_OR_RETURN(const LocatedPoint& located,
+                   locate(object, impulse.location, impulse.impulse_newton_seconds));
   felt.by[0].handle = contact.handle;
   felt.count = 1;
   FillIn(object, located, impulse.impulse_newton_seconds, felt.by[0]);
   ElasticBody striker = kSteelTip;
   if (second != nullptr) {
-    ASSIGN_OR_RETURN(const LocatedPoint& opposite, Locate(*second, contact.second->location));
-    FeelOpposite(contact, object, *second, opposite, felt);
-    striker = ElasticBodyAt(*second, opposite);
+    const Vector3 opposite = OppositeImpulse(contact, object, *second);
+    ASSIGN_OR_RETURN(const LocatedPoint& on_second,
+                     locate(*second, contact.second->location, opposite));
+    felt.by[1].handle = contact.second->handle;
+    felt.count = 2;
+    FillIn(*second, on_second, opposite, felt.by[1]);
+    striker = ElasticBodyAt(*second, on_second);
   }
   if (impulse.duration_s) {
     SetDuration(*impulse.duration_s, felt);

@@ -23,6 +23,8 @@ struct ObjectContact {
   uint32_t handle = 0;
   ContactImpulse impulse{};
   std::optional<SecondObject> second = std::nullopt;
+  /// Points may lie inside the bodies, as deep as an engine lets them reach into one another.
+  bool found_by_engine = false;
 
   uint64_t object_count() const { return second ? 2 : 1; }
 };

@@ -57,11 +57,14 @@ absl::StatusOr<std::shared_ptr<const SoundingBody>> MakeBody(
   ASSIGN_OR_RETURN(std::unique_ptr<SurfaceLocator> locator, indexing.get());
   RETURN_IF_ERROR(CheckShapes(*model));
   const ModalModel& of = *model;
+  SurfaceCurvature curvature(of.given_vertices, of.given_triangles);
+  const SharpEdges edges(of.given_vertices, curvature.sharp_edges());
   return std::make_shared<const SoundingBody>(
       SoundingBody{.model = std::move(model),
                    .shapes = std::move(shapes),
                    .locator = std::move(locator),
-                   .curvature = SurfaceCurvature(of.given_vertices, of.given_triangles),
+                   .curvature = std::move(curvature),
+                   .edges = edges,
                    .volume_m3 = VolumeM3(of.vertices, of.triangles),
                    .extent_m = ExtentM(of.vertices)});
 }

@@ -7,6 +7,7 @@
 #include "absl/base/thread_annotations.h"
 #include "absl/status/statusor.h"
 #include "server/base/mutex.h"
+#include "server/excitation/sharp_edges.h"
 #include "server/excitation/surface_curvature.h"
 #include "server/excitation/surface_locator.h"
 #include "server/mode_database/modal_model.h"
@@ -21,6 +22,7 @@ struct SoundingBody {
   ShapeTable shapes;
   std::unique_ptr<const SurfaceLocator> locator;
   SurfaceCurvature curvature;  ///< of the surface as given
+  SharpEdges edges;            ///< of the surface as given
   double volume_m3 = 0;        ///< at the model's size; zero: unknown
   double extent_m = 0;         ///< the diagonal of the bounding box at the model's size
 };

@@ -72,8 +72,9 @@ class BulletFall {
     return kept;
   }
 
+  /// A box below z = 0, since Bullet finds one contact a step with its half spaces.
   btCollisionShape* Keep(const Plane&) {
-    return Keep(std::make_unique<btStaticPlaneShape>(btVector3(0, 0, 1), 0));
+    return Keep(std::vector<Box>{{.sides_m = {20, 20, 1}, .position_m = {0, 0, -0.5}}});
   }
   btCollisionShape* Keep(const Ball& ball) {
     return Keep(std::make_unique<btSphereShape>(ball.radius_m));

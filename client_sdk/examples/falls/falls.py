@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Scenes of bodies that fall (docs/decisions/0041): their models from the daemon, and their contacts from an engine."""
+"""Scenes of bodies that fall (docs/decisions/0046): their models from the daemon, and their contacts from an engine."""
 
 import copy
 import itertools
@@ -78,7 +78,7 @@ def create_models(client, scene, folder=SCENES):
         if key not in models:
             settings = modal_model_pb2.DecompositionSettings()
             if "wall_m" in body:
-                settings.meshing.wall_m = body["wall_m"]
+                settings.mesh.wall_m = body["wall_m"]
             models[key] = client.create_model(mesh_of(body, folder), body["material"], settings=settings,
                                               label=body["name"], max_frequency_hz=body.get("max_frequency_hz", 0))
         body["model"] = models[key].name

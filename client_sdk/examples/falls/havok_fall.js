@@ -58,17 +58,18 @@ async function start(scene, stepS, settings) {
   const wasmBinary = fs.readFileSync(require.resolve('@babylonjs/havok/lib/umd/HavokPhysics.wasm'));
   const havok = await HavokPhysics({ wasmBinary });
   const [, world] = havok.HP_World_Create();
-  havok.HP_World_SetGravity(world, scene.gravity_m_per_s2 ?? [0, 0, -9.81]);
+  const gravity = scene.gravity_m_per_s2 ?? [0, 0, -9.81];
+  havok.HP_World_SetGravity(world, gravity);
   havok.HP_World_SetIdealStepTime(world, stepS);
   const { friction, restitution } = scene;
-  const contacts = new HavokContacts(havok, { ...settings, friction, restitution });
+  const contacts = new HavokContacts(havok, { ...settings, friction, restitution, gravity });
   scene.bodies.forEach((body, i) => {
     const made = addBody(havok, world, scene, body);
     if (body.model) contacts.addObject(made, i + 1);
   });
   return { step: () => {
     havok.HP_World_Step(world, stepS);
-    return contacts.read(world);
+    return contacts.read(world, stepS);
   } };
 }
 

@@ -54,15 +54,13 @@ class OdeFall {
 
  private:
   void Add(const Body& body, uint32_t handle) {
-    const dBodyID made = body.mass_kg > 0 ? dBodyCreate(world_) : nullptr;
+    const bool is_plane = std::holds_alternative<Plane>(body.shape);
+    const dBodyID made = is_plane ? nullptr : dBodyCreate(world_);
     const dSpaceID parts = dSimpleSpaceCreate(space_);  // the parts of one body do not meet
     dSpaceSetSublevel(parts, 1);
     std::visit([&](const auto& shape) { AddShape(shape, parts, made, body); }, body.shape);
     if (made == nullptr) return;
-    const auto& [ix, iy, iz] = body.inertia_kg_m2;
-    dMass mass;
-    dMassSetParameters(&mass, body.mass_kg, 0, 0, 0, ix, iy, iz, 0, 0, 0);
-    dBodySetMass(made, &mass);
+    SetMass(made, body);
     const auto& [x, y, z] = body.position_m;
     dBodySetPosition(made, x, y, z);
     dBodySetQuaternion(made, body.orientation.data());
@@ -76,30 +74,30 @@ class OdeFall {
   static void AddShape(const Plane&, dSpaceID parts, dBodyID, const Body& body) {
     dCreatePlane(parts, 0, 0, 1, body.position_m[2]);
   }
-  static void AddShape(const Ball& ball, dSpaceID parts, dBodyID made, const Body& body) {
-    Place(dCreateSphere(parts, ball.radius_m), made, body, {});
+  static void AddShape(const Ball& ball, dSpaceID parts, dBodyID made, const Body&) {
+    Place(dCreateSphere(parts, ball.radius_m), made, {});
   }
-  static void AddShape(const std::vector<Box>& boxes, dSpaceID parts, dBodyID made,
-                       const Body& body) {
+  static void AddShape(const std::vector<Box>& boxes, dSpaceID parts, dBodyID made, const Body&) {
     for (const Box& box : boxes) {
       const auto& [x, y, z] = box.sides_m;
-      Place(dCreateBox(parts, x, y, z), made, body, box);
+      Place(dCreateBox(parts, x, y, z), made, box);
     }
   }
   static void AddShape(const Hull&, dSpaceID, dBodyID, const Body&) {}  // main.cc refuses these
 
   /// Puts a geometry where `box` is in the frame of its body.
-  static void Place(dGeomID geometry, dBodyID made, const Body& body, const Box& box) {
-    if (made != nullptr) {
-      dGeomSetBody(geometry, made);
-      dGeomSetOffsetPosition(geometry, box.position_m[0], box.position_m[1], box.position_m[2]);
-      dGeomSetOffsetQuaternion(geometry, box.orientation.data());
-    } else {  // a fixed body is not turned within itself
-      dGeomSetPosition(geometry, body.position_m[0] + box.position_m[0],
-                       body.position_m[1] + box.position_m[1],
-                       body.position_m[2] + box.position_m[2]);
-      dGeomSetQuaternion(geometry, body.orientation.data());
-    }
+  static void Place(dGeomID geometry, dBodyID made, const Box& box) {
+    dGeomSetBody(geometry, made);
+    dGeomSetOffsetPosition(geometry, box.position_m[0], box.position_m[1], box.position_m[2]);
+    dGeomSetOffsetQuaternion(geometry, box.orientation.data());
+  }
+
+  static void SetMass(dBodyID made, const Body& body) {
+    if (body.mass_kg <= 0) return dBodySetKinematic(made);
+    const auto& [x, y, z] = body.inertia_kg_m2;
+    dMass mass;
+    dMassSetParameters(&mass, body.mass_kg, 0, 0, 0, x, y, z, 0, 0, 0);
+    dBodySetMass(made, &mass);
   }
 
   static void Near(void* data, dGeomID a, dGeomID b) {

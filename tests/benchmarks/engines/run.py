@@ -21,8 +21,8 @@ ROOT = pathlib.Path(__file__).resolve().parents[3]
 RATES_HZ = (60, 240, 1000)
 SAMPLE_RATE_HZ = 48000
 # Scene: simulated seconds, and the window of what travels.
-SECONDS = {"corner": 3.0, "collision": 1.0, "roll": 2.0, "slide": 2.0}
-TRAVELS_S = {"roll": (0.5, 1.8), "slide": (0.15, 0.85)}
+SECONDS = {"corner": 3.0, "collision": 1.0, "roll": 1.2, "slide": 2.0}
+TRAVELS_S = {"roll": (0.2, 1.1), "slide": (0.15, 0.85)}
 BLOW_S = 0.06
 LIMITS_DB = {"corner": 3, "collision": 3, "roll": 4, "slide": 4}
 REST_DB, LINES_DB = -100, 3

@@ -1,0 +1,123 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: Apache-2.0
+"""Runs one example: simulates it in an engine, renders its contacts, and draws what is heard.
+
+Leaves NAME-ENGINE.contacts, .wav (stereo, each body from its place), -spectrogram.png and -spectrum.png.
+"""
+
+import argparse
+import os
+import pathlib
+import sys
+import tempfile
+
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+SAMPLE_RATE_HZ = 48000
+
+
+def draw(sound, stem, title):
+    """The spectrogram and the spectrum of the mean of both channels."""
+    os.environ.setdefault("MPLCONFIGDIR", tempfile.gettempdir())
+    import matplotlib
+    matplotlib.use("Agg")
+    import numpy
+    from matplotlib import pyplot
+    highest_khz = SAMPLE_RATE_HZ / 2000
+    figure, (wave, picture) = pyplot.subplots(2, 1, sharex=True, figsize=(10, 6), layout="constrained",
+                                              height_ratios=(1, 3))
+    times = numpy.arange(len(sound.samples)) / sound.sample_rate_hz
+    wave.plot(times, sound.samples, linewidth=0.3, label=("left", "right"))
+    wave.legend(loc="upper right")
+    wave.set_ylabel("full scale")
+    wave.set_title(title)
+    _, _, _, image = picture.specgram(sound.mono + 1e-12, NFFT=2048, noverlap=1536, Fs=sound.sample_rate_hz / 1000,
+                                      scale="dB", cmap="magma", vmin=-140, vmax=-50)
+    image.set_extent((0, sound.seconds, 0, highest_khz))
+    picture.set_xlim(0, sound.seconds)
+    picture.set_xlabel("time, s")
+    picture.set_ylabel("frequency, kHz")
+    figure.colorbar(image, ax=picture, label="dB")
+    figure.savefig(f"{stem}-spectrogram.png", dpi=80)
+    pyplot.close(figure)
+    figure, axes = pyplot.subplots(figsize=(10, 4), layout="constrained")
+    frequencies = numpy.fft.rfftfreq(len(sound.mono), 1 / sound.sample_rate_hz)
+    magnitudes = numpy.abs(numpy.fft.rfft(sound.mono))
+    axes.semilogx(frequencies[1:], 20 * numpy.log10(magnitudes[1:] / magnitudes.max() + 1e-9), linewidth=0.5)
+    axes.set_xlim(20, SAMPLE_RATE_HZ / 2)
+    axes.set_ylim(-90, 3)
+    axes.set_xlabel("frequency, Hz")
+    axes.set_ylabel("dB of the greatest")
+    axes.set_title(title)
+    axes.grid(which="both", alpha=0.3)
+    figure.savefig(f"{stem}-spectrum.png", dpi=80)
+    pyplot.close(figure)
+
+
+def place_listener(path, extent_m):
+    """Lets a trace be heard in stereo from two and a half times its extent away."""
+    import carillon
+    from carillon.v1 import hearing_pb2
+    import falls
+    trace = carillon.Trace.read(path)
+    trace.header.hearing.CopyFrom(hearing_pb2.Hearing(distance_gain=True, panning=True))
+    ears = ((0, -2.5 * extent_m, 0.5 * extent_m), falls.about((1, 0, 0), 90))
+    trace.header.listener.CopyFrom(carillon.contacts.to_pose(ears))
+    trace.write(path)
+
+
+def render(client, path):
+    """In stereo, and softer than it is where that would be beyond full scale."""
+    import carillon
+    trace = carillon.Trace.read(path)
+    while True:
+        sound = client.render(trace, sample_rate_hz=SAMPLE_RATE_HZ, channel_count=2, tail_s=0.5)
+        if not sound.summary.limited_frame_count:
+            trace.write(path)
+            return sound
+        for body in trace.objects:
+            body.gain = (body.gain if body.HasField("gain") else 1) / 4
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("name")
+    parser.add_argument("--engine", default="bullet")
+    parser.add_argument("--rate", type=int, default=1000, help="steps a second")
+    parser.add_argument("--seconds", type=float, default=2.5, help="simulated time")
+    parser.add_argument("--build", type=pathlib.Path, default=ROOT / "build/release")
+    parser.add_argument("--out", type=pathlib.Path, help="a folder; BUILD/examples unless named")
+    options = parser.parse_args()
+    build = options.build.resolve()
+    sys.path[:0] = [str(build / "client_sdk/python"), str(ROOT / "client_sdk/examples/falls"),
+                    str(ROOT / "client_sdk/python"), str(ROOT / "tests/integration")]
+    os.environ.update(CARILLON_BIN_DIR=str(build / "bin"), CARILLON_BUILD_DIR=str(build))
+    # They need the paths above.
+    import carillon
+    import falls
+    import scene_makers
+    from daemon import Daemon
+    if options.name not in scene_makers.EXAMPLES or options.engine not in falls.ENGINES:
+        parser.error(f"the examples are {', '.join(scene_makers.EXAMPLES)}, the engines {', '.join(falls.ENGINES)}")
+    folder = (options.out or build / "examples").resolve()
+    folder.mkdir(parents=True, exist_ok=True)
+    stem = folder / f"{options.name}-{options.engine}"
+    trace = stem.with_suffix(".contacts")
+    scene = scene_makers.EXAMPLES[options.name](folder)
+    with tempfile.TemporaryDirectory(prefix="carillon-") as name:
+        daemon = Daemon(name)
+        try:
+            with carillon.connect(daemon.server) as client:
+                falls.record(options.engine, falls.create_models(client, scene, folder), trace, rate=options.rate,
+                             seconds=options.seconds, build=build)
+                place_listener(trace, scene["extent_m"])
+                sound = render(client, trace)
+        finally:
+            daemon.stop()
+    findings = sound.summary.findings
+    print(f"{stem.name}: {findings.blow_count} blows, {findings.load_count} loads, peak {sound.peak:.3g} of full scale")
+    sound.normalized().save(stem.with_suffix(".wav"))
+    draw(sound, stem, f"{options.name.replace('_', ' ')} in {options.engine}")
+
+
+if __name__ == "__main__":
+    main()

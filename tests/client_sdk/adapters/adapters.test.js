@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: Apache-2.0
+'use strict';
+
+const assert = require('node:assert/strict');
+const fs = require('node:fs');
+const path = require('node:path');
+const { test } = require('node:test');
+const HavokPhysics = require('@babylonjs/havok');
+const rapier = require('@dimforge/rapier3d-compat');
+
+const adapters = path.resolve(__dirname, '../../../client_sdk/adapters');
+const { ContactRows } = require(path.join(adapters, 'contact_rows'));
+const { HavokContacts } = require(path.join(adapters, 'havok_contacts'));
+const { RapierContacts } = require(path.join(adapters, 'rapier_contacts'));
+const { VelocityContacts } = require(path.join(adapters, 'velocity_contacts'));
+
+const STEP_S = 1 / 240;
+const GRAVITY = [0, 0, -9.81];
+const near = (actual, expected, tolerance) => assert.ok(Math.abs(actual - expected) <= tolerance,
+  `${actual} is not ${expected}`);
+const sum = (contacts) => contacts.reduce((total, { impulse }) => total.map((x, i) => x + impulse[i]), [0, 0, 0]);
+
+const still = (key) => ({ key });
+const moving = (key, massKg, velocity) => ({ key, massKg, centre: [0, 0, 0], velocity, angularVelocity: [0, 0, 0] });
+
+test('the object with the lower handle is the object of a row, however the engine orders the bodies', () => {
+  const rows = new ContactRows();
+  rows.addObject('a', 4);
+  rows.addObject('b', 2);
+  const contact = { point: [1, 0, 0], pointOnSecond: [2, 0, 0], normal: [0, 0, 1], impulse: [0, 0, 3] };
+  const [row] = rows.rows({ ...contact, first: still('a'), second: still('b') });
+  assert.deepEqual([row.object, row.point, row.second], [2, [2, 0, 0], { object: 4, point: [1, 0, 0] }]);
+  assert.deepEqual(row.impulse.map((x) => x + 0), [0, 0, -3]);
+  assert.deepEqual(rows.rows({ ...contact, first: still('c'), second: still('d') }), []);
+});
+
+test('velocities alone give the impulse of a collision', () => {
+  const contacts = new VelocityContacts();
+  contacts.addObject('a', 1);
+  const collision = { first: moving('a', 2, [0, 0, -3]), second: still('floor'), point: [0, 0, 0], normal: [0, 0, 1],
+    restitution: 0.5 };
+  assert.deepEqual(contacts.contacts([collision])[0].impulse, [0, 0, 9]);
+  const apart = { ...collision, first: moving('a', 2, [0, 0, 3]) };
+  assert.deepEqual(contacts.contacts([apart]), []);
+});
+
+test('friction of velocities alone is no greater than what stops the slip', () => {
+  const contacts = new VelocityContacts();
+  contacts.addObject('a', 1);
+  const collision = { first: moving('a', 2, [0.1, 0, -3]), second: still('floor'), point: [0, 0, 0], normal: [0, 0, 1],
+    friction: 0.5 };
+  near(contacts.contacts([collision])[0].impulse[0], -0.2, 1e-12);
+});
+
+/** A box of 2 kg that slides over a floor in Rapier. */
+async function slidingInRapier() {
+  await rapier.init();
+  const world = new rapier.World({ x: 0, y: 0, z: -9.81 });
+  world.timestep = STEP_S;
+  world.createCollider(rapier.ColliderDesc.cuboid(10, 10, 0.5).setTranslation(0, 0, -0.5).setFriction(0.2));
+  const body = world.createRigidBody(rapier.RigidBodyDesc.dynamic().setTranslation(0, 0, 0.015).setLinvel(2, 0, 0)
+    .setCanSleep(false));
+  world.createCollider(rapier.ColliderDesc.cuboid(0.1, 0.07, 0.015).setMass(2).setFriction(0.2), body);
+  return { world, body };
+}
+
+test('the impulses read out of Rapier are the change of momentum, friction included', async () => {
+  const { world, body } = await slidingInRapier();
+  const contacts = new RapierContacts({ roughness: { depth: 0.5 } });
+  contacts.addObject(body, 1);
+  for (let i = 0; i < 60; i += 1) {
+    const before = body.linvel();
+    world.step();
+    const [x, , z] = sum(contacts.read(world).contacts);
+    const after = body.linvel();
+    near(x, 2 * (after.x - before.x), 1e-4);
+    near(z, 2 * (after.z - before.z + 9.81 * STEP_S), 1e-4);
+    assert.ok(i < 5 || x < -0.01); // it slides
+  }
+  const { contacts: [contact], poses } = contacts.read(world);
+  near(contact.roughness.travel_speed_m_per_s, body.linvel().x, 0.01);
+  near(contact.point[2], 0, 0.002);
+  near(poses.positions[0][0], body.translation().x, 1e-6);
+});
+
+/** A box of 2 kg that falls on a floor in Havok. */
+async function fallInHavok() {
+  const wasmBinary = fs.readFileSync(require.resolve('@babylonjs/havok/lib/umd/HavokPhysics.wasm'));
+  const havok = await HavokPhysics({ wasmBinary });
+  const [, world] = havok.HP_World_Create();
+  havok.HP_World_SetGravity(world, GRAVITY);
+  const add = (motion, sides, position) => {
+    const [, shape] = havok.HP_Shape_CreateBox([0, 0, 0], [0, 0, 0, 1], sides);
+    const [, body] = havok.HP_Body_Create();
+    havok.HP_Body_SetShape(body, shape);
+    havok.HP_Body_SetMotionType(body, motion);
+    havok.HP_Body_SetQTransform(body, [position, [0, 0, 0, 1]]);
+    havok.HP_Body_SetMassProperties(body, [[0, 0, 0], 2, [0.01, 0.01, 0.01], [0, 0, 0, 1]]);
+    // Those that have finished, too, which the adapter must leave out.
+    havok.HP_Body_SetEventMask(body, HavokContacts.eventMask(havok) | havok.EventType.COLLISION_FINISHED.value);
+    havok.HP_Body_SetLinearDamping(body, 0);
+    havok.HP_World_AddBody(world, body, false);
+    return body;
+  };
+  add(havok.MotionType.STATIC, [20, 20, 1], [0, 0, -0.5]);
+  return { havok, world, body: add(havok.MotionType.DYNAMIC, [0.2, 0.14, 0.03], [0, 0, 0.065]) };
+}
+
+test('the impulses read out of Havok are the change of momentum, without those that have finished', async () => {
+  const { havok, world, body } = await fallInHavok();
+  const contacts = new HavokContacts(havok, { gravity: GRAVITY, friction: 0.5 });
+  contacts.addObject(body, 1);
+  havok.HP_Body_SetAngularVelocity(body, [0.3, 0.2, 0]);
+  let most = 0;
+  for (let i = 0; i < 120; i += 1) {
+    const before = havok.HP_Body_GetLinearVelocity(body)[1][2];
+    havok.HP_World_Step(world, STEP_S);
+    const along = sum(contacts.read(world, STEP_S).contacts)[2];
+    near(along, 2 * (havok.HP_Body_GetLinearVelocity(body)[1][2] - before + 9.81 * STEP_S), 0.02);
+    most = Math.max(most, along);
+  }
+  assert.ok(most > 0.5); // it has struck
+});
+
+test('a collision that Havok reports without an impulse gets one from the velocities before it', () => {
+  const contacts = new HavokContacts({}, { restitution: 0.5 });
+  contacts.contactRows.addObject(7n, 1);
+  contacts.before.set(7n, moving(7n, 2, [0, 0, -1]));
+  contacts.bodyOf = ([key]) => (key === 7n ? moving(7n, 2, [0, 0, 0.5]) : still(key));
+  contacts.poseOf = () => [[0, 0, 0], [1, 0, 0, 0]];
+  const side = (key, z) => [[key], [0n], [0, 0], [0, 0, 0], [0, 0, z], -1];
+  const event = { began: true, pair: '7 8', one: side(7n, -1), other: side(8n, 1), impulse: 0 };
+  contacts.events = () => [event, { ...event }];
+  const { contacts: found } = contacts.read([0n], STEP_S);
+  assert.equal(found.length, 1); // once for all points of the pair
+  near(found[0].impulse[2], 3, 1e-12);
+});
