@@ -89,6 +89,7 @@ absl::Status ReadKey(const std::string& key, const toml::node& node, Options& op
   if (key == "audio_device") return ReadValue(key, node, options.audio_device);
   if (key == "sample_rate") return ReadValue(key, node, options.sample_rate_hz);
   if (key == "channels") return ReadValue(key, node, options.channel_count);
+  if (key == "gain") return ReadValue(key, node, options.gain);
   if (key == "block_frames") return ReadValue(key, node, options.block_frame_count);
   if (key == "look_ahead_blocks") return ReadValue(key, node, options.look_ahead_block_count);
   if (key == "workers") return ReadValue(key, node, options.worker_count);
@@ -156,6 +157,7 @@ absl::Status Check(const Options& options) {
   for (const absl::Status& status :
        {CheckRange("--sample-rate", options.sample_rate_hz, 8000, 192000),
         CheckRange("--channels", options.channel_count, 1, 2),
+        CheckRange("--gain", options.gain, 0, 1000),
         CheckRange("--block-frames", options.block_frame_count, 16, 256),
         CheckRange("--look-ahead-blocks", options.look_ahead_block_count, 2, 64),
         CheckRange("--workers", options.worker_count, 0, 1024),
@@ -199,6 +201,8 @@ void AddFlags(CLI::App& app, Options& options) {
   app.add_option("--sample-rate", options.sample_rate_hz, "frames per second")
       ->capture_default_str();
   app.add_option("--channels", options.channel_count, "1 for mono, 2 for stereo")
+      ->capture_default_str();
+  app.add_option("--gain", options.gain, "linear gain of the output, before the limiter")
       ->capture_default_str();
   app.add_option("--block-frames", options.block_frame_count, "frames in a rendered block")
       ->capture_default_str();

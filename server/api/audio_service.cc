@@ -1,17 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/api/audio_service.h"
 
+#include <optional>
+
+#include "proto/cpp/status_macros.h"
 #include "server/api/listen_call.h"
 #include "server/api/render_call.h"
 #include "server/api/status_conversion.h"
+#include "server/api/unary_call.h"
 #include "server/synthesis/bank/level.h"
 #include "server/synthesis/bank/oscillator_bank.h"
 
 namespace carillon {
 
 grpc::ServerWriteReactor<v1::ListenResponse>* AudioService::Listen(
-    grpc::CallbackServerContext* context, const v1::ListenRequest*) {
-  return Open(*context, reception_, Role::kListen, [this] { return MakeListenCall(output_); });
+    grpc::CallbackServerContext* context, const v1::ListenRequest* request) {
+  return Open(*context, reception_, Role::kListen,
+              [this, request] { return MakeListenCall(output_, scenes_, *request); });
 }
 
 grpc::ServerBidiReactor<v1::RenderRequest, v1::RenderResponse>* AudioService::Render(
@@ -32,6 +37,20 @@ grpc::ServerUnaryReactor* AudioService::GetMixer(grpc::CallbackServerContext* co
   if (admitted.ok()) Describe(*response);
   reactor->Finish(ToGrpcStatus(admitted));
   return reactor;
+}
+
+grpc::ServerUnaryReactor* AudioService::UpdateMixer(grpc::CallbackServerContext* context,
+                                                    const v1::UpdateMixerRequest* request,
+                                                    v1::UpdateMixerResponse* response) {
+  return Answer(context, reception_, Role::kAdminister, [this, request, response] {
+    if (request->has_gain()) RETURN_IF_ERROR(ValidateGain(request->gain()));
+    const OutputVolume volume =
+        output_.ChangeVolume(request->has_gain() ? std::optional(request->gain()) : std::nullopt,
+                             request->has_muted() ? std::optional(request->muted()) : std::nullopt);
+    response->set_gain(volume.gain);
+    response->set_muted(volume.muted);
+    return absl::OkStatus();
+  });
 }
 
 void AudioService::Describe(v1::GetMixerResponse& mixer) const {
@@ -58,6 +77,8 @@ void AudioService::Describe(v1::GetMixerResponse& mixer) const {
   mixer.set_merged_impulse_count(state.mixer.merged_count);
   mixer.set_shed_impulse_count(state.mixer.shed_count);
   mixer.set_shed_object_count(state.mixer.shed_bank_count);
+  mixer.set_gain(output_.volume().gain);
+  mixer.set_muted(output_.volume().muted);
 }
 
 }  // namespace carillon

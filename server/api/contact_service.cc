@@ -28,12 +28,17 @@ constexpr int kMostSettlePeriods = 250;
 /// `stream_`. An answer is a snapshot; a newer one replaces the one that waits to be sent.
 class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::StreamContactsResponse> {
  public:
-  ContactCall(const ContactContext& daemon, const grpc::CallbackServerContext& context,
-              Principal caller)
-      : StreamWriter(nullptr), daemon_(daemon), context_(context), caller_(std::move(caller)) {
+  ContactCall(const ContactContext& daemon, TraceRecorders& recorders,
+              const grpc::CallbackServerContext& context, Principal caller)
+      : StreamWriter(nullptr),
+        daemon_(daemon),
+        recorders_(recorders),
+        context_(context),
+        caller_(std::move(caller)) {
     StartWriting();
     StartReading();
   }
+  ~ContactCall() override { recording_.End(); }
 
  private:
   absl::Status Take(const v1::StreamContactsRequest& request) override {
@@ -50,6 +55,7 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
 
   void AllRead() override {
     if (stream_) stream_->intake().Finish();
+    recording_.End();
     daemon_.reception.pool.Run([this] { Settle(); });
   }
 
@@ -69,6 +75,7 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
     if (start.has_scheduling_delay_s()) settings.scheduling_delay_s = start.scheduling_delay_s();
     settings.reading = ToContactReading(start.frame(), start.pulse_shape());
     ASSIGN_OR_RETURN(stream_, daemon_.scenes.OpenContactStream(scene, settings));
+    recording_ = StreamRecording(daemon_.scenes, scene, start, recorders_.Take(scene));
     Answer();
     return absl::OkStatus();
   }
@@ -78,7 +85,9 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
       return Refusal(absl::StatusCode::kInvalidArgument, "STREAM_NOT_STARTED",
                      "the first request of a contact stream must be start");
     }
+    if (recording_.active()) recording_.BeginStep();
     RETURN_IF_ERROR(ReadStep(step, stream_->intake()));
+    if (recording_.active()) recording_.AddStep(step, stream_->intake().mapping());
     const bool first = stream_->counts().step_count == 1;
     if (first || daemon_.clock.Monotonic() >= answer_due_) Answer();
     return absl::OkStatus();
@@ -142,6 +151,8 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
   }
 
   const ContactContext daemon_;
+  TraceRecorders& recorders_;
+  StreamRecording recording_;
   const grpc::CallbackServerContext& context_;
   const Principal caller_;
   std::unique_ptr<ContactStream> stream_;
@@ -151,12 +162,56 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
   std::optional<absl::Status> end_ ABSL_GUARDED_BY(mutex_);
 };
 
+/// Sends the records of a stream as they come.
+class RecordCall final : public ServerStream<v1::RecordContactsResponse> {
+ public:
+  RecordCall(TraceRecorders& recorders, absl::StatusOr<uint64_t> scene)
+      : StreamWriter(nullptr), status_(scene.status()) {
+    recorder_ = std::make_shared<TraceRecorder>(scene.value_or(0), [this] { Wake(); });
+    if (status_.ok()) recorders.Add(recorder_);
+    StartWriting();
+  }
+  /// The stream may hold the recorder longer than this call lives.
+  ~RecordCall() override { recorder_->Leave(); }
+
+ private:
+  absl::StatusOr<Supply> Fill(v1::RecordContactsResponse& response) override {
+    RETURN_IF_ERROR(status_);
+    if (!std::exchange(begun_, true)) return Supply::kMessage;
+    if (recorder_->overflowed()) {
+      return Refusal(absl::StatusCode::kDataLoss, "RECORDING_TOO_SLOW",
+                     "steps of the stream came faster than the client read them: record again, and "
+                     "write to a faster disk or over a faster network");
+    }
+    const bool ended = recorder_->ended();
+    if (recorder_->TryTake(*response.mutable_record())) return Supply::kMessage;
+    return ended ? Supply::kEnd : Supply::kLater;
+  }
+
+  const absl::Status status_;
+  std::shared_ptr<TraceRecorder> recorder_;
+  bool begun_ = false;
+};
+
 }  // namespace
+
+grpc::ServerWriteReactor<v1::RecordContactsResponse>* ContactService::RecordContacts(
+    grpc::CallbackServerContext* context, const v1::RecordContactsRequest* request) {
+  absl::StatusOr<Principal> caller = daemon_.reception.access.Admit(*context, Role::kStrike);
+  using Reactor = grpc::ServerWriteReactor<v1::RecordContactsResponse>;
+  if (!caller.ok()) return new RefusedCall<Reactor>(caller.status());
+  absl::StatusOr<uint64_t> scene = daemon_.owners.Parse(*context, *caller, request->scene());
+  if (scene.ok()) {
+    const absl::Status found = daemon_.scenes.BusOf(*scene).status();
+    if (!found.ok()) scene = found;
+  }
+  return new RecordCall(recorders_, std::move(scene));
+}
 
 grpc::ServerBidiReactor<v1::StreamContactsRequest, v1::StreamContactsResponse>*
 ContactService::StreamContacts(grpc::CallbackServerContext* context) {
   absl::StatusOr<Principal> caller = daemon_.reception.access.Admit(*context, Role::kStrike);
-  if (caller.ok()) return new ContactCall(daemon_, *context, *std::move(caller));
+  if (caller.ok()) return new ContactCall(daemon_, recorders_, *context, *std::move(caller));
   using Reactor = grpc::ServerBidiReactor<v1::StreamContactsRequest, v1::StreamContactsResponse>;
   return new RefusedCall<Reactor>(caller.status());
 }

@@ -13,18 +13,43 @@
 #include "server/api/unary_call.h"
 
 namespace carillon {
+namespace {
+
+v1::Scene ToProto(const SceneRegistry::SceneEntry& entry) {
+  v1::Scene scene;
+  scene.set_name(SceneName(entry.scene));
+  scene.set_object_count(static_cast<uint32_t>(entry.object_count));
+  scene.set_gain(entry.volume.gain);
+  scene.set_muted(entry.volume.muted);
+  scene.set_solo(entry.volume.solo);
+  scene.set_active_mode_count(static_cast<uint32_t>(entry.state.active_mode_count));
+  scene.set_peak(entry.state.peak);
+  return scene;
+}
+
+SceneVolumeChange ToVolumeChange(const v1::UpdateSceneRequest& request) {
+  SceneVolumeChange change;
+  if (request.has_gain()) change.gain = request.gain();
+  if (request.has_muted()) change.muted = request.muted();
+  if (request.has_solo()) change.solo = request.solo();
+  return change;
+}
+
+}  // namespace
 
 grpc::ServerUnaryReactor* SceneService::CreateScene(grpc::CallbackServerContext* context,
                                                     const v1::CreateSceneRequest* request,
                                                     v1::CreateSceneResponse* response) {
-  return Answer(
-      context, reception_, Role::kStrike, [this, request, response](const Principal& caller) {
-        ASSIGN_OR_RETURN(const uint64_t scene, scenes_.CreateScene(ToSceneSpace(
-                                                   request->hearing(), request->listener())));
-        owners_.Add(scene, caller.name);
-        response->set_name(SceneName(scene));
-        return absl::OkStatus();
-      });
+  return Answer(context, reception_, Role::kStrike,
+                [this, request, response](const Principal& caller) {
+                  ASSIGN_OR_RETURN(
+                      const uint64_t scene,
+                      scenes_.CreateScene(ToSceneSpace(request->hearing(), request->listener()),
+                                          request->has_gain() ? request->gain() : 1, caller.name));
+                  owners_.Add(scene, caller.name);
+                  response->set_name(SceneName(scene));
+                  return absl::OkStatus();
+                });
 }
 
 grpc::ServerUnaryReactor* SceneService::DeleteScene(grpc::CallbackServerContext* context,
@@ -39,15 +64,48 @@ grpc::ServerUnaryReactor* SceneService::DeleteScene(grpc::CallbackServerContext*
       });
 }
 
+grpc::ServerUnaryReactor* SceneService::UpdateScene(grpc::CallbackServerContext* context,
+                                                    const v1::UpdateSceneRequest* request,
+                                                    v1::UpdateSceneResponse* response) {
+  return Answer(context, reception_, Role::kStrike,
+                [this, context, request, response](const Principal& caller) {
+                  ASSIGN_OR_RETURN(const uint64_t scene,
+                                   owners_.Parse(*context, caller, request->name()));
+                  RETURN_IF_ERROR(scenes_.ChangeVolume(scene, ToVolumeChange(*request)));
+                  ASSIGN_OR_RETURN(const SceneRegistry::SceneEntry entry, scenes_.GetScene(scene));
+                  *response->mutable_scene() = ToProto(entry);
+                  return absl::OkStatus();
+                });
+}
+
+grpc::ServerUnaryReactor* SceneService::StopAll(grpc::CallbackServerContext* context,
+                                                const v1::StopAllRequest* request,
+                                                v1::StopAllResponse* response) {
+  return Answer(context, reception_, Role::kStrike,
+                [this, context, request, response](const Principal& caller) {
+                  if (request->scene().empty()) {
+                    for (const SceneRegistry::SceneEntry& entry : scenes_.ListScenes()) {
+                      const bool stopped =
+                          owners_.Owns(caller, entry.scene) && scenes_.Stop(entry.scene).ok();
+                      if (stopped) response->set_scene_count(response->scene_count() + 1);
+                    }
+                    return absl::OkStatus();
+                  }
+                  ASSIGN_OR_RETURN(const uint64_t scene,
+                                   owners_.Parse(*context, caller, request->scene()));
+                  RETURN_IF_ERROR(scenes_.Stop(scene));
+                  response->set_scene_count(1);
+                  return absl::OkStatus();
+                });
+}
+
 grpc::ServerUnaryReactor* SceneService::ListScenes(grpc::CallbackServerContext* context,
                                                    const v1::ListScenesRequest*,
                                                    v1::ListScenesResponse* response) {
   return Answer(context, reception_, Role::kStrike, [this, response](const Principal& caller) {
     for (const SceneRegistry::SceneEntry& entry : scenes_.ListScenes()) {
       if (!owners_.Owns(caller, entry.scene)) continue;
-      v1::Scene& scene = *response->add_scenes();
-      scene.set_name(SceneName(entry.scene));
-      scene.set_object_count(static_cast<uint32_t>(entry.object_count));
+      *response->add_scenes() = ToProto(entry);
     }
     return absl::OkStatus();
   });
