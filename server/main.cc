@@ -179,7 +179,8 @@ OutputSettings OutputSettingsOf(const Options& options) {
                      .channel_count = options.channel_count},
           .look_ahead_block_count = options.look_ahead_block_count,
           .device = options.audio_device,
-          .device_program = options.audio_program};
+          .device_program = options.audio_program,
+          .gain = options.gain};
 }
 
 ApiSettings ApiSettingsOf(const Options& options) {

@@ -77,6 +77,7 @@ void VisitSettings(SomeOptions& options, const Visit& visit) {
   visit("audio_program", options.audio_program);
   visit("sample_rate", options.sample_rate_hz);
   visit("channels", options.channel_count);
+  visit("gain", options.gain);
   visit("block_frames", options.block_frame_count);
   visit("look_ahead_blocks", options.look_ahead_block_count);
   visit("scene_grace", options.scene_grace_s);
@@ -170,6 +171,7 @@ absl::Status Check(const Options& options) {
   for (const absl::Status& status :
        {CheckRange("--sample-rate", options.sample_rate_hz, 8000, 192000),
         CheckRange("--channels", options.channel_count, 1, 2),
+        CheckRange("--gain", options.gain, 0, 1000),
         CheckRange("--block-frames", options.block_frame_count, 16, 256),
         CheckRange("--look-ahead-blocks", options.look_ahead_block_count, 2, 64),
         CheckRange("--workers", options.worker_count, 0, 1024),
@@ -219,6 +221,8 @@ void AddFlags(CLI::App& app, Options& options) {
   app.add_option("--sample-rate", options.sample_rate_hz, "frames per second")
       ->capture_default_str();
   app.add_option("--channels", options.channel_count, "1 for mono, 2 for stereo")
+      ->capture_default_str();
+  app.add_option("--gain", options.gain, "linear gain of the output, before the limiter")
       ->capture_default_str();
   app.add_option("--block-frames", options.block_frame_count, "frames in a rendered block")
       ->capture_default_str();

@@ -80,9 +80,25 @@ struct StrikeOptions {
   std::optional<double> seconds;  ///< absent: until the longest mode is 60 dB down, 30 s at most
 };
 
+/// The options of `carillon volume`.
+struct VolumeOptions {
+  std::string scene;  ///< empty: the output
+  std::optional<double> gain;
+  std::optional<bool> muted;
+  std::optional<bool> solo;
+};
+
+/// The options of `carillon top`.
+struct TopOptions {
+  bool once = false;
+  double interval_s = 1;
+};
+
 /// The options of `carillon listen`.
 struct ListenOptions {
   std::string out;                ///< empty: raw samples to stdout
+  std::string scene;              ///< empty: the output
+  bool quiet = false;             ///< no meter on a terminal
   std::optional<double> seconds;  ///< absent: until the program is stopped
 };
 
@@ -147,5 +163,18 @@ absl::Status Strike(const client::Client& daemon, const StrikeOptions& options,
 absl::Status Listen(const client::Client& daemon, const ListenOptions& options,
                     const StopSignal& stop);
 absl::Status Render(const client::Client& daemon, const RenderOptions& options, bool json);
+
+/// Returns the name of a scene that `text` names as "scenes/7" or "7"; empty stays empty.
+std::string SceneNamed(const std::string& text);
+/// Changes what the options have, and prints the volume.
+absl::Status ChangeVolume(const client::Client& daemon, const VolumeOptions& options, bool json);
+/// Silences a scene, or all of the caller if `scene` is empty.
+absl::Status StopSound(const client::Client& daemon, const std::string& scene, bool json);
+/// Writes the next contact stream of a scene to the file `out`, until the stream ends.
+absl::Status RecordContacts(const client::Client& daemon, const std::string& scene,
+                            const std::string& out, const StopSignal& stop);
+/// Shows mixer, scenes and jobs again and again.
+absl::Status Top(const client::Client& daemon, const std::string& server, const TopOptions& options,
+                 const StopSignal& stop, bool json);
 
 }  // namespace carillon::cli

@@ -5,7 +5,6 @@
 #include <cstring>
 #include <fstream>
 
-#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/strip.h"
@@ -20,10 +19,6 @@
 
 namespace carillon::cli {
 namespace {
-
-std::string SceneNamed(const std::string& text) {
-  return absl::StartsWith(text, "scenes/") ? text : absl::StrCat("scenes/", text);
-}
 
 void PrintObject(const v1::SoundingObject& object) {
   absl::PrintF("  %-6d %-12s  %4d modes  %8.1f to %.1f Hz  size %.4g  gain %.4g\n", object.handle(),
@@ -125,7 +120,9 @@ absl::Status ListScenes(const client::Client& daemon, bool json) {
     return absl::OkStatus();
   }
   for (const v1::Scene& scene : scenes) {
-    absl::PrintF("%s  %d objects  %s\n", scene.name(), scene.object_count(), LeaseText(scene));
+    absl::PrintF("%s  %d objects  gain %.4g%s%s  %s\n", scene.name(), scene.object_count(),
+                 scene.gain(), scene.muted() ? "  muted" : "", scene.solo() ? "  solo" : "",
+                 LeaseText(scene));
     const auto objects = daemon.ListObjects(scene.name());
     // A scene may be deleted meanwhile.
     if (!objects.ok()) continue;

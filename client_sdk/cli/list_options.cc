@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "client_sdk/cli/commands.h"
+#include "client_sdk/cli/sound_options.h"
 
 namespace carillon::cli {
 namespace {
@@ -85,7 +86,8 @@ void AddMaterials(CLI::App& app, Program& program) {
 }
 
 void AddScenes(CLI::App& app, Program& program) {
-  CLI::App& scene = *app.add_subcommand("scene", "List and delete scenes")->require_subcommand(1);
+  CLI::App& scene =
+      *app.add_subcommand("scene", "List, record and delete scenes")->require_subcommand(1);
   scene.add_subcommand("list", "List the scenes and their objects")->callback([&program] {
     program.command = [&program] { return ListScenes(*program.Daemon(), program.json); };
   });
@@ -93,6 +95,7 @@ void AddScenes(CLI::App& app, Program& program) {
            "The name or the number of a scene", [&program](const std::string& text) {
              program.command = [&program, text] { return DeleteScene(*program.Daemon(), text); };
            });
+  AddSceneRecord(scene, program);
 }
 
 void AddExample(CLI::App& app, Program& program) {

@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <optional>
+#include <string>
 #include <utility>
 
 #include "absl/strings/str_format.h"
@@ -11,6 +16,41 @@
 namespace carillon::cli {
 namespace {
 
+/// Shows the level on stderr ten times a second, in one line that is written anew: a bar from -60
+/// dB to full scale for the largest sample, and the largest one so far.
+class LevelMeter {
+ public:
+  void Take(const client::AudioBlock& block) {
+    for (const float sample : block.samples) peak_ = std::max(peak_, std::abs(sample));
+    frame_count_ += block.samples.size() / block.channel_count;
+    if (frame_count_ < block.sample_rate_hz / kPerSecond) return;
+    Show();
+    frame_count_ = 0;
+    peak_ = 0;
+  }
+
+  void Finish() const { std::fputc('\n', stderr); }
+
+ private:
+  static constexpr uint64_t kPerSecond = 10;
+  static constexpr double kWidth = 40;
+  static constexpr double kLowestDb = -60;
+
+  void Show() {
+    largest_ = std::max(largest_, peak_);
+    const double db = peak_ > 0 ? 20 * std::log10(peak_) : kLowestDb;
+    const double part = std::clamp(1 - db / kLowestDb, 0.0, 1.0);
+    const auto length = static_cast<size_t>(std::lround(part * kWidth));
+    std::string bar(length, '#');
+    bar.resize(static_cast<size_t>(kWidth), '.');
+    absl::FPrintF(stderr, "\r[%s] %-10s  largest %-10s", bar, Decibels(peak_), Decibels(largest_));
+  }
+
+  float peak_ = 0;
+  float largest_ = 0;
+  uint64_t frame_count_ = 0;
+};
+
 /// Writes blocks until the time is over, a signal arrives, or the reader of stdout has gone.
 class Recorder {
  public:
@@ -20,10 +60,17 @@ class Recorder {
     if (frame_count_ == 0) Begin(block);
     const size_t frames = Wanted(block);
     if (status_.ok()) Put(block.samples.first(frames * block.channel_count));
+    if (meter_) meter_->Take(block);
     frame_count_ += frames;
     lost_frame_count_ = block.lost_frame_count;
     return status_.ok() && !reader_gone_ && frames * block.channel_count == block.samples.size() &&
            !stop_.ArrivesWithin(0);
+  }
+
+  /// Completes the file.
+  void Finish() {
+    if (meter_) meter_->Finish();
+    if (file_ && status_.ok()) status_ = file_->Finish();
   }
 
   const absl::Status& status() const { return status_; }
@@ -31,6 +78,7 @@ class Recorder {
 
  private:
   void Begin(const client::AudioBlock& block) {
+    if (!options_.quiet && isatty(STDERR_FILENO) != 0) meter_.emplace();
     if (options_.out.empty()) {
       absl::FPrintF(stderr, "raw samples: float, little endian, %d Hz, %d channels\n",
                     block.sample_rate_hz, block.channel_count);
@@ -62,6 +110,7 @@ class Recorder {
   const StopSignal& stop_;
   absl::Status status_;
   std::optional<WaveFile> file_;
+  std::optional<LevelMeter> meter_;
   uint64_t frame_count_ = 0;
   uint64_t lost_frame_count_ = 0;
   bool reader_gone_ = false;
@@ -74,8 +123,11 @@ absl::Status Listen(const client::Client& daemon, const ListenOptions& options,
   // A reader of stdout that closes its pipe ends the recording without an error.
   std::signal(SIGPIPE, SIG_IGN);
   Recorder recorder(options, stop);
-  const absl::Status heard =
-      daemon.Listen([&](const client::AudioBlock& block) { return recorder.Take(block); });
+  v1::ListenRequest request;
+  request.set_scene(SceneNamed(options.scene));
+  const absl::Status heard = daemon.ListenTo(
+      request, [&](const client::AudioBlock& block) { return recorder.Take(block); });
+  recorder.Finish();
   if (recorder.lost_frame_count() > 0) {
     absl::FPrintF(stderr, "%d frames lost on the way\n", recorder.lost_frame_count());
   }

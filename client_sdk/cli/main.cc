@@ -15,6 +15,7 @@
 #include "client_sdk/cli/model_options.h"
 #include "client_sdk/cli/output.h"
 #include "client_sdk/cli/program.h"
+#include "client_sdk/cli/sound_options.h"
 #include "proto/cpp/manual_page.h"
 #include "proto/cpp/striker_catalogue.h"
 
@@ -146,6 +147,9 @@ void AddListen(CLI::App& app, Program& program) {
       .add_option("--seconds", options->seconds,
                   "The time to record, s [until the program is stopped]")
       ->check(CLI::Range(0.0, 1e9));
+  listen.add_option("--scene", options->scene,
+                    "The name or the number of a scene to record alone [the output]");
+  listen.add_flag("--quiet", options->quiet, "Show no level on the terminal");
   listen.callback([&program, options] {
     program.command = [&program, options] {
       const StopSignal stop;
@@ -233,6 +237,9 @@ int Main(int argc, char** argv) {
   AddStrike(app, program);
   AddListen(app, program);
   AddRender(app, program);
+  AddVolume(app, program);
+  AddStop(app, program);
+  AddTop(app, program);
   AddExample(app, program);
   AddCompletion(app, program);
   try {

@@ -9,6 +9,8 @@ include(CMakePackageConfigHelpers)
 set(package_folder ${CMAKE_INSTALL_LIBDIR}/cmake/carillon)
 install(TARGETS carillon_client EXPORT carillonTargets ARCHIVE COMPONENT sdk INCLUDES DESTINATION include)
 install(DIRECTORY client_sdk/cpp/include/carillon TYPE INCLUDE COMPONENT sdk)
+# The C interface: carillon.h, libcarillon.so.
+install(TARGETS carillon_c LIBRARY COMPONENT sdk NAMELINK_COMPONENT sdk PUBLIC_HEADER COMPONENT sdk)
 install(DIRECTORY ${PROJECT_BINARY_DIR}/proto/carillon TYPE INCLUDE COMPONENT sdk
         FILES_MATCHING PATTERN "*.pb.h" PATTERN "*.grpc.pb.h" EXCLUDE)
 install(EXPORT carillonTargets NAMESPACE carillon:: DESTINATION ${package_folder} COMPONENT sdk)

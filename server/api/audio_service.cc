@@ -1,21 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/api/audio_service.h"
 
+#include <optional>
 #include <utility>
 
+#include "proto/cpp/status_macros.h"
 #include "server/api/listen_call.h"
 #include "server/api/render_call.h"
 #include "server/api/status_conversion.h"
+#include "server/api/unary_call.h"
 #include "server/synthesis/bank/level.h"
 #include "server/synthesis/bank/oscillator_bank.h"
 
 namespace carillon {
 
 grpc::ServerWriteReactor<v1::ListenResponse>* AudioService::Listen(
-    grpc::CallbackServerContext* context, const v1::ListenRequest*) {
+    grpc::CallbackServerContext* context, const v1::ListenRequest* request) {
   return Open(*context, reception_, Role::kListen, Holding::kListener,
-              [this](const Principal&, ClientPlace place) {
-                return MakeListenCall(output_, std::move(place));
+              [this, request](const Principal&, ClientPlace place) {
+                return MakeListenCall(output_, scenes_, *request, std::move(place));
               });
 }
 
@@ -43,6 +46,20 @@ grpc::ServerUnaryReactor* AudioService::GetMixer(grpc::CallbackServerContext* co
   return reactor;
 }
 
+grpc::ServerUnaryReactor* AudioService::UpdateMixer(grpc::CallbackServerContext* context,
+                                                    const v1::UpdateMixerRequest* request,
+                                                    v1::UpdateMixerResponse* response) {
+  return Answer(context, reception_, Role::kAdminister, [this, request, response] {
+    if (request->has_gain()) RETURN_IF_ERROR(ValidateGain(request->gain()));
+    const OutputVolume volume =
+        output_.ChangeVolume(request->has_gain() ? std::optional(request->gain()) : std::nullopt,
+                             request->has_muted() ? std::optional(request->muted()) : std::nullopt);
+    response->set_gain(volume.gain);
+    response->set_muted(volume.muted);
+    return absl::OkStatus();
+  });
+}
+
 void AudioService::Describe(v1::GetMixerResponse& mixer) const {
   const OutputState state = output_.state();
   mixer.set_version(version_);
@@ -67,6 +84,8 @@ void AudioService::Describe(v1::GetMixerResponse& mixer) const {
   mixer.set_merged_impulse_count(state.mixer.merged_count);
   mixer.set_shed_impulse_count(state.mixer.shed_count);
   mixer.set_shed_object_count(state.mixer.shed_bank_count);
+  mixer.set_gain(output_.volume().gain);
+  mixer.set_muted(output_.volume().muted);
 }
 
 }  // namespace carillon

@@ -37,6 +37,9 @@ class AudioService final : public v1::AudioService::CallbackService {
   grpc::ServerUnaryReactor* GetMixer(grpc::CallbackServerContext* context,
                                      const v1::GetMixerRequest* request,
                                      v1::GetMixerResponse* response) override;
+  grpc::ServerUnaryReactor* UpdateMixer(grpc::CallbackServerContext* context,
+                                        const v1::UpdateMixerRequest* request,
+                                        v1::UpdateMixerResponse* response) override;
 
  private:
   void Describe(v1::GetMixerResponse& mixer) const;

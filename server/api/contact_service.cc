@@ -28,16 +28,18 @@ constexpr int kMostSettlePeriods = 250;
 /// `stream_`. An answer is a snapshot; a newer one replaces the one that waits to be sent.
 class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::StreamContactsResponse> {
  public:
-  ContactCall(const ContactContext& daemon, const grpc::CallbackServerContext& context,
-              Principal caller, ClientPlace place)
+  ContactCall(const ContactContext& daemon, TraceRecorders& recorders,
+              const grpc::CallbackServerContext& context, Principal caller, ClientPlace place)
       : StreamWriter(nullptr),
         daemon_(daemon),
+        recorders_(recorders),
         context_(context),
         caller_(std::move(caller)),
         place_(std::move(place)) {
     StartWriting();
     StartReading();
   }
+  ~ContactCall() override { recording_.End(); }
 
  private:
   absl::Status Take(const v1::StreamContactsRequest& request) override {
@@ -54,6 +56,7 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
 
   void AllRead() override {
     if (stream_) stream_->intake().Finish();
+    recording_.End();
     daemon_.reception.pool.Run([this] { Settle(); });
   }
 
@@ -73,6 +76,7 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
     if (start.has_scheduling_delay_s()) settings.scheduling_delay_s = start.scheduling_delay_s();
     settings.reading = ToContactReading(start.frame(), start.pulse_shape());
     ASSIGN_OR_RETURN(stream_, daemon_.scenes.OpenContactStream(scene, settings));
+    recording_ = StreamRecording(daemon_.scenes, scene, start, recorders_.Take(scene));
     Answer();
     return absl::OkStatus();
   }
@@ -82,7 +86,9 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
       return Refusal(absl::StatusCode::kInvalidArgument, "STREAM_NOT_STARTED",
                      "the first request of a contact stream must be start");
     }
+    if (recording_.active()) recording_.BeginStep();
     RETURN_IF_ERROR(ReadStep(step, stream_->intake()));
+    if (recording_.active()) recording_.AddStep(step, stream_->intake().mapping());
     const bool first = stream_->counts().step_count == 1;
     if (first || daemon_.clock.Monotonic() >= answer_due_) Answer();
     return absl::OkStatus();
@@ -146,6 +152,8 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
   }
 
   const ContactContext daemon_;
+  TraceRecorders& recorders_;
+  StreamRecording recording_;
   const grpc::CallbackServerContext& context_;
   const Principal caller_;
   const ClientPlace place_;
@@ -156,14 +164,60 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
   std::optional<absl::Status> end_ ABSL_GUARDED_BY(mutex_);
 };
 
+/// Sends the records of a stream as they come.
+class RecordCall final : public ServerStream<v1::RecordContactsResponse> {
+ public:
+  RecordCall(TraceRecorders& recorders, absl::StatusOr<uint64_t> scene, ClientPlace place)
+      : StreamWriter(nullptr), place_(std::move(place)), status_(scene.status()) {
+    recorder_ = std::make_shared<TraceRecorder>(scene.value_or(0), [this] { Wake(); });
+    if (status_.ok()) recorders.Add(recorder_);
+    StartWriting();
+  }
+  /// The stream may hold the recorder longer than this call lives.
+  ~RecordCall() override { recorder_->Leave(); }
+
+ private:
+  absl::StatusOr<Supply> Fill(v1::RecordContactsResponse& response) override {
+    RETURN_IF_ERROR(status_);
+    if (!std::exchange(begun_, true)) return Supply::kMessage;
+    if (recorder_->overflowed()) {
+      return Refusal(absl::StatusCode::kDataLoss, "RECORDING_TOO_SLOW",
+                     "steps of the stream came faster than the client read them: record again, and "
+                     "write to a faster disk or over a faster network");
+    }
+    const bool ended = recorder_->ended();
+    if (recorder_->TryTake(*response.mutable_record())) return Supply::kMessage;
+    return ended ? Supply::kEnd : Supply::kLater;
+  }
+
+  const ClientPlace place_;
+  const absl::Status status_;
+  std::shared_ptr<TraceRecorder> recorder_;
+  bool begun_ = false;
+};
+
 }  // namespace
+
+grpc::ServerWriteReactor<v1::RecordContactsResponse>* ContactService::RecordContacts(
+    grpc::CallbackServerContext* context, const v1::RecordContactsRequest* request) {
+  using Reactor = grpc::ServerWriteReactor<v1::RecordContactsResponse>;
+  const auto make = [&](const Principal& caller, ClientPlace place) -> Reactor* {
+    absl::StatusOr<uint64_t> scene = daemon_.owners.Parse(*context, caller, request->scene());
+    if (scene.ok()) {
+      const absl::Status found = daemon_.scenes.BusOf(*scene).status();
+      if (!found.ok()) scene = found;
+    }
+    return new RecordCall(recorders_, std::move(scene), std::move(place));
+  };
+  return Open(*context, daemon_.reception, Role::kStrike, Holding::kListener, make);
+}
 
 grpc::ServerBidiReactor<v1::StreamContactsRequest, v1::StreamContactsResponse>*
 ContactService::StreamContacts(grpc::CallbackServerContext* context) {
   using Reactor = grpc::ServerBidiReactor<v1::StreamContactsRequest, v1::StreamContactsResponse>;
   return Open(*context, daemon_.reception, Role::kStrike, Holding::kContactStream,
               [&](const Principal& caller, ClientPlace place) -> Reactor* {
-                return new ContactCall(daemon_, *context, caller, std::move(place));
+                return new ContactCall(daemon_, recorders_, *context, caller, std::move(place));
               });
 }
 

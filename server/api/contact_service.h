@@ -4,6 +4,7 @@
 #include "carillon/v1/contact_service.grpc.pb.h"
 #include "server/api/reception.h"
 #include "server/api/scene_owners.h"
+#include "server/api/trace_recorders.h"
 #include "server/base/clock.h"
 #include "server/live_output/live_output.h"
 #include "server/scene/scene_registry.h"
@@ -26,9 +27,12 @@ class ContactService final : public v1::ContactService::CallbackService {
 
   grpc::ServerBidiReactor<v1::StreamContactsRequest, v1::StreamContactsResponse>* StreamContacts(
       grpc::CallbackServerContext* context) override;
+  grpc::ServerWriteReactor<v1::RecordContactsResponse>* RecordContacts(
+      grpc::CallbackServerContext* context, const v1::RecordContactsRequest* request) override;
 
  private:
   const ContactContext daemon_;
+  TraceRecorders recorders_;
 };
 
 }  // namespace carillon

@@ -6,11 +6,15 @@
 #include "carillon/v1/audio_service.pb.h"
 #include "server/api/client_limits.h"
 #include "server/live_output/live_output.h"
+#include "server/scene/scene_registry.h"
 
 namespace carillon {
 
 /// Makes the server's side of one call of AudioService.Listen. The returned reactor deletes itself
-/// when the call ends; it holds `place`. `output` must outlive it.
-grpc::ServerWriteReactor<v1::ListenResponse>* MakeListenCall(LiveOutput& output, ClientPlace place);
+/// when the call ends; it holds `place`. `output` and `scenes` must outlive it.
+grpc::ServerWriteReactor<v1::ListenResponse>* MakeListenCall(LiveOutput& output,
+                                                             const SceneRegistry& scenes,
+                                                             const v1::ListenRequest& request,
+                                                             ClientPlace place);
 
 }  // namespace carillon

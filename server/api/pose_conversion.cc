@@ -28,6 +28,18 @@ v1::Pose ToProto(const Pose& pose) {
   return proto;
 }
 
+v1::Hearing ToProto(const HearingSettings& hearing) {
+  v1::Hearing proto;
+  proto.set_distance_gain(hearing.distance_gain);
+  proto.set_propagation_delay(hearing.propagation_delay);
+  proto.set_panning(hearing.panning);
+  proto.set_directivity(hearing.directivity);
+  proto.set_near_field(hearing.near_field);
+  proto.set_reference_distance_m(hearing.reference_distance_m);
+  proto.set_sound_speed_m_per_s(hearing.sound_speed_m_per_s);
+  return proto;
+}
+
 SceneSpace ToSceneSpace(const v1::Hearing& hearing, const v1::Pose& listener) {
   SceneSpace space{.hearing = {.distance_gain = hearing.distance_gain(),
                                .propagation_delay = hearing.propagation_delay(),

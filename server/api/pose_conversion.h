@@ -13,6 +13,7 @@ Quaternion FromProto(const v1::Quaternion& proto);
 Pose FromProto(const v1::Pose& proto);
 
 v1::Pose ToProto(const Pose& pose);
+v1::Hearing ToProto(const HearingSettings& hearing);
 
 /// Converts without a check. Zeros are replaced by the contract's defaults.
 SceneSpace ToSceneSpace(const v1::Hearing& hearing, const v1::Pose& listener);

@@ -13,6 +13,35 @@
 #include "server/api/unary_call.h"
 
 namespace carillon {
+namespace {
+
+v1::Scene ToProto(const SceneRegistry::SceneEntry& entry) {
+  v1::Scene scene;
+  scene.set_name(SceneName(entry.scene));
+  scene.set_object_count(static_cast<uint32_t>(entry.object_count));
+  scene.set_gain(entry.volume.gain);
+  scene.set_muted(entry.volume.muted);
+  scene.set_solo(entry.volume.solo);
+  scene.set_active_mode_count(static_cast<uint32_t>(entry.state.active_mode_count));
+  scene.set_peak(entry.state.peak);
+  return scene;
+}
+
+void AddLease(const LeaseState& lease, v1::Scene& scene) {
+  scene.set_keep(lease.keep);
+  scene.set_connection_count(static_cast<uint32_t>(lease.connection_count));
+  if (lease.ends_in_s) scene.set_ends_in_s(*lease.ends_in_s);
+}
+
+SceneVolumeChange ToVolumeChange(const v1::UpdateSceneRequest& request) {
+  SceneVolumeChange change;
+  if (request.has_gain()) change.gain = request.gain();
+  if (request.has_muted()) change.muted = request.muted();
+  if (request.has_solo()) change.solo = request.solo();
+  return change;
+}
+
+}  // namespace
 
 grpc::ServerUnaryReactor* SceneService::CreateScene(grpc::CallbackServerContext* context,
                                                     const v1::CreateSceneRequest* request,
@@ -37,6 +66,42 @@ grpc::ServerUnaryReactor* SceneService::DeleteScene(grpc::CallbackServerContext*
       });
 }
 
+grpc::ServerUnaryReactor* SceneService::UpdateScene(grpc::CallbackServerContext* context,
+                                                    const v1::UpdateSceneRequest* request,
+                                                    v1::UpdateSceneResponse* response) {
+  return Answer(context, reception_, Role::kStrike,
+                [this, context, request, response](const Principal& caller) {
+                  ASSIGN_OR_RETURN(const uint64_t scene,
+                                   owners_.Parse(*context, caller, request->name()));
+                  RETURN_IF_ERROR(scenes_.ChangeVolume(scene, ToVolumeChange(*request)));
+                  ASSIGN_OR_RETURN(const SceneRegistry::SceneEntry entry, scenes_.GetScene(scene));
+                  *response->mutable_scene() = ToProto(entry);
+                  AddLease(owners_.leases().StateOf(scene), *response->mutable_scene());
+                  return absl::OkStatus();
+                });
+}
+
+grpc::ServerUnaryReactor* SceneService::StopAll(grpc::CallbackServerContext* context,
+                                                const v1::StopAllRequest* request,
+                                                v1::StopAllResponse* response) {
+  return Answer(context, reception_, Role::kStrike,
+                [this, context, request, response](const Principal& caller) {
+                  if (request->scene().empty()) {
+                    for (const SceneRegistry::SceneEntry& entry : scenes_.ListScenes()) {
+                      const bool stopped =
+                          owners_.Owns(caller, entry.scene) && scenes_.Stop(entry.scene).ok();
+                      if (stopped) response->set_scene_count(response->scene_count() + 1);
+                    }
+                    return absl::OkStatus();
+                  }
+                  ASSIGN_OR_RETURN(const uint64_t scene,
+                                   owners_.Parse(*context, caller, request->scene()));
+                  RETURN_IF_ERROR(scenes_.Stop(scene));
+                  response->set_scene_count(1);
+                  return absl::OkStatus();
+                });
+}
+
 grpc::ServerUnaryReactor* SceneService::ListScenes(grpc::CallbackServerContext* context,
                                                    const v1::ListScenesRequest*,
                                                    v1::ListScenesResponse* response) {
@@ -44,12 +109,8 @@ grpc::ServerUnaryReactor* SceneService::ListScenes(grpc::CallbackServerContext* 
     for (const SceneRegistry::SceneEntry& entry : scenes_.ListScenes()) {
       if (!owners_.Owns(caller, entry.scene)) continue;
       v1::Scene& scene = *response->add_scenes();
-      scene.set_name(SceneName(entry.scene));
-      scene.set_object_count(static_cast<uint32_t>(entry.object_count));
-      const LeaseState lease = owners_.leases().StateOf(entry.scene);
-      scene.set_keep(lease.keep);
-      scene.set_connection_count(static_cast<uint32_t>(lease.connection_count));
-      if (lease.ends_in_s) scene.set_ends_in_s(*lease.ends_in_s);
+      scene = ToProto(entry);
+      AddLease(owners_.leases().StateOf(entry.scene), scene);
     }
     return absl::OkStatus();
   });
@@ -122,9 +183,10 @@ absl::StatusOr<uint64_t> SceneService::Create(const grpc::CallbackServerContext&
     place = reception_.limits.Take(Holding::kScene, caller.client);
   }
   if (!place.ok()) return reception_.access.Refuse(context, place.status());
-  absl::StatusOr<uint64_t> scene = scenes_.CreateScene(space);
+  const double gain = request.has_gain() ? request.gain() : 1;
+  absl::StatusOr<uint64_t> scene = scenes_.CreateScene(space, gain, caller.name);
   if (absl::IsResourceExhausted(scene.status()) && EndAbandoned(std::nullopt)) {
-    scene = scenes_.CreateScene(space);
+    scene = scenes_.CreateScene(space, gain, caller.name);
   }
   RETURN_IF_ERROR(scene.status());
   owners_.Add(*scene, caller, *std::move(place), request.keep());

@@ -24,6 +24,12 @@ class SceneService final : public v1::SceneService::CallbackService {
   grpc::ServerUnaryReactor* CreateScene(grpc::CallbackServerContext* context,
                                         const v1::CreateSceneRequest* request,
                                         v1::CreateSceneResponse* response) override;
+  grpc::ServerUnaryReactor* UpdateScene(grpc::CallbackServerContext* context,
+                                        const v1::UpdateSceneRequest* request,
+                                        v1::UpdateSceneResponse* response) override;
+  grpc::ServerUnaryReactor* StopAll(grpc::CallbackServerContext* context,
+                                    const v1::StopAllRequest* request,
+                                    v1::StopAllResponse* response) override;
   grpc::ServerUnaryReactor* DeleteScene(grpc::CallbackServerContext* context,
                                         const v1::DeleteSceneRequest* request,
                                         v1::DeleteSceneResponse* response) override;

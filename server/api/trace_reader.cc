@@ -48,6 +48,7 @@ absl::Status TraceReader::TakeSettings(const v1::RenderSettings& settings) {
   settings_.emplace();
   if (settings.sample_rate_hz() != 0) settings_->sample_rate_hz = settings.sample_rate_hz();
   settings_->tail_s = settings.tail_s();
+  if (settings.has_gain()) settings_->gain = settings.gain();
   if (settings.channel_count() != 0) settings_->channel_count = settings.channel_count();
   return absl::OkStatus();
 }
@@ -70,6 +71,7 @@ absl::Status TraceReader::TakeHeader(const v1::ContactTraceHeader& header) {
   if (header.step_s() > 0 && header.step_s() <= 1) settings_->step_s = header.step_s();
   settings_->space = ToSceneSpace(header.hearing(), header.listener());
   settings_->reading = ToContactReading(header.frame(), header.pulse_shape());
+  if (header.has_gain()) settings_->gain *= header.gain();
   if (header.has_clock()) {
     RETURN_IF_ERROR(TakeClock(header.clock()));
   }
@@ -92,6 +94,7 @@ absl::Status TraceReader::TakeClock(const v1::ContactTraceClock& clock) {
   settings_->mapping = {.first_frame = clock.first_frame(),
                         .first_time_s = clock.first_time_s(),
                         .delay_s = clock.scheduling_delay_s()};
+  settings_->stagger = clock.stagger() % kSectionCount;
   time_s_ = clock.first_time_s();
   return absl::OkStatus();
 }

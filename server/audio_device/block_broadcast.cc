@@ -21,6 +21,11 @@ std::shared_ptr<const RenderedBlock> BlockBroadcast::Listener::TryTake() {
   return block;
 }
 
+bool BlockBroadcast::Listener::ended() const {
+  const MutexLock lock(&mutex_);
+  return ended_;
+}
+
 uint64_t BlockBroadcast::Listener::lost_frame_count() const {
   const MutexLock lock(&mutex_);
   return lost_frame_count_;
@@ -74,6 +79,22 @@ absl::StatusOr<std::unique_ptr<BlockBroadcast::Listener>> BlockBroadcast::Subscr
   std::unique_ptr<Listener> listener(new Listener(*this, std::move(wake)));
   listeners_.push_back(listener.get());
   return listener;
+}
+
+void BlockBroadcast::End() {
+  const MutexLock lock(&mutex_);
+  for (Listener* listener : listeners_) {
+    {
+      const MutexLock listener_lock(&listener->mutex_);
+      listener->ended_ = true;
+    }
+    listener->wake_();
+  }
+}
+
+size_t BlockBroadcast::listener_count() const {
+  const MutexLock lock(&mutex_);
+  return listeners_.size();
 }
 
 void BlockBroadcast::Remove(Listener* listener) {

@@ -43,6 +43,9 @@ class BlockBroadcast {
     /// The next block, or null when none waits. Any thread.
     std::shared_ptr<const RenderedBlock> TryTake();
 
+    /// Whether no further block will come; blocks may still wait.
+    bool ended() const;
+
     /// Frames lost so far.
     uint64_t lost_frame_count() const;
 
@@ -56,6 +59,7 @@ class BlockBroadcast {
     mutable Mutex mutex_;
     std::deque<std::shared_ptr<const RenderedBlock>> queue_ ABSL_GUARDED_BY(mutex_);
     uint64_t lost_frame_count_ ABSL_GUARDED_BY(mutex_) = 0;
+    bool ended_ ABSL_GUARDED_BY(mutex_) = false;
     /// First frame of the next block if none is lost; unset before the first block.
     std::optional<uint64_t> next_frame_ ABSL_GUARDED_BY(mutex_);
   };
@@ -74,6 +78,11 @@ class BlockBroadcast {
   /// block, after it has queued blocks. Errors: ResourceExhausted (TOO_MANY_LISTENERS).
   absl::StatusOr<std::unique_ptr<Listener>> Subscribe(std::function<void()> wake);
 
+  /// Tells the listeners that no further block will come.
+  void End();
+
+  size_t listener_count() const;
+
  private:
   void Remove(Listener* listener);
   std::shared_ptr<const RenderedBlock> TryTakePublished();
@@ -82,7 +91,7 @@ class BlockBroadcast {
   const size_t queue_block_count_;
   RingBuffer<float> samples_;
   RingBuffer<uint64_t> first_frames_;
-  Mutex mutex_;
+  mutable Mutex mutex_;
   std::vector<Listener*> listeners_ ABSL_GUARDED_BY(mutex_);
 };
 

@@ -21,11 +21,13 @@ size_t BlocksPerSecond(const DeviceFormat& format) {
   return format.sample_rate_hz / format.block_frame_count + 1;
 }
 
-MixerSettings MixerSettingsOf(const DeviceFormat& format, const Clock& clock) {
+MixerSettings MixerSettingsOf(const OutputSettings& settings, const Clock& clock) {
+  const DeviceFormat& format = settings.format;
   return {.sample_rate_hz = static_cast<double>(format.sample_rate_hz),
           .block_frame_count = format.block_frame_count,
           .channel_count = format.channel_count,
-          .clock = &clock};
+          .clock = &clock,
+          .gain = settings.gain};
 }
 
 }  // namespace
@@ -41,12 +43,14 @@ LiveOutput::LiveOutput(const OutputSettings& settings, Clock& clock, Log log)
     : settings_(settings),
       clock_(clock),
       log_(std::move(log)),
-      mixer_(MixerSettingsOf(settings.format, clock)),
+      mixer_(MixerSettingsOf(settings, clock)),
       broadcast_(settings.format, BlocksPerSecond(settings.format)),
+      stems_(mixer_, settings.format, BlocksPerSecond(settings.format)),
       look_ahead_(
           settings.format, settings.look_ahead_block_count,
           [this](std::span<float> block) { RenderBlock(block); }, clock),
       final_fade_(settings.format),
+      volume_{.gain = settings.gain},
       loudness_(settings.format.sample_rate_hz, settings.format.channel_count) {}
 
 LiveOutput::~LiveOutput() {
@@ -92,6 +96,18 @@ OutputState LiveOutput::state() const {
   return state;
 }
 
+OutputVolume LiveOutput::volume() const {
+  const MutexLock lock(&mutex_);
+  return volume_;
+}
+
+OutputVolume LiveOutput::ChangeVolume(std::optional<double> gain, std::optional<bool> muted) {
+  const MutexLock lock(&mutex_);
+  volume_ = {.gain = gain.value_or(volume_.gain), .muted = muted.value_or(volume_.muted)};
+  mixer_.SetGain(volume_.muted ? 0 : volume_.gain);
+  return volume_;
+}
+
 void LiveOutput::FadeOut() {
   final_fade_.Begin();
   const std::chrono::nanoseconds longest = clock_.Monotonic() + kLongestFade;
@@ -108,6 +124,7 @@ void LiveOutput::KeepHouse() {
   std::chrono::nanoseconds levels_due = clock_.Monotonic();
   while (!stopping_) {
     broadcast_.Deliver([this](const RenderedBlock& block) { loudness_.Add(block.samples); });
+    stems_.Deliver();
     mixer_.CollectGarbage();
     if (clock_.Monotonic() >= levels_due) {
       NoteLevels();

@@ -19,6 +19,7 @@
 #include "server/base/mutex.h"
 #include "server/live_output/device_keeper.h"
 #include "server/live_output/final_fade.h"
+#include "server/live_output/stems.h"
 #include "server/loudness/loudness_meter.h"
 #include "server/synthesis/mixer.h"
 
@@ -33,6 +34,13 @@ struct OutputSettings {
   std::string device = "auto";
   /// Path of carillon-audio, which opens sound cards.
   std::string device_program{};
+  double gain = 1;  ///< of the output, before the limiter
+};
+
+/// The volume of the output.
+struct OutputVolume {
+  double gain = 1;  ///< linear
+  bool muted = false;
 };
 
 /// State of the output at one moment.
@@ -68,7 +76,12 @@ class LiveOutput {
 
   Mixer& mixer() { return mixer_; }
   BlockBroadcast& broadcast() { return broadcast_; }
+  /// Lets clients listen to single scenes.
+  Stems& stems() { return stems_; }
   const DeviceFormat& format() const { return settings_.format; }
+  OutputVolume volume() const;
+  /// Changes what is given; the volume glides within 30 ms. Returns the volume as it is now.
+  OutputVolume ChangeVolume(std::optional<double> gain, std::optional<bool> muted);
   OutputState state() const;
 
   /// Calls `observer` now, and whenever the wanted device begins or ceases to play, until it is
@@ -92,10 +105,12 @@ class LiveOutput {
   const Log log_;
   Mixer mixer_;
   BlockBroadcast broadcast_;
+  Stems stems_;
   LookAhead look_ahead_;
   FinalFade final_fade_;
   std::unique_ptr<DeviceKeeper> keeper_;
   mutable Mutex mutex_;
+  OutputVolume volume_ ABSL_GUARDED_BY(mutex_);
   struct Peak {
     std::chrono::nanoseconds time;
     double value;

@@ -33,6 +33,7 @@ MixerSettings SettingsOf(const OfflineSettings& settings, SectionThreads& thread
           .channel_count = settings.channel_count,
           .first_frame = settings.mapping.first_frame,
           .most_buses = 1,
+          .stagger = settings.stagger,
           .most_streams = 1,
           .most_pending_events = kOfflineQueueCapacity,
           .most_events_per_block = kOfflineQueueCapacity,

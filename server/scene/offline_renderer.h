@@ -35,6 +35,8 @@ struct OfflineSettings {
   /// The mapping by which the trace was heard live. Rendering begins at its first frame, a multiple
   /// of OfflineRenderer::kBlockFrameCount.
   TimeMapping mapping{};
+  /// The stagger of the bus through which the trace was heard live (Mixer::Stagger).
+  size_t stagger = 0;
   /// The sound is bit for bit the same for any number of threads.
   size_t thread_count = std::max(std::thread::hardware_concurrency(), 1U);
 };

@@ -107,6 +107,11 @@ absl::StatusOr<BusId> SceneRegistry::BusOf(uint64_t scene) const {
   return found->bus();
 }
 
+absl::StatusOr<SceneSpace> SceneRegistry::SpaceOf(uint64_t scene) const {
+  ASSIGN_OR_RETURN(const std::shared_ptr<Scene> found, FindScene(scene));
+  return found->space();
+}
+
 absl::StatusOr<std::vector<PlacedObject>> SceneRegistry::ListObjects(uint64_t scene) const {
   ASSIGN_OR_RETURN(const std::shared_ptr<Scene> found, FindScene(scene));
   std::vector<PlacedObject> placed;

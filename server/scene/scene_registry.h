@@ -80,6 +80,9 @@ class SceneRegistry {
   /// The bus that the objects of a scene sound through. Errors: NotFound (SCENE_NOT_FOUND).
   absl::StatusOr<BusId> BusOf(uint64_t scene) const;
 
+  /// How a scene is heard. Errors: NotFound (SCENE_NOT_FOUND).
+  absl::StatusOr<SceneSpace> SpaceOf(uint64_t scene) const;
+
   /// Returns the objects of a scene by their handles. Errors: NotFound (SCENE_NOT_FOUND).
   absl::StatusOr<std::vector<PlacedObject>> ListObjects(uint64_t scene) const;
 

@@ -27,6 +27,10 @@ class BusListener {
   /// Takes a block of the bus, after its gain, interleaved. The rendering thread calls it: it must
   /// not allocate, lock, log, throw or call the system.
   virtual void Hear(uint64_t first_frame, std::span<const float> block) noexcept = 0;
+
+  /// The bus was closed: but for a block that is being rendered now, there will be no further one.
+  /// A controlling thread calls it.
+  virtual void End() {}
 };
 
 /// One section of a bus with the sound that it has rendered last.

@@ -36,8 +36,9 @@ namespace carillon {
 /// Number of sections that the banks of one bus are spread over.
 inline constexpr size_t kSectionCount = BlockMix::kStaggers;
 
-/// Most buses of a mixer, the default one included.
-inline constexpr size_t kMostBuses = 512;
+/// Most buses of a mixer, the default one included: twice as many as there are scenes, because the
+/// bus of a deleted scene is in use until its objects have faded out.
+inline constexpr size_t kMostBuses = 1024;
 
 /// Most blocks that each section renders before the next section begins, if the caller requests
 /// several blocks at once.
@@ -51,6 +52,7 @@ struct MixerSettings {
   uint64_t first_frame = 0;        ///< number of the first frame; a multiple of block_frame_count
   size_t most_banks = 8192;        ///< including those that ring out or fade
   size_t most_buses = kMostBuses;
+  size_t stagger = 0;  ///< of the default bus; see Mixer::Stagger
   size_t most_streams = 1024;
   size_t most_pending_events = 262144;   ///< events that wait for their block
   size_t most_events_per_block = 32768;  ///< taken from the streams; the rest wait there
@@ -82,7 +84,7 @@ struct MixerStatistics {
   uint64_t active_mode_count = 0;    ///< modes that ring
 };
 
-/// What a bus sounds like now.
+/// The sound of a bus at this moment, in figures.
 struct BusState {
   uint64_t active_mode_count = 0;  ///< modes that ring
   float peak = 0;                  ///< the largest sample of late; it falls by 40 dB a second
@@ -304,7 +306,7 @@ class Mixer {
   // Numbers of the sections that were made, ascending: the sections of a bus are neighbours.
   FixedVector<uint32_t> open_sections_ ABSL_GUARDED_BY(kRenderRole);
   uint64_t active_mode_count_ ABSL_GUARDED_BY(kRenderRole) = 0;
-  // Of the blocks rendered together: a bus's gains and sound, and the sound of all buses.
+  // A bus's gains and sound, and the sound of all buses, in the blocks rendered together.
   std::vector<float> gains_ ABSL_GUARDED_BY(kRenderRole);
   std::vector<float> bus_frames_ ABSL_GUARDED_BY(kRenderRole);            // mono
   std::vector<float> bus_placed_ ABSL_GUARDED_BY(kRenderRole);            // interleaved

@@ -36,12 +36,15 @@ constexpr double kPeakFallS = 0.217;
 
 void Mixer::OpenSection(uint32_t section, MixedSection* opened) noexcept {
   sections_[section] = opened;
-  // Nothing rings on the bus yet that an earlier stop could mean.
-  Bus& bus = *buses_[section / kSectionCount];
   const bool is_first = std::ranges::none_of(open_sections_, [section](uint32_t other) {
     return other / kSectionCount == section / kSectionCount;
   });
-  if (is_first) bus.stop_count = bus.stops_asked.load(std::memory_order_relaxed);
+  if (is_first) {
+    // Nothing rings on the bus yet that could glide or stop.
+    Bus& bus = *buses_[section / kSectionCount];
+    bus.fader.JumpTo(bus.gain.load(std::memory_order_relaxed));
+    bus.stop_count = bus.stops_asked.load(std::memory_order_relaxed);
+  }
   open_sections_.push_back(section);
   std::ranges::sort(open_sections_);
 }

@@ -194,7 +194,8 @@ MixedSection* Mixer::MakeSection(uint32_t section) {
   owned = std::make_unique<MixedSection>(
       RenderSection::Settings{
           .block_frame_count = settings_.block_frame_count,
-          .stagger = (section + Stagger(bus)) % kSectionCount,
+          .stagger =
+              (section + (bus == BusId() ? settings_.stagger : Stagger(bus))) % kSectionCount,
           .most_banks = settings_.most_banks,
           .fade_step = static_cast<float>(1 / (kFadeS * settings_.sample_rate_hz)),
           .channel_count = settings_.channel_count},
@@ -215,12 +216,13 @@ absl::StatusOr<BusId> Mixer::OpenBus(double gain) {
   const BusId id{static_cast<uint32_t>(free - owned_buses_.begin())};
   Bus& bus = *buses_[id.index];
   bus.gain = static_cast<float>(gain);
-  bus.listener = nullptr;
   bus.jumps.store(true, std::memory_order_release);
   return id;
 }
 
 void Mixer::CloseBus(BusId bus) {
+  BusListener* const listener = buses_[bus.index]->listener.exchange(nullptr);
+  if (listener != nullptr) listener->End();
   const MutexLock lock(&control_mutex_);
   owned_buses_[bus.index].open = false;
 }

@@ -80,7 +80,7 @@ stop_daemon
 # Each page of ten minutes is typed as printed, in a folder of its own.
 start_daemon
 install_packages python3
-for page in ten_minutes_{python,cpp,node,any_language}.md; do
+for page in ten_minutes_{python,cpp,c,node,any_language}.md; do
   mkdir -p "pages/$page"
   (cd "pages/$page" && env -u CARILLON_SERVER ../../type_page.py "/usr/share/doc/carillon/docs/$page" ../../now) ||
     fail "$page does not work as printed"

@@ -167,3 +167,32 @@ test('a trace is written and read, and a damaged one is refused', async () => {
   assert.throws(() => trace.step(-1), /goes back/);
   assert.throws(() => trace.step(1, { contacts: { objects: 1, points: [0, 0], impulses: [0, 0] } }), /3 a contact/);
 });
+
+test('a scene is turned down, muted and stopped', async () => {
+  const scene = await c.createScene({ gain: 0.5 });
+  try {
+    assert.equal((await scene.update({ muted: true })).gain, 0.5);
+    const bar = await scene.add(model);
+    const muted = await scene.listen({ block_frame_count: 4800 });
+    await bar.strike(STRIKE);
+    assert.equal((await muted.take(0.5)).peak, 0);
+    await scene.update({ muted: false });
+    const heard = await scene.listen({ encoding: 'AUDIO_ENCODING_INT16' });
+    assert.ok((await heard.take(0.3)).peak > 0);
+    await scene.stop();
+    assert.ok(await c.stopAll() >= 1);
+  } finally {
+    await scene.delete();
+  }
+  assert.equal((await c.setVolume({ gain: 0.25 })).gain, 0.25);
+  await c.setVolume({ gain: 1 });
+});
+
+test('a stream that is too fast drops the oldest steps', async () => withScene(async (scene) => {
+  const stream = scene.stream({ step: 0.001 });
+  // Nothing is sent while this loop does not wait.
+  for (let i = 0; i < 5000; i += 1) stream.step(0.001 * i, {});
+  assert.ok(stream.droppedStepCount > 5000 - 4096 - 100);
+  const report = await stream.close();
+  assert.equal(Number(report.step_count) + stream.droppedStepCount, 5000);
+}));

@@ -9,6 +9,7 @@ import unittest
 
 import numpy
 
+import carillon as carillon_package
 import meshes
 import sound
 from carillon.v1 import contact_pb2, contact_trace_pb2, material_pb2, scene_service_pb2
@@ -85,11 +86,59 @@ class ListsTest(CommandLineTest):
         scene = self.client.scenes.CreateScene(scene_service_pb2.CreateSceneRequest()).name
         self.client.scenes.AddObject(scene_service_pb2.AddObjectRequest(
             scene=scene, modal_model=self.model, material=MATERIAL, handle=5))
-        listed = {each["name"]: each["object_count"] for each in self.json_of("scene", "list")["scenes"]}
-        self.assertEqual(listed[scene], 1)
-        self.assertRegex(self.run_command("scene", "list"), rf"(?m){scene}  1 objects  .*1 connections.*\n  5 ")
+        listed = next(item for item in self.json_of("scene", "list")["scenes"] if item["name"] == scene)
+        self.assertEqual((listed["object_count"], listed["gain"], listed["muted"]), (1, 1, False))
+        self.assertRegex(self.run_command("scene", "list"), rf"(?m){scene}  1 objects  gain 1  .*1 connections.*\n  5 ")
         self.run_command("scene", "delete", scene.removeprefix("scenes/"))
         self.assertNotIn(scene, self.run_command("scene", "list"))
+
+
+class VolumeTest(CommandLineTest):
+    def test_the_volume_of_the_output_and_of_a_scene_is_changed_and_shown(self):
+        self.assertEqual(self.run_command("volume", "--gain", "-6dB"), "output  gain 0.5012 (-6.0 dB)")
+        self.assertEqual(self.run_command("volume", "--gain", "1", "--mute"), "output  gain 1 (+0.0 dB)  muted")
+        self.assertEqual(self.run_command("volume", "--unmute"), "output  gain 1 (+0.0 dB)")
+        scene = self.client.scenes.CreateScene(scene_service_pb2.CreateSceneRequest()).name
+        shown = self.json_of("volume", "--scene", scene.removeprefix("scenes/"), "--solo", "--gain", "2")
+        self.assertEqual((shown["gain"], shown["solo"], shown["muted"]), (2, True, False))
+        self.run_command("scene", "delete", scene)
+        for words in (("--gain", "loud"), ("--solo",), ("--gain",)):
+            self.assertEqual(self.daemon.command("volume", *words, check=False).returncode, 2, words)
+        self.assertIn("INVALID_GAIN", self.daemon.command("volume", "--gain", "-1", check=False).stderr)
+
+    def test_stop_says_how_many_scenes_it_silenced(self):
+        scene = self.client.scenes.CreateScene(scene_service_pb2.CreateSceneRequest()).name
+        self.assertEqual(self.run_command("stop", scene), "1 scenes silenced")
+        self.run_command("scene", "delete", scene)
+        self.assertIn("SCENE_NOT_FOUND", self.daemon.command("stop", scene, check=False).stderr)
+
+    def test_top_shows_the_scenes_once(self):
+        scene = self.client.scenes.CreateScene(scene_service_pb2.CreateSceneRequest()).name
+        self.assertRegex(self.run_command("top", "--once"), rf"(?m)^{scene} +0 +0 +silence +gain 1$")
+        view = self.json_of("top", "--once")
+        self.assertIn(scene, [item["name"] for item in view["scenes"]])
+        self.assertEqual((view["jobs"], view["mixer"]["gain"]), ([], 1))
+        self.run_command("scene", "delete", scene)
+
+    def test_a_recorded_stream_is_rendered_as_it_was_heard(self):
+        with carillon_package.connect(self.daemon.server) as c, c.scene() as scene:
+            bar = scene.add(self.model, meshes.MATERIAL)
+            trace = self.folder / "live.contacts"
+            recorder = subprocess.Popen([BIN / "carillon", "--server", self.daemon.server, "scene", "record",
+                                         scene.name, "--out", trace], stderr=subprocess.PIPE, text=True)
+            self.assertIn("waiting for a contact stream", recorder.stderr.readline())
+            with c.recording(scene=scene.name) as heard:
+                with scene.stream(step=0.01) as stream:
+                    for i in range(5):
+                        stream.step(0.01 * i, impulses=carillon_package.Impulses(
+                            [bar], [(0, 0.008, 0.01)], [(0, 0, -0.002)], durations=1e-4))
+                self.assertIn("5 steps", recorder.communicate()[1])
+                live = heard.take(1.5)
+            self.assertEqual(recorder.returncode, 0)
+            rendered = c.render(trace, tail_s=0.3)
+        begin = int(numpy.flatnonzero(live.samples[:, 0])[0]) - int(numpy.flatnonzero(rendered.samples[:, 0])[0])
+        self.assertGreater(rendered.peak, 1e-4)
+        numpy.testing.assert_array_equal(live.samples[begin:begin + len(rendered.samples)], rendered.samples)
 
 
 class ExampleTest(CommandLineTest):

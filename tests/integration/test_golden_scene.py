@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """One scene by every SDK: its trace has the same bytes, and its offline rendering the same samples, bit for bit."""
 
+import json
 import pathlib
 import subprocess
 import sys
@@ -34,6 +35,19 @@ class GoldenSceneTest(DaemonTest):
         for name, (trace, sound) in made.items():
             self.assertEqual(trace, made["C++"][0], f"the trace of {name} differs from that of C++")
             self.assertEqual(sound, made["C++"][1], f"the sound of {name} differs from that of C++")
+
+    def test_equal_arrays_are_equal_files_in_every_sdk(self):
+        vertices = [[0, -0.0, 1e-5], [1 / 3, 1e-7, 0.1], [123456789.125, 1e16, 2 ** -25], [-1.5e-300, 1e22, 5e-324],
+                    [0.0001, 9.999e-5, 1e15]]
+        triangles = [[0, 1, 2], [0, 2, 3], [4, 2, 1]]
+        script = (f"require('carillon').connect({json.dumps(self.daemon.server)}).upload("
+                  f"{json.dumps({'vertices': vertices, 'triangles': triangles})}).then((digest) => "
+                  "{ process.stdout.write(digest); process.exit(0); });")
+        script = script.replace('-0.0', '-0')
+        node = subprocess.run(["node", "-e", script], check=True, env=node_environment(self.folder),
+                              capture_output=True, text=True).stdout
+        with carillon.connect(self.daemon.server) as c:
+            self.assertEqual(c.upload((numpy.array(vertices), numpy.array(triangles))), node)
 
 
 if __name__ == "__main__":

@@ -152,6 +152,45 @@ class SoundTest(PackageTest):
             self.assertIn(scene.name, [found.name for found in self.c.scenes()])
             self.assertEqual([item.handle for item in scene.objects()], [9])
 
+    def test_a_scene_is_turned_down_muted_and_stopped(self):
+        with self.c.scene(gain=0.5) as scene:
+            self.assertEqual(scene.update(muted=True).gain, 0.5)
+            bar = scene.add(self.model)
+            with self.c.recording(scene=scene.name, block_frame_count=4800) as heard:
+                bar.strike(POINT, IMPULSE, DURATION_S)
+                self.assertEqual(heard.take(0.5).peak, 0)
+            self.assertGreater(self.c.status().active_mode_count, 0)
+            scene.update(muted=False)
+            self.assertGreater(scene.listen(0.3).peak, 0)
+            scene.stop()
+            self.assertGreaterEqual(self.c.stop_all(), 1)
+
+    def test_the_output_is_turned_down(self):
+        self.assertEqual(self.c.set_volume(gain=0.25).gain, 0.25)
+        self.assertEqual(self.c.status().gain, 0.25)
+        self.c.set_volume(gain=1)
+
+    def test_integers_of_16_bits_are_the_floats_rounded(self):
+        with self.c.scene() as scene:
+            bar = scene.add(self.model)
+            with (self.c.recording(scene=scene.name) as floats,
+                  self.c.recording(scene=scene.name, encoding="AUDIO_ENCODING_INT16") as integers):
+                bar.strike(POINT, IMPULSE, DURATION_S)
+                one, other = (record.take(1.0).samples[:, 0] for record in (floats, integers))
+        first, second = (int(numpy.flatnonzero(numpy.abs(samples) > 1e-3)[0]) for samples in (one, other))
+        count = len(one) - max(first, second)
+        self.assertLess(numpy.abs(one[first:first + count] - other[second:second + count]).max(), 0.51 / 32767)
+
+    def test_a_stream_that_is_too_fast_drops_the_oldest_steps(self):
+        with self.c.scene() as scene:
+            stream = scene.stream(step=0.001)
+            step = contact_pb2.ContactStep(columns=contact_pb2.ImpulseColumns(object=[1] * 200))
+            for i in range(20000):
+                step.time_s = 0.001 * i
+                stream.send(contact_pb2.ContactStep.FromString(step.SerializeToString()))
+            report = stream.close(warn=False)
+            self.assertEqual(report.step_count + stream.dropped_step_count, 20000)
+
     def test_a_stream_that_failed_raises_at_its_next_step(self):
         scene = self.c.scene()
         scene.delete()

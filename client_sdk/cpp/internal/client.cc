@@ -141,6 +141,28 @@ absl::StatusOr<std::string> Client::CreateScene(const v1::CreateSceneRequest&) c
   return NotOverridden("CreateScene");
 }
 
+absl::StatusOr<v1::Scene> Client::UpdateScene(const v1::UpdateSceneRequest&) const {
+  return NotOverridden("UpdateScene");
+}
+
+absl::StatusOr<uint32_t> Client::StopAll(const std::string&) const {
+  return NotOverridden("StopAll");
+}
+
+absl::Status Client::RecordContacts(
+    const std::string&, const std::function<void()>&,
+    const std::function<bool(const v1::ContactTraceRecord&)>&) const {
+  return NotOverridden("RecordContacts");
+}
+
+absl::Status Client::ListenTo(const v1::ListenRequest&, const AudioCallback&) const {
+  return NotOverridden("ListenTo");
+}
+
+absl::StatusOr<v1::UpdateMixerResponse> Client::UpdateMixer(const v1::UpdateMixerRequest&) const {
+  return NotOverridden("UpdateMixer");
+}
+
 absl::Status Client::DeleteScene(const std::string&) const { return NotOverridden("DeleteScene"); }
 
 absl::StatusOr<std::vector<v1::Scene>> Client::ListScenes() const {

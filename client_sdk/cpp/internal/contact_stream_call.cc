@@ -19,10 +19,11 @@ namespace {
 
 /// A call of StreamContacts, driven by gRPC's reactor.
 ///
-/// At most one write is in progress, that of the front of `queue_`; the next one starts when it is
-/// done. Because Send() starts writes from outside the reactor, a hold keeps gRPC from ending the
-/// call between two writes; the hold is released once, when no further write can start. A read of
-/// the next answer is always in progress until the daemon ends the stream.
+/// At most one write is in progress, that of `written_`; the next one, that of the front of
+/// `queue_`, starts when it is done. Because Send() starts writes from outside the reactor, a hold
+/// keeps gRPC from ending the call between two writes; the hold is released once, when no further
+/// write can start. A read of the next answer is always in progress until the daemon ends the
+/// stream.
 class ContactStreamCall final
     : public ContactStream,
       public grpc::ClientBidiReactor<v1::StreamContactsRequest, v1::StreamContactsResponse> {
@@ -44,8 +45,9 @@ class ContactStreamCall final
       started_ = true;
       AddHold();
       StartRead(&answer_);
-      *queue_.emplace_back().mutable_start() = start;
-      StartWrite(&queue_.front());
+      *written_.mutable_start() = start;
+      writing_ = true;
+      StartWrite(&written_);
     }
     StartCall();
     absl::MutexLock lock(&mutex_);
@@ -60,18 +62,22 @@ class ContactStreamCall final
       return EndedLocked();
     }
     if (queue_.size() >= kMaxQueuedSteps) {
-      return Refusal(absl::StatusCode::kResourceExhausted, "CONTACT_QUEUE_FULL",
-                     "the step was dropped, because the network is slower than the simulation; "
-                     "send fewer steps, or run nearer to the daemon");
+      queue_.pop_front();
+      ++dropped_step_count_;
     }
     *queue_.emplace_back().mutable_step() = std::move(step);
-    if (queue_.size() == 1) StartWrite(&queue_.front());
+    if (!writing_) WriteNextLocked();
     return absl::OkStatus();
   }
 
   size_t WaitingStepCount() const override {
     absl::MutexLock lock(&mutex_);
-    return queue_.size();
+    return queue_.size() + (writing_ ? 1 : 0);
+  }
+
+  uint64_t DroppedStepCount() const override {
+    absl::MutexLock lock(&mutex_);
+    return dropped_step_count_;
   }
 
   v1::StreamContactsResponse Report() const override {
@@ -82,7 +88,7 @@ class ContactStreamCall final
   absl::StatusOr<v1::StreamContactsResponse> Finish() override {
     absl::MutexLock lock(&mutex_);
     finishing_ = true;
-    if (holding_ && queue_.empty()) EndWritesLocked();
+    if (holding_ && queue_.empty() && !writing_) EndWritesLocked();
     mutex_.Await(absl::Condition(this, &ContactStreamCall::Done));
     if (!status_->ok()) return *status_;
     return report_;
@@ -91,12 +97,12 @@ class ContactStreamCall final
  private:
   void OnWriteDone(bool ok) override {
     absl::MutexLock lock(&mutex_);
-    queue_.pop_front();
+    writing_ = false;
     if (!holding_) return;
     if (!ok) {
       ReleaseHoldLocked();
     } else if (!queue_.empty()) {
-      StartWrite(&queue_.front());
+      WriteNextLocked();
     } else if (finishing_) {
       EndWritesLocked();
     }
@@ -119,6 +125,13 @@ class ContactStreamCall final
     status_ = result;
   }
 
+  void WriteNextLocked() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+    written_ = std::move(queue_.front());
+    queue_.pop_front();
+    writing_ = true;
+    StartWrite(&written_);
+  }
+
   void EndWritesLocked() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
     StartWritesDone();
     ReleaseHoldLocked();
@@ -139,9 +152,12 @@ class ContactStreamCall final
 
   const std::string server_;
   grpc::ClientContext context_;
-  v1::StreamContactsResponse answer_;  ///< belongs to the read in progress
+  v1::StreamContactsResponse answer_;    ///< belongs to the read in progress
+  v1::StreamContactsRequest written_{};  ///< belongs to the write in progress
   mutable absl::Mutex mutex_;
   std::deque<v1::StreamContactsRequest> queue_ ABSL_GUARDED_BY(mutex_);
+  bool writing_ ABSL_GUARDED_BY(mutex_) = false;
+  uint64_t dropped_step_count_ ABSL_GUARDED_BY(mutex_) = 0;
   v1::StreamContactsResponse report_ ABSL_GUARDED_BY(mutex_);
   std::optional<absl::Status> status_ ABSL_GUARDED_BY(mutex_);
   bool started_ ABSL_GUARDED_BY(mutex_) = false;

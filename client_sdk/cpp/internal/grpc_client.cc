@@ -134,6 +134,20 @@ absl::StatusOr<std::string> GrpcClient::CreateScene(const v1::CreateSceneRequest
   return response->name();
 }
 
+absl::StatusOr<v1::Scene> GrpcClient::UpdateScene(const v1::UpdateSceneRequest& request) const {
+  auto response = Call(*stubs_, stubs_->scenes, &v1::SceneService::Stub::UpdateScene, request);
+  if (!response.ok()) return response.status();
+  return std::move(*response->mutable_scene());
+}
+
+absl::StatusOr<uint32_t> GrpcClient::StopAll(const std::string& scene) const {
+  v1::StopAllRequest request;
+  request.set_scene(scene);
+  auto response = Call(*stubs_, stubs_->scenes, &v1::SceneService::Stub::StopAll, request);
+  if (!response.ok()) return response.status();
+  return response->scene_count();
+}
+
 absl::Status GrpcClient::DeleteScene(const std::string& name) const {
   return Call(*stubs_, stubs_->scenes, &v1::SceneService::Stub::DeleteScene,
               Named<v1::DeleteSceneRequest>(name))
@@ -187,6 +201,11 @@ absl::StatusOr<std::unique_ptr<ContactStream>> GrpcClient::StreamContacts(
 
 absl::StatusOr<v1::GetMixerResponse> GrpcClient::GetMixer() const {
   return Call(*stubs_, stubs_->audio, &v1::AudioService::Stub::GetMixer, v1::GetMixerRequest());
+}
+
+absl::StatusOr<v1::UpdateMixerResponse> GrpcClient::UpdateMixer(
+    const v1::UpdateMixerRequest& request) const {
+  return Call(*stubs_, stubs_->audio, &v1::AudioService::Stub::UpdateMixer, request);
 }
 
 }  // namespace carillon::client

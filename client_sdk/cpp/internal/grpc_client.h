@@ -52,6 +52,8 @@ class GrpcClient final : public Client {
       const std::string& name, const std::function<void(const v1::Job&)>& on_change) const override;
 
   absl::StatusOr<std::string> CreateScene(const v1::CreateSceneRequest& request) const override;
+  absl::StatusOr<v1::Scene> UpdateScene(const v1::UpdateSceneRequest& request) const override;
+  absl::StatusOr<uint32_t> StopAll(const std::string& scene) const override;
   absl::Status DeleteScene(const std::string& name) const override;
   absl::StatusOr<std::vector<v1::Scene>> ListScenes() const override;
   absl::StatusOr<std::vector<v1::SoundingObject>> ListObjects(
@@ -64,11 +66,19 @@ class GrpcClient final : public Client {
   absl::StatusOr<std::unique_ptr<ContactStream>> StreamContacts(
       const v1::ContactStreamStart& start) const override;
 
+  absl::Status RecordContacts(
+      const std::string& scene, const std::function<void()>& on_begun,
+      const std::function<bool(const v1::ContactTraceRecord&)>& on_record) const override;
+
+  absl::Status ListenTo(const v1::ListenRequest& request,
+                        const AudioCallback& on_block) const override;
   absl::Status Listen(const AudioCallback& on_block) const override;
   absl::StatusOr<v1::RenderSummary> Render(const v1::RenderSettings& settings,
                                            ContactTraceReader& trace,
                                            const AudioCallback& on_block) const override;
   absl::StatusOr<v1::GetMixerResponse> GetMixer() const override;
+  absl::StatusOr<v1::UpdateMixerResponse> UpdateMixer(
+      const v1::UpdateMixerRequest& request) const override;
 
   absl::Status FetchMesh(const JobRun& run, const std::string& file) const override;
   absl::Status ReportProgress(const JobRun& run, const v1::Progress& progress) const override;

@@ -28,11 +28,16 @@ class BlockReader {
   void SetFormat(const v1::AudioFormat& format) {
     block_.sample_rate_hz = format.sample_rate_hz();
     block_.channel_count = format.channel_count();
+    encoding_ = format.encoding();
   }
 
   const AudioBlock& Read(const v1::AudioBlock& message, uint64_t lost_frame_count) {
-    samples_.resize(message.samples().size() / sizeof(float));
-    std::memcpy(samples_.data(), message.samples().data(), samples_.size() * sizeof(float));
+    if (encoding_ == v1::AUDIO_ENCODING_INT16) {
+      ReadIntegers(message.samples());
+    } else {
+      samples_.resize(message.samples().size() / sizeof(float));
+      std::memcpy(samples_.data(), message.samples().data(), samples_.size() * sizeof(float));
+    }
     block_.first_frame = message.first_frame();
     block_.lost_frame_count = lost_frame_count;
     block_.samples = samples_;
@@ -40,7 +45,16 @@ class BlockReader {
   }
 
  private:
+  void ReadIntegers(const std::string& bytes) {
+    constexpr float kFullScale = 32767;
+    std::vector<int16_t> integers(bytes.size() / sizeof(int16_t));
+    std::memcpy(integers.data(), bytes.data(), integers.size() * sizeof(int16_t));
+    samples_.assign(integers.begin(), integers.end());
+    for (float& sample : samples_) sample /= kFullScale;
+  }
+
   std::vector<float> samples_;
+  v1::AudioEncoding encoding_ = v1::AUDIO_ENCODING_UNSPECIFIED;
   AudioBlock block_;
 };
 
@@ -132,9 +146,36 @@ absl::StatusOr<v1::Job> GrpcClient::WatchJob(
 }
 
 absl::Status GrpcClient::Listen(const AudioCallback& on_block) const {
+  return ListenTo(v1::ListenRequest(), on_block);
+}
+
+absl::Status GrpcClient::RecordContacts(
+    const std::string& scene, const std::function<void()>& on_begun,
+    const std::function<bool(const v1::ContactTraceRecord&)>& on_record) const {
   grpc::ClientContext context;
   Authorize(context, stubs_->token);
-  const auto stream = stubs_->audio.Listen(&context, v1::ListenRequest());
+  v1::RecordContactsRequest request;
+  request.set_scene(scene);
+  const auto stream = stubs_->contacts.RecordContacts(&context, request);
+  v1::RecordContactsResponse response;
+  bool stopped = false;
+  while (!stopped && stream->Read(&response)) {
+    if (response.has_record()) {
+      stopped = !on_record(response.record());
+    } else if (on_begun) {
+      on_begun();
+    }
+  }
+  if (stopped) context.TryCancel();
+  const grpc::Status status = stream->Finish();
+  return stopped ? absl::OkStatus() : FromRpc(status, stubs_->server);
+}
+
+absl::Status GrpcClient::ListenTo(const v1::ListenRequest& request,
+                                  const AudioCallback& on_block) const {
+  grpc::ClientContext context;
+  Authorize(context, stubs_->token);
+  const auto stream = stubs_->audio.Listen(&context, request);
   BlockReader reader;
   v1::ListenResponse response;
   bool stopped = false;

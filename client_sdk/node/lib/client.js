@@ -11,7 +11,7 @@ const { toMaterial } = require('./materials');
 const { toMeshFile } = require('./meshes');
 const { Model } = require('./models');
 const { Scene } = require('./scenes');
-const { Sound, samplesOf } = require('./sound');
+const { Sound, samplesOf, samplesOfIntegers } = require('./sound');
 const { Trace } = require('./traces');
 
 const PIECE_BYTES = 1 << 20;
@@ -128,9 +128,19 @@ class Client {
     }
   }
 
+  /** Changes the linear gain of the daemon's output, or mutes it, without a click. Returns both. */
+  setVolume({ gain, muted }) {
+    return this.call('AudioService', 'UpdateMixer', { ...given('gain', gain), ...given('muted', muted) });
+  }
+
+  /** Fades out all that sounds in your scenes. Returns their number. */
+  async stopAll() {
+    return (await this.call('SceneService', 'StopAll', {})).scene_count;
+  }
+
   /** Makes an empty scene. It ends by itself a minute after its clients, unless `keep` is true. */
-  async createScene({ hearing, listener, keep = false } = {}) {
-    const request = { ...given('hearing', hearing), ...given('listener', toPose(listener)), keep };
+  async createScene({ hearing, listener, gain, keep = false } = {}) {
+    const request = { ...given('hearing', hearing), ...given('listener', toPose(listener)), ...given('gain', gain), keep };
     return new Scene(this, (await this.call('SceneService', 'CreateScene', request)).name);
   }
 
@@ -161,9 +171,12 @@ class Client {
     return new Sound(samplesOf(pieces), format.sample_rate_hz, format.channel_count, summary);
   }
 
-  /** Begins to record what the daemon plays. Returns once it does. */
-  async listen() {
-    const answers = this.answers(this.stub('AudioService').Listen({}));
+  /**
+   * Begins to record what the daemon plays. Returns once it does. `request` has fields of ListenRequest: scene,
+   * block_frame_count and encoding.
+   */
+  async listen(request = {}) {
+    const answers = this.answers(this.stub('AudioService').Listen(request));
     const { value } = await answers.next();
     return new Recording(answers, value.format);
   }
@@ -184,16 +197,18 @@ class Recording {
   async take(seconds) {
     const { sample_rate_hz: rateHz, channel_count: channelCount } = this.format;
     const wanted = Math.floor(seconds * rateHz) * channelCount;
+    const isShort = this.format.encoding === 'AUDIO_ENCODING_INT16';
     const pieces = [];
     let count = 0;
     while (count < wanted) {
       const { value, done } = await this.answers.next();
       if (done) break;
       pieces.push(value.block.samples);
-      count += value.block.samples.length / 4;
+      count += value.block.samples.length / (isShort ? 2 : 4);
     }
     await this.answers.return();
-    return new Sound(samplesOf(pieces).subarray(0, wanted), rateHz, channelCount);
+    const samples = isShort ? samplesOfIntegers(pieces) : samplesOf(pieces);
+    return new Sound(samples.subarray(0, wanted), rateHz, channelCount);
   }
 }
 

@@ -11,14 +11,17 @@ import type { GetMixerResponse__Output } from '../types/carillon/v1/GetMixerResp
 import type { Hearing } from '../types/carillon/v1/Hearing';
 import type { HertzContact } from '../types/carillon/v1/HertzContact';
 import type { Job__Output } from '../types/carillon/v1/Job';
+import type { ListenRequest } from '../types/carillon/v1/ListenRequest';
 import type { ListModalModelsRequest } from '../types/carillon/v1/ListModalModelsRequest';
 import type { Material as MaterialMessage } from '../types/carillon/v1/Material';
 import type { ModalModelSummary__Output } from '../types/carillon/v1/ModalModelSummary';
 import type { RenderSettings } from '../types/carillon/v1/RenderSettings';
 import type { RenderSummary__Output } from '../types/carillon/v1/RenderSummary';
 import type { Roughness } from '../types/carillon/v1/Roughness';
+import type { Scene__Output } from '../types/carillon/v1/Scene';
 import type { SoundingObject__Output } from '../types/carillon/v1/SoundingObject';
 import type { StreamContactsResponse__Output } from '../types/carillon/v1/StreamContactsResponse';
+import type { UpdateMixerResponse__Output } from '../types/carillon/v1/UpdateMixerResponse';
 
 /** x, y, z in metres or newton seconds. */
 export type Vector = ArrayLike<number>;
@@ -190,6 +193,12 @@ export class Scene {
   /** Adds an object. Without a material it gets the one that the model was asked for with. */
   add(model: Model | string, settings?: ObjectSettings): Promise<SoundingObject>;
   objects(): Promise<SoundingObject[]>;
+  /** Changes the volume, which glides within 30 ms. `solo`: of your scenes, only those with this flag are heard. */
+  update(volume: { gain?: number; muted?: boolean; solo?: boolean }): Promise<Scene__Output>;
+  /** Fades out all that sounds in the scene. Later contacts sound. */
+  stop(): Promise<void>;
+  /** Begins to record the scene alone, before the gain and the limiter of the output. */
+  listen(request?: Omit<ListenRequest, 'scene'>): Promise<Recording>;
   moveListener(pose: Pose, glide?: number): Promise<void>;
   /** Opens a stream for a simulation whose steps last `step` seconds, to sound `delay` seconds later. */
   stream(settings: StreamSettings & { step: number; delay?: number }): ContactStream;
@@ -200,7 +209,7 @@ export class Scene {
 export class ContactStream {
   /** The daemon's newest answer, with the counts so far. */
   readonly report?: StreamContactsResponse__Output;
-  /** Steps that were not sent, because 4096 waited. */
+  /** Steps that were not sent: the oldest ones, when 4096 waited. */
   readonly droppedStepCount: number;
   /** How many steps wait for the network. */
   readonly waitingStepCount: number;
@@ -231,12 +240,16 @@ export class Client {
   }): Promise<Model>;
   model(name: string, material?: Material): Promise<Model>;
   models(filters?: ListModalModelsRequest): AsyncGenerator<Model>;
-  createScene(settings?: { hearing?: Hearing; listener?: Pose; keep?: boolean }): Promise<Scene>;
+  createScene(settings?: { hearing?: Hearing; listener?: Pose; gain?: number; keep?: boolean }): Promise<Scene>;
   scenes(): Promise<Scene[]>;
   /** Renders a trace or a .contacts file. Throws CarillonError if a contact is rejected. */
   render(trace: Trace | string, settings?: RenderSettings): Promise<Sound>;
   /** Begins to record what the daemon plays. Returns once it does. */
-  listen(): Promise<Recording>;
+  listen(request?: ListenRequest): Promise<Recording>;
+  /** Changes the linear gain of the daemon's output, or mutes it, without a click. */
+  setVolume(volume: { gain?: number; muted?: boolean }): Promise<UpdateMixerResponse__Output>;
+  /** Fades out all that sounds in your scenes. Returns their number. */
+  stopAll(): Promise<number>;
   /** Calls a method of the contract that takes one message and answers one, such as "SceneService", "ListScenes". */
   call(service: string, method: string, request: object): Promise<any>;
   close(): void;

@@ -6,7 +6,7 @@ const { fromCall, fromInfo } = require('./errors');
 const { named, toMaterial, toRadiation } = require('./materials');
 const { streamSettings } = require('./traces');
 
-// Steps that may wait for the network before further ones are dropped.
+// Steps that may wait for the network before the oldest is dropped.
 const MOST_WAITING = 4096;
 
 /** An object of a scene. It may be given wherever handles are wanted. */
@@ -66,6 +66,25 @@ class Scene {
     return answer.objects.map((object) => new SoundingObject(this, object));
   }
 
+  /**
+   * Changes the volume: a linear gain; muted, so that the scene rings on unheard; solo, so that of your scenes only those
+   * with this flag are heard. Returns the scene's state.
+   */
+  async update({ gain, muted, solo }) {
+    const request = { name: this.name, ...given('gain', gain), ...given('muted', muted), ...given('solo', solo) };
+    return (await this.client.call('SceneService', 'UpdateScene', request)).scene;
+  }
+
+  /** Fades out all that sounds in the scene. Later contacts sound. */
+  async stop() {
+    await this.client.call('SceneService', 'StopAll', { scene: this.name });
+  }
+
+  /** Begins to record the scene alone, before the gain and the limiter of the output. */
+  listen(request = {}) {
+    return this.client.listen({ ...request, scene: this.name });
+  }
+
   /** Moves the listener, within `glide` seconds. */
   async moveListener(pose, glide = 0) {
     await this.client.call('SceneService', 'UpdateListener', { scene: this.name, pose: toPose(pose), glide_s: glide });
@@ -85,7 +104,7 @@ class Scene {
 
 /**
  * Sends the contacts of each step. `report` is the daemon's newest answer, with the counts so far; `droppedStepCount`
- * steps were not sent, because 4096 waited.
+ * steps were not sent: the oldest ones, when 4096 waited.
  */
 class ContactStream {
   constructor(scene, start) {
@@ -99,7 +118,18 @@ class ContactStream {
       this.call.on('error', (error) => { this.error = fromCall(error, client.server); });
       this.call.on('close', resolve);
     });
-    this.call.write({ start });
+    this.waiting = [];
+    this.isFull = !this.call.write({ start });
+    this.call.on('drain', () => {
+      this.isFull = false;
+      this.write();
+    });
+  }
+
+  /** Hands steps to the network while it takes them. */
+  write() {
+    while (this.waiting.length && !this.isFull) this.isFull = !this.call.write(this.waiting.shift());
+    if (this.isClosing && !this.waiting.length) this.call.end();
   }
 
   /** What the daemon found out about the contacts so far, such as blow_count and distant_point_count. */
@@ -114,7 +144,7 @@ class ContactStream {
 
   /** How many steps wait for the network. */
   get waitingStepCount() {
-    return this.call.writableLength;
+    return this.waiting.length + this.call.writableLength;
   }
 
   /**
@@ -123,14 +153,19 @@ class ContactStream {
    */
   step(time, content) {
     if (this.error) throw this.error;
-    if (this.call.writableLength >= MOST_WAITING) this.droppedStepCount += 1;
-    else this.call.write({ step: makeStep(time, content) });
+    if (this.waiting.length >= MOST_WAITING) {
+      this.waiting.shift();
+      this.droppedStepCount += 1;
+    }
+    this.waiting.push({ step: makeStep(time, content) });
+    this.write();
     return new Promise(setImmediate);
   }
 
   /** Waits until the daemon has taken all steps. Returns the last report. */
   async close() {
-    this.call.end();
+    this.isClosing = true;
+    this.write();
     await this.ended;
     if (this.error) throw this.error;
     return this.report;

@@ -59,4 +59,10 @@ function samplesOf(pieces) {
   return new Float32Array(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length));
 }
 
-module.exports = { Sound, samplesOf };
+/** The same of integers of 16 bits. */
+function samplesOfIntegers(pieces) {
+  const bytes = Buffer.concat(pieces);
+  return Float32Array.from({ length: bytes.length / 2 }, (_, i) => bytes.readInt16LE(2 * i) / 32767);
+}
+
+module.exports = { Sound, samplesOf, samplesOfIntegers };

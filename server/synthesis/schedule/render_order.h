@@ -14,7 +14,7 @@ namespace carillon {
 /// then by arrival. All fields are packed into one key, the first field highest, because 64-bit
 /// numbers sort fastest:
 ///
-///     13 bits   4       16      6        1        2                22
+///     14 bits   4       15      6        1        2                22
 ///   | section | block | slot | group | merged | frame in group | arrival |
 class RenderOrder {
  public:
@@ -27,9 +27,9 @@ class RenderOrder {
     uint32_t arrival = 0;  ///< index among the events due in the blocks rendered together
   };
 
-  static constexpr uint32_t kMostSections = 1U << 13U;
+  static constexpr uint32_t kMostSections = 1U << 14U;
   static constexpr uint32_t kMostBlocks = 1U << 4U;
-  static constexpr uint32_t kMostSlots = 1U << 16U;
+  static constexpr uint32_t kMostSlots = 1U << 15U;
   static constexpr uint32_t kMostGroups = 1U << 6U;
   static constexpr uint32_t kMostArrivals = 1U << 22U;
 

@@ -99,6 +99,24 @@ TEST_F(BusesTest, AGainThatABusBeginsWithNeedsNoGlide) {
   for (size_t n = 0; n < frames.size(); ++n) EXPECT_NEAR(frames[n], 0.5 * Right(n, 0), 1e-6) << n;
 }
 
+TEST_F(BusesTest, WhatABusWasToldBeforeItsFirstBankHoldsAtOnce) {
+  const BusId bus = mixer_.OpenBus().value();
+  Render(5);
+  mixer_.SetGain(bus, 0);
+  mixer_.Stop(bus);
+  Render(5);
+  const BankId bank = mixer_.Add(MakeBank(), nullptr, bus).value();
+  Strike(bank, 0);
+  EXPECT_THAT(Render(20), Each(0.0F));
+  mixer_.SetGain(bus, 1);
+  Render(12);
+  // The strike came after the stop, and rings on.
+  const std::vector<float> frames = Render(10);
+  for (size_t n = 0; n < frames.size(); ++n) {
+    EXPECT_NEAR(frames[n], Right(42 * 128 + n, 10 * 128), 1e-6) << n;
+  }
+}
+
 TEST_F(BusesTest, AGainOfABusAndOneOfAllGiveTheSameBits) {
   Mixer other({.gain = 0.3});
   const BankId bank = other.Add(MakeBank()).value();

@@ -138,6 +138,13 @@ class Client {
   /// Creates a scene and returns its name, "scenes/{id}".
   virtual absl::StatusOr<std::string> CreateScene(const v1::CreateSceneRequest& request) const;
 
+  /// Changes the gain of a scene, mutes it, or lets it sound alone, and returns it.
+  virtual absl::StatusOr<v1::Scene> UpdateScene(const v1::UpdateSceneRequest& request) const;
+
+  /// Silences what sounds in a scene or, if `scene` is empty, in all scenes of the caller, with a
+  /// short fade. Returns the number of scenes.
+  virtual absl::StatusOr<uint32_t> StopAll(const std::string& scene = "") const;
+
   /// Fades out the objects of a scene and deletes it. A scene that was not made with `keep` ends by
   /// itself a minute after the connections that have used it.
   virtual absl::Status DeleteScene(const std::string& name) const;
@@ -167,7 +174,20 @@ class Client {
   virtual absl::StatusOr<std::unique_ptr<ContactStream>> StreamContacts(
       const v1::ContactStreamStart& start) const;
 
+  /// Passes the records of the next contact stream that begins in a scene to `on_record`: a header,
+  /// then objects and steps, until that stream ends or `on_record` returns false. `on_begun`, which
+  /// may be null, is called once the recording waits for the stream.
+  virtual absl::Status RecordContacts(
+      const std::string& scene, const std::function<void()>& on_begun,
+      const std::function<bool(const v1::ContactTraceRecord&)>& on_record) const;
+
   // Sound.
+
+  /// Passes the sound that `request` asks for, of the output or of one scene, to `on_block` until
+  /// `on_block` returns false or the scene is deleted; then returns OK. Samples come as floats,
+  /// whatever their encoding on the wire is.
+  virtual absl::Status ListenTo(const v1::ListenRequest& request,
+                                const AudioCallback& on_block) const;
 
   /// Passes the sound of the mixer to `on_block` until `on_block` returns false; then returns OK.
   virtual absl::Status Listen(const AudioCallback& on_block) const;
@@ -181,6 +201,10 @@ class Client {
 
   /// Returns the state of the mixer and the audio device.
   virtual absl::StatusOr<v1::GetMixerResponse> GetMixer() const;
+
+  /// Changes the gain of the output or mutes it. Over TCP this needs the role "administer".
+  virtual absl::StatusOr<v1::UpdateMixerResponse> UpdateMixer(
+      const v1::UpdateMixerRequest& request) const;
 
   // Runs of decomposition jobs on the machines of a cluster.
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -25,12 +26,15 @@ class ContactStream {
 
   /// Queues one simulation step and returns at once. If the stream has ended, returns the error
   /// that ended it, or FAILED_PRECONDITION (CONTACT_STREAM_ENDED) after Finish(). If
-  /// kMaxQueuedSteps steps are waiting, drops `step` and returns RESOURCE_EXHAUSTED
-  /// (CONTACT_QUEUE_FULL).
+  /// kMaxQueuedSteps steps are waiting, the oldest of them is dropped, and counted: what is newest
+  /// is heard.
   virtual absl::Status Send(v1::ContactStep step) = 0;
 
   /// Returns the number of steps that wait for the network.
   virtual size_t WaitingStepCount() const { return 0; }
+
+  /// Returns the number of steps that were dropped, because too many waited.
+  virtual uint64_t DroppedStepCount() const { return 0; }
 
   /// Returns the newest answer of the daemon: the delays in seconds, and counts since the stream
   /// was opened.

@@ -84,6 +84,12 @@ class AsyncClient:
     async def materials(self) -> dict[str, material_pb2.Material]:
         return await in_thread(lambda: self.sync.materials)
 
+    async def set_volume(self, **volume: Any) -> audio_service_pb2.UpdateMixerResponse:
+        return await in_thread(self.sync.set_volume, **volume)
+
+    async def stop_all(self) -> int:
+        return await in_thread(self.sync.stop_all)
+
     async def scene(self, **settings: Any) -> AsyncScene:
         return AsyncScene(await in_thread(self.sync.scene, **settings))
 
@@ -126,6 +132,16 @@ class AsyncScene:
 
     async def remove(self, item: SoundingObject) -> None:
         await in_thread(item.remove)
+
+    async def change_volume(self, **volume: Any) -> None:
+        """Changes gain, muted or solo; see Scene.update."""
+        await in_thread(self.sync.update, **volume)
+
+    async def stop(self) -> None:
+        await in_thread(self.sync.stop)
+
+    async def listen(self, seconds: float) -> Sound:
+        return await in_thread(self.sync.listen, seconds)
 
     async def objects(self) -> list[SoundingObject]:
         return await in_thread(self.sync.objects)

@@ -143,11 +143,22 @@ class Client:
                                        "Client.materials has all of them")
         return resolved(message, self.materials)
 
+    def set_volume(self, *, gain: Optional[float] = None,
+                   muted: Optional[bool] = None) -> audio_service_pb2.UpdateMixerResponse:
+        """Changes the linear gain of the daemon's output, or mutes it, without a click. Returns both."""
+        with errors.translated(self.server):
+            return self.audio_stub.UpdateMixer(audio_service_pb2.UpdateMixerRequest(gain=gain, muted=muted))
+
+    def stop_all(self) -> int:
+        """Fades out all that sounds in your scenes. Returns their number."""
+        with errors.translated(self.server):
+            return self.scenes_stub.StopAll(scene_service_pb2.StopAllRequest()).scene_count
+
     def scene(self, *, hearing: Optional[hearing_pb2.Hearing] = None, listener: Optional[PoseLike] = None,
-              keep: bool = False) -> Scene:
+              gain: Optional[float] = None, keep: bool = False) -> Scene:
         """Makes an empty scene. It ends by itself a minute after its clients, unless `keep` is true."""
         request = scene_service_pb2.CreateSceneRequest(
-            hearing=hearing, listener=None if listener is None else to_pose(listener), keep=keep)
+            hearing=hearing, listener=None if listener is None else to_pose(listener), gain=gain, keep=keep)
         with errors.translated(self.server):
             return Scene(self, self.scenes_stub.CreateScene(request).name)
 
@@ -159,7 +170,7 @@ class Client:
 
     def render(self, trace: Trace | str | os.PathLike[str], **settings: Any) -> Sound:
         """Renders a trace, or a .contacts file, faster than real time. `settings` are fields of RenderSettings:
-        sample_rate_hz, channel_count and tail_s. Raises CarillonError if a contact is rejected."""
+        sample_rate_hz, channel_count, tail_s and gain. Raises CarillonError if a contact is rejected."""
         records = (trace if isinstance(trace, Trace) else Trace.read(trace)).records()
         return self._render(records, audio_service_pb2.RenderSettings(**settings))
 
@@ -169,10 +180,11 @@ class Client:
             return record.take(seconds)
 
     @contextlib.contextmanager
-    def recording(self) -> Iterator[Recording]:
-        """Records what the daemon plays within the block, from its first line on."""
+    def recording(self, **request: Any) -> Iterator[Recording]:
+        """Records what the daemon plays within the block, from its first line on. `request` has fields of
+        ListenRequest: scene, block_frame_count and encoding."""
         with errors.translated(self.server):
-            answers = self.audio_stub.Listen(audio_service_pb2.ListenRequest())
+            answers = self.audio_stub.Listen(audio_service_pb2.ListenRequest(**request))
             with self.cancellable(answers):
                 record = Recording(answers)
                 try:
@@ -243,6 +255,7 @@ class Recording:
     def __init__(self, answers: Any):
         self._answers = answers
         self._format = next(answers).format
+        self._short = self._format.encoding == audio_service_pb2.AUDIO_ENCODING_INT16
         self._blocks: list[bytes] = []
         self._frame_count = self._lost = 0
         self._error: Optional[grpc.RpcError] = None
@@ -253,7 +266,9 @@ class Recording:
     @property
     def sound(self) -> Sound:
         with self._more:
-            samples = numpy.frombuffer(b"".join(self._blocks), "<f4")
+            samples = numpy.frombuffer(b"".join(self._blocks), "<i2" if self._short else "<f4")
+        if self._short:
+            samples = samples.astype("<f4") / 32767
         return Sound(samples.reshape(-1, self._format.channel_count), self._format.sample_rate_hz, self._lost)
 
     def take(self, seconds: float) -> Sound:
@@ -275,7 +290,8 @@ class Recording:
             for answer in self._answers:
                 with self._more:
                     self._blocks.append(answer.block.samples)
-                    self._frame_count += len(answer.block.samples) // (4 * self._format.channel_count)
+                    self._frame_count += len(answer.block.samples) // (
+                        (2 if self._short else 4) * self._format.channel_count)
                     self._lost = answer.lost_frame_count
                     self._more.notify_all()
         except grpc.RpcError as error:

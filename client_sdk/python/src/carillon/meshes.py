@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import dataclasses
-import io
 import os
 import pathlib
 from typing import Any
@@ -40,10 +39,16 @@ def make_obj(vertices: Any, triangles: Any, label: str = "") -> MeshFile:
     if len(corners) and (corners.min() < 0 or corners.max() >= len(points)):
         raise CarillonError("MESH_INDEX_OUT_OF_RANGE", f"a triangle names a vertex outside 0 to {len(points) - 1}; "
                             "indices count from zero")
-    text = io.StringIO()
-    numpy.savetxt(text, points, fmt="v %.17g %.17g %.17g")
-    numpy.savetxt(text, corners + 1, fmt="f %d %d %d")
-    return MeshFile(text.getvalue().encode(), "obj", label)
+    lines = [f"v {_number(x)} {_number(y)} {_number(z)}\n" for x, y, z in points.tolist()]
+    lines += [f"f {i} {j} {k}\n" for i, j, k in (corners + 1).tolist()]
+    return MeshFile("".join(lines).encode(), "obj", label)
+
+
+def _number(value: float) -> str:
+    """The fewest digits that give the number back, written as each client writes them, so that equal arrays make
+    equal files."""
+    digits, exponential, exponent = repr(value + 0.0).partition("e")
+    return f"{digits}e{int(exponent):+d}" if exponential else digits.removesuffix(".0")
 
 
 def to_mesh_file(mesh: Any) -> MeshFile:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import queue
 import threading
 from collections.abc import Iterator
@@ -12,6 +13,8 @@ import grpc
 
 from carillon import contacts, errors, materials
 from carillon.contacts import Array, Contacts, Forces, Impulses, PoseLike, Poses, make_step
+from carillon.sound import Sound
+from carillon.traces import Trace
 from carillon.v1 import contact_pb2, contact_service_pb2, scene_service_pb2
 
 if TYPE_CHECKING:
@@ -98,6 +101,35 @@ class Scene:
             answer = self.client.scenes_stub.ListObjects(scene_service_pb2.ListObjectsRequest(scene=self.name))
         return [SoundingObject(self, item) for item in answer.objects]
 
+    def update(self, *, gain: Optional[float] = None, muted: Optional[bool] = None,
+               solo: Optional[bool] = None) -> scene_service_pb2.Scene:
+        """Changes the volume: a linear gain; muted, so that the scene rings on unheard; solo, so that of your scenes
+        only those with this flag are heard. Changes glide within 30 ms. Returns the scene's state."""
+        request = scene_service_pb2.UpdateSceneRequest(name=self.name, gain=gain, muted=muted, solo=solo)
+        with errors.translated(self.client.server):
+            return self.client.scenes_stub.UpdateScene(request).scene
+
+    def stop(self) -> None:
+        """Fades out all that sounds in the scene. Later contacts sound."""
+        with errors.translated(self.client.server):
+            self.client.scenes_stub.StopAll(scene_service_pb2.StopAllRequest(scene=self.name))
+
+    def listen(self, seconds: float) -> Sound:
+        """Records the scene alone, before the gain and the limiter of the output."""
+        with self.client.recording(scene=self.name) as record:
+            return record.take(seconds)
+
+    @contextlib.contextmanager
+    def recording_contacts(self) -> Iterator[TraceRecording]:
+        """Has the daemon record the next stream of contacts that begins within the block. After the stream's end,
+        `take` of what the block gets returns its trace, which renders to the same samples."""
+        request = contact_service_pb2.RecordContactsRequest(scene=self.name)
+        with errors.translated(self.client.server):
+            answers = self.client.contacts_stub.RecordContacts(request)
+            with self.client.cancellable(answers):
+                next(answers)  # it has begun
+                yield TraceRecording(answers)
+
     def move_listener(self, pose: PoseLike, glide: float = 0) -> None:
         """Moves the listener, within `glide` seconds."""
         request = scene_service_pb2.UpdateListenerRequest(scene=self.name, pose=contacts.to_pose(pose), glide_s=glide)
@@ -125,11 +157,22 @@ class Scene:
         self.delete()
 
 
+class TraceRecording:
+    """A stream of contacts that the daemon records."""
+
+    def __init__(self, answers: Any):
+        self._answers = answers
+
+    def take(self) -> Trace:
+        """Waits until the stream has ended. Returns its trace."""
+        return Trace.of(answer.record for answer in self._answers)
+
+
 class ContactStream:
     """Sends the contacts of each step without waiting for the daemon: a thread sends them, and another reads the
-    answers. `report` is the newest answer, with the counts so far; `dropped_step_count` steps were not sent, because
-    more than 4096 waited. At the end of the block a ContactWarning tells of contacts that were rejected or lie far from
-    their objects."""
+    answers. `report` is the newest answer, with the counts so far; `dropped_step_count` steps were not sent: the
+    oldest ones, when more than 4096 waited. At the end of the block a ContactWarning tells of contacts that were
+    rejected or lie far from their objects."""
 
     def __init__(self, scene: Scene, start: contact_service_pb2.ContactStreamStart):
         self._server = scene.client.server
@@ -137,8 +180,7 @@ class ContactStream:
         self._error: Optional[grpc.RpcError] = None
         self.report: contact_service_pb2.StreamContactsResponse = contact_service_pb2.StreamContactsResponse()
         self.dropped_step_count = 0
-        self._requests.put(contact_service_pb2.StreamContactsRequest(start=start))
-        self._answers = scene.client.contacts_stub.StreamContacts(self._sent())
+        self._answers = scene.client.contacts_stub.StreamContacts(self._sent(start))
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 
@@ -169,8 +211,9 @@ class ContactStream:
         if self._error:
             raise errors.from_rpc(self._error, self._server)
         if self._requests.qsize() >= MOST_WAITING:
-            self._requests.get()
-            self.dropped_step_count += 1
+            with contextlib.suppress(queue.Empty):  # the thread that sends may have taken it meanwhile
+                self._requests.get_nowait()
+                self.dropped_step_count += 1
         self._requests.put(contact_service_pb2.StreamContactsRequest(step=step))
 
     def close(self, warn: bool = True) -> contact_service_pb2.StreamContactsResponse:
@@ -183,7 +226,9 @@ class ContactStream:
             errors.warn_of_contacts(self.findings, self.report.rejected_count, self.report.last_rejection)
         return self.report
 
-    def _sent(self) -> Iterator[contact_service_pb2.StreamContactsRequest]:
+    def _sent(self, start: contact_service_pb2.ContactStreamStart
+              ) -> Iterator[contact_service_pb2.StreamContactsRequest]:
+        yield contact_service_pb2.StreamContactsRequest(start=start)
         while (request := self._requests.get()) is not None:
             yield request
 

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, BinaryIO, Optional
 
 from google.protobuf.message import DecodeError
@@ -71,21 +71,26 @@ class Trace:
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Trace:
         """Reads a .contacts file. Raises CarillonError (TRACE_MALFORMED)."""
-        trace = cls()
         with open(path, "rb") as file:
-            for number, record in enumerate(_read_records(file, str(path))):
-                kind = record.WhichOneof("record")
-                if (number == 0) != (kind == "header"):
-                    raise CarillonError("TRACE_MALFORMED", f"{path}: record {number} must"
-                                        f"{'' if number == 0 else ' not'} be a header")
-                if kind == "header":
-                    trace.header = record.header
-                elif kind == "object":
-                    trace.objects.append(record.object)
-                else:
-                    trace.steps.append(record.step)
+            return cls.of(_read_records(file, str(path)), str(path))
+
+    @classmethod
+    def of(cls, records: Iterable[contact_trace_pb2.ContactTraceRecord], source: str = "the trace") -> Trace:
+        """Makes a trace of its records. Raises CarillonError (TRACE_MALFORMED)."""
+        trace = cls()
+        for number, record in enumerate(records):
+            kind = record.WhichOneof("record")
+            if (number == 0) != (kind == "header"):
+                raise CarillonError("TRACE_MALFORMED", f"{source}: record {number} must"
+                                    f"{'' if number == 0 else ' not'} be a header")
+            if kind == "header":
+                trace.header = record.header
+            elif kind == "object":
+                trace.objects.append(record.object)
+            else:
+                trace.steps.append(record.step)
         if trace.header.format_version > FORMAT_VERSION:
-            raise CarillonError("TRACE_MALFORMED", f"{path} has format version {trace.header.format_version}; this "
+            raise CarillonError("TRACE_MALFORMED", f"{source} has format version {trace.header.format_version}; this "
                                 f"program reads {FORMAT_VERSION}")
         return trace
 

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client_sdk/c/c_conversion.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+
+#include "absl/strings/str_cat.h"
+#include "proto/cpp/error_reason.h"
+
+namespace carillon::c {
+namespace {
+
+/// The fewest digits that give the number back: plain from 1e-4 to 1e16, otherwise as "1.5e-7".
+std::string Digits(double value) {
+  if (value == 0) return "0";
+  const double size = std::abs(value);
+  const bool plain = size >= 1e-4 && size < 1e16;
+  std::array<char, 64> text;
+  const auto end = std::to_chars(text.data(), text.data() + text.size(), value,
+                                 plain ? std::chars_format::fixed : std::chars_format::scientific)
+                       .ptr;
+  std::string digits(text.data(), end);
+  // to_chars writes at least two digits of an exponent.
+  const size_t sign = digits.find_first_of("+-", digits.find('e') + 1);
+  if (!plain && digits[sign + 1] == '0') digits.erase(sign + 1, 1);
+  return digits;
+}
+
+void Set(const carillon_vec3& from, v1::Vec3& to) {
+  to.set_x(from.x);
+  to.set_y(from.y);
+  to.set_z(from.z);
+}
+
+void Set(const carillon_contact& from, v1::EngineContact& to) {
+  to.set_object(from.object);
+  Set(from.point_m, *to.mutable_point_m());
+  Set(from.impulse_newton_seconds, *to.mutable_impulse_newton_seconds());
+  to.set_partner(from.partner);
+  if (from.travel_speed_m_per_s == 0) return;
+  to.mutable_roughness()->set_travel_speed_m_per_s(from.travel_speed_m_per_s);
+  to.mutable_roughness()->set_depth(from.roughness_depth);
+}
+
+void Set(const carillon_impulse& from, v1::Impulse& to) {
+  to.set_object(from.object);
+  Set(from.point_m, *to.mutable_point_m());
+  Set(from.impulse_newton_seconds, *to.mutable_impulse_newton_seconds());
+  if (from.duration_s != 0) to.set_duration_s(from.duration_s);
+}
+
+void Set(const carillon_pose& from, v1::ObjectPose& to) {
+  to.set_object(from.object);
+  Set(from.position_m, *to.mutable_pose()->mutable_position_m());
+  const carillon_quaternion& turn = from.orientation;
+  if (turn.w == 0 && turn.x == 0 && turn.y == 0 && turn.z == 0) return;
+  v1::Quaternion& orientation = *to.mutable_pose()->mutable_orientation();
+  orientation.set_w(turn.w);
+  orientation.set_x(turn.x);
+  orientation.set_y(turn.y);
+  orientation.set_z(turn.z);
+}
+
+}  // namespace
+
+absl::StatusOr<std::string> MakeObj(std::span<const double> vertices_m,
+                                    std::span<const uint32_t> triangles) {
+  const size_t vertex_count = vertices_m.size() / 3;
+  if (std::ranges::any_of(triangles, [&](uint32_t corner) { return corner >= vertex_count; })) {
+    return Refusal(absl::StatusCode::kInvalidArgument, "MESH_INDEX_OUT_OF_RANGE",
+                   absl::StrCat("a triangle names a vertex outside 0 to ", vertex_count,
+                                " - 1; indices count from zero"));
+  }
+  std::string text;
+  for (size_t i = 0; i < vertices_m.size(); i += 3) {
+    absl::StrAppend(&text, "v ", Digits(vertices_m[i]), " ", Digits(vertices_m[i + 1]), " ",
+                    Digits(vertices_m[i + 2]), "\n");
+  }
+  for (size_t i = 0; i < triangles.size(); i += 3) {
+    absl::StrAppend(&text, "f ", triangles[i] + 1, " ", triangles[i + 1] + 1, " ",
+                    triangles[i + 2] + 1, "\n");
+  }
+  return text;
+}
+
+v1::ContactStep ToStep(const carillon_step& step) {
+  v1::ContactStep made;
+  made.set_time_s(step.time_s);
+  for (size_t i = 0; i < step.contact_count; ++i) Set(step.contacts[i], *made.add_contacts());
+  for (size_t i = 0; i < step.impulse_count; ++i) Set(step.impulses[i], *made.add_impulses());
+  for (size_t i = 0; i < step.pose_count; ++i) Set(step.poses[i], *made.add_poses());
+  return made;
+}
+
+}  // namespace carillon::c

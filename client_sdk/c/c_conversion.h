@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "carillon/v1/contact.pb.h"
+#include "client_sdk/c/carillon.h"
+
+namespace carillon::c {
+
+/// Makes an OBJ file of three coordinates a vertex and three indices a triangle, with the same
+/// bytes as the clients of other languages. Errors: InvalidArgument (MESH_INDEX_OUT_OF_RANGE).
+absl::StatusOr<std::string> MakeObj(std::span<const double> vertices_m,
+                                    std::span<const uint32_t> triangles);
+
+/// Fills in the object of a scene or of a trace.
+template <class Message>
+void Fill(const carillon_object& object, Message& message) {
+  message.set_modal_model(object.model);
+  message.mutable_material()->set_preset(object.material);
+  if (object.size != 0) message.set_size(object.size);
+  if (object.gain != 0) message.set_gain(object.gain);
+  message.set_handle(object.handle);
+}
+
+v1::ContactStep ToStep(const carillon_step& step);
+
+}  // namespace carillon::c

@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: Apache-2.0
+/**
+ * The C interface of Carillon, for engines and for languages that load a shared library
+ * (libcarillon.so): scenes, contacts of a running simulation, and offline rendering.
+ *
+ * Units are SI: metres, newton seconds, seconds. Points and impulses are in the frame of their
+ * object. Strings are UTF-8 and end with a zero.
+ *
+ * Every function that returns a carillon_code returns CARILLON_OK, or another code; then
+ * carillon_error() and carillon_error_reason() say why. proto/README.md lists the reasons. Results
+ * are written only on success. No function throws or ends the program. The functions of different
+ * objects may be called by different threads; those of one object by one thread at a time.
+ */
+#ifndef CARILLON_H_
+#define CARILLON_H_
+
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/** What became of a call: zero, or the code of gRPC. */
+typedef int32_t carillon_code;
+enum {
+  CARILLON_OK = 0,
+  CARILLON_INVALID_ARGUMENT = 3,
+  CARILLON_NOT_FOUND = 5,
+  CARILLON_UNAVAILABLE = 14
+};
+
+/** Room for a name, such as "modalModels/" and 64 digits, with the zero at its end. */
+#define CARILLON_NAME_SIZE 96
+
+typedef struct carillon_client carillon_client;
+typedef struct carillon_scene carillon_scene;
+typedef struct carillon_stream carillon_stream;
+typedef struct carillon_trace carillon_trace;
+
+typedef struct carillon_vec3 {
+  double x, y, z;
+} carillon_vec3;
+
+/** A rotation as a unit quaternion; all zeros: none. */
+typedef struct carillon_quaternion {
+  double w, x, y, z;
+} carillon_quaternion;
+
+/** The closed surface of a body. */
+typedef struct carillon_mesh {
+  const double* vertices_m; /**< three coordinates a vertex */
+  size_t vertex_count;
+  const uint32_t* triangles; /**< three vertices a triangle, counted from zero */
+  size_t triangle_count;
+} carillon_mesh;
+
+/** An object that sounds. Zeros are defaults, but for the model and the material. */
+typedef struct carillon_object {
+  const char* model;    /**< "modalModels/{digest}" */
+  const char* material; /**< a name of the catalogue, such as "structural_steel" */
+  double size;          /**< relative to the model's; zero: 1 */
+  double gain;          /**< linear; zero: 1 */
+  uint32_t handle;      /**< wanted in contacts; zero: the next free one */
+} carillon_object;
+
+/** What an engine reports of one contact, in every step, also at rest. Zero the rest. */
+typedef struct carillon_contact {
+  uint32_t object;
+  carillon_vec3 point_m;
+  carillon_vec3 impulse_newton_seconds; /**< on the object over the step, friction included */
+  uint32_t partner;                     /**< any number that names the other body */
+  double travel_speed_m_per_s;          /**< along a rough surface; zero: no roughness */
+  double roughness_depth;               /**< relative to the force */
+} carillon_contact;
+
+/** A blow that somebody means, such as a hammer's. */
+typedef struct carillon_impulse {
+  uint32_t object;
+  carillon_vec3 point_m;
+  carillon_vec3 impulse_newton_seconds;
+  double duration_s; /**< zero: as long as an elastic collision with steel */
+} carillon_impulse;
+
+/** Where an object is in its scene. */
+typedef struct carillon_pose {
+  uint32_t object;
+  carillon_vec3 position_m;
+  carillon_quaternion orientation;
+} carillon_pose;
+
+/** One step of a simulation. Times do not go back within a stream or a trace. */
+typedef struct carillon_step {
+  double time_s;
+  const carillon_contact* contacts;
+  size_t contact_count;
+  const carillon_impulse* impulses;
+  size_t impulse_count;
+  const carillon_pose* poses;
+  size_t pose_count;
+} carillon_step;
+
+/** What became of a stream's steps. */
+typedef struct carillon_report {
+  uint64_t step_count;         /**< that the daemon has read */
+  uint64_t accepted_count;     /**< impulses that sound at their time */
+  uint64_t late_count;         /**< impulses that came late and sounded at once */
+  uint64_t rejected_count;     /**< impulses that could not be used */
+  uint64_t dropped_step_count; /**< steps that were not sent: the oldest of too many */
+} carillon_report;
+
+/** Rendered sound; full scale is 1. */
+typedef struct carillon_sound {
+  float* samples; /**< interleaved by channel */
+  uint64_t frame_count;
+  uint32_t channel_count;
+  uint32_t sample_rate_hz;
+} carillon_sound;
+
+/** The version of this library, such as "0.1.0". */
+const char* carillon_version(void);
+/** Why the last failed call of this thread failed: its reason, a colon and a text; empty at
+ * first. */
+const char* carillon_error(void);
+/** The reason alone, such as "SERVER_UNAVAILABLE", which is stable. */
+const char* carillon_error_reason(void);
+
+/** Connects to "unix:PATH" or "HOST:PORT"; null: to the default daemon. It waits for its answer. */
+carillon_code carillon_connect(const char* server, carillon_client** client);
+/** Ends the connection, after its scenes, streams and traces. Null is ignored, as by each function
+ * that ends something. */
+void carillon_disconnect(carillon_client* client);
+
+/** Computes the model of a mesh file, unless it is stored already, and waits for it. `model` has
+ * room for CARILLON_NAME_SIZE characters. */
+carillon_code carillon_create_model(carillon_client* client, const char* mesh_file,
+                                    const char* material, char* model);
+/** The same of a mesh in memory. */
+carillon_code carillon_create_model_of_mesh(carillon_client* client, const carillon_mesh* mesh,
+                                            const char* material, char* model);
+
+carillon_code carillon_create_scene(carillon_client* client, carillon_scene** scene);
+/** Fades out the objects of the scene and deletes it. */
+void carillon_delete_scene(carillon_scene* scene);
+/** The name of the scene, "scenes/{id}", as long as it is not deleted. */
+const char* carillon_scene_name(const carillon_scene* scene);
+/** Adds an object, ready to be struck when the call returns. `handle` may be null. */
+carillon_code carillon_add_object(carillon_scene* scene, const carillon_object* object,
+                                  uint32_t* handle);
+carillon_code carillon_remove_object(carillon_scene* scene, uint32_t handle);
+/** Lets the linear gain of the scene glide to a value of 0 to 1000. */
+carillon_code carillon_set_gain(carillon_scene* scene, double gain);
+/** Silences all that sounds in the scene, with a short fade. */
+carillon_code carillon_stop(carillon_scene* scene);
+
+/** Opens a stream of the contacts of a simulation whose steps last `step_s`. */
+carillon_code carillon_open_stream(carillon_scene* scene, double step_s, carillon_stream** stream);
+/** Sends a step. It copies the step and never waits for the daemon. */
+carillon_code carillon_send(carillon_stream* stream, const carillon_step* step);
+/** Sends what waits and ends the stream. `report` may be null. */
+carillon_code carillon_close_stream(carillon_stream* stream, carillon_report* report);
+
+/** Begins a contact trace, which is written to a file (.contacts), to be rendered now or later. */
+carillon_code carillon_create_trace(const char* file, double step_s, carillon_trace** trace);
+/** Adds an object; all of them come before the first step. `handle` may be null. */
+carillon_code carillon_trace_object(carillon_trace* trace, const carillon_object* object,
+                                    uint32_t* handle);
+carillon_code carillon_trace_step(carillon_trace* trace, const carillon_step* step);
+/** Completes the file. */
+carillon_code carillon_close_trace(carillon_trace* trace);
+/** Renders a trace, faster than real time: the same samples each time. `tail_s`: the time after the
+ * last contact; zero: until the sound has died away. carillon_free_sound frees the sound. */
+carillon_code carillon_render(carillon_client* client, const char* trace_file,
+                              uint32_t sample_rate_hz, double tail_s, carillon_sound* sound);
+void carillon_free_sound(carillon_sound* sound);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif /* CARILLON_H_ */

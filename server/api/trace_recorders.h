@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <set>
+#include <vector>
+
+#include "absl/base/thread_annotations.h"
+#include "carillon/v1/contact_service.pb.h"
+#include "carillon/v1/contact_trace.pb.h"
+#include "server/base/mutex.h"
+#include "server/scene/scene_registry.h"
+
+namespace carillon {
+
+/// Takes the records of one contact stream, for a client that reads them. Safe from every thread.
+class TraceRecorder {
+ public:
+  /// Records that may wait for the client.
+  static constexpr size_t kMostWaiting = 65536;
+
+  /// `wake` is called when there is something to take, until Leave; it must not destroy the
+  /// recorder.
+  TraceRecorder(uint64_t scene, std::function<void()> wake)
+      : scene_(scene), wake_(std::move(wake)) {}
+
+  /// The client has gone: nobody is woken any more when it returns.
+  void Leave();
+
+  uint64_t scene() const { return scene_; }
+  void Add(v1::ContactTraceRecord record);
+  void End();
+
+  /// Takes the next record; false: none waits.
+  bool TryTake(v1::ContactTraceRecord& record);
+  /// Whether no further record will come.
+  bool ended() const;
+  /// Whether records were lost because too many waited.
+  bool overflowed() const;
+
+ private:
+  void Wake();
+
+  const uint64_t scene_;
+  Mutex wake_mutex_;
+  std::function<void()> wake_ ABSL_GUARDED_BY(wake_mutex_);
+  mutable Mutex mutex_;
+  std::deque<v1::ContactTraceRecord> waiting_ ABSL_GUARDED_BY(mutex_);
+  bool ended_ ABSL_GUARDED_BY(mutex_) = false;
+  bool overflowed_ ABSL_GUARDED_BY(mutex_) = false;
+};
+
+/// The recorders that wait for a stream of their scene to begin. Safe from every thread.
+class TraceRecorders {
+ public:
+  void Add(const std::shared_ptr<TraceRecorder>& recorder);
+
+  /// Takes out the recorders of a scene, in which a stream begins.
+  std::vector<std::shared_ptr<TraceRecorder>> Take(uint64_t scene);
+
+ private:
+  Mutex mutex_;
+  std::vector<std::weak_ptr<TraceRecorder>> waiting_ ABSL_GUARDED_BY(mutex_);
+};
+
+/// Writes one contact stream to its recorders. One thread at a time.
+class StreamRecording {
+ public:
+  StreamRecording() = default;
+  /// `start` is that of the stream, whose first step is about to be read.
+  StreamRecording(const SceneRegistry& scenes, uint64_t scene, const v1::ContactStreamStart& start,
+                  std::vector<std::shared_ptr<TraceRecorder>> recorders);
+
+  bool active() const { return !recorders_.empty(); }
+
+  /// Notes the objects as they are before a step.
+  void BeginStep();
+  /// Adds a step that was read, whose times `mapping` maps.
+  void AddStep(const v1::ContactStep& step, const TimeMapping& mapping);
+  void End();
+
+ private:
+  void Add(const v1::ContactTraceRecord& record);
+
+  const SceneRegistry* scenes_ = nullptr;
+  uint64_t scene_ = 0;
+  v1::ContactTraceHeader header_;
+  std::vector<std::shared_ptr<TraceRecorder>> recorders_;
+  std::vector<v1::ContactTraceRecord> new_objects_;
+  std::set<uint32_t> known_;
+  bool begun_ = false;
+};
+
+}  // namespace carillon

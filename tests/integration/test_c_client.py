@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The C interface: the page's program, compiled as C99 against what is installed, and calls that go wrong."""
+
+import ctypes
+import os
+import pathlib
+import re
+import subprocess
+import unittest
+
+import numpy
+
+import carillon
+import meshes
+from daemon import ROOT, DaemonTest
+
+BUILD = pathlib.Path(os.environ["CARILLON_BUILD_DIR"])
+VERTICES = [(x, y, z) for x in (0, 0.2) for y in (0, 0.03) for z in (0, 0.01)]
+TRIANGLES = [(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6), (0, 2, 6),
+             (0, 6, 4), (1, 5, 7), (1, 7, 3)]
+
+
+class Vec3(ctypes.Structure):
+    _fields_ = [(name, ctypes.c_double) for name in "xyz"]
+
+
+class Mesh(ctypes.Structure):
+    _fields_ = [("vertices_m", ctypes.c_void_p), ("vertex_count", ctypes.c_size_t), ("triangles", ctypes.c_void_p),
+                ("triangle_count", ctypes.c_size_t)]
+
+
+class Object(ctypes.Structure):
+    _fields_ = [("model", ctypes.c_char_p), ("material", ctypes.c_char_p), ("size", ctypes.c_double),
+                ("gain", ctypes.c_double), ("handle", ctypes.c_uint32)]
+
+
+class Impulse(ctypes.Structure):
+    _fields_ = [("object", ctypes.c_uint32), ("point_m", Vec3), ("impulse", Vec3), ("duration_s", ctypes.c_double)]
+
+
+class Step(ctypes.Structure):
+    _fields_ = [("time_s", ctypes.c_double), ("contacts", ctypes.c_void_p), ("contact_count", ctypes.c_size_t),
+                ("impulses", ctypes.POINTER(Impulse)), ("impulse_count", ctypes.c_size_t),
+                ("poses", ctypes.c_void_p), ("pose_count", ctypes.c_size_t)]
+
+
+class Sound(ctypes.Structure):
+    _fields_ = [("samples", ctypes.POINTER(ctypes.c_float)), ("frame_count", ctypes.c_uint64),
+                ("channel_count", ctypes.c_uint32), ("sample_rate_hz", ctypes.c_uint32)]
+
+
+class CClientTest(DaemonTest):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.prefix = cls.folder / "prefix"
+        subprocess.run(["cmake", "--install", BUILD, "--component", "sdk", "--prefix", cls.prefix], check=True,
+                       stdout=subprocess.DEVNULL)
+        cls.library = next(cls.prefix.rglob("libcarillon.so"))
+        cls.c = ctypes.CDLL(str(cls.library))
+        cls.c.carillon_error.restype = cls.c.carillon_error_reason.restype = ctypes.c_char_p
+        cls.c.carillon_render.argtypes = [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_uint32, ctypes.c_double,
+                                          ctypes.POINTER(Sound)]
+        cls.c.carillon_create_trace.argtypes = [ctypes.c_char_p, ctypes.c_double, ctypes.POINTER(ctypes.c_void_p)]
+        cls.connection = ctypes.c_void_p()
+        assert cls.c.carillon_connect(cls.daemon.server.encode(), ctypes.byref(cls.connection)) == 0
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.c.carillon_disconnect(cls.connection)
+
+    def model_of_arrays(self, vertices, triangles):
+        corners, indices = numpy.array(vertices, "f8"), numpy.array(triangles, "u4")
+        name = ctypes.create_string_buffer(96)
+        mesh = Mesh(corners.ctypes.data, len(corners), indices.ctypes.data, len(indices))
+        code = self.c.carillon_create_model_of_mesh(self.connection, ctypes.byref(mesh), meshes.MATERIAL.encode(), name)
+        return code, name.value.decode()
+
+    def test_the_program_of_the_page_strikes_a_bell(self):
+        page = (ROOT / "docs/ten_minutes_c.md").read_text()
+        (self.folder / "strike.c").write_text(re.search(r"(?ms)^```c\n(.*?)^```", page)[1])
+        (self.folder / "bowl.obj").write_bytes(meshes.bowl())
+        subprocess.run(["gcc", "-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", self.folder / "strike.c",
+                        "-o", self.folder / "strike", f"-I{self.prefix}/include", f"-L{self.library.parent}",
+                        "-lcarillon", f"-Wl,-rpath,{self.library.parent}"], check=True)
+        environment = {**os.environ, "CARILLON_SERVER": self.daemon.server}
+        subprocess.run([self.folder / "strike", self.folder / "bowl.obj"], env=environment, check=True,
+                       stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+        with carillon.connect(self.daemon.server) as c, c.recording() as heard:
+            with subprocess.Popen([self.folder / "strike", self.folder / "bowl.obj"], env=environment,
+                                  stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as striker:
+                heard.take(2.0)
+                said = striker.communicate("\n")[0]
+            self.assertEqual((striker.returncode, said), (0, "1 strikes sounded\n"))
+            self.assertGreater(heard.sound.peak, 1e-3)
+        failed = subprocess.run([self.folder / "strike", "none.obj"], env=environment, check=False,
+                                stdin=subprocess.DEVNULL, capture_output=True, text=True)
+        self.assertEqual(failed.returncode, 1)
+        self.assertIn("strike: MESH_FILE_NOT_READABLE: none.obj", failed.stderr)
+
+    def test_only_functions_of_the_header_are_exported(self):
+        listed = subprocess.run(["nm", "-D", "--defined-only", self.library], check=True, capture_output=True,
+                                text=True).stdout
+        exported = {line.split()[-1] for line in listed.splitlines()}
+        header = (self.prefix / "include/carillon.h").read_text()
+        declared = set(re.findall(r"^(?:carillon_code|void|const char\*) (carillon_\w+)\(", header, re.MULTILINE))
+        self.assertEqual(exported, declared)
+
+    def test_a_trace_renders_to_the_samples_that_python_gets(self):
+        code, model = self.model_of_arrays(VERTICES, TRIANGLES)
+        self.assertEqual(code, 0, self.c.carillon_error())
+        trace, file = ctypes.c_void_p(), str(self.folder / "c.contacts").encode()
+        self.assertEqual(self.c.carillon_create_trace(file, 1 / 60, ctypes.byref(trace)), 0)
+        handle = ctypes.c_uint32()
+        bar = Object(model=model.encode(), material=meshes.MATERIAL.encode())
+        self.assertEqual(self.c.carillon_trace_object(trace, ctypes.byref(bar), ctypes.byref(handle)), 0)
+        blow = Impulse(handle, Vec3(0.2, 0.015, 0.01), Vec3(0, 0, -0.01), 1e-4)
+        step = Step(0.0, None, 0, ctypes.pointer(blow), 1, None, 0)
+        self.assertEqual(self.c.carillon_trace_step(trace, ctypes.byref(step)), 0)
+        self.assertEqual(self.c.carillon_close_trace(trace), 0)
+        sound = Sound()
+        code = self.c.carillon_render(self.connection, file, 44100, 0.5, ctypes.byref(sound))
+        self.assertEqual(code, 0, self.c.carillon_error())
+        samples = numpy.ctypeslib.as_array(sound.samples, (sound.frame_count, sound.channel_count)).copy()
+        self.c.carillon_free_sound(ctypes.byref(sound))
+        with carillon.connect(self.daemon.server) as c:
+            same = c.render(file.decode(), sample_rate_hz=44100, tail_s=0.5)
+            # Equal arrays are one model, from whichever language they come.
+            self.assertEqual(c.create_model((VERTICES, TRIANGLES), meshes.MATERIAL).name, model)
+        self.assertGreater(same.peak, 1e-4)
+        numpy.testing.assert_array_equal(samples, same.samples)
+
+    def test_mistakes_have_a_code_and_a_reason(self):
+        code, _ = self.model_of_arrays(VERTICES, [(0, 1, 99)])
+        self.assertEqual((code, self.c.carillon_error_reason()), (3, b"MESH_INDEX_OUT_OF_RANGE"))
+        self.assertEqual(self.c.carillon_connect(b"unix:/nowhere", ctypes.byref(ctypes.c_void_p())), 14)
+        self.assertEqual(self.c.carillon_error_reason(), b"SERVER_UNAVAILABLE")
+        for call in (lambda: self.c.carillon_connect(None, None), lambda: self.c.carillon_stop(None),
+                     lambda: self.c.carillon_send(None, None), lambda: self.c.carillon_create_scene(None, None)):
+            self.assertEqual(call(), 3)
+            self.assertIn(b"null pointer", self.c.carillon_error())
+        # What ends something takes nothing for done.
+        for end in ("delete_scene", "disconnect", "free_sound", "close_stream", "close_trace"):
+            getattr(self.c, "carillon_" + end)(None)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,255 @@
+// SPDX-License-Identifier: Apache-2.0
+// The volume of scenes and of the output, stops, stems and recorded contacts, as clients see them.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "tests/server/api/served_daemon.h"
+
+namespace carillon {
+namespace {
+
+constexpr auto kInvalid = grpc::StatusCode::INVALID_ARGUMENT;
+
+class VolumeApi : public ServedDaemon {
+ protected:
+  v1::Scene Update(v1::UpdateSceneRequest request, const std::string& scene) {
+    request.set_name(scene);
+    v1::UpdateSceneResponse response;
+    const grpc::Status status =
+        Call(*scenes, &v1::SceneService::Stub::UpdateScene, request, response);
+    EXPECT_TRUE(status.ok()) << status.error_message();
+    return response.scene();
+  }
+
+  std::string SceneWithObject() {
+    const std::string scene = CreateScene();
+    v1::AddObjectResponse added;
+    EXPECT_TRUE(Add(SmallObject(scene), added).ok());
+    return scene;
+  }
+
+  /// Strikes object 1 of a scene live; returns the last answer.
+  v1::StreamContactsResponse StrikeLive(const std::string& scene) {
+    grpc::ClientContext context;
+    const auto stream = contacts->StreamContacts(&context);
+    v1::StreamContactsRequest request;
+    request.mutable_start()->set_scene(scene);
+    request.mutable_start()->set_step_s(0.01);
+    stream->Write(request);
+    *request.mutable_step()->add_impulses() = Strike(1);
+    stream->Write(request);
+    stream->WritesDone();
+    v1::StreamContactsResponse answer;
+    while (stream->Read(&answer)) {
+    }
+    EXPECT_TRUE(stream->Finish().ok());
+    return answer;
+  }
+
+  /// The records of the stream that `act` sends to a scene.
+  template <class Act>
+  std::vector<v1::ContactTraceRecord> Recorded(const std::string& scene, Act act) {
+    grpc::ClientContext context;
+    v1::RecordContactsRequest request;
+    request.set_scene(scene);
+    const auto reader = contacts->RecordContacts(&context, request);
+    v1::RecordContactsResponse response;
+    EXPECT_TRUE(reader->Read(&response));
+    EXPECT_FALSE(response.has_record());
+    act();
+    std::vector<v1::ContactTraceRecord> records;
+    while (reader->Read(&response)) records.push_back(response.record());
+    EXPECT_TRUE(reader->Finish().ok());
+    return records;
+  }
+
+  /// The samples of an offline rendering of the records.
+  std::vector<float> Render(const std::vector<v1::ContactTraceRecord>& records, double gain) {
+    grpc::ClientContext context;
+    const auto stream = audio->Render(&context);
+    v1::RenderRequest request;
+    request.mutable_settings()->set_gain(gain);
+    request.mutable_settings()->set_tail_s(0.5);
+    stream->Write(request);
+    for (const v1::ContactTraceRecord& record : records) {
+      *request.mutable_record() = record;
+      stream->Write(request);
+    }
+    stream->WritesDone();
+    std::vector<float> samples;
+    v1::RenderResponse response;
+    while (stream->Read(&response)) Append(response.block().samples(), samples);
+    EXPECT_TRUE(stream->Finish().ok());
+    return samples;
+  }
+
+  static void Append(const std::string& bytes, std::vector<float>& samples) {
+    const size_t before = samples.size();
+    samples.resize(before + bytes.size() / sizeof(float));
+    std::memcpy(samples.data() + before, bytes.data(), bytes.size());
+  }
+};
+
+TEST_F(VolumeApi, ASceneTellsItsVolume) {
+  const std::string scene = CreateScene();
+  v1::UpdateSceneRequest change;
+  change.set_gain(0.25);
+  change.set_muted(true);
+  v1::Scene changed = Update(change, scene);
+  EXPECT_EQ(changed.gain(), 0.25);
+  EXPECT_TRUE(changed.muted());
+  EXPECT_FALSE(changed.solo());
+  change.Clear();
+  change.set_solo(true);
+  changed = Update(change, scene);
+  EXPECT_EQ(changed.gain(), 0.25);
+  EXPECT_TRUE(changed.muted() && changed.solo());
+}
+
+TEST_F(VolumeApi, GainsOutOfRangeAreRefused) {
+  const std::string scene = CreateScene();
+  for (const double gain : {-0.1, 1000.1, std::numeric_limits<double>::quiet_NaN(),
+                            std::numeric_limits<double>::infinity()}) {
+    v1::UpdateSceneRequest change;
+    change.set_name(scene);
+    change.set_gain(gain);
+    v1::UpdateSceneResponse changed;
+    ExpectRefused(Call(*scenes, &v1::SceneService::Stub::UpdateScene, change, changed), kInvalid,
+                  "INVALID_GAIN");
+    v1::CreateSceneRequest create;
+    create.set_gain(gain);
+    v1::CreateSceneResponse created;
+    ExpectRefused(Call(*scenes, &v1::SceneService::Stub::CreateScene, create, created), kInvalid,
+                  "INVALID_GAIN");
+    v1::UpdateMixerRequest mixer;
+    mixer.set_gain(gain);
+    v1::UpdateMixerResponse mixed;
+    ExpectRefused(Call(*audio, &v1::AudioService::Stub::UpdateMixer, mixer, mixed), kInvalid,
+                  "INVALID_GAIN");
+  }
+}
+
+TEST_F(VolumeApi, TheMixerTellsTheVolumeOfTheOutput) {
+  v1::UpdateMixerRequest request;
+  request.set_gain(0.5);
+  v1::UpdateMixerResponse response;
+  ASSERT_TRUE(Call(*audio, &v1::AudioService::Stub::UpdateMixer, request, response).ok());
+  request.Clear();
+  request.set_muted(true);
+  ASSERT_TRUE(Call(*audio, &v1::AudioService::Stub::UpdateMixer, request, response).ok());
+  EXPECT_EQ(response.gain(), 0.5);
+  EXPECT_TRUE(response.muted());
+  v1::GetMixerResponse mixer;
+  ASSERT_TRUE(Call(*audio, &v1::AudioService::Stub::GetMixer, {}, mixer).ok());
+  EXPECT_EQ(mixer.gain(), 0.5);
+  EXPECT_TRUE(mixer.muted());
+}
+
+TEST_F(VolumeApi, AStopEndsWhatRings) {
+  const std::string scene = SceneWithObject();
+  ASSERT_EQ(StrikeLive(scene).accepted_count(), 1U);
+  v1::GetMixerResponse mixer;
+  const auto ringing = [&] {
+    EXPECT_TRUE(Call(*audio, &v1::AudioService::Stub::GetMixer, {}, mixer).ok());
+    return mixer.active_mode_count();
+  };
+  while (ringing() == 0) {
+  }
+  v1::StopAllResponse stopped;
+  ASSERT_TRUE(Call(*scenes, &v1::SceneService::Stub::StopAll, {}, stopped).ok());
+  EXPECT_EQ(stopped.scene_count(), 1U);
+  // The model rings for seconds, so that only the stop ends it before the test's time is over.
+  while (ringing() > 0) {
+  }
+  v1::StopAllRequest request;
+  request.set_scene("scenes/999");
+  ExpectRefused(Call(*scenes, &v1::SceneService::Stub::StopAll, request, stopped),
+                grpc::StatusCode::NOT_FOUND, "SCENE_NOT_FOUND");
+}
+
+TEST_F(VolumeApi, AStemIsTheSceneAloneAndItsRecordedContactsRenderToTheSameSamples) {
+  const std::string other = SceneWithObject(), scene = SceneWithObject();
+  v1::UpdateSceneRequest change;
+  change.set_gain(0.5);
+  Update(change, scene);
+  grpc::ClientContext listening;
+  v1::ListenRequest listen;
+  listen.set_scene(scene);
+  const auto heard = audio->Listen(&listening, listen);
+  v1::ListenResponse block;
+  ASSERT_TRUE(heard->Read(&block));
+
+  const std::vector<v1::ContactTraceRecord> records = Recorded(scene, [&] {
+    StrikeLive(other);
+    StrikeLive(scene);
+  });
+  ASSERT_EQ(records.size(), 3U);
+  EXPECT_EQ(records[0].header().gain(), 0.5);
+  const uint64_t first_frame = records[0].header().clock().first_frame();
+  const std::vector<float> rendered = Render(records, 1);
+  std::vector<float> live;
+  while (live.size() < rendered.size() && heard->Read(&block)) {
+    ASSERT_EQ(block.lost_frame_count(), 0U);
+    if (block.block().first_frame() >= first_frame) Append(block.block().samples(), live);
+  }
+  listening.TryCancel();
+  live.resize(rendered.size());
+  EXPECT_GT(*std::ranges::max_element(rendered), 1e-3F);
+  EXPECT_EQ(live, rendered);
+
+  // A gain of the rendering is that much more.
+  const std::vector<float> half = Render(records, 0.5);
+  ASSERT_EQ(half.size(), rendered.size());
+  for (size_t n = 0; n < half.size(); ++n) ASSERT_FLOAT_EQ(half[n], 0.5F * rendered[n]);
+}
+
+TEST_F(VolumeApi, BlocksHaveTheSizeAndTheEncodingAskedFor) {
+  grpc::ClientContext context;
+  v1::ListenRequest request;
+  request.set_block_frame_count(1000);
+  request.set_encoding(v1::AUDIO_ENCODING_INT16);
+  const auto reader = audio->Listen(&context, request);
+  v1::ListenResponse response;
+  ASSERT_TRUE(reader->Read(&response));
+  EXPECT_EQ(response.format().encoding(), v1::AUDIO_ENCODING_INT16);
+  uint64_t next = 0;
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_TRUE(reader->Read(&response));
+    EXPECT_EQ(response.block().samples().size(), 2000U);
+    if (i > 0) {
+      EXPECT_EQ(response.block().first_frame(), next);
+    }
+    next = response.block().first_frame() + 1000;
+  }
+  context.TryCancel();
+  grpc::ClientContext refused;
+  request.set_block_frame_count(65537);
+  ExpectRefused(audio->Listen(&refused, request)->Finish(), kInvalid, "INVALID_SETTINGS");
+}
+
+TEST_F(VolumeApi, AStemEndsWithItsScene) {
+  const std::string scene = CreateScene();
+  grpc::ClientContext context;
+  v1::ListenRequest request;
+  request.set_scene(scene);
+  const auto reader = audio->Listen(&context, request);
+  v1::ListenResponse response;
+  ASSERT_TRUE(reader->Read(&response));
+  v1::DeleteSceneRequest removal;
+  removal.set_name(scene);
+  v1::DeleteSceneResponse removed;
+  ASSERT_TRUE(Call(*scenes, &v1::SceneService::Stub::DeleteScene, removal, removed).ok());
+  while (reader->Read(&response)) {
+  }
+  EXPECT_TRUE(reader->Finish().ok());
+}
+
+}  // namespace
+}  // namespace carillon
