@@ -4,9 +4,9 @@
 # deploy/setup.sh LIST...
 #
 # Installs what is missing of the packages in the given lists, from Debian as this machine's apt is set up. A list is
-# one of deploy/packages/ (programs, engines, tests, languages, packages, lint, client) or a file. With `lint` it also installs
-# buf, with `tests` or `packages` what the client for Node needs, with `tests` or `engines` the engines that run in
-# Node, all from the npm registry.
+# one of deploy/packages/ (programs, engines, tests, languages, packages, lint, client) or a file. From the npm registry
+# `lint` also installs buf, `tests`, `packages` and `engines` what the client for Node needs, and `tests` and `engines`
+# the engines that run in Node.
 # Calls neither registry when nothing is missing.
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
@@ -83,5 +83,6 @@ if [[ -n $with_node && ! -e $CARILLON_NODE_MODULES/@grpc/grpc-js ]]; then
   install_from_npm "$root/client_sdk/node" "${CARILLON_NODE_MODULES%/*}" "$CARILLON_NODE_MODULES/@grpc/grpc-js"
 fi
 if [[ -n $with_engines && ! -e $CARILLON_ENGINE_MODULES/@babylonjs/havok ]]; then
-  install_from_npm "$root/client_sdk/adapters" "${CARILLON_ENGINE_MODULES%/*}" "$CARILLON_ENGINE_MODULES/@babylonjs/havok"
+  install_from_npm "$root/client_sdk/adapters" "${CARILLON_ENGINE_MODULES%/*}" \
+    "$CARILLON_ENGINE_MODULES/@babylonjs/havok"
 fi

@@ -40,7 +40,8 @@ void MujocoContacts::Read(const mjData& data, v1::ContactStep& step) {
 
 ContactSide MujocoContacts::SideOf(const mjData& data, int geom, const mjContact& contact) const {
   const int body = model_.geom_bodyid[geom];
-  if (model_.body_weldid[body] == 0) return {.body = KeyOf(body), .point_m = VectorFrom(contact.pos)};
+  if (model_.body_weldid[body] == 0)
+    return {.body = KeyOf(body), .point_m = VectorFrom(contact.pos)};
   const mjtNum* orientation = data.xquat + 4 * body;
   Vector arm{}, local{}, from_centre{}, turning{};
   std::array<mjtNum, 4> inverse{};
