@@ -16,6 +16,7 @@ class HavokContacts {
     this.gravity = settings.gravity ?? [0, 0, 0];
     this.contactRows = new ContactRows(settings);
     this.before = new Map(); // Bodies as they were after the step before.
+    this.posesBefore = new Map();
   }
 
   /** The sum of the events that the adapter reads. */
@@ -27,16 +28,24 @@ class HavokContacts {
   addObject(body, handle) {
     this.contactRows.addObject(body[0], handle);
     this.before.set(body[0], this.bodyOf(body));
+    this.posesBefore.set(body[0], this.poseOf(body));
   }
 
-  /** Returns what a step of a stream or trace takes. Call it after HP_World_Step(world, stepS). */
+  /**
+   * Returns what a step of a stream or trace takes. Call it after HP_World_Step(world, stepS). The poses are those from
+   * before the step, to which the points of Havok's events belong.
+   */
   read(world, stepS) {
     const events = this.events(world);
     const found = events.flatMap((event) => this.readEvent(event, isSilent(event, events)));
     const contacts = withFriction(found, this.before, this.gravity, stepS)
       .flatMap((contact) => this.contactRows.rows(contact));
-    for (const key of this.before.keys()) this.before.set(key, this.bodyOf([key]));
-    return { contacts, poses: this.contactRows.poses((key) => this.poseOf([key])) };
+    const poses = this.contactRows.poses((key) => this.posesBefore.get(key));
+    for (const key of this.before.keys()) {
+      this.before.set(key, this.bodyOf([key]));
+      this.posesBefore.set(key, this.poseOf([key]));
+    }
+    return { contacts, poses };
   }
 
   /** Collisions that have begun or go on: one that has finished repeats the impulse of its last step. */

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One collision sounds alike from five engines, and an engine's contact inside a body sounds as the one at its corner."""
+"""One collision sounds alike from five engines; a contact beneath a corner sounds as one at the corner."""
 
 import json
 import statistics

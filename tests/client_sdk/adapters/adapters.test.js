@@ -128,6 +128,7 @@ test('a collision that Havok reports without an impulse gets one from the veloci
   contacts.before.set(7n, moving(7n, 2, [0, 0, -1]));
   contacts.bodyOf = ([key]) => (key === 7n ? moving(7n, 2, [0, 0, 0.5]) : still(key));
   contacts.poseOf = () => [[0, 0, 0], [1, 0, 0, 0]];
+  contacts.posesBefore.set(7n, contacts.poseOf());
   const side = (key, z) => [[key], [0n], [0, 0], [0, 0, 0], [0, 0, z], -1];
   const event = { began: true, pair: '7 8', one: side(7n, -1), other: side(8n, 1), impulse: 0 };
   contacts.events = () => [event, { ...event }];
