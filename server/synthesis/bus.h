@@ -69,15 +69,20 @@ struct Bus {
   /// Events that came before the last stop are not rendered.
   uint32_t stop_count = 0;
 
-  /// Takes what the controlling threads told.
+  /// Something was rendered in the last blocks.
+  bool sounded = false;
+
+  /// Takes what the controlling threads told. A bus that is silent needs neither glide nor fade.
   void Listen() noexcept {
     const float target = gain.load(std::memory_order_relaxed);
-    if (jumps.exchange(false, std::memory_order_acquire)) fader.JumpTo(target);
+    const bool opened = jumps.exchange(false, std::memory_order_acquire);
+    if (opened) peak.store(0, std::memory_order_relaxed);
+    if (opened || !sounded) fader.JumpTo(target);
     fader.GlideTo(target);
     const uint32_t asked = stops_asked.load(std::memory_order_acquire);
     if (asked == stop_count) return;
     stop_count = asked;
-    stop.GlideTo(0);
+    if (sounded) stop.GlideTo(0);
   }
 };
 

@@ -102,6 +102,7 @@ void Mixer::MixBus(uint32_t index, std::span<const uint32_t> sections,
     if (section.counts.sounded) AddTo(section.frames, frames);
     if (section.counts.placed) AddTo(section.placed, placed);
   }
+  bus.sounded = sounded;
   active_mode_count_ += active_mode_count;
   bus.active_mode_count.store(active_mode_count, std::memory_order_relaxed);
   ApplyGains(bus, frame_count);
