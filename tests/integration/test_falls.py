@@ -34,8 +34,8 @@ class FallsTest(DaemonTest):
         levels = {}
         for engine in falls.ENGINES:
             trace = self.folder / f"{engine}.contacts"
-            falls.record(engine, self.scene, trace, rate=240, seconds=0.3)
-            sound = self.carillon.render(trace, sample_rate_hz=48000, tail_s=0.3)
+            falls.record(engine, self.scene, trace, rate=1000, seconds=0.3)
+            sound = self.render(trace)
             self.assertEqual(sound.summary.limited_frame_count, 0)
             self.assertGreater(sound.summary.findings.blow_count, 0)
             levels[engine] = energy_db(sound)
@@ -44,17 +44,24 @@ class FallsTest(DaemonTest):
         for engine, level in levels.items():
             self.assertLess(abs(level - median), LIMIT_DB, engine)
 
+    def render(self, path):
+        """Softly, so that nothing is limited."""
+        trace = carillon.Trace.read(path)
+        for body in trace.objects:
+            body.gain = 0.001
+        return self.carillon.render(trace, sample_rate_hz=48000, tail_s=0.3)
+
     def strike(self, at):
         """A contact of a cube's corner, as an engine reports it at a place on the way to its middle."""
         trace = carillon.Trace(step=1 / 240)
-        cube = trace.add(self.scene["bodies"][0]["model"], "oak")
+        cube = trace.add(self.scene["bodies"][0]["model"], "concrete", gain=0.001)
         for step in range(20):
             contacts = carillon.Contacts(cube, [(at, at, at)], [(-0.3, -0.3, -0.3)]) if step == 2 else None
             trace.step(step / 240, contacts=contacts)
         return self.carillon.render(trace, sample_rate_hz=48000, tail_s=0.3)
 
     def test_a_contact_beneath_a_corner_sounds_as_one_at_the_corner(self):
-        numpy.testing.assert_array_equal(self.strike(0.046).samples, self.strike(0.05).samples)
+        numpy.testing.assert_array_equal(self.strike(0.096).samples, self.strike(0.1).samples)
 
 
 if __name__ == "__main__":
