@@ -129,10 +129,10 @@ void AddRequestFile(CLI::App& app, Options& options) {
 }
 
 void AddOptions(CLI::App& app, Options& options, CommandLine& result) {
-  app.add_option(
-         "IN", result.input,
-         "Mesh file: a closed surface, or tetrahedra (msh, mesh, inp, node with the ele beside it); "
-         "with --radiate a stored modal model")
+  app.add_option("IN", result.input,
+                 "Mesh file: a closed surface, or tetrahedra (msh, mesh, inp, node with the ele "
+                 "beside it); "
+                 "with --radiate a stored modal model")
       ->required();
   app.add_option("--out", result.output,
                  "Where to write the modal model, or the radiation with --radiate")

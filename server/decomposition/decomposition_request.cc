@@ -29,9 +29,10 @@ absl::Status Invalid(absl::string_view what) {
 
 absl::Status CheckMesh(const v1::CreateModalModelRequest& request) {
   if (std::ranges::find(kFormats, request.mesh_format()) == kFormats.end()) {
-    return Refusal(absl::StatusCode::kInvalidArgument, "MESH_FORMAT_UNKNOWN",
-                   absl::StrCat("mesh_format is \"", request.mesh_format(),
-                                "\"; name one of obj, ply, stl, off, glb, gltf, msh, mesh, node, inp"));
+    return Refusal(
+        absl::StatusCode::kInvalidArgument, "MESH_FORMAT_UNKNOWN",
+        absl::StrCat("mesh_format is \"", request.mesh_format(),
+                     "\"; name one of obj, ply, stl, off, glb, gltf, msh, mesh, node, inp"));
   }
   if (!IsSha256Hex(request.mesh_digest())) {
     return Refusal(

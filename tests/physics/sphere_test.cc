@@ -39,8 +39,8 @@ TEST(Sphere, TenLowestModesAreThoseOfLamb) {
 
 // With sides that follow the sphere R is the sphere's own radius.
 TEST(Sphere, CurvedElementsFindItsModesWithinATwentiethOfAPerCent) {
-  const TetMesh mesh = MakeTetSphere(1, 500, true);
-  EXPECT_NEAR(static_cast<double>(mesh.nodes.size()), 5000, 1000);
+  const TetMesh mesh = MakeTetSphere(1, 700, true);
+  EXPECT_LT(mesh.nodes.size(), 6500u);
   const double shear_speed = std::sqrt(ToLame(kElastic).mu_pa);
   const std::vector<double> hz = FrequenciesHz(ModesOf(mesh, kElastic, 1, 0.285));
   ASSERT_EQ(hz.size(), 10u);

@@ -2,8 +2,8 @@
 """Curved ten-node tetrahedra of Gmsh: Carillon beside CalculiX and SciPy on the same mesh, and beside Lamb's sphere.
 
 CalculiX integrates stiffness and mass of a C3D10 with four points, Carillon exactly or nearly so. The matrices that are
-given to SciPy are assembled here, once with four points and once with as many as Gauss-Jacobi rules of five points give:
-the first must agree with CalculiX, the second with Carillon.
+given to SciPy are assembled here, once with four points and once by Gauss-Jacobi rules of five points: the first must
+agree with CalculiX, the second with Carillon.
 """
 
 import dataclasses
