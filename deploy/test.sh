@@ -68,9 +68,9 @@ if [[ $preset == ?san && $bits -gt 28 ]]; then
   if setarch --addr-no-randomize true 2>/dev/null; then
     launcher=(setarch --addr-no-randomize)
   elif [[ $preset == tsan ]]; then
-    printf 'test.sh: tsan cannot run here: the kernel places memory with %s random bits, of which tsan bears 28, and\n' \
+    printf 'test.sh: tsan cannot run here: the kernel places memory with %s random bits, of which tsan bears 28,\n' \
       "$bits" >&2
-    printf '  setarch may not turn that off; as root, "sysctl vm.mmap_rnd_bits=28" lowers them\n' >&2
+    printf '  and setarch may not turn that off; as root, "sysctl vm.mmap_rnd_bits=28" lowers them\n' >&2
     exit 77
   fi
 fi
