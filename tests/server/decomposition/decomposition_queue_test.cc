@@ -182,11 +182,11 @@ TEST_F(DecompositionQueueTest, AModelRemembersTheMaterialThatItWasLastAskedForWi
   v1::CreateModalModelRequest request = Request(20'000);
   request.mutable_settings()->set_poisson_ratio(0.25);
   const v1::Job done = SubmitAndAwaitEnd(request);
-  request.mutable_material()->set_preset("steel");
+  request.mutable_material()->set_preset("structural_steel");
   ASSERT_EQ(Submit(request).name(), done.name());
   const auto material = database_->models().Material(DigestOf(done));
   ASSERT_TRUE(material.ok() && material->has_value()) << material.status();
-  EXPECT_EQ((*material)->preset(), "steel");
+  EXPECT_EQ((*material)->preset(), "structural_steel");
   // The ratio of the model, since the ratio of steel is another and would be refused.
   EXPECT_EQ((*material)->poisson_ratio(), 0.25);
 }
