@@ -6,6 +6,7 @@
 #include <assimp/scene.h>
 
 #include <array>
+#include <assimp/IOSystem.hpp>
 #include <assimp/Importer.hpp>
 #include <cmath>
 #include <cstddef>
@@ -28,6 +29,16 @@ namespace carillon::precompute {
 namespace {
 
 using Triangles = std::vector<std::array<Point, 3>>;
+
+/// Opens no file. A glTF can name files beside its own, and a client of the daemon must not have
+/// them read.
+class NoFiles final : public Assimp::IOSystem {
+ public:
+  bool Exists(const char* /*file*/) const override { return false; }
+  char getOsSeparator() const override { return '/'; }
+  Assimp::IOStream* Open(const char* /*file*/, const char* /*mode*/) override { return nullptr; }
+  void Close(Assimp::IOStream* /*stream*/) override {}
+};
 
 absl::Status RefuseSurface(absl::string_view reason, absl::string_view message) {
   return Refusal(absl::StatusCode::kInvalidArgument, reason, message);
@@ -143,6 +154,7 @@ absl::flat_hash_map<int64_t, Point> NumberVertices(const aiScene& scene, const s
 absl::StatusOr<NamedMesh> ReadSurface(const std::string& bytes, const std::string& format) {
   ASSIGN_OR_RETURN(const std::string clean, CleanSurfaceFile(bytes, format));
   Assimp::Importer importer;
+  importer.SetIOHandler(new NoFiles);  // the importer owns it
   const aiScene* scene = importer.ReadFileFromMemory(clean.data(), clean.size(), 0, format.c_str());
   if (scene == nullptr) return Unreadable(format, importer.GetErrorString());
   RETURN_IF_ERROR(CheckIndices(*scene));

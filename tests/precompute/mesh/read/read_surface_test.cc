@@ -2,11 +2,17 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
 #include <map>
 
+#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "precompute/mesh/point_math.h"
 #include "precompute/mesh/surface/check_surface.h"
@@ -207,6 +213,49 @@ TEST_F(ReadSurfaceTest, ACountBeyondTheFileIsRefusedWithoutRoomForIt) {
                       "property list uchar int vertex_indices\nend_header\nxyz",
                       "ply"),
               HasSubstr("MESH_UNREADABLE: line 9: the file ends within vertex 0"));
+}
+
+/// A glTF of one tetrahedron whose edges along the axes are 1 m long, twice as large in its scene;
+/// `uri` has its 60 bytes.
+std::string TetrahedronInGltf(const std::string& uri) {
+  return absl::StrCat(
+      R"({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}],
+          "nodes": [{"mesh": 0, "scale": [2, 2, 2]}],
+          "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+          "buffers": [{"byteLength": 60, "uri": ")",
+      uri, R"("}],
+          "bufferViews": [{"buffer": 0, "byteOffset": 0, "byteLength": 48},
+                          {"buffer": 0, "byteOffset": 48, "byteLength": 12}],
+          "accessors": [{"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3",
+                         "min": [0, 0, 0], "max": [1, 1, 1]},
+                        {"bufferView": 1, "componentType": 5121, "count": 12, "type": "SCALAR"}]})");
+}
+
+std::string TetrahedronInBytes() {
+  const std::array<float, 12> points = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
+  std::string bytes(48, '\0');
+  std::memcpy(bytes.data(), points.data(), bytes.size());
+  for (const char corner : {0, 2, 1, 0, 1, 3, 1, 2, 3, 2, 0, 3}) bytes.push_back(corner);
+  return bytes;
+}
+
+TEST_F(ReadSurfaceTest, TheBodyOfAGltfIsAsLargeAsInItsScene) {
+  const std::string data = absl::StrCat("data:application/octet-stream;base64,",
+                                        absl::Base64Escape(TetrahedronInBytes()));
+  const SurfaceMesh body = ReadSurfaceOf(TetrahedronInGltf(data), "gltf");
+  EXPECT_EQ(body.triangles.size(), 4U);
+  EXPECT_EQ(body.vertices.size(), 4U);
+  double largest = 0;
+  for (const Point& p : body.vertices) largest = std::max({largest, p[0], p[1], p[2]});
+  EXPECT_EQ(largest, 2);
+}
+
+TEST_F(ReadSurfaceTest, AGltfReadsNoFileBesideItself) {
+  const std::filesystem::path outside =
+      std::filesystem::path(testing::TempDir()) / "outside_of_gltf.bin";
+  std::ofstream(outside, std::ios::binary) << TetrahedronInBytes();
+  EXPECT_THAT(Refused(TetrahedronInGltf(outside.string()), "gltf"), HasSubstr("MESH_UNREADABLE"));
+  std::filesystem::remove(outside);
 }
 
 TEST_F(ReadSurfaceTest, WordsInPlaceOfNumbersAreRefusedWithTheirLine) {
