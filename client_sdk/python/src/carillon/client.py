@@ -146,8 +146,11 @@ class Client:
     def set_volume(self, *, gain: Optional[float] = None,
                    muted: Optional[bool] = None) -> audio_service_pb2.UpdateMixerResponse:
         """Changes the linear gain of the daemon's output, or mutes it, without a click. Returns both."""
+        request = audio_service_pb2.UpdateMixerRequest(gain=gain)
+        if muted is not None:
+            request.muted = muted
         with errors.translated(self.server):
-            return self.audio_stub.UpdateMixer(audio_service_pb2.UpdateMixerRequest(gain=gain, muted=muted))
+            return self.audio_stub.UpdateMixer(request)
 
     def stop_all(self) -> int:
         """Fades out all that sounds in your scenes. Returns their number."""

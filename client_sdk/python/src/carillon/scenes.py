@@ -105,7 +105,11 @@ class Scene:
                solo: Optional[bool] = None) -> scene_service_pb2.Scene:
         """Changes the volume: a linear gain; muted, so that the scene rings on unheard; solo, so that of your scenes
         only those with this flag are heard. Changes glide within 30 ms. Returns the scene's state."""
-        request = scene_service_pb2.UpdateSceneRequest(name=self.name, gain=gain, muted=muted, solo=solo)
+        request = scene_service_pb2.UpdateSceneRequest(name=self.name, gain=gain)
+        if muted is not None:
+            request.muted = muted
+        if solo is not None:
+            request.solo = solo
         with errors.translated(self.client.server):
             return self.client.scenes_stub.UpdateScene(request).scene
 

@@ -235,8 +235,8 @@ std::string TetrahedronInBytes() {
   const std::array<float, 12> points = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
   std::string bytes(48, '\0');
   std::memcpy(bytes.data(), points.data(), bytes.size());
-  for (const char corner : {0, 2, 1, 0, 1, 3, 1, 2, 3, 2, 0, 3}) bytes.push_back(corner);
-  return bytes;
+  const std::array<uint8_t, 12> corners = {0, 2, 1, 0, 1, 3, 1, 2, 3, 2, 0, 3};
+  return bytes.append(corners.begin(), corners.end());
 }
 
 TEST_F(ReadSurfaceTest, TheBodyOfAGltfIsAsLargeAsInItsScene) {
