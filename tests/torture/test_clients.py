@@ -138,7 +138,7 @@ class ClientTest(unittest.TestCase):
         client.scenes.CreateScene(scene_service_pb2.CreateSceneRequest())
         client.close()
         torture.wait_until(lambda: [scene.name for scene in self.scenes()] == [kept], 30)
-        self.assertEqual(self.daemon.command("scene", "list").stdout, f"{kept}  0 objects  kept\n")
+        self.assertEqual(self.daemon.command("scene", "list").stdout, f"{kept}  0 objects  gain 1  kept\n")
 
     def test_one_client_does_not_shut_out_others(self):
         self.serve()
