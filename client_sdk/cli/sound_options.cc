@@ -39,12 +39,12 @@ void AddVolume(CLI::App& app, Program& program) {
                                                "The name or the number of a scene [the output]");
   volume
       .add_option_function<std::string>(
-          "--gain",
+          "gain,--gain",
           [options](const std::string& text) {
             options->gain = ReadGain(text);
             if (!options->gain) throw CLI::ValidationError("--gain", "give a factor or decibels");
           },
-          "The gain: a factor such as 0.5, or decibels such as -6dB")
+          "The gain: a factor such as 0.5, or decibels: --gain=-6dB")
       ->type_name("GAIN");
   AddSwitch(volume, "mute", "Silence it", options->muted);
   AddSwitch(volume, "unmute", "End that", options->muted, false)->excludes("--mute");

@@ -280,6 +280,8 @@ class Mixer {
 
   uint64_t block_start_ ABSL_GUARDED_BY(kRenderRole);
   std::vector<BankSlot> slots_ ABSL_GUARDED_BY(kRenderRole);
+  // The same slots, for sections that are made while others are rendered, and read them later.
+  const std::span<BankSlot> slots_of_sections_;
   // Slots of banks that are retired once they are silent.
   FixedVector<uint32_t> leaving_ ABSL_GUARDED_BY(kRenderRole);
   FixedVector<EventQueue*> open_queues_ ABSL_GUARDED_BY(kRenderRole);

@@ -38,6 +38,7 @@ Mixer::Mixer(const MixerSettings& settings)
       retired_(settings.most_banks + settings.most_streams),
       block_start_(settings.first_frame),
       slots_(settings.most_banks),
+      slots_of_sections_(slots_),
       leaving_(settings.most_banks),
       open_queues_(settings.most_streams),
       pending_(settings.most_pending_events, settings.block_frame_count),
@@ -199,7 +200,7 @@ MixedSection* Mixer::MakeSection(uint32_t section) {
           .most_banks = settings_.most_banks,
           .fade_step = static_cast<float>(1 / (kFadeS * settings_.sample_rate_hz)),
           .channel_count = settings_.channel_count},
-      slots_, kBlocksTogether * settings_.block_frame_count);
+      slots_of_sections_, kBlocksTogether * settings_.block_frame_count);
   return owned.get();
 }
 
