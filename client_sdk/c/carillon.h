@@ -21,6 +21,8 @@
 extern "C" {
 #endif
 
+/* NOLINTBEGIN(readability-identifier-naming): names of C, all with one prefix */
+
 /** What became of a call: zero, or the code of gRPC. */
 typedef int32_t carillon_code;
 enum {
@@ -173,6 +175,8 @@ carillon_code carillon_close_trace(carillon_trace* trace);
 carillon_code carillon_render(carillon_client* client, const char* trace_file,
                               uint32_t sample_rate_hz, double tail_s, carillon_sound* sound);
 void carillon_free_sound(carillon_sound* sound);
+
+/* NOLINTEND(readability-identifier-naming) */
 
 #ifdef __cplusplus
 }

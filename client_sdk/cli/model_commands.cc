@@ -103,7 +103,7 @@ void PrintTransfer(const v1::TransferSummary& transfer) {
 std::string MaterialText(const v1::Material& material) {
   v1::Material figures = material;
   figures.clear_preset();
-  const std::string text = figures.ShortDebugString();
+  std::string text = figures.ShortDebugString();
   if (material.preset().empty()) return text;
   return text.empty() ? material.preset() : absl::StrCat(material.preset(), " with ", text);
 }

@@ -25,6 +25,7 @@ constexpr double kLeastDeterminant = 1e-6;
 /// The derivatives of the shape functions with respect to the reference coordinates, at each point.
 std::vector<Derivatives> DerivativesAt(const std::vector<TetRulePoint>& rule) {
   std::vector<Derivatives> derivatives;
+  derivatives.reserve(rule.size());
   for (const TetRulePoint& point : rule) {
     derivatives.push_back(QuadraticGradients(ReferenceGradients(), point.barycentric));
   }
