@@ -167,7 +167,7 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
 /// Sends the records of a stream as they come.
 class RecordCall final : public ServerStream<v1::RecordContactsResponse> {
  public:
-  RecordCall(TraceRecorders& recorders, absl::StatusOr<uint64_t> scene, ClientPlace place)
+  RecordCall(TraceRecorders& recorders, const absl::StatusOr<uint64_t>& scene, ClientPlace place)
       : StreamWriter(nullptr), place_(std::move(place)), status_(scene.status()) {
     recorder_ = std::make_shared<TraceRecorder>(scene.value_or(0), [this] { Wake(); });
     if (status_.ok()) recorders.Add(recorder_);
@@ -207,7 +207,7 @@ grpc::ServerWriteReactor<v1::RecordContactsResponse>* ContactService::RecordCont
       const absl::Status found = daemon_.scenes.BusOf(*scene).status();
       if (!found.ok()) scene = found;
     }
-    return new RecordCall(recorders_, std::move(scene), std::move(place));
+    return new RecordCall(recorders_, scene, std::move(place));
   };
   return Open(*context, daemon_.reception, Role::kStrike, Holding::kListener, make);
 }

@@ -76,9 +76,13 @@ NamedPeer::~NamedPeer() { named_path = nullptr; }
 
 }  // namespace carillon
 
-/// Takes the place of the C library's function for the whole process.
-extern "C" __attribute__((visibility("default"))) int getpeername(
-    int connection, sockaddr* __restrict address, socklen_t* __restrict length) noexcept {
+/// Takes the place of the C library's getpeername for the whole process.
+extern "C" __attribute__((visibility("default"))) int CarillonGetPeerName(
+    int connection, sockaddr* __restrict address, socklen_t* __restrict length) noexcept
+    __asm__("getpeername");
+
+extern "C" int CarillonGetPeerName(int connection, sockaddr* __restrict address,
+                                   socklen_t* __restrict length) noexcept {
   if (carillon::named_path != nullptr) {
     carillon::WritePath(*carillon::named_path, address, length);
     return 0;
