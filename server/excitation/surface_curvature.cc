@@ -193,8 +193,7 @@ std::vector<std::array<uint32_t, 2>> SurfaceCurvature::sharp_edges() const {
     }
   }
   std::ranges::sort(edges);
-  const auto doubled = std::ranges::unique(edges);
-  edges.erase(doubled.begin(), doubled.end());
+  edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
   return edges;
 }
 

@@ -84,9 +84,8 @@ void Mixer::MixBuses(std::span<float> frames) noexcept {
   Multiply(gains, channels, frames);
 }
 
-void Mixer::MixBus(uint32_t index, std::span<const uint32_t> sections,
-                   size_t frame_count) noexcept {
-  Bus& bus = *buses_[index];
+void Mixer::MixBus(uint32_t bus, std::span<const uint32_t> sections, size_t frame_count) noexcept {
+  Bus& mixed_bus = *buses_[bus];
   const std::span<float> frames = std::span(bus_frames_).first(frame_count);
   const std::span<float> placed =
       std::span(bus_placed_).first(frame_count * settings_.channel_count);
@@ -102,15 +101,16 @@ void Mixer::MixBus(uint32_t index, std::span<const uint32_t> sections,
     if (section.counts.sounded) AddTo(section.frames, frames);
     if (section.counts.placed) AddTo(section.placed, placed);
   }
-  bus.sounded = sounded;
+  mixed_bus.sounded = sounded;
   active_mode_count_ += active_mode_count;
-  bus.active_mode_count.store(active_mode_count, std::memory_order_relaxed);
-  ApplyGains(bus, frame_count);
-  LetHear(bus, frame_count);
+  mixed_bus.active_mode_count.store(active_mode_count, std::memory_order_relaxed);
+  ApplyGains(mixed_bus, frame_count);
+  LetHear(mixed_bus, frame_count);
   const double seconds = static_cast<double>(frame_count) / settings_.sample_rate_hz;
-  const float fallen = bus.peak.load(std::memory_order_relaxed) *
+  const float fallen = mixed_bus.peak.load(std::memory_order_relaxed) *
                        static_cast<float>(std::exp(-seconds / kPeakFallS));
-  bus.peak.store(std::max({fallen, Largest(frames), Largest(placed)}), std::memory_order_relaxed);
+  mixed_bus.peak.store(std::max({fallen, Largest(frames), Largest(placed)}),
+                       std::memory_order_relaxed);
   if (!sounded) return;
   AddTo(frames, std::span(mixed_frames_).first(frames.size()));
   AddTo(placed, std::span(mixed_placed_).first(placed.size()));

@@ -30,15 +30,16 @@ mjModel* Load(const std::string& xml) {
 /// Two balls of 1 kg that meet without weight: the left one, of body 1, flies to the right; the
 /// right one, of body 2, is turned by a quarter about z, so that x of the world is its -y.
 class MujocoContactsTest : public testing::Test {
- protected:
+ public:
   MujocoContactsTest() { data_->qvel[0] = 1; }
+  MujocoContactsTest(const MujocoContactsTest&) = delete;
+  MujocoContactsTest& operator=(const MujocoContactsTest&) = delete;
   ~MujocoContactsTest() override {
     mj_deleteData(data_);
     mj_deleteModel(model_);
   }
-  MujocoContactsTest(const MujocoContactsTest&) = delete;
-  MujocoContactsTest& operator=(const MujocoContactsTest&) = delete;
 
+ protected:
   void Simulate() {
     for (int i = 0; i < 200; ++i) {
       mj_step(model_, data_);
