@@ -29,7 +29,7 @@ class VolumeApi : public ServedDaemon {
   }
 
   std::string SceneWithObject() {
-    const std::string scene = CreateScene();
+    std::string scene = CreateScene();
     v1::AddObjectResponse added;
     EXPECT_TRUE(Add(SmallObject(scene), added).ok());
     return scene;

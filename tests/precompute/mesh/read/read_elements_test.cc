@@ -72,6 +72,7 @@ TEST_F(ReadElementsTest, SetsOfAbaqusAreGroups) {
   ASSERT_TRUE(read.ok()) << read.status();
   const std::vector<MeshGroup>& groups = read->names.groups;
   std::vector<std::string> names;
+  names.reserve(groups.size());
   for (const MeshGroup& group : groups) names.push_back(group.name);
   ASSERT_THAT(names, ElementsAre("skin", "the body", "tip", "two"));
   EXPECT_EQ(groups[0].simplices.size(), Box(10).boundary.size());
