@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -9,6 +10,9 @@
 #include "carillon/v1/material.pb.h"
 #include "carillon/v1/radiation.pb.h"
 #include "carillon/v1/scene_service.pb.h"
+#include "proto/cpp/status_macros.h"
+#include "server/api/pose_conversion.h"
+#include "server/api/resource_name.h"
 #include "server/mode_database/model_store.h"
 #include "server/scene/scene_registry.h"
 
@@ -25,6 +29,29 @@ absl::StatusOr<v1::Material> MaterialOrModels(const v1::Material& asked, const s
                                               ModelStore& models);
 
 RadiationModel FromProto(v1::RadiationModel radiation);
+
+/// A model, and how an object of it sounds.
+struct ObjectOfModel {
+  std::shared_ptr<const ModalModel> model;
+  ObjectProperties properties;
+};
+
+/// The object that a request or a record of a trace describes, whose fields have the same names.
+/// Errors: those of ParseModelName, MaterialOrModels, ToObjectProperties and
+/// ModelStore::FindToSound.
+template <typename Message>
+absl::StatusOr<ObjectOfModel> ToObject(const Message& message, ModelStore& models) {
+  ASSIGN_OR_RETURN(const std::string digest, ParseModelName(message.modal_model()));
+  ASSIGN_OR_RETURN(const v1::Material material,
+                   MaterialOrModels(message.material(), digest, models));
+  const auto gain = message.has_gain() ? std::optional<double>(message.gain()) : std::nullopt;
+  ObjectOfModel object;
+  ASSIGN_OR_RETURN(object.properties, ToObjectProperties(material, message.size(), gain));
+  if (message.has_pose()) object.properties.pose = FromProto(message.pose());
+  object.properties.radiation = FromProto(message.radiation());
+  ASSIGN_OR_RETURN(object.model, models.FindToSound(digest));
+  return object;
+}
 
 /// Errors: those of ResolveMaterial.
 absl::StatusOr<ObjectChange> ToObjectChange(const v1::UpdateObjectRequest& request);

@@ -203,18 +203,10 @@ bool SceneService::EndAbandoned(const std::optional<std::string>& client) {
 
 absl::Status SceneService::Add(uint64_t scene, const v1::AddObjectRequest& request,
                                v1::AddObjectResponse& response) {
-  ASSIGN_OR_RETURN(const std::string digest, ParseModelName(request.modal_model()));
-  ASSIGN_OR_RETURN(const v1::Material material,
-                   MaterialOrModels(request.material(), digest, database_.models()));
+  ASSIGN_OR_RETURN(ObjectOfModel object, ToObject(request, database_.models()));
   ASSIGN_OR_RETURN(
-      ObjectProperties properties,
-      ToObjectProperties(material, request.size(),
-                         request.has_gain() ? std::optional(request.gain()) : std::nullopt));
-  if (request.has_pose()) properties.pose = FromProto(request.pose());
-  properties.radiation = FromProto(request.radiation());
-  ASSIGN_OR_RETURN(std::shared_ptr<const ModalModel> model, database_.models().FindToSound(digest));
-  ASSIGN_OR_RETURN(const PlacedObject placed,
-                   scenes_.AddObject(scene, request.handle(), std::move(model), properties));
+      const PlacedObject placed,
+      scenes_.AddObject(scene, request.handle(), std::move(object.model), object.properties));
   *response.mutable_object() = ToProto(scene, placed);
   return absl::OkStatus();
 }

@@ -99,19 +99,10 @@ absl::Status TraceReader::TakeClock(const v1::ContactTraceClock& clock) {
   return absl::OkStatus();
 }
 
-absl::Status TraceReader::TakeObject(const v1::ContactTraceObject& object) {
-  ASSIGN_OR_RETURN(const std::string digest, ParseModelName(object.modal_model()));
-  ASSIGN_OR_RETURN(const v1::Material material,
-                   MaterialOrModels(object.material(), digest, database_.models()));
-  ASSIGN_OR_RETURN(
-      ObjectProperties properties,
-      ToObjectProperties(material, object.size(),
-                         object.has_gain() ? std::optional(object.gain()) : std::nullopt));
-  if (object.has_pose()) properties.pose = FromProto(object.pose());
-  properties.radiation = FromProto(object.radiation());
-  ASSIGN_OR_RETURN(std::shared_ptr<const ModalModel> model, database_.models().FindToSound(digest));
+absl::Status TraceReader::TakeObject(const v1::ContactTraceObject& message) {
+  ASSIGN_OR_RETURN(ObjectOfModel object, ToObject(message, database_.models()));
   ++object_count_;
-  return renderer_->AddObject(object.handle(), std::move(model), properties);
+  return renderer_->AddObject(message.handle(), std::move(object.model), object.properties);
 }
 
 absl::Status TraceReader::TakeStep(const v1::ContactStep& step) {

@@ -36,7 +36,7 @@ class TraceReader {
   absl::Status TakeRecord(const v1::ContactTraceRecord& record);
   absl::Status TakeHeader(const v1::ContactTraceHeader& header);
   absl::Status TakeClock(const v1::ContactTraceClock& clock);
-  absl::Status TakeObject(const v1::ContactTraceObject& object);
+  absl::Status TakeObject(const v1::ContactTraceObject& message);
   absl::Status TakeStep(const v1::ContactStep& step);
 
   ModeDatabase& database_;
