@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -117,6 +118,28 @@ class ServedDaemon : public testing::Test {
     impulse.mutable_point_m();
     impulse.mutable_impulse_newton_seconds()->set_x(1);
     return impulse;
+  }
+
+  /// Strikes object 1 of a scene live; returns the last answer.
+  v1::StreamContactsResponse StrikeLive(const std::string& scene,
+                                        std::optional<double> scheduling_delay_s = {}) {
+    grpc::ClientContext context;
+    const auto stream = contacts->StreamContacts(&context);
+    v1::StreamContactsRequest request;
+    request.mutable_start()->set_scene(scene);
+    request.mutable_start()->set_step_s(0.01);
+    if (scheduling_delay_s) {
+      request.mutable_start()->set_scheduling_delay_s(*scheduling_delay_s);
+    }
+    stream->Write(request);
+    *request.mutable_step()->add_impulses() = Strike(1);
+    stream->Write(request);
+    stream->WritesDone();
+    v1::StreamContactsResponse answer;
+    while (stream->Read(&answer)) {
+    }
+    EXPECT_TRUE(stream->Finish().ok());
+    return answer;
   }
 
   std::unique_ptr<v1::ModalModelService::Stub> models;

@@ -35,24 +35,6 @@ class VolumeApi : public ServedDaemon {
     return scene;
   }
 
-  /// Strikes object 1 of a scene live; returns the last answer.
-  v1::StreamContactsResponse StrikeLive(const std::string& scene) {
-    grpc::ClientContext context;
-    const auto stream = contacts->StreamContacts(&context);
-    v1::StreamContactsRequest request;
-    request.mutable_start()->set_scene(scene);
-    request.mutable_start()->set_step_s(0.01);
-    stream->Write(request);
-    *request.mutable_step()->add_impulses() = Strike(1);
-    stream->Write(request);
-    stream->WritesDone();
-    v1::StreamContactsResponse answer;
-    while (stream->Read(&answer)) {
-    }
-    EXPECT_TRUE(stream->Finish().ok());
-    return answer;
-  }
-
   /// The records of the stream that `act` sends to a scene.
   template <class Act>
   std::vector<v1::ContactTraceRecord> Recorded(const std::string& scene, Act act) {
