@@ -1,151 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "server/decomposition/decomposition_queue.h"
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <chrono>
-#include <condition_variable>
-#include <mutex>
 #include <thread>
-#include <vector>
 
 #include "proto/cpp/error_reason.h"
 #include "server/base/sha256.h"
-#include "server/decomposition/decomposition_request.h"
-#include "server/decomposition/local_executor.h"
 #include "server/decomposition/worker_command.h"
-#include "tests/server/decomposition/scripted_worker.h"
+#include "tests/server/decomposition/queue_fixture.h"
 
 namespace carillon {
 namespace {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-
-constexpr std::chrono::seconds kDeadline(60);
-
-std::string DigestOf(const v1::Job& job) { return job.name().substr(5); }
-
-/// What a watch was told, for waiting.
-class Diary {
- public:
-  void Write(const v1::Job& job) {
-    const std::lock_guard lock(mutex_);
-    if (states_.empty() || states_.back() != job.state()) states_.push_back(job.state());
-    last_ = job;
-    written_.notify_all();
-  }
-
-  v1::Job Await(v1::JobState state) {
-    return AwaitThat([state](const v1::Job& job) { return job.state() == state; });
-  }
-
-  v1::Job AwaitEnd() {
-    return AwaitThat([](const v1::Job& job) { return job.state() >= v1::JOB_STATE_SUCCEEDED; });
-  }
-
-  std::vector<v1::JobState> states() {
-    const std::lock_guard lock(mutex_);
-    return states_;
-  }
-
- private:
-  template <typename Test>
-  v1::Job AwaitThat(Test test) {
-    std::unique_lock lock(mutex_);
-    EXPECT_TRUE(written_.wait_for(lock, kDeadline, [&] { return test(last_); }));
-    return last_;
-  }
-
-  std::mutex mutex_;
-  std::condition_variable written_;
-  std::vector<v1::JobState> states_;
-  v1::Job last_;
-};
-
-// Every run of a script appends a line to "runs". The models in the folder are complete up to what
-// SampleRequest wants with a maximal frequency of 10 kHz ("model10") and of 20 kHz ("model20").
-constexpr char kCount[] = "echo $band >>\"$here/runs\"\n";
-constexpr char kSucceed[] =
-    "case $band in *:20000) cp \"$here/model20\" \"$out\";; *) cp \"$here/model10\" \"$out\";; "
-    "esac";
-constexpr char kWaitAtGate[] = "read line <\"$here/gate\"\n";
-
-class DecompositionQueueTest : public ::testing::Test {
- protected:
-  DecompositionQueueTest() {
-    Open("carillon.db");
-    mesh_ = database_->meshes().Put("solid")->digest;
-    WriteModel("model10", 10'000);
-    WriteModel("model20", 20'000);
-  }
-
-  void WriteModel(const std::string& name, double frequency_hz) {
-    ModalModel model = SampleModel(3, 4);
-    model.complete_to_eigenvalue =
-        UnitEigenvalue(*ResolveRequest(SampleRequest(mesh_)), frequency_hz);
-    WriteRecords(folder_ / name, SampleRecords(model));
-  }
-
-  void Open(const std::string& name) {
-    queue_.reset();
-    database_.reset();
-    auto database = ModeDatabase::Open(folder_ / name, clock_);
-    ASSERT_TRUE(database.ok()) << database.status();
-    database_ = *std::move(database);
-  }
-
-  void MakeQueue(const std::string& script) {
-    queue_.reset();
-    options_.program = WriteWorkerScript(folder_.path(), script);
-    options_.directory = folder_ / "running";
-    auto executor = MakeLocalExecutor(options_, clock_);
-    ASSERT_TRUE(executor.ok()) << executor.status();
-    auto queue = DecompositionQueue::Make(*database_, *std::move(executor), clock_, settings_);
-    ASSERT_TRUE(queue.ok()) << queue.status();
-    queue_ = *std::move(queue);
-  }
-
-  v1::CreateModalModelRequest Request(double max_frequency_hz, uint32_t node_count = 0) {
-    v1::CreateModalModelRequest request = SampleRequest(mesh_);
-    request.set_max_frequency_hz(max_frequency_hz);
-    request.mutable_settings()->mutable_mesh()->set_target_node_count(node_count);
-    return request;
-  }
-
-  v1::Job Submit(const v1::CreateModalModelRequest& request) {
-    const auto job = queue_->Submit(request);
-    EXPECT_TRUE(job.ok()) << job.status();
-    return job.ok() ? *job : v1::Job();
-  }
-
-  std::unique_ptr<JobWatch> Watch(const v1::Job& job, Diary& diary) {
-    auto watch = queue_->Watch(DigestOf(job), [&diary](const v1::Job& now) { diary.Write(now); });
-    EXPECT_TRUE(watch.ok()) << watch.status();
-    return watch.ok() ? *std::move(watch) : nullptr;
-  }
-
-  v1::Job SubmitAndAwaitEnd(const v1::CreateModalModelRequest& request) {
-    Diary diary;
-    const auto watch = Watch(Submit(request), diary);
-    return diary.AwaitEnd();
-  }
-
-  size_t RunCount() {
-    const std::string runs = ReadBytes(folder_ / "runs");
-    return static_cast<size_t>(std::ranges::count(runs, '\n'));
-  }
-
-  TemporaryFolder folder_;
-  SystemClock clock_;
-  LocalExecutorOptions options_{.worker_count = 1};
-  QueueSettings settings_;
-  std::string mesh_;
-  std::unique_ptr<ModeDatabase> database_;
-  std::unique_ptr<DecompositionQueue> queue_;
-};
 
 TEST_F(DecompositionQueueTest, AThousandSubmitsOfFiftyClientsComputeOnceAndAllAreTold) {
   MakeQueue(absl::StrCat(kCount, kSucceed));
@@ -286,85 +151,6 @@ TEST_F(DecompositionQueueTest, AJobUnderWhichTheDaemonDiesAgainAndAgainIsGivenUp
   EXPECT_EQ(SubmitAndAwaitEnd(Request(20'000)).state(), v1::JOB_STATE_SUCCEEDED);
 }
 
-TEST_F(DecompositionQueueTest, AHigherPriorityStartsFirstAndMayBeGivenLater) {
-  const Gate gate(folder_ / "gate");
-  MakeQueue(absl::StrCat("echo $nodes >>\"$here/order\"\n", kWaitAtGate, kSucceed));
-  const auto with_priority = [&](uint32_t nodes, int priority) {
-    auto request = Request(20'000, nodes);
-    request.set_priority(priority);
-    return request;
-  };
-  Diary first;
-  const auto watch = Watch(Submit(with_priority(1, 0)), first);
-  first.Await(v1::JOB_STATE_RUNNING);
-  const v1::Job last = Submit(with_priority(2, -1));
-  Submit(with_priority(3, 0));
-  Submit(with_priority(4, 5));
-  Submit(with_priority(5, 0));
-  EXPECT_EQ(Submit(with_priority(5, 7)).priority(), 7);
-  Diary diary;
-  const auto watch_last = Watch(last, diary);
-  for (int i = 0; i < 5; ++i) gate.Open();
-  diary.AwaitEnd();
-  EXPECT_EQ(ReadBytes(folder_ / "order"), "1\n5\n4\n3\n2\n");
-}
-
-TEST_F(DecompositionQueueTest, ClientsTakeTurnsWhateverThePrioritiesOfTheirJobs) {
-  const Gate gate(folder_ / "gate");
-  MakeQueue(absl::StrCat("echo $nodes >>\"$here/order\"\n", kWaitAtGate, kSucceed));
-  const auto submit = [&](const std::string& client, uint32_t nodes, int priority) {
-    auto request = Request(20'000, nodes);
-    request.set_priority(priority);
-    const absl::StatusOr<v1::Job> job = queue_->Submit(request, client);
-    EXPECT_TRUE(job.ok()) << job.status();
-    return job.value_or(v1::Job());
-  };
-  Diary first;
-  const auto watch = Watch(submit("greedy", 1, 100), first);
-  first.Await(v1::JOB_STATE_RUNNING);
-  submit("greedy", 2, 100);
-  submit("greedy", 3, 100);
-  const v1::Job last = submit("greedy", 4, 100);
-  submit("modest", 5, 0);
-  submit("other", 6, -1);
-  submit("modest", 7, 1);
-  Diary diary;
-  const auto watch_last = Watch(last, diary);
-  for (int i = 0; i < 7; ++i) gate.Open();
-  diary.AwaitEnd();
-  EXPECT_EQ(ReadBytes(folder_ / "order"), "1\n7\n6\n2\n5\n3\n4\n");
-}
-
-TEST_F(DecompositionQueueTest, OneClientsJobsDoNotFillTheQueue) {
-  const Gate gate(folder_ / "gate");
-  settings_.max_queued_count = 4;
-  settings_.max_queued_count_of_client = 2;
-  MakeQueue(absl::StrCat(kWaitAtGate, kSucceed));
-  for (const uint32_t nodes : {1U, 2U, 3U}) {
-    ASSERT_TRUE(queue_->Submit(Request(20'000, nodes), "greedy").ok()) << nodes;
-  }
-  EXPECT_EQ(queue_->counts().queued, 2U);
-  EXPECT_EQ(queue_->counts().running, 1U);
-  EXPECT_THAT(queue_->Submit(Request(20'000, 4), "greedy").status().ToString(),
-              testing::HasSubstr("CLIENT_LIMIT_REACHED: "));
-  EXPECT_TRUE(queue_->Submit(Request(20'000, 4), "modest").ok());
-}
-
-TEST_F(DecompositionQueueTest, NoMoreRunAtATimeThanAreEstimatedToFitIntoTheMemory) {
-  options_.worker_count = 4;
-  options_.memory_budget_bytes = 100 << 20;  // the smallest body is estimated to take 70 MB
-  MakeQueue(absl::StrCat("mkdir \"$here/alone\" || touch \"$here/crowd\"\n", kSucceed,
-                         "\nrmdir \"$here/alone\""));
-  std::vector<v1::Job> jobs;
-  for (uint32_t i = 0; i < 4; ++i) jobs.push_back(Submit(Request(20'000, 600 + i)));
-  for (const v1::Job& job : jobs) {
-    Diary diary;
-    const auto watch = Watch(job, diary);
-    EXPECT_EQ(diary.AwaitEnd().state(), v1::JOB_STATE_SUCCEEDED);
-  }
-  EXPECT_FALSE(std::filesystem::exists(folder_ / "crowd"));
-}
-
 TEST_F(DecompositionQueueTest, AModelThatBreaksTheRulesIsAFailureAndNotStored) {
   MakeQueue("echo 'no model' >\"$out\"");
   const v1::Job job = SubmitAndAwaitEnd(Request(20'000));
@@ -451,63 +237,6 @@ TEST_F(DecompositionQueueTest, DeletingAModelEndsItsExtension) {
   EXPECT_THAT(queue_->Get(digest).status().ToString(), HasSubstr("JOB_NOT_FOUND"));
   EXPECT_FALSE(database_->models().Find(digest).ok());
   EXPECT_THAT(queue_->DeleteModel(digest).ToString(), HasSubstr("MODAL_MODEL_NOT_FOUND"));
-}
-
-TEST_F(DecompositionQueueTest, AWatchTellsEveryStateAndProgressThenEnds) {
-  const Gate gate(folder_ / "gate");
-  WriteBytes(folder_ / "events", ProgressBytes(0.75));
-  MakeQueue(absl::StrCat(kWaitAtGate, "cat \"$here/events\" >&3\n", kSucceed));
-  Submit(Request(20'000, 1));
-  const v1::Job job = Submit(Request(20'000, 2));
-  Diary diary;
-  std::mutex mutex;
-  double fraction = 0;
-  const auto watch = queue_->Watch(DigestOf(job), [&](const v1::Job& now) {
-    diary.Write(now);
-    const std::lock_guard lock(mutex);
-    fraction = std::max(fraction, now.progress().fraction());
-  });
-  gate.Open();
-  gate.Open();
-  diary.AwaitEnd();
-  EXPECT_THAT(diary.states(),
-              ElementsAre(v1::JOB_STATE_QUEUED, v1::JOB_STATE_RUNNING, v1::JOB_STATE_SUCCEEDED));
-  const std::lock_guard lock(mutex);
-  EXPECT_EQ(fraction, 0.75);
-}
-
-TEST_F(DecompositionQueueTest, AWatchMayEndItselfAndIsNotCalledAgain) {
-  const Gate gate(folder_ / "gate");
-  MakeQueue(absl::StrCat(kWaitAtGate, kSucceed));
-  const v1::Job job = Submit(Request(20'000));
-  std::mutex mutex;
-  std::unique_ptr<JobWatch> watch;
-  bool ended = false;
-  int calls_after_end = 0;
-  auto made = queue_->Watch(DigestOf(job), [&](const v1::Job&) {
-    const std::lock_guard lock(mutex);
-    if (ended) ++calls_after_end;
-    if (watch != nullptr) ended = true;
-    watch.reset();
-  });
-  {
-    const std::lock_guard lock(mutex);
-    if (!ended) watch = *std::move(made);
-  }
-  Diary diary;
-  const auto other = Watch(job, diary);
-  gate.Open();
-  diary.AwaitEnd();
-  const std::lock_guard lock(mutex);
-  EXPECT_EQ(calls_after_end, 0);
-}
-
-TEST_F(DecompositionQueueTest, AWatchOfAnEndedJobTellsItsEndAtOnce) {
-  MakeQueue(kSucceed);
-  const v1::Job job = SubmitAndAwaitEnd(Request(20'000));
-  Diary diary;
-  const auto watch = Watch(job, diary);
-  EXPECT_THAT(diary.states(), ElementsAre(v1::JOB_STATE_SUCCEEDED));
 }
 
 TEST_F(DecompositionQueueTest, ListsJobsNewestFirstAsTheyStandNow) {
