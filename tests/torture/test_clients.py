@@ -1,13 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """What clients leave behind when they die, and what one client can take from the others."""
 
-import pathlib
 import re
 import signal
 import socket
 import subprocess
 import sys
-import tempfile
 import time
 import unittest
 import urllib.request
@@ -20,7 +18,6 @@ from carillon.v1 import (
     audio_service_pb2, audio_service_pb2_grpc, contact_pb2, contact_service_pb2, decomposition_pb2,
     decomposition_service_pb2, material_pb2, modal_model_pb2, modal_model_service_pb2, modal_model_service_pb2_grpc,
     scene_service_pb2, scene_service_pb2_grpc)
-from daemon import Daemon
 
 MATERIAL = material_pb2.Material(preset=meshes.MATERIAL)
 SCENES = 512
@@ -61,17 +58,7 @@ class Client:
         self.close = channel.close
 
 
-class ClientTest(unittest.TestCase):
-    def setUp(self):
-        scratch = tempfile.TemporaryDirectory(prefix="carillon-")
-        self.addCleanup(scratch.cleanup)
-        self.folder = pathlib.Path(scratch.name)
-
-    def serve(self, *arguments):
-        self.daemon = Daemon(self.folder, *arguments)
-        self.addCleanup(self.daemon.kill)
-        self.client = self.daemon.client()
-
+class ClientTest(torture.ServedTest):
     def another(self):
         """The stubs of a client with a connection of its own, which its `close` closes."""
         return Client(self.daemon.server)

@@ -6,7 +6,6 @@ import pathlib
 import resource
 import socket
 import subprocess
-import tempfile
 import time
 import unittest
 
@@ -22,12 +21,7 @@ ACCEPTED_AGAIN_S = 1.0 if torture.LONG else 30.0
 HANDSHAKE_S = 5.0
 
 
-class ConnectionTest(unittest.TestCase):
-    def setUp(self):
-        scratch = tempfile.TemporaryDirectory(prefix="carillon-")
-        self.addCleanup(scratch.cleanup)
-        self.folder = pathlib.Path(scratch.name)
-
+class ConnectionTest(torture.ScratchTest):
     def serve(self, *arguments):
         """A daemon whose limit of descriptors cannot be raised."""
         soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)

@@ -4,7 +4,6 @@
 import hashlib
 import pathlib
 import signal
-import tempfile
 import threading
 import time
 import unittest
@@ -14,7 +13,6 @@ import numpy
 
 import torture
 from carillon.v1 import admin_service_pb2, admin_service_pb2_grpc, audio_service_pb2, contact_service_pb2
-from daemon import Daemon
 
 STOP_S = 5.0 if torture.LONG else 30.0
 FADE_S = 0.05
@@ -26,17 +24,7 @@ def read_float_wave(path):
     return numpy.frombuffer(data[data.index(b"data", 12) + 8:], numpy.float32)
 
 
-class StopTest(unittest.TestCase):
-    def setUp(self):
-        scratch = tempfile.TemporaryDirectory(prefix="carillon-")
-        self.addCleanup(scratch.cleanup)
-        self.folder = pathlib.Path(scratch.name)
-
-    def serve(self, *arguments):
-        self.daemon = Daemon(self.folder, *arguments)
-        self.addCleanup(self.daemon.kill)
-        self.client = self.daemon.client()
-
+class StopTest(torture.ServedTest):
     def stop_in_time(self):
         begin_s = time.monotonic()
         self.assertEqual(self.daemon.stop(), 0)

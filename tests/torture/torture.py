@@ -3,11 +3,15 @@
 
 import contextlib
 import os
+import pathlib
+import tempfile
 import threading
 import time
+import unittest
 
 import meshes
 from carillon.v1 import audio_service_pb2, contact_pb2, contact_service_pb2, material_pb2, scene_service_pb2
+from daemon import Daemon
 
 LONG = os.environ.get("CARILLON_TORTURE") == "long"
 
@@ -24,6 +28,24 @@ def wait_until(condition, limit_s):
             raise AssertionError(f"not within {limit_s} s")
         time.sleep(0.01)
     return time.monotonic() - begin_s
+
+
+class ScratchTest(unittest.TestCase):
+    """A test with a folder of its own."""
+
+    def setUp(self):
+        scratch = tempfile.TemporaryDirectory(prefix="carillon-")
+        self.addCleanup(scratch.cleanup)
+        self.folder = pathlib.Path(scratch.name)
+
+
+class ServedTest(ScratchTest):
+    """A test that serves a daemon with the arguments that it needs."""
+
+    def serve(self, *arguments):
+        self.daemon = Daemon(self.folder, *arguments)
+        self.addCleanup(self.daemon.kill)
+        self.client = self.daemon.client()
 
 
 class SoundingScene:
