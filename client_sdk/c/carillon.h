@@ -144,7 +144,7 @@ carillon_code carillon_create_model_of_mesh(carillon_client* client, const caril
 carillon_code carillon_create_scene(carillon_client* client, carillon_scene** scene);
 /** Fades out the objects of the scene and deletes it. */
 void carillon_delete_scene(carillon_scene* scene);
-/** The name of the scene, "scenes/{id}", as long as it is not deleted. */
+/** Returns the name of the scene, "scenes/{id}". The text is valid until the scene is deleted. */
 const char* carillon_scene_name(const carillon_scene* scene);
 /** Adds an object, ready to be struck when the call returns. `handle` may be null. */
 carillon_code carillon_add_object(carillon_scene* scene, const carillon_object* object,

@@ -22,7 +22,7 @@ namespace {
 constexpr uint64_t kEnoughDescriptors = 1024;
 constexpr double kHighLoad = 0.7;
 
-/// What was found, a line for each thing.
+/// Prints each finding as a line, and counts the faults.
 class Findings {
  public:
   void Good(const char* subject, const std::string& text) { Print("ok   ", subject, text); }

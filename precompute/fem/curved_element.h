@@ -12,8 +12,8 @@
 namespace carillon::precompute {
 
 /// The isoparametric tetrahedron: its ten shape functions map the reference tetrahedron to the
-/// body, so that its edges and faces are curved. The reference coordinates are the barycentric ones
-/// of corners 1, 2 and 3.
+/// body, so that its edges and faces are curved. The reference coordinates of a
+/// point are its barycentric coordinates for corners 1, 2 and 3.
 
 /// The positions of an element's nodes (columns, metres), in the order of TetMesh.
 using TenNodes = Eigen::Matrix<double, 3, 10>;

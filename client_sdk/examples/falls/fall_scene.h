@@ -53,7 +53,7 @@ struct FallScene {
   std::vector<Body> bodies;
 };
 
-/// Reads a scene. Errors: InvalidArgument, which says what is missing.
+/// Reads a scene. Errors: InvalidArgument, whose message names the field that is missing.
 absl::StatusOr<FallScene> ReadFallScene(const std::string& path);
 
 }  // namespace carillon::falls

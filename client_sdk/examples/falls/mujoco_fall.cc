@@ -119,7 +119,7 @@ class MujocoFall {
         contacts_({.roughness_depth = scene.roughness_depth,
                    .irregularity_length_m = scene.irregularity_length_m},
                   *model_) {
-    int number = 0;  // of the world
+    int number = 0;  // MuJoCo's number of the body; the world's is 0
     uint32_t handle = 0;
     for (const Body& body : scene.bodies) {
       ++handle;

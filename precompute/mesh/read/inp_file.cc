@@ -307,7 +307,7 @@ class InpParser {
   TextLines lines_;
   ElementFile file_;
   Keyword keyword_;
-  std::optional<InpKind> kind_;   // of the current block of elements
+  std::optional<InpKind> kind_;   // the kind of the elements that are being read
   std::vector<int64_t> pending_;  // the number and the first nodes of an element
   absl::flat_hash_map<int64_t, Placed> elements_;
   int part_count_ = 0;

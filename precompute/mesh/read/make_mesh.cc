@@ -138,8 +138,8 @@ absl::Status OrientElements(TetMesh& mesh) {
   return absl::OkStatus();
 }
 
-/// Distance of a mid-side node from the middle of its edge, in lengths of the edge: that of a third
-/// of a circle is 0.29.
+/// The largest distance of a mid-side node from the middle of its edge, in lengths of the edge. An
+/// edge along a third of a circle has 0.29.
 constexpr double kMostCurved = 0.35;
 
 /// In another order of the nodes a mid-side node would be a whole edge away from its place.

@@ -141,8 +141,8 @@ class Client {
   /// Changes the gain of a scene, mutes it, or lets it sound alone, and returns it.
   virtual absl::StatusOr<v1::Scene> UpdateScene(const v1::UpdateSceneRequest& request) const;
 
-  /// Silences what sounds in a scene or, if `scene` is empty, in all scenes of the caller, with a
-  /// short fade. Returns the number of scenes.
+  /// Fades out all objects of a scene within 30 ms or, if `scene` is empty, those of all scenes of
+  /// the caller. Returns the number of scenes.
   virtual absl::StatusOr<uint32_t> StopAll(const std::string& scene = "") const;
 
   /// Fades out the objects of a scene and deletes it. A scene that was not made with `keep` ends by

@@ -26,8 +26,8 @@ class ContactStream {
 
   /// Queues one simulation step and returns at once. If the stream has ended, returns the error
   /// that ended it, or FAILED_PRECONDITION (CONTACT_STREAM_ENDED) after Finish(). If
-  /// kMaxQueuedSteps steps are waiting, the oldest of them is dropped, and counted: what is newest
-  /// is heard.
+  /// kMaxQueuedSteps steps are waiting, the stream drops and counts the oldest of them, so that the
+  /// newest are heard.
   virtual absl::Status Send(v1::ContactStep step) = 0;
 
   /// Returns the number of steps that wait for the network.
