@@ -72,6 +72,9 @@ struct Bus {
   /// Something was rendered in the last blocks.
   bool sounded = false;
 
+  /// A gain glides, or the bus fades out to be silenced.
+  bool changes() const noexcept { return !fader.resting() || !stop.neutral(); }
+
   /// Takes what the controlling threads told. A bus that is silent needs neither glide nor fade.
   void Listen() noexcept {
     const float target = gain.load(std::memory_order_relaxed);

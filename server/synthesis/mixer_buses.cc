@@ -32,6 +32,13 @@ float Largest(std::span<const float> samples) noexcept {
 /// The time in which a shown peak falls by a factor of e: 40 dB in a second.
 constexpr double kPeakFallS = 0.217;
 
+void LetPeakFall(Bus& bus, double seconds) noexcept {
+  const float peak = bus.peak.load(std::memory_order_relaxed);
+  if (peak == 0) return;
+  const auto kept = static_cast<float>(std::exp(-seconds / kPeakFallS));
+  bus.peak.store(peak * kept, std::memory_order_relaxed);
+}
+
 }  // namespace
 
 void Mixer::OpenSection(uint32_t section, MixedSection* opened) noexcept {
@@ -86,32 +93,37 @@ void Mixer::MixBuses(std::span<float> frames) noexcept {
 
 void Mixer::MixBus(uint32_t bus, std::span<const uint32_t> sections, size_t frame_count) noexcept {
   Bus& mixed_bus = *buses_[bus];
+  bool sounded = false;
+  uint64_t active_mode_count = 0;
+  for (const uint32_t number : sections) {
+    const SectionCounts& counts = sections_[number]->counts;
+    CountSection(counts);
+    active_mode_count += counts.active_mode_count;
+    sounded |= counts.sounded;
+  }
+  mixed_bus.sounded = sounded;
+  active_mode_count_ += active_mode_count;
+  mixed_bus.active_mode_count.store(active_mode_count, std::memory_order_relaxed);
+  LetPeakFall(mixed_bus, static_cast<double>(frame_count) / settings_.sample_rate_hz);
+  // Most buses of a daemon are those of scenes that rest, which nobody should pay for.
+  const bool heard = mixed_bus.listener.load(std::memory_order_relaxed) != nullptr;
+  if (!sounded && !heard && !mixed_bus.changes()) return;
   const std::span<float> frames = std::span(bus_frames_).first(frame_count);
   const std::span<float> placed =
       std::span(bus_placed_).first(frame_count * settings_.channel_count);
   std::ranges::fill(frames, 0.0F);
   std::ranges::fill(placed, 0.0F);
-  bool sounded = false;
-  uint64_t active_mode_count = 0;
   for (const uint32_t number : sections) {
     const MixedSection& section = *sections_[number];
-    CountSection(section.counts);
-    active_mode_count += section.counts.active_mode_count;
-    sounded |= section.counts.sounded;
     if (section.counts.sounded) AddTo(section.frames, frames);
     if (section.counts.placed) AddTo(section.placed, placed);
   }
-  mixed_bus.sounded = sounded;
-  active_mode_count_ += active_mode_count;
-  mixed_bus.active_mode_count.store(active_mode_count, std::memory_order_relaxed);
   ApplyGains(mixed_bus, frame_count);
   LetHear(mixed_bus, frame_count);
-  const double seconds = static_cast<double>(frame_count) / settings_.sample_rate_hz;
-  const float fallen = mixed_bus.peak.load(std::memory_order_relaxed) *
-                       static_cast<float>(std::exp(-seconds / kPeakFallS));
-  mixed_bus.peak.store(std::max({fallen, Largest(frames), Largest(placed)}),
-                       std::memory_order_relaxed);
   if (!sounded) return;
+  mixed_bus.peak.store(std::max({mixed_bus.peak.load(std::memory_order_relaxed), Largest(frames),
+                                 Largest(placed)}),
+                       std::memory_order_relaxed);
   AddTo(frames, std::span(mixed_frames_).first(frames.size()));
   AddTo(placed, std::span(mixed_placed_).first(placed.size()));
 }

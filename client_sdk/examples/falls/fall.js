@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 'use strict';
 
-// Lets the bodies of a scene (docs/decisions/0046) fall in Rapier or Havok, and records their contacts as the engine
+// Lets the bodies of a scene (docs/decisions/0042) fall in Rapier or Havok, and records their contacts as the engine
 // reports them: node fall.js SCENE TRACE [--engine rapier|havok] [--rate HZ] [--seconds S]
 const fs = require('fs');
 const { parseArgs } = require('util');

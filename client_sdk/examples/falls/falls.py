@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Scenes of bodies that fall (docs/decisions/0046): their models from the daemon, and their contacts from an engine."""
+"""Scenes of bodies that fall (docs/decisions/0042): their models from the daemon, and their contacts from an engine."""
 
 import copy
 import itertools

@@ -80,7 +80,7 @@ absl::Status Record(const Options& options) {
 int Main(int argc, char** argv) {
   CLI::App app("Records a contact trace of bodies that fall in a physics engine.");
   Options options;
-  app.add_option("scene", options.scene, "The scene, a JSON file (docs/decisions/0046)")
+  app.add_option("scene", options.scene, "The scene, a JSON file (docs/decisions/0042)")
       ->required();
   app.add_option("trace", options.trace, "The contact trace to write")->required();
   app.add_option("--engine", options.engine, "The physics engine")

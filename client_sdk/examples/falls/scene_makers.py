@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The scenes of the examples: blocks and boxes that a ball knocks over, falling letters, a bowl that rolls on its rim.
 
-Each function returns a scene (docs/decisions/0046), and writes the meshes that it names into a folder.
+Each function returns a scene (docs/decisions/0042), and writes the meshes that it names into a folder.
 """
 
 import math
