@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "server/synthesis/flush_denormals.h"
+#include "server/synthesis/frames.h"
 
 namespace carillon {
 namespace {
@@ -324,8 +325,7 @@ void Mixer::SendBack(const Retired& retired) noexcept {
 }
 
 void Mixer::NotePeak(std::span<const float> block) noexcept {
-  float peak = 0;
-  for (const float sample : block) peak = std::max(peak, std::abs(sample));
+  const float peak = LargestMagnitude(block);
   float noted = peak_.load(std::memory_order_relaxed);
   while (peak > noted && !peak_.compare_exchange_weak(noted, peak, std::memory_order_relaxed)) {
   }

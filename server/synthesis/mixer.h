@@ -250,8 +250,11 @@ class Mixer {
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void ListenToControl() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void MixBuses(std::span<float> frames) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
-  /// Adds the sections' sound, in their order, to that of all buses.
-  void MixBus(uint32_t bus, std::span<const uint32_t> sections, size_t frame_count) noexcept
+  /// Adds the sections' sound, in their order, to that of all buses. Returns whether a voice
+  /// sounds on the bus.
+  bool MixBus(uint32_t bus, std::span<const uint32_t> sections, size_t frame_count) noexcept
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  void AddSections(std::span<const uint32_t> sections, size_t frame_count) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void CountSection(const SectionCounts& counts) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);

@@ -4,30 +4,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/synthesis/frames.h"
 #include "server/synthesis/mixer.h"
 
 namespace carillon {
 namespace {
-
-void AddTo(std::span<const float> more, std::span<float> sum) noexcept {
-  for (size_t n = 0; n < sum.size(); ++n) sum[n] += more[n];
-}
-
-/// Multiplies each frame, which has `channels` samples, by its gain.
-void Multiply(std::span<const float> gains, size_t channels, std::span<float> frames) noexcept {
-  for (size_t n = 0; n < frames.size(); ++n) frames[n] *= gains[n / channels];
-}
-
-/// Writes frames that have the same sample in each channel.
-void Spread(std::span<const float> mono, size_t channels, std::span<float> frames) noexcept {
-  for (size_t n = 0; n < frames.size(); ++n) frames[n] = mono[n / channels];
-}
-
-float Largest(std::span<const float> samples) noexcept {
-  float largest = 0;
-  for (const float sample : samples) largest = std::max(largest, std::abs(sample));
-  return largest;
-}
 
 /// The time in which a shown peak falls by a factor of e: 40 dB in a second.
 constexpr double kPeakFallS = 0.217;
@@ -73,44 +54,63 @@ void Mixer::MixBuses(std::span<float> frames) noexcept {
   std::ranges::fill(std::span(mixed_placed_).first(frames.size()), 0.0F);
   active_mode_count_ = 0;
   ringing_work_ = 0;
+  bool placed = false;
   for (auto first = open_sections_.begin(); first != open_sections_.end();) {
     const auto bus = static_cast<uint32_t>(*first / kSectionCount);
     const auto last = std::find_if(first, open_sections_.end(), [bus](uint32_t section) {
       return section / kSectionCount != bus;
     });
-    MixBus(bus, {first, last}, frame_count);
+    placed |= MixBus(bus, {first, last}, frame_count);
     first = last;
   }
   statistics_.active_mode_count.store(active_mode_count_, std::memory_order_relaxed);
   Spread(mixed_frames_, channels, frames);
-  AddTo(mixed_placed_, frames);
+  if (placed) AddTo(mixed_placed_, frames);
   if (master_.neutral()) return;
   const std::span<float> gains = std::span(gains_).first(frame_count);
   std::ranges::fill(gains, 1.0F);
   master_.Multiply(gains);
-  Multiply(gains, channels, frames);
+  MultiplyFrames(gains, channels, frames);
 }
 
-void Mixer::MixBus(uint32_t bus, std::span<const uint32_t> sections, size_t frame_count) noexcept {
+bool Mixer::MixBus(uint32_t bus, std::span<const uint32_t> sections, size_t frame_count) noexcept {
   Bus& mixed_bus = *buses_[bus];
-  bool sounded = false;
+  bool placed = false;
+  mixed_bus.sounded = false;
   uint64_t active_mode_count = 0;
   for (const uint32_t number : sections) {
     const SectionCounts& counts = sections_[number]->counts;
     CountSection(counts);
     active_mode_count += counts.active_mode_count;
-    sounded |= counts.sounded;
+    mixed_bus.sounded |= counts.sounded;
+    placed |= counts.placed;
   }
-  mixed_bus.sounded = sounded;
   active_mode_count_ += active_mode_count;
   mixed_bus.active_mode_count.store(active_mode_count, std::memory_order_relaxed);
   LetPeakFall(mixed_bus, static_cast<double>(frame_count) / settings_.sample_rate_hz);
   // Most buses of a daemon are those of scenes that rest, which nobody should pay for.
   const bool heard = mixed_bus.listener.load(std::memory_order_relaxed) != nullptr;
-  if (!sounded && !heard && !mixed_bus.changes()) return;
+  if (!mixed_bus.sounded && !heard && !mixed_bus.changes()) return false;
+  AddSections(sections, frame_count);
+  ApplyGains(mixed_bus, frame_count);
+  LetHear(mixed_bus, frame_count);
+  if (!mixed_bus.sounded) return false;
+  const std::span<const float> frames = std::span(bus_frames_).first(frame_count);
+  float peak = LargestMagnitude(frames);
+  AddTo(frames, std::span(mixed_frames_).first(frame_count));
+  if (placed) {
+    const auto directed = std::span(bus_placed_).first(frame_count * settings_.channel_count);
+    peak = std::max(peak, LargestMagnitude(directed));
+    AddTo(directed, std::span(mixed_placed_).first(directed.size()));
+  }
+  const float fallen = mixed_bus.peak.load(std::memory_order_relaxed);
+  mixed_bus.peak.store(std::max(fallen, peak), std::memory_order_relaxed);
+  return placed;
+}
+
+void Mixer::AddSections(std::span<const uint32_t> sections, size_t frame_count) noexcept {
   const std::span<float> frames = std::span(bus_frames_).first(frame_count);
-  const std::span<float> placed =
-      std::span(bus_placed_).first(frame_count * settings_.channel_count);
+  const auto placed = std::span(bus_placed_).first(frame_count * settings_.channel_count);
   std::ranges::fill(frames, 0.0F);
   std::ranges::fill(placed, 0.0F);
   for (const uint32_t number : sections) {
@@ -118,14 +118,6 @@ void Mixer::MixBus(uint32_t bus, std::span<const uint32_t> sections, size_t fram
     if (section.counts.sounded) AddTo(section.frames, frames);
     if (section.counts.placed) AddTo(section.placed, placed);
   }
-  ApplyGains(mixed_bus, frame_count);
-  LetHear(mixed_bus, frame_count);
-  if (!sounded) return;
-  mixed_bus.peak.store(std::max({mixed_bus.peak.load(std::memory_order_relaxed), Largest(frames),
-                                 Largest(placed)}),
-                       std::memory_order_relaxed);
-  AddTo(frames, std::span(mixed_frames_).first(frames.size()));
-  AddTo(placed, std::span(mixed_placed_).first(placed.size()));
 }
 
 void Mixer::CountSection(const SectionCounts& counts) noexcept {
@@ -145,8 +137,8 @@ void Mixer::ApplyGains(Bus& bus, size_t frame_count) noexcept {
   bus.fader.Multiply(gains);
   bus.stop.Multiply(gains);
   const size_t channels = settings_.channel_count;
-  Multiply(gains, 1, std::span(bus_frames_).first(frame_count));
-  Multiply(gains, channels, std::span(bus_placed_).first(frame_count * channels));
+  MultiplyFrames(gains, 1, std::span(bus_frames_).first(frame_count));
+  MultiplyFrames(gains, channels, std::span(bus_placed_).first(frame_count * channels));
 }
 
 void Mixer::LetHear(Bus& bus, size_t frame_count) noexcept {
