@@ -78,6 +78,7 @@ void VisitSettings(SomeOptions& options, const Visit& visit) {
   visit("sample_rate", options.sample_rate_hz);
   visit("channels", options.channel_count);
   visit("gain", options.gain);
+  visit("full_scale_pa", options.full_scale_pa);
   visit("block_frames", options.block_frame_count);
   visit("look_ahead_blocks", options.look_ahead_block_count);
   visit("scene_grace", options.scene_grace_s);
@@ -172,6 +173,7 @@ absl::Status Check(const Options& options) {
        {CheckRange("--sample-rate", options.sample_rate_hz, 8000, 192000),
         CheckRange("--channels", options.channel_count, 1, 2),
         CheckRange("--gain", options.gain, 0, 1000),
+        CheckRange("--full-scale-pa", options.full_scale_pa, kLeastFullScalePa, kMostFullScalePa),
         CheckRange("--block-frames", options.block_frame_count, 16, 256),
         CheckRange("--look-ahead-blocks", options.look_ahead_block_count, 2, 64),
         CheckRange("--workers", options.worker_count, 0, 1024),
@@ -223,6 +225,9 @@ void AddFlags(CLI::App& app, Options& options) {
   app.add_option("--channels", options.channel_count, "1 for mono, 2 for stereo")
       ->capture_default_str();
   app.add_option("--gain", options.gain, "linear gain of the output, before the limiter")
+      ->capture_default_str();
+  app.add_option("--full-scale-pa", options.full_scale_pa,
+                 "pressure of a sample of full scale, Pa; less is louder")
       ->capture_default_str();
   app.add_option("--block-frames", options.block_frame_count, "frames in a rendered block")
       ->capture_default_str();
