@@ -168,7 +168,7 @@ bool IsHostAndPort(absl::string_view text) {
          absl::SimpleAtoi(text.substr(colon + 1), &port) && port > 0 && port < 65536;
 }
 
-absl::Status Check(const Options& options) {
+absl::Status CheckNumbers(const Options& options) {
   for (const absl::Status& status :
        {CheckRange("--sample-rate", options.sample_rate_hz, 8000, 192000),
         CheckRange("--channels", options.channel_count, 1, 2),
@@ -187,6 +187,11 @@ absl::Status Check(const Options& options) {
         CheckRange("--model-budget-mib", options.model_budget_mib, 0, kMostMib)}) {
     if (!status.ok()) return status;
   }
+  return absl::OkStatus();
+}
+
+absl::Status Check(const Options& options) {
+  RETURN_IF_ERROR(CheckNumbers(options));
   if (options.executor != "local" && options.executor != "slurm") {
     return InvalidConfiguration(
         absl::StrCat("--executor is \"", options.executor, "\"; it must be local or slurm"));

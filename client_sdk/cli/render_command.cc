@@ -26,9 +26,9 @@ void PrintSummary(const RenderOptions& options, const v1::RenderSummary& summary
   absl::FPrintF(out, "%s: %.2f s, %d impulses, peak %s\n", options.out,
                 static_cast<double>(summary.frame_count()) / sample_rate_hz,
                 summary.accepted_count(), Decibels(summary.peak()));
-  absl::FPrintF(out, "%.3g Pa (full scale is %.4g Pa), true peak %s, whole sound %s, loudest 0.4 s %s\n",
-                summary.peak_pa(), summary.full_scale_pa(),
-                Decibels(summary.true_peak()),
+  absl::FPrintF(out,
+                "%.3g Pa (full scale is %.4g Pa), true peak %s, whole sound %s, loudest 0.4 s %s\n",
+                summary.peak_pa(), summary.full_scale_pa(), Decibels(summary.true_peak()),
                 Loudness(summary.has_integrated_lufs(), summary.integrated_lufs()),
                 Loudness(summary.has_loudest_momentary_lufs(), summary.loudest_momentary_lufs()));
   if (summary.rejected_count() > 0) {
@@ -45,7 +45,8 @@ void PrintSummary(const RenderOptions& options, const v1::RenderSummary& summary
     absl::PrintF("%d contacts have no impulse\n", findings.zero_impulse_count());
   }
   if (summary.limited_frame_count() > 0) {
-    absl::FPrintF(out, "the limiter worked in %d frames; --full-scale-pa above %.4g would avoid it\n",
+    absl::FPrintF(out,
+                  "the limiter worked in %d frames; --full-scale-pa above %.4g would avoid it\n",
                   summary.limited_frame_count(), summary.peak_pa() * kHeadroom);
   }
 }

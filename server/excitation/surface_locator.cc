@@ -75,12 +75,12 @@ struct Search {
   ClosestPoint closest{.squared_distance_m2 = std::numeric_limits<double>::infinity()};
 };
 
-/// Squared distance of `point` from the box around a triangle: the triangle is no nearer. It takes a
-/// fraction of the time of FindClosestPoint.
+/// Squared distance of `point` from the box around a triangle: the triangle is no nearer. It takes
+/// a fraction of the time of FindClosestPoint.
 double SquaredDistanceOfBox(std::span<const std::array<float, 3>> vertices,
                             const std::array<uint32_t, 3>& triangle, const Point& point) {
   const std::array<float, 3>&a = vertices[triangle[0]], &b = vertices[triangle[1]],
-             &c = vertices[triangle[2]];
+                          &c = vertices[triangle[2]];
   double squared = 0;
   for (size_t axis = 0; axis < 3; ++axis) {
     const double least = std::min(std::min(a[axis], b[axis]), c[axis]);

@@ -21,7 +21,6 @@
 #include "server/live_output/final_fade.h"
 #include "server/live_output/stems.h"
 #include "server/loudness/loudness_meter.h"
-#include "server/synthesis/bank/level.h"
 #include "server/synthesis/mixer.h"
 
 namespace carillon {
@@ -35,7 +34,7 @@ struct OutputSettings {
   std::string device = "auto";
   /// Path of carillon-audio, which opens sound cards.
   std::string device_program{};
-  double gain = 1;  ///< of the output, before the limiter
+  double gain = 1;                      ///< of the output, before the limiter
   double full_scale_pa = kFullScalePa;  ///< the pressure of a sample of 1
 };
 

@@ -14,8 +14,7 @@ constexpr uint64_t kGrainFrames = 128;
 }  // namespace
 
 void Lateness::Note(double time_s, uint64_t frame, TimeMapping& mapping) {
-  const double late_frames =
-      static_cast<double>(frame) - mapping.FrameOf(time_s, sample_rate_hz_);
+  const double late_frames = static_cast<double>(frame) - mapping.FrameOf(time_s, sample_rate_hz_);
   if (late_frames <= 0) {
     since_frame_.reset();
     return;

@@ -28,7 +28,7 @@ struct OfflineSettings {
   /// Length of the sound after the last contact; zero: until it stays below -80 dB of full scale,
   /// at most 60 s.
   double tail_s = 0;
-  double gain = 1;  ///< of the whole sound, before the limiter
+  double gain = 1;                      ///< of the whole sound, before the limiter
   double full_scale_pa = kFullScalePa;  ///< the pressure of a sample of 1
   /// The simulator's step, seconds, above 0 and at most 1.
   double step_s = 1.0 / 60;

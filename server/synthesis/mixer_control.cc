@@ -121,8 +121,7 @@ void Mixer::FadeOut(BankId bank) {
   Send({.kind = Command::Kind::kFadeOut, .id = bank});
 }
 
-absl::StatusOr<std::unique_ptr<EventStream>> Mixer::OpenStream(size_t capacity,
-                                                                     bool timely) {
+absl::StatusOr<std::unique_ptr<EventStream>> Mixer::OpenStream(size_t capacity, bool timely) {
   auto queue = std::make_shared<EventQueue>(capacity, timely);
   const MutexLock lock(&control_mutex_);
   if (queues_.size() == settings_.most_streams) {

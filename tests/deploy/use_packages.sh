@@ -97,6 +97,7 @@ run_apt remove "${packages[@]}"
 # A package without settings is gone when it is removed, and apt knows its name no more.
 run_apt purge carillond
 [[ ! -e /etc/carillon && ! -e /var/lib/carillon ]] || fail "purge left settings or models"
-known=$(dpkg-query -W -f '${Package} ${db:Status-Status}\n' "${packages[@]}" 2>/dev/null | grep -v ' not-installed$') || true
+known=$(dpkg-query -W -f '${Package} ${db:Status-Status}\n' "${packages[@]}" 2>/dev/null |
+  grep -v ' not-installed$') || true
 [[ -z $known ]] || fail "purge left $known"
 printf 'use_packages: installed, upgraded, heard, removed and purged\n'
