@@ -49,7 +49,7 @@ class AudioLevel : public ServedDaemon {
 
 TEST_F(AudioLevel, ARenderingStatesPressureAndLoudness) {
   const v1::RenderSummary once = RenderStrike(1);
-  EXPECT_GT(once.peak(), 0.001);
+  EXPECT_GT(once.peak(), 0.0001);
   EXPECT_EQ(once.full_scale_pa(), 200);
   EXPECT_DOUBLE_EQ(once.peak_pa(), 200 * once.peak());
   EXPECT_GE(once.true_peak(), 0.99 * once.peak());
