@@ -38,7 +38,9 @@ case $preset in
     ;;
 esac
 if [[ -z $excluded ]] && { ((${#rooms[@]} == 0)) || [[ " ${rooms[*]} " == *" deploy"* ]]; }; then lists+=(lint); fi
-if [[ -z $excluded || $preset == asan ]] && { ((${#rooms[@]} == 0)) || [[ " ${rooms[*]} " == *" proto"* ]]; }; then
+# Generated code is compiled by the tests of proto, and the recipes by those of integration.
+if [[ -z $excluded || $preset == asan ]] &&
+  { ((${#rooms[@]} == 0)) || [[ " ${rooms[*]}" =~ " "(proto|integration) ]]; }; then
   lists+=(languages)
 fi
 

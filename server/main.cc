@@ -180,7 +180,8 @@ OutputSettings OutputSettingsOf(const Options& options) {
           .look_ahead_block_count = options.look_ahead_block_count,
           .device = options.audio_device,
           .device_program = options.audio_program,
-          .gain = options.gain};
+          .gain = options.gain,
+          .full_scale_pa = options.full_scale_pa};
 }
 
 ApiSettings ApiSettingsOf(const Options& options) {

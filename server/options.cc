@@ -78,6 +78,7 @@ void VisitSettings(SomeOptions& options, const Visit& visit) {
   visit("sample_rate", options.sample_rate_hz);
   visit("channels", options.channel_count);
   visit("gain", options.gain);
+  visit("full_scale_pa", options.full_scale_pa);
   visit("block_frames", options.block_frame_count);
   visit("look_ahead_blocks", options.look_ahead_block_count);
   visit("scene_grace", options.scene_grace_s);
@@ -167,11 +168,12 @@ bool IsHostAndPort(absl::string_view text) {
          absl::SimpleAtoi(text.substr(colon + 1), &port) && port > 0 && port < 65536;
 }
 
-absl::Status Check(const Options& options) {
+absl::Status CheckNumbers(const Options& options) {
   for (const absl::Status& status :
        {CheckRange("--sample-rate", options.sample_rate_hz, 8000, 192000),
         CheckRange("--channels", options.channel_count, 1, 2),
         CheckRange("--gain", options.gain, 0, 1000),
+        CheckRange("--full-scale-pa", options.full_scale_pa, kLeastFullScalePa, kMostFullScalePa),
         CheckRange("--block-frames", options.block_frame_count, 16, 256),
         CheckRange("--look-ahead-blocks", options.look_ahead_block_count, 2, 64),
         CheckRange("--workers", options.worker_count, 0, 1024),
@@ -185,6 +187,11 @@ absl::Status Check(const Options& options) {
         CheckRange("--model-budget-mib", options.model_budget_mib, 0, kMostMib)}) {
     if (!status.ok()) return status;
   }
+  return absl::OkStatus();
+}
+
+absl::Status Check(const Options& options) {
+  RETURN_IF_ERROR(CheckNumbers(options));
   if (options.executor != "local" && options.executor != "slurm") {
     return InvalidConfiguration(
         absl::StrCat("--executor is \"", options.executor, "\"; it must be local or slurm"));
@@ -223,6 +230,9 @@ void AddFlags(CLI::App& app, Options& options) {
   app.add_option("--channels", options.channel_count, "1 for mono, 2 for stereo")
       ->capture_default_str();
   app.add_option("--gain", options.gain, "linear gain of the output, before the limiter")
+      ->capture_default_str();
+  app.add_option("--full-scale-pa", options.full_scale_pa,
+                 "pressure of a sample of full scale, Pa; less is louder")
       ->capture_default_str();
   app.add_option("--block-frames", options.block_frame_count, "frames in a rendered block")
       ->capture_default_str();

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "server/synthesis/bank/level.h"
 
 namespace carillon {
 
@@ -19,7 +20,8 @@ struct Options {
   uint32_t block_frame_count = 128;
   uint32_t look_ahead_block_count = 8;
   uint32_t channel_count = 1;
-  double gain = 1;                ///< of the output, linear
+  double gain = 1;  ///< of the output, linear
+  double full_scale_pa = kFullScalePa;
   int worker_count = 0;           ///< decompositions at a time; 0: half of the processors
   int64_t memory_budget_mib = 0;  ///< of all decompositions together; 0: half of the machine's
   int64_t job_memory_mib = 0;     ///< of one decomposition; 0: the whole budget

@@ -109,7 +109,8 @@ struct RenderOptions {
   uint32_t sample_rate_hz = 48000;
   uint32_t channel_count = 1;
   double tail_s = 0;
-  double gain = 1;         ///< factor of every sample
+  double gain = 1;                      ///< factor of every sample
+  std::optional<double> full_scale_pa;  ///< pressure of a sample of 1; absent: the daemon's default
   bool normalize = false;  ///< scale the sound to a peak of 0.9 of full scale, before `gain`
   int bits = 24;           ///< of a sample: 16, 24, or 32 for floating point
 };

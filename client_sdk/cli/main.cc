@@ -165,6 +165,8 @@ void AddRender(CLI::App& app, Program& program) {
   render.add_option("--out", options->out, "The WAV file to write, or - for stdout")->required();
   render.add_option("--gain", options->gain, "The factor of every sample")
       ->check(CLI::Range(0.0, 1e6));
+  render.add_option("--full-scale-pa", options->full_scale_pa,
+                    "The pressure of a sample of full scale, Pa [200]");
   render.add_flag("--normalize", options->normalize,
                   "Scale the sound to a peak of 0.9 of full scale");
   render

@@ -17,14 +17,18 @@
 namespace carillon::cli {
 namespace {
 
+/// The limiter works from 3 dB below full scale on.
+constexpr double kHeadroom = 1.4126;
+
 void PrintSummary(const RenderOptions& options, const v1::RenderSummary& summary,
                   uint32_t sample_rate_hz) {
   std::FILE* const out = options.out == "-" ? stderr : stdout;
   absl::FPrintF(out, "%s: %.2f s, %d impulses, peak %s\n", options.out,
                 static_cast<double>(summary.frame_count()) / sample_rate_hz,
                 summary.accepted_count(), Decibels(summary.peak()));
-  absl::FPrintF(out, "%.3g Pa, true peak %s, whole sound %s, loudest 0.4 s %s\n", summary.peak_pa(),
-                Decibels(summary.true_peak()),
+  absl::FPrintF(out,
+                "%.3g Pa (full scale is %.4g Pa), true peak %s, whole sound %s, loudest 0.4 s %s\n",
+                summary.peak_pa(), summary.full_scale_pa(), Decibels(summary.true_peak()),
                 Loudness(summary.has_integrated_lufs(), summary.integrated_lufs()),
                 Loudness(summary.has_loudest_momentary_lufs(), summary.loudest_momentary_lufs()));
   if (summary.rejected_count() > 0) {
@@ -41,8 +45,9 @@ void PrintSummary(const RenderOptions& options, const v1::RenderSummary& summary
     absl::PrintF("%d contacts have no impulse\n", findings.zero_impulse_count());
   }
   if (summary.limited_frame_count() > 0) {
-    absl::FPrintF(out, "the limiter worked in %d frames; smaller gains would avoid it\n",
-                  summary.limited_frame_count());
+    absl::FPrintF(out,
+                  "the limiter worked in %d frames; --full-scale-pa above %.4g would avoid it\n",
+                  summary.limited_frame_count(), summary.peak_pa() * kHeadroom);
   }
 }
 
@@ -99,6 +104,7 @@ absl::Status Render(const client::Client& daemon, const RenderOptions& options, 
   settings.set_sample_rate_hz(options.sample_rate_hz);
   settings.set_channel_count(options.channel_count);
   settings.set_tail_s(options.tail_s);
+  if (options.full_scale_pa) settings.set_full_scale_pa(*options.full_scale_pa);
 
   RenderedFile file(options);
   const auto summary = daemon.Render(

@@ -23,6 +23,8 @@ absl::Status ShowStatus(const client::Client& daemon, const std::string& server,
   absl::PrintF("level    peak %s (%.3g Pa), last 0.4 s %s, last 3 s %s\n", Decibels(mixer->peak()),
                mixer->peak_pa(), Loudness(mixer->has_momentary_lufs(), mixer->momentary_lufs()),
                Loudness(mixer->has_short_term_lufs(), mixer->short_term_lufs()));
+  absl::PrintF("         full scale is %.4g Pa, gain %.4g%s\n", mixer->full_scale_pa(),
+               mixer->gain(), mixer->muted() ? ", muted" : "");
   absl::PrintF("missed   %d times, %d frames; limited %d of %d frames\n", mixer->xrun_count(),
                mixer->lost_frame_count(), mixer->limited_frame_count(), mixer->frame_count());
   if (mixer->merged_impulse_count() + mixer->shed_object_count() > 0) {

@@ -52,13 +52,13 @@ absl::StatusOr<v1::SoundingObject> AddObject(const client::Client& daemon, const
   return daemon.AddObject(request);
 }
 
-/// Sends the strike with no scheduling delay, so that it sounds on arrival.
+/// Sends the strike so that it sounds on arrival.
 absl::Status SendImpulse(const client::Client& daemon, const std::string& scene, uint32_t handle,
                          const StrikeOptions& options) {
   v1::ContactStreamStart start;
   start.set_scene(scene);
   start.set_step_s(kStep);
-  start.set_scheduling_delay_s(0);
+  start.set_at_once(true);
   const auto stream = daemon.StreamContacts(start);
   if (!stream.ok()) return stream.status();
   v1::ContactStep step;

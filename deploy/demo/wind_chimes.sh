@@ -45,8 +45,10 @@ stop_daemon() {
 trap stop_daemon EXIT
 
 start_daemon() {
-  # The chimes shall all sound alike, and the player shall have the processors for itself.
-  "$bin/carillond" --data-dir "$folder/database" --listen "$CARILLON_SERVER" --no-transfers >"$log" 2>&1 &
+  # The chimes shall all sound alike, and the player shall have the processors for itself. They are softer than the
+  # bodies for which full scale is 200 Pa.
+  "$bin/carillond" --data-dir "$folder/database" --listen "$CARILLON_SERVER" --no-transfers \
+    --full-scale-pa 20 >"$log" 2>&1 &
   daemon=$!
   for _ in {1..100}; do
     if "$bin/carillon" status >/dev/null 2>&1; then return; fi
@@ -74,6 +76,6 @@ printf '\nSwinging them for %s s, every contact streamed as it happens:\n' "$sec
 "$bin/carillon-wind-chimes" play --gain 0.5 "${models[@]}" --seconds "$seconds" --seed "$seed" --trace "$trace"
 
 printf '\nThe same contacts, rendered offline:\n'
-"$bin/carillon" render "$trace" --out "$wav"
+"$bin/carillon" render "$trace" --full-scale-pa 20 --out "$wav"
 "$root/deploy/demo/spectrogram.py" "$wav" "$png"
 printf '\nSound:       %s\nSpectrogram: %s\n' "$wav" "$png"

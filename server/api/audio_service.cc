@@ -9,7 +9,6 @@
 #include "server/api/render_call.h"
 #include "server/api/status_conversion.h"
 #include "server/api/unary_call.h"
-#include "server/synthesis/bank/level.h"
 #include "server/synthesis/bank/oscillator_bank.h"
 
 namespace carillon {
@@ -76,7 +75,8 @@ void AudioService::Describe(v1::GetMixerResponse& mixer) const {
   mixer.set_lost_frame_count(state.lost_frame_count);
   mixer.set_limited_frame_count(state.mixer.limited_frame_count);
   mixer.set_peak(state.peak);
-  mixer.set_peak_pa(state.peak * kFullScalePa);
+  mixer.set_full_scale_pa(output_.full_scale_pa());
+  mixer.set_peak_pa(state.peak * output_.full_scale_pa());
   if (state.momentary_lufs) mixer.set_momentary_lufs(*state.momentary_lufs);
   if (state.short_term_lufs) mixer.set_short_term_lufs(*state.short_term_lufs);
   mixer.set_device_message(state.device_message);

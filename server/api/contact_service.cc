@@ -74,6 +74,7 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
     ContactStreamSettings settings;
     settings.step_s = start.step_s();
     if (start.has_scheduling_delay_s()) settings.scheduling_delay_s = start.scheduling_delay_s();
+    settings.at_once = start.at_once();
     settings.reading = ToContactReading(start.frame(), start.pulse_shape());
     ASSIGN_OR_RETURN(stream_, daemon_.scenes.OpenContactStream(scene, settings));
     recording_ = StreamRecording(daemon_.scenes, scene, start, recorders_.Take(scene));
@@ -143,6 +144,7 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
     answer.set_accepted_count(counts.accepted_count);
     answer.set_late_count(counts.late_count);
     answer.set_dropped_count(counts.dropped_count);
+    answer.set_remap_count(counts.remap_count);
     answer.set_rejected_count(counts.rejected_count);
     if (!stream_->last_rejection().ok()) {
       *answer.mutable_last_rejection() = ToErrorInfo(stream_->last_rejection());

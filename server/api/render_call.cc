@@ -16,7 +16,6 @@
 #include "server/api/stream_call.h"
 #include "server/api/trace_reader.h"
 #include "server/loudness/loudness_meter.h"
-#include "server/synthesis/bank/level.h"
 
 namespace carillon {
 namespace {
@@ -118,7 +117,8 @@ class RenderCall final : public BidiStream<v1::RenderRequest, v1::RenderResponse
     *summary.mutable_findings() = ToProto(rendered.findings);
     summary.set_peak(rendered.peak);
     summary.set_limited_frame_count(rendered.limited_frame_count);
-    summary.set_peak_pa(rendered.peak * kFullScalePa);
+    summary.set_full_scale_pa(reader_.full_scale_pa());
+    summary.set_peak_pa(rendered.peak * reader_.full_scale_pa());
     summary.set_true_peak(loudness_->true_peak());
     if (const auto lufs = loudness_->integrated()) summary.set_integrated_lufs(*lufs);
     if (const auto lufs = loudness_->loudest_momentary()) {

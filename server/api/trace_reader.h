@@ -30,6 +30,7 @@ class TraceReader {
 
   uint32_t sample_rate_hz() const { return settings_->sample_rate_hz; }
   uint32_t channel_count() const { return settings_->channel_count; }
+  double full_scale_pa() const { return settings_->full_scale_pa; }
 
  private:
   absl::Status TakeSettings(const v1::RenderSettings& settings);

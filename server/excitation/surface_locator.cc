@@ -75,12 +75,33 @@ struct Search {
   ClosestPoint closest{.squared_distance_m2 = std::numeric_limits<double>::infinity()};
 };
 
+/// Squared distance of `point` from the box around a triangle: the triangle is no nearer. It takes
+/// a fraction of the time of FindClosestPoint.
+double SquaredDistanceOfBox(std::span<const std::array<float, 3>> vertices,
+                            const std::array<uint32_t, 3>& triangle, const Point& point) {
+  const std::array<float, 3>&a = vertices[triangle[0]], &b = vertices[triangle[1]],
+                          &c = vertices[triangle[2]];
+  double squared = 0;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    const double least = std::min(std::min(a[axis], b[axis]), c[axis]);
+    const double most = std::max(std::max(a[axis], b[axis]), c[axis]);
+    const double away = std::max(std::max(least - point[axis], point[axis] - most), 0.0);
+    squared += away * away;
+  }
+  return squared;
+}
+
 bool VisitTriangle(RTCPointQueryFunctionArguments* arguments) {
+  // Far more than rounding can err, so that no triangle is left out that would be the nearest.
+  constexpr double kSlack = 1.001, kSlackM2 = 1e-24;
   Search& search = *static_cast<Search*>(arguments->userPtr);
   const uint32_t t = arguments->primID;
   if (search.given_triangle && search.surfaces.given_triangle[t] != *search.given_triangle) {
     return false;
   }
+  const double box =
+      SquaredDistanceOfBox(search.surfaces.vertices, search.surfaces.triangles[t], search.point);
+  if (box > kSlack * search.closest.squared_distance_m2 + kSlackM2) return false;
   const ClosestPoint closest = FindClosestPoint(
       Corners(search.surfaces.vertices, search.surfaces.triangles[t]), search.point);
   if (!(closest.squared_distance_m2 < search.closest.squared_distance_m2)) return false;

@@ -27,7 +27,8 @@ MixerSettings MixerSettingsOf(const OutputSettings& settings, const Clock& clock
           .block_frame_count = format.block_frame_count,
           .channel_count = format.channel_count,
           .clock = &clock,
-          .gain = settings.gain};
+          .gain = settings.gain,
+          .full_scale_pa = settings.full_scale_pa};
 }
 
 }  // namespace

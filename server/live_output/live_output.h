@@ -34,7 +34,8 @@ struct OutputSettings {
   std::string device = "auto";
   /// Path of carillon-audio, which opens sound cards.
   std::string device_program{};
-  double gain = 1;  ///< of the output, before the limiter
+  double gain = 1;                      ///< of the output, before the limiter
+  double full_scale_pa = kFullScalePa;  ///< the pressure of a sample of 1
 };
 
 /// The volume of the output.
@@ -79,6 +80,7 @@ class LiveOutput {
   /// Lets clients listen to single scenes.
   Stems& stems() { return stems_; }
   const DeviceFormat& format() const { return settings_.format; }
+  double full_scale_pa() const { return settings_.full_scale_pa; }
   OutputVolume volume() const;
   /// Changes what is given; the volume glides within 30 ms. Returns the volume as it is now.
   OutputVolume ChangeVolume(std::optional<double> gain, std::optional<bool> muted);

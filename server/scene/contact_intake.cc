@@ -26,6 +26,7 @@ ContactIntake::ContactIntake(Scene& scene, EventTarget& target, const IntakeSett
       target_(target),
       settings_(settings),
       mapping_(settings.mapping.value_or(TimeMapping{.delay_s = settings.delay_s})),
+      lateness_(settings.sample_rate_hz),
       time_s_(mapping_.first_time_s),
       forces_(settings.step_s),
       pose_times_(settings.step_s) {}
@@ -34,13 +35,17 @@ absl::Status ContactIntake::BeginStep(double time_s) {
   if (!std::isfinite(time_s)) {
     return Invalid("INVALID_STREAM", absl::StrCat("time_s of step ", step_count_, " is ", time_s));
   }
-  if (step_count_ == 0 && !settings_.mapping) {
-    mapping_.first_frame = target_.frame();
-    mapping_.first_time_s = time_s;
-  } else if (time_s < time_s_) {
+  const bool begins = step_count_ == 0 && !settings_.mapping;
+  if (!begins && time_s < time_s_) {
     return Invalid("INVALID_STREAM",
                    absl::StrCat("time goes back from ", time_s_, " s to ", time_s, " s at step ",
                                 step_count_, "; open another stream for another run"));
+  }
+  if (begins || settings_.at_once) {
+    mapping_.first_frame = target_.frame();
+    mapping_.first_time_s = time_s;
+  } else if (!settings_.mapping) {
+    lateness_.Note(time_s, target_.frame(), mapping_);
   }
   Push(forces_.Begin(time_s));
   time_s_ = time_s;
@@ -195,7 +200,8 @@ void ContactIntake::Push(const ContactForces::Events& events) {
 }
 
 void ContactIntake::Push(MixerEvent& event, double frame) {
-  SetFrame(event, frame);
+  // What an earlier step has left may lie before the first frame where steps sound at once.
+  SetFrame(event, std::max(frame, 0.0));
   target_.Push(event);
 }
 

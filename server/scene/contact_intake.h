@@ -8,6 +8,7 @@
 #include "absl/status/statusor.h"
 #include "server/scene/contact_forces.h"
 #include "server/scene/frame_time.h"
+#include "server/scene/lateness.h"
 #include "server/scene/object_contact.h"
 #include "server/scene/rejection_counts.h"
 #include "server/scene/scene.h"
@@ -41,6 +42,8 @@ struct IntakeSettings {
   /// The mapping of a simulation that was heard before, with its own delay; absent: the first step
   /// lies at the target's frame when the step comes.
   std::optional<TimeMapping> mapping = std::nullopt;
+  /// Each step lies at the target's frame when it comes, so that no contact is late.
+  bool at_once = false;
   double most_ahead_s = 60;  ///< limit of TIME_TOO_FAR_AHEAD, not counting the delay
   ContactReading reading{};
   /// Counts rejected contacts, too, by reason; null: nobody wants to know. It must outlive the
@@ -62,6 +65,9 @@ struct IntakeFindings {
 /// so that a simulation sounds the same, and is refused for the same reasons, in both.
 ///
 ///     frame(t) = first frame + (t - time of the first step + delay) rate
+///
+/// If every step of kLateRunS comes late, as after a pause in which a simulator loads, time is
+/// mapped anew, as if the newest of these steps were the first.
 ///
 /// A report that cannot be used counts as rejected, once for each object of a contact, and the rest
 /// goes on; last_rejection() says why. One thread at a time.
@@ -95,6 +101,8 @@ class ContactIntake {
   void Reject(uint64_t count, absl::Status reason);
 
   const TimeMapping& mapping() const { return mapping_; }
+  /// How many times simulation time was mapped anew.
+  uint64_t remap_count() const { return lateness_.remap_count(); }
   uint64_t step_count() const { return step_count_; }
   /// Impulses handed on.
   uint64_t impulse_count() const { return impulse_count_; }
@@ -126,6 +134,7 @@ class ContactIntake {
   EventTarget& target_;
   const IntakeSettings settings_;
   TimeMapping mapping_;
+  Lateness lateness_;
   double time_s_ = 0;
   ContactForces forces_;
   PoseTimes pose_times_;

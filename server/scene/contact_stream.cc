@@ -26,6 +26,10 @@ absl::StatusOr<double> SchedulingDelay(const ContactStreamSettings& settings, co
   }
   const double block_s =
       static_cast<double>(mixer.settings().block_frame_count) / mixer.settings().sample_rate_hz;
+  if (settings.at_once && settings.scheduling_delay_s.value_or(0) != 0) {
+    return InvalidStream("at_once and a scheduling_delay_s above zero exclude each other");
+  }
+  if (settings.at_once) return 0;
   const double delay_s =
       settings.scheduling_delay_s.value_or(settings.step_s + block_s + kNetworkJitterS);
   if (!(delay_s >= 0 && delay_s <= kLongestDelayS)) {
@@ -40,10 +44,12 @@ absl::StatusOr<double> SchedulingDelay(const ContactStreamSettings& settings, co
 absl::StatusOr<std::unique_ptr<ContactStream>> ContactStream::Make(
     std::shared_ptr<Scene> scene, Mixer& mixer, const ContactStreamSettings& settings) {
   ASSIGN_OR_RETURN(const double delay_s, SchedulingDelay(settings, mixer));
-  ASSIGN_OR_RETURN(std::unique_ptr<EventStream> events, mixer.OpenStream(kQueueCapacity));
+  ASSIGN_OR_RETURN(std::unique_ptr<EventStream> events,
+                   mixer.OpenStream(kQueueCapacity, !settings.at_once));
   const IntakeSettings intake{.sample_rate_hz = mixer.settings().sample_rate_hz,
                               .step_s = settings.step_s,
                               .delay_s = delay_s,
+                              .at_once = settings.at_once,
                               .reading = settings.reading,
                               .rejections = settings.rejections};
   return std::unique_ptr<ContactStream>(
@@ -61,7 +67,8 @@ ContactCounts ContactStream::counts() const {
           .accepted_count = target_.events().accepted_count(),
           .late_count = target_.events().late_count(),
           .dropped_count = target_.events().dropped_count(),
-          .rejected_count = intake_.rejected_count()};
+          .rejected_count = intake_.rejected_count(),
+          .remap_count = intake_.remap_count()};
 }
 
 bool ContactStream::settled() const {

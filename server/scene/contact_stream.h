@@ -18,6 +18,8 @@ struct ContactStreamSettings {
   double step_s = 0;  ///< the simulator's step: above 0, at most 1
   /// 0 to 10; absent: one step, one block and 5 ms for the network.
   std::optional<double> scheduling_delay_s = std::nullopt;
+  /// Each contact sounds when it comes, with no scheduling delay but its own time offset.
+  bool at_once = false;
   ContactReading reading{};
   RejectionCounts* rejections = nullptr;  ///< as in IntakeSettings
 };
@@ -29,6 +31,7 @@ struct ContactCounts {
   uint64_t late_count = 0;
   uint64_t dropped_count = 0;
   uint64_t rejected_count = 0;
+  uint64_t remap_count = 0;  ///< how many times simulation time was mapped anew
 };
 
 /// The contacts of one simulator that runs now: an intake whose events go through a queue to the
@@ -48,7 +51,8 @@ class ContactStream {
 
   double scheduling_delay_s() const { return intake_.mapping().delay_s; }
 
-  /// The mixer's frame at the arrival of the first step; absent before.
+  /// The mixer's frame that the first step's time is mapped to, less the scheduling delay; absent
+  /// before it has come.
   std::optional<uint64_t> first_frame() const {
     return intake_.step_count() > 0 ? std::optional(intake_.mapping().first_frame) : std::nullopt;
   }

@@ -38,6 +38,7 @@ MixerSettings SettingsOf(const OfflineSettings& settings, SectionThreads& thread
           .most_pending_events = kOfflineQueueCapacity,
           .most_events_per_block = kOfflineQueueCapacity,
           .gain = settings.gain,
+          .full_scale_pa = settings.full_scale_pa,
           .threads = &threads};
 }
 
@@ -74,6 +75,12 @@ absl::StatusOr<std::unique_ptr<OfflineRenderer>> OfflineRenderer::Make(
         absl::StrCat("channel_count is ", settings.channel_count, "; it must be 1 or 2"));
   }
   RETURN_IF_ERROR(ValidateGain(settings.gain));
+  if (!(settings.full_scale_pa >= kLeastFullScalePa &&
+        settings.full_scale_pa <= kMostFullScalePa)) {
+    return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
+                   absl::StrCat("full_scale_pa is ", settings.full_scale_pa, "; it must be ",
+                                kLeastFullScalePa, " to ", kMostFullScalePa));
+  }
   RETURN_IF_ERROR(Validate(settings.space));
   std::unique_ptr<OfflineRenderer> renderer(new OfflineRenderer(settings, bodies, transfers));
   ASSIGN_OR_RETURN(renderer->stream_, renderer->mixer_.OpenStream(kOfflineQueueCapacity));

@@ -15,6 +15,7 @@
 #include "server/scene/scene.h"
 #include "server/scene/sounding_body.h"
 #include "server/scene/sounding_object.h"
+#include "server/synthesis/bank/level.h"
 #include "server/synthesis/mixer.h"
 #include "server/synthesis/render_threads.h"
 
@@ -27,7 +28,8 @@ struct OfflineSettings {
   /// Length of the sound after the last contact; zero: until it stays below -80 dB of full scale,
   /// at most 60 s.
   double tail_s = 0;
-  double gain = 1;  ///< of the whole sound, before the limiter
+  double gain = 1;                      ///< of the whole sound, before the limiter
+  double full_scale_pa = kFullScalePa;  ///< the pressure of a sample of 1
   /// The simulator's step, seconds, above 0 and at most 1.
   double step_s = 1.0 / 60;
   SceneSpace space{};

@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
+#include "server/synthesis/bank/level.h"
 
 namespace carillon {
 namespace {
@@ -133,7 +134,7 @@ absl::StatusOr<SoundingObject> MakeSoundingObject(std::shared_ptr<const Sounding
       sounding, body->shapes,
       OscillatorBankSettings{.sample_rate_hz = settings.sample_rate_hz,
                              .block_frame_count = settings.block_frame_count,
-                             .gain = properties.gain,
+                             .gain = properties.gain * kFullScalePa / settings.full_scale_pa,
                              .directivity = std::move(directivity)});
   ASSIGN_OR_RETURN(const BankId bank, output.mixer.Add(std::move(oscillators), voice, output.bus));
   const double top_hz = std::min(band.highest_hz, settings.sample_rate_hz / 2);

@@ -151,8 +151,9 @@ void Mixer::Take(MixerEvent& event, EventQueue& queue) noexcept {
   Count(statistics_.shed_count, shed_early ? 1 : 0);
   if (!shed_early) ++slot->pending_count;
   if (event.impulse() == nullptr) return;
-  Count(late ? queue.late_count : queue.accepted_count);
-  Count(late ? statistics_.late_count : statistics_.accepted_count);
+  const bool counts_as_late = late && queue.timely;
+  Count(counts_as_late ? queue.late_count : queue.accepted_count);
+  Count(counts_as_late ? statistics_.late_count : statistics_.accepted_count);
 }
 
 /// Whether an impulse is so quiet that keeping and judging it would be a waste: see

@@ -17,6 +17,7 @@
 #include "server/base/spsc_queue.h"
 #include "server/base/thread_role.h"
 #include "server/synthesis/bank/block_mix.h"
+#include "server/synthesis/bank/level.h"
 #include "server/synthesis/bank/oscillator_bank.h"
 #include "server/synthesis/bank_slot.h"
 #include "server/synthesis/bus.h"
@@ -63,6 +64,8 @@ struct MixerSettings {
   const Clock* clock = nullptr;
   double most_load = 0.7;  ///< fraction of real time that rendering may take
   double gain = 1;         ///< of all buses together, before the limiter
+  /// The pressure of a sample of 1. The banks of the mixer are made for it.
+  double full_scale_pa = kFullScalePa;
   /// Threads that render the sections; null: the caller's thread alone. The sound is the same bit
   /// for bit. They must outlive the mixer.
   SectionThreads* threads = nullptr;
@@ -155,9 +158,11 @@ class Mixer {
   /// ended, within 2048 frames. Events already sent to the bank are lost.
   void FadeOut(BankId bank) ABSL_LOCKS_EXCLUDED(kRenderRole);
 
-  /// Opens a stream of events; `capacity` events may wait in it until the mixer takes them.
+  /// Opens a stream of events; `capacity` events may wait in it until the mixer takes them. Unless
+  /// it is `timely`, impulses whose frame has passed count as accepted, not as late.
   /// RESOURCE_EXHAUSTED (TOO_MANY_STREAMS).
-  absl::StatusOr<std::unique_ptr<EventStream>> OpenStream(size_t capacity = 4096)
+  absl::StatusOr<std::unique_ptr<EventStream>> OpenStream(size_t capacity = 4096,
+                                                          bool timely = true)
       ABSL_LOCKS_EXCLUDED(kRenderRole);
 
   /// Frees the banks, voices and queues that Render has retired. A housekeeping thread calls it

@@ -121,8 +121,8 @@ void Mixer::FadeOut(BankId bank) {
   Send({.kind = Command::Kind::kFadeOut, .id = bank});
 }
 
-absl::StatusOr<std::unique_ptr<EventStream>> Mixer::OpenStream(size_t capacity) {
-  auto queue = std::make_shared<EventQueue>(capacity);
+absl::StatusOr<std::unique_ptr<EventStream>> Mixer::OpenStream(size_t capacity, bool timely) {
+  auto queue = std::make_shared<EventQueue>(capacity, timely);
   const MutexLock lock(&control_mutex_);
   if (queues_.size() == settings_.most_streams) {
     return Refusal(absl::StatusCode::kResourceExhausted, "TOO_MANY_STREAMS",

@@ -92,7 +92,7 @@ class CClientTest(DaemonTest):
                 heard.take(2.0)
                 said = striker.communicate("\n")[0]
             self.assertEqual((striker.returncode, said), (0, "1 strikes sounded\n"))
-            self.assertGreater(heard.sound.peak, 1e-3)
+            self.assertGreater(heard.sound.peak, 1e-4)
         failed = subprocess.run([self.folder / "strike", "none.obj"], env=environment, check=False,
                                 stdin=subprocess.DEVNULL, capture_output=True, text=True)
         self.assertEqual(failed.returncode, 1)
@@ -127,7 +127,7 @@ class CClientTest(DaemonTest):
             same = c.render(file.decode(), sample_rate_hz=44100, tail_s=0.5)
             # Equal arrays are one model, from whichever language they come.
             self.assertEqual(c.create_model((VERTICES, TRIANGLES), meshes.MATERIAL).name, model)
-        self.assertGreater(same.peak, 1e-4)
+        self.assertGreater(same.peak, 1e-5)
         numpy.testing.assert_array_equal(samples, same.samples)
 
     def test_mistakes_have_a_code_and_a_reason(self):

@@ -32,7 +32,7 @@ class KillTest(DaemonTest):
         self.restart()
         listed = self.daemon.command("model", "list").stdout
         self.assertIn(model.removeprefix("modalModels/")[:12], listed)
-        self.assertGreater(self.peak_of_a_strike(model), 1e-4)
+        self.assertGreater(self.peak_of_a_strike(model), 1e-5)
 
     def test_job_acknowledged_before_a_kill_is_computed_after_it(self):
         # Another ratio makes it another model than the one above.

@@ -55,7 +55,7 @@ class RefusalTest(DaemonTest):
             object=self.handle, point_m=contact_pb2.Vec3(z=meshes.BAR_SIZE[2]),
             impulse_newton_seconds=contact_pb2.Vec3(z=-0.001))
         heard = self.client.listen(0.2, on_start=lambda: self.client.strike(self.scene, [impulse]))
-        self.assertGreater(max(map(abs, heard.samples)), 1e-4)
+        self.assertGreater(max(map(abs, heard.samples)), 1e-5)
 
     def assert_repairs(self, message):
         """A sentence of what was wrong and, after a colon or semicolon, what to do."""

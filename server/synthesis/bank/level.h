@@ -14,13 +14,19 @@ inline constexpr double kAirDensityKgPerM3 = 1.204;
 inline constexpr double kPascalsPerVolumeVelocity =
     kAirDensityKgPerM3 * (2 * std::numbers::pi * 1000) / (4 * std::numbers::pi * 1.0);
 
-/// The pressure at 1 m that corresponds to full scale: 20 Pa peak, 120 dB above 20 uPa. An aluminum
-/// chime of 0.5 m struck in its middle with 0.02 N s peaks at -14 dB of full scale with a contact
-/// of 1 ms, and at -11 dB with a contact of 0.5 ms.
-inline constexpr double kFullScalePa = 20;
+/// The reference level: the pressure that corresponds to full scale unless a setting says
+/// otherwise. It is 200 Pa peak, 140 dB above 20 uPa, so that a steel box of 23.6 kg that falls
+/// from 1 m on a corner stays below full scale at half a metre. An aluminum chime of 0.5 m struck
+/// in its middle with 0.02 N s peaks at -34 dB of full scale with a contact of 1 ms, and at -31 dB
+/// with one of 0.5 ms.
+inline constexpr double kFullScalePa = 200;
 
-/// Converts the sum of c_m z_m to samples. All objects share this constant, so a struck anvil is
-/// louder than a struck pin.
+/// Bounds of the pressure that a setting may give to full scale: 40 to 180 dB above 20 uPa.
+inline constexpr double kLeastFullScalePa = 0.002;
+inline constexpr double kMostFullScalePa = 20000;
+
+/// Converts the sum of c_m z_m to samples at the reference level. All objects share this constant,
+/// so a struck anvil is louder than a struck pin.
 inline constexpr double kSamplesPerVolumeVelocity = kPascalsPerVolumeVelocity / kFullScalePa;
 
 }  // namespace carillon

@@ -29,9 +29,9 @@ namespace carillon {
 
 struct LanePlan;
 
-/// The largest amplitude that a mode may have: 24 dB above full scale, 144 dB SPL at the reference
-/// distance. One object that is struck beyond all measure, or whose model is wrong, must not drive
-/// the limiter so far that the others are not heard until it has decayed.
+/// The largest amplitude that a mode may have: 24 dB above full scale. One object that is struck
+/// beyond all measure, or whose model is wrong, must not drive the limiter so far that the others
+/// are not heard until it has decayed.
 inline constexpr double kMostAmplitude = 16;
 
 /// Settings of a bank.

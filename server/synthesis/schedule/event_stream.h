@@ -15,9 +15,11 @@ namespace carillon {
 /// The part of an event stream that the mixer shares: the pushing thread produces events, the
 /// rendering thread consumes them.
 struct EventQueue {
-  explicit EventQueue(size_t capacity) : events(capacity) {}
+  explicit EventQueue(size_t capacity, bool is_timely = true)
+      : events(capacity), timely(is_timely) {}
 
   SpscQueue<MixerEvent> events;
+  const bool timely;  ///< false: its impulses are meant for the next block, and are never late
   std::atomic<bool> closed{false};
   std::atomic<uint64_t> accepted_count{0};
   std::atomic<uint64_t> late_count{0};

@@ -106,7 +106,7 @@ TEST_F(AudioApi, RenderGivesFormatSoundAndSummary) {
   EXPECT_EQ(rendering.summary.frame_count(), rendering.sound.size());
   EXPECT_EQ(rendering.summary.accepted_count(), 1U);
   EXPECT_EQ(rendering.summary.rejected_count(), 0U);
-  EXPECT_GT(rendering.summary.peak(), 0.001);
+  EXPECT_GT(rendering.summary.peak(), 0.0001);
 }
 
 TEST_F(AudioApi, ATraceCarriesHowAndFromWhereItIsHeard) {
@@ -234,7 +234,7 @@ TEST_F(AudioApi, ColumnsSoundBitForBitAsTheSameInRows) {
   EXPECT_EQ(by_rows.summary.rejected_count(), 0U);
   EXPECT_EQ(by_rows.summary.accepted_count(), 20U + 16);  // four are of one object
   EXPECT_EQ(by_columns.summary.accepted_count(), 20U + 16);
-  EXPECT_GT(by_rows.summary.peak(), 0.001);
+  EXPECT_GT(by_rows.summary.peak(), 0.0001);
   EXPECT_EQ(by_columns.sound, by_rows.sound);
   EXPECT_NE(by_columns.sound, Render(alone).sound);
 }

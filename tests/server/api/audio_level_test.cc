@@ -11,11 +11,12 @@ namespace {
 class AudioLevel : public ServedDaemon {
  protected:
   /// The summary of a rendering of one object that is struck once along x.
-  v1::RenderSummary RenderStrike(double newton_seconds) {
+  v1::RenderSummary RenderStrike(double newton_seconds, double full_scale_pa = 0) {
     grpc::ClientContext context;
     const auto stream = audio->Render(&context);
     v1::RenderRequest request;
     request.mutable_settings()->set_tail_s(0.6);
+    if (full_scale_pa != 0) request.mutable_settings()->set_full_scale_pa(full_scale_pa);
     stream->Write(request);
     request.mutable_record()->mutable_header()->set_format_version(1);
     stream->Write(request);
@@ -31,9 +32,12 @@ class AudioLevel : public ServedDaemon {
     v1::RenderResponse response;
     while (stream->Read(&response)) {
     }
-    EXPECT_TRUE(stream->Finish().ok());
+    status = stream->Finish();
+    EXPECT_EQ(status.ok(), full_scale_pa >= 0);
     return response.summary();
   }
+
+  grpc::Status status;
 
   v1::GetMixerResponse Mixer() {
     grpc::ClientContext context;
@@ -45,14 +49,27 @@ class AudioLevel : public ServedDaemon {
 
 TEST_F(AudioLevel, ARenderingStatesPressureAndLoudness) {
   const v1::RenderSummary once = RenderStrike(1);
-  EXPECT_GT(once.peak(), 0.001);
-  EXPECT_DOUBLE_EQ(once.peak_pa(), 20 * once.peak());
+  EXPECT_GT(once.peak(), 0.0001);
+  EXPECT_EQ(once.full_scale_pa(), 200);
+  EXPECT_DOUBLE_EQ(once.peak_pa(), 200 * once.peak());
   EXPECT_GE(once.true_peak(), 0.99 * once.peak());
   ASSERT_TRUE(once.has_integrated_lufs() && once.has_loudest_momentary_lufs());
   EXPECT_GE(once.loudest_momentary_lufs(), once.integrated_lufs() - 0.1);
   // Half of the impulse is 6.02 dB less.
   const v1::RenderSummary half = RenderStrike(0.5);
   EXPECT_NEAR(once.loudest_momentary_lufs() - half.loudest_momentary_lufs(), 6.02, 0.01);
+}
+
+TEST_F(AudioLevel, TheReferenceLevelScalesTheSoundAndLeavesThePressure) {
+  const v1::RenderSummary normal = RenderStrike(1);
+  const v1::RenderSummary louder = RenderStrike(1, 20);
+  EXPECT_EQ(louder.full_scale_pa(), 20);
+  EXPECT_NEAR(louder.peak() / normal.peak(), 10, 1e-4);
+  EXPECT_NEAR(louder.peak_pa() / normal.peak_pa(), 1, 1e-5);
+  EXPECT_NEAR(louder.loudest_momentary_lufs() - normal.loudest_momentary_lufs(), 20, 0.01);
+  RenderStrike(0.1, -1);
+  EXPECT_NE(status.error_message().find("INVALID_SETTINGS: full_scale_pa is -1"),
+            std::string::npos);
 }
 
 TEST_F(AudioLevel, ARenderingOfNextToNothingHasNoLoudness) {
@@ -69,6 +86,8 @@ TEST_F(AudioLevel, TheMixerStatesTheLoudnessOfWhatItPlays) {
   ASSERT_EQ(StrikeLive(scene).accepted_count(), 1U);
   while (!mixer.has_momentary_lufs()) mixer = Mixer();
   EXPECT_GT(mixer.momentary_lufs(), -70);
+  EXPECT_EQ(mixer.full_scale_pa(), 200);
+  EXPECT_DOUBLE_EQ(mixer.peak_pa(), 200 * mixer.peak());
   EXPECT_GT(mixer.peak_pa(), 0);
 }
 

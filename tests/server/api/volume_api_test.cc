@@ -72,6 +72,32 @@ class VolumeApi : public ServedDaemon {
     return samples;
   }
 
+  /// Expects that the stream that `act` sends to a scene renders to the samples that are heard, and
+  /// returns its records.
+  template <class Act>
+  std::vector<v1::ContactTraceRecord> ExpectRendersAsHeard(const std::string& scene, Act act) {
+    grpc::ClientContext listening;
+    v1::ListenRequest listen;
+    listen.set_scene(scene);
+    const auto heard = audio->Listen(&listening, listen);
+    v1::ListenResponse block;
+    EXPECT_TRUE(heard->Read(&block));
+    const std::vector<v1::ContactTraceRecord> records = Recorded(scene, act);
+    EXPECT_EQ(records.size(), 3U);
+    const uint64_t first_frame = records[0].header().clock().first_frame();
+    const std::vector<float> rendered = Render(records, 1);
+    std::vector<float> live;
+    while (live.size() < rendered.size() && heard->Read(&block)) {
+      EXPECT_EQ(block.lost_frame_count(), 0U);
+      if (block.block().first_frame() >= first_frame) Append(block.block().samples(), live);
+    }
+    listening.TryCancel();
+    live.resize(rendered.size());
+    EXPECT_GT(*std::ranges::max_element(rendered), 1e-4F);
+    EXPECT_EQ(live, rendered);
+    return records;
+  }
+
   static void Append(const std::string& bytes, std::vector<float>& samples) {
     const size_t before = samples.size();
     samples.resize(before + bytes.size() / sizeof(float));
@@ -161,35 +187,34 @@ TEST_F(VolumeApi, AStemIsTheSceneAloneAndItsRecordedContactsRenderToTheSameSampl
   v1::UpdateSceneRequest change;
   change.set_gain(0.5);
   Update(change, scene);
-  grpc::ClientContext listening;
-  v1::ListenRequest listen;
-  listen.set_scene(scene);
-  const auto heard = audio->Listen(&listening, listen);
-  v1::ListenResponse block;
-  ASSERT_TRUE(heard->Read(&block));
-
-  const std::vector<v1::ContactTraceRecord> records = Recorded(scene, [&] {
+  const std::vector<v1::ContactTraceRecord> records = ExpectRendersAsHeard(scene, [&] {
     StrikeLive(other);
     StrikeLive(scene);
   });
-  ASSERT_EQ(records.size(), 3U);
   EXPECT_EQ(records[0].header().gain(), 0.5);
-  const uint64_t first_frame = records[0].header().clock().first_frame();
-  const std::vector<float> rendered = Render(records, 1);
-  std::vector<float> live;
-  while (live.size() < rendered.size() && heard->Read(&block)) {
-    ASSERT_EQ(block.lost_frame_count(), 0U);
-    if (block.block().first_frame() >= first_frame) Append(block.block().samples(), live);
-  }
-  listening.TryCancel();
-  live.resize(rendered.size());
-  EXPECT_GT(*std::ranges::max_element(rendered), 1e-3F);
-  EXPECT_EQ(live, rendered);
 
   // A gain of the rendering is that much more.
+  const std::vector<float> rendered = Render(records, 1);
   const std::vector<float> half = Render(records, 0.5);
   ASSERT_EQ(half.size(), rendered.size());
   for (size_t n = 0; n < half.size(); ++n) ASSERT_FLOAT_EQ(half[n], 0.5F * rendered[n]);
+}
+
+TEST_F(VolumeApi, AfterAStopASceneSoundsBitForBitAsOneThatNeverSounded) {
+  const std::string scene = SceneWithObject();
+  ASSERT_EQ(StrikeLive(scene).accepted_count(), 1U);
+  v1::GetMixerResponse mixer;
+  const auto ringing = [&] {
+    EXPECT_TRUE(Call(*audio, &v1::AudioService::Stub::GetMixer, {}, mixer).ok());
+    return mixer.active_mode_count();
+  };
+  while (ringing() == 0) {
+  }
+  v1::StopAllResponse stopped;
+  ASSERT_TRUE(Call(*scenes, &v1::SceneService::Stub::StopAll, {}, stopped).ok());
+  while (ringing() > 0) {
+  }
+  ExpectRendersAsHeard(scene, [&] { StrikeLive(scene); });
 }
 
 TEST_F(VolumeApi, BlocksHaveTheSizeAndTheEncodingAskedFor) {

@@ -155,6 +155,71 @@ TEST_F(ContactStreamTest, WhatComesTooLateSoundsAtOnceAndIsCounted) {
   EXPECT_EQ(stream->counts().accepted_count, 1U);
 }
 
+TEST_F(ContactStreamTest, AfterAPauseTimeIsMappedAnewAndContactsAreInTimeAgain) {
+  const auto stream = Open(0.02);
+  const auto step = [&](int number) {
+    ASSERT_TRUE(stream->intake().BeginStep(512 / kRate * number).ok());
+    stream->intake().Strike(SmallImpulse(1));
+    stream->intake().EndStep();
+    Render(512);  // the simulator runs in real time
+  };
+  for (int number = 0; number < 10; ++number) step(number);
+  EXPECT_EQ(stream->counts().late_count, 0U);
+  Render(96000);  // it loads for two seconds
+  for (int number = 10; number < 35; ++number) step(number);
+  EXPECT_EQ(stream->counts().remap_count, 1U);
+  const uint64_t late = stream->counts().late_count;
+  EXPECT_EQ(late, 24U);  // those of a quarter of a second
+  for (int number = 35; number < 50; ++number) step(number);
+  EXPECT_EQ(stream->counts().late_count, late);
+  EXPECT_EQ(stream->counts().accepted_count, 50 - late);
+  EXPECT_EQ(*stream->first_frame() % 128, 0U);
+}
+
+TEST_F(ContactStreamTest, AStallWhoseStepsCatchUpLeavesTheMappingAsItIs) {
+  const auto stream = Open(0.02);
+  ASSERT_TRUE(stream->intake().BeginStep(0).ok());
+  const uint64_t first = *stream->first_frame();
+  Render(48000);
+  // A second's steps come at once, the last of them in time.
+  for (int number = 1; number <= 100; ++number) {
+    ASSERT_TRUE(stream->intake().BeginStep(0.01 * number).ok());
+  }
+  EXPECT_EQ(stream->counts().remap_count, 0U);
+  EXPECT_EQ(stream->first_frame(), first);
+}
+
+TEST_F(ContactStreamTest, ASimulatorSlowerThanRealTimeIsMappedAnewAgainAndAgain) {
+  const auto stream = Open(0.02);
+  for (int number = 0; number < 400; ++number) {
+    ASSERT_TRUE(stream->intake().BeginStep(0.01 * number).ok());
+    stream->intake().Strike(SmallImpulse(1));
+    stream->intake().EndStep();
+    Render(512);  // 10.67 ms of sound for 10 ms
+  }
+  Render(4800);
+  EXPECT_GT(stream->counts().remap_count, 2U);
+  EXPECT_GT(stream->counts().accepted_count, stream->counts().late_count);
+}
+
+TEST_F(ContactStreamTest, WithAtOnceContactsSoundWhenTheyComeAndNoneIsLate) {
+  const auto stream = *scenes_.OpenContactStream(scene_, {.step_s = 0.01, .at_once = true});
+  EXPECT_EQ(stream->scheduling_delay_s(), 0);
+  ASSERT_TRUE(stream->intake().BeginStep(0).ok());
+  Render(kBlock);  // the mixer goes on between the beginning of a step and its contacts
+  stream->intake().Strike(SmallImpulse(1));
+  EXPECT_LE(Onset(Render(640)), 1U);
+  Render(480000);
+  ASSERT_TRUE(stream->intake().BeginStep(0.01).ok());
+  stream->intake().Strike(SmallImpulse(1, 1, 0.001));
+  Render(640);
+  EXPECT_EQ(stream->counts().accepted_count, 2U);
+  EXPECT_EQ(stream->counts().late_count + stream->counts().remap_count, 0U);
+  const auto both = scenes_.OpenContactStream(
+      scene_, {.step_s = 0.01, .scheduling_delay_s = 0.1, .at_once = true});
+  EXPECT_THAT(both.status().ToString(), HasSubstr("INVALID_STREAM"));
+}
+
 TEST_F(ContactStreamTest, TheDelayIsOneStepOneBlockAndFiveMillisecondsUnlessGiven) {
   const auto stream = *scenes_.OpenContactStream(scene_, {.step_s = 1.0 / 60});
   EXPECT_DOUBLE_EQ(stream->scheduling_delay_s(), 1.0 / 60 + kBlock / kRate + 0.005);

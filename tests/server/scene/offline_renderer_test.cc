@@ -164,7 +164,7 @@ TEST_F(OfflineRendererTest, PlacesAreHeardBitForBitAsLiveAndForAnyNumberOfThread
   std::vector<float> live((offline.size() + 255) / 256 * 256);
   mixer.Render(live);
   live.resize(offline.size());
-  EXPECT_GT(*std::ranges::max_element(offline), 0.003);
+  EXPECT_GT(*std::ranges::max_element(offline), 0.0003);
   EXPECT_EQ(offline, live);
   EXPECT_EQ(RenderPlaced(2, mapping, bodies_), offline);
 }

@@ -28,7 +28,7 @@ inline ObjectProperties SmallProperties() {
 }
 
 /// A tetrahedron of 0.1 m with three modes that all move along x, everywhere alike; 1 N s along x
-/// sounds at about -33 dB of full scale.
+/// sounds at about -53 dB of full scale.
 inline std::shared_ptr<const ModalModel> SmallModel() {
   auto model = std::make_shared<ModalModel>();
   model->digest = std::string(64, 'a');

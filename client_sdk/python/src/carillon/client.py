@@ -173,7 +173,7 @@ class Client:
 
     def render(self, trace: Trace | str | os.PathLike[str], **settings: Any) -> Sound:
         """Renders a trace, or a .contacts file, faster than real time. `settings` are fields of RenderSettings:
-        sample_rate_hz, channel_count, tail_s and gain. Raises CarillonError if a contact is rejected."""
+        sample_rate_hz, channel_count, tail_s, gain and full_scale_pa. Raises CarillonError if a contact is rejected."""
         records = (trace if isinstance(trace, Trace) else Trace.read(trace)).records()
         return self._render(records, audio_service_pb2.RenderSettings(**settings))
 

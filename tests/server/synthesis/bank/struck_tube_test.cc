@@ -177,13 +177,13 @@ TEST(StruckTube, LoudnessDoesNotDependOnTheAngleThoughTheMeshSplitsThePairs) {
 }
 
 TEST(StruckTube, ComesOutWellBelowFullScale) {
-  // Struck in the middle: its odd modes ring at 0.3 to 0.36 of full scale each; the contact leaves
+  // Struck in the middle: its odd modes ring at 0.03 to 0.036 of full scale each; the contact leaves
   // little of all but the first.
   const auto sound = StrikeTube(
       kAluminum, {.ring = Tube::kMiddle, .duration_s = 1e-3, .impulse_newton_seconds = 0.02});
   const double peak = *std::ranges::max_element(sound);
-  EXPECT_GT(20 * std::log10(peak), -17);
-  EXPECT_LT(20 * std::log10(peak), -11);
+  EXPECT_GT(20 * std::log10(peak), -37);
+  EXPECT_LT(20 * std::log10(peak), -31);
 }
 
 /// Pitch and level of the first mode against plain aluminum; undamped, so that levels compare.
