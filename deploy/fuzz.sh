@@ -23,6 +23,7 @@ fi
 build=$root/build/fuzz
 mkdir -p "$build/found"
 export ASAN_OPTIONS=${ASAN_OPTIONS-detect_stack_use_after_return=1:allocator_may_return_null=0}
+export LSAN_OPTIONS=${LSAN_OPTIONS-suppressions=$root/deploy/sanitizers/lsan.txt:print_suppressions=0}
 failed=()
 for name in "${names[@]}"; do
   mkdir -p "$build/corpora/$name"

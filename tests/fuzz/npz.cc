@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Reads the input as a modal model in NumPy's format.
+#include "client_sdk/interchange/npz_model.h"
 
 #include <cstdint>
 
