@@ -24,8 +24,8 @@ if(CARILLON_SANITIZE)
   endif()
 endif()
 
-# Our own code only: generated protobuf code is compiled without them. clang, which makes the fuzzers, knows others by the
-# same names.
+# Our own code only: generated protobuf code is compiled without them. The names are those of g++; clang, which compiles
+# the fuzzers, means others by some of them.
 add_library(carillon_warnings INTERFACE)
 if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
   target_compile_options(carillon_warnings INTERFACE -Wall -Wextra -Wpedantic -Wconversion -Wshadow

@@ -67,7 +67,8 @@ std::string PeerNameOf(int connection, const sockaddr_storage& address, uint64_t
 }
 
 std::string ProcessOfPeer(const std::string& peer) {
-  const bool is_known = absl::StartsWith(peer, "unix:pid-") && !absl::StartsWith(peer, "unix:pid-0/");
+  const bool is_known =
+      absl::StartsWith(peer, "unix:pid-") && !absl::StartsWith(peer, "unix:pid-0/");
   return is_known ? peer.substr(0, peer.find('/')) : peer;
 }
 

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Reads the input as an access file, and looks its whole text up as a token and as a name.
-#include "server/api/access_table.h"
-
 #include <sys/stat.h>
 
 #include <cstdint>
 #include <string>
 
+#include "server/api/access_table.h"
 #include "tests/fuzz/memory_file.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {

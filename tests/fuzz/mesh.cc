@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: AGPL-3.0-or-later
+// SPDX-License-Identifier: Apache-2.0
 // Reads the input as a mesh of the format that the build defines.
 #include <cstdint>
 #include <string>

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Reads the input as a modal model in NumPy's format.
-#include "client_sdk/interchange/npz_model.h"
-
 #include <cstdint>
 
+#include "client_sdk/interchange/npz_model.h"
 #include "tests/fuzz/memory_file.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Runs a fuzzer's target once for each file of its corpus.
+#include <gtest/gtest.h>
+
 #include <cstdint>
 #include <filesystem>
-
-#include <gtest/gtest.h>
 
 #include "tests/server/mode_database/sample_model.h"
 

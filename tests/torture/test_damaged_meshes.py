@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""carillon-precompute reads damaged mesh files: each ends with a model or a reason, within bounds of time and memory."""
+"""carillon-precompute reads damaged mesh files: each ends with a model or a reason, in bounded time and memory."""
 
 import collections
 import os
@@ -60,8 +60,8 @@ class DamagedMeshTest(torture.ScratchTest):
     def decompose(self, mesh_format, data):
         """The reason of the refusal, or "MODEL"."""
         (self.folder / "in").write_bytes(data)
-        command = [PROGRAM, "in", "--format", mesh_format, "--out", "out", "--material", "chime_aluminum", "--keep", "4",
-                   "--nodes", "50", "--threads", "1"]
+        command = [PROGRAM, "in", "--format", mesh_format, "--out", "out", "--material", "chime_aluminum",
+                   "--keep", "4", "--nodes", "50", "--threads", "1"]
         ended = subprocess.run(command, cwd=self.folder, capture_output=True, timeout=LIMIT_S, check=False)
         if ended.returncode == 0:
             return "MODEL"
