@@ -11,6 +11,7 @@
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 #include "server/api/bearer_token.h"
+#include "server/api/peer_name.h"
 
 namespace carillon {
 namespace {
@@ -104,7 +105,7 @@ absl::StatusOr<Principal> AccessControl::Identify(const grpc::CallbackServerCont
 }
 
 std::string AccessControl::ClientOf(const Principal& caller) const {
-  if (caller.name == kLocalCaller) return caller.connection;
+  if (caller.name == kLocalCaller) return ProcessOfPeer(caller.connection);
   if (caller.name == table()->anybody().name) return AddressOfPeer(caller.connection);
   return caller.name;
 }

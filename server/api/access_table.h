@@ -27,7 +27,8 @@ struct Principal {
   unsigned roles = 0;        ///< bits of Role
   std::string connection{};  ///< of this call, as gRPC names its peer
   /// Whose share of scenes, streams and jobs it uses: the caller, if it has shown a credential;
-  /// else the connection, or, where the network reaches the daemon, the address that it comes from.
+  /// else the process behind a Unix socket, a connection over TCP, or, where the network reaches
+  /// the daemon, the address that it comes from.
   std::string client{};
 
   bool has(Role role) const {

@@ -12,6 +12,7 @@
 #include <cstddef>
 #include <cstring>
 
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
 #include "absl/strings/strip.h"
@@ -63,6 +64,12 @@ std::string PeerNameOf(int connection, const sockaddr_storage& address, uint64_t
     default:
       return absl::StrCat("unix:pid-", ProcessBehind(connection), "/", number);
   }
+}
+
+std::string ProcessOfPeer(const std::string& peer) {
+  const bool is_known =
+      absl::StartsWith(peer, "unix:pid-") && !absl::StartsWith(peer, "unix:pid-0/");
+  return is_known ? peer.substr(0, peer.find('/')) : peer;
 }
 
 NamedPeer::NamedPeer(const std::string& peer) {

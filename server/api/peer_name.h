@@ -13,6 +13,10 @@ namespace carillon {
 /// of the other end; `number` tells Unix connections apart.
 std::string PeerNameOf(int connection, const sockaddr_storage& address, uint64_t number);
 
+/// The process behind a Unix connection, "unix:pid-PID"; the whole name where the system does not
+/// know the process, as beyond a namespace of processes, and of other connections.
+std::string ProcessOfPeer(const std::string& peer);
+
 /// While it exists, gRPC learns on this thread that the other end of a Unix connection has the name
 /// that PeerNameOf made.
 ///

@@ -59,9 +59,18 @@ class Client:
 
 
 class ClientTest(torture.ServedTest):
-    def another(self):
-        """The stubs of a client with a connection of its own, which its `close` closes."""
-        return Client(self.daemon.server)
+    def another(self, server=None):
+        """The stubs of a client with a connection of its own, which its `close` closes; over TCP it has a share of its
+        own, too."""
+        client = Client(server or self.daemon.server)
+        self.addCleanup(client.close)
+        return client
+
+    def serve_over_tcp(self, *arguments):
+        """Returns the address."""
+        address = f"127.0.0.1:{free_port()}"
+        self.serve("--listen", address, *arguments)
+        return address
 
     def crash(self, clients, scenes):
         """So many clients at a time make so many scenes each, and are killed."""
@@ -111,7 +120,6 @@ class ClientTest(torture.ServedTest):
         first.close()
         torture.wait_until(lambda: self.scenes()[0].HasField("ends_in_s"), 30)
         again = self.another()
-        self.addCleanup(again.close)
         again.scenes.ListObjects(scene_service_pb2.ListObjectsRequest(scene=scene))
         self.assertTrue(self.scenes()[0].HasField("ends_in_s"))
         again.scenes.UpdateListener(scene_service_pb2.UpdateListenerRequest(scene=scene, pose=contact_pb2.Pose()))
@@ -128,7 +136,7 @@ class ClientTest(torture.ServedTest):
         self.assertEqual(self.daemon.command("scene", "list").stdout, f"{kept}  0 objects  gain 1  kept\n")
 
     def test_one_client_does_not_shut_out_others(self):
-        self.serve()
+        tcp = self.serve_over_tcp()
         taken = [self.create() for _ in range(SCENES // 2)]
         self.assertEqual(self.refused(self.create), "CLIENT_LIMIT_REACHED")
         calls = [self.client.audio.Listen(audio_service_pb2.ListenRequest()) for _ in range(16)]
@@ -136,8 +144,10 @@ class ClientTest(torture.ServedTest):
             next(call)
         self.assertEqual(self.refused(lambda: next(self.client.audio.Listen(audio_service_pb2.ListenRequest()))),
                          "CLIENT_LIMIT_REACHED")
-        other = self.another()
-        self.addCleanup(other.close)
+        same = self.another()
+        self.assertEqual(self.refused(lambda: same.scenes.CreateScene(scene_service_pb2.CreateSceneRequest())),
+                         "CLIENT_LIMIT_REACHED")
+        other = self.another(tcp)
         self.assertEqual(other.scenes.CreateScene(scene_service_pb2.CreateSceneRequest()).name,
                          f"scenes/{len(taken) + 1}")
         next(other.audio.Listen(audio_service_pb2.ListenRequest()))
@@ -145,7 +155,7 @@ class ClientTest(torture.ServedTest):
         self.create()
 
     def test_a_flood_of_urgent_jobs_does_not_hold_up_another_client(self):
-        self.serve("--workers", "1", "--queue-limit", "64")
+        tcp = self.serve_over_tcp("--workers", "1", "--queue-limit", "64")
         mesh_digest = self.client.upload(meshes.bar())
 
         def request(priority, nodes):
@@ -161,8 +171,7 @@ class ClientTest(torture.ServedTest):
                 reason = error.details().split(":")[0]
                 break
         self.assertEqual(reason, "CLIENT_LIMIT_REACHED")
-        other = self.another()
-        self.addCleanup(other.close)
+        other = self.another(tcp)
         begin_s = time.monotonic()
         self.client.wait(other.models.CreateModalModel(request(0, 500)).job)
         taken_s = time.monotonic() - begin_s

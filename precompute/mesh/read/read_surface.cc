@@ -54,11 +54,18 @@ std::span<aiMesh* const> Meshes(const aiScene& scene) { return {scene.mMeshes, s
 
 std::span<const aiFace> Faces(const aiMesh& mesh) { return {mesh.mFaces, mesh.mNumFaces}; }
 
-/// assimp passes on indices of a PLY file as they are; its own steps would read past the vertices.
+/// assimp passes on faces of a PLY file as they are; its own steps would read past the vertices,
+/// and abort at a face without any.
 absl::Status CheckIndices(const aiScene& scene) {
   size_t face_number = 0;
   for (const aiMesh* mesh : Meshes(scene)) {
     for (const aiFace& face : Faces(*mesh)) {
+      if (face.mNumIndices == 0) {
+        return RefuseSurface("MESH_UNREADABLE",
+                             absl::StrCat("face ", face_number,
+                                          " (counted from zero) names no vertices: export the mesh "
+                                          "again"));
+      }
       for (const unsigned index : std::span(face.mIndices, face.mNumIndices)) {
         if (index < mesh->mNumVertices) continue;
         return RefuseSurface("MESH_INDEX_OUT_OF_RANGE",

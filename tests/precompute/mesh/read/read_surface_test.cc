@@ -215,6 +215,15 @@ TEST_F(ReadSurfaceTest, ACountBeyondTheFileIsRefusedWithoutRoomForIt) {
               HasSubstr("MESH_UNREADABLE: line 9: the file ends within vertex 0"));
 }
 
+TEST_F(ReadSurfaceTest, AFaceWithoutVerticesIsRefused) {
+  EXPECT_THAT(Refused("ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\n"
+                      "property float y\nproperty float z\nelement face 2\n"
+                      "property list uchar int vertex_indices\nend_header\n"
+                      "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n0\n",
+                      "ply"),
+              HasSubstr("face 1 (counted from zero) names no vertices"));
+}
+
 /// A glTF of one tetrahedron whose edges along the axes are 1 m long, twice as large in its scene;
 /// `uri` has its 60 bytes.
 std::string TetrahedronInGltf(const std::string& uri) {
