@@ -36,6 +36,13 @@ v1::Material ToProto(const ObjectProperties& properties, double model_poisson_ra
   return material;
 }
 
+v1::RadiationModel RadiationOf(const SoundingObject& object) {
+  if (object.transfer == nullptr) return v1::RADIATION_MODEL_PAPER_COUPLING;
+  return object.properties.radiation == RadiationModel::kModesOnly
+             ? v1::RADIATION_MODEL_MODES_ONLY
+             : v1::RADIATION_MODEL_RADIATED_POWER;
+}
+
 }  // namespace
 
 absl::StatusOr<ObjectProperties> ToObjectProperties(const v1::Material& material, double size,
@@ -65,6 +72,8 @@ RadiationModel FromProto(v1::RadiationModel radiation) {
       return RadiationModel::kPaperCoupling;
     case v1::RADIATION_MODEL_RADIATED_POWER:
       return RadiationModel::kRadiatedPower;
+    case v1::RADIATION_MODEL_MODES_ONLY:
+      return RadiationModel::kModesOnly;
     default:
       return RadiationModel::kDefault;
   }
@@ -100,8 +109,7 @@ v1::SoundingObject ToProto(uint64_t scene, const PlacedObject& placed) {
   proto.set_lowest_frequency_hz(object.lowest_frequency_hz);
   proto.set_highest_frequency_hz(object.highest_frequency_hz);
   if (object.complete_to_hz) proto.set_complete_to_hz(*object.complete_to_hz);
-  proto.set_radiation(object.transfer == nullptr ? v1::RADIATION_MODEL_PAPER_COUPLING
-                                                 : v1::RADIATION_MODEL_RADIATED_POWER);
+  proto.set_radiation(RadiationOf(object));
   if (object.properties.pose) *proto.mutable_pose() = ToProto(*object.properties.pose);
   return proto;
 }

@@ -123,6 +123,39 @@ bool AreHarmonics(const std::vector<uint32_t>& first, const std::vector<uint32_t
   return true;
 }
 
+/// Whether the transfer says how a body radiates that moves freely as a whole.
+bool HasRigidBody(const v1::TransferHeader& header) {
+  return header.settings().fixtures_size() == 0 && header.rigid_body().motions_size() > 0;
+}
+
+bool IsPhysical(const v1::RigidBody& body) {
+  bool good = body.motions_size() == 6 && body.inertia_kg_m2_size() == 6 &&
+              IsPositive(body.volume_m3()) && std::isfinite(body.center_of_mass_m().x()) &&
+              std::isfinite(body.center_of_mass_m().y()) &&
+              std::isfinite(body.center_of_mass_m().z());
+  const auto finite = [](double value) { return std::isfinite(value); };
+  good = good && std::ranges::all_of(body.inertia_kg_m2(), finite);
+  for (const v1::RigidMotion& motion : body.motions()) {
+    good = good && std::isfinite(motion.radius_m()) && motion.radius_m() >= 0 &&
+           motion.strengths_size() == 9 && std::ranges::all_of(motion.strengths(), finite);
+  }
+  return good;
+}
+
+RigidRadiation RigidOf(const v1::RigidBody& body) {
+  RigidRadiation rigid{
+      .volume_m3 = body.volume_m3(),
+      .center_of_mass_m = {body.center_of_mass_m().x(), body.center_of_mass_m().y(),
+                           body.center_of_mass_m().z()}};
+  std::ranges::copy(body.inertia_kg_m2(), rigid.inertia_kg_m2.begin());
+  for (int i = 0; i < 6; ++i) {
+    RigidRadiation::Motion& motion = rigid.motions[static_cast<size_t>(i)];
+    motion.radius_m = body.motions(i).radius_m();
+    std::ranges::copy(body.motions(i).strengths(), motion.strengths.begin());
+  }
+  return rigid;
+}
+
 /// Turns the coefficients c_lm into those of the far pattern, of unit power.
 void SetPatterns(const std::vector<float>& coefficients, Transfer& transfer) {
   const size_t count = transfer.harmonics.size();
@@ -258,6 +291,7 @@ absl::Status StoredTransfer::CheckNumbers() const {
   const std::vector<uint32_t> first = Array<uint32_t>(kFirst);
   good = good && first.front() == 0 && first.back() == sizes.harmonics &&
          std::ranges::is_sorted(first) && AreHarmonics(first, Array<uint32_t>(kHarmonics));
+  good = good && (!HasRigidBody(header_) || IsPhysical(header_.rigid_body()));
   if (good) return absl::OkStatus();
   return Malformed("a number is not finite, out of range or out of order");
 }
@@ -285,6 +319,7 @@ Transfer StoredTransfer::Decode() const {
   SetPatterns(Array<float>(kCoefficients), transfer);
   EstimateMissing(Eigenvalues(), Array<uint32_t>(kStates), Array<float>(kNormalEnergies),
                   transfer.power_integrals);
+  if (HasRigidBody(header_)) transfer.rigid = RigidOf(header_.rigid_body());
   return transfer;
 }
 

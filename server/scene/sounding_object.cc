@@ -88,6 +88,28 @@ std::optional<HeardDirectivity> DirectivityOf(const std::shared_ptr<const Transf
                           .near_field = voice->hearing().near_field};
 }
 
+/// The body whose acceleration sounds; absent: its modes alone do.
+std::optional<MovedBody> MovedBodyOf(const Transfer* transfer, const SoundingBody& body,
+                                     const ObjectProperties& properties) {
+  if (transfer == nullptr || !transfer->rigid) return std::nullopt;
+  if (properties.radiation == RadiationModel::kModesOnly) return std::nullopt;
+  const RigidRadiation& rigid = *transfer->rigid;
+  RigidBody moved{.volume_m3 = rigid.volume_m3,
+                  .center_of_mass_m = rigid.center_of_mass_m,
+                  .inertia_kg_m2 = rigid.inertia_kg_m2};
+  for (size_t i = 0; i < rigid.motions.size(); ++i) {
+    moved.motions[i] = {.radius_m = rigid.motions[i].radius_m,
+                        .strengths = rigid.motions[i].strengths};
+  }
+  return MovedBody{.body = moved,
+                   .density_kg_per_m3 = properties.material.density_kg_per_m3,
+                   .size = properties.material.size,
+                   .vertices = body.model->vertices,
+                   .owner = body.model,
+                   .air_density_kg_per_m3 = transfer->air_density_kg_per_m3,
+                   .sound_speed_m_per_s = transfer->sound_speed_m_per_s};
+}
+
 /// Returns the frequency up to which the model is complete, unless that is the top of the band.
 std::optional<double> CompleteTo(const ModalModel& model, const SoundingMaterial& material,
                                  double top_hz) {
@@ -135,7 +157,8 @@ absl::StatusOr<SoundingObject> MakeSoundingObject(std::shared_ptr<const Sounding
       OscillatorBankSettings{.sample_rate_hz = settings.sample_rate_hz,
                              .block_frame_count = settings.block_frame_count,
                              .gain = properties.gain * kFullScalePa / settings.full_scale_pa,
-                             .directivity = std::move(directivity)});
+                             .directivity = std::move(directivity),
+                             .moved = MovedBodyOf(transfer.get(), *body, properties)});
   ASSIGN_OR_RETURN(const BankId bank, output.mixer.Add(std::move(oscillators), voice, output.bus));
   const double top_hz = std::min(band.highest_hz, settings.sample_rate_hz / 2);
   return SoundingObject{.body = std::move(body),

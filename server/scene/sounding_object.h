@@ -23,7 +23,9 @@ namespace carillon {
 enum class RadiationModel {
   kDefault,        ///< kRadiatedPower if a transfer is stored, otherwise kPaperCoupling
   kPaperCoupling,  ///< every mode radiates as well as a plane wave does, without damping by it
-  kRadiatedPower,  ///< each mode radiates, and is damped, by the power of a stored transfer
+  kRadiatedPower,  ///< each mode radiates, and is damped, by the power of a stored transfer, and a
+                   ///< free body's own acceleration sounds
+  kModesOnly,      ///< as kRadiatedPower, without the sound of the acceleration
 };
 
 /// Material, loudness, place and radiation of an object.

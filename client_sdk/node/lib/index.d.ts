@@ -34,7 +34,7 @@ export type Pose = Vector | { position: Vector; orientation?: Rotation };
 export type Material = string | MaterialMessage;
 /** A name of the catalogue, such as "wood", or figures. */
 export type Striker = string | HertzContact;
-export type Radiation = 'paper_coupling' | 'radiated_power';
+export type Radiation = 'paper_coupling' | 'radiated_power' | 'modes_only';
 export type ObjectLike = number | SoundingObject;
 /** A file, or metres and indices that count from zero. */
 export type Mesh = string | { vertices: Table; triangles: Table };

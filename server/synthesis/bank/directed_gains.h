@@ -74,6 +74,9 @@ class DirectedGains {
   /// The centre from which bearings are measured, in the object's frame.
   const std::array<double, 3>& center_m() const noexcept { return center_m_; }
 
+  /// The bearing that the newest gains belong to.
+  const Bearing& bearing() const noexcept { return bearing_; }
+
   /// Terms of the sums that all gains together take.
   size_t term_count() const noexcept { return term_count_; }
 

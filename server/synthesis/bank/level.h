@@ -29,4 +29,10 @@ inline constexpr double kMostFullScalePa = 20000;
 /// so a struck anvil is louder than a struck pin.
 inline constexpr double kSamplesPerVolumeVelocity = kPascalsPerVolumeVelocity / kFullScalePa;
 
+/// The largest amplitude that a mode or a body's acceleration noise may have: 24 dB above full
+/// scale, 144 dB SPL at the reference distance. One object that is struck beyond all measure, or
+/// whose model is wrong, must not drive the limiter so far that the others are not heard until it
+/// has decayed.
+inline constexpr double kMostAmplitude = 16;
+
 }  // namespace carillon

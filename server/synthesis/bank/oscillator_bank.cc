@@ -3,7 +3,9 @@
 #include "server/synthesis/bank/oscillator_bank.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <span>
 #include <utility>
 
 #include "server/synthesis/schedule/work_budget.h"
@@ -24,20 +26,43 @@ bool OscillatorBank::out_of_spectrum() const noexcept {
 }
 
 bool OscillatorBank::RenderAdd(BlockMix& mix) noexcept {
-  if (silent()) return true;
+  RenderAcceleration(mix);
+  return RenderModes(mix);
+}
+
+bool OscillatorBank::RenderAddInTime(BlockMix& mix) noexcept {
+  RenderAcceleration(mix);
+  return RenderModesInTime(mix);
+}
+
+/// The acceleration's sound has the listener's direction already, so that it is in both renderings
+/// of a block whose gains move.
+void OscillatorBank::RenderAcceleration(BlockMix& mix) noexcept {
+  if (moved_ == nullptr || !moved_->active()) return;
+  std::array<float, kMostBlockFrames> sound{};
+  moved_->RenderAdd(std::span(sound).first(block_frame_count_));
+  const auto add = [&](LaneMix& lanes) {
+    for (size_t n = 0; n < block_frame_count_; ++n) lanes.frames()[n] += sound[n];
+  };
+  add(mix.lanes());
+  if (gains_move()) add(mix.fading(block_frame_count_));
+}
+
+bool OscillatorBank::RenderModes(BlockMix& mix) noexcept {
+  if (modes_silent()) return true;
   if (!struck() && !force_.driving()) {
     if (ringing_ != Ringing::kInTime && !mix.any_begins()) {
       block_.phase = Phase::kWaiting;  // a refused onset may have begun the block
       return true;
     }
     BeginBlock(mix);
-    return RenderAddInTime(mix);
+    return RenderModesInTime(mix);
   }
   BeginStrikes(mix);
   return FinishStruck(mix);
 }
 
-bool OscillatorBank::RenderAddInTime(BlockMix& mix) noexcept {
+bool OscillatorBank::RenderModesInTime(BlockMix& mix) noexcept {
   const auto output = [this](LaneMix& lanes, const ring_kernel::Gains& gains) {
     return ring_kernel::Output{.sums = Sums(lanes.nodes(), block_frame_count_, lanes),
                                .gains = gains};
@@ -132,6 +157,7 @@ void OscillatorBank::Silence() noexcept {
 }
 
 void OscillatorBank::SilenceLanes() noexcept {
+  if (moved_ != nullptr) moved_->Silence();
   awake_changed_ = true;
   lanes_.Silence({0, lane_count_});
   for (RingingSegment& segment : segments_) segment.awake_count = 0;

@@ -12,8 +12,10 @@
 
 #include "absl/base/thread_annotations.h"
 #include "server/base/thread_role.h"
+#include "server/synthesis/bank/acceleration_noise.h"
 #include "server/synthesis/bank/block_mix.h"
 #include "server/synthesis/bank/directed_gains.h"
+#include "server/synthesis/bank/level.h"
 #include "server/synthesis/bank/shape_table.h"
 #include "server/synthesis/bank/sounding_modes.h"
 #include "server/synthesis/bank/sustained_force.h"
@@ -29,11 +31,6 @@ namespace carillon {
 
 struct LanePlan;
 
-/// The largest amplitude that a mode may have: 24 dB above full scale. One object that is struck
-/// beyond all measure, or whose model is wrong, must not drive the limiter so far that the others
-/// are not heard until it has decayed.
-inline constexpr double kMostAmplitude = 16;
-
 /// Settings of a bank.
 struct OscillatorBankSettings {
   double sample_rate_hz = 48000;
@@ -44,6 +41,9 @@ struct OscillatorBankSettings {
   /// The directions in which the modes radiate. With them the bank must be rendered apart
   /// (BlockMix), and rings in the time domain only; absent: in all directions equally.
   std::optional<HeardDirectivity> directivity = std::nullopt;
+  /// The body whose acceleration sounds in each blow, with the vertices of the shape table; absent:
+  /// its modes alone sound.
+  std::optional<MovedBody> moved = std::nullopt;
 };
 
 /// All modes of one sounding object, each a decaying complex exponential (the paper, 3.4):
@@ -133,7 +133,7 @@ class OscillatorBank {
 
   /// True: rendering the bank would add nothing.
   bool silent() const noexcept {
-    return !struck() && ringing_ == Ringing::kNowhere && !force_.driving();
+    return modes_silent() && (moved_ == nullptr || !moved_->active());
   }
 
   /// Modes that still ring.
@@ -212,6 +212,9 @@ class OscillatorBank {
   OscillatorBank(const LanePlan& plan, const SoundingModes& sounding, ShapeTable shapes,
                  const OscillatorBankSettings& settings);
 
+  bool modes_silent() const noexcept {
+    return !struck() && ringing_ == Ringing::kNowhere && !force_.driving();
+  }
   bool struck() const noexcept { return block_.phase >= Phase::kStruck; }
 
   void BeginBlock(BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
@@ -222,6 +225,10 @@ class OscillatorBank {
       const TrianglePoint& at, const std::array<float, 3>& vector) const noexcept;
   void AddVertex(size_t vertex, float weight, const std::array<float, 3>& vector,
                  strike_kernel::Projection& projection) const noexcept;
+  bool RenderModes(BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  bool RenderModesInTime(BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  void RenderAcceleration(BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  bool Accelerate(bool struck, Pulse pulse, size_t offset, float lead_frames) noexcept;
   void SetSegments(const LanePlan& plan);
   void MeasureLoudness(const LanePlan& plan);
   double TimeWork(size_t lane_count) const noexcept;
@@ -278,6 +285,7 @@ class OscillatorBank {
   LaneArrays lanes_;
   SustainedForce force_;
   std::unique_ptr<DirectedGains> gains_;
+  std::unique_ptr<AccelerationNoise> moved_;
 };
 
 /// The SIMD target in use on this machine ("AVX3", "AVX2", "SSE4", "NEON", ...).

@@ -129,6 +129,10 @@ OscillatorBank::OscillatorBank(const LanePlan& plan, const SoundingModes& soundi
   }
   MeasureLoudness(plan);
   if (settings.directivity) SetDirectivity(sounding, plan, settings);
+  if (!settings.moved) return;
+  assert(settings.moved->vertices.size() == shapes_.vertex_count());
+  moved_ = std::make_unique<AccelerationNoise>(*settings.moved, settings.sample_rate_hz,
+                                               settings.gain / kFullScalePa);
 }
 
 void OscillatorBank::SetDirectivity(const SoundingModes& sounding, const LanePlan& plan,

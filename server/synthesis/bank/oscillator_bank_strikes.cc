@@ -91,18 +91,24 @@ bool OscillatorBank::StrikeMerged(std::span<const DueEvent> events, BlockMix& mi
     if (weight > most_weight) shape = impulse->pulse;
     most_weight = std::max(most_weight, weight);
     AddVertex(nearest, 1, impulse->impulse_newton_seconds, projection);
+    if (moved_ != nullptr) {
+      moved_->Push({.vertices = {nearest, nearest, nearest}, .weights = {1, 0, 0}},
+                   impulse->impulse_newton_seconds);
+    }
     if (projection.row_count < projection.rows.size()) continue;
     strike_kernel::Project(projection, modal_impulses);
     projection.row_count = 0;
     projection.add = true;
   }
-  if (!(weight_sum > 0) || !std::isfinite(weight_sum)) return false;
+  if (!(weight_sum > 0) || !std::isfinite(weight_sum)) return Accelerate(false, {}, 0, 0);
   if (projection.row_count > 0) strike_kernel::Project(projection, modal_impulses);
   const double time = time_sum / weight_sum;
   const double offset = std::max(std::ceil(time), 0.0);
   const Pulse pulse = Pulse::OfVariance(static_cast<float>(variance_sum / weight_sum), shape);
-  return StrikeModes({modal_impulses, column_count_}, static_cast<size_t>(offset),
-                     OnsetOf(static_cast<float>(offset - time), pulse), mix);
+  const auto lead_frames = static_cast<float>(offset - time);
+  const bool struck = StrikeModes({modal_impulses, column_count_}, static_cast<size_t>(offset),
+                                  OnsetOf(lead_frames, pulse), mix);
+  return Accelerate(struck, pulse, static_cast<size_t>(offset), lead_frames);
 }
 
 bool OscillatorBank::Strike(const SurfaceImpulse& impulse, size_t offset, float lead_frames,
@@ -112,8 +118,21 @@ bool OscillatorBank::Strike(const SurfaceImpulse& impulse, size_t offset, float 
   if (!projection) return false;
   float* modal_impulses = mix.batch().modal_impulses();
   strike_kernel::Project(*projection, modal_impulses);
-  return StrikeModes({modal_impulses, column_count_}, offset, OnsetOf(lead_frames, impulse.pulse),
-                     mix);
+  if (moved_ != nullptr) moved_->Push(impulse.at, impulse.impulse_newton_seconds);
+  const bool struck = StrikeModes({modal_impulses, column_count_}, offset,
+                                  OnsetOf(lead_frames, impulse.pulse), mix);
+  return Accelerate(struck, impulse.pulse, offset, lead_frames);
+}
+
+/// Begins the sound of the acceleration by the impulses that were pushed, if they `struck` the
+/// modes, too; returns that.
+bool OscillatorBank::Accelerate(bool struck, Pulse pulse, size_t offset,
+                                float lead_frames) noexcept {
+  if (moved_ == nullptr) return struck;
+  const Bearing* bearing = gains_ == nullptr ? nullptr : &gains_->bearing();
+  if (struck) moved_->Begin(pulse, offset, lead_frames, bearing);
+  moved_->Forget();
+  return struck;
 }
 
 bool OscillatorBank::StrikeModes(std::span<const float> modal_impulses, size_t offset,
@@ -131,7 +150,7 @@ bool OscillatorBank::StrikeModes(std::span<const float> modal_impulses, size_t o
       strike_kernel::Excite(lanes_, lane_count_, modal_impulses.data(), onset, batch.ahead,
                             batch.re(batch.count, lane_count_), batch.im(batch.count, lane_count_));
   if (finite) NoteOnset(offset, batch);
-  if (silent()) block_.phase = Phase::kWaiting;  // it is not rendered in this block
+  if (modes_silent()) block_.phase = Phase::kWaiting;  // they are not rendered
   return finite;
 }
 
@@ -145,7 +164,7 @@ bool OscillatorBank::AddForce(const SurfaceForce& force) noexcept {
 bool OscillatorBank::ApplyKnot(const ForceKnot& knot, size_t offset, BlockMix& mix) noexcept {
   BeginStrikes(mix);
   StrikeBatch& batch = mix.batch();
-  const bool silent_before = silent();
+  const bool silent_before = modes_silent();
   offset = NotBeforeTheLast(offset, batch);
   RenderStrikes(offset, mix);
   const bool finite =

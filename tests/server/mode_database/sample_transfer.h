@@ -22,6 +22,8 @@ struct SampleRadiation {
   std::vector<float> power_integrals{};
   std::vector<float> normal_energies{};  ///< empty: all one
   std::vector<uint32_t> harmonics{};     ///< one of each mode; empty: l = 0
+  v1::RigidBody rigid{};
+  bool fixed = false;  ///< the model has a boundary condition
 };
 
 template <typename T>
@@ -55,6 +57,21 @@ inline std::string Zeros(const TransferSizes& sizes, size_t array) {
   return std::string(bytes, '\0');
 }
 
+/// A ball of 5 cm that translates.
+inline v1::RigidBody SampleRigidBody() {
+  v1::RigidBody body;
+  body.set_volume_m3(5.236e-4);
+  for (const double moment : {5.2e-7, 5.2e-7, 5.2e-7, 0.0, 0.0, 0.0}) {
+    body.add_inertia_kg_m2(moment);
+  }
+  for (const int harmonic : {3, 1, 2, 0, 0, 0}) {
+    v1::RigidMotion& motion = *body.add_motions();
+    motion.set_radius_m(0.05);
+    for (int i = 0; i < 9; ++i) motion.add_strengths(harmonic > 0 && i == harmonic ? 2.05 : 0);
+  }
+  return body;
+}
+
 /// The stored form of a transfer of `model`, each mode with one harmonic.
 inline std::string SampleTransferBytes(const ModalModel& model, SampleRadiation radiation) {
   const auto modes = static_cast<uint32_t>(model.mode_count());
@@ -77,6 +94,8 @@ inline std::string SampleTransferBytes(const ModalModel& model, SampleRadiation 
                                 BytesOf(std::vector(size_t{2} * modes, 1.0F))};
   v1::TransferRecord record;
   *record.mutable_header() = SampleTransferHeader(modes, radiation.speed_ratio);
+  *record.mutable_header()->mutable_rigid_body() = radiation.rigid;
+  if (radiation.fixed) record.mutable_header()->mutable_settings()->add_fixtures();
   const TransferSizes all_sizes{.modes = modes, .harmonics = modes};
   std::string all = Delimited(record);
   for (uint32_t i = 0; i < kTransferArrayCount; ++i) {

@@ -174,6 +174,24 @@ TEST(StoredTransfer, AnImpossibleHarmonicIsRefused) {
               HasSubstr("TRANSFER_MALFORMED"));
 }
 
+TEST(StoredTransfer, AnImpossibleRigidBodyIsRefused) {
+  const auto parse = [](const v1::RigidBody& rigid) {
+    return StoredTransfer::Parse(
+        SampleTransferBytes(SampleModel(3, 4), {.power_integrals = {1, 1, 1}, .rigid = rigid}));
+  };
+  ASSERT_TRUE(parse(SampleRigidBody()).ok());
+  EXPECT_TRUE(parse(SampleRigidBody())->Decode().rigid.has_value());
+  v1::RigidBody body = SampleRigidBody();
+  body.set_volume_m3(0);
+  EXPECT_FALSE(parse(body).ok());
+  body = SampleRigidBody();
+  body.mutable_motions()->RemoveLast();
+  EXPECT_FALSE(parse(body).ok());
+  body = SampleRigidBody();
+  body.mutable_motions(3)->set_strengths(2, NAN);
+  EXPECT_FALSE(parse(body).ok());
+}
+
 TEST(StoredTransfer, EveryDamageIsRefused) {
   const ModalModel model = SampleModel(3, 4);
   const float integral = 1.2345678F;

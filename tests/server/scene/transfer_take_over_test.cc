@@ -45,6 +45,18 @@ class TransferStage {
     return *scenes.AddObject(scene, 0, *database->models().Find(SmallModel()->digest), properties);
   }
 
+  /// The transfer of a body that is fixed somewhere, or that moves freely as a ball does.
+  void StoreBall(bool fixed) {
+    const double speed_m_per_s = std::sqrt(kTestYoungPa / kTestDensityKgPerM3);
+    const auto stored =
+        database->transfers().Put(SmallModel()->digest,
+                                  SampleTransfer(*SmallModel(), {.speed_ratio = speed_m_per_s / 343,
+                                                                 .power_integrals = {0, 0, 0},
+                                                                 .rigid = SampleRigidBody(),
+                                                                 .fixed = fixed}));
+    EXPECT_TRUE(stored.ok()) << stored.status();
+  }
+
   void Store(std::vector<float> integrals) {
     const double speed_m_per_s = std::sqrt(kTestYoungPa / kTestDensityKgPerM3);
     const auto stored = database->transfers().Put(
@@ -113,6 +125,28 @@ TEST(TransferTakeOver, RadiatedPowerIsRefusedUntilATransferIsStored) {
   EXPECT_TRUE(add().ok());
   properties.material.young_pa *= 1.3;  // sound travels 14 percent faster
   EXPECT_THAT(add().ToString(), HasSubstr("TRANSFER_NOT_FOUND: "));
+}
+
+TEST(TransferTakeOver, TheAccelerationOfAFreeBodySoundsUnlessItsModesAloneAreAskedFor) {
+  TransferStage stage;
+  stage.StoreBall(false);
+  const uint32_t ball = stage.Add().handle;
+  const uint32_t modes_only = stage.Add(RadiationModel::kModesOnly).handle;
+  stage.Strike(ball);
+  const std::vector<float> click = stage.Render(200);
+  EXPECT_GT(Peak(click), 0);
+  const auto last =
+      std::find_if(click.rbegin(), click.rend(), [](float sample) { return sample != 0; });
+  EXPECT_LT(click.rend() - last, 1000) << "the click ends";
+  stage.Strike(modes_only);
+  EXPECT_EQ(Peak(stage.Render(200)), 0);
+}
+
+TEST(TransferTakeOver, TheAccelerationOfAFixedBodyIsSilent) {
+  TransferStage stage;
+  stage.StoreBall(true);
+  stage.Strike(stage.Add().handle);
+  EXPECT_EQ(Peak(stage.Render(200)), 0);
 }
 
 TEST(TransferTakeOver, RadiationDampsAnObject) {

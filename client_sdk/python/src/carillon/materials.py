@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from carillon.models import Model
 
 Material = Union[str, material_pb2.Material]
-Radiation = Literal["paper_coupling", "radiated_power"]
+Radiation = Literal["paper_coupling", "radiated_power", "modes_only"]
 
 
 def material(preset: str = "", *, loss_factor: float | dict[float, float] | None = None,

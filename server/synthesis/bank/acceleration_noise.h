@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <memory>
+#include <span>
+
+#include "server/base/fixed_vector.h"
+#include "server/synthesis/bank/harmonic_basis.h"
+#include "server/synthesis/schedule/bearing.h"
+#include "server/synthesis/schedule/mixer_event.h"
+
+namespace carillon {
+
+/// How a free body of unit density radiates when it accelerates as a whole
+/// (proto/carillon/v1/transfer.proto, RigidBody).
+struct RigidBody {
+  /// The equivalent sphere of one motion.
+  struct Motion {
+    double radius_m = 0;
+    std::array<double, 9> strengths{};  ///< s_lm at l^2 + l + m; for rotation in metres
+  };
+  double volume_m3 = 0;
+  std::array<double, 3> center_of_mass_m{};
+  std::array<double, 6> inertia_kg_m2{};  ///< about the centre of mass: xx, yy, zz, xy, yz, zx
+  std::array<Motion, 6> motions{};        ///< translation along x, y, z, rotation about x, y, z
+};
+
+/// A rigid body as an object of a scene. The vertices belong to `owner`.
+struct MovedBody {
+  RigidBody body;
+  double density_kg_per_m3 = 0;
+  double size = 1;                                   ///< relative to the body's
+  std::span<const std::array<float, 3>> vertices{};  ///< of the sounding surface, unscaled
+  std::shared_ptr<const void> owner = nullptr;
+  double air_density_kg_per_m3 = 1.204;
+  double sound_speed_m_per_s = 343;
+};
+
+/// The sound of a body's own acceleration in a blow (Chadwick, Zheng and James, "Precomputed
+/// acceleration noise for improved rigid-body sound", 2012). An impulse J at the point r gives the
+/// six accelerations
+///
+///   A = J w(t)/m along the axes,  A = I^(-1) (r - center) x J w(t) about them,
+///
+/// with the pulse w(t) of its contact, and each of them the pressure at 1 m, with s' = a s/c,
+///
+///   rho0 a^2 A (S_1 s'/(2 + 2 s' + s'^2) + S_2 s'^2/(9 + 9 s' + 4 s'^2 + s'^3)),
+///
+/// S_l the sum over m of s_lm Y_lm towards the listener. Heard without directions, the sum over l
+/// and m of the squares has its mean over all directions, and the motions sound in phase.
+///
+/// For w = (1 - cos(W t))/T from 0 to T, W = 2 pi/T, the response is known exactly: with the poles
+/// p and their residues R of a term H,
+///
+///   (sum of K exp(p t) - Re(H(i W) exp(i W t)))/T,   K = R W^2/(p (p^2 + W^2)),
+///
+/// until T, and the sum of K (exp(p t) - exp(p (t - T)))/T afterwards. One recursion a pole serves
+/// all pulses, and each pulse adds a sinusoid while it lasts. A pulse lasts at least two frames,
+/// begins at the time of its impulse, and one of another shape is taken for the raised cosine of
+/// its variance.
+///
+/// Any thread may make one; then one thread at a time uses it, which neither allocates nor locks.
+class AccelerationNoise {
+ public:
+  /// Pulses of one body that may sound at once; further impulses then add no acceleration noise.
+  static constexpr size_t kMostPulses = 16;
+
+  /// `samples_per_pascal` includes the object's gain.
+  AccelerationNoise(const MovedBody& moved, double sample_rate_hz, double samples_per_pascal);
+
+  /// Adds an impulse at one point to the six accelerations of the next pulse. The vertices must be
+  /// the body's.
+  void Push(const TrianglePoint& at, const std::array<float, 3>& impulse_newton_seconds) noexcept;
+
+  /// Forgets what was pushed.
+  void Forget() noexcept { pushed_ = {}; }
+
+  /// Begins a pulse with what was pushed, as for OscillatorBank::Strike. `bearing` null: heard
+  /// without directions.
+  void Begin(Pulse pulse, size_t offset, float lead_frames, const Bearing* bearing) noexcept;
+
+  /// Adds a block to `frames`.
+  void RenderAdd(std::span<float> frames) noexcept;
+
+  /// Whether anything sounds.
+  bool active() const noexcept { return !pulses_.empty() || decaying_; }
+
+  /// Ends all sound.
+  void Silence() noexcept;
+
+ private:
+  static constexpr size_t kMotions = 6;
+  static constexpr size_t kSources = 2 * kMotions;  // dipole and quadrupole of each motion
+  static constexpr size_t kPoles = 3 * kMotions;    // one pair and, of quadrupoles, a real pole
+
+  using Weights = std::array<double, kSources>;
+  struct Number {
+    double re = 0, im = 0;
+  };
+  /// A pole p of a source's transfer function, or of a pair the one with a positive frequency.
+  struct Pole {
+    size_t source = 0;
+    Number p{};        // 1/s
+    Number residue{};  // twice that of the transfer function for a pair, whose real part counts
+    Number step{};     // exp(p / sample rate)
+    Number state{};
+  };
+  /// A contact that lasts.
+  struct ActivePulse {
+    size_t begin = 0, end = 0;  // frames from the begin of the next block to render
+    double lead_s = 0;          // from the contact's begin to frame `begin`
+    double end_lead_s = 0;      // from the contact's end to frame `end`
+    double duration_s = 0;
+    bool begun = false;
+    Number phasor{}, turn{};  // the sinusoid at `begin`, and its step in a frame
+    Weights weights{};
+  };
+
+  void AddPoles(size_t source, double speed_per_radius);
+  Weights WeightsTowards(const Bearing& bearing) noexcept;
+  Weights MeanWeights() const noexcept;
+  Number ResponseAt(size_t source, double rad_per_s) const noexcept;
+  void Kick(const ActivePulse& pulse, double sign, double time_s) noexcept;
+  size_t StartAndEndPulses(size_t at, size_t frame_count) noexcept;
+  void RenderPart(std::span<float> frames) noexcept;
+  void NoteDecay() noexcept;
+
+  MovedBody moved_;
+  double rate_;
+  double scale_;                   // samples at 1 m of unit acceleration times a^2 S
+  std::array<double, 9> inverse_;  // of the tensor of inertia, 1/(kg m^2)
+  std::array<Pole, kPoles> poles_;
+  size_t pole_count_ = 0;
+  HarmonicBasis basis_{2};
+  FixedVector<ActivePulse> pulses_{kMostPulses};
+  std::array<double, kMotions> pushed_{};
+  bool decaying_ = false;
+};
+
+}  // namespace carillon
