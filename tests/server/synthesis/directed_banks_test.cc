@@ -305,7 +305,8 @@ TEST(DirectedBanks, ATurningObjectSoundsAsIfTheListenerWalkedRoundTheOtherWay) {
                                         .glide_frames = 800}});
   }
   const std::vector<float> turned = turning.Render(760), walked = walking.Render(760);
-  EXPECT_LT(Suddenness(turned, 6000, kStill), -90);
+  // The greatest step is at -90 dB; rounding moves it by some hundredths.
+  EXPECT_LT(Suddenness(turned, 6000, kStill), -89.9);
   double peak = 0, difference = 0;
   for (size_t n = 0; n < turned.size(); ++n) {
     peak = std::max(peak, std::abs(double{turned[n]}));
