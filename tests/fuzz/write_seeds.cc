@@ -91,6 +91,7 @@ std::vector<v1::RenderRequest> Rendering() {
   object.set_handle(1);
   object.set_modal_model("modalModels/" + std::string(64, 'a'));
   object.mutable_material()->set_preset("chime_aluminum");
+  object.mutable_material()->set_poisson_ratio(0.33);  // that of the model
   v1::ContactStep& step = *requests[3].mutable_record()->mutable_step();
   v1::Impulse& impulse = *step.add_impulses();
   impulse.set_object(1);
