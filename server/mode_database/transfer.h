@@ -12,7 +12,7 @@ namespace carillon {
 struct RigidRadiation {
   /// The equivalent sphere of one motion.
   struct Motion {
-    double radius_m = 0;                  ///< zero: the motion moves no air
+    double radius_m = 0;                ///< zero: the motion moves no air
     std::array<double, 9> strengths{};  ///< s_lm at l^2 + l + m; for rotation in metres
   };
   double volume_m3 = 0;

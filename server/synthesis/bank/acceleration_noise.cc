@@ -36,8 +36,8 @@ Vector Cross(const Vector& a, const Vector& b) {
 
 /// The inverse of a symmetric tensor (xx, yy, zz, xy, yz, zx); zeros if it has none.
 std::array<double, 9> Inverse(const std::array<double, 6>& t) {
-  const std::array<Vector, 3> rows = {
-      Vector{t[0], t[3], t[5]}, Vector{t[3], t[1], t[4]}, Vector{t[5], t[4], t[2]}};
+  const std::array<Vector, 3> rows = {Vector{t[0], t[3], t[5]}, Vector{t[3], t[1], t[4]},
+                                      Vector{t[5], t[4], t[2]}};
   const std::array<Vector, 3> columns = {Cross(rows[1], rows[2]), Cross(rows[2], rows[0]),
                                          Cross(rows[0], rows[1])};
   const double determinant =

@@ -74,11 +74,11 @@ class AccelerationNoise {
   /// the body's.
   void Push(const TrianglePoint& at, const std::array<float, 3>& impulse_newton_seconds) noexcept;
 
-  /// Forgets what was pushed.
+  /// Forgets the accelerations that were pushed.
   void Forget() noexcept { pushed_ = {}; }
 
-  /// Begins a pulse with what was pushed, as for OscillatorBank::Strike. `bearing` null: heard
-  /// without directions.
+  /// Begins a pulse with the accelerations that were pushed, as for OscillatorBank::Strike.
+  /// `bearing` null: heard without directions.
   void Begin(Pulse pulse, size_t offset, float lead_frames, const Bearing* bearing) noexcept;
 
   /// Adds a block to `frames`.

@@ -118,14 +118,25 @@ def decompose(folder, body):
     return stem.with_suffix(".model")
 
 
-def hear(studio, model_file, body, before):
-    """The Drop by the laws of version 0.1 (Rayleigh damping, soft contacts, the paper's coupling) or of today."""
+def click_db(modes, whole):
+    """Energy of the acceleration noise over that of the modes, dB."""
+    count = min(len(modes), len(whole))
+    click = numpy.array(whole, dtype=float)
+    click[:count] -= modes[:count]
+    return 10 * math.log10((click**2).sum() / max((numpy.asarray(modes, dtype=float)**2).sum(), 1e-30))
+
+
+def hear(studio, model_file, body, before, modes_only=False):
+    """The Drop by the laws of version 0.1 (Rayleigh damping, soft contacts, the paper's coupling) or of today, which
+    may be left without the sound of the body's acceleration.
+    """
     model = studio.import_model(model_file)
     material = catalogue.read()[body.material]
     figures = {"young_pa": material.young_pa, "density_kg_per_m3": material.density_kg_per_m3,
                **(rayleigh(body.rayleigh_eta) if before else programs.loss_factor(material.loss_factor))}
     radiates = not before and studio.radiate(model, figures)
-    heard = programs.Heard(model, figures, paper_coupling=not radiates, gaussian=before)
+    heard = programs.Heard(model, figures, paper_coupling=not radiates, gaussian=before,
+                           modes_only=bool(modes_only and radiates))
     mass_kg = body.volume_m3 * material.density_kg_per_m3
     sound, summary = studio.render(heard, blows(body.surface(), mass_kg, SOFT_S if before else None), 0)
     return Drop(body.name, sound, summary)

@@ -85,6 +85,7 @@ class Heard:
     material: dict  # fields of the contract
     paper_coupling: bool = True
     gaussian: bool = True  # the shape of a contact's force
+    modes_only: bool = False  # without the sound of the body's acceleration
 
     def message(self):
         from carillon.v1 import contact_trace_pb2, material_pb2
@@ -95,6 +96,10 @@ class Heard:
             from carillon.v1 import radiation_pb2
 
             body.radiation = radiation_pb2.RADIATION_MODEL_PAPER_COUPLING
+        elif self.modes_only:
+            from carillon.v1 import radiation_pb2
+
+            body.radiation = radiation_pb2.RADIATION_MODEL_MODES_ONLY
         return body
 
 

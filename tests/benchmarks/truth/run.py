@@ -13,6 +13,7 @@ import argparse
 import contextlib
 import math
 import pathlib
+import sys
 import tempfile
 
 import bar
@@ -133,11 +134,16 @@ def show_drops(options):
         for body in drops.BODIES:
             model_file = drops.decompose(folder, body)
             before = drops.hear(old, model_file, body, before=True)
+            modes = drops.hear(new, model_file, body, before=False, modes_only=True)
             after = drops.hear(new, model_file, body, before=False)
-            pairs += [(f"{body.name}, before", before.sound), (f"{body.name}, now", after.sound)]
-            print(drop_line("before", before), drop_line("now", after), sep="\n", flush=True)
+            pairs += [(f"{body.name}, {laws}", drop.sound)
+                      for laws, drop in (("before", before), ("modes only", modes), ("now", after))]
+            print(drop_line("before", before), drop_line("modes only", modes), drop_line("now", after), sep="\n",
+                  flush=True)
+            print(f"{body.name}: acceleration noise over modes, dB: {drops.click_db(modes.sound, after.sound):+.1f}",
+                  file=sys.stderr)
     print()
-    pictures.draw(pairs, options.pictures / "drops.png", 1.0, columns=2)
+    pictures.draw(pairs, options.pictures / "drops.png", 1.0, columns=3)
 
 
 if __name__ == "__main__":

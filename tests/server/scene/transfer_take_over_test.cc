@@ -48,12 +48,11 @@ class TransferStage {
   /// The transfer of a body that is fixed somewhere, or that moves freely as a ball does.
   void StoreBall(bool fixed) {
     const double speed_m_per_s = std::sqrt(kTestYoungPa / kTestDensityKgPerM3);
-    const auto stored =
-        database->transfers().Put(SmallModel()->digest,
-                                  SampleTransfer(*SmallModel(), {.speed_ratio = speed_m_per_s / 343,
-                                                                 .power_integrals = {0, 0, 0},
-                                                                 .rigid = SampleRigidBody(),
-                                                                 .fixed = fixed}));
+    const auto stored = database->transfers().Put(
+        SmallModel()->digest, SampleTransfer(*SmallModel(), {.speed_ratio = speed_m_per_s / 343,
+                                                             .power_integrals = {0, 0, 0},
+                                                             .rigid = SampleRigidBody(),
+                                                             .fixed = fixed}));
     EXPECT_TRUE(stored.ok()) << stored.status();
   }
 
