@@ -130,6 +130,34 @@ absl::Status CheckBand(const ModalModel& model, const IntendedUse& use) {
   return status;
 }
 
+/// The cost of a body above which modes of a band that nobody asked for are left out.
+constexpr Means kUsualMeans{.bytes = size_t{7} << 30U, .cpu_s = 60};
+/// Largest estimated error of a frequency that goes without a warning: nearly two semitones.
+constexpr double kGreatError = 0.1;
+
+void WarnOfLowerBand(const DeformationModes& solution, const IntendedUse& use, ModalModel& model) {
+  if (solution.mode_count_below_asked == 0) return;
+  model.warnings.push_back(absl::StrFormat(
+      "only the %d modes below %.5g Hz were computed, because all of some %d below %g Hz would "
+      "need more than %d GiB or %g s of processor time; ask for that band (--band) to have them "
+      "all, or for "
+      "the most audible of them (--keep)",
+      model.eigenvalues.size(), use.FrequencyHz(solution.complete_to_eigenvalue),
+      solution.mode_count_below_asked, use.high_hz, kUsualMeans.bytes >> 30U, kUsualMeans.cpu_s));
+}
+
+void WarnOfGreatErrors(ModalModel& model) {
+  const auto many = std::ranges::count_if(model.estimated_errors,
+                                          [](double error) { return error > kGreatError; });
+  if (many == 0) return;
+  model.warnings.push_back(absl::StrFormat(
+      "very inaccurate: the frequencies of %d of %d modes are estimated to be off by more than %g "
+      "%%, "
+      "the worst by %.3g %%; ask for a finer mesh (--accuracy, --budget or --nodes), or leave "
+      "these modes out (--max-frequency-error)",
+      many, model.eigenvalues.size(), 100 * kGreatError, 100 * model.WorstError()));
+}
+
 /// What takes time after the matrices.
 std::vector<PlannedStep> PlanOf(const SolveCost& cost) {
   return {{.phase = v1::PHASE_VERIFY, .predicted_s = cost.count_s},
@@ -141,9 +169,12 @@ std::vector<PlannedStep> PlanOf(const SolveCost& cost) {
 
 SolveOptions OptionsOf(v1::Solver solver, const v1::WorkerRequest& request,
                        DecompositionObserver& observer) {
+  const bool may_lower_band =
+      UseOf(request).high_is_default && request.settings().keep_mode_count() == 0;
   return {.solver = ToSolverChoice(solver),
           .max_mode_count =
               request.settings().keep_mode_count() > 0 ? kMaxFoundModeCount : kMaxModeCount,
+          .means = may_lower_band ? std::optional(kUsualMeans) : std::nullopt,
           .on_cost = [&observer](const SolveCost& cost) { observer.OnPlan(PlanOf(cost)); }};
 }
 
@@ -189,6 +220,7 @@ absl::StatusOr<ModalModel> Solve(const Body& body, const v1::WorkerRequest& requ
   observer.OnProgress(v1::PHASE_WRITE, 0);
   ModalModel model = MakeModalModel(body.mesh, body.given, elastic, solution);
   model.warnings = body.warnings;
+  WarnOfLowerBand(solution, UseOf(request), model);
   if (comparison) model.warnings.push_back(comparison->Text());
   model.comparison = std::move(comparison);
   KeepMostAudible(static_cast<int>(settings.keep_mode_count()), model);
@@ -304,6 +336,7 @@ absl::StatusOr<ModalModel> Decompose(std::string mesh_bytes, const v1::WorkerReq
   RETURN_IF_ERROR(CheckBand(model, UseOf(request)));
   WarnOfAccuracy(GoalOf(request), model);
   RETURN_IF_ERROR(LeaveOutInaccurate(request, model));
+  WarnOfGreatErrors(model);
   WarnOfOverruns(GoalOf(request), PhaseClock::Now().cpu_seconds - begun_cpu_s, model);
   observer.OnModes(model.eigenvalues.size());
   return model;

@@ -19,6 +19,8 @@ struct IntendedUse {
   double size = 1;     ///< relative to the mesh
   double low_hz = 20;  ///< lower end of the wanted band of natural frequencies
   double high_hz = 20000;
+  /// Whether nobody asked for `high_hz`, so that a body too costly may have a lower one.
+  bool high_is_default = false;
   std::vector<LossFactorPoint> loss_factor = {};  ///< ascending; damping added to D
 
   /// Returns Lambda E / (rho s^2), 1/s^2, for an eigenvalue Lambda of unit material and size.

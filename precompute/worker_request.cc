@@ -38,15 +38,19 @@ absl::Status CheckTransfer(const v1::TransferSettings& transfer) {
                               " s; it must be finite and not below zero"));
 }
 
+/// Upper end of the band, whether somebody asked for it or not.
+double HighestHz(const v1::WorkerRequest& request) {
+  return request.max_frequency_hz() == 0 ? kHighestHz : request.max_frequency_hz();
+}
+
 absl::Status CheckUse(const v1::WorkerRequest& request) {
   if (!(request.size() > 0) || !std::isfinite(request.size())) {
     return Invalid(absl::StrCat("size is ", request.size(), "; it must be above zero"));
   }
-  if (!(request.min_frequency_hz() >= 0 &&
-        request.min_frequency_hz() < request.max_frequency_hz() &&
-        request.max_frequency_hz() <= kMostHz)) {
-    return Invalid(absl::StrCat("the band is ", request.min_frequency_hz(), " to ",
-                                request.max_frequency_hz(),
+  const double high_hz = HighestHz(request);
+  if (!(request.min_frequency_hz() >= 0 && request.min_frequency_hz() < high_hz &&
+        high_hz <= kMostHz)) {
+    return Invalid(absl::StrCat("the band is ", request.min_frequency_hz(), " to ", high_hz,
                                 " Hz; it must rise from zero or more to at most 1e9 Hz"));
   }
   RETURN_IF_ERROR(CheckTransfer(request.transfer()));
@@ -61,7 +65,6 @@ absl::Status CheckUse(const v1::WorkerRequest& request) {
 absl::StatusOr<v1::WorkerRequest> Complete(v1::WorkerRequest request) {
   FillInDefaults(*request.mutable_settings());
   if (request.size() == 0) request.set_size(1);
-  if (request.max_frequency_hz() == 0) request.set_max_frequency_hz(kHighestHz);
   if (!request.radiate_stored_model()) RETURN_IF_ERROR(CheckSettings(request.settings()));
   RETURN_IF_ERROR(CheckUse(request));
   const bool radiate = request.has_transfer() || request.radiate_stored_model();
@@ -91,7 +94,8 @@ IntendedUse UseOf(const v1::WorkerRequest& request) {
           .alpha2_per_s = material.alpha2_per_s(),
           .size = request.size(),
           .low_hz = request.min_frequency_hz(),
-          .high_hz = request.max_frequency_hz(),
+          .high_hz = HighestHz(request),
+          .high_is_default = request.max_frequency_hz() == 0,
           .loss_factor = LossFactorOf(material)};
 }
 

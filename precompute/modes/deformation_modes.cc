@@ -14,6 +14,7 @@
 #include "precompute/eigen/solve_cost.h"
 #include "precompute/eigen/sparse_eigensolver.h"
 #include "precompute/fem/held_nodes.h"
+#include "precompute/modes/lower_limit.h"
 #include "precompute/modes/rigid_body.h"
 #include "precompute/sparse/dense_blas.h"
 #include "precompute/sparse/multifrontal_inertia.h"
@@ -80,13 +81,8 @@ absl::Status TooManyModes(int count, int limit) {
                               "; lower the band's upper frequency", keep));
 }
 
-/// Weyl's law for elastic waves in a volume, at a Poisson's ratio of 0.3 and unit Young's modulus
-/// and density: a probable lower bound of the number of modes.
 int GuessModeCount(const SystemMatrices& system, double limit) {
-  const Eigen::VectorXd ones = Eigen::VectorXd::Ones(system.unknown_count());
-  const double volume = ones.dot(system.M.selfadjointView<Eigen::Lower>() * ones) / 3;
-  return static_cast<int>(
-      std::min<double>(0.153 * volume * std::pow(limit, 1.5), kMaxFoundModeCount));
+  return static_cast<int>(std::min<double>(WeylModeCount(system, limit), kMaxFoundModeCount));
 }
 
 /// Returns the unknowns of the nodes in the order of the nodes, three for each.
@@ -97,6 +93,9 @@ std::vector<int> UnknownsOf(const std::vector<int32_t>& nodes) {
   }
   return unknowns;
 }
+
+/// Number of modes that is found whatever it costs, as long as there is memory for it.
+constexpr int kAlwaysAffordable = 30;
 
 /// One solution: it counts the modes, solves for them and verifies them.
 class Solution {
@@ -127,9 +126,35 @@ class Solution {
                                              " rigid-body modes lie below "
                                              "the limit"));
     }
-    const int found = *count - rigid_mode_count();
-    if (found > options_.max_mode_count) return TooManyModes(found, options_.max_mode_count);
     return count;
+  }
+
+  /// The number of modes of the body that is expected below the limit, whatever its mesh; rarely
+  /// too many.
+  int ExpectedCount(double limit) const {
+    constexpr double kMost = 1e9;
+    return rigid_mode_count() + static_cast<int>(std::min(WeylModeCount(system_, limit), kMost));
+  }
+
+  int unknown_count() const { return static_cast<int>(system_.unknown_count()); }
+
+  /// Whether the limit may be lowered so that fewer than `count` modes lie below it.
+  bool MayLowerLimit(int count) const {
+    return options_.means.has_value() && count > MostAffordable();
+  }
+
+  /// Checks the number of modes, rigid-body ones included.
+  absl::Status CheckCount(int count) const {
+    const int found = count - rigid_mode_count();
+    if (found > options_.max_mode_count) return TooManyModes(found, options_.max_mode_count);
+    return absl::OkStatus();
+  }
+
+  /// The largest number of modes, rigid-body ones included, that the means allow.
+  int MostAffordable() const {
+    return LargestThat(rigid_mode_count() + kAlwaysAffordable,
+                       rigid_mode_count() + options_.max_mode_count,
+                       [this](int count) { return IsAffordable(count); });
   }
 
   absl::StatusOr<Modes> SolveLowest(int count, double limit) const {
@@ -177,6 +202,11 @@ class Solution {
   }
 
  private:
+  bool IsAffordable(int count) const {
+    const SolveCost cost = Cost(count);
+    return cost.peak_bytes <= options_.means->bytes && cost.cpu_seconds() <= options_.means->cpu_s;
+  }
+
   bool IsDense(int count) const {
     return options_.solver == SolverChoice::kBlockLanczos &&
            PrefersDense(system_.unknown_count(), count);
@@ -264,6 +294,24 @@ class Solution {
   mutable Workers workers_;
 };
 
+/// Counts the modes below the limit, or below a lower one where all of them cost too much. The
+/// count that was asked for is skipped where far too many modes must be expected.
+absl::StatusOr<Counted> CountAffordable(const Solution& solution, double limit) {
+  constexpr int kFarTooMany = 4;
+  const int expected = solution.ExpectedCount(limit);
+  Counted counted{limit, expected, expected};
+  if (!solution.MayLowerLimit(std::min(expected, solution.unknown_count()) / kFarTooMany)) {
+    ASSIGN_OR_RETURN(const int count, solution.CountBelow(limit));
+    counted = {limit, count, count};
+  }
+  if (solution.MayLowerLimit(counted.count)) {
+    ASSIGN_OR_RETURN(counted, LowerLimit(counted, solution.MostAffordable(),
+                                         [&](double lower) { return solution.CountBelow(lower); }));
+  }
+  RETURN_IF_ERROR(solution.CheckCount(counted.count));
+  return counted;
+}
+
 /// Handles a body without a mode below the limit: finds its lowest mode with one more
 /// factorization.
 absl::StatusOr<DeformationModes> FindLowest(const Solution& solution, double limit) {
@@ -288,27 +336,31 @@ absl::StatusOr<DeformationModes> SolveDeformationModes(const SystemMatrices& sys
   const Solution solution(system, std::move(ordered), nodes, watch, options);
   absl::Status failure;
   for (int attempt = 0; attempt < kMaxAttempts; ++attempt) {
-    const double limit = eigenvalue_limit * (1 + 1e-4 * attempt);
-    const absl::StatusOr<int> count = solution.CountBelow(limit);
-    if (absl::IsInternal(count.status())) {  // the limit may lie on an eigenvalue
-      failure = count.status();
+    const absl::StatusOr<Counted> counted =
+        CountAffordable(solution, eigenvalue_limit * (1 + 1e-4 * attempt));
+    if (absl::IsInternal(counted.status())) {  // the limit may lie on an eigenvalue
+      failure = counted.status();
       continue;
     }
-    if (!count.ok()) return count.status();
-    if (*count == solution.rigid_mode_count()) return FindLowest(solution, limit);
-    ASSIGN_OR_RETURN(Modes all, solution.SolveLowest(*count + 4 * attempt, limit));
+    if (!counted.ok()) return counted.status();
+    const auto [limit, count, asked_count] = *counted;
+    if (count == solution.rigid_mode_count()) return FindLowest(solution, limit);
+    ASSIGN_OR_RETURN(Modes all, solution.SolveLowest(count + 4 * attempt, limit));
     std::vector<Eigen::Index> below(static_cast<size_t>((all.eigenvalues.array() < limit).count()));
     std::iota(below.begin(), below.end(), 0);
-    if (static_cast<int>(below.size()) != *count) {
+    if (static_cast<int>(below.size()) != count) {
       failure =
           VerificationFailed("not all modes that were counted below the limit could be found");
       continue;
     }
     Keep(below, all);
     ASSIGN_OR_RETURN(DeformationModes result, solution.Verify(std::move(all), limit));
-    result.verification.sturm_count = *count;
+    result.verification.sturm_count = count;
     result.verification.sturm_eigenvalue = limit;
     result.complete_to_eigenvalue = limit;
+    if (count < asked_count) {
+      result.mode_count_below_asked = asked_count - solution.rigid_mode_count();
+    }
     return result;
   }
   return failure;

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include <cstddef>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -20,6 +22,9 @@ struct DeformationModes {
   Eigen::VectorXd residuals;  ///< relative, of each mode
   Verification verification;
   double complete_to_eigenvalue = 0;
+  /// Modes below the limit that was asked for, as counted or expected, where it was lowered; zero:
+  /// it was not.
+  int mode_count_below_asked = 0;
   /// The lowest deformation mode, whether below the limit or not.
   double lowest_eigenvalue = 0;
 };
@@ -36,10 +41,19 @@ enum class SolveStage { kFactor, kSolve, kVerify };
 /// Called with the current stage and the fraction of it that is done, 0 to 1.
 using SolveWatch = std::function<void(SolveStage, double)>;
 
+/// The cost above which a solution finds fewer modes.
+struct Means {
+  size_t bytes = 0;  ///< memory, the matrices included
+  double cpu_s = 0;  ///< processor time, as PredictSolveCost() predicts it
+};
+
 struct SolveOptions {
   SolverChoice solver = SolverChoice::kBlockLanczos;
   std::vector<Point> held = {};  ///< positions of the fixed nodes
   int max_mode_count = kMaxModeCount;
+  /// Present: where all modes below the limit would cost more than these means, or be more than
+  /// max_mode_count, the limit is lowered until they do not.
+  std::optional<Means> means = {};
   /// Called with the predicted cost before the modes are counted, based on a guess of their number,
   /// and again afterwards.
   std::function<void(const SolveCost&)> on_cost = [](const SolveCost&) {};

@@ -133,6 +133,38 @@ TEST(DeformationModes, MoreThanTheStatedLimitAreRefused) {
                 "lower the band's upper frequency, or keep only the most audible (--keep"));
 }
 
+TEST(DeformationModes, LimitIsLoweredUntilTheMeansAllowAllModesBelowIt) {
+  const TetMesh mesh = MakeTetBox({1, 0.6, 0.3}, {9, 6, 3}, 4);
+  const SystemMatrices system = AssembleUnit(mesh);
+  const Eigen::VectorXd eigenvalues = AllEigenvalues(mesh);
+  const double above_all = 2 * eigenvalues[eigenvalues.size() - 1];
+  const auto result = SolveDeformationModes(system, mesh.nodes, above_all, kSilent,
+                                            {.means = Means{.bytes = 1, .cpu_s = 0}});
+  ASSERT_TRUE(result.ok()) << result.status();
+  const Eigen::Index count = result->modes.eigenvalues.size();
+  EXPECT_GE(count, 10);
+  EXPECT_LE(count, 30);
+  for (Eigen::Index m = 0; m < count; ++m) {
+    EXPECT_NEAR(result->modes.eigenvalues[m] / eigenvalues[m + 6], 1, 1e-9);
+  }
+  EXPECT_EQ(result->verification.sturm_count, count + 6);
+  EXPECT_LT(result->complete_to_eigenvalue, eigenvalues[count + 6]);
+  EXPECT_GT(result->mode_count_below_asked, count);
+}
+
+TEST(DeformationModes, AmpleMeansChangeNothing) {
+  const TetMesh mesh = MakeTetBox({1, 0.6, 0.3}, {9, 6, 3}, 4);
+  const SystemMatrices system = AssembleUnit(mesh);
+  const auto plain = Solve(mesh, 40);
+  const auto with_means = SolveDeformationModes(
+      system, mesh.nodes, 40, kSilent, {.means = Means{.bytes = size_t{1} << 30U, .cpu_s = 60}});
+  ASSERT_TRUE(plain.ok() && with_means.ok());
+  EXPECT_EQ(with_means->modes.eigenvalues, plain->modes.eigenvalues);
+  EXPECT_EQ(with_means->modes.shapes, plain->modes.shapes);
+  EXPECT_EQ(with_means->complete_to_eigenvalue, plain->complete_to_eigenvalue);
+  EXPECT_EQ(with_means->mode_count_below_asked, 0);
+}
+
 TEST(DeformationModes, TheProofIsToldApartFromTheSolution) {
   for (const std::array<int, 3>& cells : {std::array{4, 3, 2}, std::array{9, 6, 3}}) {
     const TetMesh mesh = MakeTetBox({1, 0.6, 0.3}, cells, 4);
