@@ -177,8 +177,8 @@ TEST(StruckTube, LoudnessDoesNotDependOnTheAngleThoughTheMeshSplitsThePairs) {
 }
 
 TEST(StruckTube, ComesOutWellBelowFullScale) {
-  // Struck in the middle: its odd modes ring at 0.03 to 0.036 of full scale each; the contact leaves
-  // little of all but the first.
+  // Struck in the middle: its odd modes ring at 0.03 to 0.036 of full scale each; the contact
+  // leaves little of all but the first.
   const auto sound = StrikeTube(
       kAluminum, {.ring = Tube::kMiddle, .duration_s = 1e-3, .impulse_newton_seconds = 0.02});
   const double peak = *std::ranges::max_element(sound);
