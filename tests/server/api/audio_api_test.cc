@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "server/api/listen_address.h"
+#include "server/synthesis/bank/oscillator_bank.h"
 #include "tests/server/api/served_daemon.h"
 
 namespace carillon {
@@ -251,13 +252,14 @@ TEST_F(AudioApi, AListenerHearsWhatTheMixerRenders) {
   ASSERT_GE(rendered.size(), 9000U);
   ASSERT_GE(heard.size(), rendered.size());
   // Bit for bit only where the strike falls into the same phase of the long blocks; else within
-  // what the spectral form is accurate to.
+  // what the spectral form is accurate to, and modes fall asleep at other samples.
   float peak = 0, error = 0;
   for (size_t n = 0; n < rendered.size(); ++n) {
     peak = std::max(peak, std::abs(rendered[n]));
     error = std::max(error, std::abs(heard[n] - rendered[n]));
   }
-  EXPECT_LT(error, 1e-5F * peak);
+  const auto asleep = static_cast<float>(OscillatorBankSettings{}.silence);
+  EXPECT_LT(error, 1e-5F * peak + asleep);
 }
 
 TEST_F(AudioApi, TheNumberOfListenersIsLimited) {

@@ -100,11 +100,11 @@ TEST_P(AtEveryStep, AJitteringLoadIsFarBelowTheBodysOwnImpact) {
 TEST(SustainedForce, AChangeOfSlopeRingsAsTheFreeResponseToARamp) {
   const SoundingModes modes{.modes = {MakeMode(0, 100, -3)}};
   Held held(modes);
-  const auto sound = held.Render(4800, 4800, [](double) { return 50.0; },
-                                 {});  // one knot: from 0 to 50 N over the 0.1 s before it
+  const auto sound = held.Render(4800, 4800, [](double) { return 5000.0; },
+                                 {});  // one knot: from 0 to 5 kN over the 0.1 s before it
   const std::complex<double> s(-3, modes.modes[0].damped_rad_per_s);
   const double tau_s = 3 / s.imag();
-  const double slope = 50 / 0.1;
+  const double slope = 5000 / 0.1;
   const std::complex<double> state = kSamplesPerVolumeVelocity * slope / s.imag() *
                                      std::complex<double>(0, -1) *
                                      std::exp(s * s * tau_s * tau_s / 2.0) / (s * s);
