@@ -1,0 +1,13 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+#
+# deploy/paper.sh [ARGUMENTS OF tests/benchmarks/paper/run.py...]
+#
+# Computes Tables 1 and 2 and figures 3 and 5 of the paper (O'Brien, Shen, Gatchalian 2002) anew, and writes
+# docs/REPRODUCTION.md with docs/pictures/figure3.png and figure5.png. Installs what is missing, and builds, first.
+set -euo pipefail
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+
+"$root/deploy/setup.sh" programs "$root/tests/benchmarks/paper/packages.txt"
+"$root/deploy/build.sh" release carillond carillon carillon-precompute carillon_python
+exec /usr/bin/python3 "$root/tests/benchmarks/paper/run.py" --build "$root/build/release" "$@"

@@ -1,0 +1,187 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: Apache-2.0
+"""Computes the tables of O'Brien, Shen, Gatchalian 2002 anew, and writes docs/REPRODUCTION.md.
+
+    run.py --build BUILD [--out docs]
+
+Writes REPRODUCTION.md, pictures/figure3.png and pictures/figure5.png. Exits with 1, without the page, where an error in
+print is refuted or a chime is off by more than 2 % from the measured one. deploy/paper.sh installs what this needs.
+"""
+
+import argparse
+import math
+import pathlib
+import string
+import sys
+import tempfile
+
+HERE = pathlib.Path(__file__).resolve().parent
+ROOT = HERE.parents[2]
+sys.dont_write_bytecode = True
+
+
+def arguments():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--build", type=pathlib.Path, required=True)
+    parser.add_argument("--out", type=pathlib.Path, default=ROOT / "docs")
+    return parser.parse_args()
+
+
+def take(build):
+    """Makes the modules of the other benchmarks and the contract in Python importable."""
+    sys.path[:0] = [str(ROOT / folder) for folder in
+                    ("tests/benchmarks/truth", "tests/benchmarks", "client_sdk/examples/falls")]
+    import programs
+    programs.use(build)
+
+
+def percent(value, reference):
+    return f"{100 * (value / reference - 1):+.2f} %"
+
+
+def clock(seconds):
+    """As the paper prints it."""
+    hours, rest = divmod(round(seconds), 3600)
+    minutes, left = divmod(rest, 60)
+    return " ".join(f"{count} {unit}" for count, unit in ((hours, "h"), (minutes, "min"), (left, "s")) if count)
+
+
+def frequency_table(rows, linear, best):
+    from errata import head, line
+    yield from head("row", "the paper, Hz", "linear, Hz (nodes, elements)", "quadratic, Hz (nodes, elements)",
+                    "estimated error", "size at which ours has the paper's frequency")
+    for row in rows:
+        low, high = linear[row.name], best[row.name]
+        size = high.natural_hz / row.natural_hz
+        yield line(row.name, f"{row.printed.damped_hz} ({row.printed.nodes})",
+                   f"{low.base['damped_frequency_hz']:.1f} ({low.nodes}, {low.elements})",
+                   f"{high.base['damped_frequency_hz']:.1f} ({high.nodes}, {high.elements})",
+                   f"{100 * high.base['estimated_error']:.2f} %", f"x {size:.3f}")
+
+
+def decay_table(rows, best):
+    from errata import head, line
+    yield from head("row", "printed, 1/s", "from the printed frequency, 1/s", "ours, 1/s", "our T60, s")
+    for row in rows:
+        decay = best[row.name].decay_per_s
+        yield line(row.name, row.printed.decay_per_s, f"{row.material.decay_per_s(row.printed.damped_hz):.2f}",
+                   f"{decay:.2f}", f"{math.log(1000) / decay:.3g}")
+
+
+def time_table(rows, linear, best):
+    from errata import head, line
+    yield from head("row", "method, paper", "time, paper", "modes to 20 kHz", "CPU s, linear", "times less",
+                    "CPU s, quadratic (modes)")
+    for row in rows:
+        low, high = linear[row.name], best[row.name]
+        yield line(row.name, row.printed.method, clock(row.printed.seconds), len(low.modes), f"{low.cpu_s:.2f}",
+                   f"{row.printed.seconds / low.cpu_s:,.0f}", f"{high.cpu_s:.2f} ({len(high.modes)})")
+
+
+RATIOS = [("shelf (plastic)", "shelf (aluminum)"), ("shelf (wood)", "shelf (aluminum)"), ("bowl 2", "bowl 1"),
+          ("bunny (ceramic)", "bunny (metal)"), ("boxes", "blocks")]
+
+
+def ratio_table(rows, best):
+    """Natural frequencies of rows that share a shape."""
+    from errata import head, line, possible_ratio
+    yield from head("rows", "the paper, damped as printed", "the paper, natural", "ours, natural", "possible")
+    for below, above in RATIOS:
+        low, high = rows[below], rows[above]
+        least, most = possible_ratio(low.material, high.material, 10 if below == "boxes" else 1)
+        yield line(f"{below} : {above}", f"1 : {high.printed.damped_hz / low.printed.damped_hz:.4f}",
+                   f"1 : {high.natural_hz / low.natural_hz:.4f}",
+                   f"1 : {best[above].natural_hz / best[below].natural_hz:.4f}",
+                   f"1 : {least:.4f} to {most:.4f}")
+
+
+# Table 2: ideal Hz, measured length in m and Hz, computed Hz, adjusted length in m and Hz.
+CHIMES = {"D3": (587.33, .505, 585.8, 589.17, .5061, 587.40), "E3": (659.26, .475, 656., 665.03, .4770, 659.27),
+          "G3": (783.99, .435, 781.8, 787.01, .4366, 784.06), "A4": (880., .410, 877.5, 884.70, .4115, 879.36),
+          "B4": (987.77, .388, 982.5, 984.75, .3878, 987.32), "D4": (1174.66, .353, 1167., 1186.88, .3548, 1174.67)}
+
+
+def chime_tables(solver, aluminum):
+    """The lines of two tables, and the quadratic frequency of each chime at its measured length in Hz."""
+    import bodies
+    import table2
+    from errata import head, line
+    options = ["--keep-surface", "--band", "20:2500", *aluminum.options()]
+    first = head("note", "length, m", "measured, Hz", "computed in the paper, Hz", "quadratic, Hz (nodes, CPU s)",
+                 "from measured", "beam theory, Hz", "linear, Hz (nodes, CPU s)", "from the paper's")
+    second = head("note", "ideal, Hz", "adjusted length, m", "the paper, Hz", "quadratic, Hz", "from the paper's",
+                  "length for the ideal, m")
+    found = {}
+    for note, (ideal, length, measured, computed, adjusted, tuned) in CHIMES.items():
+        best = solver.solve(bodies.tube(length, 16, round(100 * length)), note, options)
+        linear = solver.solve(bodies.tube(length, 48, 195), f"{note}, linear", [*options, "--element", "linear"])
+        other = solver.solve(bodies.tube(adjusted, 16, round(100 * adjusted)), f"{note}, adjusted", options)
+        found[note] = best.natural_hz
+        first.append(line(note, length, measured, computed, f"{best.natural_hz:.2f} ({best.nodes}, {best.cpu_s:.1f})",
+                          percent(best.natural_hz, measured), f"{table2.timoshenko_hz(length):.2f}",
+                          f"{linear.natural_hz:.2f} ({linear.nodes}, {linear.cpu_s:.1f})",
+                          percent(linear.natural_hz, computed)))
+        # A bending mode's frequency goes with the square of the length, nearly.
+        right = adjusted * math.sqrt(other.natural_hz / ideal)
+        second.append(line(note, ideal, adjusted, tuned, f"{other.natural_hz:.2f}", percent(other.natural_hz, tuned),
+                           f"{right:.4f}"))
+    return first, second, found
+
+
+def compute(options, folder):
+    """What the page is filled with, and whether all is as it must be."""
+    import errata
+    import figures
+    import mode_shapes
+    import rows as paper
+    solver = paper.Solver(options.build / "bin/carillon-precompute", folder)
+    rows = {row.name: row for row in paper.table1()}
+    best = {name: solver.best(row) for name, row in rows.items()}
+    linear = {name: solver.as_in_paper(row) for name, row in rows.items()}
+    chimes, tuned, found = chime_tables(solver, rows["chime (D3)"].material)
+    errors = errata.table(rows, best, (CHIMES["D3"][2], found["D3"]))
+    pictures = options.out / "pictures"
+    pictures.mkdir(parents=True, exist_ok=True)
+    mode_shapes.figure3(folder, rows["bowl 1"], best["bowl 1"], pictures / "figure3.png")
+    peaks = figures.figure5(rows, folder, pictures / "figure5.png")
+    tables = {"frequencies": frequency_table(rows.values(), linear, best), "decays": decay_table(rows.values(), best),
+              "times": time_table(rows.values(), linear, best), "ratios": ratio_table(rows, best), "chimes": chimes,
+              "tuned": tuned, "errors": errors}
+    filled = {name: "\n".join(lines) for name, lines in tables.items()}
+    filled |= sentences(rows, linear, best, peaks)
+    worst = max(abs(found[note] / chime[2] - 1) for note, chime in CHIMES.items())
+    filled["worst_chime"] = f"{100 * worst:.2f}"
+    return filled, worst < .02 and "refuted" not in filled["errors"]
+
+
+def sentences(rows, linear, best, peaks):
+    """The figures within the page's text."""
+    def too_high(name):
+        return f"{linear[name].natural_hz / best[name].natural_hz:.2f}"
+
+    blocks = rows["blocks"].natural_hz / best["blocks"].natural_hz
+    residual = max(solved.residual for solved in (*best.values(), *linear.values()))
+    faster = [row.printed.seconds / linear[name].cpu_s for name, row in rows.items()]
+    return {"blocks_high": too_high("blocks"), "blocks_paper": f"{blocks:.2f}", "chime_high": too_high("chime (D3)"),
+            "bowl_high": too_high("bowl 1"), "bunny_high": too_high("bunny (ceramic)"),
+            "shelf_high": too_high("shelf (aluminum)"), "letter_high": too_high("the end (T)"),
+            "residual": f"{residual:.1g}", "least_faster": f"{min(faster):,.0f}", "most_faster": f"{max(faster):,.0f}",
+            "block_peak": f"{peaks['blocks'][0]:.0f}", "box_peak": f"{peaks['boxes'][0]:.0f}",
+            "block_half": f"{peaks['blocks'][1]:.0f}", "box_half": f"{peaks['boxes'][1]:.0f}"}
+
+
+def main():
+    options = arguments()
+    options.build, options.out = options.build.resolve(), options.out.resolve()
+    take(options.build)
+    with tempfile.TemporaryDirectory(prefix="carillon-") as folder:
+        filled, good = compute(options, pathlib.Path(folder))
+    page = string.Template((HERE / "REPRODUCTION.md.in").read_text()).substitute(filled)
+    if not good:
+        sys.exit("an error in print is refuted, or a chime is off by more than 2 %:\n" + page)
+    (options.out / "REPRODUCTION.md").write_text(page)
+    print(f"written: {options.out / 'REPRODUCTION.md'}")
+
+
+if __name__ == "__main__":
+    main()
