@@ -35,6 +35,24 @@ class VolumeApi : public ServedDaemon {
     return scene;
   }
 
+  /// Strikes the scene and stops all scenes while it rings. The model rings for seconds, so that
+  /// only the stop ends it before the test's time is over.
+  v1::StopAllResponse StrikeAndStop(const std::string& scene) {
+    EXPECT_EQ(StrikeLive(scene).accepted_count(), 1U);
+    const auto ringing = [&] {
+      v1::GetMixerResponse mixer;
+      EXPECT_TRUE(Call(*audio, &v1::AudioService::Stub::GetMixer, {}, mixer).ok());
+      return mixer.active_mode_count();
+    };
+    while (ringing() == 0) {
+    }
+    v1::StopAllResponse stopped;
+    EXPECT_TRUE(Call(*scenes, &v1::SceneService::Stub::StopAll, {}, stopped).ok());
+    while (ringing() > 0) {
+    }
+    return stopped;
+  }
+
   /// The records of the stream that `act` sends to a scene.
   template <class Act>
   std::vector<v1::ContactTraceRecord> Recorded(const std::string& scene, Act act) {
@@ -161,21 +179,8 @@ TEST_F(VolumeApi, TheMixerTellsTheVolumeOfTheOutput) {
 }
 
 TEST_F(VolumeApi, AStopEndsWhatRings) {
-  const std::string scene = SceneWithObject();
-  ASSERT_EQ(StrikeLive(scene).accepted_count(), 1U);
-  v1::GetMixerResponse mixer;
-  const auto ringing = [&] {
-    EXPECT_TRUE(Call(*audio, &v1::AudioService::Stub::GetMixer, {}, mixer).ok());
-    return mixer.active_mode_count();
-  };
-  while (ringing() == 0) {
-  }
-  v1::StopAllResponse stopped;
-  ASSERT_TRUE(Call(*scenes, &v1::SceneService::Stub::StopAll, {}, stopped).ok());
+  v1::StopAllResponse stopped = StrikeAndStop(SceneWithObject());
   EXPECT_EQ(stopped.scene_count(), 1U);
-  // The model rings for seconds, so that only the stop ends it before the test's time is over.
-  while (ringing() > 0) {
-  }
   v1::StopAllRequest request;
   request.set_scene("scenes/999");
   ExpectRefused(Call(*scenes, &v1::SceneService::Stub::StopAll, request, stopped),
@@ -202,18 +207,7 @@ TEST_F(VolumeApi, AStemIsTheSceneAloneAndItsRecordedContactsRenderToTheSameSampl
 
 TEST_F(VolumeApi, AfterAStopASceneSoundsBitForBitAsOneThatNeverSounded) {
   const std::string scene = SceneWithObject();
-  ASSERT_EQ(StrikeLive(scene).accepted_count(), 1U);
-  v1::GetMixerResponse mixer;
-  const auto ringing = [&] {
-    EXPECT_TRUE(Call(*audio, &v1::AudioService::Stub::GetMixer, {}, mixer).ok());
-    return mixer.active_mode_count();
-  };
-  while (ringing() == 0) {
-  }
-  v1::StopAllResponse stopped;
-  ASSERT_TRUE(Call(*scenes, &v1::SceneService::Stub::StopAll, {}, stopped).ok());
-  while (ringing() > 0) {
-  }
+  StrikeAndStop(scene);
   ExpectRendersAsHeard(scene, [&] { StrikeLive(scene); });
 }
 
