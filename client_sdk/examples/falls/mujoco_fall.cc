@@ -4,15 +4,19 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdio>
 #include <cstring>
 #include <memory>
 #include <numbers>
 #include <span>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
 #include "client_sdk/adapters/mujoco_contacts.h"
 #include "client_sdk/examples/falls/fall.h"
@@ -32,12 +36,31 @@ double DampingRatio(double restitution) {
   return logarithm / std::hypot(std::numbers::pi, logarithm);
 }
 
+/// MuJoCo leaves out contacts that do not fit into its buffers. A part is a ball, a box or a hull;
+/// each can lie on the ground and on others with a few contacts each. A contact with friction has
+/// a row along the normal and two across it.
+constexpr size_t kContactsPerPart = 24, kRowsPerContact = 3;
+
+size_t PartCount(const FallScene& scene) {
+  size_t count = 0;
+  for (const Body& body : scene.bodies) {
+    const auto* boxes = std::get_if<std::vector<Box>>(&body.shape);
+    count += boxes != nullptr ? boxes->size() : 1;
+  }
+  return count;
+}
+
+/// MuJoCo would write its warnings into MUJOCO_LOG.TXT in the current folder.
+void PrintWarning(const char* message) { absl::FPrintF(stderr, "MuJoCo: %s\n", message); }
+
 class Mjcf {
  public:
   Mjcf(const FallScene& scene, double step_s) {
     // The engine's manual: not stiffer than two steps.
     constexpr double kSoftness_s = 0.005;
-    absl::StrAppend(&text_, "<mujoco><option timestep='", step_s, "' gravity='",
+    const size_t contact_count = kContactsPerPart * PartCount(scene);
+    absl::StrAppend(&text_, "<mujoco><size nconmax='", contact_count, "' njmax='",
+                    kRowsPerContact * contact_count, "'/><option timestep='", step_s, "' gravity='",
                     Text(scene.gravity_m_per_s2),
                     "' cone='elliptic' impratio='10'/><default><geom friction='", scene.friction,
                     " 0 0' solref='", std::max(kSoftness_s, 2 * step_s), " ",
@@ -158,6 +181,7 @@ class MujocoFall {
 }  // namespace
 
 absl::StatusOr<Simulation> FallInMujoco(const FallScene& scene, double step_s) {
+  mju_user_warning = &PrintWarning;
   absl::StatusOr<Model> model = Compile(Mjcf(scene, step_s).text());
   if (!model.ok()) return model.status();
   const auto fall = std::make_shared<MujocoFall>(scene, *std::move(model));

@@ -30,7 +30,9 @@ def draw(sound, stem, title):
     wave.legend(loc="upper right")
     wave.set_ylabel("full scale")
     wave.set_title(title)
-    _, _, _, image = picture.specgram(sound.mono + 1e-12, NFFT=2048, noverlap=1536, Fs=sound.sample_rate_hz / 1000,
+    # A noise far below the scale stands for digital silence, which has no level in dB.
+    dither = numpy.random.default_rng(0).normal(scale=1e-10, size=len(sound.mono))
+    _, _, _, image = picture.specgram(sound.mono + dither, NFFT=2048, noverlap=1536, Fs=sound.sample_rate_hz / 1000,
                                       scale="dB", cmap="magma", vmin=-140, vmax=-50)
     image.set_extent((0, sound.seconds, 0, highest_khz))
     picture.set_xlim(0, sound.seconds)
