@@ -100,7 +100,7 @@ class VolumeApi : public ServedDaemon {
     const auto heard = audio->Listen(&listening, listen);
     v1::ListenResponse block;
     EXPECT_TRUE(heard->Read(&block));
-    const std::vector<v1::ContactTraceRecord> records = Recorded(scene, act);
+    std::vector<v1::ContactTraceRecord> records = Recorded(scene, act);
     EXPECT_EQ(records.size(), 3U);
     const uint64_t first_frame = records[0].header().clock().first_frame();
     const std::vector<float> rendered = Render(records, 1);
