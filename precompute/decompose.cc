@@ -140,8 +140,7 @@ void WarnOfLowerBand(const DeformationModes& solution, const IntendedUse& use, M
   model.warnings.push_back(absl::StrFormat(
       "only the %d modes below %.5g Hz were computed, because all of some %d below %g Hz would "
       "need more than %d GiB or %g s of processor time; ask for that band (--band) to have them "
-      "all, or for "
-      "the most audible of them (--keep)",
+      "all, or for the most audible of them (--keep)",
       model.eigenvalues.size(), use.FrequencyHz(solution.complete_to_eigenvalue),
       solution.mode_count_below_asked, use.high_hz, kUsualMeans.bytes >> 30U, kUsualMeans.cpu_s));
 }
@@ -151,10 +150,9 @@ void WarnOfGreatErrors(ModalModel& model) {
                                           [](double error) { return error > kGreatError; });
   if (many == 0) return;
   model.warnings.push_back(absl::StrFormat(
-      "very inaccurate: the frequencies of %d of %d modes are estimated to be off by more than %g "
-      "%%, "
-      "the worst by %.3g %%; ask for a finer mesh (--accuracy, --budget or --nodes), or leave "
-      "these modes out (--max-frequency-error)",
+      "very inaccurate: the frequencies of %d of %d modes are estimated to be off by more than "
+      "%g %%, the worst by %.3g %%; ask for a finer mesh (--accuracy, --budget or --nodes), or "
+      "leave these modes out (--max-frequency-error)",
       many, model.eigenvalues.size(), 100 * kGreatError, 100 * model.WorstError()));
 }
 

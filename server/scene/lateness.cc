@@ -3,13 +3,15 @@
 
 #include <cmath>
 
+#include "server/scene/offline_renderer.h"
+
 namespace carillon {
 namespace {
 
 /// Two steps alone say nothing about those that follow.
 constexpr uint64_t kFewestLateSteps = 3;
-/// A recorded trace begins at a multiple of this (OfflineRenderer::kBlockFrameCount).
-constexpr uint64_t kGrainFrames = 128;
+/// A recorded trace begins at a multiple of this.
+constexpr uint64_t kGrainFrames = OfflineRenderer::kBlockFrameCount;
 
 }  // namespace
 

@@ -26,8 +26,8 @@ class Lateness {
 
  private:
   const double sample_rate_hz_;
-  std::optional<uint64_t> since_frame_;  // at which the first step of an unbroken run came late
-  uint64_t step_count_ = 0;              // of the run
+  std::optional<uint64_t> since_frame_;  // when the first of the newest, unbroken late steps came
+  uint64_t step_count_ = 0;              // number of these steps
   uint64_t remap_count_ = 0;
 };
 

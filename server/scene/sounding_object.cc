@@ -93,15 +93,7 @@ std::optional<MovedBody> MovedBodyOf(const Transfer* transfer, const SoundingBod
                                      const ObjectProperties& properties) {
   if (transfer == nullptr || !transfer->rigid) return std::nullopt;
   if (properties.radiation == RadiationModel::kModesOnly) return std::nullopt;
-  const RigidRadiation& rigid = *transfer->rigid;
-  RigidBody moved{.volume_m3 = rigid.volume_m3,
-                  .center_of_mass_m = rigid.center_of_mass_m,
-                  .inertia_kg_m2 = rigid.inertia_kg_m2};
-  for (size_t i = 0; i < rigid.motions.size(); ++i) {
-    moved.motions[i] = {.radius_m = rigid.motions[i].radius_m,
-                        .strengths = rigid.motions[i].strengths};
-  }
-  return MovedBody{.body = moved,
+  return MovedBody{.body = *transfer->rigid,
                    .density_kg_per_m3 = properties.material.density_kg_per_m3,
                    .size = properties.material.size,
                    .vertices = body.model->vertices,

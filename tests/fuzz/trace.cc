@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads the input as the requests of a rendering, in protobuf's delimited form, and renders a
-// second of what was accepted. The database has one small model, "modalModels/aaa...".
+// Reads the input as the requests of a rendering, in protobuf's delimited form, and renders one
+// second of the contacts that are accepted. The database has one small model, "modalModels/aaa...".
 #include <google/protobuf/io/zero_copy_stream_impl_lite.h>
 #include <google/protobuf/util/delimited_message_util.h>
 

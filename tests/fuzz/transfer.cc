@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads the input as the records of a stored transfer, and what is taken as the server does.
+// Reads the input as the records of a stored transfer, and decodes an accepted one as the server
+// does.
 #include <cstdint>
 #include <string>
 

@@ -3,10 +3,10 @@
 
 const fs = require('fs');
 const HavokPhysics = require('@babylonjs/havok');
+const { cross } = require('../../adapters/contact_rows');
 const { HavokContacts } = require('../../adapters/havok_contacts');
 
 const NOT_TURNED = [1, 0, 0, 0];
-const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 const quaternion = ([w, x, y, z]) => [x, y, z, w];
 // Havok has no half spaces; a box below z = 0 stands for one.
 const GROUND_M = [20, 20, 1];

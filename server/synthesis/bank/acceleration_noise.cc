@@ -48,7 +48,7 @@ std::array<double, 9> Inverse(const std::array<double, 6>& t) {
   return inverse;
 }
 
-RigidBody Scaled(RigidBody body, double size, double density) {
+RigidRadiation Scaled(RigidRadiation body, double size, double density) {
   body.volume_m3 *= std::pow(size, 3);
   for (double& coordinate : body.center_of_mass_m) coordinate *= size;
   for (double& moment : body.inertia_kg_m2) moment *= density * std::pow(size, 5);
@@ -147,7 +147,7 @@ AccelerationNoise::Weights AccelerationNoise::WeightsTowards(const Bearing& bear
   basis_.Evaluate(bearing.direction);
   Weights weights{};
   for (size_t source = 0; source < kSources; ++source) {
-    const RigidBody::Motion& motion = moved_.body.motions[source / 2];
+    const RigidRadiation::Motion& motion = moved_.body.motions[source / 2];
     double pattern = 0;
     for (size_t i = kFirstHarmonic[source % 2]; i < kFirstHarmonic[source % 2 + 1]; ++i) {
       pattern += motion.strengths[i] * basis_.values()[i];
@@ -164,7 +164,7 @@ AccelerationNoise::Weights AccelerationNoise::MeanWeights() const noexcept {
     for (size_t i = kFirstHarmonic[order]; i < kFirstHarmonic[order + 1]; ++i) {
       double harmonic = 0;
       for (size_t motion = 0; motion < kMotions; ++motion) {
-        const RigidBody::Motion& of = moved_.body.motions[motion];
+        const RigidRadiation::Motion& of = moved_.body.motions[motion];
         const double part = pushed_[motion] * Square(of.radius_m) * of.strengths[i];
         harmonic += part;
         weights[2 * motion + order] += part * part;

@@ -7,29 +7,16 @@
 #include <span>
 
 #include "server/base/fixed_vector.h"
+#include "server/base/rigid_radiation.h"
 #include "server/synthesis/bank/harmonic_basis.h"
 #include "server/synthesis/schedule/bearing.h"
 #include "server/synthesis/schedule/mixer_event.h"
 
 namespace carillon {
 
-/// How a free body of unit density radiates when it accelerates as a whole
-/// (proto/carillon/v1/transfer.proto, RigidBody).
-struct RigidBody {
-  /// The equivalent sphere of one motion.
-  struct Motion {
-    double radius_m = 0;
-    std::array<double, 9> strengths{};  ///< s_lm at l^2 + l + m; for rotation in metres
-  };
-  double volume_m3 = 0;
-  std::array<double, 3> center_of_mass_m{};
-  std::array<double, 6> inertia_kg_m2{};  ///< about the centre of mass: xx, yy, zz, xy, yz, zx
-  std::array<Motion, 6> motions{};        ///< translation along x, y, z, rotation about x, y, z
-};
-
 /// A rigid body as an object of a scene. The vertices belong to `owner`.
 struct MovedBody {
-  RigidBody body;
+  RigidRadiation body;
   double density_kg_per_m3 = 0;
   double size = 1;                                   ///< relative to the body's
   std::span<const std::array<float, 3>> vertices{};  ///< of the sounding surface, unscaled
@@ -130,7 +117,7 @@ class AccelerationNoise {
   MovedBody moved_;
   double rate_;
   double scale_;                   // samples at 1 m of unit acceleration times a^2 S
-  std::array<double, 9> inverse_;  // of the tensor of inertia, 1/(kg m^2)
+  std::array<double, 9> inverse_;  // inverse tensor of inertia, 1/(kg m^2)
   std::array<Pole, kPoles> poles_;
   size_t pole_count_ = 0;
   HarmonicBasis basis_{2};

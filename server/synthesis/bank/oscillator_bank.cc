@@ -35,8 +35,8 @@ bool OscillatorBank::RenderAddInTime(BlockMix& mix) noexcept {
   return RenderModesInTime(mix);
 }
 
-/// The acceleration's sound has the listener's direction already, so that it is in both renderings
-/// of a block whose gains move.
+/// Adds the sound of the body's acceleration. It is made for the listener's direction, so that both
+/// renderings get it while the gains of the modes move.
 void OscillatorBank::RenderAcceleration(BlockMix& mix) noexcept {
   if (moved_ == nullptr || !moved_->active()) return;
   std::array<float, kMostBlockFrames> sound{};

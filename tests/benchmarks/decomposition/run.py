@@ -7,7 +7,6 @@ Each part prints a Markdown table:
   calculix  CalculiX on the same meshes: frequencies
   curved    CalculiX, SciPy and Lamb on curved ten-node meshes of Gmsh: frequencies
   growth    time and memory over the number of nodes, up to a million with --full
-  table1    the sizes of the paper's Table 1, beside its times
   accuracy  --accuracy 1% on five bodies: estimated and true errors of every mode
 
 Nothing is kept from one run to the next. Slow programs on large bodies run with --full only, or where
@@ -25,7 +24,6 @@ import calculix
 import compare
 import curved
 import growth
-import table1
 
 
 def processor_flags():
@@ -51,7 +49,7 @@ def fair_environment():
 
 PARTS = {"compare": compare.compare, "calculix": calculix.compare_frequencies,
          "curved": curved.curved,
-         "table1": table1.table1, "growth": growth.growth, "accuracy": accuracy.accuracy}
+         "growth": growth.growth, "accuracy": accuracy.accuracy}
 
 
 def names(text):
