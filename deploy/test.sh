@@ -47,8 +47,9 @@ fi
 # The targets tests_ROOM are made by carillon_needs in deploy/cmake/CarillonRoom.cmake.
 targets=()
 selection=()
-# Packages are made and tried in a bare Debian only when their test is named: that takes minutes, and the network.
-if [[ " ${rooms[*]} " == *" deploy/bare_packages "* ]]; then
+# Packages are made and tried in a bare Debian or a container only when their test is named: that takes minutes, and
+# the network.
+if [[ " ${rooms[*]} " =~ " deploy/bare_"(packages|container)" " ]]; then
   lists+=(packages)
 else
   excluded="${excluded:+$excluded|}packages"
