@@ -14,12 +14,14 @@ import math
 import os
 import pathlib
 import random
+import subprocess
 import sys
 import tempfile
 import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 DENSITIES_KG_PER_M3 = {"structural_steel": 7850, "soda_lime_glass": 2500, "porcelain": 2400, "oak": 750, "abs": 1050}
+MOST_ATTEMPTS = 10
 HEXAGON = [(math.cos(math.pi * i / 3), math.sin(math.pi * i / 3)) for i in range(6)]
 
 
@@ -126,10 +128,15 @@ def simulate(models, traces, number, options):
     if trace.exists():
         return False
     part = traces / f"{number:05}.part"
-    falls.record("mujoco", fall(models, number, options), part, rate=1000, seconds=options.seconds,
-                 build=options.build)
-    part.rename(trace)
-    return True
+    for attempt in range(MOST_ATTEMPTS):
+        try:
+            falls.record("mujoco", fall(models, f"{number} {attempt}", options), part, rate=1000,
+                         seconds=options.seconds, build=options.build)
+        except subprocess.CalledProcessError:
+            continue  # MuJoCo warns of an unstable simulation about once in a hundred falls
+        part.rename(trace)
+        return True
+    raise RuntimeError(f"{MOST_ATTEMPTS} falls of number {number} were unstable")
 
 
 def create_models(client, folder):

@@ -85,7 +85,7 @@ def main():
     parser.add_argument("name")
     parser.add_argument("--engine", default="bullet")
     parser.add_argument("--rate", type=int, default=1000, help="steps a second")
-    parser.add_argument("--seconds", type=float, default=2.5, help="simulated time")
+    parser.add_argument("--seconds", type=float, help="simulated time, if not what the scene says")
     parser.add_argument("--build", type=pathlib.Path, default=ROOT / "build/release")
     parser.add_argument("--out", type=pathlib.Path, help="a folder; BUILD/examples unless named")
     options = parser.parse_args()
