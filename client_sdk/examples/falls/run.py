@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Runs one example: simulates it in an engine, renders its contacts, and draws what is heard.
 
-Leaves NAME-ENGINE.contacts, .wav (stereo, each body from its place), -spectrogram.png and -spectrum.png.
+Leaves NAME-ENGINE.contacts, .wav (stereo, each body from its place), -spectrogram.png and -spectrum.png,
+and with --video NAME-ENGINE.mp4.
 """
 
 import argparse
@@ -87,6 +88,7 @@ def main():
     parser.add_argument("--rate", type=int, default=1000, help="steps a second")
     parser.add_argument("--seconds", type=float, help="simulated time, if not what the scene says")
     parser.add_argument("--build", type=pathlib.Path, default=ROOT / "build/release")
+    parser.add_argument("--video", action="store_true", help="make a video, too; needs an X server, such as Xvfb")
     parser.add_argument("--out", type=pathlib.Path, help="a folder; BUILD/examples unless named")
     options = parser.parse_args()
     build = options.build.resolve()
@@ -117,8 +119,13 @@ def main():
             daemon.stop()
     findings = sound.summary.findings
     print(f"{stem.name}: {findings.blow_count} blows, {findings.load_count} loads, peak {sound.peak:.3g} of full scale")
-    sound.normalized().save(stem.with_suffix(".wav"))
+    wav = stem.with_suffix(".wav")
+    sound.normalized().save(wav)
     draw(sound, stem, f"{options.name.replace('_', ' ')} in {options.engine}")
+    if options.video:
+        import video
+        video.make(options.engine, scene, folder, wav, stem.with_suffix(".mp4"), rate=options.rate,
+                   seconds=options.seconds, build=build)
 
 
 if __name__ == "__main__":
