@@ -12,7 +12,7 @@ import falls
 
 BUNNY = pathlib.Path("/usr/share/glmark2/models/bunny.obj")  # of Debian's glmark2-data; it crosses itself
 LENGTH_M, WALL_M, KG_PER_M3 = 0.15, 0.008, 2700
-SHELF_M = (0.30, 0.22, 0.02)
+SHELF_M = (0.30, 0.30, 0.02)
 MOST_CORNERS = 120
 
 
@@ -94,16 +94,17 @@ def chute():
 
 
 def bunnies(folder):
-    """The scene. Shelves slope by 14 degrees, by turns to either side, so that a bunny tumbles down all three."""
+    """The scene. Shelves slope to either side by turns, so that a bunny tumbles down all three."""
     shape = bunny(folder)
     bodies = [{"name": "floor", "shape": {"plane": {}}}, *chute(),
-              shelf("plastic shelf", "shelf_plastic", (0.0, 0, 0.90), -14),
-              shelf("aluminium shelf", "shelf_aluminum", (-0.26, 0, 0.58), 14),
-              shelf("wooden shelf", "shelf_wood", (0.02, 0, 0.28), -14)]
-    # The metal bunny comes behind the ceramic one.
-    for name, material, up in (("ceramic bunny", "bunny_ceramic", 0.0), ("metal bunny", "bunny_metal", 0.32)):
-        bodies.append({"name": name, "material": material, **shape, "position_m": [-0.55 - 0.64 * up, 0, 1.6 + up],
-                       "orientation": falls.product(falls.about((0, 0, 1), 30 + 200 * up),
+              board("wall", (1.2, 0.02, 1.6), (-0.1, SHELF_M[1] / 2 + 0.01, 0.8), 0),
+              shelf("plastic shelf", "shelf_plastic", (0.0, 0, 0.90), -24),
+              shelf("aluminium shelf", "shelf_aluminum", (-0.30, 0, 0.56), 24),
+              shelf("wooden shelf", "shelf_wood", (0.04, 0, 0.24), -24)]
+    # The metal bunny comes after the ceramic one.
+    for name, material, up in (("ceramic bunny", "bunny_ceramic", 0.0), ("metal bunny", "bunny_metal", 0.5)):
+        bodies.append({"name": name, "material": material, **shape, "position_m": [-0.52, 0, 1.6 + up],
+                       "orientation": falls.product(falls.about((0, 0, 1), 30 + 60 * up),
                                                     falls.about((1, 0, 0), 40)),
-                       "angular_velocity_rad_per_s": [0, 2, 0]})
-    return {"friction": 0.3, "restitution": 0.2, "seconds": 4, "extent_m": 1.2, "bodies": bodies}
+                       "angular_velocity_rad_per_s": [0, 2 + up, 0]})
+    return {"friction": 0.25, "restitution": 0.1, "seconds": 4, "extent_m": 1.2, "bodies": bodies}

@@ -97,6 +97,7 @@ def add_body(vtk, renderer, body, folder):
         mapper.ScalarVisibilityOff()
         actor.SetMapper(mapper)
         actor.GetProperty().SetColor(GROUND if "plane" in body["shape"] else colour_of(body))
+        actor.GetProperty().SetAmbient(0.25)
         actor.GetProperty().SetSpecular(0.3)
         actor.GetProperty().SetSpecularPower(25)
         renderer.AddActor(actor)
@@ -129,8 +130,8 @@ def stage(vtk, scene):
     renderer.AddLight(light)
     camera = renderer.GetActiveCamera()
     camera.SetViewUp(0, 0, 1)
-    camera.SetFocalPoint(scene.get("look_at_m", (0, 0, 0.15 * extent)))
-    camera.SetPosition(scene.get("camera_m", (0.5 * extent, -1.5 * extent, 0.6 * extent)))
+    camera.SetFocalPoint(scene.get("look_at_m", (0, 0, 0.1 * extent)))
+    camera.SetPosition(scene.get("camera_m", (0.4 * extent, -1.1 * extent, 0.5 * extent)))
     camera.SetViewAngle(36)
     renderer.ResetCameraClippingRange(-20, 20, -20, 20, -20, 20)
     return renderer, window
