@@ -20,7 +20,7 @@ import numpy
 import carillon
 import meshes
 import sound
-from daemon import BIN, DaemonTest
+from daemon import BIN, ROOT, DaemonTest
 
 CLIP_COUNT = int(os.environ.get("CARILLON_CLIPS", "12"))
 KILL_COUNT = int(os.environ.get("CARILLON_CLIP_KILLS", "4"))
@@ -195,6 +195,15 @@ class ClipsTest(DaemonTest):
             self.assertTrue(all(numpy.abs(stem).max() > 0 for stem in stems))
             # Each file is rounded to 24 bits, and the tail of a stem that is below -80 dB may be left out.
             numpy.testing.assert_allclose(sum(stems), mix, atol=1.1e-4)
+
+    def test_the_tasks_of_a_slurm_array_give_the_same_bytes(self):
+        backup, out = self.folder / "backup.db", self.new_folder()
+        self.daemon.command("db", "backup", backup)
+        for task in ("1", "2"):
+            subprocess.run([ROOT / "deploy/slurm/render_clips.sh", self.traces, out, backup, "--stems"], check=True,
+                           env={**os.environ, "CARILLON_BIN": str(BIN), "SLURM_ARRAY_TASK_ID": task,
+                                "SLURM_ARRAY_TASK_COUNT": "2"})
+        self.assertEqual(contents(out), self.expected)
 
     def test_refusals(self):
         empty = self.new_folder()
