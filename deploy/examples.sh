@@ -27,5 +27,6 @@ elif [[ " $* " == *" --video "* ]]; then
   run=(xvfb-run -a -s "-screen 0 640x480x24" "${run[@]}")
 fi
 "$root/deploy/setup.sh" "${lists[@]}"
-"$root/deploy/build.sh" release carillond carillon carillon-precompute carillon-fall carillon-wind-chimes carillon_python
+"$root/deploy/build.sh" release \
+  carillond carillon carillon-precompute carillon-fall carillon-wind-chimes carillon_python
 exec "${run[@]}" --build "$root/build/release" "$@"

@@ -18,7 +18,7 @@ struct ClipFile {
   std::string digest;  ///< SHA-256, hexadecimal
 };
 
-/// What the record of a clip says: a line of JSON, which docs/clips.md describes.
+/// The content of the record of a clip: a line of JSON, which docs/clips.md describes.
 struct ClipRecord {
   std::string clip;          ///< the name of the trace without its suffix
   std::string trace_digest;  ///< SHA-256, hexadecimal

@@ -119,7 +119,7 @@ struct RenderOptions {
   std::optional<double> full_scale_pa;  ///< pressure of a sample of 1; absent: the daemon's default
   bool normalize = false;  ///< scale the sound to a peak of 0.9 of full scale, before `gain`
   int bits = 24;           ///< of a sample: 16, 24, or 32 for floating point
-  // Of a folder only.
+  // These apply to a folder only.
   bool stems = false;       ///< write the sound of each object alone, too
   size_t worker_count = 1;  ///< clips at a time
   Shard shard{};

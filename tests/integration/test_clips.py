@@ -59,9 +59,11 @@ class ClipsTest(DaemonTest):
         left, right = (trace.add(cls.model, meshes.MATERIAL, label=name, handle=handle)
                        for name, handle in (("left \"bar\"", 3), ("right", 7)))
         for step in range(8):
-            contacts = carillon.Contacts(left, [(0.1, 0.005, 0.01)], [(0, 0, -0.01 * (number + 1))], second_objects=[right],
-                                         second_points=[(0.1, 0.005, 0)]) if step == 4 else None
-            impulses = carillon.Impulses(left, [(0.2 * rng.random(), 0.01, 0.01)], [(0, 0, -0.02)]) if not step else None
+            contacts = carillon.Contacts(
+                left, [(0.1, 0.005, 0.01)], [(0, 0, -0.01 * (number + 1))], second_objects=[right],
+                second_points=[(0.1, 0.005, 0)]) if step == 4 else None
+            at = (0.2 * rng.random(), 0.01, 0.01)
+            impulses = carillon.Impulses(left, [at], [(0, 0, -0.02)]) if step == 0 else None
             trace.step(step * 0.01, contacts=contacts, impulses=impulses)
         trace.write(cls.traces / f"{number:03}.contacts")
 

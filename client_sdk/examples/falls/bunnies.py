@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The example of the bunnies: two hollow ones, of ceramic and of metal, slide down a chute and tumble over three shelves
-of plastic, aluminium and wood, which are screwed to a wall and sound, too.
+"""The example of the bunnies: two hollow ones, of ceramic and of metal, slide down a chute and tumble over three
+shelves of plastic, aluminium and wood, which are screwed to a wall and sound, too.
 """
 
 import math

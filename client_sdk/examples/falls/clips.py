@@ -36,11 +36,11 @@ def ball(radius):
             "inertia_per_kg": [0.4 * radius**2] * 3}
 
 
-def hull(name, corners, faces, volume, inertia, folder):
+def hull(path, corners, faces, volume, inertia):
     """A convex body about its centre of mass, whose surface goes into a file."""
     import scene_makers
-    scene_makers.write_obj(folder / f"{name}.obj", corners, faces)
-    return {"shape": {"hull": {"corners_m": corners}}, "mesh": f"{name}.obj", "volume_m3": volume,
+    scene_makers.write_obj(path, corners, faces)
+    return {"shape": {"hull": {"corners_m": corners}}, "mesh": path.name, "volume_m3": volume,
             "extent_m": 2 * max(math.hypot(*corner) for corner in corners), "inertia_per_kg": inertia}
 
 
@@ -53,20 +53,21 @@ def prism(name, radius, height, folder):
         faces += [(i, j, j + 6), (i, j + 6, i + 6)]
     along = 5 / 12 * radius**2
     across = along / 2 + height**2 / 12
-    return hull(name, corners, faces, 1.5 * math.sqrt(3) * radius**2 * height, [across, across, along], folder)
+    volume = 1.5 * math.sqrt(3) * radius**2 * height
+    return hull(folder / f"{name}.obj", corners, faces, volume, [across, across, along])
 
 
 def octahedron(radius, folder):
     corners = [(radius, 0, 0), (0, radius, 0), (0, 0, radius), (-radius, 0, 0), (0, -radius, 0), (0, 0, -radius)]
     faces = [(0, 1, 2), (1, 3, 2), (3, 4, 2), (4, 0, 2), (1, 0, 5), (3, 1, 5), (4, 3, 5), (0, 4, 5)]
-    return hull("octahedron", corners, faces, 4 / 3 * radius**3, [radius**2 / 5] * 3, folder)
+    return hull(folder / "octahedron.obj", corners, faces, 4 / 3 * radius**3, [radius**2 / 5] * 3)
 
 
 def tetrahedron(half, folder):
     """Four corners of a cube whose sides are twice `half`."""
     corners = [(half, half, half), (half, -half, -half), (-half, half, -half), (-half, -half, half)]
     faces = [(0, 1, 2), (0, 3, 1), (0, 2, 3), (1, 3, 2)]
-    return hull("tetrahedron", corners, faces, 8 / 3 * half**3, [0.4 * half**2] * 3, folder)
+    return hull(folder / "tetrahedron.obj", corners, faces, 8 / 3 * half**3, [0.4 * half**2] * 3)
 
 
 def hollow(kind, inradius, wall):
