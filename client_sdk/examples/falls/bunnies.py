@@ -107,4 +107,5 @@ def bunnies(folder):
                        "orientation": falls.product(falls.about((0, 0, 1), 30 + 60 * up),
                                                     falls.about((1, 0, 0), 40)),
                        "angular_velocity_rad_per_s": [0, 2 + up, 0]})
-    return {"friction": 0.25, "restitution": 0.1, "seconds": 4, "extent_m": 1.2, "bodies": bodies}
+    return {"friction": 0.25, "restitution": 0.1, "seconds": 4, "extent_m": 1.2, "bodies": bodies,
+            "camera_m": (0.7, -2.9, 1.5), "look_at_m": (-0.15, 0, 0.85)}
