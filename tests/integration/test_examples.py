@@ -40,8 +40,9 @@ class ExamplesTest(DaemonTest):
     def test_blocks_sound_from_every_engine(self):
         for engine in falls.ENGINES:
             with self.subTest(engine):
-                sound = self.run_example("blocks", engine, 0.5)
-                self.assertEqual(sound.summary.findings.distant_point_count, 0)
+                findings = self.run_example("blocks", engine, 0.5).summary.findings
+                # An engine lets a corner sink in now and then; points in a wrong frame would be far away throughout.
+                self.assertLess(findings.distant_point_count, 0.01 * findings.load_count)
 
     def test_chimes_sound_from_both_sides(self):
         sound = self.run_example("chimes", "bullet", 3)
