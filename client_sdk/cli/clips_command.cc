@@ -132,7 +132,7 @@ class ClipRenderer {
                           const RenderedForm& form, ClipRecord& record) const {
     constexpr auto kPause = std::chrono::milliseconds(50);
     while (true) {
-      const absl::Status status = TryRenderFile(path, settings, form, record);
+      absl::Status status = TryRenderFile(path, settings, form, record);
       const std::string reason = status.ok() ? "" : ToErrorInfo(status).reason();
       if (reason != "TOO_MANY_RENDERINGS" && reason != "CLIENT_LIMIT_REACHED") return status;
       std::this_thread::sleep_for(kPause);
