@@ -4,9 +4,9 @@
 # deploy/setup.sh LIST...
 #
 # Installs what is missing of the packages in the given lists, from Debian as this machine's apt is set up. A list is
-# one of deploy/packages/ (programs, engines, tests, languages, packages, lint, fuzz, client) or a file. From the npm
-# registry `lint` also installs buf, `tests`, `packages` and `engines` what the client for Node needs, and `tests` and
-# `engines` the engines that run in Node.
+# one of deploy/packages/ (programs, engines, videos, tests, languages, packages, lint, fuzz, client) or a file. From
+# the npm registry `lint` also installs buf, `tests`, `packages` and `engines` what the client for Node needs, and
+# `tests` and `engines` the engines that run in Node.
 # Calls neither registry when nothing is missing.
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)

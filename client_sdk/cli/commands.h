@@ -102,10 +102,16 @@ struct ListenOptions {
   std::optional<double> seconds;  ///< absent: until the program is stopped
 };
 
+/// The part of the clips of a folder that one run renders: every `count`-th.
+struct Shard {
+  size_t number = 1;  ///< 1 to `count`
+  size_t count = 1;
+};
+
 /// The options of `carillon render`.
 struct RenderOptions {
-  std::string trace;
-  std::string out;  ///< "-": stdout
+  std::string trace;  ///< a contact trace, or a folder of them
+  std::string out;    ///< "-": stdout
   uint32_t sample_rate_hz = 48000;
   uint32_t channel_count = 1;
   double tail_s = 0;
@@ -113,6 +119,10 @@ struct RenderOptions {
   std::optional<double> full_scale_pa;  ///< pressure of a sample of 1; absent: the daemon's default
   bool normalize = false;  ///< scale the sound to a peak of 0.9 of full scale, before `gain`
   int bits = 24;           ///< of a sample: 16, 24, or 32 for floating point
+  // These apply to a folder only.
+  bool stems = false;       ///< write the sound of each object alone, too
+  size_t worker_count = 1;  ///< clips at a time
+  Shard shard{};
 };
 
 /// The commands. Each prints its result to stdout, as JSON if `json` is true, and returns its
@@ -164,6 +174,13 @@ absl::Status Strike(const client::Client& daemon, const StrikeOptions& options,
 absl::Status Listen(const client::Client& daemon, const ListenOptions& options,
                     const StopSignal& stop);
 absl::Status Render(const client::Client& daemon, const RenderOptions& options, bool json);
+/// Renders the contact traces of a folder into another (see ClipFolder). Clips that are there
+/// already stay. A trace that cannot be rendered does not stop the others. Errors: NotFound
+/// (NO_TRACES), Internal (OUTPUT_NOT_WRITABLE), FailedPrecondition (CLIPS_FAILED).
+absl::Status RenderClips(const client::Client& daemon, const RenderOptions& options, bool json);
+v1::RenderSettings SettingsOf(const RenderOptions& options);
+/// The error of a trace without contacts.
+absl::Status EmptyTrace(const std::string& path);
 
 /// Returns the name of a scene that `text` names as "scenes/7" or "7"; empty stays empty.
 std::string SceneNamed(const std::string& text);

@@ -15,6 +15,7 @@
 #include "client_sdk/cli/model_options.h"
 #include "client_sdk/cli/output.h"
 #include "client_sdk/cli/program.h"
+#include "client_sdk/cli/render_options.h"
 #include "client_sdk/cli/sound_options.h"
 #include "proto/cpp/manual_page.h"
 #include "proto/cpp/striker_catalogue.h"
@@ -154,37 +155,6 @@ void AddListen(CLI::App& app, Program& program) {
     program.command = [&program, options] {
       const StopSignal stop;
       return Listen(*program.Daemon(), *options, stop);
-    };
-  });
-}
-
-void AddRender(CLI::App& app, Program& program) {
-  auto options = std::make_shared<RenderOptions>();
-  CLI::App& render = *app.add_subcommand("render", "Render a contact trace to a WAV file");
-  render.add_option("trace", options->trace, "The contact trace (.contacts)")->required();
-  render.add_option("--out", options->out, "The WAV file to write, or - for stdout")->required();
-  render.add_option("--gain", options->gain, "The factor of every sample")
-      ->check(CLI::Range(0.0, 1e6));
-  render.add_option("--full-scale-pa", options->full_scale_pa,
-                    "The pressure of a sample of full scale, Pa [200]");
-  render.add_flag("--normalize", options->normalize,
-                  "Scale the sound to a peak of 0.9 of full scale");
-  render
-      .add_option("--bits", options->bits, "The size of a sample: 16, 24, or 32 for floating point")
-      ->check(CLI::IsMember({16, 24, 32}))
-      ->capture_default_str();
-  render.add_option("--sample-rate", options->sample_rate_hz, "The sample rate, Hz")
-      ->capture_default_str();
-  render
-      .add_option("--channels", options->channel_count,
-                  "The number of channels: 1 for mono, 2 for stereo")
-      ->check(CLI::Range(1, 2))
-      ->capture_default_str();
-  render.add_option("--tail", options->tail_s,
-                    "The time to render after the last contact, s [until the sound has died away]");
-  render.callback([&program, options] {
-    program.command = [&program, options] {
-      return Render(*program.Daemon(), *options, program.json);
     };
   });
 }

@@ -1,16 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <algorithm>
-#include <cmath>
 #include <cstdio>
-#include <optional>
-#include <utility>
-#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "client_sdk/cli/commands.h"
 #include "client_sdk/cli/output.h"
-#include "client_sdk/cli/wave_file.h"
+#include "client_sdk/cli/rendered_file.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 
@@ -51,73 +46,40 @@ void PrintSummary(const RenderOptions& options, const v1::RenderSummary& summary
   }
 }
 
-/// Writes the blocks of a rendering to a file, or collects them first if their peak must be known.
-class RenderedFile {
- public:
-  explicit RenderedFile(const RenderOptions& options) : options_(options) {}
-
-  /// Returns false after an error.
-  bool Take(const client::AudioBlock& block) {
-    if (!file_) {
-      auto file = WaveFile::Create(options_.out, {.sample_rate_hz = block.sample_rate_hz,
-                                                  .channel_count = block.channel_count,
-                                                  .bits = options_.bits});
-      status_ = file.status();
-      if (file.ok()) file_ = *std::move(file);
-    }
-    samples_.insert(samples_.end(), block.samples.begin(), block.samples.end());
-    if (!options_.normalize && status_.ok()) Write(1);
-    return status_.ok();
-  }
-
-  /// Completes the file.
-  absl::Status Finish() {
-    constexpr float kPeak = 0.9F;
-    float peak = 0;
-    for (const float sample : samples_) peak = std::max(peak, std::abs(sample));
-    if (options_.normalize) Write(peak > 0 ? kPeak / peak : 1);
-    return status_.ok() && file_ ? file_->Finish() : status_;
-  }
-
-  bool begun() const { return file_.has_value(); }
-  const absl::Status& status() const { return status_; }
-
- private:
-  void Write(float factor) {
-    for (float& sample : samples_) sample *= factor * static_cast<float>(options_.gain);
-    status_ = file_->Write(samples_);
-    samples_.clear();
-  }
-
-  const RenderOptions& options_;
-  std::optional<WaveFile> file_;
-  std::vector<float> samples_;
-  absl::Status status_;
-};
-
 }  // namespace
 
-absl::Status Render(const client::Client& daemon, const RenderOptions& options, bool json) {
-  auto trace = client::ContactTraceReader::Open(options.trace);
-  if (!trace.ok()) return trace.status();
+v1::RenderSettings SettingsOf(const RenderOptions& options) {
   v1::RenderSettings settings;
   settings.set_sample_rate_hz(options.sample_rate_hz);
   settings.set_channel_count(options.channel_count);
   settings.set_tail_s(options.tail_s);
   if (options.full_scale_pa) settings.set_full_scale_pa(*options.full_scale_pa);
+  return settings;
+}
 
-  RenderedFile file(options);
-  const auto summary = daemon.Render(
-      settings, *trace, [&](const client::AudioBlock& block) { return file.Take(block); });
+absl::Status EmptyTrace(const std::string& path) {
+  return Refusal(absl::StatusCode::kInvalidArgument, "TRACE_EMPTY",
+                 absl::StrCat(path,
+                              ": holds no contact, so there is nothing to hear; "
+                              "record a simulation in which something is struck"));
+}
+
+absl::Status Render(const client::Client& daemon, const RenderOptions& options, bool json) {
+  auto trace = client::ContactTraceReader::Open(options.trace);
+  if (!trace.ok()) return trace.status();
+  RenderedFile file({.path = options.out,
+                     .format = {.sample_rate_hz = options.sample_rate_hz,
+                                .channel_count = options.channel_count,
+                                .bits = options.bits},
+                     .factor = options.gain,
+                     .normalize = options.normalize});
+  const auto summary =
+      daemon.Render(SettingsOf(options), *trace,
+                    [&](const client::AudioBlock& block) { return file.Take(block); });
   RETURN_IF_ERROR(file.status());
   if (!summary.ok()) return summary.status();
   RETURN_IF_ERROR(file.Finish());
-  if (!file.begun()) {
-    return Refusal(absl::StatusCode::kInvalidArgument, "TRACE_EMPTY",
-                   absl::StrCat(options.trace,
-                                ": holds no contact, so there is nothing to hear; "
-                                "record a simulation in which something is struck"));
-  }
+  if (!file.begun()) return EmptyTrace(options.trace);
   if (json && options.out != "-") {
     PrintJson(*summary);
   } else {

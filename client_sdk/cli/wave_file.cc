@@ -56,6 +56,8 @@ absl::StatusOr<WaveFile> WaveFile::Create(const std::string& path, const WaveFor
                            : SndfileHandle(memory, false, SFM_WRITE, form, channels, rate);
   // Its conversion to bool says nothing about the file.
   if (sound->file.error() != SF_ERR_NO_ERROR) return NotWritable(path, sound->file.strError());
+  // It has the time of day, and would make each file of the same samples another.
+  sound->file.command(SFC_SET_ADD_PEAK_CHUNK, nullptr, SF_FALSE);
   return WaveFile(std::move(sound));
 }
 

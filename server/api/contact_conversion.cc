@@ -149,6 +149,22 @@ v1::ContactFindings ToProto(const IntakeFindings& findings) {
   return proto;
 }
 
+v1::Blow ToProto(const FoundBlow& blow) {
+  v1::Blow proto;
+  proto.set_time_s(blow.time_s);
+  proto.set_object(blow.handle);
+  if (blow.by && blow.by_sounds) proto.set_other_object(*blow.by);
+  if (blow.by && !blow.by_sounds) proto.set_partner(*blow.by);
+  proto.mutable_point_m()->set_x(blow.point_m[0]);
+  proto.mutable_point_m()->set_y(blow.point_m[1]);
+  proto.mutable_point_m()->set_z(blow.point_m[2]);
+  proto.mutable_impulse_newton_seconds()->set_x(blow.impulse_newton_seconds[0]);
+  proto.mutable_impulse_newton_seconds()->set_y(blow.impulse_newton_seconds[1]);
+  proto.mutable_impulse_newton_seconds()->set_z(blow.impulse_newton_seconds[2]);
+  proto.set_duration_s(blow.duration_s);
+  return proto;
+}
+
 absl::Status ReadStep(const v1::ContactStep& step, ContactIntake& intake) {
   RETURN_IF_ERROR(intake.BeginStep(step.time_s()));
   for (const v1::ObjectPose& row : step.poses()) intake.Move(row.object(), FromProto(row.pose()));

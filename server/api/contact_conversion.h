@@ -2,6 +2,7 @@
 #pragma once
 
 #include "absl/status/status.h"
+#include "carillon/v1/audio_service.pb.h"
 #include "carillon/v1/contact.pb.h"
 #include "server/scene/contact_intake.h"
 
@@ -11,6 +12,7 @@ namespace carillon {
 ContactReading ToContactReading(v1::Frame frame, v1::PulseShape pulse_shape);
 
 v1::ContactFindings ToProto(const IntakeFindings& findings);
+v1::Blow ToProto(const FoundBlow& blow);
 
 /// Gives `intake` a whole step: poses, impulses, forces, then engine contacts; of each, rows before
 /// columns. Rows that cannot be read count as rejected (LOCATION_MISSING, COLUMNS_MISMATCHED).

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/api/render_call.h"
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <memory>
@@ -100,10 +101,22 @@ class RenderCall final : public BidiStream<v1::RenderRequest, v1::RenderResponse
       loudness_->Add(block);
       response.mutable_block()->set_first_frame(first_frame);
       response.mutable_block()->set_samples(ToBytes(block));
+    } else if (told_blow_count_ < renderer_->blows().size()) {
+      FillBlows(*response.mutable_blows());
     } else {
       FillSummary(*response.mutable_summary());
     }
     return Supply::kMessage;
+  }
+
+  void FillBlows(v1::RenderedBlows& message) {
+    constexpr size_t kBlowsPerMessage = 1000;
+    message.clear_blows();
+    const std::vector<FoundBlow>& blows = renderer_->blows();
+    const size_t end = std::min(told_blow_count_ + kBlowsPerMessage, blows.size());
+    for (; told_blow_count_ < end; ++told_blow_count_) {
+      *message.add_blows() = ToProto(blows[told_blow_count_]);
+    }
   }
 
   void FillSummary(v1::RenderSummary& summary) const {
@@ -135,6 +148,7 @@ class RenderCall final : public BidiStream<v1::RenderRequest, v1::RenderResponse
   TraceReader reader_;
   std::unique_ptr<OfflineRenderer> renderer_;
   std::optional<LoudnessMeter> loudness_;
+  size_t told_blow_count_ = 0;
   std::vector<float> samples_;
 };
 

@@ -56,7 +56,7 @@ void ContactForces::Add(const Felt& felt, double per_second, const Roughness& ro
 
 void ContactForces::Touch(const ObjectTouch& touch, const FeltContact& impulse) {
   pairs_[{touch.contact.handle, touch.partner}].touches.push_back(
-      {impulse, touch.roughness, touch.time_offset_s});
+      {impulse, touch.roughness, touch.time_offset_s, touch.partner});
 }
 
 ContactForces::Events ContactForces::End() {
@@ -147,15 +147,25 @@ void ContactForces::SendBlow(const Blow& blow, double remains_newtons, Events& e
   }
   const double scale = impulse / whole;
   for (const PairTouch& touch : blow.touches) {
-    const double longer =
-        touch.impulse.duration_follows_impulse ? std::pow(scale, kDurationPower) : 1;
-    for (const Felt& felt : touch.impulse.all()) {
-      SurfaceImpulse part = felt.impulse();
-      part.impulse_newton_seconds = Scaled(part.impulse_newton_seconds, scale);
-      part.pulse = part.pulse.Lasting(static_cast<float>(part.pulse.duration_s() * longer));
-      events.push_back({felt.handle, part, *time_s_ + touch.time_offset_s});
+    for (size_t i = 0; i < touch.impulse.count; ++i) {
+      events.push_back(PartOfBlow(touch, i, scale));
+      events.back().time_s = *time_s_ + touch.time_offset_s;
     }
   }
+}
+
+/// What the first or the second object of a touch feels, `scale` times as great.
+ForceEvent ContactForces::PartOfBlow(const PairTouch& touch, size_t which, double scale) {
+  const FeltContact& contact = touch.impulse;
+  const double longer = contact.duration_follows_impulse ? std::pow(scale, kDurationPower) : 1;
+  SurfaceImpulse part = contact.by[which].impulse();
+  part.impulse_newton_seconds = Scaled(part.impulse_newton_seconds, scale);
+  part.pulse = part.pulse.Lasting(static_cast<float>(part.pulse.duration_s() * longer));
+  const bool of_two = contact.count == contact.by.size();
+  return {.handle = contact.by[which].handle,
+          .action = part,
+          .by = of_two ? contact.by[1 - which].handle : touch.partner,
+          .by_sounds = of_two};
 }
 
 ForceKnot ContactForces::MakeKnot(const std::vector<Force>& forces, double step_s) {

@@ -26,6 +26,8 @@ struct ForceEvent {
   uint32_t handle = 0;
   MixerEvent::Action action{};
   double time_s = 0;
+  uint32_t by = 0;         ///< of a blow: the other body
+  bool by_sounds = false;  ///< of a blow: whether `by` is the handle of an object
 };
 
 /// Turns the lasting contacts of one simulation into events of the mixer. Each step gives, for each
@@ -85,7 +87,9 @@ class ContactForces {
     FeltContact impulse;
     Roughness roughness;
     double time_offset_s = 0;
+    uint32_t partner = 0;
   };
+  static ForceEvent PartOfBlow(const PairTouch& touch, size_t which, double scale);
   /// The steps of a blow that is not over yet.
   struct Blow {
     double load_newtons = 0;  // before the blow

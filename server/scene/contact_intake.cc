@@ -2,6 +2,7 @@
 #include "server/scene/contact_intake.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 #include <variant>
@@ -64,7 +65,14 @@ absl::Status ContactIntake::TryStrike(const ObjectImpulse& impulse) {
   RETURN_IF_ERROR(Locate(impulse.contact, 1, felt));
   NoteZero(impulse.contact);
   impulse_count_ += felt.count;
-  for (Felt& one : felt.all()) Push(one.event, frame);
+  for (size_t i = 0; i < felt.count; ++i) {
+    FoundBlow blow;
+    blow.handle = felt.by[i].handle;
+    blow.by_sounds = felt.count == felt.by.size();
+    if (blow.by_sounds) blow.by = felt.by[1 - i].handle;
+    Tell(felt.by[i].event, blow, frame);
+    Push(felt.by[i].event, frame);
+  }
   return absl::OkStatus();
 }
 
@@ -194,9 +202,35 @@ void ContactIntake::Push(const ContactForces::Events& events) {
     const absl::StatusOr<const SoundingObject*> object = scene_.Find(force.handle);
     if (!object.ok()) continue;  // an object that was removed meanwhile feels no more forces
     MixerEvent event{.bank = (*object)->bank, .action = force.action};
-    impulse_count_ += event.impulse() != nullptr ? 1 : 0;
-    Push(event, FrameOf(force.time_s));
+    const double frame = FrameOf(force.time_s);
+    if (event.impulse() != nullptr) {
+      ++impulse_count_;
+      FoundBlow blow;
+      blow.handle = force.handle;
+      blow.by = force.by;
+      blow.by_sounds = force.by_sounds;
+      Tell(event, blow, frame);
+    }
+    Push(event, frame);
   }
+}
+
+void ContactIntake::Tell(const MixerEvent& event, FoundBlow blow, double frame) {
+  if (settings_.blows == nullptr) return;
+  const absl::StatusOr<const SoundingObject*> object = scene_.Find(blow.handle);
+  if (!object.ok()) return;
+  const SurfaceImpulse& impulse = *event.impulse();
+  const auto& vertices = (*object)->body->model->vertices;
+  for (size_t corner = 0; corner < impulse.at.vertices.size(); ++corner) {
+    const std::array<float, 3>& vertex = vertices[impulse.at.vertices[corner]];
+    const double weight = impulse.at.weights[corner] * (*object)->properties.material.size;
+    for (size_t axis = 0; axis < vertex.size(); ++axis) blow.point_m[axis] += weight * vertex[axis];
+  }
+  blow.time_s =
+      (std::max(frame, 0.0) - static_cast<double>(mapping_.first_frame)) / settings_.sample_rate_hz;
+  blow.impulse_newton_seconds = impulse.impulse_newton_seconds;
+  blow.duration_s = impulse.pulse.duration_s();
+  settings_.blows->push_back(blow);
 }
 
 void ContactIntake::Push(MixerEvent& event, double frame) {

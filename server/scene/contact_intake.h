@@ -3,10 +3,12 @@
 
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "server/scene/contact_forces.h"
+#include "server/scene/found_blow.h"
 #include "server/scene/frame_time.h"
 #include "server/scene/lateness.h"
 #include "server/scene/object_contact.h"
@@ -49,6 +51,8 @@ struct IntakeSettings {
   /// Counts rejected contacts, too, by reason; null: nobody wants to know. It must outlive the
   /// intake.
   RejectionCounts* rejections = nullptr;
+  /// Gets each impulse that is handed on; null: nobody wants to know. It must outlive the intake.
+  std::vector<FoundBlow>* blows = nullptr;
 };
 
 /// Findings of an intake about contacts.
@@ -127,6 +131,9 @@ class ContactIntake {
   void NoteZero(const ObjectContact& contact);
   void Push(const ContactForces::Events& events);
   void Push(MixerEvent& event, double frame);
+  /// Tells the blow of `event`, whose object, partner and frame are given.
+  void Tell(const MixerEvent& event, FoundBlow blow, double frame)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(scene_.mutex());
   absl::StatusOr<double> FrameOfImpulse(double time_offset_s) const;
   double FrameOf(double time_s) const { return mapping_.FrameOf(time_s, settings_.sample_rate_hz); }
 

@@ -42,12 +42,13 @@ MixerSettings SettingsOf(const OfflineSettings& settings, SectionThreads& thread
           .threads = &threads};
 }
 
-IntakeSettings IntakeSettingsOf(const OfflineSettings& settings) {
+IntakeSettings IntakeSettingsOf(const OfflineSettings& settings, std::vector<FoundBlow>& blows) {
   return {.sample_rate_hz = static_cast<double>(settings.sample_rate_hz),
           .step_s = settings.step_s,
           .mapping = settings.mapping,
           .most_ahead_s = OfflineRenderer::kMaxTimeS - settings.mapping.first_time_s,
-          .reading = settings.reading};
+          .reading = settings.reading,
+          .blows = settings.tells_blows ? &blows : nullptr};
 }
 
 bool IsMove(const MixerEvent& event) {
@@ -96,7 +97,7 @@ OfflineRenderer::OfflineRenderer(const OfflineSettings& settings, BodyCache& bod
       mixer_(SettingsOf(settings, threads_)),
       scene_("the trace", settings.space),
       target_(settings.mapping.first_frame),
-      intake_(scene_, target_, IntakeSettingsOf(settings)) {}
+      intake_(scene_, target_, IntakeSettingsOf(settings, blows_)) {}
 
 absl::Status OfflineRenderer::AddObject(uint32_t handle, std::shared_ptr<const ModalModel> model,
                                         const ObjectProperties& properties) {

@@ -39,6 +39,7 @@ struct OfflineSettings {
   TimeMapping mapping{};
   /// The stagger of the bus through which the trace was heard live (Mixer::Stagger).
   size_t stagger = 0;
+  bool tells_blows = false;  ///< whether OfflineRenderer::blows() gets them
   /// The sound is bit for bit the same for any number of threads.
   size_t thread_count = std::max(std::thread::hardware_concurrency(), 1U);
 };
@@ -82,6 +83,9 @@ class OfflineRenderer {
   /// kBlockFrameCount; returns how many, zero after the end.
   size_t Render(std::span<float> samples);
 
+  /// The impulses that sounded, as far as anything was rendered, if the settings ask for them.
+  const std::vector<FoundBlow>& blows() const { return blows_; }
+
   /// True for everything rendered so far.
   const OfflineSummary& summary() const { return summary_; }
 
@@ -118,6 +122,7 @@ class OfflineRenderer {
   std::unique_ptr<EventStream> stream_;
   Scene scene_;
   Target target_;
+  std::vector<FoundBlow> blows_;
   ContactIntake intake_;
   size_t pushed_count_ = 0;
   size_t contact_count_ = 0;  // events up to the last that is no move

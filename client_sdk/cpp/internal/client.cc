@@ -201,6 +201,12 @@ absl::StatusOr<v1::RenderSummary> Client::Render(const v1::RenderSettings&, Cont
   return NotOverridden("Render");
 }
 
+absl::StatusOr<v1::RenderSummary> Client::Render(
+    const v1::RenderSettings&, ContactTraceReader&, const AudioCallback&,
+    const std::function<void(const v1::Blow&)>&) const {
+  return NotOverridden("Render");
+}
+
 absl::StatusOr<v1::GetMixerResponse> Client::GetMixer() const { return NotOverridden("GetMixer"); }
 
 absl::Status Client::FetchMesh(const JobRun&, const std::string&) const {

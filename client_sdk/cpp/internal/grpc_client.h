@@ -76,6 +76,9 @@ class GrpcClient final : public Client {
   absl::StatusOr<v1::RenderSummary> Render(const v1::RenderSettings& settings,
                                            ContactTraceReader& trace,
                                            const AudioCallback& on_block) const override;
+  absl::StatusOr<v1::RenderSummary> Render(
+      const v1::RenderSettings& settings, ContactTraceReader& trace, const AudioCallback& on_block,
+      const std::function<void(const v1::Blow&)>& on_blow) const override;
   absl::StatusOr<v1::GetMixerResponse> GetMixer() const override;
   absl::StatusOr<v1::UpdateMixerResponse> UpdateMixer(
       const v1::UpdateMixerRequest& request) const override;

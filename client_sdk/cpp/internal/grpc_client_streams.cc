@@ -5,6 +5,7 @@
 
 #include <bit>
 #include <cstring>
+#include <functional>
 #include <optional>
 #include <thread>
 #include <utility>
@@ -87,14 +88,17 @@ struct Rendering {
   bool stopped = false;
 };
 
-Rendering ReceiveSound(const AudioCallback& on_block, grpc::ClientContext& context,
-                       RenderCall& call) {
+using BlowCallback = std::function<void(const v1::Blow&)>;
+
+Rendering ReceiveSound(const AudioCallback& on_block, const BlowCallback& on_blow,
+                       grpc::ClientContext& context, RenderCall& call) {
   Rendering rendering;
   BlockReader reader;
   v1::RenderResponse response;
   while (call.Read(&response)) {
     if (response.has_format()) reader.SetFormat(response.format());
     if (response.has_summary()) rendering.summary = response.summary();
+    for (const v1::Blow& blow : response.blows().blows()) on_blow(blow);
     if (response.has_block() && !rendering.stopped && !on_block(reader.Read(response.block(), 0))) {
       rendering.stopped = true;
       context.TryCancel();
@@ -192,13 +196,20 @@ absl::Status GrpcClient::ListenTo(const v1::ListenRequest& request,
 absl::StatusOr<v1::RenderSummary> GrpcClient::Render(const v1::RenderSettings& settings,
                                                      ContactTraceReader& trace,
                                                      const AudioCallback& on_block) const {
+  return Render(settings, trace, on_block, [](const v1::Blow&) {});
+}
+
+absl::StatusOr<v1::RenderSummary> GrpcClient::Render(const v1::RenderSettings& settings,
+                                                     ContactTraceReader& trace,
+                                                     const AudioCallback& on_block,
+                                                     const BlowCallback& on_blow) const {
   grpc::ClientContext context;
   Authorize(context, stubs_->token);
   const auto call = stubs_->audio.Render(&context);
   // A second thread sends, because the daemon may send sound before it has the whole trace.
   absl::Status sent;
   std::jthread sender([&] { sent = SendTrace(settings, trace, context, *call); });
-  const Rendering rendering = ReceiveSound(on_block, context, *call);
+  const Rendering rendering = ReceiveSound(on_block, on_blow, context, *call);
   sender.join();
   const grpc::Status status = call->Finish();
   if (!sent.ok()) return sent;

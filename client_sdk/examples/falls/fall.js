@@ -9,14 +9,16 @@ const carillon = require('carillon');
 
 const { values: options, positionals: [scenePath, tracePath] } = parseArgs({ allowPositionals: true, options: {
   engine: { type: 'string', default: 'rapier' }, rate: { type: 'string', default: '240' },
-  seconds: { type: 'string', default: '2' } } });
+  seconds: { type: 'string' } } });
 
 async function main() {
-  const [rate, seconds] = [Number(options.rate), Number(options.seconds)];
-  if (!scenePath || !tracePath || !['rapier', 'havok'].includes(options.engine) || !(rate >= 20) || !(seconds >= 0)) {
+  const rate = Number(options.rate);
+  if (!scenePath || !tracePath || !['rapier', 'havok'].includes(options.engine) || !(rate >= 20)) {
     throw new Error('usage: node fall.js SCENE TRACE [--engine rapier|havok] [--rate HZ] [--seconds S]');
   }
   const scene = JSON.parse(fs.readFileSync(scenePath, 'utf8'));
+  const seconds = Number(options.seconds ?? scene.seconds ?? 2);
+  if (!(seconds >= 0)) throw new Error(`--seconds ${options.seconds} is no time`);
   const { roughness_depth: depth, irregularity_length_m: irregularity } = scene;
   const settings = depth ? { roughness: { depth, irregularity_length_m: irregularity } } : {};
   const fall = await require(`./${options.engine}_fall`).start(scene, 1 / rate, settings);

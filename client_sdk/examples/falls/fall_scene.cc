@@ -47,6 +47,7 @@ FallScene SceneFrom(const Json& json) {
   scene.restitution = json.value("restitution", scene.restitution);
   scene.roughness_depth = json.value("roughness_depth", scene.roughness_depth);
   scene.irregularity_length_m = json.value("irregularity_length_m", scene.irregularity_length_m);
+  scene.seconds = json.value("seconds", scene.seconds);
   for (const Json& body : json.at("bodies")) scene.bodies.push_back(BodyFrom(body));
   return scene;
 }

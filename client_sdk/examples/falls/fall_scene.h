@@ -50,6 +50,7 @@ struct FallScene {
   Vector gravity_m_per_s2{0, 0, -9.81};
   double friction = 0.5, restitution = 0;  ///< of every pair of bodies
   double roughness_depth = 0, irregularity_length_m = 0.001;
+  double seconds = 2;  ///< the simulated time, unless the user wants another
   std::vector<Body> bodies;
 };
 

@@ -9,7 +9,7 @@ import os
 import pathlib
 import subprocess
 
-from carillon.v1 import modal_model_pb2
+from carillon.v1 import contact_pb2, modal_model_pb2
 
 HERE = pathlib.Path(__file__).resolve().parent
 SCENES = HERE / "scenes"
@@ -67,6 +67,21 @@ def mesh_of(body, folder):
     return ball_mesh(shape["ball"]["radius_m"]) if "ball" in shape else box_mesh(shape["boxes"][0]["sides_m"])
 
 
+# All that makes one model another.
+SOUNDING = ("shape", "mesh", "repair", "wall_m", "held_m", "material", "max_frequency_hz")
+
+
+def settings_of(body):
+    """How the body is decomposed."""
+    settings = modal_model_pb2.DecompositionSettings()
+    settings.mesh.wall_m = body.get("wall_m", 0)
+    settings.mesh.repair = body.get("repair", False)
+    if "held_m" in body:
+        low, high = (contact_pb2.Vec3(x=x, y=y, z=z) for x, y, z in (body["held_m"]["low"], body["held_m"]["high"]))
+        settings.fixtures.add().box.CopyFrom(modal_model_pb2.HeldBox(low_m=low, high_m=high))
+    return settings
+
+
 def create_models(client, scene, folder=SCENES):
     """Returns the scene with the name of a model in each body that has a material; `folder` has the meshes. Bodies of
     one shape share a model."""
@@ -74,25 +89,24 @@ def create_models(client, scene, folder=SCENES):
     for body in made["bodies"]:
         if "material" not in body:
             continue
-        key = json.dumps([body.get(name) for name in ("shape", "mesh", "wall_m", "material", "max_frequency_hz")])
+        key = json.dumps([body.get(name) for name in SOUNDING])
         if key not in models:
-            settings = modal_model_pb2.DecompositionSettings()
-            if "wall_m" in body:
-                settings.mesh.wall_m = body["wall_m"]
-            models[key] = client.create_model(mesh_of(body, folder), body["material"], settings=settings,
+            models[key] = client.create_model(mesh_of(body, folder), body["material"], settings=settings_of(body),
                                               label=body["name"], max_frequency_hz=body.get("max_frequency_hz", 0))
         body["model"] = models[key].name
     return made
 
 
-def record(engine, scene, trace, *, rate=240, seconds=2, build=None):
-    """Lets a scene with models fall in an engine and leaves its contact trace."""
+def record(engine, scene, trace, *, rate=240, seconds=None, build=None):
+    """Lets a scene with models fall in an engine and leaves its contact trace. Without `seconds` it lasts as long as
+    the scene says."""
     path = pathlib.Path(trace).with_suffix(".json")
     path.write_text(json.dumps(scene, indent=1))
     build = pathlib.Path(build or HERE.parents[2] / "build/release")
     program = ["node", HERE / "fall.js"] if engine in IN_NODE else [build / "bin/carillon-fall"]
-    words = [*program, path, trace, "--engine", engine, "--rate", str(rate), "--seconds", str(seconds)]
-    subprocess.run(words, check=True, env=node_environment(path.parent) if engine in IN_NODE else None)
+    words = [*program, path, trace, "--engine", engine, "--rate", str(rate)]
+    subprocess.run([*words, *([] if seconds is None else ["--seconds", str(seconds)])], check=True,
+                   env=node_environment(path.parent) if engine in IN_NODE else None)
 
 
 def node_environment(folder):

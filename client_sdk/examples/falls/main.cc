@@ -4,7 +4,7 @@
 // reports them.
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <map>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -18,7 +18,8 @@ namespace {
 
 struct Options {
   std::string scene, trace, engine = "bullet";
-  double rate_hz = 240, seconds = 2;
+  double rate_hz = 240;
+  std::optional<double> seconds;  ///< absent: as long as the scene says
 };
 
 bool HasHull(const Body& body) { return std::holds_alternative<Hull>(body.shape); }
@@ -72,7 +73,8 @@ absl::Status Record(const Options& options) {
     ++handle;
     if (!body.model.empty()) trace->Write(ObjectOf(body, handle));
   }
-  const int step_count = static_cast<int>(options.seconds * options.rate_hz);
+  const int step_count =
+      static_cast<int>(options.seconds.value_or(scene->seconds) * options.rate_hz);
   for (int i = 0; i < step_count; ++i) trace->Write((*simulation)());
   return trace->Close();
 }
@@ -89,9 +91,8 @@ int Main(int argc, char** argv) {
   app.add_option("--rate", options.rate_hz, "The number of simulation steps in a second")
       ->check(CLI::Range(20.0, 10000.0))
       ->capture_default_str();
-  app.add_option("--seconds", options.seconds, "The simulated time, s")
-      ->check(CLI::Range(0.0, 1000.0))
-      ->capture_default_str();
+  app.add_option("--seconds", options.seconds, "The simulated time, s [what the scene says]")
+      ->check(CLI::Range(0.0, 1000.0));
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

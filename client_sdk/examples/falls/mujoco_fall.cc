@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <memory>
 #include <numbers>
@@ -50,8 +51,13 @@ size_t PartCount(const FallScene& scene) {
   return count;
 }
 
-/// MuJoCo would write its warnings into MUJOCO_LOG.TXT in the current folder.
-void PrintWarning(const char* message) { absl::FPrintF(stderr, "MuJoCo: %s\n", message); }
+/// MuJoCo warns of contacts that it has left out, and of an unstable simulation, which it begins
+/// anew: neither is to be heard. It would write its warnings into MUJOCO_LOG.TXT in the current
+/// folder.
+void EndWithWarning(const char* message) {
+  absl::FPrintF(stderr, "carillon-fall: MuJoCo: %s; take more steps a second\n", message);
+  std::exit(1);
+}
 
 class Mjcf {
  public:
@@ -181,7 +187,7 @@ class MujocoFall {
 }  // namespace
 
 absl::StatusOr<Simulation> FallInMujoco(const FallScene& scene, double step_s) {
-  mju_user_warning = &PrintWarning;
+  mju_user_warning = &EndWithWarning;
   absl::StatusOr<Model> model = Compile(Mjcf(scene, step_s).text());
   if (!model.ok()) return model.status();
   const auto fall = std::make_shared<MujocoFall>(scene, *std::move(model));

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Runs one example: simulates it in an engine, renders its contacts, and draws what is heard.
 
-Leaves NAME-ENGINE.contacts, .wav (stereo, each body from its place), -spectrogram.png and -spectrum.png.
+Leaves NAME-ENGINE.contacts, .wav (stereo, each body from its place), -spectrogram.png and -spectrum.png,
+and with --video NAME-ENGINE.mp4.
 """
 
 import argparse
@@ -80,45 +81,76 @@ def render(client, path):
             body.gain = (body.gain if body.HasField("gain") else 1) / 4
 
 
+def record_example(client, options, folder, trace):
+    """Leaves the contact trace of the example, heard from before it. Returns its scene; None for the chimes, which have
+    a program of their own."""
+    import falls
+    import scene_makers
+    if options.name == "chimes":
+        import chimes
+        chimes.record(client, trace, folder, options.seconds, options.build)
+        place_listener(trace, chimes.EXTENT_M)
+        return None
+    scene = scene_makers.EXAMPLES[options.name](folder)
+    falls.record(options.engine, falls.create_models(client, scene, folder), trace, rate=options.rate,
+                 seconds=options.seconds, build=options.build)
+    place_listener(trace, scene["extent_m"])
+    return scene
+
+
+def run(client, options, folder):
+    """Leaves all files of the example in the folder. Returns the sound."""
+    stem = folder / f"{options.name}-{options.engine}"
+    trace, wav = stem.with_suffix(".contacts"), stem.with_suffix(".wav")
+    scene = record_example(client, options, folder, trace)
+    sound = render(client, trace)
+    findings = sound.summary.findings
+    print(f"{stem.name}: {findings.blow_count} blows, {findings.load_count} loads, peak {sound.peak:.3g} of full scale")
+    sound.normalized().save(wav)
+    draw(sound, stem, f"{options.name.replace('_', ' ')} in {options.engine}")
+    if options.video and scene:
+        import video
+        video.make(options.engine, scene, folder, wav, stem.with_suffix(".mp4"), rate=options.rate,
+                   seconds=options.seconds, build=options.build)
+    return sound
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("name")
     parser.add_argument("--engine", default="bullet")
     parser.add_argument("--rate", type=int, default=1000, help="steps a second")
-    parser.add_argument("--seconds", type=float, default=2.5, help="simulated time")
+    parser.add_argument("--seconds", type=float, help="simulated time, if not what the scene says")
     parser.add_argument("--build", type=pathlib.Path, default=ROOT / "build/release")
+    parser.add_argument("--video", action="store_true", help="make a video, too; needs an X server, such as Xvfb")
     parser.add_argument("--out", type=pathlib.Path, help="a folder; BUILD/examples unless named")
     options = parser.parse_args()
-    build = options.build.resolve()
-    sys.path[:0] = [str(build / "client_sdk/python"), str(ROOT / "client_sdk/examples/falls"),
+    options.build = options.build.resolve()
+    sys.path[:0] = [str(options.build / "client_sdk/python"), str(ROOT / "client_sdk/examples/falls"),
                     str(ROOT / "client_sdk/python"), str(ROOT / "tests/integration")]
-    os.environ.update(CARILLON_BIN_DIR=str(build / "bin"), CARILLON_BUILD_DIR=str(build))
+    os.environ.update(CARILLON_BIN_DIR=str(options.build / "bin"), CARILLON_BUILD_DIR=str(options.build))
     # They need the paths above.
     import carillon
     import falls
     import scene_makers
     from daemon import Daemon
-    if options.name not in scene_makers.EXAMPLES or options.engine not in falls.ENGINES:
-        parser.error(f"the examples are {', '.join(scene_makers.EXAMPLES)}, the engines {', '.join(falls.ENGINES)}")
-    folder = (options.out or build / "examples").resolve()
+    names = (*scene_makers.EXAMPLES, "chimes")
+    if options.name not in names or options.engine not in falls.ENGINES:
+        parser.error(f"the examples are {', '.join(names)}, the engines {', '.join(falls.ENGINES)}")
+    if options.name == "chimes" and options.engine != "bullet":
+        parser.error("the chimes hang on joints, which only their program for Bullet has")
+    folder = (options.out or options.build / "examples").resolve()
     folder.mkdir(parents=True, exist_ok=True)
-    stem = folder / f"{options.name}-{options.engine}"
-    trace = stem.with_suffix(".contacts")
-    scene = scene_makers.EXAMPLES[options.name](folder)
+    (folder / "models").mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="carillon-") as name:
+        # The models stay for the next run; the socket's path must be short.
+        pathlib.Path(name, "data").symlink_to(folder / "models")
         daemon = Daemon(name)
         try:
             with carillon.connect(daemon.server) as client:
-                falls.record(options.engine, falls.create_models(client, scene, folder), trace, rate=options.rate,
-                             seconds=options.seconds, build=build)
-                place_listener(trace, scene["extent_m"])
-                sound = render(client, trace)
+                run(client, options, folder)
         finally:
             daemon.stop()
-    findings = sound.summary.findings
-    print(f"{stem.name}: {findings.blow_count} blows, {findings.load_count} loads, peak {sound.peak:.3g} of full scale")
-    sound.normalized().save(stem.with_suffix(".wav"))
-    draw(sound, stem, f"{options.name.replace('_', ' ')} in {options.engine}")
 
 
 if __name__ == "__main__":

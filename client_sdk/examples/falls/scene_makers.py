@@ -6,6 +6,7 @@ Each function returns a scene (docs/decisions/0042), and writes the meshes that 
 
 import math
 
+import bunnies
 import falls
 
 FLOOR = {"name": "floor", "shape": {"plane": {}}}
@@ -36,7 +37,8 @@ def blocks(_folder, side=0.05):
     bodies.append({"name": "ball", "shape": {"ball": {"radius_m": radius}}, "mass_kg": heavy,
                    "inertia_kg_m2": [0.4 * heavy * radius**2] * 3, "position_m": [-8 * side, 0.1 * side, radius],
                    "velocity_m_per_s": [speed, 0, 0], "angular_velocity_rad_per_s": [0, speed / radius, 0]})
-    return {"friction": 0.5, "restitution": 0, "bodies": bodies, "extent_m": 10 * side}
+    return {"friction": 0.5, "restitution": 0, "bodies": bodies, "extent_m": 10 * side,
+            "seconds": 2.5}
 
 
 def boxes(folder):
@@ -126,7 +128,7 @@ def letters(folder):
         bodies.append({**letter_body(letter, folder), "position_m": [at, 0, 0.3 + 0.1 * number],
                        "orientation": falls.product(falls.about((1, 0, 0), 12 + 2 * number),
                                                     falls.about((0, 1, 0), (-1)**number * 6))})
-    return {"friction": 0.4, "restitution": 0, "bodies": bodies, "extent_m": 1.4}
+    return {"friction": 0.4, "restitution": 0, "bodies": bodies, "extent_m": 1.4, "seconds": 2.5}
 
 
 BOWL_RADIUS_M, BOWL_WALL_M = 0.08, 0.004
@@ -164,7 +166,7 @@ def bowl(folder, material="bowl_metal"):
     mass, square = 0.4, BOWL_RADIUS_M**2
     outside = vertices[:12 * 48 + 1]
     return {"friction": 0.4, "restitution": 0, "roughness_depth": 0.3, "irregularity_length_m": 0.0005, "extent_m": 0.4,
-            "bodies": [FLOOR, {
+            "seconds": 6, "bodies": [FLOOR, {
                 "name": "bowl", "mesh": "bowl.obj", "shape": {"hull": {"corners_m": outside}}, "mass_kg": mass,
                 "inertia_kg_m2": [mass * square * 5 / 12, mass * square * 5 / 12, mass * square * 2 / 3],
                 "position_m": [0, 0, 0.2], "orientation": falls.about((1, 0, 0), 155),
@@ -176,4 +178,5 @@ def wooden_bowl(folder):
     return bowl(folder, "bowl_wood")
 
 
-EXAMPLES = {"blocks": blocks, "boxes": boxes, "letters": letters, "bowl": bowl, "wooden_bowl": wooden_bowl}
+EXAMPLES = {"blocks": blocks, "boxes": boxes, "letters": letters, "bowl": bowl, "wooden_bowl": wooden_bowl,
+            "bunnies": bunnies.bunnies}

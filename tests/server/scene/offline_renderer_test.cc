@@ -220,6 +220,36 @@ TEST_F(OfflineRendererTest, TakesMoreImpulsesAtOnceThanTheLiveMixer) {
   EXPECT_EQ(renderer->summary().rejected_count, 0U);
 }
 
+TEST_F(OfflineRendererTest, TellsBlowsFromItsFirstFrameAndOnTheSurface) {
+  auto renderer = *OfflineRenderer::Make(
+      {.mapping = {.first_frame = 1280, .first_time_s = 3, .delay_s = 0.125}, .tells_blows = true},
+      bodies_);
+  ObjectProperties twice = SmallProperties();
+  twice.material.size = 2;
+  ASSERT_TRUE(renderer->AddObject(7, model_, twice).ok());
+  ObjectImpulse impulse = SmallImpulse(7, 0.5);
+  impulse.contact.impulse.location = SurfacePoint{.triangle = 0, .weights = {0, 0.5, 0.5}};
+  StrikeAt(*renderer, 3.5, impulse);
+  impulse.contact.handle = 8;  // is rejected
+  StrikeAt(*renderer, 3.6, impulse);
+  RenderAll(*renderer, 8);
+  ASSERT_EQ(renderer->blows().size(), 1U);
+  const FoundBlow& blow = renderer->blows().front();
+  EXPECT_NEAR(blow.time_s, 0.625, 1e-9);
+  EXPECT_EQ(blow.handle, 7U);
+  EXPECT_FALSE(blow.by.has_value());
+  EXPECT_NEAR(blow.point_m[0], 0.1, 1e-6);
+  EXPECT_NEAR(blow.point_m[1], 0.1, 1e-6);
+  EXPECT_FLOAT_EQ(blow.impulse_newton_seconds[0], 0.5F);
+}
+
+TEST_F(OfflineRendererTest, TellsNoBlowsUnlessAsked) {
+  const auto renderer = Make();
+  StrikeAt(*renderer, 0, SmallImpulse(1));
+  RenderAll(*renderer, 8);
+  EXPECT_TRUE(renderer->blows().empty());
+}
+
 TEST_F(OfflineRendererTest, RefusesSettingsOutOfRange) {
   for (const OfflineSettings& settings : std::vector<OfflineSettings>{
            {.sample_rate_hz = 7999}, {.sample_rate_hz = 192001}, {.tail_s = -1}, {.tail_s = 121}}) {

@@ -199,6 +199,12 @@ class Client {
                                                    ContactTraceReader& trace,
                                                    const AudioCallback& on_block) const;
 
+  /// As above, and passes each impulse that sounded to `on_blow` after the sound, if
+  /// `settings.tell_blows()`.
+  virtual absl::StatusOr<v1::RenderSummary> Render(
+      const v1::RenderSettings& settings, ContactTraceReader& trace, const AudioCallback& on_block,
+      const std::function<void(const v1::Blow&)>& on_blow) const;
+
   /// Returns the state of the mixer and the audio device.
   virtual absl::StatusOr<v1::GetMixerResponse> GetMixer() const;
 

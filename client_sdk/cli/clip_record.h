@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "carillon/client.h"
+#include "client_sdk/cli/commands.h"
+
+namespace carillon::cli {
+
+/// A sound file, by its name in the folder of the clips.
+struct ClipFile {
+  std::string name;
+  std::string digest;  ///< SHA-256, hexadecimal
+};
+
+/// The content of the record of a clip: a line of JSON, which docs/clips.md describes.
+struct ClipRecord {
+  std::string clip;          ///< the name of the trace without its suffix
+  std::string trace_digest;  ///< SHA-256, hexadecimal
+  std::string settings;      ///< SettingsText
+  ClipFile sound;
+  double factor = 1;  ///< by which the samples were multiplied
+  std::vector<v1::ContactTraceObject> objects;
+  std::vector<ClipFile> stems;  ///< one for each object, or none
+  v1::RenderSummary summary;
+  std::vector<v1::Blow> blows;
+};
+
+/// All that the samples of a clip depend on beside its trace and the models, as JSON.
+std::string SettingsText(const RenderOptions& options, const std::string& daemon_version);
+
+/// The line of a clip that was rendered, or of one that could not be.
+std::string RecordLine(const ClipRecord& record);
+std::string ErrorLine(const std::string& clip, const absl::Status& error);
+
+/// Whether the record `clip`.json in `folder` tells of this trace with these settings, and all its
+/// files are there with the digests that it names.
+bool IsRendered(const std::filesystem::path& folder, const ClipRecord& wanted);
+
+}  // namespace carillon::cli

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client_sdk/cli/render_options.h"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "absl/strings/numbers.h"
+#include "client_sdk/cli/commands.h"
+
+namespace carillon::cli {
+namespace {
+
+/// Traces that a daemon renders at a time.
+constexpr size_t kMostWorkers = 8;
+
+std::optional<Shard> ParseShard(const std::string& text) {
+  const size_t slash = text.find('/');
+  uint32_t number = 0, count = 0;
+  if (slash == std::string::npos || !absl::SimpleAtoi(text.substr(0, slash), &number) ||
+      !absl::SimpleAtoi(text.substr(slash + 1), &count) || number < 1 || number > count) {
+    return std::nullopt;
+  }
+  return Shard{.number = number, .count = count};
+}
+
+void AddSound(CLI::App& render, RenderOptions& options) {
+  render.add_option("--gain", options.gain, "The factor of every sample")
+      ->check(CLI::Range(0.0, 1e6));
+  render.add_option("--full-scale-pa", options.full_scale_pa,
+                    "The pressure of a sample of full scale, Pa [200]");
+  render.add_flag("--normalize", options.normalize,
+                  "Scale the sound to a peak of 0.9 of full scale");
+  render
+      .add_option("--bits", options.bits, "The size of a sample: 16, 24, or 32 for floating point")
+      ->check(CLI::IsMember({16, 24, 32}))
+      ->capture_default_str();
+  render.add_option("--sample-rate", options.sample_rate_hz, "The sample rate, Hz")
+      ->capture_default_str();
+  render
+      .add_option("--channels", options.channel_count,
+                  "The number of channels: 1 for mono, 2 for stereo")
+      ->check(CLI::Range(1, 2))
+      ->capture_default_str();
+  render.add_option("--tail", options.tail_s,
+                    "The time to render after the last contact, s [until the sound has died away]");
+}
+
+void AddFolder(CLI::App& render, RenderOptions& options) {
+  options.worker_count = std::clamp<size_t>(std::thread::hardware_concurrency(), 1, kMostWorkers);
+  render.add_flag("--stems", options.stems,
+                  "Write the sound of each object alone, too (of a folder)");
+  render
+      .add_option("--workers", options.worker_count, "The clips to render at a time (of a folder)")
+      ->check(CLI::Range(size_t{1}, kMostWorkers))
+      ->capture_default_str();
+  render
+      .add_option_function<std::string>(
+          "--shard", [&options](const std::string& text) { options.shard = *ParseShard(text); },
+          "The part of the folder to render: I/N is every N-th trace from the I-th on, such as "
+          "$SLURM_ARRAY_TASK_ID/10 [1/1]")
+      ->check([](const std::string& text) {
+        return ParseShard(text) ? "" : text + " is not I/N with I from 1 to N, such as 3/10";
+      });
+}
+
+}  // namespace
+
+void AddRender(CLI::App& app, Program& program) {
+  auto options = std::make_shared<RenderOptions>();
+  CLI::App& render = *app.add_subcommand(
+      "render", "Render a contact trace to a WAV file, or a folder of traces to a folder");
+  render
+      .add_option("trace", options->trace, "The contact trace (.contacts), or a folder of traces")
+      ->required();
+  render
+      .add_option("--out", options->out,
+                  "The WAV file to write, or - for stdout; the folder for a folder")
+      ->required();
+  AddSound(render, *options);
+  AddFolder(render, *options);
+  render.callback([&program, options] {
+    program.command = [&program, options] {
+      return std::filesystem::is_directory(options->trace)
+                 ? RenderClips(*program.Daemon(), *options, program.json)
+                 : Render(*program.Daemon(), *options, program.json);
+    };
+  });
+}
+
+}  // namespace carillon::cli

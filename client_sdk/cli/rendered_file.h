@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "carillon/audio.h"
+#include "client_sdk/cli/wave_file.h"
+
+namespace carillon::cli {
+
+/// How a rendering is written to a file.
+struct RenderedForm {
+  std::string path;  ///< "-": stdout
+  WaveFormat format;
+  double factor = 1;       ///< of every sample
+  bool normalize = false;  ///< scale the sound to a peak of 0.9 of full scale, before `factor`
+  /// The length of the file: a longer sound is cut, a shorter one is followed by silence. Absent:
+  /// that of the sound.
+  std::optional<uint64_t> frame_count = std::nullopt;
+};
+
+/// Writes the blocks of a rendering to a file, or collects them first if their peak must be known.
+class RenderedFile {
+ public:
+  explicit RenderedFile(RenderedForm form);
+
+  /// Returns false after an error.
+  bool Take(const client::AudioBlock& block);
+
+  /// Completes the file. Errors: Internal (OUTPUT_NOT_WRITABLE).
+  absl::Status Finish();
+
+  bool begun() const { return file_.has_value(); }
+  const absl::Status& status() const { return status_; }
+  /// The factor by which the samples were multiplied, once the file is complete.
+  double factor() const { return factor_; }
+
+ private:
+  void Begin();
+  void Write();
+  void FillUp();
+
+  const RenderedForm form_;
+  double factor_;
+  std::optional<WaveFile> file_;
+  uint64_t written_count_ = 0;  // samples
+  std::vector<float> samples_;
+  absl::Status status_;
+};
+
+}  // namespace carillon::cli

@@ -1,0 +1,222 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`carillon render FOLDER --out FOLDER`: the same bytes however many workers, shards and deaths there were.
+
+CARILLON_CLIPS and CARILLON_CLIP_KILLS say how many clips and kills (200 and 20 are the whole campaign), CARILLON_SEED
+repeats one.
+"""
+
+import hashlib
+import json
+import os
+import pathlib
+import random
+import signal
+import subprocess
+import tempfile
+import unittest
+
+import numpy
+
+import carillon
+import meshes
+import sound
+from daemon import BIN, ROOT, DaemonTest
+
+CLIP_COUNT = int(os.environ.get("CARILLON_CLIPS", "12"))
+KILL_COUNT = int(os.environ.get("CARILLON_CLIP_KILLS", "4"))
+SEED = int(os.environ.get("CARILLON_SEED", "0")) or random.SystemRandom().getrandbits(32)
+
+
+def contents(folder):
+    """The digests of all files but those that begin with a dot."""
+    return {str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest()
+            for path in folder.rglob("*") if path.is_file() and not path.name.startswith(".")}
+
+
+def manifest(folder):
+    return [json.loads(line) for line in (folder / "manifest.jsonl").read_text().splitlines()]
+
+
+class ClipsTest(DaemonTest):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        with carillon.connect(cls.daemon.server) as client:
+            cls.model = client.create_model(meshes.box(meshes.BAR_SIZE), meshes.MATERIAL).name
+        cls.traces = cls.folder / "traces"
+        cls.traces.mkdir()
+        for number in range(CLIP_COUNT):
+            cls.write_trace(number)
+        cls.whole = cls.folder / "whole"
+        cls.run_ended(cls.render(cls.whole, "--stems", "--workers", 1))
+        cls.expected = contents(cls.whole)
+
+    @classmethod
+    def write_trace(cls, number):
+        """Two bars: one is struck by a named impulse, then the second strikes it as an engine would say."""
+        rng = random.Random(number)
+        trace = carillon.Trace(step=0.01, simulator="test")
+        left, right = (trace.add(cls.model, meshes.MATERIAL, label=name, handle=handle)
+                       for name, handle in (("left \"bar\"", 3), ("right", 7)))
+        for step in range(8):
+            contacts = carillon.Contacts(
+                left, [(0.1, 0.005, 0.01)], [(0, 0, -0.01 * (number + 1))], second_objects=[right],
+                second_points=[(0.1, 0.005, 0)]) if step == 4 else None
+            at = (0.2 * rng.random(), 0.01, 0.01)
+            impulses = carillon.Impulses(left, [at], [(0, 0, -0.02)]) if step == 0 else None
+            trace.step(step * 0.01, contacts=contacts, impulses=impulses)
+        trace.write(cls.traces / f"{number:03}.contacts")
+
+    @classmethod
+    def command(cls, traces, out, *options):
+        return [BIN / "carillon", "--server", cls.daemon.server, "render", str(traces), "--out", str(out),
+                *map(str, options)]
+
+    @classmethod
+    def render(cls, out, *options, traces=None):
+        return subprocess.run(cls.command(traces or cls.traces, out, *options), capture_output=True, text=True,
+                              check=False)
+
+    @staticmethod
+    def run_ended(run, code=0):
+        assert run.returncode == code, run
+        return run
+
+    def new_folder(self):
+        scratch = tempfile.TemporaryDirectory(dir=self.folder)
+        self.addCleanup(scratch.cleanup)
+        return pathlib.Path(scratch.name) / "clips"
+
+    def test_any_number_of_workers_gives_the_same_bytes(self):
+        for workers in (2, 8):
+            out = self.new_folder()
+            self.run_ended(self.render(out, "--stems", "--workers", workers))
+            self.assertEqual(contents(out), self.expected)
+
+    def test_shards_side_by_side_give_the_same_bytes(self):
+        out = self.new_folder()
+        shards = [subprocess.Popen(self.command(self.traces, out, "--stems", "--workers", 2, "--shard", f"{i}/3"))
+                  for i in (1, 2, 3)]
+        self.assertEqual([shard.wait() for shard in shards], [0, 0, 0])
+        self.assertEqual(contents(out), self.expected)
+
+    def test_floating_point_files_have_the_same_bytes_at_any_time(self):
+        outs = [self.new_folder() for _ in range(2)]
+        for out in outs:
+            self.run_ended(self.render(out, "--bits", 32, "--shard", f"1/{CLIP_COUNT}"))
+        # libsndfile's record of the peak has the second in which it was written.
+        self.assertNotIn(b"PEAK", (outs[0] / "000.wav").read_bytes()[:200])
+        self.assertEqual(contents(outs[0]), contents(outs[1]))
+
+    def test_runs_killed_at_random_end_in_the_same_bytes(self):
+        print(f"CARILLON_SEED={SEED}", flush=True)
+        rng = random.Random(SEED)
+        out, killed = self.new_folder(), 0
+        while killed < KILL_COUNT:
+            # Two at a time, one of which is killed: it must not take anything from the other.
+            runs = [subprocess.Popen(self.command(self.traces, out, "--stems", "--shard", f"{i}/2"),
+                                     stdout=subprocess.DEVNULL) for i in (1, 2)]
+            victim = rng.choice(runs)
+            try:
+                victim.wait(rng.uniform(0.01, 0.05 * CLIP_COUNT))
+            except subprocess.TimeoutExpired:
+                pass
+            victim.send_signal(signal.SIGKILL)
+            killed += 1
+            codes = [run.wait() for run in runs]
+            self.assertEqual(codes[1 - runs.index(victim)], 0)
+            for path in out.glob("*.json"):
+                record = json.loads(path.read_text())
+                self.assertEqual(hashlib.sha256((out / record["file"]).read_bytes()).hexdigest(), record["sha256"])
+        self.run_ended(self.render(out, "--stems"))
+        self.assertEqual(contents(out), self.expected)
+        self.assertEqual(list(out.glob(".work-*")), [])
+
+    def test_finished_clips_stay_and_damaged_ones_are_rendered_again(self):
+        out = self.new_folder()
+        self.run_ended(self.render(out, "--stems"))
+        (out / "001.wav").write_bytes(b"RIFF")
+        (out / "002.stems/7.wav").unlink()
+        (out / "003.json").write_text("{}")
+        before = (out / "004.wav").stat().st_mtime_ns
+        printed = self.run_ended(self.render(out, "--stems"))
+        self.assertIn("3 clips in ", printed.stdout)
+        self.assertIn(f"{CLIP_COUNT - 3} were there", printed.stdout)
+        self.assertEqual((out / "004.wav").stat().st_mtime_ns, before)
+        self.assertEqual(contents(out), self.expected)
+
+    def test_other_settings_render_again_and_leave_nothing_of_the_old(self):
+        out = self.new_folder()
+        self.run_ended(self.render(out, "--stems"))
+        self.run_ended(self.render(out, "--bits", 16))
+        self.assertEqual(list(out.glob("*.stems")), [])
+        self.assertTrue(all(record["settings"]["bits"] == 16 for record in manifest(out)))
+
+    def test_a_bad_trace_does_not_stop_the_others(self):
+        traces, out = self.new_folder(), self.new_folder()
+        traces.mkdir(parents=True)
+        good = (self.traces / "000.contacts").read_bytes()
+        (traces / "a.contacts").write_bytes(good)
+        (traces / "b.contacts").write_bytes(good[:len(good) // 2])
+        (traces / "c.contacts").write_bytes(b"")
+        (traces / "d.contacts").mkdir()
+        (traces / "e.contacts").write_bytes(good)
+        failed = self.run_ended(self.render(out, traces=traces), 1)
+        self.assertIn("CLIPS_FAILED: 3 clips", failed.stderr)
+        lines = manifest(out)
+        self.assertEqual([line["clip"] for line in lines], list("abcde"))
+        self.assertEqual(["error" in line for line in lines], [False, True, True, True, False])
+        self.assertEqual(lines[1]["error"]["reason"], "TRACE_MALFORMED")
+        self.assertEqual((out / "a.wav").read_bytes(), (self.whole / "000.wav").read_bytes())
+        # Once it is repaired, the next run takes it.
+        (traces / "b.contacts").write_bytes(good)
+        self.run_ended(self.render(out, traces=traces), 1)
+        self.assertEqual((out / "b.wav").read_bytes(), (out / "a.wav").read_bytes())
+
+    def test_the_manifest_tells_what_struck_what_when_where_and_how_hard(self):
+        line = manifest(self.whole)[2]
+        self.assertEqual(line["sha256"], self.expected[line["file"]])
+        self.assertEqual([item["label"] for item in line["objects"]], ["left \"bar\"", "right"])
+        struck, first, second = line["blows"]
+        self.assertEqual((struck["object"], struck["time_s"]), (3, 0))
+        self.assertNotIn("other_object", struck)
+        numpy.testing.assert_allclose(struck["impulse_newton_seconds"], (0, 0, -0.02), rtol=1e-6)
+        self.assertGreater(struck["duration_s"], 0)
+        self.assertEqual([(blow["object"], blow["other_object"]) for blow in (first, second)], [(3, 7), (7, 3)])
+        numpy.testing.assert_allclose(first["point_m"], (0.1, 0.005, 0.01), atol=1e-6)
+        numpy.testing.assert_allclose(second["point_m"], (0.1, 0.005, 0), atol=1e-6)
+        numpy.testing.assert_allclose(second["impulse_newton_seconds"], (0, 0, 0.03), rtol=1e-5)
+        # The daemon sends a blow when the engine's contact is over.
+        self.assertTrue(0.04 <= first["time_s"] <= 0.05)
+
+    def test_stems_add_up_to_the_clip(self):
+        for line in manifest(self.whole)[:3]:
+            mix = sound.read_wave(self.whole / line["file"])
+            stems = [sound.read_wave(self.whole / item["file"]) for item in line["objects"]]
+            self.assertEqual([len(stem) for stem in stems], [line["frame_count"]] * 2)
+            self.assertTrue(all(numpy.abs(stem).max() > 0 for stem in stems))
+            # Each file is rounded to 24 bits, and the tail of a stem that is below -80 dB may be left out.
+            numpy.testing.assert_allclose(sum(stems), mix, atol=1.1e-4)
+
+    def test_the_tasks_of_a_slurm_array_give_the_same_bytes(self):
+        backup, out = self.folder / "backup.db", self.new_folder()
+        self.daemon.command("db", "backup", backup)
+        for task in ("1", "2"):
+            subprocess.run([ROOT / "deploy/slurm/render_clips.sh", self.traces, out, backup, "--stems"], check=True,
+                           env={**os.environ, "CARILLON_BIN": str(BIN), "SLURM_ARRAY_TASK_ID": task,
+                                "SLURM_ARRAY_TASK_COUNT": "2"})
+        self.assertEqual(contents(out), self.expected)
+
+    def test_refusals(self):
+        empty = self.new_folder()
+        empty.mkdir(parents=True)
+        self.assertIn("NO_TRACES", self.run_ended(self.render(self.new_folder(), traces=empty), 1).stderr)
+        self.run_ended(self.render(self.new_folder(), "--shard", "0/3"), 2)
+        self.run_ended(self.render(self.new_folder(), "--shard", "4/3"), 2)
+        self.run_ended(self.render(self.new_folder(), "--workers", 9), 2)
+        blocked = self.run_ended(self.render(self.traces / "000.contacts" / "out"), 1)
+        self.assertIn("OUTPUT_NOT_WRITABLE", blocked.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()

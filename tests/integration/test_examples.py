@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The examples at reduced length: what deploy/examples.sh leaves, from every engine."""
+
+import argparse
+import json
+import pathlib
+import sys
+import unittest
+
+import numpy
+
+import carillon
+from daemon import ROOT, DaemonTest
+
+sys.path.insert(0, str(ROOT / "client_sdk/examples/falls"))
+import bunnies  # noqa: E402
+import falls  # noqa: E402
+import run  # noqa: E402
+import scene_makers  # noqa: E402
+
+BUILD = pathlib.Path(run.os.environ["CARILLON_BUILD_DIR"])
+
+
+class ExamplesTest(DaemonTest):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.carillon = carillon.connect(cls.daemon.server)
+        cls.addClassCleanup(cls.carillon.close)
+
+    def run_example(self, name, engine, seconds, rate=240):
+        options = argparse.Namespace(name=name, engine=engine, rate=rate, seconds=seconds, build=BUILD, video=False)
+        sound = run.run(self.carillon, options, self.folder)
+        for suffix in (".contacts", ".wav", "-spectrogram.png", "-spectrum.png"):
+            self.assertGreater((self.folder / f"{name}-{engine}{suffix}").stat().st_size, 1000)
+        self.assertGreater(sound.summary.findings.blow_count, 0)
+        self.assertEqual(sound.samples.shape[1], 2)
+        return sound
+
+    def test_blocks_sound_from_every_engine(self):
+        for engine in falls.ENGINES:
+            with self.subTest(engine):
+                findings = self.run_example("blocks", engine, 0.5).summary.findings
+                # An engine lets a corner sink in now and then; points in a wrong frame would be far away throughout.
+                self.assertLess(findings.distant_point_count, 0.01 * findings.load_count)
+
+    def test_chimes_sound_from_both_sides(self):
+        sound = self.run_example("chimes", "bullet", 3)
+        self.assertFalse(numpy.array_equal(sound.samples[:, 0], sound.samples[:, 1]))
+
+    def test_every_engine_simulates_as_long_as_the_scene_says(self):
+        scene = json.loads((falls.SCENES / "corner.json").read_text())
+        scene["seconds"] = 0.25
+        for engine in falls.ENGINES:
+            trace = self.folder / f"{engine}.contacts"
+            falls.record(engine, scene, trace, rate=240)
+            self.assertEqual(len(carillon.Trace.read(trace).steps), 60, engine)
+            falls.record(engine, scene, trace, rate=240, seconds=0.5)
+            self.assertEqual(len(carillon.Trace.read(trace).steps), 120, engine)
+
+    def test_bunnies_reach_every_shelf(self):
+        scene = scene_makers.EXAMPLES["bunnies"](self.folder)
+        names = [body["name"] for body in scene["bodies"]]
+        for body in scene["bodies"]:
+            if "material" in body:
+                body["model"] = "modalModels/not_rendered"
+        trace = self.folder / "bunnies.contacts"
+        falls.record("bullet", scene, trace, rate=1000)
+        pairs = {(row.object, row.second.object) for step in carillon.Trace.read(trace).steps for row in step.contacts}
+        for name in ("plastic shelf", "aluminium shelf", "wooden shelf"):
+            shelf = 1 + names.index(name)
+            self.assertTrue(any(shelf in pair for pair in pairs), name)
+
+    def test_a_shell_of_a_sphere_has_its_moments(self):
+        area, centre, inertia = bunnies.as_shell(*map(numpy.array, falls.ball_mesh(1, 4)))
+        numpy.testing.assert_allclose(area, 4 * numpy.pi, rtol=0.01)
+        numpy.testing.assert_allclose(centre, 0, atol=1e-12)
+        numpy.testing.assert_allclose(inertia, 2 / 3 * numpy.eye(3), atol=0.01)
+
+
+if __name__ == "__main__":
+    unittest.main()
