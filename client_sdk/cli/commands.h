@@ -117,6 +117,7 @@ struct RenderOptions {
 
 /// The commands. Each prints its result to stdout, as JSON if `json` is true, and returns its
 /// error.
+absl::Status ShowInfo(const client::Client& daemon, const std::string& server, bool json);
 absl::Status ShowStatus(const client::Client& daemon, const std::string& server, bool json);
 absl::Status CreateModel(const client::Client& daemon, const CreateModelOptions& options,
                          bool json);

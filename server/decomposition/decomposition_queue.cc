@@ -30,6 +30,8 @@ DecompositionQueue::DecompositionQueue(std::shared_ptr<QueueCore> core) : core_(
 
 DecompositionQueue::~DecompositionQueue() { core_->Stop(); }
 
+const QueueSettings& DecompositionQueue::settings() const { return core_->settings(); }
+
 absl::StatusOr<std::unique_ptr<DecompositionQueue>> DecompositionQueue::Make(
     ModeDatabase& database, std::unique_ptr<Executor> executor, const Clock& clock,
     QueueSettings settings) {

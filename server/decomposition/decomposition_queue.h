@@ -53,6 +53,8 @@ class DecompositionQueue {
       QueueSettings settings = {});
   ~DecompositionQueue();
 
+  const QueueSettings& settings() const;
+
   /// Requests the modal model of a mesh (ResolveRequest is applied). The job is in the database
   /// when the call returns.
   /// The job has succeeded at once if a stored model is complete up to the eigenvalue that the

@@ -39,6 +39,8 @@ class QueueCore {
         settings_(std::move(settings)),
         runs_(database, std::move(executor), clock, jobs_, settings_) {}
 
+  const QueueSettings& settings() const { return settings_; }
+
   /// Queues the unfinished jobs of an earlier run of the daemon.
   absl::Status TakeUp();
   /// Ends running workers; no watcher is told of a change afterwards.

@@ -71,6 +71,14 @@ test('a mesh of arrays is a model of the same modes as its file', async () => {
   assert.deepEqual(found, same.name === model.name ? found : [same.name]);
 });
 
+test('the daemon says what it is', async () => {
+  const info = await c.info();
+  assert.equal(info.version, require('carillon/package.json').version);
+  assert.equal(info.limits.scene_count, 512);
+  assert.ok(info.features.includes('decomposition'));
+  assert.ok(info.uptime_s > 0);
+});
+
 test('a rendered strike rings at the lowest bending mode, and is the same again', async () => {
   const once = await model.renderStrike({ ...STRIKE, seconds: 1 });
   const again = await model.renderStrike({ ...STRIKE, seconds: 1 });

@@ -93,6 +93,14 @@ class ListsTest(CommandLineTest):
         self.assertNotIn(scene, self.run_command("scene", "list"))
 
 
+class InfoTest(CommandLineTest):
+    def test_the_daemon_says_its_version_limits_and_features(self):
+        shown = self.json_of("info")
+        self.assertEqual((shown["version"], shown["limits"]["scene_count"]), (carillon_package.__version__, 512))
+        self.assertIn("decomposition", shown["features"])
+        self.assertRegex(self.run_command("info"), r"(?m)^carillond \S+ at unix:.*\nup +\d+ s, output 48000 Hz, 1 channels$")
+
+
 class VolumeTest(CommandLineTest):
     def test_the_volume_of_the_output_and_of_a_scene_is_changed_and_shown(self):
         self.assertEqual(self.run_command("volume", "--gain", "-6dB"), "output  gain 0.5012 (-6.0 dB)")

@@ -78,6 +78,10 @@ absl::StatusOr<v1::ModalModelSummary> Client::ImportModalModelFile(const std::st
                           label);
 }
 
+absl::StatusOr<v1::GetServerInfoResponse> Client::GetServerInfo() const {
+  return NotOverridden("GetServerInfo");
+}
+
 absl::StatusOr<std::string> Client::UploadMesh(absl::string_view) const {
   return NotOverridden("UploadMesh");
 }

@@ -60,6 +60,11 @@ GrpcClient::GrpcClient(const std::string& server, const ConnectOptions& options)
     : stubs_(std::make_unique<Stubs>(server, TokenOf(options),
                                      grpc::CreateChannel(server, CredentialsFor(options)))) {}
 
+absl::StatusOr<v1::GetServerInfoResponse> GrpcClient::GetServerInfo() const {
+  return Call(*stubs_, stubs_->info, &v1::ServerService::Stub::GetServerInfo,
+              v1::GetServerInfoRequest());
+}
+
 absl::StatusOr<v1::Job> GrpcClient::CreateModalModel(
     const v1::CreateModalModelRequest& request) const {
   auto response =

@@ -17,6 +17,7 @@
 #include "carillon/v1/job_run_service.grpc.pb.h"
 #include "carillon/v1/modal_model_service.grpc.pb.h"
 #include "carillon/v1/scene_service.grpc.pb.h"
+#include "carillon/v1/server_service.grpc.pb.h"
 
 namespace carillon::client {
 
@@ -27,6 +28,8 @@ inline constexpr auto kCallTimeout = std::chrono::seconds(60);
 class GrpcClient final : public Client {
  public:
   GrpcClient(const std::string& server, const ConnectOptions& options);
+
+  absl::StatusOr<v1::GetServerInfoResponse> GetServerInfo() const override;
 
   absl::StatusOr<std::string> UploadMesh(absl::string_view bytes) const override;
   absl::StatusOr<v1::Job> CreateModalModel(
@@ -102,7 +105,8 @@ class GrpcClient final : public Client {
           contacts(channel),
           audio(channel),
           admin(channel),
-          job_runs(channel) {}
+          job_runs(channel),
+          info(channel) {}
 
     const std::string server;
     const std::string token;
@@ -113,6 +117,7 @@ class GrpcClient final : public Client {
     v1::AudioService::Stub audio;
     v1::AdminService::Stub admin;
     v1::JobRunService::Stub job_runs;
+    v1::ServerService::Stub info;
   };
 
   // gRPC's stubs take their calls as changes, which the calls of a client are not.

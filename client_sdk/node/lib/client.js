@@ -63,6 +63,11 @@ class Client {
     }
   }
 
+  /** Returns the version, the age, the limits and the features of the daemon. */
+  info() {
+    return this.call('ServerService', 'GetServerInfo', {});
+  }
+
   /** Returns the state of the daemon's mixer and output. */
   status() {
     return this.call('AudioService', 'GetMixer', {});

@@ -8,6 +8,7 @@ import type { ContactTraceObject } from '../types/carillon/v1/ContactTraceObject
 import type { ContactTraceRecord } from '../types/carillon/v1/ContactTraceRecord';
 import type { CreateModalModelRequest } from '../types/carillon/v1/CreateModalModelRequest';
 import type { GetMixerResponse__Output } from '../types/carillon/v1/GetMixerResponse';
+import type { GetServerInfoResponse__Output } from '../types/carillon/v1/GetServerInfoResponse';
 import type { Hearing } from '../types/carillon/v1/Hearing';
 import type { HertzContact } from '../types/carillon/v1/HertzContact';
 import type { Job__Output } from '../types/carillon/v1/Job';
@@ -231,6 +232,8 @@ export class Recording {
 /** A connection. */
 export class Client {
   readonly server: string;
+  /** Returns the version, the age, the limits and the features of the daemon. */
+  info(): Promise<GetServerInfoResponse__Output>;
   status(): Promise<GetMixerResponse__Output>;
   /** Stores a mesh. Returns its digest. */
   upload(mesh: Mesh): Promise<string>;

@@ -21,6 +21,7 @@
 #include "carillon/v1/job_run_service.pb.h"
 #include "carillon/v1/modal_model_service.pb.h"
 #include "carillon/v1/scene_service.pb.h"
+#include "carillon/v1/server_service.pb.h"
 
 namespace carillon::client {
 
@@ -51,6 +52,11 @@ class Client {
   /// Receives the records of a stored modal model in order. An error that it returns ends the
   /// transfer.
   using RecordSink = std::function<absl::Status(const v1::ModalModelRecord&)>;
+
+  // The daemon.
+
+  /// Returns the version, the age, the limits and the features of the daemon. Needs no token.
+  virtual absl::StatusOr<v1::GetServerInfoResponse> GetServerInfo() const;
 
   // Modal models.
 

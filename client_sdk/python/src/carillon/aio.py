@@ -26,7 +26,7 @@ from carillon.models import Model
 from carillon.scenes import ContactStream, Scene, SoundingObject
 from carillon.sound import Sound
 from carillon.traces import Trace
-from carillon.v1 import audio_service_pb2, contact_pb2, contact_service_pb2, material_pb2
+from carillon.v1 import audio_service_pb2, contact_pb2, contact_service_pb2, material_pb2, server_service_pb2
 
 Result = TypeVar("Result")
 
@@ -59,6 +59,9 @@ class AsyncClient:
 
     def __init__(self, sync: client.Client):
         self.sync = sync
+
+    async def info(self) -> server_service_pb2.GetServerInfoResponse:
+        return await in_thread(self.sync.info)
 
     async def status(self) -> audio_service_pb2.GetMixerResponse:
         return await in_thread(self.sync.status)

@@ -28,7 +28,8 @@ from carillon.traces import Trace
 from carillon.v1 import (
     admin_service_pb2_grpc, audio_service_pb2, audio_service_pb2_grpc, contact_service_pb2_grpc,
     decomposition_service_pb2, decomposition_service_pb2_grpc, hearing_pb2, material_pb2, modal_model_pb2,
-    modal_model_service_pb2, modal_model_service_pb2_grpc, scene_service_pb2, scene_service_pb2_grpc)
+    modal_model_service_pb2, modal_model_service_pb2_grpc, scene_service_pb2, scene_service_pb2_grpc,
+    server_service_pb2, server_service_pb2_grpc)
 
 PIECE_BYTES = 1 << 20
 
@@ -66,7 +67,13 @@ class Client:
         self.scenes_stub = scene_service_pb2_grpc.SceneServiceStub(self._channel)
         self.contacts_stub = contact_service_pb2_grpc.ContactServiceStub(self._channel)
         self.audio_stub = audio_service_pb2_grpc.AudioServiceStub(self._channel)
+        self.server_stub = server_service_pb2_grpc.ServerServiceStub(self._channel)
         self.admin_stub = admin_service_pb2_grpc.AdminServiceStub(self._channel)
+
+    def info(self) -> server_service_pb2.GetServerInfoResponse:
+        """Returns the version, the age, the limits and the features of the daemon. Needs no token."""
+        with errors.translated(self.server):
+            return self.server_stub.GetServerInfo(server_service_pb2.GetServerInfoRequest())
 
     def status(self) -> audio_service_pb2.GetMixerResponse:
         """Returns the state of the daemon's mixer and output."""
