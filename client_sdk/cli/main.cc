@@ -34,9 +34,7 @@ void AddStatus(CLI::App& app, Program& program) {
 void AddInfo(CLI::App& app, Program& program) {
   app.add_subcommand("info", "Show the version, the limits and the features of the daemon")
       ->callback([&] {
-        program.command = [&] {
-          return ShowInfo(*program.Daemon(), program.server, program.json);
-        };
+        program.command = [&] { return ShowInfo(*program.Daemon(), program.server, program.json); };
       });
 }
 

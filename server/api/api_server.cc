@@ -128,6 +128,7 @@ struct ApiServer::State {
         limits(settings.client_share),
         leases(rooms.clock, Duration(settings.scene_grace_s),
                [this](const std::string& connection) { return IsOpen(connection); }),
+        owners(access, leases, rooms.scenes),
         admin(rooms.database, reception),
         models(rooms.database, rooms.decompositions, reception),
         decompositions(rooms.decompositions, reception),
@@ -169,7 +170,7 @@ struct ApiServer::State {
   AccessControl access;
   ClientLimits limits;
   SceneLeases leases;
-  SceneOwners owners{access, leases};
+  SceneOwners owners;
   IdleCalls idle_calls;
   ThreadPool call_pool{kCallThreadCount};
   ThreadPool render_pool{kRenderThreadCount, kRenderNiceness};
@@ -216,8 +217,7 @@ absl::Status ApiServer::State::Listen(const ApiSettings& settings) {
     RETURN_IF_ERROR(gate->Listen(address, std::make_unique<GrpcTaker>(std::move(acceptor))));
   }
   for (grpc::Service* service : std::initializer_list<grpc::Service*>{
-           &admin, &models, &decompositions, &job_runs, &scenes, &contacts, &audio,
-           &server_info}) {
+           &admin, &models, &decompositions, &job_runs, &scenes, &contacts, &audio, &server_info}) {
     builder.RegisterService(service);
   }
   server = builder.BuildAndStart();

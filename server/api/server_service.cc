@@ -30,6 +30,8 @@ grpc::ServerUnaryReactor* ServerService::GetServerInfo(grpc::CallbackServerConte
 
 void ServerService::DescribeFeatures(v1::GetServerInfoResponse& info) const {
   if (facts_.can_decompose()) info.add_features("decomposition");
+  info.add_features("job-filters");
+  info.add_features("scene-ids");
   if (decompositions_.settings().transfers) info.add_features("transfers");
 }
 

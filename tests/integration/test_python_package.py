@@ -320,19 +320,6 @@ class ContactsTest(PackageTest):
             self.assertEqual(stream.findings.too_large_impulse_count, 1)
 
 
-class InfoTest(PackageTest):
-    def test_the_daemon_says_what_it_is(self):
-        async def ask():
-            async with carillon.aio.connect(self.daemon.server) as c:
-                return await c.info()
-
-        info, later = self.c.info(), asyncio.run(ask())
-        self.assertEqual((info.version, info.limits), (carillon.__version__, later.limits))
-        self.assertGreater(later.uptime_s, info.uptime_s)
-        self.assertIn("decomposition", info.features)
-        self.assertEqual(info.sample_rate_hz, self.c.status().format.sample_rate_hz)
-
-
 class AioTest(PackageTest):
     def test_a_strike_is_heard_while_the_event_loop_goes_on(self):
         async def strike():

@@ -53,7 +53,15 @@ class GrpcClient final : public Client {
   absl::StatusOr<v1::Job> CancelJob(const std::string& name) const override;
   absl::StatusOr<v1::Job> WatchJob(
       const std::string& name, const std::function<void(const v1::Job&)>& on_change) const override;
+  absl::Status WatchJobs(
+      const v1::WatchJobsRequest& request,
+      const std::function<bool(const v1::WatchJobsResponse&)>& on_answer) const override;
 
+  absl::StatusOr<v1::CreateSceneResponse> CreateOrFindScene(
+      const v1::CreateSceneRequest& request) const override;
+  absl::StatusOr<v1::Scene> GetScene(const std::string& name) const override;
+  absl::StatusOr<std::vector<v1::SoundingObject>> AddObjects(
+      const v1::AddObjectsRequest& request) const override;
   absl::StatusOr<std::string> CreateScene(const v1::CreateSceneRequest& request) const override;
   absl::StatusOr<v1::Scene> UpdateScene(const v1::UpdateSceneRequest& request) const override;
   absl::StatusOr<uint32_t> StopAll(const std::string& scene) const override;

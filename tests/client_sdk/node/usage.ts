@@ -15,6 +15,11 @@ async function main(): Promise<void> {
   });
   const scene = await c.createScene({ hearing: { panning: true }, listener: [0, 0, 1] });
   const bell = await scene.add(model, { pose: { position: [0, 0, 0], orientation: [1, 0, 0, 0] }, handle: 3 });
+  const shared = await c.createScene({ id: 'lathe-1' });
+  const clapper = (await shared.addAll([{ model, handle: 1 }, { model: model.name, gain: 0.5 }]))[1];
+  console.log(shared.existing, clapper.handle, (await shared.get()).peak);
+  for await (const job of c.jobs({ states: ['failed'] })) console.log(job.label);
+  for await (const job of c.watchJobs({ label_contains: 'bell' })) if (job === null) break;
   await bell.strike({ point: [0, 0, 0], impulse: new Float32Array(3), striker: 'wood' });
   await bell.update({ gain: 0.5, glide: 1 });
   const stream = scene.stream({ step: 1 / 240, delay: 0.05, frame: 'scene' });

@@ -93,12 +93,11 @@ class GuardedInfoApi : public ServedDaemon {
 };
 
 TEST_F(GuardedInfoApi, NeedsNoToken) {
-  const auto channel =
-      grpc::CreateChannel(addresses().back(), grpc::InsecureChannelCredentials());
+  const auto channel = grpc::CreateChannel(addresses().back(), grpc::InsecureChannelCredentials());
   v1::GetMixerResponse mixer;
   const auto guarded = v1::AudioService::NewStub(channel);
-  ExpectRefused(Call(*guarded, &v1::AudioService::Stub::GetMixer, {}, mixer),
-                grpc::UNAUTHENTICATED, "CREDENTIAL_MISSING");
+  ExpectRefused(Call(*guarded, &v1::AudioService::Stub::GetMixer, {}, mixer), grpc::UNAUTHENTICATED,
+                "CREDENTIAL_MISSING");
   EXPECT_EQ(InfoFrom(*v1::ServerService::NewStub(channel)).version(), "test");
 }
 
