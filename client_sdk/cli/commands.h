@@ -127,6 +127,7 @@ struct RenderOptions {
 
 /// The commands. Each prints its result to stdout, as JSON if `json` is true, and returns its
 /// error.
+absl::Status ShowInfo(const client::Client& daemon, const std::string& server, bool json);
 absl::Status ShowStatus(const client::Client& daemon, const std::string& server, bool json);
 absl::Status CreateModel(const client::Client& daemon, const CreateModelOptions& options,
                          bool json);
@@ -148,7 +149,7 @@ absl::Status CollectGarbage(const client::Client& daemon, const v1::CollectGarba
 absl::Status ShowModel(const client::Client& daemon, const std::string& text,
                        const MaterialFigures& figures, bool json);
 absl::Status DeleteModel(const client::Client& daemon, const std::string& text);
-absl::Status ListJobs(const client::Client& daemon, bool json);
+absl::Status ListJobs(const client::Client& daemon, const v1::ListJobsRequest& filter, bool json);
 absl::Status ShowJob(const client::Client& daemon, const std::string& text, bool json);
 absl::Status CancelJob(const client::Client& daemon, const std::string& text);
 absl::Status ListMaterials(const client::Client& daemon, bool json);
@@ -161,6 +162,9 @@ absl::Status DeleteScene(const client::Client& daemon, const std::string& text);
 /// Internal (OUTPUT_NOT_WRITABLE).
 absl::Status WriteExample(const Example& example, const std::string& path);
 absl::Status WatchJob(const client::Client& daemon, const std::string& text, bool json);
+/// Prints the jobs that wait or run, and then each job that matches when its state changes, or with
+/// `json` at each change, as long as somebody reads.
+absl::Status WatchJobs(const client::Client& daemon, const v1::WatchJobsRequest& filter, bool json);
 /// Runs a decomposition for the daemon on this machine. Fetches the mesh of the job as the file
 /// "mesh" into a new folder, writes the standard input to the file "request" beside it, runs the
 /// command there, reports its progress (WorkerEvent on descriptor 3), and uploads the file "model"

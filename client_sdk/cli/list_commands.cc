@@ -2,8 +2,10 @@
 //
 // The commands that show and end jobs, materials and scenes, and that write the examples.
 #include <cerrno>
+#include <cstdio>
 #include <cstring>
 #include <fstream>
+#include <map>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
@@ -33,20 +35,37 @@ std::string LeaseText(const v1::Scene& scene) {
   return absl::StrCat(scene.connection_count(), " connections");
 }
 
+void PrintJobLine(const v1::Job& job) {
+  absl::PrintF("%s  %s  %s\n", absl::StripPrefix(job.name(), "jobs/").substr(0, 12),
+               ProgressText(job), job.label());
+}
+
 }  // namespace
 
-absl::Status ListJobs(const client::Client& daemon, bool json) {
-  ASSIGN_OR_RETURN(const std::vector<v1::Job> jobs, daemon.ListJobs());
+absl::Status WatchJobs(const client::Client& daemon, const v1::WatchJobsRequest& filter,
+                       bool json) {
+  std::map<std::string, v1::JobState> shown;
+  const auto show = [&](const v1::WatchJobsResponse& answer) {
+    const v1::Job& job = answer.job();
+    const auto known = shown.find(job.name());
+    const bool news = known == shown.end() || known->second != job.state();
+    if (answer.has_job() && json) PrintJson(job);
+    if (answer.has_job() && !json && news) PrintJobLine(job);
+    shown[job.name()] = job.state();
+    return std::fflush(stdout) == 0;  // else the reader has gone
+  };
+  return daemon.WatchJobs(filter, show);
+}
+
+absl::Status ListJobs(const client::Client& daemon, const v1::ListJobsRequest& filter, bool json) {
+  ASSIGN_OR_RETURN(const std::vector<v1::Job> jobs, daemon.ListJobs(filter));
   v1::ListJobsResponse list;
   list.mutable_jobs()->Assign(jobs.begin(), jobs.end());
   if (json) {
     PrintJson(list);
     return absl::OkStatus();
   }
-  for (const v1::Job& job : jobs) {
-    absl::PrintF("%s  %s  %s\n", absl::StripPrefix(job.name(), "jobs/").substr(0, 12),
-                 ProgressText(job), job.label());
-  }
+  for (const v1::Job& job : jobs) PrintJobLine(job);
   return absl::OkStatus();
 }
 

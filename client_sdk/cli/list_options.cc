@@ -6,6 +6,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -46,24 +47,72 @@ void AddAbout(CLI::App& parent, const std::string& name, const std::string& text
   command.callback([run, thing] { run(*thing); });
 }
 
+/// The options that choose jobs by state and label.
+struct JobChoice {
+  std::vector<v1::JobState> states;
+  std::string label;
+};
+
+void AddJobChoice(CLI::App& command, JobChoice& choice) {
+  const std::map<std::string, v1::JobState> states = {{"queued", v1::JOB_STATE_QUEUED},
+                                                      {"running", v1::JOB_STATE_RUNNING},
+                                                      {"succeeded", v1::JOB_STATE_SUCCEEDED},
+                                                      {"failed", v1::JOB_STATE_FAILED},
+                                                      {"cancelled", v1::JOB_STATE_CANCELLED}};
+  command
+      .add_option("--state", choice.states,
+                  "Only jobs in these states: queued, running, succeeded, failed, cancelled [any]")
+      ->delimiter(',')
+      ->transform(CLI::CheckedTransformer(states, CLI::ignore_case).description(""));
+  command.add_option("--label", choice.label, "Only jobs whose label contains this text");
+}
+
+/// The request for the chosen jobs: a ListJobsRequest or a WatchJobsRequest.
+template <class Request>
+Request RequestOf(const JobChoice& choice) {
+  Request request;
+  for (const v1::JobState state : choice.states) request.add_states(state);
+  request.set_label_contains(choice.label);
+  return request;
+}
+
+void AddJobList(CLI::App& job, Program& program) {
+  auto choice = std::make_shared<JobChoice>();
+  CLI::App& list = *job.add_subcommand("list", "List the jobs, newest first");
+  AddJobChoice(list, *choice);
+  list.callback([&program, choice] {
+    program.command = [&program, choice] {
+      return ListJobs(*program.Daemon(), RequestOf<v1::ListJobsRequest>(*choice), program.json);
+    };
+  });
+}
+
+void AddJobWatch(CLI::App& job, const std::string& named, Program& program) {
+  auto text = std::make_shared<std::string>();
+  auto choice = std::make_shared<JobChoice>();
+  CLI::App& watch = *job.add_subcommand(
+      "watch", "Show the progress of a job until it ends, or the changes of all jobs");
+  watch.add_option("job", *text, named + " [all jobs, until the program is stopped]");
+  AddJobChoice(watch, *choice);
+  watch.callback([&program, text, choice] {
+    program.command = [&program, text, choice] {
+      if (!text->empty()) return WatchJob(*program.Daemon(), *text, program.json);
+      return WatchJobs(*program.Daemon(), RequestOf<v1::WatchJobsRequest>(*choice), program.json);
+    };
+  });
+}
+
 }  // namespace
 
 void AddJob(CLI::App& app, Program& program) {
   CLI::App& job = *app.add_subcommand("job", "List, follow, cancel and run decomposition jobs")
                        ->require_subcommand(1);
-  job.add_subcommand("list", "List the jobs, newest first")->callback([&program] {
-    program.command = [&program] { return ListJobs(*program.Daemon(), program.json); };
-  });
+  AddJobList(job, program);
   const std::string named = "The name, the label, or the first digits of the digest of a job";
   AddAbout(job, "show", "Show a job", named, [&program](const std::string& text) {
     program.command = [&program, text] { return ShowJob(*program.Daemon(), text, program.json); };
   });
-  AddAbout(job, "watch", "Show the progress of a job until it ends", named,
-           [&program](const std::string& text) {
-             program.command = [&program, text] {
-               return WatchJob(*program.Daemon(), text, program.json);
-             };
-           });
+  AddJobWatch(job, named, program);
   AddAbout(job, "cancel", "Cancel a job that has not ended", named,
            [&program](const std::string& text) {
              program.command = [&program, text] { return CancelJob(*program.Daemon(), text); };

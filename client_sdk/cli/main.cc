@@ -32,6 +32,13 @@ void AddStatus(CLI::App& app, Program& program) {
       });
 }
 
+void AddInfo(CLI::App& app, Program& program) {
+  app.add_subcommand("info", "Show the version, the limits and the features of the daemon")
+      ->callback([&] {
+        program.command = [&] { return ShowInfo(*program.Daemon(), program.server, program.json); };
+      });
+}
+
 void AddDatabase(CLI::App& app, Program& program) {
   auto file = std::make_shared<std::string>();
   auto budget_mib = std::make_shared<uint64_t>(0);
@@ -198,6 +205,7 @@ int Main(int argc, char** argv) {
   CLI::App app("Controls the daemon carillond, which makes rigid-body simulations audible.",
                "carillon");
   AddProgramOptions(app, program);
+  AddInfo(app, program);
   AddStatus(app, program);
   AddDoctor(app, program);
   AddDatabase(app, program);

@@ -1,9 +1,34 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "absl/strings/str_format.h"
+#include "absl/strings/str_join.h"
 #include "client_sdk/cli/commands.h"
 #include "client_sdk/cli/output.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::cli {
+
+absl::Status ShowInfo(const client::Client& daemon, const std::string& server, bool json) {
+  ASSIGN_OR_RETURN(const v1::GetServerInfoResponse info, daemon.GetServerInfo());
+  if (json) {
+    PrintJson(info);
+    return absl::OkStatus();
+  }
+  const v1::ServerLimits& limits = info.limits();
+  absl::PrintF("carillond %s at %s\n", info.version(), server);
+  absl::PrintF("up       %.0f s, output %d Hz, %d channels\n", info.uptime_s(),
+               info.sample_rate_hz(), info.channel_count());
+  absl::PrintF("features %s\n", absl::StrJoin(info.features(), ", "));
+  absl::PrintF("limits   %d scenes, %d objects, %d modes of an object that sound\n",
+               limits.scene_count(), limits.object_count(), limits.sounding_mode_count());
+  absl::PrintF("         %d contact streams, %d listeners, %d renderings, %d waiting jobs\n",
+               limits.contact_stream_count(), limits.listener_count(), limits.rendering_count(),
+               limits.waiting_job_count());
+  absl::PrintF("         of these %.0f %% for one client\n", limits.client_share() * 100);
+  absl::PrintF("         %d bytes a message, %d bytes a mesh file, %d entries a page\n",
+               limits.message_bytes(), limits.mesh_bytes(), limits.page_size());
+  absl::PrintF("         a scene waits %.0f s for its clients\n", limits.scene_grace_s());
+  return absl::OkStatus();
+}
 
 absl::Status ShowStatus(const client::Client& daemon, const std::string& server, bool json) {
   const auto mixer = daemon.GetMixer();

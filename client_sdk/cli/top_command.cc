@@ -27,17 +27,14 @@ struct View {
   std::vector<v1::Job> jobs;  // those that have not ended
 };
 
-bool HasEnded(const v1::Job& job) {
-  return job.state() == v1::JOB_STATE_SUCCEEDED || job.state() == v1::JOB_STATE_FAILED ||
-         job.state() == v1::JOB_STATE_CANCELLED;
-}
-
 absl::StatusOr<View> Look(const client::Client& daemon) {
   View view;
   ASSIGN_OR_RETURN(view.mixer, daemon.GetMixer());
   ASSIGN_OR_RETURN(view.scenes, daemon.ListScenes());
-  ASSIGN_OR_RETURN(view.jobs, daemon.ListJobs());
-  std::erase_if(view.jobs, HasEnded);
+  v1::ListJobsRequest unfinished;
+  unfinished.add_states(v1::JOB_STATE_QUEUED);
+  unfinished.add_states(v1::JOB_STATE_RUNNING);
+  ASSIGN_OR_RETURN(view.jobs, daemon.ListJobs(unfinished));
   return view;
 }
 

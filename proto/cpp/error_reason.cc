@@ -49,6 +49,13 @@ v1::ErrorInfo ToErrorInfo(const absl::Status& status) {
   return error;
 }
 
+absl::Status AtElement(const absl::Status& status, absl::string_view list, size_t index) {
+  v1::ErrorInfo error = ToErrorInfo(status);
+  error.set_message(absl::StrCat(list, "[", index, "]: ", error.message()));
+  (*error.mutable_metadata())["index"] = absl::StrCat(index);
+  return FromErrorInfo(status.code(), error);
+}
+
 absl::Status FromErrorInfo(absl::StatusCode code, const v1::ErrorInfo& error) {
   absl::Status status = Refusal(code, error.reason(), error.message());
   for (const auto& [name, value] : error.metadata()) AddFigure(status, name, value);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
+
 #include "absl/status/status.h"
 #include "absl/strings/string_view.h"
 #include "carillon/v1/error.pb.h"
@@ -13,6 +15,10 @@ absl::Status Refusal(absl::StatusCode code, absl::string_view reason, absl::stri
 
 /// Adds a figure that belongs to the reason, for programs ("first_mode_hz" = "31.5").
 void AddFigure(absl::Status& status, absl::string_view name, absl::string_view value);
+
+/// The same refusal of element `index` of a list: "REASON: list[index]: message", with the figure
+/// "index".
+absl::Status AtElement(const absl::Status& status, absl::string_view list, size_t index);
 
 /// Reason, message and figures of a status; a status without a reason gets "INTERNAL".
 v1::ErrorInfo ToErrorInfo(const absl::Status& status);

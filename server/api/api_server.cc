@@ -31,6 +31,7 @@
 #include "server/api/scene_leases.h"
 #include "server/api/scene_owners.h"
 #include "server/api/scene_service.h"
+#include "server/api/server_service.h"
 #include "server/api/thread_pool.h"
 #include "server/api/tls_credentials.h"
 
@@ -114,6 +115,7 @@ void LimitClients(grpc::ServerBuilder& builder) {
   grpc::ResourceQuota quota("clients");
   quota.Resize(kClientMemoryBytes);
   builder.SetResourceQuota(quota);
+  builder.SetMaxReceiveMessageSize(static_cast<int>(kMaxMessageBytes));
 }
 
 }  // namespace
@@ -126,6 +128,7 @@ struct ApiServer::State {
         limits(settings.client_share),
         leases(rooms.clock, Duration(settings.scene_grace_s),
                [this](const std::string& connection) { return IsOpen(connection); }),
+        owners(access, leases, rooms.scenes),
         admin(rooms.database, reception),
         models(rooms.database, rooms.decompositions, reception),
         decompositions(rooms.decompositions, reception),
@@ -138,6 +141,11 @@ struct ApiServer::State {
                   .reception = reception}),
         audio(settings.version, rooms.output, rooms.scenes, rooms.database, rooms.clock, idle_calls,
               {access, limits, render_pool}),
+        server_info({.version = settings.version,
+                     .client_share = settings.client_share,
+                     .scene_grace_s = settings.scene_grace_s,
+                     .can_decompose = rooms.can_decompose},
+                    rooms.decompositions, rooms.output, rooms.clock),
         output(rooms.output) {}
 
   absl::Status Listen(const ApiSettings& settings);
@@ -162,7 +170,7 @@ struct ApiServer::State {
   AccessControl access;
   ClientLimits limits;
   SceneLeases leases;
-  SceneOwners owners{access, leases};
+  SceneOwners owners;
   IdleCalls idle_calls;
   ThreadPool call_pool{kCallThreadCount};
   ThreadPool render_pool{kRenderThreadCount, kRenderNiceness};
@@ -174,6 +182,7 @@ struct ApiServer::State {
   SceneService scenes;
   ContactService contacts;
   AudioService audio;
+  ServerService server_info;
   LiveOutput& output;
   /// Those of each TCP address.
   std::vector<std::shared_ptr<TlsCredentials>> tls;
@@ -208,7 +217,7 @@ absl::Status ApiServer::State::Listen(const ApiSettings& settings) {
     RETURN_IF_ERROR(gate->Listen(address, std::make_unique<GrpcTaker>(std::move(acceptor))));
   }
   for (grpc::Service* service : std::initializer_list<grpc::Service*>{
-           &admin, &models, &decompositions, &job_runs, &scenes, &contacts, &audio}) {
+           &admin, &models, &decompositions, &job_runs, &scenes, &contacts, &audio, &server_info}) {
     builder.RegisterService(service);
   }
   server = builder.BuildAndStart();

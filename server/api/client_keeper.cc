@@ -2,10 +2,10 @@
 #include "server/api/client_keeper.h"
 
 #include <cstdint>
+#include <string>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "server/api/resource_name.h"
 
 namespace carillon {
 namespace {
@@ -24,10 +24,11 @@ ClientKeeper::~ClientKeeper() {
 void ClientKeeper::Run() {
   while (!stop_.try_acquire_for(kPeriod)) {
     for (const uint64_t scene : kept_.owners.leases().Expired()) {
+      const std::string name = kept_.scenes.NameOf(scene);
       // Somebody may have deleted it meanwhile.
       const bool ended = kept_.scenes.DeleteScene(scene).ok();
       kept_.owners.Remove(scene);
-      if (ended) kept_.log(absl::StrCat(SceneName(scene), " has ended: its clients have gone"));
+      if (ended) kept_.log(absl::StrCat(name, " has ended: its clients have gone"));
     }
     kept_.idle_calls.EndIdle(kept_.idle_limit);
     kept_.tick();

@@ -2,16 +2,20 @@
 #include "server/api/decomposition_service.h"
 
 #include <deque>
+#include <map>
 #include <memory>
 #include <string>
 #include <utility>
 
 #include "absl/base/thread_annotations.h"
+#include "absl/strings/str_cat.h"
+#include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 #include "server/api/resource_name.h"
 #include "server/api/stream_call.h"
 #include "server/api/unary_call.h"
 #include "server/base/mutex.h"
+#include "server/decomposition/job_rules.h"
 
 namespace carillon {
 namespace {
@@ -64,6 +68,78 @@ class JobWatchCall final : public ServerStream<v1::WatchJobResponse> {
   absl::StatusOr<std::unique_ptr<JobWatch>> watch_;
 };
 
+/// The filter of a ListJobsRequest or a WatchJobsRequest, whose fields have the same names.
+template <typename Message>
+JobFilter FilterOf(const Message& request) {
+  JobFilter filter{.label_contains = request.label_contains()};
+  for (const int state : request.states()) {
+    filter.states.push_back(static_cast<v1::JobState>(state));
+  }
+  return filter;
+}
+
+/// Sends the jobs that match as they change. Of a job that waits to be sent, only the newest state
+/// is kept.
+class JobsWatchCall final : public ServerStream<v1::WatchJobsResponse>, private JobSink {
+ public:
+  JobsWatchCall(DecompositionQueue& queue, JobFilter filter, ThreadPool& pool)
+      : StreamWriter(&pool), filter_(std::move(filter)), watch_(queue.WatchAll(*this)) {
+    StartWriting();
+  }
+
+ private:
+  static constexpr size_t kMostWaiting = 4096;
+
+  // Called with the queue's lock held. Wake hands the writing to the pool, so no call of the queue
+  // follows on this thread.
+  void Take(const v1::Job& job) override {
+    if (!Matches(job, filter_)) return;
+    {
+      const MutexLock lock(&mutex_);
+      if (waiting_.size() < kMostWaiting || waiting_.contains(job.name())) {
+        if (!waiting_.contains(job.name())) order_.push_back(job.name());
+        waiting_[job.name()] = job;
+      } else {
+        overrun_ = true;
+      }
+    }
+    Wake();
+  }
+
+  void TakeBegin() override {
+    {
+      const MutexLock lock(&mutex_);
+      order_.emplace_back();
+    }
+    Wake();
+  }
+
+  absl::StatusOr<Supply> Fill(v1::WatchJobsResponse& response) override {
+    const MutexLock lock(&mutex_);
+    if (overrun_) {
+      return Refusal(absl::StatusCode::kDataLoss, "WATCH_TOO_SLOW",
+                     absl::StrCat("the client did not read, and changes of over ", kMostWaiting,
+                                  " jobs wait for it: watch again, and read at once"));
+    }
+    if (order_.empty()) return Supply::kLater;
+    response.Clear();
+    if (auto job = waiting_.extract(order_.front())) {
+      *response.mutable_job() = std::move(job.mapped());
+    }
+    order_.pop_front();
+    return Supply::kMessage;
+  }
+
+  const JobFilter filter_;
+  Mutex mutex_;
+  /// Names in the order of sending; an empty one stands for the begin of the changes.
+  std::deque<std::string> order_ ABSL_GUARDED_BY(mutex_);
+  std::map<std::string, v1::Job> waiting_ ABSL_GUARDED_BY(mutex_);
+  bool overrun_ ABSL_GUARDED_BY(mutex_) = false;
+  /// Last, so that it is destroyed, and calls Take no more, before the rest.
+  const std::unique_ptr<JobWatch> watch_;
+};
+
 }  // namespace
 
 grpc::ServerUnaryReactor* DecompositionService::GetJob(grpc::CallbackServerContext* context,
@@ -81,7 +157,7 @@ grpc::ServerUnaryReactor* DecompositionService::ListJobs(grpc::CallbackServerCon
                                                          v1::ListJobsResponse* response) {
   return Answer(context, reception_, Role::kAny, [this, request, response] {
     ASSIGN_OR_RETURN(DecompositionJobPage page,
-                     queue_.List(request->page_size(), request->page_token()));
+                     queue_.List(request->page_size(), request->page_token(), FilterOf(*request)));
     for (v1::Job& job : page.jobs) *response->add_jobs() = std::move(job);
     response->set_next_page_token(page.next_page_token);
     return absl::OkStatus();
@@ -103,6 +179,14 @@ grpc::ServerWriteReactor<v1::WatchJobResponse>* DecompositionService::WatchJob(
   return Open(*context, reception_, Role::kAny,
               [this, request]() -> grpc::ServerWriteReactor<v1::WatchJobResponse>* {
                 return new JobWatchCall(queue_, ParseJobName(request->name()));
+              });
+}
+
+grpc::ServerWriteReactor<v1::WatchJobsResponse>* DecompositionService::WatchJobs(
+    grpc::CallbackServerContext* context, const v1::WatchJobsRequest* request) {
+  return Open(*context, reception_, Role::kAny,
+              [this, request]() -> grpc::ServerWriteReactor<v1::WatchJobsResponse>* {
+                return new JobsWatchCall(queue_, FilterOf(*request), reception_.pool);
               });
 }
 

@@ -24,6 +24,8 @@ class DecompositionService final : public v1::DecompositionService::CallbackServ
                                       v1::CancelJobResponse* response) override;
   grpc::ServerWriteReactor<v1::WatchJobResponse>* WatchJob(
       grpc::CallbackServerContext* context, const v1::WatchJobRequest* request) override;
+  grpc::ServerWriteReactor<v1::WatchJobsResponse>* WatchJobs(
+      grpc::CallbackServerContext* context, const v1::WatchJobsRequest* request) override;
 
  private:
   DecompositionQueue& queue_;

@@ -37,7 +37,8 @@ absl::StatusOr<std::unique_ptr<Listener>> Subscribe(LiveOutput& output, const Sc
                                                     std::function<void()> wake) {
   RETURN_IF_ERROR(Check(request));
   if (request.scene().empty()) return output.broadcast().Subscribe(std::move(wake));
-  ASSIGN_OR_RETURN(const uint64_t scene, ParseSceneName(request.scene()));
+  ASSIGN_OR_RETURN(const std::string id, ParseSceneName(request.scene()));
+  ASSIGN_OR_RETURN(const uint64_t scene, scenes.FindId(id));
   ASSIGN_OR_RETURN(const BusId bus, scenes.BusOf(scene));
   return output.stems().Subscribe(bus, std::move(wake));
 }

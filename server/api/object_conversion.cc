@@ -96,10 +96,10 @@ absl::StatusOr<ObjectChange> ToObjectChange(const v1::UpdateObjectRequest& reque
   return change;
 }
 
-v1::SoundingObject ToProto(uint64_t scene, const PlacedObject& placed) {
+v1::SoundingObject ToProto(const std::string& scene, const PlacedObject& placed) {
   const SoundingObject& object = placed.object;
   v1::SoundingObject proto;
-  proto.set_name(ObjectNameString(scene, placed.handle));
+  proto.set_name(absl::StrCat(scene, "/objects/", placed.handle));
   proto.set_handle(placed.handle);
   proto.set_modal_model(ModelName(object.body->model->digest));
   *proto.mutable_material() = ToProto(object.properties, object.body->model->poisson_ratio);

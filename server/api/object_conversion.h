@@ -56,6 +56,7 @@ absl::StatusOr<ObjectOfModel> ToObject(const Message& message, ModelStore& model
 /// Errors: those of ResolveMaterial.
 absl::StatusOr<ObjectChange> ToObjectChange(const v1::UpdateObjectRequest& request);
 
-v1::SoundingObject ToProto(uint64_t scene, const PlacedObject& placed);
+/// `scene` is the name of its scene.
+v1::SoundingObject ToProto(const std::string& scene, const PlacedObject& placed);
 
 }  // namespace carillon

@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/api/resource_name.h"
 
+#include <algorithm>
+
+#include "absl/strings/ascii.h"
+#include "absl/strings/escaping.h"
+#include "absl/strings/match.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/strip.h"
@@ -13,6 +18,10 @@ namespace {
 absl::Status NotAName(absl::string_view reason, absl::string_view name, absl::string_view form) {
   return Refusal(absl::StatusCode::kNotFound, reason,
                  absl::StrCat("\"", name, "\" names nothing; a name has the form ", form));
+}
+
+bool IsOfSceneId(unsigned char c) {
+  return absl::ascii_islower(c) || absl::ascii_isdigit(c) || c == '.' || c == '_' || c == '-';
 }
 
 }  // namespace
@@ -29,11 +38,24 @@ absl::StatusOr<std::string> ParseJobName(absl::string_view name) {
   return NotAName("JOB_NOT_FOUND", name, "jobs/{digest}");
 }
 
-absl::StatusOr<uint64_t> ParseSceneName(absl::string_view name) {
+absl::StatusOr<std::string> ParseSceneName(absl::string_view name) {
   absl::string_view id = name;
-  uint64_t scene = 0;
-  if (absl::ConsumePrefix(&id, "scenes/") && absl::SimpleAtoi(id, &scene)) return scene;
+  if (absl::ConsumePrefix(&id, "scenes/") && !id.empty() && !absl::StrContains(id, '/')) {
+    return std::string(id);
+  }
   return NotAName("SCENE_NOT_FOUND", name, "scenes/{id}");
+}
+
+absl::Status ValidateSceneId(absl::string_view id) {
+  constexpr size_t kLongest = 64;
+  const bool fits = !id.empty() && id.size() <= kLongest && absl::ascii_islower(id.front());
+  if (fits && std::ranges::all_of(id, IsOfSceneId)) return absl::OkStatus();
+  return Refusal(
+      absl::StatusCode::kInvalidArgument, "INVALID_SCENE_ID",
+      absl::StrCat("the id of a scene is 1 to ", kLongest,
+                   " lower-case letters, digits, \".\", \"_\" and \"-\", of which the "
+                   "first is a letter; this one is \"",
+                   absl::CHexEscape(id.substr(0, kLongest)), "\" of ", id.size(), " bytes"));
 }
 
 absl::StatusOr<ObjectName> ParseObjectName(absl::string_view name) {
@@ -41,18 +63,12 @@ absl::StatusOr<ObjectName> ParseObjectName(absl::string_view name) {
   if (separator == absl::string_view::npos) {
     return NotAName("OBJECT_NOT_FOUND", name, "scenes/{id}/objects/{handle}");
   }
-  ASSIGN_OR_RETURN(const uint64_t scene, ParseSceneName(name.substr(0, separator)));
-  ObjectName object{.scene = scene};
+  ObjectName object;
+  ASSIGN_OR_RETURN(object.scene, ParseSceneName(name.substr(0, separator)));
   if (absl::SimpleAtoi(name.substr(separator + 9), &object.handle)) return object;
   return NotAName("OBJECT_NOT_FOUND", name, "scenes/{id}/objects/{handle}");
 }
 
 std::string ModelName(absl::string_view digest) { return absl::StrCat("modalModels/", digest); }
-
-std::string SceneName(uint64_t scene) { return absl::StrCat("scenes/", scene); }
-
-std::string ObjectNameString(uint64_t scene, uint32_t handle) {
-  return absl::StrCat("scenes/", scene, "/objects/", handle);
-}
 
 }  // namespace carillon

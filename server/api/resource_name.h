@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <string>
 
+#include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 
@@ -16,10 +17,14 @@ absl::StatusOr<std::string> ParseModelName(absl::string_view name);
 absl::StatusOr<std::string> ParseJobName(absl::string_view name);
 
 /// Returns the id of "scenes/{id}". Errors: NotFound (SCENE_NOT_FOUND).
-absl::StatusOr<uint64_t> ParseSceneName(absl::string_view name);
+absl::StatusOr<std::string> ParseSceneName(absl::string_view name);
+
+/// Whether a client may give a scene this id: 1 to 64 lower-case letters, digits, ".", "_" and "-",
+/// of which the first is a letter. Errors: InvalidArgument (INVALID_SCENE_ID).
+absl::Status ValidateSceneId(absl::string_view id);
 
 struct ObjectName {
-  uint64_t scene = 0;
+  std::string scene{};  ///< its id
   uint32_t handle = 0;
 };
 
@@ -28,7 +33,5 @@ struct ObjectName {
 absl::StatusOr<ObjectName> ParseObjectName(absl::string_view name);
 
 std::string ModelName(absl::string_view digest);
-std::string SceneName(uint64_t scene);
-std::string ObjectNameString(uint64_t scene, uint32_t handle);
 
 }  // namespace carillon

@@ -10,10 +10,12 @@
 
 namespace carillon {
 
-void SceneOwners::Add(uint64_t scene, const Principal& owner, ClientPlace place, bool keep) {
-  leases_.Begin(scene, owner.connection, keep);
+void SceneOwners::Add(uint64_t scene, const Principal& owner, ClientPlace place,
+                      const SceneWish& wish) {
+  leases_.Begin(scene, owner.connection, wish.keep);
   const MutexLock lock(&mutex_);
-  owners_[scene] = {.name = owner.name, .client = owner.client, .place = std::move(place)};
+  owners_[scene] = {
+      .name = owner.name, .client = owner.client, .place = std::move(place), .wish = wish};
 }
 
 void SceneOwners::Remove(uint64_t scene) {
@@ -40,9 +42,41 @@ bool SceneOwners::Owns(const Principal& caller, uint64_t scene) const {
 absl::StatusOr<uint64_t> SceneOwners::Parse(const grpc::CallbackServerContext& context,
                                             const Principal& caller, absl::string_view name,
                                             SceneCall call) const {
-  ASSIGN_OR_RETURN(const uint64_t scene, ParseSceneName(name));
+  ASSIGN_OR_RETURN(const std::string id, ParseSceneName(name));
+  ASSIGN_OR_RETURN(const uint64_t scene, scenes_.FindId(id));
   RETURN_IF_ERROR(Check(context, caller, scene, call));
   return scene;
+}
+
+absl::Status SceneOwners::CheckMadeBy(const grpc::CallbackServerContext& context,
+                                      const Principal& caller, uint64_t scene,
+                                      const SceneWish& wish) const {
+  const std::string name = scenes_.NameOf(scene);
+  const std::optional<Made> made = FindMade(scene);
+  if (!made) {
+    return Refusal(absl::StatusCode::kNotFound, "SCENE_NOT_FOUND",
+                   absl::StrCat(name, " ends just now: make it again"));
+  }
+  if (made->owner != caller.name) {
+    return access_.Refuse(context, Refusal(absl::StatusCode::kAlreadyExists, "SCENE_ID_TAKEN",
+                                           absl::StrCat(name, " belongs to another caller than ",
+                                                        caller.name, ": choose another id")));
+  }
+  if (made->wish != wish) {
+    return Refusal(absl::StatusCode::kAlreadyExists, "SCENE_DIFFERS",
+                   absl::StrCat(name,
+                                " was made with another hearing, listener, keep or gain: give the "
+                                "same ones, or delete it first"));
+  }
+  leases_.Use(scene, caller.connection);
+  return absl::OkStatus();
+}
+
+std::optional<SceneOwners::Made> SceneOwners::FindMade(uint64_t scene) const {
+  const MutexLock lock(&mutex_);
+  const auto owner = owners_.find(scene);
+  if (owner == owners_.end()) return std::nullopt;
+  return Made{.owner = owner->second.name, .wish = owner->second.wish};
 }
 
 absl::Status SceneOwners::Check(const grpc::CallbackServerContext& context, const Principal& caller,
@@ -53,7 +87,7 @@ absl::Status SceneOwners::Check(const grpc::CallbackServerContext& context, cons
   }
   return access_.Refuse(
       context, Refusal(absl::StatusCode::kPermissionDenied, "SCENE_OF_ANOTHER",
-                       absl::StrCat(SceneName(scene), " belongs to another caller than ",
+                       absl::StrCat(scenes_.NameOf(scene), " belongs to another caller than ",
                                     caller.name, ": make a scene with SceneService.CreateScene")));
 }
 

@@ -14,21 +14,32 @@
 #include "server/api/client_limits.h"
 #include "server/api/scene_leases.h"
 #include "server/base/mutex.h"
+#include "server/scene/scene_registry.h"
 
 namespace carillon {
 
 /// Whether a call makes its scene last.
 enum class SceneCall { kUses, kLooks };
 
+/// The settings with which a caller makes a scene.
+struct SceneWish {
+  SceneSpace space{};
+  double gain = 1;
+  bool keep = false;
+
+  bool operator==(const SceneWish&) const = default;
+};
+
 /// The caller to whom each scene belongs, and the connections for which it lasts. Safe from every
 /// thread.
 class SceneOwners {
  public:
-  /// `access`, which logs refusals, and `leases` must outlive this.
-  SceneOwners(AccessControl& access, SceneLeases& leases) : access_(access), leases_(leases) {}
+  /// `access`, which logs refusals, `leases` and `scenes` must outlive this.
+  SceneOwners(AccessControl& access, SceneLeases& leases, const SceneRegistry& scenes)
+      : access_(access), leases_(leases), scenes_(scenes) {}
 
   /// `place` is the scene's among those of its client.
-  void Add(uint64_t scene, const Principal& owner, ClientPlace place, bool keep);
+  void Add(uint64_t scene, const Principal& owner, ClientPlace place, const SceneWish& wish);
   void Remove(uint64_t scene);
 
   SceneLeases& leases() { return leases_; }
@@ -43,8 +54,14 @@ class SceneOwners {
   absl::Status Check(const grpc::CallbackServerContext& context, const Principal& caller,
                      uint64_t scene, SceneCall call = SceneCall::kUses) const;
 
-  /// Returns the scene of this name if the caller may use it. Errors: those of ParseSceneName and
-  /// Check.
+  /// OK if this caller made the scene with the same wish; the scene lasts for its connection, too.
+  /// Errors: AlreadyExists (SCENE_ID_TAKEN, SCENE_DIFFERS), NotFound (SCENE_NOT_FOUND: it was
+  /// deleted meanwhile).
+  absl::Status CheckMadeBy(const grpc::CallbackServerContext& context, const Principal& caller,
+                           uint64_t scene, const SceneWish& wish) const;
+
+  /// Returns the scene of this name if the caller may use it. Errors: those of ParseSceneName,
+  /// SceneRegistry::FindId and Check.
   absl::StatusOr<uint64_t> Parse(const grpc::CallbackServerContext& context,
                                  const Principal& caller, absl::string_view name,
                                  SceneCall call = SceneCall::kUses) const;
@@ -57,10 +74,19 @@ class SceneOwners {
     std::string name;
     std::string client;
     ClientPlace place;
+    SceneWish wish;
   };
+
+  /// By whom, and how, a scene was made.
+  struct Made {
+    std::string owner;
+    SceneWish wish;
+  };
+  std::optional<Made> FindMade(uint64_t scene) const;
 
   AccessControl& access_;
   SceneLeases& leases_;
+  const SceneRegistry& scenes_;
   mutable Mutex mutex_;
   std::map<uint64_t, Owner> owners_ ABSL_GUARDED_BY(mutex_);
 };

@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "absl/strings/str_cat.h"
+#include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 #include "server/api/object_conversion.h"
 #include "server/api/pose_conversion.h"
@@ -17,7 +19,7 @@ namespace {
 
 v1::Scene ToProto(const SceneRegistry::SceneEntry& entry) {
   v1::Scene scene;
-  scene.set_name(SceneName(entry.scene));
+  scene.set_name(entry.name);
   scene.set_object_count(static_cast<uint32_t>(entry.object_count));
   scene.set_gain(entry.volume.gain);
   scene.set_muted(entry.volume.muted);
@@ -48,9 +50,19 @@ grpc::ServerUnaryReactor* SceneService::CreateScene(grpc::CallbackServerContext*
                                                     v1::CreateSceneResponse* response) {
   return Answer(context, reception_, Role::kStrike,
                 [this, context, request, response](const Principal& caller) {
-                  ASSIGN_OR_RETURN(const uint64_t scene, Create(*context, caller, *request));
-                  response->set_name(SceneName(scene));
-                  return absl::OkStatus();
+                  return Create(*context, caller, *request, *response);
+                });
+}
+
+grpc::ServerUnaryReactor* SceneService::GetScene(grpc::CallbackServerContext* context,
+                                                 const v1::GetSceneRequest* request,
+                                                 v1::GetSceneResponse* response) {
+  return Answer(context, reception_, Role::kStrike,
+                [this, context, request, response](const Principal& caller) {
+                  ASSIGN_OR_RETURN(
+                      const uint64_t scene,
+                      owners_.Parse(*context, caller, request->name(), SceneCall::kLooks));
+                  return Describe(scene, *response->mutable_scene());
                 });
 }
 
@@ -74,10 +86,7 @@ grpc::ServerUnaryReactor* SceneService::UpdateScene(grpc::CallbackServerContext*
                   ASSIGN_OR_RETURN(const uint64_t scene,
                                    owners_.Parse(*context, caller, request->name()));
                   RETURN_IF_ERROR(scenes_.ChangeVolume(scene, ToVolumeChange(*request)));
-                  ASSIGN_OR_RETURN(const SceneRegistry::SceneEntry entry, scenes_.GetScene(scene));
-                  *response->mutable_scene() = ToProto(entry);
-                  AddLease(owners_.leases().StateOf(scene), *response->mutable_scene());
-                  return absl::OkStatus();
+                  return Describe(scene, *response->mutable_scene());
                 });
 }
 
@@ -125,8 +134,8 @@ grpc::ServerUnaryReactor* SceneService::ListObjects(grpc::CallbackServerContext*
         ASSIGN_OR_RETURN(const uint64_t scene,
                          owners_.Parse(*context, caller, request->scene(), SceneCall::kLooks));
         ASSIGN_OR_RETURN(const std::vector<PlacedObject> objects, scenes_.ListObjects(scene));
-        for (const PlacedObject& placed : objects)
-          *response->add_objects() = ToProto(scene, placed);
+        const std::string name = scenes_.NameOf(scene);
+        for (const PlacedObject& placed : objects) *response->add_objects() = ToProto(name, placed);
         return absl::OkStatus();
       });
 }
@@ -142,14 +151,25 @@ grpc::ServerUnaryReactor* SceneService::AddObject(grpc::CallbackServerContext* c
                 });
 }
 
+grpc::ServerUnaryReactor* SceneService::AddObjects(grpc::CallbackServerContext* context,
+                                                   const v1::AddObjectsRequest* request,
+                                                   v1::AddObjectsResponse* response) {
+  return Answer(context, reception_, Role::kStrike,
+                [this, context, request, response](const Principal& caller) {
+                  ASSIGN_OR_RETURN(const uint64_t scene,
+                                   owners_.Parse(*context, caller, request->scene()));
+                  return AddAll(scene, *request, *response);
+                });
+}
+
 grpc::ServerUnaryReactor* SceneService::UpdateObject(grpc::CallbackServerContext* context,
                                                      const v1::UpdateObjectRequest* request,
                                                      v1::UpdateObjectResponse* response) {
   return Answer(context, reception_, Role::kStrike,
                 [this, context, request, response](const Principal& caller) {
                   ASSIGN_OR_RETURN(const ObjectName name, ParseObjectName(request->name()));
-                  RETURN_IF_ERROR(owners_.Check(*context, caller, name.scene));
-                  return Update(name, *request, *response);
+                  ASSIGN_OR_RETURN(const uint64_t scene, Parse(*context, caller, name));
+                  return Update(scene, name.handle, *request, *response);
                 });
 }
 
@@ -159,8 +179,8 @@ grpc::ServerUnaryReactor* SceneService::RemoveObject(grpc::CallbackServerContext
   return Answer(context, reception_, Role::kStrike,
                 [this, context, request](const Principal& caller) {
                   ASSIGN_OR_RETURN(const ObjectName name, ParseObjectName(request->name()));
-                  RETURN_IF_ERROR(owners_.Check(*context, caller, name.scene));
-                  return scenes_.RemoveObject(name.scene, name.handle);
+                  ASSIGN_OR_RETURN(const uint64_t scene, Parse(*context, caller, name));
+                  return scenes_.RemoveObject(scene, name.handle);
                 });
 }
 
@@ -174,22 +194,60 @@ grpc::ServerUnaryReactor* SceneService::UpdateListener(grpc::CallbackServerConte
       });
 }
 
-absl::StatusOr<uint64_t> SceneService::Create(const grpc::CallbackServerContext& context,
-                                              const Principal& caller,
-                                              const v1::CreateSceneRequest& request) {
-  const SceneSpace space = ToSceneSpace(request.hearing(), request.listener());
+absl::Status SceneService::Create(const grpc::CallbackServerContext& context,
+                                  const Principal& caller, const v1::CreateSceneRequest& request,
+                                  v1::CreateSceneResponse& response) {
+  const SceneWish wish{.space = ToSceneSpace(request.hearing(), request.listener()),
+                       .gain = request.has_gain() ? request.gain() : 1,
+                       .keep = request.keep()};
+  const std::string& id = request.id();
+  if (!id.empty()) {
+    RETURN_IF_ERROR(ValidateSceneId(id));
+    const MutexLock lock(&create_mutex_);
+    const absl::StatusOr<uint64_t> known = scenes_.FindId(id);
+    response.set_existing(known.ok());
+    if (known.ok()) {
+      RETURN_IF_ERROR(owners_.CheckMadeBy(context, caller, *known, wish));
+    } else {
+      RETURN_IF_ERROR(CreateNew(context, caller, id, wish).status());
+    }
+    response.set_name(absl::StrCat("scenes/", id));
+    return absl::OkStatus();
+  }
+  ASSIGN_OR_RETURN(const uint64_t scene, CreateNew(context, caller, id, wish));
+  response.set_name(scenes_.NameOf(scene));
+  return absl::OkStatus();
+}
+
+absl::StatusOr<uint64_t> SceneService::CreateNew(const grpc::CallbackServerContext& context,
+                                                 const Principal& caller, const std::string& id,
+                                                 const SceneWish& wish) {
   absl::StatusOr<ClientPlace> place = reception_.limits.Take(Holding::kScene, caller.client);
   if (!place.ok() && EndAbandoned(caller.client)) {
     place = reception_.limits.Take(Holding::kScene, caller.client);
   }
   if (!place.ok()) return reception_.access.Refuse(context, place.status());
-  const double gain = request.has_gain() ? request.gain() : 1;
-  absl::StatusOr<uint64_t> scene = scenes_.CreateScene(space, gain, caller.name);
+  absl::StatusOr<uint64_t> scene = scenes_.CreateScene(wish.space, wish.gain, caller.name, id);
   if (absl::IsResourceExhausted(scene.status()) && EndAbandoned(std::nullopt)) {
-    scene = scenes_.CreateScene(space, gain, caller.name);
+    scene = scenes_.CreateScene(wish.space, wish.gain, caller.name, id);
   }
   RETURN_IF_ERROR(scene.status());
-  owners_.Add(*scene, caller, *std::move(place), request.keep());
+  owners_.Add(*scene, caller, *std::move(place), wish);
+  return scene;
+}
+
+absl::Status SceneService::Describe(uint64_t scene, v1::Scene& described) const {
+  ASSIGN_OR_RETURN(const SceneRegistry::SceneEntry entry, scenes_.GetScene(scene));
+  described = ToProto(entry);
+  AddLease(owners_.leases().StateOf(scene), described);
+  return absl::OkStatus();
+}
+
+absl::StatusOr<uint64_t> SceneService::Parse(const grpc::CallbackServerContext& context,
+                                             const Principal& caller,
+                                             const ObjectName& name) const {
+  ASSIGN_OR_RETURN(const uint64_t scene, scenes_.FindId(name.scene));
+  RETURN_IF_ERROR(owners_.Check(context, caller, scene));
   return scene;
 }
 
@@ -207,16 +265,39 @@ absl::Status SceneService::Add(uint64_t scene, const v1::AddObjectRequest& reque
   ASSIGN_OR_RETURN(
       const PlacedObject placed,
       scenes_.AddObject(scene, request.handle(), std::move(object.model), object.properties));
-  *response.mutable_object() = ToProto(scene, placed);
+  *response.mutable_object() = ToProto(scenes_.NameOf(scene), placed);
   return absl::OkStatus();
 }
 
-absl::Status SceneService::Update(const ObjectName& name, const v1::UpdateObjectRequest& request,
+absl::Status SceneService::AddAll(uint64_t scene, const v1::AddObjectsRequest& request,
+                                  v1::AddObjectsResponse& response) {
+  std::vector<NewObject> objects;
+  for (const v1::AddObjectRequest& wanted : request.objects()) {
+    const size_t index = objects.size();
+    if (!wanted.scene().empty() && wanted.scene() != request.scene()) {
+      return AtElement(Refusal(absl::StatusCode::kInvalidArgument, "INVALID_NAME",
+                               absl::StrCat("it names \"", wanted.scene(), "\" and the call \"",
+                                            request.scene(), "\": leave its scene empty")),
+                       "objects", index);
+    }
+    absl::StatusOr<ObjectOfModel> object = ToObject(wanted, database_.models());
+    if (!object.ok()) return AtElement(object.status(), "objects", index);
+    objects.push_back({.handle = wanted.handle(),
+                       .model = std::move(object->model),
+                       .properties = std::move(object->properties)});
+  }
+  ASSIGN_OR_RETURN(const std::vector<PlacedObject> placed, scenes_.AddObjects(scene, objects));
+  const std::string name = scenes_.NameOf(scene);
+  for (const PlacedObject& made : placed) *response.add_objects() = ToProto(name, made);
+  return absl::OkStatus();
+}
+
+absl::Status SceneService::Update(uint64_t scene, uint32_t handle,
+                                  const v1::UpdateObjectRequest& request,
                                   v1::UpdateObjectResponse& response) {
   ASSIGN_OR_RETURN(const ObjectChange change, ToObjectChange(request));
-  ASSIGN_OR_RETURN(const PlacedObject placed,
-                   scenes_.UpdateObject(name.scene, name.handle, change));
-  *response.mutable_object() = ToProto(name.scene, placed);
+  ASSIGN_OR_RETURN(const PlacedObject placed, scenes_.UpdateObject(scene, handle, change));
+  *response.mutable_object() = ToProto(scenes_.NameOf(scene), placed);
   return absl::OkStatus();
 }
 

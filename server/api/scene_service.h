@@ -9,6 +9,7 @@
 #include "server/api/reception.h"
 #include "server/api/resource_name.h"
 #include "server/api/scene_owners.h"
+#include "server/base/mutex.h"
 #include "server/mode_database/mode_database.h"
 #include "server/scene/scene_registry.h"
 
@@ -24,6 +25,9 @@ class SceneService final : public v1::SceneService::CallbackService {
   grpc::ServerUnaryReactor* CreateScene(grpc::CallbackServerContext* context,
                                         const v1::CreateSceneRequest* request,
                                         v1::CreateSceneResponse* response) override;
+  grpc::ServerUnaryReactor* GetScene(grpc::CallbackServerContext* context,
+                                     const v1::GetSceneRequest* request,
+                                     v1::GetSceneResponse* response) override;
   grpc::ServerUnaryReactor* UpdateScene(grpc::CallbackServerContext* context,
                                         const v1::UpdateSceneRequest* request,
                                         v1::UpdateSceneResponse* response) override;
@@ -42,6 +46,9 @@ class SceneService final : public v1::SceneService::CallbackService {
   grpc::ServerUnaryReactor* AddObject(grpc::CallbackServerContext* context,
                                       const v1::AddObjectRequest* request,
                                       v1::AddObjectResponse* response) override;
+  grpc::ServerUnaryReactor* AddObjects(grpc::CallbackServerContext* context,
+                                       const v1::AddObjectsRequest* request,
+                                       v1::AddObjectsResponse* response) override;
   grpc::ServerUnaryReactor* UpdateObject(grpc::CallbackServerContext* context,
                                          const v1::UpdateObjectRequest* request,
                                          v1::UpdateObjectResponse* response) override;
@@ -53,20 +60,31 @@ class SceneService final : public v1::SceneService::CallbackService {
                                            v1::UpdateListenerResponse* response) override;
 
  private:
-  absl::StatusOr<uint64_t> Create(const grpc::CallbackServerContext& context,
-                                  const Principal& caller, const v1::CreateSceneRequest& request);
+  /// Makes the scene, or finds the one that the caller has made before with this id.
+  absl::Status Create(const grpc::CallbackServerContext& context, const Principal& caller,
+                      const v1::CreateSceneRequest& request, v1::CreateSceneResponse& response);
+  absl::StatusOr<uint64_t> CreateNew(const grpc::CallbackServerContext& context,
+                                     const Principal& caller, const std::string& id,
+                                     const SceneWish& wish);
+  absl::Status Describe(uint64_t scene, v1::Scene& described) const;
+  absl::StatusOr<uint64_t> Parse(const grpc::CallbackServerContext& context,
+                                 const Principal& caller, const ObjectName& name) const;
   /// Ends the scene, of one client's or of all, that was abandoned for the longest time; false:
   /// none is.
   bool EndAbandoned(const std::optional<std::string>& client);
   absl::Status Add(uint64_t scene, const v1::AddObjectRequest& request,
                    v1::AddObjectResponse& response);
-  absl::Status Update(const ObjectName& name, const v1::UpdateObjectRequest& request,
+  absl::Status AddAll(uint64_t scene, const v1::AddObjectsRequest& request,
+                      v1::AddObjectsResponse& response);
+  absl::Status Update(uint64_t scene, uint32_t handle, const v1::UpdateObjectRequest& request,
                       v1::UpdateObjectResponse& response);
 
   SceneRegistry& scenes_;
   SceneOwners& owners_;
   ModeDatabase& database_;
   const Reception reception_;
+  /// Held while a scene with an id of the client's is made, so that two equal requests make one.
+  Mutex create_mutex_;
 };
 
 }  // namespace carillon

@@ -112,7 +112,7 @@ void StreamRecording::BeginStep() {
   if (!objects.ok()) return;
   for (const PlacedObject& placed : *objects) {
     if (known_.insert(placed.handle).second) {
-      new_objects_.push_back(RecordOf(ToProto(scene_, placed)));
+      new_objects_.push_back(RecordOf(ToProto(scenes_->NameOf(scene_), placed)));
     }
   }
 }

@@ -12,12 +12,16 @@ using Vector3 = std::array<double, 3>;
 /// A rotation, of unit length.
 struct Quaternion {
   double w = 1, x = 0, y = 0, z = 0;
+
+  bool operator==(const Quaternion&) const = default;
 };
 
 /// Position and orientation of a body in its scene.
 struct Pose {
   Vector3 position_m{};      ///< the origin of its frame
   Quaternion orientation{};  ///< rotates vectors of the body's frame into the scene's frame
+
+  bool operator==(const Pose&) const = default;
 };
 
 /// INVALID_ARGUMENT (INVALID_POSE) if a value is not finite, a coordinate exceeds 1e6 m, or the

@@ -92,7 +92,9 @@ void ActiveJobs::Add(ActiveJob job) {
       job.record.transfer_of.empty() ? experience_.Corrected(job.guess_bytes) : job.guess_bytes;
   if (job.record.peak_bytes > 0) job.estimate_bytes = job.record.peak_bytes;
   const std::string digest = job.record.digest;
-  Enqueue(jobs_.emplace(digest, std::move(job)).first->second);
+  ActiveJob& added = jobs_.emplace(digest, std::move(job)).first->second;
+  Enqueue(added);
+  TellSinks(ViewOf(added));
 }
 
 Notice ActiveJobs::Change(const std::string& digest, absl::FunctionRef<void(ActiveJob&)> change) {
@@ -109,6 +111,7 @@ Notice ActiveJobs::Remove(const std::string& digest, const v1::Job& last) {
   const auto job = jobs_.find(digest);
   Dequeue(job->second);
   jobs_.erase(job);
+  TellSinks(last);
   Notice notice{{}, last, ++version_};
   if (auto watchers = watchers_.extract(digest)) notice.watchers = std::move(watchers.mapped());
   return notice;
@@ -185,6 +188,23 @@ void ActiveJobs::Forget(const std::string& digest, const std::shared_ptr<Watcher
   EraseWatcher(digest, watcher);
 }
 
+void ActiveJobs::WatchAll(JobSink& sink) {
+  MutexLock lock(&mutex_);
+  for (const auto& [digest, job] : jobs_) sink.Take(ViewOf(job));
+  sink.TakeBegin();
+  sinks_.insert(&sink);
+}
+
+void ActiveJobs::Forget(JobSink& sink) {
+  MutexLock lock(&mutex_);
+  sinks_.erase(&sink);
+}
+
+void ActiveJobs::TellEnded(const v1::Job& job) {
+  MutexLock lock(&mutex_);
+  TellSinks(job);
+}
+
 void ActiveJobs::SetExperience(const MemoryExperience& experience) {
   MutexLock lock(&mutex_);
   experience_ = experience;
@@ -211,8 +231,14 @@ v1::Job ActiveJobs::ViewOf(const ActiveJob& job) {
 
 Notice ActiveJobs::Announce(const ActiveJob& job) {
   const auto watchers = watchers_.find(job.record.digest);
-  if (watchers == watchers_.end()) return {{}, ViewOf(job), ++version_};
-  return {watchers->second, ViewOf(job), ++version_};
+  Notice notice{{}, ViewOf(job), ++version_};
+  if (watchers != watchers_.end()) notice.watchers = watchers->second;
+  TellSinks(notice.job);
+  return notice;
+}
+
+void ActiveJobs::TellSinks(const v1::Job& job) {
+  for (JobSink* sink : sinks_) sink->Take(job);
 }
 
 void ActiveJobs::Enqueue(ActiveJob& job) {

@@ -17,6 +17,7 @@
 #include "carillon/v1/decomposition.pb.h"
 #include "carillon/v1/modal_model_service.pb.h"
 #include "server/base/mutex.h"
+#include "server/decomposition/job_sink.h"
 #include "server/decomposition/memory_estimate.h"
 #include "server/decomposition/watcher.h"
 #include "server/mode_database/job_store.h"
@@ -112,6 +113,13 @@ class ActiveJobs {
   Notice CompleteWatch(const std::string& digest, Notice watch, const v1::Job& stored);
   void Forget(const std::string& digest, const std::shared_ptr<Watcher>& watcher);
 
+  /// Hands all jobs to `sink`, then every change until Forget.
+  void WatchAll(JobSink& sink);
+  /// No call of `sink` runs when this returns, and none follows.
+  void Forget(JobSink& sink);
+  /// Tells the sinks of a job that is new and has ended already.
+  void TellEnded(const v1::Job& job);
+
   void SetExperience(const MemoryExperience& experience);
   /// Compares the memory of a run with its guess. Returns the correction of guesses from now on.
   double Learn(uint64_t guess_bytes, uint64_t peak_bytes);
@@ -123,6 +131,7 @@ class ActiveJobs {
 
   static Place PlaceOf(const ActiveJob& job);
   static v1::Job ViewOf(const ActiveJob& job);
+  void TellSinks(const v1::Job& job) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   Notice Announce(const ActiveJob& job) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void Enqueue(ActiveJob& job) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void Dequeue(const ActiveJob& job) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
@@ -141,6 +150,7 @@ class ActiveJobs {
   std::map<std::string, uint64_t> starts_ ABSL_GUARDED_BY(mutex_);
   uint64_t start_count_ ABSL_GUARDED_BY(mutex_) = 0;
   std::map<std::string, std::vector<std::shared_ptr<Watcher>>> watchers_ ABSL_GUARDED_BY(mutex_);
+  std::set<JobSink*> sinks_ ABSL_GUARDED_BY(mutex_);
   uint64_t last_number_ ABSL_GUARDED_BY(mutex_) = 0;
   uint64_t version_ ABSL_GUARDED_BY(mutex_) = 0;
   int running_count_ ABSL_GUARDED_BY(mutex_) = 0;

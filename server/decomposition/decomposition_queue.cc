@@ -24,11 +24,27 @@ class Watch final : public JobWatch {
   std::shared_ptr<Watcher> watcher_;
 };
 
+class WatchOfAll final : public JobWatch {
+ public:
+  WatchOfAll(const std::shared_ptr<QueueCore>& core, JobSink& sink) : core_(core), sink_(sink) {
+    core->WatchAll(sink);
+  }
+  ~WatchOfAll() override {
+    if (const auto core = core_.lock()) core->Forget(sink_);
+  }
+
+ private:
+  std::weak_ptr<QueueCore> core_;
+  JobSink& sink_;
+};
+
 }  // namespace
 
 DecompositionQueue::DecompositionQueue(std::shared_ptr<QueueCore> core) : core_(std::move(core)) {}
 
 DecompositionQueue::~DecompositionQueue() { core_->Stop(); }
+
+const QueueSettings& DecompositionQueue::settings() const { return core_->settings(); }
 
 absl::StatusOr<std::unique_ptr<DecompositionQueue>> DecompositionQueue::Make(
     ModeDatabase& database, std::unique_ptr<Executor> executor, const Clock& clock,
@@ -60,8 +76,9 @@ absl::StatusOr<v1::Job> DecompositionQueue::Get(const std::string& digest) {
 }
 
 absl::StatusOr<DecompositionJobPage> DecompositionQueue::List(int page_size,
-                                                              const std::string& page_token) {
-  return core_->List(page_size, page_token);
+                                                              const std::string& page_token,
+                                                              const JobFilter& filter) {
+  return core_->List(page_size, page_token, filter);
 }
 
 absl::StatusOr<v1::Job> DecompositionQueue::Cancel(const std::string& digest) {
@@ -73,6 +90,10 @@ absl::StatusOr<std::unique_ptr<JobWatch>> DecompositionQueue::Watch(
   auto watcher = std::make_shared<Watcher>(std::move(on_change));
   RETURN_IF_ERROR(core_->Watch(digest, watcher));
   return std::make_unique<carillon::Watch>(core_, digest, std::move(watcher));
+}
+
+std::unique_ptr<JobWatch> DecompositionQueue::WatchAll(JobSink& sink) {
+  return std::make_unique<WatchOfAll>(core_, sink);
 }
 
 absl::Status DecompositionQueue::DeleteModel(const std::string& digest) {

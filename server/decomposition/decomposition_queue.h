@@ -13,6 +13,7 @@
 #include "carillon/v1/modal_model_service.pb.h"
 #include "server/base/clock.h"
 #include "server/decomposition/executor.h"
+#include "server/decomposition/job_sink.h"
 #include "server/mode_database/mode_database.h"
 
 namespace carillon {
@@ -53,6 +54,8 @@ class DecompositionQueue {
       QueueSettings settings = {});
   ~DecompositionQueue();
 
+  const QueueSettings& settings() const;
+
   /// Requests the modal model of a mesh (ResolveRequest is applied). The job is in the database
   /// when the call returns.
   /// The job has succeeded at once if a stored model is complete up to the eigenvalue that the
@@ -86,8 +89,10 @@ class DecompositionQueue {
   /// Errors: NotFound (JOB_NOT_FOUND).
   absl::StatusOr<v1::Job> Get(const std::string& digest);
 
-  /// Newest first. `page_size` 0: 100; at most 1000. Errors: InvalidArgument (INVALID_PAGE).
-  absl::StatusOr<DecompositionJobPage> List(int page_size, const std::string& page_token);
+  /// Those that match, newest first. `page_size` 0: 100; at most 1000. A page may have fewer
+  /// although others follow. Errors: InvalidArgument (INVALID_PAGE).
+  absl::StatusOr<DecompositionJobPage> List(int page_size, const std::string& page_token,
+                                            const JobFilter& filter = {});
 
   /// Cancels a queued or running job; a job that has ended stays unchanged. A running job is still
   /// running in the answer, and a watch tells its end. Errors: NotFound (JOB_NOT_FOUND).
@@ -99,6 +104,10 @@ class DecompositionQueue {
   /// (JOB_NOT_FOUND).
   absl::StatusOr<std::unique_ptr<JobWatch>> Watch(const std::string& digest,
                                                   std::function<void(const v1::Job&)> on_change);
+
+  /// Hands all jobs that wait or run to `sink`, which must outlive the watch, then every change of
+  /// every job.
+  std::unique_ptr<JobWatch> WatchAll(JobSink& sink);
 
   /// Deletes the model of that digest, its transfers and their jobs, which are cancelled if they
   /// have not ended.

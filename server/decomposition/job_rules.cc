@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <array>
 
+#include "absl/strings/ascii.h"
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 #include "server/decomposition/decomposition_request.h"
@@ -92,6 +94,12 @@ v1::JobState StateOf(Verdict verdict) {
 bool HasEnded(v1::JobState state) {
   return state == v1::JOB_STATE_SUCCEEDED || state == v1::JOB_STATE_FAILED ||
          state == v1::JOB_STATE_CANCELLED;
+}
+
+bool Matches(const v1::Job& job, const JobFilter& filter) {
+  const bool in_state = filter.states.empty() || std::ranges::count(filter.states, job.state()) > 0;
+  return in_state && absl::StrContains(absl::AsciiStrToLower(job.label()),
+                                       absl::AsciiStrToLower(filter.label_contains));
 }
 
 v1::ErrorInfo InternalError(absl::string_view reason, absl::string_view message) {

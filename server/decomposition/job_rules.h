@@ -45,6 +45,9 @@ v1::JobState StateOf(Verdict verdict);
 
 bool HasEnded(v1::JobState state);
 
+/// Whether a job as clients see it passes the filter.
+bool Matches(const v1::Job& job, const JobFilter& filter);
+
 /// An error with the given reason whose cause lies on the server's side.
 v1::ErrorInfo InternalError(absl::string_view reason, absl::string_view message);
 

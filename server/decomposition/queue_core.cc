@@ -42,6 +42,12 @@ absl::Status ClientQueueFull(size_t count, size_t whole) {
                               whole, ": wait until some have run"));
 }
 
+/// The filter for the stored states: running jobs are stored as queued ones.
+JobFilter AsStored(JobFilter filter) {
+  std::ranges::replace(filter.states, v1::JOB_STATE_RUNNING, v1::JOB_STATE_QUEUED);
+  return filter;
+}
+
 void TellAll(const std::vector<Notice>& notices) {
   for (const Notice& notice : notices) notice.Tell();
 }
@@ -170,7 +176,11 @@ absl::StatusOr<v1::Job> QueueCore::SubmitNew(const WantedJob& wanted, Notices& n
   if (satisfied) record.state = v1::JOB_STATE_SUCCEEDED;
   if (known.has_value()) record.peak_bytes = known->peak_bytes;
   RETURN_IF_ERROR(database_.jobs().Put(record));
-  if (satisfied) return ToJob(record);
+  if (satisfied) {
+    const v1::Job ended = ToJob(record);
+    jobs_.TellEnded(ended);
+    return ended;
+  }
   runs_.Enqueue(std::move(record), request, {.client = client, .waits_for = std::move(coarse)});
   runs_.StartWhatFits(notices);
   return Get(digest);
@@ -271,17 +281,25 @@ absl::StatusOr<v1::Job> QueueCore::Get(const std::string& digest) {
   return FindStored(digest);
 }
 
-absl::StatusOr<DecompositionJobPage> QueueCore::List(int page_size, const std::string& page_token) {
+absl::StatusOr<DecompositionJobPage> QueueCore::List(int page_size, const std::string& page_token,
+                                                     const JobFilter& filter) {
   // The memory is read first: a job that a client has seen running is not listed as queued then.
   std::map<std::string, v1::Job> active = jobs_.ViewAll();
-  ASSIGN_OR_RETURN(const JobPage records, database_.jobs().List(page_size, page_token));
+  ASSIGN_OR_RETURN(JobPage records, database_.jobs().List(page_size, page_token, AsStored(filter)));
   DecompositionJobPage page;
-  page.next_page_token = records.next_page_token;
-  for (const JobRecord& record : records.jobs) {
-    const auto job = active.find(record.digest);
-    page.jobs.push_back(job == active.end() ? ToJob(record) : std::move(job->second));
+  // Of jobs that are stored as queued, the database does not know which run. Pages of which
+  // nothing is left are skipped.
+  while (true) {
+    for (const JobRecord& record : records.jobs) {
+      const auto job = active.find(record.digest);
+      v1::Job view = job == active.end() ? ToJob(record) : job->second;
+      if (Matches(view, filter)) page.jobs.push_back(std::move(view));
+    }
+    page.next_page_token = records.next_page_token;
+    if (!page.jobs.empty() || page.next_page_token.empty()) return page;
+    ASSIGN_OR_RETURN(records,
+                     database_.jobs().List(page_size, page.next_page_token, AsStored(filter)));
   }
-  return page;
 }
 
 absl::StatusOr<v1::Job> QueueCore::Cancel(const std::string& digest) {

@@ -39,6 +39,8 @@ class QueueCore {
         settings_(std::move(settings)),
         runs_(database, std::move(executor), clock, jobs_, settings_) {}
 
+  const QueueSettings& settings() const { return settings_; }
+
   /// Queues the unfinished jobs of an earlier run of the daemon.
   absl::Status TakeUp();
   /// Ends running workers; no watcher is told of a change afterwards.
@@ -51,11 +53,14 @@ class QueueCore {
                                          const std::string& client);
   DecompositionQueue::Counts counts();
   absl::StatusOr<v1::Job> Get(const std::string& digest);
-  absl::StatusOr<DecompositionJobPage> List(int page_size, const std::string& page_token);
+  absl::StatusOr<DecompositionJobPage> List(int page_size, const std::string& page_token,
+                                            const JobFilter& filter);
   absl::StatusOr<v1::Job> Cancel(const std::string& digest);
   absl::Status DeleteModel(const std::string& digest);
   absl::Status Watch(const std::string& digest, const std::shared_ptr<Watcher>& watcher);
   void Forget(const std::string& digest, const std::shared_ptr<Watcher>& watcher);
+  void WatchAll(JobSink& sink) { jobs_.WatchAll(sink); }
+  void Forget(JobSink& sink) { jobs_.Forget(sink); }
 
  private:
   using Notices = JobRuns::Notices;

@@ -8,6 +8,7 @@
 
 #include "absl/functional/function_ref.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 #include "server/base/xxh3.h"
@@ -65,6 +66,17 @@ JobRecord ParseJob(const SqlRow& row) {
   return job;
 }
 
+/// The condition that a job is in one of the states.
+std::string StatesAre(const std::vector<v1::JobState>& states) {
+  if (states.empty()) return "";
+  return absl::StrCat("AND state IN (",
+                      absl::StrJoin(states, ",",
+                                    [](std::string* out, auto state) {
+                                      absl::StrAppend(out, static_cast<int>(state));
+                                    }),
+                      ") ");
+}
+
 }  // namespace
 
 absl::Status JobStore::Put(const JobRecord& job) {
@@ -116,13 +128,17 @@ absl::StatusOr<std::vector<JobRecord>> JobStore::Unfinished() {
   return jobs;
 }
 
-absl::StatusOr<JobPage> JobStore::List(int page_size, const std::string& page_token) {
+absl::StatusOr<JobPage> JobStore::List(int page_size, const std::string& page_token,
+                                       const JobFilter& filter) {
   ASSIGN_OR_RETURN(const PageRange range, ParsePage(page_size, page_token));
   JobPage page;
   RETURN_IF_ERROR(database_->Read([&](SqliteConnection& connection) {
     return connection.Query(
-        absl::StrCat(kSelectJobs, "WHERE number < ? ORDER BY number DESC LIMIT ?").c_str(),
-        {range.below, range.size}, [&](const SqlRow& row) {
+        absl::StrCat(kSelectJobs, "WHERE number < ?1 ", StatesAre(filter.states),
+                     "AND (?2 = '' OR instr(lower(label), lower(?2)) > 0) "
+                     "ORDER BY number DESC LIMIT ?3")
+            .c_str(),
+        {range.below, filter.label_contains, range.size}, [&](const SqlRow& row) {
           page.next_page_token = absl::StrCat(row.Int(0));
           page.jobs.push_back(ParseJob(row));
           return absl::OkStatus();

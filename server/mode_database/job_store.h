@@ -33,6 +33,12 @@ struct JobRecord {
   bool damaged = false;
 };
 
+/// The jobs that a list is to have.
+struct JobFilter {
+  std::vector<v1::JobState> states{};  ///< none: any
+  std::string label_contains{};        ///< in upper or lower case; empty: any
+};
+
 struct JobPage {
   std::vector<JobRecord> jobs;
   std::string next_page_token;  ///< empty: this was the last page
@@ -52,7 +58,8 @@ class JobStore {
   absl::StatusOr<std::vector<JobRecord>> Unfinished();
 
   /// Newest first. `page_size` 0: 100; at most 1000. Errors: InvalidArgument (INVALID_PAGE).
-  absl::StatusOr<JobPage> List(int page_size, const std::string& page_token);
+  absl::StatusOr<JobPage> List(int page_size, const std::string& page_token,
+                               const JobFilter& filter = {});
 
   /// Deleting a job that is not there is no error.
   absl::Status Delete(const std::string& digest);

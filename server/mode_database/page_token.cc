@@ -11,7 +11,7 @@
 namespace carillon {
 
 absl::StatusOr<PageRange> ParsePage(int page_size, const std::string& page_token) {
-  PageRange page{page_size == 0 ? 100 : std::min<int64_t>(page_size, 1000),
+  PageRange page{page_size == 0 ? 100 : std::min<int64_t>(page_size, kMaxPageSize),
                  std::numeric_limits<int64_t>::max()};
   if (page.size < 0) {
     return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_PAGE",

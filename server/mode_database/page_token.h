@@ -8,6 +8,9 @@
 
 namespace carillon {
 
+/// Most rows of a page.
+inline constexpr int kMaxPageSize = 1000;
+
 /// A page of rows in falling order of key: at most `size` keys below `below`.
 struct PageRange {
   int64_t size = 0;

@@ -21,9 +21,12 @@ namespace carillon {
 /// is sent to a bank that has been given up.
 class Scene {
  public:
-  /// `name` is used in error messages. The objects sound through `bus`.
+  /// `name` is "scenes/{id}". The objects sound through `bus`.
   explicit Scene(std::string name, const SceneSpace& space = {}, BusId bus = {})
       : name_(std::move(name)), bus_(bus), space_(space) {}
+
+  /// "scenes/{id}".
+  const std::string& name() const { return name_; }
 
   BusId bus() const { return bus_; }
 

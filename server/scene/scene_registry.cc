@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/scene/scene_registry.h"
 
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -15,6 +16,36 @@ absl::Status TooMany(absl::string_view reason, size_t limit, absl::string_view w
   return Refusal(
       absl::StatusCode::kResourceExhausted, reason,
       absl::StrCat("the daemon holds ", limit, " ", what, " already; remove some first"));
+}
+
+absl::Status SceneNotFound(absl::string_view name) {
+  return Refusal(absl::StatusCode::kNotFound, "SCENE_NOT_FOUND",
+                 absl::StrCat("there is no ", name, "; make one with SceneService.CreateScene"));
+}
+
+/// The handle of each object: its own, or one that neither the scene nor another object has.
+absl::StatusOr<std::vector<uint32_t>> ChooseHandles(const Scene& scene,
+                                                    const std::vector<NewObject>& objects) {
+  std::set<uint32_t> taken;
+  for (const auto& [handle, object] : scene.CopyAll()) taken.insert(handle);
+  for (size_t i = 0; i < objects.size(); ++i) {
+    const uint32_t handle = objects[i].handle;
+    if (handle == 0 || taken.insert(handle).second) continue;
+    const absl::Status in_scene = scene.CheckFree(handle);
+    if (!in_scene.ok()) return AtElement(in_scene, "objects", i);
+    return AtElement(Refusal(absl::StatusCode::kAlreadyExists, "OBJECT_EXISTS",
+                             absl::StrCat("an object before it has the handle ", handle,
+                                          ": give each its own, or 0")),
+                     "objects", i);
+  }
+  std::vector<uint32_t> handles;
+  uint32_t free = 0;
+  for (const NewObject& object : objects) {
+    while (object.handle == 0 && !taken.insert(++free).second) {
+    }
+    handles.push_back(object.handle == 0 ? free : object.handle);
+  }
+  return handles;
 }
 
 ObjectProperties Changed(ObjectProperties properties, const ObjectChange& change) {
@@ -41,16 +72,35 @@ absl::Status ValidateGlide(double glide_s) {
 }  // namespace
 
 absl::StatusOr<uint64_t> SceneRegistry::CreateScene(const SceneSpace& space, double gain,
-                                                    const std::string& owner) {
+                                                    const std::string& owner,
+                                                    const std::string& id) {
   RETURN_IF_ERROR(Validate(space));
   const MutexLock lock(&mutex_);
+  if (numbers_.contains(id)) {
+    return Refusal(absl::StatusCode::kAlreadyExists, "SCENE_ID_TAKEN",
+                   absl::StrCat("there is a scenes/", id, " already: choose another id"));
+  }
   if (scenes_.size() >= kMaxSceneCount) {
     return TooMany("TOO_MANY_SCENES", kMaxSceneCount, "scenes");
   }
-  const uint64_t id = next_scene_++;
-  ASSIGN_OR_RETURN(const BusId bus, volumes_.Open(id, owner, gain));
-  scenes_[id] = std::make_shared<Scene>(absl::StrCat("scenes/", id), space, bus);
-  return id;
+  const uint64_t number = next_scene_++;
+  ASSIGN_OR_RETURN(const BusId bus, volumes_.Open(number, owner, gain));
+  const std::string chosen = id.empty() ? absl::StrCat(number) : id;
+  scenes_[number] = std::make_shared<Scene>(absl::StrCat("scenes/", chosen), space, bus);
+  numbers_[chosen] = number;
+  return number;
+}
+
+absl::StatusOr<uint64_t> SceneRegistry::FindId(const std::string& id) const {
+  const MutexLock lock(&mutex_);
+  if (const auto found = numbers_.find(id); found != numbers_.end()) return found->second;
+  constexpr size_t kMostShown = 64;
+  return SceneNotFound(absl::StrCat("scenes/", id.substr(0, kMostShown)));
+}
+
+std::string SceneRegistry::NameOf(uint64_t scene) const {
+  const absl::StatusOr<std::shared_ptr<Scene>> found = FindScene(scene);
+  return found.ok() ? (*found)->name() : absl::StrCat("scenes/", scene);
 }
 
 absl::Status SceneRegistry::DeleteScene(uint64_t scene) {
@@ -61,6 +111,7 @@ absl::Status SceneRegistry::DeleteScene(uint64_t scene) {
   volumes_.Close(scene);
   const MutexLock lock(&mutex_);
   scenes_.erase(scene);
+  std::erase_if(numbers_, [scene](const auto& entry) { return entry.second == scene; });
   object_count_ -= objects.size();
   return absl::OkStatus();
 }
@@ -81,6 +132,7 @@ std::vector<SceneRegistry::SceneEntry> SceneRegistry::ListScenes() const {
 
 SceneRegistry::SceneEntry SceneRegistry::EntryOf(uint64_t id, const Scene& scene) const {
   return {.scene = id,
+          .name = scene.name(),
           .object_count = scene.CopyAll().size(),
           .volume = volumes_.volume(id),
           .state = mixer_.State(scene.bus())};
@@ -130,17 +182,48 @@ absl::StatusOr<PlacedObject> SceneRegistry::AddObject(uint64_t scene, uint32_t h
   if (object_count() >= kMaxObjectCount) {
     return TooMany("TOO_MANY_OBJECTS", kMaxObjectCount, "objects");
   }
-  ASSIGN_OR_RETURN(std::shared_ptr<const SoundingBody> body, bodies_.Get(std::move(model)));
-  auto voice = MakeVoice(found->space(), properties.pose, mixer_.settings());
-  ASSIGN_OR_RETURN(SoundingObject object,
-                   MakeSoundingObject(std::move(body), properties, {mixer_, found->bus()},
-                                      std::move(voice), transfers_));
+  ASSIGN_OR_RETURN(
+      SoundingObject object,
+      MakeObject(*found, {.handle = handle, .model = std::move(model), .properties = properties}));
   const uint32_t chosen = handle != 0 ? handle : found->FreeHandle();
   // This cannot fail, because every change of the scene holds change_mutex_.
   found->Insert(chosen, object).IgnoreError();
   const MutexLock lock(&mutex_);
   ++object_count_;
   return PlacedObject{.handle = chosen, .object = std::move(object)};
+}
+
+absl::StatusOr<std::vector<PlacedObject>> SceneRegistry::AddObjects(
+    uint64_t scene, const std::vector<NewObject>& objects) {
+  const MutexLock change_lock(&change_mutex_);
+  ASSIGN_OR_RETURN(const std::shared_ptr<Scene> found, FindScene(scene));
+  const size_t room = kMaxObjectCount - object_count();
+  if (objects.size() > room) {
+    return AtElement(TooMany("TOO_MANY_OBJECTS", kMaxObjectCount, "objects"), "objects", room);
+  }
+  ASSIGN_OR_RETURN(const std::vector<uint32_t> handles, ChooseHandles(*found, objects));
+  std::vector<PlacedObject> placed;
+  for (size_t i = 0; i < objects.size(); ++i) {
+    absl::StatusOr<SoundingObject> object = MakeObject(*found, objects[i]);
+    if (!object.ok()) {
+      for (const PlacedObject& made : placed) mixer_.FadeOut(made.object.bank);
+      return AtElement(object.status(), "objects", i);
+    }
+    placed.push_back({.handle = handles[i], .object = *std::move(object)});
+  }
+  // This cannot fail, because every change of the scene holds change_mutex_.
+  for (const PlacedObject& made : placed) found->Insert(made.handle, made.object).IgnoreError();
+  const MutexLock lock(&mutex_);
+  object_count_ += placed.size();
+  return placed;
+}
+
+absl::StatusOr<SoundingObject> SceneRegistry::MakeObject(const Scene& scene,
+                                                         const NewObject& object) {
+  ASSIGN_OR_RETURN(std::shared_ptr<const SoundingBody> body, bodies_.Get(object.model));
+  auto voice = MakeVoice(scene.space(), object.properties.pose, mixer_.settings());
+  return MakeSoundingObject(std::move(body), object.properties, {mixer_, scene.bus()},
+                            std::move(voice), transfers_);
 }
 
 absl::StatusOr<PlacedObject> SceneRegistry::UpdateObject(uint64_t scene, uint32_t handle,
@@ -251,9 +334,7 @@ size_t SceneRegistry::scene_count() const {
 absl::StatusOr<std::shared_ptr<Scene>> SceneRegistry::FindScene(uint64_t scene) const {
   const MutexLock lock(&mutex_);
   if (const auto found = scenes_.find(scene); found != scenes_.end()) return found->second;
-  return Refusal(
-      absl::StatusCode::kNotFound, "SCENE_NOT_FOUND",
-      absl::StrCat("there is no scenes/", scene, "; make one with SceneService.CreateScene"));
+  return SceneNotFound(absl::StrCat("scenes/", scene));
 }
 
 }  // namespace carillon

@@ -25,6 +25,13 @@ struct PlacedObject {
   SoundingObject object;
 };
 
+/// An object to be made.
+struct NewObject {
+  uint32_t handle = 0;  ///< zero: a free one
+  std::shared_ptr<const ModalModel> model;
+  ObjectProperties properties;
+};
+
 /// A change of an object. Absent properties stay as they are.
 struct ObjectChange {
   /// Replaces the material except for its size, for which there is `size` below.
@@ -47,10 +54,17 @@ class SceneRegistry {
   explicit SceneRegistry(Mixer& mixer, TransferStore* transfers = nullptr)
       : mixer_(mixer), transfers_(transfers), volumes_(mixer) {}
 
-  /// Returns the id of a new scene. Errors: ResourceExhausted (TOO_MANY_SCENES), and those of
-  /// Validate and ValidateGain.
+  /// Returns the number of a new scene. `id` is its id within its name; empty: the number. Errors:
+  /// ResourceExhausted (TOO_MANY_SCENES), AlreadyExists (SCENE_ID_TAKEN), and those of Validate and
+  /// ValidateGain.
   absl::StatusOr<uint64_t> CreateScene(const SceneSpace& space = {}, double gain = 1,
-                                       const std::string& owner = "");
+                                       const std::string& owner = "", const std::string& id = "");
+
+  /// The number of the scene with this id. Errors: NotFound (SCENE_NOT_FOUND).
+  absl::StatusOr<uint64_t> FindId(const std::string& id) const;
+
+  /// "scenes/{id}"; with the number as its id if there is no such scene.
+  std::string NameOf(uint64_t scene) const;
 
   /// Fades out the scene's objects. Errors: NotFound (SCENE_NOT_FOUND).
   absl::Status DeleteScene(uint64_t scene);
@@ -58,6 +72,7 @@ class SceneRegistry {
   /// A scene in a list of all.
   struct SceneEntry {
     uint64_t scene = 0;
+    std::string name{};  ///< "scenes/{id}"
     size_t object_count = 0;
     SceneVolume volume{};
     BusState state{};
@@ -93,6 +108,11 @@ class SceneRegistry {
                                          std::shared_ptr<const ModalModel> model,
                                          const ObjectProperties& properties);
 
+  /// Makes all of the objects, or none of them. Free handles are those that none of `objects` asks
+  /// for. Errors: those of AddObject, by AtElement ("objects").
+  absl::StatusOr<std::vector<PlacedObject>> AddObjects(uint64_t scene,
+                                                       const std::vector<NewObject>& objects);
+
   /// Changes an object. If more than the pose changes, a new oscillator bank takes the impulses
   /// from now on, and the old bank rings out. Errors: NotFound (SCENE_NOT_FOUND, OBJECT_NOT_FOUND),
   /// InvalidArgument (INVALID_GLIDE), and those of MakeSoundingObject.
@@ -126,6 +146,8 @@ class SceneRegistry {
  private:
   absl::StatusOr<std::shared_ptr<Scene>> FindScene(uint64_t scene) const;
   SceneEntry EntryOf(uint64_t id, const Scene& scene) const;
+  absl::StatusOr<SoundingObject> MakeObject(const Scene& scene, const NewObject& object)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(change_mutex_);
   absl::StatusOr<SoundingObject> Remake(const SoundingObject& old,
                                         const ObjectProperties& properties)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(change_mutex_);
@@ -146,6 +168,8 @@ class SceneRegistry {
   std::unique_ptr<EventStream> moves_ ABSL_GUARDED_BY(change_mutex_);
   mutable Mutex mutex_ ABSL_ACQUIRED_AFTER(change_mutex_);
   std::map<uint64_t, std::shared_ptr<Scene>> scenes_ ABSL_GUARDED_BY(mutex_);
+  /// The number of each scene by its id.
+  std::map<std::string, uint64_t> numbers_ ABSL_GUARDED_BY(mutex_);
   uint64_t next_scene_ ABSL_GUARDED_BY(mutex_) = 1;
   size_t object_count_ ABSL_GUARDED_BY(mutex_) = 0;
 };

@@ -17,6 +17,8 @@ namespace carillon {
 struct SceneSpace {
   HearingSettings hearing;
   Pose listener;  ///< the listener looks along -z of this frame; x points to the right
+
+  bool operator==(const SceneSpace&) const = default;
 };
 
 /// Errors: InvalidArgument (INVALID_HEARING, INVALID_POSE).

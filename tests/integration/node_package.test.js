@@ -71,6 +71,14 @@ test('a mesh of arrays is a model of the same modes as its file', async () => {
   assert.deepEqual(found, same.name === model.name ? found : [same.name]);
 });
 
+test('the daemon says what it is', async () => {
+  const info = await c.info();
+  assert.equal(info.version, require('carillon/package.json').version);
+  assert.equal(info.limits.scene_count, 512);
+  assert.ok(info.features.includes('decomposition'));
+  assert.ok(info.uptime_s > 0);
+});
+
 test('a rendered strike rings at the lowest bending mode, and is the same again', async () => {
   const once = await model.renderStrike({ ...STRIKE, seconds: 1 });
   const again = await model.renderStrike({ ...STRIKE, seconds: 1 });
@@ -81,6 +89,34 @@ test('a rendered strike rings at the lowest bending mode, and is the same again'
   const file = path.join(FOLDER, 'node.wav');
   await once.save(file);
   assert.equal((await fs.stat(file)).size, 44 + 3 * once.samples.length);
+});
+
+test('a scene with an id is found again with its objects', async () => {
+  const made = await c.createScene({ id: 'lathe-1' });
+  try {
+    assert.deepEqual([made.name, made.existing], ['scenes/lathe-1', false]);
+    await made.addAll([{ model }, { model, handle: 7, gain: 2 }]);
+    await assert.rejects(made.addAll([{ model }, { model, handle: 7 }]),
+      (error) => error.reason === 'OBJECT_EXISTS' && error.metadata.index === '1');
+    const again = await c.createScene({ id: 'lathe-1' });
+    assert.equal(again.existing, true);
+    assert.deepEqual((await again.objects()).map((object) => object.handle), [1, 7]);
+    assert.equal((await again.get()).object_count, 2);
+    await assert.rejects(c.createScene({ id: 'lathe-1', gain: 2 }), { reason: 'SCENE_DIFFERS' });
+  } finally {
+    await made.delete();
+  }
+});
+
+test('jobs are watched and listed by state and label', async () => {
+  for await (const job of c.watchJobs({ states: ['queued'] })) {
+    assert.equal(job, null);
+    break;
+  }
+  const labels = [];
+  for await (const job of c.jobs({ states: ['succeeded'], label_contains: model.label })) labels.push(job.label);
+  assert.ok(labels.includes(model.label));
+  for await (const job of c.jobs({ states: ['cancelled'] })) assert.fail(job.name);
 });
 
 test('a live strike is heard', async () => {

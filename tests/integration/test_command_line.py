@@ -63,6 +63,24 @@ class ListsTest(CommandLineTest):
         ended = self.daemon.command("job", "watch", "long", check=False)
         self.assertIn("JOB_CANCELLED", ended.stderr)
 
+    def test_jobs_are_listed_and_watched_by_state_and_label(self):
+        labels = [job["label"] for job in self.json_of("job", "list", "--state", "succeeded", "--label", "BAR")["jobs"]]
+        self.assertIn("bar", labels)
+        self.assertEqual(self.run_command("job", "list", "--state", "failed,cancelled", "--label", "bar"), "")
+        self.assertIn("--state", self.daemon.command("job", "list", "--state", "lost", check=False).stderr)
+        (self.folder / "watched.obj").write_bytes(meshes.obj(*meshes.box([1.02 * side for side in meshes.BAR_SIZE])))
+        with subprocess.Popen([BIN / "carillon", "--json", "--server", self.daemon.server, "job", "watch", "--label",
+                               "watched"], stdout=subprocess.PIPE, text=True) as watch:
+            self.run_command("model", "create", self.folder / "watched.obj", "--material", meshes.MATERIAL, "--wait")
+            self.run_command("model", "create", self.folder / "bar.obj", "--material", meshes.MATERIAL, "--label",
+                             "other", "--wait")
+            states = []
+            while "JOB_STATE_SUCCEEDED" not in states:
+                job = json.loads(watch.stdout.readline())
+                self.assertEqual(job["label"], "watched")
+                states.append(job["state"])
+            watch.terminate()
+
     def test_the_doctor_finds_no_fault_with_a_daemon_and_says_what_to_do_without_one(self):
         healthy = self.daemon.command("doctor", check=False)
         self.assertIn("carillond", healthy.stdout)
@@ -91,6 +109,15 @@ class ListsTest(CommandLineTest):
         self.assertRegex(self.run_command("scene", "list"), rf"(?m){scene}  1 objects  gain 1  .*1 connections.*\n  5 ")
         self.run_command("scene", "delete", scene.removeprefix("scenes/"))
         self.assertNotIn(scene, self.run_command("scene", "list"))
+
+
+class InfoTest(CommandLineTest):
+    def test_the_daemon_says_its_version_limits_and_features(self):
+        shown = self.json_of("info")
+        self.assertEqual((shown["version"], shown["limits"]["scene_count"]), (carillon_package.__version__, 512))
+        self.assertIn("decomposition", shown["features"])
+        self.assertRegex(self.run_command("info"),
+                         r"(?m)^carillond \S+ at unix:.*\nup +\d+ s, output 48000 Hz, 1 channels$")
 
 
 class VolumeTest(CommandLineTest):

@@ -46,9 +46,10 @@ absl::StatusOr<std::vector<v1::ModalModelSummary>> Client::ListModalModels(
   return models;
 }
 
-absl::StatusOr<std::vector<v1::Job>> Client::ListJobs() const {
+absl::StatusOr<std::vector<v1::Job>> Client::ListJobs(const v1::ListJobsRequest& filter) const {
   std::vector<v1::Job> jobs;
-  v1::ListJobsRequest request;
+  v1::ListJobsRequest request = filter;
+  request.clear_page_token();
   request.set_page_size(kPageSize);
   do {
     auto page = ListJobsPage(request);
@@ -76,6 +77,10 @@ absl::StatusOr<v1::ModalModelSummary> Client::ImportModalModelFile(const std::st
                                                                    const std::string& label) const {
   return ImportModalModel([&](const RecordSink& sink) { return ReadRecords(file, sink); }, name,
                           label);
+}
+
+absl::StatusOr<v1::GetServerInfoResponse> Client::GetServerInfo() const {
+  return NotOverridden("GetServerInfo");
 }
 
 absl::StatusOr<std::string> Client::UploadMesh(absl::string_view) const {
@@ -135,6 +140,25 @@ absl::StatusOr<v1::Job> Client::CancelJob(const std::string&) const {
 absl::StatusOr<v1::Job> Client::WatchJob(const std::string&,
                                          const std::function<void(const v1::Job&)>&) const {
   return NotOverridden("WatchJob");
+}
+
+absl::Status Client::WatchJobs(const v1::WatchJobsRequest&,
+                               const std::function<bool(const v1::WatchJobsResponse&)>&) const {
+  return NotOverridden("WatchJobs");
+}
+
+absl::StatusOr<v1::CreateSceneResponse> Client::CreateOrFindScene(
+    const v1::CreateSceneRequest&) const {
+  return NotOverridden("CreateOrFindScene");
+}
+
+absl::StatusOr<v1::Scene> Client::GetScene(const std::string&) const {
+  return NotOverridden("GetScene");
+}
+
+absl::StatusOr<std::vector<v1::SoundingObject>> Client::AddObjects(
+    const v1::AddObjectsRequest&) const {
+  return NotOverridden("AddObjects");
 }
 
 absl::StatusOr<std::string> Client::CreateScene(const v1::CreateSceneRequest&) const {

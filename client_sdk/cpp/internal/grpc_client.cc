@@ -60,6 +60,11 @@ GrpcClient::GrpcClient(const std::string& server, const ConnectOptions& options)
     : stubs_(std::make_unique<Stubs>(server, TokenOf(options),
                                      grpc::CreateChannel(server, CredentialsFor(options)))) {}
 
+absl::StatusOr<v1::GetServerInfoResponse> GrpcClient::GetServerInfo() const {
+  return Call(*stubs_, stubs_->info, &v1::ServerService::Stub::GetServerInfo,
+              v1::GetServerInfoRequest());
+}
+
 absl::StatusOr<v1::Job> GrpcClient::CreateModalModel(
     const v1::CreateModalModelRequest& request) const {
   auto response =
@@ -128,8 +133,27 @@ absl::StatusOr<v1::Job> GrpcClient::CancelJob(const std::string& name) const {
   return std::move(*response->mutable_job());
 }
 
+absl::StatusOr<v1::CreateSceneResponse> GrpcClient::CreateOrFindScene(
+    const v1::CreateSceneRequest& request) const {
+  return Call(*stubs_, stubs_->scenes, &v1::SceneService::Stub::CreateScene, request);
+}
+
+absl::StatusOr<v1::Scene> GrpcClient::GetScene(const std::string& name) const {
+  auto response = Call(*stubs_, stubs_->scenes, &v1::SceneService::Stub::GetScene,
+                       Named<v1::GetSceneRequest>(name));
+  if (!response.ok()) return response.status();
+  return std::move(*response->mutable_scene());
+}
+
+absl::StatusOr<std::vector<v1::SoundingObject>> GrpcClient::AddObjects(
+    const v1::AddObjectsRequest& request) const {
+  auto response = Call(*stubs_, stubs_->scenes, &v1::SceneService::Stub::AddObjects, request);
+  if (!response.ok()) return response.status();
+  return std::vector<v1::SoundingObject>(response->objects().begin(), response->objects().end());
+}
+
 absl::StatusOr<std::string> GrpcClient::CreateScene(const v1::CreateSceneRequest& request) const {
-  auto response = Call(*stubs_, stubs_->scenes, &v1::SceneService::Stub::CreateScene, request);
+  auto response = CreateOrFindScene(request);
   if (!response.ok()) return response.status();
   return response->name();
 }

@@ -17,6 +17,7 @@
 #include "carillon/v1/job_run_service.grpc.pb.h"
 #include "carillon/v1/modal_model_service.grpc.pb.h"
 #include "carillon/v1/scene_service.grpc.pb.h"
+#include "carillon/v1/server_service.grpc.pb.h"
 
 namespace carillon::client {
 
@@ -27,6 +28,8 @@ inline constexpr auto kCallTimeout = std::chrono::seconds(60);
 class GrpcClient final : public Client {
  public:
   GrpcClient(const std::string& server, const ConnectOptions& options);
+
+  absl::StatusOr<v1::GetServerInfoResponse> GetServerInfo() const override;
 
   absl::StatusOr<std::string> UploadMesh(absl::string_view bytes) const override;
   absl::StatusOr<v1::Job> CreateModalModel(
@@ -50,7 +53,15 @@ class GrpcClient final : public Client {
   absl::StatusOr<v1::Job> CancelJob(const std::string& name) const override;
   absl::StatusOr<v1::Job> WatchJob(
       const std::string& name, const std::function<void(const v1::Job&)>& on_change) const override;
+  absl::Status WatchJobs(
+      const v1::WatchJobsRequest& request,
+      const std::function<bool(const v1::WatchJobsResponse&)>& on_answer) const override;
 
+  absl::StatusOr<v1::CreateSceneResponse> CreateOrFindScene(
+      const v1::CreateSceneRequest& request) const override;
+  absl::StatusOr<v1::Scene> GetScene(const std::string& name) const override;
+  absl::StatusOr<std::vector<v1::SoundingObject>> AddObjects(
+      const v1::AddObjectsRequest& request) const override;
   absl::StatusOr<std::string> CreateScene(const v1::CreateSceneRequest& request) const override;
   absl::StatusOr<v1::Scene> UpdateScene(const v1::UpdateSceneRequest& request) const override;
   absl::StatusOr<uint32_t> StopAll(const std::string& scene) const override;
@@ -105,7 +116,8 @@ class GrpcClient final : public Client {
           contacts(channel),
           audio(channel),
           admin(channel),
-          job_runs(channel) {}
+          job_runs(channel),
+          info(channel) {}
 
     const std::string server;
     const std::string token;
@@ -116,6 +128,7 @@ class GrpcClient final : public Client {
     v1::AudioService::Stub audio;
     v1::AdminService::Stub admin;
     v1::JobRunService::Stub job_runs;
+    v1::ServerService::Stub info;
   };
 
   // gRPC's stubs take their calls as changes, which the calls of a client are not.

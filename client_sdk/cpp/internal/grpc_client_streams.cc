@@ -149,6 +149,20 @@ absl::StatusOr<v1::Job> GrpcClient::WatchJob(
   return job;
 }
 
+absl::Status GrpcClient::WatchJobs(
+    const v1::WatchJobsRequest& request,
+    const std::function<bool(const v1::WatchJobsResponse&)>& on_answer) const {
+  grpc::ClientContext context;
+  Authorize(context, stubs_->token);
+  const auto reader = stubs_->decompositions.WatchJobs(&context, request);
+  v1::WatchJobsResponse answer;
+  bool stopped = false;
+  while (!stopped && reader->Read(&answer)) stopped = !on_answer(answer);
+  if (stopped) context.TryCancel();
+  const grpc::Status status = reader->Finish();
+  return stopped ? absl::OkStatus() : FromRpc(status, stubs_->server);
+}
+
 absl::Status GrpcClient::Listen(const AudioCallback& on_block) const {
   return ListenTo(v1::ListenRequest(), on_block);
 }

@@ -75,15 +75,16 @@ class LiveScene {
     auto scene = client_->CreateScene({});
     if (!scene.ok()) return scene.status();
     scene_ = *scene;
+    v1::AddObjectsRequest tubes;
+    tubes.set_scene(scene_);
     for (size_t i = 0; i < options.models.size(); ++i) {
-      v1::AddObjectRequest request;
-      request.set_scene(scene_);
-      request.set_modal_model(options.models[i]);
-      request.mutable_material()->set_preset(kMaterial);
-      request.set_gain(options.gain);
-      request.set_handle(static_cast<uint32_t>(i + 1));
-      if (const auto added = client_->AddObject(request); !added.ok()) return added.status();
+      v1::AddObjectRequest& tube = *tubes.add_objects();
+      tube.set_modal_model(options.models[i]);
+      tube.mutable_material()->set_preset(kMaterial);
+      tube.set_gain(options.gain);
+      tube.set_handle(static_cast<uint32_t>(i + 1));
     }
+    if (const auto added = client_->AddObjects(tubes); !added.ok()) return added.status();
     v1::ContactStreamStart start;
     start.set_scene(scene_);
     start.set_step_s(WindChimes::kStep_s);

@@ -14,6 +14,11 @@ const { Scene } = require('./scenes');
 const { Sound, samplesOf, samplesOfIntegers } = require('./sound');
 const { Trace } = require('./traces');
 
+/** The fields of ListJobsRequest and WatchJobsRequest for states such as 'failed'. */
+function jobFilter({ states = [], label_contains = '' }) {
+  return { states: states.map((state) => `JOB_STATE_${state.toUpperCase()}`), label_contains };
+}
+
 const PIECE_BYTES = 1 << 20;
 
 /**
@@ -61,6 +66,11 @@ class Client {
     } finally {
       stream.cancel();
     }
+  }
+
+  /** Returns the version, the age, the limits and the features of the daemon. */
+  info() {
+    return this.call('ServerService', 'GetServerInfo', {});
   }
 
   /** Returns the state of the daemon's mixer and output. */
@@ -112,6 +122,25 @@ class Client {
     return newest;
   }
 
+  /** Yields the jobs that match, newest first; filters are `states`, such as 'failed', and `label_contains`. */
+  async* jobs(filters = {}) {
+    for (let page_token = ''; ;) {
+      const page = await this.call('DecompositionService', 'ListJobs', { ...jobFilter(filters), page_token });
+      yield* page.jobs;
+      page_token = page.next_page_token;
+      if (!page_token) return;
+    }
+  }
+
+  /**
+   * Yields the jobs that wait or run, then null, and then each job that matches after every change, until the loop is
+   * left. Filters as for jobs.
+   */
+  async* watchJobs(filters = {}) {
+    const stream = this.stub('DecompositionService').WatchJobs(jobFilter(filters));
+    for await (const answer of this.answers(stream)) yield answer.job ?? null;
+  }
+
   /** Returns the model of a name, "modalModels/{digest}". */
   async model(name, material) {
     const answer = await this.call('ModalModelService', 'GetModalModel', { name });
@@ -138,10 +167,15 @@ class Client {
     return (await this.call('SceneService', 'StopAll', {})).scene_count;
   }
 
-  /** Makes an empty scene. It ends by itself a minute after its clients, unless `keep` is true. */
-  async createScene({ hearing, listener, gain, keep = false } = {}) {
-    const request = { ...given('hearing', hearing), ...given('listener', toPose(listener)), ...given('gain', gain), keep };
-    return new Scene(this, (await this.call('SceneService', 'CreateScene', request)).name);
+  /**
+   * Makes an empty scene. It ends by itself a minute after its clients, unless `keep` is true. With an `id`, a scene that
+   * you made before with this id and the same settings is returned as it is, and its `existing` is true.
+   */
+  async createScene({ hearing, listener, gain, keep = false, id } = {}) {
+    const request = { ...given('hearing', hearing), ...given('listener', toPose(listener)), ...given('gain', gain), keep,
+      ...given('id', id) };
+    const made = await this.call('SceneService', 'CreateScene', request);
+    return new Scene(this, made.name, made.existing);
   }
 
   /** Returns all scenes of the daemon, the oldest first. */

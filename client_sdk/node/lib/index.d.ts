@@ -8,6 +8,7 @@ import type { ContactTraceObject } from '../types/carillon/v1/ContactTraceObject
 import type { ContactTraceRecord } from '../types/carillon/v1/ContactTraceRecord';
 import type { CreateModalModelRequest } from '../types/carillon/v1/CreateModalModelRequest';
 import type { GetMixerResponse__Output } from '../types/carillon/v1/GetMixerResponse';
+import type { GetServerInfoResponse__Output } from '../types/carillon/v1/GetServerInfoResponse';
 import type { Hearing } from '../types/carillon/v1/Hearing';
 import type { HertzContact } from '../types/carillon/v1/HertzContact';
 import type { Job__Output } from '../types/carillon/v1/Job';
@@ -188,8 +189,14 @@ export class SoundingObject {
 
 /** A scene of the daemon. It lasts until it is deleted. */
 export class Scene {
-  constructor(client: Client, name: string);
+  constructor(client: Client, name: string, existing?: boolean);
   readonly name: string;
+  /** The scene was there before its createScene, which had an id. */
+  readonly existing: boolean;
+  /** Returns its state: volume, peak, and how long it lasts. */
+  get(): Promise<Scene__Output>;
+  /** Adds all objects, or none if one is refused; `metadata.index` of the error is its place. */
+  addAll(objects: Array<ObjectSettings & { model: Model | string }>): Promise<SoundingObject[]>;
   /** Adds an object. Without a material it gets the one that the model was asked for with. */
   add(model: Model | string, settings?: ObjectSettings): Promise<SoundingObject>;
   objects(): Promise<SoundingObject[]>;
@@ -228,9 +235,17 @@ export class Recording {
   take(seconds: number): Promise<Sound>;
 }
 
+export interface JobFilters {
+  states?: Array<'queued' | 'running' | 'succeeded' | 'failed' | 'cancelled'>;
+  /** Text that the label has, in upper or lower case. */
+  label_contains?: string;
+}
+
 /** A connection. */
 export class Client {
   readonly server: string;
+  /** Returns the version, the age, the limits and the features of the daemon. */
+  info(): Promise<GetServerInfoResponse__Output>;
   status(): Promise<GetMixerResponse__Output>;
   /** Stores a mesh. Returns its digest. */
   upload(mesh: Mesh): Promise<string>;
@@ -240,7 +255,14 @@ export class Client {
   }): Promise<Model>;
   model(name: string, material?: Material): Promise<Model>;
   models(filters?: ListModalModelsRequest): AsyncGenerator<Model>;
-  createScene(settings?: { hearing?: Hearing; listener?: Pose; gain?: number; keep?: boolean }): Promise<Scene>;
+  /** Makes an empty scene, or returns the one that you made before with the same `id` and settings. */
+  createScene(settings?: {
+    hearing?: Hearing; listener?: Pose; gain?: number; keep?: boolean; id?: string;
+  }): Promise<Scene>;
+  /** Yields the jobs that match, newest first. */
+  jobs(filters?: JobFilters): AsyncGenerator<Job__Output>;
+  /** Yields the jobs that wait or run, then null, and then each job that matches after every change. */
+  watchJobs(filters?: JobFilters): AsyncGenerator<Job__Output | null>;
   scenes(): Promise<Scene[]>;
   /** Renders a trace or a .contacts file. Throws CarillonError if a contact is rejected. */
   render(trace: Trace | string, settings?: RenderSettings): Promise<Sound>;

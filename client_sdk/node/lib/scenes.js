@@ -46,18 +46,39 @@ class SoundingObject {
   }
 }
 
-/** A scene of the daemon. It lasts until it is deleted. */
+/** A scene of the daemon. It lasts until it is deleted. `existing`: it was there before its createScene with an id. */
 class Scene {
-  constructor(client, name) {
+  constructor(client, name, existing = false) {
     this.client = client;
     this.name = name;
+    this.existing = existing;
+  }
+
+  /** Returns the scene's state: its volume, peak, and how long it lasts. */
+  async get() {
+    return (await this.client.call('SceneService', 'GetScene', { name: this.name })).scene;
+  }
+
+  /**
+   * Adds all objects, each { model, material, size, ... }, or none if one is refused; `metadata.index` of the error is
+   * its place.
+   */
+  async addAll(objects) {
+    const request = { scene: this.name, objects: objects.map((object) => this.request(object)) };
+    const answer = await this.client.call('SceneService', 'AddObjects', request);
+    return answer.objects.map((object) => new SoundingObject(this, object));
+  }
+
+  /** The request for an object. */
+  request({ model, material, size, gain, pose, handle, radiation }) {
+    return { scene: this.name, ...named(model, material), ...present({ size, handle }), ...given('gain', gain),
+      ...given('pose', toPose(pose)), ...present({ radiation: toRadiation(radiation) }) };
   }
 
   /** Adds an object, ready to be struck. Without a material it gets the one that the model was asked for with. */
-  async add(model, { material, size, gain, pose, handle, radiation } = {}) {
-    const request = { scene: this.name, ...named(model, material), ...present({ size, handle }), ...given('gain', gain),
-      ...given('pose', toPose(pose)), ...present({ radiation: toRadiation(radiation) }) };
-    return new SoundingObject(this, (await this.client.call('SceneService', 'AddObject', request)).object);
+  async add(model, settings = {}) {
+    const answer = await this.client.call('SceneService', 'AddObject', this.request({ ...settings, model }));
+    return new SoundingObject(this, answer.object);
   }
 
   /** Returns the objects of the scene by their handles. */

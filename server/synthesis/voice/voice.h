@@ -26,6 +26,7 @@ struct HearingSettings {
   double reference_distance_m = 1;
   double sound_speed_m_per_s = 343;
 
+  bool operator==(const HearingSettings&) const = default;
   bool any() const { return distance_gain || propagation_delay || panning || directivity; }
 };
 

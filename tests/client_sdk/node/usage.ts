@@ -5,6 +5,9 @@ import * as carillon from 'carillon';
 async function main(): Promise<void> {
   const c: carillon.Client = carillon.connect(carillon.defaultServer(), { tlsRoots: 'roots.pem' });
   const version: string = (await c.status()).version;
+  const { limits, features } = await c.info();
+  const most: number | undefined = limits?.scene_count;
+  const transfers: boolean = features.includes('transfers');
   const mesh = { vertices: new Float64Array(12), triangles: [[0, 1, 2], [0, 2, 3]] };
   const model = await c.createModel(mesh, {
     material: { preset: 'steel', alpha1_s: 1e-7 }, size: 2, settings: { metres_per_unit: 0.001 },
@@ -12,6 +15,11 @@ async function main(): Promise<void> {
   });
   const scene = await c.createScene({ hearing: { panning: true }, listener: [0, 0, 1] });
   const bell = await scene.add(model, { pose: { position: [0, 0, 0], orientation: [1, 0, 0, 0] }, handle: 3 });
+  const shared = await c.createScene({ id: 'lathe-1' });
+  const clapper = (await shared.addAll([{ model, handle: 1 }, { model: model.name, gain: 0.5 }]))[1];
+  console.log(shared.existing, clapper.handle, (await shared.get()).peak);
+  for await (const job of c.jobs({ states: ['failed'] })) console.log(job.label);
+  for await (const job of c.watchJobs({ label_contains: 'bell' })) if (job === null) break;
   await bell.strike({ point: [0, 0, 0], impulse: new Float32Array(3), striker: 'wood' });
   await bell.update({ gain: 0.5, glide: 1 });
   const stream = scene.stream({ step: 1 / 240, delay: 0.05, frame: 'scene' });
@@ -28,7 +36,7 @@ async function main(): Promise<void> {
   trace.step(0, { contacts: [{ object: trace.add(model), point: [0, 0, 0], impulse: [0, 0, 1], partner: 2 }] });
   const sound: carillon.Sound = await c.render(trace, { tail_s: 1 });
   const recorded: Float32Array = (await (await c.listen()).take(1)).samples;
-  console.log(version, late, reason, far, sound.summary?.peak_pa, recorded.length);
+  console.log(version, most, transfers, late, reason, far, sound.summary?.peak_pa, recorded.length);
   if (reason === 'IMPULSE_TOO_LARGE') throw new carillon.CarillonError(reason, 'too large', { newton_seconds: '1' });
   c.close();
 }

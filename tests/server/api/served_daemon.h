@@ -17,6 +17,7 @@
 #include "carillon/v1/job_run_service.grpc.pb.h"
 #include "carillon/v1/modal_model_service.grpc.pb.h"
 #include "carillon/v1/scene_service.grpc.pb.h"
+#include "carillon/v1/server_service.grpc.pb.h"
 #include "server/api/api_server.h"
 #include "server/base/mutex.h"
 #include "server/decomposition/local_executor.h"
@@ -50,6 +51,7 @@ class ServedDaemon : public testing::Test {
     contacts = v1::ContactService::NewStub(channel_);
     audio = v1::AudioService::NewStub(channel_);
     job_runs = v1::JobRunService::NewStub(channel_);
+    info = v1::ServerService::NewStub(channel_);
   }
 
   /// Calls a method with one request and one response; the response stays in `response`.
@@ -148,6 +150,7 @@ class ServedDaemon : public testing::Test {
   std::unique_ptr<v1::ContactService::Stub> contacts;
   std::unique_ptr<v1::AudioService::Stub> audio;
   std::unique_ptr<v1::JobRunService::Stub> job_runs;
+  std::unique_ptr<v1::ServerService::Stub> info;
   std::shared_ptr<grpc::Channel> channel() { return channel_; }
   LiveOutput& output() { return *output_; }
   RemoteRuns& runs() { return runs_; }

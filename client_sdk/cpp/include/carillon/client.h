@@ -21,6 +21,7 @@
 #include "carillon/v1/job_run_service.pb.h"
 #include "carillon/v1/modal_model_service.pb.h"
 #include "carillon/v1/scene_service.pb.h"
+#include "carillon/v1/server_service.pb.h"
 
 namespace carillon::client {
 
@@ -51,6 +52,11 @@ class Client {
   /// Receives the records of a stored modal model in order. An error that it returns ends the
   /// transfer.
   using RecordSink = std::function<absl::Status(const v1::ModalModelRecord&)>;
+
+  // The daemon.
+
+  /// Returns the version, the age, the limits and the features of the daemon. Needs no token.
+  virtual absl::StatusOr<v1::GetServerInfoResponse> GetServerInfo() const;
 
   // Modal models.
 
@@ -120,8 +126,9 @@ class Client {
   virtual absl::StatusOr<v1::ListJobsResponse> ListJobsPage(
       const v1::ListJobsRequest& request) const;
 
-  /// Returns all jobs, newest first, by calling ListJobsPage for each page.
-  absl::StatusOr<std::vector<v1::Job>> ListJobs() const;
+  /// Returns all jobs that match `filter`, newest first, by calling ListJobsPage for each page. The
+  /// page size and the page token of `filter` are ignored.
+  absl::StatusOr<std::vector<v1::Job>> ListJobs(const v1::ListJobsRequest& filter = {}) const;
 
   /// Cancels a job that has not ended.
   virtual absl::StatusOr<v1::Job> CancelJob(const std::string& name) const;
@@ -133,10 +140,23 @@ class Client {
   virtual absl::StatusOr<v1::Job> WatchJob(
       const std::string& name, const std::function<void(const v1::Job&)>& on_change) const;
 
+  /// Passes the jobs that wait or run to `on_answer`, then an answer without a job, then each job
+  /// that matches after every change, until `on_answer` returns false; then returns OK.
+  virtual absl::Status WatchJobs(
+      const v1::WatchJobsRequest& request,
+      const std::function<bool(const v1::WatchJobsResponse&)>& on_answer) const;
+
   // Scenes and their sounding objects.
 
   /// Creates a scene and returns its name, "scenes/{id}".
   virtual absl::StatusOr<std::string> CreateScene(const v1::CreateSceneRequest& request) const;
+
+  /// As CreateScene, and says whether the scene was there before, which only happens with an id.
+  virtual absl::StatusOr<v1::CreateSceneResponse> CreateOrFindScene(
+      const v1::CreateSceneRequest& request) const;
+
+  /// Returns the scene "scenes/{id}".
+  virtual absl::StatusOr<v1::Scene> GetScene(const std::string& name) const;
 
   /// Changes the gain of a scene, mutes it, or lets it sound alone, and returns it.
   virtual absl::StatusOr<v1::Scene> UpdateScene(const v1::UpdateSceneRequest& request) const;
@@ -159,6 +179,11 @@ class Client {
   /// Adds an object that sounds with a stored model to a scene. Contacts refer to the object by its
   /// handle, which the caller may choose.
   virtual absl::StatusOr<v1::SoundingObject> AddObject(const v1::AddObjectRequest& request) const;
+
+  /// Adds all of the objects to a scene, or none of them. The figure "index" of an error is the
+  /// place of the object that was refused.
+  virtual absl::StatusOr<std::vector<v1::SoundingObject>> AddObjects(
+      const v1::AddObjectsRequest& request) const;
 
   /// Changes the material, the size, the gain or the pose of an object while it sounds.
   virtual absl::StatusOr<v1::SoundingObject> UpdateObject(

@@ -19,14 +19,16 @@ from typing import Any, Optional, TypeVar
 
 from carillon import client
 from carillon.contacts import PoseLike, Striker
-from carillon.errors import CarillonError
-from carillon.jobs import Job
+from carillon.errors import CarillonError, translated
+from carillon.jobs import Job, to_states
 from carillon.materials import Material
 from carillon.models import Model
 from carillon.scenes import ContactStream, Scene, SoundingObject
 from carillon.sound import Sound
 from carillon.traces import Trace
-from carillon.v1 import audio_service_pb2, contact_pb2, contact_service_pb2, material_pb2
+from carillon.v1 import (
+    audio_service_pb2, contact_pb2, contact_service_pb2, decomposition_service_pb2, material_pb2, scene_service_pb2,
+    server_service_pb2)
 
 Result = TypeVar("Result")
 
@@ -54,11 +56,23 @@ async def in_thread(function: Callable[..., Result], *arguments: Any, **named: A
         raise
 
 
+def _next_answer(answers: Any, sync: client.Client) -> Any:
+    """The next answer of a stream; None at its end. Cancelling the task cancels the stream."""
+    calls = client.running_calls.get()
+    if calls is not None:
+        calls.append(answers)
+    with translated(sync.server):
+        return next(answers, None)
+
+
 class AsyncClient:
     """A connection. `sync` is the client that it calls; what has no method here is called by in_thread."""
 
     def __init__(self, sync: client.Client):
         self.sync = sync
+
+    async def info(self) -> server_service_pb2.GetServerInfoResponse:
+        return await in_thread(self.sync.info)
 
     async def status(self) -> audio_service_pb2.GetMixerResponse:
         return await in_thread(self.sync.status)
@@ -83,6 +97,23 @@ class AsyncClient:
 
     async def materials(self) -> dict[str, material_pb2.Material]:
         return await in_thread(lambda: self.sync.materials)
+
+    async def jobs(self, **filters: Any) -> AsyncIterator[Job]:
+        """Yields jobs; see Client.jobs."""
+        found = self.sync.jobs(**filters)
+        while job := await in_thread(lambda: next(found, None)):
+            yield job
+
+    async def watch_jobs(self, **filters: Any) -> AsyncIterator[Optional[Job]]:
+        """Yields the changes of jobs; see Client.watch_jobs. A cancelled task ends the call."""
+        request = decomposition_service_pb2.WatchJobsRequest(
+            states=to_states(filters.pop("states", ())), **filters)
+        answers = self.sync.jobs_stub.WatchJobs(request)
+        try:
+            while (answer := await in_thread(_next_answer, answers, self.sync)) is not None:
+                yield Job(self.sync, answer.job) if answer.HasField("job") else None
+        finally:
+            answers.cancel()
 
     async def set_volume(self, **volume: Any) -> audio_service_pb2.UpdateMixerResponse:
         return await in_thread(self.sync.set_volume, **volume)
@@ -121,6 +152,17 @@ class AsyncScene:
 
     async def add(self, model: Model | str, material: Optional[Material] = None, **settings: Any) -> SoundingObject:
         return await in_thread(self.sync.add, model, material, **settings)
+
+    async def add_all(self, objects: Any) -> list[SoundingObject]:
+        """Adds all objects or none; see Scene.add_all."""
+        return await in_thread(self.sync.add_all, objects)
+
+    @property
+    def existing(self) -> bool:
+        return self.sync.existing
+
+    async def get(self) -> scene_service_pb2.Scene:
+        return await in_thread(self.sync.get)
 
     async def strike(self, item: SoundingObject, point: Any, impulse: Any, duration: Optional[float] = None, *,
                      striker: Striker = None) -> None:

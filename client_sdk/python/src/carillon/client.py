@@ -19,7 +19,7 @@ from carillon import errors, meshes, progress
 from carillon.address import default_server
 from carillon.authorization import authorized
 from carillon.contacts import PoseLike, to_pose
-from carillon.jobs import Job
+from carillon.jobs import Job, to_states
 from carillon.materials import Material, resolved, to_message
 from carillon.models import Model
 from carillon.scenes import Scene
@@ -28,7 +28,8 @@ from carillon.traces import Trace
 from carillon.v1 import (
     admin_service_pb2_grpc, audio_service_pb2, audio_service_pb2_grpc, contact_service_pb2_grpc,
     decomposition_service_pb2, decomposition_service_pb2_grpc, hearing_pb2, material_pb2, modal_model_pb2,
-    modal_model_service_pb2, modal_model_service_pb2_grpc, scene_service_pb2, scene_service_pb2_grpc)
+    modal_model_service_pb2, modal_model_service_pb2_grpc, scene_service_pb2, scene_service_pb2_grpc,
+    server_service_pb2, server_service_pb2_grpc)
 
 PIECE_BYTES = 1 << 20
 
@@ -66,7 +67,13 @@ class Client:
         self.scenes_stub = scene_service_pb2_grpc.SceneServiceStub(self._channel)
         self.contacts_stub = contact_service_pb2_grpc.ContactServiceStub(self._channel)
         self.audio_stub = audio_service_pb2_grpc.AudioServiceStub(self._channel)
+        self.server_stub = server_service_pb2_grpc.ServerServiceStub(self._channel)
         self.admin_stub = admin_service_pb2_grpc.AdminServiceStub(self._channel)
+
+    def info(self) -> server_service_pb2.GetServerInfoResponse:
+        """Returns the version, the age, the limits and the features of the daemon. Needs no token."""
+        with errors.translated(self.server):
+            return self.server_stub.GetServerInfo(server_service_pb2.GetServerInfoRequest())
 
     def status(self) -> audio_service_pb2.GetMixerResponse:
         """Returns the state of the daemon's mixer and output."""
@@ -117,9 +124,20 @@ class Client:
                 return
             request.page_token = page.next_page_token
 
-    def jobs(self) -> Iterator[Job]:
-        """Yields all jobs, newest first."""
-        request = decomposition_service_pb2.ListJobsRequest()
+    def watch_jobs(self, states: Iterable[str] = (), label_contains: str = "") -> Iterator[Optional[Job]]:
+        """Yields the jobs that wait or run, then None, and then each job after every change, new ones too. The loop
+        goes on until it is left. Only jobs in the `states`, such as "failed", and with this text in their label
+        come."""
+        request = decomposition_service_pb2.WatchJobsRequest(states=to_states(states), label_contains=label_contains)
+        with errors.translated(self.server):
+            answers = self.jobs_stub.WatchJobs(request)
+            with self.cancellable(answers):
+                for answer in answers:
+                    yield Job(self, answer.job) if answer.HasField("job") else None
+
+    def jobs(self, states: Iterable[str] = (), label_contains: str = "") -> Iterator[Job]:
+        """Yields the jobs, newest first: those in the `states`, such as "failed", and with this text in their label."""
+        request = decomposition_service_pb2.ListJobsRequest(states=to_states(states), label_contains=label_contains)
         while True:
             with errors.translated(self.server):
                 page = self.jobs_stub.ListJobs(request)
@@ -158,12 +176,15 @@ class Client:
             return self.scenes_stub.StopAll(scene_service_pb2.StopAllRequest()).scene_count
 
     def scene(self, *, hearing: Optional[hearing_pb2.Hearing] = None, listener: Optional[PoseLike] = None,
-              gain: Optional[float] = None, keep: bool = False) -> Scene:
-        """Makes an empty scene. It ends by itself a minute after its clients, unless `keep` is true."""
+              gain: Optional[float] = None, keep: bool = False, id: str = "") -> Scene:
+        """Makes an empty scene. It ends by itself a minute after its clients, unless `keep` is true. With an `id`, such
+        as "lathe-1", it is "scenes/lathe-1"; a scene that you made before with this id and the same settings is
+        returned as it is, and its `existing` is true."""
         request = scene_service_pb2.CreateSceneRequest(
-            hearing=hearing, listener=None if listener is None else to_pose(listener), gain=gain, keep=keep)
+            hearing=hearing, listener=None if listener is None else to_pose(listener), gain=gain, keep=keep, id=id)
         with errors.translated(self.server):
-            return Scene(self, self.scenes_stub.CreateScene(request).name)
+            made = self.scenes_stub.CreateScene(request)
+        return Scene(self, made.name, made.existing)
 
     def scenes(self) -> list[Scene]:
         """Returns all scenes of the daemon, the oldest first."""

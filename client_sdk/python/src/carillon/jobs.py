@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
 
 from carillon import errors, progress
 from carillon.materials import Material
@@ -13,6 +13,11 @@ from carillon.v1 import decomposition_pb2, decomposition_service_pb2
 if TYPE_CHECKING:
     from carillon.client import Client
     from carillon.models import Model
+
+
+def to_states(states: Iterable[str]) -> list[Any]:
+    """The values of the contract for states such as "failed"."""
+    return [decomposition_pb2.JobState.Value(f"JOB_STATE_{state.upper()}") for state in states]
 
 
 class Job:

@@ -6,7 +6,7 @@ from __future__ import annotations
 import contextlib
 import queue
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Optional
 
 import grpc
@@ -78,22 +78,42 @@ class SoundingObject:
 
 
 class Scene:
-    """A scene of the daemon; as a context manager it is deleted at the end."""
+    """A scene of the daemon; as a context manager it is deleted at the end. `existing`: it was there before its
+    Client.scene, which had an id."""
 
-    def __init__(self, client: Client, name: str):
+    def __init__(self, client: Client, name: str, existing: bool = False):
         self.client = client
         self.name = name
+        self.existing = existing
+
+    def get(self) -> scene_service_pb2.Scene:
+        """Returns the scene's state: its volume, peak, and how long it lasts."""
+        with errors.translated(self.client.server):
+            return self.client.scenes_stub.GetScene(scene_service_pb2.GetSceneRequest(name=self.name)).scene
+
+    def add_all(self, objects: Iterable[Mapping[str, Any] | Model | str]) -> list[SoundingObject]:
+        """Adds all objects, or none if one is refused; `metadata["index"]` of the error is its place. An object is a
+        model, or the arguments of `add` by name, such as {"model": bell, "handle": 3, "gain": 0.5}."""
+        requests = [self._request(**item) if isinstance(item, Mapping) else self._request(item) for item in objects]
+        request = scene_service_pb2.AddObjectsRequest(scene=self.name, objects=requests)
+        with errors.translated(self.client.server):
+            return [SoundingObject(self, item) for item in self.client.scenes_stub.AddObjects(request).objects]
 
     def add(self, model: Model | str, material: Optional[materials.Material] = None, *, size: float = 1,
             gain: float = 1, pose: Optional[PoseLike] = None, handle: int = 0,
             radiation: Optional[materials.Radiation] = None) -> SoundingObject:
         """Adds an object, ready to be struck. Without a material it gets the one that the model was asked for with."""
-        name, message = materials.named(model, material)
-        request = scene_service_pb2.AddObjectRequest(
-            scene=self.name, modal_model=name, material=message, size=size, gain=gain, handle=handle,
-            pose=None if pose is None else contacts.to_pose(pose), radiation=materials.to_radiation(radiation))
+        request = self._request(model, material, size=size, gain=gain, pose=pose, handle=handle, radiation=radiation)
         with errors.translated(self.client.server):
             return SoundingObject(self, self.client.scenes_stub.AddObject(request).object)
+
+    def _request(self, model: Model | str, material: Optional[materials.Material] = None, *, size: float = 1,
+                 gain: float = 1, pose: Optional[PoseLike] = None, handle: int = 0,
+                 radiation: Optional[materials.Radiation] = None) -> scene_service_pb2.AddObjectRequest:
+        name, message = materials.named(model, material)
+        return scene_service_pb2.AddObjectRequest(
+            scene=self.name, modal_model=name, material=message, size=size, gain=gain, handle=handle,
+            pose=None if pose is None else contacts.to_pose(pose), radiation=materials.to_radiation(radiation))
 
     def objects(self) -> list[SoundingObject]:
         """Returns the objects of the scene by their handles."""

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <utility>
+
+#include "carillon/v1/server_service.grpc.pb.h"
+#include "server/base/clock.h"
+#include "server/decomposition/decomposition_queue.h"
+#include "server/live_output/live_output.h"
+
+namespace carillon {
+
+/// The largest message that gRPC accepts.
+inline constexpr size_t kMaxMessageBytes = size_t{4} << 20U;
+
+/// The settings of the API that GetServerInfo tells.
+struct ServerFacts {
+  std::string version;
+  double client_share = 0;
+  double scene_grace_s = 0;
+  std::function<bool()> can_decompose;  ///< called on any thread
+};
+
+/// carillon.v1.ServerService. The constructor's references must outlive the service, which begins
+/// to count its uptime when it is made.
+class ServerService final : public v1::ServerService::CallbackService {
+ public:
+  ServerService(ServerFacts facts, const DecompositionQueue& decompositions,
+                const LiveOutput& output, const Clock& clock)
+      : facts_(std::move(facts)),
+        decompositions_(decompositions),
+        output_(output),
+        clock_(clock),
+        started_unix_ms_(clock.UnixMs()),
+        started_(clock.Monotonic()) {}
+
+  grpc::ServerUnaryReactor* GetServerInfo(grpc::CallbackServerContext* context,
+                                          const v1::GetServerInfoRequest* request,
+                                          v1::GetServerInfoResponse* response) override;
+
+ private:
+  void DescribeFeatures(v1::GetServerInfoResponse& info) const;
+  void DescribeLimits(v1::ServerLimits& limits) const;
+
+  const ServerFacts facts_;
+  const DecompositionQueue& decompositions_;
+  const LiveOutput& output_;
+  const Clock& clock_;
+  const int64_t started_unix_ms_;
+  const std::chrono::nanoseconds started_;
+};
+
+}  // namespace carillon

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "carillon/v1/decomposition.pb.h"
+
+namespace carillon {
+
+/// Receives every change of every job, in order and one call at a time. The calls come with locks
+/// of the queue held: they must return soon, and must not call the queue.
+class JobSink {
+ public:
+  virtual ~JobSink() = default;
+
+  /// A job as it is now.
+  virtual void Take(const v1::Job& job) = 0;
+
+  /// All jobs that waited or ran were taken; changes follow.
+  virtual void TakeBegin() = 0;
+};
+
+}  // namespace carillon

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The Python package against the real daemon: what the daemon is, scenes with ids, and all jobs at once."""
+
+import asyncio
+import unittest
+
+import numpy
+
+import carillon
+import meshes
+from daemon import DaemonTest
+
+BAR = meshes.box(meshes.BAR_SIZE)
+
+
+class CallsTest(DaemonTest):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.c = carillon.connect(cls.daemon.server)
+        cls.addClassCleanup(cls.c.close)
+        cls.model = cls.c.create_model(BAR, meshes.MATERIAL, label="bar")
+
+    def test_the_daemon_says_what_it_is(self):
+        async def ask():
+            async with carillon.aio.connect(self.daemon.server) as c:
+                return await c.info()
+
+        info, later = self.c.info(), asyncio.run(ask())
+        self.assertEqual((info.version, info.limits), (carillon.__version__, later.limits))
+        self.assertGreater(later.uptime_s, info.uptime_s)
+        self.assertIn("decomposition", info.features)
+        self.assertEqual(info.sample_rate_hz, self.c.status().format.sample_rate_hz)
+
+    def test_a_scene_with_an_id_is_found_again_with_its_objects(self):
+        made = self.c.scene(id="lathe-1", gain=0.5)
+        self.assertEqual((made.name, made.existing), ("scenes/lathe-1", False))
+        made.add_all([self.model, {"model": self.model, "handle": 7, "gain": 2}])
+        with self.assertRaises(carillon.CarillonError) as raised:
+            made.add_all([self.model, {"model": self.model, "handle": 7}])
+        self.assertEqual((raised.exception.reason, raised.exception.metadata["index"]), ("OBJECT_EXISTS", "1"))
+        # Another connection, as after a loss of this one.
+        with carillon.connect(self.daemon.server) as other, other.scene(id="lathe-1", gain=0.5) as again:
+            self.assertTrue(again.existing)
+            self.assertEqual([item.handle for item in again.objects()], [1, 7])
+            self.assertEqual((again.get().object_count, again.get().gain), (2, 0.5))
+            with self.assertRaises(carillon.CarillonError) as raised:
+                other.scene(id="lathe-1")
+            self.assertEqual(raised.exception.reason, "SCENE_DIFFERS")
+        with self.assertRaises(carillon.CarillonError) as raised:
+            made.get()
+        self.assertEqual(raised.exception.reason, "SCENE_NOT_FOUND")
+
+    def test_jobs_are_watched_and_filtered(self):
+        changes = self.c.watch_jobs(label_contains="watched")
+        self.assertIsNone(next(changes))
+        size = 1.01 * numpy.array(meshes.BAR_SIZE)
+        self.c.create_job(meshes.box(size), meshes.MATERIAL, label="Watched bar", without_transfer=True)
+        states = []
+        while not states or states[-1] != "succeeded":
+            states.append(next(changes).state)
+        changes.close()
+        self.assertEqual(states, sorted(states, key=["queued", "running", "succeeded"].index))
+        self.assertEqual([job.message.label for job in self.c.jobs(["succeeded"], "WATCHED")], ["Watched bar"])
+        self.assertEqual(list(self.c.jobs(["failed"])), [])
+
+        async def watch():
+            async with carillon.aio.connect(self.daemon.server) as c:
+                self.assertEqual([job.state async for job in c.jobs(label_contains="watched")], ["succeeded"])
+                async for job in c.watch_jobs(states=["queued"]):
+                    return job
+
+        self.assertIsNone(asyncio.run(watch()))
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,299 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Scenes with ids of the client's choice, and many objects in one call.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <memory>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "server/base/sha256.h"
+#include "tests/server/api/served_daemon.h"
+
+namespace carillon {
+namespace {
+
+using SceneStub = v1::SceneService::Stub;
+
+v1::CreateSceneRequest Wanted(const std::string& id) {
+  v1::CreateSceneRequest request;
+  request.set_id(id);
+  return request;
+}
+
+class SceneIdApi : public ServedDaemon {
+ protected:
+  explicit SceneIdApi(ApiSettings settings = {.client_share = 1},
+                      const std::vector<std::string>& more = {})
+      : ServedDaemon(std::move(settings), more) {}
+
+  grpc::Status Create(const v1::CreateSceneRequest& request) {
+    return Call(*scenes, &SceneStub::CreateScene, request, created);
+  }
+
+  grpc::Status Get(const std::string& name, v1::Scene& scene) {
+    v1::GetSceneRequest request;
+    request.set_name(name);
+    v1::GetSceneResponse response;
+    const grpc::Status status = Call(*scenes, &SceneStub::GetScene, request, response);
+    scene = response.scene();
+    return status;
+  }
+
+  grpc::Status Delete(const std::string& name) {
+    v1::DeleteSceneRequest request;
+    request.set_name(name);
+    v1::DeleteSceneResponse response;
+    return Call(*scenes, &SceneStub::DeleteScene, request, response);
+  }
+
+  uint32_t CountScenes() {
+    v1::ListScenesResponse response;
+    EXPECT_TRUE(Call(*scenes, &SceneStub::ListScenes, {}, response).ok());
+    return static_cast<uint32_t>(response.scenes_size());
+  }
+
+  v1::CreateSceneResponse created;
+};
+
+TEST_F(SceneIdApi, TheSameRequestAgainGivesTheSameSceneWithItsObjects) {
+  v1::CreateSceneRequest request = Wanted("lathe-1");
+  request.set_gain(0.5);
+  request.mutable_hearing()->set_panning(true);
+  ASSERT_TRUE(Create(request).ok());
+  EXPECT_EQ(created.name(), "scenes/lathe-1");
+  EXPECT_FALSE(created.existing());
+  v1::AddObjectResponse added;
+  ASSERT_TRUE(Add(SmallObject(created.name()), added).ok());
+  EXPECT_EQ(added.object().name(), "scenes/lathe-1/objects/1");
+  v1::UpdateSceneRequest louder;
+  louder.set_name(created.name());
+  louder.set_gain(2);
+  v1::UpdateSceneResponse updated;
+  ASSERT_TRUE(Call(*scenes, &SceneStub::UpdateScene, louder, updated).ok());
+  // The same settings, written otherwise.
+  request.mutable_hearing()->set_reference_distance_m(1);
+  request.mutable_listener();
+  ASSERT_TRUE(Create(request).ok());
+  EXPECT_TRUE(created.existing());
+  EXPECT_EQ(CountScenes(), 1U);
+  v1::Scene scene;
+  ASSERT_TRUE(Get("scenes/lathe-1", scene).ok());
+  EXPECT_EQ(scene.name(), "scenes/lathe-1");
+  EXPECT_EQ(scene.object_count(), 1U);
+  EXPECT_EQ(scene.gain(), 2);
+  EXPECT_EQ(StrikeLive("scenes/lathe-1").accepted_count(), 1U);
+}
+
+TEST_F(SceneIdApi, OtherSettingsUnderTheSameIdAreRefusedUntilTheSceneIsDeleted) {
+  ASSERT_TRUE(Create(Wanted("a")).ok());
+  const std::vector<std::function<void(v1::CreateSceneRequest&)>> changes = {
+      [](v1::CreateSceneRequest& request) { request.set_keep(true); },
+      [](v1::CreateSceneRequest& request) { request.set_gain(0.5); },
+      [](v1::CreateSceneRequest& request) { request.mutable_hearing()->set_panning(true); },
+      [](v1::CreateSceneRequest& request) {
+        request.mutable_listener()->mutable_position_m()->set_x(1);
+      }};
+  for (const auto& change : changes) {
+    v1::CreateSceneRequest other = Wanted("a");
+    change(other);
+    ExpectRefused(Create(other), grpc::ALREADY_EXISTS, "SCENE_DIFFERS");
+  }
+  ASSERT_TRUE(Delete("scenes/a").ok());
+  ExpectRefused(Delete("scenes/a"), grpc::NOT_FOUND, "SCENE_NOT_FOUND");
+  v1::CreateSceneRequest kept = Wanted("a");
+  kept.set_keep(true);
+  ASSERT_TRUE(Create(kept).ok());
+  EXPECT_FALSE(created.existing());
+}
+
+TEST_F(SceneIdApi, AnIdHasTheStatedForm) {
+  for (const std::string& id :
+       {std::string("a"), std::string("robot_2.left-hand"), std::string(64, 'z')}) {
+    ASSERT_TRUE(Create(Wanted(id)).ok()) << id;
+    EXPECT_EQ(created.name(), "scenes/" + id);
+  }
+  for (const std::string& id : {std::string("1"), std::string("-a"), std::string("A"),
+                                std::string("a/b"), std::string("a b"), std::string("\xc3\xa4"),
+                                std::string("a\0b", 3), std::string("a\n"), std::string(65, 'z')}) {
+    ExpectRefused(Create(Wanted(id)), grpc::INVALID_ARGUMENT, "INVALID_SCENE_ID");
+  }
+}
+
+TEST_F(SceneIdApi, NumbersNameOnlyScenesThatTheDaemonHasNumbered) {
+  const std::string numbered = CreateScene();
+  ASSERT_TRUE(Create(Wanted("a")).ok());
+  v1::Scene scene;
+  EXPECT_TRUE(Get(numbered, scene).ok());
+  for (const char* name : {"scenes/2", "scenes/01", "scenes/+1", "scenes/", "scenes/b", "a", ""}) {
+    ExpectRefused(Get(name, scene), grpc::NOT_FOUND, "SCENE_NOT_FOUND");
+  }
+}
+
+TEST_F(SceneIdApi, EqualRequestsAtOnceMakeOneScene) {
+  std::vector<std::thread> threads;
+  std::atomic<int> made = 0;
+  for (int i = 0; i < 16; ++i) {
+    threads.emplace_back([&] {
+      v1::CreateSceneResponse response;
+      EXPECT_TRUE(Call(*scenes, &SceneStub::CreateScene, Wanted("shared"), response).ok());
+      made += response.existing() ? 0 : 1;
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(made, 1);
+  EXPECT_EQ(CountScenes(), 1U);
+}
+
+class BriefSceneIdApi : public SceneIdApi {
+ protected:
+  BriefSceneIdApi() : SceneIdApi({.scene_grace_s = 0.2, .client_share = 1}) {}
+};
+
+TEST_F(BriefSceneIdApi, AnIdIsFreeAgainWhenItsSceneHasEndedWithItsClient) {
+  grpc::ChannelArguments own;
+  own.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
+  auto channel = grpc::CreateCustomChannel(address(), grpc::InsecureChannelCredentials(), own);
+  v1::CreateSceneResponse response;
+  ASSERT_TRUE(
+      Call(*v1::SceneService::NewStub(channel), &SceneStub::CreateScene, Wanted("brief"), response)
+          .ok());
+  channel.reset();
+  // Looking does not make it last.
+  v1::Scene scene;
+  while (Get("scenes/brief", scene).ok()) {
+  }
+  EXPECT_THAT(log(), testing::HasSubstr("scenes/brief has ended: its clients have gone"));
+  ASSERT_TRUE(Create(Wanted("brief")).ok());
+  EXPECT_FALSE(created.existing());
+}
+
+class GuardedSceneIdApi : public SceneIdApi {
+ protected:
+  GuardedSceneIdApi()
+      : SceneIdApi({.access_file = AccessFile(), .client_share = 1}, {"127.0.0.1:0"}) {}
+
+  static std::string AccessFile() {
+    const std::string path = testing::TempDir() + "/carillon_scene_id_access";
+    std::filesystem::remove(path);
+    std::ofstream(path) << "ann strike sha256:" << Sha256Hex("ann's") << "\nboss strike,administer "
+                        << "sha256:" << Sha256Hex("boss's") << "\n";
+    std::filesystem::permissions(path, std::filesystem::perms::owner_read);
+    return path;
+  }
+
+  grpc::Status CreateAs(const std::string& token, const std::string& id) {
+    const auto channel =
+        grpc::CreateChannel(addresses().back(), grpc::InsecureChannelCredentials());
+    grpc::ClientContext context;
+    context.AddMetadata("authorization", "Bearer " + token);
+    return v1::SceneService::NewStub(channel)->CreateScene(&context, Wanted(id), &created);
+  }
+};
+
+TEST_F(GuardedSceneIdApi, TheIdOfAnotherOwnerIsRefusedAlsoToAnAdministrator) {
+  ASSERT_TRUE(CreateAs("ann's", "mine").ok());
+  ExpectRefused(CreateAs("boss's", "mine"), grpc::ALREADY_EXISTS, "SCENE_ID_TAKEN");
+  ExpectRefused(Create(Wanted("mine")), grpc::ALREADY_EXISTS, "SCENE_ID_TAKEN");
+  ASSERT_TRUE(CreateAs("ann's", "mine").ok());
+  EXPECT_TRUE(created.existing());
+}
+
+class AddObjectsApi : public SceneIdApi {
+ protected:
+  v1::AddObjectsRequest Objects(const std::vector<uint32_t>& handles) {
+    v1::AddObjectsRequest request;
+    request.set_scene(scene_);
+    const v1::AddObjectRequest object = SmallObject("");
+    for (const uint32_t handle : handles) {
+      *request.add_objects() = object;
+      request.mutable_objects()->rbegin()->set_handle(handle);
+    }
+    return request;
+  }
+
+  grpc::Status AddAll(const v1::AddObjectsRequest& request) {
+    return Call(*scenes, &SceneStub::AddObjects, request, added_);
+  }
+
+  std::vector<uint32_t> Handles() {
+    std::vector<uint32_t> handles;
+    for (const v1::SoundingObject& object : added_.objects()) handles.push_back(object.handle());
+    return handles;
+  }
+
+  void ExpectRefusedAt(const v1::AddObjectsRequest& request, grpc::StatusCode code,
+                       const char* reason, const std::string& index) {
+    const grpc::Status status = AddAll(request);
+    ExpectRefused(status, code, reason);
+    EXPECT_EQ(ErrorOf(status).metadata().at("index"), index);
+    EXPECT_THAT(ErrorOf(status).message(), testing::StartsWith("objects[" + index + "]: "));
+    v1::Scene scene;
+    ASSERT_TRUE(Get(scene_, scene).ok());
+    EXPECT_EQ(scene.object_count(), 0U) << reason;
+  }
+
+  const std::string scene_ = CreateScene();
+  v1::AddObjectsResponse added_;
+};
+
+TEST_F(AddObjectsApi, FreeHandlesAreThoseThatNoObjectAsksFor) {
+  ASSERT_TRUE(AddAll(Objects({0, 2, 0, 1, 0})).ok());
+  EXPECT_THAT(Handles(), testing::ElementsAre(3, 2, 4, 1, 5));
+  EXPECT_EQ(added_.objects(0).name(), scene_ + "/objects/3");
+  EXPECT_EQ(added_.objects(0).sounding_mode_count(), added_.objects(4).sounding_mode_count());
+  EXPECT_EQ(StrikeLive(scene_).accepted_count(), 1U);
+  ASSERT_TRUE(AddAll(Objects({0, 0})).ok());
+  EXPECT_THAT(Handles(), testing::ElementsAre(6, 7));
+  ASSERT_TRUE(AddAll(Objects({})).ok());
+}
+
+TEST_F(AddObjectsApi, OneThatIsRefusedKeepsAllOthersOutAndIsNamed) {
+  v1::AddObjectsRequest request = Objects({1, 2, 3, 2});
+  ExpectRefusedAt(request, grpc::ALREADY_EXISTS, "OBJECT_EXISTS", "3");
+  request = Objects({1, 2, 3});
+  request.mutable_objects(2)->set_size(-1);
+  ExpectRefusedAt(request, grpc::INVALID_ARGUMENT, "INVALID_OBJECT", "2");
+  request = Objects({1, 2, 3});
+  request.mutable_objects(1)->set_modal_model("modalModels/none");
+  ExpectRefusedAt(request, grpc::NOT_FOUND, "MODAL_MODEL_NOT_FOUND", "1");
+  request = Objects({1, 2, 3});
+  request.mutable_objects(0)->mutable_material()->set_preset("unobtainium");
+  ExpectRefusedAt(request, grpc::INVALID_ARGUMENT, "UNKNOWN_MATERIAL", "0");
+  request = Objects({1, 2});
+  request.mutable_objects(1)->set_scene("scenes/other");
+  ExpectRefusedAt(request, grpc::INVALID_ARGUMENT, "INVALID_NAME", "1");
+  request.mutable_objects(1)->set_scene(scene_);
+  EXPECT_TRUE(AddAll(request).ok());
+}
+
+TEST_F(AddObjectsApi, AHandleOfTheSceneIsTaken) {
+  ASSERT_TRUE(AddAll(Objects({7})).ok());
+  const grpc::Status status = AddAll(Objects({0, 7}));
+  ExpectRefused(status, grpc::ALREADY_EXISTS, "OBJECT_EXISTS");
+  EXPECT_EQ(ErrorOf(status).metadata().at("index"), "1");
+  v1::AddObjectsRequest nowhere = Objects({0});
+  nowhere.set_scene("scenes/none");
+  ExpectRefused(AddAll(nowhere), grpc::NOT_FOUND, "SCENE_NOT_FOUND");
+}
+
+TEST_F(AddObjectsApi, TheDaemonIsFilledAndNotOverfilled) {
+  const std::vector<uint32_t> half(SceneRegistry::kMaxObjectCount / 2, 0);
+  ASSERT_TRUE(AddAll(Objects(half)).ok());
+  std::vector<uint32_t> more(half.size() + 1, 0);
+  const grpc::Status status = AddAll(Objects(more));
+  ExpectRefused(status, grpc::RESOURCE_EXHAUSTED, "TOO_MANY_OBJECTS");
+  EXPECT_EQ(ErrorOf(status).metadata().at("index"), std::to_string(half.size()));
+  ASSERT_TRUE(AddAll(Objects(half)).ok());
+}
+
+}  // namespace
+}  // namespace carillon

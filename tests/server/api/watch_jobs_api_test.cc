@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// WatchJobs, and ListJobs with a filter. Every job of this daemon fails.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "tests/server/api/served_daemon.h"
+
+namespace carillon {
+namespace {
+
+using testing::Contains;
+using testing::ElementsAre;
+
+class WatchJobsApi : public ServedDaemon {
+ protected:
+  using Reader = std::unique_ptr<grpc::ClientReader<v1::WatchJobsResponse>>;
+
+  /// Creates a job that fails, and returns its name.
+  std::string Submit(const std::string& label) {
+    grpc::ClientContext context;
+    v1::UploadMeshResponse uploaded;
+    const auto writer = models->UploadMesh(&context, &uploaded);
+    v1::UploadMeshRequest mesh;
+    mesh.set_data("a mesh for " + label);
+    writer->Write(mesh);
+    writer->WritesDone();
+    EXPECT_TRUE(writer->Finish().ok());
+    v1::CreateModalModelRequest request;
+    request.set_mesh_digest(uploaded.mesh_digest());
+    request.set_mesh_format("obj");
+    request.mutable_material()->set_preset("chime_aluminum");
+    request.set_label(label);
+    v1::CreateModalModelResponse response;
+    EXPECT_TRUE(
+        Call(*models, &v1::ModalModelService::Stub::CreateModalModel, request, response).ok());
+    return response.job().name();
+  }
+
+  /// Reads to the job's end; returns all messages with a job.
+  static std::vector<v1::Job> ReadToEndOf(const std::string& name, Reader& reader) {
+    std::vector<v1::Job> read;
+    v1::WatchJobsResponse response;
+    while (reader->Read(&response)) {
+      if (!response.has_job()) continue;
+      read.push_back(response.job());
+      if (response.job().name() == name && response.job().state() == v1::JOB_STATE_FAILED) break;
+    }
+    return read;
+  }
+
+  /// Reads the jobs that wait or run.
+  static std::vector<std::string> ReadBegin(Reader& reader) {
+    std::vector<std::string> names;
+    v1::WatchJobsResponse response;
+    while (reader->Read(&response) && response.has_job()) names.push_back(response.job().name());
+    EXPECT_FALSE(response.has_job());
+    return names;
+  }
+
+  std::vector<std::string> ListLabels(const v1::ListJobsRequest& request) {
+    v1::ListJobsResponse response;
+    EXPECT_TRUE(Call(*jobs, &v1::DecompositionService::Stub::ListJobs, request, response).ok());
+    std::vector<std::string> labels;
+    for (const v1::Job& job : response.jobs()) labels.push_back(job.label());
+    return labels;
+  }
+
+  grpc::ClientContext context_;
+};
+
+TEST_F(WatchJobsApi, TellsOfEachJobFromItsBeginToItsEnd) {
+  Reader reader = jobs->WatchJobs(&context_, {});
+  EXPECT_THAT(ReadBegin(reader), ElementsAre());
+  const std::string first = Submit("first");
+  const std::string second = Submit("second");
+  const std::vector<v1::Job> read = ReadToEndOf(second, reader);
+  for (const std::string& name : {first, second}) {
+    int last = v1::JOB_STATE_UNSPECIFIED;
+    for (const v1::Job& job : read) {
+      if (job.name() == name) last = job.state();
+    }
+    if (name == second) {
+      EXPECT_EQ(last, v1::JOB_STATE_FAILED);
+    }
+    EXPECT_NE(last, v1::JOB_STATE_UNSPECIFIED) << name;
+  }
+  EXPECT_NE(read.back().error().reason(), "");
+  context_.TryCancel();
+  EXPECT_EQ(reader->Finish().error_code(), grpc::CANCELLED);
+}
+
+TEST_F(WatchJobsApi, SendsOnlyWhatMatches) {
+  v1::WatchJobsRequest request;
+  request.add_states(v1::JOB_STATE_FAILED);
+  request.set_label_contains("bell");
+  Reader reader = jobs->WatchJobs(&context_, request);
+  ReadBegin(reader);
+  Submit("bowl");
+  Submit("BELL one");
+  const std::vector<v1::Job> read = ReadToEndOf(Submit("two bells"), reader);
+  std::vector<std::string> labels;
+  for (const v1::Job& job : read) {
+    EXPECT_EQ(job.state(), v1::JOB_STATE_FAILED);
+    labels.push_back(job.label());
+  }
+  EXPECT_THAT(labels, Contains("two bells"));
+  EXPECT_THAT(labels, testing::Not(Contains("bowl")));
+}
+
+TEST_F(WatchJobsApi, ManyWatchersThatLeaveInTheMidstDisturbNobody) {
+  for (int i = 0; i < 20; ++i) {
+    grpc::ClientContext context;
+    Reader reader = jobs->WatchJobs(&context, {});
+    Submit("job " + std::to_string(i));
+    v1::WatchJobsResponse response;
+    EXPECT_TRUE(reader->Read(&response));
+    context.TryCancel();
+    reader->Finish();
+  }
+  Reader reader = jobs->WatchJobs(&context_, {});
+  ReadBegin(reader);
+  const std::string name = Submit("last");
+  EXPECT_EQ(ReadToEndOf(name, reader).back().name(), name);
+}
+
+TEST_F(WatchJobsApi, ListsHaveTheSameFilter) {
+  Reader reader = jobs->WatchJobs(&context_, {});
+  ReadBegin(reader);
+  for (const char* label : {"bell", "Bell two", "bowl"}) ReadToEndOf(Submit(label), reader);
+  v1::ListJobsRequest request;
+  EXPECT_THAT(ListLabels(request), ElementsAre("bowl", "Bell two", "bell"));
+  request.set_label_contains("BELL");
+  EXPECT_THAT(ListLabels(request), ElementsAre("Bell two", "bell"));
+  request.add_states(v1::JOB_STATE_FAILED);
+  request.add_states(v1::JOB_STATE_RUNNING);
+  request.set_page_size(1);
+  EXPECT_THAT(ListLabels(request), ElementsAre("Bell two"));
+  request.clear_states();
+  request.add_states(v1::JOB_STATE_SUCCEEDED);
+  EXPECT_THAT(ListLabels(request), ElementsAre());
+}
+
+}  // namespace
+}  // namespace carillon
