@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <string>
+
 #include "absl/status/status.h"
 #include "absl/strings/string_view.h"
 #include "carillon/v1/error.pb.h"
@@ -14,7 +16,13 @@ absl::Status Refusal(absl::StatusCode code, absl::string_view reason, absl::stri
 /// Adds a figure that belongs to the reason, for programs ("first_mode_hz" = "31.5").
 void AddFigure(absl::Status& status, absl::string_view name, absl::string_view value);
 
-/// Reason, message and figures of a status; a status without a reason gets "INTERNAL".
+/// Adds a change to the request that may help.
+void AddRemedy(absl::Status& status, const v1::Remedy& remedy);
+
+/// A remedy for people who type options, such as "--repair: repairs the surface".
+std::string RemedyText(const v1::Remedy& remedy);
+
+/// Reason, message, figures and remedies of a status; a status without a reason gets "INTERNAL".
 v1::ErrorInfo ToErrorInfo(const absl::Status& status);
 
 /// The status that ToErrorInfo would turn into `error`.
