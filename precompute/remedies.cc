@@ -48,8 +48,7 @@ constexpr Known kBudget{"settings.mesh.budget_s", "", "--budget",
                         "refines the mesh as far as this processor time and memory allow", Never};
 constexpr Known kSize{"size", "", "--size", "changes the size that the body sounds with", Never};
 constexpr Known kUnit{"settings.metres_per_unit", "0.001", "--unit",
-                      "reads the file's lengths as millimetres",
-                      [](const v1::WorkerRequest& r) {
+                      "reads the file's lengths as millimetres", [](const v1::WorkerRequest& r) {
                         return r.settings().metres_per_unit() != 0 &&
                                r.settings().metres_per_unit() != 1;
                       }};

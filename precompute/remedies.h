@@ -6,8 +6,8 @@
 
 namespace carillon::precompute {
 
-/// Adds to the refusal of a decomposition the changes to `request` that may help, as data. What the
-/// request has already is left out. Other errors get none.
+/// Adds to the refusal of a decomposition the changes to `request` that may help, as data. A change
+/// that the request has already is left out. Other errors get none.
 absl::Status WithRemedies(absl::Status refusal, const v1::WorkerRequest& request);
 
 }  // namespace carillon::precompute

@@ -36,7 +36,8 @@ absl::StatusOr<std::string> ReadMesh(const std::string& path) {
   std::string bytes;
   if (file && !std::filesystem::is_directory(path)) {
     std::array<char, 65536> piece;
-    while (bytes.size() <= kMostMeshBytes && (file.read(piece.data(), piece.size()), file.gcount() > 0)) {
+    while (bytes.size() <= kMostMeshBytes &&
+           (file.read(piece.data(), piece.size()), file.gcount() > 0)) {
       bytes.append(piece.data(), static_cast<size_t>(file.gcount()));
     }
     if (bytes.size() > kMostMeshBytes) {
@@ -262,9 +263,8 @@ absl::Status CreateModel(const client::Client& daemon, const CreateModelOptions&
     absl::StatusOr<v1::Job> job = std::move(jobs[i]);
     if (job.ok() && options.wait) job = AwaitModel(daemon, options, options.files[i], job->name());
     if (job.ok() && options.wait) PrintWarnings(daemon, job->modal_model());
-    const absl::Status ended =
-        Conclude(daemon, std::move(job),
-                 {.wait = false, .json = json, .name = &v1::Job::modal_model});
+    const absl::Status ended = Conclude(
+        daemon, std::move(job), {.wait = false, .json = json, .name = &v1::Job::modal_model});
     if (ended.ok()) continue;
     if (!first_error.ok()) (void)Report(first_error);
     first_error = ended;

@@ -36,9 +36,17 @@ CLI::Validator Band(CreateModelOptions& options) {
       "LO:HI");
 }
 
+void AddBand(CLI::App& create, const std::shared_ptr<CreateModelOptions>& options) {
+  create
+      .add_option_function<std::string>(
+          "--band", [options](const std::string& /*checked*/) {},
+          "frequencies wanted, Hz [20:20000; fewer modes where those are too many for 7 GiB or a "
+          "minute]")
+      ->check(Band(*options));
+}
+
 void AddModelCreate(CLI::App& app, Program& program) {
   auto options = std::make_shared<CreateModelOptions>();
-  auto band = std::make_shared<std::string>();
   CLI::App& create = *app.add_subcommand("create", "Compute the modal model of a mesh file");
   create
       .add_option(
@@ -51,11 +59,7 @@ void AddModelCreate(CLI::App& app, Program& program) {
   create.add_option("--label", options->label, "name for people of a single file [its name]");
   create.add_option("--size", options->size,
                     "size it is meant to sound with, relative to the file");
-  create
-      .add_option("--band", *band,
-                  "frequencies wanted, Hz [20:20000; fewer modes where those are too many for 7 GiB "
-                  "or a minute]")
-      ->check(Band(*options));
+  AddBand(create, options);
   create.add_flag("--without-transfer", options->without_transfer,
                   "Do not compute how the modes radiate afterwards");
   create.add_flag("--coarse-first", options->coarse_first,
@@ -70,7 +74,7 @@ void AddModelCreate(CLI::App& app, Program& program) {
                   "with --wait, repair a surface that is refused otherwise, and say so [yes]");
   AddMaterial(create, options->material);
   AddSettingsOptions(create, options->settings);
-  create.callback([&program, options, band] {
+  create.callback([&program, options] {
     if (options->files.size() > 1 && !options->label.empty()) {
       throw CLI::ValidationError("--label", "several files would get the same label");
     }

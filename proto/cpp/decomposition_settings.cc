@@ -117,8 +117,7 @@ absl::Status CheckSettings(const v1::DecompositionSettings& settings) {
   const double poisson_ratio = RoundedPoissonRatio(settings.poisson_ratio());
   if (!(poisson_ratio > -1 && poisson_ratio < 0.5)) {
     return Invalid(
-        absl::StrCat("poisson_ratio is ", settings.poisson_ratio(),
-                     ", which is ", poisson_ratio,
+        absl::StrCat("poisson_ratio is ", settings.poisson_ratio(), ", which is ", poisson_ratio,
                      " after rounding to 1e-4; it must be greater than -1 and less than 0.5, such "
                      "as 0.49 for rubber"));
   }

@@ -26,8 +26,8 @@ absl::StatusOr<v1::CreateModalModelRequest> ParseRequest(const JobRecord& record
 /// Whether both requests want the same band of eigenvalues, and both or neither leave it open.
 bool SameHints(const v1::CreateModalModelRequest& a, const v1::CreateModalModelRequest& b);
 
-/// Whether `a` wants modes that a job for `b` may leave out: those up to a higher eigenvalue, or the
-/// same ones whatever they cost.
+/// Whether `a` wants modes that a job for `b` may leave out: those up to a higher eigenvalue, or
+/// the same ones whatever they cost.
 bool WantsMore(const v1::CreateModalModelRequest& a, const v1::CreateModalModelRequest& b);
 
 /// Whether a refusal depends on the band, so that a request with other hints may succeed.

@@ -132,8 +132,8 @@ std::optional<SurfaceMesh> InChild(const SurfaceMesh& surface,
 
 std::optional<RepairedSurface> FillHoles(const SurfaceMesh& surface) {
   const double longest_rim = kRimPart * Diagonal(surface.vertices);
-  std::optional<SurfaceMesh> filled = InChild(
-      surface, [=](HalfedgeMesh mesh) { return FillAll(std::move(mesh), longest_rim); });
+  std::optional<SurfaceMesh> filled =
+      InChild(surface, [=](HalfedgeMesh mesh) { return FillAll(std::move(mesh), longest_rim); });
   if (!filled) return std::nullopt;
   const double distance = GreatestDistance(*filled, NearestTriangle(surface));
   return RepairedSurface{

@@ -295,7 +295,8 @@ std::string InUtf16(const std::string& ascii, bool big) {
 }
 
 TEST(ParseMesh, TextInUtf16IsReadAsItsLetters) {
-  const std::string obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+  const std::string obj =
+      "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
   for (const bool big : {false, true}) {
     const absl::StatusOr<NamedMesh> read = ParseMesh(InUtf16(obj, big), "obj", 1);
     ASSERT_TRUE(read.ok()) << read.status();

@@ -134,10 +134,11 @@ TEST(PrepareSurface, AWideHoleIsFilledWhereItIs) {
       used |= std::ranges::count(triangle, static_cast<int32_t>(v)) > 0;
     }
     if (!used) continue;
-    EXPECT_LT(std::ranges::min(filled->surface.vertices | std::views::transform([&](const Point& p) {
-                                 return Distance(p, open.vertices[v]);
-                               })),
-              1e-9);
+    EXPECT_LT(
+        std::ranges::min(filled->surface.vertices | std::views::transform([&](const Point& p) {
+                           return Distance(p, open.vertices[v]);
+                         })),
+        1e-9);
   }
 }
 
