@@ -119,7 +119,7 @@ TEST(PrepareSurface, AWideHoleIsFilledWhereItIs) {
   SurfaceMesh open = ball;
   std::erase_if(open.triangles, [&](const auto& triangle) {
     return std::ranges::all_of(triangle, [&](int32_t v) {
-      return Distance(ball.vertices[static_cast<size_t>(v)], ball.vertices[0]) < 0.06;
+      return Distance(ball.vertices[static_cast<size_t>(v)], ball.vertices[0]) < 0.045;
     });
   });
   ASSERT_LT(open.triangles.size(), ball.triangles.size());
