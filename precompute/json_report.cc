@@ -124,6 +124,8 @@ std::string JsonReport(const ModalModel& model, const Transfer* transfer, const 
                  {"peak_memory_bytes", PeakMemoryBytes()},
                  {"phases", PhaseTimes(reporter.clock())},
                  {"left_out_modes", model.left_out_mode_count},
+                 {"complete_to_hz", use.FrequencyHz(model.complete_to_eigenvalue)},
+                 {"lowered_from_modes", model.lowered_from_mode_count},
                  {"accuracy", model.WorstError()},
                  {"warnings", model.warnings},
                  {"modes", ModesInBand(model, transfer, use)}};
@@ -136,6 +138,12 @@ std::string JsonError(const absl::Status& status) {
   const v1::ErrorInfo error = ToErrorInfo(status);
   Json object = {{"reason", error.reason()}, {"message", error.message()}};
   for (const auto& [name, value] : error.metadata()) object["figures"][name] = value;
+  for (const v1::Remedy& remedy : error.remedies()) {
+    object["remedies"].push_back({{"field", remedy.field()},
+                                  {"value", remedy.value()},
+                                  {"option", remedy.option()},
+                                  {"effect", remedy.effect()}});
+  }
   return Json{{"error", object}}.dump(2);
 }
 

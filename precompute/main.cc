@@ -24,6 +24,7 @@
 #include "precompute/progress_reporter.h"
 #include "precompute/radiate.h"
 #include "precompute/read_modal_model.h"
+#include "precompute/remedies.h"
 #include "precompute/sha256.h"
 #include "precompute/sparse/openblas.h"
 #include "precompute/transfer_codec.h"
@@ -95,6 +96,9 @@ int Refuse(const absl::Status& status, bool json, const WorkerEvents& events) {
   const v1::ErrorInfo error = ToErrorInfo(status);
   std::fprintf(stderr, "carillon-precompute: %s: %s\n", error.reason().c_str(),
                error.message().c_str());
+  for (const v1::Remedy& remedy : error.remedies()) {
+    std::fprintf(stderr, "carillon-precompute: try %s\n", RemedyText(remedy).c_str());
+  }
   if (json) std::puts(JsonError(status).c_str());
   events.SendError(status);
   return EXIT_FAILURE;
@@ -138,7 +142,9 @@ int Run(const CommandLine& asked) {
       std::puts(JsonReport(result->stored.model, transfer, UseOf(asked.request), reporter).c_str());
     }
   }
-  if (!result.ok()) return Refuse(result.status(), asked.json, events);
+  if (!result.ok()) {
+    return Refuse(WithRemedies(result.status(), asked.request), asked.json, events);
+  }
   if (!asked.json) PrintSummary(*result, asked);
   return FinishOutput();
 }

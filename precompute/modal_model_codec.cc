@@ -60,6 +60,7 @@ v1::ModalModelRecord MakeHeader(const ModalModel& model, const ModelOrigin& orig
   header.set_element_count(static_cast<uint32_t>(model.element_count));
   header.set_mode_count(static_cast<uint32_t>(model.eigenvalues.size()));
   header.set_complete_to_eigenvalue(model.complete_to_eigenvalue);
+  header.set_lowered_from_mode_count(static_cast<uint32_t>(model.lowered_from_mode_count));
   header.set_volume_m3(model.volume_m3);
   header.set_left_out_mode_count(static_cast<uint32_t>(model.left_out_mode_count));
   *header.mutable_verification() = ToProto(model.verification);

@@ -97,6 +97,7 @@ class ModelReader {
     model.element_count = static_cast<int>(header.element_count());
     model.volume_m3 = header.volume_m3();
     model.complete_to_eigenvalue = header.complete_to_eigenvalue();
+    model.lowered_from_mode_count = static_cast<int>(header.lowered_from_mode_count());
     model.left_out_mode_count = static_cast<int>(header.left_out_mode_count());
     model.warnings.assign(header.warnings().begin(), header.warnings().end());
     model.estimated_errors.assign(header.estimated_errors().begin(),

@@ -23,13 +23,15 @@ struct CreateModelOptions {
   v1::DecompositionSettings settings;
   double size = 1;
   double min_frequency_hz = 20;
-  double max_frequency_hz = 20000;
+  double max_frequency_hz = 0;  ///< zero: open, see CreateModalModelRequest
   bool coarse_first = false;
   bool without_transfer = false;
   int32_t priority = 0;
   double time_limit_s = 0;
   uint64_t memory_limit_mib = 0;
   bool wait = false;  ///< end with the jobs, and show their progress
+  /// While waiting, ask again with repair for a surface that is refused and may be repaired.
+  bool may_repair = true;
 };
 
 /// The options of `carillon transfer create`.

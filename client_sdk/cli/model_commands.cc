@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <numbers>
 #include <utility>
 #include <vector>
@@ -27,11 +27,23 @@
 namespace carillon::cli {
 namespace {
 
+/// The daemon takes no larger mesh file.
+constexpr size_t kMostMeshBytes = size_t{256} << 20;
+
+/// Reads a file that may be endless, such as a pipe or a device.
 absl::StatusOr<std::string> ReadMesh(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   std::string bytes;
   if (file && !std::filesystem::is_directory(path)) {
-    bytes.assign(std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>());
+    std::array<char, 65536> piece;
+    while (bytes.size() <= kMostMeshBytes &&
+           (file.read(piece.data(), piece.size()), file.gcount() > 0)) {
+      bytes.append(piece.data(), static_cast<size_t>(file.gcount()));
+    }
+    if (bytes.size() > kMostMeshBytes) {
+      return Refusal(absl::StatusCode::kResourceExhausted, "MESH_TOO_LARGE",
+                     absl::StrCat(path, " has more than 256 MiB: simplify the body's surface"));
+    }
     if (!file.bad()) return bytes;
   }
   const bool directory = std::filesystem::is_directory(path);
@@ -160,6 +172,18 @@ void PrintModes(const v1::ModalModelSummary& model, const v1::Material& material
   }
 }
 
+/// Prints up to where the model has all modes of a body of `material`.
+void PrintBand(const v1::ModalModelSummary& model, const v1::Material& material) {
+  const v1::ModalModelHeader& header = model.header();
+  const double lambda =
+      header.complete_to_eigenvalue() * material.young_pa() / material.density_kg_per_m3();
+  absl::PrintF("band       all modes up to %.5g Hz", std::sqrt(lambda) / (2 * std::numbers::pi));
+  if (header.lowered_from_mode_count() > 0) {
+    absl::PrintF(", lowered from some %d modes below 20 kHz", header.lowered_from_mode_count());
+  }
+  absl::PrintF("\n");
+}
+
 /// Asks for the model of one file.
 absl::StatusOr<v1::Job> RequestModel(const client::Client& daemon,
                                      const CreateModelOptions& options, const std::string& file) {
@@ -190,6 +214,33 @@ absl::Status Conclude(const client::Client& daemon, absl::StatusOr<v1::Job> job,
   return absl::OkStatus();
 }
 
+bool HelpsToRepair(const v1::Remedy& remedy) { return remedy.field() == "settings.mesh.repair"; }
+
+/// Waits for the job of one file. A surface that is refused, and that repair may help, is asked for
+/// again with repair; where that fails, too, the first refusal is returned.
+absl::StatusOr<v1::Job> AwaitModel(const client::Client& daemon, const CreateModelOptions& options,
+                                   const std::string& file, const std::string& job) {
+  absl::StatusOr<v1::Job> ended = WatchWithProgress(daemon, job);
+  const v1::ErrorInfo refusal = ended.ok() ? v1::ErrorInfo() : ToErrorInfo(ended.status());
+  if (!options.may_repair || std::ranges::none_of(refusal.remedies(), HelpsToRepair)) return ended;
+  absl::FPrintF(stderr, "carillon: %s is asked for again with --repair: %s: %s\n", file,
+                refusal.reason(), refusal.message());
+  CreateModelOptions repairing = options;
+  repairing.settings.mutable_mesh()->set_repair(true);
+  absl::StatusOr<v1::Job> repaired = RequestModel(daemon, repairing, file);
+  if (repaired.ok()) repaired = WatchWithProgress(daemon, repaired->name());
+  return repaired.ok() ? repaired : ended;
+}
+
+/// Prints what the user should know about a model that was just made.
+void PrintWarnings(const client::Client& daemon, const std::string& name) {
+  const auto model = daemon.GetModalModel(name);
+  if (!model.ok()) return;
+  for (const std::string& warning : model->header().warnings()) {
+    absl::FPrintF(stderr, "warning: %s\n", warning);
+  }
+}
+
 /// Removes what a list of models need not tell; `carillon model show` tells it.
 void Shorten(v1::ModalModelSummary& model) {
   model.mutable_header()->clear_settings();
@@ -208,10 +259,12 @@ absl::Status CreateModel(const client::Client& daemon, const CreateModelOptions&
     jobs.push_back(RequestModel(daemon, options, file));
   }
   absl::Status first_error;
-  for (absl::StatusOr<v1::Job>& job : jobs) {
-    const absl::Status ended =
-        Conclude(daemon, std::move(job),
-                 {.wait = options.wait, .json = json, .name = &v1::Job::modal_model});
+  for (size_t i = 0; i < jobs.size(); ++i) {
+    absl::StatusOr<v1::Job> job = std::move(jobs[i]);
+    if (job.ok() && options.wait) job = AwaitModel(daemon, options, options.files[i], job->name());
+    if (job.ok() && options.wait) PrintWarnings(daemon, job->modal_model());
+    const absl::Status ended = Conclude(
+        daemon, std::move(job), {.wait = false, .json = json, .name = &v1::Job::modal_model});
     if (ended.ok()) continue;
     if (!first_error.ok()) (void)Report(first_error);
     first_error = ended;
@@ -277,6 +330,7 @@ absl::Status ShowModel(const client::Client& daemon, const std::string& text,
   const auto material = has_material ? ResolveMaterial(chosen) : chosen;
   if (!material.ok()) return material.status();
   PrintSummary(*model);
+  if (has_material) PrintBand(*model, *material);
   if (has_material) PrintModes(*model, *material);
   return absl::OkStatus();
 }

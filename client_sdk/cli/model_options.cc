@@ -29,15 +29,24 @@ CLI::Validator Band(CreateModelOptions& options) {
         const bool parsed =
             colon != std::string::npos &&
             CLI::detail::lexical_cast(text.substr(0, colon), options.min_frequency_hz) &&
-            CLI::detail::lexical_cast(text.substr(colon + 1), options.max_frequency_hz);
+            CLI::detail::lexical_cast(text.substr(colon + 1), options.max_frequency_hz) &&
+            options.max_frequency_hz > 0;
         return parsed ? std::string() : text + " is not two frequencies LO:HI";
       },
       "LO:HI");
 }
 
+void AddBand(CLI::App& create, const std::shared_ptr<CreateModelOptions>& options) {
+  create
+      .add_option_function<std::string>(
+          "--band", [options](const std::string& /*checked*/) {},
+          "frequencies wanted, Hz [20:20000; fewer modes where those are too many for 7 GiB or a "
+          "minute]")
+      ->check(Band(*options));
+}
+
 void AddModelCreate(CLI::App& app, Program& program) {
   auto options = std::make_shared<CreateModelOptions>();
-  auto band = std::make_shared<std::string>("20:20000");
   CLI::App& create = *app.add_subcommand("create", "Compute the modal model of a mesh file");
   create
       .add_option(
@@ -50,9 +59,7 @@ void AddModelCreate(CLI::App& app, Program& program) {
   create.add_option("--label", options->label, "name for people of a single file [its name]");
   create.add_option("--size", options->size,
                     "size it is meant to sound with, relative to the file");
-  create.add_option("--band", *band, "frequencies wanted, Hz")
-      ->check(Band(*options))
-      ->capture_default_str();
+  AddBand(create, options);
   create.add_flag("--without-transfer", options->without_transfer,
                   "Do not compute how the modes radiate afterwards");
   create.add_flag("--coarse-first", options->coarse_first,
@@ -63,9 +70,11 @@ void AddModelCreate(CLI::App& app, Program& program) {
   options->wait = isatty(STDERR_FILENO) != 0;
   create.add_flag("--wait,!--no-wait", options->wait,
                   "show the progress and end with the jobs [on a terminal]");
+  create.add_flag("--may-repair,!--no-repair", options->may_repair,
+                  "with --wait, repair a surface that is refused otherwise, and say so [yes]");
   AddMaterial(create, options->material);
   AddSettingsOptions(create, options->settings);
-  create.callback([&program, options, band] {
+  create.callback([&program, options] {
     if (options->files.size() > 1 && !options->label.empty()) {
       throw CLI::ValidationError("--label", "several files would get the same label");
     }

@@ -17,6 +17,9 @@ int Report(const absl::Status& status) {
   std::string message = error.message();
   std::ranges::replace(message, '\n', ' ');
   absl::FPrintF(stderr, "carillon: %s: %s\n", error.reason(), message);
+  for (const v1::Remedy& remedy : error.remedies()) {
+    absl::FPrintF(stderr, "carillon: try %s\n", RemedyText(remedy));
+  }
   return error.reason() == "SERVER_UNAVAILABLE" ? kNoServer : kRefused;
 }
 

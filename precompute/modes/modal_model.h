@@ -21,6 +21,8 @@ struct ModalModel {
   int element_count = 0;
   double volume_m3 = 0;
   double complete_to_eigenvalue = 0;
+  /// Modes below the limit that was asked for, where it was lowered; zero: it was not.
+  int lowered_from_mode_count = 0;
   /// The lowest deformation eigenvalue of the body, also if it lies above the limit and is not in
   /// the model.
   double lowest_eigenvalue = 0;

@@ -114,10 +114,12 @@ void FillInDefaults(v1::DecompositionSettings& settings) {
 }
 
 absl::Status CheckSettings(const v1::DecompositionSettings& settings) {
-  if (!(settings.poisson_ratio() > -1 && settings.poisson_ratio() < 0.5)) {
+  const double poisson_ratio = RoundedPoissonRatio(settings.poisson_ratio());
+  if (!(poisson_ratio > -1 && poisson_ratio < 0.5)) {
     return Invalid(
-        absl::StrCat("poisson_ratio is ", settings.poisson_ratio(),
-                     " after rounding to 1e-4; it must be greater than -1 and less than 0.5"));
+        absl::StrCat("poisson_ratio is ", settings.poisson_ratio(), ", which is ", poisson_ratio,
+                     " after rounding to 1e-4; it must be greater than -1 and less than 0.5, such "
+                     "as 0.49 for rubber"));
   }
   if (!(std::isfinite(settings.metres_per_unit()) && settings.metres_per_unit() > 0)) {
     return Invalid(absl::StrCat("metres_per_unit is ", settings.metres_per_unit(),

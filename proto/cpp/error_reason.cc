@@ -13,6 +13,8 @@ namespace carillon {
 namespace {
 
 constexpr absl::string_view kFigurePrefix = "carillon.figure/";
+/// Its value is an ErrorInfo with nothing but remedies.
+constexpr absl::string_view kRemedies = "carillon.remedies";
 
 bool IsReason(absl::string_view text) {
   return !text.empty() && std::ranges::all_of(text, [](unsigned char c) {
@@ -30,6 +32,21 @@ void AddFigure(absl::Status& status, absl::string_view name, absl::string_view v
   status.SetPayload(absl::StrCat(kFigurePrefix, name), absl::Cord(value));
 }
 
+void AddRemedy(absl::Status& status, const v1::Remedy& remedy) {
+  v1::ErrorInfo remedies;
+  if (const auto before = status.GetPayload(kRemedies)) {
+    remedies.ParseFromString(std::string(*before));
+  }
+  *remedies.add_remedies() = remedy;
+  status.SetPayload(kRemedies, absl::Cord(remedies.SerializeAsString()));
+}
+
+std::string RemedyText(const v1::Remedy& remedy) {
+  const bool flag = remedy.value().empty() || remedy.value() == "true";
+  return absl::StrCat(remedy.option(), flag ? "" : " ", flag ? "" : remedy.value(), ": ",
+                      remedy.effect());
+}
+
 v1::ErrorInfo ToErrorInfo(const absl::Status& status) {
   v1::ErrorInfo error;
   const absl::string_view message = status.message();
@@ -40,6 +57,9 @@ v1::ErrorInfo ToErrorInfo(const absl::Status& status) {
   } else {
     error.set_reason("INTERNAL");
     error.set_message(std::string(message));
+  }
+  if (const auto remedies = status.GetPayload(kRemedies)) {
+    error.MergeFromString(std::string(*remedies));
   }
   status.ForEachPayload([&](absl::string_view url, const absl::Cord& value) {
     if (absl::ConsumePrefix(&url, kFigurePrefix)) {
@@ -59,6 +79,7 @@ absl::Status AtElement(const absl::Status& status, absl::string_view list, size_
 absl::Status FromErrorInfo(absl::StatusCode code, const v1::ErrorInfo& error) {
   absl::Status status = Refusal(code, error.reason(), error.message());
   for (const auto& [name, value] : error.metadata()) AddFigure(status, name, value);
+  for (const v1::Remedy& remedy : error.remedies()) AddRemedy(status, remedy);
   return status;
 }
 

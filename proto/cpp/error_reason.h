@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <string>
 
 #include "absl/status/status.h"
 #include "absl/strings/string_view.h"
@@ -20,7 +21,13 @@ void AddFigure(absl::Status& status, absl::string_view name, absl::string_view v
 /// "index".
 absl::Status AtElement(const absl::Status& status, absl::string_view list, size_t index);
 
-/// Reason, message and figures of a status; a status without a reason gets "INTERNAL".
+/// Adds a change to the request that may help.
+void AddRemedy(absl::Status& status, const v1::Remedy& remedy);
+
+/// A remedy for people who type options, such as "--repair: repairs the surface".
+std::string RemedyText(const v1::Remedy& remedy);
+
+/// Reason, message, figures and remedies of a status; a status without a reason gets "INTERNAL".
 v1::ErrorInfo ToErrorInfo(const absl::Status& status);
 
 /// The status that ToErrorInfo would turn into `error`.

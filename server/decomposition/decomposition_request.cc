@@ -19,12 +19,18 @@ namespace {
 
 constexpr std::array kFormats = {"obj",  "ply", "stl",  "off",  "glb",
                                  "gltf", "msh", "mesh", "node", "inp"};
+/// Upper end of a band that the request leaves open, Hz.
+constexpr double kOpenBandHz = 20'000;
 constexpr int kMostPriority = 100;
 constexpr double kLeastTransferDb = 0.06;
 constexpr double kMostTransferDb = 20;
 
 absl::Status Invalid(absl::string_view what) {
   return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS", what);
+}
+
+double HighestHz(const v1::CreateModalModelRequest& request) {
+  return LeavesBandOpen(request) ? kOpenBandHz : request.max_frequency_hz();
 }
 
 absl::Status CheckMesh(const v1::CreateModalModelRequest& request) {
@@ -46,10 +52,10 @@ absl::Status CheckHints(const v1::CreateModalModelRequest& request) {
   if (!(std::isfinite(request.size()) && request.size() > 0)) {
     return Invalid(absl::StrCat("size is ", request.size(), "; it must be greater than zero"));
   }
-  if (!(request.min_frequency_hz() > 0 && request.max_frequency_hz() > request.min_frequency_hz() &&
-        std::isfinite(request.max_frequency_hz()))) {
-    return Invalid(absl::StrCat("the band is ", request.min_frequency_hz(), " to ",
-                                request.max_frequency_hz(),
+  const double high_hz = HighestHz(request);
+  if (!(request.min_frequency_hz() > 0 && high_hz > request.min_frequency_hz() &&
+        std::isfinite(high_hz))) {
+    return Invalid(absl::StrCat("the band is ", request.min_frequency_hz(), " to ", high_hz,
                                 " Hz; it must rise from above zero to a finite frequency"));
   }
   if (request.priority() < -kMostPriority || request.priority() > kMostPriority) {
@@ -100,7 +106,6 @@ absl::StatusOr<v1::CreateModalModelRequest> ResolveRequest(
 absl::Status ResolveUse(v1::CreateModalModelRequest& request) {
   ASSIGN_OR_RETURN(*request.mutable_material(), ResolveMaterial(request.material()));
   if (request.size() == 0) request.set_size(1);
-  if (request.max_frequency_hz() == 0) request.set_max_frequency_hz(20'000);
   if (request.min_frequency_hz() == 0) request.set_min_frequency_hz(20);
   return CheckHints(request);
 }
@@ -123,8 +128,12 @@ double UnitEigenvalue(const v1::CreateModalModelRequest& resolved, double freque
          material.young_pa();
 }
 
+bool LeavesBandOpen(const v1::CreateModalModelRequest& resolved) {
+  return resolved.max_frequency_hz() == 0;
+}
+
 double WantedEigenvalue(const v1::CreateModalModelRequest& resolved) {
-  return UnitEigenvalue(resolved, resolved.max_frequency_hz());
+  return UnitEigenvalue(resolved, HighestHz(resolved));
 }
 
 }  // namespace carillon

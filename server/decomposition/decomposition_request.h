@@ -10,7 +10,7 @@ namespace carillon {
 
 /// A request with every default filled in: material resolved to its figures, Poisson's ratio (from
 /// the material where the settings leave it zero) rounded to 1e-4, element, mass matrix, metres per
-/// unit, size and band.
+/// unit, size and the lower end of the band. A band without an upper end stays open.
 /// Errors: InvalidArgument (INVALID_SETTINGS, UNKNOWN_MATERIAL, INVALID_MATERIAL,
 /// MESH_FORMAT_UNKNOWN), NotFound (MESH_NOT_FOUND: mesh_digest is no digest).
 absl::StatusOr<v1::CreateModalModelRequest> ResolveRequest(
@@ -38,7 +38,12 @@ std::string RequestDigest(const v1::CreateModalModelRequest& resolved);
 /// the hints: Lambda = (2 pi f)^2 rho s^2 / E, the scaling law of modal_model.proto.
 double UnitEigenvalue(const v1::CreateModalModelRequest& resolved, double frequency_hz);
 
-/// Eigenvalue up to which modes are wanted: that of the maximal frequency.
+/// Whether the request leaves the upper end of the band open, so that a costly body may get a lower
+/// one than WantedEigenvalue().
+bool LeavesBandOpen(const v1::CreateModalModelRequest& resolved);
+
+/// Eigenvalue up to which modes are wanted: that of the maximal frequency, or of 20 kHz where the
+/// band is open.
 double WantedEigenvalue(const v1::CreateModalModelRequest& resolved);
 
 }  // namespace carillon

@@ -53,8 +53,14 @@ absl::StatusOr<v1::CreateModalModelRequest> ParseRequest(const JobRecord& record
 }
 
 bool SameHints(const v1::CreateModalModelRequest& a, const v1::CreateModalModelRequest& b) {
-  return WantedEigenvalue(a) == WantedEigenvalue(b) &&
+  return LeavesBandOpen(a) == LeavesBandOpen(b) && WantedEigenvalue(a) == WantedEigenvalue(b) &&
          UnitEigenvalue(a, a.min_frequency_hz()) == UnitEigenvalue(b, b.min_frequency_hz());
+}
+
+bool WantsMore(const v1::CreateModalModelRequest& a, const v1::CreateModalModelRequest& b) {
+  const double wanted = WantedEigenvalue(a);
+  const double other = WantedEigenvalue(b);
+  return wanted > other || (wanted == other && !LeavesBandOpen(a) && LeavesBandOpen(b));
 }
 
 bool DependsOnHints(const std::string& reason) {

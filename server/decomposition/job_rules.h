@@ -23,8 +23,12 @@ JobRecord NewRecord(const WantedJob& wanted, int64_t now_unix_ms);
 /// The request of a job. Errors: DataLoss (DATABASE_CORRUPT).
 absl::StatusOr<v1::CreateModalModelRequest> ParseRequest(const JobRecord& record);
 
-/// Whether both requests want the same band of eigenvalues.
+/// Whether both requests want the same band of eigenvalues, and both or neither leave it open.
 bool SameHints(const v1::CreateModalModelRequest& a, const v1::CreateModalModelRequest& b);
+
+/// Whether `a` wants modes that a job for `b` may leave out: those up to a higher eigenvalue, or
+/// the same ones whatever they cost.
+bool WantsMore(const v1::CreateModalModelRequest& a, const v1::CreateModalModelRequest& b);
 
 /// Whether a refusal depends on the band, so that a request with other hints may succeed.
 bool DependsOnHints(const std::string& reason);

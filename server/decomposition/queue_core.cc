@@ -223,7 +223,7 @@ absl::StatusOr<v1::Job> QueueCore::SubmitAgain(const ActiveJob& active,
                                                const v1::CreateModalModelRequest& request) {
   const std::string& digest = active.record.digest;
   const bool wanted_no_more = active.record.state == v1::JOB_STATE_CANCELLED || active.deleted;
-  const bool farther = WantedEigenvalue(request) > WantedEigenvalue(active.request);
+  const bool farther = WantsMore(request, active.request);
   const bool sooner = request.priority() > active.record.priority;
   if (!wanted_no_more && !farther && !sooner) return Get(digest);
   JobRecord record = active.record;

@@ -55,6 +55,8 @@ absl::StatusOr<bool> IsSatisfied(ModelStore& models, const std::string& digest,
   if (IsCoarseOf(model->header, request)) return false;
   const double wanted = WantedEigenvalue(request) * (1 - kRelativeTolerance);
   if (model->header.complete_to_eigenvalue() >= wanted) return true;
+  // Another computation with an open band would stop as low as this one, whatever the material.
+  if (model->header.lowered_from_mode_count() > 0) return LeavesBandOpen(request);
   if (!record.has_value() || record->state != v1::JOB_STATE_SUCCEEDED) return false;
   const auto ran = ParseRequest(*record);
   return ran.ok() && WantedEigenvalue(*ran) >= wanted;

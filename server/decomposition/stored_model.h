@@ -17,7 +17,8 @@ namespace carillon {
 /// Functions that compare what is stored with what a job is to compute.
 
 /// Whether the stored model is complete up to the eigenvalue that the request wants, or up to where
-/// an earlier job (`record`) that wanted as much could go. Errors: those of ModelStore::Summary but
+/// an earlier job (`record`) that wanted as much could go. A model whose band was lowered satisfies
+/// every request that leaves the band open. Errors: those of ModelStore::Summary but
 /// for a model that is missing or damaged, which satisfies nobody.
 absl::StatusOr<bool> IsSatisfied(ModelStore& models, const std::string& digest,
                                  const std::optional<JobRecord>& record,

@@ -38,6 +38,11 @@ BAD_MESHES = {
 }
 
 
+# The options that help against them.
+REMEDIES = {"MESH_NOT_CLOSED": ["--repair", "--wall"], "MESH_SELF_INTERSECTING": ["--repair"],
+            "MESH_DUPLICATE_SHELL": ["--repair"], "NO_MODE_IN_BAND": ["--unit", "--size", "--band"]}
+
+
 class RefusalTest(DaemonTest):
     @classmethod
     def setUpClass(cls):
@@ -77,6 +82,7 @@ class RefusalTest(DaemonTest):
                 info = self.refusal(lambda data=data: self.client.wait(
                     self.client.create(data, "obj", material=MATERIAL)))
                 self.assertEqual(info.reason, reason)
+                self.assertEqual([remedy.option for remedy in info.remedies], REMEDIES.get(reason, []))
                 self.assert_repairs(info.message)
                 self.assert_plays()
 
@@ -86,12 +92,22 @@ class RefusalTest(DaemonTest):
             with self.subTest(reason):
                 path.write_bytes(data)
                 ended = self.daemon.command("model", "create", path, "--material", meshes.MATERIAL,
-                                            "--wait", check=False)
+                                            "--wait", "--no-repair", check=False)
                 self.assertEqual((ended.returncode, ended.stdout), (1, ""))
-                line = ended.stderr.splitlines()[-1]
+                tries = [line for line in ended.stderr.splitlines() if line.startswith("carillon: try ")]
+                self.assertEqual([line.split()[2].rstrip(":") for line in tries], REMEDIES.get(reason, []))
+                line = ended.stderr.splitlines()[-1 - len(tries)]
                 self.assertTrue(line.startswith(f"carillon: {reason}: "), line)
                 self.assert_repairs(line.removeprefix(f"carillon: {reason}: "))
                 self.assert_plays()
+
+    def test_the_command_line_repairs_what_may_be_repaired_and_says_so(self):
+        path = self.folder / "open.obj"
+        path.write_bytes(BAD_MESHES["MESH_NOT_CLOSED"])
+        ended = self.daemon.command("model", "create", path, "--material", meshes.MATERIAL, "--wait")
+        self.assertIn("asked for again with --repair: MESH_NOT_CLOSED", ended.stderr)
+        self.assertIn("warning: repaired: 1 holes closed", ended.stderr)
+        self.assertTrue(ended.stdout.startswith("modalModels/"), ended.stdout)
 
     def test_by_the_decomposing_program_itself(self):
         path = self.folder / "bad.obj"

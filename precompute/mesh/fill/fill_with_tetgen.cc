@@ -221,7 +221,14 @@ absl::StatusOr<TetMesh> MakeMesh(const Filling& filling) {
 absl::StatusOr<TetMesh> FillWithTetgen(const FillRequest& request) {
   const absl::StatusOr<std::string> bytes =
       RunInChild([&] { return RunTetgen(request); }, kMostCpu);
-  if (!bytes.ok()) return Failed(absl::StrCat("TetGen was ", bytes.status().message()));
+  if (!bytes.ok()) {
+    // The surface has passed every check, and TetGen reports the faults that it finds itself.
+    return Refusal(absl::StatusCode::kInvalidArgument, "MESH_TETRAHEDRALIZATION_FAILED",
+                   absl::StrCat("the mesher TetGen was ", bytes.status().message(),
+                                " with every setting that was tried, which is a fault of TetGen "
+                                "rather than of the surface: ask for another number of nodes, or "
+                                "give a mesh of tetrahedra (Gmsh)"));
+  }
   return MakeMesh(Parse(*bytes));
 }
 

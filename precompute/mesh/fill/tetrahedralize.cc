@@ -264,10 +264,24 @@ class Filler {
                         .keep_surface = true,
                         .max_added_nodes = kMaxMeshNodes / NodesPerCorner(settings_),
                         .cautious = settings_.cautious};
-    absl::StatusOr<TetMesh> mesh = FillAndCheck(request);
-    if (mesh.ok() || keep_surface) return mesh;
-    request.keep_surface = false;
-    return FillAndCheck(request);
+    return FillSomehow(request, keep_surface);
+  }
+
+  /// Fills with the settings asked for, and where the mesher fails, with others. Returns the first
+  /// failure if all fail.
+  absl::StatusOr<TetMesh> FillSomehow(FillRequest request, bool keep_surface) const {
+    absl::StatusOr<TetMesh> first = FillAndCheck(request);
+    const auto try_another = [&](bool keep, bool cautious) {
+      if (first.ok() || absl::IsResourceExhausted(first.status())) return;
+      request.keep_surface = keep;
+      request.cautious = cautious;
+      absl::StatusOr<TetMesh> mesh = FillAndCheck(request);
+      if (mesh.ok()) first = std::move(mesh);
+    };
+    if (!keep_surface) try_another(false, settings_.cautious);
+    if (!settings_.cautious) try_another(true, true);
+    if (!settings_.cautious && !keep_surface) try_another(false, true);
+    return first;
   }
 
   absl::StatusOr<TetMesh> FillAndCheck(const FillRequest& request) const {

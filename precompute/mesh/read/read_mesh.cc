@@ -5,6 +5,7 @@
 #include <array>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -16,6 +17,7 @@
 #include "precompute/mesh/read/medit_file.h"
 #include "precompute/mesh/read/read_surface.h"
 #include "precompute/mesh/read/tetgen_file.h"
+#include "precompute/mesh/read/text_encoding.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 
@@ -116,8 +118,10 @@ absl::StatusOr<NamedMesh> ParseMesh(const std::string& bytes, const std::string&
                      "\": give obj, ply, stl, off, glb or gltf (a surface), msh (Gmsh), mesh "
                      "(Medit), node (TetGen) or inp (Abaqus, CalculiX)"));
   }
+  const std::optional<std::string> text = Utf8OfUtf16(bytes);
+  const std::string& content = text ? *text : bytes;
   ASSIGN_OR_RETURN(NamedMesh named,
-                   is_surface ? ReadSurface(bytes, format) : ReadElements(bytes, format));
+                   is_surface ? ReadSurface(content, format) : ReadElements(content, format));
   Scale(named, metres_per_unit);
   return named;
 }

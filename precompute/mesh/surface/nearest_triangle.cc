@@ -6,6 +6,7 @@
 #include <CGAL/AABB_triangle_primitive.h>
 #include <CGAL/Simple_cartesian.h>
 
+#include <algorithm>
 #include <vector>
 
 #include "precompute/mesh/point_math.h"
@@ -47,6 +48,15 @@ NearestTriangle::Place NearestTriangle::Find(const Point& point) const {
   const Point found = {nearest.x(), nearest.y(), nearest.z()};
   const auto number = static_cast<size_t>(triangle - index_->triangles.cbegin());
   return {index_->numbers[number], found, Distance(point, found)};
+}
+
+double GreatestDistance(const SurfaceMesh& surface, const NearestTriangle& other) {
+  double distance = 0;
+  for (const Point& p : surface.vertices) distance = std::max(distance, other.Find(p).distance_m);
+  for (size_t t = 0; t < surface.triangles.size(); ++t) {
+    distance = std::max(distance, other.Find(MiddleOf(CornersOf(surface, t))).distance_m);
+  }
+  return distance;
 }
 
 }  // namespace carillon::precompute

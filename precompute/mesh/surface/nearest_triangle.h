@@ -27,4 +27,8 @@ class NearestTriangle {
   std::unique_ptr<Index> index_;
 };
 
+/// The greatest distance, metres, of the vertices and the triangles' middles of a surface from
+/// another.
+double GreatestDistance(const SurfaceMesh& surface, const NearestTriangle& other);
+
 }  // namespace carillon::precompute

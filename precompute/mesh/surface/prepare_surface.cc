@@ -2,6 +2,7 @@
 #include "precompute/mesh/surface/prepare_surface.h"
 
 #include <numeric>
+#include <optional>
 #include <utility>
 
 #include "absl/status/status.h"
@@ -9,6 +10,7 @@
 #include "precompute/mesh/point_math.h"
 #include "precompute/mesh/surface/check_surface.h"
 #include "precompute/mesh/surface/make_wall.h"
+#include "precompute/mesh/surface/mend_surface.h"
 #include "precompute/mesh/surface/nearest_triangle.h"
 #include "precompute/mesh/surface/repair_soup.h"
 #include "precompute/mesh/surface/wrap_surface.h"
@@ -47,10 +49,30 @@ std::vector<int32_t> NearestGiven(const SurfaceMesh& surface, const SurfaceMesh&
   return nearest;
 }
 
+/// Mends what CheckSurface finds, a kind of fault at a time, where that leaves the rest of the
+/// surface as it is. Returns the state of the surface after that.
+absl::StatusOr<Warnings> Mend(RepairedSurface& repaired) {
+  absl::StatusOr<Warnings> sound = CheckSurface(repaired.surface);
+  const auto mend = [&](std::optional<RepairedSurface> mended) {
+    if (!mended) return;
+    absl::StatusOr<Warnings> after = CheckSurface(mended->surface);
+    if (ToErrorInfo(after.status()).reason() == ToErrorInfo(sound.status()).reason()) return;
+    repaired.surface = std::move(mended->surface);
+    AddTo(repaired.remarks, mended->remarks);
+    sound = std::move(after);
+  };
+  if (Is(sound.status(), "MESH_NOT_CLOSED")) mend(FillHoles(repaired.surface));
+  if (Is(sound.status(), "MESH_SELF_INTERSECTING") ||
+      Is(sound.status(), "MESH_DEGENERATE_TRIANGLE")) {
+    mend(Untangle(repaired.surface));
+  }
+  return sound;
+}
+
 /// Repairs the surface until it passes the checks, and describes the repairs in `warnings`.
 absl::StatusOr<SurfaceMesh> Repair(const SurfaceMesh& given, Warnings& warnings) {
   RepairedSurface repaired = RepairSoup(given);
-  const absl::StatusOr<Warnings> sound = CheckSurface(repaired.surface);
+  const absl::StatusOr<Warnings> sound = Mend(repaired);
   if (sound.ok()) {
     AddTo(warnings, repaired.remarks);
     AddTo(warnings, *sound);
@@ -58,6 +80,7 @@ absl::StatusOr<SurfaceMesh> Repair(const SurfaceMesh& given, Warnings& warnings)
   }
   if (BeyondRepair(sound.status())) return sound.status();
   ASSIGN_OR_RETURN(RepairedSurface wrapped, WrapSurface(repaired.surface));
+  AddTo(warnings, repaired.remarks);
   AddTo(warnings, wrapped.remarks);
   return std::move(wrapped.surface);
 }

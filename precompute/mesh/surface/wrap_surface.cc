@@ -158,19 +158,10 @@ double SheetPart(const SurfaceMesh& given, const SurfaceMesh& wrap, double offse
   return static_cast<double>(sheet_count) / kSampleCount;
 }
 
-/// The greatest distance of the vertices and the triangles' middles of one surface from another.
-double DistanceFrom(const SurfaceMesh& surface, const NearestTriangle& other) {
-  double distance = 0;
-  for (const Point& p : surface.vertices) distance = std::max(distance, other.Find(p).distance_m);
-  for (size_t t = 0; t < surface.triangles.size(); ++t) {
-    distance = std::max(distance, other.Find(MiddleOf(CornersOf(surface, t))).distance_m);
-  }
-  return distance;
-}
-
 std::string Remark(const SurfaceMesh& wrap, const SurfaceMesh& given, const NearestTriangle& index,
                    double diagonal) {
-  const double out = DistanceFrom(wrap, index), in = DistanceFrom(given, NearestTriangle(wrap));
+  const double out = GreatestDistance(wrap, index);
+  const double in = GreatestDistance(given, NearestTriangle(wrap));
   return absl::StrFormat(
       "the surface was wrapped: %d triangles, at most %.3g m (%.2g of the diagonal) from the given "
       "surface, of which no part is further than %.3g m (%.2g) from them; holes narrower than "

@@ -75,6 +75,33 @@ TEST_F(DecompositionQueueTest, AModelThatGoesNoFartherIsNotComputedForEver) {
   EXPECT_EQ(RunCount(), 1U);
 }
 
+TEST_F(DecompositionQueueTest, AnOpenBandIsNotComputedAgainWhereItWasLowered) {
+  MakeQueue(absl::StrCat(kCount, "case $band in *:20000) cp \"$here/model20\" \"$out\";; ",
+                         "*) cp \"$here/lowered\" \"$out\";; esac"));
+  SubmitAndAwaitEnd(Request(0));
+  v1::CreateModalModelRequest softer = Request(0);
+  softer.set_size(2);
+  for (const v1::CreateModalModelRequest& open : {Request(0), softer}) {
+    EXPECT_EQ(Submit(open).state(), v1::JOB_STATE_SUCCEEDED);
+  }
+  EXPECT_EQ(Submit(Request(4'000)).state(), v1::JOB_STATE_SUCCEEDED);
+  EXPECT_EQ(RunCount(), 1U);
+  // A band that reaches higher is computed, and serves an open one after that.
+  EXPECT_EQ(SubmitAndAwaitEnd(Request(20'000)).state(), v1::JOB_STATE_SUCCEEDED);
+  EXPECT_EQ(RunCount(), 2U);
+  EXPECT_EQ(Submit(Request(0)).state(), v1::JOB_STATE_SUCCEEDED);
+  EXPECT_EQ(RunCount(), 2U);
+}
+
+TEST_F(DecompositionQueueTest, ARefusalOfABandIsNoRefusalOfAnOpenOne) {
+  WriteBytes(folder_ / "events", ErrorBytes("TOO_MANY_MODES"));
+  MakeQueue(absl::StrCat(kCount, "case $band in *:20000) cat \"$here/events\" >&3; exit 1;; ",
+                         "*) cp \"$here/lowered\" \"$out\";; esac"));
+  EXPECT_EQ(SubmitAndAwaitEnd(Request(20'000)).error().reason(), "TOO_MANY_MODES");
+  EXPECT_EQ(SubmitAndAwaitEnd(Request(0)).state(), v1::JOB_STATE_SUCCEEDED);
+  EXPECT_EQ(RunCount(), 2U);
+}
+
 TEST_F(DecompositionQueueTest, ARunningJobIsExtendedByAFartherRequest) {
   const Gate gate(folder_ / "gate");
   MakeQueue(absl::StrCat(kCount, kWaitAtGate, kSucceed));

@@ -75,13 +75,17 @@ class DecompositionQueueTest : public ::testing::Test {
     mesh_ = database_->meshes().Put("solid")->digest;
     WriteModel("model10", 10'000);
     WriteModel("model20", 20'000);
+    WriteModel("lowered", 5'000, 900);
   }
 
-  void WriteModel(const std::string& name, double frequency_hz) {
+  void WriteModel(const std::string& name, double frequency_hz, int lowered_from_mode_count = 0) {
     ModalModel model = SampleModel(3, 4);
     model.complete_to_eigenvalue =
         UnitEigenvalue(*ResolveRequest(SampleRequest(mesh_)), frequency_hz);
-    WriteRecords(folder_ / name, SampleRecords(model));
+    auto records = SampleRecords(model);
+    records.front().mutable_header()->set_lowered_from_mode_count(
+        static_cast<uint32_t>(lowered_from_mode_count));
+    WriteRecords(folder_ / name, records);
   }
 
   void Open(const std::string& name) {

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import grpc
 
@@ -16,13 +16,17 @@ DETAILS_KEY = "grpc-status-details-bin"
 
 class CarillonError(Exception):
     """A refusal. `reason` is stable and one of proto/README.md's; `message` is a sentence that says what was wrong,
-    where, and how to repair it; `metadata` has figures that belong to the reason."""
+    where, and how to repair it; `metadata` has figures that belong to the reason; `remedies` are changes to the
+    request that may help, the most promising first: each has a `field` of CreateModalModelRequest, a `value` in
+    protobuf's text form (empty: the caller chooses), the command line's `option`, and its `effect` in words."""
 
-    def __init__(self, reason: str, message: str, metadata: dict[str, str] | None = None):
+    def __init__(self, reason: str, message: str, metadata: dict[str, str] | None = None,
+                 remedies: Iterable[error_pb2.Remedy] = ()):
         super().__init__(f"{reason}: {message}")
         self.reason = reason
         self.message = message
         self.metadata = metadata or {}
+        self.remedies = list(remedies)
 
 
 class ServerUnavailable(CarillonError):
@@ -46,7 +50,7 @@ def warn_of_contacts(findings: contact_pb2.ContactFindings, rejected_count: int 
 
 
 def from_info(info: error_pb2.ErrorInfo) -> CarillonError:
-    return CarillonError(info.reason, info.message, dict(info.metadata))
+    return CarillonError(info.reason, info.message, dict(info.metadata), info.remedies)
 
 
 def from_rpc(error: grpc.RpcError, server: str) -> CarillonError:

@@ -287,5 +287,24 @@ TEST_F(ReadSurfaceTest, TheBunnyWhoseFilledHolesCrossItIsRefusedBeforeTheMesherC
   EXPECT_THAT(CheckSurface(surface).status().ToString(), HasSubstr("MESH_SELF_INTERSECTING"));
 }
 
+/// The text with a byte order mark, in UTF-16.
+std::string InUtf16(const std::string& ascii, bool big) {
+  std::string bytes = big ? "\xFE\xFF" : "\xFF\xFE";
+  for (const char c : ascii) bytes += big ? std::string{'\0', c} : std::string{c, '\0'};
+  return bytes;
+}
+
+TEST(ParseMesh, TextInUtf16IsReadAsItsLetters) {
+  const std::string obj =
+      "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+  for (const bool big : {false, true}) {
+    const absl::StatusOr<NamedMesh> read = ParseMesh(InUtf16(obj, big), "obj", 1);
+    ASSERT_TRUE(read.ok()) << read.status();
+    EXPECT_EQ(std::get<SurfaceMesh>(read->mesh).triangles.size(), 4U);
+  }
+  // Half a letter at the end is no text.
+  EXPECT_FALSE(ParseMesh(InUtf16(obj, false) + "x", "obj", 1).ok());
+}
+
 }  // namespace
 }  // namespace carillon::precompute

@@ -4,8 +4,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <ranges>
 
 #include "precompute/mesh/point_math.h"
 #include "precompute/mesh/surface/check_surface.h"
@@ -26,6 +28,21 @@ double Volume(const SurfaceMesh& surface) {
   double volume = 0;
   for (const Shell& shell : FindShells(surface)) volume += shell.volume_m3;
   return volume;
+}
+
+/// Moves one vertex of a surface past a neighbour by `depth_m`, so that triangles there cross
+/// others. Returns where.
+Point FoldOver(SurfaceMesh& surface, double depth_m) {
+  const auto [a, b, c] = surface.triangles[10];
+  const Point from = surface.vertices[static_cast<size_t>(a)];
+  const Point to = surface.vertices[static_cast<size_t>(b)];
+  const double length = Distance(from, to);
+  const Point normal = AreaNormal(CornersOf(surface, 10));
+  Point& moved = surface.vertices[static_cast<size_t>(a)];
+  for (size_t i = 0; i < 3; ++i) {
+    moved[i] = to[i] + depth_m * ((to[i] - from[i]) / length - normal[i] / Norm(normal));
+  }
+  return to;
 }
 
 TEST(PrepareSurface, ASoundSurfaceStaysAsItIs) {
@@ -95,6 +112,62 @@ TEST(PrepareSurface, BodiesThatCrossAreUnitedByAWrap) {
   EXPECT_NEAR(Volume(united->surface), volume, 0.01 * volume);
   ASSERT_EQ(united->warnings.size(), 1U);
   EXPECT_THAT(united->warnings[0], HasSubstr("wrapped"));
+}
+
+TEST(PrepareSurface, AWideHoleIsFilledWhereItIs) {
+  const SurfaceMesh ball = MakeSphereSurface(0.1, 3);
+  SurfaceMesh open = ball;
+  std::erase_if(open.triangles, [&](const auto& triangle) {
+    return std::ranges::all_of(triangle, [&](int32_t v) {
+      return Distance(ball.vertices[static_cast<size_t>(v)], ball.vertices[0]) < 0.045;
+    });
+  });
+  ASSERT_LT(open.triangles.size(), ball.triangles.size());
+  const auto filled = PrepareSurface(open, {.repair = true});
+  ASSERT_TRUE(filled.ok()) << filled.status();
+  EXPECT_NEAR(Volume(filled->surface), Volume(ball), 0.01 * Volume(ball));
+  EXPECT_THAT(filled->warnings[0], HasSubstr("holes filled with smooth patches"));
+  // What was given is still there.
+  for (size_t v = 0; v < open.vertices.size(); v += 7) {
+    bool used = false;
+    for (const auto& triangle : open.triangles) {
+      used |= std::ranges::count(triangle, static_cast<int32_t>(v)) > 0;
+    }
+    if (!used) continue;
+    EXPECT_LT(
+        std::ranges::min(filled->surface.vertices | std::views::transform([&](const Point& p) {
+                           return Distance(p, open.vertices[v]);
+                         })),
+        1e-9);
+  }
+}
+
+TEST(PrepareSurface, AVesselIsNotFilledThroughItsMouth) {
+  SurfaceMesh cup = MakeBoxSurface({0.1, 0.1, 0.2});
+  std::erase_if(cup.triangles, [&](const auto& triangle) {
+    return std::ranges::all_of(
+        triangle, [&](int32_t v) { return cup.vertices[static_cast<size_t>(v)][2] > 0.19; });
+  });
+  EXPECT_THAT(PrepareSurface(cup, {.repair = true}).status().ToString(),
+              HasSubstr("MESH_NOT_CLOSED"));
+}
+
+TEST(PrepareSurface, AFoldIsUntangledWhereItIs) {
+  SurfaceMesh ball = MakeSphereSurface(0.1, 5);
+  const double volume = Volume(ball);
+  const Point fold = FoldOver(ball, 3e-6);
+  EXPECT_THAT(PrepareSurface(ball, {}).status().ToString(), HasSubstr("MESH_SELF_INTERSECTING"));
+  const auto untangled = PrepareSurface(ball, {.repair = true});
+  ASSERT_TRUE(untangled.ok()) << untangled.status();
+  EXPECT_NEAR(Volume(untangled->surface), volume, 1e-4 * volume);
+  EXPECT_THAT(untangled->warnings[0], HasSubstr("were replaced"));
+  // Far from the fold nothing has changed.
+  int moved = 0;
+  for (const Point& p : ball.vertices) {
+    if (Distance(p, fold) < 0.05) continue;
+    moved += std::ranges::count(untangled->surface.vertices, p) == 0 ? 1 : 0;
+  }
+  EXPECT_EQ(moved, 0);
 }
 
 TEST(PrepareSurface, BodiesApartAreNotJoined) {

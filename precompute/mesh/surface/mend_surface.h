@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <optional>
+
+#include "precompute/mesh/surface/repair_soup.h"
+#include "precompute/mesh/surface_mesh.h"
+
+namespace carillon::precompute {
+
+/// Repairs of a surface's faults where they are, which leave the rest of it as it is. Both take a
+/// surface whose edges have one or two triangles each, and return nothing where they cannot repair
+/// it so.
+
+/// Fills holes with smooth patches: those with a rim of at most the diagonal's length whose patches
+/// together have at most a twentieth of the area. A wider hole is the mouth of a vessel.
+std::optional<RepairedSurface> FillHoles(const SurfaceMesh& surface);
+
+/// Replaces the triangles about places where a closed surface crosses itself, if no part of the
+/// result is further than a thousandth of the diagonal from the surface, or the reverse.
+std::optional<RepairedSurface> Untangle(const SurfaceMesh& surface);
+
+}  // namespace carillon::precompute
