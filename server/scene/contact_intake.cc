@@ -201,7 +201,7 @@ void ContactIntake::Push(const ContactForces::Events& events) {
 
 void ContactIntake::Push(MixerEvent& event, double frame) {
   // What an earlier step has left may lie before the first frame where steps sound at once.
-  SetFrame(event, std::max(frame, 0.0));
+  event.SetTime(std::max(frame, 0.0));
   target_.Push(event);
 }
 
