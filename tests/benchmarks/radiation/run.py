@@ -4,6 +4,7 @@
 
 Each part prints a Markdown table:
   exact     spheres of every order to 6 against the closed form
+  fork      levels round a tuning fork, near by and far away
   dense     the equation solved by sweeps and GMRES beside its assembled matrix, factorized: spheres and the bodies
   loudness  each body's modes: efficiency, decay by radiation, and by how many dB its pressure at 1 m differs from
             that of the paper's coupling
@@ -168,7 +169,8 @@ def spheres(part):
     return run
 
 
-PARTS = {"exact": spheres("exact"), "dense": dense, "loudness": loudness, "errors": errors, "cost": cost}
+PARTS = {"exact": spheres("exact"), "fork": spheres("fork"), "dense": dense, "loudness": loudness, "errors": errors,
+         "cost": cost}
 
 
 def names(text):
