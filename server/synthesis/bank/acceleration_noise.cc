@@ -166,8 +166,7 @@ AccelerationNoise::Weights AccelerationNoise::WeightsTowards(const Bearing& bear
   return weights;
 }
 
-AccelerationNoise::Weights AccelerationNoise::MeanWeights(
-    const Accelerations& by) const noexcept {
+AccelerationNoise::Weights AccelerationNoise::MeanWeights(const Accelerations& by) const noexcept {
   Weights weights{};
   for (size_t order = 0; order < 2; ++order) {
     double total_square = 0, sum = 0;

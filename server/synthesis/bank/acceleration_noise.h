@@ -44,10 +44,11 @@ struct MovedBody {
 ///   (sum of K exp(p t) - Re(H(i W) exp(i W t)))/T,   K = R W^2/(p (p^2 + W^2)),
 ///
 /// until T, and the sum of K (exp(p t) - exp(p (t - T)))/T afterwards. One recursion a pole serves
-/// all pulses, and each pulse adds a sinusoid while it lasts. A pulse lasts at least two frames, and
-/// one of another shape is taken for the raised cosine of its variance. Its middle lies at the time
-/// of its impulse, as for modes, so that it is to be begun half of PulseFrames before. Neither this
-/// sound nor the onset of modes has the a/c that a wave needs from a body's surface to its centre.
+/// all pulses, and each pulse adds a sinusoid while it lasts. A pulse lasts at least two frames,
+/// and one of another shape is taken for the raised cosine of its variance. Its middle lies at the
+/// time of its impulse, as for modes, so that it is to be begun half of PulseFrames before. Neither
+/// this sound nor the onset of modes has the a/c that a wave needs from a body's surface to its
+/// centre.
 ///
 /// Any thread may make one; then one thread at a time uses it, which neither allocates nor locks.
 class AccelerationNoise {
@@ -61,9 +62,9 @@ class AccelerationNoise {
   /// How long a pulse lasts here, at most 0.15 s, in frames.
   double PulseFrames(Pulse pulse) const noexcept;
 
-  /// Begins the pulse of an impulse at sample `offset` of the next block to render, `lead_frames` (0
-  /// to 1) after its begin. The impulse's vertices must be the body's. `bearing` null: heard without
-  /// directions.
+  /// Begins the pulse of an impulse at sample `offset` of the next block to render, `lead_frames`
+  /// (0 to 1) after its begin. The impulse's vertices must be the body's. `bearing` null: heard
+  /// without directions.
   void Begin(const SurfaceImpulse& impulse, size_t offset, float lead_frames,
              const Bearing* bearing) noexcept;
 

@@ -31,8 +31,8 @@ struct SurfaceImpulse {
   Pulse pulse{};
 };
 
-/// The begin of an impulse's contact. The sound of the body's own acceleration begins then, the modes
-/// at the impulse's time.
+/// The begin of an impulse's contact. The sound of the body's own acceleration begins then, the
+/// modes at the impulse's time.
 struct ContactBegin {
   SurfaceImpulse impulse{};
 };
@@ -77,8 +77,8 @@ struct ListenerMove {
 /// The first audible sample is the first at or after that time; its phase accounts for the part of
 /// a frame between the two.
 struct MixerEvent {
-  using Action = std::variant<SurfaceImpulse, SurfaceForce, ForceKnot, ObjectMove, ListenerMove,
-                              ContactBegin>;
+  using Action =
+      std::variant<SurfaceImpulse, SurfaceForce, ForceKnot, ObjectMove, ListenerMove, ContactBegin>;
 
   BankId bank{};
   uint64_t frame = 0;

@@ -51,8 +51,8 @@ ModeField FieldOf(const ModeRadiation& mode, const SphereGrid& grid) {
     for (size_t i = 0; i < mode.index.size(); ++i) {
       const auto l = static_cast<int>(std::sqrt(static_cast<double>(mode.index[i])));
       const std::complex<double> turn = std::pow(std::complex<double>(0, -1), l + 1);
-      sum += turn / mode.wavenumber * std::complex<double>(mode.value[i]) *
-             harmonics[mode.index[i]];
+      sum +=
+          turn / mode.wavenumber * std::complex<double>(mode.value[i]) * harmonics[mode.index[i]];
     }
     field.pattern.push_back(sum);
   }

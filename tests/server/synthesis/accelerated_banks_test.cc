@@ -40,14 +40,14 @@ struct Integrated {
 };
 
 /// The ball's pressure at 1 m, the mean over all directions, after the equation
-/// y'' = -2 b y' - 2 b^2 y + b f', and the mode's after u'' = 2 sigma u' - (omega^2 + sigma^2) u + f,
-/// for the raised cosine f with its middle at `middle_frame`.
+/// y'' = -2 b y' - 2 b^2 y + b f', and the mode's after u'' = 2 sigma u' - (omega^2 + sigma^2) u +
+/// f, for the raised cosine f with its middle at `middle_frame`.
 Integrated Integrate(double middle_frame, double duration_s, size_t frame_count) {
   constexpr int kSteps = 400;
   const double b = kSoundSpeed / kRadiusM, dt = kTestFrameS / kSteps;
   const double omega = 2 * kPi * kHz, stiffness = omega * omega + kSigma * kSigma;
-  const double click_scale = kAirDensity * kRadiusM * kRadiusM / kFullScalePa /
-                             (kDensity * kSphereM3) / std::sqrt(3.0);
+  const double click_scale =
+      kAirDensity * kRadiusM * kRadiusM / kFullScalePa / (kDensity * kSphereM3) / std::sqrt(3.0);
   const auto force = [&](double t) {
     const double since = t - middle_frame * kTestFrameS;
     if (std::abs(since) > duration_s / 2) return 0.0;
@@ -80,8 +80,7 @@ class Scene {
     OscillatorBankSettings bank;
     if (moves) bank.moved = Ball();
     const SoundingModes modes{.modes = {MakeMode(0, kHz, kSigma, kCoupling)}};
-    bank_ =
-        mixer_.Add(std::make_unique<OscillatorBank>(modes, MakeUniformShapes(1), bank)).value();
+    bank_ = mixer_.Add(std::make_unique<OscillatorBank>(modes, MakeUniformShapes(1), bank)).value();
   }
 
   void Strike(double frame, double duration_s) {
@@ -133,7 +132,8 @@ TEST(AcceleratedBanks, BallAndModeFollowOneForce) {
       ASSERT_TRUE(duration_s > 5e-3 || Peak(right.mode) > peak / 2) << duration_s;
       const auto over = static_cast<size_t>(frame + duration_s / 2 * kTestSampleRateHz) + 1;
       for (size_t n = over; n < sound.size(); ++n) {
-        ASSERT_NEAR(sound[n], right.click[n] + right.mode[n], 2e-3 * peak) << duration_s << " " << n;
+        ASSERT_NEAR(sound[n], right.click[n] + right.mode[n], 2e-3 * peak)
+            << duration_s << " " << n;
       }
       const std::vector<double> click = ClickOf(frame, duration_s, 16);
       for (size_t n = 0; n < click.size(); ++n) {
