@@ -120,8 +120,8 @@ def share(values, bound):
 
 
 def errors(options, folder):
-    print("| body | modes compared | power within 0.5 dB | 95 %, dB | worst, dB | directions within 1.5 dB | worst, dB | "
-          "power, worst over stated | directions, worst over stated | finer surface too large |")
+    print("| body | modes compared | power within 0.5 dB | 95 %, dB | worst, dB | directions within 1.5 dB | "
+          "worst, dB | power, worst over stated | directions, worst over stated | finer surface too large |")
     print("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |")
     for name in options.only:
         found = compare(options, folder, name)
