@@ -155,25 +155,28 @@ nlohmann::json Measure(const SurfaceModes& modes, const RadiationSettings& setti
 }  // namespace carillon::precompute
 
 int main(int argc, char** argv) {
-  using namespace carillon::precompute;
+  namespace precompute = carillon::precompute;
   if (argc != 7) {
     std::fprintf(stderr,
                  "usage: radiation_reference MODEL SPEED_RATIO ACCURACY_DB BUDGET_S EVERY "
                  "GREATEST_VERTEX_COUNT\n");
     return EXIT_FAILURE;
   }
-  const ModalModel model = ValueOrExit(ReadModalModel(argv[1])).model;
-  const SurfaceModes modes{.vertices = model.vertices,
-                           .triangles = model.triangles,
-                           .eigenvalues = model.eigenvalues,
-                           .shapes = model.shapes};
-  const RadiationSettings settings{.speed_ratio = std::atof(argv[2]),
-                                   .air = {},
-                                   .least_wavenumber = kGreatestWavenumber / 1000,
-                                   .greatest_wavenumber = kGreatestWavenumber,
-                                   .goal_db = std::atof(argv[3]),
-                                   .budget_cpu_s = std::atof(argv[4])};
+  const precompute::ModalModel model =
+      precompute::ValueOrExit(precompute::ReadModalModel(argv[1])).model;
+  const precompute::SurfaceModes modes{.vertices = model.vertices,
+                                       .triangles = model.triangles,
+                                       .eigenvalues = model.eigenvalues,
+                                       .shapes = model.shapes};
+  const precompute::RadiationSettings settings{
+      .speed_ratio = std::atof(argv[2]),
+      .air = {},
+      .least_wavenumber = precompute::kGreatestWavenumber / 1000,
+      .greatest_wavenumber = precompute::kGreatestWavenumber,
+      .goal_db = std::atof(argv[3]),
+      .budget_cpu_s = std::atof(argv[4])};
   const auto every = static_cast<size_t>(std::max(1, std::atoi(argv[5])));
-  std::printf("%s\n", Measure(modes, settings, every, std::atoi(argv[6])).dump().c_str());
+  std::printf("%s\n",
+              precompute::Measure(modes, settings, every, std::atoi(argv[6])).dump().c_str());
   return EXIT_SUCCESS;
 }
