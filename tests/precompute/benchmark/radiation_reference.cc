@@ -126,8 +126,8 @@ class Reference {
   SurfaceLevels levels_;
 };
 
-nlohmann::json Measure(const SurfaceModes& modes, const RadiationSettings& settings, size_t every,
-                       int most_vertices) {
+nlohmann::json MeasureBody(const SurfaceModes& modes, const RadiationSettings& settings,
+                           size_t every, int most_vertices) {
   const Transfer transfer = ValueOrExit(ComputeTransfer(modes, settings, [](double) {}));
   Reference reference(modes, transfer);
   nlohmann::json report = {{"cpu_s", transfer.cpu_s}, {"checked", nlohmann::json::array()}};
@@ -177,6 +177,6 @@ int main(int argc, char** argv) {
       .budget_cpu_s = std::atof(argv[4])};
   const auto every = static_cast<size_t>(std::max(1, std::atoi(argv[5])));
   std::printf("%s\n",
-              precompute::Measure(modes, settings, every, std::atoi(argv[6])).dump().c_str());
+              precompute::MeasureBody(modes, settings, every, std::atoi(argv[6])).dump().c_str());
   return EXIT_SUCCESS;
 }
