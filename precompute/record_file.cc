@@ -108,7 +108,8 @@ absl::Status ReadModelRecords(const std::string& path,
   file.SetCloseOnDelete(true);
   v1::ModalModelRecord record;
   bool ended = false;
-  while (ParseDelimitedFromZeroCopyStream(&record, &file, &ended)) {
+  // Parsing merges into what the record held.
+  for (; ParseDelimitedFromZeroCopyStream(&record, &file, &ended); record.Clear()) {
     RETURN_IF_ERROR(CheckHash(record));
     RETURN_IF_ERROR(take(record));
   }

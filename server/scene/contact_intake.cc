@@ -235,7 +235,7 @@ void ContactIntake::Tell(const MixerEvent& event, FoundBlow blow, double frame) 
 
 void ContactIntake::Push(MixerEvent& event, double frame) {
   // What an earlier step has left may lie before the first frame where steps sound at once.
-  SetFrame(event, std::max(frame, 0.0));
+  event.SetTime(std::max(frame, 0.0));
   target_.Push(event);
 }
 

@@ -35,7 +35,6 @@ MixerSettings SettingsOf(const OfflineSettings& settings, SectionThreads& thread
           .most_buses = 1,
           .stagger = settings.stagger,
           .most_streams = 1,
-          .most_pending_events = kOfflineQueueCapacity,
           .most_events_per_block = kOfflineQueueCapacity,
           .gain = settings.gain,
           .full_scale_pa = settings.full_scale_pa,
@@ -49,6 +48,16 @@ IntakeSettings IntakeSettingsOf(const OfflineSettings& settings, std::vector<Fou
           .most_ahead_s = OfflineRenderer::kMaxTimeS - settings.mapping.first_time_s,
           .reading = settings.reading,
           .blows = settings.tells_blows ? &blows : nullptr};
+}
+
+/// No contact begins longer than this before its impulse.
+uint64_t LongestContactFrames(std::span<const MixerEvent> events, double sample_rate_hz) {
+  float longest_s = 0;
+  for (const MixerEvent& event : events) {
+    if (event.impulse() == nullptr) continue;
+    longest_s = std::max(longest_s, event.impulse()->pulse.duration_s());
+  }
+  return static_cast<uint64_t>(std::ceil(longest_s * sample_rate_hz)) + 1;
 }
 
 bool IsMove(const MixerEvent& event) {
@@ -116,6 +125,7 @@ size_t OfflineRenderer::Render(std::span<float> samples) {
     std::ranges::stable_sort(events(), {}, &MixerEvent::FirstSample);
     const auto last = std::find_if_not(events().rbegin(), events().rend(), IsMove);
     contact_count_ = static_cast<size_t>(events().rend() - last);
+    ahead_frame_count_ = LongestContactFrames(events(), mixer_.settings().sample_rate_hz);
   }
   begun_ = true;
   const FlushDenormals flush;
@@ -165,7 +175,7 @@ size_t OfflineRenderer::CountBlocks(size_t most) const {
   size_t count = std::min<size_t>({most, kBlocksTogether, left / kBlockFrameCount + 1});
   const size_t full = pushed_count_ + kOfflineQueueCapacity / 2;
   while (count > 1 && full < events().size() &&
-         events()[full].FirstSample() < first + count * kBlockFrameCount) {
+         events()[full].FirstSample() < first + count * kBlockFrameCount + ahead_frame_count_) {
     --count;
   }
   return count;
@@ -178,9 +188,14 @@ uint64_t OfflineRenderer::EndFrame() const {
   return last + static_cast<uint64_t>(std::ceil(tail_s * settings_.sample_rate_hz));
 }
 
+/// Pushes the events before `frame`, and as many as find room of those whose contacts may begin
+/// before it.
 void OfflineRenderer::PushEventsBefore(uint64_t frame) {
-  while (pushed_count_ < events().size() && events()[pushed_count_].FirstSample() < frame) {
-    if (!stream_->TryPush(events()[pushed_count_])) {
+  while (pushed_count_ < events().size()) {
+    const MixerEvent& event = events()[pushed_count_];
+    if (event.FirstSample() >= frame + ahead_frame_count_) return;
+    if (!stream_->TryPush(event)) {
+      if (event.FirstSample() >= frame) return;
       intake_.Reject(1, Refusal(absl::StatusCode::kResourceExhausted, "TRACE_TOO_LARGE",
                                 absl::StrCat("over ", kOfflineQueueCapacity,
                                              " events fall into one block; render fewer objects")));

@@ -126,6 +126,7 @@ class OfflineRenderer {
   ContactIntake intake_;
   size_t pushed_count_ = 0;
   size_t contact_count_ = 0;  // events up to the last that is no move
+  uint64_t ahead_frame_count_ = 0;
   uint64_t quiet_frame_count_ = 0;
   bool begun_ = false;
   bool ended_ = false;

@@ -144,16 +144,36 @@ void Mixer::Take(MixerEvent& event, EventQueue& queue) noexcept {
   }
   const bool known = slot != nullptr && !slot->fading;
   const bool shed_early = known && IsShedEarly(event, *slot);
-  if (!known || (!shed_early && !pending_.TryPush(event, buses_[slot->bus]->stop_count))) {
+  if (!known || (!shed_early && !Await(event, *slot))) {
     Count(queue.dropped_count);
     return Count(statistics_.dropped_count);
   }
   Count(statistics_.shed_count, shed_early ? 1 : 0);
-  if (!shed_early) ++slot->pending_count;
   if (event.impulse() == nullptr) return;
   const bool counts_as_late = late && queue.timely;
   Count(counts_as_late ? queue.late_count : queue.accepted_count);
   Count(counts_as_late ? statistics_.late_count : statistics_.accepted_count);
+}
+
+/// Keeps an event until its block, and the begin of its contact if the bank sounds from then on.
+/// False: there are too many.
+bool Mixer::Await(MixerEvent& event, BankSlot& slot) noexcept {
+  const SurfaceImpulse* impulse = event.impulse();
+  const double lead = impulse != nullptr ? slot.bank->ContactLeadFrames(impulse->pulse) : 0;
+  const auto now = static_cast<double>(block_start_);
+  // A contact that would have begun already begins now.
+  if (lead > 0 && event.Time() - lead < now) event.SetTime(now + lead);
+  const auto push = [&](const MixerEvent& awaited) ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole) {
+    const bool pushed = pending_.TryPush(awaited, buses_[slot.bus]->stop_count);
+    if (pushed) ++slot.pending_count;
+    return pushed;
+  };
+  if (!push(event)) return false;
+  if (!(lead > 0)) return true;
+  MixerEvent begin = event;
+  begin.action = ContactBegin{*impulse};
+  begin.SetTime(std::max(event.Time() - lead, now));
+  return push(begin);
 }
 
 /// Whether an impulse is so quiet that keeping and judging it would be a waste: see
@@ -238,19 +258,19 @@ void Mixer::ChooseEvents(uint32_t block, std::span<const uint32_t> due) noexcept
       continue;
     }
     --slot->pending_count;
+    const bool strikes = event.impulse() != nullptr;
+    const SurfaceImpulse* impulse = strikes ? event.impulse() : event.beginning();
     // A bus that was stopped renders no impulse that came before.
-    if (event.impulse() != nullptr && pending_.tag(index) != buses_[slot->bus]->stop_count) {
-      continue;
-    }
+    if (impulse != nullptr && pending_.tag(index) != buses_[slot->bus]->stop_count) continue;
     Treatment treatment = Treatment::kExact;
-    if (budget_.bounded() && event.impulse() != nullptr) {
-      treatment = triage_.Treat(LoudnessOf(*event.impulse(), *slot));
+    if (budget_.bounded() && impulse != nullptr) {
+      treatment = triage_.Treat(LoudnessOf(*impulse, *slot));
     }
     if (treatment == Treatment::kShed) {
-      Count(statistics_.shed_count);
+      Count(statistics_.shed_count, strikes ? 1 : 0);
       continue;
     }
-    const bool merged = treatment == Treatment::kMerged;
+    const bool merged = strikes && treatment == Treatment::kMerged;
     Count(statistics_.merged_count, merged ? 1 : 0);
     due_order_.push_back(RenderOrder({.section = slot->section,
                                       .block = block,

@@ -246,6 +246,7 @@ class Mixer {
   float LoudnessOf(const SurfaceImpulse& impulse, const BankSlot& slot) const noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   double LoudestSquared(uint32_t slot) const noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  bool Await(MixerEvent& event, BankSlot& slot) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   bool IsShedEarly(const MixerEvent& event, const BankSlot& slot) const noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void RenderOneSection(size_t thread, MixedSection& mixed, size_t frame_count) noexcept

@@ -35,7 +35,8 @@ size_t CountImpulses(std::span<const DueEvent> events) {
 
 /// Whether the event can make a silent bank sound. A force takes effect at its knot.
 bool CanAwaken(const MixerEvent& event) {
-  return event.impulse() != nullptr || std::holds_alternative<ForceKnot>(event.action);
+  return event.impulse() != nullptr || event.beginning() != nullptr ||
+         std::holds_alternative<ForceKnot>(event.action);
 }
 
 }  // namespace
@@ -116,6 +117,9 @@ bool RenderSection::Apply(BankSlot& slot, std::span<const DueEvent> due) noexcep
   if (first.merged) return bank.StrikeMerged(due, mix_);
   if (const SurfaceImpulse* impulse = event.impulse()) {
     return bank.Strike(*impulse, first.offset, event.LeadFrames(), mix_);
+  }
+  if (const SurfaceImpulse* impulse = event.beginning()) {
+    return bank.BeginContact(*impulse, first.offset, event.LeadFrames());
   }
   if (const auto* force = std::get_if<SurfaceForce>(&event.action)) return bank.AddForce(*force);
   if (const auto* knot = std::get_if<ForceKnot>(&event.action)) {

@@ -17,7 +17,7 @@ using Complex = std::complex<double>;
 using Vector = std::array<double, 3>;
 
 constexpr double kPi = std::numbers::pi;
-constexpr double kShortestPulseFrames = 2;
+constexpr double kShortestPulseFrames = 2, kLongestPulseS = 0.15;
 /// A state below -160 dB of full scale is silent.
 constexpr double kSilence = 1e-8;
 /// Index of the dipole's and of the quadrupole's first harmonic, and the end of the latter's.
@@ -95,32 +95,40 @@ void AccelerationNoise::AddPoles(size_t source, double speed_per_radius) {
   add(kRealRoot, residue(kRealRoot));
 }
 
-void AccelerationNoise::Push(const TrianglePoint& at,
-                             const std::array<float, 3>& impulse_newton_seconds) noexcept {
-  Vector arm{}, impulse{};
+/// The six accelerations at w = 1.
+AccelerationNoise::Accelerations AccelerationNoise::AccelerationsBy(
+    const SurfaceImpulse& impulse) const noexcept {
+  Vector arm{}, newton_seconds{};
   for (size_t axis = 0; axis < 3; ++axis) {
     for (size_t i = 0; i < 3; ++i) {
-      arm[axis] += moved_.size * at.weights[i] * moved_.vertices[at.vertices[i]][axis];
+      const std::array<float, 3>& vertex = moved_.vertices[impulse.at.vertices[i]];
+      arm[axis] += moved_.size * impulse.at.weights[i] * vertex[axis];
     }
     arm[axis] -= moved_.body.center_of_mass_m[axis];
-    impulse[axis] = impulse_newton_seconds[axis];
+    newton_seconds[axis] = impulse.impulse_newton_seconds[axis];
   }
-  const Vector moment = Cross(arm, impulse);
+  const Vector moment = Cross(arm, newton_seconds);
+  Accelerations by{};
   for (size_t axis = 0; axis < 3; ++axis) {
-    pushed_[axis] += impulse[axis] / (moved_.density_kg_per_m3 * moved_.body.volume_m3);
-    for (size_t i = 0; i < 3; ++i) pushed_[3 + axis] += inverse_[3 * axis + i] * moment[i];
+    by[axis] = newton_seconds[axis] / (moved_.density_kg_per_m3 * moved_.body.volume_m3);
+    for (size_t i = 0; i < 3; ++i) by[3 + axis] += inverse_[3 * axis + i] * moment[i];
   }
+  return by;
 }
 
-void AccelerationNoise::Begin(Pulse pulse, size_t offset, float lead_frames,
+double AccelerationNoise::PulseFrames(Pulse pulse) const noexcept {
+  const double told_s = Pulse::OfVariance(pulse.variance_s2(), Pulse()).duration_s();
+  return std::fmin(std::fmax(told_s * rate_, kShortestPulseFrames), kLongestPulseS * rate_);
+}
+
+void AccelerationNoise::Begin(const SurfaceImpulse& impulse, size_t offset, float lead_frames,
                               const Bearing* bearing) noexcept {
-  const Weights weights = bearing != nullptr ? WeightsTowards(*bearing) : MeanWeights();
-  pushed_ = {};
+  const Accelerations by = AccelerationsBy(impulse);
+  const Weights weights = bearing != nullptr ? WeightsTowards(*bearing, by) : MeanWeights(by);
   double magnitude = 0;
   for (const double weight : weights) magnitude += std::abs(weight);
   if (!(magnitude > 0) || !std::isfinite(magnitude) || pulses_.size() == kMostPulses) return;
-  const double told_s = Pulse::OfVariance(pulse.variance_s2(), Pulse()).duration_s();
-  const double duration_s = std::max(told_s, kShortestPulseFrames / rate_);
+  const double duration_s = PulseFrames(impulse.pulse) / rate_;
   const double end = static_cast<double>(offset) - lead_frames + duration_s * rate_;
   const double rad_per_s = 2 * kPi / duration_s;
   ActivePulse active{.begin = offset,
@@ -143,7 +151,8 @@ void AccelerationNoise::Begin(Pulse pulse, size_t offset, float lead_frames,
   pulses_.push_back(active);
 }
 
-AccelerationNoise::Weights AccelerationNoise::WeightsTowards(const Bearing& bearing) noexcept {
+AccelerationNoise::Weights AccelerationNoise::WeightsTowards(const Bearing& bearing,
+                                                             const Accelerations& by) noexcept {
   basis_.Evaluate(bearing.direction);
   Weights weights{};
   for (size_t source = 0; source < kSources; ++source) {
@@ -152,12 +161,12 @@ AccelerationNoise::Weights AccelerationNoise::WeightsTowards(const Bearing& bear
     for (size_t i = kFirstHarmonic[source % 2]; i < kFirstHarmonic[source % 2 + 1]; ++i) {
       pattern += motion.strengths[i] * basis_.values()[i];
     }
-    weights[source] = scale_ * pushed_[source / 2] * Square(motion.radius_m) * pattern;
+    weights[source] = scale_ * by[source / 2] * Square(motion.radius_m) * pattern;
   }
   return weights;
 }
 
-AccelerationNoise::Weights AccelerationNoise::MeanWeights() const noexcept {
+AccelerationNoise::Weights AccelerationNoise::MeanWeights(const Accelerations& by) const noexcept {
   Weights weights{};
   for (size_t order = 0; order < 2; ++order) {
     double total_square = 0, sum = 0;
@@ -165,7 +174,7 @@ AccelerationNoise::Weights AccelerationNoise::MeanWeights() const noexcept {
       double harmonic = 0;
       for (size_t motion = 0; motion < kMotions; ++motion) {
         const RigidRadiation::Motion& of = moved_.body.motions[motion];
-        const double part = pushed_[motion] * Square(of.radius_m) * of.strengths[i];
+        const double part = by[motion] * Square(of.radius_m) * of.strengths[i];
         harmonic += part;
         weights[2 * motion + order] += part * part;
       }

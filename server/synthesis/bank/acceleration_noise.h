@@ -45,8 +45,10 @@ struct MovedBody {
 ///
 /// until T, and the sum of K (exp(p t) - exp(p (t - T)))/T afterwards. One recursion a pole serves
 /// all pulses, and each pulse adds a sinusoid while it lasts. A pulse lasts at least two frames,
-/// begins at the time of its impulse, and one of another shape is taken for the raised cosine of
-/// its variance.
+/// and one of another shape is taken for the raised cosine of its variance. Its middle lies at the
+/// time of its impulse, as for modes, so that it is to be begun half of PulseFrames before. Neither
+/// this sound nor the onset of modes has the a/c that a wave needs from a body's surface to its
+/// centre.
 ///
 /// Any thread may make one; then one thread at a time uses it, which neither allocates nor locks.
 class AccelerationNoise {
@@ -57,16 +59,14 @@ class AccelerationNoise {
   /// `samples_per_pascal` includes the object's gain.
   AccelerationNoise(const MovedBody& moved, double sample_rate_hz, double samples_per_pascal);
 
-  /// Adds an impulse at one point to the six accelerations of the next pulse. The vertices must be
-  /// the body's.
-  void Push(const TrianglePoint& at, const std::array<float, 3>& impulse_newton_seconds) noexcept;
+  /// How long a pulse lasts here, at most 0.15 s, in frames.
+  double PulseFrames(Pulse pulse) const noexcept;
 
-  /// Forgets the accelerations that were pushed.
-  void Forget() noexcept { pushed_ = {}; }
-
-  /// Begins a pulse with the accelerations that were pushed, as for OscillatorBank::Strike.
-  /// `bearing` null: heard without directions.
-  void Begin(Pulse pulse, size_t offset, float lead_frames, const Bearing* bearing) noexcept;
+  /// Begins the pulse of an impulse at sample `offset` of the next block to render, `lead_frames`
+  /// (0 to 1) after its begin. The impulse's vertices must be the body's. `bearing` null: heard
+  /// without directions.
+  void Begin(const SurfaceImpulse& impulse, size_t offset, float lead_frames,
+             const Bearing* bearing) noexcept;
 
   /// Adds a block to `frames`.
   void RenderAdd(std::span<float> frames) noexcept;
@@ -105,9 +105,12 @@ class AccelerationNoise {
     Weights weights{};
   };
 
+  using Accelerations = std::array<double, kMotions>;
+
   void AddPoles(size_t source, double speed_per_radius);
-  Weights WeightsTowards(const Bearing& bearing) noexcept;
-  Weights MeanWeights() const noexcept;
+  Accelerations AccelerationsBy(const SurfaceImpulse& impulse) const noexcept;
+  Weights WeightsTowards(const Bearing& bearing, const Accelerations& by) noexcept;
+  Weights MeanWeights(const Accelerations& by) const noexcept;
   Number ResponseAt(size_t source, double rad_per_s) const noexcept;
   void Kick(const ActivePulse& pulse, double sign, double time_s) noexcept;
   size_t StartAndEndPulses(size_t at, size_t frame_count) noexcept;
@@ -122,7 +125,6 @@ class AccelerationNoise {
   size_t pole_count_ = 0;
   HarmonicBasis basis_{2};
   FixedVector<ActivePulse> pulses_{kMostPulses};
-  std::array<double, kMotions> pushed_{};
   bool decaying_ = false;
 };
 

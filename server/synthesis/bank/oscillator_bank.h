@@ -100,6 +100,15 @@ class OscillatorBank {
   bool StrikeMerged(std::span<const DueEvent> events, BlockMix& mix) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
+  /// Frames from the begin of an impulse's contact to its time, if the bank is to be told when
+  /// contacts begin; zero: it is not.
+  double ContactLeadFrames(Pulse pulse) const noexcept;
+
+  /// Begins the sound of the body's acceleration by an impulse whose contact begins at sample
+  /// `offset`, as for Strike. False: it names no vertex of the body, and has no effect.
+  bool BeginContact(const SurfaceImpulse& impulse, size_t offset, float lead_frames) noexcept
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+
   /// The rows of the shape table that these events, one or several merged, will read.
   StrikeBatch::RowsAhead RowsOf(std::span<const DueEvent> events) const noexcept;
 
@@ -228,7 +237,6 @@ class OscillatorBank {
   bool RenderModes(BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   bool RenderModesInTime(BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void RenderAcceleration(BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
-  bool Accelerate(bool struck, Pulse pulse, size_t offset, float lead_frames) noexcept;
   void SetSegments(const LanePlan& plan);
   void MeasureLoudness(const LanePlan& plan);
   double TimeWork(size_t lane_count) const noexcept;

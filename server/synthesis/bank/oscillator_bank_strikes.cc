@@ -91,24 +91,19 @@ bool OscillatorBank::StrikeMerged(std::span<const DueEvent> events, BlockMix& mi
     if (weight > most_weight) shape = impulse->pulse;
     most_weight = std::max(most_weight, weight);
     AddVertex(nearest, 1, impulse->impulse_newton_seconds, projection);
-    if (moved_ != nullptr) {
-      moved_->Push({.vertices = {nearest, nearest, nearest}, .weights = {1, 0, 0}},
-                   impulse->impulse_newton_seconds);
-    }
     if (projection.row_count < projection.rows.size()) continue;
     strike_kernel::Project(projection, modal_impulses);
     projection.row_count = 0;
     projection.add = true;
   }
-  if (!(weight_sum > 0) || !std::isfinite(weight_sum)) return Accelerate(false, {}, 0, 0);
+  if (!(weight_sum > 0) || !std::isfinite(weight_sum)) return false;
   if (projection.row_count > 0) strike_kernel::Project(projection, modal_impulses);
   const double time = time_sum / weight_sum;
   const double offset = std::max(std::ceil(time), 0.0);
   const Pulse pulse = Pulse::OfVariance(static_cast<float>(variance_sum / weight_sum), shape);
   const auto lead_frames = static_cast<float>(offset - time);
-  const bool struck = StrikeModes({modal_impulses, column_count_}, static_cast<size_t>(offset),
-                                  OnsetOf(lead_frames, pulse), mix);
-  return Accelerate(struck, pulse, static_cast<size_t>(offset), lead_frames);
+  return StrikeModes({modal_impulses, column_count_}, static_cast<size_t>(offset),
+                     OnsetOf(lead_frames, pulse), mix);
 }
 
 bool OscillatorBank::Strike(const SurfaceImpulse& impulse, size_t offset, float lead_frames,
@@ -118,21 +113,20 @@ bool OscillatorBank::Strike(const SurfaceImpulse& impulse, size_t offset, float 
   if (!projection) return false;
   float* modal_impulses = mix.batch().modal_impulses();
   strike_kernel::Project(*projection, modal_impulses);
-  if (moved_ != nullptr) moved_->Push(impulse.at, impulse.impulse_newton_seconds);
-  const bool struck = StrikeModes({modal_impulses, column_count_}, offset,
-                                  OnsetOf(lead_frames, impulse.pulse), mix);
-  return Accelerate(struck, impulse.pulse, offset, lead_frames);
+  return StrikeModes({modal_impulses, column_count_}, offset, OnsetOf(lead_frames, impulse.pulse),
+                     mix);
 }
 
-/// Begins the sound of the acceleration by the impulses that were pushed, if they `struck` the
-/// modes, too; returns that.
-bool OscillatorBank::Accelerate(bool struck, Pulse pulse, size_t offset,
-                                float lead_frames) noexcept {
-  if (moved_ == nullptr) return struck;
-  const Bearing* bearing = gains_ == nullptr ? nullptr : &gains_->bearing();
-  if (struck) moved_->Begin(pulse, offset, lead_frames, bearing);
-  moved_->Forget();
-  return struck;
+double OscillatorBank::ContactLeadFrames(Pulse pulse) const noexcept {
+  return moved_ == nullptr ? 0 : moved_->PulseFrames(pulse) / 2;
+}
+
+bool OscillatorBank::BeginContact(const SurfaceImpulse& impulse, size_t offset,
+                                  float lead_frames) noexcept {
+  const auto known = [this](uint32_t vertex) { return vertex < shapes_.vertex_count(); };
+  if (moved_ == nullptr || !std::ranges::all_of(impulse.at.vertices, known)) return false;
+  moved_->Begin(impulse, offset, lead_frames, gains_ == nullptr ? nullptr : &gains_->bearing());
+  return true;
 }
 
 bool OscillatorBank::StrikeModes(std::span<const float> modal_impulses, size_t offset,

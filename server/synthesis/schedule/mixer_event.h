@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <type_traits>
 #include <variant>
@@ -28,6 +29,12 @@ struct SurfaceImpulse {
   TrianglePoint at{};
   std::array<float, 3> impulse_newton_seconds{};  ///< in the object's frame
   Pulse pulse{};
+};
+
+/// The begin of an impulse's contact. The sound of the body's own acceleration begins then, the
+/// modes at the impulse's time.
+struct ContactBegin {
+  SurfaceImpulse impulse{};
 };
 
 /// The force of one sustained contact at a point of the sounding surface. The mixer adds it to the
@@ -70,12 +77,24 @@ struct ListenerMove {
 /// The first audible sample is the first at or after that time; its phase accounts for the part of
 /// a frame between the two.
 struct MixerEvent {
-  using Action = std::variant<SurfaceImpulse, SurfaceForce, ForceKnot, ObjectMove, ListenerMove>;
+  using Action =
+      std::variant<SurfaceImpulse, SurfaceForce, ForceKnot, ObjectMove, ListenerMove, ContactBegin>;
 
   BankId bank{};
   uint64_t frame = 0;
   float fraction = 0;  ///< 0 <= fraction < 1
   Action action{};
+
+  /// The event's time in frames.
+  double Time() const noexcept { return static_cast<double>(frame) + double{fraction}; }
+
+  /// Sets the event's time to `frames`, zero or more.
+  void SetTime(double frames) noexcept {
+    const double whole = std::floor(frames);
+    frame = static_cast<uint64_t>(whole);
+    // The cast may round 1 - 1e-9 up to 1.
+    fraction = std::fmin(static_cast<float>(frames - whole), 0x1.fffffep-1F);
+  }
 
   /// Number of the first audible sample.
   uint64_t FirstSample() const noexcept { return frame + (fraction > 0 ? 1 : 0); }
@@ -85,6 +104,12 @@ struct MixerEvent {
 
   /// The impulse; null for another kind of event.
   const SurfaceImpulse* impulse() const noexcept { return std::get_if<SurfaceImpulse>(&action); }
+
+  /// The impulse of a contact that begins; null for another kind of event.
+  const SurfaceImpulse* beginning() const noexcept {
+    const auto* begin = std::get_if<ContactBegin>(&action);
+    return begin != nullptr ? &begin->impulse : nullptr;
+  }
 };
 
 // Queues between threads copy events bytewise; each event fills one cache line.

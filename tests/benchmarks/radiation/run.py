@@ -4,14 +4,16 @@
 
 Each part prints a Markdown table:
   exact     spheres of every order to 6 against the closed form
-  dense     the equation solved by sweeps and GMRES beside its assembled matrix, factorized
+  fork      levels round a tuning fork, near by and far away
+  dense     the equation solved by sweeps and GMRES beside its assembled matrix, factorized: spheres and the bodies
   loudness  each body's modes: efficiency, decay by radiation, and by how many dB its pressure at 1 m differs from
             that of the paper's coupling
-  errors    modes solved to --goal against the same to --reference: true and stated errors, of those modes that were
-            then solved on surfaces at least twice as fine
+  errors    every --every-th mode, as computed with --goal, against itself on a surface with edges half as long:
+            true and stated errors
   cost      CPU and wall seconds with one thread and with two
 
-What one part has computed is used by the next. A reference takes long: --band chooses some of the modes.
+What one part has computed is used by the next. `--every 1` compares all modes, which takes long. Of the parts dense
+and errors only those modes of a body count whose finer surface has at most --most-vertices.
 """
 
 import argparse
@@ -25,10 +27,11 @@ import tempfile
 import time
 import typing
 
-sys.path.insert(0, str(pathlib.Path(__file__).parents[1] / "decomposition"))
+sys.path[:0] = [str(pathlib.Path(__file__).parents[1] / folder) for folder in ("decomposition", "truth")]
 import bodies  # noqa: E402
+import catalogue  # noqa: E402
 
-AIR_DENSITY = 1.204
+AIR_DENSITY, SOUND_SPEED = 1.204, 343
 PASCALS_PER_COUPLING = AIR_DENSITY * 2 * math.pi * 1000 / (4 * math.pi)  # server/synthesis/bank/level.h
 
 BODIES = {"chime": (lambda: bodies.tube(.403, 24, 64), "chime_aluminum"),
@@ -85,23 +88,68 @@ def loudness(options, folder):
                   f"{change:+.1f} | {found['decay_rate_per_s']:.3g} | {found['power_error_db']:.2f} |", flush=True)
 
 
+@functools.cache
+def model_of(build, folder, name):
+    """A stored model whose modes are exact enough for comparisons with themselves."""
+    make, material = BODIES[name]
+    mesh, model = folder / f"{name}.obj", folder / f"{name}.model"
+    bodies.write_obj(mesh, *make())
+    command = [build / "bin/carillon-precompute", mesh, "--out", model, "--material", material, "--accuracy", "5%",
+               "--band", "20:20000"]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    return model
+
+
+@functools.cache
+def reference_of(build, folder, name, limits):
+    """What tests/radiation_reference finds for a body, with its last four arguments."""
+    material = catalogue.read()[BODIES[name][1]]
+    speed_ratio = math.sqrt(material.young_pa / material.density_kg_per_m3) / SOUND_SPEED
+    command = [build / "tests/radiation_reference", model_of(build, folder, name), speed_ratio, *limits]
+    done = subprocess.run([str(word) for word in command], check=True, stdout=subprocess.PIPE)
+    return json.loads(done.stdout)
+
+
+def compare(options, folder, name):
+    return reference_of(options.build, folder, name,
+                        (options.goal, options.budget, options.every, options.most_vertices))
+
+
+def share(values, bound):
+    return f"{100 * sum(value <= bound for value in values) / len(values):.0f} %"
+
+
 def errors(options, folder):
-    print("| body | modes on surfaces twice as fine | median, dB | 95 %, dB | worst, dB | worst over stated |")
-    print("| --- | --- | --- | --- | --- | --- |")
+    print("| body | modes compared | power within 0.5 dB | 95 %, dB | worst, dB | directions within 1.5 dB | "
+          "worst, dB | power, worst over stated | directions, worst over stated | finer surface too large |")
+    print("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |")
     for name in options.only:
-        coarse = radiate(options, folder, name, options.goal)["modes"]
-        fine = radiate(options, folder, name, options.reference)["modes"]
-        pairs = [(a["radiation"], b["radiation"]) for a, b in zip(coarse, fine)]
-        pairs = [(a, b) for a, b in pairs if a["computed"] and b["computed"] and 1.9 * b["edge_m"] < a["edge_m"]]
-        off = [(abs(2 * decibels(a["pressure_at_1m_pa"] / b["pressure_at_1m_pa"])), a["power_error_db"])
-               for a, b in pairs]
-        if not off:
-            print(f"| {name} | 0 | | | | |")
+        found = compare(options, folder, name)
+        modes = found["checked"]
+        if not modes:
+            print(f"| {name} | 0 of {found['computed']} | | | | | | | | {found['too_large']} |", flush=True)
             continue
-        true = sorted(error for error, _ in off)
-        print(f"| {name} | {len(off)} of {len(coarse)} | {true[len(true) // 2]:.2f} | "
-              f"{true[int(.95 * len(true))]:.2f} | {true[-1]:.2f} | "
-              f"{max(error / stated for error, stated in off):.2f} |", flush=True)
+        power = sorted(abs(mode["power_db"]) for mode in modes)
+        direction = sorted(mode["direction_db"] for mode in modes)
+        over = {kind: max(abs(mode[f"{kind}_db"]) / mode[f"stated_{kind}_db"] for mode in modes)
+                for kind in ("power", "direction")}
+        print(f"| {name} | {len(modes)} of {found['computed']} | {share(power, .5)} | "
+              f"{power[int(.95 * len(power))]:.2f} | {power[-1]:.2f} | {share(direction, 1.5)} | {direction[-1]:.2f} | "
+              f"{over['power']:.2f} | {over['direction']:.2f} | {found['too_large']} |", flush=True)
+
+
+def dense(options, folder):
+    print("Spheres\n")
+    spheres("dense")(options, folder)
+    print("\nBodies: one mode by sweeps and GMRES, and on the same surface by its assembled matrix\n")
+    print("| body | all modes, CPU s | modes | vertices | iterations | sweeps, CPU s | assembly, CPU s | LU, CPU s |")
+    print("| --- | --- | --- | --- | --- | --- | --- | --- |")
+    for name in options.only:
+        found = compare(options, folder, name)
+        one = found.get("dense")
+        if one:
+            print(f"| {name} | {found['cpu_s']:.1f} | {found['computed']} | {one['vertices']} | {one['iterations']} | "
+                  f"{one['sweeps_s']:.2f} | {one['assembly_s']:.1f} | {one['factors_s']:.1f} |", flush=True)
 
 
 def cost(options, folder):
@@ -121,7 +169,8 @@ def spheres(part):
     return run
 
 
-PARTS = {"exact": spheres("exact"), "dense": spheres("dense"), "loudness": loudness, "errors": errors, "cost": cost}
+PARTS = {"exact": spheres("exact"), "fork": spheres("fork"), "dense": dense, "loudness": loudness, "errors": errors,
+         "cost": cost}
 
 
 def names(text):
@@ -134,7 +183,8 @@ def main():
     parser.add_argument("--parts", type=names, default=list(PARTS), help="some of " + ",".join(PARTS))
     parser.add_argument("--only", type=names, default=list(BODIES), help="bodies, by name")
     parser.add_argument("--goal", type=float, default=.5, help="accuracy of the power, dB")
-    parser.add_argument("--reference", type=float, default=.1, help="accuracy of what it is compared with, dB")
+    parser.add_argument("--every", type=int, default=8, help="of how many modes one is compared with a finer surface")
+    parser.add_argument("--most-vertices", type=int, default=16000, help="of a finer surface")
     parser.add_argument("--budget", type=float, default=600, help="CPU seconds for one body")
     parser.add_argument("--band", default="20:20000", help="of the modes, Hz")
     parser.add_argument("--rows", type=int, default=12, help="modes to print of each body")

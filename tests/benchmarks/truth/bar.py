@@ -117,9 +117,11 @@ def variants(studio, folder, young_pa, poisson_ratio):
     if not studio.radiate(name, material, "--accuracy", RADIATION_ACCURACY_DB, "--budget", RADIATION_BUDGET_S):
         print("these programs cannot compute radiation: the rest of the table is missing")
         return
-    yield Variant("and radiation", heard(name, young_pa, own_loss, paper_coupling=False), HARD_S)
-    own = heard(name, young_pa, own_loss, paper_coupling=False, gaussian=False)
+    # The recording begins after the blow, and so after the sound of the bar's acceleration.
+    yield Variant("and radiation", heard(name, young_pa, own_loss, paper_coupling=False, modes_only=True), HARD_S)
+    own = heard(name, young_pa, own_loss, paper_coupling=False, gaussian=False, modes_only=True)
     yield Variant("and the daemon's own contact", own, None)
+    yield Variant("the same with the acceleration noise", dataclasses.replace(own, modes_only=False), None)
     transfer = microphone.read(studio.export(name))
     yield Variant("and a microphone near by", own, None,
                   microphone.Microphones(transfer, preset, young_pa, DENSITY_KG_PER_M3))

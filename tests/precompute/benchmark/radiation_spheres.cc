@@ -2,11 +2,13 @@
 //
 // radiation_spheres exact: spheres of every order to 6 against the closed form.
 // radiation_spheres dense: the equation solved by sweeps and GMRES beside its assembled matrix,
-// factorized, in one thread. Both print a Markdown table.
+// factorized, in one thread.
+// radiation_spheres fork: levels round the tines of a tuning fork. Each prints a Markdown table.
 #include <sys/resource.h>
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <complex>
 #include <cstdio>
@@ -20,6 +22,7 @@
 #include "precompute/radiation/mode_solver.h"
 #include "precompute/radiation/solve_time.h"
 #include "tests/precompute/radiation/dense_equation.h"
+#include "tests/precompute/radiation/fork.h"
 #include "tests/precompute/radiation/spheres.h"
 
 namespace carillon::precompute {
@@ -129,6 +132,23 @@ void PrintDense() {
   }
 }
 
+void PrintFork() {
+  constexpr std::array<size_t, 7> kDegrees = {15, 30, 45, 60, 75, 80, 90};
+  std::printf("dB against the direction in which the tines move\n\n| distance |");
+  for (const size_t degree : kDegrees) std::printf(" %zu degrees |", degree);
+  std::printf(" least | at |\n| --- |");
+  for (size_t i = 0; i < kDegrees.size() + 2; ++i) std::printf(" --- |");
+  for (const double distance_m : {0.05, 0.2, 0.8, 100.0}) {
+    const std::vector<double> levels = LevelsRoundFork(distance_m);
+    const auto least = std::min_element(levels.begin(), levels.end());
+    std::printf("\n| %g m |", distance_m);
+    for (const size_t degree : kDegrees) std::printf(" %.1f |", levels[degree]);
+    std::printf(" %.0f | %td degrees |", *least, least - levels.begin());
+    std::fflush(stdout);
+  }
+  std::printf("\n");
+}
+
 }  // namespace
 }  // namespace carillon::precompute
 
@@ -138,8 +158,10 @@ int main(int argc, char** argv) {
     carillon::precompute::PrintExact();
   } else if (part == "dense") {
     carillon::precompute::PrintDense();
+  } else if (part == "fork") {
+    carillon::precompute::PrintFork();
   } else {
-    std::fprintf(stderr, "usage: radiation_spheres exact|dense\n");
+    std::fprintf(stderr, "usage: radiation_spheres exact|dense|fork\n");
     return EXIT_FAILURE;
   }
   return EXIT_SUCCESS;

@@ -4,8 +4,11 @@
 #include <cmath>
 #include <cstddef>
 #include <numbers>
+#include <vector>
 
 #include "precompute/mesh/point_math.h"
+#include "precompute/radiation/far_pattern.h"
+#include "precompute/radiation/mode_solver.h"
 #include "tests/precompute/test_meshes.h"
 
 namespace carillon::precompute {
@@ -47,6 +50,34 @@ std::complex<double> PressureAt(const Point& place, const AcousticSurface& surfa
     sum += std::complex<double>(p[v]) * green * (ik - 1 / r) * (Dot(n, e) / r) - green * q;
   }
   return sum;
+}
+
+std::vector<double> LevelsRoundFork(double distance_m) {
+  const Fork fork = MakeFork();
+  Workers workers(2);
+  SurfaceLevel level;
+  level.surface = MakeAcousticSurface(fork.mesh);
+  level.near = MakeNearCorrection(level.surface, workers);
+  RadiatingSurface body;
+  body.center = {0, 0, Fork::kLengthM / 2};
+  body.radius_m = 0.05;
+  const SphereGrid grid(PatternOrder(Fork::kWavenumber, body.radius_m));
+  const ModeField field = SolveModes({.wavenumber = Fork::kWavenumber,
+                                      .displacements = {fork.motion},
+                                      .starts = {},
+                                      .tolerance = 1e-4},
+                                     level, body, grid, workers)
+                              .front();
+  std::vector<double> levels;
+  for (int degree = 0; degree <= 90; ++degree) {
+    const double angle = degree * std::numbers::pi / 180;
+    const Point place = {distance_m * std::cos(angle), distance_m * std::sin(angle),
+                         0.8 * Fork::kLengthM};
+    levels.push_back(20 * std::log10(std::abs(PressureAt(place, level.surface, Fork::kWavenumber,
+                                                         field.pressure, fork.motion))));
+  }
+  for (size_t i = levels.size(); i-- > 0;) levels[i] -= levels[0];
+  return levels;
 }
 
 }  // namespace carillon::precompute

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <complex>
+#include <span>
+#include <vector>
 
 #include "precompute/radiation/surface_level.h"
 #include "tests/precompute/radiation/spheres.h"
@@ -25,5 +27,9 @@ Fork MakeFork();
 std::complex<double> PressureAt(const Point& place, const AcousticSurface& surface,
                                 double wavenumber, std::span<const ComplexFloat> p,
                                 const Displacement& motion);
+
+/// Levels in dB against the direction in which the tines move, each degree from 0 to 90, round the
+/// tines at four fifths of their length.
+std::vector<double> LevelsRoundFork(double distance_m);
 
 }  // namespace carillon::precompute

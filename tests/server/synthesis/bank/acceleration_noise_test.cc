@@ -62,12 +62,16 @@ struct Blow {
   float lead_frames = 0;
 };
 
+SurfaceImpulse ImpulseOf(const Blow& blow) {
+  return {.at = Corner(blow.vertex),
+          .impulse_newton_seconds = blow.impulse,
+          .pulse = Pulse::RaisedCosine(static_cast<float>(blow.duration_s))};
+}
+
 /// The sound in pascals at 1 m.
 std::vector<float> Sound(const Blow& blow, const Bearing* bearing, const MovedBody& body = Ball()) {
   AccelerationNoise noise(body, kRate, 1);
-  noise.Push(Corner(blow.vertex), blow.impulse);
-  noise.Begin(Pulse::RaisedCosine(static_cast<float>(blow.duration_s)), blow.offset,
-              blow.lead_frames, bearing);
+  noise.Begin(ImpulseOf(blow), blow.offset, blow.lead_frames, bearing);
   return Render(noise);
 }
 
@@ -189,6 +193,15 @@ TEST(AccelerationNoise, KnowsThePartOfAFrameBeforeItsFirstSample) {
   EXPECT_LT(Difference(early, lead), 1e-6 * Peak(early));
 }
 
+TEST(AccelerationNoise, BoundsHowLongAPulseLasts) {
+  const AccelerationNoise noise(Ball(), kRate, 1);
+  EXPECT_EQ(noise.PulseFrames(Pulse()), 2);
+  EXPECT_NEAR(noise.PulseFrames(Pulse::RaisedCosine(0.001F)), 48, 1e-3);
+  EXPECT_NEAR(noise.PulseFrames(Pulse::Gaussian(0.001F)), 48 * std::sqrt(0.0625 / 0.0326726), 1e-3);
+  EXPECT_EQ(noise.PulseFrames(Pulse::RaisedCosine(1e9F)), 7200);
+  EXPECT_EQ(noise.PulseFrames(Pulse::RaisedCosine(NAN)), 2);
+}
+
 TEST(AccelerationNoise, HasNoEnergyAtFrequencyZero) {
   double sum = 0;
   const auto sound = Sound({.duration_s = 2e-4}, nullptr);
@@ -200,8 +213,7 @@ TEST(AccelerationNoise, EndsAndBeginsAnew) {
   AccelerationNoise noise(Ball(), kRate, 1);
   for (int i = 0; i < 2; ++i) {
     EXPECT_FALSE(noise.active());
-    noise.Push(Corner(2), {0, 0, -1});
-    noise.Begin(Pulse::RaisedCosine(5e-4F), 3, 0, nullptr);
+    noise.Begin(ImpulseOf({.impulse = {0, 0, -1}}), 3, 0, nullptr);
     EXPECT_TRUE(noise.active());
     EXPECT_GT(Peak(Render(noise)), 0.1);
   }
@@ -210,13 +222,11 @@ TEST(AccelerationNoise, EndsAndBeginsAnew) {
 TEST(AccelerationNoise, IsBoundedHoweverHardAndOftenItIsStruck) {
   AccelerationNoise noise(Ball(), kRate, 1);
   for (size_t i = 0; i < 3 * AccelerationNoise::kMostPulses; ++i) {
-    noise.Push(Corner(2), {0, 0, 1e6F});
-    noise.Begin(Pulse(), i, 0, nullptr);
+    noise.Begin(ImpulseOf({.impulse = {0, 0, 1e6F}, .duration_s = 0}), i, 0, nullptr);
   }
   EXPECT_LE(Peak(Render(noise)), kMostAmplitude);
   EXPECT_FALSE(noise.active());
-  noise.Push(Corner(2), {0, 0, NAN});
-  noise.Begin(Pulse(), 0, 0, nullptr);
+  noise.Begin(ImpulseOf({.impulse = {0, 0, NAN}, .duration_s = 0}), 0, 0, nullptr);
   EXPECT_FALSE(noise.active());
 }
 
