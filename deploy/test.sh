@@ -7,7 +7,7 @@
 # synthesis and API, with more time; under tsan those of the audio path, without the sound server, which was compiled
 # without the sanitizer. A ROOM is a folder of tests/ or one test in it, such as server/synthesis or
 # server/synthesis/mixer_test: only what its tests need is built, and only they run.
-# Exits with 77 where the kernel keeps tsan from running.
+# Exits with 77 where the kernel keeps asan or tsan from running.
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 # shellcheck source=deploy/environment.sh
@@ -70,9 +70,9 @@ bits=$(cat /proc/sys/vm/mmap_rnd_bits 2>/dev/null || echo 28)
 if [[ $preset == ?san && $bits -gt 28 ]]; then
   if setarch --addr-no-randomize true 2>/dev/null; then
     launcher=(setarch --addr-no-randomize)
-  elif [[ $preset == tsan ]]; then
-    printf 'test.sh: tsan cannot run here: the kernel places memory with %s random bits, of which tsan bears 28,\n' \
-      "$bits" >&2
+  else
+    printf 'test.sh: %s cannot run here: the kernel places memory with %s random bits, of which it bears 28,\n' \
+      "$preset" "$bits" >&2
     printf '  and setarch may not turn that off; as root, "sysctl vm.mmap_rnd_bits=28" lowers them\n' >&2
     exit 77
   fi

@@ -119,7 +119,7 @@ class VolumeApi : public ServedDaemon {
   static void Append(const std::string& bytes, std::vector<float>& samples) {
     const size_t before = samples.size();
     samples.resize(before + bytes.size() / sizeof(float));
-    std::memcpy(samples.data() + before, bytes.data(), bytes.size());
+    if (!bytes.empty()) std::memcpy(samples.data() + before, bytes.data(), bytes.size());
   }
 };
 
