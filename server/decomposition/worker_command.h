@@ -24,7 +24,7 @@ struct WorkerPlace {
 /// repaired, too.
 constexpr uint32_t kWayCount = 3;
 
-/// What carillon-precompute is to compute for a task, in its way (below kWayCount): a
+/// The request to carillon-precompute for a task, computed in the task's way (below kWayCount): a
 /// v1::WorkerRequest in protobuf's text form.
 std::string WorkerRequestFile(const DecompositionTask& task);
 

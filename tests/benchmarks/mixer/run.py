@@ -3,11 +3,11 @@
 """Carillon's mixer beside the synthesisers that others use, one after the other on one core, and one table.
 
 Modes a core: how many modes one core renders in real time at 48 kHz, from CPU time; of other programs the median of
-three runs, fixed costs taken off. Because a shared core's speed changes from minute to minute, Carillon and Klank run in
-turns: what is printed is the median of the turns, and of the times Klank in each turn, with their range. All render the same modes: frequencies log-uniform from 20 Hz to 20 kHz, T60
-log-uniform from 20 ms to 60 s; none ever sleeps. Error: largest deviation from the closed form in double over the
-largest sample, and the same of root mean squares; of another program against its own recurrence in double, so that
-only its rounding counts.
+three runs, fixed costs taken off. Because a shared core's speed changes from minute to minute, Carillon and Klank run
+in turns, and the medians over the turns are printed: of Carillon's modes, and of its ratio to Klank in each turn, with
+their range. All render the same modes: frequencies log-uniform from 20 Hz to 20 kHz, T60 log-uniform from 20 ms to
+60 s; none ever sleeps. Error: largest deviation from the closed form in double over the largest sample, and the same
+of root mean squares; of another program against its own recurrence in double, so that only its rounding counts.
 """
 
 import argparse
@@ -89,7 +89,8 @@ def ringing(options, folder):
         loads, rates, times = zip(*results)
         what = {"ringing": "ringing freely", "struck": "every bank struck in every block"}[what]
         row(f"Carillon {target}, {what}", f"{count:,.0f}", f"{statistics.median(loads):.1%}",
-            f"{statistics.median(rates):,.0f}", f"{statistics.median(times):.1f}", f"{min(times):.1f} ... {max(times):.1f}")
+            f"{statistics.median(rates):,.0f}", f"{statistics.median(times):.1f}",
+            f"{min(times):.1f} ... {max(times):.1f}")
 
 
 def directed(options, _folder):
@@ -168,8 +169,8 @@ def session(options, folder):
     import session as sessions
     print("\n## A session under a busy loop on each core and decompositions: JACK capture against the rendering of its "
           "trace\n\n| seconds | impulses | late, dropped, merged or shed | real-time priority | xruns told by JACK; of "
-          "these, while a core of the machine stood still; frames lost | such standstills, longest ms | frames compared "
-          "| differing |\n| --- | --- | --- | --- | --- | --- | --- | --- |")
+          "these, while a core of the machine stood still; frames lost | such standstills, longest ms | frames "
+          "compared | differing |\n| --- | --- | --- | --- | --- | --- | --- | --- |")
     played = sessions.Session(folder)
     try:
         found = played.run(options.session_seconds)
@@ -187,7 +188,8 @@ def main():
     parser.add_argument("--build", type=pathlib.Path, required=True, help="the release build's folder")
     parser.add_argument("--parts", type=lambda text: text.split(","), default=list(PARTS),
                         help="some of " + ",".join(PARTS))
-    parser.add_argument("--seconds", type=float, default=5, help="of sound, for each measurement of 80,000 modes or more; of fewer it is longer")
+    parser.add_argument("--seconds", type=float, default=5,
+                        help="of sound, for each measurement of 80,000 modes or more; of fewer it is longer")
     parser.add_argument("--turns", type=int, default=5, help="of measurements of modes")
     parser.add_argument("--flood-seconds", type=float, default=60)
     parser.add_argument("--latency-strikes", type=lambda text: tuple(map(int, text.split("x"))), default=(40, 100),
@@ -197,7 +199,8 @@ def main():
     print(f"load average before: {os.getloadavg()[0]:.1f}", flush=True)
     for part in options.parts:
         with tempfile.TemporaryDirectory() as folder:
-            run = {"ringing": ringing, "directed": directed, "accuracy": accuracy, "flood": flood, "latency": latency, "session": session}
+            run = {"ringing": ringing, "directed": directed, "accuracy": accuracy, "flood": flood, "latency": latency,
+                   "session": session}
             run[part](options, pathlib.Path(folder))
     print(f"\nload average after: {os.getloadavg()[0]:.1f}")
     return 0
