@@ -18,7 +18,7 @@ while (($#)); do
     *) names+=("$1") && shift ;;
   esac
 done
-names=${names[*]:-.*}
+pattern=${names[*]:-.*}
 export CARILLON_TORTURE=long
-exec ctest --test-dir "$root/build/release" --tests-regex "^torture/test_(${names// /|})\$" --timeout 7200 \
+exec ctest --test-dir "$root/build/release" --tests-regex "^torture/test_(${pattern// /|})\$" --timeout 7200 \
   --output-on-failure --verbose

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Clients that come and go, some without a word: the daemon's memory, descriptors, threads and places stay as they are."""
+"""Clients come and go, some without a word: the daemon's memory, descriptors, threads and places stay the same."""
 
 import collections
 import os
