@@ -35,12 +35,12 @@ using HalfedgeMesh = CGAL::Surface_mesh<Kernel::Point_3>;
 using Halfedge = HalfedgeMesh::Halfedge_index;
 
 /// Longest rim of a hole that is filled, as a part of the diagonal.
-constexpr double kRimPart = 1;
+constexpr double kPatchRim = 1;
 /// Largest area of all patches, as a part of the surface's.
 constexpr double kPatchPart = 1.0 / 20;
 /// Largest distance of an untangled surface from the given one, as a part of the diagonal.
 constexpr double kUntangledPart = 1e-3;
-constexpr std::chrono::seconds kMostCpu(60);
+constexpr std::chrono::seconds kMostRepairCpu(60);
 
 /// Returns nothing for a surface that is no manifold.
 std::optional<HalfedgeMesh> ToHalfedges(const SurfaceMesh& surface) {
@@ -121,7 +121,7 @@ std::optional<SurfaceMesh> InChild(const SurfaceMesh& surface,
         std::optional<HalfedgeMesh> mesh = ToHalfedges(surface);
         return mesh ? work(*std::move(mesh)) : "";
       },
-      kMostCpu);
+      kMostRepairCpu);
   if (!bytes.ok() || bytes->empty()) return std::nullopt;
   return FromBytes(*bytes);
 }
@@ -129,7 +129,7 @@ std::optional<SurfaceMesh> InChild(const SurfaceMesh& surface,
 }  // namespace
 
 std::optional<RepairedSurface> FillHoles(const SurfaceMesh& surface) {
-  const double longest_rim = kRimPart * Diagonal(surface.vertices);
+  const double longest_rim = kPatchRim * Diagonal(surface.vertices);
   std::optional<SurfaceMesh> filled =
       InChild(surface, [=](HalfedgeMesh mesh) { return FillAll(std::move(mesh), longest_rim); });
   if (!filled) return std::nullopt;
