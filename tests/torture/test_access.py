@@ -21,13 +21,13 @@ import carillon
 import torture
 from carillon.v1 import (
     admin_service_pb2, audio_service_pb2, contact_service_pb2, decomposition_service_pb2,
-    job_run_service_pb2, modal_model_service_pb2, scene_service_pb2, scene_service_pb2_grpc)
+    job_run_service_pb2, modal_model_service_pb2, scene_service_pb2, scene_service_pb2_grpc, server_service_pb2)
 from certificates import Authority
 from daemon import BIN, ROOT, Daemon
 
 ROLES = ("listen", "strike", "submit", "administer")
 CONTRACT = (admin_service_pb2, audio_service_pb2, contact_service_pb2, decomposition_service_pb2, job_run_service_pb2,
-            modal_model_service_pb2, scene_service_pb2)
+            modal_model_service_pb2, scene_service_pb2, server_service_pb2)
 TIMES = 100
 REFUSED = (grpc.StatusCode.UNAUTHENTICATED, grpc.StatusCode.PERMISSION_DENIED, grpc.StatusCode.RESOURCE_EXHAUSTED)
 
