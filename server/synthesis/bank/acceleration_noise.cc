@@ -118,7 +118,7 @@ AccelerationNoise::Accelerations AccelerationNoise::AccelerationsBy(
 
 double AccelerationNoise::PulseFrames(Pulse pulse) const noexcept {
   const double told_s = Pulse::OfVariance(pulse.variance_s2(), Pulse()).duration_s();
-  return std::fmin(std::fmax(told_s * rate_, kShortestPulseFrames), kLongestPulseS * rate_);
+  return std::min(std::max(kShortestPulseFrames, told_s * rate_), kLongestPulseS * rate_);
 }
 
 void AccelerationNoise::Begin(const SurfaceImpulse& impulse, size_t offset, float lead_frames,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -93,7 +94,7 @@ struct MixerEvent {
     const double whole = std::floor(frames);
     frame = static_cast<uint64_t>(whole);
     // The cast may round 1 - 1e-9 up to 1.
-    fraction = std::fmin(static_cast<float>(frames - whole), 0x1.fffffep-1F);
+    fraction = std::min(0x1.fffffep-1F, static_cast<float>(frames - whole));
   }
 
   /// Number of the first audible sample.

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <ranges>
@@ -30,19 +31,34 @@ double Volume(const SurfaceMesh& surface) {
   return volume;
 }
 
-/// Moves one vertex of a surface past a neighbour by `depth_m`, so that triangles there cross
-/// others. Returns where.
-Point FoldOver(SurfaceMesh& surface, double depth_m) {
-  const auto [a, b, c] = surface.triangles[10];
-  const Point from = surface.vertices[static_cast<size_t>(a)];
-  const Point to = surface.vertices[static_cast<size_t>(b)];
-  const double length = Distance(from, to);
-  const Point normal = AreaNormal(CornersOf(surface, 10));
-  Point& moved = surface.vertices[static_cast<size_t>(a)];
-  for (size_t i = 0; i < 3; ++i) {
-    moved[i] = to[i] + depth_m * ((to[i] - from[i]) / length - normal[i] / Norm(normal));
+/// Puts a triangle of size `depth_m`, turned by half a turn, into a triangle of the surface, so
+/// that the triangles between both cross one another. Returns where.
+Point FoldIn(SurfaceMesh& surface, double depth_m) {
+  const auto given = surface.triangles[10];
+  const auto corners = CornersOf(surface, 10);
+  const Point normal = AreaNormal(corners);
+  Point center{};
+  for (const Point& corner : corners) {
+    for (size_t i = 0; i < 3; ++i) center[i] += corner[i] / 3;
   }
-  return to;
+  std::array<int32_t, 3> turned{};
+  const std::array<double, 3> heights{0.5, -1, 1};  // so that no two planes are parallel
+  for (size_t k = 0; k < 3; ++k) {
+    Point p = center;
+    for (size_t i = 0; i < 3; ++i) {
+      p[i] -= depth_m * (corners[k][i] - center[i]) / Distance(corners[k], center);
+      p[i] += depth_m * heights[k] * normal[i] / Norm(normal);
+    }
+    turned[k] = static_cast<int32_t>(surface.vertices.size());
+    surface.vertices.push_back(p);
+  }
+  surface.triangles[10] = turned;
+  for (size_t k = 0; k < 3; ++k) {
+    const size_t next = (k + 1) % 3;
+    surface.triangles.push_back({given[k], given[next], turned[k]});
+    surface.triangles.push_back({given[next], turned[next], turned[k]});
+  }
+  return center;
 }
 
 TEST(PrepareSurface, ASoundSurfaceStaysAsItIs) {
@@ -155,7 +171,7 @@ TEST(PrepareSurface, AVesselIsNotFilledThroughItsMouth) {
 TEST(PrepareSurface, AFoldIsUntangledWhereItIs) {
   SurfaceMesh ball = MakeSphereSurface(0.1, 5);
   const double volume = Volume(ball);
-  const Point fold = FoldOver(ball, 3e-6);
+  const Point fold = FoldIn(ball, 3e-6);
   EXPECT_THAT(PrepareSurface(ball, {}).status().ToString(), HasSubstr("MESH_SELF_INTERSECTING"));
   const auto untangled = PrepareSurface(ball, {.repair = true});
   ASSERT_TRUE(untangled.ok()) << untangled.status();
