@@ -49,7 +49,7 @@ targets=()
 selection=()
 # Packages are made and tried in a bare Debian or a container only when their test is named: that takes minutes, and
 # the network.
-if [[ " ${rooms[*]} " =~ " deploy/bare_"(packages|container)" " ]]; then
+if [[ " ${rooms[*]} " =~ " deploy/bare_"(packages|container|client)" " ]]; then
   lists+=(packages)
 else
   excluded="${excluded:+$excluded|}packages"
