@@ -6,7 +6,6 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -49,29 +48,35 @@ void AddAbout(CLI::App& parent, const std::string& name, const std::string& text
 
 /// The options that choose jobs by state and label.
 struct JobChoice {
-  std::vector<v1::JobState> states;
+  std::vector<std::string> states;
   std::string label;
 };
 
 void AddJobChoice(CLI::App& command, JobChoice& choice) {
-  const std::map<std::string, v1::JobState> states = {{"queued", v1::JOB_STATE_QUEUED},
-                                                      {"running", v1::JOB_STATE_RUNNING},
-                                                      {"succeeded", v1::JOB_STATE_SUCCEEDED},
-                                                      {"failed", v1::JOB_STATE_FAILED},
-                                                      {"cancelled", v1::JOB_STATE_CANCELLED}};
   command
       .add_option("--state", choice.states,
-                  "Only jobs in these states: queued, running, succeeded, failed, cancelled [any]")
+                  "Only jobs in these states: waiting, running, done, failed, cancelled [any]")
       ->delimiter(',')
-      ->transform(CLI::CheckedTransformer(states, CLI::ignore_case).description(""));
+      ->transform(CLI::IsMember(
+                      {"waiting", "queued", "running", "done", "succeeded", "failed", "cancelled"},
+                      CLI::ignore_case)
+                      .description(""));
   command.add_option("--label", choice.label, "Only jobs whose label contains this text");
+}
+
+/// The state with a name that AddJobChoice allows.
+v1::JobState StateOf(const std::string& name) {
+  if (name == "waiting" || name == "queued") return v1::JOB_STATE_QUEUED;
+  if (name == "running") return v1::JOB_STATE_RUNNING;
+  if (name == "failed") return v1::JOB_STATE_FAILED;
+  return name == "cancelled" ? v1::JOB_STATE_CANCELLED : v1::JOB_STATE_SUCCEEDED;
 }
 
 /// The request for the chosen jobs: a ListJobsRequest or a WatchJobsRequest.
 template <class Request>
 Request RequestOf(const JobChoice& choice) {
   Request request;
-  for (const v1::JobState state : choice.states) request.add_states(state);
+  for (const std::string& state : choice.states) request.add_states(StateOf(state));
   request.set_label_contains(choice.label);
   return request;
 }
