@@ -23,6 +23,7 @@ std::optional<std::string> Utf8OfUtf16(std::string_view bytes) {
   if (!BeginsAsUtf16(bytes)) return std::nullopt;
   // "UTF-16" reads the byte order mark and leaves it out.
   const iconv_t converter = iconv_open("UTF-8", "UTF-16");
+  // NOLINTNEXTLINE(performance-no-int-to-ptr): iconv_open reports its failure so
   if (converter == reinterpret_cast<iconv_t>(-1)) return std::nullopt;
   const absl::Cleanup close = [converter] { iconv_close(converter); };
   std::string text(bytes.size() / 2 * 3, '\0');  // a unit of two bytes takes at most three

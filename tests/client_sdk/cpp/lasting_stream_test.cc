@@ -26,31 +26,31 @@ absl::Status Gone() { return absl::UnavailableError("SERVER_UNAVAILABLE: no daem
 class FakeDaemon {
  public:
   void Restart() {
-    const absl::MutexLock lock(&mutex_);
-    scenes_.clear();
-    ++epoch_;
+    const absl::MutexLock lock(&mutex);
+    scenes.clear();
+    ++epoch;
   }
-  void SetReachable(bool reachable) {
-    const absl::MutexLock lock(&mutex_);
-    reachable_ = reachable;
-    if (!reachable) ++epoch_;
+  void SetReachable(bool now) {
+    const absl::MutexLock lock(&mutex);
+    reachable = now;
+    if (!now) ++epoch;
   }
-  void Refuse(const absl::Status& refusal) {
-    const absl::MutexLock lock(&mutex_);
-    refusal_ = refusal;
+  void Refuse(const absl::Status& status) {
+    const absl::MutexLock lock(&mutex);
+    refusal = status;
   }
   std::vector<uint32_t> Handles(const std::string& id) {
-    const absl::MutexLock lock(&mutex_);
+    const absl::MutexLock lock(&mutex);
     std::vector<uint32_t> handles;
-    for (const auto& [handle, model] : scenes_[id]) handles.push_back(handle);
+    for (const auto& [handle, model] : scenes[id]) handles.push_back(handle);
     return handles;
   }
 
-  absl::Mutex mutex_;
-  std::map<std::string, std::map<uint32_t, std::string>> scenes_ ABSL_GUARDED_BY(mutex_);
-  bool reachable_ ABSL_GUARDED_BY(mutex_) = true;
-  int epoch_ ABSL_GUARDED_BY(mutex_) = 0;  ///< of connections
-  absl::Status refusal_ ABSL_GUARDED_BY(mutex_);
+  absl::Mutex mutex;
+  std::map<std::string, std::map<uint32_t, std::string>> scenes ABSL_GUARDED_BY(mutex);
+  bool reachable ABSL_GUARDED_BY(mutex) = true;
+  int epoch ABSL_GUARDED_BY(mutex) = 0;  ///< of connections
+  absl::Status refusal ABSL_GUARDED_BY(mutex);
   std::atomic<uint64_t> step_count{0};
   std::atomic<int> stream_count{0};
 };
@@ -60,8 +60,8 @@ class FakeStream final : public ContactStream {
   FakeStream(FakeDaemon& daemon, int epoch) : daemon_(daemon), epoch_(epoch) {}
 
   absl::Status Send(v1::ContactStep) override {
-    const absl::MutexLock lock(&daemon_.mutex_);
-    if (daemon_.epoch_ != epoch_) return Gone();
+    const absl::MutexLock lock(&daemon_.mutex);
+    if (daemon_.epoch != epoch_) return Gone();
     report_.set_step_count(report_.step_count() + 1);
     ++daemon_.step_count;
     return absl::OkStatus();
@@ -81,20 +81,20 @@ class FakeClient final : public Client {
 
   absl::StatusOr<v1::CreateSceneResponse> CreateOrFindScene(
       const v1::CreateSceneRequest& request) const override {
-    const absl::MutexLock lock(&daemon_.mutex_);
-    if (!daemon_.reachable_) return Gone();
-    if (!daemon_.refusal_.ok()) return daemon_.refusal_;
+    const absl::MutexLock lock(&daemon_.mutex);
+    if (!daemon_.reachable) return Gone();
+    if (!daemon_.refusal.ok()) return daemon_.refusal;
     v1::CreateSceneResponse response;
     response.set_name("scenes/" + request.id());
-    response.set_existing(daemon_.scenes_.contains(request.id()));
-    daemon_.scenes_[request.id()];
+    response.set_existing(daemon_.scenes.contains(request.id()));
+    daemon_.scenes[request.id()];
     return response;
   }
   absl::StatusOr<std::vector<v1::SoundingObject>> ListObjects(
       const std::string& scene) const override {
-    const absl::MutexLock lock(&daemon_.mutex_);
+    const absl::MutexLock lock(&daemon_.mutex);
     std::vector<v1::SoundingObject> objects;
-    for (const auto& [handle, model] : daemon_.scenes_[scene.substr(7)]) {
+    for (const auto& [handle, model] : daemon_.scenes[scene.substr(7)]) {
       objects.emplace_back().set_handle(handle);
       objects.back().set_modal_model(model);
     }
@@ -102,19 +102,19 @@ class FakeClient final : public Client {
   }
   absl::StatusOr<std::vector<v1::SoundingObject>> AddObjects(
       const v1::AddObjectsRequest& request) const override {
-    const absl::MutexLock lock(&daemon_.mutex_);
+    const absl::MutexLock lock(&daemon_.mutex);
     for (const v1::AddObjectRequest& object : request.objects()) {
-      daemon_.scenes_[request.scene().substr(7)][object.handle()] = object.modal_model();
+      daemon_.scenes[request.scene().substr(7)][object.handle()] = object.modal_model();
     }
     return std::vector<v1::SoundingObject>();
   }
   absl::StatusOr<std::unique_ptr<ContactStream>> StreamContacts(
       const v1::ContactStreamStart& start) const override {
     EXPECT_EQ(start.scene(), "scenes/lathe");
-    const absl::MutexLock lock(&daemon_.mutex_);
-    if (!daemon_.reachable_) return Gone();
+    const absl::MutexLock lock(&daemon_.mutex);
+    if (!daemon_.reachable) return Gone();
     ++daemon_.stream_count;
-    return std::make_unique<FakeStream>(daemon_, daemon_.epoch_);
+    return std::make_unique<FakeStream>(daemon_, daemon_.epoch);
   }
 
  private:
@@ -160,9 +160,9 @@ TEST_F(LastingStreamTest, RegistersTheSceneAgainAfterARestartAndSendsOn) {
 TEST_F(LastingStreamTest, AddsOnlyTheObjectsThatASceneLacks) {
   ASSERT_TRUE(RegisterScene(client_, Lathe()).ok());
   {
-    const absl::MutexLock lock(&daemon_.mutex_);
-    daemon_.scenes_["lathe"].erase(2);
-    daemon_.scenes_["lathe"][9] = "modalModels/b";
+    const absl::MutexLock lock(&daemon_.mutex);
+    daemon_.scenes["lathe"].erase(2);
+    daemon_.scenes["lathe"][9] = "modalModels/b";
   }
   EXPECT_EQ(*RegisterScene(client_, Lathe()), "scenes/lathe");
   EXPECT_THAT(daemon_.Handles("lathe"), ElementsAre(1, 2, 9));

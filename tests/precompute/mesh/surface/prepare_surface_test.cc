@@ -8,7 +8,6 @@
 #include <array>
 #include <cmath>
 #include <numbers>
-#include <ranges>
 
 #include "precompute/mesh/point_math.h"
 #include "precompute/mesh/surface/check_surface.h"
@@ -150,11 +149,9 @@ TEST(PrepareSurface, AWideHoleIsFilledWhereItIs) {
       used |= std::ranges::count(triangle, static_cast<int32_t>(v)) > 0;
     }
     if (!used) continue;
-    EXPECT_LT(
-        std::ranges::min(filled->surface.vertices | std::views::transform([&](const Point& p) {
-                           return Distance(p, open.vertices[v]);
-                         })),
-        1e-9);
+    const auto& kept = filled->surface.vertices;
+    EXPECT_TRUE(std::ranges::any_of(
+        kept, [&](const Point& p) { return Distance(p, open.vertices[v]) < 1e-9; }));
   }
 }
 
