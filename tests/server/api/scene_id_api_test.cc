@@ -43,7 +43,7 @@ class SceneIdApi : public ServedDaemon {
     v1::GetSceneRequest request;
     request.set_name(name);
     v1::GetSceneResponse response;
-    const grpc::Status status = Call(*scenes, &SceneStub::GetScene, request, response);
+    grpc::Status status = Call(*scenes, &SceneStub::GetScene, request, response);
     scene = response.scene();
     return status;
   }
@@ -141,6 +141,7 @@ TEST_F(SceneIdApi, NumbersNameOnlyScenesThatTheDaemonHasNumbered) {
 TEST_F(SceneIdApi, EqualRequestsAtOnceMakeOneScene) {
   std::vector<std::thread> threads;
   std::atomic<int> made = 0;
+  threads.reserve(16);
   for (int i = 0; i < 16; ++i) {
     threads.emplace_back([&] {
       v1::CreateSceneResponse response;
@@ -182,7 +183,7 @@ class GuardedSceneIdApi : public SceneIdApi {
       : SceneIdApi({.access_file = AccessFile(), .client_share = 1}, {"127.0.0.1:0"}) {}
 
   static std::string AccessFile() {
-    const std::string path = testing::TempDir() + "/carillon_scene_id_access";
+    std::string path = testing::TempDir() + "/carillon_scene_id_access";
     std::filesystem::remove(path);
     std::ofstream(path) << "ann strike sha256:" << Sha256Hex("ann's") << "\nboss strike,administer "
                         << "sha256:" << Sha256Hex("boss's") << "\n";

@@ -85,7 +85,7 @@ class GuardedInfoApi : public ServedDaemon {
   GuardedInfoApi() : ServedDaemon({.access_file = AccessFile()}, {"127.0.0.1:0"}) {}
 
   static std::string AccessFile() {
-    const std::string path = testing::TempDir() + "/carillon_server_info_access";
+    std::string path = testing::TempDir() + "/carillon_server_info_access";
     std::ofstream(path) << "# nobody\n";
     std::filesystem::permissions(path, std::filesystem::perms::owner_read);
     return path;

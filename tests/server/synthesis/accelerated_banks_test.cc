@@ -23,8 +23,8 @@ constexpr double kSphereM3 = 4 * kPi / 3 * kRadiusM * kRadiusM * kRadiusM;
 
 /// A ball that translates along x, without rotation, struck towards its centre.
 MovedBody Ball() {
-  static const std::array<std::array<float, 3>, 3> kCentre{};
-  MovedBody moved{.body = {}, .density_kg_per_m3 = kDensity, .vertices = kCentre};
+  static const std::array<std::array<float, 3>, 3> centre{};
+  MovedBody moved{.body = {}, .density_kg_per_m3 = kDensity, .vertices = centre};
   moved.body.volume_m3 = kSphereM3;
   moved.body.inertia_kg_m2 = {1, 1, 1, 0, 0, 0};
   for (size_t axis = 0; axis < 3; ++axis) {
