@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "precompute/radiation/remesh_surface.h"
 
-#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Polygon_mesh_processing/detect_features.h>
 #include <CGAL/Polygon_mesh_processing/orient_polygon_soup.h>
 #include <CGAL/Polygon_mesh_processing/polygon_soup_to_polygon_mesh.h>
 #include <CGAL/Polygon_mesh_processing/remesh.h>
-#include <CGAL/Surface_mesh.h>
 #include <CGAL/boost/graph/Euler_operations.h>
 
 #include <algorithm>
@@ -14,19 +12,18 @@
 #include <chrono>
 #include <cmath>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
-#include "precompute/mesh/byte_stream.h"
 #include "precompute/mesh/run_in_child.h"
+#include "precompute/mesh/surface/halfedge_mesh.h"
 #include "proto/cpp/error_reason.h"
 
 namespace carillon::precompute {
 namespace {
 
 namespace pmp = CGAL::Polygon_mesh_processing;
-using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
-using HalfedgeMesh = CGAL::Surface_mesh<Kernel::Point_3>;
 
 constexpr std::chrono::seconds kMostCpu(300);
 constexpr unsigned kIterations = 3;
@@ -38,7 +35,7 @@ constexpr double kSliverArea = 0.03;
 constexpr int kSliverPasses = 4;
 
 HalfedgeMesh ToCgal(const SurfaceMesh& given) {
-  std::vector<Kernel::Point_3> points;
+  std::vector<HalfedgeKernel::Point_3> points;
   points.reserve(given.vertices.size());
   for (const Point& p : given.vertices) points.emplace_back(p[0], p[1], p[2]);
   std::vector<std::array<size_t, 3>> triangles;
@@ -93,22 +90,7 @@ std::string Remesh(const SurfaceMesh& given, double edge_m) {
       CGAL::parameters::number_of_iterations(kIterations).edge_is_constrained_map(sharp));
   for (int pass = 0; pass < kSliverPasses && CollapseSlivers(mesh, edge_m); ++pass) {
   }
-  mesh.collect_garbage();
-  std::vector<double> coordinates;
-  for (const auto vertex : mesh.vertices()) {
-    const auto& p = mesh.point(vertex);
-    coordinates.insert(coordinates.end(), {p.x(), p.y(), p.z()});
-  }
-  std::vector<int32_t> corners;
-  for (const auto face : mesh.faces()) {
-    for (const auto vertex : mesh.vertices_around_face(mesh.halfedge(face))) {
-      corners.push_back(static_cast<int32_t>(vertex));
-    }
-  }
-  std::string bytes;
-  AppendValues<double>(bytes, coordinates);
-  AppendValues<int32_t>(bytes, corners);
-  return bytes;
+  return ToBytes(std::move(mesh));
 }
 
 }  // namespace
@@ -123,17 +105,7 @@ absl::StatusOr<SurfaceMesh> RemeshSurface(const SurfaceMesh& given, double edge_
                                 ". The modal model itself is sound; use it without a transfer, or "
                                 "decompose the body with another number of nodes"));
   }
-  const char* next = bytes->data();
-  const auto coordinates = TakeValues<double>(next);
-  const auto corners = TakeValues<int32_t>(next);
-  SurfaceMesh mesh;
-  for (size_t i = 0; i + 2 < coordinates.size(); i += 3) {
-    mesh.vertices.push_back({coordinates[i], coordinates[i + 1], coordinates[i + 2]});
-  }
-  for (size_t i = 0; i + 2 < corners.size(); i += 3) {
-    mesh.triangles.push_back({corners[i], corners[i + 1], corners[i + 2]});
-  }
-  return mesh;
+  return SurfaceFromBytes(*bytes);
 }
 
 }  // namespace carillon::precompute

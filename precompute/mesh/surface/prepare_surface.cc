@@ -49,22 +49,22 @@ std::vector<int32_t> NearestGiven(const SurfaceMesh& surface, const SurfaceMesh&
   return nearest;
 }
 
-/// Mends what CheckSurface finds, a kind of fault at a time, where that leaves the rest of the
-/// surface as it is. Returns the state of the surface after that.
-absl::StatusOr<Warnings> Mend(RepairedSurface& repaired) {
+/// Repairs the faults that CheckSurface finds, one kind of fault at a time, in the places where
+/// they are. Returns the result of CheckSurface for the repaired surface.
+absl::StatusOr<Warnings> RepairLocally(RepairedSurface& repaired) {
   absl::StatusOr<Warnings> sound = CheckSurface(repaired.surface);
-  const auto mend = [&](std::optional<RepairedSurface> mended) {
-    if (!mended) return;
-    absl::StatusOr<Warnings> after = CheckSurface(mended->surface);
+  const auto take = [&](std::optional<RepairedSurface> better) {
+    if (!better) return;
+    absl::StatusOr<Warnings> after = CheckSurface(better->surface);
     if (ToErrorInfo(after.status()).reason() == ToErrorInfo(sound.status()).reason()) return;
-    repaired.surface = std::move(mended->surface);
-    AddTo(repaired.remarks, mended->remarks);
+    repaired.surface = std::move(better->surface);
+    AddTo(repaired.remarks, better->remarks);
     sound = std::move(after);
   };
-  if (Is(sound.status(), "MESH_NOT_CLOSED")) mend(FillHoles(repaired.surface));
+  if (Is(sound.status(), "MESH_NOT_CLOSED")) take(FillHoles(repaired.surface));
   if (Is(sound.status(), "MESH_SELF_INTERSECTING") ||
       Is(sound.status(), "MESH_DEGENERATE_TRIANGLE")) {
-    mend(Untangle(repaired.surface));
+    take(Untangle(repaired.surface));
   }
   return sound;
 }
@@ -72,7 +72,7 @@ absl::StatusOr<Warnings> Mend(RepairedSurface& repaired) {
 /// Repairs the surface until it passes the checks, and describes the repairs in `warnings`.
 absl::StatusOr<SurfaceMesh> Repair(const SurfaceMesh& given, Warnings& warnings) {
   RepairedSurface repaired = RepairSoup(given);
-  const absl::StatusOr<Warnings> sound = Mend(repaired);
+  const absl::StatusOr<Warnings> sound = RepairLocally(repaired);
   if (sound.ok()) {
     AddTo(warnings, repaired.remarks);
     AddTo(warnings, *sound);

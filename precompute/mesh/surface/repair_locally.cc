@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "precompute/mesh/surface/repair_locally.h"
 
-#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Polygon_mesh_processing/border.h>
 #include <CGAL/Polygon_mesh_processing/measure.h>
 #include <CGAL/Polygon_mesh_processing/repair_self_intersections.h>
 #include <CGAL/Polygon_mesh_processing/triangulate_hole.h>
-#include <CGAL/Surface_mesh.h>
 
 #include <algorithm>
 #include <array>
@@ -20,9 +18,9 @@
 
 #include "absl/status/statusor.h"
 #include "absl/strings/str_format.h"
-#include "precompute/mesh/byte_stream.h"
 #include "precompute/mesh/point_math.h"
 #include "precompute/mesh/run_in_child.h"
+#include "precompute/mesh/surface/halfedge_mesh.h"
 #include "precompute/mesh/surface/nearest_triangle.h"
 #include "precompute/mesh/surface/surface_shells.h"
 
@@ -30,8 +28,6 @@ namespace carillon::precompute {
 namespace {
 
 namespace pmp = CGAL::Polygon_mesh_processing;
-using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
-using HalfedgeMesh = CGAL::Surface_mesh<Kernel::Point_3>;
 using Halfedge = HalfedgeMesh::Halfedge_index;
 
 /// Longest rim of a hole that is filled, as a part of the diagonal.
@@ -55,40 +51,6 @@ std::optional<HalfedgeMesh> ToHalfedges(const SurfaceMesh& surface) {
     if (mesh.add_face(corners) == HalfedgeMesh::null_face()) return std::nullopt;
   }
   return mesh;
-}
-
-/// Coordinates and corners, as the child process sends them.
-std::string ToBytes(HalfedgeMesh mesh) {
-  mesh.collect_garbage();
-  std::vector<double> coordinates;
-  for (const auto vertex : mesh.vertices()) {
-    const auto& p = mesh.point(vertex);
-    coordinates.insert(coordinates.end(), {p.x(), p.y(), p.z()});
-  }
-  std::vector<int32_t> corners;
-  for (const auto face : mesh.faces()) {
-    for (const auto vertex : mesh.vertices_around_face(mesh.halfedge(face))) {
-      corners.push_back(static_cast<int32_t>(vertex));
-    }
-  }
-  std::string bytes;
-  AppendValues<double>(bytes, coordinates);
-  AppendValues<int32_t>(bytes, corners);
-  return bytes;
-}
-
-SurfaceMesh FromBytes(const std::string& bytes) {
-  const char* next = bytes.data();
-  const auto coordinates = TakeValues<double>(next);
-  const auto corners = TakeValues<int32_t>(next);
-  SurfaceMesh surface;
-  for (size_t i = 0; i + 2 < coordinates.size(); i += 3) {
-    surface.vertices.push_back({coordinates[i], coordinates[i + 1], coordinates[i + 2]});
-  }
-  for (size_t i = 0; i + 2 < corners.size(); i += 3) {
-    surface.triangles.push_back({corners[i], corners[i + 1], corners[i + 2]});
-  }
-  return surface;
 }
 
 /// Fills every hole. Returns nothing where a rim is too long, or a hole cannot be filled.
@@ -123,7 +85,7 @@ std::optional<SurfaceMesh> InChild(const SurfaceMesh& surface,
       },
       kMostRepairCpu);
   if (!bytes.ok() || bytes->empty()) return std::nullopt;
-  return FromBytes(*bytes);
+  return SurfaceFromBytes(*bytes);
 }
 
 }  // namespace

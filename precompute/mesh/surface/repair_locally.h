@@ -8,9 +8,8 @@
 
 namespace carillon::precompute {
 
-/// Repairs of a surface's faults where they are, which leave the rest of it as it is. Both take a
-/// surface whose edges have one or two triangles each, and return nothing where they cannot repair
-/// it so.
+/// These functions repair single places of a surface and keep all other triangles. Each edge of the
+/// given surface has one or two triangles. They return nothing if they cannot repair the surface.
 
 /// Fills holes with smooth patches: those with a rim of at most the diagonal's length whose patches
 /// together have at most a twentieth of the area. A wider hole is the mouth of a vessel.

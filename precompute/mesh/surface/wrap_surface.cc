@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "precompute/mesh/surface/wrap_surface.h"
 
-#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-#include <CGAL/Surface_mesh.h>
 #include <CGAL/alpha_wrap_3.h>
 
 #include <algorithm>
@@ -10,22 +8,20 @@
 #include <chrono>
 #include <cmath>
 #include <random>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
-#include "precompute/mesh/byte_stream.h"
 #include "precompute/mesh/point_math.h"
 #include "precompute/mesh/run_in_child.h"
 #include "precompute/mesh/surface/check_surface.h"
+#include "precompute/mesh/surface/halfedge_mesh.h"
 #include "precompute/mesh/surface/nearest_triangle.h"
 #include "precompute/mesh/surface/surface_shells.h"
 #include "proto/cpp/error_reason.h"
 
 namespace carillon::precompute {
 namespace {
-
-using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
-using HalfedgeMesh = CGAL::Surface_mesh<Kernel::Point_3>;
 
 /// Parts of the diagonal: holes wider than alpha are entered; the wrap lies an offset outside, and
 /// is then drawn back onto the surface.
@@ -41,7 +37,7 @@ absl::Status Failed(absl::string_view what) {
 
 /// Runs in the child: CGAL's assertions end the process.
 std::string RunWrap(const SurfaceMesh& given, double diagonal) {
-  std::vector<Kernel::Point_3> points;
+  std::vector<HalfedgeKernel::Point_3> points;
   points.reserve(given.vertices.size());
   for (const Point& p : given.vertices) points.emplace_back(p[0], p[1], p[2]);
   std::vector<std::array<size_t, 3>> triangles;
@@ -52,36 +48,7 @@ std::string RunWrap(const SurfaceMesh& given, double diagonal) {
   }
   HalfedgeMesh wrap;
   CGAL::alpha_wrap_3(points, triangles, kAlphaPart * diagonal, kOffsetPart * diagonal, wrap);
-  wrap.collect_garbage();
-  std::vector<double> coordinates;
-  for (const auto vertex : wrap.vertices()) {
-    const auto& p = wrap.point(vertex);
-    coordinates.insert(coordinates.end(), {p.x(), p.y(), p.z()});
-  }
-  std::vector<int32_t> corners;
-  for (const auto face : wrap.faces()) {
-    for (const auto vertex : wrap.vertices_around_face(wrap.halfedge(face))) {
-      corners.push_back(static_cast<int32_t>(vertex));
-    }
-  }
-  std::string bytes;
-  AppendValues<double>(bytes, coordinates);
-  AppendValues<int32_t>(bytes, corners);
-  return bytes;
-}
-
-SurfaceMesh Parse(const std::string& bytes) {
-  const char* next = bytes.data();
-  const auto coordinates = TakeValues<double>(next);
-  const auto corners = TakeValues<int32_t>(next);
-  SurfaceMesh wrap;
-  for (size_t i = 0; i + 2 < coordinates.size(); i += 3) {
-    wrap.vertices.push_back({coordinates[i], coordinates[i + 1], coordinates[i + 2]});
-  }
-  for (size_t i = 0; i + 2 < corners.size(); i += 3) {
-    wrap.triangles.push_back({corners[i], corners[i + 1], corners[i + 2]});
-  }
-  return wrap;
+  return ToBytes(std::move(wrap));
 }
 
 /// Whether a triangle has kept its direction and an angle, so that tetrahedra can stand on it.
@@ -177,7 +144,7 @@ absl::StatusOr<RepairedSurface> WrapSurface(const SurfaceMesh& given) {
   const absl::StatusOr<std::string> bytes =
       RunInChild([&] { return RunWrap(given, diagonal); }, kMostCpu);
   if (!bytes.ok()) return Failed(absl::StrCat("wrapping it was ", bytes.status().message()));
-  const SurfaceMesh wrap = Parse(*bytes);
+  const SurfaceMesh wrap = SurfaceFromBytes(*bytes);
   if (wrap.triangles.empty()) return Failed("its wrap is empty");
   const double offset = kOffsetPart * diagonal;
   constexpr double kMostSheet = 0.05;

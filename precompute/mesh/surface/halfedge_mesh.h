@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/Surface_mesh.h>
+
+#include <string>
+
+#include "precompute/mesh/surface_mesh.h"
+
+namespace carillon::precompute {
+
+using HalfedgeKernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+/// CGAL's mesh of triangles. Its algorithms run in a child process, because CGAL's assertions end
+/// the process.
+using HalfedgeMesh = CGAL::Surface_mesh<HalfedgeKernel::Point_3>;
+
+/// The coordinates and corners of a mesh, as the child process sends them to its parent.
+std::string ToBytes(HalfedgeMesh mesh);
+
+/// The surface whose mesh ToBytes has written.
+SurfaceMesh SurfaceFromBytes(const std::string& bytes);
+
+}  // namespace carillon::precompute
