@@ -51,7 +51,7 @@ class ClipFolder {
   static absl::StatusOr<ClipFolder> Open(const std::filesystem::path& path);
   ClipFolder(ClipFolder&&) noexcept = default;
   ClipFolder& operator=(ClipFolder&&) = delete;
-  /// Removes what is not finished.
+  /// Removes the files that were not published.
   ~ClipFolder();
 
   std::filesystem::path Final(const std::string& file) const { return path_ / file; }

@@ -5,13 +5,13 @@
 
 namespace carillon {
 
-/// Receives every change of every job, in order and one call at a time. The calls come with locks
-/// of the queue held: they must return soon, and must not call the queue.
+/// Receives every change of every job, in order and one call at a time. The queue holds locks
+/// during these calls, so they must return soon and must not call the queue.
 class JobSink {
  public:
   virtual ~JobSink() = default;
 
-  /// A job as it is now.
+  /// Receives the present state of a job.
   virtual void Take(const v1::Job& job) = 0;
 
   /// All jobs that waited or ran were taken; changes follow.

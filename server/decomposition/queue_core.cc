@@ -287,8 +287,8 @@ absl::StatusOr<DecompositionJobPage> QueueCore::List(int page_size, const std::s
   std::map<std::string, v1::Job> active = jobs_.ViewAll();
   ASSIGN_OR_RETURN(JobPage records, database_.jobs().List(page_size, page_token, AsStored(filter)));
   DecompositionJobPage page;
-  // Of jobs that are stored as queued, the database does not know which run. Pages of which
-  // nothing is left are skipped.
+  // The database stores running jobs as queued, so the filter is applied again to the present
+  // states. A page without a matching job is skipped.
   while (true) {
     for (const JobRecord& record : records.jobs) {
       const auto job = active.find(record.digest);

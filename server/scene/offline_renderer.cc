@@ -188,8 +188,8 @@ uint64_t OfflineRenderer::EndFrame() const {
   return last + static_cast<uint64_t>(std::ceil(tail_s * settings_.sample_rate_hz));
 }
 
-/// Pushes the events before `frame`, and as many as find room of those whose contacts may begin
-/// before it.
+/// Pushes the events before `frame`. Then pushes the events whose contacts may begin before
+/// `frame`, until the mixer's queue is full.
 void OfflineRenderer::PushEventsBefore(uint64_t frame) {
   while (pushed_count_ < events().size()) {
     const MixerEvent& event = events()[pushed_count_];

@@ -116,7 +116,7 @@ class LastingStream final : public ContactStream {
   }
 
  private:
-  /// Keeps what is known of a stream whose connection is lost, and lets the thread open another.
+  /// Keeps the report of the stream whose connection is lost, and lets the thread open another.
   void Lose() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
     loss_ = std::exchange(status_, absl::OkStatus());
     report_ = stream_->Report();
@@ -176,7 +176,7 @@ class LastingStream final : public ContactStream {
   mutable absl::Mutex mutex_;
   std::unique_ptr<ContactStream> stream_ ABSL_GUARDED_BY(mutex_);  ///< null: none is open now
   std::unique_ptr<ContactStream> lost_ ABSL_GUARDED_BY(mutex_);    ///< to be destroyed
-  absl::Status status_ ABSL_GUARDED_BY(mutex_);  ///< what has ended the stream for good
+  absl::Status status_ ABSL_GUARDED_BY(mutex_);  ///< the error that has ended the stream for good
   absl::Status loss_ ABSL_GUARDED_BY(mutex_);    ///< why no stream is open
   v1::StreamContactsResponse report_ ABSL_GUARDED_BY(mutex_);
   uint64_t dropped_step_count_ ABSL_GUARDED_BY(mutex_) = 0;

@@ -142,7 +142,7 @@ TEST(PrepareSurface, AWideHoleIsFilledWhereItIs) {
   ASSERT_TRUE(filled.ok()) << filled.status();
   EXPECT_NEAR(Volume(filled->surface), Volume(ball), 0.01 * Volume(ball));
   EXPECT_THAT(filled->warnings[0], HasSubstr("holes filled with smooth patches"));
-  // What was given is still there.
+  // The repaired surface has kept the given vertices.
   for (size_t v = 0; v < open.vertices.size(); v += 7) {
     bool used = false;
     for (const auto& triangle : open.triangles) {
