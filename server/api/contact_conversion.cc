@@ -2,6 +2,7 @@
 #include "server/api/contact_conversion.h"
 
 #include <algorithm>
+#include <array>
 #include <utility>
 #include <variant>
 
@@ -16,6 +17,15 @@ namespace carillon {
 namespace {
 
 Point ToArray(const v1::Vec3& vector) { return {vector.x(), vector.y(), vector.z()}; }
+
+template <typename Number>
+v1::Vec3 ToVec3(const std::array<Number, 3>& vector) {
+  v1::Vec3 proto;
+  proto.set_x(vector[0]);
+  proto.set_y(vector[1]);
+  proto.set_z(vector[2]);
+  return proto;
+}
 
 SurfacePoint ToSurfacePoint(const v1::SurfacePoint& point) {
   return {.triangle = point.triangle(),
@@ -155,12 +165,8 @@ v1::Blow ToProto(const FoundBlow& blow) {
   proto.set_object(blow.handle);
   if (blow.by && blow.by_sounds) proto.set_other_object(*blow.by);
   if (blow.by && !blow.by_sounds) proto.set_partner(*blow.by);
-  proto.mutable_point_m()->set_x(blow.point_m[0]);
-  proto.mutable_point_m()->set_y(blow.point_m[1]);
-  proto.mutable_point_m()->set_z(blow.point_m[2]);
-  proto.mutable_impulse_newton_seconds()->set_x(blow.impulse_newton_seconds[0]);
-  proto.mutable_impulse_newton_seconds()->set_y(blow.impulse_newton_seconds[1]);
-  proto.mutable_impulse_newton_seconds()->set_z(blow.impulse_newton_seconds[2]);
+  *proto.mutable_point_m() = ToVec3(blow.point_m);
+  *proto.mutable_impulse_newton_seconds() = ToVec3(blow.impulse_newton_seconds);
   proto.set_duration_s(blow.duration_s);
   return proto;
 }
