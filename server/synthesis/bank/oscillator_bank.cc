@@ -78,6 +78,7 @@ bool OscillatorBank::RenderModesInTime(BlockMix& mix) noexcept {
 
 bool OscillatorBank::EndBlock() noexcept {
   const bool finite = std::exchange(block_, {}).finite;
+  loudness_changed_ = true;
   if (!finite) Silence();
   if (std::exchange(awake_changed_, false) || AwakeCounts() != counted_) CountAwake();
   return finite;
@@ -170,6 +171,7 @@ void OscillatorBank::SilenceLanes() noexcept {
 }
 
 bool OscillatorBank::BoundLoudness() noexcept {
+  if (!std::exchange(loudness_changed_, false)) return false;
   const double loudest = loudest_squared();
   if (!(loudest > kMostAmplitude * kMostAmplitude)) return false;
   const double factor = kMostAmplitude / std::sqrt(loudest);

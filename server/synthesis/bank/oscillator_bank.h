@@ -283,17 +283,20 @@ class OscillatorBank {
   std::vector<LongSegment> long_segments_;  // kLongBlockKinds of them
   // Modes, without companions, in each group of kMostLanes lanes, by segment.
   std::vector<uint8_t> group_mode_counts_;
+  // A block without events in which the bank rings by spectrum reads only the members from here to
+  // the begin of force_, so that a thousand banks cost few cache misses.
   Block block_;
   Ringing ringing_ = Ringing::kNowhere;
-  bool awake_changed_ = false;  // the awake lanes are to be counted again
+  bool awake_changed_ = false;     // the awake lanes are to be counted again
+  bool loudness_changed_ = false;  // since BoundLoudness
   bool leaving_spectrum_ = false;
   size_t active_mode_count_ = 0;
   double ringing_work_ = 0;
   float loudness_per_newton_second_ = 0;
-  LaneArrays lanes_;
-  SustainedForce force_;
   std::unique_ptr<DirectedGains> gains_;
   std::unique_ptr<AccelerationNoise> moved_;
+  SustainedForce force_;
+  LaneArrays lanes_;
 };
 
 /// The SIMD target in use on this machine ("AVX3", "AVX2", "SSE4", "NEON", ...).

@@ -103,8 +103,8 @@ OscillatorBank::OscillatorBank(const LanePlan& plan, const SoundingModes& soundi
       lane_count_(CountLanes(plan)),
       first_column_(FirstColumn(sounding)),
       column_count_(CountColumns(sounding)),
-      lanes_(lane_count_),
-      force_(lane_count_, column_count_, settings.sample_rate_hz, settings.noise_seed) {
+      force_(lane_count_, column_count_, settings.sample_rate_hz, settings.noise_seed),
+      lanes_(lane_count_) {
   assert(block_frame_count_ > 0 && block_frame_count_ <= kMostBlockFrames);
   assert(first_column_ + column_count_ <= shapes_.mode_count());
   assert(lane_count_ <= StrikeBatch::kMostBankLanes);

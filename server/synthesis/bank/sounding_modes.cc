@@ -68,7 +68,7 @@ void MakePair(bool directed, SoundingMode& first, SoundingMode& second) {
   second.output_phase_rad = kPi / 2;
 }
 
-/// What the air does to a mode.
+/// The coupling of a mode to the air, and the damping that it causes.
 struct RadiatingMode {
   double coupling = 0;     ///< as SoundingMode::coupling
   double decay_per_s = 0;  ///< by radiation

@@ -64,10 +64,10 @@ class SustainedForce {
 
   void NextShares(size_t frame_count, Shares& from, Shares& to) noexcept;
 
+  bool driving_ = false;  // first, because it is read in every block
   ForceArrays arrays_;
   float sample_rate_hz_;
   RoughnessNoise noise_;
-  bool driving_ = false;
   bool releasing_ = false;           // the drive goes to zero
   float position_ = 1;               // from the last knot (0) to the next (1)
   float advance_ = 0;                // of the position per frame
