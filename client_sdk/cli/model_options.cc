@@ -12,9 +12,11 @@
 #include <string>
 #include <vector>
 
+#include "absl/strings/str_cat.h"
 #include "client_sdk/cli/commands.h"
 #include "client_sdk/cli/material_options.h"
 #include "client_sdk/cli/quantity.h"
+#include "proto/cpp/mesh_format.h"
 #include "proto/cpp/parsed_option.h"
 #include "proto/cpp/settings_options.h"
 
@@ -55,7 +57,7 @@ void AddModelCreate(CLI::App& app, Program& program) {
           "CalculiX INP)")
       ->required();
   create.add_option("--format", options->format,
-                    "obj, ply, stl, off, glb, gltf, msh, mesh, node or inp [the file's suffix]");
+                    absl::StrCat(MeshFormatNames(), " [the file's suffix]"));
   create.add_option("--label", options->label, "name for people of a single file [its name]");
   create.add_option("--size", options->size,
                     "size it is meant to sound with, relative to the file");
@@ -65,7 +67,7 @@ void AddModelCreate(CLI::App& app, Program& program) {
   create.add_flag("--coarse-first", options->coarse_first,
                   "first a model of few nodes, under the same name, to sound with meanwhile");
   create.add_option("--priority", options->priority, "-100 to 100: higher ones start first");
-  create.add_option("--time-limit", options->time_limit_s, "give up after so many seconds");
+  create.add_option("--time-limit", options->time_limit_s, "give up after this many seconds");
   create.add_option("--memory-limit-mib", options->memory_limit_mib, "memory that it may take");
   options->wait = isatty(STDERR_FILENO) != 0;
   create.add_flag("--wait,!--no-wait", options->wait,

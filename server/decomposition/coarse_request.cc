@@ -1,18 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/decomposition/coarse_request.h"
 
-#include <algorithm>
-#include <array>
 #include <string>
 
 #include "absl/strings/str_cat.h"
+#include "proto/cpp/mesh_format.h"
 #include "server/decomposition/memory_estimate.h"
 #include "server/mode_database/model_store.h"
 
 namespace carillon {
 namespace {
 
-constexpr std::array kSurfaceFormats = {"obj", "ply", "stl", "off"};
 constexpr uint32_t kCoarseCornerCount = 300;
 /// Meshes with more corners than this take long with quadratic elements.
 constexpr double kFineSurface = 1500;
@@ -27,8 +25,8 @@ std::string CoarseLabel(const std::string& label) {
 std::optional<v1::CreateModalModelRequest> CoarseRequest(
     const v1::CreateModalModelRequest& resolved, uint64_t mesh_bytes) {
   if (!resolved.coarse_first()) return std::nullopt;
-  const auto* format = std::ranges::find(kSurfaceFormats, resolved.mesh_format());
-  if (format == kSurfaceFormats.end()) return std::nullopt;
+  const MeshFormat* format = FindMeshFormat(resolved.mesh_format());
+  if (format == nullptr || !format->is_surface) return std::nullopt;
   const uint32_t asked = resolved.settings().mesh().target_node_count();
   if (asked > 0 && asked <= kCoarseCornerCount) return std::nullopt;
   v1::CreateModalModelRequest coarse = resolved;

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/decomposition/decomposition_request.h"
 
-#include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -10,6 +8,7 @@
 #include "proto/cpp/decomposition_settings.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/material_catalogue.h"
+#include "proto/cpp/mesh_format.h"
 #include "proto/cpp/status_macros.h"
 #include "server/base/sha256.h"
 #include "server/mode_database/model_store.h"
@@ -17,8 +16,6 @@
 namespace carillon {
 namespace {
 
-constexpr std::array kFormats = {"obj",  "ply", "stl",  "off",  "glb",
-                                 "gltf", "msh", "mesh", "node", "inp"};
 /// Upper end of a band that the request leaves open, Hz.
 constexpr double kOpenBandHz = 20'000;
 constexpr int kMostPriority = 100;
@@ -34,11 +31,10 @@ double HighestHz(const v1::CreateModalModelRequest& request) {
 }
 
 absl::Status CheckMesh(const v1::CreateModalModelRequest& request) {
-  if (std::ranges::find(kFormats, request.mesh_format()) == kFormats.end()) {
+  if (FindMeshFormat(request.mesh_format()) == nullptr) {
     return Refusal(
         absl::StatusCode::kInvalidArgument, "MESH_FORMAT_UNKNOWN",
-        absl::StrCat("mesh_format is \"", request.mesh_format(),
-                     "\"; name one of obj, ply, stl, off, glb, gltf, msh, mesh, node, inp"));
+        absl::StrCat("mesh_format is \"", request.mesh_format(), "\"; give ", MeshFormatNames()));
   }
   if (!IsSha256Hex(request.mesh_digest())) {
     return Refusal(

@@ -3,23 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string>
+
+#include "proto/cpp/mesh_format.h"
 
 namespace carillon {
 namespace {
-
-bool IsOfTetrahedra(const std::string& format) {
-  return format == "msh" || format == "mesh" || format == "node" || format == "inp";
-}
-
-// Bytes of a mesh file for each vertex. A closed surface has two triangles a vertex; OBJ is taken
-// for text, the other surface formats for binary.
-double BytesAVertex(const std::string& format) {
-  if (format == "obj" || format == "gltf") return 90;
-  if (format == "stl") return 100;
-  if (IsOfTetrahedra(format)) return 250;  // a vertex of tetrahedra, of which there are five each
-  return 60;
-}
 
 // Nodes of a quadratic mesh for each corner: the corner and its share of the mid-side nodes.
 constexpr double kQuadraticNodesACorner = 7.5;
@@ -29,11 +17,12 @@ constexpr double kCornersAVertex = 2;  // those inside, too
 }  // namespace
 
 double GuessNodeCount(const v1::CreateModalModelRequest& resolved, uint64_t mesh_bytes) {
-  const bool tetrahedra = IsOfTetrahedra(resolved.mesh_format());
-  const double vertices = static_cast<double>(mesh_bytes) / BytesAVertex(resolved.mesh_format());
-  double corners = std::max(kFewestCorners, vertices * (tetrahedra ? 1 : kCornersAVertex));
+  const MeshFormat* known = FindMeshFormat(resolved.mesh_format());
+  const MeshFormat& format = known != nullptr ? *known : kMeshFormats.front();
+  const double vertices = static_cast<double>(mesh_bytes) / format.bytes_per_vertex;
+  double corners = std::max(kFewestCorners, vertices * (format.is_surface ? kCornersAVertex : 1));
   const uint32_t asked = resolved.settings().mesh().target_node_count();
-  if (asked > 0 && !tetrahedra) corners = asked;
+  if (asked > 0 && format.is_surface) corners = asked;
   return resolved.settings().element() == v1::ELEMENT_LINEAR ? corners
                                                              : corners * kQuadraticNodesACorner;
 }

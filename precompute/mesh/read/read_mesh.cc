@@ -2,7 +2,6 @@
 #include "precompute/mesh/read/read_mesh.h"
 
 #include <algorithm>
-#include <array>
 #include <filesystem>
 #include <fstream>
 #include <optional>
@@ -19,6 +18,7 @@
 #include "precompute/mesh/read/tetgen_file.h"
 #include "precompute/mesh/read/text_encoding.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/mesh_format.h"
 #include "proto/cpp/status_macros.h"
 
 namespace carillon::precompute {
@@ -26,8 +26,6 @@ namespace {
 
 constexpr size_t kMostMeshBytes = size_t{256} << 20;
 constexpr size_t kReadPiece = size_t{1} << 20;
-constexpr std::array<const char*, 6> kSurfaceFormats = {"obj", "ply", "stl", "off", "glb", "gltf"};
-constexpr std::array<const char*, 4> kElementFormats = {"msh", "mesh", "node", "inp"};
 
 /// Reads at most `limit` bytes from the file's place on. The file may be a pipe, which knows no
 /// length.
@@ -73,14 +71,6 @@ void Scale(NamedMesh& named, double factor) {
   for (auto& [number, p] : named.names.vertices) Scale(p, factor);
 }
 
-bool IsSurfaceFormat(const std::string& format) {
-  return std::ranges::find(kSurfaceFormats, format) != kSurfaceFormats.end();
-}
-
-bool IsElementFormat(const std::string& format) {
-  return std::ranges::find(kElementFormats, format) != kElementFormats.end();
-}
-
 absl::StatusOr<ElementFile> ParseElements(const std::string& bytes, const std::string& format) {
   if (format == "msh") return ParseGmsh(bytes);
   if (format == "inp") return ParseInp(bytes);
@@ -110,18 +100,16 @@ absl::StatusOr<std::string> ReadMeshFile(const std::string& path, const std::str
 
 absl::StatusOr<NamedMesh> ParseMesh(const std::string& bytes, const std::string& format,
                                     double metres_per_unit) {
-  const bool is_surface = IsSurfaceFormat(format);
-  if (!is_surface && !IsElementFormat(format)) {
+  const MeshFormat* known = FindMeshFormat(format);
+  if (known == nullptr) {
     return Refusal(
         absl::StatusCode::kInvalidArgument, "MESH_FORMAT_UNKNOWN",
-        absl::StrCat("there is no mesh format \"", format,
-                     "\": give obj, ply, stl, off, glb or gltf (a surface), msh (Gmsh), mesh "
-                     "(Medit), node (TetGen) or inp (Abaqus, CalculiX)"));
+        absl::StrCat("there is no mesh format \"", format, "\": give ", MeshFormatNames()));
   }
   const std::optional<std::string> text = Utf8OfUtf16(bytes);
   const std::string& content = text ? *text : bytes;
-  ASSIGN_OR_RETURN(NamedMesh named,
-                   is_surface ? ReadSurface(content, format) : ReadElements(content, format));
+  ASSIGN_OR_RETURN(NamedMesh named, known->is_surface ? ReadSurface(content, format)
+                                                      : ReadElements(content, format));
   Scale(named, metres_per_unit);
   return named;
 }

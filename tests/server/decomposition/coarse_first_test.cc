@@ -8,6 +8,7 @@
 #include <condition_variable>
 #include <mutex>
 
+#include "proto/cpp/mesh_format.h"
 #include "server/decomposition/coarse_request.h"
 #include "server/decomposition/decomposition_queue.h"
 #include "server/decomposition/decomposition_request.h"
@@ -246,6 +247,14 @@ TEST_F(CoarseFirstTest, AFineJobMayBeCancelledWhileItWaits) {
 TEST_F(CoarseFirstTest, TetrahedraHaveNoCoarserMesh) {
   request_.set_mesh_format("msh");
   EXPECT_FALSE(CoarseRequest(*ResolveRequest(request_), 5).has_value());
+}
+
+TEST_F(CoarseFirstTest, ASurfaceOfAnyFormatHasACoarserMesh) {
+  for (const MeshFormat& format : kMeshFormats) {
+    request_.set_mesh_format(std::string(format.name));
+    EXPECT_EQ(CoarseRequest(*ResolveRequest(request_), 5).has_value(), format.is_surface)
+        << format.name;
+  }
 }
 
 TEST_F(CoarseFirstTest, AFineSurfaceIsTakenWithLinearElements) {

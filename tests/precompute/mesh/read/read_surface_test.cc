@@ -134,7 +134,7 @@ TEST_F(ReadSurfaceTest, AMissingFileIsRefused) {
 
 TEST_F(ReadSurfaceTest, AnUnknownFormatIsRefused) {
   EXPECT_THAT(Refused("x", "dae"),
-              HasSubstr("MESH_FORMAT_UNKNOWN: there is no mesh format \"dae\""));
+              HasSubstr("MESH_FORMAT_UNKNOWN: there is no mesh format \"dae\": give obj, ply, "));
 }
 
 TEST_F(ReadSurfaceTest, AnEmptyFileIsRefused) {

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <string>
+#include <string_view>
+
+namespace carillon {
+
+/// A format of mesh files, as CreateModalModelRequest.mesh_format names it.
+struct MeshFormat {
+  std::string_view name;  ///< also the suffix of its files
+  bool is_surface;        ///< triangles only; otherwise tetrahedra, or triangles
+  /// Typical size of a file for each vertex, from which memory is predicted before the file is
+  /// read.
+  double bytes_per_vertex;
+};
+
+/// Every format that carillon-precompute reads. A closed surface has two triangles for each vertex,
+/// a solid about five tetrahedra. OBJ and glTF are text; PLY, STL, OFF and GLB are counted as
+/// binary.
+inline constexpr std::array kMeshFormats = std::to_array<MeshFormat>({
+    {.name = "obj", .is_surface = true, .bytes_per_vertex = 90},
+    {.name = "ply", .is_surface = true, .bytes_per_vertex = 60},
+    {.name = "stl", .is_surface = true, .bytes_per_vertex = 100},
+    {.name = "off", .is_surface = true, .bytes_per_vertex = 60},
+    {.name = "glb", .is_surface = true, .bytes_per_vertex = 60},
+    {.name = "gltf", .is_surface = true, .bytes_per_vertex = 90},
+    {.name = "msh", .is_surface = false, .bytes_per_vertex = 250},
+    {.name = "mesh", .is_surface = false, .bytes_per_vertex = 250},
+    {.name = "node", .is_surface = false, .bytes_per_vertex = 250},
+    {.name = "inp", .is_surface = false, .bytes_per_vertex = 250},
+});
+
+/// Returns the format of that name; null if there is none.
+const MeshFormat* FindMeshFormat(std::string_view name);
+
+/// Returns the names of all formats: "obj, ply, ... or inp".
+std::string MeshFormatNames();
+
+}  // namespace carillon
