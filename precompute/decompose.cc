@@ -156,7 +156,7 @@ void WarnOfGreatErrors(ModalModel& model) {
       many, model.eigenvalues.size(), 100 * kGreatError, 100 * model.WorstError()));
 }
 
-/// What takes time after the matrices.
+/// Returns the steps after the assembly of the matrices, with their predicted times.
 std::vector<PlannedStep> PlanOf(const SolveCost& cost) {
   return {{.phase = v1::PHASE_VERIFY, .predicted_s = cost.count_s},
           {.phase = v1::PHASE_FACTOR, .predicted_s = cost.factor_s},

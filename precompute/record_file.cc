@@ -108,7 +108,7 @@ absl::Status ReadModelRecords(const std::string& path,
   file.SetCloseOnDelete(true);
   v1::ModalModelRecord record;
   bool ended = false;
-  // Parsing merges into what the record held.
+  // Parsing merges into the record, so that it must be empty before.
   for (; ParseDelimitedFromZeroCopyStream(&record, &file, &ended); record.Clear()) {
     RETURN_IF_ERROR(CheckHash(record));
     RETURN_IF_ERROR(take(record));

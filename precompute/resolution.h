@@ -37,8 +37,8 @@ std::optional<double> NextElementSize(const ResolutionGoal& goal, const std::vec
 /// Predicted time of a round with this element size, relative to the round `last`.
 double TimeGrowth(const Round& last, double element_size_m);
 
-/// Warnings for the user about each budget that was exceeded. The first round is solved whatever it
-/// costs, and the cost of later rounds is only predicted.
+/// Warnings for the user about each budget that was exceeded. A budget can be exceeded in two ways:
+/// the first round is always solved, and later rounds are chosen by a predicted cost.
 std::vector<std::string> OverrunWarnings(const ResolutionGoal& goal, double used_s,
                                          double used_bytes);
 

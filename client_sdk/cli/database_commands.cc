@@ -5,6 +5,7 @@
 #include "client_sdk/cli/commands.h"
 #include "client_sdk/cli/find_model.h"
 #include "client_sdk/cli/output.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::cli {
 namespace {
@@ -15,47 +16,42 @@ constexpr double kMib = 1 << 20;
 
 absl::Status UpdateModel(const client::Client& daemon, const std::string& text,
                          v1::UpdateModalModelRequest change, bool json) {
-  const auto name = FindModel(daemon, text);
-  if (!name.ok()) return name.status();
-  change.set_name(*name);
-  const auto model = daemon.UpdateModalModel(change);
-  if (!model.ok()) return model.status();
-  if (json) PrintJson(*model);
+  ASSIGN_OR_RETURN(const auto name, FindModel(daemon, text));
+  change.set_name(name);
+  ASSIGN_OR_RETURN(const auto model, daemon.UpdateModalModel(change));
+  if (json) PrintJson(model);
   return absl::OkStatus();
 }
 
 absl::Status ShowDatabaseStats(const client::Client& daemon, bool json) {
-  const auto stats = daemon.GetDatabaseStats();
-  if (!stats.ok()) return stats.status();
+  ASSIGN_OR_RETURN(const auto stats, daemon.GetDatabaseStats());
   if (json) {
-    PrintJson(*stats);
+    PrintJson(stats);
     return absl::OkStatus();
   }
-  absl::PrintF("models       %d, %.1f MiB\n", stats->model_count(),
-               static_cast<double>(stats->model_bytes()) / kMib);
-  absl::PrintF("quarantined  %d\n", stats->quarantined_count());
-  absl::PrintF("meshes       %d, %.1f MiB\n", stats->mesh_count(),
-               static_cast<double>(stats->mesh_bytes()) / kMib);
-  absl::PrintF("jobs         %d, %d unfinished\n", stats->job_count(),
-               stats->unfinished_job_count());
+  absl::PrintF("models       %d, %.1f MiB\n", stats.model_count(),
+               static_cast<double>(stats.model_bytes()) / kMib);
+  absl::PrintF("quarantined  %d\n", stats.quarantined_count());
+  absl::PrintF("meshes       %d, %.1f MiB\n", stats.mesh_count(),
+               static_cast<double>(stats.mesh_bytes()) / kMib);
+  absl::PrintF("jobs         %d, %d unfinished\n", stats.job_count(), stats.unfinished_job_count());
   absl::PrintF("file         %.1f MiB, %.1f MiB free, schema %d\n",
-               static_cast<double>(stats->file_bytes()) / kMib,
-               static_cast<double>(stats->free_bytes()) / kMib, stats->schema_version());
+               static_cast<double>(stats.file_bytes()) / kMib,
+               static_cast<double>(stats.free_bytes()) / kMib, stats.schema_version());
   return absl::OkStatus();
 }
 
 absl::Status CollectGarbage(const client::Client& daemon, const v1::CollectGarbageRequest& request,
                             bool json) {
-  const auto collected = daemon.CollectGarbage(request);
-  if (!collected.ok()) return collected.status();
+  ASSIGN_OR_RETURN(const auto collected, daemon.CollectGarbage(request));
   if (json) {
-    PrintJson(*collected);
+    PrintJson(collected);
   } else {
     absl::PrintF("%d models %sdeleted, %.1f MiB; %d meshes without a model or job, %.1f MiB\n",
-                 collected->deleted_count(), request.dry_run() ? "would be " : "",
-                 static_cast<double>(collected->deleted_bytes()) / kMib,
-                 collected->deleted_mesh_count(),
-                 static_cast<double>(collected->deleted_mesh_bytes()) / kMib);
+                 collected.deleted_count(), request.dry_run() ? "would be " : "",
+                 static_cast<double>(collected.deleted_bytes()) / kMib,
+                 collected.deleted_mesh_count(),
+                 static_cast<double>(collected.deleted_mesh_bytes()) / kMib);
   }
   return absl::OkStatus();
 }

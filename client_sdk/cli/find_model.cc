@@ -7,6 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/strip.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::cli {
 namespace {
@@ -46,17 +47,14 @@ absl::StatusOr<std::string> Choose(const std::vector<Item>& items, const std::st
 
 absl::StatusOr<std::string> FindModel(const client::Client& daemon, const std::string& text) {
   if (absl::StartsWith(text, kModels)) return text;
-  const auto models = daemon.ListModalModels();
-  if (!models.ok()) return models.status();
-  return Choose(*models, text,
-                {kModels, "MODAL_MODEL_NOT_FOUND", "MODAL_MODEL_AMBIGUOUS", "model"});
+  ASSIGN_OR_RETURN(const auto models, daemon.ListModalModels());
+  return Choose(models, text, {kModels, "MODAL_MODEL_NOT_FOUND", "MODAL_MODEL_AMBIGUOUS", "model"});
 }
 
 absl::StatusOr<std::string> FindJob(const client::Client& daemon, const std::string& text) {
   if (absl::StartsWith(text, kJobs)) return text;
-  const auto jobs = daemon.ListJobs();
-  if (!jobs.ok()) return jobs.status();
-  return Choose(*jobs, std::string(absl::StripPrefix(text, kModels)),
+  ASSIGN_OR_RETURN(const auto jobs, daemon.ListJobs());
+  return Choose(jobs, std::string(absl::StripPrefix(text, kModels)),
                 {kJobs, "JOB_NOT_FOUND", "JOB_AMBIGUOUS", "job"});
 }
 

@@ -4,6 +4,7 @@
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/loss_factor.h"
 #include "proto/cpp/material_catalogue.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::cli {
 
@@ -16,9 +17,8 @@ absl::StatusOr<v1::Material> ToMaterial(const MaterialFigures& figures) {
   if (figures.alpha1_s) material.set_alpha1_s(*figures.alpha1_s);
   if (figures.alpha2_per_s) material.set_alpha2_per_s(*figures.alpha2_per_s);
   if (!figures.loss_factor.empty()) {
-    const auto points = ReadLossFactor(figures.loss_factor);
-    if (!points.ok()) return points.status();
-    SetLossFactor(*points, material);
+    ASSIGN_OR_RETURN(const auto points, ReadLossFactor(figures.loss_factor));
+    SetLossFactor(points, material);
   }
   if (!figures.lame_lambda_pa && !figures.lame_mu_pa) return material;
   if (!figures.lame_lambda_pa || !figures.lame_mu_pa || figures.young_pa || figures.poisson_ratio) {

@@ -77,15 +77,14 @@ absl::StatusOr<std::string> ReadAllOfMesh(const CreateModelOptions& options,
 absl::StatusOr<v1::CreateModalModelRequest> MakeRequest(const CreateModelOptions& options,
                                                         const std::string& file,
                                                         std::string mesh_digest) {
-  auto material = ToMaterial(options.material);
-  if (!material.ok()) return material.status();
+  ASSIGN_OR_RETURN(auto material, ToMaterial(options.material));
   v1::CreateModalModelRequest request;
   request.set_mesh_digest(std::move(mesh_digest));
   request.set_mesh_format(Format(options, file));
   *request.mutable_settings() = options.settings;
   request.set_coarse_first(options.coarse_first);
   request.set_without_transfer(options.without_transfer);
-  *request.mutable_material() = *std::move(material);
+  *request.mutable_material() = std::move(material);
   request.set_size(options.size);
   request.set_min_frequency_hz(options.min_frequency_hz);
   request.set_max_frequency_hz(options.max_frequency_hz);
@@ -274,13 +273,11 @@ absl::Status CreateModel(const client::Client& daemon, const CreateModelOptions&
 
 absl::Status CreateTransfer(const client::Client& daemon, const CreateTransferOptions& options,
                             bool json) {
-  const auto model = FindModel(daemon, options.model);
-  if (!model.ok()) return model.status();
-  const auto material = ToMaterial(options.material);
-  if (!material.ok()) return material.status();
+  ASSIGN_OR_RETURN(const auto model, FindModel(daemon, options.model));
+  ASSIGN_OR_RETURN(const auto material, ToMaterial(options.material));
   v1::CreateTransferRequest request;
-  request.set_modal_model(*model);
-  *request.mutable_material() = *material;
+  request.set_modal_model(model);
+  *request.mutable_material() = material;
   request.set_size(options.size);
   request.mutable_settings()->set_accuracy_db(options.accuracy_db);
   request.mutable_settings()->set_budget_s(options.budget_s);
@@ -292,13 +289,10 @@ absl::Status ListModels(const client::Client& daemon, const v1::ListModalModelsR
                         bool json) {
   v1::ListModalModelsResponse list;
   if (filter.page_size() > 0) {
-    auto page = daemon.ListModalModelsPage(filter);
-    if (!page.ok()) return page.status();
-    list = *std::move(page);
+    ASSIGN_OR_RETURN(list, daemon.ListModalModelsPage(filter));
   } else {
-    auto models = daemon.ListModalModels(filter);
-    if (!models.ok()) return models.status();
-    for (auto& model : *models) *list.add_modal_models() = std::move(model);
+    ASSIGN_OR_RETURN(auto models, daemon.ListModalModels(filter));
+    for (auto& model : models) *list.add_modal_models() = std::move(model);
   }
   if (json) {
     for (v1::ModalModelSummary& model : *list.mutable_modal_models()) Shorten(model);
@@ -314,42 +308,35 @@ absl::Status ListModels(const client::Client& daemon, const v1::ListModalModelsR
 
 absl::Status ShowModel(const client::Client& daemon, const std::string& text,
                        const MaterialFigures& figures, bool json) {
-  const auto name = FindModel(daemon, text);
-  if (!name.ok()) return name.status();
-  const auto model = daemon.GetModalModel(*name);
-  if (!model.ok()) return model.status();
+  ASSIGN_OR_RETURN(const auto name, FindModel(daemon, text));
+  ASSIGN_OR_RETURN(const auto model, daemon.GetModalModel(name));
   if (json) {
-    PrintJson(*model);
+    PrintJson(model);
     return absl::OkStatus();
   }
-  const auto given = ToMaterial(figures);
-  if (!given.ok()) return given.status();
-  const bool is_given = !given->preset().empty() || given->has_young_pa();
-  const v1::Material& chosen = is_given ? *given : model->material();
-  const bool has_material = is_given || model->has_material();
-  const auto material = has_material ? ResolveMaterial(chosen) : chosen;
-  if (!material.ok()) return material.status();
-  PrintSummary(*model);
-  if (has_material) PrintBand(*model, *material);
-  if (has_material) PrintModes(*model, *material);
+  ASSIGN_OR_RETURN(const auto given, ToMaterial(figures));
+  const bool is_given = !given.preset().empty() || given.has_young_pa();
+  const v1::Material& chosen = is_given ? given : model.material();
+  const bool has_material = is_given || model.has_material();
+  ASSIGN_OR_RETURN(const auto material, has_material ? ResolveMaterial(chosen) : chosen);
+  PrintSummary(model);
+  if (has_material) PrintBand(model, material);
+  if (has_material) PrintModes(model, material);
   return absl::OkStatus();
 }
 
 absl::Status DeleteModel(const client::Client& daemon, const std::string& text) {
-  const auto name = FindModel(daemon, text);
-  if (!name.ok()) return name.status();
-  return daemon.DeleteModalModel(*name);
+  ASSIGN_OR_RETURN(const auto name, FindModel(daemon, text));
+  return daemon.DeleteModalModel(name);
 }
 
 absl::Status WatchJob(const client::Client& daemon, const std::string& text, bool json) {
-  const auto name = FindJob(daemon, text);
-  if (!name.ok()) return name.status();
-  const auto job = WatchWithProgress(daemon, *name);
-  if (!job.ok()) return job.status();
+  ASSIGN_OR_RETURN(const auto name, FindJob(daemon, text));
+  ASSIGN_OR_RETURN(const auto job, WatchWithProgress(daemon, name));
   if (json) {
-    PrintJson(*job);
+    PrintJson(job);
   } else {
-    absl::PrintF("%s\n", job->modal_model());
+    absl::PrintF("%s\n", job.modal_model());
   }
   return absl::OkStatus();
 }

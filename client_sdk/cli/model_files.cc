@@ -18,6 +18,7 @@
 #include "client_sdk/interchange/npz_model.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/material_catalogue.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::cli {
 namespace {
@@ -59,9 +60,8 @@ absl::StatusOr<v1::Material> MaterialFor(const std::string& format,
 
 absl::StatusOr<StoredModel> Fetch(const client::Client& daemon, const std::string& name) {
   interchange::ModelAssembler assembler;
-  const absl::Status status = daemon.ExportModalModel(
-      name, [&](const v1::ModalModelRecord& record) { return assembler.Append(record); });
-  if (!status.ok()) return status;
+  RETURN_IF_ERROR(daemon.ExportModalModel(
+      name, [&](const v1::ModalModelRecord& record) { return assembler.Append(record); }));
   return assembler.Finish();
 }
 
@@ -71,24 +71,20 @@ absl::Status WriteGltf(const client::Client& daemon, const std::string& name,
     return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
                    "a glTF holds the frequencies and decay rates of one material; give --material");
   }
-  absl::StatusOr<v1::Material> material = ResolveMaterial(given);
-  if (!material.ok()) return material.status();
-  const absl::StatusOr<v1::ModalModelSummary> summary = daemon.GetModalModel(name);
-  if (!summary.ok()) return summary.status();
-  const absl::StatusOr<StoredModel> model = Fetch(daemon, name);
-  if (!model.ok()) return model.status();
-  if (!material->has_poisson_ratio()) {
-    material->set_poisson_ratio(model->header.settings().poisson_ratio());
+  ASSIGN_OR_RETURN(v1::Material material, ResolveMaterial(given));
+  ASSIGN_OR_RETURN(const v1::ModalModelSummary summary, daemon.GetModalModel(name));
+  ASSIGN_OR_RETURN(const StoredModel model, Fetch(daemon, name));
+  if (!material.has_poisson_ratio()) {
+    material.set_poisson_ratio(model.header.settings().poisson_ratio());
   }
-  return interchange::WriteGltfModel(
-      file, *model, *material, {.body = summary->label(), .material = given.preset()}, binary);
+  return interchange::WriteGltfModel(file, model, material,
+                                     {.body = summary.label(), .material = given.preset()}, binary);
 }
 
 absl::Status WriteNpz(const client::Client& daemon, const std::string& name,
                       const std::string& file) {
-  const absl::StatusOr<StoredModel> model = Fetch(daemon, name);
-  if (!model.ok()) return model.status();
-  return interchange::WriteNpz(file, *model);
+  ASSIGN_OR_RETURN(const StoredModel model, Fetch(daemon, name));
+  return interchange::WriteNpz(file, model);
 }
 
 absl::StatusOr<v1::ModalModelSummary> Store(const client::Client& daemon, const StoredModel& model,
@@ -123,23 +119,19 @@ std::string OptionsOf(const v1::Material& material) {
 absl::StatusOr<Imported> ImportGltf(const client::Client& daemon, const ImportOptions& options,
                                     v1::Material material) {
   if (!material.preset().empty()) {
-    absl::StatusOr<v1::Material> resolved = ResolveMaterial(material);
-    if (!resolved.ok()) return resolved.status();
-    material = *std::move(resolved);
+    ASSIGN_OR_RETURN(material, ResolveMaterial(material));
   }
-  const auto read = interchange::ReadGltfModel(options.file, options.pick, material);
-  if (!read.ok()) return read.status();
-  auto summary = Store(daemon, read->model, options.label.empty() ? read->label : options.label);
-  if (!summary.ok()) return summary.status();
-  return Imported{.summary = *std::move(summary), .sounds_with = OptionsOf(read->material)};
+  ASSIGN_OR_RETURN(const auto read,
+                   interchange::ReadGltfModel(options.file, options.pick, material));
+  ASSIGN_OR_RETURN(auto summary,
+                   Store(daemon, read.model, options.label.empty() ? read.label : options.label));
+  return Imported{.summary = std::move(summary), .sounds_with = OptionsOf(read.material)};
 }
 
 absl::StatusOr<Imported> ImportNpz(const client::Client& daemon, const ImportOptions& options) {
-  const absl::StatusOr<StoredModel> model = interchange::ReadNpz(options.file);
-  if (!model.ok()) return model.status();
-  auto summary = Store(daemon, *model, options.label);
-  if (!summary.ok()) return summary.status();
-  return Imported{.summary = *std::move(summary), .sounds_with = ""};
+  ASSIGN_OR_RETURN(const StoredModel model, interchange::ReadNpz(options.file));
+  ASSIGN_OR_RETURN(auto summary, Store(daemon, model, options.label));
+  return Imported{.summary = std::move(summary), .sounds_with = ""};
 }
 
 /// Imports a file in the stored form. If its name is a digest, the model gets that name, because
@@ -147,49 +139,44 @@ absl::StatusOr<Imported> ImportNpz(const client::Client& daemon, const ImportOpt
 absl::StatusOr<Imported> ImportStored(const client::Client& daemon, const ImportOptions& options) {
   const std::string stem = std::filesystem::path(options.file).stem();
   const std::string name = IsDigest(stem) ? absl::StrCat("modalModels/", stem) : "";
-  auto summary = daemon.ImportModalModelFile(options.file, name, options.label);
-  if (!summary.ok()) return summary.status();
-  return Imported{.summary = *std::move(summary), .sounds_with = ""};
+  ASSIGN_OR_RETURN(auto summary, daemon.ImportModalModelFile(options.file, name, options.label));
+  return Imported{.summary = std::move(summary), .sounds_with = ""};
 }
 
 }  // namespace
 
 absl::Status ExportModel(const client::Client& daemon, const ExportOptions& options) {
-  const auto name = FindModel(daemon, options.model);
-  if (!name.ok()) return name.status();
+  ASSIGN_OR_RETURN(const auto name, FindModel(daemon, options.model));
   const std::string format = FormatOf(options.file, options.format);
-  const auto material = MaterialFor(format, options.material);
-  if (!material.ok()) return material.status();
+  ASSIGN_OR_RETURN(const auto material, MaterialFor(format, options.material));
   const std::string file = options.file.empty()
-                               ? absl::StrCat(absl::StripPrefix(*name, "modalModels/"), ".", format)
+                               ? absl::StrCat(absl::StripPrefix(name, "modalModels/"), ".", format)
                                : options.file;
-  absl::Status status = IsGltf(format) ? WriteGltf(daemon, *name, file, *material, format == "glb")
-                        : format == "npz" ? WriteNpz(daemon, *name, file)
-                                          : daemon.ExportModalModelFile(*name, file);
+  absl::Status status = IsGltf(format)    ? WriteGltf(daemon, name, file, material, format == "glb")
+                        : format == "npz" ? WriteNpz(daemon, name, file)
+                                          : daemon.ExportModalModelFile(name, file);
   if (status.ok()) absl::PrintF("%s\n", file);
   return status;
 }
 
 absl::Status ImportModel(const client::Client& daemon, const ImportOptions& options, bool json) {
   const std::string format = FormatOf(options.file, options.format);
-  const auto material = MaterialFor(format, options.material);
-  if (!material.ok()) return material.status();
-  const auto imported = IsGltf(format)    ? ImportGltf(daemon, options, *material)
-                        : format == "npz" ? ImportNpz(daemon, options)
-                                          : ImportStored(daemon, options);
-  if (!imported.ok()) return imported.status();
+  ASSIGN_OR_RETURN(const auto material, MaterialFor(format, options.material));
+  ASSIGN_OR_RETURN(const auto imported, IsGltf(format)    ? ImportGltf(daemon, options, material)
+                                        : format == "npz" ? ImportNpz(daemon, options)
+                                                          : ImportStored(daemon, options));
   // To stderr, so that stdout is the name alone.
-  for (const std::string& warning : imported->summary.header().warnings()) {
+  for (const std::string& warning : imported.summary.header().warnings()) {
     absl::FPrintF(stderr, "carillon: %s\n", warning);
   }
-  if (!imported->sounds_with.empty()) {
+  if (!imported.sounds_with.empty()) {
     absl::FPrintF(stderr, "carillon: the model sounds as the file says with %s\n",
-                  imported->sounds_with);
+                  imported.sounds_with);
   }
   if (json) {
-    PrintJson(imported->summary);
+    PrintJson(imported.summary);
   } else {
-    absl::PrintF("%s\n", imported->summary.name());
+    absl::PrintF("%s\n", imported.summary.name());
   }
   return absl::OkStatus();
 }

@@ -65,8 +65,7 @@ absl::Status EmptyTrace(const std::string& path) {
 }
 
 absl::Status Render(const client::Client& daemon, const RenderOptions& options, bool json) {
-  auto trace = client::ContactTraceReader::Open(options.trace);
-  if (!trace.ok()) return trace.status();
+  ASSIGN_OR_RETURN(auto trace, client::ContactTraceReader::Open(options.trace));
   RenderedFile file({.path = options.out,
                      .format = {.sample_rate_hz = options.sample_rate_hz,
                                 .channel_count = options.channel_count,
@@ -74,7 +73,7 @@ absl::Status Render(const client::Client& daemon, const RenderOptions& options, 
                      .factor = options.gain,
                      .normalize = options.normalize});
   const auto summary =
-      daemon.Render(SettingsOf(options), *trace,
+      daemon.Render(SettingsOf(options), trace,
                     [&](const client::AudioBlock& block) { return file.Take(block); });
   RETURN_IF_ERROR(file.status());
   if (!summary.ok()) return summary.status();

@@ -168,19 +168,16 @@ absl::Status RunJob(const client::Client& daemon, const RunJobOptions& options,
                     const StopSignal& stop) {
   unsetenv("CARILLON_JOB_TOKEN");  // of no use to the command
   const client::JobRun run{.job = absl::StrCat("jobs/", options.digest), .token = options.token};
-  const absl::StatusOr<RunFolder> folder = RunFolder::Make();
-  if (!folder.ok()) return folder.status();
-  RETURN_IF_ERROR(SaveStandardInput(folder->File("request")));
-  absl::Status fetched =
-      Patiently(stop, [&] { return daemon.FetchMesh(run, folder->File("mesh")); });
-  if (!fetched.ok()) return fetched;
+  ASSIGN_OR_RETURN(const RunFolder folder, RunFolder::Make());
+  RETURN_IF_ERROR(SaveStandardInput(folder.File("request")));
+  RETURN_IF_ERROR(Patiently(stop, [&] { return daemon.FetchMesh(run, folder.File("mesh")); }));
   const absl::StatusOr<v1::RunEnd> end = RunToEnd(
-      options.command, *folder, stop,
+      options.command, folder, stop,
       [&](const v1::Progress& progress) { daemon.ReportProgress(run, progress).IgnoreError(); });
   if (!end.ok()) return end.status();
   const bool done = end->exit_status() == 0 && !end->has_error();
   return Patiently(
-      stop, [&] { return daemon.UploadResult(run, *end, done ? folder->File("model") : ""); });
+      stop, [&] { return daemon.UploadResult(run, *end, done ? folder.File("model") : ""); });
 }
 
 }  // namespace carillon::cli

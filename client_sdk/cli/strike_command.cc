@@ -8,6 +8,7 @@
 #include "client_sdk/cli/output.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/material_catalogue.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::cli {
 namespace {
@@ -38,14 +39,12 @@ void Set(v1::Vec3& vector, const std::array<double, 3>& components) {
 
 absl::StatusOr<v1::SoundingObject> AddObject(const client::Client& daemon, const std::string& scene,
                                              const StrikeOptions& options) {
-  const auto model = FindModel(daemon, options.model);
-  if (!model.ok()) return model.status();
-  const auto material = ToMaterial(options.material);
-  if (!material.ok()) return material.status();
+  ASSIGN_OR_RETURN(const auto model, FindModel(daemon, options.model));
+  ASSIGN_OR_RETURN(const auto material, ToMaterial(options.material));
   v1::AddObjectRequest request;
   request.set_scene(scene);
-  request.set_modal_model(*model);
-  if (material->ByteSizeLong() > 0) *request.mutable_material() = *material;
+  request.set_modal_model(model);
+  if (material.ByteSizeLong() > 0) *request.mutable_material() = material;
   request.set_size(options.size);
   request.set_gain(options.gain);
   if (options.paper_coupling) request.set_radiation(v1::RADIATION_MODEL_PAPER_COUPLING);
@@ -59,8 +58,7 @@ absl::Status SendImpulse(const client::Client& daemon, const std::string& scene,
   start.set_scene(scene);
   start.set_step_s(kStep);
   start.set_at_once(true);
-  const auto stream = daemon.StreamContacts(start);
-  if (!stream.ok()) return stream.status();
+  ASSIGN_OR_RETURN(const auto stream, daemon.StreamContacts(start));
   v1::ContactStep step;
   v1::Impulse& impulse = *step.add_impulses();
   impulse.set_object(handle);
@@ -68,29 +66,26 @@ absl::Status SendImpulse(const client::Client& daemon, const std::string& scene,
   Set(*impulse.mutable_impulse_newton_seconds(), options.impulse_newton_seconds);
   if (options.duration_s) impulse.set_duration_s(*options.duration_s);
   impulse.mutable_hertz()->set_striker(options.striker);
-  if (absl::Status sent = (*stream)->Send(std::move(step)); !sent.ok()) return sent;
-  const auto report = (*stream)->Finish();
-  if (!report.ok()) return report.status();
-  if (report->rejected_count() == 0) return absl::OkStatus();
-  return FromErrorInfo(absl::StatusCode::kInvalidArgument, report->last_rejection());
+  RETURN_IF_ERROR(stream->Send(std::move(step)));
+  ASSIGN_OR_RETURN(const auto report, stream->Finish());
+  if (report.rejected_count() == 0) return absl::OkStatus();
+  return FromErrorInfo(absl::StatusCode::kInvalidArgument, report.last_rejection());
 }
 
 absl::Status StrikeIn(const client::Client& daemon, const std::string& scene,
                       const StrikeOptions& options, const StopSignal& stop, bool json) {
-  const auto object = AddObject(daemon, scene, options);
-  if (!object.ok()) return object.status();
-  absl::Status struck = SendImpulse(daemon, scene, object->handle(), options);
-  if (!struck.ok()) return struck;
+  ASSIGN_OR_RETURN(const auto object, AddObject(daemon, scene, options));
+  RETURN_IF_ERROR(SendImpulse(daemon, scene, object.handle(), options));
   if (json) {
-    PrintJson(*object);
+    PrintJson(object);
   } else {
-    const bool paper = object->radiation() == v1::RADIATION_MODEL_PAPER_COUPLING;
-    absl::PrintF("%d modes sound, %.2f to %.2f Hz, by %s\n", object->sounding_mode_count(),
-                 object->lowest_frequency_hz(), object->highest_frequency_hz(),
+    const bool paper = object.radiation() == v1::RADIATION_MODEL_PAPER_COUPLING;
+    absl::PrintF("%d modes sound, %.2f to %.2f Hz, by %s\n", object.sounding_mode_count(),
+                 object.lowest_frequency_hz(), object.highest_frequency_hz(),
                  paper ? "the paper's coupling" : "their radiated power");
   }
   std::fflush(stdout);
-  (void)stop.ArrivesWithin(options.seconds.value_or(SoundingSeconds(*object)));
+  (void)stop.ArrivesWithin(options.seconds.value_or(SoundingSeconds(object)));
   return absl::OkStatus();
 }
 
@@ -98,10 +93,9 @@ absl::Status StrikeIn(const client::Client& daemon, const std::string& scene,
 
 absl::Status Strike(const client::Client& daemon, const StrikeOptions& options,
                     const StopSignal& stop, bool json) {
-  const auto scene = daemon.CreateScene({});
-  if (!scene.ok()) return scene.status();
-  const absl::Status struck = StrikeIn(daemon, *scene, options, stop, json);
-  const absl::Status deleted = daemon.DeleteScene(*scene);
+  ASSIGN_OR_RETURN(const auto scene, daemon.CreateScene({}));
+  const absl::Status struck = StrikeIn(daemon, scene, options, stop, json);
+  const absl::Status deleted = daemon.DeleteScene(scene);
   return struck.ok() ? deleted : struck;
 }
 

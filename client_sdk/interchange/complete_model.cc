@@ -7,6 +7,8 @@
 #include <numeric>
 #include <vector>
 
+#include "proto/cpp/status_macros.h"
+
 namespace carillon::interchange {
 namespace {
 
@@ -98,8 +100,7 @@ absl::Status Complete(StoredModel& model) {
   // The array has the right size, so that Validate() checks the others before they are used.
   const bool coupled = !model.couplings.empty();
   if (!coupled) model.couplings.assign(model.mode_count(), 0.0);
-  absl::Status status = Validate(model);
-  if (!status.ok()) return status;
+  RETURN_IF_ERROR(Validate(model));
   if (!coupled) model.couplings = Couplings(model);
   if (header.complete_to_eigenvalue() == 0) {
     header.set_complete_to_eigenvalue(model.eigenvalues.back());

@@ -9,6 +9,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client_sdk/interchange/file_refusal.h"
+#include "proto/cpp/status_macros.h"
 
 static_assert(std::endian::native == std::endian::little, "glTF's numbers are little endian");
 
@@ -58,15 +59,14 @@ absl::StatusOr<std::string_view> View(GltfDocument& file, uint64_t index) {
   const bool known = views.is_array() && index < views.size();
   const auto buffer = known ? Whole(Member(views[index], "buffer")) : std::nullopt;
   if (!buffer) return Malformed(absl::StrCat("there is no buffer view ", index));
-  const absl::StatusOr<std::string_view> bytes = file.Buffer(*buffer);
-  if (!bytes.ok()) return bytes.status();
+  ASSIGN_OR_RETURN(const std::string_view bytes, file.Buffer(*buffer));
   const uint64_t offset = Or(Member(views[index], "byteOffset"), 0);
   const uint64_t length = Or(Member(views[index], "byteLength"), UINT64_MAX);
-  if (offset > bytes->size() || length > bytes->size() - offset) {
+  if (offset > bytes.size() || length > bytes.size() - offset) {
     return Malformed(absl::StrCat("buffer view ", index, " reaches beyond its buffer of ",
-                                  bytes->size(), " bytes"));
+                                  bytes.size(), " bytes"));
   }
-  return bytes->substr(offset, length);
+  return bytes.substr(offset, length);
 }
 
 absl::Status Bad(const std::string& name, absl::string_view what) {
@@ -88,8 +88,7 @@ absl::StatusOr<Pieces> Find(GltfDocument& file, const json& property, const std:
     return Bad(name,
                "has an accessor that is sparse, compressed or without data, which is not read");
   }
-  const absl::StatusOr<std::string_view> bytes = View(file, *view);
-  if (!bytes.ok()) return bytes.status();
+  ASSIGN_OR_RETURN(const std::string_view bytes, View(file, *view));
   Pieces pieces;
   pieces.component = Or(Member(accessor, "componentType"), 0);
   pieces.count = Or(Member(accessor, "count"), 0);
@@ -98,11 +97,11 @@ absl::StatusOr<Pieces> Find(GltfDocument& file, const json& property, const std:
   pieces.stride = Or(Member(Member(file.root(), "bufferViews")[*view], "byteStride"), size);
   const uint64_t offset = Or(Member(accessor, "byteOffset"), 0);
   if (pieces.count == 0 || pieces.stride < size ||
-      !Fits(bytes->size(), offset, pieces.count, pieces.stride, size)) {
+      !Fits(bytes.size(), offset, pieces.count, pieces.stride, size)) {
     return Bad(name, absl::StrCat("has an accessor of ", pieces.count,
                                   " pieces that does not fit into its buffer view"));
   }
-  pieces.bytes = bytes->substr(offset);
+  pieces.bytes = bytes.substr(offset);
   return pieces;
 }
 
@@ -131,13 +130,12 @@ json Extreme(const std::vector<float>& numbers, Better better) {
 
 absl::StatusOr<std::vector<float>> ReadFloats(GltfDocument& file, const json& property,
                                               const std::string& name, const std::string& type) {
-  const absl::StatusOr<Pieces> pieces = Find(file, property, name, type);
-  if (!pieces.ok()) return pieces.status();
-  if (pieces->component != kFloat) return Bad(name, "must hold floats");
+  ASSIGN_OR_RETURN(const Pieces pieces, Find(file, property, name, type));
+  if (pieces.component != kFloat) return Bad(name, "must hold floats");
   const size_t width = type == "VEC3" ? 3 : 1;
-  std::vector<float> numbers(pieces->count * width);
-  for (uint64_t i = 0; i < pieces->count; ++i) {
-    std::memcpy(&numbers[i * width], pieces->bytes.data() + i * pieces->stride,
+  std::vector<float> numbers(pieces.count * width);
+  for (uint64_t i = 0; i < pieces.count; ++i) {
+    std::memcpy(&numbers[i * width], pieces.bytes.data() + i * pieces.stride,
                 width * sizeof(float));
   }
   return numbers;
@@ -145,15 +143,14 @@ absl::StatusOr<std::vector<float>> ReadFloats(GltfDocument& file, const json& pr
 
 absl::StatusOr<std::vector<uint32_t>> ReadIndices(GltfDocument& file, const json& property,
                                                   const std::string& name) {
-  const absl::StatusOr<Pieces> pieces = Find(file, property, name, "SCALAR");
-  if (!pieces.ok()) return pieces.status();
-  switch (pieces->component) {
+  ASSIGN_OR_RETURN(const Pieces pieces, Find(file, property, name, "SCALAR"));
+  switch (pieces.component) {
     case kByte:
-      return Widen<uint8_t>(*pieces);
+      return Widen<uint8_t>(pieces);
     case kShort:
-      return Widen<uint16_t>(*pieces);
+      return Widen<uint16_t>(pieces);
     case kInt:
-      return Widen<uint32_t>(*pieces);
+      return Widen<uint32_t>(pieces);
     default:
       return Bad(name, "must hold whole numbers");
   }

@@ -19,6 +19,7 @@
 #include "absl/strings/string_view.h"
 #include "client_sdk/interchange/file_refusal.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::interchange {
 namespace {
@@ -122,16 +123,14 @@ bool WriteWhole(const std::string& path, const std::vector<std::string_view>& pi
 }  // namespace
 
 absl::StatusOr<GltfDocument> GltfDocument::Read(const std::string& path) {
-  const absl::StatusOr<std::string> file = ReadFile(path);
-  if (!file.ok()) return file.status();
+  ASSIGN_OR_RETURN(const std::string file, ReadFile(path));
   GltfDocument document;
   document.folder_ = std::filesystem::path(path).parent_path();
-  std::string_view text = *file;
-  if (absl::StartsWith(*file, kMagic)) {
-    const absl::StatusOr<Chunks> chunks = Split(*file);
-    if (!chunks.ok()) return chunks.status();
-    text = chunks->json;
-    if (chunks->binary) document.binary_ = std::string(*chunks->binary);
+  std::string_view text = file;
+  if (absl::StartsWith(file, kMagic)) {
+    ASSIGN_OR_RETURN(const Chunks chunks, Split(file));
+    text = chunks.json;
+    if (chunks.binary) document.binary_ = std::string(*chunks.binary);
   }
   // Deeper values are left out, so that recursive functions do not exhaust the stack.
   const auto shallow = [](int depth, json::parse_event_t, json&) { return depth <= kMostDepth; };
@@ -145,9 +144,8 @@ absl::StatusOr<GltfDocument> GltfDocument::Read(const std::string& path) {
 absl::StatusOr<std::string_view> GltfDocument::Buffer(uint64_t index) {
   auto known = buffers_.find(index);
   if (known == buffers_.end()) {
-    absl::StatusOr<std::string> bytes = ReadBuffer(index);
-    if (!bytes.ok()) return bytes.status();
-    known = buffers_.emplace(index, *std::move(bytes)).first;
+    ASSIGN_OR_RETURN(std::string bytes, ReadBuffer(index));
+    known = buffers_.emplace(index, std::move(bytes)).first;
   }
   return std::string_view(known->second);
 }

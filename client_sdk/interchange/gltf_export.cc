@@ -13,6 +13,7 @@
 #include "client_sdk/interchange/header_json.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/material_catalogue.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::interchange {
 namespace {
@@ -148,8 +149,7 @@ absl::Status CheckPoissonRatio(const StoredModel& model, const v1::Material& mat
 
 absl::Status WriteGltfModel(const std::string& path, const StoredModel& model,
                             const v1::Material& material, const GltfNames& names, bool binary) {
-  absl::Status status = CheckPoissonRatio(model, material);
-  if (!status.ok()) return status;
+  RETURN_IF_ERROR(CheckPoissonRatio(model, material));
   const std::vector<SoundingMode> modes = SoundingModes(model, material);
   if (modes.empty()) {
     return Refusal(absl::StatusCode::kFailedPrecondition, "NO_MODE_IN_BAND",

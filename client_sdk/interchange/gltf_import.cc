@@ -21,6 +21,7 @@
 #include "client_sdk/interchange/gltf_nodes.h"
 #include "client_sdk/interchange/gltf_surface.h"
 #include "client_sdk/interchange/header_json.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::interchange {
 namespace {
@@ -70,9 +71,7 @@ absl::Status Check(const GltfModes& modes) {
 absl::StatusOr<GltfModes> ReadModes(GltfDocument& file, const json& model) {
   GltfModes modes;
   const auto read = [&](const char* name, const char* type, std::vector<float>& numbers) {
-    absl::StatusOr<std::vector<float>> found = ReadFloats(file, Member(model, name), name, type);
-    if (!found.ok()) return found.status();
-    numbers = *std::move(found);
+    ASSIGN_OR_RETURN(numbers, ReadFloats(file, Member(model, name), name, type));
     return absl::OkStatus();
   };
   for (const absl::Status& status :
@@ -82,14 +81,11 @@ absl::StatusOr<GltfModes> ReadModes(GltfDocument& file, const json& model) {
     if (!status.ok()) return status;
   }
   if (const json& indices = Member(model, "indices"); !indices.is_null()) {
-    absl::StatusOr<std::vector<uint32_t>> found = ReadIndices(file, indices, "indices");
-    if (!found.ok()) return found.status();
-    const absl::Status status = CheckTriangles(*found, modes.point_count());
-    if (!status.ok()) return status;
-    modes.indices = *std::move(found);
+    ASSIGN_OR_RETURN(std::vector<uint32_t> found, ReadIndices(file, indices, "indices"));
+    RETURN_IF_ERROR(CheckTriangles(found, modes.point_count()));
+    modes.indices = std::move(found);
   }
-  const absl::Status status = Check(modes);
-  if (!status.ok()) return status;
+  RETURN_IF_ERROR(Check(modes));
   return modes;
 }
 
@@ -193,12 +189,11 @@ absl::StatusOr<std::vector<uint32_t>> SetSurface(GltfDocument& file, const Chose
       return Incomplete("the modal model has sample points without triangles, and its node no mesh",
                         "store the triangles as the model's indices");
     }
-    absl::StatusOr<GltfSurface> mesh = ReadMesh(file, *chosen.mesh);
-    if (!mesh.ok()) return mesh.status();
-    if (!AllFinite(mesh->vertices)) return Malformed("a vertex of the mesh is not finite");
-    points = NearestPoints(modes.positions, mesh->vertices);
-    model.vertices = std::move(mesh->vertices);
-    model.triangles = std::move(mesh->triangles);
+    ASSIGN_OR_RETURN(GltfSurface mesh, ReadMesh(file, *chosen.mesh));
+    if (!AllFinite(mesh.vertices)) return Malformed("a vertex of the mesh is not finite");
+    points = NearestPoints(modes.positions, mesh.vertices);
+    model.vertices = std::move(mesh.vertices);
+    model.triangles = std::move(mesh.triangles);
   }
   for (float& x : model.vertices) x = static_cast<float>(x * chosen.metres_per_unit);
   return points;
@@ -251,26 +246,20 @@ v1::ModalModelHeader HeaderOf(const GltfDocument& file, const ChosenModel& chose
 
 absl::StatusOr<GltfModel> ReadWhole(const std::string& path, const std::string& pick,
                                     const v1::Material& material) {
-  absl::StatusOr<GltfDocument> file = GltfDocument::Read(path);
-  if (!file.ok()) return file.status();
-  const absl::StatusOr<ChosenModel> chosen = ChooseModel(*file, pick);
-  if (!chosen.ok()) return chosen.status();
-  const absl::StatusOr<GltfModes> modes = ReadModes(*file, *chosen->model);
-  if (!modes.ok()) return modes.status();
-  absl::StatusOr<v1::Material> resolved = MaterialOf(*file, *chosen->model, material);
-  if (!resolved.ok()) return resolved.status();
+  ASSIGN_OR_RETURN(GltfDocument file, GltfDocument::Read(path));
+  ASSIGN_OR_RETURN(const ChosenModel chosen, ChooseModel(file, pick));
+  ASSIGN_OR_RETURN(const GltfModes modes, ReadModes(file, *chosen.model));
+  ASSIGN_OR_RETURN(v1::Material resolved, MaterialOf(file, *chosen.model, material));
   GltfModel result = {
-      .model = {}, .label = ShortText(Member(*chosen->model, "name")), .material = *resolved};
-  const absl::StatusOr<std::vector<uint32_t>> points =
-      SetSurface(*file, *chosen, *modes, result.model);
-  if (!points.ok()) return points.status();
-  SetGivenSurface(*file, *chosen, result.model);
-  result.model.header = HeaderOf(*file, *chosen, *modes, *resolved);
-  const std::vector<DampedMode> damped = Damped(*modes);
+      .model = {}, .label = ShortText(Member(*chosen.model, "name")), .material = resolved};
+  ASSIGN_OR_RETURN(const std::vector<uint32_t> points,
+                   SetSurface(file, chosen, modes, result.model));
+  SetGivenSurface(file, chosen, result.model);
+  result.model.header = HeaderOf(file, chosen, modes, resolved);
+  const std::vector<DampedMode> damped = Damped(modes);
   SetDamping(damped, result.material, result.model.header);
-  SetModes(*modes, damped, *points, *resolved, result.model);
-  const absl::Status status = Complete(result.model);
-  if (!status.ok()) return status;
+  SetModes(modes, damped, points, resolved, result.model);
+  RETURN_IF_ERROR(Complete(result.model));
   return result;
 }
 

@@ -12,6 +12,7 @@
 #include "client_sdk/interchange/file_refusal.h"
 #include "client_sdk/interchange/gltf_extension.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::interchange {
 namespace {
@@ -187,21 +188,19 @@ absl::StatusOr<ChosenModel> ChooseModel(const GltfDocument& file, const std::str
   }
   const json& nodes = List(file.root(), "nodes");
   std::vector<SoundingNode> sounding = SoundingNodes(nodes);
-  const absl::StatusOr<uint64_t> number = Pick(models, nodes, pick, sounding);
-  if (!number.ok()) return number.status();
-  if (*number >= models.size()) return Malformed(absl::StrCat("there is no modal model ", *number));
-  ChosenModel chosen{.model = &models[*number], .metres_per_unit = 1, .mesh = std::nullopt};
+  ASSIGN_OR_RETURN(const uint64_t number, Pick(models, nodes, pick, sounding));
+  if (number >= models.size()) return Malformed(absl::StrCat("there is no modal model ", number));
+  ChosenModel chosen{.model = &models[number], .metres_per_unit = 1, .mesh = std::nullopt};
   const std::vector<uint64_t> parents = Parents(nodes);
   bool first = true;
   for (const auto& [index, model] : sounding) {
-    if (model != *number) continue;
-    const absl::StatusOr<double> scale = GlobalScale(nodes, parents, index);
-    if (!scale.ok()) return scale.status();
-    if (!first && std::abs(*scale / chosen.metres_per_unit - 1) > kScaleTolerance) {
+    if (model != number) continue;
+    ASSIGN_OR_RETURN(const double scale, GlobalScale(nodes, parents, index));
+    if (!first && std::abs(scale / chosen.metres_per_unit - 1) > kScaleTolerance) {
       return Ambiguous(
           "nodes of different scale sound with the modal model, so that its size is not known");
     }
-    if (first) chosen.metres_per_unit = *scale;
+    if (first) chosen.metres_per_unit = scale;
     if (!chosen.mesh) chosen.mesh = Whole(Member(nodes[index], "mesh"));
     first = false;
   }

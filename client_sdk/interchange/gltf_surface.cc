@@ -8,6 +8,7 @@
 #include "absl/strings/str_cat.h"
 #include "client_sdk/interchange/file_refusal.h"
 #include "client_sdk/interchange/gltf_accessor.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::interchange {
 namespace {
@@ -20,21 +21,17 @@ absl::Status Append(GltfDocument& file, const json& primitive, GltfSurface& surf
   const json& mode = Member(primitive, "mode");
   if (!mode.is_null() && Whole(mode) != kTriangles) return absl::OkStatus();
   const json& position = Member(Member(primitive, "attributes"), "POSITION");
-  const absl::StatusOr<std::vector<float>> vertices =
-      ReadFloats(file, position, "POSITION", "VEC3");
-  if (!vertices.ok()) return vertices.status();
-  std::vector<uint32_t> triangles(vertices->size() / 3);
+  ASSIGN_OR_RETURN(const std::vector<float> vertices,
+                   ReadFloats(file, position, "POSITION", "VEC3"));
+  std::vector<uint32_t> triangles(vertices.size() / 3);
   std::iota(triangles.begin(), triangles.end(), 0U);
   if (const json& indices = Member(primitive, "indices"); !indices.is_null()) {
-    absl::StatusOr<std::vector<uint32_t>> read = ReadIndices(file, indices, "indices of the mesh");
-    if (!read.ok()) return read.status();
-    triangles = *std::move(read);
+    ASSIGN_OR_RETURN(triangles, ReadIndices(file, indices, "indices of the mesh"));
   }
-  absl::Status status = CheckTriangles(triangles, vertices->size() / 3);
-  if (!status.ok()) return status;
+  RETURN_IF_ERROR(CheckTriangles(triangles, vertices.size() / 3));
   const auto first = static_cast<uint32_t>(surface.vertices.size() / 3);
   for (const uint32_t vertex : triangles) surface.triangles.push_back(first + vertex);
-  surface.vertices.insert(surface.vertices.end(), vertices->begin(), vertices->end());
+  surface.vertices.insert(surface.vertices.end(), vertices.begin(), vertices.end());
   return absl::OkStatus();
 }
 
@@ -76,8 +73,7 @@ absl::StatusOr<GltfSurface> ReadMesh(GltfDocument& file, uint64_t mesh) {
   GltfSurface surface;
   const json& primitives = Member(meshes[mesh], "primitives");
   for (const json& primitive : primitives.is_array() ? primitives : json::array()) {
-    absl::Status status = Append(file, primitive, surface);
-    if (!status.ok()) return status;
+    RETURN_IF_ERROR(Append(file, primitive, surface));
   }
   if (!surface.triangles.empty()) return surface;
   return Incomplete(absl::StrCat("mesh ", mesh, " has no triangles"), "store it as triangles");

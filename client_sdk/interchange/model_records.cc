@@ -11,6 +11,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client_sdk/interchange/file_refusal.h"
+#include "proto/cpp/status_macros.h"
 
 static_assert(std::endian::native == std::endian::little, "arrays are stored little endian");
 
@@ -82,8 +83,7 @@ absl::Status ModelAssembler::AppendChunk(const v1::ModalModelChunk& chunk) {
 }
 
 absl::StatusOr<StoredModel> ModelAssembler::Finish() {
-  const absl::Status status = Validate(model_);
-  if (!status.ok()) return status;
+  RETURN_IF_ERROR(Validate(model_));
   return std::move(model_);
 }
 

@@ -14,6 +14,7 @@
 #include "client_sdk/interchange/header_json.h"
 #include "client_sdk/interchange/npy_array.h"
 #include "client_sdk/interchange/zip_archive.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::interchange {
 namespace {
@@ -24,12 +25,10 @@ const char* NpyTypeOf(uint32_t) { return "<u4"; }
 
 absl::StatusOr<std::optional<NpyArray>> ReadArray(const ZipReader& archive,
                                                   const std::string& name) {
-  const auto file = archive.Read(name + ".npy");
-  if (!file.ok()) return file.status();
-  if (!file->has_value()) return std::nullopt;
-  absl::StatusOr<NpyArray> array = ParseNpy(name, **file);
-  if (!array.ok()) return array.status();
-  return *std::move(array);
+  ASSIGN_OR_RETURN(const auto file, archive.Read(name + ".npy"));
+  if (!file.has_value()) return std::nullopt;
+  ASSIGN_OR_RETURN(NpyArray array, ParseNpy(name, *file));
+  return array;
 }
 
 /// Reads the arrays of the file. The shape of each must agree with its letters and with the arrays
@@ -40,10 +39,10 @@ class ArrayReader {
 
   template <class T>
   absl::Status Read(const std::string& name, std::vector<T>& numbers, std::string_view dimensions) {
-    const auto array = ReadArray(archive_, name);
-    if (!array.ok() || !array->has_value()) return array.status();
-    absl::Status status = CheckShape(name, (*array)->shape, dimensions);
-    return status.ok() ? ToNumbers(name, **array, numbers) : status;
+    ASSIGN_OR_RETURN(const auto array, ReadArray(archive_, name));
+    if (!array.has_value()) return absl::OkStatus();
+    RETURN_IF_ERROR(CheckShape(name, array->shape, dimensions));
+    return ToNumbers(name, *array, numbers);
   }
 
  private:
@@ -64,33 +63,28 @@ class ArrayReader {
 };
 
 absl::StatusOr<double> ReadPoissonRatio(const ZipReader& archive) {
-  const auto array = ReadArray(archive, "poisson_ratio");
-  if (!array.ok()) return array.status();
-  if (!array->has_value()) {
+  ASSIGN_OR_RETURN(const auto array, ReadArray(archive, "poisson_ratio"));
+  if (!array.has_value()) {
     return Incomplete("the .npz file has neither \"header\" nor \"poisson_ratio\"",
                       "save one of them beside the arrays");
   }
   std::vector<double> numbers;
-  const absl::Status status = ToNumbers("poisson_ratio", **array, numbers);
-  if (!status.ok()) return status;
+  RETURN_IF_ERROR(ToNumbers("poisson_ratio", *array, numbers));
   if (numbers.size() == 1 && numbers[0] > -1 && numbers[0] < 0.5) return numbers[0];
   return Malformed("\"poisson_ratio\" must be one number above -1 and below 0.5");
 }
 
 absl::StatusOr<v1::ModalModelHeader> ReadHeader(const ZipReader& archive) {
-  const auto array = ReadArray(archive, "header");
-  if (!array.ok()) return array.status();
+  ASSIGN_OR_RETURN(const auto array, ReadArray(archive, "header"));
   v1::ModalModelHeader header;
-  if (array->has_value()) {
-    const absl::StatusOr<std::string> text = ToText("header", **array);
-    if (!text.ok()) return text.status();
-    auto parsed = HeaderFromJson(*text);
+  if (array.has_value()) {
+    ASSIGN_OR_RETURN(const std::string text, ToText("header", *array));
+    auto parsed = HeaderFromJson(text);
     if (!parsed) return Malformed("\"header\" is not the JSON of a model's header");
     return *std::move(parsed);
   }
-  const absl::StatusOr<double> poisson_ratio = ReadPoissonRatio(archive);
-  if (!poisson_ratio.ok()) return poisson_ratio.status();
-  header.mutable_settings()->set_poisson_ratio(*poisson_ratio);
+  ASSIGN_OR_RETURN(const double poisson_ratio, ReadPoissonRatio(archive));
+  header.mutable_settings()->set_poisson_ratio(poisson_ratio);
   header.set_solver("NumPy");
   return header;
 }
@@ -110,19 +104,16 @@ absl::Status RequireArrays(const StoredModel& model) {
 }
 
 absl::StatusOr<StoredModel> ReadWhole(const std::string& path) {
-  const absl::StatusOr<ZipReader> archive = ZipReader::Open(path);
-  if (!archive.ok()) return archive.status();
+  ASSIGN_OR_RETURN(const ZipReader archive, ZipReader::Open(path));
   StoredModel model;
-  ArrayReader reader(*archive);
+  ArrayReader reader(archive);
   absl::Status status = absl::OkStatus();
   VisitArrays(model, [&](const char* name, auto& numbers, const char* dimensions) {
     if (status.ok()) status = reader.Read(name, numbers, dimensions);
   });
   if (status.ok()) status = RequireArrays(model);
   if (!status.ok()) return status;
-  absl::StatusOr<v1::ModalModelHeader> header = ReadHeader(*archive);
-  if (!header.ok()) return header.status();
-  model.header = *std::move(header);
+  ASSIGN_OR_RETURN(model.header, ReadHeader(archive));
   status = Complete(model);
   if (!status.ok()) return status;
   return model;

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""Finds the phrases of words.toml in pages, in comments of headers and of the contract, and in errors.
+"""Finds the phrases of words.toml in pages, in comments, and in string literals: errors, help, events of the log.
 
 Code is not read: code blocks, `quoted code`, calls like Code(), and names with an underscore.
 """
@@ -45,20 +45,19 @@ def comment_lines(text):
         yield number, QUOTED.sub("`code`", comment.group(1).strip()) or None if comment else None
 
 
-def error_lines(text):
-    """(line number, text) of the string literals within each call of Refusal()."""
-    for call in re.finditer(r"\bRefusal\(", text):
-        depth, end = 1, call.end()
-        while depth and end < len(text):
-            literal = LITERAL.match(text, end)
-            if literal:
-                yield text.count("\n", 0, end) + 1, literal.group(1)
-            depth += {"(": 1, ")": -1}.get(text[end], 0)
-            end = literal.end() if literal else end + 1
-        yield 0, None
+def code_lines(text):
+    """comment_lines, and each paragraph of adjacent string literals: errors, help, events of the log."""
+    yield from comment_lines(text)
+    yield 0, None
+    for number, line in enumerate(text.splitlines(), start=1):
+        literals = [] if COMMENT.match(line) or line.startswith("#") else LITERAL.findall(line)
+        if not literals:
+            yield number, None
+        for literal in literals:
+            yield number, QUOTED.sub("`code`", literal.strip())
 
 
-READERS = {".md": page_lines, ".h": comment_lines, ".proto": comment_lines, ".cc": error_lines}
+READERS = {".md": page_lines, ".h": comment_lines, ".proto": comment_lines, ".cc": code_lines}
 
 
 def paragraphs(lines):

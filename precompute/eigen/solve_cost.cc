@@ -82,8 +82,8 @@ constexpr double kRefineSeconds = 30e-9;
 constexpr double kVerifySeconds = 12e-9;
 constexpr double kModelSeconds = 100e-9;
 
-/// Of Spectra, which solves for one vector at a time: solves for each mode, bytes of the factor and
-/// operations on the basis a second.
+/// The cost of Spectra, which solves for one vector at a time: solves for each mode, bytes of the
+/// factor and operations on the basis a second.
 constexpr double kSpectraSolvesOfMode = 4;
 constexpr double kSpectraSolveRate = 3e9;
 constexpr double kSpectraOrthogonalRate = 3e9;

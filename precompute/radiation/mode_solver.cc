@@ -12,8 +12,8 @@
 namespace carillon::precompute {
 namespace {
 
-/// What flows through the surface, Im of integral of conj(p) q / k, in the measure of the power
-/// integral: W = rho0 c k^2 I / 2 with I = Im(integral of p conj(q)) / k.
+/// Returns I = Im(integral of p conj(q)) / k over the surface, from which the radiated power
+/// follows as W = rho0 c k^2 I / 2.
 double SurfacePowerIntegral(const AcousticSurface& surface, double wavenumber,
                             std::span<const ComplexFloat> p, const Displacement& displacement) {
   double flow = 0;

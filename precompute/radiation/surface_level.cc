@@ -8,6 +8,7 @@
 
 #include "precompute/mesh/point_math.h"
 #include "precompute/radiation/remesh_surface.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::precompute {
 namespace {
@@ -134,9 +135,8 @@ std::vector<SurfacePlace> PlacesOn(const SurfaceMesh& given, const NearestTriang
 absl::StatusOr<SurfaceLevel> MakeSurfaceLevel(const RadiatingSurface& given,
                                               const NearestTriangle& index, double edge_m,
                                               Workers& workers) {
-  const absl::StatusOr<SurfaceMesh> remeshed = RemeshSurface(given.mesh, edge_m);
-  if (!remeshed.ok()) return remeshed.status();
-  AcousticSurface near_it = MakeAcousticSurface(WithoutLoose(WithoutFlat(*remeshed, edge_m)));
+  ASSIGN_OR_RETURN(const SurfaceMesh remeshed, RemeshSurface(given.mesh, edge_m));
+  AcousticSurface near_it = MakeAcousticSurface(WithoutLoose(WithoutFlat(remeshed, edge_m)));
   std::vector<SurfacePlace> places = PlacesOn(given.mesh, index, near_it);
   SurfaceMesh on_it = std::move(near_it.mesh);
   for (size_t v = 0; v < places.size(); ++v) {

@@ -63,7 +63,7 @@ HWY_INLINE V FlipSign(V v, hn::VFromD<hn::RebindToUnsigned<D>> sign) {
   return hn::BitCast(d, hn::Xor(hn::BitCast(du, v), sign));
 }
 
-/// What a pair's kernel is made of.
+/// The distance between target and source, and the Green function there.
 struct Pair {
   V dx, dy, dz;      ///< from target to source
   V inverse;         ///< 1/u; zero where target and source coincide

@@ -18,6 +18,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon {
 namespace {
@@ -46,7 +47,8 @@ absl::Status NotExecuted(const std::string& program, int error) {
                               "): install it, or name another program"));
 }
 
-/// What the child needs between fork and exec, computed before the fork.
+/// The arguments and descriptors that the child uses between fork and exec, computed before the
+/// fork.
 struct Preparation {
   std::vector<char*> arguments{};
   const char* folder = nullptr;
@@ -187,15 +189,14 @@ std::string Pipe::Read(size_t limit) {
 }
 
 absl::StatusOr<ChildProcess> ChildProcess::Start(const ChildCommand& command) {
-  absl::StatusOr<Pipe> failure = Pipe::Make();
-  if (!failure.ok()) return failure.status();
-  const Preparation prepared = Prepare(command, failure->write_end());
+  ASSIGN_OR_RETURN(Pipe failure, Pipe::Make());
+  const Preparation prepared = Prepare(command, failure.write_end());
   const pid_t pid = fork();
   if (pid < 0) return NotStarted(errno);
   if (pid == 0) RunInChild(prepared);
-  failure->CloseWriteEnd();
+  failure.CloseWriteEnd();
   ChildProcess child(pid, prepared.is_worker);
-  const std::string why = failure->Read(sizeof(int));  // empty: exec has closed the pipe
+  const std::string why = failure.Read(sizeof(int));  // empty: exec has closed the pipe
   if (why.size() == sizeof(int)) {
     int error = 0;
     why.copy(reinterpret_cast<char*>(&error), sizeof error);

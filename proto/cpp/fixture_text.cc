@@ -24,9 +24,10 @@ absl::Status Invalid(absl::string_view what) {
 }
 
 absl::Status NotAFixture(absl::string_view text) {
-  return Invalid(absl::StrCat("\"", text.substr(0, 100),
-                              "\" does not say what is held; give plane:X,Y,Z/NX,NY,NZ, "
-                              "box:X,Y,Z/X,Y,Z, vertices:I,J,... or group:NAME"));
+  return Invalid(
+      absl::StrCat("\"", text.substr(0, 100),
+                   "\" does not say which part of the body is fixed; give plane:X,Y,Z/NX,NY,NZ, "
+                   "box:X,Y,Z/X,Y,Z, vertices:I,J,... or group:NAME"));
 }
 
 bool ToVector(absl::string_view text, v1::Vec3& vector) {

@@ -16,6 +16,7 @@ namespace {
 
 constexpr char kMaterialsText[] =
 #include "materials.inc"
+#include "proto/cpp/status_macros.h"
     ;
 
 v1::MaterialCatalogue ParseMaterials() {
@@ -100,9 +101,7 @@ const v1::MaterialCatalogue& Materials() {
 absl::StatusOr<v1::Material> ResolveMaterial(const v1::Material& material) {
   v1::Material resolved;
   if (!material.preset().empty()) {
-    absl::StatusOr<v1::Material> preset = FindPreset(material.preset());
-    if (!preset.ok()) return preset.status();
-    resolved = *std::move(preset);
+    ASSIGN_OR_RETURN(resolved, FindPreset(material.preset()));
     DropReplacedLossFactor(material, resolved);
   }
   resolved.MergeFrom(material);
@@ -111,7 +110,7 @@ absl::StatusOr<v1::Material> ResolveMaterial(const v1::Material& material) {
     resolved.set_alpha1_s(resolved.alpha1_s());
     resolved.set_alpha2_per_s(resolved.alpha2_per_s());
   }
-  if (absl::Status status = Check(resolved); !status.ok()) return status;
+  RETURN_IF_ERROR(Check(resolved));
   return resolved;
 }
 

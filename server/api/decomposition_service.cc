@@ -78,8 +78,8 @@ JobFilter FilterOf(const Message& request) {
   return filter;
 }
 
-/// Sends the jobs that match as they change. Of a job that waits to be sent, only the newest state
-/// is kept.
+/// Sends the jobs that match as they change. While a job waits to be sent, only its newest state is
+/// kept.
 class JobsWatchCall final : public ServerStream<v1::WatchJobsResponse>, private JobSink {
  public:
   JobsWatchCall(DecompositionQueue& queue, JobFilter filter, ThreadPool& pool)

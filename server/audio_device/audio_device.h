@@ -52,7 +52,8 @@ class AudioDevice {
   /// included.
   virtual uint64_t xrun_count() const = 0;
 
-  /// Number of frames of its source that the device has skipped, as far as its clock tells.
+  /// Number of frames taken from the source that were never played or written. A sound card's are
+  /// estimated from the time stamps of its callbacks, see output_clock.h.
   virtual uint64_t lost_frame_count() const = 0;
 };
 

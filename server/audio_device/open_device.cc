@@ -7,6 +7,7 @@
 #include "absl/strings/string_view.h"
 #include "absl/strings/strip.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 #include "server/audio_device/clocked_device.h"
 #include "server/audio_device/device_process.h"
 #include "server/audio_device/wav_writer.h"
@@ -17,10 +18,9 @@ namespace {
 absl::StatusOr<std::unique_ptr<AudioDevice>> OpenFileDevice(absl::string_view path,
                                                             const DeviceFormat& format,
                                                             Clock& clock) {
-  absl::StatusOr<WavWriter> made =
-      WavWriter::Make(std::string(path), format.sample_rate_hz, format.channel_count);
-  if (!made.ok()) return made.status();
-  auto writer = std::make_shared<WavWriter>(*std::move(made));
+  ASSIGN_OR_RETURN(WavWriter made,
+                   WavWriter::Make(std::string(path), format.sample_rate_hz, format.channel_count));
+  auto writer = std::make_shared<WavWriter>(std::move(made));
   return std::make_unique<ClockedDevice>(
       absl::StrCat("file: ", path), format, clock,
       [writer](std::span<const float> block) { return writer->Write(block); });

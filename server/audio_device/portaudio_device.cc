@@ -16,6 +16,7 @@
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 #include "server/audio_device/output_clock.h"
 
 namespace carillon {
@@ -92,10 +93,9 @@ class PortAudioDevice final : public AudioDevice {
   absl::Status Open(absl::string_view name) {
     library_ = std::make_unique<Library>();
     if (library_->error() != paNoError) return Failed("PortAudio", library_->error());
-    absl::StatusOr<PaDeviceIndex> device = FindDevice(name);
-    if (!device.ok()) return device.status();
-    name_ = FullName(*device);
-    return OpenStream(*device);
+    ASSIGN_OR_RETURN(PaDeviceIndex device, FindDevice(name));
+    name_ = FullName(device);
+    return OpenStream(device);
   }
 
   absl::Status Start(FrameSource& source) override {
@@ -225,7 +225,7 @@ class PortAudioDevice final : public AudioDevice {
 absl::StatusOr<std::unique_ptr<AudioDevice>> OpenPortAudioDevice(absl::string_view name,
                                                                  const DeviceFormat& format) {
   auto device = std::make_unique<PortAudioDevice>(format);
-  if (absl::Status status = device->Open(name); !status.ok()) return status;
+  RETURN_IF_ERROR(device->Open(name));
   return device;
 }
 

@@ -45,8 +45,8 @@ struct ActiveJob {
 
 /// The jobs that wait or run, and everybody who watches a job: all in memory. No call waits for a
 /// disk, so readers and progress reports are served while the database is busy. Safe from every
-/// thread; one thread at a time adds, removes and changes jobs. A returned notice is told by the
-/// caller once it holds no lock.
+/// thread; one thread at a time adds, removes and changes jobs. A call that returns a Notice tells
+/// the watchers nothing itself: the caller tells it after it has released its locks.
 class ActiveJobs {
  public:
   /// What may run at a time.

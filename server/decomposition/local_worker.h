@@ -37,7 +37,7 @@ struct WorkerLimits {
   std::chrono::nanoseconds time{};
   std::chrono::nanoseconds stall{};
 
-  /// These limits, each lowered to the one of the request if that is less.
+  /// These limits, with memory and time lowered to the request's where it states less.
   WorkerLimits For(const v1::CreateModalModelRequest& request) const;
 };
 

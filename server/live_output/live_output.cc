@@ -36,7 +36,7 @@ MixerSettings MixerSettingsOf(const OutputSettings& settings, const Clock& clock
 absl::StatusOr<std::unique_ptr<LiveOutput>> LiveOutput::Start(const OutputSettings& settings,
                                                               Clock& clock, Log log) {
   std::unique_ptr<LiveOutput> output(new LiveOutput(settings, clock, std::move(log)));
-  if (absl::Status status = output->Open(); !status.ok()) return status;
+  RETURN_IF_ERROR(output->Open());
   return output;
 }
 

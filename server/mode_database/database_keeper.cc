@@ -26,7 +26,7 @@ void DatabaseKeeper::Run() {
     const absl::Status files = database_.CheckFiles();
     if (last != files) observer_(files);
     last = files;
-    // What cannot be tidied now is tried again in a second.
+    // Pages that cannot be freed now are tried again in a second.
     if (files.ok()) database_.Tidy().IgnoreError();
   } while (!stop_.try_acquire_for(kPeriod));
 }

@@ -22,8 +22,10 @@ struct JobRecord {
   std::string request{};  ///< serialized by the caller, who alone interprets it
   std::string label{};
   v1::JobState state = v1::JOB_STATE_QUEUED;
-  v1::ErrorInfo error{};    ///< while `state` is JOB_STATE_FAILED
-  bool remembered = false;  ///< the same request would fail again, so it is not run again
+  v1::ErrorInfo error{};  ///< while `state` is JOB_STATE_FAILED
+  /// The job has failed, and the same request would fail again: it is refused with `error`, and is
+  /// not run again.
+  bool remembered = false;
   int64_t created_unix_ms = 0;
   int32_t priority = 0;      ///< higher starts first
   uint32_t start_count = 0;  ///< workers started since the last submit that have not ended

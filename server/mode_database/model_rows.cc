@@ -71,15 +71,14 @@ absl::Status InsertChunk(SqliteConnection& connection, int64_t revision, int64_t
 }
 
 absl::Status RemoveOldRevision(SqliteConnection& connection, ModelSummary& summary) {
-  absl::Status status =
+  RETURN_IF_ERROR(
       connection.Query("SELECT label, pinned, sounded_unix_ms FROM models WHERE digest = ?",
                        {summary.digest}, [&](const SqlRow& row) {
                          if (!row.Text(0).empty()) summary.label = row.Text(0);
                          summary.pinned = row.Int(1) != 0;
                          summary.sounded_unix_ms = row.Int(2);
                          return absl::OkStatus();
-                       });
-  if (!status.ok()) return status;
+                       }));
   return connection.Run("DELETE FROM models WHERE digest = ?", {summary.digest});
 }
 

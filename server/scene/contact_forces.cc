@@ -154,7 +154,7 @@ void ContactForces::SendBlow(const Blow& blow, double remains_newtons, Events& e
   }
 }
 
-/// What the first or the second object of a touch feels, `scale` times as great.
+/// Returns the impulse on the first or the second object of a touch, times `scale`.
 ForceEvent ContactForces::PartOfBlow(const PairTouch& touch, size_t which, double scale) {
   const FeltContact& contact = touch.impulse;
   const double longer = contact.duration_follows_impulse ? std::pow(scale, kDurationPower) : 1;

@@ -234,7 +234,7 @@ void ContactIntake::Tell(const MixerEvent& event, FoundBlow blow, double frame) 
 }
 
 void ContactIntake::Push(MixerEvent& event, double frame) {
-  // What an earlier step has left may lie before the first frame where steps sound at once.
+  // An event of an earlier step may be due before the first frame where steps sound at once.
   event.SetTime(std::max(frame, 0.0));
   target_.Push(event);
 }

@@ -9,12 +9,12 @@
 #include "absl/status/statusor.h"
 #include "server/scene/contact_forces.h"
 #include "server/scene/found_blow.h"
-#include "server/scene/frame_time.h"
 #include "server/scene/lateness.h"
 #include "server/scene/object_contact.h"
 #include "server/scene/rejection_counts.h"
 #include "server/scene/scene.h"
 #include "server/scene/scene_space.h"
+#include "server/scene/time_mapping.h"
 #include "server/synthesis/schedule/mixer_event.h"
 
 namespace carillon {

@@ -40,7 +40,7 @@ struct FeltContact {
   std::span<const Felt> all() const { return std::span(by).first(count); }
 };
 
-/// The time of an elastic collision goes with this power of the impulse.
+/// The duration of an elastic collision is proportional to the impulse to this power.
 inline constexpr double kDurationPower = -0.2;
 
 /// Fills in the impulses that `object`, and in a contact of two `second`, feel of `contact`. Points

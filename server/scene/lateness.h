@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "server/scene/frame_time.h"
+#include "server/scene/time_mapping.h"
 
 namespace carillon {
 

@@ -127,7 +127,7 @@ class Mixer {
   /// Opens a bus. RESOURCE_EXHAUSTED (TOO_MANY_SCENES: it has most_buses).
   absl::StatusOr<BusId> OpenBus(double gain = 1) ABSL_LOCKS_EXCLUDED(kRenderRole);
 
-  /// Gives a bus up. The caller adds no bank to it any more; its banks still sound until they are
+  /// Gives up a bus. No bank may be added to it after this call; its banks sound until they are
   /// removed.
   void CloseBus(BusId bus) ABSL_LOCKS_EXCLUDED(kRenderRole);
 

@@ -47,10 +47,14 @@ only_in = ["precompute/*"]
         self.write("server/a.h", "// The grain of\n// the mesh.\n")
         self.found("precompute/a.h:1")
 
-    def test_an_error_message_is_read_and_other_strings_and_comments_of_a_source_are_not(self):
-        self.write("server/a.cc", 'Refusal(code, "REASON",\n        StrCat("mend it (", x, ")"));\n'
-                                  'Print("mend");  // mend\n')
-        self.found("server/a.cc:2")
+    def test_strings_and_comments_of_a_source_are_read_and_its_code_is_not(self):
+        self.write("server/a.cc", '#include "mend.h"\nreturn Invalid("REASON",\n        StrCat("mend it (", x, ")"));\n'
+                                  'mend();\n// It mends.\n')
+        self.found("server/a.cc:5", "server/a.cc:3")
+
+    def test_a_phrase_across_two_strings_is_found(self):
+        self.write("precompute/a.cc", 'Refusal("the grain of "\n        "the mesh");\n')
+        self.found("precompute/a.cc:1")
 
     def test_files_that_are_listed_are_not_read(self):
         self.write("tests/a.h", "// It mends.\n")

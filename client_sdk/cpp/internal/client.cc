@@ -13,6 +13,7 @@
 #include "client_sdk/cpp/internal/model_file.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/server_address.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::client {
 namespace {
@@ -38,10 +39,9 @@ absl::StatusOr<std::vector<v1::ModalModelSummary>> Client::ListModalModels(
   request.clear_page_token();
   request.set_page_size(kPageSize);
   do {
-    auto page = ListModalModelsPage(request);
-    if (!page.ok()) return page.status();
-    for (auto& model : *page->mutable_modal_models()) models.push_back(std::move(model));
-    request.set_page_token(page->next_page_token());
+    ASSIGN_OR_RETURN(auto page, ListModalModelsPage(request));
+    for (auto& model : *page.mutable_modal_models()) models.push_back(std::move(model));
+    request.set_page_token(page.next_page_token());
   } while (!request.page_token().empty());
   return models;
 }
@@ -52,10 +52,9 @@ absl::StatusOr<std::vector<v1::Job>> Client::ListJobs(const v1::ListJobsRequest&
   request.clear_page_token();
   request.set_page_size(kPageSize);
   do {
-    auto page = ListJobsPage(request);
-    if (!page.ok()) return page.status();
-    for (auto& job : *page->mutable_jobs()) jobs.push_back(std::move(job));
-    request.set_page_token(page->next_page_token());
+    ASSIGN_OR_RETURN(auto page, ListJobsPage(request));
+    for (auto& job : *page.mutable_jobs()) jobs.push_back(std::move(job));
+    request.set_page_token(page.next_page_token());
   } while (!request.page_token().empty());
   return jobs;
 }

@@ -13,6 +13,7 @@
 #include "client_sdk/cpp/internal/authorize.h"
 #include "client_sdk/cpp/internal/rpc_status.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::client {
 namespace {
@@ -172,7 +173,7 @@ absl::StatusOr<std::unique_ptr<ContactStream>> OpenContactStream(
     v1::ContactService::Stub& stub, const std::string& server, const std::string& token,
     const v1::ContactStreamStart& start) {
   auto call = std::make_unique<ContactStreamCall>(server, token);
-  if (const absl::Status status = call->Open(stub, start); !status.ok()) return status;
+  RETURN_IF_ERROR(call->Open(stub, start));
   return call;
 }
 

@@ -9,6 +9,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::client {
 namespace {
@@ -86,12 +87,11 @@ absl::StatusOr<ContactTraceReader> ContactTraceReader::Open(const std::string& p
                    absl::StrCat(path, ": ", std::strerror(errno), "; check the file's name"));
   }
   ContactTraceReader reader(path, std::move(file));
-  absl::StatusOr<std::optional<v1::ContactTraceRecord>> first = reader.Next();
-  if (!first.ok()) return first.status();
-  if (!*first || !(*first)->has_header() || (*first)->header().format_version() == 0) {
+  ASSIGN_OR_RETURN(std::optional<v1::ContactTraceRecord> first, reader.Next());
+  if (!first || !first->has_header() || first->header().format_version() == 0) {
     return reader.Malformed("does not begin with the header of a contact trace");
   }
-  reader.header_ = (*first)->header();
+  reader.header_ = first->header();
   if (reader.header_.format_version() > kFormatVersion) {
     return Refusal(absl::StatusCode::kUnimplemented, "TRACE_TOO_NEW",
                    absl::StrCat(path, ": has format version ", reader.header_.format_version(),

@@ -13,6 +13,7 @@
 #include "client_sdk/cpp/internal/authorize.h"
 #include "client_sdk/cpp/internal/contact_stream_call.h"
 #include "client_sdk/cpp/internal/rpc_status.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::client {
 namespace {
@@ -27,8 +28,7 @@ absl::StatusOr<Response> Call(const Stubs& stubs, Stub& stub,
   context.set_deadline(std::chrono::system_clock::now() + kCallTimeout);
   Authorize(context, stubs.token);
   Response response;
-  const absl::Status status = FromRpc((stub.*method)(&context, request, &response), stubs.server);
-  if (!status.ok()) return status;
+  RETURN_IF_ERROR(FromRpc((stub.*method)(&context, request, &response), stubs.server));
   return response;
 }
 
@@ -67,32 +67,29 @@ absl::StatusOr<v1::GetServerInfoResponse> GrpcClient::GetServerInfo() const {
 
 absl::StatusOr<v1::Job> GrpcClient::CreateModalModel(
     const v1::CreateModalModelRequest& request) const {
-  auto response =
-      Call(*stubs_, stubs_->models, &v1::ModalModelService::Stub::CreateModalModel, request);
-  if (!response.ok()) return response.status();
-  return std::move(*response->mutable_job());
+  ASSIGN_OR_RETURN(auto response, Call(*stubs_, stubs_->models,
+                                       &v1::ModalModelService::Stub::CreateModalModel, request));
+  return std::move(*response.mutable_job());
 }
 
 absl::StatusOr<v1::Job> GrpcClient::CreateTransfer(const v1::CreateTransferRequest& request) const {
-  auto response =
-      Call(*stubs_, stubs_->models, &v1::ModalModelService::Stub::CreateTransfer, request);
-  if (!response.ok()) return response.status();
-  return std::move(*response->mutable_job());
+  ASSIGN_OR_RETURN(auto response, Call(*stubs_, stubs_->models,
+                                       &v1::ModalModelService::Stub::CreateTransfer, request));
+  return std::move(*response.mutable_job());
 }
 
 absl::StatusOr<v1::ModalModelSummary> GrpcClient::GetModalModel(const std::string& name) const {
-  auto response = Call(*stubs_, stubs_->models, &v1::ModalModelService::Stub::GetModalModel,
-                       Named<v1::GetModalModelRequest>(name));
-  if (!response.ok()) return response.status();
-  return std::move(*response->mutable_modal_model());
+  ASSIGN_OR_RETURN(auto response,
+                   Call(*stubs_, stubs_->models, &v1::ModalModelService::Stub::GetModalModel,
+                        Named<v1::GetModalModelRequest>(name)));
+  return std::move(*response.mutable_modal_model());
 }
 
 absl::StatusOr<v1::ModalModelSummary> GrpcClient::UpdateModalModel(
     const v1::UpdateModalModelRequest& request) const {
-  auto response =
-      Call(*stubs_, stubs_->models, &v1::ModalModelService::Stub::UpdateModalModel, request);
-  if (!response.ok()) return response.status();
-  return std::move(*response->mutable_modal_model());
+  ASSIGN_OR_RETURN(auto response, Call(*stubs_, stubs_->models,
+                                       &v1::ModalModelService::Stub::UpdateModalModel, request));
+  return std::move(*response.mutable_modal_model());
 }
 
 absl::StatusOr<v1::ListModalModelsResponse> GrpcClient::ListModalModelsPage(
@@ -107,18 +104,18 @@ absl::Status GrpcClient::DeleteModalModel(const std::string& name) const {
 }
 
 absl::StatusOr<std::vector<v1::CatalogueMaterial>> GrpcClient::ListMaterials() const {
-  auto response = Call(*stubs_, stubs_->models, &v1::ModalModelService::Stub::ListMaterials,
-                       v1::ListMaterialsRequest());
-  if (!response.ok()) return response.status();
-  return std::vector<v1::CatalogueMaterial>(response->materials().begin(),
-                                            response->materials().end());
+  ASSIGN_OR_RETURN(auto response,
+                   Call(*stubs_, stubs_->models, &v1::ModalModelService::Stub::ListMaterials,
+                        v1::ListMaterialsRequest()));
+  return std::vector<v1::CatalogueMaterial>(response.materials().begin(),
+                                            response.materials().end());
 }
 
 absl::StatusOr<v1::Job> GrpcClient::GetJob(const std::string& name) const {
-  auto response = Call(*stubs_, stubs_->decompositions, &v1::DecompositionService::Stub::GetJob,
-                       Named<v1::GetJobRequest>(name));
-  if (!response.ok()) return response.status();
-  return std::move(*response->mutable_job());
+  ASSIGN_OR_RETURN(auto response,
+                   Call(*stubs_, stubs_->decompositions, &v1::DecompositionService::Stub::GetJob,
+                        Named<v1::GetJobRequest>(name)));
+  return std::move(*response.mutable_job());
 }
 
 absl::StatusOr<v1::ListJobsResponse> GrpcClient::ListJobsPage(
@@ -127,10 +124,10 @@ absl::StatusOr<v1::ListJobsResponse> GrpcClient::ListJobsPage(
 }
 
 absl::StatusOr<v1::Job> GrpcClient::CancelJob(const std::string& name) const {
-  auto response = Call(*stubs_, stubs_->decompositions, &v1::DecompositionService::Stub::CancelJob,
-                       Named<v1::CancelJobRequest>(name));
-  if (!response.ok()) return response.status();
-  return std::move(*response->mutable_job());
+  ASSIGN_OR_RETURN(auto response,
+                   Call(*stubs_, stubs_->decompositions, &v1::DecompositionService::Stub::CancelJob,
+                        Named<v1::CancelJobRequest>(name)));
+  return std::move(*response.mutable_job());
 }
 
 absl::StatusOr<v1::CreateSceneResponse> GrpcClient::CreateOrFindScene(
@@ -139,37 +136,35 @@ absl::StatusOr<v1::CreateSceneResponse> GrpcClient::CreateOrFindScene(
 }
 
 absl::StatusOr<v1::Scene> GrpcClient::GetScene(const std::string& name) const {
-  auto response = Call(*stubs_, stubs_->scenes, &v1::SceneService::Stub::GetScene,
-                       Named<v1::GetSceneRequest>(name));
-  if (!response.ok()) return response.status();
-  return std::move(*response->mutable_scene());
+  ASSIGN_OR_RETURN(auto response, Call(*stubs_, stubs_->scenes, &v1::SceneService::Stub::GetScene,
+                                       Named<v1::GetSceneRequest>(name)));
+  return std::move(*response.mutable_scene());
 }
 
 absl::StatusOr<std::vector<v1::SoundingObject>> GrpcClient::AddObjects(
     const v1::AddObjectsRequest& request) const {
-  auto response = Call(*stubs_, stubs_->scenes, &v1::SceneService::Stub::AddObjects, request);
-  if (!response.ok()) return response.status();
-  return std::vector<v1::SoundingObject>(response->objects().begin(), response->objects().end());
+  ASSIGN_OR_RETURN(auto response,
+                   Call(*stubs_, stubs_->scenes, &v1::SceneService::Stub::AddObjects, request));
+  return std::vector<v1::SoundingObject>(response.objects().begin(), response.objects().end());
 }
 
 absl::StatusOr<std::string> GrpcClient::CreateScene(const v1::CreateSceneRequest& request) const {
-  auto response = CreateOrFindScene(request);
-  if (!response.ok()) return response.status();
-  return response->name();
+  ASSIGN_OR_RETURN(auto response, CreateOrFindScene(request));
+  return response.name();
 }
 
 absl::StatusOr<v1::Scene> GrpcClient::UpdateScene(const v1::UpdateSceneRequest& request) const {
-  auto response = Call(*stubs_, stubs_->scenes, &v1::SceneService::Stub::UpdateScene, request);
-  if (!response.ok()) return response.status();
-  return std::move(*response->mutable_scene());
+  ASSIGN_OR_RETURN(auto response,
+                   Call(*stubs_, stubs_->scenes, &v1::SceneService::Stub::UpdateScene, request));
+  return std::move(*response.mutable_scene());
 }
 
 absl::StatusOr<uint32_t> GrpcClient::StopAll(const std::string& scene) const {
   v1::StopAllRequest request;
   request.set_scene(scene);
-  auto response = Call(*stubs_, stubs_->scenes, &v1::SceneService::Stub::StopAll, request);
-  if (!response.ok()) return response.status();
-  return response->scene_count();
+  ASSIGN_OR_RETURN(auto response,
+                   Call(*stubs_, stubs_->scenes, &v1::SceneService::Stub::StopAll, request));
+  return response.scene_count();
 }
 
 absl::Status GrpcClient::DeleteScene(const std::string& name) const {
@@ -179,33 +174,32 @@ absl::Status GrpcClient::DeleteScene(const std::string& name) const {
 }
 
 absl::StatusOr<std::vector<v1::Scene>> GrpcClient::ListScenes() const {
-  auto response =
-      Call(*stubs_, stubs_->scenes, &v1::SceneService::Stub::ListScenes, v1::ListScenesRequest());
-  if (!response.ok()) return response.status();
-  return std::vector<v1::Scene>(response->scenes().begin(), response->scenes().end());
+  ASSIGN_OR_RETURN(auto response, Call(*stubs_, stubs_->scenes, &v1::SceneService::Stub::ListScenes,
+                                       v1::ListScenesRequest()));
+  return std::vector<v1::Scene>(response.scenes().begin(), response.scenes().end());
 }
 
 absl::StatusOr<std::vector<v1::SoundingObject>> GrpcClient::ListObjects(
     const std::string& scene) const {
   v1::ListObjectsRequest request;
   request.set_scene(scene);
-  auto response = Call(*stubs_, stubs_->scenes, &v1::SceneService::Stub::ListObjects, request);
-  if (!response.ok()) return response.status();
-  return std::vector<v1::SoundingObject>(response->objects().begin(), response->objects().end());
+  ASSIGN_OR_RETURN(auto response,
+                   Call(*stubs_, stubs_->scenes, &v1::SceneService::Stub::ListObjects, request));
+  return std::vector<v1::SoundingObject>(response.objects().begin(), response.objects().end());
 }
 
 absl::StatusOr<v1::SoundingObject> GrpcClient::AddObject(
     const v1::AddObjectRequest& request) const {
-  auto response = Call(*stubs_, stubs_->scenes, &v1::SceneService::Stub::AddObject, request);
-  if (!response.ok()) return response.status();
-  return std::move(*response->mutable_object());
+  ASSIGN_OR_RETURN(auto response,
+                   Call(*stubs_, stubs_->scenes, &v1::SceneService::Stub::AddObject, request));
+  return std::move(*response.mutable_object());
 }
 
 absl::StatusOr<v1::SoundingObject> GrpcClient::UpdateObject(
     const v1::UpdateObjectRequest& request) const {
-  auto response = Call(*stubs_, stubs_->scenes, &v1::SceneService::Stub::UpdateObject, request);
-  if (!response.ok()) return response.status();
-  return std::move(*response->mutable_object());
+  ASSIGN_OR_RETURN(auto response,
+                   Call(*stubs_, stubs_->scenes, &v1::SceneService::Stub::UpdateObject, request));
+  return std::move(*response.mutable_object());
 }
 
 absl::Status GrpcClient::RemoveObject(const std::string& name) const {

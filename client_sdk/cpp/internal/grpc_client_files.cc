@@ -11,6 +11,7 @@
 #include "client_sdk/cpp/internal/grpc_client.h"
 #include "client_sdk/cpp/internal/model_file.h"
 #include "client_sdk/cpp/internal/rpc_status.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::client {
 absl::Status GrpcClient::ExportModalModel(const std::string& name, const RecordSink& sink) const {
@@ -59,9 +60,7 @@ absl::StatusOr<v1::GetDatabaseStatsResponse> GrpcClient::GetDatabaseStats() cons
   Authorize(context, stubs_->token);
   context.set_deadline(std::chrono::system_clock::now() + kCallTimeout);
   v1::GetDatabaseStatsResponse response;
-  const absl::Status status =
-      FromRpc(stubs_->admin.GetDatabaseStats(&context, {}, &response), stubs_->server);
-  if (!status.ok()) return status;
+  RETURN_IF_ERROR(FromRpc(stubs_->admin.GetDatabaseStats(&context, {}, &response), stubs_->server));
   return response;
 }
 
@@ -95,9 +94,8 @@ absl::StatusOr<v1::CollectGarbageResponse> GrpcClient::CollectGarbage(
   Authorize(context, stubs_->token);
   context.set_deadline(std::chrono::system_clock::now() + kCallTimeout);
   v1::CollectGarbageResponse response;
-  const absl::Status status =
-      FromRpc(stubs_->admin.CollectGarbage(&context, request, &response), stubs_->server);
-  if (!status.ok()) return status;
+  RETURN_IF_ERROR(
+      FromRpc(stubs_->admin.CollectGarbage(&context, request, &response), stubs_->server));
   return response;
 }
 

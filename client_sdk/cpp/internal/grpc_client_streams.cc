@@ -14,6 +14,7 @@
 #include "client_sdk/cpp/internal/grpc_client.h"
 #include "client_sdk/cpp/internal/rpc_status.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::client {
 namespace {
@@ -120,8 +121,7 @@ absl::StatusOr<std::string> GrpcClient::UploadMesh(absl::string_view bytes) cons
     if (!writer->Write(request)) break;  // Finish tells why
   }
   writer->WritesDone();
-  const absl::Status status = FromRpc(writer->Finish(), stubs_->server);
-  if (!status.ok()) return status;
+  RETURN_IF_ERROR(FromRpc(writer->Finish(), stubs_->server));
   return response.mesh_digest();
 }
 
@@ -136,8 +136,7 @@ absl::StatusOr<v1::Job> GrpcClient::WatchJob(
   while (reader->Read(&response)) {
     if (on_change) on_change(response.job());
   }
-  const absl::Status status = FromRpc(reader->Finish(), stubs_->server);
-  if (!status.ok()) return status;
+  RETURN_IF_ERROR(FromRpc(reader->Finish(), stubs_->server));
   const v1::Job& job = response.job();
   if (job.state() == v1::JOB_STATE_FAILED) {
     return FromErrorInfo(absl::StatusCode::kFailedPrecondition, job.error());

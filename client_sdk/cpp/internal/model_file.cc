@@ -7,6 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::client {
 namespace {
@@ -32,7 +33,7 @@ absl::Status ReadDelimited(const std::string& file,
           absl::StatusCode::kInvalidArgument, "MODAL_MODEL_MALFORMED",
           absl::StrCat(file, " is not a whole file of modal model records; export it again"));
     }
-    if (absl::Status status = sink(record); !status.ok()) return status;
+    RETURN_IF_ERROR(sink(record));
   }
 }
 

@@ -12,6 +12,7 @@
 #include "absl/strings/str_format.h"
 #include "carillon/contact_trace.h"
 #include "client_sdk/examples/falls/fall.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::falls {
 namespace {
@@ -59,24 +60,21 @@ v1::ContactTraceObject ObjectOf(const Body& body, uint32_t handle) {
 }
 
 absl::Status Record(const Options& options) {
-  auto scene = ReadFallScene(options.scene);
-  if (!scene.ok()) return scene.status();
-  auto simulation = Simulate(options, *scene);
-  if (!simulation.ok()) return simulation.status();
+  ASSIGN_OR_RETURN(auto scene, ReadFallScene(options.scene));
+  ASSIGN_OR_RETURN(auto simulation, Simulate(options, scene));
   v1::ContactTraceHeader header;
   header.set_simulator(absl::StrCat("carillon-fall ", options.engine));
   header.set_step_s(1 / options.rate_hz);
-  auto trace = client::ContactTraceWriter::Create(options.trace, header);
-  if (!trace.ok()) return trace.status();
+  ASSIGN_OR_RETURN(auto trace, client::ContactTraceWriter::Create(options.trace, header));
   uint32_t handle = 0;
-  for (const Body& body : scene->bodies) {
+  for (const Body& body : scene.bodies) {
     ++handle;
-    if (!body.model.empty()) trace->Write(ObjectOf(body, handle));
+    if (!body.model.empty()) trace.Write(ObjectOf(body, handle));
   }
   const int step_count =
-      static_cast<int>(options.seconds.value_or(scene->seconds) * options.rate_hz);
-  for (int i = 0; i < step_count; ++i) trace->Write((*simulation)());
-  return trace->Close();
+      static_cast<int>(options.seconds.value_or(scene.seconds) * options.rate_hz);
+  for (int i = 0; i < step_count; ++i) trace.Write(simulation());
+  return trace.Close();
 }
 
 int Main(int argc, char** argv) {

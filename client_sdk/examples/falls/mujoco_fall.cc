@@ -21,6 +21,7 @@
 #include "absl/strings/str_join.h"
 #include "client_sdk/adapters/mujoco_contacts.h"
 #include "client_sdk/examples/falls/fall.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::falls {
 namespace {
@@ -188,9 +189,8 @@ class MujocoFall {
 
 absl::StatusOr<Simulation> FallInMujoco(const FallScene& scene, double step_s) {
   mju_user_warning = &EndWithWarning;
-  absl::StatusOr<Model> model = Compile(Mjcf(scene, step_s).text());
-  if (!model.ok()) return model.status();
-  const auto fall = std::make_shared<MujocoFall>(scene, *std::move(model));
+  ASSIGN_OR_RETURN(Model model, Compile(Mjcf(scene, step_s).text()));
+  const auto fall = std::make_shared<MujocoFall>(scene, std::move(model));
   return [fall] { return fall->Step(); };
 }
 

@@ -11,6 +11,7 @@
 #include "carillon/contact_trace.h"
 #include "client_sdk/examples/rough_floor/rough_floor.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::rough_floor {
 namespace {
@@ -26,19 +27,18 @@ absl::Status Record(const Options& options) {
   v1::ContactTraceHeader header;
   header.set_simulator("carillon-rough-floor");
   header.set_step_s(step_s);
-  auto trace = client::ContactTraceWriter::Create(options.trace, header);
-  if (!trace.ok()) return trace.status();
+  ASSIGN_OR_RETURN(auto trace, client::ContactTraceWriter::Create(options.trace, header));
   v1::ContactTraceObject object;
   object.set_handle(1);
   object.set_modal_model(options.model);
   object.mutable_material()->set_preset(options.material);
-  trace->Write(object);
+  trace.Write(object);
   const Simulation simulation = options.engine == "ode"
                                     ? SimulateInOde(options.scene, {}, step_s)
                                     : SimulateInBullet(options.scene, {}, step_s);
   const int step_count = static_cast<int>(options.seconds * options.rate_hz);
-  for (int i = 0; i < step_count; ++i) trace->Write(simulation());
-  return trace->Close();
+  for (int i = 0; i < step_count; ++i) trace.Write(simulation());
+  return trace.Close();
 }
 
 int Main(int argc, char** argv) {

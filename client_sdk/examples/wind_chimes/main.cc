@@ -20,6 +20,7 @@
 #include "client_sdk/examples/wind_chimes/wind_chimes.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/server_address.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::wind_chimes {
 namespace {
@@ -55,8 +56,7 @@ class LiveScene {
  public:
   static absl::StatusOr<std::unique_ptr<LiveScene>> Open(const PlayOptions& options) {
     std::unique_ptr<LiveScene> live(new LiveScene(options.server));
-    const absl::Status opened = live->Fill(options);
-    if (!opened.ok()) return opened;
+    RETURN_IF_ERROR(live->Fill(options));
     return live;
   }
 
@@ -72,9 +72,7 @@ class LiveScene {
   explicit LiveScene(const std::string& server) : client_(client::Connect(server)) {}
 
   absl::Status Fill(const PlayOptions& options) {
-    auto scene = client_->CreateScene({});
-    if (!scene.ok()) return scene.status();
-    scene_ = *scene;
+    ASSIGN_OR_RETURN(scene_, client_->CreateScene({}));
     v1::AddObjectsRequest tubes;
     tubes.set_scene(scene_);
     for (size_t i = 0; i < options.models.size(); ++i) {
@@ -88,9 +86,7 @@ class LiveScene {
     v1::ContactStreamStart start;
     start.set_scene(scene_);
     start.set_step_s(WindChimes::kStep_s);
-    auto stream = client_->StreamContacts(start);
-    if (!stream.ok()) return stream.status();
-    stream_ = *std::move(stream);
+    ASSIGN_OR_RETURN(stream_, client_->StreamContacts(start));
     return absl::OkStatus();
   }
 
@@ -130,15 +126,11 @@ void PrintReport(const v1::StreamContactsResponse& report) {
 absl::Status Play(const PlayOptions& options) {
   std::unique_ptr<LiveScene> live;
   if (!options.offline) {
-    auto opened = LiveScene::Open(options);
-    if (!opened.ok()) return opened.status();
-    live = *std::move(opened);
+    ASSIGN_OR_RETURN(live, LiveScene::Open(options));
   }
   std::optional<client::ContactTraceWriter> trace;
   if (!options.trace.empty()) {
-    auto begun = BeginTrace(options);
-    if (!begun.ok()) return begun.status();
-    trace = *std::move(begun);
+    ASSIGN_OR_RETURN(trace, BeginTrace(options));
   }
 
   WindChimes chimes(options.seed);
@@ -152,12 +144,12 @@ absl::Status Play(const PlayOptions& options) {
     if (!live) continue;
     // The simulation of a step takes less time than the step, so the loop waits for real time.
     std::this_thread::sleep_until(start + i * std::chrono::duration<double>(WindChimes::kStep_s));
-    if (absl::Status sent = live->Send(step); !sent.ok()) return sent;
+    RETURN_IF_ERROR(live->Send(step));
   }
   absl::PrintF("%d contacts in %.1f s\n", contact_count, options.seconds);
 
   if (trace) {
-    if (absl::Status closed = trace->Close(); !closed.ok()) return closed;
+    RETURN_IF_ERROR(trace->Close());
   }
   if (!live) return absl::OkStatus();
   const auto report = live->Finish();

@@ -149,8 +149,7 @@ class GmshParser {
       return lines_.Unreadable("an element with another number of nodes than its type has");
     }
     const int32_t physical = figures[2] > 0 ? figures[3] : 0;
-    absl::Status status = AddElement(*kind, physical, std::span(figures).subspan(first));
-    if (!status.ok()) return status;
+    RETURN_IF_ERROR(AddElement(*kind, physical, std::span(figures).subspan(first)));
     return 1;
   }
 

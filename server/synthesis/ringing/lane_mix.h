@@ -10,8 +10,9 @@
 
 namespace carillon {
 
-/// One block of sound that all banks add to. Most of it is still split into SIMD lanes, or stands
-/// at the nodes of tiles; both are summed once for all banks.
+/// One block of sound that all banks add to. Most of it is not samples yet: sums in separate SIMD
+/// lanes, and values at the Chebyshev nodes of longer tiles (tile.h). Both become samples once for
+/// all banks.
 class LaneMix {
  public:
   /// Silences the first `frame_count` frames.

@@ -166,7 +166,8 @@ float Voice::Sample(double delay_frames, size_t n) const noexcept {
 }
 
 /// Between the ends of the block the delay is a cubic, whose slopes there follow from the
-/// neighbouring blocks (Catmull and Rom).
+/// neighbouring blocks (Catmull and Rom). Reading the line at a changing delay is the Doppler
+/// shift.
 void Voice::RenderFrom(const Hearings& heard, float fade, float fade_step,
                        std::span<float> frames) noexcept {
   const size_t channels = settings_.channel_count;
