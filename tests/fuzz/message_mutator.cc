@@ -9,7 +9,6 @@ namespace carillon {
 namespace {
 
 using google::protobuf::Descriptor;
-using google::protobuf::EnumValueDescriptor;
 using google::protobuf::FieldDescriptor;
 using google::protobuf::Message;
 using google::protobuf::Reflection;
@@ -65,7 +64,7 @@ void MessageMutator::ChangeSingular(Message& message, const Field& field) {
     case Field::CPPTYPE_BOOL:
       return reflection.SetBool(&message, &field, Below(2) == 0);
     case Field::CPPTYPE_ENUM:
-      return reflection.SetEnum(&message, &field, EnumValue(field));
+      return reflection.SetEnumValue(&message, &field, EnumValue(field));
     case Field::CPPTYPE_STRING:
       return reflection.SetString(&message, &field, Text(field));
     case Field::CPPTYPE_MESSAGE:
@@ -102,7 +101,7 @@ void MessageMutator::Add(Message& message, const Field& field) {
     case Field::CPPTYPE_BOOL:
       return reflection.AddBool(&message, &field, Below(2) == 0);
     case Field::CPPTYPE_ENUM:
-      return reflection.AddEnum(&message, &field, EnumValue(field));
+      return reflection.AddEnumValue(&message, &field, EnumValue(field));
     case Field::CPPTYPE_STRING:
       return reflection.AddString(&message, &field, Text(field));
     case Field::CPPTYPE_MESSAGE: {
@@ -143,10 +142,10 @@ std::string MessageMutator::Text(const Field& field) {
   return text;
 }
 
-const EnumValueDescriptor* MessageMutator::EnumValue(const Field& field) {
+int MessageMutator::EnumValue(const Field& field) {
   const auto& type = *field.enum_type();
-  if (Below(8) == 0) return type.FindValueByNumberCreatingIfUnknown(static_cast<int>(Below(100)));
-  return type.value(static_cast<int>(Below(static_cast<size_t>(type.value_count()))));
+  if (Below(8) == 0) return static_cast<int>(Below(100));
+  return type.value(static_cast<int>(Below(static_cast<size_t>(type.value_count()))))->number();
 }
 
 }  // namespace carillon

@@ -30,7 +30,7 @@ class MessageMutator {
   double Number();
   int64_t Integer();
   std::string Text(const Field& field);
-  const google::protobuf::EnumValueDescriptor* EnumValue(const Field& field);
+  int EnumValue(const Field& field);
 
   Random& random_;
   const std::span<const std::string> words_;

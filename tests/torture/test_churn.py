@@ -116,10 +116,13 @@ class ChurnTest(torture.ServedTest):
         time.sleep(REST_S)
         return self.sample()
 
+    def allocated_mib(self):
+        return float(self.metrics()["carillon_heap_bytes"]) / 2**20
+
     def check_memory(self, before, rests):
-        growth_mib_per_hour = slope_per_hour(rests[1:])
+        growth_mib_per_hour = slope_per_hour(rests[len(rests) // 2:])
         print("memory at rest: " + ", ".join(f"{rest.mib:.1f}" for rest in (before, *rests))
-              + f" MiB; {growth_mib_per_hour:+.1f} MiB/h after the first part", flush=True)
+              + f" MiB; {growth_mib_per_hour:+.1f} MiB/h in the second half", flush=True)
         self.assertLess(rests[0].mib, before.mib + WARM_UP_MIB)
         for rest in rests[1:]:
             self.assertLess(rest.mib, (1 + GROWTH) * rests[0].mib)
@@ -149,7 +152,8 @@ class ChurnTest(torture.ServedTest):
             rests.append(self.rest())
             print(f"{self.lives} lives, {self.deaths} deaths without a word; memory amid the clients "
                   f"{statistics.median(sample.mib for sample in parts[-1]):.1f} MiB, at most "
-                  f"{max(sample.mib for sample in parts[-1]):.1f}; at rest {rests[-1].mib:.1f}", flush=True)
+                  f"{max(sample.mib for sample in parts[-1]):.1f}; at rest {rests[-1].mib:.1f}, of which "
+                  f"{self.allocated_mib():.2f} are allocated", flush=True)
         self.check_counts(before, parts, rests[-1])
         self.check_memory(before, rests)
         self.assertGreater(self.lives, CLIENTS)
