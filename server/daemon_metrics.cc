@@ -113,7 +113,8 @@ void AddClients(Metrics& metrics, const ClientCounts& clients) {
 
 /// "PHASE_SOLVE" as "solve".
 std::string PhaseName(size_t phase) {
-  return absl::AsciiStrToLower(absl::StripPrefix(v1::Phase_Name(static_cast<int>(phase)), "PHASE_"));
+  return absl::AsciiStrToLower(
+      absl::StripPrefix(v1::Phase_Name(static_cast<int>(phase)), "PHASE_"));
 }
 
 void AddPhases(Metrics& metrics, const PhaseUses& phases) {

@@ -145,13 +145,13 @@ void CheckCertificates(const client::Client& daemon, Findings& findings) {
   const auto info = daemon.GetServerInfo();
   if (!info.ok() || info->certificate_end_unix_s() == 0) return;
   const absl::Time end = absl::FromUnixSeconds(info->certificate_end_unix_s());
-  const std::string when =
-      absl::FormatTime("a certificate of the daemon expires on %Y-%m-%d %H:%M UTC", end,
-                       absl::UTCTimeZone());
+  const std::string when = absl::FormatTime(
+      "a certificate of the daemon expires on %Y-%m-%d %H:%M UTC", end, absl::UTCTimeZone());
   if (end - absl::Now() > kEnoughTime) return findings.Good("expiry", when);
   findings.Bad("expiry",
-               absl::StrCat(when, ", and clients refuse it then: put a new one in its file, and "
-                                  "reload the daemon (systemctl reload carillond)"));
+               absl::StrCat(when,
+                            ", and clients refuse it then: put a new one in its file, and "
+                            "reload the daemon (systemctl reload carillond)"));
 }
 
 void CheckDaemon(const Program& program, Findings& findings) {

@@ -253,12 +253,13 @@ absl::StatusOr<std::unique_ptr<ApiServer>> ApiServer::Start(const ApiSettings& s
       .idle_calls = state->idle_calls,
       .idle_limit = Duration(settings.rendering_idle_s),
       .log = [log = &state->client_log](const std::string& line) { log->Warn(line); },
-      .tick = [state = state.get(), can_decompose = rooms.can_decompose] {
-        state->ShowWorkers(can_decompose());
-        if (const auto warning = state->certificate_end.WarningDue()) {
-          state->client_log.Warn(*warning);
-        }
-      }});
+      .tick =
+          [state = state.get(), can_decompose = rooms.can_decompose] {
+            state->ShowWorkers(can_decompose());
+            if (const auto warning = state->certificate_end.WarningDue()) {
+              state->client_log.Warn(*warning);
+            }
+          }});
   rooms.output.ObserveDevice([health = state->server->GetHealthCheckService()](bool plays) {
     health->SetServingStatus(v1::AudioService::service_full_name(), plays);
   });

@@ -28,7 +28,7 @@ std::optional<std::string> CertificateEnd::WarningDue() {
   const std::string when =
       *left < 0 ? "has expired, and clients refuse it"
                 : absl::StrCat("expires in ", static_cast<int>(std::floor(*left / kDayS)), " days");
-  return absl::StrCat("TLS_EXPIRES: a certificate of the daemon ", when,
+  return absl::StrCat("a certificate of the daemon ", when,
                       ": put a new one in its file, and reload the daemon (SIGHUP)");
 }
 

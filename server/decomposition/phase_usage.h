@@ -13,7 +13,7 @@
 
 namespace carillon {
 
-/// What one phase of all jobs has taken since the daemon started.
+/// The cost of one phase in all jobs since the daemon started.
 struct PhaseUse {
   double seconds = 0;
   uint64_t peak_bytes = 0;  ///< largest memory of one worker within the phase; 0: unknown

@@ -117,18 +117,35 @@ void MessageMutator::Add(Message& message, const Field& field) {
 
 double MessageMutator::Number() {
   using Limits = std::numeric_limits<double>;
-  static constexpr double kEnds[] = {
-      0, -0.0, 1, -1, 0.01, 0.5, 20, 1e3, 1e6, 1e10, 1e20, 3e38, -3e38, 1e300, 1e-9, 1e-300,
-      Limits::infinity(), -Limits::infinity(), Limits::quiet_NaN(), Limits::denorm_min()};
+  static constexpr double kEnds[] = {0,
+                                     -0.0,
+                                     1,
+                                     -1,
+                                     0.01,
+                                     0.5,
+                                     20,
+                                     1e3,
+                                     1e6,
+                                     1e10,
+                                     1e20,
+                                     3e38,
+                                     -3e38,
+                                     1e300,
+                                     1e-9,
+                                     1e-300,
+                                     Limits::infinity(),
+                                     -Limits::infinity(),
+                                     Limits::quiet_NaN(),
+                                     Limits::denorm_min()};
   if (Below(2) == 0) return kEnds[Below(std::size(kEnds))];
   return std::normal_distribution<double>(0, 1)(random_);
 }
 
 int64_t MessageMutator::Integer() {
   using Limits = std::numeric_limits<int64_t>;
-  static constexpr int64_t kEnds[] = {0,         1,          2,        3,           -1,
-                                      255,       65536,      INT32_MAX, INT32_MIN,  UINT32_MAX,
-                                      1'000'000, 44'100,     48'000,   Limits::max(), Limits::min()};
+  static constexpr int64_t kEnds[] = {
+      0,         1,          2,         3,      -1,     255,           65536,        INT32_MAX,
+      INT32_MIN, UINT32_MAX, 1'000'000, 44'100, 48'000, Limits::max(), Limits::min()};
   if (Below(2) == 0) return kEnds[Below(std::size(kEnds))];
   return static_cast<int64_t>(Below(10));
 }

@@ -136,7 +136,8 @@ class FuzzedDaemon {
   }
 
   void StoreModel() {
-    if (!rooms_.database->models().PutFile(SmallModel()->digest, "small", rooms_.folder / "model")
+    if (!rooms_.database->models()
+             .PutFile(SmallModel()->digest, "small", rooms_.folder / "model")
              .ok()) {
       __builtin_trap();
     }

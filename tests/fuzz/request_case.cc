@@ -84,8 +84,7 @@ std::string ToText(const RequestCase& request) {
 std::unique_ptr<google::protobuf::Message> NewRequest(const std::string& method) {
   std::string dotted = method;
   std::ranges::replace(dotted, '/', '.');
-  const MethodDescriptor* const found =
-      DescriptorPool::generated_pool()->FindMethodByName(dotted);
+  const MethodDescriptor* const found = DescriptorPool::generated_pool()->FindMethodByName(dotted);
   const auto* const prototype =
       MessageFactory::generated_factory()->GetPrototype(found->input_type());
   return std::unique_ptr<google::protobuf::Message>(prototype->New());

@@ -19,10 +19,22 @@ using Random = MessageMutator::Random;
 std::string Digest(char digit) { return std::string(64, digit); }
 
 const std::vector<std::string>& Words() {
-  static const auto* const words = new std::vector<std::string>{
-      "scenes/fuzz", "scenes/1", "scenes/fuzz/objects/1", "modalModels/" + Digest('a'),
-      "modalModels/" + Digest('b'), "meshes/" + Digest('a'), "jobs/1", "fuzz", "chime_aluminum",
-      "glass", "obj", "60:4", "a label", "", "*", std::string(300, 'x')};
+  static const auto* const words = new std::vector<std::string>{"scenes/fuzz",
+                                                                "scenes/1",
+                                                                "scenes/fuzz/objects/1",
+                                                                "modalModels/" + Digest('a'),
+                                                                "modalModels/" + Digest('b'),
+                                                                "meshes/" + Digest('a'),
+                                                                "jobs/1",
+                                                                "fuzz",
+                                                                "chime_aluminum",
+                                                                "glass",
+                                                                "obj",
+                                                                "60:4",
+                                                                "a label",
+                                                                "",
+                                                                "*",
+                                                                std::string(300, 'x')};
   return *words;
 }
 

@@ -14,8 +14,8 @@
 #include "client_sdk/interchange/npz_model.h"
 #include "precompute/mesh/boundary.h"
 #include "tests/client_sdk/interchange/small_model.h"
-#include "tests/precompute/mesh/mesh_files.h"
 #include "tests/fuzz/write_request_seeds.h"
+#include "tests/precompute/mesh/mesh_files.h"
 #include "tests/server/mode_database/sample_model.h"
 #include "tests/server/mode_database/sample_transfer.h"
 
