@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/daemon_metrics.h"
 
+#include <malloc.h>
 #include <unistd.h>
 
 #include <cstdint>
 #include <fstream>
+#include <optional>
 #include <utility>
 
+#include "absl/strings/ascii.h"
+#include "absl/strings/strip.h"
 #include "server/mode_database/database.h"
 #include "server/mode_database/database_admin.h"
 
@@ -107,6 +111,35 @@ void AddClients(Metrics& metrics, const ClientCounts& clients) {
                   Of("rendering", clients.renderings)}});
 }
 
+/// "PHASE_SOLVE" as "solve".
+std::string PhaseName(size_t phase) {
+  return absl::AsciiStrToLower(
+      absl::StripPrefix(v1::Phase_Name(static_cast<int>(phase)), "PHASE_"));
+}
+
+void AddPhases(Metrics& metrics, const PhaseUses& phases) {
+  Metric seconds{.name = "carillon_job_phase_seconds_total",
+                 .help = "Time that decompositions have spent in each phase.",
+                 .kind = Metric::Kind::kCounter,
+                 .label_name = "phase"};
+  Metric memory{.name = "carillon_job_phase_peak_memory_bytes",
+                .help = "Largest memory of one decomposition within each phase.",
+                .kind = Metric::Kind::kGauge,
+                .label_name = "phase"};
+  for (size_t phase = v1::PHASE_UNSPECIFIED + 1; phase < phases.size(); ++phase) {
+    seconds.values.push_back({.label = PhaseName(phase), .value = phases[phase].seconds});
+    memory.values.push_back(Of(PhaseName(phase), phases[phase].peak_bytes));
+  }
+  metrics.push_back(std::move(seconds));
+  metrics.push_back(std::move(memory));
+}
+
+void AddTls(Metrics& metrics, const std::optional<double>& certificate_left_s) {
+  if (!certificate_left_s) return;
+  Gauge(metrics, "carillon_tls_certificate_left_seconds",
+        "Time until the first of the daemon's certificates expires.", *certificate_left_s);
+}
+
 void AddJobs(Metrics& metrics, const DecompositionQueue::Counts& jobs) {
   metrics.push_back({.name = "carillon_jobs",
                      .help = "Decompositions that wait or run.",
@@ -119,6 +152,7 @@ void AddJobs(Metrics& metrics, const DecompositionQueue::Counts& jobs) {
                      .label_name = "state",
                      .values = {Of("succeeded", jobs.succeeded), Of("failed", jobs.failed),
                                 Of("cancelled", jobs.cancelled)}});
+  AddPhases(metrics, jobs.phases);
 }
 
 void AddDatabase(Metrics& metrics, Database& database) {
@@ -142,6 +176,11 @@ double ResidentBytes() {
   return static_cast<double>(resident) * static_cast<double>(sysconf(_SC_PAGESIZE));
 }
 
+double AllocatedBytes() {
+  const struct mallinfo2 heap = mallinfo2();
+  return static_cast<double>(heap.uordblks + heap.hblkhd);
+}
+
 }  // namespace
 
 std::vector<Metric> ReadMetrics(const MeasuredRooms& rooms) {
@@ -156,10 +195,13 @@ std::vector<Metric> ReadMetrics(const MeasuredRooms& rooms) {
   AddMixer(metrics, rooms.output, state.mixer);
   AddScenes(metrics, rooms.scenes);
   AddClients(metrics, rooms.server.clients());
+  AddTls(metrics, rooms.server.certificate_left_s());
   AddJobs(metrics, rooms.decompositions.counts());
   AddDatabase(metrics, rooms.database.database());
   Gauge(metrics, "process_resident_memory_bytes", "Resident memory of the daemon alone.",
         ResidentBytes());
+  Gauge(metrics, "carillon_heap_bytes", "Memory that the daemon has allocated and not freed.",
+        AllocatedBytes());
   return metrics;
 }
 

@@ -31,6 +31,7 @@
 #include "server/decomposition/local_executor.h"
 #include "server/decomposition/remote_runs.h"
 #include "server/decomposition/slurm_executor.h"
+#include "server/heap_keeper.h"
 #include "server/live_output/live_output.h"
 #include "server/metrics/metrics_server.h"
 #include "server/mode_database/database.h"
@@ -249,6 +250,7 @@ absl::Status Serve(const MeasuredRooms& rooms, Options& options, const ReadOptio
     rooms.server.ShowDatabaseHealth(files.ok());
     if (!files.ok()) spdlog::error("{}", std::string(files.message()));
   });
+  const HeapKeeper heap_keeper;
   LogOutput(rooms.output);
   AnnounceReady(rooms.server);
   const Watchdog watchdog(rooms.output);
@@ -320,6 +322,7 @@ absl::Status RunDatabaseCommand(const CommandLine& command) {
 }
 
 int Main(int argc, const char* const* argv) {
+  BoundFreeMemory();
   SetUpLog();
   const ReadOptions read_options = [=] { return ReadCommandLine(argc, argv, kVersion); };
   const absl::StatusOr<CommandLine> command = read_options();

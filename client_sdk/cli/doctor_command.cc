@@ -3,6 +3,8 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <iostream>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -11,7 +13,10 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/strip.h"
+#include "absl/time/clock.h"
+#include "absl/time/time.h"
 #include "client_sdk/cli/daemon_process.h"
+#include "client_sdk/cli/findings.h"
 #include "proto/cpp/child_process.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
@@ -21,25 +26,7 @@ namespace {
 
 constexpr uint64_t kEnoughDescriptors = 1024;
 constexpr double kHighLoad = 0.7;
-
-/// Prints each finding as a line, and counts the faults.
-class Findings {
- public:
-  void Good(const char* subject, const std::string& text) { Print("ok   ", subject, text); }
-  void Bad(const char* subject, const std::string& text) {
-    Print("FAULT", subject, text);
-    ++fault_count_;
-  }
-  void Unknown(const char* subject, const std::string& text) { Print("?    ", subject, text); }
-  int fault_count() const { return fault_count_; }
-
- private:
-  static void Print(const char* verdict, const char* subject, const std::string& text) {
-    absl::PrintF("%s  %-10s  %s\n", verdict, subject, text);
-  }
-
-  int fault_count_ = 0;
-};
+constexpr absl::Duration kEnoughTime = absl::Hours(30 * 24);
 
 std::string Text(const absl::Status& status) { return std::string(status.message()); }
 
@@ -154,25 +141,25 @@ void CheckTls(const Program& program, Findings& findings) {
                "name the certificate that vouches for the daemon");
 }
 
-absl::Status Conclude(const Findings& findings) {
-  if (findings.fault_count() == 0) return absl::OkStatus();
-  return Refusal(absl::StatusCode::kFailedPrecondition, "FAULTS_FOUND",
-                 absl::StrCat("see the lines that begin with FAULT, of which there are ",
-                              findings.fault_count()));
+void CheckCertificates(const client::Client& daemon, Findings& findings) {
+  const auto info = daemon.GetServerInfo();
+  if (!info.ok() || info->certificate_end_unix_s() == 0) return;
+  const absl::Time end = absl::FromUnixSeconds(info->certificate_end_unix_s());
+  const std::string when = absl::FormatTime(
+      "a certificate of the daemon expires on %Y-%m-%d %H:%M UTC", end, absl::UTCTimeZone());
+  if (end - absl::Now() > kEnoughTime) return findings.Good("expiry", when);
+  findings.Bad("expiry",
+               absl::StrCat(when,
+                            ", and clients refuse it then: put a new one in its file, and "
+                            "reload the daemon (systemctl reload carillond)"));
 }
 
-}  // namespace
-
-absl::Status Diagnose(const Program& program) {
-  Findings findings;
+void CheckDaemon(const Program& program, Findings& findings) {
   const auto daemon = program.Daemon();
   const auto mixer = daemon->GetMixer();
   CheckProcess(program, findings);
   CheckSlurm(findings);
-  if (!mixer.ok()) {
-    findings.Bad("daemon", Text(mixer.status()));
-    return Conclude(findings);
-  }
+  if (!mixer.ok()) return findings.Bad("daemon", Text(mixer.status()));
   const bool same = mixer->version() == CARILLON_VERSION;
   const std::string version = absl::StrCat("carillond ", mixer->version(), " at ", program.server);
   same ? findings.Good("daemon", version)
@@ -182,6 +169,22 @@ absl::Status Diagnose(const Program& program) {
   CheckDatabase(*daemon, findings);
   CheckWorkers(*daemon, findings);
   CheckTls(program, findings);
+  CheckCertificates(*daemon, findings);
+}
+
+absl::Status Conclude(const Findings& findings) {
+  if (findings.fault_count() == 0) return absl::OkStatus();
+  return Refusal(absl::StatusCode::kFailedPrecondition, "FAULTS_FOUND",
+                 absl::StrCat("see the findings that are a FAULT, of which there are ",
+                              findings.fault_count()));
+}
+
+}  // namespace
+
+absl::Status Diagnose(const Program& program) {
+  Findings findings;
+  CheckDaemon(program, findings);
+  std::cout << (program.json ? findings.ToJson() : findings.ToText()) << std::flush;
   return Conclude(findings);
 }
 

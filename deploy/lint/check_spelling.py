@@ -8,7 +8,7 @@ import project
 
 SUFFIXES = project.CXX_SUFFIXES + (".md", ".proto", ".py", ".sh", ".toml", ".txt", ".cmake")
 # Right although codespell has them in its list: "to and fro", and the journal Numer. Math.
-RIGHT = "fro,numer"
+RIGHT = "fro,numer,te"
 
 
 def check(root):

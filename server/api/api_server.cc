@@ -17,6 +17,7 @@
 #include "server/api/access_control.h"
 #include "server/api/admin_service.h"
 #include "server/api/audio_service.h"
+#include "server/api/certificate_end.h"
 #include "server/api/client_keeper.h"
 #include "server/api/client_limits.h"
 #include "server/api/connection_gate.h"
@@ -51,6 +52,9 @@ constexpr int kHandshakeLimit_ms = 5'000;
 /// after the second.
 constexpr int kKeepalive_ms = 30'000;
 constexpr int kKeepaliveAnswer_ms = 10'000;
+/// Bytes of a connection that are parsed before others have their turn. With gRPC's own 4 MiB a few
+/// connections that begin and cancel calls keep all its threads busy for seconds.
+constexpr int kReadBytes = 16 << 10;
 /// Memory of all connections; beyond it gRPC refuses calls and connections.
 constexpr size_t kClientMemoryBytes = size_t{512} << 20U;
 
@@ -112,6 +116,8 @@ void LimitClients(grpc::ServerBuilder& builder) {
   builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, kHandshakeLimit_ms);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepalive_ms);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveAnswer_ms);
+  builder.AddChannelArgument(GRPC_ARG_TCP_READ_CHUNK_SIZE, kReadBytes);
+  builder.AddChannelArgument(GRPC_ARG_TCP_MAX_READ_CHUNK_SIZE, kReadBytes);
   grpc::ResourceQuota quota("clients");
   quota.Resize(kClientMemoryBytes);
   builder.SetResourceQuota(quota);
@@ -141,9 +147,11 @@ struct ApiServer::State {
                   .reception = reception}),
         audio(settings.version, rooms.output, rooms.scenes, rooms.database, rooms.clock, idle_calls,
               {access, limits, render_pool}),
+        certificate_end(rooms.clock),
         server_info({.version = settings.version,
                      .client_share = settings.client_share,
                      .scene_grace_s = settings.scene_grace_s,
+                     .certificate_end = certificate_end,
                      .can_decompose = rooms.can_decompose},
                     rooms.decompositions, rooms.output, rooms.clock),
         output(rooms.output) {}
@@ -182,6 +190,7 @@ struct ApiServer::State {
   SceneService scenes;
   ContactService contacts;
   AudioService audio;
+  CertificateEnd certificate_end;
   ServerService server_info;
   LiveOutput& output;
   /// Those of each TCP address.
@@ -200,6 +209,7 @@ absl::StatusOr<std::shared_ptr<grpc::ServerCredentials>> ApiServer::State::Crede
     return grpc::InsecureServerCredentials();
   }
   ASSIGN_OR_RETURN(TlsFiles files, ReadTlsFiles(settings.tls));
+  certificate_end.Set(files.end_unix_s);
   tls.push_back(std::make_shared<TlsCredentials>(std::move(files)));
   return tls.back();
 }
@@ -243,8 +253,13 @@ absl::StatusOr<std::unique_ptr<ApiServer>> ApiServer::Start(const ApiSettings& s
       .idle_calls = state->idle_calls,
       .idle_limit = Duration(settings.rendering_idle_s),
       .log = [log = &state->client_log](const std::string& line) { log->Warn(line); },
-      .tick = [state = state.get(),
-               can_decompose = rooms.can_decompose] { state->ShowWorkers(can_decompose()); }});
+      .tick =
+          [state = state.get(), can_decompose = rooms.can_decompose] {
+            state->ShowWorkers(can_decompose());
+            if (const auto warning = state->certificate_end.WarningDue()) {
+              state->client_log.Warn(*warning);
+            }
+          }});
   rooms.output.ObserveDevice([health = state->server->GetHealthCheckService()](bool plays) {
     health->SetServingStatus(v1::AudioService::service_full_name(), plays);
   });
@@ -258,6 +273,7 @@ absl::Status ApiServer::Reload(const ApiSettings& settings) {
     ASSIGN_OR_RETURN(files, ReadTlsFiles(settings.tls));
   }
   for (const auto& credentials : state_->tls) credentials->Replace(files);
+  state_->certificate_end.Set(files.end_unix_s);
   state_->access.Replace(std::move(table));
   return absl::OkStatus();
 }
@@ -286,6 +302,10 @@ ClientCounts ApiServer::clients() const {
           .contact_streams = limits.count(Holding::kContactStream),
           .listeners = limits.count(Holding::kListener),
           .renderings = limits.count(Holding::kRendering)};
+}
+
+std::optional<double> ApiServer::certificate_left_s() const {
+  return state_->certificate_end.left_s();
 }
 
 const std::vector<std::string>& ApiServer::addresses() const { return state_->addresses; }

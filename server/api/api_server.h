@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -84,6 +85,9 @@ class ApiServer {
   void ShowDatabaseHealth(bool stores);
 
   ClientCounts clients() const;
+
+  /// Seconds until the first of the daemon's certificates expires; nothing without TLS.
+  std::optional<double> certificate_left_s() const;
 
   /// The addresses of the settings, with the ports that were chosen.
   const std::vector<std::string>& addresses() const;

@@ -21,6 +21,7 @@ grpc::ServerUnaryReactor* ServerService::GetServerInfo(grpc::CallbackServerConte
   response->set_uptime_s(uptime.count());
   response->set_sample_rate_hz(output_.format().sample_rate_hz);
   response->set_channel_count(output_.format().channel_count);
+  response->set_certificate_end_unix_s(facts_.certificate_end.unix_s());
   DescribeFeatures(*response);
   DescribeLimits(*response->mutable_limits());
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();

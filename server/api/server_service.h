@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "carillon/v1/server_service.grpc.pb.h"
+#include "server/api/certificate_end.h"
 #include "server/base/clock.h"
 #include "server/decomposition/decomposition_queue.h"
 #include "server/live_output/live_output.h"
@@ -23,6 +24,7 @@ struct ServerFacts {
   std::string version;
   double client_share = 0;
   double scene_grace_s = 0;
+  const CertificateEnd& certificate_end;
   std::function<bool()> can_decompose;  ///< called on any thread
 };
 

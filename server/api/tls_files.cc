@@ -5,6 +5,8 @@
 #include <openssl/pem.h>
 #include <openssl/x509.h>
 
+#include <algorithm>
+#include <ctime>
 #include <memory>
 
 #include "absl/strings/str_cat.h"
@@ -38,6 +40,12 @@ std::string TextOf(const ASN1_TIME* moment) {
   const char* data = nullptr;
   const auto size = static_cast<size_t>(BIO_get_mem_data(text.get(), &data));
   return {data, size};
+}
+
+int64_t EndOf(const X509& certificate) {
+  std::tm end{};
+  ASN1_TIME_to_tm(X509_get0_notAfter(&certificate), &end);
+  return timegm(&end);
 }
 
 absl::StatusOr<Certificate> ReadCertificate(const std::string& pem, const std::string& path) {
@@ -81,9 +89,12 @@ absl::StatusOr<TlsFiles> ReadTlsFiles(const TlsPaths& paths) {
   ASSIGN_OR_RETURN(const Certificate certificate,
                    ReadCertificate(files.certificate_pem, paths.certificate));
   RETURN_IF_ERROR(CheckKey(files, paths, *certificate));
+  files.end_unix_s = EndOf(*certificate);
   if (paths.client_roots.empty()) return files;
   ASSIGN_OR_RETURN(files.client_roots_pem, ReadPublicFile(paths.client_roots, kReason));
-  RETURN_IF_ERROR(ReadCertificate(files.client_roots_pem, paths.client_roots).status());
+  ASSIGN_OR_RETURN(const Certificate roots,
+                   ReadCertificate(files.client_roots_pem, paths.client_roots));
+  files.end_unix_s = std::min(files.end_unix_s, EndOf(*roots));
   return files;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 #include "absl/status/statusor.h"
@@ -21,6 +22,7 @@ struct TlsFiles {
   std::string certificate_pem;
   std::string key_pem;
   std::string client_roots_pem;
+  int64_t end_unix_s = 0;  ///< when the first of the certificates expires
 
   bool operator==(const TlsFiles&) const = default;
 };

@@ -14,6 +14,7 @@
 #include "server/base/clock.h"
 #include "server/decomposition/executor.h"
 #include "server/decomposition/job_sink.h"
+#include "server/decomposition/phase_usage.h"
 #include "server/mode_database/mode_database.h"
 
 namespace carillon {
@@ -83,6 +84,7 @@ class DecompositionQueue {
     uint64_t succeeded = 0;
     uint64_t failed = 0;
     uint64_t cancelled = 0;
+    PhaseUses phases{};
   };
   Counts counts();
 

@@ -149,11 +149,17 @@ DecompositionTask JobRuns::MakeTask(const ActiveJob& job) {
             return radiates ? WriteModelFile(database_.models(), from, file)
                             : database_.meshes().WriteFile(from, file);
           },
-      .on_progress = [this, digest](const v1::Progress& p) { jobs_.Report(digest, p).Tell(); },
+      .on_progress = [this, digest](const v1::Progress& progress) { OnProgress(digest, progress); },
       .on_end = [this, digest](const Outcome& outcome) { OnEnd(digest, outcome); }};
 }
 
+void JobRuns::OnProgress(const std::string& digest, const v1::Progress& progress) {
+  phases_.Report(digest, progress, clock_.Monotonic());
+  jobs_.Report(digest, progress).Tell();
+}
+
 void JobRuns::OnEnd(const std::string& digest, const Outcome& outcome) {
+  phases_.End(digest, clock_.Monotonic());
   const Outcome result = Store(digest, outcome);
   Notices notices;
   {
@@ -212,7 +218,9 @@ bool JobRuns::RunsAgain(ActiveJob& job, const Outcome& result) const {
 
 DecompositionQueue::Counts JobRuns::ended() {
   const MutexLock lock(&ended_mutex_);
-  return ended_;
+  DecompositionQueue::Counts counts = ended_;
+  counts.phases = phases_.uses();
+  return counts;
 }
 
 void JobRuns::CountEnd(v1::JobState state) {

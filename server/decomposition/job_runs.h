@@ -11,6 +11,7 @@
 #include "server/decomposition/active_jobs.h"
 #include "server/decomposition/decomposition_queue.h"
 #include "server/decomposition/executor.h"
+#include "server/decomposition/phase_usage.h"
 #include "server/decomposition/watcher.h"
 #include "server/mode_database/mode_database.h"
 
@@ -56,7 +57,7 @@ class JobRuns {
   void ReleaseWaiting(const std::string& coarse, Notices& notices)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
 
-  /// Runs that have ended, by what became of their jobs.
+  /// Runs that have ended, by what became of their jobs, and what the phases took.
   DecompositionQueue::Counts ended();
 
   /// Mean time until a place in a full queue becomes free, in seconds.
@@ -65,6 +66,7 @@ class JobRuns {
   }
 
  private:
+  void OnProgress(const std::string& digest, const v1::Progress& progress);
   DecompositionTask MakeTask(const ActiveJob& job);
   void OnEnd(const std::string& digest, const Outcome& outcome);
   Outcome Store(const std::string& digest, const Outcome& outcome);
@@ -85,6 +87,7 @@ class JobRuns {
   bool stopping_ ABSL_GUARDED_BY(writer_) = false;
   double mean_run_s_ ABSL_GUARDED_BY(writer_) = 10;  // until a run has ended
   DecompositionQueue::Counts ended_ ABSL_GUARDED_BY(ended_mutex_);
+  PhaseUsage phases_;
   std::unique_ptr<Executor> executor_;
   const ActiveJobs::Capacity capacity_;
 };

@@ -148,14 +148,15 @@ void LocalWorker::OnProgress(v1::Progress progress) {
     fraction_ = std::max(fraction_, std::min(progress.fraction(), 1.0));
   }
   progress.set_fraction(fraction_);
+  progress.set_memory_bytes(resident_bytes_);
   node_count_ = std::max(node_count_, progress.node_count());
   task_.on_progress(progress);
 }
 
 uint64_t LocalWorker::Enforce(nanoseconds now) {
-  const uint64_t resident_bytes = process_.ResidentBytes();
-  peak_bytes_ = std::max(peak_bytes_, resident_bytes);
-  if (resident_bytes > limits_.memory_bytes) {
+  resident_bytes_ = process_.ResidentBytes();
+  peak_bytes_ = std::max(peak_bytes_, resident_bytes_);
+  if (resident_bytes_ > limits_.memory_bytes) {
     Kill(Verdict::kOutOfMemory,
          OutOfMemory(absl::StrCat("took more than its ", limits_.memory_bytes >> 20U, " MiB",
                                   WouldNeed(node_count_))));
@@ -173,7 +174,7 @@ uint64_t LocalWorker::Enforce(nanoseconds now) {
                                     " s: try again; if it stalls again, report it with "
                                     "the mesh")));
   }
-  return resident_bytes;
+  return resident_bytes_;
 }
 
 void LocalWorker::MakeRoom(uint64_t budget_bytes) {

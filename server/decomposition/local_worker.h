@@ -113,6 +113,7 @@ class LocalWorker {
   Pipe error_pipe_;
   ChildProcess process_;
   WorkerLimits limits_;
+  uint64_t resident_bytes_ = 0;  // when it was last asked for
   uint64_t peak_bytes_ = 0;
   uint32_t node_count_ = 0;
   std::chrono::nanoseconds started_;

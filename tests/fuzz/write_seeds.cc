@@ -14,6 +14,7 @@
 #include "client_sdk/interchange/npz_model.h"
 #include "precompute/mesh/boundary.h"
 #include "tests/client_sdk/interchange/small_model.h"
+#include "tests/fuzz/write_request_seeds.h"
 #include "tests/precompute/mesh/mesh_files.h"
 #include "tests/server/mode_database/sample_model.h"
 #include "tests/server/mode_database/sample_transfer.h"
@@ -142,4 +143,5 @@ int main(int argc, char** argv) {
   carillon::WriteStored();
   carillon::WriteTrace();
   carillon::WriteTexts();
+  carillon::WriteRequestSeeds(carillon::root / "request", carillon::Rendering());
 }

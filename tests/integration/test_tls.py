@@ -2,9 +2,13 @@
 """The daemon over TLS, with a certificate made here."""
 
 import pathlib
+import re
+import socket
 import subprocess
 import tempfile
+import time
 import unittest
+import urllib.request
 
 from daemon import BIN, Daemon
 
@@ -18,8 +22,11 @@ class TlsTest(unittest.TestCase):
         subprocess.run(["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes",
                         "-subj", "/CN=carillon", "-addext", "subjectAltName=IP:127.0.0.1", "-days", "2",
                         "-keyout", key, "-out", self.certificate], check=True, capture_output=True)
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            self.metrics = f"127.0.0.1:{free.getsockname()[1]}"
         self.daemon = Daemon(self.folder, "--listen", "127.0.0.1:0", "--tls-certificate", self.certificate,
-                             "--tls-key", key)
+                             "--tls-key", key, "--metrics", self.metrics)
         self.addCleanup(self.daemon.stop)
         self.address = self.daemon.listening[1].split()[-1]
 
@@ -30,6 +37,19 @@ class TlsTest(unittest.TestCase):
     def test_the_command_line_talks_to_a_daemon_that_its_roots_vouch_for(self):
         done = self.status("--tls-roots", self.certificate)
         self.assertEqual(done.returncode, 0, done.stderr)
+
+    def test_a_certificate_that_expires_soon_is_told_by_log_metrics_and_doctor(self):
+        with urllib.request.urlopen(f"http://{self.metrics}/metrics", timeout=10) as answer:
+            found = re.search(r"(?m)^carillon_tls_certificate_left_seconds (\S+)$", answer.read().decode())
+        self.assertLess(86400, float(found[1]))
+        self.assertLess(float(found[1]), 2 * 86400)
+        doctor = subprocess.run([BIN / "carillon", "--server", self.address, "--tls-roots", self.certificate, "doctor"],
+                                capture_output=True, text=True, check=False, timeout=60)
+        self.assertRegex(doctor.stdout, "FAULT  expiry .* expires on 20..-..-.. ..:.. UTC.*reload the daemon")
+        end_s = time.monotonic() + 30
+        while "a certificate of the daemon expires in 1 days" not in (self.folder / "log").read_text():
+            self.assertLess(time.monotonic(), end_s, (self.folder / "log").read_text())
+            time.sleep(0.05)
 
     def test_without_roots_it_says_that_the_daemon_may_want_tls(self):
         done = self.status()

@@ -22,11 +22,18 @@ from test_clients import free_port
 
 CLIENTS = 20
 RUN_S = 60 * float(os.environ.get("CARILLON_TORTURE_MINUTES") or torture.rounds(0.25, 10))
-# Within this part of the run caches and thread pools fill.
-WARM_UP = 0.4
-# A run of ten minutes cannot tell a smaller slope from the noise of the allocator.
-MEMORY_MIB_PER_HOUR = 20
+# The clients rest after each part of the run. What the daemon then still has is not in use.
+PARTS = 2 if RUN_S < 300 else round(RUN_S / 150)
+# The daemon gives freed memory back every 5 s.
+REST_S = 12
+# Caches and thread pools fill in the first part. The first connections and renderings of a daemon need these.
+WARM_UP_MIB = 32
+# Of the memory at rest after the first part.
+GROWTH = 0.1
+GROWTH_PER_HOUR = 0.01
+# A shorter run cannot tell a smaller slope from the noise of the allocator, which is about 0.5 MiB.
 LONG_ENOUGH_S = 600
+NOISE_MIB = 0.5
 
 Sample = collections.namedtuple("Sample", "time_s mib descriptors threads")
 
@@ -88,44 +95,68 @@ class ChurnTest(torture.ServedTest):
         return {name: value for name, value in self.metrics().items() if name.startswith(wanted) and value != "0"}
 
     def churn(self, model):
-        """Returns the samples of each second, and the churn that has ended."""
+        """Runs the clients for one part; returns the samples of each second."""
         churn = Churn(self.daemon.server, model)
         samples = []
         try:
-            end_s = time.monotonic() + RUN_S
+            end_s = time.monotonic() + RUN_S / PARTS
             while time.monotonic() < end_s:
                 time.sleep(min(1.0, RUN_S / 20))
                 samples.append(self.sample())
         finally:
             churn.stop()
-        return samples, churn
+        self.lives += churn.lives
+        self.deaths += churn.deaths
+        self.assertEqual(churn.failures, 0)
+        return samples
+
+    def rest(self):
+        """Returns a sample when no call is left, no place is taken, and freed memory has been given back."""
+        torture.wait_until(lambda: not self.taken_places(), 60)
+        time.sleep(REST_S)
+        return self.sample()
+
+    def allocated_mib(self):
+        return float(self.metrics()["carillon_heap_bytes"]) / 2**20
+
+    def check_memory(self, before, rests):
+        growth_mib_per_hour = slope_per_hour(rests[len(rests) // 2:])
+        print("memory at rest: " + ", ".join(f"{rest.mib:.1f}" for rest in (before, *rests))
+              + f" MiB; {growth_mib_per_hour:+.1f} MiB/h in the second half", flush=True)
+        self.assertLess(rests[0].mib, before.mib + WARM_UP_MIB)
+        for rest in rests[1:]:
+            self.assertLess(rest.mib, (1 + GROWTH) * rests[0].mib)
+        if RUN_S >= LONG_ENOUGH_S:
+            allowed = GROWTH_PER_HOUR * rests[0].mib + 2 * NOISE_MIB * 3600 / RUN_S
+            self.assertLess(growth_mib_per_hour, allowed)
+            self.assertGreater(self.deaths, 0)
+
+    def check_counts(self, before, parts, after):
+        for name in ("descriptors", "threads"):
+            most = [max(getattr(sample, name) for sample in part) for part in parts]
+            print(f"{name}: {getattr(before, name)} before, at most {most[0]} in the first part, {most[-1]} in the "
+                  f"last, {getattr(after, name)} after", flush=True)
+            self.assertLess(most[-1], 1.25 * most[0] + 5)
+            self.assertLess(getattr(after, name), getattr(before, name) + 2 * CLIENTS)
 
     def test_nothing_grows_and_no_place_is_used_up(self):
         self.serve("--scene-grace", "1", "--metrics", f"127.0.0.1:{free_port()}")
         model = self.client.wait(self.client.create(
             meshes.bar(), "obj", material=material_pb2.Material(preset=meshes.MATERIAL)))
+        self.lives = self.deaths = 0
         before = self.sample()
-        samples, churn = self.churn(model)
-        torture.wait_until(lambda: not self.taken_places(), 60)
-        warm = samples[int(WARM_UP * len(samples)):]
-        first, last = warm[:len(warm) // 2], warm[len(warm) // 2:]
-        after = self.sample()
-        slope = slope_per_hour(warm)
-        print(f"{churn.lives} lives, {churn.deaths} deaths without a word in {RUN_S:.0f} s; memory "
-              f"{before.mib:.1f} MiB before, {warm[0].mib:.1f} warm, {warm[-1].mib:.1f} at the end, "
-              f"{after.mib:.1f} after: {slope:+.1f} MiB/h", flush=True)
-        for name in ("descriptors", "threads"):
-            medians = [statistics.median(getattr(sample, name) for sample in part) for part in (first, last)]
-            most = max(getattr(sample, name) for sample in samples)
-            print(f"{name}: {getattr(before, name)} before, {medians[0]:g} then {medians[1]:g} amid, at most {most}, "
-                  f"{getattr(after, name)} after", flush=True)
-            self.assertLess(medians[1], 1.25 * medians[0] + 5)
-            self.assertLess(getattr(after, name), getattr(before, name) + 2 * CLIENTS)
-        self.assertGreater(churn.lives, CLIENTS)
-        self.assertEqual(churn.failures, 0)
-        if RUN_S >= LONG_ENOUGH_S:
-            self.assertLess(slope, MEMORY_MIB_PER_HOUR)
-            self.assertGreater(churn.deaths, 0)
+        parts = []
+        rests = []
+        for _ in range(PARTS):
+            parts.append(self.churn(model))
+            rests.append(self.rest())
+            print(f"{self.lives} lives, {self.deaths} deaths without a word; memory amid the clients "
+                  f"{statistics.median(sample.mib for sample in parts[-1]):.1f} MiB, at most "
+                  f"{max(sample.mib for sample in parts[-1]):.1f}; at rest {rests[-1].mib:.1f}, of which "
+                  f"{self.allocated_mib():.2f} are allocated", flush=True)
+        self.check_counts(before, parts, rests[-1])
+        self.check_memory(before, rests)
+        self.assertGreater(self.lives, CLIENTS)
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "carillon/v1/audio_service.grpc.pb.h"
@@ -19,32 +20,21 @@
 #include "carillon/v1/scene_service.grpc.pb.h"
 #include "carillon/v1/server_service.grpc.pb.h"
 #include "server/api/api_server.h"
-#include "server/base/mutex.h"
-#include "server/decomposition/local_executor.h"
 #include "server/live_output/live_output.h"
+#include "tests/server/api/daemon_rooms.h"
 #include "tests/server/mode_database/sample_model.h"
 #include "tests/server/scene/small_model.h"
 
 namespace carillon {
 
-/// All rooms of a daemon, on the null device, served on a Unix socket; and clients of it. Its
-/// decompositions fail: the worker is a program that only exits.
+/// A daemon as DaemonRooms, and clients of it.
 class ServedDaemon : public testing::Test {
  protected:
   /// Of `settings`, the addresses and the version are set here; `more` are further addresses.
   explicit ServedDaemon(ApiSettings settings = {.client_share = 1},
                         const std::vector<std::string>& more = {}) {
-    settings.addresses = {address_};
-    settings.addresses.insert(settings.addresses.end(), more.begin(), more.end());
-    settings.version = "test";
-    server_ = *ApiServer::Start(settings, {.database = *database_,
-                                           .decompositions = *queue_,
-                                           .runs = runs_,
-                                           .scenes = scenes_,
-                                           .output = *output_,
-                                           .clock = clock_,
-                                           .log = [this](const std::string& line) { Note(line); }});
-    channel_ = grpc::CreateChannel(address_, grpc::InsecureChannelCredentials());
+    rooms_.Serve(std::move(settings), more);
+    channel_ = grpc::CreateChannel(rooms_.address, grpc::InsecureChannelCredentials());
     models = v1::ModalModelService::NewStub(channel_);
     jobs = v1::DecompositionService::NewStub(channel_);
     scenes = v1::SceneService::NewStub(channel_);
@@ -152,43 +142,20 @@ class ServedDaemon : public testing::Test {
   std::unique_ptr<v1::JobRunService::Stub> job_runs;
   std::unique_ptr<v1::ServerService::Stub> info;
   std::shared_ptr<grpc::Channel> channel() { return channel_; }
-  LiveOutput& output() { return *output_; }
-  RemoteRuns& runs() { return runs_; }
-  std::filesystem::path folder() const { return folder_ / ""; }
-  const std::string& address() const { return address_; }
-  const std::vector<std::string>& addresses() const { return server_->addresses(); }
-  const ApiServer& server() const { return *server_; }
+  LiveOutput& output() { return *rooms_.output; }
+  RemoteRuns& runs() { return rooms_.runs; }
+  std::filesystem::path folder() const { return rooms_.folder / ""; }
+  const std::string& address() const { return rooms_.address; }
+  const std::vector<std::string>& addresses() const { return rooms_.server->addresses(); }
+  const ApiServer& server() const { return *rooms_.server; }
   /// The warnings so far, a line each.
   std::string log() {
-    const MutexLock lock(&log_mutex_);
-    return log_;
+    const MutexLock lock(&rooms_.log_mutex);
+    return rooms_.log;
   }
 
  private:
-  std::unique_ptr<DecompositionQueue> MakeQueue() {
-    LocalExecutorOptions options;
-    options.program = "/bin/false";
-    options.directory = folder_ / "work";
-    return *DecompositionQueue::Make(*database_, *MakeLocalExecutor(options, clock_), clock_);
-  }
-
-  void Note(const std::string& line) {
-    const MutexLock lock(&log_mutex_);
-    log_ += line + "\n";
-  }
-
-  Mutex log_mutex_;
-  std::string log_;
-  TemporaryFolder folder_;
-  std::string address_ = "unix:" + (folder_ / "socket").string();
-  SystemClock clock_;
-  std::unique_ptr<ModeDatabase> database_ = *ModeDatabase::Open(folder_ / "carillon.db", clock_);
-  std::unique_ptr<DecompositionQueue> queue_ = MakeQueue();
-  std::unique_ptr<LiveOutput> output_ =
-      *LiveOutput::Start({.device = "null"}, clock_, [](const std::string&) {});
-  SceneRegistry scenes_{output_->mixer()};
-  RemoteRuns runs_;
-  std::unique_ptr<ApiServer> server_;
+  DaemonRooms rooms_;
   std::shared_ptr<grpc::Channel> channel_;
 };
 

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/heap_keeper.h"
+
+#include <malloc.h>
+
+#include <chrono>
+
+namespace carillon {
+namespace {
+
+/// Larger blocks have pages of their own, which go back as soon as the block is freed.
+constexpr int kOwnPagesBytes = 256 << 10;
+/// Free memory that stays at the end of an arena.
+constexpr int kKeptBytes = 1 << 20;
+constexpr std::chrono::seconds kPeriod(5);
+
+}  // namespace
+
+void BoundFreeMemory() {
+  mallopt(M_MMAP_THRESHOLD, kOwnPagesBytes);
+  mallopt(M_TRIM_THRESHOLD, kKeptBytes);
+}
+
+HeapKeeper::HeapKeeper() : thread_([this] { Run(); }) {}
+
+HeapKeeper::~HeapKeeper() {
+  stop_.release();
+  thread_.join();
+}
+
+void HeapKeeper::Run() {
+  while (!stop_.try_acquire_for(kPeriod)) malloc_trim(kKeptBytes);
+}
+
+}  // namespace carillon

@@ -1,0 +1,179 @@
+# SPDX-License-Identifier: Apache-2.0
+"""HTTP/2 rapid resets: connections that begin calls and cancel them at once, and floods of pings and settings.
+
+A good client goes on meanwhile, and the daemon's memory comes back.
+"""
+
+import contextlib
+import pathlib
+import resource
+import socket
+import statistics
+import struct
+import threading
+import time
+import unittest
+
+import grpc
+
+import torture
+from carillon.v1 import audio_service_pb2
+
+CONNECTIONS = 4
+RUN_S = torture.rounds(2.0, 20.0)
+# The issue's bound on a machine that does nothing else. Otherwise a test must only end.
+P99_S = 0.05 if torture.LONG else 10.0
+# Answers to pings that the client does not fetch count towards gRPC's 512 MiB of all connections.
+GROWTH_MIB = 768
+LEFT_MIB = 16
+# gRPC 1.51 limits the calls of a connection only when its client has confirmed the limit.
+UNBOUNDED = "gRPC 1.51 does not bound calls of a client that confirms no settings: deploy/torture.sh measures them"
+# The daemon gives freed memory back every 5 s.
+REST_S = 12
+
+PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"
+HEADERS, RST_STREAM, SETTINGS, PING = 1, 3, 4, 6
+END_STREAM, END_HEADERS = 1, 4
+CANCEL = 8
+MOST_STREAM_ID = 2**31 - 1
+FRAMES_AT_ONCE = 200
+METHOD = b"/carillon.v1.AudioService/GetMixer"
+
+
+def frame(kind, flags=0, stream=0, payload=b""):
+    return struct.pack(">I", len(payload))[1:] + struct.pack(">BBI", kind, flags, stream) + payload
+
+
+def literal(name, value):
+    """A header without compression, which is not remembered (RFC 7541, 6.2.2)."""
+    return b"\0" + bytes([len(name)]) + name + bytes([len(value)]) + value
+
+
+CALL = b"".join(literal(name, value) for name, value in (
+    (b":method", b"POST"), (b":scheme", b"http"), (b":path", METHOD), (b":authority", b"localhost"),
+    (b"te", b"trailers"), (b"content-type", b"application/grpc")))
+
+
+def resets(stream):
+    """A call that is cancelled before its message."""
+    return (frame(HEADERS, END_HEADERS, stream, CALL)
+            + frame(RST_STREAM, 0, stream, struct.pack(">I", CANCEL)))
+
+
+def unfinished(stream):
+    """A call that waits for its message for ever."""
+    return frame(HEADERS, END_HEADERS, stream, CALL)
+
+
+def pings(_):
+    return frame(PING, 0, 0, b"12345678")
+
+
+def settings(_):
+    return frame(SETTINGS)
+
+
+class Flood:
+    """Connections that send frames as fast as the daemon takes them, and read nothing but the ends of connections.
+    A connection that the daemon closes is made again."""
+
+    def __init__(self, path, make):
+        self.path = path
+        self.make = make
+        self.stopped = False
+        self.frames = self.connections = 0
+        self.lock = threading.Lock()
+        self.threads = [threading.Thread(target=self._run) for _ in range(CONNECTIONS)]
+        for thread in self.threads:
+            thread.start()
+
+    def _run(self):
+        while not self.stopped:
+            with contextlib.suppress(OSError), socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
+                # A timeout of Python's own would let each read wait for it.
+                connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, struct.pack("ll", 1, 0))
+                connection.connect(self.path)
+                with self.lock:
+                    self.connections += 1
+                self._send(connection)
+            time.sleep(0.01)
+
+    def _send(self, connection):
+        connection.sendall(PREFACE + frame(SETTINGS))
+        stream = 1
+        while not self.stopped and stream < MOST_STREAM_ID - 2 * FRAMES_AT_ONCE:
+            connection.sendall(b"".join(self.make(stream + 2 * i) for i in range(FRAMES_AT_ONCE)))
+            stream += 2 * FRAMES_AT_ONCE
+            with self.lock:
+                self.frames += FRAMES_AT_ONCE
+            with contextlib.suppress(BlockingIOError):
+                while connection.recv(1 << 16, socket.MSG_DONTWAIT):
+                    pass
+
+    def stop(self):
+        self.stopped = True
+        for thread in self.threads:
+            thread.join()
+
+
+class RapidResetTest(torture.ServedTest):
+    def setUp(self):
+        super().setUp()
+        self.serve()
+        channel = grpc.insecure_channel(self.daemon.server, [("grpc.use_local_subchannel_pool", 1)])
+        self.addCleanup(channel.close)
+        self.call = channel.unary_unary(METHOD.decode(), audio_service_pb2.GetMixerRequest.SerializeToString,
+                                        audio_service_pb2.GetMixerResponse.FromString)
+
+    def mib(self):
+        statm = pathlib.Path("/proc", str(self.daemon.process.pid), "statm").read_text().split()
+        return int(statm[1]) * resource.getpagesize() / 2**20
+
+    def calls(self, seconds):
+        """The durations of good calls, fifty a second at most, and the daemon's largest memory meanwhile."""
+        times, most_mib = [], 0.0
+        end_s = time.monotonic() + seconds
+        while time.monotonic() < end_s:
+            begin_s = time.monotonic()
+            self.call(audio_service_pb2.GetMixerRequest(), timeout=30)
+            times.append(time.monotonic() - begin_s)
+            most_mib = max(most_mib, self.mib())
+            time.sleep(0.02)
+        return times, most_mib
+
+    def attack(self, make):
+        quiet, _ = self.calls(1.0)
+        before_mib = self.mib()
+        flood = Flood(str(self.folder / "socket"), make)
+        try:
+            amid, most_mib = self.calls(RUN_S)
+        finally:
+            flood.stop()
+        time.sleep(REST_S)
+        p99_s = statistics.quantiles(amid, n=100)[98]
+        print(f"{make.__name__}: {flood.frames} in {RUN_S:g} s on {CONNECTIONS} connections, made {flood.connections} "
+              f"times; a good call took {1e3 * statistics.median(quiet):.1f} ms before, amid them "
+              f"{1e3 * statistics.median(amid):.1f}, p99 {1e3 * p99_s:.1f} ms; {before_mib:.1f} MiB before, at most "
+              f"{most_mib:.1f}, {self.mib():.1f} after", flush=True)
+        self.assertGreater(flood.frames, 0)
+        self.assertLess(p99_s, P99_S)
+        self.assertLess(most_mib, before_mib + GROWTH_MIB)
+        self.assertLess(self.mib(), before_mib + LEFT_MIB)
+
+    @unittest.skipUnless(torture.LONG, UNBOUNDED)
+    def test_calls_that_are_cancelled_at_once(self):
+        self.attack(resets)
+
+    @unittest.skipUnless(torture.LONG, UNBOUNDED)
+    def test_calls_that_never_send_their_message(self):
+        self.attack(unfinished)
+
+    def test_pings(self):
+        self.attack(pings)
+
+    def test_settings(self):
+        self.attack(settings)
+
+
+if __name__ == "__main__":
+    unittest.main()
