@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <utility>
 
 namespace carillon {
@@ -16,6 +18,8 @@ constexpr double kLongestStep = 1.5;
 constexpr double kLongestBlowS = 0.04;
 /// A force that stays the same for this time is a load.
 constexpr double kLoadS = 0.01;
+/// Blows that are farther apart are heard one by one, and not as lines.
+constexpr double kLastingS = 0.1;
 
 std::array<float, 3> Scaled(std::array<float, 3> vector, double factor) {
   for (float& component : vector) component *= static_cast<float>(factor);
@@ -24,6 +28,18 @@ std::array<float, 3> Scaled(std::array<float, 3> vector, double factor) {
 
 double Magnitude(const std::array<float, 3>& vector) {
   return std::hypot(double{vector[0]}, double{vector[1]}, double{vector[2]});
+}
+
+/// Returns a number from 0 to 1 that is the same for the same arguments and looks random otherwise:
+/// SplitMix64's finalizer, for each argument.
+double Share(double time_s, uint32_t handle, uint32_t partner) {
+  const auto mix = [](uint64_t x) {
+    x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9;
+    x = (x ^ (x >> 27)) * 0x94D049BB133111EB;
+    return x ^ (x >> 31);
+  };
+  const uint64_t bodies = uint64_t{handle} << 32 | partner;
+  return static_cast<double>(mix(mix(std::bit_cast<uint64_t>(time_s)) ^ bodies) >> 11) * 0x1p-53;
 }
 
 }  // namespace
@@ -66,7 +82,7 @@ ContactForces::Events ContactForces::End() {
 }
 
 void ContactForces::End(Events& events) {
-  for (auto& [key, pair] : pairs_) Divide(pair, events);
+  for (auto& [bodies, pair] : pairs_) Divide(bodies, pair, events);
   std::erase_if(pairs_,
                 [](const auto& pair) { return pair.second.load.idle() && !pair.second.blow; });
   for (auto& [handle, object] : objects_) {
@@ -81,8 +97,8 @@ void ContactForces::End(Events& events) {
 
 ContactForces::Events ContactForces::Finish() {
   Events events;
-  for (auto& [key, pair] : pairs_) {
-    if (pair.blow) SendBlow(*std::exchange(pair.blow, std::nullopt), 0, events);
+  for (auto& [bodies, pair] : pairs_) {
+    if (pair.blow) SendBlow(bodies, *std::exchange(pair.blow, std::nullopt), 0, events);
   }
   return events;
 }
@@ -91,7 +107,7 @@ bool ContactForces::gathers() const {
   return std::ranges::any_of(pairs_, [](const auto& pair) { return pair.second.blow.has_value(); });
 }
 
-void ContactForces::Divide(Pair& pair, Events& events) {
+void ContactForces::Divide(const Bodies& bodies, Pair& pair, Events& events) {
   double impulse = 0;
   for (const PairTouch& touch : pair.touches) {
     impulse += Magnitude(touch.impulse.by[0].impulse().impulse_newton_seconds);
@@ -102,18 +118,25 @@ void ContactForces::Divide(Pair& pair, Events& events) {
   if (pair.blow) share = force > 0 ? std::max(1 - pair.blow->load_newtons / force, 0.0) : 0;
   double remains = 0;
   if (pair.blow && IsOver(*pair.blow, force, share * impulse, remains)) {
-    SendBlow(*std::exchange(pair.blow, std::nullopt), remains, events);
+    SendBlow(bodies, *std::exchange(pair.blow, std::nullopt), remains, events);
     share = 0;
   } else if (share > 0) {
-    if (!pair.blow) pair.blow = {.load_newtons = (1 - share) * force, .begin_s = *time_s_};
+    if (!pair.blow) pair.blow = BlowOf(pair, (1 - share) * force);
     Gather(pair, force, share * impulse);
-    if (!follows_) SendBlow(*std::exchange(pair.blow, std::nullopt), 0, events);
+    if (!follows_) SendBlow(bodies, *std::exchange(pair.blow, std::nullopt), 0, events);
   }
   counts_.load_count += share > 0 ? 0 : pair.touches.size();
   for (const PairTouch& touch : pair.touches) {
     for (const Felt& felt : touch.impulse.all()) Add(felt, (1 - share) / step_s_, touch.roughness);
   }
+  if (force > 0) pair.touched_s = time_s_;
   pair.touches.clear();
+}
+
+ContactForces::Blow ContactForces::BlowOf(const Pair& pair, double load_newtons) const {
+  return {.load_newtons = load_newtons,
+          .begin_s = *time_s_,
+          .lasting = pair.touched_s && *time_s_ - *pair.touched_s <= kLastingS};
 }
 
 void ContactForces::Gather(Pair& pair, double force_newtons, double impulse) const {
@@ -135,7 +158,8 @@ bool ContactForces::IsOver(const Blow& blow, double force_newtons, double impuls
   return force_newtons >= 0.75 * *(blow.forces.end() - static_cast<ptrdiff_t>(steps));
 }
 
-void ContactForces::SendBlow(const Blow& blow, double remains_newtons, Events& events) {
+void ContactForces::SendBlow(const Bodies& bodies, const Blow& blow, double remains_newtons,
+                             Events& events) {
   const double excess = std::max(remains_newtons - blow.load_newtons, 0.0) * step_s_;
   double impulse = 0;
   for (const double step : blow.impulses) impulse += std::max(step - excess, 0.0);
@@ -149,9 +173,14 @@ void ContactForces::SendBlow(const Blow& blow, double remains_newtons, Events& e
   for (const PairTouch& touch : blow.touches) {
     for (size_t i = 0; i < touch.impulse.count; ++i) {
       events.push_back(PartOfBlow(touch, i, scale));
-      events.back().time_s = *time_s_ + touch.time_offset_s;
+      events.back().time_s = TimeOf(bodies, blow, touch);
     }
   }
+}
+
+double ContactForces::TimeOf(const Bodies& bodies, const Blow& blow, const PairTouch& touch) const {
+  if (!blow.lasting || touch.time_offset_s > 0) return *time_s_ + touch.time_offset_s;
+  return *time_s_ + Share(blow.begin_s, bodies.first, bodies.second) * step_s_;
 }
 
 /// Returns the impulse on the first or the second object of a touch, times `scale`.

@@ -92,3 +92,17 @@ def spectral_peaks_hz(samples, floor_db):
 
 def level_db(samples):
     return 10 * numpy.log10(numpy.mean(numpy.square(samples)))
+
+
+def lines_db(samples, step_rate_hz):
+    """The mean level of the spectrum at the multiples of a step rate over that beside them, in decibels; about zero
+    where there are no lines. Each spectrum is that of 24 steps, or of 0.1 s where these are longer."""
+    size = int(RATE * max(24 / step_rate_hz, 0.1))
+    pieces = numpy.lib.stride_tricks.sliding_window_view(samples, size)[::size // 2] * numpy.hanning(size)
+    power = numpy.mean(numpy.abs(numpy.fft.rfft(pieces))**2, axis=0)
+    level = 10 * numpy.log10(power + 1e-40)
+    line = round(step_rate_hz * size / RATE)
+    at = numpy.arange(line, len(power) - 8, line)
+    at = at[at * RATE > 50 * size]  # below is what the window leaves of the mean
+    beside = numpy.median([level[at + offset] for offset in range(-8, 9) if abs(offset) > 1], axis=0)
+    return float(numpy.mean(level[at] - beside))

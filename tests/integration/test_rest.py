@@ -115,16 +115,7 @@ class RestTest(DaemonTest):
                 self.assert_no_lines(rolls, 240)
 
     def assert_no_lines(self, samples, rate_hz):
-        """Averaged spectra at the multiples of the step rate against those between them."""
-        size = sound.RATE // 10  # bins of 10 Hz, of which 240 Hz is a multiple
-        pieces = samples[:len(samples) // size * size].reshape(-1, size) * numpy.hanning(size)
-        power = numpy.mean(numpy.abs(numpy.fft.rfft(pieces))**2, axis=0)
-        lines, beside = [], []
-        for multiple in range(rate_hz // 10, len(power) - 6, rate_hz // 10):
-            lines.append(power[multiple])
-            beside.append(numpy.exp(numpy.mean(numpy.log(power[[multiple - 5, multiple - 4,
-                                                                multiple + 4, multiple + 5]]))))
-        excess = decibels(numpy.exp(numpy.mean(numpy.log(numpy.divide(lines, beside))))) / 2
+        excess = sound.lines_db(samples, rate_hz)
         print(f"lines at the step rate: {excess:.1f} dB over what is beside them", flush=True)
         self.assertLess(excess, 3)
 

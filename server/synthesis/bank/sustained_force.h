@@ -18,7 +18,7 @@ namespace carillon {
 /// A sustained force on one bank: a load, a slide or a roll
 /// (docs/physics.md, 3). Between knots, which are the
 /// simulation's steps, the modal forces are interpolated linearly and smoothed by a Gaussian of
-/// standard deviation 3 / omega of the lowest mode, so that the steps themselves are inaudible.
+/// standard deviation 5 / omega of the lowest mode, so that the steps themselves are inaudible.
 /// Only the free part of the response is rendered: each change of slope d adds
 ///
 ///   gain d exp(s^2 tau^2/2) / s^2

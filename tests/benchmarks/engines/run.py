@@ -43,22 +43,12 @@ def blow_energy(samples):
     return numpy.sum(numpy.square(samples[begin:begin + int(BLOW_S * SAMPLE_RATE_HZ)])) / SAMPLE_RATE_HZ
 
 
-def lines_db(samples, rate_hz):
-    """The mean level at the multiples of the step rate over that beside them."""
-    size = SAMPLE_RATE_HZ // 10  # bins of 10 Hz
-    pieces = samples[:len(samples) // size * size].reshape(-1, size) * numpy.hanning(size)
-    power = numpy.mean(numpy.abs(numpy.fft.rfft(pieces))**2, axis=0)
-    at = numpy.arange(rate_hz // 10, len(power) - 4, rate_hz // 10)
-    at = at[at > 5]
-    beside = numpy.mean([numpy.log(power[at + offset]) for offset in (-3, -2, 2, 3)], axis=0)
-    return float(10 / numpy.log(10) * numpy.mean(numpy.log(power[at]) - beside))
-
-
 def measure(name, samples, rate_hz):
     """The level in decibels, and what stands beside it."""
     if name in TRAVELS_S:
+        import sound
         travels = between(samples, *TRAVELS_S[name])
-        return {"level_db": decibels(numpy.mean(numpy.square(travels))), "lines_db": lines_db(travels, rate_hz)}
+        return {"level_db": decibels(numpy.mean(numpy.square(travels))), "lines_db": sound.lines_db(travels, rate_hz)}
     measured = {"level_db": decibels(blow_energy(samples))}
     if name == "corner":
         rest = numpy.abs(between(samples, SECONDS[name] - 0.4, SECONDS[name])).max()

@@ -94,17 +94,20 @@ TEST_P(AtEveryStep, AJitteringLoadIsFarBelowTheBodysOwnImpact) {
   const auto impact = Ring(bank, MakeUnitImpulse(), 48000);  // 1 kg that falls at 1 m/s
   const double quiet_db = 20 * std::log10(PeakOf(std::span(sound).last(48000)) / PeakOf(impact));
   RecordProperty("decibels", std::to_string(quiet_db));
-  EXPECT_LT(quiet_db, -60);
+  // Each knot begins abruptly, and would be a click if it were louder.
+  EXPECT_LT(quiet_db, -120);
 }
 
 TEST(SustainedForce, AChangeOfSlopeRingsAsTheFreeResponseToARamp) {
   const SoundingModes modes{.modes = {MakeMode(0, 100, -3)}};
   Held held(modes);
-  const auto sound = held.Render(4800, 4800, [](double) { return 5000.0; },
-                                 {});  // one knot: from 0 to 5 kN over the 0.1 s before it
+  // One knot: from zero over the 0.1 s before it to a force that no body bears, because the
+  // response to a smaller one counts as silence.
+  constexpr double kForceNewtons = 5e8;
+  const auto sound = held.Render(4800, 4800, [](double) { return kForceNewtons; }, {});
   const std::complex<double> s(-3, modes.modes[0].damped_rad_per_s);
-  const double tau_s = 3 / s.imag();
-  const double slope = 5000 / 0.1;
+  const double tau_s = 5 / s.imag();
+  const double slope = kForceNewtons / 0.1;
   const std::complex<double> state = kSamplesPerVolumeVelocity * slope / s.imag() *
                                      std::complex<double>(0, -1) *
                                      std::exp(s * s * tau_s * tau_s / 2.0) / (s * s);
@@ -137,7 +140,7 @@ TEST(SustainedForce, RoughnessDrivesTheModesAsItsNoiseSays) {
       sum += kSamplesPerVolumeVelocity * states[m].real();
       states[m] *= std::exp(s / kTestSampleRateHz);
     }
-    // The knots' kinks ring too, 60 dB lower; the first block has the loudest of them.
+    // The knots' kinks ring too, over 120 dB lower.
     error = std::max(error, std::abs(sum - sound[n]));
     peak = std::max(peak, std::abs(sum));
   }
