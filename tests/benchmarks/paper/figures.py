@@ -16,10 +16,7 @@ BLOCK_CONTACT_S = 2e-4
 
 def strike(studio, folder, row, side_m):
     """What is heard of a cube that is struck, as the paper renders it: its coupling, damping and Gaussian."""
-    material = row.material
-    heard = programs.Heard(studio.import_model(folder / f"{row.name}.model"), {
-        "young_pa": material.young_pa, "poisson_ratio": material.poisson, "density_kg_per_m3": material.density,
-        "alpha1_s": material.alpha1, "alpha2_per_s": material.alpha2})
+    heard = programs.Heard(studio.import_model(folder / f"{row.name}.model"), row.material.figures())
     impulse = 1e-3 * (side_m / .05)**3
     blow = programs.Blow(tuple(side_m * x for x in STRUCK), tuple(impulse * x for x in BLOW),
                          BLOCK_CONTACT_S * side_m / .05)
@@ -27,14 +24,14 @@ def strike(studio, folder, row, side_m):
     return sound
 
 
-def spectrum(sound):
-    """(Hz, amplitude with the greatest at 1) up to 5000 Hz."""
+def spectrum(sound, scaled=True):
+    """(Hz, amplitude) up to 5000 Hz; the greatest amplitude is 1 if it is `scaled`."""
     padded = numpy.zeros(int(RATE_HZ * SPAN_S))
     padded[:min(len(padded), len(sound))] = sound[:len(padded)]
     hz = numpy.fft.rfftfreq(len(padded), 1 / RATE_HZ)
     amplitude = numpy.abs(numpy.fft.rfft(padded))
     shown = hz <= HIGHEST_HZ
-    return hz[shown], amplitude[shown] / amplitude[shown].max()
+    return hz[shown], amplitude[shown] / (amplitude[shown].max() if scaled else 1)
 
 
 def draw(spectra, path):

@@ -64,6 +64,11 @@ class Material:
     def natural_hz(self, damped_hz):
         return math.hypot(damped_hz, self.decay_per_s(damped_hz) / (2 * math.pi))
 
+    def figures(self):
+        """Fields of the contract's Material."""
+        return {"young_pa": self.young_pa, "poisson_ratio": self.poisson, "density_kg_per_m3": self.density,
+                "alpha1_s": self.alpha1, "alpha2_per_s": self.alpha2}
+
     def options(self):
         figures = {"--lame-lambda": self.lame_lambda, "--lame-mu": self.lame_mu, "--density": self.density,
                    "--alpha1": self.alpha1, "--alpha2": self.alpha2}
