@@ -3,8 +3,8 @@
 #
 # deploy/paper.sh [ARGUMENTS OF tests/benchmarks/paper/run.py...]
 #
-# Computes Tables 1 and 2 and figures 3 and 5 of the paper (O'Brien, Shen, Gatchalian 2002) anew, and writes
-# docs/REPRODUCTION.md with docs/pictures/figure3.png and figure5.png. Installs what is missing, and builds, first.
+# Computes Tables 1 and 2 and figures 3 to 5 of the paper (O'Brien, Shen, Gatchalian 2002) anew, and its sound model
+# beside Carillon's, and writes docs/REPRODUCTION.md with its pictures. Installs what is missing, and builds, first.
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 

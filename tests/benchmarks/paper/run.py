@@ -4,8 +4,9 @@
 
     run.py --build BUILD [--out docs]
 
-Writes REPRODUCTION.md, pictures/figure3.png and pictures/figure5.png. Exits with 1, without the page, where an error in
-print is refuted or a chime is off by more than 2 % from the measured one. deploy/paper.sh installs what this needs.
+Writes REPRODUCTION.md with pictures/figure3.png, figure4.png, figure5.png and sound_models.png, and six sounds into
+BUILD/paper. Exits with 1, without the page, where an error in print is refuted or a chime is off by more than 2 % from
+the measured one. deploy/paper.sh installs what this needs.
 """
 
 import argparse
@@ -130,10 +131,12 @@ def chime_tables(solver, aluminum):
 
 def compute(options, folder):
     """What the page is filled with, and whether all is as it must be."""
+    import bunny_responses
     import errata
     import figures
     import mode_shapes
     import rows as paper
+    import sound_models
     solver = paper.Solver(options.build / "bin/carillon-precompute", folder)
     rows = {row.name: row for row in paper.table1()}
     best = {name: solver.best(row) for name, row in rows.items()}
@@ -143,12 +146,15 @@ def compute(options, folder):
     pictures = options.out / "pictures"
     pictures.mkdir(parents=True, exist_ok=True)
     mode_shapes.figure3(folder, rows["bowl 1"], best["bowl 1"], pictures / "figure3.png")
+    responses = bunny_responses.figure4(folder, rows["bunny (ceramic)"], pictures / "figure4.png")
     peaks = figures.figure5(rows, folder, pictures / "figure5.png")
+    sounds = sound_models.compare(solver, rows, pictures / "sound_models.png", options.build / "paper")
     tables = {"frequencies": frequency_table(rows.values(), linear, best), "decays": decay_table(rows.values(), best),
               "times": time_table(rows.values(), linear, best), "ratios": ratio_table(rows, best), "chimes": chimes,
-              "tuned": tuned, "errors": errors}
+              "tuned": tuned, "errors": errors, "sounds": sounds}
     filled = {name: "\n".join(lines) for name, lines in tables.items()}
     filled |= sentences(rows, linear, best, peaks)
+    filled |= {f"{name}_peaks": ", ".join(f"{hz:.0f}" for hz in highest) for name, highest in responses.items()}
     worst = max(abs(found[note] / chime[2] - 1) for note, chime in CHIMES.items())
     filled["worst_chime"] = f"{100 * worst:.2f}"
     return filled, worst < .02 and "refuted" not in filled["errors"]

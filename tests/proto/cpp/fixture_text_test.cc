@@ -31,7 +31,9 @@ TEST(FixtureText, WhatIsNoFixtureIsRefusedInWords) {
   for (const char* text :
        {"", "plane", "plane:0,0,0", "plane:0,0/0,0,1", "plane:0,0,x/0,0,1", "box:0,0,0/1,1,1/2",
         "vertices:", "vertices:1,-2", "vertices:1.5", "sphere:0,0,0/1"}) {
-    EXPECT_THAT(Canonical(text), HasSubstr("does not say which part of the body is fixed; give plane:")) << text;
+    EXPECT_THAT(Canonical(text),
+                HasSubstr("does not say which part of the body is fixed; give plane:"))
+        << text;
   }
   EXPECT_THAT(Canonical("plane:0,0,0/0,0,0"), HasSubstr("a normal longer than zero"));
   EXPECT_THAT(Canonical("box:0,0,0/1,1,inf"), HasSubstr("finite corners"));
