@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "precompute/radiation/mode_solver.h"
+#include "precompute/radiation/field_solver.h"
 
 namespace carillon::precompute {
 

@@ -10,7 +10,7 @@
 
 #include "precompute/mesh/point_math.h"
 #include "precompute/radiation/far_pattern.h"
-#include "precompute/radiation/mode_solver.h"
+#include "precompute/radiation/field_solver.h"
 #include "precompute/radiation/spherical_harmonics.h"
 
 namespace carillon::precompute {

@@ -8,8 +8,8 @@
 #include <utility>
 
 #include "precompute/radiation/far_pattern.h"
+#include "precompute/radiation/field_solver.h"
 #include "precompute/radiation/mode_groups.h"
-#include "precompute/radiation/mode_solver.h"
 #include "precompute/radiation/solve_time.h"
 #include "precompute/radiation/spherical_harmonics.h"
 #include "precompute/radiation/surface_levels.h"

@@ -18,7 +18,7 @@
 #include <vector>
 
 #include "precompute/radiation/far_pattern.h"
-#include "precompute/radiation/mode_solver.h"
+#include "precompute/radiation/field_solver.h"
 #include "precompute/radiation/solve_time.h"
 #include "precompute/radiation/surface_levels.h"
 #include "precompute/radiation/transfer.h"

@@ -18,8 +18,8 @@
 #include <vector>
 
 #include "precompute/radiation/far_pattern.h"
+#include "precompute/radiation/field_solver.h"
 #include "precompute/radiation/gmres.h"
-#include "precompute/radiation/mode_solver.h"
 #include "precompute/radiation/solve_time.h"
 #include "tests/precompute/radiation/dense_equation.h"
 #include "tests/precompute/radiation/fork.h"

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "precompute/radiation/far_pattern.h"
-#include "precompute/radiation/mode_solver.h"
+#include "precompute/radiation/field_solver.h"
 #include "tests/precompute/radiation/spheres.h"
 
 namespace carillon::precompute {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
-#include "precompute/radiation/mode_solver.h"
+#include "precompute/radiation/field_solver.h"
 
 #include <algorithm>
 #include <cmath>
