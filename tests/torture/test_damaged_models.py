@@ -186,7 +186,7 @@ class DamagedModelTest(torture.ServedTest):
         time.sleep(REST_S)
         print(f"{self.count} damaged {kind}: {dict(ends.most_common())}; {before_mib:.1f} MiB before, "
               f"{self.mib():.1f} after", file=sys.stderr)
-        self.assertGreater(len(ends), 3)
+        self.assertGreater(len(ends), 2)
         self.assertLess(self.mib(), before_mib + GROWTH_MIB)
 
     def test_each_model_is_imported_or_refused(self):
