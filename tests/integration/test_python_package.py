@@ -286,14 +286,15 @@ class ContactsTest(PackageTest):
             self.model.render_strike(POINT, IMPULSE, striker="marshmallow")
         self.assertEqual(refused.exception.reason, "UNKNOWN_STRIKER")
 
-    def test_a_force_that_ends_suddenly_is_heard(self):
-        def steps(newtons):
-            force = carillon.Forces(1, [POINT], [(0, 0, -newtons)])
-            return [(i * 1e-4, {"forces": force}) for i in range(10)] + [(10e-4, {}), (11e-4, {})]
-        loud = self.rendered(*steps(10), step=1e-4)
+    def test_a_force_is_heard_by_its_roughness_and_not_by_its_end(self):
+        def slid(newtons, **roughness):
+            force = carillon.Forces(1, [POINT], [(0, 0, -newtons)], **roughness)
+            return self.rendered(*[(i / 240, {"forces": force}) for i in range(24)], (24 / 240, {}))
+        rough = {"travel_speeds": [1.0], "roughness_depth": 0.5, "irregularity_length": 1e-4}
+        loud, quiet = slid(10, **rough), slid(5, **rough)
         self.assertGreater(loud.peak, 1e-6)
-        quiet = self.rendered(*steps(5), step=1e-4)
         numpy.testing.assert_allclose(loud.samples, 2 * quiet.samples, atol=1e-3 * loud.peak)
+        self.assertLess(slid(10).peak, 1e-3 * loud.peak)
 
     def test_findings_tell_of_points_away_from_the_surface(self):
         far = {"contacts": carillon.Contacts(1, [(0, 0, 1)], [IMPULSE])}
