@@ -166,7 +166,7 @@ def bowl(folder, material="bowl_metal"):
     mass, square = 0.4, BOWL_RADIUS_M**2
     outside = vertices[:12 * 48 + 1]
     return {"friction": 0.4, "restitution": 0, "roughness_depth": 0.3, "irregularity_length_m": 0.0005, "extent_m": 0.4,
-            "seconds": 6, "bodies": [FLOOR, {
+            "look_at_m": (0, 0, 0.1), "camera_m": (0.25, -0.7, 0.3), "seconds": 6, "bodies": [FLOOR, {
                 "name": "bowl", "mesh": "bowl.obj", "shape": {"hull": {"corners_m": outside}}, "mass_kg": mass,
                 "inertia_kg_m2": [mass * square * 5 / 12, mass * square * 5 / 12, mass * square * 2 / 3],
                 "position_m": [0, 0, 0.2], "orientation": falls.about((1, 0, 0), 155),
