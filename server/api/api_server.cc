@@ -23,6 +23,7 @@
 #include "server/api/connection_gate.h"
 #include "server/api/contact_service.h"
 #include "server/api/decomposition_service.h"
+#include "server/api/flood_guard.h"
 #include "server/api/grpc_log.h"
 #include "server/api/idle_calls.h"
 #include "server/api/job_run_service.h"
@@ -44,14 +45,15 @@ constexpr int kCallThreadCount = 4;
 constexpr int kRenderThreadCount = 2;
 constexpr int kRenderNiceness = 10;
 constexpr std::chrono::milliseconds kGracePeriod(500);
-/// Further calls wait in the client until one has ended.
-constexpr int kMaxCallsOfConnection = 256;
 /// Time in which a new connection must have sent its HTTP/2 settings, and with TLS its handshake.
 constexpr int kHandshakeLimit_ms = 5'000;
 /// A connection without traffic is asked after the first time whether its client lives, and closed
 /// after the second.
 constexpr int kKeepalive_ms = 30'000;
 constexpr int kKeepaliveAnswer_ms = 10'000;
+/// Pings without end are answered. To close a connection for its third ping, gRPC 1.51 waits until
+/// what it has to send is sent, and keeps 1 kB for each ping that comes meanwhile.
+constexpr int kNoPingStrikes = 0;
 /// Bytes of a connection that are parsed before others have their turn. With gRPC's own 4 MiB a few
 /// connections that begin and cancel calls keep all its threads busy for seconds.
 constexpr int kReadBytes = 16 << 10;
@@ -116,6 +118,7 @@ void LimitClients(grpc::ServerBuilder& builder) {
   builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, kHandshakeLimit_ms);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepalive_ms);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveAnswer_ms);
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_MAX_PING_STRIKES, kNoPingStrikes);
   builder.AddChannelArgument(GRPC_ARG_TCP_READ_CHUNK_SIZE, kReadBytes);
   builder.AddChannelArgument(GRPC_ARG_TCP_MAX_READ_CHUNK_SIZE, kReadBytes);
   grpc::ResourceQuota quota("clients");
@@ -198,6 +201,7 @@ struct ApiServer::State {
   std::unique_ptr<grpc::Server> server;
   std::optional<ConnectionGate> gate;
   std::optional<ClientKeeper> keeper;
+  std::optional<FloodGuard> flood_guard;
   std::atomic<bool> stores{true};
   std::atomic<bool> can_decompose{true};
   std::vector<std::string> addresses;
@@ -236,6 +240,7 @@ absl::Status ApiServer::State::Listen(const ApiSettings& settings) {
                    "cannot serve: gRPC does not take the TLS files; see the line before");
   }
   gate->Open();
+  flood_guard.emplace(*gate, client_log);
   for (const ListenAddress& address : parsed) addresses.push_back(address.ToString());
   return absl::OkStatus();
 }
@@ -289,6 +294,7 @@ void ApiServer::ShowDatabaseHealth(bool stores) {
 ApiServer::ApiServer(std::unique_ptr<State> state) : state_(std::move(state)) {}
 
 ApiServer::~ApiServer() {
+  state_->flood_guard.reset();
   state_->gate->Close();
   state_->keeper.reset();
   state_->output.ObserveDevice(nullptr);

@@ -20,6 +20,7 @@
 #include <utility>
 
 #include "absl/cleanup/cleanup.h"
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
@@ -71,6 +72,11 @@ int PortOf(int bound) {
   getsockname(bound, reinterpret_cast<sockaddr*>(&address), &size);
   // The port has the same place in the addresses of both families.
   return ntohs(reinterpret_cast<const sockaddr_in*>(&address)->sin_port);
+}
+
+/// The process or the address from which a connection of this name came.
+std::string SourceOf(const std::string& peer) {
+  return absl::StartsWith(peer, "unix:") ? ProcessOfPeer(peer) : peer.substr(0, peer.rfind(':'));
 }
 
 /// The inode of an open descriptor; 0 if it is closed.
@@ -183,6 +189,8 @@ bool ConnectionGate::Connection::is_open() const { return InodeOf(descriptor) ==
 
 bool ConnectionGate::Admit(const std::string& peer, const Connection& connection) {
   const MutexLock lock(&mutex_);
+  const auto refused = refused_.find(SourceOf(peer));
+  if (refused != refused_.end() && std::chrono::steady_clock::now() < refused->second) return false;
   if (connections_.size() >= max_connection_count_) {
     std::erase_if(connections_, [](const auto& each) { return !each.second.is_open(); });
   }
@@ -195,6 +203,20 @@ bool ConnectionGate::IsOpen(const std::string& peer) const {
   const MutexLock lock(&mutex_);
   const auto found = connections_.find(peer);
   return found != connections_.end() && found->second.is_open();
+}
+
+bool ConnectionGate::Refuse(const std::string& peer) {
+  const auto now = std::chrono::steady_clock::now();
+  const MutexLock lock(&mutex_);
+  const auto found = connections_.find(peer);
+  if (found == connections_.end() || found->second.refused || !found->second.is_open())
+    return false;
+  found->second.refused = true;
+  // gRPC, which owns the descriptor, sees the end of the connection and closes it.
+  shutdown(found->second.descriptor, SHUT_RDWR);
+  std::erase_if(refused_, [now](const auto& each) { return each.second <= now; });
+  refused_.insert_or_assign(SourceOf(peer), now + kRefusal);
+  return true;
 }
 
 size_t ConnectionGate::open_count() const {

@@ -3,6 +3,7 @@
 
 #include <sys/types.h>
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <map>
@@ -30,6 +31,9 @@ class ConnectionTaker {
 /// connection is closed at once.
 class ConnectionGate {
  public:
+  /// Time for which nobody is let in from where a refused connection came.
+  static constexpr std::chrono::seconds kRefusal{30};
+
   explicit ConnectionGate(size_t max_connection_count);
 
   ~ConnectionGate();
@@ -50,6 +54,11 @@ class ConnectionGate {
   /// thread.
   bool IsOpen(const std::string& peer) const;
 
+  /// Ends the connection of this name, and closes others of the same process (Unix) or address
+  /// (TCP) at once until kRefusal has passed. False: it is not open, or it ends already. Any
+  /// thread.
+  bool Refuse(const std::string& peer);
+
   /// Number of connections that are open. Any thread.
   size_t open_count() const;
 
@@ -63,6 +72,7 @@ class ConnectionGate {
   struct Connection {
     int descriptor;
     ino_t inode;
+    bool refused = false;
     bool is_open() const;
   };
 
@@ -81,6 +91,8 @@ class ConnectionGate {
   mutable Mutex mutex_;
   /// By peer; some may have been closed.
   std::map<std::string, Connection> connections_ ABSL_GUARDED_BY(mutex_);
+  /// By process or address: until when its connections are closed at once.
+  std::map<std::string, std::chrono::steady_clock::time_point> refused_ ABSL_GUARDED_BY(mutex_);
   int stop_;  ///< becomes readable when the gate is to end
   std::thread thread_;
 };

@@ -14,6 +14,7 @@
 #include <string>
 #include <utility>
 
+#include "absl/strings/str_cat.h"
 #include "tests/server/mode_database/sample_model.h"
 
 namespace carillon {
@@ -56,6 +57,14 @@ class ConnectionGateTest : public testing::Test {
     return made;
   }
 
+  /// The name that the daemon has for a connection.
+  static std::string NameOf(int connection) {
+    sockaddr_in from{};
+    socklen_t size = sizeof from;
+    EXPECT_EQ(getsockname(connection, reinterpret_cast<sockaddr*>(&from), &size), 0);
+    return absl::StrCat("ipv4:127.0.0.1:", ntohs(from.sin_port));
+  }
+
   /// The daemon's end was closed.
   static bool IsClosed(int connection) {
     char byte = 0;
@@ -79,6 +88,20 @@ TEST_F(ConnectionGateTest, ClosesConnectionsBeyondItsLimitAndAcceptsAgainWhenOne
   Connect();
   taken_.acquire();
   EXPECT_TRUE(IsClosed(Connect()));
+}
+
+TEST_F(ConnectionGateTest, EndsAConnectionAndRefusesOthersFromTheSameAddress) {
+  Open(4);
+  const int first = Connect();
+  taken_.acquire();
+  const int second = Connect();
+  taken_.acquire();
+  EXPECT_FALSE(gate_->Refuse("ipv4:127.0.0.1:0"));
+  EXPECT_TRUE(gate_->Refuse(NameOf(second)));
+  EXPECT_FALSE(gate_->Refuse(NameOf(second)));  // it has been refused already
+  EXPECT_TRUE(IsClosed(second));
+  EXPECT_TRUE(IsClosed(Connect()));
+  EXPECT_TRUE(gate_->IsOpen(NameOf(first)));
 }
 
 TEST_F(ConnectionGateTest, RefusesAPortThatIsInUse) {

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <chrono>
+#include <map>
+#include <semaphore>
+#include <string>
+#include <thread>
+
+#include "server/api/connection_calls.h"
+#include "server/api/connection_gate.h"
+#include "server/api/limited_log.h"
+
+namespace carillon {
+
+/// Calls that may be open on one connection. gRPC makes further calls wait in the client, but only
+/// once the client has confirmed the limit.
+inline constexpr int kMaxCallsOfConnection = 256;
+
+/// Calls a second that may fail on one connection, on the average of half a second.
+inline constexpr double kMaxFailedCallsPerSecond = 2000;
+
+/// Why a connection with these counts is to be closed, in words for an operator; empty if it may
+/// stay. `before` was counted `seconds` earlier.
+std::string FindFlood(const ConnectionCalls& before, const ConnectionCalls& now, double seconds);
+
+/// A thread that closes connections whose clients begin calls without end: gRPC 1.51 bounds neither
+/// calls that are cancelled at once nor calls that never send their message. Whoever made such a
+/// connection is refused others for a while.
+class FloodGuard {
+ public:
+  /// Both must outlive the guard.
+  FloodGuard(ConnectionGate& gate, LimitedLog& log);
+
+  /// Joins the thread.
+  ~FloodGuard();
+  FloodGuard(const FloodGuard&) = delete;
+  FloodGuard& operator=(const FloodGuard&) = delete;
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  void Run();
+  void Look(Clock::time_point now);
+
+  struct Seen {
+    ConnectionCalls calls;
+    Clock::time_point at;
+  };
+
+  ConnectionGate& gate_;
+  LimitedLog& log_;
+  std::map<std::string, Seen> seen_;
+  std::binary_semaphore stop_{0};
+  std::thread thread_;
+};
+
+}  // namespace carillon

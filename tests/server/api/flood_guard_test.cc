@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/api/flood_guard.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <vector>
+
+#include "tests/server/api/served_daemon.h"
+
+namespace carillon {
+namespace {
+
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+TEST(FindFloodTest, LetsAConnectionHaveItsCallsAndSomeThatFail) {
+  const ConnectionCalls before{.begun_count = 1000, .answered_count = 900, .failed_count = 10};
+  EXPECT_THAT(
+      FindFlood(before, {.begun_count = 1256, .answered_count = 990, .failed_count = 10}, 0.1),
+      IsEmpty());
+  EXPECT_THAT(
+      FindFlood(before, {.begun_count = 3000, .answered_count = 2010, .failed_count = 990}, 0.1),
+      IsEmpty());
+}
+
+TEST(FindFloodTest, FindsCallsThatNeverEndAndCallsThatFailWithoutEnd) {
+  EXPECT_THAT(FindFlood({}, {.begun_count = 600}, 0.1), HasSubstr("600 open calls"));
+  EXPECT_THAT(FindFlood({}, {.begun_count = 1100, .failed_count = 1100}, 0.4),
+              HasSubstr("cancelled 1100 calls"));
+}
+
+TEST(FindFloodTest, ToleratesCallsThatEndWhileTheyAreCounted) {
+  EXPECT_EQ((ConnectionCalls{.begun_count = 7, .answered_count = 8}.open_count()), 0U);
+}
+
+using ConnectionCallsTest = ServedDaemon;
+
+TEST_F(ConnectionCallsTest, AreCountedByConnection) {
+  for (int i = 0; i < 4; ++i) CreateScene();
+  std::vector<uint64_t> begun;
+  for (const auto& [peer, calls] : ReadConnectionCalls()) {
+    EXPECT_THAT(peer, HasSubstr("unix:pid-"));
+    begun.push_back(calls.begun_count);
+  }
+  EXPECT_THAT(begun, testing::Contains(4));
+}
+
+}  // namespace
+}  // namespace carillon
