@@ -66,7 +66,8 @@ typedef struct carillon_object {
   uint32_t handle;      /**< wanted in contacts; zero: the next free one */
 } carillon_object;
 
-/** What an engine reports of one contact, in every step, also at rest. Zero the rest. */
+/** A contact that a physics engine reports. Report it in every step while the bodies touch, even if
+ * they do not move. Set unused members to zero. */
 typedef struct carillon_contact {
   uint32_t object;
   carillon_vec3 point_m;

@@ -11,8 +11,8 @@
 
 namespace carillon::cli {
 
-/// The process that listens at a Unix socket. Errors: Unavailable (SERVER_UNAVAILABLE: nobody does,
-/// and why).
+/// The process that listens at a Unix socket. Errors: Unavailable (SERVER_UNAVAILABLE), if no
+/// process listens there or this user may not connect.
 absl::StatusOr<pid_t> ProcessAt(const std::string& socket_path);
 
 /// Whether a thread of the process has real-time priority; absent: this user may not see that.

@@ -56,8 +56,8 @@ struct ModalModel {
   }
 };
 
-/// `given`: the surface as given, to which the boundary of `mesh` refers. `elastic`: the constants
-/// of the matrices.
+/// `given` is the surface from which `mesh` was made: each boundary triangle of `mesh` names the
+/// triangle of `given` on which it lies (tet_mesh.h). `elastic` are the constants of the matrices.
 ModalModel MakeModalModel(const TetMesh& mesh, const SurfaceMesh& given,
                           const ElasticConstants& elastic, const DeformationModes& solution);
 

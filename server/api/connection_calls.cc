@@ -4,9 +4,9 @@
 #include <grpc/grpc.h>
 #include <grpc/support/alloc.h>
 
+#include <algorithm>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <optional>
 
 #include "absl/strings/numbers.h"
 #include "absl/strings/string_view.h"
@@ -43,40 +43,44 @@ std::string PeerOf(const json& reference) {
   return space == std::string::npos ? name : name.substr(space + 1);
 }
 
-void ReadSocket(const json& reference, std::map<std::string, ConnectionCalls>& calls) {
-  const auto id = static_cast<intptr_t>(Number(reference, "socketId"));
-  const json answer = Parse(grpc_channelz_get_socket(id));
-  const auto socket = answer.find("socket");
-  if (socket == answer.end() || !socket->contains("data")) return;
-  const json& data = (*socket)["data"];
-  calls[PeerOf(reference)] = {.begun_count = Number(data, "streamsStarted"),
-                              .answered_count = Number(data, "streamsSucceeded"),
-                              .failed_count = Number(data, "streamsFailed")};
-}
-
-void ReadServer(intptr_t server, std::map<std::string, ConnectionCalls>& calls) {
-  for (intptr_t first = 0;;) {
+void ListOf(intptr_t server, intptr_t first, std::vector<GrpcConnection>& connections) {
+  for (;;) {
     const json page = Parse(grpc_channelz_get_server_sockets(server, first, kPageSize));
     const auto sockets = page.find("socketRef");
     if (sockets == page.end() || sockets->empty()) return;
-    for (const json& reference : *sockets) ReadSocket(reference, calls);
+    for (const json& reference : *sockets) {
+      first = static_cast<intptr_t>(Number(reference, "socketId"));
+      connections.push_back({.id = first, .peer = PeerOf(reference)});
+    }
     if (page.value("end", false)) return;
-    first = static_cast<intptr_t>(Number(sockets->back(), "socketId")) + 1;
+    ++first;
   }
 }
 
 }  // namespace
 
-std::map<std::string, ConnectionCalls> ReadConnectionCalls() {
-  std::map<std::string, ConnectionCalls> calls;
+std::vector<GrpcConnection> ListConnections(int64_t first_id) {
+  std::vector<GrpcConnection> connections;
   const json answer = Parse(grpc_channelz_get_servers(0));
   const auto servers = answer.find("server");
-  if (servers == answer.end()) return calls;
+  if (servers == answer.end()) return connections;
   for (const json& server : *servers) {
     if (!server.contains("ref")) continue;
-    ReadServer(static_cast<intptr_t>(Number(server["ref"], "serverId")), calls);
+    const auto id = static_cast<intptr_t>(Number(server["ref"], "serverId"));
+    ListOf(id, static_cast<intptr_t>(first_id), connections);
   }
-  return calls;
+  std::ranges::sort(connections, {}, &GrpcConnection::id);
+  return connections;
+}
+
+std::optional<ConnectionCalls> ReadConnectionCalls(int64_t id) {
+  const json answer = Parse(grpc_channelz_get_socket(static_cast<intptr_t>(id)));
+  const auto socket = answer.find("socket");
+  if (socket == answer.end() || !socket->contains("data")) return std::nullopt;
+  const json& data = (*socket)["data"];
+  return ConnectionCalls{.begun_count = Number(data, "streamsStarted"),
+                         .answered_count = Number(data, "streamsSucceeded"),
+                         .failed_count = Number(data, "streamsFailed")};
 }
 
 }  // namespace carillon

@@ -2,10 +2,17 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
+#include <optional>
 #include <string>
+#include <vector>
 
 namespace carillon {
+
+/// An open connection of this process's gRPC servers.
+struct GrpcConnection {
+  int64_t id = 0;    ///< gRPC's own; a later connection has a larger one
+  std::string peer;  ///< the name that calls see (ServerContext::peer)
+};
 
 /// What gRPC has counted on one connection since it was made.
 struct ConnectionCalls {
@@ -21,9 +28,12 @@ struct ConnectionCalls {
   }
 };
 
-/// Returns the counts of each open connection of this process's gRPC servers, by the name that
-/// calls see (ServerContext::peer). It takes about 20 us for a connection. Source: gRPC's channelz,
-/// which counts a call when its first frame has come, before any service learns of it.
-std::map<std::string, ConnectionCalls> ReadConnectionCalls();
+/// Returns the open connections from this id on, in the order of their ids. Source: gRPC's
+/// channelz.
+std::vector<GrpcConnection> ListConnections(int64_t first_id);
+
+/// Returns the counts of a connection; absent if it is closed. It takes some 10 us. Source: gRPC's
+/// channelz, which counts a call when its first frame has come, before any service learns of it.
+std::optional<ConnectionCalls> ReadConnectionCalls(int64_t id);
 
 }  // namespace carillon

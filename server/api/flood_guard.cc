@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -14,7 +15,10 @@ namespace {
 constexpr uint64_t kMostOpenCalls = 2 * kMaxCallsOfConnection;
 constexpr std::chrono::milliseconds kPeriod(25);
 /// Looking takes at most this share of a core, however many connections there are.
-constexpr double kMostLoad = 0.02;
+constexpr double kMostLoad = 0.05;
+/// Connections that are looked at each time, beside the busy ones.
+constexpr size_t kNewest = 64;
+constexpr size_t kInTurn = 64;
 /// Time over which the rate of failed calls is averaged.
 constexpr double kWindowS = 0.5;
 
@@ -57,23 +61,51 @@ void FloodGuard::Run() {
 }
 
 void FloodGuard::Look(Clock::time_point now) {
-  std::map<std::string, Seen> still_open;
-  for (const auto& [peer, calls] : ReadConnectionCalls()) {
-    const auto found = seen_.find(peer);
-    Seen seen = found == seen_.end() ? Seen{.calls = {}, .at = now} : found->second;
-    // A peer's name may have come back with another connection.
-    if (calls.begun_count < seen.calls.begun_count) seen = {.calls = {}, .at = now};
-    const double seconds = SecondsOf(now - seen.at);
-    const std::string flood = FindFlood(seen.calls, calls, seconds);
-    if (!flood.empty() && gate_.Refuse(peer)) {
-      log_.Warn(absl::StrCat("closed the connection ", peer, ": ", flood,
-                             "; connections from there are refused for ",
-                             ConnectionGate::kRefusal.count(), " s"));
-    }
-    if (seconds >= kWindowS) seen = {.calls = calls, .at = now};
-    still_open.emplace(peer, seen);
+  WatchNewConnections(now);
+  for (const int64_t id : ChooseConnections()) LookAt(watched_.find(id), now);
+}
+
+void FloodGuard::WatchNewConnections(Clock::time_point now) {
+  const int64_t first_id = watched_.empty() ? 0 : watched_.rbegin()->first + 1;
+  for (GrpcConnection& connection : ListConnections(first_id)) {
+    watched_[connection.id] = {.peer = std::move(connection.peer), .calls = {}, .since = now};
   }
-  seen_ = std::move(still_open);
+}
+
+std::vector<int64_t> FloodGuard::ChooseConnections() {
+  std::vector<int64_t> chosen;
+  size_t rank = watched_.size();
+  for (const auto& [id, watched] : watched_) {
+    if (rank-- <= kNewest || watched.busy) chosen.push_back(id);
+  }
+  auto next = watched_.lower_bound(next_in_turn_);
+  for (size_t i = 0; i < kInTurn && next != watched_.end(); ++i, ++next)
+    chosen.push_back(next->first);
+  next_in_turn_ = next == watched_.end() ? 0 : next->first;
+  std::ranges::sort(chosen);
+  chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
+  return chosen;
+}
+
+void FloodGuard::LookAt(WatchedById::iterator at, Clock::time_point now) {
+  const std::optional<ConnectionCalls> calls = ReadConnectionCalls(at->first);
+  if (!calls) {
+    watched_.erase(at);
+    return;
+  }
+  Watched& watched = at->second;
+  watched.busy = calls->begun_count != watched.begun_count;
+  watched.begun_count = calls->begun_count;
+  const double seconds = SecondsOf(now - watched.since);
+  const std::string flood = FindFlood(watched.calls, *calls, seconds);
+  if (!flood.empty() && gate_.Refuse(watched.peer)) {
+    log_.Warn(absl::StrCat("closed the connection ", watched.peer, ": ", flood,
+                           "; connections from there are refused for ",
+                           ConnectionGate::kRefusal.count(), " s"));
+  }
+  if (seconds < kWindowS) return;
+  watched.calls = *calls;
+  watched.since = now;
 }
 
 }  // namespace carillon

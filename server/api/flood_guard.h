@@ -2,10 +2,12 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <map>
 #include <semaphore>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "server/api/connection_calls.h"
 #include "server/api/connection_gate.h"
@@ -39,18 +41,27 @@ class FloodGuard {
 
  private:
   using Clock = std::chrono::steady_clock;
+  struct Watched {
+    std::string peer;
+    ConnectionCalls calls;     ///< when the span over which calls are counted began
+    Clock::time_point since;   ///< that time
+    uint64_t begun_count = 0;  ///< when the connection was last looked at
+    bool busy = false;         ///< it had begun calls since the time before
+  };
+  using WatchedById = std::map<int64_t, Watched>;
 
   void Run();
+  /// Looks at the connections that most likely flood, the newest and the busy ones, and at some of
+  /// the others in turn.
   void Look(Clock::time_point now);
-
-  struct Seen {
-    ConnectionCalls calls;
-    Clock::time_point at;
-  };
+  void WatchNewConnections(Clock::time_point now);
+  std::vector<int64_t> ChooseConnections();
+  void LookAt(WatchedById::iterator at, Clock::time_point now);
 
   ConnectionGate& gate_;
   LimitedLog& log_;
-  std::map<std::string, Seen> seen_;
+  WatchedById watched_;
+  int64_t next_in_turn_ = 0;
   std::binary_semaphore stop_{0};
   std::thread thread_;
 };

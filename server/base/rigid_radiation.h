@@ -8,7 +8,8 @@ namespace carillon {
 /// How a free body of unit density radiates when it accelerates as a whole
 /// (proto/carillon/v1/transfer.proto, RigidBody).
 struct RigidRadiation {
-  /// The equivalent sphere of one motion.
+  /// One of the six rigid motions. The body radiates like a sphere of this radius whose normal
+  /// velocity is a sum of spherical harmonics with these strengths.
   struct Motion {
     double radius_m = 0;                ///< zero: the motion moves no air
     std::array<double, 9> strengths{};  ///< s_lm at l^2 + l + m; for rotation in metres

@@ -13,7 +13,8 @@
 
 namespace carillon {
 
-/// Rules, without state, for the consequences of a job's end.
+// The functions in this file decide what the queue does with a job: whether it computes, retries or
+// repeats the job, and how clients see it. They keep no state.
 
 v1::Job ToJob(const JobRecord& record);
 

@@ -13,9 +13,10 @@ namespace carillon {
 
 /// The sharp edges and corners of a surface, at which bodies touch first.
 ///
-/// Engines let bodies reach into one another before they push them apart, or round their corners
-/// off, and so find a contact some millimetres inside a body. Next to an edge the nearest point of
-/// the surface is then on a face, and a face meets another body for a tenth of an edge's time.
+/// A physics engine lets bodies overlap by some millimetres before it separates them, and some
+/// engines round corners off. The contact that they report may therefore lie inside a body. Next to
+/// an edge the nearest point of the surface is then on a face, and a face meets another body for a
+/// tenth of an edge's time.
 class SharpEdges {
  public:
   /// Surfaces with more edges than this are rough, and have none by which to find a contact.

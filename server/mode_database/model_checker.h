@@ -13,7 +13,7 @@
 
 namespace carillon {
 
-/// A ModalModelChunk that refers to bytes of its caller.
+/// A ModalModelChunk whose bytes are not copied: they must outlive the view.
 struct ChunkView {
   uint32_t array = 0;
   uint64_t offset = 0;

@@ -79,8 +79,9 @@ class OfflineRenderer {
   /// Takes the steps of the simulation.
   ContactIntake& intake() { return intake_; }
 
-  /// Renders the next frames, interleaved, as many as `samples` holds, a multiple of
-  /// kBlockFrameCount; returns how many, zero after the end.
+  /// Renders whole blocks of kBlockFrameCount frames into `samples`, channels interleaved, until no
+  /// further block fits or the sound ends. `samples` must hold at least one block. Returns the
+  /// number of frames that belong to the sound; zero after its end.
   size_t Render(std::span<float> samples);
 
   /// The impulses that sounded, as far as anything was rendered, if the settings ask for them.

@@ -54,7 +54,7 @@ struct MixerSettings {
   size_t most_banks = 8192;        ///< including those that ring out or fade
   size_t most_buses = kMostBuses;
   size_t stagger = 0;  ///< of the default bus; see Mixer::Stagger
-  size_t most_streams = 1024;
+  size_t most_streams = 2048;
   size_t most_pending_events = 262144;   ///< events that wait for their block
   size_t most_events_per_block = 32768;  ///< taken from the streams; the rest wait there
   /// With a clock, the work of a block is bounded so that its deadline is kept: beyond the bound

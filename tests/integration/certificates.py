@@ -26,6 +26,14 @@ def openssl(*arguments):
     subprocess.run(["openssl", *map(str, arguments)], check=True, capture_output=True)
 
 
+def self_signed(folder, name="carillon"):
+    """Returns the PEM files of a certificate for 127.0.0.1, valid for two days, and its key."""
+    certificate, key = folder / f"{name}.pem", folder / f"{name}.key"
+    openssl("req", "-x509", *CURVE, "-subj", f"/CN={name}", "-addext", "subjectAltName=IP:127.0.0.1", "-days", "2",
+            "-keyout", key, "-out", certificate)
+    return certificate, key
+
+
 class Authority:
     """Signs certificates; `certificate` is the PEM file of its own."""
 

@@ -10,6 +10,7 @@ import time
 import unittest
 import urllib.request
 
+from certificates import self_signed
 from daemon import BIN, Daemon
 
 
@@ -18,10 +19,7 @@ class TlsTest(unittest.TestCase):
         scratch = tempfile.TemporaryDirectory(prefix="carillon-")
         self.addCleanup(scratch.cleanup)
         self.folder = pathlib.Path(scratch.name)
-        self.certificate, key = self.folder / "certificate.pem", self.folder / "key.pem"
-        subprocess.run(["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes",
-                        "-subj", "/CN=carillon", "-addext", "subjectAltName=IP:127.0.0.1", "-days", "2",
-                        "-keyout", key, "-out", self.certificate], check=True, capture_output=True)
+        self.certificate, key = self_signed(self.folder)
         with socket.socket() as free:
             free.bind(("127.0.0.1", 0))
             self.metrics = f"127.0.0.1:{free.getsockname()[1]}"
@@ -57,10 +55,7 @@ class TlsTest(unittest.TestCase):
         self.assertRegex(done.stderr, "SERVER_UNAVAILABLE: .*closed the connection.*TLS.*--tls-roots")
 
     def test_roots_that_do_not_vouch_for_the_daemon_are_a_mistake_of_tls(self):
-        other = self.folder / "other.pem"
-        subprocess.run(["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes",
-                        "-subj", "/CN=other", "-days", "2", "-keyout", self.folder / "other.key", "-out", other],
-                       check=True, capture_output=True)
+        other, _ = self_signed(self.folder, "other")
         done = self.status("--tls-roots", other)
         self.assertEqual(done.returncode, 3)
         self.assertRegex(done.stderr, "SERVER_UNAVAILABLE: TLS with .*failed.*certificate")

@@ -13,6 +13,7 @@ import grpc
 
 import torture
 from carillon.v1 import audio_service_pb2
+from certificates import self_signed
 from daemon import BIN, Daemon
 
 DESCRIPTORS = 1024
@@ -78,10 +79,7 @@ class ConnectionTest(torture.ScratchTest):
             connection.close()
 
     def test_tls_accepts_again_too(self):
-        certificate, key = self.folder / "certificate.pem", self.folder / "key.pem"
-        subprocess.run(["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes",
-                        "-subj", "/CN=carillon", "-addext", "subjectAltName=IP:127.0.0.1", "-days", "2",
-                        "-keyout", key, "-out", certificate], check=True, capture_output=True)
+        certificate, key = self_signed(self.folder)
         self.serve("--tls-certificate", certificate, "--tls-key", key)
         for connection in self.silent(socket.AF_INET, ("127.0.0.1", self.port), 1100):
             connection.close()

@@ -62,9 +62,9 @@ class AccelerationNoise {
   /// How long a pulse lasts here, at most 0.15 s, in frames.
   double PulseFrames(Pulse pulse) const noexcept;
 
-  /// Begins the pulse of an impulse at sample `offset` of the next block to render, `lead_frames`
-  /// (0 to 1) after its begin. The impulse's vertices must be the body's. `bearing` null: heard
-  /// without directions.
+  /// Starts the pulse of an impulse. The pulse starts `lead_frames` (0 to 1) frames before sample
+  /// `offset` of the next block, which is the first sample in which it sounds. The impulse's
+  /// vertices must be the body's. `bearing` null: heard without directions.
   void Begin(const SurfaceImpulse& impulse, size_t offset, float lead_frames,
              const Bearing* bearing) noexcept;
 

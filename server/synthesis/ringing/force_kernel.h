@@ -35,7 +35,8 @@ struct ForceArrays {
   LaneArray<float> next, last, slope, jump;
   /// Change of the state by a unit change of slope: gain exp(s^2 tau^2/2) / s^2.
   LaneArray<float> kink_re, kink_im;
-  /// Change of the state by a unit of noise in one sample, at the last knot and at the next.
+  /// Change of the state by a unit of noise in one sample. It goes from `from` to `to` within one
+  /// step; `to` follows the force at the last knot.
   LaneArray<float> from_re, from_im, to_re, to_im;
 };
 

@@ -57,9 +57,9 @@ struct ForceKnot {
 /// A straight way to a new place.
 struct Motion {
   std::array<float, 3> position_m{};
-  std::array<float, 3> right{1, 0, 0};  ///< unit vector to the right; only a listener's is used
-  /// x, y and z of the unit quaternion, with w not negative, that rotates vectors of the body's
-  /// frame into the scene's; only an object's is used.
+  std::array<float, 3> right{1, 0, 0};  ///< a listener's unit vector to the right
+  /// x, y and z of the unit quaternion (w is not negative) that rotates vectors from the body's
+  /// frame into the scene's frame. The orientation of a listener is not used.
   std::array<float, 3> orientation{};
   float glide_frames = 0;  ///< duration of the way; below one: a jump
 };

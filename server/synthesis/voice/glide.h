@@ -33,8 +33,8 @@ class Glide {
   /// The place at the end of the last block.
   Place place() const noexcept { return PlaceAt(smoothed_); }
 
-  /// The place at the begin of this block, as far as its motions are known: that of the end of the
-  /// last block, or the target of a jump.
+  /// The place at which this block begins: the place at the end of the last block. If a motion of
+  /// this block was a jump, it is the place after all motions so far.
   Place begin() const noexcept { return PlaceAt(jumps_ ? unsmoothed_ : smoothed_); }
 
   /// Whether it jumped in the last block.

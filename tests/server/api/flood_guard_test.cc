@@ -40,9 +40,9 @@ using ConnectionCallsTest = ServedDaemon;
 TEST_F(ConnectionCallsTest, AreCountedByConnection) {
   for (int i = 0; i < 4; ++i) CreateScene();
   std::vector<uint64_t> begun;
-  for (const auto& [peer, calls] : ReadConnectionCalls()) {
-    EXPECT_THAT(peer, HasSubstr("unix:pid-"));
-    begun.push_back(calls.begun_count);
+  for (const GrpcConnection& connection : ListConnections(0)) {
+    EXPECT_THAT(connection.peer, HasSubstr("unix:pid-"));
+    begun.push_back(ReadConnectionCalls(connection.id).value_or(ConnectionCalls{}).begun_count);
   }
   EXPECT_THAT(begun, testing::Contains(4));
 }

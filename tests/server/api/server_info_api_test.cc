@@ -48,7 +48,7 @@ TEST_F(ServerInfoApi, HasTheLimitsAndSettingsOfThisDaemon) {
   EXPECT_EQ(limits.scene_count(), 512U);
   EXPECT_EQ(limits.object_count(), 4096U);
   EXPECT_EQ(limits.sounding_mode_count(), 800U);
-  EXPECT_EQ(limits.contact_stream_count(), 1024U);
+  EXPECT_EQ(limits.contact_stream_count(), 2048U);
   EXPECT_EQ(limits.listener_count(), 32U);
   EXPECT_EQ(limits.rendering_count(), 8U);
   EXPECT_EQ(limits.waiting_job_count(), 1024U);

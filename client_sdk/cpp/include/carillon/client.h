@@ -64,7 +64,8 @@ class Client {
   virtual absl::StatusOr<std::string> UploadMesh(absl::string_view bytes) const;
 
   /// Asks for the decomposition of a stored mesh and returns the job at once; WatchJob waits for
-  /// its end. The daemon computes each request once, however often it is sent.
+  /// its end. The same request again returns the same job while that job waits or runs, or if its
+  /// model is stored, or if it would fail again; otherwise the daemon computes it anew.
   virtual absl::StatusOr<v1::Job> CreateModalModel(
       const v1::CreateModalModelRequest& request) const;
 

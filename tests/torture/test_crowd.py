@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A thousand clients that strike four times a second each, alone and amid clients that mean no good."""
+
+import contextlib
+import itertools
+import json
+import os
+import pathlib
+import resource
+import signal
+import socket
+import statistics
+import subprocess
+import threading
+import time
+import unittest
+
+import grpc
+
+import meshes
+import torture
+from carillon.v1 import audio_service_pb2, material_pb2, scene_service_pb2
+from certificates import self_signed
+from test_rapid_reset import METHOD, Flood, resets
+
+CROWD = pathlib.Path(os.environ["CARILLON_BUILD_DIR"], "tests", "crowd")
+GOOD, SCENES = torture.rounds(40, 1000), torture.rounds(20, 500)
+SILENT, HALF_OPEN = torture.rounds(100, 2000), torture.rounds(30, 600)
+BAD_CROWDS, BAD_CLIENTS = torture.rounds(2, 10), 20
+RUN_S = torture.rounds(3, 30)
+DELAY_S = 0.05
+# The attackers, who share the cores, keep them busy while they begin.
+MOST_LATE = 0.05
+# gRPC keeps some threads of its own, whose number varies.
+MOST_THREADS = 40
+# The first bytes of a TLS handshake: a record that says it is 512 bytes long.
+HALF_HANDSHAKE = bytes([22, 3, 1, 2, 0, 1])
+REST_S = torture.rounds(1, 60)
+
+
+def threads_of(process):
+    return len(list(pathlib.Path("/proc", str(process.pid), "task").iterdir()))
+
+
+def mib_of(process):
+    statm = pathlib.Path("/proc", str(process.pid), "statm").read_text().split()
+    return int(statm[1]) * resource.getpagesize() / 2**20
+
+
+class Prober:
+    """Calls the daemon fifty times a second, until it is stopped, and keeps how long each call took."""
+
+    def __init__(self, server):
+        self.channel = grpc.insecure_channel(server, [("grpc.use_local_subchannel_pool", 1)])
+        self.call = self.channel.unary_unary(METHOD.decode(), audio_service_pb2.GetMixerRequest.SerializeToString,
+                                             audio_service_pb2.GetMixerResponse.FromString)
+        self.times_s = []
+        self.stopped = threading.Event()
+        self.thread = threading.Thread(target=self._run)
+        self.call(audio_service_pb2.GetMixerRequest(), timeout=30)
+        self.thread.start()
+
+    def _run(self):
+        while not self.stopped.wait(0.02):
+            begin_s = time.monotonic()
+            self.call(audio_service_pb2.GetMixerRequest(), timeout=30)
+            self.times_s.append(time.monotonic() - begin_s)
+
+    def stop(self):
+        """The 99th percentile, seconds."""
+        self.stopped.set()
+        self.thread.join()
+        self.channel.close()
+        return statistics.quantiles(self.times_s, n=100)[98]
+
+
+class CrowdTest(torture.ServedTest):
+    def setUp(self):
+        super().setUp()
+        soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (min(hard, 8192), hard))
+        self.addCleanup(resource.setrlimit, resource.RLIMIT_NOFILE, (soft, hard))
+        certificate, key = self_signed(self.folder)
+        self.serve("--listen", "127.0.0.1:0", "--tls-certificate", certificate, "--tls-key", key, "--client-share", "1")
+        self.port = int(self.daemon.listening[1].rsplit(":", 1)[1])
+        model = self.client.wait(self.client.create(meshes.bar(), "obj",
+                                                    material=material_pb2.Material(preset=meshes.MATERIAL)))
+        self.targets = [word for _ in range(SCENES) for word in self.scene_with(model)]
+
+    def scene_with(self, model):
+        scene = self.client.scenes.CreateScene(scene_service_pb2.CreateSceneRequest()).name
+        added = self.client.scenes.AddObject(scene_service_pb2.AddObjectRequest(
+            scene=scene, modal_model=model, material=material_pb2.Material(preset=meshes.MATERIAL), gain=0.01))
+        return scene, str(added.object.handle)
+
+    def start_crowd(self, clients, seconds, targets):
+        """The process, once all its streams are open."""
+        crowd = subprocess.Popen([CROWD, self.daemon.server, str(clients), str(seconds), str(DELAY_S), *targets],
+                                 stdout=subprocess.PIPE, text=True)
+        self.addCleanup(crowd.stdout.close)
+        self.addCleanup(crowd.wait)
+        self.addCleanup(crowd.kill)
+        self.assertEqual(crowd.stdout.readline(), "ready\n")
+        return crowd
+
+    def run_good(self, meanwhile=None):
+        """The counts of the good clients, with the 99th percentile of other calls and the daemon's threads."""
+        crowd = self.start_crowd(GOOD, RUN_S, self.targets)
+        prober = Prober(self.daemon.server)
+        if meanwhile is not None:
+            meanwhile()
+        counts = json.loads(crowd.stdout.readline())
+        counts.update(p99_ms=1e3 * prober.stop(), threads=threads_of(self.daemon.process))
+        return counts
+
+    def silent(self, family, address, count, first=b""):
+        made = []
+        for _ in range(count):
+            connection = socket.socket(family, socket.SOCK_STREAM)
+            self.addCleanup(connection.close)
+            connection.settimeout(2)
+            with contextlib.suppress(OSError):
+                connection.connect(address)
+                connection.sendall(first)
+            made.append(connection)
+        return made
+
+    def misbehave(self):
+        crowds = [self.start_crowd(BAD_CLIENTS, RUN_S, self.targets[:2]) for _ in range(BAD_CROWDS)]
+        self.bad = [self.silent(socket.AF_UNIX, str(self.folder / "socket"), SILENT),
+                    self.silent(socket.AF_INET, ("127.0.0.1", self.port), HALF_OPEN, HALF_HANDSHAKE)]
+        self.flood = Flood(str(self.folder / "socket"), resets, reads=True)
+        for number, crowd in enumerate(crowds):
+            crowd.send_signal(signal.SIGKILL if number % 2 else signal.SIGSTOP)
+
+    def test_good_clients_are_served_amid_bad_ones(self):
+        alone = self.run_good()
+        before_mib = mib_of(self.daemon.process)
+        try:
+            amid = self.run_good(self.misbehave)
+        finally:
+            self.flood.stop()
+        for connection in itertools.chain(*self.bad):
+            connection.close()
+        time.sleep(REST_S)
+        after_mib = mib_of(self.daemon.process)
+        print(f"{GOOD} clients alone: {alone}; amid bad ones: {amid}; memory {before_mib:.0f} MiB, {REST_S} s after "
+              f"{after_mib:.0f}", flush=True)
+        for counts in (alone, amid):
+            self.assertEqual((counts["failed"], counts["lost"]), (0, 0))
+            self.assertEqual(counts["accepted"] + counts["late"], counts["sent"])
+            self.assertGreater(counts["sent"], 0.9 * 4 * GOOD * RUN_S)
+            self.assertLessEqual(counts["threads"], MOST_THREADS)
+            if torture.LONG:
+                self.assertLess(counts["late"], MOST_LATE * counts["sent"])
+                self.assertLess(counts["p99_ms"], 1e3 * DELAY_S)
+        if torture.LONG:
+            self.assertLess(after_mib, 1.1 * before_mib)
+
+
+if __name__ == "__main__":
+    unittest.main()
