@@ -55,7 +55,7 @@ struct IntakeSettings {
   std::vector<FoundBlow>* blows = nullptr;
 };
 
-/// What a ContactIntake has found in a simulation's contacts so far.
+/// Counts of the contacts of a simulation that a ContactIntake has found unusual so far.
 struct IntakeFindings {
   BlowCounts engine{};
   uint64_t distant_point_count = 0;      ///< farther than 5 % of the object's extent
