@@ -14,6 +14,7 @@ from daemon import ROOT, DaemonTest
 
 sys.path.insert(0, str(ROOT / "client_sdk/examples/falls"))
 import bunnies  # noqa: E402
+import chimes  # noqa: E402
 import falls  # noqa: E402
 import run  # noqa: E402
 import scene_makers  # noqa: E402
@@ -44,9 +45,17 @@ class ExamplesTest(DaemonTest):
                 # An engine lets a corner sink in now and then; points in a wrong frame would be far away throughout.
                 self.assertLess(findings.distant_point_count, 0.01 * findings.load_count)
 
+    def test_every_other_example_sounds(self):
+        for name, engine, seconds in (("boxes", "ode", 0.5), ("letters", "mujoco", 0.8), ("bowl", "bullet", 0.4),
+                                      ("wooden_bowl", "rapier", 0.4)):
+            with self.subTest(name):
+                self.run_example(name, engine, seconds)
+
     def test_chimes_sound_from_both_sides(self):
-        sound = self.run_example("chimes", "bullet", 3)
-        self.assertFalse(numpy.array_equal(sound.samples[:, 0], sound.samples[:, 1]))
+        for engine in chimes.ENGINES:
+            with self.subTest(engine):
+                sound = self.run_example("chimes", engine, 3)
+                self.assertFalse(numpy.array_equal(sound.samples[:, 0], sound.samples[:, 1]))
 
     def test_every_engine_simulates_as_long_as_the_scene_says(self):
         scene = json.loads((falls.SCENES / "corner.json").read_text())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The example of the six wind chimes in a gust, which the program carillon-wind-chimes simulates in Bullet."""
+"""The example of the six wind chimes in a gust, which the program carillon-wind-chimes simulates."""
 
 import math
 import subprocess
@@ -8,16 +8,17 @@ import carillon
 import falls
 
 NOTES = ("D3", "E3", "G3", "A4", "B4", "D4")
+ENGINES = ("bullet", "ode")
 CIRCLE_M, EXTENT_M, SECONDS = 0.062, 0.4, 8
 
 
-def record(client, trace, folder, seconds, build):
+def record(client, engine, trace, folder, *, seconds, build):
     """Leaves the contact trace of the chimes, each in its place on the circle on which they hang."""
     program = build / "bin/carillon-wind-chimes"
     subprocess.run([program, "meshes", folder], check=True)
     models = [client.create_model(str(folder / f"{note}.obj"), "chime_aluminum", label=note) for note in NOTES]
-    subprocess.run([program, "play", "--offline", "--trace", trace, "--seconds", str(seconds or SECONDS),
-                    *(model.name for model in models)], check=True, stdout=subprocess.DEVNULL)
+    subprocess.run([program, "play", "--offline", "--engine", engine, "--trace", trace,
+                    "--seconds", str(seconds or SECONDS), *(model.name for model in models)], check=True, stdout=subprocess.DEVNULL)
     recorded = carillon.Trace.read(trace)
     for number, chime in enumerate(recorded.objects):
         angle = 2 * math.pi * number / len(NOTES)

@@ -88,7 +88,7 @@ def record_example(client, options, folder, trace):
     import scene_makers
     if options.name == "chimes":
         import chimes
-        chimes.record(client, trace, folder, options.seconds, options.build)
+        chimes.record(client, options.engine, trace, folder, seconds=options.seconds, build=options.build)
         place_listener(trace, chimes.EXTENT_M)
         return None
     scene = scene_makers.EXAMPLES[options.name](folder)
@@ -131,14 +131,15 @@ def main():
     os.environ.update(CARILLON_BIN_DIR=str(options.build / "bin"), CARILLON_BUILD_DIR=str(options.build))
     # They need the paths above.
     import carillon
+    import chimes
     import falls
     import scene_makers
     from daemon import Daemon
     names = (*scene_makers.EXAMPLES, "chimes")
     if options.name not in names or options.engine not in falls.ENGINES:
         parser.error(f"the examples are {', '.join(names)}, the engines {', '.join(falls.ENGINES)}")
-    if options.name == "chimes" and options.engine != "bullet":
-        parser.error("the chimes hang on joints, which only their program for Bullet has")
+    if options.name == "chimes" and options.engine not in chimes.ENGINES:
+        parser.error(f"the chimes hang on joints; their program has {' and '.join(chimes.ENGINES)}")
     folder = (options.out or options.build / "examples").resolve()
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "models").mkdir(exist_ok=True)

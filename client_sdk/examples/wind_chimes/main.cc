@@ -35,7 +35,12 @@ struct PlayOptions {
   double gain = 1;
   std::string trace;
   bool offline = false;
+  std::string engine = "bullet";
 };
+
+Simulation Simulate(const PlayOptions& options) {
+  return options.engine == "ode" ? ChimesInOde(options.seed) : ChimesInBullet(options.seed);
+}
 
 absl::Status WriteMeshes(const std::string& folder) {
   for (const Tube& tube : kTubes) {
@@ -85,7 +90,7 @@ class LiveScene {
     if (const auto added = client_->AddObjects(tubes); !added.ok()) return added.status();
     v1::ContactStreamStart start;
     start.set_scene(scene_);
-    start.set_step_s(WindChimes::kStep_s);
+    start.set_step_s(kStep_s);
     ASSIGN_OR_RETURN(stream_, client_->StreamContacts(start));
     return absl::OkStatus();
   }
@@ -98,7 +103,7 @@ class LiveScene {
 absl::StatusOr<client::ContactTraceWriter> BeginTrace(const PlayOptions& options) {
   v1::ContactTraceHeader header;
   header.set_simulator("carillon-wind-chimes");
-  header.set_step_s(WindChimes::kStep_s);
+  header.set_step_s(kStep_s);
   auto trace = client::ContactTraceWriter::Create(options.trace, header);
   if (!trace.ok()) return trace;
   for (size_t i = 0; i < options.models.size(); ++i) {
@@ -133,17 +138,17 @@ absl::Status Play(const PlayOptions& options) {
     ASSIGN_OR_RETURN(trace, BeginTrace(options));
   }
 
-  WindChimes chimes(options.seed);
+  const Simulation chimes = Simulate(options);
   int contact_count = 0;
   const auto start = std::chrono::steady_clock::now();
-  const int step_count = static_cast<int>(options.seconds / WindChimes::kStep_s);
+  const int step_count = static_cast<int>(options.seconds / kStep_s);
   for (int i = 0; i < step_count; ++i) {
-    const v1::ContactStep step = chimes.Step();
+    const v1::ContactStep step = chimes();
     contact_count += step.contacts_size();
     if (trace) trace->Write(step);
     if (!live) continue;
     // The simulation of a step takes less time than the step, so the loop waits for real time.
-    std::this_thread::sleep_until(start + i * std::chrono::duration<double>(WindChimes::kStep_s));
+    std::this_thread::sleep_until(start + i * std::chrono::duration<double>(kStep_s));
     RETURN_IF_ERROR(live->Send(step));
   }
   absl::PrintF("%d contacts in %.1f s\n", contact_count, options.seconds);
@@ -185,6 +190,9 @@ int Main(int argc, char** argv) {
       ->capture_default_str();
   play.add_option("--seconds", options.seconds, "The simulated time, s")->capture_default_str();
   play.add_option("--seed", options.seed, "The seed of the wind")->capture_default_str();
+  play.add_option("--engine", options.engine, "The engine: bullet or ode")
+      ->check(CLI::IsMember({"bullet", "ode"}))
+      ->capture_default_str();
   play.add_option("--gain", options.gain, "The linear gain of every chime")->capture_default_str();
   play.add_option("--trace", options.trace, "Record the contacts to this contact trace");
   play.add_flag("--offline", options.offline,

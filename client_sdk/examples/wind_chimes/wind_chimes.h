@@ -2,29 +2,22 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
+#include <functional>
 
 #include "carillon/v1/contact.pb.h"
 
 namespace carillon::wind_chimes {
 
-/// A rigid-body simulation in Bullet of six tubes that hang from threads around a wooden clapper. A
-/// gust of wind drives the clapper. The same seed gives the same contacts.
-class WindChimes {
- public:
-  /// The time step of the simulation.
-  static constexpr double kStep_s = 1.0 / 960;
+/// The time step of the simulation.
+inline constexpr double kStep_s = 1.0 / 960;
 
-  explicit WindChimes(uint64_t seed);
-  ~WindChimes();
+/// Advances a simulation by one step and returns its contacts. The tubes are the objects 1 to 6 in
+/// the order of kTubes, and their frames are those of WriteTubeMesh.
+using Simulation = std::function<v1::ContactStep()>;
 
-  /// Advances by one step and returns its contacts. The tubes are the objects 1 to 6 in the order
-  /// of kTubes, and their frames are those of WriteTubeMesh.
-  v1::ContactStep Step();
-
- private:
-  class World;
-  std::unique_ptr<World> world_;
-};
+/// Simulates in Bullet or in ODE six tubes that hang from threads around a wooden clapper. A gust
+/// of wind drives the clapper. The same seed gives the same contacts.
+Simulation ChimesInBullet(uint64_t seed);
+Simulation ChimesInOde(uint64_t seed);
 
 }  // namespace carillon::wind_chimes

@@ -1,65 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "client_sdk/examples/wind_chimes/wind_chimes.h"
-
 #include <btBulletDynamicsCommon.h>
 
-#include <algorithm>
-#include <cmath>
-#include <numbers>
+#include <memory>
 #include <utility>
 #include <vector>
 
 #include "client_sdk/adapters/bullet_contacts.h"
 #include "client_sdk/examples/wind_chimes/gust.h"
+#include "client_sdk/examples/wind_chimes/hanging.h"
 #include "client_sdk/examples/wind_chimes/tubes.h"
+#include "client_sdk/examples/wind_chimes/wind_chimes.h"
 
 namespace carillon::wind_chimes {
 namespace {
 
-// The tubes hang on a circle, with their centres at one height. A thread holds each tube at a node
-// of its first bending mode (22.4 % of the length from the end), where it damps the sound least.
-constexpr double kCircleRadius_m = 0.062;
-constexpr double kTubeCentre_z_m = -0.40;
-constexpr double kNodeFromEnd = 0.224;
-
-// The clapper is a wooden ball between the tubes. It hangs a little below their middles, so that it
-// also excites modes that have a node there. Below the clapper hangs the sail that catches the
-// wind.
-constexpr double kClapperRadius_m = 0.030;
-constexpr double kClapper_z_m = -0.44;
-constexpr double kClapperMass_kg = 0.050;
-constexpr double kSail_z_m = -0.75;
-constexpr double kSailSide_m = 0.09;
-constexpr double kSailMass_kg = 0.012;
-constexpr double kThreadMass_kg = 0.002;
-
-constexpr double kAir_kg_per_m3 = 1.2;
-constexpr double kDrag = 1.2;  // coefficient of a flat plate
-
-constexpr double kTubeRestitution = 0.9;
-constexpr double kClapperRestitution = 0.65;  // Bullet takes the product
-
-double TubeMass(const Tube& tube) {
-  const double inner = kOuterRadius_m - kWall_m;
-  return kDensity_kg_per_m3 * std::numbers::pi * (kOuterRadius_m * kOuterRadius_m - inner * inner) *
-         tube.length_m;
-}
-
-/// The moments of inertia of a hollow cylinder with the axis z.
-btVector3 TubeInertia(const Tube& tube) {
-  const double inner = kOuterRadius_m - kWall_m;
-  const double squares = kOuterRadius_m * kOuterRadius_m + inner * inner;
-  const double mass = TubeMass(tube);
-  const double across = mass * (3 * squares + tube.length_m * tube.length_m) / 12;
-  return {across, across, mass * squares / 2};
-}
-
-}  // namespace
+btVector3 ToBullet(const Vector& v) { return {v[0], v[1], v[2]}; }
 
 /// Owns the objects to which Bullet only points.
-class WindChimes::World {
+class BulletChimes {
  public:
-  explicit World(uint64_t seed)
+  explicit BulletChimes(uint64_t seed)
       : gust_(seed),
         dispatcher_(&configuration_),
         world_(&dispatcher_, &broadphase_, &solver_, &configuration_),
@@ -67,14 +27,14 @@ class WindChimes::World {
     world_.setGravity({0, 0, -9.81});
     world_.getSolverInfo().m_numIterations = 50;
     // By default Bullet lets no contact bounce that is slower than 0.2 m/s.
-    world_.getSolverInfo().m_restitutionVelocityThreshold = 0.01;
+    world_.getSolverInfo().m_restitutionVelocityThreshold = kSlowest_m_per_s;
     world_.setInternalTickCallback(BeforeStep, this, /*isPreTick=*/true);
     world_.setInternalTickCallback(AfterStep, this, /*isPreTick=*/false);
     for (size_t i = 0; i < kTubes.size(); ++i) HangTube(i);
     HangClapper();
   }
 
-  ~World() {
+  ~BulletChimes() {
     for (const auto& constraint : constraints_) world_.removeConstraint(constraint.get());
     for (const auto& body : bodies_) world_.removeRigidBody(body.get());
   }
@@ -91,21 +51,17 @@ class WindChimes::World {
 
  private:
   static void BeforeStep(btDynamicsWorld* world, btScalar) {
-    static_cast<World*>(world->getWorldUserInfo())->BlowOnSail();
+    static_cast<BulletChimes*>(world->getWorldUserInfo())->BlowOnSail();
   }
 
   static void AfterStep(btDynamicsWorld* world, btScalar) {
-    static_cast<World*>(world->getWorldUserInfo())->ReadContacts();
+    static_cast<BulletChimes*>(world->getWorldUserInfo())->ReadContacts();
   }
 
-  /// Applies the drag F = rho/2 c A |v| v, where v is the velocity of the wind relative to the
-  /// sail.
   void BlowOnSail() {
-    const Gust::Velocity wind = gust_.At(step_.time_s());
-    const btVector3 relative =
-        btVector3(wind.x_m_per_s, wind.y_m_per_s, 0) - sail_->getLinearVelocity();
-    const double area = kSailSide_m * kSailSide_m;
-    sail_->applyCentralForce(relative * (kAir_kg_per_m3 / 2 * kDrag * area * relative.length()));
+    const btVector3& velocity = sail_->getLinearVelocity();
+    const Vector sail{velocity.x(), velocity.y(), velocity.z()};
+    sail_->applyCentralForce(ToBullet(DragOnSail(gust_.At(step_.time_s()), sail)));
   }
 
   void ReadContacts() { contacts_.Read(dispatcher_, step_); }
@@ -118,7 +74,7 @@ class WindChimes::World {
         btRigidBody::btRigidBodyConstructionInfo(mass, nullptr, shape.get(), inertia)));
     shapes_.push_back(std::move(shape));
     body.setWorldTransform(pose);
-    body.setDamping(0.02, 0.05);
+    body.setDamping(kLinearDamping, kAngularDamping);
     body.setActivationState(DISABLE_DEACTIVATION);
     const int solid = btBroadphaseProxy::DefaultFilter, nothing = 0;
     world_.addRigidBody(&body, solid, collides ? solid : nothing);
@@ -154,20 +110,20 @@ class WindChimes::World {
   /// a body that hangs on it swings as a double pendulum.
   btRigidBody& AddThread(const btVector3& top, const btVector3& bottom) {
     const double length = (top - bottom).length();
-    return AddSolid(std::make_unique<btCapsuleShapeZ>(0.002, length), kThreadMass_kg,
+    return AddSolid(std::make_unique<btCapsuleShapeZ>(kThreadRadius_m, length), kThreadMass_kg,
                     (top + bottom) / 2, /*collides=*/false);
   }
 
   void HangTube(size_t index) {
     const Tube& tube = kTubes[index];
-    const double angle = 2 * std::numbers::pi * static_cast<double>(index) / kTubes.size();
-    const btVector3 axis(kCircleRadius_m * std::cos(angle), kCircleRadius_m * std::sin(angle), 0);
+    const btVector3 axis = ToBullet(TopOf(index));
     const btVector3 centre = axis + btVector3(0, 0, kTubeCentre_z_m);
     const btVector3 node = centre + btVector3(0, 0, (0.5 - kNodeFromEnd) * tube.length_m);
     auto shape = std::make_unique<btCylinderShapeZ>(
         btVector3(kOuterRadius_m, kOuterRadius_m, tube.length_m / 2));
     shape->setMargin(0.001);
-    btRigidBody& body = AddBody(std::move(shape), TubeMass(tube), TubeInertia(tube), centre, true);
+    btRigidBody& body =
+        AddBody(std::move(shape), MassOf(tube), ToBullet(InertiaOf(tube)), centre, true);
     body.setRestitution(kTubeRestitution);
     contacts_.AddObject(body, static_cast<uint32_t>(index + 1));
     btRigidBody& thread = AddThread(axis, node);
@@ -205,8 +161,10 @@ class WindChimes::World {
   uint64_t step_count_ = 0;
 };
 
-WindChimes::WindChimes(uint64_t seed) : world_(std::make_unique<World>(seed)) {}
-WindChimes::~WindChimes() = default;
-v1::ContactStep WindChimes::Step() { return world_->Step(); }
+}  // namespace
+
+Simulation ChimesInBullet(uint64_t seed) {
+  return [chimes = std::make_shared<BulletChimes>(seed)] { return chimes->Step(); };
+}
 
 }  // namespace carillon::wind_chimes
