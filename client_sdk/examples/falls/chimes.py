@@ -17,8 +17,8 @@ def record(client, engine, trace, folder, *, seconds, build):
     program = build / "bin/carillon-wind-chimes"
     subprocess.run([program, "meshes", folder], check=True)
     models = [client.create_model(str(folder / f"{note}.obj"), "chime_aluminum", label=note) for note in NOTES]
-    subprocess.run([program, "play", "--offline", "--engine", engine, "--trace", trace,
-                    "--seconds", str(seconds or SECONDS), *(model.name for model in models)], check=True, stdout=subprocess.DEVNULL)
+    words = [program, "play", "--offline", "--engine", engine, "--trace", trace, "--seconds", str(seconds or SECONDS)]
+    subprocess.run([*words, *(model.name for model in models)], check=True, stdout=subprocess.DEVNULL)
     recorded = carillon.Trace.read(trace)
     for number, chime in enumerate(recorded.objects):
         angle = 2 * math.pi * number / len(NOTES)
