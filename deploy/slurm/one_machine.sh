@@ -1,18 +1,20 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 #
-# deploy/slurm/one_machine.sh start|stop FOLDER
-# deploy/slurm/one_machine.sh slurmctld|slurmd FOLDER
+# deploy/slurm/one_machine.sh start FOLDER [NODES]
+# deploy/slurm/one_machine.sh stop|slurmctld|slurmd FOLDER
 #
-# A Slurm cluster of this machine alone, in FOLDER, on ports of its own and beside any other: for the test, and to
-# try the daemon's --executor slurm. Needs Debian's slurm-wlm and munge, and root, as slurmd does. `slurmctld` and
-# `slurmd` start that one again, after a crash for instance. The commands of Slurm find the cluster by
+# A Slurm cluster on this machine alone, in FOLDER, on ports of its own and beside any other: for the tests, and to try
+# the daemon's --executor slurm. It has one node, or NODES, node1 and so on, each with all cores and all memory. Needs
+# Debian's slurm-wlm and munge, and root, as slurmd does. `slurmctld` starts the controller again and `slurmd` node1,
+# after a crash for instance. The commands of Slurm find the cluster by
 #
 #   export SLURM_CONF=FOLDER/slurm.conf
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 action=${1:?start, stop, slurmctld or slurmd}
 folder=$(realpath "${2:?a folder}")
+nodes=${3:-1}
 export SLURM_CONF=$folder/slurm.conf
 
 free_port() {
@@ -24,11 +26,16 @@ configure() {
   chmod 755 "$folder"
   dd if=/dev/urandom of="$folder/munge.key" bs=128 count=1 status=none
   chmod 400 "$folder/munge.key"
-  local memory_mib
+  local memory_mib host
+  host=$(hostname -s)
   memory_mib=$(awk '/MemTotal/ {print int($2 / 1024)}' /proc/meminfo)
-  sed -e "s|@FOLDER@|$folder|g" -e "s|@HOST@|$(hostname -s)|g" -e "s|@CPUS@|$(nproc)|g" \
-    -e "s|@MEMORY_MIB@|$memory_mib|g" -e "s|@CONTROLLER_PORT@|$(free_port)|g" \
-    -e "s|@NODE_PORT@|$(free_port)|g" "$here/slurm.conf.in" >"$folder/slurm.conf"
+  {
+    sed -e "s|@FOLDER@|$folder|g" -e "s|@HOST@|$host|g" -e "s|@CONTROLLER_PORT@|$(free_port)|g" "$here/slurm.conf.in"
+    for ((node = 1; node <= nodes; ++node)); do
+      echo "NodeName=node$node NodeHostname=$host NodeAddr=127.0.0.1 Port=$(free_port) CPUs=$(nproc)" \
+        "RealMemory=$memory_mib State=UNKNOWN"
+    done
+  } >"$folder/slurm.conf"
 }
 
 start_munged() {
@@ -49,13 +56,14 @@ case $action in
     configure
     start_munged
     slurmctld
-    slurmd
+    for ((node = 1; node <= nodes; ++node)); do slurmd -N "node$node"; done
     ;;
   stop)
     scancel --user="$(id -un)" 2>/dev/null || :
-    for pid_file in slurmd slurmctld munged; do stop_by "$folder/$pid_file.pid"; done
+    for pid_file in "$folder"/slurmd-*.pid "$folder"/{slurmctld,munged}.pid; do stop_by "$pid_file"; done
     ;;
-  slurmctld | slurmd) "$action" ;;
+  slurmctld) slurmctld ;;
+  slurmd) slurmd -N node1 ;;
   *)
     echo "$0: there is no action \"$action\"" >&2
     exit 2

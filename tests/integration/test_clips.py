@@ -37,6 +37,22 @@ def manifest(folder):
     return [json.loads(line) for line in (folder / "manifest.jsonl").read_text().splitlines()]
 
 
+def write_trace(model, path, number):
+    """Two bars: one is struck by a named impulse, then the second strikes it as an engine would say."""
+    rng = random.Random(number)
+    trace = carillon.Trace(step=0.01, simulator="test")
+    left, right = (trace.add(model, meshes.MATERIAL, label=name, handle=handle)
+                   for name, handle in (("left \"bar\"", 3), ("right", 7)))
+    for step in range(8):
+        contacts = carillon.Contacts(
+            left, [(0.1, 0.005, 0.01)], [(0, 0, -0.01 * (number + 1))], second_objects=[right],
+            second_points=[(0.1, 0.005, 0)]) if step == 4 else None
+        at = (0.2 * rng.random(), 0.01, 0.01)
+        impulses = carillon.Impulses(left, [at], [(0, 0, -0.02)]) if step == 0 else None
+        trace.step(step * 0.01, contacts=contacts, impulses=impulses)
+    trace.write(path)
+
+
 class ClipsTest(DaemonTest):
     @classmethod
     def setUpClass(cls):
@@ -46,26 +62,10 @@ class ClipsTest(DaemonTest):
         cls.traces = cls.folder / "traces"
         cls.traces.mkdir()
         for number in range(CLIP_COUNT):
-            cls.write_trace(number)
+            write_trace(cls.model, cls.traces / f"{number:03}.contacts", number)
         cls.whole = cls.folder / "whole"
         cls.run_ended(cls.render(cls.whole, "--stems", "--workers", 1))
         cls.expected = contents(cls.whole)
-
-    @classmethod
-    def write_trace(cls, number):
-        """Two bars: one is struck by a named impulse, then the second strikes it as an engine would say."""
-        rng = random.Random(number)
-        trace = carillon.Trace(step=0.01, simulator="test")
-        left, right = (trace.add(cls.model, meshes.MATERIAL, label=name, handle=handle)
-                       for name, handle in (("left \"bar\"", 3), ("right", 7)))
-        for step in range(8):
-            contacts = carillon.Contacts(
-                left, [(0.1, 0.005, 0.01)], [(0, 0, -0.01 * (number + 1))], second_objects=[right],
-                second_points=[(0.1, 0.005, 0)]) if step == 4 else None
-            at = (0.2 * rng.random(), 0.01, 0.01)
-            impulses = carillon.Impulses(left, [at], [(0, 0, -0.02)]) if step == 0 else None
-            trace.step(step * 0.01, contacts=contacts, impulses=impulses)
-        trace.write(cls.traces / f"{number:03}.contacts")
 
     @classmethod
     def command(cls, traces, out, *options):

@@ -4,6 +4,7 @@
 import argparse
 import json
 import pathlib
+import re
 import sys
 import unittest
 
@@ -66,6 +67,22 @@ class ExamplesTest(DaemonTest):
             self.assertEqual(len(carillon.Trace.read(trace).steps), 60, engine)
             falls.record(engine, scene, trace, rate=240, seconds=0.5)
             self.assertEqual(len(carillon.Trace.read(trace).steps), 120, engine)
+
+    def test_an_example_has_at_most_sixty_lines_for_its_sound(self):
+        """Beside the simulation: the lines that name the contract, the client, the adapter or what it reads."""
+        examples = ROOT / "client_sdk/examples"
+        sounding = re.compile(r"v1::|client::|carillon\.|[Cc]ontacts|[Tt]race|\bstep\b|require\('carillon")
+        mains = {"falls": {".cc": "main.cc", ".js": "fall.js"}, "rough_floor": {".cc": "main.cc"},
+                 "wind_chimes": {".cc": "main.cc"}}
+        simulations = [*examples.glob("falls/*_fall.*"), *examples.glob("rough_floor/*_floor.cc"),
+                       *examples.glob("wind_chimes/*_chimes.cc")]
+        self.assertEqual(len(simulations), 9)
+        for simulation in simulations:
+            main = simulation.parent / mains[simulation.parent.name][simulation.suffix]
+            lines = [line for path in (simulation, main) for line in path.read_text().splitlines()
+                     if sounding.search(line) and not line.strip().startswith("//")]
+            print(f"{simulation.name}: {len(lines)} lines", flush=True)
+            self.assertLessEqual(len(lines), 60, simulation)
 
     def test_bunnies_reach_every_shelf(self):
         scene = scene_makers.EXAMPLES["bunnies"](self.folder)

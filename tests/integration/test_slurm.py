@@ -33,19 +33,21 @@ SCRIPT = ROOT / "deploy/slurm/one_machine.sh"
 
 
 class Cluster:
-    def __init__(self, folder):
+    def __init__(self, folder, nodes=1):
         self.folder = folder
+        self.nodes = nodes
         self.over = threading.Event()
         os.environ["SLURM_CONF"] = str(folder / "slurm.conf")
 
-    def run(self, action):
-        return subprocess.run([SCRIPT, action, self.folder], capture_output=True, text=True,
+    def run(self, *action):
+        action, *more = map(str, action)
+        return subprocess.run([SCRIPT, action, self.folder, *more], capture_output=True, text=True,
                               check=False, timeout=120)
 
     def start(self):
         """Whether it works: a job that does nothing comes to its end."""
         try:
-            if self.run("start").returncode != 0:
+            if self.run("start", self.nodes).returncode != 0:
                 return False
             return subprocess.run(["srun", "--mem=10M", "true"], capture_output=True, timeout=60,
                                   check=False).returncode == 0
@@ -70,7 +72,7 @@ class Cluster:
 
     def kill(self, program):
         """kill -9, and the program starts again."""
-        pid_file = self.folder / f"{program}.pid"
+        pid_file = self.folder / {"slurmctld": "slurmctld.pid", "slurmd": "slurmd-node1.pid"}[program]
         try:
             os.kill(int(pid_file.read_text()), signal.SIGKILL)
         except (OSError, ValueError):
