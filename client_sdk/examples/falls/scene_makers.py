@@ -159,18 +159,36 @@ def bowl_mesh(around=48, down=12):
     return vertices, faces
 
 
+# How the rim's plane leans at first, and how fast the bowl falls.
+BOWL_LEANS_DEGREES, BOWL_FALLS_M_PER_S = 30, 0.5
+
+
+def rolling(leans_degrees, radius_m, height_m, across_m2, along_m2):
+    """The angular velocity in the world, rad/s, of a body that leans about x and rolls on a rim without its centre of
+    mass moving: the torque of its weight about the centre turns its angular momentum as the body precesses. The centre
+    of mass is at a height above the rim's plane; the moments of inertia are divided by the mass."""
+    sine, cosine = math.sin(math.radians(leans_degrees)), math.cos(math.radians(leans_degrees))
+    lever = radius_m * cosine - height_m * sine
+    precession = math.sqrt(9.81 * lever / (sine * (across_m2 * cosine - along_m2 * height_m / radius_m * sine)))
+    up_slope, axis = (0, -cosine, sine), (0, sine, cosine)
+    return [precession * sine * (a + height_m / radius_m * b) for a, b in zip(up_slope, axis)]
+
+
 def bowl(folder, material="bowl_metal"):
-    """A bowl that falls on its rim, aslant and spinning, and rolls on it until it lies."""
+    """A bowl that falls on its rim, aslant, and rolls on it until it lies."""
     vertices, faces = bowl_mesh()
     write_obj(folder / "bowl.obj", vertices, faces)
-    mass, square = 0.4, BOWL_RADIUS_M**2
-    outside = vertices[:12 * 48 + 1]
+    mass, height, square = 0.4, BOWL_RADIUS_M / 2, BOWL_RADIUS_M**2
+    across, along, leans = square * 5 / 12, square * 2 / 3, math.radians(BOWL_LEANS_DEGREES)
     return {"friction": 0.4, "restitution": 0, "roughness_depth": 0.3, "irregularity_length_m": 0.0005, "extent_m": 0.4,
             "look_at_m": (0, 0, 0.1), "camera_m": (0.25, -0.7, 0.3), "seconds": 6, "bodies": [FLOOR, {
-                "name": "bowl", "mesh": "bowl.obj", "shape": {"hull": {"corners_m": outside}}, "mass_kg": mass,
-                "inertia_kg_m2": [mass * square * 5 / 12, mass * square * 5 / 12, mass * square * 2 / 3],
-                "position_m": [0, 0, 0.2], "orientation": falls.about((1, 0, 0), 155),
-                "angular_velocity_rad_per_s": [0, 3, 14], "material": material, "max_frequency_hz": 16000}]}
+                "name": "bowl", "mesh": "bowl.obj", "shape": {"hull": {"corners_m": vertices[:12 * 48 + 1]}},
+                "mass_kg": mass, "inertia_kg_m2": [mass * across, mass * across, mass * along],
+                "position_m": [0, 0, BOWL_RADIUS_M * math.sin(leans) + height * math.cos(leans) + 0.001],
+                "orientation": falls.about((1, 0, 0), 180 - BOWL_LEANS_DEGREES),
+                "velocity_m_per_s": [0, 0, -BOWL_FALLS_M_PER_S],
+                "angular_velocity_rad_per_s": rolling(BOWL_LEANS_DEGREES, BOWL_RADIUS_M, height, across, along),
+                "material": material, "max_frequency_hz": 16000}]}
 
 
 def wooden_bowl(folder):
