@@ -47,11 +47,13 @@ constexpr Known kAccuracy{
 constexpr Known kBudget{"settings.mesh.budget_s", "", "--budget",
                         "refines the mesh as far as this processor time and memory allow", Never};
 constexpr Known kSize{"size", "", "--size", "changes the size that the body sounds with", Never};
-constexpr Known kUnit{"settings.metres_per_unit", "0.001", "--unit",
-                      "reads the file's lengths as millimetres", [](const v1::WorkerRequest& r) {
-                        return r.settings().metres_per_unit() != 0 &&
-                               r.settings().metres_per_unit() != 1;
-                      }};
+constexpr Known kHigherBand{"max_frequency_hz", "", "--band", "looks for modes in a higher band",
+                            Never};
+constexpr Known kMetres{"settings.metres_per_unit", "1", "--unit",
+                        "reads the file's lengths as metres", [](const v1::WorkerRequest& r) {
+                          return r.settings().metres_per_unit() == 0 ||
+                                 r.settings().metres_per_unit() == 1;
+                        }};
 
 std::vector<Known> RemediesOf(const std::string& reason) {
   if (reason == "MESH_NOT_CLOSED") return {kRepair, kWall};
@@ -66,7 +68,7 @@ std::vector<Known> RemediesOf(const std::string& reason) {
   if (reason == "TOO_MANY_MODES") return {kOpenBand, kKeep, kBand};
   if (reason == "MEMORY_TOO_SMALL" || reason == "OUT_OF_MEMORY") return {kOpenBand, kBand, kNodes};
   if (reason == "ACCURACY_NOT_REACHED") return {kAccuracy, kBudget, kNodes};
-  if (reason == "NO_MODE_IN_BAND") return {kUnit, kSize, kBand};
+  if (reason == "NO_MODE_IN_BAND") return {kHigherBand, kSize, kMetres};
   return {};
 }
 

@@ -240,8 +240,9 @@ TEST_F(CarillonPrecomputeTest, BodyWithoutAModeInTheBandIsToldItsFirst) {
   std::filesystem::remove(model);
   const Result result = RunBar(std::string(kSteel) + " --band 20:1000");
   EXPECT_EQ(ReasonOf(result), "NO_MODE_IN_BAND");
-  const std::string first_hz =
-      Json::parse(result.output).at("error").at("figures").at("first_mode_hz");
+  const Json error = Json::parse(result.output).at("error");
+  EXPECT_EQ(error.at("remedies")[0].at("option"), "--band");
+  const std::string first_hz = error.at("figures").at("first_mode_hz");
   EXPECT_NEAR(std::stod(first_hz) /
                   Json::parse(full.output).at("modes")[0].at("frequency_hz").get<double>(),
               1, 1e-5);

@@ -85,15 +85,6 @@ absl::StatusOr<SurfaceMesh> Repair(const SurfaceMesh& given, Warnings& warnings)
   return std::move(wrapped.surface);
 }
 
-/// The refusal of a surface that nobody asked to repair, with the options that may help.
-absl::Status WithRemedies(const absl::Status& refusal) {
-  v1::ErrorInfo error = ToErrorInfo(refusal);
-  const bool open = error.reason() == "MESH_NOT_CLOSED";
-  error.set_message(absl::StrCat(error.message(), ". Or have it repaired (--repair)",
-                                 open ? ", or have a sheet thickened (--wall)" : ""));
-  return FromErrorInfo(refusal.code(), error);
-}
-
 absl::StatusOr<RepairedSurface> WithWall(const SurfaceMesh& surface, const absl::Status& sound,
                                          double wall_m) {
   return sound.ok() ? HollowOut(surface, wall_m) : Thicken(surface, wall_m);
@@ -115,7 +106,7 @@ absl::StatusOr<PreparedSurface> PrepareSurface(const SurfaceMesh& given,
     if (repaired.ok()) prepared.surface = *std::move(repaired);
   }
   const bool thickens = settings.wall_m > 0 && Is(sound, "MESH_NOT_CLOSED");
-  if (!sound.ok() && !thickens) return settings.repair ? sound : WithRemedies(sound);
+  if (!sound.ok() && !thickens) return sound;
   if (settings.wall_m > 0) {
     ASSIGN_OR_RETURN(RepairedSurface walled, WithWall(prepared.surface, sound, settings.wall_m));
     prepared.surface = std::move(walled.surface);
