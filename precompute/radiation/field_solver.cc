@@ -64,13 +64,14 @@ double PowerDifferenceDb(const ModeField& a, const ModeField& b) {
   return Decibels(a.power_integral / b.power_integral);
 }
 
-double DirectionDifferenceDb(const ModeField& a, const ModeField& b, const SphereGrid& grid) {
+double DirectionDifferenceDb(std::span<const std::complex<double>> a,
+                             std::span<const std::complex<double>> b, const SphereGrid& grid) {
   constexpr double kWithin = 1e-2;
   double strongest = 0, weight = 0, sum = 0;
-  for (const auto& p : b.pattern) strongest = std::max(strongest, std::norm(p));
-  for (size_t d = 0; d < b.pattern.size(); ++d) {
-    if (std::norm(b.pattern[d]) < kWithin * strongest) continue;
-    const double off = Decibels(std::max(1e-12, std::norm(a.pattern[d]) / std::norm(b.pattern[d])));
+  for (const auto& p : b) strongest = std::max(strongest, std::norm(p));
+  for (size_t d = 0; d < b.size(); ++d) {
+    if (std::norm(b[d]) < kWithin * strongest) continue;
+    const double off = Decibels(std::max(1e-12, std::norm(a[d]) / std::norm(b[d])));
     sum += grid.weights()[d] * off * off;
     weight += grid.weights()[d];
   }

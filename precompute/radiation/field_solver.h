@@ -38,8 +38,9 @@ std::vector<ModeField> SolveModes(const ModeProblem& problem, const SurfaceLevel
 /// 10 log10 of the ratio of both power integrals.
 double PowerDifferenceDb(const ModeField& a, const ModeField& b);
 
-/// Root mean square over the sphere of the difference in level, where that of `b` is within 20 dB
-/// of its strongest direction.
-double DirectionDifferenceDb(const ModeField& a, const ModeField& b, const SphereGrid& grid);
+/// Root mean square over the sphere of the difference in level of two patterns at the directions of
+/// the grid, where that of `b` is within 20 dB of its strongest direction.
+double DirectionDifferenceDb(std::span<const std::complex<double>> a,
+                             std::span<const std::complex<double>> b, const SphereGrid& grid);
 
 }  // namespace carillon::precompute

@@ -53,4 +53,16 @@ void ExpandPattern(std::span<const std::complex<double>> pattern, const SphereGr
   for (std::complex<float>& value : mode.value) value *= scale;
 }
 
+std::vector<std::complex<double>> KeptPattern(const ModeRadiation& mode, const SphereGrid& grid) {
+  std::vector<std::complex<double>> kept(HarmonicCount(grid.order()));
+  size_t next = 0;
+  std::complex<double> turn(0, mode.wavenumber);  // k i^(l + 1)
+  for (int l = 0; l <= mode.order; ++l, turn *= std::complex<double>(0, 1)) {
+    for (; next < mode.index.size() && mode.index[next] < HarmonicCount(l); ++next) {
+      kept[mode.index[next]] = std::complex<double>(mode.value[next]) / turn;
+    }
+  }
+  return grid.Synthesise(kept);
+}
+
 }  // namespace carillon::precompute

@@ -29,11 +29,13 @@ struct ModeRadiation {
   std::vector<uint32_t> index;             ///< l^2 + l + m of the harmonics kept
   std::vector<std::complex<float>> value;  ///< c_lm of each, scaled so that they give all of I
   double power_error_db = 0;               ///< estimated
-  double direction_error_db = 0;  ///< estimated, root mean square within 20 dB of the strongest
-  double residual = 0;            ///< of the solution
-  double surface_power_db = 0;    ///< power at the surface over that far away
-  int vertex_count = 0;           ///< of the finest surface used
-  double edge_m = 0;              ///< of that surface
+  /// Estimated, root mean square within 20 dB of the strongest direction, with the harmonics that
+  /// are not kept.
+  double direction_error_db = 0;
+  double residual = 0;          ///< of the solution
+  double surface_power_db = 0;  ///< power at the surface over that far away
+  int vertex_count = 0;         ///< of the finest surface used
+  double edge_m = 0;            ///< of that surface
   int iterations = 0;
 
   /// Radiated power over that of a plane wave from the same motion, k^2 I / normal_energy.
@@ -46,5 +48,9 @@ struct ModeRadiation {
 /// mode.
 void ExpandPattern(std::span<const std::complex<double>> pattern, const SphereGrid& grid,
                    ModeRadiation& mode);
+
+/// The far pattern of the harmonics that the mode keeps, at the directions of a grid of at least
+/// its order.
+std::vector<std::complex<double>> KeptPattern(const ModeRadiation& mode, const SphereGrid& grid);
 
 }  // namespace carillon::precompute

@@ -33,6 +33,15 @@ std::vector<double> Legendre(int order, double x) {
   return p;
 }
 
+/// cos(m phi), or sin(|m| phi) for m < 0, at step j of `around`.
+double Wave(int m, int j, int around) {
+  const double phi = 2 * kPi * ((m * j) % around) / around;
+  return m < 0 ? std::sin(-phi) : std::cos(phi);
+}
+
+/// What the harmonics of this degree have besides n_l|m| P_l^|m|.
+double DegreeFactor(int m) { return m == 0 ? 1 : std::numbers::sqrt2; }
+
 /// Value and derivative of Legendre's polynomial of degree n.
 std::pair<double, double> LegendrePolynomial(int n, double x) {
   double before = 1, value = x;
@@ -63,8 +72,8 @@ std::vector<double> RealHarmonics(int order, const Point& direction) {
   for (int l = 0; l <= order; ++l) {
     for (int m = -l; m <= l; ++m) {
       const double turned = m < 0 ? std::sin(-m * phi) : std::cos(m * phi);
-      harmonics[HarmonicIndex(l, m)] = (m == 0 ? 1 : std::numbers::sqrt2) * turned *
-                                       p[static_cast<size_t>(l * (l + 1) / 2 + std::abs(m))];
+      harmonics[HarmonicIndex(l, m)] =
+          DegreeFactor(m) * turned * p[static_cast<size_t>(l * (l + 1) / 2 + std::abs(m))];
     }
   }
   return harmonics;
@@ -94,17 +103,37 @@ std::vector<std::complex<double>> SphereGrid::Analyse(
     for (int m = -order_; m <= order_; ++m) {
       std::complex<double> sum = 0;
       for (int j = 0; j < around; ++j) {
-        const double phi = 2 * kPi * ((m * j) % around) / around;
-        const double wave = m < 0 ? std::sin(-phi) : std::cos(phi);
-        sum += values[first + static_cast<size_t>(j)] * wave;
+        sum += values[first + static_cast<size_t>(j)] * Wave(m, j, around);
       }
-      waves[static_cast<size_t>(m + order_)] = (m == 0 ? 1 : std::numbers::sqrt2) * sum;
+      waves[static_cast<size_t>(m + order_)] = DegreeFactor(m) * sum;
     }
     const std::vector<double> p = Legendre(order_, directions_[first][2]);
     for (int l = 0; l <= order_; ++l) {
       for (int m = -l; m <= l; ++m) {
         result[HarmonicIndex(l, m)] += weights_[first] * waves[static_cast<size_t>(m + order_)] *
                                        p[static_cast<size_t>(l * (l + 1) / 2 + std::abs(m))];
+      }
+    }
+  }
+  return result;
+}
+
+std::vector<std::complex<double>> SphereGrid::Synthesise(
+    std::span<const std::complex<double>> coefficients) const {
+  const int rings = order_ + 1, around = 2 * order_ + 2;
+  std::vector<std::complex<double>> result(directions_.size());
+  for (int i = 0; i < rings; ++i) {
+    const auto first = static_cast<size_t>(i * around);
+    const std::vector<double> p = Legendre(order_, directions_[first][2]);
+    for (int m = -order_; m <= order_; ++m) {
+      std::complex<double> ring = 0;
+      for (int l = std::abs(m); l <= order_; ++l) {
+        ring += coefficients[HarmonicIndex(l, m)] *
+                p[static_cast<size_t>(l * (l + 1) / 2 + std::abs(m))];
+      }
+      ring *= DegreeFactor(m);
+      for (int j = 0; j < around; ++j) {
+        result[first + static_cast<size_t>(j)] += ring * Wave(m, j, around);
       }
     }
   }

@@ -38,6 +38,10 @@ class SphereGrid {
   /// Integrals of Y_lm times the function with these values at the directions.
   std::vector<std::complex<double>> Analyse(std::span<const std::complex<double>> values) const;
 
+  /// The inverse: values at the directions of the function with these coefficients.
+  std::vector<std::complex<double>> Synthesise(
+      std::span<const std::complex<double>> coefficients) const;
+
  private:
   int order_;
   std::vector<Point> directions_;  ///< phi fastest

@@ -233,11 +233,11 @@ class TransferSolver {
 
   static ErrorDb DifferenceOf(const ModeField& before, const ModeField& field,
                               const SphereGrid& grid) {
-    return {
-        .power = std::max(kLeastErrorDb,
-                          kErrorPerDifference * std::abs(PowerDifferenceDb(before, field))),
-        .direction = std::max(kDirectionGoal * kLeastErrorDb,
-                              kErrorPerDifference * DirectionDifferenceDb(before, field, grid))};
+    return {.power = std::max(kLeastErrorDb,
+                              kErrorPerDifference * std::abs(PowerDifferenceDb(before, field))),
+            .direction = std::max(
+                kDirectionGoal * kLeastErrorDb,
+                kErrorPerDifference * DirectionDifferenceDb(before.pattern, field.pattern, grid))};
   }
 
   /// Gives each mode that was solved on one surface only the largest error that the first surface
@@ -269,7 +269,10 @@ class TransferSolver {
     mode.iterations = field.iterations;
     mode.edge_m = levels_.EdgeOf(level);
     mode.vertex_count = static_cast<int>(levels_.VertexCountOf(level));
-    ExpandPattern(field.pattern, SphereGrid(PatternOrder(group.wavenumber, body_.radius_m)), mode);
+    const SphereGrid grid(PatternOrder(group.wavenumber, body_.radius_m));
+    ExpandPattern(field.pattern, grid, mode);
+    const double left_out_db = DirectionDifferenceDb(KeptPattern(mode, grid), field.pattern, grid);
+    mode.direction_error_db = std::hypot(mode.direction_error_db, left_out_db);
   }
 
   void Report() const {
