@@ -198,8 +198,13 @@ test('a trace is written and read, and a damaged one is refused', async () => {
   const [one, other] = [await c.render(trace, { tail_s: 0.2 }), await c.render(file, { tail_s: 0.2 })];
   assert.ok(one.peak > 1e-4);
   assert.deepEqual(one.samples, other.samples);
-  await fs.writeFile(file, trace.bytes().subarray(0, -3));
-  await assert.rejects(carillon.Trace.read(file), { reason: 'TRACE_MALFORMED' });
+  const header = [4, 0x0a, 2, 8, 1];
+  for (const [bytes, reason] of [[trace.bytes().subarray(0, -3), 'TRACE_MALFORMED'], [[], 'TRACE_MALFORMED'],
+    [[4, 0x0a, 2, 8, 9], 'TRACE_TOO_NEW'], [[2, 0x0a, 0], 'TRACE_MALFORMED'],
+    [[...header, 3, 0x7a, 1, 0], 'TRACE_MALFORMED'], [Array(100).fill(0xff), 'TRACE_MALFORMED']]) {
+    await fs.writeFile(file, Buffer.from(bytes));
+    await assert.rejects(carillon.Trace.read(file), { reason });
+  }
   assert.throws(() => trace.step(-1), /goes back/);
   assert.throws(() => trace.step(1, { contacts: { objects: 1, points: [0, 0], impulses: [0, 0] } }), /3 a contact/);
 });

@@ -210,10 +210,24 @@ class SoundTest(PackageTest):
         heard = self.c.render(file, tail_s=1.0, channel_count=2)
         self.assertEqual(heard.samples.shape[1], 2)
         self.assert_rings(heard)
-        file.write_bytes(file.read_bytes()[:-3])
-        with self.assertRaises(carillon.CarillonError) as refused:
-            carillon.Trace.read(file)
-        self.assertEqual(refused.exception.reason, "TRACE_MALFORMED")
+
+    def test_damaged_and_newer_traces_are_refused(self):
+        trace = carillon.Trace(1 / 60)
+        trace.step(0.5)
+        file = self.folder / "damaged.contacts"
+        trace.write(file)
+        whole = file.read_bytes()
+        header = bytes([4, 0x0A, 2, 8, 1])
+        newer = bytes([4, 0x0A, 2, 8, 9])
+        unknown_kind = bytes([3, 0x7A, 1, 0])
+        for data, reason in ((whole[:-3], "TRACE_MALFORMED"), (b"", "TRACE_MALFORMED"), (newer, "TRACE_TOO_NEW"),
+                             (bytes([2, 0x0A, 0]), "TRACE_MALFORMED"), (header + unknown_kind, "TRACE_MALFORMED"),
+                             (b"\xff" * 9 + b"\x01", "TRACE_MALFORMED"), (b"\xff" * 100, "TRACE_MALFORMED")):
+            with self.subTest(data=data[:20]):
+                file.write_bytes(data)
+                with self.assertRaises(carillon.CarillonError) as refused:
+                    carillon.Trace.read(file)
+                self.assertEqual(refused.exception.reason, reason)
 
 
 class ContactsTest(PackageTest):

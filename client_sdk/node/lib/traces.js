@@ -63,7 +63,7 @@ class Trace {
     await fs.writeFile(path, this.bytes());
   }
 
-  /** Reads a .contacts file. Throws CarillonError (TRACE_MALFORMED). */
+  /** Reads a .contacts file. Throws CarillonError (TRACE_MALFORMED, TRACE_TOO_NEW). */
   static async read(path) {
     const trace = new Trace();
     const bytes = await fs.readFile(path);
@@ -72,14 +72,31 @@ class Trace {
       if ((number === 0) !== (record.record === 'header')) {
         throw new CarillonError('TRACE_MALFORMED', `${path}: record ${number} must${number ? ' not' : ''} be a header`);
       }
-      if (record.record === 'header') trace.header = record.header;
+      if (record.record === 'header') trace.header = checked(record.header, path);
       else if (record.record === 'object') trace.objects.push(record.object);
-      else trace.steps.push(record.step);
+      else if (record.record === 'step') trace.steps.push(record.step);
+      else {
+        throw new CarillonError('TRACE_MALFORMED', `${path}: record ${number} is of no known kind; update this ` +
+          'program, or write the trace again');
+      }
       number += 1;
     }
     if (number === 0) throw new CarillonError('TRACE_MALFORMED', `${path} is empty; write the trace again`);
     return trace;
   }
+}
+
+/** The header, if this program can read what follows it. */
+function checked(header, path) {
+  if (!header.format_version) {
+    throw new CarillonError('TRACE_MALFORMED', `${path} does not begin with the header of a contact trace; write the ` +
+      'trace again');
+  }
+  if (header.format_version > FORMAT_VERSION) {
+    throw new CarillonError('TRACE_TOO_NEW', `${path} has format version ${header.format_version}, this program ` +
+      `reads ${FORMAT_VERSION}; update it`);
+  }
+  return header;
 }
 
 function varint(number) {

@@ -81,7 +81,7 @@ class Reference {
             {"finer_vertices", surface.surface.vertex_count()},
             {"efficiency", mode.efficiency()},
             {"power_db", PowerDifferenceDb(stored, fine)},
-            {"direction_db", DirectionDifferenceDb(stored, fine, grid)},
+            {"direction_db", DirectionDifferenceDb(stored.pattern, fine.pattern, grid)},
             {"stated_power_db", mode.power_error_db},
             {"stated_direction_db", mode.direction_error_db}};
   }

@@ -70,29 +70,41 @@ class Trace:
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Trace:
-        """Reads a .contacts file. Raises CarillonError (TRACE_MALFORMED)."""
+        """Reads a .contacts file. Raises CarillonError (TRACE_MALFORMED, TRACE_TOO_NEW)."""
         with open(path, "rb") as file:
             return cls.of(_read_records(file, str(path)), str(path))
 
     @classmethod
     def of(cls, records: Iterable[contact_trace_pb2.ContactTraceRecord], source: str = "the trace") -> Trace:
-        """Makes a trace of its records. Raises CarillonError (TRACE_MALFORMED)."""
+        """Makes a trace of its records. Raises CarillonError (TRACE_MALFORMED, TRACE_TOO_NEW)."""
         trace = cls()
+        trace.header.format_version = 0
         for number, record in enumerate(records):
             kind = record.WhichOneof("record")
+            if kind is None:
+                raise CarillonError("TRACE_MALFORMED", f"{source}: record {number} is of no known kind; update this "
+                                    "program, or write the trace again")
             if (number == 0) != (kind == "header"):
                 raise CarillonError("TRACE_MALFORMED", f"{source}: record {number} must"
                                     f"{'' if number == 0 else ' not'} be a header")
             if kind == "header":
                 trace.header = record.header
+                cls._check_version(record.header.format_version, source)
             elif kind == "object":
                 trace.objects.append(record.object)
             else:
                 trace.steps.append(record.step)
-        if trace.header.format_version > FORMAT_VERSION:
-            raise CarillonError("TRACE_MALFORMED", f"{source} has format version {trace.header.format_version}; this "
-                                f"program reads {FORMAT_VERSION}")
+        cls._check_version(trace.header.format_version, source)
         return trace
+
+    @staticmethod
+    def _check_version(version: int, source: str) -> None:
+        if version == 0:
+            raise CarillonError("TRACE_MALFORMED", f"{source} does not begin with the header of a contact trace; write "
+                                "the trace again")
+        if version > FORMAT_VERSION:
+            raise CarillonError("TRACE_TOO_NEW", f"{source} has format version {version}, this program reads "
+                                f"{FORMAT_VERSION}; update it")
 
 
 def _read_varint(file: BinaryIO) -> Optional[int]:
@@ -103,6 +115,8 @@ def _read_varint(file: BinaryIO) -> Optional[int]:
         if byte[0] < 0x80:
             return value
         shift += 7
+        if shift > 63:
+            raise EOFError
     if shift:
         raise EOFError
     return None
@@ -110,9 +124,10 @@ def _read_varint(file: BinaryIO) -> Optional[int]:
 
 def _read_records(file: BinaryIO, path: str) -> Iterator[contact_trace_pb2.ContactTraceRecord]:
     number = 0
+    most = os.fstat(file.fileno()).st_size
     try:
         while (size := _read_varint(file)) is not None:
-            data = file.read(size)
+            data = file.read(min(size, most))
             if len(data) < size:
                 raise EOFError
             yield contact_trace_pb2.ContactTraceRecord.FromString(data)
