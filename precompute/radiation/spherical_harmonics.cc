@@ -39,7 +39,7 @@ double Wave(int m, int j, int around) {
   return m < 0 ? std::sin(-phi) : std::cos(phi);
 }
 
-/// What the harmonics of this degree have besides n_l|m| P_l^|m|.
+/// The factor of the harmonics of this degree beside n_l|m| P_l^|m| and the wave.
 double DegreeFactor(int m) { return m == 0 ? 1 : std::numbers::sqrt2; }
 
 /// Value and derivative of Legendre's polynomial of degree n.
