@@ -40,7 +40,7 @@ BAD_MESHES = {
 
 # The options that help against them.
 REMEDIES = {"MESH_NOT_CLOSED": ["--repair", "--wall"], "MESH_SELF_INTERSECTING": ["--repair"],
-            "MESH_DUPLICATE_SHELL": ["--repair"], "NO_MODE_IN_BAND": ["--unit", "--size", "--band"]}
+            "MESH_DUPLICATE_SHELL": ["--repair"], "NO_MODE_IN_BAND": ["--band", "--size"]}
 
 
 class RefusalTest(DaemonTest):

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "precompute/mesh/point_math.h"
+#include "precompute/radiation/spherical_harmonics.h"
 #include "tests/precompute/radiation/spheres.h"
 #include "tests/precompute/test_meshes.h"
 
@@ -91,6 +92,24 @@ TEST(Transfer, BreathingSphereDecaysAsTheClosedFormSays) {
     EXPECT_NEAR(mode.DecayRatePerS(transfer.settings.air) / exact, 1, 0.03) << k;
     EXPECT_EQ(mode.order, 0);
   }
+}
+
+/// The stated error in direction of a sphere that moves by the harmonic (1, 0) and by each of order
+/// 3 with `share` of its amplitude.
+double StatedDirectionErrorDb(double share) {
+  const auto motion = [share](const Point& p) {
+    const std::vector<double> harmonics = RealHarmonics(3, p);
+    double amplitude = harmonics[HarmonicIndex(1, 0)];
+    for (int m = -3; m <= 3; ++m) amplitude += share * harmonics[HarmonicIndex(3, m)];
+    const double r = Norm(p);
+    return Point{amplitude * p[0] / r, amplitude * p[1] / r, amplitude * p[2] / r};
+  };
+  const Body body = MakeBody(MakeIcosphere(1, 4), {3}, {motion});
+  return Compute(body, Settings(0.5)).modes[0].direction_error_db;
+}
+
+TEST(Transfer, StatedErrorOfDirectionsCountsTheHarmonicsThatAreLeftOut) {
+  EXPECT_GT(StatedDirectionErrorDb(0.008), StatedDirectionErrorDb(0) + 0.1);
 }
 
 TEST(Transfer, IsTheSameWhereverTheBodyIsAndHoweverItIsTurned) {
