@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Draws a frame and the spectrogram of each example into one picture: overview.py FOLDER OUT.png
 
-FOLDER is where deploy/examples.sh has left NAME-ENGINE.wav, and NAME-ENGINE.mp4 but for the chimes, from which a
-spectrogram alone is drawn.
+FOLDER is where deploy/examples.sh with --video has left NAME-ENGINE.wav and NAME-ENGINE.mp4.
 """
 
 import os
@@ -15,7 +14,7 @@ import tempfile
 import numpy
 
 NAMES = ("blocks", "boxes", "letters", "bowl", "wooden_bowl", "bunnies", "chimes")
-FRAME_AT_S = {"bunnies": 1.0}
+FRAME_AT_S = {"bunnies": 1.0, "boxes": 0.8, "chimes": 2.6}
 WIDTH, HEIGHT = 640, 360
 
 
@@ -28,7 +27,7 @@ def frame_of(video, at_s):
 
 
 def sound_of(path):
-    """The mean of the channels of a sound or a video, 48 kHz."""
+    """The mean of the channels, 48 kHz."""
     words = ["ffmpeg", "-loglevel", "error", "-i", path, "-vn", "-ac", 1, "-ar", 48000, "-f", "f32le", "-"]
     return numpy.frombuffer(subprocess.run(list(map(str, words)), check=True, capture_output=True).stdout, "<f4")
 
@@ -41,8 +40,7 @@ def main(folder, out):
     figure, axes = pyplot.subplots(len(NAMES), 2, figsize=(9, 1.9 * len(NAMES)), layout="constrained",
                                    width_ratios=(16, 20))
     for (left, right), name in zip(axes, NAMES):
-        # The sound of a video has lost what lies above 16 kHz.
-        heard = next(path for suffix in (".wav", ".mp4") for path in sorted(folder.glob(f"{name}-*{suffix}")))
+        heard = min(folder.glob(f"{name}-*.wav"))
         samples = sound_of(heard)
         dither = numpy.random.default_rng(0).normal(scale=1e-10, size=len(samples))
         right.specgram(samples + dither, NFFT=2048, noverlap=1536, Fs=48, scale="dB", cmap="magma", vmin=-140,
@@ -52,8 +50,7 @@ def main(folder, out):
         right.set_ylabel("kHz")
         left.axis("off")
         left.set_title(f"{name.replace('_', ' ')}, {heard.stem.split('-')[1]}", fontsize=9)
-        for video in folder.glob(f"{heard.stem}.mp4"):
-            left.imshow(frame_of(video, FRAME_AT_S.get(name, 0.6)))
+        left.imshow(frame_of(heard.with_suffix(".mp4"), FRAME_AT_S.get(name, 0.6)))
     axes[-1][1].set_xlabel("time, s")
     figure.savefig(out, dpi=70)
 

@@ -82,20 +82,31 @@ def render(client, path):
 
 
 def record_example(client, options, folder, trace):
-    """Leaves the contact trace of the example, heard from before it. Returns its scene; None for the chimes, which have
-    a program of their own."""
+    """Leaves the contact trace of the example, heard from before it. Returns its scene."""
     import falls
     import scene_makers
     if options.name == "chimes":
         import chimes
         chimes.record(client, options.engine, trace, folder, seconds=options.seconds, build=options.build)
         place_listener(trace, chimes.EXTENT_M)
-        return None
+        return chimes.scene()
     scene = scene_makers.EXAMPLES[options.name](folder)
     falls.record(options.engine, falls.create_models(client, scene, folder), trace, rate=options.rate,
                  seconds=options.seconds, build=options.build)
     place_listener(trace, scene["extent_m"])
     return scene
+
+
+def video(options, scene, folder, stem):
+    """Leaves the video of the example beside its sound."""
+    import video as film
+    how = {"seconds": options.seconds, "build": options.build}
+    if options.name == "chimes":
+        import chimes
+        frames = film.frames_of(scene, chimes.poses(options.engine, folder, **how))
+    else:
+        frames = film.poses_of(options.engine, scene, rate=options.rate, **how)
+    film.make(scene, frames, folder, stem.with_suffix(".wav"), stem.with_suffix(".mp4"))
 
 
 def run(client, options, folder):
@@ -108,10 +119,8 @@ def run(client, options, folder):
     print(f"{stem.name}: {findings.blow_count} blows, {findings.load_count} loads, peak {sound.peak:.3g} of full scale")
     sound.normalized().save(wav)
     draw(sound, stem, f"{options.name.replace('_', ' ')} in {options.engine}")
-    if options.video and scene:
-        import video
-        video.make(options.engine, scene, folder, wav, stem.with_suffix(".mp4"), rate=options.rate,
-                   seconds=options.seconds, build=options.build)
+    if options.video:
+        video(options, scene, folder, stem)
     return sound
 
 

@@ -28,7 +28,11 @@ def poses_of(engine, scene, **how):
     with tempfile.TemporaryDirectory(prefix="carillon-") as folder:
         trace = pathlib.Path(folder, "poses.contacts")
         falls.record(engine, everyone, trace, **how)
-        steps = carillon.Trace.read(trace).steps
+        return frames_of(scene, carillon.Trace.read(trace).steps)
+
+
+def frames_of(scene, steps):
+    """As poses_of, of steps that have the poses of all bodies; body i is the object i + 1."""
     now = [(body.get("position_m", (0, 0, 0)), body.get("orientation", (1, 0, 0, 0))) for body in scene["bodies"]]
     frames, due = [], 0
     for step in steps:
@@ -155,9 +159,8 @@ def draw(scene, folder, frames, take_frame):
         take_frame(vtk_to_numpy(image.GetOutput().GetPointData().GetScalars()).tobytes())
 
 
-def make(engine, scene, folder, sound, out, **how):
-    """Writes the video of a scene whose sound is a WAV file; `how` is for falls.record."""
-    frames = poses_of(engine, scene, **how)
+def make(scene, frames, folder, sound, out):
+    """Writes the video of a scene whose sound is a WAV file."""
     words = ["ffmpeg", "-loglevel", "error", "-y", "-f", "rawvideo", "-pixel_format", "rgb24", "-video_size",
              f"{WIDTH}x{HEIGHT}", "-framerate", str(FRAMES_PER_S), "-i", "-", "-i", sound, "-vf", "vflip", "-c:v",
              "libx264", "-pix_fmt", "yuv420p", "-crf", "26", "-c:a", "aac", "-b:a", "96k", "-t", str(LONGEST_S),

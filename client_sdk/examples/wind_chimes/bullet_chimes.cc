@@ -19,8 +19,9 @@ btVector3 ToBullet(const Vector& v) { return {v[0], v[1], v[2]}; }
 /// Owns the objects to which Bullet only points.
 class BulletChimes {
  public:
-  explicit BulletChimes(uint64_t seed)
-      : gust_(seed),
+  BulletChimes(uint64_t seed, Purpose purpose)
+      : purpose_(purpose),
+        gust_(seed),
         dispatcher_(&configuration_),
         world_(&dispatcher_, &broadphase_, &solver_, &configuration_),
         contacts_({.roughness_depth = 0, .striker = "wood"}) {
@@ -32,6 +33,9 @@ class BulletChimes {
     world_.setInternalTickCallback(AfterStep, this, /*isPreTick=*/false);
     for (size_t i = 0; i < kTubes.size(); ++i) HangTube(i);
     HangClapper();
+    if (purpose == Purpose::kSound) return;
+    contacts_.AddObject(*clapper_, kClapperHandle);
+    contacts_.AddObject(*sail_, kSailHandle);
   }
 
   ~BulletChimes() {
@@ -43,6 +47,7 @@ class BulletChimes {
     step_ = v1::ContactStep();
     step_.set_time_s(static_cast<double>(step_count_++) * kStep_s);
     world_.stepSimulation(kStep_s, 0);
+    if (purpose_ == Purpose::kPicture) contacts_.ReadPoses(step_);
     for (v1::EngineContact& contact : *step_.mutable_contacts()) {
       if (!contact.has_second()) contact.mutable_hertz()->set_striker_radius_m(kClapperRadius_m);
     }
@@ -136,6 +141,7 @@ class BulletChimes {
     btRigidBody& clapper =
         AddSolid(std::make_unique<btSphereShape>(kClapperRadius_m), kClapperMass_kg, middle, true);
     clapper.setRestitution(kClapperRestitution);
+    clapper_ = &clapper;
     sail_ = &AddSolid(std::make_unique<btBoxShape>(btVector3(kSailSide_m, 0.001, kSailSide_m) / 2),
                       kSailMass_kg, bottom, false);
     btRigidBody& upper = AddThread(top, middle);
@@ -146,6 +152,7 @@ class BulletChimes {
     Pin(lower, *sail_, bottom);
   }
 
+  const Purpose purpose_;
   Gust gust_;
   btDefaultCollisionConfiguration configuration_;
   btCollisionDispatcher dispatcher_;
@@ -156,6 +163,7 @@ class BulletChimes {
   std::vector<std::unique_ptr<btRigidBody>> bodies_;
   std::vector<std::unique_ptr<btTypedConstraint>> constraints_;
   adapters::BulletContacts contacts_;
+  btRigidBody* clapper_ = nullptr;
   btRigidBody* sail_ = nullptr;
   v1::ContactStep step_;
   uint64_t step_count_ = 0;
@@ -163,8 +171,8 @@ class BulletChimes {
 
 }  // namespace
 
-Simulation ChimesInBullet(uint64_t seed) {
-  return [chimes = std::make_shared<BulletChimes>(seed)] { return chimes->Step(); };
+Simulation ChimesInBullet(uint64_t seed, Purpose purpose) {
+  return [chimes = std::make_shared<BulletChimes>(seed, purpose)] { return chimes->Step(); };
 }
 
 }  // namespace carillon::wind_chimes

@@ -36,10 +36,13 @@ struct PlayOptions {
   std::string trace;
   bool offline = false;
   std::string engine = "bullet";
+  bool picture = false;
 };
 
 Simulation Simulate(const PlayOptions& options) {
-  return options.engine == "ode" ? ChimesInOde(options.seed) : ChimesInBullet(options.seed);
+  const Purpose purpose = options.picture ? Purpose::kPicture : Purpose::kSound;
+  return options.engine == "ode" ? ChimesInOde(options.seed, purpose)
+                                 : ChimesInBullet(options.seed, purpose);
 }
 
 absl::Status WriteMeshes(const std::string& folder) {
@@ -197,6 +200,8 @@ int Main(int argc, char** argv) {
   play.add_option("--trace", options.trace, "Record the contacts to this contact trace");
   play.add_flag("--offline", options.offline,
                 "Only record, as fast as possible and without a daemon");
+  play.add_flag("--picture", options.picture,
+                "Record the poses of all parts, too; the clapper is 7, the sail 8");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

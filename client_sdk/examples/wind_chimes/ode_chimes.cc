@@ -21,8 +21,8 @@ void InitializeOde() {
 
 class OdeChimes {
  public:
-  explicit OdeChimes(uint64_t seed)
-      : gust_(seed), contacts_({.roughness_depth = 0, .striker = "wood"}) {
+  OdeChimes(uint64_t seed, Purpose purpose)
+      : purpose_(purpose), gust_(seed), contacts_({.roughness_depth = 0, .striker = "wood"}) {
     dWorldSetGravity(world_, 0, 0, -9.81);
     // ODE takes a share of the velocity in each step.
     dWorldSetLinearDamping(world_, kLinearDamping * kStep_s);
@@ -31,6 +31,9 @@ class OdeChimes {
     dWorldSetAngularDampingThreshold(world_, 0);
     for (size_t i = 0; i < kTubes.size(); ++i) HangTube(i);
     HangClapper();
+    if (purpose == Purpose::kSound) return;
+    contacts_.AddObject(clapper_, kClapperHandle);
+    contacts_.AddObject(sail_, kSailHandle);
   }
   ~OdeChimes() {
     dJointGroupDestroy(touching_);
@@ -47,6 +50,7 @@ class OdeChimes {
     dSpaceCollide(space_, this, &OdeChimes::Near);
     dWorldStep(world_, kStep_s);
     contacts_.Read(kStep_s, step);
+    if (purpose_ == Purpose::kPicture) contacts_.ReadPoses(step);
     dJointGroupEmpty(touching_);
     for (v1::EngineContact& contact : *step.mutable_contacts()) {
       if (!contact.has_second()) contact.mutable_hertz()->set_striker_radius_m(kClapperRadius_m);
@@ -136,6 +140,7 @@ class OdeChimes {
     }
   }
 
+  const Purpose purpose_;
   const Gust gust_;
   dWorldID world_ = dWorldCreate();
   dSpaceID space_ = dSimpleSpaceCreate(nullptr);
@@ -147,9 +152,9 @@ class OdeChimes {
 
 }  // namespace
 
-Simulation ChimesInOde(uint64_t seed) {
+Simulation ChimesInOde(uint64_t seed, Purpose purpose) {
   InitializeOde();
-  return [chimes = std::make_shared<OdeChimes>(seed)] { return chimes->Step(); };
+  return [chimes = std::make_shared<OdeChimes>(seed, purpose)] { return chimes->Step(); };
 }
 
 }  // namespace carillon::wind_chimes

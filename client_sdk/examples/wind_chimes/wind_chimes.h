@@ -11,13 +11,22 @@ namespace carillon::wind_chimes {
 /// The time step of the simulation.
 inline constexpr double kStep_s = 1.0 / 960;
 
+/// Handles of the silent parts in a simulation for a picture.
+inline constexpr uint32_t kClapperHandle = 7, kSailHandle = 8;
+
+/// The purpose of a simulation.
+enum class Purpose {
+  kSound,    ///< contacts of the tubes
+  kPicture,  ///< poses of the tubes, of the clapper and of the sail, as if all of them sounded
+};
+
 /// Advances a simulation by one step and returns its contacts. The tubes are the objects 1 to 6 in
 /// the order of kTubes, and their frames are those of WriteTubeMesh.
 using Simulation = std::function<v1::ContactStep()>;
 
 /// Simulates in Bullet or in ODE six tubes that hang from threads around a wooden clapper. A gust
 /// of wind drives the clapper. The same seed gives the same contacts.
-Simulation ChimesInBullet(uint64_t seed);
-Simulation ChimesInOde(uint64_t seed);
+Simulation ChimesInBullet(uint64_t seed, Purpose purpose = Purpose::kSound);
+Simulation ChimesInOde(uint64_t seed, Purpose purpose = Purpose::kSound);
 
 }  // namespace carillon::wind_chimes

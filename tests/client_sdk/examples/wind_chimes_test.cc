@@ -12,11 +12,11 @@
 namespace carillon::wind_chimes {
 namespace {
 
-using Engine = Simulation (*)(uint64_t seed);
+using Engine = Simulation (*)(uint64_t seed, Purpose purpose);
 
 /// All contacts of the first seconds, as one step.
 v1::ContactStep ContactsOf(Engine engine, uint64_t seed, double seconds) {
-  const Simulation chimes = engine(seed);
+  const Simulation chimes = engine(seed, Purpose::kSound);
   v1::ContactStep all;
   for (int i = 0; i < seconds / kStep_s; ++i) all.MergeFrom(chimes());
   return all;
@@ -54,6 +54,21 @@ TEST_P(WindChimesTest, EveryTubeIsStruckOnItsOuterSurface) {
     EXPECT_NEAR(contact.hertz().striker_mass_kg(), 0.05, 1e-12);
   }
   EXPECT_EQ(struck.size(), kTubes.size());
+}
+
+TEST_P(WindChimesTest, APictureHasThePosesOfAllParts) {
+  const Simulation chimes = GetParam()(1, Purpose::kPicture);
+  v1::ContactStep step;
+  for (int i = 0; i < 3 / kStep_s; ++i) step = chimes();
+  std::set<uint32_t> posed;
+  for (const v1::ObjectPose& pose : step.poses()) {
+    posed.insert(pose.object());
+    if (pose.object() != kSailHandle) continue;
+    // It hangs below the rest, and the wind has taken it aside.
+    EXPECT_LT(pose.pose().position_m().z(), -0.5);
+    EXPECT_GT(std::hypot(pose.pose().position_m().x(), pose.pose().position_m().y()), 0.001);
+  }
+  EXPECT_EQ(posed, (std::set<uint32_t>{1, 2, 3, 4, 5, 6, kClapperHandle, kSailHandle}));
 }
 
 INSTANTIATE_TEST_SUITE_P(Engines, WindChimesTest, testing::Values(&ChimesInBullet, &ChimesInOde),
