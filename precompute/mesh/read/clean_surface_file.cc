@@ -165,6 +165,9 @@ absl::StatusOr<std::string> CleanSurfaceFile(const std::string& bytes, const std
   if (format == "ply") {
     RETURN_IF_ERROR(CheckPly(bytes));
   }
+  if (format == "glb") {
+    RETURN_IF_ERROR(CheckGlb(bytes));
+  }
   if (format == "stl" && bytes.size() == kBinaryStlHeader) return NoFaces();
   return bytes;
 }

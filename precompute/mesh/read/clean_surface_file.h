@@ -11,9 +11,9 @@ namespace carillon::precompute {
 /// the file reduced to its surface, because assimp groups the faces of an OBJ file by its objects
 /// and does not accept comments in OFF.
 ///
-/// `format`: "obj", "off", "ply", or "stl", "glb" or "gltf" (returned as they are: assimp hides
+/// `format`: "obj", "off", "ply", "glb", or "stl" or "gltf" (returned as they are: assimp hides
 /// nothing there).
-/// Errors: MESH_UNREADABLE, MESH_NOT_FINITE, MESH_INDEX_OUT_OF_RANGE, each with the line;
+/// Errors: MESH_UNREADABLE, MESH_NOT_FINITE, MESH_INDEX_OUT_OF_RANGE, each with the line or byte;
 /// MESH_EMPTY.
 absl::StatusOr<std::string> CleanSurfaceFile(const std::string& bytes, const std::string& format);
 
@@ -21,5 +21,6 @@ absl::StatusOr<std::string> CleanSurfaceFile(const std::string& bytes, const std
 absl::StatusOr<std::string> CleanObj(const std::string& bytes);
 absl::StatusOr<std::string> CleanOff(const std::string& bytes);
 absl::Status CheckPly(const std::string& bytes);
+absl::Status CheckGlb(const std::string& bytes);
 
 }  // namespace carillon::precompute

@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <utility>
 
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
@@ -285,6 +286,22 @@ TEST_F(ReadSurfaceTest, TheBunnyWhoseFilledHolesCrossItIsRefusedBeforeTheMesherC
   EXPECT_EQ(surface.triangles.size(), 69'666U);
   EXPECT_EQ(surface.vertices.size(), 34'835U);
   EXPECT_THAT(CheckSurface(surface).status().ToString(), HasSubstr("MESH_SELF_INTERSECTING"));
+}
+
+TEST(ParseMesh, AGlbWhoseChunksAreLongerThanTheFileIsRefused) {
+  const auto number = [](uint32_t value) {
+    std::string bytes(sizeof value, '\0');
+    std::memcpy(bytes.data(), &value, sizeof value);
+    return bytes;
+  };
+  const std::string header = "glTF" + number(2) + number(24);
+  for (const auto& [bytes, words] :
+       {std::pair{header + number(0x54000007) + "JSON{}  ", "says that it has 1409286151 bytes"},
+        {header + number(4) + "JSON{}  " + number(5) + "BIN\n1234", "the chunk at byte 24"},
+        {header, "begins with \"glTF\""}}) {
+    const absl::Status status = ParseMesh(bytes, "glb", 1).status();
+    EXPECT_THAT(status.ToString(), AllOf(HasSubstr("MESH_UNREADABLE: "), HasSubstr(words)));
+  }
 }
 
 /// The text with a byte order mark, in UTF-16.
