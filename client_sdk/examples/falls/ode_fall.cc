@@ -1,62 +1,42 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <ode/ode.h>
 
-#include <array>
 #include <memory>
-#include <utility>
 
-#include "client_sdk/adapters/ode_contacts.h"
 #include "client_sdk/examples/falls/fall.h"
+#include "client_sdk/examples/ode_world.h"
 
 namespace carillon::falls {
 namespace {
-
-/// ODE's own memory, once for the process.
-void InitializeOde() {
-  static const bool initialized = dInitODE2(0) != 0;
-  (void)initialized;
-}
 
 class OdeFall {
  public:
   OdeFall(const FallScene& scene, double step_s)
       : step_s_(step_s),
-        friction_(scene.friction),
-        restitution_(scene.restitution),
-        contacts_({.roughness_depth = scene.roughness_depth,
-                   .irregularity_length_m = scene.irregularity_length_m}) {
+        world_(step_s,
+               {.roughness_depth = scene.roughness_depth,
+                .irregularity_length_m = scene.irregularity_length_m},
+               [surface = examples::OdeSurface{.friction = scene.friction,
+                                               .restitution = scene.restitution}](
+                   dBodyID, dBodyID) { return surface; }) {
     const auto& [x, y, z] = scene.gravity_m_per_s2;
-    dWorldSetGravity(world_, x, y, z);
-    // The engine's manual: soft enough for a contact to stay.
-    dWorldSetCFM(world_, 1e-6);
-    dWorldSetContactSurfaceLayer(world_, 1e-4);
+    dWorldSetGravity(world_.world(), x, y, z);
+    world_.SoftenContacts();
     uint32_t handle = 0;
     for (const Body& body : scene.bodies) Add(body, ++handle);
   }
-  ~OdeFall() {
-    dJointGroupDestroy(joints_);
-    dSpaceDestroy(space_);
-    dWorldDestroy(world_);
-  }
-  OdeFall(const OdeFall&) = delete;
-  OdeFall& operator=(const OdeFall&) = delete;
 
   v1::ContactStep Step() {
-    v1::ContactStep step;
-    step.set_time_s(static_cast<double>(++step_count_) * step_s_);
-    dSpaceCollide(space_, this, &OdeFall::Near);
-    dWorldStep(world_, step_s_);
-    contacts_.Read(step_s_, step);
-    contacts_.ReadPoses(step);
-    dJointGroupEmpty(joints_);
+    v1::ContactStep step = world_.Step(static_cast<double>(++step_count_) * step_s_);
+    world_.contacts().ReadPoses(step);
     return step;
   }
 
  private:
   void Add(const Body& body, uint32_t handle) {
     const bool is_plane = std::holds_alternative<Plane>(body.shape);
-    const dBodyID made = is_plane ? nullptr : dBodyCreate(world_);
-    const dSpaceID parts = dSimpleSpaceCreate(space_);  // the parts of one body do not meet
+    const dBodyID made = is_plane ? nullptr : dBodyCreate(world_.world());
+    const dSpaceID parts = dSimpleSpaceCreate(world_.space());  // the parts of one body do not meet
     dSpaceSetSublevel(parts, 1);
     std::visit([&](const auto& shape) { AddShape(shape, parts, made, body); }, body.shape);
     if (made == nullptr) return;
@@ -68,7 +48,7 @@ class OdeFall {
     dBodySetLinearVel(made, vx, vy, vz);
     const auto& [wx, wy, wz] = body.angular_velocity_rad_per_s;
     dBodySetAngularVel(made, wx, wy, wz);
-    if (!body.model.empty()) contacts_.AddObject(made, handle);
+    if (!body.model.empty()) world_.contacts().AddObject(made, handle);
   }
 
   static void AddShape(const Plane&, dSpaceID parts, dBodyID, const Body& body) {
@@ -100,40 +80,14 @@ class OdeFall {
     dBodySetMass(made, &mass);
   }
 
-  static void Near(void* data, dGeomID a, dGeomID b) {
-    auto& self = *static_cast<OdeFall*>(data);
-    if (dGeomIsSpace(a) != 0 || dGeomIsSpace(b) != 0) return dSpaceCollide2(a, b, data, &Near);
-    if (dGeomGetBody(a) == dGeomGetBody(b)) return;
-    constexpr int kMost = 8;
-    std::array<dContactGeom, kMost> points;
-    const int count = dCollide(a, b, kMost, points.data(), sizeof(dContactGeom));
-    for (int i = 0; i < count; ++i) self.Join(a, b, points[static_cast<size_t>(i)]);
-  }
-
-  void Join(dGeomID a, dGeomID b, const dContactGeom& geometry) {
-    dContact contact{};
-    contact.geom = geometry;
-    contact.surface.mode = dContactBounce | dContactApprox1;
-    contact.surface.mu = friction_;
-    contact.surface.bounce = restitution_;
-    contact.surface.bounce_vel = 0.05;
-    const dJointID joint = dJointCreateContact(world_, joints_, &contact);
-    dJointAttach(joint, dGeomGetBody(a), dGeomGetBody(b));
-    contacts_.Add(joint, geometry);
-  }
-
-  const double step_s_, friction_, restitution_;
-  dWorldID world_ = dWorldCreate();
-  dSpaceID space_ = dSimpleSpaceCreate(nullptr);
-  dJointGroupID joints_ = dJointGroupCreate(0);
-  adapters::OdeContacts contacts_;
+  const double step_s_;
+  examples::OdeWorld world_;
   int step_count_ = 0;
 };
 
 }  // namespace
 
 Simulation FallInOde(const FallScene& scene, double step_s) {
-  InitializeOde();
   return [fall = std::make_shared<OdeFall>(scene, step_s)] { return fall->Step(); };
 }
 

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <ode/ode.h>
 
-#include <array>
 #include <memory>
 
-#include "client_sdk/adapters/ode_contacts.h"
+#include "client_sdk/examples/ode_world.h"
 #include "client_sdk/examples/wind_chimes/gust.h"
 #include "client_sdk/examples/wind_chimes/hanging.h"
 #include "client_sdk/examples/wind_chimes/tubes.h"
@@ -13,45 +12,28 @@
 namespace carillon::wind_chimes {
 namespace {
 
-/// ODE's own memory, once for the process.
-void InitializeOde() {
-  static const bool initialized = dInitODE2(0) != 0;
-  (void)initialized;
-}
-
 class OdeChimes {
  public:
-  OdeChimes(uint64_t seed, Purpose purpose)
-      : purpose_(purpose), gust_(seed), contacts_({.roughness_depth = 0, .striker = "wood"}) {
-    dWorldSetGravity(world_, 0, 0, -9.81);
+  OdeChimes(uint64_t seed, Purpose purpose) : purpose_(purpose), gust_(seed) {
+    const dWorldID world = world_.world();
+    dWorldSetGravity(world, 0, 0, -9.81);
     // ODE takes a share of the velocity in each step.
-    dWorldSetLinearDamping(world_, kLinearDamping * kStep_s);
-    dWorldSetAngularDamping(world_, kAngularDamping * kStep_s);
-    dWorldSetLinearDampingThreshold(world_, 0);
-    dWorldSetAngularDampingThreshold(world_, 0);
+    dWorldSetLinearDamping(world, kLinearDamping * kStep_s);
+    dWorldSetAngularDamping(world, kAngularDamping * kStep_s);
+    dWorldSetLinearDampingThreshold(world, 0);
+    dWorldSetAngularDampingThreshold(world, 0);
     for (size_t i = 0; i < kTubes.size(); ++i) HangTube(i);
     HangClapper();
     if (purpose == Purpose::kSound) return;
-    contacts_.AddObject(clapper_, kClapperHandle);
-    contacts_.AddObject(sail_, kSailHandle);
+    world_.contacts().AddObject(clapper_, kClapperHandle);
+    world_.contacts().AddObject(sail_, kSailHandle);
   }
-  ~OdeChimes() {
-    dJointGroupDestroy(touching_);
-    dSpaceDestroy(space_);
-    dWorldDestroy(world_);
-  }
-  OdeChimes(const OdeChimes&) = delete;
-  OdeChimes& operator=(const OdeChimes&) = delete;
 
   v1::ContactStep Step() {
-    v1::ContactStep step;
-    step.set_time_s(static_cast<double>(step_count_++) * kStep_s);
-    BlowOnSail(step.time_s());
-    dSpaceCollide(space_, this, &OdeChimes::Near);
-    dWorldStep(world_, kStep_s);
-    contacts_.Read(kStep_s, step);
-    if (purpose_ == Purpose::kPicture) contacts_.ReadPoses(step);
-    dJointGroupEmpty(touching_);
+    const double time_s = static_cast<double>(step_count_++) * kStep_s;
+    BlowOnSail(time_s);
+    v1::ContactStep step = world_.Step(time_s);
+    if (purpose_ == Purpose::kPicture) world_.contacts().ReadPoses(step);
     for (v1::EngineContact& contact : *step.mutable_contacts()) {
       if (!contact.has_second()) contact.mutable_hertz()->set_striker_radius_m(kClapperRadius_m);
     }
@@ -66,7 +48,7 @@ class OdeChimes {
   }
 
   dBodyID AddBody(const dMass& mass, const Vector& centre) {
-    const dBodyID body = dBodyCreate(world_);
+    const dBodyID body = dBodyCreate(world_.world());
     dBodySetMass(body, &mass);
     dBodySetPosition(body, centre[0], centre[1], centre[2]);
     return body;
@@ -74,7 +56,7 @@ class OdeChimes {
 
   /// Joins two bodies, or one to the world if `other` is null, at a point given in the world.
   void Pin(dBodyID body, dBodyID other, const Vector& point) {
-    const dJointID joint = dJointCreateBall(world_, nullptr);
+    const dJointID joint = dJointCreateBall(world_.world(), nullptr);
     dJointAttach(joint, body, other);
     dJointSetBallAnchor(joint, point[0], point[1], point[2]);
   }
@@ -96,8 +78,9 @@ class OdeChimes {
     dMass mass;
     dMassSetParameters(&mass, MassOf(tube), 0, 0, 0, x, y, z, 0, 0, 0);
     const dBodyID body = AddBody(mass, {top[0], top[1], kTubeCentre_z_m});
-    dGeomSetBody(dCreateCapsule(space_, kOuterRadius_m, tube.length_m - 2 * kOuterRadius_m), body);
-    contacts_.AddObject(body, static_cast<uint32_t>(index + 1));
+    dGeomSetBody(dCreateCapsule(world_.space(), kOuterRadius_m, tube.length_m - 2 * kOuterRadius_m),
+                 body);
+    world_.contacts().AddObject(body, static_cast<uint32_t>(index + 1));
     const dBodyID thread = AddThread(top, node);
     Pin(thread, nullptr, top);
     Pin(thread, body, node);
@@ -108,7 +91,7 @@ class OdeChimes {
     dMass mass;
     dMassSetSphereTotal(&mass, kClapperMass_kg, kClapperRadius_m);
     clapper_ = AddBody(mass, middle);
-    dGeomSetBody(dCreateSphere(space_, kClapperRadius_m), clapper_);
+    dGeomSetBody(dCreateSphere(world_.space(), kClapperRadius_m), clapper_);
     dMassSetBoxTotal(&mass, kSailMass_kg, kSailSide_m, 0.001, kSailSide_m);
     sail_ = AddBody(mass, bottom);
     const dBodyID upper = AddThread(top, middle), lower = AddThread(middle, bottom);
@@ -118,42 +101,27 @@ class OdeChimes {
     Pin(lower, sail_, bottom);
   }
 
-  static void Near(void* data, dGeomID a, dGeomID b) {
-    auto& self = *static_cast<OdeChimes*>(data);
-    const std::array<dBodyID, 2> bodies{dGeomGetBody(a), dGeomGetBody(b)};
-    constexpr int kMost = 4;
-    std::array<dContactGeom, kMost> points;
-    const int count = dCollide(a, b, kMost, points.data(), sizeof(dContactGeom));
-    for (int i = 0; i < count; ++i) {
-      dContact contact{};
-      contact.geom = points[static_cast<size_t>(i)];
-      contact.surface.mode = dContactBounce | dContactApprox1;
-      contact.surface.mu = 0.5;
-      contact.surface.bounce = 1;
-      for (const dBodyID body : bodies) {
-        contact.surface.bounce *= body == self.clapper_ ? kClapperRestitution : kTubeRestitution;
-      }
-      contact.surface.bounce_vel = kSlowest_m_per_s;
-      const dJointID joint = dJointCreateContact(self.world_, self.touching_, &contact);
-      dJointAttach(joint, bodies[0], bodies[1]);
-      self.contacts_.Add(joint, contact.geom);
-    }
+  double RestitutionOf(dBodyID body) const {
+    return body == clapper_ ? kClapperRestitution : kTubeRestitution;
+  }
+  examples::OdeSurface SurfaceOf(dBodyID a, dBodyID b) const {
+    return {.friction = 0.5,
+            .restitution = RestitutionOf(a) * RestitutionOf(b),
+            .slowest_bounce_m_per_s = kSlowest_m_per_s};
   }
 
   const Purpose purpose_;
   const Gust gust_;
-  dWorldID world_ = dWorldCreate();
-  dSpaceID space_ = dSimpleSpaceCreate(nullptr);
-  dJointGroupID touching_ = dJointGroupCreate(0);
   dBodyID clapper_ = nullptr, sail_ = nullptr;
-  adapters::OdeContacts contacts_;
+  examples::OdeWorld world_{kStep_s,
+                            {.roughness_depth = 0, .striker = "wood"},
+                            [this](dBodyID a, dBodyID b) { return SurfaceOf(a, b); }};
   uint64_t step_count_ = 0;
 };
 
 }  // namespace
 
 Simulation ChimesInOde(uint64_t seed, Purpose purpose) {
-  InitializeOde();
   return [chimes = std::make_shared<OdeChimes>(seed, purpose)] { return chimes->Step(); };
 }
 
