@@ -209,8 +209,9 @@ bool ConnectionGate::Refuse(const std::string& peer) {
   const auto now = std::chrono::steady_clock::now();
   const MutexLock lock(&mutex_);
   const auto found = connections_.find(peer);
-  if (found == connections_.end() || found->second.refused || !found->second.is_open())
+  if (found == connections_.end() || found->second.refused || !found->second.is_open()) {
     return false;
+  }
   found->second.refused = true;
   // gRPC, which owns the descriptor, sees the end of the connection and closes it.
   shutdown(found->second.descriptor, SHUT_RDWR);

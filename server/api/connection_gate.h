@@ -31,7 +31,7 @@ class ConnectionTaker {
 /// connection is closed at once.
 class ConnectionGate {
  public:
-  /// Time for which nobody is let in from where a refused connection came.
+  /// The gate closes new connections from the process or address of a refused one for this time.
   static constexpr std::chrono::seconds kRefusal{30};
 
   explicit ConnectionGate(size_t max_connection_count);
@@ -67,8 +67,8 @@ class ConnectionGate {
     int socket;
     ConnectionTaker* taker;
   };
-  /// Whoever took a connection closes it without a word; its descriptor then has no inode, or
-  /// another.
+  /// The taker closes a connection without telling the gate. The inode shows that: the descriptor
+  /// of a closed connection has none, or another.
   struct Connection {
     int descriptor;
     ino_t inode;

@@ -79,8 +79,9 @@ std::vector<int64_t> FloodGuard::ChooseConnections() {
     if (rank-- <= kNewest || watched.busy) chosen.push_back(id);
   }
   auto next = watched_.lower_bound(next_in_turn_);
-  for (size_t i = 0; i < kInTurn && next != watched_.end(); ++i, ++next)
+  for (size_t i = 0; i < kInTurn && next != watched_.end(); ++i, ++next) {
     chosen.push_back(next->first);
+  }
   next_in_turn_ = next == watched_.end() ? 0 : next->first;
   std::ranges::sort(chosen);
   chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());

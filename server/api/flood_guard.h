@@ -22,13 +22,13 @@ inline constexpr int kMaxCallsOfConnection = 256;
 /// Calls a second that may fail on one connection, on the average of half a second.
 inline constexpr double kMaxFailedCallsPerSecond = 2000;
 
-/// Why a connection with these counts is to be closed, in words for an operator; empty if it may
-/// stay. `before` was counted `seconds` earlier.
+/// Returns the reason to close a connection with these counts, in words for an operator; empty if
+/// the connection may stay. `before` was counted `seconds` earlier.
 std::string FindFlood(const ConnectionCalls& before, const ConnectionCalls& now, double seconds);
 
 /// A thread that closes connections whose clients begin calls without end: gRPC 1.51 bounds neither
-/// calls that are cancelled at once nor calls that never send their message. Whoever made such a
-/// connection is refused others for a while.
+/// calls that are cancelled at once nor calls that never send their message. The guard also refuses
+/// further connections from the same process or address for ConnectionGate::kRefusal.
 class FloodGuard {
  public:
   /// Both must outlive the guard.

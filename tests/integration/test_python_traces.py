@@ -10,9 +10,7 @@ import carillon
 
 class DamagedTraceTest(unittest.TestCase):
     def setUp(self):
-        scratch = tempfile.TemporaryDirectory(prefix="carillon-")
-        self.addCleanup(scratch.cleanup)
-        self.folder = pathlib.Path(scratch.name)
+        self.folder = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory(prefix="carillon-")))
 
     def test_damaged_and_newer_traces_are_refused(self):
         trace = carillon.Trace(1 / 60)

@@ -5,7 +5,6 @@ import collections
 import os
 import pathlib
 import re
-import resource
 import signal
 import statistics
 import subprocess
@@ -82,8 +81,7 @@ def slope_per_hour(samples):
 class ChurnTest(torture.ServedTest):
     def sample(self):
         process = pathlib.Path("/proc", str(self.daemon.process.pid))
-        statm = (process / "statm").read_text().split()
-        return Sample(time.monotonic(), int(statm[1]) * resource.getpagesize() / 2**20,
+        return Sample(time.monotonic(), torture.resident_mib(self.daemon.process),
                       len(os.listdir(process / "fd")), len(os.listdir(process / "task")))
 
     def metrics(self):

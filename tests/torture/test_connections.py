@@ -2,7 +2,6 @@
 """Connections that say nothing, or too much, do not keep others out for long."""
 
 import contextlib
-import pathlib
 import resource
 import socket
 import subprocess
@@ -92,7 +91,8 @@ class ConnectionTest(torture.ScratchTest):
     def test_many_calls_at_once_on_one_connection_are_answered_in_bounded_memory(self):
         self.serve()
         self.assertTrue(self.answers(self.daemon.server))
-        before_mib = self.resident_mib()
+        process = self.daemon.process
+        before_mib = torture.resident_mib(process)
         count = torture.rounds(2_000, 20_000)
         client = self.daemon.client()
         begin_s = time.monotonic()
@@ -100,15 +100,12 @@ class ConnectionTest(torture.ScratchTest):
         most_mib = before_mib
         for call in calls:
             call.result()
-            most_mib = max(most_mib, self.resident_mib()) if call is calls[len(calls) // 2] else most_mib
+            most_mib = max(most_mib, torture.resident_mib(process)) if call is calls[len(calls) // 2] else most_mib
         print(f"{count} calls at once: {time.monotonic() - begin_s:.1f} s, {before_mib:.0f} MiB before, "
-              f"{most_mib:.0f} MiB amid, {self.resident_mib():.0f} MiB after", flush=True)
-        self.assertLess(self.resident_mib() - before_mib, 100)
+              f"{most_mib:.0f} MiB amid, {torture.resident_mib(process):.0f} MiB after", flush=True)
+        self.assertLess(torture.resident_mib(process) - before_mib, 100)
 
-    def resident_mib(self):
-        statm = pathlib.Path(f"/proc/{self.daemon.process.pid}/statm").read_text().split()
-        return int(statm[1]) * resource.getpagesize() / 2**20
-
+ 
 
 if __name__ == "__main__":
     unittest.main()

@@ -42,11 +42,6 @@ def threads_of(process):
     return len(list(pathlib.Path("/proc", str(process.pid), "task").iterdir()))
 
 
-def mib_of(process):
-    statm = pathlib.Path("/proc", str(process.pid), "statm").read_text().split()
-    return int(statm[1]) * resource.getpagesize() / 2**20
-
-
 class Prober:
     """Calls the daemon fifty times a second, until it is stopped, and keeps how long each call took."""
 
@@ -67,10 +62,11 @@ class Prober:
             self.times_s.append(time.monotonic() - begin_s)
 
     def stop(self):
-        """The 99th percentile, seconds."""
         self.stopped.set()
         self.thread.join()
         self.channel.close()
+
+    def percentile_99_s(self):
         return statistics.quantiles(self.times_s, n=100)[98]
 
 
@@ -107,10 +103,12 @@ class CrowdTest(torture.ServedTest):
         """The counts of the good clients, with the 99th percentile of other calls and the daemon's threads."""
         crowd = self.start_crowd(GOOD, RUN_S, self.targets)
         prober = Prober(self.daemon.server)
+        self.addCleanup(prober.stop)
         if meanwhile is not None:
             meanwhile()
         counts = json.loads(crowd.stdout.readline())
-        counts.update(p99_ms=1e3 * prober.stop(), threads=threads_of(self.daemon.process))
+        prober.stop()
+        counts.update(p99_ms=1e3 * prober.percentile_99_s(), threads=threads_of(self.daemon.process))
         return counts
 
     def silent(self, family, address, count, first=b""):
@@ -130,20 +128,19 @@ class CrowdTest(torture.ServedTest):
         self.bad = [self.silent(socket.AF_UNIX, str(self.folder / "socket"), SILENT),
                     self.silent(socket.AF_INET, ("127.0.0.1", self.port), HALF_OPEN, HALF_HANDSHAKE)]
         self.flood = Flood(str(self.folder / "socket"), resets, reads=True)
+        self.addCleanup(self.flood.stop)
         for number, crowd in enumerate(crowds):
             crowd.send_signal(signal.SIGKILL if number % 2 else signal.SIGSTOP)
 
     def test_good_clients_are_served_amid_bad_ones(self):
         alone = self.run_good()
-        before_mib = mib_of(self.daemon.process)
-        try:
-            amid = self.run_good(self.misbehave)
-        finally:
-            self.flood.stop()
+        before_mib = torture.resident_mib(self.daemon.process)
+        amid = self.run_good(self.misbehave)
+        self.flood.stop()
         for connection in itertools.chain(*self.bad):
             connection.close()
         time.sleep(REST_S)
-        after_mib = mib_of(self.daemon.process)
+        after_mib = torture.resident_mib(self.daemon.process)
         print(f"{GOOD} clients alone: {alone}; amid bad ones: {amid}; memory {before_mib:.0f} MiB, {REST_S} s after "
               f"{after_mib:.0f}", flush=True)
         for counts in (alone, amid):

@@ -9,9 +9,7 @@ import collections
 import ctypes
 import itertools
 import os
-import pathlib
 import random
-import resource
 import sys
 import time
 import unittest
@@ -119,10 +117,6 @@ class DamagedModelTest(torture.ServedTest):
         self.first = int(os.environ.get("CARILLON_TORTURE_SEED", "0"))
         self.count = int(os.environ.get("CARILLON_TORTURE_COUNT", torture.rounds(60, 50_000)))
 
-    def mib(self):
-        statm = pathlib.Path("/proc", str(self.daemon.process.pid), "statm").read_text().split()
-        return int(statm[1]) * resource.getpagesize() / 2**20
-
     def stored(self):
         """The model as it is imported."""
         answers = self.client.models.ExportModalModel(modal_model_service_pb2.ExportModalModelRequest(name=self.model))
@@ -177,7 +171,7 @@ class DamagedModelTest(torture.ServedTest):
     def attack(self, requests, act, kind):
         self.assertIn("OK", act([request.SerializeToString() for request in requests]))
         time.sleep(REST_S)
-        before_mib = self.mib()
+        before_mib = torture.resident_mib(self.daemon.process)
         ends = collections.Counter()
         for seed in range(self.first, self.first + self.count):
             with self.subTest(seed=seed):
@@ -185,9 +179,9 @@ class DamagedModelTest(torture.ServedTest):
                 self.assertIsNone(self.daemon.process.poll(), "the daemon has ended")
         time.sleep(REST_S)
         print(f"{self.count} damaged {kind}: {dict(ends.most_common())}; {before_mib:.1f} MiB before, "
-              f"{self.mib():.1f} after", file=sys.stderr)
+              f"{torture.resident_mib(self.daemon.process):.1f} after", file=sys.stderr)
         self.assertGreater(len(ends), 2)
-        self.assertLess(self.mib(), before_mib + GROWTH_MIB)
+        self.assertLess(torture.resident_mib(self.daemon.process), before_mib + GROWTH_MIB)
 
     def test_each_model_is_imported_or_refused(self):
         self.attack(self.stored(), self.import_model, "models")

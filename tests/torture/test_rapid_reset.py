@@ -5,8 +5,6 @@ A good client goes on meanwhile, and the daemon's memory comes back.
 """
 
 import contextlib
-import pathlib
-import resource
 import socket
 import statistics
 import struct
@@ -124,10 +122,6 @@ class RapidResetTest(torture.ServedTest):
         self.call = channel.unary_unary(METHOD.decode(), audio_service_pb2.GetMixerRequest.SerializeToString,
                                         audio_service_pb2.GetMixerResponse.FromString)
 
-    def mib(self):
-        statm = pathlib.Path("/proc", str(self.daemon.process.pid), "statm").read_text().split()
-        return int(statm[1]) * resource.getpagesize() / 2**20
-
     def calls(self, seconds):
         """The durations of good calls, fifty a second at most, and the daemon's largest memory meanwhile."""
         times, most_mib = [], 0.0
@@ -136,13 +130,13 @@ class RapidResetTest(torture.ServedTest):
             begin_s = time.monotonic()
             self.call(audio_service_pb2.GetMixerRequest(), timeout=30)
             times.append(time.monotonic() - begin_s)
-            most_mib = max(most_mib, self.mib())
+            most_mib = max(most_mib, torture.resident_mib(self.daemon.process))
             time.sleep(0.02)
         return times, most_mib
 
     def attack(self, make, reads=True):
         quiet, _ = self.calls(1.0)
-        before_mib = self.mib()
+        before_mib = torture.resident_mib(self.daemon.process)
         flood = Flood(str(self.folder / "socket"), make, reads)
         try:
             amid, most_mib = self.calls(RUN_S)
@@ -153,11 +147,11 @@ class RapidResetTest(torture.ServedTest):
         print(f"{make.__name__}: {flood.frames} in {RUN_S:g} s on {CONNECTIONS} connections, made {flood.connections} "
               f"times; a good call took {1e3 * statistics.median(quiet):.1f} ms before, amid them "
               f"{1e3 * statistics.median(amid):.1f}, p99 {1e3 * p99_s:.1f} ms; {before_mib:.1f} MiB before, at most "
-              f"{most_mib:.1f}, {self.mib():.1f} after", flush=True)
+              f"{most_mib:.1f}, {torture.resident_mib(self.daemon.process):.1f} after", flush=True)
         self.assertGreater(flood.frames, 0)
         self.assertLess(p99_s, P99_S)
         self.assertLess(most_mib, before_mib + GROWTH_MIB)
-        self.assertLess(self.mib(), before_mib + LEFT_MIB)
+        self.assertLess(torture.resident_mib(self.daemon.process), before_mib + LEFT_MIB)
 
     def test_calls_that_are_cancelled_at_once(self):
         self.attack(resets)

@@ -4,6 +4,7 @@
 import contextlib
 import os
 import pathlib
+import resource
 import tempfile
 import threading
 import time
@@ -28,6 +29,12 @@ def wait_until(condition, limit_s):
             raise AssertionError(f"not within {limit_s} s")
         time.sleep(0.01)
     return time.monotonic() - begin_s
+
+
+def resident_mib(process):
+    """The memory of a process (subprocess.Popen) that is resident now, MiB."""
+    pages = int(pathlib.Path("/proc", str(process.pid), "statm").read_text().split()[1])
+    return pages * resource.getpagesize() / 2**20
 
 
 class ScratchTest(unittest.TestCase):

@@ -5,6 +5,7 @@
 FOLDER is where deploy/examples.sh with --video has left NAME-ENGINE.wav and NAME-ENGINE.mp4.
 """
 
+import io
 import os
 import pathlib
 import subprocess
@@ -13,23 +14,27 @@ import tempfile
 
 import numpy
 
+from run import draw_spectrogram
+
 NAMES = ("blocks", "boxes", "letters", "bowl", "wooden_bowl", "bunnies", "chimes")
 FRAME_AT_S = {"bunnies": 1.0, "boxes": 0.8, "chimes": 2.6}
-WIDTH, HEIGHT = 640, 360
+SAMPLE_RATE_HZ = 48000
+
+
+def ffmpeg(*words):
+    """Returns the bytes that ffmpeg writes."""
+    words = ["ffmpeg", "-loglevel", "error", *map(str, words), "-"]
+    return subprocess.run(words, check=True, capture_output=True).stdout
 
 
 def frame_of(video, at_s):
-    """A frame of the video: rows, columns, RGB."""
-    words = ["ffmpeg", "-loglevel", "error", "-ss", at_s, "-i", video, "-frames:v", 1, "-f", "rawvideo", "-pix_fmt",
-             "rgb24", "-"]
-    data = subprocess.run(list(map(str, words)), check=True, capture_output=True).stdout
-    return numpy.frombuffer(data, numpy.uint8).reshape(HEIGHT, WIDTH, 3)
+    """Returns a frame of the video as a PNG file in memory."""
+    return io.BytesIO(ffmpeg("-ss", at_s, "-i", video, "-frames:v", 1, "-f", "image2pipe", "-codec:v", "png"))
 
 
 def sound_of(path):
-    """The mean of the channels, 48 kHz."""
-    words = ["ffmpeg", "-loglevel", "error", "-i", path, "-vn", "-ac", 1, "-ar", 48000, "-f", "f32le", "-"]
-    return numpy.frombuffer(subprocess.run(list(map(str, words)), check=True, capture_output=True).stdout, "<f4")
+    """Returns the mean of the channels."""
+    return numpy.frombuffer(ffmpeg("-i", path, "-vn", "-ac", 1, "-ar", SAMPLE_RATE_HZ, "-f", "f32le"), "<f4")
 
 
 def main(folder, out):
@@ -41,16 +46,12 @@ def main(folder, out):
                                    width_ratios=(16, 20))
     for (left, right), name in zip(axes, NAMES):
         heard = min(folder.glob(f"{name}-*.wav"))
-        samples = sound_of(heard)
-        dither = numpy.random.default_rng(0).normal(scale=1e-10, size=len(samples))
-        right.specgram(samples + dither, NFFT=2048, noverlap=1536, Fs=48, scale="dB", cmap="magma", vmin=-140,
-                       vmax=-50)[3].set_extent((0, len(samples) / 48000, 0, 24))
-        right.set_xlim(0, len(samples) / 48000)
+        draw_spectrogram(right, sound_of(heard), SAMPLE_RATE_HZ)
         right.set_ylim(0, 20)
         right.set_ylabel("kHz")
         left.axis("off")
         left.set_title(f"{name.replace('_', ' ')}, {heard.stem.split('-')[1]}", fontsize=9)
-        left.imshow(frame_of(heard.with_suffix(".mp4"), FRAME_AT_S.get(name, 0.6)))
+        left.imshow(pyplot.imread(frame_of(heard.with_suffix(".mp4"), FRAME_AT_S.get(name, 0.6))))
     axes[-1][1].set_xlabel("time, s")
     figure.savefig(out, dpi=70)
 

@@ -16,6 +16,19 @@ ROOT = pathlib.Path(__file__).resolve().parents[3]
 SAMPLE_RATE_HZ = 48000
 
 
+def draw_spectrogram(axes, samples, sample_rate_hz):
+    """Draws the spectrogram of one channel, in dB of full scale. Returns the image."""
+    import numpy
+    # A noise far below the scale stands for digital silence, which has no level in dB.
+    dither = numpy.random.default_rng(0).normal(scale=1e-10, size=len(samples))
+    seconds = len(samples) / sample_rate_hz
+    _, _, _, image = axes.specgram(samples + dither, NFFT=2048, noverlap=1536, Fs=sample_rate_hz / 1000, scale="dB",
+                                   cmap="magma", vmin=-140, vmax=-50)
+    image.set_extent((0, seconds, 0, sample_rate_hz / 2000))
+    axes.set_xlim(0, seconds)
+    return image
+
+
 def draw(sound, stem, title):
     """The spectrogram and the spectrum of the mean of both channels."""
     os.environ.setdefault("MPLCONFIGDIR", tempfile.gettempdir())
@@ -23,7 +36,6 @@ def draw(sound, stem, title):
     matplotlib.use("Agg")
     import numpy
     from matplotlib import pyplot
-    highest_khz = SAMPLE_RATE_HZ / 2000
     figure, (wave, picture) = pyplot.subplots(2, 1, sharex=True, figsize=(10, 6), layout="constrained",
                                               height_ratios=(1, 3))
     times = numpy.arange(len(sound.samples)) / sound.sample_rate_hz
@@ -31,12 +43,7 @@ def draw(sound, stem, title):
     wave.legend(loc="upper right")
     wave.set_ylabel("full scale")
     wave.set_title(title)
-    # A noise far below the scale stands for digital silence, which has no level in dB.
-    dither = numpy.random.default_rng(0).normal(scale=1e-10, size=len(sound.mono))
-    _, _, _, image = picture.specgram(sound.mono + dither, NFFT=2048, noverlap=1536, Fs=sound.sample_rate_hz / 1000,
-                                      scale="dB", cmap="magma", vmin=-140, vmax=-50)
-    image.set_extent((0, sound.seconds, 0, highest_khz))
-    picture.set_xlim(0, sound.seconds)
+    image = draw_spectrogram(picture, sound.mono, sound.sample_rate_hz)
     picture.set_xlabel("time, s")
     picture.set_ylabel("frequency, kHz")
     figure.colorbar(image, ax=picture, label="dB")
@@ -97,16 +104,16 @@ def record_example(client, options, folder, trace):
     return scene
 
 
-def video(options, scene, folder, stem):
+def film(options, scene, folder, stem):
     """Leaves the video of the example beside its sound."""
-    import video as film
+    import video
     how = {"seconds": options.seconds, "build": options.build}
     if options.name == "chimes":
         import chimes
-        frames = film.frames_of(scene, chimes.poses(options.engine, folder, **how))
+        frames = video.frames_of(scene, chimes.poses(options.engine, folder, **how))
     else:
-        frames = film.poses_of(options.engine, scene, rate=options.rate, **how)
-    film.make(scene, frames, folder, stem.with_suffix(".wav"), stem.with_suffix(".mp4"))
+        frames = video.poses_of(options.engine, scene, rate=options.rate, **how)
+    video.make(scene, frames, folder, stem.with_suffix(".wav"), stem.with_suffix(".mp4"))
 
 
 def run(client, options, folder):
@@ -120,7 +127,7 @@ def run(client, options, folder):
     sound.normalized().save(wav)
     draw(sound, stem, f"{options.name.replace('_', ' ')} in {options.engine}")
     if options.video:
-        video(options, scene, folder, stem)
+        film(options, scene, folder, stem)
     return sound
 
 

@@ -15,7 +15,8 @@ namespace carillon::wind_chimes {
 using Vector = std::array<double, 3>;
 
 // The tubes hang on a circle, with their centres at one height. A thread holds each tube at a node
-// of its first bending mode (22.4 % of the length from the end), where it damps the sound least.
+// of its first bending mode, 22.4 % of the tube's length from its end. The thread damps the sound
+// least there.
 inline constexpr double kCircleRadius_m = 0.062;
 inline constexpr double kTubeCentre_z_m = -0.40;
 inline constexpr double kNodeFromEnd = 0.224;

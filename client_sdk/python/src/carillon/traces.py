@@ -77,24 +77,21 @@ class Trace:
     @classmethod
     def of(cls, records: Iterable[contact_trace_pb2.ContactTraceRecord], source: str = "the trace") -> Trace:
         """Makes a trace of its records. Raises CarillonError (TRACE_MALFORMED, TRACE_TOO_NEW)."""
+        remaining = iter(records)
         trace = cls()
-        trace.header.format_version = 0
-        for number, record in enumerate(records):
+        trace.header = next(remaining, contact_trace_pb2.ContactTraceRecord()).header
+        cls._check_version(trace.header.format_version, source)
+        for number, record in enumerate(remaining, 1):
             kind = record.WhichOneof("record")
-            if kind is None:
+            if kind == "object":
+                trace.objects.append(record.object)
+            elif kind == "step":
+                trace.steps.append(record.step)
+            elif kind == "header":
+                raise CarillonError("TRACE_MALFORMED", f"{source}: record {number} must not be a header")
+            else:
                 raise CarillonError("TRACE_MALFORMED", f"{source}: record {number} is of no known kind; update this "
                                     "program, or write the trace again")
-            if (number == 0) != (kind == "header"):
-                raise CarillonError("TRACE_MALFORMED", f"{source}: record {number} must"
-                                    f"{'' if number == 0 else ' not'} be a header")
-            if kind == "header":
-                trace.header = record.header
-                cls._check_version(record.header.format_version, source)
-            elif kind == "object":
-                trace.objects.append(record.object)
-            else:
-                trace.steps.append(record.step)
-        cls._check_version(trace.header.format_version, source)
         return trace
 
     @staticmethod
