@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "precompute/radiation/field_solver.h"
+#include "precompute/radiation/solve_radiation.h"
 
 namespace carillon::precompute {
 

@@ -10,7 +10,7 @@
 
 #include "precompute/mesh/point_math.h"
 #include "precompute/radiation/far_pattern.h"
-#include "precompute/radiation/field_solver.h"
+#include "precompute/radiation/solve_radiation.h"
 #include "precompute/radiation/spherical_harmonics.h"
 
 namespace carillon::precompute {
@@ -160,7 +160,7 @@ RigidRadiation SolveRigidMotions(const MassProperties& mass, const SurfaceLevel&
       for (const size_t m : {motion, motion + 1}) {
         problem.displacements.push_back(RigidDisplacement(level.surface, mass.center_of_mass, m));
       }
-      const std::vector<ModeField> fields = SolveModes(problem, level, body, grid, workers);
+      const std::vector<ModeField> fields = SolveRadiation(problem, level, body, grid, workers);
       for (size_t s = 0; s < 2; ++s) solved[motion + s].push_back(Expand(fields[s], k, grid));
     }
   }

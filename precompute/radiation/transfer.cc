@@ -8,8 +8,8 @@
 #include <utility>
 
 #include "precompute/radiation/far_pattern.h"
-#include "precompute/radiation/field_solver.h"
 #include "precompute/radiation/mode_groups.h"
+#include "precompute/radiation/solve_radiation.h"
 #include "precompute/radiation/solve_time.h"
 #include "precompute/radiation/spherical_harmonics.h"
 #include "precompute/radiation/surface_levels.h"
@@ -186,7 +186,7 @@ class TransferSolver {
     const double begun_s = CpuSeconds();
     const SphereGrid grid(PatternOrder(group.wavenumber, body_.radius_m));
     std::vector<ModeField> fields =
-        SolveModes(ProblemOf(group, *made), made->level, body_, grid, workers_);
+        SolveRadiation(ProblemOf(group, *made), made->level, body_, grid, workers_);
     // The right side and the far pattern take a sweep each.
     double sweeps = 2;
     for (const ModeField& field : fields) sweeps = std::max(sweeps, field.iterations + 2.0);

@@ -8,9 +8,10 @@
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
+#include "absl/strings/strip.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
-#include "server/api/bearer_token.h"
 #include "server/api/peer_name.h"
 
 namespace carillon {
@@ -61,6 +62,13 @@ absl::Status MissingRole(const Principal& principal, Role role, bool is_anybody)
 }
 
 }  // namespace
+
+std::string BearerToken(const grpc::CallbackServerContext& context) {
+  const auto shown = context.client_metadata().find("authorization");
+  if (shown == context.client_metadata().end()) return "";
+  absl::string_view token(shown->second.data(), shown->second.size());
+  return absl::ConsumePrefix(&token, "Bearer ") ? std::string(token) : "";
+}
 
 AccessControl::AccessControl(AccessTable table, const Clock& clock, LimitedLog::Sink log)
     : table_(std::make_shared<const AccessTable>(std::move(table))),

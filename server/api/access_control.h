@@ -17,6 +17,10 @@
 
 namespace carillon {
 
+/// Returns the token that a caller sends in the metadata "authorization" as "Bearer TOKEN"; empty
+/// if the caller sends none.
+std::string BearerToken(const grpc::CallbackServerContext& context);
+
 /// Decides who may call what. Whoever comes through a Unix socket has every role; callers over TCP
 /// have those that the table gives to their token or certificate. Refusals are logged. Safe from
 /// every thread.

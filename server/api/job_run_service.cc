@@ -8,7 +8,6 @@
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
-#include "server/api/bearer_token.h"
 #include "server/api/file_pieces.h"
 #include "server/api/read_call.h"
 #include "server/api/resource_name.h"

@@ -26,9 +26,9 @@ ContactIntake::ContactIntake(Scene& scene, EventTarget& target, const IntakeSett
     : scene_(scene),
       target_(target),
       settings_(settings),
-      mapping_(settings.mapping.value_or(TimeMapping{.delay_s = settings.delay_s})),
-      lateness_(settings.sample_rate_hz),
-      time_s_(mapping_.first_time_s),
+      mapper_(settings.sample_rate_hz,
+              settings.mapping.value_or(TimeMapping{.delay_s = settings.delay_s})),
+      time_s_(mapper_.mapping().first_time_s),
       forces_(settings.step_s),
       pose_times_(settings.step_s) {}
 
@@ -43,10 +43,9 @@ absl::Status ContactIntake::BeginStep(double time_s) {
                                 step_count_, "; open another stream for another run"));
   }
   if (begins || settings_.at_once) {
-    mapping_.first_frame = target_.frame();
-    mapping_.first_time_s = time_s;
+    mapper_.Begin(time_s, target_.frame());
   } else if (!settings_.mapping) {
-    lateness_.Note(time_s, target_.frame(), mapping_);
+    mapper_.Note(time_s, target_.frame());
   }
   Push(forces_.Begin(time_s));
   time_s_ = time_s;
@@ -226,8 +225,8 @@ void ContactIntake::Tell(const MixerEvent& event, FoundBlow blow, double frame) 
     const double weight = impulse.at.weights[corner] * (*object)->properties.material.size;
     for (size_t axis = 0; axis < vertex.size(); ++axis) blow.point_m[axis] += weight * vertex[axis];
   }
-  blow.time_s =
-      (std::max(frame, 0.0) - static_cast<double>(mapping_.first_frame)) / settings_.sample_rate_hz;
+  blow.time_s = (std::max(frame, 0.0) - static_cast<double>(mapping().first_frame)) /
+                settings_.sample_rate_hz;
   blow.impulse_newton_seconds = impulse.impulse_newton_seconds;
   blow.duration_s = impulse.pulse.duration_s();
   settings_.blows->push_back(blow);
@@ -247,7 +246,7 @@ absl::StatusOr<double> ContactIntake::FrameOfImpulse(double time_offset_s) const
   }
   const double frame = FrameOf(time_s_ + time_offset_s);
   const double ahead_s = (frame - static_cast<double>(target_.frame())) / settings_.sample_rate_hz;
-  if (ahead_s <= settings_.most_ahead_s + mapping_.delay_s) return frame;
+  if (ahead_s <= settings_.most_ahead_s + mapping().delay_s) return frame;
   return Invalid(
       "TIME_TOO_FAR_AHEAD",
       absl::StrCat("the impulse is due in ", ahead_s, " s, over ", settings_.most_ahead_s,

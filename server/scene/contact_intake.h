@@ -9,7 +9,6 @@
 #include "absl/status/statusor.h"
 #include "server/scene/contact_forces.h"
 #include "server/scene/found_blow.h"
-#include "server/scene/lateness.h"
 #include "server/scene/object_contact.h"
 #include "server/scene/rejection_counts.h"
 #include "server/scene/scene.h"
@@ -104,9 +103,9 @@ class ContactIntake {
   /// Counts `count` contacts that could not be used.
   void Reject(uint64_t count, absl::Status reason);
 
-  const TimeMapping& mapping() const { return mapping_; }
+  const TimeMapping& mapping() const { return mapper_.mapping(); }
   /// How many times simulation time was mapped anew.
-  uint64_t remap_count() const { return lateness_.remap_count(); }
+  uint64_t remap_count() const { return mapper_.remap_count(); }
   uint64_t step_count() const { return step_count_; }
   /// Impulses handed on.
   uint64_t impulse_count() const { return impulse_count_; }
@@ -135,13 +134,12 @@ class ContactIntake {
   void Tell(const MixerEvent& event, FoundBlow blow, double frame)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(scene_.mutex());
   absl::StatusOr<double> FrameOfImpulse(double time_offset_s) const;
-  double FrameOf(double time_s) const { return mapping_.FrameOf(time_s, settings_.sample_rate_hz); }
+  double FrameOf(double time_s) const { return mapper_.FrameOf(time_s); }
 
   Scene& scene_;
   EventTarget& target_;
   const IntakeSettings settings_;
-  TimeMapping mapping_;
-  Lateness lateness_;
+  TimeMapper mapper_;
   double time_s_ = 0;
   ContactForces forces_;
   PoseTimes pose_times_;

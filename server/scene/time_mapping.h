@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 namespace carillon {
 
@@ -11,10 +12,43 @@ struct TimeMapping {
   double first_time_s = 0;  ///< simulation time at that frame
   double delay_s = 0;
 
+  /// Returns the frame in which a contact at this simulation time is due:
   /// frame(t) = first frame + (t - first time + delay) rate
   double FrameOf(double time_s, double sample_rate_hz) const {
     return static_cast<double>(first_frame) + (time_s - first_time_s + delay_s) * sample_rate_hz;
   }
+};
+
+/// The time for which every step must come late until simulation time is mapped anew. A shorter
+/// pause of the network is followed by steps that come at once and are in time again.
+inline constexpr double kLateRunS = 0.25;
+
+/// Makes the time mapping of a running simulation from the frames at which its steps come.
+class TimeMapper {
+ public:
+  TimeMapper(double sample_rate_hz, const TimeMapping& mapping)
+      : sample_rate_hz_(sample_rate_hz), mapping_(mapping) {}
+
+  const TimeMapping& mapping() const { return mapping_; }
+  double FrameOf(double time_s) const { return mapping_.FrameOf(time_s, sample_rate_hz_); }
+
+  /// Maps simulation time `time_s` to `frame`, which is rendered next.
+  void Begin(double time_s, uint64_t frame);
+
+  /// Notes that the step of simulation time `time_s` has come when `frame` was to be rendered next.
+  /// If every step has come late for kLateRunS, maps time anew, later by whole blocks, as if this
+  /// step were the first.
+  void Note(double time_s, uint64_t frame);
+
+  /// How many times Note has mapped time anew.
+  uint64_t remap_count() const { return remap_count_; }
+
+ private:
+  const double sample_rate_hz_;
+  TimeMapping mapping_;
+  std::optional<uint64_t> since_frame_;  // when the first of the newest, unbroken late steps came
+  uint64_t step_count_ = 0;              // number of these steps
+  uint64_t remap_count_ = 0;
 };
 
 }  // namespace carillon

@@ -21,15 +21,13 @@ size_t HistoryBlocks(const Voice::Settings& settings) {
          3;
 }
 
-double Length(const std::array<double, 3>& v) { return std::hypot(v[0], v[1], v[2]); }
+double Length(const Vector3& v) { return std::hypot(v[0], v[1], v[2]); }
 
-std::array<double, 3> Minus(const std::array<double, 3>& a, const std::array<double, 3>& b) {
+Vector3 Minus(const Vector3& a, const Vector3& b) {
   return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
 }
 
-double Dot(const std::array<double, 3>& a, const std::array<double, 3>& b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
+double Dot(const Vector3& a, const Vector3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 }  // namespace
 
@@ -50,7 +48,7 @@ Voice::Voice(const Settings& settings, const Place& object, const Place& listene
 void Voice::SetCenter(const Vector3& center_m) noexcept {
   if (center_m == center_m_) return;
   center_m_ = center_m;
-  std::ranges::fill(positions_, SoundAt(object_.place()));
+  positions_.Fill(SoundAt(object_.place()));
   jump_waits_ = true;
 }
 
@@ -64,50 +62,35 @@ Bearing Voice::BearingOfListener() const noexcept {
   return bearing;
 }
 
-std::array<double, 3> Voice::SoundAt(const Place& object) const noexcept {
+Vector3 Voice::SoundAt(const Place& object) const noexcept {
   if (center_m_ == Vector3{}) return object.position_m;
   const Vector3 center = Rotated(center_m_, object.orientation);
   return {object.position_m[0] + center[0], object.position_m[1] + center[1],
           object.position_m[2] + center[2]};
 }
 
-/// Position of the object `blocks` blocks before the end of the last block.
-std::array<double, 3> Voice::PositionBefore(double blocks) const noexcept {
-  const size_t count = positions_.size();
-  const auto whole = std::min(static_cast<size_t>(blocks), count - 2);
-  const double part = std::min(blocks - static_cast<double>(whole), 1.0);
-  const auto& after = positions_[(newest_ + count - whole) % count];
-  const auto& before = positions_[(newest_ + count - whole - 1) % count];
-  return {after[0] + part * (before[0] - after[0]), after[1] + part * (before[1] - after[1]),
-          after[2] + part * (before[2] - after[2])};
-}
-
 /// Delay and gains at the end of the last block; `delay_frames` is a first estimate of the delay.
 Voice::Heard Voice::Hear(double delay_frames) const noexcept {
   const HearingSettings& hearing = settings_.hearing;
   const Place listener = listener_.place();
-  std::array<double, 3> away = Minus(positions_[newest_], listener.position_m);
-  Heard heard;
+  SoundPath path{.away_m = Minus(positions_.newest(), listener.position_m)};
   if (delayed()) {
-    const double frames_per_metre = settings_.sample_rate_hz / hearing.sound_speed_m_per_s;
-    const double most = kLongestPropagationS * settings_.sample_rate_hz;
-    // Each round reduces the error by the ratio of the object's speed to the speed of sound.
-    constexpr int kRounds = 5;
-    for (int round = 0; round < kRounds; ++round) {
-      const double blocks = delay_frames / static_cast<double>(settings_.block_frame_count);
-      away = Minus(PositionBefore(blocks), listener.position_m);
-      delay_frames = std::clamp(Length(away) * frames_per_metre, DelayLine::kLeastDelay, most);
-    }
-    heard.delay_frames = delay_frames;
+    const DelayLimits limits{
+        .frames_per_metre = settings_.sample_rate_hz / hearing.sound_speed_m_per_s,
+        .block_frame_count = settings_.block_frame_count,
+        .least_frames = DelayLine::kLeastDelay,
+        .most_frames = kLongestPropagationS * settings_.sample_rate_hz};
+    path = FindSoundPath(positions_, listener.position_m, limits, delay_frames);
   }
-  const double distance = Length(away);
+  Heard heard{.delay_frames = path.delay_frames};
+  const double distance = Length(path.away_m);
   const double reference = hearing.reference_distance_m;
   const double gain = hearing.distance_gain ? reference / std::max(distance, reference) : 1;
   heard.gains.fill(static_cast<float>(gain));
   if (hearing.panning && settings_.channel_count == 2) {
     const double unit = std::max(Length(listener.right), 0.5);
-    const double side =
-        std::clamp(Dot(listener.right, away) / (unit * std::max(distance, kNearM)), -1.0, 1.0);
+    const double side = std::clamp(
+        Dot(listener.right, path.away_m) / (unit * std::max(distance, kNearM)), -1.0, 1.0);
     const double angle = std::numbers::pi * (1 + side) / 4;
     heard.gains = {static_cast<float>(gain * std::numbers::sqrt2 * std::cos(angle)),
                    static_cast<float>(gain * std::numbers::sqrt2 * std::sin(angle))};
@@ -118,9 +101,8 @@ Voice::Heard Voice::Hear(double delay_frames) const noexcept {
 void Voice::NoteHeard() noexcept {
   object_.Advance();
   listener_.Advance();
-  newest_ = (newest_ + 1) % positions_.size();
-  positions_[newest_] = SoundAt(object_.place());
-  if (object_.jumped()) std::ranges::fill(positions_, positions_[newest_]);
+  positions_.Add(SoundAt(object_.place()));
+  if (object_.jumped()) positions_.Fill(SoundAt(object_.place()));
   const double trend = 2 * heard_[3].delay_frames - heard_[2].delay_frames;
   const Heard next = Hear(trend);
   const double most_change = kFastestDelay * static_cast<double>(settings_.block_frame_count);
@@ -165,20 +147,15 @@ float Voice::Sample(double delay_frames, size_t n) const noexcept {
   return line_ ? line_->Read(delay_frames + static_cast<double>(input_.size() - n)) : input_[n];
 }
 
-/// Between the ends of the block the delay is a cubic, whose slopes there follow from the
-/// neighbouring blocks (Catmull and Rom). Reading the line at a changing delay is the Doppler
-/// shift.
 void Voice::RenderFrom(const Hearings& heard, float fade, float fade_step,
                        std::span<float> frames) noexcept {
   const size_t channels = settings_.channel_count;
-  const double d0 = heard[1].delay_frames, d1 = heard[2].delay_frames;
-  const double m0 = (d1 - heard[0].delay_frames) / 2, m1 = (heard[3].delay_frames - d0) / 2;
-  const double cubic = 2 * d0 + m0 - 2 * d1 + m1, square = -3 * d0 - 2 * m0 + 3 * d1 - m1;
+  const DelayCurve delay(
+      {heard[0].delay_frames, heard[1].delay_frames, heard[2].delay_frames, heard[3].delay_frames});
   const double step = 1 / static_cast<double>(input_.size());
   for (size_t n = 0; n < input_.size(); ++n) {
     const double u = static_cast<double>(n) * step;
-    const float sample =
-        std::clamp(fade, 0.0F, 1.0F) * Sample(((cubic * u + square) * u + m0) * u + d0, n);
+    const float sample = std::clamp(fade, 0.0F, 1.0F) * Sample(delay.At(u), n);
     for (size_t channel = 0; channel < channels; ++channel) {
       const float from = heard[1].gains[channel], to = heard[2].gains[channel];
       frames[n * channels + channel] += sample * (from + static_cast<float>(u) * (to - from));

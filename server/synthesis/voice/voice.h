@@ -12,6 +12,7 @@
 #include "server/synthesis/schedule/bearing.h"
 #include "server/synthesis/schedule/mixer_event.h"
 #include "server/synthesis/voice/delay_line.h"
+#include "server/synthesis/voice/doppler.h"
 #include "server/synthesis/voice/glide.h"
 
 namespace carillon {
@@ -105,8 +106,7 @@ class Voice {
   /// the third.
   using Hearings = std::array<Heard, 4>;
 
-  std::array<double, 3> SoundAt(const Place& object) const noexcept;
-  std::array<double, 3> PositionBefore(double blocks) const noexcept;
+  Vector3 SoundAt(const Place& object) const noexcept;
   Heard Hear(double delay_frames) const noexcept;
   void NoteHeard() noexcept;
   void RenderFrom(const Hearings& heard, float fade, float fade_step,
@@ -120,9 +120,8 @@ class Voice {
 
   Settings settings_;
   Glide object_, listener_;
-  Vector3 center_m_{};                            // in the object's frame
-  std::vector<std::array<double, 3>> positions_;  // at the ends of the last blocks, a ring buffer
-  size_t newest_ = 0;
+  Vector3 center_m_{};  // in the object's frame
+  PastPositions positions_;
   std::vector<float> input_;
   std::optional<DelayLine> line_;
   Hearings heard_{}, heard_before_{};

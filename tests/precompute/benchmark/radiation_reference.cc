@@ -18,7 +18,7 @@
 #include <vector>
 
 #include "precompute/radiation/far_pattern.h"
-#include "precompute/radiation/field_solver.h"
+#include "precompute/radiation/solve_radiation.h"
 #include "precompute/radiation/solve_time.h"
 #include "precompute/radiation/surface_levels.h"
 #include "precompute/radiation/transfer.h"
@@ -75,7 +75,7 @@ class Reference {
     const SphereGrid grid(PatternOrder(mode.wavenumber, body_.radius_m));
     const SurfaceLevel& surface = ValueOrExit(levels_.At(level))->level;
     const ModeField fine =
-        SolveModes(ProblemOf(number, surface), surface, body_, grid, workers_).front();
+        SolveRadiation(ProblemOf(number, surface), surface, body_, grid, workers_).front();
     const ModeField stored = FieldOf(mode, grid);
     return {{"vertices", mode.vertex_count},
             {"finer_vertices", surface.surface.vertex_count()},
@@ -93,7 +93,7 @@ class Reference {
     const SphereGrid grid(PatternOrder(mode.wavenumber, body_.radius_m));
     double begun_s = CpuSeconds();
     const ModeField field =
-        SolveModes(ProblemOf(number, level), level, body_, grid, workers_).front();
+        SolveRadiation(ProblemOf(number, level), level, body_, grid, workers_).front();
     const double sweeps_s = CpuSeconds() - begun_s;
     begun_s = CpuSeconds();
     const Eigen::MatrixXcf matrix =

@@ -18,8 +18,8 @@
 #include <vector>
 
 #include "precompute/radiation/far_pattern.h"
-#include "precompute/radiation/field_solver.h"
 #include "precompute/radiation/gmres.h"
+#include "precompute/radiation/solve_radiation.h"
 #include "precompute/radiation/solve_time.h"
 #include "tests/precompute/radiation/dense_equation.h"
 #include "tests/precompute/radiation/fork.h"
@@ -71,7 +71,7 @@ void PrintCell(Sphere& sphere, double ka, int l) {
                             .starts = {},
                             .tolerance = 2e-3};
   const ModeField field =
-      SolveModes(problem, sphere.level, sphere.body, grid, sphere.workers).front();
+      SolveRadiation(problem, sphere.level, sphere.body, grid, sphere.workers).front();
   std::printf(" %+.2f / %.2f |", Decibels(field.power_integral / exact),
               WorstDirectionDb(field, l, l / 2, exact, grid));
   std::fflush(stdout);

@@ -8,7 +8,7 @@
 
 #include "precompute/mesh/point_math.h"
 #include "precompute/radiation/far_pattern.h"
-#include "precompute/radiation/field_solver.h"
+#include "precompute/radiation/solve_radiation.h"
 #include "tests/precompute/test_meshes.h"
 
 namespace carillon::precompute {
@@ -62,11 +62,11 @@ std::vector<double> LevelsRoundFork(double distance_m) {
   body.center = {0, 0, Fork::kLengthM / 2};
   body.radius_m = 0.05;
   const SphereGrid grid(PatternOrder(Fork::kWavenumber, body.radius_m));
-  const ModeField field = SolveModes({.wavenumber = Fork::kWavenumber,
-                                      .displacements = {fork.motion},
-                                      .starts = {},
-                                      .tolerance = 1e-4},
-                                     level, body, grid, workers)
+  const ModeField field = SolveRadiation({.wavenumber = Fork::kWavenumber,
+                                          .displacements = {fork.motion},
+                                          .starts = {},
+                                          .tolerance = 1e-4},
+                                         level, body, grid, workers)
                               .front();
   std::vector<double> levels;
   for (int degree = 0; degree <= 90; ++degree) {

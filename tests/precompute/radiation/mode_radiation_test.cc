@@ -7,7 +7,7 @@
 #include <complex>
 #include <vector>
 
-#include "precompute/radiation/field_solver.h"
+#include "precompute/radiation/solve_radiation.h"
 
 namespace carillon::precompute {
 namespace {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "precompute/radiation/far_pattern.h"
-#include "precompute/radiation/field_solver.h"
+#include "precompute/radiation/solve_radiation.h"
 #include "tests/precompute/radiation/spheres.h"
 
 namespace carillon::precompute {
@@ -29,7 +29,7 @@ struct Sphere {
   ModeField Solve(double ka, const Displacement& motion, const SphereGrid& grid) {
     const ModeProblem problem{
         .wavenumber = ka, .displacements = {motion}, .starts = {}, .tolerance = 2e-3};
-    return SolveModes(problem, level, body, grid, workers).front();
+    return SolveRadiation(problem, level, body, grid, workers).front();
   }
 
   Workers workers{2};

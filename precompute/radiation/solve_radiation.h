@@ -31,9 +31,9 @@ struct ModeProblem {
 };
 
 /// Solves them on one surface, and finds the patterns at the directions of the grid.
-std::vector<ModeField> SolveModes(const ModeProblem& problem, const SurfaceLevel& level,
-                                  const RadiatingSurface& body, const SphereGrid& grid,
-                                  Workers& workers);
+std::vector<ModeField> SolveRadiation(const ModeProblem& problem, const SurfaceLevel& level,
+                                      const RadiatingSurface& body, const SphereGrid& grid,
+                                      Workers& workers);
 
 /// 10 log10 of the ratio of both power integrals.
 double PowerDifferenceDb(const ModeField& a, const ModeField& b);

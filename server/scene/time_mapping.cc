@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "server/scene/lateness.h"
+#include "server/scene/time_mapping.h"
 
 #include <cmath>
 
@@ -15,8 +15,13 @@ constexpr uint64_t kGrainFrames = OfflineRenderer::kBlockFrameCount;
 
 }  // namespace
 
-void Lateness::Note(double time_s, uint64_t frame, TimeMapping& mapping) {
-  const double late_frames = static_cast<double>(frame) - mapping.FrameOf(time_s, sample_rate_hz_);
+void TimeMapper::Begin(double time_s, uint64_t frame) {
+  mapping_.first_frame = frame;
+  mapping_.first_time_s = time_s;
+}
+
+void TimeMapper::Note(double time_s, uint64_t frame) {
+  const double late_frames = static_cast<double>(frame) - FrameOf(time_s);
   if (late_frames <= 0) {
     since_frame_.reset();
     return;
@@ -29,8 +34,8 @@ void Lateness::Note(double time_s, uint64_t frame, TimeMapping& mapping) {
   const auto run_frames = static_cast<double>(frame - *since_frame_);
   if (step_count_ < kFewestLateSteps || run_frames < kLateRunS * sample_rate_hz_) return;
   const double grains =
-      std::ceil((late_frames + mapping.delay_s * sample_rate_hz_) / double{kGrainFrames});
-  mapping.first_frame += static_cast<uint64_t>(grains) * kGrainFrames;
+      std::ceil((late_frames + mapping_.delay_s * sample_rate_hz_) / double{kGrainFrames});
+  mapping_.first_frame += static_cast<uint64_t>(grains) * kGrainFrames;
   since_frame_.reset();
   ++remap_count_;
 }

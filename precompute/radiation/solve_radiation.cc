@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
-#include "precompute/radiation/field_solver.h"
+#include "precompute/radiation/solve_radiation.h"
 
 #include <algorithm>
 #include <cmath>
@@ -29,9 +29,9 @@ double Decibels(double power_ratio) { return 10 * std::log10(power_ratio); }
 
 }  // namespace
 
-std::vector<ModeField> SolveModes(const ModeProblem& problem, const SurfaceLevel& level,
-                                  const RadiatingSurface& body, const SphereGrid& grid,
-                                  Workers& workers) {
+std::vector<ModeField> SolveRadiation(const ModeProblem& problem, const SurfaceLevel& level,
+                                      const RadiatingSurface& body, const SphereGrid& grid,
+                                      Workers& workers) {
   const double k = problem.wavenumber;
   const BoundaryOperator equation(level.surface, level.near, body.center, body.radius_m, k);
   const auto apply = [&](std::span<const std::vector<ComplexFloat>> inputs,
