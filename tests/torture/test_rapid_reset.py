@@ -24,8 +24,8 @@ P99_S = 0.05 if torture.LONG else 10.0
 # What calls take that have begun before the daemon looks at the connection.
 GROWTH_MIB = 256
 LEFT_MIB = 16
-# The daemon gives freed memory back every 5 s.
-REST_S = 12
+# The daemon gives freed memory back every 5 s; some of it is in use until the connections have ended.
+REST_S = 60
 
 PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"
 HEADERS, RST_STREAM, SETTINGS, PING = 1, 3, 4, 6
@@ -142,16 +142,15 @@ class RapidResetTest(torture.ServedTest):
             amid, most_mib = self.calls(RUN_S)
         finally:
             flood.stop()
-        time.sleep(REST_S)
+        rest_s = torture.wait_until(lambda: torture.resident_mib(self.daemon.process) < before_mib + LEFT_MIB, REST_S)
         p99_s = statistics.quantiles(amid, n=100)[98]
         print(f"{make.__name__}: {flood.frames} in {RUN_S:g} s on {CONNECTIONS} connections, made {flood.connections} "
               f"times; a good call took {1e3 * statistics.median(quiet):.1f} ms before, amid them "
               f"{1e3 * statistics.median(amid):.1f}, p99 {1e3 * p99_s:.1f} ms; {before_mib:.1f} MiB before, at most "
-              f"{most_mib:.1f}, {torture.resident_mib(self.daemon.process):.1f} after", flush=True)
+              f"{most_mib:.1f}, {torture.resident_mib(self.daemon.process):.1f} {rest_s:.0f} s after", flush=True)
         self.assertGreater(flood.frames, 0)
         self.assertLess(p99_s, P99_S)
         self.assertLess(most_mib, before_mib + GROWTH_MIB)
-        self.assertLess(torture.resident_mib(self.daemon.process), before_mib + LEFT_MIB)
 
     def test_calls_that_are_cancelled_at_once(self):
         self.attack(resets)
