@@ -21,7 +21,7 @@ struct RoundForecast {
   double later_rounds = 0;  ///< time of all later rounds, as a multiple of this round's
 };
 
-/// Is told about the progress of a decomposition, in the thread that does the work.
+/// Gets the progress of a decomposition, in the thread that does the work.
 class DecompositionObserver {
  public:
   virtual ~DecompositionObserver() = default;

@@ -11,7 +11,7 @@
 namespace carillon::adapters {
 
 /// Reads the contacts of a Bullet world as the engine reports them, with the speed at which each
-/// travels over the surfaces. The daemon tells blows, loads, slides and rolls apart.
+/// travels over the surfaces. The daemon distinguishes blows, loads, slides and rolls.
 class BulletContacts {
  public:
   explicit BulletContacts(const ContactSettings& settings) : rows_(settings) {}

@@ -14,7 +14,7 @@
 namespace carillon::adapters {
 
 /// Reads the contacts of an ODE world as the engine reports them, with the speed at which each
-/// travels over the surfaces. The daemon tells blows, loads, slides and rolls apart.
+/// travels over the surfaces. The daemon distinguishes blows, loads, slides and rolls.
 class OdeContacts {
  public:
   explicit OdeContacts(const ContactSettings& settings) : rows_(settings) {}

@@ -38,8 +38,8 @@ std::string SettingsText(const RenderOptions& options, const std::string& daemon
 std::string RecordLine(const ClipRecord& record);
 std::string ErrorLine(const std::string& clip, const absl::Status& error);
 
-/// Whether the record `clip`.json in `folder` tells of this trace with these settings, and all its
-/// files are there with the digests that it names.
+/// Returns whether the record `clip`.json in `folder` was made of this trace with these settings,
+/// and all its files are there with the digests that it names.
 bool IsRendered(const std::filesystem::path& folder, const ClipRecord& wanted);
 
 }  // namespace carillon::cli

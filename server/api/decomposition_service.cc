@@ -132,7 +132,7 @@ class JobsWatchCall final : public ServerStream<v1::WatchJobsResponse>, private 
 
   const JobFilter filter_;
   Mutex mutex_;
-  /// Names in the order of sending; an empty one stands for the begin of the changes.
+  /// Names in the order of sending; an empty one stands for the start of the changes.
   std::deque<std::string> order_ ABSL_GUARDED_BY(mutex_);
   std::map<std::string, v1::Job> waiting_ ABSL_GUARDED_BY(mutex_);
   bool overrun_ ABSL_GUARDED_BY(mutex_) = false;

@@ -22,10 +22,11 @@ class GuessLimiter {
   /// `clock` must outlive the limiter.
   explicit GuessLimiter(const Clock& clock) : clock_(clock) {}
 
-  /// Whether to let in the caller `name`, which showed a right credential.
+  /// Returns whether the caller `name`, which showed a right credential, may come in.
   bool TakeRight(absl::string_view peer, const std::string& name);
 
-  /// Whether to tell a caller that it showed a wrong credential. False: it has shown too many.
+  /// Counts a wrong credential. Returns whether the caller may learn that it was wrong; false if
+  /// the caller has shown too many.
   bool TakeWrong(absl::string_view peer);
 
  private:

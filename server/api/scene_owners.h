@@ -48,8 +48,8 @@ class SceneOwners {
   /// time.
   std::optional<uint64_t> LongestAbandoned(const std::optional<std::string>& client);
 
-  /// OK if the caller may use the scene: its owner and administrators may, and everybody may use
-  /// a scene that does not exist, to be told so. A scene that the call uses lasts for its
+  /// OK if the caller may use the scene: its owner and administrators may. OK, too, if the scene
+  /// does not exist, so that the caller learns that. A scene that the call uses lasts for its
   /// connection, too. Errors: PermissionDenied (SCENE_OF_ANOTHER).
   absl::Status Check(const grpc::CallbackServerContext& context, const Principal& caller,
                      uint64_t scene, SceneCall call = SceneCall::kUses) const;

@@ -19,7 +19,7 @@ namespace carillon {
 /// The largest message that gRPC accepts.
 inline constexpr size_t kMaxMessageBytes = size_t{4} << 20U;
 
-/// The settings of the API that GetServerInfo tells.
+/// The settings of the API that GetServerInfo returns.
 struct ServerFacts {
   std::string version;
   double client_share = 0;

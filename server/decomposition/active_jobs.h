@@ -40,13 +40,13 @@ struct ActiveJob {
   uint64_t guess_bytes = 0;     ///< predicted memory, before the correction by experience
   uint64_t estimate_bytes = 0;  ///< predicted memory
   uint64_t reserved_bytes = 0;  ///< share of the memory budget while it runs
-  std::chrono::nanoseconds started{};  ///< monotonic clock at the begin of the run
+  std::chrono::nanoseconds started{};  ///< monotonic clock at the start of the run
 };
 
 /// The jobs that wait or run, and everybody who watches a job: all in memory. No call waits for a
 /// disk, so readers and progress reports are served while the database is busy. Safe from every
-/// thread; one thread at a time adds, removes and changes jobs. A call that returns a Notice tells
-/// the watchers nothing itself: the caller tells it after it has released its locks.
+/// thread; one thread at a time adds, removes and changes jobs. A call that returns a Notice has
+/// not called the watchers: the caller sends the notice after it has released its locks.
 class ActiveJobs {
  public:
   /// What may run at a time.
@@ -85,7 +85,7 @@ class ActiveJobs {
   /// Applies `change` to a job. A waiting job moves to the place in the queue that it then has.
   Notice Change(const std::string& digest, absl::FunctionRef<void(ActiveJob&)> change);
 
-  /// Removes a job; `last` is what its watchers are told.
+  /// Removes a job. Its watchers get `last`.
   Notice Remove(const std::string& digest, const v1::Job& last);
 
   /// Marks the next job as running if a worker and the memory for it are free. It is the first of

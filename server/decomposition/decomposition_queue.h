@@ -33,7 +33,7 @@ struct QueueSettings {
   size_t max_queued_count_of_client = 512;
   /// Whether a transfer is computed of each model after it, unless the request leaves it out.
   bool transfers = false;
-  /// Takes log lines about events that no caller is told of. Called on any thread.
+  /// Takes log lines about events of which no caller learns. Any thread calls it.
   std::function<void(const std::string& line)> log = [](const std::string&) {};
 };
 
@@ -97,7 +97,7 @@ class DecompositionQueue {
                                             const JobFilter& filter = {});
 
   /// Cancels a queued or running job; a job that has ended stays unchanged. A running job is still
-  /// running in the answer, and a watch tells its end. Errors: NotFound (JOB_NOT_FOUND).
+  /// running in the answer; its watchers learn of its end. Errors: NotFound (JOB_NOT_FOUND).
   absl::StatusOr<v1::Job> Cancel(const std::string& digest);
 
   /// Calls `on_change` with the job at once and after every change, in order and one call at a

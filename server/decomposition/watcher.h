@@ -13,13 +13,13 @@
 
 namespace carillon {
 
-/// A function that is told of a job's changes: in order, one call at a time, none after Close.
+/// Calls a function with each change of a job: in order, one call at a time, none after Close.
 class Watcher {
  public:
   explicit Watcher(std::function<void(const v1::Job&)> on_change)
       : on_change_(std::move(on_change)) {}
 
-  /// Calls the function with `job`, unless it was told a newer version. Versions count from 1.
+  /// Calls the function with `job`, unless it has had a newer version. Versions count from 1.
   void Tell(const v1::Job& job, uint64_t version) {
     const RecursiveMutexLock lock(&mutex_);
     if (closed_ || version <= told_) return;
@@ -41,7 +41,7 @@ class Watcher {
   const std::function<void(const v1::Job&)> on_change_;
 };
 
-/// A change of a job, to be told to its watchers when no lock is held.
+/// A change of a job, of which its watchers learn when no lock is held.
 struct Notice {
   std::vector<std::shared_ptr<Watcher>> watchers;
   v1::Job job;

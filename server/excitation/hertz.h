@@ -38,9 +38,9 @@ inline constexpr double kFlattestRadiusM = 0.05;
 ///
 ///   T = 2.87 (m^2 / (R E^2 v))^(1/5),  1/E = (1 - nu1^2)/E1 + (1 - nu2^2)/E2
 ///
-/// `told` replaces what the bodies say. Without an approach speed v = J/(2 m), which is that of two
-/// elastic bodies that exchange the impulse J, `impulse_newton_seconds`. The result is at most
-/// kLongestContactS.
+/// The values of `told` replace those that follow from the bodies. Without an approach speed v =
+/// J/(2 m), which is that of two elastic bodies that exchange the impulse J,
+/// `impulse_newton_seconds`. The result is at most kLongestContactS.
 double HertzDurationS(const ElasticBody& struck, const ElasticBody& striker,
                       const HertzContact& told, double impulse_newton_seconds);
 

@@ -40,7 +40,7 @@ class DeviceKeeper {
  public:
   /// Takes a line for people to read.
   using Log = std::function<void(const std::string&)>;
-  /// Is told whether the wanted device plays, each time that this changes.
+  /// The keeper calls this each time that the wanted device begins or ceases to play.
   using Observer = std::function<void(bool plays)>;
 
   /// Plays `source`, which must outlive the keeper, as `clock` must. A sound card that is not there

@@ -44,7 +44,7 @@ using OnFinding = std::function<void(const std::string& line)>;
 absl::Status CheckDatabase(const std::filesystem::path& file, const OnFinding& on_finding);
 
 /// Copies every undamaged model, mesh and job into a new database, which replaces the old one; the
-/// old one is kept as `file`.damaged. `on_finding` is told of each row that is left out.
+/// old one is kept as `file`.damaged. `on_finding` gets each row that is left out.
 /// Errors: FailedPrecondition (DATABASE_UNUSABLE), ResourceExhausted (DATABASE_FULL).
 absl::Status RepairDatabase(const std::filesystem::path& file, const OnFinding& on_finding);
 

@@ -15,8 +15,8 @@ namespace carillon {
 
 /// Reads the readable part of a damaged database.
 
-/// The digests in `table` that can be read from its begin and from its end. `on_finding` is told of
-/// an error in between.
+/// Returns the digests in `table` that can be read from its start and from its end. `on_finding`
+/// gets an error in between.
 inline std::vector<std::string> Names(Database& database, const std::string& table,
                                       const std::function<void(const std::string&)>& on_finding) {
   std::vector<std::string> names;

@@ -49,7 +49,7 @@ struct ForceEvent {
 /// A client that sends only steps with contacts does not wait: the first step after a gap is a blow
 /// by itself.
 ///
-/// An engine tells the step of a blow and not the time within the step. Blows of two bodies that
+/// An engine gives the step of a blow and not the time within the step. Blows of two bodies that
 /// slide, roll or hop would therefore sound on the grid of the steps, and be heard as lines at the
 /// multiples of the step rate. A blow of two bodies that touched within 0.1 s before it is sent at
 /// a random time within one step after the step in which it is over. The time is uniformly

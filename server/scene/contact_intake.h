@@ -90,7 +90,7 @@ class ContactIntake {
   void Touch(const ObjectTouch& touch);
 
   /// The pose of an object, or of the listener, at the time of the step: both move there in a
-  /// straight line from the pose told before.
+  /// straight line from the pose given before.
   void Move(uint32_t handle, const Pose& pose);
   void MoveListener(const Pose& pose);
 
@@ -130,7 +130,7 @@ class ContactIntake {
   void NoteZero(const ObjectContact& contact);
   void Push(const ContactForces::Events& events);
   void Push(MixerEvent& event, double frame);
-  /// Tells the blow of `event`, whose object, partner and frame are given.
+  /// Adds the blow of `event`, whose object, partner and frame are given, to the settings' blows.
   void Tell(const MixerEvent& event, FoundBlow blow, double frame)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(scene_.mutex());
   absl::StatusOr<double> FrameOfImpulse(double time_offset_s) const;

@@ -19,7 +19,7 @@ namespace carillon {
 struct Felt {
   uint32_t handle = 0;
   MixerEvent event{};     ///< a SurfaceImpulse; its time is set when it is sent
-  double distance_m = 0;  ///< from the point that was told to the surface
+  double distance_m = 0;  ///< from the point of the contact to the surface
   double extent_m = 0;    ///< of the object
   /// An impulse that makes the whole object ten times as fast as sound travels in its material. No
   /// body bears even a tenth of it.

@@ -34,7 +34,7 @@ struct ObjectProperties {
   /// Poisson's ratio of the material; if it is given, it must agree with the model's.
   std::optional<double> poisson_ratio;
   double gain = 1;                          ///< linear
-  std::optional<Pose> pose = std::nullopt;  ///< the newest that was told
+  std::optional<Pose> pose = std::nullopt;  ///< the newest
   RadiationModel radiation = RadiationModel::kDefault;
 };
 

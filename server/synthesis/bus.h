@@ -48,7 +48,8 @@ struct MixedSection {
   SectionCounts counts;
 };
 
-/// A bus as the rendering thread sees it, with what the controlling threads tell it.
+/// A bus as the rendering thread sees it, with the settings that the controlling threads leave
+/// there.
 struct Bus {
   explicit Bus(double sample_rate_hz) : fader(sample_rate_hz), stop(sample_rate_hz) {}
 
@@ -75,7 +76,8 @@ struct Bus {
   /// A gain glides, or the bus fades out to be silenced.
   bool changes() const noexcept { return !fader.resting() || !stop.neutral(); }
 
-  /// Takes what the controlling threads told. A bus that is silent needs neither glide nor fade.
+  /// Takes over the settings of the controlling threads. A bus that is silent needs neither glide
+  /// nor fade.
   void Listen() noexcept {
     const float target = gain.load(std::memory_order_relaxed);
     const bool opened = jumps.exchange(false, std::memory_order_acquire);

@@ -155,7 +155,7 @@ void Mixer::Take(MixerEvent& event, EventQueue& queue) noexcept {
   Count(counts_as_late ? statistics_.late_count : statistics_.accepted_count);
 }
 
-/// Keeps an event until its block, and the begin of its contact if the bank sounds from then on.
+/// Keeps an event until its block, and the start of its contact if the bank sounds from then on.
 /// False: there are too many.
 bool Mixer::Await(MixerEvent& event, BankSlot& slot) noexcept {
   const SurfaceImpulse* impulse = event.impulse();

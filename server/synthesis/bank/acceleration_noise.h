@@ -96,7 +96,7 @@ class AccelerationNoise {
   };
   /// A contact that lasts.
   struct ActivePulse {
-    size_t begin = 0, end = 0;  // frames from the begin of the next block to render
+    size_t begin = 0, end = 0;  // frames from the start of the next block to render
     double lead_s = 0;          // from the contact's begin to frame `begin`
     double end_lead_s = 0;      // from the contact's end to frame `end`
     double duration_s = 0;

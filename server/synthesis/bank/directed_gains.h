@@ -64,10 +64,10 @@ class DirectedGains {
   /// effect. After a block without a call the gains begin at `bearing`.
   void BeginBlock(uint64_t block_number, const Bearing& bearing) noexcept;
 
-  /// Whether the gains at the block's end differ from those at its begin.
+  /// Whether the gains at the block's end differ from those at its start.
   bool moving() const noexcept { return moving_; }
 
-  /// The gains of all lanes at the begin of the block, if they move, and at its end.
+  /// The gains of all lanes at the start of the block, if they move, and at its end.
   ring_kernel::Gains at_begin() const noexcept { return begin_.gains(); }
   ring_kernel::Gains at_end() const noexcept { return end_.gains(); }
 

@@ -51,7 +51,7 @@ struct OscillatorBankSettings {
 ///   Z_m(n+1) = q_m Z_m(n),  q_m = exp((sigma_m + i omega_m) / sample rate),  output = sum Re Z_m
 ///
 /// or, for a bank with directivity, output = sum Re (gain_m Z_m) with the gains of DirectedGains.
-/// While the gains move, the states are rendered twice, with the gains of the block's begin and of
+/// While the gains move, the states are rendered twice, with the gains of the block's start and of
 /// its end, and one rendering fades into the other. A block with impulses is rendered once more for
 /// the sake of the states alone.
 ///
@@ -100,7 +100,7 @@ class OscillatorBank {
   bool StrikeMerged(std::span<const DueEvent> events, BlockMix& mix) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
-  /// Frames from the begin of an impulse's contact to its time, if the bank is to be told when
+  /// Frames from the start of an impulse's contact to its time, if the bank is to be told when
   /// contacts begin; zero: it is not.
   double ContactLeadFrames(Pulse pulse) const noexcept;
 
@@ -284,7 +284,7 @@ class OscillatorBank {
   // Modes, without companions, in each group of kMostLanes lanes, by segment.
   std::vector<uint8_t> group_mode_counts_;
   // A block without events in which the bank rings by spectrum reads only the members from here to
-  // the begin of force_, so that a thousand banks cost few cache misses.
+  // the start of force_, so that a thousand banks cost few cache misses.
   Block block_;
   Ringing ringing_ = Ringing::kNowhere;
   bool awake_changed_ = false;     // the awake lanes are to be counted again

@@ -60,7 +60,7 @@ bool RingFreely(LaneArrays& lanes, std::span<RingingSegment> segments,
                 const FreeBlock& block) noexcept;
 
 /// A part of a block, for all lanes, with the impulses that fall into it. Tiles begin anew with the
-/// part. The batch's states are those at the impulses' frames; in longer tiles, those at the begin
+/// part. The batch's states are those at the impulses' frames; in longer tiles, those at the start
 /// of the impulse's tile. In longer tiles each impulse has nodes of its own (StrikeBatch::nodes),
 /// because only the frames after it are audible.
 struct StruckPart {

@@ -32,13 +32,13 @@ struct Onset {
   float lead_frames = 0;        ///< from the impulse to its first audible sample
   float gaussian_tau_s = 0;     ///< standard deviation of a Gaussian contact; zero: another one
   float cosine_duration_s = 0;  ///< of a contact with the pulse of a raised cosine; zero: another
-  /// Frames from the begin of the part's first tile (tile.h) to the onset. Zero: states are
+  /// Frames from the start of the part's first tile (tile.h) to the onset. Zero: states are
   /// computed at the onset's frame in longer tiles too.
   size_t frames_into_tiles = 0;
 };
 
 /// Writes what modal impulses add to the states into added_re and added_im: at the onset's frame,
-/// or for lanes in longer tiles at the begin of the onset's tile. False: not finite.
+/// or for lanes in longer tiles at the start of the onset's tile. False: not finite.
 bool Excite(const LaneArrays& lanes, size_t lane_count, const float* modal_impulses,
             const Onset& onset, const StrikeBatch::RowsAhead& ahead, float* added_re,
             float* added_im) noexcept;

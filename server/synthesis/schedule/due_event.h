@@ -11,7 +11,7 @@ namespace carillon {
 struct DueEvent {
   uint32_t slot = 0;    ///< the bank's
   uint32_t block = 0;   ///< index among the blocks rendered together
-  uint32_t offset = 0;  ///< first audible sample, frames since that block's begin
+  uint32_t offset = 0;  ///< first audible sample, frames since that block's start
   bool merged = false;  ///< an impulse that is merged with its neighbours in time
   const MixerEvent* event = nullptr;
 };

@@ -22,7 +22,7 @@ class RenderOrder {
     uint32_t section = 0;
     uint32_t block = 0;   ///< index among the blocks rendered together
     uint32_t slot = 0;    ///< the bank's
-    uint32_t offset = 0;  ///< frames since the block's begin
+    uint32_t offset = 0;  ///< frames since the block's start
     bool merged = false;
     uint32_t arrival = 0;  ///< index among the events due in the blocks rendered together
   };

@@ -68,7 +68,7 @@ class Voice {
   /// Makes a point of the object's frame the place of its sound, in place of the frame's origin.
   void SetCenter(const Vector3& center_m) noexcept;
 
-  /// Where the listener is at the begin of this block, seen from the place of the object's sound.
+  /// Where the listener is at the start of this block, seen from the place of the object's sound.
   /// The gains of the last block hold for the same time, because the voice is one block late.
   Bearing BearingOfListener() const noexcept;
 

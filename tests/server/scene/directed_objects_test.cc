@@ -63,7 +63,7 @@ class DirectedObjects : public testing::Test {
     return scene;
   }
 
-  /// The root mean square of a strike on an object in this pose, without its begin.
+  /// The root mean square of a strike on an object in this pose, without its start.
   double Strike(uint64_t scene, const Pose& pose = {}) {
     ObjectChange change;
     change.pose = pose;
