@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 'use strict';
 
-const fs = require('fs');
-const grpc = require('@grpc/grpc-js');
 const { defaultServer } = require('./address');
 const { given, toPose } = require('./contacts');
 const { services } = require('./contract');
+const { channelCredentials, tokenInterceptors } = require('./credentials');
 const { CarillonError, fromCall, fromInfo } = require('./errors');
 const { toMaterial } = require('./materials');
 const { toMeshFile } = require('./meshes');
@@ -23,25 +22,26 @@ const PIECE_BYTES = 1 << 20;
 
 /**
  * Connects to a daemon: "unix:PATH" or "HOST:PORT", by default where defaultServer() says. `tlsRoots` is the PEM file
- * with the certificates that vouch for a daemon with TLS.
+ * with the certificates that vouch for a daemon with TLS. Over TCP the daemon may want to know the caller, by `token`
+ * (default: $CARILLON_TOKEN), or by the PEM files `tlsCertificate` and `tlsKey`.
  */
-function connect(server, { tlsRoots } = {}) {
-  return new Client(server ?? defaultServer(), tlsRoots);
+function connect(server, options = {}) {
+  return new Client(server ?? defaultServer(), options);
 }
 
 /** A connection. Its process can end when it is closed. */
 class Client {
-  constructor(server, tlsRoots) {
+  constructor(server, { token, ...tlsFiles } = {}) {
     this.server = server;
-    this.credentials = tlsRoots ? grpc.credentials.createSsl(fs.readFileSync(tlsRoots))
-      : grpc.credentials.createInsecure();
+    this.credentials = channelCredentials(tlsFiles);
+    this.interceptors = tokenInterceptors(token);
     this.stubs = new Map();
   }
 
   /** The client of a service of the contract that grpc-js makes, for calls that have no method here. */
   stub(service) {
     if (!this.stubs.has(service)) {
-      const options = { 'grpc.max_receive_message_length': -1 };
+      const options = { 'grpc.max_receive_message_length': -1, interceptors: this.interceptors };
       this.stubs.set(service, new services[service](this.server, this.credentials, options));
     }
     return this.stubs.get(service);

@@ -277,7 +277,17 @@ export class Client {
   close(): void;
 }
 
-/** Connects to a daemon: "unix:PATH" or "HOST:PORT"; `tlsRoots` is a PEM file. */
-export function connect(server?: string, options?: { tlsRoots?: string }): Client;
+/** How a client knows a daemon over TCP, and the daemon the client. */
+export interface ConnectOptions {
+  /** The PEM file with the certificates that vouch for a daemon with TLS. */
+  tlsRoots?: string;
+  /** The token by which the daemon knows the caller. Default: $CARILLON_TOKEN. */
+  token?: string;
+  /** The PEM files of a client certificate, by which the daemon knows the caller; both or none. */
+  tlsCertificate?: string;
+  tlsKey?: string;
+}
+/** Connects to a daemon: "unix:PATH" or "HOST:PORT". Throws a TypeError if the options do not fit together. */
+export function connect(server?: string, options?: ConnectOptions): Client;
 /** The address where the daemon listens unless somebody says otherwise. */
 export function defaultServer(): string;
