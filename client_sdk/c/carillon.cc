@@ -20,6 +20,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "carillon/client.h"
+#include "carillon/lasting_stream.h"
 #include "client_sdk/c/c_conversion.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
@@ -31,6 +32,7 @@ struct carillon_client {
 struct carillon_scene {
   const carillon::client::Client& daemon;
   std::string name;
+  std::optional<carillon::client::SceneRegistration> registration = std::nullopt;
 };
 
 struct carillon_stream {
@@ -179,6 +181,23 @@ carillon_code carillon_create_scene(carillon_client* client, carillon_scene** sc
   });
 }
 
+carillon_code carillon_register_scene(carillon_client* client, const char* id,
+                                      const carillon_object* objects, size_t object_count,
+                                      carillon_scene** scene) {
+  return Try([&]() -> absl::Status {
+    if (!client || !id || (!objects && object_count > 0) || !scene) return Missing("an argument");
+    carillon::client::SceneRegistration registration;
+    registration.scene.set_id(id);
+    for (const carillon_object& object : std::span(objects, object_count)) {
+      if (!object.model || !object.material) return Missing("the model or material of an object");
+      carillon::c::Fill(object, registration.objects.emplace_back());
+    }
+    ASSIGN_OR_RETURN(std::string name, RegisterScene(*client->daemon, registration));
+    *scene = new carillon_scene{*client->daemon, std::move(name), std::move(registration)};
+    return absl::OkStatus();
+  });
+}
+
 void carillon_delete_scene(carillon_scene* scene) {
   if (scene == nullptr) return;
   const std::unique_ptr<carillon_scene> owned(scene);
@@ -232,8 +251,11 @@ carillon_code carillon_open_stream(carillon_scene* scene, double step_s, carillo
     v1::ContactStreamStart start;
     start.set_scene(scene->name);
     start.set_step_s(step_s);
-    ASSIGN_OR_RETURN(auto opened, scene->daemon.StreamContacts(start));
-    *stream = new carillon_stream{std::move(opened)};
+    auto opened = scene->registration
+                      ? OpenLastingStream(scene->daemon, *scene->registration, start)
+                      : scene->daemon.StreamContacts(start);
+    RETURN_IF_ERROR(opened.status());
+    *stream = new carillon_stream{*std::move(opened)};
     return absl::OkStatus();
   });
 }

@@ -143,6 +143,13 @@ carillon_code carillon_create_model_of_mesh(carillon_client* client, const caril
                                             const char* material, char* model);
 
 carillon_code carillon_create_scene(carillon_client* client, carillon_scene** scene);
+/** Makes a scene of the id (1 to 64 lower-case letters, digits, ".", "_" and "-", a letter first)
+ * with its objects, each with a handle above zero. If the daemon has the scene already, its objects
+ * stay, and the missing ones are added: a program may register its scene again after it was
+ * restarted. */
+carillon_code carillon_register_scene(carillon_client* client, const char* id,
+                                      const carillon_object* objects, size_t object_count,
+                                      carillon_scene** scene);
 /** Fades out the objects of the scene and deletes it. */
 void carillon_delete_scene(carillon_scene* scene);
 /** Returns the name of the scene, "scenes/{id}". The text is valid until the scene is deleted. */
@@ -156,11 +163,15 @@ carillon_code carillon_set_gain(carillon_scene* scene, double gain);
 /** Silences all that sounds in the scene, with a short fade. */
 carillon_code carillon_stop(carillon_scene* scene);
 
-/** Opens a stream of the contacts of a simulation whose steps last `step_s`. */
+/** Opens a stream of the contacts of a simulation whose steps last `step_s`. The stream of a
+ * registered scene outlives its connection: while the daemon does not answer, steps are dropped and
+ * counted, and a thread tries twice a second to register the scene again, without the objects that
+ * carillon_add_object has added. */
 carillon_code carillon_open_stream(carillon_scene* scene, double step_s, carillon_stream** stream);
 /** Sends a step. It copies the step and never waits for the daemon. */
 carillon_code carillon_send(carillon_stream* stream, const carillon_step* step);
-/** Sends what waits and ends the stream. `report` may be null. */
+/** Sends what waits and ends the stream. `report` may be null. Of a stream that was opened again it
+ * counts the newest part, but for the dropped steps, which it counts from the beginning. */
 carillon_code carillon_close_stream(carillon_stream* stream, carillon_report* report);
 
 /** Begins a contact trace, which is written to a file (.contacts), to be rendered now or later. */

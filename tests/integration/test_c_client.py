@@ -6,6 +6,7 @@ import os
 import pathlib
 import re
 import subprocess
+import time
 import unittest
 
 import numpy
@@ -44,6 +45,10 @@ class Step(ctypes.Structure):
                 ("poses", ctypes.c_void_p), ("pose_count", ctypes.c_size_t)]
 
 
+class Report(ctypes.Structure):
+    _fields_ = [(name + "_count", ctypes.c_uint64) for name in ("step", "accepted", "late", "rejected", "dropped_step")]
+
+
 class Sound(ctypes.Structure):
     _fields_ = [("samples", ctypes.POINTER(ctypes.c_float)), ("frame_count", ctypes.c_uint64),
                 ("channel_count", ctypes.c_uint32), ("sample_rate_hz", ctypes.c_uint32)]
@@ -59,6 +64,10 @@ class CClientTest(DaemonTest):
         cls.library = next(cls.prefix.rglob("libcarillon.so"))
         cls.c = ctypes.CDLL(str(cls.library))
         cls.c.carillon_error.restype = cls.c.carillon_error_reason.restype = ctypes.c_char_p
+        cls.c.carillon_scene_name.restype = ctypes.c_char_p
+        cls.c.carillon_register_scene.argtypes = [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p, ctypes.c_size_t,
+                                                  ctypes.c_void_p]
+        cls.c.carillon_open_stream.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p]
         cls.c.carillon_render.argtypes = [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_uint32, ctypes.c_double,
                                           ctypes.POINTER(Sound)]
         cls.c.carillon_create_trace.argtypes = [ctypes.c_char_p, ctypes.c_double, ctypes.POINTER(ctypes.c_void_p)]
@@ -129,6 +138,51 @@ class CClientTest(DaemonTest):
             self.assertEqual(c.create_model((VERTICES, TRIANGLES), meshes.MATERIAL).name, model)
         self.assertGreater(same.peak, 1e-5)
         numpy.testing.assert_array_equal(samples, same.samples)
+
+    def test_a_registered_scene_outlives_its_daemon(self):
+        code, model = self.model_of_arrays(VERTICES, TRIANGLES)
+        self.assertEqual(code, 0, self.c.carillon_error())
+        bars = (Object * 2)(*(Object(model.encode(), meshes.MATERIAL.encode(), handle=handle) for handle in (5, 9)))
+        scene, again, stream = ctypes.c_void_p(), ctypes.c_void_p(), ctypes.c_void_p()
+        for made in (scene, again):
+            code = self.c.carillon_register_scene(self.connection, b"lathe-1", bars, 2, ctypes.byref(made))
+            self.assertEqual(code, 0, self.c.carillon_error())
+            self.assertEqual(self.c.carillon_scene_name(made), b"scenes/lathe-1")
+        self.assertEqual(self.c.carillon_open_stream(scene, 0.01, ctypes.byref(stream)), 0)
+        self.daemon.kill()
+        self.daemon.start()
+        step = Step(0.0, None, 0, None, 0, None, 0)
+        handles, end_s = [], time.monotonic() + 30
+        with carillon.connect(self.daemon.server) as c:
+            while handles != [5, 9] and time.monotonic() < end_s:
+                step.time_s += 0.01
+                self.assertEqual(self.c.carillon_send(stream, ctypes.byref(step)), 0, self.c.carillon_error())
+                time.sleep(0.01)
+                handles = [item.handle for scene_there in c.scenes() for item in scene_there.objects()]
+        self.assertEqual(handles, [5, 9])
+        blow = Impulse(9, Vec3(0.2, 0.015, 0.01), Vec3(0, 0, -0.01), 1e-4)
+        step.impulses, step.impulse_count, step.time_s = ctypes.pointer(blow), 1, step.time_s + 0.01
+        report = Report()
+        while report.accepted_count + report.late_count == 0 and time.monotonic() < end_s:
+            self.assertEqual(self.c.carillon_send(stream, ctypes.byref(step)), 0)
+            self.assertEqual(self.c.carillon_close_stream(stream, ctypes.byref(report)), 0, self.c.carillon_error())
+            self.assertEqual(self.c.carillon_open_stream(scene, 0.01, ctypes.byref(stream)), 0)
+        self.assertEqual(report.accepted_count + report.late_count, 1)
+        self.c.carillon_close_stream(stream, None)
+        self.c.carillon_delete_scene(again)
+        self.c.carillon_delete_scene(scene)
+
+    def test_registrations_without_an_id_or_a_handle_are_refused(self):
+        scene = ctypes.c_void_p()
+        register = self.c.carillon_register_scene
+        self.assertEqual(register(self.connection, b"", None, 0, ctypes.byref(scene)), 3)
+        self.assertEqual(self.c.carillon_error_reason(), b"INVALID_SCENE_ID")
+        bar = Object(b"modalModels/" + b"0" * 64, meshes.MATERIAL.encode())
+        self.assertEqual(register(self.connection, b"a", ctypes.byref(bar), 1, ctypes.byref(scene)), 3)
+        self.assertEqual(self.c.carillon_error_reason(), b"INVALID_SETTINGS")
+        self.assertEqual(register(self.connection, b"a", None, 1, ctypes.byref(scene)), 3)
+        self.assertIn(b"null pointer", self.c.carillon_error())
+        self.assertIsNone(scene.value)
 
     def test_mistakes_have_a_code_and_a_reason(self):
         code, _ = self.model_of_arrays(VERTICES, [(0, 1, 99)])
