@@ -191,6 +191,7 @@ ApiSettings ApiSettingsOf(const Options& options) {
                   .key = options.tls_key_file,
                   .client_roots = options.tls_client_roots_file},
           .access_file = options.access_file,
+          .head_file = options.head_file,
           .version = kVersion,
           .scene_grace_s = options.scene_grace_s,
           .client_share = options.client_share};

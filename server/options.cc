@@ -79,6 +79,7 @@ void VisitSettings(SomeOptions& options, const Visit& visit) {
   visit("channels", options.channel_count);
   visit("gain", options.gain);
   visit("full_scale_pa", options.full_scale_pa);
+  visit("head", options.head_file);
   visit("block_frames", options.block_frame_count);
   visit("look_ahead_blocks", options.look_ahead_block_count);
   visit("scene_grace", options.scene_grace_s);
@@ -233,6 +234,10 @@ void AddFlags(CLI::App& app, Options& options) {
       ->capture_default_str();
   app.add_option("--full-scale-pa", options.full_scale_pa,
                  "pressure of a sample of full scale, Pa; less is louder")
+      ->capture_default_str();
+  app.add_option("--head", options.head_file,
+                 "SOFA file with the measured head for binaural scenes; by default the one of "
+                 "Debian's libmysofa1")
       ->capture_default_str();
   app.add_option("--block-frames", options.block_frame_count, "frames in a rendered block")
       ->capture_default_str();

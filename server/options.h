@@ -22,6 +22,7 @@ struct Options {
   uint32_t channel_count = 1;
   double gain = 1;  ///< of the output, linear
   double full_scale_pa = kFullScalePa;
+  std::string head_file;          ///< SOFA file for binaural scenes; empty: libmysofa1's
   int worker_count = 0;           ///< decompositions at a time; 0: half of the processors
   int64_t memory_budget_mib = 0;  ///< of all decompositions together; 0: half of the machine's
   int64_t job_memory_mib = 0;     ///< of one decomposition; 0: the whole budget

@@ -19,7 +19,8 @@ ROOMS = ("server/base/", "server/mode_database/", "server/decomposition/", "serv
          "server/live_output/", "server/scene/")
 # Compiled once for each SIMD target, and without a lock or a role: minutes for nothing.
 KERNELS = ("server/synthesis/ringing/force_kernel.cc", "server/synthesis/ringing/ring_kernel.cc",
-           "server/synthesis/ringing/strike_kernel.cc", "server/synthesis/spectrum/spectral_kernel.cc")
+           "server/synthesis/ringing/strike_kernel.cc", "server/synthesis/spectrum/spectral_kernel.cc",
+           "server/synthesis/voice/convolution_kernel.cc")
 KEPT = ("-I", "-D", "-std")
 
 

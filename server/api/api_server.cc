@@ -142,19 +142,21 @@ struct ApiServer::State {
         models(rooms.database, rooms.decompositions, reception),
         decompositions(rooms.decompositions, reception),
         job_runs(rooms.runs, access, call_pool),
-        scenes(rooms.scenes, owners, rooms.database, reception),
+        heads(settings.head_file),
+        scenes(rooms.scenes, owners, rooms.database, heads, reception),
         contacts({.scenes = rooms.scenes,
                   .output = rooms.output,
                   .clock = rooms.clock,
                   .owners = owners,
                   .reception = reception}),
-        audio(settings.version, rooms.output, rooms.scenes, rooms.database, rooms.clock, idle_calls,
-              {access, limits, render_pool}),
+        audio(settings.version, rooms.output, rooms.scenes, rooms.database, heads, rooms.clock,
+              idle_calls, {access, limits, render_pool}),
         certificate_end(rooms.clock),
         server_info({.version = settings.version,
                      .client_share = settings.client_share,
                      .scene_grace_s = settings.scene_grace_s,
                      .certificate_end = certificate_end,
+                     .binaural = heads.available(),
                      .can_decompose = rooms.can_decompose},
                     rooms.decompositions, rooms.output, rooms.clock),
         output(rooms.output) {}
@@ -190,6 +192,7 @@ struct ApiServer::State {
   ModalModelService models;
   DecompositionService decompositions;
   JobRunService job_runs;
+  HeadStore heads;
   SceneService scenes;
   ContactService contacts;
   AudioService audio;
@@ -251,6 +254,10 @@ absl::StatusOr<std::unique_ptr<ApiServer>> ApiServer::Start(const ApiSettings& s
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();
   ASSIGN_OR_RETURN(AccessTable table, ReadAccess(settings));
   auto state = std::make_unique<State>(settings, rooms, std::move(table));
+  if (!settings.head_file.empty()) {
+    const uint32_t rate_hz = rooms.output.format().sample_rate_hz;
+    RETURN_IF_ERROR(state->heads.Get(rate_hz).status());
+  }
   RETURN_IF_ERROR(state->Listen(settings));
   state->keeper.emplace(ClientKeeper::Kept{
       .scenes = rooms.scenes,

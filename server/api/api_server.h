@@ -28,6 +28,8 @@ struct ApiSettings {
   /// Who may do what over TCP; see AccessTable. Empty: only addresses of this machine, from which
   /// anybody may do all but administer.
   std::string access_file{};
+  /// SOFA file with the head for binaural scenes; empty: that of HeadStore.
+  std::string head_file{};
   /// Version of the daemon.
   std::string version{};
   /// Seconds for which a scene waits for its clients to come back.

@@ -26,6 +26,7 @@ grpc::ServerBidiReactor<v1::RenderRequest, v1::RenderResponse>* AudioService::Re
   return Open(*context, reception_, Role::kStrike, Holding::kRendering,
               [this, context](const Principal&, ClientPlace place) {
                 return MakeRenderCall({.database = database_,
+                                       .heads = heads_,
                                        .bodies = render_bodies_,
                                        .pool = reception_.pool,
                                        .call_count = rendering_count_,

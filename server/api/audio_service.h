@@ -10,6 +10,7 @@
 #include "server/base/clock.h"
 #include "server/live_output/live_output.h"
 #include "server/mode_database/mode_database.h"
+#include "server/scene/head_store.h"
 #include "server/scene/scene_registry.h"
 #include "server/scene/sounding_body.h"
 
@@ -20,12 +21,13 @@ class AudioService final : public v1::AudioService::CallbackService {
  public:
   /// The pool of `reception` has the threads that render offline.
   AudioService(std::string version, LiveOutput& output, const SceneRegistry& scenes,
-               ModeDatabase& database, const Clock& clock, IdleCalls& idle_calls,
+               ModeDatabase& database, HeadStore& heads, const Clock& clock, IdleCalls& idle_calls,
                const Reception& reception)
       : version_(std::move(version)),
         output_(output),
         scenes_(scenes),
         database_(database),
+        heads_(heads),
         clock_(clock),
         idle_calls_(idle_calls),
         reception_(reception) {}
@@ -48,6 +50,7 @@ class AudioService final : public v1::AudioService::CallbackService {
   LiveOutput& output_;
   const SceneRegistry& scenes_;
   ModeDatabase& database_;
+  HeadStore& heads_;
   const Clock& clock_;
   IdleCalls& idle_calls_;
   const Reception reception_;

@@ -33,6 +33,7 @@ v1::Hearing ToProto(const HearingSettings& hearing) {
   proto.set_distance_gain(hearing.distance_gain);
   proto.set_propagation_delay(hearing.propagation_delay);
   proto.set_panning(hearing.panning);
+  proto.set_binaural(hearing.binaural);
   proto.set_directivity(hearing.directivity);
   proto.set_near_field(hearing.near_field);
   proto.set_reference_distance_m(hearing.reference_distance_m);
@@ -44,6 +45,7 @@ SceneSpace ToSceneSpace(const v1::Hearing& hearing, const v1::Pose& listener) {
   SceneSpace space{.hearing = {.distance_gain = hearing.distance_gain(),
                                .propagation_delay = hearing.propagation_delay(),
                                .panning = hearing.panning(),
+                               .binaural = hearing.binaural(),
                                .directivity = hearing.directivity(),
                                .near_field = hearing.near_field()},
                    .listener = FromProto(listener)};

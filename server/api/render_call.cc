@@ -36,7 +36,7 @@ class RenderCall final : public BidiStream<v1::RenderRequest, v1::RenderResponse
         call_count_(daemon.call_count),
         idle_calls_(daemon.idle_calls),
         wait_(daemon.clock),
-        reader_(daemon.database, daemon.bodies) {
+        reader_(daemon.database, daemon.heads, daemon.bodies) {
     if (++call_count_ <= static_cast<int>(kMaxRenderingCount)) {
       idle_calls_.Add(*this);
       StartReading();

@@ -11,6 +11,7 @@
 #include "server/api/thread_pool.h"
 #include "server/base/clock.h"
 #include "server/mode_database/mode_database.h"
+#include "server/scene/head_store.h"
 #include "server/scene/sounding_body.h"
 
 namespace carillon {
@@ -18,6 +19,7 @@ namespace carillon {
 /// The parts of the daemon that offline rendering uses.
 struct RenderContext {
   ModeDatabase& database;
+  HeadStore& heads;
   BodyCache& bodies;
   ThreadPool& pool;
   /// Number of Render calls that run now.

@@ -197,9 +197,12 @@ grpc::ServerUnaryReactor* SceneService::UpdateListener(grpc::CallbackServerConte
 absl::Status SceneService::Create(const grpc::CallbackServerContext& context,
                                   const Principal& caller, const v1::CreateSceneRequest& request,
                                   v1::CreateSceneResponse& response) {
-  const SceneWish wish{.space = ToSceneSpace(request.hearing(), request.listener()),
-                       .gain = request.has_gain() ? request.gain() : 1,
-                       .keep = request.keep()};
+  SceneWish wish{.space = ToSceneSpace(request.hearing(), request.listener()),
+                 .gain = request.has_gain() ? request.gain() : 1,
+                 .keep = request.keep()};
+  const MixerSettings& mixer = scenes_.mixer_settings();
+  RETURN_IF_ERROR(heads_.Complete(wish.space, static_cast<uint32_t>(mixer.sample_rate_hz),
+                                  static_cast<uint32_t>(mixer.channel_count)));
   const std::string& id = request.id();
   if (!id.empty()) {
     RETURN_IF_ERROR(ValidateSceneId(id));

@@ -11,6 +11,7 @@
 #include "server/api/scene_owners.h"
 #include "server/base/mutex.h"
 #include "server/mode_database/mode_database.h"
+#include "server/scene/head_store.h"
 #include "server/scene/scene_registry.h"
 
 namespace carillon {
@@ -18,9 +19,13 @@ namespace carillon {
 /// carillon.v1.SceneService. The constructor's references must outlive the service.
 class SceneService final : public v1::SceneService::CallbackService {
  public:
-  SceneService(SceneRegistry& scenes, SceneOwners& owners, ModeDatabase& database,
+  SceneService(SceneRegistry& scenes, SceneOwners& owners, ModeDatabase& database, HeadStore& heads,
                const Reception& reception)
-      : scenes_(scenes), owners_(owners), database_(database), reception_(reception) {}
+      : scenes_(scenes),
+        owners_(owners),
+        database_(database),
+        heads_(heads),
+        reception_(reception) {}
 
   grpc::ServerUnaryReactor* CreateScene(grpc::CallbackServerContext* context,
                                         const v1::CreateSceneRequest* request,
@@ -82,6 +87,7 @@ class SceneService final : public v1::SceneService::CallbackService {
   SceneRegistry& scenes_;
   SceneOwners& owners_;
   ModeDatabase& database_;
+  HeadStore& heads_;
   const Reception reception_;
   /// Held while a scene with an id of the client's is made, so that two equal requests make one.
   Mutex create_mutex_;

@@ -30,6 +30,7 @@ grpc::ServerUnaryReactor* ServerService::GetServerInfo(grpc::CallbackServerConte
 }
 
 void ServerService::DescribeFeatures(v1::GetServerInfoResponse& info) const {
+  if (facts_.binaural) info.add_features("binaural");
   if (facts_.can_decompose()) info.add_features("decomposition");
   info.add_features("job-filters");
   info.add_features("scene-ids");

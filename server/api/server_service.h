@@ -25,6 +25,7 @@ struct ServerFacts {
   double client_share = 0;
   double scene_grace_s = 0;
   const CertificateEnd& certificate_end;
+  bool binaural = false;                ///< a measured head is there
   std::function<bool()> can_decompose;  ///< called on any thread
 };
 

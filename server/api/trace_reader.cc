@@ -72,6 +72,8 @@ absl::Status TraceReader::TakeHeader(const v1::ContactTraceHeader& header) {
   }
   if (header.step_s() > 0 && header.step_s() <= 1) settings_->step_s = header.step_s();
   settings_->space = ToSceneSpace(header.hearing(), header.listener());
+  RETURN_IF_ERROR(
+      heads_.Complete(settings_->space, settings_->sample_rate_hz, settings_->channel_count));
   settings_->reading = ToContactReading(header.frame(), header.pulse_shape());
   if (header.has_gain()) settings_->gain *= header.gain();
   if (header.has_clock()) {

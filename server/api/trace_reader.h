@@ -8,6 +8,7 @@
 #include "absl/status/statusor.h"
 #include "carillon/v1/audio_service.pb.h"
 #include "server/mode_database/mode_database.h"
+#include "server/scene/head_store.h"
 #include "server/scene/offline_renderer.h"
 
 namespace carillon {
@@ -17,11 +18,12 @@ class TraceReader {
  public:
   static constexpr uint64_t kMaxImpulseCount = 4'000'000;
 
-  TraceReader(ModeDatabase& database, BodyCache& bodies) : database_(database), bodies_(bodies) {}
+  TraceReader(ModeDatabase& database, HeadStore& heads, BodyCache& bodies)
+      : database_(database), heads_(heads), bodies_(bodies) {}
 
   /// Errors: InvalidArgument (TRACE_MALFORMED, and those of the objects' materials),
-  /// ResourceExhausted (TRACE_TOO_LARGE), NotFound (MODAL_MODEL_NOT_FOUND), and those of
-  /// OfflineRenderer.
+  /// ResourceExhausted (TRACE_TOO_LARGE), NotFound (MODAL_MODEL_NOT_FOUND), and those of HeadStore
+  /// and OfflineRenderer.
   absl::Status Take(const v1::RenderRequest& request);
 
   /// Returns the renderer after the last request. Errors: InvalidArgument (TRACE_MALFORMED: nothing
@@ -41,6 +43,7 @@ class TraceReader {
   absl::Status TakeStep(const v1::ContactStep& step);
 
   ModeDatabase& database_;
+  HeadStore& heads_;
   BodyCache& bodies_;
   std::optional<OfflineSettings> settings_;
   std::unique_ptr<OfflineRenderer> renderer_;  // once there is a header

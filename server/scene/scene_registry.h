@@ -140,6 +140,9 @@ class SceneRegistry {
 
   size_t scene_count() const;
 
+  /// The format in which all scenes are rendered.
+  const MixerSettings& mixer_settings() const { return mixer_.settings(); }
+
   /// Contacts of all streams that were rejected.
   const RejectionCounts& rejections() const { return rejections_; }
 

@@ -42,7 +42,8 @@ std::shared_ptr<Voice> MakeVoice(const SceneSpace& space, const std::optional<Po
   return std::make_shared<Voice>(Voice::Settings{.hearing = space.hearing,
                                                  .sample_rate_hz = mixer.sample_rate_hz,
                                                  .block_frame_count = mixer.block_frame_count,
-                                                 .channel_count = mixer.channel_count},
+                                                 .channel_count = mixer.channel_count,
+                                                 .head = space.head},
                                  PlaceOf(pose.value_or(Pose())), PlaceOf(space.listener));
 }
 

@@ -16,7 +16,9 @@ namespace carillon {
 /// The spatial effects of a scene, and the pose of its listener.
 struct SceneSpace {
   HearingSettings hearing;
-  Pose listener;  ///< the listener looks along -z of this frame; x points to the right
+  Pose listener;  ///< the listener looks along -z of this frame; x points to the right, y up
+  /// The listener's head, by which the scene is heard if `hearing.binaural`; null: it is not.
+  std::shared_ptr<const Head> head = nullptr;
 
   bool operator==(const SceneSpace&) const = default;
 };

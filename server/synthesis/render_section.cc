@@ -164,8 +164,8 @@ void RenderSection::Wake(Voice& voice) noexcept {
 }
 
 void RenderSection::RenderVoices(std::span<float> placed, SectionCounts& counts) noexcept {
-  counts.ringing_work += work::kVoice * static_cast<double>(voices_.size());
-  voices_.EraseIf([placed](Voice* voice) {
+  voices_.EraseIf([placed, &counts](Voice* voice) {
+    counts.ringing_work += work::kVoice + (voice->binaural() ? work::kEars : 0);
     voice->Render(placed);
     return voice->asleep();
   });

@@ -30,11 +30,12 @@ class Rooms {
  public:
   std::unique_ptr<ModeDatabase> database = *ModeDatabase::Open(folder_ / "carillon.db", clock_);
   BodyCache bodies;
+  HeadStore heads{"/none.sofa"};  // to read one for each sample rate would take most of the time
 };
 
 void Render(Rooms& rooms, const uint8_t* data, size_t size) {
   google::protobuf::io::ArrayInputStream input(data, static_cast<int>(size));
-  TraceReader reader(*rooms.database, rooms.bodies);
+  TraceReader reader(*rooms.database, rooms.heads, rooms.bodies);
   v1::RenderRequest request;
   bool at_end = false;
   while (google::protobuf::util::ParseDelimitedFromZeroCopyStream(&request, &input, &at_end)) {

@@ -2,7 +2,8 @@
 #include "server/synthesis/voice/doppler.h"
 
 #include <algorithm>
-#include <cmath>
+
+#include "server/synthesis/voice/vector3.h"
 
 namespace carillon {
 
@@ -32,11 +33,9 @@ SoundPath FindSoundPath(const PastPositions& object, const Vector3& listener_m,
   SoundPath path{.delay_frames = delay_frames};
   for (int round = 0; round < kRounds; ++round) {
     const double blocks = path.delay_frames / static_cast<double>(limits.block_frame_count);
-    const Vector3 then = object.Before(blocks);
-    path.away_m = {then[0] - listener_m[0], then[1] - listener_m[1], then[2] - listener_m[2]};
-    const double distance_m = std::hypot(path.away_m[0], path.away_m[1], path.away_m[2]);
-    path.delay_frames =
-        std::clamp(distance_m * limits.frames_per_metre, limits.least_frames, limits.most_frames);
+    path.away_m = Minus(object.Before(blocks), listener_m);
+    path.delay_frames = std::clamp(Length(path.away_m) * limits.frames_per_metre,
+                                   limits.least_frames, limits.most_frames);
   }
   return path;
 }

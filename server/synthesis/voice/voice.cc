@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
+
+#include "server/synthesis/voice/vector3.h"
 
 namespace carillon {
 namespace {
@@ -21,14 +24,6 @@ size_t HistoryBlocks(const Voice::Settings& settings) {
          3;
 }
 
-double Length(const Vector3& v) { return std::hypot(v[0], v[1], v[2]); }
-
-Vector3 Minus(const Vector3& a, const Vector3& b) {
-  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-}
-
-double Dot(const Vector3& a, const Vector3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-
 }  // namespace
 
 Voice::Voice(const Settings& settings, const Place& object, const Place& listener)
@@ -38,11 +33,20 @@ Voice::Voice(const Settings& settings, const Place& object, const Place& listene
       positions_(HistoryBlocks(settings), object.position_m),
       input_(settings.block_frame_count),
       fade_step_(static_cast<float>(1 / (kFadeS * settings.sample_rate_hz))) {
-  if (delayed()) {
-    line_.emplace(static_cast<size_t>(kLongestPropagationS * settings.sample_rate_hz),
-                  2 * settings.block_frame_count);
+  if (settings.hearing.binaural && settings.head && settings.channel_count == 2) {
+    ears_.assign(2, Ears(*settings.head, settings.block_frame_count));
+    sound_.resize(settings.block_frame_count);
+  }
+  double longest_delay = delayed() ? kLongestPropagationS * settings.sample_rate_hz : 0;
+  if (binaural()) {
+    const auto tap_count = static_cast<double>(settings.head->tap_count());
+    longest_delay += DelayLine::kLeastDelay + settings.head->longest_delay() + tap_count;
+  }
+  if (longest_delay > 0) {
+    line_.emplace(static_cast<size_t>(longest_delay) + 1, 2 * settings.block_frame_count);
   }
   heard_.fill(Hear(0));
+  if (binaural()) NoteEars(true);
 }
 
 void Voice::SetCenter(const Vector3& center_m) noexcept {
@@ -83,11 +87,12 @@ Voice::Heard Voice::Hear(double delay_frames) const noexcept {
     path = FindSoundPath(positions_, listener.position_m, limits, delay_frames);
   }
   Heard heard{.delay_frames = path.delay_frames};
+  if (binaural()) HearBinaurally(path.away_m, listener, heard);
   const double distance = Length(path.away_m);
   const double reference = hearing.reference_distance_m;
   const double gain = hearing.distance_gain ? reference / std::max(distance, reference) : 1;
   heard.gains.fill(static_cast<float>(gain));
-  if (hearing.panning && settings_.channel_count == 2) {
+  if (hearing.panning && settings_.channel_count == 2 && !binaural()) {
     const double unit = std::max(Length(listener.right), 0.5);
     const double side = std::clamp(
         Dot(listener.right, path.away_m) / (unit * std::max(distance, kNearM)), -1.0, 1.0);
@@ -96,6 +101,13 @@ Voice::Heard Voice::Hear(double delay_frames) const noexcept {
                    static_cast<float>(gain * std::numbers::sqrt2 * std::sin(angle))};
   }
   return heard;
+}
+
+void Voice::HearBinaurally(const Vector3& away_m, const Place& listener,
+                           Heard& heard) const noexcept {
+  heard.delay_frames = std::max(heard.delay_frames, DelayLine::kLeastDelay);
+  if (Length(away_m) > 0) heard.direction = Rotated(away_m, Inverse(listener.orientation));
+  heard.ear_delay_frames = settings_.head->Delays(heard.direction);
 }
 
 void Voice::NoteHeard() noexcept {
@@ -117,7 +129,21 @@ void Voice::NoteHeard() noexcept {
     heard_.fill(next);
     fade_ = silent() ? 1 : 0;
     jump_waits_ = false;
+    if (binaural()) NoteEars(true);
+    return;
   }
+  if (binaural()) NoteEars(false);
+}
+
+void Voice::NoteEars(bool jumps) noexcept {
+  const Vector3& direction = heard_[2].direction;
+  if (jumps) {
+    std::swap(ears_[0], ears_[1]);
+    ears_[0].Jump(*settings_.head, direction);
+  } else {
+    ears_[0].Turn(*settings_.head, direction);
+  }
+  ears_[1].Hold();
 }
 
 void Voice::Render(std::span<float> frames) noexcept {
@@ -141,6 +167,34 @@ void Voice::Silence() noexcept {
   std::ranges::fill(input_, 0.0F);
   fed_ = false;
   if (line_) line_->Silence();
+  for (Ears& ears : ears_) ears.Silence();
+}
+
+void Voice::RenderEars(const Hearings& heard, Ears& ears, float fade, float fade_step,
+                       std::span<float> frames) noexcept {
+  const auto size = static_cast<double>(input_.size());
+  for (size_t ear = 0; ear < ears_.size(); ++ear) {
+    std::array<double, 4> delays{};
+    for (size_t i = 0; i < delays.size(); ++i) {
+      delays[i] = heard[i].delay_frames + heard[i].ear_delay_frames[ear];
+    }
+    const DelayCurve delay(delays);
+    const float from = heard[1].gains[ear], to = heard[2].gains[ear];
+    const std::span<float> past = ears.past(ear);
+    for (size_t n = 0; n < past.size(); ++n) {
+      past[n] = from * line_->Read(delays[1] + size + static_cast<double>(past.size() - n));
+    }
+    const std::span<float> signal = ears.signal(ear);
+    for (size_t n = 0; n < signal.size(); ++n) {
+      const double u = static_cast<double>(n) / size;
+      signal[n] = (from + static_cast<float>(u) * (to - from)) * Sample(delay.At(u), n);
+    }
+    ears.Filter(ear, sound_);
+    for (size_t n = 0; n < sound_.size(); ++n) {
+      const float faded = std::clamp(fade + static_cast<float>(n) * fade_step, 0.0F, 1.0F);
+      frames[2 * n + ear] += faded * sound_[n];
+    }
+  }
 }
 
 float Voice::Sample(double delay_frames, size_t n) const noexcept {
@@ -149,6 +203,9 @@ float Voice::Sample(double delay_frames, size_t n) const noexcept {
 
 void Voice::RenderFrom(const Hearings& heard, float fade, float fade_step,
                        std::span<float> frames) noexcept {
+  if (binaural()) {
+    return RenderEars(heard, ears_[&heard == &heard_ ? 0 : 1], fade, fade_step, frames);
+  }
   const size_t channels = settings_.channel_count;
   const DelayCurve delay(
       {heard[0].delay_frames, heard[1].delay_frames, heard[2].delay_frames, heard[3].delay_frames});

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -13,7 +14,9 @@
 #include "server/synthesis/schedule/mixer_event.h"
 #include "server/synthesis/voice/delay_line.h"
 #include "server/synthesis/voice/doppler.h"
+#include "server/synthesis/voice/ears.h"
 #include "server/synthesis/voice/glide.h"
+#include "server/synthesis/voice/head.h"
 
 namespace carillon {
 
@@ -22,13 +25,16 @@ struct HearingSettings {
   bool distance_gain = false;
   bool propagation_delay = false;
   bool panning = false;
+  bool binaural = false;     ///< by the responses of a measured head, in place of panning
   bool directivity = false;  ///< modes sound as loud as they radiate towards the listener
   bool near_field = false;   ///< with directivity: as the sound field is at the listener's distance
   double reference_distance_m = 1;
   double sound_speed_m_per_s = 343;
 
   bool operator==(const HearingSettings&) const = default;
-  bool any() const { return distance_gain || propagation_delay || panning || directivity; }
+  bool any() const {
+    return distance_gain || propagation_delay || panning || binaural || directivity;
+  }
 };
 
 /// Longest propagation delay; the sound of objects farther away arrives after this time.
@@ -46,6 +52,10 @@ inline constexpr double kLongestPropagationS = 0.6;
 /// least DelayLine::kLeastDelay samples, so objects nearer than 0.1 m (at 48 kHz) sound as from 0.1
 /// m.
 ///
+/// For two ears the gains to left and right are one, and the responses of a measured head follow,
+/// for the direction from which the sound comes. Their delays add to d, so that each ear has its
+/// own Doppler shift.
+///
 /// Any thread may make a voice; then one thread at a time uses it, which neither allocates nor
 /// locks.
 class Voice {
@@ -55,6 +65,8 @@ class Voice {
     double sample_rate_hz = 48000;
     size_t block_frame_count = 128;
     size_t channel_count = 1;
+    /// The listener's; it must be there for `hearing.binaural`, which needs two channels.
+    std::shared_ptr<const Head> head = nullptr;
   };
 
   Voice(const Settings& settings, const Place& object, const Place& listener);
@@ -83,6 +95,9 @@ class Voice {
   /// Adds the block to `frames`, interleaved, and begins the next block.
   void Render(std::span<float> frames) noexcept;
 
+  /// Whether it renders for two ears.
+  bool binaural() const noexcept { return !ears_.empty(); }
+
   /// Ends the sound that is on its way to the listener, between two blocks.
   void Silence() noexcept;
 
@@ -97,10 +112,13 @@ class Voice {
   uint32_t bank_count = 0;
 
  private:
-  /// Delay and gains at one time.
+  /// Delay and gains at one time. With two ears the sound comes from `direction` of the listener's
+  /// frame, and later by the delays of the ears.
   struct Heard {
     double delay_frames = 0;
     std::array<float, 2> gains{};
+    std::array<double, 2> ear_delay_frames{};
+    Vector3 direction{0, 0, -1};
   };
   /// Values at the ends of four consecutive blocks; the rendered block lies between the second and
   /// the third.
@@ -108,13 +126,18 @@ class Voice {
 
   Vector3 SoundAt(const Place& object) const noexcept;
   Heard Hear(double delay_frames) const noexcept;
+  void HearBinaurally(const Vector3& away_m, const Place& listener, Heard& heard) const noexcept;
   void NoteHeard() noexcept;
+  void NoteEars(bool jumps) noexcept;
   void RenderFrom(const Hearings& heard, float fade, float fade_step,
+                  std::span<float> frames) noexcept;
+  void RenderEars(const Hearings& heard, Ears& ears, float fade, float fade_step,
                   std::span<float> frames) noexcept;
   float Sample(double delay_frames, size_t n) const noexcept;
   /// Whether all of the object's sound has arrived.
   bool silent() const noexcept {
-    return quiet_frame_count_ > (line_ ? line_->length() : size_t{0});
+    const size_t ears = binaural() ? settings_.head->tap_count() : 0;
+    return quiet_frame_count_ > (line_ ? line_->length() : size_t{0}) + ears;
   }
   bool delayed() const noexcept { return settings_.hearing.propagation_delay; }
 
@@ -125,6 +148,8 @@ class Voice {
   std::vector<float> input_;
   std::optional<DelayLine> line_;
   Hearings heard_{}, heard_before_{};
+  std::vector<Ears> ears_;    // for heard_ and for heard_before_; none without a head
+  std::vector<float> sound_;  // in one ear
   float fade_ = 1, fade_step_;
   bool jump_waits_ = false, fed_ = false, asleep_ = true;
   size_t quiet_frame_count_ = SIZE_MAX / 2, rest_block_count_ = 0;

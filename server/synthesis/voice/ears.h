@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "server/synthesis/voice/head.h"
+
+namespace carillon {
+
+/// The two ears of a listener, which filter the signal of one object block by block. Each ear's
+/// response changes linearly from that at the start of a block to that at its end. Only the
+/// constructor allocates; nothing locks.
+class Ears {
+ public:
+  Ears(const Head& head, size_t block_frame_count);
+
+  /// Begins a block that ends with the head's responses for a direction, and starts with those at
+  /// the end of the block before. `head` has the tap count of the constructor's.
+  void Turn(const Head& head, const Vector3& direction) noexcept;
+
+  /// Begins a block with the responses for a direction from its start to its end. The signal before
+  /// the block is no longer known.
+  void Jump(const Head& head, const Vector3& direction) noexcept;
+
+  /// Begins a block that keeps the responses at the end of the block before.
+  void Hold() noexcept { start_ = end_; }
+
+  /// Makes the signal before the block zero.
+  void Silence() noexcept;
+
+  /// The signal at an ear in the frames before the block that its response reaches. Empty if they
+  /// are known from the block before; otherwise the caller sets them before Filter.
+  std::span<float> past(size_t ear) noexcept {
+    return known_[ear] ? std::span<float>() : std::span(signals_[ear]).first(past_count());
+  }
+
+  /// The signal at an ear in this block, which the caller sets before Filter.
+  std::span<float> signal(size_t ear) noexcept {
+    return std::span(signals_[ear]).subspan(past_count());
+  }
+
+  /// Computes the sound in an ear, a block, and ends the block for this ear.
+  void Filter(size_t ear, std::span<float> sound) noexcept;
+
+ private:
+  size_t past_count() const noexcept { return end_[0].taps.size() - 1; }
+
+  EarResponses start_, end_;
+  std::array<bool, 2> known_{};
+  std::array<std::vector<float>, 2> signals_;  // the past, then the block
+  std::vector<float> other_;                   // the block by the other response
+};
+
+}  // namespace carillon

@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Scenes that are heard by two ears: from traces, live, and by a daemon without a measured head."""
+
+import pathlib
+import tempfile
+import unittest
+
+import numpy
+
+import carillon
+import meshes
+from carillon.v1 import hearing_pb2
+from daemon import Daemon, DaemonTest
+
+HEARING = hearing_pb2.Hearing(binaural=True)
+STRIKE = carillon.Impulses(objects=[1], points=[(0, 0.008, 0.01)], impulses=[(0, 0, -0.002)], durations=[1e-4])
+
+
+def levels_db(sound):
+    """Of the left and of the right channel, with that of the whole."""
+    left, right = (10 * numpy.log10(numpy.mean(numpy.square(sound.samples[:, i], dtype="f8"))) for i in (0, 1))
+    return left, right, numpy.logaddexp(left / 4.343, right / 4.343) * 4.343
+
+
+class BinauralTest(DaemonTest):
+    def setUp(self):
+        self.client = carillon.connect(self.daemon.server)
+        self.addCleanup(self.client.close)
+        self.model = self.client.create_model(meshes.box(meshes.BAR_SIZE), meshes.MATERIAL)
+
+    def heard_from(self, place, hearing=HEARING, **settings):
+        trace = carillon.Trace(1 / 240, hearing=hearing)
+        trace.add(self.model, pose=(place, (1, 0, 0, 0)))
+        trace.step(0.1, impulses=STRIKE)
+        return self.client.render(trace, channel_count=2, tail_s=0.5, **settings)
+
+    def test_each_ear_hears_its_own_side_louder(self):
+        for place in ((1, 0, 0), (0.7, 0.2, -0.7), (1, 0, 0.3)):
+            left, right, _ = levels_db(self.heard_from(place))
+            self.assertGreater(right, left + 3, place)
+            mirrored_left, mirrored_right, _ = levels_db(self.heard_from((-place[0], *place[1:])))
+            self.assertGreater(mirrored_left, mirrored_right + 3, place)
+
+    def test_straight_ahead_is_as_loud_as_with_panning(self):
+        for rate in (44100, 48000, 96000):
+            *_, ears = levels_db(self.heard_from((0, 0, -1), sample_rate_hz=rate))
+            *_, panned = levels_db(self.heard_from((0, 0, -1), hearing_pb2.Hearing(panning=True), sample_rate_hz=rate))
+            self.assertAlmostEqual(ears, panned, delta=4, msg=rate)
+
+    def test_behind_and_above_sound_unlike_ahead(self):
+        ahead, behind, above = (self.heard_from(place).samples for place in ((0, 0, -1), (0, 0, 1), (0, 1, 0)))
+        for other in (behind, above):
+            self.assertGreater(numpy.abs(other - ahead).max(), 0.05 * numpy.abs(ahead).max())
+
+    def test_a_trace_renders_to_the_same_bytes_each_time(self):
+        numpy.testing.assert_array_equal(self.heard_from((1, 0, 0)).samples, self.heard_from((1, 0, 0)).samples)
+
+    def test_a_live_scene_is_made_and_says_what_it_is(self):
+        with self.client.scene(hearing=HEARING) as scene:
+            scene.add(self.model, pose=((1, 0, 0), (1, 0, 0, 0)))
+        self.assertIn("binaural", self.client.info().features)
+
+
+class HeadlessTest(unittest.TestCase):
+    def setUp(self):
+        self.folder = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory(prefix="carillon-")))
+
+    def test_a_daemon_does_not_start_with_a_head_that_it_cannot_read(self):
+        with self.assertRaisesRegex(RuntimeError, "HEAD_UNUSABLE: the measured head /none.sofa cannot be read; let"):
+            Daemon(self.folder, "--head", "/none.sofa")
+
+    def test_scenes_are_refused_once_the_head_is_gone(self):
+        head = self.folder / "head.sofa"
+        head.write_bytes(pathlib.Path("/usr/share/libmysofa/default.sofa").read_bytes())
+        daemon = Daemon(self.folder, "--channels", "2", "--head", head)
+        self.addCleanup(daemon.stop)
+        head.unlink()
+        with carillon.connect(daemon.server) as client:
+            with client.scene(hearing=HEARING):
+                pass  # the head is in memory
+            trace = carillon.Trace(1 / 240, hearing=HEARING)
+            with self.assertRaises(carillon.CarillonError) as refused:
+                client.render(trace, channel_count=2, sample_rate_hz=44100)
+            self.assertEqual(refused.exception.reason, "HEAD_UNUSABLE")
+
+
+if __name__ == "__main__":
+    unittest.main()

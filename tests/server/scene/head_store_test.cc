@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The head that Debian's libmysofa1 brings, KEMAR, beside the library's own filters.
+#include "server/scene/head_store.h"
+
+#include <gtest/gtest.h>
+#include <mysofa.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <complex>
+#include <fstream>
+#include <memory>
+#include <numbers>
+#include <numeric>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "tests/server/mode_database/sample_model.h"
+
+namespace carillon {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+constexpr const char* kKemar = "/usr/share/libmysofa/MIT_KEMAR_normal_pinna.sofa";
+
+Vector3 At(double degrees_to_the_right, double degrees_up = 0) {
+  const double azimuth = degrees_to_the_right * kPi / 180, elevation = degrees_up * kPi / 180;
+  return {std::cos(elevation) * std::sin(azimuth), std::sin(elevation),
+          -std::cos(elevation) * std::cos(azimuth)};
+}
+
+template <class Taps>
+double LevelAt(const Taps& taps, double frequency_hz, double rate_hz) {
+  std::complex<double> sum = 0;
+  for (size_t n = 0; n < taps.size(); ++n) {
+    sum += double{taps[n]} *
+           std::polar(1.0, -2 * kPi * frequency_hz / rate_hz * static_cast<double>(n));
+  }
+  return 20 * std::log10(std::abs(sum));
+}
+
+TEST(HeadStoreTest, EarsHearAsLateAsSoundTakesAroundAHead) {
+  const auto head = *HeadStore().Get(48000);
+  for (const double degrees : {0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 90.0}) {
+    const auto [left, right] = head->Delays(At(degrees));
+    const double angle = degrees * kPi / 180;
+    const double woodworth_s = 0.0875 / 343 * (angle + std::sin(angle));
+    EXPECT_NEAR((left - right) / 48000, woodworth_s, 1e-4) << degrees;
+    const auto mirrored = head->Delays(At(-degrees));
+    EXPECT_NEAR(mirrored[1] - mirrored[0], left - right, 2) << degrees;
+  }
+}
+
+TEST(HeadStoreTest, ResponsesAreThoseOfTheFile) {
+  int error = 0;
+  const std::unique_ptr<MYSOFA_HRTF, decltype(&mysofa_free)> file(mysofa_load(kKemar, &error),
+                                                                  &mysofa_free);
+  ASSERT_TRUE(file);
+  mysofa_tocartesian(file.get());
+  const auto head = *HeadStore(kKemar).Get(44100);
+  std::vector<double> differences;
+  for (size_t i = 0; i < file->M; ++i) {
+    const float* const at = &file->SourcePosition.values[3 * i];
+    if (std::abs(at[2]) > 1e-3) continue;  // those at the height of the ears are 5 degrees apart
+    EarResponses responses = head->Silent();
+    head->Respond({-at[1], at[2], -at[0]}, responses);
+    for (const size_t ear : {0U, 1U}) {
+      const std::span<const float> whole(&file->DataIR.values[(2 * i + ear) * file->N], file->N);
+      for (const double frequency_hz : {300.0, 1000.0, 3000.0, 6000.0, 10000.0}) {
+        differences.push_back(LevelAt(responses[ear].taps, frequency_hz, 44100) -
+                              LevelAt(whole, frequency_hz, 44100));
+      }
+    }
+  }
+  ASSERT_EQ(differences.size(), 72 * 2 * 5);
+  // One factor for all of them.
+  const auto count = static_cast<double>(differences.size());
+  const double mean = std::accumulate(differences.begin(), differences.end(), 0.0) / count;
+  double square = 0;
+  for (const double difference : differences) square += (difference - mean) * (difference - mean);
+  EXPECT_LT(std::sqrt(square / count), 0.3) << "dB";
+}
+
+TEST(HeadStoreTest, SoundsAsAtAnotherRate) {
+  HeadStore heads;
+  const auto respond = [&heads](uint32_t rate_hz) {
+    const auto head = *heads.Get(rate_hz);
+    EarResponses responses = head->Silent();
+    head->Respond(At(40), responses);
+    return responses;
+  };
+  const EarResponses at_48 = respond(48000), at_96 = respond(96000);
+  for (const double frequency_hz : {1000.0, 4000.0, 10000.0}) {
+    EXPECT_NEAR(LevelAt(at_48[0].taps, frequency_hz, 48000),
+                LevelAt(at_96[0].taps, frequency_hz, 96000), 1)
+        << frequency_hz;
+  }
+  EXPECT_EQ(*heads.Get(48000), *heads.Get(48000));  // it is kept
+}
+
+TEST(HeadStoreTest, FilesWithoutAHeadAreRefused) {
+  const TemporaryFolder folder;
+  const auto garbage = folder / "garbage.sofa";
+  std::ofstream(garbage) << "\x89HDF\r\n\x1a\n and nothing that belongs there";
+  std::string cut(20000, '\0');
+  std::ifstream(kKemar, std::ios::binary).read(cut.data(), static_cast<std::streamsize>(20000));
+  const auto cut_off = folder / "cut.sofa";
+  std::ofstream(cut_off, std::ios::binary) << cut;
+  for (const std::string& file : {garbage.string(), cut_off.string(), std::string("/none.sofa"),
+                                  folder.path().string(), std::string("/dev/null")}) {
+    HeadStore heads(file);
+    const absl::Status refused = heads.Get(48000).status();
+    EXPECT_EQ(refused.code(), absl::StatusCode::kFailedPrecondition) << file;
+    EXPECT_NE(refused.message().find("HEAD_UNUSABLE: the measured head " + file),
+              absl::string_view::npos)
+        << refused.message();
+  }
+  EXPECT_FALSE(HeadStore("/none.sofa").available());
+  EXPECT_TRUE(HeadStore().available());
+}
+
+TEST(HeadStoreTest, OnlyScenesOfTwoChannelsThatAskForItGetAHead) {
+  HeadStore heads;
+  SceneSpace space;
+  EXPECT_TRUE(heads.Complete(space, 48000, 2).ok());
+  EXPECT_EQ(space.head, nullptr);
+  space.hearing.binaural = true;
+  EXPECT_TRUE(heads.Complete(space, 48000, 1).ok());
+  EXPECT_EQ(space.head, nullptr);
+  EXPECT_TRUE(heads.Complete(space, 48000, 2).ok());
+  EXPECT_NE(space.head, nullptr);
+  HeadStore none("/none.sofa");
+  EXPECT_FALSE(none.Complete(space, 48000, 2).ok());
+}
+
+}  // namespace
+}  // namespace carillon
