@@ -44,8 +44,27 @@ struct Filling {
   std::vector<int32_t> given_triangles;  // one a face
 };
 
+/// The surface without the vertices that no triangle has. TetGen would make nodes of them, and flat
+/// tetrahedra where one lies in a face except for rounding.
+SurfaceMesh WithoutUnusedVertices(const SurfaceMesh& given) {
+  SurfaceMesh surface{{}, given.triangles};
+  std::vector<int32_t> number(given.vertices.size(), -1);
+  for (const auto& triangle : surface.triangles) {
+    for (const int32_t v : triangle) number[static_cast<size_t>(v)] = 0;
+  }
+  for (size_t v = 0; v < number.size(); ++v) {
+    if (number[v] < 0) continue;
+    number[v] = static_cast<int32_t>(surface.vertices.size());
+    surface.vertices.push_back(given.vertices[v]);
+  }
+  for (auto& triangle : surface.triangles) {
+    for (int32_t& v : triangle) v = number[static_cast<size_t>(v)];
+  }
+  return surface;
+}
+
 void DescribeSurface(const RefinedSurface& surface, tetgenio& in) {
-  const auto& [vertices, triangles] = surface.surface;
+  const auto [vertices, triangles] = WithoutUnusedVertices(surface.surface);
   in.numberofpoints = static_cast<int>(vertices.size());
   in.pointlist = new double[vertices.size() * 3];
   std::memcpy(in.pointlist, vertices.data(), vertices.size() * sizeof(Point));

@@ -14,6 +14,7 @@
 #include "absl/strings/str_cat.h"
 #include "precompute/mesh/mesh_limits.h"
 #include "precompute/mesh/point_math.h"
+#include "precompute/mesh/surface/find_overlaps.h"
 #include "precompute/mesh/surface/find_self_intersection.h"
 #include "precompute/mesh/surface/surface_shells.h"
 #include "proto/cpp/error_reason.h"
@@ -216,6 +217,17 @@ absl::Status CheckCrossings(const SurfaceMesh& surface) {
                              ": unite bodies that overlap, and pull apart walls that cross"));
 }
 
+absl::Status CheckOverlaps(const SurfaceMesh& surface) {
+  const auto overlaps = FindOverlaps(surface, 1);
+  if (overlaps.empty()) return absl::OkStatus();
+  const auto& [first, second] = overlaps.front();
+  return Refuse("MESH_SELF_INTERSECTING",
+                absl::StrCat(ShowTriangle(surface, static_cast<size_t>(first)), " lies on ",
+                             ShowTriangle(surface, static_cast<size_t>(second)),
+                             " except for rounding: unfold the surface there, and separate or "
+                             "unite walls that touch"));
+}
+
 bool IsInside(const SurfaceMesh& surface, const Shell& inner, const Shell& outer) {
   const Point middle = MiddleOf(CornersOf(surface, static_cast<size_t>(inner.triangles.front())));
   return std::abs(WindingNumber(surface, outer, middle)) > 0.5;
@@ -274,6 +286,7 @@ absl::StatusOr<std::vector<std::string>> CheckSurface(const SurfaceMesh& surface
   const std::vector<Shell> shells = FindShells(surface);
   RETURN_IF_ERROR(CheckVolume(surface, shells));
   RETURN_IF_ERROR(CheckCrossings(surface));
+  RETURN_IF_ERROR(CheckOverlaps(surface));
   RETURN_IF_ERROR(CheckNesting(surface, shells));
   return FindWarnings(surface, shells);
 }

@@ -64,6 +64,10 @@ absl::StatusOr<Warnings> RepairLocally(RepairedSurface& repaired) {
   if (Is(sound.status(), "MESH_NOT_CLOSED")) take(FillHoles(repaired.surface));
   if (Is(sound.status(), "MESH_SELF_INTERSECTING") ||
       Is(sound.status(), "MESH_DEGENERATE_TRIANGLE")) {
+    take(Unfold(repaired.surface));
+  }
+  if (Is(sound.status(), "MESH_SELF_INTERSECTING") ||
+      Is(sound.status(), "MESH_DEGENERATE_TRIANGLE")) {
     take(Untangle(repaired.surface));
   }
   return sound;

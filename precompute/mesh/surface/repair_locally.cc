@@ -3,6 +3,7 @@
 
 #include <CGAL/Polygon_mesh_processing/border.h>
 #include <CGAL/Polygon_mesh_processing/measure.h>
+#include <CGAL/Polygon_mesh_processing/repair.h>
 #include <CGAL/Polygon_mesh_processing/repair_self_intersections.h>
 #include <CGAL/Polygon_mesh_processing/triangulate_hole.h>
 
@@ -20,6 +21,8 @@
 #include "absl/strings/str_format.h"
 #include "precompute/mesh/point_math.h"
 #include "precompute/mesh/run_in_child.h"
+#include "precompute/mesh/surface/check_surface.h"
+#include "precompute/mesh/surface/find_overlaps.h"
 #include "precompute/mesh/surface/halfedge_mesh.h"
 #include "precompute/mesh/surface/nearest_triangle.h"
 #include "precompute/mesh/surface/surface_shells.h"
@@ -36,6 +39,11 @@ constexpr double kPatchRim = 1;
 constexpr double kPatchPart = 1.0 / 20;
 /// Largest distance of an untangled surface from the given one, as a part of the diagonal.
 constexpr double kUntangledPart = 1e-3;
+/// Greatest distance of a hole's rim from a plane in which the hole is filled, as a part of the
+/// diagonal.
+constexpr double kFlatPart = 1e-6;
+/// Rings of triangles about overlapping ones that are replaced, too, where fewer do not suffice.
+constexpr int kMostRings = 3;
 constexpr std::chrono::seconds kMostRepairCpu(60);
 
 /// Returns nothing for a surface that is no manifold.
@@ -70,6 +78,22 @@ std::string FillAll(HalfedgeMesh mesh, double longest_rim) {
   return ToBytes(std::move(mesh));
 }
 
+/// Fills every hole that the removal of triangles has left, within the plane of its rim where that
+/// is flat within `flat_m`, and without new vertices.
+std::string CloseAll(HalfedgeMesh mesh, double flat_m) {
+  std::vector<Halfedge> rims;
+  pmp::extract_boundary_cycles(mesh, std::back_inserter(rims));
+  for (const Halfedge rim : rims) {
+    std::vector<HalfedgeMesh::Face_index> faces;
+    pmp::triangulate_hole(mesh, rim, std::back_inserter(faces),
+                          CGAL::parameters::use_2d_constrained_delaunay_triangulation(true)
+                              .threshold_distance(flat_m));
+    if (faces.empty()) return "";
+  }
+  pmp::remove_isolated_vertices(mesh);
+  return ToBytes(std::move(mesh));
+}
+
 std::string UntangleAll(HalfedgeMesh mesh) {
   return pmp::experimental::remove_self_intersections(mesh) ? ToBytes(std::move(mesh)) : "";
 }
@@ -88,6 +112,72 @@ std::optional<SurfaceMesh> InChild(const SurfaceMesh& surface,
   return SurfaceFromBytes(*bytes);
 }
 
+/// The triangles that overlap others, and those that share a vertex with such a triangle, `rings`
+/// times over.
+std::vector<bool> AtOverlaps(const SurfaceMesh& surface,
+                             const std::vector<std::pair<int32_t, int32_t>>& overlaps, int rings) {
+  std::vector<bool> at(surface.triangles.size(), false);
+  for (const auto& [first, second] : overlaps) {
+    at[static_cast<size_t>(first)] = at[static_cast<size_t>(second)] = true;
+  }
+  for (int ring = 0; ring < rings; ++ring) {
+    std::vector<bool> reached(surface.vertices.size(), false);
+    for (size_t t = 0; t < at.size(); ++t) {
+      if (!at[t]) continue;
+      for (const int32_t v : surface.triangles[t]) reached[static_cast<size_t>(v)] = true;
+    }
+    for (size_t t = 0; t < at.size(); ++t) {
+      at[t] = at[t] || std::ranges::any_of(surface.triangles[t], [&](int32_t v) {
+                return reached[static_cast<size_t>(v)];
+              });
+    }
+  }
+  return at;
+}
+
+/// The surface without the triangles that are `gone`, and without the smaller pieces into which
+/// their removal has cut a shell.
+SurfaceMesh Without(const SurfaceMesh& surface, const std::vector<bool>& gone) {
+  std::vector<size_t> shell_of(surface.triangles.size(), 0);
+  const std::vector<Shell> shells = FindShells(surface);
+  for (size_t s = 0; s < shells.size(); ++s) {
+    for (const int32_t t : shells[s].triangles) shell_of[static_cast<size_t>(t)] = s;
+  }
+  SurfaceMesh rest{surface.vertices, {}};
+  std::vector<size_t> given;
+  for (size_t t = 0; t < gone.size(); ++t) {
+    if (gone[t]) continue;
+    rest.triangles.push_back(surface.triangles[t]);
+    given.push_back(t);
+  }
+  std::vector<Shell> largest(shells.size());
+  for (Shell& piece : FindShells(rest)) {
+    Shell& kept = largest[shell_of[given[static_cast<size_t>(piece.triangles.front())]]];
+    if (piece.triangles.size() > kept.triangles.size()) kept = std::move(piece);
+  }
+  SurfaceMesh whole{surface.vertices, {}};
+  for (const Shell& piece : largest) {
+    for (const int32_t t : piece.triangles) {
+      whole.triangles.push_back(rest.triangles[static_cast<size_t>(t)]);
+    }
+  }
+  return whole;
+}
+
+/// The surface as `repaired`, described as `what`, unless one is too far from the other.
+std::optional<RepairedSurface> IfNear(const SurfaceMesh& surface, SurfaceMesh repaired,
+                                      const char* what) {
+  const double out = GreatestDistance(repaired, NearestTriangle(surface));
+  const double in = GreatestDistance(surface, NearestTriangle(repaired));
+  if (std::max(out, in) > kUntangledPart * Diagonal(surface.vertices)) return std::nullopt;
+  return RepairedSurface{
+      std::move(repaired),
+      {absl::StrFormat("repaired: the triangles where the surface %s were replaced; the result is "
+                       "at most %.3g m from the given surface, of which no part is further than "
+                       "%.3g m from it",
+                       what, out, in)}};
+}
+
 }  // namespace
 
 std::optional<RepairedSurface> FillHoles(const SurfaceMesh& surface) {
@@ -103,18 +193,26 @@ std::optional<RepairedSurface> FillHoles(const SurfaceMesh& surface) {
                        distance)}};
 }
 
+std::optional<RepairedSurface> Unfold(const SurfaceMesh& surface) {
+  const auto overlaps = FindOverlaps(surface, surface.triangles.size());
+  if (overlaps.empty()) return std::nullopt;
+  const double flat_m = kFlatPart * Diagonal(surface.vertices);
+  for (int rings = 0; rings <= kMostRings; ++rings) {
+    const SurfaceMesh cut = Without(surface, AtOverlaps(surface, overlaps, rings));
+    if (cut.triangles.empty()) return std::nullopt;
+    std::optional<SurfaceMesh> closed =
+        InChild(cut, [=](HalfedgeMesh mesh) { return CloseAll(std::move(mesh), flat_m); });
+    if (!closed || !CheckSurface(*closed).ok()) continue;
+    auto unfolded = IfNear(surface, *std::move(closed), "lay folded on itself");
+    if (unfolded) return unfolded;
+  }
+  return std::nullopt;
+}
+
 std::optional<RepairedSurface> Untangle(const SurfaceMesh& surface) {
   std::optional<SurfaceMesh> untangled = InChild(surface, UntangleAll);
   if (!untangled || untangled->triangles.empty()) return std::nullopt;
-  const double out = GreatestDistance(*untangled, NearestTriangle(surface));
-  const double in = GreatestDistance(surface, NearestTriangle(*untangled));
-  if (std::max(out, in) > kUntangledPart * Diagonal(surface.vertices)) return std::nullopt;
-  return RepairedSurface{
-      *std::move(untangled),
-      {absl::StrFormat("repaired: the triangles where the surface crossed itself were replaced; "
-                       "the result is at most %.3g m from the given surface, of which no part is "
-                       "further than %.3g m from it",
-                       out, in)}};
+  return IfNear(surface, *std::move(untangled), "crossed itself");
 }
 
 }  // namespace carillon::precompute

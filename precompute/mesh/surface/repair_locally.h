@@ -15,6 +15,10 @@ namespace carillon::precompute {
 /// together have at most a twentieth of the area. A wider hole is the mouth of a vessel.
 std::optional<RepairedSurface> FillHoles(const SurfaceMesh& surface);
 
+/// Replaces the triangles where a closed surface lies folded on itself except for rounding, with
+/// the limits of Untangle. The result passes CheckSurface.
+std::optional<RepairedSurface> Unfold(const SurfaceMesh& surface);
+
 /// Replaces the triangles about places where a closed surface crosses itself, if no part of the
 /// result is further than a thousandth of the diagonal from the surface, or the reverse.
 std::optional<RepairedSurface> Untangle(const SurfaceMesh& surface);
