@@ -137,11 +137,10 @@ absl::Status ReadFile(const std::string& path, Options& options) {
   try {
     const toml::table table = toml::parse_file(path);
     for (const auto& [key, node] : table) {
-      if (const absl::Status status = ReadKey(std::string(key.str()), node, options);
-          !status.ok()) {
-        return InvalidConfiguration(absl::StrCat(path, " line ", key.source().begin.line, ": ",
-                                                 ToErrorInfo(status).message()));
-      }
+      const absl::Status status = ReadKey(std::string(key.str()), node, options);
+      if (status.ok()) continue;
+      return InvalidConfiguration(absl::StrCat(path, " line ", key.source().begin.line, ": ",
+                                               ToErrorInfo(status).message()));
     }
   } catch (const toml::parse_error& error) {
     return InvalidConfiguration(
@@ -235,10 +234,7 @@ void AddFlags(CLI::App& app, Options& options) {
   app.add_option("--full-scale-pa", options.full_scale_pa,
                  "pressure of a sample of full scale, Pa; less is louder")
       ->capture_default_str();
-  app.add_option("--head", options.head_file,
-                 "SOFA file with the measured head for binaural scenes; by default the one of "
-                 "Debian's libmysofa1")
-      ->capture_default_str();
+  app.add_option("--head", options.head_file, "SOFA file with the head for binaural scenes");
   app.add_option("--block-frames", options.block_frame_count, "frames in a rendered block")
       ->capture_default_str();
   app.add_option("--look-ahead-blocks", options.look_ahead_block_count,

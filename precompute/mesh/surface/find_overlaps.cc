@@ -74,7 +74,7 @@ double GreatestHeight(const Polygon& polygon) {
 }
 
 /// A triangle, and its axes: the direction of its first side, the one across it, and the normal.
-struct Face {
+struct FlatFace {
   std::array<Point, 3> corners;
   std::array<Point, 3> axes;
   double twice_area;
@@ -82,7 +82,7 @@ struct Face {
 
 Point Scaled(const Point& p, double by) { return {p[0] * by, p[1] * by, p[2] * by}; }
 
-Face FaceOf(const std::array<Point, 3>& corners) {
+FlatFace FaceOf(const std::array<Point, 3>& corners) {
   const Point side = Difference(corners[1], corners[0]), normal = AreaNormal(corners);
   const double twice_area = Norm(normal);
   if (!(twice_area > 0)) return {corners, {}, 0};
@@ -91,7 +91,7 @@ Face FaceOf(const std::array<Point, 3>& corners) {
 }
 
 /// The corners of `face` along the axes of `plane`, from its first corner.
-Polygon SeenFrom(const Face& plane, const Face& face) {
+Polygon SeenFrom(const FlatFace& plane, const FlatFace& face) {
   Polygon seen;
   for (const Point& corner : face.corners) {
     const Point p = Difference(corner, plane.corners[0]);
@@ -100,10 +100,10 @@ Polygon SeenFrom(const Face& plane, const Face& face) {
   return seen;
 }
 
-bool Overlap(const Face& a, const Face& b, double diagonal) {
+bool Overlap(const FlatFace& a, const FlatFace& b, double diagonal) {
   if (std::abs(Dot(a.axes[2], b.axes[2])) < kLeastCosine) return false;
   const bool a_is_larger = a.twice_area >= b.twice_area;
-  const Face &larger = a_is_larger ? a : b, &smaller = a_is_larger ? b : a;
+  const FlatFace &larger = a_is_larger ? a : b, &smaller = a_is_larger ? b : a;
   const Polygon outline = SeenFrom(larger, larger);
   Polygon common = SeenFrom(larger, smaller);
   for (size_t i = 0; i < 3 && common.count > 0; ++i) {
@@ -131,7 +131,7 @@ std::vector<std::pair<int32_t, int32_t>> FindOverlaps(const SurfaceMesh& surface
   std::vector<std::pair<int32_t, int32_t>> found;
   if (surface.triangles.empty()) return found;
   const double diagonal = Diagonal(surface.vertices);
-  std::vector<Face> faces;
+  std::vector<FlatFace> faces;
   std::vector<Box> boxes;
   for (size_t t = 0; t < surface.triangles.size(); ++t) {
     faces.push_back(FaceOf(CornersOf(surface, t)));

@@ -85,9 +85,10 @@ std::string CloseAll(HalfedgeMesh mesh, double flat_m) {
   pmp::extract_boundary_cycles(mesh, std::back_inserter(rims));
   for (const Halfedge rim : rims) {
     std::vector<HalfedgeMesh::Face_index> faces;
-    pmp::triangulate_hole(mesh, rim, std::back_inserter(faces),
-                          CGAL::parameters::use_2d_constrained_delaunay_triangulation(true)
-                              .threshold_distance(flat_m));
+    pmp::triangulate_hole(
+        mesh, rim, std::back_inserter(faces),
+        CGAL::parameters::use_2d_constrained_delaunay_triangulation(true).threshold_distance(
+            flat_m));
     if (faces.empty()) return "";
   }
   pmp::remove_isolated_vertices(mesh);

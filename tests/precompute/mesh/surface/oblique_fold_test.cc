@@ -241,8 +241,11 @@ TEST(ObliqueFold, OfAnEdgeOfTheBodyIsRepaired) {
 TEST(FindOverlaps, FindsNoneOnSoundBodies) {
   SurfaceMesh hollow = MakeSphereSurface(0.1, 3);
   AddShell(hollow, InsideOut(MakeSphereSurface(0.08, 3)));
-  const std::vector<SurfaceMesh> sound = {MakeBar().surface, MakeSphereSurface(0.1, 4),
-                                          MakeTubeSurface({}), MakeBoxSurface({1, 1, 1}), hollow,
+  const std::vector<SurfaceMesh> sound = {MakeBar().surface,
+                                          MakeSphereSurface(0.1, 4),
+                                          MakeTubeSurface({}),
+                                          MakeBoxSurface({1, 1, 1}),
+                                          hollow,
                                           MakeTubeSurface({.around = 64, .along = 1})};
   for (size_t s = 0; s < sound.size(); ++s) {
     for (unsigned seed = 0; seed < 3; ++seed) {
@@ -256,7 +259,7 @@ TEST(FindOverlaps, FindsNoneOnAFoilOrAKnife) {
   // A square metre, a tenth of a micrometre thick.
   EXPECT_TRUE(FindOverlaps(Rotated(MakeBoxSurface({1, 1, 1e-7}), 1), 1).empty());
   SurfaceMesh knife;  // its edge has an angle of 0.001
-  knife.vertices = {{0, 0, 0}, {0.2, 0, 0}, {0.2, 0.05, 25e-6},
+  knife.vertices = {{0, 0, 0},        {0.2, 0, 0},       {0.2, 0.05, 25e-6},
                     {0, 0.05, 25e-6}, {0, 0.05, -25e-6}, {0.2, 0.05, -25e-6}};
   knife.triangles = {{0, 1, 2}, {0, 2, 3}, {0, 4, 5}, {0, 5, 1},
                      {3, 2, 5}, {3, 5, 4}, {0, 3, 4}, {1, 5, 2}};
