@@ -256,8 +256,8 @@ TEST(FindOverlaps, FindsNoneOnSoundBodies) {
 }
 
 TEST(FindOverlaps, FindsNoneOnAFoilOrAKnife) {
-  // A square metre, a tenth of a micrometre thick.
-  EXPECT_TRUE(FindOverlaps(Rotated(MakeBoxSurface({1, 1, 1e-7}), 1), 1).empty());
+  // A square metre, a fifth of a micrometre thick.
+  EXPECT_TRUE(FindOverlaps(Rotated(MakeBoxSurface({1, 1, 2e-7}), 1), 1).empty());
   SurfaceMesh knife;  // its edge has an angle of 0.001
   knife.vertices = {{0, 0, 0},        {0.2, 0, 0},       {0.2, 0.05, 25e-6},
                     {0, 0.05, 25e-6}, {0, 0.05, -25e-6}, {0.2, 0.05, -25e-6}};
