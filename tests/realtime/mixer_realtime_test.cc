@@ -16,11 +16,13 @@
 #include <memory>
 #include <mutex>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "server/synthesis/mixer.h"
 #include "tests/realtime/forbidden_calls.h"
 #include "tests/server/synthesis/closed_form.h"
+#include "tests/server/synthesis/voice/sphere_head.h"
 
 namespace carillon {
 namespace {
@@ -35,10 +37,12 @@ std::unique_ptr<OscillatorBank> MakeBank(double decay_rate_per_s) {
                                           OscillatorBankSettings{});
 }
 
-std::shared_ptr<Voice> MakeVoice() {
-  const HearingSettings all{.distance_gain = true, .propagation_delay = true, .panning = true};
-  return std::make_shared<Voice>(Voice::Settings{.hearing = all, .channel_count = 2}, Place(),
-                                 Place());
+std::shared_ptr<Voice> MakeVoice(bool binaural) {
+  static const auto head = std::make_shared<const Head>(SphereHead::Make());
+  const HearingSettings all{
+      .distance_gain = true, .propagation_delay = true, .panning = true, .binaural = binaural};
+  return std::make_shared<Voice>(Voice::Settings{.hearing = all, .channel_count = 2, .head = head},
+                                 Place(), Place());
 }
 
 TEST(MixerRealtime, TheWatchSeesMallocFreeAndLocks) {
@@ -63,7 +67,8 @@ TEST(MixerRealtime, RenderNeitherAllocatesNorFreesNorLocks) {
   auto stream = mixer.OpenStream(256).value();
   for (int i = 0; i < 300; ++i) {
     if (i % 5 == 0 && i < 250) {
-      banks.push_back(mixer.Add(MakeBank(-300), i % 2 == 0 ? MakeVoice() : nullptr).value());
+      auto voice = i % 2 == 0 ? MakeVoice(i % 4 == 0) : nullptr;
+      banks.push_back(mixer.Add(MakeBank(-300), std::move(voice)).value());
     }
     const Motion motion{.position_m = {1.0F * static_cast<float>(i), 0, 0},
                         .glide_frames = i % 4 == 0 ? 0.0F : 300.0F};
