@@ -132,7 +132,9 @@ std::vector<std::pair<int32_t, int32_t>> FindOverlaps(const SurfaceMesh& surface
   if (surface.triangles.empty()) return found;
   const double diagonal = Diagonal(surface.vertices);
   std::vector<FlatFace> faces;
+  faces.reserve(surface.triangles.size());
   std::vector<Box> boxes;
+  boxes.reserve(surface.triangles.size());
   for (size_t t = 0; t < surface.triangles.size(); ++t) {
     faces.push_back(FaceOf(CornersOf(surface, t)));
     if (IsCollapsed(surface.triangles[t])) continue;
@@ -140,6 +142,7 @@ std::vector<std::pair<int32_t, int32_t>> FindOverlaps(const SurfaceMesh& surface
         BoxAround(faces.back().corners, kRoundingPart * diagonal, static_cast<int32_t>(t)));
   }
   std::vector<const Box*> handles;
+  handles.reserve(boxes.size());
   for (const Box& box : boxes) handles.push_back(&box);
   CGAL::box_self_intersection_d(handles.begin(), handles.end(), [&](const Box* a, const Box* b) {
     const auto [first, second] = std::minmax({a->info(), b->info()});
