@@ -8,9 +8,10 @@ Each part prints a Markdown table:
   curved    CalculiX, SciPy and Lamb on curved ten-node meshes of Gmsh: frequencies
   growth    time and memory over the number of nodes, up to a million with --full
   accuracy  --accuracy 1% on five bodies: estimated and true errors of every mode
+  packages  the closed surfaces of some Debian packages, with --repair: the share that ends in a model
 
-Nothing is kept from one run to the next. Slow programs on large bodies run with --full only, or where
---peers names them. CPU seconds are those of one thread for everybody.
+Nothing is kept from one run to the next, but for what `packages` adds to the file of --results. Slow programs on
+large bodies run with --full only, or where --peers names them. CPU seconds are those of one thread for everybody.
 """
 
 import argparse
@@ -24,6 +25,7 @@ import calculix
 import compare
 import curved
 import growth
+import packages
 
 
 def processor_flags():
@@ -49,7 +51,8 @@ def fair_environment():
 
 PARTS = {"compare": compare.compare, "calculix": calculix.compare_frequencies,
          "curved": curved.curved,
-         "growth": growth.growth, "accuracy": accuracy.accuracy}
+         "growth": growth.growth, "accuracy": accuracy.accuracy,
+         "packages": packages.packages}
 
 
 def names(text):
@@ -65,6 +68,8 @@ def main():
     parser.add_argument("--only", type=names, default=[], help="bodies, by name")
     parser.add_argument("--peers", type=names, default=[], help="other programs, by name")
     parser.add_argument("--picture", type=pathlib.Path, help="where to draw the errors that `accuracy` finds")
+    parser.add_argument("--results", type=pathlib.Path,
+                        help="where `packages` keeps each outcome, to go on from there (one JSON object a line)")
     options = parser.parse_args()
     for part in options.parts:
         print(f"\n## {part}\n", flush=True)
