@@ -8,6 +8,7 @@ Each part prints a Markdown table:
   curved    CalculiX, SciPy and Lamb on curved ten-node meshes of Gmsh: frequencies
   growth    time and memory over the number of nodes, up to a million with --full
   accuracy  --accuracy 1% on five bodies: estimated and true errors of every mode
+  bodies    thirty bodies as users have them, with the defaults: verdict, cost, stated and true errors
   packages  the closed surfaces of some Debian packages, with --repair: the share that ends in a model
 
 Nothing is kept from one run to the next, but for what `packages` adds to the file of --results. Slow programs on
@@ -26,6 +27,7 @@ import compare
 import curved
 import growth
 import packages
+import users
 
 
 def processor_flags():
@@ -52,7 +54,7 @@ def fair_environment():
 PARTS = {"compare": compare.compare, "calculix": calculix.compare_frequencies,
          "curved": curved.curved,
          "growth": growth.growth, "accuracy": accuracy.accuracy,
-         "packages": packages.packages}
+         "bodies": users.users, "packages": packages.packages}
 
 
 def names(text):
