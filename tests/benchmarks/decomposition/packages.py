@@ -38,7 +38,8 @@ def model_files():
 
 
 def read_triangles(path, folder):
-    """Corners of the file's triangles, N by 3 by 3, or None where assimp reads none."""
+    """Corners of the file's triangles, N by 3 by 3, or None where assimp reads none, or points or lines beside them:
+    it writes these into an STL file as records of other lengths."""
     binary = folder / "triangles.stl"
     binary.unlink(missing_ok=True)
     try:
@@ -48,13 +49,16 @@ def read_triangles(path, folder):
         return None
     if not binary.is_file() or binary.stat().st_size < 84:
         return None
-    return numpy.frombuffer(binary.read_bytes()[84:], RECORD)["corners"].astype(float)
+    content = binary.read_bytes()
+    if len(content) != 84 + RECORD.itemsize * int.from_bytes(content[80:84], "little"):
+        return None
+    return numpy.frombuffer(content[84:], RECORD)["corners"].astype(float)
 
 
 def why_not(corners):
     """Why a surface is not closed or nearly closed; empty where it is."""
     if corners is None or len(corners) == 0:
-        return "assimp reads no triangles"
+        return "assimp reads no triangles, or not only triangles"
     if not numpy.isfinite(corners).all():
         return "coordinates that are not finite"
     points, vertex = numpy.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
