@@ -57,6 +57,9 @@ PARTS = {"compare": compare.compare, "calculix": calculix.compare_frequencies,
          "bodies": users.users, "packages": packages.packages}
 
 
+HOURS = ("bodies", "packages")  # take one or two
+
+
 def names(text):
     return text.split(",")
 
@@ -66,7 +69,8 @@ def main():
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--build", type=pathlib.Path, required=True, help="the release build's folder")
     parser.add_argument("--full", action="store_true", help="slow programs and large bodies, too")
-    parser.add_argument("--parts", type=names, default=list(PARTS), help="some of " + ",".join(PARTS))
+    parser.add_argument("--parts", type=names, default=[part for part in PARTS if part not in HOURS],
+                        help=f"some of {','.join(PARTS)}; all but {','.join(HOURS)} unless named")
     parser.add_argument("--only", type=names, default=[], help="bodies, by name")
     parser.add_argument("--peers", type=names, default=[], help="other programs, by name")
     parser.add_argument("--picture", type=pathlib.Path, help="where to draw the errors that `accuracy` finds")
