@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <utility>
 
 #include "server/synthesis/voice/convolution_kernel.h"
 
@@ -14,14 +13,20 @@ Ears::Ears(const Head& head, size_t block_frame_count)
 }
 
 void Ears::Turn(const Head& head, const Vector3& direction) noexcept {
-  std::swap(start_, end_);
+  for (size_t ear = 0; ear < end_.size(); ++ear) start_[ear].taps.swap(end_[ear].taps);
   head.Respond(direction, end_);
 }
 
 void Ears::Jump(const Head& head, const Vector3& direction) noexcept {
   head.Respond(direction, end_);
-  start_ = end_;
+  Hold();
   known_ = {};
+}
+
+void Ears::Hold() noexcept {
+  for (size_t ear = 0; ear < end_.size(); ++ear) {
+    std::ranges::copy(end_[ear].taps, start_[ear].taps.begin());
+  }
 }
 
 void Ears::Silence() noexcept {

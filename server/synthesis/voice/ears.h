@@ -26,7 +26,7 @@ class Ears {
   void Jump(const Head& head, const Vector3& direction) noexcept;
 
   /// Begins a block that keeps the responses at the end of the block before.
-  void Hold() noexcept { start_ = end_; }
+  void Hold() noexcept;
 
   /// Makes the signal before the block zero.
   void Silence() noexcept;

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <utility>
 
 #include "server/synthesis/voice/vector3.h"
 
@@ -138,12 +137,12 @@ void Voice::NoteHeard() noexcept {
 void Voice::NoteEars(bool jumps) noexcept {
   const Vector3& direction = heard_[2].direction;
   if (jumps) {
-    std::swap(ears_[0], ears_[1]);
-    ears_[0].Jump(*settings_.head, direction);
+    ears_now_ = 1 - ears_now_;
+    ears_[ears_now_].Jump(*settings_.head, direction);
   } else {
-    ears_[0].Turn(*settings_.head, direction);
+    ears_[ears_now_].Turn(*settings_.head, direction);
   }
-  ears_[1].Hold();
+  ears_[1 - ears_now_].Hold();
 }
 
 void Voice::Render(std::span<float> frames) noexcept {
@@ -204,7 +203,8 @@ float Voice::Sample(double delay_frames, size_t n) const noexcept {
 void Voice::RenderFrom(const Hearings& heard, float fade, float fade_step,
                        std::span<float> frames) noexcept {
   if (binaural()) {
-    return RenderEars(heard, ears_[&heard == &heard_ ? 0 : 1], fade, fade_step, frames);
+    return RenderEars(heard, ears_[&heard == &heard_ ? ears_now_ : 1 - ears_now_], fade, fade_step,
+                      frames);
   }
   const size_t channels = settings_.channel_count;
   const DelayCurve delay(

@@ -149,6 +149,7 @@ class Voice {
   std::optional<DelayLine> line_;
   Hearings heard_{}, heard_before_{};
   std::vector<Ears> ears_;    // for heard_ and for heard_before_; none without a head
+  size_t ears_now_ = 0;       // those for heard_
   std::vector<float> sound_;  // in one ear
   float fade_ = 1, fade_step_;
   bool jump_waits_ = false, fed_ = false, asleep_ = true;
