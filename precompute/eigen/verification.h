@@ -31,7 +31,7 @@ inline constexpr double kMaxOrthogonalityError = 1e-7;
 /// mode. The result is at most a thousandth.
 double ResidualOfRounding(double stiffest, double eigenvalue);
 
-/// The largest diagonal entry of K over that of M.
+/// Returns the largest ratio K_ii / M_ii of the diagonal entries.
 double StiffestNode(const NodeMatrix& A);
 
 /// Measured properties of modes.

@@ -19,7 +19,7 @@ void AddManualFlag(CLI::App& app, int section, const std::string& version);
 /// Returns the manual page as man(7) describes it.
 std::string ManualPage(const CLI::App& app, int section, const std::string& version);
 
-/// Returns the options that --help lists, without the positional ones.
+/// Returns the options that --help lists, except positional options and --help itself.
 std::vector<const CLI::Option*> ListedOptions(const CLI::App& app);
 
 /// Returns the commands of a program or of a command that --help lists.
