@@ -67,8 +67,8 @@ class ConnectionGate {
     int socket;
     ConnectionTaker* taker;
   };
-  /// The taker closes a connection without telling the gate. The inode shows that: the descriptor
-  /// of a closed connection has none, or another.
+  /// The gate learns from the inode that the taker has closed a connection: the descriptor then has
+  /// no inode, or that of another file.
   struct Connection {
     int descriptor;
     ino_t inode;

@@ -73,7 +73,7 @@ class SlurmTask {
   RemoteRuns* runs_;
   std::filesystem::path folder_;
   SlurmJob job_;
-  std::string progress_bytes_;  // of the newest progress that was reported
+  std::string progress_bytes_;  // the newest reported progress, serialized
   double fraction_ = 0;
 };
 

@@ -69,7 +69,7 @@ absl::Status ContactIntake::TryStrike(const ObjectImpulse& impulse) {
     blow.handle = felt.by[i].handle;
     blow.by_sounds = felt.count == felt.by.size();
     if (blow.by_sounds) blow.by = felt.by[1 - i].handle;
-    Tell(felt.by[i].event, blow, frame);
+    AddBlow(felt.by[i].event, blow, frame);
     Push(felt.by[i].event, frame);
   }
   return absl::OkStatus();
@@ -208,13 +208,13 @@ void ContactIntake::Push(const ContactForces::Events& events) {
       blow.handle = force.handle;
       blow.by = force.by;
       blow.by_sounds = force.by_sounds;
-      Tell(event, blow, frame);
+      AddBlow(event, blow, frame);
     }
     Push(event, frame);
   }
 }
 
-void ContactIntake::Tell(const MixerEvent& event, FoundBlow blow, double frame) {
+void ContactIntake::AddBlow(const MixerEvent& event, FoundBlow blow, double frame) {
   if (settings_.blows == nullptr) return;
   const absl::StatusOr<const SoundingObject*> object = scene_.Find(blow.handle);
   if (!object.ok()) return;

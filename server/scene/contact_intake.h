@@ -131,7 +131,7 @@ class ContactIntake {
   void Push(const ContactForces::Events& events);
   void Push(MixerEvent& event, double frame);
   /// Adds the blow of `event`, whose object, partner and frame are given, to the settings' blows.
-  void Tell(const MixerEvent& event, FoundBlow blow, double frame)
+  void AddBlow(const MixerEvent& event, FoundBlow blow, double frame)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(scene_.mutex());
   absl::StatusOr<double> FrameOfImpulse(double time_offset_s) const;
   double FrameOf(double time_s) const { return mapper_.FrameOf(time_s); }

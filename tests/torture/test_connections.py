@@ -105,7 +105,6 @@ class ConnectionTest(torture.ScratchTest):
               f"{most_mib:.0f} MiB amid, {torture.resident_mib(process):.0f} MiB after", flush=True)
         self.assertLess(torture.resident_mib(process) - before_mib, 100)
 
- 
 
 if __name__ == "__main__":
     unittest.main()

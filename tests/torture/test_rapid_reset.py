@@ -151,6 +151,7 @@ class RapidResetTest(torture.ServedTest):
         self.assertGreater(flood.frames, 0)
         self.assertLess(p99_s, P99_S)
         self.assertLess(most_mib, before_mib + GROWTH_MIB)
+        self.assertLess(torture.resident_mib(self.daemon.process), before_mib + LEFT_MIB)
 
     def test_calls_that_are_cancelled_at_once(self):
         self.attack(resets)

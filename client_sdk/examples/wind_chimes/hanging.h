@@ -14,9 +14,9 @@ namespace carillon::wind_chimes {
 /// A point or a vector in the world, whose axis z points up: x, y, z, metres unless stated.
 using Vector = std::array<double, 3>;
 
-// The tubes hang on a circle, with their centres at one height. A thread holds each tube at a node
-// of its first bending mode, 22.4 % of the tube's length from its end. The thread damps the sound
-// least there.
+// The tubes hang on a circle, with their centres at one height. A thread holds each tube 22.4 % of
+// its length from the end. The first bending mode has a node there, so that the thread damps it
+// least.
 inline constexpr double kCircleRadius_m = 0.062;
 inline constexpr double kTubeCentre_z_m = -0.40;
 inline constexpr double kNodeFromEnd = 0.224;

@@ -59,7 +59,8 @@ struct Motion {
   std::array<float, 3> position_m{};
   std::array<float, 3> right{1, 0, 0};  ///< a listener's unit vector to the right
   /// x, y and z of the unit quaternion (w is not negative) that rotates vectors from the body's
-  /// frame into the scene's frame. The orientation of a listener is not used.
+  /// frame into the scene's frame. The orientation of a listener matters to binaural voices
+  /// alone.
   std::array<float, 3> orientation{};
   float glide_frames = 0;  ///< duration of the way; below one: a jump
 };

@@ -24,8 +24,8 @@ class PastPositions {
 
   const Vector3& newest() const noexcept { return positions_m_[newest_]; }
 
-  /// Returns the position `blocks` blocks before the end of the last block, linear between the ends
-  /// of blocks.
+  /// Returns the position `blocks` blocks before the end of the last block. Between the ends of two
+  /// blocks the object moves in a straight line.
   Vector3 Before(double blocks) const noexcept;
 
   /// Number of blocks kept.
@@ -36,7 +36,7 @@ class PastPositions {
   size_t newest_ = 0;
 };
 
-/// The unit of a propagation delay and its limits.
+/// The conversion of distances into delays, and the range of the delays.
 struct DelayLimits {
   double frames_per_metre = 0;  ///< sample rate over speed of sound
   size_t block_frame_count = 0;

@@ -7,6 +7,7 @@
 #include "server/synthesis/voice/convolution_kernel.h"
 
 namespace carillon {
+
 Ears::Ears(const Head& head, size_t block_frame_count)
     : start_(head.Silent()), end_(start_), other_(block_frame_count) {
   for (std::vector<float>& signal : signals_) signal.resize(past_count() + block_frame_count);

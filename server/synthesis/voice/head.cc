@@ -17,11 +17,11 @@ constexpr double kPi = std::numbers::pi;
 constexpr float kOnset = 0.1F;
 /// Frames that are kept before the onset.
 constexpr double kBefore = 16;
-/// The part of a response that is kept: all of KEMAR's, whose quieter ear rings long.
+/// Each response is kept for 10.7 ms. Those of KEMAR last 11.6 ms.
 constexpr double kLength_s = 512.0 / 48000;
 /// The last taps fade out.
 constexpr size_t kFadeTaps = 32;
-/// A direction of the grid is interpolated between so many measured ones.
+/// Each direction of the grid is interpolated between the four nearest measured ones.
 constexpr size_t kNeighbours = 4;
 
 double OnsetOf(std::span<const float> response) {
@@ -86,7 +86,7 @@ void Add(const EarResponses& from, double weight, EarResponses& to) {
   }
 }
 
-/// The power of a response on the mean from 0 to 10 kHz.
+/// Returns the mean power of a response from 0 to 10 kHz.
 double PowerOf(const EarResponse& response, double sample_rate_hz) {
   constexpr double kHighest_hz = 10000;
   constexpr int kCount = 100;
@@ -108,8 +108,8 @@ struct Neighbour {
   size_t index = 0;
 };
 
-/// The mean of the nearest measured directions, by the inverse square of their angles. `mean`: of
-/// zeros.
+/// Returns the mean of the nearest measured directions, weighted by the inverse square of their
+/// angles. `mean` holds zeros.
 EarResponses Interpolate(const Vector3& direction, std::span<const Vector3> directions,
                          std::span<const EarResponses> split, EarResponses mean) {
   std::vector<Neighbour> near;

@@ -190,7 +190,7 @@ void ExpectRefusedAndRepaired(const SurfaceMesh& folded) {
   EXPECT_THAT(PrepareSurface(folded, {}).status().ToString(), HasSubstr("MESH_SELF_INTERSECTING"));
   const auto repaired = PrepareSurface(folded, {.repair = true});
   ASSERT_TRUE(repaired.ok()) << repaired.status();
-  // What is repaired lies in one plane, so that nothing but rounding is lost.
+  // The repaired triangles lie in one plane, so that the volume changes by rounding alone.
   EXPECT_NEAR(Volume(repaired->surface), kVolume, 1e-6 * kVolume);
   EXPECT_THAT(repaired->warnings, ::testing::Contains(HasSubstr("were replaced")));
 }

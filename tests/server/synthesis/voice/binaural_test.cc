@@ -100,8 +100,8 @@ double LevelAt(const std::vector<double>& sound, double frequency_hz) {
   return 20 * std::log10(std::abs(sum) + 1e-12);
 }
 
-/// The greatest part of a sound that changes faster than any tone far below 24 kHz / 8: what is
-/// left after eight differences, as large as at the highest frequency.
+/// Returns the greatest amplitude of a sound after a high pass, which shows steps. Eight
+/// differences, each of gain 1 at half of the sample rate, leave 2e-13 of a tone of 400 Hz.
 double FastestPart(const std::vector<double>& sound) {
   std::vector<double> left(sound.begin() + 2000, sound.end());
   for (int order = 0; order < 8; ++order) {
