@@ -17,8 +17,9 @@ constexpr double kPi = std::numbers::pi;
 constexpr float kOnset = 0.1F;
 /// Frames that are kept before the onset.
 constexpr double kBefore = 16;
-/// Each response is kept for 10.7 ms. Those of KEMAR last 11.6 ms.
-constexpr double kLength_s = 512.0 / 48000;
+/// The part of a response that is kept. KEMAR's responses last 11.6 ms, and the last millisecond of
+/// the quieter ear is 30 dB below the whole.
+constexpr double kLength_s = 0.0125;
 /// The last taps fade out.
 constexpr size_t kFadeTaps = 32;
 /// Each direction of the grid is interpolated between the four nearest measured ones.

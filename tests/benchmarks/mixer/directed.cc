@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What it costs that objects have a place, and that their modes have directions.
+// What it costs that objects have a place, that two ears hear them, and that their modes have
+// directions.
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -14,6 +15,7 @@
 #include "tests/benchmarks/mixer/population.h"
 #include "tests/benchmarks/mixer/programs.h"
 #include "tests/server/synthesis/closed_form.h"
+#include "tests/server/synthesis/voice/sphere_head.h"
 
 namespace carillon {
 namespace {
@@ -58,6 +60,7 @@ struct PlacedSetting {
   bool moving = false;
   uint32_t most_order = 0;  ///< zero: without directivity
   bool near_field = false;
+  bool binaural = false;
 };
 
 /// Objects whose modes are never put to sleep, heard by one listener.
@@ -116,10 +119,14 @@ class PlacedStage {
     if (!setting_.placed) return nullptr;
     const HearingSettings hearing{.distance_gain = true,
                                   .propagation_delay = true,
-                                  .panning = true,
+                                  .panning = !setting_.binaural,
+                                  .binaural = setting_.binaural,
                                   .directivity = setting_.most_order > 0,
                                   .near_field = setting_.near_field};
-    return std::make_shared<Voice>(Voice::Settings{.hearing = hearing, .channel_count = 2},
+    static const auto head = std::make_shared<const Head>(SphereHead::Make());
+    return std::make_shared<Voice>(Voice::Settings{.hearing = hearing,
+                                                   .channel_count = 2,
+                                                   .head = setting_.binaural ? head : nullptr},
                                    Place{.position_m = {0.1 * static_cast<double>(object), 0, 0}},
                                    Place{.position_m = {2, 0, 0.5}});
   }
@@ -165,6 +172,8 @@ int MeasureDirected(const Arguments& arguments) {
       {.name = "no place"},
       {.name = "place", .placed = true},
       {.name = "place, moving", .placed = true, .moving = true},
+      {.name = "two ears", .placed = true, .binaural = true},
+      {.name = "two ears, moving", .placed = true, .moving = true, .binaural = true},
       {.name = "directions of order 2", .placed = true, .most_order = kFew},
       {.name = "directions of order 2, moving", .placed = true, .moving = true, .most_order = kFew},
       {.name = "directions of order 2, near, moving",

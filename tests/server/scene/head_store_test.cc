@@ -16,8 +16,10 @@
 #include <numeric>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "server/synthesis/voice/voice.h"
 #include "tests/server/mode_database/sample_model.h"
 
 namespace carillon {
@@ -82,6 +84,111 @@ TEST(HeadStoreTest, ResponsesAreThoseOfTheFile) {
   double square = 0;
   for (const double difference : differences) square += (difference - mean) * (difference - mean);
   EXPECT_LT(std::sqrt(square / count), 0.3) << "dB";
+}
+
+using Spectrum = std::vector<std::complex<double>>;
+
+/// Each 200 Hz up to 16 kHz.
+Spectrum SpectrumOf(std::span<const float> sound, double rate_hz) {
+  Spectrum spectrum;
+  for (double frequency_hz = 200; frequency_hz <= 16000; frequency_hz += 200) {
+    const std::complex<double> turn = std::polar(1.0, -2 * kPi * frequency_hz / rate_hz);
+    std::complex<double> sum = 0, phase = 1;
+    for (const float sample : sound) {
+      sum += double{sample} * phase;
+      phase *= turn;
+    }
+    spectrum.push_back(sum);
+  }
+  return spectrum;
+}
+
+/// The gain and the delay that make one sound of another.
+struct Fit {
+  double gain = 0, delay_frames = 0;
+};
+
+/// What is left of `heard` after the fitted filter, in relation to it, dB.
+double ErrorOf(const Spectrum& heard, const Spectrum& filter, const Fit& fit, double rate_hz) {
+  double error = 0, power = 0;
+  for (size_t i = 0; i < heard.size(); ++i) {
+    const double turn = -2 * kPi * 200 * static_cast<double>(i + 1) / rate_hz;
+    error += std::norm(heard[i] - filter[i] * std::polar(fit.gain, turn * fit.delay_frames));
+    power += std::norm(heard[i]);
+  }
+  return 10 * std::log10(error / power);
+}
+
+/// Finds the delay to a thousandth of a frame, below 300 frames.
+Fit FitTo(const Spectrum& heard, const Spectrum& filter, double rate_hz) {
+  Fit best;
+  double power = 0, most = 0;
+  for (const auto& value : filter) power += std::norm(value);
+  const auto attempt = [&](double delay_frames) {
+    double likeness = 0;
+    for (size_t i = 0; i < heard.size(); ++i) {
+      const double turn = 2 * kPi * 200 * static_cast<double>(i + 1) / rate_hz;
+      likeness += (std::conj(filter[i]) * heard[i] * std::polar(1.0, turn * delay_frames)).real();
+    }
+    if (likeness <= most) return;
+    most = likeness;
+    best = {.gain = likeness / power, .delay_frames = delay_frames};
+  };
+  for (int i = 0; i < 1200; ++i) attempt(i / 4.0);
+  for (double step = 0.125; step > 5e-4; step /= 2) {
+    const double at = best.delay_frames;
+    attempt(at - step);
+    attempt(at + step);
+  }
+  return best;
+}
+
+/// A click as both ears hear it from a direction.
+std::array<std::vector<float>, 2> HearClick(std::shared_ptr<const Head> head,
+                                            const Vector3& direction, double rate_hz) {
+  constexpr size_t kBlock = 128;
+  Voice voice({.hearing = {.binaural = true},
+               .sample_rate_hz = rate_hz,
+               .block_frame_count = kBlock,
+               .channel_count = 2,
+               .head = std::move(head)},
+              {.position_m = direction}, {});
+  voice.input()[0] = 1;
+  std::array<std::vector<float>, 2> heard;
+  for (int block = 0; block < 8; ++block) {
+    std::vector<float> frames(2 * kBlock);
+    voice.Render(frames);
+    for (size_t n = 0; n < frames.size(); ++n) heard[n % 2].push_back(frames[n]);
+  }
+  return heard;
+}
+
+TEST(HeadStoreTest, AClickIsHeardThroughTheFiltersOfTheLibrary) {
+  for (const uint32_t rate_hz : {44100U, 48000U}) {
+    const auto head = *HeadStore(kKemar).Get(rate_hz);
+    int length = 0, error = 0;
+    const std::unique_ptr<MYSOFA_EASY, decltype(&mysofa_close)> library(
+        mysofa_open(kKemar, static_cast<float>(rate_hz), &length, &error), &mysofa_close);
+    ASSERT_TRUE(library);
+    Fit fit;  // one for all directions and both ears
+    for (int degrees = 0; degrees < 360; degrees += 15) {
+      const Vector3 at = At(degrees);
+      const auto heard = HearClick(head, at, rate_hz);
+      std::array<std::vector<float>, 2> filters;
+      for (std::vector<float>& filter : filters) filter.resize(static_cast<size_t>(length));
+      std::array<float, 2> delays_s{};
+      mysofa_getfilter_float(library.get(), static_cast<float>(-at[2]), static_cast<float>(-at[0]),
+                             static_cast<float>(at[1]), filters[0].data(), filters[1].data(),
+                             &delays_s[0], &delays_s[1]);
+      for (const size_t ear : {0U, 1U}) {
+        ASSERT_EQ(delays_s[ear], 0) << "KEMAR's delays are in its responses";
+        const Spectrum sound = SpectrumOf(heard[ear], rate_hz);
+        const Spectrum filter = SpectrumOf(filters[ear], rate_hz);
+        if (fit.gain == 0) fit = FitTo(sound, filter, rate_hz);
+        EXPECT_LT(ErrorOf(sound, filter, fit, rate_hz), -60) << degrees << ", ear " << ear;
+      }
+    }
+  }
 }
 
 TEST(HeadStoreTest, SoundsAsAtAnotherRate) {

@@ -187,6 +187,32 @@ TEST(BinauralTest, AnObjectThatCirclesTheHeadDoesNotClick) {
   }
 }
 
+TEST(BinauralTest, AListenerWhoTurnsHearsAsIfTheObjectCircled) {
+  const auto angle = [](size_t n) { return static_cast<double>(n) / 96000 * 720; };
+  const std::vector<float> tone = Tone(400, 96000);
+  const auto turned = Play({.binaural = true}, At(0), tone, [&angle](Voice& voice, size_t n) {
+    if (n % 800 >= 128) return;
+    // To the left, so that the object wanders to the right; half of the angle in the quaternion.
+    const double half = std::remainder(angle(n), 360) / 2 * kPi / 180;
+    voice.MoveListener({.right = {static_cast<float>(std::cos(2 * half)), 0,
+                                  static_cast<float>(-std::sin(2 * half))},
+                        .orientation = {0, static_cast<float>(std::sin(half)), 0},
+                        .glide_frames = 800},
+                       0);
+  });
+  const auto circled = Play({.binaural = true}, At(0), tone, [&angle](Voice& voice, size_t n) {
+    if (n % 800 < 128) voice.Move(MotionTo(At(angle(n)), 800), 0);
+  });
+  for (const size_t ear : {0U, 1U}) {
+    EXPECT_LT(FastestPart(turned[ear]), 3e-5 * PeakOf(turned[ear]));  // -90 dB
+    double most = 0;
+    for (size_t n = 0; n < turned[ear].size(); ++n) {
+      most = std::max(most, std::abs(turned[ear][n] - circled[ear][n]));
+    }
+    EXPECT_LT(most, 0.01 * PeakOf(circled[ear]));
+  }
+}
+
 TEST(BinauralTest, AJumpIsACrossFadeFromTheSoundBefore) {
   const auto heard = Play({.binaural = true}, At(-70), Tone(400, 9600), [](Voice& voice, size_t n) {
     if (n == 4992) voice.Move(MotionTo(At(70), 0), 0);
