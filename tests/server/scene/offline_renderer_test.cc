@@ -6,10 +6,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <vector>
 
 #include "server/scene/scene_registry.h"
 #include "tests/server/scene/small_model.h"
+#include "tests/server/synthesis/voice/sphere_head.h"
 
 namespace carillon {
 namespace {
@@ -103,8 +105,15 @@ TEST_F(OfflineRendererTest, IsBitForBitWhatTheLiveMixerRenders) {
   EXPECT_EQ(offline, live);
 }
 
-constexpr HearingSettings kAllHeard{
-    .distance_gain = true, .propagation_delay = true, .panning = true};
+SceneSpace AllHeard(bool binaural) {
+  static const auto head = std::make_shared<const Head>(SphereHead::Make());
+  return {.hearing = {.distance_gain = true,
+                      .propagation_delay = true,
+                      .panning = !binaural,
+                      .binaural = binaural},
+          .listener = {},
+          .head = binaural ? head : nullptr};
+}
 
 /// One object circles, the listener walks and turns, and is struck on the way.
 void MoveAt(ContactIntake& intake, double time_s) {
@@ -112,13 +121,13 @@ void MoveAt(ContactIntake& intake, double time_s) {
   intake.MoveListener({.position_m = {0, time_s, 0}, .orientation = Normalized({1, 0, time_s, 0})});
 }
 
-std::vector<float> RenderPlaced(size_t thread_count, const TimeMapping& mapping,
-                                BodyCache& bodies) {
+std::vector<float> RenderPlaced(const SceneSpace& space, size_t thread_count,
+                                const TimeMapping& mapping, BodyCache& bodies) {
   const auto renderer = *OfflineRenderer::Make({.sample_rate_hz = kRate,
                                                 .channel_count = 2,
                                                 .tail_s = 0.5,
                                                 .step_s = 0.0137,
-                                                .space = {.hearing = kAllHeard, .listener = {}},
+                                                .space = space,
                                                 .mapping = mapping,
                                                 .thread_count = thread_count},
                                                bodies);
@@ -139,12 +148,17 @@ std::vector<float> RenderPlaced(size_t thread_count, const TimeMapping& mapping,
   return sound;
 }
 
-TEST_F(OfflineRendererTest, PlacesAreHeardBitForBitAsLiveAndForAnyNumberOfThreads) {
+class PlacesTest : public OfflineRendererTest, public testing::WithParamInterface<bool> {};
+
+INSTANTIATE_TEST_SUITE_P(PannedAndByTwoEars, PlacesTest, testing::Bool());
+
+TEST_P(PlacesTest, AreHeardBitForBitAsLiveAndForAnyNumberOfThreads) {
+  const SceneSpace space = AllHeard(GetParam());
   Mixer mixer({.sample_rate_hz = kRate,
                .block_frame_count = OfflineRenderer::kBlockFrameCount,
                .channel_count = 2});
   SceneRegistry scenes(mixer);
-  const uint64_t scene = *scenes.CreateScene({.hearing = kAllHeard, .listener = {}});
+  const uint64_t scene = *scenes.CreateScene(space);
   for (const uint32_t handle : {1U, 2U}) {
     ASSERT_TRUE(scenes.AddObject(scene, handle, model_, SmallProperties()).ok());
   }
@@ -160,13 +174,13 @@ TEST_F(OfflineRendererTest, PlacesAreHeardBitForBitAsLiveAndForAnyNumberOfThread
     stream->intake().Strike(impulse);
   });
   const TimeMapping mapping{.first_frame = *stream->first_frame(), .delay_s = 0.0271};
-  const std::vector<float> offline = RenderPlaced(1, mapping, bodies_);
+  const std::vector<float> offline = RenderPlaced(space, 1, mapping, bodies_);
   std::vector<float> live((offline.size() + 255) / 256 * 256);
   mixer.Render(live);
   live.resize(offline.size());
   EXPECT_GT(*std::ranges::max_element(offline), 0.0003);
   EXPECT_EQ(offline, live);
-  EXPECT_EQ(RenderPlaced(2, mapping, bodies_), offline);
+  EXPECT_EQ(RenderPlaced(space, 2, mapping, bodies_), offline);
 }
 
 TEST_F(OfflineRendererTest, FrameZeroIsSimulationTimeZero) {
