@@ -30,23 +30,44 @@ absl::Status Unusable(const std::string& file, absl::string_view fault) {
                               "impulse responses, or install Debian's libmysofa1"));
 }
 
-/// Whether the arrays are as long as the counts in the file say, and every number is finite.
-bool IsWhole(const MYSOFA_HRTF& sofa) {
+constexpr double kLowestRate_hz = 8000, kHighestRate_hz = 384000;
+/// The delays of a file lie within this time.
+constexpr double kLongestDelay_s = 0.1;
+
+bool AreWithin(std::span<const float> values, double most) {
+  return std::ranges::all_of(values, [most](float value) { return std::abs(value) <= most; });
+}
+
+/// Whether the arrays are as long as the counts in the file say, and every number can be used.
+bool IsWhole(const MYSOFA_HRTF& sofa, double rate_hz) {
+  constexpr double kGreatest = 1e9;  // no infinity and no NaN
   const size_t filter_count = size_t{sofa.M} * sofa.R;
-  const size_t delay_count = sofa.DataDelay.elements;
   const std::span responses(sofa.DataIR.values, sofa.DataIR.elements);
+  const std::span positions(sofa.SourcePosition.values, sofa.SourcePosition.elements);
+  const std::span delays(sofa.DataDelay.values, sofa.DataDelay.elements);
   return sofa.R == 2 && sofa.M > 0 && sofa.N > 0 && responses.size() == filter_count * sofa.N &&
-         sofa.SourcePosition.elements == 3 * size_t{sofa.M} &&
-         (delay_count == sofa.R || delay_count == filter_count) &&
-         std::ranges::all_of(responses, [](float sample) { return std::isfinite(sample); });
+         positions.size() == 3 * size_t{sofa.M} &&
+         (delays.size() == sofa.R || delays.size() == filter_count) &&
+         AreWithin(responses, kGreatest) && AreWithin(positions, kGreatest) &&
+         AreWithin(delays, kLongestDelay_s * rate_hz);
 }
 
 absl::StatusOr<Sofa> Read(const std::string& file) {
   int error = MYSOFA_OK;
   Sofa sofa(mysofa_load(file.c_str(), &error), &mysofa_free);
   if (!sofa) return Unusable(file, "cannot be read");
-  if (mysofa_check(sofa.get()) != MYSOFA_OK || !IsWhole(*sofa)) {
+  if (mysofa_check(sofa.get()) != MYSOFA_OK || sofa->DataSamplingRate.elements == 0) {
     return Unusable(file, "does not hold impulse responses of two ears by direction");
+  }
+  const double rate_hz = sofa->DataSamplingRate.values[0];
+  if (!(rate_hz >= kLowestRate_hz && rate_hz <= kHighestRate_hz)) {
+    return Unusable(file, absl::StrCat("has a sampling rate of ", rate_hz, " Hz; it must be ",
+                                       kLowestRate_hz, " to ", kHighestRate_hz));
+  }
+  if (!IsWhole(*sofa, rate_hz)) {
+    return Unusable(file, absl::StrCat("does not hold finite impulse responses of two ears by ",
+                                       "direction, with delays of at most ", kLongestDelay_s,
+                                       " s"));
   }
   return sofa;
 }

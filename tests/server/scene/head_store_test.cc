@@ -3,6 +3,7 @@
 // The head that Debian's libmysofa1 brings, KEMAR, beside the library's own filters.
 #include "server/scene/head_store.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <mysofa.h>
 
@@ -11,6 +12,7 @@
 #include <cmath>
 #include <complex>
 #include <fstream>
+#include <iterator>
 #include <memory>
 #include <numbers>
 #include <numeric>
@@ -227,6 +229,22 @@ TEST(HeadStoreTest, FilesWithoutAHeadAreRefused) {
   }
   EXPECT_FALSE(HeadStore("/none.sofa").available());
   EXPECT_TRUE(HeadStore().available());
+}
+
+TEST(HeadStoreTest, ASamplingRateInKilohertzIsRefused) {
+  std::ifstream stream(kKemar, std::ios::binary);
+  std::string file((std::istreambuf_iterator<char>(stream)), {});
+  // The file's rate of 44100 is one deflated chunk. These bytes are 48, deflated.
+  const std::array<unsigned char, 13> forty_eight = {0x78, 0xDA, 0x63, 0x60, 0x00, 0x01, 0x0F,
+                                                     0x07, 0x00, 0x00, 0xD8, 0x00, 0x89};
+  constexpr size_t kRateAt = 1173131;
+  ASSERT_EQ(file.substr(kRateAt, 4), "\x78\x01\x63\x60") << "libmysofa1 brings another file";
+  std::ranges::copy(forty_eight, file.begin() + kRateAt);
+  const TemporaryFolder folder;
+  const auto path = folder / "kilohertz.sofa";
+  std::ofstream(path, std::ios::binary) << file;
+  EXPECT_THAT(std::string(HeadStore(path.string()).Get(48000).status().message()),
+              testing::HasSubstr("kilohertz.sofa has a sampling rate of 48 Hz; it must be 8000 to"));
 }
 
 TEST(HeadStoreTest, OnlyScenesOfTwoChannelsThatAskForItGetAHead) {
