@@ -65,9 +65,9 @@ absl::StatusOr<Sofa> Read(const std::string& file) {
                                        kLowestRate_hz, " to ", kHighestRate_hz));
   }
   if (!IsWhole(*sofa, rate_hz)) {
-    return Unusable(file, absl::StrCat("does not hold finite impulse responses of two ears by ",
-                                       "direction, with delays of at most ", kLongestDelay_s,
-                                       " s"));
+    return Unusable(file,
+                    absl::StrCat("does not hold finite impulse responses of two ears by ",
+                                 "direction, with delays of at most ", kLongestDelay_s, " s"));
   }
   return sofa;
 }

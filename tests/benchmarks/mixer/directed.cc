@@ -124,11 +124,11 @@ class PlacedStage {
                                   .directivity = setting_.most_order > 0,
                                   .near_field = setting_.near_field};
     static const auto head = std::make_shared<const Head>(SphereHead::Make());
-    return std::make_shared<Voice>(Voice::Settings{.hearing = hearing,
-                                                   .channel_count = 2,
-                                                   .head = setting_.binaural ? head : nullptr},
-                                   Place{.position_m = {0.1 * static_cast<double>(object), 0, 0}},
-                                   Place{.position_m = {2, 0, 0.5}});
+    return std::make_shared<Voice>(
+        Voice::Settings{
+            .hearing = hearing, .channel_count = 2, .head = setting_.binaural ? head : nullptr},
+        Place{.position_m = {0.1 * static_cast<double>(object), 0, 0}},
+        Place{.position_m = {2, 0, 0.5}});
   }
 
   PlacedSetting setting_;

@@ -243,8 +243,9 @@ TEST(HeadStoreTest, ASamplingRateInKilohertzIsRefused) {
   const TemporaryFolder folder;
   const auto path = folder / "kilohertz.sofa";
   std::ofstream(path, std::ios::binary) << file;
-  EXPECT_THAT(std::string(HeadStore(path.string()).Get(48000).status().message()),
-              testing::HasSubstr("kilohertz.sofa has a sampling rate of 48 Hz; it must be 8000 to"));
+  EXPECT_THAT(
+      std::string(HeadStore(path.string()).Get(48000).status().message()),
+      testing::HasSubstr("kilohertz.sofa has a sampling rate of 48 Hz; it must be 8000 to"));
 }
 
 TEST(HeadStoreTest, OnlyScenesOfTwoChannelsThatAskForItGetAHead) {
