@@ -24,6 +24,14 @@ double ModeRadiation::DecayRatePerS(const Air& air) const {
          power_integral / 2;
 }
 
+double PowerIntegral(std::span<const std::complex<double>> pattern, const SphereGrid& grid) {
+  double integral = 0;
+  for (size_t d = 0; d < pattern.size(); ++d) {
+    integral += std::norm(pattern[d]) * grid.weights()[d];
+  }
+  return integral;
+}
+
 void ExpandPattern(std::span<const std::complex<double>> pattern, const SphereGrid& grid,
                    ModeRadiation& mode) {
   const std::vector<std::complex<double>> all = grid.Analyse(pattern);

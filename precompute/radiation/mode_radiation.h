@@ -44,6 +44,10 @@ struct ModeRadiation {
   double DecayRatePerS(const Air& air) const;
 };
 
+/// Integrates |P|^2 over all directions, for the far pattern P at the directions of the grid. The
+/// result has the unit of |P|^2, and is ModeRadiation::power_integral for the pattern of a mode.
+double PowerIntegral(std::span<const std::complex<double>> pattern, const SphereGrid& grid);
+
 /// Fills order, index and value from the far pattern and the wavenumber and power integral of the
 /// mode.
 void ExpandPattern(std::span<const std::complex<double>> pattern, const SphereGrid& grid,

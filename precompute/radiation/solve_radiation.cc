@@ -8,6 +8,7 @@
 
 #include "precompute/radiation/far_pattern.h"
 #include "precompute/radiation/gmres.h"
+#include "precompute/radiation/mode_radiation.h"
 
 namespace carillon::precompute {
 namespace {
@@ -50,9 +51,7 @@ std::vector<ModeField> SolveRadiation(const ModeProblem& problem, const SurfaceL
     const Displacement& displacement = problem.displacements[s];
     field.pattern =
         FarPattern(level.surface, body.center, k, field.pressure, displacement, grid, workers);
-    for (size_t d = 0; d < field.pattern.size(); ++d) {
-      field.power_integral += std::norm(field.pattern[d]) * grid.weights()[d];
-    }
+    field.power_integral = PowerIntegral(field.pattern, grid);
     field.surface_power_db =
         Decibels(SurfacePowerIntegral(level.surface, k, field.pressure, displacement) /
                  field.power_integral);

@@ -7,11 +7,6 @@
 #include "server/decomposition/job_rules.h"
 
 namespace carillon {
-namespace {
-
-constexpr size_t kMostRememberedClients = 4096;
-
-}  // namespace
 
 std::optional<ActiveJob> ActiveJobs::Find(const std::string& digest) {
   MutexLock lock(&mutex_);
@@ -27,15 +22,12 @@ bool ActiveJobs::Contains(const std::string& digest) {
 
 size_t ActiveJobs::queued_count() {
   MutexLock lock(&mutex_);
-  size_t count = 0;
-  for (const auto& [client, queue] : queues_) count += queue.size();
-  return count;
+  return queue_.size();
 }
 
 size_t ActiveJobs::queued_count(const std::string& client) {
   MutexLock lock(&mutex_);
-  const auto queue = queues_.find(client);
-  return queue == queues_.end() ? 0 : queue->second.size();
+  return queue_.size(client);
 }
 
 ActiveJobs::Counts ActiveJobs::CountStates() {
@@ -100,16 +92,16 @@ void ActiveJobs::Add(ActiveJob job) {
 Notice ActiveJobs::Change(const std::string& digest, absl::FunctionRef<void(ActiveJob&)> change) {
   MutexLock lock(&mutex_);
   ActiveJob& job = jobs_.at(digest);
-  Dequeue(job);
+  queue_.Remove(EntryOf(job));
   change(job);
-  if (!job.running.has_value() && job.waits_for.empty()) queues_[job.client].insert(PlaceOf(job));
+  if (!job.running.has_value() && job.waits_for.empty()) queue_.Add(EntryOf(job));
   return Announce(job);
 }
 
 Notice ActiveJobs::Remove(const std::string& digest, const v1::Job& last) {
   MutexLock lock(&mutex_);
   const auto job = jobs_.find(digest);
-  Dequeue(job->second);
+  queue_.Remove(EntryOf(job->second));
   jobs_.erase(job);
   TellSinks(last);
   Notice notice{{}, last, ++version_};
@@ -120,13 +112,13 @@ Notice ActiveJobs::Remove(const std::string& digest, const v1::Job& last) {
 std::optional<ActiveJob> ActiveJobs::BeginRun(const Capacity& capacity,
                                               std::chrono::nanoseconds now) {
   MutexLock lock(&mutex_);
-  if (queues_.empty() || running_count_ >= capacity.worker_count) return std::nullopt;
-  const std::set<Place>& queue = NextClient()->second;
-  ActiveJob& job = jobs_.at(std::get<std::string>(*queue.begin()));
+  const std::optional<std::string> next = queue_.Next();
+  if (!next.has_value() || running_count_ >= capacity.worker_count) return std::nullopt;
+  ActiveJob& job = jobs_.at(*next);
   const bool fits = reserved_bytes_ + job.estimate_bytes <= capacity.memory_bytes;
   if (!fits && running_count_ > 0) return std::nullopt;
-  Dequeue(job);
-  NoteStart(job.client);
+  queue_.Remove(EntryOf(job));
+  queue_.NoteStart(job.client);
   ++running_count_;
   Reserve(job, job.estimate_bytes);
   job.running = job.request;
@@ -216,8 +208,11 @@ double ActiveJobs::Learn(uint64_t guess_bytes, uint64_t peak_bytes) {
   return experience_.correction();
 }
 
-ActiveJobs::Place ActiveJobs::PlaceOf(const ActiveJob& job) {
-  return {-job.record.priority, job.number, job.record.digest};
+FairQueue::Entry ActiveJobs::EntryOf(const ActiveJob& job) {
+  return {.client = job.client,
+          .priority = job.record.priority,
+          .number = job.number,
+          .digest = job.record.digest};
 }
 
 v1::Job ActiveJobs::ViewOf(const ActiveJob& job) {
@@ -243,30 +238,7 @@ void ActiveJobs::TellSinks(const v1::Job& job) {
 
 void ActiveJobs::Enqueue(ActiveJob& job) {
   job.number = ++last_number_;
-  if (job.waits_for.empty()) queues_[job.client].insert(PlaceOf(job));
-}
-
-void ActiveJobs::Dequeue(const ActiveJob& job) {
-  const auto queue = queues_.find(job.client);
-  if (queue == queues_.end()) return;
-  queue->second.erase(PlaceOf(job));
-  if (queue->second.empty()) queues_.erase(queue);
-}
-
-ActiveJobs::Queues::iterator ActiveJobs::NextClient() {
-  const auto newest_start = [this](const auto& queue) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
-    const auto start = starts_.find(queue.first);
-    return start == starts_.end() ? 0 : start->second;
-  };
-  return std::ranges::min_element(queues_, {}, newest_start);
-}
-
-void ActiveJobs::NoteStart(const std::string& client) {
-  starts_[client] = ++start_count_;
-  if (starts_.size() <= kMostRememberedClients) return;
-  // Whoever started longest ago counts as new when it comes again.
-  starts_.erase(
-      std::ranges::min_element(starts_, {}, [](const auto& start) { return start.second; }));
+  if (job.waits_for.empty()) queue_.Add(EntryOf(job));
 }
 
 void ActiveJobs::Reserve(ActiveJob& job, uint64_t bytes) {

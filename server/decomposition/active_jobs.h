@@ -9,7 +9,6 @@
 #include <optional>
 #include <set>
 #include <string>
-#include <tuple>
 #include <vector>
 
 #include "absl/base/thread_annotations.h"
@@ -17,6 +16,7 @@
 #include "carillon/v1/decomposition.pb.h"
 #include "carillon/v1/modal_model_service.pb.h"
 #include "server/base/mutex.h"
+#include "server/decomposition/fair_queue.h"
 #include "server/decomposition/job_sink.h"
 #include "server/decomposition/memory_estimate.h"
 #include "server/decomposition/watcher.h"
@@ -88,10 +88,9 @@ class ActiveJobs {
   /// Removes a job. Its watchers get `last`.
   Notice Remove(const std::string& digest, const v1::Job& last);
 
-  /// Marks the next job as running if a worker and the memory for it are free. It is the first of
-  /// the client whose newest start is the longest ago, so that clients take turns whatever the
-  /// priorities of their jobs. No other job overtakes it, because small jobs could delay a large
-  /// one for ever. A job that does not fit into the budget at all runs alone.
+  /// Marks the next job of the fair queue as running if a worker and the memory for it are free. No
+  /// other job overtakes it, because small jobs could delay a large one for ever. A job that does
+  /// not fit into the budget at all runs alone.
   std::optional<ActiveJob> BeginRun(const Capacity& capacity, std::chrono::nanoseconds now);
 
   /// Records the progress of a run. The node count of the mesh, once it is known, predicts the
@@ -125,30 +124,18 @@ class ActiveJobs {
   double Learn(uint64_t guess_bytes, uint64_t peak_bytes);
 
  private:
-  /// In a client's queue: by priority, highest first, then by number.
-  using Place = std::tuple<int32_t, uint64_t, std::string>;
-  using Queues = std::map<std::string, std::set<Place>>;
-
-  static Place PlaceOf(const ActiveJob& job);
+  static FairQueue::Entry EntryOf(const ActiveJob& job);
   static v1::Job ViewOf(const ActiveJob& job);
   void TellSinks(const v1::Job& job) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   Notice Announce(const ActiveJob& job) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void Enqueue(ActiveJob& job) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  void Dequeue(const ActiveJob& job) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  /// The client whose turn it is; there are queued jobs.
-  Queues::iterator NextClient() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  void NoteStart(const std::string& client) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void Reserve(ActiveJob& job, uint64_t bytes) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void EraseWatcher(const std::string& digest, const std::shared_ptr<Watcher>& watcher)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   Mutex mutex_;
   std::map<std::string, ActiveJob> jobs_ ABSL_GUARDED_BY(mutex_);
-  /// By client; none is empty.
-  Queues queues_ ABSL_GUARDED_BY(mutex_);
-  /// Number of each client's newest start, of those that are remembered.
-  std::map<std::string, uint64_t> starts_ ABSL_GUARDED_BY(mutex_);
-  uint64_t start_count_ ABSL_GUARDED_BY(mutex_) = 0;
+  FairQueue queue_ ABSL_GUARDED_BY(mutex_);
   std::map<std::string, std::vector<std::shared_ptr<Watcher>>> watchers_ ABSL_GUARDED_BY(mutex_);
   std::set<JobSink*> sinks_ ABSL_GUARDED_BY(mutex_);
   uint64_t last_number_ ABSL_GUARDED_BY(mutex_) = 0;

@@ -238,17 +238,70 @@ absl::Status InsertCopy(SqliteConnection& connection, const std::string& digest,
       {summary.revision, from});
 }
 
+absl::Status UpdateModel(SqliteConnection& connection, const std::string& digest,
+                         const ModelChange& change) {
+  if (change.label.has_value()) {
+    RETURN_IF_ERROR(connection.Run("UPDATE models SET label = ? WHERE digest = ?",
+                                   {Utf8Prefix(*change.label, kMaxLabelBytes), digest}));
+  }
+  if (change.pinned.has_value()) {
+    RETURN_IF_ERROR(connection.Run("UPDATE models SET pinned = ? WHERE digest = ?",
+                                   {static_cast<int64_t>(*change.pinned), digest}));
+  }
+  if (change.material.has_value()) {
+    RETURN_IF_ERROR(StoreMaterial(connection, digest, *change.material));
+  }
+  for (const std::string& tag : change.add_tags) {
+    RETURN_IF_ERROR(connection.Run("INSERT OR IGNORE INTO model_tags (tag, digest) VALUES (?, ?)",
+                                   {tag, digest}));
+  }
+  for (const std::string& tag : change.remove_tags) {
+    RETURN_IF_ERROR(
+        connection.Run("DELETE FROM model_tags WHERE tag = ? AND digest = ?", {tag, digest}));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status StoreSounded(SqliteConnection& connection, const std::string& digest,
+                          int64_t unix_ms) {
+  return connection.Run("UPDATE models SET sounded_unix_ms = ? WHERE digest = ?",
+                        {unix_ms, digest});
+}
+
+absl::StatusOr<bool> QuarantineModel(SqliteConnection& connection, const std::string& digest) {
+  RETURN_IF_ERROR(connection.Run(
+      "UPDATE models SET quarantined = 1 WHERE digest = ? AND quarantined = 0", {digest}));
+  return connection.changed_row_count() > 0;
+}
+
+absl::StatusOr<int64_t> CountChunks(SqliteConnection& connection, int64_t revision) {
+  int64_t count = 0;
+  RETURN_IF_ERROR(connection.Query("SELECT count(*) FROM model_chunks WHERE revision = ?",
+                                   {revision}, [&](const SqlRow& row) {
+                                     count = row.Int(0);
+                                     return absl::OkStatus();
+                                   }));
+  return count;
+}
+
+absl::Status SelectSizes(SqliteConnection& connection,
+                         absl::FunctionRef<void(const ModelSize&)> on_model) {
+  return connection.Query(
+      "SELECT digest, stored_bytes + (SELECT coalesce(sum(transfers.stored_bytes), 0) "
+      "FROM transfers WHERE transfers.revision = models.revision), pinned FROM models "
+      "ORDER BY max(sounded_unix_ms, created_unix_ms), revision",
+      {}, [&](const SqlRow& row) {
+        on_model({row.Text(0), static_cast<uint64_t>(row.Int(1)), row.Int(2) != 0});
+        return absl::OkStatus();
+      });
+}
+
 absl::Status DeleteModelRows(SqliteConnection& connection, const std::string& digest) {
-  absl::Status status = connection.Run("DELETE FROM models WHERE digest = ?", {digest});
-  if (status.ok() && connection.changed_row_count() == 0) return ModelNotFound(digest);
-  if (status.ok()) status = connection.Run("DELETE FROM model_tags WHERE digest = ?", {digest});
-  if (status.ok()) {
-    status = connection.Run("DELETE FROM model_materials WHERE digest = ?", {digest});
-  }
-  if (status.ok()) {
-    status = connection.Run("DELETE FROM jobs WHERE digest = ?1 OR transfer_of = ?1", {digest});
-  }
-  return status;
+  RETURN_IF_ERROR(connection.Run("DELETE FROM models WHERE digest = ?", {digest}));
+  if (connection.changed_row_count() == 0) return ModelNotFound(digest);
+  RETURN_IF_ERROR(connection.Run("DELETE FROM model_tags WHERE digest = ?", {digest}));
+  RETURN_IF_ERROR(connection.Run("DELETE FROM model_materials WHERE digest = ?", {digest}));
+  return connection.Run("DELETE FROM jobs WHERE digest = ?1 OR transfer_of = ?1", {digest});
 }
 
 }  // namespace carillon

@@ -17,8 +17,8 @@
 
 namespace carillon {
 
-/// The rows of a modal model, within a transaction of the caller. Every function that reads them
-/// can fail with NotFound (MODAL_MODEL_NOT_FOUND), DataLoss (MODAL_MODEL_CORRUPT).
+/// All SQL statements about modal models. The caller opens the transaction. Every function that
+/// reads a model can fail with NotFound (MODAL_MODEL_NOT_FOUND) or DataLoss (MODAL_MODEL_CORRUPT).
 
 absl::Status ModelNotFound(const std::string& digest);
 absl::Status ModelCorrupt(const std::string& digest, absl::string_view what);
@@ -31,8 +31,8 @@ absl::Status SelectModels(SqliteConnection& connection, const ModelFilter& filte
                           int64_t limit, absl::FunctionRef<void(ModelSummary)> on_model,
                           absl::FunctionRef<void(std::string, absl::Status)> on_damaged);
 
-/// The material remembered for the model of this digest; absent: there is none, or its row is
-/// damaged.
+/// Returns the material remembered for the model of this digest, or nothing if there is none or its
+/// row is damaged.
 absl::StatusOr<std::optional<v1::Material>> SelectMaterial(SqliteConnection& connection,
                                                            const std::string& digest);
 
@@ -56,6 +56,29 @@ absl::Status InsertModel(SqliteConnection& connection, ModelFileReader& records,
 /// chunks. `summary` then describes the copy.
 absl::Status InsertCopy(SqliteConnection& connection, const std::string& digest,
                         ModelSummary& summary);
+
+/// Writes the label, the pin, the material and the tags that `change` gives.
+absl::Status UpdateModel(SqliteConnection& connection, const std::string& digest,
+                         const ModelChange& change);
+
+/// Writes when the model sounded last.
+absl::Status StoreSounded(SqliteConnection& connection, const std::string& digest, int64_t unix_ms);
+
+/// Puts the model into quarantine. Returns false if it was there already.
+absl::StatusOr<bool> QuarantineModel(SqliteConnection& connection, const std::string& digest);
+
+absl::StatusOr<int64_t> CountChunks(SqliteConnection& connection, int64_t revision);
+
+struct ModelSize {
+  std::string digest{};
+  uint64_t bytes = 0;  ///< of the model's arrays and its transfers
+  bool pinned = false;
+};
+
+/// Calls `on_model` for all models; those that sounded (or, if they never sounded, were stored)
+/// longest ago come first.
+absl::Status SelectSizes(SqliteConnection& connection,
+                         absl::FunctionRef<void(const ModelSize&)> on_model);
 
 /// Deletes model, tags, material and job. Errors: NotFound (MODAL_MODEL_NOT_FOUND).
 absl::Status DeleteModelRows(SqliteConnection& connection, const std::string& digest);

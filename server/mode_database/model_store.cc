@@ -49,34 +49,6 @@ ModelSummary Named(const std::string& digest, const std::string& label) {
   return summary;
 }
 
-absl::Status Apply(SqliteConnection& connection, const std::string& digest,
-                   const ModelChange& change) {
-  absl::Status status;
-  if (change.label.has_value()) {
-    status = connection.Run("UPDATE models SET label = ? WHERE digest = ?",
-                            {Utf8Prefix(*change.label, kMaxLabelBytes), digest});
-  }
-  if (status.ok() && change.pinned.has_value()) {
-    status = connection.Run("UPDATE models SET pinned = ? WHERE digest = ?",
-                            {static_cast<int64_t>(*change.pinned), digest});
-  }
-  if (status.ok() && change.material.has_value()) {
-    status = StoreMaterial(connection, digest, *change.material);
-  }
-  for (const std::string& tag : change.add_tags) {
-    if (status.ok()) status = CheckTag(tag);
-    if (status.ok()) {
-      status = connection.Run("INSERT OR IGNORE INTO model_tags (tag, digest) VALUES (?, ?)",
-                              {tag, digest});
-    }
-  }
-  for (const std::string& tag : change.remove_tags) {
-    if (!status.ok()) break;
-    status = connection.Run("DELETE FROM model_tags WHERE tag = ? AND digest = ?", {tag, digest});
-  }
-  return status;
-}
-
 /// A model is read into memory whole when it sounds.
 absl::Status CheckSize(uint64_t array_bytes) {
   const uint64_t most_bytes = PhysicalBytes() / 2;
@@ -164,10 +136,8 @@ void ModelStore::ListenToQuarantine(OnQuarantine on_quarantine) {
 absl::Status ModelStore::Quarantine(const std::string& digest, const absl::Status& why) {
   bool news = false;
   RETURN_IF_ERROR(database_->Write([&](SqliteConnection& connection) {
-    absl::Status marked = connection.Run(
-        "UPDATE models SET quarantined = 1 WHERE digest = ? AND quarantined = 0", {digest});
-    news = connection.changed_row_count() > 0;
-    return marked;
+    ASSIGN_OR_RETURN(news, QuarantineModel(connection, digest));
+    return absl::OkStatus();
   }));
   MutexLock lock(&listener_mutex_);
   if (news && on_quarantine_) on_quarantine_(digest, why);
@@ -222,11 +192,8 @@ absl::StatusOr<ModelExport> ModelStore::Export(const std::string& digest) {
   ASSIGN_OR_RETURN(ModelSummary summary, Summary(digest));
   ModelExport result(*database_, *this, std::move(summary));
   RETURN_IF_ERROR(database_->Read([&](SqliteConnection& connection) {
-    return connection.Query("SELECT count(*) FROM model_chunks WHERE revision = ?",
-                            {result.summary_.revision}, [&](const SqlRow& count) {
-                              result.chunk_count_ = count.Int(0);
-                              return absl::OkStatus();
-                            });
+    ASSIGN_OR_RETURN(result.chunk_count_, CountChunks(connection, result.summary_.revision));
+    return absl::OkStatus();
   }));
   return result;
 }
@@ -323,9 +290,11 @@ absl::StatusOr<ModelSummary> ModelStore::Update(const std::string& digest,
   absl::StatusOr<ModelSummary> summary = ModelNotFound(digest);
   RETURN_IF_ERROR(database_->Write([&](SqliteConnection& connection) {
     summary = SelectModel(connection, digest);
-    absl::Status changed = summary.ok() ? Apply(connection, digest, change) : summary.status();
-    if (changed.ok()) summary = SelectModel(connection, digest);
-    return changed.ok() ? summary.status() : changed;
+    RETURN_IF_ERROR(summary.status());
+    for (const std::string& tag : change.add_tags) RETURN_IF_ERROR(CheckTag(tag));
+    RETURN_IF_ERROR(UpdateModel(connection, digest, change));
+    summary = SelectModel(connection, digest);
+    return summary.status();
   }));
   return summary;
 }
@@ -335,52 +304,40 @@ absl::Status ModelStore::Delete(const std::string& digest) {
       [&](SqliteConnection& connection) { return DeleteModelRows(connection, digest); });
 }
 
+bool ModelStore::InMemory(const std::string& digest) const {
+  const auto cached = cache_.find(digest);
+  return cached != cache_.end() && !cached->second.model.expired();
+}
+
 absl::Status ModelStore::WriteSounded(SqliteConnection& connection) {
-  absl::Status status;
   for (const auto& [digest, unix_ms] : sounded_) {
-    if (!status.ok()) break;
-    status =
-        connection.Run("UPDATE models SET sounded_unix_ms = ? WHERE digest = ?", {unix_ms, digest});
+    RETURN_IF_ERROR(StoreSounded(connection, digest, unix_ms));
   }
-  return status;
+  return absl::OkStatus();
 }
 
 absl::StatusOr<Collected> ModelStore::Collect(uint64_t budget_bytes,
                                               const CollectSettings& settings) {
-  struct Candidate {
-    std::string digest;
-    uint64_t bytes = 0;
-    bool stays = false;
-  };
   MutexLock lock(&cache_mutex_);
   Collected collected;
   const auto collect =
       [&](SqliteConnection& connection) ABSL_EXCLUSIVE_LOCKS_REQUIRED(cache_mutex_) {
         collected = {};
         RETURN_IF_ERROR(WriteSounded(connection));
-        std::vector<Candidate> oldest_first;
+        std::vector<ModelSize> oldest_first;
         uint64_t total_bytes = 0;
-        absl::Status written = connection.Query(
-            "SELECT digest, stored_bytes + (SELECT coalesce(sum(transfers.stored_bytes), 0) "
-            "FROM transfers WHERE transfers.revision = models.revision), pinned FROM models "
-            "ORDER BY max(sounded_unix_ms, created_unix_ms), revision",
-            {}, [&](const SqlRow& row) ABSL_EXCLUSIVE_LOCKS_REQUIRED(cache_mutex_) {
-              const auto bytes = static_cast<uint64_t>(row.Int(1));
-              const auto cached = cache_.find(row.Text(0));
-              const bool in_memory = cached != cache_.end() && !cached->second.model.expired();
-              const bool stays = row.Int(2) != 0 || in_memory || row.Text(0) == settings.spared;
-              oldest_first.push_back({row.Text(0), bytes, stays});
-              total_bytes += bytes;
-              return absl::OkStatus();
-            });
-        for (const Candidate& model : oldest_first) {
-          if (!written.ok() || total_bytes <= budget_bytes) break;
-          if (model.stays) continue;
-          if (!settings.dry_run) written = DeleteModelRows(connection, model.digest);
+        RETURN_IF_ERROR(SelectSizes(connection, [&](const ModelSize& model) {
+          oldest_first.push_back(model);
+          total_bytes += model.bytes;
+        }));
+        for (const ModelSize& model : oldest_first) {
+          if (total_bytes <= budget_bytes) break;
+          if (model.pinned || model.digest == settings.spared || InMemory(model.digest)) continue;
+          if (!settings.dry_run) RETURN_IF_ERROR(DeleteModelRows(connection, model.digest));
           total_bytes -= model.bytes;
           collected = {collected.model_count + 1, collected.bytes + model.bytes};
         }
-        return written;
+        return absl::OkStatus();
       };
   RETURN_IF_ERROR(database_->WriteToFree(collect));
   sounded_.clear();

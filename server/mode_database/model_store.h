@@ -220,6 +220,7 @@ class ModelStore {
   absl::StatusOr<std::shared_ptr<const ModalModel>> Load(const std::string& digest);
   absl::StatusOr<ModelSummary> Store(ModelFileReader records, ModelSummary summary);
   absl::Status Quarantine(const std::string& digest, const absl::Status& why);
+  bool InMemory(const std::string& digest) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(cache_mutex_);
   absl::Status WriteSounded(SqliteConnection& connection)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(cache_mutex_);
 

@@ -23,14 +23,6 @@ static_assert(kMostBuses * kSectionCount <= RenderOrder::kMostSections);
 static_assert(kBlocksTogether <= RenderOrder::kMostBlocks);
 static_assert(kMostBlockFrames <= RenderOrder::kMostGroups * kMergedFrames);
 
-/// An impulse 6 dB quieter than all that the last block rendered is shed on arrival, if it is due
-/// within this number of blocks.
-constexpr float kEarlyShedRatio = 0.5F;
-constexpr uint64_t kEarlyShedBlocks = 8;
-
-/// Part of the bound that ringing banks may take; impulses get the rest.
-constexpr double kRingingShare = 0.9;
-
 }  // namespace
 
 void Mixer::Render(std::span<float> frames) noexcept {
@@ -176,21 +168,15 @@ bool Mixer::Await(MixerEvent& event, BankSlot& slot) noexcept {
   return push(begin);
 }
 
-/// Whether an impulse is so quiet that keeping and judging it would be a waste: see
-/// kEarlyShedRatio.
-bool Mixer::IsShedEarly(const MixerEvent& event, const BankSlot& slot) const noexcept {
-  return early_shed_below_ > 0 && event.impulse() != nullptr &&
-         event.FirstSample() < block_start_ + kEarlyShedBlocks * settings_.block_frame_count &&
-         LoudnessOf(*event.impulse(), slot) < early_shed_below_;
-}
-
 void Mixer::CollectDueEvents(size_t block_count) noexcept {
   due_.clear();
   due_order_.clear();
   due_events_.clear();
   rendered_work_ = 0;
   for (const uint32_t section : open_sections_) sections_[section]->due = {};
-  if (budget_.bounded() && ringing_work_ > budget_.most_work()) ShedBanks();
+  if (budget_.bounded() && ringing_work_ > budget_.most_work()) {
+    Count(statistics_.shed_bank_count, ShedBanks());
+  }
   for (uint32_t block = 0; block < block_count; ++block) {
     const size_t first = due_.size();
     pending_.Collect(block_start_ + block * settings_.block_frame_count, due_);
@@ -209,39 +195,6 @@ void Mixer::CollectDueEvents(size_t block_count) noexcept {
     std::span<const DueEvent>& section = sections_[due.section]->due;
     section = std::span(due_events_).last(section.size() + 1);
   }
-}
-
-/// Decides which impulses of a block are exact, merged or shed.
-void Mixer::DecideTreatment(std::span<const uint32_t> due) noexcept {
-  triage_.Clear();
-  for (const uint32_t index : due) {
-    const MixerEvent& event = pending_[index];
-    BankSlot* slot = FindSlot(event.bank);
-    if (slot == nullptr || event.impulse() == nullptr) continue;
-    const double awakening = slot->awakening ? 0 : slot->bank->awakening_work();
-    slot->awakening = true;
-    triage_.Note(LoudnessOf(*event.impulse(), *slot), slot->bank->strike_work() + awakening,
-                 slot->bank->merged_strike_work() + awakening);
-  }
-  for (const uint32_t index : due) {
-    if (BankSlot* slot = FindSlot(pending_[index].bank)) slot->awakening = false;
-  }
-  const double taken = work::kTakeEvent * static_cast<double>(std::exchange(taken_count_, 0));
-  const double judged = work::kChooseEvent * static_cast<double>(due.size());
-  const double spent = ringing_work_ + taken + judged;
-  rendered_work_ += spent + triage_.Decide(budget_.most_work() - spent);
-  early_shed_below_ = triage_.shed_below() * kEarlyShedRatio;
-}
-
-float Mixer::LoudnessOf(const SurfaceImpulse& impulse, const BankSlot& slot) const noexcept {
-  const auto& [x, y, z] = impulse.impulse_newton_seconds;
-  const float squared = x * x + y * y + z * z;
-  return buses_[slot.bus]->fader.target() * slot.loudness_per_newton_second * std::sqrt(squared);
-}
-
-double Mixer::LoudestSquared(uint32_t slot) const noexcept {
-  const double gain = buses_[slots_[slot].bus]->fader.target();
-  return gain * gain * slots_[slot].bank->loudest_squared();
 }
 
 /// Decides which of a block's events are rendered, and notes their places in the order of
@@ -278,26 +231,6 @@ void Mixer::ChooseEvents(uint32_t block, std::span<const uint32_t> due) noexcept
                                       .offset = static_cast<uint32_t>(event.FirstSample() - start),
                                       .merged = merged,
                                       .arrival = arrival}));
-  }
-}
-
-/// Silences the quietest banks until the rest can be rendered in time.
-void Mixer::ShedBanks() noexcept {
-  triage_.Clear();
-  for (const uint32_t section : open_sections_) {
-    for (const uint32_t index : sections_[section]->section.sounding()) {
-      const OscillatorBank& bank = *slots_[index].bank;
-      triage_.Note(static_cast<float>(LoudestSquared(index)), bank.ringing_work(),
-                   bank.ringing_work());
-    }
-  }
-  ringing_work_ = triage_.Decide(kRingingShare * budget_.most_work());
-  for (const uint32_t section : open_sections_) {
-    for (const uint32_t index : sections_[section]->section.sounding()) {
-      if (triage_.Treat(static_cast<float>(LoudestSquared(index))) != Treatment::kShed) continue;
-      slots_[index].bank->Shed();
-      Count(statistics_.shed_bank_count);
-    }
   }
 }
 

@@ -240,7 +240,7 @@ class Mixer {
   void CollectDueEvents(size_t block_count) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void ChooseEvents(uint32_t block, std::span<const uint32_t> due) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
-  void ShedBanks() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  uint64_t ShedBanks() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void DecideTreatment(std::span<const uint32_t> due) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   float LoudnessOf(const SurfaceImpulse& impulse, const BankSlot& slot) const noexcept

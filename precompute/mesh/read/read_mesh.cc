@@ -74,7 +74,9 @@ void Scale(NamedMesh& named, double factor) {
 absl::StatusOr<ElementFile> ParseElements(const std::string& bytes, const std::string& format) {
   if (format == "msh") return ParseGmsh(bytes);
   if (format == "inp") return ParseInp(bytes);
-  return format == "mesh" ? ParseMedit(bytes) : ParseTetgen(bytes);
+  if (format == "mesh") return ParseMedit(bytes);
+  if (format == "node") return ParseTetgen(bytes);
+  return absl::InternalError(absl::StrCat("no reader of elements for the format ", format));
 }
 
 absl::StatusOr<NamedMesh> ReadElements(const std::string& bytes, const std::string& format) {

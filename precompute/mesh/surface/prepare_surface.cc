@@ -51,7 +51,7 @@ std::vector<int32_t> NearestGiven(const SurfaceMesh& surface, const SurfaceMesh&
 
 /// Repairs the faults that CheckSurface finds, one kind of fault at a time, in the places where
 /// they are. Returns the result of CheckSurface for the repaired surface.
-absl::StatusOr<Warnings> RepairLocally(RepairedSurface& repaired) {
+absl::StatusOr<Warnings> RepairWithoutWrapping(RepairedSurface& repaired) {
   absl::StatusOr<Warnings> sound = CheckSurface(repaired.surface);
   const auto take = [&](std::optional<RepairedSurface> better) {
     if (!better) return;
@@ -76,7 +76,7 @@ absl::StatusOr<Warnings> RepairLocally(RepairedSurface& repaired) {
 /// Repairs the surface until it passes the checks, and describes the repairs in `warnings`.
 absl::StatusOr<SurfaceMesh> Repair(const SurfaceMesh& given, Warnings& warnings) {
   RepairedSurface repaired = RepairSoup(given);
-  const absl::StatusOr<Warnings> sound = RepairLocally(repaired);
+  const absl::StatusOr<Warnings> sound = RepairWithoutWrapping(repaired);
   if (sound.ok()) {
     AddTo(warnings, repaired.remarks);
     AddTo(warnings, *sound);
