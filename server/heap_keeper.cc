@@ -3,7 +3,9 @@
 
 #include <malloc.h>
 
+#include <algorithm>
 #include <chrono>
+#include <thread>
 
 namespace carillon {
 namespace {
@@ -19,6 +21,7 @@ constexpr std::chrono::seconds kPeriod(5);
 void BoundFreeMemory() {
   mallopt(M_MMAP_THRESHOLD, kOwnPagesBytes);
   mallopt(M_TRIM_THRESHOLD, kKeptBytes);
+  mallopt(M_ARENA_MAX, static_cast<int>(std::max(1U, std::thread::hardware_concurrency())));
 }
 
 HeapKeeper::HeapKeeper() : thread_([this] { Run(); }) {}

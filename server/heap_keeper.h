@@ -6,10 +6,11 @@
 
 namespace carillon {
 
-/// Bounds what the allocator keeps of freed memory. Must be called before the first thread starts.
+/// Bounds the freed memory that the allocator keeps. Must be called before the first thread starts.
 ///
-/// glibc raises its thresholds with each large array that is freed, up to 64 MiB kept for each
-/// arena, and a rendering frees many.
+/// By default glibc raises its thresholds with each large array that is freed, until each arena
+/// keeps 64 MiB, and makes eight arenas for each core, between which clients that come and go
+/// spread small blocks. The thresholds stay fixed here, and each core has one arena.
 void BoundFreeMemory();
 
 /// Gives freed memory back to the system every few seconds, on a thread of its own. An arena's free

@@ -115,10 +115,11 @@ class Churning:
                 mesh=modal_model_pb2.MeshSettings(target_node_count=self.random.randrange(300, 340))))
         if dies:
             self.die()
-        if self.random.random() < 0.5:
-            self.client.jobs.CancelJob(decomposition_service_pb2.CancelJobRequest(name=job.name))
-            return
+        cancels = self.random.random() < 0.5
         with contextlib.suppress(strike.Refused, grpc.RpcError):  # another client may have cancelled or deleted it
+            if cancels:
+                self.client.jobs.CancelJob(decomposition_service_pb2.CancelJobRequest(name=job.name))
+                return
             self.client.models.DeleteModalModel(
                 modal_model_service_pb2.DeleteModalModelRequest(name=self.client.wait(job)))
 
