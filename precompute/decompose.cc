@@ -38,6 +38,7 @@ struct Body {
   SurfaceMesh given;
   TetMesh mesh;
   std::vector<std::string> warnings;
+  double frequency_error = 0;  ///< estimated and relative, because its surface was coarsened
 };
 
 /// A surface that can be filled as finely as one likes.
@@ -54,7 +55,8 @@ absl::StatusOr<Body> FillSurface(const Fillable& surface, const MeshingSettings&
     face.given_triangle = surface.prepared.given_triangle[static_cast<size_t>(face.given_triangle)];
   }
   RETURN_IF_ERROR(FixNodes(FixturesOf(request), surface.given, surface.names, mesh));
-  return Body{surface.given, std::move(mesh), surface.prepared.warnings};
+  return Body{surface.given, std::move(mesh), surface.prepared.warnings,
+              surface.prepared.frequency_error};
 }
 
 absl::StatusOr<Body> TakeTetrahedra(TetMesh mesh, const MeshNames& names,
@@ -70,7 +72,18 @@ absl::StatusOr<Body> TakeTetrahedra(TetMesh mesh, const MeshNames& names,
   SurfaceMesh given = BoundarySurface(mesh);
   if (mesh.nodes_per_element < nodes_per_element) AddMidsideNodes(mesh);
   RETURN_IF_ERROR(FixNodes(FixturesOf(request), given, names, mesh));
-  return Body{std::move(given), std::move(mesh), {}};
+  return Body{.given = std::move(given), .mesh = std::move(mesh), .warnings = {}};
+}
+
+/// Whether the surface may get other triangles. Fixtures can name vertices of the given ones.
+bool MayCoarsen(const v1::WorkerRequest& request) {
+  const v1::MeshSettings& mesh = request.settings().mesh();
+  const std::vector<Fixture> fixtures = FixturesOf(request);
+  return !mesh.has_keep_surface() && mesh.accuracy() == 0 &&
+         std::ranges::none_of(fixtures, [](const Fixture& fixture) {
+           return std::holds_alternative<FixedVertices>(fixture) ||
+                  std::holds_alternative<FixedGroup>(fixture);
+         });
 }
 
 /// A surface to be filled, or a mesh of tetrahedra as it is.
@@ -87,9 +100,12 @@ absl::StatusOr<Input> ReadInput(const std::string& bytes, const v1::WorkerReques
     return TakeTetrahedra(std::move(*tetrahedra), read.names, request);
   }
   auto& given = std::get<SurfaceMesh>(read.mesh);
-  ASSIGN_OR_RETURN(PreparedSurface prepared,
-                   PrepareSurface(given, {.repair = settings.mesh().repair(),
-                                          .wall_m = settings.mesh().wall_m()}));
+  ASSIGN_OR_RETURN(
+      PreparedSurface prepared,
+      PrepareSurface(given, {.repair = settings.mesh().repair(),
+                             .wall_m = settings.mesh().wall_m(),
+                             .coarsen = MayCoarsen(request),
+                             .most_triangles = 2 * settings.mesh().target_node_count()}));
   return Fillable{std::move(given), std::move(prepared), std::move(read.names)};
 }
 
@@ -218,6 +234,7 @@ absl::StatusOr<ModalModel> Solve(const Body& body, const v1::WorkerRequest& requ
   observer.OnProgress(v1::PHASE_WRITE, 0);
   ModalModel model = MakeModalModel(body.mesh, body.given, elastic, solution);
   model.warnings = body.warnings;
+  for (double& error : model.estimated_errors) error += body.frequency_error;
   WarnOfLowerBand(solution, UseOf(request), model);
   if (comparison) model.warnings.push_back(comparison->Text());
   model.comparison = std::move(comparison);

@@ -6,12 +6,18 @@
 #include <cstddef>
 #include <utility>
 
+#include "absl/strings/str_cat.h"
 #include "precompute/mesh/point_math.h"
-#include "precompute/radiation/remesh_surface.h"
+#include "precompute/mesh/surface/remesh_surface.h"
+#include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 
 namespace carillon::precompute {
 namespace {
+
+/// Edges between faces that differ by more are edges of the body, and not of facets of a round
+/// surface. A surface that cuts them off radiates too little.
+constexpr double kSharpDegrees = 50;
 
 Point Moved(const Point& p, const Point& direction, double distance) {
   Point moved = p;
@@ -120,6 +126,16 @@ void KeepVolume(const SurfaceMesh& given, const NearestTriangle& index, SurfaceM
   }
 }
 
+absl::StatusOr<SurfaceMesh> Remesh(const SurfaceMesh& given, double edge_m) {
+  absl::StatusOr<SurfaceMesh> remeshed = RemeshSurface(given, edge_m, kSharpDegrees);
+  if (remeshed.ok()) return remeshed;
+  return Refusal(absl::StatusCode::kInternal, "RADIATION_REMESHING_FAILED",
+                 absl::StrCat("the surface could not be meshed with edges of ", edge_m,
+                              " m for its radiation: the mesher was ", remeshed.status().message(),
+                              ". The modal model itself is sound; use it without a transfer, or "
+                              "decompose the body with another number of nodes"));
+}
+
 }  // namespace
 
 std::vector<SurfacePlace> PlacesOn(const SurfaceMesh& given, const NearestTriangle& index,
@@ -135,7 +151,7 @@ std::vector<SurfacePlace> PlacesOn(const SurfaceMesh& given, const NearestTriang
 absl::StatusOr<SurfaceLevel> MakeSurfaceLevel(const RadiatingSurface& given,
                                               const NearestTriangle& index, double edge_m,
                                               Workers& workers) {
-  ASSIGN_OR_RETURN(const SurfaceMesh remeshed, RemeshSurface(given.mesh, edge_m));
+  ASSIGN_OR_RETURN(const SurfaceMesh remeshed, Remesh(given.mesh, edge_m));
   AcousticSurface near_it = MakeAcousticSurface(WithoutLoose(WithoutFlat(remeshed, edge_m)));
   std::vector<SurfacePlace> places = PlacesOn(given.mesh, index, near_it);
   SurfaceMesh on_it = std::move(near_it.mesh);

@@ -34,7 +34,7 @@ struct SurfaceLevel {
 std::vector<SurfacePlace> PlacesOn(const SurfaceMesh& given, const NearestTriangle& index,
                                    const AcousticSurface& surface);
 
-/// Errors: those of RemeshSurface.
+/// Errors: Internal RADIATION_REMESHING_FAILED.
 absl::StatusOr<SurfaceLevel> MakeSurfaceLevel(const RadiatingSurface& given,
                                               const NearestTriangle& index, double edge_m,
                                               Workers& workers);

@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "precompute/mesh/point_math.h"
 #include "precompute/mesh/surface/check_surface.h"
+#include "precompute/mesh/surface/coarsen_surface.h"
 #include "precompute/mesh/surface/make_wall.h"
 #include "precompute/mesh/surface/nearest_triangle.h"
 #include "precompute/mesh/surface/repair_locally.h"
@@ -98,7 +99,7 @@ absl::StatusOr<RepairedSurface> WithWall(const SurfaceMesh& surface, const absl:
 
 absl::StatusOr<PreparedSurface> PrepareSurface(const SurfaceMesh& given,
                                                const PreparationSettings& settings) {
-  PreparedSurface prepared{given, {}, {}};
+  PreparedSurface prepared{.surface = given, .given_triangle = {}, .warnings = {}};
   const absl::StatusOr<Warnings> as_given = CheckSurface(given);
   absl::Status sound = as_given.status();
   if (as_given.ok()) prepared.warnings = *as_given;
@@ -116,9 +117,17 @@ absl::StatusOr<PreparedSurface> PrepareSurface(const SurfaceMesh& given,
     prepared.surface = std::move(walled.surface);
     AddTo(prepared.warnings, walled.remarks);
   }
+  bool changed = settings.wall_m > 0 || !as_given.ok();
+  if (settings.coarsen) {
+    if (auto coarse = CoarsenSurface(prepared.surface, settings.most_triangles)) {
+      prepared.surface = std::move(coarse->surface);
+      prepared.warnings.push_back(std::move(coarse->remark));
+      prepared.frequency_error = coarse->frequency_error;
+      changed = true;
+    }
+  }
   prepared.given_triangle.resize(given.triangles.size());
   std::iota(prepared.given_triangle.begin(), prepared.given_triangle.end(), 0);
-  const bool changed = settings.wall_m > 0 || !as_given.ok();
   if (changed) prepared.given_triangle = NearestGiven(prepared.surface, given);
   return prepared;
 }

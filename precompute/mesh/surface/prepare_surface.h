@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -14,6 +15,9 @@ namespace carillon::precompute {
 struct PreparationSettings {
   bool repair = false;  ///< repair a surface that CheckSurface would refuse
   double wall_m = 0;    ///< above zero: hollow it out, or thicken an open sheet
+  /// Whether a surface with more triangles than its modes need may be remeshed with fewer.
+  bool coarsen = false;
+  size_t most_triangles = 0;  ///< above zero: of a surface that is remeshed
 };
 
 /// A surface ready to be filled.
@@ -23,11 +27,13 @@ struct PreparedSurface {
   /// it.
   std::vector<int32_t> given_triangle;
   std::vector<std::string> warnings;
+  /// Estimated relative error of the modes' frequencies because the surface was coarsened.
+  double frequency_error = 0;
 };
 
 /// Checks a surface. If the settings allow it, repairs a faulty surface, first without changing its
-/// shape and then by wrapping it. Then makes the wall. Errors: those of CheckSurface,
-/// MESH_REPAIR_FAILED, MESH_WALL_IMPOSSIBLE.
+/// shape and then by wrapping it. Then makes the wall, and coarsens the surface. Errors: those of
+/// CheckSurface, MESH_REPAIR_FAILED, MESH_WALL_IMPOSSIBLE.
 absl::StatusOr<PreparedSurface> PrepareSurface(const SurfaceMesh& given,
                                                const PreparationSettings& settings);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
-#include "precompute/radiation/remesh_surface.h"
+#include "precompute/mesh/surface/remesh_surface.h"
 
 #include <CGAL/Polygon_mesh_processing/detect_features.h>
 #include <CGAL/Polygon_mesh_processing/orient_polygon_soup.h>
@@ -15,10 +15,8 @@
 #include <utility>
 #include <vector>
 
-#include "absl/strings/str_cat.h"
 #include "precompute/mesh/run_in_child.h"
 #include "precompute/mesh/surface/halfedge_mesh.h"
-#include "proto/cpp/error_reason.h"
 
 namespace carillon::precompute {
 namespace {
@@ -27,9 +25,6 @@ namespace pmp = CGAL::Polygon_mesh_processing;
 
 constexpr std::chrono::seconds kMostCpu(300);
 constexpr unsigned kIterations = 3;
-/// Edges between faces that differ by more are edges of the body, and not of facets of a round
-/// surface.
-constexpr double kSharpDegrees = 50;
 /// A triangle of less than this part of edge^2 is a sliver.
 constexpr double kSliverArea = 0.03;
 constexpr int kSliverPasses = 4;
@@ -79,12 +74,12 @@ bool CollapseSlivers(HalfedgeMesh& mesh, double edge_m) {
 }
 
 /// Runs in a child: CGAL's assertions end the process.
-std::string Remesh(const SurfaceMesh& given, double edge_m) {
+std::string Remesh(const SurfaceMesh& given, double edge_m, double sharp_degrees) {
   HalfedgeMesh mesh = ToCgal(given);
   // Triangles that cut off the edges of the body, such as the rim of a bell, would make it smaller
-  // by a part of an edge, and radiate too little.
+  // by a part of an edge.
   auto sharp = mesh.add_property_map<HalfedgeMesh::Edge_index, bool>("e:sharp", false).first;
-  pmp::detect_sharp_edges(mesh, kSharpDegrees, sharp);
+  pmp::detect_sharp_edges(mesh, sharp_degrees, sharp);
   pmp::isotropic_remeshing(
       faces(mesh), edge_m, mesh,
       CGAL::parameters::number_of_iterations(kIterations).edge_is_constrained_map(sharp));
@@ -95,16 +90,11 @@ std::string Remesh(const SurfaceMesh& given, double edge_m) {
 
 }  // namespace
 
-absl::StatusOr<SurfaceMesh> RemeshSurface(const SurfaceMesh& given, double edge_m) {
+absl::StatusOr<SurfaceMesh> RemeshSurface(const SurfaceMesh& given, double edge_m,
+                                          double sharp_degrees) {
   const absl::StatusOr<std::string> bytes =
-      RunInChild([&] { return Remesh(given, edge_m); }, kMostCpu);
-  if (!bytes.ok()) {
-    return Refusal(absl::StatusCode::kInternal, "RADIATION_REMESHING_FAILED",
-                   absl::StrCat("the surface could not be meshed with edges of ", edge_m,
-                                " m for its radiation: the mesher was ", bytes.status().message(),
-                                ". The modal model itself is sound; use it without a transfer, or "
-                                "decompose the body with another number of nodes"));
-  }
+      RunInChild([&] { return Remesh(given, edge_m, sharp_degrees); }, kMostCpu);
+  if (!bytes.ok()) return bytes.status();
   return SurfaceFromBytes(*bytes);
 }
 

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+
+#include "precompute/mesh/surface_mesh.h"
+
+namespace carillon::precompute {
+
+/// A surface of at most this many triangles is never coarsened.
+inline constexpr size_t kMaxUncoarsenedTriangles = 20'000;
+
+struct CoarsenedSurface {
+  SurfaceMesh surface;
+  std::string remark;  ///< describes the change
+  /// Estimated relative error of the modes' frequencies by the change: the distance of both
+  /// surfaces (root mean square) over the mean thickness.
+  double frequency_error = 0;
+};
+
+/// Gives a surface with more triangles than its modes need longer edges. The edges are half as long
+/// as those into which a surface of few triangles is divided, but the result has at most
+/// `most_triangles` triangles where that is above zero. The edges become shorter until the surface
+/// moves by at most a hundredth of the mean thickness (root mean square) and a quarter of it
+/// (greatest distance). The result passes CheckSurface.
+///
+/// Returns nothing if the surface has at most kMaxUncoarsenedTriangles triangles, or if no surface
+/// with two thirds of its triangles keeps these limits. `surface` must pass CheckSurface.
+std::optional<CoarsenedSurface> CoarsenSurface(const SurfaceMesh& surface, size_t most_triangles);
+
+}  // namespace carillon::precompute

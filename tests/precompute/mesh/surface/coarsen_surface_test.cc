@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "precompute/mesh/surface/coarsen_surface.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <optional>
+
+#include "precompute/mesh/point_math.h"
+#include "precompute/mesh/surface/check_surface.h"
+#include "precompute/mesh/surface/prepare_surface.h"
+#include "precompute/mesh/surface/refine_surface.h"
+#include "precompute/mesh/surface/surface_shells.h"
+#include "tests/precompute/test_meshes.h"
+
+namespace carillon::precompute {
+namespace {
+
+double VolumeOf(const SurfaceMesh& surface) {
+  double volume_m3 = 0;
+  for (const Shell& shell : FindShells(surface)) volume_m3 += shell.volume_m3;
+  return volume_m3;
+}
+
+SurfaceMesh FineSphere() { return MakeSphereSurface(0.1, 6); }
+
+TEST(CoarsenSurface, ASphereKeepsItsVolume) {
+  const SurfaceMesh fine = FineSphere();
+  ASSERT_GT(fine.triangles.size(), kMaxUncoarsenedTriangles);
+  const std::optional<CoarsenedSurface> coarse = CoarsenSurface(fine, 0);
+  ASSERT_TRUE(coarse.has_value());
+  EXPECT_LT(coarse->surface.triangles.size(), fine.triangles.size() / 2);
+  EXPECT_NEAR(VolumeOf(coarse->surface) / VolumeOf(fine), 1, 5e-4);
+  EXPECT_GT(coarse->frequency_error, 0);
+  EXPECT_LT(coarse->frequency_error, 0.002);
+  EXPECT_TRUE(CheckSurface(coarse->surface).ok());
+}
+
+TEST(CoarsenSurface, GivesFewerTrianglesWhereFewerAreWanted) {
+  const SurfaceMesh fine = FineSphere();
+  const std::optional<CoarsenedSurface> some = CoarsenSurface(fine, 0);
+  const std::optional<CoarsenedSurface> few = CoarsenSurface(fine, 3000);
+  ASSERT_TRUE(some.has_value() && few.has_value());
+  EXPECT_LT(few->surface.triangles.size(), 4000);
+  EXPECT_LT(few->surface.triangles.size(), some->surface.triangles.size());
+}
+
+TEST(CoarsenSurface, ABoxKeepsItsEdges) {
+  const SurfaceMesh fine = RefineSurface(MakeBoxSurface({0.3, 0.2, 0.1}), 0.003).surface;
+  ASSERT_GT(fine.triangles.size(), kMaxUncoarsenedTriangles);
+  const std::optional<CoarsenedSurface> coarse = CoarsenSurface(fine, 0);
+  ASSERT_TRUE(coarse.has_value());
+  EXPECT_NEAR(VolumeOf(coarse->surface), 0.3 * 0.2 * 0.1, 1e-9);
+  EXPECT_LT(coarse->frequency_error, 1e-6);
+}
+
+TEST(CoarsenSurface, LeavesASurfaceOfFewTrianglesAlone) {
+  EXPECT_FALSE(CoarsenSurface(MakeSphereSurface(0.1, 4), 0).has_value());
+}
+
+TEST(CoarsenSurface, LeavesAFoilAloneWhoseFormItWouldChange) {
+  // A wall of 0.2 mm, whose folds of 2 mm would be cut off.
+  SurfaceMesh foil = RefineSurface(MakeBoxSurface({0.1, 0.1, 0.0002}), 0.0011).surface;
+  ASSERT_GT(foil.triangles.size(), kMaxUncoarsenedTriangles);
+  for (Point& p : foil.vertices) p[2] += 0.002 * std::sin(p[0] * 2 * std::numbers::pi / 0.006);
+  EXPECT_FALSE(CoarsenSurface(foil, 0).has_value());
+}
+
+TEST(CoarsenSurface, EachTriangleNamesTheGivenOneBeneathIt) {
+  const SurfaceMesh fine = FineSphere();
+  const absl::StatusOr<PreparedSurface> prepared = PrepareSurface(fine, {.coarsen = true});
+  ASSERT_TRUE(prepared.ok()) << prepared.status();
+  ASSERT_EQ(prepared->given_triangle.size(), prepared->surface.triangles.size());
+  EXPECT_EQ(prepared->warnings.size(), 1U);
+  EXPECT_GT(prepared->frequency_error, 0);
+  for (size_t t = 0; t < prepared->given_triangle.size(); ++t) {
+    const auto given = static_cast<size_t>(prepared->given_triangle[t]);
+    EXPECT_LT(Distance(MiddleOf(CornersOf(prepared->surface, t)), MiddleOf(CornersOf(fine, given))),
+              0.005);
+  }
+}
+
+}  // namespace
+}  // namespace carillon::precompute
