@@ -10,27 +10,28 @@
 
 namespace carillon {
 
-/// A refusal: `code` with the message "REASON: message". Every absl::Status that can reach a user
-/// is made so; the reasons are listed in proto/README.md.
+/// Returns a status of `code` with the message "REASON: message". Every absl::Status that can reach
+/// a user is made by this function. proto/README.md lists the reasons.
 absl::Status Refusal(absl::StatusCode code, absl::string_view reason, absl::string_view message);
 
 /// Adds a figure that belongs to the reason, for programs ("first_mode_hz" = "31.5").
 void AddFigure(absl::Status& status, absl::string_view name, absl::string_view value);
 
-/// The same refusal of element `index` of a list: "REASON: list[index]: message", with the figure
-/// "index".
+/// Returns the same refusal for element `index` of a list, "REASON: list[index]: message", with the
+/// figure "index".
 absl::Status AtElement(const absl::Status& status, absl::string_view list, size_t index);
 
 /// Adds a change to the request that may help.
 void AddRemedy(absl::Status& status, const v1::Remedy& remedy);
 
-/// A remedy for people who type options, such as "--repair: repairs the surface".
+/// Returns a remedy as text for people who type options, such as "--repair: repairs the surface".
 std::string RemedyText(const v1::Remedy& remedy);
 
-/// Reason, message, figures and remedies of a status; a status without a reason gets "INTERNAL".
+/// Returns reason, message, figures and remedies of a status. A status without a reason gets
+/// "INTERNAL".
 v1::ErrorInfo ToErrorInfo(const absl::Status& status);
 
-/// The status that ToErrorInfo would turn into `error`.
+/// Returns the status that ToErrorInfo would turn into `error`.
 absl::Status FromErrorInfo(absl::StatusCode code, const v1::ErrorInfo& error);
 
 }  // namespace carillon

@@ -9,7 +9,7 @@
 
 namespace carillon {
 
-/// A fixture as command lines write it, lengths in metres:
+/// Reads a fixture as command lines write it, with lengths in metres:
 ///
 ///     plane:PX,PY,PZ/NX,NY,NZ    a point of the plane, and its normal (toward the free side)
 ///     box:X0,Y0,Z0/X1,Y1,Z1      two opposite corners
@@ -19,9 +19,10 @@ namespace carillon {
 /// Errors: INVALID_SETTINGS.
 absl::StatusOr<v1::Fixture> ParseFixture(absl::string_view text);
 
-/// The canonical text of a fixture, which ParseFixture reads: shortest decimals, vertices ascending
-/// without repetition, the lower corner of a box first, a normal of length one. Errors:
-/// INVALID_SETTINGS (the fixture is empty, a number is not finite, a limit is exceeded).
+/// Returns the canonical text of a fixture, which ParseFixture reads. It has shortest decimals,
+/// ascending vertices without repetition, the lower corner of a box first, and a normal of length
+/// one. Errors: INVALID_SETTINGS (the fixture is empty, a number is not finite, a limit is
+/// exceeded).
 absl::StatusOr<std::string> FixtureText(const v1::Fixture& fixture);
 
 inline constexpr int kMaxHeldVertices = 10'000;  // their text must fit in one argument of a program

@@ -16,12 +16,13 @@ struct LossFactorPoint {
   double loss_factor = 0;   ///< above zero and below 2, where a mode would be overdamped
 };
 
-/// The loss factor at a frequency. It is interpolated between `points` (ascending), linearly in the
-/// logarithms of both figures, and constant beyond the ends; it is zero if there are no points.
+/// Returns the loss factor at a frequency. Between `points` (ascending) it is interpolated linearly
+/// in the logarithms of both figures, and beyond the ends it is constant. It is zero if there are
+/// no points.
 double LossFactorAt(std::span<const LossFactorPoint> points, double frequency_hz);
 
-/// Reads "ETA", the same at all frequencies, or "HZ:ETA,HZ:ETA,...".
-/// Errors: InvalidArgument (INVALID_MATERIAL). ResolveMaterial checks the range of the figures.
+/// Reads "ETA", which applies to all frequencies, or "HZ:ETA,HZ:ETA,...". Errors: InvalidArgument
+/// (INVALID_MATERIAL). ResolveMaterial checks the range of the figures.
 absl::StatusOr<std::vector<LossFactorPoint>> ReadLossFactor(absl::string_view text);
 
 }  // namespace carillon

@@ -11,9 +11,9 @@ class Option;
 
 namespace carillon {
 
-/// Adds the flag --man, which --help does not list, to a program: it prints the manual page of the
-/// program, for `man`, and ends. The page has the texts of --help. `section` is 1 for commands of
-/// users and 8 for daemons.
+/// Adds the flag --man, which --help does not list, to a program. With this flag the program prints
+/// its manual page, for `man`, and ends. The page has the texts of --help. `section` is 1 for
+/// commands of users and 8 for daemons.
 void AddManualFlag(CLI::App& app, int section, const std::string& version);
 
 /// Returns the manual page as man(7) describes it.

@@ -10,9 +10,9 @@ namespace carillon {
 /// A format of mesh files, as CreateModalModelRequest.mesh_format names it.
 struct MeshFormat {
   std::string_view name;  ///< also the suffix of its files
-  bool is_surface;        ///< triangles only; otherwise tetrahedra, or triangles
-  /// Typical size of a file for each vertex, from which memory is predicted before the file is
-  /// read.
+  bool is_surface;        ///< has triangles only; if false, tetrahedra or triangles
+  /// Typical number of bytes of a file for each vertex, from which memory is predicted before the
+  /// file is read.
   double bytes_per_vertex;
 };
 
@@ -32,7 +32,7 @@ inline constexpr std::array kMeshFormats = std::to_array<MeshFormat>({
     {.name = "inp", .is_surface = false, .bytes_per_vertex = 250},
 });
 
-/// Returns the format of that name; null if there is none.
+/// Returns the format of that name, or null if there is none.
 const MeshFormat* FindMeshFormat(std::string_view name);
 
 /// Returns the names of all formats: "obj, ply, ... or inp".

@@ -10,8 +10,8 @@
 
 namespace carillon {
 
-/// The layout of a stored modal model, format version 1 (see ModalModelHeader.arrays in
-/// proto/carillon/v1/modal_model.proto): the one table for all who write, read or check it.
+/// This file has the layout of a stored modal model, format version 1, for all code that writes,
+/// reads or checks one. See ModalModelHeader.arrays in proto/carillon/v1/modal_model.proto.
 
 inline constexpr uint32_t kModelFormatVersion = 1;
 inline constexpr size_t kMaxModelChunkBytes = 1 << 20;
@@ -19,8 +19,8 @@ inline constexpr size_t kMaxModelChunkBytes = 1 << 20;
 struct ArraySpec {
   const char* name;
   v1::ElementType type;
-  const char* shape;  ///< a letter for each dimension, slowest first: those of ModelSizes, or '3'
-  char index_bound = 0;  ///< of indices: the dimension that they count; 0: these are no indices
+  const char* shape;     ///< a letter of ModelSizes, or '3', for each dimension, slowest first
+  char index_bound = 0;  ///< the dimension that indices count; 0 if the array has no indices
 };
 
 /// The arrays in the order in which they are stored.
@@ -37,14 +37,15 @@ inline constexpr std::array kModelArrays = {
 };
 inline constexpr size_t kModelArrayCount = kModelArrays.size();
 
-/// The index in kModelArrays of the array of this name; kModelArrayCount: there is none.
+/// Returns the index in kModelArrays of the array of this name, or kModelArrayCount if there is
+/// none.
 constexpr size_t ModelArrayIndex(std::string_view name) {
   size_t index = 0;
   while (index < kModelArrayCount && name != kModelArrays[index].name) ++index;
   return index;
 }
 
-/// How long the dimensions of a model are.
+/// The lengths of the dimensions of a model's arrays.
 struct ModelSizes {
   uint64_t modes;            ///< 'm'
   uint64_t vertices;         ///< 'V', of the sounding surface
@@ -70,7 +71,7 @@ struct ModelSizes {
   }
 };
 
-/// Sizes: ModelSizes, or another struct that says how long each dimension is.
+/// Returns the descriptor of an array. `Sizes` is ModelSizes or TransferSizes.
 template <class Sizes>
 v1::ArrayDescriptor DescribeArray(const ArraySpec& spec, const Sizes& sizes) {
   v1::ArrayDescriptor array;

@@ -11,8 +11,9 @@
 
 namespace carillon {
 
-/// The names with the least edit distance to `written`, ignoring case. The distance of a name with
-/// underscores is that of its closest word. Empty if more than a third of the letters differ.
+/// Returns the names with the least edit distance to `written`, ignoring case. The distance of a
+/// name with underscores is that of the whole name or of its closest word. Returns no names if more
+/// than a third of the letters differ.
 std::vector<std::string> NearNames(std::string_view written, std::span<const std::string> names);
 
 /// Returns `REASON: no KIND is named "NAME"` as an InvalidArgument, with the nearest of the known

@@ -7,8 +7,8 @@
 
 namespace carillon {
 
-/// Adds an option whose text `parse` converts to the value that `take` gets. `form` describes the
-/// text in the message about a wrong one.
+/// Adds an option. `parse` converts its text to a value, which `take` gets. `form` describes the
+/// right text in the message about a wrong text.
 template <class T, class Take>
 CLI::Option* AddParsed(CLI::App& app, const std::string& name,
                        std::optional<T> (*parse)(const std::string&), const std::string& form,

@@ -6,24 +6,25 @@
 
 namespace carillon {
 
-/// Figures as people write them on a command line; nullopt where a text is none.
+/// These functions read figures from a command line. They return nullopt if the text is no figure.
 
-/// "1%" or "0.01": a share above zero.
+/// Reads a share above zero, such as "1%" or "0.01".
 std::optional<double> ParseShare(const std::string& text);
 
-/// Processor time in seconds and memory in GiB; zero: no bound.
+/// Processor time and memory. Zero means no bound.
 struct Budget {
   double seconds = 0;
   double gib = 0;
 };
 
-/// "60" or "60:4": seconds, or seconds:GiB.
+/// Reads seconds or seconds:GiB, such as "60" or "60:4".
 std::optional<Budget> ParseBudget(const std::string& text);
 
-/// "m", "cm", "mm", "in", or a number of metres above zero: the length of one unit, metres.
+/// Reads the length of one unit, metres, from "m", "cm", "mm", "in", or a number of metres above
+/// zero.
 std::optional<double> ParseUnitM(const std::string& text);
 
-/// "3mm", "0.003m" or "0.003": a length above zero, metres.
+/// Reads a length above zero, metres, such as "3mm", "0.003m" or "0.003".
 std::optional<double> ParseLengthM(const std::string& text);
 
 }  // namespace carillon

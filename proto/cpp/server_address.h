@@ -5,17 +5,16 @@
 
 namespace carillon {
 
-/// Where the daemon listens if it is given no address: $CARILLON_SERVER, or
-/// "unix:$XDG_RUNTIME_DIR/carillon/carillond.sock", or "unix:/tmp/carillon-UID/carillond.sock".
-/// An address is "unix:PATH" or "HOST:PORT".
+/// Returns the address of a daemon that is given no address. It is $CARILLON_SERVER, or
+/// "unix:$XDG_RUNTIME_DIR/carillon/carillond.sock", or "unix:/tmp/carillon-UID/carillond.sock". An
+/// address is "unix:PATH" or "HOST:PORT".
 std::string DefaultServerAddress();
 
-/// Where a client looks if it is given no address: DefaultServerAddress(), or, if there is no
-/// socket, that of the daemon that systemd runs, "unix:/run/carillon/carillond.sock", if there is
-/// one.
+/// Returns the address for a client that is given no address. It is DefaultServerAddress(), unless
+/// that has no socket and the daemon of systemd has one, "unix:/run/carillon/carillond.sock".
 std::string ReachableServerAddress();
 
-/// Whether nobody beyond this machine can read what is sent to the address.
+/// Returns true if no other machine can read data that is sent to the address.
 bool IsOnThisMachine(const std::string& address);
 
 }  // namespace carillon

@@ -7,7 +7,7 @@
 
 namespace carillon {
 
-/// The shortest decimal that reads back as the same double, whatever the locale.
+/// Returns the shortest decimal that reads back as the same double, whatever the locale.
 inline std::string ShortestDecimal(double value) {
   std::array<char, 32> text;
   return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};

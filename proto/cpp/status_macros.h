@@ -21,9 +21,9 @@
 ///     ASSIGN_OR_RETURN((const std::map<int, Mesh> meshes), ReadMeshes());
 ///     ASSIGN_OR_RETURN((const auto [nodes, elements]), CountParts(surface));
 ///
-/// A target with a comma in it stands in parentheses; commas in the expression need none. A target
-/// that is a const reference refers to the value without moving it, for the rest of the scope. The
-/// macro is several statements, so it cannot stand alone below an `if`.
+/// A target with a comma in it stands in parentheses. Commas in the expression need no parentheses.
+/// A target that is a const reference refers to the value without moving it, for the rest of the
+/// scope. The macro is several statements, so it cannot stand alone below an `if`.
 #define ASSIGN_OR_RETURN(target, ...) \
   STATUS_MACROS_ASSIGN_OR_RETURN(STATUS_MACROS_JOIN(status_or_, __COUNTER__), target, __VA_ARGS__)
 
@@ -42,9 +42,8 @@
 #define STATUS_MACROS_JOIN(a, b) STATUS_MACROS_JOIN_EXPANDED(a, b)
 #define STATUS_MACROS_JOIN_EXPANDED(a, b) a##b
 
-// Removes a pair of parentheses around `x`, if there is one: "MARK (a, b)" expands to "MARK a, b",
-// whereas "MARK a" stays as it is. Joining "REMOVE_" with MARK then gives REMOVE_..._MARK, which is
-// empty.
+// Removes the parentheses around `x`, if there are any. "MARK (a, b)" expands to "MARK a, b", and
+// "MARK a" stays as it is. Joining "REMOVE_" with MARK then gives REMOVE_..._MARK, which is empty.
 #define STATUS_MACROS_WITHOUT_PARENTHESES(x) STATUS_MACROS_REMOVE(STATUS_MACROS_MARK x)
 #define STATUS_MACROS_MARK(...) STATUS_MACROS_MARK __VA_ARGS__
 #define STATUS_MACROS_REMOVE(...) STATUS_MACROS_REMOVE_EXPANDED(__VA_ARGS__)

@@ -8,13 +8,13 @@
 
 namespace carillon {
 
-/// The named strikers of proto/strikers.textproto.
+/// Returns the named strikers of proto/strikers.textproto.
 const v1::StrikerCatalogue& Strikers();
 
-/// The names of all strikers, "steel, wood, ...".
+/// Returns the names of all strikers, "steel, wood, ...".
 std::string StrikerNames();
 
-/// Errors: InvalidArgument (UNKNOWN_STRIKER; the message lists the names, the nearest first).
+/// Returns a striker. Errors: InvalidArgument (UNKNOWN_STRIKER; lists the nearest names first).
 absl::StatusOr<v1::CatalogueStriker> FindStriker(const std::string& name);
 
 }  // namespace carillon

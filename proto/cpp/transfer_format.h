@@ -9,12 +9,12 @@
 
 namespace carillon {
 
-/// The layout of a stored transfer, format version 1 (see TransferHeader.arrays in
-/// proto/carillon/v1/transfer.proto): the one table for all who write, read or check it.
+/// This file has the layout of a stored transfer, format version 1, for all code that writes, reads
+/// or checks one. See TransferHeader.arrays in proto/carillon/v1/transfer.proto.
 
 inline constexpr uint32_t kTransferFormatVersion = 1;
 
-/// The arrays in the order in which they are stored; the letters are those of TransferSizes.
+/// The arrays in the order in which they are stored. TransferSizes explains the letters.
 inline constexpr std::array kTransferArrays = {
     ArraySpec{"eigenvalues", v1::ELEMENT_TYPE_FLOAT64, "m"},
     ArraySpec{"states", v1::ELEMENT_TYPE_UINT32, "m"},
@@ -32,7 +32,7 @@ inline constexpr size_t kTransferArrayCount = kTransferArrays.size();
 /// Values of the array "states".
 enum class RadiationState : uint32_t { kOutsideBand = 0, kComputed = 1, kOutOfTime = 2 };
 
-/// How long the dimensions of a transfer are.
+/// The lengths of the dimensions of a transfer's arrays.
 struct TransferSizes {
   uint64_t modes;      ///< 'm'; 'M' is one more
   uint64_t harmonics;  ///< 'n', kept of all modes together

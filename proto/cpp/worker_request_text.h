@@ -9,13 +9,14 @@
 
 namespace carillon {
 
-/// A request to a decomposing process in protobuf's text form, in which people can read it, shell
-/// scripts can carry it, and a worker refuses a setting that it does not know. (From the binary
-/// form an older worker would drop the setting, and compute another model under this one's name.)
+/// Returns a request to a decomposing process in protobuf's text form. People can read this form,
+/// shell scripts can contain it, and a worker refuses a setting that it does not know. In the
+/// binary form an older worker would ignore the setting, and compute another model under the same
+/// name.
 std::string WorkerRequestText(const v1::WorkerRequest& request);
 
-/// The inverse of WorkerRequestText. Errors: InvalidArgument (INVALID_SETTINGS; the message names
-/// line and column).
+/// Reads the text that WorkerRequestText wrote. Errors: InvalidArgument (INVALID_SETTINGS; the
+/// message names line and column).
 absl::StatusOr<v1::WorkerRequest> ParseWorkerRequest(absl::string_view text);
 
 }  // namespace carillon
