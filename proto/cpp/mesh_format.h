@@ -17,8 +17,8 @@ struct MeshFormat {
 };
 
 /// Every format that carillon-precompute reads. A closed surface has two triangles for each vertex,
-/// a solid about five tetrahedra. OBJ and glTF are text; PLY, STL, OFF and GLB are counted as
-/// binary.
+/// a solid about five tetrahedra. The sizes assume that OBJ and glTF are text, and that PLY, STL,
+/// OFF and GLB are binary.
 inline constexpr std::array kMeshFormats = std::to_array<MeshFormat>({
     {.name = "obj", .is_surface = true, .bytes_per_vertex = 90},
     {.name = "ply", .is_surface = true, .bytes_per_vertex = 60},

@@ -6,15 +6,15 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
-/// RETURN_IF_ERROR(expression): evaluates an expression of type absl::Status once, and returns the
+/// RETURN_IF_ERROR(expression) evaluates an expression of type absl::Status once, and returns the
 /// status from the enclosing function if it is an error. It is one statement, so it can stand alone
 /// below an `if` or an `else`. Commas in the expression need no parentheses.
 #define RETURN_IF_ERROR(...) \
   STATUS_MACROS_RETURN_IF_ERROR(STATUS_MACROS_JOIN(status_, __COUNTER__), __VA_ARGS__)
 
-/// ASSIGN_OR_RETURN(target, expression): evaluates an expression of type absl::StatusOr<T> once.
-/// On success it moves the value into `target`, a declaration or an assignable expression. On error
-/// it returns the status from the enclosing function.
+/// ASSIGN_OR_RETURN(target, expression) evaluates an expression of type absl::StatusOr<T> once. On
+/// success it moves the value into `target`, a declaration or an assignable expression. On error it
+/// returns the status from the enclosing function.
 ///
 ///     ASSIGN_OR_RETURN(const TetMesh mesh, Tetrahedralize(surface));
 ///     ASSIGN_OR_RETURN(mesh_, Tetrahedralize(surface));
