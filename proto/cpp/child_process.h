@@ -93,7 +93,7 @@ class ChildProcess {
   /// group and reaps the process.
   std::optional<ProcessEnd> Reap();
 
-  /// Waits until the process has ended.
+  /// Waits until the process has ended, and returns its end.
   ProcessEnd Wait();
 
  private:

@@ -16,9 +16,9 @@ struct MeshFormat {
   double bytes_per_vertex;
 };
 
-/// Every format that carillon-precompute reads. A closed surface has two triangles for each vertex,
-/// a solid about five tetrahedra. The sizes assume that OBJ and glTF are text, and that PLY, STL,
-/// OFF and GLB are binary.
+/// Every format that carillon-precompute reads. For each vertex, a closed surface has two
+/// triangles, and a solid has about five tetrahedra. The sizes assume that OBJ and glTF are text,
+/// and that PLY, STL, OFF and GLB are binary.
 inline constexpr std::array kMeshFormats = std::to_array<MeshFormat>({
     {.name = "obj", .is_surface = true, .bytes_per_vertex = 90},
     {.name = "ply", .is_surface = true, .bytes_per_vertex = 60},

@@ -27,7 +27,7 @@
 #define ASSIGN_OR_RETURN(target, ...) \
   STATUS_MACROS_ASSIGN_OR_RETURN(STATUS_MACROS_JOIN(status_or_, __COUNTER__), target, __VA_ARGS__)
 
-// The rest is internal to the two macros above.
+// The macros below are internal to the two macros above.
 
 #define STATUS_MACROS_RETURN_IF_ERROR(status, ...)                        \
   do {                                                                    \
