@@ -30,7 +30,7 @@ absl::Status CheckSettings(const v1::DecompositionSettings& settings);
 ///     target_node_count <integer; 0 if decided from the surface>
 ///
 /// Settings that were added later have a line only if they differ from their default value, so that
-/// no older model changes its name. The code of SettingsText lists them.
+/// no older model changes its name. The code of SettingsText lists these settings.
 std::string SettingsText(const v1::DecompositionSettings& settings);
 
 /// Returns Poisson's ratio, rounded to 1e-4 as in the name of a model.
