@@ -30,8 +30,9 @@ class ExamplesTest(DaemonTest):
         cls.carillon = carillon.connect(cls.daemon.server)
         cls.addClassCleanup(cls.carillon.close)
 
-    def run_example(self, name, engine, seconds, rate=240):
-        options = argparse.Namespace(name=name, engine=engine, rate=rate, seconds=seconds, build=BUILD, video=False)
+    def run_example(self, name, engine, seconds, rate=240, max_frequency=None):
+        options = argparse.Namespace(name=name, engine=engine, rate=rate, seconds=seconds, build=BUILD, video=False,
+                                     max_frequency=max_frequency)
         sound = run.run(self.carillon, options, self.folder)
         for suffix in (".contacts", ".wav", "-spectrogram.png", "-spectrum.png"):
             self.assertGreater((self.folder / f"{name}-{engine}{suffix}").stat().st_size, 1000)
@@ -51,6 +52,19 @@ class ExamplesTest(DaemonTest):
                                       ("wooden_bowl", "rapier", 0.4)):
             with self.subTest(name):
                 self.run_example(name, engine, seconds)
+
+    def test_each_bunny_and_each_shelf_sounds(self):
+        # Meshing takes most of the time, so that a lower limit of frequency saves half of it.
+        self.run_example("bunnies", "bullet", 2.6, rate=1000, max_frequency=3000)
+        trace = carillon.Trace.read(self.folder / "bunnies-bullet.contacts")
+        gains = [body.gain if body.HasField("gain") else 1 for body in trace.objects]
+        peaks = []
+        for alone in range(5):
+            for number, body in enumerate(trace.objects):
+                body.gain = gains[number] if number == alone else 0
+            peaks.append(self.carillon.render(trace, sample_rate_hz=48000, tail_s=0.1).peak)
+        print("peaks of the shelves and the bunnies:", *(f"{peak:.2g}" for peak in peaks), flush=True)
+        self.assertGreater(min(peaks), 1e-3 * max(peaks))
 
     def test_chimes_sound_from_both_sides(self):
         for engine in chimes.ENGINES:

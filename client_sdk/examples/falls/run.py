@@ -7,6 +7,7 @@ and with --video NAME-ENGINE.mp4.
 """
 
 import argparse
+import math
 import os
 import pathlib
 import sys
@@ -98,6 +99,10 @@ def record_example(client, options, folder, trace):
         place_listener(trace, chimes.EXTENT_M)
         return chimes.scene()
     scene = scene_makers.EXAMPLES[options.name](folder)
+    if options.max_frequency:
+        for body in scene["bodies"]:
+            if "material" in body:
+                body["max_frequency_hz"] = min(options.max_frequency, body.get("max_frequency_hz", math.inf))
     falls.record(options.engine, falls.create_models(client, scene, folder), trace, rate=options.rate,
                  seconds=options.seconds, build=options.build)
     place_listener(trace, scene["extent_m"])
@@ -137,6 +142,8 @@ def main():
     parser.add_argument("--engine", default="bullet")
     parser.add_argument("--rate", type=int, default=1000, help="steps a second")
     parser.add_argument("--seconds", type=float, help="simulated time, if not what the scene says")
+    parser.add_argument("--max-frequency", type=float, metavar="HZ",
+                        help="compute no modes above it: less sound in less time (not for chimes)")
     parser.add_argument("--build", type=pathlib.Path, default=ROOT / "build/release")
     parser.add_argument("--video", action="store_true", help="make a video, too; needs an X server, such as Xvfb")
     parser.add_argument("--out", type=pathlib.Path, help="a folder; BUILD/examples unless named")
