@@ -24,8 +24,10 @@ constexpr size_t kLeastTriangles = 2'000;
 constexpr double kWorthwhile = 2.0 / 3;
 /// Growth of the number of triangles from one try to the next.
 constexpr double kGrowth = 2;
-/// Largest distances between both surfaces, in parts of the mean thickness.
-constexpr double kMostRms = 0.01, kMostDistance = 0.25;
+/// Largest distances between both surfaces, in parts of the thickness at each place.
+constexpr double kMostRms = 0.01, kMostDistance = 0.5;
+/// Thinner places count as this part of the mean thickness.
+constexpr double kLeastThickness = 0.05;
 
 struct Extent {
   double area_m2 = 0;
@@ -91,24 +93,46 @@ void Balance(const NearestTriangle& given, SurfaceMesh& coarse) {
   }
 }
 
+/// The distances between two surfaces, in parts of the body's thickness at each place.
 struct Deviation {
-  double rms_m = 0;
+  double rms = 0;
+  double greatest = 0;
   double greatest_m = 0;
 };
 
-/// Measures how far the vertices of the given surface lie from the other, and the greatest distance
-/// in both directions.
+std::vector<Point> VertexNormals(const SurfaceMesh& surface) {
+  std::vector<Point> normals(surface.vertices.size());
+  for (size_t t = 0; t < surface.triangles.size(); ++t) {
+    const Point normal = AreaNormal(CornersOf(surface, t));
+    for (const int32_t corner : surface.triangles[t]) {
+      for (size_t x = 0; x < 3; ++x) normals[static_cast<size_t>(corner)][x] += normal[x];
+    }
+  }
+  return normals;
+}
+
+/// Measures how far the vertices of the given surface lie from the other. Modes of thin parts, such
+/// as ears, change most where these are changed, so that the thickness beneath each vertex counts.
 Deviation Compare(const SurfaceMesh& given, const NearestTriangle& on_given,
-                  const SurfaceMesh& coarse) {
+                  const SurfaceMesh& coarse, const Extent& extent) {
+  // Beneath sharp edges the thickness vanishes.
+  const double least_m = kLeastThickness * extent.thickness_m;
   const NearestTriangle on_coarse(coarse);
+  const std::vector<Point> normals = VertexNormals(given);
   Deviation deviation;
   double sum = 0;
-  for (const Point& p : given.vertices) {
+  for (size_t v = 0; v < given.vertices.size(); ++v) {
+    const Point& p = given.vertices[v];
     const double distance_m = on_coarse.Find(p).distance_m;
-    sum += distance_m * distance_m;
+    const Point inwards = {-normals[v][0], -normals[v][1], -normals[v][2]};
+    double thickness_m = extent.length_m;
+    if (Norm(inwards) > 0) thickness_m = on_given.DistanceAlong(p, inwards, least_m);
+    const double part = distance_m / std::min(thickness_m, extent.length_m);
+    sum += part * part;
+    deviation.greatest = std::max(deviation.greatest, part);
     deviation.greatest_m = std::max(deviation.greatest_m, distance_m);
   }
-  deviation.rms_m = std::sqrt(sum / static_cast<double>(given.vertices.size()));
+  deviation.rms = std::sqrt(sum / static_cast<double>(given.vertices.size()));
   deviation.greatest_m = std::max(deviation.greatest_m, GreatestDistance(coarse, on_given));
   return deviation;
 }
@@ -125,18 +149,19 @@ std::optional<CoarsenedSurface> CoarsenSurface(const SurfaceMesh& surface, size_
         RemeshSurface(surface, EdgeForTriangles(extent, count), kSharpDegrees);
     if (!coarse.ok() || static_cast<double>(coarse->triangles.size()) > most) continue;
     Balance(on_given, *coarse);
-    const Deviation deviation = Compare(surface, on_given, *coarse);
-    if (deviation.rms_m > kMostRms * extent.thickness_m ||
-        deviation.greatest_m > kMostDistance * extent.thickness_m || !CheckSurface(*coarse).ok()) {
+    const Deviation deviation = Compare(surface, on_given, *coarse, extent);
+    if (deviation.rms > kMostRms || deviation.greatest > kMostDistance ||
+        !CheckSurface(*coarse).ok()) {
       continue;
     }
     std::string remark = absl::StrFormat(
         "the surface of %d triangles was made coarser: the new one of %d triangles lies at most "
-        "%.3g m from it, and %.3g m on average (root mean square); ask to keep the surface "
-        "(--keep-surface) or for an accuracy (--accuracy) to have all its triangles",
-        surface.triangles.size(), coarse->triangles.size(), deviation.greatest_m, deviation.rms_m);
-    return CoarsenedSurface{*std::move(coarse), std::move(remark),
-                            deviation.rms_m / extent.thickness_m};
+        "%.3g m from it, and on average (root mean square) %.2g %% of the body's thickness; ask to "
+        "keep the surface (--keep-surface) or for an accuracy (--accuracy) to have all its "
+        "triangles",
+        surface.triangles.size(), coarse->triangles.size(), deviation.greatest_m,
+        100 * deviation.rms);
+    return CoarsenedSurface{*std::move(coarse), std::move(remark), deviation.rms};
   }
   return std::nullopt;
 }

@@ -7,6 +7,7 @@
 #include <CGAL/Simple_cartesian.h>
 
 #include <algorithm>
+#include <limits>
 #include <vector>
 
 #include "precompute/mesh/point_math.h"
@@ -48,6 +49,20 @@ NearestTriangle::Place NearestTriangle::Find(const Point& point) const {
   const Point found = {nearest.x(), nearest.y(), nearest.z()};
   const auto number = static_cast<size_t>(triangle - index_->triangles.cbegin());
   return {index_->numbers[number], found, Distance(point, found)};
+}
+
+double NearestTriangle::DistanceAlong(const Point& point, const Point& direction,
+                                      double least_m) const {
+  const double length = Norm(direction);
+  Point start = point;
+  for (size_t x = 0; x < 3; ++x) start[x] += least_m / length * direction[x];
+  const TreeKernel::Vector_3 along(direction[0], direction[1], direction[2]);
+  const auto met = index_->tree.first_intersection(TreeKernel::Ray_3(ToCgal(start), along));
+  if (!met) return std::numeric_limits<double>::infinity();
+  // A ray within a triangle's plane meets it in a segment.
+  const auto* place = boost::get<TreeKernel::Point_3>(&met->first);
+  if (place == nullptr) return least_m;
+  return Distance(point, {place->x(), place->y(), place->z()});
 }
 
 double GreatestDistance(const SurfaceMesh& surface, const NearestTriangle& other) {

@@ -8,8 +8,8 @@
 
 namespace carillon::precompute {
 
-/// Finds the nearest point of a surface, which may be any soup of triangles with at least one
-/// triangle of positive area.
+/// Finds the nearest point of a surface, or the first along a ray. The surface may be any soup of
+/// triangles with at least one triangle of positive area.
 class NearestTriangle {
  public:
   explicit NearestTriangle(const SurfaceMesh& surface);
@@ -21,6 +21,10 @@ class NearestTriangle {
     double distance_m;
   };
   Place Find(const Point& point) const;
+
+  /// Returns the distance, metres, from `point` to the first triangle that a ray in `direction` (of
+  /// any length above zero) meets farther away than `least_m`. Returns infinity if it meets none.
+  double DistanceAlong(const Point& point, const Point& direction, double least_m) const;
 
  private:
   struct Index;
