@@ -7,19 +7,19 @@
 
 namespace carillon {
 
-/// The daemon's folder. One daemon at a time has it, for the lifetime of this object: the kernel
-/// releases the lock however the process ends.
+/// The daemon's folder, locked for the lifetime of this object, so that only one daemon at a time
+/// uses it. The kernel releases the lock however the process ends.
 class DataDirectory {
  public:
-  /// Makes the folder, readable by its owner only, unless it exists.
-  /// Errors: FailedPrecondition (DATA_DIRECTORY_IN_USE, DATA_DIRECTORY_UNUSABLE).
+  /// Locks the folder. Creates it, readable by its owner only, unless it exists. Errors:
+  /// FailedPrecondition (DATA_DIRECTORY_IN_USE, DATA_DIRECTORY_UNUSABLE).
   static absl::StatusOr<DataDirectory> Open(const std::filesystem::path& path);
   ~DataDirectory();
   DataDirectory(DataDirectory&& other) noexcept;
   DataDirectory& operator=(DataDirectory&&) = delete;
 
   std::filesystem::path database_file() const { return path_ / "carillon.db"; }
-  /// For the files of running decompositions.
+  /// The folder for the files of running decompositions.
   std::filesystem::path work_directory() const { return path_ / "work"; }
 
  private:

@@ -13,8 +13,8 @@ namespace carillon {
 /// spread small blocks. The thresholds stay fixed here, and each core has one arena.
 void BoundFreeMemory();
 
-/// Gives freed memory back to the system every few seconds, on a thread of its own. An arena's free
-/// pages below a small block that is still in use do not go back by themselves.
+/// Gives freed memory back to the system every few seconds, on a thread of its own. By itself,
+/// glibc does not return free pages that lie below a small block in use.
 class HeapKeeper {
  public:
   HeapKeeper();

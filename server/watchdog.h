@@ -8,14 +8,14 @@
 
 namespace carillon {
 
-/// Tells systemd, if it asks for that (WatchdogSec=), that the daemon works: as long as the mixer
-/// renders. It also shows the state of the output in `systemctl status`.
+/// Reports to systemd that the daemon is alive, as long as the mixer renders, if the unit sets
+/// WatchdogSec=. The watchdog also shows the state of the output in `systemctl status`.
 class Watchdog {
  public:
   /// `output` must outlive the watchdog.
   explicit Watchdog(LiveOutput& output);
 
-  /// Joins the thread. A stop has a time limit of its own.
+  /// Joins the thread. From then on only systemd's time limit for a stop applies.
   ~Watchdog();
   Watchdog(const Watchdog&) = delete;
   Watchdog& operator=(const Watchdog&) = delete;

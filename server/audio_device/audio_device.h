@@ -30,30 +30,32 @@ class AudioDevice {
   /// Stops the device.
   virtual ~AudioDevice() = default;
 
-  /// Begins to pull from `source`, which must live until Stop has returned. It is quick: whatever
-  /// takes time is done when the device is opened.
+  /// Begins to pull from `source`, which must live until Stop has returned. Start returns quickly,
+  /// because all slow steps are done when the device is opened.
   virtual absl::Status Start(FrameSource& source) = 0;
 
-  /// Ends pulling: after it has returned, the source is not used again. It may be called twice.
+  /// Ends pulling. The device does not use the source after Stop has returned. Stop may be called
+  /// twice.
   virtual void Stop() = 0;
 
   /// "portaudio: NAME", "null" or "file: PATH".
   virtual std::string description() const = 0;
 
-  /// Seconds from a pull to audible sound as far as the device knows; valid from the second pull
-  /// on.
+  /// Returns the seconds from a pull to audible sound, as far as the device knows them. Valid from
+  /// the second pull on.
   virtual double latency_s() const = 0;
 
-  /// OK while the device plays. Unavailable: it has failed (its server went away), and must be
-  /// replaced. Another error: it loses frames at present (its disk is full), but keeps trying.
+  /// Returns OK while the device plays. Unavailable means that the device has failed (for instance
+  /// because its server went away) and must be replaced. After any other error (such as a full
+  /// disk) the device loses frames at present, but keeps trying.
   virtual absl::Status Check() = 0;
 
-  /// Number of times that the device itself reported missed frames; its source's xruns are not
+  /// Number of times that the device itself reported missed frames. Xruns of the source are not
   /// included.
   virtual uint64_t xrun_count() const = 0;
 
-  /// Number of frames taken from the source that were never played or written. A sound card's are
-  /// estimated from the time stamps of its callbacks, see output_clock.h.
+  /// Number of frames taken from the source that were never played or written. For a sound card,
+  /// the number is estimated from the time stamps of its callbacks (output_clock.h).
   virtual uint64_t lost_frame_count() const = 0;
 };
 

@@ -20,7 +20,7 @@ namespace carillon {
 
 /// Some consecutive rendered frames, interleaved.
 struct RenderedBlock {
-  /// Number of the first frame since the mixer began.
+  /// Number of the first frame, counted from the mixer's start.
   uint64_t first_frame = 0;
   std::vector<float> samples;
 };
@@ -30,23 +30,23 @@ struct RenderedBlock {
 /// A listener that does not read fast enough loses whole blocks.
 class BlockBroadcast {
  public:
-  /// Most listeners at a time.
+  /// Greatest number of listeners at a time.
   static constexpr size_t kMaxListenerCount = 32;
 
-  /// A listener. It must be destroyed before the broadcast, and not from within `wake`.
+  /// A listener. It must be destroyed before the broadcast, and not by its own `wake`.
   class Listener {
    public:
     ~Listener();
     Listener(const Listener&) = delete;
     Listener& operator=(const Listener&) = delete;
 
-    /// The next block, or null when none waits. Any thread.
+    /// Returns the next block, or null if no block waits. Any thread.
     std::shared_ptr<const RenderedBlock> TryTake();
 
-    /// Whether no further block will come; blocks may still wait.
+    /// Returns whether the broadcast has ended. Blocks that were queued before may still wait.
     bool ended() const;
 
-    /// Frames lost so far.
+    /// Number of frames lost so far.
     uint64_t lost_frame_count() const;
 
    private:
@@ -60,22 +60,23 @@ class BlockBroadcast {
     std::deque<std::shared_ptr<const RenderedBlock>> queue_ ABSL_GUARDED_BY(mutex_);
     uint64_t lost_frame_count_ ABSL_GUARDED_BY(mutex_) = 0;
     bool ended_ ABSL_GUARDED_BY(mutex_) = false;
-    /// First frame of the next block if none is lost; unset before the first block.
+    /// First frame of the next block if no block is lost. Unset before the first block.
     std::optional<uint64_t> next_frame_ ABSL_GUARDED_BY(mutex_);
   };
 
   /// The ring buffer and each queue hold `queue_block_count` blocks of `format`.
   BlockBroadcast(const DeviceFormat& format, size_t queue_block_count);
 
-  /// Called by the render thread: passes a block on, or drops it if Deliver has not kept up.
+  /// Copies a block into the ring buffer, or drops it if Deliver has not kept up. Called by the
+  /// render thread.
   void Publish(uint64_t first_frame, std::span<const float> block) noexcept;
 
-  /// Called by the housekeeping thread: hands the newly published blocks to the listeners, and
-  /// calls `observe`, which must not use the broadcast, with each.
+  /// Hands the newly published blocks to the listeners, and calls `observe` with each block.
+  /// `observe` must not use the broadcast. Called by the housekeeping thread.
   void Deliver(absl::FunctionRef<void(const RenderedBlock&)> observe = [](const RenderedBlock&) {});
 
-  /// Adds a listener, which gets blocks from the next one on. Deliver calls `wake`, which must not
-  /// block, after it has queued blocks. Errors: ResourceExhausted (TOO_MANY_LISTENERS).
+  /// Adds a listener, which gets all blocks from the next one on. Deliver calls `wake` after it has
+  /// queued blocks. `wake` must not block. Errors: ResourceExhausted (TOO_MANY_LISTENERS).
   absl::StatusOr<std::unique_ptr<Listener>> Subscribe(std::function<void()> wake);
 
   /// Tells the listeners that no further block will come.

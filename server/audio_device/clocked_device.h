@@ -16,10 +16,11 @@
 namespace carillon {
 
 /// A device without a sound card: a thread pulls a block each time the clock has advanced by a
-/// block, and gives it to a sink. It catches up after late wake-ups, so the mean rate is exact.
+/// block, and gives it to a sink. The thread catches up after late wake-ups, so the mean rate is
+/// exact.
 class ClockedDevice final : public AudioDevice {
  public:
-  /// Takes one block. After an error the block is lost, and the next one is given to the sink.
+  /// Takes one block. After an error that block is lost, and the sink gets the next block as usual.
   using Sink = std::function<absl::Status(std::span<const float>)>;
 
   /// `clock` must outlive the device.
@@ -47,7 +48,7 @@ class ClockedDevice final : public AudioDevice {
   FrameSource* source_ = nullptr;
   std::atomic<uint64_t> lost_frame_count_{0};
   Mutex mutex_;
-  /// Whether the sink took the newest block.
+  /// The sink's result for the newest block.
   absl::Status state_ ABSL_GUARDED_BY(mutex_);
   std::atomic<bool> stopping_{false};
   std::thread thread_;

@@ -11,14 +11,15 @@
 
 namespace carillon {
 
-/// Opens a sound card in a process of its own: `program` (carillon-audio), which calls PortAudio.
-/// A call of PortAudio can wait for ever once its sound server has died; the process is then killed
-/// after a bounded time. It lists the devices anew each time, which PortAudio does only when it is
-/// initialized.
+/// Opens a sound card in a process of its own: `program` (carillon-audio), which calls PortAudio. A
+/// call of PortAudio can wait for ever once its sound server has died. The process is then killed
+/// after a bounded time. Each process lists the devices anew, whereas PortAudio lists them only
+/// when it is initialized.
 ///
-/// `name` is a part of the wanted device's name in upper or lower case ("jack", "pulse"); empty:
-/// the system's default. Errors: NotFound (AUDIO_DEVICE_NOT_FOUND: the message lists the devices
-/// there are), Unavailable (AUDIO_DEVICE_FAILED), and those of ChildProcess::Start.
+/// `name` is a part of the wanted device's name in upper or lower case ("jack", "pulse"). If `name`
+/// is empty, the system's default is opened. Errors: NotFound (AUDIO_DEVICE_NOT_FOUND: the message
+/// lists the devices there are), Unavailable (AUDIO_DEVICE_FAILED), and those of
+/// ChildProcess::Start.
 absl::StatusOr<std::unique_ptr<AudioDevice>> OpenDeviceProcess(const std::string& program,
                                                                absl::string_view name,
                                                                const DeviceFormat& format,

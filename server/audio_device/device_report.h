@@ -12,12 +12,12 @@
 
 namespace carillon {
 
-/// One message of the program carillon-audio to the daemon, as the bytes of this struct.
+/// One message from the program carillon-audio to the daemon, sent as the bytes of this struct.
 struct DeviceReport {
   enum class State : uint32_t {
     kOpen,     ///< the device is open; `text` describes it
     kPlaying,  ///< sent regularly while the device plays
-    kFailed,   ///< `code` and `text` are those of a Refusal; the process ends
+    kFailed,   ///< the process ends; `code` and `text` are those of its Refusal
   };
 
   State state = State::kOpen;
@@ -32,9 +32,9 @@ struct DeviceReport {
   }
 };
 
-/// The descriptors of carillon-audio: a socket of type SOCK_SEQPACKET. The daemon sends one byte
-/// with the descriptor of the FrameRing's memory: the device then plays. When the daemon closes its
-/// end, the process ends.
+/// The descriptors of carillon-audio: a socket of type SOCK_SEQPACKET. The device plays once the
+/// daemon has sent one byte with the descriptor of the FrameRing's memory. When the daemon closes
+/// its end, the process ends.
 inline constexpr int kDaemonSocket = 0;
 
 }  // namespace carillon

@@ -13,15 +13,15 @@
 
 namespace carillon {
 
-/// The rendered frames that wait for the device, in memory that the process of a sound card maps,
-/// too. The render thread of the daemon writes frames(); one device at a time pulls.
+/// The rendered frames that wait for the device, in memory that carillon-audio, the process of a
+/// sound card, maps too. The daemon's render thread writes to frames(). One device at a time pulls.
 class FrameRing final : public FrameSource {
  public:
-  /// Makes the memory for `block_count` blocks.
+  /// Allocates memory for `block_count` blocks.
   FrameRing(const DeviceFormat& format, uint32_t block_count);
 
   /// Maps the memory of another process's ring, and keeps `descriptor`. Errors: Internal
-  /// (AUDIO_DEVICE_FAILED: it is no such memory).
+  /// (AUDIO_DEVICE_FAILED: `descriptor` is not such memory).
   static absl::StatusOr<std::unique_ptr<FrameRing>> Map(int descriptor);
 
   ~FrameRing() override;
@@ -36,7 +36,7 @@ class FrameRing final : public FrameSource {
   /// Number of pulls that found too few frames.
   uint64_t xrun_count() const;
 
-  /// Number of silent frames given instead of missing ones.
+  /// Number of silent frames that pulls returned in place of missing frames.
   uint64_t lost_frame_count() const;
 
  private:

@@ -18,11 +18,11 @@ class FrameSource {
  public:
   virtual ~FrameSource() = default;
 
-  /// Fills all of `frames`; frames that are not ready are silent.
+  /// Fills all of `frames`, with silence in place of frames that are not ready.
   virtual void Pull(std::span<float> frames) noexcept = 0;
 
-  /// Descriptor of the memory from which another process can pull the same frames (see FrameRing);
-  /// -1 if there is none.
+  /// Returns the descriptor of the memory from which another process can pull the same frames (see
+  /// FrameRing), or -1 if there is no such memory.
   virtual int shared_memory() const { return -1; }
 };
 

@@ -15,10 +15,10 @@
 namespace carillon {
 
 /// Renders ahead of the device on a thread of its own, so that the device only copies. A ring
-/// buffer of `block_count` blocks lies between them, which is also the latency that it adds.
+/// buffer of `block_count` blocks lies between both threads and adds their duration to the latency.
 ///
-/// The thread polls the ring buffer for room twice in a block's time. Waking it would need a system
-/// call in the device's callback.
+/// The thread polls the ring buffer for room twice in each block's duration, because waking it
+/// would need a system call in the device's callback.
 class LookAhead final {
  public:
   /// Fills one block. Only the render thread calls it; it must be real-time safe.
@@ -30,8 +30,8 @@ class LookAhead final {
   LookAhead(const LookAhead&) = delete;
   LookAhead& operator=(const LookAhead&) = delete;
 
-  /// Fills the ring buffer, then starts the thread. A status that is not OK means that the system
-  /// refused real-time priority; the thread runs without it.
+  /// Fills the ring buffer, then starts the thread. If the system refuses real-time priority, the
+  /// thread runs without that priority and the refusal is returned.
   absl::Status Start();
 
   /// Joins the thread.
@@ -40,13 +40,13 @@ class LookAhead final {
   /// The frames that the device pulls.
   FrameSource& source() { return rendered_; }
 
-  /// Latency of the ring buffer.
+  /// Latency that the ring buffer adds.
   double latency_s() const;
 
   /// Number of pulls that found too few frames in the ring buffer.
   uint64_t xrun_count() const { return rendered_.xrun_count(); }
 
-  /// Number of silent frames given instead of missing ones.
+  /// Number of silent frames that pulls returned in place of missing frames.
   uint64_t lost_frame_count() const { return rendered_.lost_frame_count(); }
 
   /// Fraction of real time that rendering takes, smoothed over about a second; 1 is the limit.

@@ -13,18 +13,19 @@ namespace carillon {
 /// The wanted device.
 struct DeviceSettings {
   /// "portaudio" or "portaudio:PART OF A NAME" (a sound card), "null" (silent, in real time),
-  /// "file:PATH" (a WAV file, in real time), or "auto": a sound card if there is one.
+  /// "file:PATH" (a WAV file, in real time), or "auto" (the default sound card).
   std::string specification = "auto";
   DeviceFormat format{};
   /// Path of carillon-audio, which opens sound cards.
   std::string program{};
 };
 
-/// Opens a device. Errors: InvalidArgument (INVALID_AUDIO_DEVICE), and those of the device.
+/// Opens a device. Errors: InvalidArgument (INVALID_AUDIO_DEVICE), and those of OpenDeviceProcess
+/// and WavWriter::Make.
 absl::StatusOr<std::unique_ptr<AudioDevice>> OpenDevice(const DeviceSettings& settings,
                                                         Clock& clock);
 
-/// The null device.
+/// Opens the null device.
 std::unique_ptr<AudioDevice> OpenNullDevice(const DeviceFormat& format, Clock& clock);
 
 }  // namespace carillon

@@ -20,7 +20,7 @@ enum class LossKind {
 /// The lead is the device's time in frames minus the number of frames given to it. If a callback is
 /// just late, its time stamp is late too, but the following ones are not, and the lead returns. If
 /// frames were lost, the lead stays larger by their number. So the lead is observed for a second
-/// after an xrun; its increase is the number of frames lost.
+/// after an xrun, and its increase is the number of lost frames.
 ///
 /// JACK computes its time stamps by a feedback loop that follows its cycles. If the server itself
 /// was late, all frames were delayed and none is missing, but the loop is disturbed: the lead
@@ -32,12 +32,12 @@ class OutputClock {
         sample_rate_hz_(sample_rate_hz),
         kind_(kind) {}
 
-  /// Forgets earlier callbacks; the counts stay.
+  /// Forgets earlier callbacks, but keeps the counts.
   void Restart() noexcept;
 
-  /// Notes a callback for `frame_count` frames that will be heard at `output_s`. Callbacks of the
-  /// same cycle of the device have the same `cycle_s` and `underflow`. One thread calls it; it is
-  /// real-time safe.
+  /// Counts a callback for `frame_count` frames that will be heard at `output_s`. Callbacks of the
+  /// same cycle of the device have the same `cycle_s` and `underflow`. Only one thread may call
+  /// Count, which is real-time safe.
   void Count(double cycle_s, double output_s, size_t frame_count, bool underflow) noexcept;
 
   /// Number of cycles in which the device reported an underflow. Any thread.
@@ -48,7 +48,7 @@ class OutputClock {
     return longest_cycle_frames_.load(std::memory_order_relaxed);
   }
 
-  /// Number of lost frames; it includes an xrun a second after it. Any thread.
+  /// Number of lost frames. The loss of an xrun is included a second after the xrun. Any thread.
   uint64_t lost_frame_count() const { return lost_frame_count_.load(std::memory_order_relaxed); }
 
  private:
@@ -56,7 +56,8 @@ class OutputClock {
 
   void BeginCycle(double lead_frames, bool underflow) noexcept;
   void EndStretch() noexcept;
-  /// `early`, `late`: increase of the lead half a second and a second after the xrun.
+  /// Returns the number of lost frames. `early` and `late` are the increases of the lead half a
+  /// second and a second after the xrun.
   double LostFrames(double early, double late) const noexcept;
 
   const uint64_t half_watch_;  ///< frames

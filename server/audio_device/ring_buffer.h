@@ -25,13 +25,13 @@ class RingView {
 
   size_t capacity() const { return values_.size(); }
 
-  /// Called by the producer: number of values that may be pushed.
+  /// Returns the number of values that may be pushed. Called by the producer.
   size_t free_count() const {
     return capacity() - (counts_->written.load(std::memory_order_relaxed) -
                          counts_->read.load(std::memory_order_acquire));
   }
 
-  /// Called by the producer: appends `values`, at most free_count() of them.
+  /// Appends `values`, at most free_count() of them. Called by the producer.
   void Push(std::span<const T> values) noexcept {
     const size_t written = counts_->written.load(std::memory_order_relaxed);
     const size_t begin = written % capacity();
@@ -41,9 +41,9 @@ class RingView {
     counts_->written.store(written + values.size(), std::memory_order_release);
   }
 
-  /// Called by a producer that always appends the same number of values, of which the capacity is a
-  /// multiple: the place of the next `count` values, at most free_count(). They are appended by
-  /// Commit once they have been written there.
+  /// Returns the memory for the next `count` values, at most free_count(). Commit appends them once
+  /// they have been written there. Called by a producer that always appends the same number of
+  /// values; the capacity is a multiple of that number.
   std::span<T> Next(size_t count) noexcept {
     const size_t begin = counts_->written.load(std::memory_order_relaxed) % capacity();
     assert(begin + count <= capacity());
@@ -55,8 +55,8 @@ class RingView {
                            std::memory_order_release);
   }
 
-  /// Called by the consumer: moves up to values.size() values to the front of `values`; returns
-  /// their number.
+  /// Moves up to values.size() values to the front of `values` and returns their number. Called by
+  /// the consumer.
   size_t Pop(std::span<T> values) noexcept {
     const size_t read = counts_->read.load(std::memory_order_relaxed);
     const size_t count =
@@ -82,7 +82,7 @@ struct RingStorage {
   RingCounts counts;
 };
 
-/// A ring buffer in memory of its own.
+/// A ring buffer that owns its memory.
 template <typename T>
 class RingBuffer : private RingStorage<T>, public RingView<T> {
  public:

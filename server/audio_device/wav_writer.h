@@ -18,8 +18,9 @@ class WavWriter {
   static absl::StatusOr<WavWriter> Make(const std::string& path, uint32_t sample_rate_hz,
                                         uint32_t channel_count);
 
-  /// Appends frames, interleaved. Errors: DataLoss (AUDIO_FILE_FAILED), for instance because the
-  /// disk is full. The frames are then left out, and the next ones follow those written before.
+  /// Appends interleaved frames. Errors: DataLoss (AUDIO_FILE_FAILED), for instance because the
+  /// disk is full. The file then lacks these frames, and the next frames follow the last ones that
+  /// were written.
   absl::Status Write(std::span<const float> frames);
 
  private:
@@ -33,7 +34,7 @@ class WavWriter {
   File file_;
   std::string path_;
   uint32_t channel_count_;
-  int64_t frame_count_ = 0;  ///< written completely
+  int64_t frame_count_ = 0;  ///< frames written completely
   bool failed_ = false;      ///< the newest frames were not written completely
 };
 

@@ -13,10 +13,10 @@ class Clock {
  public:
   virtual ~Clock() = default;
 
-  /// Monotonic; for durations and deadlines.
+  /// Returns a time that never goes back, for durations and deadlines.
   virtual std::chrono::nanoseconds Monotonic() const noexcept = 0;
 
-  /// Milliseconds since 1970-01-01 UTC; for people.
+  /// Returns the milliseconds since 1970-01-01 UTC, for times that people read.
   virtual int64_t UnixMs() const noexcept = 0;
 
   /// Returns once Monotonic() has reached `time`.

@@ -17,14 +17,15 @@ class FixedVector {
   explicit FixedVector(size_t capacity)
       : capacity_(capacity), values_(std::make_unique_for_overwrite<T[]>(capacity)) {}
 
-  /// The vector must have room. A value beyond the capacity is a bug; it is discarded.
+  /// Appends a value. A value beyond the capacity is a bug of the caller and is discarded.
   void push_back(const T& value) noexcept {
     assert(size_ < capacity_);
     if (size_ < capacity_) values_[size_++] = value;
   }
   void clear() noexcept { size_ = 0; }
 
-  /// Erases the values for which `predicate` is true; it is called once for each value, in order.
+  /// Erases the values for which `predicate` is true. Calls `predicate` once for each value, in
+  /// order.
   template <typename Predicate>
   void EraseIf(Predicate predicate) noexcept {
     size_ = static_cast<size_t>(std::remove_if(begin(), end(), predicate) - begin());

@@ -12,8 +12,8 @@
 namespace carillon {
 
 /// An allocator for arrays of many megabytes that are filled once and read at random. Arrays of 2
-/// MiB and more lie in huge pages, because pages of 4 KiB cost a page fault each when they are
-/// filled and a page-table walk at most reads. resize() leaves new numbers uninitialized.
+/// MiB and more lie in huge pages: each page of 4 KiB would cost a page fault when it is filled,
+/// and most reads a page-table walk. A vector's resize() leaves new numbers uninitialized.
 template <typename T>
 class LargeAllocator {
  public:

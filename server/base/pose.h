@@ -18,7 +18,7 @@ struct Quaternion {
 
 /// Position and orientation of a body in its scene.
 struct Pose {
-  Vector3 position_m{};      ///< the origin of its frame
+  Vector3 position_m{};      ///< the origin of the body's frame
   Quaternion orientation{};  ///< rotates vectors of the body's frame into the scene's frame
 
   bool operator==(const Pose&) const = default;

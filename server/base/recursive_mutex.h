@@ -8,7 +8,7 @@
 
 namespace carillon {
 
-/// As Mutex, for a thread that may lock it again while it holds it.
+/// A Mutex that the thread that holds it may lock again.
 class ABSL_LOCKABLE RecursiveMutex {
  public:
   void Lock() ABSL_EXCLUSIVE_LOCK_FUNCTION() ABSL_LOCKS_EXCLUDED(kRenderRole) { mutex_.lock(); }
@@ -18,7 +18,7 @@ class ABSL_LOCKABLE RecursiveMutex {
   std::recursive_mutex mutex_;
 };
 
-/// Holds a recursive mutex for the length of a scope.
+/// Locks a recursive mutex until the end of a scope.
 class ABSL_SCOPED_LOCKABLE RecursiveMutexLock {
  public:
   explicit RecursiveMutexLock(RecursiveMutex* mutex) ABSL_EXCLUSIVE_LOCK_FUNCTION(mutex)

@@ -11,8 +11,8 @@ struct RigidRadiation {
   /// One of the six rigid motions. The body radiates like a sphere of this radius whose normal
   /// velocity is a sum of spherical harmonics with these strengths.
   struct Motion {
-    double radius_m = 0;                ///< zero: the motion moves no air
-    std::array<double, 9> strengths{};  ///< s_lm at l^2 + l + m; for rotation in metres
+    double radius_m = 0;                ///< zero if the motion moves no air
+    std::array<double, 9> strengths{};  ///< s_lm at index l^2 + l + m; in metres for rotations
   };
   double volume_m3 = 0;
   std::array<double, 3> center_of_mass_m{};

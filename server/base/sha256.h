@@ -17,7 +17,8 @@ class Sha256 {
 
   void Update(std::string_view bytes);
 
-  /// The digest of everything so far, 64 lower-case hexadecimal digits. Call once, last.
+  /// Returns the digest of all bytes added, 64 lower-case hexadecimal digits. Must be the last
+  /// call.
   std::string Finish();
 
  private:
@@ -25,10 +26,10 @@ class Sha256 {
   std::unique_ptr<Context> context_;
 };
 
-/// The digest of `bytes`, 64 lower-case hexadecimal digits.
+/// Returns the digest of `bytes`, 64 lower-case hexadecimal digits.
 std::string Sha256Hex(std::string_view bytes);
 
-/// Whether `text` has the form of a digest: 64 lower-case hexadecimal digits.
+/// Returns whether `text` has the form of a digest: 64 lower-case hexadecimal digits.
 bool IsSha256Hex(std::string_view text);
 
 }  // namespace carillon

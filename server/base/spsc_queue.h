@@ -13,16 +13,16 @@ class SpscQueue {
  public:
   explicit SpscQueue(size_t capacity) : queue_(capacity) {}
 
-  /// Producer only. False: the queue is full and `value` was not taken.
+  /// Called by the producer. Returns false, without taking `value`, if the queue is full.
   bool TryPush(const T& value) noexcept { return queue_.push(value); }
 
-  /// Consumer only. False: the queue is empty and `value` is untouched.
+  /// Called by the consumer. Returns false, and leaves `value` unchanged, if the queue is empty.
   bool TryPop(T& value) noexcept { return queue_.pop(value); }
 
-  /// Consumer only. Moves up to `most` values to `values`; returns how many.
+  /// Called by the consumer. Moves up to `most` values to `values`; returns their number.
   size_t PopSome(T* values, size_t most) noexcept { return queue_.pop(values, most); }
 
-  /// Consumer only.
+  /// Called by the consumer.
   bool empty() const noexcept { return queue_.read_available() == 0; }
 
  private:

@@ -7,15 +7,15 @@ namespace carillon {
 
 /// The role of a thread, modelled as a lock that costs nothing, so that clang's thread-safety
 /// analysis finds functions called by the wrong kind of thread (lint/thread_roles).
-/// ABSL_EXCLUSIVE_LOCKS_REQUIRED names the role that may call a function, ABSL_LOCKS_EXCLUDED a
-/// role that may not.
+/// ABSL_EXCLUSIVE_LOCKS_REQUIRED names the role that may call a function; ABSL_LOCKS_EXCLUDED names
+/// a role that may not.
 class ABSL_LOCKABLE ThreadRole {
  public:
   void Take() const ABSL_EXCLUSIVE_LOCK_FUNCTION() {}
   void Leave() const ABSL_UNLOCK_FUNCTION() {}
 };
 
-/// The role of rendering threads, which neither allocate, lock, log, throw nor call the system.
+/// The role of rendering threads, which must not allocate, lock, log, throw or make system calls.
 inline constexpr ThreadRole kRenderRole;
 
 /// Gives this thread a role until the end of a scope.

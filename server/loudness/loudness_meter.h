@@ -9,9 +9,10 @@
 
 namespace carillon {
 
-/// Measures the loudness of a sound after EBU R 128 (ITU-R BS.1770) as it goes by. A sound without
-/// a value is silent: below -70 LUFS or, for the integrated loudness, shorter than 400 ms.
-/// It allocates now and then, so that it does not belong on an audio thread. One thread at a time.
+/// Measures the loudness of a sound after EBU R 128 (ITU-R BS.1770) while the sound is added. A
+/// loudness is absent if the sound is below -70 LUFS or, for the integrated loudness, shorter than
+/// 400 ms. The meter allocates now and then, so it must not run on an audio thread. One thread at a
+/// time.
 class LoudnessMeter {
  public:
   LoudnessMeter(uint32_t sample_rate_hz, uint32_t channel_count);
@@ -19,7 +20,7 @@ class LoudnessMeter {
   LoudnessMeter(const LoudnessMeter&) = delete;
   LoudnessMeter& operator=(const LoudnessMeter&) = delete;
 
-  /// Adds frames, interleaved.
+  /// Adds interleaved frames.
   void Add(std::span<const float> samples);
 
   /// Loudness of the last 400 ms, LUFS.
@@ -30,7 +31,8 @@ class LoudnessMeter {
   std::optional<double> integrated() const;
   /// The loudest momentary loudness so far, LUFS, in steps of 100 ms.
   std::optional<double> loudest_momentary() const { return loudest_momentary_; }
-  /// Largest sample so far of the sound at four times its rate, of any channel; full scale is 1.
+  /// Returns the largest sample so far in any channel of the sound oversampled four times; full
+  /// scale is 1.
   double true_peak() const;
 
  private:

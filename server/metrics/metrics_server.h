@@ -12,24 +12,25 @@ namespace carillon {
 
 /// One number of a metric, with at most one label.
 struct MetricValue {
-  std::string label{};  ///< value of the metric's label; empty if it has none
+  std::string label{};  ///< value of the metric's label; empty if the metric has no label
   double value = 0;
 };
 
-/// A metric, named as Prometheus recommends: with its unit, and "_total" if it only grows.
+/// A metric. Its name ends with the unit, and with "_total" if the value only grows, as Prometheus
+/// recommends.
 struct Metric {
   enum class Kind { kGauge, kCounter };
   std::string name;
   std::string help;
   Kind kind = Kind::kGauge;
-  std::string label_name{};  ///< empty: no label
+  std::string label_name{};  ///< empty if the metric has no label
   std::vector<MetricValue> values{};
 };
 
 /// Serves metrics to Prometheus, at /metrics of an address of its own, by HTTP without TLS.
 class MetricsServer {
  public:
-  /// Returns the metrics of this moment; called on the server's threads, for each request.
+  /// Returns the present metrics. The server's threads call it for each request.
   using Read = std::function<std::vector<Metric>()>;
 
   /// `address` is HOST:PORT. Errors: FailedPrecondition (LISTEN_FAILED).
