@@ -21,8 +21,9 @@ namespace carillon {
 
 class QueueCore;
 
-/// Ends a watch when it is destroyed: its function is not running then and is never called again.
-/// The function itself may destroy it. The caller must hold no lock that the function takes.
+/// Ends a watch when it is destroyed. After that, the watch's function is neither running nor
+/// called again. The function itself may destroy the JobWatch. The caller must hold no lock that
+/// the function takes.
 class JobWatch {
  public:
   virtual ~JobWatch() = default;
@@ -31,25 +32,25 @@ class JobWatch {
 struct QueueSettings {
   size_t max_queued_count = 1024;
   size_t max_queued_count_of_client = 512;
-  /// Whether a transfer is computed of each model after it, unless the request leaves it out.
+  /// Whether a transfer is computed after each model whose request does not exclude it.
   bool transfers = false;
-  /// Takes log lines about events of which no caller learns. Any thread calls it.
+  /// Takes log lines about events that no call reports. Any thread may call it.
   std::function<void(const std::string& line)> log = [](const std::string&) {};
 };
 
 struct DecompositionJobPage {
   std::vector<v1::Job> jobs;
-  std::string next_page_token;  ///< empty: this was the last page
+  std::string next_page_token;  ///< empty after the last page
 };
 
-/// Jobs that compute modal models and their transfers. Each is computed once, however many requests
-/// ask for it, and an accepted job is computed even if the daemon dies in between. Get, List and
-/// Watch do not wait while the database writes. Safe from every thread.
+/// Jobs that compute modal models and their transfers. Each job is computed once, however many
+/// requests ask for it. The next daemon computes the accepted jobs of a daemon that died. Get, List
+/// and Watch do not wait while the database writes. Safe from every thread.
 class DecompositionQueue {
  public:
   /// Queues the unfinished jobs of an earlier run of the daemon. `database` and `clock` must
-  /// outlive the queue. The destructor ends running workers and leaves their jobs to the next
-  /// start. A model that the database puts into quarantine is computed again if it has a job.
+  /// outlive the queue. The destructor ends running workers; the next start of the daemon runs
+  /// their jobs. A model that the database puts into quarantine is computed again if it has a job.
   static absl::StatusOr<std::unique_ptr<DecompositionQueue>> Make(
       ModeDatabase& database, std::unique_ptr<Executor> executor, const Clock& clock,
       QueueSettings settings = {});
@@ -58,26 +59,25 @@ class DecompositionQueue {
   const QueueSettings& settings() const;
 
   /// Requests the modal model of a mesh (ResolveRequest is applied). The job is in the database
-  /// when the call returns.
-  /// The job has succeeded at once if a stored model is complete up to the eigenvalue that the
-  /// hints want; otherwise the model is computed again and replaced. A job that waits or runs is
-  /// returned, extended if this request wants more. A job that failed for a reason that would recur
-  /// has failed at once; after a crash, a stall, a time-out or a lack of memory it is queued again.
-  /// Errors: those of ResolveRequest, NotFound (MESH_NOT_FOUND), ResourceExhausted (QUEUE_FULL,
-  /// CLIENT_LIMIT_REACHED).
-  /// Clients, named by `client`, take turns. A job that several ask for is the first one's.
+  /// when the call returns. The job has succeeded at once if a stored model is complete up to the
+  /// eigenvalue that the hints want; otherwise the model is computed again and replaced. If the job
+  /// waits or runs already, it is returned, extended if this request wants more. If it failed for a
+  /// reason that would recur, it is returned as failed. A job that failed by a crash, a stall, a
+  /// time-out or a lack of memory is queued again. Errors: those of ResolveRequest, NotFound
+  /// (MESH_NOT_FOUND), ResourceExhausted (QUEUE_FULL, CLIENT_LIMIT_REACHED). Clients, named by
+  /// `client`, take turns. A job that several clients ask for counts for the first of them.
   absl::StatusOr<v1::Job> Submit(const v1::CreateModalModelRequest& request,
                                  const std::string& client = {});
 
-  /// Requests a transfer of the stored model `model`. The job has succeeded at once if a transfer
-  /// is stored that serves the request. The rest is as for Submit. Errors: InvalidArgument
-  /// (INVALID_SETTINGS, UNKNOWN_MATERIAL, INVALID_MATERIAL), NotFound (MODAL_MODEL_NOT_FOUND),
-  /// ResourceExhausted (QUEUE_FULL, CLIENT_LIMIT_REACHED).
+  /// Requests a transfer of the stored model `model`. The job has succeeded at once if a stored
+  /// transfer satisfies the request. In all other respects the call works like Submit. Errors:
+  /// InvalidArgument (INVALID_SETTINGS, UNKNOWN_MATERIAL, INVALID_MATERIAL), NotFound
+  /// (MODAL_MODEL_NOT_FOUND), ResourceExhausted (QUEUE_FULL, CLIENT_LIMIT_REACHED).
   absl::StatusOr<v1::Job> SubmitTransfer(const std::string& model,
                                          const v1::CreateTransferRequest& request,
                                          const std::string& client = {});
 
-  /// Jobs that wait and run, and those that have ended since this was made.
+  /// The numbers of jobs that wait, that run, and that have ended since the queue was made.
   struct Counts {
     size_t queued = 0;
     size_t running = 0;
@@ -91,29 +91,28 @@ class DecompositionQueue {
   /// Errors: NotFound (JOB_NOT_FOUND).
   absl::StatusOr<v1::Job> Get(const std::string& digest);
 
-  /// Those that match, newest first. `page_size` 0: 100; at most 1000. A page may have fewer
-  /// although others follow. Errors: InvalidArgument (INVALID_PAGE).
+  /// Returns the jobs that match, newest first, up to 1000 a page; a `page_size` of 0 means 100. A
+  /// page may have fewer jobs than that even if more pages follow. Errors: InvalidArgument
+  /// (INVALID_PAGE).
   absl::StatusOr<DecompositionJobPage> List(int page_size, const std::string& page_token,
                                             const JobFilter& filter = {});
 
-  /// Cancels a queued or running job; a job that has ended stays unchanged. A running job is still
-  /// running in the answer; its watchers learn of its end. Errors: NotFound (JOB_NOT_FOUND).
+  /// Cancels a queued or running job. A job that has ended stays unchanged. The answer shows a
+  /// running job as still running; its watchers learn of its end. Errors: NotFound (JOB_NOT_FOUND).
   absl::StatusOr<v1::Job> Cancel(const std::string& digest);
 
   /// Calls `on_change` with the job at once and after every change, in order and one call at a
-  /// time; the job of the last call has ended. The calls come on this thread or on one of the
-  /// executor, with no lock of the queue held, and must not block. Errors: NotFound
-  /// (JOB_NOT_FOUND).
+  /// time, until the job has ended. The calls are made on this thread or on a thread of the
+  /// executor, without a lock of the queue, and must not block. Errors: NotFound (JOB_NOT_FOUND).
   absl::StatusOr<std::unique_ptr<JobWatch>> Watch(const std::string& digest,
                                                   std::function<void(const v1::Job&)> on_change);
 
-  /// Hands all jobs that wait or run to `sink`, which must outlive the watch, then every change of
+  /// Gives `sink`, which must outlive the watch, all jobs that wait or run and then every change of
   /// every job.
   std::unique_ptr<JobWatch> WatchAll(JobSink& sink);
 
-  /// Deletes the model of that digest, its transfers and their jobs, which are cancelled if they
-  /// have not ended.
-  /// Errors: NotFound (MODAL_MODEL_NOT_FOUND).
+  /// Deletes the model `digest`, its transfers and all their jobs. Jobs that have not ended are
+  /// cancelled first. Errors: NotFound (MODAL_MODEL_NOT_FOUND).
   absl::Status DeleteModel(const std::string& digest);
 
  private:

@@ -26,27 +26,27 @@ enum class Verdict {
 
 struct Outcome {
   Verdict verdict = Verdict::kCrashed;
-  v1::ErrorInfo error;               ///< unless kOk
-  std::filesystem::path model_file;  ///< if kOk: the stored form; it exists until on_end returns
-  uint64_t peak_bytes = 0;           ///< highest memory that was observed; 0: unknown
-  /// With kOutOfMemory: the worker kept its own limit, but all workers together exceeded the
-  /// budget. It may succeed alone.
+  v1::ErrorInfo error;               ///< empty if kOk
+  std::filesystem::path model_file;  ///< the stored form if kOk; exists until on_end returns
+  uint64_t peak_bytes = 0;           ///< highest observed memory; 0 if unknown
+  /// Set with kOutOfMemory if the worker kept to its own limit, but all workers together exceeded
+  /// the budget. The task may succeed if it runs alone.
   bool crowded = false;
 };
 
-/// One decomposition to run, or one transfer to compute. The functions are called on threads of the
-/// executor, one call for a task at a time. A limit of the request applies if it is below the
-/// executor's own.
+/// One decomposition to run, or one transfer to compute. Threads of the executor call its
+/// functions, one call at a time for each task. A limit of the request applies if it is below the
+/// executor's own limit.
 struct DecompositionTask {
   std::string digest;     ///< names the task; at most one task of a digest runs at a time
-  bool radiates = false;  ///< computes the transfer of a stored model, not a model
+  bool radiates = false;  ///< whether to compute the transfer of a stored model, and not a model
   v1::CreateModalModelRequest request;  ///< resolved
-  uint32_t way = 0;                     ///< as JobRecord::way
+  uint32_t way = 0;                     ///< see JobRecord::way
   uint64_t estimate_bytes = 0;          ///< predicted memory
   /// Writes the mesh, or the stored model, to the file that the worker reads.
   std::function<absl::Status(const std::filesystem::path& file)> write_input;
   std::function<void(const v1::Progress&)> on_progress;
-  std::function<void(const Outcome&)> on_end;  ///< once, last
+  std::function<void(const Outcome&)> on_end;  ///< the last call, made exactly once
 };
 
 /// Runs tasks, in processes of this machine or on a cluster. The destructor ends running
@@ -55,16 +55,16 @@ class Executor {
  public:
   virtual ~Executor() = default;
 
-  /// The number of tasks that the caller may have running at a time.
+  /// Returns the number of tasks that may run at a time.
   virtual int worker_count() const = 0;
 
-  /// Memory for all running tasks together, bytes. The caller starts only tasks whose estimates fit
-  /// into it, or a single one.
+  /// Returns the memory for all running tasks together, bytes. The caller starts further tasks only
+  /// if the estimates of all running tasks fit into this budget.
   virtual uint64_t memory_budget_bytes() const = 0;
 
   virtual void Start(DecompositionTask task) = 0;
 
-  /// The task ends as kCancelled, unless it ended otherwise before the call reached it.
+  /// Ends the task as kCancelled, unless it has ended before.
   virtual void Cancel(const std::string& digest) = 0;
 };
 

@@ -17,13 +17,13 @@
 
 namespace carillon {
 
-/// Two fields of ActiveJob.
+/// The origin of a job, with the fields of ActiveJob that have the same names.
 struct JobOrigin {
   std::string client{};
   std::string waits_for{};
 };
 
-/// Starts queued jobs on the executor, stores their results and decides what follows from them.
+/// Starts queued jobs on the executor, stores their results and queues the jobs that follow.
 class JobRuns {
  public:
   using Notices = std::vector<Notice>;
@@ -32,35 +32,35 @@ class JobRuns {
   JobRuns(ModeDatabase& database, std::unique_ptr<Executor> executor, const Clock& clock,
           ActiveJobs& jobs, QueueSettings settings);
 
-  /// Held by the one thread that writes jobs into the database and into `jobs`, also while it waits
-  /// for the disk. Readers never take it.
+  /// Returns the mutex of the one thread that writes jobs into the database and into `jobs`. The
+  /// thread also holds it while it waits for the disk. Readers never lock it.
   Mutex& writer() ABSL_LOCK_RETURNED(writer_) { return writer_; }
 
-  /// Restores what earlier runs of the daemon learnt about memory.
+  /// Restores the correction of memory estimates that earlier runs of the daemon learnt.
   void RecallExperience();
 
   /// Ends the running workers; no job changes afterwards.
   void Stop();
 
-  /// Adds a job, whose record is stored already, to the queue.
+  /// Adds a job to the queue. The caller has stored the job's record.
   void Enqueue(JobRecord record, v1::CreateModalModelRequest request, JobOrigin origin = {})
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
 
   /// Starts jobs while workers and memory are free.
   void StartWhatFits(Notices& notices) ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
 
-  /// Ends the worker of a running job; the job ends, or is queued again, when the worker has ended.
+  /// Ends the worker of a running job. The job ends, or is queued again, when the worker has ended.
   void Cancel(const std::string& digest) ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
 
-  /// The coarse model's job `coarse` has ended, successfully or not: queues the jobs that waited
-  /// for it, with its model, if there is one, copied under their digests.
+  /// Queues the jobs that waited for the coarse model's job `coarse`, which has ended successfully
+  /// or not. The coarse model, if there is one, is copied under their digests.
   void ReleaseWaiting(const std::string& coarse, Notices& notices)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
 
-  /// Runs that have ended, by what became of their jobs, and what the phases took.
+  /// Returns the numbers of ended runs by the outcome of their jobs, and the cost of each phase.
   DecompositionQueue::Counts ended();
 
-  /// Mean time until a place in a full queue becomes free, in seconds.
+  /// Returns the mean time until a place in a full queue becomes free, in seconds.
   double retry_after_s() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_) {
     return mean_run_s_ / capacity_.worker_count;
   }
@@ -85,7 +85,7 @@ class JobRuns {
   Mutex writer_;
   Mutex ended_mutex_ ABSL_ACQUIRED_AFTER(writer_);
   bool stopping_ ABSL_GUARDED_BY(writer_) = false;
-  double mean_run_s_ ABSL_GUARDED_BY(writer_) = 10;  // until a run has ended
+  double mean_run_s_ ABSL_GUARDED_BY(writer_) = 10;  // a guess until a run has ended
   DecompositionQueue::Counts ended_ ABSL_GUARDED_BY(ended_mutex_);
   PhaseUsage phases_;
   std::unique_ptr<Executor> executor_;

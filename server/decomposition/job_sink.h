@@ -14,7 +14,7 @@ class JobSink {
   /// Receives the present state of a job.
   virtual void Take(const v1::Job& job) = 0;
 
-  /// All jobs that waited or ran were taken; changes follow.
+  /// Called once all jobs that waited or ran were taken. Changes follow.
   virtual void TakeBegin() = 0;
 };
 

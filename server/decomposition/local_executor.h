@@ -13,22 +13,25 @@
 namespace carillon {
 
 struct LocalExecutorOptions {
-  std::filesystem::path program{};    ///< carillon-precompute
-  std::filesystem::path directory{};  ///< of the running tasks' files; emptied by MakeLocalExecutor
-  int worker_count = 0;               ///< 0: half of the processors, at least 1
+  std::filesystem::path program{};  ///< carillon-precompute
+  std::filesystem::path
+      directory{};       ///< for the files of running tasks; MakeLocalExecutor empties it
+  int worker_count = 0;  ///< 0 means half of the processors, at least 1
   int threads_per_worker = 1;
-  uint64_t memory_budget_bytes = 0;  ///< resident memory of all workers; 0: half of the machine's
-  uint64_t memory_limit_bytes = 0;   ///< resident memory of one worker; 0: the whole budget
+  uint64_t memory_budget_bytes =
+      0;  ///< resident memory of all workers; 0 means half of the machine's
+  uint64_t memory_limit_bytes = 0;  ///< resident memory of one worker; 0 means the whole budget
   std::chrono::milliseconds time_limit = std::chrono::hours(6);
-  std::chrono::milliseconds stall_limit = std::chrono::seconds(60);  ///< without any event
+  std::chrono::milliseconds stall_limit =
+      std::chrono::seconds(60);  ///< longest time without an event
 };
 
-/// Runs each decomposition in a child process, as a worker of child_process.h, with limits of
-/// memory and time. One thread starts and watches all workers, because the kernel sends the
-/// parent-death signal when the starting *thread* ends. A second thread makes the calls that wait
-/// for the disk, so that neither a cancel nor progress waits for them. Errors: FailedPrecondition
-/// (WORKER_NOT_FOUND: `program` cannot be executed; DATABASE_UNUSABLE: the directory cannot be
-/// made). `clock` must outlive the executor.
+/// Runs each decomposition in a child process (child_process.h), with limits of memory and time.
+/// One thread starts and watches all workers, because the kernel sends the parent-death signal when
+/// the starting *thread* ends. A second thread makes the calls that wait for the disk, so that they
+/// delay neither progress nor a cancellation. Errors: FailedPrecondition (WORKER_NOT_FOUND:
+/// `program` cannot be executed; DATABASE_UNUSABLE: the directory cannot be made). `clock` must
+/// outlive the executor.
 absl::StatusOr<std::unique_ptr<Executor>> MakeLocalExecutor(const LocalExecutorOptions& options,
                                                             const Clock& clock);
 

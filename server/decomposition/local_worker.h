@@ -17,7 +17,7 @@
 
 namespace carillon {
 
-/// Removes a folder with all that is in it when it goes out of scope.
+/// Removes a folder and its content when it goes out of scope.
 class ScratchFolder {
  public:
   explicit ScratchFolder(std::filesystem::path path) : path_(std::move(path)) {}
@@ -37,7 +37,7 @@ struct WorkerLimits {
   std::chrono::nanoseconds time{};
   std::chrono::nanoseconds stall{};
 
-  /// These limits, with memory and time lowered to the request's where it states less.
+  /// Returns these limits, with memory and time lowered to the request's limits if those are lower.
   WorkerLimits For(const v1::CreateModalModelRequest& request) const;
 };
 
@@ -69,16 +69,16 @@ class LocalWorker {
                                            std::chrono::nanoseconds now);
   const DecompositionTask& task() const { return task_; }
 
-  /// Each becomes readable when there is something to do: the process has ended, or Read finds an
-  /// event or a line of its log. -1: no more of that comes.
+  /// Returns descriptors that become readable when the process has ended, or when Read would find
+  /// an event or a line of the log. A descriptor is -1 if no more input comes from it.
   std::array<int, 3> descriptors() const {
     return {process_.descriptor(), event_pipe_.read_end(), error_pipe_.read_end()};
   }
 
-  /// Reads the output of the process; an event counts as a sign of life at `now`.
+  /// Reads the output of the process. An event counts as a sign of life at `now`.
   void Read(std::chrono::nanoseconds now);
 
-  /// Kills the process if it exceeds a limit. Returns its memory in RAM, bytes.
+  /// Kills the process if it exceeds a limit. Returns the resident memory of the process, bytes.
   uint64_t Enforce(std::chrono::nanoseconds now);
 
   void Cancel() { Kill(Verdict::kCancelled, {}); }
@@ -86,7 +86,7 @@ class LocalWorker {
   /// Kills the process because all workers together exceed `budget_bytes`.
   void MakeRoom(uint64_t budget_bytes);
 
-  /// The outcome, once the process has ended.
+  /// Returns the outcome once the process has ended.
   std::optional<Outcome> TakeOutcome(std::chrono::nanoseconds now);
 
  private:
@@ -113,16 +113,16 @@ class LocalWorker {
   Pipe error_pipe_;
   ChildProcess process_;
   WorkerLimits limits_;
-  uint64_t resident_bytes_ = 0;  // when it was last asked for
+  uint64_t resident_bytes_ = 0;  // as measured last
   uint64_t peak_bytes_ = 0;
   uint32_t node_count_ = 0;
   std::chrono::nanoseconds started_;
   std::chrono::nanoseconds last_event_;
   WorkerEventReader events_;
   uint64_t event_byte_count_ = 0;
-  std::string log_;  // the end of its standard error
+  std::string log_;  // the end of the process's standard error
   double fraction_ = 0;
-  std::optional<v1::ErrorInfo> reported_;  // by the worker itself
+  std::optional<v1::ErrorInfo> reported_;  // error that the worker itself reported
   std::optional<Outcome> killed_;          // the outcome if this class killed it
 };
 

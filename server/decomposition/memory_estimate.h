@@ -7,27 +7,29 @@
 
 namespace carillon {
 
-/// A guess of the number of nodes of a resolved request's mesh, from its settings and the size of
-/// the mesh file. The daemon never parses the file.
+/// Estimates the number of mesh nodes of a resolved request from its settings and the size of the
+/// mesh file. The daemon never parses the file.
 double GuessNodeCount(const v1::CreateModalModelRequest& resolved, uint64_t mesh_bytes);
 
-/// Predicted memory of a decomposition with n nodes, bytes: 30 MB + 650 n^(4/3), the fill-in of the
-/// factor of a solid body. Fitted to bars of 3000 to 75000 nodes, with errors below 25 %.
+/// Returns the predicted memory of a decomposition with n nodes, bytes: 30 MB + 650 n^(4/3), where
+/// the second term is the fill-in of a solid body's factor. The constants were fitted to bars of
+/// 3000 to 75000 nodes, with errors below 25 %.
 uint64_t MemoryOfNodes(double node_count);
 
-/// Corrects memory estimates by the memory that decompositions took. One thread at a time.
+/// Corrects memory estimates by the memory that earlier decompositions took. One thread at a time.
 class MemoryExperience {
  public:
-  /// `correction`: the result of an earlier run of the daemon.
+  /// `correction` is the result of an earlier run of the daemon.
   explicit MemoryExperience(double correction = 1);
 
-  /// A decomposition with the uncorrected estimate `estimate_bytes` took `seen_bytes`.
+  /// Notes that a decomposition with the uncorrected estimate `estimate_bytes` took `seen_bytes`.
   void Learn(uint64_t estimate_bytes, uint64_t seen_bytes);
 
-  /// The estimate times the correction.
+  /// Returns the estimate times the correction.
   uint64_t Corrected(uint64_t estimate_bytes) const;
 
-  /// Geometric mean of seen over estimated memory of about the last ten decompositions, 0.1 to 10.
+  /// Returns the geometric mean, over about the last ten decompositions, of the ratio of memory
+  /// taken to memory estimated; 0.1 to 10.
   double correction() const { return correction_; }
 
  private:

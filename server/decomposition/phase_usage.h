@@ -16,7 +16,7 @@ namespace carillon {
 /// The cost of one phase in all jobs since the daemon started.
 struct PhaseUse {
   double seconds = 0;
-  uint64_t peak_bytes = 0;  ///< largest memory of one worker within the phase; 0: unknown
+  uint64_t peak_bytes = 0;  ///< largest memory of one worker within the phase; 0 if unknown
 };
 
 using PhaseUses = std::array<PhaseUse, v1::Phase_ARRAYSIZE>;
@@ -25,14 +25,15 @@ using PhaseUses = std::array<PhaseUse, v1::Phase_ARRAYSIZE>;
 /// every thread.
 class PhaseUsage {
  public:
-  /// The job `digest` reports progress at `now`: until then it was in the phase reported before.
+  /// Notes that the job `digest` reports progress at `now`. The time since its last report counts
+  /// for the phase of that report.
   void Report(const std::string& digest, const v1::Progress& progress,
               std::chrono::nanoseconds now);
 
-  /// The run of the job has ended.
+  /// Notes that the run of the job has ended.
   void End(const std::string& digest, std::chrono::nanoseconds now);
 
-  /// By the number of the phase.
+  /// Returns the costs by the number of the phase.
   PhaseUses uses() const;
 
  private:

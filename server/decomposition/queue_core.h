@@ -23,13 +23,13 @@ namespace carillon {
 
 /// Implements DecompositionQueue, whose calls are documented there.
 ///
-/// A job that waits or runs is in `jobs_` and, as JOB_STATE_QUEUED, in the database; a job that has
-/// ended is in the database only. Running jobs stay JOB_STATE_QUEUED there, because a daemon that
-/// starts has to run them anyway.
+/// A job that waits or runs is in `jobs_` and in the database; a job that has ended is in the
+/// database only. The database has running jobs as JOB_STATE_QUEUED, too, because the next daemon
+/// has to run them again.
 ///
 /// Calls that change jobs hold the writer's lock of `runs_`, also while the database writes. They
-/// store a change first and show it in `jobs_` second. Get, List, Watch and Forget take no lock but
-/// the one of `jobs_`, which is never held across an access to the disk.
+/// store a change before they show it in `jobs_`. Get, List, Watch and Forget lock only `jobs_`,
+/// whose lock is never held during an access to the disk.
 class QueueCore {
  public:
   QueueCore(ModeDatabase& database, std::unique_ptr<Executor> executor, const Clock& clock,
@@ -43,7 +43,7 @@ class QueueCore {
 
   /// Queues the unfinished jobs of an earlier run of the daemon.
   absl::Status TakeUp();
-  /// Ends running workers; no watcher is told of a change afterwards.
+  /// Ends running workers. Watchers learn of no change afterwards.
   void Stop();
 
   absl::StatusOr<v1::Job> Submit(const v1::CreateModalModelRequest& request,

@@ -9,7 +9,7 @@
 
 namespace carillon {
 
-/// Unpredictable hexadecimal digits from the system's random source, eight for each word.
+/// Returns unpredictable hexadecimal digits from the system's random source, eight for each word.
 inline std::string RandomDigits(int word_count) {
   std::random_device random;
   std::string digits;

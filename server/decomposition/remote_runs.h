@@ -32,14 +32,13 @@ class RunUpload {
   /// ResourceExhausted (DATABASE_FULL).
   absl::Status Append(const v1::ModalModelRecord& record);
 
-  /// Append for the result of a job that computes a transfer. Errors: ResourceExhausted
+  /// Appends to the result of a job that computes a transfer. Errors: ResourceExhausted
   /// (DATABASE_FULL).
   absl::Status Append(const v1::TransferRecord& record);
 
-  /// Ends the run: its result is on the disk and is accepted, and its token is invalid from now on.
-  /// Call once, last.
-  /// Errors: those of Append and of RemoteRuns, InvalidArgument (TRANSFER_MALFORMED), DataLoss
-  /// (TRANSFER_CORRUPT).
+  /// Ends the run, after which its result is on the disk and accepted, and its token is invalid.
+  /// Must be the last call. Errors: those of Append and of RemoteRuns, InvalidArgument
+  /// (TRANSFER_MALFORMED), DataLoss (TRANSFER_CORRUPT).
   absl::Status Finish(const v1::RunEnd& end);
 
  private:
@@ -52,27 +51,27 @@ class RunUpload {
   std::unique_ptr<State> state_;
 };
 
-/// Runs of jobs on machines that share no folder with this one. Each run shows a token, of which
-/// the daemon keeps only the hash. A token is valid for one submission of one job, until that has
-/// ended or has delivered a result. Results go into the job's folder, which slurm_task.h describes.
-/// Errors of every call with a token: PermissionDenied (JOB_TOKEN_WRONG), FailedPrecondition
-/// (JOB_TOKEN_EXPIRED, JOB_TOKEN_USED). Safe from every thread.
+/// Runs of jobs on machines that share no folder with this one. Each run shows a token; the daemon
+/// keeps only its hash. A token is valid for one submission of one job, until the job has ended or
+/// has a result. Results go into the job's folder, which slurm_task.h describes. Errors of every
+/// call with a token: PermissionDenied (JOB_TOKEN_WRONG), FailedPrecondition (JOB_TOKEN_EXPIRED,
+/// JOB_TOKEN_USED). Safe from every thread.
 class RemoteRuns {
  public:
-  /// A token that nobody can guess.
+  /// Returns a token that nobody can guess.
   static std::string NewToken();
 
-  /// The hash that the daemon keeps of a token, bound to its job.
+  /// Returns the hash of a token and the digest of its job, which the daemon keeps.
   static std::string HashOf(const std::string& digest, const std::string& token);
 
-  /// Admits the run whose token has that hash, and from now on no other run of the job.
+  /// Admits the run whose token has this hash, and from then on no other run of the job.
   void Admit(const std::string& digest, const std::filesystem::path& folder,
              const std::string& token_hash);
 
-  /// Admits no run of the job any more.
+  /// Refuses all runs of the job from then on.
   void Dismiss(const std::string& digest);
 
-  /// Counts a run as begun. Returns the file with its mesh.
+  /// Notes that a run has begun. Returns the path of its mesh file.
   absl::StatusOr<std::filesystem::path> Begin(const std::string& digest, const std::string& token);
 
   absl::Status Report(const std::string& digest, const std::string& token,

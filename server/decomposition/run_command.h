@@ -12,8 +12,8 @@ struct CommandResult {
   std::string output;
 };
 
-/// Runs a program of the search path to its end, with `input` on its standard input. It is killed
-/// after half a minute.
+/// Runs a program of the search path to its end, with `input` on its standard input. Kills the
+/// program after half a minute.
 CommandResult RunCommand(const std::vector<std::string>& command, const std::string& input = "");
 
 }  // namespace carillon

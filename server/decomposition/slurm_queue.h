@@ -8,7 +8,7 @@
 
 namespace carillon {
 
-/// Slurm's state of the jobs of one name and ticket.
+/// The state, according to Slurm, of the jobs with one name and ticket.
 enum class SlurmState {
   kWaitsOrRuns,
   kCompleted,
@@ -23,7 +23,7 @@ enum class SlurmState {
 struct SlurmJob {
   std::string name;
   std::string ticket;
-  std::string script{};  ///< its text
+  std::string script{};  ///< the text of the script
   std::string partition;
   int thread_count = 1;
   uint64_t memory_bytes = 0;
@@ -36,16 +36,19 @@ using SlurmJobs = std::map<std::pair<std::string, std::string>, SlurmState>;
 /// Parses the output of `squeue` in the format "%j|%k|%T|%r", or of sacct, which lacks the reason.
 SlurmJobs ParseSqueue(const std::string& output);
 
-/// All jobs in the queue and those that ended lately; absent if the controller does not answer.
+/// Returns all jobs in the queue and those that ended lately, or nothing if the controller does not
+/// answer.
 std::optional<SlurmJobs> ReadSqueue();
 
-/// The accounting's state of a job that the queue has forgotten; absent if it has no record.
+/// Returns the state that Slurm's accounting has for a job that has left the queue, or nothing if
+/// it has no record of the job.
 std::optional<SlurmState> ReadSacct(const std::string& name, const std::string& ticket);
 
-/// Submits the job. False does not exclude that the controller took it: its answer may be lost.
+/// Submits the job. Even if this returns false, the controller may have taken the job, because its
+/// answer may have been lost.
 bool Submit(const SlurmJob& job);
 
-/// Cancels every job of a name if the controller answers.
+/// Cancels every job with this name if the controller answers.
 void CancelByName(const std::string& name);
 
 }  // namespace carillon

@@ -15,7 +15,7 @@
 
 namespace carillon {
 
-/// One decomposition in a folder that the cluster shares, or that RemoteRuns fills for it:
+/// The files of one decomposition, in a folder that the cluster shares or that RemoteRuns fills:
 ///
 ///     ticket     the name of this submission, and the hash of its token if it has one
 ///     request    v1::WorkerRequest as text; if it differs from the current request, the folder is
@@ -25,10 +25,10 @@ namespace carillon {
 ///     log.R      its standard error       model.R    its result
 ///     end        "R STATUS": the first run to end; the others' links fail
 ///
-/// One thread.
+/// One thread at a time.
 class SlurmTask {
  public:
-  /// Makes the folder, or takes up one with the same request that an earlier daemon left.
+  /// Makes the folder, or takes over a folder with the same request that an earlier daemon left.
   /// Errors: those of write_input, FailedPrecondition (DATABASE_UNUSABLE).
   static absl::StatusOr<SlurmTask> Prepare(DecompositionTask task,
                                            const SlurmExecutorOptions& options, RemoteRuns& runs);
@@ -36,24 +36,26 @@ class SlurmTask {
   const DecompositionTask& task() const { return task_; }
   const SlurmJob& job() const { return job_; }
 
-  /// The job to submit now, with a ticket of its own. Where its run is to upload, it has a token of
-  /// its own, too, and that of any earlier submission is worth nothing. Errors: FailedPrecondition
+  /// Returns the job to submit, with a new ticket. If its run is to upload, the job has a new
+  /// token, too, and the tokens of earlier submissions become invalid. Errors: FailedPrecondition
   /// (DATABASE_UNUSABLE).
   absl::StatusOr<SlurmJob> NextSubmission();
 
-  /// Tells progress that runs have reported since the last call.
+  /// Calls on_progress with the progress that runs have reported since the last call.
   void ReadProgress();
 
-  /// The outcome, once a run has ended.
+  /// Returns the outcome once a run has ended.
   std::optional<Outcome> TakeEnd() const;
 
-  /// The outcome of a job that left the queue without an end, if there is no hope in another run.
+  /// Returns the outcome of a job that left the queue without a result, if another run would not
+  /// succeed either.
   std::optional<Outcome> JudgeLoss(std::optional<SlurmState> state) const;
 
-  /// Lets its runs bring nothing more, and removes the folder.
+  /// Refuses further uploads of the task's runs, and removes the folder.
   void Remove() const;
 
-  /// Lets runs in whose jobs an earlier daemon left in `directory`, before any task is prepared.
+  /// Admits the runs of jobs that an earlier daemon left in `directory`. Called before any task is
+  /// prepared.
   static void AdmitLeft(const std::filesystem::path& directory, RemoteRuns& runs);
 
  private:

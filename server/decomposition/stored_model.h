@@ -14,22 +14,23 @@
 
 namespace carillon {
 
-/// Functions that compare what is stored with what a job is to compute.
+/// Functions that compare stored models and transfers with those that a job is to compute.
 
-/// Whether the stored model is complete up to the eigenvalue that the request wants, or up to where
-/// an earlier job (`record`) that wanted as much could go. A model whose band was lowered satisfies
-/// every request that leaves the band open. Errors: those of ModelStore::Summary but
-/// for a model that is missing or damaged, which satisfies nobody.
+/// Returns whether the stored model satisfies the request. It does if it is complete up to the
+/// wanted eigenvalue, or if an earlier job (`record`) that wanted this eigenvalue or a higher one
+/// has succeeded. A model whose band was lowered satisfies every request that leaves the band open,
+/// and no other. A missing or damaged model satisfies no request. Errors: the others of
+/// ModelStore::Summary.
 absl::StatusOr<bool> IsSatisfied(ModelStore& models, const std::string& digest,
                                  const std::optional<JobRecord>& record,
                                  const v1::CreateModalModelRequest& request);
 
-/// The same for any job. A stored transfer satisfies who wants one of its step of the speed ratio
-/// that is no more exact and reaches no farther.
+/// Returns the same for any job. A stored transfer satisfies a job for its step of the speed ratio
+/// that wants neither more accuracy nor a higher eigenvalue.
 absl::StatusOr<bool> IsSatisfied(ModeDatabase& database, const WantedJob& wanted,
                                  const std::optional<JobRecord>& record);
 
-/// Whether the stored model is only the coarse one that the request wants first.
+/// Returns whether the stored model is only the coarse model that the request wants first.
 bool HasCoarseModel(ModelStore& models, const std::string& digest,
                     const v1::CreateModalModelRequest& request);
 

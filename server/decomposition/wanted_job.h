@@ -9,27 +9,29 @@
 
 namespace carillon {
 
-/// A job that somebody asked for.
+/// A job that a client asked for.
 struct WantedJob {
   std::string digest;  ///< the job's name
-  /// Resolved. A transfer has the use that the body is meant for: material, size, band and limits.
+  /// The resolved request. For a transfer, it states the use of the body: material, size, band and
+  /// limits.
   v1::CreateModalModelRequest request;
-  std::string transfer_of{};  ///< as JobRecord::transfer_of
-  std::string client{};       ///< who asked; see ActiveJob
+  std::string transfer_of{};  ///< see JobRecord::transfer_of
+  std::string client{};       ///< the client that asked; see ActiveJob
 };
 
-/// The decomposition that a resolved request asks for.
+/// Returns the decomposition that a resolved request asks for.
 WantedJob WantedModel(const v1::CreateModalModelRequest& resolved);
 
-/// The transfer that follows the model of a resolved request, which is stored as `model`. The job
-/// is named by the model's digest and the step of the speed ratio.
+/// Returns the transfer to compute after the model of a resolved request, which is stored as
+/// `model`. The model's digest and the step of the speed ratio name the job.
 WantedJob WantedTransfer(const std::string& model, const v1::CreateModalModelRequest& resolved);
 
-/// The transfer of the stored model `model` that a client asks for. Errors: those of ResolveUse.
+/// Returns the transfer of the stored model `model` that a client asks for. Errors: those of
+/// ResolveUse.
 absl::StatusOr<WantedJob> WantedTransfer(const std::string& model,
                                          const v1::CreateTransferRequest& request);
 
-/// The step of the speed ratio for the material of a resolved request.
+/// Returns the step of the speed ratio for the material of a resolved request.
 int64_t SpeedStepOf(const v1::CreateModalModelRequest& resolved);
 
 }  // namespace carillon

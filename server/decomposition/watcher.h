@@ -13,13 +13,14 @@
 
 namespace carillon {
 
-/// Calls a function with each change of a job: in order, one call at a time, none after Close.
+/// Calls a function with each change of a job, in order, one call at a time, and not after Close.
 class Watcher {
  public:
   explicit Watcher(std::function<void(const v1::Job&)> on_change)
       : on_change_(std::move(on_change)) {}
 
-  /// Calls the function with `job`, unless it has had a newer version. Versions count from 1.
+  /// Calls the function with `job`, unless the function has had a newer version. Versions count
+  /// from 1.
   void Tell(const v1::Job& job, uint64_t version) {
     const RecursiveMutexLock lock(&mutex_);
     if (closed_ || version <= told_) return;
@@ -27,7 +28,7 @@ class Watcher {
     on_change_(job);
   }
 
-  /// Returns when no call is running; none follows.
+  /// Waits until no call is running, and prevents further calls.
   void Close() {
     const RecursiveMutexLock lock(&mutex_);
     closed_ = true;
@@ -41,7 +42,7 @@ class Watcher {
   const std::function<void(const v1::Job&)> on_change_;
 };
 
-/// A change of a job, of which its watchers learn when no lock is held.
+/// A change of a job, kept until no lock is held and its watchers can be called.
 struct Notice {
   std::vector<std::shared_ptr<Watcher>> watchers;
   v1::Job job;

@@ -11,7 +11,7 @@
 
 namespace carillon {
 
-/// Where one decomposition reads and writes, and how many threads it may use.
+/// The files that one decomposition reads and writes, and the number of its threads.
 struct WorkerPlace {
   std::filesystem::path program;
   std::filesystem::path mesh_file;
@@ -20,18 +20,18 @@ struct WorkerPlace {
   int thread_count = 1;
 };
 
-/// The ways there are to compute one request: as asked; meshing with more caution; with the surface
-/// repaired, too.
+/// Number of ways to compute one request: 0 as asked, 1 with more cautious meshing, 2 with the
+/// surface repaired, too.
 constexpr uint32_t kWayCount = 3;
 
-/// The request to carillon-precompute for a task, computed in the task's way (below kWayCount): a
+/// Returns the request to carillon-precompute for a task and its way (below kWayCount), as a
 /// v1::WorkerRequest in protobuf's text form.
 std::string WorkerRequestFile(const DecompositionTask& task);
 
 /// Writes WorkerRequestFile to `file`. Errors: FailedPrecondition (DATABASE_UNUSABLE).
 absl::Status WriteWorkerRequest(const DecompositionTask& task, const std::filesystem::path& file);
 
-/// The command line of carillon-precompute, which reports to descriptor 3.
+/// Returns the command line of carillon-precompute, which writes its events to descriptor 3.
 std::vector<std::string> WorkerCommand(const WorkerPlace& place);
 
 }  // namespace carillon

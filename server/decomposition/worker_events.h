@@ -26,7 +26,7 @@ class WorkerEventReader {
   std::string pending_;
 };
 
-/// The bytes of an event on the pipe.
+/// Returns the bytes of an event on the pipe.
 std::string Delimited(const v1::WorkerEvent& event);
 
 }  // namespace carillon
