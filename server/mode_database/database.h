@@ -16,30 +16,32 @@
 
 namespace carillon {
 
-/// The SQLite file with its schema: one writer at a time, readers on connections of their own. Safe
-/// from every thread.
+/// The SQLite file with its schema. There is one writer at a time; each reader has its own
+/// connection. Safe from every thread.
 class Database {
  public:
-  /// As ModeDatabase::Open.
+  /// Opens the file. See ModeDatabase::Open.
   static absl::StatusOr<std::unique_ptr<Database>> Open(const std::filesystem::path& file);
 
-  /// Runs `body` in one transaction. It is committed and on the disk when this returns OK, and
-  /// rolled back if `body` fails.
+  /// Runs `body` in one transaction. The transaction is committed and on the disk when Write
+  /// returns OK, and rolled back if `body` fails.
   absl::Status Write(absl::FunctionRef<absl::Status(SqliteConnection&)> body);
 
-  /// As Write, for a change that frees space: where the disk is full, it makes room for the change
-  /// first, and runs `body` again.
+  /// Runs `body`, which frees space, as Write does. If the disk is full, makes room for the change
+  /// and runs `body` again.
   absl::Status WriteToFree(absl::FunctionRef<absl::Status(SqliteConnection&)> body);
 
-  /// Errors: FailedPrecondition (DATABASE_LOST), from which on every Write fails so.
+  /// Checks that the files are in place. Errors: FailedPrecondition (DATABASE_LOST), after which
+  /// every Write fails with this error, too.
   absl::Status CheckFiles() { return files_.Check(); }
 
-  /// Gives some free pages back to the disk if they are more than a quarter of the file, and renews
-  /// the reserve for a full disk. Files of older programs do not shrink before `db repair`.
+  /// Gives some free pages back to the disk if at least a quarter of the file is free, and renews
+  /// the reserve for a full disk. A file that an older program made shrinks only after `db repair`.
   absl::Status Tidy();
 
-  /// Says how many changes were acknowledged once and are not in the file that was opened, because
-  /// its write-ahead log was removed or it is an older copy; empty if none.
+  /// Returns a text with the number of changes that were acknowledged once but are missing from the
+  /// opened file, because its write-ahead log was removed or the file is an older copy. Empty if no
+  /// change is missing.
   std::string MissingChanges() const;
 
   /// Runs `body` on one snapshot of the database.
@@ -48,7 +50,7 @@ class Database {
   /// Runs `body` on a connection of its own, for statements that SQLite refuses in a transaction.
   absl::Status ReadOutsideTransaction(absl::FunctionRef<absl::Status(SqliteConnection&)> body);
 
-  /// The folder for files that wait for a transaction: it is on the same disk.
+  /// The folder, on the same disk, for files that wait for a transaction.
   std::filesystem::path folder() const { return file_.parent_path(); }
   const std::filesystem::path& file() const { return file_; }
 

@@ -33,19 +33,19 @@ absl::StatusOr<DatabaseStats> ReadStats(Database& database);
 /// on. Errors: ResourceExhausted (DATABASE_FULL), FailedPrecondition (DATABASE_UNUSABLE).
 absl::Status BackUp(Database& database, const std::filesystem::path& copy);
 
-/// Takes the faults that a check has found, a line for each.
+/// Takes the faults that a check finds, one line for each.
 using OnFinding = std::function<void(const std::string& line)>;
 
-/// The calls below work on a file that no daemon has open.
+/// The functions below work on a file that no daemon has open.
 
 /// Checks SQLite's structure, every hash of every model, the digest of every mesh and every job.
 /// Writes nothing. Errors: as ModeDatabase::Open; DataLoss (DATABASE_CORRUPT) if the structure
 /// cannot be read.
 absl::Status CheckDatabase(const std::filesystem::path& file, const OnFinding& on_finding);
 
-/// Copies every undamaged model, mesh and job into a new database, which replaces the old one; the
-/// old one is kept as `file`.damaged. `on_finding` gets each row that is left out.
-/// Errors: FailedPrecondition (DATABASE_UNUSABLE), ResourceExhausted (DATABASE_FULL).
+/// Copies every undamaged model, mesh and job into a new database, which replaces the old one.
+/// Keeps the old database as `file`.damaged. `on_finding` gets each row that is left out. Errors:
+/// FailedPrecondition (DATABASE_UNUSABLE), ResourceExhausted (DATABASE_FULL).
 absl::Status RepairDatabase(const std::filesystem::path& file, const OnFinding& on_finding);
 
 /// Replaces the database by a copy that BackUp made, after a check of the copy. The old database is

@@ -13,10 +13,10 @@
 
 namespace carillon {
 
-/// Reads the readable part of a damaged database.
+/// Functions that read the undamaged part of a database.
 
-/// Returns the digests in `table` that can be read from its start and from its end. `on_finding`
-/// gets an error in between.
+/// Returns the digests that can be read from the start and from the end of `table`. `on_finding`
+/// gets the error that separates both parts.
 inline std::vector<std::string> Names(Database& database, const std::string& table,
                                       const std::function<void(const std::string&)>& on_finding) {
   std::vector<std::string> names;

@@ -13,17 +13,19 @@
 
 namespace carillon {
 
-/// Watches a database file and its write-ahead log from outside of SQLite, which goes on writing to
-/// files that somebody has removed or replaced. Safe from every thread.
+/// Watches a database file and its write-ahead log, because SQLite itself goes on writing to files
+/// that somebody has removed or replaced. Safe from every thread.
 class DatabaseFiles {
  public:
   explicit DatabaseFiles(const std::filesystem::path& file) : file_(file) {}
 
-  /// Takes the sizes after a write of our own for the right ones. Errors: FailedPrecondition
-  /// (DATABASE_LOST: a file is another one than before); it stays so from then on.
+  /// Remembers the present sizes as correct. Must be called after each write of the daemon. Errors:
+  /// FailedPrecondition (DATABASE_LOST: a file was removed or replaced). All later calls return
+  /// this error, too.
   absl::Status Remember();
 
-  /// Errors: as above, and if a file is smaller than at the last Remember.
+  /// Checks both files. Errors: FailedPrecondition (DATABASE_LOST: a file was removed or replaced,
+  /// or is smaller than at the last Remember).
   absl::Status Check();
 
  private:
@@ -44,18 +46,19 @@ class DatabaseFiles {
   bool lost_ ABSL_GUARDED_BY(mutex_) = false;
 };
 
-/// The number of committed changes, in a file beside the database. A database that has fewer has
-/// lost its write-ahead log, or is an older copy. The file is written without waiting for the disk:
-/// after a loss of power it may count fewer changes than the database, but never more.
+/// The number of committed changes, in a file beside the database. A database with fewer changes
+/// has lost its write-ahead log or is an older copy. The daemon does not wait until the file is on
+/// the disk. After a loss of power the file may therefore count fewer changes than the database
+/// has, but never more.
 class ChangeCount {
  public:
-  /// `file`: the database's.
+  /// `file` is the database file.
   explicit ChangeCount(const std::filesystem::path& file);
   ~ChangeCount();
   ChangeCount(const ChangeCount&) = delete;
   ChangeCount& operator=(const ChangeCount&) = delete;
 
-  /// The count in the file; zero if there is none.
+  /// Returns the count in the file, or zero if the file has no count.
   int64_t Read() const;
 
   void Write(int64_t count) const;
@@ -64,13 +67,14 @@ class ChangeCount {
   int descriptor_;
 };
 
-/// Space on the disk that is given up when the disk is full, so that models can still be deleted.
+/// A file that reserves space on the disk. It is removed when the disk is full, so that models can
+/// still be deleted.
 class DiskReserve {
  public:
-  /// `file`: the database's; the reserve lies beside it.
+  /// `file` is the database file. The reserve is in the same folder.
   explicit DiskReserve(const std::filesystem::path& file);
 
-  /// Takes 16 MiB, unless it has them already or the disk has little more.
+  /// Reserves 16 MiB, unless they are reserved already or the disk has less than 64 MiB free.
   void Take() const;
 
   void Release() const;
@@ -79,10 +83,10 @@ class DiskReserve {
   const std::filesystem::path file_;
 };
 
-/// A new name beside the database for a backup in progress.
+/// Returns a new file name in the database's folder for a backup in progress.
 std::filesystem::path NewBackupFile(const std::filesystem::path& file);
 
-/// Removes the backups that a killed process has left.
+/// Removes the unfinished backups that a killed process has left.
 void RemoveUnfinishedBackups(const std::filesystem::path& file);
 
 }  // namespace carillon

@@ -10,12 +10,12 @@
 
 namespace carillon {
 
-/// A thread that looks after the files of a database once a second: whether they are still there,
-/// and whether the database can shrink.
+/// A thread that checks once a second that the files of a database are in place, and gives free
+/// pages back to the disk.
 class DatabaseKeeper {
  public:
-  /// Takes the result of Database::CheckFiles: the first, and each that differs from the one
-  /// before.
+  /// Takes the first result of Database::CheckFiles, and each result that differs from the previous
+  /// one.
   using Observer = std::function<void(const absl::Status& files)>;
 
   /// `database` must outlive the keeper.

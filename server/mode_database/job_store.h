@@ -16,57 +16,62 @@ class Database;
 
 /// A job as it is stored.
 struct JobRecord {
-  std::string digest{};  ///< the modal model's, or of a job that computes a transfer its own
-  /// Digest of the modal model whose transfer the job computes; empty: it computes a model.
+  std::string digest{};  ///< the modal model's; a job that computes a transfer has its own digest
+  /// Digest of the modal model whose transfer the job computes; empty if the job computes a model.
   std::string transfer_of{};
-  std::string request{};  ///< serialized by the caller, who alone interprets it
+  std::string request{};  ///< serialized by the caller; the store does not read it
   std::string label{};
   v1::JobState state = v1::JOB_STATE_QUEUED;
   v1::ErrorInfo error{};  ///< while `state` is JOB_STATE_FAILED
-  /// The job has failed, and the same request would fail again: it is refused with `error`, and is
-  /// not run again.
+  /// Whether the job has failed so that the same request would fail again. Such a request is
+  /// refused with `error` and not run again.
   bool remembered = false;
   int64_t created_unix_ms = 0;
-  int32_t priority = 0;      ///< higher starts first
-  uint32_t start_count = 0;  ///< workers started since the last submit that have not ended
-  uint32_t way = 0;          ///< 0: computed as requested; above: by another way, see kWayCount
-  uint64_t peak_bytes = 0;   ///< peak memory of its worker; 0: none has ended yet
-  /// The row has changed on the disk: only `digest` is right, and `state` and `error` report it.
+  int32_t priority = 0;  ///< higher starts first
+  uint32_t start_count =
+      0;  ///< workers started since the last submission that have not reported an end
+  uint32_t way =
+      0;  ///< 0 if computed as requested; otherwise the number of another way, see kWayCount
+  uint64_t peak_bytes = 0;  ///< peak memory of the job's worker; 0 until a worker has ended
+  /// Whether the row was damaged on the disk. Only `digest` is then valid; `state` and `error`
+  /// report the damage.
   bool damaged = false;
 };
 
-/// The jobs that a list is to have.
+/// Selects the jobs of a list.
 struct JobFilter {
-  std::vector<v1::JobState> states{};  ///< none: any
-  std::string label_contains{};        ///< in upper or lower case; empty: any
+  std::vector<v1::JobState> states{};  ///< if empty, jobs in all states
+  std::string label_contains{};        ///< in upper or lower case; if empty, all jobs
 };
 
 struct JobPage {
   std::vector<JobRecord> jobs;
-  std::string next_page_token;  ///< empty: this was the last page
+  std::string next_page_token;  ///< empty after the last page
 };
 
-/// Jobs by digest, so that they outlive the daemon. Safe from every thread.
+/// Stores jobs by digest, so that they outlive the daemon. Safe from every thread.
 class JobStore {
  public:
   explicit JobStore(Database& database) : database_(&database) {}
 
-  /// Writes a job, durably; replaces one of the same digest.
+  /// Writes a job durably; replaces a job with the same digest.
   absl::Status Put(const JobRecord& job);
 
   absl::StatusOr<std::optional<JobRecord>> Find(const std::string& digest);
 
-  /// Queued, running and damaged jobs, oldest first.
+  /// Returns the queued, running and damaged jobs, oldest first.
   absl::StatusOr<std::vector<JobRecord>> Unfinished();
 
-  /// Newest first. `page_size` 0: 100; at most 1000. Errors: InvalidArgument (INVALID_PAGE).
+  /// Returns the jobs newest first, up to 1000 a page; a `page_size` of 0 means 100. Errors:
+  /// InvalidArgument (INVALID_PAGE).
   absl::StatusOr<JobPage> List(int page_size, const std::string& page_token,
                                const JobFilter& filter = {});
 
-  /// Deleting a job that is not there is no error.
+  /// Deletes a job. It is not an error if the job does not exist.
   absl::Status Delete(const std::string& digest);
 
-  /// A named value that the daemon learnt from jobs; absent until it is first stored.
+  /// Returns a named value that the daemon learnt from jobs, or nothing before the value is first
+  /// stored.
   absl::StatusOr<std::optional<std::string>> Fact(const std::string& name);
   absl::Status PutFact(const std::string& name, const std::string& value);
 

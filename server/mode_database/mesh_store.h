@@ -30,8 +30,8 @@ class MeshUpload {
   /// Appends the next bytes. Errors: ResourceExhausted (MESH_TOO_LARGE: over 256 MiB in all).
   absl::Status Append(std::string_view bytes);
 
-  /// Stores the mesh, durably, unless it is stored already. Call once, last.
-  /// Errors: InvalidArgument (MESH_EMPTY).
+  /// Stores the mesh durably, unless it is stored already. Must be the last call. Errors:
+  /// InvalidArgument (MESH_EMPTY).
   absl::StatusOr<StoredMesh> Finish();
 
  private:
@@ -46,18 +46,18 @@ class MeshUpload {
   uint64_t byte_count_ = 0;
 };
 
-/// The mesh files that a collection of garbage deleted.
+/// The mesh files that a garbage collection deleted.
 struct CollectedMeshes {
   uint64_t mesh_count = 0;
   uint64_t bytes = 0;
 };
 
-/// Mesh files, as bytes, under their SHA-256. Safe from every thread.
+/// Stores mesh files as bytes under their SHA-256. Safe from every thread.
 class MeshStore {
  public:
   static constexpr uint64_t kMaxByteCount = 256ULL << 20;
 
-  /// A mesh that no model and no job refers to is kept this long after its last upload, because a
+  /// The time for which a mesh without a model and a job is kept after its last upload, because a
   /// request for its model may follow.
   static constexpr std::chrono::hours kUnusedLife{24};
 
@@ -71,9 +71,9 @@ class MeshStore {
   /// Errors: NotFound (MESH_NOT_FOUND).
   absl::StatusOr<StoredMesh> Find(const std::string& digest);
 
-  /// Writes the mesh to a new file that only its owner may read.
-  /// Errors: NotFound (MESH_NOT_FOUND), DataLoss (MESH_CORRUPT: its bytes no longer have its
-  /// digest; it is deleted, so that it can be stored anew).
+  /// Writes the mesh to a new file that only its owner may read. Errors: NotFound (MESH_NOT_FOUND),
+  /// DataLoss (MESH_CORRUPT: the stored bytes do not match the digest; the mesh is deleted, so that
+  /// it can be stored again).
   absl::Status WriteFile(const std::string& digest, const std::filesystem::path& file);
 
   /// Deletes meshes that no model and no job refers to, a day after their last upload; a dry run

@@ -10,12 +10,12 @@
 
 namespace carillon {
 
-/// A modal model in the server's memory: unit Young's modulus, density and size (see
-/// proto/carillon/v1/modal_model.proto for every array and how it scales). Immutable once made,
-/// shared by all objects that sound with it.
+/// A modal model in the server's memory, for unit Young's modulus, density and size.
+/// proto/carillon/v1/modal_model.proto states how each array scales. A model is immutable, and all
+/// objects that sound with it share it.
 struct ModalModel {
   std::string digest;
-  int64_t revision = 0;  ///< as it is stored; see ModelSummary
+  int64_t revision = 0;  ///< revision of the stored model; see ModelSummary
   double poisson_ratio = 0;
   /// The model has every deformation mode up to this eigenvalue.
   double complete_to_eigenvalue = 0;
@@ -24,7 +24,7 @@ struct ModalModel {
   /// The sounding surface: #V vertices in metres, #T triangles, counter-clockwise from outside.
   std::vector<std::array<float, 3>> vertices;
   std::vector<std::array<uint32_t, 3>> triangles;
-  /// #T: the triangle of the given surface in which each triangle lies.
+  /// #T: for each triangle, the triangle of the given surface on which it lies.
   std::vector<uint32_t> given_triangle;
   /// The given surface: #G vertices in metres, #H triangles.
   std::vector<std::array<float, 3>> given_vertices;

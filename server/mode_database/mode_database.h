@@ -15,14 +15,14 @@ namespace carillon {
 
 class Database;
 
-/// Meshes, modal models, transfers and jobs in one SQLite file. A change survives kill -9 and power
-/// failure once its call has returned OK (WAL, synchronous=FULL). Safe from every thread.
+/// Meshes, modal models, transfers and jobs in one SQLite file. Once a call has returned OK, its
+/// change survives kill -9 and power failure (WAL, synchronous=FULL). Safe from every thread.
 class ModeDatabase {
  public:
-  /// Opens the file, or makes it, and brings an older schema up to date in one transaction.
-  /// `clock` must outlive the database.
-  /// Errors: FailedPrecondition (SCHEMA_TOO_NEW: written by a newer Carillon; DATABASE_UNUSABLE:
-  /// the file or its folder cannot be used), DataLoss (DATABASE_CORRUPT).
+  /// Opens the file and creates it if it does not exist. Brings an older schema up to date in one
+  /// transaction. `clock` must outlive the database. Errors: FailedPrecondition (SCHEMA_TOO_NEW:
+  /// written by a newer Carillon; DATABASE_UNUSABLE: the file or its folder cannot be used),
+  /// DataLoss (DATABASE_CORRUPT).
   static absl::StatusOr<std::unique_ptr<ModeDatabase>> Open(const std::filesystem::path& file,
                                                             const Clock& clock);
   ~ModeDatabase();

@@ -13,7 +13,7 @@
 
 namespace carillon {
 
-/// A ModalModelChunk whose bytes are not copied: they must outlive the view.
+/// A ModalModelChunk whose bytes are not copied. The bytes must outlive the view.
 struct ChunkView {
   uint32_t array = 0;
   uint64_t offset = 0;
@@ -21,17 +21,17 @@ struct ChunkView {
   std::string_view data;
 };
 
-/// Checks a stored model record by record: hashes, the order and completeness of the chunks, that
-/// the arrays of format version 1 are there with consistent shapes, that numbers are finite,
+/// Checks a stored model record by record: the hashes, the order and completeness of the chunks,
+/// and the presence and shapes of the arrays of format version 1. Numbers must be finite,
 /// eigenvalues positive and ascending, and indices in range. A reader of a model that passes needs
 /// no further checks.
 class ModelChecker {
  public:
-  /// Errors: InvalidArgument (MODAL_MODEL_MALFORMED), DataLoss (MODAL_MODEL_CORRUPT: a hash is
-  /// wrong). The checker cannot be used after an error.
+  /// Checks the next record. Errors: InvalidArgument (MODAL_MODEL_MALFORMED), DataLoss
+  /// (MODAL_MODEL_CORRUPT: a hash is wrong). The checker cannot be used after an error.
   absl::Status Check(const v1::ModalModelRecord& record);
 
-  /// Checks a chunk that follows the header, without a record around it. Errors: as those of Check.
+  /// Checks a chunk that follows the header and is not part of a record. Errors: those of Check.
   absl::Status CheckChunk(const ChunkView& chunk);
 
   /// Checks that every array is complete. Errors: InvalidArgument (MODAL_MODEL_MALFORMED).
@@ -39,7 +39,7 @@ class ModelChecker {
 
   const v1::ModalModelHeader& header() const { return header_; }
 
-  /// Bytes of all arrays.
+  /// Number of bytes in all arrays.
   uint64_t array_bytes() const;
 
  private:
@@ -50,10 +50,10 @@ class ModelChecker {
 
   bool has_header_ = false;
   v1::ModalModelHeader header_;
-  std::vector<uint64_t> byte_counts_;    ///< of each array
+  std::vector<uint64_t> byte_counts_;    ///< size of each array
   std::map<char, uint64_t> dimensions_;  ///< 'V', 'T', 'm', 'G', 'H' of modal_model.proto
-  int array_ = 0;                        ///< the array whose chunks come now
-  uint64_t offset_ = 0;                  ///< of the next chunk
+  int array_ = 0;                        ///< the array whose chunks come next
+  uint64_t offset_ = 0;                  ///< offset of the next chunk
   double last_eigenvalue_ = 0;
 };
 

@@ -21,7 +21,7 @@ namespace carillon {
 /// Reads the records of a file in protobuf's delimited form, one by one. One thread at a time.
 class ModelFileReader {
  public:
-  /// Errors: NotFound (FILE_NOT_FOUND).
+  /// Opens a file. Errors: NotFound (FILE_NOT_FOUND).
   static absl::StatusOr<ModelFileReader> Open(const std::filesystem::path& file);
 
   /// Reads from the present position of `descriptor`, which the caller closes.
@@ -30,7 +30,8 @@ class ModelFileReader {
   ModelFileReader& operator=(ModelFileReader&&) noexcept;
   ~ModelFileReader();
 
-  /// The next record; nullopt at the end. Errors: InvalidArgument (MODAL_MODEL_MALFORMED).
+  /// Returns the next record, or nullopt at the end. Errors: InvalidArgument
+  /// (MODAL_MODEL_MALFORMED).
   absl::StatusOr<std::optional<v1::ModalModelRecord>> Next();
 
  private:
@@ -38,19 +39,19 @@ class ModelFileReader {
   std::unique_ptr<State> state_;
 };
 
-/// The bytes of a record in a file: its length as a varint, then the record.
+/// Returns the bytes of a record in a file: the record's length as a varint, then the record.
 std::string Delimited(const v1::ModalModelRecord& record);
 
 /// Builds a model from its records and checks each of them.
 class ModelDecoder {
  public:
-  /// Errors: as ModelChecker::Check.
+  /// Adds a record. Errors: those of ModelChecker::Check.
   absl::Status Append(const v1::ModalModelRecord& record);
 
-  /// As Append of a record with that chunk, after the header.
+  /// Adds a chunk that follows the header. Equivalent to Append of a record with that chunk.
   absl::Status AppendChunk(const ChunkView& chunk);
 
-  /// Call once, last. Errors: as ModelChecker::Finish.
+  /// Returns the model. Must be the last call. Errors: those of ModelChecker::Finish.
   absl::StatusOr<ModalModel> Finish(const std::string& digest);
 
   const v1::ModalModelHeader& header() const { return checker_.header(); }
@@ -61,7 +62,8 @@ class ModelDecoder {
 
   ModelChecker checker_;
   ModalModel model_;
-  std::vector<char*> destinations_;  // of each array's first byte; null: not held in memory
+  std::vector<char*>
+      destinations_;  // address for each array's first byte; null if the array is not kept
 };
 
 /// Hands the records of `model` to `sink` in order and stops at its first error, which is returned.
@@ -71,8 +73,8 @@ absl::Status EncodeModel(const ModalModel& model, v1::ModalModelHeader header,
                          const std::vector<double>& residuals,
                          absl::FunctionRef<absl::Status(const v1::ModalModelRecord&)> sink);
 
-/// The model of a file. Errors: NotFound (FILE_NOT_FOUND), InvalidArgument (MODAL_MODEL_MALFORMED),
-/// DataLoss (MODAL_MODEL_CORRUPT).
+/// Reads the model of a file. Errors: NotFound (FILE_NOT_FOUND), InvalidArgument
+/// (MODAL_MODEL_MALFORMED), DataLoss (MODAL_MODEL_CORRUPT).
 absl::StatusOr<ModalModel> ReadModelFile(const std::filesystem::path& file,
                                          const std::string& digest);
 

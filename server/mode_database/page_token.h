@@ -8,17 +8,19 @@
 
 namespace carillon {
 
-/// Most rows of a page.
+/// Largest number of rows of a page.
 inline constexpr int kMaxPageSize = 1000;
 
-/// A page of rows in falling order of key: at most `size` keys below `below`.
+/// The range of a page of rows in descending order of keys: at most `size` rows with keys less than
+/// `below`.
 struct PageRange {
   int64_t size = 0;
   int64_t below = 0;
 };
 
-/// `page_size` 0: 100; at most 1000. An empty token starts at the newest row; otherwise it is the
-/// last key of the page before. Errors: InvalidArgument (INVALID_PAGE).
+/// Returns the range of a page. A `page_size` of 0 means 100; the largest is 1000. The token is the
+/// last key of the previous page, or empty for the newest rows. Errors: InvalidArgument
+/// (INVALID_PAGE).
 absl::StatusOr<PageRange> ParsePage(int page_size, const std::string& page_token);
 
 }  // namespace carillon

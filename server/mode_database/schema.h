@@ -23,8 +23,9 @@
 //
 // An arrow is a foreign key: chunks and transfers are deleted with the row that owns them. A dotted
 // line joins equal values without a foreign key: one digest names a job, its model, and the model's
-// tags and material, which therefore stay when a new revision replaces the model. The digest of a
-// job that computes a transfer names the job alone; jobs.transfer_of is the digest of its model.
+// tags and material. Tags and material therefore stay when a new revision replaces the model. The
+// digest of a job that computes a transfer names only the job; jobs.transfer_of is the digest of
+// the model.
 
 namespace carillon {
 

@@ -12,8 +12,8 @@
 
 namespace carillon {
 
-/// A nameless temporary file. It collects data that arrives slowly and is stored in one
-/// transaction; it is deleted with the object or with the process. One thread at a time.
+/// A nameless temporary file for data that arrives slowly and is then stored in one transaction.
+/// The system deletes the file when the object or the process ends. One thread at a time.
 class SpoolFile {
  public:
   /// Errors: FailedPrecondition (DATABASE_UNUSABLE: the folder cannot be written).
@@ -31,7 +31,7 @@ class SpoolFile {
   /// Goes back to the first byte.
   absl::Status Rewind();
 
-  /// The next bytes, at most `limit`; fewer only at the end.
+  /// Returns the next `limit` bytes, or fewer at the end.
   absl::StatusOr<std::string> Read(size_t limit);
 
   int descriptor() const { return descriptor_; }

@@ -28,7 +28,7 @@ class SqlRow {
   virtual ~SqlRow() = default;
   virtual int64_t Int(int column) const = 0;
   virtual std::string Text(int column) const = 0;
-  /// Valid until the next row.
+  /// Returns bytes that are valid until the next row.
   virtual std::string_view Blob(int column) const = 0;
 };
 
@@ -37,11 +37,12 @@ class SqlRow {
 /// or Internal (DATABASE_ERROR).
 class SqliteConnection {
  public:
-  /// Opens the file and makes it unless it exists; waits up to 10 s for a lock of another process.
+  /// Opens the file, and creates it unless it exists. Waits up to 10 s for a lock of another
+  /// process.
   static absl::StatusOr<std::unique_ptr<SqliteConnection>> Open(const std::filesystem::path& file);
   ~SqliteConnection();
 
-  /// Runs one statement that gives no rows.
+  /// Runs one statement that returns no rows.
   absl::Status Run(const char* sql, std::initializer_list<SqlParameter> parameters = {});
 
   /// Runs statements without parameters, separated by semicolons.
@@ -54,10 +55,10 @@ class SqliteConnection {
   /// Copies one snapshot of the database into a new file. Must be called outside a transaction.
   absl::Status BackUpTo(const std::filesystem::path& copy);
 
-  /// Rows that the last statement changed.
+  /// Number of rows that the last statement changed.
   int64_t changed_row_count() const;
 
-  /// Rows that all statements of this connection changed.
+  /// Number of rows that all statements of this connection changed.
   int64_t total_changed_row_count() const;
 
   /// Key of the row inserted last.

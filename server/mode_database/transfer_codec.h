@@ -14,28 +14,28 @@
 
 namespace carillon {
 
-/// A transfer in its stored form (proto/carillon/v1/transfer.proto) that has been checked: hashes,
-/// the order and completeness of the chunks, the shapes of the arrays, finite numbers, indices in
-/// range.
+/// A transfer in its stored form (proto/carillon/v1/transfer.proto) that has passed all checks: of
+/// hashes, of the order and completeness of the chunks, of the shapes of the arrays, and that
+/// numbers are finite and indices in range.
 class StoredTransfer {
  public:
-  /// `bytes`: the records in protobuf's delimited form.
-  /// Errors: InvalidArgument (TRANSFER_MALFORMED), DataLoss (TRANSFER_CORRUPT: a hash is wrong).
+  /// Checks `bytes`, the records in protobuf's delimited form. Errors: InvalidArgument
+  /// (TRANSFER_MALFORMED), DataLoss (TRANSFER_CORRUPT: a hash is wrong).
   static absl::StatusOr<StoredTransfer> Parse(std::string bytes);
 
-  /// Errors: NotFound (FILE_NOT_FOUND), and those of Parse.
+  /// Reads and checks a file. Errors: NotFound (FILE_NOT_FOUND), and those of Parse.
   static absl::StatusOr<StoredTransfer> ReadFile(const std::filesystem::path& file);
 
-  /// The arrays that the server reads: the first ones of kTransferArrays. Others, of a later minor
-  /// version, are kept with the bytes and only checked by their hashes.
+  /// Number of arrays that the server reads, which are the first of kTransferArrays. Arrays of a
+  /// later minor version are kept with the bytes, and only their hashes are checked.
   static constexpr size_t kReadArrayCount = 10;
 
   const v1::TransferHeader& header() const { return header_; }
   const std::string& bytes() const { return bytes_; }
-  /// The eigenvalues of the modal model, unit material, ascending.
+  /// Returns the ascending eigenvalues of the modal model for a unit material.
   std::vector<double> Eigenvalues() const;
   Transfer Decode() const;
-  /// The records, in order.
+  /// Returns the records in order.
   std::vector<v1::TransferRecord> Records() const;
 
  private:
@@ -49,11 +49,11 @@ class StoredTransfer {
 
   v1::TransferHeader header_;
   std::string bytes_;
-  std::vector<std::string> arrays_;              ///< as in the header
-  std::array<size_t, kReadArrayCount> place_{};  ///< in arrays_, of each of kTransferArrays
+  std::vector<std::string> arrays_;              ///< the arrays, in the order of the header
+  std::array<size_t, kReadArrayCount> place_{};  ///< index in arrays_ of each of kTransferArrays
 };
 
-/// The bytes of a record in a file: its length as a varint, then the record.
+/// Returns the bytes of a record in a file: the record's length as a varint, then the record.
 std::string Delimited(const v1::TransferRecord& record);
 
 }  // namespace carillon

@@ -31,24 +31,25 @@ struct TransferSummary {
   int64_t created_unix_ms = 0;
 };
 
-/// Speed of sound in the air of speed ratios, m/s.
+/// Speed of sound in air by which speed ratios are defined, m/s.
 inline constexpr double kSoundSpeedInAirMPerS = 343;
 
-/// The number under which transfers of nearly the same speed ratio s are stored: ln s in steps of
-/// one percent.
+/// Returns the number under which transfers with nearly the same speed ratio s are stored, which is
+/// ln s in steps of one percent.
 int64_t SpeedStep(double speed_ratio);
 
-/// How the stored modal models radiate, by model and speed ratio. A transfer belongs to one
-/// revision of a model and is deleted with it. Safe from every thread.
+/// Stores the transfers of modal models by model and speed ratio. A transfer belongs to one
+/// revision of a model and is deleted with that revision. Safe from every thread.
 ///
-/// A transfer whose bytes have changed on the disk is left out by every call; it can be computed
-/// again.
+/// Every call ignores a transfer whose bytes were damaged on the disk. Such a transfer can be
+/// computed again.
 class TransferStore {
  public:
-  /// A transfer serves every material whose ln s differs by no more from its own: 2 dB of power.
+  /// A transfer serves every material whose ln s differs by at most this from the transfer's ln s;
+  /// the power then differs by up to 2 dB.
   static constexpr double kSpeedTolerance = 0.05;
 
-  /// Called after each transfer that is stored, with no lock of the database held.
+  /// Called after each transfer that is stored, without a lock of the database.
   using OnStored = std::function<void(const std::string& model_digest)>;
 
   TransferStore(Database& database, const Clock& clock) : database_(&database), clock_(&clock) {}
@@ -56,25 +57,25 @@ class TransferStore {
   /// Replaces the listener. The old one is not running when this returns and is never called again.
   void Listen(OnStored on_stored);
 
-  /// Stores a transfer of the model, durably; replaces one of the same step of the speed ratio.
-  /// Errors: NotFound (MODAL_MODEL_NOT_FOUND), InvalidArgument (TRANSFER_MALFORMED: its modes are
-  /// not the model's).
+  /// Stores a transfer of the model durably; replaces a transfer with the same step of the speed
+  /// ratio. Errors: NotFound (MODAL_MODEL_NOT_FOUND), InvalidArgument (TRANSFER_MALFORMED: its
+  /// modes are not the model's).
   absl::StatusOr<TransferSummary> Put(const std::string& model_digest,
                                       const StoredTransfer& transfer);
 
-  /// Put of a file. Further errors: those of StoredTransfer::ReadFile.
+  /// Stores the transfer in a file, as Put does. Further errors: those of StoredTransfer::ReadFile.
   absl::StatusOr<TransferSummary> PutFile(const std::string& model_digest,
                                           const std::filesystem::path& file);
 
-  /// The transfers of a model by ascending speed ratio.
+  /// Returns the summaries of a model's transfers by ascending speed ratio.
   absl::StatusOr<std::vector<TransferSummary>> List(const std::string& model_digest);
 
-  /// The same, whole.
+  /// Returns a model's transfers with their arrays by ascending speed ratio.
   absl::StatusOr<std::vector<StoredTransfer>> Read(const std::string& model_digest);
 
-  /// The transfer of this revision of the model that is nearest to a material in which sound
-  /// travels at sqrt(E / rho) = `material_m_per_s`; null: none is within the tolerance. All objects
-  /// share one copy in memory.
+  /// Returns the transfer of this revision of the model that is nearest to a material with sqrt(E /
+  /// rho) = `material_m_per_s`. Returns null if no transfer is within kSpeedTolerance, or if the
+  /// nearest cannot be read. All objects share one copy in memory.
   std::shared_ptr<const Transfer> Find(const ModalModel& model, double material_m_per_s);
 
  private:
@@ -86,7 +87,7 @@ class TransferStore {
   OnStored on_stored_ ABSL_GUARDED_BY(listener_mutex_);
   Mutex cache_mutex_;
   std::map<Key, std::pair<int64_t, std::weak_ptr<const Transfer>>> cache_
-      ABSL_GUARDED_BY(cache_mutex_);  // with the hash of its bytes
+      ABSL_GUARDED_BY(cache_mutex_);  // each transfer with the hash of its bytes
 };
 
 }  // namespace carillon

@@ -7,9 +7,9 @@
 
 namespace carillon {
 
-/// The first characters of UTF-8 text that fit into `max_bytes`. A character that is cut at the end
-/// is left out: protobuf refuses a message with half a character in it, and so a whole list of
-/// models.
+/// Returns the first characters of UTF-8 text that fit into `max_bytes`. A character that does not
+/// fit as a whole is left out, because protobuf refuses every message with half a character, such
+/// as a list of models.
 std::string Utf8Prefix(std::string_view text, size_t max_bytes);
 
 }  // namespace carillon
