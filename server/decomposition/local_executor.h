@@ -14,16 +14,15 @@ namespace carillon {
 
 struct LocalExecutorOptions {
   std::filesystem::path program{};  ///< carillon-precompute
-  std::filesystem::path
-      directory{};       ///< for the files of running tasks; MakeLocalExecutor empties it
+  /// For the files of running tasks; MakeLocalExecutor empties it.
+  std::filesystem::path directory{};
   int worker_count = 0;  ///< 0 means half of the processors, at least 1
   int threads_per_worker = 1;
-  uint64_t memory_budget_bytes =
-      0;  ///< resident memory of all workers; 0 means half of the machine's
-  uint64_t memory_limit_bytes = 0;  ///< resident memory of one worker; 0 means the whole budget
+  uint64_t memory_budget_bytes = 0;  ///< resident memory of all workers; 0: half of the RAM
+  uint64_t memory_limit_bytes = 0;   ///< resident memory of one worker; 0 means the whole budget
   std::chrono::milliseconds time_limit = std::chrono::hours(6);
-  std::chrono::milliseconds stall_limit =
-      std::chrono::seconds(60);  ///< longest time without an event
+  /// Longest time without an event.
+  std::chrono::milliseconds stall_limit = std::chrono::seconds(60);
 };
 
 /// Runs each decomposition in a child process (child_process.h), with limits of memory and time.

@@ -27,12 +27,10 @@ struct JobRecord {
   /// refused with `error` and not run again.
   bool remembered = false;
   int64_t created_unix_ms = 0;
-  int32_t priority = 0;  ///< higher starts first
-  uint32_t start_count =
-      0;  ///< workers started since the last submission that have not reported an end
-  uint32_t way =
-      0;  ///< 0 if computed as requested; otherwise the number of another way, see kWayCount
-  uint64_t peak_bytes = 0;  ///< peak memory of the job's worker; 0 until a worker has ended
+  int32_t priority = 0;      ///< higher starts first
+  uint32_t start_count = 0;  ///< starts of workers since the last submission or end of a worker
+  uint32_t way = 0;          ///< 0 if computed as requested, else see kWayCount
+  uint64_t peak_bytes = 0;   ///< peak memory of the job's worker; 0 until a worker has ended
   /// Whether the row was damaged on the disk. Only `digest` is then valid; `state` and `error`
   /// report the damage.
   bool damaged = false;
