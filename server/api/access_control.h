@@ -17,26 +17,26 @@
 
 namespace carillon {
 
-/// Returns the token that a caller sends in the metadata "authorization" as "Bearer TOKEN"; empty
-/// if the caller sends none.
+/// Returns the token that a caller sends in the metadata "authorization" as "Bearer TOKEN", or an
+/// empty string if the caller sends no token.
 std::string BearerToken(const grpc::CallbackServerContext& context);
 
-/// Decides who may call what. Whoever comes through a Unix socket has every role; callers over TCP
-/// have those that the table gives to their token or certificate. Refusals are logged. Safe from
-/// every thread.
+/// Decides which calls each caller may make. Callers through a Unix socket have every role. Callers
+/// over TCP have the roles that the table gives to their token or certificate. Refusals are logged.
+/// Safe from every thread.
 class AccessControl {
  public:
   /// `clock` must outlive this.
   AccessControl(AccessTable table, const Clock& clock, LimitedLog::Sink log);
 
-  /// Replaces the table. Calls that run go on.
+  /// Replaces the table. Running calls go on.
   void Replace(AccessTable table);
 
-  /// The caller, if it has the role. Errors: Unauthenticated (CREDENTIAL_MISSING, TOKEN_WRONG),
-  /// PermissionDenied (ROLE_MISSING), ResourceExhausted (TOO_MANY_FAILURES).
+  /// Returns the caller if it has the role. Errors: Unauthenticated (CREDENTIAL_MISSING,
+  /// TOKEN_WRONG), PermissionDenied (ROLE_MISSING), ResourceExhausted (TOO_MANY_FAILURES).
   absl::StatusOr<Principal> Admit(const grpc::CallbackServerContext& context, Role role);
 
-  /// Logs that the caller was refused for `status`, and returns it.
+  /// Logs that the caller was refused for `status`, and returns `status`.
   absl::Status Refuse(const grpc::CallbackServerContext& context, absl::Status status);
 
  private:

@@ -11,24 +11,24 @@ namespace carillon {
 
 /// The rights that a caller can have. docs/operations.md lists the calls of each role.
 enum class Role : unsigned {
-  kAny = 0,  ///< any role of the others will do
+  kAny = 0,  ///< satisfied by any other role
   kListen = 1,
   kStrike = 2,
   kSubmit = 4,
   kAdminister = 8,
 };
 
-/// The name of the role in files and messages.
+/// Returns the name of the role in files and messages.
 absl::string_view RoleName(Role role);
 
 /// A caller whom the daemon knows.
 struct Principal {
   std::string name;
   unsigned roles = 0;        ///< bits of Role
-  std::string connection{};  ///< of this call, as gRPC names its peer
-  /// Whose share of scenes, streams and jobs it uses: the caller, if it has shown a credential;
-  /// else the process behind a Unix socket, a connection over TCP, or, where the network reaches
-  /// the daemon, the address that it comes from.
+  std::string connection{};  ///< connection of this call, as gRPC names its peer
+  /// The client whose share of scenes, streams and jobs the call uses. It is the caller, if the
+  /// caller has shown a credential. Otherwise it is the process behind a Unix socket, a connection
+  /// over TCP or, if the network reaches the daemon, the caller's address.
   std::string client{};
 
   bool has(Role role) const {
@@ -39,28 +39,30 @@ struct Principal {
 /// The name of every caller that comes through the Unix socket.
 inline constexpr char kLocalCaller[] = "local";
 
-/// The callers that come over TCP, by the tokens and certificates that they show. It keeps only the
-/// SHA-256 of tokens.
+/// The callers that come over TCP, by the tokens and certificates that they show. The table keeps
+/// only the SHA-256 of tokens.
 class AccessTable {
  public:
-  /// The table of a daemon without a file: anybody may do all but administer, as the caller
-  /// kLocalCaller, so that scenes made over TCP and over the Unix socket are open to both.
+  /// Returns the table of a daemon without an access file. Everybody is the caller kLocalCaller,
+  /// who may do everything except administer. Scenes made over TCP and over the Unix socket are
+  /// therefore open to both.
   static AccessTable ForThisMachine();
 
   /// Reads lines of the form "NAME ROLES CREDENTIAL". ROLES are separated by commas; CREDENTIAL is
   /// "sha256:" with the digest of a token, or "certificate:" with a name in a client's certificate.
-  /// The name "anybody", without a credential, stands for callers that show neither. Lines that
-  /// begin with # are left out. Errors: FailedPrecondition (ACCESS_FILE_UNUSABLE: the file cannot
-  /// be read, others may read or change it, or a line is wrong).
+  /// The name "anybody", without a credential, stands for callers that show neither a token nor a
+  /// certificate. Lines that begin with # are ignored. Errors: FailedPrecondition
+  /// (ACCESS_FILE_UNUSABLE: the file cannot be read, others may read or change it, or a line is
+  /// wrong).
   static absl::StatusOr<AccessTable> Read(const std::string& path);
 
-  /// Null: no caller has this token.
+  /// Returns the caller with this token, or null.
   const Principal* FindToken(const std::string& token) const;
 
-  /// Null: no caller has one of these names in its certificate.
+  /// Returns the caller with one of these names in its certificate, or null.
   const Principal* FindCertificate(const std::vector<std::string>& names) const;
 
-  /// The rights of callers that show nothing.
+  /// Returns the rights of callers without a credential.
   const Principal& anybody() const { return anybody_; }
 
  private:

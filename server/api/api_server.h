@@ -21,14 +21,15 @@ namespace carillon {
 
 /// The addresses at which the server listens, and the files that protect them.
 struct ApiSettings {
-  /// "unix:PATH" or "HOST:PORT" (port 0: any that is free).
+  /// "unix:PATH" or "HOST:PORT". Port 0 stands for any free port.
   std::vector<std::string> addresses{};
-  /// PEM files for all TCP addresses; empty: no TLS, and only addresses of this machine.
+  /// PEM files for all TCP addresses. If they are empty, there is no TLS, and only addresses of
+  /// this machine are allowed.
   TlsPaths tls{};
-  /// Who may do what over TCP; see AccessTable. Empty: only addresses of this machine, from which
-  /// anybody may do all but administer.
+  /// Path of the callers over TCP and their roles (AccessTable). If it is empty, only addresses of
+  /// this machine are allowed, and everybody may do everything except administer.
   std::string access_file{};
-  /// SOFA file with the head for binaural scenes; empty: that of HeadStore.
+  /// SOFA file with the head for binaural scenes. If it is empty, HeadStore's file is used.
   std::string head_file{};
   /// Version of the daemon.
   std::string version{};
@@ -37,7 +38,7 @@ struct ApiSettings {
   /// Share of all scenes, streams, listeners and renderings that one client may hold; above 0, at
   /// most 1.
   double client_share = 0.5;
-  /// Seconds after which a rendering is ended whose client neither sends nor reads.
+  /// Seconds after which a rendering ends if its client neither sends nor reads.
   double rendering_idle_s = 60;
 };
 
@@ -49,12 +50,12 @@ struct ServedRooms {
   SceneRegistry& scenes;
   LiveOutput& output;
   Clock& clock;
-  std::function<void(const std::string& line)> log;  ///< of warnings
-  /// Whether decompositions can run; asked several times a second.
+  std::function<void(const std::string& line)> log;  ///< takes warnings
+  /// Returns whether decompositions can run. Called several times a second.
   std::function<bool()> can_decompose = [] { return true; };
 };
 
-/// Numbers of the places that clients hold at one moment.
+/// The numbers of scenes, streams, listeners and renderings that clients hold at one moment.
 struct ClientCounts {
   size_t connections = 0;
   size_t contact_streams = 0;
@@ -62,12 +63,12 @@ struct ClientCounts {
   size_t renderings = 0;
 };
 
-/// All services of carillon.v1, health and reflection. The health of carillon.v1.AudioService is
-/// NOT_SERVING while the wanted sound device does not play; that of the whole server ("") is
-/// SERVING.
+/// A gRPC server with all services of carillon.v1, health and reflection. The health of
+/// carillon.v1.AudioService is NOT_SERVING while the wanted sound device does not play. The health
+/// of the whole server ("") is SERVING.
 class ApiServer {
  public:
-  /// Starts to serve; calls are answered when it returns. Errors: InvalidArgument
+  /// Starts to serve. Calls are answered as soon as Start has returned. Errors: InvalidArgument
   /// (INVALID_ADDRESS), FailedPrecondition (TLS_REQUIRED, ACCESS_FILE_REQUIRED: a network address
   /// without either, TLS_UNUSABLE, ACCESS_FILE_UNUSABLE, ADDRESS_IN_USE, LISTEN_FAILED).
   static absl::StatusOr<std::unique_ptr<ApiServer>> Start(const ApiSettings& settings,
@@ -78,20 +79,21 @@ class ApiServer {
   ApiServer(const ApiServer&) = delete;
   ApiServer& operator=(const ApiServer&) = delete;
 
-  /// Reads the access file and the TLS files anew; connections and calls go on. Errors: those of
-  /// Start about them; nothing is changed then.
+  /// Reads the access file and the TLS files anew. Connections and calls go on. Errors: those of
+  /// Start about these files; an error changes nothing.
   absl::Status Reload(const ApiSettings& settings);
 
-  /// Makes carillon.v1.ModalModelService healthy or not. carillon.v1.DecompositionService is
-  /// healthy if that one is and decompositions can run.
+  /// Sets the health of carillon.v1.ModalModelService. carillon.v1.DecompositionService is healthy
+  /// if ModalModelService is healthy and decompositions can run.
   void ShowDatabaseHealth(bool stores);
 
   ClientCounts clients() const;
 
-  /// Seconds until the first of the daemon's certificates expires; nothing without TLS.
+  /// Returns the seconds until the first of the daemon's certificates expires, or nothing without
+  /// TLS.
   std::optional<double> certificate_left_s() const;
 
-  /// The addresses of the settings, with the ports that were chosen.
+  /// Returns the addresses of the settings, with the chosen ports.
   const std::vector<std::string>& addresses() const;
 
  private:

@@ -19,7 +19,7 @@ namespace carillon {
 /// carillon.v1.AudioService. The constructor's references must outlive the service.
 class AudioService final : public v1::AudioService::CallbackService {
  public:
-  /// The pool of `reception` has the threads that render offline.
+  /// Offline rendering runs on the threads of `reception`'s pool.
   AudioService(std::string version, LiveOutput& output, const SceneRegistry& scenes,
                ModeDatabase& database, HeadStore& heads, const Clock& clock, IdleCalls& idle_calls,
                const Reception& reception)

@@ -11,26 +11,27 @@
 
 namespace carillon {
 
-/// When the daemon's certificates expire. All functions may be called from any thread but
-/// WarningDue, which one thread calls.
+/// The time at which the first of the daemon's certificates expires. Any thread may call all
+/// functions except WarningDue, which only one thread may call.
 class CertificateEnd {
  public:
-  /// Days before the end in which the daemon warns.
+  /// Number of days before the end in which the daemon warns.
   static constexpr int kWarningDays = 30;
 
   /// `clock` must outlive the object.
   explicit CertificateEnd(const Clock& clock) : clock_(clock) {}
 
-  /// New files are in use, of which the first expires at this time; 0: none are in use.
+  /// Sets the time, or 0 if no certificates are in use.
   void Set(int64_t unix_s) { end_unix_s_ = unix_s; }
 
-  /// 0: no certificates are in use.
+  /// Returns that time, or 0 if no certificates are in use.
   int64_t unix_s() const { return end_unix_s_; }
 
-  /// Seconds until the end, negative after it; nothing if no certificates are in use.
+  /// Returns the seconds until that time, negative after it, or nothing if no certificates are in
+  /// use.
   std::optional<double> left_s() const;
 
-  /// A line for the log if the end is near and none was due within a day; else nothing.
+  /// Returns a line for the log if the end is near and no warning was due within the last day.
   std::optional<std::string> WarningDue();
 
  private:

@@ -13,7 +13,7 @@
 
 namespace carillon {
 
-/// A thread that ends what clients have left behind: scenes whose lease is over, and idle calls.
+/// A thread that ends scenes whose lease is over, and idle calls.
 class ClientKeeper {
  public:
   /// Takes a line for people to read.

@@ -13,16 +13,16 @@
 
 namespace carillon {
 
-/// The kinds of places that clients hold for a while; the daemon has a bounded number of each.
+/// The kinds of places that clients hold for a while. The daemon has a bounded number of each kind.
 enum class Holding { kScene, kContactStream, kListener, kRendering };
 inline constexpr size_t kHoldingCount = 4;
 
-/// Traces that are rendered at a time.
+/// Greatest number of traces that are rendered at a time.
 inline constexpr size_t kMaxRenderingCount = 8;
 
 class ClientLimits;
 
-/// One scene, stream, listener or rendering of a client, given back by the destructor.
+/// One scene, stream, listener or rendering of a client. The destructor gives the place back.
 class ClientPlace {
  public:
   ClientPlace() = default;
@@ -43,21 +43,22 @@ class ClientPlace {
   std::string client_;
 };
 
-/// Bounds what one client holds to a share of what all may hold together, so that nobody can shut
-/// out all others. Safe from every thread.
+/// Bounds the places of one client to a share of the places of all clients together, so that no
+/// client can shut out all others. Safe from every thread.
 class ClientLimits {
  public:
-  /// `share` is above 0; a client may always hold one of each. With 1 a client has no limit of its
-  /// own.
+  /// `share` is above 0. A client may always hold one place of each kind. If `share` is 1, there is
+  /// no limit for a single client.
   explicit ClientLimits(double share) : share_(share) {}
 
-  /// Errors: ResourceExhausted (CLIENT_LIMIT_REACHED). The place must not outlive this.
+  /// Takes a place for a client. The place must not outlive this. Errors: ResourceExhausted
+  /// (CLIENT_LIMIT_REACHED).
   absl::StatusOr<ClientPlace> Take(Holding holding, const std::string& client);
 
-  /// Places that are taken now.
+  /// Returns the number of places that are taken.
   size_t count(Holding holding) const;
 
-  /// How many of `whole` one client may hold.
+  /// Returns the number of `whole` places that one client may hold.
   static size_t ShareOf(size_t whole, double share);
 
  private:

@@ -9,16 +9,16 @@
 
 namespace carillon {
 
-/// Whether columns have numbers for each of their objects. Errors: InvalidArgument
+/// Checks that columns have numbers for each of their objects. Errors: InvalidArgument
 /// (COLUMNS_MISMATCHED).
 absl::Status Validate(const v1::ImpulseColumns& columns);
 absl::Status Validate(const v1::EngineContactColumns& columns);
 absl::Status Validate(const v1::PoseColumns& columns);
 
-/// Contacts, counted once for each object, of columns that need not be valid.
+/// Returns the number of contacts, counted once for each object. The columns need not be valid.
 uint64_t CountContacts(const v1::ImpulseColumns& columns);
 
-/// Reads a row of valid columns, without what `hertz` says.
+/// Reads a row of valid columns, except for the field `hertz`.
 ObjectImpulse ReadRow(const v1::ImpulseColumns& columns, int row);
 ObjectTouch ReadRow(const v1::EngineContactColumns& columns, int row);
 Pose ReadRow(const v1::PoseColumns& columns, int row);

@@ -10,30 +10,29 @@ namespace carillon {
 
 /// An open connection of this process's gRPC servers.
 struct GrpcConnection {
-  int64_t id = 0;    ///< gRPC's own; a later connection has a larger one
+  int64_t id = 0;    ///< gRPC's id; a later connection has a larger id
   std::string peer;  ///< the name that calls see (ServerContext::peer)
 };
 
-/// What gRPC has counted on one connection since it was made.
+/// The calls that gRPC has counted on one connection since the connection was made.
 struct ConnectionCalls {
   uint64_t begun_count = 0;
   uint64_t answered_count = 0;
-  uint64_t failed_count = 0;  ///< calls that ended without an answer: cancelled, for instance
+  uint64_t failed_count = 0;  ///< calls that ended without an answer, as cancelled calls do
 
-  /// Calls go on while gRPC reads its counts one after another, so that more may have ended than
-  /// had begun.
+  /// Returns the number of open calls. gRPC reads its counts one after another while calls go on,
+  /// so the count of ended calls may exceed the count of begun calls.
   uint64_t open_count() const noexcept {
     const uint64_t ended = answered_count + failed_count;
     return begun_count > ended ? begun_count - ended : 0;
   }
 };
 
-/// Returns the open connections from this id on, in the order of their ids. Source: gRPC's
-/// channelz.
+/// Returns the open connections from this id on, in the order of their ids, from gRPC's channelz.
 std::vector<GrpcConnection> ListConnections(int64_t first_id);
 
-/// Returns the counts of a connection; absent if it is closed. It takes some 10 us. Source: gRPC's
-/// channelz, which counts a call when its first frame has come, before any service learns of it.
+/// Returns the counts of a connection, or nothing if it is closed, within some 10 us. gRPC's
+/// channelz counts a call when its first frame has come, before any service learns of the call.
 std::optional<ConnectionCalls> ReadConnectionCalls(int64_t id);
 
 }  // namespace carillon

@@ -19,7 +19,7 @@
 
 namespace carillon {
 
-/// Takes an accepted connection, which it closes when it has ended.
+/// Takes accepted connections, and closes each connection that has ended.
 class ConnectionTaker {
  public:
   virtual ~ConnectionTaker() = default;
@@ -31,7 +31,8 @@ class ConnectionTaker {
 /// connection is closed at once.
 class ConnectionGate {
  public:
-  /// The gate closes new connections from the process or address of a refused one for this time.
+  /// The time for which the gate closes new connections from the process or address of a refused
+  /// connection.
   static constexpr std::chrono::seconds kRefusal{30};
 
   explicit ConnectionGate(size_t max_connection_count);
@@ -40,23 +41,24 @@ class ConnectionGate {
   ConnectionGate(const ConnectionGate&) = delete;
   ConnectionGate& operator=(const ConnectionGate&) = delete;
 
-  /// Binds the address, whose port is set if it was 0. Its connections are handed to `taker` once
-  /// the gate is open. Errors: FailedPrecondition (LISTEN_FAILED, ADDRESS_IN_USE).
+  /// Binds the address. If its port is 0, it is set to the chosen port. The connections of the
+  /// address are handed to `taker` once the gate is open. Errors: FailedPrecondition
+  /// (LISTEN_FAILED, ADDRESS_IN_USE).
   absl::Status Listen(ListenAddress& address, std::unique_ptr<ConnectionTaker> taker);
 
   /// Begins to accept.
   void Open();
 
-  /// Joins the thread, and closes and removes the sockets. Connections that were taken stay.
+  /// Joins the thread, and closes and removes the listening sockets. Connections that were taken
+  /// stay open.
   void Close();
 
-  /// Whether the connection of this name, as calls see it (ServerContext::peer), is open. Any
-  /// thread.
+  /// Returns whether the connection with this name (ServerContext::peer) is open. Any thread.
   bool IsOpen(const std::string& peer) const;
 
-  /// Ends the connection of this name, and closes others of the same process (Unix) or address
-  /// (TCP) at once until kRefusal has passed. False: it is not open, or it ends already. Any
-  /// thread.
+  /// Ends the connection with this name. Until kRefusal has passed, other connections of the same
+  /// process (Unix) or address (TCP) are closed at once. Returns false if the connection is not
+  /// open or is ending already. Any thread.
   bool Refuse(const std::string& peer);
 
   /// Number of connections that are open. Any thread.
@@ -67,8 +69,8 @@ class ConnectionGate {
     int socket;
     ConnectionTaker* taker;
   };
-  /// The gate learns from the inode that the taker has closed a connection: the descriptor then has
-  /// no inode, or that of another file.
+  /// An open connection. Once the taker has closed it, the descriptor has no inode or the inode of
+  /// another file, by which the gate sees that the connection is closed.
   struct Connection {
     int descriptor;
     ino_t inode;
@@ -80,7 +82,7 @@ class ConnectionGate {
   absl::Status ListenTcp(ListenAddress& address, ConnectionTaker& taker);
   void Run();
   void Accept(const Door& door);
-  /// Whether another connection may be open at a time; if so, notes this one by its peer.
+  /// Returns whether another connection may be open. If so, stores this connection by its peer.
   bool Admit(const std::string& peer, const Connection& connection);
 
   const size_t max_connection_count_;
@@ -89,16 +91,16 @@ class ConnectionGate {
   std::vector<std::string> socket_paths_;
   uint64_t accepted_count_ = 0;
   mutable Mutex mutex_;
-  /// By peer; some may have been closed.
+  /// Connections by peer. Some of them may have been closed.
   std::map<std::string, Connection> connections_ ABSL_GUARDED_BY(mutex_);
-  /// By process or address: until when its connections are closed at once.
+  /// For each refused process or address, the time until which its connections are closed at once.
   std::map<std::string, std::chrono::steady_clock::time_point> refused_ ABSL_GUARDED_BY(mutex_);
   int stop_;  ///< becomes readable when the gate is to end
   std::thread thread_;
 };
 
-/// Raises this process's limit of open descriptors as far as the system allows. Returns how many
-/// connections the process may then hold open at a time.
+/// Raises this process's limit of open descriptors as far as the system allows. Returns the number
+/// of connections that may then be open at a time.
 size_t RaiseConnectionLimit();
 
 }  // namespace carillon

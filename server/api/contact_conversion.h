@@ -8,15 +8,15 @@
 
 namespace carillon {
 
-/// The conventions of a stream or of a trace.
+/// Returns the conventions of a stream or of a trace.
 ContactReading ToContactReading(v1::Frame frame, v1::PulseShape pulse_shape);
 
 v1::ContactFindings ToProto(const IntakeFindings& findings);
 v1::Blow ToProto(const FoundBlow& blow);
 
-/// Gives `intake` a whole step: poses, impulses, forces, then engine contacts; of each, rows before
-/// columns. Rows that cannot be read count as rejected (LOCATION_MISSING, COLUMNS_MISMATCHED).
-/// Errors: those of ContactIntake::BeginStep.
+/// Gives `intake` a whole step, in the order poses, impulses, forces, engine contacts; of each
+/// kind, rows come before columns. Rows that cannot be read count as rejected (LOCATION_MISSING,
+/// COLUMNS_MISMATCHED). Errors: those of ContactIntake::BeginStep.
 absl::Status ReadStep(const v1::ContactStep& step, ContactIntake& intake);
 
 }  // namespace carillon

@@ -11,7 +11,7 @@
 namespace carillon {
 
 /// Calls `work()`, which returns an absl::Status or absl::StatusOr, and turns an exception into an
-/// error: a request that needs more memory than there is must not end the daemon.
+/// error, because a request that needs too much memory must not end the daemon.
 template <typename Work>
 auto WithoutExceptions(Work work) -> decltype(work()) {
   try {

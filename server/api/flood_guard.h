@@ -15,23 +15,24 @@
 
 namespace carillon {
 
-/// Calls that may be open on one connection. gRPC makes further calls wait in the client, but only
-/// once the client has confirmed the limit.
+/// Greatest number of open calls on one connection. gRPC makes further calls wait in the client,
+/// but only after the client has confirmed this limit.
 inline constexpr int kMaxCallsOfConnection = 256;
 
-/// Calls a second that may fail on one connection, on the average of half a second.
+/// Greatest number of calls that may fail in a second on one connection, averaged over half a
+/// second.
 inline constexpr double kMaxFailedCallsPerSecond = 2000;
 
-/// Returns the reason to close a connection with these counts, in words for an operator; empty if
-/// the connection may stay. `before` was counted `seconds` earlier.
+/// Returns the reason to close a connection with these counts, as a text for an operator, or an
+/// empty string if the connection may stay. `before` was counted `seconds` before `now`.
 std::string FindFlood(const ConnectionCalls& before, const ConnectionCalls& now, double seconds);
 
-/// A thread that closes connections whose clients begin calls without end: gRPC 1.51 bounds neither
-/// calls that are cancelled at once nor calls that never send their message. The guard also refuses
-/// further connections from the same process or address for ConnectionGate::kRefusal.
+/// A thread that closes connections whose clients begin calls without end, because gRPC 1.51 bounds
+/// neither calls that are cancelled at once nor calls that never send their message. The guard also
+/// refuses further connections from the same process or address for ConnectionGate::kRefusal.
 class FloodGuard {
  public:
-  /// Both must outlive the guard.
+  /// `gate` and `log` must outlive the guard.
   FloodGuard(ConnectionGate& gate, LimitedLog& log);
 
   /// Joins the thread.
@@ -43,16 +44,16 @@ class FloodGuard {
   using Clock = std::chrono::steady_clock;
   struct Watched {
     std::string peer;
-    ConnectionCalls calls;     ///< when the span over which calls are counted began
-    Clock::time_point since;   ///< that time
-    uint64_t begun_count = 0;  ///< when the connection was last looked at
-    bool busy = false;         ///< it had begun calls since the time before
+    ConnectionCalls calls;     ///< counts at the start of the span over which calls are counted
+    Clock::time_point since;   ///< start of that span
+    uint64_t begun_count = 0;  ///< calls begun by the last look at the connection
+    bool busy = false;         ///< whether calls had begun between the last two looks
   };
   using WatchedById = std::map<int64_t, Watched>;
 
   void Run();
-  /// Looks at the connections that most likely flood, the newest and the busy ones, and at some of
-  /// the others in turn.
+  /// Examines the connections that most likely flood, which are the newest and the busy ones, and
+  /// some of the others in turn.
   void Look(Clock::time_point now);
   void WatchNewConnections(Clock::time_point now);
   std::vector<int64_t> ChooseConnections();

@@ -5,8 +5,8 @@
 
 namespace carillon {
 
-/// Sends what gRPC itself reports, such as handshakes that fail, to `sink`, within the limits of a
-/// LimitedLog. `clock` must outlive the returned object, of which there may be one at a time.
+/// Sends gRPC's own messages, such as those about failed handshakes, to `sink`, within the limits
+/// of a LimitedLog. `clock` must outlive the object. There may be only one GrpcLog at a time.
 class GrpcLog {
  public:
   GrpcLog(const Clock& clock, LimitedLog::Sink sink);

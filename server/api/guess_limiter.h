@@ -14,9 +14,10 @@
 
 namespace carillon {
 
-/// Slows the guessing of credentials: each address may show ten wrong ones, then one a second.
-/// Meanwhile right ones are refused there, too, so that a guess learns nothing, except those of
-/// callers that were let in from the address before. Safe from every thread.
+/// Slows the guessing of credentials. Each address may show ten wrong credentials, then one a
+/// second. While an address may show none, right credentials are refused there, too, so that a
+/// guess reveals nothing. Callers that were admitted from the address before are exempt. Safe from
+/// every thread.
 class GuessLimiter {
  public:
   /// `clock` must outlive the limiter.
@@ -32,7 +33,7 @@ class GuessLimiter {
  private:
   struct Source {
     Allowance wrong{10};
-    std::set<std::string> known;  ///< callers that were let in
+    std::set<std::string> known;  ///< callers that were admitted
   };
 
   Source& SourceOf(absl::string_view peer) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
@@ -42,8 +43,9 @@ class GuessLimiter {
   std::map<std::string, Source> sources_ ABSL_GUARDED_BY(mutex_);
 };
 
-/// The address of a peer such as "ipv4:192.0.2.1:4711" without its port; of an IPv6 address the
-/// first 64 bits, because one machine may have all the rest.
+/// Returns the address of a peer such as "ipv4:192.0.2.1:4711" without its port. For an IPv6
+/// address, returns the first 64 bits, because one machine may have all addresses with the same
+/// first 64 bits.
 std::string AddressOfPeer(absl::string_view peer);
 
 }  // namespace carillon

@@ -7,8 +7,8 @@
 
 namespace carillon {
 
-/// The figures of the named striker, overridden by those that are present. Errors: InvalidArgument
-/// (UNKNOWN_STRIKER).
+/// Returns the figures of the named striker, overridden by the other figures in `proto`. Errors:
+/// InvalidArgument (UNKNOWN_STRIKER).
 absl::StatusOr<HertzContact> ToHertzContact(const v1::HertzContact& proto);
 
 }  // namespace carillon

@@ -11,19 +11,19 @@
 
 namespace carillon {
 
-/// Says since when a call waits for its client. Safe from every thread.
+/// Records since when a call has waited for its client. Safe from every thread.
 class ClientWait {
  public:
-  /// `clock` must outlive this. The call waits from now on.
+  /// The call waits from its construction on. `clock` must outlive this.
   explicit ClientWait(const Clock& clock) : clock_(clock), since_(clock.Monotonic()) {}
 
-  /// The client has done something. False: the call was ended meanwhile.
+  /// Notes that the client has acted. Returns false if the call was ended meanwhile.
   bool Resume();
 
-  /// From now on the call waits for its client.
+  /// Notes that the call waits for its client from this moment on.
   void Begin();
 
-  /// Whether the call waits for `limit` or longer; if so, it counts as ended.
+  /// Returns whether the call has waited for `limit` or longer. If so, the call counts as ended.
   bool EndIfLonger(std::chrono::nanoseconds limit);
 
  private:
@@ -34,7 +34,7 @@ class ClientWait {
   std::chrono::nanoseconds since_ ABSL_GUARDED_BY(mutex_);
 };
 
-/// A call that is ended if its client says nothing for too long.
+/// A call that is ended if its client is silent for too long.
 class IdleCall {
  public:
   virtual ~IdleCall() = default;
@@ -44,17 +44,17 @@ class IdleCall {
   virtual void EndIfIdle(std::chrono::nanoseconds limit) = 0;
 };
 
-/// The calls whose idleness is bounded. Safe from every thread.
+/// The calls whose waiting time is limited. Safe from every thread.
 class IdleCalls {
  public:
   void Add(IdleCall& call);
-  /// The destructor of a call calls it first.
+  /// Must be the first step of a call's destructor.
   void Remove(IdleCall& call);
 
   void EndIdle(std::chrono::nanoseconds limit);
 
  private:
-  /// Held while a call is ended, so that none is deleted meanwhile but by that thread itself.
+  /// Held while a call is ended, so that only the thread that ends it may delete calls meanwhile.
   RecursiveMutex mutex_;
   std::set<IdleCall*> calls_ ABSL_GUARDED_BY(mutex_);
 };

@@ -11,7 +11,7 @@ namespace carillon {
 /// carillon.v1.JobRunService. The constructor's references must outlive the service.
 class JobRunService final : public v1::JobRunService::CallbackService {
  public:
-  /// `access` logs wrong tokens.
+  /// Wrong tokens are logged through `access`.
   JobRunService(RemoteRuns& runs, AccessControl& access, ThreadPool& pool)
       : runs_(runs), access_(access), pool_(pool) {}
 

@@ -12,18 +12,18 @@
 
 namespace carillon {
 
-/// A budget that refills with time: some at once, then one a second.
+/// A budget that starts full and refills by one a second.
 class Allowance {
  public:
   explicit Allowance(double most) : most_(most), left_(most) {}
 
-  /// Takes one; false if none is left.
+  /// Takes one unit. Returns false if no unit is left.
   bool Take(std::chrono::nanoseconds now);
 
-  /// Whether one is left.
+  /// Returns whether a unit is left.
   bool Has(std::chrono::nanoseconds now);
 
-  /// Whether nothing has been taken lately.
+  /// Returns whether the budget is full.
   bool IsFull(std::chrono::nanoseconds now);
 
  private:
@@ -34,9 +34,9 @@ class Allowance {
   std::chrono::nanoseconds refilled_{0};
 };
 
-/// A log that untrusted clients cannot flood: twenty lines at once, then one a second. Lines beyond
-/// are counted, and the count is a line before the next. Bytes that are not printable ASCII are
-/// escaped, and lines are cut at 400 bytes. Safe from every thread.
+/// A log that untrusted clients cannot flood. It takes twenty lines at once, then one a second.
+/// Further lines are dropped, and their count is logged before the next line. Bytes that are not
+/// printable ASCII are escaped, and lines are cut at 400 bytes. Safe from every thread.
 class LimitedLog {
  public:
   using Sink = std::function<void(const std::string&)>;
@@ -44,7 +44,7 @@ class LimitedLog {
   /// `clock` must outlive the log.
   LimitedLog(const Clock& clock, Sink sink) : clock_(clock), sink_(std::move(sink)) {}
 
-  /// Says how many lines were left out.
+  /// Logs the number of lines dropped.
   ~LimitedLog();
   LimitedLog(const LimitedLog&) = delete;
   LimitedLog& operator=(const LimitedLog&) = delete;

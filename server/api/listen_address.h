@@ -19,20 +19,19 @@ struct ListenAddress {
   int port = 0;
 
   bool is_unix() const { return !socket_path.empty(); }
-  /// Whether only this machine can reach the address.
+  /// Returns whether only this machine can reach the address.
   bool is_local() const;
-  /// The address as text: "unix:PATH", "HOST:PORT" or "[HOST]:PORT".
+  /// Returns the address as "unix:PATH", "HOST:PORT" or "[HOST]:PORT".
   std::string ToString() const;
 };
 
 /// Errors: InvalidArgument (INVALID_ADDRESS).
 absl::StatusOr<ListenAddress> ParseListenAddress(absl::string_view text);
 
-/// Makes the folder of a Unix socket, for its owner only, unless it exists; removes a socket that
-/// no running daemon serves; and returns the mode that the new socket is to have: 0660 where only a
-/// group may enter the folder, else 0600. Errors: FailedPrecondition (LISTEN_FAILED,
-/// ADDRESS_IN_USE, SOCKET_FOLDER_UNSAFE: another user owns the folder, or could replace the socket
-/// in it).
+/// Makes the folder of a Unix socket, for its owner only, unless it exists. Removes a socket that
+/// no running daemon serves. Returns the mode for the new socket, which is 0660 if only a group may
+/// enter the folder, and otherwise 0600. Errors: FailedPrecondition (LISTEN_FAILED, ADDRESS_IN_USE,
+/// SOCKET_FOLDER_UNSAFE: another user owns the folder, or could replace the socket in it).
 absl::StatusOr<mode_t> PrepareSocket(const std::string& path);
 
 }  // namespace carillon

@@ -10,8 +10,8 @@
 
 namespace carillon {
 
-/// Makes the server's side of one call of AudioService.Listen. The returned reactor deletes itself
-/// when the call ends; it holds `place`. `output` and `scenes` must outlive it.
+/// Makes the server's side of one call of AudioService.Listen. The returned reactor holds `place`,
+/// and deletes itself when the call ends. `output` and `scenes` must outlive the reactor.
 grpc::ServerWriteReactor<v1::ListenResponse>* MakeListenCall(LiveOutput& output,
                                                              const SceneRegistry& scenes,
                                                              const v1::ListenRequest& request,

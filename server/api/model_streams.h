@@ -10,8 +10,8 @@
 
 namespace carillon {
 
-/// The streams of ModalModelService. Each deletes itself when its call is done; the database and
-/// the pool must outlive the call.
+/// The streams of ModalModelService. Each stream deletes itself when its call is done. The database
+/// and the pool must outlive the call.
 
 grpc::ServerReadReactor<v1::UploadMeshRequest>* MakeUpload(grpc::CallbackServerContext& context,
                                                            v1::UploadMeshResponse& response,

@@ -23,21 +23,22 @@ namespace carillon {
 absl::StatusOr<ObjectProperties> ToObjectProperties(const v1::Material& material, double size,
                                                     std::optional<double> gain);
 
-/// The material of an object of the model with this digest: `asked`, or the model's own where
-/// `asked` is empty. Errors: InvalidArgument (INVALID_MATERIAL: the model has none).
+/// Returns the material of an object of the model with this digest, which is `asked` or, if `asked`
+/// is empty, the model's own material. Errors: InvalidArgument (INVALID_MATERIAL: the model has no
+/// material).
 absl::StatusOr<v1::Material> MaterialOrModels(const v1::Material& asked, const std::string& digest,
                                               ModelStore& models);
 
 RadiationModel FromProto(v1::RadiationModel radiation);
 
-/// A model, and how an object of it sounds.
+/// A model and the properties of an object that sounds with it.
 struct ObjectOfModel {
   std::shared_ptr<const ModalModel> model;
   ObjectProperties properties;
 };
 
-/// The object that a request or a record of a trace describes, whose fields have the same names.
-/// Errors: those of ParseModelName, MaterialOrModels, ToObjectProperties and
+/// Returns the object that a request or a record of a trace describes. Both have fields with the
+/// same names. Errors: those of ParseModelName, MaterialOrModels, ToObjectProperties and
 /// ModelStore::FindToSound.
 template <typename Message>
 absl::StatusOr<ObjectOfModel> ToObject(const Message& message, ModelStore& models) {
@@ -53,10 +54,10 @@ absl::StatusOr<ObjectOfModel> ToObject(const Message& message, ModelStore& model
   return object;
 }
 
-/// Errors: those of ResolveMaterial.
+/// Converts the change of an object. Errors: those of ResolveMaterial.
 absl::StatusOr<ObjectChange> ToObjectChange(const v1::UpdateObjectRequest& request);
 
-/// `scene` is the name of its scene.
+/// Converts an object. `scene` is the name of its scene.
 v1::SoundingObject ToProto(const std::string& scene, const PlacedObject& placed);
 
 }  // namespace carillon

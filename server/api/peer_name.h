@@ -8,20 +8,21 @@
 
 namespace carillon {
 
-/// The name of a connection, as gRPC gives it to calls (ServerContext::peer): "ipv4:HOST:PORT",
-/// "ipv6:%5BHOST%5D:PORT" or, for an accepted Unix socket, "unix:pid-PID/NUMBER". `address` is that
-/// of the other end; `number` tells Unix connections apart.
+/// Returns the name of a connection that calls see (ServerContext::peer): "ipv4:HOST:PORT",
+/// "ipv6:%5BHOST%5D:PORT" or, for an accepted Unix socket, "unix:pid-PID/NUMBER". `address` is the
+/// address of the other end; `number` distinguishes Unix connections.
 std::string PeerNameOf(int connection, const sockaddr_storage& address, uint64_t number);
 
-/// The process behind a Unix connection, "unix:pid-PID"; the whole name where the system does not
-/// know the process, as beyond a namespace of processes, and of other connections.
+/// Returns "unix:pid-PID", the process behind a Unix connection. Returns the whole name for other
+/// connections, and if the system does not know the process, for instance because it is in another
+/// PID namespace.
 std::string ProcessOfPeer(const std::string& peer);
 
-/// While it exists, gRPC learns on this thread that the other end of a Unix connection has the name
-/// that PeerNameOf made.
+/// While this object exists, gRPC on this thread learns that the other end of a Unix connection has
+/// the name that PeerNameOf made.
 ///
-/// The other ends of Unix connections have no names, so that all of them would be one peer. gRPC
-/// asks getpeername, which peer_name.cc defines in place of the C library's.
+/// Without it, all Unix connections would be one peer, because their other ends have no names. gRPC
+/// calls getpeername, which peer_name.cc replaces.
 class NamedPeer {
  public:
   explicit NamedPeer(const std::string& peer);

@@ -8,7 +8,7 @@
 
 namespace carillon {
 
-/// Converts without a check; Validate tells whether the numbers are a rotation.
+/// Converts without a check. Validate checks whether the numbers are a rotation.
 Quaternion FromProto(const v1::Quaternion& proto);
 Pose FromProto(const v1::Pose& proto);
 

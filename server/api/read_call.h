@@ -8,8 +8,8 @@
 
 namespace carillon {
 
-/// Reads requests into a `Sink`, which has Status Append(const Request&) and
-/// Status Finish(Response&). Both run on a thread of the pool, because they write to disk.
+/// Reads requests into a `Sink`, which has Status Append(const Request&) and Status
+/// Finish(Response&). Both functions run on a thread of the pool, because they write to the disk.
 template <typename Request, typename Response, typename Sink>
 class ReadCall final : public ClientStream<Request> {
  public:

@@ -12,14 +12,14 @@
 
 namespace carillon {
 
-/// What every call passes before its work begins.
+/// The access control, limits and threads that every call passes through before its work begins.
 struct Reception {
   AccessControl& access;
   ClientLimits& limits;
   ThreadPool& pool;
 };
 
-/// A call that ends before it has begun.
+/// A call that is refused before its work begins.
 template <typename Reactor>
 class RefusedCall final : public StreamCall<Reactor> {
  public:
@@ -28,7 +28,7 @@ class RefusedCall final : public StreamCall<Reactor> {
   }
 };
 
-/// Returns the reactor of a streaming call that `make()` makes, if the caller has the role.
+/// Returns the reactor of a streaming call that `make()` makes if the caller has the role.
 template <typename Make>
 auto Open(const grpc::CallbackServerContext& context, const Reception& reception, Role role,
           Make make) -> decltype(make()) {
@@ -37,7 +37,7 @@ auto Open(const grpc::CallbackServerContext& context, const Reception& reception
   return new RefusedCall<std::remove_pointer_t<decltype(make())>>(admitted);
 }
 
-/// As above; the call holds a place of its client, which `make(caller, place)` takes.
+/// The same for a call that holds a place of its client. `make(caller, place)` takes the place.
 template <typename Make>
 auto Open(const grpc::CallbackServerContext& context, const Reception& reception, Role role,
           Holding holding, Make make) -> decltype(make(Principal(), ClientPlace())) {

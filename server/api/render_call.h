@@ -22,14 +22,14 @@ struct RenderContext {
   HeadStore& heads;
   BodyCache& bodies;
   ThreadPool& pool;
-  /// Number of Render calls that run now.
+  /// Number of Render calls that are running.
   std::atomic<int>& call_count;
   const Clock& clock;
   IdleCalls& idle_calls;
 };
 
-/// Makes a call of AudioService.Render, which holds `place` and deletes itself when it is done. It
-/// is one of the idle calls of `daemon`, whose parts must outlive it.
+/// Makes a call of AudioService.Render, which holds `place` and deletes itself when it is done. The
+/// call is added to the idle calls of `daemon`, whose parts must outlive the call.
 grpc::ServerBidiReactor<v1::RenderRequest, v1::RenderResponse>* MakeRenderCall(
     const RenderContext& daemon, grpc::CallbackServerContext& context, ClientPlace place);
 

@@ -19,8 +19,8 @@ absl::StatusOr<std::string> ParseJobName(absl::string_view name);
 /// Returns the id of "scenes/{id}". Errors: NotFound (SCENE_NOT_FOUND).
 absl::StatusOr<std::string> ParseSceneName(absl::string_view name);
 
-/// Whether a client may give a scene this id: 1 to 64 lower-case letters, digits, ".", "_" and "-".
-/// The first character is a letter. Errors: InvalidArgument (INVALID_SCENE_ID).
+/// Checks an id that a client gives a scene. It has 1 to 64 lower-case letters, digits, ".", "_"
+/// and "-", and begins with a letter. Errors: InvalidArgument (INVALID_SCENE_ID).
 absl::Status ValidateSceneId(absl::string_view id);
 
 struct ObjectName {

@@ -17,37 +17,38 @@
 
 namespace carillon {
 
-/// The state of the lease of one scene.
+/// The state of one scene's lease.
 struct LeaseState {
-  bool keep = false;                  ///< the scene lasts until somebody deletes it
+  bool keep = false;                  ///< whether the scene lasts until somebody deletes it
   size_t connection_count = 0;        ///< open connections that have used the scene
   std::optional<double> ends_in_s{};  ///< set while no such connection is open
 };
 
-/// How long scenes last: until every connection that has used the scene was closed, and a time of
-/// grace has passed in which a client may come back. Safe from every thread.
+/// Decides how long scenes last. A scene ends when every connection that has used it was closed,
+/// and a grace period in which a client may come back has passed. Safe from every thread.
 class SceneLeases {
  public:
-  /// Whether a connection is open.
+  /// Returns whether a connection is open.
   using IsOpen = std::function<bool(const std::string& connection)>;
 
   /// `clock` must outlive this.
   SceneLeases(const Clock& clock, std::chrono::nanoseconds grace, IsOpen is_open)
       : clock_(clock), grace_(grace), is_open_(std::move(is_open)) {}
 
-  /// A new scene, made by a call on `connection`; with `keep` it never ends by itself.
+  /// Adds a new scene, which a call on `connection` made. With `keep` the scene never ends by
+  /// itself.
   void Begin(uint64_t scene, const std::string& connection, bool keep);
 
-  /// A call on `connection` uses the scene.
+  /// Notes that a call on `connection` uses the scene.
   void Use(uint64_t scene, const std::string& connection);
 
   void End(uint64_t scene);
 
-  /// Looks which connections were closed, and returns the scenes whose grace is over.
+  /// Drops closed connections, and returns the scenes whose grace period is over.
   std::vector<uint64_t> Expired();
 
-  /// The scene, of those for which `among` is true, that nobody has used for the longest time and
-  /// no open connection holds; it is in its grace.
+  /// Returns, among the scenes for which `among` is true, the scene that has had no open connection
+  /// for the longest time. It is in its grace period.
   std::optional<uint64_t> LongestAbandoned(const std::function<bool(uint64_t scene)>& among);
 
   LeaseState StateOf(uint64_t scene);
@@ -56,7 +57,8 @@ class SceneLeases {
   struct Lease {
     bool keep = false;
     std::set<std::string> connections{};
-    std::optional<std::chrono::nanoseconds> abandoned{};  ///< since this time
+    std::optional<std::chrono::nanoseconds>
+        abandoned{};  ///< time since which the scene has no open connection
   };
 
   /// Drops the connections that were closed.

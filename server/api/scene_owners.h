@@ -18,7 +18,7 @@
 
 namespace carillon {
 
-/// Whether a call makes its scene last.
+/// Whether a call uses its scene, so that the scene lasts, or only looks at it.
 enum class SceneCall { kUses, kLooks };
 
 /// The settings with which a caller makes a scene.
@@ -30,33 +30,33 @@ struct SceneWish {
   bool operator==(const SceneWish&) const = default;
 };
 
-/// The caller to whom each scene belongs, and the connections for which it lasts. Safe from every
-/// thread.
+/// The owner of each scene, and the connections for which the scene lasts. Safe from every thread.
 class SceneOwners {
  public:
   /// `access`, which logs refusals, `leases` and `scenes` must outlive this.
   SceneOwners(AccessControl& access, SceneLeases& leases, const SceneRegistry& scenes)
       : access_(access), leases_(leases), scenes_(scenes) {}
 
-  /// `place` is the scene's among those of its client.
+  /// Adds a scene. `place` is the scene's place in the limits of its client.
   void Add(uint64_t scene, const Principal& owner, ClientPlace place, const SceneWish& wish);
   void Remove(uint64_t scene);
 
   SceneLeases& leases() { return leases_; }
 
-  /// The scene, of one client's or, without a client, of all, that was abandoned for the longest
-  /// time.
+  /// Returns the scene that was abandoned for the longest time, among those of one client or,
+  /// without a client, among all scenes.
   std::optional<uint64_t> LongestAbandoned(const std::optional<std::string>& client);
 
-  /// OK if the caller may use the scene: its owner and administrators may. OK, too, if the scene
-  /// does not exist, so that the caller learns that. A scene that the call uses lasts for its
-  /// connection, too. Errors: PermissionDenied (SCENE_OF_ANOTHER).
+  /// Returns OK if the caller is the owner of the scene or an administrator. Also returns OK if the
+  /// scene does not exist, so that the caller learns that from the next step. If the call uses the
+  /// scene, the scene also lasts for the call's connection. Errors: PermissionDenied
+  /// (SCENE_OF_ANOTHER).
   absl::Status Check(const grpc::CallbackServerContext& context, const Principal& caller,
                      uint64_t scene, SceneCall call = SceneCall::kUses) const;
 
-  /// OK if this caller made the scene with the same wish; the scene lasts for its connection, too.
-  /// Errors: AlreadyExists (SCENE_ID_TAKEN, SCENE_DIFFERS), NotFound (SCENE_NOT_FOUND: it was
-  /// deleted meanwhile).
+  /// Returns OK if this caller made the scene with the same wish. The scene then also lasts for the
+  /// call's connection. Errors: AlreadyExists (SCENE_ID_TAKEN, SCENE_DIFFERS), NotFound
+  /// (SCENE_NOT_FOUND: it was deleted meanwhile).
   absl::Status CheckMadeBy(const grpc::CallbackServerContext& context, const Principal& caller,
                            uint64_t scene, const SceneWish& wish) const;
 
@@ -66,7 +66,7 @@ class SceneOwners {
                                  const Principal& caller, absl::string_view name,
                                  SceneCall call = SceneCall::kUses) const;
 
-  /// Whether the caller may use the scene.
+  /// Returns whether the caller may use the scene.
   bool Owns(const Principal& caller, uint64_t scene) const;
 
  private:
@@ -77,7 +77,7 @@ class SceneOwners {
     SceneWish wish;
   };
 
-  /// By whom, and how, a scene was made.
+  /// The owner of a scene and the wish with which it was made.
   struct Made {
     std::string owner;
     SceneWish wish;

@@ -65,7 +65,7 @@ class SceneService final : public v1::SceneService::CallbackService {
                                            v1::UpdateListenerResponse* response) override;
 
  private:
-  /// Makes the scene, or finds the one that the caller has made before with this id.
+  /// Makes the scene, or finds the scene that the caller has made before with this id.
   absl::Status Create(const grpc::CallbackServerContext& context, const Principal& caller,
                       const v1::CreateSceneRequest& request, v1::CreateSceneResponse& response);
   absl::StatusOr<uint64_t> CreateNew(const grpc::CallbackServerContext& context,
@@ -74,8 +74,8 @@ class SceneService final : public v1::SceneService::CallbackService {
   absl::Status Describe(uint64_t scene, v1::Scene& described) const;
   absl::StatusOr<uint64_t> Parse(const grpc::CallbackServerContext& context,
                                  const Principal& caller, const ObjectName& name) const;
-  /// Ends the scene, of one client's or of all, that was abandoned for the longest time; false:
-  /// none is.
+  /// Ends the scene that was abandoned for the longest time, among those of `client` or among all.
+  /// Returns false if no scene is abandoned.
   bool EndAbandoned(const std::optional<std::string>& client);
   absl::Status Add(uint64_t scene, const v1::AddObjectRequest& request,
                    v1::AddObjectResponse& response);
@@ -89,7 +89,7 @@ class SceneService final : public v1::SceneService::CallbackService {
   ModeDatabase& database_;
   HeadStore& heads_;
   const Reception reception_;
-  /// Held while a scene with an id of the client's is made, so that two equal requests make one.
+  /// Held while a scene with a client's id is made, so that two equal requests make one scene.
   Mutex create_mutex_;
 };
 

@@ -25,12 +25,12 @@ struct ServerFacts {
   double client_share = 0;
   double scene_grace_s = 0;
   const CertificateEnd& certificate_end;
-  bool binaural = false;                ///< a measured head is there
+  bool binaural = false;                ///< whether a measured head is there
   std::function<bool()> can_decompose;  ///< called on any thread
 };
 
-/// carillon.v1.ServerService. The constructor's references must outlive the service, which begins
-/// to count its uptime when it is made.
+/// carillon.v1.ServerService. The constructor's references must outlive the service, whose uptime
+/// counts from its construction.
 class ServerService final : public v1::ServerService::CallbackService {
  public:
   ServerService(ServerFacts facts, const DecompositionQueue& decompositions,

@@ -17,19 +17,19 @@
 
 namespace carillon {
 
-/// The parts of which every streaming call of the API is made. A call derives from ClientStream,
-/// ServerStream or BidiStream, and deletes itself when it is done. It holds one request and one
-/// response at a time, so its memory is bounded by what its subclass keeps.
+/// The base classes of every streaming call of the API. A call derives from ClientStream,
+/// ServerStream or BidiStream, and deletes itself when it is done. The base classes keep one
+/// request and one response at a time, so only a subclass can need more memory.
 
-/// Runs the steps of a call on a thread pool, or, where there is none, on the thread that caused
-/// them.
+/// Runs the steps of a call on a thread pool or, without a pool, on the thread that caused them.
 template <typename Reactor>
 class StreamCall : public Reactor {
  public:
   void OnDone() final { delete this; }
 
  protected:
-  /// Calls whose steps may block name a `pool`, which must outlive them.
+  /// A call whose steps may block needs a `pool`, which must outlive the call. `pool` may be null
+  /// for others.
   explicit StreamCall(ThreadPool* pool) : pool_(pool) {}
 
   void Run(std::function<void()> step) {
@@ -37,15 +37,14 @@ class StreamCall : public Reactor {
     pool_->Run(std::move(step));
   }
 
-  /// Ends the call. This must be the last thing that a step does, for the call may be deleted at
-  /// once.
+  /// Ends the call. A step must return after End, because the call may be deleted at once.
   void End(const absl::Status& status) { this->Finish(ToGrpcStatus(status)); }
 
  private:
   ThreadPool* const pool_;
 };
 
-/// The reading half of a call: takes one request after the other.
+/// The reading half of a call, which takes one request after the other.
 template <typename Reactor, typename Request>
 class StreamReader : public Reactor {
  public:
@@ -60,19 +59,21 @@ class StreamReader : public Reactor {
  protected:
   using Reactor::Reactor;
 
-  /// Takes a request; an error is handed to Refuse, and nothing more is read.
+  /// Takes a request. After an error, Refuse is called with the error and no further request is
+  /// read.
   virtual absl::Status Take(const Request& request) = 0;
 
-  /// The client has sent all its requests, or has cancelled the call.
+  /// Called when the client has sent all its requests or has cancelled the call.
   virtual void AllRead() = 0;
 
   virtual void Refuse(const absl::Status& status) { this->End(status); }
 
-  /// False: the call was ended while it waited for a request. It may be deleted as soon as this
-  /// returns, so that nothing may be left to the pool. Called on gRPC's threads.
+  /// Returns false if the call was ended while it waited for a request. The call may then be
+  /// deleted as soon as GoesOn returns, so no step may be left to the pool. Called on gRPC's
+  /// threads.
   virtual bool GoesOn() { return true; }
 
-  /// The constructor of a call ends with it.
+  /// Must be the last step of a call's constructor.
   void StartReading() { ReadNext(); }
 
  private:
@@ -90,8 +91,8 @@ class StreamReader : public Reactor {
     return status;
   }
 
-  /// gRPC reports a message that it cannot parse as the end of the requests. But parsing clears the
-  /// request first, and with it the mark of ReadNext.
+  /// gRPC reports a message that it cannot parse as the end of the requests. Such a message is
+  /// detected because parsing first clears the request and the mark that ReadNext has set in it.
   absl::Status TakeEnd() {
     const auto& unknown = request_.GetReflection()->GetUnknownFields(request_);
     if (unknown.empty() || unknown.field(unknown.field_count() - 1).number() != kUnread) {
@@ -106,20 +107,20 @@ class StreamReader : public Reactor {
   Request request_;
 };
 
-/// Whether a call has a message to send at a moment.
+/// Whether a call has a message to send.
 enum class Supply {
   kMessage,  ///< the response that was filled in
-  kLater,    ///< nothing yet; Wake is called when there is something
+  kLater,    ///< nothing yet; Wake is called when there is a message
   kEnd,      ///< nothing more; the call ends with OK
 };
 
-/// The writing half of a call: sends one response after the other, each filled in when the one
-/// before has left.
+/// The writing half of a call. It sends one response after the other, and fills in each response
+/// when the previous one has been sent.
 ///
-/// At any time at most one thread has the turn: it fills in, has gRPC write, or ends the call. The
-/// turn is taken by StartWriting or Wake, is kept while gRPC writes, and is given back when there
-/// is nothing to send. A call that is cancelled ends with CANCELLED: at once if nobody has the
-/// turn, else by whoever has it.
+/// At most one thread at a time has the turn, which is the right to fill in a response, to let gRPC
+/// write it, or to end the call. StartWriting and Wake take the turn, it is kept while gRPC writes,
+/// and it is given back when there is nothing to send. A cancelled call ends with CANCELLED, either
+/// at once if no thread has the turn, or by the thread that has it.
 template <typename Reactor, typename Response>
 class StreamWriter : public Reactor {
  public:
@@ -141,20 +142,21 @@ class StreamWriter : public Reactor {
  protected:
   using Reactor::Reactor;
 
-  /// Fills in the next response, from which the last has not been cleared. An error ends the call.
+  /// Fills in the next response, which still has the content of the last one. An error ends the
+  /// call.
   virtual absl::StatusOr<Supply> Fill(Response& response) = 0;
 
-  /// False: a cancelled call goes on until Fill returns kEnd or an error, because its reading half
-  /// may still be at work.
+  /// Returns whether a cancelled call ends by itself. If not, it goes on until Fill returns kEnd or
+  /// an error, because its reading half may still be at work.
   virtual bool ends_by_cancellation() const { return true; }
 
-  /// Sends the first response. Before, the turn belongs to the constructor, or to the reading half
-  /// of a call that writes only when all is read; that may use End instead.
+  /// Sends the first response. Until then the constructor has the turn or, in a call that writes
+  /// only after all requests are read, the reading half. The reading half may call End instead.
   void StartWriting() {
     this->Run([this] { WriteNext(); });
   }
 
-  /// There may be something to send. May be called by any thread while the call exists.
+  /// Notes that there may be a message to send. Any thread may call Wake while the call exists.
   void Wake() {
     {
       const MutexLock lock(&mutex_);
@@ -184,14 +186,14 @@ class StreamWriter : public Reactor {
     return cancelled_;
   }
 
-  /// False: the call was woken or cancelled meanwhile, so the turn is kept.
+  /// Returns false, and keeps the turn, if the call was woken or cancelled meanwhile.
   bool GiveBackTurn() {
     const MutexLock lock(&mutex_);
     taken_ = woken_ || cancelled_;
     return !taken_;
   }
 
-  Response response_;  // gRPC's while it writes
+  Response response_;  // must not be touched while gRPC writes
   Mutex mutex_;
   bool taken_ ABSL_GUARDED_BY(mutex_) = true;
   bool woken_ ABSL_GUARDED_BY(mutex_) = false;

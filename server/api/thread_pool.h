@@ -12,14 +12,14 @@
 
 namespace carillon {
 
-/// Threads for calls that block (on the database, on offline rendering), so that gRPC's own threads
-/// never wait. Tasks start in the order in which they were given.
+/// Threads for calls that block (for the database or offline rendering), so that gRPC's own threads
+/// never wait. Tasks start in the order in which they were added.
 class ThreadPool {
  public:
   /// `niceness`, 0 to 19, lowers the scheduling priority of the threads.
   explicit ThreadPool(int thread_count, int niceness = 0);
 
-  /// Runs the tasks given so far, then joins the threads.
+  /// Runs all tasks added so far, then joins the threads.
   ~ThreadPool();
   ThreadPool(const ThreadPool&) = delete;
   ThreadPool& operator=(const ThreadPool&) = delete;
@@ -32,7 +32,7 @@ class ThreadPool {
 
   Mutex mutex_;
   std::deque<std::function<void()>> tasks_ ABSL_GUARDED_BY(mutex_);
-  /// Counts the tasks, and at the end one more for each thread.
+  /// Counts the waiting tasks; the destructor adds one for each thread.
   std::counting_semaphore<> ready_{0};
   std::vector<std::thread> threads_;
 };

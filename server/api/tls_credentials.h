@@ -13,14 +13,15 @@
 
 namespace carillon {
 
-/// TLS whose certificates can be replaced while connections stay open. gRPC's C++ interface has no
-/// credentials whose files are replaced at a chosen moment; its C interface has. Safe from every
+/// TLS whose certificates can be replaced while connections stay open. Only gRPC's C interface has
+/// credentials that can be replaced at a chosen moment; its C++ interface does not. Safe from every
 /// thread.
 class TlsCredentials final : public grpc::ServerCredentials {
  public:
   explicit TlsCredentials(TlsFiles files) : files_(std::move(files)) {}
 
-  /// New connections get these; both or neither must have client roots.
+  /// Uses these files for new connections. The old and the new files must both have client roots,
+  /// or neither.
   void Replace(TlsFiles files);
 
   /// Does nothing: AccessControl decides about callers.

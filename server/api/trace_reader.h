@@ -13,7 +13,7 @@
 
 namespace carillon {
 
-/// Makes an offline renderer from the requests of one Render call.
+/// Builds an offline renderer from the requests of one Render call.
 class TraceReader {
  public:
   static constexpr uint64_t kMaxImpulseCount = 4'000'000;
@@ -46,9 +46,9 @@ class TraceReader {
   HeadStore& heads_;
   BodyCache& bodies_;
   std::optional<OfflineSettings> settings_;
-  std::unique_ptr<OfflineRenderer> renderer_;  // once there is a header
+  std::unique_ptr<OfflineRenderer> renderer_;  // set once the header was read
   double time_s_ = 0;
-  uint64_t impulse_count_ = 0;  // and poses
+  uint64_t impulse_count_ = 0;  // number of impulses and poses
   uint64_t object_count_ = 0;
 };
 

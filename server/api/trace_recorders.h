@@ -19,26 +19,26 @@ namespace carillon {
 /// Takes the records of one contact stream, for a client that reads them. Safe from every thread.
 class TraceRecorder {
  public:
-  /// Records that may wait for the client.
+  /// Greatest number of records that may wait for the client.
   static constexpr size_t kMostWaiting = 65536;
 
-  /// `wake` is called when there is something to take, until Leave; it must not destroy the
+  /// `wake` is called when there is a record to take, until Leave. It must not destroy the
   /// recorder.
   TraceRecorder(uint64_t scene, std::function<void()> wake)
       : scene_(scene), wake_(std::move(wake)) {}
 
-  /// The client has gone: nobody is woken any more when it returns.
+  /// Called when the client has gone. `wake` is not called after Leave has returned.
   void Leave();
 
   uint64_t scene() const { return scene_; }
   void Add(v1::ContactTraceRecord record);
   void End();
 
-  /// Takes the next record; false: none waits.
+  /// Takes the next record. Returns false if no record waits.
   bool TryTake(v1::ContactTraceRecord& record);
-  /// Whether no further record will come.
+  /// Returns whether no further record will come.
   bool ended() const;
-  /// Whether records were lost because too many waited.
+  /// Returns whether records were lost because too many waited.
   bool overflowed() const;
 
  private:
@@ -58,7 +58,7 @@ class TraceRecorders {
  public:
   void Add(const std::shared_ptr<TraceRecorder>& recorder);
 
-  /// Takes out the recorders of a scene, in which a stream begins.
+  /// Removes and returns the recorders of a scene in which a stream begins.
   std::vector<std::shared_ptr<TraceRecorder>> Take(uint64_t scene);
 
  private:
@@ -70,15 +70,15 @@ class TraceRecorders {
 class StreamRecording {
  public:
   StreamRecording() = default;
-  /// `start` is that of the stream, whose first step is about to be read.
+  /// `start` is the start message of the stream. No step of the stream was read yet.
   StreamRecording(const SceneRegistry& scenes, uint64_t scene, const v1::ContactStreamStart& start,
                   std::vector<std::shared_ptr<TraceRecorder>> recorders);
 
   bool active() const { return !recorders_.empty(); }
 
-  /// Notes the objects as they are before a step.
+  /// Notes the state of the objects before a step.
   void BeginStep();
-  /// Adds a step that was read, whose times `mapping` maps.
+  /// Adds a step that was read. `mapping` maps the step's times.
   void AddStep(const v1::ContactStep& step, const TimeMapping& mapping);
   void End();
 

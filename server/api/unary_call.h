@@ -25,7 +25,7 @@ grpc::ServerUnaryReactor* Answer(grpc::CallbackServerContext* context, ThreadPoo
   return reactor;
 }
 
-/// As above, if the caller has the role; its work may be `work(const Principal&)`.
+/// The same for a call that needs a role. The work may also be `work(const Principal&)`.
 template <typename Work>
 grpc::ServerUnaryReactor* Answer(grpc::CallbackServerContext* context, const Reception& reception,
                                  Role role, Work work) {
