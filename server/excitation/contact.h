@@ -24,8 +24,8 @@ using Point = std::array<double, 3>;
 struct ContactImpulse {
   /// A point in space, or a point on a triangle of the surface as given.
   std::variant<Point, SurfacePoint> location;
-  std::array<double, 3> impulse_newton_seconds{};  ///< newtons if this is a force
-  /// Absent: that of the collision of two elastic bodies.
+  std::array<double, 3> impulse_newton_seconds{};  ///< in newtons if this is a force
+  /// If it is absent, the duration is that of the collision of two elastic bodies.
   std::optional<double> duration_s = std::nullopt;
   HertzContact hertz{};
 };
@@ -40,17 +40,17 @@ struct Roughness {
 /// Longer contacts are refused.
 inline constexpr double kLongestContactS = 0.1;
 
-/// INVALID_ARGUMENT (POINT_NOT_FINITE).
+/// Checks a point. Errors: INVALID_ARGUMENT (POINT_NOT_FINITE).
 absl::Status ValidatePoint(const Point& point);
 
-/// INVALID_ARGUMENT (INVALID_WEIGHTS).
+/// Checks weights. Errors: INVALID_ARGUMENT (INVALID_WEIGHTS).
 absl::Status ValidateWeights(const std::array<double, 3>& weights);
 
-/// INVALID_ARGUMENT with IMPULSE_NOT_FINITE, POINT_NOT_FINITE, INVALID_DURATION,
-/// INVALID_HERTZ_CONTACT or INVALID_WEIGHTS.
+/// Checks a contact. Errors: INVALID_ARGUMENT with IMPULSE_NOT_FINITE, POINT_NOT_FINITE,
+/// INVALID_DURATION, INVALID_HERTZ_CONTACT or INVALID_WEIGHTS.
 absl::Status Validate(const ContactImpulse& contact);
 
-/// INVALID_ARGUMENT (INVALID_ROUGHNESS).
+/// Checks a roughness. Errors: INVALID_ARGUMENT (INVALID_ROUGHNESS).
 absl::Status Validate(const Roughness& roughness);
 
 }  // namespace carillon

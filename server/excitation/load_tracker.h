@@ -10,22 +10,23 @@ namespace carillon {
 /// loads.
 ///
 /// Engines report the load of a resting contact as an impulse in every step, and this impulse
-/// jitters; a blow is an impulse in one step or a few. The part of a step's force that exceeds
-/// three times the usual force is a blow. The usual force is the greater of the median and the mean
-/// over the last steps, including steps without contact. So a body that comes from flight has no
-/// usual force and strikes with its whole impulse, whereas a body that rests with a jitter does not
-/// strike.
+/// jitters. A blow is an impulse in one step or a few steps. The part of a step's force that
+/// exceeds three times the usual force is a blow. The usual force is the greater of the median and
+/// the mean over the last steps, including steps without contact. Therefore a body that comes from
+/// flight has no usual force and strikes with its whole impulse, whereas a body that rests with a
+/// jitter does not strike.
 class LoadTracker {
  public:
-  /// Takes the next step's impulse, zero or more, of a step of `step_s` seconds, above zero.
-  /// Returns the part of it that is a blow, 0 to 1.
+  /// Adds the next step, with an impulse of zero or more and a duration above zero. Returns the
+  /// part of the impulse that is a blow, 0 to 1.
   double Next(double impulse_newton_seconds, double step_s);
 
-  /// True if all remembered steps were without contact: a new tracker would behave alike.
+  /// Returns whether all remembered steps were without contact, so that a new tracker would behave
+  /// alike.
   bool idle() const;
 
  private:
-  /// Number of remembered steps; the usual force follows a change after half of them.
+  /// Number of remembered steps. The usual force follows a change after half of them.
   static constexpr size_t kStepCount = 8;
 
   double Usual() const;

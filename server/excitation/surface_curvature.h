@@ -13,26 +13,27 @@ namespace carillon {
 /// The radius to which the sharp edges and corners of real bodies are taken to be rounded.
 inline constexpr double kEdgeRadiusM = 0.0005;
 
-/// The curvature of a surface, as far as the duration of a contact needs it.
+/// The curvature of a surface, for the duration of contacts.
 ///
 /// The mean curvature H of a triangle mesh lies in its edges: an edge of length l between triangles
 /// whose normals form the angle theta has the integral l theta/2. Edges below 50 degrees count as
-/// the facets of a round surface; half of their integral belongs to each neighbour, and the sum is
-/// divided by the area of the triangle and of its neighbours up to two edges away, which averages
-/// the noise of scanned surfaces. Sharper edges, and edges without two neighbours, are edges of the
-/// body. They contribute nothing to faces beside them, and within kEdgeRadiusM of them the body is
-/// as sharp as a cylinder (an edge) or a sphere (a corner) of that radius.
+/// facets of a round surface, and each neighbour gets half of their integral. The integrals of a
+/// triangle and of its neighbours up to two edges away are summed and divided by the area of these
+/// triangles, which averages the noise of scanned surfaces. Sharper edges contribute nothing to
+/// adjacent faces. Convex ones, and edges without two neighbours, are sharp: within kEdgeRadiusM of
+/// them, the body is like a cylinder (an edge) or a sphere (a corner) of that radius.
 class SurfaceCurvature {
  public:
   /// #V vertices in metres, #T triangles; both must outlive this.
   SurfaceCurvature(std::span<const std::array<float, 3>> vertices,
                    std::span<const std::array<uint32_t, 3>> triangles);
 
-  /// The mean curvature at `point` of triangle `triangle` of a body `size` times as large as the
-  /// surface, 1/m; above zero where the body bulges. `point` is on the surface at its own size.
+  /// Returns the mean curvature at `point` of triangle `triangle`, 1/m, for a body `size` times as
+  /// large as the surface. It is positive where the body is convex. `point` is on the surface at
+  /// its own size.
   double At(uint32_t triangle, const Point& point, double size) const;
 
-  /// The sharp edges as pairs of vertices, each once.
+  /// Returns each sharp edge once, as a pair of vertices.
   std::vector<std::array<uint32_t, 2>> sharp_edges() const;
 
  private:

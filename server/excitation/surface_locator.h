@@ -27,23 +27,24 @@ struct LocatedPoint {
   uint32_t triangle = 0;
   std::array<uint32_t, 3> vertices{};
   std::array<double, 3> weights{};  ///< barycentric
-  double distance_m = 0;            ///< from the point of the query
+  double distance_m = 0;            ///< distance from the point of the query
 };
 
 /// Finds the point of the sounding surface at which a contact acts. Several threads may query at
-/// once, but no thread that renders may.
+/// once, except render threads.
 class SurfaceLocator {
  public:
-  /// INVALID_ARGUMENT (SURFACE_MALFORMED): no triangle, or an index out of range.
+  /// Makes a locator. Errors: INVALID_ARGUMENT (SURFACE_MALFORMED: no triangle, or an index out of
+  /// range).
   static absl::StatusOr<std::unique_ptr<SurfaceLocator>> Make(const LocatorSurfaces& surfaces);
   ~SurfaceLocator();
 
   /// Returns the point of the sounding surface nearest to `point`, which is in the model's frame
-  /// and size, metres. INVALID_ARGUMENT (POINT_NOT_FINITE, POINT_TOO_FAR).
+  /// and size, metres. Errors: INVALID_ARGUMENT (POINT_NOT_FINITE, POINT_TOO_FAR).
   absl::StatusOr<LocatedPoint> Nearest(const Point& point) const;
 
   /// Returns the point of the sounding surface at a point of a given triangle. Triangles that lie
-  /// on that given triangle are preferred. INVALID_ARGUMENT (TRIANGLE_OUT_OF_RANGE,
+  /// on that given triangle are preferred. Errors: INVALID_ARGUMENT (TRIANGLE_OUT_OF_RANGE,
   /// INVALID_WEIGHTS).
   absl::StatusOr<LocatedPoint> OnGivenTriangle(const SurfacePoint& at) const;
 

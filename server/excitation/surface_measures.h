@@ -7,16 +7,16 @@
 
 namespace carillon {
 
-/// The volume inside a closed surface, m^3, of #V vertices in metres and #T triangles; zero for a
-/// surface that encloses none.
+/// Returns the volume inside a closed surface, m^3, of #V vertices in metres and #T triangles.
+/// Returns zero for a surface that encloses no volume.
 double VolumeM3(std::span<const std::array<float, 3>> vertices,
                 std::span<const std::array<uint32_t, 3>> triangles);
 
-/// The area of the triangles, m^2.
+/// Returns the area of the triangles, m^2.
 double AreaM2(std::span<const std::array<float, 3>> vertices,
               std::span<const std::array<uint32_t, 3>> triangles);
 
-/// The diagonal of the bounding box, metres.
+/// Returns the diagonal of the bounding box, metres.
 double ExtentM(std::span<const std::array<float, 3>> vertices);
 
 }  // namespace carillon

@@ -18,34 +18,34 @@
 
 namespace carillon {
 
-/// Whether a wanted device plays, and since when it does not.
+/// The state of the wanted device and of the device in use.
 struct DeviceState {
-  std::string description;  ///< of the device that pulls at present
-  std::string message;      ///< one line on what is wrong; empty: nothing
-  /// The wanted device pulls, and takes every frame; or the wanted device is "auto", and there has
-  /// never been a sound card.
+  std::string description;  ///< device that pulls at present
+  std::string message;      ///< one line about the present fault, or empty
+  /// Whether the wanted device pulls and takes every frame. Also true if the wanted device is
+  /// "auto" and there has never been a sound card.
   bool plays = true;
   double latency_s = 0;
-  uint64_t xrun_count = 0;  ///< of all devices so far
+  uint64_t xrun_count = 0;  ///< xruns of all devices so far
   uint64_t lost_frame_count = 0;
 };
 
 /// Plays a source on the wanted device. While that device is away, the null device pulls from the
-/// source, so that time goes on, and the wanted device is opened again twice a second.
+/// source, so that time goes on, and the keeper tries to open the wanted device twice a second.
 ///
 ///     wanted device plays --Check fails--> null pulls --opened and started--> wanted device plays
 ///
-/// A thread of its own does this, because opening a device may take seconds.
+/// The keeper has its own thread, because opening a device may take seconds.
 class DeviceKeeper {
  public:
   /// Takes a line for people to read.
   using Log = std::function<void(const std::string&)>;
-  /// The keeper calls this each time that the wanted device begins or ceases to play.
+  /// Takes DeviceState::plays when it may have changed.
   using Observer = std::function<void(bool plays)>;
 
-  /// Plays `source`, which must outlive the keeper, as `clock` must. A sound card that is not there
-  /// is waited for. Errors: InvalidArgument (INVALID_AUDIO_DEVICE), FailedPrecondition
-  /// (AUDIO_FILE_FAILED, WORKER_NOT_FOUND).
+  /// Plays `source`. `source` and `clock` must outlive the keeper. If a sound card does not exist
+  /// yet, the keeper waits for it. Errors: InvalidArgument (INVALID_AUDIO_DEVICE),
+  /// FailedPrecondition (AUDIO_FILE_FAILED, WORKER_NOT_FOUND).
   static absl::StatusOr<std::unique_ptr<DeviceKeeper>> Start(const DeviceSettings& settings,
                                                              FrameSource& source, Clock& clock,
                                                              Log log);
@@ -57,7 +57,8 @@ class DeviceKeeper {
 
   DeviceState state() const;
 
-  /// Calls `observer` now, and whenever its argument changes, until it is replaced by a null one.
+  /// Calls `observer` at once, and whenever its argument may have changed, until it is replaced by
+  /// a null observer.
   void Observe(Observer observer);
 
  private:
@@ -83,11 +84,11 @@ class DeviceKeeper {
   mutable Mutex mutex_;
   /// Only the keeper's thread changes it.
   std::unique_ptr<AudioDevice> device_ ABSL_GUARDED_BY(mutex_);
-  bool wanted_ ABSL_GUARDED_BY(mutex_) = false;  ///< device_ is the wanted one, not null
-  /// Silence is a fault: a device was named, or "auto" has found one before.
+  bool wanted_ ABSL_GUARDED_BY(mutex_) = false;  ///< whether device_ is the wanted device
+  /// Whether silence is a fault, because a device was named or "auto" has found a device before.
   bool missed_ ABSL_GUARDED_BY(mutex_);
   std::string message_ ABSL_GUARDED_BY(mutex_);
-  /// Counts of devices that were replaced.
+  /// Counts of the devices that were replaced.
   uint64_t earlier_xrun_count_ ABSL_GUARDED_BY(mutex_) = 0;
   uint64_t earlier_lost_frame_count_ ABSL_GUARDED_BY(mutex_) = 0;
   Mutex observer_mutex_;

@@ -9,8 +9,8 @@
 
 namespace carillon {
 
-/// The end of the sound when the daemon stops: 50 ms of a raised cosine, then silence, because a
-/// cut is heard as a click.
+/// Fades the sound out when the daemon stops, by 50 ms of a raised cosine, because an abrupt end is
+/// heard as a click.
 class FinalFade {
  public:
   explicit FinalFade(const DeviceFormat& format);
@@ -18,17 +18,17 @@ class FinalFade {
   /// Begins the fade. Any thread.
   void Begin() noexcept { begun_.store(true, std::memory_order_relaxed); }
 
-  /// Whether a silent block has been rendered. Any thread.
+  /// Returns whether a silent block has been rendered. Any thread.
   bool ended() const noexcept { return ended_.load(std::memory_order_relaxed); }
 
-  /// Called by the render thread with each block; it is real-time safe.
+  /// Applies the fade to a block. The render thread calls it with each block. Real-time safe.
   void Apply(std::span<float> block) noexcept;
 
  private:
   double Gain() const noexcept;
 
   const size_t channel_count_;
-  const double frame_count_;  ///< of the fade
+  const double frame_count_;  ///< frames of the fade
   double frame_ = 0;          ///< next frame of the fade
   std::atomic<bool> begun_{false};
   std::atomic<bool> ended_{false};

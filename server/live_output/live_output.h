@@ -30,11 +30,11 @@ struct OutputSettings {
   DeviceFormat format{};
   /// Blocks rendered ahead of the device.
   uint32_t look_ahead_block_count = 8;
-  /// See DeviceSettings.
+  /// See DeviceSettings::specification.
   std::string device = "auto";
   /// Path of carillon-audio, which opens sound cards.
   std::string device_program{};
-  double gain = 1;                      ///< of the output, before the limiter
+  double gain = 1;                      ///< gain of the output, before the limiter
   double full_scale_pa = kFullScalePa;  ///< the pressure of a sample of 1
 };
 
@@ -48,18 +48,18 @@ struct OutputVolume {
 struct OutputState {
   std::string device;
   bool device_plays = true;    ///< as DeviceState::plays
-  std::string device_message;  ///< one line on what is wrong with it; empty: nothing
-  double latency_s = 0;        ///< from the mixer to audible sound, as far as known
+  std::string device_message;  ///< one line about the device's fault, or empty
+  double latency_s = 0;        ///< delay from the mixer to audible sound, as far as known
   double load = 0;             ///< fraction of real time that rendering takes
   uint64_t xrun_count = 0;
   uint64_t lost_frame_count = 0;
   double peak = 0;                        ///< largest sample of the last second, before the limiter
-  std::optional<double> momentary_lufs;   ///< loudness of the last 400 ms; unset for silence
-  std::optional<double> short_term_lufs;  ///< loudness of the last 3 s; unset for silence
+  std::optional<double> momentary_lufs;   ///< loudness of the last 400 ms; absent for silence
+  std::optional<double> short_term_lufs;  ///< loudness of the last 3 s; absent for silence
   MixerStatistics mixer;
 };
 
-/// Plays a mixer: renders it ahead of a device that a DeviceKeeper keeps playing, broadcasts it to
+/// Renders a mixer ahead of a device that a DeviceKeeper keeps playing, broadcasts the sound to
 /// listeners, and frees retired memory on a housekeeping thread. All functions may be called from
 /// any thread.
 class LiveOutput {
@@ -67,8 +67,8 @@ class LiveOutput {
   /// Takes a line for people to read.
   using Log = DeviceKeeper::Log;
 
-  /// Opens the device and begins to play. `clock` must outlive the output.
-  /// Errors: those of DeviceKeeper::Start.
+  /// Opens the device and starts to play. `clock` must outlive the output. Errors: those of
+  /// DeviceKeeper::Start.
   static absl::StatusOr<std::unique_ptr<LiveOutput>> Start(const OutputSettings& settings,
                                                            Clock& clock, Log log);
   ~LiveOutput();
@@ -77,21 +77,22 @@ class LiveOutput {
 
   Mixer& mixer() { return mixer_; }
   BlockBroadcast& broadcast() { return broadcast_; }
-  /// Lets clients listen to single scenes.
+  /// The stems, through which clients listen to single scenes.
   Stems& stems() { return stems_; }
   const DeviceFormat& format() const { return settings_.format; }
   double full_scale_pa() const { return settings_.full_scale_pa; }
   OutputVolume volume() const;
-  /// Changes what is given; the volume glides within 30 ms. Returns the volume as it is now.
+  /// Changes the gain and the mute switch, each if it is present. The volume glides within 30 ms.
+  /// Returns the new volume.
   OutputVolume ChangeVolume(std::optional<double> gain, std::optional<bool> muted);
   OutputState state() const;
 
-  /// Calls `observer` now, and whenever the wanted device begins or ceases to play, until it is
-  /// replaced by a null one.
+  /// Calls `observer` at once, and whenever the wanted device may have begun or ceased to play,
+  /// until it is replaced by a null observer.
   void ObserveDevice(DeviceKeeper::Observer observer) { keeper_->Observe(std::move(observer)); }
 
-  /// Lets the sound fade to silence within 50 ms, and returns when the device has played that. The
-  /// output stays silent.
+  /// Fades the sound out within 50 ms, and returns when the device has played the fade. The output
+  /// stays silent.
   void FadeOut();
 
  private:
@@ -120,7 +121,7 @@ class LiveOutput {
   std::deque<Peak> peaks_ ABSL_GUARDED_BY(mutex_);
   std::optional<double> momentary_lufs_ ABSL_GUARDED_BY(mutex_);
   std::optional<double> short_term_lufs_ ABSL_GUARDED_BY(mutex_);
-  LoudnessMeter loudness_;  ///< used by the housekeeping thread alone
+  LoudnessMeter loudness_;  ///< used only by the housekeeping thread
   std::atomic<bool> stopping_{false};
   std::thread housekeeper_;
 };

@@ -17,16 +17,17 @@ namespace carillon {
 /// Lets clients listen to single buses of a mixer. Safe from every thread.
 class Stems {
  public:
-  /// `mixer` must outlive this, but must render no more when this is destroyed.
+  /// `mixer` must outlive this, and must have stopped rendering before this is destroyed.
   Stems(Mixer& mixer, const DeviceFormat& format, size_t queue_block_count)
       : mixer_(mixer), format_(format), queue_block_count_(queue_block_count) {}
 
-  /// Adds a listener to a bus; see BlockBroadcast::Subscribe. It must be destroyed before this.
+  /// Adds a listener to a bus; see BlockBroadcast::Subscribe. The listener must be destroyed before
+  /// this.
   absl::StatusOr<std::unique_ptr<BlockBroadcast::Listener>> Subscribe(BusId bus,
                                                                       std::function<void()> wake);
 
-  /// Hands new blocks to the listeners, and frees what nobody hears. The housekeeping thread calls
-  /// it periodically.
+  /// Hands new blocks to the listeners, and frees the stems that have no listener. The housekeeping
+  /// thread calls it periodically.
   void Deliver();
 
  private:
@@ -45,8 +46,8 @@ class Stems {
 
     const BusId bus;
     BlockBroadcast broadcast;
-    std::atomic<bool> closed{false};  ///< the bus was
-    /// The mixer's frame when the bus ceased to be tapped; zero: it is tapped.
+    std::atomic<bool> closed{false};  ///< whether the bus was closed
+    /// The mixer's frame when the bus ceased to be tapped, or zero while it is tapped.
     uint64_t left_frame = 0;
   };
 

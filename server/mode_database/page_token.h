@@ -18,8 +18,8 @@ struct PageRange {
   int64_t below = 0;
 };
 
-/// Returns a range. A `page_size` of 0 means 100; 1000 is the largest. The token is the last key of
-/// the previous page, or empty for the newest rows. Errors: InvalidArgument (INVALID_PAGE).
+/// Returns a range. A `page_size` of 0 means 100. The token is the last key of the previous page,
+/// or empty for the newest rows. Errors: InvalidArgument (INVALID_PAGE).
 absl::StatusOr<PageRange> ParsePage(int page_size, const std::string& page_token);
 
 }  // namespace carillon

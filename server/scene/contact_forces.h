@@ -15,10 +15,10 @@
 
 namespace carillon {
 
-/// The numbers of an engine's contacts by what they turned out to be.
+/// The numbers of an engine's contacts that turned out to be blows and loads.
 struct BlowCounts {
-  uint64_t blow_count = 0;  ///< blows, each of one step or of several
-  uint64_t load_count = 0;  ///< contacts that were wholly loads, in each step
+  uint64_t blow_count = 0;  ///< blows; a blow may span several steps
+  uint64_t load_count = 0;  ///< contacts that were only loads, counted in each step
 };
 
 /// An action on an object at a simulation time.
@@ -26,17 +26,17 @@ struct ForceEvent {
   uint32_t handle = 0;
   MixerEvent::Action action{};
   double time_s = 0;
-  uint32_t by = 0;         ///< of a blow: the other body
-  bool by_sounds = false;  ///< of a blow: whether `by` is the handle of an object
+  uint32_t by = 0;         ///< the other body of a blow
+  bool by_sounds = false;  ///< whether `by`, in a blow, is the handle of an object
 };
 
-/// Turns the lasting contacts of one simulation into events of the mixer. Each step gives, for each
-/// object under a force, the object's forces and then a knot; a contact that was a blow gives an
-/// impulse, too. One thread at a time.
+/// Turns the lasting contacts of one simulation into events of the mixer. For each object under a
+/// force, each step produces the object's forces and then a knot. A contact that was a blow also
+/// produces an impulse. One thread at a time.
 ///
-/// Engines with soft contacts spread a blow over several steps. While steps follow each other
-/// without a gap, the steps of a blow are gathered into one impulse, which is sent at the step in
-/// which the blow turns out to be over:
+/// Engines with soft contacts spread a blow over several steps. As long as no step is missing, the
+/// steps of a blow are gathered into one impulse, which is sent at the step in which the blow turns
+/// out to be over:
 ///
 ///     force   |      . .                the blow is over when
 ///             |    .     .              * the force above the load has fallen to a quarter of its
@@ -46,38 +46,39 @@ struct ForceEvent {
 ///             +------------+------ t    In the last two cases the force that remains is a load,
 ///             begin        over         and counts for nothing in the blow.
 ///
-/// A client that sends only steps with contacts does not wait: the first step after a gap is a blow
-/// by itself.
+/// A client that sends only steps with contacts need not wait for its sound, because the first step
+/// after a gap is a blow by itself.
 ///
-/// An engine gives the step of a blow and not the time within the step. Blows of two bodies that
-/// slide, roll or hop would therefore sound on the grid of the steps, and be heard as lines at the
-/// multiples of the step rate. A blow of two bodies that touched within 0.1 s before it is sent at
-/// a random time within one step after the step in which it is over. The time is uniformly
-/// distributed, so that the mean spectrum of such blows has no lines; it is a function of the
-/// simulation time and of the two bodies, so that the same simulation gives the same events. The
-/// first blow after a flight, and contacts with a time offset of their own, have exact times.
+/// An engine reports the step of a blow, not the time within the step. Blows of two bodies that
+/// slide, roll or hop would therefore sound on the grid of the steps, as tones at multiples of the
+/// step rate. A blow of two bodies that touched within 0.1 s before it is sent at a random time
+/// within one step after the step in which it is over. The time is uniformly distributed, so that
+/// the mean spectrum of such blows has no lines. The time is a function of the simulation time and
+/// of the two bodies, so that the same simulation gives the same events. The first blow after a
+/// flight, and contacts with a time offset of their own, have exact times.
 class ContactForces {
  public:
   using Events = std::vector<ForceEvent>;
 
-  /// `step_s`: the simulator's step, seconds.
+  /// `step_s` is the simulator's step, seconds.
   explicit ContactForces(double step_s) : nominal_step_s_(step_s) {}
 
-  /// Begins the step at simulation time `time_s`, which is not before the last step's. If steps
-  /// were left out, the forces ended with the last step, and the events that end them are returned.
+  /// Begins the step at simulation time `time_s`, which must not be before the last step's. If
+  /// steps were left out, the forces ended with the last step; returns the events that end these
+  /// forces.
   Events Begin(double time_s);
 
-  /// Adds a force to this step, with newtons in place of newton seconds.
+  /// Adds a force to this step. The impulses in `force` are newtons, not newton seconds.
   void Add(const FeltContact& force, const Roughness& roughness);
 
-  /// Adds a contact to this step that may be a blow or a load. `impulse` is what the objects of
-  /// `touch` feel.
+  /// Adds a contact that may be a blow or a load to this step. `impulse` has the impulses that the
+  /// objects of `touch` feel.
   void Touch(const ObjectTouch& touch, const FeltContact& impulse);
 
   /// Ends the step and returns its events.
   Events End();
 
-  /// Ends the simulation: returns the blows that are not over yet.
+  /// Ends the simulation. Returns the blows that are not over yet.
   Events Finish();
 
   const BlowCounts& counts() const { return counts_; }
@@ -100,13 +101,13 @@ class ContactForces {
   static ForceEvent PartOfBlow(const PairTouch& touch, size_t which, double scale);
   /// The steps of a blow that is not over yet.
   struct Blow {
-    double load_newtons = 0;  // before the blow
+    double load_newtons = 0;  // load before the blow
     double begin_s = 0;
-    std::vector<double> impulses{};    // above the load, N s, of each step
-    std::vector<double> forces{};      // whole, newtons, of each step
-    std::vector<PairTouch> touches{};  // those of the step with the greatest impulse
+    std::vector<double> impulses{};    // impulse of each step above the load, N s
+    std::vector<double> forces{};      // whole force of each step, newtons
+    std::vector<PairTouch> touches{};  // touches of the step with the greatest impulse
     double greatest = 0;               // the greatest of `impulses`
-    bool lasting = false;              // the bodies touched shortly before the blow
+    bool lasting = false;              // whether the bodies touched shortly before the blow
   };
   struct Pair {
     LoadTracker load;
@@ -119,14 +120,14 @@ class ContactForces {
   void End(Events& events);
   /// Adds the impulse of `felt` times `per_second` as a force of this step.
   void Add(const Felt& felt, double per_second, const Roughness& roughness);
-  /// Sends the touches of two bodies on: blows as impulses, loads (see LoadTracker) as forces.
+  /// Sends the blows of two bodies as impulses, and their loads (see LoadTracker) as forces.
   void Divide(const Bodies& bodies, Pair& pair, Events& events);
-  /// Returns the blow that begins in this step, without its impulses.
+  /// Returns the blow that begins in this step; its impulses are still empty.
   Blow BlowOf(const Pair& pair, double load_newtons) const;
   /// Adds a step's force and the impulse above the load to the pair's blow.
   void Gather(Pair& pair, double force_newtons, double impulse) const;
-  /// Whether the blow is over in this step, whose force and impulse above the load are given. If a
-  /// load remains, `remains` is set to its force.
+  /// Returns whether the blow is over in this step, which has the given force and impulse above the
+  /// load. If a load remains, `remains` is set to its force.
   bool IsOver(const Blow& blow, double force_newtons, double impulse, double& remains) const;
   void SendBlow(const Bodies& bodies, const Blow& blow, double remains_newtons, Events& events);
   /// Returns the time of a touch of a blow that is over in this step.
@@ -135,11 +136,11 @@ class ContactForces {
   static ForceKnot MakeKnot(const std::vector<Force>& forces, double step_s);
 
   double nominal_step_s_;
-  double step_s_ = 0;  // since the step before
+  double step_s_ = 0;  // time since the previous step
   std::optional<double> time_s_;
   std::map<uint32_t, Object> objects_;
   std::map<Bodies, Pair> pairs_;
-  bool follows_ = false;  // this step follows the one before without a gap
+  bool follows_ = false;  // whether no step is missing before this step
   BlowCounts counts_;
 };
 

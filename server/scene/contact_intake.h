@@ -18,21 +18,21 @@
 
 namespace carillon {
 
-/// Where the events of an intake go, and the clock by which they are late or early.
+/// Takes the events of an intake, and has the clock by which they are late or early.
 class EventTarget {
  public:
   virtual ~EventTarget() = default;
 
-  /// Number of the frame that is rendered next.
+  /// Returns the number of the frame that is rendered next.
   virtual uint64_t frame() const = 0;
 
   virtual void Push(const MixerEvent& event) = 0;
 };
 
-/// How the contacts of a simulation are to be read.
+/// The conventions by which the contacts of a simulation are read.
 struct ContactReading {
-  bool scene_frame = false;      ///< points and impulses are in the scene's frame
-  bool gaussian_pulses = false;  ///< instead of raised cosines
+  bool scene_frame = false;      ///< whether points and impulses are in the scene's frame
+  bool gaussian_pulses = false;  ///< Gaussian pulses instead of raised cosines
 };
 
 /// How an intake maps simulation time to frames.
@@ -40,40 +40,40 @@ struct IntakeSettings {
   double sample_rate_hz = 48000;
   double step_s = 0;  ///< the simulator's step
   double delay_s = 0;
-  /// The mapping of a simulation that was heard before, with its own delay; absent: the first step
-  /// lies at the target's frame when the step comes.
+  /// The mapping, with its own delay, of a simulation that was heard before. If it is absent, the
+  /// first step is mapped to the target's frame at the step's arrival.
   std::optional<TimeMapping> mapping = std::nullopt;
-  /// Each step lies at the target's frame when it comes, so that no contact is late.
+  /// Whether each step is mapped to the target's frame at the step's arrival, so that no contact is
+  /// late.
   bool at_once = false;
-  double most_ahead_s = 60;  ///< limit of TIME_TOO_FAR_AHEAD, not counting the delay
+  double most_ahead_s = 60;  ///< limit for TIME_TOO_FAR_AHEAD, not counting the delay
   ContactReading reading{};
-  /// Counts rejected contacts, too, by reason; null: nobody wants to know. It must outlive the
-  /// intake.
+  /// If not null, also counts rejected contacts by reason. It must outlive the intake.
   RejectionCounts* rejections = nullptr;
-  /// Gets each impulse that is handed on; null: nobody wants to know. It must outlive the intake.
+  /// If not null, gets each impulse that is handed on. It must outlive the intake.
   std::vector<FoundBlow>* blows = nullptr;
 };
 
 /// Counts of the contacts of a simulation that a ContactIntake has found unusual so far.
 struct IntakeFindings {
   BlowCounts engine{};
-  uint64_t distant_point_count = 0;      ///< farther than 5 % of the object's extent
-  double largest_distance_m = 0;         ///< of a point from its object's surface
+  uint64_t distant_point_count = 0;      ///< points farther from the surface than 5 % of the extent
+  double largest_distance_m = 0;         ///< largest distance of a point from its object's surface
   uint64_t zero_impulse_count = 0;       ///< contacts without an impulse
-  uint64_t too_large_impulse_count = 0;  ///< rejected
+  uint64_t too_large_impulse_count = 0;  ///< contacts rejected for their impulse
 };
 
-/// Takes all that a client reports of one simulation, checks it, locates it on the objects of a
-/// scene, and hands it on as events of the mixer. Live streams and offline rendering both use it,
-/// so that a simulation sounds the same, and is refused for the same reasons, in both.
+/// Takes the reports of a client about one simulation, checks them, locates them on the objects of
+/// a scene, and hands them on as events of the mixer. Live streams and offline rendering both use
+/// the intake, so that both render a simulation alike and refuse it for the same reasons.
 ///
 ///     frame(t) = first frame + (t - time of the first step + delay) rate
 ///
-/// If every step of kLateRunS comes late, as after a pause in which a simulator loads, time is
-/// mapped anew, as if the newest of these steps were the first.
+/// If every step within kLateRunS comes late, for instance after a pause in which a simulator
+/// loads, simulation time is mapped anew, as if the newest of these steps were the first.
 ///
-/// A report that cannot be used counts as rejected, once for each object of a contact, and the rest
-/// goes on; last_rejection() says why. One thread at a time.
+/// A report that cannot be used counts as rejected, once for each object of a contact, and
+/// last_rejection() has the reason. Other reports are still used. One thread at a time.
 class ContactIntake {
  public:
   /// `scene` and `target` must outlive the intake.
@@ -85,32 +85,33 @@ class ContactIntake {
 
   void Strike(const ObjectImpulse& impulse);
 
-  /// Forces and touches last for one step, and are reported again in each step until they end.
+  /// Adds a force. Forces and touches last for one step, and must be reported again in each step
+  /// until they end.
   void Hold(const ObjectForce& force);
   void Touch(const ObjectTouch& touch);
 
-  /// The pose of an object, or of the listener, at the time of the step: both move there in a
-  /// straight line from the pose given before.
+  /// Sets the pose of an object or of the listener at the time of the step. The object or listener
+  /// moves there in a straight line from its previous pose.
   void Move(uint32_t handle, const Pose& pose);
   void MoveListener(const Pose& pose);
 
-  /// Ends the step: all its forces have been reported.
+  /// Ends the step after all its forces have been reported.
   void EndStep();
 
-  /// Ends the simulation: blows that an engine spreads over steps are over now.
+  /// Ends the simulation, and with it the blows that an engine spreads over steps.
   void Finish();
 
   /// Counts `count` contacts that could not be used.
   void Reject(uint64_t count, absl::Status reason);
 
   const TimeMapping& mapping() const { return mapper_.mapping(); }
-  /// How many times simulation time was mapped anew.
+  /// Number of times that simulation time was mapped anew.
   uint64_t remap_count() const { return mapper_.remap_count(); }
   uint64_t step_count() const { return step_count_; }
-  /// Impulses handed on.
+  /// Number of impulses handed on.
   uint64_t impulse_count() const { return impulse_count_; }
   uint64_t rejected_count() const { return rejected_count_; }
-  /// Why the newest rejected contact could not be used; OK if none was rejected.
+  /// Returns the reason of the newest rejection, or OK if no contact was rejected.
   const absl::Status& last_rejection() const { return last_rejection_; }
   IntakeFindings findings() const;
 
@@ -121,11 +122,11 @@ class ContactIntake {
   absl::Status TryMove(uint32_t handle, const Pose& pose);
   absl::Status TryMoveListener(const Pose& pose);
   void Note(uint64_t count, absl::Status verdict);
-  /// Finds the objects of a contact and what they feel. `seconds`: one for an impulse, the step for
-  /// a force.
+  /// Finds the objects of a contact and the impulses that they feel. `seconds` is one for an
+  /// impulse, and the step for a force.
   absl::Status Locate(const ObjectContact& contact, double seconds, FeltContact& felt)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(scene_.mutex());
-  /// Counts the findings about a contact. Errors: InvalidArgument (IMPULSE_TOO_LARGE).
+  /// Counts unusual properties of a contact. Errors: InvalidArgument (IMPULSE_TOO_LARGE).
   absl::Status Examine(const FeltContact& felt, double seconds);
   void NoteZero(const ObjectContact& contact);
   void Push(const ContactForces::Events& events);

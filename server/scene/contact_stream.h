@@ -13,29 +13,29 @@
 
 namespace carillon {
 
-/// How a contact stream maps simulation time to audio time.
+/// Settings by which a contact stream maps simulation time to audio time.
 struct ContactStreamSettings {
-  double step_s = 0;  ///< the simulator's step: above 0, at most 1
-  /// 0 to 10; absent: one step, one block and 5 ms for the network.
+  double step_s = 0;  ///< the simulator's step, above 0 and at most 1
+  /// 0 to 10. If it is absent, the delay is one step, one block and 5 ms for the network.
   std::optional<double> scheduling_delay_s = std::nullopt;
-  /// Each contact sounds when it comes, with no scheduling delay but its own time offset.
+  /// Whether each contact sounds at its arrival, delayed only by its own time offset.
   bool at_once = false;
   ContactReading reading{};
-  RejectionCounts* rejections = nullptr;  ///< as in IntakeSettings
+  RejectionCounts* rejections = nullptr;  ///< see IntakeSettings
 };
 
-/// The numbers of a stream's steps, and of its impulses by what became of them.
+/// The numbers of a stream's steps, and of its impulses by outcome.
 struct ContactCounts {
   uint64_t step_count = 0;
   uint64_t accepted_count = 0;
   uint64_t late_count = 0;
   uint64_t dropped_count = 0;
   uint64_t rejected_count = 0;
-  uint64_t remap_count = 0;  ///< how many times simulation time was mapped anew
+  uint64_t remap_count = 0;  ///< times that simulation time was mapped anew
 };
 
-/// The contacts of one simulator that runs now: an intake whose events go through a queue to the
-/// live mixer. One thread at a time.
+/// The contacts of one running simulator. The events of the stream's intake go through a queue to
+/// the live mixer. One thread at a time.
 class ContactStream {
  public:
   /// `mixer` must outlive the stream. Errors: InvalidArgument (INVALID_STREAM), ResourceExhausted
@@ -51,19 +51,19 @@ class ContactStream {
 
   double scheduling_delay_s() const { return intake_.mapping().delay_s; }
 
-  /// The mixer's frame that the first step's time is mapped to, less the scheduling delay; absent
-  /// before it has come.
+  /// Returns the mixer's frame to which the first step's time is mapped, less the scheduling delay,
+  /// or nothing before the first step.
   std::optional<uint64_t> first_frame() const {
     return intake_.step_count() > 0 ? std::optional(intake_.mapping().first_frame) : std::nullopt;
   }
 
-  /// Impulses that the mixer has not taken yet are in none of the counts.
+  /// Returns the counts. No count includes impulses that the mixer has not taken yet.
   ContactCounts counts() const;
 
-  /// True if the mixer has taken every impulse: counts() is final.
+  /// Returns whether the mixer has taken every impulse, so that counts() is final.
   bool settled() const;
 
-  /// Why the newest rejected impulse could not be used; OK if none was rejected.
+  /// Returns the reason of the newest rejection, or OK if no contact was rejected.
   const absl::Status& last_rejection() const { return intake_.last_rejection(); }
 
  private:

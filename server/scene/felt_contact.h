@@ -15,14 +15,14 @@
 
 namespace carillon {
 
-/// The impulse that one object feels of a contact, as the event that its bank gets.
+/// The impulse of a contact on one object, as the event that the object's bank gets.
 struct Felt {
   uint32_t handle = 0;
-  MixerEvent event{};     ///< a SurfaceImpulse; its time is set when it is sent
-  double distance_m = 0;  ///< from the point of the contact to the surface
-  double extent_m = 0;    ///< of the object
-  /// An impulse that makes the whole object ten times as fast as sound travels in its material. No
-  /// body bears even a tenth of it.
+  MixerEvent event{};     ///< a SurfaceImpulse; gets its time when it is sent
+  double distance_m = 0;  ///< distance from the point of the contact to the surface
+  double extent_m = 0;    ///< extent of the object
+  /// The impulse that gives the whole object ten times the speed of sound in its material. No body
+  /// withstands even a tenth of this impulse.
   double largest_newton_seconds = std::numeric_limits<double>::infinity();
 
   const SurfaceImpulse& impulse() const { return std::get<SurfaceImpulse>(event.action); }
@@ -32,7 +32,7 @@ struct Felt {
 struct FeltContact {
   std::array<Felt, 2> by{};
   size_t count = 0;
-  /// Whether the duration was computed from the impulse, so that a greater one has a shorter
+  /// Whether the duration was computed from the impulse, so that a greater impulse has a shorter
   /// contact.
   bool duration_follows_impulse = false;
 
@@ -44,8 +44,8 @@ struct FeltContact {
 inline constexpr double kDurationPower = -0.2;
 
 /// Fills in the impulses that `object`, and in a contact of two `second`, feel of `contact`. Points
-/// are in metres of the object at its size. Where the contact states no duration, it is that of the
-/// collision of `object` with `second` or, without one, with the tip of a steel hammer.
+/// are in metres of the object at its size. If the contact states no duration, the duration is that
+/// of the collision of `object` with `second` or, if that is null, with the tip of a steel hammer.
 /// Errors: InvalidArgument (INVALID_POSE: the rotation between the objects, and those of Validate
 /// and of SurfaceLocator).
 absl::Status Feel(const ObjectContact& contact, const SoundingObject& object,

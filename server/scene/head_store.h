@@ -16,21 +16,21 @@
 namespace carillon {
 
 /// The measured head through which scenes are heard binaurally, from a SOFA file (AES69, convention
-/// SimpleFreeFieldHRIR). It is read when it is needed first. Safe from every thread.
+/// SimpleFreeFieldHRIR). The file is read when the head is first needed. Safe from every thread.
 class HeadStore {
  public:
-  /// Empty: the file that the Debian package libmysofa1 brings, of the dummy head KEMAR.
+  /// If `file` is empty, uses the file of the dummy head KEMAR in the Debian package libmysofa1.
   explicit HeadStore(std::string file = "");
 
-  /// Sets the head of a scene that asks for binaural rendering, if it sounds on two channels; does
-  /// nothing for others. Errors: those of Get.
+  /// Sets the head of a scene that asks for binaural rendering and has two channels. Does nothing
+  /// for other scenes. Errors: those of Get.
   absl::Status Complete(SceneSpace& space, uint32_t sample_rate_hz, uint32_t channel_count);
 
   /// Returns the head at a sample rate. Errors: FailedPrecondition (HEAD_UNUSABLE: the file cannot
   /// be read or holds no measured head).
   absl::StatusOr<std::shared_ptr<const Head>> Get(uint32_t sample_rate_hz);
 
-  /// Whether the file is there.
+  /// Returns whether the file exists.
   bool available() const;
 
  private:
@@ -41,7 +41,7 @@ class HeadStore {
 
   const std::string file_;
   Mutex mutex_;
-  std::list<Made> heads_ ABSL_GUARDED_BY(mutex_);  ///< those used last, the newest first
+  std::list<Made> heads_ ABSL_GUARDED_BY(mutex_);  ///< the heads used last, the newest first
 };
 
 }  // namespace carillon

@@ -14,22 +14,23 @@ namespace carillon {
 struct SecondObject {
   uint32_t handle = 0;
   std::variant<Point, SurfacePoint> location;  ///< in the second object's frame
-  /// From the first object's frame into the second's; absent: the poses of both say it.
+  /// Rotates from the first object's frame into the second's. If it is absent, the rotation follows
+  /// from the poses of both objects.
   std::optional<Quaternion> rotation = std::nullopt;
 };
 
-/// A contact of one object of a scene, or of two.
+/// A contact of one or two objects of a scene.
 struct ObjectContact {
   uint32_t handle = 0;
   ContactImpulse impulse{};
   std::optional<SecondObject> second = std::nullopt;
-  /// Points may lie inside the bodies, as deep as an engine lets them reach into one another.
+  /// Whether points may lie inside the bodies, because engines let bodies overlap.
   bool found_by_engine = false;
 
   uint64_t object_count() const { return second ? 2 : 1; }
 };
 
-/// An impulse, at a time after its step's.
+/// An impulse, at the time of its step plus an offset.
 struct ObjectImpulse {
   ObjectContact contact{};
   double time_offset_s = 0;
@@ -37,7 +38,7 @@ struct ObjectImpulse {
 
 /// A force that lasts.
 struct ObjectForce {
-  ObjectContact contact{};  ///< newtons in place of newton seconds
+  ObjectContact contact{};  ///< the impulse is in newtons, not newton seconds
   Roughness roughness{};
 };
 
@@ -46,7 +47,7 @@ struct ObjectTouch {
   ObjectContact contact{};  ///< the impulse is that of the whole step
   uint32_t partner = 0;     ///< names the other body
   Roughness roughness{};
-  double time_offset_s = 0;  ///< of a blow
+  double time_offset_s = 0;  ///< time offset of a blow
 };
 
 }  // namespace carillon

@@ -21,12 +21,12 @@
 
 namespace carillon {
 
-/// How to render offline.
+/// Settings of an offline rendering.
 struct OfflineSettings {
   uint32_t sample_rate_hz = 48000;
-  uint32_t channel_count = 1;  ///< or 2
-  /// Length of the sound after the last contact; zero: until it stays below -80 dB of full scale,
-  /// at most 60 s.
+  uint32_t channel_count = 1;  ///< 1 or 2
+  /// Length of the sound after the last contact. If it is zero, the sound ends when it stays below
+  /// -80 dB of full scale, and after 60 s at the latest.
   double tail_s = 0;
   double gain = 1;                      ///< of the whole sound, before the limiter
   double full_scale_pa = kFullScalePa;  ///< the pressure of a sample of 1
@@ -39,7 +39,7 @@ struct OfflineSettings {
   TimeMapping mapping{};
   /// The stagger of the bus through which the trace was heard live (Mixer::Stagger).
   size_t stagger = 0;
-  bool tells_blows = false;  ///< whether OfflineRenderer::blows() gets them
+  bool tells_blows = false;  ///< whether OfflineRenderer::blows() is filled in
   /// The sound is bit for bit the same for any number of threads.
   size_t thread_count = std::max(std::thread::hardware_concurrency(), 1U);
 };
@@ -49,45 +49,45 @@ struct OfflineSummary {
   uint64_t frame_count = 0;
   uint64_t accepted_count = 0;
   uint64_t rejected_count = 0;
-  absl::Status last_rejection;  ///< why the newest of those was rejected; OK if none was
-  double peak = 0;              ///< before the limiter
+  absl::Status last_rejection;  ///< reason of the newest rejection; OK if none
+  double peak = 0;              ///< largest sample before the limiter
   uint64_t limited_frame_count = 0;
   IntakeFindings findings;
 };
 
 /// Renders a recorded simulation with a mixer of its own, as fast as possible and bit for bit the
-/// same each time. A virtual clock takes the place of time: frame 0 is simulation time zero, unless
-/// the settings map time otherwise, and no contact is late. Objects are added first, then the
-/// intake takes the steps, then Render is called until it returns zero. One thread at a time.
+/// same each time. Time is virtual: no contact is late, and frame 0 is simulation time zero unless
+/// the settings map time otherwise. A caller first adds objects, then gives all steps to the
+/// intake, then calls Render until it returns zero. One thread at a time.
 class OfflineRenderer {
  public:
-  /// Frames that Render makes at a time.
+  /// Number of frames in a block that Render makes.
   static constexpr size_t kBlockFrameCount = 128;
   /// Impulses later than this are rejected.
   static constexpr double kMaxTimeS = 86400;
 
-  /// `bodies` and `transfers` (null: none are stored) must outlive the renderer. Errors:
-  /// InvalidArgument (INVALID_SETTINGS, INVALID_GAIN, INVALID_HEARING, INVALID_POSE).
+  /// `bodies` and `transfers` must outlive the renderer. `transfers` is null if none are stored.
+  /// Errors: InvalidArgument (INVALID_SETTINGS, INVALID_GAIN, INVALID_HEARING, INVALID_POSE).
   static absl::StatusOr<std::unique_ptr<OfflineRenderer>> Make(const OfflineSettings& settings,
                                                                BodyCache& bodies,
                                                                TransferStore* transfers = nullptr);
 
-  /// Errors: AlreadyExists (OBJECT_EXISTS), and those of MakeSoundingObject.
+  /// Adds an object. Errors: AlreadyExists (OBJECT_EXISTS), and those of MakeSoundingObject.
   absl::Status AddObject(uint32_t handle, std::shared_ptr<const ModalModel> model,
                          const ObjectProperties& properties);
 
-  /// Takes the steps of the simulation.
+  /// The intake that takes the steps of the simulation.
   ContactIntake& intake() { return intake_; }
 
   /// Renders whole blocks of kBlockFrameCount frames into `samples`, channels interleaved, until no
   /// further block fits or the sound ends. `samples` must hold at least one block. Returns the
-  /// number of frames that belong to the sound; zero after its end.
+  /// number of frames that belong to the sound, which is zero after its end.
   size_t Render(std::span<float> samples);
 
-  /// The impulses that sounded, as far as anything was rendered, if the settings ask for them.
+  /// The impulses in the frames rendered so far, if the settings ask for them.
   const std::vector<FoundBlow>& blows() const { return blows_; }
 
-  /// True for everything rendered so far.
+  /// The result of all frames rendered so far.
   const OfflineSummary& summary() const { return summary_; }
 
  private:
@@ -126,7 +126,7 @@ class OfflineRenderer {
   std::vector<FoundBlow> blows_;
   ContactIntake intake_;
   size_t pushed_count_ = 0;
-  size_t contact_count_ = 0;  // events up to the last that is no move
+  size_t contact_count_ = 0;  // number of events up to the last that is not a move
   uint64_t ahead_frame_count_ = 0;
   uint64_t quiet_frame_count_ = 0;
   bool begun_ = false;

@@ -11,7 +11,7 @@
 
 namespace carillon {
 
-/// Contacts that were rejected, by reason. Safe from every thread.
+/// Counts rejected contacts by reason. Safe from every thread.
 class RejectionCounts {
  public:
   void Add(uint64_t count, const absl::Status& why) {

@@ -18,7 +18,7 @@ namespace carillon {
 ///
 /// A contact holds mutex() from the look-up of an object until its events are pushed. An object's
 /// bank is taken off the mixer only after the object was removed under the same mutex, so no event
-/// is sent to a bank that has been given up.
+/// is sent to a bank that is off the mixer.
 class Scene {
  public:
   /// `name` is "scenes/{id}". The objects sound through `bus`.
@@ -32,45 +32,49 @@ class Scene {
 
   Mutex& mutex() const ABSL_LOCK_RETURNED(mutex_) { return mutex_; }
 
-  /// Errors: NotFound (SCENE_NOT_FOUND: it was deleted meanwhile, OBJECT_NOT_FOUND).
+  /// Returns an object. Errors: NotFound (SCENE_NOT_FOUND: the scene was deleted meanwhile,
+  /// OBJECT_NOT_FOUND).
   absl::StatusOr<const SoundingObject*> Find(uint32_t handle) const
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
-  /// Notes the pose of an object, and returns the object.
-  /// Errors: InvalidArgument (INVALID_POSE), and those of Find.
+  /// Stores the pose of an object, and returns the object. Errors: InvalidArgument (INVALID_POSE),
+  /// and those of Find.
   absl::StatusOr<const SoundingObject*> Move(uint32_t handle, const Pose& pose)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
-  /// Notes the pose of the listener, and returns all objects.
-  /// Errors: InvalidArgument (INVALID_POSE), NotFound (SCENE_NOT_FOUND).
+  /// Stores the pose of the listener, and returns all objects. Errors: InvalidArgument
+  /// (INVALID_POSE), NotFound (SCENE_NOT_FOUND).
   absl::StatusOr<const std::map<uint32_t, SoundingObject>*> MoveListener(const Pose& pose)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
-  /// How the scene is heard, with the newest pose of the listener.
+  /// Returns the spatial effects of the scene, with the newest pose of the listener.
   SceneSpace space() const;
 
   /// Returns a copy of an object. Errors: those of Find.
   absl::StatusOr<SoundingObject> Copy(uint32_t handle) const;
 
-  /// Returns a copy of every object by its handle; none once the scene was deleted.
+  /// Returns a copy of every object by its handle. The result is empty if the scene was deleted.
   std::map<uint32_t, SoundingObject> CopyAll() const;
 
-  /// Errors: AlreadyExists (OBJECT_EXISTS: an object has this handle).
+  /// Checks that a handle is free. Errors: AlreadyExists (OBJECT_EXISTS: an object has this
+  /// handle).
   absl::Status CheckFree(uint32_t handle) const;
 
-  /// The smallest handle above zero that no object has.
+  /// Returns the smallest handle above zero that no object has.
   uint32_t FreeHandle() const;
 
-  /// Errors: NotFound (SCENE_NOT_FOUND), AlreadyExists (OBJECT_EXISTS).
+  /// Inserts an object. Errors: NotFound (SCENE_NOT_FOUND), AlreadyExists (OBJECT_EXISTS).
   absl::Status Insert(uint32_t handle, SoundingObject object);
 
-  /// Puts `object` in the place of another and returns the other. Errors: those of Find.
+  /// Replaces the object with this handle by `object`, and returns the replaced object. Errors:
+  /// those of Find.
   absl::StatusOr<SoundingObject> Replace(uint32_t handle, SoundingObject object);
 
-  /// Takes an object out and returns it. Errors: those of Find.
+  /// Removes an object and returns it. Errors: those of Find.
   absl::StatusOr<SoundingObject> Remove(uint32_t handle);
 
-  /// Takes all objects out. From then on every call returns SCENE_NOT_FOUND.
+  /// Removes and returns all objects. From then on, every call that finds or inserts an object
+  /// returns SCENE_NOT_FOUND.
   std::map<uint32_t, SoundingObject> Close();
 
  private:

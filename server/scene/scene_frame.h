@@ -6,7 +6,7 @@
 
 namespace carillon {
 
-/// Turns a contact whose points and impulse are in the scene's frame into the frames of its
+/// Transforms a contact whose points and impulse are in the scene's frame into the frames of its
 /// objects, by their newest poses. An object without a pose lies at the origin, not rotated.
 /// `second` is null for a contact of one object.
 ObjectContact FromSceneFrame(ObjectContact contact, const SoundingObject& object,

@@ -19,7 +19,7 @@
 
 namespace carillon {
 
-/// An object with the handle that names it in contacts.
+/// An object, and the handle by which contacts name the object.
 struct PlacedObject {
   uint32_t handle = 0;
   SoundingObject object;
@@ -27,21 +27,21 @@ struct PlacedObject {
 
 /// An object to be made.
 struct NewObject {
-  uint32_t handle = 0;  ///< zero: a free one
+  uint32_t handle = 0;  ///< zero stands for any free handle
   std::shared_ptr<const ModalModel> model;
   ObjectProperties properties;
 };
 
 /// A change of an object. Absent properties stay as they are.
 struct ObjectChange {
-  /// Replaces the material except for its size, for which there is `size` below.
+  /// Replaces the material except for its size, which `size` below replaces.
   std::optional<SoundingMaterial> material;
   std::optional<double> poisson_ratio;  ///< Poisson's ratio of that material
   std::optional<double> size;
   std::optional<double> gain;
   std::optional<Pose> pose;
   std::optional<RadiationModel> radiation;
-  double glide_s = 0;  ///< duration of the way to the pose, 0 to 10; zero: the object jumps
+  double glide_s = 0;  ///< duration of the movement to the pose, 0 to 10; with 0 the object jumps
 };
 
 /// All scenes of the daemon, on one mixer. Safe from every thread.
@@ -50,23 +50,23 @@ class SceneRegistry {
   static constexpr size_t kMaxSceneCount = 512;
   static constexpr size_t kMaxObjectCount = 4096;
 
-  /// `mixer` and `transfers` (null: none are stored) must outlive the registry.
+  /// `mixer` and `transfers` must outlive the registry. `transfers` is null if none are stored.
   explicit SceneRegistry(Mixer& mixer, TransferStore* transfers = nullptr)
       : mixer_(mixer), transfers_(transfers), volumes_(mixer) {}
 
-  /// Returns the number of a new scene. `id` is its id within its name; empty: the number. Errors:
-  /// ResourceExhausted (TOO_MANY_SCENES), AlreadyExists (SCENE_ID_TAKEN), and those of Validate and
-  /// ValidateGain.
+  /// Makes a scene and returns its number. `id` is the id within the scene's name; if it is empty,
+  /// the number is the id. Errors: ResourceExhausted (TOO_MANY_SCENES), AlreadyExists
+  /// (SCENE_ID_TAKEN), and those of Validate and ValidateGain.
   absl::StatusOr<uint64_t> CreateScene(const SceneSpace& space = {}, double gain = 1,
                                        const std::string& owner = "", const std::string& id = "");
 
-  /// The number of the scene with this id. Errors: NotFound (SCENE_NOT_FOUND).
+  /// Returns the number of the scene with this id. Errors: NotFound (SCENE_NOT_FOUND).
   absl::StatusOr<uint64_t> FindId(const std::string& id) const;
 
-  /// "scenes/{id}"; with the number as its id if there is no such scene.
+  /// Returns "scenes/{id}", with the number as the id if the scene does not exist.
   std::string NameOf(uint64_t scene) const;
 
-  /// Fades out the scene's objects. Errors: NotFound (SCENE_NOT_FOUND).
+  /// Deletes the scene and fades its objects out. Errors: NotFound (SCENE_NOT_FOUND).
   absl::Status DeleteScene(uint64_t scene);
 
   /// A scene in a list of all.
@@ -84,18 +84,19 @@ class SceneRegistry {
   /// Errors: NotFound (SCENE_NOT_FOUND).
   absl::StatusOr<SceneEntry> GetScene(uint64_t scene) const;
 
-  /// The volume glides within 30 ms. Errors: NotFound (SCENE_NOT_FOUND), InvalidArgument
-  /// (INVALID_GAIN).
+  /// Changes the volume of a scene, which glides within 30 ms. Errors: NotFound (SCENE_NOT_FOUND),
+  /// InvalidArgument (INVALID_GAIN).
   absl::Status ChangeVolume(uint64_t scene, const SceneVolumeChange& change);
 
-  /// Fades all that sounds in a scene out within 30 ms; contacts that come later sound. Errors:
-  /// NotFound (SCENE_NOT_FOUND).
+  /// Fades all sound of a scene out within 30 ms. Later contacts sound as usual. Errors: NotFound
+  /// (SCENE_NOT_FOUND).
   absl::Status Stop(uint64_t scene);
 
-  /// The bus that the objects of a scene sound through. Errors: NotFound (SCENE_NOT_FOUND).
+  /// Returns the bus through which the objects of a scene sound. Errors: NotFound
+  /// (SCENE_NOT_FOUND).
   absl::StatusOr<BusId> BusOf(uint64_t scene) const;
 
-  /// How a scene is heard. Errors: NotFound (SCENE_NOT_FOUND).
+  /// Returns the spatial effects of a scene. Errors: NotFound (SCENE_NOT_FOUND).
   absl::StatusOr<SceneSpace> SpaceOf(uint64_t scene) const;
 
   /// Returns the objects of a scene by their handles. Errors: NotFound (SCENE_NOT_FOUND).
@@ -108,19 +109,19 @@ class SceneRegistry {
                                          std::shared_ptr<const ModalModel> model,
                                          const ObjectProperties& properties);
 
-  /// Makes all of the objects, or none of them. Free handles are those that none of `objects` asks
-  /// for. Errors: those of AddObject, by AtElement ("objects").
+  /// Makes either all of the objects or none of them. An object without a handle gets one that no
+  /// other of `objects` asks for. Errors: those of AddObject, by AtElement ("objects").
   absl::StatusOr<std::vector<PlacedObject>> AddObjects(uint64_t scene,
                                                        const std::vector<NewObject>& objects);
 
-  /// Changes an object. If more than the pose changes, a new oscillator bank takes the impulses
-  /// from now on, and the old bank rings out. Errors: NotFound (SCENE_NOT_FOUND, OBJECT_NOT_FOUND),
+  /// Changes an object. If more than the pose changes, a new oscillator bank takes further
+  /// impulses, and the old bank decays. Errors: NotFound (SCENE_NOT_FOUND, OBJECT_NOT_FOUND),
   /// InvalidArgument (INVALID_GLIDE), and those of MakeSoundingObject.
   absl::StatusOr<PlacedObject> UpdateObject(uint64_t scene, uint32_t handle,
                                             const ObjectChange& change);
 
-  /// Makes objects with this model sound by the transfer that fits them best now. A new oscillator
-  /// bank takes the impulses from now on, and the old bank rings out.
+  /// Gives each object with this model the stored transfer that fits the object best. A new
+  /// oscillator bank takes further impulses, and the old bank decays.
   void TakeOverTransfers(const std::string& model_digest);
 
   /// Moves the listener to `pose`; `glide_s` is as for objects. Errors: NotFound (SCENE_NOT_FOUND),
@@ -130,8 +131,8 @@ class SceneRegistry {
   /// Fades the object out. Errors: NotFound (SCENE_NOT_FOUND, OBJECT_NOT_FOUND).
   absl::Status RemoveObject(uint64_t scene, uint32_t handle);
 
-  /// Errors: NotFound (SCENE_NOT_FOUND), InvalidArgument (INVALID_STREAM), ResourceExhausted
-  /// (TOO_MANY_STREAMS).
+  /// Opens a contact stream. Errors: NotFound (SCENE_NOT_FOUND), InvalidArgument (INVALID_STREAM),
+  /// ResourceExhausted (TOO_MANY_STREAMS).
   absl::StatusOr<std::unique_ptr<ContactStream>> OpenContactStream(
       uint64_t scene, const ContactStreamSettings& settings);
 
@@ -143,7 +144,7 @@ class SceneRegistry {
   /// The format in which all scenes are rendered.
   const MixerSettings& mixer_settings() const { return mixer_.settings(); }
 
-  /// Contacts of all streams that were rejected.
+  /// Counts the rejected contacts of all streams.
   const RejectionCounts& rejections() const { return rejections_; }
 
  private:
@@ -165,9 +166,9 @@ class SceneRegistry {
   RejectionCounts rejections_;
   SceneVolumes volumes_;
   /// Held while objects are added, changed and removed, so that limits are exact and two changes of
-  /// one object do not undo each other. Contacts do not take it.
+  /// one object do not undo each other. Contacts do not lock it.
   Mutex change_mutex_;
-  /// Carries moves that come by a call and not in a contact stream; opened by the first move.
+  /// Carries moves that come by a call and not in a contact stream. The first such move opens it.
   std::unique_ptr<EventStream> moves_ ABSL_GUARDED_BY(change_mutex_);
   mutable Mutex mutex_ ABSL_ACQUIRED_AFTER(change_mutex_);
   std::map<uint64_t, std::shared_ptr<Scene>> scenes_ ABSL_GUARDED_BY(mutex_);

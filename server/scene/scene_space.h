@@ -17,7 +17,8 @@ namespace carillon {
 struct SceneSpace {
   HearingSettings hearing;
   Pose listener;  ///< the listener looks along -z of this frame; x points to the right, y up
-  /// The listener's head, by which the scene is heard if `hearing.binaural`; null: it is not.
+  /// The listener's head for binaural rendering, which `hearing.binaural` asks for. Null if the
+  /// scene is not rendered binaurally.
   std::shared_ptr<const Head> head = nullptr;
 
   bool operator==(const SceneSpace&) const = default;
@@ -40,8 +41,8 @@ class PoseTimes {
  public:
   explicit PoseTimes(double step_s) : step_s_(step_s) {}
 
-  /// Returns the time, in seconds before `time_s`, at which the way to the pose of that time
-  /// begins; zero: a jump. `handle` names an object; absent: the listener.
+  /// Returns the duration of the movement that ends in the pose at `time_s`, seconds. Zero means a
+  /// jump. Without a `handle`, the pose is the listener's.
   double GlideS(std::optional<uint32_t> handle, double time_s);
 
  private:

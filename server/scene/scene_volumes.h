@@ -14,17 +14,17 @@
 
 namespace carillon {
 
-/// Errors: InvalidArgument (INVALID_GAIN: not 0 to 1000).
+/// Checks a gain. Errors: InvalidArgument (INVALID_GAIN: not 0 to 1000).
 absl::Status ValidateGain(double gain);
 
-/// How loud a scene is.
+/// The volume of a scene.
 struct SceneVolume {
   double gain = 1;  ///< linear
   bool muted = false;
-  bool solo = false;  ///< of the scenes of its owner, only those with this flag are heard
+  bool solo = false;  ///< if an owner has scenes with this flag, only these are heard
 };
 
-/// A change of a volume; absent properties stay as they are.
+/// A change of a volume. Absent properties stay as they are.
 struct SceneVolumeChange {
   std::optional<double> gain;
   std::optional<bool> muted;

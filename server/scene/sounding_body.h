@@ -21,14 +21,14 @@ struct SoundingBody {
   std::shared_ptr<const ModalModel> model;
   ShapeTable shapes;
   std::unique_ptr<const SurfaceLocator> locator;
-  SurfaceCurvature curvature;  ///< of the surface as given
-  SharpEdges edges;            ///< of the surface as given
-  double volume_m3 = 0;        ///< at the model's size; zero: unknown
+  SurfaceCurvature curvature;  ///< curvature of the surface as given
+  SharpEdges edges;            ///< edges of the surface as given
+  double volume_m3 = 0;        ///< at the model's size; zero if unknown
   double extent_m = 0;         ///< the diagonal of the bounding box at the model's size
 };
 
-/// Makes the body of a model once, and finds it again while any object uses it. Safe from every
-/// thread.
+/// Makes the body of a model once, and returns the same body as long as any object uses it. Safe
+/// from every thread.
 class BodyCache {
  public:
   /// Errors: InvalidArgument (SURFACE_MALFORMED), FailedPrecondition (SHAPES_NOT_PHYSICAL).

@@ -22,19 +22,19 @@ namespace carillon {
 /// How the motion of an object's surface becomes sound.
 enum class RadiationModel {
   kDefault,        ///< kRadiatedPower if a transfer is stored, otherwise kPaperCoupling
-  kPaperCoupling,  ///< every mode radiates as well as a plane wave does, without damping by it
-  kRadiatedPower,  ///< each mode radiates, and is damped, by the power of a stored transfer, and a
-                   ///< free body's own acceleration sounds
-  kModesOnly,      ///< as kRadiatedPower, without the sound of the acceleration
+  kPaperCoupling,  ///< every mode radiates like a plane wave, and radiation does not damp it
+  kRadiatedPower,  ///< each mode radiates, and is damped, by the power of a stored transfer;
+                   ///< acceleration noise of a free body is added
+  kModesOnly,      ///< kRadiatedPower without acceleration noise
 };
 
 /// Material, loudness, place and radiation of an object.
 struct ObjectProperties {
   SoundingMaterial material;  ///< with the size relative to the model's
-  /// Poisson's ratio of the material; if it is given, it must agree with the model's.
+  /// Poisson's ratio of the material. If present, it must agree with the model's.
   std::optional<double> poisson_ratio;
   double gain = 1;                          ///< linear
-  std::optional<Pose> pose = std::nullopt;  ///< the newest
+  std::optional<Pose> pose = std::nullopt;  ///< the newest pose
   RadiationModel radiation = RadiationModel::kDefault;
 };
 
@@ -45,19 +45,18 @@ struct SoundingObject {
   uint32_t mode_count = 0;          ///< number of modes that sound
   double lowest_frequency_hz = 0;   ///< lowest natural frequency of those modes
   double highest_frequency_hz = 0;  ///< highest natural frequency of those modes
-  /// Natural frequency up to which the model is complete; absent: it is complete up to the top of
-  /// the band.
+  /// Natural frequency up to which the model is complete. Absent if the model is complete up to the
+  /// top of the band.
   std::optional<double> complete_to_hz;
   BankId bank;
-  BusId bus{};                             ///< of the bank
+  BusId bus{};                             ///< bus of the bank
   std::shared_ptr<Voice> voice = nullptr;  ///< null in a scene without spatial audio
-  /// How its modes radiate; null: by the paper's coupling.
+  /// The transfer by which the modes radiate; null if they radiate by the paper's coupling.
   std::shared_ptr<const Transfer> transfer = nullptr;
 };
 
-/// The transfer with which an object sounds, as its properties ask; null: by the paper's coupling.
-/// `transfers` may be null: none is stored.
-/// Errors: FailedPrecondition (TRANSFER_NOT_FOUND).
+/// Returns the transfer that an object's properties ask for, or null for the paper's coupling.
+/// `transfers` is null if none are stored. Errors: FailedPrecondition (TRANSFER_NOT_FOUND).
 absl::StatusOr<std::shared_ptr<const Transfer>> ChooseTransfer(const ModalModel& model,
                                                                const ObjectProperties& properties,
                                                                TransferStore* transfers);
@@ -68,11 +67,10 @@ struct MixerBus {
   BusId bus{};
 };
 
-/// Applies material and size to a model and puts its bank, heard through `voice`, on a bus.
+/// Applies material and size to a model, and puts its oscillator bank with `voice` on a bus.
 /// Errors: InvalidArgument (INVALID_OBJECT: size or gain out of range; INVALID_POSE),
-/// FailedPrecondition
-/// (POISSON_RATIO_DIFFERS, NO_MODE_IN_BAND with the figure first_mode_hz), ResourceExhausted
-/// (TOO_MANY_OBJECTS), and those of ChooseTransfer.
+/// FailedPrecondition (POISSON_RATIO_DIFFERS, NO_MODE_IN_BAND with the figure first_mode_hz),
+/// ResourceExhausted (TOO_MANY_OBJECTS), and those of ChooseTransfer.
 absl::StatusOr<SoundingObject> MakeSoundingObject(std::shared_ptr<const SoundingBody> body,
                                                   const ObjectProperties& properties,
                                                   const MixerBus& output,

@@ -9,7 +9,7 @@ namespace carillon {
 /// Maps simulation time to the frames of a mixer.
 struct TimeMapping {
   uint64_t first_frame = 0;
-  double first_time_s = 0;  ///< simulation time at that frame
+  double first_time_s = 0;  ///< simulation time at `first_frame`
   double delay_s = 0;
 
   /// Returns the frame in which a contact at this simulation time is due:
@@ -19,8 +19,9 @@ struct TimeMapping {
   }
 };
 
-/// The time for which every step must come late until simulation time is mapped anew. A shorter
-/// pause of the network is followed by steps that come at once and are in time again.
+/// The time for which every step must come late before simulation time is mapped anew. After a
+/// shorter pause of the network, the delayed steps come together, and the following steps are in
+/// time.
 inline constexpr double kLateRunS = 0.25;
 
 /// Makes the time mapping of a running simulation from the frames at which its steps come.
@@ -35,19 +36,19 @@ class TimeMapper {
   /// Maps simulation time `time_s` to `frame`, which is rendered next.
   void Begin(double time_s, uint64_t frame);
 
-  /// Notes that the step of simulation time `time_s` has come when `frame` was to be rendered next.
-  /// If every step has come late for kLateRunS, maps time anew, later by whole blocks, as if this
-  /// step were the first.
+  /// Notes that the step of simulation time `time_s` has come when `frame` was the next frame to
+  /// render. If every step within kLateRunS has come late, maps simulation time anew, later by
+  /// whole blocks, as if this step were the first.
   void Note(double time_s, uint64_t frame);
 
-  /// How many times Note has mapped time anew.
+  /// Number of times that Note has mapped simulation time anew.
   uint64_t remap_count() const { return remap_count_; }
 
  private:
   const double sample_rate_hz_;
   TimeMapping mapping_;
-  std::optional<uint64_t> since_frame_;  // when the first of the newest, unbroken late steps came
-  uint64_t step_count_ = 0;              // number of these steps
+  std::optional<uint64_t> since_frame_;  // frame at which the present run of late steps began
+  uint64_t step_count_ = 0;              // number of steps in the present run
   uint64_t remap_count_ = 0;
 };
 
