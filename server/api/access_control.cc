@@ -19,8 +19,8 @@ namespace {
 
 constexpr unsigned kEveryRole = ~0U;
 
-/// The alternative names of the client's certificate; its common name if it has none. A certificate
-/// is here only if an authority of --tls-client-roots vouches for it.
+/// Returns the alternative names of the client's certificate, or its common name if it has none.
+/// gRPC shows a certificate only if an authority of --tls-client-roots vouches for it.
 std::vector<std::string> CertificateNames(const grpc::CallbackServerContext& context) {
   std::vector<std::string> names;
   const auto identity = context.auth_context();

@@ -33,7 +33,7 @@ v1::GetDatabaseStatsResponse ToProto(const DatabaseStats& stats) {
   return proto;
 }
 
-/// Copies the database to a file beside it, and sends that piece by piece.
+/// Copies the database to a file in its folder, and sends the file piece by piece.
 class BackupCall final : public ServerStream<v1::BackUpDatabaseResponse> {
  public:
   BackupCall(ModeDatabase& database, ThreadPool& pool) : StreamWriter(&pool), database_(database) {

@@ -41,23 +41,25 @@ namespace carillon {
 namespace {
 
 constexpr int kCallThreadCount = 4;
-/// Offline rendering has a lower priority than all that is heard live.
+/// Offline rendering has a lower priority than live sound.
 constexpr int kRenderThreadCount = 2;
 constexpr int kRenderNiceness = 10;
 constexpr std::chrono::milliseconds kGracePeriod(500);
-/// Time in which a new connection must have sent its HTTP/2 settings, and with TLS its handshake.
+/// Time within which a new connection must send its HTTP/2 settings and, with TLS, complete its
+/// handshake.
 constexpr int kHandshakeLimit_ms = 5'000;
-/// A connection without traffic is asked after the first time whether its client lives, and closed
-/// after the second.
+/// A connection without traffic gets a ping after kKeepalive_ms, and is closed if no answer comes
+/// within kKeepaliveAnswer_ms.
 constexpr int kKeepalive_ms = 30'000;
 constexpr int kKeepaliveAnswer_ms = 10'000;
-/// Pings without end are answered. To close a connection for its third ping, gRPC 1.51 waits until
-/// what it has to send is sent, and keeps 1 kB for each ping that comes meanwhile.
+/// With 0, any number of pings is answered. With a limit, gRPC 1.51 closes the connection only
+/// after all its data is sent, and keeps 1 kB for each ping that comes meanwhile.
 constexpr int kNoPingStrikes = 0;
-/// Bytes of a connection that are parsed before others have their turn. With gRPC's own 4 MiB a few
-/// connections that begin and cancel calls keep all its threads busy for seconds.
+/// Bytes of a connection that are parsed before other connections have their turn. With gRPC's
+/// default of 4 MiB, a few connections that begin and cancel calls keep all threads busy for
+/// seconds.
 constexpr int kReadBytes = 16 << 10;
-/// Memory of all connections; beyond it gRPC refuses calls and connections.
+/// Memory of all connections, beyond which gRPC refuses calls and connections.
 constexpr size_t kClientMemoryBytes = size_t{512} << 20U;
 
 std::chrono::nanoseconds Duration(double seconds) {
@@ -112,7 +114,7 @@ class GrpcTaker final : public ConnectionTaker {
   const std::unique_ptr<Acceptor> acceptor_;
 };
 
-/// Bounds what one connection, and all together, can take.
+/// Bounds the resources of each connection, and of all connections together.
 void LimitClients(grpc::ServerBuilder& builder) {
   builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, kMaxCallsOfConnection);
   builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, kHandshakeLimit_ms);
@@ -165,12 +167,13 @@ struct ApiServer::State {
   absl::StatusOr<std::shared_ptr<grpc::ServerCredentials>> Credentials(const ListenAddress& address,
                                                                        const ApiSettings& settings);
 
-  /// A connection without a name of its own counts as open for ever.
+  /// Returns whether a connection is open. A connection without a name counts as open for ever.
   bool IsOpen(const std::string& connection) const {
     return connection == "unix:" || gate->IsOpen(connection);
   }
 
-  /// Says on the service of decompositions whether they can run, when that has changed.
+  /// Sets the health of DecompositionService when decompositions have become possible or
+  /// impossible.
   void ShowWorkers(bool can) {
     if (can_decompose.exchange(can) == can) return;
     server->GetHealthCheckService()->SetServingStatus(v1::DecompositionService::service_full_name(),
@@ -199,7 +202,7 @@ struct ApiServer::State {
   CertificateEnd certificate_end;
   ServerService server_info;
   LiveOutput& output;
-  /// Those of each TCP address.
+  /// The credentials of each TCP address.
   std::vector<std::shared_ptr<TlsCredentials>> tls;
   std::unique_ptr<grpc::Server> server;
   std::optional<ConnectionGate> gate;

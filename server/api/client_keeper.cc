@@ -25,7 +25,7 @@ void ClientKeeper::Run() {
   while (!stop_.try_acquire_for(kPeriod)) {
     for (const uint64_t scene : kept_.owners.leases().Expired()) {
       const std::string name = kept_.scenes.NameOf(scene);
-      // Somebody may have deleted it meanwhile.
+      // A client may have deleted the scene meanwhile.
       const bool ended = kept_.scenes.DeleteScene(scene).ok();
       kept_.owners.Remove(scene);
       if (ended) kept_.log(absl::StrCat(name, " has ended: its clients have gone"));

@@ -14,7 +14,7 @@ namespace {
 
 struct Bound {
   const char* name;
-  size_t whole;  ///< of all clients together
+  size_t whole;  ///< limit of all clients together
 };
 
 Bound BoundOf(Holding holding) {

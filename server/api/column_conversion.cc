@@ -20,7 +20,7 @@ Vector3 ToArray(const Numbers<Number>& column, int row) {
   return {column[3 * row], column[3 * row + 1], column[3 * row + 2]};
 }
 
-/// Absent if all four numbers are zero, or if the column is empty.
+/// Returns a row's rotation, or nothing if all four numbers are zero or the column is empty.
 std::optional<Quaternion> ToRotation(const Numbers<float>& column, int row) {
   if (column.empty()) return std::nullopt;
   const Quaternion q{column[4 * row], column[4 * row + 1], column[4 * row + 2],
@@ -29,7 +29,7 @@ std::optional<Quaternion> ToRotation(const Numbers<float>& column, int row) {
   return q;
 }
 
-/// The number of a column's numbers, and what it should be.
+/// The size of a column, and the numbers from which its right size follows.
 struct ColumnSize {
   absl::string_view name;
   int size = 0;

@@ -16,17 +16,17 @@ namespace {
 
 using nlohmann::json;
 
-/// Servers or sockets that gRPC names at a time.
+/// Number of servers or sockets that gRPC lists at a time.
 constexpr intptr_t kPageSize = 500;
 
-/// Parses an answer of channelz and frees it. An answer to a socket that has been closed meanwhile
-/// is null.
+/// Parses an answer of channelz and frees it. The answer is null if the socket has been closed
+/// meanwhile.
 json Parse(char* answer) {
   const std::unique_ptr<char, decltype(&gpr_free)> owned(answer, &gpr_free);
   return answer == nullptr ? json::object() : json::parse(answer, nullptr, false);
 }
 
-/// Numbers of 64 bits are strings in the JSON of Protobuf; zeros are left out.
+/// Returns a number of 64 bits, which is a string in Protobuf's JSON. Zeros are absent there.
 uint64_t Number(const json& object, const char* name) {
   uint64_t number = 0;
   const auto found = object.find(name);
@@ -36,7 +36,7 @@ uint64_t Number(const json& object, const char* name) {
   return number;
 }
 
-/// gRPC names a socket "TRANSPORT PEER".
+/// Returns the peer of a socket, which gRPC names "TRANSPORT PEER".
 std::string PeerOf(const json& reference) {
   const std::string name = reference.value("name", "");
   const size_t space = name.find(' ');

@@ -30,10 +30,10 @@ namespace carillon {
 namespace {
 
 constexpr size_t kMaxConnectionCount = 4096;
-/// Descriptors that the database, decompositions and devices may need beside the connections.
+/// Descriptors that the database, decompositions and devices may need, apart from the connections.
 constexpr size_t kOwnDescriptorCount = 256;
 constexpr int kBacklog = 1024;
-/// Pause after an accept that failed for want of descriptors or memory.
+/// Pause after an accept that failed for lack of descriptors or memory.
 constexpr std::chrono::milliseconds kPause(50);
 
 absl::Status Failed(const ListenAddress& address, int error) {
@@ -43,7 +43,7 @@ absl::Status Failed(const ListenAddress& address, int error) {
                               std::generic_category().message(error), "; choose another --listen"));
 }
 
-/// A socket that is bound to an address and listens, or -1 with errno.
+/// Returns a socket that listens at an address, or -1 with errno.
 int Bind(const sockaddr* address, socklen_t size) {
   const int made = socket(address->sa_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
   if (made < 0) return -1;
@@ -53,7 +53,7 @@ int Bind(const sockaddr* address, socklen_t size) {
     setsockopt(made, IPPROTO_IPV6, IPV6_V6ONLY, &no, sizeof no);
   }
   if (address->sa_family == AF_UNIX) {
-    fchmod(made, 0600);  // nobody else can connect before the mode is decided
+    fchmod(made, 0600);  // no other user can connect before the mode is decided
   } else {
     setsockopt(made, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
     // Accepted connections inherit this option.
@@ -74,12 +74,12 @@ int PortOf(int bound) {
   return ntohs(reinterpret_cast<const sockaddr_in*>(&address)->sin_port);
 }
 
-/// The process or the address from which a connection of this name came.
+/// Returns the process or the address from which the connection with this name came.
 std::string SourceOf(const std::string& peer) {
   return absl::StartsWith(peer, "unix:") ? ProcessOfPeer(peer) : peer.substr(0, peer.rfind(':'));
 }
 
-/// The inode of an open descriptor; 0 if it is closed.
+/// Returns the inode of a descriptor, or 0 if the descriptor is closed.
 ino_t InodeOf(int descriptor) {
   struct stat status {};
   return fstat(descriptor, &status) == 0 ? status.st_ino : 0;
@@ -164,7 +164,7 @@ void ConnectionGate::Run() {
   }
 }
 
-/// Accepts one connection, so that no address waits for another.
+/// Accepts only one connection, so that no address waits for another.
 void ConnectionGate::Accept(const Door& door) {
   sockaddr_storage address{};
   socklen_t size = sizeof address;
@@ -213,7 +213,7 @@ bool ConnectionGate::Refuse(const std::string& peer) {
     return false;
   }
   found->second.refused = true;
-  // gRPC, which owns the descriptor, sees the end of the connection and closes it.
+  // gRPC, which owns the descriptor, then sees the end of the connection and closes the descriptor.
   shutdown(found->second.descriptor, SHUT_RDWR);
   std::erase_if(refused_, [now](const auto& each) { return each.second <= now; });
   refused_.insert_or_assign(SourceOf(peer), now + kRefusal);

@@ -42,7 +42,7 @@ absl::StatusOr<std::variant<Point, SurfacePoint>> FromLocation(const Row& row) {
       absl::StrCat("a contact on object ", row.object(), " has neither point_m nor surface_point"));
 }
 
-/// Fills in what all kinds of contacts have. `vector` is an impulse or a force.
+/// Fills in the fields that all kinds of contacts have. `vector` is an impulse or a force.
 template <typename Row>
 absl::Status ReadContact(const Row& row, const v1::Vec3& vector, ObjectContact& contact) {
   ASSIGN_OR_RETURN(contact.impulse.location, FromLocation(row));
@@ -66,7 +66,7 @@ Roughness FromProto(const v1::Roughness& proto) {
   return roughness;
 }
 
-/// Reads the duration of a contact, or the figures of the collision that the duration follows from.
+/// Reads the duration of a contact, or the figures of the collision that determine the duration.
 template <typename Row>
 absl::Status ReadDuration(const Row& row, ContactImpulse& impulse) {
   if (row.has_duration_s()) {
@@ -113,8 +113,7 @@ void ReadRows(const Rows& rows, ContactIntake& intake,
   }
 }
 
-/// Gives each row of columns to `take`, with the duration of an elastic collision where none is
-/// stated.
+/// Gives each row of columns to `take`. A row without a duration gets that of an elastic collision.
 template <typename Contact, typename Columns>
 void ReadColumns(const Columns& columns, const v1::ImpulseColumns& impulses, ContactIntake& intake,
                  void (ContactIntake::*take)(const Contact&)) {

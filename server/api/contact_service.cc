@@ -17,15 +17,15 @@
 namespace carillon {
 namespace {
 
-/// Half of the period that the contract promises.
+/// Half of the period of answers that the contract promises.
 constexpr std::chrono::milliseconds kAnswerPeriod(500);
-/// The mixer takes impulses within a block. Waiting ends after kMostSettlePeriods if the mixer does
-/// not render at all.
+/// Time between two looks whether the mixer has taken all impulses, which takes a block. Waiting
+/// ends after kMostSettlePeriods, in case the mixer does not render at all.
 constexpr std::chrono::milliseconds kSettlePeriod(2);
 constexpr int kMostSettlePeriods = 250;
 
 /// One contact stream. Requests are read one at a time, so only one thread at a time uses
-/// `stream_`. An answer is a snapshot; a newer one replaces the one that waits to be sent.
+/// `stream_`. An answer is a snapshot, and a newer answer replaces an answer that waits to be sent.
 class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::StreamContactsResponse> {
  public:
   ContactCall(const ContactContext& daemon, TraceRecorders& recorders,
@@ -62,7 +62,7 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
 
   void Refuse(const absl::Status& status) override { CloseWith(status); }
 
-  /// The reading half ends the call: reading fails when the client has gone.
+  /// The reading half ends a cancelled call, because reading fails when the client has gone.
   bool ends_by_cancellation() const override { return false; }
 
   absl::Status Open(const v1::ContactStreamStart& start) {
@@ -166,7 +166,7 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
   std::optional<absl::Status> end_ ABSL_GUARDED_BY(mutex_);
 };
 
-/// Sends the records of a stream as they come.
+/// Sends the records of a stream as they are made.
 class RecordCall final : public ServerStream<v1::RecordContactsResponse> {
  public:
   RecordCall(TraceRecorders& recorders, const absl::StatusOr<uint64_t>& scene, ClientPlace place)

@@ -25,8 +25,8 @@ bool HasEnded(const v1::Job& job) {
          job.state() == v1::JOB_STATE_CANCELLED;
 }
 
-/// Sends a job as it changes. If the client reads slowly, it gets the newest progress of each
-/// state, and of the states the newest kMostWaiting.
+/// Sends a job whenever it changes. A client that reads slowly gets only the newest progress of
+/// each state, and only the newest kMostWaiting states.
 class JobWatchCall final : public ServerStream<v1::WatchJobResponse> {
  public:
   JobWatchCall(DecompositionQueue& queue, const absl::StatusOr<std::string>& digest)
@@ -64,7 +64,7 @@ class JobWatchCall final : public ServerStream<v1::WatchJobResponse> {
 
   Mutex mutex_;
   std::deque<v1::Job> waiting_ ABSL_GUARDED_BY(mutex_);
-  /// Last, so that it is destroyed, and calls OnChange no more, before the rest.
+  /// The last member, so that it is destroyed first, and OnChange is not called afterwards.
   absl::StatusOr<std::unique_ptr<JobWatch>> watch_;
 };
 
@@ -78,8 +78,8 @@ JobFilter FilterOf(const Message& request) {
   return filter;
 }
 
-/// Sends the jobs that match as they change. While a job waits to be sent, only its newest state is
-/// kept.
+/// Sends the jobs that match whenever they change. While a job waits to be sent, only its newest
+/// state is kept.
 class JobsWatchCall final : public ServerStream<v1::WatchJobsResponse>, private JobSink {
  public:
   JobsWatchCall(DecompositionQueue& queue, JobFilter filter, ThreadPool& pool)
@@ -90,8 +90,8 @@ class JobsWatchCall final : public ServerStream<v1::WatchJobsResponse>, private 
  private:
   static constexpr size_t kMostWaiting = 4096;
 
-  // Called with the queue's lock held. Wake hands the writing to the pool, so no call of the queue
-  // follows on this thread.
+  // Called while the queue holds its lock. Wake hands the writing to the pool, so this thread makes
+  // no call of the queue.
   void Take(const v1::Job& job) override {
     if (!Matches(job, filter_)) return;
     {
@@ -132,11 +132,11 @@ class JobsWatchCall final : public ServerStream<v1::WatchJobsResponse>, private 
 
   const JobFilter filter_;
   Mutex mutex_;
-  /// Names in the order of sending; an empty one stands for the start of the changes.
+  /// Names in the order of sending. An empty name stands for the start of the changes.
   std::deque<std::string> order_ ABSL_GUARDED_BY(mutex_);
   std::map<std::string, v1::Job> waiting_ ABSL_GUARDED_BY(mutex_);
   bool overrun_ ABSL_GUARDED_BY(mutex_) = false;
-  /// Last, so that it is destroyed, and calls Take no more, before the rest.
+  /// The last member, so that it is destroyed first, and Take is not called afterwards.
   const std::unique_ptr<JobWatch> watch_;
 };
 

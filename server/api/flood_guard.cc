@@ -11,12 +11,12 @@
 namespace carillon {
 namespace {
 
-/// gRPC's count of open calls may be ahead of its limit while calls end.
+/// While calls end, gRPC's count of open calls may exceed gRPC's limit.
 constexpr uint64_t kMostOpenCalls = 2 * kMaxCallsOfConnection;
 constexpr std::chrono::milliseconds kPeriod(25);
-/// Looking takes at most this share of a core, however many connections there are.
+/// The guard takes at most this share of a core, however many connections there are.
 constexpr double kMostLoad = 0.05;
-/// Connections that are looked at each time, beside the busy ones.
+/// Number of newest connections that are examined each time, in addition to the busy ones.
 constexpr size_t kNewest = 64;
 constexpr size_t kInTurn = 64;
 /// Time over which the rate of failed calls is averaged.

@@ -22,7 +22,7 @@ absl::Status Incomplete(absl::string_view what) {
                  absl::StrCat(what, ": send the result again, the end last"));
 }
 
-/// Somebody who calls with the token of a run. Wrong tokens are logged.
+/// A caller that shows the token of a run. Wrong tokens are logged.
 class RunCaller {
  public:
   RunCaller(AccessControl& access, const grpc::CallbackServerContext& context)
@@ -30,7 +30,7 @@ class RunCaller {
 
   const std::string& token() const { return token_; }
 
-  /// Logs the refusal of the token, if `status` is one, and returns it.
+  /// Returns `status`. Logs it if it is the refusal of a token.
   absl::Status Note(absl::Status status) const {
     if (!absl::IsPermissionDenied(status)) return status;
     return access_->Refuse(*context_, std::move(status));
@@ -42,7 +42,7 @@ class RunCaller {
   std::string token_;
 };
 
-/// Takes the records of a result, then the end of the run.
+/// Takes the records of a result, and then the end of the run.
 class ResultSink {
  public:
   ResultSink(RemoteRuns& runs, RunCaller caller) : runs_(&runs), caller_(std::move(caller)) {}
@@ -71,7 +71,7 @@ class ResultSink {
     return absl::OkStatus();
   }
 
-  /// Deletes what was uploaded before the caller hears of a refusal.
+  /// Deletes the uploaded records before the caller learns of a refusal.
   absl::Status Drop(absl::Status status) {
     if (!status.ok()) upload_.reset();
     return status;

@@ -44,7 +44,7 @@ absl::StatusOr<ListenAddress> ParseTcp(absl::string_view text) {
   return address;
 }
 
-/// Whether a server answers at the socket.
+/// Returns whether a server answers at the socket.
 bool IsServed(const std::string& path) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
@@ -56,7 +56,7 @@ bool IsServed(const std::string& path) {
   return served;
 }
 
-/// The mode of a socket in a folder.
+/// Returns the mode for a socket in a folder.
 absl::StatusOr<mode_t> SocketMode(const std::filesystem::path& folder) {
   struct stat status {};
   if (stat(folder.c_str(), &status) != 0) {

@@ -43,8 +43,8 @@ absl::StatusOr<std::unique_ptr<Listener>> Subscribe(LiveOutput& output, const Sc
   return output.stems().Subscribe(bus, std::move(wake));
 }
 
-/// Sends the format, then blocks. Blocks that come while one is being sent wait in the listener's
-/// bounded queue.
+/// Sends the format, then blocks. While a block is being sent, further blocks wait in the
+/// listener's bounded queue.
 class ListenCall final : public ServerStream<v1::ListenResponse> {
  public:
   ListenCall(LiveOutput& output, const SceneRegistry& scenes, const v1::ListenRequest& request,
@@ -82,7 +82,7 @@ class ListenCall final : public ServerStream<v1::ListenResponse> {
     return ended ? Supply::kEnd : Supply::kLater;
   }
 
-  /// Whether frames are missing between those that wait and the block taken last.
+  /// Returns whether frames are missing between the waiting samples and the block taken last.
   bool gap() const { return next_ && !samples_.empty() && next_->first_frame != end_frame(); }
 
   uint64_t end_frame() const { return first_frame_ + samples_.size() / format_.channel_count; }
@@ -109,12 +109,12 @@ class ListenCall final : public ServerStream<v1::ListenResponse> {
   const ClientPlace place_;
   const DeviceFormat format_;
   const v1::AudioEncoding encoding_;
-  size_t wanted_;  // samples a message
+  size_t wanted_;  // samples in a message
   bool format_sent_ = false;
-  std::vector<float> samples_;  // those that wait, from first_frame_ on
+  std::vector<float> samples_;  // samples that wait, from first_frame_ on
   uint64_t first_frame_ = 0;
   std::shared_ptr<const RenderedBlock> next_;  // a block after a gap
-  /// Last, so that it is destroyed, and wakes nobody any more, before the rest.
+  /// The last member, so that it is destroyed first, and Wake is not called afterwards.
   absl::StatusOr<std::unique_ptr<Listener>> listener_;
 };
 

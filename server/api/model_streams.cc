@@ -85,7 +85,7 @@ class ModelSink {
     return absl::OkStatus();
   }
 
-  /// A header begins the next transfer.
+  /// Appends a record of a transfer. A header begins the next transfer.
   absl::Status AppendTransfer(const std::string& serialized) {
     v1::TransferRecord record;
     const bool parsed = record.ParseFromString(serialized);
@@ -105,7 +105,7 @@ class ModelSink {
 
   ModeDatabase* database_;
   std::optional<ModelImport> import_;
-  std::vector<std::string> transfers_;  // in the stored form
+  std::vector<std::string> transfers_;  // transfers in their stored form
   size_t transfer_bytes_ = 0;
 };
 

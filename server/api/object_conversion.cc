@@ -58,7 +58,7 @@ absl::StatusOr<v1::Material> MaterialOrModels(const v1::Material& asked, const s
   if (asked.ByteSizeLong() > 0) return asked;
   ASSIGN_OR_RETURN(const std::optional<v1::Material> remembered, models.Material(digest));
   if (remembered.has_value()) return *remembered;
-  // A model that is not there says so itself.
+  // If the model does not exist, this error is returned, and not the one below.
   RETURN_IF_ERROR(models.Summary(digest).status());
   return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_MATERIAL",
                  absl::StrCat(ModelName(digest),

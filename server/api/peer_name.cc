@@ -20,7 +20,8 @@
 namespace carillon {
 namespace {
 
-/// The name that the other end of Unix connections has on this thread; null: the system's.
+/// The name that the other end of Unix connections has on this thread. If it is null, getpeername
+/// returns the system's name.
 thread_local const std::string* named_path = nullptr;
 
 pid_t ProcessBehind(int connection) {
@@ -35,7 +36,7 @@ std::string TextOf(int family, const void* address) {
   return inet_ntop(family, address, text.data(), text.size()) == nullptr ? "" : text.data();
 }
 
-/// Writes the name as the system would write the path of a bound socket.
+/// Writes a name in the form in which the system writes the path of a bound socket.
 void WritePath(const std::string& path, sockaddr* address, socklen_t* length) {
   sockaddr_un name{};
   name.sun_family = AF_UNIX;
@@ -83,7 +84,7 @@ NamedPeer::~NamedPeer() { named_path = nullptr; }
 
 }  // namespace carillon
 
-/// Takes the place of the C library's getpeername for the whole process.
+/// Replaces the C library's getpeername for the whole process.
 extern "C" __attribute__((visibility("default"))) int CarillonGetPeerName(
     int connection, sockaddr* __restrict address, socklen_t* __restrict length) noexcept
     __asm__("getpeername");

@@ -18,7 +18,7 @@ namespace carillon {
 namespace {
 
 constexpr size_t kMostBytes = 1 << 20;
-/// Others may do nothing, and the group may not write.
+/// Mode bits of a file that others may access or that the group may change.
 constexpr mode_t kForbidden = 0027;
 
 absl::Status Unusable(const std::string& path, absl::string_view reason, absl::string_view why) {

@@ -21,12 +21,13 @@
 namespace carillon {
 namespace {
 
-/// 64 blocks, or 32 KiB: large enough for few messages, and small enough that the thread soon
-/// serves the next call.
+/// 64 blocks (32 KiB for one channel) give few messages, and let the thread serve the next call
+/// soon.
 constexpr size_t kFramesPerMessage = 64 * OfflineRenderer::kBlockFrameCount;
 
 /// Reads the whole trace, then renders and sends one message after the other. A message is rendered
-/// when the one before has left, so a client that reads slowly holds neither a thread nor memory.
+/// when the previous one has been sent, so a client that reads slowly occupies neither a thread nor
+/// memory.
 class RenderCall final : public BidiStream<v1::RenderRequest, v1::RenderResponse>, public IdleCall {
  public:
   RenderCall(const RenderContext& daemon, grpc::CallbackServerContext& context, ClientPlace place)
@@ -53,7 +54,7 @@ class RenderCall final : public BidiStream<v1::RenderRequest, v1::RenderResponse
 
   void EndIfIdle(std::chrono::nanoseconds limit) override {
     if (!wait_.EndIfLonger(limit)) return;
-    // A message that is being sent cannot be followed by the end.
+    // A call cannot be finished while a message is being sent.
     if (writes_) return context_.TryCancel();
     End(Refusal(absl::StatusCode::kDeadlineExceeded, "RENDERING_IDLE",
                 absl::StrCat("nothing was sent for ", std::chrono::duration<double>(limit).count(),

@@ -11,7 +11,7 @@
 
 namespace carillon {
 
-// As with the health service, nobody has to be known to the daemon for this call.
+// Anybody may make this call, as those of the health service.
 grpc::ServerUnaryReactor* ServerService::GetServerInfo(grpc::CallbackServerContext* context,
                                                        const v1::GetServerInfoRequest*,
                                                        v1::GetServerInfoResponse* response) {

@@ -18,9 +18,9 @@ int TlsCredentials::AddPortToServer(const std::string& address, grpc_server* ser
   grpc_ssl_client_certificate_request_type request = GRPC_SSL_DONT_REQUEST_CLIENT_CERTIFICATE;
   {
     const MutexLock lock(&mutex_);
-    changed_ = true;  // each port fetches the files for itself
+    changed_ = true;  // so that this port fetches the files
     if (!files_.client_roots_pem.empty()) {
-      // A client without a certificate may show a token instead.
+      // A certificate is optional, because a client may show a token instead.
       request = GRPC_SSL_REQUEST_CLIENT_CERTIFICATE_AND_VERIFY;
     }
   }

@@ -33,7 +33,7 @@ Bytes BytesOf(const std::string& pem) {
   return {BIO_new_mem_buf(pem.data(), static_cast<int>(pem.size())), BIO_free};
 }
 
-/// A moment as "Nov 22 13:30:00 2026 GMT".
+/// Returns a time in the form "Nov 22 13:30:00 2026 GMT".
 std::string TextOf(const ASN1_TIME* moment) {
   const Bytes text(BIO_new(BIO_s_mem()), BIO_free);
   ASN1_TIME_print(text.get(), moment);
@@ -64,7 +64,7 @@ absl::StatusOr<Certificate> ReadCertificate(const std::string& pem, const std::s
   return certificate;
 }
 
-/// Refuses an encrypted key, for whose password the daemon cannot ask.
+/// Refuses an encrypted key, because the daemon cannot ask for its password.
 int NoPassword(char*, int, int, void*) { return 0; }
 
 absl::Status CheckKey(const TlsFiles& files, const TlsPaths& paths, X509& certificate) {

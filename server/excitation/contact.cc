@@ -12,7 +12,7 @@
 namespace carillon {
 namespace {
 
-/// Whether every component is a number and no component is larger than `most`.
+/// Returns whether every component is a number and at most `most` in magnitude.
 bool Finite(const std::array<double, 3>& vector, double most = std::numeric_limits<double>::max()) {
   return std::ranges::all_of(vector, [most](double x) { return std::abs(x) <= most; });
 }
@@ -49,7 +49,7 @@ absl::Status ValidatePoint(const Point& point) {
 }
 
 absl::Status ValidateWeights(const std::array<double, 3>& weights) {
-  constexpr double kRounding = 1e-6;  // weights that were single precision at the client
+  constexpr double kRounding = 1e-6;  // for weights that the client computed in single precision
   const double sum = weights[0] + weights[1] + weights[2];
   const bool inside = std::ranges::all_of(weights, [](double w) { return w >= -kRounding; });
   if (inside && std::abs(sum - 1) <= kRounding) return absl::OkStatus();

@@ -9,7 +9,7 @@
 namespace carillon {
 namespace {
 
-/// (1 - nu^2)/E, 1/Pa.
+/// Returns (1 - nu^2)/E, 1/Pa.
 double Compliance(double young_pa, double poisson_ratio) {
   return (1 - poisson_ratio * poisson_ratio) / young_pa;
 }

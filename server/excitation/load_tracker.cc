@@ -7,7 +7,7 @@
 namespace carillon {
 namespace {
 
-/// The jitter of resting contacts in common engines stays below this factor.
+/// In common engines, the jitter of resting contacts stays below the usual force times this factor.
 constexpr double kUsualFactor = 3;
 
 }  // namespace

@@ -9,10 +9,11 @@
 namespace carillon {
 namespace {
 
-/// The cosine of the greatest angle between the impulse's opposite and the way to an edge.
+/// Cosine of the greatest angle between the direction against the impulse and the direction to a
+/// point of an edge.
 constexpr double kLeastCosine = 0.5;
-/// A cube's corner is sqrt(3) times as far from a point as its faces are, and farther where these
-/// distances differ.
+/// Reach in units of the depth. A cube's corner is sqrt(3) times as far from an inner point as its
+/// faces are if these are equally far, and otherwise farther.
 constexpr double kReach = 3;
 
 double Along(const Point& a, const Point& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
@@ -44,7 +45,7 @@ SharpEdges::SharpEdges(std::span<const std::array<float, 3>> vertices,
 std::optional<Point> SharpEdges::Protruding(const Point& point, double depth_m,
                                             const std::array<double, 3>& impulse) const {
   const double reach_m = kReach * depth_m, strength = std::sqrt(Along(impulse, impulse));
-  // Closer to an edge, the surface is as sharp as the edge already.
+  // This close to an edge, the surface's curvature is that of the edge anyway.
   if (reach_m < kEdgeRadiusM || strength == 0) return std::nullopt;
   std::optional<Point> found;
   double farthest_m = 0;

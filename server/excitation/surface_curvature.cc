@@ -10,7 +10,7 @@ namespace carillon {
 namespace {
 
 constexpr double kSharpAngle = 50 * std::numbers::pi / 180;
-/// How often the curvature of a triangle is averaged with that of its neighbours.
+/// Number of times that the curvature of a triangle is averaged with that of its neighbours.
 constexpr int kAveragings = 2;
 
 Point Minus(const Point& a, const Point& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
@@ -23,15 +23,15 @@ Point Cross(const Point& a, const Point& b) {
 
 double Length(const Point& a) { return std::sqrt(Dot(a, a)); }
 
-/// An edge of a triangle, found again by its two vertices.
+/// An edge of a triangle. Two triangles that share an edge are found by its two vertices.
 struct Edge {
   uint32_t low = 0, high = 0;
   uint32_t triangle = 0;
-  uint8_t side = 0;  ///< from corner `side` to the next
+  uint8_t side = 0;  ///< the edge from corner `side` to the next
   bool SameAs(const Edge& other) const { return low == other.low && high == other.high; }
 };
 
-/// The mean curvature of triangles, integrated and before the division by the area.
+/// The integral of the mean curvature over some triangles, and their area.
 struct Integral {
   double curvature_m = 0;
   double area_m2 = 0;
@@ -116,14 +116,15 @@ class Facets {
     sharp_[edge.triangle] = static_cast<uint8_t>(sharp_[edge.triangle] | (1U << edge.side));
   }
 
-  /// The angle between the normals of both triangles, above zero where the body bulges.
+  /// Adds the angle between two neighbours, which is positive where the body is convex, to their
+  /// curvature, or marks their edge as sharp.
   void Meet(const Edge& a, const Edge& b) {
     const std::array<uint32_t, 3>& corners = triangles_[a.triangle];
     const Point edge = Minus(At(corners[(a.side + 1U) % 3]), At(corners[a.side]));
     const Point &first = normals_[a.triangle], &second = normals_[b.triangle];
     const double length = Length(edge);
     const double sine = length > 0 ? Dot(Cross(first, second), edge) / length : 0;
-    // A surface whose triangles look inwards is inside out.
+    // The angle changes sign if the triangles face inwards.
     const double angle = std::atan2(sine, Dot(first, second)) * (volume_ < 0 ? -1 : 1);
     if (std::abs(angle) < kSharpAngle) {
       for (const Edge& side : {a, b}) {
@@ -151,9 +152,9 @@ class Facets {
   std::span<const std::array<float, 3>> vertices_;
   std::span<const std::array<uint32_t, 3>> triangles_;
   std::vector<Point> normals_;  // unit vectors
-  double volume_ = 0;           // six times, and below zero where the triangles look inwards
+  double volume_ = 0;           // six times the volume; negative if the triangles face inwards
   std::vector<Integral> integrals_;
-  std::vector<std::array<uint32_t, 2>> neighbours_;  // across edges that are not sharp
+  std::vector<std::array<uint32_t, 2>> neighbours_;  // triangles on both sides of smooth edges
   std::vector<uint8_t> sharp_;
 };
 

@@ -66,7 +66,7 @@ Point Interpolate(const std::array<Point, 3>& corners, const std::array<double, 
   return point;
 }
 
-/// The state of a query, which Embree hands to the callback for each triangle near enough.
+/// The state of a query. Embree hands it to the callback for each triangle that is near enough.
 struct Search {
   const LocatorSurfaces& surfaces;
   const Point& point;
@@ -75,8 +75,8 @@ struct Search {
   ClosestPoint closest{.squared_distance_m2 = std::numeric_limits<double>::infinity()};
 };
 
-/// Squared distance of `point` from the box around a triangle: the triangle is no nearer. It takes
-/// a fraction of the time of FindClosestPoint.
+/// Returns the squared distance of `point` from the box around a triangle. The triangle is not
+/// nearer than this. The function takes a fraction of the time of FindClosestPoint.
 double SquaredDistanceOfBox(std::span<const std::array<float, 3>> vertices,
                             const std::array<uint32_t, 3>& triangle, const Point& point) {
   const std::array<float, 3>&a = vertices[triangle[0]], &b = vertices[triangle[1]],
@@ -92,7 +92,7 @@ double SquaredDistanceOfBox(std::span<const std::array<float, 3>> vertices,
 }
 
 bool VisitTriangle(RTCPointQueryFunctionArguments* arguments) {
-  // Far more than rounding can err, so that no triangle is left out that would be the nearest.
+  // Far more than rounding errors, so that the nearest triangle is never left out.
   constexpr double kSlack = 1.001, kSlackM2 = 1e-24;
   Search& search = *static_cast<Search*>(arguments->userPtr);
   const uint32_t t = arguments->primID;
@@ -124,7 +124,8 @@ void CopyToBuffer(RTCGeometry geometry, RTCBufferType type, RTCFormat format,
 /// Embree's objects, and the surfaces from which they were made.
 struct SurfaceLocator::Index {
   explicit Index(const LocatorSurfaces& of)
-      // By default Embree builds with a thread on each core, which would disturb the audio.
+      // By default Embree builds its index with a thread on each core, which would disturb the
+      // audio.
       : surfaces(of), device(rtcNewDevice("threads=1,user_threads=1")), scene(rtcNewScene(device)) {
     rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
     const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
@@ -143,7 +144,7 @@ struct SurfaceLocator::Index {
   Index(const Index&) = delete;
   Index& operator=(const Index&) = delete;
 
-  /// Returns false if no triangle lies on the given triangle.
+  /// Runs a query. Returns false if no triangle lies on the given triangle.
   bool Run(Search& search) const {
     RTCPointQuery query{.x = static_cast<float>(search.point[0]),
                         .y = static_cast<float>(search.point[1]),

@@ -28,7 +28,8 @@ double VolumeM3(std::span<const std::array<float, 3>> vertices,
                 std::span<const std::array<uint32_t, 3>> triangles) {
   double sum = 0;
   if (triangles.empty()) return 0;
-  // Volumes of tetrahedra are taken from a vertex of the surface, where they cancel best.
+  // The volumes of tetrahedra are summed from a vertex of the surface, because rounding errors are
+  // smallest there.
   const std::array<float, 3>& origin = vertices[triangles[0][0]];
   const auto from_origin = [&](uint32_t vertex) {
     std::array<double, 3> v{};

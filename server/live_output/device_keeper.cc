@@ -11,11 +11,11 @@ namespace carillon {
 namespace {
 
 constexpr std::chrono::milliseconds kCheckPeriod(20);
-/// A server that has come back sounds at most this, and the time to open it, later.
+/// A sound server that has come back plays after at most this period and the time to open a device.
 constexpr std::chrono::milliseconds kTryPeriod(500);
 
-/// Whether a device that cannot be opened may appear later. A file that cannot be written, or a
-/// specification without meaning, is an error of the configuration.
+/// Returns whether a device that cannot be opened may appear later. A file that cannot be written
+/// and a meaningless specification are errors of the configuration.
 bool MayAppear(const absl::Status& status) {
   return absl::IsNotFound(status) || absl::IsUnavailable(status) ||
          absl::IsResourceExhausted(status);
@@ -106,7 +106,7 @@ void DeviceKeeper::CheckDevice() {
 void DeviceKeeper::PlayOnNull() {
   std::unique_ptr<AudioDevice> null = OpenNullDevice(settings_.format, clock_);
   StopDevice();
-  null->Start(source_).IgnoreError();  // it always starts
+  null->Start(source_).IgnoreError();  // a null device always starts
   Install(std::move(null), false);
 }
 
@@ -116,7 +116,7 @@ void DeviceKeeper::TryWanted() {
   next_try_ = clock_.Monotonic() + kTryPeriod;
   if (!device.ok()) {
     const MutexLock lock(&mutex_);
-    message_ = NoSound(device.status());  // not logged: it may change with each attempt
+    message_ = NoSound(device.status());  // not logged, because it may change with each attempt
     return;
   }
   StopDevice();
@@ -129,15 +129,17 @@ void DeviceKeeper::TryWanted() {
   }
 }
 
-/// Two devices never pull from the source at the same time, so the old one stops first.
+/// Stops the present device before another starts, because two devices must not pull from the
+/// source at the same time.
 void DeviceKeeper::StopDevice() {
   AudioDevice* device = nullptr;
   {
     const MutexLock lock(&mutex_);
     device = device_.get();
   }
-  device
-      ->Stop();  // without the lock: it takes up to half a second, and only this thread replaces it
+  // The lock is not held, because Stop takes up to half a second. Only this thread replaces the
+  // device.
+  device->Stop();
 }
 
 void DeviceKeeper::Install(std::unique_ptr<AudioDevice> device, bool wanted) {
@@ -151,7 +153,7 @@ void DeviceKeeper::Install(std::unique_ptr<AudioDevice> device, bool wanted) {
   missed_ |= wanted;
 }
 
-/// Notes what is wrong, or with an empty message that nothing is; a change is logged.
+/// Stores a fault, or with an empty message its end. Logs each change.
 void DeviceKeeper::Note(const std::string& message) {
   std::string line;
   bool plays_now = false;

@@ -24,7 +24,8 @@ void Stems::Deliver() {
   std::erase_if(stems_, [this](const std::unique_ptr<Stem>& stem) { return IsFree(*stem); });
 }
 
-/// A stem is free when nobody listens, and the block in which the mixer may still use it is over.
+/// Returns whether a stem may be freed, because it has no listener and the mixer has finished the
+/// last block that may use the stem.
 bool Stems::IsFree(Stem& stem) const {
   if (stem.broadcast.listener_count() > 0) return false;
   if (stem.left_frame == 0) {

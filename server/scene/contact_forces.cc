@@ -11,14 +11,15 @@
 namespace carillon {
 namespace {
 
-/// After the last force one knot brings the force down to zero, and one ends the slope.
+/// After the last force, one knot brings the force down to zero, and another ends the slope.
 constexpr int kKnotsToEnd = 2;
-/// An engine's steps have one length, or nearly.
+/// Longest step, in nominal steps, that does not count as a gap. An engine's steps have nearly the
+/// same length.
 constexpr double kLongestStep = 1.5;
 constexpr double kLongestBlowS = 0.04;
-/// A force that stays the same for this time is a load.
+/// A force that hardly changes for this time is a load.
 constexpr double kLoadS = 0.01;
-/// Blows that are farther apart are heard one by one, and not as lines.
+/// Blows that are farther apart than this are heard one by one, not as a tone.
 constexpr double kLastingS = 0.1;
 
 std::array<float, 3> Scaled(std::array<float, 3> vector, double factor) {
@@ -30,8 +31,8 @@ double Magnitude(const std::array<float, 3>& vector) {
   return std::hypot(double{vector[0]}, double{vector[1]}, double{vector[2]});
 }
 
-/// Returns a number from 0 to 1 that is the same for the same arguments and looks random otherwise:
-/// SplitMix64's finalizer, for each argument.
+/// Returns a number from 0 to 1 that looks random but depends only on the arguments, by
+/// SplitMix64's finalizer.
 double Share(double time_s, uint32_t handle, uint32_t partner) {
   const auto mix = [](uint64_t x) {
     x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9;
@@ -113,7 +114,7 @@ void ContactForces::Divide(const Bodies& bodies, Pair& pair, Events& events) {
     impulse += Magnitude(touch.impulse.by[0].impulse().impulse_newton_seconds);
   }
   const double force = impulse / step_s_;
-  // The part of the impulse that exceeds the load.
+  // The part of the impulse that exceeds the load, 0 to 1.
   double share = pair.load.Next(impulse, step_s_);
   if (pair.blow) share = force > 0 ? std::max(1 - pair.blow->load_newtons / force, 0.0) : 0;
   double remains = 0;

@@ -199,7 +199,7 @@ void ContactIntake::Push(const ContactForces::Events& events) {
   for (const ForceEvent& force : events) {
     const MutexLock lock(&scene_.mutex());
     const absl::StatusOr<const SoundingObject*> object = scene_.Find(force.handle);
-    if (!object.ok()) continue;  // an object that was removed meanwhile feels no more forces
+    if (!object.ok()) continue;  // forces on an object that was removed meanwhile are dropped
     MixerEvent event{.bank = (*object)->bank, .action = force.action};
     const double frame = FrameOf(force.time_s);
     if (event.impulse() != nullptr) {
@@ -233,7 +233,7 @@ void ContactIntake::AddBlow(const MixerEvent& event, FoundBlow blow, double fram
 }
 
 void ContactIntake::Push(MixerEvent& event, double frame) {
-  // An event of an earlier step may be due before the first frame where steps sound at once.
+  // If steps sound at once, an event of an earlier step may be due before the first frame.
   event.SetTime(std::max(frame, 0.0));
   target_.Push(event);
 }

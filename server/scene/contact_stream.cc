@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kNetworkJitterS = 0.005;
 constexpr double kLongestDelayS = 10;
-/// Events that may wait for the mixer, which takes them at each block.
+/// Greatest number of events that wait for the mixer, which takes them at each block.
 constexpr size_t kQueueCapacity = 16384;
 
 absl::Status InvalidStream(absl::string_view message) {

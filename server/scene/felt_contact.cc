@@ -22,8 +22,8 @@ absl::StatusOr<LocatedPoint> Locate(const SoundingObject& object,
   return locator.Nearest(point);
 }
 
-/// As Locate; but where an engine has found the contact beneath an edge, the contact is on the
-/// edge.
+/// Locates a contact as Locate does, but moves a contact that an engine has found beneath an edge
+/// onto the edge.
 absl::StatusOr<LocatedPoint> LocateEngines(const SoundingObject& object,
                                            const std::variant<Point, SurfacePoint>& location,
                                            const Vector3& impulse) {
@@ -39,7 +39,7 @@ absl::StatusOr<LocatedPoint> LocateEngines(const SoundingObject& object,
   return on_edge;
 }
 
-/// Returns the rotation from the frame of `from` into that of `to` that their poses say.
+/// Returns the rotation from the frame of `from` into that of `to`, by the poses of both.
 Quaternion RotationBetween(const SoundingObject& from, const SoundingObject& to) {
   const auto orientation = [](const SoundingObject& object) {
     const std::optional<Pose>& pose = object.properties.pose;
@@ -54,7 +54,7 @@ double MassKg(const SoundingObject& object) {
   return volume > 0 ? volume * material.density_kg_per_m3 : std::numeric_limits<double>::infinity();
 }
 
-/// The object as one of two bodies that collide at `located`.
+/// Returns the object as one of two bodies that collide at `located`.
 ElasticBody ElasticBodyAt(const SoundingObject& object, const LocatedPoint& located) {
   const ModalModel& model = *object.body->model;
   Point point{};
@@ -71,7 +71,7 @@ ElasticBody ElasticBodyAt(const SoundingObject& object, const LocatedPoint& loca
 
 double Magnitude(const Vector3& vector) { return std::hypot(vector[0], vector[1], vector[2]); }
 
-/// Fills in the impulse on one object, without its pulse.
+/// Fills in the impulse on one object, except for its pulse.
 void FillIn(const SoundingObject& object, const LocatedPoint& located, const Vector3& impulse,
             Felt& felt) {
   const auto narrow = [](double x) { return static_cast<float>(x); };
@@ -93,7 +93,7 @@ void SetDuration(double duration_s, FeltContact& felt) {
   }
 }
 
-/// The opposite impulse in the frame of the second object.
+/// Returns the opposite impulse in the frame of the second object.
 Vector3 OppositeImpulse(const ObjectContact& contact, const SoundingObject& object,
                         const SoundingObject& second) {
   const Quaternion rotation = contact.second->rotation.value_or(RotationBetween(object, second));

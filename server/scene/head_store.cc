@@ -18,7 +18,8 @@ namespace carillon {
 namespace {
 
 constexpr const char* kDefaultFile = "/usr/share/libmysofa/default.sofa";
-/// Heads that are kept, each at a sample rate of its own: of 13 MB at 48 kHz, 51 MB at 192 kHz.
+/// Number of heads that are kept, each for another sample rate. A head takes 13 MB at 48 kHz, and
+/// 51 MB at 192 kHz.
 constexpr size_t kMostHeads = 2;
 
 using Sofa = std::unique_ptr<MYSOFA_HRTF, decltype(&mysofa_free)>;
@@ -31,16 +32,17 @@ absl::Status Unusable(const std::string& file, absl::string_view fault) {
 }
 
 constexpr double kLowestRate_hz = 8000, kHighestRate_hz = 384000;
-/// The delays of a file lie within this time.
+/// Greatest delay in a file that is accepted.
 constexpr double kLongestDelay_s = 0.1;
 
 bool AreWithin(std::span<const float> values, double most) {
   return std::ranges::all_of(values, [most](float value) { return std::abs(value) <= most; });
 }
 
-/// Whether the arrays are as long as the counts in the file say, and every number can be used.
+/// Returns whether the lengths of the arrays match the counts in the file, and every number can be
+/// used.
 bool IsWhole(const MYSOFA_HRTF& sofa, double rate_hz) {
-  constexpr double kGreatest = 1e9;  // no infinity and no NaN
+  constexpr double kGreatest = 1e9;  // excludes infinities and NaN, too
   const size_t filter_count = size_t{sofa.M} * sofa.R;
   const std::span responses(sofa.DataIR.values, sofa.DataIR.elements);
   const std::span positions(sofa.SourcePosition.values, sofa.SourcePosition.elements);
@@ -72,7 +74,7 @@ absl::StatusOr<Sofa> Read(const std::string& file) {
   return sofa;
 }
 
-/// The directions of the file, whose positions are Cartesian: x ahead, y left, z up.
+/// Returns the directions of the file. Its positions are Cartesian: x points ahead, y left, z up.
 std::vector<MeasuredDirection> DirectionsOf(const MYSOFA_HRTF& sofa,
                                             std::span<const double> delays) {
   std::vector<MeasuredDirection> directions(sofa.M);

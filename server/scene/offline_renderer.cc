@@ -21,13 +21,13 @@ constexpr double kLongestTailS = 120;
 constexpr double kLongestOpenTailS = 60;
 /// -80 dB of full scale.
 constexpr float kQuiet = 1e-4F;
-/// The sound must stay quiet for this time, because two close modes beat and are silent together
-/// for a while.
+/// The sound must stay quiet for this time, because two modes that beat are silent together for a
+/// while.
 constexpr double kQuietS = 0.25;
 constexpr size_t kOfflineQueueCapacity = 65536;
 
 MixerSettings SettingsOf(const OfflineSettings& settings, SectionThreads& threads) {
-  // Nobody waits for an offline block, so a block takes all events that fall into it.
+  // Offline blocks have no deadline, so a block takes all its events.
   return {.sample_rate_hz = static_cast<double>(settings.sample_rate_hz),
           .block_frame_count = OfflineRenderer::kBlockFrameCount,
           .channel_count = settings.channel_count,
@@ -50,7 +50,7 @@ IntakeSettings IntakeSettingsOf(const OfflineSettings& settings, std::vector<Fou
           .blows = settings.tells_blows ? &blows : nullptr};
 }
 
-/// No contact begins longer than this before its impulse.
+/// Returns the longest time, in frames, by which a contact begins before its impulse.
 uint64_t LongestContactFrames(std::span<const MixerEvent> events, double sample_rate_hz) {
   float longest_s = 0;
   for (const MixerEvent& event : events) {
@@ -121,7 +121,7 @@ absl::Status OfflineRenderer::AddObject(uint32_t handle, std::shared_ptr<const M
 size_t OfflineRenderer::Render(std::span<float> samples) {
   if (!begun_) {
     intake_.Finish();
-    // Events of one sample keep their order, as they do live.
+    // The sort is stable, because live events of one sample keep their order, too.
     std::ranges::stable_sort(events(), {}, &MixerEvent::FirstSample);
     const auto last = std::find_if_not(events().rbegin(), events().rend(), IsMove);
     contact_count_ = static_cast<size_t>(events().rend() - last);
@@ -167,8 +167,8 @@ size_t OfflineRenderer::RenderBlocks(std::span<float> samples) {
   return count;
 }
 
-/// Returns the number of blocks to render together: no block lies past the end, and the queue holds
-/// the events of all of them.
+/// Returns the number of blocks to render together. No block lies past the end, and the queue holds
+/// the events of all these blocks.
 size_t OfflineRenderer::CountBlocks(size_t most) const {
   const uint64_t first = mixer_.frame();
   const uint64_t left = EndFrame() - std::min(first, EndFrame());
@@ -211,7 +211,8 @@ bool OfflineRenderer::TailEnded(std::span<const float> block) {
          static_cast<double>(quiet_frame_count_) >= QuietS() * settings_.sample_rate_hz;
 }
 
-/// Sound that was made may still be on its way to the listener.
+/// Returns the time for which the sound must be quiet, because sound may still be on its way to the
+/// listener.
 double OfflineRenderer::QuietS() const {
   return kQuietS + (settings_.space.hearing.propagation_delay ? kLongestPropagationS : 0);
 }

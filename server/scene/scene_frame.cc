@@ -13,7 +13,7 @@ Vector3 Inwards(const Vector3& vector, const Pose& pose) {
   return Rotated(vector, Inverse(Normalized(pose.orientation)));
 }
 
-/// A point on a triangle belongs to its object in any frame.
+/// Transforms a point in space. A point on a triangle is the same in each frame.
 void MoveInwards(std::variant<Point, SurfacePoint>& location, const Pose& pose) {
   auto* point = std::get_if<Point>(&location);
   if (point == nullptr) return;
@@ -30,7 +30,7 @@ ObjectContact FromSceneFrame(ObjectContact contact, const SoundingObject& object
   contact.impulse.impulse_newton_seconds = Inwards(contact.impulse.impulse_newton_seconds, pose);
   if (second == nullptr) return contact;
   MoveInwards(contact.second->location, PoseOf(*second));
-  contact.second->rotation = std::nullopt;  // the poses say it
+  contact.second->rotation = std::nullopt;  // follows from the poses
   return contact;
 }
 

@@ -23,7 +23,8 @@ absl::Status SceneNotFound(absl::string_view name) {
                  absl::StrCat("there is no ", name, "; make one with SceneService.CreateScene"));
 }
 
-/// The handle of each object: its own, or one that neither the scene nor another object has.
+/// Returns the handle of each object, which is the requested one or a handle that neither the scene
+/// nor another object uses.
 absl::StatusOr<std::vector<uint32_t>> ChooseHandles(const Scene& scene,
                                                     const std::vector<NewObject>& objects) {
   std::set<uint32_t> taken;
@@ -261,7 +262,8 @@ void SceneRegistry::TakeOverTransfers(const std::string& model_digest) {
       if (model.digest != model_digest) continue;
       const auto transfer = ChooseTransfer(model, old.properties, transfers_);
       if (!transfer.ok() || *transfer == old.transfer) continue;
-      // An object that cannot be made anew, as for want of room on the mixer, stays as it is.
+      // An object that cannot be made anew, for instance because the mixer is full, stays
+      // unchanged.
       absl::StatusOr<SoundingObject> object = Remake(old, old.properties);
       if (!object.ok()) continue;
       scene->Replace(handle, *std::move(object)).IgnoreError();

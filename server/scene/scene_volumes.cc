@@ -39,7 +39,7 @@ absl::Status SceneVolumes::Change(uint64_t scene, const SceneVolumeChange& chang
   if (change.gain) RETURN_IF_ERROR(ValidateGain(*change.gain));
   const MutexLock lock(&mutex_);
   const auto found = entries_.find(scene);
-  if (found == entries_.end()) return absl::OkStatus();  // deleted meanwhile
+  if (found == entries_.end()) return absl::OkStatus();  // the scene was deleted meanwhile
   SceneVolume& volume = found->second.volume;
   volume.gain = change.gain.value_or(volume.gain);
   volume.muted = change.muted.value_or(volume.muted);

@@ -14,8 +14,8 @@
 namespace carillon {
 namespace {
 
-/// A mode moves no part of a body as far as it would move a part of this share of the mass that
-/// vibrated alone.
+/// A physical mode moves no part of a body farther than it would move this share of the mass if
+/// that share vibrated alone.
 constexpr double kLeastMassShare = 1e-8;
 
 absl::Status NotPhysical(absl::string_view what, double value, double most) {
@@ -25,8 +25,8 @@ absl::Status NotPhysical(absl::string_view what, double value, double most) {
                    ", but a body of its size has at most ", most, ": compute or export it again"));
 }
 
-/// Checks the model against its own mass, which is its volume, because models are stored for unit
-/// density. Mode shapes have unit modal mass.
+/// Checks the model's shapes, which have unit modal mass, against its mass. The mass equals the
+/// volume, because models are stored for unit density.
 absl::Status CheckShapes(const ModalModel& model) {
   const double volume_m3 = VolumeM3(model.vertices, model.triangles);
   if (!(volume_m3 > 0)) return absl::OkStatus();  // the surface is open
@@ -45,7 +45,7 @@ absl::Status CheckShapes(const ModalModel& model) {
 
 absl::StatusOr<std::shared_ptr<const SoundingBody>> MakeBody(
     std::shared_ptr<const ModalModel> model) {
-  // The two parts are made at the same time, because a client waits for the object.
+  // Two threads make the two parts, because a client waits for the object.
   auto indexing = std::async([&model] {
     return SurfaceLocator::Make({.vertices = model->vertices,
                                  .triangles = model->triangles,

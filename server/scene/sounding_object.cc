@@ -17,7 +17,7 @@ namespace {
 constexpr double kSmallestSize = 0.001;
 constexpr double kLargestSize = 1000;
 constexpr double kLargestGain = 1000;
-/// Models round Poisson's ratio to 1e-4; the rest is room for the rounding of the difference.
+/// Models round Poisson's ratio to 1e-4. The remainder allows for the rounding of the difference.
 constexpr double kPoissonTolerance = 1.0001e-4;
 
 absl::Status OutOfRange(absl::string_view what, double value, double least, double most) {
@@ -71,8 +71,8 @@ Radiation RadiationOf(const Transfer* transfer) {
           .sound_speed_m_per_s = transfer->sound_speed_m_per_s};
 }
 
-/// The directions of an object that is heard through `voice`; absent: it radiates equally in all of
-/// them.
+/// Returns the directivity of an object that is heard through `voice`, or nothing if the object
+/// radiates equally in all directions.
 std::optional<HeardDirectivity> DirectivityOf(const std::shared_ptr<const Transfer>& transfer,
                                               const Voice* voice, double size) {
   if (transfer == nullptr || voice == nullptr || !voice->hearing().directivity) return std::nullopt;
@@ -88,7 +88,7 @@ std::optional<HeardDirectivity> DirectivityOf(const std::shared_ptr<const Transf
                           .near_field = voice->hearing().near_field};
 }
 
-/// The body whose acceleration sounds; absent: its modes alone do.
+/// Returns the body whose acceleration sounds, or nothing if only its modes sound.
 std::optional<MovedBody> MovedBodyOf(const Transfer* transfer, const SoundingBody& body,
                                      const ObjectProperties& properties) {
   if (transfer == nullptr || !transfer->rigid) return std::nullopt;
@@ -106,7 +106,7 @@ std::optional<MovedBody> MovedBodyOf(const Transfer* transfer, const SoundingBod
 std::optional<double> CompleteTo(const ModalModel& model, const SoundingMaterial& material,
                                  double top_hz) {
   const double complete_hz = NaturalFrequencyHz(model.complete_to_eigenvalue, material);
-  // The limit that was asked for and this one are the same number, computed in two ways.
+  // Relative difference that rounding makes between two computations of the same limit.
   constexpr double kRounding = 1e-6;
   if (complete_hz >= top_hz * (1 - kRounding)) return std::nullopt;
   return complete_hz;

@@ -8,9 +8,9 @@
 namespace carillon {
 namespace {
 
-/// Two steps alone say nothing about those that follow.
+/// Fewest late steps in a row that show that the following steps will be late, too.
 constexpr uint64_t kFewestLateSteps = 3;
-/// A recorded trace begins at a multiple of this.
+/// A recorded trace begins at a multiple of this number of frames.
 constexpr uint64_t kGrainFrames = OfflineRenderer::kBlockFrameCount;
 
 }  // namespace
