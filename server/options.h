@@ -20,18 +20,18 @@ struct Options {
   uint32_t block_frame_count = 128;
   uint32_t look_ahead_block_count = 8;
   uint32_t channel_count = 1;
-  double gain = 1;  ///< of the output, linear
+  double gain = 1;  ///< linear gain of the output
   double full_scale_pa = kFullScalePa;
   std::string head_file;          ///< SOFA file for binaural scenes; if empty, libmysofa1's
   int worker_count = 0;           ///< decompositions at a time; 0 means half of the processors
-  int64_t memory_budget_mib = 0;  ///< of all decompositions together; 0 means half of the machine's
-  int64_t job_memory_mib = 0;     ///< of one decomposition; 0 means the whole budget
+  int64_t memory_budget_mib = 0;  ///< memory of all decompositions; 0 means half of the machine's
+  int64_t job_memory_mib = 0;     ///< memory of one decomposition; 0 means the whole budget
   double job_time_s = 21600;
   double stall_time_s = 60;        ///< longest time without an event of a worker
   int64_t queue_limit = 1024;      ///< jobs that wait at a time
   bool transfers = true;           ///< compute a transfer after each model
-  int64_t model_budget_mib = 0;    ///< of stored models; 0 means no limit
-  std::string executor = "local";  ///< or "slurm"
+  int64_t model_budget_mib = 0;    ///< size of stored models; 0 means no limit
+  std::string executor = "local";  ///< "local" or "slurm"
   std::string slurm_directory;     ///< shared with the nodes; if empty, "slurm" in the data folder
   std::string slurm_partition;     ///< if empty, the cluster's default
   std::string slurm_upload;  ///< HOST:PORT at which nodes reach the daemon; empty if they share a
@@ -61,7 +61,7 @@ struct CommandLine {
   /// "check", "repair" or "restore" if the program is to do this to the database, which no daemon
   /// may have open. If empty, the program serves.
   std::string database_command{};
-  std::string backup_file{};  ///< for "restore"
+  std::string backup_file{};  ///< the backup for "restore"
   bool only_check = false;    ///< set by --check-config: end after the configuration was read
   bool only_print = false;    ///< set by --print-config: print the settings in force, and end
   int exit_status = 0;

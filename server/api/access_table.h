@@ -68,8 +68,8 @@ class AccessTable {
  private:
   struct Entry {
     Principal principal;
-    std::string token_sha256{};      ///< empty: none
-    std::string certificate_name{};  ///< empty: none
+    std::string token_sha256{};      ///< empty if the caller has no token
+    std::string certificate_name{};  ///< empty if it has no certificate
   };
 
   absl::Status ReadLine(absl::string_view line);

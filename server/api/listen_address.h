@@ -25,7 +25,7 @@ struct ListenAddress {
   std::string ToString() const;
 };
 
-/// Errors: InvalidArgument (INVALID_ADDRESS).
+/// Parses an address. Errors: InvalidArgument (INVALID_ADDRESS).
 absl::StatusOr<ListenAddress> ParseListenAddress(absl::string_view text);
 
 /// Makes the folder of a Unix socket, for its owner only, unless it exists. Removes a socket that

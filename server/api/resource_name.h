@@ -24,7 +24,7 @@ absl::StatusOr<std::string> ParseSceneName(absl::string_view name);
 absl::Status ValidateSceneId(absl::string_view id);
 
 struct ObjectName {
-  std::string scene{};  ///< its id
+  std::string scene{};  ///< the id of the scene
   uint32_t handle = 0;
 };
 

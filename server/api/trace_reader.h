@@ -21,9 +21,9 @@ class TraceReader {
   TraceReader(ModeDatabase& database, HeadStore& heads, BodyCache& bodies)
       : database_(database), heads_(heads), bodies_(bodies) {}
 
-  /// Errors: InvalidArgument (TRACE_MALFORMED, and those of the objects' materials),
-  /// ResourceExhausted (TRACE_TOO_LARGE), NotFound (MODAL_MODEL_NOT_FOUND), and those of HeadStore
-  /// and OfflineRenderer.
+  /// Takes a request. Errors: InvalidArgument (TRACE_MALFORMED, and those of the objects'
+  /// materials), ResourceExhausted (TRACE_TOO_LARGE), NotFound (MODAL_MODEL_NOT_FOUND), and those
+  /// of HeadStore and OfflineRenderer.
   absl::Status Take(const v1::RenderRequest& request);
 
   /// Returns the renderer after the last request. Errors: InvalidArgument (TRACE_MALFORMED: nothing

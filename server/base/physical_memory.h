@@ -7,7 +7,7 @@
 
 namespace carillon {
 
-/// The size of the machine's memory, bytes.
+/// Returns the size of the machine's memory, bytes.
 inline uint64_t PhysicalBytes() {
   return static_cast<uint64_t>(sysconf(_SC_PHYS_PAGES)) *
          static_cast<uint64_t>(sysconf(_SC_PAGESIZE));

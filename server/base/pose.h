@@ -24,17 +24,17 @@ struct Pose {
   bool operator==(const Pose&) const = default;
 };
 
-/// INVALID_ARGUMENT (INVALID_POSE) if a value is not finite, a coordinate exceeds 1e6 m, or the
-/// quaternion's length differs from 1 by more than 1e-3.
+/// Returns INVALID_ARGUMENT (INVALID_POSE) if a value is not finite, a coordinate exceeds 1e6 m, or
+/// the quaternion's length differs from 1 by more than 1e-3.
 absl::Status Validate(const Pose& pose);
 absl::Status Validate(const Quaternion& rotation);
 
-/// The quaternion divided by its length.
+/// Returns the quaternion divided by its length.
 Quaternion Normalized(const Quaternion& q);
 
 Quaternion Inverse(const Quaternion& q);
 
-/// The rotation `b` followed by the rotation `a`.
+/// Returns the rotation `b` followed by the rotation `a`.
 Quaternion Product(const Quaternion& a, const Quaternion& b);
 
 Vector3 Rotated(const Vector3& v, const Quaternion& q);

@@ -5,8 +5,8 @@
 
 namespace carillon {
 
-/// The role of a thread, modelled as a lock that costs nothing, so that clang's thread-safety
-/// analysis finds functions called by the wrong kind of thread (lint/thread_roles).
+/// The role of a thread. It is modelled as a lock without cost, so that clang's thread-safety
+/// analysis finds functions that the wrong kind of thread calls (lint/thread_roles).
 /// ABSL_EXCLUSIVE_LOCKS_REQUIRED names the role that may call a function; ABSL_LOCKS_EXCLUDED names
 /// a role that may not.
 class ABSL_LOCKABLE ThreadRole {

@@ -88,7 +88,7 @@ class DecompositionQueue {
   };
   Counts counts();
 
-  /// Errors: NotFound (JOB_NOT_FOUND).
+  /// Returns a job. Errors: NotFound (JOB_NOT_FOUND).
   absl::StatusOr<v1::Job> Get(const std::string& digest);
 
   /// Returns the jobs that match, newest first, up to 1000 a page; a `page_size` of 0 means 100. A

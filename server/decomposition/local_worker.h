@@ -113,7 +113,7 @@ class LocalWorker {
   Pipe error_pipe_;
   ChildProcess process_;
   WorkerLimits limits_;
-  uint64_t resident_bytes_ = 0;  // as measured last
+  uint64_t resident_bytes_ = 0;  // newest measurement
   uint64_t peak_bytes_ = 0;
   uint32_t node_count_ = 0;
   std::chrono::nanoseconds started_;

@@ -28,8 +28,8 @@ class RunUpload {
   RunUpload& operator=(RunUpload&&) noexcept;
   ~RunUpload();
 
-  /// Errors: InvalidArgument (MODAL_MODEL_MALFORMED), DataLoss (MODAL_MODEL_CORRUPT),
-  /// ResourceExhausted (DATABASE_FULL).
+  /// Appends to the result of a job that computes a model. Errors: InvalidArgument
+  /// (MODAL_MODEL_MALFORMED), DataLoss (MODAL_MODEL_CORRUPT), ResourceExhausted (DATABASE_FULL).
   absl::Status Append(const v1::ModalModelRecord& record);
 
   /// Appends to the result of a job that computes a transfer. Errors: ResourceExhausted

@@ -30,7 +30,8 @@ struct SlurmJob {
   int64_t time_limit_s = 0;
 };
 
-/// States by name and ticket. If several jobs share these, the state nearest to success counts.
+/// States by name and ticket. If several jobs have the same name and ticket, the state nearest to
+/// success counts.
 using SlurmJobs = std::map<std::pair<std::string, std::string>, SlurmState>;
 
 /// Parses the output of `squeue` in the format "%j|%k|%T|%r", or of sacct, which lacks the reason.

@@ -24,7 +24,7 @@ using Point = std::array<double, 3>;
 struct ContactImpulse {
   /// A point in space, or a point on a triangle of the surface as given.
   std::variant<Point, SurfacePoint> location;
-  std::array<double, 3> impulse_newton_seconds{};  ///< in newtons if this is a force
+  std::array<double, 3> impulse_newton_seconds{};  ///< newtons if the contact is a force
   /// If it is absent, the duration is that of the collision of two elastic bodies.
   std::optional<double> duration_s = std::nullopt;
   HertzContact hertz{};

@@ -25,7 +25,7 @@
 
 namespace carillon {
 
-/// Settings of the daemon's output.
+/// The settings of the daemon's output.
 struct OutputSettings {
   DeviceFormat format{};
   /// Blocks rendered ahead of the device.
@@ -47,7 +47,7 @@ struct OutputVolume {
 /// State of the output at one moment.
 struct OutputState {
   std::string device;
-  bool device_plays = true;    ///< as DeviceState::plays
+  bool device_plays = true;    ///< see DeviceState::plays
   std::string device_message;  ///< one line about the device's fault, or empty
   double latency_s = 0;        ///< delay from the mixer to audible sound, as far as known
   double load = 0;             ///< fraction of real time that rendering takes

@@ -68,7 +68,7 @@ class MeshStore {
   /// Stores a whole mesh at once.
   absl::StatusOr<StoredMesh> Put(std::string_view bytes);
 
-  /// Errors: NotFound (MESH_NOT_FOUND).
+  /// Returns a stored mesh. Errors: NotFound (MESH_NOT_FOUND).
   absl::StatusOr<StoredMesh> Find(const std::string& digest);
 
   /// Writes the mesh to a new file that only its owner may read. Errors: NotFound (MESH_NOT_FOUND),

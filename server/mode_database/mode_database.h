@@ -31,7 +31,9 @@ class ModeDatabase {
   ModelStore& models() { return models_; }
   TransferStore& transfers() { return transfers_; }
   JobStore& jobs() { return jobs_; }
-  Database& database() { return *database_; }  ///< for database_admin.h
+  Database& database() {
+    return *database_;
+  }  ///< the database, for the functions of database_admin.h
   /// The folder of the database file, for other files of the daemon.
   std::filesystem::path folder() const;
 

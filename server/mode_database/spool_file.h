@@ -16,7 +16,8 @@ namespace carillon {
 /// The system deletes the file when the object or the process ends. One thread at a time.
 class SpoolFile {
  public:
-  /// Errors: FailedPrecondition (DATABASE_UNUSABLE: the folder cannot be written).
+  /// Makes a file in `folder`. Errors: FailedPrecondition (DATABASE_UNUSABLE: the folder cannot be
+  /// written).
   static absl::StatusOr<SpoolFile> Make(const std::filesystem::path& folder);
   SpoolFile(SpoolFile&& other) noexcept : descriptor_(std::exchange(other.descriptor_, -1)) {}
   SpoolFile& operator=(SpoolFile&& other) noexcept {
@@ -25,7 +26,7 @@ class SpoolFile {
   }
   ~SpoolFile();
 
-  /// Errors: ResourceExhausted (DATABASE_FULL: no space left).
+  /// Appends bytes. Errors: ResourceExhausted (DATABASE_FULL: no space left).
   absl::Status Append(std::string_view bytes);
 
   /// Goes back to the first byte.

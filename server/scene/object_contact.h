@@ -13,7 +13,7 @@ namespace carillon {
 /// The second object of a contact, which feels the opposite impulse.
 struct SecondObject {
   uint32_t handle = 0;
-  std::variant<Point, SurfacePoint> location;  ///< in the second object's frame
+  std::variant<Point, SurfacePoint> location;  ///< location in the second object's frame
   /// Rotates from the first object's frame into the second's. If it is absent, the rotation follows
   /// from the poses of both objects.
   std::optional<Quaternion> rotation = std::nullopt;

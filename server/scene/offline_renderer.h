@@ -28,7 +28,7 @@ struct OfflineSettings {
   /// Length of the sound after the last contact. If it is zero, the sound ends when it stays below
   /// -80 dB of full scale, and after 60 s at the latest.
   double tail_s = 0;
-  double gain = 1;                      ///< of the whole sound, before the limiter
+  double gain = 1;                      ///< gain of the whole sound, before the limiter
   double full_scale_pa = kFullScalePa;  ///< the pressure of a sample of 1
   /// The simulator's step, seconds, above 0 and at most 1.
   double step_s = 1.0 / 60;

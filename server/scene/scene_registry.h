@@ -81,7 +81,7 @@ class SceneRegistry {
   /// Returns all scenes, the oldest first.
   std::vector<SceneEntry> ListScenes() const;
 
-  /// Errors: NotFound (SCENE_NOT_FOUND).
+  /// Returns a scene. Errors: NotFound (SCENE_NOT_FOUND).
   absl::StatusOr<SceneEntry> GetScene(uint64_t scene) const;
 
   /// Changes the volume of a scene, which glides within 30 ms. Errors: NotFound (SCENE_NOT_FOUND),

@@ -43,7 +43,7 @@ class SceneVolumes {
 
   void Close(uint64_t scene);
 
-  /// Errors: InvalidArgument (INVALID_GAIN).
+  /// Changes the volume of a scene. Errors: InvalidArgument (INVALID_GAIN).
   absl::Status Change(uint64_t scene, const SceneVolumeChange& change);
 
   SceneVolume volume(uint64_t scene) const;

@@ -23,7 +23,7 @@ struct SoundingBody {
   std::unique_ptr<const SurfaceLocator> locator;
   SurfaceCurvature curvature;  ///< curvature of the surface as given
   SharpEdges edges;            ///< edges of the surface as given
-  double volume_m3 = 0;        ///< at the model's size; zero if unknown
+  double volume_m3 = 0;        ///< volume at the model's size; zero if unknown
   double extent_m = 0;         ///< the diagonal of the bounding box at the model's size
 };
 
@@ -31,7 +31,8 @@ struct SoundingBody {
 /// from every thread.
 class BodyCache {
  public:
-  /// Errors: InvalidArgument (SURFACE_MALFORMED), FailedPrecondition (SHAPES_NOT_PHYSICAL).
+  /// Returns the body of a model. Errors: InvalidArgument (SURFACE_MALFORMED), FailedPrecondition
+  /// (SHAPES_NOT_PHYSICAL).
   absl::StatusOr<std::shared_ptr<const SoundingBody>> Get(std::shared_ptr<const ModalModel> model);
 
  private:

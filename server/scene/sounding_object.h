@@ -30,7 +30,7 @@ enum class RadiationModel {
 
 /// Material, loudness, place and radiation of an object.
 struct ObjectProperties {
-  SoundingMaterial material;  ///< with the size relative to the model's
+  SoundingMaterial material;  ///< its size is relative to the model's
   /// Poisson's ratio of the material. If present, it must agree with the model's.
   std::optional<double> poisson_ratio;
   double gain = 1;                          ///< linear
