@@ -27,8 +27,8 @@ class ConnectionTaker {
 };
 
 /// Accepts connections in place of gRPC, whose own listener stops for ever when no descriptor is
-/// left (CVE-2023-4785). Beyond a limit, which leaves descriptors for the daemon's other work, a
-/// connection is closed at once.
+/// left (CVE-2023-4785). A limit leaves descriptors for the daemon's other work. Connections beyond
+/// the limit are closed at once.
 class ConnectionGate {
  public:
   /// The time for which the gate closes new connections from the process or address of a refused

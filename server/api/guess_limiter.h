@@ -23,11 +23,11 @@ class GuessLimiter {
   /// `clock` must outlive the limiter.
   explicit GuessLimiter(const Clock& clock) : clock_(clock) {}
 
-  /// Returns whether the caller `name`, which showed a right credential, may come in.
+  /// Returns whether the caller `name`, which showed a right credential, is admitted.
   bool TakeRight(absl::string_view peer, const std::string& name);
 
-  /// Counts a wrong credential. Returns whether the caller may learn that it was wrong; false if
-  /// the caller has shown too many.
+  /// Counts a wrong credential. Returns false if the address has shown too many, so that the caller
+  /// must not learn that the credential was wrong.
   bool TakeWrong(absl::string_view peer);
 
  private:

@@ -18,8 +18,8 @@
 
 namespace carillon {
 
-/// Resolves a material to its figures, and fills in the defaults of size (zero: 1) and gain
-/// (absent: 1). Errors: those of ResolveMaterial.
+/// Resolves a material to its figures, and fills in the defaults: a size of zero and an absent gain
+/// become 1. Errors: those of ResolveMaterial.
 absl::StatusOr<ObjectProperties> ToObjectProperties(const v1::Material& material, double size,
                                                     std::optional<double> gain);
 

@@ -17,8 +17,8 @@ inline std::string ToBytes(std::span<const float> samples) {
   return {reinterpret_cast<const char*>(samples.data()), samples.size_bytes()};
 }
 
-/// Returns samples as integers of 16 bits, little endian; full scale is 32767, and
-/// samples beyond it are clipped.
+/// Returns samples as integers of 16 bits, little endian; full scale is 32767, and samples beyond
+/// full scale are clipped.
 inline std::string ToInt16Bytes(std::span<const float> samples) {
   std::vector<int16_t> integers(samples.size());
   std::ranges::transform(samples, integers.begin(), [](float sample) {

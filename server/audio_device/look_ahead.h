@@ -21,7 +21,7 @@ namespace carillon {
 /// would need a system call in the device's callback.
 class LookAhead final {
  public:
-  /// Fills one block. Only the render thread calls it; it must be real-time safe.
+  /// Fills one block. Only the render thread calls it, so it must be real-time safe.
   using RenderBlock = std::function<void(std::span<float>)>;
 
   /// `clock` must outlive this.
@@ -49,7 +49,8 @@ class LookAhead final {
   /// Number of silent frames that pulls returned in place of missing frames.
   uint64_t lost_frame_count() const { return rendered_.lost_frame_count(); }
 
-  /// Fraction of real time that rendering takes, smoothed over about a second; 1 is the limit.
+  /// Returns the fraction of real time that rendering takes, smoothed over about a second. Above 1,
+  /// rendering is too slow.
   double load() const { return load_.load(std::memory_order_relaxed); }
 
  private:

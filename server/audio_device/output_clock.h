@@ -70,7 +70,7 @@ class OutputClock {
   double cycle_frame_count_ = 0;  ///< frames of the last whole cycle
   uint64_t stretch_first_ = 0;    ///< the first frame of this half second
   bool begun_ = false, watching_ = false;
-  /// Least lead of this half second and of the one before; the minimum ignores late callbacks.
+  /// Least lead of this and of the previous half second. The minimum ignores late callbacks.
   double least_ = kNever, least_before_ = kNever;
   double usual_ = 0;  ///< lead before the xrun that is being observed
   std::atomic<size_t> longest_cycle_frames_{0};

@@ -7,8 +7,8 @@
 
 namespace carillon {
 
-/// Gives `thread` real-time priority (SCHED_FIFO), below that of a sound server.
-/// Errors: PermissionDenied (REALTIME_NOT_ALLOWED: the message says what would allow it).
+/// Gives `thread` real-time priority (SCHED_FIFO), below that of a sound server. Errors:
+/// PermissionDenied (REALTIME_NOT_ALLOWED: the message names the setting that allows it).
 absl::Status MakeRealtime(std::thread& thread);
 
 }  // namespace carillon

@@ -16,8 +16,8 @@ struct RingCounts {
   alignas(64) std::atomic<size_t> read{0};
 };
 
-/// A ring buffer over memory that somebody else owns. It carries plain values (samples, numbers)
-/// from one thread, or process, to another. Values are copied in runs, without locks.
+/// A ring buffer over memory that it does not own. It carries plain values (samples, numbers) from
+/// one thread, or process, to another. Values are copied in runs, without locks.
 template <typename T>
 class RingView {
  public:

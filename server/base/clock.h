@@ -7,8 +7,8 @@
 
 namespace carillon {
 
-/// A source of time, passed in so that code that depends on time can be tested. All threads may use
-/// it.
+/// A source of time. Code that depends on time gets it as an argument, so that a test can control
+/// time. All threads may use it.
 class Clock {
  public:
   virtual ~Clock() = default;

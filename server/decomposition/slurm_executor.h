@@ -35,8 +35,8 @@ struct SlurmExecutorOptions {
 };
 
 /// Runs each decomposition as a job of a Slurm cluster, with files in a shared folder. With
-/// `upload` no folder is shared: each submission has a token, with which its run fetches the mesh
-/// and uploads the result through `runs`, which must outlive the executor.
+/// `upload` no folder is shared. Each submission then has a token, with which its run fetches the
+/// mesh and uploads the result through `runs`. `runs` must outlive the executor.
 ///
 /// Slurm may forget jobs. A controller that is killed loses the submissions that it acknowledged in
 /// its last seconds, and assigns their numbers again. Therefore a job is named by its digest and

@@ -12,7 +12,7 @@
 namespace carillon {
 
 /// Splits the bytes of a worker's event pipe into events (protobuf's delimited form). A worker
-/// reads untrusted files and may write anything, so the reader buffers one event at most.
+/// reads untrusted files and may write any bytes, so the reader buffers at most one event.
 class WorkerEventReader {
  public:
   static constexpr uint32_t kMaxEventBytes = 64 << 10;

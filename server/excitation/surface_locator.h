@@ -11,9 +11,9 @@
 
 namespace carillon {
 
-/// The two surfaces of one body: the sounding surface (#V vertices in metres, #T triangles, and for
-/// each triangle the triangle of the given surface on which it lies), and the surface as given.
-/// Both must outlive the locator.
+/// The sounding surface of a body and the surface as given. The sounding surface has #V vertices in
+/// metres, #T triangles and, for each triangle, the triangle of the given surface on which it lies.
+/// Both surfaces must outlive the locator.
 struct LocatorSurfaces {
   std::span<const std::array<float, 3>> vertices;
   std::span<const std::array<uint32_t, 3>> triangles;

@@ -11,7 +11,7 @@ namespace carillon {
 namespace {
 
 constexpr std::chrono::milliseconds kHousekeepingPeriod(5);
-/// Peak and loudness are sampled every kLevelPeriod; the peak is the maximum over kPeakMemory.
+/// Peak and loudness are sampled every kLevelPeriod. The peak is the maximum over kPeakMemory.
 constexpr std::chrono::milliseconds kLevelPeriod(50);
 constexpr std::chrono::seconds kPeakMemory(1);
 /// A fade takes 50 ms and the latency of the device. A device that is stuck must not delay a stop.

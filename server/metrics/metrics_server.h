@@ -27,7 +27,7 @@ struct Metric {
   std::vector<MetricValue> values{};
 };
 
-/// Serves metrics to Prometheus, at /metrics of an address of its own, by HTTP without TLS.
+/// Serves metrics to Prometheus at the path /metrics of a separate address, by HTTP without TLS.
 class MetricsServer {
  public:
   /// Returns the present metrics. The server's threads call it for each request.

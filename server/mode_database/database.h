@@ -47,7 +47,7 @@ class Database {
   /// Runs `body` on one snapshot of the database.
   absl::Status Read(absl::FunctionRef<absl::Status(SqliteConnection&)> body);
 
-  /// Runs `body` on a connection of its own, for statements that SQLite refuses in a transaction.
+  /// Runs `body` on a separate connection, for statements that SQLite refuses in a transaction.
   absl::Status ReadOutsideTransaction(absl::FunctionRef<absl::Status(SqliteConnection&)> body);
 
   /// The folder, on the same disk, for files that wait for a transaction.

@@ -39,8 +39,8 @@ using OnFinding = std::function<void(const std::string& line)>;
 /// The functions below work on a file that no daemon has open.
 
 /// Checks SQLite's structure, every hash of every model, the digest of every mesh and every job.
-/// Writes nothing. Errors: as ModeDatabase::Open; DataLoss (DATABASE_CORRUPT) if the structure
-/// cannot be read.
+/// Writes nothing. Errors: those of ModeDatabase::Open, and DataLoss (DATABASE_CORRUPT) if the
+/// structure cannot be read.
 absl::Status CheckDatabase(const std::filesystem::path& file, const OnFinding& on_finding);
 
 /// Copies every undamaged model, mesh and job into a new database, which replaces the old one.

@@ -23,8 +23,9 @@ struct StoredMesh {
   uint64_t byte_count = 0;
 };
 
-/// A mesh file that arrives in pieces. The pieces are collected in a nameless file beside the
-/// database, so that a slow sender occupies neither memory nor a transaction. One thread at a time.
+/// A mesh file that arrives in pieces. The pieces are collected in a nameless file in the
+/// database's folder, so that a slow sender occupies neither memory nor a transaction. One thread
+/// at a time.
 class MeshUpload {
  public:
   /// Appends the next bytes. Errors: ResourceExhausted (MESH_TOO_LARGE: over 256 MiB in all).
@@ -76,8 +77,8 @@ class MeshStore {
   /// it can be stored again).
   absl::Status WriteFile(const std::string& digest, const std::filesystem::path& file);
 
-  /// Deletes meshes that no model and no job refers to, a day after their last upload; a dry run
-  /// only counts them.
+  /// Deletes meshes that no model and no job refers to, kUnusedLife after their last upload. A dry
+  /// run only counts these meshes.
   absl::StatusOr<CollectedMeshes> Collect(bool dry_run = false);
 
  private:

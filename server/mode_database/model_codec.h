@@ -66,9 +66,9 @@ class ModelDecoder {
       destinations_;  // address for each array's first byte; null if the array is not kept
 };
 
-/// Hands the records of `model` to `sink` in order and stops at its first error, which is returned.
-/// `header` supplies the fields that the model lacks; its arrays and mode count are filled in.
-/// `residuals` (#m) belong to the eigenvalues.
+/// Hands the records of `model` to `sink` in order. Stops at the first error of `sink` and returns
+/// it. `header` supplies the fields that the model lacks; its arrays and mode count are filled in.
+/// `residuals` are those of the #m eigenvalues.
 absl::Status EncodeModel(const ModalModel& model, v1::ModalModelHeader header,
                          const std::vector<double>& residuals,
                          absl::FunctionRef<absl::Status(const v1::ModalModelRecord&)> sink);

@@ -48,7 +48,8 @@ class SqliteConnection {
   /// Runs statements without parameters, separated by semicolons.
   absl::Status RunScript(const char* sql);
 
-  /// Runs one query, calls `on_row` for each row and stops at its first error, which is returned.
+  /// Runs one query and calls `on_row` for each row. Stops at the first error of `on_row` and
+  /// returns it.
   absl::Status Query(const char* sql, std::initializer_list<SqlParameter> parameters,
                      absl::FunctionRef<absl::Status(const SqlRow&)> on_row);
 

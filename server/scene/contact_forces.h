@@ -41,7 +41,7 @@ struct ForceEvent {
 ///     force   |      . .                the blow is over when
 ///             |    .     .              * the force above the load has fallen to a quarter of its
 ///             |   .       .               greatest value, or
-///             |  .         |            * it stays at less than half of that for 10 ms, or
+///             |  .         |            * it is below half of that, and steady for 10 ms, or
 ///      load   |............|......      * 40 ms have passed.
 ///             +------------+------ t    In the last two cases the force that remains is a load,
 ///             begin        over         and counts for nothing in the blow.

@@ -54,7 +54,7 @@ struct IntakeSettings {
   std::vector<FoundBlow>* blows = nullptr;
 };
 
-/// Counts of the contacts of a simulation that a ContactIntake has found unusual so far.
+/// The numbers of unusual contacts that a ContactIntake has found so far in a simulation.
 struct IntakeFindings {
   BlowCounts engine{};
   uint64_t distant_point_count = 0;      ///< points farther from the surface than 5 % of the extent
@@ -131,7 +131,7 @@ class ContactIntake {
   void NoteZero(const ObjectContact& contact);
   void Push(const ContactForces::Events& events);
   void Push(MixerEvent& event, double frame);
-  /// Adds the blow of `event`, whose object, partner and frame are given, to the settings' blows.
+  /// Adds the blow of `event` to the settings' blows. `blow` has its object and partner.
   void AddBlow(const MixerEvent& event, FoundBlow blow, double frame)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(scene_.mutex());
   absl::StatusOr<double> FrameOfImpulse(double time_offset_s) const;

@@ -136,7 +136,7 @@ size_t OfflineRenderer::Render(std::span<float> samples) {
   return count;
 }
 
-/// Renders blocks into the front of `samples`; returns the number of frames that belong to the
+/// Renders blocks into the front of `samples`. Returns the number of frames that belong to the
 /// sound.
 size_t OfflineRenderer::RenderBlocks(std::span<float> samples) {
   const size_t block_size = kBlockFrameCount * settings_.channel_count;

@@ -124,8 +124,8 @@ class SceneRegistry {
   /// oscillator bank takes further impulses, and the old bank decays.
   void TakeOverTransfers(const std::string& model_digest);
 
-  /// Moves the listener to `pose`; `glide_s` is as for objects. Errors: NotFound (SCENE_NOT_FOUND),
-  /// InvalidArgument (INVALID_POSE, INVALID_GLIDE).
+  /// Moves the listener to `pose` within `glide_s`, which has the limits of ObjectChange::glide_s.
+  /// Errors: NotFound (SCENE_NOT_FOUND), InvalidArgument (INVALID_POSE, INVALID_GLIDE).
   absl::Status UpdateListener(uint64_t scene, const Pose& pose, double glide_s);
 
   /// Fades the object out. Errors: NotFound (SCENE_NOT_FOUND, OBJECT_NOT_FOUND).

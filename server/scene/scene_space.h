@@ -35,8 +35,8 @@ std::shared_ptr<Voice> MakeVoice(const SceneSpace& space, const std::optional<Po
 /// The motion of an object or of the listener to `pose`.
 Motion MotionTo(const Pose& pose, double glide_frames);
 
-/// Computes how long an object or the listener takes from one pose to the next. A simulation
-/// advances step by step, so this is at most a step.
+/// Computes the time that an object or the listener takes from one pose to the next. This time is
+/// at most one step of the simulation.
 class PoseTimes {
  public:
   explicit PoseTimes(double step_s) : step_s_(step_s) {}

@@ -102,7 +102,8 @@ std::optional<MovedBody> MovedBodyOf(const Transfer* transfer, const SoundingBod
                    .sound_speed_m_per_s = transfer->sound_speed_m_per_s};
 }
 
-/// Returns the frequency up to which the model is complete, unless that is the top of the band.
+/// Returns the frequency up to which the model is complete, or nothing if it is complete up to
+/// `top_hz`.
 std::optional<double> CompleteTo(const ModalModel& model, const SoundingMaterial& material,
                                  double top_hz) {
   const double complete_hz = NaturalFrequencyHz(model.complete_to_eigenvalue, material);
