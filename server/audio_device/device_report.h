@@ -32,9 +32,9 @@ struct DeviceReport {
   }
 };
 
-/// The descriptors of carillon-audio: a socket of type SOCK_SEQPACKET. The device plays once the
-/// daemon has sent one byte with the descriptor of the FrameRing's memory. When the daemon closes
-/// its end, the process ends.
+/// The descriptor of carillon-audio's socket to the daemon, of type SOCK_SEQPACKET. The device
+/// plays once the daemon has sent one byte with the descriptor of the FrameRing's memory. When the
+/// daemon closes its end, the process ends.
 inline constexpr int kDaemonSocket = 0;
 
 }  // namespace carillon

@@ -38,7 +38,7 @@ struct Outcome {
 /// functions, one call at a time for each task. A limit of the request applies if it is below the
 /// executor's own limit.
 struct DecompositionTask {
-  std::string digest;     ///< names the task; at most one task of a digest runs at a time
+  std::string digest;  ///< names the task; tasks with the same digest must not run at the same time
   bool radiates = false;  ///< whether to compute the transfer of a stored model, and not a model
   v1::CreateModalModelRequest request;  ///< resolved
   uint32_t way = 0;                     ///< see JobRecord::way

@@ -18,7 +18,7 @@ struct LocalExecutorOptions {
   std::filesystem::path directory{};
   int worker_count = 0;  ///< 0 means half of the processors, at least 1
   int threads_per_worker = 1;
-  uint64_t memory_budget_bytes = 0;  ///< resident memory of all workers; 0: half of the RAM
+  uint64_t memory_budget_bytes = 0;  ///< resident memory of all workers; 0 means half of RAM
   uint64_t memory_limit_bytes = 0;   ///< resident memory of one worker; 0 means the whole budget
   std::chrono::milliseconds time_limit = std::chrono::hours(6);
   /// Longest time without an event.

@@ -12,8 +12,8 @@ namespace carillon {
 /// A job that a client asked for.
 struct WantedJob {
   std::string digest;  ///< the job's name
-  /// The resolved request. For a transfer, it states the use of the body: material, size, band and
-  /// limits.
+  /// The resolved request. The request of a transfer has a material, size, band and limits, but no
+  /// mesh.
   v1::CreateModalModelRequest request;
   std::string transfer_of{};  ///< see JobRecord::transfer_of
   std::string client{};       ///< the client that asked; see ActiveJob

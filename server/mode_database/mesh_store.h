@@ -58,7 +58,7 @@ class MeshStore {
  public:
   static constexpr uint64_t kMaxByteCount = 256ULL << 20;
 
-  /// The time for which a mesh without a model and a job is kept after its last upload, because a
+  /// The time for which a mesh that no model and no job refers to is kept after its last upload. A
   /// request for its model may follow.
   static constexpr std::chrono::hours kUnusedLife{24};
 
