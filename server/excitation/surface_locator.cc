@@ -14,6 +14,7 @@
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 #include "server/excitation/closest_point.h"
+#include "server/excitation/surface_grid.h"
 
 namespace carillon {
 namespace {
@@ -66,49 +67,54 @@ Point Interpolate(const std::array<Point, 3>& corners, const std::array<double, 
   return point;
 }
 
-/// The state of a query. Embree hands it to the callback for each triangle that is near enough.
+/// The state of a query.
 struct Search {
   const LocatorSurfaces& surfaces;
+  const SurfaceGrid& grid;
   const Point& point;
   std::optional<uint32_t> given_triangle;  // if set, only triangles that lie on it count
   uint32_t triangle = 0;
   ClosestPoint closest{.squared_distance_m2 = std::numeric_limits<double>::infinity()};
+
+  bool found() const { return std::isfinite(closest.squared_distance_m2); }
+  /// True if the triangle is the nearest so far. Of several at the same distance the one with the
+  /// lowest index is, so that the order in which triangles are considered does not matter.
+  bool Consider(uint32_t t);
 };
 
-/// Returns the squared distance of `point` from the box around a triangle. The triangle is not
-/// nearer than this. The function takes a fraction of the time of FindClosestPoint.
-double SquaredDistanceOfBox(std::span<const std::array<float, 3>> vertices,
-                            const std::array<uint32_t, 3>& triangle, const Point& point) {
-  const std::array<float, 3>&a = vertices[triangle[0]], &b = vertices[triangle[1]],
-                          &c = vertices[triangle[2]];
-  double squared = 0;
-  for (size_t axis = 0; axis < 3; ++axis) {
-    const double least = std::min(std::min(a[axis], b[axis]), c[axis]);
-    const double most = std::max(std::max(a[axis], b[axis]), c[axis]);
-    const double away = std::max(std::max(least - point[axis], point[axis] - most), 0.0);
-    squared += away * away;
-  }
-  return squared;
+bool Search::Consider(uint32_t t) {
+  // Far more than rounding can err, so that no triangle is left out that would be the nearest.
+  constexpr double kSlack = 1.001, kSlackM2 = 1e-24;
+  if (given_triangle && surfaces.given_triangle[t] != *given_triangle) return false;
+  const double best = closest.squared_distance_m2;
+  // Many points are corners of the surface, where several triangles meet.
+  if (best == 0 && t > triangle) return false;
+  // The box takes a fraction of the time of the triangle, which is no nearer.
+  if (grid.box(t).SquaredDistanceFrom(point) > kSlack * best + kSlackM2) return false;
+  const ClosestPoint on_triangle =
+      FindClosestPoint(Corners(surfaces.vertices, surfaces.triangles[t]), point);
+  const double squared = on_triangle.squared_distance_m2;
+  if (!(squared < best) && !(squared == best && t < triangle && found())) return false;
+  triangle = t;
+  closest = on_triangle;
+  return true;
 }
 
+/// The radius within which a triangle may still be the nearest or as near. Embree computes in
+/// single precision: the radius allows for a few roundings of the point and of the distance.
+float RadiusOf(const Search& search) {
+  constexpr double kRounding = 1e-6;
+  double magnitude = std::sqrt(search.closest.squared_distance_m2);
+  const double radius = magnitude;
+  for (const double coordinate : search.point) magnitude += std::abs(coordinate);
+  return static_cast<float>(radius + kRounding * magnitude);
+}
+
+/// Embree calls this for each triangle that is near enough.
 bool VisitTriangle(RTCPointQueryFunctionArguments* arguments) {
-  // Far more than rounding errors, so that the nearest triangle is never left out.
-  constexpr double kSlack = 1.001, kSlackM2 = 1e-24;
   Search& search = *static_cast<Search*>(arguments->userPtr);
-  const uint32_t t = arguments->primID;
-  if (search.given_triangle && search.surfaces.given_triangle[t] != *search.given_triangle) {
-    return false;
-  }
-  const double box =
-      SquaredDistanceOfBox(search.surfaces.vertices, search.surfaces.triangles[t], search.point);
-  if (box > kSlack * search.closest.squared_distance_m2 + kSlackM2) return false;
-  const ClosestPoint closest = FindClosestPoint(
-      Corners(search.surfaces.vertices, search.surfaces.triangles[t]), search.point);
-  if (!(closest.squared_distance_m2 < search.closest.squared_distance_m2)) return false;
-  search.triangle = t;
-  search.closest = closest;
-  const auto radius = static_cast<float>(std::sqrt(closest.squared_distance_m2));
-  arguments->query->radius = std::nextafter(radius, std::numeric_limits<float>::infinity());
+  if (!search.Consider(arguments->primID)) return false;
+  arguments->query->radius = std::min(arguments->query->radius, RadiusOf(search));
   return true;
 }
 
@@ -121,12 +127,14 @@ void CopyToBuffer(RTCGeometry geometry, RTCBufferType type, RTCFormat format,
 
 }  // namespace
 
-/// Embree's objects, and the surfaces from which they were made.
+/// The surfaces, the grid for points on and near them, and Embree's objects for all others.
 struct SurfaceLocator::Index {
   explicit Index(const LocatorSurfaces& of)
-      // By default Embree builds its index with a thread on each core, which would disturb the
-      // audio.
-      : surfaces(of), device(rtcNewDevice("threads=1,user_threads=1")), scene(rtcNewScene(device)) {
+      : surfaces(of),
+        grid(of.vertices, of.triangles),
+        // By default Embree builds with a thread on each core, which would disturb the audio.
+        device(rtcNewDevice("threads=1,user_threads=1")),
+        scene(rtcNewScene(device)) {
     rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
     const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
     CopyToBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT3, surfaces.vertices);
@@ -144,8 +152,33 @@ struct SurfaceLocator::Index {
   Index(const Index&) = delete;
   Index& operator=(const Index&) = delete;
 
-  /// Runs a query. Returns false if no triangle lies on the given triangle.
-  bool Run(Search& search) const {
+  /// Returns false if no triangle lies on the given triangle, or the point is too far away.
+  bool Run(Search& search) const { return RunInGrid(search) || RunEverywhere(search); }
+
+  /// Searches the cells about the point, at first the nearest. False: the search is not over.
+  bool RunInGrid(Search& search) const {
+    constexpr size_t kMostCells = 125;
+    // Far more than rounding can err, as in Consider.
+    constexpr double kSlack = 1.001, kSlackOfSide = 1e-9;
+    if (!grid.usable()) return false;
+    const auto consider = [&search](uint32_t t) { search.Consider(t); };
+    SurfaceGrid::Block searched = grid.Around(search.point, 0);
+    if (!grid.Visit(searched, consider)) return false;
+    if (!search.found()) {
+      searched = grid.Around(search.point, grid.cell_width_m());
+      if (!grid.Visit(searched, consider) || !search.found()) return false;
+    }
+    const double radius = kSlack * std::sqrt(search.closest.squared_distance_m2) +
+                          kSlackOfSide * grid.longest_side_m();
+    if (radius > grid.longest_side_m()) return false;
+    const SurfaceGrid::Block within = grid.Around(search.point, radius);
+    if (searched.Contains(within)) return true;
+    return within.cell_count() <= kMostCells && grid.Visit(within, consider);
+  }
+
+  bool RunEverywhere(Search& search) const {
+    // A triangle that the grid has found bounds nothing here, for Embree says what is too far.
+    search.closest.squared_distance_m2 = std::numeric_limits<double>::infinity();
     RTCPointQuery query{.x = static_cast<float>(search.point[0]),
                         .y = static_cast<float>(search.point[1]),
                         .z = static_cast<float>(search.point[2]),
@@ -154,7 +187,7 @@ struct SurfaceLocator::Index {
     RTCPointQueryContext context;
     rtcInitPointQueryContext(&context);
     rtcPointQuery(scene, &query, &context, nullptr, &search);
-    return std::isfinite(search.closest.squared_distance_m2);
+    return search.found();
   }
 
   LocatedPoint Describe(const Search& search) const {
@@ -165,6 +198,7 @@ struct SurfaceLocator::Index {
   }
 
   LocatorSurfaces surfaces;
+  SurfaceGrid grid;
   RTCDevice device;
   RTCScene scene;
 };
@@ -187,7 +221,10 @@ absl::StatusOr<std::unique_ptr<SurfaceLocator>> SurfaceLocator::Make(
 
 absl::StatusOr<LocatedPoint> SurfaceLocator::Nearest(const Point& point) const {
   RETURN_IF_ERROR(ValidatePoint(point));
-  Search search{.surfaces = index_->surfaces, .point = point, .given_triangle = std::nullopt};
+  Search search{.surfaces = index_->surfaces,
+                .grid = index_->grid,
+                .point = point,
+                .given_triangle = std::nullopt};
   if (index_->Run(search)) return index_->Describe(search);
   return Refusal(
       absl::StatusCode::kInvalidArgument, "POINT_TOO_FAR",
@@ -206,7 +243,8 @@ absl::StatusOr<LocatedPoint> SurfaceLocator::OnGivenTriangle(const SurfacePoint&
   }
   const Point point = Interpolate(
       Corners(surfaces.given_vertices, surfaces.given_triangles[at.triangle]), at.weights);
-  Search search{.surfaces = surfaces, .point = point, .given_triangle = at.triangle};
+  Search search{
+      .surfaces = surfaces, .grid = index_->grid, .point = point, .given_triangle = at.triangle};
   if (index_->Run(search)) return index_->Describe(search);
   return Nearest(point);  // a repair of the surface may have removed that triangle
 }

@@ -40,7 +40,8 @@ class SurfaceLocator {
   ~SurfaceLocator();
 
   /// Returns the point of the sounding surface nearest to `point`, which is in the model's frame
-  /// and size, metres. Errors: INVALID_ARGUMENT (POINT_NOT_FINITE, POINT_TOO_FAR).
+  /// and size, metres. Where several triangles are equally near, it is on the one with the lowest
+  /// index. INVALID_ARGUMENT (POINT_NOT_FINITE, POINT_TOO_FAR).
   absl::StatusOr<LocatedPoint> Nearest(const Point& point) const;
 
   /// Returns the point of the sounding surface at a point of a given triangle. Triangles that lie
