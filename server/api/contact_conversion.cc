@@ -3,8 +3,11 @@
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
+#include <span>
 #include <utility>
 #include <variant>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
@@ -99,35 +102,66 @@ absl::Status ReadInto(const v1::EngineContact& row, ObjectTouch& touch) {
   return absl::OkStatus();
 }
 
-/// Gives each row to `take`, one of the intake's methods.
+/// Contacts on their way to `take`, one of the intake's methods, which gets many at once.
+template <typename Contact>
+class Batch {
+ public:
+  Batch(ContactIntake& intake, void (ContactIntake::*take)(std::span<const Contact>), int count)
+      : intake_(intake), take_(take) {
+    contacts_.reserve(std::min(static_cast<size_t>(count), kMostContactsAtOnce));
+  }
+
+  void Add(const Contact& contact) {
+    contacts_.push_back(contact);
+    if (contacts_.size() == kMostContactsAtOnce) Send();
+  }
+
+  void Send() {
+    if (!contacts_.empty()) (intake_.*take_)(contacts_);
+    contacts_.clear();
+  }
+
+ private:
+  ContactIntake& intake_;
+  void (ContactIntake::*take_)(std::span<const Contact>);
+  std::vector<Contact> contacts_;
+};
+
+/// Gives the rows to `take`, one of the intake's methods.
 template <typename Contact, typename Rows>
 void ReadRows(const Rows& rows, ContactIntake& intake,
-              void (ContactIntake::*take)(const Contact&)) {
+              void (ContactIntake::*take)(std::span<const Contact>)) {
+  Batch<Contact> batch(intake, take, rows.size());
   for (const auto& row : rows) {
     Contact contact;
     if (absl::Status status = ReadInto(row, contact); status.ok()) {
-      (intake.*take)(contact);
+      batch.Add(contact);
     } else {
+      batch.Send();  // so that the newest rejection is that of the last row
       intake.Reject(row.has_second() ? 2 : 1, std::move(status));
     }
   }
+  batch.Send();
 }
 
-/// Gives each row of columns to `take`. A row without a duration gets that of an elastic collision.
+/// Gives the rows of columns to `take`, with the duration of an elastic collision where none is
+/// stated.
 template <typename Contact, typename Columns>
 void ReadColumns(const Columns& columns, const v1::ImpulseColumns& impulses, ContactIntake& intake,
-                 void (ContactIntake::*take)(const Contact&)) {
+                 void (ContactIntake::*take)(std::span<const Contact>)) {
   absl::Status status = Validate(columns);
   const absl::StatusOr<HertzContact> hertz = ToHertzContact(impulses.hertz());
   status.Update(hertz.status());
   if (!status.ok()) {
     return intake.Reject(std::max<uint64_t>(1, CountContacts(impulses)), std::move(status));
   }
+  Batch<Contact> batch(intake, take, impulses.object_size());
   for (int row = 0; row < impulses.object_size(); ++row) {
     Contact contact = ReadRow(columns, row);
     contact.contact.impulse.hertz = *hertz;
-    (intake.*take)(contact);
+    batch.Add(contact);
   }
+  batch.Send();
 }
 
 void ReadColumns(const v1::PoseColumns& columns, ContactIntake& intake) {

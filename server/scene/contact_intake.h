@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -18,7 +20,10 @@
 
 namespace carillon {
 
-/// Takes the events of an intake, and has the clock by which they are late or early.
+/// The contacts for which a scene's mutex is held at once: some 20 us.
+inline constexpr size_t kMostContactsAtOnce = 64;
+
+/// Where the events of an intake go, and the clock by which they are late or early.
 class EventTarget {
  public:
   virtual ~EventTarget() = default;
@@ -83,12 +88,16 @@ class ContactIntake {
   /// is not finite or goes back).
   absl::Status BeginStep(double time_s);
 
-  void Strike(const ObjectImpulse& impulse);
+  /// These three hold the scene's mutex once for all contacts: callers give at most
+  /// kMostContactsAtOnce, so that other threads need not wait long.
+  void Strike(std::span<const ObjectImpulse> impulses);
+  void Strike(const ObjectImpulse& impulse) { Strike(std::span(&impulse, 1)); }
 
-  /// Adds a force. Forces and touches last for one step, and must be reported again in each step
-  /// until they end.
-  void Hold(const ObjectForce& force);
-  void Touch(const ObjectTouch& touch);
+  /// Forces and touches last for one step, and are reported again in each step until they end.
+  void Hold(std::span<const ObjectForce> forces);
+  void Hold(const ObjectForce& force) { Hold(std::span(&force, 1)); }
+  void Touch(std::span<const ObjectTouch> touches);
+  void Touch(const ObjectTouch& touch) { Touch(std::span(&touch, 1)); }
 
   /// Sets the pose of an object or of the listener at the time of the step. The object or listener
   /// moves there in a straight line from its previous pose.
@@ -116,9 +125,10 @@ class ContactIntake {
   IntakeFindings findings() const;
 
  private:
-  absl::Status TryStrike(const ObjectImpulse& impulse);
-  absl::Status TryHold(const ObjectForce& force);
-  absl::Status TryTouch(const ObjectTouch& touch);
+  absl::Status TryStrike(const ObjectImpulse& impulse)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(scene_.mutex());
+  absl::Status TryHold(const ObjectForce& force) ABSL_EXCLUSIVE_LOCKS_REQUIRED(scene_.mutex());
+  absl::Status TryTouch(const ObjectTouch& touch) ABSL_EXCLUSIVE_LOCKS_REQUIRED(scene_.mutex());
   absl::Status TryMove(uint32_t handle, const Pose& pose);
   absl::Status TryMoveListener(const Pose& pose);
   void Note(uint64_t count, absl::Status verdict);
