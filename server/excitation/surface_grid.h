@@ -77,16 +77,18 @@ class SurfaceGrid {
     return block;
   }
 
-  /// Calls `visit` with the index of each triangle of the cells, more than once for a triangle of
-  /// several cells. False: it stopped at a cell with over kMostInCell triangles.
+  /// Calls `visit` with the triangles of each cell, ascending; a triangle of several cells comes
+  /// more than once. False: it stopped at a cell with over kMostInCell triangles.
   template <typename Visitor>
   bool Visit(const Block& block, const Visitor& visit) const {
     for (uint32_t z = block.first[2]; z <= block.last[2]; ++z) {
       for (uint32_t y = block.first[1]; y <= block.last[1]; ++y) {
         for (uint32_t x = block.first[0]; x <= block.last[0]; ++x) {
           const size_t cell = IndexOf(x, y, z);
-          if (begins_[cell + 1] - begins_[cell] > kMostInCell) return false;
-          for (uint32_t i = begins_[cell]; i < begins_[cell + 1]; ++i) visit(entries_[i]);
+          const auto triangles =
+              std::span(entries_).subspan(begins_[cell], begins_[cell + 1] - begins_[cell]);
+          if (triangles.size() > kMostInCell) return false;
+          visit(triangles);
         }
       }
     }

@@ -67,6 +67,8 @@ Point Interpolate(const std::array<Point, 3>& corners, const std::array<double, 
   return point;
 }
 
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
 /// The state of a query.
 struct Search {
   const LocatorSurfaces& surfaces;
@@ -74,30 +76,58 @@ struct Search {
   const Point& point;
   std::optional<uint32_t> given_triangle;  // if set, only triangles that lie on it count
   uint32_t triangle = 0;
-  ClosestPoint closest{.squared_distance_m2 = std::numeric_limits<double>::infinity()};
+  ClosestPoint closest{.squared_distance_m2 = kInfinity};
 
   bool found() const { return std::isfinite(closest.squared_distance_m2); }
   /// True if the triangle is the nearest so far. Of several at the same distance the one with the
   /// lowest index is, so that the order in which triangles are considered does not matter.
-  bool Consider(uint32_t t);
+  bool Consider(uint32_t t) {
+    return MayBeNearest(t, grid.box(t).SquaredDistanceFrom(point)) && Measure(t);
+  }
+  /// Considers the triangles of a cell, the one whose box is nearest first: it rules out most of
+  /// the others.
+  void ConsiderCell(std::span<const uint32_t> triangles);
+
+ private:
+  /// `box` is the squared distance from the triangle's box, to which the triangle is no nearer. It
+  /// takes a fraction of the time of the distance from the triangle.
+  bool MayBeNearest(uint32_t t, double box) const;
+  bool Measure(uint32_t t);
 };
 
-bool Search::Consider(uint32_t t) {
+bool Search::MayBeNearest(uint32_t t, double box) const {
   // Far more than rounding can err, so that no triangle is left out that would be the nearest.
   constexpr double kSlack = 1.001, kSlackM2 = 1e-24;
-  if (given_triangle && surfaces.given_triangle[t] != *given_triangle) return false;
   const double best = closest.squared_distance_m2;
+  if (box > kSlack * best + kSlackM2) return false;
   // Many points are corners of the surface, where several triangles meet.
   if (best == 0 && t > triangle) return false;
-  // The box takes a fraction of the time of the triangle, which is no nearer.
-  if (grid.box(t).SquaredDistanceFrom(point) > kSlack * best + kSlackM2) return false;
+  return !given_triangle || surfaces.given_triangle[t] == *given_triangle;
+}
+
+bool Search::Measure(uint32_t t) {
   const ClosestPoint on_triangle =
       FindClosestPoint(Corners(surfaces.vertices, surfaces.triangles[t]), point);
-  const double squared = on_triangle.squared_distance_m2;
+  const double best = closest.squared_distance_m2, squared = on_triangle.squared_distance_m2;
   if (!(squared < best) && !(squared == best && t < triangle && found())) return false;
   triangle = t;
   closest = on_triangle;
   return true;
+}
+
+void Search::ConsiderCell(std::span<const uint32_t> triangles) {
+  std::array<double, SurfaceGrid::kMostInCell> boxes;
+  size_t nearest = 0;
+  for (size_t i = 0; i < triangles.size(); ++i) {
+    boxes[i] = grid.box(triangles[i]).SquaredDistanceFrom(point);
+    if (boxes[i] < boxes[nearest]) nearest = i;
+  }
+  if (!triangles.empty() && MayBeNearest(triangles[nearest], boxes[nearest])) {
+    Measure(triangles[nearest]);
+  }
+  for (size_t i = 0; i < triangles.size(); ++i) {
+    if (i != nearest && MayBeNearest(triangles[i], boxes[i])) Measure(triangles[i]);
+  }
 }
 
 /// The radius within which a triangle may still be the nearest or as near. Embree computes in
@@ -155,35 +185,32 @@ struct SurfaceLocator::Index {
   /// Returns false if no triangle lies on the given triangle, or the point is too far away.
   bool Run(Search& search) const { return RunInGrid(search) || RunEverywhere(search); }
 
-  /// Searches the cells about the point, at first the nearest. False: the search is not over.
+  /// Searches the cells about the point, at first the nearest. False: the search is not over, but
+  /// may have found a triangle that is near.
   bool RunInGrid(Search& search) const {
-    constexpr size_t kMostCells = 125;
-    // Far more than rounding can err, as in Consider.
+    constexpr size_t kMostCells = 8;  // Embree is quicker than more of them
+    // Far more than rounding can err, as in MayBeNearest.
     constexpr double kSlack = 1.001, kSlackOfSide = 1e-9;
     if (!grid.usable()) return false;
-    const auto consider = [&search](uint32_t t) { search.Consider(t); };
-    SurfaceGrid::Block searched = grid.Around(search.point, 0);
-    if (!grid.Visit(searched, consider)) return false;
-    if (!search.found()) {
-      searched = grid.Around(search.point, grid.cell_width_m());
-      if (!grid.Visit(searched, consider) || !search.found()) return false;
-    }
+    const auto consider = [&search](std::span<const uint32_t> cell) { search.ConsiderCell(cell); };
+    const SurfaceGrid::Block searched = grid.Around(search.point, 0);
+    if (!grid.Visit(searched, consider) || !search.found()) return false;
     const double radius = kSlack * std::sqrt(search.closest.squared_distance_m2) +
                           kSlackOfSide * grid.longest_side_m();
-    if (radius > grid.longest_side_m()) return false;
     const SurfaceGrid::Block within = grid.Around(search.point, radius);
+    // Embree says what is too far.
+    if (radius > grid.longest_side_m()) search.closest.squared_distance_m2 = kInfinity;
+    if (!search.found()) return false;
     if (searched.Contains(within)) return true;
     return within.cell_count() <= kMostCells && grid.Visit(within, consider);
   }
 
   bool RunEverywhere(Search& search) const {
-    // A triangle that the grid has found bounds nothing here, for Embree says what is too far.
-    search.closest.squared_distance_m2 = std::numeric_limits<double>::infinity();
     RTCPointQuery query{.x = static_cast<float>(search.point[0]),
                         .y = static_cast<float>(search.point[1]),
                         .z = static_cast<float>(search.point[2]),
                         .time = 0,
-                        .radius = std::numeric_limits<float>::infinity()};
+                        .radius = RadiusOf(search)};
     RTCPointQueryContext context;
     rtcInitPointQueryContext(&context);
     rtcPointQuery(scene, &query, &context, nullptr, &search);

@@ -250,7 +250,10 @@ TEST(SurfaceGrid, TheCellsAboutAPointHoldEveryTriangleThatIsNear) {
       const Point point = OnSurface(mesh, random);
       const double radius = grid.cell_width_m();
       std::vector<bool> visited(mesh.triangles.size());
-      if (!grid.Visit(grid.Around(point, radius), [&](uint32_t t) { visited[t] = true; })) continue;
+      const auto note = [&visited](std::span<const uint32_t> cell) {
+        for (const uint32_t t : cell) visited[t] = true;
+      };
+      if (!grid.Visit(grid.Around(point, radius), note)) continue;
       for (uint32_t t = 0; t < mesh.triangles.size(); ++t) {
         const double squared = FindClosestPoint(Corners(mesh, t), point).squared_distance_m2;
         EXPECT_TRUE(visited[t] || squared > 0.999 * radius * radius) << name << " " << t;
