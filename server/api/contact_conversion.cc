@@ -111,10 +111,14 @@ class Batch {
     contacts_.reserve(std::min(static_cast<size_t>(count), kMostContactsAtOnce));
   }
 
-  void Add(const Contact& contact) {
-    contacts_.push_back(contact);
+  /// Returns a contact to be filled in.
+  Contact& Next() {
     if (contacts_.size() == kMostContactsAtOnce) Send();
+    return contacts_.emplace_back();
   }
+
+  /// Takes the newest contact out again.
+  void Drop() { contacts_.pop_back(); }
 
   void Send() {
     if (!contacts_.empty()) (intake_.*take_)(contacts_);
@@ -133,13 +137,11 @@ void ReadRows(const Rows& rows, ContactIntake& intake,
               void (ContactIntake::*take)(std::span<const Contact>)) {
   Batch<Contact> batch(intake, take, rows.size());
   for (const auto& row : rows) {
-    Contact contact;
-    if (absl::Status status = ReadInto(row, contact); status.ok()) {
-      batch.Add(contact);
-    } else {
-      batch.Send();  // so that the newest rejection is that of the last row
-      intake.Reject(row.has_second() ? 2 : 1, std::move(status));
-    }
+    absl::Status status = ReadInto(row, batch.Next());
+    if (status.ok()) continue;
+    batch.Drop();
+    batch.Send();  // so that the newest rejection is that of the last row
+    intake.Reject(row.has_second() ? 2 : 1, std::move(status));
   }
   batch.Send();
 }
@@ -157,9 +159,9 @@ void ReadColumns(const Columns& columns, const v1::ImpulseColumns& impulses, Con
   }
   Batch<Contact> batch(intake, take, impulses.object_size());
   for (int row = 0; row < impulses.object_size(); ++row) {
-    Contact contact = ReadRow(columns, row);
+    Contact& contact = batch.Next();
+    contact = ReadRow(columns, row);
     contact.contact.impulse.hertz = *hertz;
-    batch.Add(contact);
   }
   batch.Send();
 }
