@@ -79,8 +79,8 @@ struct Search {
   ClosestPoint closest{.squared_distance_m2 = kInfinity};
 
   bool found() const { return std::isfinite(closest.squared_distance_m2); }
-  /// True if the triangle is the nearest so far. Of several at the same distance the one with the
-  /// lowest index is, so that the order in which triangles are considered does not matter.
+  /// True if the triangle is the nearest so far. The lowest index decides between triangles at the
+  /// same distance, so that the order in which they are considered does not matter.
   bool Consider(uint32_t t) {
     return MayBeNearest(t, grid.box(t).SquaredDistanceFrom(point)) && Measure(t);
   }
