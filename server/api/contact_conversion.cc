@@ -102,7 +102,7 @@ absl::Status ReadInto(const v1::EngineContact& row, ObjectTouch& touch) {
   return absl::OkStatus();
 }
 
-/// Contacts on their way to `take`, one of the intake's methods, which gets many at once.
+/// Collects contacts and hands them to `take`, one of the intake's methods, many at a time.
 template <typename Contact>
 class Batch {
  public:
@@ -117,7 +117,7 @@ class Batch {
     return contacts_.emplace_back();
   }
 
-  /// Takes the newest contact out again.
+  /// Removes the newest contact.
   void Drop() { contacts_.pop_back(); }
 
   void Send() {
@@ -140,7 +140,7 @@ void ReadRows(const Rows& rows, ContactIntake& intake,
     absl::Status status = ReadInto(row, batch.Next());
     if (status.ok()) continue;
     batch.Drop();
-    batch.Send();  // so that the newest rejection is that of the last row
+    batch.Send();  // the contacts before it come first, so that the last rejection stays the newest
     intake.Reject(row.has_second() ? 2 : 1, std::move(status));
   }
   batch.Send();

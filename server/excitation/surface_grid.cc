@@ -7,13 +7,13 @@ namespace carillon {
 namespace {
 
 constexpr size_t kMostCellsPerTriangle = 4, kMostEntriesPerTriangle = 12, kMoreOfEach = 64;
-/// Cells along the longest side at first.
+/// Largest number of cells along the longest side.
 constexpr double kMostAlongASide = 1000;
 constexpr double kWidening = 1.25;
 
-/// The width of cells that are about as wide as an average triangle of an even surface.
+/// Returns the width of an average triangle.
 double WidthOfTriangles(std::span<const SurfaceGrid::Box> boxes) {
-  double area = 0;  // of three sides of each box
+  double area = 0;  // sum over all boxes of three sides
   for (const SurfaceGrid::Box& box : boxes) {
     std::array<double, 3> side{};
     for (size_t axis = 0; axis < 3; ++axis) {
@@ -75,7 +75,8 @@ SurfaceGrid::Block SurfaceGrid::BlockOf(const Box& box) const {
   return block;
 }
 
-/// Whether the cells are few enough. At most two cells along each axis always are.
+/// Returns whether the cells and their entries are few enough. Two cells along each axis always
+/// are.
 bool SurfaceGrid::Fits() const {
   const size_t cell_count = size_t{size_[0]} * size_[1] * size_[2];
   if (cell_count > kMostCellsPerTriangle * boxes_.size() + kMoreOfEach) return false;
@@ -106,7 +107,7 @@ void SurfaceGrid::Fill() {
     begin = end;
   }
   entries_.resize(end);
-  // Triangles are put in from the last to the first, so that those of a cell ascend.
+  // The last triangle comes first, so that the triangles of each cell end up in ascending order.
   for (size_t t = boxes_.size(); t > 0; --t) {
     for_each_cell(BlockOf(boxes_[t - 1]), [this, t](size_t cell) {
       entries_[--begins_[cell]] = static_cast<uint32_t>(t - 1);

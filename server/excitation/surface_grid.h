@@ -13,12 +13,12 @@
 
 namespace carillon {
 
-/// A grid of cubic cells over a surface, each with the triangles whose bounding boxes reach into
-/// it. A triangle that has a point in a cell is always among the triangles of that cell.
+/// A grid of cubic cells over a surface. Each cell lists the triangles whose bounding boxes reach
+/// into it, and so every triangle that has a point in the cell.
 ///
-/// A cell is about as wide as a triangle, or wider where that would take more than 4 cells or 12
-/// entries for each triangle, and 64 of each more: the grid takes at most 88 bytes a triangle and
-/// 520 bytes. A surface with a vertex that is not finite gets no cells.
+/// A cell is about as wide as a triangle. It is wider where the grid would otherwise have more than
+/// 64 + 4 T cells or 64 + 12 T list entries for T triangles. The grid takes at most 520 + 88 T
+/// bytes. A surface with a vertex that is not finite has no cells.
 class SurfaceGrid {
  public:
   /// The bounding box of a triangle.
@@ -55,11 +55,11 @@ class SurfaceGrid {
     }
   };
 
-  /// #V vertices in metres, #T triangles, whose indices are in range.
+  /// Makes the grid of #V vertices in metres and #T triangles, whose indices must be in range.
   SurfaceGrid(std::span<const std::array<float, 3>> vertices,
               std::span<const std::array<uint32_t, 3>> triangles);
 
-  /// False if the surface has no cells.
+  /// Returns false if the surface has no cells.
   bool usable() const { return !begins_.empty(); }
   double cell_width_m() const { return width_m_; }
   /// The longest side of the box around the surface.
@@ -77,8 +77,9 @@ class SurfaceGrid {
     return block;
   }
 
-  /// Calls `visit` with the triangles of each cell, ascending; a triangle of several cells comes
-  /// more than once. False: it stopped at a cell with over kMostInCell triangles.
+  /// Calls `visit` with the triangles of each cell in ascending order. A triangle that lies in
+  /// several cells is visited several times. Stops at a cell with more than kMostInCell triangles,
+  /// and then returns false.
   template <typename Visitor>
   bool Visit(const Block& block, const Visitor& visit) const {
     for (uint32_t z = block.first[2]; z <= block.last[2]; ++z) {
@@ -98,8 +99,7 @@ class SurfaceGrid {
   static constexpr uint32_t kMostInCell = 64;
 
  private:
-  /// The cell of a coordinate along an axis: it never falls as the coordinate rises, so that a
-  /// coordinate between two others lies in a cell between theirs.
+  /// Returns the cell of a coordinate along an axis. A larger coordinate never has a lower cell.
   uint32_t CellOf(double coordinate_m, size_t axis) const {
     const double cell = (coordinate_m - origin_m_[axis]) * cells_per_m_;
     return static_cast<uint32_t>(std::clamp<double>(cell, 0, size_[axis] - 1));

@@ -69,7 +69,7 @@ Point Interpolate(const std::array<Point, 3>& corners, const std::array<double, 
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// The state of a query.
+/// The state of a query. Embree hands it to the callback for each triangle that is near enough.
 struct Search {
   const LocatorSurfaces& surfaces;
   const SurfaceGrid& grid;
@@ -79,24 +79,24 @@ struct Search {
   ClosestPoint closest{.squared_distance_m2 = kInfinity};
 
   bool found() const { return std::isfinite(closest.squared_distance_m2); }
-  /// True if the triangle is the nearest so far. The lowest index decides between triangles at the
-  /// same distance, so that the order in which they are considered does not matter.
+  /// Compares a triangle with the nearest so far. Returns true if it is nearer, or as near with a
+  /// lower index, so that the order in which triangles are considered does not matter.
   bool Consider(uint32_t t) {
     return MayBeNearest(t, grid.box(t).SquaredDistanceFrom(point)) && Measure(t);
   }
-  /// Considers the triangles of a cell, the one whose box is nearest first: it rules out most of
-  /// the others.
+  /// Considers the triangles of a cell. The triangle whose box is nearest comes first, because it
+  /// rules out most of the others.
   void ConsiderCell(std::span<const uint32_t> triangles);
 
  private:
-  /// `box` is the squared distance from the triangle's box, to which the triangle is no nearer. It
-  /// takes a fraction of the time of the distance from the triangle.
+  /// Returns false if the triangle cannot be the nearest. `box` is the squared distance of its box,
+  /// which takes a fraction of the time of the triangle's own distance and is never larger.
   bool MayBeNearest(uint32_t t, double box) const;
   bool Measure(uint32_t t);
 };
 
 bool Search::MayBeNearest(uint32_t t, double box) const {
-  // Far more than rounding can err, so that no triangle is left out that would be the nearest.
+  // Far more than rounding errors, so that the nearest triangle is never left out.
   constexpr double kSlack = 1.001, kSlackM2 = 1e-24;
   const double best = closest.squared_distance_m2;
   if (box > kSlack * best + kSlackM2) return false;
@@ -130,8 +130,8 @@ void Search::ConsiderCell(std::span<const uint32_t> triangles) {
   }
 }
 
-/// The radius within which a triangle may still be the nearest or as near. Embree computes in
-/// single precision: the radius allows for a few roundings of the point and of the distance.
+/// Returns the radius within which a triangle may still be the nearest or as near. Embree computes
+/// in single precision, so that the radius has room for rounding errors of point and distance.
 float RadiusOf(const Search& search) {
   constexpr double kRounding = 1e-6;
   double magnitude = std::sqrt(search.closest.squared_distance_m2);
@@ -157,12 +157,14 @@ void CopyToBuffer(RTCGeometry geometry, RTCBufferType type, RTCFormat format,
 
 }  // namespace
 
-/// The surfaces, the grid for points on and near them, and Embree's objects for all others.
+/// The surfaces, the grid that finds points on and near them, and Embree's objects, which find all
+/// other points.
 struct SurfaceLocator::Index {
   explicit Index(const LocatorSurfaces& of)
       : surfaces(of),
         grid(of.vertices, of.triangles),
-        // By default Embree builds with a thread on each core, which would disturb the audio.
+        // By default Embree builds its index with a thread on each core, which would disturb the
+        // audio.
         device(rtcNewDevice("threads=1,user_threads=1")),
         scene(rtcNewScene(device)) {
     rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
@@ -182,14 +184,15 @@ struct SurfaceLocator::Index {
   Index(const Index&) = delete;
   Index& operator=(const Index&) = delete;
 
-  /// Returns false if no triangle lies on the given triangle, or the point is too far away.
+  /// Runs a query. Returns false if no triangle lies on the given triangle, or if the point is too
+  /// far away.
   bool Run(Search& search) const { return RunInGrid(search) || RunEverywhere(search); }
 
-  /// Searches the cells about the point, at first the nearest. False: the search is not over, but
-  /// may have found a triangle that is near.
+  /// Searches the cell of the point, and then the cells around it. Returns false if a nearer
+  /// triangle may lie outside these cells; the search has then often found a near one.
   bool RunInGrid(Search& search) const {
-    constexpr size_t kMostCells = 8;  // Embree is quicker than more of them
-    // Far more than rounding can err, as in MayBeNearest.
+    constexpr size_t kMostCells = 8;  // Embree is faster than a search of more cells
+    // Far more than rounding errors, as in MayBeNearest.
     constexpr double kSlack = 1.001, kSlackOfSide = 1e-9;
     if (!grid.usable()) return false;
     const auto consider = [&search](std::span<const uint32_t> cell) { search.ConsiderCell(cell); };
@@ -198,7 +201,7 @@ struct SurfaceLocator::Index {
     const double radius = kSlack * std::sqrt(search.closest.squared_distance_m2) +
                           kSlackOfSide * grid.longest_side_m();
     const SurfaceGrid::Block within = grid.Around(search.point, radius);
-    // Embree says what is too far.
+    // Only Embree decides whether a point is too far away.
     if (radius > grid.longest_side_m()) search.closest.squared_distance_m2 = kInfinity;
     if (!search.found()) return false;
     if (searched.Contains(within)) return true;

@@ -20,10 +20,11 @@
 
 namespace carillon {
 
-/// The contacts for which a scene's mutex is held at once: some 20 us.
+/// The largest number of contacts for which the scene's mutex is locked once. They take about
+/// 20 us.
 inline constexpr size_t kMostContactsAtOnce = 64;
 
-/// Where the events of an intake go, and the clock by which they are late or early.
+/// Takes the events of an intake, and has the clock by which they are late or early.
 class EventTarget {
  public:
   virtual ~EventTarget() = default;
@@ -88,12 +89,13 @@ class ContactIntake {
   /// is not finite or goes back).
   absl::Status BeginStep(double time_s);
 
-  /// These three hold the scene's mutex once for all contacts: callers give at most
-  /// kMostContactsAtOnce, so that other threads need not wait long.
+  /// Each of these three functions locks the scene's mutex once for all contacts that it is given.
+  /// Callers give at most kMostContactsAtOnce, so that other threads wait only briefly.
   void Strike(std::span<const ObjectImpulse> impulses);
   void Strike(const ObjectImpulse& impulse) { Strike(std::span(&impulse, 1)); }
 
-  /// Forces and touches last for one step, and are reported again in each step until they end.
+  /// Adds forces or touches. They last for one step, and must be reported again in each step until
+  /// they end.
   void Hold(std::span<const ObjectForce> forces);
   void Hold(const ObjectForce& force) { Hold(std::span(&force, 1)); }
   void Touch(std::span<const ObjectTouch> touches);
