@@ -13,8 +13,10 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "precompute/command_line.h"
+#include "precompute/confine_writes.h"
 #include "precompute/decompose.h"
 #include "precompute/json_report.h"
 #include "precompute/mesh/read/read_mesh.h"
@@ -113,6 +115,16 @@ void OpenStandardStreams() {
   }
 }
 
+/// Returns the paths of all files that the program may write.
+std::vector<std::string> FilesToWrite(const CommandLine& asked) {
+  std::vector<std::string> files{asked.output};
+  if (!asked.transfer_output.empty()) files.push_back(asked.transfer_output);
+  if (const std::string& folder = asked.request.matrices_folder(); !folder.empty()) {
+    files.push_back(folder + "/K.mtx");
+  }
+  return files;
+}
+
 /// Flushes standard output. Returns the exit status of the program.
 int FinishOutput() {
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return EXIT_SUCCESS;
@@ -124,6 +136,8 @@ int FinishOutput() {
 }
 
 int Run(const CommandLine& asked) {
+  // Whoever takes events runs the program with meshes of others.
+  if (asked.event_descriptor >= 0) ConfineWrites(FilesToWrite(asked));
   SetThreadCount(asked.thread_count);
   const WorkerEvents events(asked.event_descriptor);
   absl::StatusOr<Result> result = absl::UnknownError("not computed");

@@ -10,9 +10,11 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <fstream>
+#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -51,6 +53,7 @@ absl::Status NotExecuted(const std::string& program, int error) {
 /// fork.
 struct Preparation {
   std::vector<char*> arguments{};
+  std::vector<char*> environment{};
   const char* folder = nullptr;
   std::array<int, 4> descriptors{};  // of this process, by their number in the child
   bool is_worker = false;
@@ -72,6 +75,24 @@ cpu_set_t LastProcessors(int count) {
   return last;
 }
 
+/// The variables that a worker gets; the last ones are prefixes.
+constexpr std::array kWorkerVariables = std::to_array<std::string_view>(
+    {"PATH=", "HOME=", "TMPDIR=", "LD_LIBRARY_PATH=", "TZ=", "LANG=", "LC_", "OPENBLAS_", "OMP_",
+     "ASAN_", "LSAN_", "TSAN_", "UBSAN_"});
+
+std::vector<char*> EnvironmentFor(bool is_worker) {
+  std::vector<char*> variables;
+  for (char** variable = environ; *variable != nullptr; ++variable) {
+    const std::string_view text(*variable);
+    const bool kept = !is_worker || std::ranges::any_of(kWorkerVariables, [text](auto prefix) {
+      return text.starts_with(prefix);
+    });
+    if (kept) variables.push_back(*variable);
+  }
+  variables.push_back(nullptr);
+  return variables;
+}
+
 Preparation Prepare(const ChildCommand& command, int failure) {
   Preparation child;
   child.arguments.reserve(command.words.size() + 1);
@@ -82,6 +103,7 @@ Preparation Prepare(const ChildCommand& command, int failure) {
   if (!command.folder.empty()) child.folder = command.folder.c_str();
   child.descriptors = {command.input, command.output, command.errors, command.events};
   child.is_worker = command.worker_processor_count > 0;
+  child.environment = EnvironmentFor(child.is_worker);
   child.processors = LastProcessors(command.worker_processor_count);
   child.parent = getpid();
   child.failure = failure;
@@ -107,6 +129,7 @@ void BecomeWorker(const Preparation& child) {
   setrlimit(RLIMIT_CORE, &no_core);
   BecomeFirstToBeKilled();
   signal(SIGXFSZ, SIG_IGN);  // a file that may not grow fails like a full disk
+  prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
 }
 
 void ResetSignals() {
@@ -142,7 +165,8 @@ bool ArrangeDescriptors(std::array<int, 4> descriptors) {
   ResetSignals();
   if (ArrangeDescriptors(child.descriptors) &&
       (child.folder == nullptr || chdir(child.folder) == 0)) {
-    execvp(child.arguments[0], child.arguments.data());  // glibc's allocates no memory
+    // glibc's function allocates no memory.
+    execvpe(child.arguments[0], child.arguments.data(), child.environment.data());
   }
   const int error = errno;
   [[maybe_unused]] const ssize_t written = write(failure, &error, sizeof error);

@@ -7,12 +7,14 @@
 #include <poll.h>
 #include <unistd.h>
 
+#include <cstdlib>
 #include <limits>
 
 namespace carillon {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 constexpr size_t kAll = std::numeric_limits<size_t>::max();
 
@@ -73,6 +75,22 @@ TEST(ChildProcess, AWorkerTakesItsWholeGroupWithItWhenItEnds) {
   output.CloseWriteEnd();
   EXPECT_TRUE(worker->Wait().exited);
   EXPECT_THAT(output.Read(kAll), ::testing::MatchesRegex("1[0-9]\n"));
+}
+
+TEST(ChildProcess, AWorkerGetsOnlyTheVariablesThatItNeeds) {
+  setenv("CARILLON_TOKEN", "secret", 1);
+  setenv("LC_TIME", "C", 1);
+  const std::string variables = RunScript("env", {.worker_processor_count = 1}).output;
+  EXPECT_THAT(variables, Not(HasSubstr("secret")));
+  EXPECT_THAT(variables, HasSubstr("LC_TIME=C"));
+  EXPECT_THAT(variables, HasSubstr("PATH="));
+  EXPECT_THAT(RunScript("env").output, HasSubstr("secret"));
+  unsetenv("CARILLON_TOKEN");
+}
+
+TEST(ChildProcess, AWorkerGainsNoPrivileges) {
+  const std::string script = "grep NoNewPrivs /proc/self/status";
+  EXPECT_EQ(RunScript(script, {.worker_processor_count = 1}).output, "NoNewPrivs:\t1\n");
 }
 
 }  // namespace
