@@ -73,7 +73,7 @@ AccelerationNoise::AccelerationNoise(const MovedBody& moved, double sample_rate_
   inverse_ = Inverse(moved_.body.inertia_kg_m2);
   for (size_t motion = 0; motion < kMotions; ++motion) {
     const double radius_m = moved_.body.motions[motion].radius_m;
-    if (!(radius_m > 0)) continue;  // the motion moves no air
+    if (!(radius_m > 0)) continue;  // this motion moves no air
     for (const size_t source : {2 * motion, 2 * motion + 1}) {
       AddPoles(source, moved.sound_speed_m_per_s / radius_m);
     }
@@ -239,7 +239,8 @@ void AccelerationNoise::RenderAdd(std::span<float> frames) noexcept {
   for (size_t n = 0; n < sound.size(); ++n) frames[n] += std::clamp(sound[n], -kMost, kMost);
 }
 
-/// Applies what happens at frame `at`, and returns the frame at which something happens next.
+/// Starts and ends the pulses that are due at frame `at`. Returns the next frame at which a pulse
+/// starts or ends, at most `frame_count`.
 size_t AccelerationNoise::StartAndEndPulses(size_t at, size_t frame_count) noexcept {
   size_t next = frame_count;
   for (ActivePulse& pulse : pulses_) {

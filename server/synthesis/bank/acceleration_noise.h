@@ -18,7 +18,7 @@ namespace carillon {
 struct MovedBody {
   RigidRadiation body;
   double density_kg_per_m3 = 0;
-  double size = 1;                                   ///< relative to the body's
+  double size = 1;                                   ///< relative to the size of `body`
   std::span<const std::array<float, 3>> vertices{};  ///< of the sounding surface, unscaled
   std::shared_ptr<const void> owner = nullptr;
   double air_density_kg_per_m3 = 1.204;
@@ -31,40 +31,43 @@ struct MovedBody {
 ///
 ///   A = J w(t)/m along the axes,  A = I^(-1) (r - center) x J w(t) about them,
 ///
-/// with the pulse w(t) of its contact, and each of them the pressure at 1 m, with s' = a s/c,
+/// where w(t) is the pulse of the contact. With s' = a s/c, each of them gives at 1 m the pressure
 ///
 ///   rho0 a^2 A (S_1 s'/(2 + 2 s' + s'^2) + S_2 s'^2/(9 + 9 s' + 4 s'^2 + s'^3)),
 ///
-/// S_l the sum over m of s_lm Y_lm towards the listener. Heard without directions, the sum over l
-/// and m of the squares has its mean over all directions, and the motions sound in phase.
+/// where S_l is the sum over m of s_lm Y_lm towards the listener. Without directions, the pattern
+/// of each l is replaced by its root mean square over all directions, and the motions sound in
+/// phase.
 ///
-/// For w = (1 - cos(W t))/T from 0 to T, W = 2 pi/T, the response is known exactly: with the poles
-/// p and their residues R of a term H,
+/// For w = (1 - cos(W t))/T from 0 to T, W = 2 pi/T, the response is known exactly. With the poles
+/// p and residues R of a term H, the response is
 ///
 ///   (sum of K exp(p t) - Re(H(i W) exp(i W t)))/T,   K = R W^2/(p (p^2 + W^2)),
 ///
-/// until T, and the sum of K (exp(p t) - exp(p (t - T)))/T afterwards. One recursion a pole serves
-/// all pulses, and each pulse adds a sinusoid while it lasts. A pulse lasts at least two frames,
-/// and one of another shape is taken for the raised cosine of its variance. Its middle lies at the
-/// time of its impulse, as for modes, so that it is to be begun half of PulseFrames before. Neither
-/// this sound nor the onset of modes has the a/c that a wave needs from a body's surface to its
-/// centre.
+/// until T, and the sum of K (exp(p t) - exp(p (t - T)))/T afterwards. One recursion for each pole
+/// serves all pulses, and each pulse adds a sinusoid while it lasts. A pulse lasts at least two
+/// frames. A pulse of another shape is replaced by the raised cosine of the same variance. The
+/// middle of a pulse lies at the time of its impulse, as for modes, so Begin is called half of
+/// PulseFrames earlier. Neither this sound nor the modes include the time a/c that a wave takes
+/// between a body's surface and its centre.
 ///
-/// Any thread may make one; then one thread at a time uses it, which neither allocates nor locks.
+/// Any thread may construct the object; then one thread at a time uses it. Only the constructor
+/// allocates; nothing locks.
 class AccelerationNoise {
  public:
-  /// Pulses of one body that may sound at once; further impulses then add no acceleration noise.
+  /// The number of pulses of one body that may sound at once. Further impulses add no acceleration
+  /// noise.
   static constexpr size_t kMostPulses = 16;
 
   /// `samples_per_pascal` includes the object's gain.
   AccelerationNoise(const MovedBody& moved, double sample_rate_hz, double samples_per_pascal);
 
-  /// How long a pulse lasts here, at most 0.15 s, in frames.
+  /// Returns the duration of a pulse in frames: at least 2 frames, at most 0.15 s.
   double PulseFrames(Pulse pulse) const noexcept;
 
   /// Starts the pulse of an impulse. The pulse starts `lead_frames` (0 to 1) frames before sample
-  /// `offset` of the next block, which is the first sample in which it sounds. The impulse's
-  /// vertices must be the body's. `bearing` null: heard without directions.
+  /// `offset` of the next block, which is the first sample in which it sounds. The impulse must act
+  /// on vertices of the body. If `bearing` is null, directions are ignored.
   void Begin(const SurfaceImpulse& impulse, size_t offset, float lead_frames,
              const Bearing* bearing) noexcept;
 
@@ -80,24 +83,25 @@ class AccelerationNoise {
  private:
   static constexpr size_t kMotions = 6;
   static constexpr size_t kSources = 2 * kMotions;  // dipole and quadrupole of each motion
-  static constexpr size_t kPoles = 3 * kMotions;    // one pair and, of quadrupoles, a real pole
+  static constexpr size_t kPoles = 3 * kMotions;    // a pair each, and a real pole per quadrupole
 
   using Weights = std::array<double, kSources>;
   struct Number {
     double re = 0, im = 0;
   };
-  /// A pole p of a source's transfer function, or of a pair the one with a positive frequency.
+  /// A real pole p of a source's transfer function, or the pole of a conjugate pair that has a
+  /// positive frequency.
   struct Pole {
     size_t source = 0;
     Number p{};        // 1/s
-    Number residue{};  // twice that of the transfer function for a pair, whose real part counts
+    Number residue{};  // doubled for a pair, of which only the real part is used
     Number step{};     // exp(p / sample rate)
     Number state{};
   };
-  /// A contact that lasts.
+  /// A pulse that sounds or is about to start.
   struct ActivePulse {
     size_t begin = 0, end = 0;  // frames from the start of the next block to render
-    double lead_s = 0;          // from the contact's begin to frame `begin`
+    double lead_s = 0;          // from the contact's start to frame `begin`
     double end_lead_s = 0;      // from the contact's end to frame `end`
     double duration_s = 0;
     bool begun = false;

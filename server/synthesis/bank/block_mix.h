@@ -23,26 +23,27 @@ struct RenderWorkspace {
   LaneMix lanes, lanes_apart, lanes_fading, lanes_unheard;
 };
 
-/// The sum of some banks' sound, block by block: of the banks that ring in the time domain and of
-/// the long blocks that ring by spectrum.
+/// Sums the sound of banks block by block: the banks that ring in the time domain, and the long
+/// blocks of the banks that ring by spectrum.
 class BlockMix {
  public:
   static constexpr size_t kStaggers = 16;
 
-  /// Mixes of different `stagger`, 0 to kStaggers - 1, begin long blocks in different blocks: a
-  /// long block of m blocks begins where m divides block number + stagger * m / kStaggers.
+  /// Mixes of different `stagger`, 0 to kStaggers - 1, begin long blocks in different blocks,
+  /// because a long block of m blocks begins where m divides block number + stagger * m /
+  /// kStaggers.
   explicit BlockMix(size_t block_frame_count, size_t stagger = 0);
 
   /// Begins the block of this number; Begin and Finish alternate.
   void Begin(uint64_t block_number, RenderWorkspace& workspace) noexcept;
 
-  /// Writes the block.
+  /// Writes the sum to `block`.
   void Finish(std::span<float> block) noexcept;
 
   /// Ends the long blocks that are being played. Called between Finish and Begin.
   void Silence() noexcept;
 
-  /// Number of the block.
+  /// The number that the last Begin was given.
   uint64_t block_number() const noexcept { return block_number_; }
 
   /// Whether a long block of this kind begins in this block.
@@ -51,8 +52,8 @@ class BlockMix {
   /// Whether a long block of any kind begins in this block.
   bool any_begins() const noexcept { return any_begins_; }
 
-  /// The slots (Spectrum::slots) of the long block of this kind that begins; modes are added to
-  /// them.
+  /// Returns the slots (Spectrum::slots) of the long block of this kind that begins in this block,
+  /// so that modes can be added to them.
   float* Slots(size_t kind) noexcept {
     used_[kind] = true;
     return workspace_->spectra[kind].slots();
@@ -67,11 +68,12 @@ class BlockMix {
   /// Redirects lanes() to a private buffer until Reunite(). Calling it again before then has no
   /// effect.
   void SetApart(size_t block_frame_count) noexcept;
-  /// A second private buffer while the bank is apart: its sound is faded out over the block, while
-  /// that of lanes() is faded in. Without a call, lanes() sounds at its full level.
+  /// Returns a second private buffer, between SetApart and Reunite. Its sound is faded out over the
+  /// block while the sound of lanes() is faded in. If fading() is not called, lanes() sounds at its
+  /// full level.
   LaneMix& fading(size_t block_frame_count) noexcept;
 
-  /// Takes sound that is rendered for the sake of the states only.
+  /// Returns a buffer for sound that is rendered only to advance the states, and is not heard.
   LaneMix& unheard() noexcept { return workspace_->lanes_unheard; }
 
   /// Adds the sound in the private buffers to `frames`.

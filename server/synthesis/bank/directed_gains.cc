@@ -82,7 +82,8 @@ Bearing DirectedGains::Outside(const Bearing& bearing) const noexcept {
 }
 
 /// A direction that turns by an angle changes a pattern of order l by at most about l times the
-/// angle; near by, a distance changes it by the order times the relative change.
+/// angle. In the near field, a change of distance changes the pattern by the order times the
+/// relative change.
 bool DirectedGains::Differs(const Bearing& bearing) const noexcept {
   double square = 0;
   for (size_t i = 0; i < 3; ++i) {
@@ -93,7 +94,7 @@ bool DirectedGains::Differs(const Bearing& bearing) const noexcept {
   return !known_ || square * order * order > kLeastChange * kLeastChange;
 }
 
-/// Prepares the gains of a bearing for being computed.
+/// Prepares the computation of the gains for a bearing.
 void DirectedGains::Aim(const Bearing& bearing) noexcept {
   bearing_ = bearing;
   basis_.Evaluate(bearing.direction);

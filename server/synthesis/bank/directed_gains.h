@@ -17,10 +17,9 @@ namespace carillon {
 /// How a bank's directions are heard.
 struct HeardDirectivity {
   Directivity directivity;
-  double size = 1;  ///< relative to the model's
+  double size = 1;  ///< relative to the model's size
   double sound_speed_m_per_s = 343;
-  /// Whether the near field is heard, that is the factors h_l(k r) instead of their limits far
-  /// away.
+  /// Whether the gains use the factors h_l(k r) of the near field instead of their limits far away.
   bool near_field = false;
 };
 
@@ -28,21 +27,24 @@ struct HeardDirectivity {
 ///
 ///   g = sqrt(4 pi) conj(sum over l, m of p_lm f_l(k r) Y_lm(direction))
 ///
-/// with p_lm of Directivity, and f_l(x) = i^(l + 1) x exp(-ix) h_l(x), which is 1 far away:
-/// f_(l+1) = i (2l + 1)/x f_l + f_(l-1), f_0 = f_(-1) = 1 (Abramowitz and Stegun, 10.1.19). Without
-/// near_field f_l is 1. Its mean square over all directions far away is one, so that |g| is
-/// relative to a mode that radiates its power equally in all directions. It is the conjugate
-/// because a transfer's time is exp(-i omega t), and a bank's is exp(i omega t).
+/// where p_lm are the coefficients of Directivity and f_l(x) = i^(l + 1) x exp(-ix) h_l(x) is 1 far
+/// away. The recursion is f_(l+1) = i (2l + 1)/x f_l + f_(l-1), f_0 = f_(-1) = 1 (Abramowitz and
+/// Stegun, 10.1.19). Without near_field f_l is 1. Far away the mean of |g|^2 over all directions is
+/// one, so |g| is relative to a mode that radiates its power equally in all directions. The
+/// conjugate is taken because a transfer has the time dependence exp(-i omega t), and a bank exp(i
+/// omega t).
 ///
-/// An impulse makes a mode begin as a sine, which begins with a jump where the gain turns it into a
-/// cosine. Therefore each mode has a companion (OscillatorBank), of gain i Im g: their sum begins
-/// at zero.
+/// A struck mode begins as a sine. The imaginary part of its gain adds a cosine, which begins with
+/// a jump. Therefore each mode has a companion (OscillatorBank) with the gain i Im g, and the sum
+/// of the two begins at zero.
 ///
 /// The gains are computed for one bearing in each period of 10 ms or longer, and a part of them in
-/// each block, so that a body of many harmonics costs no more in a block than one of few. Between
-/// periods they are interpolated linearly: a period's bearing is reached two periods later.
+/// each block, so that a body with many harmonics costs no more in a block than a body with few.
+/// Between periods the gains are interpolated linearly, and reach those of a period's bearing two
+/// periods later.
 ///
-/// Any thread may make it; then one thread at a time uses it. Only the constructor allocates.
+/// Any thread may construct the object; then one thread at a time uses it. Only the constructor
+/// allocates.
 class DirectedGains {
  public:
   /// A mode and the lane in which it rings.
@@ -60,8 +62,8 @@ class DirectedGains {
 
   DirectedGains(const HeardDirectivity& heard, std::vector<Mode> modes, const Size& size);
 
-  /// Computes the gains of the block of this number; further calls for the same block have no
-  /// effect. After a block without a call the gains begin at `bearing`.
+  /// Computes the gains of block `block_number`; further calls for the same block have no effect.
+  /// If the previous block had no call, the gains start at `bearing`.
   void BeginBlock(uint64_t block_number, const Bearing& bearing) noexcept;
 
   /// Whether the gains at the block's end differ from those at its start.
@@ -77,10 +79,11 @@ class DirectedGains {
   /// The bearing that the newest gains belong to.
   const Bearing& bearing() const noexcept { return bearing_; }
 
-  /// Terms of the sums that all gains together take.
+  /// Returns the number of terms in the sums of all gains.
   size_t term_count() const noexcept { return term_count_; }
 
-  /// Terms that a block computes at most, apart from a mode's last ones.
+  /// Returns the most terms that a block computes. The last mode may exceed this number by its own
+  /// terms.
   size_t terms_per_block() const noexcept { return term_count_ / period_ + 1; }
 
  private:
@@ -91,7 +94,7 @@ class DirectedGains {
     LaneArray<float> re, im;
   };
 
-  /// `bearing`, moved out of the sphere that encloses the body.
+  /// Returns `bearing`, moved out of the sphere that encloses the body.
   Bearing Outside(const Bearing& bearing) const noexcept;
   bool Differs(const Bearing& bearing) const noexcept;
   void Aim(const Bearing& bearing) noexcept;

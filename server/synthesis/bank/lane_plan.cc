@@ -11,8 +11,8 @@ namespace {
 
 using Complex = std::complex<double>;
 
-/// s = sigma + i omega. For a mode so strongly damped that sigma^2 > omega^2, where the factor
-/// exp(s^2 tau^2/2) of a Gaussian would explode, i |s|.
+/// Returns s = sigma + i omega. Where sigma^2 > omega^2, the factor exp(s^2 tau^2/2) of a Gaussian
+/// would explode, so the function returns i |s| instead.
 Complex ContactS(const SoundingMode& mode) {
   const Complex s(mode.decay_rate_per_s, mode.damped_rad_per_s);
   return -s.real() < s.imag() ? s : Complex(0, std::abs(s));

@@ -21,7 +21,7 @@ struct PlannedLane {
   std::complex<double> log_q;  ///< (sigma + i omega)/rate
   std::complex<double> start;  ///< the state after a modal impulse of one unit of the shape table
   std::complex<double> contact_s;  ///< sigma + i omega, 1/s, for the factor of a contact
-  SpreadMode spread;               ///< into the long blocks of its part
+  SpreadMode spread;               ///< how it spreads in the long blocks of its part
   bool companion = false;
 };
 
@@ -35,8 +35,8 @@ struct LanePlan {
     return (lanes[part].size() + kMostLanes - 1) / kMostLanes * kMostLanes;
   }
 
-  /// The lanes of a padded part that are rendered in tiles of this kind: the slower a mode
-  /// oscillates, the longer its tiles. Part 0 always uses the shortest tiles.
+  /// Returns the lanes of a padded part that are rendered in tiles of this kind. The slower a mode
+  /// oscillates, the longer are its tiles. Part 0 always uses the shortest tiles.
   LaneRange Tiled(size_t part, size_t tile_kind) const;
 };
 

@@ -30,9 +30,8 @@ inline constexpr double kMostFullScalePa = 20000;
 inline constexpr double kSamplesPerVolumeVelocity = kPascalsPerVolumeVelocity / kFullScalePa;
 
 /// The largest amplitude that a mode or a body's acceleration noise may have: 24 dB above full
-/// scale, 164 dB above 20 uPa at 1 m. One object that is struck beyond all measure, or
-/// whose model is wrong, must not drive the limiter so far that the others are not heard until it
-/// has decayed.
+/// scale, 164 dB above 20 uPa at 1 m. An object that is struck far too hard, or whose model is
+/// wrong, must not make the limiter suppress all other objects until it has decayed.
 inline constexpr double kMostAmplitude = 16;
 
 }  // namespace carillon

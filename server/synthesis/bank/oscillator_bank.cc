@@ -35,8 +35,8 @@ bool OscillatorBank::RenderAddInTime(BlockMix& mix) noexcept {
   return RenderModesInTime(mix);
 }
 
-/// Adds the sound of the body's acceleration. It is made for the listener's direction, so that both
-/// renderings get it while the gains of the modes move.
+/// Adds the sound of the body's acceleration. It is computed for the listener's direction already,
+/// so both renderings receive it while the gains of the modes move.
 void OscillatorBank::RenderAcceleration(BlockMix& mix) noexcept {
   if (moved_ == nullptr || !moved_->active()) return;
   std::array<float, kMostBlockFrames> sound{};

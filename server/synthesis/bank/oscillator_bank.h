@@ -38,11 +38,12 @@ struct OscillatorBankSettings {
   double gain = 1;                 ///< linear
   uint64_t noise_seed = 0;         ///< of the roughness noise
   double silence = 1e-7;           ///< modes below this amplitude (-140 dB) are put to sleep
-  /// The directions in which the modes radiate. With them the bank must be rendered apart
-  /// (BlockMix), and rings in the time domain only; absent: in all directions equally.
+  /// The directions in which the modes radiate. If set, the bank must be rendered apart (BlockMix)
+  /// and in the time domain only (LeaveSpectrum). If absent, the modes radiate equally in all
+  /// directions.
   std::optional<HeardDirectivity> directivity = std::nullopt;
-  /// The body whose acceleration sounds in each blow, with the vertices of the shape table; absent:
-  /// its modes alone sound.
+  /// The body whose acceleration sounds in each blow, with the vertices of the shape table. If
+  /// absent, only the modes sound.
   std::optional<MovedBody> moved = std::nullopt;
 };
 
@@ -52,13 +53,13 @@ struct OscillatorBankSettings {
 ///
 /// or, for a bank with directivity, output = sum Re (gain_m Z_m) with the gains of DirectedGains.
 /// While the gains move, the states are rendered twice, with the gains of the block's start and of
-/// its end, and one rendering fades into the other. A block with impulses is rendered once more for
-/// the sake of the states alone.
+/// its end, and one rendering fades into the other. In such a bank, a block with impulses is
+/// rendered once more, only to advance the states.
 ///
 /// An impulse J adds -i c_m g_m / omega_m exp(i phase_m) exp(s_m^2 tau^2 / 2) to Z_m at its time,
-/// with g_m = sum_v w_v phi_m(v) . J and s_m = sigma_m + i omega_m. The last factor accounts for
-/// the Gaussian contact and is exact once the contact is over (where sigma^2 > omega^2,
-/// exp(-|s_m|^2 tau^2 / 2) replaces it).
+/// with g_m = sum_v w_v phi_m(v) . J and s_m = sigma_m + i omega_m. The last factor is that of a
+/// Gaussian pulse, and is exact once the contact is over (where sigma^2 > omega^2, exp(-|s_m|^2
+/// tau^2 / 2) replaces it). A raised cosine has another factor (strike_kernel::Onset).
 ///
 /// A struck mode rings in the time domain, SIMD across modes: in single precision within a block,
 /// in double between blocks, which keeps the error below -100 dB. At the next long block of its
@@ -73,55 +74,57 @@ struct OscillatorBankSettings {
 /// at zero with the slope of the pair's first mode. In a bank with directivity each mode has such a
 /// companion.
 ///
-/// Any thread may make a bank; then one thread at a time uses it, which neither allocates nor
-/// locks. In each block of the mix, impulses and knots come first and RenderAdd last, without calls
-/// to another bank in between.
+/// Any thread may construct a bank; then one thread at a time uses it. Only the constructor
+/// allocates; nothing locks. In each block of the mix, impulses and knots come first and RenderAdd
+/// last, without calls to another bank in between.
 class OscillatorBank {
  public:
   /// Lanes and columns may number at most StrikeBatch::kMostBankLanes each.
   OscillatorBank(const SoundingModes& sounding, const ShapeTable& shapes,
                  const OscillatorBankSettings& settings);
 
-  /// Applies an impulse, first audible at sample `offset` of the block of `mix`, `lead_frames` (0
-  /// to 1) after its time. Offsets ascend within a block. False: the impulse is not finite or names
-  /// no vertex of the body, and has no effect.
+  /// Applies an impulse. It is first audible at sample `offset` of the block of `mix`, which lies
+  /// `lead_frames` (0 to 1) after its time. Offsets ascend within a block. Returns false, without
+  /// effect, if the impulse is not finite or names a vertex that the body lacks.
   bool Strike(const SurfaceImpulse& impulse, size_t offset, float lead_frames,
               BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
   /// Applies modal impulses g_m, in units of the shape table's scales, one for each of the
-  /// column_count() projected columns. The caller leaves onset.frames_into_tiles at zero. False:
-  /// not finite.
+  /// column_count() projected columns. The caller leaves onset.frames_into_tiles at zero. Returns
+  /// false if an impulse is not finite.
   bool StrikeModes(std::span<const float> modal_impulses, size_t offset, strike_kernel::Onset onset,
                    BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
   /// Applies the impulses of `events`, which are neighbours in time within this block, as one
-  /// onset, which costs less: each at the nearest vertex of its triangle, all at their mean time
-  /// weighted by their magnitude.
+  /// onset, which costs less. Each acts at the nearest vertex of its triangle, and all act at their
+  /// mean time, weighted by their magnitudes.
   bool StrikeMerged(std::span<const DueEvent> events, BlockMix& mix) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
-  /// Frames from the start of an impulse's contact to its time, if the bank is to be told when
-  /// contacts begin; zero: it is not.
+  /// Returns the frames from the start of an impulse's contact to the impulse's time, or zero if
+  /// the bank needs no BeginContact.
   double ContactLeadFrames(Pulse pulse) const noexcept;
 
   /// Begins the sound of the body's acceleration by an impulse whose contact begins at sample
-  /// `offset`, as for Strike. False: it names no vertex of the body, and has no effect.
+  /// `offset`, as for Strike. Returns false, without effect, if the bank has no acceleration noise
+  /// or the body lacks a vertex of the impulse.
   bool BeginContact(const SurfaceImpulse& impulse, size_t offset, float lead_frames) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
-  /// The rows of the shape table that these events, one or several merged, will read.
+  /// Returns the rows of the shape table that these events, one or several merged, will read first.
   StrikeBatch::RowsAhead RowsOf(std::span<const DueEvent> events) const noexcept;
 
-  /// Adds a contact's force to the whole force of the next knot. False: it names no vertex of the
-  /// body, and has no effect.
+  /// Adds a contact's force to the whole force of the next knot. Returns false, without effect, if
+  /// the force names a vertex that the body lacks.
   bool AddForce(const SurfaceForce& force) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
-  /// Ends a step of the sustained force at sample `offset`, as for Strike: the forces added since
-  /// the previous knot are the whole force now. False: it was not finite and has been set to zero.
+  /// Ends a step of the sustained force at sample `offset`, as for Strike. The forces added since
+  /// the previous knot become the whole force. Returns false if this force was not finite; it is
+  /// then zero.
   bool ApplyKnot(const ForceKnot& knot, size_t offset, BlockMix& mix) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
-  /// Adds the bank's block to `mix`. False: the state was not finite and the bank has been
+  /// Adds the bank's block to `mix`. Returns false if the state was not finite; the bank is then
   /// silenced.
   bool RenderAdd(BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
@@ -136,11 +139,12 @@ class OscillatorBank {
   /// RenderAdd for a bank that is out_of_spectrum() and not struck in this block.
   bool RenderAddInTime(BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
-  /// The gains towards the listener; null: it radiates equally in all directions. BeginBlock is to
-  /// be called for them in each block, before impulses, knots and RenderAdd.
+  /// Returns the gains towards the listener, or null if the bank radiates equally in all
+  /// directions. The caller calls their BeginBlock in each block, before impulses, knots and
+  /// RenderAdd.
   DirectedGains* gains() noexcept { return gains_.get(); }
 
-  /// True: rendering the bank would add nothing.
+  /// Whether rendering the bank would add nothing.
   bool silent() const noexcept {
     return modes_silent() && (moved_ == nullptr || !moved_->active());
   }
@@ -148,35 +152,36 @@ class OscillatorBank {
   /// Modes that still ring.
   size_t active_mode_count() const noexcept { return struck() ? mode_count_ : active_mode_count_; }
 
-  /// Units of work (work_budget.h): of a block without events, of an impulse, of a merged impulse,
-  /// and of the lanes that a first impulse awakens.
+  /// Return the units of work (work_budget.h) of a block without events, of an impulse, of a merged
+  /// impulse, and of the lanes that a first impulse awakens.
   double ringing_work() const noexcept;
   double strike_work() const noexcept;
   double merged_strike_work() const noexcept;
   double awakening_work() const noexcept;
 
-  /// Approximate loudness of an impulse of one newton second: the sum of the modes' squared
-  /// amplitudes, root of its mean over the surface.
+  /// Returns the approximate loudness of an impulse of 1 N s. It is the root of the sum of the
+  /// modes' squared amplitudes, which is averaged over the surface and the three axes.
   float loudness_per_newton_second() const noexcept { return loudness_per_newton_second_; }
 
-  /// The largest squared amplitude of a ringing mode, as of the last block or long block.
+  /// Returns the largest squared amplitude of a ringing mode, at the end of the last block or at
+  /// the start of its current long block.
   double loudest_squared() const noexcept;
 
-  /// Lowers the bank if a mode is louder than kMostAmplitude; false: none is. Its part of a current
-  /// long block is heard as it is until that long block ends.
+  /// Lowers the bank if a mode is louder than kMostAmplitude, and returns whether it did. Its part
+  /// of a current long block is heard as it is until that long block ends.
   bool BoundLoudness() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
   /// Silences the bank. Its part of a current long block sounds until that long block ends.
   void Shed() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole) { Silence(); }
 
-  /// Ends all that rings, between two blocks of a mix whose long blocks end, too. Sustained forces
-  /// stay as they are, so that a load that rests does not sound anew.
+  /// Silences the modes and the acceleration noise, between two blocks and together with
+  /// BlockMix::Silence. Sustained forces are kept, so that a resting load makes no new sound.
   void Hush() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole) { SilenceLanes(); }
 
   /// Columns of the shape table that impulses are projected onto, from the first mode's column on.
   size_t column_count() const noexcept { return column_count_; }
 
-  /// All modes of the object.
+  /// Number of modes of the object.
   size_t mode_count() const noexcept { return mode_count_; }
 
  private:
@@ -212,7 +217,7 @@ class OscillatorBank {
   struct Block {
     Phase phase = Phase::kWaiting;
     bool by_frames = false;  ///< all lanes use tiles of the first kind
-    bool finite = true;      ///< all states were
+    bool finite = true;      ///< whether all states were finite so far
     size_t rendered_to = 0;  ///< frames of the block that are rendered already
   };
   /// Where any lane is awake.
@@ -243,8 +248,8 @@ class OscillatorBank {
   void SetDirectivity(const SoundingModes& sounding, const LanePlan& plan,
                       const OscillatorBankSettings& settings);
   bool gains_move() const noexcept { return gains_ != nullptr && gains_->moving(); }
-  /// Delays `offset` to that of the last onset in the batch, if it lies before it: merged impulses
-  /// come after exact ones of the same group of frames.
+  /// Returns `offset`, delayed to the last onset in the batch or to the part that is not yet
+  /// rendered, because merged impulses come after exact ones of the same group of frames.
   size_t NotBeforeTheLast(size_t offset, const StrikeBatch& batch) const noexcept;
   void NoteOnset(size_t offset, StrikeBatch& batch) noexcept;
   void BeginStrikes(BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
@@ -254,7 +259,8 @@ class OscillatorBank {
   void RenderDriven(size_t end, BlockMix& mix) noexcept;
   /// Renders the block up to frame `end` with the gains, and leaves the states as they are.
   void HearStruck(size_t end, BlockMix& mix) noexcept;
-  /// Takes the rendering that advances the states: unheard if there are gains.
+  /// Returns the buffer for the rendering that advances the states. It is unheard if there are
+  /// gains.
   LaneMix& Advanced(BlockMix& mix) const noexcept {
     return gains_ == nullptr ? mix.lanes() : mix.unheard();
   }

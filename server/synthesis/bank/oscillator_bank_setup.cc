@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Making a bank, which any thread may do.
+// The construction of a bank, which any thread may do.
 #include <algorithm>
 #include <cassert>
 #include <cmath>
@@ -175,7 +175,7 @@ void OscillatorBank::SetSegments(const LanePlan& plan) {
   }
 }
 
-/// Samples at most about kVertices vertices, evenly spaced by index.
+/// Samples fewer than 2 * kVertices vertices, evenly spaced by index.
 void OscillatorBank::MeasureLoudness(const LanePlan& plan) {
   constexpr size_t kVertices = 32;
   const size_t stride = std::max<size_t>(shapes_.vertex_count() / kVertices, 1);
@@ -191,7 +191,7 @@ void OscillatorBank::MeasureLoudness(const LanePlan& plan) {
       }
     }
   }
-  // The mean is over vertices and directions: an impulse has one of the three directions.
+  // The mean is over vertices and axes, because an impulse is taken along one of the three axes.
   loudness_per_newton_second_ =
       count == 0 ? 0 : static_cast<float>(std::sqrt(sum / static_cast<double>(count)));
 }

@@ -13,7 +13,7 @@ namespace carillon {
 namespace {
 
 /// In longer tiles each impulse needs a tile of its own. With more impulses in a block than this,
-/// that costs more than longer tiles save.
+/// those tiles cost more than longer tiles save.
 constexpr size_t kMostStrikesInTiles = 8;
 
 /// The corner of the triangle that is nearest to the point.
@@ -144,7 +144,7 @@ bool OscillatorBank::StrikeModes(std::span<const float> modal_impulses, size_t o
       strike_kernel::Excite(lanes_, lane_count_, modal_impulses.data(), onset, batch.ahead,
                             batch.re(batch.count, lane_count_), batch.im(batch.count, lane_count_));
   if (finite) NoteOnset(offset, batch);
-  if (modes_silent()) block_.phase = Phase::kWaiting;  // they are not rendered
+  if (modes_silent()) block_.phase = Phase::kWaiting;  // silent modes are not rendered
   return finite;
 }
 

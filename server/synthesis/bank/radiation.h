@@ -8,10 +8,10 @@
 
 namespace carillon {
 
-/// The directions in which the modes of a model radiate. The arrays are those of `owner`.
+/// The directions in which the modes of a model radiate. `owner` keeps the arrays alive.
 struct Directivity {
-  /// #m + 1: mode i has the harmonics first[i] to first[i + 1] - 1. Without harmonics it radiates
-  /// equally in all directions.
+  /// #m + 1: mode i has the harmonics first[i] to first[i + 1] - 1. A mode without harmonics
+  /// radiates equally in all directions.
   std::span<const uint32_t> first = {};
   std::span<const uint32_t> harmonics = {};  ///< l^2 + l + m, ascending in each mode
   /// The far pattern's coefficients (-i)^(l + 1) c_lm, scaled so that the sum of their squared
@@ -22,11 +22,11 @@ struct Directivity {
   std::shared_ptr<const void> owner = nullptr;
 };
 
-/// How the modes of a model radiate into air (proto/carillon/v1/transfer.proto). The arrays are the
-/// caller's.
+/// How the modes of a model radiate into air (proto/carillon/v1/transfer.proto). The caller owns
+/// the arrays.
 struct Radiation {
   /// #m: I, the integral of the squared far pattern over all directions, m^4/kg, for unit density
-  /// and size. Empty: unknown; the modes sound by the paper's coupling.
+  /// and size. If it is empty, the modes sound with the paper's coupling.
   std::span<const float> power_integrals = {};
   double air_density_kg_per_m3 = 1.204;
   double sound_speed_m_per_s = 343;  ///< in air

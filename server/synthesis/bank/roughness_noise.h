@@ -7,9 +7,9 @@
 
 namespace carillon {
 
-/// Noise of unit variance and settable bandwidth: uniform white noise through two equal one-pole
-/// low-passes, y(n) = (1 - p) x(n) + p y(n - 1) each, and a high-pass at 20 Hz, so that its mean is
-/// zero. The same seed gives the same noise.
+/// Noise of unit variance and settable bandwidth. Uniform white noise passes two equal one-pole
+/// low-passes, y(n) = (1 - p) x(n) + p y(n - 1), and a high-pass at 20 Hz that makes its mean zero.
+/// The same seed gives the same noise.
 class RoughnessNoise {
  public:
   explicit RoughnessNoise(uint64_t seed) noexcept : state_(Mix(seed)) {}

@@ -17,7 +17,7 @@ struct SoundingMaterial {
   double density_kg_per_m3 = 0;
   double alpha1_s = 0;  ///< D = alpha1 K + alpha2 M
   double alpha2_per_s = 0;
-  double size = 1;                                ///< relative to the model's
+  double size = 1;                                ///< relative to the model's size
   std::vector<LossFactorPoint> loss_factor = {};  ///< ascending; damping added to D
 };
 
@@ -32,8 +32,8 @@ struct SoundingBand {
   /// more than this and their couplings by less than a factor of two. Finite-element meshes split
   /// true pairs by up to about 1e-3.
   double pair_tolerance = 2e-3;
-  /// The two modes of a degenerate pair have directions of their own and keep their couplings and
-  /// phases; they share their mean frequency and decay only.
+  /// If true, the modes of a degenerate pair radiate in different directions, so each keeps its
+  /// coupling and phase; the two share only their mean frequency and decay.
   bool directed = false;
 };
 
@@ -43,8 +43,9 @@ struct SoundingMode {
   double natural_frequency_hz = 0;
   double damped_rad_per_s = 0;  ///< omega_d
   double decay_rate_per_s = 0;  ///< sigma, not above zero
-  /// The pressure at 1 m is kPascalsPerVolumeVelocity times this times the modal displacement,
-  /// m^2 kg^(-1/2) s^(-1): the paper's c_m, or what radiates the mode's true power.
+  /// The pressure at 1 m is kPascalsPerVolumeVelocity times this coupling times the modal
+  /// displacement. It is the paper's c_m, or the coupling that radiates the mode's true power, in
+  /// m^2 kg^(-1/2) s^(-1).
   double coupling = 0;
   /// The phase by which the output leads a sine: pi/2 for the second mode of a degenerate pair,
   /// else zero.
@@ -57,7 +58,7 @@ struct SoundingModes {
   double shape_scale = 1;           ///< phi = shape_scale * phi of the model
 };
 
-/// sqrt(Lambda E / (rho s^2)) / (2 pi), Hz, of an `eigenvalue` of the model.
+/// Returns sqrt(Lambda E / (rho s^2)) / (2 pi), Hz, for an `eigenvalue` Lambda of the model.
 double NaturalFrequencyHz(double eigenvalue, const SoundingMaterial& material);
 
 /// Applies material and size to a model's modes, and selects those that sound (docs/physics.md, 2
@@ -72,13 +73,13 @@ double NaturalFrequencyHz(double eigenvalue, const SoundingMaterial& material);
 ///   (I'/(4 pi))^(1/2)
 ///
 /// so that the mode loses the power W that it radiates, and the pressure at 1 m is that of W
-/// radiated in all directions alike. A mode sounds if its natural frequency lies
-/// in the band and below Nyquist, sigma^2 < Lambda', and T60 is long enough. The two modes of a
-/// degenerate pair share their mean frequency, decay and coupling and differ in phase by a quarter
-/// period, so that loudness does not depend on the direction around the body in which it is struck;
-/// the mesh splits the pair of a chime by about 1e-4, which would beat over seconds and make 2 dB
-/// of difference. If more than `most_modes` qualify, those are kept whose sound after a unit modal
-/// impulse has the most A-weighted energy in its first 0.2 s (about the ear's integration time).
+/// radiated equally in all directions. A mode sounds if its natural frequency lies in the band and
+/// below Nyquist, sigma^2 < Lambda', and T60 is long enough. The two modes of a degenerate pair
+/// share their mean frequency, decay and coupling and differ in phase by a quarter period, so that
+/// loudness does not depend on the direction around the body in which it is struck. The mesh splits
+/// the pair of a chime by about 1e-4; unmerged, the pair would beat over seconds and differ by 2
+/// dB. If more than `most_modes` qualify, the modes with the most A-weighted energy in the first
+/// 0.2 s after a unit modal impulse are kept (0.2 s is about the ear's integration time).
 SoundingModes SelectSoundingModes(const ModeTable& table, const SoundingMaterial& material,
                                   double sample_rate_hz, const SoundingBand& band = {});
 

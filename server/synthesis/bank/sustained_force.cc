@@ -8,8 +8,9 @@ namespace carillon {
 namespace {
 
 /// The smoothing attenuates by 109 dB at the lowest mode, and more at every other one. The free
-/// part of a response begins abruptly at its knot: attenuated by less, it would click at each knot,
-/// and the clicks of a jittering load would make lines between the multiples of the step rate.
+/// part of a response begins abruptly at its knot. With less attenuation it would click at each
+/// knot, and the clicks of a jittering load would add spectral lines between the multiples of the
+/// step rate.
 constexpr double kSmoothingRadians = 5;
 /// A drive that no knot renews for this number of steps is released.
 constexpr float kStepsUntilRelease = 4;

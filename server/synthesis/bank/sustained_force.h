@@ -28,7 +28,8 @@ namespace carillon {
 /// silent. If the contact travels over a rough surface, noise multiplied by the force drives the
 /// modes sample by sample.
 ///
-/// Any thread may make it; then one thread at a time uses it. Only the constructor allocates.
+/// Any thread may construct the object; then one thread at a time uses it. Only the constructor
+/// allocates.
 class SustainedForce {
  public:
   /// Different seeds give different noise.
@@ -45,7 +46,7 @@ class SustainedForce {
   }
 
   /// Ends a step, and writes the knot's contribution to the states into added_re and added_im.
-  /// False: the force was not finite; it is zero now, and nothing was written.
+  /// Returns false if the force was not finite; it is then zero, and nothing is written.
   bool ApplyKnot(const ForceKnot& knot, const LaneArrays& lanes, float* added_re,
                  float* added_im) noexcept;
 
@@ -71,7 +72,7 @@ class SustainedForce {
   bool releasing_ = false;           // the drive goes to zero
   float position_ = 1;               // from the last knot (0) to the next (1)
   float advance_ = 0;                // of the position per frame
-  size_t frames_until_release_ = 0;  // at position 1, until a late knot is given up
+  size_t frames_until_release_ = 0;  // at position 1, if no knot comes
 };
 
 }  // namespace carillon
