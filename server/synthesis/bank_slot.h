@@ -11,7 +11,7 @@ namespace carillon {
 /// A bank as the rendering threads see it.
 struct BankSlot {
   OscillatorBank* bank = nullptr;
-  Voice* voice = nullptr;  ///< null: the bank is heard without a position
+  Voice* voice = nullptr;  ///< null if the bank is heard without a position
   uint32_t generation = 0;
   uint32_t section = 0;  ///< the section that renders it
   uint32_t bus = 0;      ///< of that section

@@ -13,13 +13,14 @@
 
 namespace carillon {
 
-/// Names a bus of a mixer: banks that share a gain. The default one is always there.
+/// Names a bus of a mixer, whose banks share a gain. A default BusId names the bus that always
+/// exists.
 struct BusId {
   uint32_t index = 0;
   friend bool operator==(const BusId&, const BusId&) = default;
 };
 
-/// Hears the sound of one bus.
+/// Receives the sound of one bus.
 class BusListener {
  public:
   virtual ~BusListener() = default;
@@ -28,8 +29,8 @@ class BusListener {
   /// not allocate, lock, log, throw or call the system.
   virtual void Hear(uint64_t first_frame, std::span<const float> block) noexcept = 0;
 
-  /// The bus was closed: but for a block that is being rendered now, there will be no further one.
-  /// A controlling thread calls it.
+  /// Called when the bus is closed, by a controlling thread. At most the block that is being
+  /// rendered still follows.
   virtual void End() {}
 };
 
@@ -55,7 +56,7 @@ struct Bus {
 
   // Controlling threads write these.
   std::atomic<float> gain{1};
-  std::atomic<bool> jumps{false};  ///< to the gain, without a glide
+  std::atomic<bool> jumps{false};  ///< the gain changes without a glide
   std::atomic<uint32_t> stops_asked{0};
   std::atomic<BusListener*> listener{nullptr};
 
@@ -65,15 +66,16 @@ struct Bus {
 
   // Only the rendering thread uses what follows.
   Fader fader;
-  /// Falls to zero when the bus is to be silenced, and is one again when it is silent.
+  /// This fader falls to zero when the bus is to be silenced, and is one again when the bus is
+  /// silent.
   Fader stop;
   /// Events that came before the last stop are not rendered.
   uint32_t stop_count = 0;
 
-  /// Something was rendered in the last blocks.
+  /// Whether something was rendered in the last blocks.
   bool sounded = false;
 
-  /// A gain glides, or the bus fades out to be silenced.
+  /// Whether a gain glides, or the bus fades out to be silenced.
   bool changes() const noexcept { return !fader.resting() || !stop.neutral(); }
 
   /// Takes over the settings of the controlling threads. A bus that is silent needs neither glide

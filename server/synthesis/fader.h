@@ -7,14 +7,15 @@
 
 namespace carillon {
 
-/// A gain that glides to each new value within 30 ms, along 3t^2 - 2t^3, whose slope has no step:
-/// neither the glide nor its ends click. One thread at a time uses it; it neither allocates nor
-/// locks.
+/// A gain that glides to each new value within 30 ms, along 3t^2 - 2t^3. The slope of this curve
+/// has no step, so neither the glide nor its ends click. One thread at a time uses it; it neither
+/// allocates nor locks.
 class Fader {
  public:
   explicit Fader(double sample_rate_hz, float gain = 1);
 
-  /// Begins to glide to `gain` from the present value. It has no effect on a glide to that gain.
+  /// Begins to glide to `gain` from the present value. The call has no effect if `gain` is the
+  /// target already.
   void GlideTo(float gain) noexcept;
 
   /// Sets the gain at once.
@@ -28,7 +29,7 @@ class Fader {
 
   float target() const noexcept { return to_; }
 
-  /// Multiplies the gains of the next frames onto `gains`.
+  /// Multiplies `gains` by the gains of the next frames.
   void Multiply(std::span<float> gains) noexcept;
 
  private:

@@ -6,7 +6,7 @@
 namespace carillon {
 
 /// Makes this thread treat denormal numbers as zero (FTZ and DAZ) while the object lives. Decaying
-/// modes would otherwise cost up to 190 times as much. Every thread that renders holds one.
+/// modes would otherwise cost up to 190 times as much. Every rendering thread has such an object.
 class FlushDenormals {
  public:
   FlushDenormals() noexcept;

@@ -6,7 +6,7 @@
 
 /// Loops over samples and frames that the mixer and its buses share. A frame has one or two
 /// channels, which are interleaved. Nothing here allocates, locks, logs, throws or calls the
-/// system, and each loop is one that compilers write for several samples at a time.
+/// system, and compilers vectorise each loop.
 namespace carillon {
 
 /// sum[n] += more[n].

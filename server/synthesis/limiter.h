@@ -13,9 +13,10 @@ namespace carillon {
 ///   f(e) = T + (1 - T) u/(1 + u),  u = (e - T)/(1 - T)
 ///
 /// f has slope one at T and limit one. Samples below T pass unchanged. There is no delay; the gain
-/// recovers with a time constant of 0.1 s. A sample that is not finite becomes zero, and one beyond
-/// +-32 is clipped to that first, so that the gain has recovered within half a second of anything.
-/// All channels of a frame get the gain of the loudest, so that the stereo image does not move.
+/// recovers with a time constant of 0.1 s. A sample that is not finite becomes zero. A sample
+/// beyond +-32 is clipped to +-32 first, so that the gain recovers from any sample within half a
+/// second. All channels of a frame get the gain of the loudest channel, so that the stereo image
+/// does not move.
 class Limiter {
  public:
   explicit Limiter(double sample_rate_hz, size_t channel_count = 1);

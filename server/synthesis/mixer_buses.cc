@@ -28,7 +28,7 @@ void Mixer::OpenSection(uint32_t section, MixedSection* opened) noexcept {
     return other / kSectionCount == section / kSectionCount;
   });
   if (is_first) {
-    // Nothing rings on the bus yet that could glide or stop.
+    // No bank of the bus rings yet, so neither the gain nor a stop needs a glide.
     Bus& bus = *buses_[section / kSectionCount];
     bus.fader.JumpTo(bus.gain.load(std::memory_order_relaxed));
     bus.stop_count = bus.stops_asked.load(std::memory_order_relaxed);
@@ -88,7 +88,7 @@ bool Mixer::MixBus(uint32_t bus, std::span<const uint32_t> sections, size_t fram
   active_mode_count_ += active_mode_count;
   mixed_bus.active_mode_count.store(active_mode_count, std::memory_order_relaxed);
   LetPeakFall(mixed_bus, static_cast<double>(frame_count) / settings_.sample_rate_hz);
-  // Most buses of a daemon are those of scenes that rest, which nobody should pay for.
+  // Most buses of a daemon belong to scenes at rest, which should cost nothing.
   const bool heard = mixed_bus.listener.load(std::memory_order_relaxed) != nullptr;
   if (!mixed_bus.sounded && !heard && !mixed_bus.changes()) return false;
   AddSections(sections, frame_count);

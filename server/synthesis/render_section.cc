@@ -11,7 +11,7 @@
 namespace carillon {
 namespace {
 
-/// How many of the events, from the first on, are rendered as one.
+/// Returns the number of leading events that are rendered as one.
 size_t CountTogether(std::span<const DueEvent> events) {
   const DueEvent& first = events.front();
   if (!first.merged) return 1;
@@ -22,7 +22,7 @@ size_t CountTogether(std::span<const DueEvent> events) {
   return static_cast<size_t>(other - events.begin());
 }
 
-/// Impulses of the first event's bank, merged ones counted once.
+/// Returns the number of impulses of the first event's bank; impulses merged into one count once.
 size_t CountImpulses(std::span<const DueEvent> events) {
   const uint32_t slot = events.front().slot;
   size_t count = 0;

@@ -18,10 +18,10 @@ namespace carillon {
 struct SectionCounts {
   uint64_t dropped_count = 0;
   uint64_t reset_bank_count = 0;
-  uint64_t bounded_bank_count = 0;  ///< banks lowered because a mode was beyond all bounds
+  uint64_t bounded_bank_count = 0;  ///< banks lowered because a mode exceeded kMostAmplitude
   uint64_t active_mode_count = 0;   ///< at the end
   double ringing_work = 0;          ///< units of work of the next block without events
-  bool sounded = false;             ///< anything was rendered: without it, the frames are unwritten
+  bool sounded = false;             ///< anything was rendered; if false, frames are unwritten
   bool placed = false;              ///< a voice was rendered
 };
 
@@ -56,7 +56,7 @@ class RenderSection {
                        const Output& output, RenderWorkspace& workspace) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
-  /// Ends all sound at once, that which is still on its way to the listener included.
+  /// Ends all sound at once, including the sound that is still on its way to the listener.
   void Silence() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
  private:
@@ -72,7 +72,7 @@ class RenderSection {
   void FinishBanks(std::span<float> block, SectionCounts& counts) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
-  /// Turns the gains of a bank with directivity towards the listener, once in a block.
+  /// Computes the gains of a bank with directivity for the listener's bearing, once in a block.
   void SetGains(BankSlot& slot) noexcept;
   bool Move(Voice* voice, const MixerEvent& event, size_t offset) noexcept;
   void Wake(Voice& voice) noexcept;

@@ -24,8 +24,8 @@ class SectionThreads {
   virtual void Render(size_t count, absl::FunctionRef<void(size_t, size_t)> render) noexcept = 0;
 };
 
-/// Threads that render beside the caller's. They are for offline rendering only, because they wait
-/// in the kernel.
+/// Threads that render in addition to the caller's thread. They are for offline rendering only,
+/// because they wait in the kernel.
 class RenderThreads final : public SectionThreads {
  public:
   explicit RenderThreads(size_t thread_count);

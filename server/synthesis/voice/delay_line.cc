@@ -39,7 +39,7 @@ PhaseTable MakePhaseTable() {
   return table;
 }
 
-/// Computed when the first delay line is made, which is never on a rendering thread.
+/// The table is computed when the first delay line is made, which is never on a rendering thread.
 const float* Phases() {
   static const PhaseTable table = MakePhaseTable();
   return table.front().data();
@@ -67,7 +67,7 @@ float DelayLine::Read(double delay) const noexcept {
   const auto part = static_cast<float>(phase - static_cast<double>(row));
   const float* below = phases_ + row * kTaps;
   const float* above = below + kTaps;
-  // Below zero before the line was full once.
+  // `begin` is below zero until enough samples have been written.
   const auto begin =
       static_cast<ptrdiff_t>(written_ - static_cast<size_t>(whole) - (kTaps / 2 - 1));
   const auto silent = static_cast<size_t>(std::clamp<ptrdiff_t>(

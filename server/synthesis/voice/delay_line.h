@@ -16,16 +16,16 @@ class DelayLine {
   /// The least delay: interpolation needs half of the taps after the position.
   static constexpr double kLeastDelay = kTaps / 2.0;
 
-  /// Reads may be `longest_delay` samples before any of the last `block_frame_count` samples
+  /// Read can go back `longest_delay` samples before any of the last `block_frame_count` samples
   /// written.
   DelayLine(size_t longest_delay, size_t block_frame_count);
 
   void Write(std::span<const float> samples) noexcept;
 
-  /// Makes all samples zero that were written so far, without touching them.
+  /// Makes all samples written so far read as zero, without overwriting them.
   void Silence() noexcept { silent_count_ = written_; }
 
-  /// The signal `delay` samples before the sample that is written next.
+  /// Returns the signal `delay` samples before the sample that is written next.
   float Read(double delay) const noexcept;
 
   /// Number of samples kept.
@@ -36,7 +36,7 @@ class DelayLine {
   std::vector<float> samples_;  // a ring buffer; the first kTaps samples are repeated at its end
   const float* phases_;         // rows of kTaps coefficients
   size_t written_ = 0;
-  size_t silent_count_ = 0;  // of the samples written first, those that count as zero
+  size_t silent_count_ = 0;  // the first samples written, which read as zero
 };
 
 }  // namespace carillon

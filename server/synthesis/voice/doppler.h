@@ -12,14 +12,14 @@ namespace carillon {
 /// The positions of a moving object at the ends of the last blocks. Only the constructor allocates.
 class PastPositions {
  public:
-  /// At least two blocks, if the object's position is asked for before the end of the last one.
+  /// `block_count` must be at least two if positions before the end of the last block are needed.
   PastPositions(size_t block_count, const Vector3& position_m)
       : positions_m_(block_count, position_m) {}
 
   /// Adds the position at the end of the block that has just ended.
   void Add(const Vector3& position_m) noexcept;
 
-  /// Lets the object have been at a position for all the time that is kept.
+  /// Sets all kept positions to `position_m`.
   void Fill(const Vector3& position_m) noexcept;
 
   const Vector3& newest() const noexcept { return positions_m_[newest_]; }
@@ -44,7 +44,7 @@ struct DelayLimits {
   double most_frames = 0;
 };
 
-/// The way of a sound from the place where an object was when it sounded.
+/// The path of a sound from the place where an object was when it sounded.
 struct SoundPath {
   double delay_frames = 0;
   Vector3 away_m{};  ///< from the listener to that place

@@ -18,31 +18,31 @@ class Ears {
   Ears(const Head& head, size_t block_frame_count);
 
   /// Begins a block that ends with the head's responses for a direction, and starts with those at
-  /// the end of the block before. `head` has the tap count of the constructor's.
+  /// the end of the previous block. `head` must have the same tap count as the constructor's head.
   void Turn(const Head& head, const Vector3& direction) noexcept;
 
-  /// Begins a block with the responses for a direction from its start to its end. The signal before
-  /// the block is no longer known.
+  /// Begins a block with the responses for a direction from its start to its end. The caller must
+  /// then set past().
   void Jump(const Head& head, const Vector3& direction) noexcept;
 
-  /// Begins a block that keeps the responses at the end of the block before.
+  /// Begins a block that keeps the responses at the end of the previous block.
   void Hold() noexcept;
 
   /// Makes the signal before the block zero.
   void Silence() noexcept;
 
-  /// The signal at an ear in the frames before the block that its response reaches. Empty if they
-  /// are known from the block before; otherwise the caller sets them before Filter.
+  /// Returns the frames of an ear's signal before the block that its response reaches. The caller
+  /// sets them before Filter. The span is empty if they are known from the previous block.
   std::span<float> past(size_t ear) noexcept {
     return known_[ear] ? std::span<float>() : std::span(signals_[ear]).first(past_count());
   }
 
-  /// The signal at an ear in this block, which the caller sets before Filter.
+  /// Returns the signal at an ear in this block, which the caller sets before Filter.
   std::span<float> signal(size_t ear) noexcept {
     return std::span(signals_[ear]).subspan(past_count());
   }
 
-  /// Computes the sound in an ear, a block, and ends the block for this ear.
+  /// Writes the block of the sound in an ear to `sound`, and ends the block for this ear.
   void Filter(size_t ear, std::span<float> sound) noexcept;
 
  private:
@@ -51,7 +51,7 @@ class Ears {
   EarResponses start_, end_;
   std::array<bool, 2> known_{};
   std::array<std::vector<float>, 2> signals_;  // the past, then the block
-  std::vector<float> other_;                   // the block by the other response
+  std::vector<float> other_;                   // the block, filtered by the end response
 };
 
 }  // namespace carillon

@@ -9,22 +9,22 @@
 
 namespace carillon {
 
-/// A position, for a listener the direction to the right, and for an object its orientation.
+/// A position and an orientation, and for a listener the direction to the right.
 struct Place {
   std::array<double, 3> position_m{};
   std::array<double, 3> right{1, 0, 0};
-  Quaternion orientation{};  ///< rotates vectors of the object's frame into the scene's
+  Quaternion orientation{};  ///< from the object's or listener's frame into the scene's
 };
 
-/// The place of an object or listener that is moved by Motions, block by block. It goes straight
-/// from place to place and is smoothed, with a lag of 10 ms, so that its velocity does not jump. At
-/// rest it is exactly at the last target. Neither allocates nor locks.
+/// The place of an object or listener that is moved by Motions, block by block. The place moves in
+/// straight lines and is smoothed with a lag of 10 ms, so that its velocity does not jump. At rest
+/// it is exactly the last target. No function allocates or locks.
 class Glide {
  public:
   Glide(const Place& place, double sample_rate_hz, size_t block_frame_count);
 
-  /// Starts a motion at sample `offset` of this block; glide_frames below one makes it jump.
-  /// Offsets ascend within a block.
+  /// Starts a motion at sample `offset` of this block. If its glide_frames is below one, the place
+  /// jumps. Offsets ascend within a block.
   void Move(const Motion& motion, size_t offset) noexcept;
 
   /// Ends the block.
@@ -37,7 +37,7 @@ class Glide {
   /// this block was a jump, it is the place after all motions so far.
   Place begin() const noexcept { return PlaceAt(jumps_ ? unsmoothed_ : smoothed_); }
 
-  /// Whether it jumped in the last block.
+  /// Whether the place jumped in the last block.
   bool jumped() const noexcept { return jumped_; }
 
   bool at_rest() const noexcept { return at_rest_; }

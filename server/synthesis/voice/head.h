@@ -24,26 +24,27 @@ struct EarResponse {
   float delay_frames = 0;
 };
 
-/// Left, then right.
+/// The responses of the left ear, then of the right ear.
 using EarResponses = std::array<EarResponse, 2>;
 
 /// A measured head at one sample rate: the responses of its ears to sounds from all directions.
 ///
 /// Each measured response is split into the delay until its onset and the response from there on.
-/// Both are interpolated apart, so that the delays of neighbouring directions do not comb.
+/// The two parts are interpolated separately, so that the delays of neighbouring directions do not
+/// cause comb filtering.
 class Head {
  public:
-  /// `measured` must not be empty. All responses are scaled by one factor, so that the power of
-  /// both ears for a sound from straight ahead is 1 on the mean from 0 to 10 kHz, as loud as
+  /// `measured` must not be empty. All responses are scaled by one factor. For a sound from
+  /// straight ahead, the mean power of the two ears from 0 to 10 kHz is then 1, which is as loud as
   /// panning is there.
   Head(std::span<const MeasuredDirection> measured, double sample_rate_hz);
 
-  /// Returns responses of zeros, with the number of taps that all responses of this head have.
+  /// Returns responses of zeros that have tap_count() taps.
   EarResponses Silent() const;
 
-  /// Computes the responses for a direction in the listener's frame, of any length but zero. They
-  /// are continuous in the direction. `responses` are any of this head, or Silent. Neither
-  /// allocates nor locks.
+  /// Computes the responses for a direction in the listener's frame, of any length but zero. The
+  /// responses change continuously with the direction. `responses` must have tap_count() taps.
+  /// Neither allocates nor locks.
   void Respond(const Vector3& direction, EarResponses& responses) const noexcept;
 
   /// Returns the delays of both ears, frames, as Respond does.
@@ -55,9 +56,9 @@ class Head {
   double longest_delay() const noexcept { return longest_delay_; }
 
  private:
-  static constexpr size_t kAzimuths = 72, kElevations = 37;  // one each 5 degrees
+  static constexpr size_t kAzimuths = 72, kElevations = 37;  // one every 5 degrees
 
-  /// A part of a direction's place between four of the grid.
+  /// The weight of one of the four grid directions around a direction.
   struct Share {
     size_t index = 0;
     double weight = 0;

@@ -11,7 +11,7 @@ namespace carillon {
 namespace {
 
 constexpr double kFadeS = 0.01;
-/// A delay that changes faster, in frames per frame, is treated as a jump.
+/// A delay that changes faster than this, in frames per frame, is treated as a jump.
 constexpr double kFastestDelay = 0.5;
 /// Within this distance an object's panning moves to the middle.
 constexpr double kNearM = 0.1;

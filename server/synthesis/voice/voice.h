@@ -27,7 +27,7 @@ struct HearingSettings {
   bool panning = false;
   bool binaural = false;     ///< by the responses of a measured head, in place of panning
   bool directivity = false;  ///< modes sound as loud as they radiate towards the listener
-  bool near_field = false;   ///< with directivity: as the sound field is at the listener's distance
+  bool near_field = false;   ///< directivity includes the near field
   double reference_distance_m = 1;
   double sound_speed_m_per_s = 343;
 
@@ -48,16 +48,15 @@ inline constexpr double kLongestPropagationS = 0.6;
 ///
 /// These are evaluated at the ends of blocks. Between them, gains are interpolated linearly and the
 /// delay by a cubic with continuous slope, so that a moving object has the right Doppler shift and
-/// does not click. The voice is one block late. A jump is a cross-fade of 10 ms. The delay is at
-/// least DelayLine::kLeastDelay samples, so objects nearer than 0.1 m (at 48 kHz) sound as from 0.1
-/// m.
+/// does not click. The voice is one block late. A jump is rendered as a cross-fade of 10 ms. The
+/// delay is at least DelayLine::kLeastDelay samples, the delay of an object at 0.09 m (at 48 kHz).
 ///
-/// For two ears the gains to left and right are one, and the responses of a measured head follow,
-/// for the direction from which the sound comes. Their delays add to d, so that each ear has its
-/// own Doppler shift.
+/// For two ears, the responses of a measured head for the direction of the sound replace the gains
+/// to left and right. The delays of these responses add to d, so that each ear has its own Doppler
+/// shift.
 ///
-/// Any thread may make a voice; then one thread at a time uses it, which neither allocates nor
-/// locks.
+/// Any thread may construct a voice; then one thread at a time uses it. Only the constructor
+/// allocates; nothing locks.
 class Voice {
  public:
   struct Settings {
@@ -65,28 +64,29 @@ class Voice {
     double sample_rate_hz = 48000;
     size_t block_frame_count = 128;
     size_t channel_count = 1;
-    /// The listener's; it must be there for `hearing.binaural`, which needs two channels.
+    /// The listener's head, which `hearing.binaural` needs, as well as two channels.
     std::shared_ptr<const Head> head = nullptr;
   };
 
   Voice(const Settings& settings, const Place& object, const Place& listener);
 
-  /// Start motions at sample `offset` of this block; they are called before Render.
+  /// Start a motion at sample `offset` of this block; the caller calls them before Render.
   void Move(const Motion& motion, size_t offset) noexcept { object_.Move(motion, offset); }
   void MoveListener(const Motion& motion, size_t offset) noexcept {
     listener_.Move(motion, offset);
   }
 
-  /// Makes a point of the object's frame the place of its sound, in place of the frame's origin.
+  /// Sets the point of the object's frame from which its sound comes; without a call it is the
+  /// origin.
   void SetCenter(const Vector3& center_m) noexcept;
 
-  /// Where the listener is at the start of this block, seen from the place of the object's sound.
-  /// The gains of the last block hold for the same time, because the voice is one block late.
+  /// Returns the bearing of the listener at the start of this block, from the point that sounds.
+  /// The gains of the last block are for the same time, because the voice is one block late.
   Bearing BearingOfListener() const noexcept;
 
   const HearingSettings& hearing() const noexcept { return settings_.hearing; }
 
-  /// The object's sound in this block: zeros, to which banks add themselves.
+  /// Returns the buffer of the object's sound in this block: zeros, to which banks add their sound.
   std::span<float> input() noexcept {
     fed_ = true;
     return input_;
@@ -95,10 +95,10 @@ class Voice {
   /// Adds the block to `frames`, interleaved, and begins the next block.
   void Render(std::span<float> frames) noexcept;
 
-  /// Whether it renders for two ears.
+  /// Whether the voice renders for two ears.
   bool binaural() const noexcept { return !ears_.empty(); }
 
-  /// Ends the sound that is on its way to the listener, between two blocks.
+  /// Ends the sound that is on its way to the listener. It is called between two blocks.
   void Silence() noexcept;
 
   /// Whether the voice is silent and nothing moves, so that Render need not be called until the
@@ -112,8 +112,8 @@ class Voice {
   uint32_t bank_count = 0;
 
  private:
-  /// Delay and gains at one time. With two ears the sound comes from `direction` of the listener's
-  /// frame, and later by the delays of the ears.
+  /// Delay and gains at one time. With two ears the sound comes from `direction` in the listener's
+  /// frame, and reaches each ear later by the delay of that ear.
   struct Heard {
     double delay_frames = 0;
     std::array<float, 2> gains{};
