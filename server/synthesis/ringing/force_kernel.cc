@@ -19,7 +19,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 using Floats = hn::CappedTag<float, kMostLanes>;
 using V = hn::Vec<Floats>;
 
-// Far above any force, far below what the products that follow can hold.
+// This limit is far above any change of a force's slope, and its products do not overflow.
 constexpr float kMostForce = 1e15F;
 
 void AddForce(const strike_kernel::Projection& projection, float* HWY_RESTRICT next) {

@@ -48,10 +48,11 @@ namespace force_kernel {
 void AddForce(const strike_kernel::Projection& projection, float* next) noexcept;
 
 /// Ends a step of length 1 / rate_hz: sets slope and jump, moves next to last and clears next.
-/// False: a force was not finite; all forces are zero now.
+/// Returns false if a force was not finite; all forces are then zero.
 bool EndStep(float rate_hz, ForceArrays& force) noexcept;
 
-/// Writes what the changes of slope in `jump` add to the states into added_re and added_im.
+/// Writes the changes of the states that the changes of slope in `jump` cause to added_re and
+/// added_im.
 void Kink(const ForceArrays& force, const LaneArrays& lanes, float* added_re,
           float* added_im) noexcept;
 
@@ -67,11 +68,11 @@ struct Drive {
   size_t frame_count = 0;
 };
 
-/// Where the driven lanes are rendered to, frame by frame, and with which gains.
+/// The buffer that the driven lanes are rendered to, frame by frame, and their gains.
 struct DrivenOutput {
   float* mix = nullptr;
   ring_kernel::Gains gains{};
-  /// A second rendering of the same states with other gains; null: none.
+  /// A second rendering of the same states with other gains; null if there is none.
   float* second_mix = nullptr;
   ring_kernel::Gains second_gains{};
 };

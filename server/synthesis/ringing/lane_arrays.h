@@ -16,7 +16,7 @@ namespace carillon {
 /// The widest vector of floats that any SIMD target uses; arrays over modes are padded to it.
 inline constexpr size_t kMostLanes = 16;
 
-/// Floats of the nodes of a longer tile, each still split into lanes.
+/// Number of floats in the nodes of a longer tile, each node still split into lanes.
 inline constexpr size_t kNodeFloats = kClosedTileNodes * kMostLanes;
 
 /// A zeroed array aligned for the widest vector.
@@ -58,12 +58,12 @@ struct LaneRun {
   }
 };
 
-/// Coefficients and states of a bank's modes in the time domain, one lane a mode.
+/// Coefficients and states in the time domain, one lane for each mode or companion of a bank.
 ///
-/// The lanes of a bank are sorted by kind of tile, longest tiles first, then by segment; a run is a
-/// piece with both in common, padded to groups of kMostLanes. Segment 0 stays in the time domain;
-/// segment 1 + k can move to long blocks of kind k. In this example two segments use tiles of 64
-/// frames, and segment 1 has lanes in all three kinds of tile:
+/// The lanes of a bank are sorted by kind of tile, longest tiles first, then by segment; a run has
+/// one kind of tile and one segment, and is padded to groups of kMostLanes. Segment 0 stays in the
+/// time domain; segment 1 + k can move to long blocks of kind k. In this example two segments use
+/// tiles of 64 frames, and segment 1 has lanes in all three kinds of tile:
 ///
 ///   tiles of      64 frames             16 frames        8 frames
 ///           +------------+-----------+------------+------------+------------+
@@ -74,7 +74,7 @@ struct LaneArrays {
   /// `lane_count` is a multiple of kMostLanes.
   explicit LaneArrays(size_t lane_count);
 
-  /// Index in `powers` of the real part of a lane's power of q that advances from the tile's begin
+  /// Index in `powers` of the real part of a lane's power of q that advances from the tile's start
   /// to node k + 1, or for the last k to the next tile. The imaginary part is kMostLanes further.
   static size_t PowerIndex(size_t lane, size_t k) {
     return (lane / kMostLanes * kTileNodes + k) * 2 * kMostLanes + lane % kMostLanes;
@@ -102,9 +102,9 @@ struct LaneArrays {
   LaneArray<float> start_re, start_im;
   LaneArray<float> fresh_re, fresh_im;
 
-  /// Modal impulse to state: -i exp(i phase) c / omega_d, times all scales.
+  /// Factor from modal impulse to state: -i exp(i phase) c / omega_d, times all scales.
   LaneArray<float> gain_re, gain_im;
-  /// Logarithm of q: what a frame of lead contributes to the exponent.
+  /// Logarithm of q, which each frame of lead adds to the exponent.
   LaneArray<float> lead_re, lead_im;
   /// s = sigma + i omega of the lane's mode, 1/s, from which a contact's factor is computed.
   LaneArray<float> contact_re, contact_im;

@@ -10,15 +10,15 @@
 
 namespace carillon {
 
-/// One block of sound that all banks add to. Most of it is not samples yet: sums in separate SIMD
-/// lanes, and values at the Chebyshev nodes of longer tiles (tile.h). Both become samples once for
-/// all banks.
+/// One block of sound that all banks add to. Most of the sound is stored as sums in separate SIMD
+/// lanes, and as values at the Chebyshev nodes of longer tiles (tile.h). Both become samples once
+/// for all banks.
 class LaneMix {
  public:
   /// Silences the first `frame_count` frames.
   void Clear(size_t frame_count) noexcept;
 
-  /// Writes the sum of all that was added to `block`, which has the cleared number of frames.
+  /// Writes the sum of all added sound to `block`, which has the cleared number of frames.
   void Reduce(std::span<float> block) noexcept;
 
   /// Frame n is lanes()[n * kMostLanes] and the kMostLanes - 1 floats after it.

@@ -22,13 +22,13 @@ using Doubles = hn::Repartition<double, Floats>;
 using HalfFloats = hn::Half<Floats>;
 using V = hn::Vec<Floats>;
 
-// Far above any sound, and far below the largest float.
+// This squared amplitude is far above any sound, and far below the largest float.
 constexpr float kMostSquared = 1e30F;
 
 /// Collects the squared amplitudes of some lanes while they advance.
 struct Loudness {
   hn::Vec<Doubles> loudest;
-  hn::Vec<Doubles> all_small;  ///< zero in lanes where one was too large or NaN
+  hn::Vec<Doubles> all_small;  ///< zero in lanes where an amplitude was too large or NaN
 
   HWY_INLINE void Clear() {
     loudest = hn::Zero(Doubles());

@@ -9,7 +9,8 @@
 
 namespace carillon {
 
-/// Longest block: within a block, single precision drifts from the state in double.
+/// The longest block. It is bounded because single precision drifts from the state in double within
+/// a block.
 inline constexpr size_t kMostBlockFrames = 256;
 
 /// Sums over modes at the nodes of tiles of the longer kinds, each still split into SIMD lanes.
@@ -17,12 +18,13 @@ class NodeMix {
  public:
   void Clear() noexcept { used_ = {}; }
 
-  /// The nodes of the tiles of this kind that cover `frame_count` frames; the first use since Clear
-  /// sets them to zero. Node k of tile i is at [(i * kClosedTileNodes + k) * kMostLanes].
+  /// Returns the nodes of the tiles of this kind that cover `frame_count` frames. The first use
+  /// since Clear sets them to zero. Node k of tile i is at [(i * kClosedTileNodes + k) *
+  /// kMostLanes].
   float* Use(size_t kind, size_t frame_count) noexcept;
 
-  /// Interpolates the tiles, of which the first of each kind begins at frame `begin`, and adds them
-  /// to frames[begin] to frames[end - 1]; reads as far as sum_kernel::AddTiles.
+  /// Interpolates the tiles and adds them to frames[begin] to frames[end - 1]. The first tile of
+  /// each kind begins at frame `begin`. Reads as far as sum_kernel::AddTiles does.
   void AddTo(size_t begin, size_t end, float* frames) const noexcept;
 
  private:

@@ -159,7 +159,7 @@ struct Oscillators {
   }
 
   /// Renders one tile of the first kind: every sample is computed from the state at the tile's
-  /// begin, then the state advances by a tile.
+  /// start, then the state advances by a tile.
   HWY_INLINE void AddTile(Z& z, float* mix) const { AddNodes<kTileNodes>(z, mix); }
 
   /// Renders the nodes of one longer tile, including the node at its end, and advances the state.

@@ -20,8 +20,8 @@ namespace carillon::HWY_NAMESPACE {
 // from the cache.
 constexpr size_t kVectorsPerPass = 4;
 
-/// Prefetches the powers of the next pass's vectors, a share with each tile of this pass: all
-/// requests at once would wait for each other.
+/// Prefetches the powers of the next pass's vectors, a share with each tile of this pass, because
+/// simultaneous requests would wait for each other.
 template <size_t kVectors>
 class Prefetching {
  public:

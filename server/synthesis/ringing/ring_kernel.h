@@ -31,14 +31,14 @@ namespace ring_kernel {
 /// kMostLanes]. Null if no lanes are rendered in that kind.
 using TileSums = std::array<float*, kTileKinds>;
 
-/// Complex gains by which the states of all lanes are multiplied before they are rendered; null:
+/// Complex gains by which the states of all lanes are multiplied before they are rendered. If null,
 /// the states themselves are rendered.
 struct Gains {
   const float* re = nullptr;
   const float* im = nullptr;
 };
 
-/// Where the lanes are rendered to, and with which gains.
+/// The buffers that the lanes are rendered to, and their gains.
 struct Output {
   TileSums sums{};
   Gains gains{};
@@ -47,7 +47,7 @@ struct Output {
 /// A block without impulses.
 struct FreeBlock {
   Output output;
-  /// A second rendering of the same states with other gains; without sums: none.
+  /// A second rendering of the same states with other gains; there is none if it has no sums.
   Output second{};
   size_t frame_count = 0;
   /// Groups of lanes whose squared amplitudes are all below this are silenced.
@@ -55,7 +55,7 @@ struct FreeBlock {
 };
 
 /// Renders a block of all awake lanes and advances them to the next block. `segments` are all
-/// segments of the bank. False: a state was not finite.
+/// segments of the bank. Returns false if a state was not finite.
 bool RingFreely(LaneArrays& lanes, std::span<RingingSegment> segments,
                 const FreeBlock& block) noexcept;
 
@@ -68,8 +68,9 @@ struct StruckPart {
   Gains gains{};     ///< for HearStruck only
   size_t begin = 0;  ///< frames
   size_t end = 0;
-  /// True: read the state at `begin` from start_re/fresh_re, because an earlier part was rendered.
-  /// False: this is the block's first part; read re/im, and the fresh state is zero.
+  /// If true, the state at `begin` is read from start_re/fresh_re, because an earlier part was
+  /// rendered. If false, this is the block's first part: the state is read from re/im, and the
+  /// fresh state is zero.
   bool started = false;
   /// Render all lanes in tiles of the first kind, which is less work if there are many impulses.
   bool by_frames = false;
@@ -87,7 +88,7 @@ void RingStruck(LaneArrays& lanes, const StruckPart& part) noexcept;
 /// Renders a part with its gains, and leaves all states as they are.
 void HearStruck(const LaneArrays& lanes, const StruckPart& part) noexcept;
 
-/// Adds what an impulse contributes to the start and fresh states.
+/// Adds the contribution of an impulse to the start and fresh states.
 void AddStrike(LaneArrays& lanes, size_t lane_count, const float* added_re,
                const float* added_im) noexcept;
 
@@ -96,7 +97,7 @@ void AddStrike(LaneArrays& lanes, size_t lane_count, const float* added_re,
 bool FinishStruck(LaneArrays& lanes, std::span<RingingSegment> segments, const StruckPart& part,
                   double silence_squared) noexcept;
 
-/// Name of the target dispatched to.
+/// Returns the name of the SIMD target in use.
 std::string_view Target();
 
 }  // namespace ring_kernel

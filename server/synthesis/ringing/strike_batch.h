@@ -12,20 +12,21 @@
 namespace carillon {
 
 /// Onsets (impulses and knots) of one bank within a block, which are rendered in one pass over the
-/// lanes: what each onset adds to the states, and at which frame. Scratch memory of one rendering
-/// thread.
+/// lanes. The batch has the frame of each onset and the change that it makes to the states. Scratch
+/// memory of one rendering thread.
 class StrikeBatch {
  public:
   static constexpr size_t kMostStrikes = 32;
   /// Most lanes, and most projected columns, of a bank.
   static constexpr size_t kMostBankLanes = 16384;
 
-  /// Rows that the next impulse will read. They are prefetched bit by bit while the present impulse
-  /// is processed, because all requests at once would wait for each other.
+  /// The vertices whose rows of the shape table the next impulse will read. They are prefetched bit
+  /// by bit while the present impulse is processed, because simultaneous requests would wait for
+  /// each other.
   struct RowsAhead {
     std::array<const int16_t*, 12> rows{};
     size_t count = 0;
-    size_t value_count = 0;  ///< of each row
+    size_t value_count = 0;  ///< of the three rows of a vertex, which are consecutive
   };
 
   StrikeBatch()

@@ -152,7 +152,7 @@ class StruckVectors {
 
   const Oscillators<kVectors>& oscillators_;
   Ahead ahead_;
-  size_t fresh_at_ = 0;  // the frame at which the fresh state is
+  size_t fresh_at_ = 0;  // the frame that the fresh state belongs to
   bool any_fresh_ = false;
 };
 

@@ -34,7 +34,7 @@ NodeShares MakeNodeShares(size_t kind) noexcept {
   return shares;
 }
 
-/// Computed at the program's start, before any thread renders.
+/// The shares are computed at the program's start, before any thread renders.
 const std::array<NodeShares, kTileKinds> kShares = {NodeShares{}, MakeNodeShares(1),
                                                     MakeNodeShares(2)};
 

@@ -5,7 +5,7 @@
 
 namespace carillon {
 
-/// Where the listener is, seen from an object.
+/// The direction and distance of the listener, seen from an object.
 struct Bearing {
   std::array<double, 3> direction{0, 0, 1};  ///< unit vector in the object's frame
   double distance_m = 1;

@@ -19,7 +19,7 @@ struct EventQueue {
       : events(capacity), timely(is_timely) {}
 
   SpscQueue<MixerEvent> events;
-  const bool timely;  ///< false: its impulses are meant for the next block, and are never late
+  const bool timely;  ///< if false, late impulses count as accepted
   std::atomic<bool> closed{false};
   std::atomic<uint64_t> accepted_count{0};
   std::atomic<uint64_t> late_count{0};
@@ -35,7 +35,8 @@ class EventStream {
   EventStream(const EventStream&) = delete;
   EventStream& operator=(const EventStream&) = delete;
 
-  /// False: the queue to the mixer is full and the event is lost (counted as dropped).
+  /// Returns false if the queue to the mixer is full. The event is then lost, and counted as
+  /// dropped.
   bool TryPush(const MixerEvent& event) noexcept {
     const bool pushed = queue_->events.TryPush(event);
     if (!pushed) queue_->dropped_count.fetch_add(1, std::memory_order_relaxed);

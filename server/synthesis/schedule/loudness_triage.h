@@ -15,8 +15,8 @@ enum class Treatment : uint8_t {
 };
 
 /// Chooses the treatment of impulses by their loudness, so that their total work stays within a
-/// bound: the loudest are exact, the next are merged and the quietest are shed. It sorts into a
-/// histogram, so its time grows with the number of impulses only.
+/// bound: the loudest are exact, the next are merged and the quietest are shed. It uses a
+/// histogram, so its time is linear in the number of impulses.
 class LoudnessTriage {
  public:
   /// Empties the histogram.
@@ -25,10 +25,10 @@ class LoudnessTriage {
   /// Adds an impulse: its loudness, and its work if it is rendered exactly or merged.
   void Note(float loudness, double exact_work, double merged_work) noexcept;
 
-  /// Settles the treatment of every loudness; returns the work of all noted impulses under it.
+  /// Decides the treatment of every loudness, and returns the resulting work of all noted impulses.
   double Decide(double most_work) noexcept;
 
-  /// Impulses quieter than this are shed; zero: none is.
+  /// Impulses quieter than this are shed; zero if no impulse is shed.
   float shed_below() const noexcept;
 
   Treatment Treat(float loudness) const noexcept;

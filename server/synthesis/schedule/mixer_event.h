@@ -12,7 +12,7 @@
 
 namespace carillon {
 
-/// Names a bank in a mixer; a default one names none.
+/// Names a bank in a mixer; a default BankId names no bank.
 struct BankId {
   uint32_t slot = UINT32_MAX;
   uint32_t generation = 0;
@@ -32,8 +32,8 @@ struct SurfaceImpulse {
   Pulse pulse{};
 };
 
-/// The begin of an impulse's contact. The sound of the body's own acceleration begins then, the
-/// modes at the impulse's time.
+/// The start of an impulse's contact. The sound of the body's own acceleration begins at this time,
+/// and the modes begin at the impulse's time.
 struct ContactBegin {
   SurfaceImpulse impulse{};
 };
@@ -45,24 +45,22 @@ struct SurfaceForce {
   std::array<float, 3> force_newtons{};  ///< in the object's frame
 };
 
-/// The end of a simulation step: the forces added since the previous knot are the object's whole
-/// force now. Between two knots the force is interpolated linearly.
+/// The end of a simulation step: the forces added since the previous knot become the object's whole
+/// force. Between two knots the force is interpolated linearly.
 struct ForceKnot {
-  float step_s = 0;     ///< time since the previous knot
-  float roughness = 0;  ///< root mean square of the force's fluctuation, relative to the force
-  float bandwidth_hz =
-      0;  ///< of the fluctuation; zero: the contact does not travel, no fluctuation
+  float step_s = 0;        ///< time since the previous knot
+  float roughness = 0;     ///< root mean square of the force's fluctuation, relative to the force
+  float bandwidth_hz = 0;  ///< of the fluctuation; zero if the contact does not travel
 };
 
-/// A straight way to a new place.
+/// A straight movement to a new place.
 struct Motion {
   std::array<float, 3> position_m{};
   std::array<float, 3> right{1, 0, 0};  ///< a listener's unit vector to the right
   /// x, y and z of the unit quaternion (w is not negative) that rotates vectors from the body's
-  /// frame into the scene's frame. The orientation of a listener matters to binaural voices
-  /// alone.
+  /// frame into the scene's frame. Only binaural voices use the orientation of a listener.
   std::array<float, 3> orientation{};
-  float glide_frames = 0;  ///< duration of the way; below one: a jump
+  float glide_frames = 0;  ///< duration; below one, the motion is a jump
 };
 
 /// The object whose voice the bank sounds through moves.
@@ -77,7 +75,7 @@ struct ListenerMove {
 
 /// One instruction to one bank, with its time: frame + fraction, in frames since the mixer began.
 /// The first audible sample is the first at or after that time; its phase accounts for the part of
-/// a frame between the two.
+/// a frame between that time and the sample.
 struct MixerEvent {
   using Action =
       std::variant<SurfaceImpulse, SurfaceForce, ForceKnot, ObjectMove, ListenerMove, ContactBegin>;
@@ -104,10 +102,10 @@ struct MixerEvent {
   /// Frames from the event to its first audible sample.
   float LeadFrames() const noexcept { return fraction > 0 ? 1 - fraction : 0; }
 
-  /// The impulse; null for another kind of event.
+  /// Returns the impulse, or null for another kind of event.
   const SurfaceImpulse* impulse() const noexcept { return std::get_if<SurfaceImpulse>(&action); }
 
-  /// The impulse of a contact that begins; null for another kind of event.
+  /// Returns the impulse of a contact that begins, or null for another kind of event.
   const SurfaceImpulse* beginning() const noexcept {
     const auto* begin = std::get_if<ContactBegin>(&action);
     return begin != nullptr ? &begin->impulse : nullptr;

@@ -6,8 +6,8 @@
 namespace carillon {
 namespace {
 
-/// Blocks whose numbers differ by a multiple of this share a list: 11 s apart at 128 frames and 48
-/// kHz.
+/// Blocks whose numbers differ by a multiple of this share a list. They are 11 s apart at 128
+/// frames and 48 kHz.
 constexpr size_t kListCount = 4096;
 
 }  // namespace

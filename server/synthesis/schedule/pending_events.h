@@ -13,21 +13,21 @@
 namespace carillon {
 
 /// Events that wait for their block: a hash table from block number to the list of the block's
-/// events. Neither adding an event nor collecting a block depends on how many events wait. All
-/// memory is allocated by the constructor.
+/// events. The time to add an event is constant, and the time to collect a block depends only on
+/// the events in its list. The constructor allocates all memory.
 class PendingEvents {
  public:
   PendingEvents(size_t capacity, size_t block_frame_count);
 
-  /// False: full. The event's first sample does not lie before the block that was collected last.
-  /// `tag` is any number that the caller wants to find again.
+  /// Returns false if the table is full. The event's first sample must not lie before the end of
+  /// the block that was collected last. tag() returns `tag`, any number of the caller's.
   bool TryPush(const MixerEvent& event, uint32_t tag = 0) noexcept;
 
   /// Appends the indices of the events of the block that begins at `block_start`, in order of
   /// arrival. Blocks are collected in ascending order. Collected events stay readable until Free.
   void Collect(uint64_t block_start, FixedVector<uint32_t>& indices) noexcept;
 
-  /// Makes room in place of collected events.
+  /// Frees the memory of collected events for further events.
   void Free(std::span<const uint32_t> indices) noexcept;
 
   const MixerEvent& operator[](uint32_t index) const noexcept { return entries_[index].event; }

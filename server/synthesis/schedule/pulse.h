@@ -5,8 +5,8 @@
 
 namespace carillon {
 
-/// How an impulse is spread over the time of its contact, in four bytes: events have no room for
-/// more. The middle of the pulse lies at the time of the impulse.
+/// The spread of an impulse over the time of its contact. It has four bytes, because events have no
+/// room for more. The middle of the pulse lies at the time of the impulse.
 class Pulse {
  public:
   /// The impulse acts in an instant.
@@ -21,7 +21,7 @@ class Pulse {
   bool gaussian() const noexcept { return signed_duration_s_ < 0; }
   float duration_s() const noexcept { return std::abs(signed_duration_s_); }
 
-  /// A pulse of the same shape.
+  /// Returns a pulse of the same shape that lasts `duration_s`.
   Pulse Lasting(float duration_s) const noexcept {
     return gaussian() ? Gaussian(duration_s) : RaisedCosine(duration_s);
   }
@@ -33,7 +33,7 @@ class Pulse {
            signed_duration_s_;
   }
 
-  /// The pulse of this variance and of the shape of `like`.
+  /// Returns the pulse with this variance and the shape of `like`.
   static Pulse OfVariance(float variance_s2, Pulse like) noexcept {
     return like.gaussian() ? Gaussian(std::sqrt(variance_s2 / kGaussianVariance))
                            : RaisedCosine(std::sqrt(variance_s2 / kCosineVariance));

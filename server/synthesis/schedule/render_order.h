@@ -60,7 +60,8 @@ class RenderOrder {
   friend constexpr auto operator<=>(const RenderOrder&, const RenderOrder&) = default;
 
  private:
-  /// `limit` values of each field are distinguished: powers of two, so that these are shifts.
+  /// `limit` is the number of values of a field. It is a power of two, so that these operations are
+  /// shifts.
   constexpr void Append(uint32_t value, uint32_t limit) noexcept {
     assert(value < limit);
     key_ = key_ * limit + value;

@@ -25,7 +25,8 @@ inline constexpr double kChooseEvent =
 /// Bounds the work of a block so that the block is rendered before its deadline.
 class WorkBudget {
  public:
-  /// Null `clock`: unbounded. `most_load` is the fraction of real time that rendering may use.
+  /// If `clock` is null, the work is unbounded. `most_load` is the fraction of real time that
+  /// rendering may use.
   WorkBudget(const Clock* clock, double block_s, double most_load);
 
   bool bounded() const noexcept { return clock_ != nullptr; }

@@ -9,8 +9,9 @@ namespace carillon {
 namespace {
 
 constexpr std::array<size_t, kLongBlockKinds> kTargetFrames = {256, 512, 1024, 2048};
-/// Largest decay in bins, -sigma M/(2 pi): beyond it the error of the truncated kernel exceeds -120
-/// dB. It corresponds to a T60 of 160 ms at 2048 frames and 48 kHz, and of 20 ms at 256 frames.
+/// The largest decay in bins, -sigma M/(2 pi). Beyond this decay the error of the truncated kernel
+/// exceeds -120 dB. It corresponds to a T60 of 160 ms at 2048 frames and 48 kHz, and of 20 ms at
+/// 256 frames.
 constexpr double kMostDecayBins = 0.6;
 
 }  // namespace

@@ -31,8 +31,8 @@ struct LongBlock {
 /// mixer.
 std::array<LongBlock, kLongBlockKinds> MakeLongBlocks(size_t block_frame_count);
 
-/// The longest kind that renders a mode accurately; none if the mode decays too fast for every
-/// kind. `log_q` = (sigma + i omega)/rate.
+/// Returns the longest kind that renders a mode accurately, or no kind if the mode decays too fast
+/// for all. `log_q` = (sigma + i omega)/rate.
 std::optional<size_t> ChooseLongBlock(std::complex<double> log_q, size_t block_frame_count);
 
 }  // namespace carillon

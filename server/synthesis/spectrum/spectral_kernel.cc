@@ -23,7 +23,7 @@ using carillon::HWY_NAMESPACE::kMostSquared;
 using carillon::HWY_NAMESPACE::Loudness;
 using carillon::HWY_NAMESPACE::V;
 
-// Groups by which the prefetching of lanes is ahead.
+// The number of groups by which the prefetching of lanes runs ahead.
 constexpr size_t kGroupsAhead = 2;
 
 /// The state of a group of spectral lanes in single precision.
@@ -79,7 +79,7 @@ HWY_INLINE void SpreadMode(const float* HWY_RESTRICT weights, float re, float im
 #endif
 }
 
-/// Prefetches a group's data: those of a large scene do not fit into the caches.
+/// Prefetches a group's data, because the data of a large scene do not fit into the caches.
 HWY_INLINE void PrefetchGroup(const SpectralLanes& lanes, size_t group) {
   constexpr size_t kLine = 64;
   const auto prefetch = [](const auto* first, size_t count) {

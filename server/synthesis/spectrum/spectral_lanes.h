@@ -29,7 +29,7 @@ struct SpectralLanes {
   LaneArray<double> block_re, block_im;
   /// The state at the start of the next long block.
   LaneArray<double> re, im;
-  /// For each group of kMostLanes lanes: whether it rings.
+  /// A flag for each group of kMostLanes lanes, which tells whether the group rings.
   std::vector<uint8_t> awake;
 };
 

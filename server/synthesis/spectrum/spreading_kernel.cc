@@ -12,8 +12,8 @@ namespace {
 using Complex = std::complex<double>;
 constexpr double kPi = std::numbers::pi;
 constexpr double kWidth = kSpreadBins;
-/// pi w (1 - 1/(2 s)) for oversampling s = 2, so that the kernel's main lobe ends where its images
-/// begin.
+/// The shape of the kernel, pi w (1 - 1/(2 s)) for oversampling s = 2. With it the kernel's main
+/// lobe ends where its images begin.
 constexpr double kBeta = kPi * kWidth * 0.75;
 
 /// I0(u) as a series in u^2; |u| is at most about kBeta.
