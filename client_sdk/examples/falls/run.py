@@ -10,6 +10,7 @@ import argparse
 import math
 import os
 import pathlib
+import subprocess
 import sys
 import tempfile
 
@@ -163,9 +164,13 @@ def main():
         parser.error(f"the examples are {', '.join(names)}, the engines {', '.join(falls.ENGINES)}")
     if options.name == "chimes" and options.engine not in chimes.ENGINES:
         parser.error(f"the chimes hang on joints; their program has {' and '.join(chimes.ENGINES)}")
+    if options.seconds is not None and not options.seconds > 0:
+        parser.error("--seconds must be above zero")
     folder = (options.out or options.build / "examples").resolve()
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "models").mkdir(exist_ok=True)
+    try:
+        (folder / "models").mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        parser.error(f"--out: {error}")
     with tempfile.TemporaryDirectory(prefix="carillon-") as name:
         # The models stay for the next run; the socket's path must be short.
         pathlib.Path(name, "data").symlink_to(folder / "models")
@@ -173,6 +178,9 @@ def main():
         try:
             with carillon.connect(daemon.server) as client:
                 run(client, options, folder)
+        except subprocess.CalledProcessError as error:
+            sys.exit(f"run.py: {pathlib.Path(error.cmd[0]).name} could not simulate {options.name} in {options.engine}: "
+                     "its message is above")
         finally:
             daemon.stop()
 
