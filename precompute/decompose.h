@@ -17,8 +17,8 @@ namespace carillon::precompute {
 /// The model's warnings say if the accuracy was not reached or the budget was exceeded.
 ///
 /// Errors: those of ParseMesh, CheckSurface, Tetrahedralize, FixNodes and SolveDeformationModes;
-/// NO_MODE_IN_BAND with the figure first_mode_hz; INVALID_SETTINGS if linear elements are asked for
-/// and the mesh has ten-node ones; OUTPUT_NOT_WRITABLE. The mesh generator may also crash the
+/// NO_MODE_IN_BAND with the figure first_mode_hz; INVALID_SETTINGS if linear elements are requested
+/// but the mesh has ten-node elements; OUTPUT_NOT_WRITABLE. The mesh generator may also crash the
 /// process.
 absl::StatusOr<ModalModel> Decompose(std::string mesh_bytes, const v1::WorkerRequest& request,
                                      DecompositionObserver& observer);

@@ -8,29 +8,31 @@
 
 namespace carillon::precompute {
 
-/// A step that is still to be done. All phases but the first may repeat.
+/// A step that is still to be done. A step is repeated if a solution misses a mode, except the
+/// first step, which counts the modes.
 struct PlannedStep {
   v1::Phase phase;
-  double predicted_s = 0;  ///< on the machine for which the cost model was measured
+  double predicted_s = 0;  ///< on the machine on which the cost model was measured
 };
 
 /// The predicted time of a round, which makes and solves one mesh, and of the rounds after it,
 /// which make finer meshes.
 struct RoundForecast {
-  double expected_s = 0;    ///< wall time of this round; zero: not known
-  double later_rounds = 0;  ///< time of all later rounds, as a multiple of this round's
+  double expected_s = 0;    ///< wall time of this round; zero if it is not known
+  double later_rounds = 0;  ///< time of all later rounds, as a multiple of this round's time
 };
 
-/// Gets the progress of a decomposition, in the thread that does the work.
+/// Receives the progress of a decomposition. All functions are called in the thread that does the
+/// work.
 class DecompositionObserver {
  public:
   virtual ~DecompositionObserver() = default;
   /// `fraction` is the estimated part of the phase that is done, 0 to 1.
   virtual void OnProgress(v1::Phase phase, double fraction) = 0;
-  /// A round begins: another mesh is about to be made and solved.
+  /// Called when a round begins, before the next mesh is made and solved.
   virtual void OnRound(const RoundForecast& forecast) = 0;
-  /// `steps` are those of this round from the counting of modes on. The call is repeated when the
-  /// prediction becomes more precise.
+  /// `steps` are the steps of this round, beginning with the counting of modes. The function is
+  /// called again when the prediction becomes more precise.
   virtual void OnPlan(const std::vector<PlannedStep>& steps) = 0;
   /// The mesh has `node_count` nodes, counting corners and mid-sides.
   virtual void OnMesh(size_t node_count) = 0;

@@ -6,8 +6,8 @@
 
 namespace carillon::precompute {
 
-/// A fixture of the contract in the one form that ParseFixture gives it: a plane's normal has
-/// length one, and a box its least corner first.
+/// Returns a fixture of the contract in the form that ParseFixture returns: the normal of a plane
+/// has length one, and the first corner of a box is the least one.
 Fixture FromProto(const v1::Fixture& given);
 
 }  // namespace carillon::precompute

@@ -8,9 +8,9 @@
 namespace carillon::precompute {
 
 /// The material and the size that a body will have when it sounds, and the band of frequencies that
-/// are wanted. They determine up to which frequency modes are computed, and the figures in the
-/// report. The modal model does not depend on them: it is for unit Young's modulus, density and
-/// size.
+/// are wanted. They determine the frequency up to which modes are computed, and the figures in the
+/// report. The modal model does not depend on them, because it is for unit Young's modulus, density
+/// and size.
 struct IntendedUse {
   double young_pa;
   double density_kg_per_m3;
@@ -19,7 +19,7 @@ struct IntendedUse {
   double size = 1;     ///< relative to the mesh
   double low_hz = 20;  ///< lower end of the wanted band of natural frequencies
   double high_hz = 20000;
-  /// Whether nobody asked for `high_hz`, so that a body too costly may have a lower one.
+  /// Whether `high_hz` is the default, so that it may be lowered for a body that costs too much.
   bool high_is_default = false;
   std::vector<LossFactorPoint> loss_factor = {};  ///< ascending; damping added to D
 

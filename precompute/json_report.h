@@ -13,8 +13,8 @@ namespace carillon::precompute {
 
 /// Returns the object that --json prints: nodes, elements, unknowns, peak_memory_bytes, phases, the
 /// count of modes left out, warnings, the modes of the model that lie in the band of `use`, and
-/// with --check-with the comparison of the solvers ("check"). Where `transfer` is not null, also
-/// how each mode radiates ("radiation").
+/// with --check-with the comparison of the solvers ("check"). If `transfer` is not null, the object
+/// also describes how each mode radiates ("radiation").
 std::string JsonReport(const ModalModel& model, const Transfer* transfer, const IntendedUse& use,
                        const ProgressReporter& reporter);
 

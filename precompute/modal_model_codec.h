@@ -9,7 +9,8 @@
 
 namespace carillon::precompute {
 
-/// The mesh file and the settings of which a model was made; they stand in the header of its file.
+/// The mesh file and the settings from which a model was made. The header of the model's file
+/// contains them.
 struct ModelOrigin {
   std::string mesh_digest;             ///< SHA-256 of the mesh file
   v1::DecompositionSettings settings;  ///< with every default filled in

@@ -8,7 +8,7 @@
 
 namespace carillon::precompute {
 
-/// The name that users see: "read", "mesh", ...
+/// Returns the name that users see: "read", "mesh", ...
 std::string_view PhaseName(v1::Phase phase);
 
 inline constexpr size_t kPhaseCount = v1::PHASE_RADIATE;  ///< the phases from v1::PHASE_READ on
@@ -18,7 +18,7 @@ class PhaseClock {
  public:
   struct Times {
     double seconds = 0;      ///< by the wall clock
-    double cpu_seconds = 0;  ///< of this process and its children that have ended
+    double cpu_seconds = 0;  ///< processor time of this process and of its children that have ended
   };
 
   PhaseClock() : last_(Now()) {}
@@ -27,12 +27,12 @@ class PhaseClock {
   void Enter(v1::Phase phase);
   /// Ends the phase under way.
   void Stop();
-  /// The clocks' state, of which differences are times.
+  /// Returns the state of the clocks. The difference of two states is a time.
   static Times Now();
   const Times& Of(v1::Phase phase) const { return times_[static_cast<size_t>(phase)]; }
 
  private:
-  std::array<Times, kPhaseCount + 1> times_;  // that of PHASE_UNSPECIFIED stays zero
+  std::array<Times, kPhaseCount + 1> times_;  // the entry of PHASE_UNSPECIFIED stays zero
   v1::Phase phase_ = v1::PHASE_READ;
   Times last_;
 };

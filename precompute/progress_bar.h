@@ -5,7 +5,7 @@
 
 namespace carillon::precompute {
 
-/// One line on standard error, drawn over and over, where that is a terminal; otherwise nothing.
+/// Draws one line on standard error repeatedly. Draws nothing if standard error is not a terminal.
 class ProgressBar {
  public:
   ProgressBar();

@@ -51,7 +51,7 @@ class ProgressReporter : public DecompositionObserver {
   PhaseClock clock_;
   double begun_s_ = PhaseClock::Now().seconds;
   RemainingTime remaining_;
-  bool counted_ = false;  ///< the number of modes is known
+  bool counted_ = false;  ///< whether the number of modes is known
   std::thread thread_;
 };
 

@@ -9,13 +9,13 @@
 
 namespace carillon::precompute {
 
-/// Processor time, seconds, that the radiation may take where the request sets no limit and the
-/// modes took less.
+/// Processor time, seconds, that the radiation may take if the request sets no limit and the modes
+/// took less than this.
 inline constexpr double kLeastRadiationBudgetS = 20;
 
-/// Computes the radiation of the model's modes in the band of the completed `request`, for its
-/// material's speed ratio, as request.transfer() says. `modes_cpu_s`: processor time that the modes
-/// took. Errors: those of ComputeTransfer.
+/// Computes the radiation of the model's modes in the band of the completed `request`, for the
+/// speed ratio of the request's material and with the settings in request.transfer(). `modes_cpu_s`
+/// is the processor time that the modes took. Errors: those of ComputeTransfer.
 absl::StatusOr<Transfer> Radiate(const ModalModel& model, const v1::WorkerRequest& request,
                                  double modes_cpu_s, DecompositionObserver& observer);
 

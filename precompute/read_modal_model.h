@@ -8,8 +8,8 @@
 
 namespace carillon::precompute {
 
-/// Reads the stored form (proto/carillon/v1/modal_model.proto), without the surface as given and
-/// the triangles that refer to it.
+/// Reads the stored form (proto/carillon/v1/modal_model.proto), except the given surface and the
+/// references to its triangles.
 /// Errors: NotFound FILE_NOT_FOUND, InvalidArgument MODAL_MODEL_MALFORMED, DataLoss
 /// MODAL_MODEL_CORRUPT.
 absl::StatusOr<StoredModel> ReadModalModel(const std::string& path);

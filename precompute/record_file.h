@@ -20,10 +20,11 @@ Bytes BytesOf(const std::vector<T>& values) {
   return std::as_bytes(std::span(values));
 }
 
-/// Writes the header and then the arrays in chunks, in protobuf's delimited form, each chunk with
-/// its hash: to a temporary name beside `path`, flushed to the disk and renamed, so that `path`
-/// never holds half a result. A device or a pipe at `path` is written to and stays. Record:
-/// v1::ModalModelRecord or v1::TransferRecord. Errors: Internal OUTPUT_NOT_WRITABLE.
+/// Writes the header and then the arrays, in protobuf's delimited form. The arrays are split into
+/// chunks, and each chunk has its hash. The file is written under a temporary name next to `path`,
+/// flushed to the disk and renamed, so that `path` never contains half a result. A device or a pipe
+/// at `path` is written to directly. Record is v1::ModalModelRecord or v1::TransferRecord. Errors:
+/// Internal OUTPUT_NOT_WRITABLE.
 template <class Record>
 absl::Status WriteRecordFile(const std::string& path, const Record& header,
                              std::span<const Bytes> arrays);

@@ -9,37 +9,39 @@
 
 namespace carillon::precompute {
 
-/// How long a decomposition will take yet: the work predicted of each step to come, at the speed
-/// measured of those done. Knows no clock: every time is given, in seconds from the beginning.
+/// Estimates how long a decomposition will still take. The estimate is the predicted time of each
+/// remaining step, scaled by the speed measured in the finished steps. The class reads no clock:
+/// callers pass every time, in seconds since the start.
 class RemainingTime {
  public:
-  /// Another mesh is about to be made and solved.
+  /// Called before another mesh is made and solved.
   void BeginRound(double now_s, const RoundForecast& forecast);
-  /// The steps of this round after its matrices, as far as they are not done yet.
+  /// Sets the steps of this round that follow the assembly of the matrices. A later call replaces
+  /// them.
   void Plan(double now_s, std::vector<PlannedStep> steps);
-  /// `fraction` of the phase is done, 0 to 1; zero also where nobody knows.
+  /// Reports that `fraction` of the phase is done, 0 to 1. An unknown fraction is zero.
   void Progress(double now_s, v1::Phase phase, double fraction);
 
-  /// Nothing where neither a plan nor a forecast is there.
+  /// Returns the remaining time, or nothing if there is neither a plan nor a forecast.
   std::optional<double> Seconds(double now_s) const;
 
  private:
   const PlannedStep* current() const { return step_ < steps_.size() ? &steps_[step_] : nullptr; }
   void Go(double now_s, size_t step);
-  /// Seconds that a predicted second takes.
+  /// Returns the ratio of measured to predicted time.
   double Slowness() const;
   double ThisRound(double now_s) const;
 
   RoundForecast forecast_;
   double round_begun_s_ = 0;
   std::vector<PlannedStep> steps_;
-  size_t step_ = 0;  ///< the one under way; with no plan, or before its first one, none
+  size_t step_ = 0;  ///< the current step, if under_way_
   bool under_way_ = false;
   double step_begun_s_ = 0;
-  double fraction_ = 0;  ///< as last reported, and when
+  double fraction_ = 0;  ///< the last reported fraction, and the time of that report
   double reported_s_ = 0;
-  double done_s_ = 0;       ///< measured, of all steps done, in earlier rounds too
-  double predicted_s_ = 0;  ///< of the same
+  double done_s_ = 0;       ///< measured time of all finished steps, including earlier rounds
+  double predicted_s_ = 0;  ///< predicted time of the same steps
 };
 
 }  // namespace carillon::precompute

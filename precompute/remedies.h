@@ -6,8 +6,9 @@
 
 namespace carillon::precompute {
 
-/// Adds to the refusal of a decomposition the changes to `request` that may help, as data. A change
-/// that the request has already is left out. Other errors get none.
+/// Attaches to the refusal of a decomposition, as data, the changes to `request` that may help.
+/// Changes that the request already contains are left out. Errors without a known remedy are
+/// returned as they are.
 absl::Status WithRemedies(absl::Status refusal, const v1::WorkerRequest& request);
 
 }  // namespace carillon::precompute

@@ -5,7 +5,7 @@
 
 namespace carillon::precompute {
 
-/// SHA-256 of some bytes, lower-case hexadecimal.
+/// Returns the SHA-256 of `bytes` in lower-case hexadecimal digits.
 std::string Sha256Hex(const std::string& bytes);
 
 }  // namespace carillon::precompute

@@ -6,7 +6,7 @@
 
 namespace carillon::precompute {
 
-/// A modal model with what its header says beside it.
+/// A modal model with the origin that its file's header states.
 struct StoredModel {
   ModalModel model;
   ModelOrigin origin;

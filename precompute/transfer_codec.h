@@ -9,9 +9,9 @@
 
 namespace carillon::precompute {
 
-/// Writes the stored form (proto/carillon/v1/transfer.proto): to a temporary name beside `path`,
-/// then renamed, so that `path` never holds half a transfer. `stored`: the modal model that it
-/// belongs to. Errors: Internal OUTPUT_NOT_WRITABLE.
+/// Writes the stored form (proto/carillon/v1/transfer.proto) under a temporary name next to `path`
+/// and renames it, so that `path` never contains half a transfer. `stored` is the modal model to
+/// which the transfer belongs. Errors: Internal OUTPUT_NOT_WRITABLE.
 absl::Status WriteTransfer(const std::string& path, const Transfer& transfer,
                            const StoredModel& stored);
 

@@ -6,12 +6,13 @@
 
 namespace carillon::precompute {
 
-/// Tells the process that started this one how the work goes on: WorkerEvent messages of
-/// proto/carillon/v1/decomposition.proto, delimited, on an open descriptor. One thread at a time. A
-/// reader that has gone away is no error: the result may still be wanted.
+/// Sends the progress and the error of the work to the process that started this one, as delimited
+/// WorkerEvent messages (proto/carillon/v1/decomposition.proto) on an open descriptor. Only one
+/// thread may send at a time. It is no error if the reader has gone away, because the result may
+/// still be wanted.
 class WorkerEvents {
  public:
-  /// `descriptor`: below zero says nothing to nobody.
+  /// If `descriptor` is below zero, nothing is sent.
   explicit WorkerEvents(int descriptor) : descriptor_(descriptor) {}
 
   void SendProgress(const v1::Progress& progress) const;

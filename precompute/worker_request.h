@@ -15,13 +15,13 @@
 
 namespace carillon::precompute {
 
-/// v1::WorkerRequest is the settings struct of a decomposition. This is the one place where it is
-/// completed, checked, and turned into what the rooms take.
+/// v1::WorkerRequest is the settings struct of a decomposition. Only the functions in this file
+/// complete it, check it, and convert it to the types that the folders of precompute/ take.
 
-/// The request with every default filled in. Errors: INVALID_SETTINGS, INVALID_MATERIAL.
+/// Returns the request with every default filled in. Errors: INVALID_SETTINGS, INVALID_MATERIAL.
 absl::StatusOr<v1::WorkerRequest> Complete(v1::WorkerRequest request);
 
-/// The completed request of a file in protobuf's text form.
+/// Reads a request in protobuf's text form from a file, and completes it.
 /// Errors: INVALID_SETTINGS, INVALID_MATERIAL.
 absl::StatusOr<v1::WorkerRequest> ReadWorkerRequest(const std::string& path);
 

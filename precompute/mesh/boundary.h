@@ -8,12 +8,13 @@
 namespace carillon::precompute {
 
 /// Fills `mesh.boundary` with the faces that belong to one element only, oriented outward, in the
-/// order of the elements; face i lies on given triangle i, that is BoundarySurface(mesh).
-/// Errors: MESH_NOT_MANIFOLD (a face of three elements or more).
+/// order of the elements. The given triangle of face i is i, because BoundarySurface(mesh) becomes
+/// the given surface.
+/// Errors: MESH_NOT_MANIFOLD (three elements or more share a face).
 absl::Status FindBoundary(TetMesh& mesh);
 
-/// The boundary as a surface: triangle i has the corners of boundary face i. For a mesh read from a
-/// file it is the surface as given.
+/// Returns the boundary as a surface, whose triangle i has the corners of boundary face i. For a
+/// mesh read from a file, this surface is the given one.
 SurfaceMesh BoundarySurface(const TetMesh& mesh);
 
 }  // namespace carillon::precompute

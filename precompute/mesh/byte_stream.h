@@ -9,8 +9,8 @@
 
 namespace carillon::precompute {
 
-/// Appends the number of plain values and the values themselves. TakeValues of the same program
-/// reads them.
+/// Appends the number of plain values and the values themselves, in a form that only TakeValues of
+/// the same program reads.
 template <typename T>
 void AppendValues(std::string& bytes, std::span<const T> values) {
   const size_t count = values.size();
@@ -18,7 +18,7 @@ void AppendValues(std::string& bytes, std::span<const T> values) {
   bytes.append(reinterpret_cast<const char*>(values.data()), values.size_bytes());
 }
 
-/// Reads values written by AppendValues and advances `bytes` behind them.
+/// Reads values written by AppendValues and advances `bytes` to the first byte after them.
 template <typename T>
 std::vector<T> TakeValues(const char*& bytes) {
   size_t count = 0;

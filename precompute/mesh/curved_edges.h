@@ -7,11 +7,11 @@
 
 namespace carillon::precompute {
 
-/// Whether a mid-side node of the element lies beside the middle of its edge, by more than a
+/// Returns whether a mid-side node of the element is further from the middle of its edge than a
 /// millionth of the edge's length. Elements of four nodes are straight.
 bool IsCurved(const TetMesh& mesh, size_t element);
 
-/// The same for a face of the boundary.
+/// Returns whether a mid-side node of a boundary face is that far from the middle of its edge.
 bool IsCurved(const TetMesh& mesh, const BoundaryFace& face);
 
 }  // namespace carillon::precompute

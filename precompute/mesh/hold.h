@@ -13,8 +13,8 @@
 
 namespace carillon::precompute {
 
-/// Vertices by their numbers, see MeshNames. The nearest node of each is fixed, and so are all
-/// nodes of a given triangle or edge whose corners are all listed.
+/// Vertices, identified by their numbers (see MeshNames). The node nearest to each vertex is fixed.
+/// If all corners of a given triangle or edge are listed, all nodes on it are fixed, too.
 struct FixedVertices {
   std::vector<int64_t> numbers;
 };
@@ -40,7 +40,7 @@ using Fixture = std::variant<FixedVertices, FixedPlane, FixedBox, FixedGroup>;
 
 /// Applies boundary conditions: fills `mesh.held` with the nodes in the regions of the fixtures,
 /// including mid-side nodes. The tolerance of a region is a millionth of the body's diagonal.
-/// `given`: the surface to which the boundary of `mesh` refers.
+/// `given` is the surface to which the boundary of `mesh` refers.
 ///
 /// Errors: NO_VERTEX_HELD (a fixture contains no node), ALL_VERTICES_HELD, GROUP_UNKNOWN.
 absl::Status FixNodes(const std::vector<Fixture>& fixtures, const SurfaceMesh& given,

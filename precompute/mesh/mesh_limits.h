@@ -3,13 +3,15 @@
 
 namespace carillon::precompute {
 
-/// Largest surface accepted: larger ones take more than minutes to check and to mesh.
+/// Largest number of triangles of a surface. A larger surface takes more than minutes to check and
+/// to mesh.
 inline constexpr int kMaxSurfaceTriangles = 1'000'000;
 
-/// Largest tetrahedral mesh, corner and mid-side nodes: its factorization needs some 100 GB.
+/// Largest number of nodes of a tetrahedral mesh, mid-side nodes included. The factorization of
+/// such a mesh needs some 100 GB.
 inline constexpr int kMaxMeshNodes = 2'000'000;
 
-/// Most closed shells (the outside and its cavities) in one surface.
+/// Largest number of closed shells (the outer one and those of cavities) in one surface.
 inline constexpr int kMaxShells = 1'000;
 
 }  // namespace carillon::precompute

@@ -16,22 +16,24 @@ namespace carillon::precompute {
 /// A named part of a mesh file.
 struct MeshGroup {
   std::string name;
-  /// For a surface: indices of its triangles, as given.
+  /// Indices of given triangles, if the mesh is a surface.
   std::vector<int32_t> triangles = {};
-  /// For tetrahedra: its points, edges, faces and elements, each by the nodes at its corners,
-  /// filled up with -1.
+  /// If the mesh consists of tetrahedra: the points, edges, faces and elements of the group. Each
+  /// is given by the nodes at its corners, filled up with -1.
   std::vector<std::array<int32_t, 4>> simplices = {};
 };
 
 /// The names and numbers by which a mesh file identifies parts of the body.
 struct MeshNames {
-  /// Position of each vertex, by its number. Vertices of a surface are counted from 0 in the order
-  /// of the file (STL has none); nodes of tetrahedra have the file's numbers.
+  /// The position of each vertex, with the vertex's number as the key. Vertices of a surface are
+  /// counted from 0 in the order of the file (STL has none); nodes of tetrahedra have the file's
+  /// numbers.
   absl::flat_hash_map<int64_t, Point> vertices = {};
   std::vector<MeshGroup> groups = {};
 };
 
-/// The content of a mesh file: a surface still to be filled, or a mesh of tetrahedra ready for use.
+/// The content of a mesh file, which is a surface still to be filled, or a mesh of tetrahedra ready
+/// for use.
 using Mesh = std::variant<SurfaceMesh, TetMesh>;
 
 struct NamedMesh {

@@ -28,13 +28,13 @@ inline double Norm(const Point& a) { return std::hypot(a[0], a[1], a[2]); }
 
 inline double Distance(const Point& a, const Point& b) { return Norm(Difference(a, b)); }
 
-/// Signed volume of the tetrahedron a, b, c, d: positive where a, b, c turn counter-clockwise seen
-/// from the side away from d.
+/// Returns the signed volume of the tetrahedron a, b, c, d. It is positive if a, b, c are
+/// counter-clockwise seen from d.
 inline double TetVolume(const Point& a, const Point& b, const Point& c, const Point& d) {
   return Dot(Cross(Difference(b, a), Difference(c, a)), Difference(d, a)) / 6;
 }
 
-/// The three corners of triangle `t`.
+/// Returns the three corners of triangle `t`.
 inline std::array<Point, 3> CornersOf(const SurfaceMesh& surface, size_t t) {
   const auto& triangle = surface.triangles[t];
   return {surface.vertices[static_cast<size_t>(triangle[0])],
@@ -42,14 +42,14 @@ inline std::array<Point, 3> CornersOf(const SurfaceMesh& surface, size_t t) {
           surface.vertices[static_cast<size_t>(triangle[2])]};
 }
 
-/// The middle of a triangle.
+/// Returns the centroid of a triangle.
 inline Point MiddleOf(const std::array<Point, 3>& corner) {
   Point middle;
   for (size_t i = 0; i < 3; ++i) middle[i] = (corner[0][i] + corner[1][i] + corner[2][i]) / 3;
   return middle;
 }
 
-/// Diagonal of the box around points, of which there are some.
+/// Returns the length of the diagonal of the box around `points`, which must not be empty.
 inline double Diagonal(const std::vector<Point>& points) {
   Point low = points.front(), high = low;
   for (const Point& p : points) {
@@ -61,7 +61,7 @@ inline double Diagonal(const std::vector<Point>& points) {
   return Distance(low, high);
 }
 
-/// Twice the area times the unit normal of a triangle.
+/// Returns the unit normal of a triangle times twice the triangle's area.
 inline Point AreaNormal(const std::array<Point, 3>& corner) {
   return Cross(Difference(corner[1], corner[0]), Difference(corner[2], corner[0]));
 }

@@ -10,10 +10,10 @@
 namespace carillon::precompute {
 
 /// Runs `work` in a forked child, silent on standard output and error, and returns its bytes. A
-/// crash in `work` ends the child only. The child dies with the calling thread, and once it has
-/// used `most_cpu`.
+/// crash in `work` ends the child only. The child is killed when the calling thread ends, or when
+/// the child has used `most_cpu` of processor time.
 ///
-/// Errors: Aborted, with how the child died; Internal if no child could be made.
+/// Errors: Aborted, stating how the child died; Internal if no child process could be started.
 absl::StatusOr<std::string> RunInChild(const std::function<std::string()>& work,
                                        std::chrono::seconds most_cpu);
 

@@ -9,14 +9,15 @@
 
 namespace carillon::precompute {
 
-/// The surface that sounds: the boundary nodes of the mesh, mid-sides included.
+/// The surface that sounds. Its vertices are the boundary nodes of the mesh, mid-side nodes
+/// included.
 struct SoundingSurface {
-  /// Node of the mesh for each vertex, ascending.
+  /// For each vertex, its node in the mesh; ascending.
   std::vector<int32_t> nodes;
-  /// Three indices into `nodes` each, counter-clockwise seen from outside; a six-node face gives
-  /// four.
+  /// Each triangle has three indices into `nodes`, counter-clockwise seen from outside. A six-node
+  /// face is split into four triangles.
   std::vector<std::array<int32_t, 3>> triangles;
-  /// For each triangle the triangle of the surface as given on which it lies.
+  /// For each triangle, the triangle of the given surface on which it lies.
   std::vector<int32_t> given_triangle;
 };
 

@@ -10,11 +10,11 @@
 
 namespace carillon::precompute {
 
-/// A face of the boundary, counter-clockwise seen from outside: three corners, then (quadratic
-/// only, else -1) the mid-side nodes between corners 0-1, 1-2 and 2-0.
+/// A face of the boundary, counter-clockwise seen from outside: three corners, then the mid-side
+/// nodes between corners 0-1, 1-2 and 2-0. The mid-side nodes of a linear element are -1.
 struct BoundaryFace {
   std::array<int32_t, 6> nodes;
-  /// The triangle of the surface as given on which this face lies.
+  /// The triangle of the given surface on which this face lies.
   int32_t given_triangle;
 };
 
@@ -34,7 +34,7 @@ struct TetMesh {
   /// volume, then the mid-side nodes of edges 0-1, 1-2, 2-0, 0-3, 1-3, 2-3.
   std::vector<int32_t> elements;
   std::vector<BoundaryFace> boundary;
-  /// Fixed nodes, ascending. Empty: the body is free.
+  /// Fixed nodes, ascending; empty if the body is free.
   std::vector<int32_t> held = {};
 
   size_t element_count() const { return elements.size() / static_cast<size_t>(nodes_per_element); }
