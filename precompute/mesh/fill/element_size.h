@@ -5,8 +5,9 @@
 
 namespace carillon::precompute {
 
-/// The element size of a surface: the longest edge of each triangle, averaged over the area, in the
-/// unit of the vertices. Frequency errors are proportional to a power of it.
+/// Returns the element size of a surface, in the unit of the vertices: the longest edge of each
+/// triangle, averaged over the area. Frequency errors are proportional to a power of the element
+/// size.
 double SurfaceElementSize(const SurfaceMesh& surface);
 
 }  // namespace carillon::precompute

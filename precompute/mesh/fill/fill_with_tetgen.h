@@ -21,8 +21,8 @@ struct FillRequest {
   bool keep_surface;
   /// Largest number of vertices to add.
   int max_added_nodes;
-  /// For a surface on which the mesher failed: it tolerates larger defects of the surface and worse
-  /// shapes of the tetrahedra.
+  /// Whether TetGen tolerates larger defects of the surface and worse shapes of the tetrahedra.
+  /// Useful for a surface on which TetGen has failed.
   bool cautious = false;
 };
 

@@ -10,23 +10,24 @@
 namespace carillon::precompute {
 
 struct MeshingSettings {
-  /// Whether to keep the vertices of the surface and add none on it; unset: it is chosen from the
-  /// surface.
+  /// Whether to keep the vertices of the surface and add none on it. If unset, the choice depends
+  /// on the surface.
   std::optional<bool> keep_surface = std::nullopt;
-  /// Approximate number of corner nodes of the mesh; zero: it is chosen from the surface.
+  /// Approximate number of corner nodes of the mesh. If zero, the number is chosen from the
+  /// surface.
   int target_node_count = 0;
-  /// Largest element size on the surface, as SurfaceElementSize() measures it, metres; zero: no
-  /// limit.
+  /// Largest element size on the surface, metres, as SurfaceElementSize() measures it. Zero means
+  /// no limit.
   double element_size_m = 0;
   /// 4 or 10. Mid-side nodes lie on straight edges.
   int nodes_per_element = 10;
-  /// As FillRequest::cautious.
+  /// The same as FillRequest::cautious.
   bool cautious = false;
 };
 
 /// Fills a surface that CheckSurface accepted with tetrahedra; cavities stay empty. Each face of
 /// the mesh's boundary stores the given triangle that it lies on. The mesher runs in a child
-/// process, so that a crash of the mesher is an ordinary error.
+/// process, so that a crash of the mesher becomes an ordinary error.
 ///
 /// Errors: MESH_TETRAHEDRALIZATION_FAILED, MESH_TOO_LARGE, OUT_OF_MEMORY.
 absl::StatusOr<TetMesh> Tetrahedralize(const SurfaceMesh& surface, const MeshingSettings& settings);

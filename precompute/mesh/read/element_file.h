@@ -19,7 +19,8 @@ struct ElementFile {
   /// A named group of points, edges, faces and elements.
   struct Group {
     std::string name;
-    /// Numbers of the nodes at the corners of each, filled up with kNoNode.
+    /// For each point, edge, face or element, the numbers of its corner nodes, filled up with
+    /// kNoNode.
     std::vector<std::array<int64_t, 4>> simplices;
     /// Indices into `triangles`.
     std::vector<int32_t> triangles;
@@ -27,28 +28,29 @@ struct ElementFile {
   static constexpr int64_t kNoNode = std::numeric_limits<int64_t>::min();
 
   std::vector<int64_t> node_numbers;
-  std::vector<Point> nodes;       ///< their places
-  int nodes_per_element = 0;      ///< 4 or 10; 0 where there is no tetrahedron
+  std::vector<Point> nodes;       ///< the position of each node
+  int nodes_per_element = 0;      ///< 4 or 10, or 0 if there is no tetrahedron
   std::vector<int64_t> elements;  ///< node numbers of each tetrahedron, in the order of TetMesh
-  std::vector<std::array<int64_t, 3>> triangles;  ///< on surfaces, which bound or divide the body
+  std::vector<std::array<int64_t, 3>>
+      triangles;  ///< triangles of surfaces that bound or divide the body
   std::vector<Group> groups;
 
-  /// Adds a simplex to each of these groups.
+  /// Adds a simplex to each of the named groups.
   void AddToGroups(std::span<const std::string> names, std::span<const int64_t> corners);
-  /// Adds a triangle, or the two or four into which a face is split.
+  /// Adds the triangle or triangles (one, two or four) into which a face is split.
   void AddTriangles(std::span<const std::string> names,
                     std::span<const std::array<int64_t, 3>> pieces);
-  /// Adds a tetrahedron of 4 or 10 nodes. Errors: MESH_ELEMENT_UNSUPPORTED (both in one file).
+  /// Adds a tetrahedron of 4 or 10 nodes. Errors: MESH_ELEMENT_UNSUPPORTED (a file has both kinds).
   absl::Status AddTetrahedron(std::span<const int64_t> nodes_of_one);
 
  private:
   Group& Named(const std::string& name);
 };
 
-/// Errors: MESH_TOO_LARGE, if there are more nodes than the limit.
+/// Checks the number of nodes of a file. Errors: MESH_TOO_LARGE if it exceeds the limit.
 absl::Status CheckNodeCountOfFile(size_t count);
 
-/// The error MESH_ELEMENT_UNSUPPORTED of a file that has `what`.
+/// Returns the error MESH_ELEMENT_UNSUPPORTED for a file that contains `what`.
 absl::Status UnsupportedElements(absl::string_view what);
 
 }  // namespace carillon::precompute

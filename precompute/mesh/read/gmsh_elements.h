@@ -20,17 +20,18 @@ struct GmshKind {
   size_t corner_count;
 };
 
-/// Points, lines, triangles, quadrangles and tetrahedra of first and second order; null for others.
+/// Returns the kind of points, lines, triangles, quadrangles and tetrahedra of first and second
+/// order, and null for other types.
 const GmshKind* FindGmshKind(int type);
 
-/// The error for an element of another type.
+/// Returns the error for an element of any other type.
 absl::Status UnknownGmshKind(int type);
 
 /// Elements of a Gmsh file of any version, as they are read.
 struct GmshElements {
-  /// Adds an element to the file and to its physical groups: by their names, or by their numbers if
-  /// they have no name and do not contain volumes (numbers of volumes stand for materials). Zero
-  /// means no group.
+  /// Adds an element to the file and to its physical groups. A group is identified by its name. A
+  /// group without a name is identified by its number, unless it contains volumes, because numbers
+  /// of volumes stand for materials. Zero means no group.
   absl::Status Add(const GmshKind& kind, std::span<const int32_t> physicals,
                    std::span<const int64_t> nodes);
 

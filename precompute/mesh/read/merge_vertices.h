@@ -8,8 +8,9 @@
 
 namespace carillon::precompute {
 
-/// The surface of triangles given by their corners: corners at exactly the same place become one
-/// vertex, numbered in the order of first use; triangles keep order and count.
+/// Returns the surface of triangles that are given by their corners. Corners with exactly the same
+/// position become one vertex. Vertices are numbered in the order of first use, and the order and
+/// number of triangles stay the same.
 SurfaceMesh MergeVertices(const std::vector<std::array<Point, 3>>& triangles);
 
 }  // namespace carillon::precompute

@@ -9,13 +9,14 @@
 
 namespace carillon::precompute {
 
-/// Numbers one after the other, as words of a text (a '#' begins a comment that ends with the line)
-/// or as plain bytes of the machine.
+/// Reads numbers one after the other, from the words of a text (a '#' begins a comment that ends
+/// with the line) or from bytes in the machine's own representation.
 class NumberStream {
  public:
   NumberStream(std::string_view bytes, bool is_binary) : rest_(bytes), is_binary_(is_binary) {}
 
-  /// Returns false if the next word is not such a number, or at the end.
+  /// Takes the next number. Returns false if the next word is not a number of type T, or at the
+  /// end.
   template <typename T>
   bool Take(T& value) {
     if (is_binary_) return TakeBytes(value);
@@ -32,7 +33,7 @@ class NumberStream {
     return true;
   }
 
-  /// Takes the next word of a text; empty at the end.
+  /// Takes the next word of a text. Returns an empty word at the end.
   std::string_view NextWord() {
     const std::string_view word = PeekWord();
     rest_.remove_prefix(word.size());

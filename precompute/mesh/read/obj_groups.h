@@ -8,8 +8,9 @@
 
 namespace carillon::precompute {
 
-/// The groups and objects ("g", "o") of an OBJ file that CleanObj accepts, with their triangles as
-/// ReadSurface counts them. A group and an object of one name are one.
+/// Returns the groups and objects ("g", "o") of an OBJ file that CleanObj accepts, with their
+/// triangles as ReadSurface numbers them. A group and an object with the same name become one
+/// group.
 std::vector<MeshGroup> ObjGroups(const std::string& bytes);
 
 }  // namespace carillon::precompute

@@ -15,11 +15,12 @@ absl::StatusOr<std::string> ReadMeshFile(const std::string& path, const std::str
 
 /// Parses the bytes that ReadMeshFile returned into a mesh with the names of its parts.
 ///
-/// `format`: "obj", "ply", "stl", "off", "glb", "gltf" (a surface; polygons are split into
-/// triangles, otherwise triangles keep their order and count; vertices at the same place become
-/// one), "msh" (Gmsh MSH 2.2 or 4.1), "mesh" (Medit, text), "node" (TetGen's .node and .ele) or
-/// "inp" (Abaqus, CalculiX): 4- or 10-node tetrahedra, whose boundary is filled in, or without any
-/// the triangles as a surface. `metres_per_unit`: length of one unit of the file.
+/// The formats "obj", "ply", "stl", "off", "glb" and "gltf" give a surface. Polygons are split into
+/// triangles, the order and number of triangles stay the same otherwise, and vertices with the same
+/// position become one. The formats "msh" (Gmsh MSH 2.2 or 4.1), "mesh" (Medit, text), "node"
+/// (TetGen's .node and .ele) and "inp" (Abaqus, CalculiX) give 4- or 10-node tetrahedra with their
+/// boundary. A file without tetrahedra gives its triangles as a surface. `metres_per_unit` is the
+/// length of one unit of the file.
 ///
 /// Errors: MESH_FORMAT_UNKNOWN, MESH_UNREADABLE, MESH_NOT_FINITE, MESH_INDEX_OUT_OF_RANGE,
 /// MESH_TOO_LARGE, MESH_ELEMENT_UNSUPPORTED, MESH_ZERO_VOLUME, MESH_MIDSIDE_NODE_MISPLACED,
@@ -27,7 +28,7 @@ absl::StatusOr<std::string> ReadMeshFile(const std::string& path, const std::str
 absl::StatusOr<NamedMesh> ParseMesh(const std::string& bytes, const std::string& format,
                                     double metres_per_unit);
 
-/// ReadMeshFile, then ParseMesh.
+/// Calls ReadMeshFile and then ParseMesh.
 absl::StatusOr<NamedMesh> ReadMesh(const std::string& path, const std::string& format,
                                    double metres_per_unit);
 

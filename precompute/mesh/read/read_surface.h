@@ -9,9 +9,9 @@
 namespace carillon::precompute {
 
 /// Reads a surface, in the file's unit, and the names of its parts from the bytes of a file.
-/// Coordinates have single precision, as assimp's numbers have.
+/// Coordinates have single precision, because assimp uses it.
 ///
-/// `format`: "obj", "ply", "stl", "off", or "glb" or "gltf", whose bytes are within the file.
+/// `format`: "obj", "ply", "stl", "off", or "glb" or "gltf" with all data embedded in the file.
 /// Errors: MESH_EMPTY, MESH_UNREADABLE, MESH_NOT_FINITE, MESH_INDEX_OUT_OF_RANGE.
 absl::StatusOr<NamedMesh> ReadSurface(const std::string& bytes, const std::string& format);
 

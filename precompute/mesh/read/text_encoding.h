@@ -7,8 +7,8 @@
 
 namespace carillon::precompute {
 
-/// The UTF-8 text of bytes that are UTF-16 text with a byte order mark, as editors and old
-/// exporters write them on Windows. Nothing for all other bytes, and for damaged UTF-16.
+/// Converts UTF-16 text with a byte order mark, which editors and old exporters write on Windows,
+/// to UTF-8. Returns nothing if the bytes are any other text or damaged UTF-16.
 std::optional<std::string> Utf8OfUtf16(std::string_view bytes);
 
 }  // namespace carillon::precompute

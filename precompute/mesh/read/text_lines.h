@@ -18,12 +18,12 @@
 
 namespace carillon::precompute {
 
-/// The lines of a text file, one after the other, split into words.
+/// Reads the lines of a text file one after the other, and splits them into words.
 class TextLines {
  public:
   explicit TextLines(const std::string& bytes) : rest_(bytes) {}
 
-  /// The next line as it is; false at the end.
+  /// Takes the next line unchanged. Returns false at the end.
   bool Next(std::string_view& line) {
     if (rest_.empty()) return false;
     const size_t end = std::min(rest_.find('\n'), rest_.size());
@@ -34,7 +34,7 @@ class TextLines {
     return true;
   }
 
-  /// The words of the next line that has any before a '#'; empty at the end.
+  /// Returns the words of the next line that has words before a '#'. Returns no words at the end.
   std::vector<std::string_view> NextWords() {
     std::string_view line;
     while (Next(line)) {
@@ -54,10 +54,10 @@ class TextLines {
     return words;
   }
 
-  /// Number of the line returned last, counted from 1.
+  /// Returns the number of the line taken last, counted from 1.
   int number() const { return number_; }
 
-  /// The text behind the line returned last.
+  /// Returns the text after the line taken last.
   std::string_view rest() const { return rest_; }
   void Skip(size_t bytes) { rest_.remove_prefix(bytes); }
 

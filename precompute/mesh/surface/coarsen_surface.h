@@ -15,16 +15,16 @@ inline constexpr size_t kMaxUncoarsenedTriangles = 20'000;
 struct CoarsenedSurface {
   SurfaceMesh surface;
   std::string remark;  ///< describes the change
-  /// Estimated relative error of the modes' frequencies by the change: the distance between both
-  /// surfaces over the thickness of the body at that place, root mean square.
+  /// Estimated relative error of the modes' frequencies that the change causes. It is the root mean
+  /// square of the distance between both surfaces divided by the local thickness of the body.
   double frequency_error = 0;
 };
 
 /// Gives a surface with more triangles than its modes need longer edges. The edges are half as long
 /// as those into which a surface of few triangles is divided, but the result has at most
-/// `most_triangles` triangles where that is above zero. The edges become shorter until the surface
-/// moves by at most a hundredth of the body's thickness at that place (root mean square), and at
-/// most by half of it anywhere. The result passes CheckSurface.
+/// `most_triangles` triangles if that number is above zero. The edges become shorter until the
+/// surface moves by at most a hundredth of the body's thickness at that place (root mean square),
+/// and at most by half of it anywhere. The result passes CheckSurface.
 ///
 /// Returns nothing if the surface has at most kMaxUncoarsenedTriangles triangles, or if no surface
 /// with two thirds of its triangles keeps these limits. `surface` must pass CheckSurface.

@@ -9,7 +9,7 @@
 
 namespace carillon::precompute {
 
-/// A defect because of which a closed surface is not the boundary of a solid.
+/// A reason why a closed surface is not the boundary of a solid.
 struct SurfaceDefect {
   enum class Kind {
     kFlatTriangle,     ///< `first` has its corners on one line
@@ -21,8 +21,8 @@ struct SurfaceDefect {
   int32_t second;
 };
 
-/// The first such defect of a closed, oriented surface whose edges have two triangles each, found
-/// with exact predicates. Collapsed triangles are ignored.
+/// Returns the first defect of a closed, oriented surface whose edges have two triangles each. Uses
+/// exact predicates. Collapsed triangles are ignored.
 std::optional<SurfaceDefect> FindSelfIntersection(const SurfaceMesh& surface);
 
 }  // namespace carillon::precompute

@@ -15,10 +15,11 @@ using HalfedgeKernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 /// the process.
 using HalfedgeMesh = CGAL::Surface_mesh<HalfedgeKernel::Point_3>;
 
-/// The coordinates and corners of a mesh, as the child process sends them to its parent.
+/// Returns the coordinates and corners of a mesh as the bytes that the child process sends to its
+/// parent.
 std::string ToBytes(HalfedgeMesh mesh);
 
-/// The surface whose mesh ToBytes has written.
+/// Returns the surface that ToBytes has written.
 SurfaceMesh SurfaceFromBytes(const std::string& bytes);
 
 }  // namespace carillon::precompute

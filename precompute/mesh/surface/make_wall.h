@@ -8,17 +8,17 @@
 namespace carillon::precompute {
 
 /// Hollows out a closed surface that CheckSurface accepted: adds the surface at depth `wall_m`
-/// inside, an isosurface of the signed distance, as the wall of a cavity. The given surface stays
-/// as it is.
+/// inside as the wall of a cavity. The added surface is an isosurface of the signed distance. The
+/// given surface stays as it is.
 ///
-/// Errors: MESH_WALL_IMPOSSIBLE: the body is nowhere thicker than twice the wall, or the wall is
-/// too thin beside the body.
+/// Errors: MESH_WALL_IMPOSSIBLE if the body is nowhere thicker than twice the wall, or if the wall
+/// is too thin compared with the body.
 absl::StatusOr<RepairedSurface> HollowOut(const SurfaceMesh& surface, double wall_m);
 
 /// Thickens an open sheet, which may be any soup of triangles, to `wall_m`: the result is the
 /// isosurface of the distance at half of that thickness.
 ///
-/// Errors: MESH_WALL_IMPOSSIBLE: the wall is too thin or too thick beside the sheet.
+/// Errors: MESH_WALL_IMPOSSIBLE if the wall is too thin or too thick compared with the sheet.
 absl::StatusOr<RepairedSurface> Thicken(const SurfaceMesh& sheet, double wall_m);
 
 }  // namespace carillon::precompute

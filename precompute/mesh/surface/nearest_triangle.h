@@ -8,8 +8,8 @@
 
 namespace carillon::precompute {
 
-/// Finds the nearest point of a surface, or the first along a ray. The surface may be any soup of
-/// triangles with at least one triangle of positive area.
+/// Finds the point of a surface that is nearest to a given point, or the first triangle along a
+/// ray. The surface may be any soup of triangles with at least one triangle of positive area.
 class NearestTriangle {
  public:
   explicit NearestTriangle(const SurfaceMesh& surface);
@@ -31,8 +31,8 @@ class NearestTriangle {
   std::unique_ptr<Index> index_;
 };
 
-/// The greatest distance, metres, of the vertices and the triangles' middles of a surface from
-/// another.
+/// Returns the greatest distance, metres, of the vertices and triangle centroids of `surface` from
+/// `other`.
 double GreatestDistance(const SurfaceMesh& surface, const NearestTriangle& other);
 
 }  // namespace carillon::precompute

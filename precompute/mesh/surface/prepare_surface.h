@@ -13,21 +13,20 @@ namespace carillon::precompute {
 
 /// The changes that may be made to a surface before it is filled.
 struct PreparationSettings {
-  bool repair = false;  ///< repair a surface that CheckSurface would refuse
-  double wall_m = 0;    ///< above zero: hollow it out, or thicken an open sheet
+  bool repair = false;  ///< whether to repair a surface that CheckSurface would refuse
+  double wall_m = 0;    ///< if above zero, hollow out the body or thicken an open sheet
   /// Whether a surface with more triangles than its modes need may be remeshed with fewer.
   bool coarsen = false;
-  size_t most_triangles = 0;  ///< above zero: of a surface that is remeshed
+  size_t most_triangles = 0;  ///< if above zero, the limit for a remeshed surface
 };
 
 /// A surface ready to be filled.
 struct PreparedSurface {
   SurfaceMesh surface;
-  /// For each triangle, the triangle of the surface as given that it lies on or that is nearest to
-  /// it.
+  /// For each triangle, the given triangle that it lies on or that is nearest to it.
   std::vector<int32_t> given_triangle;
   std::vector<std::string> warnings;
-  /// Estimated relative error of the modes' frequencies because the surface was coarsened.
+  /// Estimated relative error of the modes' frequencies that the coarsening causes.
   double frequency_error = 0;
 };
 

@@ -8,11 +8,11 @@
 namespace carillon::precompute {
 
 /// Wraps a soup of triangles with a closed surface (Portaneri, Rouxel-Labbe, Hemmer, Cohen-Steiner
-/// and Alliez, Alpha wrapping with an offset, SIGGRAPH 2022): closes gaps and holes narrower than a
-/// hundredth of the diagonal of the box around it, unites parts that overlap, drops what is inside.
-/// The remark states the greatest distance between the two surfaces in both directions.
+/// and Alliez, Alpha wrapping with an offset, SIGGRAPH 2022). This closes gaps and holes narrower
+/// than a hundredth of the diagonal, unites parts that overlap, and drops enclosed triangles. The
+/// remark states the greatest distance of each of the two surfaces from the other.
 ///
-/// Errors: MESH_NOT_CLOSED where nothing is inside (an open sheet), MESH_REPAIR_FAILED.
+/// Errors: MESH_NOT_CLOSED if the result encloses no volume (an open sheet), MESH_REPAIR_FAILED.
 absl::StatusOr<RepairedSurface> WrapSurface(const SurfaceMesh& given);
 
 }  // namespace carillon::precompute
