@@ -22,7 +22,7 @@ template <typename Real>
 using VectorBlockOf = Eigen::Matrix<Real, Eigen::Dynamic, kBlockWidth, Eigen::RowMajor>;
 using VectorBlock = VectorBlockOf<double>;
 
-/// The coefficients of a block with respect to each block of a basis, in the order of the basis.
+/// The coefficients of a block with respect to the blocks of a basis, in the order of the basis.
 using Coefficients = std::vector<SmallBlock>;
 
 /// The basis Q of a block Krylov method, stored in blocks of vectors. Products process a stretch of
@@ -36,11 +36,11 @@ class BlockBasis {
   BlockBasis(Eigen::Index rows, Workers& workers) : rows_(rows), workers_(workers) {}
 
   void Append(Block block) { blocks_.push_back(std::make_unique<Block>(std::move(block))); }
-  /// The block appended `before` blocks before the last one.
+  /// Returns the block that was appended `before` blocks before the last one.
   const Block& back(size_t before) const { return *blocks_[blocks_.size() - 1 - before]; }
   int size() const { return static_cast<int>(blocks_.size()) * kBlockWidth; }
 
-  /// Q^T x
+  /// Returns Q^T x.
   Coefficients Project(const Block& x) const {
     std::vector<Coefficients> parts(static_cast<size_t>(workers_.count()));
     workers_.ForParts(rows_, kStretch, [&](int64_t begin, int64_t end, int t) {
@@ -52,7 +52,7 @@ class BlockBasis {
     return std::move(parts[0]);
   }
 
-  /// x -= q h for the block q = back(before).
+  /// Computes x -= q h for the block q = back(before).
   void SubtractBlock(size_t before, const SmallBlock& h, Block& x) const {
     SmallBlockOf<Real> rounded;
     rounded = h.template cast<Real>();
@@ -61,7 +61,7 @@ class BlockBasis {
     });
   }
 
-  /// a^T b
+  /// Returns a^T b.
   static SmallBlock Dot(const Block& a, const Block& b, Workers& workers) {
     std::vector<SmallBlock> parts(static_cast<size_t>(workers.count()), SmallBlock::Zero());
     workers.ForParts(a.rows(), kStretch, [&](int64_t begin, int64_t end, int t) {
@@ -75,7 +75,7 @@ class BlockBasis {
     return parts[0];
   }
 
-  /// x -= Q h
+  /// Computes x -= Q h.
   void Subtract(const Coefficients& h, Block& x) const {
     std::vector<SmallBlockOf<Real>> rounded;
     for (const SmallBlock& part : h) rounded.push_back(part.template cast<Real>());
@@ -89,7 +89,7 @@ class BlockBasis {
     });
   }
 
-  /// Q s, in blocks; s: size() by a multiple of kBlockWidth.
+  /// Returns Q s in blocks. s is size() by a multiple of kBlockWidth.
   std::vector<Block> Combine(const Eigen::MatrixXd& s) const {
     const size_t count = static_cast<size_t>(s.cols()) / kBlockWidth;
     std::vector<Block> result(count, Block::Zero(rows_, kBlockWidth));

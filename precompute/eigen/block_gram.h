@@ -12,11 +12,11 @@ namespace carillon::precompute {
 /// Vectors in blocks of kBlockWidth, all of one length.
 using VectorBlocks = std::vector<VectorBlock>;
 
-/// The lower triangle of x^T y, which must be symmetric. The upper triangle of the result is
-/// undefined.
+/// Returns the lower triangle of x^T y, which must be symmetric. The upper triangle of the result
+/// is undefined.
 Eigen::MatrixXd Gram(const VectorBlocks& x, const VectorBlocks& y, Workers& workers);
 
-/// x := x V. V is square and has as many columns as x has vectors.
+/// Computes x := x V. V is square, and has one column for each vector of x.
 void Rotate(const Eigen::MatrixXd& V, Workers& workers, VectorBlocks& x);
 
 }  // namespace carillon::precompute

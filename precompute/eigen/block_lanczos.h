@@ -18,18 +18,20 @@ namespace carillon::precompute {
 ///     OP q_j = q_{j-1} R_j^T + q_j H_j + q_{j+1} R_{j+1},   OP = -shift (K - shift M)^-1 M,
 ///
 /// in the inner product of M, kept orthogonal to the deflated vectors. The eigenvalues of OP lie
-/// between 0 and 1; a mode has theta = shift / (shift - Lambda).
+/// between 0 and 1. A mode with eigenvalue Lambda has theta = shift / (shift - Lambda).
 template <typename Real>
 class LanczosRecurrence {
  public:
   using Block = VectorBlockOf<Real>;
 
-  /// `deflated`: at most kBlockWidth vectors, M-orthonormal, in elimination order. `expected_size`:
-  /// the predicted size of the basis at the end. The objects referred to must outlive this one.
+  /// `deflated` has at most kBlockWidth vectors, M-orthonormal, in elimination order.
+  /// `expected_size` is the predicted size of the basis at the end. The objects referred to must
+  /// outlive this one.
   LanczosRecurrence(const NodeMatrix& A, const MultifrontalCholesky<Real>& factor, double shift,
                     const Eigen::MatrixXd& deflated, double expected_size, Workers& workers);
 
-  /// Starts with random vectors from a fixed seed, so that a body gives the same model each time.
+  /// Makes the first block from random vectors with a fixed seed, so that a body gives the same
+  /// model each time.
   bool Start();
 
   /// Adds one block to the basis and to T. Returns false if the Krylov space is exhausted in the
@@ -38,19 +40,19 @@ class LanczosRecurrence {
 
   int size() const { return basis_.size(); }
   double solve_error() const { return operator_.error(); }
-  /// Estimated fraction of the iteration that is done.
+  /// Returns the estimated fraction of the iteration that is done.
   double done() const { return std::min(1.0, size() / expected_size_); }
 
-  /// The projection of OP on the basis, block-tridiagonal, size() square.
+  /// Returns the projection of OP on the basis. It is block-tridiagonal and size() square.
   Eigen::MatrixXd T() const;
 
-  /// |R s|, the norm of OP y - theta y for a Ritz vector y = Q s. `last`: the last kBlockWidth
-  /// components of s.
+  /// Returns |R s|, the norm of OP y - theta y for a Ritz vector y = Q s. `last` is the last
+  /// kBlockWidth components of s.
   double Remainder(const Eigen::Ref<const Eigen::VectorXd>& last) const {
     return (R_ * last).norm();
   }
 
-  /// Q s, in blocks; s: size() by a multiple of kBlockWidth.
+  /// Returns Q s in blocks. s is size() by a multiple of kBlockWidth.
   std::vector<Block> Combine(const Eigen::MatrixXd& s) const { return basis_.Combine(s); }
 
  private:

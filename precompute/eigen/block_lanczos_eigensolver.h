@@ -14,8 +14,8 @@ namespace carillon::precompute {
 /// factor serves sixteen solves, and they find all modes of a degenerate group.
 class BlockLanczosEigensolver : public Eigensolver {
  public:
-  /// `ordered`: the system to be solved in elimination order; it must outlive the solver. `rigid`:
-  /// the rigid-body modes, #U by at most six, M-orthonormal.
+  /// `ordered` is the system to be solved, in elimination order. `rigid` is the rigid-body modes,
+  /// #U by at most six, M-orthonormal. Both must outlive the solver.
   BlockLanczosEigensolver(const OrderedSystem& ordered, const Eigen::MatrixXd& rigid)
       : ordered_(ordered), rigid_(rigid) {}
 

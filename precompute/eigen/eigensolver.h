@@ -19,12 +19,12 @@ struct Modes {
 struct ModeRequest {
   /// Number of modes, at most the number of unknowns.
   int count;
-  /// An upper bound near the highest eigenvalue wanted. It sets the scale of shifts.
+  /// An upper bound near the highest eigenvalue wanted. This bound sets the scale of shifts.
   double eigenvalue_limit;
 };
 
-/// The solvers that a user can choose from. Block Lanczos leaves small bodies, and those of which a
-/// large part of all modes is wanted, to LAPACK's dense solver.
+/// The solvers that a user can choose from. With kBlockLanczos, LAPACK's dense solver handles small
+/// bodies, and bodies of which a large part of all modes is wanted.
 enum class SolverChoice { kBlockLanczos, kSpectra };
 
 /// Called with the estimated fraction of the iteration that is done, 0 to 1.

@@ -5,32 +5,33 @@
 
 namespace carillon::precompute {
 
-// Kernels for residuals of blocks of vectors x with their products K x and M x. Each makes one pass
-// over memory, and its variant for the machine is chosen at run time. Blocks: `rows` by
-// kBlockWidth, row-major, three rows a node. `energy`, `mass`, `quotient`, `residual` and `scale`:
-// kBlockWidth numbers, one a vector.
+// Kernels for residuals of blocks of vectors x with their products K x and M x. Each kernel makes
+// one pass over memory, and its variant for the machine is chosen at run time. Blocks are `rows` by
+// kBlockWidth, row-major, with three rows for each node. `energy`, `mass`, `quotient`, `residual`
+// and `scale` have kBlockWidth numbers, one for each vector.
 
-/// energy += x . elastic, mass += x . inertial
+/// Computes energy += x . elastic and mass += x . inertial.
 void AddRayleighSums(const double* x, const double* elastic, const double* inertial, int64_t rows,
                      double* energy, double* mass);
 
-/// residual += |D^1/2 (elastic - inertial quotient)|^2, scale += |D^1/2 inertial|^2: D^1/2 converts
-/// products to the user's unknowns; for `root_mass` see NodeMatrix.
+/// Computes residual += |D^1/2 (elastic - inertial quotient)|^2 and scale += |D^1/2 inertial|^2.
+/// D^1/2 converts products to the user's unknowns; for `root_mass` see NodeMatrix.
 void AddResidualSums(const double* quotient, const double* root_mass, const double* elastic,
                      const double* inertial, int64_t nodes, double* residual, double* scale);
 
-/// out = elastic - inertial quotient; rows of `out` and `change` lie `stride` numbers apart.
+/// Computes out = elastic - inertial quotient. Here and in SubtractChange, `stride` is the
+/// distance, in numbers, between the rows of `out` or `change`.
 template <typename Real>
 void StoreResidual(const double* quotient, const double* elastic, const double* inertial,
                    int64_t rows, int64_t stride, Real* out);
 
-/// out = right - (elastic - shift inertial), the residual of a solve for `right`. All arrays have
-/// `count` numbers.
+/// Computes out = right - (elastic - shift inertial), the residual of a solve for `right`. All
+/// arrays have `count` numbers.
 template <typename Real>
 void StoreSolveResidual(const Real* right, const double* elastic, const Real* inertial,
                         double shift, int64_t count, Real* out);
 
-/// x -= change
+/// Computes x -= change.
 template <typename Real>
 void SubtractChange(const Real* change, int64_t stride, int64_t rows, double* x);
 

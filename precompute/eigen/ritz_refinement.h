@@ -35,9 +35,10 @@ struct RefinedModes {
 /// all vectors in double precision (Rayleigh-Ritz). Both steps are repeated until the residuals are
 /// small.
 ///
-/// `rough`: vectors in elimination order, in which the last blocks may have more than wanted; each
-/// block is freed as soon as it has been read. `deflated`: as for LanczosRecurrence. `progress` is
-/// called in this thread. Errors: VERIFICATION_FAILED if residuals stay large.
+/// `rough` has vectors in elimination order, and its last blocks may have more vectors than wanted.
+/// Each block is freed as soon as it has been read. `deflated` is the same as for
+/// LanczosRecurrence. `progress` is called in the calling thread. Errors: VERIFICATION_FAILED if
+/// residuals stay large.
 template <typename Real>
 absl::StatusOr<RefinedModes> RefineModes(const NodeMatrix& A,
                                          const MultifrontalCholesky<Real>& factor,

@@ -8,12 +8,12 @@
 
 namespace carillon::precompute {
 
-/// y = -shift (K - shift M)^-1 x, with a factor in Real. A factor in float equals the exact factor
-/// of a slightly different stiffness, which has different modes. In the first part of an iteration
-/// each solve is therefore followed by a solve for its residual, computed in double. The error of
-/// the first solve determines the length of that part: a Krylov method tolerates larger errors the
-/// nearer it is to its end (Simoncini and Szyld 2003), because converged directions already lie in
-/// the basis.
+/// Computes y = -shift (K - shift M)^-1 x with a factor in Real. A factor in float equals the exact
+/// factor of a slightly different stiffness, which has different modes. In the first part of an
+/// iteration each solve is therefore followed by a solve for its residual, computed in double. The
+/// error of the first solve determines the length of that part: a Krylov method tolerates larger
+/// errors the nearer it is to its end (Simoncini and Szyld 2003), because converged directions
+/// already lie in the basis.
 template <typename Real>
 class ShiftInvert {
  public:
@@ -22,11 +22,11 @@ class ShiftInvert {
   ShiftInvert(const NodeMatrix& A, const MultifrontalCholesky<Real>& factor,
               const MassRows<Real>& mass, double shift, Workers& workers);
 
-  /// x and y are in elimination order and may be the same object. `done`: the fraction of
+  /// x and y are in elimination order and may be the same object. `done` is the fraction of
   /// the iteration that is done.
   void Apply(const Block& x, Block& y, double done);
 
-  /// Relative error of the first solve; 0 in double.
+  /// Returns the relative error of the first solve; 0 in double.
   double error() const { return error_; }
 
  private:

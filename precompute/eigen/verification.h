@@ -26,7 +26,7 @@ struct Verification {
 inline constexpr double kMaxResidual = 1e-5;
 inline constexpr double kMaxOrthogonalityError = 1e-7;
 
-/// The residual that an exact mode has because of rounding. The product with K has an error
+/// Returns the residual that an exact mode has because of rounding. The product with K has an error
 /// relative to its stiffest node, which on a slender body is 1e12 times as stiff as the lowest
 /// mode. The result is at most a thousandth.
 double ResidualOfRounding(double stiffest, double eigenvalue);
@@ -40,22 +40,23 @@ struct Measurement {
   Eigen::MatrixXd gram;       ///< phi_i^T M phi_j
 };
 
-/// `order`: the order of the nodes in A, see MakeNodeMatrix.
+/// Measures the residuals and the Gram matrix of modes. `order` is the order of the nodes in A, see
+/// MakeNodeMatrix.
 Measurement Measure(const NodeMatrix& A, const std::vector<int32_t>& order, const Modes& modes,
                     Workers& workers);
 
-/// Largest |gram_ij - delta_ij|.
+/// Returns the largest |gram_ij - delta_ij|.
 double OrthogonalityError(const Eigen::MatrixXd& gram);
 
 /// A number for each vector of a block.
 using BlockRow = Eigen::Array<double, 1, kBlockWidth>;
 
-/// |D^1/2 (elastic - inertial Lambda)| / |D^1/2 inertial Lambda| of each column of the products K x
-/// and M x. D^1/2 converts them to the user's unknowns.
+/// Returns |D^1/2 (elastic - inertial Lambda)| / |D^1/2 inertial Lambda| for each vector x, where
+/// elastic = K x and inertial = M x. D^1/2 converts the products to the user's unknowns.
 BlockRow RelativeResiduals(const NodeMatrix& A, const VectorBlock& elastic,
                            const VectorBlock& inertial, const BlockRow& eigenvalues);
 
-/// The same quantities computed from the matrices as assembled.
+/// Compute residuals and the orthogonality error from the assembled matrices.
 Eigen::VectorXd Residuals(const SystemMatrices& system, const Modes& modes);
 double OrthogonalityError(const SystemMatrices& system, const Eigen::MatrixXd& shapes);
 

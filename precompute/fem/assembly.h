@@ -9,27 +9,27 @@
 
 namespace carillon::precompute {
 
-/// Stiffness and mass of a body; unknown 3 i + a is component a of the displacement of the i-th
-/// node that is not fixed.
+/// The stiffness and mass matrices of a body. Unknown 3 i + a is component a of the displacement of
+/// the i-th node that is not fixed.
 struct SystemMatrices {
   using Sparse = Eigen::SparseMatrix<double>;
 
   /// #U by #U, N/m, symmetric: the lower triangle only.
   Sparse K;
-  /// #U by #U, kg, symmetric positive definite: the lower triangle only. It does not couple
+  /// #U by #U, kg, symmetric positive definite: the lower triangle only. M does not couple
   /// different components.
   Sparse M;
 
   Eigen::Index unknown_count() const { return K.rows(); }
 };
 
-/// Assembles the matrices of a body from elements of 4 or 10 nodes; those with curved edges are
+/// Assembles the matrices of a body from elements of 4 or 10 nodes. Elements with curved edges are
 /// isoparametric. Fixed nodes have no unknowns. Every element must have positive volume, and pass
 /// CheckCurvedElements.
 SystemMatrices Assemble(const TetMesh& mesh, const ElasticConstants& elastic,
                         double density_kg_per_m3, MassSharing sharing);
 
-/// Volume of the mesh, m^3.
+/// Returns the volume of the mesh, m^3.
 double VolumeM3(const TetMesh& mesh);
 
 }  // namespace carillon::precompute

@@ -18,24 +18,26 @@ namespace carillon::precompute {
 /// The positions of an element's nodes (columns, metres), in the order of TetMesh.
 using TenNodes = Eigen::Matrix<double, 3, 10>;
 
-/// Derivatives (rows) of the barycentric coordinates with respect to the reference coordinates.
+/// Returns the derivatives (rows) of the barycentric coordinates with respect to the reference
+/// coordinates.
 Eigen::Matrix<double, 4, 3> ReferenceGradients();
 
 TenNodes NodesOf(const TetMesh& mesh, size_t element);
 
-/// The stiffness, N/m, by the rule of degree five: exact where the element is straight.
+/// Returns the stiffness, N/m, by the rule of degree five, which is exact if the element is
+/// straight.
 QuadraticStiffness MakeCurvedStiffness(const TenNodes& nodes, const LameConstants& lame);
 
-/// The mass, kg, the same for each component, exact. Lumped by diagonal scaling, as
-/// MakeQuadraticMass.
+/// Returns the exact mass, kg, which is the same for each component. It is lumped by diagonal
+/// scaling, like that of MakeQuadraticMass.
 QuadraticMass MakeCurvedMass(const TenNodes& nodes, double density_kg_per_m3, MassSharing sharing);
 
-/// Volume, m^3, exact.
+/// Returns the exact volume, m^3.
 double CurvedVolumeM3(const TenNodes& nodes);
 
-/// Checks that no curved element of the mesh is turned inside out: the determinant of its Jacobian
-/// is positive at all quadrature points.
-/// Errors: MESH_ELEMENT_INVERTED with the element's number.
+/// Checks that no curved element of the mesh is turned inside out, that is, that the determinant of
+/// its Jacobian is positive at all quadrature points.
+/// Errors: MESH_ELEMENT_INVERTED, stating the element's number.
 absl::Status CheckCurvedElements(const TetMesh& mesh);
 
 }  // namespace carillon::precompute

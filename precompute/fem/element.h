@@ -18,7 +18,7 @@ struct TetGeometry {
   double volume_m3;
 };
 
-/// Geometry from the corners (columns, metres); its volume is signed.
+/// Returns the geometry for these corners (columns, metres). The volume is signed.
 TetGeometry MakeTetGeometry(const Eigen::Matrix<double, 3, 4>& corners);
 
 using LinearStiffness = Eigen::Matrix<double, 12, 12>;
@@ -26,36 +26,40 @@ using LinearMass = Eigen::Matrix<double, 4, 4>;
 using QuadraticStiffness = Eigen::Matrix<double, 30, 30>;
 using QuadraticMass = Eigen::Matrix<double, 10, 10>;
 
-/// The block of two nodes whose gradients' outer product, integrated, is `c` (c_ab = g_ia g_jb).
+/// Returns the stiffness block of nodes i and j, where `c` is the integral of the outer product of
+/// their gradients (c_ab = g_ia g_jb).
 Eigen::Matrix3d StiffnessBlock(const Eigen::Matrix3d& c, const LameConstants& lame);
 
-/// The ten shape functions of the quadratic tetrahedron at a point: corners L(2L - 1), mid-sides
-/// 4 L_i L_j.
+/// Returns the ten shape functions of the quadratic tetrahedron at a point: L(2L - 1) for corners,
+/// 4 L_i L_j for mid-side nodes.
 Eigen::Matrix<double, 10, 1> QuadraticValues(const Eigen::Vector4d& barycentric);
 
-/// Their gradients (rows), from those of the barycentric coordinates (rows of `g`).
+/// Returns the gradients (rows) of those ten shape functions. The rows of `g` are the gradients of
+/// the barycentric coordinates.
 Eigen::Matrix<double, 10, 3> QuadraticGradients(const Eigen::Matrix<double, 4, 3>& g,
                                                 const Eigen::Vector4d& barycentric);
 
-/// Stiffness of the four-node tetrahedron, N/m; unknown 3 i + a is component a of node i.
+/// Returns the stiffness of the four-node tetrahedron, N/m. Unknown 3 i + a is component a of node
+/// i.
 ///
 ///     k[ij]ab = vol (lambda beta_ia beta_jb + mu beta_ib beta_ja + mu delta_ab beta_i . beta_j)
 ///
-/// Deviates from the paper, whose eq. 12 prints vol/2: differentiating its eq. 10 gives vol.
+/// The paper's eq. 12 has vol/2 instead of vol, which is an error: differentiating its eq. 10 gives
+/// vol.
 LinearStiffness MakeLinearStiffness(const TetGeometry& geometry, const LameConstants& lame);
 
-/// Mass of the four-node tetrahedron, kg, the same for each component: rho vol/20 (1 + delta_ij),
-/// or lumped rho vol/4 delta_ij (the paper's eq. 14 and 15).
+/// Returns the mass of the four-node tetrahedron, kg, which is the same for each component. It is
+/// rho vol/20 (1 + delta_ij), or rho vol/4 delta_ij if lumped (the paper's eq. 14 and 15).
 LinearMass MakeLinearMass(double volume_m3, double density_kg_per_m3, MassSharing sharing);
 
-/// Stiffness of the ten-node tetrahedron with straight sides and mid-side nodes in their middles,
-/// N/m; nodes in the order of TetMesh. Its integrand is quadratic, so that the four-point rule is
-/// exact.
+/// Returns the stiffness, N/m, of the ten-node tetrahedron with straight edges and mid-side nodes
+/// in the middle of the edges. Nodes are in the order of TetMesh. The four-point rule is exact,
+/// because the integrand is quadratic.
 QuadraticStiffness MakeQuadraticStiffness(const TetGeometry& geometry, const LameConstants& lame);
 
-/// Mass of the ten-node tetrahedron, kg, the same for each component; lumped by diagonal scaling
-/// (Hinton, Rock, Zienkiewicz 1976: 1/36 a corner, 4/27 a mid-side node), because row sums would
-/// give the corners negative mass.
+/// Returns the mass of the ten-node tetrahedron, kg, which is the same for each component. It is
+/// lumped by diagonal scaling (Hinton, Rock, Zienkiewicz 1976), because row sums would give the
+/// corners negative mass. A corner gets 1/36 of the mass, and a mid-side node gets 4/27.
 QuadraticMass MakeQuadraticMass(double volume_m3, double density_kg_per_m3, MassSharing sharing);
 
 }  // namespace carillon::precompute

@@ -9,10 +9,11 @@
 
 namespace carillon::precompute {
 
-/// The nodes of a mesh that are not fixed, ascending. The unknowns are in this order.
+/// Returns the nodes of a mesh that are not fixed, in ascending order, which is the order of the
+/// unknowns.
 std::vector<int32_t> MovingNodes(const TetMesh& mesh);
 
-/// The positions of `nodes`, metres.
+/// Returns the positions of `nodes`, metres.
 std::vector<Point> PlacesOf(const std::vector<int32_t>& nodes, const TetMesh& mesh);
 
 /// Restricts matrices of all nodes to the rows and columns of the moving nodes.

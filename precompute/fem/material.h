@@ -15,11 +15,11 @@ struct ElasticConstants {
   double poisson_ratio;
 };
 
-/// lambda = E nu / ((1 + nu)(1 - 2 nu)), mu = E / (2 (1 + nu)).
+/// Returns lambda = E nu / ((1 + nu)(1 - 2 nu)) and mu = E / (2 (1 + nu)).
 LameConstants ToLame(const ElasticConstants& elastic);
 
-/// E = mu (3 lambda + 2 mu) / (lambda + mu), nu = lambda / (2 (lambda + mu)): the inverse of
-/// ToLame.
+/// Returns E = mu (3 lambda + 2 mu) / (lambda + mu) and nu = lambda / (2 (lambda + mu)), the
+/// inverse of ToLame.
 ElasticConstants FromLame(const LameConstants& lame);
 
 }  // namespace carillon::precompute

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
-// Vectors across the columns of a block, once for each SIMD target; included by kernels only,
-// within foreach_target.
+// SIMD vectors along the columns of a block. Only kernels include this file, once for each SIMD
+// target, by foreach_target.
 #if defined(CARILLON_PRECOMPUTE_MODES_BLOCK_LANES_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef CARILLON_PRECOMPUTE_MODES_BLOCK_LANES_INL_H_
 #undef CARILLON_PRECOMPUTE_MODES_BLOCK_LANES_INL_H_
@@ -26,8 +26,8 @@ constexpr int LaneCount() {
   return std::min(kBlockWidth, static_cast<int>(HWY_MAX_BYTES / sizeof(Real)));
 }
 
-/// Columns of kWidth that are worked on at once: two vectors, as many as registers allow for the
-/// rows kept beside them.
+/// Returns how many of kWidth columns a kernel processes at once. That is two vectors, because the
+/// registers hold several rows, too.
 template <typename Real, int kWidth = kBlockWidth>
 constexpr int Chunk() {
   return std::min(kWidth, 2 * LaneCount<Real>());

@@ -7,8 +7,8 @@
 
 namespace carillon::precompute {
 
-/// The dense matrix of one supernode: its pivot columns (height by pivots) and the update matrix
-/// for its parent (updates by updates), both column-major, lower.
+/// The dense matrix of one supernode. It consists of the pivot columns (height by pivots) and of
+/// the update matrix for the parent (updates by updates), both column-major and lower.
 template <typename Real>
 struct Front {
   int pivots = 0;
@@ -21,14 +21,14 @@ struct Front {
 
 enum class Elimination {
   kDone,
-  kNotPositive,  ///< a negative pivot where none was allowed
-  kVanishing,    ///< a pivot whose sign is rounding
+  kNotPositive,  ///< a pivot was negative although none was allowed
+  kVanishing,    ///< a pivot is so small that rounding determines its sign
 };
 
-/// Turns the panel into L, and subtracts its part from the update matrix: A = L S L^T with signs S
-/// on the diagonal. This is a Cholesky factorization except for the few columns with negative
-/// pivots. `negative`: if null, negative pivots are not allowed; otherwise their number is added to
-/// it. Pivots up to `smallest` count as vanishing.
+/// Overwrites the panel by L, and subtracts the panel's contribution from the update matrix: A = L
+/// S L^T with signs S on the diagonal. This is a Cholesky factorization except for the few columns
+/// with negative pivots. If `negative` is null, negative pivots are not allowed; otherwise their
+/// number is added to *negative. Pivots up to `smallest` count as vanishing.
 template <typename Real>
 Elimination Eliminate(Front<Real>& front, Real smallest, Workers& workers, int* negative);
 

@@ -92,8 +92,8 @@ class FrontWalk {
     return failure;
   }
 
-  /// When a parent is processed, the update matrices of its children are on top of the stack. Its
-  /// own update matrix is made above them and then moved to their place.
+  /// When a parent is processed, the update matrices of its children are on top of the stack. The
+  /// parent's own update matrix is computed above them and then moved down to their place.
   absl::Status RunSubtree(const Subtree& subtree, Real* stack, Assembler& assembler,
                           Workers& alone);
 
@@ -132,7 +132,8 @@ class FrontWalk {
       front_.pivots = 3 * (last - first);
       front_.updates = 3 * rows - front_.pivots;
       const auto size = static_cast<size_t>(front_.height()) * static_cast<size_t>(front_.pivots);
-      if (front_.panel.capacity() < size) front_.panel = {};  // not two at once
+      if (front_.panel.capacity() < size)
+        front_.panel = {};  // frees the old panel first, to save memory
       front_.panel.assign(size, 0);
       front_.update = update;
       for (int j = 0; j < front_.updates; ++j) {
@@ -158,8 +159,8 @@ class FrontWalk {
       }
     }
 
-    /// A column of the front, indexed by the front's rows; columns of the update matrix have only
-    /// rows below the pivots.
+    /// Returns column `c` of the front, to be indexed by the front's rows. Columns of the update
+    /// matrix have only the rows below the pivots.
     Real* Column(int c) {
       if (c < front_.pivots) return &front_.panel[static_cast<size_t>(c) * front_.height()];
       return front_.update + static_cast<ptrdiff_t>(c - front_.pivots) * front_.updates -
@@ -199,9 +200,10 @@ class FrontWalk {
   const double shift_;
   const Visit& visit_;
   Workers& workers_;
-  std::vector<const Real*> waiting_;           ///< update matrices not yet taken by their parents
-  std::vector<std::unique_ptr<Real[]>> kept_;  ///< those of the top, and of subtrees' roots
-  double done_ = 0;                            ///< flops
+  std::vector<const Real*> waiting_;  ///< update matrices that have not been added to their parents
+  std::vector<std::unique_ptr<Real[]>>
+      kept_;         ///< update matrices of the top, and of subtrees' roots
+  double done_ = 0;  ///< flops
 };
 
 template <typename Real, typename Visit>

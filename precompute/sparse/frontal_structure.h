@@ -10,17 +10,18 @@
 
 namespace carillon::precompute {
 
-/// Supernodes begin ... end - 1, the last one the root of all others.
+/// The supernodes begin ... end - 1, of which the last one is the root.
 struct Subtree {
   int begin = 0;
   int end = 0;
-  /// Most numbers that the update matrices of its supernodes take at the same time.
+  /// Largest count of numbers that the update matrices of these supernodes take at one time.
   size_t stack_size = 0;
 };
 
 /// The supernodes of a Cholesky factorization, in terms of nodes; each node has three unknowns.
 struct FrontalStructure {
-  /// Elimination order: order[i] is the node eliminated i-th. Nested dissection of the node graph.
+  /// Elimination order: order[i] is the node eliminated i-th. It is a nested dissection of the
+  /// graph of nodes.
   std::vector<int32_t> order;
   /// #supernodes + 1: supernode s eliminates nodes first_pivot[s] .. first_pivot[s + 1] - 1.
   std::vector<int32_t> first_pivot;
@@ -36,7 +37,7 @@ struct FrontalStructure {
   /// ascending.
   std::vector<int32_t> child_start;
   std::vector<int32_t> child;
-  /// #supernodes: multiply-adds of each supernode with three unknowns a node, and their sum.
+  /// #supernodes: the number of multiply-adds of each supernode. factor_flops is their sum.
   std::vector<double> flops;
   double factor_flops = 0;
   /// Subtrees with little work each, which single threads process, and the supernodes above all
@@ -62,8 +63,8 @@ struct FrontalStructure {
 };
 
 /// Orders the graph of nodes and finds the supernodes with CHOLMOD's symbolic analysis. The graph
-/// of nodes is a third the size of the graph of unknowns, and METIS finds better separators in it.
-/// Errors: RESOURCE_EXHAUSTED.
+/// of nodes is used because it has a third of the size of the graph of unknowns, and because METIS
+/// finds better separators in it. Errors: RESOURCE_EXHAUSTED.
 absl::StatusOr<FrontalStructure> AnalyzeFronts(const Eigen::SparseMatrix<double>& K);
 
 }  // namespace carillon::precompute

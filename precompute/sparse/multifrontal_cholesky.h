@@ -13,20 +13,22 @@
 
 namespace carillon::precompute {
 
-/// L L^T = K - shift M by the multifrontal method (Duff and Reid 1983), for solves of kBlockWidth
-/// right-hand sides at once. The panels of L are packed in tiles that one kernel streams through.
+/// The factorization L L^T = K - shift M by the multifrontal method (Duff and Reid 1983), for
+/// solves of kBlockWidth right-hand sides at once. The panels of L are packed in tiles that one
+/// kernel streams through.
 template <typename Real>
 class MultifrontalCholesky {
  public:
-  /// Errors: VERIFICATION_FAILED where K - shift M is not positive definite.
+  /// Errors: VERIFICATION_FAILED if K - shift M is not positive definite.
   static absl::StatusOr<MultifrontalCholesky> Factorize(const FrontalStructure& fronts,
                                                         const NodeMatrix& A, double shift,
                                                         Workers& workers, const PartDone& progress);
 
-  /// Overwrites x, 3 #nodes by kBlockWidth, row-major, in elimination order, by its solution.
+  /// Overwrites the right-hand sides x by the solutions. x is 3 #nodes by kBlockWidth, row-major,
+  /// in elimination order.
   void Solve(Real* x, Workers& workers) const;
 
-  /// Solves for kWideBlock columns with one thread.
+  /// Solves for kWideBlock right-hand sides with one thread.
   void SolveWide(Real* x) const requires std::is_same_v<Real, float>;
 
   size_t stored_bytes() const { return tile_start_.back() * sizeof(Real); }
@@ -36,13 +38,13 @@ class MultifrontalCholesky {
   class Substitution;
 
   const FrontalStructure* fronts_ = nullptr;
-  std::unique_ptr<Real[]> tiles_;   // written whole by the factorization: not zeroed before
+  std::unique_ptr<Real[]> tiles_;   // not zeroed, because the factorization writes every number
   std::vector<size_t> tile_start_;  ///< #supernodes + 1, into tiles_
   std::vector<int32_t> top_nodes_;  ///< the nodes eliminated by the fronts above all subtrees
-  std::vector<int32_t> top_index_;  ///< #nodes: place in top_nodes_, or -1
+  std::vector<int32_t> top_index_;  ///< #nodes: index of each node in top_nodes_, or -1
 };
 
-/// The number of matrix entries that a factor stores.
+/// Returns the number of matrix entries that a factor stores.
 size_t FactorNumbers(const FrontalStructure& fronts);
 
 }  // namespace carillon::precompute

@@ -8,10 +8,10 @@
 
 namespace carillon::precompute {
 
-/// The number of negative eigenvalues of K - shift M, which is the number of eigenvalues of K x =
-/// Lambda M x below `shift` (Sylvester's law of inertia), from a factorization L S L^T with signs S
-/// and without pivoting. Errors: VERIFICATION_FAILED if a pivot is too small for its sign to be
-/// trusted, which means that the shift lies on an eigenvalue and must be moved.
+/// Returns the number of eigenvalues of K x = Lambda M x below `shift`. By Sylvester's law of
+/// inertia, this is the number of negative pivots in a factorization K - shift M = L S L^T with
+/// signs S and without pivoting. Errors: VERIFICATION_FAILED if a pivot is too small for its sign
+/// to be trusted, which means that the shift lies on an eigenvalue and must be moved.
 absl::StatusOr<int> CountEigenvaluesBelow(const FrontalStructure& fronts, const NodeMatrix& A,
                                           double shift, Workers& workers, const PartDone& progress);
 

@@ -7,15 +7,15 @@
 
 namespace carillon::precompute {
 
-/// Pivot order of the unknowns that keeps factors sparse: element k is the unknown eliminated k-th.
-/// It is a nested dissection of the graph of nodes, which is a third the size of the graph of
-/// unknowns; the three unknowns of a node follow one another.
+/// Returns a pivot order of the unknowns that keeps factors sparse. Element k is the unknown
+/// eliminated k-th. The order is a nested dissection of the graph of nodes, which has a third of
+/// the size of the graph of unknowns. The three unknowns of a node follow one another.
 std::vector<int> OrderUnknowns(const SystemMatrices& system);
 
-/// An order of the nodes of a body whose walls are mostly one element thick. Each pair of nodes
-/// across the wall counts as one vertex of the graph, so that the order is found in less than half
-/// the time; the factor is as sparse. Returns an empty order if the mesh is not mostly one element
-/// thick.
+/// Returns an order of the nodes of a body whose walls are mostly one element thick. Each pair of
+/// nodes across the wall counts as one vertex of the graph, so that the order is found in less than
+/// half the time, with an equally sparse factor. Returns an empty order if the mesh is not mostly
+/// one element thick.
 std::vector<int> OrderThinWall(const SystemMatrices::Sparse& K);
 
 }  // namespace carillon::precompute

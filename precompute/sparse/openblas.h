@@ -3,12 +3,12 @@
 
 namespace carillon::precompute {
 
-/// How many threads solvers may use from now on; zero: one for each processor.
+/// Sets the number of threads that solvers may use. Zero means one thread for each processor.
 void SetThreadCount(int count);
 int ThreadCount();
 
-/// While an object of this class lives, OpenBLAS uses threads of its own. Otherwise its kernels run
-/// in the calling thread, so that several threads may call them in parallel.
+/// While an object of this class lives, OpenBLAS uses `count` threads. Otherwise OpenBLAS runs its
+/// kernels in the calling thread, so that several threads may call them in parallel.
 class ScopedBlasThreads {
  public:
   explicit ScopedBlasThreads(int count);
@@ -17,11 +17,11 @@ class ScopedBlasThreads {
   ScopedBlasThreads& operator=(const ScopedBlasThreads&) = delete;
 };
 
-/// OpenBLAS chooses its kernels by the model number of the processor. For an unknown number it
-/// takes the oldest kernels (SSE3), and a factorization takes three times as long; Debian 12's
-/// version does not know most newer processors. Returns the value of OPENBLAS_CORETYPE that suits
-/// the instructions of this processor, or nullptr if OpenBLAS chose well or the variable is already
-/// set. OpenBLAS reads the variable when a process starts.
+/// OpenBLAS chooses its kernels by the model number of the processor. For an unknown number
+/// OpenBLAS takes the oldest kernels (SSE3), with which a factorization takes three times as long.
+/// The version of Debian 12 does not know most newer processors. Returns the value of
+/// OPENBLAS_CORETYPE that suits the instructions of this processor, or nullptr if OpenBLAS chose
+/// well or the variable is already set. OpenBLAS reads the variable when a process starts.
 const char* BetterOpenBlasCore();
 
 }  // namespace carillon::precompute

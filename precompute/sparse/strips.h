@@ -8,7 +8,8 @@
 namespace carillon::precompute {
 
 /// Calls visit(first, count) for strips of the columns 0 ... n - 1 of a lower triangle, distributed
-/// to the threads. A matrix product for each strip computes only little of the upper triangle.
+/// to the threads. If a matrix product is computed for each strip, only a small part of the upper
+/// triangle is computed needlessly.
 template <typename Visit>
 void ForStrips(Workers& workers, int n, const Visit& visit) {
   constexpr int kStrip = 192;

@@ -5,16 +5,16 @@
 
 namespace carillon::precompute {
 
-/// Rows of a packed panel that one tile holds: two nodes.
+/// Number of rows of a packed panel in one tile, which are the rows of two nodes.
 inline constexpr int kTileRows = 6;
 
 /// Number of right-hand sides that one pass over a factor in float can serve.
 inline constexpr int kWideBlock = 2 * kBlockWidth;
 
-/// One tile of a packed panel times kWidth right-hand sides, chosen at run time for the machine:
-/// kBlockWidth, and in float kWideBlock. The tile holds columns one after another, kTileRows
-/// numbers each. `y` has `column_count` rows of kWidth numbers; `x[0]` and `x[1]` point at three
-/// rows each, one node.
+/// Multiply one tile of a packed panel by kWidth right-hand sides, which is kBlockWidth or, in
+/// float, kWideBlock. The variant for the machine is chosen at run time. The tile stores its
+/// columns one after another, kTileRows numbers each. `y` has `column_count` rows of kWidth
+/// numbers. `x[0]` and `x[1]` point at one node each, that is, at three rows.
 ///
 ///     TileForward:   x -= tile * y        TileBackward:   y -= tile^T * x
 template <typename Real, int kWidth>
@@ -22,8 +22,8 @@ void TileForward(const Real* tile, int column_count, const Real* y, Real* const 
 template <typename Real, int kWidth>
 void TileBackward(const Real* tile, int column_count, Real* y, const Real* const x[2]);
 
-/// x = D^-1 x and x = D^-T x for the lower triangle D of a diagonal tile (its diagonal inverted);
-/// x: six rows.
+/// Compute x = D^-1 x and x = D^-T x, where D is the lower triangle of a diagonal tile, whose
+/// diagonal is stored inverted. x has six rows.
 template <typename Real, int kWidth>
 void TileSolve(const Real* tile, Real* x);
 template <typename Real, int kWidth>

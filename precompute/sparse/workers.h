@@ -14,7 +14,7 @@ namespace carillon::precompute {
 /// Threads that share a task and then wait for the next one.
 class Workers {
  public:
-  /// `count` threads, the caller's included.
+  /// Makes `count` threads, including the caller's.
   explicit Workers(int count);
   ~Workers();
   Workers(const Workers&) = delete;
@@ -22,15 +22,15 @@ class Workers {
 
   int count() const { return static_cast<int>(threads_.size()) + 1; }
 
-  /// Calls work(0) ... work(count() - 1), each in a thread of its own, and waits for all. Rethrows
-  /// an exception of one of them.
+  /// Calls work(0) ... work(count() - 1), each in a thread of its own, and waits for all calls. If
+  /// calls throw, rethrows one of the exceptions.
   void Run(const std::function<void(int)>& work);
 
   /// Calls visit(begin, end, t) for contiguous parts of 0 ... n - 1, part t in thread t. Parts
   /// begin at multiples of `unit`.
   void ForParts(int64_t n, int64_t unit, const std::function<void(int64_t, int64_t, int)>& visit);
 
-  /// Calls visit(i) for 0 <= i < n; each call is made by the next free thread.
+  /// Calls visit(i) for 0 <= i < n. The next free thread makes the next call.
   void ForEach(int64_t n, const std::function<void(int64_t)>& visit);
 
  private:
