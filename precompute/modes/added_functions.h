@@ -6,19 +6,19 @@
 
 namespace carillon::precompute {
 
-/// A function on the tetrahedron, at a point: its value, and its derivatives with respect to the
+/// The value of a function on the tetrahedron at a point, and its derivatives with respect to the
 /// four barycentric coordinates.
 struct FunctionAt {
   double value;
   Eigen::Vector4d derivative;
 };
 
-/// The element's own shape functions, in the order of TetMesh.
+/// Returns the element's own shape functions, in the order of TetMesh.
 std::vector<FunctionAt> BaseFunctions(const Eigen::Vector4d& barycentric, int node_count);
 
-/// The functions that the next order adds: for linear elements 4 L_a L_b on each edge; for
-/// quadratic ones L_a L_b (L_a - L_b) on each edge, L_a L_b L_c on each face. Edges and faces are
-/// in the order of kTetEdges and kTetFaces.
+/// Returns the functions that elements of the next order add. For linear elements these are 4 L_a
+/// L_b on each edge. For quadratic elements they are L_a L_b (L_a - L_b) on each edge and L_a L_b
+/// L_c on each face. Edges and faces are in the order of kTetEdges and kTetFaces.
 std::vector<FunctionAt> AddedFunctions(const Eigen::Vector4d& barycentric, int node_count);
 
 }  // namespace carillon::precompute

@@ -9,13 +9,15 @@
 
 namespace carillon::precompute {
 
-/// How strongly each mode moves air: c_m = omega_m * integral over the surface of |n . phi_m| dA
-/// (O'Brien et al. 2002, 3.4; the signed integral would be zero for every bending mode of a tube).
-/// Exact for displacements linear on each triangle: a triangle is split where the sign changes.
-/// Result: one number a mode, m^2 kg^(-1/2) s^(-1).
+/// Returns how strongly each mode moves air, which is c_m = omega_m * integral over the surface of
+/// |n . phi_m| dA (O'Brien et al. 2002, 3.4; the signed integral would be zero for every bending
+/// mode of a tube). The integral is exact for displacements that are linear on each triangle,
+/// because a triangle is split where the sign changes. The result has one number for each mode, m^2
+/// kg^(-1/2) s^(-1).
 Eigen::VectorXd Couplings(const TetMesh& mesh, const SoundingSurface& surface, const Modes& modes);
 
-/// Integral of |f| over a triangle of area `area`, f linear with these values at the corners.
+/// Returns the integral of |f| over a triangle of this area, where f is linear and has these values
+/// at the corners.
 double IntegralOfAbsolute(double area, double f0, double f1, double f2);
 
 }  // namespace carillon::precompute

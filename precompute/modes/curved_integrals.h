@@ -9,8 +9,9 @@
 
 namespace carillon::precompute {
 
-/// Integrals over curved elements of products of the functions that the next order adds (see
-/// AddedFunctions) with the element's own and with themselves, by the rule of degree five.
+/// Computes integrals over curved elements by the rule of degree five. The integrands are products
+/// of the functions that the next order adds (see AddedFunctions) with the element's own functions
+/// and with themselves.
 class CurvedIntegrals {
  public:
   /// Unknown 3 i + a is component a of function i.
@@ -23,7 +24,7 @@ class CurvedIntegrals {
 
   Mixed OfBoth(const TenNodes& nodes, const LameConstants& lame) const;
 
-  /// a(b, b) of each added function b, one 3 by 3 block after the other.
+  /// Returns a(b, b) of each added function b, one 3 by 3 block after the other.
   Eigen::Matrix<double, 3, 30> OfAdded(const TenNodes& nodes, const LameConstants& lame) const;
 
  private:
@@ -34,7 +35,7 @@ class CurvedIntegrals {
     Eigen::Matrix<double, 10, 3> derivatives;
   };
 
-  std::vector<TenFunctions> own_;  // at each point of the rule
+  std::vector<TenFunctions> own_;  // the element's own functions at each point of the rule
   std::vector<TenFunctions> added_;
 };
 

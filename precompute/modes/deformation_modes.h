@@ -22,15 +22,15 @@ struct DeformationModes {
   Eigen::VectorXd residuals;  ///< relative, of each mode
   Verification verification;
   double complete_to_eigenvalue = 0;
-  /// Modes below the limit that was asked for, as counted or expected, where it was lowered; zero:
-  /// it was not.
+  /// If the limit was lowered, the counted or expected number of modes below the requested limit;
+  /// otherwise zero.
   int mode_count_below_asked = 0;
-  /// The lowest deformation mode, whether below the limit or not.
+  /// The eigenvalue of the lowest deformation mode, even if it lies above the limit.
   double lowest_eigenvalue = 0;
 };
 
-/// Largest number of modes of a model. More modes never sound at once, and their shapes would fill
-/// gigabytes.
+/// Largest number of modes of a model. More modes never sound at once, and the shapes of more modes
+/// would fill gigabytes.
 inline constexpr int kMaxModeCount = 5000;
 /// Largest number of modes that may be found if only the most audible ones are kept.
 inline constexpr int kMaxFoundModeCount = 20'000;
@@ -41,7 +41,7 @@ enum class SolveStage { kFactor, kSolve, kVerify };
 /// Called with the current stage and the fraction of it that is done, 0 to 1.
 using SolveWatch = std::function<void(SolveStage, double)>;
 
-/// The cost above which a solution finds fewer modes.
+/// The largest cost of a solution. If all modes would cost more, fewer modes are found.
 struct Means {
   size_t bytes = 0;  ///< memory, the matrices included
   double cpu_s = 0;  ///< processor time, as PredictSolveCost() predicts it
@@ -51,11 +51,11 @@ struct SolveOptions {
   SolverChoice solver = SolverChoice::kBlockLanczos;
   std::vector<Point> held = {};  ///< positions of the fixed nodes
   int max_mode_count = kMaxModeCount;
-  /// Present: where all modes below the limit would cost more than these means, or be more than
-  /// max_mode_count, the limit is lowered until they do not.
+  /// If this is set, the limit is lowered until the modes below it cost at most these means and are
+  /// at most max_mode_count.
   std::optional<Means> means = {};
-  /// Called with the predicted cost before the modes are counted, based on a guess of their number,
-  /// and again afterwards.
+  /// Called with the predicted cost, first for a guessed number of modes before the modes are
+  /// counted, and again afterwards.
   std::function<void(const SolveCost&)> on_cost = [](const SolveCost&) {};
 };
 
@@ -63,24 +63,24 @@ struct SolveOptions {
 /// so that the solver knows when it has found all of them. If the limit agrees with an eigenvalue
 /// to nearly all digits, it is raised slightly.
 ///
-/// `nodes`: positions, in the order of the unknowns.
-/// Errors: BODY_IN_SEVERAL_PIECES, TOO_MANY_MODES, MEMORY_TOO_SMALL (before it is taken),
-/// OUT_OF_MEMORY, MESH_TOO_LARGE, VERIFICATION_FAILED; with SolverChoice::kSpectra INVALID_SETTINGS
-/// (more modes than it can find of so few unknowns).
+/// `nodes` are the positions of the nodes, in the order of the unknowns.
+/// Errors: BODY_IN_SEVERAL_PIECES, TOO_MANY_MODES, MEMORY_TOO_SMALL (before memory is allocated),
+/// OUT_OF_MEMORY, MESH_TOO_LARGE, VERIFICATION_FAILED; with SolverChoice::kSpectra also
+/// INVALID_SETTINGS (Spectra cannot find this many modes of so few unknowns).
 absl::StatusOr<DeformationModes> SolveDeformationModes(const SystemMatrices& system,
                                                        const std::vector<Point>& nodes,
                                                        double eigenvalue_limit,
                                                        const SolveWatch& watch,
                                                        const SolveOptions& options = {});
 
-/// The same for the body `mesh`, from which Assemble made the matrices. The shapes have all nodes
-/// and are zero at fixed nodes.
+/// Finds the same modes for the body `mesh`, from which Assemble made the matrices. The shapes
+/// include all nodes and are zero at fixed nodes.
 absl::StatusOr<DeformationModes> SolveDeformationModes(const SystemMatrices& system,
                                                        const TetMesh& mesh, double eigenvalue_limit,
                                                        const SolveWatch& watch,
                                                        SolveOptions options = {});
 
-/// Whether the dense solver is faster, by measurement.
+/// Returns whether the dense solver is faster, according to measurements.
 bool PrefersDense(Eigen::Index unknown_count, int mode_count);
 
 }  // namespace carillon::precompute

@@ -9,24 +9,25 @@
 
 namespace carillon::precompute {
 
-/// Estimates the relative error of each mode's frequency that is due to the mesh; the computed
+/// Estimates the relative error of each mode's frequency that the mesh causes. The computed
 /// frequency is too high.
 ///
-/// The residual of each mode is tested with the functions that elements one order higher would add:
-/// the hierarchical function b of each edge and (quadratic elements) of each face (Bank and Smith,
-/// A posteriori error estimates based on hierarchical bases, SIAM J. Numer. Anal. 30, 1993):
+/// The residual of each mode is tested with the functions that elements one order higher would add.
+/// These are the hierarchical functions b of each edge and (quadratic elements) of each face (Bank
+/// and Smith, A posteriori error estimates based on hierarchical bases, SIAM J. Numer. Anal. 30,
+/// 1993):
 ///
 ///     r_b = a(b, phi) - Lambda m(b, phi),   delta Lambda ~ C sum_b r_b^T a(b, b)^-1 r_b
 ///
 /// This detects the locking of thin walls, which estimates by averaged stresses do not. C is fitted
 /// to a bar, a block, a plate and a tube so that the estimate is rarely too small for errors of a
 /// few percent or less. For walls of linear elements with errors of half or more the estimate is
-/// too small. The body is that of its mesh, curved elements included; the difference to an original
-/// with other curves is not part of the estimate.
+/// too small. The estimate refers to the body as meshed, including curved elements. It does not
+/// include the difference between the mesh and the shape of the original object.
 ///
-/// `elastic`: the constants of the matrices from which the modes were computed, for unit density. A
-/// consistent mass is assumed. Shapes have all nodes; fixed edges and faces add nothing. Result:
-/// one number for each mode, 0.01 for one percent.
+/// `elastic` has the constants of the matrices from which the modes were computed, for unit
+/// density. A consistent mass is assumed. Shapes include all nodes; fixed edges and faces add
+/// nothing. The result has one number for each mode, 0.01 for one percent.
 Eigen::VectorXd EstimateFrequencyErrors(const TetMesh& mesh, const ElasticConstants& elastic,
                                         const Modes& modes);
 

@@ -8,26 +8,27 @@
 
 namespace carillon::precompute {
 
-/// An eigenvalue, and the numbers of eigenvalues below it and, as counted or expected, below the
-/// one that was asked for.
+/// A limit with the number of eigenvalues below it, and the counted or expected number of
+/// eigenvalues below the limit that was requested.
 struct Counted {
   double limit;
   int count;
   int asked_count;
 };
 
-/// Finds a limit below `above.limit` with at most `most` eigenvalues below it, and half as many at
-/// least where a few counts suffice to find it. `count_below` counts the eigenvalues below a limit;
-/// its errors are returned. `above.count` must be above `most`, which must be above zero.
+/// Finds a limit below `above.limit` with at most `most` eigenvalues below it, and preferably with
+/// at least half of `most`. The search ends after eight counts. If each of them exceeds `most`, the
+/// last one is returned. `count_below` counts the eigenvalues below a limit; its errors are
+/// returned. `above.count` must be above `most`, which must be above zero.
 absl::StatusOr<Counted> LowerLimit(
     Counted above, int most, const std::function<absl::StatusOr<int>(double limit)>& count_below);
 
-/// Weyl's law for elastic waves in a volume, at a Poisson's ratio of 0.3 and unit Young's modulus
-/// and density: a probable lower bound of the number of modes.
+/// Returns the number of modes by Weyl's law for elastic waves in a volume, for a Poisson's ratio
+/// of 0.3 and unit Young's modulus and density. It is a probable lower bound.
 double WeylModeCount(const SystemMatrices& system, double limit);
 
-/// The largest number from `least` to `most` for which `holds` is true, which must be true for all
-/// numbers up to it; `least` if it is true for none.
+/// Returns the largest number from `least` to `most` for which `holds` is true, or `least` if there
+/// is none. If `holds` is true for a number, it must be true for all smaller ones.
 int LargestThat(int least, int most, const std::function<bool(int)>& holds);
 
 }  // namespace carillon::precompute

@@ -21,15 +21,15 @@ struct ModalModel {
   int element_count = 0;
   double volume_m3 = 0;
   double complete_to_eigenvalue = 0;
-  /// Modes below the limit that was asked for, where it was lowered; zero: it was not.
+  /// If the limit was lowered, the number of modes below the requested limit; otherwise zero.
   int lowered_from_mode_count = 0;
-  /// The lowest deformation eigenvalue of the body, also if it lies above the limit and is not in
+  /// The lowest deformation eigenvalue of the body, even if it lies above the limit and is not in
   /// the model.
   double lowest_eigenvalue = 0;
   Verification verification;
-  /// Set where another solver was asked for its opinion.
+  /// The comparison with another solver, if one was requested.
   std::optional<SolverComparison> comparison;
-  int left_out_mode_count = 0;  ///< found, but not kept: see KeepMostAudible
+  int left_out_mode_count = 0;  ///< modes that were found but not kept, see KeepMostAudible
   /// Warnings for the user.
   std::vector<std::string> warnings;
 
@@ -39,10 +39,10 @@ struct ModalModel {
   /// #modes, see EstimateFrequencyErrors.
   std::vector<double> estimated_errors;
 
-  /// The sounding surface: boundary nodes of the mesh, metres, and its triangles.
+  /// The vertices (boundary nodes of the mesh, metres) and triangles of the sounding surface.
   std::vector<std::array<float, 3>> vertices;
   std::vector<std::array<int32_t, 3>> triangles;
-  /// For each of those triangles the given triangle it lies on.
+  /// For each of `triangles`, the given triangle on which it lies.
   std::vector<int32_t> given_triangle;
   SurfaceMesh given;
 
@@ -50,14 +50,14 @@ struct ModalModel {
   /// kg^(-1/2).
   std::vector<float> shapes;
 
-  /// The greatest of the estimated errors; zero without modes.
+  /// Returns the greatest estimated error, or zero if there are no modes.
   double WorstError() const {
     return estimated_errors.empty() ? 0 : *std::ranges::max_element(estimated_errors);
   }
 };
 
-/// `given` is the surface from which `mesh` was made: each boundary triangle of `mesh` names the
-/// triangle of `given` on which it lies (tet_mesh.h). `elastic` are the constants of the matrices.
+/// Makes a model from a solution. `given` is the surface to which the given triangles of the
+/// boundary of `mesh` refer (tet_mesh.h). `elastic` has the constants of the matrices.
 ModalModel MakeModalModel(const TetMesh& mesh, const SurfaceMesh& given,
                           const ElasticConstants& elastic, const DeformationModes& solution);
 

@@ -8,23 +8,24 @@
 
 namespace carillon::precompute {
 
-/// How far two solutions of one system are apart.
+/// The difference between two solutions of one system.
 struct SolverComparison {
   std::string solver;   ///< the name of the second solver
-  std::string failure;  ///< why it found nothing; empty: it found the modes
-  int mode_count = 0;   ///< of the first solver
+  std::string failure;  ///< why the second solver failed; empty if it did not
+  int mode_count = 0;   ///< number of modes of the first solver
   int other_mode_count = 0;
-  double largest_frequency_difference = 0;  ///< |f - f'| / f, over the modes that both have
-  /// The least modal assurance criterion, 1 where the shapes are the same. Modes whose eigenvalues
-  /// lie closer than kSameEigenvalue are compared as one subspace, since any basis of it is right:
-  /// the criterion is then the squared cosine of the largest angle between the two subspaces.
+  double largest_frequency_difference = 0;  ///< |f - f'| / f, over the modes that both found
+  /// The least modal assurance criterion, which is 1 if the shapes are the same. Modes whose
+  /// eigenvalues lie closer than kSameEigenvalue are compared as one subspace, because any basis of
+  /// it is right. The criterion is then the squared cosine of the largest angle between the two
+  /// subspaces.
   double least_mac = 1;
 
-  /// One line for people.
+  /// Returns a description in one line for people.
   std::string Text() const;
 };
 
-/// Neighbours whose eigenvalues differ by less, relatively, belong to one subspace.
+/// Neighbouring modes whose eigenvalues differ by a smaller fraction belong to one subspace.
 inline constexpr double kSameEigenvalue = 1e-3;
 
 /// Compares the modes of `first` and `second`, which are solutions of the body whose matrices

@@ -13,11 +13,11 @@ namespace carillon::precompute {
 
 using ComplexFloat = std::complex<float>;
 
-/// A closed surface with the weights of the vertex rule: an integral over a triangle is a third of
-/// its area times the sum of the values at its corners.
+/// A closed surface with the weights of the vertex rule, which takes a third of a triangle's area
+/// times the sum of the values at its corners for the integral.
 struct AcousticSurface {
   SurfaceMesh mesh;
-  std::vector<double> areas;        ///< #vertices, m^2: a third of the area of the triangles around
+  std::vector<double> areas;        ///< #vertices, m^2: a third of the area of the triangles at it
   std::vector<Point> area_vectors;  ///< #vertices, m^2: a third of their area vectors, outwards
   std::vector<Point> triangle_area_vectors;  ///< #triangles, m^2
   double mean_edge_m = 0;
@@ -27,16 +27,17 @@ struct AcousticSurface {
 
 AcousticSurface MakeAcousticSurface(SurfaceMesh mesh);
 
-/// Surface curl of the hat function of corner `c` on triangle `t`, 1/m (up to a sign common to
-/// all): the opposite edge over twice the area.
+/// Returns the surface curl of the hat function of corner `c` on triangle `t`, 1/m, up to a sign
+/// that is the same for all. It is the opposite edge divided by twice the area.
 Point CurlOfHat(const AcousticSurface& surface, size_t t, size_t c);
 
-/// J_i: the integral of the surface curl of the P1 function `p` by the vertex rule; three numbers a
-/// vertex, m.
+/// Computes J_i, the integrals of the surface curl of the P1 function `p` by the vertex rule; three
+/// numbers for each vertex, m.
 void LumpedCurls(const AcousticSurface& surface, std::span<const ComplexFloat> p,
                  std::span<std::array<ComplexFloat, 3>> curls);
 
-/// The transpose of LumpedCurls: adds sum over i of J_i(hat_v) . field_i to result_v.
+/// Applies the transpose of LumpedCurls: adds the sum over i of J_i(hat_v) . field_i, times
+/// `factor`, to result_v.
 void AddCurlTests(const AcousticSurface& surface,
                   std::span<const std::array<ComplexFloat, 3>> field, ComplexFloat factor,
                   std::span<ComplexFloat> result);

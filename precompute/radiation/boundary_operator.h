@@ -23,29 +23,29 @@ using Displacement = std::vector<std::array<float, 3>>;
 ///     (M/2 - K - eta N) p = -(V + eta (M/2 + K')) q,     eta = i / max(k, 1/R)
 ///
 /// in Galerkin's form with P1 functions (Burton and Miller, Proc. R. Soc. A 323, 1971; N by Maue's
-/// formula). The vertex rule serves all integrals, and NearCorrection puts right what it misses
-/// near by. No matrix is stored.
+/// formula). All integrals use the vertex rule, and NearCorrection corrects its errors for near
+/// pairs. No dense matrix is stored.
 class BoundaryOperator {
  public:
-  /// Keeps the references. `center` and `radius_m`: of a sphere around the surface.
+  /// Keeps the references. `center` and `radius_m` describe a sphere around the surface.
   BoundaryOperator(const AcousticSurface& surface, const NearCorrection& near, const Point& center,
                    double radius_m, double wavenumber);
 
   size_t size() const { return surface_.vertex_count(); }
 
-  /// The left side, of one or two pressures at once: results[s] = A pressures[s].
+  /// Computes the left side of one or two pressures at once: results[s] = A pressures[s].
   void Apply(std::span<const std::vector<ComplexFloat>> pressures,
              std::span<std::vector<ComplexFloat>> results, Workers& workers) const;
 
-  /// The right side, of one or two displacements.
+  /// Returns the right sides of one or two displacements.
   std::vector<std::vector<ComplexFloat>> RightSides(std::span<const Displacement> displacements,
                                                     Workers& workers) const;
 
-  /// The diagonal of the left side, near enough to precondition with.
+  /// Returns an approximate diagonal of the left side, for preconditioning.
   std::vector<ComplexFloat> Diagonal() const;
 
  private:
-  /// To the results of the rows from first to before second.
+  /// Adds the near corrections to `result` in the rows from rows.first to rows.second - 1.
   void AddNear(std::span<const ComplexFloat> p, std::pair<int64_t, int64_t> rows,
                std::span<ComplexFloat> result) const;
   void AddMass(std::span<const ComplexFloat> p, std::span<ComplexFloat> result) const;

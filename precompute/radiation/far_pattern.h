@@ -11,11 +11,13 @@
 
 namespace carillon::precompute {
 
-/// The order up to which a body within a sphere of this size, in wavelengths, radiates (Gumerov and
-/// Duraiswami's rule, measured to keep a decibel of direction).
+/// Returns the order of harmonics up to which a body within a sphere of this radius radiates at
+/// this wavenumber (Gumerov and Duraiswami's rule). By measurement, the error of directions is
+/// about a decibel.
 int PatternOrder(double wavenumber, double radius_m);
 
-/// P at the directions of the grid: far away, with r from `center`, the pressure is
+/// Returns P at the directions of the grid. Far away, at the distance r from `center`, the pressure
+/// is
 /// P exp(i k r)/r for dp/dn = n . displacement and the pressure `p` on the surface.
 std::vector<std::complex<double>> FarPattern(const AcousticSurface& surface, const Point& center,
                                              double wavenumber, std::span<const ComplexFloat> p,

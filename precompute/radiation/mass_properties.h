@@ -9,16 +9,17 @@
 
 namespace carillon::precompute {
 
-/// The mass of a body of unit density.
+/// The mass properties of a body of unit density.
 struct MassProperties {
   double volume_m3 = 0;
   Point center_of_mass{};
-  /// About the centre of mass: xx, yy, zz, xy, yz, zx of the tensor, whose products of inertia are
-  /// negative integrals; kg m^2.
+  /// The components xx, yy, zz, xy, yz, zx of the inertia tensor about the centre of mass, kg m^2.
+  /// The products of inertia are negative integrals.
   std::array<double, 6> inertia{};
 };
 
-/// Integrates by the divergence theorem over a closed surface, walls of voids included.
+/// Computes the mass properties by the divergence theorem from a closed surface, including the
+/// walls of voids.
 MassProperties ComputeMassProperties(std::span<const std::array<float, 3>> vertices,
                                      std::span<const std::array<int32_t, 3>> triangles);
 

@@ -10,23 +10,24 @@
 
 namespace carillon::precompute {
 
-/// The error of the vertex rule for a pair of vertices and the static kernel 1/(4 pi r): the exact
-/// Galerkin integrals over triangles that are near each other, minus the vertex rule for the same
-/// triangles. Rows are test functions.
+/// The correction of the vertex rule for a pair of vertices and the static kernel 1/(4 pi r). It is
+/// the exact Galerkin integrals over triangles that are near each other, minus the vertex rule for
+/// the same triangles. Rows are test functions.
 struct NearEntry {
   float double_layer = 0;             ///< K
   float single_layer = 0;             ///< V with n . n'
   float curls = 0;                    ///< V with curl . curl'
-  std::array<float, 3> source = {};   ///< V times n': to be multiplied by the displacement
-  std::array<float, 3> adjoint = {};  ///< K' times n', of the place with row and column swapped
+  std::array<float, 3> source = {};   ///< V times n', to be multiplied by the displacement
+  std::array<float, 3> adjoint = {};  ///< K' times n' of the entry with row and column swapped
 };
 
-/// A sparse matrix of them by rows, and the exact diagonals. Holds for every wavenumber.
+/// A sparse matrix of near entries by rows, and the exact diagonals. They are valid for every
+/// wavenumber.
 struct NearCorrection {
   std::vector<int64_t> row_begin;  ///< #vertices + 1
   std::vector<int32_t> columns;    ///< ascending in each row
   std::vector<NearEntry> entries;
-  /// #vertices each: exact static diagonals of K, V with n . n', and V with curl . curl'.
+  /// The exact static diagonals of K, of V with n . n', and of V with curl . curl'; #vertices each.
   std::vector<double> double_layer, single_layer, curls;
 };
 

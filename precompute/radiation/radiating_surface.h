@@ -11,7 +11,8 @@
 
 namespace carillon::precompute {
 
-/// The modes of a body on its surface, as a modal model has them. Nothing is copied.
+/// The modes of a body on its surface, in the layout of a modal model. The arrays are referred to,
+/// not copied.
 struct SurfaceModes {
   std::span<const std::array<float, 3>> vertices;  ///< metres
   std::span<const std::array<int32_t, 3>> triangles;
@@ -20,24 +21,24 @@ struct SurfaceModes {
   size_t mode_count() const { return eigenvalues.size(); }
 };
 
-/// How one mode moves the surface.
+/// The motion of the surface in one mode, along the normals.
 struct NormalMotion {
   double energy = 0;        ///< integral of (n . phi)^2, m^2/kg
   double wavelength_m = 0;  ///< 2 pi sqrt(2 integral f^2 / integral |grad f|^2), f = n . phi
 };
 
 /// The part of a body's surface that touches the surrounding air, without the walls of enclosed
-/// voids and surfaces inside them.
+/// voids and the surfaces inside such voids.
 struct RadiatingSurface {
   SurfaceMesh mesh;
-  std::vector<int32_t> body_vertex;  ///< for each vertex that of SurfaceModes
-  Point center{};                    ///< of the box around it
-  double radius_m = 0;               ///< of the sphere around `center` that holds it
+  std::vector<int32_t> body_vertex;  ///< for each vertex, its index in SurfaceModes
+  Point center{};                    ///< centre of the box around the surface
+  double radius_m = 0;  ///< radius of the sphere around `center` that contains the surface
 };
 
 RadiatingSurface FindRadiatingSurface(const SurfaceModes& modes);
 
-/// The motion of each mode along the surface's normals.
+/// Returns the motion of each mode along the surface's normals.
 std::vector<NormalMotion> NormalMotions(const SurfaceModes& modes, const RadiatingSurface& surface,
                                         Workers& workers);
 

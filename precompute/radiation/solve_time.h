@@ -3,16 +3,18 @@
 
 namespace carillon::precompute {
 
-/// Processor time of this process and of its children that have ended, seconds.
+/// Returns the processor time of this process and of its children that have ended, seconds.
 double CpuSeconds();
 
-/// Measures how long solutions and surfaces take, and predicts the next ones from that.
+/// Measures how long solutions and surfaces take, and predicts the times of the next ones from
+/// these measurements.
 class SolveTime {
  public:
-  /// Since the object was made, seconds.
+  /// Returns the processor time since the object was made, seconds.
   double Used() const { return CpuSeconds() - begun_s_; }
 
-  /// `pairs`: pairs of vertices that the operator was applied to.
+  /// Records the time of a solution. `pairs` is the number of pairs of vertices to which the
+  /// operator was applied.
   void TakeSolution(double seconds, double pairs);
   void TakeSurface(double seconds) { surface_s_ = seconds; }
 

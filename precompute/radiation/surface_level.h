@@ -16,7 +16,7 @@
 
 namespace carillon::precompute {
 
-/// A place on a surface: a mean of three of its vertices.
+/// A place on a surface, given as a weighted mean of three vertices.
 struct SurfacePlace {
   std::array<int32_t, 3> vertices;
   std::array<double, 3> weights;  ///< they sum to one
@@ -26,20 +26,21 @@ struct SurfacePlace {
 struct SurfaceLevel {
   AcousticSurface surface;
   NearCorrection near;
-  std::vector<SurfacePlace> places;  ///< of each vertex on the radiating surface
+  std::vector<SurfacePlace> places;  ///< the place of each vertex on the radiating surface
 };
 
-/// The nearest place of each vertex of `surface` on `given`, preferably where both face the same
-/// way: the two sides of a thin wall lie close together.
+/// Returns for each vertex of `surface` the nearest place on `given`. A place where both surfaces
+/// face the same way is preferred, because the two sides of a thin wall lie close together.
 std::vector<SurfacePlace> PlacesOn(const SurfaceMesh& given, const NearestTriangle& index,
                                    const AcousticSurface& surface);
 
-/// Errors: Internal RADIATION_REMESHING_FAILED.
+/// Remeshes the radiating surface with edges of about `edge_m`. Errors: Internal
+/// RADIATION_REMESHING_FAILED.
 absl::StatusOr<SurfaceLevel> MakeSurfaceLevel(const RadiatingSurface& given,
                                               const NearestTriangle& index, double edge_m,
                                               Workers& workers);
 
-/// The displacement of a mode at the level's vertices.
+/// Returns the displacement of a mode at the level's vertices.
 Displacement DisplacementOf(const SurfaceModes& modes, size_t mode, const RadiatingSurface& given,
                             const SurfaceLevel& level);
 

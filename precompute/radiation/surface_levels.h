@@ -13,11 +13,12 @@
 
 namespace carillon::precompute {
 
-/// The surfaces that the modes of one body are solved on, each sqrt(2) times as fine as the one
-/// before it. They are made when they are first asked for.
+/// The surfaces on which the modes of one body are solved. The edges of each level are 1/sqrt(2)
+/// times as long as those of the level before. A level is made when At() first returns it.
 class SurfaceLevels {
  public:
-  /// A level, and where its vertices lie on the level before it (empty where that was not made).
+  /// A level, and the places of its vertices on the level before, or no places if that level was
+  /// not made.
   struct Made {
     explicit Made(SurfaceLevel made) : level(std::move(made)), index(level.surface.mesh) {}
 
@@ -31,17 +32,19 @@ class SurfaceLevels {
 
   static constexpr int kFinest = 8;
 
-  /// Whether the level exists, in principle: not too fine, and not too large.
+  /// Returns whether the level may be made, because it is not too fine and does not have too many
+  /// vertices.
   bool Exists(int level) const;
   bool IsMade(int level) const { return levels_.contains(level); }
-  /// Edges that are asked for, metres.
+  /// Returns the requested length of the level's edges, metres.
   double EdgeOf(int level) const;
-  /// The coarsest level whose edges are about `edge_m`, or nearest to it.
+  /// Returns the level whose edges are nearest to `edge_m`, but at most kFinest - 1, so that a
+  /// finer level follows.
   int LevelOf(double edge_m) const;
-  /// As made, or predicted.
+  /// Returns the number of vertices of the level, or a prediction if the level is not made.
   double VertexCountOf(int level) const;
 
-  /// Errors: those of MakeSurfaceLevel.
+  /// Returns the level, and makes it if necessary. Errors: those of MakeSurfaceLevel.
   absl::StatusOr<const Made*> At(int level);
 
  private:

@@ -7,19 +7,22 @@
 
 namespace carillon::precompute {
 
-/// Vertices that a kernel takes at once: arrays over targets are padded to multiples of it.
+/// Number of targets that a kernel processes at once. Arrays over targets are padded to multiples
+/// of this number.
 inline constexpr int64_t kSweepGrain = 32;
-/// Right-hand sides that one evaluation of the kernel may serve.
+/// Largest number of right-hand sides that one evaluation of the kernel serves.
 inline constexpr int kMaxSweepSides = 2;
-/// Sums that a sweep makes of each target and side: real and imaginary parts of the scalar and of
-/// the three components of the field of the curls.
+/// Number of sums for each target and side: the real and imaginary parts of the scalar and of the
+/// three components of the curls' field.
 inline constexpr int kSweepSums = 8;
-/// Floats of each source before those of its sides: place, area vector.
+/// Number of floats of each source before those of its sides: the position and the area vector.
 inline constexpr int kSourceHead = 6;
-/// Floats of each source and side: p, and three components of its curl, complex.
+/// Number of floats of each source and side: p and the three components of its curl, which are
+/// complex.
 inline constexpr int kSourceSide = 8;
 
-/// Vertices as targets, each array padded to kSweepGrain. Lengths are multiplied by k / pi, so
+/// Vertices as targets. Each array is padded to a multiple of kSweepGrain. Lengths are multiplied
+/// by k / pi, so
 /// that a unit of distance is half a turn of phase.
 struct SweepTargets {
   std::vector<float> x, y, z;
@@ -27,36 +30,39 @@ struct SweepTargets {
   int64_t padded() const { return static_cast<int64_t>(x.size()); }
 };
 
-/// The sums over all sources j other than i that the left side needs, for targets begin ... end - 1
-/// (multiples of kSweepGrain), with g = exp(i pi u)/u, u the distance and e from target to source:
+/// Computes the sums over all sources j other than i that the left side needs, for the targets
+/// begin ... end - 1 (multiples of kSweepGrain). g is exp(i pi u)/u, u the distance, and e the
+/// vector from target to source.
 ///
 ///     sums 0, 1:    sum of g (d/u^2 - i (pi d/u + n_i . N_j)) p_j,     d = N_j . e
 ///     sums 2 ... 7: sum of g J_j
 ///
-/// `sources`: `source_count` records of kSourceHead + sides * kSourceSide floats. `sums`: of side s
-/// and sum q, number (s * kSweepSums + q) * targets.padded() + i.
+/// `sources` has `source_count` records of kSourceHead + sides * kSourceSide floats. Sum q of side
+/// s and target i is number (s * kSweepSums + q) * targets.padded() + i of `sums`.
 void SweepLeft(const SweepTargets& targets, const float* sources, int64_t source_count, int sides,
                int64_t begin, int64_t end, float* sums);
 
-/// The sums of the right side: of each source, its place and then `sides` strengths s_j, floats.
+/// Computes the sums of the right side. Each source has its position and then `sides` strengths
+/// s_j, all floats.
 ///
 ///     sums 0, 1:    sum of g s_j
 ///     sums 2, 3:    sum of g (1/u - i pi) (n_i . e)/u s_j
 ///
-/// `sums`: number (side * 4 + q) * targets.padded() + i.
+/// Sum q of target i is number (side * 4 + q) * targets.padded() + i of `sums`.
 void SweepRight(const SweepTargets& targets, const float* sources, int64_t source_count, int sides,
                 int64_t begin, int64_t end, float* sums);
 
-/// The far pattern: `targets` are directions (n is not used), sources as in SweepLeft with the
-/// amplitude's two parts in place of sides:
+/// Computes the sums of the far pattern. `targets` are directions, whose normals are not used. Each
+/// source has nine floats: position, area vector, b (complex) and s.
 ///
 ///     sums 0, 1:  sum of exp(-i pi d . y_j) ((d . N_j) b_j - s_j)
 ///
-/// with sources of place, area vector, b (complex) and s: nine floats. `sums`: q * padded() + i.
+/// Sum q of direction i is number q * targets.padded() + i of `sums`.
 void SweepFar(const SweepTargets& targets, const float* sources, int64_t source_count,
               int64_t begin, int64_t end, float* sums);
 
-/// The instructions that the sweeps use on this machine: "AVX3", "AVX2", "NEON", ...
+/// Returns the name of the instruction set that the sweeps use on this machine: "AVX3", "AVX2",
+/// "NEON", ...
 std::string SweepTargetName();
 
 }  // namespace carillon::precompute

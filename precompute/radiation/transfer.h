@@ -16,13 +16,14 @@ struct RadiationSettings {
   /// radiates at the wavenumber k = speed_ratio * sqrt(Lambda).
   double speed_ratio = 0;
   Air air;
-  /// Modes of wavenumbers within are computed, 1/m, of the body as large as its mesh.
+  /// Modes with wavenumbers between these bounds are computed, 1/m, for the body at the size of its
+  /// mesh.
   double least_wavenumber = 0;
   double greatest_wavenumber = 0;
-  /// Surfaces are made finer until the estimated error of a mode's power is below it (that of its
-  /// directions, root mean square, below three times it).
+  /// The goal for the estimated error of a mode's power. Surfaces are made finer until it is met,
+  /// and until the root mean square error of the directions is below three times the goal.
   double goal_db = 2;
-  /// Processor time after which nothing more is begun; zero: as long as it takes.
+  /// No solution is started that would exceed this processor time. Zero means no limit.
   double budget_cpu_s = 0;
   int thread_count = 1;
 };
@@ -32,17 +33,17 @@ struct Transfer {
   Point center{};
   double radius_m = 0;
   std::vector<ModeRadiation> modes;
-  RigidRadiation rigid;  ///< without wavenumbers where there was no time for it
+  RigidRadiation rigid;  ///< without wavenumbers if the budget did not allow it
   double cpu_s = 0;
 };
 
-/// Told the part of the work that is done, estimated, 0 to 1.
+/// Called with the estimated fraction of the work that is done, 0 to 1.
 using RadiationProgress = std::function<void(double fraction)>;
 
-/// Solves for the radiation of each mode at its own wavenumber, the lowest and loudest first. Each
-/// mode is solved on two surfaces at least, one 1.41 times as fine as the other; their difference
-/// is the error estimate. The motions of the body as a whole are solved first, where they take less
-/// than a quarter of the budget.
+/// Solves for the radiation of each mode at its own wavenumber, in the order of SortByNeed. If the
+/// budget allows, each mode is solved on at least two surfaces, one 1.41 times as fine as the
+/// other, and the error is estimated from their difference. The rigid motions of the body are
+/// solved first if they take at most a quarter of the budget.
 ///
 /// Errors: those of MakeSurfaceLevel.
 absl::StatusOr<Transfer> ComputeTransfer(const SurfaceModes& modes,

@@ -7,25 +7,26 @@
 
 namespace carillon::precompute {
 
-/// The potentials of a plane triangle with a linear density at a point: one number for the hat
-/// function of each corner.
+/// The potentials of a plane triangle with a linear density at a point. There is one number for the
+/// hat function of each corner.
 struct TrianglePotentials {
   std::array<double, 3> single;   ///< integral of hat / r, m
-  std::array<double, 3> doubled;  ///< integral of hat d(1/r)/dn' (n' the triangle's normal)
+  std::array<double, 3> doubled;  ///< integral of hat d(1/r)/dn', where n' is the triangle's normal
 };
 
-/// The potentials of one triangle in closed form (Wilton et al., IEEE Trans. Antennas Propag. 32,
-/// 1984; Graglia, ibid. 41, 1993). The triangle must have an area.
+/// Computes the potentials of one triangle in closed form (Wilton et al., IEEE Trans. Antennas
+/// Propag. 32, 1984; Graglia, ibid. 41, 1993). The triangle must have an area.
 class TrianglePotential {
  public:
   explicit TrianglePotential(const std::array<Point, 3>& corner);
 
-  /// At `x`, which may lie on the triangle but not on the line of an edge within that edge. In the
-  /// plane of the triangle the double layer is its mean over both sides, zero.
+  /// Returns the potentials at `x`, which may lie on the triangle but not on an edge. In the plane
+  /// of the triangle, the double layer is zero, the mean of its values on both sides.
   TrianglePotentials At(const Point& x) const;
 
  private:
-  /// That the triangle takes up seen from x, without a sign (van Oosterom and Strackee 1983).
+  /// Returns the solid angle of the triangle seen from x, without a sign (van Oosterom and Strackee
+  /// 1983).
   double SolidAngle(const Point& x) const;
 
   struct Edge {

@@ -11,14 +11,14 @@ namespace carillon::precompute {
 /// A point of a quadrature rule on a triangle.
 struct TrianglePoint {
   std::array<double, 3> hat;  ///< barycentric coordinates
-  double weight;              ///< of the area; all weights sum to one
+  double weight;              ///< fraction of the area; all weights sum to one
 };
 
-/// Three inner points, exact to degree 2.
+/// Returns three inner points, exact to degree 2.
 std::span<const TrianglePoint> CoarseTriangleRule();
-/// Radon's seven points, exact to degree 5.
+/// Returns Radon's seven points, exact to degree 5.
 std::span<const TrianglePoint> MediumTriangleRule();
-/// Radon's rule on each quarter of the triangle: 28 points.
+/// Returns Radon's rule on each quarter of the triangle, which has 28 points.
 std::span<const TrianglePoint> FineTriangleRule();
 
 Point PlaceIn(const std::array<Point, 3>& corner, const std::array<double, 3>& hat);
