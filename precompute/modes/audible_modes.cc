@@ -34,7 +34,7 @@ void Pick(const std::vector<size_t>& kept, std::vector<T>& values) {
   values.resize(kept.size());
 }
 
-/// The kept numbers of each row of `mode_count` numbers.
+/// Returns the kept numbers of each row of `mode_count` numbers.
 void PickColumns(const std::vector<size_t>& kept, size_t mode_count, std::vector<float>& rows) {
   size_t to = 0;
   for (size_t row = 0; row < rows.size(); row += mode_count) {

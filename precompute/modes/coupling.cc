@@ -18,11 +18,11 @@ namespace {
 struct Facet {
   Eigen::Vector3d normal;           ///< of length one
   double area;                      ///< m^2
-  std::array<Eigen::Index, 3> row;  ///< of the shapes, of its corners' first components
+  std::array<Eigen::Index, 3> row;  ///< row in the shapes of each corner's first component
 };
 
-/// A triangle of a curved face. The product of the face's two tangents changes along it; `normal`
-/// has it at each corner, and the area is that in the face's own coordinates.
+/// A triangle of a curved face. The cross product of the face's two tangents varies along the face.
+/// `normal` is that product at each corner, and integrals are taken in the face's own coordinates.
 struct CurvedFacet {
   std::array<Eigen::Vector3d, 3> normal;
   std::array<Eigen::Index, 3> row;
@@ -31,19 +31,20 @@ struct CurvedFacet {
 /// Area of a quarter of the triangle (0, 0), (1, 0), (0, 1).
 constexpr double kQuarterArea = 0.125;
 
-/// For each triangle, the face of the boundary that it is a part of.
+/// Returns the face of the boundary to which a triangle belongs.
 const BoundaryFace& FaceOf(const TetMesh& mesh, const SoundingSurface& surface, size_t triangle) {
   return mesh.boundary[triangle * mesh.boundary.size() / surface.triangles.size()];
 }
 
-/// The product of the tangents of a six-node face at its node `at`: the derivatives of its shape
-/// functions by two of the three barycentric coordinates, the third one giving way.
+/// Returns the cross product of the tangents of a six-node face at the face's node `at`. The
+/// tangents are derivatives with respect to two barycentric coordinates, where the remaining
+/// coordinate decreases by as much.
 Eigen::Vector3d NormalAt(const TetMesh& mesh, const BoundaryFace& face, size_t at) {
   Eigen::Vector3d barycentric = Eigen::Vector3d::Zero();
   for (const size_t corner : {at % 3, at < 3 ? at : (at + 1) % 3}) {
     barycentric[static_cast<Eigen::Index>(corner)] = at < 3 ? 1 : 0.5;
   }
-  Eigen::Matrix3d derivatives = Eigen::Matrix3d::Zero();  // by each barycentric coordinate
+  Eigen::Matrix3d derivatives = Eigen::Matrix3d::Zero();  // column i: with respect to coordinate i
   for (Eigen::Index i = 0; i < 3; ++i) {
     const Eigen::Index j = (i + 1) % 3;
     const auto place = [&](Eigen::Index n) {
@@ -73,7 +74,7 @@ std::vector<CurvedFacet> CurvedFacets(const TetMesh& mesh, const SoundingSurface
   return facets;
 }
 
-/// Those of the straight faces.
+/// Returns the facets of the straight faces.
 std::vector<Facet> Facets(const TetMesh& mesh, const SoundingSurface& surface) {
   std::vector<Facet> facets;
   for (size_t t = 0; t < surface.triangles.size(); ++t) {
@@ -86,7 +87,7 @@ std::vector<Facet> Facets(const TetMesh& mesh, const SoundingSurface& surface) {
       row[i] = 3 * static_cast<Eigen::Index>(node);
       at[i] = Eigen::Vector3d::Map(mesh.nodes[static_cast<size_t>(node)].data());
     }
-    const Eigen::Vector3d normal = (at[1] - at[0]).cross(at[2] - at[0]);  // twice the area long
+    const Eigen::Vector3d normal = (at[1] - at[0]).cross(at[2] - at[0]);  // length: twice the area
     const double area = normal.norm() / 2;
     if (area != 0) facets.push_back({.normal = normal / (2 * area), .area = area, .row = row});
   }
@@ -96,13 +97,14 @@ std::vector<Facet> Facets(const TetMesh& mesh, const SoundingSurface& surface) {
 }  // namespace
 
 double IntegralOfAbsolute(double area, double f0, double f1, double f2) {
-  // Makes f0 the corner whose sign differs from the two others, if there is one.
+  // Makes f0 the value whose sign differs from that of the two others, if there is one.
   if (std::signbit(f1) != std::signbit(f2)) {
     std::swap(f0, std::signbit(f0) == std::signbit(f1) ? f2 : f1);
   }
   const double whole = area * (f0 + f1 + f2) / 3;
   if (std::signbit(f0) == std::signbit(f1) || f0 == 0) return std::abs(whole);
-  // The line f = 0 cuts off the corner: a triangle with these parts of its two edges.
+  // The line f = 0 cuts off this corner. The triangle that is cut off has these fractions of the
+  // two edges.
   const double cut = area * (f0 / (f0 - f1)) * (f0 / (f0 - f2)) * f0 / 3;
   return std::abs(whole - cut) + std::abs(cut);
 }

@@ -10,7 +10,7 @@ namespace carillon::precompute {
 namespace {
 
 constexpr int kPoints = 14;
-/// Column k has the gradients of the ten functions at point k, one after the other.
+/// Column k contains the gradients of the ten functions at point k, one after the other.
 using Gradients = Eigen::Matrix<double, 30, kPoints>;
 
 /// The Jacobian of an element's mapping at a point of the rule.

@@ -35,7 +35,7 @@ constexpr int kMaxAttempts = 3;
 constexpr double kFreeMotion = 1e-9;
 constexpr double kRounding = 1e-12;
 
-/// Time of the dense solver for each cube of an unknown; see PrefersDense.
+/// Time of the dense solver divided by the cube of the number of unknowns; see PrefersDense.
 constexpr double kDenseSeconds = 1.4e-10;
 
 absl::Status VerificationFailed(const std::string& what) {
@@ -43,8 +43,7 @@ absl::Status VerificationFailed(const std::string& what) {
                  absl::StrCat(what, "; no model was made; another number of nodes may do"));
 }
 
-/// Keeps the modes with these indices (ascending). It works in place, because shapes fill
-/// gigabytes.
+/// Keeps the modes with these indices (ascending). Works in place, because shapes fill gigabytes.
 void Keep(const std::vector<Eigen::Index>& which, Modes& modes) {
   for (size_t k = 0; k < which.size(); ++k) {
     const auto to = static_cast<Eigen::Index>(k);
@@ -58,7 +57,8 @@ void Keep(const std::vector<Eigen::Index>& which, Modes& modes) {
 }
 
 /// Makes the first of the large components of each shape positive, so that the sign of a shape is
-/// unique. In a symmetric body several components are largest within rounding.
+/// unique. The largest component would not do, because several components of a symmetric body are
+/// largest within rounding.
 void FixSigns(Eigen::MatrixXd& shapes) {
   for (Eigen::Index m = 0; m < shapes.cols(); ++m) {
     auto shape = shapes.col(m);
@@ -94,7 +94,7 @@ std::vector<int> UnknownsOf(const std::vector<int32_t>& nodes) {
   return unknowns;
 }
 
-/// Number of modes that is found whatever it costs, as long as there is memory for it.
+/// Number of modes that are found whatever their cost, as long as there is memory for them.
 constexpr int kAlwaysAffordable = 30;
 
 /// One solution: it counts the modes, solves for them and verifies them.
@@ -111,7 +111,7 @@ class Solution {
         rigid_momenta_(system.M.selfadjointView<Eigen::Lower>() * rigid_),
         workers_(ThreadCount()) {}
 
-  /// Number of rigid-body modes; six for a free body.
+  /// Returns the number of rigid-body modes; six for a free body.
   int rigid_mode_count() const { return static_cast<int>(rigid_.cols()); }
 
   absl::StatusOr<int> CountBelow(double limit) const {
@@ -129,8 +129,8 @@ class Solution {
     return count;
   }
 
-  /// The number of modes of the body that is expected below the limit, whatever its mesh; rarely
-  /// too many.
+  /// Returns the number of modes that is expected below the limit, independent of the mesh. It is
+  /// rarely too high.
   int ExpectedCount(double limit) const {
     constexpr double kMost = 1e9;
     return rigid_mode_count() + static_cast<int>(std::min(WeylModeCount(system_, limit), kMost));
@@ -138,7 +138,7 @@ class Solution {
 
   int unknown_count() const { return static_cast<int>(system_.unknown_count()); }
 
-  /// Whether the limit may be lowered so that fewer than `count` modes lie below it.
+  /// Returns whether the limit may be lowered so that fewer than `count` modes lie below it.
   bool MayLowerLimit(int count) const {
     return options_.means.has_value() && count > MostAffordable();
   }
@@ -150,7 +150,7 @@ class Solution {
     return absl::OkStatus();
   }
 
-  /// The largest number of modes, rigid-body ones included, that the means allow.
+  /// Returns the largest number of modes, rigid-body ones included, that the means allow.
   int MostAffordable() const {
     return LargestThat(rigid_mode_count() + kAlwaysAffordable,
                        rigid_mode_count() + options_.max_mode_count,
@@ -170,10 +170,10 @@ class Solution {
     });
   }
 
-  /// An upper bound near the lowest deformation eigenvalue.
+  /// Returns an upper bound near the lowest deformation eigenvalue.
   double BoundOfLowest() const { return LowestEigenvalueBound(nodes_, system_, options_.held); }
 
-  /// Separates rigid-body modes, and makes all checks except the one for completeness.
+  /// Removes the rigid-body modes, and makes all checks except the one for completeness.
   absl::StatusOr<DeformationModes> Verify(Modes all, double limit) const {
     watch_(SolveStage::kVerify, 0);
     DeformationModes result;
@@ -231,7 +231,7 @@ class Solution {
     return std::make_unique<BlockLanczosEigensolver>(ordered_, rigid_);
   }
 
-  /// Components of shapes along the rigid-body modes: #rigid by #shapes.
+  /// Returns the components of shapes along the rigid-body modes, #rigid by #shapes.
   Eigen::MatrixXd InRigid(const Eigen::MatrixXd& shapes) const {
     const auto rows = static_cast<int>(shapes.rows());
     const auto rigid = static_cast<int>(rigid_momenta_.cols());
@@ -294,8 +294,8 @@ class Solution {
   mutable Workers workers_;
 };
 
-/// Counts the modes below the limit, or below a lower one where all of them cost too much. The
-/// count that was asked for is skipped where far too many modes must be expected.
+/// Counts the modes below the limit, or below a lower limit if all of the modes would cost too
+/// much. The modes below the requested limit are not counted if far too many are expected.
 absl::StatusOr<Counted> CountAffordable(const Solution& solution, double limit) {
   constexpr int kFarTooMany = 4;
   const int expected = solution.ExpectedCount(limit);

@@ -28,18 +28,18 @@ using Barycentric = Eigen::Vector4d;
 /// The constant C of the header, for each order of elements.
 constexpr double kLinearConstant = 1.3;
 constexpr double kQuadraticConstant = 1.8;
-/// Largest fraction of an eigenvalue that may be error; beyond it the mesh gives no information
-/// about the mode.
+/// Largest error as a fraction of the eigenvalue. If the estimate is larger, the mesh gives no
+/// information about the mode.
 constexpr double kMostError = 0.99;
 
 /// Residuals are computed in batches: at least kFewestModesAtATime modes, and otherwise as many as
-/// fit into max(kResidualBytes, kTimesShapes * size of the shapes), which is less than the solution
-/// needed beside the shapes.
+/// fit into max(kResidualBytes, kTimesShapes * size of the shapes), which is less than the solver
+/// needed in addition to the shapes.
 constexpr size_t kResidualBytes = size_t{512} << 20U;
 constexpr size_t kTimesShapes = 2;
 constexpr size_t kFewestModesAtATime = 8;
 
-/// Integrals over the reference tetrahedron, of volume one, of products of two sets of functions.
+/// Integrals of products of two sets of functions over a tetrahedron of volume one.
 class ReferenceIntegrals {
  public:
   explicit ReferenceIntegrals(int node_count) {
@@ -60,13 +60,13 @@ class ReferenceIntegrals {
     });
   }
 
-  std::vector<Eigen::Matrix4d> mixed;  ///< [added * #base + base], by derivative
-  std::vector<Eigen::Matrix4d> own;    ///< [added], with itself
+  std::vector<Eigen::Matrix4d> mixed;  ///< [added * #base + base]: products of derivatives
+  std::vector<Eigen::Matrix4d> own;    ///< [added]: each added function with itself
   Eigen::MatrixXd mass;                ///< #added by #base
 
  private:
-  /// The product of Gauss-Legendre rules of four points, collapsed onto the tetrahedron: exact for
-  /// polynomials of degree five.
+  /// Uses the product of Gauss-Legendre rules of four points, collapsed onto the tetrahedron. It is
+  /// exact for polynomials of degree five.
   template <typename Use>
   static void ForEachPoint(const Use& use) {
     constexpr std::array<double, 4> kAt = {0.0694318442029737, 0.3300094782075719,
@@ -77,7 +77,7 @@ class ReferenceIntegrals {
       for (size_t j = 0; j < 4; ++j) {
         for (size_t k = 0; k < 4; ++k) {
           const double x = kAt[i], y = (1 - x) * kAt[j], z = (1 - x - y) * kAt[k];
-          // The volume is 1/6; the integral is divided by it.
+          // The integral is divided by the volume, which is 1/6.
           const double jacobian = 6 * (1 - x) * (1 - x - y);
           use(Barycentric(1 - x - y - z, x, y, z), jacobian * kWeight[i] * kWeight[j] * kWeight[k]);
         }
@@ -86,8 +86,9 @@ class ReferenceIntegrals {
   }
 };
 
-/// a(f, g) of two functions, a 3 by 3 block for their components, from the integrals of their
-/// derivatives: lambda G + mu G^T + mu tr(G) I with G = vol sum_ij T_ij grad L_i grad L_j^T.
+/// Returns a(f, g) of two functions, a 3 by 3 block for their components. It is lambda G + mu G^T +
+/// mu tr(G) I with G = vol sum_ij T_ij grad L_i grad L_j^T, where T has the integrals of products
+/// of the functions' derivatives.
 Eigen::Matrix3d Stiffness(const Eigen::Matrix4d& integrals, const TetGeometry& geometry,
                           const LameConstants& lame) {
   const Eigen::Matrix3d G =
@@ -96,7 +97,8 @@ Eigen::Matrix3d Stiffness(const Eigen::Matrix4d& integrals, const TetGeometry& g
          lame.mu_pa * G.trace() * Eigen::Matrix3d::Identity();
 }
 
-/// The edges and faces of a mesh, numbered; each element's in the order of AddedFunctions.
+/// Numbers the edges and faces of a mesh. The edges and faces of an element are in the order of
+/// AddedFunctions.
 class Places {
  public:
   explicit Places(const TetMesh& mesh) : added_(mesh.nodes_per_element == 10 ? 10 : 6) {
@@ -115,7 +117,8 @@ class Places {
     for (const auto& [nodes, number] : numbers) nodes_[static_cast<size_t>(number)] = nodes;
   }
 
-  /// For each edge or face, whether it is fixed, that is whether all its corners are.
+  /// Returns for each edge or face whether it is fixed, that is, whether all of its corners are
+  /// fixed.
   std::vector<bool> HeldWith(const TetMesh& mesh) const {
     std::vector<bool> node_is_held(mesh.nodes.size());
     for (const int32_t node : mesh.held) node_is_held[static_cast<size_t>(node)] = true;
@@ -131,7 +134,7 @@ class Places {
   size_t count() const { return nodes_.size(); }
   size_t added() const { return added_; }
   int32_t Of(size_t element, size_t i) const { return number_[element * added_ + i]; }
-  /// An odd function on an edge changes its sign with the edge's direction. The function of a
+  /// An odd function on an edge changes its sign with the edge's direction. The added function of a
   /// linear element is even.
   double Sign(size_t element, size_t i) const {
     return added_ == 6 ? 1.0 : static_cast<double>(sign_[element * added_ + i]);
@@ -147,7 +150,7 @@ class Places {
   }
 
   size_t added_;
-  std::vector<std::array<int32_t, 3>> nodes_;  // corners of each, after -1 for an edge
+  std::vector<std::array<int32_t, 3>> nodes_;  // the corners; for an edge, -1 comes first
   std::vector<int32_t> number_;
   std::vector<int8_t> sign_;
 };
@@ -184,9 +187,9 @@ class Estimator {
     }
   }
 
-  /// The best number of modes for each thread in one pass over the elements. If memory allows, one
-  /// thread takes all modes in one pass, because most of the time of a pass is spent on the
-  /// elements.
+  /// Returns the best number of modes for each thread in one pass over the elements. If memory
+  /// allows, one thread takes all modes in one pass, because most of the time of a pass is spent on
+  /// the elements.
   Eigen::Index ModesAtATime(const Eigen::MatrixXd& shapes, int thread_count) const {
     const size_t bytes_of_mode = 3 * sizeof(double) * places_.count();
     const size_t shape_bytes = sizeof(double) * static_cast<size_t>(shapes.size());
@@ -196,7 +199,7 @@ class Estimator {
         std::max(kFewestModesAtATime, most / static_cast<size_t>(thread_count)));
   }
 
-  /// sum_b r_b^T a(b, b)^-1 r_b of some modes: shapes #U by #modes.
+  /// Returns sum_b r_b^T a(b, b)^-1 r_b for some modes. `shapes` is #U by #modes.
   Eigen::VectorXd Corrections(const Eigen::VectorXd& eigenvalues, const RowMatrix& shapes) const {
     RowMatrix residuals =
         RowMatrix::Zero(3 * static_cast<Eigen::Index>(places_.count()), shapes.cols());
@@ -220,8 +223,8 @@ class Estimator {
   }
 
  private:
-  /// The residuals of the modes for the added functions of an element: a(b, phi) - m(b, phi)
-  /// Lambda.
+  /// Computes the residuals of the modes for the added functions of an element, a(b, phi) - m(b,
+  /// phi) Lambda.
   struct ElementResidual {
     ElementResidual(Eigen::Index added, Eigen::Index unknowns, Eigen::Index mode_count)
         : stiffness(added, unknowns),
@@ -243,7 +246,7 @@ class Estimator {
     RowMatrix result;  ///< #added by #modes
   };
 
-  /// z := x y, as column-major matrices: z^T = y^T x^T.
+  /// Computes z := x y, which for column-major matrices is z^T = y^T x^T.
   static void RowProduct(const RowMatrix& x, const RowMatrix& y, RowMatrix& z) {
     const auto columns = static_cast<int>(y.cols()), inner = static_cast<int>(x.cols());
     blas::Product(columns, static_cast<int>(x.rows()), inner, y.data(), columns, x.data(), inner,
@@ -296,7 +299,7 @@ class Estimator {
   const CurvedIntegrals curved_;
   const Places places_;
   const std::vector<bool> held_;
-  std::vector<Eigen::Matrix3d> stiffness_;  // a(b, b) of each place
+  std::vector<Eigen::Matrix3d> stiffness_;  // a(b, b) of each edge or face
 };
 
 }  // namespace

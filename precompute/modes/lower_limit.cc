@@ -14,7 +14,7 @@ absl::StatusOr<Counted> LowerLimit(
   constexpr int kMostCounts = 8;
   constexpr double kEnough = 0.5;
   constexpr double kAimedAt = 0.75;
-  // An eigenvalue grows with this power of its number in a solid, and faster in a wall.
+  // In a solid, the n-th eigenvalue grows with this power of n. In a wall it grows faster.
   constexpr double kPowerInSolid = 2.0 / 3;
   double power = kPowerInSolid;
   std::optional<Counted> below;

@@ -20,7 +20,7 @@ std::array<float, 3> ToFloat(const Point& p) {
 }
 
 std::vector<float> ShapesOnSurface(const SoundingSurface& surface, const Eigen::MatrixXd& shapes) {
-  // The transposition works on parts that fit into the cache.
+  // The shapes are transposed in parts that fit into the cache.
   constexpr size_t kPart = 256;
   const auto mode_count = static_cast<size_t>(shapes.cols());
   std::vector<float> result(3 * surface.nodes.size() * mode_count);

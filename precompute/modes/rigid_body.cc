@@ -24,7 +24,7 @@ Eigen::Map<const Eigen::Matrix3Xd> Positions(const std::vector<Point>& nodes) {
   return {nodes.front().data(), 3, static_cast<Index>(nodes.size())};
 }
 
-/// The centre of the nodes, and half their extent.
+/// The centre of the nodes, and half of their extent.
 struct Frame {
   explicit Frame(const std::vector<Point>& nodes)
       : centroid(Positions(nodes).rowwise().mean()),
@@ -34,8 +34,8 @@ struct Frame {
   double size;
 };
 
-/// Translations, then rotations about the centroid by which a node `size` away moves by one: 3
-/// #nodes by 6.
+/// Returns the translations and then the rotations about the centroid, 3 #nodes by 6. A rotation
+/// moves a node at the distance `size` from the axis by one.
 MatrixXd Motions(const std::vector<Point>& nodes, const Frame& frame) {
   MatrixXd motions = MatrixXd::Zero(3 * static_cast<Index>(nodes.size()), 6);
   for (size_t n = 0; n < nodes.size(); ++n) {
@@ -50,7 +50,7 @@ MatrixXd Motions(const std::vector<Point>& nodes, const Frame& frame) {
   return motions;
 }
 
-/// The combinations of the six motions that do not move the fixed nodes: 6 by the number of
+/// Returns the combinations of the six motions that do not move the fixed nodes, 6 by the number of
 /// combinations.
 MatrixXd FreeCombinations(const std::vector<Point>& held, const Frame& frame) {
   if (held.empty()) return MatrixXd::Identity(6, 6);
@@ -62,8 +62,8 @@ MatrixXd FreeCombinations(const std::vector<Point>& held, const Frame& frame) {
   return gram.eigenvectors().leftCols(count);
 }
 
-/// The distance of each node to the nearest fixed node, relative to the body's size; one if no node
-/// is fixed.
+/// Returns the distance of each node to the nearest fixed node, relative to the body's size, or one
+/// if no node is fixed.
 Eigen::VectorXd Weights(const std::vector<Point>& nodes, const std::vector<Point>& held,
                         double size) {
   Eigen::VectorXd weights = Eigen::VectorXd::Ones(static_cast<Index>(nodes.size()));
@@ -80,7 +80,8 @@ Eigen::VectorXd Weights(const std::vector<Point>& nodes, const std::vector<Point
   return weights;
 }
 
-/// Displacements that are polynomials of second degree times the distance to the fixed nodes.
+/// Returns displacements that are polynomials of second degree times the distance to the fixed
+/// nodes.
 MatrixXd PolynomialFields(const std::vector<Point>& nodes, const std::vector<Point>& held) {
   const Frame frame(nodes);
   const Eigen::VectorXd weights = Weights(nodes, held, frame.size);
@@ -116,14 +117,14 @@ MatrixXd RigidBodyModes(const std::vector<Point>& nodes, const SystemMatrices& s
 double LowestEigenvalueBound(const std::vector<Point>& nodes, const SystemMatrices& system,
                              const std::vector<Point>& held) {
   MatrixXd fields = PolynomialFields(nodes, held);
-  Index rigid_count = 6;  // for a free body they are polynomials of first degree
+  Index rigid_count = 6;  // a free body's rigid-body modes are first-degree polynomials
   if (!held.empty()) {
     const MatrixXd rigid = RigidBodyModes(nodes, system, held);
     rigid_count = rigid.cols();
     fields.conservativeResize(Eigen::NoChange, 30 + rigid_count);
     fields.rightCols(rigid_count) = rigid;
   }
-  // With very few nodes the fields are dependent.
+  // If there are very few nodes, the displacements are linearly dependent.
   if (system.unknown_count() < 2 * fields.cols()) {
     return (system.K.diagonal().array() / system.M.diagonal().array()).maxCoeff();
   }

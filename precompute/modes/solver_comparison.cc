@@ -17,7 +17,7 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-/// The unknowns of the system among those of all nodes of the mesh.
+/// Returns the indices of the system's unknowns among the unknowns of all nodes of the mesh.
 std::vector<Index> MovingUnknowns(const TetMesh& mesh) {
   std::vector<Index> unknowns;
   for (const int32_t node : MovingNodes(mesh)) {
@@ -26,13 +26,14 @@ std::vector<Index> MovingUnknowns(const TetMesh& mesh) {
   return unknowns;
 }
 
-/// The squared cosine of the largest angle between the spaces that two M-orthonormal bases span.
+/// Returns the squared cosine of the largest angle between the spaces that two M-orthonormal bases
+/// span.
 double SubspaceMac(const MatrixXd& first, const MatrixXd& mass_times_second) {
   const Eigen::JacobiSVD<MatrixXd> svd(first.transpose() * mass_times_second);
   return std::pow(svd.singularValues().minCoeff(), 2);
 }
 
-/// The end of the group of close eigenvalues that begins at `begin`.
+/// Returns the end of the group of close eigenvalues that starts at `begin`.
 Index GroupEnd(const Eigen::VectorXd& eigenvalues, Index begin, Index count) {
   Index end = begin + 1;
   while (end < count && eigenvalues[end] < eigenvalues[end - 1] * (1 + kSameEigenvalue)) ++end;

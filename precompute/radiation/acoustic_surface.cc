@@ -18,7 +18,8 @@ void Add(const Point& p, Point& sum) {
   for (size_t a = 0; a < 3; ++a) sum[a] += p[a];
 }
 
-/// The edge that faces corner `c`, in the sense of the triangle's turn.
+/// Returns the edge opposite to corner `c`, in the direction in which the triangle's corners are
+/// ordered.
 std::array<float, 3> OppositeEdge(const AcousticSurface& surface, size_t t, size_t c) {
   const auto corner = CornersOf(surface.mesh, t);
   const Point edge = Difference(corner[(c + 2) % 3], corner[(c + 1) % 3]);

@@ -17,8 +17,8 @@ using ComplexFloat = std::complex<float>;
 /// times the sum of the values at its corners for the integral.
 struct AcousticSurface {
   SurfaceMesh mesh;
-  std::vector<double> areas;        ///< #vertices, m^2: a third of the area of the triangles at it
-  std::vector<Point> area_vectors;  ///< #vertices, m^2: a third of their area vectors, outwards
+  std::vector<double> areas;        ///< #vertices, m^2: a third of the area of its triangles
+  std::vector<Point> area_vectors;  ///< #vertices, m^2: a third of their area vectors; outwards
   std::vector<Point> triangle_area_vectors;  ///< #triangles, m^2
   double mean_edge_m = 0;
 

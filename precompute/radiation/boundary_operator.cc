@@ -13,7 +13,8 @@ namespace carillon::precompute {
 namespace {
 
 constexpr double kFourPi = 4 * std::numbers::pi;
-/// Where targets that pad the arrays lie, in half wavelengths: away from every source.
+/// Coordinate of the targets that pad the arrays, in half wavelengths. It is far away from every
+/// source.
 constexpr float kFarAway = 1e4F;
 
 int64_t Padded(size_t count) {
@@ -79,7 +80,7 @@ void BoundaryOperator::Apply(std::span<const std::vector<ComplexFloat>> pressure
   });
 
   const auto green = static_cast<float>(scale_ / kFourPi);
-  const auto own_green = static_cast<float>(wavenumber_ / kFourPi);  // times i
+  const auto own_green = static_cast<float>(wavenumber_ / kFourPi);  // imaginary
   for (size_t s = 0; s < sides; ++s) {
     auto& result = results[s];
     result.assign(size(), 0);
@@ -182,7 +183,7 @@ std::vector<std::vector<ComplexFloat>> BoundaryOperator::RightSides(
     for (size_t t = 0; t < surface_.mesh.triangles.size(); ++t) {
       const auto& triangle = surface_.mesh.triangles[t];
       const Point& n = surface_.triangle_area_vectors[t];
-      std::array<double, 3> q{};  // times the area
+      std::array<double, 3> q{};  // q at the corners, times the area
       for (size_t c = 0; c < 3; ++c) {
         const auto& u = displacements[s][static_cast<size_t>(triangle[c])];
         for (size_t a = 0; a < 3; ++a) q[c] += n[a] * u[a];
@@ -207,7 +208,7 @@ std::vector<ComplexFloat> BoundaryOperator::Diagonal() const {
     const auto weight = static_cast<float>(Norm(surface_.triangle_area_vectors[t]) / 12);
     for (const int32_t v : surface_.mesh.triangles[t]) diagonal[static_cast<size_t>(v)] += weight;
   }
-  // Vertices without a triangle have a row of zeros, and p = 0.
+  // The row of a vertex without a triangle is zero. A diagonal of one then gives p = 0.
   std::ranges::replace(diagonal, ComplexFloat(0), ComplexFloat(1));
   return diagonal;
 }

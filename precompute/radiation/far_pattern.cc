@@ -42,7 +42,7 @@ std::vector<std::complex<double>> FarPattern(const AcousticSurface& surface, con
       sources.push_back(static_cast<float>(scale * (surface.mesh.vertices[v][a] - center[a])));
     }
     for (const double x : n) sources.push_back(static_cast<float>(x));
-    // -i k p, whose normal derivative factor is (d . n).
+    // This is b = -i k p, which SweepFar multiplies by d . N.
     sources.push_back(static_cast<float>(wavenumber * p[v].imag()));
     sources.push_back(static_cast<float>(-wavenumber * p[v].real()));
     sources.push_back(static_cast<float>(n[0] * u[0] + n[1] * u[1] + n[2] * u[2]));

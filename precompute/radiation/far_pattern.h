@@ -17,8 +17,7 @@ namespace carillon::precompute {
 int PatternOrder(double wavenumber, double radius_m);
 
 /// Returns P at the directions of the grid. Far away, at the distance r from `center`, the pressure
-/// is
-/// P exp(i k r)/r for dp/dn = n . displacement and the pressure `p` on the surface.
+/// is P exp(i k r)/r for dp/dn = n . displacement and the pressure `p` on the surface.
 std::vector<std::complex<double>> FarPattern(const AcousticSurface& surface, const Point& center,
                                              double wavenumber, std::span<const ComplexFloat> p,
                                              const Displacement& displacement,

@@ -11,7 +11,7 @@ namespace {
 using Complex = std::complex<double>;
 using Vector = std::vector<ComplexFloat>;
 
-/// conj(a) . b, added up in double.
+/// Returns conj(a) . b, summed in double precision.
 Complex Inner(const Vector& a, const Vector& b) {
   double real = 0, imag = 0;
   for (size_t i = 0; i < a.size(); ++i) {
@@ -35,7 +35,7 @@ void SubtractTimes(const Vector& a, Complex factor, Vector& b) {
 /// The Krylov space of one right side.
 class Krylov {
  public:
-  /// `residual`: b - A start.
+  /// `residual` is b - A start.
   Krylov(Vector start, Vector residual, double right_side_length)
       : x_(std::move(start)), right_side_length_(right_side_length) {
     const double length = Length(residual);
@@ -47,7 +47,8 @@ class Krylov {
     return right_side_length_ > 0 ? std::abs(rotated_.back()) / right_side_length_ : 0;
   }
   int iterations() const { return static_cast<int>(triangle_.size()); }
-  /// The last product was zero or no number, so that another would bring nothing.
+  /// Returns whether the last product was zero or not a number, so that another product would bring
+  /// no progress.
   bool stuck() const { return stuck_; }
 
   Vector NextInput(std::span<const ComplexFloat> diagonal) const {
@@ -56,7 +57,7 @@ class Krylov {
     return input;
   }
 
-  /// Takes A times the last input into the space.
+  /// Extends the space by `product`, which is A times the last input.
   void Extend(Vector product) {
     std::vector<Complex> column;
     for (const Vector& v : basis_) {
@@ -116,7 +117,7 @@ class Krylov {
   std::vector<Vector> basis_;
   std::vector<std::vector<Complex>> triangle_;  ///< columns of the triangular factor
   std::vector<Rotation> rotations_;
-  std::vector<Complex> rotated_;  ///< the right side in the basis, rotated
+  std::vector<Complex> rotated_;  ///< the right side in the basis, after the rotations
 };
 
 std::vector<Krylov> MakeSpaces(const ApplyMatrix& apply, std::span<const Vector> right_sides,

@@ -8,15 +8,15 @@
 namespace carillon::precompute {
 namespace {
 
-/// Integrals over the volume: of 1, of x_a, and of x_a x_b.
+/// Integrals of 1, of x_a, and of x_a x_b over the volume.
 struct Moments {
   double volume = 0;
   Point first{};
   std::array<std::array<double, 3>, 3> second{};
 };
 
-/// Adds the tetrahedron between the origin and a triangle, whose volume has the sign of the
-/// triangle's turn.
+/// Adds the tetrahedron between the origin and a triangle. Its volume is positive if the triangle
+/// is clockwise seen from the origin.
 void AddTetrahedron(const std::array<Point, 3>& corner, Moments& sum) {
   const double volume = Dot(corner[0], Cross(corner[1], corner[2])) / 6;
   sum.volume += volume;

@@ -7,7 +7,7 @@
 namespace carillon::precompute {
 namespace {
 
-/// Modes whose wavenumbers differ by less, relatively, are solved at their mean.
+/// Two modes whose wavenumbers differ by a smaller fraction are solved at their mean wavenumber.
 constexpr double kPairWidth = 2e-3;
 
 }  // namespace

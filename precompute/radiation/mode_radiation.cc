@@ -8,9 +8,9 @@
 namespace carillon::precompute {
 namespace {
 
-/// Harmonics weaker than this part of a mode's strongest, in power, are not kept.
+/// Harmonics whose power is less than this fraction of the strongest harmonic's are not kept.
 constexpr double kKeptPower = 1e-4;
-/// 0.05 dB.
+/// Fraction of the power that the harmonics up to the mode's order must contain, -0.05 dB.
 constexpr double kPowerInOrder = 0.98855;
 
 }  // namespace

@@ -17,21 +17,23 @@ namespace {
 
 constexpr double kFourPi = 4 * std::numbers::pi;
 
-/// In mean edges, between the middles of two triangles: nearer pairs are integrated exactly, with
-/// ever finer outer rules.
+/// Distances between the middles of two triangles, in mean edges. Pairs nearer than kNear are
+/// integrated exactly. The nearer the pair, the finer the outer rule.
 constexpr double kNear = 2.5;
 constexpr double kNearMedium = 1.5;
 constexpr double kNearFine = 0.8;
 
 using Block = std::array<std::array<double, 3>, 3>;
 
-/// Integrals over an outer and an inner triangle, for hats [outer corner][inner corner].
+/// Integrals over an outer and an inner triangle, for the hat functions [outer corner][inner
+/// corner].
 struct PairIntegrals {
   Block single{};
   Block doubled{};  ///< derivative along the inner triangle's normal
 };
 
-/// The triangles of a surface, sorted into cubes so that those near a place are found at once.
+/// The triangles of a surface, sorted into cubic cells so that the triangles near a place are found
+/// quickly.
 class TriangleGrid {
  public:
   TriangleGrid(std::span<const Point> middles, double cell_m) : cell_m_(cell_m) {
@@ -40,7 +42,7 @@ class TriangleGrid {
     }
   }
 
-  /// Calls visit(t) for all triangles whose middles may lie within a cell's size of `place`.
+  /// Calls visit(t) for all triangles whose middles may be nearer to `place` than a cell's size.
   template <typename Visit>
   void VisitNear(const Point& place, const Visit& visit) const {
     for (int i = 0; i < 27; ++i) {
@@ -81,8 +83,8 @@ class NearAssembly {
   NearCorrection Make() && {
     FindNear();
     MakePattern();
-    // Each thread adds up in entries of its own, and always the same triangles, so that two runs
-    // round alike.
+    // Each thread sums into entries of its own, always for the same triangles, so that two runs
+    // have the same rounding errors.
     std::vector<NearCorrection> parts(static_cast<size_t>(workers_.count()), result_);
     workers_.Run([&](int thread) {
       NearCorrection& part = parts[static_cast<size_t>(thread)];
@@ -111,7 +113,7 @@ class NearAssembly {
     });
   }
 
-  /// Vertices are near where two of their triangles are.
+  /// Makes the pattern of the matrix. Two vertices are near if two of their triangles are near.
   void MakePattern() {
     const size_t n = surface_.vertex_count();
     std::vector<std::vector<int32_t>> rows(n);
@@ -159,7 +161,8 @@ class NearAssembly {
     return sum;
   }
 
-  /// The vertex rule on both triangles; a vertex does not act on itself.
+  /// Returns the integrals by the vertex rule on both triangles, in which a vertex does not act on
+  /// itself.
   PairIntegrals Lumped(size_t outer, size_t inner) const {
     const auto x = CornersOf(surface_.mesh, outer), y = CornersOf(surface_.mesh, inner);
     const double weight = AreaOf(outer) / (9 * kFourPi);
@@ -249,7 +252,7 @@ class NearAssembly {
   Workers& workers_;
   std::vector<Point> middles_;
   std::vector<TrianglePotential> potentials_;
-  std::vector<std::array<Point, 3>> curls_;  ///< of the hats of each triangle
+  std::vector<std::array<Point, 3>> curls_;  ///< curls of the hat functions of each triangle
   std::vector<std::vector<int32_t>> near_;
   NearCorrection result_;
 };

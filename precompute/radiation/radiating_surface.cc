@@ -21,7 +21,8 @@ SurfaceMesh WholeSurface(const SurfaceModes& modes) {
   return whole;
 }
 
-/// A shell that turns inwards is the wall of a void; a shell within such a wall is enclosed, too.
+/// Returns whether a shell is the wall of a void, whose normals point inwards, or lies within such
+/// a wall.
 bool IsEnclosed(const SurfaceMesh& whole, const Shell& shell, const std::vector<Shell>& shells) {
   if (shell.volume_m3 < 0) return true;
   return std::ranges::any_of(shells, [&](const Shell& other) {
@@ -44,7 +45,7 @@ void SetSphere(RadiatingSurface& surface) {
   }
 }
 
-/// Adds up the integrals of f^2 and |grad f|^2 of some modes over one triangle.
+/// Adds the integrals of f^2 and |grad f|^2 of some modes over one triangle.
 void AddTriangle(const SurfaceModes& modes, const RadiatingSurface& surface, size_t t,
                  std::pair<size_t, size_t> part, std::span<double> energy,
                  std::span<double> slope) {
@@ -54,7 +55,7 @@ void AddTriangle(const SurfaceModes& modes, const RadiatingSurface& surface, siz
   const double twice_area = Norm(area_normal);
   if (!(twice_area > 0)) return;
   std::array<const float*, 3> shape{};
-  // |grad f|^2 = sum over the corners' pairs of f_i f_j e_i . e_j / (2 A)^2.
+  // |grad f|^2 is the sum of f_i f_j e_i . e_j / (2 A)^2 over the pairs of corners i, j.
   std::array<Point, 3> edge{};
   std::array<float, 3> normal{};
   for (size_t c = 0; c < 3; ++c) {
@@ -64,7 +65,7 @@ void AddTriangle(const SurfaceModes& modes, const RadiatingSurface& surface, siz
     normal[c] = static_cast<float>(area_normal[c] / twice_area);
   }
   const auto area = static_cast<float>(twice_area / 2);
-  std::array<float, 6> stiffness{};  // 00 11 22 01 12 20
+  std::array<float, 6> stiffness{};  // index pairs 00 11 22 01 12 20
   for (size_t c = 0; c < 3; ++c) {
     stiffness[c] = static_cast<float>(Dot(edge[c], edge[c]) / (2 * twice_area));
     stiffness[3 + c] = static_cast<float>(Dot(edge[c], edge[(c + 1) % 3]) / twice_area);

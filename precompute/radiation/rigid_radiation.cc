@@ -19,16 +19,17 @@ namespace {
 using Complex = std::complex<double>;
 using Harmonics = std::array<Complex, kRigidHarmonicCount>;
 
-/// Ends of the wavenumbers: edges of the level to the shortest wave, and shortest to longest wave.
+/// Limits of the wavenumbers: the level's edges in the shortest wave, and the ratio of the longest
+/// to the shortest wave.
 constexpr double kEdgesPerWave = 2.5;
 constexpr double kRange = 60;
 constexpr double kTolerance = 2e-2;
-/// Radii that are tried, in parts of that of the sphere around the body.
+/// Range and number of the radii that are tried, in radii of the sphere around the body.
 constexpr double kLeastRadius = 0.02;
 constexpr double kGreatestRadius = 1.25;
 constexpr int kRadiusSteps = 120;
 
-/// One motion at one wavenumber.
+/// The solution for one motion at one wavenumber.
 struct Solved {
   double wavenumber;
   double power_integral;
@@ -47,7 +48,7 @@ Displacement RigidDisplacement(const AcousticSurface& surface, const Point& cent
   return displacement;
 }
 
-/// h_l'(x) of the spherical Hankel function of the first kind.
+/// Returns h_l'(x), the derivative of the spherical Hankel function of the first kind.
 Complex HankelSlope(int l, double x) {
   const Complex i(0, 1);
   const Complex wave = std::exp(i * x) / x;
@@ -60,13 +61,13 @@ Complex HankelSlope(int l, double x) {
 
 int OrderOf(size_t harmonic) { return harmonic == 0 ? 0 : harmonic < 4 ? 1 : 2; }
 
-/// c_lm of a sphere that moves by Y_lm.
+/// Returns c_lm of a sphere that moves by Y_lm.
 Complex SphereResponse(size_t harmonic, double wavenumber, double radius_m) {
   return 1.0 / (wavenumber * HankelSlope(OrderOf(harmonic), wavenumber * radius_m));
 }
 
-/// Strengths of the sphere of this radius, by least squares of the differences relative to each
-/// wavenumber's power; and what remains of them.
+/// Computes the strengths of the sphere of this radius by least squares. Differences are relative
+/// to the power at each wavenumber. Returns the remaining sum of squares.
 double FitStrengths(const std::vector<Solved>& solved, double radius_m,
                     std::array<double, kRigidHarmonicCount>& strengths) {
   double left = 0;
@@ -128,7 +129,7 @@ Solved Expand(const ModeField& field, double wavenumber, const SphereGrid& grid)
   Solved result{.wavenumber = wavenumber, .power_integral = field.power_integral, .harmonics = {}};
   const std::vector<Complex> pattern = grid.Analyse(field.pattern);
   for (size_t i = 0; i < kRigidHarmonicCount; ++i) {
-    // k i^(l + 1)
+    // This factor is k i^(l + 1).
     const Complex turn = wavenumber * std::pow(Complex(0, 1), OrderOf(i) + 1);
     result.harmonics[i] = turn * pattern[i];
   }

@@ -11,8 +11,8 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-/// n_lm P_l^m(x) for 0 <= m <= l <= order, at index l (l + 1)/2 + m, by the stable recurrence
-/// upwards in l.
+/// Returns n_lm P_l^m(x) for 0 <= m <= l <= order at index l (l + 1)/2 + m. The recurrence upwards
+/// in l is stable.
 std::vector<double> Legendre(int order, double x) {
   const auto at = [](int l, int m) { return static_cast<size_t>(l * (l + 1) / 2 + m); };
   std::vector<double> p(at(order, order) + 1);
@@ -33,16 +33,17 @@ std::vector<double> Legendre(int order, double x) {
   return p;
 }
 
-/// cos(m phi), or sin(|m| phi) for m < 0, at step j of `around`.
+/// Returns cos(m phi), or sin(|m| phi) for m < 0, at step j of `around`.
 double Wave(int m, int j, int around) {
   const double phi = 2 * kPi * ((m * j) % around) / around;
   return m < 0 ? std::sin(-phi) : std::cos(phi);
 }
 
-/// The factor of the harmonics of this degree beside n_l|m| P_l^|m| and the wave.
+/// Returns the constant factor of the harmonics of degree m, which multiplies n_l|m| P_l^|m| and
+/// the wave.
 double DegreeFactor(int m) { return m == 0 ? 1 : std::numbers::sqrt2; }
 
-/// Value and derivative of Legendre's polynomial of degree n.
+/// Returns the value and the derivative of the Legendre polynomial of degree n.
 std::pair<double, double> LegendrePolynomial(int n, double x) {
   double before = 1, value = x;
   for (int l = 2; l <= n; ++l) {
@@ -51,7 +52,7 @@ std::pair<double, double> LegendrePolynomial(int n, double x) {
   return {value, n * (x * value - before) / (x * x - 1)};
 }
 
-/// Node i of n of Gauss's rule on [-1, 1], and its weight, by Newton's iteration.
+/// Returns node i of the n nodes of Gauss's rule on [-1, 1], and its weight, by Newton's iteration.
 std::pair<double, double> GaussNode(int n, int i) {
   double x = std::cos(kPi * (i + 0.75) / (n + 0.5));
   for (int step = 0; step < 20; ++step) {
@@ -99,7 +100,7 @@ std::vector<std::complex<double>> SphereGrid::Analyse(
   std::vector<std::complex<double>> waves(static_cast<size_t>(2 * order_ + 1));
   for (int i = 0; i < rings; ++i) {
     const auto first = static_cast<size_t>(i * around);
-    // Fourier's coefficients of the ring, for m = -order ... order.
+    // The Fourier coefficients of the values on this circle, for m = -order ... order.
     for (int m = -order_; m <= order_; ++m) {
       std::complex<double> sum = 0;
       for (int j = 0; j < around; ++j) {

@@ -15,8 +15,9 @@
 namespace carillon::precompute {
 namespace {
 
-/// Edges between faces that differ by more are edges of the body, and not of facets of a round
-/// surface. A surface that cuts them off radiates too little.
+/// An edge between faces whose normals differ by a larger angle is an edge of the body, not one
+/// between facets of a round surface. A surface that cuts off edges of the body radiates too
+/// little.
 constexpr double kSharpDegrees = 50;
 
 Point Moved(const Point& p, const Point& direction, double distance) {
@@ -26,7 +27,8 @@ Point Moved(const Point& p, const Point& direction, double distance) {
   return moved;
 }
 
-/// The nearest place from outside the surface, so that it is one that faces outwards there.
+/// Finds the place on `given` nearest to `p`. Searches from points further along `normal` if the
+/// given surface does not face the same way there.
 NearestTriangle::Place FindFacing(const SurfaceMesh& given, const NearestTriangle& index,
                                   const Point& p, const Point& normal, double edge_m) {
   const NearestTriangle::Place nearest = index.Find(p);
@@ -64,7 +66,7 @@ SurfaceMesh WithoutFlat(SurfaceMesh mesh, double edge_m) {
   return mesh;
 }
 
-/// Drops vertices that no triangle has.
+/// Returns the surface without the vertices that belong to no triangle.
 SurfaceMesh WithoutLoose(const SurfaceMesh& mesh) {
   SurfaceMesh result;
   std::vector<int32_t> number(mesh.vertices.size(), -1);
@@ -82,11 +84,12 @@ SurfaceMesh WithoutLoose(const SurfaceMesh& mesh) {
   return result;
 }
 
-/// How far the given surface lies outside the middle of the edge between two corners of a
-/// triangle. Zero where that is no matter of curvature, as at a rim that the edge cuts off.
+/// Returns how far the given surface lies outside the middle of the edge between two corners of a
+/// triangle. Returns zero if curvature is not the cause, as at a rim that the edge cuts off.
 double GapAt(const SurfaceMesh& given, const NearestTriangle& index, const Point& a, const Point& b,
              const Point& normal) {
-  // In parts of the edge. A circle that is drawn with five corners has this gap.
+  // Largest gap that curvature causes, as a fraction of the edge. A circle drawn with five corners
+  // has about this gap.
   constexpr double kMostGap = 0.2;
   const double edge_m = Distance(a, b);
   Point middle{};
@@ -96,9 +99,9 @@ double GapAt(const SurfaceMesh& given, const NearestTriangle& index, const Point
   return std::abs(gap_m) < kMostGap * edge_m ? gap_m : 0;
 }
 
-/// Moves the vertices, which lie on the given surface, along their normals so far that the flat
-/// triangles between them enclose the volume that the given surface does there. Otherwise a tube
-/// would be narrower by its chords, and its air would resonate elsewhere.
+/// Moves the vertices, which lie on the given surface, along their normals until the flat triangles
+/// enclose the same volume as the given surface. Otherwise the chords would make a tube narrower,
+/// and its air would resonate at other frequencies.
 void KeepVolume(const SurfaceMesh& given, const NearestTriangle& index, SurfaceMesh& mesh) {
   std::vector<Point> normals(mesh.vertices.size());
   std::vector<double> areas(mesh.vertices.size());
@@ -106,7 +109,7 @@ void KeepVolume(const SurfaceMesh& given, const NearestTriangle& index, SurfaceM
   for (size_t t = 0; t < mesh.triangles.size(); ++t) {
     const auto corner = CornersOf(mesh, t);
     const Point normal = AreaNormal(corner);
-    double gap_m = 0;  // the mean of a parabola that is zero at the corners
+    double gap_m = 0;  // the mean height of a parabola that is zero at the corners
     for (size_t c = 0; c < 3; ++c) {
       gap_m += GapAt(given, index, corner[c], corner[(c + 1) % 3], normal) / 3;
     }
@@ -118,7 +121,8 @@ void KeepVolume(const SurfaceMesh& given, const NearestTriangle& index, SurfaceM
     }
   }
   for (size_t i = 0; i < mesh.vertices.size(); ++i) {
-    // Where the normals differ, a step along their mean sweeps less volume than the areas say.
+    // If the normals differ, a step along their mean sweeps less volume than the sum of the areas
+    // suggests.
     const double swept = Norm(normals[i]);
     if (swept > 0.5 * areas[i]) {
       mesh.vertices[i] = Moved(mesh.vertices[i], normals[i], volumes[i] / swept);

@@ -11,10 +11,10 @@
 namespace carillon::precompute {
 namespace {
 
-/// Edges of the coarsest level to the radius of a sphere of the same area. Bodies with thin walls
-/// and long bodies have more area than the sphere around them suggests.
+/// Number of edges of the coarsest level in the radius of a sphere that has the same area as the
+/// body. The sphere around the body would be a worse measure for thin walls and long bodies.
 constexpr double kEdgesPerRadius = 9;
-/// Vertices of the finest surface that is made: a sweep then takes seconds.
+/// Largest number of vertices of a level. A sweep over such a level takes seconds.
 constexpr double kMostVertices = 40000;
 
 double AreaM2(const SurfaceMesh& mesh) {
@@ -50,7 +50,8 @@ double SurfaceLevels::VertexCountOf(int level) const {
   if (const auto made = levels_.find(level); made != levels_.end()) {
     return static_cast<double>(made->second.level.surface.vertex_count());
   }
-  // A closed surface has half as many vertices as triangles; these are about equilateral.
+  // A closed surface has half as many vertices as triangles, and the triangles are nearly
+  // equilateral.
   return area_m2_ / (std::sqrt(3.0) / 2 * EdgeOf(level) * EdgeOf(level));
 }
 

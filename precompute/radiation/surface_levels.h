@@ -32,7 +32,7 @@ class SurfaceLevels {
 
   static constexpr int kFinest = 8;
 
-  /// Returns whether the level may be made, because it is not too fine and does not have too many
+  /// Returns whether the level may be made, that is, has neither too fine edges nor too many
   /// vertices.
   bool Exists(int level) const;
   bool IsMade(int level) const { return levels_.contains(level); }

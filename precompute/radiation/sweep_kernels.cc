@@ -19,12 +19,13 @@ namespace hn = hwy::HWY_NAMESPACE;
 using D = hn::CappedTag<float, 16>;
 using V = hn::Vec<D>;
 constexpr int kLanes = std::min(16, static_cast<int>(HWY_MAX_BYTES / sizeof(float)));
-/// Sources whose sums are made in registers before they are added to memory: keeps the rounding of
-/// long sums small.
+/// Number of sources that are summed in registers before the sums are added to memory. This keeps
+/// the rounding errors of long sums small.
 constexpr int64_t kSourceChunk = 512;
 constexpr float kPi = 3.14159265358979F;
 
-/// Vectors of targets at once: as many sums as fit into registers beside what is worked with.
+/// Number of vectors of targets that are processed at once, so that their sums and the intermediate
+/// values fit into registers.
 #if HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_SSE4 || HWY_TARGET == HWY_SSE2
 constexpr int kVectorsOneSide = 1;
 #else
@@ -34,11 +35,11 @@ constexpr int kVectorsOneSide = 2;
 struct Phase {
   V cosine;
   V sine;
-  hn::VFromD<hn::RebindToUnsigned<D>> sign;  ///< to be applied to both by Xor
+  hn::VFromD<hn::RebindToUnsigned<D>> sign;  ///< sign bit, to be applied to cosine and sine by Xor
 };
 
-/// exp(i pi u), but for a sign. The polynomials are near-best on a quarter turn either way, to
-/// 5e-8.
+/// Returns exp(i pi u) except for the sign. The polynomials are near-best within a quarter turn on
+/// either side, with an error of 5e-8.
 HWY_INLINE Phase HalfTurns(V u) {
   const D d;
   const hn::RebindToSigned<D> di;
@@ -82,7 +83,8 @@ HWY_INLINE Pair Between(V x, V y, V z, const float* source) {
   const V half = hn::Mul(hn::Mul(square, hn::Set(d, 0.5F)), guess);
   pair.inverse = hn::Mul(guess, hn::NegMulAdd(half, guess, hn::Set(d, 1.5F)));
 #if HWY_TARGET == HWY_NEON || HWY_TARGET == HWY_SSE4 || HWY_TARGET == HWY_SSE2
-  // The guess of these targets may have eight good bits only, so a second step is needed.
+  // The guess of these instruction sets may have only eight correct bits, so a second Newton step
+  // is needed.
   const V again = hn::Mul(hn::Mul(square, hn::Set(d, 0.5F)), pair.inverse);
   pair.inverse = hn::Mul(pair.inverse, hn::NegMulAdd(again, pair.inverse, hn::Set(d, 1.5F)));
 #endif
@@ -101,7 +103,7 @@ HWY_INLINE V Dot(V x, V y, V z, const float* b) {
                     hn::MulAdd(y, hn::Set(d, b[1]), hn::Mul(x, hn::Set(d, b[0]))));
 }
 
-/// sum += (real + i imag) * (b[0] + i b[1])
+/// Adds (real + i imag) * (b[0] + i b[1]) to sum.
 HWY_INLINE void AddProduct(V real, V imag, const float* b, V* HWY_RESTRICT sum) {
   const D d;
   const V br = hn::Set(d, b[0]), bi = hn::Set(d, b[1]);

@@ -19,26 +19,29 @@
 namespace carillon::precompute {
 namespace {
 
-/// The coarsest surface that a mode is tried on: edges to a wavelength in air and on the body.
+/// Number of edges in a wavelength, in air and on the body, of the coarsest surface on which a mode
+/// is solved.
 constexpr double kEdgesPerAirWave = 2.2;
 constexpr double kEdgesPerBodyWave = 3;
-/// A mode that moves the surface along its normals with less than this part of the median mode's
-/// energy, such as torsion, is all but silent: only the wave in air decides on its surface, and two
+/// A mode whose normal motion has less than this fraction of the median mode's energy, such as
+/// torsion, is almost silent. Its first surface depends on the wavelength in air only, and two
 /// surfaces suffice.
 constexpr double kWeakEnergy = 1e-2;
-/// Directions may be off by this many times the error that the power may have.
+/// The goal for the error of directions, as a multiple of the goal for the error of the power.
 constexpr double kDirectionGoal = 3;
-/// The error stated for a mode that was solved on one surface only, where fewer than
+/// The error stated for a mode that was solved on one surface only, if fewer than
 /// kFewestChecked modes were solved on two.
 constexpr double kUncheckedErrorDb = 6;
 constexpr size_t kFewestChecked = 8;
-/// The error stated for each unit of the difference between two surfaces, of which the finer one
-/// counts. Differences fall to 0.5 from one surface to the next, which would be 1, but near a
-/// resonance of the air inside the body they do not as long as the surface is coarse.
+/// The stated error of the finer of two surfaces, relative to the difference between both. If
+/// differences halve from one surface to the next, this ratio is 1. Near a resonance of the air
+/// inside the body, differences on coarse surfaces decrease more slowly, which needs a greater
+/// ratio.
 constexpr double kErrorPerDifference = 1.7;
-/// The least error that is stated: the solver's tolerance and the far pattern's order leave it.
+/// The least error that is stated. It is due to the solver's tolerance and the far pattern's order.
 constexpr double kLeastErrorDb = 0.05;
-/// Applications of the operator that a solution takes, about, where none was counted.
+/// Approximate number of applications of the operator in a solution, used until a solution is
+/// counted.
 constexpr double kUsualSweeps = 10;
 
 /// Errors in power and direction, dB.
@@ -47,7 +50,7 @@ struct ErrorDb {
   double direction = kDirectionGoal * kUncheckedErrorDb;
 };
 
-/// Values at the vertices of one level, interpolated between those of the level before it.
+/// Returns values at the vertices of one level, interpolated from the values on the level before.
 std::vector<ComplexFloat> ValuesAt(const std::vector<SurfacePlace>& places,
                                    const std::vector<ComplexFloat>& values) {
   std::vector<ComplexFloat> result;
@@ -92,8 +95,8 @@ class TransferSolver {
 
   absl::StatusOr<Transfer> Solve() && {
     RETURN_IF_ERROR(SolveRigid());
-    // All modes once on coarse surfaces; then each on the next finer one until its goal is met, so
-    // that no mode takes the time of all others.
+    // Solves all modes once on coarse surfaces, and then each mode on the next finer surface until
+    // its goal is met, so that no mode takes the time of all others.
     bool any = true;
     while (any) {
       any = false;
@@ -121,8 +124,8 @@ class TransferSolver {
     return energies.empty() ? 0 : *middle;
   }
 
-  /// Chooses the first level of a group. Modes of less energy than `weak` do not ask for a fine
-  /// one.
+  /// Chooses the first level of a group. Modes with less energy than `weak` do not require a fine
+  /// level.
   void Prepare(double weak, ModeGroup& group) {
     double edge_m = 2 * std::numbers::pi / group.wavenumber / kEdgesPerAirWave;
     for (const size_t m : group.modes) {
@@ -137,7 +140,7 @@ class TransferSolver {
     for (const int finer : {0, 1}) whole_pairs_ += PairsOf(group, group.first_level + finer);
   }
 
-  /// Pairs of vertices of one sweep for all sides.
+  /// Returns the number of pairs of vertices of one sweep for all right sides.
   double PairsOf(const ModeGroup& group, int level) const {
     const double n = levels_.VertexCountOf(level);
     return static_cast<double>(group.modes.size()) * n * n;
@@ -213,7 +216,7 @@ class TransferSolver {
     return problem;
   }
 
-  /// Takes the difference from the level before as the error of each mode.
+  /// Estimates the error of each mode from the difference between this level and the level before.
   void Compare(const std::vector<ModeField>& fields, const SphereGrid& grid, ModeGroup& group) {
     group.error_db = 0;
     group.loudness = 0;

@@ -18,8 +18,8 @@ void AddScaled(const Point& p, double factor, Point& sum) {
   for (size_t a = 0; a < 3; ++a) sum[a] += factor * p[a];
 }
 
-/// Integral of 1/r along a straight edge from abscissa s0 to s1, with r0, r1 the distances of its
-/// ends. The form is chosen that does not cancel.
+/// Returns the integral of 1/r along a straight edge from abscissa s0 to s1, whose ends have the
+/// distances r0 and r1. Of two equivalent formulas, the one without cancellation is chosen.
 double LogAlong(double s0, double s1, double r0, double r1) {
   return s0 + s1 >= 0 ? std::log((r1 + s1) / (r0 + s0)) : std::log((r0 - s0) / (r1 - s1));
 }
@@ -51,7 +51,7 @@ double TrianglePotential::SolidAngle(const Point& x) const {
 
 TrianglePotentials TrianglePotential::At(const Point& x) const {
   const double height = Dot(Difference(x, corner_[0]), normal_);
-  double integral = 0;   // of 1/r
+  double integral = 0;   // integral of 1/r
   Point first_moment{};  // integral of (y - foot)/r
   Point edge_logs{};     // sum of outward normals times integrals of 1/r along the edges
   for (const Edge& edge : edges_) {
@@ -70,7 +70,7 @@ TrianglePotentials TrianglePotential::At(const Point& x) const {
   const double signed_angle = std::copysign(solid_angle, height);
   TrianglePotentials result{};
   for (size_t c = 0; c < 3; ++c) {
-    // The hat function at the foot of x: one at its corner, and linear.
+    // The value at the foot of x of the hat function, which is linear and one at its corner.
     const double hat = 1 + Dot(gradient_[c], Difference(x, corner_[c]));
     result.single[c] = hat * integral + Dot(gradient_[c], first_moment);
     result.doubled[c] = hat * signed_angle - height * Dot(gradient_[c], edge_logs);

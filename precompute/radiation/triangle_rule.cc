@@ -16,7 +16,7 @@ std::array<TrianglePoint, 3> MakeCoarse() {
            {{kNear, kNear, kFar}, kWeight}}};
 }
 
-/// Radon 1948: the middle, and two orbits of three points.
+/// Radon's rule (1948), which consists of the middle and two orbits of three points.
 std::array<TrianglePoint, kMediumCount> MakeMedium() {
   std::array<TrianglePoint, kMediumCount> rule{};
   rule[0] = {{1.0 / 3, 1.0 / 3, 1.0 / 3}, 9.0 / 40};
@@ -42,7 +42,8 @@ std::array<TrianglePoint, 4 * kMediumCount> MakeFine() {
       TrianglePoint& point = rule[4 * i + quarter];
       point.weight = medium[i].weight / 4;
       for (size_t c = 0; c < 3; ++c) {
-        // Three quarters share a corner each with the whole; the last lies turned between them.
+        // Three of the quarters share one corner each with the whole triangle. The last quarter
+        // lies between them, rotated by half a turn.
         point.hat[c] = quarter < 3 ? hat[c] / 2 + (c == quarter ? 0.5 : 0) : (1 - hat[c]) / 2;
       }
     }
