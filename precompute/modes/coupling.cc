@@ -38,7 +38,7 @@ const BoundaryFace& FaceOf(const TetMesh& mesh, const SoundingSurface& surface, 
 
 /// Returns the cross product of the tangents of a six-node face at the face's node `at`. The
 /// tangents are derivatives with respect to two barycentric coordinates, where the remaining
-/// coordinate decreases by as much.
+/// coordinate decreases accordingly.
 Eigen::Vector3d NormalAt(const TetMesh& mesh, const BoundaryFace& face, size_t at) {
   Eigen::Vector3d barycentric = Eigen::Vector3d::Zero();
   for (const size_t corner : {at % 3, at < 3 ? at : (at + 1) % 3}) {
