@@ -11,7 +11,7 @@ namespace carillon::precompute {
 
 /// The parsed command line of carillon-precompute.
 struct CommandLine {
-  std::string input;  ///< a mesh, or a stored model where request.radiate_stored_model()
+  std::string input;  ///< a mesh, or a stored model if request.radiate_stored_model()
   std::string output;
   std::string transfer_output;  ///< the file for the radiation, which is separate from the modes
   v1::WorkerRequest request;    ///< with every default filled in

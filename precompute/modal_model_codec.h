@@ -16,7 +16,7 @@ struct ModelOrigin {
   v1::DecompositionSettings settings;  ///< with every default filled in
 };
 
-/// Writes the stored form (see proto/carillon/v1/modal_model.proto) under a temporary name beside
+/// Writes the stored form (see proto/carillon/v1/modal_model.proto) under a temporary name next to
 /// `path` and renames it, so that `path` never contains half a model.
 ///
 /// Errors: Internal OUTPUT_NOT_WRITABLE.

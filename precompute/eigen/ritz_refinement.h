@@ -17,7 +17,7 @@ namespace carillon::precompute {
 struct RefinementPlan {
   Eigen::Index wanted;  ///< number of modes wanted, the lowest of the rough ones
   int first_steps;      ///< number of corrections before the first projection of K and M
-  /// Vectors with Rayleigh quotients below this are rigid-body motions; their relative residuals
+  /// Vectors with Rayleigh quotients below this are rigid-body motions, whose relative residuals
   /// are not defined.
   double free_motion;
 };

@@ -32,9 +32,9 @@ constexpr double kQuadraticConstant = 1.8;
 /// information about the mode.
 constexpr double kMostError = 0.99;
 
-/// Residuals are computed in batches: at least kFewestModesAtATime modes, and otherwise as many as
-/// fit into max(kResidualBytes, kTimesShapes * size of the shapes), which is less than the solver
-/// needed in addition to the shapes.
+/// Residuals are computed in batches of modes that fit into max(kResidualBytes, kTimesShapes * size
+/// of the shapes), but of at least kFewestModesAtATime modes. The solver needed more than this in
+/// addition to the shapes.
 constexpr size_t kResidualBytes = size_t{512} << 20U;
 constexpr size_t kTimesShapes = 2;
 constexpr size_t kFewestModesAtATime = 8;

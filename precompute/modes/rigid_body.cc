@@ -14,7 +14,8 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-/// Motions of the fixed nodes smaller than this fraction of the largest are rounding errors.
+/// Motions of the fixed nodes that are smaller than this fraction of the largest motion count as
+/// rounding errors.
 constexpr double kRankTolerance = 1e-6;
 
 /// Largest number of fixed nodes used to compute the distance of other nodes.

@@ -25,7 +25,8 @@ struct SolverComparison {
   std::string Text() const;
 };
 
-/// Neighbouring modes whose eigenvalues differ by a smaller fraction belong to one subspace.
+/// Neighbouring modes belong to one subspace if their eigenvalues differ by less than this
+/// fraction.
 inline constexpr double kSameEigenvalue = 1e-3;
 
 /// Compares the modes of `first` and `second`, which are solutions of the body whose matrices

@@ -7,7 +7,8 @@
 namespace carillon::precompute {
 namespace {
 
-/// Two modes whose wavenumbers differ by a smaller fraction are solved at their mean wavenumber.
+/// Two modes are solved at their mean wavenumber if their wavenumbers differ by less than this
+/// fraction.
 constexpr double kPairWidth = 2e-3;
 
 }  // namespace

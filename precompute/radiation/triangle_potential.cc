@@ -19,7 +19,7 @@ void AddScaled(const Point& p, double factor, Point& sum) {
 }
 
 /// Returns the integral of 1/r along a straight edge from abscissa s0 to s1, whose ends have the
-/// distances r0 and r1. The function chooses the one of two equivalent formulas that has no
+/// distances r0 and r1. Two formulas are equivalent; the function chooses the formula without
 /// cancellation.
 double LogAlong(double s0, double s1, double r0, double r1) {
   return s0 + s1 >= 0 ? std::log((r1 + s1) / (r0 + s0)) : std::log((r0 - s0) / (r1 - s1));

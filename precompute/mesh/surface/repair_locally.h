@@ -9,7 +9,8 @@
 namespace carillon::precompute {
 
 /// These functions repair single places of a surface and keep all other triangles. Each edge of the
-/// given surface has one or two triangles. They return nothing if they cannot repair the surface.
+/// given surface must have one or two triangles. If a function cannot repair the surface, it
+/// returns nothing.
 
 /// Fills holes with smooth patches. A hole is filled if its rim is at most as long as the diagonal,
 /// and if all patches together have at most a twentieth of the area. A wider hole is taken for the

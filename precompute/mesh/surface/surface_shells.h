@@ -9,8 +9,8 @@
 
 namespace carillon::precompute {
 
-/// Returns whether two corners of a triangle are the same vertex. Such a triangle keeps its index
-/// in the surface and is ignored otherwise, because it neither closes nor opens a gap.
+/// Returns whether two corners of a triangle are the same vertex. Such a collapsed triangle keeps
+/// its index in the surface and is ignored otherwise, because it neither closes nor opens a gap.
 bool IsCollapsed(const std::array<int32_t, 3>& triangle);
 
 /// Triangles that are connected by their edges.
