@@ -137,6 +137,23 @@ def run(client, options, folder):
     return sound
 
 
+def run_with_daemon(options, folder):
+    """Runs the example with a daemon of its own. The models stay in the folder for the next run."""
+    import carillon
+    from daemon import Daemon
+    with tempfile.TemporaryDirectory(prefix="carillon-") as name:  # the socket's path must be short
+        pathlib.Path(name, "data").symlink_to(folder / "models")
+        daemon = Daemon(name)
+        try:
+            with carillon.connect(daemon.server) as client:
+                run(client, options, folder)
+        except subprocess.CalledProcessError as error:
+            sys.exit(f"run.py: {pathlib.Path(error.cmd[0]).name} could not simulate {options.name} in "
+                     f"{options.engine}: its message is above")
+        finally:
+            daemon.stop()
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("name")
@@ -154,11 +171,9 @@ def main():
                     str(ROOT / "client_sdk/python"), str(ROOT / "tests/integration")]
     os.environ.update(CARILLON_BIN_DIR=str(options.build / "bin"), CARILLON_BUILD_DIR=str(options.build))
     # They need the paths above.
-    import carillon
     import chimes
     import falls
     import scene_makers
-    from daemon import Daemon
     names = (*scene_makers.EXAMPLES, "chimes")
     if options.name not in names or options.engine not in falls.ENGINES:
         parser.error(f"the examples are {', '.join(names)}, the engines {', '.join(falls.ENGINES)}")
@@ -171,18 +186,7 @@ def main():
         (folder / "models").mkdir(parents=True, exist_ok=True)
     except OSError as error:
         parser.error(f"--out: {error}")
-    with tempfile.TemporaryDirectory(prefix="carillon-") as name:
-        # The models stay for the next run; the socket's path must be short.
-        pathlib.Path(name, "data").symlink_to(folder / "models")
-        daemon = Daemon(name)
-        try:
-            with carillon.connect(daemon.server) as client:
-                run(client, options, folder)
-        except subprocess.CalledProcessError as error:
-            sys.exit(f"run.py: {pathlib.Path(error.cmd[0]).name} could not simulate {options.name} in {options.engine}: "
-                     "its message is above")
-        finally:
-            daemon.stop()
+    run_with_daemon(options, folder)
 
 
 if __name__ == "__main__":
