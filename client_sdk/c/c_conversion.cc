@@ -53,17 +53,44 @@ void Set(const carillon_impulse& from, v1::Impulse& to) {
 
 void Set(const carillon_pose& from, v1::ObjectPose& to) {
   to.set_object(from.object);
-  Set(from.position_m, *to.mutable_pose()->mutable_position_m());
+  *to.mutable_pose() = ToPose(from);
+}
+
+}  // namespace
+
+v1::Pose ToPose(const carillon_pose& from) {
+  v1::Pose pose;
+  Set(from.position_m, *pose.mutable_position_m());
   const carillon_quaternion& turn = from.orientation;
-  if (turn.w == 0 && turn.x == 0 && turn.y == 0 && turn.z == 0) return;
-  v1::Quaternion& orientation = *to.mutable_pose()->mutable_orientation();
+  if (turn.w == 0 && turn.x == 0 && turn.y == 0 && turn.z == 0) return pose;
+  v1::Quaternion& orientation = *pose.mutable_orientation();
   orientation.set_w(turn.w);
   orientation.set_x(turn.x);
   orientation.set_y(turn.y);
   orientation.set_z(turn.z);
+  return pose;
 }
 
-}  // namespace
+v1::Hearing ToHearing(const carillon_hearing& from) {
+  v1::Hearing hearing;
+  hearing.set_distance_gain(from.distance_gain != 0);
+  hearing.set_propagation_delay(from.propagation_delay != 0);
+  hearing.set_panning(from.panning != 0);
+  hearing.set_directivity(from.directivity != 0);
+  hearing.set_near_field(from.near_field != 0);
+  hearing.set_binaural(from.binaural != 0);
+  hearing.set_reference_distance_m(from.reference_distance_m);
+  hearing.set_sound_speed_m_per_s(from.sound_speed_m_per_s);
+  return hearing;
+}
+
+absl::StatusOr<v1::Frame> ToFrame(carillon_frame frame) {
+  if (frame == CARILLON_FRAME_OBJECT) return v1::FRAME_OBJECT;
+  if (frame == CARILLON_FRAME_SCENE) return v1::FRAME_SCENE;
+  return Refusal(
+      absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
+      absl::StrCat("the frame is ", frame, ": give CARILLON_FRAME_OBJECT or CARILLON_FRAME_SCENE"));
+}
 
 absl::StatusOr<std::string> MakeObj(std::span<const double> vertices_m,
                                     std::span<const uint32_t> triangles) {
@@ -91,6 +118,7 @@ v1::ContactStep ToStep(const carillon_step& step) {
   for (size_t i = 0; i < step.contact_count; ++i) Set(step.contacts[i], *made.add_contacts());
   for (size_t i = 0; i < step.impulse_count; ++i) Set(step.impulses[i], *made.add_impulses());
   for (size_t i = 0; i < step.pose_count; ++i) Set(step.poses[i], *made.add_poses());
+  if (step.listener != nullptr) *made.mutable_listener() = ToPose(*step.listener);
   return made;
 }
 

@@ -7,6 +7,7 @@
 
 #include "absl/status/statusor.h"
 #include "carillon/v1/contact.pb.h"
+#include "carillon/v1/hearing.pb.h"
 #include "client_sdk/c/carillon.h"
 
 namespace carillon::c {
@@ -16,6 +17,13 @@ namespace carillon::c {
 absl::StatusOr<std::string> MakeObj(std::span<const double> vertices_m,
                                     std::span<const uint32_t> triangles);
 
+v1::Pose ToPose(const carillon_pose& from);
+
+v1::Hearing ToHearing(const carillon_hearing& from);
+
+/// Errors: InvalidArgument (INVALID_SETTINGS: no such frame).
+absl::StatusOr<v1::Frame> ToFrame(carillon_frame frame);
+
 /// Fills in the object of a scene or of a trace.
 template <class Message>
 void Fill(const carillon_object& object, Message& message) {
@@ -24,6 +32,14 @@ void Fill(const carillon_object& object, Message& message) {
   if (object.size != 0) message.set_size(object.size);
   if (object.gain != 0) message.set_gain(object.gain);
   message.set_handle(object.handle);
+}
+
+/// Fills in the hearing and the listener of a scene or of a trace. Null leaves both absent.
+template <class Message>
+void Fill(const carillon_hearing* hearing, Message& message) {
+  if (hearing == nullptr) return;
+  *message.mutable_hearing() = ToHearing(*hearing);
+  *message.mutable_listener() = ToPose(hearing->listener);
 }
 
 v1::ContactStep ToStep(const carillon_step& step);

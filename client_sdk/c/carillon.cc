@@ -172,28 +172,34 @@ carillon_code carillon_create_model_of_mesh(carillon_client* client, const caril
   });
 }
 
-carillon_code carillon_create_scene(carillon_client* client, carillon_scene** scene) {
+carillon_code carillon_create_scene(carillon_client* client, const carillon_hearing* hearing,
+                                    carillon_scene** scene) {
   return Try([&]() -> absl::Status {
     if (!client || !scene) return Missing("an argument");
-    ASSIGN_OR_RETURN(std::string name, client->daemon->CreateScene({}));
+    v1::CreateSceneRequest request;
+    carillon::c::Fill(hearing, request);
+    ASSIGN_OR_RETURN(std::string name, client->daemon->CreateScene(request));
     *scene = new carillon_scene{*client->daemon, std::move(name)};
     return absl::OkStatus();
   });
 }
 
-carillon_code carillon_register_scene(carillon_client* client, const char* id,
-                                      const carillon_object* objects, size_t object_count,
+carillon_code carillon_register_scene(carillon_client* client,
+                                      const carillon_registration* registration,
                                       carillon_scene** scene) {
   return Try([&]() -> absl::Status {
-    if (!client || !id || (!objects && object_count > 0) || !scene) return Missing("an argument");
-    carillon::client::SceneRegistration registration;
-    registration.scene.set_id(id);
+    if (!client || !registration || !registration->id || !scene) return Missing("an argument");
+    const auto& [id, hearing, objects, object_count] = *registration;
+    if (!objects && object_count > 0) return Missing("the list of objects");
+    carillon::client::SceneRegistration made;
+    made.scene.set_id(id);
+    carillon::c::Fill(hearing, made.scene);
     for (const carillon_object& object : std::span(objects, object_count)) {
       if (!object.model || !object.material) return Missing("the model or material of an object");
-      carillon::c::Fill(object, registration.objects.emplace_back());
+      carillon::c::Fill(object, made.objects.emplace_back());
     }
-    ASSIGN_OR_RETURN(std::string name, RegisterScene(*client->daemon, registration));
-    *scene = new carillon_scene{*client->daemon, std::move(name), std::move(registration)};
+    ASSIGN_OR_RETURN(std::string name, RegisterScene(*client->daemon, made));
+    *scene = new carillon_scene{*client->daemon, std::move(name), std::move(made)};
     return absl::OkStatus();
   });
 }
@@ -245,12 +251,15 @@ carillon_code carillon_stop(carillon_scene* scene) {
   });
 }
 
-carillon_code carillon_open_stream(carillon_scene* scene, double step_s, carillon_stream** stream) {
+carillon_code carillon_open_stream(carillon_scene* scene, double step_s, carillon_frame frame,
+                                   carillon_stream** stream) {
   return Try([&]() -> absl::Status {
     if (!scene || !stream) return Missing("an argument");
     v1::ContactStreamStart start;
     start.set_scene(scene->name);
     start.set_step_s(step_s);
+    ASSIGN_OR_RETURN(const v1::Frame given, carillon::c::ToFrame(frame));
+    start.set_frame(given);
     auto opened = scene->registration
                       ? OpenLastingStream(scene->daemon, *scene->registration, start)
                       : scene->daemon.StreamContacts(start);
@@ -282,11 +291,15 @@ carillon_code carillon_close_stream(carillon_stream* stream, carillon_report* re
   });
 }
 
-carillon_code carillon_create_trace(const char* file, double step_s, carillon_trace** trace) {
+carillon_code carillon_create_trace(const char* file, double step_s, carillon_frame frame,
+                                    const carillon_hearing* hearing, carillon_trace** trace) {
   return Try([&]() -> absl::Status {
     if (!file || !trace) return Missing("an argument");
     v1::ContactTraceHeader header;
     header.set_step_s(step_s);
+    ASSIGN_OR_RETURN(const v1::Frame given, carillon::c::ToFrame(frame));
+    header.set_frame(given);
+    carillon::c::Fill(hearing, header);
     ASSIGN_OR_RETURN(auto writer, carillon::client::ContactTraceWriter::Create(file, header));
     *trace = new carillon_trace{std::move(writer)};
     return absl::OkStatus();
@@ -322,13 +335,16 @@ carillon_code carillon_close_trace(carillon_trace* trace) {
 }
 
 carillon_code carillon_render(carillon_client* client, const char* trace_file,
-                              uint32_t sample_rate_hz, double tail_s, carillon_sound* sound) {
+                              const carillon_render_settings* settings, carillon_sound* sound) {
   return Try([&]() -> absl::Status {
     if (!client || !trace_file || !sound) return Missing("an argument");
-    v1::RenderSettings settings;
-    settings.set_sample_rate_hz(sample_rate_hz);
-    settings.set_tail_s(tail_s);
-    ASSIGN_OR_RETURN(*sound, Render(*client->daemon, trace_file, settings));
+    v1::RenderSettings wanted;
+    if (settings != nullptr) {
+      wanted.set_sample_rate_hz(settings->sample_rate_hz);
+      wanted.set_channel_count(settings->channel_count);
+      wanted.set_tail_s(settings->tail_s);
+    }
+    ASSIGN_OR_RETURN(*sound, Render(*client->daemon, trace_file, wanted));
     return absl::OkStatus();
   });
 }

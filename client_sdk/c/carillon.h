@@ -4,7 +4,8 @@
  * (libcarillon.so): scenes, contacts of a running simulation, and offline rendering.
  *
  * Units are SI: metres, newton seconds, seconds. Points and impulses are in the frame of their
- * object. Strings are UTF-8 and end with a zero.
+ * object or in that of the scene, as a carillon_frame says. Poses are in the frame of the scene.
+ * Strings are UTF-8 and end with a zero.
  *
  * Every function that returns a carillon_code returns CARILLON_OK, or another code; then
  * carillon_error() and carillon_error_reason() say why. proto/README.md lists the reasons. Results
@@ -85,12 +86,32 @@ typedef struct carillon_impulse {
   double duration_s; /**< zero: as long as an elastic collision with steel */
 } carillon_impulse;
 
-/** Where an object is in its scene. */
+/** Where an object, or the listener, is in its scene. */
 typedef struct carillon_pose {
-  uint32_t object;
+  uint32_t object; /**< ignored for the listener */
   carillon_vec3 position_m;
   carillon_quaternion orientation;
 } carillon_pose;
+
+/** The frame of the points and impulses of a stream or of a trace. The daemon converts those in the
+ * frame of the scene by the newest pose of their object. */
+typedef int32_t carillon_frame;
+enum { CARILLON_FRAME_OBJECT = 0, CARILLON_FRAME_SCENE = 1 };
+
+/** What is heard of the places of the objects: the effects that are not zero, as hearing.proto
+ * describes them. Without it a scene sounds as if all objects were at one place, and poses only
+ * convert points and impulses. */
+typedef struct carillon_hearing {
+  int32_t distance_gain;       /**< quieter from afar */
+  int32_t propagation_delay;   /**< later from afar, and with the Doppler effect */
+  int32_t panning;             /**< on two channels, from the left or the right */
+  int32_t directivity;         /**< each mode as loud as the object radiates it to the listener */
+  int32_t near_field;          /**< with directivity: true near the object, too */
+  int32_t binaural;            /**< for headphones, by a measured head, in place of panning */
+  double reference_distance_m; /**< where distance_gain is 1, from 0.01 to 1000; zero: 1 */
+  double sound_speed_m_per_s;  /**< from 10 to 10000; zero: 343 */
+  carillon_pose listener;      /**< at first; it looks along -z, with x to its right and y upward */
+} carillon_hearing;
 
 /** One step of a simulation. Times do not go back within a stream or a trace. */
 typedef struct carillon_step {
@@ -101,6 +122,7 @@ typedef struct carillon_step {
   size_t impulse_count;
   const carillon_pose* poses;
   size_t pose_count;
+  const carillon_pose* listener; /**< where it is now; null: it stays */
 } carillon_step;
 
 /** What became of a stream's steps. */
@@ -111,6 +133,21 @@ typedef struct carillon_report {
   uint64_t rejected_count;     /**< impulses that could not be used */
   uint64_t dropped_step_count; /**< steps that were not sent: the oldest of too many */
 } carillon_report;
+
+/** A scene as a program wants it, to be registered as often as needed. */
+typedef struct carillon_registration {
+  const char* id; /**< 1 to 64 lower-case letters, digits, ".", "_" and "-", a letter first */
+  const carillon_hearing* hearing; /**< null: the scene has no places */
+  const carillon_object* objects;  /**< each with a handle above zero */
+  size_t object_count;
+} carillon_registration;
+
+/** How a trace is rendered. Zeros are defaults. */
+typedef struct carillon_render_settings {
+  uint32_t sample_rate_hz; /**< 8000 to 192000; zero: 48000 */
+  uint32_t channel_count;  /**< 1 or 2; zero: 1. Panning and binaural sound need 2. */
+  double tail_s; /**< after the last contact, at most 120; zero: until the sound has died away */
+} carillon_render_settings;
 
 /** Rendered sound; full scale is 1. */
 typedef struct carillon_sound {
@@ -142,13 +179,14 @@ carillon_code carillon_create_model(carillon_client* client, const char* mesh_fi
 carillon_code carillon_create_model_of_mesh(carillon_client* client, const carillon_mesh* mesh,
                                             const char* material, char* model);
 
-carillon_code carillon_create_scene(carillon_client* client, carillon_scene** scene);
-/** Makes a scene of the id (1 to 64 lower-case letters, digits, ".", "_" and "-", a letter first)
- * with its objects, each with a handle above zero. If the daemon has the scene already, its objects
- * stay, and the missing ones are added: a program may register its scene again after it was
- * restarted. */
-carillon_code carillon_register_scene(carillon_client* client, const char* id,
-                                      const carillon_object* objects, size_t object_count,
+/** Makes a scene. If `hearing` is null, it has no places. */
+carillon_code carillon_create_scene(carillon_client* client, const carillon_hearing* hearing,
+                                    carillon_scene** scene);
+/** Makes a scene with an id and its objects. If the daemon has the scene already, its objects stay,
+ * and the missing ones are added: a program may register its scene again after it was restarted. A
+ * scene that was made with another hearing is refused (SCENE_DIFFERS). */
+carillon_code carillon_register_scene(carillon_client* client,
+                                      const carillon_registration* registration,
                                       carillon_scene** scene);
 /** Fades out the objects of the scene and deletes it. */
 void carillon_delete_scene(carillon_scene* scene);
@@ -167,25 +205,28 @@ carillon_code carillon_stop(carillon_scene* scene);
  * registered scene outlives its connection: while the daemon does not answer, steps are dropped and
  * counted, and a thread tries twice a second to register the scene again, without the objects that
  * carillon_add_object has added. */
-carillon_code carillon_open_stream(carillon_scene* scene, double step_s, carillon_stream** stream);
+carillon_code carillon_open_stream(carillon_scene* scene, double step_s, carillon_frame frame,
+                                   carillon_stream** stream);
 /** Sends a step. It copies the step and never waits for the daemon. */
 carillon_code carillon_send(carillon_stream* stream, const carillon_step* step);
 /** Sends what waits and ends the stream. `report` may be null. Of a stream that was opened again it
  * counts the newest part, but for the dropped steps, which it counts from the beginning. */
 carillon_code carillon_close_stream(carillon_stream* stream, carillon_report* report);
 
-/** Begins a contact trace, which is written to a file (.contacts), to be rendered now or later. */
-carillon_code carillon_create_trace(const char* file, double step_s, carillon_trace** trace);
+/** Begins a contact trace, which is written to a file (.contacts), to be rendered now or later. If
+ * `hearing` is null, it has no places. */
+carillon_code carillon_create_trace(const char* file, double step_s, carillon_frame frame,
+                                    const carillon_hearing* hearing, carillon_trace** trace);
 /** Adds an object; all of them come before the first step. `handle` may be null. */
 carillon_code carillon_trace_object(carillon_trace* trace, const carillon_object* object,
                                     uint32_t* handle);
 carillon_code carillon_trace_step(carillon_trace* trace, const carillon_step* step);
 /** Completes the file. */
 carillon_code carillon_close_trace(carillon_trace* trace);
-/** Renders a trace, faster than real time: the same samples each time. `tail_s`: the time after the
- * last contact; zero: until the sound has died away. carillon_free_sound frees the sound. */
+/** Renders a trace, faster than real time: the same samples each time. `settings` may be null.
+ * carillon_free_sound frees the sound. */
 carillon_code carillon_render(carillon_client* client, const char* trace_file,
-                              uint32_t sample_rate_hz, double tail_s, carillon_sound* sound);
+                              const carillon_render_settings* settings, carillon_sound* sound);
 void carillon_free_sound(carillon_sound* sound);
 
 /* NOLINTEND(readability-identifier-naming) */

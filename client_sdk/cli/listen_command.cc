@@ -29,7 +29,10 @@ class LevelMeter {
     peak_ = 0;
   }
 
-  void Finish() const { std::fputc('\n', stderr); }
+  void Finish() {
+    if (frame_count_ > 0) Show();
+    std::fputc('\n', stderr);
+  }
 
  private:
   static constexpr uint64_t kPerSecond = 10;

@@ -9,6 +9,7 @@
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
+#include "proto/cpp/error_reason.h"
 
 namespace carillon {
 
@@ -33,10 +34,10 @@ absl::StatusOr<std::vector<LossFactorPoint>> ReadLossFactor(absl::string_view te
     LossFactorPoint point;
     if (!absl::SimpleAtod(pair.first, &point.frequency_hz) ||
         !absl::SimpleAtod(pair.second, &point.loss_factor)) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("INVALID_MATERIAL: the loss factor is \"", text,
-                       "\"; give a number, or frequencies with their loss factors, such as "
-                       "100:0.001,1000:0.002"));
+      return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_MATERIAL",
+                     absl::StrCat("the loss factor is \"", text,
+                                  "\"; give a number, or frequencies with their loss factors, such "
+                                  "as 100:0.001,1000:0.002"));
     }
     points.push_back(point);
   }

@@ -9,6 +9,7 @@
 
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
+#include "proto/cpp/error_reason.h"
 #include "proto/cpp/near_names.h"
 
 namespace carillon {
@@ -43,8 +44,8 @@ void DropReplacedLossFactor(const v1::Material& asked, v1::Material& preset) {
 }
 
 absl::Status OutOfRange(const char* field, double value, const char* range) {
-  return absl::InvalidArgumentError(
-      absl::StrCat("INVALID_MATERIAL: ", field, " is ", value, "; it must be ", range));
+  return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_MATERIAL",
+                 absl::StrCat(field, " is ", value, "; it must be ", range));
 }
 
 absl::Status CheckLossFactor(const v1::Material& m) {
@@ -70,10 +71,9 @@ absl::Status CheckLossFactor(const v1::Material& m) {
 absl::Status Check(const v1::Material& m) {
   if (!m.has_young_pa() || !m.has_density_kg_per_m3() || !m.has_alpha1_s() ||
       !m.has_alpha2_per_s()) {
-    return absl::InvalidArgumentError(
-        "INVALID_MATERIAL: a material needs young_pa, density_kg_per_m3, alpha1_s and "
-        "alpha2_per_s (or loss_factor); "
-        "name a preset to start from or give all four");
+    return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_MATERIAL",
+                   "a material needs young_pa, density_kg_per_m3, alpha1_s and alpha2_per_s (or "
+                   "loss_factor); name a preset to start from or give all four");
   }
   const auto positive = [](double x) { return std::isfinite(x) && x > 0; };
   const auto not_negative = [](double x) { return std::isfinite(x) && x >= 0; };

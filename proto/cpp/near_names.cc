@@ -8,6 +8,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "absl/strings/str_split.h"
+#include "proto/cpp/error_reason.h"
 
 namespace carillon {
 namespace {
@@ -57,10 +58,11 @@ std::vector<std::string> NearNames(std::string_view written, std::span<const std
 absl::Status UnknownName(absl::string_view reason, absl::string_view kind, const std::string& name,
                          std::span<const std::string> known) {
   const std::vector<std::string> near = NearNames(name, known);
-  return absl::InvalidArgumentError(absl::StrCat(
-      reason, ": no ", kind, " is named \"", name, "\"", near.empty() ? "" : ", the nearest is ",
-      absl::StrJoin(near, " or "), "; name one of ", absl::StrJoin(known, ", "),
-      ", or give the figures themselves"));
+  return Refusal(
+      absl::StatusCode::kInvalidArgument, reason,
+      absl::StrCat("no ", kind, " is named \"", name, "\"", near.empty() ? "" : ", the nearest is ",
+                   absl::StrJoin(near, " or "), "; name one of ", absl::StrJoin(known, ", "),
+                   ", or give the figures themselves"));
 }
 
 }  // namespace carillon

@@ -15,9 +15,9 @@
 namespace carillon {
 
 /// Slows the guessing of credentials. Each address may show ten wrong credentials, then one a
-/// second. While an address may show none, right credentials are refused there, too, so that a
-/// guess reveals nothing. Callers that were admitted from the address before are exempt. Safe from
-/// every thread.
+/// second. While an address has used up this allowance, right credentials from it are refused, too,
+/// so that the answer to a guess reveals nothing. Callers that were admitted from the address
+/// before are exempt. Safe from every thread.
 class GuessLimiter {
  public:
   /// `clock` must outlive the limiter.

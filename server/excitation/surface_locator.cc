@@ -242,9 +242,10 @@ absl::StatusOr<std::unique_ptr<SurfaceLocator>> SurfaceLocator::Make(
   RETURN_IF_ERROR(Check(surfaces));
   auto index = std::make_unique<Index>(surfaces);
   if (const RTCError error = rtcGetDeviceError(index->device); error != RTC_ERROR_NONE) {
-    return absl::InternalError(absl::StrCat("INTERNAL: the index of ", surfaces.triangles.size(),
-                                            " triangles could not be built, Embree error ",
-                                            static_cast<int>(error)));
+    return Refusal(
+        absl::StatusCode::kInternal, "INTERNAL",
+        absl::StrCat("the index of ", surfaces.triangles.size(),
+                     " triangles could not be built, Embree error ", static_cast<int>(error)));
   }
   return std::unique_ptr<SurfaceLocator>(new SurfaceLocator(std::move(index)));
 }

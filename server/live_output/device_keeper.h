@@ -38,7 +38,7 @@ struct DeviceState {
 /// The keeper has its own thread, because opening a device may take seconds.
 class DeviceKeeper {
  public:
-  /// Takes a line for people to read.
+  /// Takes a line of text for the operator, whenever the fault of the device changes.
   using Log = std::function<void(const std::string&)>;
   /// Takes DeviceState::plays when it may have changed.
   using Observer = std::function<void(bool plays)>;

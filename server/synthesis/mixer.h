@@ -230,6 +230,7 @@ class Mixer {
   void Send(const Command& command) ABSL_EXCLUSIVE_LOCKS_REQUIRED(control_mutex_);
 
   // Only the rendering thread calls and uses what follows.
+  /// Renders whole blocks, at most kBlocksTogether.
   void RenderBlocks(std::span<float> frames) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void ExecuteCommands() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void Execute(const Command& command) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
@@ -299,7 +300,7 @@ class Mixer {
   bool all_events_taken_ ABSL_GUARDED_BY(kRenderRole) = true;
   std::array<MixerEvent, 64> taken_ ABSL_GUARDED_BY(kRenderRole){};
   PendingEvents pending_ ABSL_GUARDED_BY(kRenderRole);
-  // Indices in pending_ of the events due in the blocks rendered together.
+  // Indices in pending_ of the events that are due in the blocks that one RenderBlocks renders.
   FixedVector<uint32_t> due_ ABSL_GUARDED_BY(kRenderRole);
   FixedVector<RenderOrder> due_order_ ABSL_GUARDED_BY(kRenderRole);
   FixedVector<DueEvent> due_events_ ABSL_GUARDED_BY(kRenderRole);
@@ -307,17 +308,17 @@ class Mixer {
   WorkBudget budget_ ABSL_GUARDED_BY(kRenderRole);
   // Quieter impulses are shed on arrival; zero: none is.
   float early_shed_below_ ABSL_GUARDED_BY(kRenderRole) = 0;
-  // Events taken for the blocks rendered together.
+  // Number of events taken for the blocks that one RenderBlocks renders.
   size_t taken_count_ ABSL_GUARDED_BY(kRenderRole) = 0;
   // Work of the sounding banks in the next block.
   double ringing_work_ ABSL_GUARDED_BY(kRenderRole) = 0;
-  // Work of the blocks rendered together.
+  // Work of the blocks that one RenderBlocks renders.
   double rendered_work_ ABSL_GUARDED_BY(kRenderRole) = 0;
   std::vector<MixedSection*> sections_ ABSL_GUARDED_BY(kRenderRole);  // null: not made yet
   // Numbers of the sections that were made, ascending: the sections of a bus are neighbours.
   FixedVector<uint32_t> open_sections_ ABSL_GUARDED_BY(kRenderRole);
   uint64_t active_mode_count_ ABSL_GUARDED_BY(kRenderRole) = 0;
-  // A bus's gains and sound, and the sound of all buses, in the blocks rendered together.
+  // A bus's gains and sound, and the sound of all buses, in the blocks of one RenderBlocks.
   std::vector<float> gains_ ABSL_GUARDED_BY(kRenderRole);
   std::vector<float> bus_frames_ ABSL_GUARDED_BY(kRenderRole);            // mono
   std::vector<float> bus_placed_ ABSL_GUARDED_BY(kRenderRole);            // interleaved

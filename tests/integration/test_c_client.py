@@ -39,14 +39,37 @@ class Impulse(ctypes.Structure):
     _fields_ = [("object", ctypes.c_uint32), ("point_m", Vec3), ("impulse", Vec3), ("duration_s", ctypes.c_double)]
 
 
+class Quaternion(ctypes.Structure):
+    _fields_ = [(name, ctypes.c_double) for name in "wxyz"]
+
+
+class Pose(ctypes.Structure):
+    _fields_ = [("object", ctypes.c_uint32), ("position_m", Vec3), ("orientation", Quaternion)]
+
+
 class Step(ctypes.Structure):
     _fields_ = [("time_s", ctypes.c_double), ("contacts", ctypes.c_void_p), ("contact_count", ctypes.c_size_t),
                 ("impulses", ctypes.POINTER(Impulse)), ("impulse_count", ctypes.c_size_t),
-                ("poses", ctypes.c_void_p), ("pose_count", ctypes.c_size_t)]
+                ("poses", ctypes.POINTER(Pose)), ("pose_count", ctypes.c_size_t), ("listener", ctypes.POINTER(Pose))]
+
+
+class Hearing(ctypes.Structure):
+    EFFECTS = ("distance_gain", "propagation_delay", "panning", "directivity", "near_field", "binaural")
+    _fields_ = [*((name, ctypes.c_int32) for name in EFFECTS), ("reference_distance_m", ctypes.c_double),
+                ("sound_speed_m_per_s", ctypes.c_double), ("listener", Pose)]
 
 
 class Report(ctypes.Structure):
     _fields_ = [(name + "_count", ctypes.c_uint64) for name in ("step", "accepted", "late", "rejected", "dropped_step")]
+
+
+class Registration(ctypes.Structure):
+    _fields_ = [("id", ctypes.c_char_p), ("hearing", ctypes.c_void_p), ("objects", ctypes.POINTER(Object)),
+                ("object_count", ctypes.c_size_t)]
+
+
+class RenderSettings(ctypes.Structure):
+    _fields_ = [("sample_rate_hz", ctypes.c_uint32), ("channel_count", ctypes.c_uint32), ("tail_s", ctypes.c_double)]
 
 
 class Sound(ctypes.Structure):
@@ -65,12 +88,9 @@ class CClientTest(DaemonTest):
         cls.c = ctypes.CDLL(str(cls.library))
         cls.c.carillon_error.restype = cls.c.carillon_error_reason.restype = ctypes.c_char_p
         cls.c.carillon_scene_name.restype = ctypes.c_char_p
-        cls.c.carillon_register_scene.argtypes = [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p, ctypes.c_size_t,
-                                                  ctypes.c_void_p]
-        cls.c.carillon_open_stream.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p]
-        cls.c.carillon_render.argtypes = [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_uint32, ctypes.c_double,
-                                          ctypes.POINTER(Sound)]
-        cls.c.carillon_create_trace.argtypes = [ctypes.c_char_p, ctypes.c_double, ctypes.POINTER(ctypes.c_void_p)]
+        cls.c.carillon_open_stream.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_int32, ctypes.c_void_p]
+        cls.c.carillon_create_trace.argtypes = [ctypes.c_char_p, ctypes.c_double, ctypes.c_int32, ctypes.c_void_p,
+                                                ctypes.c_void_p]
         cls.connection = ctypes.c_void_p()
         assert cls.c.carillon_connect(cls.daemon.server.encode(), ctypes.byref(cls.connection)) == 0
 
@@ -115,40 +135,96 @@ class CClientTest(DaemonTest):
         declared = set(re.findall(r"^(?:carillon_code|void|const char\*) (carillon_\w+)\(", header, re.MULTILINE))
         self.assertEqual(exported, declared)
 
-    def test_a_trace_renders_to_the_samples_that_python_gets(self):
+    def write_trace(self, file, steps, frame=0, hearing=None):
+        """A trace of a bar. `steps` makes them for its handle. Returns the name of the bar's model."""
         code, model = self.model_of_arrays(VERTICES, TRIANGLES)
         self.assertEqual(code, 0, self.c.carillon_error())
-        trace, file = ctypes.c_void_p(), str(self.folder / "c.contacts").encode()
-        self.assertEqual(self.c.carillon_create_trace(file, 1 / 60, ctypes.byref(trace)), 0)
+        trace = ctypes.c_void_p()
+        code = self.c.carillon_create_trace(file.encode(), 1 / 60, frame, hearing, ctypes.byref(trace))
+        self.assertEqual(code, 0, self.c.carillon_error())
         handle = ctypes.c_uint32()
         bar = Object(model=model.encode(), material=meshes.MATERIAL.encode())
         self.assertEqual(self.c.carillon_trace_object(trace, ctypes.byref(bar), ctypes.byref(handle)), 0)
-        blow = Impulse(handle, Vec3(0.2, 0.015, 0.01), Vec3(0, 0, -0.01), 1e-4)
-        step = Step(0.0, None, 0, ctypes.pointer(blow), 1, None, 0)
-        self.assertEqual(self.c.carillon_trace_step(trace, ctypes.byref(step)), 0)
+        for step in steps(handle):
+            self.assertEqual(self.c.carillon_trace_step(trace, ctypes.byref(step)), 0)
         self.assertEqual(self.c.carillon_close_trace(trace), 0)
+        return model
+
+    def render(self, file, channel_count=1):
         sound = Sound()
-        code = self.c.carillon_render(self.connection, file, 44100, 0.5, ctypes.byref(sound))
+        settings = RenderSettings(44100, channel_count, 0.5)
+        code = self.c.carillon_render(self.connection, file.encode(), ctypes.byref(settings), ctypes.byref(sound))
         self.assertEqual(code, 0, self.c.carillon_error())
         samples = numpy.ctypeslib.as_array(sound.samples, (sound.frame_count, sound.channel_count)).copy()
         self.c.carillon_free_sound(ctypes.byref(sound))
+        return samples
+
+    def test_a_trace_renders_to_the_samples_that_python_gets(self):
+        def steps(handle):
+            blow = Impulse(handle, Vec3(0.2, 0.015, 0.01), Vec3(0, 0, -0.01), 1e-4)
+            return [Step(0.0, None, 0, ctypes.pointer(blow), 1, None, 0)]
+
+        file = str(self.folder / "c.contacts")
+        model = self.write_trace(file, steps)
+        samples = self.render(file)
         with carillon.connect(self.daemon.server) as c:
-            same = c.render(file.decode(), sample_rate_hz=44100, tail_s=0.5)
+            same = c.render(file, sample_rate_hz=44100, tail_s=0.5)
             # Equal arrays are one model, from whichever language they come.
             self.assertEqual(c.create_model((VERTICES, TRIANGLES), meshes.MATERIAL).name, model)
         self.assertGreater(same.peak, 1e-5)
         numpy.testing.assert_array_equal(samples, same.samples)
 
+    def test_a_placed_bar_is_heard_from_its_place(self):
+        """The bar is 2 m to the right of the listener, who looks along -z from z = 1 m."""
+        at = Vec3(2, 0, 1)
+
+        def blow(handle, point, listener=None):
+            pose, impulse = Pose(handle, at), Impulse(handle, point, Vec3(0, 0, -0.01), 1e-4)
+            return [Step(0.0, None, 0, ctypes.pointer(impulse), 1, ctypes.pointer(pose), 1,
+                         listener and ctypes.pointer(listener))]
+
+        hearing = Hearing(distance_gain=1, propagation_delay=1, panning=1, listener=Pose(0, Vec3(0, 0, 1)))
+        here, file = Vec3(0.2, 0.015, 0.01), str(self.folder / "placed.contacts")
+        self.write_trace(file, lambda handle: blow(handle, here), 0, ctypes.byref(hearing))
+        left, right = self.render(file, 2).T
+        self.assertGreater(abs(right).max(), 1e-5)
+        self.assertLess(abs(left).max(), 1e-3 * abs(right).max())
+        # The same point in the frame of the scene gives the same sound.
+        self.write_trace(file, lambda handle: blow(handle, Vec3(here.x + at.x, here.y + at.y, here.z + at.z)), 1,
+                         ctypes.byref(hearing))
+        again = self.render(file, 2)[:, 1]
+        numpy.testing.assert_allclose(again, right, atol=1e-3 * abs(right).max())
+        # A listener who has turned round hears it from the left.
+        turned = Pose(0, Vec3(0, 0, 1), Quaternion(0, 0, 1, 0))
+        self.write_trace(file, lambda handle: blow(handle, here, turned), 0, ctypes.byref(hearing))
+        numpy.testing.assert_allclose(self.render(file, 2)[:, 0], right, atol=1e-3 * abs(right).max())
+        # Without a hearing the bar sounds at 1 m, at once, and on both channels.
+        self.write_trace(file, lambda handle: blow(handle, here))
+        plain = self.render(file, 2)
+        numpy.testing.assert_array_equal(*plain.T)
+        delay = int(2 / 343 * 44100)
+        first = [numpy.flatnonzero(abs(sound) > 0.05 * abs(sound).max())[0] for sound in (plain[:, 0], right)]
+        self.assertAlmostEqual(first[1] - first[0], delay, delta=20)
+
+    def test_hearings_and_frames_that_are_none_are_refused(self):
+        made, hearing = ctypes.c_void_p(), Hearing(near_field=1)
+        refused = self.c.carillon_create_scene(self.connection, ctypes.byref(hearing), ctypes.byref(made))
+        self.assertEqual((refused, self.c.carillon_error_reason()), (3, b"INVALID_HEARING"))
+        refused = self.c.carillon_create_trace(str(self.folder / "x").encode(), 0.01, 7, None, ctypes.byref(made))
+        self.assertEqual(refused, 3)
+        self.assertIn(b"the frame is 7", self.c.carillon_error())
+
     def test_a_registered_scene_outlives_its_daemon(self):
         code, model = self.model_of_arrays(VERTICES, TRIANGLES)
         self.assertEqual(code, 0, self.c.carillon_error())
         bars = (Object * 2)(*(Object(model.encode(), meshes.MATERIAL.encode(), handle=handle) for handle in (5, 9)))
+        registration = Registration(b"lathe-1", None, bars, 2)
         scene, again, stream = ctypes.c_void_p(), ctypes.c_void_p(), ctypes.c_void_p()
         for made in (scene, again):
-            code = self.c.carillon_register_scene(self.connection, b"lathe-1", bars, 2, ctypes.byref(made))
+            code = self.c.carillon_register_scene(self.connection, ctypes.byref(registration), ctypes.byref(made))
             self.assertEqual(code, 0, self.c.carillon_error())
             self.assertEqual(self.c.carillon_scene_name(made), b"scenes/lathe-1")
-        self.assertEqual(self.c.carillon_open_stream(scene, 0.01, ctypes.byref(stream)), 0)
+        self.assertEqual(self.c.carillon_open_stream(scene, 0.01, 0, ctypes.byref(stream)), 0)
         self.daemon.kill()
         self.daemon.start()
         step = Step(0.0, None, 0, None, 0, None, 0)
@@ -166,7 +242,7 @@ class CClientTest(DaemonTest):
         while report.accepted_count + report.late_count == 0 and time.monotonic() < end_s:
             self.assertEqual(self.c.carillon_send(stream, ctypes.byref(step)), 0)
             self.assertEqual(self.c.carillon_close_stream(stream, ctypes.byref(report)), 0, self.c.carillon_error())
-            self.assertEqual(self.c.carillon_open_stream(scene, 0.01, ctypes.byref(stream)), 0)
+            self.assertEqual(self.c.carillon_open_stream(scene, 0.01, 0, ctypes.byref(stream)), 0)
         self.assertEqual(report.accepted_count + report.late_count, 1)
         self.c.carillon_close_stream(stream, None)
         self.c.carillon_delete_scene(again)
@@ -174,13 +250,17 @@ class CClientTest(DaemonTest):
 
     def test_registrations_without_an_id_or_a_handle_are_refused(self):
         scene = ctypes.c_void_p()
-        register = self.c.carillon_register_scene
-        self.assertEqual(register(self.connection, b"", None, 0, ctypes.byref(scene)), 3)
+
+        def register(*registration):
+            return self.c.carillon_register_scene(self.connection, ctypes.byref(Registration(*registration)),
+                                                  ctypes.byref(scene))
+
+        self.assertEqual(register(b"", None, None, 0), 3)
         self.assertEqual(self.c.carillon_error_reason(), b"INVALID_SCENE_ID")
         bar = Object(b"modalModels/" + b"0" * 64, meshes.MATERIAL.encode())
-        self.assertEqual(register(self.connection, b"a", ctypes.byref(bar), 1, ctypes.byref(scene)), 3)
+        self.assertEqual(register(b"a", None, ctypes.pointer(bar), 1), 3)
         self.assertEqual(self.c.carillon_error_reason(), b"INVALID_SETTINGS")
-        self.assertEqual(register(self.connection, b"a", None, 1, ctypes.byref(scene)), 3)
+        self.assertEqual(register(b"a", None, None, 1), 3)
         self.assertIn(b"null pointer", self.c.carillon_error())
         self.assertIsNone(scene.value)
 
@@ -190,7 +270,7 @@ class CClientTest(DaemonTest):
         self.assertEqual(self.c.carillon_connect(b"unix:/nowhere", ctypes.byref(ctypes.c_void_p())), 14)
         self.assertEqual(self.c.carillon_error_reason(), b"SERVER_UNAVAILABLE")
         for call in (lambda: self.c.carillon_connect(None, None), lambda: self.c.carillon_stop(None),
-                     lambda: self.c.carillon_send(None, None), lambda: self.c.carillon_create_scene(None, None)):
+                     lambda: self.c.carillon_send(None, None), lambda: self.c.carillon_create_scene(None, None, None)):
             self.assertEqual(call(), 3)
             self.assertIn(b"null pointer", self.c.carillon_error())
         # What ends something takes nothing for done.

@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command line as people and scripts use it, against the real daemon."""
 
+import contextlib
 import json
+import math
+import os
 import re
 import shutil
 import subprocess
@@ -218,6 +221,30 @@ class RenderTest(CommandLineTest):
         done = subprocess.run([BIN / "carillon", "--server", self.daemon.server, "render", self.trace, "--out", "-",
                                "--tail", "0.3"], capture_output=True, check=True)
         self.assertEqual(done.stdout, file)
+
+
+class ListenTest(CommandLineTest):
+    def test_a_meter_on_a_terminal_shows_the_level_of_what_is_recorded(self):
+        terminal, end = os.openpty()
+        self.addCleanup(os.close, terminal)
+        with subprocess.Popen([BIN / "carillon", "--server", self.daemon.server, "listen", "--seconds", "1.5",
+                               "--out", self.folder / "heard.wav"], stderr=end) as listener:
+            os.close(end)
+            shown = os.read(terminal, 4096)
+            self.run_command("strike", self.model, "--point", "0,0.0065,0.01", "--impulse", "0,0,-0.02")
+        with contextlib.suppress(OSError):  # the end of a terminal
+            while more := os.read(terminal, 4096):
+                shown += more
+        self.assertEqual(listener.returncode, 0, shown)
+        meter = re.findall(r"\r\[(#*)(\.*)\] (silence|\S+ dBFS) +largest (silence|\S+ dBFS)", shown.decode())
+        self.assertGreaterEqual(len(meter), 14, shown)
+        peak_db = 20 * math.log10(abs(sound.read_wave(self.folder / "heard.wav")).max())
+        self.assertAlmostEqual(float(meter[-1][3].removesuffix(" dBFS")), peak_db, delta=0.06)
+        for bar, rest, now, _ in meter:
+            wanted = 0 if now == "silence" else 40 * max(0, 1 + float(now.removesuffix(" dBFS")) / 60)
+            self.assertEqual(len(bar + rest), 40)
+            self.assertAlmostEqual(len(bar), wanted, delta=0.6)
+        self.assertGreater(len({bar for bar, *_ in meter}), 3, "the level falls")
 
 
 class StrikeTest(CommandLineTest):

@@ -21,8 +21,8 @@ class Ears {
   /// the end of the previous block. `head` must have the same tap count as the constructor's head.
   void Turn(const Head& head, const Vector3& direction) noexcept;
 
-  /// Begins a block with the responses for a direction from its start to its end. The caller must
-  /// then set past().
+  /// Begins a block that has the responses for `direction` throughout, without a transition. The
+  /// caller must then set past().
   void Jump(const Head& head, const Vector3& direction) noexcept;
 
   /// Begins a block that keeps the responses at the end of the previous block.

@@ -112,8 +112,9 @@ class Voice {
   uint32_t bank_count = 0;
 
  private:
-  /// Delay and gains at one time. With two ears the sound comes from `direction` in the listener's
-  /// frame, and reaches each ear later by the delay of that ear.
+  /// Delay and gains at one time. For a binaural listener, `direction` points from the listener to
+  /// the sound, in the listener's frame, and the sound reaches each ear after delay_frames and the
+  /// ear_delay_frames of that ear.
   struct Heard {
     double delay_frames = 0;
     std::array<float, 2> gains{};

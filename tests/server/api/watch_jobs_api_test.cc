@@ -20,25 +20,39 @@ class WatchJobsApi : public ServedDaemon {
  protected:
   using Reader = std::unique_ptr<grpc::ClientReader<v1::WatchJobsResponse>>;
 
-  /// Creates a job that fails, and returns its name.
-  std::string Submit(const std::string& label) {
+  /// Stores a mesh of which every job fails, and returns its digest.
+  std::string Upload(const std::string& text) {
     grpc::ClientContext context;
     v1::UploadMeshResponse uploaded;
     const auto writer = models->UploadMesh(&context, &uploaded);
     v1::UploadMeshRequest mesh;
-    mesh.set_data("a mesh for " + label);
+    mesh.set_data(text);
     writer->Write(mesh);
     writer->WritesDone();
     EXPECT_TRUE(writer->Finish().ok());
+    return uploaded.mesh_digest();
+  }
+
+  /// Creates a job that fails, and returns its name.
+  std::string Submit(const std::string& label) { return Submit(label, Upload("mesh of " + label)); }
+  std::string Submit(const std::string& label, const std::string& mesh, uint32_t mode_count = 0) {
     v1::CreateModalModelRequest request;
-    request.set_mesh_digest(uploaded.mesh_digest());
+    request.set_mesh_digest(mesh);
     request.set_mesh_format("obj");
     request.mutable_material()->set_preset("chime_aluminum");
     request.set_label(label);
+    if (mode_count > 0) request.mutable_settings()->set_keep_mode_count(mode_count);
     v1::CreateModalModelResponse response;
     EXPECT_TRUE(
         Call(*models, &v1::ModalModelService::Stub::CreateModalModel, request, response).ok());
     return response.job().name();
+  }
+
+  void Cancel(const std::string& name) {
+    v1::CancelJobRequest request;
+    request.set_name(name);
+    v1::CancelJobResponse response;
+    EXPECT_TRUE(Call(*jobs, &v1::DecompositionService::Stub::CancelJob, request, response).ok());
   }
 
   /// Reads to the job's end; returns all messages with a job.
@@ -126,6 +140,31 @@ TEST_F(WatchJobsApi, ManyWatchersThatLeaveInTheMidstDisturbNobody) {
   ReadBegin(reader);
   const std::string name = Submit("last");
   EXPECT_EQ(ReadToEndOf(name, reader).back().name(), name);
+}
+
+TEST_F(WatchJobsApi, EndsForAWatcherThatDoesNotReadAndForNoOther) {
+  constexpr uint32_t kMostWaiting = 4096;
+  // What is more fills the connection's window, which does not grow here.
+  constexpr uint32_t kSubmitted = kMostWaiting + 700;
+  grpc::ChannelArguments arguments;
+  arguments.SetInt(GRPC_ARG_HTTP2_BDP_PROBE, 0);
+  const auto stub = v1::DecompositionService::NewStub(
+      grpc::CreateCustomChannel(address(), grpc::InsecureChannelCredentials(), arguments));
+  const std::string mesh = Upload("a mesh");
+  Reader reader = stub->WatchJobs(&context_, {});
+  for (uint32_t i = 0; i < kSubmitted; ++i) Cancel(Submit(std::string(200, 'x'), mesh, 1 + i));
+  uint32_t read_count = 0;
+  v1::WatchJobsResponse response;
+  while (read_count < kSubmitted && reader->Read(&response)) ++read_count;
+  EXPECT_LT(read_count, kSubmitted);
+  const grpc::Status status = reader->Finish();
+  EXPECT_EQ(status.error_code(), grpc::DATA_LOSS);
+  EXPECT_THAT(status.error_message(), testing::StartsWith("WATCH_TOO_SLOW: "));
+  grpc::ClientContext context;
+  Reader another = jobs->WatchJobs(&context, {});
+  ReadBegin(another);
+  const std::string name = Submit("last");
+  EXPECT_EQ(ReadToEndOf(name, another).back().name(), name);
 }
 
 TEST_F(WatchJobsApi, ListsHaveTheSameFilter) {
