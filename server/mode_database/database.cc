@@ -20,9 +20,12 @@ constexpr char kReader[] = "PRAGMA page_size = 65536; PRAGMA cache_size = -512;"
 // The readers that stay open. The readers of a busier moment are closed after it, so that the
 // daemon's memory does not remember its busiest moment.
 constexpr size_t kMostIdleReaders = 4;
-// This makes a new file one that can shrink. On an existing file it is a write, for which another
-// connection would wait, so that readers do without.
-constexpr char kWriter[] = "PRAGMA page_size = 65536; PRAGMA auto_vacuum = INCREMENTAL;";
+// The writer alone makes a new file one that can shrink, because on an existing file this is a
+// write, for which another connection would wait. Changes go from the log into the file whenever
+// the log exceeds 4 MiB, so that little is lost with a log that somebody removes after a crash.
+constexpr char kWriter[] =
+    "PRAGMA page_size = 65536; PRAGMA auto_vacuum = INCREMENTAL;"
+    "PRAGMA wal_autocheckpoint = 64; PRAGMA journal_size_limit = 4194304;";
 
 absl::StatusOr<std::unique_ptr<SqliteConnection>> Connect(const std::filesystem::path& file,
                                                           const char* first = kReader) {
