@@ -38,8 +38,9 @@ constexpr size_t kFewestChecked = 8;
 /// inside the body, differences on coarse surfaces decrease more slowly, which needs a greater
 /// ratio.
 constexpr double kErrorPerDifference = 1.7;
-/// The least error that is stated. It is due to the solver's tolerance and the far pattern's order.
-constexpr double kLeastErrorDb = 0.05;
+/// The part of the stated error that is due to the solver, relative to its tolerance. It is added
+/// to the part that two surfaces show, because they may agree by chance.
+constexpr double kErrorDbPerTolerance = 5;
 /// Approximate number of applications of the operator in a solution, used until a solution is
 /// counted.
 constexpr double kUsualSweeps = 10;
@@ -204,9 +205,7 @@ class TransferSolver {
   }
 
   ModeProblem ProblemOf(const ModeGroup& group, const SurfaceLevels::Made& made) const {
-    // A residual of 1e-2 leaves no more than 0.1 dB of power, and 0.3 dB of direction.
-    ModeProblem problem{.wavenumber = group.wavenumber,
-                        .tolerance = settings_.goal_db < 0.3 ? 3e-3 : 1e-2};
+    ModeProblem problem{.wavenumber = group.wavenumber, .tolerance = Tolerance()};
     for (size_t s = 0; s < group.modes.size(); ++s) {
       problem.displacements.push_back(DisplacementOf(modes_, group.modes[s], body_, made.level));
       if (group.solved_count > 0 && !made.places_before.empty()) {
@@ -216,13 +215,17 @@ class TransferSolver {
     return problem;
   }
 
+  /// The residual of a solution. One of 1e-2 leaves no more than 0.1 dB of power, and 0.3 dB of
+  /// direction.
+  double Tolerance() const { return settings_.goal_db < 0.3 ? 3e-3 : 1e-2; }
+
   /// Estimates the error of each mode from the difference between this level and the level before.
   void Compare(const std::vector<ModeField>& fields, const SphereGrid& grid, ModeGroup& group) {
     group.error_db = 0;
     group.loudness = 0;
     for (size_t s = 0; s < fields.size(); ++s) {
       ErrorDb error;
-      if (group.solved_count > 0) error = DifferenceOf(group.fields[s], fields[s], grid);
+      if (group.solved_count > 0) error = ErrorOf(group.fields[s], fields[s], grid);
       if (group.solved_count == 1) first_differences_db_.push_back(error);
       ModeRadiation& mode = transfer_.modes[group.modes[s]];
       mode.power_error_db = error.power;
@@ -234,13 +237,12 @@ class TransferSolver {
     }
   }
 
-  static ErrorDb DifferenceOf(const ModeField& before, const ModeField& field,
-                              const SphereGrid& grid) {
-    return {.power = std::max(kLeastErrorDb,
-                              kErrorPerDifference * std::abs(PowerDifferenceDb(before, field))),
-            .direction = std::max(
-                kDirectionGoal * kLeastErrorDb,
-                kErrorPerDifference * DirectionDifferenceDb(before.pattern, field.pattern, grid))};
+  ErrorDb ErrorOf(const ModeField& before, const ModeField& field, const SphereGrid& grid) const {
+    const double solver_db = kErrorDbPerTolerance * Tolerance();
+    const double power_db = std::abs(PowerDifferenceDb(before, field));
+    const double direction_db = DirectionDifferenceDb(before.pattern, field.pattern, grid);
+    return {.power = solver_db + kErrorPerDifference * power_db,
+            .direction = kDirectionGoal * solver_db + kErrorPerDifference * direction_db};
   }
 
   /// Gives each mode that was solved on one surface only the largest error that the first surface

@@ -24,8 +24,7 @@ constexpr size_t kMostIdleReaders = 4;
 // write, for which another connection would wait. Changes go from the log into the file whenever
 // the log exceeds 4 MiB, so that little is lost with a log that somebody removes after a crash.
 constexpr char kWriter[] =
-    "PRAGMA page_size = 65536; PRAGMA auto_vacuum = INCREMENTAL;"
-    "PRAGMA wal_autocheckpoint = 64; PRAGMA journal_size_limit = 4194304;";
+    "PRAGMA page_size = 65536; PRAGMA auto_vacuum = INCREMENTAL; PRAGMA wal_autocheckpoint = 64;";
 
 absl::StatusOr<std::unique_ptr<SqliteConnection>> Connect(const std::filesystem::path& file,
                                                           const char* first = kReader) {
@@ -111,7 +110,9 @@ absl::Status Database::WriteToFree(absl::FunctionRef<absl::Status(SqliteConnecti
   absl::Status status = WriteLocked(body);
   if (!has_no_room(status)) return status;
   // After a checkpoint the log is written from its beginning again.
+  RETURN_IF_ERROR(files_.BeginChange());
   Figure(*writer_, "PRAGMA wal_checkpoint(RESTART)").status().IgnoreError();
+  RETURN_IF_ERROR(files_.Remember());
   status = WriteLocked(body);
   if (!has_no_room(status)) return status;
   reserve_.Release();
@@ -119,16 +120,19 @@ absl::Status Database::WriteToFree(absl::FunctionRef<absl::Status(SqliteConnecti
 }
 
 absl::Status Database::WriteLocked(absl::FunctionRef<absl::Status(SqliteConnection&)> body) {
-  RETURN_IF_ERROR(files_.Check());
+  RETURN_IF_ERROR(files_.BeginChange());
   const int64_t row_count = writer_->total_changed_row_count();
   int64_t change_count = change_count_;
-  RETURN_IF_ERROR(InTransaction(*writer_, "BEGIN IMMEDIATE", [&](SqliteConnection& connection) {
+  const auto change = [&](SqliteConnection& connection) {
     RETURN_IF_ERROR(body(connection));
     if (connection.total_changed_row_count() == row_count) return absl::OkStatus();
     return connection.Run("INSERT OR REPLACE INTO facts (name, value) VALUES ('change_count', ?)",
                           {std::to_string(++change_count)});
-  }));
-  RETURN_IF_ERROR(files_.Remember());
+  };
+  const absl::Status changed = InTransaction(*writer_, "BEGIN IMMEDIATE", change);
+  const absl::Status remembered = files_.Remember();
+  RETURN_IF_ERROR(changed);
+  RETURN_IF_ERROR(remembered);
   if (change_count != change_count_) change_count_file_.Write(change_count);
   change_count_ = change_count;
   return absl::OkStatus();
@@ -145,9 +149,11 @@ absl::Status Database::Tidy() {
   if (can_shrink == 0 || free_count < kLeastFreePages || free_count * 4 < page_count) {
     return absl::OkStatus();
   }
-  RETURN_IF_ERROR(writer_->RunScript("PRAGMA incremental_vacuum(256)"));
-  RETURN_IF_ERROR(Figure(*writer_, "PRAGMA wal_checkpoint(PASSIVE)").status());
-  return files_.Remember();
+  RETURN_IF_ERROR(files_.BeginChange());
+  absl::Status shrunk = writer_->RunScript("PRAGMA incremental_vacuum(256)");
+  if (shrunk.ok()) shrunk = Figure(*writer_, "PRAGMA wal_checkpoint(PASSIVE)").status();
+  const absl::Status remembered = files_.Remember();
+  return shrunk.ok() ? remembered : shrunk;
 }
 
 absl::Status Database::Read(absl::FunctionRef<absl::Status(SqliteConnection&)> body) {

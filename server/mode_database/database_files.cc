@@ -14,6 +14,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon {
 namespace {
@@ -53,12 +54,25 @@ absl::Status DatabaseFiles::Remember() {
   lost_ = lost_ || !IsSame(database_, database) || !IsSame(log_, log);
   database_ = database;
   log_ = log;
+  changing_ = false;
   return Judge();
 }
 
 absl::Status DatabaseFiles::Check() {
   const MutexLock lock(&mutex_);
-  lost_ = lost_ || !IsWhole(database_, Look(file_)) || !IsWhole(log_, Look(LogOf(file_)));
+  return CheckLocked();
+}
+
+absl::Status DatabaseFiles::BeginChange() {
+  const MutexLock lock(&mutex_);
+  RETURN_IF_ERROR(CheckLocked());
+  changing_ = true;
+  return absl::OkStatus();
+}
+
+absl::Status DatabaseFiles::CheckLocked() {
+  const auto is_right = changing_ ? IsSame : IsWhole;
+  lost_ = lost_ || !is_right(database_, Look(file_)) || !is_right(log_, Look(LogOf(file_)));
   return Judge();
 }
 

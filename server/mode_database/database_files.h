@@ -25,8 +25,12 @@ class DatabaseFiles {
   absl::Status Remember();
 
   /// Checks both files. Errors: FailedPrecondition (DATABASE_LOST: a file was removed or replaced,
-  /// or is smaller than at the last Remember).
+  /// or is smaller than at the last Remember, although no change is being made).
   absl::Status Check();
+
+  /// Checks both files before a change, which may make them smaller. The change lasts until the
+  /// next Remember. Errors: as Check.
+  absl::Status BeginChange();
 
  private:
   struct Seen {
@@ -37,12 +41,14 @@ class DatabaseFiles {
   static std::optional<Seen> Look(const std::filesystem::path& file);
   static bool IsSame(const std::optional<Seen>& before, const std::optional<Seen>& now);
   static bool IsWhole(const std::optional<Seen>& before, const std::optional<Seen>& now);
+  absl::Status CheckLocked() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   absl::Status Judge() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   const std::filesystem::path file_;
   Mutex mutex_;
   std::optional<Seen> database_ ABSL_GUARDED_BY(mutex_);
   std::optional<Seen> log_ ABSL_GUARDED_BY(mutex_);
+  bool changing_ ABSL_GUARDED_BY(mutex_) = false;
   bool lost_ ABSL_GUARDED_BY(mutex_) = false;
 };
 

@@ -10,6 +10,7 @@
 #include <functional>
 #include <semaphore>
 #include <string>
+#include <thread>
 
 #include "server/base/sha256.h"
 #include "server/mode_database/database.h"
@@ -127,6 +128,25 @@ TEST_F(DatabaseFilesTest, TheFileShrinksAfterDeletions) {
   EXPECT_TRUE(Put("new").ok());
   Open();
   EXPECT_TRUE(Has("new"));
+}
+
+TEST_F(DatabaseFilesTest, AFileThatItsDaemonMakesSmallerIsNotLost) {
+  WriteRecords(folder_ / "model", SampleRecords(SampleModel(200, 5000)));
+  std::atomic<bool> done = false;
+  std::thread checker([&] {
+    while (!done && database_->database().CheckFiles().ok()) {
+    }
+  });
+  for (int round = 0; round < 5; ++round) {
+    for (int i = 0; i < 4; ++i) EXPECT_TRUE(Put(std::to_string(i)).ok());
+    for (int i = 0; i < 4; ++i) {
+      EXPECT_TRUE(database_->models().Delete(Sha256Hex(std::to_string(i))).ok());
+    }
+    for (int i = 0; i < 5; ++i) EXPECT_TRUE(database_->database().Tidy().ok());
+  }
+  done = true;
+  checker.join();
+  EXPECT_TRUE(database_->database().CheckFiles().ok());
 }
 
 TEST_F(DatabaseFilesTest, AReaderConnectsWhileAChangeIsBeingMade) {
