@@ -7,7 +7,9 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <chrono>
 #include <system_error>
+#include <thread>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -23,6 +25,15 @@ absl::Status Unusable(const std::filesystem::path& path, int error) {
                               "; choose another with --data-dir"));
 }
 
+/// A worker that a killed daemon was just starting holds the lock until it runs its own program.
+bool LockWithinASecond(int lock) {
+  for (int tries = 20; flock(lock, LOCK_EX | LOCK_NB) != 0; --tries) {
+    if (tries == 0) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+  return true;
+}
+
 }  // namespace
 
 absl::StatusOr<DataDirectory> DataDirectory::Open(const std::filesystem::path& path) {
@@ -31,7 +42,7 @@ absl::StatusOr<DataDirectory> DataDirectory::Open(const std::filesystem::path& p
   if (mkdir(path.c_str(), 0700) != 0 && errno != EEXIST) return Unusable(path, errno);
   const int lock = open((path / "lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
   if (lock < 0) return Unusable(path, errno);
-  if (flock(lock, LOCK_EX | LOCK_NB) == 0) return DataDirectory(path, lock);
+  if (LockWithinASecond(lock)) return DataDirectory(path, lock);
   close(lock);
   return Refusal(absl::StatusCode::kFailedPrecondition, "DATA_DIRECTORY_IN_USE",
                  absl::StrCat("another daemon uses \"", path.string(),

@@ -11,8 +11,8 @@ namespace carillon {
 /// uses it. The kernel releases the lock however the process ends.
 class DataDirectory {
  public:
-  /// Locks the folder. Creates it, readable by its owner only, unless it exists. Errors:
-  /// FailedPrecondition (DATA_DIRECTORY_IN_USE, DATA_DIRECTORY_UNUSABLE).
+  /// Locks the folder, for which it waits up to a second. Creates it, readable by its owner only,
+  /// unless it exists. Errors: FailedPrecondition (DATA_DIRECTORY_IN_USE, DATA_DIRECTORY_UNUSABLE).
   static absl::StatusOr<DataDirectory> Open(const std::filesystem::path& path);
   ~DataDirectory();
   DataDirectory(DataDirectory&& other) noexcept;

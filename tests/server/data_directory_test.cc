@@ -4,7 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <latch>
 #include <optional>
+#include <thread>
 
 #include "tests/server/mode_database/sample_model.h"
 
@@ -27,6 +29,24 @@ TEST(DataDirectory, IsHeldByOneAtATime) {
   EXPECT_THAT(second.ToString(), testing::HasSubstr("DATA_DIRECTORY_IN_USE: "));
   first.reset();
   EXPECT_TRUE(DataDirectory::Open(folder / "data").ok());
+}
+
+TEST(DataDirectory, WaitsForOneThatIsBeingGivenUp) {
+  const TemporaryFolder folder;
+  // In most rounds the other thread tries while the first still has the folder.
+  for (int round = 0; round < 20; ++round) {
+    std::optional<absl::StatusOr<DataDirectory>> first = DataDirectory::Open(folder / "data");
+    ASSERT_TRUE(first->ok());
+    std::latch begun(1);
+    std::thread other([&] {
+      begun.count_down();
+      EXPECT_TRUE(DataDirectory::Open(folder / "data").ok());
+    });
+    begun.wait();
+    std::this_thread::yield();
+    first.reset();
+    other.join();
+  }
 }
 
 TEST(DataDirectory, RefusesAFileInItsPlace) {
