@@ -38,9 +38,10 @@ constexpr size_t kFewestChecked = 8;
 /// inside the body, differences on coarse surfaces decrease more slowly, which needs a greater
 /// ratio.
 constexpr double kErrorPerDifference = 1.7;
-/// The part of the stated error that is due to the solver, relative to its tolerance. It is added
-/// to the part that two surfaces show, because they may agree by chance.
-constexpr double kErrorDbPerTolerance = 5;
+/// The parts of the stated errors that are due to the solver, relative to its tolerance. They are
+/// added to the parts that two surfaces show, because the surfaces may agree by chance.
+constexpr double kPowerErrorDbPerTolerance = 10;
+constexpr double kDirectionErrorDbPerTolerance = 15;
 /// Approximate number of applications of the operator in a solution, used until a solution is
 /// counted.
 constexpr double kUsualSweeps = 10;
@@ -238,11 +239,11 @@ class TransferSolver {
   }
 
   ErrorDb ErrorOf(const ModeField& before, const ModeField& field, const SphereGrid& grid) const {
-    const double solver_db = kErrorDbPerTolerance * Tolerance();
     const double power_db = std::abs(PowerDifferenceDb(before, field));
     const double direction_db = DirectionDifferenceDb(before.pattern, field.pattern, grid);
-    return {.power = solver_db + kErrorPerDifference * power_db,
-            .direction = kDirectionGoal * solver_db + kErrorPerDifference * direction_db};
+    return {.power = kPowerErrorDbPerTolerance * Tolerance() + kErrorPerDifference * power_db,
+            .direction =
+                kDirectionErrorDbPerTolerance * Tolerance() + kErrorPerDifference * direction_db};
   }
 
   /// Gives each mode that was solved on one surface only the largest error that the first surface

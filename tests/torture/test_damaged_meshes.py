@@ -73,6 +73,15 @@ class DamagedMeshTest(torture.ScratchTest):
         self.assertTrue(reason, ended.stderr[-2000:])
         return reason.group(1).decode()
 
+    def test_a_surface_that_tetgen_refines_without_end_is_refused_soon(self):
+        seed = 6642  # before, it took 100 s of processor time
+        originals = files()
+        mesh_format, data = originals[seed % len(originals)]
+        before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+        self.assertEqual(self.decompose(mesh_format, damaged(data, random.Random(seed))),
+                         "MESH_TETRAHEDRALIZATION_FAILED")
+        self.assertLess(resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before, 50)
+
     def test_each_ends_with_a_model_or_a_reason(self):
         originals = files()
         self.assertGreater(len(originals), 10)

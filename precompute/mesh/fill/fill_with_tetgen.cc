@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cstddef>
 #include <cstring>
 #include <string>
@@ -24,8 +23,6 @@
 namespace carillon::precompute {
 namespace {
 
-/// The largest accepted meshes need a minute.
-constexpr std::chrono::seconds kMostCpu(600);
 constexpr int kTetgenOutOfMemory = 1;  // what terminatetetgen throws
 
 absl::Status Failed(absl::string_view what) {
@@ -239,7 +236,7 @@ absl::StatusOr<TetMesh> MakeMesh(const Filling& filling) {
 
 absl::StatusOr<TetMesh> FillWithTetgen(const FillRequest& request) {
   const absl::StatusOr<std::string> bytes =
-      RunInChild([&] { return RunTetgen(request); }, kMostCpu);
+      RunInChild([&] { return RunTetgen(request); }, request.most_cpu);
   if (!bytes.ok()) {
     // The surface has passed every check, and TetGen reports the faults that it finds itself.
     return Refusal(absl::StatusCode::kInvalidArgument, "MESH_TETRAHEDRALIZATION_FAILED",

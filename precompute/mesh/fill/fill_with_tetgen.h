@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <vector>
 
@@ -21,6 +22,8 @@ struct FillRequest {
   bool keep_surface;
   /// Largest number of vertices to add.
   int max_added_nodes;
+  /// Processor time after which TetGen is stopped. It refines some surfaces without end.
+  std::chrono::seconds most_cpu;
   /// Whether TetGen tolerates larger defects of the surface and worse shapes of the tetrahedra.
   /// Useful for a surface on which TetGen has failed.
   bool cautious = false;

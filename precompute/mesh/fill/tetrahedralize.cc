@@ -2,6 +2,7 @@
 #include "precompute/mesh/fill/tetrahedralize.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <limits>
@@ -253,6 +254,14 @@ class Filler {
                                                   : kLongestToMeanEdge * edge;
   }
 
+  /// The processor time for one try. TetGen makes 50,000 tetrahedra a second or more; a thousand
+  /// are expected here.
+  std::chrono::seconds MostCpu(const RefinedSurface& refined, double inside) const {
+    const double tetrahedra = extent_.volume / (kVolumeOfRegular * inside * inside * inside);
+    const auto triangles = static_cast<double>(refined.surface.triangles.size());
+    return std::chrono::seconds(std::lround(std::min(5 + (tetrahedra + triangles) / 1000, 600.0)));
+  }
+
   absl::StatusOr<TetMesh> FillWithEdge(double edge) const { return FillWithEdge(edge, edge); }
 
   absl::StatusOr<TetMesh> FillWithEdge(double edge, double inside) const {
@@ -263,6 +272,7 @@ class Filler {
                         .max_volume = kVolumeOfRegular * inside * inside * inside,
                         .keep_surface = true,
                         .max_added_nodes = kMaxMeshNodes / NodesPerCorner(settings_),
+                        .most_cpu = MostCpu(refined, inside),
                         .cautious = settings_.cautious};
     return FillSomehow(request, keep_surface);
   }
