@@ -47,9 +47,8 @@ absl::StatusOr<std::shared_ptr<const SoundingBody>> MakeBody(
     std::shared_ptr<const ModalModel> model) {
   // Two threads make the two parts, because a client waits for the object. The new thread is not
   // the one that makes the locator: Embree keeps 192 bytes for each thread that ever used it.
-  auto tabulating = std::async([&model] {
-    return ShapeTable(model->shapes, model->vertices.size(), model->mode_count());
-  });
+  auto tabulating = std::async(
+      [&model] { return ShapeTable(model->shapes, model->vertices.size(), model->mode_count()); });
   ASSIGN_OR_RETURN(std::unique_ptr<SurfaceLocator> locator,
                    SurfaceLocator::Make({.vertices = model->vertices,
                                          .triangles = model->triangles,
