@@ -209,8 +209,9 @@ carillon_code carillon_open_stream(carillon_scene* scene, double step_s, carillo
                                    carillon_stream** stream);
 /** Sends a step. It copies the step and never waits for the daemon. */
 carillon_code carillon_send(carillon_stream* stream, const carillon_step* step);
-/** Sends what waits and ends the stream. `report` may be null. Of a stream that was opened again it
- * counts the newest part, but for the dropped steps, which it counts from the beginning. */
+/** Sends what waits, waits for the daemon's answer, and ends the stream. `report` may be null. Of a
+ * stream that was opened again it counts the newest part, but for the dropped steps, which it
+ * counts from the beginning. */
 carillon_code carillon_close_stream(carillon_stream* stream, carillon_report* report);
 
 /** Begins a contact trace, which is written to a file (.contacts), to be rendered now or later. If

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/api/grpc_log.h"
 
+#include <google/protobuf/stubs/logging.h>
 #include <grpc/support/log.h>
 
+#include <string>
 #include <utility>
 
 #include "absl/base/thread_annotations.h"
@@ -21,12 +23,20 @@ void Log(gpr_log_func_args* message) {
   if (present_log != nullptr) present_log->Warn(absl::StrCat("gRPC: ", message->message));
 }
 
+void LogProtobuf(google::protobuf::LogLevel level, const char* /*file*/, int /*line*/,
+                 const std::string& message) {
+  if (level < google::protobuf::LOGLEVEL_ERROR) return;
+  const MutexLock lock(&log_mutex);
+  if (present_log != nullptr) present_log->Warn(absl::StrCat("protobuf: ", message));
+}
+
 }  // namespace
 
 GrpcLog::GrpcLog(const Clock& clock, LimitedLog::Sink sink) : log_(clock, std::move(sink)) {
   const MutexLock lock(&log_mutex);
   present_log = &log_;
   gpr_set_log_function(Log);
+  google::protobuf::SetLogHandler(LogProtobuf);
 }
 
 GrpcLog::~GrpcLog() {

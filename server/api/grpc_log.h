@@ -5,8 +5,9 @@
 
 namespace carillon {
 
-/// Sends gRPC's own messages, such as those about failed handshakes, to `sink`, within the limits
-/// of a LimitedLog. `clock` must outlive the object. There may be only one GrpcLog at a time.
+/// Sends the messages of gRPC and protobuf, such as those about failed handshakes and about text
+/// that is not UTF-8, to `sink`, within the limits of a LimitedLog. `clock` must outlive the
+/// object. There may be only one GrpcLog at a time.
 class GrpcLog {
  public:
   GrpcLog(const Clock& clock, LimitedLog::Sink sink);

@@ -234,5 +234,17 @@ TEST_F(ModelApi, HealthSaysServing) {
   EXPECT_EQ(std::string(bytes.begin(), bytes.end()), "\x08\x01");  // status = SERVING
 }
 
+TEST_F(ModelApi, TextThatIsNotUtf8IsRefusedWithOneWarningOfTheDaemonsOwn) {
+  v1::CreateModalModelRequest request;
+  request.mutable_material()->set_preset("\xff");
+  v1::CreateModalModelResponse response;
+  for (int i = 0; i < 100; ++i) {
+    EXPECT_FALSE(
+        Call(*models, &v1::ModalModelService::Stub::CreateModalModel, request, response).ok());
+  }
+  EXPECT_THAT(log(), testing::HasSubstr("protobuf: String field"));
+  EXPECT_LT(log().size(), 10'000U);
+}
+
 }  // namespace
 }  // namespace carillon
