@@ -20,9 +20,10 @@ constexpr char kReader[] = "PRAGMA page_size = 65536; PRAGMA cache_size = -512;"
 // The readers that stay open. The readers of a busier moment are closed after it, so that the
 // daemon's memory does not remember its busiest moment.
 constexpr size_t kMostIdleReaders = 4;
-// The writer alone makes a new file one that can shrink, because on an existing file this is a
-// write, for which another connection would wait. Changes go from the log into the file whenever
-// the log exceeds 4 MiB, so that little is lost with a log that somebody removes after a crash.
+// Only the writer sets auto_vacuum, with which a new file can shrink: on an existing file this
+// pragma is a write, and a reader would wait for the writer. Changes go from the log into the file
+// whenever the log exceeds 4 MiB, so that little is lost with a log that somebody removes after a
+// crash.
 constexpr char kWriter[] =
     "PRAGMA page_size = 65536; PRAGMA auto_vacuum = INCREMENTAL; PRAGMA wal_autocheckpoint = 64;";
 
@@ -110,9 +111,10 @@ absl::Status Database::WriteToFree(absl::FunctionRef<absl::Status(SqliteConnecti
   absl::Status status = WriteLocked(body);
   if (!has_no_room(status)) return status;
   // After a checkpoint the log is written from its beginning again.
-  RETURN_IF_ERROR(files_.BeginChange());
-  Figure(*writer_, "PRAGMA wal_checkpoint(RESTART)").status().IgnoreError();
-  RETURN_IF_ERROR(files_.Remember());
+  RETURN_IF_ERROR(files_.Change([&writer = *writer_] {
+    Figure(writer, "PRAGMA wal_checkpoint(RESTART)").status().IgnoreError();
+    return absl::OkStatus();
+  }));
   status = WriteLocked(body);
   if (!has_no_room(status)) return status;
   reserve_.Release();
@@ -120,8 +122,8 @@ absl::Status Database::WriteToFree(absl::FunctionRef<absl::Status(SqliteConnecti
 }
 
 absl::Status Database::WriteLocked(absl::FunctionRef<absl::Status(SqliteConnection&)> body) {
-  RETURN_IF_ERROR(files_.BeginChange());
-  const int64_t row_count = writer_->total_changed_row_count();
+  SqliteConnection& writer = *writer_;
+  const int64_t row_count = writer.total_changed_row_count();
   int64_t change_count = change_count_;
   const auto change = [&](SqliteConnection& connection) {
     RETURN_IF_ERROR(body(connection));
@@ -129,10 +131,7 @@ absl::Status Database::WriteLocked(absl::FunctionRef<absl::Status(SqliteConnecti
     return connection.Run("INSERT OR REPLACE INTO facts (name, value) VALUES ('change_count', ?)",
                           {std::to_string(++change_count)});
   };
-  const absl::Status changed = InTransaction(*writer_, "BEGIN IMMEDIATE", change);
-  const absl::Status remembered = files_.Remember();
-  RETURN_IF_ERROR(changed);
-  RETURN_IF_ERROR(remembered);
+  RETURN_IF_ERROR(files_.Change([&] { return InTransaction(writer, "BEGIN IMMEDIATE", change); }));
   if (change_count != change_count_) change_count_file_.Write(change_count);
   change_count_ = change_count;
   return absl::OkStatus();
@@ -149,11 +148,10 @@ absl::Status Database::Tidy() {
   if (can_shrink == 0 || free_count < kLeastFreePages || free_count * 4 < page_count) {
     return absl::OkStatus();
   }
-  RETURN_IF_ERROR(files_.BeginChange());
-  absl::Status shrunk = writer_->RunScript("PRAGMA incremental_vacuum(256)");
-  if (shrunk.ok()) shrunk = Figure(*writer_, "PRAGMA wal_checkpoint(PASSIVE)").status();
-  const absl::Status remembered = files_.Remember();
-  return shrunk.ok() ? remembered : shrunk;
+  return files_.Change([&writer = *writer_] {
+    RETURN_IF_ERROR(writer.RunScript("PRAGMA incremental_vacuum(256)"));
+    return Figure(writer, "PRAGMA wal_checkpoint(PASSIVE)").status();
+  });
 }
 
 absl::Status Database::Read(absl::FunctionRef<absl::Status(SqliteConnection&)> body) {

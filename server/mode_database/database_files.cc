@@ -63,6 +63,13 @@ absl::Status DatabaseFiles::Check() {
   return CheckLocked();
 }
 
+absl::Status DatabaseFiles::Change(absl::FunctionRef<absl::Status()> work) {
+  RETURN_IF_ERROR(BeginChange());
+  const absl::Status worked = work();
+  const absl::Status remembered = Remember();
+  return worked.ok() ? remembered : worked;
+}
+
 absl::Status DatabaseFiles::BeginChange() {
   const MutexLock lock(&mutex_);
   RETURN_IF_ERROR(CheckLocked());

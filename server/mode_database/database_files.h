@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "absl/base/thread_annotations.h"
+#include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "server/base/mutex.h"
 
@@ -19,18 +20,18 @@ class DatabaseFiles {
  public:
   explicit DatabaseFiles(const std::filesystem::path& file) : file_(file) {}
 
-  /// Remembers the present sizes as correct. Must be called after each write of the daemon. Errors:
-  /// FailedPrecondition (DATABASE_LOST: a file was removed or replaced). All later calls return
-  /// this error, too.
+  /// Remembers the present sizes as correct. Errors: FailedPrecondition (DATABASE_LOST: a file was
+  /// removed or replaced). All later calls return this error, too.
   absl::Status Remember();
 
   /// Checks both files. Errors: FailedPrecondition (DATABASE_LOST: a file was removed or replaced,
   /// or is smaller than at the last Remember, although no change is being made).
   absl::Status Check();
 
-  /// Checks both files before a change, which may make them smaller. The change lasts until the
-  /// next Remember. Errors: as Check.
-  absl::Status BeginChange();
+  /// Checks both files, runs `work`, which may change them and make them smaller, and remembers
+  /// their new sizes, also after a failure. Each write of the daemon must be made here. Errors: as
+  /// Check before the work; otherwise the work's error, or that of Remember.
+  absl::Status Change(absl::FunctionRef<absl::Status()> work);
 
  private:
   struct Seen {
@@ -41,6 +42,7 @@ class DatabaseFiles {
   static std::optional<Seen> Look(const std::filesystem::path& file);
   static bool IsSame(const std::optional<Seen>& before, const std::optional<Seen>& now);
   static bool IsWhole(const std::optional<Seen>& before, const std::optional<Seen>& now);
+  absl::Status BeginChange();
   absl::Status CheckLocked() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   absl::Status Judge() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
