@@ -254,10 +254,10 @@ class Filler {
                                                   : kLongestToMeanEdge * edge;
   }
 
-  /// The processor time for one try. TetGen makes 50,000 tetrahedra a second or more; a thousand
-  /// are expected here.
-  std::chrono::seconds MostCpu(const RefinedSurface& refined, double inside) const {
-    const double tetrahedra = extent_.volume / (kVolumeOfRegular * inside * inside * inside);
+  /// The processor time for one try: 5 s, and 1 ms for each expected tetrahedron and each triangle,
+  /// but at most 600 s. TetGen usually takes less than 20 us for a tetrahedron.
+  std::chrono::seconds MostCpu(const RefinedSurface& refined, double max_volume) const {
+    const double tetrahedra = extent_.volume / max_volume;
     const auto triangles = static_cast<double>(refined.surface.triangles.size());
     return std::chrono::seconds(std::lround(std::min(5 + (tetrahedra + triangles) / 1000, 600.0)));
   }
@@ -267,12 +267,13 @@ class Filler {
   absl::StatusOr<TetMesh> FillWithEdge(double edge, double inside) const {
     const bool keep_surface = settings_.keep_surface.value_or(false);
     const RefinedSurface refined = RefineSurface(surface_, LongestOnSurface(edge));
+    const double max_volume = kVolumeOfRegular * inside * inside * inside;
     FillRequest request{.surface = refined,
                         .cavities = PointsInCavities(surface_, shells_),
-                        .max_volume = kVolumeOfRegular * inside * inside * inside,
+                        .max_volume = max_volume,
                         .keep_surface = true,
                         .max_added_nodes = kMaxMeshNodes / NodesPerCorner(settings_),
-                        .most_cpu = MostCpu(refined, inside),
+                        .most_cpu = MostCpu(refined, max_volume),
                         .cautious = settings_.cautious};
     return FillSomehow(request, keep_surface);
   }
