@@ -17,17 +17,20 @@ namespace {
 Mutex log_mutex;
 LimitedLog* present_log ABSL_GUARDED_BY(log_mutex) = nullptr;
 
-void Log(gpr_log_func_args* message) {
-  if (message->severity != GPR_LOG_SEVERITY_ERROR) return;
+void Warn(const std::string& text) {
   const MutexLock lock(&log_mutex);
-  if (present_log != nullptr) present_log->Warn(absl::StrCat("gRPC: ", message->message));
+  if (present_log != nullptr) present_log->Warn(text);
+}
+
+void LogGrpc(gpr_log_func_args* message) {
+  if (message->severity != GPR_LOG_SEVERITY_ERROR) return;
+  Warn(absl::StrCat("gRPC: ", message->message));
 }
 
 void LogProtobuf(google::protobuf::LogLevel level, const char* /*file*/, int /*line*/,
                  const std::string& message) {
   if (level < google::protobuf::LOGLEVEL_ERROR) return;
-  const MutexLock lock(&log_mutex);
-  if (present_log != nullptr) present_log->Warn(absl::StrCat("protobuf: ", message));
+  Warn(absl::StrCat("protobuf: ", message));
 }
 
 }  // namespace
@@ -35,7 +38,7 @@ void LogProtobuf(google::protobuf::LogLevel level, const char* /*file*/, int /*l
 GrpcLog::GrpcLog(const Clock& clock, LimitedLog::Sink sink) : log_(clock, std::move(sink)) {
   const MutexLock lock(&log_mutex);
   present_log = &log_;
-  gpr_set_log_function(Log);
+  gpr_set_log_function(LogGrpc);
   google::protobuf::SetLogHandler(LogProtobuf);
 }
 
