@@ -86,7 +86,7 @@ typedef struct carillon_impulse {
   double duration_s; /**< zero: as long as an elastic collision with steel */
 } carillon_impulse;
 
-/** Where an object, or the listener, is in its scene. */
+/** The place and the rotation of an object, or of the listener, in the scene's frame. */
 typedef struct carillon_pose {
   uint32_t object; /**< ignored for the listener */
   carillon_vec3 position_m;
@@ -98,9 +98,9 @@ typedef struct carillon_pose {
 typedef int32_t carillon_frame;
 enum { CARILLON_FRAME_OBJECT = 0, CARILLON_FRAME_SCENE = 1 };
 
-/** What is heard of the places of the objects: the effects that are not zero, as hearing.proto
- * describes them. Without it a scene sounds as if all objects were at one place, and poses only
- * convert points and impulses. */
+/** Which effects of the objects' places are heard. A field that is not zero turns its effect on;
+ * hearing.proto describes the effects. A scene without this structure sounds as if all objects were
+ * at one place, and its poses only convert points and impulses. */
 typedef struct carillon_hearing {
   int32_t distance_gain;       /**< quieter from afar */
   int32_t propagation_delay;   /**< later from afar, and with the Doppler effect */

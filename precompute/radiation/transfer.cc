@@ -216,7 +216,7 @@ class TransferSolver {
     return problem;
   }
 
-  /// The residual of a solution. One of 1e-2 leaves no more than 0.1 dB of power, and 0.3 dB of
+  /// The residual of a solution. A residual of 1e-2 leaves at most 0.1 dB of power and 0.15 dB of
   /// direction.
   double Tolerance() const { return settings_.goal_db < 0.3 ? 3e-3 : 1e-2; }
 

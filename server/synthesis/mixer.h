@@ -230,6 +230,7 @@ class Mixer {
   void Send(const Command& command) ABSL_EXCLUSIVE_LOCKS_REQUIRED(control_mutex_);
 
   // Only the rendering thread calls and uses what follows.
+
   /// Renders whole blocks, at most kBlocksTogether.
   void RenderBlocks(std::span<float> frames) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void ExecuteCommands() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);

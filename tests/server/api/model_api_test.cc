@@ -234,7 +234,7 @@ TEST_F(ModelApi, HealthSaysServing) {
   EXPECT_EQ(std::string(bytes.begin(), bytes.end()), "\x08\x01");  // status = SERVING
 }
 
-TEST_F(ModelApi, TextThatIsNotUtf8IsRefusedWithOneWarningOfTheDaemonsOwn) {
+TEST_F(ModelApi, TextThatIsNotUtf8IsRefusedAndLoggedWithinLimits) {
   v1::CreateModalModelRequest request;
   request.mutable_material()->set_preset("\xff");
   v1::CreateModalModelResponse response;

@@ -144,7 +144,8 @@ TEST_F(WatchJobsApi, ManyWatchersThatLeaveInTheMidstDisturbNobody) {
 
 TEST_F(WatchJobsApi, EndsForAWatcherThatDoesNotReadAndForNoOther) {
   constexpr uint32_t kMostWaiting = 4096;
-  // What is more fills the connection's window, which does not grow here.
+  // The messages that the reader does not read fill the connection's window, which does not grow
+  // here.
   constexpr uint32_t kSubmitted = kMostWaiting + 700;
   grpc::ChannelArguments arguments;
   arguments.SetInt(GRPC_ARG_HTTP2_BDP_PROBE, 0);
