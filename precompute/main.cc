@@ -33,6 +33,7 @@
 #include "precompute/worker_events.h"
 #include "precompute/worker_request.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/mesh_file.h"
 #include "proto/cpp/status_macros.h"
 
 namespace carillon::precompute {

@@ -8,8 +8,6 @@
 #include <cstring>
 #include <exception>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <memory>
 #include <new>
 #include <optional>
@@ -18,11 +16,14 @@
 #include <utility>
 #include <vector>
 
+#include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/strip.h"
 #include "carillon/client.h"
 #include "carillon/lasting_stream.h"
 #include "client_sdk/c/c_conversion.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/mesh_file.h"
 #include "proto/cpp/status_macros.h"
 
 struct carillon_client {
@@ -75,14 +76,6 @@ carillon_code Try(Work work) {
 absl::Status Missing(const char* what) {
   return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
                  absl::StrCat(what, " is a null pointer"));
-}
-
-absl::StatusOr<std::string> ReadFile(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::string bytes((std::istreambuf_iterator<char>(file)), {});
-  if (file.is_open() && !file.bad()) return bytes;
-  return Refusal(absl::StatusCode::kNotFound, "MESH_FILE_NOT_READABLE",
-                 absl::StrCat(path, " cannot be read: check its name and permissions"));
 }
 
 /// Uploads a mesh and waits for its model.
@@ -146,10 +139,10 @@ carillon_code carillon_create_model(carillon_client* client, const char* mesh_fi
   return Try([&]() -> absl::Status {
     if (!client || !mesh_file || !material || !model) return Missing("an argument");
     const std::filesystem::path path = mesh_file;
-    ASSIGN_OR_RETURN(const std::string bytes, ReadFile(path));
     v1::CreateModalModelRequest request;
     const std::string suffix = path.extension();
-    request.set_mesh_format(suffix.substr(suffix.empty() ? 0 : 1));
+    request.set_mesh_format(absl::AsciiStrToLower(absl::StripPrefix(suffix, ".")));
+    ASSIGN_OR_RETURN(const std::string bytes, carillon::ReadMeshFile(path, request.mesh_format()));
     request.mutable_material()->set_preset(material);
     request.set_label(path.stem());
     return CreateModel(*client->daemon, bytes, request, model);

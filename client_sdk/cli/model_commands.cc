@@ -1,11 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <array>
-#include <cerrno>
 #include <cmath>
-#include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <numbers>
 #include <utility>
 #include <vector>
@@ -22,56 +18,17 @@
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/fixture_text.h"
 #include "proto/cpp/material_catalogue.h"
+#include "proto/cpp/mesh_file.h"
 #include "proto/cpp/status_macros.h"
 
 namespace carillon::cli {
 namespace {
-
-/// The daemon takes no larger mesh file.
-constexpr size_t kMostMeshBytes = size_t{256} << 20;
-
-/// Reads a file that may be endless, such as a pipe or a device.
-absl::StatusOr<std::string> ReadMesh(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::string bytes;
-  if (file && !std::filesystem::is_directory(path)) {
-    std::array<char, 65536> piece;
-    while (bytes.size() <= kMostMeshBytes &&
-           (file.read(piece.data(), piece.size()), file.gcount() > 0)) {
-      bytes.append(piece.data(), static_cast<size_t>(file.gcount()));
-    }
-    if (bytes.size() > kMostMeshBytes) {
-      return Refusal(absl::StatusCode::kResourceExhausted, "MESH_TOO_LARGE",
-                     absl::StrCat(path, " has more than 256 MiB: simplify the body's surface"));
-    }
-    if (!file.bad()) return bytes;
-  }
-  const bool directory = std::filesystem::is_directory(path);
-  return Refusal(absl::StatusCode::kNotFound, "FILE_NOT_FOUND",
-                 absl::StrCat(path, ": ", std::strerror(directory ? EISDIR : errno),
-                              "; check the file's name"));
-}
 
 std::string Format(const CreateModelOptions& options, const std::string& file) {
   if (!options.format.empty()) return options.format;
   const std::string suffix = std::filesystem::path(file).extension();
   const std::string format = absl::AsciiStrToLower(absl::StripPrefix(suffix, "."));
   return format == "ele" ? "node" : format;
-}
-
-/// Reads a mesh file. The two files that TetGen writes go to the daemon as one.
-absl::StatusOr<std::string> ReadAllOfMesh(const CreateModelOptions& options,
-                                          const std::string& file) {
-  const std::filesystem::path path(file);
-  const auto elements = std::filesystem::path(path).replace_extension(".ele");
-  const bool pair = Format(options, file) == "node" && std::filesystem::exists(elements);
-  if (!pair) return ReadMesh(file);
-  absl::StatusOr<std::string> nodes =
-      ReadMesh(std::filesystem::path(path).replace_extension(".node"));
-  const absl::StatusOr<std::string> rest = ReadMesh(elements);
-  if (!nodes.ok()) return nodes;
-  if (!rest.ok()) return rest.status();
-  return absl::StrCat(*nodes, nodes->ends_with('\n') ? "" : "\n", *rest);
 }
 
 absl::StatusOr<v1::CreateModalModelRequest> MakeRequest(const CreateModelOptions& options,
@@ -186,7 +143,7 @@ void PrintBand(const v1::ModalModelSummary& model, const v1::Material& material)
 /// Asks for the model of one file.
 absl::StatusOr<v1::Job> RequestModel(const client::Client& daemon,
                                      const CreateModelOptions& options, const std::string& file) {
-  ASSIGN_OR_RETURN(const std::string bytes, ReadAllOfMesh(options, file));
+  ASSIGN_OR_RETURN(const std::string bytes, ReadMeshFile(file, Format(options, file)));
   ASSIGN_OR_RETURN(std::string digest, daemon.UploadMesh(bytes));
   ASSIGN_OR_RETURN(const v1::CreateModalModelRequest request,
                    MakeRequest(options, file, std::move(digest)));

@@ -2,7 +2,9 @@
 """Small bodies as OBJ files, good and bad ones."""
 
 import itertools
+import json
 import math
+import struct
 
 MATERIAL = "chime_aluminum"
 YOUNG_PA, DENSITY, ALPHA1_S = 6.835179e10, 2700, 1e-7  # of that preset
@@ -22,6 +24,28 @@ def box(size, low=(0, 0, 0)):
     """(vertices, faces) of a box; counter-clockwise from outside."""
     corners = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))
     return [tuple(l + s * c for l, s, c in zip(low, size, corner)) for corner in corners], BOX_FACES
+
+
+def gltf_with_buffer(size, folder, name="box"):
+    """Writes a box as NAME.gltf, whose data is in the file NAME.bin beside it, into the folder. The .gltf file."""
+    vertices, faces = box(size)
+    corners = [index for face in faces for index in face]
+    data = struct.pack(f"<{3 * len(vertices)}f", *(x for vertex in vertices for x in vertex))
+    points = len(data)
+    data += struct.pack(f"<{len(corners)}H", *corners)
+    (folder / f"{name}.bin").write_bytes(data)
+    document = {
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "buffers": [{"byteLength": len(data), "uri": f"{name}.bin"}],
+        "bufferViews": [{"buffer": 0, "byteOffset": 0, "byteLength": points},
+                        {"buffer": 0, "byteOffset": points, "byteLength": len(data) - points}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": len(vertices), "type": "VEC3",
+                       "min": [0, 0, 0], "max": list(size)},
+                      {"bufferView": 1, "componentType": 5123, "count": len(corners), "type": "SCALAR"}]}
+    file = folder / f"{name}.gltf"
+    file.write_text(json.dumps(document))
+    return file
 
 
 def joined(*parts):

@@ -71,6 +71,14 @@ test('a mesh of arrays is a model of the same modes as its file', async () => {
   assert.deepEqual(found, same.name === model.name ? found : [same.name]);
 });
 
+test('a glTF brings the file with its data', async () => {
+  const file = process.env.CARILLON_TEST_GLTF;
+  assert.equal((await c.createModel(file, { material })).modeCount, model.modeCount);
+  const outside = path.join(FOLDER, 'outside.gltf');
+  await fs.writeFile(outside, (await fs.readFile(file, 'utf8')).replace('box.bin', '%2e%2e/box.bin'));
+  await assert.rejects(c.createModel(outside, { material }), { reason: 'MESH_UNREADABLE' });
+});
+
 test('the daemon says what it is', async () => {
   const info = await c.info();
   assert.equal(info.version, require('carillon/package.json').version);

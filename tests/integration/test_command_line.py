@@ -194,6 +194,16 @@ class ExampleTest(CommandLineTest):
         self.assertEqual(len(self.run_command("model", "create", *files, "--material", "bell_bronze").split()), 4)
 
 
+class MeshFileTest(CommandLineTest):
+    def test_a_gltf_brings_the_file_with_its_data(self):
+        file = meshes.gltf_with_buffer(meshes.BAR_SIZE, self.folder)
+        model = self.run_command("model", "create", file, "--material", meshes.MATERIAL, "--wait")
+        eigenvalues = [self.json_of("model", "show", name)["eigenvalues"] for name in (model, self.model)]
+        for ours, same in zip(*eigenvalues, strict=True):
+            # Coordinates pass through 24 bits, and the rigid-body modes are zero.
+            self.assertLess(abs(ours - same), 1e-6 * eigenvalues[0][-1])
+
+
 class RenderTest(CommandLineTest):
     def setUp(self):
         impulse = sound.impulse((0, 0.008, 0.010), (0, 0, -0.002), duration_s=1e-4)

@@ -15,7 +15,9 @@ class NodePackageTest(DaemonTest):
         bar = self.folder / "bar.obj"
         bar.write_bytes(meshes.bar())
         environment = {**node_environment(self.folder), "CARILLON_SERVER": self.daemon.server,
-                       "CARILLON_TEST_BAR": str(bar), "CARILLON_TEST_MATERIAL": meshes.MATERIAL}
+                       "CARILLON_TEST_BAR": str(bar),
+                       "CARILLON_TEST_GLTF": str(meshes.gltf_with_buffer(meshes.BAR_SIZE, bar.parent)),
+                       "CARILLON_TEST_MATERIAL": meshes.MATERIAL}
         done = subprocess.run(["node", "--test", pathlib.Path(__file__).with_name("node_package.test.js")],
                               env=environment, check=False, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
         self.assertEqual(done.returncode, 0, done.stdout)

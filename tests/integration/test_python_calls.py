@@ -32,6 +32,15 @@ class CallsTest(DaemonTest):
         self.assertIn("decomposition", info.features)
         self.assertEqual(info.sample_rate_hz, self.c.status().format.sample_rate_hz)
 
+    def test_a_gltf_brings_the_file_with_its_data(self):
+        file = meshes.gltf_with_buffer(meshes.BAR_SIZE, self.folder)
+        model = self.c.create_model(file, meshes.MATERIAL)
+        self.assertEqual(model.mode_count, self.model.mode_count)
+        file.write_text(file.read_text().replace("box.bin", "../box.bin"))
+        with self.assertRaises(carillon.CarillonError) as raised:
+            self.c.create_model(file, meshes.MATERIAL)
+        self.assertEqual(raised.exception.reason, "MESH_UNREADABLE")
+
     def test_a_scene_with_an_id_is_found_again_with_its_objects(self):
         made = self.c.scene(id="lathe-1", gain=0.5)
         self.assertEqual((made.name, made.existing), ("scenes/lathe-1", False))

@@ -31,11 +31,52 @@ function makeObj({ vertices, triangles }) {
   return Buffer.from(lines.join(''));
 }
 
+/**
+ * Returns the file of a glTF's buffer. A file elsewhere is refused, because an untrusted document could have any file
+ * of the user sent to the daemon.
+ */
+function besideGltf(file, uri) {
+  let name = uri;
+  try {
+    name = decodeURIComponent(uri);
+  } catch {
+    // An address with a stray % is the name of a file as it is.
+  }
+  if (path.isAbsolute(name) || name.split(/[\\/]/).includes('..') || uri.includes('://')) {
+    throw new CarillonError('MESH_UNREADABLE', `${file} keeps its data in "${uri}", which is not in its folder: put it ` +
+      'there, or export the body as GLB');
+  }
+  return path.join(path.dirname(file), name);
+}
+
+/**
+ * Returns a glTF document with the data of its buffers in it. A text that is no such document stays as it is, so that the
+ * daemon says what is wrong with it.
+ */
+async function withBuffers(file, data) {
+  let document;
+  try {
+    document = JSON.parse(data.toString());
+  } catch {
+    return data;
+  }
+  // An array in glTF 2.0, an object in glTF 1.0.
+  const external = Object.values((document && document.buffers) || {})
+    .filter((buffer) => buffer && typeof buffer.uri === 'string' && !/^data:/i.test(buffer.uri));
+  for (const buffer of external) {
+    const content = await fs.readFile(besideGltf(file, buffer.uri));
+    buffer.uri = `data:application/octet-stream;base64,${content.toString('base64')}`;
+  }
+  return external.length ? Buffer.from(JSON.stringify(document)) : data;
+}
+
 /** Reads a mesh file, or makes one of { vertices, triangles }. Returns its bytes, its format and a label. */
 async function toMeshFile(mesh) {
   if (typeof mesh !== 'string') return { data: makeObj(mesh), format: 'obj', label: '' };
   const { ext, name } = path.parse(mesh);
-  return { data: await fs.readFile(mesh), format: ext.slice(1).toLowerCase(), label: name };
+  const format = ext.slice(1).toLowerCase();
+  const data = await fs.readFile(mesh);
+  return { data: format === 'gltf' ? await withBuffers(mesh, data) : data, format, label: name };
 }
 
 module.exports = { toMeshFile };

@@ -57,7 +57,8 @@ bool ReadHeaderLine(const std::vector<std::string_view>& words, Header& header) 
     if (!SizeOf(property.type) || (is_list && !SizeOf(property.count_type))) return false;
     header.elements.back().properties.push_back(property);
   } else {
-    return words[0] == "comment" || words[0] == "obj_info";
+    // Old exporters of Blender write their name before the elements without "comment".
+    return words[0] == "comment" || words[0] == "obj_info" || header.elements.empty();
   }
   return true;
 }

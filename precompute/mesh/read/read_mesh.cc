@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "precompute/mesh/read/read_mesh.h"
 
-#include <algorithm>
-#include <filesystem>
-#include <fstream>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -18,47 +15,12 @@
 #include "precompute/mesh/read/tetgen_file.h"
 #include "precompute/mesh/read/text_encoding.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/mesh_file.h"
 #include "proto/cpp/mesh_format.h"
 #include "proto/cpp/status_macros.h"
 
 namespace carillon::precompute {
 namespace {
-
-constexpr size_t kMostMeshBytes = size_t{256} << 20;
-constexpr size_t kReadPiece = size_t{1} << 20;
-
-/// Reads at most `limit` bytes from the file's place on. The file may be a pipe, which knows no
-/// length.
-std::string ReadUpTo(std::ifstream& file, size_t limit) {
-  std::string bytes;
-  while (file && bytes.size() < limit) {
-    const size_t read = bytes.size();
-    bytes.resize(std::min(limit, read + kReadPiece));
-    file.read(bytes.data() + read, static_cast<std::streamsize>(bytes.size() - read));
-    bytes.resize(read + static_cast<size_t>(file.gcount()));
-  }
-  return bytes;
-}
-
-absl::StatusOr<std::string> ReadFile(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::string bytes = ReadUpTo(file, kMostMeshBytes + 1);
-  if (!file.is_open() || file.bad()) {
-    return Refusal(absl::StatusCode::kNotFound, "MESH_FILE_NOT_READABLE",
-                   absl::StrCat(path,
-                                " cannot be read: check that it is a file, its name and its "
-                                "permissions"));
-  }
-  if (bytes.size() > kMostMeshBytes) {
-    return Refusal(absl::StatusCode::kResourceExhausted, "MESH_TOO_LARGE",
-                   absl::StrCat(path, " has more than 256 MiB: simplify the body's surface"));
-  }
-  if (bytes.empty()) {
-    return Refusal(absl::StatusCode::kInvalidArgument, "MESH_EMPTY",
-                   "the mesh file has no bytes: export the body again");
-  }
-  return bytes;
-}
 
 void Scale(Point& p, double factor) {
   for (double& x : p) x *= factor;
@@ -85,20 +47,6 @@ absl::StatusOr<NamedMesh> ReadElements(const std::string& bytes, const std::stri
 }
 
 }  // namespace
-
-absl::StatusOr<std::string> ReadMeshFile(const std::string& path, const std::string& format) {
-  const std::filesystem::path file(path);
-  if (format != "node" || (file.extension() != ".node" && file.extension() != ".ele")) {
-    return ReadFile(path);
-  }
-  ASSIGN_OR_RETURN(std::string nodes,
-                   ReadFile(std::filesystem::path(file).replace_extension(".node")));
-  const std::filesystem::path elements = std::filesystem::path(file).replace_extension(".ele");
-  // They may stand in one file already.
-  if (!std::filesystem::exists(elements)) return nodes;
-  ASSIGN_OR_RETURN(const std::string rest, ReadFile(elements));
-  return absl::StrCat(nodes, nodes.ends_with('\n') ? "" : "\n", rest);
-}
 
 absl::StatusOr<NamedMesh> ParseMesh(const std::string& bytes, const std::string& format,
                                     double metres_per_unit) {

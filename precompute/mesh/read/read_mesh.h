@@ -8,11 +8,6 @@
 
 namespace carillon::precompute {
 
-/// Returns the bytes of a mesh file. For TetGen's pair of files it returns the .node file followed
-/// by the .ele file, whichever of them is named, unless one file contains both already. Errors:
-/// MESH_FILE_NOT_READABLE, MESH_EMPTY.
-absl::StatusOr<std::string> ReadMeshFile(const std::string& path, const std::string& format);
-
 /// Parses the bytes that ReadMeshFile returned into a mesh with the names of its parts.
 ///
 /// The formats "obj", "ply", "stl", "off", "glb" and "gltf" give a surface. Polygons are split into

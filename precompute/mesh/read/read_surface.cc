@@ -17,18 +17,24 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "precompute/mesh/read/clean_surface_file.h"
 #include "precompute/mesh/read/merge_vertices.h"
 #include "precompute/mesh/read/obj_groups.h"
 #include "precompute/mesh/read/text_lines.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/mesh_file.h"
 #include "proto/cpp/status_macros.h"
 
 namespace carillon::precompute {
 namespace {
 
 using Triangles = std::vector<std::array<Point, 3>>;
+
+/// A file of 256 MiB can list about 10 million triangles, but a small glTF can place a part any
+/// number of times.
+constexpr size_t kMostTriangles = 20'000'000;
 
 /// Opens no file. A glTF can name files beside its own, and a client of the daemon must not have
 /// them read.
@@ -48,6 +54,17 @@ absl::Status Unreadable(absl::string_view format, absl::string_view what) {
   return RefuseSurface("MESH_UNREADABLE",
                        absl::StrCat("the file cannot be read as ", format, ": ", what,
                                     ". Name its right format, or export it again"));
+}
+
+/// Returns why assimp could not read a file.
+absl::Status NotRead(const std::string& format, const std::string& bytes, absl::string_view error) {
+  const std::string missing = format == "gltf" ? ExternalBuffer(bytes) : "";
+  if (missing.empty()) return Unreadable(format, error);
+  return RefuseSurface(
+      "MESH_UNREADABLE",
+      absl::StrCat("the glTF keeps its data in another file, \"", absl::CHexEscape(missing),
+                   "\", which did not come with it: export the body as GLB, or "
+                   "name the .gltf file itself to Carillon's programs"));
 }
 
 std::span<aiMesh* const> Meshes(const aiScene& scene) { return {scene.mMeshes, scene.mNumMeshes}; }
@@ -95,15 +112,33 @@ absl::Status CheckFinite(const aiScene& scene) {
   return absl::OkStatus();
 }
 
+/// Only glTF places the parts of a body in a scene, each any number of times.
 bool IsGltf(const std::string& format) { return format == "glb" || format == "gltf"; }
 
-/// Triangles that the polygons of the file must give.
-size_t CountTriangles(const aiScene& scene) {
+/// Triangles that the polygons of a mesh must give.
+size_t CountTriangles(const aiMesh& mesh) {
   size_t count = 0;
-  for (const aiMesh* mesh : Meshes(scene)) {
-    for (const aiFace& face : Faces(*mesh)) {
-      if (face.mNumIndices >= 3) count += face.mNumIndices - 2;
+  for (const aiFace& face : Faces(mesh)) {
+    if (face.mNumIndices >= 3) count += face.mNumIndices - 2;
+  }
+  return count;
+}
+
+/// Triangles that all polygons must give.
+size_t CountTriangles(const aiScene& scene, bool with_places) {
+  size_t count = 0;
+  if (!with_places) {
+    for (const aiMesh* mesh : Meshes(scene)) count += CountTriangles(*mesh);
+    return count;
+  }
+  std::vector<const aiNode*> waiting = {scene.mRootNode};
+  while (!waiting.empty()) {
+    const aiNode& node = *waiting.back();
+    waiting.pop_back();
+    for (const unsigned mesh : std::span(node.mMeshes, node.mNumMeshes)) {
+      count += CountTriangles(*Meshes(scene)[mesh]);
     }
+    waiting.insert(waiting.end(), node.mChildren, node.mChildren + node.mNumChildren);
   }
   return count;
 }
@@ -163,17 +198,21 @@ absl::StatusOr<NamedMesh> ReadSurface(const std::string& bytes, const std::strin
   Assimp::Importer importer;
   importer.SetIOHandler(new NoFiles);  // the importer owns it
   const aiScene* scene = importer.ReadFileFromMemory(clean.data(), clean.size(), 0, format.c_str());
-  if (scene == nullptr) return Unreadable(format, importer.GetErrorString());
+  if (scene == nullptr) return NotRead(format, clean, importer.GetErrorString());
   RETURN_IF_ERROR(CheckIndices(*scene));
   RETURN_IF_ERROR(CheckFinite(*scene));
-  const size_t expected = CountTriangles(*scene);
+  const size_t expected = CountTriangles(*scene, IsGltf(format));
+  if (expected > kMostTriangles) {
+    return Refusal(absl::StatusCode::kResourceExhausted, "MESH_TOO_LARGE",
+                   absl::StrCat("the scene of the file has ", expected, " triangles, more than ",
+                                kMostTriangles, ": simplify it, or leave out parts"));
+  }
   if (expected == 0) {
     return RefuseSurface("MESH_EMPTY",
                          "the file has no faces: export the body as triangles or polygons");
   }
   MeshNames names;
   names.vertices = NumberVertices(*scene, clean, format);
-  // Only glTF places the parts of a body in a scene.
   const unsigned place = IsGltf(format) ? unsigned{aiProcess_PreTransformVertices} : 0;
   scene = importer.ApplyPostProcessing(aiProcess_Triangulate | place);
   if (scene == nullptr) return Unreadable(format, importer.GetErrorString());

@@ -3,9 +3,12 @@
 
 from __future__ import annotations
 
+import base64
 import dataclasses
+import json
 import os
 import pathlib
+import urllib.parse
 from typing import Any
 
 import numpy
@@ -23,13 +26,47 @@ class MeshFile:
 
 
 def read_mesh(path: str | os.PathLike[str]) -> MeshFile:
-    """Reads a mesh file; the two files that TetGen writes become one."""
+    """Reads a mesh file. The two files that TetGen writes become one, and a .gltf file gets the data of its buffers,
+    whose files must be in its folder or below it.
+
+    Raises OSError where a file cannot be read, and CarillonError (MESH_UNREADABLE) where a buffer's file is elsewhere.
+    """
     file = pathlib.Path(path)
     mesh_format = file.suffix.lstrip(".").lower()
     if mesh_format in ("node", "ele") and file.with_suffix(".ele").exists():
         nodes = file.with_suffix(".node").read_bytes()
         return MeshFile(nodes.rstrip(b"\n") + b"\n" + file.with_suffix(".ele").read_bytes(), "node", file.stem)
-    return MeshFile(file.read_bytes(), mesh_format, file.stem)
+    data = file.read_bytes()
+    return MeshFile(_with_buffers(file, data) if mesh_format == "gltf" else data, mesh_format, file.stem)
+
+
+def _with_buffers(file: pathlib.Path, data: bytes) -> bytes:
+    """A glTF document with the data of its buffers in it. A text that is no such document stays as it is, so that the
+    daemon says what is wrong with it."""
+    try:
+        document = json.loads(data)
+        buffers = document.get("buffers", [])
+    except (ValueError, RecursionError, AttributeError):
+        return data
+    changed = False
+    # An array in glTF 2.0, an object in glTF 1.0.
+    for buffer in buffers.values() if isinstance(buffers, dict) else buffers if isinstance(buffers, list) else []:
+        uri = buffer.get("uri") if isinstance(buffer, dict) else None
+        if isinstance(uri, str) and not uri.lower().startswith("data:"):
+            content = base64.b64encode(_beside(file, uri).read_bytes()).decode()
+            buffer["uri"] = f"data:application/octet-stream;base64,{content}"
+            changed = True
+    return json.dumps(document).encode() if changed else data
+
+
+def _beside(file: pathlib.Path, uri: str) -> pathlib.Path:
+    """The file of a buffer. A file elsewhere is refused, because an untrusted document could have any file of the
+    user sent to the daemon."""
+    name = pathlib.PurePath(urllib.parse.unquote(uri))
+    if name.is_absolute() or ".." in name.parts or "://" in uri:
+        raise CarillonError("MESH_UNREADABLE", f'{file} keeps its data in "{uri}", which is not in its folder: put it '
+                            "there, or export the body as GLB")
+    return file.parent / name
 
 
 def make_obj(vertices: Any, triangles: Any, label: str = "") -> MeshFile:

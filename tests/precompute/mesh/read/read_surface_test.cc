@@ -15,6 +15,7 @@
 
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_replace.h"
 #include "precompute/mesh/point_math.h"
 #include "precompute/mesh/surface/check_surface.h"
 #include "tests/precompute/mesh/mesh_files.h"
@@ -230,7 +231,7 @@ TEST_F(ReadSurfaceTest, AFaceWithoutVerticesIsRefused) {
 std::string TetrahedronInGltf(const std::string& uri) {
   return absl::StrCat(
       R"({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}],
-          "nodes": [{"mesh": 0, "scale": [2, 2, 2]}],
+          "nodes": [{"mesh": 0, "scale": [2, 2, 2]}, {"mesh": 0, "translation": [5, 0, 0]}],
           "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
           "buffers": [{"byteLength": 60, "uri": ")",
       uri, R"("}],
@@ -260,12 +261,29 @@ TEST_F(ReadSurfaceTest, TheBodyOfAGltfIsAsLargeAsInItsScene) {
   EXPECT_EQ(largest, 2);
 }
 
+TEST_F(ReadSurfaceTest, APartThatAGltfPlacesTwiceIsThereTwice) {
+  std::string gltf = TetrahedronInGltf(absl::StrCat("data:application/octet-stream;base64,",
+                                                    absl::Base64Escape(TetrahedronInBytes())));
+  EXPECT_EQ(
+      ReadSurfaceOf(absl::StrReplaceAll(gltf, {{"\"nodes\": [0]", "\"nodes\": [0, 1]"}}), "gltf")
+          .triangles.size(),
+      8U);
+}
+
 TEST_F(ReadSurfaceTest, AGltfReadsNoFileBesideItself) {
   const std::filesystem::path outside =
       std::filesystem::path(testing::TempDir()) / "outside_of_gltf.bin";
   std::ofstream(outside, std::ios::binary) << TetrahedronInBytes();
-  EXPECT_THAT(Refused(TetrahedronInGltf(outside.string()), "gltf"), HasSubstr("MESH_UNREADABLE"));
+  EXPECT_THAT(Refused(TetrahedronInGltf(outside.string()), "gltf"),
+              AllOf(HasSubstr("MESH_UNREADABLE"), HasSubstr("which did not come with it")));
   std::filesystem::remove(outside);
+}
+
+TEST_F(ReadSurfaceTest, APlyMayNameItsExporterWithoutAComment) {
+  const SurfaceMesh tube = MakeTubeSurface({.around = 12, .along = 10});
+  const std::string named = absl::StrReplaceAll(
+      ToTextPly(tube), {{"format ascii 1.0\n", "format ascii 1.0\nCreated by Blender3D 247\n"}});
+  ExpectSameTriangles(ReadSurfaceOf(named, "ply"), tube);
 }
 
 TEST_F(ReadSurfaceTest, WordsInPlaceOfNumbersAreRefusedWithTheirLine) {

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+#include "absl/status/statusor.h"
+
+namespace carillon {
+
+/// Returns the name of the first file that the glTF document needs for its buffers, or an empty
+/// string if all buffers are in the document. A text that is no JSON names no file.
+std::string ExternalBuffer(const std::string& gltf);
+
+/// Reads a mesh file as UploadMesh takes it: in one piece, with the data of other files that belong
+/// to it.
+///
+///   - For the format "node" it returns TetGen's .node file followed by the .ele file, whichever of
+///     them `path` names, unless one file contains both already.
+///   - For a file *.gltf it returns the document with the data of its buffers in it. Their files
+///     must be in the folder of `path` or below it.
+///   - Other files it returns as they are.
+///
+/// Errors: NotFound (MESH_FILE_NOT_READABLE), ResourceExhausted (MESH_TOO_LARGE: above 256 MiB),
+/// InvalidArgument (MESH_EMPTY; MESH_UNREADABLE: a buffer's file is elsewhere).
+absl::StatusOr<std::string> ReadMeshFile(const std::string& path, const std::string& format);
+
+}  // namespace carillon

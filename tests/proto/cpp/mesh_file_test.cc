@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// A mesh file in one piece, with the data of the files beside it.
+#include "proto/cpp/mesh_file.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "absl/strings/str_cat.h"
+
+namespace carillon {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+class MeshFile : public testing::Test {
+ protected:
+  MeshFile()
+      : folder_(std::filesystem::path(testing::TempDir()) /
+                testing::UnitTest::GetInstance()->current_test_info()->name()) {
+    std::filesystem::create_directories(folder_ / "data");
+  }
+  ~MeshFile() override { std::filesystem::remove_all(folder_); }
+
+  std::string Write(const std::string& name, const std::string& bytes) {
+    std::ofstream(folder_ / name, std::ios::binary) << bytes;
+    return (folder_ / name).string();
+  }
+
+  std::string ReadGltf(const std::string& document) {
+    const auto bytes = ReadMeshFile(Write("body.gltf", document), "gltf");
+    return bytes.ok() ? *bytes : bytes.status().ToString();
+  }
+
+  static std::string Gltf(const std::string& uri) {
+    return absl::StrCat(R"({"asset": {"version": "2.0"}, "buffers": [{"byteLength": 3, "uri": ")",
+                        uri, R"("}]})");
+  }
+
+  std::filesystem::path folder_;
+};
+
+constexpr char kAbc[] = "data:application/octet-stream;base64,YWJj";
+
+TEST_F(MeshFile, AGltfComesWithTheDataOfItsBuffers) {
+  Write("data/of body.bin", "abc");
+  const std::string bytes = ReadGltf(Gltf("data/of%20body.bin"));
+  EXPECT_THAT(bytes, AllOf(HasSubstr(kAbc), HasSubstr("byteLength"), HasSubstr("2.0")));
+  EXPECT_EQ(ExternalBuffer(bytes), "");
+  EXPECT_EQ(ExternalBuffer(Gltf("data/of%20body.bin")), "data/of%20body.bin");
+}
+
+TEST_F(MeshFile, TheBuffersOfGltf1HaveNames) {
+  Write("body.bin", "abc");
+  const std::string document =
+      R"({"buffers": {"all": {"uri": "body.bin", "type": "arraybuffer"}}})";
+  EXPECT_EQ(ExternalBuffer(document), "body.bin");
+  EXPECT_THAT(ReadGltf(document), HasSubstr(kAbc));
+}
+
+TEST_F(MeshFile, AGltfWithAllDataAndATextThatIsNoneStayAsTheyAre) {
+  for (const std::string& bytes :
+       {Gltf(kAbc), std::string("no JSON {"), std::string(R"({"buffers": 3})"),
+        std::string(R"({"buffers": [3, {"uri": 4}, {}]})"), std::string("[1]")}) {
+    EXPECT_EQ(ReadGltf(bytes), bytes);
+  }
+}
+
+TEST_F(MeshFile, ABufferOutsideTheFolderIsRefused) {
+  for (const char* uri : {"/etc/passwd", "../passwd", "data/../../passwd", "%2e%2e/passwd",
+                          "%2Fetc%2Fpasswd", "file:///etc/passwd", "https://there/body.bin"}) {
+    EXPECT_THAT(ReadGltf(Gltf(uri)), AllOf(HasSubstr("MESH_UNREADABLE: "), HasSubstr(uri)));
+  }
+}
+
+TEST_F(MeshFile, AMissingBufferIsNamed) {
+  EXPECT_THAT(ReadGltf(Gltf("data/body.bin")),
+              AllOf(HasSubstr("MESH_FILE_NOT_READABLE: "),
+                    HasSubstr((folder_ / "data/body.bin").string()), HasSubstr("No such file")));
+}
+
+TEST_F(MeshFile, OnlyAFileNamedGltfBringsOthers) {
+  Write("body.bin", "abc");
+  const std::string document = Gltf("body.bin");
+  EXPECT_EQ(*ReadMeshFile(Write("mesh", document), "gltf"), document);
+  EXPECT_EQ(*ReadMeshFile(Write("body.gltf", document), "obj"), document);
+}
+
+TEST_F(MeshFile, TheTwoFilesOfTetgenBecomeOne) {
+  Write("body.node", "nodes");
+  const std::string elements = Write("body.ele", "elements\n");
+  EXPECT_EQ(*ReadMeshFile(elements, "node"), "nodes\nelements\n");
+  std::filesystem::remove(elements);
+  EXPECT_EQ(*ReadMeshFile((folder_ / "body.node").string(), "node"), "nodes");
+}
+
+TEST_F(MeshFile, WhatIsNoFileOrEmptyIsRefused) {
+  EXPECT_THAT(ReadMeshFile(folder_.string(), "obj").status().ToString(),
+              AllOf(HasSubstr("MESH_FILE_NOT_READABLE: "), HasSubstr("Is a directory")));
+  EXPECT_THAT(ReadMeshFile(Write("empty.obj", ""), "obj").status().ToString(),
+              HasSubstr("MESH_EMPTY: "));
+}
+
+}  // namespace
+}  // namespace carillon
