@@ -150,6 +150,10 @@ absl::Status CheckBand(const ModalModel& model, const IntendedUse& use) {
 constexpr Means kUsualMeans{.bytes = size_t{7} << 30U, .cpu_s = 60};
 /// Largest estimated error of a frequency that goes without a warning: nearly two semitones.
 constexpr double kGreatError = 0.1;
+/// The goal for a surface if nobody asked for another. Its processor time is the predicted one, so
+/// that each machine makes the same model. The prediction for thin plates is about half the time
+/// that they take.
+constexpr ResolutionGoal kUsualGoal{.accuracy = kGreatError, .budget_s = kUsualMeans.cpu_s / 2};
 
 void WarnOfLowerBand(const DeformationModes& solution, const IntendedUse& use, ModalModel& model) {
   if (solution.mode_count_below_asked == 0) return;
@@ -216,9 +220,15 @@ SolverComparison CheckWithOther(const SystemMatrices& system, const TetMesh& mes
   return result;
 }
 
+/// A model, and the processor time that was predicted for it, which is the same on each machine.
+struct Solved {
+  ModalModel model;
+  double predicted_cpu_s;
+};
+
 /// One body solved whole.
-absl::StatusOr<ModalModel> Solve(const Body& body, const v1::WorkerRequest& request,
-                                 DecompositionObserver& observer) {
+absl::StatusOr<Solved> Solve(const Body& body, const v1::WorkerRequest& request,
+                             DecompositionObserver& observer) {
   const v1::DecompositionSettings& settings = request.settings();
   observer.OnMesh(body.mesh.nodes.size());
   observer.OnProgress(v1::PHASE_ASSEMBLE, 0);
@@ -239,7 +249,7 @@ absl::StatusOr<ModalModel> Solve(const Body& body, const v1::WorkerRequest& requ
   if (comparison) model.warnings.push_back(comparison->Text());
   model.comparison = std::move(comparison);
   KeepMostAudible(static_cast<int>(settings.keep_mode_count()), model);
-  return model;
+  return Solved{std::move(model), solution.predicted_cpu_s};
 }
 
 double PeakBytes() {
@@ -265,16 +275,25 @@ Round Describe(const TetMesh& mesh, const ModalModel& model, double cpu_s) {
           .peak_bytes = PeakBytes()};
 }
 
+/// Whether the request leaves the fineness of the mesh to the program. Linear elements are left as
+/// they are, because they serve comparisons.
+bool IsFinenessFree(const v1::WorkerRequest& request) {
+  const v1::MeshSettings& mesh = request.settings().mesh();
+  return !GoalOf(request).given() && mesh.target_node_count() == 0 && !mesh.keep_surface() &&
+         MeshingOf(request).nodes_per_element == 10;
+}
+
 /// Fills and solves a surface finer and finer until the goal is met.
 absl::StatusOr<ModalModel> SolveToGoal(const Fillable& surface, const v1::WorkerRequest& request,
                                        DecompositionObserver& observer) {
-  const ResolutionGoal goal = GoalOf(request);
+  const bool is_free = IsFinenessFree(request);
+  const ResolutionGoal goal = is_free ? kUsualGoal : GoalOf(request);
   MeshingSettings meshing = MeshingOf(request);
-  if (goal.given() && meshing.target_node_count == 0) {
+  if (goal.given() && !is_free && meshing.target_node_count == 0) {
     meshing.target_node_count = kFirstCornerNodeCount;
   }
   std::vector<Round> rounds;
-  RoundForecast forecast{.later_rounds = goal.given() ? kLaterRoundsAfterFirst : 0};
+  RoundForecast forecast{.later_rounds = goal.given() && !is_free ? kLaterRoundsAfterFirst : 0};
   absl::StatusOr<ModalModel> best = absl::UnknownError("");
   while (true) {
     const PhaseClock::Times begun = PhaseClock::Now();
@@ -284,18 +303,29 @@ absl::StatusOr<ModalModel> SolveToGoal(const Fillable& surface, const v1::Worker
     // A finer mesh that cannot be made takes nothing from the coarser one.
     if (!body.ok() && best.ok()) return best;
     if (!body.ok()) return body.status();
-    absl::StatusOr<ModalModel> model = Solve(*body, request, observer);
-    if (!model.ok() && best.ok()) return best;
-    if (!model.ok() || !goal.given()) return model;
+    absl::StatusOr<Solved> solved = Solve(*body, request, observer);
+    if (!solved.ok() && best.ok()) return best;
+    if (!solved.ok()) return solved.status();
     const PhaseClock::Times ended = PhaseClock::Now();
-    rounds.push_back(Describe(body->mesh, *model, ended.cpu_seconds - begun.cpu_seconds));
-    const std::optional<double> next = NextElementSize(goal, rounds);
-    if (!next) return model;
-    best = std::move(model);
+    rounds.push_back(
+        Describe(body->mesh, solved->model,
+                 is_free ? solved->predicted_cpu_s : ended.cpu_seconds - begun.cpu_seconds));
+    const std::optional<double> next =
+        goal.given() ? NextElementSize(goal, rounds) : std::optional<double>();
+    if (!next) return std::move(solved->model);
+    best = std::move(solved->model);
     meshing.element_size_m = *next;
     forecast = {.expected_s = (ended.seconds - begun.seconds) * TimeGrowth(rounds.back(), *next),
                 .later_rounds = kLaterRounds};
   }
+}
+
+absl::StatusOr<ModalModel> SolveInput(const Input& input, const v1::WorkerRequest& request,
+                                      DecompositionObserver& observer) {
+  const auto* surface = std::get_if<Fillable>(&input);
+  if (surface != nullptr) return SolveToGoal(*surface, request, observer);
+  ASSIGN_OR_RETURN(Solved solved, Solve(std::get<Body>(input), request, observer));
+  return std::move(solved.model);
 }
 
 void WarnOfAccuracy(const ResolutionGoal& goal, ModalModel& model) {
@@ -344,10 +374,7 @@ absl::StatusOr<ModalModel> Decompose(std::string mesh_bytes, const v1::WorkerReq
                                      DecompositionObserver& observer) {
   const double begun_cpu_s = PhaseClock::Now().cpu_seconds;
   ASSIGN_OR_RETURN(const Input input, ReadInput(std::exchange(mesh_bytes, {}), request, observer));
-  const auto* surface = std::get_if<Fillable>(&input);
-  ASSIGN_OR_RETURN(ModalModel model, surface != nullptr
-                                         ? SolveToGoal(*surface, request, observer)
-                                         : Solve(std::get<Body>(input), request, observer));
+  ASSIGN_OR_RETURN(ModalModel model, SolveInput(input, request, observer));
   RETURN_IF_ERROR(CheckBand(model, UseOf(request)));
   WarnOfAccuracy(GoalOf(request), model);
   RETURN_IF_ERROR(LeaveOutInaccurate(request, model));

@@ -177,6 +177,7 @@ class Solution {
   absl::StatusOr<DeformationModes> Verify(Modes all, double limit) const {
     watch_(SolveStage::kVerify, 0);
     DeformationModes result;
+    result.predicted_cpu_s = Cost(static_cast<int>(all.shapes.cols())).cpu_seconds();
     const Measurement measured = Measure(ordered_.matrix, ordered_.fronts.order, all, workers_);
     result.verification.max_orthogonality_error = OrthogonalityError(measured.gram);
     std::vector<Eigen::Index> kept;

@@ -27,6 +27,8 @@ struct DeformationModes {
   int mode_count_below_asked = 0;
   /// The eigenvalue of the lowest deformation mode, even if it lies above the limit.
   double lowest_eigenvalue = 0;
+  /// Processor time, s, that PredictSolveCost() predicts for the modes found.
+  double predicted_cpu_s = 0;
 };
 
 /// Largest number of modes of a model. More modes never sound at once, and the shapes of more modes

@@ -27,9 +27,8 @@ using Json = nlohmann::json;
 
 inline constexpr char kSteel[] = " --young 210e9 --poisson 0.3 --density 7850";
 
-/// A bar of 100 x 20 x 12 mm, written in millimetres.
-inline void WriteBar(const std::string& path) {
-  const SurfaceMesh box = MakeBoxSurface({100, 20, 12});
+inline void WriteBox(const std::string& path, const Point& sides) {
+  const SurfaceMesh box = MakeBoxSurface(sides);
   std::ofstream file(path);
   for (const auto& [x, y, z] : box.vertices) file << "v " << x << " " << y << " " << z << "\n";
   for (const auto& [a, b, c] : box.triangles) {
@@ -46,7 +45,7 @@ struct CarillonPrecomputeTest : ::testing::Test {
 
   CarillonPrecomputeTest() {
     std::filesystem::create_directories(folder);
-    WriteBar(bar);
+    WriteBox(bar, {100, 20, 12});  // mm
   }
   ~CarillonPrecomputeTest() override { std::filesystem::remove_all(folder); }
 

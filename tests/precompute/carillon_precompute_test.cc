@@ -191,6 +191,19 @@ TEST_F(CarillonPrecomputeTest, GreatErrorsAreToldLoudly) {
   EXPECT_EQ(OnStandardError(), "");
 }
 
+TEST_F(CarillonPrecomputeTest, AThinPlateIsDividedFinelyEnoughUnlessNodesAreGiven) {
+  const std::string plate = folder + "/plate.obj";
+  WriteBox(plate, {0.1, 0.07, 0.001});
+  const std::string options = plate + " --out " + model + kSteel;
+  ASSERT_EQ(Run(options).exit_status, 0);
+  EXPECT_EQ(OnStandardError(), "");
+  const uint32_t nodes = ReadRecords(model)[0].header().node_count();
+  std::filesystem::remove(model);
+  ASSERT_EQ(Run(options + " --nodes 300").exit_status, 0);
+  EXPECT_THAT(OnStandardError(), HasSubstr("warning: very inaccurate"));
+  EXPECT_LT(2 * ReadRecords(model)[0].header().node_count(), nodes);
+}
+
 TEST_F(CarillonPrecomputeTest, UnitMayBeANumberOfMetres) {
   const auto volume_m3 = [&](const std::string& unit) {
     Run(bar + " --out " + model + " --unit " + unit + " --element linear --nodes 100 " + kSteel);

@@ -102,7 +102,7 @@ TEST_F(ProgramFilesTest, WhatIsNoFileOfAMeshIsRefused) {
 TEST_F(ProgramFilesTest, AMeshMayComeFromAPipe) {
   const std::string pipe = folder + "/pipe";
   ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
-  std::thread writer([&] { WriteBar(pipe); });
+  std::thread writer([&] { WriteBox(pipe, {100, 20, 12}); });
   EXPECT_EQ(Run(pipe + " --out " + model + " --format obj --unit mm --nodes 100 --json" + kSteel)
                 .exit_status,
             0);
