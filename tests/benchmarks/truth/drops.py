@@ -15,6 +15,7 @@ import rings
 
 HEIGHT_M, GRAVITY_M_PER_S2 = 0.3, 9.81
 BOUNCE_COUNT, RESTITUTION = 6, 0.5
+FIRST_S = 0.1  # the first contact begins before its middle, so not at the start of the rendering
 SOFT_S = 5e-4  # the duration of every contact up to version 0.1, where nobody gave one
 
 
@@ -96,7 +97,7 @@ def blows(surface, mass_kg, duration_s):
     """The bounces: each meets the floor with another vertex, the same in each run, and a third of the mass."""
     vertices = [tuple(map(float, vertex)) for vertex in surface[0]]
     centre = [(min(side) + max(side)) / 2 for side in zip(*vertices)]
-    found, time_s, speed = [], 0.0, math.sqrt(2 * GRAVITY_M_PER_S2 * HEIGHT_M)
+    found, time_s, speed = [], FIRST_S, math.sqrt(2 * GRAVITY_M_PER_S2 * HEIGHT_M)
     for point in random.Random(1).choices(vertices, k=BOUNCE_COUNT):
         impulse = mass_kg / 3 * speed * (1 + RESTITUTION)
         inwards = [c - x for x, c in zip(point, centre)]

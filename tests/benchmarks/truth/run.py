@@ -120,7 +120,7 @@ def drop_line(when, drop):
     summary = drop.summary
     if drop.silent():
         return materials.row(drop.name, when, "silent", *[""] * (len(likeness.OCTAVES_HZ) + 2))
-    return materials.row(drop.name, when, f"{float(summary['peak']) * 20:.2g}",
+    return materials.row(drop.name, when, f"{float(summary['peak']) * summary['full_scale_pa']:.2g}",
                          *(f"{db:.0f}" for db in drop.octaves_db()), f"{drop.ring_s():.2f}",
                          f"{summary['loudest_momentary_lufs']:.1f}" if "loudest_momentary_lufs" in summary else "-")
 
