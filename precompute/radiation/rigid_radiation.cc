@@ -138,7 +138,7 @@ Solved Expand(const ModeField& field, double wavenumber, const SphereGrid& grid)
 
 }  // namespace
 
-std::vector<double> RigidWavenumbers(const SurfaceLevel& level, double greatest_wavenumber) {
+std::vector<double> RigidWavenumbers(const RemeshedSurface& level, double greatest_wavenumber) {
   const double limit = 2 * std::numbers::pi / (kEdgesPerWave * level.surface.mean_edge_m);
   const double greatest = std::min(limit, greatest_wavenumber);
   std::vector<double> wavenumbers;
@@ -149,7 +149,7 @@ std::vector<double> RigidWavenumbers(const SurfaceLevel& level, double greatest_
   return wavenumbers;
 }
 
-RigidRadiation SolveRigidMotions(const MassProperties& mass, const SurfaceLevel& level,
+RigidRadiation SolveRigidMotions(const MassProperties& mass, const RemeshedSurface& level,
                                  const RadiatingSurface& body, std::vector<double> wavenumbers,
                                  Workers& workers) {
   RigidRadiation result{.mass = mass, .wavenumbers = std::move(wavenumbers), .motions = {}};

@@ -8,7 +8,7 @@
 #include "precompute/radiation/mass_properties.h"
 #include "precompute/radiation/mode_radiation.h"
 #include "precompute/radiation/radiating_surface.h"
-#include "precompute/radiation/surface_level.h"
+#include "precompute/radiation/remeshed_surface.h"
 #include "precompute/sparse/workers.h"
 
 namespace carillon::precompute {
@@ -44,10 +44,10 @@ struct RigidRadiation {
 
 /// Returns wavenumbers in equal ratios. The greatest is that of the shortest wave that the level
 /// resolves, or `greatest_wavenumber` if that is less. The least is a sixtieth of the greatest.
-std::vector<double> RigidWavenumbers(const SurfaceLevel& level, double greatest_wavenumber);
+std::vector<double> RigidWavenumbers(const RemeshedSurface& level, double greatest_wavenumber);
 
 /// Solves the six motions at these wavenumbers, and fits the equivalent spheres.
-RigidRadiation SolveRigidMotions(const MassProperties& mass, const SurfaceLevel& level,
+RigidRadiation SolveRigidMotions(const MassProperties& mass, const RemeshedSurface& level,
                                  const RadiatingSurface& body, std::vector<double> wavenumbers,
                                  Workers& workers);
 

@@ -30,7 +30,7 @@ double Decibels(double power_ratio) { return 10 * std::log10(power_ratio); }
 
 }  // namespace
 
-std::vector<ModeField> SolveRadiation(const ModeProblem& problem, const SurfaceLevel& level,
+std::vector<ModeField> SolveRadiation(const ModeProblem& problem, const RemeshedSurface& level,
                                       const RadiatingSurface& body, const SphereGrid& grid,
                                       Workers& workers) {
   const double k = problem.wavenumber;

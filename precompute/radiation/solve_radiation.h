@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "precompute/radiation/acoustic_surface.h"
+#include "precompute/radiation/remeshed_surface.h"
 #include "precompute/radiation/spherical_harmonics.h"
-#include "precompute/radiation/surface_level.h"
 
 namespace carillon::precompute {
 
@@ -31,7 +31,7 @@ struct ModeProblem {
 };
 
 /// Solves the problem on one surface, and computes the far patterns at the directions of the grid.
-std::vector<ModeField> SolveRadiation(const ModeProblem& problem, const SurfaceLevel& level,
+std::vector<ModeField> SolveRadiation(const ModeProblem& problem, const RemeshedSurface& level,
                                       const RadiatingSurface& body, const SphereGrid& grid,
                                       Workers& workers);
 

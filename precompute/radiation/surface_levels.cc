@@ -57,7 +57,8 @@ double SurfaceLevels::VertexCountOf(int level) const {
 
 absl::StatusOr<const SurfaceLevels::Made*> SurfaceLevels::At(int level) {
   if (const auto made = levels_.find(level); made != levels_.end()) return &made->second;
-  ASSIGN_OR_RETURN(SurfaceLevel surface, MakeSurfaceLevel(body_, index_, EdgeOf(level), workers_));
+  ASSIGN_OR_RETURN(RemeshedSurface surface,
+                   MakeRemeshedSurface(body_, index_, EdgeOf(level), workers_));
   Made& made = levels_.try_emplace(level, std::move(surface)).first->second;
   if (const auto before = levels_.find(level - 1); before != levels_.end()) {
     made.places_before =

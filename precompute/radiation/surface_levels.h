@@ -8,7 +8,7 @@
 #include "absl/status/statusor.h"
 #include "precompute/mesh/surface/nearest_triangle.h"
 #include "precompute/radiation/radiating_surface.h"
-#include "precompute/radiation/surface_level.h"
+#include "precompute/radiation/remeshed_surface.h"
 #include "precompute/sparse/workers.h"
 
 namespace carillon::precompute {
@@ -20,9 +20,9 @@ class SurfaceLevels {
   /// A level, and the places of its vertices on the level before, or no places if that level was
   /// not made.
   struct Made {
-    explicit Made(SurfaceLevel made) : level(std::move(made)), index(level.surface.mesh) {}
+    explicit Made(RemeshedSurface made) : level(std::move(made)), index(level.surface.mesh) {}
 
-    SurfaceLevel level;
+    RemeshedSurface level;
     NearestTriangle index;
     std::vector<SurfacePlace> places_before;
   };
@@ -44,7 +44,7 @@ class SurfaceLevels {
   /// Returns the number of vertices of the level, or a prediction if the level is not made.
   double VertexCountOf(int level) const;
 
-  /// Returns the level, and makes it if necessary. Errors: those of MakeSurfaceLevel.
+  /// Returns the level, and makes it if necessary. Errors: those of MakeRemeshedSurface.
   absl::StatusOr<const Made*> At(int level);
 
  private:

@@ -45,7 +45,7 @@ using RadiationProgress = std::function<void(double fraction)>;
 /// other, and the error is estimated from their difference. The rigid motions of the body are
 /// solved first if they take at most a quarter of the budget.
 ///
-/// Errors: those of MakeSurfaceLevel.
+/// Errors: those of MakeRemeshedSurface.
 absl::StatusOr<Transfer> ComputeTransfer(const SurfaceModes& modes,
                                          const RadiationSettings& settings,
                                          const RadiationProgress& on_progress);

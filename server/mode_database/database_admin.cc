@@ -12,7 +12,7 @@
 #include "server/mode_database/database.h"
 #include "server/mode_database/database_contents.h"
 #include "server/mode_database/job_store.h"
-#include "server/mode_database/model_rows.h"
+#include "server/mode_database/model_sql.h"
 #include "server/mode_database/sqlite_connection.h"
 #include "server/mode_database/transfer_store.h"
 

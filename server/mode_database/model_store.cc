@@ -14,7 +14,7 @@
 #include "server/base/xxh3.h"
 #include "server/mode_database/database.h"
 #include "server/mode_database/model_codec.h"
-#include "server/mode_database/model_rows.h"
+#include "server/mode_database/model_sql.h"
 #include "server/mode_database/page_token.h"
 #include "server/mode_database/spool_file.h"
 #include "server/mode_database/utf8_prefix.h"

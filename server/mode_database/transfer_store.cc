@@ -12,7 +12,7 @@
 #include "proto/cpp/status_macros.h"
 #include "server/base/xxh3.h"
 #include "server/mode_database/database.h"
-#include "server/mode_database/model_rows.h"
+#include "server/mode_database/model_sql.h"
 #include "server/mode_database/sqlite_connection.h"
 
 namespace carillon {

@@ -73,7 +73,7 @@ class Reference {
     const int level = levels_.LevelOf(mode.edge_m) + 2;
     if (!levels_.Exists(level) || levels_.VertexCountOf(level) > most_vertices) return nullptr;
     const SphereGrid grid(PatternOrder(mode.wavenumber, body_.radius_m));
-    const SurfaceLevel& surface = ValueOrExit(levels_.At(level))->level;
+    const RemeshedSurface& surface = ValueOrExit(levels_.At(level))->level;
     const ModeField fine =
         SolveRadiation(ProblemOf(number, surface), surface, body_, grid, workers_).front();
     const ModeField stored = FieldOf(mode, grid);
@@ -89,7 +89,7 @@ class Reference {
   /// CPU seconds of one mode by sweeps, and by the same equation assembled and factorized.
   nlohmann::json BesideDense(size_t number) {
     const ModeRadiation& mode = transfer_.modes[number];
-    const SurfaceLevel& level = ValueOrExit(levels_.At(levels_.LevelOf(mode.edge_m)))->level;
+    const RemeshedSurface& level = ValueOrExit(levels_.At(levels_.LevelOf(mode.edge_m)))->level;
     const SphereGrid grid(PatternOrder(mode.wavenumber, body_.radius_m));
     double begun_s = CpuSeconds();
     const ModeField field =
@@ -110,7 +110,7 @@ class Reference {
   }
 
  private:
-  ModeProblem ProblemOf(size_t number, const SurfaceLevel& level) const {
+  ModeProblem ProblemOf(size_t number, const RemeshedSurface& level) const {
     ModeProblem problem{.wavenumber = transfer_.modes[number].wavenumber,
                         .displacements = {},
                         .starts = {},

@@ -54,7 +54,7 @@ struct Sphere {
   }
 
   Workers workers{1};
-  SurfaceLevel level;
+  RemeshedSurface level;
   RadiatingSurface body;
 };
 

@@ -55,7 +55,7 @@ std::complex<double> PressureAt(const Point& place, const AcousticSurface& surfa
 std::vector<double> LevelsRoundFork(double distance_m) {
   const Fork fork = MakeFork();
   Workers workers(2);
-  SurfaceLevel level;
+  RemeshedSurface level;
   level.surface = MakeAcousticSurface(fork.mesh);
   level.near = MakeNearCorrection(level.surface, workers);
   RadiatingSurface body;

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "precompute/radiation/surface_level.h"
+#include "precompute/radiation/remeshed_surface.h"
 #include "tests/precompute/radiation/spheres.h"
 
 namespace carillon::precompute {

@@ -24,7 +24,7 @@ MassProperties MassOf(const SurfaceMesh& mesh) {
 
 RigidRadiation Solve(const SurfaceMesh& mesh) {
   Workers workers(2);
-  SurfaceLevel level;
+  RemeshedSurface level;
   level.surface = MakeAcousticSurface(mesh);
   level.near = MakeNearCorrection(level.surface, workers);
   RadiatingSurface body;

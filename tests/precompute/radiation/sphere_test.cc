@@ -33,7 +33,7 @@ struct Sphere {
   }
 
   Workers workers{2};
-  SurfaceLevel level;
+  RemeshedSurface level;
   RadiatingSurface body;
 };
 

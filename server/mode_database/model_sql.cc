@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "server/mode_database/model_rows.h"
+#include "server/mode_database/model_sql.h"
 
 #include <bit>
 #include <limits>

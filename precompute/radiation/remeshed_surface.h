@@ -23,7 +23,7 @@ struct SurfacePlace {
 };
 
 /// The radiating surface in triangles of one size, with the quantities computed once for it.
-struct SurfaceLevel {
+struct RemeshedSurface {
   AcousticSurface surface;
   NearCorrection near;
   std::vector<SurfacePlace> places;  ///< the place of each vertex on the radiating surface
@@ -36,12 +36,12 @@ std::vector<SurfacePlace> PlacesOn(const SurfaceMesh& given, const NearestTriang
 
 /// Remeshes the radiating surface with edges of about `edge_m`. Errors: Internal
 /// RADIATION_REMESHING_FAILED.
-absl::StatusOr<SurfaceLevel> MakeSurfaceLevel(const RadiatingSurface& given,
-                                              const NearestTriangle& index, double edge_m,
-                                              Workers& workers);
+absl::StatusOr<RemeshedSurface> MakeRemeshedSurface(const RadiatingSurface& given,
+                                                    const NearestTriangle& index, double edge_m,
+                                                    Workers& workers);
 
 /// Returns the displacement of a mode at the level's vertices.
 Displacement DisplacementOf(const SurfaceModes& modes, size_t mode, const RadiatingSurface& given,
-                            const SurfaceLevel& level);
+                            const RemeshedSurface& level);
 
 }  // namespace carillon::precompute

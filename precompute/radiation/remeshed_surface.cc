@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
-#include "precompute/radiation/surface_level.h"
+#include "precompute/radiation/remeshed_surface.h"
 
 #include <algorithm>
 #include <cmath>
@@ -152,9 +152,9 @@ std::vector<SurfacePlace> PlacesOn(const SurfaceMesh& given, const NearestTriang
   return places;
 }
 
-absl::StatusOr<SurfaceLevel> MakeSurfaceLevel(const RadiatingSurface& given,
-                                              const NearestTriangle& index, double edge_m,
-                                              Workers& workers) {
+absl::StatusOr<RemeshedSurface> MakeRemeshedSurface(const RadiatingSurface& given,
+                                                    const NearestTriangle& index, double edge_m,
+                                                    Workers& workers) {
   ASSIGN_OR_RETURN(const SurfaceMesh remeshed, Remesh(given.mesh, edge_m));
   AcousticSurface near_it = MakeAcousticSurface(WithoutLoose(WithoutFlat(remeshed, edge_m)));
   std::vector<SurfacePlace> places = PlacesOn(given.mesh, index, near_it);
@@ -169,14 +169,14 @@ absl::StatusOr<SurfaceLevel> MakeSurfaceLevel(const RadiatingSurface& given,
   }
   on_it = WithoutFlat(std::move(on_it), edge_m);
   KeepVolume(given.mesh, index, on_it);
-  SurfaceLevel level{
+  RemeshedSurface level{
       .surface = MakeAcousticSurface(std::move(on_it)), .near = {}, .places = std::move(places)};
   level.near = MakeNearCorrection(level.surface, workers);
   return level;
 }
 
 Displacement DisplacementOf(const SurfaceModes& modes, size_t mode, const RadiatingSurface& given,
-                            const SurfaceLevel& level) {
+                            const RemeshedSurface& level) {
   const size_t count = modes.mode_count();
   Displacement displacement;
   displacement.reserve(level.places.size());
