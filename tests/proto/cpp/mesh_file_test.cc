@@ -19,14 +19,17 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 class MeshFile : public testing::Test {
- protected:
+ public:
   MeshFile()
       : folder_(std::filesystem::path(testing::TempDir()) /
                 testing::UnitTest::GetInstance()->current_test_info()->name()) {
     std::filesystem::create_directories(folder_ / "data");
   }
   ~MeshFile() override { std::filesystem::remove_all(folder_); }
+  MeshFile(const MeshFile&) = delete;
+  MeshFile& operator=(const MeshFile&) = delete;
 
+ protected:
   std::string Write(const std::string& name, const std::string& bytes) {
     std::ofstream(folder_ / name, std::ios::binary) << bytes;
     return (folder_ / name).string();
