@@ -3,7 +3,6 @@
 
 #include <CLI/CLI.hpp>
 #include <cmath>
-#include <filesystem>
 #include <utility>
 #include <vector>
 
@@ -11,12 +10,12 @@
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
-#include "absl/strings/strip.h"
 #include "precompute/fem/material.h"
 #include "precompute/worker_request.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/manual_page.h"
 #include "proto/cpp/material_catalogue.h"
+#include "proto/cpp/mesh_file.h"
 #include "proto/cpp/settings_options.h"
 #include "proto/cpp/status_macros.h"
 
@@ -222,9 +221,7 @@ absl::Status SetBand(const std::string& band, v1::WorkerRequest& request) {
 }
 
 std::string FormatOf(const std::string& format, const std::string& file) {
-  const std::string suffix = std::filesystem::path(file).extension();
-  const std::string named =
-      absl::AsciiStrToLower(format.empty() ? absl::StripPrefix(suffix, ".") : format);
+  const std::string named = format.empty() ? MeshFormatOf(file) : absl::AsciiStrToLower(format);
   return named == "ele" ? "node" : named;
 }
 

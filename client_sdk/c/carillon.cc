@@ -16,9 +16,7 @@
 #include <utility>
 #include <vector>
 
-#include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
-#include "absl/strings/strip.h"
 #include "carillon/client.h"
 #include "carillon/lasting_stream.h"
 #include "client_sdk/c/c_conversion.h"
@@ -140,8 +138,7 @@ carillon_code carillon_create_model(carillon_client* client, const char* mesh_fi
     if (!client || !mesh_file || !material || !model) return Missing("an argument");
     const std::filesystem::path path = mesh_file;
     v1::CreateModalModelRequest request;
-    const std::string suffix = path.extension();
-    request.set_mesh_format(absl::AsciiStrToLower(absl::StripPrefix(suffix, ".")));
+    request.set_mesh_format(carillon::MeshFormatOf(path));
     ASSIGN_OR_RETURN(const std::string bytes, carillon::ReadMeshFile(path, request.mesh_format()));
     request.mutable_material()->set_preset(material);
     request.set_label(path.stem());

@@ -6,7 +6,6 @@
 #include <utility>
 #include <vector>
 
-#include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/strip.h"
@@ -25,10 +24,7 @@ namespace carillon::cli {
 namespace {
 
 std::string Format(const CreateModelOptions& options, const std::string& file) {
-  if (!options.format.empty()) return options.format;
-  const std::string suffix = std::filesystem::path(file).extension();
-  const std::string format = absl::AsciiStrToLower(absl::StripPrefix(suffix, "."));
-  return format == "ele" ? "node" : format;
+  return options.format.empty() ? MeshFormatOf(file) : options.format;
 }
 
 absl::StatusOr<v1::CreateModalModelRequest> MakeRequest(const CreateModelOptions& options,

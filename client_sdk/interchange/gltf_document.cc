@@ -14,11 +14,11 @@
 
 #include "absl/strings/escaping.h"
 #include "absl/strings/match.h"
-#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
 #include "client_sdk/interchange/file_refusal.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/gltf_uri.h"
 #include "proto/cpp/status_macros.h"
 
 namespace carillon::interchange {
@@ -80,34 +80,6 @@ absl::StatusOr<Chunks> Split(std::string_view file) {
   return chunks;
 }
 
-std::optional<std::string> Unescape(absl::string_view uri) {
-  std::string text;
-  for (size_t i = 0; i < uri.size(); ++i) {
-    if (uri[i] != '%') {
-      text.push_back(uri[i]);
-      continue;
-    }
-    int code = 0;
-    if (!absl::SimpleHexAtoi(uri.substr(i + 1, 2), &code) || code == 0) return std::nullopt;
-    text.push_back(static_cast<char>(code));
-    i += 2;
-  }
-  return text;
-}
-
-/// Returns the path of a file that a relative URI names, or nullopt if the path leaves the folder.
-/// An untrusted asset must not make this program read other files.
-std::optional<std::string> FileWithin(const std::string& folder, const std::string& uri) {
-  const std::optional<std::string> name = Unescape(uri);
-  if (!name || name->empty() || absl::StrContains(uri, ":")) return std::nullopt;
-  const std::filesystem::path path(*name);
-  if (path.is_absolute()) return std::nullopt;
-  for (const auto& part : path) {
-    if (part == "..") return std::nullopt;
-  }
-  return (std::filesystem::path(folder) / path).string();
-}
-
 bool WriteWhole(const std::string& path, const std::vector<std::string_view>& pieces) {
   const std::string temporary = absl::StrCat(path, ".partial-", getpid());
   std::ofstream out(temporary, std::ios::binary);
@@ -165,7 +137,7 @@ absl::StatusOr<std::string> GltfDocument::ReadBuffer(uint64_t index) const {
       return bytes;
     return Malformed(absl::StrCat("the data of buffer ", index, " are no base64"));
   }
-  const std::optional<std::string> path = FileWithin(folder_, text);
+  const std::optional<std::string> path = FileOfGltfUri(folder_, text);
   if (path) return ReadFile(*path);
   return Malformed(absl::StrCat("buffer ", index, " names no file in the folder of the glTF file"));
 }

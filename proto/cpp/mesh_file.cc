@@ -9,13 +9,16 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <vector>
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/escaping.h"
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/strip.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/gltf_uri.h"
 #include "proto/cpp/status_macros.h"
 
 namespace carillon {
@@ -59,15 +62,13 @@ absl::StatusOr<std::string> ReadOne(const std::filesystem::path& path) {
   return bytes;
 }
 
-absl::StatusOr<std::string> ReadTetgen(const std::filesystem::path& path) {
-  std::filesystem::path file = path;
-  const std::filesystem::path elements = file.replace_extension(".ele");
-  const std::filesystem::path nodes = file.replace_extension(".node");
+absl::StatusOr<std::string> ReadTetgen(std::filesystem::path path) {
+  ASSIGN_OR_RETURN(const std::string nodes, ReadOne(path.replace_extension(".node")));
+  const std::filesystem::path elements = path.replace_extension(".ele");
   // One file may contain both already.
-  if (!std::filesystem::exists(nodes) || !std::filesystem::exists(elements)) return ReadOne(path);
-  ASSIGN_OR_RETURN(const std::string first, ReadOne(nodes));
+  if (!std::filesystem::exists(elements)) return nodes;
   ASSIGN_OR_RETURN(const std::string rest, ReadOne(elements));
-  return absl::StrCat(first, first.ends_with('\n') ? "" : "\n", rest);
+  return absl::StrCat(nodes, nodes.ends_with('\n') ? "" : "\n", rest);
 }
 
 bool IsExternal(const std::string& uri) { return !absl::StartsWithIgnoreCase(uri, "data:"); }
@@ -103,31 +104,14 @@ bool ReadDocument(const std::string& gltf, Struct& document) {
   return google::protobuf::util::JsonStringToMessage(gltf, &document).ok();
 }
 
-/// Replaces each "%20" by the character that it stands for.
-std::string Unescape(const std::string& uri) {
-  std::string text;
-  for (size_t i = 0; i < uri.size(); ++i) {
-    const bool escaped = uri[i] == '%' && i + 2 < uri.size() && absl::ascii_isxdigit(uri[i + 1]) &&
-                         absl::ascii_isxdigit(uri[i + 2]);
-    text += escaped ? absl::HexStringToBytes(uri.substr(i + 1, 2)) : uri.substr(i, 1);
-    if (escaped) i += 2;
-  }
-  return text;
-}
-
-/// Reads the file of a buffer. A file elsewhere is refused, because an untrusted document could
-/// have any file of the user sent to the daemon.
 absl::StatusOr<std::string> ReadBuffer(const std::filesystem::path& document,
                                        const std::string& uri) {
-  const std::filesystem::path name = Unescape(uri);
-  const bool leaves = std::ranges::find(name, std::filesystem::path("..")) != name.end();
-  if (name.is_absolute() || leaves || absl::StrContains(uri, "://")) {
-    return Refusal(absl::StatusCode::kInvalidArgument, "MESH_UNREADABLE",
-                   absl::StrCat(document.string(), " keeps its data in \"", absl::CHexEscape(uri),
-                                "\", which is not in its folder: put it there, or export the body "
-                                "as GLB"));
-  }
-  return ReadOne(document.parent_path() / name);
+  const std::optional<std::string> file = FileOfGltfUri(document.parent_path(), uri);
+  if (file) return ReadOne(*file);
+  return Refusal(absl::StatusCode::kInvalidArgument, "MESH_UNREADABLE",
+                 absl::StrCat(document.string(), " keeps its data in \"", absl::CHexEscape(uri),
+                              "\", which is not in its folder: put it there, or export the body "
+                              "as GLB"));
 }
 
 absl::StatusOr<std::string> ReadGltf(const std::filesystem::path& path) {
@@ -156,12 +140,19 @@ absl::StatusOr<std::string> ReadGltf(const std::filesystem::path& path) {
 
 absl::StatusOr<std::string> ReadAnyFormat(const std::filesystem::path& path,
                                           const std::string& format) {
-  const std::string suffix = absl::AsciiStrToLower(path.extension().string());
+  const std::filesystem::path suffix = path.extension();
   if (format == "node" && (suffix == ".node" || suffix == ".ele")) return ReadTetgen(path);
-  return format == "gltf" && suffix == ".gltf" ? ReadGltf(path) : ReadOne(path);
+  const bool has_buffers = format == "gltf" && absl::EqualsIgnoreCase(suffix.string(), ".gltf");
+  return has_buffers ? ReadGltf(path) : ReadOne(path);
 }
 
 }  // namespace
+
+std::string MeshFormatOf(const std::string& path) {
+  const std::string suffix = std::filesystem::path(path).extension();
+  const std::string format = absl::AsciiStrToLower(absl::StripPrefix(suffix, "."));
+  return format == "ele" ? "node" : format;
+}
 
 std::string ExternalBuffer(const std::string& gltf) {
   Struct document;

@@ -7,6 +7,10 @@
 
 namespace carillon {
 
+/// Returns the format that the suffix of a mesh file names, for example "obj". TetGen's ".ele"
+/// names "node". The format need not be known.
+std::string MeshFormatOf(const std::string& path);
+
 /// Returns the name of the first file that the glTF document needs for its buffers, or an empty
 /// string if all buffers are in the document. A text that is no JSON names no file.
 std::string ExternalBuffer(const std::string& gltf);
