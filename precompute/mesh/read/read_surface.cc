@@ -11,6 +11,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <numeric>
 #include <span>
 #include <string_view>
 #include <utility>
@@ -126,18 +127,15 @@ size_t CountTriangles(const aiMesh& mesh) {
 
 /// Triangles that all polygons must give.
 size_t CountTriangles(const aiScene& scene, bool with_places) {
+  std::vector<size_t> counts;
+  for (const aiMesh* mesh : Meshes(scene)) counts.push_back(CountTriangles(*mesh));
+  if (!with_places) return std::accumulate(counts.begin(), counts.end(), size_t{0});
   size_t count = 0;
-  if (!with_places) {
-    for (const aiMesh* mesh : Meshes(scene)) count += CountTriangles(*mesh);
-    return count;
-  }
   std::vector<const aiNode*> waiting = {scene.mRootNode};
   while (!waiting.empty()) {
     const aiNode& node = *waiting.back();
     waiting.pop_back();
-    for (const unsigned mesh : std::span(node.mMeshes, node.mNumMeshes)) {
-      count += CountTriangles(*Meshes(scene)[mesh]);
-    }
+    for (const unsigned mesh : std::span(node.mMeshes, node.mNumMeshes)) count += counts[mesh];
     waiting.insert(waiting.end(), node.mChildren, node.mChildren + node.mNumChildren);
   }
   return count;
