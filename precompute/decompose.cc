@@ -287,13 +287,13 @@ bool IsFinenessFree(const v1::WorkerRequest& request) {
 absl::StatusOr<ModalModel> SolveToGoal(const Fillable& surface, const v1::WorkerRequest& request,
                                        DecompositionObserver& observer) {
   const bool is_free = IsFinenessFree(request);
-  const ResolutionGoal goal = is_free ? kUsualGoal : GoalOf(request);
+  const ResolutionGoal asked = GoalOf(request);
   MeshingSettings meshing = MeshingOf(request);
-  if (goal.given() && !is_free && meshing.target_node_count == 0) {
+  if (asked.given() && meshing.target_node_count == 0) {
     meshing.target_node_count = kFirstCornerNodeCount;
   }
   std::vector<Round> rounds;
-  RoundForecast forecast{.later_rounds = goal.given() && !is_free ? kLaterRoundsAfterFirst : 0};
+  RoundForecast forecast{.later_rounds = asked.given() ? kLaterRoundsAfterFirst : 0};
   absl::StatusOr<ModalModel> best = absl::UnknownError("");
   while (true) {
     const PhaseClock::Times begun = PhaseClock::Now();
@@ -310,8 +310,7 @@ absl::StatusOr<ModalModel> SolveToGoal(const Fillable& surface, const v1::Worker
     rounds.push_back(
         Describe(body->mesh, solved->model,
                  is_free ? solved->predicted_cpu_s : ended.cpu_seconds - begun.cpu_seconds));
-    const std::optional<double> next =
-        goal.given() ? NextElementSize(goal, rounds) : std::optional<double>();
+    const std::optional<double> next = NextElementSize(is_free ? kUsualGoal : asked, rounds);
     if (!next) return std::move(solved->model);
     best = std::move(solved->model);
     meshing.element_size_m = *next;

@@ -78,7 +78,7 @@ double TimeGrowth(const Round& last, double element_size_m) {
 std::optional<double> NextElementSize(const ResolutionGoal& goal,
                                       const std::vector<Round>& rounds) {
   const Round& last = rounds.back();
-  if (rounds.size() >= kMostRounds || !Refined(rounds)) return std::nullopt;
+  if (!goal.given() || rounds.size() >= kMostRounds || !Refined(rounds)) return std::nullopt;
   if (goal.accuracy > 0 && last.worst_error > 0 && last.worst_error <= goal.accuracy) {
     return std::nullopt;
   }
