@@ -13,6 +13,7 @@
 #include "precompute/mesh/boundary.h"
 #include "precompute/mesh/fill/midside_nodes.h"
 #include "precompute/mesh/fill/tetrahedralize.h"
+#include "precompute/mesh/surface/surface_shells.h"
 
 namespace carillon::precompute {
 namespace {
@@ -187,6 +188,12 @@ void AddShell(SurfaceMesh& whole, const SurfaceMesh& part, const Point& offset_m
   for (const auto& t : part.triangles) {
     whole.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
   }
+}
+
+double EnclosedVolume(const SurfaceMesh& surface) {
+  double volume_m3 = 0;
+  for (const Shell& shell : FindShells(surface)) volume_m3 += shell.volume_m3;
+  return volume_m3;
 }
 
 SurfaceMesh InsideOut(SurfaceMesh surface) {

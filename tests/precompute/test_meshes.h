@@ -49,6 +49,9 @@ SurfaceMesh MakeRodSurface(double radius_m, double length_m, int around, int alo
 /// `part` added to `whole`, moved by `offset_m`.
 void AddShell(SurfaceMesh& whole, const SurfaceMesh& part, const Point& offset_m = {0, 0, 0});
 
+/// The volume that a closed surface encloses, without its voids, m^3.
+double EnclosedVolume(const SurfaceMesh& surface);
+
 /// The surface turned inside out.
 SurfaceMesh InsideOut(SurfaceMesh surface);
 

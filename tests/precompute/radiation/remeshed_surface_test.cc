@@ -5,21 +5,11 @@
 
 #include <cmath>
 
-#include "precompute/mesh/point_math.h"
 #include "tests/precompute/radiation/spheres.h"
 #include "tests/precompute/test_meshes.h"
 
 namespace carillon::precompute {
 namespace {
-
-double VolumeOf(const SurfaceMesh& mesh) {
-  double volume = 0;
-  for (size_t t = 0; t < mesh.triangles.size(); ++t) {
-    const auto [a, b, c] = CornersOf(mesh, t);
-    volume -= TetVolume(a, b, c, {0, 0, 0});
-  }
-  return volume;
-}
 
 RemeshedSurface MakeLevel(const SurfaceMesh& mesh, double edge_m) {
   RadiatingSurface body;
@@ -38,7 +28,7 @@ TEST(RemeshedSurface, KeepsTheVolumeOfACurvedBody) {
   for (Point& p : mesh.vertices) p = {p[0], 0.6 * p[1], 0.8 * p[2]};
   const RemeshedSurface level = MakeLevel(mesh, 0.3);
   EXPECT_LT(level.surface.vertex_count(), 300U);
-  EXPECT_NEAR(VolumeOf(level.surface.mesh) / VolumeOf(mesh), 1, 0.004);
+  EXPECT_NEAR(EnclosedVolume(level.surface.mesh) / EnclosedVolume(mesh), 1, 0.004);
 }
 
 TEST(RemeshedSurface, LeavesAFlatBodyAsItIs) {
@@ -54,7 +44,7 @@ TEST(RemeshedSurface, LeavesAFlatBodyAsItIs) {
 TEST(RemeshedSurface, KeepsEdgesThatAreFinerThanItsTriangles) {
   const SurfaceMesh mesh = MakeBoxSurface({1, 0.6, 0.04});
   const RemeshedSurface level = MakeLevel(mesh, 0.1);
-  EXPECT_NEAR(VolumeOf(level.surface.mesh) / VolumeOf(mesh), 1, 1e-3);
+  EXPECT_NEAR(EnclosedVolume(level.surface.mesh) / EnclosedVolume(mesh), 1, 1e-3);
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 
 #include "precompute/mesh/point_math.h"
 #include "precompute/radiation/spherical_harmonics.h"
+#include "tests/precompute/test_meshes.h"
 
 namespace carillon::precompute {
 namespace {
@@ -56,15 +57,6 @@ SurfaceMesh InFour(const SurfaceMesh& mesh) {
   return finer;
 }
 
-double VolumeWithin(const SurfaceMesh& mesh) {
-  double volume = 0;
-  for (size_t t = 0; t < mesh.triangles.size(); ++t) {
-    const auto [a, b, c] = CornersOf(mesh, t);
-    volume -= TetVolume(a, b, c, {0, 0, 0});
-  }
-  return volume;
-}
-
 void Scale(double factor, Point& p) {
   for (double& x : p) x *= factor;
 }
@@ -75,7 +67,7 @@ SurfaceMesh MakeIcosphere(double radius_m, int halvings) {
   SurfaceMesh sphere = MakeIcosahedron();
   for (int i = 0; i < halvings; ++i) sphere = InFour(sphere);
   for (Point& p : sphere.vertices) Scale(1 / Norm(p), p);
-  const double blow = std::cbrt(4 * std::numbers::pi / 3 / VolumeWithin(sphere));
+  const double blow = std::cbrt(4 * std::numbers::pi / 3 / EnclosedVolume(sphere));
   for (Point& p : sphere.vertices) Scale(blow * radius_m, p);
   return sphere;
 }

@@ -37,15 +37,6 @@ double Volume(const TetMesh& mesh) {
   return volume;
 }
 
-double Volume(const SurfaceMesh& surface) {
-  double volume = 0;
-  for (size_t t = 0; t < surface.triangles.size(); ++t) {
-    const auto [a, b, c] = CornersOf(surface, t);
-    volume -= TetVolume(a, b, c, {0, 0, 0});
-  }
-  return volume;
-}
-
 /// Each boundary face must lie on the triangle it names, and all together cover it.
 void ExpectBoundaryOnGivenTriangles(const TetMesh& mesh, const SurfaceMesh& given, double size) {
   std::vector<double> uncovered;
@@ -77,7 +68,7 @@ TEST(Tetrahedralize, FillsTheVolumeOfEachBody) {
   AddShell(hollow, InsideOut(MakeSphereSurface(0.08, 3)));
   for (const SurfaceMesh& surface :
        {MakeBoxSurface({1, 0.05, 0.03}), MakeTubeSurface({}), MakeSphereSurface(0.1, 3), hollow}) {
-    const double volume = Volume(surface);
+    const double volume = EnclosedVolume(surface);
     EXPECT_NEAR(Volume(Fill(surface, {})), volume, 1e-6 * volume);
   }
 }

@@ -11,17 +11,10 @@
 #include "precompute/mesh/surface/check_surface.h"
 #include "precompute/mesh/surface/prepare_surface.h"
 #include "precompute/mesh/surface/refine_surface.h"
-#include "precompute/mesh/surface/surface_shells.h"
 #include "tests/precompute/test_meshes.h"
 
 namespace carillon::precompute {
 namespace {
-
-double VolumeOf(const SurfaceMesh& surface) {
-  double volume_m3 = 0;
-  for (const Shell& shell : FindShells(surface)) volume_m3 += shell.volume_m3;
-  return volume_m3;
-}
 
 SurfaceMesh FineSphere() { return MakeSphereSurface(0.1, 6); }
 
@@ -31,7 +24,7 @@ TEST(CoarsenSurface, ASphereKeepsItsVolume) {
   const std::optional<CoarsenedSurface> coarse = CoarsenSurface(fine, 0);
   ASSERT_TRUE(coarse.has_value());
   EXPECT_LT(coarse->surface.triangles.size(), fine.triangles.size() / 2);
-  EXPECT_NEAR(VolumeOf(coarse->surface) / VolumeOf(fine), 1, 5e-4);
+  EXPECT_NEAR(EnclosedVolume(coarse->surface) / EnclosedVolume(fine), 1, 5e-4);
   EXPECT_GT(coarse->frequency_error, 0);
   EXPECT_LT(coarse->frequency_error, 0.002);
   EXPECT_TRUE(CheckSurface(coarse->surface).ok());
@@ -51,7 +44,7 @@ TEST(CoarsenSurface, ABoxKeepsItsEdges) {
   ASSERT_GT(fine.triangles.size(), kMaxUncoarsenedTriangles);
   const std::optional<CoarsenedSurface> coarse = CoarsenSurface(fine, 0);
   ASSERT_TRUE(coarse.has_value());
-  EXPECT_NEAR(VolumeOf(coarse->surface), 0.3 * 0.2 * 0.1, 1e-9);
+  EXPECT_NEAR(EnclosedVolume(coarse->surface), 0.3 * 0.2 * 0.1, 1e-9);
   EXPECT_LT(coarse->frequency_error, 1e-6);
 }
 

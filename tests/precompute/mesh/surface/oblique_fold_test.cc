@@ -167,12 +167,6 @@ SurfaceMesh InSinglePrecision(SurfaceMesh surface) {
   return surface;
 }
 
-double Volume(const SurfaceMesh& surface) {
-  double volume = 0;
-  for (const Shell& shell : FindShells(surface)) volume += shell.volume_m3;
-  return volume;
-}
-
 /// The least volume of a tetrahedron, in cubes of its longest edge.
 double LeastQuality(const TetMesh& mesh) {
   double least = 1;
@@ -191,7 +185,7 @@ void ExpectRefusedAndRepaired(const SurfaceMesh& folded) {
   const auto repaired = PrepareSurface(folded, {.repair = true});
   ASSERT_TRUE(repaired.ok()) << repaired.status();
   // The repaired triangles lie in one plane, so that the volume changes by rounding alone.
-  EXPECT_NEAR(Volume(repaired->surface), kVolume, 1e-6 * kVolume);
+  EXPECT_NEAR(EnclosedVolume(repaired->surface), kVolume, 1e-6 * kVolume);
   EXPECT_THAT(repaired->warnings, ::testing::Contains(HasSubstr("were replaced")));
 }
 
@@ -234,7 +228,7 @@ TEST(ObliqueFold, OfAnEdgeOfTheBodyIsRepaired) {
                 HasSubstr("MESH_SELF_INTERSECTING"));
     const auto repaired = PrepareSurface(folded, {.repair = true});
     ASSERT_TRUE(repaired.ok()) << repaired.status();
-    EXPECT_NEAR(Volume(repaired->surface), kVolume, 1e-2 * kVolume);
+    EXPECT_NEAR(EnclosedVolume(repaired->surface), kVolume, 1e-2 * kVolume);
   }
 }
 

@@ -24,12 +24,6 @@ using ::testing::HasSubstr;
 
 constexpr double kPi = std::numbers::pi;
 
-double Volume(const SurfaceMesh& surface) {
-  double volume = 0;
-  for (const Shell& shell : FindShells(surface)) volume += shell.volume_m3;
-  return volume;
-}
-
 /// Puts a triangle of size `depth_m`, turned by half a turn, into a triangle of the surface, so
 /// that the triangles between both cross one another. Returns where.
 Point FoldIn(SurfaceMesh& surface, double depth_m) {
@@ -75,7 +69,7 @@ TEST(PrepareSurface, WithoutRepairAFaultIsRefused) {
   EXPECT_THAT(PrepareSurface(box, {}).status().ToString(), HasSubstr("MESH_NOT_ORIENTED"));
   const auto repaired = PrepareSurface(box, {.repair = true});
   ASSERT_TRUE(repaired.ok()) << repaired.status();
-  EXPECT_NEAR(Volume(repaired->surface), 0.15, 1e-12);
+  EXPECT_NEAR(EnclosedVolume(repaired->surface), 0.15, 1e-12);
   EXPECT_EQ(repaired->given_triangle[3], 3);
 }
 
@@ -85,7 +79,7 @@ TEST(PrepareSurface, ABallHollowedOutHasTheVolumeOfItsShellAndNamesItsOwnTriangl
   ASSERT_TRUE(hollow.ok()) << hollow.status();
   // The polyhedron of 2048 triangles has 0.5 % less than the ball.
   const double shell = 4 * kPi / 3 * (std::pow(0.1, 3) - std::pow(0.08, 3));
-  EXPECT_NEAR(Volume(hollow->surface), shell, 0.01 * shell);
+  EXPECT_NEAR(EnclosedVolume(hollow->surface), shell, 0.01 * shell);
   for (size_t t = 0; t < ball.triangles.size(); ++t) {
     EXPECT_EQ(hollow->given_triangle[t], static_cast<int32_t>(t));
   }
@@ -106,7 +100,7 @@ TEST(PrepareSurface, AnOpenSheetGetsAThickness) {
   ASSERT_TRUE(thick.ok()) << thick.status();
   // A slab with a round edge, a half cylinder of radius 5 mm, and quarter balls at the corners.
   const double slab = 0.2 * 0.1 * 0.01 + 0.6 * kPi / 2 * 25e-6 + 4 * kPi / 3 * 125e-9;
-  EXPECT_NEAR(Volume(thick->surface), slab, 0.02 * slab);
+  EXPECT_NEAR(EnclosedVolume(thick->surface), slab, 0.02 * slab);
 }
 
 TEST(PrepareSurface, AnImpossibleWallIsRefusedWithFigures) {
@@ -124,7 +118,7 @@ TEST(PrepareSurface, BodiesThatCrossAreUnitedByAWrap) {
   const auto united = PrepareSurface(cross, {.repair = true});
   ASSERT_TRUE(united.ok()) << united.status();
   const double volume = 0.05 * 0.05 * (0.2 + 0.2 - 0.05);
-  EXPECT_NEAR(Volume(united->surface), volume, 0.01 * volume);
+  EXPECT_NEAR(EnclosedVolume(united->surface), volume, 0.01 * volume);
   ASSERT_EQ(united->warnings.size(), 1U);
   EXPECT_THAT(united->warnings[0], HasSubstr("wrapped"));
 }
@@ -140,7 +134,7 @@ TEST(PrepareSurface, AWideHoleIsFilledWhereItIs) {
   ASSERT_LT(open.triangles.size(), ball.triangles.size());
   const auto filled = PrepareSurface(open, {.repair = true});
   ASSERT_TRUE(filled.ok()) << filled.status();
-  EXPECT_NEAR(Volume(filled->surface), Volume(ball), 0.01 * Volume(ball));
+  EXPECT_NEAR(EnclosedVolume(filled->surface), EnclosedVolume(ball), 0.01 * EnclosedVolume(ball));
   EXPECT_THAT(filled->warnings[0], HasSubstr("holes filled with smooth patches"));
   // The repaired surface has kept the given vertices.
   for (size_t v = 0; v < open.vertices.size(); v += 7) {
@@ -167,12 +161,12 @@ TEST(PrepareSurface, AVesselIsNotFilledThroughItsMouth) {
 
 TEST(PrepareSurface, AFoldIsUntangledWhereItIs) {
   SurfaceMesh ball = MakeSphereSurface(0.1, 5);
-  const double volume = Volume(ball);
+  const double volume = EnclosedVolume(ball);
   const Point fold = FoldIn(ball, 3e-6);
   EXPECT_THAT(PrepareSurface(ball, {}).status().ToString(), HasSubstr("MESH_SELF_INTERSECTING"));
   const auto untangled = PrepareSurface(ball, {.repair = true});
   ASSERT_TRUE(untangled.ok()) << untangled.status();
-  EXPECT_NEAR(Volume(untangled->surface), volume, 1e-4 * volume);
+  EXPECT_NEAR(EnclosedVolume(untangled->surface), volume, 1e-4 * volume);
   EXPECT_THAT(untangled->warnings[0], HasSubstr("were replaced"));
   // Far from the fold nothing has changed.
   int moved = 0;
