@@ -218,7 +218,7 @@ carillon_code carillon_close_stream(carillon_stream* stream, carillon_report* re
  * `hearing` is null, it has no places. */
 carillon_code carillon_create_trace(const char* file, double step_s, carillon_frame frame,
                                     const carillon_hearing* hearing, carillon_trace** trace);
-/** Adds an object; all of them come before the first step. `handle` may be null. */
+/** Adds an object, before the first step that names it. `handle` may be null. */
 carillon_code carillon_trace_object(carillon_trace* trace, const carillon_object* object,
                                     uint32_t* handle);
 carillon_code carillon_trace_step(carillon_trace* trace, const carillon_step* step);

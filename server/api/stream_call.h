@@ -118,9 +118,9 @@ enum class Supply {
 /// when the previous one has been sent.
 ///
 /// At most one thread at a time has the turn, which is the right to fill in a response, to let gRPC
-/// write it, or to end the call. StartWriting and Wake take the turn, it is kept while gRPC writes,
-/// and it is given back when there is nothing to send. A cancelled call ends with CANCELLED, either
-/// at once if no thread has the turn, or by the thread that has it.
+/// write it, or to end the call. A call begins with the turn, keeps it while gRPC writes, and gives
+/// it back when there is nothing to send; after that Wake takes it. A cancelled call ends with
+/// CANCELLED, either at once if no thread has the turn, or by the thread that has it.
 template <typename Reactor, typename Response>
 class StreamWriter : public Reactor {
  public:

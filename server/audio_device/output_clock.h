@@ -22,9 +22,9 @@ enum class LossKind {
 /// frames were lost, the lead stays larger by their number. So the lead is observed for a second
 /// after an xrun, and its increase is the number of lost frames.
 ///
-/// JACK computes its time stamps by a feedback loop that follows its cycles. If the server itself
-/// was late, all frames were delayed and none is missing, but the loop is disturbed: the lead
-/// increases at first and then decays.
+/// JACK computes its time stamps by a feedback loop that follows its cycles. If the JACK server
+/// itself was late, all frames were delayed and none was lost, but the feedback loop is disturbed:
+/// the lead first increases and then decays.
 class OutputClock {
  public:
   OutputClock(double sample_rate_hz, LossKind kind)

@@ -86,8 +86,9 @@ struct LaneArrays {
   /// Sets the state at the start of the block to zero.
   void Silence(LaneRange range) noexcept;
 
-  /// All runs, in order, and all lanes of each kind of tile.
+  /// All runs, in the order of their lanes.
   std::vector<LaneRun> runs;
+  /// The range of lanes of each kind of tile.
   std::array<LaneRange, kTileKinds> by_tile;
   /// Powers of q, interleaved for groups of kMostLanes lanes: see PowerIndex.
   LaneArray<float> powers;

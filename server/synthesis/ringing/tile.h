@@ -25,7 +25,7 @@ inline constexpr size_t kClosedTileNodes = kTileNodes + 1;
 /// The kinds of tiles, longest first.
 inline constexpr std::array<size_t, kTileKinds> kTileOrder = {2, 1, 0};
 
-/// Returns the longest kind of tile that renders a mode with an error below -110 dB of its
+/// Returns the longest kind of tile that renders a mode with an error below -110 dB relative to its
 /// amplitude at the tile's start. This amplitude may be 4 dB above that of an impulse late in the
 /// tile. `log_q` is (sigma + i omega)/rate. Within the tile the mode completes less than a cycle.
 size_t ChooseTile(std::complex<double> log_q);

@@ -24,8 +24,8 @@ class ContactTraceWriter {
   static absl::StatusOr<ContactTraceWriter> Create(const std::string& path,
                                                    v1::ContactTraceHeader header);
 
-  /// Appends an object. All objects must be written before the first step. Close() reports an error
-  /// of the file.
+  /// Appends an object. It must be written before the first step that names it. Close() reports an
+  /// error of the file.
   void Write(const v1::ContactTraceObject& object);
 
   /// Appends a simulation step. Steps must be written in the order of their times. Close() reports
