@@ -132,4 +132,4 @@ function collisionImpulse({ first, second, point, normal, restitution = 0 }) {
   return approach > 0 ? (1 + restitution) * approach * reducedMassKg(first, second) : 0;
 }
 
-module.exports = { ContactRows, collisionImpulse, cross, reducedMassKg, slipAt, times, withFriction };
+module.exports = { ContactRows, collisionImpulse, cross, minus, plus, reducedMassKg, slipAt, times, withFriction };

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 'use strict';
 
-const { ContactRows, collisionImpulse, times, withFriction } = require('./contact_rows');
+const { ContactRows, collisionImpulse, plus, times, withFriction } = require('./contact_rows');
+
+// A contact does not wait for the rest of its blow if the rest is at most this part of its impulse: it is inaudible.
+const UNFINISHED = 0.01;
 
 /**
  * Reads the collision events of a Havok world. Open the stream or trace with frame 'scene', and let each body that
@@ -17,6 +20,7 @@ class HavokContacts {
     this.contactRows = new ContactRows(settings);
     this.before = new Map(); // Bodies as they were after the step before.
     this.posesBefore = new Map();
+    this.unfinished = []; // Contacts that wait for the rest of their blow, which the next step has.
   }
 
   /** The sum of the events that the adapter reads. */
@@ -38,7 +42,7 @@ class HavokContacts {
   read(world, stepS) {
     const events = this.events(world);
     const found = events.flatMap((event) => this.readEvent(event, isSilent(event, events)));
-    const contacts = withFriction(found, this.before, this.gravity, stepS)
+    const contacts = this.wholeBlows(withFriction(found, this.before, this.gravity, stepS))
       .flatMap((contact) => this.contactRows.rows(contact));
     const poses = this.contactRows.poses((key) => this.posesBefore.get(key));
     for (const key of this.before.keys()) {
@@ -46,6 +50,24 @@ class HavokContacts {
       this.posesBefore.set(key, this.poseOf([key]));
     }
     return { contacts, poses };
+  }
+
+  /**
+   * Havok stops two bodies before they touch: the step in which a collision begins leaves them the speed that closes
+   * their gap, and the next step takes the rest. A contact that has begun while its bodies still approach therefore
+   * waits for the next step, in which the pair's nearest contact gets the impulse of both steps.
+   */
+  wholeBlows(contacts) {
+    const waiting = this.unfinished;
+    this.unfinished = contacts.filter(isUnfinished);
+    const told = contacts.filter((contact) => !isUnfinished(contact));
+    for (const part of waiting) {
+      const [nearest] = contacts.filter(({ pair }) => pair === part.pair)
+        .sort((a, b) => distance(a.point, part.point) - distance(b.point, part.point));
+      if (nearest) nearest.impulse = plus(nearest.impulse, part.impulse);
+      else told.push(part);
+    }
+    return told;
   }
 
   /** Collisions that have begun or go on: one that has finished repeats the impulse of its last step. */
@@ -64,11 +86,12 @@ class HavokContacts {
   }
 
   /** Each event has the normal out of both bodies, against which the impulse acts, without friction. */
-  readEvent({ one, other, impulse }, silent) {
+  readEvent({ began, pair, one, other, impulse }, silent) {
     const [first, second] = [this.bodyOf(one[0]), this.bodyOf(other[0])];
     const [point, normal] = [[...one[3]], times(one[4], -1)];
     const along = silent ? this.derived(one[0], other[0], point, normal) : impulse;
-    return along > 0 ? [{ first, second, point, normal, along, friction: this.friction }] : [];
+    if (!(along > 0)) return [];
+    return [{ first, second, point, normal, along, friction: this.friction, pair, began: began && !silent }];
   }
 
   /** The impulse of a collision that Havok reports with zero, from the velocities before the step. */
@@ -97,6 +120,13 @@ const typeOf = (type) => type.value ?? type;
 function isSilent(event, events) {
   const all = events.filter(({ pair }) => pair === event.pair);
   return all[0] === event && all.every(({ began, impulse }) => began && impulse === 0);
+}
+
+const distance = (a, b) => Math.hypot(...a.map((x, i) => x - b[i]));
+
+/** Whether the step has left the bodies of a contact that has begun a part of the speed at which they approached. */
+function isUnfinished({ began, first, second, point, normal, along }) {
+  return began && collisionImpulse({ first, second, point, normal }) > UNFINISHED * along;
 }
 
 module.exports = { HavokContacts };
