@@ -17,13 +17,18 @@ namespace carillon::precompute {
 /// and Smith, A posteriori error estimates based on hierarchical bases, SIAM J. Numer. Anal. 30,
 /// 1993):
 ///
-///     r_b = a(b, phi) - Lambda m(b, phi),   delta Lambda ~ C sum_b r_b^T a(b, b)^-1 r_b
+///     r_b = a(b, phi) - Lambda m(b, phi),   delta Lambda ~ C sum_b w_b r_b^T a(b, b)^-1 r_b
 ///
-/// This detects the locking of thin walls, which estimates by averaged stresses do not. C is fitted
-/// to a bar, a block, a plate and a tube so that the estimate is rarely too small for errors of a
-/// few percent or less. For walls of linear elements with errors of half or more the estimate is
-/// too small. The estimate refers to the body as meshed, including curved elements. It does not
-/// include the difference between the mesh and the shape of the original object.
+/// At a re-entrant edge of the body the stress is singular, and functions of a higher order take up
+/// a smaller part of the error than elsewhere. The weight w_b makes up for this: it is 1 away from
+/// such edges, and rises with the square root of ReentrantNodes() to 2 where the body encloses 270
+/// degrees or more.
+///
+/// The estimate detects the locking of thin walls, which estimates by averaged stresses do not. C
+/// is fitted to a bar, a block, a plate and a tube so that the estimate is rarely too small for
+/// errors of a few percent or less. For walls of linear elements with errors of half or more the
+/// estimate is too small. The estimate refers to the body as meshed, including curved elements. It
+/// does not include the difference between the mesh and the shape of the original object.
 ///
 /// `elastic` has the constants of the matrices from which the modes were computed, for unit
 /// density. A consistent mass is assumed. Shapes include all nodes; fixed edges and faces add

@@ -142,6 +142,32 @@ SurfaceMesh MakeSphereSurface(double radius_m, int halvings) {
   return sphere;
 }
 
+TetMesh Part(const TetMesh& mesh, const std::function<bool(const Point&)>& kept) {
+  TetMesh part{
+      .nodes = {}, .nodes_per_element = mesh.nodes_per_element, .elements = {}, .boundary = {}};
+  const auto node_count = static_cast<size_t>(mesh.nodes_per_element);
+  std::vector<int32_t> number(mesh.nodes.size(), -1);
+  for (size_t e = 0; e < mesh.element_count(); ++e) {
+    const int32_t* element = &mesh.elements[e * node_count];
+    Point middle{};
+    for (size_t i = 0; i < 4; ++i) {
+      for (size_t x = 0; x < 3; ++x)
+        middle[x] += mesh.nodes[static_cast<size_t>(element[i])][x] / 4;
+    }
+    if (!kept(middle)) continue;
+    for (size_t i = 0; i < node_count; ++i) {
+      int32_t& to = number[static_cast<size_t>(element[i])];
+      if (to < 0) {
+        to = static_cast<int32_t>(part.nodes.size());
+        part.nodes.push_back(mesh.nodes[static_cast<size_t>(element[i])]);
+      }
+      part.elements.push_back(to);
+    }
+  }
+  if (!FindBoundary(part).ok()) std::abort();
+  return part;
+}
+
 TetMesh MakeTetSphere(double radius_m, int corner_count, bool curved) {
   const int halvings = corner_count < 300 ? 2 : 3;
   absl::StatusOr<TetMesh> filled =

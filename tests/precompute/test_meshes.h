@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 
 #include "precompute/mesh/surface_mesh.h"
 #include "precompute/mesh/tet_mesh.h"
@@ -34,6 +35,10 @@ SurfaceMesh MakeBoxSurface(const Point& size_m);
 
 /// The same box cut into `cells` along each axis, six tetrahedra each, boundary included.
 TetMesh MakeTetBox(const Point& size_m, const std::array<int, 3>& cells, int nodes_per_element);
+
+/// The tetrahedra of `mesh` whose centroids are `kept`, with the boundary of what they fill. Nodes
+/// that no tetrahedron has are left out.
+TetMesh Part(const TetMesh& mesh, const std::function<bool(const Point&)>& kept);
 
 /// A sphere about the origin: an octahedron whose edges are halved `halvings` times.
 SurfaceMesh MakeSphereSurface(double radius_m, int halvings);

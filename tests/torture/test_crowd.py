@@ -29,7 +29,8 @@ SILENT, HALF_OPEN = torture.rounds(100, 2000), torture.rounds(30, 600)
 BAD_CROWDS, BAD_CLIENTS = torture.rounds(2, 10), 20
 RUN_S = torture.rounds(3, 30)
 DELAY_S = 0.05
-# The attackers, who share the cores, keep them busy while they begin.
+# An attacker's own work, which on its own machine would take nothing from anybody, gets the cores last.
+ATTACKERS_NICENESS = 19
 MOST_LATE = 0.05
 # gRPC keeps some threads of its own, whose number varies.
 MOST_THREADS = 40
@@ -124,6 +125,16 @@ class CrowdTest(torture.ServedTest):
         return made
 
     def misbehave(self):
+        thread = threading.get_native_id()
+        before = os.getpriority(os.PRIO_PROCESS, thread)
+        os.setpriority(os.PRIO_PROCESS, thread, ATTACKERS_NICENESS)  # its threads and processes inherit it
+        try:
+            self.attack()
+        finally:
+            with contextlib.suppress(PermissionError):
+                os.setpriority(os.PRIO_PROCESS, thread, before)
+
+    def attack(self):
         crowds = [self.start_crowd(BAD_CLIENTS, RUN_S, self.targets[:2]) for _ in range(BAD_CROWDS)]
         self.bad = [self.silent(socket.AF_UNIX, str(self.folder / "socket"), SILENT),
                     self.silent(socket.AF_INET, ("127.0.0.1", self.port), HALF_OPEN, HALF_HANDSHAKE)]

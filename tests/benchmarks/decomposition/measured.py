@@ -23,10 +23,11 @@ class Run:
         return self.report["error"]["reason"] if "error" in self.report else "model"
 
 
-def precompute(surface, arguments, options, environment, most_seconds):
-    """Decomposes the file with these arguments; a run that takes longer is ended, and its reason is TIMEOUT."""
+def precompute(surface, arguments, options, environment, most_seconds, out=None):
+    """Decomposes the file with these arguments; a run that takes longer is ended, and its reason is TIMEOUT. The
+    model's file is kept where `out` names one."""
     with tempfile.TemporaryDirectory() as folder:
-        command = [options.build / "bin/carillon-precompute", surface, "--out", os.path.join(folder, "model"),
+        command = [options.build / "bin/carillon-precompute", surface, "--out", out or os.path.join(folder, "model"),
                    "--json", *arguments]
         with tempfile.TemporaryFile("w+") as output:
             start = time.monotonic()

@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Stated errors of frequencies beside true ones, on twelve bodies, of which six have re-entrant corners."""
+
+import dataclasses
+import math
+import sys
+from typing import Callable
+
+import accuracy
+import bodies
+import measured
+import numpy
+import pairing
+import users
+
+FINER, MOST_NODES, MOST_SECONDS = 4, 300_000, 1200
+# Below a cent, which nobody hears, an error is not judged.
+SMALLEST_ERROR = 5.8e-4
+GOALS = {"defaults": (), "3 %": ("--accuracy", "3%")}
+
+
+def union(xs, ys, zs, full):
+    """The boundary of the grid cells for whose indices (i, j, k) `full` is true; the planes are in metres."""
+    planes, count = (xs, ys, zs), (len(xs) - 1, len(ys) - 1, len(zs) - 1)
+    number, vertices, triangles = {}, [], []
+
+    def vertex(index):
+        if index not in number:
+            number[index] = len(vertices)
+            vertices.append([planes[a][index[a]] for a in range(3)])
+        return number[index]
+
+    def inside(cell):
+        return all(0 <= cell[a] < count[a] for a in range(3)) and full(*cell)
+
+    for cell in numpy.ndindex(*count):
+        if not full(*cell):
+            continue
+        for axis in range(3):
+            u, v = (axis + 1) % 3, (axis + 2) % 3
+            for side in (0, 1):
+                other = list(cell)
+                other[axis] += 2 * side - 1
+                if inside(other):
+                    continue
+                corners = []
+                for du, dv in ((0, 0), (1, 0), (1, 1), (0, 1)):
+                    index = list(cell)
+                    index[axis] += side
+                    index[u] += du
+                    index[v] += dv
+                    corners.append(vertex(tuple(index)))
+                a, b, c, d = corners if side else corners[::-1]
+                triangles.extend([(a, b, c), (a, c, d)])
+    return numpy.array(vertices), triangles
+
+
+def millimetres(*values):
+    return [.001 * x for x in values]
+
+
+def l_profile():
+    return union(millimetres(0, 4, 30), millimetres(0, 4, 30), millimetres(0, 60, 120),
+                 lambda i, j, k: i == 0 or j == 0)
+
+
+def filleted_l_profile(length=.12, leg=.03, wall=.004, fillet=.002, steps=6):
+    """Seen along its length; the origin lies within the corner, from which all of the outline is seen."""
+    arc = [(wall + fillet * (1 - math.sin(a)), wall + fillet * (1 - math.cos(a)))
+           for a in (math.pi / 2 * k / steps for k in range(steps + 1))]
+    outline = [(0, 0), (leg, 0), (leg, wall), *arc, (wall, leg), (0, leg)]
+    return users.prism([(x - wall / 2, y - wall / 2) for x, y in outline], length)
+
+
+def fork():
+    return union(millimetres(0, 4, 10, 14), millimetres(0, 30, 36, 120), millimetres(0, 4),
+                 lambda i, j, k: i in (0, 2) and j == 2 or j == 1 or i == 1 and j == 0)
+
+
+def stepped_shaft():
+    profile = [(0, 0), (8, 0), (8, 40), (14, 40), (14, 60), (6, 60), (6, 110), (0, 110)]
+    return bodies.lathe([(.001 * r, .001 * z) for r, z in profile], 24)
+
+
+def frame():
+    """A plate with a square hole."""
+    return union(millimetres(0, 30, 60, 90), millimetres(0, 30, 60, 90), millimetres(0, 4),
+                 lambda i, j, k: (i, j) != (1, 1))
+
+
+@dataclasses.dataclass
+class Body:
+    name: str
+    surface: Callable
+    material: str = "structural_steel"
+
+
+BODIES = [
+    Body("bar", users.block(.2, .03, .02)),
+    Body("plate", users.block(.3, .2, .003)),
+    Body("bowl", lambda: bodies.bowl(.08, .003, 64, 24)),
+    Body("bell", bodies.bell, "bell_bronze"),
+    Body("chime", lambda: bodies.tube(.505, 24, 120), "chime_aluminum"),
+    Body("bunny", lambda: bodies.bunny(.15, .15 / 28), "bunny_ceramic"),
+    Body("L profile", l_profile),
+    Body("L profile, fillet", filleted_l_profile),
+    Body("fork", fork),
+    Body("stepped shaft", stepped_shaft),
+    Body("frame", frame),
+    Body("gear", lambda: users.gear(teeth=12, inner=.03, outer=.04, height=.008)),
+]
+
+
+class Solver:
+    """Decompositions of one body, whose models stay in `folder`."""
+
+    def __init__(self, body, surface, options, environment):
+        self.body, self.surface, self.options, self.environment = body, surface, options, environment
+
+    def run(self, name, *arguments):
+        out = self.surface.with_suffix(f".{name}.model")
+        run = measured.precompute(self.surface, ["--material", self.body.material, "--threads", "1", *arguments],
+                                  self.options, self.environment, MOST_SECONDS, out)
+        if run.verdict != "model":
+            sys.exit(f"{self.body.name}, {name}: {run.report['error']['message']}")
+        return run.report, pairing.read_arrays(out), run.cpu_seconds
+
+    def finer(self, nodes):
+        """A mesh of four times the nodes. Its band is stated, so that it has all modes whatever they cost."""
+        return self.run("finer", "--nodes", str(min(FINER * nodes, MOST_NODES) // users.NODES_PER_CORNER),
+                        "--band", "20:20000")
+
+
+def errors(ours, finer):
+    """Stated and true errors of the modes that both meshes have."""
+    mine, theirs = pairing.pairs(ours[1], finer[1])
+    stated = accuracy.column(ours[0], "estimated_error")[mine]
+    true = accuracy.column(ours[0], "frequency_hz")[mine] / accuracy.column(finer[0], "frequency_hz")[theirs] - 1
+    told = abs(true) > SMALLEST_ERROR
+    return stated[told], abs(true[told])
+
+
+def row(body, goal, ours, finer):
+    stated, true = errors(ours, finer)
+    ratios = stated / true
+    report, _, cpu_seconds = ours
+    print(f"| {body.name} | {goal} | {report['nodes']} | {finer[0]['nodes']} | {len(true)} of {len(report['modes'])} "
+          f"| {cpu_seconds:.1f} | {100 * stated.max():.2f} % | {100 * true.max():.2f} % "
+          f"| {ratios.min():.2f}, {numpy.median(ratios):.2f}, {ratios.max():.2f} | {numpy.sum(ratios >= 1)} |",
+          flush=True)
+    return ratios
+
+
+def estimates(options, folder, environment):
+    sys.path[:0] = [str(options.build / "client_sdk/python")]
+    print("| body | goal | nodes | nodes of the finer mesh | modes compared | CPU s | largest stated error "
+          "| largest true error | stated over true: least, median, most | modes within their bar |\n"
+          + "| --- " * 10 + "|", flush=True)
+    found = {goal: [] for goal in GOALS}
+    for number, body in enumerate(BODIES):
+        if options.only and body.name not in options.only:
+            continue
+        surface = folder / f"{number}.obj"
+        bodies.write_obj(surface, *body.surface())
+        solver = Solver(body, surface, options, environment)
+        runs = {goal: solver.run(str(n), *arguments) for n, (goal, arguments) in enumerate(GOALS.items())}
+        finer = solver.finer(max(report["nodes"] for report, _, _ in runs.values()))
+        for goal, ours in runs.items():
+            found[goal].append(row(body, goal, ours, finer))
+    for goal, ratios in found.items():
+        every = numpy.concatenate(ratios)
+        print(f"\n{goal}: {100 * numpy.mean(every >= 1):.1f} % of {len(every)} modes are within their bar, which is "
+              f"{numpy.median(every):.2f} times the true error in the median.")
