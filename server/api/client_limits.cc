@@ -5,6 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 #include "server/audio_device/block_broadcast.h"
 #include "server/scene/scene_registry.h"
 #include "server/synthesis/mixer.h"
@@ -43,16 +44,20 @@ size_t ClientLimits::ShareOf(size_t whole, double share) {
 
 absl::StatusOr<ClientPlace> ClientLimits::Take(Holding holding, const std::string& client) {
   const Bound bound = BoundOf(holding);
-  const size_t most = ShareOf(bound.whole, share_);
   const MutexLock lock(&mutex_);
-  size_t& count = held_[static_cast<size_t>(holding)][client];
-  if (share_ < 1 && count >= most) {
-    return Refusal(absl::StatusCode::kResourceExhausted, "CLIENT_LIMIT_REACHED",
-                   absl::StrCat("this client has ", count, " ", bound.name,
-                                " already, its share of ", bound.whole, ": end some first"));
-  }
-  ++count;
+  auto& held = held_[static_cast<size_t>(holding)];
+  const auto found = held.find(client);
+  RETURN_IF_ERROR(Check(bound.name, bound.whole, found == held.end() ? 1 : found->second + 1));
+  ++held[client];
   return ClientPlace(*this, holding, client);
+}
+
+absl::Status ClientLimits::Check(absl::string_view name, size_t whole, size_t wanted) const {
+  const size_t most = ShareOf(whole, share_);
+  if (share_ >= 1 || wanted <= most) return absl::OkStatus();
+  return Refusal(absl::StatusCode::kResourceExhausted, "CLIENT_LIMIT_REACHED",
+                 absl::StrCat("this client may have ", most, " ", name, ", its share of ", whole,
+                              ", and this would be ", wanted, ": end some first"));
 }
 
 size_t ClientLimits::count(Holding holding) const {

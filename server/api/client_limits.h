@@ -8,7 +8,9 @@
 #include <utility>
 
 #include "absl/base/thread_annotations.h"
+#include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
 #include "server/base/mutex.h"
 
 namespace carillon {
@@ -54,6 +56,10 @@ class ClientLimits {
   /// Takes a place for a client. The place must not outlive this. Errors: ResourceExhausted
   /// (CLIENT_LIMIT_REACHED).
   absl::StatusOr<ClientPlace> Take(Holding holding, const std::string& client);
+
+  /// Checks that one client may have `wanted` of `whole` things of a kind that `name` names, such
+  /// as objects, which the caller counts. Errors: ResourceExhausted (CLIENT_LIMIT_REACHED).
+  absl::Status Check(absl::string_view name, size_t whole, size_t wanted) const;
 
   /// Returns the number of places that are taken.
   size_t count(Holding holding) const;

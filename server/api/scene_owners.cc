@@ -32,6 +32,17 @@ std::optional<uint64_t> SceneOwners::LongestAbandoned(const std::optional<std::s
   });
 }
 
+std::vector<uint64_t> SceneOwners::ScenesOfItsClient(uint64_t scene) const {
+  const MutexLock lock(&mutex_);
+  std::vector<uint64_t> scenes;
+  const auto found = owners_.find(scene);
+  if (found == owners_.end()) return scenes;
+  for (const auto& [other, owner] : owners_) {
+    if (owner.client == found->second.client) scenes.push_back(other);
+  }
+  return scenes;
+}
+
 bool SceneOwners::Owns(const Principal& caller, uint64_t scene) const {
   if (caller.has(Role::kAdminister)) return true;
   const MutexLock lock(&mutex_);

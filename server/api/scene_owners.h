@@ -66,6 +66,9 @@ class SceneOwners {
                                  const Principal& caller, absl::string_view name,
                                  SceneCall call = SceneCall::kUses) const;
 
+  /// Returns all scenes of the client that made this scene, or nothing if it does not exist.
+  std::vector<uint64_t> ScenesOfItsClient(uint64_t scene) const;
+
   /// Returns whether the caller may use the scene.
   bool Owns(const Principal& caller, uint64_t scene) const;
 

@@ -262,8 +262,18 @@ bool SceneService::EndAbandoned(const std::optional<std::string>& client) {
   return true;
 }
 
+absl::Status SceneService::CheckObjectCount(uint64_t scene, size_t more) const {
+  const std::vector<uint64_t> of_client = owners_.ScenesOfItsClient(scene);
+  size_t count = more;
+  for (const SceneRegistry::SceneEntry& entry : scenes_.ListScenes()) {
+    if (std::ranges::binary_search(of_client, entry.scene)) count += entry.object_count;
+  }
+  return reception_.limits.Check("objects", SceneRegistry::kMaxObjectCount, count);
+}
+
 absl::Status SceneService::Add(uint64_t scene, const v1::AddObjectRequest& request,
                                v1::AddObjectResponse& response) {
+  RETURN_IF_ERROR(CheckObjectCount(scene, 1));
   ASSIGN_OR_RETURN(ObjectOfModel object, ToObject(request, database_.models()));
   ASSIGN_OR_RETURN(
       const PlacedObject placed,
@@ -274,6 +284,7 @@ absl::Status SceneService::Add(uint64_t scene, const v1::AddObjectRequest& reque
 
 absl::Status SceneService::AddAll(uint64_t scene, const v1::AddObjectsRequest& request,
                                   v1::AddObjectsResponse& response) {
+  RETURN_IF_ERROR(CheckObjectCount(scene, static_cast<size_t>(request.objects_size())));
   std::vector<NewObject> objects;
   for (const v1::AddObjectRequest& wanted : request.objects()) {
     const size_t index = objects.size();

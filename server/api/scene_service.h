@@ -77,6 +77,9 @@ class SceneService final : public v1::SceneService::CallbackService {
   /// Ends the scene that was abandoned for the longest time, among those of `client` or among all.
   /// Returns false if no scene is abandoned.
   bool EndAbandoned(const std::optional<std::string>& client);
+  /// Checks that the scene's client may have this number of further objects, in all its scenes
+  /// together. Errors: ResourceExhausted (CLIENT_LIMIT_REACHED).
+  absl::Status CheckObjectCount(uint64_t scene, size_t more) const;
   absl::Status Add(uint64_t scene, const v1::AddObjectRequest& request,
                    v1::AddObjectResponse& response);
   absl::Status AddAll(uint64_t scene, const v1::AddObjectsRequest& request,

@@ -16,6 +16,9 @@ class SpscQueue {
   /// Called by the producer. Returns false, without taking `value`, if the queue is full.
   bool TryPush(const T& value) noexcept { return queue_.push(value); }
 
+  /// Called by the producer. Returns the number of values for which there is room.
+  size_t room() const noexcept { return queue_.write_available(); }
+
   /// Called by the consumer. Returns false, and leaves `value` unchanged, if the queue is empty.
   bool TryPop(T& value) noexcept { return queue_.pop(value); }
 

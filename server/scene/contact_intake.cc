@@ -87,6 +87,7 @@ void ContactIntake::Hold(std::span<const ObjectForce> forces) {
 
 absl::Status ContactIntake::TryHold(const ObjectForce& force) {
   RETURN_IF_ERROR(Validate(force.roughness));
+  RETURN_IF_ERROR(CheckAhead(FrameOf(time_s_)));
   FeltContact felt;
   RETURN_IF_ERROR(Locate(force.contact, settings_.step_s, felt));
   forces_.Add(felt, force.roughness);
@@ -115,6 +116,7 @@ absl::Status ContactIntake::TryTouch(const ObjectTouch& touch) {
 void ContactIntake::Move(uint32_t handle, const Pose& pose) { Note(1, TryMove(handle, pose)); }
 
 absl::Status ContactIntake::TryMove(uint32_t handle, const Pose& pose) {
+  RETURN_IF_ERROR(CheckAhead(FrameOf(time_s_)));
   const MutexLock lock(&scene_.mutex());
   ASSIGN_OR_RETURN(const SoundingObject* object, scene_.Move(handle, pose));
   if (object->voice == nullptr) return absl::OkStatus();
@@ -128,6 +130,7 @@ absl::Status ContactIntake::TryMove(uint32_t handle, const Pose& pose) {
 void ContactIntake::MoveListener(const Pose& pose) { Note(1, TryMoveListener(pose)); }
 
 absl::Status ContactIntake::TryMoveListener(const Pose& pose) {
+  RETURN_IF_ERROR(CheckAhead(FrameOf(time_s_)));
   const MutexLock lock(&scene_.mutex());
   ASSIGN_OR_RETURN(const auto* objects, scene_.MoveListener(pose));
   const double glide_s = pose_times_.GlideS(std::nullopt, time_s_);
@@ -212,6 +215,7 @@ void ContactIntake::Push(const ContactForces::Events& events) {
     if (!object.ok()) continue;  // forces on an object that was removed meanwhile are dropped
     MixerEvent event{.bank = (*object)->bank, .action = force.action};
     const double frame = FrameOf(force.time_s);
+    if (!CheckAhead(frame).ok()) continue;  // the end of a force, in a step that was rejected
     if (event.impulse() != nullptr) {
       ++impulse_count_;
       FoundBlow blow;
@@ -255,12 +259,18 @@ absl::StatusOr<double> ContactIntake::FrameOfImpulse(double time_offset_s) const
                                 " s after its step; it must be zero or more"));
   }
   const double frame = FrameOf(time_s_ + time_offset_s);
+  RETURN_IF_ERROR(CheckAhead(frame));
+  return frame;
+}
+
+absl::Status ContactIntake::CheckAhead(double frame) const {
   const double ahead_s = (frame - static_cast<double>(target_.frame())) / settings_.sample_rate_hz;
-  if (ahead_s <= settings_.most_ahead_s + mapping().delay_s) return frame;
+  if (ahead_s <= settings_.most_ahead_s + mapping().delay_s) return absl::OkStatus();
   return Invalid(
       "TIME_TOO_FAR_AHEAD",
-      absl::StrCat("the impulse is due in ", ahead_s, " s, over ", settings_.most_ahead_s,
-                   " s ahead; send each impulse with the step in which it happens"));
+      absl::StrCat("the step or impulse is due in ", ahead_s, " s, over ", settings_.most_ahead_s,
+                   " s ahead; give times in seconds, and send each step when it "
+                   "happens"));
 }
 
 }  // namespace carillon

@@ -147,6 +147,8 @@ class ContactIntake {
   void AddBlow(const MixerEvent& event, FoundBlow blow, double frame)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(scene_.mutex());
   absl::StatusOr<double> FrameOfImpulse(double time_offset_s) const;
+  /// Errors: InvalidArgument (TIME_TOO_FAR_AHEAD).
+  absl::Status CheckAhead(double frame) const;
   double FrameOf(double time_s) const { return mapper_.FrameOf(time_s); }
 
   Scene& scene_;

@@ -6,6 +6,8 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "absl/time/clock.h"
+#include "absl/time/time.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 
@@ -233,6 +235,7 @@ absl::StatusOr<PlacedObject> SceneRegistry::UpdateObject(uint64_t scene, uint32_
   ASSIGN_OR_RETURN(const std::shared_ptr<Scene> found, FindScene(scene));
   RETURN_IF_ERROR(ValidateGlide(change.glide_s));
   if (change.pose) RETURN_IF_ERROR(Validate(*change.pose));
+  if (change.pose) RETURN_IF_ERROR(AwaitRoomForMoves(1));
   ASSIGN_OR_RETURN(const SoundingObject old, found->Copy(handle));
   if (change.material || change.size || change.gain || change.radiation) {
     ASSIGN_OR_RETURN(SoundingObject object, Remake(old, Changed(old.properties, change)));
@@ -240,7 +243,6 @@ absl::StatusOr<PlacedObject> SceneRegistry::UpdateObject(uint64_t scene, uint32_
     mixer_.LetRingOut(old.bank);
   }
   if (change.pose) {
-    RETURN_IF_ERROR(OpenMoves());
     const MutexLock lock(&found->mutex());
     ASSIGN_OR_RETURN(const SoundingObject* object, found->Move(handle, *change.pose));
     SendMove(*object, ObjectMove{MotionOf(*change.pose, change.glide_s)});
@@ -281,7 +283,7 @@ absl::Status SceneRegistry::UpdateListener(uint64_t scene, const Pose& pose, dou
   const MutexLock change_lock(&change_mutex_);
   ASSIGN_OR_RETURN(const std::shared_ptr<Scene> found, FindScene(scene));
   RETURN_IF_ERROR(ValidateGlide(glide_s));
-  RETURN_IF_ERROR(OpenMoves());
+  RETURN_IF_ERROR(AwaitRoomForMoves(EntryOf(scene, *found).object_count));
   const MutexLock lock(&found->mutex());
   ASSIGN_OR_RETURN(const auto* objects, found->MoveListener(pose));
   for (const auto& [handle, object] : *objects) {
@@ -290,9 +292,20 @@ absl::Status SceneRegistry::UpdateListener(uint64_t scene, const Pose& pose, dou
   return absl::OkStatus();
 }
 
-absl::Status SceneRegistry::OpenMoves() {
-  if (moves_ != nullptr) return absl::OkStatus();
-  ASSIGN_OR_RETURN(moves_, mixer_.OpenStream(kMaxObjectCount));
+absl::Status SceneRegistry::AwaitRoomForMoves(size_t count) {
+  if (moves_ == nullptr) {
+    ASSIGN_OR_RETURN(moves_, mixer_.OpenStream(kMaxObjectCount));
+  }
+  // The mixer takes thousands of events in each block.
+  constexpr absl::Duration kLongest = absl::Milliseconds(200), kPause = absl::Microseconds(500);
+  for (absl::Duration waited; moves_->room() < count; waited += kPause) {
+    if (waited >= kLongest) {
+      return Refusal(absl::StatusCode::kResourceExhausted, "TOO_MANY_MOVES",
+                     "the mixer has not taken the poses of earlier calls yet, so nothing was "
+                     "moved: call again, or send poses in a contact stream");
+    }
+    absl::SleepFor(kPause);
+  }
   return absl::OkStatus();
 }
 

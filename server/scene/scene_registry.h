@@ -155,7 +155,9 @@ class SceneRegistry {
   absl::StatusOr<SoundingObject> Remake(const SoundingObject& old,
                                         const ObjectProperties& properties)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(change_mutex_);
-  absl::Status OpenMoves() ABSL_EXCLUSIVE_LOCKS_REQUIRED(change_mutex_);
+  /// Waits until this number of moves can be sent. Errors: ResourceExhausted (TOO_MANY_MOVES,
+  /// TOO_MANY_STREAMS).
+  absl::Status AwaitRoomForMoves(size_t count) ABSL_EXCLUSIVE_LOCKS_REQUIRED(change_mutex_);
   void SendMove(const SoundingObject& object, const MixerEvent::Action& move)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(change_mutex_);
   Motion MotionOf(const Pose& pose, double glide_s) const;

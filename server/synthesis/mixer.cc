@@ -148,7 +148,7 @@ void Mixer::Take(MixerEvent& event, EventQueue& queue) noexcept {
 }
 
 /// Keeps an event until its block, and the start of its contact if the bank sounds from then on.
-/// False: there are too many.
+/// False: there are too many, or too many on its bus.
 bool Mixer::Await(MixerEvent& event, BankSlot& slot) noexcept {
   const SurfaceImpulse* impulse = event.impulse();
   const double lead = impulse != nullptr ? slot.bank->ContactLeadFrames(impulse->pulse) : 0;
@@ -156,7 +156,7 @@ bool Mixer::Await(MixerEvent& event, BankSlot& slot) noexcept {
   // A contact that would have begun already begins now.
   if (lead > 0 && event.Time() - lead < now) event.SetTime(now + lead);
   const auto push = [&](const MixerEvent& awaited) ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole) {
-    const bool pushed = pending_.TryPush(awaited, buses_[slot.bus]->stop_count);
+    const bool pushed = pending_.TryPush(awaited, buses_[slot.bus]->stop_count, slot.bus);
     if (pushed) ++slot.pending_count;
     return pushed;
   };
@@ -179,7 +179,10 @@ void Mixer::CollectDueEvents(size_t block_count) noexcept {
   }
   for (uint32_t block = 0; block < block_count; ++block) {
     const size_t first = due_.size();
-    pending_.Collect(block_start_ + block * settings_.block_frame_count, due_);
+    pending_.Collect(
+        block_start_ + block * settings_.block_frame_count, due_,
+        [this](const MixerEvent& event, uint32_t stop_count)
+            ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole) { return IsStale(event, stop_count); });
     const std::span<const uint32_t> due = std::span(due_).subspan(first);
     if (budget_.bounded()) DecideTreatment(due);
     ChooseEvents(block, due);
@@ -195,6 +198,15 @@ void Mixer::CollectDueEvents(size_t block_count) noexcept {
     std::span<const DueEvent>& section = sections_[due.section]->due;
     section = std::span(due_events_).last(section.size() + 1);
   }
+}
+
+/// Whether an event will have no effect, because its bank has gone, or because its bus was stopped
+/// after it came. Such events give their places to others before they are due.
+bool Mixer::IsStale(const MixerEvent& event, uint32_t stop_count) const noexcept {
+  const BankSlot& slot = slots_[event.bank.slot];
+  if (slot.bank == nullptr || slot.generation != event.bank.generation) return true;
+  const bool strikes = event.impulse() != nullptr || event.beginning() != nullptr;
+  return strikes && stop_count != buses_[slot.bus]->stop_count;
 }
 
 /// Decides which of a block's events are rendered, and notes their places in the order of

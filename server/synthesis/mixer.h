@@ -55,7 +55,8 @@ struct MixerSettings {
   size_t most_buses = kMostBuses;
   size_t stagger = 0;  ///< of the default bus; see Mixer::Stagger
   size_t most_streams = 2048;
-  size_t most_pending_events = 262144;   ///< events that wait for their block
+  /// Events that wait for their block. Buses share these places: see PendingEvents.
+  size_t most_pending_events = 262144;
   size_t most_events_per_block = 32768;  ///< taken from the streams; the rest wait there
   /// With a clock, the work of a block is bounded so that its deadline is kept: beyond the bound
   /// the quietest impulses are merged, then shed, then the quietest banks are silenced
@@ -76,7 +77,7 @@ struct MixerStatistics {
   uint64_t frame_count = 0;          ///< number of the next frame to be rendered
   uint64_t accepted_count = 0;       ///< impulses that came in time
   uint64_t late_count = 0;           ///< impulses that came too late and sounded at once
-  uint64_t dropped_count = 0;        ///< events lost: no such bank, too many, or not finite
+  uint64_t dropped_count = 0;        ///< events lost: bank gone, too many, or not finite
   uint64_t merged_count = 0;         ///< impulses merged with their neighbours
   uint64_t shed_count = 0;           ///< impulses not rendered: the quietest of too many
   uint64_t shed_bank_count = 0;      ///< banks silenced: the quietest of too many
@@ -240,6 +241,8 @@ class Mixer {
   void Take(MixerEvent& event, EventQueue& queue) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void CollectDueEvents(size_t block_count) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  bool IsStale(const MixerEvent& event, uint32_t stop_count) const noexcept
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void ChooseEvents(uint32_t block, std::span<const uint32_t> due) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   uint64_t ShedBanks() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);

@@ -41,7 +41,7 @@ Mixer::Mixer(const MixerSettings& settings)
       slots_of_sections_(slots_),
       leaving_(settings.most_banks),
       open_queues_(settings.most_streams),
-      pending_(settings.most_pending_events, settings.block_frame_count),
+      pending_(settings.most_pending_events, settings.block_frame_count, settings.most_buses),
       due_(settings.most_pending_events),
       due_order_(settings.most_pending_events),
       due_events_(settings.most_pending_events),

@@ -2,6 +2,7 @@
 // The mixer's decisions under overload: which impulses are merged or shed, and which banks are
 // silenced, so that each block is rendered in time. Like Mixer::Render, nothing here allocates,
 // locks, logs, throws or calls the system.
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -17,6 +18,9 @@ constexpr uint64_t kEarlyShedBlocks = 8;
 
 /// Part of the bound that ringing banks may take; impulses get the rest.
 constexpr double kRingingShare = 0.9;
+/// Part of the bound that impulses may take in any case, so that moves and forces, however many, do
+/// not silence them.
+constexpr double kStrikingShare = 0.2;
 
 }  // namespace
 
@@ -46,7 +50,8 @@ void Mixer::DecideTreatment(std::span<const uint32_t> due) noexcept {
   const double taken = work::kTakeEvent * static_cast<double>(std::exchange(taken_count_, 0));
   const double judged = work::kChooseEvent * static_cast<double>(due.size());
   const double spent = ringing_work_ + taken + judged;
-  rendered_work_ += spent + triage_.Decide(budget_.most_work() - spent);
+  const double most_work = budget_.most_work();
+  rendered_work_ += spent + triage_.Decide(std::max(most_work - spent, kStrikingShare * most_work));
   early_shed_below_ = triage_.shed_below() * kEarlyShedRatio;
 }
 

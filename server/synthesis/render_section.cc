@@ -165,7 +165,11 @@ void RenderSection::Wake(Voice& voice) noexcept {
 
 void RenderSection::RenderVoices(std::span<float> placed, SectionCounts& counts) noexcept {
   voices_.EraseIf([placed, &counts](Voice* voice) {
-    counts.ringing_work += work::kVoice + (voice->binaural() ? work::kEars : 0);
+    if (voice->sounding()) {
+      counts.ringing_work += work::kVoice + (voice->binaural() ? work::kEars : 0);
+    } else {
+      counts.ringing_work += work::kMovingVoice;
+    }
     voice->Render(placed);
     return voice->asleep();
   });

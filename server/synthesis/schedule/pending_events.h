@@ -15,17 +15,44 @@ namespace carillon {
 /// Events that wait for their block: a hash table from block number to the list of the block's
 /// events. The time to add an event is constant, and the time to collect a block depends only on
 /// the events in its list. The constructor allocates all memory.
+///
+/// Several owners share the table. With more than one, an owner may have at most
+/// kFreeMultiple times as many events in it as there are free places (Choudhury and Hahne,
+/// Dynamic queue length thresholds, IEEE/ACM Trans. Networking 6, 1998). So one owner alone can
+/// use four fifths of the table, and whatever n owners do, a 4n + 1st part remains for the next.
 class PendingEvents {
  public:
-  PendingEvents(size_t capacity, size_t block_frame_count);
+  static constexpr size_t kFreeMultiple = 4;
 
-  /// Returns false if the table is full. The event's first sample must not lie before the end of
-  /// the block that was collected last. tag() returns `tag`, any number of the caller's.
-  bool TryPush(const MixerEvent& event, uint32_t tag = 0) noexcept;
+  PendingEvents(size_t capacity, size_t block_frame_count, size_t owner_count = 1);
+
+  /// Returns false if the table is full, or full for this owner. The event's first sample must not
+  /// lie before the end of the block that was collected last. tag() returns `tag`, any number of
+  /// the caller's.
+  bool TryPush(const MixerEvent& event, uint32_t tag = 0, uint32_t owner = 0) noexcept;
 
   /// Appends the indices of the events of the block that begins at `block_start`, in order of
   /// arrival. Blocks are collected in ascending order. Collected events stay readable until Free.
-  void Collect(uint64_t block_start, FixedVector<uint32_t>& indices) noexcept;
+  /// Later events of the block's list are collected, too, if `is_stale(event, tag)` says that they
+  /// will have no effect. Each list is looked at once in kListCount blocks.
+  template <typename IsStale>
+  void Collect(uint64_t block_start, FixedVector<uint32_t>& indices,
+               const IsStale& is_stale) noexcept {
+    List& list = ListOf(block_start);
+    const uint64_t block_end = block_start + block_frame_count_;
+    List later;
+    for (uint32_t index = list.first; index != kNone;) {
+      const Entry& entry = entries_[index];
+      const uint32_t next = entry.next;
+      if (entry.event.FirstSample() < block_end || is_stale(entry.event, entry.tag)) {
+        indices.push_back(index);
+      } else {
+        Append(later, index);
+      }
+      index = next;
+    }
+    list = later;
+  }
 
   /// Frees the memory of collected events for further events.
   void Free(std::span<const uint32_t> indices) noexcept;
@@ -39,6 +66,7 @@ class PendingEvents {
     MixerEvent event;
     uint32_t next = kNone;
     uint32_t tag = 0;
+    uint32_t owner = 0;
   };
   /// A linked list of entries, in order of arrival.
   struct List {
@@ -46,13 +74,23 @@ class PendingEvents {
     uint32_t last = kNone;
   };
 
+  /// Blocks whose numbers differ by a multiple of this share a list. They are 11 s apart at 128
+  /// frames and 48 kHz.
+  static constexpr size_t kListCount = 4096;
+
+  List& ListOf(uint64_t first_sample) noexcept {
+    return lists_[first_sample / block_frame_count_ % kListCount];
+  }
+  bool HasPlaceFor(uint32_t owner) const noexcept;
   uint32_t TakeEntry() noexcept;
   void Append(List& list, uint32_t index) noexcept;
 
   size_t capacity_;
   size_t block_frame_count_;
   std::unique_ptr<Entry[]> entries_;
-  uint32_t used_count_ = 0;  // entries that were ever used
+  std::vector<uint32_t> owned_counts_;  // events of each owner
+  size_t waiting_count_ = 0;            // events of all owners
+  uint32_t used_count_ = 0;             // entries that were ever used
   uint32_t first_free_ = kNone;
   std::vector<List> lists_;  // by block number modulo their count
 };

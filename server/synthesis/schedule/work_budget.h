@@ -16,6 +16,7 @@ inline constexpr double kStrikeLane = 2;      ///< an exact impulse, for each la
 inline constexpr double kMergedLane = 0.8;    ///< a merged impulse, for each lane of its bank
 inline constexpr double kDirectedTerm = 1;    ///< a term of the gains of directed modes
 inline constexpr double kVoice = 3000;        ///< a voice, for 128 frames
+inline constexpr double kMovingVoice = 300;   ///< a silent voice that moves, for 128 frames
 inline constexpr double kEars = 12000;        ///< the two ears of a voice, for 128 frames
 inline constexpr double kTakeEvent = 30;      ///< taking an event from its stream
 inline constexpr double kChooseEvent =

@@ -145,8 +145,7 @@ void Voice::NoteEars(bool jumps) noexcept {
   ears_[1 - ears_now_].Hold();
 }
 
-void Voice::Render(std::span<float> frames) noexcept {
-  NoteHeard();
+void Voice::RenderSound(std::span<float> frames) noexcept {
   if (line_) line_->Write(input_);
   if (fade_ < 1) {
     RenderFrom(heard_before_, 1 - fade_, -fade_step_, frames);
@@ -154,6 +153,15 @@ void Voice::Render(std::span<float> frames) noexcept {
     fade_ += fade_step_ * static_cast<float>(input_.size());
   } else {
     RenderFrom(heard_, 1, 0, frames);
+  }
+}
+
+void Voice::Render(std::span<float> frames) noexcept {
+  NoteHeard();
+  if (sounding()) {
+    RenderSound(frames);
+  } else {
+    fade_ = 1;  // a jump in silence needs no cross-fade
   }
   quiet_frame_count_ = fed_ ? 0 : quiet_frame_count_ + input_.size();
   rest_block_count_ = object_.at_rest() && listener_.at_rest() ? rest_block_count_ + 1 : 0;

@@ -92,8 +92,12 @@ class Voice {
     return input_;
   }
 
-  /// Adds the block to `frames`, interleaved, and begins the next block.
+  /// Adds the block to `frames`, interleaved, and begins the next block. A silent voice only
+  /// follows the places of object and listener.
   void Render(std::span<float> frames) noexcept;
+
+  /// Whether the next call of Render has sound to render.
+  bool sounding() const noexcept { return fed_ || !silent(); }
 
   /// Whether the voice renders for two ears.
   bool binaural() const noexcept { return !ears_.empty(); }
@@ -129,6 +133,7 @@ class Voice {
   Heard Hear(double delay_frames) const noexcept;
   void HearBinaurally(const Vector3& away_m, const Place& listener, Heard& heard) const noexcept;
   void NoteHeard() noexcept;
+  void RenderSound(std::span<float> frames) noexcept;
   void NoteEars(bool jumps) noexcept;
   void RenderFrom(const Hearings& heard, float fade, float fade_step,
                   std::span<float> frames) noexcept;
