@@ -33,7 +33,7 @@ std::string Decibels(double amplitude) {
 }
 
 std::string Loudness(bool present, double lufs) {
-  return present ? absl::StrFormat("%.1f LUFS", lufs) : "silence";
+  return present ? absl::StrFormat("%.1f LUFS", lufs) : "below -70 LUFS";
 }
 
 }  // namespace carillon::cli

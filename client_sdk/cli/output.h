@@ -21,7 +21,8 @@ void PrintJson(const google::protobuf::Message& message);
 /// Returns a linear amplitude (full scale is 1) as text, such as "-6.0 dBFS" or "silence".
 std::string Decibels(double amplitude);
 
-/// Returns a loudness as text, such as "-23.0 LUFS", or "silence" if there is none.
+/// Returns a loudness as text, such as "-23.0 LUFS", or "below -70 LUFS" if none is
+/// given: the standard does not measure what is softer.
 std::string Loudness(bool present, double lufs);
 
 }  // namespace carillon::cli

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cstdio>
 
 #include "absl/strings/str_cat.h"
@@ -46,6 +47,21 @@ void PrintSummary(const RenderOptions& options, const v1::RenderSummary& summary
   }
 }
 
+/// Says how the file differs from the rendering that the summary describes.
+void PrintFile(const RenderOptions& options, const RenderedFile& file) {
+  std::FILE* const out = options.out == "-" ? stderr : stdout;
+  if (file.factor() != 1) {
+    absl::FPrintF(out, "the file has the sound times %.4g, with a peak of %s\n", file.factor(),
+                  Decibels(std::min(file.peak(), file.clipped_count() > 0 ? 1.0F : file.peak())));
+  }
+  if (file.clipped_count() > 0) {
+    absl::FPrintF(out,
+                  "%d samples were clipped; a --gain up to %.3g, --normalize or --bits 32 would "
+                  "avoid it\n",
+                  file.clipped_count(), options.gain / file.peak());
+  }
+}
+
 }  // namespace
 
 v1::RenderSettings SettingsOf(const RenderOptions& options) {
@@ -83,6 +99,7 @@ absl::Status Render(const client::Client& daemon, const RenderOptions& options, 
     PrintJson(*summary);
   } else {
     PrintSummary(options, *summary, options.sample_rate_hz);
+    PrintFile(options, file);
   }
   return absl::OkStatus();
 }

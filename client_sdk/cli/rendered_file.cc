@@ -40,7 +40,11 @@ void RenderedFile::Write() {
     const uint64_t wanted = *form_.frame_count * form_.format.channel_count - written_count_;
     samples_.resize(static_cast<size_t>(std::min<uint64_t>(samples_.size(), wanted)));
   }
-  for (float& sample : samples_) sample *= static_cast<float>(factor_);
+  for (float& sample : samples_) {
+    sample *= static_cast<float>(factor_);
+    peak_ = std::max(peak_, std::abs(sample));
+    if (form_.format.bits < 32 && std::abs(sample) > 1) ++clipped_count_;
+  }
   status_ = file_->Write(samples_);
   written_count_ += samples_.size();
   samples_.clear();

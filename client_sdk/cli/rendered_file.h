@@ -38,6 +38,10 @@ class RenderedFile {
   const absl::Status& status() const { return status_; }
   /// The factor by which the samples were multiplied, once the file is complete.
   double factor() const { return factor_; }
+  /// The largest magnitude of the samples in the file, before they are clipped.
+  float peak() const { return peak_; }
+  /// Number of samples that were clipped to full scale. A file of 32 bits clips none.
+  uint64_t clipped_count() const { return clipped_count_; }
 
  private:
   void Begin();
@@ -48,6 +52,8 @@ class RenderedFile {
   double factor_;
   std::optional<WaveFile> file_;
   uint64_t written_count_ = 0;  // samples
+  float peak_ = 0;
+  uint64_t clipped_count_ = 0;
   std::vector<float> samples_;
   absl::Status status_;
 };

@@ -58,6 +58,8 @@ absl::StatusOr<WaveFile> WaveFile::Create(const std::string& path, const WaveFor
   if (sound->file.error() != SF_ERR_NO_ERROR) return NotWritable(path, sound->file.strError());
   // It has the time of day, and would make each file of the same samples another.
   sound->file.command(SFC_SET_ADD_PEAK_CHUNK, nullptr, SF_FALSE);
+  // Without it a sample beyond full scale would become one of the other sign.
+  sound->file.command(SFC_SET_CLIPPING, nullptr, SF_TRUE);
   return WaveFile(std::move(sound));
 }
 

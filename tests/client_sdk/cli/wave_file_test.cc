@@ -13,25 +13,39 @@
 namespace carillon::cli {
 namespace {
 
-TEST(WaveFile, HoldsEverySampleWithin24Bits) {
-  const std::string path = testing::TempDir() + "HoldsEverySampleWithin24Bits.wav";
-  const std::vector<float> samples = {0.0F, 0.5F, -0.5F, 0.25F, -1.0F, 1e-5F};
+/// Writes samples to a file of 24 bits, and reads them back.
+std::vector<int> ThroughAFile(const std::vector<float>& samples) {
+  const std::string path = testing::TempDir() + "ThroughAFile.wav";
   {
     auto file = WaveFile::Create(path, {.sample_rate_hz = 48000, .channel_count = 2});
-    ASSERT_TRUE(file.ok()) << file.status();
-    ASSERT_TRUE(file->Write(samples).ok());
+    EXPECT_TRUE(file.ok()) << file.status();
+    EXPECT_TRUE(file->Write(samples).ok());
   }
   std::ifstream file(path, std::ios::binary);
   const std::vector<unsigned char> bytes{std::istreambuf_iterator<char>(file), {}};
-  const size_t data_bytes = samples.size() * 3;
-  ASSERT_GT(bytes.size(), data_bytes);
-  for (size_t i = 0; i < samples.size(); ++i) {
-    const unsigned char* sample = &bytes[bytes.size() - data_bytes + 3 * i];
-    const int value = (sample[0] << 8 | sample[1] << 16 | sample[2] << 24) >> 8;
-    // One step of 24 bits.
-    EXPECT_NEAR(value, std::ldexp(samples[i], 23), 1) << i;
-  }
   std::filesystem::remove(path);
+  const size_t data_bytes = samples.size() * 3;
+  EXPECT_GT(bytes.size(), data_bytes);
+  std::vector<int> values;
+  for (size_t at = bytes.size() - data_bytes; at < bytes.size(); at += 3) {
+    values.push_back((bytes[at] << 8 | bytes[at + 1] << 16 | bytes[at + 2] << 24) >> 8);
+  }
+  return values;
+}
+
+TEST(WaveFile, HoldsEverySampleWithin24Bits) {
+  const std::vector<float> samples = {0.0F, 0.5F, -0.5F, 0.25F, -1.0F, 1e-5F};
+  const std::vector<int> values = ThroughAFile(samples);
+  for (size_t i = 0; i < samples.size(); ++i) {
+    // One step of 24 bits.
+    EXPECT_NEAR(values[i], std::ldexp(samples[i], 23), 1) << i;
+  }
+}
+
+TEST(WaveFile, ClipsSamplesBeyondFullScale) {
+  const std::vector<int> values = ThroughAFile({1.3F, -1.3F});
+  EXPECT_NEAR(values[0], 1 << 23, 2);
+  EXPECT_NEAR(values[1], -(1 << 23), 2);
 }
 
 TEST(WaveFile, SaysWhyItCannotBeWritten) {
