@@ -11,6 +11,7 @@
 #include "proto/cpp/status_macros.h"
 #include "server/api/contact_conversion.h"
 #include "server/api/resource_name.h"
+#include "server/api/status_conversion.h"
 #include "server/api/stream_call.h"
 #include "server/base/mutex.h"
 
@@ -147,7 +148,7 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
     answer.set_remap_count(counts.remap_count);
     answer.set_rejected_count(counts.rejected_count);
     if (!stream_->last_rejection().ok()) {
-      *answer.mutable_last_rejection() = ToErrorInfo(stream_->last_rejection());
+      *answer.mutable_last_rejection() = ToLegibleErrorInfo(stream_->last_rejection());
     }
     *answer.mutable_findings() = ToProto(stream_->findings());
     return answer;
