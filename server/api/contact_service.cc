@@ -185,8 +185,9 @@ class RecordCall final : public ServerStream<v1::RecordContactsResponse> {
     if (!std::exchange(begun_, true)) return Supply::kMessage;
     if (recorder_->overflowed()) {
       return Refusal(absl::StatusCode::kDataLoss, "RECORDING_TOO_SLOW",
-                     "steps of the stream came faster than the client read them: record again, and "
-                     "write to a faster disk or over a faster network");
+                     "steps of the stream came faster than the client read them, and over 65,536 "
+                     "records or 16 MiB waited: record again, and write to a faster disk or over a "
+                     "faster network");
     }
     const bool ended = recorder_->ended();
     if (recorder_->TryTake(*response.mutable_record())) return Supply::kMessage;
