@@ -5,10 +5,12 @@
 #include <grpcpp/grpcpp.h>
 #include <grpcpp/health_check_service_interface.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <deque>
 #include <optional>
+#include <thread>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -23,6 +25,7 @@
 #include "server/api/connection_gate.h"
 #include "server/api/contact_service.h"
 #include "server/api/decomposition_service.h"
+#include "server/api/fair_pool.h"
 #include "server/api/flood_guard.h"
 #include "server/api/grpc_log.h"
 #include "server/api/idle_calls.h"
@@ -66,6 +69,10 @@ std::chrono::nanoseconds Duration(double seconds) {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(
       std::chrono::duration<double>(seconds));
 }
+
+/// Returns the number of threads that take large steps of contact streams. One client may occupy
+/// half of them.
+int StepThreadCount() { return std::max(2, static_cast<int>(std::thread::hardware_concurrency())); }
 
 absl::Status Unready(absl::string_view reason, absl::string_view message) {
   return Refusal(absl::StatusCode::kFailedPrecondition, reason, message);
@@ -150,7 +157,8 @@ struct ApiServer::State {
                   .output = rooms.output,
                   .clock = rooms.clock,
                   .owners = owners,
-                  .reception = reception}),
+                  .reception = reception,
+                  .large_steps = large_steps}),
         audio(settings.version, rooms.output, rooms.scenes, rooms.database, heads, rooms.clock,
               idle_calls, {access, limits, render_pool}),
         certificate_end(rooms.clock),
@@ -188,6 +196,7 @@ struct ApiServer::State {
   SceneLeases leases;
   SceneOwners owners;
   IdleCalls idle_calls;
+  FairPool large_steps{StepThreadCount()};
   ThreadPool call_pool{kCallThreadCount};
   ThreadPool render_pool{kRenderThreadCount, kRenderNiceness};
   const Reception reception{access, limits, call_pool};

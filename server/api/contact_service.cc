@@ -2,6 +2,7 @@
 #include "server/api/contact_service.h"
 
 #include <chrono>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -24,19 +25,26 @@ constexpr std::chrono::milliseconds kAnswerPeriod(500);
 /// ends after kMostSettlePeriods, in case the mixer does not render at all.
 constexpr std::chrono::milliseconds kSettlePeriod(2);
 constexpr int kMostSettlePeriods = 250;
+/// Greatest number of rows of a step that gRPC's thread takes at once. gRPC has few threads, and
+/// all calls wait while these are busy. A row takes up to 6 us.
+constexpr size_t kMostRowsAtOnce = 256;
+/// Number of rows that it takes at once even from a client that has used up its time on gRPC's
+/// threads. They take no longer than gRPC's own work for the message.
+constexpr size_t kFewRows = 16;
 
 /// One contact stream. Requests are read one at a time, so only one thread at a time uses
 /// `stream_`. An answer is a snapshot, and a newer answer replaces an answer that waits to be sent.
 class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::StreamContactsResponse> {
  public:
-  ContactCall(const ContactContext& daemon, TraceRecorders& recorders,
+  ContactCall(const ContactContext& daemon, ContactClients& clients,
               const grpc::CallbackServerContext& context, Principal caller, ClientPlace place)
       : StreamWriter(nullptr),
         daemon_(daemon),
-        recorders_(recorders),
+        recorders_(clients.recorders),
         context_(context),
         caller_(std::move(caller)),
-        place_(std::move(place)) {
+        place_(std::move(place)),
+        budget_(clients.budgets.Of(caller_.client)) {
     StartWriting();
     StartReading();
   }
@@ -53,6 +61,19 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
         return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_STREAM",
                        "a request is neither start nor step");
     }
+  }
+
+  void RunTaking(const v1::StreamContactsRequest& request, std::function<void()> step) override {
+    const size_t row_count = CountRows(request.step());
+    if (row_count <= kFewRows) return step();
+    Clock& clock = daemon_.clock;
+    const std::chrono::nanoseconds begin = clock.Monotonic();
+    if (row_count > kMostRowsAtOnce || !budget_->Allows(begin)) {
+      return daemon_.large_steps.Run(caller_.client, std::move(step));
+    }
+    const std::shared_ptr<StepBudget> budget = budget_;  // the call may be deleted during the step
+    step();
+    budget->Spend(clock.Monotonic() - begin);
   }
 
   void AllRead() override {
@@ -160,6 +181,7 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
   const grpc::CallbackServerContext& context_;
   const Principal caller_;
   const ClientPlace place_;
+  const std::shared_ptr<StepBudget> budget_;
   std::unique_ptr<ContactStream> stream_;
   std::chrono::nanoseconds answer_due_{0};
   Mutex mutex_;
@@ -211,7 +233,7 @@ grpc::ServerWriteReactor<v1::RecordContactsResponse>* ContactService::RecordCont
       const absl::Status found = daemon_.scenes.BusOf(*scene).status();
       if (!found.ok()) scene = found;
     }
-    return new RecordCall(recorders_, scene, std::move(place));
+    return new RecordCall(clients_.recorders, scene, std::move(place));
   };
   return Open(*context, daemon_.reception, Role::kStrike, Holding::kListener, make);
 }
@@ -221,7 +243,7 @@ ContactService::StreamContacts(grpc::CallbackServerContext* context) {
   using Reactor = grpc::ServerBidiReactor<v1::StreamContactsRequest, v1::StreamContactsResponse>;
   return Open(*context, daemon_.reception, Role::kStrike, Holding::kContactStream,
               [&](const Principal& caller, ClientPlace place) -> Reactor* {
-                return new ContactCall(daemon_, recorders_, *context, caller, std::move(place));
+                return new ContactCall(daemon_, clients_, *context, caller, std::move(place));
               });
 }
 

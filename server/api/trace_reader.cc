@@ -117,10 +117,7 @@ absl::Status TraceReader::TakeStep(const v1::ContactStep& step) {
                      OfflineRenderer::kMaxTimeS, " s"));
   }
   time_s_ = step.time_s();
-  impulse_count_ += static_cast<uint64_t>(step.impulses_size() + step.columns().object_size() +
-                                          step.sustained_size() + step.contacts_size() +
-                                          step.contact_columns().impulses().object_size() +
-                                          step.poses_size() + step.pose_columns().object_size());
+  impulse_count_ += CountRows(step);
   // A pose of the listener gives an event for each object.
   if (step.has_listener()) impulse_count_ += object_count_;
   if (impulse_count_ > kMaxImpulseCount) {
