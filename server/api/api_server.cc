@@ -44,6 +44,9 @@ namespace carillon {
 namespace {
 
 constexpr int kCallThreadCount = 4;
+/// Calls that change the database wait for its write lock, which storing a large mesh holds for
+/// seconds. They have threads of their own, so that the other calls do not wait with them.
+constexpr int kWriteThreadCount = 2;
 /// Offline rendering has a lower priority than live sound.
 constexpr int kRenderThreadCount = 2;
 constexpr int kRenderNiceness = 10;
@@ -147,9 +150,14 @@ struct ApiServer::State {
         leases(rooms.clock, Duration(settings.scene_grace_s),
                [this](const std::string& connection) { return IsOpen(connection); }),
         owners(access, leases, rooms.scenes),
-        admin(rooms.database, reception),
-        models(rooms.database, rooms.decompositions, reception),
-        decompositions(rooms.decompositions, reception),
+        admin(rooms.database, reception, writing),
+        models({.database = rooms.database,
+                .queue = rooms.decompositions,
+                .reception = reception,
+                .writing = writing,
+                .idle_calls = idle_calls,
+                .clock = rooms.clock}),
+        decompositions(rooms.decompositions, reception, writing),
         job_runs(rooms.runs, access, call_pool),
         heads(settings.head_file),
         scenes(rooms.scenes, owners, rooms.database, heads, reception),
@@ -198,8 +206,10 @@ struct ApiServer::State {
   IdleCalls idle_calls;
   FairPool large_steps{StepThreadCount()};
   ThreadPool call_pool{kCallThreadCount};
+  ThreadPool write_pool{kWriteThreadCount};
   ThreadPool render_pool{kRenderThreadCount, kRenderNiceness};
   const Reception reception{access, limits, call_pool};
+  const Reception writing{access, limits, write_pool};
   AdminService admin;
   ModalModelService models;
   DecompositionService decompositions;

@@ -25,6 +25,8 @@ Bound BoundOf(Holding holding) {
       return {"contact streams", MixerSettings().most_streams};
     case Holding::kListener:
       return {"listeners", BlockBroadcast::kMaxListenerCount};
+    case Holding::kUpload:
+      return {"uploads", kMaxUploadCount};
     case Holding::kRendering:
       break;
   }
@@ -45,6 +47,11 @@ absl::StatusOr<ClientPlace> ClientLimits::Take(Holding holding, const std::strin
   const Bound bound = BoundOf(holding);
   const size_t most = ShareOf(bound.whole, share_);
   const MutexLock lock(&mutex_);
+  if (holding == Holding::kUpload && CountAll(holding) >= bound.whole) {
+    return Refusal(
+        absl::StatusCode::kResourceExhausted, "TOO_MANY_UPLOADS",
+        absl::StrCat(bound.whole, " uploads and imports run: try again when one is done"));
+  }
   size_t& count = held_[static_cast<size_t>(holding)][client];
   if (share_ < 1 && count >= most) {
     return Refusal(absl::StatusCode::kResourceExhausted, "CLIENT_LIMIT_REACHED",
@@ -57,6 +64,10 @@ absl::StatusOr<ClientPlace> ClientLimits::Take(Holding holding, const std::strin
 
 size_t ClientLimits::count(Holding holding) const {
   const MutexLock lock(&mutex_);
+  return CountAll(holding);
+}
+
+size_t ClientLimits::CountAll(Holding holding) const {
   size_t sum = 0;
   for (const auto& [client, count] : held_[static_cast<size_t>(holding)]) sum += count;
   return sum;
