@@ -105,8 +105,9 @@ void VisitSettings(SomeOptions& options, const Visit& visit) {
 /// Stores one value of the configuration file in `target`.
 template <typename T>
 absl::Status ReadValue(absl::string_view key, const toml::node& node, T& target) {
-  if (const auto value = node.value<T>()) {
-    target = *value;
+  // toml++ would read the integer 1 as true.
+  if (const auto v = node.value<T>(); v && (node.is_boolean() || !std::is_same_v<T, bool>)) {
+    target = *v;
     return absl::OkStatus();
   }
   return InvalidConfiguration(absl::StrCat(key, " has a value of the wrong type or size"));
@@ -257,22 +258,21 @@ void AddFlags(CLI::App& app, Options& options) {
   app.add_flag("--transfers,!--no-transfers", options.transfers,
                "compute how the modes of each new model radiate, in a job that follows the model's")
       ->capture_default_str();
-  app.add_option(
-         "--scene-grace", options.scene_grace_s,
-         "seconds for which a scene whose connections were all closed waits for its clients")
+  app.add_option("--scene-grace", options.scene_grace_s,
+                 "seconds for which a scene without connections waits for its clients")
       ->capture_default_str();
-  app.add_option("--client-share", options.client_share,
-                 "share of all scenes, streams, listeners, renderings and waiting jobs that one "
-                 "client may have, 0.001 to 1")
+  app.add_option(
+         "--client-share", options.client_share,
+         "share of all scenes, streams, listeners, renderings, uploads and waiting jobs that "
+         "one client may have, 0.001 to 1")
       ->capture_default_str();
   app.add_option("--metrics", options.metrics_address,
                  "HOST:PORT at which Prometheus reads metrics, by HTTP without TLS [nowhere]");
   app.add_option("--queue-limit", options.queue_limit, "decompositions that may wait at a time")
       ->capture_default_str();
-  app.add_option(
-         "--model-budget-mib", options.model_budget_mib,
-         "space for stored models: beyond it the least recently sounded models are deleted, but "
-         "never the newest, a sounding or a pinned one; 0: no limit")
+  app.add_option("--model-budget-mib", options.model_budget_mib,
+                 "space for stored models: beyond it the least recently sounded models are "
+                 "deleted, but never the newest, a sounding or a pinned one; 0: no limit")
       ->capture_default_str();
   app.add_option("--executor", options.executor,
                  "where decompositions run: local, or slurm (the cluster that sbatch submits to)")

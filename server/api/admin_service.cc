@@ -86,7 +86,7 @@ grpc::ServerWriteReactor<v1::BackUpDatabaseResponse>* AdminService::BackUpDataba
 grpc::ServerUnaryReactor* AdminService::CollectGarbage(grpc::CallbackServerContext* context,
                                                        const v1::CollectGarbageRequest* request,
                                                        v1::CollectGarbageResponse* response) {
-  return Answer(context, reception_, Role::kAdminister, [this, request, response] {
+  return Answer(context, writing_, Role::kAdminister, [this, request, response] {
     if ((request->budget_bytes() == 0) != request->delete_unpinned()) {
       return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_BUDGET",
                      "set either budget_bytes above zero, or delete_unpinned to delete every model "

@@ -10,8 +10,9 @@ namespace carillon {
 /// carillon.v1.AdminService. The constructor's references must outlive the service.
 class AdminService final : public v1::AdminService::CallbackService {
  public:
-  AdminService(ModeDatabase& database, const Reception& reception)
-      : database_(database), reception_(reception) {}
+  /// The pool of `writing` runs the calls that change the database.
+  AdminService(ModeDatabase& database, const Reception& reception, const Reception& writing)
+      : database_(database), reception_(reception), writing_(writing) {}
 
   grpc::ServerUnaryReactor* GetDatabaseStats(grpc::CallbackServerContext* context,
                                              const v1::GetDatabaseStatsRequest* request,
@@ -25,6 +26,7 @@ class AdminService final : public v1::AdminService::CallbackService {
  private:
   ModeDatabase& database_;
   const Reception reception_;
+  const Reception writing_;
 };
 
 }  // namespace carillon

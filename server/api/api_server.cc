@@ -5,10 +5,12 @@
 #include <grpcpp/grpcpp.h>
 #include <grpcpp/health_check_service_interface.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <deque>
 #include <optional>
+#include <thread>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -23,6 +25,7 @@
 #include "server/api/connection_gate.h"
 #include "server/api/contact_service.h"
 #include "server/api/decomposition_service.h"
+#include "server/api/fair_pool.h"
 #include "server/api/flood_guard.h"
 #include "server/api/grpc_log.h"
 #include "server/api/idle_calls.h"
@@ -41,6 +44,9 @@ namespace carillon {
 namespace {
 
 constexpr int kCallThreadCount = 4;
+/// Calls that change the database wait for its write lock, which storing a large mesh holds for
+/// seconds. They have threads of their own, so that the other calls do not wait with them.
+constexpr int kWriteThreadCount = 2;
 /// Offline rendering has a lower priority than live sound.
 constexpr int kRenderThreadCount = 2;
 constexpr int kRenderNiceness = 10;
@@ -66,6 +72,10 @@ std::chrono::nanoseconds Duration(double seconds) {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(
       std::chrono::duration<double>(seconds));
 }
+
+/// Returns the number of threads that take large steps of contact streams. One client may occupy
+/// half of them.
+int StepThreadCount() { return std::max(2, static_cast<int>(std::thread::hardware_concurrency())); }
 
 absl::Status Unready(absl::string_view reason, absl::string_view message) {
   return Refusal(absl::StatusCode::kFailedPrecondition, reason, message);
@@ -140,9 +150,14 @@ struct ApiServer::State {
         leases(rooms.clock, Duration(settings.scene_grace_s),
                [this](const std::string& connection) { return IsOpen(connection); }),
         owners(access, leases, rooms.scenes),
-        admin(rooms.database, reception),
-        models(rooms.database, rooms.decompositions, reception),
-        decompositions(rooms.decompositions, reception),
+        admin(rooms.database, reception, writing),
+        models({.database = rooms.database,
+                .queue = rooms.decompositions,
+                .reception = reception,
+                .writing = writing,
+                .idle_calls = idle_calls,
+                .clock = rooms.clock}),
+        decompositions(rooms.decompositions, reception, writing),
         job_runs(rooms.runs, access, call_pool),
         heads(settings.head_file),
         scenes(rooms.scenes, owners, rooms.database, heads, reception),
@@ -150,9 +165,10 @@ struct ApiServer::State {
                   .output = rooms.output,
                   .clock = rooms.clock,
                   .owners = owners,
-                  .reception = reception}),
-        audio(settings.version, rooms.output, rooms.scenes, rooms.database, heads, rooms.clock,
-              idle_calls, {access, limits, render_pool}),
+                  .reception = reception,
+                  .large_steps = large_steps}),
+        audio(settings.version, rooms.output, rooms.scenes, owners, rooms.database, heads,
+              rooms.clock, idle_calls, {access, limits, render_pool}),
         certificate_end(rooms.clock),
         server_info({.version = settings.version,
                      .client_share = settings.client_share,
@@ -188,9 +204,12 @@ struct ApiServer::State {
   SceneLeases leases;
   SceneOwners owners;
   IdleCalls idle_calls;
+  FairPool large_steps{StepThreadCount()};
   ThreadPool call_pool{kCallThreadCount};
+  ThreadPool write_pool{kWriteThreadCount};
   ThreadPool render_pool{kRenderThreadCount, kRenderNiceness};
   const Reception reception{access, limits, call_pool};
+  const Reception writing{access, limits, write_pool};
   AdminService admin;
   ModalModelService models;
   DecompositionService decompositions;

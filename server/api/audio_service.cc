@@ -16,9 +16,20 @@ namespace carillon {
 grpc::ServerWriteReactor<v1::ListenResponse>* AudioService::Listen(
     grpc::CallbackServerContext* context, const v1::ListenRequest* request) {
   return Open(*context, reception_, Role::kListen, Holding::kListener,
-              [this, request](const Principal&, ClientPlace place) {
-                return MakeListenCall(output_, scenes_, *request, std::move(place));
+              [&](const Principal& caller, ClientPlace place) {
+                return MakeListenCall(output_, HeardBus(*context, caller, request->scene()),
+                                      *request, std::move(place));
               });
+}
+
+absl::StatusOr<std::optional<BusId>> AudioService::HeardBus(
+    const grpc::CallbackServerContext& context, const Principal& caller,
+    const std::string& scene_name) const {
+  if (scene_name.empty()) return std::nullopt;
+  ASSIGN_OR_RETURN(const uint64_t scene,
+                   owners_.Parse(context, caller, scene_name, SceneCall::kLooks));
+  ASSIGN_OR_RETURN(const BusId bus, scenes_.BusOf(scene));
+  return bus;
 }
 
 grpc::ServerBidiReactor<v1::RenderRequest, v1::RenderResponse>* AudioService::Render(

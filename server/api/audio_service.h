@@ -2,11 +2,13 @@
 #pragma once
 
 #include <atomic>
+#include <optional>
 #include <string>
 
 #include "carillon/v1/audio_service.grpc.pb.h"
 #include "server/api/idle_calls.h"
 #include "server/api/reception.h"
+#include "server/api/scene_owners.h"
 #include "server/base/clock.h"
 #include "server/live_output/live_output.h"
 #include "server/mode_database/mode_database.h"
@@ -21,11 +23,12 @@ class AudioService final : public v1::AudioService::CallbackService {
  public:
   /// Offline rendering runs on the threads of `reception`'s pool.
   AudioService(std::string version, LiveOutput& output, const SceneRegistry& scenes,
-               ModeDatabase& database, HeadStore& heads, const Clock& clock, IdleCalls& idle_calls,
-               const Reception& reception)
+               const SceneOwners& owners, ModeDatabase& database, HeadStore& heads,
+               const Clock& clock, IdleCalls& idle_calls, const Reception& reception)
       : version_(std::move(version)),
         output_(output),
         scenes_(scenes),
+        owners_(owners),
         database_(database),
         heads_(heads),
         clock_(clock),
@@ -44,11 +47,17 @@ class AudioService final : public v1::AudioService::CallbackService {
                                         v1::UpdateMixerResponse* response) override;
 
  private:
+  /// Returns the bus of a scene, or nothing for the output if the name is empty. Errors: those of
+  /// SceneOwners::Parse.
+  absl::StatusOr<std::optional<BusId>> HeardBus(const grpc::CallbackServerContext& context,
+                                                const Principal& caller,
+                                                const std::string& scene_name) const;
   void Describe(v1::GetMixerResponse& mixer) const;
 
   const std::string version_;
   LiveOutput& output_;
   const SceneRegistry& scenes_;
+  const SceneOwners& owners_;
   ModeDatabase& database_;
   HeadStore& heads_;
   const Clock& clock_;

@@ -26,6 +26,8 @@ Bound BoundOf(Holding holding) {
       return {"contact streams", MixerSettings().most_streams};
     case Holding::kListener:
       return {"listeners", BlockBroadcast::kMaxListenerCount};
+    case Holding::kUpload:
+      return {"uploads", kMaxUploadCount};
     case Holding::kRendering:
       break;
   }
@@ -46,6 +48,11 @@ absl::StatusOr<ClientPlace> ClientLimits::Take(Holding holding, const std::strin
   const Bound bound = BoundOf(holding);
   const MutexLock lock(&mutex_);
   auto& held = held_[static_cast<size_t>(holding)];
+  if (holding == Holding::kUpload && CountAll(holding) >= bound.whole) {
+    return Refusal(
+        absl::StatusCode::kResourceExhausted, "TOO_MANY_UPLOADS",
+        absl::StrCat(bound.whole, " uploads and imports run: try again when one is done"));
+  }
   const auto found = held.find(client);
   RETURN_IF_ERROR(Check(bound.name, bound.whole, found == held.end() ? 1 : found->second + 1));
   ++held[client];
@@ -62,6 +69,10 @@ absl::Status ClientLimits::Check(absl::string_view name, size_t whole, size_t wa
 
 size_t ClientLimits::count(Holding holding) const {
   const MutexLock lock(&mutex_);
+  return CountAll(holding);
+}
+
+size_t ClientLimits::CountAll(Holding holding) const {
   size_t sum = 0;
   for (const auto& [client, count] : held_[static_cast<size_t>(holding)]) sum += count;
   return sum;

@@ -16,15 +16,19 @@
 namespace carillon {
 
 /// The kinds of places that clients hold for a while. The daemon has a bounded number of each kind.
-enum class Holding { kScene, kContactStream, kListener, kRendering };
-inline constexpr size_t kHoldingCount = 4;
+enum class Holding { kScene, kContactStream, kListener, kRendering, kUpload };
+inline constexpr size_t kHoldingCount = 5;
 
 /// Greatest number of traces that are rendered at a time.
 inline constexpr size_t kMaxRenderingCount = 8;
 
+/// Greatest number of uploads of meshes and imports of models at a time.
+inline constexpr size_t kMaxUploadCount = 64;
+
 class ClientLimits;
 
-/// One scene, stream, listener or rendering of a client. The destructor gives the place back.
+/// One scene, stream, listener, rendering or upload of a client. The destructor gives the place
+/// back.
 class ClientPlace {
  public:
   ClientPlace() = default;
@@ -54,7 +58,7 @@ class ClientLimits {
   explicit ClientLimits(double share) : share_(share) {}
 
   /// Takes a place for a client. The place must not outlive this. Errors: ResourceExhausted
-  /// (CLIENT_LIMIT_REACHED).
+  /// (CLIENT_LIMIT_REACHED; TOO_MANY_UPLOADS: kMaxUploadCount uploads of all clients run).
   absl::StatusOr<ClientPlace> Take(Holding holding, const std::string& client);
 
   /// Checks that one client may have `wanted` of `whole` things of a kind that `name` names, such
@@ -69,6 +73,7 @@ class ClientLimits {
 
  private:
   friend class ClientPlace;
+  size_t CountAll(Holding holding) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void GiveBack(Holding holding, const std::string& client);
 
   const double share_;

@@ -206,6 +206,13 @@ v1::Blow ToProto(const FoundBlow& blow) {
   return proto;
 }
 
+size_t CountRows(const v1::ContactStep& step) {
+  const int rows = step.impulses_size() + step.columns().object_size() + step.sustained_size() +
+                   step.contacts_size() + step.contact_columns().impulses().object_size() +
+                   step.poses_size() + step.pose_columns().object_size();
+  return static_cast<size_t>(rows);
+}
+
 absl::Status ReadStep(const v1::ContactStep& step, ContactIntake& intake) {
   RETURN_IF_ERROR(intake.BeginStep(step.time_s()));
   for (const v1::ObjectPose& row : step.poses()) intake.Move(row.object(), FromProto(row.pose()));

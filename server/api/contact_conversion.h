@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
+
 #include "absl/status/status.h"
 #include "carillon/v1/audio_service.pb.h"
 #include "carillon/v1/contact.pb.h"
@@ -13,6 +15,9 @@ ContactReading ToContactReading(v1::Frame frame, v1::PulseShape pulse_shape);
 
 v1::ContactFindings ToProto(const IntakeFindings& findings);
 v1::Blow ToProto(const FoundBlow& blow);
+
+/// Returns the number of impulses, forces, contacts and poses in a step.
+size_t CountRows(const v1::ContactStep& step);
 
 /// Gives `intake` a whole step, in the order poses, impulses, forces, engine contacts; of each
 /// kind, rows come before columns. Rows that cannot be read count as rejected (LOCATION_MISSING,

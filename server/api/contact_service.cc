@@ -2,6 +2,7 @@
 #include "server/api/contact_service.h"
 
 #include <chrono>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -11,6 +12,7 @@
 #include "proto/cpp/status_macros.h"
 #include "server/api/contact_conversion.h"
 #include "server/api/resource_name.h"
+#include "server/api/status_conversion.h"
 #include "server/api/stream_call.h"
 #include "server/base/mutex.h"
 
@@ -23,19 +25,26 @@ constexpr std::chrono::milliseconds kAnswerPeriod(500);
 /// ends after kMostSettlePeriods, in case the mixer does not render at all.
 constexpr std::chrono::milliseconds kSettlePeriod(2);
 constexpr int kMostSettlePeriods = 250;
+/// Greatest number of rows of a step that gRPC's thread takes at once. gRPC has few threads, and
+/// all calls wait while these are busy. A row takes up to 6 us.
+constexpr size_t kMostRowsAtOnce = 256;
+/// Number of rows that it takes at once even from a client that has used up its time on gRPC's
+/// threads. They take no longer than gRPC's own work for the message.
+constexpr size_t kFewRows = 16;
 
 /// One contact stream. Requests are read one at a time, so only one thread at a time uses
 /// `stream_`. An answer is a snapshot, and a newer answer replaces an answer that waits to be sent.
 class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::StreamContactsResponse> {
  public:
-  ContactCall(const ContactContext& daemon, TraceRecorders& recorders,
+  ContactCall(const ContactContext& daemon, ContactClients& clients,
               const grpc::CallbackServerContext& context, Principal caller, ClientPlace place)
       : StreamWriter(nullptr),
         daemon_(daemon),
-        recorders_(recorders),
+        recorders_(clients.recorders),
         context_(context),
         caller_(std::move(caller)),
-        place_(std::move(place)) {
+        place_(std::move(place)),
+        budget_(clients.budgets.Of(caller_.client)) {
     StartWriting();
     StartReading();
   }
@@ -52,6 +61,19 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
         return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_STREAM",
                        "a request is neither start nor step");
     }
+  }
+
+  void RunTaking(const v1::StreamContactsRequest& request, std::function<void()> step) override {
+    const size_t row_count = CountRows(request.step());
+    if (row_count <= kFewRows) return step();
+    Clock& clock = daemon_.clock;
+    const std::chrono::nanoseconds begin = clock.Monotonic();
+    if (row_count > kMostRowsAtOnce || !budget_->Allows(begin)) {
+      return daemon_.large_steps.Run(caller_.client, std::move(step));
+    }
+    const std::shared_ptr<StepBudget> budget = budget_;  // the call may be deleted during the step
+    step();
+    budget->Spend(clock.Monotonic() - begin);
   }
 
   void AllRead() override {
@@ -147,7 +169,7 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
     answer.set_remap_count(counts.remap_count);
     answer.set_rejected_count(counts.rejected_count);
     if (!stream_->last_rejection().ok()) {
-      *answer.mutable_last_rejection() = ToErrorInfo(stream_->last_rejection());
+      *answer.mutable_last_rejection() = ToLegibleErrorInfo(stream_->last_rejection());
     }
     *answer.mutable_findings() = ToProto(stream_->findings());
     return answer;
@@ -159,6 +181,7 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
   const grpc::CallbackServerContext& context_;
   const Principal caller_;
   const ClientPlace place_;
+  const std::shared_ptr<StepBudget> budget_;
   std::unique_ptr<ContactStream> stream_;
   std::chrono::nanoseconds answer_due_{0};
   Mutex mutex_;
@@ -184,8 +207,9 @@ class RecordCall final : public ServerStream<v1::RecordContactsResponse> {
     if (!std::exchange(begun_, true)) return Supply::kMessage;
     if (recorder_->overflowed()) {
       return Refusal(absl::StatusCode::kDataLoss, "RECORDING_TOO_SLOW",
-                     "steps of the stream came faster than the client read them: record again, and "
-                     "write to a faster disk or over a faster network");
+                     "steps of the stream came faster than the client read them, and over 65,536 "
+                     "records or 16 MiB waited: record again, and write to a faster disk or over a "
+                     "faster network");
     }
     const bool ended = recorder_->ended();
     if (recorder_->TryTake(*response.mutable_record())) return Supply::kMessage;
@@ -209,7 +233,7 @@ grpc::ServerWriteReactor<v1::RecordContactsResponse>* ContactService::RecordCont
       const absl::Status found = daemon_.scenes.BusOf(*scene).status();
       if (!found.ok()) scene = found;
     }
-    return new RecordCall(recorders_, scene, std::move(place));
+    return new RecordCall(clients_.recorders, scene, std::move(place));
   };
   return Open(*context, daemon_.reception, Role::kStrike, Holding::kListener, make);
 }
@@ -219,7 +243,7 @@ ContactService::StreamContacts(grpc::CallbackServerContext* context) {
   using Reactor = grpc::ServerBidiReactor<v1::StreamContactsRequest, v1::StreamContactsResponse>;
   return Open(*context, daemon_.reception, Role::kStrike, Holding::kContactStream,
               [&](const Principal& caller, ClientPlace place) -> Reactor* {
-                return new ContactCall(daemon_, recorders_, *context, caller, std::move(place));
+                return new ContactCall(daemon_, clients_, *context, caller, std::move(place));
               });
 }
 

@@ -2,8 +2,10 @@
 #pragma once
 
 #include "carillon/v1/contact_service.grpc.pb.h"
+#include "server/api/fair_pool.h"
 #include "server/api/reception.h"
 #include "server/api/scene_owners.h"
+#include "server/api/step_budget.h"
 #include "server/api/trace_recorders.h"
 #include "server/base/clock.h"
 #include "server/live_output/live_output.h"
@@ -18,6 +20,13 @@ struct ContactContext {
   Clock& clock;
   SceneOwners& owners;
   Reception reception;
+  FairPool& large_steps;  ///< takes the steps that keep a thread busy for long
+};
+
+/// The parts of the service that several of its calls share.
+struct ContactClients {
+  TraceRecorders recorders{};
+  StepBudgets budgets{};
 };
 
 /// carillon.v1.ContactService. The constructor's references must outlive the service.
@@ -32,7 +41,7 @@ class ContactService final : public v1::ContactService::CallbackService {
 
  private:
   const ContactContext daemon_;
-  TraceRecorders recorders_;
+  ContactClients clients_;
 };
 
 }  // namespace carillon

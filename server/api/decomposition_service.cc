@@ -167,7 +167,7 @@ grpc::ServerUnaryReactor* DecompositionService::ListJobs(grpc::CallbackServerCon
 grpc::ServerUnaryReactor* DecompositionService::CancelJob(grpc::CallbackServerContext* context,
                                                           const v1::CancelJobRequest* request,
                                                           v1::CancelJobResponse* response) {
-  return Answer(context, reception_, Role::kSubmit, [this, request, response] {
+  return Answer(context, writing_, Role::kSubmit, [this, request, response] {
     ASSIGN_OR_RETURN(const std::string digest, ParseJobName(request->name()));
     ASSIGN_OR_RETURN(*response->mutable_job(), queue_.Cancel(digest));
     return absl::OkStatus();

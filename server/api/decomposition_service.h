@@ -10,8 +10,10 @@ namespace carillon {
 /// carillon.v1.DecompositionService. The constructor's references must outlive the service.
 class DecompositionService final : public v1::DecompositionService::CallbackService {
  public:
-  DecompositionService(DecompositionQueue& queue, const Reception& reception)
-      : queue_(queue), reception_(reception) {}
+  /// The pool of `writing` runs the calls that change the database.
+  DecompositionService(DecompositionQueue& queue, const Reception& reception,
+                       const Reception& writing)
+      : queue_(queue), reception_(reception), writing_(writing) {}
 
   grpc::ServerUnaryReactor* GetJob(grpc::CallbackServerContext* context,
                                    const v1::GetJobRequest* request,
@@ -30,6 +32,7 @@ class DecompositionService final : public v1::DecompositionService::CallbackServ
  private:
   DecompositionQueue& queue_;
   const Reception reception_;
+  const Reception writing_;
 };
 
 }  // namespace carillon

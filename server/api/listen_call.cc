@@ -10,7 +10,6 @@
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
-#include "server/api/resource_name.h"
 #include "server/api/sample_bytes.h"
 #include "server/api/stream_call.h"
 
@@ -32,23 +31,22 @@ absl::Status Check(const v1::ListenRequest& request) {
                  absl::StrCat("there is no encoding ", static_cast<int>(request.encoding())));
 }
 
-absl::StatusOr<std::unique_ptr<Listener>> Subscribe(LiveOutput& output, const SceneRegistry& scenes,
+absl::StatusOr<std::unique_ptr<Listener>> Subscribe(LiveOutput& output,
+                                                    const absl::StatusOr<std::optional<BusId>>& bus,
                                                     const v1::ListenRequest& request,
                                                     std::function<void()> wake) {
   RETURN_IF_ERROR(Check(request));
-  if (request.scene().empty()) return output.broadcast().Subscribe(std::move(wake));
-  ASSIGN_OR_RETURN(const std::string id, ParseSceneName(request.scene()));
-  ASSIGN_OR_RETURN(const uint64_t scene, scenes.FindId(id));
-  ASSIGN_OR_RETURN(const BusId bus, scenes.BusOf(scene));
-  return output.stems().Subscribe(bus, std::move(wake));
+  RETURN_IF_ERROR(bus.status());
+  if (!*bus) return output.broadcast().Subscribe(std::move(wake));
+  return output.stems().Subscribe(**bus, std::move(wake));
 }
 
 /// Sends the format, then blocks. While a block is being sent, further blocks wait in the
 /// listener's bounded queue.
 class ListenCall final : public ServerStream<v1::ListenResponse> {
  public:
-  ListenCall(LiveOutput& output, const SceneRegistry& scenes, const v1::ListenRequest& request,
-             ClientPlace place)
+  ListenCall(LiveOutput& output, const absl::StatusOr<std::optional<BusId>>& bus,
+             const v1::ListenRequest& request, ClientPlace place)
       : StreamWriter(nullptr),
         place_(std::move(place)),
         format_(output.format()),
@@ -56,7 +54,7 @@ class ListenCall final : public ServerStream<v1::ListenResponse> {
                                                                  : v1::AUDIO_ENCODING_FLOAT32),
         wanted_(size_t{request.block_frame_count()} * format_.channel_count) {
     if (wanted_ == 0) wanted_ = format_.block_size();
-    listener_ = Subscribe(output, scenes, request, [this] { Wake(); });
+    listener_ = Subscribe(output, bus, request, [this] { Wake(); });
     StartWriting();
   }
 
@@ -120,11 +118,10 @@ class ListenCall final : public ServerStream<v1::ListenResponse> {
 
 }  // namespace
 
-grpc::ServerWriteReactor<v1::ListenResponse>* MakeListenCall(LiveOutput& output,
-                                                             const SceneRegistry& scenes,
-                                                             const v1::ListenRequest& request,
-                                                             ClientPlace place) {
-  return new ListenCall(output, scenes, request, std::move(place));
+grpc::ServerWriteReactor<v1::ListenResponse>* MakeListenCall(
+    LiveOutput& output, const absl::StatusOr<std::optional<BusId>>& bus,
+    const v1::ListenRequest& request, ClientPlace place) {
+  return new ListenCall(output, bus, request, std::move(place));
 }
 
 }  // namespace carillon

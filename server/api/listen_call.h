@@ -3,18 +3,21 @@
 
 #include <grpcpp/grpcpp.h>
 
+#include <optional>
+
+#include "absl/status/statusor.h"
 #include "carillon/v1/audio_service.pb.h"
 #include "server/api/client_limits.h"
 #include "server/live_output/live_output.h"
-#include "server/scene/scene_registry.h"
+#include "server/synthesis/mixer.h"
 
 namespace carillon {
 
 /// Makes the server's side of one call of AudioService.Listen. The returned reactor holds `place`,
-/// and deletes itself when the call ends. `output` and `scenes` must outlive the reactor.
-grpc::ServerWriteReactor<v1::ListenResponse>* MakeListenCall(LiveOutput& output,
-                                                             const SceneRegistry& scenes,
-                                                             const v1::ListenRequest& request,
-                                                             ClientPlace place);
+/// and deletes itself when the call ends. `bus` is that of the request's scene, or nothing for the
+/// output; the call ends with its error. `output` must outlive the reactor.
+grpc::ServerWriteReactor<v1::ListenResponse>* MakeListenCall(
+    LiveOutput& output, const absl::StatusOr<std::optional<BusId>>& bus,
+    const v1::ListenRequest& request, ClientPlace place);
 
 }  // namespace carillon

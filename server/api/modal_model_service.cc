@@ -33,15 +33,18 @@ ModelFilter FilterOf(const v1::ListModalModelsRequest& request) {
 
 grpc::ServerReadReactor<v1::UploadMeshRequest>* ModalModelService::UploadMesh(
     grpc::CallbackServerContext* context, v1::UploadMeshResponse* response) {
-  return Open(*context, reception_, Role::kSubmit,
-              [&] { return MakeUpload(*context, *response, database_.meshes(), reception_.pool); });
+  return Open(*context, daemon_.writing, Role::kSubmit, Holding::kUpload,
+              [&](const Principal&, ClientPlace place) {
+                return MakeUpload(*context, *response, database_.meshes(), daemon_.writing.pool,
+                                  BoundsOf(std::move(place)));
+              });
 }
 
 grpc::ServerUnaryReactor* ModalModelService::CreateModalModel(
     grpc::CallbackServerContext* context, const v1::CreateModalModelRequest* request,
     v1::CreateModalModelResponse* response) {
   return Answer(
-      context, reception_, Role::kSubmit, [this, request, response](const Principal& caller) {
+      context, daemon_.writing, Role::kSubmit, [this, request, response](const Principal& caller) {
         ASSIGN_OR_RETURN(*response->mutable_job(), queue_.Submit(*request, caller.client));
         return absl::OkStatus();
       });
@@ -51,7 +54,7 @@ grpc::ServerUnaryReactor* ModalModelService::CreateTransfer(
     grpc::CallbackServerContext* context, const v1::CreateTransferRequest* request,
     v1::CreateTransferResponse* response) {
   return Answer(
-      context, reception_, Role::kSubmit, [this, request, response](const Principal& caller) {
+      context, daemon_.writing, Role::kSubmit, [this, request, response](const Principal& caller) {
         ASSIGN_OR_RETURN(const std::string digest, ParseModelName(request->modal_model()));
         v1::CreateTransferRequest whole = *request;
         ASSIGN_OR_RETURN(*whole.mutable_material(),
@@ -65,28 +68,28 @@ grpc::ServerUnaryReactor* ModalModelService::CreateTransfer(
 grpc::ServerUnaryReactor* ModalModelService::GetModalModel(grpc::CallbackServerContext* context,
                                                            const v1::GetModalModelRequest* request,
                                                            v1::GetModalModelResponse* response) {
-  return Answer(context, reception_, Role::kAny,
+  return Answer(context, daemon_.reception, Role::kAny,
                 [this, request, response] { return Get(*request, *response); });
 }
 
 grpc::ServerUnaryReactor* ModalModelService::ListModalModels(
     grpc::CallbackServerContext* context, const v1::ListModalModelsRequest* request,
     v1::ListModalModelsResponse* response) {
-  return Answer(context, reception_, Role::kAny,
+  return Answer(context, daemon_.reception, Role::kAny,
                 [this, request, response] { return List(*request, *response); });
 }
 
 grpc::ServerUnaryReactor* ModalModelService::UpdateModalModel(
     grpc::CallbackServerContext* context, const v1::UpdateModalModelRequest* request,
     v1::UpdateModalModelResponse* response) {
-  return Answer(context, reception_, Role::kSubmit,
+  return Answer(context, daemon_.writing, Role::kSubmit,
                 [this, request, response] { return Update(*request, *response); });
 }
 
 grpc::ServerUnaryReactor* ModalModelService::DeleteModalModel(
     grpc::CallbackServerContext* context, const v1::DeleteModalModelRequest* request,
     v1::DeleteModalModelResponse*) {
-  return Answer(context, reception_, Role::kAdminister, [this, request] {
+  return Answer(context, daemon_.writing, Role::kAdminister, [this, request] {
     ASSIGN_OR_RETURN(const std::string digest, ParseModelName(request->name()));
     return queue_.DeleteModel(digest);
   });
@@ -94,23 +97,30 @@ grpc::ServerUnaryReactor* ModalModelService::DeleteModalModel(
 
 grpc::ServerReadReactor<v1::ImportModalModelRequest>* ModalModelService::ImportModalModel(
     grpc::CallbackServerContext* context, v1::ImportModalModelResponse* response) {
-  return Open(*context, reception_, Role::kSubmit,
-              [&] { return MakeImport(*context, *response, database_, reception_.pool); });
+  return Open(*context, daemon_.writing, Role::kSubmit, Holding::kUpload,
+              [&](const Principal&, ClientPlace place) {
+                return MakeImport(*context, *response, database_, daemon_.writing.pool,
+                                  BoundsOf(std::move(place)));
+              });
 }
 
 grpc::ServerWriteReactor<v1::ExportModalModelResponse>* ModalModelService::ExportModalModel(
     grpc::CallbackServerContext* context, const v1::ExportModalModelRequest* request) {
-  return Open(*context, reception_, Role::kSubmit,
-              [&] { return MakeExport(*request, database_, reception_.pool); });
+  return Open(*context, daemon_.reception, Role::kSubmit,
+              [&] { return MakeExport(*request, database_, daemon_.reception.pool); });
 }
 
 grpc::ServerUnaryReactor* ModalModelService::ListMaterials(grpc::CallbackServerContext* context,
                                                            const v1::ListMaterialsRequest*,
                                                            v1::ListMaterialsResponse* response) {
-  return Answer(context, reception_, Role::kAny, [response] {
+  return Answer(context, daemon_.reception, Role::kAny, [response] {
     *response->mutable_materials() = Materials().materials();
     return absl::OkStatus();
   });
+}
+
+UploadBounds ModalModelService::BoundsOf(ClientPlace place) const {
+  return {.place = std::move(place), .idle_calls = daemon_.idle_calls, .clock = daemon_.clock};
 }
 
 absl::Status ModalModelService::Get(const v1::GetModalModelRequest& request,

@@ -2,17 +2,30 @@
 #pragma once
 
 #include "carillon/v1/modal_model_service.grpc.pb.h"
+#include "server/api/idle_calls.h"
+#include "server/api/read_call.h"
 #include "server/api/reception.h"
+#include "server/base/clock.h"
 #include "server/decomposition/decomposition_queue.h"
 #include "server/mode_database/mode_database.h"
 
 namespace carillon {
 
+/// The parts of the daemon that the calls about models use.
+struct ModelContext {
+  ModeDatabase& database;
+  DecompositionQueue& queue;
+  Reception reception;
+  Reception writing;  ///< its pool runs the calls that change the database
+  IdleCalls& idle_calls;
+  const Clock& clock;
+};
+
 /// carillon.v1.ModalModelService. The constructor's references must outlive the service.
 class ModalModelService final : public v1::ModalModelService::CallbackService {
  public:
-  ModalModelService(ModeDatabase& database, DecompositionQueue& queue, const Reception& reception)
-      : database_(database), queue_(queue), reception_(reception) {}
+  explicit ModalModelService(const ModelContext& daemon)
+      : daemon_(daemon), database_(daemon.database), queue_(daemon.queue) {}
 
   grpc::ServerReadReactor<v1::UploadMeshRequest>* UploadMesh(
       grpc::CallbackServerContext* context, v1::UploadMeshResponse* response) override;
@@ -49,9 +62,11 @@ class ModalModelService final : public v1::ModalModelService::CallbackService {
   absl::Status List(const v1::ListModalModelsRequest& request,
                     v1::ListModalModelsResponse& response);
 
+  UploadBounds BoundsOf(ClientPlace place) const;
+
+  const ModelContext daemon_;
   ModeDatabase& database_;
   DecompositionQueue& queue_;
-  const Reception reception_;
 };
 
 }  // namespace carillon

@@ -14,6 +14,8 @@
 #include "server/api/read_call.h"
 #include "server/api/resource_name.h"
 #include "server/api/stream_call.h"
+#include "server/api/transfer_spool.h"
+#include "server/mode_database/database.h"
 
 namespace carillon {
 namespace {
@@ -48,12 +50,13 @@ class MeshSink {
 
 class ModelSink {
  public:
-  explicit ModelSink(ModeDatabase& database) : database_(&database) {}
+  explicit ModelSink(ModeDatabase& database)
+      : database_(&database), transfers_(database.database().folder()) {}
 
   absl::Status Append(const v1::ImportModalModelRequest& request) {
     RETURN_IF_ERROR(Begin(request));
     if (request.record().record_case() == v1::ModalModelRecord::kTransfer) {
-      return AppendTransfer(request.record().transfer());
+      return transfers_.Append(request.record().transfer());
     }
     return import_->Append(request.record());
   }
@@ -63,15 +66,12 @@ class ModelSink {
       return Refusal(absl::StatusCode::kInvalidArgument, "MODAL_MODEL_MALFORMED",
                      "no record was sent; send the header, then every chunk");
     }
-    std::vector<StoredTransfer> checked;
-    for (std::string& bytes : transfers_) {
-      ASSIGN_OR_RETURN(StoredTransfer transfer, StoredTransfer::Parse(std::move(bytes)));
-      checked.push_back(std::move(transfer));
-    }
+    // All transfers are checked before anything is stored.
+    RETURN_IF_ERROR(transfers_.ForEach([](const StoredTransfer&) { return absl::OkStatus(); }));
     ASSIGN_OR_RETURN(const ModelSummary summary, import_->Finish());
-    for (const StoredTransfer& transfer : checked) {
-      RETURN_IF_ERROR(database_->transfers().Put(summary.digest, transfer).status());
-    }
+    RETURN_IF_ERROR(transfers_.ForEach([&](const StoredTransfer& transfer) {
+      return database_->transfers().Put(summary.digest, transfer).status();
+    }));
     *response.mutable_modal_model() = ToProto(summary);
     return absl::OkStatus();
   }
@@ -85,28 +85,9 @@ class ModelSink {
     return absl::OkStatus();
   }
 
-  /// Appends a record of a transfer. A header begins the next transfer.
-  absl::Status AppendTransfer(const std::string& serialized) {
-    v1::TransferRecord record;
-    const bool parsed = record.ParseFromString(serialized);
-    if (parsed && record.has_header()) transfers_.emplace_back();
-    transfer_bytes_ += serialized.size();
-    if (!parsed || transfers_.empty() || transfer_bytes_ > kMostTransferBytes) {
-      return Refusal(
-          absl::StatusCode::kInvalidArgument, "TRANSFER_MALFORMED",
-          "a record of a transfer cannot be read, comes before its header, or is one too "
-          "many: export the model again");
-    }
-    transfers_.back() += Delimited(record);
-    return absl::OkStatus();
-  }
-
-  static constexpr size_t kMostTransferBytes = size_t{1} << 30U;
-
   ModeDatabase* database_;
   std::optional<ModelImport> import_;
-  std::vector<std::string> transfers_;  // transfers in their stored form
-  size_t transfer_bytes_ = 0;
+  TransferSpool transfers_;
 };
 
 /// Sends a model, then its transfers, record by record.
@@ -154,16 +135,17 @@ class ExportCall final : public ServerStream<v1::ExportModalModelResponse> {
 
 grpc::ServerReadReactor<v1::UploadMeshRequest>* MakeUpload(grpc::CallbackServerContext& context,
                                                            v1::UploadMeshResponse& response,
-                                                           MeshStore& meshes, ThreadPool& pool) {
+                                                           MeshStore& meshes, ThreadPool& pool,
+                                                           UploadBounds bounds) {
   return new ReadCall<v1::UploadMeshRequest, v1::UploadMeshResponse, MeshSink>(
-      context, response, MeshSink(meshes), pool);
+      context, response, MeshSink(meshes), pool, std::move(bounds));
 }
 
 grpc::ServerReadReactor<v1::ImportModalModelRequest>* MakeImport(
     grpc::CallbackServerContext& context, v1::ImportModalModelResponse& response,
-    ModeDatabase& database, ThreadPool& pool) {
+    ModeDatabase& database, ThreadPool& pool, UploadBounds bounds) {
   return new ReadCall<v1::ImportModalModelRequest, v1::ImportModalModelResponse, ModelSink>(
-      context, response, ModelSink(database), pool);
+      context, response, ModelSink(database), pool, std::move(bounds));
 }
 
 grpc::ServerWriteReactor<v1::ExportModalModelResponse>* MakeExport(

@@ -5,6 +5,7 @@
 
 #include "absl/status/statusor.h"
 #include "carillon/v1/modal_model_service.pb.h"
+#include "server/api/read_call.h"
 #include "server/api/thread_pool.h"
 #include "server/mode_database/mode_database.h"
 
@@ -15,11 +16,12 @@ namespace carillon {
 
 grpc::ServerReadReactor<v1::UploadMeshRequest>* MakeUpload(grpc::CallbackServerContext& context,
                                                            v1::UploadMeshResponse& response,
-                                                           MeshStore& meshes, ThreadPool& pool);
+                                                           MeshStore& meshes, ThreadPool& pool,
+                                                           UploadBounds bounds);
 
 grpc::ServerReadReactor<v1::ImportModalModelRequest>* MakeImport(
     grpc::CallbackServerContext& context, v1::ImportModalModelResponse& response,
-    ModeDatabase& database, ThreadPool& pool);
+    ModeDatabase& database, ThreadPool& pool, UploadBounds bounds);
 
 grpc::ServerWriteReactor<v1::ExportModalModelResponse>* MakeExport(
     const v1::ExportModalModelRequest& request, ModeDatabase& database, ThreadPool& pool);

@@ -1,31 +1,67 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <chrono>
+#include <optional>
 #include <utility>
 
 #include "absl/status/status.h"
+#include "absl/strings/str_cat.h"
+#include "proto/cpp/error_reason.h"
+#include "server/api/client_limits.h"
+#include "server/api/idle_calls.h"
 #include "server/api/stream_call.h"
 
 namespace carillon {
 
+/// The place of an upload among those of its client, and the parts of the daemon that end an idle
+/// upload.
+struct UploadBounds {
+  ClientPlace place;
+  IdleCalls& idle_calls;
+  const Clock& clock;
+};
+
 /// Reads requests into a `Sink`, which has Status Append(const Request&) and Status
 /// Finish(Response&). Both functions run on a thread of the pool, because they write to the disk.
+/// A call with bounds ends with UPLOAD_IDLE when its client is silent for too long.
 template <typename Request, typename Response, typename Sink>
-class ReadCall final : public ClientStream<Request> {
+class ReadCall final : public ClientStream<Request>, public IdleCall {
  public:
-  ReadCall(grpc::CallbackServerContext& context, Response& response, Sink sink, ThreadPool& pool)
+  ReadCall(grpc::CallbackServerContext& context, Response& response, Sink sink, ThreadPool& pool,
+           std::optional<UploadBounds> bounds = std::nullopt)
       : ClientStream<Request>(&pool),
         context_(context),
         response_(response),
-        sink_(std::move(sink)) {
+        sink_(std::move(sink)),
+        bounds_(std::move(bounds)) {
+    if (bounds_) {
+      wait_.emplace(bounds_->clock);
+      bounds_->idle_calls.Add(*this);
+    }
     this->StartReading();
+  }
+  ~ReadCall() override {
+    if (bounds_) bounds_->idle_calls.Remove(*this);
+  }
+
+  void EndIfIdle(std::chrono::nanoseconds limit) override {
+    if (!wait_->EndIfLonger(limit)) return;
+    this->End(
+        Refusal(absl::StatusCode::kDeadlineExceeded, "UPLOAD_IDLE",
+                absl::StrCat("nothing was sent for ", std::chrono::duration<double>(limit).count(),
+                             " s, and nothing was stored: send it again without pauses")));
   }
 
  private:
   absl::Status Take(const Request& request) override {
     if (context_.IsCancelled()) return absl::CancelledError("the client has gone");
-    return sink_.Append(request);
+    absl::Status status = sink_.Append(request);
+    if (status.ok() && wait_) wait_->Begin();
+    return status;
   }
+
+  bool GoesOn() override { return !wait_ || wait_->Resume(); }
 
   void AllRead() override {
     if (context_.IsCancelled()) return this->End(absl::CancelledError("the client has gone"));
@@ -35,6 +71,8 @@ class ReadCall final : public ClientStream<Request> {
   grpc::CallbackServerContext& context_;
   Response& response_;
   Sink sink_;
+  std::optional<UploadBounds> bounds_;
+  std::optional<ClientWait> wait_;
 };
 
 }  // namespace carillon

@@ -14,6 +14,7 @@
 #include "proto/cpp/status_macros.h"
 #include "server/api/contact_conversion.h"
 #include "server/api/sample_bytes.h"
+#include "server/api/status_conversion.h"
 #include "server/api/stream_call.h"
 #include "server/api/trace_reader.h"
 #include "server/loudness/loudness_meter.h"
@@ -126,7 +127,7 @@ class RenderCall final : public BidiStream<v1::RenderRequest, v1::RenderResponse
     summary.set_accepted_count(rendered.accepted_count);
     summary.set_rejected_count(rendered.rejected_count);
     if (!rendered.last_rejection.ok()) {
-      *summary.mutable_last_rejection() = ToErrorInfo(rendered.last_rejection);
+      *summary.mutable_last_rejection() = ToLegibleErrorInfo(rendered.last_rejection);
     }
     *summary.mutable_findings() = ToProto(rendered.findings);
     summary.set_peak(rendered.peak);

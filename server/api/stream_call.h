@@ -50,10 +50,12 @@ class StreamReader : public Reactor {
  public:
   void OnReadDone(bool ok) final {
     if (!GoesOn()) return;
-    this->Run([this, ok] {
+    auto step = [this, ok] {
       const absl::Status status = WithoutExceptions([&] { return ok ? TakeRequest() : TakeEnd(); });
       if (!status.ok()) Refuse(status);
-    });
+    };
+    if (ok) return RunTaking(request_, std::move(step));
+    this->Run(std::move(step));
   }
 
  protected:
@@ -67,6 +69,10 @@ class StreamReader : public Reactor {
   virtual void AllRead() = 0;
 
   virtual void Refuse(const absl::Status& status) { this->End(status); }
+
+  /// Runs the step that takes a request. A call may choose other threads for some requests. They
+  /// are still taken one at a time and in order, because the next one is read after the step.
+  virtual void RunTaking(const Request&, std::function<void()> step) { this->Run(std::move(step)); }
 
   /// Returns false if the call was ended while it waited for a request. The call may then be
   /// deleted as soon as GoesOn returns, so no step may be left to the pool. Called on gRPC's

@@ -12,6 +12,7 @@
 #include "server/api/object_conversion.h"
 #include "server/api/pose_conversion.h"
 #include "server/api/resource_name.h"
+#include "server/scene/scene_registry.h"
 
 namespace carillon {
 namespace {
@@ -105,7 +106,11 @@ absl::Status TraceReader::TakeClock(const v1::ContactTraceClock& clock) {
 
 absl::Status TraceReader::TakeObject(const v1::ContactTraceObject& message) {
   ASSIGN_OR_RETURN(ObjectOfModel object, ToObject(message, database_.models()));
-  ++object_count_;
+  if (++object_count_ > SceneRegistry::kMaxObjectCount) {
+    return Refusal(absl::StatusCode::kResourceExhausted, "TRACE_TOO_LARGE",
+                   absl::StrCat("the trace has over ", SceneRegistry::kMaxObjectCount,
+                                " objects, the most that sound together: render it in parts"));
+  }
   return renderer_->AddObject(message.handle(), std::move(object.model), object.properties);
 }
 
@@ -117,10 +122,7 @@ absl::Status TraceReader::TakeStep(const v1::ContactStep& step) {
                      OfflineRenderer::kMaxTimeS, " s"));
   }
   time_s_ = step.time_s();
-  impulse_count_ += static_cast<uint64_t>(step.impulses_size() + step.columns().object_size() +
-                                          step.sustained_size() + step.contacts_size() +
-                                          step.contact_columns().impulses().object_size() +
-                                          step.poses_size() + step.pose_columns().object_size());
+  impulse_count_ += CountRows(step);
   // A pose of the listener gives an event for each object.
   if (step.has_listener()) impulse_count_ += object_count_;
   if (impulse_count_ > kMaxImpulseCount) {

@@ -22,8 +22,8 @@ class TraceReader {
       : database_(database), heads_(heads), bodies_(bodies) {}
 
   /// Takes a request. Errors: InvalidArgument (TRACE_MALFORMED, and those of the objects'
-  /// materials), ResourceExhausted (TRACE_TOO_LARGE), NotFound (MODAL_MODEL_NOT_FOUND), and those
-  /// of HeadStore and OfflineRenderer.
+  /// materials), ResourceExhausted (TRACE_TOO_LARGE: too many objects or contacts), NotFound
+  /// (MODAL_MODEL_NOT_FOUND), and those of HeadStore and OfflineRenderer.
   absl::Status Take(const v1::RenderRequest& request);
 
   /// Returns the renderer after the last request. Errors: InvalidArgument (TRACE_MALFORMED: nothing

@@ -24,13 +24,20 @@ v1::ContactTraceRecord RecordOf(const v1::SoundingObject& object) {
 
 }  // namespace
 
-void TraceRecorder::Add(v1::ContactTraceRecord record) {
+bool TraceRecorder::Add(std::shared_ptr<const v1::ContactTraceRecord> record, size_t byte_count) {
   {
     const MutexLock lock(&mutex_);
-    overflowed_ |= waiting_.size() >= kMostWaiting;
-    if (!overflowed_) waiting_.push_back(std::move(record));
+    if (left_) return false;
+    waiting_byte_count_ += byte_count;
+    overflowed_ |= waiting_.size() >= kMostWaiting || waiting_byte_count_ > kMostWaitingBytes;
+    if (overflowed_) {
+      waiting_.clear();
+    } else {
+      waiting_.push_back({std::move(record), byte_count});
+    }
   }
   Wake();
+  return !overflowed();
 }
 
 void TraceRecorder::End() {
@@ -42,6 +49,11 @@ void TraceRecorder::End() {
 }
 
 void TraceRecorder::Leave() {
+  {
+    const MutexLock lock(&mutex_);
+    left_ = true;
+    waiting_.clear();
+  }
   const MutexLock lock(&wake_mutex_);
   wake_ = nullptr;
 }
@@ -52,10 +64,15 @@ void TraceRecorder::Wake() {
 }
 
 bool TraceRecorder::TryTake(v1::ContactTraceRecord& record) {
-  const MutexLock lock(&mutex_);
-  if (waiting_.empty()) return false;
-  record = std::move(waiting_.front());
-  waiting_.pop_front();
+  Waiting next;
+  {
+    const MutexLock lock(&mutex_);
+    if (waiting_.empty()) return false;
+    next = std::move(waiting_.front());
+    waiting_.pop_front();
+    waiting_byte_count_ -= next.byte_count;
+  }
+  record = *next.record;
   return true;
 }
 
@@ -118,18 +135,19 @@ void StreamRecording::BeginStep() {
 }
 
 void StreamRecording::AddStep(const v1::ContactStep& step, const TimeMapping& mapping) {
-  v1::ContactTraceRecord record;
   if (!std::exchange(begun_, true)) {
     v1::ContactTraceClock& clock = *header_.mutable_clock();
     clock.set_first_frame(mapping.first_frame);
     clock.set_first_time_s(mapping.first_time_s);
     clock.set_scheduling_delay_s(mapping.delay_s);
-    *record.mutable_header() = header_;
-    Add(record);
+    v1::ContactTraceRecord first;
+    *first.mutable_header() = header_;
+    Add(std::move(first));
   }
-  for (const v1::ContactTraceRecord& object : std::exchange(new_objects_, {})) Add(object);
+  for (v1::ContactTraceRecord& object : std::exchange(new_objects_, {})) Add(std::move(object));
+  v1::ContactTraceRecord record;
   *record.mutable_step() = step;
-  Add(record);
+  Add(std::move(record));
 }
 
 void StreamRecording::End() {
@@ -137,8 +155,11 @@ void StreamRecording::End() {
   recorders_.clear();
 }
 
-void StreamRecording::Add(const v1::ContactTraceRecord& record) {
-  for (const auto& recorder : recorders_) recorder->Add(record);
+void StreamRecording::Add(v1::ContactTraceRecord record) {
+  const size_t byte_count = record.SpaceUsedLong();
+  const auto shared = std::make_shared<const v1::ContactTraceRecord>(std::move(record));
+  std::erase_if(recorders_,
+                [&](const auto& recorder) { return !recorder->Add(shared, byte_count); });
 }
 
 }  // namespace carillon

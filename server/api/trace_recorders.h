@@ -19,8 +19,9 @@ namespace carillon {
 /// Takes the records of one contact stream, for a client that reads them. Safe from every thread.
 class TraceRecorder {
  public:
-  /// Greatest number of records that may wait for the client.
+  /// Greatest number of records that may wait for the client, and of their bytes in memory.
   static constexpr size_t kMostWaiting = 65536;
+  static constexpr size_t kMostWaitingBytes = size_t{16} << 20U;
 
   /// `wake` is called when there is a record to take, until Leave. It must not destroy the
   /// recorder.
@@ -31,7 +32,9 @@ class TraceRecorder {
   void Leave();
 
   uint64_t scene() const { return scene_; }
-  void Add(v1::ContactTraceRecord record);
+  /// Adds a record, which recorders share. `byte_count` is the record's size in memory. Returns
+  /// false if the recorder takes no more records, because it overflowed or its client has gone.
+  bool Add(std::shared_ptr<const v1::ContactTraceRecord> record, size_t byte_count);
   void End();
 
   /// Takes the next record. Returns false if no record waits.
@@ -48,7 +51,13 @@ class TraceRecorder {
   Mutex wake_mutex_;
   std::function<void()> wake_ ABSL_GUARDED_BY(wake_mutex_);
   mutable Mutex mutex_;
-  std::deque<v1::ContactTraceRecord> waiting_ ABSL_GUARDED_BY(mutex_);
+  struct Waiting {
+    std::shared_ptr<const v1::ContactTraceRecord> record;
+    size_t byte_count = 0;
+  };
+  std::deque<Waiting> waiting_ ABSL_GUARDED_BY(mutex_);
+  size_t waiting_byte_count_ ABSL_GUARDED_BY(mutex_) = 0;
+  bool left_ ABSL_GUARDED_BY(mutex_) = false;
   bool ended_ ABSL_GUARDED_BY(mutex_) = false;
   bool overflowed_ ABSL_GUARDED_BY(mutex_) = false;
 };
@@ -83,7 +92,7 @@ class StreamRecording {
   void End();
 
  private:
-  void Add(const v1::ContactTraceRecord& record);
+  void Add(v1::ContactTraceRecord record);
 
   const SceneRegistry* scenes_ = nullptr;
   uint64_t scene_ = 0;

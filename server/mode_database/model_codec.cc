@@ -30,6 +30,13 @@ absl::Status Truncated() {
       "the file is not a sequence of modal model records, or is cut short: copy it again");
 }
 
+absl::Status TooLong(uint32_t byte_count) {
+  return Refusal(absl::StatusCode::kInvalidArgument, "MODAL_MODEL_MALFORMED",
+                 absl::StrCat("a record has ", byte_count, " bytes; at most ", kMaxRecordBytes,
+                              " are allowed: shorten the warnings of its header, or copy the file "
+                              "again if it is damaged"));
+}
+
 template <typename Vector>
 std::string_view Bytes(const Vector& values) {
   return {reinterpret_cast<const char*>(values.data()),
@@ -114,7 +121,7 @@ absl::StatusOr<std::optional<v1::ModalModelRecord>> ModelFileReader::Next() {
     if (in.CurrentPosition() == 0 && state_->stream.GetErrno() == 0) return std::nullopt;
     return Truncated();
   }
-  if (byte_count > kMaxRecordBytes) return Truncated();
+  if (byte_count > kMaxRecordBytes) return TooLong(byte_count);
   const auto limit = in.PushLimit(static_cast<int>(byte_count));
   v1::ModalModelRecord record;
   if (!record.MergeFromCodedStream(&in) || !in.ConsumedEntireMessage() ||

@@ -38,8 +38,9 @@ absl::StatusOr<ModelSummary> ParseModel(const SqlRow& row) {
 }
 
 absl::Status SelectTags(SqliteConnection& connection, ModelSummary& model) {
-  return connection.Query("SELECT tag FROM model_tags WHERE digest = ? ORDER BY tag",
-                          {model.digest}, [&](const SqlRow& row) {
+  return connection.Query("SELECT tag FROM model_tags WHERE digest = ? ORDER BY tag LIMIT ?",
+                          {model.digest, static_cast<int64_t>(kMaxTagCount)},
+                          [&](const SqlRow& row) {
                             model.tags.push_back(row.Text(0));
                             return absl::OkStatus();
                           });
@@ -49,6 +50,14 @@ absl::Status SelectTagsAndMaterial(SqliteConnection& connection, ModelSummary& m
   RETURN_IF_ERROR(SelectTags(connection, model));
   ASSIGN_OR_RETURN(model.material, SelectMaterial(connection, model.digest));
   return absl::OkStatus();
+}
+
+absl::Status CheckTagCount(SqliteConnection& connection, const std::string& digest) {
+  return connection.Query(
+      "SELECT count(*) FROM model_tags WHERE digest = ?", {digest}, [&](const SqlRow& row) {
+        const auto count = static_cast<uint64_t>(row.Int(0));
+        return count > kMaxTagCount ? TooManyTags(digest, count) : absl::OkStatus();
+      });
 }
 
 absl::Status InsertHeader(SqliteConnection& connection, const ModelSummary& summary) {
@@ -90,6 +99,13 @@ absl::Status ModelNotFound(const std::string& digest) {
                               ": create or import it first, and let its job succeed"));
 }
 
+absl::Status TooManyTags(const std::string& digest, uint64_t count) {
+  return Refusal(
+      absl::StatusCode::kResourceExhausted, "TOO_MANY_TAGS",
+      absl::StrCat("modalModels/", digest, " would have ", count, " tags; a model has at most ",
+                   kMaxTagCount, ": remove some of them first"));
+}
+
 absl::Status ModelCorrupt(const std::string& digest, absl::string_view what) {
   return Refusal(absl::StatusCode::kDataLoss, "MODAL_MODEL_CORRUPT",
                  absl::StrCat("modalModels/", digest, " has changed on the disk (", what,
@@ -109,6 +125,7 @@ absl::StatusOr<std::optional<v1::Material>> SelectMaterial(SqliteConnection& con
                          v1::Material read;
                          if (std::bit_cast<int64_t>(Xxh3(bytes)) == row.Int(0) &&
                              read.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) {
+                           read.DiscardUnknownFields();
                            material = std::move(read);
                          }
                          return absl::OkStatus();
@@ -137,10 +154,13 @@ absl::StatusOr<ModelSummary> SelectModel(SqliteConnection& connection, const std
   return model;
 }
 
-absl::Status SelectModels(SqliteConnection& connection, const ModelFilter& filter, int64_t below,
-                          int64_t limit, absl::FunctionRef<void(ModelSummary)> on_model,
-                          absl::FunctionRef<void(std::string, absl::Status)> on_damaged) {
+absl::StatusOr<bool> SelectModels(SqliteConnection& connection, const ModelFilter& filter,
+                                  int64_t below, int64_t limit,
+                                  absl::FunctionRef<void(ModelSummary)> on_model,
+                                  absl::FunctionRef<void(std::string, absl::Status)> on_damaged) {
   std::vector<ModelSummary> models;
+  size_t header_bytes = 0;
+  bool is_full = false;
   absl::Status status = connection.Query(
       absl::StrCat(kSelectModels,
                    "WHERE revision < ?1 AND quarantined = 0 "
@@ -159,13 +179,17 @@ absl::Status SelectModels(SqliteConnection& connection, const ModelFilter& filte
         } else {
           on_damaged(row.Text(1), model.status());
         }
-        return absl::OkStatus();
+        header_bytes += row.Blob(9).size();
+        is_full = header_bytes >= kMaxHeaderBytes;
+        return is_full ? absl::CancelledError("the page is full") : absl::OkStatus();
       });
+  if (is_full && absl::IsCancelled(status)) status = absl::OkStatus();
   for (ModelSummary& model : models) {
     if (status.ok()) status = SelectTagsAndMaterial(connection, model);
     if (status.ok()) on_model(std::move(model));
   }
-  return status;
+  if (!status.ok()) return status;
+  return is_full;
 }
 
 absl::Status SelectChunks(SqliteConnection& connection, int64_t revision, int64_t first,
@@ -259,7 +283,7 @@ absl::Status UpdateModel(SqliteConnection& connection, const std::string& digest
     RETURN_IF_ERROR(
         connection.Run("DELETE FROM model_tags WHERE tag = ? AND digest = ?", {tag, digest}));
   }
-  return absl::OkStatus();
+  return change.add_tags.empty() ? absl::OkStatus() : CheckTagCount(connection, digest);
 }
 
 absl::Status StoreSounded(SqliteConnection& connection, const std::string& digest,

@@ -21,15 +21,18 @@ namespace carillon {
 /// reads a model can fail with NotFound (MODAL_MODEL_NOT_FOUND) or DataLoss (MODAL_MODEL_CORRUPT).
 
 absl::Status ModelNotFound(const std::string& digest);
+absl::Status TooManyTags(const std::string& digest, uint64_t count);
 absl::Status ModelCorrupt(const std::string& digest, absl::string_view what);
 
 absl::StatusOr<ModelSummary> SelectModel(SqliteConnection& connection, const std::string& digest);
 
 /// Calls `on_model` for at most `limit` models below revision `below`, newest first, and
-/// `on_damaged` with the digest of each row that is damaged.
-absl::Status SelectModels(SqliteConnection& connection, const ModelFilter& filter, int64_t below,
-                          int64_t limit, absl::FunctionRef<void(ModelSummary)> on_model,
-                          absl::FunctionRef<void(std::string, absl::Status)> on_damaged);
+/// `on_damaged` with the digest of each row that is damaged. Returns whether it ended before
+/// because the headers have kMaxHeaderBytes.
+absl::StatusOr<bool> SelectModels(SqliteConnection& connection, const ModelFilter& filter,
+                                  int64_t below, int64_t limit,
+                                  absl::FunctionRef<void(ModelSummary)> on_model,
+                                  absl::FunctionRef<void(std::string, absl::Status)> on_damaged);
 
 /// Returns the material remembered for the model of this digest, or nothing if there is none or its
 /// row is damaged.

@@ -62,6 +62,13 @@ absl::Status CheckSize(uint64_t array_bytes) {
                               "surface"));
 }
 
+absl::Status CheckHeaderSize(size_t header_bytes) {
+  if (header_bytes <= kMaxHeaderBytes) return absl::OkStatus();
+  return Refusal(absl::StatusCode::kResourceExhausted, "MODAL_MODEL_TOO_LARGE",
+                 absl::StrCat("the header of the model has ", header_bytes, " bytes; at most ",
+                              kMaxHeaderBytes, " are taken: shorten its warnings"));
+}
+
 }  // namespace
 
 struct ModelImport::State {
@@ -78,6 +85,7 @@ ModelImport& ModelImport::operator=(ModelImport&&) noexcept = default;
 ModelImport::~ModelImport() = default;
 
 absl::Status ModelImport::Append(const v1::ModalModelRecord& record) {
+  if (record.has_header()) RETURN_IF_ERROR(CheckHeaderSize(record.header().ByteSizeLong()));
   RETURN_IF_ERROR(state_->checker.Check(record));
   if (record.has_header()) {
     RETURN_IF_ERROR(CheckSize(state_->checker.array_bytes()));
@@ -250,18 +258,22 @@ absl::StatusOr<ModelPage> ModelStore::List(const ModelFilter& filter, int page_s
                                            const std::string& page_token) {
   ASSIGN_OR_RETURN(const PageRange range, ParsePage(page_size, page_token));
   ModelPage page;
+  bool is_full = false;
   std::vector<std::pair<std::string, absl::Status>> damaged;
   RETURN_IF_ERROR(database_->Read([&](SqliteConnection& connection) {
-    return SelectModels(
-        connection, filter, range.below, range.size,
-        [&](ModelSummary model) { page.models.push_back(std::move(model)); },
-        [&](std::string digest, absl::Status why) {
-          damaged.emplace_back(std::move(digest), std::move(why));
-        });
+    ASSIGN_OR_RETURN(is_full,
+                     SelectModels(
+                         connection, filter, range.below, range.size,
+                         [&](ModelSummary model) { page.models.push_back(std::move(model)); },
+                         [&](std::string digest, absl::Status why) {
+                           damaged.emplace_back(std::move(digest), std::move(why));
+                         }));
+    return absl::OkStatus();
   }));
   for (const auto& [digest, why] : damaged) Quarantine(digest, why).IgnoreError();
   // Damaged models are left out of the page, which makes it shorter but not the last one.
-  if (std::ssize(page.models) + std::ssize(damaged) == range.size && !page.models.empty()) {
+  is_full |= std::ssize(page.models) + std::ssize(damaged) == range.size;
+  if (is_full && !page.models.empty()) {
     page.next_page_token = absl::StrCat(page.models.back().revision);
   }
   return page;
@@ -291,6 +303,7 @@ absl::StatusOr<ModelSummary> ModelStore::Update(const std::string& digest,
   RETURN_IF_ERROR(database_->Write([&](SqliteConnection& connection) {
     summary = SelectModel(connection, digest);
     RETURN_IF_ERROR(summary.status());
+    if (change.add_tags.size() > kMaxTagCount) return TooManyTags(digest, change.add_tags.size());
     for (const std::string& tag : change.add_tags) RETURN_IF_ERROR(CheckTag(tag));
     RETURN_IF_ERROR(UpdateModel(connection, digest, change));
     summary = SelectModel(connection, digest);

@@ -30,6 +30,14 @@ class SqliteConnection;
 /// A label is cut to this length.
 inline constexpr size_t kMaxLabelBytes = 200;
 
+/// Greatest number of tags of a model. A model that an older version gave more tags is returned
+/// with the first of them.
+inline constexpr size_t kMaxTagCount = 100;
+
+/// Greatest size of the header of an imported model. A page of a list ends when its headers have
+/// this size, so that every client can receive it.
+inline constexpr size_t kMaxHeaderBytes = size_t{1} << 20U;
+
 /// A modal model without its arrays.
 struct ModelSummary {
   std::string digest{};
@@ -99,7 +107,7 @@ class ModelImport {
   ~ModelImport();
 
   /// Errors: InvalidArgument (MODAL_MODEL_MALFORMED), DataLoss (MODAL_MODEL_CORRUPT: a hash is
-  /// wrong).
+  /// wrong), ResourceExhausted (MODAL_MODEL_TOO_LARGE).
   absl::Status Append(const v1::ModalModelRecord& record);
 
   /// Stores the model, durably; replaces one of the same digest. Call once, last.
@@ -186,7 +194,8 @@ class ModelStore {
   /// Eigenvalues for a Young's modulus of 1 Pa and 1 kg/m^3, ascending. Errors: those of Find.
   absl::StatusOr<std::vector<double>> Eigenvalues(const std::string& digest);
 
-  /// Newest first. `page_size` 0: 100; at most 1000. Errors: InvalidArgument (INVALID_PAGE).
+  /// Newest first. `page_size` 0: 100; at most 1000. A page also ends when its headers have
+  /// kMaxHeaderBytes. Errors: InvalidArgument (INVALID_PAGE).
   absl::StatusOr<ModelPage> List(const ModelFilter& filter, int page_size,
                                  const std::string& page_token);
 
@@ -198,7 +207,7 @@ class ModelStore {
   absl::StatusOr<std::optional<v1::Material>> Material(const std::string& digest);
 
   /// Errors: NotFound (MODAL_MODEL_NOT_FOUND), InvalidArgument (INVALID_TAG), DataLoss
-  /// (MODAL_MODEL_CORRUPT).
+  /// (MODAL_MODEL_CORRUPT), ResourceExhausted (TOO_MANY_TAGS).
   absl::StatusOr<ModelSummary> Update(const std::string& digest, const ModelChange& change);
 
   /// Deletes a model, its tags, its material and its job. Errors: NotFound (MODAL_MODEL_NOT_FOUND).

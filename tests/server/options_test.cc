@@ -82,6 +82,7 @@ TEST_F(OptionsFile, WhatTheFileMayNotSayIsRefusedByName) {
   expect("tls_key = \"key.pem\"\n", "--tls-certificate");
   expect("a = \n", "line 1");
   expect("workers = 1\nsample_rate = \"high\"\n", "line 2: sample_rate");
+  expect("workers = 1\ntransfers = 1\n", "line 2: transfers has a value of the wrong type");
   expect("data_dir = \"\"\n", "--data-dir");
   expect("scene_grace = -1\n", "--scene-grace");
   expect("client_share = 0\n", "--client-share");

@@ -166,6 +166,21 @@ class AccessTest(unittest.TestCase):
         self.daemon.stop()
         self.assertEqual(self.logged("a call from ipv4:127.0.0.1:[0-9]+ was refused"), self.attempts)
 
+    def test_a_scene_alone_is_heard_by_its_owner_and_administrators_only(self):
+        self.write_access(line_of("band", "strike,listen"), line_of("rival", "strike,listen"),
+                          line_of("chief", "listen,administer"), line_of("guest", "listen"))
+        self.serve()
+        listen = "/carillon.v1.AudioService/Listen"
+        with self.channel() as channel:
+            scene = scene_service_pb2_grpc.SceneServiceStub(channel).CreateScene(
+                scene_service_pb2.CreateSceneRequest(),
+                metadata=(("authorization", f"Bearer {token_of('band')}"),)).name
+            request = audio_service_pb2.ListenRequest(scene=scene).SerializeToString()
+            for name, reason in (("band", ""), ("chief", ""), ("rival", "SCENE_OF_ANOTHER"),
+                                 ("guest", "SCENE_OF_ANOTHER")):
+                self.assertEqual(self.outcome(channel, listen, token_of(name), request)[1], reason, name)
+            self.assertEqual(self.outcome(channel, listen, token_of("guest"))[0], grpc.StatusCode.OK)
+
     def test_certificates_of_others_and_expired_ones_are_refused_and_logged(self):
         self.serve()
         self.attempts = 0

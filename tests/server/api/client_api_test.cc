@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/api/client_limits.h"
 #include "tests/server/api/served_daemon.h"
 
 namespace carillon {
@@ -101,6 +102,39 @@ TEST_F(ClientApi, ARenderingWhoseClientSaysNothingEnds) {
   ExpectRefused(call->Finish(), grpc::DEADLINE_EXCEEDED, "RENDERING_IDLE");
   while (server().clients().renderings > 0) {
   }
+}
+
+TEST_F(ClientApi, AnUploadWhoseClientSaysNothingEndsAndStoresNothing) {
+  grpc::ClientContext context;
+  v1::UploadMeshResponse response;
+  const auto call = models->UploadMesh(&context, &response);
+  v1::UploadMeshRequest request;
+  request.set_data("the first half");
+  call->Write(request);
+  ExpectRefused(call->Finish(), grpc::DEADLINE_EXCEEDED, "UPLOAD_IDLE");
+}
+
+TEST_F(ClientApi, OneClientHasAShareOfAllUploadsAndOthersHaveTheirs) {
+  std::vector<std::unique_ptr<grpc::ClientContext>> contexts;
+  std::vector<v1::UploadMeshResponse> responses(kMaxUploadCount / 4 + 1);
+  std::vector<std::unique_ptr<grpc::ClientWriter<v1::UploadMeshRequest>>> uploads;
+  for (v1::UploadMeshResponse& response : responses) {
+    contexts.push_back(std::make_unique<grpc::ClientContext>());
+    uploads.push_back(models->UploadMesh(contexts.back().get(), &response));
+  }
+  int refused_count = 0;
+  for (const auto& upload : uploads) {
+    refused_count += ErrorOf(upload->Finish()).reason() == "CLIENT_LIMIT_REACHED" ? 1 : 0;
+  }
+  EXPECT_EQ(refused_count, 1);  // the others end as idle and give their places back
+  v1::UploadMeshResponse response;
+  grpc::ClientContext context;
+  const auto upload = models->UploadMesh(&context, &response);
+  v1::UploadMeshRequest request;
+  request.set_data("mesh");
+  upload->Write(request);
+  upload->WritesDone();
+  EXPECT_TRUE(upload->Finish().ok());
 }
 
 TEST_F(ClientApi, RenderingsThatSayNothingLeaveRoomForOthers) {

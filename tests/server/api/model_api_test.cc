@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "tests/server/api/served_daemon.h"
+#include "tests/server/mode_database/sample_transfer.h"
 
 namespace carillon {
 namespace {
@@ -44,12 +45,13 @@ class ModelApi : public ServedDaemon {
     return status;
   }
 
-  grpc::Status Import(const std::vector<v1::ModalModelRecord>& records) {
+  grpc::Status Import(const std::vector<v1::ModalModelRecord>& records,
+                      const std::string& digest = std::string(64, 'b')) {
     grpc::ClientContext context;
     v1::ImportModalModelResponse response;
     const auto writer = models->ImportModalModel(&context, &response);
     v1::ImportModalModelRequest request;
-    request.set_name(std::string("modalModels/").append(64, 'b'));
+    request.set_name("modalModels/" + digest);
     for (const v1::ModalModelRecord& record : records) {
       *request.mutable_record() = record;
       writer->Write(request);
@@ -175,6 +177,70 @@ TEST_F(ModelApi, WhatIsImportedIsExportedUnchangedAndListed) {
   ASSERT_EQ(listed.modal_models_size(), 1);
   EXPECT_EQ(listed.modal_models(0).name(), name);
   EXPECT_EQ(listed.modal_models(0).eigenvalues_size(), 0);
+}
+
+TEST_F(ModelApi, AListEndsAPageBeforeItIsTooLargeForAClient) {
+  std::vector<v1::ModalModelRecord> records = SampleRecords(*SmallModel());
+  records[0].mutable_header()->add_warnings(std::string(900'000, 'w'));
+  for (const char digit : {'1', '2', '3', '4', '5', '6'}) {
+    ASSERT_TRUE(Import(records, std::string(64, digit)).ok());
+  }
+  v1::ListModalModelsRequest request;
+  size_t count = 0;
+  do {
+    v1::ListModalModelsResponse page;
+    ASSERT_TRUE(Call(*models, &v1::ModalModelService::Stub::ListModalModels, request, page).ok());
+    EXPECT_LT(page.ByteSizeLong(), 3U << 20U);
+    count += static_cast<size_t>(page.modal_models_size());
+    request.set_page_token(page.next_page_token());
+  } while (!request.page_token().empty());
+  EXPECT_EQ(count, 6U);
+}
+
+TEST_F(ModelApi, AHeaderThatIsTooLongIsRefusedWithTheLimit) {
+  std::vector<v1::ModalModelRecord> records = SampleRecords(*SmallModel());
+  records[0].mutable_header()->add_warnings(std::string(1 << 20, 'w'));
+  const grpc::Status status = Import(records);
+  ExpectRefused(status, grpc::RESOURCE_EXHAUSTED, "MODAL_MODEL_TOO_LARGE");
+  EXPECT_THAT(status.error_message(), testing::HasSubstr("1048576"));
+}
+
+TEST_F(ModelApi, TheNumberOfTagsOfAModelIsBounded) {
+  v1::UpdateModalModelRequest request;
+  request.set_name(ImportSmallModel());
+  for (int i = 0; i < 100; ++i) request.add_add_tags("tag" + std::to_string(i));
+  v1::UpdateModalModelResponse response;
+  const auto update = &v1::ModalModelService::Stub::UpdateModalModel;
+  ASSERT_TRUE(Call(*models, update, request, response).ok());
+  EXPECT_EQ(response.modal_model().tags_size(), 100);
+  request.clear_add_tags();
+  request.add_add_tags("one-more");
+  ExpectRefused(Call(*models, update, request, response), grpc::RESOURCE_EXHAUSTED,
+                "TOO_MANY_TAGS");
+  request.add_remove_tags("tag1");
+  ASSERT_TRUE(Call(*models, update, request, response).ok());
+  EXPECT_EQ(response.modal_model().tags_size(), 100);
+}
+
+TEST_F(ModelApi, ARefusalThatRepeatsALongNameKeepsItsReason) {
+  v1::GetModalModelRequest request;
+  request.set_name("modalModels/" + std::string(3'900'000, 'x') + "\x1b[31m");
+  v1::GetModalModelResponse response;
+  const grpc::Status status =
+      Call(*models, &v1::ModalModelService::Stub::GetModalModel, request, response);
+  EXPECT_NE(status.error_code(), grpc::RESOURCE_EXHAUSTED);
+  EXPECT_NE(ErrorOf(status).reason(), "");
+  EXPECT_LE(status.error_message().size(), 1024U);
+}
+
+TEST_F(ModelApi, ManyTransfersOfAnImportAreRefused) {
+  std::vector<v1::ModalModelRecord> records = SampleRecords(*SmallModel());
+  v1::TransferRecord header;
+  *header.mutable_header() = SampleTransferHeader(1, 10);
+  for (int i = 0; i < 65; ++i) {
+    records.emplace_back().set_transfer(header.SerializeAsString());
+  }
+  ExpectRefused(Import(records), grpc::RESOURCE_EXHAUSTED, "TRANSFER_TOO_LARGE");
 }
 
 TEST_F(ModelApi, AModelThatIsNotThereIsNotFound) {

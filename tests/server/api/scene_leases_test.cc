@@ -105,6 +105,18 @@ TEST(ClientLimits, AClientHasAShareOfTheWholeAndGivesItBack) {
   EXPECT_EQ(limits.count(Holding::kRendering), 1U);
 }
 
+TEST(ClientLimits, UploadsOfAllClientsTogetherAreBounded) {
+  ClientLimits limits(0.5);
+  std::vector<ClientPlace> places;
+  for (size_t i = 0; i < kMaxUploadCount; ++i) {
+    places.push_back(*limits.Take(Holding::kUpload, std::to_string(i)));
+  }
+  EXPECT_THAT(limits.Take(Holding::kUpload, "late").status().ToString(),
+              testing::HasSubstr("TOO_MANY_UPLOADS"));
+  places.pop_back();
+  EXPECT_TRUE(limits.Take(Holding::kUpload, "late").ok());
+}
+
 TEST(ClientLimits, TheSmallestShareIsOne) {
   EXPECT_EQ(ClientLimits::ShareOf(8, 0.001), 1U);
   EXPECT_EQ(ClientLimits::ShareOf(8, 1), 8U);

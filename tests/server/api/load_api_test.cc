@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include "tests/server/api/served_daemon.h"
+
+namespace carillon {
+namespace {
+
+/// A daemon whose clients send as much as they can.
+class LoadApi : public ServedDaemon {};
+
+TEST_F(LoadApi, LargeStepsAreTakenWholeAndInOrder) {
+  v1::AddObjectRequest object = SmallObject(CreateScene());
+  object.set_handle(1);
+  v1::AddObjectResponse added;
+  ASSERT_TRUE(Add(object, added).ok());
+  grpc::ClientContext context;
+  const auto stream = contacts->StreamContacts(&context);
+  v1::StreamContactsRequest request;
+  request.mutable_start()->set_scene(object.scene());
+  request.mutable_start()->set_step_s(0.01);
+  stream->Write(request);
+  for (int step = 0; step < 20; ++step) {  // times that went back would end the stream
+    request.mutable_step()->set_time_s(step * 0.01);
+    request.mutable_step()->clear_impulses();
+    const int count = step % 2 == 0 ? 5000 : 1;
+    for (int i = 0; i < count; ++i) *request.mutable_step()->add_impulses() = Strike(2);
+    stream->Write(request);
+  }
+  stream->WritesDone();
+  v1::StreamContactsResponse answer;
+  while (stream->Read(&answer)) {
+  }
+  EXPECT_TRUE(stream->Finish().ok());
+  EXPECT_EQ(answer.step_count(), 20U);
+  EXPECT_EQ(answer.rejected_count(), 10U * 5001);
+}
+
+TEST_F(LoadApi, ATraceWithMoreObjectsThanADaemonMaySoundIsRefused) {
+  grpc::ClientContext context;
+  const auto stream = audio->Render(&context);
+  v1::RenderRequest request;
+  request.mutable_settings()->set_tail_s(0.2);
+  stream->Write(request);
+  request.mutable_record()->mutable_header()->set_format_version(1);
+  stream->Write(request);
+  v1::ContactTraceObject& object = *request.mutable_record()->mutable_object();
+  object.set_modal_model(ImportSmallModel());
+  *object.mutable_material() = SmallMaterial();
+  for (uint32_t handle = 1; handle <= SceneRegistry::kMaxObjectCount + 1; ++handle) {
+    object.set_handle(handle);
+    if (!stream->Write(request)) break;
+  }
+  v1::RenderResponse response;
+  EXPECT_FALSE(stream->Read(&response));
+  ExpectRefused(stream->Finish(), grpc::RESOURCE_EXHAUSTED, "TRACE_TOO_LARGE");
+}
+
+}  // namespace
+}  // namespace carillon
