@@ -111,6 +111,15 @@ absl::StatusOr<mode_t> PrepareSocket(const std::string& path) {
                    absl::StrCat("a daemon serves unix:", path,
                                 " already; stop it or choose another --listen"));
   }
+  struct stat status {};
+  if (lstat(path.c_str(), &status) != 0) return mode;
+  if (!S_ISSOCK(status.st_mode)) {
+    return Refusal(
+        absl::StatusCode::kFailedPrecondition, "LISTEN_FAILED",
+        absl::StrCat("\"", path, "\" is ",
+                     S_ISDIR(status.st_mode) ? "a folder" : "a file of another kind",
+                     ", not a socket, and stays as it is: choose another name with --listen"));
+  }
   std::filesystem::remove(path, error);  // a daemon that was killed leaves its socket
   return mode;
 }

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/audio_device/open_device.h"
 
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <system_error>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -15,9 +19,25 @@
 namespace carillon {
 namespace {
 
+/// Whether a file exists that holds something other than a sound.
+bool HoldsOther(const std::string& path) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) return false;
+  std::ifstream file(path, std::ios::binary);
+  std::string begin(4, '\0');
+  file.read(begin.data(), static_cast<std::streamsize>(begin.size()));
+  return file.gcount() > 0 && begin != "RIFF" && begin != "RF64";
+}
+
 absl::StatusOr<std::unique_ptr<AudioDevice>> OpenFileDevice(absl::string_view path,
                                                             const DeviceFormat& format,
                                                             Clock& clock) {
+  if (HoldsOther(std::string(path))) {
+    return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_AUDIO_DEVICE",
+                   absl::StrCat("\"", path,
+                                "\" holds something other than a WAV sound, and stays as it is: "
+                                "name another file with --audio-device file:PATH"));
+  }
   ASSIGN_OR_RETURN(WavWriter made,
                    WavWriter::Make(std::string(path), format.sample_rate_hz, format.channel_count));
   auto writer = std::make_shared<WavWriter>(std::move(made));

@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <fstream>
 #include <string>
 
 namespace carillon {
@@ -36,6 +38,20 @@ TEST(ListenAddress, RefusesWhatIsNone) {
     EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument) << text;
     EXPECT_THAT(status.ToString(), testing::HasSubstr("INVALID_ADDRESS: "));
   }
+}
+
+TEST(ListenAddress, KeepsAFileThatIsNoSocket) {
+  const std::string folder = testing::TempDir() + "KeepsAFileThatIsNoSocket";
+  std::filesystem::create_directory(folder);
+  std::filesystem::permissions(folder, std::filesystem::perms::owner_all);
+  const std::string path = folder + "/thesis.txt";
+  std::ofstream(path) << "years of work";
+  for (const std::string& taken : {path, folder}) {
+    EXPECT_THAT(PrepareSocket(taken).status().ToString(),
+                testing::HasSubstr("LISTEN_FAILED: \"" + taken));
+  }
+  EXPECT_EQ(std::filesystem::file_size(path), 13U);
+  std::filesystem::remove_all(folder);
 }
 
 }  // namespace

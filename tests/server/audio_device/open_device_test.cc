@@ -7,6 +7,7 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <latch>
 #include <vector>
 
@@ -81,6 +82,16 @@ TEST(OpenDevice, RefusesAFileThatCannotBeWritten) {
   ManualClock clock;
   const absl::Status status = Open("file:/nonexistent/folder/out.wav", clock).status();
   EXPECT_THAT(status.ToString(), testing::HasSubstr("AUDIO_FILE_FAILED: "));
+}
+
+TEST(OpenDevice, KeepsAFileThatIsNoSound) {
+  ManualClock clock;
+  const std::string path = testing::TempDir() + "KeepsAFileThatIsNoSound.db";
+  std::ofstream(path) << "SQLite format 3";
+  const absl::Status status = Open("file:" + path, clock).status();
+  EXPECT_THAT(status.ToString(), testing::HasSubstr("INVALID_AUDIO_DEVICE: \"" + path));
+  EXPECT_EQ(std::filesystem::file_size(path), 15U);
+  std::filesystem::remove(path);
 }
 
 TEST(OpenDevice, RefusesWhatNamesNoDevice) {

@@ -202,6 +202,33 @@ TEST(ContactIntake, CountsTheImpulsesThatItHandsOn) {
   EXPECT_TRUE(intake.last_rejection().ok());
 }
 
+TEST(ContactIntake, RejectsAllReportsOfAStepFarAhead) {
+  Mixer mixer;
+  SceneRegistry scenes(mixer);
+  const uint64_t registered = *scenes.CreateScene();
+  Scene scene("a scene");
+  ASSERT_TRUE(
+      scene.Insert(1, scenes.AddObject(registered, 1, SmallModel(), SmallProperties())->object)
+          .ok());
+  RecordingTarget target;
+  ContactIntake intake(scene, target, {.step_s = kStepS});
+  ASSERT_TRUE(intake.BeginStep(0).ok());
+  intake.Hold({.contact = SmallImpulse(1).contact});
+  intake.EndStep();
+  target.events.clear();
+  ASSERT_TRUE(intake.BeginStep(1e9).ok());  // milliseconds, say, or a clock of another machine
+  const size_t ended_count = target.events.size();  // the force ends where it was last reported
+  intake.Move(1, {});
+  intake.MoveListener({});
+  intake.Strike(SmallImpulse(1));
+  intake.Hold({.contact = SmallImpulse(1).contact});
+  intake.Touch({.contact = SmallImpulse(1).contact});
+  intake.EndStep();
+  EXPECT_EQ(intake.rejected_count(), 5U);
+  EXPECT_THAT(std::string(intake.last_rejection().message()), StartsWith("TIME_TOO_FAR_AHEAD: "));
+  EXPECT_EQ(target.events.size(), ended_count);
+}
+
 /// A scene with two objects, and the events that an intake of it hands on.
 class ReadingTest : public testing::Test {
  protected:

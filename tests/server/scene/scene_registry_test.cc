@@ -275,6 +275,26 @@ TEST(SceneRegistry, AnObjectThatRingsIsHeardWhereItGoesAndFromWhereTheListenerGo
   EXPECT_GT(render(), 1000);
 }
 
+TEST(SceneRegistry, RefusesAMoveThatTheMixerHasNoRoomFor) {
+  Stage stage;
+  const HearingSettings hearing{.distance_gain = true};
+  const uint64_t scene = *stage.scenes.CreateScene({.hearing = hearing, .listener = {}});
+  ObjectProperties properties = SmallProperties();
+  properties.pose = Pose{.position_m = {-1, 0, 0}};
+  const uint32_t handle = stage.scenes.AddObject(scene, 0, SmallModel(), properties)->handle;
+  const auto move = [&] {
+    ObjectChange change;
+    change.pose = Pose{.position_m = {1, 0, 0}};
+    return stage.scenes.UpdateObject(scene, handle, change).status();
+  };
+  absl::Status status;
+  // Nothing renders, so that nothing takes the moves.
+  for (size_t i = 0; status.ok() && i <= SceneRegistry::kMaxObjectCount; ++i) status = move();
+  EXPECT_THAT(status.ToString(), HasSubstr("TOO_MANY_MOVES: "));
+  stage.Render(1);
+  EXPECT_TRUE(move().ok());
+}
+
 TEST(SceneRegistry, RefusesPosesGlidesAndHearingsOutOfRange) {
   Stage stage;
   const uint32_t handle = stage.Add();

@@ -121,6 +121,21 @@ TEST(Overload, TooManyStrikesAreMergedThenShedAndTheLoudOneIsHeard) {
   EXPECT_NEAR(Rms(std::span(shed.sound).subspan(128)), alone, 0.01 * alone);
 }
 
+TEST(Overload, MovesHoweverManyLeaveWorkForAStrike) {
+  const TestClock clock;
+  Mixer mixer(Bounded(clock, 0.7));
+  const BankId bank = mixer.Add(MakeBank()).value();
+  // Their 100 units each are more than the 1.87e6 of a block.
+  constexpr size_t kMoves = 20'000;
+  const auto stream = mixer.OpenStream(kMoves + 1).value();
+  for (size_t i = 0; i < kMoves; ++i) stream->TryPush({.bank = bank, .action = ListenerMove{}});
+  stream->TryPush({.bank = bank, .action = MakeUnitImpulse()});
+  std::vector<float> sound(512);
+  mixer.Render(sound);
+  EXPECT_EQ(mixer.statistics().shed_count, 0U);
+  EXPECT_GT(Rms(sound), 0);
+}
+
 TEST(Overload, TheQuietestBanksAreShedUntilTheRestCanRing) {
   TestClock clock;
   clock.set_step(std::chrono::microseconds(30));  // about what a unit of work is to take
