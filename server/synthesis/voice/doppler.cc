@@ -2,6 +2,7 @@
 #include "server/synthesis/voice/doppler.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "server/synthesis/voice/vector3.h"
 
@@ -26,16 +27,34 @@ Vector3 PastPositions::Before(double blocks) const noexcept {
           after[2] + part * (before[2] - after[2])};
 }
 
+Vector3 PastPositions::StepBefore(double blocks) const noexcept {
+  const size_t count = positions_m_.size();
+  const auto whole = std::min(static_cast<size_t>(blocks), count - 2);
+  return Minus(positions_m_[(newest_ + count - whole - 1) % count],
+               positions_m_[(newest_ + count - whole) % count]);
+}
+
 SoundPath FindSoundPath(const PastPositions& object, const Vector3& listener_m,
                         const DelayLimits& limits, double delay_frames) noexcept {
-  // Each round reduces the error by the ratio of the object's speed to the speed of sound.
-  constexpr int kRounds = 5;
-  SoundPath path{.delay_frames = delay_frames};
-  for (int round = 0; round < kRounds; ++round) {
+  // Newton's method converges for every object that is slower than sound. Where an object comes
+  // nearer at more than kFastest times the speed of sound, the steps are those of this speed.
+  constexpr int kMostRounds = 12;
+  constexpr double kFastest = 0.9, kClose = 1e-4;  // of a frame
+  SoundPath path{.delay_frames = std::clamp(delay_frames, limits.least_frames, limits.most_frames)};
+  for (int round = 0; round < kMostRounds; ++round) {
     const double blocks = path.delay_frames / static_cast<double>(limits.block_frame_count);
     path.away_m = Minus(object.Before(blocks), listener_m);
-    path.delay_frames = std::clamp(Length(path.away_m) * limits.frames_per_metre,
+    const double distance_m = Length(path.away_m);
+    const double excess = distance_m * limits.frames_per_metre - path.delay_frames;
+    // The growth of the distance, in frames, with each frame farther in the past.
+    const double growth = distance_m > 0 ? Dot(path.away_m, object.StepBefore(blocks)) /
+                                               distance_m * limits.frames_per_metre /
+                                               static_cast<double>(limits.block_frame_count)
+                                         : 0;
+    const double before = path.delay_frames;
+    path.delay_frames = std::clamp(before + excess / (1 - std::min(growth, kFastest)),
                                    limits.least_frames, limits.most_frames);
+    if (std::abs(path.delay_frames - before) < kClose) break;
   }
   return path;
 }

@@ -28,6 +28,10 @@ class PastPositions {
   /// blocks the object moves in a straight line.
   Vector3 Before(double blocks) const noexcept;
 
+  /// Returns the change of position from one block to the block before it, at the time `blocks`
+  /// blocks before the end of the last block.
+  Vector3 StepBefore(double blocks) const noexcept;
+
   /// Number of blocks kept.
   size_t size() const noexcept { return positions_m_.size(); }
 

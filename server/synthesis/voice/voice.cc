@@ -11,8 +11,10 @@ namespace carillon {
 namespace {
 
 constexpr double kFadeS = 0.01;
-/// A delay that changes faster than this, in frames per frame, is treated as a jump.
-constexpr double kFastestDelay = 0.5;
+/// A delay that grows or shrinks faster than this, in frames per frame, is treated as a jump. An
+/// object that comes nearer at v shrinks its delay by v/(c - v), so 3 is three quarters of the
+/// speed of sound, two octaves up. At a growth of 1, the listener would outrun the sound.
+constexpr double kFastestGrowth = 0.9, kFastestShrinking = 3;
 /// Within this distance an object's panning moves to the middle.
 constexpr double kNearM = 0.1;
 
@@ -116,9 +118,10 @@ void Voice::NoteHeard() noexcept {
   if (object_.jumped()) positions_.Fill(SoundAt(object_.place()));
   const double trend = 2 * heard_[3].delay_frames - heard_[2].delay_frames;
   const Heard next = Hear(trend);
-  const double most_change = kFastestDelay * static_cast<double>(settings_.block_frame_count);
-  jump_waits_ |= object_.jumped() || listener_.jumped() ||
-                 std::abs(next.delay_frames - heard_[3].delay_frames) > most_change;
+  const double growth = (next.delay_frames - heard_[3].delay_frames) /
+                        static_cast<double>(settings_.block_frame_count);
+  jump_waits_ |= object_.jumped() || listener_.jumped() || growth > kFastestGrowth ||
+                 growth < -kFastestShrinking;
   if (!jump_waits_) {
     heard_ = {heard_[1], heard_[2], heard_[3], next};
   } else if (fade_ < 1) {  // the new jump waits until the present cross-fade has ended

@@ -48,8 +48,10 @@ inline constexpr double kLongestPropagationS = 0.6;
 ///
 /// These are evaluated at the ends of blocks. Between them, gains are interpolated linearly and the
 /// delay by a cubic with continuous slope, so that a moving object has the right Doppler shift and
-/// does not click. The voice is one block late. A jump is rendered as a cross-fade of 10 ms. The
-/// delay is at least DelayLine::kLeastDelay samples, the delay of an object at 0.09 m (at 48 kHz).
+/// does not click. The voice is one block late. A jump, or a delay that grows by more than 0.9 or
+/// shrinks by more than 3 frames in a frame, is rendered as a cross-fade of 10 ms. Frequencies that
+/// are shifted above Nyquist alias. The delay is at least DelayLine::kLeastDelay samples, the delay
+/// of an object at 0.09 m (at 48 kHz).
 ///
 /// For two ears, the responses of a measured head for the direction of the sound replace the gains
 /// to left and right. The delays of these responses add to d, so that each ear has its own Doppler

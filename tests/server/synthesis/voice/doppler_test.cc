@@ -35,6 +35,16 @@ TEST(DopplerTest, SoundComesFromWhereTheObjectWas) {
   }
 }
 
+TEST(DopplerTest, FindsTheDelayOfFastObjectsFromAPoorEstimate) {
+  for (const double speed : {-260.0, -200.0, 200.0, 300.0, 340.0}) {
+    const double delay_s = 30 / (kSoundSpeed + speed);
+    for (const double estimate : {12.0, 2 * delay_s * kRate}) {
+      const SoundPath path = FindSoundPath(Moving(30, speed), {}, kLimits, estimate);
+      EXPECT_NEAR(path.delay_frames, delay_s * kRate, 1e-3) << speed;
+    }
+  }
+}
+
 TEST(DopplerTest, DelaysStayWithinTheirLimits) {
   EXPECT_EQ(FindSoundPath(Moving(0, 0), {}, kLimits, 0).delay_frames, kLimits.least_frames);
   EXPECT_EQ(FindSoundPath(Moving(1e6, 0), {}, kLimits, 0).delay_frames, kLimits.most_frames);

@@ -194,6 +194,34 @@ TEST(Voice, AListenerWhoMovesHearsTheDopplerFactorOfAMovingReceiver) {
   EXPECT_NEAR(FrequencyHz(sound.left, 48000, 95000), expected_hz, 1e-4 * expected_hz);
 }
 
+TEST(Voice, TheDopplerFactorHoldsForFastObjects) {
+  for (const auto [start_m, speed, begin_s, end_s] :
+       {std::array{200.0, -250.0, 0.63, 0.7}, std::array{5.0, 300.0, 0.15, 0.6}}) {
+    Heard heard({.propagation_delay = true}, {.position_m = {0, 0, start_m}}, 1);
+    const auto sound = heard.Play(Tone(1000, 0.75), Drive([&](double t) -> std::array<double, 3> {
+                                    return {0, 0, start_m + speed * t};
+                                  }));
+    const double expected_hz = 1000 * kSpeed / (kSpeed + speed);
+    EXPECT_NEAR(FrequencyHz(sound.left, static_cast<size_t>(begin_s * kRate),
+                            static_cast<size_t>(end_s * kRate)),
+                expected_hz, 2e-3 * expected_hz)
+        << speed;
+  }
+}
+
+TEST(Voice, TheDopplerFactorHoldsForFastListeners) {
+  for (const auto [start_m, speed] : {std::array{205.0, -300.0}, std::array{5.0, 300.0}}) {
+    Heard heard({.propagation_delay = true}, {}, 1);
+    heard.voice().MoveListener(MotionTo(0, 0, start_m, 0), 0);
+    heard.Play(std::vector<float>(48000));
+    heard.voice().MoveListener(MotionTo(0, 0, start_m + 0.6 * speed, 28800), 0);
+    const Stereo sound = heard.Play(Tone(1000, 0.6));
+    const double expected_hz = 1000 * (kSpeed - speed) / kSpeed;
+    // The tone reaches a listener who comes nearer 0.32 s after its start.
+    EXPECT_NEAR(FrequencyHz(sound.left, 17280, 27840), expected_hz, 5e-3 * expected_hz) << speed;
+  }
+}
+
 TEST(Voice, AnObjectThatCirclesCloselyDoesNotClick) {
   const HearingSettings all{.distance_gain = true, .propagation_delay = true, .panning = true};
   Heard heard(all, {.position_m = {1, 0, 0}});
