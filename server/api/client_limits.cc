@@ -54,17 +54,20 @@ absl::StatusOr<ClientPlace> ClientLimits::Take(Holding holding, const std::strin
         absl::StrCat(bound.whole, " uploads and imports run: try again when one is done"));
   }
   const auto found = held.find(client);
-  RETURN_IF_ERROR(Check(bound.name, bound.whole, found == held.end() ? 1 : found->second + 1));
+  RETURN_IF_ERROR(Check(bound.name, bound.whole, found == held.end() ? 0 : found->second, 1));
   ++held[client];
   return ClientPlace(*this, holding, client);
 }
 
-absl::Status ClientLimits::Check(absl::string_view name, size_t whole, size_t wanted) const {
+absl::Status ClientLimits::Check(absl::string_view name, size_t whole, size_t held,
+                                 size_t more) const {
   const size_t most = ShareOf(whole, share_);
-  if (share_ >= 1 || wanted <= most) return absl::OkStatus();
+  if (share_ >= 1 || held + more <= most) return absl::OkStatus();
+  const std::string wish =
+      held >= most ? " already" : absl::StrCat(", and ", more, " more would exceed ", most);
   return Refusal(absl::StatusCode::kResourceExhausted, "CLIENT_LIMIT_REACHED",
-                 absl::StrCat("this client may have ", most, " ", name, ", its share of ", whole,
-                              ", and this would be ", wanted, ": end some first"));
+                 absl::StrCat("this client has ", held, " ", name, wish, ", its share of ", whole,
+                              ": end some first"));
 }
 
 size_t ClientLimits::count(Holding holding) const {

@@ -61,9 +61,10 @@ class ClientLimits {
   /// (CLIENT_LIMIT_REACHED; TOO_MANY_UPLOADS: kMaxUploadCount uploads of all clients run).
   absl::StatusOr<ClientPlace> Take(Holding holding, const std::string& client);
 
-  /// Checks that one client may have `wanted` of `whole` things of a kind that `name` names, such
-  /// as objects, which the caller counts. Errors: ResourceExhausted (CLIENT_LIMIT_REACHED).
-  absl::Status Check(absl::string_view name, size_t whole, size_t wanted) const;
+  /// Checks that a client that holds `held` of `whole` things may have `more` of them. `name` names
+  /// the things, such as objects, which the caller counts. Errors: ResourceExhausted
+  /// (CLIENT_LIMIT_REACHED).
+  absl::Status Check(absl::string_view name, size_t whole, size_t held, size_t more) const;
 
   /// Returns the number of places that are taken.
   size_t count(Holding holding) const;

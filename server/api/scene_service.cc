@@ -264,11 +264,11 @@ bool SceneService::EndAbandoned(const std::optional<std::string>& client) {
 
 absl::Status SceneService::CheckObjectCount(uint64_t scene, size_t more) const {
   const std::vector<uint64_t> of_client = owners_.ScenesOfItsClient(scene);
-  size_t count = more;
+  size_t held = 0;
   for (const SceneRegistry::SceneEntry& entry : scenes_.ListScenes()) {
-    if (std::ranges::binary_search(of_client, entry.scene)) count += entry.object_count;
+    if (std::ranges::binary_search(of_client, entry.scene)) held += entry.object_count;
   }
-  return reception_.limits.Check("objects", SceneRegistry::kMaxObjectCount, count);
+  return reception_.limits.Check("objects", SceneRegistry::kMaxObjectCount, held, more);
 }
 
 absl::Status SceneService::Add(uint64_t scene, const v1::AddObjectRequest& request,

@@ -65,6 +65,20 @@ TEST_F(ClientApi, ASceneEndsAfterItsConnectionOverAnyKindOfAddress) {
   }
 }
 
+TEST_F(ClientApi, AClientMayNotHaveMoreThanItsShareOfAllObjects) {
+  const auto channel = Connect(address());
+  v1::AddObjectsRequest request;
+  request.set_scene(CreateSceneOn(channel));
+  for (int i = 0; i < 1025; ++i) request.add_objects();  // one more than a quarter of 4096
+  v1::AddObjectsResponse response;
+  const auto stub = v1::SceneService::NewStub(channel);
+  const grpc::Status status = Call(*stub, &v1::SceneService::Stub::AddObjects, request, response);
+  EXPECT_EQ(ErrorOf(status).reason(), "CLIENT_LIMIT_REACHED");
+  request.mutable_objects()->RemoveLast();
+  const grpc::Status within = Call(*stub, &v1::SceneService::Stub::AddObjects, request, response);
+  EXPECT_NE(ErrorOf(within).reason(), "CLIENT_LIMIT_REACHED");  // they name no model
+}
+
 TEST_F(ClientApi, ASceneThatIsToBeKeptOutlivesItsConnection) {
   auto channel = Connect(address());
   v1::CreateSceneRequest request;

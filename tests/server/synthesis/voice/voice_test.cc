@@ -198,9 +198,10 @@ TEST(Voice, TheDopplerFactorHoldsForFastObjects) {
   for (const auto [start_m, speed, begin_s, end_s] :
        {std::array{200.0, -250.0, 0.63, 0.7}, std::array{5.0, 300.0, 0.15, 0.6}}) {
     Heard heard({.propagation_delay = true}, {.position_m = {0, 0, start_m}}, 1);
-    const auto sound = heard.Play(Tone(1000, 0.75), Drive([&](double t) -> std::array<double, 3> {
-                                    return {0, 0, start_m + speed * t};
-                                  }));
+    const auto sound = heard.Play(
+        Tone(1000, 0.75), Drive([z = start_m, v = speed](double t) -> std::array<double, 3> {
+          return {0, 0, z + v * t};
+        }));
     const double expected_hz = 1000 * kSpeed / (kSpeed + speed);
     EXPECT_NEAR(FrequencyHz(sound.left, static_cast<size_t>(begin_s * kRate),
                             static_cast<size_t>(end_s * kRate)),
