@@ -179,10 +179,11 @@ void Mixer::CollectDueEvents(size_t block_count) noexcept {
   }
   for (uint32_t block = 0; block < block_count; ++block) {
     const size_t first = due_.size();
-    pending_.Collect(
-        block_start_ + block * settings_.block_frame_count, due_,
-        [this](const MixerEvent& event, uint32_t stop_count)
-            ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole) { return IsStale(event, stop_count); });
+    const auto is_stale = [this](const MixerEvent& event, uint32_t stop_count) {
+      const InRole role(kRenderRole);
+      return IsStale(event, stop_count);
+    };
+    pending_.Collect(block_start_ + block * settings_.block_frame_count, due_, is_stale);
     const std::span<const uint32_t> due = std::span(due_).subspan(first);
     if (budget_.bounded()) DecideTreatment(due);
     ChooseEvents(block, due);
