@@ -4,12 +4,14 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
 #include <sndfile.hh>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
@@ -32,6 +34,8 @@ struct WaveFile::Sound {
   std::string path;
   int memory;  ///< descriptor of the file in memory that goes to stdout; -1: none
   SndfileHandle file;
+  bool clips = false;  ///< whether samples are whole numbers, which end at full scale
+  std::vector<float> clipped{};
 
   ~Sound() {
     if (memory >= 0) close(memory);
@@ -58,8 +62,7 @@ absl::StatusOr<WaveFile> WaveFile::Create(const std::string& path, const WaveFor
   if (sound->file.error() != SF_ERR_NO_ERROR) return NotWritable(path, sound->file.strError());
   // It has the time of day, and would make each file of the same samples another.
   sound->file.command(SFC_SET_ADD_PEAK_CHUNK, nullptr, SF_FALSE);
-  // Without it a sample beyond full scale would become one of the other sign.
-  sound->file.command(SFC_SET_CLIPPING, nullptr, SF_TRUE);
+  sound->clips = format.bits < 32;
   return WaveFile(std::move(sound));
 }
 
@@ -79,6 +82,13 @@ absl::Status WaveFile::Finish() {
 }
 
 absl::Status WaveFile::Write(std::span<const float> samples) {
+  // A sample beyond full scale would become one of the other sign. The library's own clipping
+  // truncates where its conversion without clipping rounds.
+  if (sound_->clips) {
+    sound_->clipped.assign(samples.begin(), samples.end());
+    for (float& sample : sound_->clipped) sample = std::clamp(sample, -1.0F, 1.0F);
+    samples = sound_->clipped;
+  }
   const auto count = static_cast<sf_count_t>(samples.size());
   if (sound_->file.write(samples.data(), count) == count) return absl::OkStatus();
   return NotWritable(sound_->path, sound_->file.strError());
