@@ -201,13 +201,18 @@ void Mixer::CollectDueEvents(size_t block_count) noexcept {
   }
 }
 
-/// Whether an event will have no effect, because its bank has gone, or because its bus was stopped
-/// after it came. Such events give their places to others before they are due.
-bool Mixer::IsStale(const MixerEvent& event, uint32_t stop_count) const noexcept {
-  const BankSlot& slot = slots_[event.bank.slot];
-  if (slot.bank == nullptr || slot.generation != event.bank.generation) return true;
+/// Whether a bus that was stopped after the event came leaves it out: an impulse, or its beginning.
+bool Mixer::WasStopped(const MixerEvent& event, const BankSlot& slot,
+                       uint32_t stop_count) const noexcept {
   const bool strikes = event.impulse() != nullptr || event.beginning() != nullptr;
   return strikes && stop_count != buses_[slot.bus]->stop_count;
+}
+
+/// Whether an event will have no effect, because its bank has gone or its bus was stopped. Such an
+/// event gives its place to others before it is due.
+bool Mixer::IsStale(const MixerEvent& event, uint32_t stop_count) noexcept {
+  const BankSlot* slot = FindSlot(event.bank);
+  return slot == nullptr || WasStopped(event, *slot, stop_count);
 }
 
 /// Decides which of a block's events are rendered, and notes their places in the order of
@@ -226,8 +231,7 @@ void Mixer::ChooseEvents(uint32_t block, std::span<const uint32_t> due) noexcept
     --slot->pending_count;
     const bool strikes = event.impulse() != nullptr;
     const SurfaceImpulse* impulse = strikes ? event.impulse() : event.beginning();
-    // A bus that was stopped renders no impulse that came before.
-    if (impulse != nullptr && pending_.tag(index) != buses_[slot->bus]->stop_count) continue;
+    if (WasStopped(event, *slot, pending_.tag(index))) continue;
     Treatment treatment = Treatment::kExact;
     if (budget_.bounded() && impulse != nullptr) {
       treatment = triage_.Treat(LoudnessOf(*impulse, *slot));

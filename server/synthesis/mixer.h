@@ -241,7 +241,9 @@ class Mixer {
   void Take(MixerEvent& event, EventQueue& queue) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void CollectDueEvents(size_t block_count) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
-  bool IsStale(const MixerEvent& event, uint32_t stop_count) const noexcept
+  bool WasStopped(const MixerEvent& event, const BankSlot& slot, uint32_t stop_count) const noexcept
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  bool IsStale(const MixerEvent& event, uint32_t stop_count) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void ChooseEvents(uint32_t block, std::span<const uint32_t> due) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);

@@ -39,6 +39,7 @@ void Mixer::DecideTreatment(std::span<const uint32_t> due) noexcept {
     const MixerEvent& event = pending_[index];
     BankSlot* slot = FindSlot(event.bank);
     if (slot == nullptr || event.impulse() == nullptr) continue;
+    if (WasStopped(event, *slot, pending_.tag(index))) continue;
     const double awakening = slot->awakening ? 0 : slot->bank->awakening_work();
     slot->awakening = true;
     triage_.Note(LoudnessOf(*event.impulse(), *slot), slot->bank->strike_work() + awakening,

@@ -121,6 +121,22 @@ TEST(Overload, TooManyStrikesAreMergedThenShedAndTheLoudOneIsHeard) {
   EXPECT_NEAR(Rms(std::span(shed.sound).subspan(128)), alone, 0.01 * alone);
 }
 
+TEST(Overload, StoppedStrikesTakeNoWorkFromThoseThatSound) {
+  const TestClock clock;
+  // 4001 strikes would be shed, see TooManyStrikesAreMergedThenShedAndTheLoudOneIsHeard.
+  Mixer mixer(Bounded(clock, 0.2));
+  const BankId bank = mixer.Add(MakeBank()).value();
+  const auto stream = mixer.OpenStream(4096).value();
+  const MixerEvent strike{.bank = bank, .frame = 128, .action = MakeUnitImpulse()};
+  for (int i = 0; i < 4000; ++i) stream->TryPush(strike);
+  std::vector<float> block(128);
+  mixer.Render(block);  // takes the strikes, which are due in the next block
+  mixer.Stop({});
+  stream->TryPush({.bank = bank, .frame = 128, .action = MakeUnitImpulse()});
+  mixer.Render(block);
+  EXPECT_EQ(mixer.statistics().merged_count + mixer.statistics().shed_count, 0U);
+}
+
 TEST(Overload, MovesHoweverManyLeaveWorkForAStrike) {
   const TestClock clock;
   Mixer mixer(Bounded(clock, 0.7));
