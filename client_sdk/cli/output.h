@@ -21,8 +21,8 @@ void PrintJson(const google::protobuf::Message& message);
 /// Returns a linear amplitude (full scale is 1) as text, such as "-6.0 dBFS" or "silence".
 std::string Decibels(double amplitude);
 
-/// Returns a loudness as text, such as "-23.0 LUFS", or "below -70 LUFS" if none is
-/// given: the standard does not measure what is softer.
+/// Returns a loudness as text, such as "-23.0 LUFS", or "below -70 LUFS" if it is absent. The
+/// standard (ITU-R BS.1770) leaves out all sound below -70 LUFS.
 std::string Loudness(bool present, double lufs);
 
 }  // namespace carillon::cli

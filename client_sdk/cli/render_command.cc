@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <algorithm>
 #include <cstdio>
 
 #include "absl/strings/str_cat.h"
@@ -52,7 +51,7 @@ void PrintFile(const RenderOptions& options, const RenderedFile& file) {
   std::FILE* const out = options.out == "-" ? stderr : stdout;
   if (file.factor() != 1) {
     absl::FPrintF(out, "the file has the sound times %.4g, with a peak of %s\n", file.factor(),
-                  Decibels(std::min(file.peak(), file.clipped_count() > 0 ? 1.0F : file.peak())));
+                  Decibels(file.clipped_count() > 0 ? 1.0 : file.peak()));
   }
   if (file.clipped_count() > 0) {
     absl::FPrintF(out,

@@ -43,7 +43,7 @@ void RenderedFile::Write() {
   for (float& sample : samples_) {
     sample *= static_cast<float>(factor_);
     peak_ = std::max(peak_, std::abs(sample));
-    if (form_.format.bits < 32 && std::abs(sample) > 1) ++clipped_count_;
+    if (form_.format.clips() && std::abs(sample) > 1) ++clipped_count_;
   }
   status_ = file_->Write(samples_);
   written_count_ += samples_.size();

@@ -34,7 +34,7 @@ struct WaveFile::Sound {
   std::string path;
   int memory;  ///< descriptor of the file in memory that goes to stdout; -1: none
   SndfileHandle file;
-  bool clips = false;  ///< whether samples are whole numbers, which end at full scale
+  bool clips = false;  ///< see WaveFormat
   std::vector<float> clipped{};
 
   ~Sound() {
@@ -62,7 +62,7 @@ absl::StatusOr<WaveFile> WaveFile::Create(const std::string& path, const WaveFor
   if (sound->file.error() != SF_ERR_NO_ERROR) return NotWritable(path, sound->file.strError());
   // It has the time of day, and would make each file of the same samples another.
   sound->file.command(SFC_SET_ADD_PEAK_CHUNK, nullptr, SF_FALSE);
-  sound->clips = format.bits < 32;
+  sound->clips = format.clips();
   return WaveFile(std::move(sound));
 }
 

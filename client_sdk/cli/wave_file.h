@@ -16,6 +16,9 @@ struct WaveFormat {
   uint32_t sample_rate_hz = 48000;
   uint32_t channel_count = 1;
   int bits = 24;  ///< 16 or 24; 32 for floating point
+
+  /// Whether samples beyond full scale are clipped. Samples in floating point are not.
+  bool clips() const { return bits < 32; }
 };
 
 /// Writes a WAV file block by block.

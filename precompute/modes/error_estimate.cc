@@ -175,10 +175,11 @@ TetGeometry GeometryOf(const TetMesh& mesh, const int32_t* element) {
   return MakeTetGeometry(corners);
 }
 
-/// Returns the weights of edges and faces by the reentrance of their corners (ReentrantNodes). At a
-/// vertex where the displacement is like r^a, elements of order p + 1 in place of p lessen the
-/// error to (p / (p + 1))^(4 a) (Babuska and Suri, SIAM Review 36, 1994). With the exponents of
-/// elastic wedges the part that is left rises about as the square root of the reentrant angle.
+/// Returns the weights of edges and faces by the reentrance of their corners (ReentrantNodes). At
+/// an edge from which the displacement grows as the power a of the distance, elements of order p +
+/// 1 in place of p lessen the error to (p / (p + 1))^(4 a) (Babuska and Suri, SIAM Review 36,
+/// 1994). With the exponents of elastic wedges the part that is left rises about as the square root
+/// of the reentrant angle.
 std::vector<double> Weights(std::vector<double> reentrance) {
   for (double& value : reentrance) value = 1 + std::sqrt(value);
   return reentrance;

@@ -32,7 +32,7 @@ double Reentrance(const TetMesh& mesh, const BoundaryFace& first, const Boundary
   const Point other = NormalOf(mesh, second);
   const double angle = std::atan2(Norm(Cross(normal, other)), Dot(normal, other));
   const double rise = Dot(Difference(At(mesh, opposite), At(mesh, first.nodes[0])), normal);
-  return rise > 0 ? angle / (std::numbers::pi / 2) : -angle / (std::numbers::pi / 2);
+  return (rise > 0 ? angle : -angle) / (std::numbers::pi / 2);
 }
 
 }  // namespace

@@ -263,11 +263,7 @@ bool SceneService::EndAbandoned(const std::optional<std::string>& client) {
 }
 
 absl::Status SceneService::CheckObjectCount(uint64_t scene, size_t more) const {
-  const std::vector<uint64_t> of_client = owners_.ScenesOfItsClient(scene);
-  size_t held = 0;
-  for (const SceneRegistry::SceneEntry& entry : scenes_.ListScenes()) {
-    if (std::ranges::binary_search(of_client, entry.scene)) held += entry.object_count;
-  }
+  const size_t held = scenes_.CountObjects(owners_.ScenesOfItsClient(scene));
   return reception_.limits.Check("objects", SceneRegistry::kMaxObjectCount, held, more);
 }
 

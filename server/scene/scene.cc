@@ -48,6 +48,11 @@ std::map<uint32_t, SoundingObject> Scene::CopyAll() const {
   return objects_;
 }
 
+size_t Scene::object_count() const {
+  const MutexLock lock(&mutex_);
+  return objects_.size();
+}
+
 absl::Status Scene::CheckFree(uint32_t handle) const {
   const MutexLock lock(&mutex_);
   return objects_.contains(handle) ? ObjectExists(handle) : absl::OkStatus();

@@ -56,6 +56,9 @@ class Scene {
   /// Returns a copy of every object by its handle. The result is empty if the scene was deleted.
   std::map<uint32_t, SoundingObject> CopyAll() const;
 
+  /// Returns the number of objects, which is zero if the scene was deleted.
+  size_t object_count() const;
+
   /// Checks that a handle is free. Errors: AlreadyExists (OBJECT_EXISTS: an object has this
   /// handle).
   absl::Status CheckFree(uint32_t handle) const;

@@ -133,10 +133,19 @@ std::vector<SceneRegistry::SceneEntry> SceneRegistry::ListScenes() const {
   return entries;
 }
 
+size_t SceneRegistry::CountObjects(std::span<const uint64_t> scenes) const {
+  size_t count = 0;
+  for (const uint64_t scene : scenes) {
+    const absl::StatusOr<std::shared_ptr<Scene>> found = FindScene(scene);
+    if (found.ok()) count += (*found)->object_count();
+  }
+  return count;
+}
+
 SceneRegistry::SceneEntry SceneRegistry::EntryOf(uint64_t id, const Scene& scene) const {
   return {.scene = id,
           .name = scene.name(),
-          .object_count = scene.CopyAll().size(),
+          .object_count = scene.object_count(),
           .volume = volumes_.volume(id),
           .state = mixer_.State(scene.bus())};
 }
@@ -283,7 +292,7 @@ absl::Status SceneRegistry::UpdateListener(uint64_t scene, const Pose& pose, dou
   const MutexLock change_lock(&change_mutex_);
   ASSIGN_OR_RETURN(const std::shared_ptr<Scene> found, FindScene(scene));
   RETURN_IF_ERROR(ValidateGlide(glide_s));
-  RETURN_IF_ERROR(AwaitRoomForMoves(EntryOf(scene, *found).object_count));
+  RETURN_IF_ERROR(AwaitRoomForMoves(found->object_count()));
   const MutexLock lock(&found->mutex());
   ASSIGN_OR_RETURN(const auto* objects, found->MoveListener(pose));
   for (const auto& [handle, object] : *objects) {

@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -80,6 +81,9 @@ class SceneRegistry {
 
   /// Returns all scenes, the oldest first.
   std::vector<SceneEntry> ListScenes() const;
+
+  /// Returns the number of objects in these scenes. Scenes that do not exist have none.
+  size_t CountObjects(std::span<const uint64_t> scenes) const;
 
   /// Returns a scene. Errors: NotFound (SCENE_NOT_FOUND).
   absl::StatusOr<SceneEntry> GetScene(uint64_t scene) const;

@@ -8,8 +8,7 @@ namespace carillon {
 namespace {
 
 /// Bounds for a mode in a tile: |log q| times half the tile's frames, and -Re log q times all of
-/// them. The interpolation error is then at most -116 dB, or -110 dB for the
-/// fastest decay.
+/// them. The interpolation error is then at most -116 dB, or -110 dB for the fastest decay.
 constexpr double kMostHalfTileRadians = 2.4;
 constexpr double kMostDecay = 0.5;
 /// The polynomial's highest frequency relative to the fastest mode's, chosen for the least error.

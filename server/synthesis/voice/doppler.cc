@@ -39,7 +39,9 @@ SoundPath FindSoundPath(const PastPositions& object, const Vector3& listener_m,
   // Newton's method converges for every object that is slower than sound. Where an object comes
   // nearer at more than kFastest times the speed of sound, the steps are those of this speed.
   constexpr int kMostRounds = 12;
-  constexpr double kFastest = 0.9, kClose = 1e-4;  // of a frame
+  constexpr double kFastest = 0.9;
+  // The rounds end when the delay changes by less than this, in frames.
+  constexpr double kClose = 1e-4;
   SoundPath path{.delay_frames = std::clamp(delay_frames, limits.least_frames, limits.most_frames)};
   for (int round = 0; round < kMostRounds; ++round) {
     const double blocks = path.delay_frames / static_cast<double>(limits.block_frame_count);

@@ -3,6 +3,8 @@
 
 import dataclasses
 import math
+import os
+import pathlib
 import sys
 from typing import Callable
 
@@ -13,6 +15,7 @@ import numpy
 import pairing
 import users
 
+ROOT = pathlib.Path(__file__).parents[3]
 FINER, MOST_NODES, MOST_SECONDS = 4, 300_000, 1200
 # Below a cent, which nobody hears, an error is not judged.
 SMALLEST_ERROR = 5.8e-4
@@ -152,7 +155,9 @@ def row(body, goal, ours, finer):
 
 
 def estimates(options, folder, environment):
-    sys.path[:0] = [str(options.build / "client_sdk/python")]
+    os.environ["CARILLON_BIN_DIR"] = str(options.build / "bin")
+    sys.path[:0] = [str(options.build / "client_sdk/python"), str(ROOT / "client_sdk/python"),
+                    str(ROOT / "tests/integration")]
     print("| body | goal | nodes | nodes of the finer mesh | modes compared | CPU s | largest stated error "
           "| largest true error | stated over true: least, median, most | modes within their bar |\n"
           + "| --- " * 10 + "|", flush=True)

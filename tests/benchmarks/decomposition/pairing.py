@@ -15,19 +15,13 @@ ALIKE = 0.8
 
 def read_arrays(path):
     """The arrays of a model's file by name (docs/model_format.md)."""
+    import scripted
     from carillon.v1 import modal_model_pb2
-    from google.protobuf.internal.decoder import _DecodeVarint32
 
-    data, at, parts = path.read_bytes(), 0, {}
-    header = None
-    while at < len(data):
-        length, at = _DecodeVarint32(data, at)
-        record = modal_model_pb2.ModalModelRecord.FromString(data[at:at + length])
-        at += length
-        if record.HasField("header"):
-            header = record.header
-        else:
-            parts.setdefault(record.chunk.array, []).append(record.chunk.data)
+    first, *chunks = scripted.read_records(path)
+    header, parts = first.header, {}
+    for record in chunks:
+        parts.setdefault(record.chunk.array, []).append(record.chunk.data)
     types = {modal_model_pb2.ELEMENT_TYPE_FLOAT32: "<f4", modal_model_pb2.ELEMENT_TYPE_FLOAT64: "<f8",
              modal_model_pb2.ELEMENT_TYPE_UINT32: "<u4"}
     return {array.name: numpy.frombuffer(b"".join(parts.get(number, [])), types[array.type]).reshape(array.shape)

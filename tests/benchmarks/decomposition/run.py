@@ -8,7 +8,7 @@ Each part prints a Markdown table:
   curved    CalculiX, SciPy and Lamb on curved ten-node meshes of Gmsh: frequencies
   growth    time and memory over the number of nodes, up to a million with --full
   accuracy  --accuracy 1% on five bodies: estimated and true errors of every mode
-  estimates  stated and true errors of every mode of twelve bodies, six of them with re-entrant corners
+  estimates stated and true errors of every mode of twelve bodies, six of them with re-entrant corners
   bodies    thirty bodies as users have them, with the defaults: verdict, cost, stated and true errors
   packages  the closed surfaces of some Debian packages, with --repair: the share that ends in a model
 
@@ -59,7 +59,7 @@ PARTS = {"compare": compare.compare, "calculix": calculix.compare_frequencies,
          "estimates": estimates.estimates, "bodies": users.users, "packages": packages.packages}
 
 
-HOURS = ("estimates", "bodies", "packages")  # take half of one to two
+HOURS = ("estimates", "bodies", "packages")  # take from half an hour to two hours
 
 
 def names(text):
