@@ -2,7 +2,6 @@
 //
 // carillond: puts the rooms of the daemon together.
 
-#include <signal.h>
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 #include <systemd/sd-daemon.h>
@@ -15,7 +14,6 @@
 #include <iostream>
 #include <memory>
 #include <string>
-#include <thread>
 #include <utility>
 
 #include "absl/cleanup/cleanup.h"
@@ -33,6 +31,7 @@
 #include "server/decomposition/slurm_executor.h"
 #include "server/heap_keeper.h"
 #include "server/live_output/live_output.h"
+#include "server/memory_limits.h"
 #include "server/metrics/metrics_server.h"
 #include "server/mode_database/database.h"
 #include "server/mode_database/database_admin.h"
@@ -40,13 +39,13 @@
 #include "server/mode_database/mode_database.h"
 #include "server/options.h"
 #include "server/scene/scene_registry.h"
+#include "server/stop_signals.h"
 #include "server/watchdog.h"
 
 namespace carillon {
 namespace {
 
 constexpr char kVersion[] = CARILLON_VERSION;
-constexpr std::chrono::milliseconds kStopLimit(4500);
 
 /// Reads the command line and the configuration file once more.
 using ReadOptions = std::function<absl::StatusOr<CommandLine>()>;
@@ -58,39 +57,6 @@ void SetUpLog() {
   spdlog::flush_on(spdlog::level::info);
 }
 
-/// The signals that the daemon acts on; blocked in every thread, so that only WaitForStop sees
-/// them.
-sigset_t BlockSignals() {
-  sigset_t signals;
-  sigemptyset(&signals);
-  for (const int signal_number : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&signals, signal_number);
-  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
-  for (const int signal_number : {SIGUSR1, SIGUSR2}) signal(signal_number, SIG_IGN);
-  signal(SIGPIPE, SIG_IGN);
-  signal(SIGXFSZ, SIG_IGN);  // writing beyond a file-size limit then fails like a full disk
-  return signals;
-}
-
-/// Returns on SIGINT and SIGTERM; each SIGHUP calls `reload`.
-void WaitForStop(const sigset_t& signals, const std::function<void()>& reload) {
-  int received = 0;
-  while (sigwait(&signals, &received) != 0 || received == SIGHUP) {
-    if (received == SIGHUP) reload();
-  }
-  spdlog::info("stopping on {}", received == SIGINT ? "SIGINT" : "SIGTERM");
-}
-
-/// Ends the process if it has not stopped within 4.5 s, for instance because a call computes.
-/// Nothing that was acknowledged is lost: the database is written as for a loss of power.
-void LimitStop() {
-  std::thread([] {
-    std::this_thread::sleep_for(kStopLimit);
-    spdlog::warn("calls still run {} ms after the signal to stop, and are cut off",
-                 kStopLimit.count());
-    std::_Exit(EXIT_SUCCESS);
-  }).detach();
-}
-
 void AnnounceReady(const ApiServer& server) {
   for (const std::string& address : server.addresses()) {
     std::cout << "listening on " << address << std::endl;
@@ -99,6 +65,8 @@ void AnnounceReady(const ApiServer& server) {
 }
 
 void LogWarning(const std::string& line) { spdlog::warn("{}", line); }
+
+void LogInfo(const std::string& line) { spdlog::info("{}", line); }
 
 void CollectUnusedMeshes(ModeDatabase& database) {
   const auto collected = database.meshes().Collect();
@@ -245,7 +213,7 @@ absl::StatusOr<std::unique_ptr<MetricsServer>> StartMetrics(const Options& optio
 
 /// Serves until a stop signal arrives, and lets the sound fade out.
 absl::Status Serve(const MeasuredRooms& rooms, Options& options, const ReadOptions& read_options,
-                   const sigset_t& signals) {
+                   StartGuard& start) {
   ASSIGN_OR_RETURN(const std::unique_ptr<MetricsServer> metrics, StartMetrics(options, rooms));
   const DatabaseKeeper keeper(rooms.database.database(), [&rooms](const absl::Status& files) {
     rooms.server.ShowDatabaseHealth(files.ok());
@@ -253,11 +221,12 @@ absl::Status Serve(const MeasuredRooms& rooms, Options& options, const ReadOptio
   });
   const HeapKeeper heap_keeper;
   LogOutput(rooms.output);
+  start.Complete();
   AnnounceReady(rooms.server);
   const Watchdog watchdog(rooms.output);
-  WaitForStop(signals, [&] { Reload(read_options, options, rooms.server); });
+  WaitForStop([&] { Reload(read_options, options, rooms.server); }, LogInfo);
   sd_notify(0, "STOPPING=1");
-  LimitStop();
+  LimitStop(LogWarning);
   rooms.output.FadeOut();
   return absl::OkStatus();
 }
@@ -265,7 +234,9 @@ absl::Status Serve(const MeasuredRooms& rooms, Options& options, const ReadOptio
 /// Makes the parts of the daemon, and serves. Each part is made after the parts that it uses and
 /// destroyed before them.
 absl::Status Run(Options options, const ReadOptions& read_options) {
-  const sigset_t signals = BlockSignals();
+  BlockSignals();
+  StartGuard start(LogInfo);
+  RETURN_IF_ERROR(CheckThreadsAndMemory());
   SystemClock clock;
   ASSIGN_OR_RETURN(const DataDirectory directory, DataDirectory::Open(options.data_directory));
   ASSIGN_OR_RETURN(const std::unique_ptr<ModeDatabase> database,
@@ -300,7 +271,7 @@ absl::Status Run(Options options, const ReadOptions& read_options) {
                 .decompositions = *decompositions,
                 .database = *database,
                 .server = *server},
-               options, read_options, signals);
+               options, read_options, start);
 }
 
 /// Runs `carillond db check|repair|restore`.
@@ -324,6 +295,7 @@ absl::Status RunDatabaseCommand(const CommandLine& command) {
 
 int Main(int argc, const char* const* argv) {
   BoundFreeMemory();
+  ReportUncaughtExceptions();
   SetUpLog();
   const ReadOptions read_options = [=] { return ReadCommandLine(argc, argv, kVersion); };
   const absl::StatusOr<CommandLine> command = read_options();

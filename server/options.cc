@@ -261,10 +261,10 @@ void AddFlags(CLI::App& app, Options& options) {
   app.add_option("--scene-grace", options.scene_grace_s,
                  "seconds for which a scene without connections waits for its clients")
       ->capture_default_str();
-  app.add_option(
-         "--client-share", options.client_share,
-         "share of all scenes, streams, listeners, renderings, uploads and waiting jobs that "
-         "one client may have, 0.001 to 1")
+  app.add_option("--client-share", options.client_share,
+                 "share of all connections, scenes, streams, listeners, renderings, uploads and "
+                 "waiting jobs that "
+                 "one client may have, 0.001 to 1")
       ->capture_default_str();
   app.add_option("--metrics", options.metrics_address,
                  "HOST:PORT at which Prometheus reads metrics, by HTTP without TLS [nowhere]");

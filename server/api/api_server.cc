@@ -247,7 +247,7 @@ absl::Status ApiServer::State::Listen(const ApiSettings& settings) {
   ASSIGN_OR_RETURN(std::deque<ListenAddress> parsed, ParseAddresses(settings));
   grpc::ServerBuilder builder;
   LimitClients(builder);
-  gate.emplace(RaiseConnectionLimit());
+  gate.emplace(RaiseConnectionLimit(), settings.client_share, &client_log);
   for (ListenAddress& address : parsed) {
     ASSIGN_OR_RETURN(const std::shared_ptr<grpc::ServerCredentials> credentials,
                      Credentials(address, settings));

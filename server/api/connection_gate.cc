@@ -24,6 +24,7 @@
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
+#include "server/api/client_limits.h"
 #include "server/api/peer_name.h"
 
 namespace carillon {
@@ -33,6 +34,8 @@ constexpr size_t kMaxConnectionCount = 4096;
 /// Descriptors that the database, decompositions and devices may need, apart from the connections.
 constexpr size_t kOwnDescriptorCount = 256;
 constexpr int kBacklog = 1024;
+/// This part of the places is for processes and addresses with few connections.
+constexpr size_t kKeptPart = 16;
 /// Pause after an accept that failed for lack of descriptors or memory.
 constexpr std::chrono::milliseconds kPause(50);
 
@@ -79,6 +82,14 @@ std::string SourceOf(const std::string& peer) {
   return absl::StartsWith(peer, "unix:") ? ProcessOfPeer(peer) : peer.substr(0, peer.rfind(':'));
 }
 
+/// Returns the beginning that the names of all connections of one process or address have, and no
+/// others. Processes that the system does not know share it.
+std::string SharerOf(const std::string& peer) {
+  return peer.substr(0, 1 + peer.rfind(absl::StartsWith(peer, "unix:") ? '/' : ':'));
+}
+
+std::chrono::steady_clock::time_point Now() { return std::chrono::steady_clock::now(); }
+
 /// Returns the inode of a descriptor, or 0 if the descriptor is closed.
 ino_t InodeOf(int descriptor) {
   struct stat status {};
@@ -87,8 +98,11 @@ ino_t InodeOf(int descriptor) {
 
 }  // namespace
 
-ConnectionGate::ConnectionGate(size_t max_connection_count)
-    : max_connection_count_(max_connection_count), stop_(eventfd(0, EFD_CLOEXEC)) {}
+ConnectionGate::ConnectionGate(size_t max_connection_count, double client_share, LimitedLog* log)
+    : max_connection_count_(max_connection_count),
+      client_share_(client_share),
+      log_(log),
+      stop_(eventfd(0, EFD_CLOEXEC)) {}
 
 ConnectionGate::~ConnectionGate() {
   Close();
@@ -98,10 +112,17 @@ ConnectionGate::~ConnectionGate() {
 void ConnectionGate::Close() {
   eventfd_write(stop_, 1);
   if (thread_.joinable()) thread_.join();
+  // Before the sockets are closed, their inodes belong to no other file.
+  for (const SocketFile& file : socket_files_) file.Remove();
   for (const Door& door : doors_) close(door.socket);
-  for (const std::string& path : socket_paths_) unlink(path.c_str());
   doors_.clear();
-  socket_paths_.clear();
+  socket_files_.clear();
+}
+
+void ConnectionGate::SocketFile::Remove() const {
+  struct stat now {};
+  if (lstat(path.c_str(), &now) != 0 || now.st_dev != device || now.st_ino != inode) return;
+  unlink(path.c_str());
 }
 
 absl::Status ConnectionGate::Listen(ListenAddress& address,
@@ -119,7 +140,9 @@ absl::Status ConnectionGate::ListenUnix(const ListenAddress& address, Connection
   const int bound = Bind(reinterpret_cast<const sockaddr*>(&name), sizeof name);
   if (bound < 0) return Failed(address, errno);
   doors_.push_back({bound, &taker});
-  socket_paths_.push_back(address.socket_path);
+  struct stat status {};
+  if (lstat(address.socket_path.c_str(), &status) != 0) return Failed(address, errno);
+  socket_files_.push_back({address.socket_path, status.st_dev, status.st_ino});
   if (chmod(address.socket_path.c_str(), mode) != 0) return Failed(address, errno);
   return absl::OkStatus();
 }
@@ -188,15 +211,56 @@ void ConnectionGate::Accept(const Door& door) {
 bool ConnectionGate::Connection::is_open() const { return InodeOf(descriptor) == inode; }
 
 bool ConnectionGate::Admit(const std::string& peer, const Connection& connection) {
-  const MutexLock lock(&mutex_);
-  const auto refused = refused_.find(SourceOf(peer));
-  if (refused != refused_.end() && std::chrono::steady_clock::now() < refused->second) return false;
-  if (connections_.size() >= max_connection_count_) {
-    std::erase_if(connections_, [](const auto& each) { return !each.second.is_open(); });
+  const std::string sharer = SharerOf(peer);
+  std::string reason;
+  {
+    const MutexLock lock(&mutex_);
+    const auto refused = refused_.find(SourceOf(peer));
+    if (refused != refused_.end() && Now() < refused->second) return false;
+    reason = WhyNoPlace(sharer);
+    if (!reason.empty()) {
+      std::erase_if(connections_, [](const auto& each) { return !each.second.is_open(); });
+      reason = WhyNoPlace(sharer);
+    }
+    if (reason.empty()) connections_.insert_or_assign(peer, connection);
   }
-  if (connections_.size() >= max_connection_count_) return false;
-  connections_.insert_or_assign(peer, connection);
-  return true;
+  if (!reason.empty()) Tell(sharer, reason);
+  return reason.empty();
+}
+
+std::string ConnectionGate::WhyNoPlace(const std::string& sharer) const {
+  const size_t all = connections_.size();
+  if (all >= max_connection_count_) return absl::StrCat("all ", all, " places are taken");
+  const size_t count = CountOf(sharer);
+  const size_t most = ClientLimits::ShareOf(max_connection_count_, client_share_);
+  if (client_share_ < 1 && count >= most) {
+    return absl::StrCat("it has ", count, " already, its share (--client-share) of ",
+                        max_connection_count_);
+  }
+  const size_t kept = max_connection_count_ / kKeptPart;
+  if (all < max_connection_count_ - kept || count < kFewConnections) return "";
+  return absl::StrCat("it has ", count, " already, and the last ", kept, " of ",
+                      max_connection_count_, " places are for clients with fewer than ",
+                      kFewConnections);
+}
+
+size_t ConnectionGate::CountOf(const std::string& sharer) const {
+  size_t count = 0;
+  for (auto at = connections_.lower_bound(sharer);
+       at != connections_.end() && absl::StartsWith(at->first, sharer); ++at) {
+    ++count;
+  }
+  return count;
+}
+
+void ConnectionGate::Tell(const std::string& sharer, const std::string& reason) {
+  if (log_ == nullptr) return;
+  const auto now = Now();
+  std::erase_if(told_, [now](const auto& each) { return each.second <= now; });
+  if (!told_.emplace(sharer, now + kRefusal).second) return;
+  log_->Warn(absl::StrCat("closed a new connection from ", sharer.substr(0, sharer.size() - 1),
+                          ": ", reason,
+                          "; for 30 s further ones that reach a limit are closed without a line"));
 }
 
 bool ConnectionGate::IsOpen(const std::string& peer) const {
@@ -206,7 +270,7 @@ bool ConnectionGate::IsOpen(const std::string& peer) const {
 }
 
 bool ConnectionGate::Refuse(const std::string& peer) {
-  const auto now = std::chrono::steady_clock::now();
+  const auto now = Now();
   const MutexLock lock(&mutex_);
   const auto found = connections_.find(peer);
   if (found == connections_.end() || found->second.refused || !found->second.is_open()) {

@@ -14,6 +14,7 @@
 
 #include "absl/base/thread_annotations.h"
 #include "absl/status/statusor.h"
+#include "server/api/limited_log.h"
 #include "server/api/listen_address.h"
 #include "server/base/mutex.h"
 
@@ -28,14 +29,22 @@ class ConnectionTaker {
 
 /// Accepts connections in place of gRPC, whose own listener stops for ever when no descriptor is
 /// left (CVE-2023-4785). A limit leaves descriptors for the daemon's other work. Connections beyond
-/// the limit are closed at once.
+/// the limit, and beyond the share of one process or address, are closed at once.
 class ConnectionGate {
  public:
   /// The time for which the gate closes new connections from the process or address of a refused
   /// connection.
   static constexpr std::chrono::seconds kRefusal{30};
 
-  explicit ConnectionGate(size_t max_connection_count);
+  /// The last sixteenth of the places is for processes and addresses with fewer connections than
+  /// this, so that one that comes new finds a place.
+  static constexpr size_t kFewConnections = 8;
+
+  /// A process (Unix) or address (TCP) may have the share `client_share`, as ClientLimits has it,
+  /// of `max_connection_count`. `log`, which may be null, takes a line about the first connection
+  /// that is closed for a limit, and again after kRefusal. It must outlive the gate.
+  explicit ConnectionGate(size_t max_connection_count, double client_share = 1,
+                          LimitedLog* log = nullptr);
 
   ~ConnectionGate();
   ConnectionGate(const ConnectionGate&) = delete;
@@ -69,6 +78,14 @@ class ConnectionGate {
     int socket;
     ConnectionTaker* taker;
   };
+  /// A Unix socket that the gate has bound.
+  struct SocketFile {
+    std::string path;
+    dev_t device;
+    ino_t inode;
+    /// Removes the socket, unless another daemon has put its own in its place meanwhile.
+    void Remove() const;
+  };
   /// An open connection. Once the taker has closed it, the descriptor has no inode or the inode of
   /// another file, by which the gate sees that the connection is closed.
   struct Connection {
@@ -84,17 +101,28 @@ class ConnectionGate {
   void Accept(const Door& door);
   /// Returns whether another connection may be open. If so, stores this connection by its peer.
   bool Admit(const std::string& peer, const Connection& connection);
+  /// Returns why a process or address gets no place, or an empty string if it gets one. `sharer` is
+  /// the beginning of the names of its connections.
+  std::string WhyNoPlace(const std::string& sharer) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  /// Returns the number of connections of a process or address, some of which may have been closed.
+  size_t CountOf(const std::string& sharer) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void Tell(const std::string& sharer, const std::string& reason);
 
   const size_t max_connection_count_;
+  const double client_share_;
+  LimitedLog* const log_;
   std::vector<std::unique_ptr<ConnectionTaker>> takers_;
   std::vector<Door> doors_;
-  std::vector<std::string> socket_paths_;
+  std::vector<SocketFile> socket_files_;
   uint64_t accepted_count_ = 0;
   mutable Mutex mutex_;
   /// Connections by peer. Some of them may have been closed.
   std::map<std::string, Connection> connections_ ABSL_GUARDED_BY(mutex_);
   /// For each refused process or address, the time until which its connections are closed at once.
   std::map<std::string, std::chrono::steady_clock::time_point> refused_ ABSL_GUARDED_BY(mutex_);
+  /// For each process or address that reached a limit, the time until which nothing is logged about
+  /// it. Only the gate's thread uses it.
+  std::map<std::string, std::chrono::steady_clock::time_point> told_;
   int stop_;  ///< becomes readable when the gate is to end
   std::thread thread_;
 };

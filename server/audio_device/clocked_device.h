@@ -17,7 +17,8 @@ namespace carillon {
 
 /// A device without a sound card: a thread pulls a block each time the clock has advanced by a
 /// block, and gives it to a sink. The thread catches up after late wake-ups, so the mean rate is
-/// exact.
+/// exact. It keeps time as a sound card does: in place of frames that are not ready, for instance
+/// because the process was stopped, the source gives silence, and counts them as lost.
 class ClockedDevice final : public AudioDevice {
  public:
   /// Takes one block. After an error that block is lost, and the sink gets the next block as usual.

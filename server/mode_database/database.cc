@@ -118,7 +118,12 @@ absl::Status Database::WriteToFree(absl::FunctionRef<absl::Status(SqliteConnecti
   status = WriteLocked(body);
   if (!has_no_room(status)) return status;
   reserve_.Release();
-  return WriteLocked(body);
+  status = WriteLocked(body);
+  if (!absl::IsResourceExhausted(status)) return status;
+  return Refusal(
+      absl::StatusCode::kResourceExhausted, "DATABASE_FULL",
+      absl::StrCat("the disk of ", file_.string(),
+                   " has no space even for a deletion: free 2 MiB on it, and try again"));
 }
 
 absl::Status Database::WriteLocked(absl::FunctionRef<absl::Status(SqliteConnection&)> body) {

@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <charconv>
@@ -19,9 +20,11 @@
 namespace carillon {
 namespace {
 
-constexpr off_t kReserveBytes = 16 << 20;
-/// The reserve is not taken from a disk that has less than this.
-constexpr uintmax_t kLeastFreeBytes = 4 * kReserveBytes;
+constexpr uintmax_t kMostReserveBytes = 16 << 20;
+/// Space for the log of a deletion.
+constexpr uintmax_t kLeastReserveBytes = 1 << 20;
+/// The reserve takes at most a fourth of the free space.
+constexpr uintmax_t kReservePart = 4;
 constexpr char kBackupSuffix[] = "-backup-";
 
 std::filesystem::path LogOf(const std::filesystem::path& file) { return file.string() + "-wal"; }
@@ -115,14 +118,22 @@ void ChangeCount::Write(int64_t count) const {
 
 DiskReserve::DiskReserve(const std::filesystem::path& file) : file_(file.string() + "-reserve") {}
 
+uintmax_t DiskReserve::SizeOn(uintmax_t free_bytes) {
+  if (free_bytes < 2 * kLeastReserveBytes) return 0;
+  return std::clamp(free_bytes / kReservePart, kLeastReserveBytes, kMostReserveBytes);
+}
+
 void DiskReserve::Take() const {
   std::error_code error;
-  if (std::filesystem::exists(file_, error)) return;
+  uintmax_t had = std::filesystem::file_size(file_, error);
+  if (error) had = 0;
+  if (had >= kMostReserveBytes) return;
   const std::filesystem::space_info space = std::filesystem::space(file_.parent_path(), error);
-  if (error || space.available < kLeastFreeBytes) return;
+  const uintmax_t wanted = error ? 0 : SizeOn(space.available + had);
+  if (wanted <= had) return;
   const int made = open(file_.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
   if (made < 0) return;
-  if (posix_fallocate(made, 0, kReserveBytes) != 0) Release();
+  if (posix_fallocate(made, 0, static_cast<off_t>(wanted)) != 0) Release();
   close(made);
 }
 

@@ -82,7 +82,12 @@ class DiskReserve {
   /// `file` is the database file. The reserve is in the same folder.
   explicit DiskReserve(const std::filesystem::path& file);
 
-  /// Reserves 16 MiB, unless they are reserved already or the disk has less than 64 MiB free.
+  /// Returns the bytes to reserve on a disk with so much free space: a quarter of it, at least 1
+  /// MiB and at most 16 MiB. Below 2 MiB nothing is reserved.
+  static uintmax_t SizeOn(uintmax_t free_bytes);
+
+  /// Reserves the bytes that SizeOn returns, or extends a smaller reserve to them. A reserve on a
+  /// disk that has become fuller stays as it is.
   void Take() const;
 
   void Release() const;

@@ -5,6 +5,7 @@ import contextlib
 import resource
 import socket
 import subprocess
+import sys
 import time
 import unittest
 
@@ -19,6 +20,18 @@ DESCRIPTORS = 1024
 ACCEPTED_AGAIN_S = 1.0 if torture.LONG else 30.0
 # After this time the daemon closes connections that have not sent their HTTP/2 settings.
 HANDSHAKE_S = 5.0
+
+
+# A client that opens many connections, says so, and waits to be killed.
+CROWDING = """
+import socket, sys, time
+made = []
+for _ in range(int(sys.argv[2])):
+    made.append(socket.socket(socket.AF_UNIX))
+    made[-1].connect(sys.argv[1])
+print("ready", flush=True)
+time.sleep(1000)
+"""
 
 
 class ConnectionTest(torture.ScratchTest):
@@ -76,6 +89,21 @@ class ConnectionTest(torture.ScratchTest):
         print(f"accepts {waited_s:.2f} s after 1,100 connections that stay silent", flush=True)
         for connection in silent:
             connection.close()
+
+    def test_one_process_cannot_take_all_connections(self):
+        self.serve()
+        crowding = subprocess.Popen([sys.executable, "-c", CROWDING, self.folder / "socket", "1000"],
+                                    stdout=subprocess.PIPE, text=True)
+        self.addCleanup(crowding.stdout.close)
+        self.addCleanup(crowding.wait)
+        self.addCleanup(crowding.kill)
+        self.assertEqual(crowding.stdout.readline(), "ready\n")
+        torture.wait_until(lambda: "its share (--client-share)" in self.log(), HANDSHAKE_S)
+        self.assertTrue(self.answers(self.daemon.server))
+        self.assertEqual(self.log().count("closed a new connection from"), 1, self.log())
+
+    def log(self):
+        return (self.folder / "log").read_text()
 
     def test_tls_accepts_again_too(self):
         certificate, key = self_signed(self.folder)

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Signals: a stop ends within five seconds whatever the clients do, and fades; other signals do not end the daemon."""
 
+import fcntl
 import hashlib
 import pathlib
 import signal
+import subprocess
 import threading
 import time
 import unittest
@@ -13,6 +15,7 @@ import numpy
 
 import torture
 from carillon.v1 import admin_service_pb2, admin_service_pb2_grpc, audio_service_pb2, contact_service_pb2
+from daemon import BIN
 
 STOP_S = 5.0 if torture.LONG else 30.0
 FADE_S = 0.05
@@ -94,6 +97,61 @@ class StopTest(torture.ServedTest):
         self.daemon.process.send_signal(signal.SIGHUP)
         torture.wait_until(lambda: "nothing was changed" in (self.folder / "log").read_text(), 30.0)
         self.assertEqual(self.is_admitted(address, "the second of two tokens"), True)
+        self.stop_in_time()
+
+    def test_a_storm_of_sighup_reads_the_configuration_once_a_second(self):
+        self.serve()
+        begin_s = time.monotonic()
+        for _ in range(1000):
+            self.daemon.process.send_signal(signal.SIGHUP)
+            time.sleep(0.001)
+        stormed_s = time.monotonic() - begin_s
+        self.stop_in_time()
+        count = (self.folder / "log").read_text().count("were read again")
+        self.assertGreater(count, 0)
+        self.assertLessEqual(count, stormed_s + 2)
+
+    def test_a_stop_ends_a_start_that_waits(self):
+        data = self.folder / "data"
+        data.mkdir(mode=0o700)
+        with open(data / "lock", "w", encoding="utf-8") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)  # for which a start waits a second
+            process = subprocess.Popen([BIN / "carillond", "--data-dir", data, "--listen", f"unix:{self.folder}/s",
+                                        "--audio-device", "null"], stderr=subprocess.PIPE, text=True)
+            self.addCleanup(process.stderr.close)
+            self.addCleanup(process.kill)
+            torture.wait_until(lambda: self.blocks_sigterm(process), STOP_S)
+            process.terminate()
+            self.assertEqual(process.wait(STOP_S), 0)
+            self.assertIn("before the start was complete", process.stderr.read())
+
+    @staticmethod
+    def blocks_sigterm(process):
+        status = pathlib.Path("/proc", str(process.pid), "status").read_text()
+        blocked = int(status.partition("SigBlk:")[2].split()[0], 16)
+        return bool(blocked >> (signal.SIGTERM - 1) & 1)
+
+    def test_a_start_without_memory_says_so_and_ends(self):
+        for limit_kib in (250_000, 300_000, 400_000):
+            with self.subTest(limit_kib=limit_kib):
+                ended = subprocess.run(
+                    ["prlimit", f"--as={limit_kib << 10}", BIN / "carillond", "--data-dir", self.folder / "data",
+                     "--listen", f"unix:{self.folder}/s", "--audio-device", "null"],
+                    capture_output=True, text=True, check=False, timeout=STOP_S)
+                self.assertEqual(ended.returncode, 1, ended.stderr)
+                self.assertIn("SERVER_OUT_OF_MEMORY: ", ended.stderr)
+
+    def test_frames_missed_while_it_was_stopped_are_counted(self):
+        self.serve("--audio-device", f"file:{self.folder}/sound.wav")
+        before = self.client.audio.GetMixer(audio_service_pb2.GetMixerRequest())
+        self.daemon.process.send_signal(signal.SIGSTOP)
+        time.sleep(0.5)
+        self.daemon.process.send_signal(signal.SIGCONT)
+
+        def lost():
+            after = self.client.audio.GetMixer(audio_service_pb2.GetMixerRequest())
+            return after.lost_frame_count - before.lost_frame_count
+        torture.wait_until(lambda: lost() > 0.4 * RATE, STOP_S)
         self.stop_in_time()
 
     @staticmethod

@@ -9,12 +9,17 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <filesystem>
+#include <memory>
 #include <optional>
 #include <semaphore>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "server/api/limited_log.h"
+#include "server/base/clock.h"
 #include "tests/server/mode_database/sample_model.h"
 
 namespace carillon {
@@ -36,9 +41,10 @@ class Keeper final : public ConnectionTaker {
 
 class ConnectionGateTest : public testing::Test {
  protected:
-  /// Listens on a free port, and lets `count` connections in at a time.
-  void Open(size_t count) {
-    gate_.emplace(count);
+  /// Listens on a free port, and lets `count` connections in at a time, of which one address may
+  /// have the share `client_share`.
+  void Open(size_t count, double client_share = 1) {
+    gate_.emplace(count, client_share, &log_);
     auto keeper = std::make_unique<Keeper>(taken_);
     keeper_ = keeper.get();
     address_ = *ParseListenAddress("127.0.0.1:0");
@@ -47,12 +53,17 @@ class ConnectionGateTest : public testing::Test {
     gate_->Open();
   }
 
-  int Connect() const {
+  /// Connects from an address of this machine, which is 127.0.0.`host`.
+  int Connect(uint32_t host = 1) const {
+    sockaddr_in from{};
+    from.sin_family = AF_INET;
+    from.sin_addr.s_addr = htonl(INADDR_LOOPBACK - 1 + host);
     sockaddr_in to{};
     to.sin_family = AF_INET;
     to.sin_port = htons(static_cast<uint16_t>(address_.port));
     to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     const int made = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    EXPECT_EQ(bind(made, reinterpret_cast<const sockaddr*>(&from), sizeof from), 0);
     EXPECT_EQ(connect(made, reinterpret_cast<const sockaddr*>(&to), sizeof to), 0);
     return made;
   }
@@ -71,6 +82,9 @@ class ConnectionGateTest : public testing::Test {
     return recv(connection, &byte, 1, 0) <= 0;
   }
 
+  SystemClock clock_;
+  std::vector<std::string> lines_;
+  LimitedLog log_{clock_, [this](const std::string& line) { lines_.push_back(line); }};
   std::counting_semaphore<> taken_{0};
   Keeper* keeper_ = nullptr;
   ListenAddress address_;
@@ -88,6 +102,39 @@ TEST_F(ConnectionGateTest, ClosesConnectionsBeyondItsLimitAndAcceptsAgainWhenOne
   Connect();
   taken_.acquire();
   EXPECT_TRUE(IsClosed(Connect()));
+}
+
+TEST_F(ConnectionGateTest, AnAddressGetsNoMoreThanItsShareAndTheLogNamesItOnce) {
+  Open(8, 0.25);
+  for (int i = 0; i < 2; ++i) {
+    Connect();
+    taken_.acquire();
+  }
+  for (int i = 0; i < 3; ++i) EXPECT_TRUE(IsClosed(Connect()));
+  Connect(11);  // whose name begins with that of 127.0.0.1
+  taken_.acquire();
+  for (int i = 0; i < 2; ++i) {
+    Connect(2);
+    taken_.acquire();
+  }
+  gate_.reset();
+  EXPECT_THAT(lines_, testing::ElementsAre(testing::StartsWith(
+                          "closed a new connection from ipv4:127.0.0.1: it has 2 already, its "
+                          "share (--client-share) of 8; ")));
+}
+
+TEST_F(ConnectionGateTest, TheLastPlacesAreForAddressesWithFewConnections) {
+  Open(32);
+  for (int i = 0; i < 30; ++i) {
+    Connect();
+    taken_.acquire();
+  }
+  EXPECT_TRUE(IsClosed(Connect()));
+  for (int i = 0; i < 2; ++i) {
+    Connect(2);
+    taken_.acquire();
+  }
+  EXPECT_TRUE(IsClosed(Connect(3)));
 }
 
 TEST_F(ConnectionGateTest, EndsAConnectionAndRefusesOthersFromTheSameAddress) {
@@ -123,6 +170,21 @@ TEST_F(ConnectionGateTest, AUnixSocketIsItsOwnersUnlessOnlyAGroupMayEnterItsFold
     ASSERT_EQ(stat((folder / "socket").c_str(), &status), 0);
     EXPECT_EQ(status.st_mode & 0777U, socket_mode);
   }
+}
+
+TEST_F(ConnectionGateTest, RemovesItsSocketAndNoOtherThatTookItsPlace) {
+  const TemporaryFolder folder;
+  ListenAddress address{.socket_path = folder / "socket", .host = ""};
+  ConnectionGate second(1);
+  {
+    ConnectionGate first(1);
+    ASSERT_TRUE(first.Listen(address, std::make_unique<Keeper>(taken_)).ok());
+    ASSERT_EQ(unlink(address.socket_path.c_str()), 0);
+    ASSERT_TRUE(second.Listen(address, std::make_unique<Keeper>(taken_)).ok());
+  }
+  EXPECT_TRUE(std::filesystem::exists(address.socket_path));
+  second.Close();
+  EXPECT_FALSE(std::filesystem::exists(address.socket_path));
 }
 
 TEST_F(ConnectionGateTest, RefusesAFolderInWhichOthersCouldReplaceTheSocket) {

@@ -8,6 +8,7 @@
 #include <thread>
 #include <vector>
 
+#include "server/audio_device/frame_ring.h"
 #include "tests/server/audio_device/manual_clock.h"
 
 namespace carillon {
@@ -85,6 +86,27 @@ TEST(ClockedDevice, CountsTheFramesThatItsSinkRefusesAndGoesOn) {
   device.Stop();
   EXPECT_TRUE(device.Check().ok());
   EXPECT_EQ(device.lost_frame_count(), 9U * 64);
+}
+
+TEST(ClockedDevice, KeepsTimeWithSilenceThatIsCountedIfFramesAreNotReady) {
+  constexpr DeviceFormat kFormat{.block_frame_count = 64};
+  ManualClock clock;
+  FrameRing ring(kFormat, 4);
+  const std::vector<float> ones(4 * kFormat.block_size(), 1.0F);
+  ring.frames().Push(ones);
+  std::vector<float> heard;
+  std::latch enough{1};
+  ClockedDevice device("sink", kFormat, clock, [&](std::span<const float> block) {
+    heard.insert(heard.end(), block.begin(), block.end());
+    if (heard.size() == 20 * kFormat.block_size()) enough.count_down();
+    return absl::OkStatus();
+  });
+  ASSERT_TRUE(device.Start(ring).ok());
+  enough.wait();
+  device.Stop();
+  EXPECT_EQ(std::accumulate(heard.begin(), heard.end(), 0.0F), static_cast<float>(ones.size()));
+  EXPECT_EQ(ring.lost_frame_count(), heard.size() - ones.size());
+  EXPECT_EQ(device.lost_frame_count(), 0U);  // the source's count is added to the device's
 }
 
 }  // namespace

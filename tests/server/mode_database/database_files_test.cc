@@ -2,6 +2,8 @@
 //
 // Somebody else changes the files of a database.
 
+#include "server/mode_database/database_files.h"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -179,6 +181,14 @@ TEST_F(DatabaseFilesTest, TheKeeperTellsWhenTheFilesAreLost) {
   good.acquire();
   std::filesystem::remove(file_);
   lost.acquire();
+}
+
+TEST(DiskReserve, IsAQuarterOfTheFreeSpaceWithinItsBounds) {
+  constexpr uintmax_t kMib = 1 << 20;
+  EXPECT_EQ(DiskReserve::SizeOn(1000 * kMib), 16 * kMib);
+  EXPECT_EQ(DiskReserve::SizeOn(60 * kMib), 15 * kMib);
+  EXPECT_EQ(DiskReserve::SizeOn(2 * kMib), kMib);
+  EXPECT_EQ(DiskReserve::SizeOn(kMib), 0U);
 }
 
 }  // namespace

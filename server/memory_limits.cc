@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/memory_limits.h"
+
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <cstddef>
+#include <cstdlib>
+#include <exception>
+#include <latch>
+#include <new>
+#include <system_error>
+#include <thread>
+#include <vector>
+
+#include "absl/cleanup/cleanup.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
+#include "proto/cpp/error_reason.h"
+
+namespace carillon {
+namespace {
+
+/// The daemon has 33 threads when it serves; gRPC begins more of them under load.
+constexpr size_t kThreadCount = 40;
+/// Address space apart from stacks. A daemon that serves has 180 MiB, of which its programs and
+/// libraries, which are there already, take a part.
+constexpr size_t kMemoryBytes = size_t{128} << 20U;
+
+absl::Status TooLittle(absl::string_view what) {
+  return Refusal(absl::StatusCode::kResourceExhausted, "SERVER_OUT_OF_MEMORY",
+                 absl::StrCat("the system gives the daemon too few ", what,
+                              ": raise the limits of its memory and threads (ulimit -v, ulimit -u; "
+                              "systemd's LimitAS=, LimitNPROC=, TasksMax=)"));
+}
+
+bool HasAddressSpace() {
+  void* const memory = mmap(nullptr, kMemoryBytes, PROT_READ | PROT_WRITE,
+                            MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+  if (memory == MAP_FAILED) return false;
+  munmap(memory, kMemoryBytes);
+  return true;
+}
+
+/// Writes to stderr without memory of the heap.
+void Say(absl::string_view text) {
+  [[maybe_unused]] const ssize_t written = write(STDERR_FILENO, text.data(), text.size());
+}
+
+[[noreturn]] void EndWithoutMemory() {
+  Say("error: SERVER_OUT_OF_MEMORY: the daemon has no memory or threads left, and ends: raise its "
+      "limits (ulimit -v, ulimit -u; systemd's LimitAS=, MemoryMax=, TasksMax=)\n");
+  std::_Exit(EXIT_FAILURE);
+}
+
+[[noreturn]] void EndOnException() {
+  try {
+    if (const std::exception_ptr thrown = std::current_exception()) std::rethrow_exception(thrown);
+  } catch (const std::bad_alloc&) {
+    EndWithoutMemory();
+  } catch (const std::system_error& error) {
+    if (error.code() == std::errc::resource_unavailable_try_again ||
+        error.code() == std::errc::not_enough_memory) {
+      EndWithoutMemory();
+    }
+    Say("error: the daemon ends on an error of the system: ");
+    Say(error.what());
+    Say("\n");
+  } catch (const std::exception& error) {
+    Say("error: the daemon ends on an exception: ");
+    Say(error.what());
+    Say("\n");
+  } catch (...) {
+    Say("error: the daemon ends on an exception of an unknown kind\n");
+  }
+  std::abort();
+}
+
+}  // namespace
+
+absl::Status CheckThreadsAndMemory() {
+  std::latch done(1);
+  std::vector<std::thread> threads;
+  threads.reserve(kThreadCount);
+  const absl::Cleanup join = [&] {
+    done.count_down();
+    for (std::thread& thread : threads) thread.join();
+  };
+  try {
+    while (threads.size() < kThreadCount) threads.emplace_back([&done] { done.wait(); });
+  } catch (const std::system_error&) {
+    return TooLittle(absl::StrCat("threads, ", threads.size(), " of ", kThreadCount,
+                                  ", or too little address space for their stacks"));
+  }
+  return HasAddressSpace() ? absl::OkStatus() : TooLittle("bytes of address space");
+}
+
+void ReportUncaughtExceptions() { std::set_terminate(EndOnException); }
+
+}  // namespace carillon

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "absl/status/status.h"
+
+namespace carillon {
+
+/// Begins and ends as many threads as the daemon needs, with as much address space, because gRPC
+/// waits for ever for a thread that the system refuses. Errors: ResourceExhausted
+/// (SERVER_OUT_OF_MEMORY).
+absl::Status CheckThreadsAndMemory();
+
+/// Lets an exception that no thread catches end the process with a line of the log. Lack of memory
+/// or threads ends it with status 1, anything else by abort. Nothing is unwound, because
+/// destructors could wait for threads that do not run; the database is written as for a loss of
+/// power.
+void ReportUncaughtExceptions();
+
+}  // namespace carillon
