@@ -13,6 +13,7 @@
 #include "proto/cpp/status_macros.h"
 #include "server/scene/felt_contact.h"
 #include "server/scene/scene_frame.h"
+#include "server/synthesis/bank/acceleration_noise.h"
 
 namespace carillon {
 namespace {
@@ -239,8 +240,14 @@ void ContactIntake::AddBlow(const MixerEvent& event, FoundBlow blow, double fram
     const double weight = impulse.at.weights[corner] * (*object)->properties.material.size;
     for (size_t axis = 0; axis < vertex.size(); ++axis) blow.point_m[axis] += weight * vertex[axis];
   }
-  blow.time_s = (std::max(frame, 0.0) - static_cast<double>(mapping().first_frame)) /
-                settings_.sample_rate_hz;
+  // A contact whose beginning sounds, too, begins no earlier than the first frame (Mixer::Await).
+  const double lead_frames =
+      (*object)->clicks
+          ? AccelerationNoise::PulseFrames(impulse.pulse, settings_.sample_rate_hz) / 2
+          : 0;
+  const auto first_frame = static_cast<double>(mapping().first_frame);
+  blow.time_s =
+      (std::max({frame, first_frame + lead_frames, 0.0}) - first_frame) / settings_.sample_rate_hz;
   blow.impulse_newton_seconds = impulse.impulse_newton_seconds;
   blow.duration_s = impulse.pulse.duration_s();
   settings_.blows->push_back(blow);

@@ -9,7 +9,7 @@ namespace carillon {
 
 /// An impulse on an object of a simulation, as it sounds.
 struct FoundBlow {
-  double time_s = 0;  ///< time from the first frame to the middle of the contact
+  double time_s = 0;  ///< time from the first frame to the middle of the contact as it sounds
   uint32_t handle = 0;
   std::optional<uint32_t> by;       ///< the other body, if the contact named it
   bool by_sounds = false;           ///< whether `by` is the handle of an object

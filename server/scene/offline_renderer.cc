@@ -115,6 +115,9 @@ absl::Status OfflineRenderer::AddObject(uint32_t handle, std::shared_ptr<const M
   auto voice = MakeVoice(settings_.space, properties.pose, mixer_.settings());
   ASSIGN_OR_RETURN(SoundingObject object, MakeSoundingObject(std::move(body), properties, {mixer_},
                                                              std::move(voice), transfers_));
+  if (object.transfer == nullptr && properties.radiation == RadiationModel::kDefault) {
+    ++summary_.paper_coupling_object_count;
+  }
   return scene_.Insert(handle, std::move(object));
 }
 

@@ -53,6 +53,8 @@ struct OfflineSummary {
   double peak = 0;              ///< largest sample before the limiter
   uint64_t limited_frame_count = 0;
   IntakeFindings findings;
+  /// Objects that sound by the paper's coupling because no transfer fits their material.
+  uint32_t paper_coupling_object_count = 0;
 };
 
 /// Renders a recorded simulation with a mixer of its own, as fast as possible and bit for bit the

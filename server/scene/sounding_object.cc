@@ -5,6 +5,7 @@
 #include <cmath>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
@@ -59,7 +60,8 @@ absl::Status NoModeInBand(const ModalModel& model, const SoundingMaterial& mater
       absl::StrCat("with this material and size the model's ", model.mode_count(), " modes lie at ",
                    first_hz, " to ", last_hz, " Hz, and none lies within ", band.lowest_hz, " to ",
                    band.highest_hz, " Hz and rings for ", band.shortest_t60_s * 1000,
-                   " ms; change size, stiffness or damping"));
+                   " ms; change size, stiffness or damping; a free body with a stored transfer "
+                   "(CreateTransfer) sounds by its acceleration alone"));
   AddFigure(status, "first_mode_hz", absl::StrCat(first_hz));
   return status;
 }
@@ -113,6 +115,14 @@ std::optional<double> CompleteTo(const ModalModel& model, const SoundingMaterial
   return complete_hz;
 }
 
+double LowestHz(const std::vector<SoundingMode>& modes) {
+  return modes.empty() ? 0 : modes.front().natural_frequency_hz;
+}
+
+double HighestHz(const std::vector<SoundingMode>& modes) {
+  return modes.empty() ? 0 : modes.back().natural_frequency_hz;
+}
+
 }  // namespace
 
 absl::StatusOr<std::shared_ptr<const Transfer>> ChooseTransfer(const ModalModel& model,
@@ -144,25 +154,29 @@ absl::StatusOr<SoundingObject> MakeSoundingObject(std::shared_ptr<const Sounding
   const ModeTable table{model.eigenvalues, model.couplings, RadiationOf(transfer.get())};
   const SoundingModes sounding =
       SelectSoundingModes(table, properties.material, settings.sample_rate_hz, band);
-  if (sounding.modes.empty()) return NoModeInBand(model, properties.material, band);
+  auto moved = MovedBodyOf(transfer.get(), *body, properties);
+  const bool clicks = moved.has_value();
+  // A small hard body whose modes are all too high to be heard still clicks.
+  if (sounding.modes.empty() && !clicks) return NoModeInBand(model, properties.material, band);
   auto oscillators = std::make_unique<OscillatorBank>(
       sounding, body->shapes,
       OscillatorBankSettings{.sample_rate_hz = settings.sample_rate_hz,
                              .block_frame_count = settings.block_frame_count,
                              .gain = properties.gain * kFullScalePa / settings.full_scale_pa,
                              .directivity = std::move(directivity),
-                             .moved = MovedBodyOf(transfer.get(), *body, properties)});
+                             .moved = std::move(moved)});
   ASSIGN_OR_RETURN(const BankId bank, output.mixer.Add(std::move(oscillators), voice, output.bus));
   const double top_hz = std::min(band.highest_hz, settings.sample_rate_hz / 2);
   return SoundingObject{.body = std::move(body),
                         .properties = properties,
                         .mode_count = static_cast<uint32_t>(sounding.modes.size()),
-                        .lowest_frequency_hz = sounding.modes.front().natural_frequency_hz,
-                        .highest_frequency_hz = sounding.modes.back().natural_frequency_hz,
+                        .lowest_frequency_hz = LowestHz(sounding.modes),
+                        .highest_frequency_hz = HighestHz(sounding.modes),
                         .complete_to_hz = CompleteTo(model, properties.material, top_hz),
                         .bank = bank,
                         .bus = output.bus,
                         .voice = std::move(voice),
+                        .clicks = clicks,
                         .transfer = std::move(transfer)};
 }
 

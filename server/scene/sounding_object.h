@@ -42,8 +42,8 @@ struct ObjectProperties {
 struct SoundingObject {
   std::shared_ptr<const SoundingBody> body;
   ObjectProperties properties;
-  uint32_t mode_count = 0;          ///< number of modes that sound
-  double lowest_frequency_hz = 0;   ///< lowest natural frequency of those modes
+  uint32_t mode_count = 0;          ///< number of modes that sound; zero: only its acceleration
+  double lowest_frequency_hz = 0;   ///< lowest natural frequency of those modes; zero if none
   double highest_frequency_hz = 0;  ///< highest natural frequency of those modes
   /// Natural frequency up to which the model is complete. Absent if the model is complete up to the
   /// top of the band.
@@ -51,6 +51,7 @@ struct SoundingObject {
   BankId bank;
   BusId bus{};                             ///< bus of the bank
   std::shared_ptr<Voice> voice = nullptr;  ///< null in a scene without spatial audio
+  bool clicks = false;  ///< whether the acceleration of the body by each blow sounds, too
   /// The transfer by which the modes radiate; null if they radiate by the paper's coupling.
   std::shared_ptr<const Transfer> transfer = nullptr;
 };

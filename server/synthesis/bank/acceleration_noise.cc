@@ -116,9 +116,10 @@ AccelerationNoise::Accelerations AccelerationNoise::AccelerationsBy(
   return by;
 }
 
-double AccelerationNoise::PulseFrames(Pulse pulse) const noexcept {
+double AccelerationNoise::PulseFrames(Pulse pulse, double sample_rate_hz) noexcept {
   const double told_s = Pulse::OfVariance(pulse.variance_s2(), Pulse()).duration_s();
-  return std::min(std::max(kShortestPulseFrames, told_s * rate_), kLongestPulseS * rate_);
+  return std::min(std::max(kShortestPulseFrames, told_s * sample_rate_hz),
+                  kLongestPulseS * sample_rate_hz);
 }
 
 void AccelerationNoise::Begin(const SurfaceImpulse& impulse, size_t offset, float lead_frames,

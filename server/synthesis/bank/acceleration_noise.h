@@ -63,7 +63,8 @@ class AccelerationNoise {
   AccelerationNoise(const MovedBody& moved, double sample_rate_hz, double samples_per_pascal);
 
   /// Returns the duration of a pulse in frames: at least 2 frames, at most 0.15 s.
-  double PulseFrames(Pulse pulse) const noexcept;
+  static double PulseFrames(Pulse pulse, double sample_rate_hz) noexcept;
+  double PulseFrames(Pulse pulse) const noexcept { return PulseFrames(pulse, rate_); }
 
   /// Starts the pulse of an impulse. The pulse starts `lead_frames` (0 to 1) frames before sample
   /// `offset` of the next block, which is the first sample in which it sounds. The impulse must act

@@ -21,8 +21,8 @@ inline constexpr double kPascalsPerVolumeVelocity =
 /// with one of 0.5 ms.
 inline constexpr double kFullScalePa = 200;
 
-/// Bounds of the pressure that a setting may give to full scale: 40 to 180 dB above 20 uPa.
-inline constexpr double kLeastFullScalePa = 0.002;
+/// Bounds of the pressure that a setting may give to full scale: 0 to 180 dB above 20 uPa.
+inline constexpr double kLeastFullScalePa = 0.00002;
 inline constexpr double kMostFullScalePa = 20000;
 
 /// Converts the sum of c_m z_m to samples at the reference level. All objects share this constant,

@@ -74,6 +74,8 @@ struct OscillatorBankSettings {
 /// at zero with the slope of the pair's first mode. In a bank with directivity each mode has such a
 /// companion.
 ///
+/// A bank may have no modes. Then only the acceleration of its body sounds.
+///
 /// Any thread may construct a bank; then one thread at a time uses it. Only the constructor
 /// allocates; nothing locks. In each block of the mix, impulses and knots come first and RenderAdd
 /// last, without calls to another bank in between.

@@ -75,6 +75,7 @@ StrikeBatch::RowsAhead OscillatorBank::RowsOf(std::span<const DueEvent> events) 
 }
 
 bool OscillatorBank::StrikeMerged(std::span<const DueEvent> events, BlockMix& mix) noexcept {
+  if (mode_count_ == 0) return true;
   float* modal_impulses = mix.batch().modal_impulses();
   strike_kernel::Projection projection{.column_count = column_count_};
   double weight_sum = 0, time_sum = 0, variance_sum = 0, most_weight = 0;
@@ -108,6 +109,7 @@ bool OscillatorBank::StrikeMerged(std::span<const DueEvent> events, BlockMix& mi
 
 bool OscillatorBank::Strike(const SurfaceImpulse& impulse, size_t offset, float lead_frames,
                             BlockMix& mix) noexcept {
+  if (mode_count_ == 0) return true;
   const std::optional<strike_kernel::Projection> projection =
       Project(impulse.at, impulse.impulse_newton_seconds);
   if (!projection) return false;
@@ -149,6 +151,7 @@ bool OscillatorBank::StrikeModes(std::span<const float> modal_impulses, size_t o
 }
 
 bool OscillatorBank::AddForce(const SurfaceForce& force) noexcept {
+  if (mode_count_ == 0) return true;
   const std::optional<strike_kernel::Projection> projection =
       Project(force.at, force.force_newtons);
   if (projection) force_.AddForce(*projection);
@@ -156,6 +159,7 @@ bool OscillatorBank::AddForce(const SurfaceForce& force) noexcept {
 }
 
 bool OscillatorBank::ApplyKnot(const ForceKnot& knot, size_t offset, BlockMix& mix) noexcept {
+  if (mode_count_ == 0) return true;
   BeginStrikes(mix);
   StrikeBatch& batch = mix.batch();
   const bool silent_before = modes_silent();

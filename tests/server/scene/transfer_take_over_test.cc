@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "server/mode_database/mode_database.h"
+#include "server/scene/offline_renderer.h"
 #include "server/scene/scene_registry.h"
 #include "tests/server/mode_database/sample_model.h"
 #include "tests/server/mode_database/sample_transfer.h"
@@ -139,6 +140,73 @@ TEST(TransferTakeOver, TheAccelerationOfAFreeBodySoundsUnlessItsModesAloneAreAsk
   EXPECT_LT(click.rend() - last, 1000) << "the click ends";
   stage.Strike(modes_only);
   EXPECT_EQ(Peak(stage.Render(200)), 0);
+}
+
+TEST(TransferTakeOver, ABodyWithoutAudibleModesClicks) {
+  TransferStage stage;
+  ObjectProperties properties = SmallProperties();
+  properties.material.size = 0.01;  // its lowest mode is at 44 kHz
+  const auto model = *stage.database->models().Find(SmallModel()->digest);
+  const auto add = [&] { return stage.scenes.AddObject(stage.scene, 0, model, properties); };
+  EXPECT_THAT(add().status().ToString(), HasSubstr("NO_MODE_IN_BAND: "));
+  stage.StoreBall(false);
+  const auto added = add();
+  ASSERT_TRUE(added.ok()) << added.status();
+  EXPECT_EQ(added->object.mode_count, 0U);
+  const auto stream =
+      *stage.scenes.OpenContactStream(stage.scene, {.step_s = 0.01, .scheduling_delay_s = 0});
+  ASSERT_TRUE(stream->intake().BeginStep(0).ok());
+  // Ten times the mass times the speed of sound is the most that the body may bear.
+  stream->intake().Strike(SmallImpulse(added->handle, 1e-3));
+  EXPECT_EQ(stream->counts().rejected_count, 0U);
+  const std::vector<float> click = stage.Render(20);
+  EXPECT_GT(Peak(click), 0);
+  EXPECT_EQ(Peak(stage.Render(20)), 0) << "the click has ended";
+  properties.radiation = RadiationModel::kModesOnly;
+  EXPECT_THAT(add().status().ToString(), HasSubstr("NO_MODE_IN_BAND: "));
+}
+
+TEST(TransferTakeOver, ABlowIsToldWhenItSounds) {
+  TransferStage stage;
+  stage.StoreBall(false);
+  BodyCache bodies;
+  const auto model = *stage.database->models().Find(SmallModel()->digest);
+  const auto render = [&](double time_s) {
+    auto renderer = *OfflineRenderer::Make({.tail_s = 0.1, .tells_blows = true}, bodies,
+                                           &stage.database->transfers());
+    EXPECT_TRUE(renderer->AddObject(1, model, SmallProperties()).ok());
+    ObjectImpulse impulse = SmallImpulse(1);
+    impulse.contact.impulse.duration_s = 0.004;
+    EXPECT_TRUE(renderer->intake().BeginStep(time_s).ok());
+    renderer->intake().Strike(impulse);
+    renderer->intake().EndStep();
+    std::vector<float> sound(10 * kBlock);
+    renderer->Render(sound);
+    EXPECT_EQ(renderer->summary().paper_coupling_object_count, 0U);
+    return std::pair(sound, renderer->blows().at(0).time_s);
+  };
+  const auto [sound, time_s] = render(0.002);
+  EXPECT_NEAR(time_s, 0.002, 1e-9);
+  EXPECT_GT(Peak(sound), 0);
+  for (const double early_s : {0.0, 0.0015}) {
+    const auto [early, told_s] = render(early_s);
+    // A duration is stored in single precision.
+    EXPECT_NEAR(told_s, 0.002, 1e-9) << "the contact begins with the first frame";
+    for (size_t n = 0; n < sound.size(); ++n) ASSERT_NEAR(early[n], sound[n], 1e-5 * Peak(sound));
+  }
+  EXPECT_NEAR(render(0.0025).second, 0.0025, 1e-9);
+}
+
+TEST(TransferTakeOver, ARenderingCountsTheObjectsThatLackATransfer) {
+  TransferStage stage;
+  BodyCache bodies;
+  const auto model = *stage.database->models().Find(SmallModel()->digest);
+  auto renderer = *OfflineRenderer::Make({.tail_s = 0.1}, bodies, &stage.database->transfers());
+  ObjectProperties properties = SmallProperties();
+  EXPECT_TRUE(renderer->AddObject(1, model, properties).ok());
+  properties.radiation = RadiationModel::kPaperCoupling;
+  EXPECT_TRUE(renderer->AddObject(2, model, properties).ok());
+  EXPECT_EQ(renderer->summary().paper_coupling_object_count, 1U);
 }
 
 TEST(TransferTakeOver, TheAccelerationOfAFixedBodyIsSilent) {
