@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -54,10 +56,19 @@ bool IsWhole(const MYSOFA_HRTF& sofa, double rate_hz) {
          AreWithin(delays, kLongestDelay_s * rate_hz);
 }
 
+/// Returns why libmysofa, whose errors do not tell the causes apart, did not read a file.
+std::string WhyUnread(const std::string& file) {
+  std::error_code error;
+  if (!std::filesystem::exists(file, error)) return "does not exist";
+  if (!std::filesystem::is_regular_file(file, error)) return "is not a file";
+  if (!std::ifstream(file).is_open()) return "cannot be opened by the daemon's user";
+  return "is no SOFA file (AES69), or is damaged";
+}
+
 absl::StatusOr<Sofa> Read(const std::string& file) {
   int error = MYSOFA_OK;
   Sofa sofa(mysofa_load(file.c_str(), &error), &mysofa_free);
-  if (!sofa) return Unusable(file, "cannot be read");
+  if (!sofa) return Unusable(file, WhyUnread(file));
   if (mysofa_check(sofa.get()) != MYSOFA_OK || sofa->DataSamplingRate.elements == 0) {
     return Unusable(file, "does not hold impulse responses of two ears by direction");
   }

@@ -66,8 +66,14 @@ class HeadlessTest(unittest.TestCase):
         self.folder = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory(prefix="carillon-")))
 
     def test_a_daemon_does_not_start_with_a_head_that_it_cannot_read(self):
-        with self.assertRaisesRegex(RuntimeError, "HEAD_UNUSABLE: the measured head /none.sofa cannot be read; let"):
+        with self.assertRaisesRegex(RuntimeError, "HEAD_UNUSABLE: the measured head /none.sofa does not exist; let"):
             Daemon(self.folder, "--head", "/none.sofa")
+
+    def test_a_file_that_is_no_sofa_file_is_told_from_one_that_is_missing(self):
+        text = self.folder / "text.sofa"
+        text.write_text("no head")
+        with self.assertRaisesRegex(RuntimeError, r"HEAD_UNUSABLE: .*text.sofa is no SOFA file \(AES69\)"):
+            Daemon(self.folder, "--head", text)
 
     def test_scenes_are_refused_once_the_head_is_gone(self):
         head = self.folder / "head.sofa"
