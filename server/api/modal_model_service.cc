@@ -132,11 +132,18 @@ absl::Status ModalModelService::Get(const v1::GetModalModelRequest& request,
   response.mutable_modal_model()->mutable_eigenvalues()->Add(eigenvalues.begin(),
                                                              eigenvalues.end());
   ASSIGN_OR_RETURN(const auto transfers, database_.transfers().List(digest));
+  ASSIGN_OR_RETURN(const std::vector<StoredTransfer> stored, database_.transfers().Read(digest));
   for (const TransferSummary& transfer : transfers) {
     v1::TransferSummary& proto = *response.mutable_modal_model()->add_transfers();
     *proto.mutable_header() = transfer.header;
     proto.set_stored_bytes(transfer.stored_bytes);
     proto.set_created_unix_ms(transfer.created_unix_ms);
+    const auto same = std::ranges::find_if(stored, [&](const StoredTransfer& one) {
+      return one.header().speed_ratio() == transfer.header.speed_ratio();
+    });
+    if (same == stored.end()) continue;
+    const std::vector<float> integrals = same->Decode().power_integrals;
+    proto.mutable_power_integrals()->Add(integrals.begin(), integrals.end());
   }
   return absl::OkStatus();
 }

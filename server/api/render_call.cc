@@ -130,6 +130,7 @@ class RenderCall final : public BidiStream<v1::RenderRequest, v1::RenderResponse
       *summary.mutable_last_rejection() = ToLegibleErrorInfo(rendered.last_rejection);
     }
     *summary.mutable_findings() = ToProto(rendered.findings);
+    summary.set_paper_coupling_object_count(rendered.paper_coupling_object_count);
     summary.set_peak(rendered.peak);
     summary.set_limited_frame_count(rendered.limited_frame_count);
     summary.set_full_scale_pa(reader_.full_scale_pa());
