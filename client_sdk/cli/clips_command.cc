@@ -90,6 +90,10 @@ class ClipRenderer {
     v1::RenderSettings settings = SettingsOf(options_);
     settings.set_tell_blows(true);
     RETURN_IF_ERROR(RenderFile(trace, settings, form, record));
+    if (const auto finer = FinerFullScale(options_, record.summary)) {
+      settings.set_full_scale_pa(*finer);
+      RETURN_IF_ERROR(RenderFile(trace, settings, form, record));
+    }
     ASSIGN_OR_RETURN(record.sound.digest, FileDigest(form.path));
     return absl::OkStatus();
   }
@@ -104,7 +108,9 @@ class ClipRenderer {
     const std::string alone = folder_.Work(absl::StrCat(record.clip, ".alone")).string();
     RETURN_IF_ERROR(WriteAlone(trace, handle, alone));
     ClipRecord unused;
-    RETURN_IF_ERROR(RenderFile(alone, SettingsOf(options_), form, unused));
+    v1::RenderSettings settings = SettingsOf(options_);
+    settings.set_full_scale_pa(record.summary.full_scale_pa());
+    RETURN_IF_ERROR(RenderFile(alone, settings, form, unused));
     std::error_code ignored;
     fs::remove(alone, ignored);
     ASSIGN_OR_RETURN(stem.digest, FileDigest(form.path));

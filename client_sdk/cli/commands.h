@@ -79,6 +79,7 @@ struct StrikeOptions {
   double size = 1;
   double gain = 1;
   bool paper_coupling = false;
+  bool modes_only = false;
   std::optional<double> seconds;  ///< absent: until the longest mode is 60 dB down, 30 s at most
 };
 
@@ -119,7 +120,8 @@ struct RenderOptions {
   double tail_s = 0;
   double gain = 1;                      ///< factor of every sample
   std::optional<double> full_scale_pa;  ///< pressure of a sample of 1; absent: the daemon's default
-  bool normalize = false;  ///< scale the sound to a peak of 0.9 of full scale, before `gain`
+  bool normalize = false;  ///< scale the sound to a peak of 0.9 of full scale, before `gain`; a
+                           ///< soft sound is first rendered again with a finer full scale
   int bits = 24;           ///< of a sample: 16, 24, or 32 for floating point
   // These apply to a folder only.
   bool stems = false;       ///< write the sound of each object alone, too
@@ -185,6 +187,11 @@ absl::Status Render(const client::Client& daemon, const RenderOptions& options, 
 /// (NO_TRACES), Internal (OUTPUT_NOT_WRITABLE), FailedPrecondition (CLIPS_FAILED).
 absl::Status RenderClips(const client::Client& daemon, const RenderOptions& options, bool json);
 v1::RenderSettings SettingsOf(const RenderOptions& options);
+/// Returns the full scale, Pa, with which a sound should be rendered again before it is normalised:
+/// tails end at -80 dB and modes at -140 dB of full scale, so that a soft sound would be cut.
+/// Absent: the rendering was loud enough, is silent, or has the full scale that was asked for.
+std::optional<double> FinerFullScale(const RenderOptions& options,
+                                     const v1::RenderSummary& summary);
 /// The error of a trace without contacts.
 absl::Status EmptyTrace(const std::string& path);
 

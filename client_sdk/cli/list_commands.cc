@@ -36,8 +36,9 @@ std::string LeaseText(const v1::Scene& scene) {
 }
 
 void PrintJobLine(const v1::Job& job) {
-  absl::PrintF("%s  %s  %s\n", absl::StripPrefix(job.name(), "jobs/").substr(0, 12),
-               ProgressText(job), job.label());
+  const std::string reason = job.has_error() ? absl::StrCat(": ", job.error().reason()) : "";
+  absl::PrintF("%s  %s%s  %s\n", absl::StripPrefix(job.name(), "jobs/").substr(0, 12),
+               ProgressText(job), reason, job.label());
 }
 
 }  // namespace

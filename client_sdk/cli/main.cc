@@ -91,7 +91,7 @@ void AddTransfer(CLI::App& app, Program& program) {
   create.add_option("--accuracy", options->accuracy_db,
                     "The error of each mode's power that is small enough, dB [2]");
   create.add_option("--budget", options->budget_s, "The processor time to spend, s [20]");
-  create.add_flag("--wait", options->wait, "Wait until it is stored");
+  create.add_flag("--wait,!--no-wait", options->wait, "Wait until it is stored [no]");
   AddMaterial(create, options->material);
   create.callback([&program, options] {
     program.command = [&program, options] {
@@ -104,6 +104,18 @@ void AddDoctor(CLI::App& app, Program& program) {
   CLI::App& doctor = *app.add_subcommand(
       "doctor", "Look at the daemon and this machine, and say what is wrong and what to do");
   doctor.callback([&program] { program.command = [&program] { return Diagnose(program); }; });
+}
+
+/// Adds the options of the object that is struck.
+void AddStruckObject(CLI::App& strike, StrikeOptions& options) {
+  strike.add_option("--size", options.size, "The size relative to that of the model");
+  strike.add_option("--gain", options.gain, "The linear gain");
+  CLI::Option* paper = strike.add_flag("--paper-coupling", options.paper_coupling,
+                                       "Sound by the paper's coupling though a transfer is stored");
+  strike
+      .add_flag("--modes-only", options.modes_only,
+                "Sound by the stored transfer without the click of the body's acceleration")
+      ->excludes(paper);
 }
 
 void AddStrike(CLI::App& app, Program& program) {
@@ -131,10 +143,7 @@ void AddStrike(CLI::App& app, Program& program) {
       .add_option("--duration", options->duration_s,
                   "The duration of the contact, s [that of an elastic collision with the striker]")
       ->excludes(striker);
-  strike.add_option("--size", options->size, "The size relative to that of the model");
-  strike.add_option("--gain", options->gain, "The linear gain");
-  strike.add_flag("--paper-coupling", options->paper_coupling,
-                  "Sound by the paper's coupling though a transfer is stored");
+  AddStruckObject(strike, *options);
   strike.add_option("--seconds", options->seconds,
                     "The time to ring, s [until the sound has decayed by 60 dB]");
   AddMaterial(strike, options->material);

@@ -109,18 +109,51 @@ void PrintRow(const v1::ModalModelSummary& model) {
                model.label());
 }
 
+/// Returns the transfer with which an object of `material` sounds, or null if none fits.
+const v1::TransferSummary* FittingTransfer(const v1::ModalModelSummary& model,
+                                           const v1::Material& material) {
+  constexpr double kTolerance = 0.05;  // of the speed of sound, as the daemon has it
+  const double speed_m_per_s = std::sqrt(material.young_pa() / material.density_kg_per_m3());
+  const v1::TransferSummary* nearest = nullptr;
+  double least = kTolerance;
+  for (const v1::TransferSummary& transfer : model.transfers()) {
+    const v1::TransferHeader& header = transfer.header();
+    const double distance =
+        std::abs(std::log(speed_m_per_s / (header.speed_ratio() * header.sound_speed_m_per_s())));
+    if (distance > least || transfer.power_integrals_size() != model.eigenvalues_size()) continue;
+    least = distance;
+    nearest = &transfer;
+  }
+  return nearest;
+}
+
 /// Prints the frequencies and decay rates of the modes for `material`, with Lambda = eigenvalue
-/// E/rho.
+/// E/rho, and the decay by radiation, rho_air Lambda I / (2 c rho), where a transfer fits.
 void PrintModes(const v1::ModalModelSummary& model, const v1::Material& material) {
-  absl::PrintF("\n%5s %14s %14s %12s %9s\n", "mode", "natural Hz", "damped Hz", "decay 1/s",
-               "T60 s");
+  const v1::TransferSummary* const transfer = FittingTransfer(model, material);
+  absl::PrintF("\n%5s %14s %14s %12s", "mode", "natural Hz", "damped Hz", "material 1/s");
+  if (transfer == nullptr) {
+    absl::PrintF("  %s\n", "T60 s by the material alone");
+  } else {
+    absl::PrintF(" %13s %9s\n", "radiation 1/s", "T60 s");
+  }
   for (int i = 0; i < model.eigenvalues_size(); ++i) {
     const double lambda = model.eigenvalues(i) * material.young_pa() / material.density_kg_per_m3();
     const double natural_hz = std::sqrt(lambda) / (2 * std::numbers::pi);
-    const double sigma = DecayRatePerS(material, natural_hz);
+    const double by_material = DecayRatePerS(material, natural_hz);
+    double sigma = by_material;
+    std::string by_radiation;
+    if (transfer != nullptr) {
+      const v1::TransferHeader& air = transfer->header();
+      const double radiated = air.air_density_kg_per_m3() * lambda * transfer->power_integrals(i) /
+                              (2 * air.sound_speed_m_per_s() * material.density_kg_per_m3());
+      by_radiation = absl::StrFormat(" %13.4f", radiated);
+      sigma += radiated;
+    }
     const double damped = std::sqrt(std::fmax(0, lambda - sigma * sigma));
-    absl::PrintF("%5d %14.3f %14.3f %12.4f %9.3f\n", i + 1, natural_hz,
-                 damped / (2 * std::numbers::pi), -sigma, std::log(1000) / sigma);
+    absl::PrintF("%5d %14.3f %14.3f %12.4f%s %9.3f\n", i + 1, natural_hz,
+                 damped / (2 * std::numbers::pi), by_material, by_radiation,
+                 std::log(1000) / sigma);
   }
 }
 

@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cstdio>
+#include <filesystem>
+#include <optional>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
@@ -14,18 +17,46 @@ namespace {
 
 /// The limiter works from 3 dB below full scale on.
 constexpr double kHeadroom = 1.4126;
+/// -40 dB of full scale: a softer sound is rendered again before it is normalised.
+constexpr double kSoft = 0.01;
+/// -60 dB of full scale: a softer file is hardly heard.
+constexpr double kFaint = 0.001;
+/// The least full scale that the contract allows, Pa.
+constexpr double kLeastFullScale_pa = 0.00002;
+
+/// Prints what the user should know about the sound.
+void PrintFindings(const RenderOptions& options, const v1::RenderSummary& summary, std::FILE* out) {
+  if (summary.paper_coupling_object_count() > 0) {
+    absl::FPrintF(out,
+                  "%d objects sound by the paper's coupling, whose levels are not physical: their "
+                  "models have no transfer for their material; `carillon transfer create` makes "
+                  "one\n",
+                  summary.paper_coupling_object_count());
+  }
+  const double written = summary.peak() * options.gain;
+  if (!options.normalize && written > 0 && written < kFaint) {
+    absl::FPrintF(out,
+                  "the file peaks at %s; raise it by --gain, --normalize or --full-scale-pa %.2g\n",
+                  Decibels(written), std::max(summary.peak_pa() * 2, kLeastFullScale_pa));
+  }
+}
 
 void PrintSummary(const RenderOptions& options, const v1::RenderSummary& summary,
                   uint32_t sample_rate_hz) {
   std::FILE* const out = options.out == "-" ? stderr : stdout;
+  // EBU R 128 measures no sound of less than 0.4 s.
+  const bool is_short = static_cast<double>(summary.frame_count()) < 0.4 * sample_rate_hz;
+  const auto loudness = [is_short](bool present, double lufs) {
+    return is_short ? "too short to measure" : Loudness(present, lufs);
+  };
   absl::FPrintF(out, "%s: %.2f s, %d impulses, peak %s\n", options.out,
                 static_cast<double>(summary.frame_count()) / sample_rate_hz,
                 summary.accepted_count(), Decibels(summary.peak()));
   absl::FPrintF(out,
                 "%.3g Pa (full scale is %.4g Pa), true peak %s, whole sound %s, loudest 0.4 s %s\n",
                 summary.peak_pa(), summary.full_scale_pa(), Decibels(summary.true_peak()),
-                Loudness(summary.has_integrated_lufs(), summary.integrated_lufs()),
-                Loudness(summary.has_loudest_momentary_lufs(), summary.loudest_momentary_lufs()));
+                loudness(summary.has_integrated_lufs(), summary.integrated_lufs()),
+                loudness(summary.has_loudest_momentary_lufs(), summary.loudest_momentary_lufs()));
   if (summary.rejected_count() > 0) {
     absl::FPrintF(out, "%d impulses could not be used; the newest: %s: %s\n",
                   summary.rejected_count(), summary.last_rejection().reason(),
@@ -33,12 +64,13 @@ void PrintSummary(const RenderOptions& options, const v1::RenderSummary& summary
   }
   const v1::ContactFindings& findings = summary.findings();
   if (findings.distant_point_count() > 0) {
-    absl::PrintF("%d points of contact are far from their object's surface, up to %.3g m\n",
-                 findings.distant_point_count(), findings.largest_distance_m());
+    absl::FPrintF(out, "%d points of contact are far from their object's surface, up to %.3g m\n",
+                  findings.distant_point_count(), findings.largest_distance_m());
   }
   if (findings.zero_impulse_count() > 0) {
-    absl::PrintF("%d contacts have no impulse\n", findings.zero_impulse_count());
+    absl::FPrintF(out, "%d contacts have no impulse\n", findings.zero_impulse_count());
   }
+  PrintFindings(options, summary, out);
   if (summary.limited_frame_count() > 0) {
     absl::FPrintF(out,
                   "the limiter worked in %d frames; --full-scale-pa above %.4g would avoid it\n",
@@ -72,6 +104,14 @@ v1::RenderSettings SettingsOf(const RenderOptions& options) {
   return settings;
 }
 
+std::optional<double> FinerFullScale(const RenderOptions& options,
+                                     const v1::RenderSummary& summary) {
+  const bool soft = summary.peak() > 0 && summary.peak() < kSoft;
+  if (!options.normalize || options.full_scale_pa || !soft) return std::nullopt;
+  constexpr double kAbovePeak = 1.5;  // the limiter must not work
+  return std::max(summary.peak_pa() * kAbovePeak, kLeastFullScale_pa);
+}
+
 absl::Status EmptyTrace(const std::string& path) {
   return Refusal(absl::StatusCode::kInvalidArgument, "TRACE_EMPTY",
                  absl::StrCat(path,
@@ -80,16 +120,27 @@ absl::Status EmptyTrace(const std::string& path) {
 }
 
 absl::Status Render(const client::Client& daemon, const RenderOptions& options, bool json) {
-  ASSIGN_OR_RETURN(auto trace, client::ContactTraceReader::Open(options.trace));
   RenderedFile file({.path = options.out,
                      .format = {.sample_rate_hz = options.sample_rate_hz,
                                 .channel_count = options.channel_count,
                                 .bits = options.bits},
                      .factor = options.gain,
                      .normalize = options.normalize});
-  const auto summary =
-      daemon.Render(SettingsOf(options), trace,
-                    [&](const client::AudioBlock& block) { return file.Take(block); });
+  const auto render = [&](const v1::RenderSettings& settings) -> absl::StatusOr<v1::RenderSummary> {
+    ASSIGN_OR_RETURN(auto trace, client::ContactTraceReader::Open(options.trace));
+    return daemon.Render(settings, trace,
+                         [&](const client::AudioBlock& block) { return file.Take(block); });
+  };
+  v1::RenderSettings settings = SettingsOf(options);
+  auto summary = render(settings);
+  // A trace that comes through a pipe cannot be read twice.
+  const bool rereadable = std::filesystem::is_regular_file(options.trace);
+  if (const auto finer =
+          summary.ok() && rereadable ? FinerFullScale(options, *summary) : std::nullopt) {
+    file.Restart();
+    settings.set_full_scale_pa(*finer);
+    summary = render(settings);
+  }
   RETURN_IF_ERROR(file.status());
   if (!summary.ok()) return summary.status();
   RETURN_IF_ERROR(file.Finish());

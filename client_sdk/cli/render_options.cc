@@ -33,8 +33,10 @@ void AddSound(CLI::App& render, RenderOptions& options) {
       ->check(CLI::Range(0.0, 1e6));
   render.add_option("--full-scale-pa", options.full_scale_pa,
                     "The pressure of a sample of full scale, Pa [200]");
-  render.add_flag("--normalize", options.normalize,
-                  "Scale the sound to a peak of 0.9 of full scale");
+  render.add_flag(
+      "--normalize", options.normalize,
+      "Scale the sound to a peak of 0.9 of full scale; a sound below -40 dBFS is rendered "
+      "again, with a full scale a little above its peak");
   render
       .add_option("--bits", options.bits, "The size of a sample: 16, 24, or 32 for floating point")
       ->check(CLI::IsMember({16, 24, 32}))

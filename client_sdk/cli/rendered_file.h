@@ -31,6 +31,10 @@ class RenderedFile {
   /// Returns false after an error.
   bool Take(const client::AudioBlock& block);
 
+  /// Forgets the blocks that a form with `normalize` has collected, so that another rendering can
+  /// take their place.
+  void Restart() { samples_.clear(); }
+
   /// Completes the file. Errors: Internal (OUTPUT_NOT_WRITABLE).
   absl::Status Finish();
 

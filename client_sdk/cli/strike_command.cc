@@ -1,8 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <sys/mman.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
+#include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "carillon/contact_trace.h"
 #include "client_sdk/cli/commands.h"
 #include "client_sdk/cli/find_model.h"
 #include "client_sdk/cli/output.h"
@@ -20,6 +26,7 @@ constexpr double kStep = 0.001;       // seconds; there is one step only
 /// That mode is the lowest one or, with a loss factor, one near a point of its table or the
 /// highest.
 double SoundingSeconds(const v1::SoundingObject& object) {
+  if (object.sounding_mode_count() == 0) return 1;  // a click
   const v1::Material& material = object.material();
   double sigma = DecayRatePerS(material, object.lowest_frequency_hz());
   sigma = std::min(sigma, DecayRatePerS(material, object.highest_frequency_hz()));
@@ -48,7 +55,18 @@ absl::StatusOr<v1::SoundingObject> AddObject(const client::Client& daemon, const
   request.set_size(options.size);
   request.set_gain(options.gain);
   if (options.paper_coupling) request.set_radiation(v1::RADIATION_MODEL_PAPER_COUPLING);
+  if (options.modes_only) request.set_radiation(v1::RADIATION_MODEL_MODES_ONLY);
   return daemon.AddObject(request);
+}
+
+v1::Impulse ImpulseOf(const StrikeOptions& options, uint32_t handle) {
+  v1::Impulse impulse;
+  impulse.set_object(handle);
+  Set(*impulse.mutable_point_m(), options.point_m);
+  Set(*impulse.mutable_impulse_newton_seconds(), options.impulse_newton_seconds);
+  if (options.duration_s) impulse.set_duration_s(*options.duration_s);
+  impulse.mutable_hertz()->set_striker(options.striker);
+  return impulse;
 }
 
 /// Sends the strike so that it sounds on arrival.
@@ -60,16 +78,83 @@ absl::Status SendImpulse(const client::Client& daemon, const std::string& scene,
   start.set_at_once(true);
   ASSIGN_OR_RETURN(const auto stream, daemon.StreamContacts(start));
   v1::ContactStep step;
-  v1::Impulse& impulse = *step.add_impulses();
-  impulse.set_object(handle);
-  Set(*impulse.mutable_point_m(), options.point_m);
-  Set(*impulse.mutable_impulse_newton_seconds(), options.impulse_newton_seconds);
-  if (options.duration_s) impulse.set_duration_s(*options.duration_s);
-  impulse.mutable_hertz()->set_striker(options.striker);
+  *step.add_impulses() = ImpulseOf(options, handle);
   RETURN_IF_ERROR(stream->Send(std::move(step)));
   ASSIGN_OR_RETURN(const auto report, stream->Finish());
+  if (report.findings().distant_point_count() > 0) {
+    absl::FPrintF(stderr,
+                  "warning: the point is %.3g m from the surface, and the strike sounds at the "
+                  "nearest point of the surface; give metres in the frame of the object\n",
+                  report.findings().largest_distance_m());
+  }
   if (report.rejected_count() == 0) return absl::OkStatus();
   return FromErrorInfo(absl::StatusCode::kInvalidArgument, report.last_rejection());
+}
+
+/// The strike as a rendering measures it.
+struct MeasuredStrike {
+  double peak_pa = 0;
+  double duration_s = 0;
+};
+
+/// Writes the strike as a trace to `file`.
+absl::Status WriteTrace(const v1::SoundingObject& object, const StrikeOptions& options,
+                        const std::string& file) {
+  v1::ContactTraceHeader header;
+  header.set_step_s(kStep);
+  ASSIGN_OR_RETURN(auto writer, client::ContactTraceWriter::Create(file, header));
+  v1::ContactTraceObject body;
+  body.set_handle(object.handle());
+  body.set_modal_model(object.modal_model());
+  *body.mutable_material() = object.material();
+  body.set_size(object.size());
+  body.set_gain(object.gain());
+  body.set_radiation(object.radiation());
+  writer.Write(body);
+  v1::ContactStep step;
+  *step.add_impulses() = ImpulseOf(options, object.handle());
+  writer.Write(step);
+  return writer.Close();
+}
+
+/// Renders the beginning of the sound, which has its peak, offline. Absent: the daemon
+/// renders as much as it may already.
+std::optional<MeasuredStrike> Measure(const client::Client& daemon,
+                                      const v1::SoundingObject& object,
+                                      const StrikeOptions& options) {
+  constexpr double kBeginning = 0.25;  // seconds
+  const int memory = memfd_create("strike", MFD_CLOEXEC);
+  if (memory < 0) return std::nullopt;
+  const std::string file = absl::StrCat("/proc/self/fd/", memory);
+  std::optional<MeasuredStrike> measured;
+  const absl::Status written = WriteTrace(object, options, file);
+  auto trace = client::ContactTraceReader::Open(file);
+  if (written.ok() && trace.ok()) {
+    v1::RenderSettings settings;
+    settings.set_tail_s(kBeginning);
+    settings.set_tell_blows(true);
+    double duration_s = 0;
+    const auto summary = daemon.Render(
+        settings, *trace, [](const client::AudioBlock&) { return true; },
+        [&](const v1::Blow& blow) { duration_s = blow.duration_s(); });
+    if (summary.ok()) measured = {.peak_pa = summary->peak_pa(), .duration_s = duration_s};
+  }
+  close(memory);
+  return measured;
+}
+
+/// Prints what sounds, and how.
+void PrintStrike(const client::Client& daemon, const v1::SoundingObject& object,
+                 const StrikeOptions& options) {
+  const char* by = "their radiated power";
+  if (object.radiation() == v1::RADIATION_MODEL_PAPER_COUPLING) by = "the paper's coupling";
+  if (object.radiation() == v1::RADIATION_MODEL_MODES_ONLY) by = "their radiated power, without the click";
+  absl::PrintF("%d modes sound, %.2f to %.2f Hz, by %s\n", object.sounding_mode_count(),
+               object.lowest_frequency_hz(), object.highest_frequency_hz(), by);
+  if (const auto measured = Measure(daemon, object, options)) {
+    absl::PrintF("contact of %.3g ms, peak %.3g Pa at 1 m\n", 1000 * measured->duration_s,
+                 measured->peak_pa);
+  }
 }
 
 absl::Status StrikeIn(const client::Client& daemon, const std::string& scene,
@@ -79,10 +164,7 @@ absl::Status StrikeIn(const client::Client& daemon, const std::string& scene,
   if (json) {
     PrintJson(object);
   } else {
-    const bool paper = object.radiation() == v1::RADIATION_MODEL_PAPER_COUPLING;
-    absl::PrintF("%d modes sound, %.2f to %.2f Hz, by %s\n", object.sounding_mode_count(),
-                 object.lowest_frequency_hz(), object.highest_frequency_hz(),
-                 paper ? "the paper's coupling" : "their radiated power");
+    PrintStrike(daemon, object, options);
   }
   std::fflush(stdout);
   (void)stop.ArrivesWithin(options.seconds.value_or(SoundingSeconds(object)));

@@ -221,6 +221,22 @@ class RenderTest(CommandLineTest):
         numpy.testing.assert_allclose(sound.read_wave(self.render("--gain", 0.5)), plain / 2, atol=2e-7)
         self.assertAlmostEqual(numpy.abs(sound.read_wave(self.render("--normalize"))).max(), 0.9, delta=1e-4)
 
+    def test_a_soft_sound_is_normalised_with_its_tail(self):
+        plain = sound.read_wave(self.render("--normalize"))
+        impulse = sound.impulse((0, 0.008, 0.010), (0, 0, -2e-8), duration_s=1e-4)
+        item = contact_trace_pb2.ContactTraceObject(handle=1, modal_model=self.model, material=MATERIAL)
+        sound.write_trace(self.trace, [item], [contact_pb2.ContactStep(time_s=0, impulses=[impulse])])
+        shown = self.run_command("render", self.trace, "--out", self.folder / "faint.wav", "--tail", 0.6)
+        self.assertIn("raise it by --gain, --normalize or --full-scale-pa", shown)
+        self.assertIn("below -70 LUFS", shown)
+        soft = sound.read_wave(self.render("--normalize"))
+        # Without the second rendering, the modes would end at a hundredth of the peak.
+        numpy.testing.assert_allclose(soft, plain, atol=1e-4)
+
+    def test_an_object_without_a_transfer_is_reported(self):
+        shown = self.run_command("render", self.trace, "--out", self.folder / "paper.wav", "--tail", 0.3)
+        self.assertIn("1 objects sound by the paper's coupling", shown)
+
     def test_samples_have_the_size_asked_for(self):
         header = {bits: self.render("--bits", bits).read_bytes()[:40] for bits in (16, 24, 32)}
         for bits, start in header.items():
@@ -263,6 +279,17 @@ class StrikeTest(CommandLineTest):
                         ("--point", "0", "0.008", "0.01", "--impulse", "0", "0", "-0.01")):
             struck = self.daemon.command("strike", "bar", *vectors, "--seconds", "0.01")
             self.assertIn("modes sound", struck.stdout)
+
+    def test_it_prints_the_contact_and_the_peak_and_warns_of_a_distant_point(self):
+        struck = self.daemon.command("strike", "bar", "--point", "0,0.008,0.01", "--impulse", "0,0,-0.01", "--duration",
+                                     "0.002", "--seconds", "0.01")
+        self.assertRegex(struck.stdout, r"contact of 2 ms, peak \S+ Pa at 1 m")
+        self.assertNotIn("warning", struck.stderr)
+        far = self.daemon.command("strike", "bar", "--point", "0,0.008,1", "--impulse", "0,0,-0.01", "--seconds", "0")
+        self.assertIn("from the surface", far.stderr)
+        refused = self.daemon.command("strike", "bar", "--point", "0,0.008,0.01", "--impulse", "0,0,-0.01",
+                                      "--modes-only", "--seconds", "0.01", check=False)
+        self.assertIn("TRANSFER_NOT_FOUND", refused.stderr)
 
 
 class WithoutDaemonTest(unittest.TestCase):

@@ -82,6 +82,16 @@ class TransferTest(unittest.TestCase):
         *_, last = self.client.jobs.WatchJob(request)
         return last.job
 
+    def assert_shows_both_decays(self, shown):
+        """The table of `carillon model show` has decays by material and radiation, and the T60 of their sum."""
+        header, *rows = shown[shown.index(" mode  "):].splitlines()
+        self.assertEqual(header.split()[-6:], ["material", "1/s", "radiation", "1/s", "T60", "s"])
+        for row in rows:
+            *_, material, radiation, t60 = map(float, row.split())
+            self.assertGreater(material, 0)
+            self.assertGreaterEqual(radiation, 0)
+            self.assertAlmostEqual(t60, math.log(1000) / (material + radiation), delta=6e-4 + 2e-3 * t60)
+
     def add_object(self, model):
         """The name of an object in a scene of its own, and how it radiates."""
         scene = self.client.scenes.CreateScene(scene_service_pb2.CreateSceneRequest()).name
@@ -135,7 +145,9 @@ class TransferTest(unittest.TestCase):
         self.assertEqual(self.await_transfer().state, decomposition_pb2.JOB_STATE_SUCCEEDED)
         taken_over = self.client.scenes.UpdateObject(scene_service_pb2.UpdateObjectRequest(name=name)).object
         self.assertEqual(taken_over.radiation, radiation_pb2.RADIATION_MODEL_RADIATED_POWER)
-        self.assertIn("transfer   for 503", self.daemon.command("model", "show", model).stdout)
+        shown = self.daemon.command("model", "show", model).stdout
+        self.assertIn("transfer   for 503", shown)
+        self.assert_shows_both_decays(shown)
 
         after = self.render(model, radiation_pb2.RADIATION_MODEL_UNSPECIFIED)
         self.assert_changed_by(self.arrays(model), before, after)
