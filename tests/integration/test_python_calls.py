@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The Python package against the real daemon: what the daemon is, scenes with ids, and all jobs at once."""
+"""The Python package against the real daemon: what it is, scenes with ids, all jobs, and what a rendering tells."""
 
 import asyncio
 import unittest
@@ -11,6 +11,7 @@ import meshes
 from daemon import DaemonTest
 
 BAR = meshes.box(meshes.BAR_SIZE)
+POINT, IMPULSE, DURATION_S = (0.0, 0.008, 0.010), (0, 0, -0.002), 1e-4
 
 
 class CallsTest(DaemonTest):
@@ -80,6 +81,28 @@ class CallsTest(DaemonTest):
                     return job
 
         self.assertIsNone(asyncio.run(watch()))
+
+    def test_a_rendering_tells_its_blows(self):
+        trace = carillon.Trace(1 / 60)
+        bar = trace.add(self.model)
+        trace.step(0.25, impulses=carillon.Impulses(bar, POINT, IMPULSE, durations=DURATION_S))
+        self.assertEqual(self.c.render(trace, tail_s=0.1).blows, ())
+        blow, = self.c.render(trace, tail_s=0.1, tell_blows=True).blows
+        self.assertAlmostEqual(blow.time_s, 0.25)
+        self.assertAlmostEqual(blow.duration_s, DURATION_S)
+
+    def test_a_soft_sound_is_normalised_with_its_tail(self):
+        sounds = []
+        for factor in (1, 1e-5):
+            trace = carillon.Trace(1 / 60)
+            bar = trace.add(self.model)
+            trace.step(0.0, impulses=carillon.Impulses(bar, POINT, numpy.multiply(IMPULSE, factor),
+                                                       durations=DURATION_S))
+            sounds.append(self.c.render(trace, normalize=True, tail_s=0.3))
+        numpy.testing.assert_allclose(sounds[1].samples, sounds[0].samples, atol=1e-4)
+
+    def test_no_transfer_means_no_decay_by_radiation(self):
+        numpy.testing.assert_array_equal(self.model.radiation_decays(), numpy.zeros(self.model.mode_count))
 
 
 if __name__ == "__main__":

@@ -194,15 +194,17 @@ class Client {
     for (const record of records) stream.write({ record });
     stream.end();
     const pieces = [];
+    const blows = [];
     let format;
     let summary;
     for await (const answer of this.answers(stream)) {
       if (answer.response === 'format') format = answer.format;
       else if (answer.response === 'block') pieces.push(answer.block.samples);
+      else if (answer.response === 'blows') blows.push(...answer.blows.blows);
       else summary = answer.summary;
     }
     if (summary.rejected_count) throw fromInfo(summary.last_rejection);
-    return new Sound(samplesOf(pieces), format.sample_rate_hz, format.channel_count, summary);
+    return new Sound(samplesOf(pieces), format.sample_rate_hz, format.channel_count, summary, blows);
   }
 
   /**

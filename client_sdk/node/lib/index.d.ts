@@ -17,6 +17,7 @@ import type { ListModalModelsRequest } from '../types/carillon/v1/ListModalModel
 import type { Material as MaterialMessage } from '../types/carillon/v1/Material';
 import type { ModalModelSummary__Output } from '../types/carillon/v1/ModalModelSummary';
 import type { RenderSettings } from '../types/carillon/v1/RenderSettings';
+import type { Blow__Output } from '../types/carillon/v1/Blow';
 import type { RenderSummary__Output } from '../types/carillon/v1/RenderSummary';
 import type { Roughness } from '../types/carillon/v1/Roughness';
 import type { Scene__Output } from '../types/carillon/v1/Scene';
@@ -139,6 +140,8 @@ export class Sound {
   readonly channelCount: number;
   /** What the daemon measured while it rendered the sound offline. */
   readonly summary?: RenderSummary__Output;
+  /** The impulses that sounded, if the settings had tell_blows. */
+  readonly blows: Blow__Output[];
   readonly seconds: number;
   readonly peak: number;
   /** Writes a WAV file of 24-bit samples. */

@@ -7,14 +7,15 @@ const FULL_SCALE = 2 ** 23 - 1;
 
 /**
  * Samples as a Float32Array, interleaved by channel; full scale is 1. `summary` is what the daemon measured while it
- * rendered the sound offline.
+ * rendered the sound offline. `blows` are the impulses that sounded, if the settings had tell_blows.
  */
 class Sound {
-  constructor(samples, sampleRateHz, channelCount, summary) {
+  constructor(samples, sampleRateHz, channelCount, summary, blows = []) {
     this.samples = samples;
     this.sampleRateHz = sampleRateHz;
     this.channelCount = channelCount;
     this.summary = summary;
+    this.blows = blows;
   }
 
   get seconds() {

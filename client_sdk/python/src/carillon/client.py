@@ -32,6 +32,7 @@ from carillon.v1 import (
     server_service_pb2, server_service_pb2_grpc)
 
 PIECE_BYTES = 1 << 20
+LEAST_FULL_SCALE_PA = 0.00002
 
 # The calls that carillon.aio cancels when its task is cancelled.
 running_calls: contextvars.ContextVar[Optional[list[Any]]] = contextvars.ContextVar("running_calls", default=None)
@@ -192,11 +193,20 @@ class Client:
             answer = self.scenes_stub.ListScenes(scene_service_pb2.ListScenesRequest())
         return [Scene(self, item.name) for item in answer.scenes]
 
-    def render(self, trace: Trace | str | os.PathLike[str], **settings: Any) -> Sound:
+    def render(self, trace: Trace | str | os.PathLike[str], *, normalize: bool = False, **settings: Any) -> Sound:
         """Renders a trace, or a .contacts file, faster than real time. `settings` are fields of RenderSettings:
-        sample_rate_hz, channel_count, tail_s, gain and full_scale_pa. Raises CarillonError if a contact is rejected."""
-        records = (trace if isinstance(trace, Trace) else Trace.read(trace)).records()
-        return self._render(records, audio_service_pb2.RenderSettings(**settings))
+        sample_rate_hz, channel_count, tail_s, gain, full_scale_pa and tell_blows. `normalize` gives the sound a peak of
+        0.9. A sound that peaks below -40 dB of full scale is then rendered again with a full scale a little above its
+        peak, unless `full_scale_pa` is given, because tails end at -80 dB of full scale. Raises CarillonError if a
+        contact is rejected."""
+        whole = trace if isinstance(trace, Trace) else Trace.read(trace)
+        sound = self._render(whole.records(), audio_service_pb2.RenderSettings(**settings))
+        if not normalize:
+            return sound
+        if sound.summary and 0 < sound.summary.peak < 0.01 and "full_scale_pa" not in settings:
+            settings["full_scale_pa"] = max(1.5 * sound.summary.peak_pa, LEAST_FULL_SCALE_PA)
+            sound = self._render(whole.records(), audio_service_pb2.RenderSettings(**settings))
+        return sound.normalized()
 
     def listen(self, seconds: float) -> Sound:
         """Records what the daemon plays."""
@@ -249,6 +259,7 @@ class Client:
             yield from (request(record=record) for record in records)
 
         blocks, rate_hz, channels, summary = [], 0, 1, audio_service_pb2.RenderSummary()
+        blows: list[audio_service_pb2.Blow] = []
         with errors.translated(self.server):
             answers = self.audio_stub.Render(requests())
             with self.cancellable(answers):
@@ -258,13 +269,15 @@ class Client:
                         rate_hz, channels = answer.format.sample_rate_hz, answer.format.channel_count
                     elif kind == "block":
                         blocks.append(answer.block.samples)
+                    elif kind == "blows":
+                        blows.extend(answer.blows.blows)
                     else:
                         summary = answer.summary
         if summary.rejected_count:
             raise errors.from_info(summary.last_rejection)
         errors.warn_of_contacts(summary.findings)
         samples = numpy.frombuffer(b"".join(blocks), "<f4").reshape(-1, channels)
-        return Sound(samples, rate_hz, summary=summary)
+        return Sound(samples, rate_hz, summary=summary, blows=tuple(blows))
 
     def __enter__(self) -> Client:
         return self

@@ -3,11 +3,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, Literal, Optional, Union
 
 import numpy
 
-from carillon.v1 import material_pb2, radiation_pb2
+from carillon.v1 import material_pb2, modal_model_service_pb2, radiation_pb2
 
 if TYPE_CHECKING:
     from carillon.models import Model
@@ -71,8 +72,28 @@ def loss_factor_at(given: material_pb2.Material, frequency_hz: numpy.ndarray) ->
 def modes_of(eigenvalues: numpy.ndarray, given: material_pb2.Material,
              size: float) -> tuple[numpy.ndarray, numpy.ndarray]:
     """Returns the damped frequencies, Hz, and the decay rates, 1/s, of a body of this material and size relative to
-    the model. An overdamped mode has frequency zero. See docs/physics.md."""
+    the model, by the material alone. An overdamped mode has frequency zero. See docs/physics.md."""
     omega = numpy.sqrt(eigenvalues * given.young_pa / given.density_kg_per_m3) / size
     eta = loss_factor_at(given, omega / (2 * numpy.pi))
     decay = (given.alpha1_s * omega**2 + given.alpha2_per_s + eta * omega) / 2
     return numpy.sqrt(numpy.maximum(0, omega**2 - decay**2)) / (2 * numpy.pi), decay
+
+
+def radiation_decays_of(eigenvalues: numpy.ndarray, given: material_pb2.Material, size: float,
+                        transfers: Iterable[modal_model_service_pb2.TransferSummary]) -> numpy.ndarray:
+    """Returns the decay rates by radiation, 1/s, rho_air Lambda I/(2 c rho size), of the transfer that is nearest to
+    the material and serves it; zeros if none does."""
+    speed = (given.young_pa / given.density_kg_per_m3) ** 0.5
+
+    def distance(transfer: modal_model_service_pb2.TransferSummary) -> float:
+        return abs(float(numpy.log(speed / (transfer.header.speed_ratio * transfer.header.sound_speed_m_per_s))))
+
+    fitting = [transfer for transfer in transfers
+               if distance(transfer) <= 0.05 and len(transfer.power_integrals) == len(eigenvalues)]
+    if not fitting:
+        return numpy.zeros_like(eigenvalues)
+    nearest = min(fitting, key=distance)
+    air = nearest.header.air_density_kg_per_m3 / (2 * nearest.header.sound_speed_m_per_s)
+    decays: numpy.ndarray = (air * eigenvalues * given.young_pa / given.density_kg_per_m3**2 / size
+                             * numpy.array(nearest.power_integrals))
+    return decays

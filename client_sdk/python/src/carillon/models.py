@@ -58,12 +58,23 @@ class Model:
 
     def modes(self, material: Optional[materials.Material] = None,
               size: float = 1) -> tuple[numpy.ndarray, numpy.ndarray]:
-        """Returns the damped frequencies, Hz, and the decay rates, 1/s, of the modes."""
+        """Returns the damped frequencies, Hz, and the decay rates, 1/s, of the modes by the material alone.
+        `radiation_decays` has what radiation adds."""
         message = materials.named(self, material)[1]
         if message is None:
             raise errors.CarillonError("INVALID_MATERIAL", f"{self.name} was not made with a material here; give one, "
                                        "such as material=\"bell_bronze\"")
         return materials.modes_of(self.eigenvalues, self._client.resolve(message), size)
+
+    def radiation_decays(self, material: Optional[materials.Material] = None, size: float = 1) -> numpy.ndarray:
+        """Returns the decay rates of the modes by radiation, 1/s, which add to those of `modes`. They are zero if no
+        stored transfer fits the material, as for an object that sounds by the paper's coupling."""
+        message = materials.named(self, material)[1]
+        if message is None:
+            raise errors.CarillonError("INVALID_MATERIAL", f"{self.name} was not made with a material here; give one, "
+                                       "such as material=\"bell_bronze\"")
+        transfers = self._client.model(self.name).summary.transfers  # newer ones, too
+        return materials.radiation_decays_of(self.eigenvalues, self._client.resolve(message), size, transfers)
 
     def frequencies(self, material: Optional[materials.Material] = None, size: float = 1) -> numpy.ndarray:
         """Returns the damped frequencies, Hz."""

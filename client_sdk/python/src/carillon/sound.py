@@ -18,12 +18,14 @@ from carillon.v1 import audio_service_pb2
 @dataclasses.dataclass(frozen=True, eq=False)
 class Sound:
     """Frames x channels of float32; full scale is 1. `lost_frame_count` frames were not received. `summary` has
-    what the daemon measured while it rendered the sound offline: loudness, pressure, findings about the contacts."""
+    what the daemon measured while it rendered the sound offline: loudness, pressure, findings about the contacts.
+    `blows` are the impulses that sounded, if Client.render was asked for them with tell_blows=True."""
 
     samples: numpy.ndarray
     sample_rate_hz: int
     lost_frame_count: int = 0
     summary: Optional[audio_service_pb2.RenderSummary] = None
+    blows: tuple[audio_service_pb2.Blow, ...] = ()
 
     @property
     def seconds(self) -> float:
@@ -40,7 +42,8 @@ class Sound:
         return mean
 
     def normalized(self, peak: float = 0.9) -> Sound:
-        """Returns the sound with this peak; silence stays silent."""
+        """Returns the sound with this peak; silence stays silent. The tail of a rendering ends at -80 dB of full scale
+        all the same: for a soft sound use Client.render(trace, normalize=True), or give it a full_scale_pa."""
         return dataclasses.replace(self, samples=self.samples * (peak / self.peak if self.peak else 1))
 
     def save(self, path: str | os.PathLike[str]) -> None:
