@@ -23,9 +23,9 @@ namespace {
 
 /// The daemon has 33 threads when it serves; gRPC begins more of them under load.
 constexpr size_t kThreadCount = 40;
-/// Address space apart from stacks. A daemon that serves has 180 MiB, of which its programs and
-/// libraries, which are there already, take a part.
-constexpr size_t kMemoryBytes = size_t{128} << 20U;
+/// Address space apart from stacks. A daemon that serves has 180 MiB, of which its program and
+/// libraries, which are there already, take 100 MiB.
+constexpr size_t kMemoryBytes = size_t{80} << 20U;
 
 absl::Status TooLittle(absl::string_view what) {
   return Refusal(absl::StatusCode::kResourceExhausted, "SERVER_OUT_OF_MEMORY",

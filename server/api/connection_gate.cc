@@ -36,6 +36,9 @@ constexpr size_t kOwnDescriptorCount = 256;
 constexpr int kBacklog = 1024;
 /// This part of the places is for processes and addresses with few connections.
 constexpr size_t kKeptPart = 16;
+/// After the gate has looked which connections are closed, it pauses this many times as long, so
+/// that a flood of connections beyond a limit takes a small part of its time.
+constexpr int kForgettingPauses = 8;
 /// Pause after an accept that failed for lack of descriptors or memory.
 constexpr std::chrono::milliseconds kPause(50);
 
@@ -218,14 +221,20 @@ bool ConnectionGate::Admit(const std::string& peer, const Connection& connection
     const auto refused = refused_.find(SourceOf(peer));
     if (refused != refused_.end() && Now() < refused->second) return false;
     reason = WhyNoPlace(sharer);
-    if (!reason.empty()) {
-      std::erase_if(connections_, [](const auto& each) { return !each.second.is_open(); });
-      reason = WhyNoPlace(sharer);
-    }
+    if (!reason.empty() && ForgetClosed()) reason = WhyNoPlace(sharer);
     if (reason.empty()) connections_.insert_or_assign(peer, connection);
   }
   if (!reason.empty()) Tell(sharer, reason);
   return reason.empty();
+}
+
+bool ConnectionGate::ForgetClosed() {
+  const auto began = Now();
+  if (began < next_forgetting_) return false;
+  std::erase_if(connections_, [](const auto& each) { return !each.second.is_open(); });
+  const auto ended = Now();
+  next_forgetting_ = ended + kForgettingPauses * (ended - began);
+  return true;
 }
 
 std::string ConnectionGate::WhyNoPlace(const std::string& sharer) const {

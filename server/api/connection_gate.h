@@ -101,6 +101,9 @@ class ConnectionGate {
   void Accept(const Door& door);
   /// Returns whether another connection may be open. If so, stores this connection by its peer.
   bool Admit(const std::string& peer, const Connection& connection);
+  /// Removes closed connections from the table, and returns true. Soon after the last time it
+  /// returns false.
+  bool ForgetClosed() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   /// Returns why a process or address gets no place, or an empty string if it gets one. `sharer` is
   /// the beginning of the names of its connections.
   std::string WhyNoPlace(const std::string& sharer) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
@@ -118,6 +121,7 @@ class ConnectionGate {
   mutable Mutex mutex_;
   /// Connections by peer. Some of them may have been closed.
   std::map<std::string, Connection> connections_ ABSL_GUARDED_BY(mutex_);
+  std::chrono::steady_clock::time_point next_forgetting_ ABSL_GUARDED_BY(mutex_);
   /// For each refused process or address, the time until which its connections are closed at once.
   std::map<std::string, std::chrono::steady_clock::time_point> refused_ ABSL_GUARDED_BY(mutex_);
   /// For each process or address that reached a limit, the time until which nothing is logged about
