@@ -28,12 +28,12 @@ double IntendedUse::UnitEigenvalue(double frequency_hz) const {
 double IntendedUse::DecayRatePerS(double unit_eigenvalue) const {
   const double natural_hz = FrequencyHz(unit_eigenvalue);
   const double loss_rate = LossFactorAt(loss_factor, natural_hz) * kTwoPi * natural_hz;
-  return -(alpha1_s * Eigenvalue(unit_eigenvalue) + alpha2_per_s + loss_rate) / 2;
+  return (alpha1_s * Eigenvalue(unit_eigenvalue) + alpha2_per_s + loss_rate) / 2;
 }
 
 double IntendedUse::DampedFrequencyHz(double unit_eigenvalue) const {
-  const double sigma = DecayRatePerS(unit_eigenvalue);
-  return std::sqrt(std::max(0.0, Eigenvalue(unit_eigenvalue) - sigma * sigma)) / kTwoPi;
+  const double decay_per_s = DecayRatePerS(unit_eigenvalue);
+  return std::sqrt(std::max(0.0, Eigenvalue(unit_eigenvalue) - decay_per_s * decay_per_s)) / kTwoPi;
 }
 
 }  // namespace carillon::precompute

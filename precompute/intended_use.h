@@ -29,10 +29,10 @@ struct IntendedUse {
   double FrequencyHz(double unit_eigenvalue) const;
   /// Returns the eigenvalue of unit material and size for a natural frequency.
   double UnitEigenvalue(double frequency_hz) const;
-  /// Returns sigma = -(alpha1 omega^2 + alpha2 + eta omega) / 2, 1/s, with omega^2 =
-  /// Eigenvalue(unit_eigenvalue) and the loss factor eta at omega.
+  /// Returns (alpha1 omega^2 + alpha2 + eta omega) / 2, 1/s, the rate of the mode's amplitude
+  /// exp(-rate t), with omega^2 = Eigenvalue(unit_eigenvalue) and the loss factor eta at omega.
   double DecayRatePerS(double unit_eigenvalue) const;
-  /// Returns sqrt(omega^2 - sigma^2) / (2 pi), or zero for an overdamped mode.
+  /// Returns sqrt(omega^2 - decay rate^2) / (2 pi), or zero for an overdamped mode.
   double DampedFrequencyHz(double unit_eigenvalue) const;
 };
 

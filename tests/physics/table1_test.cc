@@ -59,7 +59,7 @@ double UnitEigenvalueOfDamped(const IntendedUse& use, double hz) {
 TEST(Table1, DecayOfEveryRowFollowsFromItsFrequency) {
   for (const Row& row : kRows) {
     const IntendedUse use = UseOf(row);
-    const double decay = -use.DecayRatePerS(UnitEigenvalueOfDamped(use, row.base_hz));
+    const double decay = use.DecayRatePerS(UnitEigenvalueOfDamped(use, row.base_hz));
     EXPECT_NEAR(decay, row.decay_per_s, 0.051) << row.example;  // one digit behind the point
   }
 }
@@ -86,7 +86,7 @@ TEST(Table1, BoxesAreBlocksOfTenTimesTheSize) {
 TEST(IntendedUse, OverdampedModeHasNoDampedFrequency) {
   const IntendedUse use{.young_pa = 1, .density_kg_per_m3 = 1, .alpha1_s = 0, .alpha2_per_s = 3};
   EXPECT_EQ(use.DampedFrequencyHz(2), 0);
-  EXPECT_EQ(use.DecayRatePerS(2), -1.5);
+  EXPECT_EQ(use.DecayRatePerS(2), 1.5);
   EXPECT_NEAR(use.DampedFrequencyHz(2.5) * 2 * std::numbers::pi, 0.5, 1e-12);
 }
 

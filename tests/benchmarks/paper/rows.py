@@ -123,7 +123,7 @@ class Solved:
 
     @property
     def decay_per_s(self):
-        return -self.base["decay_rate_per_s"]
+        return self.base["decay_rate_per_s"]
 
 
 def cube_row(name, side, highest_hz, printed):
