@@ -13,6 +13,7 @@ namespace carillon::precompute {
 struct Modes {
   Eigen::VectorXd eigenvalues;  ///< 1/s^2
   Eigen::MatrixXd shapes;       ///< #U by #modes, phi^T M phi = 1
+  int basis_size = 0;           ///< vectors that block Lanczos built; zero for other solvers
 };
 
 /// A request for the lowest modes of a system, including rigid-body modes.

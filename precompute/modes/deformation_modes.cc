@@ -17,6 +17,7 @@
 #include "precompute/modes/lower_limit.h"
 #include "precompute/modes/rigid_body.h"
 #include "precompute/sparse/dense_blas.h"
+#include "precompute/sparse/multifrontal_cholesky.h"
 #include "precompute/sparse/multifrontal_inertia.h"
 #include "precompute/sparse/openblas.h"
 #include "precompute/sparse/workers.h"
@@ -111,7 +112,6 @@ class Solution {
         rigid_momenta_(system.M.selfadjointView<Eigen::Lower>() * rigid_),
         workers_(ThreadCount()) {}
 
-  /// Returns the number of rigid-body modes; six for a free body.
   int rigid_mode_count() const { return static_cast<int>(rigid_.cols()); }
 
   absl::StatusOr<int> CountBelow(double limit) const {
@@ -178,6 +178,10 @@ class Solution {
     watch_(SolveStage::kVerify, 0);
     DeformationModes result;
     result.predicted_cpu_s = Cost(static_cast<int>(all.shapes.cols())).cpu_seconds();
+    result.work = {.factor_multiply_adds = ordered_.fronts.factor_flops,
+                   .factor_entries = static_cast<double>(FactorNumbers(ordered_.fronts)),
+                   .unknowns = static_cast<double>(system_.unknown_count()),
+                   .basis_size = all.basis_size};
     const Measurement measured = Measure(ordered_.matrix, ordered_.fronts.order, all, workers_);
     result.verification.max_orthogonality_error = OrthogonalityError(measured.gram);
     std::vector<Eigen::Index> kept;
@@ -235,7 +239,7 @@ class Solution {
   /// Returns the components of shapes along the rigid-body modes, #rigid by #shapes.
   Eigen::MatrixXd InRigid(const Eigen::MatrixXd& shapes) const {
     const auto rows = static_cast<int>(shapes.rows());
-    const auto rigid = static_cast<int>(rigid_momenta_.cols());
+    const int rigid = rigid_mode_count();
     const auto count = static_cast<int>(shapes.cols());
     Eigen::MatrixXd parts(rigid, count);
     if (parts.size() == 0) return parts;

@@ -15,6 +15,14 @@
 
 namespace carillon::precompute {
 
+/// The size of a solution, from which a benchmark computes the least time that a machine needs.
+struct SolveWork {
+  double factor_multiply_adds = 0;  ///< of one factorization
+  double factor_entries = 0;
+  double unknowns = 0;
+  int basis_size = 0;  ///< vectors that block Lanczos built; zero for other solvers
+};
+
 /// All verified deformation modes of a body below an eigenvalue. Its rigid-body modes (six, or
 /// fewer for a fixed body) are left to the simulator.
 struct DeformationModes {
@@ -29,6 +37,7 @@ struct DeformationModes {
   double lowest_eigenvalue = 0;
   /// Processor time, s, that PredictSolveCost() predicts for the modes found.
   double predicted_cpu_s = 0;
+  SolveWork work;
 };
 
 /// Largest number of modes of a model. More modes never sound at once, and the shapes of more modes

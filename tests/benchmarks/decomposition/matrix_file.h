@@ -75,14 +75,16 @@ class Stopwatch {
   double cpu_ = Cpu();
 };
 
-/// Writes eigenvalues and shapes (column-major) into `folder` and prints the times.
+/// Writes eigenvalues and shapes (column-major) into `folder` and prints the times, and `more`,
+/// which is empty or further members of the JSON object with a comma before each.
 inline void Report(const Stopwatch& watch, const std::string& folder,
-                   const Eigen::VectorXd& eigenvalues, const Eigen::MatrixXd& shapes) {
+                   const Eigen::VectorXd& eigenvalues, const Eigen::MatrixXd& shapes,
+                   const std::string& more = "") {
   const double cpu_seconds = watch.CpuSeconds();
   const double seconds = watch.Seconds();
   WriteArray(folder + "/eigenvalues", eigenvalues.data(), static_cast<size_t>(eigenvalues.size()));
   WriteArray(folder + "/shapes", shapes.data(), static_cast<size_t>(shapes.size()));
-  std::printf("{\"cpu_seconds\": %.3f, \"seconds\": %.3f}\n", cpu_seconds, seconds);
+  std::printf("{\"cpu_seconds\": %.3f, \"seconds\": %.3f%s}\n", cpu_seconds, seconds, more.c_str());
 }
 
 }  // namespace carillon

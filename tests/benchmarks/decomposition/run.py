@@ -4,6 +4,7 @@
 
 Each part prints a Markdown table:
   compare   SciPy, SLEPc and Spectra on the same matrices: CPU seconds, residuals
+  roofline  each stage beside the least time that this machine's arithmetic and memory allow
   calculix  CalculiX on the same meshes: frequencies
   curved    CalculiX, SciPy and Lamb on curved ten-node meshes of Gmsh: frequencies
   growth    time and memory over the number of nodes, up to a million with --full
@@ -29,6 +30,7 @@ import curved
 import estimates
 import growth
 import packages
+import roofline
 import users
 
 
@@ -53,7 +55,8 @@ def fair_environment():
     return environment
 
 
-PARTS = {"compare": compare.compare, "calculix": calculix.compare_frequencies,
+PARTS = {"compare": compare.compare, "roofline": roofline.roofline,
+         "calculix": calculix.compare_frequencies,
          "curved": curved.curved,
          "growth": growth.growth, "accuracy": accuracy.accuracy,
          "estimates": estimates.estimates, "bodies": users.users, "packages": packages.packages}
