@@ -76,7 +76,8 @@ void AddUseOptions(CLI::App& app, Options& options, v1::WorkerRequest& request) 
          "Size that the body will have, relative to the mesh [1]")
       ->group(kUseGroup);
   app.add_option("--band", options.band,
-                 "LO:HI in Hz: all modes up to natural HI are computed, one must lie in the band "
+                 "LO:HI or HI in Hz: all modes up to natural HI are computed, one must lie in the "
+                 "band "
                  "[20:20000; fewer modes where those are too many for 7 GiB or a minute]")
       ->group(kUseGroup);
   app.add_flag_function(
@@ -206,18 +207,19 @@ absl::Status SetBand(const std::string& band, v1::WorkerRequest& request) {
     return absl::OkStatus();
   }
   const std::vector<std::string> ends = absl::StrSplit(band, ':');
-  double low_hz = 0;
+  double low_hz = kUsualLowestHz;
   double high_hz = 0;
-  const bool two_numbers =
-      ends.size() == 2 && absl::SimpleAtod(ends[0], &low_hz) && absl::SimpleAtod(ends[1], &high_hz);
+  const bool numbers = ends.size() <= 2 && absl::SimpleAtod(ends.back(), &high_hz) &&
+                       (ends.size() == 1 || absl::SimpleAtod(ends.front(), &low_hz));
   request.set_min_frequency_hz(low_hz);
   request.set_max_frequency_hz(high_hz);
-  if (two_numbers && low_hz >= 0 && low_hz < high_hz && std::isfinite(high_hz)) {
+  const bool is_default = ends.size() == 1 && high_hz == 0;
+  if (numbers && low_hz >= 0 && (is_default || low_hz < high_hz) && std::isfinite(high_hz)) {
     return absl::OkStatus();
   }
   return InvalidOption(absl::StrCat("--band is \"", band,
-                                    "\"; it must be two frequencies in Hz, the lower "
-                                    "first, such as 20:20000"));
+                                    "\"; it must be the highest frequency in Hz, such as 8000, or "
+                                    "two frequencies, the lower first, such as 20:20000"));
 }
 
 std::string FormatOf(const std::string& format, const std::string& file) {

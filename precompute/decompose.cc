@@ -19,8 +19,10 @@
 #include "precompute/mesh/boundary.h"
 #include "precompute/mesh/fill/element_size.h"
 #include "precompute/mesh/fill/midside_nodes.h"
+#include "precompute/mesh/point_math.h"
 #include "precompute/mesh/read/read_mesh.h"
 #include "precompute/mesh/surface/prepare_surface.h"
+#include "precompute/model_warnings.h"
 #include "precompute/modes/audible_modes.h"
 #include "precompute/modes/deformation_modes.h"
 #include "precompute/modes/solver_comparison.h"
@@ -86,6 +88,13 @@ bool MayCoarsen(const v1::WorkerRequest& request) {
          });
 }
 
+/// Adds the diagonal of the box around a refused surface, metres, which remedies refer to.
+absl::Status WithExtent(absl::Status refusal, const SurfaceMesh& surface) {
+  if (surface.vertices.empty()) return refusal;
+  AddFigure(refusal, "extent_m", absl::StrFormat("%.6g", Diagonal(surface.vertices)));
+  return refusal;
+}
+
 /// A surface to be filled, or a mesh of tetrahedra as it is.
 using Input = std::variant<Fillable, Body>;
 
@@ -100,13 +109,13 @@ absl::StatusOr<Input> ReadInput(const std::string& bytes, const v1::WorkerReques
     return TakeTetrahedra(std::move(*tetrahedra), read.names, request);
   }
   auto& given = std::get<SurfaceMesh>(read.mesh);
-  ASSIGN_OR_RETURN(
-      PreparedSurface prepared,
+  absl::StatusOr<PreparedSurface> prepared =
       PrepareSurface(given, {.repair = settings.mesh().repair(),
                              .wall_m = settings.mesh().wall_m(),
                              .coarsen = MayCoarsen(request),
-                             .most_triangles = 2 * settings.mesh().target_node_count()}));
-  return Fillable{std::move(given), std::move(prepared), std::move(read.names)};
+                             .most_triangles = 2 * settings.mesh().target_node_count()});
+  if (!prepared.ok()) return WithExtent(prepared.status(), given);
+  return Fillable{std::move(given), *std::move(prepared), std::move(read.names)};
 }
 
 absl::Status SaveMatrices(const SystemMatrices& system, const v1::WorkerRequest& request) {
@@ -146,35 +155,10 @@ absl::Status CheckBand(const ModalModel& model, const IntendedUse& use) {
   return status;
 }
 
-/// The cost of a body above which modes of a band that nobody asked for are left out.
-constexpr Means kUsualMeans{.bytes = size_t{7} << 30U, .cpu_s = 60};
-/// Largest estimated error of a frequency that goes without a warning: nearly two semitones.
-constexpr double kGreatError = 0.1;
 /// The goal for a surface if nobody asked for another. Its processor time is the predicted one, so
 /// that each machine makes the same model. The prediction for thin plates is about half the time
 /// that they take.
 constexpr ResolutionGoal kUsualGoal{.accuracy = kGreatError, .budget_s = kUsualMeans.cpu_s / 2};
-
-void WarnOfLowerBand(const DeformationModes& solution, const IntendedUse& use, ModalModel& model) {
-  if (solution.mode_count_below_asked == 0) return;
-  model.warnings.push_back(absl::StrFormat(
-      "only the %d modes below %.5g Hz were computed, because all of some %d below %g Hz would "
-      "need more than %d GiB or %g s of processor time; ask for that band (--band) to have them "
-      "all, or for the most audible of them (--keep)",
-      model.eigenvalues.size(), use.FrequencyHz(solution.complete_to_eigenvalue),
-      solution.mode_count_below_asked, use.high_hz, kUsualMeans.bytes >> 30U, kUsualMeans.cpu_s));
-}
-
-void WarnOfGreatErrors(ModalModel& model) {
-  const auto many = std::ranges::count_if(model.estimated_errors,
-                                          [](double error) { return error > kGreatError; });
-  if (many == 0) return;
-  model.warnings.push_back(absl::StrFormat(
-      "very inaccurate: the frequencies of %d of %d modes are estimated to be off by more than "
-      "%g %%, the worst by %.3g %%; ask for a finer mesh (--accuracy, --budget or --nodes), or "
-      "leave these modes out (--max-frequency-error)",
-      many, model.eigenvalues.size(), 100 * kGreatError, 100 * model.WorstError()));
-}
 
 /// Returns the steps after the assembly of the matrices, with their predicted times.
 std::vector<PlannedStep> PlanOf(const SolveCost& cost) {
@@ -245,7 +229,7 @@ absl::StatusOr<Solved> Solve(const Body& body, const v1::WorkerRequest& request,
   ModalModel model = MakeModalModel(body.mesh, body.given, elastic, solution);
   model.warnings = body.warnings;
   for (double& error : model.estimated_errors) error += body.frequency_error;
-  WarnOfLowerBand(solution, UseOf(request), model);
+  WarnOfLowerBand(solution, UseOf(request), Diagonal(body.mesh.nodes), model);
   if (comparison) model.warnings.push_back(comparison->Text());
   model.comparison = std::move(comparison);
   KeepMostAudible(static_cast<int>(settings.keep_mode_count()), model);
@@ -325,15 +309,6 @@ absl::StatusOr<ModalModel> SolveInput(const Input& input, const v1::WorkerReques
   if (surface != nullptr) return SolveToGoal(*surface, request, observer);
   ASSIGN_OR_RETURN(Solved solved, Solve(std::get<Body>(input), request, observer));
   return std::move(solved.model);
-}
-
-void WarnOfAccuracy(const ResolutionGoal& goal, ModalModel& model) {
-  const double reached = model.WorstError();
-  if (!(goal.accuracy > 0) || reached <= goal.accuracy) return;
-  model.warnings.push_back(absl::StrFormat(
-      "the accuracy of %.3g %% asked for was not reached: the worst mode is estimated to be off by "
-      "%.3g %%; allow more time, memory or nodes, or a mesh that can be refined",
-      100 * goal.accuracy, 100 * reached));
 }
 
 /// Leaves out the modes whose estimated error is above the limit that the request sets.

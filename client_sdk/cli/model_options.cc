@@ -23,19 +23,20 @@
 namespace carillon::cli {
 namespace {
 
-/// Parses "LO:HI" as two frequencies.
+/// Parses "LO:HI" as two frequencies, and "HI" as the higher one. HI of zero is the default.
 CLI::Validator Band(CreateModelOptions& options) {
   return CLI::Validator(
       [&options](std::string& text) -> std::string {
         const size_t colon = text.find(':');
-        const bool parsed =
-            colon != std::string::npos &&
-            CLI::detail::lexical_cast(text.substr(0, colon), options.min_frequency_hz) &&
-            CLI::detail::lexical_cast(text.substr(colon + 1), options.max_frequency_hz) &&
-            options.max_frequency_hz > 0;
-        return parsed ? std::string() : text + " is not two frequencies LO:HI";
+        const bool has_low = colon != std::string::npos;
+        const std::string high = has_low ? text.substr(colon + 1) : text;
+        const bool parsed = (!has_low || CLI::detail::lexical_cast(text.substr(0, colon),
+                                                                   options.min_frequency_hz)) &&
+                            CLI::detail::lexical_cast(high, options.max_frequency_hz) &&
+                            options.max_frequency_hz >= (has_low ? options.min_frequency_hz : 0);
+        return parsed ? std::string() : text + " is not two frequencies LO:HI, or the higher one";
       },
-      "LO:HI");
+      "LO:HI|HI");
 }
 
 void AddBand(CLI::App& create, const std::shared_ptr<CreateModelOptions>& options) {

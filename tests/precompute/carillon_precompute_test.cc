@@ -48,7 +48,7 @@ TEST_F(CarillonPrecomputeTest, JsonHasEveryKey) {
   for (const Json& mode : report.at("modes")) {
     const double omega = 2 * std::numbers::pi * mode.at("frequency_hz").get<double>();
     const double sigma = mode.at("decay_rate_per_s");
-    EXPECT_NEAR(sigma, -(1e-6 * omega * omega + 3) / 2, 1e-9 * omega * omega);
+    EXPECT_NEAR(sigma, (1e-6 * omega * omega + 3) / 2, 1e-9 * omega * omega);
     EXPECT_NEAR(mode.at("damped_frequency_hz").get<double>(),
                 std::sqrt(omega * omega - sigma * sigma) / (2 * std::numbers::pi), 1e-6);
     EXPECT_LT(mode.at("residual"), 1e-5);
@@ -254,7 +254,15 @@ TEST_F(CarillonPrecomputeTest, BodyWithoutAModeInTheBandIsToldItsFirst) {
   const Result result = RunBar(std::string(kSteel) + " --band 20:1000");
   EXPECT_EQ(ReasonOf(result), "NO_MODE_IN_BAND");
   const Json error = Json::parse(result.output).at("error");
-  EXPECT_EQ(error.at("remedies")[0].at("option"), "--band");
+  for (const Json& remedy : error.at("remedies")) {
+    const std::string option = remedy.at("option");
+    const std::string value = remedy.at("value");
+    EXPECT_FALSE(value.empty()) << option;
+    if (option == "--unit") continue;  // RunBar states the unit
+    const std::string band = option == "--band" ? "" : " --band 20:1000";
+    EXPECT_EQ(RunBar(kSteel + band + " " + option + " " + value).exit_status, 0) << option;
+    std::filesystem::remove(model);
+  }
   const std::string first_hz = error.at("figures").at("first_mode_hz");
   EXPECT_NEAR(std::stod(first_hz) /
                   Json::parse(full.output).at("modes")[0].at("frequency_hz").get<double>(),
