@@ -16,6 +16,7 @@
 #include "precompute/fem/assembly.h"
 #include "precompute/fem/curved_element.h"
 #include "precompute/fem/matrix_market.h"
+#include "precompute/graded_size.h"
 #include "precompute/mesh/boundary.h"
 #include "precompute/mesh/fill/element_size.h"
 #include "precompute/mesh/fill/midside_nodes.h"
@@ -294,9 +295,14 @@ absl::StatusOr<ModalModel> SolveToGoal(const Fillable& surface, const v1::Worker
     rounds.push_back(
         Describe(body->mesh, solved->model,
                  is_free ? solved->predicted_cpu_s : ended.cpu_seconds - begun.cpu_seconds));
+    if (!meshing.relative_size.is_uniform()) SetEquivalentSize(meshing.element_size_m, rounds);
     const std::optional<double> next = NextElementSize(is_free ? kUsualGoal : asked, rounds);
     if (!next) return std::move(solved->model);
     best = std::move(solved->model);
+    if (asked.given()) {
+      meshing.relative_size = GradedSize(body->mesh, best->error_at_node,
+                                         {rounds.back().element_size_m, *next, Dimension(rounds.back())});
+    }
     meshing.element_size_m = *next;
     forecast = {.expected_s = (ended.seconds - begun.seconds) * TimeGrowth(rounds.back(), *next),
                 .later_rounds = kLaterRounds};

@@ -43,6 +43,7 @@ std::vector<float> ShapesOnSurface(const SoundingSurface& surface, const Eigen::
 ModalModel MakeModalModel(const TetMesh& mesh, const SurfaceMesh& given,
                           const ElasticConstants& elastic, const DeformationModes& solution) {
   SoundingSurface surface = MakeSoundingSurface(mesh);
+  ErrorEstimate estimate = EstimateFrequencyErrors(mesh, elastic, solution.modes);
   ModalModel model{
       .node_count = static_cast<int>(mesh.nodes.size()),
       .element_count = static_cast<int>(mesh.element_count()),
@@ -57,7 +58,8 @@ ModalModel MakeModalModel(const TetMesh& mesh, const SurfaceMesh& given,
       .eigenvalues = ToVector(solution.modes.eigenvalues),
       .residuals = ToVector(solution.residuals),
       .couplings = ToVector(Couplings(mesh, surface, solution.modes)),
-      .estimated_errors = ToVector(EstimateFrequencyErrors(mesh, elastic, solution.modes)),
+      .estimated_errors = ToVector(estimate.errors),
+      .error_at_node = std::move(estimate.at_node),
       .vertices = {},
       .triangles = std::move(surface.triangles),
       .given_triangle = std::move(surface.given_triangle),
