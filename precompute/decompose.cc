@@ -295,11 +295,12 @@ absl::StatusOr<ModalModel> SolveToGoal(const Fillable& surface, const v1::Worker
     rounds.push_back(
         Describe(body->mesh, solved->model,
                  is_free ? solved->predicted_cpu_s : ended.cpu_seconds - begun.cpu_seconds));
+    if (getenv("G_LOG")) fprintf(stderr, "round: nodes %zu boundary %zu error %.5f cpu %.2f\n", body->mesh.nodes.size(), body->mesh.boundary.size() / 2 + 2, rounds.back().worst_error, rounds.back().cpu_s);
     if (!meshing.relative_size.is_uniform()) SetEquivalentSize(meshing.element_size_m, rounds);
     const std::optional<double> next = NextElementSize(is_free ? kUsualGoal : asked, rounds);
     if (!next) return std::move(solved->model);
     best = std::move(solved->model);
-    if (asked.given()) {
+    if (asked.given() && !getenv("G_OFF")) {
       meshing.relative_size = GradedSize(body->mesh, best->error_at_node,
                                          {rounds.back().element_size_m, *next, Dimension(rounds.back())});
     }

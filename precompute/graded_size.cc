@@ -8,6 +8,8 @@
 #include <queue>
 #include <utility>
 
+#include "precompute/mesh/boundary.h"
+#include "precompute/mesh/fill/element_size.h"
 #include "precompute/mesh/point_math.h"
 
 namespace carillon::precompute {
@@ -15,12 +17,14 @@ namespace {
 
 double Env(const char* n, double d) { const char* s = getenv(n); return s ? atof(s) : d; }
 
-const double kErrorPower = Env("G_Q", 2.4);
-const double kFinest = Env("G_FINE", 0.25), kCoarsest = Env("G_COARSE", 1.4);
-const double kGradation = Env("G_GRAD", 0.4);
+const double kErrorPower = Env("G_Q", 1.6);
+const double kFinest = Env("G_FINE", 0.25), kCoarsest = Env("G_COARSE", 1.2);
+const double kGradation = Env("G_GRAD", 0.6);
 const double kLeastShare = 1e-4;
 const double kStepsPerDoubling = 8;
-const double kSmooth = Env("G_SMOOTH", 1);
+const double kInside = Env("G_INSIDE", 1.05);
+const double kVolumeOfRegular = 0.11785;
+const double kSmooth = Env("G_SMOOTH", 0);
 
 struct Neighbours {
   std::vector<std::vector<int32_t>> of;
@@ -44,21 +48,42 @@ std::vector<std::vector<int32_t>> NeighboursOf(const TetMesh& mesh) {
   return neighbours;
 }
 
-/// The longest edge of each element, averaged over the elements at each node.
+/// Sums over what lies at a node.
+struct Sum {
+  double value = 0;
+  double count = 0;
+
+  void Add(double more) {
+    value += more;
+    count += 1;
+  }
+};
+
+/// The element size at each corner node. On the boundary it is the longest edge of a triangle,
+/// averaged over the triangles at the node. Inside it is the edge of a regular tetrahedron, of whose
+/// volume TetGen makes tetrahedra of the mean volume at the node.
 std::vector<double> SizesOf(const TetMesh& mesh) {
-  std::vector<double> sums(mesh.nodes.size(), 0), counts(mesh.nodes.size(), 0);
+  std::vector<Sum> inside(mesh.nodes.size()), outside(mesh.nodes.size());
+  const auto at = [&](int32_t node) { return mesh.nodes[static_cast<size_t>(node)]; };
   for (size_t e = 0; e < mesh.element_count(); ++e) {
-    const int32_t* corners = &mesh.elements[e * static_cast<size_t>(mesh.nodes_per_element)];
-    const auto at = [&](int i) { return mesh.nodes[static_cast<size_t>(corners[i])]; };
-    double longest = 0;
-    for (const auto& [i, j] : kTetEdges) longest = std::max(longest, Distance(at(i), at(j)));
-    for (int i = 0; i < 4; ++i) {
-      sums[static_cast<size_t>(corners[i])] += longest;
-      counts[static_cast<size_t>(corners[i])] += 1;
+    const int32_t* c = &mesh.elements[e * static_cast<size_t>(mesh.nodes_per_element)];
+    const double volume = TetVolume(at(c[0]), at(c[1]), at(c[2]), at(c[3]));
+    for (int i = 0; i < 4; ++i) inside[static_cast<size_t>(c[i])].Add(volume);
+  }
+  for (const BoundaryFace& face : mesh.boundary) {
+    const Point a = at(face.nodes[0]), b = at(face.nodes[1]), c = at(face.nodes[2]);
+    const double longest = std::max({Distance(a, b), Distance(b, c), Distance(c, a)});
+    for (size_t i = 0; i < 3; ++i) outside[static_cast<size_t>(face.nodes[i])].Add(longest);
+  }
+  std::vector<double> sizes(mesh.nodes.size(), 0);
+  for (size_t n = 0; n < sizes.size(); ++n) {
+    if (outside[n].count > 0) {
+      sizes[n] = outside[n].value / outside[n].count;
+    } else if (inside[n].count > 0) {
+      sizes[n] = kInside * std::cbrt(inside[n].value / inside[n].count / kVolumeOfRegular);
     }
   }
-  for (size_t n = 0; n < sums.size(); ++n) sums[n] /= std::max(counts[n], 1.0);
-  return sums;
+  return sizes;
 }
 
 }  // namespace
@@ -100,18 +125,7 @@ SizeField GradedSize(const TetMesh& mesh, const std::vector<double>& error_at_no
     (sum > goal ? high : low) = c;
   }
   std::vector<double> size = SizesOf(mesh);
-  double area = 0, longest = 0;
-  for (const BoundaryFace& f : mesh.boundary) {
-    std::array<Point, 3> p;
-    double mine = 0;
-    for (size_t i = 0; i < 3; ++i) {
-      p[i] = at(mesh.nodes, f.nodes[i]);
-      mine += at(size, f.nodes[i]) / 3;
-    }
-    const double a = Norm(AreaNormal(p));
-    area += a, longest += a * mine;
-  }
-  const double bias = uniform.element_size_m / (longest / area);
+  const double bias = 1;
   std::vector<double> wanted(mesh.nodes.size(), 0);
   double nodes = 0, nodes_uniform = 0;
   for (int32_t n : corners) {
@@ -132,6 +146,14 @@ SizeField GradedSize(const TetMesh& mesh, const std::vector<double>& error_at_no
       const double most = w + kGradation * Distance(at(mesh.nodes, n), at(mesh.nodes, m)) / uniform.next_element_size_m;
       if (most < at(wanted, m)) queue.emplace(at(wanted, m) = most, m);
     }
+  }
+  if (getenv("G_LOG")) {
+    double after = 0, sum3 = 0;
+    for (int32_t n : corners) {
+      const double x = at(wanted, n) / (at(size, n) * bias / uniform.next_element_size_m);
+      after += std::pow(x, -d), sum3 += std::pow(x, -3);
+    }
+    fprintf(stderr, "  after gradation %.0f (cubed %.0f), bias %.3f\n", after, sum3, bias);
   }
   std::vector<Point> points;
   std::vector<double> values;

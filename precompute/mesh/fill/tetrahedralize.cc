@@ -49,6 +49,7 @@ constexpr double kTargetTolerance = 0.2;
 constexpr double kEdgeByNodes = 1 / 2.5;
 constexpr int kMaxEdgeSteps = 8;
 constexpr double kCoarsestToElementSize = 2.5;
+const double kLongestToElementSize = getenv("G_LONG") ? atof(getenv("G_LONG")) : 1.2;
 constexpr double kNodesPerCubedEdge = 2;  // as TetGen fills solids
 
 /// Where a surface lies and how large it is; scale * (p - low) is within the unit box.
@@ -240,6 +241,7 @@ class Filler {
   /// The longest edge with which the element size of the surface is at most `element_size`. All
   /// edges of a surface of few triangles are split at once, so that the result may be finer.
   double EdgeForElementSize(double element_size) const {
+    if (!relative_size_.is_uniform()) return kLongestToElementSize * element_size / kLongestToMeanEdge;
     double fine = element_size, coarse = kCoarsestToElementSize * element_size;
     for (int step = 0; step < kMaxEdgeSteps; ++step) {
       const double middle = std::sqrt(fine * coarse);
