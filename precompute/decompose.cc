@@ -268,6 +268,15 @@ bool IsFinenessFree(const v1::WorkerRequest& request) {
          MeshingOf(request).nodes_per_element == 10;
 }
 
+/// Returns the element sizes of the mesh after `last`, with which it has the error of a uniform
+/// mesh of the size `next_m`.
+SizeField Grade(const TetMesh& mesh, const ModalModel& model, const Round& last, double next_m) {
+  return GradedSize(mesh, model.error_at_node,
+                    {.element_size_m = last.element_size_m,
+                     .next_element_size_m = next_m,
+                     .dimension = Dimension(last)});
+}
+
 /// Fills and solves a surface finer and finer until the goal is met.
 absl::StatusOr<ModalModel> SolveToGoal(const Fillable& surface, const v1::WorkerRequest& request,
                                        DecompositionObserver& observer) {
@@ -295,15 +304,11 @@ absl::StatusOr<ModalModel> SolveToGoal(const Fillable& surface, const v1::Worker
     rounds.push_back(
         Describe(body->mesh, solved->model,
                  is_free ? solved->predicted_cpu_s : ended.cpu_seconds - begun.cpu_seconds));
-    if (getenv("G_LOG")) fprintf(stderr, "round: nodes %zu boundary %zu error %.5f cpu %.2f\n", body->mesh.nodes.size(), body->mesh.boundary.size() / 2 + 2, rounds.back().worst_error, rounds.back().cpu_s);
     if (!meshing.relative_size.is_uniform()) SetEquivalentSize(meshing.element_size_m, rounds);
     const std::optional<double> next = NextElementSize(is_free ? kUsualGoal : asked, rounds);
     if (!next) return std::move(solved->model);
     best = std::move(solved->model);
-    if (asked.given() && !getenv("G_OFF")) {
-      meshing.relative_size = GradedSize(body->mesh, best->error_at_node,
-                                         {rounds.back().element_size_m, *next, Dimension(rounds.back())});
-    }
+    if (asked.given()) meshing.relative_size = Grade(body->mesh, *best, rounds.back(), *next);
     meshing.element_size_m = *next;
     forecast = {.expected_s = (ended.seconds - begun.seconds) * TimeGrowth(rounds.back(), *next),
                 .later_rounds = kLaterRounds};

@@ -4,51 +4,34 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <functional>
-#include <queue>
+#include <cstdint>
 #include <utility>
 
-#include "precompute/mesh/boundary.h"
-#include "precompute/mesh/fill/element_size.h"
 #include "precompute/mesh/point_math.h"
 
 namespace carillon::precompute {
 namespace {
 
-double Env(const char* n, double d) { const char* s = getenv(n); return s ? atof(s) : d; }
+/// Power q of the element size to which local errors are proportional. It is between the powers at
+/// re-entrant edges, about 1, and elsewhere, 2.4 (resolution.cc).
+constexpr double kLocalPower = 1.6;
+/// Limits of the change of an element size from one mesh to the next.
+constexpr double kFinest = 0.25, kCoarsest = 1.2;
+/// Growth of the element size with the distance. Above 2/3, triangles beside an edge could be split
+/// without end while the edge is short enough.
+constexpr double kGradation = 0.5;
+/// Smallest share of the error that counts, in mean shares.
+constexpr double kLeastShare = 1e-4;
+/// Sizes are rounded to this part of an octave, so that rounding errors, which depend on the number
+/// of threads, do not change the mesh.
+constexpr double kStepsPerOctave = 8;
+/// The edge of the regular tetrahedron of the volume that TetGen is given as a bound, divided by
+/// that of the mean volume which TetGen then makes.
+constexpr double kBoundToMean = 1.05;
+constexpr double kVolumeOfRegular = 0.11785;  // of a tetrahedron with edges of length 1
+constexpr int kBisections = 50;
 
-const double kErrorPower = Env("G_Q", 1.6);
-const double kFinest = Env("G_FINE", 0.25), kCoarsest = Env("G_COARSE", 1.2);
-const double kGradation = Env("G_GRAD", 0.6);
-const double kLeastShare = 1e-4;
-const double kStepsPerDoubling = 8;
-const double kInside = Env("G_INSIDE", 1.05);
-const double kVolumeOfRegular = 0.11785;
-const double kSmooth = Env("G_SMOOTH", 0);
-
-struct Neighbours {
-  std::vector<std::vector<int32_t>> of;
-};
-
-/// The corner nodes of a mesh, with what surrounds them. Other nodes have no neighbours.
-std::vector<std::vector<int32_t>> NeighboursOf(const TetMesh& mesh) {
-  std::vector<std::vector<int32_t>> neighbours(mesh.nodes.size());
-  for (size_t e = 0; e < mesh.element_count(); ++e) {
-    const int32_t* corners = &mesh.elements[e * static_cast<size_t>(mesh.nodes_per_element)];
-    for (const auto& [i, j] : kTetEdges) {
-      neighbours[static_cast<size_t>(corners[i])].push_back(corners[j]);
-      neighbours[static_cast<size_t>(corners[j])].push_back(corners[i]);
-    }
-  }
-  for (std::vector<int32_t>& of : neighbours) {
-    std::ranges::sort(of);
-    const auto repeated = std::ranges::unique(of);
-    of.erase(repeated.begin(), repeated.end());
-  }
-  return neighbours;
-}
-
-/// Sums over what lies at a node.
+/// What lies at a node.
 struct Sum {
   double value = 0;
   double count = 0;
@@ -57,108 +40,102 @@ struct Sum {
     value += more;
     count += 1;
   }
+  double Mean() const { return value / count; }
 };
 
-/// The element size at each corner node. On the boundary it is the longest edge of a triangle,
-/// averaged over the triangles at the node. Inside it is the edge of a regular tetrahedron, of whose
-/// volume TetGen makes tetrahedra of the mean volume at the node.
-std::vector<double> SizesOf(const TetMesh& mesh) {
-  std::vector<Sum> inside(mesh.nodes.size()), outside(mesh.nodes.size());
+/// The corner nodes of a mesh, the element size at each one, and its share of the error in mean
+/// shares.
+struct Corners {
+  std::vector<Point> points;
+  std::vector<double> sizes_m;
+  std::vector<double> shares;
+};
+
+std::vector<Sum> VolumesAtNodes(const TetMesh& mesh) {
+  std::vector<Sum> volumes(mesh.nodes.size());
   const auto at = [&](int32_t node) { return mesh.nodes[static_cast<size_t>(node)]; };
   for (size_t e = 0; e < mesh.element_count(); ++e) {
     const int32_t* c = &mesh.elements[e * static_cast<size_t>(mesh.nodes_per_element)];
     const double volume = TetVolume(at(c[0]), at(c[1]), at(c[2]), at(c[3]));
-    for (int i = 0; i < 4; ++i) inside[static_cast<size_t>(c[i])].Add(volume);
+    for (size_t i = 0; i < 4; ++i) volumes[static_cast<size_t>(c[i])].Add(volume);
   }
+  return volumes;
+}
+
+/// The longest edges of the triangles at each node of the boundary.
+std::vector<Sum> LongestEdgesAtNodes(const TetMesh& mesh) {
+  std::vector<Sum> longest(mesh.nodes.size());
+  const auto at = [&](int32_t node) { return mesh.nodes[static_cast<size_t>(node)]; };
   for (const BoundaryFace& face : mesh.boundary) {
     const Point a = at(face.nodes[0]), b = at(face.nodes[1]), c = at(face.nodes[2]);
-    const double longest = std::max({Distance(a, b), Distance(b, c), Distance(c, a)});
-    for (size_t i = 0; i < 3; ++i) outside[static_cast<size_t>(face.nodes[i])].Add(longest);
+    const double edge = std::max({Distance(a, b), Distance(b, c), Distance(c, a)});
+    for (size_t i = 0; i < 3; ++i) longest[static_cast<size_t>(face.nodes[i])].Add(edge);
   }
-  std::vector<double> sizes(mesh.nodes.size(), 0);
-  for (size_t n = 0; n < sizes.size(); ++n) {
-    if (outside[n].count > 0) {
-      sizes[n] = outside[n].value / outside[n].count;
-    } else if (inside[n].count > 0) {
-      sizes[n] = kInside * std::cbrt(inside[n].value / inside[n].count / kVolumeOfRegular);
+  return longest;
+}
+
+Corners CornersOf(const TetMesh& mesh, const std::vector<double>& error_at_node) {
+  const std::vector<Sum> volumes = VolumesAtNodes(mesh), longest = LongestEdgesAtNodes(mesh);
+  Corners corners;
+  Sum errors;
+  for (size_t n = 0; n < mesh.nodes.size(); ++n) {
+    if (volumes[n].count == 0) continue;  // a mid-side node
+    corners.points.push_back(mesh.nodes[n]);
+    corners.sizes_m.push_back(longest[n].count > 0
+                                  ? longest[n].Mean()
+                                  : kBoundToMean * std::cbrt(volumes[n].Mean() / kVolumeOfRegular));
+    corners.shares.push_back(error_at_node[n]);
+    errors.Add(error_at_node[n]);
+  }
+  for (double& share : corners.shares) {
+    share = errors.value > 0 ? std::max(share / errors.Mean(), kLeastShare) : 1;
+  }
+  return corners;
+}
+
+/// Returns the factors x_i of the header, with which the error falls as if all were `uniform`.
+std::vector<double> FactorsOf(const std::vector<double>& shares, double uniform, double dimension) {
+  std::vector<double> shape, factors(shares.size());
+  for (const double share : shares) {
+    shape.push_back(std::pow(share, -1 / (kLocalPower + dimension)));
+  }
+  const auto scale_and_sum = [&](double scale) {
+    double error = 0;
+    for (size_t i = 0; i < shares.size(); ++i) {
+      factors[i] = std::clamp(scale * shape[i], kFinest, kCoarsest);
+      error += shares[i] * std::pow(factors[i], kLocalPower);
     }
+    return error;
+  };
+  double error = 0;
+  for (const double share : shares) error += share * std::pow(uniform, kLocalPower);
+  double low = uniform / 100, high = uniform * 100;
+  for (int step = 0; step < kBisections; ++step) {
+    const double middle = std::sqrt(low * high);
+    (scale_and_sum(middle) > error ? high : low) = middle;
   }
-  return sizes;
+  scale_and_sum(low);
+  return factors;
+}
+
+double Rounded(double size) {
+  return std::exp2(std::round(std::log2(size) * kStepsPerOctave) / kStepsPerOctave);
 }
 
 }  // namespace
 
 SizeField GradedSize(const TetMesh& mesh, const std::vector<double>& error_at_node,
                      const UniformRefinement& uniform) {
-  const auto neighbours = NeighboursOf(mesh);
-  std::vector<int32_t> corners;
-  for (size_t n = 0; n < neighbours.size(); ++n) {
-    if (!neighbours[n].empty()) corners.push_back(static_cast<int32_t>(n));
+  Corners corners = CornersOf(mesh, error_at_node);
+  const std::vector<double> factors = FactorsOf(
+      corners.shares, uniform.next_element_size_m / uniform.element_size_m, uniform.dimension);
+  std::vector<double> relative_sizes;
+  for (size_t i = 0; i < factors.size(); ++i) {
+    relative_sizes.push_back(
+        Rounded(factors[i] * corners.sizes_m[i] / uniform.next_element_size_m));
   }
-  const auto at = [](auto& v, int32_t n) -> auto& { return v[static_cast<size_t>(n)]; };
-  std::vector<double> share = error_at_node;
-  for (int s = 0; s < kSmooth; ++s) {
-    std::vector<double> smooth = share;
-    for (int32_t n : corners) {
-      double sum = at(share, n);
-      for (int32_t m : at(neighbours, n)) sum += at(share, m);
-      at(smooth, n) = sum / (1 + double(at(neighbours, n).size()));
-    }
-    share = smooth;
-  }
-  double total = 0;
-  for (int32_t n : corners) total += at(share, n);
-  const double mean = total / double(corners.size());
-  const double q = kErrorPower, d = uniform.dimension;
-  for (int32_t n : corners) at(share, n) = std::max(at(share, n) / mean, kLeastShare);
-  const double r = uniform.next_element_size_m / uniform.element_size_m;
-  const auto factor = [&](int32_t n, double c) {
-    return std::clamp(c * std::pow(at(share, n), -1 / (q + d)), kFinest, kCoarsest);
-  };
-  double low = r / 100, high = r * 100;
-  double goal = 0;
-  for (int32_t n : corners) goal += at(share, n) * std::pow(r, q);
-  for (int step = 0; step < 40; ++step) {
-    const double c = std::sqrt(low * high);
-    double sum = 0;
-    for (int32_t n : corners) sum += at(share, n) * std::pow(factor(n, c), q);
-    (sum > goal ? high : low) = c;
-  }
-  std::vector<double> size = SizesOf(mesh);
-  const double bias = 1;
-  std::vector<double> wanted(mesh.nodes.size(), 0);
-  double nodes = 0, nodes_uniform = 0;
-  for (int32_t n : corners) {
-    const double x = factor(n, low);
-    nodes += std::pow(x, -d), nodes_uniform += std::pow(r, -d);
-    const double s = x * at(size, n) * bias / uniform.next_element_size_m;
-    at(wanted, n) = std::exp2(std::round(std::log2(s) * kStepsPerDoubling) / kStepsPerDoubling);
-  }
-  if (getenv("G_LOG")) fprintf(stderr, "graded r %.3f c %.3f nodes %.0f uniform %.0f of %zu d %g\n", r, low, nodes, nodes_uniform, corners.size(), d);
-  using Entry = std::pair<double, int32_t>;
-  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
-  for (int32_t n : corners) queue.emplace(at(wanted, n), n);
-  while (!queue.empty()) {
-    const auto [w, n] = queue.top();
-    queue.pop();
-    if (w > at(wanted, n)) continue;
-    for (int32_t m : at(neighbours, n)) {
-      const double most = w + kGradation * Distance(at(mesh.nodes, n), at(mesh.nodes, m)) / uniform.next_element_size_m;
-      if (most < at(wanted, m)) queue.emplace(at(wanted, m) = most, m);
-    }
-  }
-  if (getenv("G_LOG")) {
-    double after = 0, sum3 = 0;
-    for (int32_t n : corners) {
-      const double x = at(wanted, n) / (at(size, n) * bias / uniform.next_element_size_m);
-      after += std::pow(x, -d), sum3 += std::pow(x, -3);
-    }
-    fprintf(stderr, "  after gradation %.0f (cubed %.0f), bias %.3f\n", after, sum3, bias);
-  }
-  std::vector<Point> points;
-  std::vector<double> values;
-  for (int32_t n : corners) points.push_back(at(mesh.nodes, n)), values.push_back(at(wanted, n));
-  return {std::move(points), std::move(values)};
+  return {std::move(corners.points), std::move(relative_sizes),
+          kGradation / uniform.next_element_size_m};
 }
 
 }  // namespace carillon::precompute

@@ -38,9 +38,9 @@ std::optional<double> NextElementSize(const ResolutionGoal& goal, const std::vec
 /// Returns the number of dimensions in which smaller elements become more numerous.
 double Dimension(const Round& round);
 
-/// Sets the element size of the last round, whose mesh is graded, to the `asked` size of the uniform
-/// mesh that would have the same error. If the mesh did not become finer than the one before, the
-/// size remains that of the mesh before.
+/// Sets the element size of the last round, whose mesh is graded, to the `asked` size of the
+/// uniform mesh that would have the same error. If the mesh did not become finer than the one
+/// before, the size remains that of the mesh before.
 void SetEquivalentSize(double asked_m, std::vector<Round>& rounds);
 
 /// Returns the predicted time of a round with this element size, relative to the round `last`.

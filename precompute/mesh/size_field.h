@@ -14,11 +14,12 @@ namespace carillon::precompute {
 class SizeField {
  public:
   SizeField() = default;
-  /// `relative_sizes` has a positive number for each point.
-  SizeField(std::vector<Point> points, std::vector<double> relative_sizes);
+  /// `relative_sizes` has a positive number for each point. `slope`: how much the relative size
+  /// grows with the distance from a point, 1/m.
+  SizeField(std::vector<Point> points, std::vector<double> relative_sizes, double slope);
 
-  /// Returns the relative size at the nearest of the points. Of points at equal distance the first
-  /// counts.
+  /// Returns the smallest size that a point allows at `place`: the point's relative size plus slope
+  /// times distance.
   double At(const Point& place) const;
 
   bool is_uniform() const { return points_.empty(); }
@@ -28,19 +29,17 @@ class SizeField {
   SizeField Moved(const Point& low, double scale) const;
 
  private:
-  struct Nearest {
-    double squared_distance;
-    int32_t point;
-  };
-
-  void Sort(size_t begin, size_t end, size_t axis);
-  void Search(const Point& place, size_t begin, size_t end, size_t axis, Nearest& nearest) const;
+  double Sort(size_t begin, size_t end, size_t axis);
+  void Search(const Point& place, size_t begin, size_t end, size_t axis, double& smallest) const;
 
   std::vector<Point> points_;
   std::vector<double> relative_sizes_;
+  double slope_ = 0;
   /// A k-d tree: the middle of each range of numbers of points divides the range along x, y, z in
   /// turn.
   std::vector<int32_t> tree_;
+  /// The smallest relative size of each range, at the middle of the range.
+  std::vector<double> smallest_;
 };
 
 }  // namespace carillon::precompute

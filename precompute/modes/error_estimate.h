@@ -17,8 +17,8 @@ struct ErrorEstimate {
   /// For each node of the mesh, the share of the error that arises near it: the parts of the
   /// relative corrections delta Lambda / Lambda of all edges and faces b at the node, each divided
   /// among the corners of b, and summed over the modes. Each mode has the square of its error as a
-  /// weight, because the worst modes decide how fine a mesh must be. The unit is arbitrary; mid-side
-  /// nodes have zero.
+  /// weight, because the worst modes decide how fine a mesh must be. The unit is arbitrary;
+  /// mid-side nodes have zero.
   std::vector<double> at_node;
 };
 

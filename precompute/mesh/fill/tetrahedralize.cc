@@ -49,8 +49,8 @@ constexpr double kTargetTolerance = 0.2;
 constexpr double kEdgeByNodes = 1 / 2.5;
 constexpr int kMaxEdgeSteps = 8;
 constexpr double kCoarsestToElementSize = 2.5;
-const double kLongestToElementSize = getenv("G_LONG") ? atof(getenv("G_LONG")) : 1.2;
-constexpr double kNodesPerCubedEdge = 2;  // as TetGen fills solids
+constexpr double kLongestToElementSize = 1.2;  // as uniform meshes of boxes and profiles have
+constexpr double kNodesPerCubedEdge = 2;       // as TetGen fills solids
 
 /// Where a surface lies and how large it is; scale * (p - low) is within the unit box.
 struct UnitBox {
@@ -171,8 +171,9 @@ class Filler {
       : surface_(unit_surface),
         scale_(box.scale),
         settings_(settings),
-        relative_size_(settings.element_size_m != 0 ? settings.relative_size.Moved(box.low, box.scale)
-                                                    : SizeField()),
+        relative_size_(settings.element_size_m != 0
+                           ? settings.relative_size.Moved(box.low, box.scale)
+                           : SizeField()),
         shells_(FindShells(surface_)),
         extent_(Measure(surface_, shells_)) {}
 
@@ -241,7 +242,9 @@ class Filler {
   /// The longest edge with which the element size of the surface is at most `element_size`. All
   /// edges of a surface of few triangles are split at once, so that the result may be finer.
   double EdgeForElementSize(double element_size) const {
-    if (!relative_size_.is_uniform()) return kLongestToElementSize * element_size / kLongestToMeanEdge;
+    if (!relative_size_.is_uniform()) {
+      return kLongestToElementSize / kLongestToMeanEdge * element_size;
+    }
     double fine = element_size, coarse = kCoarsestToElementSize * element_size;
     for (int step = 0; step < kMaxEdgeSteps; ++step) {
       const double middle = std::sqrt(fine * coarse);

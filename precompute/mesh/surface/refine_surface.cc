@@ -74,8 +74,8 @@ class Refiner {
 
   void NoteIfLong(const Edge& edge) {
     if (!edges_inside_too_ && IsInside(triangles_of_edge_.at(edge))) return;
-    if (RelativeLength(edge) <= max_edge_m_) return;
-    long_edges_.emplace(Distance(Vertex(edge.first), Vertex(edge.second)), edge.first, edge.second);
+    const double length = RelativeLength(edge);
+    if (length > max_edge_m_) long_edges_.emplace(length, edge.first, edge.second);
   }
 
   /// The length of the edge, divided by the relative size at its middle.
@@ -90,19 +90,8 @@ class Refiner {
     while (!long_edges_.empty()) {
       const auto [length, a, b] = long_edges_.top();
       long_edges_.pop();
-      if (!triangles_of_edge_.contains({a, b})) continue;  // it was flipped away
-      if (relative_size_.is_uniform() || !IsAtApex({a, b})) Split({a, b});
+      if (triangles_of_edge_.contains({a, b})) Split({a, b});  // else it was flipped away
     }
-  }
-
-  /// Whether an apex of the edge's triangles lies where the edge would be split. With sizes that
-  /// vary, edges can otherwise be split without end next to each other.
-  bool IsAtApex(const Edge& edge) {
-    const Point middle = SplitPoint(edge);
-    const double near = kNearApex * Distance(Vertex(edge.first), Vertex(edge.second));
-    return std::ranges::any_of(triangles_of_edge_.at(edge), [&](int32_t t) {
-      return Distance(Vertex(Apex(t, edge)), middle) < near;
-    });
   }
 
   void Split(const Edge& edge) {
@@ -182,9 +171,6 @@ class Refiner {
     }
   }
 
-  // Least distance of an apex from a new vertex, in lengths of the edge that is split.
-  static constexpr double kNearApex = 0.1;
-
   // Below this difference, rounding in a square cell could flip its diagonal again and again.
   static constexpr double kFlipTolerance = 1e-9;
 
@@ -198,7 +184,7 @@ class Refiner {
   bool edges_inside_too_ = false;
   RefinedSurface refined_;
   absl::flat_hash_map<Edge, std::array<int32_t, 2>> triangles_of_edge_;
-  // By length, then by vertices, so that the same surface is always split alike.
+  // By relative length, then by vertices, so that the same surface is always split alike.
   std::priority_queue<std::tuple<double, int32_t, int32_t>> long_edges_;
   std::vector<Edge> suspects_;
 };

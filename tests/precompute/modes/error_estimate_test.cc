@@ -6,6 +6,7 @@
 #include <cmath>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "precompute/modes/deformation_modes.h"
 #include "tests/precompute/test_meshes.h"
@@ -55,6 +56,24 @@ TEST_P(EstimateTest, IsNearTheTrueErrorAndSeldomBelowIt) {
     EXPECT_GT(errors[m], 0.8 * right - 2e-5) << "mode " << m << ", in truth " << right;
     EXPECT_LT(errors[m], 3 * right + 2e-5) << "mode " << m << ", in truth " << right;
   }
+}
+
+TEST(ErrorEstimate, HasItsLargestSharesWhereElementsAreCoarse) {
+  // Cells that are four times as long in the half of high x.
+  TetMesh mesh = MakeTetBox({1, 0.2, 0.2}, {20, 2, 2}, 4);
+  for (Point& p : mesh.nodes) p[0] = p[0] < 0.5 ? p[0] : 0.5 + 4 * (p[0] - 0.5);
+  const DeformationModes solution = Solve(mesh, 60);
+  ASSERT_GT(solution.modes.eigenvalues.size(), 0);
+  const std::vector<double> at_node =
+      EstimateFrequencyErrors(mesh, kElastic, solution.modes).at_node;
+  ASSERT_EQ(at_node.size(), mesh.nodes.size());
+  double fine = 0, coarse = 0;
+  for (size_t n = 0; n < at_node.size(); ++n) {
+    EXPECT_GE(at_node[n], 0);
+    (mesh.nodes[n][0] < 0.5 ? fine : coarse) += at_node[n];
+  }
+  EXPECT_GT(fine, 0);
+  EXPECT_GT(coarse, 4 * fine);
 }
 
 TEST(EstimateOfCurvedElements, IsNearTheTrueErrorAndSeldomBelowIt) {
