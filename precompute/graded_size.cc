@@ -30,6 +30,9 @@ constexpr double kStepsPerOctave = 8;
 constexpr double kBoundToMean = 1.05;
 constexpr double kVolumeOfRegular = 0.11785;  // of a tetrahedron with edges of length 1
 constexpr int kBisections = 50;
+/// A mesh is graded only if that is predicted to leave at most this part of the nodes. Bells and
+/// plates, whose errors are alike everywhere, gain nothing.
+constexpr double kMostNodes = 0.75;
 
 /// What lies at a node.
 struct Sum {
@@ -118,6 +121,18 @@ std::vector<double> FactorsOf(const std::vector<double>& shares, double uniform,
   return factors;
 }
 
+/// Returns the predicted number of nodes of a graded mesh, relative to the last mesh.
+double NodeGrowth(const SizeField& graded, const Corners& corners,
+                  const UniformRefinement& uniform) {
+  double nodes = 0;
+  for (size_t i = 0; i < corners.points.size(); ++i) {
+    const double factor =
+        graded.At(corners.points[i]) * uniform.next_element_size_m / corners.sizes_m[i];
+    nodes += std::pow(factor, -uniform.dimension);
+  }
+  return nodes / static_cast<double>(corners.points.size());
+}
+
 double Rounded(double size) {
   return std::exp2(std::round(std::log2(size) * kStepsPerOctave) / kStepsPerOctave);
 }
@@ -134,8 +149,10 @@ SizeField GradedSize(const TetMesh& mesh, const std::vector<double>& error_at_no
     relative_sizes.push_back(
         Rounded(factors[i] * corners.sizes_m[i] / uniform.next_element_size_m));
   }
-  return {std::move(corners.points), std::move(relative_sizes),
-          kGradation / uniform.next_element_size_m};
+  SizeField graded(corners.points, std::move(relative_sizes),
+                   kGradation / uniform.next_element_size_m);
+  const bool pays = NodeGrowth(graded, corners, uniform) <= kMostNodes * uniform.node_growth;
+  return pays ? std::move(graded) : SizeField();
 }
 
 }  // namespace carillon::precompute

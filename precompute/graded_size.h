@@ -13,6 +13,7 @@ struct UniformRefinement {
   double element_size_m;       ///< of the last mesh's surface, as SurfaceElementSize() measures it
   double next_element_size_m;  ///< of the mesh to make
   double dimension;            ///< 2 for walls, 3 for solids: power of the number of nodes
+  double node_growth;          ///< predicted number of its nodes, relative to the last mesh
 };
 
 /// Returns element sizes, relative to `next_element_size_m`, with which a mesh has the error of the
@@ -23,7 +24,8 @@ struct UniformRefinement {
 /// large. Then the number of nodes, sum_i x_i^-d, is smallest for the same error if x_i is
 /// proportional to error_i^(-1 / (q + d)) (Zienkiewicz and Zhu, A simple error estimator and
 /// adaptive procedure, Int. J. Numer. Methods Eng. 24, 1987). The factors x_i are limited, and
-/// neighbouring sizes differ by at most a part of their distance.
+/// neighbouring sizes differ by at most a part of their distance. Where such a mesh would save less
+/// than a quarter of the nodes, the field is uniform.
 SizeField GradedSize(const TetMesh& mesh, const std::vector<double>& error_at_node,
                      const UniformRefinement& uniform);
 

@@ -78,6 +78,11 @@ void SetEquivalentSize(double asked_m, std::vector<Round>& rounds) {
   const bool finer = last.node_count > kSameNodeCount * before.node_count ||
                      last.worst_error < before.worst_error / kSameNodeCount;
   last.element_size_m = finer ? asked_m : before.element_size_m;
+  last.uniform_node_count = UniformNodeCount(before, last.element_size_m);
+}
+
+double UniformNodeCount(const Round& last, double element_size_m) {
+  return last.uniform_node_count * std::pow(last.element_size_m / element_size_m, Dimension(last));
 }
 
 double TimeGrowth(const Round& last, double element_size_m) {

@@ -20,8 +20,11 @@ struct ResolutionGoal {
 struct Round {
   double element_size_m = 0;  ///< of the mesh's surface, as SurfaceElementSize() measures it
   double node_count = 0;      ///< mid-side nodes included
-  bool thin = false;          ///< whether the number of nodes grows as element_size^-2, not ^-3
-  double worst_error = 0;     ///< zero if the mesh has no mode
+  /// Predicted number of nodes of the uniform mesh of this element size; equal to node_count unless
+  /// the mesh is graded.
+  double uniform_node_count = 0;
+  bool thin = false;       ///< whether the number of nodes grows as element_size^-2, not ^-3
+  double worst_error = 0;  ///< zero if the mesh has no mode
   double cpu_s = 0;
   double peak_bytes = 0;
 };
@@ -37,6 +40,9 @@ std::optional<double> NextElementSize(const ResolutionGoal& goal, const std::vec
 
 /// Returns the number of dimensions in which smaller elements become more numerous.
 double Dimension(const Round& round);
+
+/// Returns the predicted number of nodes of the uniform mesh of this element size after `last`.
+double UniformNodeCount(const Round& last, double element_size_m);
 
 /// Sets the element size of the last round, whose mesh is graded, to the `asked` size of the
 /// uniform mesh that would have the same error. If the mesh did not become finer than the one

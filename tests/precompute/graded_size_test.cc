@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <vector>
 
 #include "precompute/mesh/boundary.h"
@@ -19,9 +20,11 @@ class GradedBar : public testing::Test {
   SizeField Grade(double finer, const ErrorAt& error_at) const {
     std::vector<double> errors;
     for (const Point& p : bar_.nodes) errors.push_back(error_at(p));
-    return GradedSize(
-        bar_, errors,
-        {.element_size_m = size_m_, .next_element_size_m = size_m_ * finer, .dimension = 3});
+    return GradedSize(bar_, errors,
+                      {.element_size_m = size_m_,
+                       .next_element_size_m = size_m_ * finer,
+                       .dimension = 3,
+                       .node_growth = std::pow(finer, -3)});
   }
 
   TetMesh bar_ = MakeTetBox({1, 0.2, 0.2}, {20, 4, 4}, 10);
@@ -30,23 +33,25 @@ class GradedBar : public testing::Test {
 
 TEST_F(GradedBar, IsUniformWhereTheErrorIs) {
   const SizeField sizes = Grade(0.5, [](const Point&) { return 3.0; });
-  for (const double x : {0.1, 0.35, 0.9}) {
-    // Sizes are rounded to an eighth of an octave, and grow between the nodes.
-    EXPECT_NEAR(sizes.At({x, 0, 0}), 1, 0.15) << x;
-  }
+  EXPECT_TRUE(sizes.is_uniform());
+}
+
+TEST_F(GradedBar, IsUniformWhereAGradedMeshWouldSaveLittle) {
+  EXPECT_TRUE(Grade(0.7, [](const Point& p) { return 1 + p[0]; }).is_uniform());
 }
 
 TEST_F(GradedBar, HasFineElementsOnlyNearTheError) {
   const SizeField sizes = Grade(0.7, [](const Point& p) { return p[0] < 0.06 ? 1.0 : 1e-3; });
   const double near = sizes.At({0, 0.1, 0.1}), far = sizes.At({1, 0.1, 0.1});
-  EXPECT_LT(near, 0.9);
-  EXPECT_GT(far, 1.2);  // 1 / 0.7 is the size of the last mesh
+  EXPECT_NEAR(near, 1, 0.15);  // as fine as the uniform mesh, because all of the error is there
+  EXPECT_GT(far, 1.2);         // 1 / 0.7 is the size of the last mesh
   EXPECT_LE(sizes.At({0.1, 0.1, 0.1}), far);
 }
 
 TEST_F(GradedBar, DoesNotDependOnTheUnitOfTheErrors) {
-  const auto error = [](const Point& p) { return 0.1 + p[0]; };
+  const auto error = [](const Point& p) { return p[0] < 0.06 ? 1.0 : 1e-3; };
   const SizeField one = Grade(0.6, error);
+  EXPECT_FALSE(one.is_uniform());
   const SizeField other = Grade(0.6, [&](const Point& p) { return 1024 * error(p); });
   for (const double x : {0.0, 0.3, 0.7}) EXPECT_EQ(one.At({x, 0, 0}), other.At({x, 0, 0}));
 }

@@ -267,6 +267,15 @@ class Filler {
     return std::chrono::seconds(std::lround(std::min(5 + (tetrahedra + triangles) / 1000, 600.0)));
   }
 
+  int MostAdded() const {
+    // TetGen's count must not end a mesh that still has fewer nodes than the limit.
+    constexpr double kMargin = 2;
+    const double limit = settings_.most_node_count;
+    const double most =
+        limit > 0 ? std::min<double>(kMaxMeshNodes, kMargin * limit) : kMaxMeshNodes;
+    return static_cast<int>(most / NodesPerCorner(settings_));
+  }
+
   absl::StatusOr<TetMesh> FillWithEdge(double edge) const { return FillWithEdge(edge, edge); }
 
   absl::StatusOr<TetMesh> FillWithEdge(double edge, double inside) const {
@@ -278,7 +287,7 @@ class Filler {
                         .max_volume = max_volume,
                         .relative_size = relative_size_,
                         .keep_surface = true,
-                        .max_added_nodes = kMaxMeshNodes / NodesPerCorner(settings_),
+                        .max_added_nodes = MostAdded(),
                         .most_cpu = MostCpu(refined, max_volume),
                         .cautious = settings_.cautious};
     return FillSomehow(request, keep_surface);

@@ -23,6 +23,9 @@ struct MeshingSettings {
   /// Element size relative to `element_size_m`, in the places of the surface in metres. Only used
   /// with `element_size_m`.
   SizeField relative_size = {};
+  /// Number of nodes, mid-side nodes included, above which the mesh is of no use. Meshing may stop
+  /// beyond it. Zero means no limit.
+  double most_node_count = 0;
   /// 4 or 10. Mid-side nodes lie on straight edges.
   int nodes_per_element = 10;
   /// The same as FillRequest::cautious.
