@@ -326,7 +326,11 @@ absl::StatusOr<ModalModel> SolveToGoal(const Fillable& surface, const v1::Worker
     rounds.push_back(
         Describe(body->mesh, solved->model,
                  is_free ? solved->predicted_cpu_s : ended.cpu_seconds - begun.cpu_seconds));
-    if (!meshing.relative_size.is_uniform()) SetEquivalentSize(meshing.element_size_m, rounds);
+    if (!meshing.relative_size.is_uniform() && !SetEquivalentSize(meshing.element_size_m, rounds)) {
+      rounds.pop_back();
+      meshing.relative_size = {};
+      continue;
+    }
     const std::optional<double> next = NextElementSize(is_free ? kUsualGoal : asked, rounds);
     if (!next) return std::move(solved->model);
     best = std::move(solved->model);

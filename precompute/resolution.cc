@@ -72,13 +72,13 @@ std::string Overrun(const char* what, double asked, double used) {
 
 double Dimension(const Round& round) { return round.thin ? 2 : 3; }
 
-void SetEquivalentSize(double asked_m, std::vector<Round>& rounds) {
+bool SetEquivalentSize(double asked_m, std::vector<Round>& rounds) {
   Round& last = rounds.back();
   const Round& before = rounds[rounds.size() - 2];
-  const bool finer = last.node_count > kSameNodeCount * before.node_count ||
-                     last.worst_error < before.worst_error / kSameNodeCount;
-  last.element_size_m = finer ? asked_m : before.element_size_m;
-  last.uniform_node_count = UniformNodeCount(before, last.element_size_m);
+  last.element_size_m = asked_m;
+  last.uniform_node_count = UniformNodeCount(before, asked_m);
+  return last.node_count > kSameNodeCount * before.node_count ||
+         last.worst_error < before.worst_error / kSameNodeCount;
 }
 
 double UniformNodeCount(const Round& last, double element_size_m) {

@@ -45,9 +45,9 @@ double Dimension(const Round& round);
 double UniformNodeCount(const Round& last, double element_size_m);
 
 /// Sets the element size of the last round, whose mesh is graded, to the `asked` size of the
-/// uniform mesh that would have the same error. If the mesh did not become finer than the one
-/// before, the size remains that of the mesh before.
-void SetEquivalentSize(double asked_m, std::vector<Round>& rounds);
+/// uniform mesh that would have the same error. Returns false if the mesh became neither finer nor
+/// more accurate than the one before.
+bool SetEquivalentSize(double asked_m, std::vector<Round>& rounds);
 
 /// Returns the predicted time of a round with this element size, relative to the round `last`.
 double TimeGrowth(const Round& last, double element_size_m);
