@@ -156,6 +156,26 @@ class CallsTest(DaemonTest):
         self.assertEqual(len(told.warnings), 1)
         self.assertEqual((stream.late_count, stream.remap_count), (1, 0))
 
+    def test_models_jobs_and_objects_of_asyncio_are_awaited(self):
+        async def use():
+            async with carillon.aio.connect(self.daemon.server) as c, await c.scene() as scene:
+                job = await c.create_job(BAR, meshes.MATERIAL)
+                model = await job.wait()
+                bar, other = await scene.add_all([model, {"model": model, "handle": 7}])
+                await other.update(gain=0.5)
+                await bar.strike(POINT, IMPULSE, DURATION_S)
+                await other.remove()
+                trace = carillon.Trace()
+                trace.step(0.0, impulses=carillon.Impulses(trace.add(model), POINT, IMPULSE, durations=DURATION_S))
+                return ((await job.refresh()).state, await model.frequencies(), (await c.render(trace)).peak,
+                        (await model.render_strike(POINT, IMPULSE, duration=DURATION_S)).peak,
+                        [item.handle for item in await scene.objects()])
+
+        state, frequencies, *peaks, handles = asyncio.run(use())
+        self.assertEqual((state, handles), ("succeeded", [1]))
+        numpy.testing.assert_array_equal(frequencies, self.model.frequencies())
+        self.assertEqual(*peaks)
+
     def test_no_transfer_means_no_decay_by_radiation(self):
         numpy.testing.assert_array_equal(self.model.radiation_decays(), numpy.zeros(self.model.mode_count))
 

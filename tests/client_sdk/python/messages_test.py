@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the Python package tells its callers without a daemon: warnings, refusals in their own names, and short forms."""
 
+import asyncio
+import threading
 import unittest
 import warnings
 
@@ -144,7 +146,7 @@ class ShortFormsTest(MessagesTest):
         model = carillon.Model(self.c, summary)
         for item, expected in (
                 (self.c, "<Client of unix:/nowhere>"), (scene, "<Scene scenes/1 of unix:/nowhere>"),
-                (model, "<Model bell: 1 mode>"),
+                (model, "<Model bell: 1 mode>"), (carillon.aio.AsyncModel(model), "<AsyncModel bell: 1 mode>"),
                 (summary, "<ModalModelSummary bell: 1 mode, 12 nodes>"),
                 (rendering, "<RenderSummary: 4800 frames, 1 contact, peak 2 Pa>"),
                 (trace, "<Trace: 1 object, 1 step, to 0.5 s>"),
@@ -155,6 +157,26 @@ class ShortFormsTest(MessagesTest):
             self.assertEqual(repr(item), expected)
         self.assertIn("node_count: 12", str(summary))
         self.assertIn("<audio controls", sound._repr_html_())
+
+
+class AioTest(unittest.TestCase):
+    def test_calls_that_wait_do_not_keep_others_waiting(self):
+        # Each call ends when all are running, as many recordings would that wait for each other.
+        count = 100
+        barrier = threading.Barrier(count)
+
+        async def together():
+            await asyncio.gather(*(carillon.aio.in_thread(barrier.wait, 60) for _ in range(count)))
+
+        asyncio.run(together())
+
+    def test_all_that_asks_the_daemon_is_a_coroutine(self):
+        aio = carillon.aio
+        for kind, plain in ((aio.AsyncModel, carillon.Model), (aio.AsyncJob, carillon.Job),
+                            (aio.AsyncObject, carillon.SoundingObject)):
+            for name, member in vars(plain).items():
+                if not name.startswith("_") and not isinstance(member, property) and not name.startswith("plot_"):
+                    self.assertTrue(asyncio.iscoroutinefunction(getattr(kind, name)), f"{kind.__name__}.{name}")
 
 
 if __name__ == "__main__":
