@@ -58,6 +58,12 @@ class DistributionTest(unittest.TestCase):
         self.assert_prints("SERVER_UNAVAILABLE", "node", "--input-type=module", "-e",
                            f"import {{ connect }} from 'carillon'; {code}")
 
+    def test_it_tells_its_callers_what_is_wrong(self):
+        code, said = run("node", "--test", pathlib.Path(__file__).with_name("messages.test.js"), cwd=self.folder,
+                         env={**os.environ, "NODE_PATH": str(self.modules)})
+        self.assertEqual(code, 0, said)
+        self.assertNotIn("# pass 0", said.replace("ℹ", "#"))
+
     def test_types_accept_a_program_that_is_right_and_refuse_those_that_are_wrong(self):
         (self.folder / "right.ts").write_text(pathlib.Path(__file__).with_name("usage.ts").read_text())
         wrong = ("c.createModel('a.obj', {})", "c.createScene({ hearing: { panning: 7 } })",
