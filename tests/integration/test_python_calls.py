@@ -103,7 +103,7 @@ class CallsTest(DaemonTest):
         numpy.testing.assert_allclose(sounds[1].samples, sounds[0].samples, atol=1e-4)
 
     def test_a_trace_sounds_as_its_stream_but_for_the_scheduling_delay(self):
-        step_s, hit = 1 / 60, 6
+        step_s, hit = 1 / 240, 6
         for kind, is_sent, blow_s in (
                 # A blow is over one step after it, and then sounds. One after a gap is a blow by itself.
                 ("contacts", lambda number: True, (hit + 1) * step_s),

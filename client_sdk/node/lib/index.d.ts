@@ -164,6 +164,7 @@ export class Model {
 
 /** A recorded simulation. */
 export class Trace {
+  /** `step`, seconds, is needed for contacts, forces and poses, as in a stream. */
   constructor(settings?: StreamSettings & { step?: number; simulator?: string; hearing?: Hearing; listener?: Pose });
   header: ContactTraceHeader;
   objects: ContactTraceObject[];

@@ -17,7 +17,11 @@ function streamSettings({ frame, pulseShape }) {
     pulse_shape: choice(pulseShape, ['raised_cosine', 'gaussian'], 'PULSE_SHAPE_', 'pulseShape') });
 }
 
-/** A recorded simulation: `header`, `objects` and `steps` are the messages of contact_trace.proto. */
+/**
+ * A recorded simulation: `header`, `objects` and `steps` are the messages of contact_trace.proto. `step`, the length of
+ * the simulator's steps in seconds, is needed for all but impulses: by it the daemon knows whether a step was left out,
+ * and so when a blow is over. A rendering then dates each blow as a stream does, which adds its scheduling delay.
+ */
 class Trace {
   constructor(own = {}) {
     refuseUnknown(own, ['step', 'simulator', 'hearing', 'listener', 'frame', 'pulseShape'], 'Trace');
@@ -44,6 +48,10 @@ class Trace {
     const last = this.steps.at(-1)?.time_s ?? 0;
     if (this.steps.length && time < last) {
       throw new RangeError(`time goes back from ${last} to ${time} s; add the steps in order`);
+    }
+    if (!this.header.step_s && (content?.contacts || content?.forces || content?.poses)) {
+      throw new TypeError("contacts, forces and poses need the length of the simulator's steps in seconds, as in a " +
+        'stream: new Trace({ step: 1 / 240 })');
     }
     this.steps.push(makeStep(time, content));
   }

@@ -33,7 +33,7 @@ function told(counts, frame = "each object's own frame", dropped = 0) {
 }
 
 function refused(expected, content) {
-  assert.throws(() => new carillon.Trace().step(0, content), (error) => error.message.includes(expected)
+  assert.throws(() => new carillon.Trace({ step: 1 / 240 }).step(0, content), (error) => error.message.includes(expected)
     || assert.fail(error.message));
 }
 
@@ -104,6 +104,13 @@ test('contacts are refused by their names, with unit and frame', async () => {
   refused("listener is [ 1, 2 ]; it must be [x, y, z]: metres in the scene's frame", { listener: [1, 2] });
   await assert.rejects(bell.strike({ point: [0, 0], impulse: IMPULSE }),
     /point is \[ 0, 0 \]; it must be \[x, y, z\]: metres in the object's own frame/);
+});
+
+test('a trace of contacts needs the length of its steps, as a stream does', () => {
+  const contacts = [{ object: 1, point: POINT, impulse: IMPULSE }];
+  assert.throws(() => new carillon.Trace().step(0, { contacts }), /new Trace\(\{ step: 1 \/ 240 \}\)/);
+  new carillon.Trace().step(0, { impulses: contacts });
+  new carillon.Trace({ step: 1 / 240 }).step(0, { contacts });
 });
 
 test('refusals of the daemon have the names of the caller', () => {

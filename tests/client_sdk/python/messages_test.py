@@ -125,6 +125,12 @@ class RefusalsTest(MessagesTest):
         self.refused("impulse is None; it must be three numbers: x, y, z, newton seconds in the object's own frame",
                      bell.strike, POINT, None)
 
+    def test_a_trace_of_contacts_needs_the_length_of_its_steps_as_a_stream_does(self):
+        contacts, impulses = (kind(1, POINT, IMPULSE) for kind in (carillon.Contacts, carillon.Impulses))
+        self.refused("Trace(step=1/240)", carillon.Trace().step, 0, contacts=contacts)
+        carillon.Trace().step(0, impulses=impulses)
+        carillon.Trace(step=1 / 240).step(0, contacts=contacts)
+
     def test_refusals_of_the_daemon_have_the_names_of_the_caller(self):
         for said, expected in (("step_s is 0; say the simulator's step", "step is 0 s; say the simulator's step"),
                                ("scheduling_delay_s is 20; it must be 0 to 10", "delay is 20 s; it must be 0 to 10 s"),

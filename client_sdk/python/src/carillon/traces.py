@@ -19,7 +19,9 @@ FORMAT_VERSION = 1
 
 
 class Trace:
-    """A trace in memory: `header`, `objects` and `steps` are the messages of contact_trace.proto."""
+    """A trace in memory: `header`, `objects` and `steps` are the messages of contact_trace.proto. `step`, the length of
+    the simulator's steps in seconds, is needed for all but impulses: by it the daemon knows whether a step was left out,
+    and so when a blow is over. A rendering then dates each blow as a stream does, which adds its scheduling delay."""
 
     def __init__(self, step: float = 0, *, simulator: str = "", hearing: Optional[hearing_pb2.Hearing] = None,
                  listener: Optional[PoseLike] = None, frame: Optional[contacts.Frame] = None,
@@ -48,6 +50,9 @@ class Trace:
         """Adds a step, as ContactStream.step sends one. Times must not go back."""
         if self.steps and time < self.steps[-1].time_s:
             raise ValueError(f"time goes back from {self.steps[-1].time_s} to {time} s; add the steps in order")
+        if not self.header.step_s and any(item is not None for item in (contacts, forces, poses)):
+            raise ValueError("contacts, forces and poses need the length of the simulator's steps in seconds, as in a "
+                             "stream: Trace(step=1/240)")
         self.steps.append(make_step(time, contacts=contacts, impulses=impulses, forces=forces, poses=poses,
                                     listener=listener))
 
