@@ -25,8 +25,8 @@ def generator():
         return ["protoc", f"--plugin=protoc-gen-grpc_python={plugin}"]
     if importlib.util.find_spec("grpc_tools") is None:
         raise SystemExit("carillon: nothing here generates code from the contract. Install Debian's protobuf-compiler "
-                         "and protobuf-compiler-grpc; or run \"pip install grpcio-tools setuptools wheel\", and give pip "
-                         "--no-build-isolation, so that it finds them.")
+                         "and protobuf-compiler-grpc; or run \"pip install grpcio-tools setuptools wheel\", and give "
+                         "pip --no-build-isolation, so that it finds them.")
     return [sys.executable, "-m", "grpc_tools.protoc"]
 
 

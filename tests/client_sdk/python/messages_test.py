@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""What the Python package tells its callers without a daemon: warnings, refusals in their own names, and short forms."""
+"""What the Python package tells its callers without a daemon: warnings, refusals in their own names, short forms."""
 
 import asyncio
 import threading
@@ -79,7 +79,7 @@ class RefusalsTest(MessagesTest):
                 (carillon.material, ("oak",), "young", "young_pa"),
                 (carillon.connect, (), "tls_root", "tls_roots")):
             self.refused(f'has no "{wrong}"; did you mean "{right}"?', function, *arguments, **{wrong: 1})
-        self.refused('models has no "lable"; it has created_before_unix_ms', next, self.c.models(lable="x"))
+        self.refused('models has no "colour"; it has created_before_unix_ms', next, self.c.models(colour="x"))
         self.refused('settings has no "meters_per_unit"; did you mean "metres_per_unit"?', self.c.create_model, mesh,
                      "oak", settings={"meters_per_unit": 1})
         scene = carillon.Scene(self.c, "scenes/1")
@@ -103,7 +103,7 @@ class RefusalsTest(MessagesTest):
     def test_columns_are_refused_by_their_names_with_unit_and_frame(self):
         contacts = carillon.Contacts
         for expected, given in (
-                ("points has the shape (2,); it must be N x 3: metres in the stream's frame, which is each object's own",
+                ("points has the shape (2,); it must be N x 3: metres in the stream's frame, which is each object's",
                  contacts(1, (0, 0), IMPULSE)),
                 ("impulses is 'no'; it must be newton seconds in the stream's frame", contacts(1, POINT, "no")),
                 ("points has 1 row and impulses has 2", contacts(1, POINT, [IMPULSE] * 2)),

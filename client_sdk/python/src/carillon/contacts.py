@@ -26,10 +26,12 @@ ABSENT = -1.0
 STREAM_FRAME = "in the stream's frame, which is each object's own unless it was opened with frame=\"scene\""
 ROTATION = "a quaternion w, x, y, z of length 1"
 MEANINGS = {
-    "points": f"metres {STREAM_FRAME}", "impulses": f"newton seconds {STREAM_FRAME}", "forces": f"newtons {STREAM_FRAME}",
-    "second_points": f"metres {STREAM_FRAME}", "second_rotations": f"{ROTATION} from the first object's frame into the "
-    "second's", "positions": "metres in the scene's frame", "orientations": f"{ROTATION} from the object's frame into the "
-    "scene's", "durations": "seconds", "time_offsets": "seconds after the step's time", "travel_speeds": "m/s"}
+    "points": f"metres {STREAM_FRAME}", "second_points": f"metres {STREAM_FRAME}",
+    "impulses": f"newton seconds {STREAM_FRAME}", "forces": f"newtons {STREAM_FRAME}",
+    "second_rotations": f"{ROTATION} from the first object's frame into the second's",
+    "positions": "metres in the scene's frame",
+    "orientations": f"{ROTATION} from the object's frame into the scene's",
+    "durations": "seconds", "time_offsets": "seconds after the step's time", "travel_speeds": "m/s"}
 OBJECT_POINT, OBJECT_IMPULSE = "metres in the object's own frame", "newton seconds in the object's own frame"
 POSE = ("a position x, y, z in metres, a pair (position, quaternion w, x, y, z), or a 4 x 4 matrix, all in the scene's "
         "frame")

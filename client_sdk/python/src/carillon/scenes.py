@@ -115,8 +115,8 @@ class Scene:
         with errors.translated(self.client.server):
             return SoundingObject(self, self.client.scenes_stub.AddObject(request).object)
 
-    def _request(self, model: materials.ModelLike | str, material: Optional[materials.Material] = None, *, size: float = 1,
-                 gain: float = 1, pose: Optional[PoseLike] = None, handle: int = 0,
+    def _request(self, model: materials.ModelLike | str, material: Optional[materials.Material] = None, *,
+                 size: float = 1, gain: float = 1, pose: Optional[PoseLike] = None, handle: int = 0,
                  radiation: Optional[materials.Radiation] = None) -> scene_service_pb2.AddObjectRequest:
         name, message = materials.named(model, material)
         return checks.message(scene_service_pb2.AddObjectRequest, "add", dict(

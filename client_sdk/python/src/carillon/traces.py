@@ -20,16 +20,16 @@ FORMAT_VERSION = 1
 
 class Trace:
     """A trace in memory: `header`, `objects` and `steps` are the messages of contact_trace.proto. `step`, the length of
-    the simulator's steps in seconds, is needed for all but impulses: by it the daemon knows whether a step was left out,
-    and so when a blow is over. A rendering then dates each blow as a stream does, which adds its scheduling delay."""
+    the simulator's steps in seconds, is needed for all but impulses: by it the daemon knows whether a step was left
+    out, and so when a blow is over. A rendering dates each blow as a stream does, which adds its scheduling delay."""
 
     def __init__(self, step: float = 0, *, simulator: str = "", hearing: Optional[hearing_pb2.Hearing] = None,
                  listener: Optional[PoseLike] = None, frame: Optional[contacts.Frame] = None,
                  pulse_shape: Optional[contacts.PulseShape] = None):
         self.header = contact_trace_pb2.ContactTraceHeader(
             format_version=FORMAT_VERSION, simulator=simulator, step_s=step, hearing=hearing,
-            listener=None if listener is None else contacts.to_pose(listener, "listener"), frame=contacts.to_frame(frame),
-            pulse_shape=contacts.to_pulse_shape(pulse_shape))
+            listener=None if listener is None else contacts.to_pose(listener, "listener"),
+            frame=contacts.to_frame(frame), pulse_shape=contacts.to_pulse_shape(pulse_shape))
         self.objects: list[contact_trace_pb2.ContactTraceObject] = []
         self.steps: list[contact_pb2.ContactStep] = []
 
