@@ -181,6 +181,14 @@ test('a stream counts, and tells what was wrong', async () => {
   });
 });
 
+test('a material and settings that the daemon told may be given back', async () => {
+  const found = await c.model(model.name);
+  assert.ok('_poisson_ratio' in found.material);
+  const again = await c.createModel(BAR, { material: found.material, settings: found.summary.header.settings });
+  assert.equal(again.modeCount, model.modeCount);
+  await withScene(async (scene) => assert.equal((await scene.add(found)).handle, 1));
+});
+
 test('contacts that come late are told once', async () => withScene(async (scene) => {
   const told = [];
   const listener = (warning) => told.push(warning.message);

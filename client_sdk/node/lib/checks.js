@@ -24,10 +24,11 @@ function distance(one, other) {
 }
 
 function hint(name, known) {
-  const nearest = known.map((right) => ({ right, far: right.startsWith(name) ? 1 : distance(name, right) }))
+  const names = known.filter((right) => !right.startsWith('_')); // without those that only the daemon uses
+  const nearest = names.map((right) => ({ right, far: right.startsWith(name) ? 1 : distance(name, right) }))
     .sort((one, other) => one.far - other.far)[0];
   return nearest && nearest.far <= Math.max(2, name.length / 3) ? `did you mean "${nearest.right}"?`
-    : `it has ${[...known].sort().join(', ')}`;
+    : `it has ${names.sort().join(', ')}`;
 }
 
 /** Throws a TypeError with the nearest known name if an object has a key that is unknown. */
@@ -50,8 +51,10 @@ const NUMBERS = new Set(['TYPE_DOUBLE', 'TYPE_FLOAT', 'TYPE_UINT32', 'TYPE_INT32
 
 /** Throws a TypeError if an object is no message of the contract: by an unknown field, word or kind of value. */
 function refuseNoMessage(given, type, where, more = []) {
-  const fields = message(type).type.field;
-  refuseUnknown(given, [...fields.map((field) => field.name), ...more], where);
+  const { field: fields, oneofDecl: choices } = message(type).type;
+  // The messages that come from the daemon also tell which field of a choice they have.
+  const names = [...fields, ...choices].map((item) => item.name);
+  refuseUnknown(given, [...names, ...fields.map((field) => `_${field.name}`), ...more], where);
   for (const field of fields) {
     const value = given[field.name];
     const isAbsent = value === undefined || value === null;

@@ -52,6 +52,12 @@ class WarningsTest(unittest.TestCase):
         self.assertIn("mapped anew 2 times", text)
         self.assertIn("it was 0.02", text)
 
+    def test_a_warning_is_of_the_line_that_uses_the_package(self):
+        report = contact_service_pb2.StreamContactsResponse(late_count=1)
+        with self.assertWarns(carillon.ContactWarning) as caught:
+            carillon.errors.warn_of_stream(report, "a frame")
+        self.assertEqual(caught.filename, __file__)
+
     def test_lost_contacts_and_steps_are_told(self):
         text, = self.told(dropped_count=3, dropped=1)
         self.assertIn("3 contacts were lost", text)

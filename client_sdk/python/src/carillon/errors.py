@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import contextlib
+import inspect
 import re
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
@@ -44,10 +45,9 @@ class ContactWarning(UserWarning):
 def warn_of_contacts(findings: contact_pb2.ContactFindings, frame: str) -> None:
     """Warns of contacts that are probably a mistake of the caller. `frame` is that of their points."""
     if count := findings.distant_point_count:
-        warnings.warn(f"{counted(count, 'contact')} {'lies' if count == 1 else 'lie'} up to "
-                      f"{findings.largest_distance_m:.3g} m away from the surfaces of the objects, and sound"
-                      f"{'s' if count == 1 else ''} at the nearest points; give points in metres, in {frame}",
-                      ContactWarning, stacklevel=3)
+        _warn(f"{counted(count, 'contact')} {'lies' if count == 1 else 'lie'} up to "
+              f"{findings.largest_distance_m:.3g} m away from the surfaces of the objects, and sound"
+              f"{'s' if count == 1 else ''} at the nearest points; give points in metres, in {frame}")
 
 
 def warn_of_stream(report: contact_service_pb2.StreamContactsResponse, frame: str, dropped_step_count: int = 0) -> None:
@@ -70,8 +70,16 @@ def warn_of_stream(report: contact_service_pb2.StreamContactsResponse, frame: st
                     f"{report.last_rejection.reason}: "
                     + report.last_rejection.message.replace("the object's frame", frame))
     if told:
-        warnings.warn("; ".join(told), ContactWarning, stacklevel=3)
+        _warn("; ".join(told))
     warn_of_contacts(report.findings, frame)
+
+
+def _warn(text: str) -> None:
+    """Warns as of the line outside this package that has called it."""
+    frame, level = inspect.currentframe(), 1
+    while frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] == "carillon":
+        frame, level = frame.f_back, level + 1
+    warnings.warn(text, ContactWarning, stacklevel=level)
 
 
 def _were(count: int, noun: str) -> str:
