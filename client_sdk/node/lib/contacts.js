@@ -78,7 +78,7 @@ function handles(objects, count, name = 'objects') {
   const list = objects && typeof objects === 'object' && 'length' in objects
     ? Array.from(objects, (object) => handleOf(object, `an entry of ${name}`))
     : new Array(count).fill(handleOf(objects, name));
-  if (list.length !== count) throw new RangeError(`${name} has ${list.length} entries; it must have ${count}`);
+  if (list.length !== count) throw new RangeError(`${name} has the length ${list.length}; it must have ${count}`);
   return list;
 }
 
@@ -90,7 +90,7 @@ function table(values, name, width = 3) {
   const flat = values.length && typeof values[0] !== 'number' ? Array.from(values).flatMap((row) => Array.from(row))
     : Array.from(values);
   if (flat.length % width) {
-    throw new RangeError(`${name} has ${flat.length} numbers; it must have ${width} a contact: ${MEANINGS[name]}`);
+    throw new RangeError(`${name} has ${counted(flat.length, 'number')}; it must have ${width} a contact: ${MEANINGS[name]}`);
   }
   for (const value of flat) if (typeof value !== 'number') refuse(value, `an entry of ${name}`, MEANINGS[name]);
   return flat;
@@ -99,7 +99,7 @@ function table(values, name, width = 3) {
 /** One number a row, or one for all. */
 function numbers(values, count, name) {
   const list = typeof values === 'number' ? new Array(count).fill(values) : Array.from(values);
-  if (list.length !== count) throw new RangeError(`${name} has ${list.length} entries; it must have ${count}`);
+  if (list.length !== count) throw new RangeError(`${name} has the length ${list.length}; it must have ${count}`);
   return list;
 }
 

@@ -199,8 +199,7 @@ def _rows(values: Array, name: str, width: int = 3, count: Optional[int] = None)
 
 def _column(values: numpy.ndarray, count: int, name: str) -> numpy.ndarray:
     if values.shape not in ((), (1,), (count,)):
-        raise ValueError(f"{name} has the shape {values.shape}; it must have {count} entries, one for each row, or one "
-                         "for all")
+        raise ValueError(f"{name} has the shape {values.shape}; it must be ({count},), one for each row or one for all")
     return numpy.broadcast_to(values, (count,))
 
 
