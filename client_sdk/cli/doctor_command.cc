@@ -27,6 +27,8 @@ namespace {
 constexpr uint64_t kEnoughDescriptors = 1024;
 constexpr double kHighLoad = 0.7;
 constexpr absl::Duration kEnoughTime = absl::Hours(30 * 24);
+/// The doctor watches the sound for this time where frames were lost before.
+constexpr absl::Duration kWatchedTime = absl::Seconds(2);
 
 std::string Text(const absl::Status& status) { return std::string(status.message()); }
 
@@ -56,7 +58,17 @@ void CheckProcess(const Program& program, Findings& findings) {
                                       " descriptors, a connection needs one: raise LimitNOFILE="));
 }
 
-void CheckSound(const v1::GetMixerResponse& mixer, Findings& findings) {
+/// Returns the number of frames that were lost since `before`, after waiting a little if some were
+/// lost at all.
+uint64_t FramesLostNow(const client::Client& daemon, const v1::GetMixerResponse& before) {
+  if (before.lost_frame_count() == 0) return 0;
+  absl::SleepFor(kWatchedTime);
+  const auto after = daemon.GetMixer();
+  return after.ok() ? after->lost_frame_count() - before.lost_frame_count() : 0;
+}
+
+void CheckSound(const client::Client& daemon, const v1::GetMixerResponse& mixer,
+                Findings& findings) {
   if (!mixer.device_message().empty()) {
     findings.Bad("sound", absl::StrCat("plays on ", mixer.device(), ": ", mixer.device_message()));
   } else if (mixer.device() == "null") {
@@ -65,13 +77,15 @@ void CheckSound(const v1::GetMixerResponse& mixer, Findings& findings) {
     findings.Good("sound", absl::StrFormat("plays on %s, %.1f ms behind", mixer.device(),
                                            1e3 * mixer.output_latency_s()));
   }
-  const std::string load =
-      absl::StrFormat("rendering takes %.0f %% of the time, %d frames were lost",
-                      100 * mixer.load(), mixer.lost_frame_count());
+  const uint64_t lost_now = FramesLostNow(daemon, mixer);
+  const std::string load = absl::StrFormat(
+      "rendering takes %.0f %% of the time, %d frames were lost since the daemon began, %d of them "
+      "just now",
+      100 * mixer.load(), mixer.lost_frame_count() + lost_now, lost_now);
   if (mixer.load() > kHighLoad) {
     return findings.Bad("load", load + ": use fewer objects, or a faster processor");
   }
-  if (mixer.lost_frame_count() > 0) {
+  if (lost_now > 0) {
     return findings.Bad("load", load + ": raise --look-ahead-blocks, or see real time above");
   }
   findings.Good("load", load);
@@ -116,7 +130,9 @@ void CheckWorkers(const client::Client& daemon, Findings& findings) {
   if (!jobs.ok()) return;
   for (const v1::Job& job : *jobs) {
     if (!absl::StartsWith(job.error().reason(), "WORKER_")) continue;
-    return findings.Bad("jobs", absl::StrCat(job.name(), " failed: ", job.error().message()));
+    // Whatever was the cause may have gone meanwhile.
+    return findings.Unknown(
+        "jobs", absl::StrCat(job.name(), " failed: ", job.error().message(), "; ask for it again"));
   }
 }
 
@@ -165,7 +181,7 @@ void CheckDaemon(const Program& program, Findings& findings) {
   same ? findings.Good("daemon", version)
        : findings.Bad("daemon", absl::StrCat(version, ", but this is carillon ", CARILLON_VERSION,
                                              ": restart the daemon after an upgrade"));
-  CheckSound(*mixer, findings);
+  CheckSound(*daemon, *mixer, findings);
   CheckDatabase(*daemon, findings);
   CheckWorkers(*daemon, findings);
   CheckTls(program, findings);
