@@ -10,6 +10,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/strip.h"
+#include "client_sdk/cli/command_words.h"
 #include "client_sdk/cli/commands.h"
 #include "client_sdk/cli/example_bodies.h"
 #include "client_sdk/cli/find_model.h"
@@ -81,8 +82,10 @@ absl::Status ShowJob(const client::Client& daemon, const std::string& text, bool
       "%s\nlabel      %s\nstate      %s\nmodel      %s\npriority   %d\nmemory     %.1f MiB\n",
       job.name(), job.label(), ProgressText(job), job.modal_model(), job.priority(),
       static_cast<double>(job.memory_bytes()) / (1 << 20));
-  if (job.has_error())
-    absl::PrintF("error      %s: %s\n", job.error().reason(), job.error().message());
+  if (job.has_error()) {
+    absl::PrintF("error      %s: %s\n", job.error().reason(),
+                 InCommandWords(job.error().message(), HasEveryOption));
+  }
   return absl::OkStatus();
 }
 

@@ -5,6 +5,7 @@
 #include <iostream>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "client_sdk/cli/commands.h"
@@ -209,6 +210,14 @@ void AddProgramOptions(CLI::App& app, Program& program) {
       "the command line is wrong; 3 if no daemon answers.");
 }
 
+/// Whether the command that the command line chose, or the program, has the option.
+bool HasOptionFor(const CLI::App& app, const std::string& option) {
+  if (app.get_option_no_throw(option) != nullptr) return true;
+  const std::vector<const CLI::App*> chosen =
+      app.get_subcommands([](const CLI::App* command) { return command->count() > 0; });
+  return !chosen.empty() && HasOptionFor(*chosen.front(), option);
+}
+
 int Main(int argc, char** argv) {
   Program program;
   CLI::App app("Controls the daemon carillond, which makes rigid-body simulations audible.",
@@ -242,7 +251,8 @@ int Main(int argc, char** argv) {
     }
     return kUsage;
   }
-  return Report(program.command());
+  return Report(program.command(),
+                [&app](const std::string& option) { return HasOptionFor(app, option); });
 }
 
 }  // namespace

@@ -251,7 +251,7 @@ absl::Status CreateModel(const client::Client& daemon, const CreateModelOptions&
     const absl::Status ended = Conclude(
         daemon, std::move(job), {.wait = false, .json = json, .name = &v1::Job::modal_model});
     if (ended.ok()) continue;
-    if (!first_error.ok()) (void)Report(first_error);
+    if (!first_error.ok()) (void)Report(first_error, HasEveryOption);
     first_error = ended;
   }
   return first_error;

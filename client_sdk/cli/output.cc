@@ -11,10 +11,10 @@
 
 namespace carillon::cli {
 
-int Report(const absl::Status& status) {
+int Report(const absl::Status& status, const HasOption& has_option) {
   if (status.ok()) return kDone;
   const v1::ErrorInfo error = ToErrorInfo(status);
-  std::string message = error.message();
+  std::string message = InCommandWords(error.message(), has_option);
   std::ranges::replace(message, '\n', ' ');
   absl::FPrintF(stderr, "carillon: %s: %s\n", error.reason(), message);
   for (const v1::Remedy& remedy : error.remedies()) {

@@ -6,14 +6,16 @@
 #include <string>
 
 #include "absl/status/status.h"
+#include "client_sdk/cli/command_words.h"
 
 namespace carillon::cli {
 
 /// Exit codes of the program.
 enum ExitCode { kDone = 0, kRefused = 1, kUsage = 2, kNoServer = 3 };
 
-/// Prints "carillon: REASON: message" to stderr if `status` is an error. Returns the exit code.
-int Report(const absl::Status& status);
+/// Prints "carillon: REASON: message" to stderr if `status` is an error, with the options of the
+/// command in the message (see InCommandWords). Returns the exit code.
+int Report(const absl::Status& status, const HasOption& has_option);
 
 /// Prints `message` to stdout as one line of JSON; see MessageJson.
 void PrintJson(const google::protobuf::Message& message);

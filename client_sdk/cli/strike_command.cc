@@ -148,7 +148,8 @@ void PrintStrike(const client::Client& daemon, const v1::SoundingObject& object,
                  const StrikeOptions& options) {
   const char* by = "their radiated power";
   if (object.radiation() == v1::RADIATION_MODEL_PAPER_COUPLING) by = "the paper's coupling";
-  if (object.radiation() == v1::RADIATION_MODEL_MODES_ONLY) by = "their radiated power, without the click";
+  if (object.radiation() == v1::RADIATION_MODEL_MODES_ONLY)
+    by = "their radiated power, without the click";
   absl::PrintF("%d modes sound, %.2f to %.2f Hz, by %s\n", object.sounding_mode_count(),
                object.lowest_frequency_hz(), object.highest_frequency_hz(), by);
   if (const auto measured = Measure(daemon, object, options)) {

@@ -127,6 +127,18 @@ class InfoTest(CommandLineTest):
                          r"(?m)^carillond \S+ at unix:.*\nup +\d+ s, output 48000 Hz, 1 channels$")
 
 
+class MessagesTest(CommandLineTest):
+    def test_messages_name_commands_and_options(self):
+        strike = ("strike", "bar", "--point", "0,0.008,0.01", "--impulse", "0,0,-0.01")
+        for words, expected in ((("stop", "99999"), "name one that `carillon scene list` shows"),
+                                (("model", "create", self.folder / "bar.obj", "--young", "3"), "--density, --alpha1"),
+                                ((*strike, "--modes-only"), "by `carillon transfer create --wait`"),
+                                (("model", "list", "--page-size", "3", "--page-token", "x"), "PAGE: --page-token is")):
+            done = self.daemon.command(*words, check=False)
+            self.assertEqual(done.returncode, 1)
+            self.assertIn(expected, done.stderr)
+
+
 class VolumeTest(CommandLineTest):
     def test_the_volume_of_the_output_and_of_a_scene_is_changed_and_shown(self):
         self.assertEqual(self.run_command("volume", "--gain", "-6dB"), "output  gain 0.5012 (-6.0 dB)")
@@ -304,6 +316,14 @@ class WithoutDaemonTest(unittest.TestCase):
             done = carillon(*words)
             self.assertEqual(done.returncode, 2)
             self.assertEqual(done.stderr, f"carillon: there is {expected}\n")
+
+    def test_options_that_take_the_place_of_fields_in_messages_exist(self):
+        table = (ROOT / "client_sdk/cli/command_words.cc").read_text()
+        page = carillon("--man").stdout.replace("\\-", "-")
+        options = re.findall(r'"[^"\n]*(--[a-z][a-z-]+)', table)
+        self.assertGreater(len(options), 20)
+        for option in options:
+            self.assertIn(option, page)
 
     def test_messages_about_numbers_are_short(self):
         for words in (("model", "create", "a.obj", "--nodes", "-3"), ("listen", "--seconds", "-3"),
