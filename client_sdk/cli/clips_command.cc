@@ -90,6 +90,7 @@ class ClipRenderer {
     v1::RenderSettings settings = SettingsOf(options_);
     settings.set_tell_blows(true);
     RETURN_IF_ERROR(RenderFile(trace, settings, form, record));
+    RETURN_IF_ERROR(CheckHasContacts(trace, record.summary));
     if (const auto finer = FinerFullScale(options_, record.summary)) {
       settings.set_full_scale_pa(*finer);
       RETURN_IF_ERROR(RenderFile(trace, settings, form, record));
@@ -156,7 +157,6 @@ class ClipRenderer {
     RETURN_IF_ERROR(file.status());
     RETURN_IF_ERROR(summary.status());
     RETURN_IF_ERROR(file.Finish());
-    if (!file.begun()) return EmptyTrace(path);
     record.summary = *std::move(summary);
     record.factor = file.factor();
     return absl::OkStatus();

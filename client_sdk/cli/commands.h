@@ -192,8 +192,9 @@ v1::RenderSettings SettingsOf(const RenderOptions& options);
 /// Absent: the rendering was loud enough, is silent, or has the full scale that was asked for.
 std::optional<double> FinerFullScale(const RenderOptions& options,
                                      const v1::RenderSummary& summary);
-/// The error of a trace without contacts.
-absl::Status EmptyTrace(const std::string& path);
+/// Errors: InvalidArgument (TRACE_EMPTY: the rendered trace has no contact, and its sound is
+/// silent).
+absl::Status CheckHasContacts(const std::string& path, const v1::RenderSummary& summary);
 
 /// Returns the name of a scene that `text` names as "scenes/7" or "7"; empty stays empty.
 std::string SceneNamed(const std::string& text);

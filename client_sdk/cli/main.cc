@@ -18,6 +18,7 @@
 #include "client_sdk/cli/program.h"
 #include "client_sdk/cli/render_options.h"
 #include "client_sdk/cli/sound_options.h"
+#include "client_sdk/cli/value_options.h"
 #include "proto/cpp/manual_page.h"
 #include "proto/cpp/striker_catalogue.h"
 
@@ -88,7 +89,7 @@ void AddTransfer(CLI::App& app, Program& program) {
       .add_option("model", options->model,
                   "The name, the label, or the first digits of the digest of a model")
       ->required();
-  create.add_option("--size", options->size, "The size relative to that of the model");
+  TakeSize(*create.add_option("--size", options->size, "The size relative to that of the model"));
   create.add_option("--accuracy", options->accuracy_db,
                     "The error of each mode's power that is small enough, dB [2]");
   create.add_option("--budget", options->budget_s, "The processor time to spend, s [20]");
@@ -109,8 +110,8 @@ void AddDoctor(CLI::App& app, Program& program) {
 
 /// Adds the options of the object that is struck.
 void AddStruckObject(CLI::App& strike, StrikeOptions& options) {
-  strike.add_option("--size", options.size, "The size relative to that of the model");
-  strike.add_option("--gain", options.gain, "The linear gain");
+  TakeSize(*strike.add_option("--size", options.size, "The size relative to that of the model"));
+  ReadGain(*strike.add_option("--gain", options.gain, absl::StrCat("The gain: ", kGainForm)));
   CLI::Option* paper = strike.add_flag("--paper-coupling", options.paper_coupling,
                                        "Sound by the paper's coupling though a transfer is stored");
   strike
@@ -145,8 +146,8 @@ void AddStrike(CLI::App& app, Program& program) {
                   "The duration of the contact, s [that of an elastic collision with the striker]")
       ->excludes(striker);
   AddStruckObject(strike, *options);
-  strike.add_option("--seconds", options->seconds,
-                    "The time to ring, s [until the sound has decayed by 60 dB]");
+  TakeSeconds(*strike.add_option("--seconds", options->seconds,
+                                 "The time to ring, s [until the sound has decayed by 60 dB]"));
   AddMaterial(strike, options->material);
   strike.callback([&program, options] {
     program.command = [&program, options] {
@@ -159,12 +160,14 @@ void AddStrike(CLI::App& app, Program& program) {
 void AddListen(CLI::App& app, Program& program) {
   auto options = std::make_shared<ListenOptions>();
   CLI::App& listen = *app.add_subcommand("listen", "Record the sound that the daemon plays");
-  listen.add_option("--out", options->out,
-                    "The WAV file to write [raw 32-bit float samples to stdout]");
   listen
-      .add_option("--seconds", options->seconds,
-                  "The time to record, s [until the program is stopped]")
-      ->check(CLI::Range(0.0, 1e9));
+      .add_option("--out", options->out,
+                  "The WAV file to write [raw 32-bit float samples to stdout]")
+      ->check([](const std::string& path) {
+        return WhyNotWritten(path, {".wav", ".wave"});
+      });
+  TakeSeconds(*listen.add_option("--seconds", options->seconds,
+                                 "The time to record, s [until the program is stopped]"));
   listen.add_option("--scene", options->scene,
                     "The name or the number of a scene to record alone [the output]");
   listen.add_flag("--quiet", options->quiet, "Show no level on the terminal");
@@ -218,11 +221,7 @@ bool HasOptionFor(const CLI::App& app, const std::string& option) {
   return !chosen.empty() && HasOptionFor(*chosen.front(), option);
 }
 
-int Main(int argc, char** argv) {
-  Program program;
-  CLI::App app("Controls the daemon carillond, which makes rigid-body simulations audible.",
-               "carillon");
-  AddProgramOptions(app, program);
+void AddCommands(CLI::App& app, Program& program) {
   AddInfo(app, program);
   AddStatus(app, program);
   AddDoctor(app, program);
@@ -240,6 +239,14 @@ int Main(int argc, char** argv) {
   AddTop(app, program);
   AddExample(app, program);
   AddCompletion(app, program);
+}
+
+int Main(int argc, char** argv) {
+  Program program;
+  CLI::App app("Controls the daemon carillond, which makes rigid-body simulations audible.",
+               "carillon");
+  AddProgramOptions(app, program);
+  AddCommands(app, program);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -249,6 +256,11 @@ int Main(int argc, char** argv) {
     } else {
       app.exit(error);
     }
+    return kUsage;
+  }
+  if (!IsServerAddress(program.server)) {
+    std::cerr << "carillon: --server or $CARILLON_SERVER: \"" << program.server
+              << "\" must be unix:PATH, or HOST:PORT with a port from 1 to 65535\n";
     return kUsage;
   }
   return Report(program.command(),

@@ -112,7 +112,13 @@ std::optional<double> FinerFullScale(const RenderOptions& options,
   return std::max(summary.peak_pa() * kAbovePeak, kLeastFullScale_pa);
 }
 
-absl::Status EmptyTrace(const std::string& path) {
+absl::Status CheckHasContacts(const std::string& path, const v1::RenderSummary& summary) {
+  const v1::ContactFindings& findings = summary.findings();
+  const uint64_t contact_count = summary.accepted_count() + summary.rejected_count() +
+                                 findings.load_count() + findings.zero_impulse_count() +
+                                 findings.too_large_impulse_count();
+  // Sustained forces are not counted, but heard.
+  if (contact_count > 0 || summary.peak() > 0) return absl::OkStatus();
   return Refusal(absl::StatusCode::kInvalidArgument, "TRACE_EMPTY",
                  absl::StrCat(path,
                               ": holds no contact, so there is nothing to hear; "
@@ -144,7 +150,7 @@ absl::Status Render(const client::Client& daemon, const RenderOptions& options, 
   RETURN_IF_ERROR(file.status());
   if (!summary.ok()) return summary.status();
   RETURN_IF_ERROR(file.Finish());
-  if (!file.begun()) return EmptyTrace(options.trace);
+  RETURN_IF_ERROR(CheckHasContacts(options.trace, *summary));
   if (json && options.out != "-") {
     PrintJson(*summary);
   } else {
