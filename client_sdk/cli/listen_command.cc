@@ -2,6 +2,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <optional>
@@ -74,6 +75,7 @@ class Recorder {
   void Finish() {
     if (meter_) meter_->Finish();
     if (file_ && status_.ok()) status_ = file_->Finish();
+    if (options_.out.empty() && std::fflush(stdout) != 0) TakeOutputError();
   }
 
   const absl::Status& status() const { return status_; }
@@ -103,10 +105,17 @@ class Recorder {
   void Put(std::span<const float> samples) {
     if (file_) {
       status_ = file_->Write(samples);
-    } else {
-      reader_gone_ =
-          std::fwrite(samples.data(), sizeof(float), samples.size(), stdout) != samples.size();
+    } else if (std::fwrite(samples.data(), sizeof(float), samples.size(), stdout) !=
+               samples.size()) {
+      TakeOutputError();
     }
+  }
+
+  /// A reader of stdout that has gone ends the recording without an error.
+  void TakeOutputError() {
+    reader_gone_ = errno == EPIPE;
+    if (reader_gone_) std::clearerr(stdout);
+    status_ = FlushOutput();
   }
 
   const ListenOptions& options_;

@@ -209,8 +209,8 @@ void AddProgramOptions(CLI::App& app, Program& program) {
   AddManualFlag(app, 1, CARILLON_VERSION);
   app.require_subcommand(1)->fallthrough();
   app.footer(
-      "Exit codes: 0 for success; 1 if the daemon refuses the command, and stderr says why; 2 if "
-      "the command line is wrong; 3 if no daemon answers.");
+      "Exit codes: 0 for success; 1 if the command fails, and stderr says why; 2 if the "
+      "command line is wrong; 3 if no daemon answers.");
 }
 
 /// Whether the command that the command line chose, or the program, has the option.
@@ -241,7 +241,11 @@ void AddCommands(CLI::App& app, Program& program) {
   AddCompletion(app, program);
 }
 
+/// Returns the exit code of a command that ended with `code`, once its output is written.
+int Finish(int code) { return code == kDone ? Report(FlushOutput(), HasEveryOption) : code; }
+
 int Main(int argc, char** argv) {
+  OpenStandardStreams();
   Program program;
   CLI::App app("Controls the daemon carillond, which makes rigid-body simulations audible.",
                "carillon");
@@ -250,7 +254,7 @@ int Main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error);
+    if (error.get_exit_code() == 0) return Finish(app.exit(error));
     if (const std::string unknown = UnknownWord(app, argc, argv); !unknown.empty()) {
       std::cerr << "carillon: " << unknown << '\n';
     } else {
@@ -263,8 +267,8 @@ int Main(int argc, char** argv) {
               << "\" must be unix:PATH, or HOST:PORT with a port from 1 to 65535\n";
     return kUsage;
   }
-  return Report(program.command(),
-                [&app](const std::string& option) { return HasOptionFor(app, option); });
+  const auto has_option = [&](const std::string& option) { return HasOptionFor(app, option); };
+  return Finish(Report(program.command(), has_option));
 }
 
 }  // namespace

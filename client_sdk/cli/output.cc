@@ -1,15 +1,39 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "client_sdk/cli/output.h"
 
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <cstdio>
+#include <cstring>
 
+#include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "client_sdk/cli/message_json.h"
 #include "proto/cpp/error_reason.h"
 
 namespace carillon::cli {
+
+void OpenStandardStreams() {
+  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (fcntl(stream, F_GETFD) >= 0) continue;
+    // The lowest free number is that of the stream. What is open for reading cannot be written.
+    (void)open("/dev/null", stream == STDOUT_FILENO ? O_RDONLY : O_RDWR);
+  }
+}
+
+absl::Status FlushOutput() {
+  const bool flushed = std::fflush(stdout) == 0;
+  const char* const why = flushed ? "an earlier write failed" : std::strerror(errno);
+  if (flushed && std::ferror(stdout) == 0) return absl::OkStatus();
+  return Refusal(absl::StatusCode::kInternal, "OUTPUT_NOT_WRITABLE",
+                 absl::StrCat("stdout: ", why,
+                              "; a part of the output is lost: send it to a file or a pipe that "
+                              "takes it"));
+}
 
 int Report(const absl::Status& status, const HasOption& has_option) {
   if (status.ok()) return kDone;

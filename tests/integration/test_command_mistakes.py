@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the command line answers to mistakes."""
+"""What the command line answers to mistakes, and when its output is lost."""
 
 import os
 import re
+import subprocess
 import unittest
 
+import meshes
 import sound
-from carillon.v1 import contact_pb2, contact_trace_pb2
-from daemon import ROOT
+from carillon.v1 import contact_pb2, contact_trace_pb2, scene_service_pb2
+from daemon import BIN, ROOT
 from test_command_line import MATERIAL, CommandLineTest, carillon
 
 
@@ -48,6 +50,50 @@ class RenderMistakesTest(CommandLineTest):
             done = self.daemon.command("render", *words, check=False)
             self.assertEqual(done.returncode, 2)
             self.assertIn(expected, done.stderr)
+
+
+class LostOutputTest(CommandLineTest):
+    def run_command_to(self, stdout, *words):
+        """The command with `stdout`, or with a closed one for None; returns (exit code, stderr)."""
+        def close():
+            if stdout is None:
+                os.close(1)
+
+        done = subprocess.run([BIN / "carillon", "--server", self.daemon.server, *map(str, words)], stdout=stdout,
+                              stderr=subprocess.PIPE, text=True, check=False, preexec_fn=close)
+        return done.returncode, done.stderr
+
+    def test_no_command_succeeds_whose_output_is_lost(self):
+        trace = self.folder / "lost.contacts"
+        impulse = sound.impulse((0, 0.008, 0.010), (0, 0, -0.002), duration_s=1e-4)
+        item = contact_trace_pb2.ContactTraceObject(handle=1, modal_model=self.model, material=MATERIAL)
+        sound.write_trace(trace, [item], [contact_pb2.ContactStep(time_s=0, impulses=[impulse])])
+        strike = ("strike", "bar", "--point", "0,0.008,0.01", "--impulse", "0,0,-0.01", "--seconds", "0")
+        commands = (("--help",), ("--version",), ("--man",), ("status",), ("info",), ("db", "stats"), ("doctor",),
+                    ("model", "list"), ("model", "show", "bar"), ("job", "list"), ("job", "show", "bar"),
+                    ("job", "watch", "bar"), ("material", "list"), ("volume",), ("stop",),
+                    ("top", "--once"), ("top",), ("completion", "bash"), ("listen", "--seconds", "0.1"), strike,
+                    ("render", trace, "--out", "-"), ("render", trace, "--out", self.folder / "lost.wav"),
+                    ("example", "bar", "--out", self.folder / "lost.obj"),
+                    ("model", "export", "bar", "--out", self.folder / "lost.model"),
+                    ("model", "create", self.folder / "bar.obj", "--material", meshes.MATERIAL))
+        self.client.scenes.CreateScene(scene_service_pb2.CreateSceneRequest())
+        with open("/dev/full", "wb") as full:
+            for words in commands:
+                for stdout in (full, None):
+                    code, errors = self.run_command_to(stdout, *words)
+                    self.assertEqual(code, 1, words)
+                    self.assertRegex(errors, "OUTPUT_NOT_WRITABLE|FAULTS_FOUND", words)
+
+    def test_a_command_without_output_succeeds_though_stdout_is_closed(self):
+        self.assertEqual(self.run_command_to(None, "model", "tag", "bar", "--add", "lost"), (0, ""))
+
+    def test_a_reader_that_has_heard_enough_ends_the_recording(self):
+        with subprocess.Popen([BIN / "carillon", "--server", self.daemon.server, "listen"], stdout=subprocess.PIPE,
+                              stderr=subprocess.PIPE) as listener:
+            self.assertEqual(len(listener.stdout.read(4096)), 4096)
+            listener.stdout.close()
+            self.assertEqual(listener.wait(10), 0, listener.stderr.read())
 
 
 class WrongValuesTest(unittest.TestCase):
