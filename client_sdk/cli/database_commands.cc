@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // The commands that look after stored models.
+#include <filesystem>
+#include <system_error>
+
 #include "absl/strings/str_format.h"
 #include "client_sdk/cli/commands.h"
 #include "client_sdk/cli/find_model.h"
@@ -38,6 +41,15 @@ absl::Status ShowDatabaseStats(const client::Client& daemon, bool json) {
   absl::PrintF("file         %.1f MiB, %.1f MiB free, schema %d\n",
                static_cast<double>(stats.file_bytes()) / kMib,
                static_cast<double>(stats.free_bytes()) / kMib, stats.schema_version());
+  return absl::OkStatus();
+}
+
+absl::Status BackUpDatabase(const client::Client& daemon, const std::string& file, bool json) {
+  RETURN_IF_ERROR(daemon.BackUpDatabase(file));
+  std::error_code error;
+  const uint64_t byte_count = std::filesystem::file_size(file, error);
+  // A device or a pipe has no size.
+  if (json) PrintJson({{"file", file}, {"byte_count", error ? uint64_t{0} : byte_count}});
   return absl::OkStatus();
 }
 

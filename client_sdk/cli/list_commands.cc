@@ -158,7 +158,7 @@ absl::Status DeleteScene(const client::Client& daemon, const std::string& text) 
   return daemon.DeleteScene(SceneNamed(text));
 }
 
-absl::Status WriteExample(const Example& example, const std::string& path) {
+absl::Status WriteExample(const Example& example, const std::string& path, bool json) {
   const std::string file = path.empty() ? example.name + ".obj" : path;
   std::ofstream out(file, std::ios::binary);
   out << ObjText(example);
@@ -166,6 +166,13 @@ absl::Status WriteExample(const Example& example, const std::string& path) {
   if (!out) {
     return Refusal(absl::StatusCode::kInternal, "OUTPUT_NOT_WRITABLE",
                    absl::StrCat(file, ": ", std::strerror(errno), "; choose another file"));
+  }
+  if (json) {
+    PrintJson({{"file", file},
+               {"description", example.description},
+               {"material", example.material},
+               {"strike", example.strike}});
+    return absl::OkStatus();
   }
   absl::PrintF("%s\n", file);
   // To stderr, so that stdout is the name alone.

@@ -165,8 +165,9 @@ void AddExample(CLI::App& app, Program& program) {
   command.add_option("--out", *out, "The OBJ file to write [NAME.obj]")
       ->check([](const std::string& path) { return WhyNotWritten(path, {".obj"}); });
   command.callback([&program, name, out] {
-    program.command = [name, out] {
-      return WriteExample(*std::ranges::find(Examples(), *name, &Example::name), *out);
+    program.command = [&program, name, out] {
+      const Example& example = *std::ranges::find(Examples(), *name, &Example::name);
+      return WriteExample(example, *out, program.json);
     };
   });
 }

@@ -13,6 +13,7 @@
 #include "client_sdk/cli/commands.h"
 #include "client_sdk/cli/output.h"
 #include "client_sdk/cli/wave_file.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::cli {
 namespace {
@@ -78,6 +79,15 @@ class Recorder {
     if (options_.out.empty() && std::fflush(stdout) != 0) TakeOutputError();
   }
 
+  void PrintAsJson() const {
+    PrintJson({{"file", options_.out},
+               {"frame_count", frame_count_},
+               {"lost_frame_count", lost_frame_count_},
+               {"sample_rate_hz", uint64_t{format_.sample_rate_hz}},
+               {"channel_count", uint64_t{format_.channel_count}},
+               {"peak", double{peak_}}});
+  }
+
   const absl::Status& status() const { return status_; }
   uint64_t lost_frame_count() const { return lost_frame_count_; }
 
@@ -89,8 +99,8 @@ class Recorder {
                     block.sample_rate_hz, block.channel_count);
       return;
     }
-    auto file = WaveFile::Create(options_.out, {.sample_rate_hz = block.sample_rate_hz,
-                                                .channel_count = block.channel_count});
+    format_ = {.sample_rate_hz = block.sample_rate_hz, .channel_count = block.channel_count};
+    auto file = WaveFile::Create(options_.out, format_);
     status_ = file.status();
     if (file.ok()) file_ = *std::move(file);
   }
@@ -103,6 +113,7 @@ class Recorder {
   }
 
   void Put(std::span<const float> samples) {
+    for (const float sample : samples) peak_ = std::max(peak_, std::abs(sample));
     if (file_) {
       status_ = file_->Write(samples);
     } else if (std::fwrite(samples.data(), sizeof(float), samples.size(), stdout) !=
@@ -121,8 +132,10 @@ class Recorder {
   const ListenOptions& options_;
   const StopSignal& stop_;
   absl::Status status_;
+  WaveFormat format_;
   std::optional<WaveFile> file_;
   std::optional<LevelMeter> meter_;
+  float peak_ = 0;
   uint64_t frame_count_ = 0;
   uint64_t lost_frame_count_ = 0;
   bool reader_gone_ = false;
@@ -131,7 +144,7 @@ class Recorder {
 }  // namespace
 
 absl::Status Listen(const client::Client& daemon, const ListenOptions& options,
-                    const StopSignal& stop) {
+                    const StopSignal& stop, bool json) {
   // A reader of stdout that closes its pipe ends the recording without an error.
   std::signal(SIGPIPE, SIG_IGN);
   Recorder recorder(options, stop);
@@ -143,7 +156,10 @@ absl::Status Listen(const client::Client& daemon, const ListenOptions& options,
   if (recorder.lost_frame_count() > 0) {
     absl::FPrintF(stderr, "%d frames lost on the way\n", recorder.lost_frame_count());
   }
-  return recorder.status().ok() ? heard : recorder.status();
+  RETURN_IF_ERROR(recorder.status());
+  RETURN_IF_ERROR(heard);
+  if (json) recorder.PrintAsJson();
+  return absl::OkStatus();
 }
 
 }  // namespace carillon::cli

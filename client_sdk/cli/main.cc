@@ -54,7 +54,9 @@ void AddDatabase(CLI::App& app, Program& program) {
   CLI::App& backup = *db.add_subcommand("backup", "Write a copy of the database to a file");
   backup.add_option("file", *file, "The file to write")->required();
   backup.callback([&program, file] {
-    program.command = [&program, file] { return program.Daemon()->BackUpDatabase(*file); };
+    program.command = [&program, file] {
+      return BackUpDatabase(*program.Daemon(), *file, program.json);
+    };
   });
   CLI::App& collect =
       *db.add_subcommand("collect", "Delete the models that sounded least recently");
@@ -172,9 +174,10 @@ void AddListen(CLI::App& app, Program& program) {
                     "The name or the number of a scene to record alone [the output]");
   listen.add_flag("--quiet", options->quiet, "Show no level on the terminal");
   listen.callback([&program, options] {
+    CheckJson(program, options->out.empty() ? "-" : options->out);
     program.command = [&program, options] {
       const StopSignal stop;
-      return Listen(*program.Daemon(), *options, stop);
+      return Listen(*program.Daemon(), *options, stop, program.json);
     };
   });
 }

@@ -223,7 +223,9 @@ void AddModelExport(CLI::App& app, Program& program) {
   command.callback([&program, options] {
     const std::string wrong = WhyNotWritten(options->file, {".model", ".glb", ".gltf", ".npz"});
     if (options->format.empty() && !wrong.empty()) throw CLI::ValidationError("--out", wrong);
-    program.command = [&program, options] { return ExportModel(*program.Daemon(), *options); };
+    program.command = [&program, options] {
+      return ExportModel(*program.Daemon(), *options, program.json);
+    };
   });
 }
 

@@ -12,7 +12,6 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
-#include "client_sdk/cli/message_json.h"
 #include "proto/cpp/error_reason.h"
 
 namespace carillon::cli {
@@ -20,7 +19,7 @@ namespace carillon::cli {
 void OpenStandardStreams() {
   for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
     if (fcntl(stream, F_GETFD) >= 0) continue;
-    // The lowest free number is that of the stream. What is open for reading cannot be written.
+    // The lowest free number is that of the stream. A file that is open for reading refuses output.
     (void)open("/dev/null", stream == STDOUT_FILENO ? O_RDONLY : O_RDWR);
   }
 }
@@ -49,6 +48,10 @@ int Report(const absl::Status& status, const HasOption& has_option) {
 
 void PrintJson(const google::protobuf::Message& message) {
   absl::PrintF("%s\n", MessageJson(message));
+}
+
+void PrintJson(std::initializer_list<JsonMember> members) {
+  absl::PrintF("%s\n", MembersJson(members));
 }
 
 std::string Decibels(double amplitude) {

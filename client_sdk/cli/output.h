@@ -3,10 +3,12 @@
 
 #include <google/protobuf/message.h>
 
+#include <initializer_list>
 #include <string>
 
 #include "absl/status/status.h"
 #include "client_sdk/cli/command_words.h"
+#include "client_sdk/cli/message_json.h"
 
 namespace carillon::cli {
 
@@ -26,6 +28,9 @@ int Report(const absl::Status& status, const HasOption& has_option);
 
 /// Prints `message` to stdout as one line of JSON; see MessageJson.
 void PrintJson(const google::protobuf::Message& message);
+
+/// Prints an object with the members to stdout as one line of JSON; see MembersJson.
+void PrintJson(std::initializer_list<JsonMember> members);
 
 /// Returns a linear amplitude (full scale is 1) as text, such as "-6.0 dBFS" or "silence".
 std::string Decibels(double amplitude);

@@ -151,7 +151,7 @@ absl::Status Render(const client::Client& daemon, const RenderOptions& options, 
   if (!summary.ok()) return summary.status();
   RETURN_IF_ERROR(file.Finish());
   RETURN_IF_ERROR(CheckHasContacts(options.trace, *summary));
-  if (json && options.out != "-") {
+  if (json) {
     PrintJson(*summary);
   } else {
     PrintSummary(options, *summary, options.sample_rate_hz);

@@ -116,6 +116,7 @@ void AddRender(CLI::App& app, Program& program) {
   AddFolder(render, *options);
   render.callback([&program, &render, options] {
     CheckUse(render, *options);
+    CheckJson(program, options->out);
     program.command = [&program, options] {
       return IsFolder(options->trace) ? RenderClips(*program.Daemon(), *options, program.json)
                                       : Render(*program.Daemon(), *options, program.json);

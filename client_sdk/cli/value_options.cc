@@ -46,4 +46,9 @@ std::string WhyNotWritten(const std::string& path, const std::vector<std::string
                       ": no other format is written");
 }
 
+void CheckJson(const Program& program, const std::string& out) {
+  if (!program.json || out != "-") return;
+  throw CLI::ValidationError("--json", "stdout has the sound; name a file with --out");
+}
+
 }  // namespace carillon::cli

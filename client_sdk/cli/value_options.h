@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "client_sdk/cli/program.h"
+
 namespace CLI {  // NOLINT(readability-identifier-naming): as the library has it
 class Option;
 }
@@ -28,5 +30,8 @@ void TakeSeconds(CLI::Option& option);
 /// Says which formats are written if the suffix of `path` is not one of `suffixes` (".wav"), in
 /// small or capital letters; empty if it is, or if the path has no suffix.
 std::string WhyNotWritten(const std::string& path, const std::vector<std::string>& suffixes);
+
+/// Throws a CLI::ValidationError if JSON is asked for while stdout, "-" as `out`, has the sound.
+void CheckJson(const Program& program, const std::string& out);
 
 }  // namespace carillon::cli

@@ -194,6 +194,22 @@ class ExampleTest(CommandLineTest):
         self.assertEqual(len(self.run_command("model", "create", *files, "--material", "bell_bronze").split()), 4)
 
 
+class JsonTest(CommandLineTest):
+    def test_commands_that_write_a_file_say_in_json_what_they_wrote(self):
+        example = self.json_of("example", "bar", "--out", self.folder / "json.obj")
+        self.assertEqual((example["file"], example["material"]), (f"{self.folder}/json.obj", "maple"))
+        self.assertIn("--impulse", example["strike"])
+        exported = self.json_of("model", "export", "bar", "--out", self.folder / "json.npz")
+        self.assertEqual(exported, {"file": f"{self.folder}/json.npz", "format": "npz", "modal_model": self.model})
+        backup = self.folder / "json.db"
+        self.assertEqual(self.json_of("db", "backup", backup),
+                         {"file": str(backup), "byte_count": backup.stat().st_size})
+        heard = self.json_of("listen", "--seconds", "0.2", "--out", self.folder / "json.wav")
+        self.assertEqual(heard, {"file": f"{self.folder}/json.wav", "frame_count": 9600, "lost_frame_count": 0,
+                                 "sample_rate_hz": 48000, "channel_count": 1, "peak": 0})
+        self.assertEqual(len(sound.read_wave(self.folder / "json.wav")), 9600)
+
+
 class MeshFileTest(CommandLineTest):
     def test_a_gltf_brings_the_file_with_its_data(self):
         file = meshes.gltf_with_buffer(meshes.BAR_SIZE, self.folder)

@@ -111,6 +111,8 @@ class WrongValuesTest(unittest.TestCase):
                                 (("listen", "--out", "x.ogg"), "must end with .wav"),
                                 (("model", "export", "bar", "--out", "x.obj"), "must end with .model, .glb"),
                                 (("example", "bar", "--out", "x.stl"), "must end with .obj"),
+                                (("--json", "listen"), "--json: stdout has the sound"),
+                                (("--json", "render", "x.contacts", "--out", "-"), "--json: stdout has the sound"),
                                 (("--server", "127.0.0.1:99999", "status"), "a port from 1 to 65535")):
             done = carillon(*words)
             self.assertEqual((done.returncode, done.stdout), (2, ""), words)
