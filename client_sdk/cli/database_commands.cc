@@ -59,10 +59,10 @@ absl::Status CollectGarbage(const client::Client& daemon, const v1::CollectGarba
   if (json) {
     PrintJson(collected);
   } else {
-    absl::PrintF("%d models %sdeleted, %.1f MiB; %d meshes without a model or job, %.1f MiB\n",
-                 collected.deleted_count(), request.dry_run() ? "would be " : "",
+    absl::PrintF("%s %sdeleted, %.1f MiB; %s without a model or job, %.1f MiB\n",
+                 Counted(collected.deleted_count(), "model"), request.dry_run() ? "would be " : "",
                  static_cast<double>(collected.deleted_bytes()) / kMib,
-                 collected.deleted_mesh_count(),
+                 Counted(collected.deleted_mesh_count(), "mesh"),
                  static_cast<double>(collected.deleted_mesh_bytes()) / kMib);
   }
   return absl::OkStatus();

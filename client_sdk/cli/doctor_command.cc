@@ -17,6 +17,7 @@
 #include "absl/time/time.h"
 #include "client_sdk/cli/daemon_process.h"
 #include "client_sdk/cli/findings.h"
+#include "client_sdk/cli/output.h"
 #include "proto/cpp/child_process.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
@@ -50,10 +51,10 @@ void CheckProcess(const Program& program, Findings& findings) {
   const std::optional<uint64_t> limit = DescriptorLimit(*process);
   if (!limit) return;
   if (*limit >= kEnoughDescriptors) {
-    return findings.Good("limits", absl::StrCat(*limit, " descriptors"));
+    return findings.Good("limits", Counted(*limit, "descriptor"));
   }
-  findings.Bad("limits", absl::StrCat("the daemon may open ", *limit,
-                                      " descriptors, a connection needs one: raise LimitNOFILE="));
+  findings.Bad("limits", absl::StrCat("the daemon may open ", Counted(*limit, "descriptor"),
+                                      ", a connection needs one: raise LimitNOFILE="));
 }
 
 void CheckSound(const v1::GetMixerResponse& mixer, Findings& findings) {
@@ -66,8 +67,8 @@ void CheckSound(const v1::GetMixerResponse& mixer, Findings& findings) {
                                            1e3 * mixer.output_latency_s()));
   }
   const std::string load =
-      absl::StrFormat("rendering takes %.0f %% of the time, %d frames were lost",
-                      100 * mixer.load(), mixer.lost_frame_count());
+      absl::StrFormat("rendering takes %.0f %% of the time, with %s lost", 100 * mixer.load(),
+                      Counted(mixer.lost_frame_count(), "frame"));
   if (mixer.load() > kHighLoad) {
     return findings.Bad("load", load + ": use fewer objects, or a faster processor");
   }
@@ -83,12 +84,12 @@ void CheckDatabase(const client::Client& daemon, Findings& findings) {
     return findings.Unknown("database", Text(stats.status()));
   }
   if (!stats.ok()) return findings.Bad("database", Text(stats.status()));
-  const std::string content =
-      absl::StrCat(stats->model_count(), " models, ", stats->file_bytes() >> 20U, " MiB");
+  const std::string content = absl::StrCat(Counted(stats->model_count(), "model"), ", ",
+                                           stats->file_bytes() >> 20U, " MiB");
   if (stats->quarantined_count() == 0) return findings.Good("database", content);
   findings.Bad("database",
-               absl::StrCat(content, ", ", stats->quarantined_count(),
-                            " models are damaged: check the disk, and run `carillond db "
+               absl::StrCat(content, ", ", Counted(stats->quarantined_count(), "damaged model"),
+                            ": check the disk, and run `carillond db "
                             "check` while the daemon is stopped"));
 }
 

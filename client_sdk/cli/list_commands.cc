@@ -24,16 +24,16 @@ namespace carillon::cli {
 namespace {
 
 void PrintObject(const v1::SoundingObject& object) {
-  absl::PrintF("  %-6d %-12s  %4d modes  %8.1f to %.1f Hz  size %.4g  gain %.4g\n", object.handle(),
+  absl::PrintF("  %-6d %-12s  %10s  %8.1f to %.1f Hz  size %.4g  gain %.4g\n", object.handle(),
                absl::StripPrefix(object.modal_model(), "modalModels/").substr(0, 12),
-               object.sounding_mode_count(), object.lowest_frequency_hz(),
+               Counted(object.sounding_mode_count(), "mode"), object.lowest_frequency_hz(),
                object.highest_frequency_hz(), object.size(), object.gain());
 }
 
 std::string LeaseText(const v1::Scene& scene) {
   if (scene.keep()) return "kept";
   if (scene.has_ends_in_s()) return absl::StrFormat("ends in %.0f s", scene.ends_in_s());
-  return absl::StrCat(scene.connection_count(), " connections");
+  return Counted(scene.connection_count(), "connection");
 }
 
 void PrintJobLine(const v1::Job& job) {
@@ -143,9 +143,9 @@ absl::Status ListScenes(const client::Client& daemon, bool json) {
     return absl::OkStatus();
   }
   for (const v1::Scene& scene : scenes) {
-    absl::PrintF("%s  %d objects  gain %.4g%s%s  %s\n", scene.name(), scene.object_count(),
-                 scene.gain(), scene.muted() ? "  muted" : "", scene.solo() ? "  solo" : "",
-                 LeaseText(scene));
+    absl::PrintF("%s  %s  gain %.4g%s%s  %s\n", scene.name(),
+                 Counted(scene.object_count(), "object"), scene.gain(),
+                 scene.muted() ? "  muted" : "", scene.solo() ? "  solo" : "", LeaseText(scene));
     const auto objects = daemon.ListObjects(scene.name());
     // A scene may be deleted meanwhile.
     if (!objects.ok()) continue;

@@ -95,8 +95,8 @@ class Recorder {
   void Begin(const client::AudioBlock& block) {
     if (!options_.quiet && isatty(STDERR_FILENO) != 0) meter_.emplace();
     if (options_.out.empty()) {
-      absl::FPrintF(stderr, "raw samples: float, little endian, %d Hz, %d channels\n",
-                    block.sample_rate_hz, block.channel_count);
+      absl::FPrintF(stderr, "raw samples: float, little endian, %d Hz, %s\n", block.sample_rate_hz,
+                    Counted(block.channel_count, "channel"));
       return;
     }
     format_ = {.sample_rate_hz = block.sample_rate_hz, .channel_count = block.channel_count};
@@ -154,7 +154,7 @@ absl::Status Listen(const client::Client& daemon, const ListenOptions& options,
       request, [&](const client::AudioBlock& block) { return recorder.Take(block); });
   recorder.Finish();
   if (recorder.lost_frame_count() > 0) {
-    absl::FPrintF(stderr, "%d frames lost on the way\n", recorder.lost_frame_count());
+    absl::FPrintF(stderr, "%s lost on the way\n", Counted(recorder.lost_frame_count(), "frame"));
   }
   RETURN_IF_ERROR(recorder.status());
   RETURN_IF_ERROR(heard);

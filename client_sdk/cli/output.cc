@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <cstring>
 
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "proto/cpp/error_reason.h"
@@ -52,6 +53,11 @@ void PrintJson(const google::protobuf::Message& message) {
 
 void PrintJson(std::initializer_list<JsonMember> members) {
   absl::PrintF("%s\n", MembersJson(members));
+}
+
+std::string Counted(uint64_t count, absl::string_view noun) {
+  const char* const ending = count == 1 ? "" : absl::EndsWith(noun, "sh") ? "es" : "s";
+  return absl::StrCat(count, " ", noun, ending);
 }
 
 std::string Decibels(double amplitude) {

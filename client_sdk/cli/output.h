@@ -3,10 +3,12 @@
 
 #include <google/protobuf/message.h>
 
+#include <cstdint>
 #include <initializer_list>
 #include <string>
 
 #include "absl/status/status.h"
+#include "absl/strings/string_view.h"
 #include "client_sdk/cli/command_words.h"
 #include "client_sdk/cli/message_json.h"
 
@@ -31,6 +33,9 @@ void PrintJson(const google::protobuf::Message& message);
 
 /// Prints an object with the members to stdout as one line of JSON; see MembersJson.
 void PrintJson(std::initializer_list<JsonMember> members);
+
+/// Returns a number with its noun, such as "1 mode", "2 modes" or "0 meshes".
+std::string Counted(uint64_t count, absl::string_view noun);
 
 /// Returns a linear amplitude (full scale is 1) as text, such as "-6.0 dBFS" or "silence".
 std::string Decibels(double amplitude);

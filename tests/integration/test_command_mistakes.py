@@ -37,7 +37,7 @@ class RenderMistakesTest(CommandLineTest):
             self.assertEqual((done.returncode, done.stdout), (1, ""))
             self.assertIn(f"TRACE_EMPTY: {trace}: ", done.stderr)
         done = self.daemon.command("render", silent, "--out", self.folder / "silent_clips", check=False)
-        self.assertIn("0 were there, 2 failed", done.stdout)
+        self.assertIn("0 there already, 2 failed", done.stdout)
 
     def test_options_for_folders_and_other_formats_are_refused(self):
         trace = self.folder / "trace.contacts"
