@@ -17,6 +17,7 @@
 #include "absl/time/time.h"
 #include "client_sdk/cli/daemon_process.h"
 #include "client_sdk/cli/findings.h"
+#include "client_sdk/cli/output.h"
 #include "proto/cpp/child_process.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
@@ -52,10 +53,10 @@ void CheckProcess(const Program& program, Findings& findings) {
   const std::optional<uint64_t> limit = DescriptorLimit(*process);
   if (!limit) return;
   if (*limit >= kEnoughDescriptors) {
-    return findings.Good("limits", absl::StrCat(*limit, " descriptors"));
+    return findings.Good("limits", Counted(*limit, "descriptor"));
   }
-  findings.Bad("limits", absl::StrCat("the daemon may open ", *limit,
-                                      " descriptors, a connection needs one: raise LimitNOFILE="));
+  findings.Bad("limits", absl::StrCat("the daemon may open ", Counted(*limit, "descriptor"),
+                                      ", a connection needs one: raise LimitNOFILE="));
 }
 
 /// Returns the number of frames that were lost since `before`, after waiting a little if some were
@@ -79,9 +80,9 @@ void CheckSound(const client::Client& daemon, const v1::GetMixerResponse& mixer,
   }
   const uint64_t lost_now = FramesLostNow(daemon, mixer);
   const std::string load = absl::StrFormat(
-      "rendering takes %.0f %% of the time, %d frames were lost since the daemon began, %d of them "
-      "just now",
-      100 * mixer.load(), mixer.lost_frame_count() + lost_now, lost_now);
+      "rendering takes %.0f %% of the time, with %s lost since the daemon began, %d of them just "
+      "now",
+      100 * mixer.load(), Counted(mixer.lost_frame_count() + lost_now, "frame"), lost_now);
   if (mixer.load() > kHighLoad) {
     return findings.Bad("load", load + ": use fewer objects, or a faster processor");
   }
@@ -97,12 +98,12 @@ void CheckDatabase(const client::Client& daemon, Findings& findings) {
     return findings.Unknown("database", Text(stats.status()));
   }
   if (!stats.ok()) return findings.Bad("database", Text(stats.status()));
-  const std::string content =
-      absl::StrCat(stats->model_count(), " models, ", stats->file_bytes() >> 20U, " MiB");
+  const std::string content = absl::StrCat(Counted(stats->model_count(), "model"), ", ",
+                                           stats->file_bytes() >> 20U, " MiB");
   if (stats->quarantined_count() == 0) return findings.Good("database", content);
   findings.Bad("database",
-               absl::StrCat(content, ", ", stats->quarantined_count(),
-                            " models are damaged: check the disk, and run `carillond db "
+               absl::StrCat(content, ", ", Counted(stats->quarantined_count(), "damaged model"),
+                            ": check the disk, and run `carillond db "
                             "check` while the daemon is stopped"));
 }
 
