@@ -18,6 +18,7 @@
 #include "client_sdk/cli/clip_record.h"
 #include "client_sdk/cli/commands.h"
 #include "client_sdk/cli/file_digest.h"
+#include "client_sdk/cli/output.h"
 #include "client_sdk/cli/rendered_file.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
@@ -90,6 +91,7 @@ class ClipRenderer {
     v1::RenderSettings settings = SettingsOf(options_);
     settings.set_tell_blows(true);
     RETURN_IF_ERROR(RenderFile(trace, settings, form, record));
+    RETURN_IF_ERROR(CheckHasContacts(trace, record.summary));
     if (const auto finer = FinerFullScale(options_, record.summary)) {
       settings.set_full_scale_pa(*finer);
       RETURN_IF_ERROR(RenderFile(trace, settings, form, record));
@@ -156,7 +158,6 @@ class ClipRenderer {
     RETURN_IF_ERROR(file.status());
     RETURN_IF_ERROR(summary.status());
     RETURN_IF_ERROR(file.Finish());
-    if (!file.begun()) return EmptyTrace(path);
     record.summary = *std::move(summary);
     record.factor = file.factor();
     return absl::OkStatus();
@@ -235,8 +236,8 @@ void PrintRun(const ClipRun& run, double seconds, bool json) {
                  run.rendered_count(), run.kept_count(), run.failed_count(), seconds);
     return;
   }
-  absl::PrintF("%d clips in %.1f s (%.0f an hour), %d were there, %d failed\n",
-               run.rendered_count(), seconds,
+  absl::PrintF("%s in %.1f s (%.0f an hour), %d there already, %d failed\n",
+               Counted(run.rendered_count(), "clip"), seconds,
                static_cast<double>(run.rendered_count()) * 3600 / std::max(seconds, 1e-3),
                run.kept_count(), run.failed_count());
 }
@@ -257,9 +258,9 @@ absl::Status RenderClips(const client::Client& daemon, const RenderOptions& opti
   RETURN_IF_ERROR(stopped);
   if (run.failed_count() == 0) return absl::OkStatus();
   return Refusal(absl::StatusCode::kFailedPrecondition, "CLIPS_FAILED",
-                 absl::StrCat(run.failed_count(), " clips could not be rendered; ",
+                 absl::StrCat(Counted(run.failed_count(), "clip"), " could not be rendered; ",
                               folder.Final("manifest.jsonl").string(),
-                              " says why; repair their traces and run the command again"));
+                              " says why; repair what it names and run the command again"));
 }
 
 }  // namespace carillon::cli

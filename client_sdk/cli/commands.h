@@ -143,9 +143,11 @@ absl::Status ListModels(const client::Client& daemon, const v1::ListModalModelsR
                         bool json);
 absl::Status UpdateModel(const client::Client& daemon, const std::string& text,
                          v1::UpdateModalModelRequest change, bool json);
-absl::Status ExportModel(const client::Client& daemon, const ExportOptions& options);
+absl::Status ExportModel(const client::Client& daemon, const ExportOptions& options, bool json);
 absl::Status ImportModel(const client::Client& daemon, const ImportOptions& options, bool json);
 absl::Status ShowDatabaseStats(const client::Client& daemon, bool json);
+/// Writes a copy of the database to a file; prints nothing but JSON.
+absl::Status BackUpDatabase(const client::Client& daemon, const std::string& file, bool json);
 absl::Status CollectGarbage(const client::Client& daemon, const v1::CollectGarbageRequest& request,
                             bool json);
 /// Shows the model that `text` means: a name, a label or the first digits of a digest. If `figures`
@@ -164,7 +166,7 @@ absl::Status ListScenes(const client::Client& daemon, bool json);
 absl::Status DeleteScene(const client::Client& daemon, const std::string& text);
 /// Writes the OBJ file of an example; `path` may be empty for the name of the example. Errors:
 /// Internal (OUTPUT_NOT_WRITABLE).
-absl::Status WriteExample(const Example& example, const std::string& path);
+absl::Status WriteExample(const Example& example, const std::string& path, bool json);
 absl::Status WatchJob(const client::Client& daemon, const std::string& text, bool json);
 /// Prints the jobs that wait or run, and then each job that matches when its state changes, or with
 /// `json` at each change, as long as somebody reads.
@@ -180,7 +182,7 @@ absl::Status RunJob(const client::Client& daemon, const RunJobOptions& options,
 absl::Status Strike(const client::Client& daemon, const StrikeOptions& options,
                     const StopSignal& stop, bool json);
 absl::Status Listen(const client::Client& daemon, const ListenOptions& options,
-                    const StopSignal& stop);
+                    const StopSignal& stop, bool json);
 absl::Status Render(const client::Client& daemon, const RenderOptions& options, bool json);
 /// Renders the contact traces of a folder into another (see ClipFolder). Clips that are there
 /// already stay. A trace that cannot be rendered does not stop the others. Errors: NotFound
@@ -192,8 +194,9 @@ v1::RenderSettings SettingsOf(const RenderOptions& options);
 /// Absent: the rendering was loud enough, is silent, or has the full scale that was asked for.
 std::optional<double> FinerFullScale(const RenderOptions& options,
                                      const v1::RenderSummary& summary);
-/// The error of a trace without contacts.
-absl::Status EmptyTrace(const std::string& path);
+/// Errors: InvalidArgument (TRACE_EMPTY: the rendered trace has no contact, and its sound is
+/// silent).
+absl::Status CheckHasContacts(const std::string& path, const v1::RenderSummary& summary);
 
 /// Returns the name of a scene that `text` names as "scenes/7" or "7"; empty stays empty.
 std::string SceneNamed(const std::string& text);

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // The commands that look after stored models.
+#include <filesystem>
+#include <system_error>
+
 #include "absl/strings/str_format.h"
 #include "client_sdk/cli/commands.h"
 #include "client_sdk/cli/find_model.h"
@@ -41,16 +44,25 @@ absl::Status ShowDatabaseStats(const client::Client& daemon, bool json) {
   return absl::OkStatus();
 }
 
+absl::Status BackUpDatabase(const client::Client& daemon, const std::string& file, bool json) {
+  RETURN_IF_ERROR(daemon.BackUpDatabase(file));
+  std::error_code error;
+  const uint64_t byte_count = std::filesystem::file_size(file, error);
+  // A device or a pipe has no size.
+  if (json) PrintJson({{"file", file}, {"byte_count", error ? uint64_t{0} : byte_count}});
+  return absl::OkStatus();
+}
+
 absl::Status CollectGarbage(const client::Client& daemon, const v1::CollectGarbageRequest& request,
                             bool json) {
   ASSIGN_OR_RETURN(const auto collected, daemon.CollectGarbage(request));
   if (json) {
     PrintJson(collected);
   } else {
-    absl::PrintF("%d models %sdeleted, %.1f MiB; %d meshes without a model or job, %.1f MiB\n",
-                 collected.deleted_count(), request.dry_run() ? "would be " : "",
+    absl::PrintF("%s %sdeleted, %.1f MiB; %s without a model or job, %.1f MiB\n",
+                 Counted(collected.deleted_count(), "model"), request.dry_run() ? "would be " : "",
                  static_cast<double>(collected.deleted_bytes()) / kMib,
-                 collected.deleted_mesh_count(),
+                 Counted(collected.deleted_mesh_count(), "mesh"),
                  static_cast<double>(collected.deleted_mesh_bytes()) / kMib);
   }
   return absl::OkStatus();

@@ -17,6 +17,7 @@
 #include "absl/time/time.h"
 #include "client_sdk/cli/daemon_process.h"
 #include "client_sdk/cli/findings.h"
+#include "client_sdk/cli/output.h"
 #include "proto/cpp/child_process.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
@@ -27,6 +28,8 @@ namespace {
 constexpr uint64_t kEnoughDescriptors = 1024;
 constexpr double kHighLoad = 0.7;
 constexpr absl::Duration kEnoughTime = absl::Hours(30 * 24);
+/// The doctor watches the sound for this time where frames were lost before.
+constexpr absl::Duration kWatchedTime = absl::Seconds(2);
 
 std::string Text(const absl::Status& status) { return std::string(status.message()); }
 
@@ -50,13 +53,23 @@ void CheckProcess(const Program& program, Findings& findings) {
   const std::optional<uint64_t> limit = DescriptorLimit(*process);
   if (!limit) return;
   if (*limit >= kEnoughDescriptors) {
-    return findings.Good("limits", absl::StrCat(*limit, " descriptors"));
+    return findings.Good("limits", Counted(*limit, "descriptor"));
   }
-  findings.Bad("limits", absl::StrCat("the daemon may open ", *limit,
-                                      " descriptors, a connection needs one: raise LimitNOFILE="));
+  findings.Bad("limits", absl::StrCat("the daemon may open ", Counted(*limit, "descriptor"),
+                                      ", a connection needs one: raise LimitNOFILE="));
 }
 
-void CheckSound(const v1::GetMixerResponse& mixer, Findings& findings) {
+/// Returns the number of frames that were lost since `before`, after waiting a little if some were
+/// lost at all.
+uint64_t FramesLostNow(const client::Client& daemon, const v1::GetMixerResponse& before) {
+  if (before.lost_frame_count() == 0) return 0;
+  absl::SleepFor(kWatchedTime);
+  const auto after = daemon.GetMixer();
+  return after.ok() ? after->lost_frame_count() - before.lost_frame_count() : 0;
+}
+
+void CheckSound(const client::Client& daemon, const v1::GetMixerResponse& mixer,
+                Findings& findings) {
   if (!mixer.device_message().empty()) {
     findings.Bad("sound", absl::StrCat("plays on ", mixer.device(), ": ", mixer.device_message()));
   } else if (mixer.device() == "null") {
@@ -65,13 +78,15 @@ void CheckSound(const v1::GetMixerResponse& mixer, Findings& findings) {
     findings.Good("sound", absl::StrFormat("plays on %s, %.1f ms behind", mixer.device(),
                                            1e3 * mixer.output_latency_s()));
   }
-  const std::string load =
-      absl::StrFormat("rendering takes %.0f %% of the time, %d frames were lost",
-                      100 * mixer.load(), mixer.lost_frame_count());
+  const uint64_t lost_now = FramesLostNow(daemon, mixer);
+  const std::string load = absl::StrFormat(
+      "rendering takes %.0f %% of the time, with %s lost since the daemon began, %d of them just "
+      "now",
+      100 * mixer.load(), Counted(mixer.lost_frame_count() + lost_now, "frame"), lost_now);
   if (mixer.load() > kHighLoad) {
     return findings.Bad("load", load + ": use fewer objects, or a faster processor");
   }
-  if (mixer.lost_frame_count() > 0) {
+  if (lost_now > 0) {
     return findings.Bad("load", load + ": raise --look-ahead-blocks, or see real time above");
   }
   findings.Good("load", load);
@@ -83,12 +98,12 @@ void CheckDatabase(const client::Client& daemon, Findings& findings) {
     return findings.Unknown("database", Text(stats.status()));
   }
   if (!stats.ok()) return findings.Bad("database", Text(stats.status()));
-  const std::string content =
-      absl::StrCat(stats->model_count(), " models, ", stats->file_bytes() >> 20U, " MiB");
+  const std::string content = absl::StrCat(Counted(stats->model_count(), "model"), ", ",
+                                           stats->file_bytes() >> 20U, " MiB");
   if (stats->quarantined_count() == 0) return findings.Good("database", content);
   findings.Bad("database",
-               absl::StrCat(content, ", ", stats->quarantined_count(),
-                            " models are damaged: check the disk, and run `carillond db "
+               absl::StrCat(content, ", ", Counted(stats->quarantined_count(), "damaged model"),
+                            ": check the disk, and run `carillond db "
                             "check` while the daemon is stopped"));
 }
 
@@ -116,7 +131,9 @@ void CheckWorkers(const client::Client& daemon, Findings& findings) {
   if (!jobs.ok()) return;
   for (const v1::Job& job : *jobs) {
     if (!absl::StartsWith(job.error().reason(), "WORKER_")) continue;
-    return findings.Bad("jobs", absl::StrCat(job.name(), " failed: ", job.error().message()));
+    // Whatever was the cause may have gone meanwhile.
+    return findings.Unknown(
+        "jobs", absl::StrCat(job.name(), " failed: ", job.error().message(), "; ask for it again"));
   }
 }
 
@@ -165,7 +182,7 @@ void CheckDaemon(const Program& program, Findings& findings) {
   same ? findings.Good("daemon", version)
        : findings.Bad("daemon", absl::StrCat(version, ", but this is carillon ", CARILLON_VERSION,
                                              ": restart the daemon after an upgrade"));
-  CheckSound(*mixer, findings);
+  CheckSound(*daemon, *mixer, findings);
   CheckDatabase(*daemon, findings);
   CheckWorkers(*daemon, findings);
   CheckTls(program, findings);

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "client_sdk/cli/find_model.h"
 
+#include <algorithm>
 #include <vector>
 
+#include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/strip.h"
+#include "client_sdk/cli/job_progress.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 
@@ -20,22 +23,25 @@ struct Wording {
   absl::string_view prefix, not_found, ambiguous, noun;
 };
 
+template <class Item>
+bool Means(const std::string& text, const Item& item, absl::string_view prefix) {
+  const absl::string_view digest = absl::StripPrefix(item.name(), prefix);
+  return item.label() == text || (!text.empty() && absl::StartsWith(digest, text));
+}
+
 /// Returns the name of the one of `items` that `text` means.
 template <class Item>
 absl::StatusOr<std::string> Choose(const std::vector<Item>& items, const std::string& text,
                                    const Wording& wording) {
   std::vector<std::string> found;
   for (const Item& item : items) {
-    const absl::string_view digest = absl::StripPrefix(item.name(), wording.prefix);
-    if (item.label() == text || (!text.empty() && absl::StartsWith(digest, text))) {
-      found.push_back(item.name());
-    }
+    if (Means(text, item, wording.prefix)) found.push_back(item.name());
   }
   if (found.size() == 1) return found.front();
   if (found.empty()) {
     return Refusal(absl::StatusCode::kNotFound, wording.not_found,
                    absl::StrCat("no ", wording.noun, " has the label or begins with the digits '",
-                                text, "'; `carillon model list` shows what there is"));
+                                text, "'; `carillon ", wording.noun, " list` shows what there is"));
   }
   return Refusal(absl::StatusCode::kInvalidArgument, wording.ambiguous,
                  absl::StrCat("'", text, "' means ", found.size(), " of the ", wording.noun,
@@ -43,12 +49,58 @@ absl::StatusOr<std::string> Choose(const std::vector<Item>& items, const std::st
                               "; give more digits of the digest"));
 }
 
+/// Says what has become of the job whose model is not there, and what to do.
+absl::Status NotMade(const std::string& text, const v1::Job& job) {
+  const std::string digest(absl::StripPrefix(job.name(), kJobs).substr(0, 12));
+  const bool queued = job.state() == v1::JOB_STATE_QUEUED;
+  std::string why;
+  if (queued || job.state() == v1::JOB_STATE_RUNNING) {
+    why = absl::StrCat("its job ", queued ? "is queued" : "is running", " (",
+                       absl::StripLeadingAsciiWhitespace(ProgressText(job)),
+                       "): `carillon job watch ", digest,
+                       "` waits for it, as `carillon model create --wait` does, and ",
+                       "`carillon job show ", digest, "` shows its state");
+  } else if (job.state() == v1::JOB_STATE_FAILED) {
+    why = absl::StrCat("its job failed (", job.error().reason(), ": ", job.error().message(),
+                       "): repair that, and call `carillon model create` again; `carillon job "
+                       "show ",
+                       digest, "` shows the job");
+  } else {
+    why = "its job was cancelled: call `carillon model create` again";
+  }
+  return Refusal(absl::StatusCode::kNotFound, "MODAL_MODEL_NOT_FOUND",
+                 absl::StrCat("the model '", text, "' is not there, because ", why));
+}
+
+/// Returns `not_found`, or the state of the newest job that has not made the model.
+absl::Status WhyNotFound(const client::Client& daemon, const std::string& text,
+                         const absl::Status& not_found) {
+  const auto jobs = daemon.ListJobs();
+  if (!jobs.ok()) return not_found;
+  const std::string digest(absl::StripPrefix(text, kModels));
+  const auto job = std::ranges::find_if(*jobs, [&](const v1::Job& item) {
+    // The job of a transfer has another digest than its model.
+    const bool makes_model =
+        absl::StripPrefix(item.name(), kJobs) == absl::StripPrefix(item.modal_model(), kModels);
+    return makes_model && Means(digest, item, kJobs);
+  });
+  if (job == jobs->end() || job->state() == v1::JOB_STATE_SUCCEEDED) return not_found;
+  return NotMade(text, *job);
+}
+
 }  // namespace
 
 absl::StatusOr<std::string> FindModel(const client::Client& daemon, const std::string& text) {
-  if (absl::StartsWith(text, kModels)) return text;
+  if (absl::StartsWith(text, kModels)) {
+    // Other errors, such as that of a damaged model, do not keep a command from deleting it.
+    const absl::Status shown = daemon.GetModalModel(text).status();
+    if (!absl::IsNotFound(shown)) return text;
+    return WhyNotFound(daemon, text, shown);
+  }
   ASSIGN_OR_RETURN(const auto models, daemon.ListModalModels());
-  return Choose(models, text, {kModels, "MODAL_MODEL_NOT_FOUND", "MODAL_MODEL_AMBIGUOUS", "model"});
+  auto found =
+      Choose(models, text, {kModels, "MODAL_MODEL_NOT_FOUND", "MODAL_MODEL_AMBIGUOUS", "model"});
+  return absl::IsNotFound(found.status()) ? WhyNotFound(daemon, text, found.status()) : found;
 }
 
 absl::StatusOr<std::string> FindJob(const client::Client& daemon, const std::string& text) {

@@ -9,8 +9,9 @@
 namespace carillon::cli {
 
 /// Returns the name "modalModels/{digest}" of the model that `text` means: its name, its label, or
-/// the first digits of its digest. Errors: NotFound (MODAL_MODEL_NOT_FOUND), InvalidArgument
-/// (MODAL_MODEL_AMBIGUOUS), and those of Client::ListModalModels.
+/// the first digits of its digest. Errors: NotFound (MODAL_MODEL_NOT_FOUND, with the state of the
+/// job that has yet to make the model, if there is one), InvalidArgument (MODAL_MODEL_AMBIGUOUS),
+/// and those of Client::ListModalModels.
 absl::StatusOr<std::string> FindModel(const client::Client& daemon, const std::string& text);
 
 /// Returns the name "jobs/{digest}" of the job that `text` means: its name, its label, or the first

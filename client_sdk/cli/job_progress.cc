@@ -10,6 +10,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/string_view.h"
+#include "client_sdk/cli/output.h"
 
 namespace carillon::cli {
 namespace {
@@ -76,9 +77,10 @@ void DrawProgressBar(const v1::Job& job) {
 std::string ProgressText(const v1::Job& job) {
   std::string text = absl::StrFormat("%3.0f %%  %s", Fraction(job) * 100, Activity(job));
   const v1::Progress& progress = job.progress();
-  if (progress.node_count() > 0) absl::StrAppend(&text, ", ", progress.node_count(), " nodes");
+  if (progress.node_count() > 0)
+    absl::StrAppend(&text, ", ", Counted(progress.node_count(), "node"));
   if (progress.converged_mode_count() > 0) {
-    absl::StrAppend(&text, ", ", progress.converged_mode_count(), " modes");
+    absl::StrAppend(&text, ", ", Counted(progress.converged_mode_count(), "mode"));
   }
   if (job.coarse_ready()) absl::StrAppend(&text, ", coarse model ready");
   if (progress.remaining_s() > 0) {

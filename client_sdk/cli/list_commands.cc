@@ -10,6 +10,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/strip.h"
+#include "client_sdk/cli/command_words.h"
 #include "client_sdk/cli/commands.h"
 #include "client_sdk/cli/example_bodies.h"
 #include "client_sdk/cli/find_model.h"
@@ -23,16 +24,16 @@ namespace carillon::cli {
 namespace {
 
 void PrintObject(const v1::SoundingObject& object) {
-  absl::PrintF("  %-6d %-12s  %4d modes  %8.1f to %.1f Hz  size %.4g  gain %.4g\n", object.handle(),
+  absl::PrintF("  %-6d %-12s  %10s  %8.1f to %.1f Hz  size %.4g  gain %.4g\n", object.handle(),
                absl::StripPrefix(object.modal_model(), "modalModels/").substr(0, 12),
-               object.sounding_mode_count(), object.lowest_frequency_hz(),
+               Counted(object.sounding_mode_count(), "mode"), object.lowest_frequency_hz(),
                object.highest_frequency_hz(), object.size(), object.gain());
 }
 
 std::string LeaseText(const v1::Scene& scene) {
   if (scene.keep()) return "kept";
   if (scene.has_ends_in_s()) return absl::StrFormat("ends in %.0f s", scene.ends_in_s());
-  return absl::StrCat(scene.connection_count(), " connections");
+  return Counted(scene.connection_count(), "connection");
 }
 
 void PrintJobLine(const v1::Job& job) {
@@ -81,8 +82,10 @@ absl::Status ShowJob(const client::Client& daemon, const std::string& text, bool
       "%s\nlabel      %s\nstate      %s\nmodel      %s\npriority   %d\nmemory     %.1f MiB\n",
       job.name(), job.label(), ProgressText(job), job.modal_model(), job.priority(),
       static_cast<double>(job.memory_bytes()) / (1 << 20));
-  if (job.has_error())
-    absl::PrintF("error      %s: %s\n", job.error().reason(), job.error().message());
+  if (job.has_error()) {
+    absl::PrintF("error      %s: %s\n", job.error().reason(),
+                 InCommandWords(job.error().message(), HasEveryOption));
+  }
   return absl::OkStatus();
 }
 
@@ -140,9 +143,9 @@ absl::Status ListScenes(const client::Client& daemon, bool json) {
     return absl::OkStatus();
   }
   for (const v1::Scene& scene : scenes) {
-    absl::PrintF("%s  %d objects  gain %.4g%s%s  %s\n", scene.name(), scene.object_count(),
-                 scene.gain(), scene.muted() ? "  muted" : "", scene.solo() ? "  solo" : "",
-                 LeaseText(scene));
+    absl::PrintF("%s  %s  gain %.4g%s%s  %s\n", scene.name(),
+                 Counted(scene.object_count(), "object"), scene.gain(),
+                 scene.muted() ? "  muted" : "", scene.solo() ? "  solo" : "", LeaseText(scene));
     const auto objects = daemon.ListObjects(scene.name());
     // A scene may be deleted meanwhile.
     if (!objects.ok()) continue;
@@ -155,7 +158,7 @@ absl::Status DeleteScene(const client::Client& daemon, const std::string& text) 
   return daemon.DeleteScene(SceneNamed(text));
 }
 
-absl::Status WriteExample(const Example& example, const std::string& path) {
+absl::Status WriteExample(const Example& example, const std::string& path, bool json) {
   const std::string file = path.empty() ? example.name + ".obj" : path;
   std::ofstream out(file, std::ios::binary);
   out << ObjText(example);
@@ -163,6 +166,13 @@ absl::Status WriteExample(const Example& example, const std::string& path) {
   if (!out) {
     return Refusal(absl::StatusCode::kInternal, "OUTPUT_NOT_WRITABLE",
                    absl::StrCat(file, ": ", std::strerror(errno), "; choose another file"));
+  }
+  if (json) {
+    PrintJson({{"file", file},
+               {"description", example.description},
+               {"material", example.material},
+               {"strike", example.strike}});
+    return absl::OkStatus();
   }
   absl::PrintF("%s\n", file);
   // To stderr, so that stdout is the name alone.

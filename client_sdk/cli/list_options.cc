@@ -12,6 +12,7 @@
 
 #include "client_sdk/cli/commands.h"
 #include "client_sdk/cli/sound_options.h"
+#include "client_sdk/cli/value_options.h"
 
 namespace carillon::cli {
 namespace {
@@ -161,10 +162,12 @@ void AddExample(CLI::App& app, Program& program) {
   command.add_option("name", *name, "bell, bowl, bar or chime")
       ->required()
       ->check(CLI::IsMember(names));
-  command.add_option("--out", *out, "The OBJ file to write [NAME.obj]");
+  command.add_option("--out", *out, "The OBJ file to write [NAME.obj]")
+      ->check([](const std::string& path) { return WhyNotWritten(path, {".obj"}); });
   command.callback([&program, name, out] {
-    program.command = [name, out] {
-      return WriteExample(*std::ranges::find(Examples(), *name, &Example::name), *out);
+    program.command = [&program, name, out] {
+      const Example& example = *std::ranges::find(Examples(), *name, &Example::name);
+      return WriteExample(example, *out, program.json);
     };
   });
 }

@@ -2,6 +2,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <optional>
@@ -12,6 +13,7 @@
 #include "client_sdk/cli/commands.h"
 #include "client_sdk/cli/output.h"
 #include "client_sdk/cli/wave_file.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::cli {
 namespace {
@@ -74,6 +76,16 @@ class Recorder {
   void Finish() {
     if (meter_) meter_->Finish();
     if (file_ && status_.ok()) status_ = file_->Finish();
+    if (options_.out.empty() && std::fflush(stdout) != 0) TakeOutputError();
+  }
+
+  void PrintAsJson() const {
+    PrintJson({{"file", options_.out},
+               {"frame_count", frame_count_},
+               {"lost_frame_count", lost_frame_count_},
+               {"sample_rate_hz", uint64_t{format_.sample_rate_hz}},
+               {"channel_count", uint64_t{format_.channel_count}},
+               {"peak", double{peak_}}});
   }
 
   const absl::Status& status() const { return status_; }
@@ -83,12 +95,12 @@ class Recorder {
   void Begin(const client::AudioBlock& block) {
     if (!options_.quiet && isatty(STDERR_FILENO) != 0) meter_.emplace();
     if (options_.out.empty()) {
-      absl::FPrintF(stderr, "raw samples: float, little endian, %d Hz, %d channels\n",
-                    block.sample_rate_hz, block.channel_count);
+      absl::FPrintF(stderr, "raw samples: float, little endian, %d Hz, %s\n", block.sample_rate_hz,
+                    Counted(block.channel_count, "channel"));
       return;
     }
-    auto file = WaveFile::Create(options_.out, {.sample_rate_hz = block.sample_rate_hz,
-                                                .channel_count = block.channel_count});
+    format_ = {.sample_rate_hz = block.sample_rate_hz, .channel_count = block.channel_count};
+    auto file = WaveFile::Create(options_.out, format_);
     status_ = file.status();
     if (file.ok()) file_ = *std::move(file);
   }
@@ -101,19 +113,29 @@ class Recorder {
   }
 
   void Put(std::span<const float> samples) {
+    for (const float sample : samples) peak_ = std::max(peak_, std::abs(sample));
     if (file_) {
       status_ = file_->Write(samples);
-    } else {
-      reader_gone_ =
-          std::fwrite(samples.data(), sizeof(float), samples.size(), stdout) != samples.size();
+    } else if (std::fwrite(samples.data(), sizeof(float), samples.size(), stdout) !=
+               samples.size()) {
+      TakeOutputError();
     }
+  }
+
+  /// A reader of stdout that has gone ends the recording without an error.
+  void TakeOutputError() {
+    reader_gone_ = errno == EPIPE;
+    if (reader_gone_) std::clearerr(stdout);
+    status_ = FlushOutput();
   }
 
   const ListenOptions& options_;
   const StopSignal& stop_;
   absl::Status status_;
+  WaveFormat format_;
   std::optional<WaveFile> file_;
   std::optional<LevelMeter> meter_;
+  float peak_ = 0;
   uint64_t frame_count_ = 0;
   uint64_t lost_frame_count_ = 0;
   bool reader_gone_ = false;
@@ -122,7 +144,7 @@ class Recorder {
 }  // namespace
 
 absl::Status Listen(const client::Client& daemon, const ListenOptions& options,
-                    const StopSignal& stop) {
+                    const StopSignal& stop, bool json) {
   // A reader of stdout that closes its pipe ends the recording without an error.
   std::signal(SIGPIPE, SIG_IGN);
   Recorder recorder(options, stop);
@@ -132,9 +154,12 @@ absl::Status Listen(const client::Client& daemon, const ListenOptions& options,
       request, [&](const client::AudioBlock& block) { return recorder.Take(block); });
   recorder.Finish();
   if (recorder.lost_frame_count() > 0) {
-    absl::FPrintF(stderr, "%d frames lost on the way\n", recorder.lost_frame_count());
+    absl::FPrintF(stderr, "%s lost on the way\n", Counted(recorder.lost_frame_count(), "frame"));
   }
-  return recorder.status().ok() ? heard : recorder.status();
+  RETURN_IF_ERROR(recorder.status());
+  RETURN_IF_ERROR(heard);
+  if (json) recorder.PrintAsJson();
+  return absl::OkStatus();
 }
 
 }  // namespace carillon::cli

@@ -5,6 +5,7 @@
 #include <iostream>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "client_sdk/cli/commands.h"
@@ -17,6 +18,7 @@
 #include "client_sdk/cli/program.h"
 #include "client_sdk/cli/render_options.h"
 #include "client_sdk/cli/sound_options.h"
+#include "client_sdk/cli/value_options.h"
 #include "proto/cpp/manual_page.h"
 #include "proto/cpp/striker_catalogue.h"
 
@@ -52,7 +54,9 @@ void AddDatabase(CLI::App& app, Program& program) {
   CLI::App& backup = *db.add_subcommand("backup", "Write a copy of the database to a file");
   backup.add_option("file", *file, "The file to write")->required();
   backup.callback([&program, file] {
-    program.command = [&program, file] { return program.Daemon()->BackUpDatabase(*file); };
+    program.command = [&program, file] {
+      return BackUpDatabase(*program.Daemon(), *file, program.json);
+    };
   });
   CLI::App& collect =
       *db.add_subcommand("collect", "Delete the models that sounded least recently");
@@ -87,7 +91,7 @@ void AddTransfer(CLI::App& app, Program& program) {
       .add_option("model", options->model,
                   "The name, the label, or the first digits of the digest of a model")
       ->required();
-  create.add_option("--size", options->size, "The size relative to that of the model");
+  TakeSize(*create.add_option("--size", options->size, "The size relative to that of the model"));
   create.add_option("--accuracy", options->accuracy_db,
                     "The error of each mode's power that is small enough, dB [2]");
   create.add_option("--budget", options->budget_s, "The processor time to spend, s [20]");
@@ -108,8 +112,8 @@ void AddDoctor(CLI::App& app, Program& program) {
 
 /// Adds the options of the object that is struck.
 void AddStruckObject(CLI::App& strike, StrikeOptions& options) {
-  strike.add_option("--size", options.size, "The size relative to that of the model");
-  strike.add_option("--gain", options.gain, "The linear gain");
+  TakeSize(*strike.add_option("--size", options.size, "The size relative to that of the model"));
+  ReadGain(*strike.add_option("--gain", options.gain, absl::StrCat("The gain: ", kGainForm)));
   CLI::Option* paper = strike.add_flag("--paper-coupling", options.paper_coupling,
                                        "Sound by the paper's coupling though a transfer is stored");
   strike
@@ -144,8 +148,8 @@ void AddStrike(CLI::App& app, Program& program) {
                   "The duration of the contact, s [that of an elastic collision with the striker]")
       ->excludes(striker);
   AddStruckObject(strike, *options);
-  strike.add_option("--seconds", options->seconds,
-                    "The time to ring, s [until the sound has decayed by 60 dB]");
+  TakeSeconds(*strike.add_option("--seconds", options->seconds,
+                                 "The time to ring, s [until the sound has decayed by 60 dB]"));
   AddMaterial(strike, options->material);
   strike.callback([&program, options] {
     program.command = [&program, options] {
@@ -158,19 +162,22 @@ void AddStrike(CLI::App& app, Program& program) {
 void AddListen(CLI::App& app, Program& program) {
   auto options = std::make_shared<ListenOptions>();
   CLI::App& listen = *app.add_subcommand("listen", "Record the sound that the daemon plays");
-  listen.add_option("--out", options->out,
-                    "The WAV file to write [raw 32-bit float samples to stdout]");
   listen
-      .add_option("--seconds", options->seconds,
-                  "The time to record, s [until the program is stopped]")
-      ->check(CLI::Range(0.0, 1e9));
+      .add_option("--out", options->out,
+                  "The WAV file to write [raw 32-bit float samples to stdout]")
+      ->check([](const std::string& path) {
+        return WhyNotWritten(path, {".wav", ".wave"});
+      });
+  TakeSeconds(*listen.add_option("--seconds", options->seconds,
+                                 "The time to record, s [until the program is stopped]"));
   listen.add_option("--scene", options->scene,
                     "The name or the number of a scene to record alone [the output]");
   listen.add_flag("--quiet", options->quiet, "Show no level on the terminal");
   listen.callback([&program, options] {
+    CheckJson(program, options->out.empty() ? "-" : options->out);
     program.command = [&program, options] {
       const StopSignal stop;
-      return Listen(*program.Daemon(), *options, stop);
+      return Listen(*program.Daemon(), *options, stop, program.json);
     };
   });
 }
@@ -205,15 +212,19 @@ void AddProgramOptions(CLI::App& app, Program& program) {
   AddManualFlag(app, 1, CARILLON_VERSION);
   app.require_subcommand(1)->fallthrough();
   app.footer(
-      "Exit codes: 0 for success; 1 if the daemon refuses the command, and stderr says why; 2 if "
-      "the command line is wrong; 3 if no daemon answers.");
+      "Exit codes: 0 for success; 1 if the command fails, and stderr says why; 2 if the "
+      "command line is wrong; 3 if no daemon answers.");
 }
 
-int Main(int argc, char** argv) {
-  Program program;
-  CLI::App app("Controls the daemon carillond, which makes rigid-body simulations audible.",
-               "carillon");
-  AddProgramOptions(app, program);
+/// Whether the command that the command line chose, or the program, has the option.
+bool HasOptionFor(const CLI::App& app, const std::string& option) {
+  if (app.get_option_no_throw(option) != nullptr) return true;
+  const std::vector<const CLI::App*> chosen =
+      app.get_subcommands([](const CLI::App* command) { return command->count() > 0; });
+  return !chosen.empty() && HasOptionFor(*chosen.front(), option);
+}
+
+void AddCommands(CLI::App& app, Program& program) {
   AddInfo(app, program);
   AddStatus(app, program);
   AddDoctor(app, program);
@@ -231,10 +242,22 @@ int Main(int argc, char** argv) {
   AddTop(app, program);
   AddExample(app, program);
   AddCompletion(app, program);
+}
+
+/// Returns the exit code of a command that ended with `code`, once its output is written.
+int Finish(int code) { return code == kDone ? Report(FlushOutput(), HasEveryOption) : code; }
+
+int Main(int argc, char** argv) {
+  OpenStandardStreams();
+  Program program;
+  CLI::App app("Controls the daemon carillond, which makes rigid-body simulations audible.",
+               "carillon");
+  AddProgramOptions(app, program);
+  AddCommands(app, program);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error);
+    if (error.get_exit_code() == 0) return Finish(app.exit(error));
     if (const std::string unknown = UnknownWord(app, argc, argv); !unknown.empty()) {
       std::cerr << "carillon: " << unknown << '\n';
     } else {
@@ -242,7 +265,13 @@ int Main(int argc, char** argv) {
     }
     return kUsage;
   }
-  return Report(program.command());
+  if (!IsServerAddress(program.server)) {
+    std::cerr << "carillon: --server or $CARILLON_SERVER: \"" << program.server
+              << "\" must be unix:PATH, or HOST:PORT with a port from 1 to 65535\n";
+    return kUsage;
+  }
+  const auto has_option = [&](const std::string& option) { return HasOptionFor(app, option); };
+  return Finish(Report(program.command(), has_option));
 }
 
 }  // namespace

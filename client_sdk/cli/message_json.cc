@@ -83,10 +83,21 @@ Json ToJson(const Message& message) {
   return object;
 }
 
+/// Text that is not UTF-8 gets a replacement character for each wrong byte.
+std::string JsonLine(const Json& json) {
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
 }  // namespace
 
-std::string MessageJson(const Message& message) {
-  return ToJson(message).dump(-1, ' ', false, Json::error_handler_t::replace);
+std::string MembersJson(std::initializer_list<JsonMember> members) {
+  Json object = Json::object();
+  for (const JsonMember& member : members) {
+    std::visit([&](const auto& value) { object[member.name] = value; }, member.value);
+  }
+  return JsonLine(object);
 }
+
+std::string MessageJson(const Message& message) { return JsonLine(ToJson(message)); }
 
 }  // namespace carillon::cli

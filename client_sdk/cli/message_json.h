@@ -3,7 +3,9 @@
 
 #include <google/protobuf/message.h>
 
+#include <initializer_list>
 #include <string>
+#include <variant>
 
 namespace carillon::cli {
 
@@ -11,5 +13,15 @@ namespace carillon::cli {
 /// JSON, 64-bit integers are numbers. Every field without presence is there, also with its default
 /// value. The message must have no bytes and no Any.
 std::string MessageJson(const google::protobuf::Message& message);
+
+/// A member of a JSON object that is no message of the contract.
+struct JsonMember {
+  const char* name;
+  std::variant<std::string, uint64_t, double> value;
+};
+
+/// Returns an object with the members in their order, as JSON in one line. Text that is not UTF-8,
+/// as names of files may be, gets a replacement character for each wrong byte.
+std::string MembersJson(std::initializer_list<JsonMember> members);
 
 }  // namespace carillon::cli

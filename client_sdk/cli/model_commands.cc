@@ -55,11 +55,11 @@ const char* ElementName(v1::Element element) {
 
 void PrintTransfer(const v1::TransferSummary& transfer) {
   const v1::TransferHeader& header = transfer.header();
-  absl::PrintF(
-      "transfer   for %.0f m/s in the material: %d of %d modes, power to %.1f dB, %d bytes\n",
-      header.speed_ratio() * header.sound_speed_m_per_s(), header.computed_mode_count(),
-      header.wanted_mode_count(), header.verification().max_power_error_db(),
-      transfer.stored_bytes());
+  absl::PrintF("transfer   for %.0f m/s in the material: %d of %s, power to %.1f dB, %s\n",
+               header.speed_ratio() * header.sound_speed_m_per_s(), header.computed_mode_count(),
+               Counted(header.wanted_mode_count(), "mode"),
+               header.verification().max_power_error_db(),
+               Counted(transfer.stored_bytes(), "byte"));
   for (const std::string& warning : header.warnings()) absl::PrintF("warning    %s\n", warning);
 }
 
@@ -79,9 +79,9 @@ void PrintSummary(const v1::ModalModelSummary& model) {
   absl::PrintF("label      %s\n", model.label());
   absl::PrintF("modes      %d, with %d rigid; Sturm count %d\n", header.mode_count(),
                proof.rigid_mode_count(), proof.sturm_count());
-  absl::PrintF("mesh       %d nodes, %d %s tetrahedra, volume %.6g m^3\n", header.node_count(),
-               header.element_count(), ElementName(header.settings().element()),
-               header.volume_m3());
+  absl::PrintF("mesh       %s, %d %s tetrahedra, volume %.6g m^3\n",
+               Counted(header.node_count(), "node"), header.element_count(),
+               ElementName(header.settings().element()), header.volume_m3());
   absl::PrintF("poisson    %.4f\n", header.settings().poisson_ratio());
   if (model.has_material()) absl::PrintF("material   %s\n", MaterialText(model.material()));
   for (const v1::Fixture& fixture : header.settings().fixtures()) {
@@ -89,7 +89,7 @@ void PrintSummary(const v1::ModalModelSummary& model) {
   }
   absl::PrintF("residual   %.2g at most, orthogonality %.2g\n", proof.max_residual(),
                proof.max_orthogonality_error());
-  absl::PrintF("stored     %d bytes by %s\n", model.stored_bytes(), header.solver());
+  absl::PrintF("stored     %s by %s\n", Counted(model.stored_bytes(), "byte"), header.solver());
   if (header.estimated_errors_size() > 0) {
     absl::PrintF("accuracy   %.2g %%, as estimated of the worst mode\n",
                  100 * *std::ranges::max_element(header.estimated_errors()));
@@ -100,8 +100,9 @@ void PrintSummary(const v1::ModalModelSummary& model) {
 
 void PrintRow(const v1::ModalModelSummary& model) {
   const absl::string_view digest = absl::StripPrefix(model.name(), "modalModels/");
-  absl::PrintF("%s  %4d modes  %7d nodes  %-9s  %8.1f MiB  %s  %s\n", digest.substr(0, 12),
-               model.header().mode_count(), model.header().node_count(),
+  absl::PrintF("%s  %10s  %13s  %-9s  %8.1f MiB  %s  %s\n", digest.substr(0, 12),
+               Counted(model.header().mode_count(), "mode"),
+               Counted(model.header().node_count(), "node"),
                ElementName(model.header().settings().element()),
                static_cast<double>(model.stored_bytes()) / (1 << 20),
                absl::FormatTime("%Y-%m-%d %H:%M", absl::FromUnixMillis(model.created_unix_ms()),
@@ -164,7 +165,8 @@ void PrintBand(const v1::ModalModelSummary& model, const v1::Material& material)
       header.complete_to_eigenvalue() * material.young_pa() / material.density_kg_per_m3();
   absl::PrintF("band       all modes up to %.5g Hz", std::sqrt(lambda) / (2 * std::numbers::pi));
   if (header.lowered_from_mode_count() > 0) {
-    absl::PrintF(", lowered from some %d modes below 20 kHz", header.lowered_from_mode_count());
+    absl::PrintF(", lowered from some %s below 20 kHz",
+                 Counted(header.lowered_from_mode_count(), "mode"));
   }
   absl::PrintF("\n");
 }
@@ -251,7 +253,7 @@ absl::Status CreateModel(const client::Client& daemon, const CreateModelOptions&
     const absl::Status ended = Conclude(
         daemon, std::move(job), {.wait = false, .json = json, .name = &v1::Job::modal_model});
     if (ended.ok()) continue;
-    if (!first_error.ok()) (void)Report(first_error);
+    if (!first_error.ok()) (void)Report(first_error, HasEveryOption);
     first_error = ended;
   }
   return first_error;

@@ -145,18 +145,22 @@ absl::StatusOr<Imported> ImportStored(const client::Client& daemon, const Import
 
 }  // namespace
 
-absl::Status ExportModel(const client::Client& daemon, const ExportOptions& options) {
+absl::Status ExportModel(const client::Client& daemon, const ExportOptions& options, bool json) {
   ASSIGN_OR_RETURN(const auto name, FindModel(daemon, options.model));
   const std::string format = FormatOf(options.file, options.format);
   ASSIGN_OR_RETURN(const auto material, MaterialFor(format, options.material));
   const std::string file = options.file.empty()
                                ? absl::StrCat(absl::StripPrefix(name, "modalModels/"), ".", format)
                                : options.file;
-  absl::Status status = IsGltf(format)    ? WriteGltf(daemon, name, file, material, format == "glb")
-                        : format == "npz" ? WriteNpz(daemon, name, file)
-                                          : daemon.ExportModalModelFile(name, file);
-  if (status.ok()) absl::PrintF("%s\n", file);
-  return status;
+  RETURN_IF_ERROR(IsGltf(format)    ? WriteGltf(daemon, name, file, material, format == "glb")
+                  : format == "npz" ? WriteNpz(daemon, name, file)
+                                    : daemon.ExportModalModelFile(name, file));
+  if (json) {
+    PrintJson({{"file", file}, {"format", format}, {"modal_model", name}});
+  } else {
+    absl::PrintF("%s\n", file);
+  }
+  return absl::OkStatus();
 }
 
 absl::Status ImportModel(const client::Client& daemon, const ImportOptions& options, bool json) {

@@ -16,6 +16,7 @@
 #include "client_sdk/cli/commands.h"
 #include "client_sdk/cli/material_options.h"
 #include "client_sdk/cli/quantity.h"
+#include "client_sdk/cli/value_options.h"
 #include "proto/cpp/mesh_format.h"
 #include "proto/cpp/parsed_option.h"
 #include "proto/cpp/settings_options.h"
@@ -60,8 +61,8 @@ void AddModelCreate(CLI::App& app, Program& program) {
   create.add_option("--format", options->format,
                     absl::StrCat(MeshFormatNames(), " [the file's suffix]"));
   create.add_option("--label", options->label, "name for people of a single file [its name]");
-  create.add_option("--size", options->size,
-                    "size it is meant to sound with, relative to the file");
+  TakeSize(*create.add_option("--size", options->size,
+                              "size it is meant to sound with, relative to the file"));
   AddBand(create, options);
   create.add_flag("--without-transfer", options->without_transfer,
                   "Do not compute how the modes radiate afterwards");
@@ -69,7 +70,8 @@ void AddModelCreate(CLI::App& app, Program& program) {
                   "first a model of few nodes, under the same name, to sound with meanwhile");
   create.add_option("--priority", options->priority, "-100 to 100: higher ones start first");
   create.add_option("--time-limit", options->time_limit_s, "give up after this many seconds");
-  create.add_option("--memory-limit-mib", options->memory_limit_mib, "memory that it may take");
+  create.add_option("--memory-limit-mib", options->memory_limit_mib, "memory that it may take")
+      ->check(CLI::Range(uint64_t{0}, uint64_t{1} << 40U));
   options->wait = isatty(STDERR_FILENO) != 0;
   create.add_flag("--wait,!--no-wait", options->wait,
                   "show the progress and end with the jobs [on a terminal]");
@@ -220,7 +222,11 @@ void AddModelExport(CLI::App& app, Program& program) {
   AddFileFormat(command, options->format);
   AddMaterial(command, options->material);
   command.callback([&program, options] {
-    program.command = [&program, options] { return ExportModel(*program.Daemon(), *options); };
+    const std::string wrong = WhyNotWritten(options->file, {".model", ".glb", ".gltf", ".npz"});
+    if (options->format.empty() && !wrong.empty()) throw CLI::ValidationError("--out", wrong);
+    program.command = [&program, options] {
+      return ExportModel(*program.Daemon(), *options, program.json);
+    };
   });
 }
 

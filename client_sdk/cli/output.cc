@@ -1,20 +1,44 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "client_sdk/cli/output.h"
 
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <cstdio>
+#include <cstring>
 
+#include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
-#include "client_sdk/cli/message_json.h"
 #include "proto/cpp/error_reason.h"
 
 namespace carillon::cli {
 
-int Report(const absl::Status& status) {
+void OpenStandardStreams() {
+  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (fcntl(stream, F_GETFD) >= 0) continue;
+    // The lowest free number is that of the stream. A file that is open for reading refuses output.
+    (void)open("/dev/null", stream == STDOUT_FILENO ? O_RDONLY : O_RDWR);
+  }
+}
+
+absl::Status FlushOutput() {
+  const bool flushed = std::fflush(stdout) == 0;
+  const char* const why = flushed ? "an earlier write failed" : std::strerror(errno);
+  if (flushed && std::ferror(stdout) == 0) return absl::OkStatus();
+  return Refusal(absl::StatusCode::kInternal, "OUTPUT_NOT_WRITABLE",
+                 absl::StrCat("stdout: ", why,
+                              "; a part of the output is lost: send it to a file or a pipe that "
+                              "takes it"));
+}
+
+int Report(const absl::Status& status, const HasOption& has_option) {
   if (status.ok()) return kDone;
   const v1::ErrorInfo error = ToErrorInfo(status);
-  std::string message = error.message();
+  std::string message = InCommandWords(error.message(), has_option);
   std::ranges::replace(message, '\n', ' ');
   absl::FPrintF(stderr, "carillon: %s: %s\n", error.reason(), message);
   for (const v1::Remedy& remedy : error.remedies()) {
@@ -25,6 +49,15 @@ int Report(const absl::Status& status) {
 
 void PrintJson(const google::protobuf::Message& message) {
   absl::PrintF("%s\n", MessageJson(message));
+}
+
+void PrintJson(std::initializer_list<JsonMember> members) {
+  absl::PrintF("%s\n", MembersJson(members));
+}
+
+std::string Counted(uint64_t count, absl::string_view noun) {
+  const char* const ending = count == 1 ? "" : absl::EndsWith(noun, "sh") ? "es" : "s";
+  return absl::StrCat(count, " ", noun, ending);
 }
 
 std::string Decibels(double amplitude) {

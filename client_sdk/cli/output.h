@@ -3,20 +3,39 @@
 
 #include <google/protobuf/message.h>
 
+#include <cstdint>
+#include <initializer_list>
 #include <string>
 
 #include "absl/status/status.h"
+#include "absl/strings/string_view.h"
+#include "client_sdk/cli/command_words.h"
+#include "client_sdk/cli/message_json.h"
 
 namespace carillon::cli {
 
 /// Exit codes of the program.
 enum ExitCode { kDone = 0, kRefused = 1, kUsage = 2, kNoServer = 3 };
 
-/// Prints "carillon: REASON: message" to stderr if `status` is an error. Returns the exit code.
-int Report(const absl::Status& status);
+/// Opens the standard streams that are closed, because files and sockets opened later would take
+/// their numbers. Writing to a stdout that was closed fails.
+void OpenStandardStreams();
+
+/// Flushes stdout. Errors: Internal (OUTPUT_NOT_WRITABLE: a part of the output is lost).
+absl::Status FlushOutput();
+
+/// Prints "carillon: REASON: message" to stderr if `status` is an error, with the options of the
+/// command in the message (see InCommandWords). Returns the exit code.
+int Report(const absl::Status& status, const HasOption& has_option);
 
 /// Prints `message` to stdout as one line of JSON; see MessageJson.
 void PrintJson(const google::protobuf::Message& message);
+
+/// Prints an object with the members to stdout as one line of JSON; see MembersJson.
+void PrintJson(std::initializer_list<JsonMember> members);
+
+/// Returns a number with its noun, such as "1 mode", "2 modes" or "0 meshes".
+std::string Counted(uint64_t count, absl::string_view noun);
 
 /// Returns a linear amplitude (full scale is 1) as text, such as "-6.0 dBFS" or "silence".
 std::string Decibels(double amplitude);

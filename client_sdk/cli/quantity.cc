@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "client_sdk/cli/quantity.h"
 
+#include <cmath>
+
+#include "absl/strings/numbers.h"
+#include "absl/strings/strip.h"
 #include "absl/time/time.h"
 
 namespace carillon::cli {
@@ -14,6 +18,16 @@ std::optional<int64_t> ParseTimeUnixMs(const std::string& text) {
     }
   }
   return std::nullopt;
+}
+
+std::optional<double> ParseGain(const std::string& text) {
+  absl::string_view number = text;
+  constexpr double kMostGain = 1e6;
+  const bool decibels = absl::ConsumeSuffix(&number, "dB");
+  double value = 0;
+  if (!absl::SimpleAtod(number, &value) || !std::isfinite(value)) return std::nullopt;
+  const double gain = decibels ? std::pow(10, value / 20) : value;
+  return gain >= 0 && gain <= kMostGain ? std::optional<double>(gain) : std::nullopt;
 }
 
 }  // namespace carillon::cli

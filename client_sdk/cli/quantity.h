@@ -12,4 +12,8 @@ namespace carillon::cli {
 /// ("2026-11-21T14:30:05Z").
 std::optional<int64_t> ParseTimeUnixMs(const std::string& text);
 
+/// Parses a gain and returns it as a factor. The text is a factor from 0 to 1e6, such as "0.5",
+/// or decibels, such as "-6dB".
+std::optional<double> ParseGain(const std::string& text);
+
 }  // namespace carillon::cli

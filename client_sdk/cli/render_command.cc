@@ -27,11 +27,11 @@ constexpr double kLeastFullScale_pa = 0.00002;
 /// Prints what the user should know about the sound.
 void PrintFindings(const RenderOptions& options, const v1::RenderSummary& summary, std::FILE* out) {
   if (summary.paper_coupling_object_count() > 0) {
-    absl::FPrintF(out,
-                  "%d objects sound by the paper's coupling, whose levels are not physical: their "
-                  "models have no transfer for their material; `carillon transfer create` makes "
-                  "one\n",
-                  summary.paper_coupling_object_count());
+    absl::FPrintF(
+        out,
+        "%s sounding by the paper's coupling, whose levels are not physical, for lack of a "
+        "transfer for the material; `carillon transfer create` makes one\n",
+        Counted(summary.paper_coupling_object_count(), "object"));
   }
   const double written = summary.peak() * options.gain;
   if (!options.normalize && written > 0 && written < kFaint) {
@@ -49,32 +49,32 @@ void PrintSummary(const RenderOptions& options, const v1::RenderSummary& summary
   const auto loudness = [is_short](bool present, double lufs) {
     return is_short ? "too short to measure" : Loudness(present, lufs);
   };
-  absl::FPrintF(out, "%s: %.2f s, %d impulses, peak %s\n", options.out,
+  absl::FPrintF(out, "%s: %.2f s, %s, peak %s\n", options.out,
                 static_cast<double>(summary.frame_count()) / sample_rate_hz,
-                summary.accepted_count(), Decibels(summary.peak()));
+                Counted(summary.accepted_count(), "impulse"), Decibels(summary.peak()));
   absl::FPrintF(out,
                 "%.3g Pa (full scale is %.4g Pa), true peak %s, whole sound %s, loudest 0.4 s %s\n",
                 summary.peak_pa(), summary.full_scale_pa(), Decibels(summary.true_peak()),
                 loudness(summary.has_integrated_lufs(), summary.integrated_lufs()),
                 loudness(summary.has_loudest_momentary_lufs(), summary.loudest_momentary_lufs()));
   if (summary.rejected_count() > 0) {
-    absl::FPrintF(out, "%d impulses could not be used; the newest: %s: %s\n",
-                  summary.rejected_count(), summary.last_rejection().reason(),
+    absl::FPrintF(out, "%s could not be used; the newest: %s: %s\n",
+                  Counted(summary.rejected_count(), "impulse"), summary.last_rejection().reason(),
                   summary.last_rejection().message());
   }
   const v1::ContactFindings& findings = summary.findings();
   if (findings.distant_point_count() > 0) {
-    absl::FPrintF(out, "%d points of contact are far from their object's surface, up to %.3g m\n",
-                  findings.distant_point_count(), findings.largest_distance_m());
+    absl::FPrintF(out, "%s of contact far from the surface of the object, up to %.3g m\n",
+                  Counted(findings.distant_point_count(), "point"), findings.largest_distance_m());
   }
   if (findings.zero_impulse_count() > 0) {
-    absl::FPrintF(out, "%d contacts have no impulse\n", findings.zero_impulse_count());
+    absl::FPrintF(out, "%s without an impulse\n",
+                  Counted(findings.zero_impulse_count(), "contact"));
   }
   PrintFindings(options, summary, out);
   if (summary.limited_frame_count() > 0) {
-    absl::FPrintF(out,
-                  "the limiter worked in %d frames; --full-scale-pa above %.4g would avoid it\n",
-                  summary.limited_frame_count(), summary.peak_pa() * kHeadroom);
+    absl::FPrintF(out, "the limiter worked in %s; --full-scale-pa above %.4g would avoid it\n",
+                  Counted(summary.limited_frame_count(), "frame"), summary.peak_pa() * kHeadroom);
   }
 }
 
@@ -87,9 +87,9 @@ void PrintFile(const RenderOptions& options, const RenderedFile& file) {
   }
   if (file.clipped_count() > 0) {
     absl::FPrintF(out,
-                  "%d samples were clipped; a --gain up to %.3g, --normalize or --bits 32 would "
+                  "clipped: %s; a --gain up to %.3g, --normalize or --bits 32 would "
                   "avoid it\n",
-                  file.clipped_count(), options.gain / file.peak());
+                  Counted(file.clipped_count(), "sample"), options.gain / file.peak());
   }
 }
 
@@ -112,7 +112,13 @@ std::optional<double> FinerFullScale(const RenderOptions& options,
   return std::max(summary.peak_pa() * kAbovePeak, kLeastFullScale_pa);
 }
 
-absl::Status EmptyTrace(const std::string& path) {
+absl::Status CheckHasContacts(const std::string& path, const v1::RenderSummary& summary) {
+  const v1::ContactFindings& findings = summary.findings();
+  const uint64_t contact_count = summary.accepted_count() + summary.rejected_count() +
+                                 findings.load_count() + findings.zero_impulse_count() +
+                                 findings.too_large_impulse_count();
+  // Sustained forces are not counted, but heard.
+  if (contact_count > 0 || summary.peak() > 0) return absl::OkStatus();
   return Refusal(absl::StatusCode::kInvalidArgument, "TRACE_EMPTY",
                  absl::StrCat(path,
                               ": holds no contact, so there is nothing to hear; "
@@ -144,8 +150,8 @@ absl::Status Render(const client::Client& daemon, const RenderOptions& options, 
   RETURN_IF_ERROR(file.status());
   if (!summary.ok()) return summary.status();
   RETURN_IF_ERROR(file.Finish());
-  if (!file.begun()) return EmptyTrace(options.trace);
-  if (json && options.out != "-") {
+  RETURN_IF_ERROR(CheckHasContacts(options.trace, *summary));
+  if (json) {
     PrintJson(*summary);
   } else {
     PrintSummary(options, *summary, options.sample_rate_hz);

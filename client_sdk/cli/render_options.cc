@@ -7,10 +7,13 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <thread>
 
 #include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
 #include "client_sdk/cli/commands.h"
+#include "client_sdk/cli/value_options.h"
 
 namespace carillon::cli {
 namespace {
@@ -29,8 +32,8 @@ std::optional<Shard> ParseShard(const std::string& text) {
 }
 
 void AddSound(CLI::App& render, RenderOptions& options) {
-  render.add_option("--gain", options.gain, "The factor of every sample")
-      ->check(CLI::Range(0.0, 1e6));
+  ReadGain(*render.add_option("--gain", options.gain,
+                              absl::StrCat("The gain of every sample: ", kGainForm)));
   render.add_option("--full-scale-pa", options.full_scale_pa,
                     "The pressure of a sample of full scale, Pa [200]");
   render.add_flag(
@@ -70,6 +73,32 @@ void AddFolder(CLI::App& render, RenderOptions& options) {
       });
 }
 
+/// Whether the path is a folder, as far as this user can see.
+bool IsFolder(const std::string& path) {
+  std::error_code ignored;
+  return std::filesystem::is_directory(path, ignored);
+}
+
+std::string WhyNoFolder(const std::string& out) {
+  std::error_code ignored;
+  if (out != "-" && (!std::filesystem::exists(out, ignored) || IsFolder(out))) return "";
+  return absl::StrCat("\"", out, "\" must be a folder, because a folder of traces is rendered");
+}
+
+/// Refuses options that the command would not follow for the trace, or the folder, that is named.
+void CheckUse(const CLI::App& render, const RenderOptions& options) {
+  const bool is_folder = IsFolder(options.trace);
+  for (const char* option : {"--stems", "--workers", "--shard"}) {
+    if (is_folder || render.count(option) == 0) continue;
+    throw CLI::ValidationError(option,
+                               absl::StrCat("is for a folder of traces, and \"", options.trace,
+                                            "\" is none; name a folder, or leave the option out"));
+  }
+  const std::string wrong =
+      is_folder ? WhyNoFolder(options.out) : WhyNotWritten(options.out, {".wav", ".wave"});
+  if (!wrong.empty()) throw CLI::ValidationError("--out", wrong);
+}
+
 }  // namespace
 
 void AddRender(CLI::App& app, Program& program) {
@@ -85,11 +114,12 @@ void AddRender(CLI::App& app, Program& program) {
       ->required();
   AddSound(render, *options);
   AddFolder(render, *options);
-  render.callback([&program, options] {
+  render.callback([&program, &render, options] {
+    CheckUse(render, *options);
+    CheckJson(program, options->out);
     program.command = [&program, options] {
-      return std::filesystem::is_directory(options->trace)
-                 ? RenderClips(*program.Daemon(), *options, program.json)
-                 : Render(*program.Daemon(), *options, program.json);
+      return IsFolder(options->trace) ? RenderClips(*program.Daemon(), *options, program.json)
+                                      : Render(*program.Daemon(), *options, program.json);
     };
   });
 }

@@ -38,7 +38,6 @@ class RenderedFile {
   /// Completes the file. Errors: Internal (OUTPUT_NOT_WRITABLE).
   absl::Status Finish();
 
-  bool begun() const { return file_.has_value(); }
   const absl::Status& status() const { return status_; }
   /// The factor by which the samples were multiplied, once the file is complete.
   double factor() const { return factor_; }

@@ -61,7 +61,7 @@ absl::Status StopSound(const client::Client& daemon, const std::string& scene, b
   if (json) {
     PrintJson(stopped);
   } else {
-    absl::PrintF("%d scenes silenced\n", count);
+    absl::PrintF("%s silenced\n", Counted(count, "scene"));
   }
   return absl::OkStatus();
 }
@@ -90,7 +90,7 @@ absl::Status RecordContacts(const client::Client& daemon, const std::string& sce
       take));
   RETURN_IF_ERROR(written);
   if (writer) RETURN_IF_ERROR(writer->Close());
-  absl::FPrintF(stderr, "%s: %d steps\n", out, step_count);
+  absl::FPrintF(stderr, "%s: %s\n", out, Counted(step_count, "step"));
   return absl::OkStatus();
 }
 

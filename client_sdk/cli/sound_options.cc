@@ -2,25 +2,16 @@
 #include "client_sdk/cli/sound_options.h"
 
 #include <CLI/CLI.hpp>
-#include <cmath>
 #include <memory>
 #include <optional>
 #include <string>
 
-#include "absl/strings/numbers.h"
-#include "absl/strings/strip.h"
+#include "absl/strings/str_cat.h"
 #include "client_sdk/cli/commands.h"
+#include "client_sdk/cli/value_options.h"
 
 namespace carillon::cli {
 namespace {
-
-/// Reads "0.5" or "-6dB"; absent: it is neither.
-std::optional<double> ReadGain(absl::string_view text) {
-  const bool decibels = absl::ConsumeSuffix(&text, "dB");
-  double value = 0;
-  if (!absl::SimpleAtod(text, &value) || !std::isfinite(value)) return std::nullopt;
-  return decibels ? std::pow(10, value / 20) : value;
-}
 
 /// Adds a flag that sets `target`, which is absent without it, to `value`.
 CLI::Option* AddSwitch(CLI::App& app, const std::string& name, const std::string& text,
@@ -37,15 +28,7 @@ void AddVolume(CLI::App& app, Program& program) {
       *app.add_subcommand("volume", "Show or change how loud the daemon or one of its scenes is");
   CLI::Option* const scene = volume.add_option("--scene", options->scene,
                                                "The name or the number of a scene [the output]");
-  volume
-      .add_option_function<std::string>(
-          "gain,--gain",
-          [options](const std::string& text) {
-            options->gain = ReadGain(text);
-            if (!options->gain) throw CLI::ValidationError("--gain", "give a factor or decibels");
-          },
-          "The gain: a factor such as 0.5, or decibels: --gain=-6dB")
-      ->type_name("GAIN");
+  ReadGain(*volume.add_option("gain,--gain", options->gain, absl::StrCat("The gain: ", kGainForm)));
   AddSwitch(volume, "mute", "Silence it", options->muted);
   AddSwitch(volume, "unmute", "End that", options->muted, false)->excludes("--mute");
   AddSwitch(volume, "solo", "Let only this scene, and others with this flag, sound of your scenes",

@@ -146,12 +146,13 @@ std::optional<MeasuredStrike> Measure(const client::Client& daemon,
 /// Prints what sounds, and how.
 void PrintStrike(const client::Client& daemon, const v1::SoundingObject& object,
                  const StrikeOptions& options) {
-  const char* by = "their radiated power";
+  const char* by = "the radiated power";
   if (object.radiation() == v1::RADIATION_MODEL_PAPER_COUPLING) by = "the paper's coupling";
   if (object.radiation() == v1::RADIATION_MODEL_MODES_ONLY)
-    by = "their radiated power, without the click";
-  absl::PrintF("%d modes sound, %.2f to %.2f Hz, by %s\n", object.sounding_mode_count(),
-               object.lowest_frequency_hz(), object.highest_frequency_hz(), by);
+    by = "the radiated power, without the click";
+  absl::PrintF("%s: %.2f to %.2f Hz, sounding by %s\n",
+               Counted(object.sounding_mode_count(), "mode"), object.lowest_frequency_hz(),
+               object.highest_frequency_hz(), by);
   if (const auto measured = Measure(daemon, object, options)) {
     absl::PrintF("contact of %.3g ms, peak %.3g Pa at 1 m\n", 1000 * measured->duration_s,
                  measured->peak_pa);

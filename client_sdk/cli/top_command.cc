@@ -63,16 +63,16 @@ std::string Text(const View& view, const std::string& server) {
   const v1::GetMixerResponse& mixer = view.mixer;
   std::string text =
       absl::StrFormat("carillond %s at %s, %s\n", mixer.version(), server, mixer.device());
-  absl::StrAppendFormat(&text, "load %.1f %%, %d modes ring, %d objects, gain %.4g%s\n",
-                        mixer.load() * 100, mixer.active_mode_count(), mixer.object_count(),
-                        mixer.gain(), mixer.muted() ? " muted" : "");
-  absl::StrAppendFormat(&text, "peak %s, %s; limited %d frames, lost %d\n\n",
-                        Decibels(mixer.peak()),
+  absl::StrAppendFormat(&text, "load %.1f %%, %s ringing, %s, gain %.4g%s\n", mixer.load() * 100,
+                        Counted(mixer.active_mode_count(), "mode"),
+                        Counted(mixer.object_count(), "object"), mixer.gain(),
+                        mixer.muted() ? " muted" : "");
+  absl::StrAppendFormat(&text, "peak %s, %s; limited %s, lost %d\n\n", Decibels(mixer.peak()),
                         Loudness(mixer.has_momentary_lufs(), mixer.momentary_lufs()),
-                        mixer.limited_frame_count(), mixer.lost_frame_count());
+                        Counted(mixer.limited_frame_count(), "frame"), mixer.lost_frame_count());
   absl::StrAppendFormat(&text, "%-14s %7s %8s   %s\n", "SCENE", "OBJECTS", "MODES", "PEAK");
   for (const v1::Scene& scene : view.scenes) text += SceneLine(scene);
-  absl::StrAppendFormat(&text, "\n%d jobs wait or run\n", view.jobs.size());
+  absl::StrAppendFormat(&text, "\n%s waiting or running\n", Counted(view.jobs.size(), "job"));
   for (size_t i = 0; i < std::min(view.jobs.size(), kMostJobs); ++i) {
     const v1::Job& job = view.jobs[i];
     absl::StrAppendFormat(&text, "%s  %s  %s\n",

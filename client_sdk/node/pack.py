@@ -4,8 +4,8 @@
 
 Usage: pack.py NODE_MODULES FOLDER
 
-NODE_MODULES has what package-lock.json names; deploy/setup.sh installs it. FOLDER gets the package as a folder named
-carillon, and as an archive that "npm install" takes.
+NODE_MODULES has what package-lock.json names: "npm ci --prefix client_sdk/node" makes client_sdk/node/node_modules.
+FOLDER gets the package as a folder named carillon, and as an archive that "npm install" takes.
 """
 
 import gzip
@@ -18,8 +18,26 @@ import tarfile
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
+GENERATOR = "@grpc/proto-loader/build/bin/proto-loader-gen-types.js"
 # As lib/contract.js loads the files.
 LOADING = ("--keepCase", "--longs=Number", "--enums=String", "--defaults", "--oneofs", "--includeComments")
+
+
+def refuse(text):
+    raise SystemExit(f"pack.py: {text}")
+
+
+def check(modules, package):
+    """Ends the program with the reason if the package cannot be made."""
+    if not (ROOT / "proto/carillon").is_dir():
+        refuse(f"{ROOT} has no proto/carillon; run pack.py in a checkout of the project")
+    if not (modules / GENERATOR).exists():
+        refuse(f"{modules} does not have what package-lock.json names; run \"npm ci --prefix {HERE}\", and name "
+               f"{HERE}/node_modules")
+    if not shutil.which("node"):
+        refuse("there is no program node; install Node 18 or later")
+    if package.exists():
+        refuse(f"{package} is there already; remove it, or name another folder")
 
 
 def make_folder(modules, package):
@@ -30,9 +48,11 @@ def make_folder(modules, package):
         shutil.copy(file, package)
     shutil.copytree(ROOT / "proto/carillon", package / "proto/carillon")
     files = sorted(str(file.relative_to(ROOT / "proto")) for file in (ROOT / "proto/carillon/v1").glob("*.proto"))
-    subprocess.run(["node", modules / "@grpc/proto-loader/build/bin/proto-loader-gen-types.js", *LOADING,
-                    f"--includeDirs={ROOT / 'proto'}", "--grpcLib=@grpc/grpc-js", f"--outDir={package / 'types'}",
-                    *files], check=True, stdout=subprocess.DEVNULL)
+    done = subprocess.run(["node", modules / GENERATOR, *LOADING, f"--includeDirs={ROOT / 'proto'}",
+                           "--grpcLib=@grpc/grpc-js", f"--outDir={package / 'types'}", *files], check=False,
+                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    if done.returncode:
+        refuse(f"{modules / GENERATOR} could not make the types of the messages:\n{done.stdout}")
 
 
 def archive(package, path):
@@ -47,10 +67,16 @@ def archive(package, path):
 
 
 def main():
+    if len(sys.argv) != 3:
+        refuse(__doc__[__doc__.index("Usage"):].strip())
     modules, folder = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2])
+    check(modules, folder / "carillon")
     version = json.loads((HERE / "package.json").read_text())["version"]
-    make_folder(modules, folder / "carillon")
-    archive(folder / "carillon", folder / f"carillon-{version}.tgz")
+    try:
+        make_folder(modules, folder / "carillon")
+        archive(folder / "carillon", folder / f"carillon-{version}.tgz")
+    except OSError as error:
+        refuse(error)
 
 
 if __name__ == "__main__":

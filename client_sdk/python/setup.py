@@ -3,6 +3,7 @@
 protobuf-compiler and protobuf-compiler-grpc), or, where those are missing, by grpcio-tools. A checkout has the contract
 in ../../proto, a source distribution in proto/."""
 
+import importlib.util
 import pathlib
 import shutil
 import subprocess
@@ -22,12 +23,19 @@ def generator():
     plugin = shutil.which("grpc_python_plugin")
     if shutil.which("protoc") and plugin:
         return ["protoc", f"--plugin=protoc-gen-grpc_python={plugin}"]
+    if importlib.util.find_spec("grpc_tools") is None:
+        raise SystemExit("carillon: nothing here generates code from the contract. Install Debian's protobuf-compiler "
+                         "and protobuf-compiler-grpc; or run \"pip install grpcio-tools setuptools wheel\", and give "
+                         "pip --no-build-isolation, so that it finds them.")
     return [sys.executable, "-m", "grpc_tools.protoc"]
 
 
 def generate(folder):
     """Writes carillon/v1 into the folder, with stubs for type checkers."""
     files = sorted((CONTRACT / "carillon/v1").glob("*.proto"))
+    if not files:
+        raise SystemExit(f"carillon: {CONTRACT} has no contract. Build the package from a checkout of the project, or "
+                         "from a source distribution.")
     subprocess.run([*generator(), f"-I{CONTRACT}", f"--python_out={folder}", f"--pyi_out={folder}",
                     f"--grpc_python_out={folder}", *map(str, files)], check=True)
     (pathlib.Path(folder) / "carillon/v1/__init__.py").touch()

@@ -25,7 +25,9 @@ std::optional<double> ParsePositive(absl::string_view text) {
 std::optional<double> ParseShare(const std::string& text) {
   const std::optional<double> number = ParsePositive(absl::StripSuffix(text, "%"));
   if (!number) return std::nullopt;
-  return absl::EndsWith(text, "%") ? *number / 100 : *number;
+  const double share = absl::EndsWith(text, "%") ? *number / 100 : *number;
+  // Who gives 1 means 1 %, and not 100 %.
+  return share < 1 ? std::optional<double>(share) : std::nullopt;
 }
 
 std::optional<Budget> ParseBudget(const std::string& text) {

@@ -8,7 +8,7 @@ namespace carillon {
 
 /// These functions read figures from a command line. They return nullopt if the text is no figure.
 
-/// Reads a share above zero, such as "1%" or "0.01".
+/// Reads a share above zero and below one, such as "1%" or "0.01".
 std::optional<double> ParseShare(const std::string& text);
 
 /// Processor time and memory. Zero means no bound.

@@ -3,8 +3,10 @@
 
 #include <unistd.h>
 
+#include <charconv>
 #include <cstdlib>
 #include <string_view>
+#include <system_error>
 
 namespace carillon {
 namespace {
@@ -35,6 +37,17 @@ std::string ReachableServerAddress() {
   const std::string own = DefaultServerAddress();
   const bool named = !Environment("CARILLON_SERVER").empty();
   return named || exists(own) || !exists(kSystem) ? own : std::string(kSystem);
+}
+
+bool IsServerAddress(const std::string& text) {
+  constexpr int kMostPort = 65535;
+  if (text.starts_with("unix:")) return text.size() > 5;
+  const size_t colon = text.rfind(':');
+  if (colon == std::string::npos || colon == 0) return false;
+  int port = 0;
+  const char* const end = text.data() + text.size();
+  const auto read = std::from_chars(text.data() + colon + 1, end, port);
+  return read.ec == std::errc() && read.ptr == end && port >= 1 && port <= kMostPort;
 }
 
 bool IsOnThisMachine(const std::string& address) {

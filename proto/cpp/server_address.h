@@ -14,6 +14,9 @@ std::string DefaultServerAddress();
 /// that has no socket and the daemon of systemd has one, "unix:/run/carillon/carillond.sock".
 std::string ReachableServerAddress();
 
+/// Returns true if the text is "unix:PATH" or ends with a port, as in "HOST:PORT".
+bool IsServerAddress(const std::string& text);
+
 /// Returns true if no other machine can read data that is sent to the address.
 bool IsOnThisMachine(const std::string& address);
 

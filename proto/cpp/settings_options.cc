@@ -16,6 +16,9 @@ namespace {
 
 using Settings = v1::DecompositionSettings;
 
+constexpr char kShareForm[] =
+    "above zero and below 100%, such as 1% or 0.01; a number without % is a fraction: 1 is 100%";
+
 /// Adds an option that takes one of some words, each of which stands for a value.
 template <class T, class Take>
 void AddChoice(CLI::App& app, const std::string& name, const std::map<std::string, T>& values,
@@ -74,7 +77,7 @@ void AddMesh(CLI::App& app, Settings& settings) {
          "about this many corner nodes [decided from the surface]")
       ->check(CLI::Range(0, 100'000'000))
       ->group(kSettingsGroup);
-  AddParsed(app, "--accuracy", ParseShare, "above zero, such as 1% or 0.01",
+  AddParsed(app, "--accuracy", ParseShare, kShareForm,
             "mesh so finely that no mode is estimated to be off by more, such as 1% or 0.01",
             [&](double share) { settings.mutable_mesh()->set_accuracy(share); })
       ->group(kSettingsGroup);
@@ -102,7 +105,7 @@ void AddModes(CLI::App& app, Settings& settings) {
          "bodies of more than 5000 modes")
       ->check(CLI::Range(0, kMaxKeptModeCount))
       ->group(kSettingsGroup);
-  AddParsed(app, "--max-frequency-error", ParseShare, "above zero, such as 2% or 0.02",
+  AddParsed(app, "--max-frequency-error", ParseShare, kShareForm,
             "leave out modes whose frequency is estimated to be off by more, such as 2% or 0.02",
             [&](double share) { settings.set_max_frequency_error(share); })
       ->group(kSettingsGroup);

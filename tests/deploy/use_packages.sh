@@ -72,7 +72,7 @@ start_daemon
 carillon status | grep -q 44100 || fail "carillond does not read $settings"
 [[ $(carillon model list | wc -l) == 1 ]] || fail "the upgrade lost the model"
 hear_a_strike
-carillon model create bar.obj --label again --material bell_bronze --accuracy 5 --wait
+carillon model create bar.obj --label again --material bell_bronze --accuracy 5% --wait
 stop_daemon
 
 # Each page of ten minutes is typed as printed, in a folder of its own.

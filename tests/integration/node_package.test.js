@@ -181,6 +181,31 @@ test('a stream counts, and tells what was wrong', async () => {
   });
 });
 
+test('a material and settings that the daemon told may be given back', async () => {
+  const found = await c.model(model.name);
+  assert.ok('_poisson_ratio' in found.material);
+  const again = await c.createModel(BAR, { material: found.material, settings: found.summary.header.settings });
+  assert.equal(again.modeCount, model.modeCount);
+  await withScene(async (scene) => assert.equal((await scene.add(found)).handle, 1));
+});
+
+test('contacts that come late are told once', async () => withScene(async (scene) => {
+  const told = [];
+  const listener = (warning) => told.push(warning.message);
+  process.on('warning', listener);
+  await scene.add(model, { handle: 1 });
+  const stream = scene.stream({ step: 1 / 240, delay: 0 });
+  await stream.step(0);
+  await (await c.listen()).take(0.1);
+  await stream.step(0, { impulses: [{ object: 1, ...STRIKE }] });
+  await stream.close();
+  await new Promise(setImmediate);
+  process.off('warning', listener);
+  assert.equal(told.length, 1);
+  assert.match(told[0], /^1 contact was late.*it was 0/);
+  assert.deepEqual([stream.lateCount, stream.remapCount], [1, 0]);
+}));
+
 test('refusals have the reason of the contract', async () => {
   const open = { vertices: [[0, 0, 0], [1, 0, 0], [0, 1, 0]], triangles: [[0, 1, 2]] };
   await assert.rejects(c.createModel(open, { material }), { reason: 'MESH_NOT_CLOSED' });

@@ -141,7 +141,7 @@ class ClipsTest(DaemonTest):
         before = (out / "004.wav").stat().st_mtime_ns
         printed = self.run_ended(self.render(out, "--stems"))
         self.assertIn("3 clips in ", printed.stdout)
-        self.assertIn(f"{CLIP_COUNT - 3} were there", printed.stdout)
+        self.assertIn(f"{CLIP_COUNT - 3} there already", printed.stdout)
         self.assertEqual((out / "004.wav").stat().st_mtime_ns, before)
         self.assertEqual(contents(out), self.expected)
 

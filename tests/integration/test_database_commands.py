@@ -73,7 +73,7 @@ class DatabaseCommandsTest(unittest.TestCase):
         self.assertIn("bar", self.run_command("model", "list", "--tag", "chime"))
         self.assertNotIn("other", self.run_command("model", "list", "--tag", "chime"))
         self.assertIn("other", self.run_command("model", "list", "--label", "THE"))
-        self.assertIn("1 models deleted", self.run_command("db", "collect", "--delete-unpinned"))
+        self.assertIn("1 model deleted", self.run_command("db", "collect", "--delete-unpinned"))
         self.assertEqual(self.stats()["model_count"], 1)
         self.assertIn("bar", self.run_command("model", "list"))
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The C++ client as users get it: installed, found by CMake and pkg-config, and sounding."""
+"""The clients of C++ and C as users get them: installed by the commands of the pages docs/ten_minutes_*.md, found by
+CMake, pkg-config and the compiler, and sounding."""
 
 import os
 import pathlib
@@ -26,14 +27,32 @@ def run(*command, **options):
                           **options)
 
 
+def commands(page, heading):
+    """The indented blocks of a section of a page, which bash runs."""
+    section = re.search(rf"(?ms)^## {heading}$(.*?)^## ", (ROOT / "docs" / page).read_text())[1]
+    return [re.sub("(?m)^    ", "", block) for block in re.findall(r"(?m)(?:^    .*\n)+", section)]
+
+
+INSTALL, FIND = commands("ten_minutes_cpp.md", "Or install from a build")
+COMPILE_C, = commands("ten_minutes_c.md", "Install")
+
+
 class InstalledClientTest(DaemonTest):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
-        cls.prefix = cls.folder / "prefix"
-        run("cmake", "--install", BUILD, "--component", "sdk", "--prefix", cls.prefix)
+        cls.prefix = cls.folder / "carillon"
+        cls.environment = {**os.environ, "HOME": str(cls.folder)}
+        # The folder is a checkout with its build, and the home of its user.
+        (cls.folder / "build").mkdir()
+        (cls.folder / "build/release").symlink_to(BUILD)
+        cls.bash(INSTALL)
         cls.model = cls.client.wait(cls.client.create(
             meshes.bowl(), "obj", material=material_pb2.Material(preset="bell_bronze")))
+
+    @classmethod
+    def bash(cls, text, **options):
+        return run("bash", "-euc", text, cwd=cls.folder, env=cls.environment, **options)
 
     def assert_strikes(self, program):
         """Runs `program`, and listens to the daemon meanwhile."""
@@ -48,16 +67,21 @@ class InstalledClientTest(DaemonTest):
 
     def test_a_project_that_finds_the_package_strikes_a_running_daemon(self):
         build = self.folder / "cmake"
-        run("cmake", "-G", "Ninja", "-S", EXAMPLE, "-B", build, f"-DCMAKE_PREFIX_PATH={self.prefix}")
-        run("cmake", "--build", build)
+        self.bash(f"{FIND}cmake -G Ninja -S {EXAMPLE} -B {build}\ncmake --build {build}")
         self.assert_strikes(build / "strike")
 
     def test_pkg_config_says_how_to_compile_and_link(self):
-        flags = run("pkg-config", "--cflags", "--libs", "carillon-client",
-                    env={**os.environ, "PKG_CONFIG_PATH": str(next(self.prefix.glob("lib*/**/pkgconfig")))})
+        flags = self.bash(f"{FIND}pkg-config --cflags --libs carillon-client")
         program = self.folder / "strike"
         run("c++", "-std=c++20", EXAMPLE / "main.cc", "-o", program, *shlex.split(flags.stdout))
         self.assert_strikes(program)
+
+    def test_a_program_in_c_strikes_a_running_daemon(self):
+        page = (ROOT / "docs/ten_minutes_c.md").read_text()
+        (self.folder / "strike.c").write_text(re.search(r"(?ms)^```c\n(.*?)^```$", page)[1])
+        (self.folder / "bowl.obj").write_bytes(meshes.bowl())
+        said = self.bash(f"{COMPILE_C}CARILLON_SERVER={self.daemon.server} ./strike bowl.obj </dev/null")
+        self.assertEqual(said.stdout, "strikes sounded: 1\n")
 
     def test_an_older_minor_version_is_not_taken_for_this_one(self):
         project = self.folder / "older"

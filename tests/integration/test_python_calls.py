@@ -8,6 +8,7 @@ import numpy
 
 import carillon
 import meshes
+from carillon.v1 import audio_service_pb2
 from daemon import DaemonTest
 
 BAR = meshes.box(meshes.BAR_SIZE)
@@ -100,6 +101,80 @@ class CallsTest(DaemonTest):
                                                        durations=DURATION_S))
             sounds.append(self.c.render(trace, normalize=True, tail_s=0.3))
         numpy.testing.assert_allclose(sounds[1].samples, sounds[0].samples, atol=1e-4)
+
+    def test_a_trace_sounds_as_its_stream_but_for_the_scheduling_delay(self):
+        step_s, hit = 1 / 240, 6
+        for kind, is_sent, blow_s in (
+                # A blow is over one step after it, and then sounds. One after a gap is a blow by itself.
+                ("contacts", lambda number: True, (hit + 1) * step_s),
+                ("contacts", lambda number: number in (0, hit), hit * step_s),
+                ("impulses", lambda number: True, hit * step_s)):
+            with self.subTest(kind=kind, blow_s=blow_s):
+                sent = getattr(carillon, kind.capitalize())(1, POINT, IMPULSE, durations=DURATION_S)
+                steps = [(number * step_s, {kind: sent} if number == hit else {})
+                         for number in range(12) if is_sent(number)]
+                offline, live = self.blow_offline_s(steps, step_s), self.blow_live_s(steps, step_s)
+                self.assertAlmostEqual(offline, blow_s, delta=1e-4)
+                self.assertAlmostEqual(live, blow_s, delta=1e-4)
+
+    def blow_offline_s(self, steps, step_s):
+        """When the blow of the steps sounds in a rendering, on the simulation's clock."""
+        trace = carillon.Trace(step_s)
+        trace.add(self.model, handle=1)
+        for time_s, content in steps:
+            trace.step(time_s, **content)
+        blow, = self.c.render(trace, tail_s=0.1, tell_blows=True).blows
+        return blow.time_s
+
+    def blow_live_s(self, steps, step_s):
+        """The same of a stream, without the delay that it states."""
+        with self.c.scene() as scene:
+            scene.add(self.model, handle=1)
+            answers = self.c.audio_stub.Listen(audio_service_pb2.ListenRequest(scene=scene.name))
+            with self.c.cancellable(answers):
+                rate_hz = next(answers).format.sample_rate_hz
+                # The delay lets all steps come at once.
+                with scene.stream(step_s, delay=0.5) as stream:
+                    for time_s, content in steps:
+                        stream.step(time_s, **content)
+                for answer in answers:
+                    samples = numpy.frombuffer(answer.block.samples, "<f4")
+                    if samples.any():
+                        break
+        begin_frame = answer.block.first_frame + int(numpy.flatnonzero(samples)[0])
+        # The pulse begins half a duration before the time of the blow.
+        return (begin_frame - stream.report.first_frame) / rate_hz - 0.5 + DURATION_S / 2
+
+    def test_contacts_that_come_late_are_told_once(self):
+        with self.c.scene() as scene:
+            scene.add(self.model, handle=1)
+            with self.assertWarnsRegex(carillon.ContactWarning, "^1 contact was late.*it was 0") as told:
+                with scene.stream(step=1 / 240, delay=0) as stream:
+                    stream.step(0.0)
+                    self.c.listen(0.1)
+                    stream.step(0.0, impulses=carillon.Impulses(1, POINT, IMPULSE, durations=DURATION_S))
+        self.assertEqual(len(told.warnings), 1)
+        self.assertEqual((stream.late_count, stream.remap_count), (1, 0))
+
+    def test_models_jobs_and_objects_of_asyncio_are_awaited(self):
+        async def use():
+            async with carillon.aio.connect(self.daemon.server) as c, await c.scene() as scene:
+                job = await c.create_job(BAR, meshes.MATERIAL)
+                model = await job.wait()
+                bar, other = await scene.add_all([model, {"model": model, "handle": 7}])
+                await other.update(gain=0.5)
+                await bar.strike(POINT, IMPULSE, DURATION_S)
+                await other.remove()
+                trace = carillon.Trace()
+                trace.step(0.0, impulses=carillon.Impulses(trace.add(model), POINT, IMPULSE, durations=DURATION_S))
+                return ((await job.refresh()).state, await model.frequencies(), (await c.render(trace)).peak,
+                        (await model.render_strike(POINT, IMPULSE, duration=DURATION_S)).peak,
+                        [item.handle for item in await scene.objects()])
+
+        state, frequencies, *peaks, handles = asyncio.run(use())
+        self.assertEqual((state, handles), ("succeeded", [1]))
+        numpy.testing.assert_array_equal(frequencies, self.model.frequencies())
+        self.assertEqual(*peaks)
 
     def test_no_transfer_means_no_decay_by_radiation(self):
         numpy.testing.assert_array_equal(self.model.radiation_decays(), numpy.zeros(self.model.mode_count))

@@ -294,7 +294,7 @@ class ContactsTest(PackageTest):
 
     def test_findings_tell_of_points_away_from_the_surface(self):
         far = {"contacts": carillon.Contacts(1, [(0, 0, 1)], [IMPULSE])}
-        with self.assertWarnsRegex(carillon.ContactWarning, r"1 contacts lie up to 0\.99 m away"):
+        with self.assertWarnsRegex(carillon.ContactWarning, r"1 contact lies up to 0\.99 m away"):
             findings = self.rendered((0.0, far), (0.01, {})).summary.findings
         self.assertEqual((findings.distant_point_count, findings.blow_count), (1, 1))
         self.assertAlmostEqual(findings.largest_distance_m, 0.99, delta=1e-6)
@@ -382,7 +382,7 @@ class ValuesTest(unittest.TestCase):
     def test_columns_that_do_not_fit_are_refused_before_they_are_sent(self):
         with self.assertRaisesRegex(ValueError, "must be N x 3"):
             carillon.contacts.make_step(0, contacts=carillon.Contacts(1, [(0, 0)], [(0, 0)]))
-        with self.assertRaisesRegex(ValueError, "2 points and 1 impulses"):
+        with self.assertRaisesRegex(ValueError, "points has 2 rows and impulses has 1"):
             carillon.contacts.make_step(0, impulses=carillon.Impulses(1, [(0, 0, 0)] * 2, [(0, 0, 1)]))
 
     def test_time_does_not_go_back_in_a_trace(self):

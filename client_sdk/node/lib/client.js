@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 'use strict';
 
+const util = require('util');
 const { defaultServer } = require('./address');
-const { given, toPose } = require('./contacts');
+const { choice, refuseNoMessage, refuseUnknown } = require('./checks');
+const { frameInWords, given, toPose } = require('./contacts');
 const { services } = require('./contract');
 const { channelCredentials, tokenInterceptors } = require('./credentials');
 const { CarillonError, fromCall, fromInfo } = require('./errors');
@@ -12,10 +14,15 @@ const { Model } = require('./models');
 const { Scene } = require('./scenes');
 const { Sound, samplesOf, samplesOfIntegers } = require('./sound');
 const { Trace } = require('./traces');
+const { warnOfContacts } = require('./warnings');
+
+const JOB_STATES = ['queued', 'running', 'succeeded', 'failed', 'cancelled'];
 
 /** The fields of ListJobsRequest and WatchJobsRequest for states such as 'failed'. */
-function jobFilter({ states = [], label_contains = '' }) {
-  return { states: states.map((state) => `JOB_STATE_${state.toUpperCase()}`), label_contains };
+function jobFilter(filters) {
+  refuseUnknown(filters, ['states', 'label_contains'], 'jobs');
+  const { states = [], label_contains = '' } = filters;
+  return { states: states.map((state) => choice(state, JOB_STATES, 'JOB_STATE_', 'an entry of states')), label_contains };
 }
 
 const PIECE_BYTES = 1 << 20;
@@ -26,6 +33,7 @@ const PIECE_BYTES = 1 << 20;
  * (default: $CARILLON_TOKEN), or by the PEM files `tlsCertificate` and `tlsKey`.
  */
 function connect(server, options = {}) {
+  refuseUnknown(options, ['tlsRoots', 'token', 'tlsCertificate', 'tlsKey'], 'connect');
   return new Client(server ?? defaultServer(), options);
 }
 
@@ -100,11 +108,12 @@ class Client {
    * Returns the model of a mesh, which is computed if the daemon does not have it. `request` has other fields of
    * CreateModalModelRequest, such as size, settings, max_frequency_hz or priority.
    */
-  async createModel(mesh, { material, label, onProgress = () => {}, ...request }) {
+  async createModel(mesh, { material, label, onProgress = () => {}, ...request } = {}) {
+    const own = { ...request, material: toMaterial(material) };
+    refuseNoMessage(own, 'CreateModalModelRequest', 'createModel', ['label', 'onProgress']);
     const file = await toMeshFile(mesh);
-    const { job } = await this.call('ModalModelService', 'CreateModalModel', { ...request,
-      mesh_digest: await this.uploadFile(file), mesh_format: file.format, material: toMaterial(material),
-      label: label ?? file.label });
+    const { job } = await this.call('ModalModelService', 'CreateModalModel', { ...own,
+      mesh_digest: await this.uploadFile(file), mesh_format: file.format, label: label ?? file.label });
     return this.model((await this.watch(job, onProgress)).modal_model, material);
   }
 
@@ -149,6 +158,7 @@ class Client {
 
   /** Yields the models that match, newest first; filters are fields of ListModalModelsRequest. */
   async* models(filters = {}) {
+    refuseNoMessage(filters, 'ListModalModelsRequest', 'models');
     for (let page_token = ''; ;) {
       const page = await this.call('ModalModelService', 'ListModalModels', { ...filters, page_token });
       for (const summary of page.modal_models) yield new Model(this, summary, summary.material ?? undefined);
@@ -158,7 +168,9 @@ class Client {
   }
 
   /** Changes the linear gain of the daemon's output, or mutes it, without a click. Returns both. */
-  setVolume({ gain, muted }) {
+  setVolume(volume) {
+    refuseUnknown(volume, ['gain', 'muted'], 'setVolume');
+    const { gain, muted } = volume;
     return this.call('AudioService', 'UpdateMixer', { ...given('gain', gain), ...given('muted', muted) });
   }
 
@@ -171,9 +183,12 @@ class Client {
    * Makes an empty scene. It ends by itself a minute after its clients, unless `keep` is true. With an `id`, a scene that
    * you made before with this id and the same settings is returned as it is, and its `existing` is true.
    */
-  async createScene({ hearing, listener, gain, keep = false, id } = {}) {
-    const request = { ...given('hearing', hearing), ...given('listener', toPose(listener)), ...given('gain', gain), keep,
-      ...given('id', id) };
+  async createScene(settings = {}) {
+    refuseUnknown(settings, ['hearing', 'listener', 'gain', 'keep', 'id'], 'createScene');
+    const { hearing, listener, gain, keep = false, id } = settings;
+    if (hearing) refuseNoMessage(hearing, 'Hearing', 'hearing');
+    const request = { ...given('hearing', hearing), ...given('listener', toPose(listener, 'listener')),
+      ...given('gain', gain), keep, ...given('id', id) };
     const made = await this.call('SceneService', 'CreateScene', request);
     return new Scene(this, made.name, made.existing);
   }
@@ -188,10 +203,11 @@ class Client {
    * CarillonError if a contact is rejected.
    */
   async render(trace, settings = {}) {
-    const records = (trace instanceof Trace ? trace : await Trace.read(trace)).records();
+    refuseNoMessage(settings, 'RenderSettings', 'render');
+    const whole = trace instanceof Trace ? trace : await Trace.read(trace);
     const stream = this.stub('AudioService').Render();
     stream.write({ settings });
-    for (const record of records) stream.write({ record });
+    for (const record of whole.records()) stream.write({ record });
     stream.end();
     const pieces = [];
     const blows = [];
@@ -204,6 +220,7 @@ class Client {
       else summary = answer.summary;
     }
     if (summary.rejected_count) throw fromInfo(summary.last_rejection);
+    warnOfContacts(summary.findings, frameInWords(whole.header.frame));
     return new Sound(samplesOf(pieces), format.sample_rate_hz, format.channel_count, summary, blows);
   }
 
@@ -212,9 +229,14 @@ class Client {
    * block_frame_count and encoding.
    */
   async listen(request = {}) {
+    refuseNoMessage(request, 'ListenRequest', 'listen');
     const answers = this.answers(this.stub('AudioService').Listen(request));
     const { value } = await answers.next();
     return new Recording(answers, value.format);
+  }
+
+  [util.inspect.custom]() {
+    return `<Client of ${this.server}>`;
   }
 
   close() {

@@ -1,6 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
 'use strict';
 
+const { counted, refuse, refuseNoMessage, refuseUnknown, tuple } = require('./checks');
+
+// What the arguments mean, for messages.
+const STREAM_FRAME = "in the stream's frame, which is each object's own unless it was opened with frame: 'scene'";
+const ROTATION = 'a quaternion [w, x, y, z] of length 1';
+const MEANINGS = {
+  points: `metres ${STREAM_FRAME}`,
+  impulses: `newton seconds ${STREAM_FRAME}`,
+  secondPoints: `metres ${STREAM_FRAME}`,
+  secondRotations: `${ROTATION} from the first object's frame into the second's`,
+  positions: "metres in the scene's frame",
+  orientations: `${ROTATION} from the object's frame into the scene's`,
+};
+const POSE = "[x, y, z] in metres, or { position, orientation } with a quaternion [w, x, y, z], in the scene's frame";
+const STEP_KEYS = ['contacts', 'impulses', 'forces', 'poses', 'listener'];
+const FORCE_ROW_KEYS = ['object', 'point', 'force', 'roughness', 'second'];
+const IMPULSE_ROW_KEYS = ['object', 'point', 'impulse', 'duration', 'timeOffset', 'striker', 'second'];
+const CONTACT_ROW_KEYS = [...IMPULSE_ROW_KEYS, 'partner', 'roughness'];
+const IMPULSE_KEYS = ['objects', 'points', 'impulses', 'durations', 'timeOffsets', 'secondObjects', 'secondPoints',
+  'secondRotations', 'striker'];
+const CONTACT_KEYS = [...IMPULSE_KEYS, 'partners', 'travelSpeeds', 'roughnessDepth', 'irregularityLength'];
+
 /** Copies the fields that differ from their default: others are not written, as in every other language. */
 function present(fields) {
   const made = {};
@@ -16,59 +38,78 @@ function given(name, value) {
   return value === undefined || value === null ? {} : { [name]: value };
 }
 
-function vector(values) {
+function vector(values, name, meaning) {
+  tuple(values, 3, name, `[x, y, z]: ${meaning}`);
   return present({ x: values[0], y: values[1], z: values[2] });
 }
 
-function quaternion(values) {
+function quaternion(values, name) {
+  tuple(values, 4, name, ROTATION);
   return present({ w: values[0], x: values[1], y: values[2], z: values[3] });
 }
 
 /** A pose is a position [x, y, z], or { position, orientation } with the quaternion [w, x, y, z]. */
-function toPose(pose) {
+function toPose(pose, name = 'pose') {
   if (pose === undefined || pose === null) return undefined;
-  if (!('position' in pose)) return { position_m: vector(pose) };
+  if (typeof pose !== 'object') refuse(pose, name, POSE);
+  if ('length' in pose) return { position_m: vector(pose, name, "metres in the scene's frame") };
+  refuseUnknown(pose, ['position', 'orientation'], name);
   const { position, orientation } = pose;
-  return { position_m: vector(position), ...given('orientation', orientation && quaternion(orientation)) };
+  return { position_m: vector(position, `the position of ${name}`, "metres in the scene's frame"),
+    ...given('orientation', orientation && quaternion(orientation, `the orientation of ${name}`)) };
 }
 
 function toStriker(striker) {
-  return typeof striker === 'string' ? { striker } : striker;
+  if (typeof striker === 'string') return { striker };
+  if (striker !== undefined && striker !== null) refuseNoMessage(striker, 'HertzContact', 'striker');
+  return striker;
 }
 
-function handleOf(object) {
-  return typeof object === 'number' ? object : object.handle;
+function handleOf(object, name = 'object') {
+  const handle = typeof object === 'number' ? object : object?.handle;
+  if (typeof handle !== 'number') {
+    refuse(object, name, 'an object that scene.add or trace.add returned, or its handle');
+  }
+  return handle;
 }
 
 /** Handles as a column; one object stands for all rows. */
 function handles(objects, count, name = 'objects') {
-  const list = typeof objects === 'object' && 'length' in objects ? Array.from(objects, handleOf)
-    : new Array(count).fill(handleOf(objects));
-  if (list.length !== count) throw new RangeError(`${name} has ${list.length} entries; it must have ${count}`);
+  const list = objects && typeof objects === 'object' && 'length' in objects
+    ? Array.from(objects, (object) => handleOf(object, `an entry of ${name}`))
+    : new Array(count).fill(handleOf(objects, name));
+  if (list.length !== count) throw new RangeError(`${name} has the length ${list.length}; it must have ${count}`);
   return list;
 }
 
 /** Numbers of a table with `width` columns, given as one flat array or as one array a row. */
 function table(values, name, width = 3) {
+  if (!values || typeof values !== 'object' || !('length' in values)) {
+    refuse(values, name, `numbers, ${width} a contact: ${MEANINGS[name]}`);
+  }
   const flat = values.length && typeof values[0] !== 'number' ? Array.from(values).flatMap((row) => Array.from(row))
     : Array.from(values);
-  if (flat.length % width) throw new RangeError(`${name} has ${flat.length} numbers; it must have ${width} a contact`);
+  if (flat.length % width) {
+    throw new RangeError(`${name} has ${counted(flat.length, 'number')}; it must have ${width} a contact: ${MEANINGS[name]}`);
+  }
+  for (const value of flat) if (typeof value !== 'number') refuse(value, `an entry of ${name}`, MEANINGS[name]);
   return flat;
 }
 
 /** One number a row, or one for all. */
 function numbers(values, count, name) {
   const list = typeof values === 'number' ? new Array(count).fill(values) : Array.from(values);
-  if (list.length !== count) throw new RangeError(`${name} has ${list.length} entries; it must have ${count}`);
+  if (list.length !== count) throw new RangeError(`${name} has the length ${list.length}; it must have ${count}`);
   return list;
 }
 
-function impulseColumns(columns) {
+function impulseColumns(columns, keys = IMPULSE_KEYS, where = 'impulses') {
+  refuseUnknown(columns, keys, where);
   const point_m = table(columns.points, 'points');
   const impulse_newton_seconds = table(columns.impulses, 'impulses');
   if (point_m.length !== impulse_newton_seconds.length) {
-    throw new RangeError(`there are ${point_m.length / 3} points and ${impulse_newton_seconds.length / 3} impulses; ` +
-      'each contact needs one of both');
+    throw new RangeError(`points has the numbers of ${counted(point_m.length / 3, 'contact')} and impulses has those of ` +
+      `${impulse_newton_seconds.length / 3}; each contact needs both`);
   }
   const count = point_m.length / 3;
   const made = { object: handles(columns.objects, count), point_m, impulse_newton_seconds };
@@ -86,7 +127,7 @@ function impulseColumns(columns) {
 }
 
 function contactColumns(columns) {
-  const impulses = impulseColumns(columns);
+  const impulses = impulseColumns(columns, CONTACT_KEYS, 'contacts');
   const count = impulses.object.length;
   const made = { impulses };
   if (columns.partners !== undefined) made.partner = numbers(columns.partners, count, 'partners');
@@ -97,28 +138,44 @@ function contactColumns(columns) {
     ...present({ depth: columns.roughnessDepth, irregularity_length_m: columns.irregularityLength }) };
 }
 
-function secondObject(second) {
-  return second && { object: handleOf(second.object), point_m: vector(second.point),
-    ...given('rotation', second.rotation && quaternion(second.rotation)) };
+function secondObject(second, where) {
+  if (!second) return second;
+  refuseUnknown(second, ['object', 'point', 'rotation'], `second of ${where}`);
+  return { object: handleOf(second.object, `object of second of ${where}`),
+    point_m: vector(second.point, `point of second of ${where}`, MEANINGS.secondPoints),
+    ...given('rotation', second.rotation && quaternion(second.rotation, `rotation of second of ${where}`)) };
+}
+
+function toRoughness(roughness, where) {
+  if (roughness) refuseNoMessage(roughness, 'Roughness', `roughness of ${where}`);
+  return roughness;
 }
 
 /** What rows of impulses and of contacts have in common. */
-function impulseRow(row) {
-  return { ...present({ object: handleOf(row.object), time_offset_s: row.timeOffset }), point_m: vector(row.point),
-    impulse_newton_seconds: vector(row.impulse), ...given('duration_s', row.duration),
-    ...given('hertz', toStriker(row.striker)), ...given('second', secondObject(row.second)) };
+function impulseRow(row, where, keys = IMPULSE_ROW_KEYS) {
+  refuseUnknown(row, keys, where);
+  return { ...present({ object: handleOf(row.object, `object of ${where}`), time_offset_s: row.timeOffset }),
+    point_m: vector(row.point, `point of ${where}`, MEANINGS.points),
+    impulse_newton_seconds: vector(row.impulse, `impulse of ${where}`, MEANINGS.impulses),
+    ...given('duration_s', row.duration), ...given('hertz', toStriker(row.striker)),
+    ...given('second', secondObject(row.second, where)) };
 }
 
-function contactRow(row) {
-  return { ...impulseRow(row), ...present({ partner: row.partner }), ...given('roughness', row.roughness) };
+function contactRow(row, where) {
+  return { ...impulseRow(row, where, CONTACT_ROW_KEYS), ...present({ partner: row.partner }),
+    ...given('roughness', toRoughness(row.roughness, where)) };
 }
 
-function forceRow(row) {
-  return { ...present({ object: handleOf(row.object) }), point_m: vector(row.point), force_newtons: vector(row.force),
-    ...given('roughness', row.roughness), ...given('second', secondObject(row.second)) };
+function forceRow(row, where) {
+  refuseUnknown(row, FORCE_ROW_KEYS, where);
+  return { ...present({ object: handleOf(row.object, `object of ${where}`) }),
+    point_m: vector(row.point, `point of ${where}`, MEANINGS.points),
+    force_newtons: vector(row.force, `force of ${where}`, `newtons ${STREAM_FRAME}`),
+    ...given('roughness', toRoughness(row.roughness, where)), ...given('second', secondObject(row.second, where)) };
 }
 
 function poseColumns(columns) {
+  refuseUnknown(columns, ['objects', 'positions', 'orientations'], 'poses');
   const position_m = table(columns.positions, 'positions');
   const made = { object: handles(columns.objects, position_m.length / 3), position_m };
   if (columns.orientations) made.orientation = table(columns.orientations, 'orientations', 4);
@@ -129,16 +186,30 @@ function poseColumns(columns) {
  * Makes the message of the step at a simulation time, seconds. Contacts and impulses are rows if they are an array, and
  * columns otherwise.
  */
-function makeStep(time, { contacts, impulses, forces, poses, listener } = {}) {
+function makeStep(time, content = {}) {
+  if (typeof time !== 'number') refuse(time, 'time', 'the simulation time in seconds');
+  refuseUnknown(content, STEP_KEYS, 'step');
+  const { contacts, impulses, forces, poses, listener } = content;
   const step = present({ time_s: time });
-  if (Array.isArray(impulses)) step.impulses = impulses.map(impulseRow);
+  if (Array.isArray(impulses)) step.impulses = impulses.map((row, i) => impulseRow(row, `impulses[${i}]`));
   else if (impulses) step.columns = impulseColumns(impulses);
-  if (forces) step.sustained = forces.map(forceRow);
-  if (Array.isArray(contacts)) step.contacts = contacts.map(contactRow);
+  if (forces) step.sustained = forces.map((row, i) => forceRow(row, `forces[${i}]`));
+  if (Array.isArray(contacts)) step.contacts = contacts.map((row, i) => contactRow(row, `contacts[${i}]`));
   else if (contacts) step.contact_columns = contactColumns(contacts);
-  if (listener) step.listener = toPose(listener);
+  if (listener) step.listener = toPose(listener, 'listener');
   if (poses) step.pose_columns = poseColumns(poses);
   return step;
 }
 
-module.exports = { given, makeStep, present, toPose };
+/** The rows of one strike. Throws a TypeError if it has not one point and one impulse. */
+function strikeOf(object, { point, impulse, duration, striker } = {}) {
+  tuple(point, 3, 'point', "[x, y, z]: metres in the object's own frame");
+  tuple(impulse, 3, 'impulse', "[x, y, z]: newton seconds in the object's own frame");
+  return [{ object, point, impulse, duration, striker }];
+}
+
+function frameInWords(frame) {
+  return frame === 'FRAME_SCENE' ? "the scene's frame" : "each object's own frame";
+}
+
+module.exports = { frameInWords, given, makeStep, present, strikeOf, toPose };

@@ -22,9 +22,36 @@ class CarillonError extends Error {
 /** No daemon answers at the address. */
 class ServerUnavailable extends CarillonError {}
 
+// The caller's names of fields of the contract that messages of the daemon mention.
+const CALLER_NAMES = { step_s: 'step', scheduling_delay_s: 'delay', glide_s: 'glide' };
+
+/** Replaces names of the contract by those of the caller, and adds the unit, seconds, that a name loses. */
+function inNamesOfCaller(text, names) {
+  let made = text;
+  for (const [field, name] of Object.entries(names)) {
+    const unit = field.endsWith('_s') ? ' s' : '';
+    made = made.replace(new RegExp(`\\b${field} is ([^ ;]+); it must be (\\S+) to (\\S+)`, 'g'),
+      `${name} is $1${unit}; it must be $2 to $3${unit}`);
+    made = made.replace(new RegExp(`\\b${field} is ([^ ;]+);`, 'g'), `${name} is $1${unit};`);
+    made = made.replace(new RegExp(`\\b${field}\\b`, 'g'), name);
+  }
+  return made;
+}
+
 /** Makes the error that an ErrorInfo of the contract describes. */
 function fromInfo(info) {
-  return new CarillonError(info.reason, info.message, info.metadata);
+  return new CarillonError(info.reason, inNamesOfCaller(info.message, CALLER_NAMES), info.metadata);
+}
+
+/** Waits for a result. A refusal has the caller's names of fields of the contract. */
+async function inNames(names, result) {
+  try {
+    return await result;
+  } catch (error) {
+    if (!(error instanceof CarillonError) || error instanceof ServerUnavailable) throw error;
+    const text = error.message.slice(`${error.reason}: `.length);
+    throw new CarillonError(error.reason, inNamesOfCaller(text, names), error.metadata);
+  }
 }
 
 /** Makes the error of a failed call; its rich status is in the trailing metadata. */
@@ -44,4 +71,4 @@ function fromCall(error, server) {
   return new CarillonError(grpc.status[error.code], error.details);
 }
 
-module.exports = { CarillonError, ServerUnavailable, fromCall, fromInfo };
+module.exports = { CarillonError, ServerUnavailable, fromCall, fromInfo, inNames };

@@ -164,6 +164,7 @@ export class Model {
 
 /** A recorded simulation. */
 export class Trace {
+  /** `step`, seconds, is needed for contacts, forces and poses, as in a stream. */
   constructor(settings?: StreamSettings & { step?: number; simulator?: string; hearing?: Hearing; listener?: Pose });
   header: ContactTraceHeader;
   objects: ContactTraceObject[];
@@ -221,6 +222,10 @@ export class ContactStream {
   readonly report?: StreamContactsResponse__Output;
   /** Steps that were not sent: the oldest ones, when 4096 waited. */
   readonly droppedStepCount: number;
+  /** How many contacts came too late for their time so far, and sounded at once. */
+  readonly lateCount: number;
+  /** How many times simulation time was mapped anew so far, because every step was late. */
+  readonly remapCount: number;
   /** How many steps wait for the network. */
   readonly waitingStepCount: number;
   readonly findings?: ContactFindings__Output;
@@ -228,8 +233,11 @@ export class ContactStream {
   readonly rejection?: CarillonError;
   /** Sends a step. The promise gives the network a turn. */
   step(time: number, content?: StepContent): Promise<void>;
-  /** Waits until the daemon has taken all steps. Returns the last report. */
-  close(): Promise<StreamContactsResponse__Output>;
+  /**
+   * Waits until the daemon has taken all steps. Returns the last report. Unless `warn` is false, the process warns of
+   * contacts that were late, lost or rejected or that lie far from their objects, by a ContactWarning.
+   */
+  close(warn?: boolean): Promise<StreamContactsResponse__Output>;
 }
 
 /** What the daemon plays, from the call of Client.listen on. */

@@ -1,9 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 'use strict';
 
+const { choice, refuse, refuseNoMessage } = require('./checks');
+
 /** A name of the catalogue becomes a message; a message stays as it is. */
 function toMaterial(material) {
-  return typeof material === 'string' ? { preset: material } : material;
+  if (typeof material === 'string') return { preset: material };
+  if (material === null || typeof material !== 'object') {
+    refuse(material, 'material', "a name such as 'oak', or figures such as { young_pa, density_kg_per_m3 }");
+  }
+  refuseNoMessage(material, 'Material', 'material');
+  return material;
 }
 
 /**
@@ -18,7 +25,7 @@ function named(model, material) {
 
 /** "radiated_power" becomes the name in the contract. */
 function toRadiation(name) {
-  return name && `RADIATION_MODEL_${name.toUpperCase()}`;
+  return choice(name, ['paper_coupling', 'radiated_power', 'modes_only'], 'RADIATION_MODEL_', 'radiation');
 }
 
 module.exports = { named, toMaterial, toRadiation };

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 'use strict';
 
+const util = require('util');
+const { counted, refuseUnknown } = require('./checks');
+const { strikeOf } = require('./contacts');
+const { inNames } = require('./errors');
 const { Trace } = require('./traces');
 
 /**
@@ -30,11 +34,19 @@ class Model {
    * Renders one strike without a scene and faster than real time, the same samples each time. `seconds` zero means
    * until the sound has died away.
    */
-  async renderStrike({ point, impulse, duration, striker, material, size, gain, seconds = 0, sampleRateHz = 48000 }) {
+  async renderStrike(strike = {}) {
+    refuseUnknown(strike, ['point', 'impulse', 'duration', 'striker', 'material', 'size', 'gain', 'seconds',
+      'sampleRateHz'], 'renderStrike');
+    const { material, size, gain, seconds = 0, sampleRateHz = 48000 } = strike;
     const trace = new Trace({ simulator: 'carillon (Node)' });
     const object = trace.add(this, { material, size, gain });
-    trace.step(0, { impulses: [{ object, point, impulse, duration, striker }] });
-    return this.client.render(trace, { tail_s: seconds, sample_rate_hz: sampleRateHz });
+    trace.step(0, { impulses: strikeOf(object, strike) });
+    return inNames({ tail_s: 'seconds', sample_rate_hz: 'sampleRateHz' },
+      this.client.render(trace, { tail_s: seconds, sample_rate_hz: sampleRateHz }));
+  }
+
+  [util.inspect.custom]() {
+    return `<Model ${this.label || this.name}: ${counted(this.modeCount, 'mode')}>`;
   }
 }
 

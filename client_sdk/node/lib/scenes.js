@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 'use strict';
 
-const { given, makeStep, present, toPose } = require('./contacts');
+const util = require('util');
+const { counted, refuseUnknown } = require('./checks');
+const { frameInWords, given, makeStep, present, strikeOf, toPose } = require('./contacts');
 const { fromCall, fromInfo } = require('./errors');
 const { named, toMaterial, toRadiation } = require('./materials');
 const { streamSettings } = require('./traces');
+const { warnOfStream } = require('./warnings');
 
 // Steps that may wait for the network before the oldest is dropped.
 const MOST_WAITING = 4096;
+const OBJECT_KEYS = ['material', 'size', 'gain', 'pose', 'radiation'];
 
 /** An object of a scene. It may be given wherever handles are wanted. */
 class SoundingObject {
@@ -25,19 +29,28 @@ class SoundingObject {
   }
 
   /** Strikes the object now. Throws CarillonError if the strike is refused. */
-  async strike({ point, impulse, duration, striker }) {
+  async strike(strike) {
+    refuseUnknown(strike, ['point', 'impulse', 'duration', 'striker'], 'strike');
+    const impulses = strikeOf(this, strike);
     const stream = this.scene.stream({ step: 0.001, delay: 0 });
-    stream.step(0, { impulses: [{ object: this, point, impulse, duration, striker }] });
-    await stream.close();
+    stream.step(0, { impulses });
+    await stream.close(false);
     if (stream.rejection) throw stream.rejection;
   }
 
   /** Changes what is given; a pose is reached after `glide` seconds. */
-  async update({ material, size, gain, pose, glide = 0, radiation }) {
+  async update(changes) {
+    refuseUnknown(changes, [...OBJECT_KEYS, 'glide'], 'update');
+    const { material, size, gain, pose, glide = 0, radiation } = changes;
     const request = { name: this.name, glide_s: glide, ...given('material', material && toMaterial(material)),
       ...given('size', size), ...given('gain', gain), ...given('pose', toPose(pose)),
       ...present({ radiation: toRadiation(radiation) }) };
     this.message = (await this.scene.client.call('SceneService', 'UpdateObject', request)).object;
+  }
+
+  [util.inspect.custom]() {
+    const { handle, sounding_mode_count: count, lowest_frequency_hz: low, highest_frequency_hz: high } = this.message;
+    return `<SoundingObject ${handle}: ${counted(count, 'mode')}, ${low.toFixed(1)} to ${high.toFixed(1)} Hz>`;
   }
 
   /** Fades the object out and removes it. */
@@ -64,20 +77,22 @@ class Scene {
    * its place.
    */
   async addAll(objects) {
-    const request = { scene: this.name, objects: objects.map((object) => this.request(object)) };
+    const request = { scene: this.name, objects: objects.map((object, i) => this.request(object, `object ${i} of addAll`)) };
     const answer = await this.client.call('SceneService', 'AddObjects', request);
     return answer.objects.map((object) => new SoundingObject(this, object));
   }
 
   /** The request for an object. */
-  request({ model, material, size, gain, pose, handle, radiation }) {
+  request(object, where) {
+    refuseUnknown(object, ['model', ...OBJECT_KEYS, 'handle'], where);
+    const { model, material, size, gain, pose, handle, radiation } = object;
     return { scene: this.name, ...named(model, material), ...present({ size, handle }), ...given('gain', gain),
       ...given('pose', toPose(pose)), ...present({ radiation: toRadiation(radiation) }) };
   }
 
   /** Adds an object, ready to be struck. Without a material it gets the one that the model was asked for with. */
   async add(model, settings = {}) {
-    const answer = await this.client.call('SceneService', 'AddObject', this.request({ ...settings, model }));
+    const answer = await this.client.call('SceneService', 'AddObject', this.request({ ...settings, model }, 'add'));
     return new SoundingObject(this, answer.object);
   }
 
@@ -91,7 +106,9 @@ class Scene {
    * Changes the volume: a linear gain; muted, so that the scene rings on unheard; solo, so that of your scenes only those
    * with this flag are heard. Returns the scene's state.
    */
-  async update({ gain, muted, solo }) {
+  async update(volume) {
+    refuseUnknown(volume, ['gain', 'muted', 'solo'], 'update');
+    const { gain, muted, solo } = volume;
     const request = { name: this.name, ...given('gain', gain), ...given('muted', muted), ...given('solo', solo) };
     return (await this.client.call('SceneService', 'UpdateScene', request)).scene;
   }
@@ -112,9 +129,15 @@ class Scene {
   }
 
   /** Opens a stream for the contacts of a simulation whose steps last `step` seconds. */
-  stream({ step, delay, ...settings }) {
+  stream(own = {}) {
+    refuseUnknown(own, ['step', 'delay', 'frame', 'pulseShape'], 'stream');
+    const { step, delay, ...settings } = own;
     return new ContactStream(this, { scene: this.name, step_s: step, ...given('scheduling_delay_s', delay),
       ...streamSettings(settings) });
+  }
+
+  [util.inspect.custom]() {
+    return `<Scene ${this.name} of ${this.client.server}>`;
   }
 
   /** Deletes the scene and fades out its objects. */
@@ -125,13 +148,16 @@ class Scene {
 
 /**
  * Sends the contacts of each step. `report` is the daemon's newest answer, with the counts so far; `droppedStepCount`
- * steps were not sent: the oldest ones, when 4096 waited.
+ * steps were not sent: the oldest ones, when 4096 waited. When it is closed, one warning of the process, a
+ * ContactWarning, tells of contacts that were late, lost or rejected and of time that was mapped anew, and another of
+ * contacts that lie far from their objects.
  */
 class ContactStream {
   constructor(scene, start) {
     this.report = undefined;
     this.droppedStepCount = 0;
     this.error = undefined;
+    this.start = start;
     const { client } = scene;
     this.call = client.stub('ContactService').StreamContacts();
     this.ended = new Promise((resolve) => {
@@ -163,6 +189,22 @@ class ContactStream {
     return this.report?.rejected_count ? fromInfo(this.report.last_rejection) : undefined;
   }
 
+  /** How many contacts came too late for their time so far, and sounded at once. */
+  get lateCount() {
+    return this.report?.late_count ?? 0;
+  }
+
+  /** How many times simulation time was mapped anew so far, because every step was late. */
+  get remapCount() {
+    return this.report?.remap_count ?? 0;
+  }
+
+  [util.inspect.custom]() {
+    const { step_count: steps = 0, accepted_count: accepted = 0, rejected_count: rejected = 0 } = this.report ?? {};
+    return `<ContactStream of ${this.start.scene}: ${counted(steps, 'step')}, ${counted(accepted, 'contact')} in time, ` +
+      `${this.lateCount} late, ${rejected} rejected>`;
+  }
+
   /** How many steps wait for the network. */
   get waitingStepCount() {
     return this.waiting.length + this.call.writableLength;
@@ -183,12 +225,13 @@ class ContactStream {
     return new Promise(setImmediate);
   }
 
-  /** Waits until the daemon has taken all steps. Returns the last report. */
-  async close() {
+  /** Waits until the daemon has taken all steps, and warns unless `warn` is false. Returns the last report. */
+  async close(warn = true) {
     this.isClosing = true;
     this.write();
     await this.ended;
     if (this.error) throw this.error;
+    if (warn) warnOfStream(this.report, frameInWords(this.start.frame), this.droppedStepCount);
     return this.report;
   }
 }

@@ -2,6 +2,8 @@
 'use strict';
 
 const fs = require('fs/promises');
+const util = require('util');
+const { counted } = require('./checks');
 
 const FULL_SCALE = 2 ** 23 - 1;
 
@@ -24,6 +26,11 @@ class Sound {
 
   get peak() {
     return this.samples.reduce((most, sample) => Math.max(most, Math.abs(sample)), 0);
+  }
+
+  [util.inspect.custom]() {
+    return `<Sound: ${Number(this.seconds.toPrecision(3))} s, ${this.sampleRateHz} Hz, ` +
+      `${counted(this.channelCount, 'channel')}, peak ${Number(this.peak.toPrecision(3))}>`;
   }
 
   /** Writes a WAV file of 24-bit samples; samples beyond full scale are clipped. */

@@ -2,6 +2,8 @@
 'use strict';
 
 const fs = require('fs/promises');
+const util = require('util');
+const { choice, counted, refuseNoMessage, refuseUnknown } = require('./checks');
 const { given, makeStep, present, toPose } = require('./contacts');
 const { message } = require('./contract');
 const { CarillonError } = require('./errors');
@@ -11,21 +13,30 @@ const FORMAT_VERSION = 1;
 
 /** "scene" becomes FRAME_SCENE, "gaussian" PULSE_SHAPE_GAUSSIAN. */
 function streamSettings({ frame, pulseShape }) {
-  return present({ frame: frame && `FRAME_${frame.toUpperCase()}`,
-    pulse_shape: pulseShape && `PULSE_SHAPE_${pulseShape.toUpperCase()}` });
+  return present({ frame: choice(frame, ['object', 'scene'], 'FRAME_', 'frame'),
+    pulse_shape: choice(pulseShape, ['raised_cosine', 'gaussian'], 'PULSE_SHAPE_', 'pulseShape') });
 }
 
-/** A recorded simulation: `header`, `objects` and `steps` are the messages of contact_trace.proto. */
+/**
+ * A recorded simulation: `header`, `objects` and `steps` are the messages of contact_trace.proto. `step`, the length of
+ * the simulator's steps in seconds, is needed for all but impulses: by it the daemon knows whether a step was left out,
+ * and so when a blow is over. A rendering then dates each blow as a stream does, which adds its scheduling delay.
+ */
 class Trace {
-  constructor({ step, simulator, hearing, listener, ...settings } = {}) {
+  constructor(own = {}) {
+    refuseUnknown(own, ['step', 'simulator', 'hearing', 'listener', 'frame', 'pulseShape'], 'Trace');
+    const { step, simulator, hearing, listener, ...settings } = own;
+    if (hearing) refuseNoMessage(hearing, 'Hearing', 'hearing');
     this.header = { format_version: FORMAT_VERSION, ...present({ simulator, step_s: step }),
-      ...given('hearing', hearing), ...given('listener', toPose(listener)), ...streamSettings(settings) };
+      ...given('hearing', hearing), ...given('listener', toPose(listener, 'listener')), ...streamSettings(settings) };
     this.objects = [];
     this.steps = [];
   }
 
   /** Adds an object, which is there from the beginning. Returns its handle. */
-  add(model, { material, size = 1, gain = 1, pose, label, handle, radiation } = {}) {
+  add(model, settings = {}) {
+    refuseUnknown(settings, ['material', 'size', 'gain', 'pose', 'label', 'handle', 'radiation'], 'add');
+    const { material, size = 1, gain = 1, pose, label, handle, radiation } = settings;
     const own = handle ?? 1 + this.objects.reduce((most, object) => Math.max(most, object.handle), 0);
     this.objects.push({ handle: own, ...named(model, material), size, gain, ...present({ label }),
       ...given('pose', toPose(pose)), ...present({ radiation: toRadiation(radiation) }) });
@@ -38,6 +49,10 @@ class Trace {
     if (this.steps.length && time < last) {
       throw new RangeError(`time goes back from ${last} to ${time} s; add the steps in order`);
     }
+    if (!this.header.step_s && (content?.contacts || content?.forces || content?.poses)) {
+      throw new TypeError("contacts, forces and poses need the length of the simulator's steps in seconds, as in a " +
+        'stream: new Trace({ step: 1 / 240 })');
+    }
     this.steps.push(makeStep(time, content));
   }
 
@@ -46,6 +61,11 @@ class Trace {
     yield { header: this.header };
     for (const object of this.objects) yield { object };
     for (const step of this.steps) yield { step };
+  }
+
+  [util.inspect.custom]() {
+    return `<Trace: ${counted(this.objects.length, 'object')}, ${counted(this.steps.length, 'step')}, to ` +
+      `${this.steps.at(-1)?.time_s ?? 0} s>`;
   }
 
   /** The bytes of a .contacts file. */

@@ -25,5 +25,15 @@ TEST(Quantity, ADateIsTheMidnightThatBeginsItHere) {
   EXPECT_LE(std::abs(*midnight - *ParseTimeUnixMs("2026-11-21T00:00:00Z")), 14 * 3600 * 1000);
 }
 
+TEST(Quantity, AGainIsAFactorOrDecibels) {
+  EXPECT_EQ(ParseGain("0.5"), 0.5);
+  EXPECT_EQ(ParseGain("0"), 0);
+  EXPECT_EQ(ParseGain("0dB"), 1);
+  EXPECT_DOUBLE_EQ(*ParseGain("-20dB"), 0.1);
+  for (const char* text : {"", "dB", "-1", "-6", "loud", "nan", "inf", "1e9", "400dB", "6 db"}) {
+    EXPECT_FALSE(ParseGain(text)) << text;
+  }
+}
+
 }  // namespace
 }  // namespace carillon::cli

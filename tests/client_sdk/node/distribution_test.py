@@ -58,6 +58,30 @@ class DistributionTest(unittest.TestCase):
         self.assert_prints("SERVER_UNAVAILABLE", "node", "--input-type=module", "-e",
                            f"import {{ connect }} from 'carillon'; {code}")
 
+    def test_a_package_that_cannot_be_made_is_refused_in_a_sentence(self):
+        pack = ROOT / "client_sdk/node/pack.py"
+        for expected, *arguments in (("Usage: pack.py NODE_MODULES FOLDER",),
+                                     ("does not have what package-lock.json names; run", "/nowhere", self.folder / "x"),
+                                     ("carillon is there already", MODULES, self.folder),
+                                     ("/dev/null", MODULES, "/dev/null")):
+            code, said = run(sys.executable, pack, *arguments)
+            self.assertEqual(code, 1)
+            self.assertIn(expected, said)
+            self.assertNotIn("Traceback", said)
+
+    def test_npm_packs_the_package_and_refuses_its_source(self):
+        code, said = run("npm", "pack", "--dry-run", cwd=ROOT / "client_sdk/node")
+        self.assertNotEqual(code, 0)
+        self.assertIn("Make the package by: npm ci, then ./pack.py node_modules FOLDER", said)
+        code, said = run("npm", "pack", "--dry-run", cwd=self.modules / "carillon")
+        self.assertEqual(code, 0, said)
+
+    def test_it_tells_its_callers_what_is_wrong(self):
+        code, said = run("node", "--test", pathlib.Path(__file__).with_name("messages.test.js"), cwd=self.folder,
+                         env={**os.environ, "NODE_PATH": str(self.modules)})
+        self.assertEqual(code, 0, said)
+        self.assertNotIn("# pass 0", said.replace("ℹ", "#"))
+
     def test_types_accept_a_program_that_is_right_and_refuse_those_that_are_wrong(self):
         (self.folder / "right.ts").write_text(pathlib.Path(__file__).with_name("usage.ts").read_text())
         wrong = ("c.createModel('a.obj', {})", "c.createScene({ hearing: { panning: 7 } })",

@@ -28,7 +28,7 @@ async function main(): Promise<void> {
     impulses: [{ object: 3, point: [0, 0, 0], impulse: [0, 0, 1], second: { object: bell, point: [0, 0, 0] } }],
     poses: { objects: [3], positions: [[0, 0, 0]] },
   });
-  const late: number = (await stream.close()).late_count;
+  const late: number = (await stream.close(false)).late_count + stream.lateCount + stream.remapCount;
   const reason: string | undefined = stream.rejection?.reason;
   const far: number | undefined = stream.findings?.largest_distance_m;
   for await (const found of c.models({ label_contains: 'bell' })) console.log(found.label, found.modeCount);

@@ -61,6 +61,18 @@ class DistributionTest(unittest.TestCase):
         run("rm", "-r", self.folder / "tree")
         self.assertIn("carillon/v1/contact_pb2.py", zipfile.ZipFile(self.wheel_of(archive)).namelist())
 
+    def test_a_build_without_a_generator_or_without_the_contract_says_what_to_do(self):
+        for name, expected in (("grpc_python_plugin", "Install Debian's protobuf-compiler and protobuf-compiler-grpc"),
+                               ("the contract", "Build the package from a checkout")):
+            if name == "the contract":
+                run("rm", "-r", self.folder / "tree/proto")
+            # Neither protoc nor its plugin is in this PATH.
+            done = subprocess.run([sys.executable, "setup.py", "build_py"], cwd=self.project, env={"PATH": "/nowhere"},
+                                  capture_output=True, text=True, check=False)
+            self.assertEqual(done.returncode, 1)
+            self.assertIn(expected, done.stderr)
+            self.assertNotIn("Traceback", done.stderr)
+
     def test_types_are_right(self):
         run("mypy", "--config-file", pathlib.Path(__file__).with_name("mypy.ini"), "--cache-dir", self.folder / "cache",
             "carillon", cwd=BUILT)

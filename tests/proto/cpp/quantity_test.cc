@@ -10,7 +10,8 @@ TEST(Quantity, AShareIsAPercentageOrAFraction) {
   EXPECT_EQ(ParseShare("1%"), 0.01);
   EXPECT_EQ(ParseShare("0.01"), 0.01);
   EXPECT_EQ(ParseShare("2.5%"), 0.025);
-  for (const char* text : {"", "%", "0", "0%", "-1%", "nan", "inf", "one", "1%%", "1 %x"}) {
+  for (const char* text :
+       {"", "%", "0", "0%", "-1%", "nan", "inf", "one", "1%%", "1 %x", "1", "5", "100%"}) {
     EXPECT_FALSE(ParseShare(text)) << text;
   }
 }

@@ -12,7 +12,7 @@
 whose `reason` programs can act upon.
 """
 
-from carillon import aio
+from carillon import aio, summaries
 from carillon.address import default_server
 from carillon.client import Client, connect
 from carillon.contacts import Contacts, Forces, Impulses, Poses, striker
@@ -25,6 +25,8 @@ from carillon.scenes import ContactStream, Scene, SoundingObject
 from carillon.sound import Sound
 from carillon.traces import Trace
 from carillon.version import __version__
+
+summaries.shorten()
 
 __all__ = ["CarillonError", "Client", "ContactStream", "ContactWarning", "Contacts", "Forces", "Impulses", "Job",
            "MeshFile", "Model", "Poses", "Scene", "ServerUnavailable", "Sound", "SoundingObject", "Trace",

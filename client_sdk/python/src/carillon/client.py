@@ -15,7 +15,7 @@ from typing import Any, Optional
 import grpc
 import numpy
 
-from carillon import errors, meshes, progress
+from carillon import checks, contacts, errors, meshes, progress
 from carillon.address import default_server
 from carillon.authorization import authorized
 from carillon.contacts import PoseLike, to_pose
@@ -43,6 +43,7 @@ def connect(server: Optional[str] = None, *, tls_roots: str | os.PathLike[str] |
     """Connects to a daemon: "unix:PATH" or "HOST:PORT", by default where default_server() says. `tls_roots` is the
     PEM file with the certificates that vouch for a daemon with TLS. Over TCP the daemon may want to know the caller, by
     `token` (default: $CARILLON_TOKEN), or by the PEM files `tls_certificate` and `tls_key`."""
+    checks.refuse_unknown(credentials, ("tls_roots", "token", "tls_certificate", "tls_key"), "connect")
     return Client(server or default_server(), tls_roots, **credentials)
 
 
@@ -94,9 +95,10 @@ class Client:
         """Asks for the model of a mesh and does not wait for it. `request` has other fields of
         CreateModalModelRequest, such as size, max_frequency_hz, priority or coarse_first."""
         file = meshes.to_mesh_file(mesh)
-        message = modal_model_service_pb2.CreateModalModelRequest(
-            mesh_digest=self.upload(file), mesh_format=file.format, material=to_message(material),
-            label=file.label if label is None else label, settings=settings, **request)
+        message = checks.message(modal_model_service_pb2.CreateModalModelRequest, "create_model", dict(
+            mesh_format=file.format, material=to_message(material), label=file.label if label is None else label,
+            settings=settings, **request))
+        message.mesh_digest = self.upload(file)
         with errors.translated(self.server):
             return Job(self, self.models_stub.CreateModalModel(message).job, material)
 
@@ -116,7 +118,7 @@ class Client:
     def models(self, **filters: Any) -> Iterator[Model]:
         """Yields the models that match, newest first, a page at a time; filters are fields of
         ListModalModelsRequest, such as label_contains or tag."""
-        request = modal_model_service_pb2.ListModalModelsRequest(**filters)
+        request = checks.message(modal_model_service_pb2.ListModalModelsRequest, "models", filters)
         while True:
             with errors.translated(self.server):
                 page = self.models_stub.ListModalModels(request)
@@ -181,8 +183,9 @@ class Client:
         """Makes an empty scene. It ends by itself a minute after its clients, unless `keep` is true. With an `id`, such
         as "lathe-1", it is "scenes/lathe-1"; a scene that you made before with this id and the same settings is
         returned as it is, and its `existing` is true."""
-        request = scene_service_pb2.CreateSceneRequest(
-            hearing=hearing, listener=None if listener is None else to_pose(listener), gain=gain, keep=keep, id=id)
+        request = checks.message(scene_service_pb2.CreateSceneRequest, "scene", dict(
+            hearing=hearing, listener=None if listener is None else to_pose(listener, "listener"), gain=gain, keep=keep,
+            id=id))
         with errors.translated(self.server):
             made = self.scenes_stub.CreateScene(request)
         return Scene(self, made.name, made.existing)
@@ -200,12 +203,12 @@ class Client:
         peak, unless `full_scale_pa` is given, because tails end at -80 dB of full scale. Raises CarillonError if a
         contact is rejected."""
         whole = trace if isinstance(trace, Trace) else Trace.read(trace)
-        sound = self._render(whole.records(), audio_service_pb2.RenderSettings(**settings))
+        sound = self._render(whole, settings)
         if not normalize:
             return sound
         if sound.summary and 0 < sound.summary.peak < 0.01 and "full_scale_pa" not in settings:
             settings["full_scale_pa"] = max(1.5 * sound.summary.peak_pa, LEAST_FULL_SCALE_PA)
-            sound = self._render(whole.records(), audio_service_pb2.RenderSettings(**settings))
+            sound = self._render(whole, settings)
         return sound.normalized()
 
     def listen(self, seconds: float) -> Sound:
@@ -218,7 +221,7 @@ class Client:
         """Records what the daemon plays within the block, from its first line on. `request` has fields of
         ListenRequest: scene, block_frame_count and encoding."""
         with errors.translated(self.server):
-            answers = self.audio_stub.Listen(audio_service_pb2.ListenRequest(**request))
+            answers = self.audio_stub.Listen(checks.message(audio_service_pb2.ListenRequest, "recording", request))
             with self.cancellable(answers):
                 record = Recording(answers)
                 try:
@@ -237,6 +240,9 @@ class Client:
         finally:
             call.cancel()
 
+    def __repr__(self) -> str:
+        return f"<Client of {self.server}>"
+
     def close(self) -> None:
         self._channel.close()
 
@@ -251,12 +257,13 @@ class Client:
         raise errors.CarillonError("MODAL_MODEL_NOT_FOUND", f"no model has the label '{text}' or begins with these "
                                    "digits")
 
-    def _render(self, records: Iterable[Any], settings: audio_service_pb2.RenderSettings) -> Sound:
+    def _render(self, trace: Trace, given: dict[str, Any]) -> Sound:
         request = audio_service_pb2.RenderRequest
+        settings = checks.message(audio_service_pb2.RenderSettings, "render", given)
 
         def requests() -> Iterator[audio_service_pb2.RenderRequest]:
             yield request(settings=settings)
-            yield from (request(record=record) for record in records)
+            yield from (request(record=record) for record in trace.records())
 
         blocks, rate_hz, channels, summary = [], 0, 1, audio_service_pb2.RenderSummary()
         blows: list[audio_service_pb2.Blow] = []
@@ -275,7 +282,7 @@ class Client:
                         summary = answer.summary
         if summary.rejected_count:
             raise errors.from_info(summary.last_rejection)
-        errors.warn_of_contacts(summary.findings)
+        errors.warn_of_contacts(summary.findings, contacts.frame_in_words(trace.header.frame))
         samples = numpy.frombuffer(b"".join(blocks), "<f4").reshape(-1, channels)
         return Sound(samples, rate_hz, summary=summary, blows=tuple(blows))
 

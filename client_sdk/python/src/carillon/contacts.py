@@ -9,6 +9,7 @@ from typing import Any, Literal, Optional, Union
 import numpy
 import numpy.typing
 
+from carillon import checks
 from carillon.columns import append
 from carillon.v1 import contact_pb2
 
@@ -20,6 +21,21 @@ PulseShape = Literal["raised_cosine", "gaussian"]
 
 # A duration that is below zero in a column is absent.
 ABSENT = -1.0
+
+# What the arguments mean, for messages.
+STREAM_FRAME = "in the stream's frame, which is each object's own unless it was opened with frame=\"scene\""
+ROTATION = "a quaternion w, x, y, z of length 1"
+MEANINGS = {
+    "points": f"metres {STREAM_FRAME}", "second_points": f"metres {STREAM_FRAME}",
+    "impulses": f"newton seconds {STREAM_FRAME}", "forces": f"newtons {STREAM_FRAME}",
+    "second_rotations": f"{ROTATION} from the first object's frame into the second's",
+    "positions": "metres in the scene's frame",
+    "orientations": f"{ROTATION} from the object's frame into the scene's",
+    "durations": "seconds", "time_offsets": "seconds after the step's time", "travel_speeds": "m/s"}
+OBJECT_POINT, OBJECT_IMPULSE = "metres in the object's own frame", "newton seconds in the object's own frame"
+POSE = ("a position x, y, z in metres, a pair (position, quaternion w, x, y, z), or a 4 x 4 matrix, all in the scene's "
+        "frame")
+STRIKER_FIGURES = ("mass_kg", "radius_m", "young_pa", "poisson_ratio")
 
 
 @dataclasses.dataclass
@@ -86,21 +102,31 @@ def striker(name: str = "", **figures: float) -> contact_pb2.HertzContact:
     """Describes the body that strikes: a named one, such as "wood", figures that override those of the named one, or
     figures alone. They are mass_kg, radius_m, young_pa and poisson_ratio of the striker, approach_speed_m_per_s,
     reduced_mass_kg and reduced_radius_m."""
-    own = {f"striker_{key}" if key in ("mass_kg", "radius_m", "young_pa", "poisson_ratio") else key: value
-           for key, value in figures.items()}
-    return contact_pb2.HertzContact(striker=name, **own)
+    own = {f"striker_{key}": figures.pop(key) for key in STRIKER_FIGURES if key in figures}
+    checks.refuse_unknown(figures, [*STRIKER_FIGURES, "approach_speed_m_per_s", "reduced_mass_kg", "reduced_radius_m"],
+                          "striker")
+    return checks.message(contact_pb2.HertzContact, "striker", {"striker": name, **own, **figures})
 
 
 def to_hertz(given: Striker) -> Optional[contact_pb2.HertzContact]:
-    return contact_pb2.HertzContact(striker=given) if isinstance(given, str) else given
+    if given is None or isinstance(given, contact_pb2.HertzContact):
+        return given
+    if not isinstance(given, str):
+        raise TypeError(f"striker is of type {type(given).__name__}; it must be a name such as \"wood\", or "
+                        "carillon.striker(...)")
+    return contact_pb2.HertzContact(striker=given)
 
 
 def to_frame(name: Optional[Frame]) -> contact_pb2.Frame:
-    return contact_pb2.Frame.Value(f"FRAME_{(name or 'unspecified').upper()}")
+    return checks.choice(contact_pb2.Frame, "FRAME_", "frame", name)
+
+
+def frame_in_words(frame: contact_pb2.Frame) -> str:
+    return "the scene's frame" if frame == contact_pb2.FRAME_SCENE else "each object's own frame"
 
 
 def to_pulse_shape(name: Optional[PulseShape]) -> contact_pb2.PulseShape:
-    return contact_pb2.PulseShape.Value(f"PULSE_SHAPE_{(name or 'unspecified').upper()}")
+    return checks.choice(contact_pb2.PulseShape, "PULSE_SHAPE_", "pulse_shape", name)
 
 
 def vector(values: Array) -> contact_pb2.Vec3:
@@ -108,16 +134,23 @@ def vector(values: Array) -> contact_pb2.Vec3:
     return contact_pb2.Vec3(x=x, y=y, z=z)
 
 
-def to_pose(given: PoseLike) -> contact_pb2.Pose:
-    """Accepts a position, a pair (position, quaternion w, x, y, z), and a 4 x 4 matrix."""
+def to_pose(given: PoseLike, name: str = "pose") -> contact_pb2.Pose:
+    """Accepts a position, a pair (position, quaternion w, x, y, z), and a 4 x 4 matrix. Raises ValueError that names
+    the argument."""
     if isinstance(given, contact_pb2.Pose):
         return given
-    if isinstance(given, tuple) and len(given) == 2:
-        w, x, y, z = (float(value) for value in numpy.asarray(given[1], dtype=float))
-        return contact_pb2.Pose(position_m=vector(given[0]), orientation=contact_pb2.Quaternion(w=w, x=x, y=y, z=z))
-    array = numpy.asarray(given, dtype=float)
+    if isinstance(given, tuple) and len(given) == 2 and numpy.ndim(given[0]) > 0:
+        position = checks.three(given[0], f"the position of {name}", "metres in the scene's frame")
+        rotation = checks.numbers(given[1], f"the orientation of {name}", ROTATION)
+        if rotation.shape != (4,):
+            checks.refuse(given[1], f"the orientation of {name}", ROTATION)
+        w, x, y, z = rotation.tolist()
+        return contact_pb2.Pose(position_m=vector(position), orientation=contact_pb2.Quaternion(w=w, x=x, y=y, z=z))
+    array = checks.numbers(given, name, POSE)
     if array.shape == (4, 4):
         return to_pose((array[:3, 3], quaternion_of(array[:3, :3])))
+    if array.size != 3:
+        checks.refuse(given, name, POSE)
     return contact_pb2.Pose(position_m=vector(array))
 
 
@@ -133,33 +166,53 @@ def quaternion_of(rotation: numpy.ndarray) -> numpy.ndarray:
     return quaternion if quaternion[0] >= 0 else -quaternion
 
 
-def handles_of(objects: Any, count: int) -> numpy.ndarray:
+def handles_of(objects: Any, count: int, name: str = "objects") -> numpy.ndarray:
     """Handles as a column; one object stands for all rows."""
     if isinstance(objects, numpy.ndarray):
         handles = objects
     else:
-        handles = numpy.array([int(item) for item in numpy.atleast_1d(numpy.asarray(objects, dtype=object))])
-    return numpy.broadcast_to(handles, (count,)).astype(numpy.uint32)
+        items = numpy.atleast_1d(numpy.asarray(objects, dtype=object))
+        handles = numpy.array([_handle_of(item, name) for item in items])
+    return _column(handles, count, name).astype(numpy.uint32)
 
 
-def _rows(values: Array, name: str, width: int = 3) -> numpy.ndarray:
-    table = numpy.atleast_2d(numpy.asarray(values, dtype=float))
+def _handle_of(item: Any, name: str) -> int:
+    try:
+        return int(item)
+    except (TypeError, ValueError):
+        raise TypeError(f"{name} has an entry of type {type(item).__name__}; give the objects that Scene.add or "
+                        "Trace.add returned, or their handles") from None
+
+
+def _rows(values: Array, name: str, width: int = 3, count: Optional[int] = None) -> numpy.ndarray:
+    """A table with `width` columns, and with `count` rows unless that is None."""
+    table = numpy.atleast_2d(checks.numbers(values, name, MEANINGS[name]))
     if table.size == 0:
-        return table.reshape(0, width)
+        table = table.reshape(0, width)
     if table.ndim != 2 or table.shape[1] != width:
-        raise ValueError(f"{name} has the shape {numpy.shape(values)}; it must be N x {width}")
+        raise ValueError(f"{name} has the shape {numpy.shape(values)}; it must be N x {width}: {MEANINGS[name]}")
+    if count is not None and len(table) != count:
+        raise ValueError(f"{name} has {checks.counted(len(table), 'row')}; it must have {count}, as the points or "
+                         "positions have")
     return table
 
 
-def _numbers(values: Array, count: int) -> numpy.ndarray:
-    return numpy.broadcast_to(numpy.asarray(values, dtype=float), (count,))
+def _column(values: numpy.ndarray, count: int, name: str) -> numpy.ndarray:
+    if values.shape not in ((), (1,), (count,)):
+        raise ValueError(f"{name} has the shape {values.shape}; it must be ({count},), one for each row or one for all")
+    return numpy.broadcast_to(values, (count,))
+
+
+def _numbers(values: Array, count: int, name: str) -> numpy.ndarray:
+    return _column(checks.numbers(values, name, MEANINGS[name]), count, name)
 
 
 def _pairs(points: Array, vectors: Array, name: str) -> tuple[numpy.ndarray, numpy.ndarray]:
     """The points, and the impulses or forces there, as tables of equal length."""
     places, values = _rows(points, "points"), _rows(vectors, name)
     if len(places) != len(values):
-        raise ValueError(f"there are {len(places)} points and {len(values)} {name}; each contact needs one of both")
+        raise ValueError(f"points has {checks.counted(len(places), 'row')} and {name} has {len(values)}; each contact "
+                         "needs one of both")
     return places, values
 
 
@@ -169,10 +222,10 @@ def fill_impulse_columns(columns: contact_pb2.ImpulseColumns, given: Impulses) -
     count = len(points)
     append(columns, object=handles_of(given.objects, count), point_m=points, impulse_newton_seconds=impulses)
     if given.durations is not None:
-        durations = _numbers(given.durations, count)
+        durations = _numbers(given.durations, count, "durations")
         append(columns, duration_s=numpy.where(numpy.isnan(durations), ABSENT, durations))
     if given.time_offsets is not None:
-        append(columns, time_offset_s=_numbers(given.time_offsets, count))
+        append(columns, time_offset_s=_numbers(given.time_offsets, count, "time_offsets"))
     if given.second_objects is not None:
         _fill_second_columns(columns, given, count)
     if given.striker is not None:
@@ -183,10 +236,16 @@ def fill_impulse_columns(columns: contact_pb2.ImpulseColumns, given: Impulses) -
 def _fill_second_columns(columns: contact_pb2.ImpulseColumns, given: Union[Impulses, Forces], count: int) -> None:
     if given.second_points is None:
         raise ValueError("second_objects without second_points: each contact needs a point on its second object")
-    append(columns, second_object=handles_of(given.second_objects, count),
-           second_point_m=_rows(given.second_points, "second_points"))
+    append(columns, second_object=handles_of(given.second_objects, count, "second_objects"),
+           second_point_m=_rows(given.second_points, "second_points", 3, count))
     if given.second_rotations is not None:
-        append(columns, second_rotation=_rows(given.second_rotations, "second_rotations", 4))
+        append(columns, second_rotation=_rows(given.second_rotations, "second_rotations", 4, count))
+
+
+def strike_of(item: Any, point: Array, impulse: Array, duration: Optional[float], struck_by: Striker) -> Impulses:
+    """One strike. Raises ValueError if it has not one point and one impulse."""
+    return Impulses(item, checks.three(point, "point", OBJECT_POINT),
+                    checks.three(impulse, "impulse", OBJECT_IMPULSE), durations=duration, striker=struck_by)
 
 
 def add_contacts(step: contact_pb2.ContactStep, given: Contacts) -> int:
@@ -194,9 +253,9 @@ def add_contacts(step: contact_pb2.ContactStep, given: Contacts) -> int:
     columns = step.contact_columns
     count = fill_impulse_columns(columns.impulses, given)
     if given.partners is not None:
-        append(columns, partner=handles_of(given.partners, count))
+        append(columns, partner=handles_of(given.partners, count, "partners"))
     if given.travel_speeds is not None:
-        append(columns, travel_speed_m_per_s=_numbers(given.travel_speeds, count))
+        append(columns, travel_speed_m_per_s=_numbers(given.travel_speeds, count, "travel_speeds"))
     columns.depth = given.roughness_depth
     columns.irregularity_length_m = given.irregularity_length
     return count
@@ -210,7 +269,7 @@ def add_forces(step: contact_pb2.ContactStep, given: Forces) -> int:
     if given.second_objects is not None:
         _fill_second_columns(second, given, count)
     handles = handles_of(given.objects, count)
-    speeds = _numbers(0 if given.travel_speeds is None else given.travel_speeds, count)
+    speeds = _numbers(0 if given.travel_speeds is None else given.travel_speeds, count, "travel_speeds")
     for i in range(count):
         contact = step.sustained.add(object=int(handles[i]), point_m=vector(points[i]), force_newtons=vector(forces[i]))
         if speeds[i]:
@@ -236,14 +295,18 @@ def add_poses(step: contact_pb2.ContactStep, given: Poses) -> None:
     positions = _rows(given.positions, "positions")
     append(step.pose_columns, object=handles_of(given.objects, len(positions)), position_m=positions)
     if given.orientations is not None:
-        append(step.pose_columns, orientation=_rows(given.orientations, "orientations", 4))
+        append(step.pose_columns, orientation=_rows(given.orientations, "orientations", 4, len(positions)))
 
 
 def make_step(time: float, *, contacts: Optional[Contacts] = None, impulses: Optional[Impulses] = None,
               forces: Optional[Forces] = None, poses: Optional[Poses] = None,
               listener: Optional[PoseLike] = None) -> contact_pb2.ContactStep:
     """Makes the message of the step at a simulation time, seconds."""
-    step = contact_pb2.ContactStep(time_s=time)
+    step = contact_pb2.ContactStep(time_s=float(checks.numbers(time, "time", "the simulation time in seconds")))
+    for name, given, kind in (("contacts", contacts, Contacts), ("impulses", impulses, Impulses),
+                              ("forces", forces, Forces), ("poses", poses, Poses)):
+        if given is not None:
+            checks.expect(given, kind, name)
     if contacts is not None:
         add_contacts(step, contacts)
     if impulses is not None:
@@ -253,5 +316,5 @@ def make_step(time: float, *, contacts: Optional[Contacts] = None, impulses: Opt
     if poses is not None:
         add_poses(step, poses)
     if listener is not None:
-        step.listener.CopyFrom(to_pose(listener))
+        step.listener.CopyFrom(to_pose(listener, "listener"))
     return step

@@ -4,14 +4,19 @@
 from __future__ import annotations
 
 import contextlib
+import inspect
+import re
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 
 import grpc
 
-from carillon.v1 import contact_pb2, error_pb2
+from carillon.checks import counted
+from carillon.v1 import contact_pb2, contact_service_pb2, error_pb2
 
 DETAILS_KEY = "grpc-status-details-bin"
+# The caller's names of fields of the contract that messages of the daemon mention.
+CALLER_NAMES = {"step_s": "step", "scheduling_delay_s": "delay", "glide_s": "glide"}
 
 
 class CarillonError(Exception):
@@ -34,23 +39,66 @@ class ServerUnavailable(CarillonError):
 
 
 class ContactWarning(UserWarning):
-    """Contacts were rejected, or lie far from the surfaces of their objects."""
+    """Contacts were late, lost or rejected, or lie far from the surfaces of their objects."""
 
 
-def warn_of_contacts(findings: contact_pb2.ContactFindings, rejected_count: int = 0,
-                     last_rejection: error_pb2.ErrorInfo | None = None) -> None:
-    """Warns of what is probably a mistake of the caller."""
-    if rejected_count and last_rejection is not None:
-        warnings.warn(f"{rejected_count} contacts were rejected, the last one with {last_rejection.reason}: "
-                      f"{last_rejection.message}", ContactWarning, stacklevel=3)
-    if findings.distant_point_count:
-        warnings.warn(f"{findings.distant_point_count} contacts lie up to {findings.largest_distance_m:.3g} m away "
-                      "from the surfaces of their objects and sound at the nearest points; give points in metres, in "
-                      "the frame of the stream", ContactWarning, stacklevel=3)
+def warn_of_contacts(findings: contact_pb2.ContactFindings, frame: str) -> None:
+    """Warns of contacts that are probably a mistake of the caller. `frame` is that of their points."""
+    if count := findings.distant_point_count:
+        _warn(f"{counted(count, 'contact')} {'lies' if count == 1 else 'lie'} up to "
+              f"{findings.largest_distance_m:.3g} m away from the surfaces of the objects, and sound"
+              f"{'s' if count == 1 else ''} at the nearest points; give points in metres, in {frame}")
+
+
+def warn_of_stream(report: contact_service_pb2.StreamContactsResponse, frame: str, dropped_step_count: int = 0) -> None:
+    """Warns, once and at the end of a stream, of the contacts that did not sound as the caller meant."""
+    told = []
+    if report.late_count:
+        told.append(f"{_were(report.late_count, 'contact')} late, and sounded at once instead of at the right time: "
+                    "send each step when it happens, or open the stream with a longer delay, in seconds (it was "
+                    f"{report.scheduling_delay_s:.3g})")
+    if report.remap_count:
+        told.append(f"simulation time was mapped anew {counted(report.remap_count, 'time')}, because every step of a "
+                    "quarter of a second was late: the simulator paused, or is slower than real time, for which "
+                    "carillon.Trace suits")
+    if report.dropped_count:
+        told.append(f"{_were(report.dropped_count, 'contact')} lost, because too many waited for the mixer")
+    if dropped_step_count:
+        told.append(f"{_were(dropped_step_count, 'step')} not sent, because too many waited for the network")
+    if report.rejected_count:
+        told.append(f"{_were(report.rejected_count, 'contact')} rejected, the last one with "
+                    f"{report.last_rejection.reason}: "
+                    + report.last_rejection.message.replace("the object's frame", frame))
+    if told:
+        _warn("; ".join(told))
+    warn_of_contacts(report.findings, frame)
+
+
+def _warn(text: str) -> None:
+    """Warns as of the line outside this package that has called it."""
+    frame, level = inspect.currentframe(), 1
+    while frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] == "carillon":
+        frame, level = frame.f_back, level + 1
+    warnings.warn(text, ContactWarning, stacklevel=level)
+
+
+def _were(count: int, noun: str) -> str:
+    return f"{counted(count, noun)} {'was' if count == 1 else 'were'}"
+
+
+def in_names_of_caller(text: str, names: Mapping[str, str]) -> str:
+    """Replaces names of the contract by those of the caller, and adds the unit, seconds, that the name loses."""
+    for field, name in names.items():
+        text = re.sub(rf"\b{field} is (\S+); it must be (\S+) to (\S+)", rf"{name} is \1 s; it must be \2 to \3 s",
+                      text)
+        text = re.sub(rf"\b{field} is (\S+);", rf"{name} is \1 s;", text)
+        text = re.sub(rf"\b{field}\b", name, text)
+    return text
 
 
 def from_info(info: error_pb2.ErrorInfo) -> CarillonError:
-    return CarillonError(info.reason, info.message, dict(info.metadata), info.remedies)
+    return CarillonError(info.reason, in_names_of_caller(info.message, CALLER_NAMES), dict(info.metadata),
+                         info.remedies)
 
 
 def from_rpc(error: grpc.RpcError, server: str) -> CarillonError:
@@ -74,3 +122,13 @@ def translated(server: str) -> Iterator[None]:
         yield
     except grpc.RpcError as error:
         raise from_rpc(error, server) from error
+
+
+@contextlib.contextmanager
+def in_names(**names: str) -> Iterator[None]:
+    """Raises a refusal within the block with the caller's names of fields of the contract."""
+    try:
+        yield
+    except CarillonError as error:
+        message = in_names_of_caller(error.message, names)
+        raise type(error)(error.reason, message, error.metadata, error.remedies) from error.__cause__

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
-from carillon import errors, progress
+from carillon import checks, errors, progress
 from carillon.materials import Material
 from carillon.v1 import decomposition_pb2, decomposition_service_pb2
 
@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 
 def to_states(states: Iterable[str]) -> list[Any]:
     """The values of the contract for states such as "failed"."""
-    return [decomposition_pb2.JobState.Value(f"JOB_STATE_{state.upper()}") for state in states]
+    listed = [states] if isinstance(states, str) else states
+    return [checks.choice(decomposition_pb2.JobState, "JOB_STATE_", "an entry of states", state) for state in listed]
 
 
 class Job:
@@ -69,4 +70,5 @@ class Job:
         return self
 
     def __repr__(self) -> str:
-        return f"<Job {self.message.label or self.name}: {self.state}, {self.message.progress.fraction:.0%}>"
+        share = f", {self.message.progress.fraction:.0%}" if self.state == "running" else ""
+        return f"<Job {self.message.label or self.name}: {self.state}{share}>"

@@ -4,17 +4,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any, Literal, Optional, Union
+from typing import Any, Literal, Optional, Protocol, Union
 
 import numpy
 
+from carillon import checks
 from carillon.v1 import material_pb2, modal_model_service_pb2, radiation_pb2
-
-if TYPE_CHECKING:
-    from carillon.models import Model
 
 Material = Union[str, material_pb2.Material]
 Radiation = Literal["paper_coupling", "radiated_power", "modes_only"]
+
+
+class ModelLike(Protocol):
+    """A Model, or an AsyncModel."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def material(self) -> Optional[Material]: ...
 
 
 def material(preset: str = "", *, loss_factor: float | dict[float, float] | None = None,
@@ -24,7 +32,7 @@ def material(preset: str = "", *, loss_factor: float | dict[float, float] | None
     `figures` are young_pa, poisson_ratio, density_kg_per_m3, alpha1_s and alpha2_per_s. `loss_factor` is a number, or a
     table from the frequency in Hz to the loss factor there.
     """
-    made = material_pb2.Material(preset=preset, **figures)
+    made: material_pb2.Material = checks.message(material_pb2.Material, "material", {"preset": preset, **figures})
     if loss_factor is not None:
         table = loss_factor if isinstance(loss_factor, dict) else {1000.0: loss_factor}
         for frequency_hz, value in sorted(table.items()):
@@ -33,14 +41,19 @@ def material(preset: str = "", *, loss_factor: float | dict[float, float] | None
 
 
 def to_message(given: Material) -> material_pb2.Material:
-    return material_pb2.Material(preset=given) if isinstance(given, str) else given
+    if isinstance(given, material_pb2.Material):
+        return given
+    if not isinstance(given, str):
+        raise TypeError(f"material is of type {type(given).__name__}; it must be a name such as \"oak\", or "
+                        "carillon.material(...)")
+    return material_pb2.Material(preset=given)
 
 
 def to_radiation(name: Optional[Radiation]) -> radiation_pb2.RadiationModel:
-    return radiation_pb2.RadiationModel.Value(f"RADIATION_MODEL_{(name or 'unspecified').upper()}")
+    return checks.choice(radiation_pb2.RadiationModel, "RADIATION_MODEL_", "radiation", name)
 
 
-def named(model: Model | str, given: Optional[Material]) -> tuple[str, Optional[material_pb2.Material]]:
+def named(model: ModelLike | str, given: Optional[Material]) -> tuple[str, Optional[material_pb2.Material]]:
     """Returns the name of a model, and the material to sound with: the one given, or else the one that the model was
     asked for with. None leaves the choice to the daemon, which remembers it, too."""
     name = model if isinstance(model, str) else model.name

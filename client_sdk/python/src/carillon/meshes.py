@@ -71,8 +71,8 @@ def _beside(file: pathlib.Path, uri: str) -> pathlib.Path:
 
 def make_obj(vertices: Any, triangles: Any, label: str = "") -> MeshFile:
     """Makes an OBJ file of N x 3 coordinates and M x 3 indices that count from zero."""
-    points = _table(vertices, float, "vertices")
-    corners = _table(triangles, numpy.int64, "triangles")
+    points = _table(vertices, float, "vertices", "metres")
+    corners = _table(triangles, numpy.int64, "triangles", "indices of vertices that count from zero")
     if len(corners) and (corners.min() < 0 or corners.max() >= len(points)):
         raise CarillonError("MESH_INDEX_OUT_OF_RANGE", f"a triangle names a vertex outside 0 to {len(points) - 1}; "
                             "indices count from zero")
@@ -104,8 +104,8 @@ def to_mesh_file(mesh: Any) -> MeshFile:
                     "and faces or triangles")
 
 
-def _table(values: Any, kind: Any, name: str) -> numpy.ndarray:
+def _table(values: Any, kind: Any, name: str, meaning: str) -> numpy.ndarray:
     table = numpy.asarray(values, dtype=kind)
     if table.ndim != 2 or table.shape[1] != 3:
-        raise CarillonError("MESH_SHAPE_WRONG", f"{name} has the shape {table.shape}; it must be N x 3")
+        raise CarillonError("MESH_SHAPE_WRONG", f"{name} has the shape {table.shape}; it must be N x 3: {meaning}")
     return table

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Optional
 
 import numpy
 
-from carillon import errors, materials
-from carillon.contacts import Array, Impulses, Striker
+from carillon import checks, errors, materials
+from carillon.contacts import Array, Striker, strike_of
 from carillon.sound import Sound
 from carillon.traces import Trace
 from carillon.v1 import modal_model_pb2, modal_model_service_pb2
@@ -106,8 +106,9 @@ class Model:
         the sound has died away."""
         trace = Trace(simulator="carillon (Python)")
         body = trace.add(self, material, size=size, gain=gain)
-        trace.step(0.0, impulses=Impulses(body, point, impulse, durations=duration, striker=striker))
-        return self._client.render(trace, tail_s=seconds, sample_rate_hz=sample_rate_hz)
+        trace.step(0.0, impulses=strike_of(body, point, impulse, duration, striker))
+        with errors.in_names(tail_s="seconds"):
+            return self._client.render(trace, tail_s=seconds, sample_rate_hz=sample_rate_hz)
 
     def update(self, *, label: Optional[str] = None, add_tags: tuple[str, ...] = (),
                remove_tags: tuple[str, ...] = (), pinned: Optional[bool] = None) -> None:
@@ -135,7 +136,7 @@ class Model:
         return plots.plot_shape(self.arrays, mode, axes)
 
     def __repr__(self) -> str:
-        return f"<Model {self.label or self.name}: {self.mode_count} modes>"
+        return f"<Model {self.label or self.name}: {checks.counted(self.mode_count, 'mode')}>"
 
     def _repr_html_(self) -> str:
         header = self.summary.header

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Optional
 
 import grpc
 
-from carillon import contacts, errors, materials
+from carillon import checks, contacts, errors, materials
 from carillon.contacts import Array, Contacts, Forces, Impulses, PoseLike, Poses, make_step
 from carillon.sound import Sound
 from carillon.traces import Trace
@@ -19,10 +19,10 @@ from carillon.v1 import contact_pb2, contact_service_pb2, scene_service_pb2
 
 if TYPE_CHECKING:
     from carillon.client import Client
-    from carillon.models import Model
 
 # Steps that may wait for the network before the oldest is dropped.
 MOST_WAITING = 4096
+ADD_ARGUMENTS = ("model", "material", "size", "gain", "pose", "handle", "radiation")
 
 
 class SoundingObject:
@@ -47,8 +47,9 @@ class SoundingObject:
         """Strikes the object now: the point in metres and the impulse in newton seconds, both in the object's own
         frame; `duration` of the contact in seconds, or the `striker`, such as "wood". Raises CarillonError if the
         strike is refused."""
+        impulses = contacts.strike_of(self, point, impulse, duration, striker)
         stream = self._scene.stream(step=0.001, delay=0)
-        stream.step(0.0, impulses=Impulses(self, point, impulse, durations=duration, striker=striker))
+        stream.step(0.0, impulses=impulses)
         stream.close(warn=False)
         if stream.rejection:
             raise stream.rejection
@@ -73,8 +74,8 @@ class SoundingObject:
 
     def __repr__(self) -> str:
         item = self.message
-        return (f"<SoundingObject {item.handle}: {item.sounding_mode_count} modes, {item.lowest_frequency_hz:.1f} to "
-                f"{item.highest_frequency_hz:.1f} Hz>")
+        return (f"<SoundingObject {item.handle}: {checks.counted(item.sounding_mode_count, 'mode')}, "
+                f"{item.lowest_frequency_hz:.1f} to {item.highest_frequency_hz:.1f} Hz>")
 
 
 class Scene:
@@ -86,20 +87,27 @@ class Scene:
         self.name = name
         self.existing = existing
 
+    def __repr__(self) -> str:
+        return f"<Scene {self.name} of {self.client.server}>"
+
     def get(self) -> scene_service_pb2.Scene:
         """Returns the scene's state: its volume, peak, and how long it lasts."""
         with errors.translated(self.client.server):
             return self.client.scenes_stub.GetScene(scene_service_pb2.GetSceneRequest(name=self.name)).scene
 
-    def add_all(self, objects: Iterable[Mapping[str, Any] | Model | str]) -> list[SoundingObject]:
+    def add_all(self, objects: Iterable[Mapping[str, Any] | materials.ModelLike | str]) -> list[SoundingObject]:
         """Adds all objects, or none if one is refused; `metadata["index"]` of the error is its place. An object is a
         model, or the arguments of `add` by name, such as {"model": bell, "handle": 3, "gain": 0.5}."""
-        requests = [self._request(**item) if isinstance(item, Mapping) else self._request(item) for item in objects]
+        requests = []
+        for i, item in enumerate(objects):
+            if isinstance(item, Mapping):
+                checks.refuse_unknown(item, ADD_ARGUMENTS, f"object {i} of add_all")
+            requests.append(self._request(**item) if isinstance(item, Mapping) else self._request(item))
         request = scene_service_pb2.AddObjectsRequest(scene=self.name, objects=requests)
         with errors.translated(self.client.server):
             return [SoundingObject(self, item) for item in self.client.scenes_stub.AddObjects(request).objects]
 
-    def add(self, model: Model | str, material: Optional[materials.Material] = None, *, size: float = 1,
+    def add(self, model: materials.ModelLike | str, material: Optional[materials.Material] = None, *, size: float = 1,
             gain: float = 1, pose: Optional[PoseLike] = None, handle: int = 0,
             radiation: Optional[materials.Radiation] = None) -> SoundingObject:
         """Adds an object, ready to be struck. Without a material it gets the one that the model was asked for with."""
@@ -107,13 +115,13 @@ class Scene:
         with errors.translated(self.client.server):
             return SoundingObject(self, self.client.scenes_stub.AddObject(request).object)
 
-    def _request(self, model: Model | str, material: Optional[materials.Material] = None, *, size: float = 1,
-                 gain: float = 1, pose: Optional[PoseLike] = None, handle: int = 0,
+    def _request(self, model: materials.ModelLike | str, material: Optional[materials.Material] = None, *,
+                 size: float = 1, gain: float = 1, pose: Optional[PoseLike] = None, handle: int = 0,
                  radiation: Optional[materials.Radiation] = None) -> scene_service_pb2.AddObjectRequest:
         name, message = materials.named(model, material)
-        return scene_service_pb2.AddObjectRequest(
+        return checks.message(scene_service_pb2.AddObjectRequest, "add", dict(
             scene=self.name, modal_model=name, material=message, size=size, gain=gain, handle=handle,
-            pose=None if pose is None else contacts.to_pose(pose), radiation=materials.to_radiation(radiation))
+            pose=None if pose is None else contacts.to_pose(pose), radiation=materials.to_radiation(radiation)))
 
     def objects(self) -> list[SoundingObject]:
         """Returns the objects of the scene by their handles."""
@@ -195,11 +203,13 @@ class TraceRecording:
 class ContactStream:
     """Sends the contacts of each step without waiting for the daemon: a thread sends them, and another reads the
     answers. `report` is the newest answer, with the counts so far; `dropped_step_count` steps were not sent: the
-    oldest ones, when more than 4096 waited. At the end of the block a ContactWarning tells of contacts that were
-    rejected or lie far from their objects."""
+    oldest ones, when more than 4096 waited. At the end of the block one ContactWarning tells of contacts that were
+    late (`late_count`), lost or rejected and of time that was mapped anew (`remap_count`), and another of contacts that
+    lie far from their objects."""
 
     def __init__(self, scene: Scene, start: contact_service_pb2.ContactStreamStart):
         self._server = scene.client.server
+        self._start = start
         self._requests: queue.SimpleQueue[Optional[contact_service_pb2.StreamContactsRequest]] = queue.SimpleQueue()
         self._error: Optional[grpc.RpcError] = None
         self.report: contact_service_pb2.StreamContactsResponse = contact_service_pb2.StreamContactsResponse()
@@ -217,6 +227,16 @@ class ContactStream:
     def rejection(self) -> Optional[errors.CarillonError]:
         """Why the newest rejected contact was rejected; None if none was so far."""
         return errors.from_info(self.report.last_rejection) if self.report.rejected_count else None
+
+    @property
+    def late_count(self) -> int:
+        """How many contacts came too late for their time so far, and sounded at once."""
+        return self.report.late_count
+
+    @property
+    def remap_count(self) -> int:
+        """How many times simulation time was mapped anew so far, because every step was late."""
+        return self.report.remap_count
 
     @property
     def waiting_step_count(self) -> int:
@@ -247,7 +267,7 @@ class ContactStream:
         if self._error:
             raise errors.from_rpc(self._error, self._server)
         if warn:
-            errors.warn_of_contacts(self.findings, self.report.rejected_count, self.report.last_rejection)
+            errors.warn_of_stream(self.report, contacts.frame_in_words(self._start.frame), self.dropped_step_count)
         return self.report
 
     def _sent(self, start: contact_service_pb2.ContactStreamStart
@@ -263,6 +283,12 @@ class ContactStream:
         except grpc.RpcError as error:
             self._error = error
             self._requests.put(None)  # ends the thread that sends
+
+    def __repr__(self) -> str:
+        report = self.report
+        return (f"<ContactStream of {self._start.scene}: {checks.counted(report.step_count, 'step')}, "
+                f"{checks.counted(report.accepted_count, 'contact')} in time, {report.late_count} late, "
+                f"{report.rejected_count} rejected>")
 
     def __enter__(self) -> ContactStream:
         return self

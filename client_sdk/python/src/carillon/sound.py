@@ -12,10 +12,11 @@ from typing import Any, Optional
 
 import numpy
 
+from carillon import checks
 from carillon.v1 import audio_service_pb2
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Sound:
     """Frames x channels of float32; full scale is 1. `lost_frame_count` frames were not received. `summary` has
     what the daemon measured while it rendered the sound offline: loudness, pressure, findings about the contacts.
@@ -26,6 +27,10 @@ class Sound:
     lost_frame_count: int = 0
     summary: Optional[audio_service_pb2.RenderSummary] = None
     blows: tuple[audio_service_pb2.Blow, ...] = ()
+
+    def __repr__(self) -> str:
+        return (f"<Sound: {self.seconds:.3g} s, {self.sample_rate_hz} Hz, "
+                f"{checks.counted(self.samples.shape[1], 'channel')}, peak {self.peak:.3g}>")
 
     @property
     def seconds(self) -> float:

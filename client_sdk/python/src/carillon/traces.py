@@ -5,36 +5,35 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, BinaryIO, Optional
+from typing import BinaryIO, Optional
 
 from google.protobuf.message import DecodeError
 
-from carillon import contacts, materials
+from carillon import checks, contacts, materials
 from carillon.columns import varint
 from carillon.contacts import Contacts, Forces, Impulses, PoseLike, Poses, make_step
 from carillon.errors import CarillonError
 from carillon.v1 import contact_pb2, contact_trace_pb2, hearing_pb2
 
-if TYPE_CHECKING:
-    from carillon.models import Model
-
 FORMAT_VERSION = 1
 
 
 class Trace:
-    """A trace in memory: `header`, `objects` and `steps` are the messages of contact_trace.proto."""
+    """A trace in memory: `header`, `objects` and `steps` are the messages of contact_trace.proto. `step`, the length of
+    the simulator's steps in seconds, is needed for all but impulses: by it the daemon knows whether a step was left
+    out, and so when a blow is over. A rendering dates each blow as a stream does, which adds its scheduling delay."""
 
     def __init__(self, step: float = 0, *, simulator: str = "", hearing: Optional[hearing_pb2.Hearing] = None,
                  listener: Optional[PoseLike] = None, frame: Optional[contacts.Frame] = None,
                  pulse_shape: Optional[contacts.PulseShape] = None):
         self.header = contact_trace_pb2.ContactTraceHeader(
             format_version=FORMAT_VERSION, simulator=simulator, step_s=step, hearing=hearing,
-            listener=None if listener is None else contacts.to_pose(listener), frame=contacts.to_frame(frame),
-            pulse_shape=contacts.to_pulse_shape(pulse_shape))
+            listener=None if listener is None else contacts.to_pose(listener, "listener"),
+            frame=contacts.to_frame(frame), pulse_shape=contacts.to_pulse_shape(pulse_shape))
         self.objects: list[contact_trace_pb2.ContactTraceObject] = []
         self.steps: list[contact_pb2.ContactStep] = []
 
-    def add(self, model: Model | str, material: Optional[materials.Material] = None, *, size: float = 1,
+    def add(self, model: materials.ModelLike | str, material: Optional[materials.Material] = None, *, size: float = 1,
             gain: float = 1, pose: Optional[PoseLike] = None, label: str = "", handle: Optional[int] = None,
             radiation: Optional[materials.Radiation] = None) -> int:
         """Adds an object, which is there from the beginning. Returns its handle."""
@@ -51,8 +50,15 @@ class Trace:
         """Adds a step, as ContactStream.step sends one. Times must not go back."""
         if self.steps and time < self.steps[-1].time_s:
             raise ValueError(f"time goes back from {self.steps[-1].time_s} to {time} s; add the steps in order")
+        if not self.header.step_s and any(item is not None for item in (contacts, forces, poses)):
+            raise ValueError("contacts, forces and poses need the length of the simulator's steps in seconds, as in a "
+                             "stream: Trace(step=1/240)")
         self.steps.append(make_step(time, contacts=contacts, impulses=impulses, forces=forces, poses=poses,
                                     listener=listener))
+
+    def __repr__(self) -> str:
+        return (f"<Trace: {checks.counted(len(self.objects), 'object')}, {checks.counted(len(self.steps), 'step')}, to "
+                f"{self.steps[-1].time_s if self.steps else 0:.6g} s>")
 
     def records(self) -> Iterator[contact_trace_pb2.ContactTraceRecord]:
         """The header, the objects, then the steps."""

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+/** Checks of the caller's arguments. Their messages have the caller's own names, and the units. */
+'use strict';
+
+const util = require('util');
+const { message } = require('./contract');
+
+/** "1 contact", "2 contacts". */
+function counted(count, noun) {
+  return Number(count) === 1 ? `${count} ${noun}` : `${count} ${noun}s`;
+}
+
+/** The number of letters to insert, remove or replace between two words. */
+function distance(one, other) {
+  let row = Array.from({ length: other.length + 1 }, (_, i) => i);
+  for (let i = 1; i <= one.length; i += 1) {
+    const next = [i];
+    for (let j = 1; j <= other.length; j += 1) {
+      next.push(Math.min(row[j] + 1, next[j - 1] + 1, row[j - 1] + (one[i - 1] === other[j - 1] ? 0 : 1)));
+    }
+    row = next;
+  }
+  return row[other.length];
+}
+
+function hint(name, known) {
+  const names = known.filter((right) => !right.startsWith('_')); // without those that only the daemon uses
+  const nearest = names.map((right) => ({ right, far: right.startsWith(name) ? 1 : distance(name, right) }))
+    .sort((one, other) => one.far - other.far)[0];
+  return nearest && nearest.far <= Math.max(2, name.length / 3) ? `did you mean "${nearest.right}"?`
+    : `it has ${names.sort().join(', ')}`;
+}
+
+/** Throws a TypeError with the nearest known name if an object has a key that is unknown. */
+function refuseUnknown(given, known, where) {
+  for (const name in given) {
+    if (!known.includes(name)) throw new TypeError(`${where} has no "${name}"; ${hint(name, known)}`);
+  }
+}
+
+function show(value) {
+  const text = util.inspect(value, { breakLength: Infinity });
+  return text.length <= 80 ? text : `${text.slice(0, 77)}...`;
+}
+
+function refuse(value, name, wanted) {
+  throw new TypeError(`${name} is ${show(value)}; it must be ${wanted}`);
+}
+
+const NUMBERS = new Set(['TYPE_DOUBLE', 'TYPE_FLOAT', 'TYPE_UINT32', 'TYPE_INT32']);
+
+/** Throws a TypeError if an object is no message of the contract: by an unknown field, word or kind of value. */
+function refuseNoMessage(given, type, where, more = []) {
+  const { field: fields, oneofDecl: choices } = message(type).type;
+  // The messages that come from the daemon also tell which field of a choice they have.
+  const names = [...fields, ...choices].map((item) => item.name);
+  refuseUnknown(given, [...names, ...fields.map((field) => `_${field.name}`), ...more], where);
+  for (const field of fields) {
+    const value = given[field.name];
+    const isAbsent = value === undefined || value === null;
+    if (!isAbsent && field.label !== 'LABEL_REPEATED') refuseWrongField(value, field, where);
+  }
+}
+
+function refuseWrongField(value, field, where) {
+  const name = `${field.name} of ${where}`;
+  if (NUMBERS.has(field.type) && typeof value !== 'number') refuse(value, name, 'a number');
+  if (field.type === 'TYPE_STRING' && typeof value !== 'string') refuse(value, name, 'text');
+  if (field.type === 'TYPE_ENUM' && typeof value === 'string') {
+    const words = message(field.typeName.split('.').at(-1)).type.value.map((item) => item.name);
+    if (!words.includes(value)) refuse(value, name, `one of ${words.join(', ')}`);
+  }
+  if (field.type === 'TYPE_MESSAGE') {
+    if (typeof value !== 'object') refuse(value, name, `a ${field.typeName} of the contract`);
+    refuseNoMessage(value, field.typeName.split('.').at(-1), field.name);
+  }
+}
+
+/** The name in the contract of a word of the caller, such as "scene"; undefined if there is none. */
+function choice(given, words, prefix, name) {
+  if (given === undefined || given === null) return undefined;
+  const word = typeof given === 'string' ? given.toLowerCase() : given;
+  if (!words.includes(word)) refuse(given, name, `one of ${words.map((right) => `"${right}"`).join(', ')}`);
+  return prefix + word.toUpperCase();
+}
+
+/** Throws a TypeError unless the values are `count` numbers. Returns them. */
+function tuple(values, count, name, meaning) {
+  const isTuple = values !== null && typeof values === 'object' && values.length === count;
+  for (let i = 0; i < count; i += 1) if (!isTuple || typeof values[i] !== 'number') refuse(values, name, meaning);
+  return values;
+}
+
+module.exports = { choice, counted, refuse, refuseNoMessage, refuseUnknown, tuple };

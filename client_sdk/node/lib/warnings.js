@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+'use strict';
+
+const { counted } = require('./checks');
+
+function were(count, noun) {
+  return `${counted(count, noun)} ${Number(count) === 1 ? 'was' : 'were'}`;
+}
+
+function warn(text) {
+  process.emitWarning(text, 'ContactWarning');
+}
+
+/** Warns of contacts that are probably a mistake of the caller. `frame` is that of their points. */
+function warnOfContacts(findings, frame) {
+  const count = Number(findings?.distant_point_count ?? 0);
+  if (!count) return;
+  const distance = Number(findings.largest_distance_m.toPrecision(3));
+  warn(`${counted(count, 'contact')} ${count === 1 ? 'lies' : 'lie'} up to ${distance} m away from the surfaces of the ` +
+    `objects, and sound${count === 1 ? 's' : ''} at the nearest points; give points in metres, in ${frame}`);
+}
+
+/** Warns, once and at the end of a stream, of the contacts that did not sound as the caller meant. */
+function warnOfStream(report, frame, droppedStepCount) {
+  const told = [];
+  if (report.late_count) {
+    told.push(`${were(report.late_count, 'contact')} late, and sounded at once instead of at the right time: send each ` +
+      'step when it happens, or open the stream with a longer delay, in seconds (it was ' +
+      `${Number(report.scheduling_delay_s.toPrecision(3))})`);
+  }
+  if (report.remap_count) {
+    told.push(`simulation time was mapped anew ${counted(report.remap_count, 'time')}, because every step of a quarter ` +
+      'of a second was late: the simulator paused, or is slower than real time, for which carillon.Trace suits');
+  }
+  if (report.dropped_count) {
+    told.push(`${were(report.dropped_count, 'contact')} lost, because too many waited for the mixer`);
+  }
+  if (droppedStepCount) {
+    told.push(`${were(droppedStepCount, 'step')} not sent, because too many waited for the network`);
+  }
+  if (report.rejected_count) {
+    const { reason, message } = report.last_rejection;
+    told.push(`${were(report.rejected_count, 'contact')} rejected, the last one with ${reason}: ` +
+      message.replaceAll("the object's frame", frame));
+  }
+  if (told.length) warn(told.join('; '));
+  warnOfContacts(report.findings, frame);
+}
+
+module.exports = { warnOfContacts, warnOfStream };

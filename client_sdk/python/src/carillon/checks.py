@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Checks of the caller's arguments. Their messages have the caller's own names, and the units."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Collection, Iterable, Mapping
+from typing import Any, NoReturn, Optional
+
+import numpy
+
+
+def counted(count: int, noun: str) -> str:
+    """Returns a number with its noun: "1 contact", "2 contacts"."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def refuse_unknown(given: Iterable[str], known: Collection[str], where: str) -> None:
+    """Raises TypeError with the nearest known name if a given name is unknown."""
+    for name in given:
+        if name not in known:
+            nearest = difflib.get_close_matches(name, known, 1)
+            hint = f'did you mean "{nearest[0]}"?' if nearest else f"it has {', '.join(sorted(known))}"
+            raise TypeError(f'{where} has no "{name}"; {hint}')
+
+
+def message(kind: Any, where: str, given: Mapping[str, Any]) -> Any:
+    """Makes a message of arguments that have the names of its fields. Raises TypeError that names the argument which
+    is unknown or of the wrong type."""
+    fields = kind.DESCRIPTOR.fields_by_name
+    _refuse_unknown_fields(kind.DESCRIPTOR, where, given)
+    try:
+        return kind(**given)
+    except (TypeError, ValueError) as error:
+        for name, value in given.items():
+            _refuse_wrong(kind, fields[name], where, value, error)
+        raise
+
+
+def _refuse_unknown_fields(descriptor: Any, where: str, given: Mapping[str, Any]) -> None:
+    """Raises TypeError for an unknown name in the arguments, or in a dictionary that stands for a message."""
+    refuse_unknown(given, descriptor.fields_by_name, where)
+    for name, value in given.items():
+        inner = descriptor.fields_by_name[name].message_type
+        if isinstance(value, Mapping) and inner is not None and not inner.GetOptions().map_entry:
+            _refuse_unknown_fields(inner, name, value)
+
+
+def _refuse_wrong(kind: Any, field: Any, where: str, value: Any, cause: Exception) -> None:
+    """Raises TypeError if a field cannot have the value."""
+    try:
+        kind(**{field.name: value})
+    except (TypeError, ValueError):
+        wanted = "a number"
+        if field.enum_type is not None:
+            wanted = "one of " + ", ".join(field.enum_type.values_by_name)
+        elif field.message_type is not None:
+            wanted = f"a {field.message_type.name} of the contract, or a dictionary"
+        elif field.cpp_type == field.CPPTYPE_STRING:
+            wanted = "text"
+        elif field.cpp_type == field.CPPTYPE_UINT32 or field.cpp_type == field.CPPTYPE_UINT64:
+            wanted = "a whole number, zero or more"
+        raise TypeError(f"{field.name} of {where} is {value!r}; it must be {wanted}") from cause
+
+
+def choice(enum: Any, prefix: str, name: str, given: Optional[str]) -> Any:
+    """Returns the value of the contract for a word of the caller, and the unspecified one for None."""
+    words = {label.removeprefix(prefix).lower(): value for label, value in enum.items()}
+    unspecified = words.pop("unspecified")
+    if given is None:
+        return unspecified
+    if not isinstance(given, str) or given.lower() not in words:
+        raise ValueError(f"{name} is {given!r}; it must be one of " + ", ".join(f'"{word}"' for word in words))
+    return words[given.lower()]
+
+
+def expect(given: Any, kind: type, name: str) -> None:
+    """Raises TypeError if an argument is not of the class of this package."""
+    if not isinstance(given, kind):
+        raise TypeError(f"{name} is of type {type(given).__name__}; it must be a carillon.{kind.__name__}")
+
+
+def numbers(values: Any, name: str, meaning: str) -> numpy.ndarray:
+    """Converts to an array. Raises ValueError that says what the numbers mean if that is impossible."""
+    try:
+        return numpy.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        refuse(values, name, meaning)
+
+
+def three(values: Any, name: str, meaning: str) -> numpy.ndarray:
+    """Converts to x, y, z. Raises ValueError if there are not three numbers."""
+    array = numbers(values, name, f"x, y, z, {meaning}")
+    if array.size != 3:
+        refuse(values, name, f"three numbers: x, y, z, {meaning}")
+    return array.reshape(3)
+
+
+def refuse(given: Any, name: str, wanted: str) -> NoReturn:
+    """Raises ValueError that shows the value, cut if it is long."""
+    shown = " ".join(repr(given).split())
+    raise ValueError(f"{name} is {shown if len(shown) <= 80 else shown[:77] + '...'}; it must be {wanted}")

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client_sdk/cli/find_model.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "proto/cpp/error_reason.h"
+
+namespace carillon::cli {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Not;
+
+const std::string kDigest(64, 'a');
+
+/// A daemon without models, and with one job, whose model it has yet to make.
+class DaemonWithJob : public client::Client {
+ public:
+  explicit DaemonWithJob(v1::JobState state) {
+    job_.set_name("jobs/" + kDigest);
+    job_.set_modal_model("modalModels/" + kDigest);
+    job_.set_label("bell");
+    job_.set_state(state);
+    if (state != v1::JOB_STATE_FAILED) return;
+    job_.mutable_error()->set_reason("MESH_NOT_CLOSED");
+    job_.mutable_error()->set_message("the surface has 12 open edges");
+  }
+
+  absl::StatusOr<v1::ListModalModelsResponse> ListModalModelsPage(
+      const v1::ListModalModelsRequest&) const override {
+    return v1::ListModalModelsResponse();
+  }
+  absl::StatusOr<v1::ModalModelSummary> GetModalModel(const std::string& name) const override {
+    return Refusal(absl::StatusCode::kNotFound, "MODAL_MODEL_NOT_FOUND", name);
+  }
+  absl::StatusOr<v1::ListJobsResponse> ListJobsPage(const v1::ListJobsRequest&) const override {
+    v1::ListJobsResponse list;
+    *list.add_jobs() = job_;
+    return list;
+  }
+
+  v1::Job& job() { return job_; }
+
+ private:
+  v1::Job job_;
+};
+
+std::string MessageOf(const client::Client& daemon, const std::string& text) {
+  const v1::ErrorInfo error = ToErrorInfo(FindModel(daemon, text).status());
+  EXPECT_EQ(error.reason(), "MODAL_MODEL_NOT_FOUND");
+  return error.message();
+}
+
+TEST(FindModel, SaysThatTheJobOfAModelWaitsOrRunsAndHowToWaitForIt) {
+  for (const std::string& text :
+       {std::string("bell"), kDigest.substr(0, 5), "modalModels/" + kDigest}) {
+    EXPECT_THAT(MessageOf(DaemonWithJob(v1::JOB_STATE_QUEUED), text),
+                AllOf(HasSubstr("is queued"), HasSubstr("`carillon job watch aaaaaaaaaaaa`"),
+                      HasSubstr("`carillon job show aaaaaaaaaaaa`"), HasSubstr("--wait")))
+        << text;
+    EXPECT_THAT(MessageOf(DaemonWithJob(v1::JOB_STATE_RUNNING), text), HasSubstr("is running"));
+  }
+}
+
+TEST(FindModel, SaysWhyTheJobOfAModelFailed) {
+  EXPECT_THAT(MessageOf(DaemonWithJob(v1::JOB_STATE_FAILED), "bell"),
+              AllOf(HasSubstr("MESH_NOT_CLOSED: the surface has 12 open edges"),
+                    HasSubstr("`carillon model create` again")));
+  EXPECT_THAT(MessageOf(DaemonWithJob(v1::JOB_STATE_CANCELLED), "bell"), HasSubstr("cancelled"));
+}
+
+TEST(FindModel, SaysNothingOfJobsThatDoNotMakeTheModel) {
+  EXPECT_THAT(MessageOf(DaemonWithJob(v1::JOB_STATE_RUNNING), "bowl"),
+              AllOf(HasSubstr("`carillon model list`"), Not(HasSubstr("job"))));
+  // The model was made and deleted since.
+  EXPECT_THAT(MessageOf(DaemonWithJob(v1::JOB_STATE_SUCCEEDED), "bell"), Not(HasSubstr("job")));
+  DaemonWithJob transfer(v1::JOB_STATE_RUNNING);
+  transfer.job().set_modal_model("modalModels/" + std::string(64, 'b'));
+  EXPECT_THAT(MessageOf(transfer, "bell"), Not(HasSubstr("job")));
+}
+
+TEST(FindJob, NamesTheCommandThatListsJobs) {
+  const auto found = FindJob(DaemonWithJob(v1::JOB_STATE_RUNNING), "bowl");
+  EXPECT_THAT(std::string(found.status().message()), HasSubstr("`carillon job list`"));
+}
+
+}  // namespace
+}  // namespace carillon::cli

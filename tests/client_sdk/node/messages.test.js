@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the package tells its callers without a daemon: warnings, refusals in their own names, and short forms.
+'use strict';
+
+const assert = require('node:assert/strict');
+const { test } = require('node:test');
+const { inspect } = require('node:util');
+const carillon = require('carillon');
+const { fromInfo } = require('carillon/lib/errors');
+const { warnOfContacts, warnOfStream } = require('carillon/lib/warnings');
+
+const POINT = [0, 0, 0];
+const IMPULSE = [0, 0, 1];
+const c = carillon.connect('unix:/nowhere');
+const scene = new carillon.Scene(c, 'scenes/1');
+const MESSAGE = { handle: 3, sounding_mode_count: 1, lowest_frequency_hz: 440, highest_frequency_hz: 440 };
+const bell = new carillon.SoundingObject(scene, MESSAGE);
+const mesh = { vertices: [POINT], triangles: [[0, 0, 0]] };
+
+/** The warnings of the process that a function makes. */
+async function warningsOf(function_) {
+  const told = [];
+  const listener = (warning) => told.push(`${warning.name}: ${warning.message}`);
+  process.on('warning', listener);
+  function_();
+  await new Promise(setImmediate);
+  process.off('warning', listener);
+  return told;
+}
+
+function told(counts, frame = "each object's own frame", dropped = 0) {
+  return warningsOf(() => warnOfStream({ scheduling_delay_s: 0.02, ...counts }, frame, dropped));
+}
+
+function refused(expected, content) {
+  assert.throws(() => new carillon.Trace({ step: 1 / 240 }).step(0, content), (error) => error.message.includes(expected)
+    || assert.fail(error.message));
+}
+
+test('a stream in time is silent', async () => assert.deepEqual(await told({ accepted_count: 7 }), []));
+
+test('late contacts, new mappings and lost steps are told once', async () => {
+  const [text, ...others] = await told({ late_count: 1, remap_count: 2, dropped_count: 3 }, 'its frame', 1);
+  assert.deepEqual(others, []);
+  assert.match(text, /^ContactWarning: 1 contact was late.*it was 0\.02.*anew 2 times.*3 contacts were lost.*1 step was/);
+});
+
+test('a rejection and a distant point name the frame of the stream', async () => {
+  const rejection = { reason: 'POINT_NOT_FINITE', message: "send metres in the object's frame" };
+  assert.deepEqual(await told({ rejected_count: 1, last_rejection: rejection }, "the scene's frame"),
+    ["ContactWarning: 1 contact was rejected, the last one with POINT_NOT_FINITE: send metres in the scene's frame"]);
+  const [text] = await warningsOf(() => warnOfContacts({ distant_point_count: 1, largest_distance_m: 0.5 }, 'a frame'));
+  assert.match(text, /1 contact lies up to 0\.5 m away .* sounds at .* in metres, in a frame$/);
+});
+
+test('a misspelt key is refused with the nearest name', async () => {
+  const refusals = [
+    [() => c.createModel(mesh, { material: 'oak', max_frequency: 1 }), 'max_frequency', 'max_frequency_hz'],
+    [() => c.createModel(mesh, { material: { young: 1 } }), 'young', 'young_pa'],
+    [() => c.createModel(mesh, { material: 'oak', settings: { meters_per_unit: 1 } }), 'meters_per_unit',
+      'metres_per_unit'],
+    [() => c.render(new carillon.Trace(), { tail: 1 }), 'tail', 'tail_s'],
+    [() => c.listen({ scen: 'x' }), 'scen', 'scene'],
+    [() => c.createScene({ listner: POINT }), 'listner', 'listener'],
+    [() => scene.add('modalModels/1', { gian: 1 }), 'gian', 'gain'],
+    [() => scene.addAll([{ model: 'modalModels/1', gian: 1 }]), 'gian', 'gain'],
+    [() => bell.strike({ point: POINT, impuls: IMPULSE }), 'impuls', 'impulse'],
+    [async () => new carillon.Trace({ stp: 1 }), 'stp', 'step'],
+    [async () => scene.stream({ stepp: 1 }), 'stepp', 'step'],
+    [async () => carillon.connect('unix:/x', { tlsRoot: 'x' }), 'tlsRoot', 'tlsRoots'],
+  ];
+  for (const [call, wrong, right] of refusals) {
+    await assert.rejects(call, (error) => error.message.includes(`no "${wrong}"; did you mean "${right}"?`)
+      || assert.fail(error.message));
+  }
+  refused('contacts[0] has no "impluse"; did you mean "impulse"?',
+    { contacts: [{ object: 1, point: POINT, impluse: IMPULSE }] });
+  refused('contacts has no "point"; did you mean "points"?', { contacts: { objects: 1, point: POINT } });
+  refused('step has no "contact"; did you mean "contacts"?', { contact: [] });
+});
+
+test('a wrong word or kind of value is refused by its name', async () => {
+  assert.throws(() => new carillon.Trace({ frame: 'world' }), /frame is 'world'; it must be one of "object", "scene"/);
+  assert.throws(() => new carillon.Trace({ pulseShape: 'box' }), /"raised_cosine", "gaussian"/);
+  assert.throws(() => new carillon.Trace().add('modalModels/1', { radiation: 'none' }), /"modes_only"/);
+  await assert.rejects(c.jobs({ states: ['broken'] }).next(), /an entry of states is 'broken'; .*"failed"/);
+  await assert.rejects(c.render(new carillon.Trace(), { tail_s: 'long' }), /tail_s of render is 'long'; .* a number/);
+  await assert.rejects(c.listen({ encoding: 'int16' }), /encoding of listen is 'int16'; .*AUDIO_ENCODING_INT16/);
+  await assert.rejects(c.createModel(mesh), /material is undefined; it must be a name such as 'oak'/);
+});
+
+test('contacts are refused by their names, with unit and frame', async () => {
+  const own = "in the stream's frame, which is each object's own unless it was opened with frame: 'scene'";
+  refused(`point of contacts[1] is [ 0, 0 ]; it must be [x, y, z]: metres ${own}`,
+    { contacts: [{ object: 1, point: POINT, impulse: IMPULSE }, { object: 1, point: [0, 0], impulse: IMPULSE }] });
+  refused(`impulse of impulses[0] is undefined; it must be [x, y, z]: newton seconds ${own}`,
+    { impulses: [{ object: 1, point: POINT }] });
+  refused('object of contacts[0] is undefined', { contacts: [{ point: POINT, impulse: IMPULSE }] });
+  refused(`points has 2 numbers; it must have 3 a contact: metres ${own}`,
+    { contacts: { objects: 1, points: [0, 0], impulses: IMPULSE } });
+  refused('points is undefined; it must be numbers, 3 a contact', { contacts: { objects: 1, impulses: IMPULSE } });
+  refused('points has the numbers of 1 contact and impulses has those of 2',
+    { contacts: { objects: 1, points: POINT, impulses: [IMPULSE, IMPULSE] } });
+  refused("listener is [ 1, 2 ]; it must be [x, y, z]: metres in the scene's frame", { listener: [1, 2] });
+  await assert.rejects(bell.strike({ point: [0, 0], impulse: IMPULSE }),
+    /point is \[ 0, 0 \]; it must be \[x, y, z\]: metres in the object's own frame/);
+});
+
+test('a trace of contacts needs the length of its steps, as a stream does', () => {
+  const contacts = [{ object: 1, point: POINT, impulse: IMPULSE }];
+  assert.throws(() => new carillon.Trace().step(0, { contacts }), /new Trace\(\{ step: 1 \/ 240 \}\)/);
+  new carillon.Trace().step(0, { impulses: contacts });
+  new carillon.Trace({ step: 1 / 240 }).step(0, { contacts });
+});
+
+test('refusals of the daemon have the names of the caller', () => {
+  for (const [said, expected] of [['step_s is 0; say', 'step is 0 s; say'],
+    ['scheduling_delay_s is 20; it must be 0 to 10', 'delay is 20 s; it must be 0 to 10 s'],
+    ['glide_s is -1; it must be 0 to 10', 'glide is -1 s; it must be 0 to 10 s']]) {
+    assert.equal(fromInfo({ reason: 'INVALID', message: said }).message, `INVALID: ${expected}`);
+  }
+});
+
+test('all that a user meets is shown in one short line', () => {
+  const trace = new carillon.Trace();
+  trace.add('modalModels/1');
+  trace.step(0.5);
+  for (const [item, expected] of [
+    [c, '<Client of unix:/nowhere>'], [scene, '<Scene scenes/1 of unix:/nowhere>'],
+    [bell, '<SoundingObject 3: 1 mode, 440.0 to 440.0 Hz>'],
+    [new carillon.Model(c, { name: 'modalModels/1', label: 'bell', header: { mode_count: 1 } }), '<Model bell: 1 mode>'],
+    [trace, '<Trace: 1 object, 1 step, to 0.5 s>'],
+    [new carillon.Sound(new Float32Array(4800), 48000, 1), '<Sound: 0.1 s, 48000 Hz, 1 channel, peak 0>'],
+  ]) assert.equal(inspect(item), expected);
+});

@@ -1,0 +1,195 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: Apache-2.0
+"""What the Python package tells its callers without a daemon: warnings, refusals in their own names, short forms."""
+
+import asyncio
+import threading
+import unittest
+import warnings
+
+import numpy
+
+import carillon
+from carillon.v1 import (
+    audio_service_pb2, contact_pb2, contact_service_pb2, error_pb2, modal_model_service_pb2, scene_service_pb2)
+
+POINT, IMPULSE = (0, 0, 0), (0, 0, 1)
+
+
+def warnings_of(function, *arguments):
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        function(*arguments)
+    return [str(item.message) for item in caught]
+
+
+def made(**content):
+    return carillon.contacts.make_step(0.0, **content)
+
+
+class MessagesTest(unittest.TestCase):
+    def setUp(self):
+        self.c = carillon.connect("unix:/nowhere")
+        self.addCleanup(self.c.close)
+
+    def refused(self, expected, function, *arguments, **named):
+        with self.assertRaises((TypeError, ValueError)) as raised:
+            function(*arguments, **named)
+        self.assertIn(expected, str(raised.exception))
+
+
+class WarningsTest(unittest.TestCase):
+    def told(self, frame="each object's own frame", dropped=0, **counts):
+        report = contact_service_pb2.StreamContactsResponse(scheduling_delay_s=0.02, **counts)
+        return warnings_of(carillon.errors.warn_of_stream, report, frame, dropped)
+
+    def test_a_stream_in_time_is_silent(self):
+        self.assertEqual(self.told(accepted_count=7), [])
+
+    def test_late_contacts_and_new_mappings_are_told_once(self):
+        text, = self.told(late_count=1, remap_count=2)
+        self.assertIn("1 contact was late", text)
+        self.assertIn("mapped anew 2 times", text)
+        self.assertIn("it was 0.02", text)
+
+    def test_a_warning_is_of_the_line_that_uses_the_package(self):
+        report = contact_service_pb2.StreamContactsResponse(late_count=1)
+        with self.assertWarns(carillon.ContactWarning) as caught:
+            carillon.errors.warn_of_stream(report, "a frame")
+        self.assertEqual(caught.filename, __file__)
+
+    def test_lost_contacts_and_steps_are_told(self):
+        text, = self.told(dropped_count=3, dropped=1)
+        self.assertIn("3 contacts were lost", text)
+        self.assertIn("1 step was not sent", text)
+
+    def test_a_rejection_names_the_frame_of_the_stream(self):
+        rejection = error_pb2.ErrorInfo(reason="POINT_NOT_FINITE", message="send metres in the object's frame")
+        text, = self.told("the scene's frame", rejected_count=1, last_rejection=rejection)
+        self.assertEqual(text, "1 contact was rejected, the last one with POINT_NOT_FINITE: send metres in the scene's "
+                               "frame")
+
+    def test_one_distant_point_is_one_contact(self):
+        findings = contact_pb2.ContactFindings(distant_point_count=1, largest_distance_m=0.5)
+        text, = warnings_of(carillon.errors.warn_of_contacts, findings, "the scene's frame")
+        self.assertRegex(text, "^1 contact lies up to 0.5 m away .* in metres, in the scene's frame$")
+
+
+class RefusalsTest(MessagesTest):
+    def test_a_misspelt_argument_is_refused_with_the_nearest_name(self):
+        mesh = ([(0, 0, 0)], [(0, 0, 0)])
+        for function, arguments, wrong, right in (
+                (self.c.create_model, (mesh, "oak"), "max_frequency", "max_frequency_hz"),
+                (self.c.render, (carillon.Trace(),), "tail", "tail_s"),
+                (carillon.striker, ("wood",), "mass", "mass_kg"),
+                (carillon.material, ("oak",), "young", "young_pa"),
+                (carillon.connect, (), "tls_root", "tls_roots")):
+            self.refused(f'has no "{wrong}"; did you mean "{right}"?', function, *arguments, **{wrong: 1})
+        self.refused('models has no "colour"; it has created_before_unix_ms', next, self.c.models(colour="x"))
+        self.refused('settings has no "meters_per_unit"; did you mean "metres_per_unit"?', self.c.create_model, mesh,
+                     "oak", settings={"meters_per_unit": 1})
+        scene = carillon.Scene(self.c, "scenes/1")
+        self.refused('object 1 of add_all has no "gian"; did you mean "gain"?', scene.add_all,
+                     ["modalModels/1", {"model": "modalModels/1", "gian": 1}])
+
+    def test_a_wrong_word_is_refused_with_the_right_ones(self):
+        for wrong, expected in (({"frame": "world"}, 'frame is \'world\'; it must be one of "object", "scene"'),
+                                ({"pulse_shape": "gauss"}, 'it must be one of "raised_cosine", "gaussian"')):
+            self.refused(expected, carillon.Trace, **wrong)
+        self.refused('"modes_only"', carillon.Trace().add, "modalModels/1", radiation="none")
+        self.refused('"failed"', next, self.c.jobs(["broken"]))
+
+    def test_a_value_of_the_wrong_type_is_refused_by_the_name_of_its_argument(self):
+        self.refused("tail_s of render is 'long'; it must be a number", self.c.render, carillon.Trace(), tail_s="long")
+        scene = carillon.Scene(self.c, "scenes/1")
+        self.refused("handle of add is -1; it must be a whole number, zero or more", scene.add, "modalModels/1",
+                     handle=-1)
+        self.refused("material is of type int", scene.add, "modalModels/1", 7)
+
+    def test_columns_are_refused_by_their_names_with_unit_and_frame(self):
+        contacts = carillon.Contacts
+        for expected, given in (
+                ("points has the shape (2,); it must be N x 3: metres in the stream's frame, which is each object's",
+                 contacts(1, (0, 0), IMPULSE)),
+                ("impulses is 'no'; it must be newton seconds in the stream's frame", contacts(1, POINT, "no")),
+                ("points has 1 row and impulses has 2", contacts(1, POINT, [IMPULSE] * 2)),
+                ("durations has the shape (3,)", contacts(1, [POINT] * 2, [IMPULSE] * 2, durations=[1, 2, 3])),
+                ("partners has the shape (3,)", contacts(1, [POINT] * 2, [IMPULSE] * 2, partners=[1, 2, 3])),
+                ("second_points has 1 row; it must have 2", contacts(1, [POINT] * 2, [IMPULSE] * 2, second_objects=2,
+                                                                     second_points=POINT)),
+                ("objects has an entry of type NoneType; give the objects", contacts(None, POINT, IMPULSE)),
+                ("contacts is of type list; it must be a carillon.Contacts", [POINT])):
+            self.refused(expected, made, contacts=given)
+        self.refused("orientations has the shape (3,)", made, poses=carillon.Poses(1, POINT, (0, 0, 1)))
+        self.refused("listener is (1, 2); it must be a position x, y, z in metres", made, listener=(1, 2))
+
+    def test_a_strike_is_refused_by_its_own_names(self):
+        scene = carillon.Scene(self.c, "scenes/1")
+        bell = carillon.SoundingObject(scene, scene_service_pb2.SoundingObject(handle=1))
+        self.refused("point is (0, 0); it must be three numbers: x, y, z, metres in the object's own frame",
+                     bell.strike, (0, 0), IMPULSE)
+        self.refused("impulse is None; it must be three numbers: x, y, z, newton seconds in the object's own frame",
+                     bell.strike, POINT, None)
+
+    def test_a_trace_of_contacts_needs_the_length_of_its_steps_as_a_stream_does(self):
+        contacts, impulses = (kind(1, POINT, IMPULSE) for kind in (carillon.Contacts, carillon.Impulses))
+        self.refused("Trace(step=1/240)", carillon.Trace().step, 0, contacts=contacts)
+        carillon.Trace().step(0, impulses=impulses)
+        carillon.Trace(step=1 / 240).step(0, contacts=contacts)
+
+    def test_refusals_of_the_daemon_have_the_names_of_the_caller(self):
+        for said, expected in (("step_s is 0; say the simulator's step", "step is 0 s; say the simulator's step"),
+                               ("scheduling_delay_s is 20; it must be 0 to 10", "delay is 20 s; it must be 0 to 10 s"),
+                               ("glide_s is -1; it must be 0 to 10", "glide is -1 s; it must be 0 to 10 s")):
+            info = error_pb2.ErrorInfo(reason="INVALID", message=said)
+            self.assertEqual(carillon.errors.from_info(info).message, expected)
+
+
+class ShortFormsTest(MessagesTest):
+    def test_all_that_a_user_meets_is_shown_in_one_short_line(self):
+        scene = carillon.Scene(self.c, "scenes/1")
+        summary = modal_model_service_pb2.ModalModelSummary(name="modalModels/1", label="bell", header={
+            "mode_count": 1, "node_count": 12})
+        rendering = audio_service_pb2.RenderSummary(frame_count=4800, accepted_count=1, peak_pa=2)
+        trace = carillon.Trace()
+        trace.add("modalModels/1")
+        trace.step(0.5)
+        sound = carillon.Sound(numpy.zeros((4800, 1), numpy.float32), 48000, summary=rendering)
+        model = carillon.Model(self.c, summary)
+        for item, expected in (
+                (self.c, "<Client of unix:/nowhere>"), (scene, "<Scene scenes/1 of unix:/nowhere>"),
+                (model, "<Model bell: 1 mode>"), (carillon.aio.AsyncModel(model), "<AsyncModel bell: 1 mode>"),
+                (summary, "<ModalModelSummary bell: 1 mode, 12 nodes>"),
+                (rendering, "<RenderSummary: 4800 frames, 1 contact, peak 2 Pa>"),
+                (trace, "<Trace: 1 object, 1 step, to 0.5 s>"),
+                (sound, "<Sound: 0.1 s, 48000 Hz, 1 channel, peak 0>"),
+                (carillon.SoundingObject(scene, scene_service_pb2.SoundingObject(
+                    handle=3, sounding_mode_count=1, lowest_frequency_hz=440, highest_frequency_hz=440)),
+                 "<SoundingObject 3: 1 mode, 440.0 to 440.0 Hz>")):
+            self.assertEqual(repr(item), expected)
+        self.assertIn("node_count: 12", str(summary))
+        self.assertIn("<audio controls", sound._repr_html_())
+
+
+class AioTest(unittest.TestCase):
+    def test_calls_that_wait_do_not_keep_others_waiting(self):
+        # Each call ends when all are running, as many recordings would that wait for each other.
+        count = 100
+        barrier = threading.Barrier(count)
+
+        async def together():
+            await asyncio.gather(*(carillon.aio.in_thread(barrier.wait, 60) for _ in range(count)))
+
+        asyncio.run(together())
+
+    def test_all_that_asks_the_daemon_is_a_coroutine(self):
+        aio = carillon.aio
+        for kind, plain in ((aio.AsyncModel, carillon.Model), (aio.AsyncJob, carillon.Job),
+                            (aio.AsyncObject, carillon.SoundingObject)):
+            for name, member in vars(plain).items():
+                if not name.startswith("_") and not isinstance(member, property) and not name.startswith("plot_"):
+                    self.assertTrue(asyncio.iscoroutinefunction(getattr(kind, name)), f"{kind.__name__}.{name}")
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the command line answers to mistakes, and when its output is lost."""
+
+import os
+import re
+import subprocess
+import unittest
+
+import meshes
+import sound
+from carillon.v1 import contact_pb2, contact_trace_pb2, scene_service_pb2
+from daemon import BIN, ROOT
+from test_command_line import MATERIAL, CommandLineTest, carillon
+
+
+class MessagesTest(CommandLineTest):
+    def test_messages_name_commands_and_options(self):
+        strike = ("strike", "bar", "--point", "0,0.008,0.01", "--impulse", "0,0,-0.01")
+        for words, expected in ((("stop", "99999"), "name one that `carillon scene list` shows"),
+                                (("model", "create", self.folder / "bar.obj", "--young", "3"), "--density, --alpha1"),
+                                ((*strike, "--modes-only"), "by `carillon transfer create --wait`"),
+                                (("model", "list", "--page-size", "3", "--page-token", "x"), "PAGE: --page-token is")):
+            done = self.daemon.command(*words, check=False)
+            self.assertEqual(done.returncode, 1)
+            self.assertIn(expected, done.stderr)
+
+
+class RenderMistakesTest(CommandLineTest):
+    def test_a_trace_without_contacts_is_refused(self):
+        item = contact_trace_pb2.ContactTraceObject(handle=1, modal_model=self.model, material=MATERIAL)
+        silent = self.folder / "silent"
+        silent.mkdir()
+        for name, objects, steps in (("none", [], []), ("steps", [item], [contact_pb2.ContactStep(time_s=0)])):
+            trace = silent / f"{name}.contacts"
+            sound.write_trace(trace, objects, steps)
+            done = self.daemon.command("render", trace, "--out", self.folder / "silent.wav", check=False)
+            self.assertEqual((done.returncode, done.stdout), (1, ""))
+            self.assertIn(f"TRACE_EMPTY: {trace}: ", done.stderr)
+        done = self.daemon.command("render", silent, "--out", self.folder / "silent_clips", check=False)
+        self.assertIn("0 there already, 2 failed", done.stdout)
+
+    def test_options_for_folders_and_other_formats_are_refused(self):
+        trace = self.folder / "trace.contacts"
+        sound.write_trace(trace, [], [])
+        for words, expected in (((trace, "--out", "x.mp3"), 'x.mp3" must end with .wav'),
+                                ((trace, "--out", "x.wav", "--stems"), "--stems: is for a folder"),
+                                ((trace, "--out", "x.wav", "--shard", "1/2"), "--shard: is for a folder"),
+                                ((self.folder, "--out", "-"), '--out: "-" must be a folder'),
+                                ((self.folder, "--out", trace), 'contacts" must be a folder')):
+            done = self.daemon.command("render", *words, check=False)
+            self.assertEqual(done.returncode, 2)
+            self.assertIn(expected, done.stderr)
+
+
+class LostOutputTest(CommandLineTest):
+    def run_command_to(self, stdout, *words):
+        """The command with `stdout`, or with a closed one for None; returns (exit code, stderr)."""
+        def close():
+            if stdout is None:
+                os.close(1)
+
+        done = subprocess.run([BIN / "carillon", "--server", self.daemon.server, *map(str, words)], stdout=stdout,
+                              stderr=subprocess.PIPE, text=True, check=False, preexec_fn=close)
+        return done.returncode, done.stderr
+
+    def test_no_command_succeeds_whose_output_is_lost(self):
+        trace = self.folder / "lost.contacts"
+        impulse = sound.impulse((0, 0.008, 0.010), (0, 0, -0.002), duration_s=1e-4)
+        item = contact_trace_pb2.ContactTraceObject(handle=1, modal_model=self.model, material=MATERIAL)
+        sound.write_trace(trace, [item], [contact_pb2.ContactStep(time_s=0, impulses=[impulse])])
+        strike = ("strike", "bar", "--point", "0,0.008,0.01", "--impulse", "0,0,-0.01", "--seconds", "0")
+        commands = (("--help",), ("--version",), ("--man",), ("status",), ("info",), ("db", "stats"), ("doctor",),
+                    ("model", "list"), ("model", "show", "bar"), ("job", "list"), ("job", "show", "bar"),
+                    ("job", "watch", "bar"), ("material", "list"), ("volume",), ("stop",),
+                    ("top", "--once"), ("top",), ("completion", "bash"), ("listen", "--seconds", "0.1"), strike,
+                    ("render", trace, "--out", "-"), ("render", trace, "--out", self.folder / "lost.wav"),
+                    ("example", "bar", "--out", self.folder / "lost.obj"),
+                    ("model", "export", "bar", "--out", self.folder / "lost.model"),
+                    ("model", "create", self.folder / "bar.obj", "--material", meshes.MATERIAL))
+        self.client.scenes.CreateScene(scene_service_pb2.CreateSceneRequest())
+        with open("/dev/full", "wb") as full:
+            for words in commands:
+                for stdout in (full, None):
+                    code, errors = self.run_command_to(stdout, *words)
+                    self.assertEqual(code, 1, words)
+                    self.assertRegex(errors, "OUTPUT_NOT_WRITABLE|FAULTS_FOUND", words)
+
+    def test_a_command_without_output_succeeds_though_stdout_is_closed(self):
+        self.assertEqual(self.run_command_to(None, "model", "tag", "bar", "--add", "lost"), (0, ""))
+
+    def test_a_reader_that_has_heard_enough_ends_the_recording(self):
+        with subprocess.Popen([BIN / "carillon", "--server", self.daemon.server, "listen"], stdout=subprocess.PIPE,
+                              stderr=subprocess.PIPE) as listener:
+            self.assertEqual(len(listener.stdout.read(4096)), 4096)
+            listener.stdout.close()
+            self.assertEqual(listener.wait(10), 0, listener.stderr.read())
+
+
+class WrongValuesTest(unittest.TestCase):
+    def test_values_that_would_be_taken_for_others_are_refused(self):
+        strike = ("strike", "bar", "--point", "0,0,0", "--impulse", "0,0,1")
+        create = ("model", "create", ROOT / "README.md")
+        for words, expected in (((*strike, "--size", "0"), '--size: "0" must be a number from 0.001 to 1000'),
+                                ((*strike, "--seconds", "-3"), '--seconds: "-3" must be a number from 0'),
+                                ((*strike, "--seconds", "nan"), '--seconds: "nan" must be'),
+                                ((*strike, "--gain", "-6"), "or decibels, such as -6dB"),
+                                ((*create, "--size", "0"), "--size"),
+                                ((*create, "--accuracy", "1"), "1 is 100%"),
+                                ((*create, "--memory-limit-mib", "-3"), "--memory-limit-mib"),
+                                (("transfer", "create", "bar", "--size", "0"), "--size"),
+                                (("listen", "--out", "x.ogg"), "must end with .wav"),
+                                (("model", "export", "bar", "--out", "x.obj"), "must end with .model, .glb"),
+                                (("example", "bar", "--out", "x.stl"), "must end with .obj"),
+                                (("--json", "listen"), "--json: stdout has the sound"),
+                                (("--json", "render", "x.contacts", "--out", "-"), "--json: stdout has the sound"),
+                                (("--server", "127.0.0.1:99999", "status"), "a port from 1 to 65535")):
+            done = carillon(*words)
+            self.assertEqual((done.returncode, done.stdout), (2, ""), words)
+            self.assertIn(expected, done.stderr)
+        asked = carillon("status", env={**os.environ, "CARILLON_SERVER": "localhost"})
+        self.assertIn('"localhost" must be unix:PATH, or HOST:PORT', asked.stderr)
+
+    def test_options_that_take_the_place_of_fields_in_messages_exist(self):
+        table = (ROOT / "client_sdk/cli/command_words.cc").read_text()
+        page = carillon("--man").stdout.replace("\\-", "-")
+        options = re.findall(r'"[^"\n]*(--[a-z][a-z-]+)', table)
+        self.assertGreater(len(options), 20)
+        for option in options:
+            self.assertIn(option, page)
+
+
+if __name__ == "__main__":
+    unittest.main()
