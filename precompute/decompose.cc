@@ -16,6 +16,7 @@
 #include "precompute/fem/assembly.h"
 #include "precompute/fem/curved_element.h"
 #include "precompute/fem/matrix_market.h"
+#include "precompute/graded_size.h"
 #include "precompute/mesh/boundary.h"
 #include "precompute/mesh/fill/element_size.h"
 #include "precompute/mesh/fill/midside_nodes.h"
@@ -253,6 +254,7 @@ Round Describe(const TetMesh& mesh, const ModalModel& model, double cpu_s) {
   const double nodes_per_corner = mesh.nodes_per_element == 10 ? kNodesPerCorner : 1;
   return {.element_size_m = SurfaceElementSize(BoundarySurface(mesh)),
           .node_count = count,
+          .uniform_node_count = count,
           .thin = nodes_per_corner * corners_on_boundary > kThin * count,
           .worst_error = model.WorstError(),
           .cpu_s = cpu_s,
@@ -267,6 +269,35 @@ bool IsFinenessFree(const v1::WorkerRequest& request) {
          MeshingOf(request).nodes_per_element == 10;
 }
 
+/// Returns the element sizes of the mesh after `last`, with which it has the error of a uniform
+/// mesh of the size `next_m`.
+SizeField Grade(const TetMesh& mesh, const ModalModel& model, const Round& last, double next_m) {
+  return GradedSize(mesh, model.error_at_node,
+                    {.element_size_m = last.element_size_m,
+                     .next_element_size_m = next_m,
+                     .dimension = Dimension(last),
+                     .node_growth = UniformNodeCount(last, next_m) / last.node_count});
+}
+
+/// A graded mesh is used only if it has at most this part of the nodes of the uniform mesh.
+constexpr double kMostOfUniform = 0.9;
+
+/// Fills a surface. Where the graded mesh would have more than `most_node_count` nodes, which the
+/// prediction can be wrong about for walls, the mesh becomes uniform.
+absl::StatusOr<Body> FillGraded(const Fillable& surface, double most_node_count,
+                                MeshingSettings& settings, const v1::WorkerRequest& request) {
+  if (!settings.relative_size.is_uniform()) {
+    settings.most_node_count = most_node_count;
+    absl::StatusOr<Body> graded = FillSurface(surface, settings, request);
+    settings.most_node_count = 0;
+    const bool is_small =
+        graded.ok() && static_cast<double>(graded->mesh.nodes.size()) <= most_node_count;
+    if (is_small) return graded;
+    settings.relative_size = {};
+  }
+  return FillSurface(surface, settings, request);
+}
+
 /// Fills and solves a surface finer and finer until the goal is met.
 absl::StatusOr<ModalModel> SolveToGoal(const Fillable& surface, const v1::WorkerRequest& request,
                                        DecompositionObserver& observer) {
@@ -276,6 +307,7 @@ absl::StatusOr<ModalModel> SolveToGoal(const Fillable& surface, const v1::Worker
   if (asked.given() && meshing.target_node_count == 0) {
     meshing.target_node_count = kFirstCornerNodeCount;
   }
+  double most_node_count = 0;  // of a graded mesh
   std::vector<Round> rounds;
   RoundForecast forecast{.later_rounds = asked.given() ? kLaterRoundsAfterFirst : 0};
   absl::StatusOr<ModalModel> best = absl::UnknownError("");
@@ -283,7 +315,7 @@ absl::StatusOr<ModalModel> SolveToGoal(const Fillable& surface, const v1::Worker
     const PhaseClock::Times begun = PhaseClock::Now();
     observer.OnRound(forecast);
     observer.OnProgress(v1::PHASE_MESH, 0);
-    const absl::StatusOr<Body> body = FillSurface(surface, meshing, request);
+    const absl::StatusOr<Body> body = FillGraded(surface, most_node_count, meshing, request);
     // A finer mesh that cannot be made takes nothing from the coarser one.
     if (!body.ok() && best.ok()) return best;
     if (!body.ok()) return body.status();
@@ -294,9 +326,16 @@ absl::StatusOr<ModalModel> SolveToGoal(const Fillable& surface, const v1::Worker
     rounds.push_back(
         Describe(body->mesh, solved->model,
                  is_free ? solved->predicted_cpu_s : ended.cpu_seconds - begun.cpu_seconds));
+    if (!meshing.relative_size.is_uniform() && !SetEquivalentSize(meshing.element_size_m, rounds)) {
+      rounds.pop_back();
+      meshing.relative_size = {};
+      continue;
+    }
     const std::optional<double> next = NextElementSize(is_free ? kUsualGoal : asked, rounds);
     if (!next) return std::move(solved->model);
     best = std::move(solved->model);
+    if (asked.given()) meshing.relative_size = Grade(body->mesh, *best, rounds.back(), *next);
+    most_node_count = kMostOfUniform * UniformNodeCount(rounds.back(), *next);
     meshing.element_size_m = *next;
     forecast = {.expected_s = (ended.seconds - begun.seconds) * TimeGrowth(rounds.back(), *next),
                 .later_rounds = kLaterRounds};

@@ -25,6 +25,9 @@ constexpr double kLeastGrowth = 1.15, kMostGrowth = 6;
 constexpr size_t kMostRounds = 6;
 /// Ratio of the element sizes of two rounds above which the mesh counts as not refined.
 constexpr double kSameSize = 0.97;
+/// Ratio of the numbers of nodes of a graded mesh and the one before, up to which the graded mesh
+/// counts as not refined.
+constexpr double kSameNodeCount = 1.03;
 
 double ErrorPower(const std::vector<Round>& rounds) {
   if (rounds.size() < 2) return kErrorPower;
@@ -65,10 +68,22 @@ std::string Overrun(const char* what, double asked, double used) {
       asked, what, used);
 }
 
-/// The number of dimensions in which smaller elements become more numerous.
+}  // namespace
+
 double Dimension(const Round& round) { return round.thin ? 2 : 3; }
 
-}  // namespace
+bool SetEquivalentSize(double asked_m, std::vector<Round>& rounds) {
+  Round& last = rounds.back();
+  const Round& before = rounds[rounds.size() - 2];
+  last.element_size_m = asked_m;
+  last.uniform_node_count = UniformNodeCount(before, asked_m);
+  return last.node_count > kSameNodeCount * before.node_count ||
+         last.worst_error < before.worst_error / kSameNodeCount;
+}
+
+double UniformNodeCount(const Round& last, double element_size_m) {
+  return last.uniform_node_count * std::pow(last.element_size_m / element_size_m, Dimension(last));
+}
 
 double TimeGrowth(const Round& last, double element_size_m) {
   const double nodes = std::pow(last.element_size_m / element_size_m, Dimension(last));

@@ -20,8 +20,11 @@ struct ResolutionGoal {
 struct Round {
   double element_size_m = 0;  ///< of the mesh's surface, as SurfaceElementSize() measures it
   double node_count = 0;      ///< mid-side nodes included
-  bool thin = false;          ///< whether the number of nodes grows as element_size^-2, not ^-3
-  double worst_error = 0;     ///< zero if the mesh has no mode
+  /// Predicted number of nodes of the uniform mesh of this element size; equal to node_count unless
+  /// the mesh is graded.
+  double uniform_node_count = 0;
+  bool thin = false;       ///< whether the number of nodes grows as element_size^-2, not ^-3
+  double worst_error = 0;  ///< zero if the mesh has no mode
   double cpu_s = 0;
   double peak_bytes = 0;
 };
@@ -34,6 +37,17 @@ inline constexpr int kFirstCornerNodeCount = 1500;
 /// element size the errors fall. Time and memory grow with powers of the number of nodes, measured
 /// on solids.
 std::optional<double> NextElementSize(const ResolutionGoal& goal, const std::vector<Round>& rounds);
+
+/// Returns the number of dimensions in which smaller elements become more numerous.
+double Dimension(const Round& round);
+
+/// Returns the predicted number of nodes of the uniform mesh of this element size after `last`.
+double UniformNodeCount(const Round& last, double element_size_m);
+
+/// Sets the element size of the last round, whose mesh is graded, to the `asked` size of the
+/// uniform mesh that would have the same error. Returns false if the mesh became neither finer nor
+/// more accurate than the one before.
+bool SetEquivalentSize(double asked_m, std::vector<Round>& rounds);
 
 /// Returns the predicted time of a round with this element size, relative to the round `last`.
 double TimeGrowth(const Round& last, double element_size_m);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "absl/container/flat_hash_map.h"
@@ -32,6 +33,9 @@ constexpr double kQuadraticConstant = 1.8;
 /// Largest error as a fraction of the eigenvalue. If the estimate is larger, the mesh gives no
 /// information about the mode.
 constexpr double kMostError = 0.99;
+
+/// Power of a mode's error in its weight, see ErrorEstimate.
+constexpr double kWeightPower = 2;
 
 /// Residuals are computed in batches of modes that fit into max(kResidualBytes, kTimesShapes * size
 /// of the shapes), but of at least kFewestModesAtATime modes. The solver needed more than this in
@@ -144,6 +148,8 @@ class Places {
   }
 
   size_t count() const { return nodes_.size(); }
+  /// The corners of an edge or face, ascending; for an edge, -1 comes first.
+  const std::array<int32_t, 3>& Corners(size_t place) const { return nodes_[place]; }
   size_t added() const { return added_; }
   int32_t Of(size_t element, size_t i) const { return number_[element * added_ + i]; }
   /// An odd function on an edge changes its sign with the edge's direction. The added function of a
@@ -222,8 +228,10 @@ class Estimator {
         std::max(kFewestModesAtATime, most / static_cast<size_t>(thread_count)));
   }
 
-  /// Returns sum_b w_b r_b^T a(b, b)^-1 r_b for some modes. `shapes` is #U by #modes.
-  Eigen::VectorXd Corrections(const Eigen::VectorXd& eigenvalues, const RowMatrix& shapes) const {
+  /// Returns sum_b w_b r_b^T a(b, b)^-1 r_b for some modes, and adds the weighted parts of each edge
+  /// and face to `shares`. `shapes` is #U by #modes.
+  Eigen::VectorXd Corrections(const Eigen::VectorXd& eigenvalues, const RowMatrix& shapes,
+                              Eigen::VectorXd& shares) const {
     RowMatrix residuals =
         RowMatrix::Zero(3 * static_cast<Eigen::Index>(places_.count()), shapes.cols());
     ElementResidual element(static_cast<Eigen::Index>(3 * places_.added()),
@@ -240,10 +248,33 @@ class Estimator {
     for (size_t b = 0; b < places_.count(); ++b) {
       if (held_[b]) continue;  // its residual is the reaction force
       const auto r = residuals.middleRows<3>(3 * static_cast<Eigen::Index>(b));
-      sums += weights_[b] * r.cwiseProduct(stiffness_[b].inverse() * r).colwise().sum().transpose();
+      const Eigen::RowVectorXd part =
+          weights_[b] * r.cwiseProduct(stiffness_[b].inverse() * r).colwise().sum();
+      sums += part.transpose();
+      residuals.row(3 * static_cast<Eigen::Index>(b)) = part;
+    }
+    const Eigen::VectorXd weights = WeightsOf(eigenvalues, sums);
+    for (size_t b = 0; b < places_.count(); ++b) {
+      const auto row = static_cast<Eigen::Index>(b);
+      if (!held_[b]) shares[row] += residuals.row(3 * row) * weights;
     }
     return sums;
   }
+
+  /// Returns the shares of the edges and faces, distributed among their corners.
+  std::vector<double> AtNodes(const Eigen::VectorXd& shares) const {
+    std::vector<double> at_node(mesh_.nodes.size(), 0);
+    for (size_t b = 0; b < places_.count(); ++b) {
+      const std::array<int32_t, 3>& corners = places_.Corners(b);
+      const double part = shares[static_cast<Eigen::Index>(b)] / (corners[0] < 0 ? 2 : 3);
+      for (const int32_t node : corners) {
+        if (node >= 0) at_node[static_cast<size_t>(node)] += part;
+      }
+    }
+    return at_node;
+  }
+
+  size_t place_count() const { return places_.count(); }
 
  private:
   /// Computes the residuals of the modes for the added functions of an element, a(b, phi) - m(b,
@@ -268,6 +299,12 @@ class Estimator {
     RowMatrix inertial;
     RowMatrix result;  ///< #added by #modes
   };
+
+  /// Returns the weights of the modes in the local shares, see ErrorEstimate.
+  static Eigen::VectorXd WeightsOf(const Eigen::VectorXd& eigenvalues,
+                                   const Eigen::VectorXd& sums) {
+    return (sums.array() / eigenvalues.array()).pow(kWeightPower) / eigenvalues.array();
+  }
 
   /// Computes z := x y, which for column-major matrices is z^T = y^T x^T.
   static void RowProduct(const RowMatrix& x, const RowMatrix& y, RowMatrix& z) {
@@ -328,24 +365,30 @@ class Estimator {
 
 }  // namespace
 
-Eigen::VectorXd EstimateFrequencyErrors(const TetMesh& mesh, const ElasticConstants& elastic,
-                                        const Modes& modes) {
+ErrorEstimate EstimateFrequencyErrors(const TetMesh& mesh, const ElasticConstants& elastic,
+                                      const Modes& modes) {
   Estimator estimator(mesh, elastic);
   const double constant = mesh.nodes_per_element == 10 ? kQuadraticConstant : kLinearConstant;
   Eigen::VectorXd errors(modes.eigenvalues.size());
   Workers workers(ThreadCount());
   const Eigen::Index at_a_time = estimator.ModesAtATime(modes.shapes, workers.count());
-  workers.ForEach((errors.size() + at_a_time - 1) / at_a_time, [&](int64_t part) {
+  const Eigen::Index part_count = (errors.size() + at_a_time - 1) / at_a_time;
+  Eigen::MatrixXd shares =
+      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(estimator.place_count()), part_count);
+  workers.ForEach(part_count, [&](int64_t part) {
     const Eigen::Index first = part * at_a_time;
     const Eigen::Index count = std::min(at_a_time, errors.size() - first);
-    const Eigen::VectorXd corrections = estimator.Corrections(
-        modes.eigenvalues.segment(first, count), modes.shapes.middleCols(first, count));
+    Eigen::VectorXd shares_of_part = Eigen::VectorXd::Zero(shares.rows());
+    const Eigen::VectorXd corrections =
+        estimator.Corrections(modes.eigenvalues.segment(first, count),
+                              modes.shapes.middleCols(first, count), shares_of_part);
+    shares.col(part) = shares_of_part;
     const Eigen::ArrayXd relative =
         constant * corrections.array() / modes.eigenvalues.segment(first, count).array();
     // A frequency is proportional to the square root of its eigenvalue.
     errors.segment(first, count) = (1 - relative.min(kMostError)).sqrt().inverse() - 1;
   });
-  return errors;
+  return {std::move(errors), estimator.AtNodes(shares.rowwise().sum())};
 }
 
 }  // namespace carillon::precompute

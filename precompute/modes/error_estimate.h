@@ -2,12 +2,25 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <vector>
 
 #include "precompute/eigen/eigensolver.h"
 #include "precompute/fem/material.h"
 #include "precompute/mesh/tet_mesh.h"
 
 namespace carillon::precompute {
+
+/// Errors of frequencies, and the nodes near which they arise.
+struct ErrorEstimate {
+  /// One relative error for each mode, 0.01 for one percent.
+  Eigen::VectorXd errors;
+  /// For each node of the mesh, the share of the error that arises near it: the parts of the
+  /// relative corrections delta Lambda / Lambda of all edges and faces b at the node, each divided
+  /// among the corners of b, and summed over the modes. Each mode has the square of its error as a
+  /// weight, because the worst modes decide how fine a mesh must be. The unit is arbitrary;
+  /// mid-side nodes have zero.
+  std::vector<double> at_node;
+};
 
 /// Estimates the relative error of each mode's frequency that the mesh causes. The computed
 /// frequency is too high.
@@ -32,8 +45,8 @@ namespace carillon::precompute {
 ///
 /// `elastic` has the constants of the matrices from which the modes were computed, for unit
 /// density. A consistent mass is assumed. Shapes include all nodes; fixed edges and faces add
-/// nothing. The result has one number for each mode, 0.01 for one percent.
-Eigen::VectorXd EstimateFrequencyErrors(const TetMesh& mesh, const ElasticConstants& elastic,
-                                        const Modes& modes);
+/// nothing.
+ErrorEstimate EstimateFrequencyErrors(const TetMesh& mesh, const ElasticConstants& elastic,
+                                      const Modes& modes);
 
 }  // namespace carillon::precompute

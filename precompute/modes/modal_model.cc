@@ -43,26 +43,27 @@ std::vector<float> ShapesOnSurface(const SoundingSurface& surface, const Eigen::
 ModalModel MakeModalModel(const TetMesh& mesh, const SurfaceMesh& given,
                           const ElasticConstants& elastic, const DeformationModes& solution) {
   SoundingSurface surface = MakeSoundingSurface(mesh);
-  ModalModel model{
-      .node_count = static_cast<int>(mesh.nodes.size()),
-      .element_count = static_cast<int>(mesh.element_count()),
-      .volume_m3 = VolumeM3(mesh),
-      .complete_to_eigenvalue = solution.complete_to_eigenvalue,
-      .lowered_from_mode_count = solution.mode_count_below_asked,
-      .lowest_eigenvalue = solution.lowest_eigenvalue,
-      .verification = solution.verification,
-      .comparison = {},
-      .left_out_mode_count = 0,
-      .warnings = {},
-      .eigenvalues = ToVector(solution.modes.eigenvalues),
-      .residuals = ToVector(solution.residuals),
-      .couplings = ToVector(Couplings(mesh, surface, solution.modes)),
-      .estimated_errors = ToVector(EstimateFrequencyErrors(mesh, elastic, solution.modes)),
-      .vertices = {},
-      .triangles = std::move(surface.triangles),
-      .given_triangle = std::move(surface.given_triangle),
-      .given = given,
-      .shapes = ShapesOnSurface(surface, solution.modes.shapes)};
+  ErrorEstimate estimate = EstimateFrequencyErrors(mesh, elastic, solution.modes);
+  ModalModel model{.node_count = static_cast<int>(mesh.nodes.size()),
+                   .element_count = static_cast<int>(mesh.element_count()),
+                   .volume_m3 = VolumeM3(mesh),
+                   .complete_to_eigenvalue = solution.complete_to_eigenvalue,
+                   .lowered_from_mode_count = solution.mode_count_below_asked,
+                   .lowest_eigenvalue = solution.lowest_eigenvalue,
+                   .verification = solution.verification,
+                   .comparison = {},
+                   .left_out_mode_count = 0,
+                   .warnings = {},
+                   .eigenvalues = ToVector(solution.modes.eigenvalues),
+                   .residuals = ToVector(solution.residuals),
+                   .couplings = ToVector(Couplings(mesh, surface, solution.modes)),
+                   .estimated_errors = ToVector(estimate.errors),
+                   .error_at_node = std::move(estimate.at_node),
+                   .vertices = {},
+                   .triangles = std::move(surface.triangles),
+                   .given_triangle = std::move(surface.given_triangle),
+                   .given = given,
+                   .shapes = ShapesOnSurface(surface, solution.modes.shapes)};
   for (const int32_t node : surface.nodes) {
     model.vertices.push_back(ToFloat(mesh.nodes[static_cast<size_t>(node)]));
   }

@@ -38,6 +38,8 @@ struct ModalModel {
   std::vector<double> couplings;    ///< #modes, see Couplings
   /// #modes, see EstimateFrequencyErrors.
   std::vector<double> estimated_errors;
+  /// #nodes of the mesh, see ErrorEstimate::at_node. Not stored.
+  std::vector<double> error_at_node;
 
   /// The vertices (boundary nodes of the mesh, metres) and triangles of the sounding surface.
   std::vector<std::array<float, 3>> vertices;

@@ -53,6 +53,15 @@ TEST(Resolution, EndsWhereTheMeshCannotBeRefined) {
   EXPECT_FALSE(NextElementSize({.accuracy = 0.01}, {Solved(4, 0.02), Solved(4, 0.02)}));
 }
 
+TEST(Resolution, GivesAGradedMeshTheSizeOfTheUniformOneAndTellsWhetherItIsFiner) {
+  std::vector<Round> rounds{Solved(4, 0.02), Solved(1, 0.012)};
+  EXPECT_TRUE(SetEquivalentSize(3e-3, rounds));
+  EXPECT_EQ(rounds.back().element_size_m, 3e-3);
+  EXPECT_TRUE(NextElementSize({.accuracy = 0.01}, rounds));
+  rounds.back() = Solved(1, 0.02);
+  EXPECT_FALSE(SetEquivalentSize(3e-3, rounds));
+}
+
 TEST(Resolution, KeepsToItsBudgets) {
   Round dear = Solved(4, 0.5);
   dear.cpu_s = 9;

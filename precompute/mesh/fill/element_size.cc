@@ -8,13 +8,14 @@
 
 namespace carillon::precompute {
 
-double SurfaceElementSize(const SurfaceMesh& surface) {
+double SurfaceElementSize(const SurfaceMesh& surface, const SizeField& relative_size) {
   double area = 0, sum = 0;
   for (size_t t = 0; t < surface.triangles.size(); ++t) {
     const auto [a, b, c] = CornersOf(surface, t);
     const double doubled = Norm(AreaNormal({a, b, c}));
     area += doubled;
-    sum += doubled * std::max({Distance(a, b), Distance(b, c), Distance(c, a)});
+    sum += doubled * std::max({Distance(a, b), Distance(b, c), Distance(c, a)}) /
+           relative_size.At(MiddleOf({a, b, c}));
   }
   return sum / area;
 }

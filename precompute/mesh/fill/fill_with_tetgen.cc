@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstring>
 #include <string>
@@ -87,6 +88,21 @@ void DescribeCavities(const std::vector<Point>& cavities, tetgenio& in) {
   std::memcpy(in.holelist, cavities.data(), cavities.size() * sizeof(Point));
 }
 
+/// The request that this process fills, for TetGen's callback, which takes no data of its user.
+const FillRequest* running_request = nullptr;
+
+/// Whether TetGen shall split the tetrahedron a, b, c, d, because it is larger than the field of
+/// sizes allows at its centroid.
+bool IsTooLarge(double* a, double* b, double* c, double* d, double* /*lengths*/,
+                double /*volume*/) {
+  const auto point = [](const double* p) { return Point{p[0], p[1], p[2]}; };
+  Point middle;
+  for (size_t x = 0; x < 3; ++x) middle[x] = (a[x] + b[x] + c[x] + d[x]) / 4;
+  const double size = running_request->relative_size.At(middle);
+  return std::abs(TetVolume(point(a), point(b), point(c), point(d))) >
+         running_request->max_volume * size * size * size;
+}
+
 /// Runs in the child.
 std::string RunTetgen(const FillRequest& request) {
   tetgenio in, out;
@@ -99,8 +115,13 @@ std::string RunTetgen(const FillRequest& request) {
   if (request.cautious) switches = request.keep_surface ? "pq3azT1e-6QY" : "pq3azT1e-6Q";
   tetgenbehavior behavior;
   behavior.parse_commandline(switches.data());
-  behavior.fixedvolume = 1;
-  behavior.maxvolume = request.max_volume;
+  if (request.relative_size.is_uniform()) {
+    behavior.fixedvolume = 1;
+    behavior.maxvolume = request.max_volume;
+  } else {
+    running_request = &request;
+    in.tetunsuitable = IsTooLarge;
+  }
   behavior.steinerleft = request.max_added_nodes;
   int error = 0;
   try {

@@ -16,8 +16,10 @@ struct FillRequest {
   const RefinedSurface& surface;
   /// A point in each cavity.
   std::vector<Point> cavities;
-  /// Largest volume of a tetrahedron, in the surface's unit of length cubed.
+  /// Largest volume of a tetrahedron, in the surface's unit of length cubed, where the relative
+  /// size is 1. The bound is proportional to the cube of the relative size.
   double max_volume;
+  const SizeField& relative_size;
   /// Whether to add no vertices on the surface.
   bool keep_surface;
   /// Largest number of vertices to add.

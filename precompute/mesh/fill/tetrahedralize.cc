@@ -49,7 +49,8 @@ constexpr double kTargetTolerance = 0.2;
 constexpr double kEdgeByNodes = 1 / 2.5;
 constexpr int kMaxEdgeSteps = 8;
 constexpr double kCoarsestToElementSize = 2.5;
-constexpr double kNodesPerCubedEdge = 2;  // as TetGen fills solids
+constexpr double kLongestToElementSize = 1.2;  // as uniform meshes of boxes and profiles have
+constexpr double kNodesPerCubedEdge = 2;       // as TetGen fills solids
 
 /// Where a surface lies and how large it is; scale * (p - low) is within the unit box.
 struct UnitBox {
@@ -166,11 +167,13 @@ std::vector<Point> PointsInCavities(const SurfaceMesh& surface, const std::vecto
 /// A surface at unit size, filled as finely as asked.
 class Filler {
  public:
-  /// `scale`: of the unit surface to the one given.
-  Filler(const SurfaceMesh& unit_surface, double scale, const MeshingSettings& settings)
+  Filler(const SurfaceMesh& unit_surface, const UnitBox& box, const MeshingSettings& settings)
       : surface_(unit_surface),
-        scale_(scale),
+        scale_(box.scale),
         settings_(settings),
+        relative_size_(settings.element_size_m != 0
+                           ? settings.relative_size.Moved(box.low, box.scale)
+                           : SizeField()),
         shells_(FindShells(surface_)),
         extent_(Measure(surface_, shells_)) {}
 
@@ -239,12 +242,14 @@ class Filler {
   /// The longest edge with which the element size of the surface is at most `element_size`. All
   /// edges of a surface of few triangles are split at once, so that the result may be finer.
   double EdgeForElementSize(double element_size) const {
+    if (!relative_size_.is_uniform()) {
+      return kLongestToElementSize / kLongestToMeanEdge * element_size;
+    }
     double fine = element_size, coarse = kCoarsestToElementSize * element_size;
     for (int step = 0; step < kMaxEdgeSteps; ++step) {
       const double middle = std::sqrt(fine * coarse);
-      (SurfaceElementSize(RefineSurface(surface_, middle).surface) <= element_size ? fine
-                                                                                   : coarse) =
-          middle;
+      const SurfaceMesh refined = RefineSurface(surface_, middle, relative_size_).surface;
+      (SurfaceElementSize(refined, relative_size_) <= element_size ? fine : coarse) = middle;
     }
     return fine / kLongestToMeanEdge;
   }
@@ -262,17 +267,27 @@ class Filler {
     return std::chrono::seconds(std::lround(std::min(5 + (tetrahedra + triangles) / 1000, 600.0)));
   }
 
+  int MostAdded() const {
+    // TetGen's count must not end a mesh that still has fewer nodes than the limit.
+    constexpr double kMargin = 2;
+    const double limit = settings_.most_node_count;
+    const double most =
+        limit > 0 ? std::min<double>(kMaxMeshNodes, kMargin * limit) : kMaxMeshNodes;
+    return static_cast<int>(most / NodesPerCorner(settings_));
+  }
+
   absl::StatusOr<TetMesh> FillWithEdge(double edge) const { return FillWithEdge(edge, edge); }
 
   absl::StatusOr<TetMesh> FillWithEdge(double edge, double inside) const {
     const bool keep_surface = settings_.keep_surface.value_or(false);
-    const RefinedSurface refined = RefineSurface(surface_, LongestOnSurface(edge));
+    const RefinedSurface refined = RefineSurface(surface_, LongestOnSurface(edge), relative_size_);
     const double max_volume = kVolumeOfRegular * inside * inside * inside;
     FillRequest request{.surface = refined,
                         .cavities = PointsInCavities(surface_, shells_),
                         .max_volume = max_volume,
+                        .relative_size = relative_size_,
                         .keep_surface = true,
-                        .max_added_nodes = kMaxMeshNodes / NodesPerCorner(settings_),
+                        .max_added_nodes = MostAdded(),
                         .most_cpu = MostCpu(refined, max_volume),
                         .cautious = settings_.cautious};
     return FillSomehow(request, keep_surface);
@@ -302,8 +317,9 @@ class Filler {
   }
 
   const SurfaceMesh& surface_;
-  double scale_;
+  double scale_;  // of the unit surface to the one given
   const MeshingSettings& settings_;
+  SizeField relative_size_;  // in the unit box
   std::vector<Shell> shells_;
   Extent extent_;
 };
@@ -316,7 +332,7 @@ absl::StatusOr<TetMesh> Tetrahedralize(const SurfaceMesh& surface,
   RETURN_IF_ERROR(CheckNodeCount(target * NodesPerCorner(settings)));
   const UnitBox box = FindUnitBox(surface);
   const SurfaceMesh unit_surface = ToUnitBox(surface, box);
-  ASSIGN_OR_RETURN(TetMesh mesh, Filler(unit_surface, box.scale, settings).Fill());
+  ASSIGN_OR_RETURN(TetMesh mesh, Filler(unit_surface, box, settings).Fill());
   FromUnitBox(mesh, box);
   if (settings.nodes_per_element == 10) AddMidsideNodes(mesh);
   RETURN_IF_ERROR(CheckNodeCount(static_cast<double>(mesh.nodes.size())));

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "absl/status/statusor.h"
+#include "precompute/mesh/size_field.h"
 #include "precompute/mesh/surface_mesh.h"
 #include "precompute/mesh/tet_mesh.h"
 
@@ -19,6 +20,12 @@ struct MeshingSettings {
   /// Largest element size on the surface, metres, as SurfaceElementSize() measures it. Zero means
   /// no limit.
   double element_size_m = 0;
+  /// Element size relative to `element_size_m`, in the places of the surface in metres. Only used
+  /// with `element_size_m`.
+  SizeField relative_size = {};
+  /// Number of nodes, mid-side nodes included, above which the mesh is of no use. Meshing may stop
+  /// beyond it. Zero means no limit.
+  double most_node_count = 0;
   /// 4 or 10. Mid-side nodes lie on straight edges.
   int nodes_per_element = 10;
   /// The same as FillRequest::cautious.

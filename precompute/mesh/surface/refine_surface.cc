@@ -23,7 +23,8 @@ Edge EdgeOf(int32_t a, int32_t b) { return {std::min(a, b), std::max(a, b)}; }
 /// A closed manifold surface whose edges can be split and flipped.
 class Refiner {
  public:
-  Refiner(const SurfaceMesh& surface, double max_edge_m) : max_edge_m_(max_edge_m) {
+  Refiner(const SurfaceMesh& surface, double max_edge_m, const SizeField& relative_size)
+      : max_edge_m_(max_edge_m), relative_size_(relative_size) {
     refined_.surface.vertices = surface.vertices;
     for (size_t t = 0; t < surface.triangles.size(); ++t) {
       if (!IsCollapsed(surface.triangles[t])) Add(surface.triangles[t], static_cast<int32_t>(t));
@@ -73,8 +74,16 @@ class Refiner {
 
   void NoteIfLong(const Edge& edge) {
     if (!edges_inside_too_ && IsInside(triangles_of_edge_.at(edge))) return;
-    const double length = Distance(Vertex(edge.first), Vertex(edge.second));
+    const double length = RelativeLength(edge);
     if (length > max_edge_m_) long_edges_.emplace(length, edge.first, edge.second);
+  }
+
+  /// The length of the edge, divided by the relative size at its middle.
+  double RelativeLength(const Edge& edge) const {
+    const Point &a = Vertex(edge.first), &b = Vertex(edge.second);
+    if (relative_size_.is_uniform()) return Distance(a, b);
+    return Distance(a, b) /
+           relative_size_.At({(a[0] + b[0]) / 2, (a[1] + b[1]) / 2, (a[2] + b[2]) / 2});
   }
 
   void SplitLongEdges() {
@@ -103,7 +112,7 @@ class Refiner {
   /// part belongs to the second half.
   Point SplitPoint(const Edge& edge) const {
     const Point &a = Vertex(edge.first), &b = Vertex(edge.second);
-    const double parts = std::ceil(Distance(a, b) / (kPartLength * max_edge_m_) - kRounding);
+    const double parts = std::ceil(RelativeLength(edge) / (kPartLength * max_edge_m_) - kRounding);
     const double t = parts < 2 ? 0.5 : std::floor(parts / 2) / parts;
     return {a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])};
   }
@@ -171,18 +180,20 @@ class Refiner {
   static constexpr double kRounding = 1e-9;  // makes no part more
 
   double max_edge_m_;
+  const SizeField& relative_size_;
   bool edges_inside_too_ = false;
   RefinedSurface refined_;
   absl::flat_hash_map<Edge, std::array<int32_t, 2>> triangles_of_edge_;
-  // By length, then by vertices, so that the same surface is always split alike.
+  // By relative length, then by vertices, so that the same surface is always split alike.
   std::priority_queue<std::tuple<double, int32_t, int32_t>> long_edges_;
   std::vector<Edge> suspects_;
 };
 
 }  // namespace
 
-RefinedSurface RefineSurface(const SurfaceMesh& surface, double max_edge_m) {
-  return Refiner(surface, max_edge_m).Refine();
+RefinedSurface RefineSurface(const SurfaceMesh& surface, double max_edge_m,
+                             const SizeField& relative_size) {
+  return Refiner(surface, max_edge_m, relative_size).Refine();
 }
 
 }  // namespace carillon::precompute

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "precompute/mesh/size_field.h"
 #include "precompute/mesh/surface_mesh.h"
 
 namespace carillon::precompute {
@@ -15,11 +16,13 @@ struct RefinedSurface {
   std::vector<int32_t> given_triangle;
 };
 
-/// Splits edges into equal parts until no edge is longer than `max_edge_m`. The edges of the given
+/// Splits edges into equal parts until no edge is longer than `max_edge_m` times the relative size
+/// at the middle of the edge. The edges of the given
 /// triangles are split first, so that a long thin triangle is split across. The edges inside the
 /// given triangles follow, always the longest one first. Inside a given triangle edges are flipped
 /// until they are Delaunay (Lawson 1977), which keeps angles large. Collapsed triangles are left
 /// out. The surface must be closed and manifold.
-RefinedSurface RefineSurface(const SurfaceMesh& surface, double max_edge_m);
+RefinedSurface RefineSurface(const SurfaceMesh& surface, double max_edge_m,
+                             const SizeField& relative_size = {});
 
 }  // namespace carillon::precompute

@@ -118,6 +118,21 @@ TEST(Tetrahedralize, ComesNearTheNumberOfNodesAskedFor) {
   }
 }
 
+TEST(Tetrahedralize, FillsFinerWhereTheFieldOfSizesIsSmall) {
+  // Fine about a corner on the surface, and about a point inside that no surface makes fine.
+  const Point corner{0, 0, 0}, inside{0.7, 0.5, 0.5}, far{0.3, 0.6, 0.6};
+  const TetMesh mesh = Fill(MakeBoxSurface({1, 1, 1}),
+                            {.element_size_m = 0.4,
+                             .relative_size = SizeField({corner, inside, far}, {0.2, 0.2, 1}, 1),
+                             .nodes_per_element = 4});
+  const auto near = [&](const Point& place) {
+    return std::ranges::count_if(mesh.nodes,
+                                 [&](const Point& p) { return Distance(p, place) < 0.2; });
+  };
+  EXPECT_GT(near(corner), 8);
+  EXPECT_GT(near(inside), 3 * std::max<std::ptrdiff_t>(near(far), 1));
+}
+
 TEST(Tetrahedralize, StaysSmallOnAThinPlate) {
   EXPECT_LT(Fill(MakeBoxSurface({1, 1, 0.001}), {}).nodes.size(), 60'000U);
 }

@@ -47,6 +47,22 @@ TEST(RefineSurface, CutsLongThinTrianglesAcross) {
   EXPECT_LT(count, 1.1 * 2 * 61 * 96);
 }
 
+TEST(RefineSurface, RefinesByTheFieldOfSizesAndEndsOnNarrowTriangles) {
+  // A size that differs a lot between both sides of strips 3.3 mm wide.
+  const SurfaceMesh strips = MakeTubeSurface({.around = 24, .along = 1});
+  const SizeField field({{0.25, 0, 0}, {0.25, 0, 0.0125}}, {1, 0.1}, 0.5 / 0.02);
+  const RefinedSurface refined = RefineSurface(strips, 0.02, field);
+  EXPECT_TRUE(CheckSurface(refined.surface).ok());
+  for (size_t t = 0; t < refined.surface.triangles.size(); ++t) {
+    const auto corner = CornersOf(refined.surface, t);
+    for (size_t i = 0; i < 3; ++i) {
+      const Point &a = corner[i], &b = corner[(i + 1) % 3];
+      const Point middle{(a[0] + b[0]) / 2, (a[1] + b[1]) / 2, (a[2] + b[2]) / 2};
+      EXPECT_LE(Distance(a, b), 0.02 * field.At(middle) * (1 + 1e-12));
+    }
+  }
+}
+
 TEST(RefineSurface, LeavesAFineSurfaceAlone) {
   const SurfaceMesh given = MakeTubeSurface({});
   const RefinedSurface refined = RefineSurface(given, std::numeric_limits<double>::infinity());
