@@ -57,7 +57,7 @@ TEST(ErrorEstimate, CoversTheErrorsOfABodyWithAReentrantEdge) {
   const TetMesh mesh = Angle(1);
   const DeformationModes coarse = solve(mesh);
   const DeformationModes fine = solve(Angle(4));
-  const Eigen::VectorXd errors = EstimateFrequencyErrors(mesh, kElastic, coarse.modes);
+  const Eigen::VectorXd errors = EstimateFrequencyErrors(mesh, kElastic, coarse.modes).errors;
   ASSERT_GE(fine.modes.eigenvalues.size(), 4);
   ASSERT_GE(errors.size(), 4);
   for (Eigen::Index m = 0; m < 4; ++m) {
