@@ -23,6 +23,7 @@
 #include "precompute/mesh/point_math.h"
 #include "precompute/mesh/read/read_mesh.h"
 #include "precompute/mesh/surface/prepare_surface.h"
+#include "precompute/model_checks.h"
 #include "precompute/model_warnings.h"
 #include "precompute/modes/audible_modes.h"
 #include "precompute/modes/deformation_modes.h"
@@ -138,22 +139,6 @@ v1::Phase PhaseOf(SolveStage stage) {
       return v1::PHASE_VERIFY;
   }
   return v1::PHASE_SOLVE;
-}
-
-absl::Status CheckBand(const ModalModel& model, const IntendedUse& use) {
-  const double lowest = use.UnitEigenvalue(use.low_hz);
-  if (std::ranges::any_of(model.eigenvalues, [&](double x) { return x >= lowest; })) {
-    return absl::OkStatus();
-  }
-  const double first_hz = use.FrequencyHz(model.lowest_eigenvalue);
-  absl::Status status =
-      Refusal(absl::StatusCode::kFailedPrecondition, "NO_MODE_IN_BAND",
-              absl::StrFormat(
-                  "no natural frequency of the body lies between %g and %g Hz, its first is "
-                  "%.5g Hz; check the unit of the file, or choose another size, material or band",
-                  use.low_hz, use.high_hz, first_hz));
-  AddFigure(status, "first_mode_hz", absl::StrFormat("%.6g", first_hz));
-  return status;
 }
 
 /// The goal for a surface if nobody asked for another. Its processor time is the predicted one, so
@@ -298,15 +283,21 @@ absl::StatusOr<Body> FillGraded(const Fillable& surface, double most_node_count,
   return FillSurface(surface, settings, request);
 }
 
+/// Returns the settings of the first mesh.
+MeshingSettings FirstMeshing(const v1::WorkerRequest& request) {
+  MeshingSettings meshing = MeshingOf(request);
+  if (GoalOf(request).given() && meshing.target_node_count == 0) {
+    meshing.target_node_count = kFirstCornerNodeCount;
+  }
+  return meshing;
+}
+
 /// Fills and solves a surface finer and finer until the goal is met.
 absl::StatusOr<ModalModel> SolveToGoal(const Fillable& surface, const v1::WorkerRequest& request,
                                        DecompositionObserver& observer) {
   const bool is_free = IsFinenessFree(request);
   const ResolutionGoal asked = GoalOf(request);
-  MeshingSettings meshing = MeshingOf(request);
-  if (asked.given() && meshing.target_node_count == 0) {
-    meshing.target_node_count = kFirstCornerNodeCount;
-  }
+  MeshingSettings meshing = FirstMeshing(request);
   double most_node_count = 0;  // of a graded mesh
   std::vector<Round> rounds;
   RoundForecast forecast{.later_rounds = asked.given() ? kLaterRoundsAfterFirst : 0};
@@ -350,33 +341,6 @@ absl::StatusOr<ModalModel> SolveInput(const Input& input, const v1::WorkerReques
   return std::move(solved.model);
 }
 
-/// Leaves out the modes whose estimated error is above the limit that the request sets.
-absl::Status LeaveOutInaccurate(const v1::WorkerRequest& request, ModalModel& model) {
-  const double limit = request.settings().max_frequency_error();
-  std::vector<size_t> kept;
-  std::vector<size_t> left_out;
-  for (size_t m = 0; m < model.eigenvalues.size(); ++m) {
-    (model.estimated_errors[m] > limit ? left_out : kept).push_back(m);
-  }
-  if (!(limit > 0) || left_out.empty()) return absl::OkStatus();
-  if (kept.empty()) {
-    return Refusal(absl::StatusCode::kFailedPrecondition, "ACCURACY_NOT_REACHED",
-                   absl::StrFormat("all %d modes are estimated to be off by more than the %.3g %% "
-                                   "allowed, the best by %.3g %%; allow more, or ask for a finer "
-                                   "mesh (nodes, accuracy or budget)",
-                                   left_out.size(), 100 * limit,
-                                   100 * *std::ranges::min_element(model.estimated_errors)));
-  }
-  const double lowest = model.eigenvalues[left_out.front()];
-  model.warnings.push_back(absl::StrFormat(
-      "%d modes, the lowest at %.5g Hz, were left out because they are estimated to be off by more "
-      "than the %.3g %% allowed; a finer mesh (nodes, accuracy or budget) keeps them",
-      left_out.size(), UseOf(request).FrequencyHz(lowest), 100 * limit));
-  model.complete_to_eigenvalue = std::min(model.complete_to_eigenvalue, std::nextafter(lowest, 0));
-  KeepModes(kept, model);
-  return absl::OkStatus();
-}
-
 void WarnOfOverruns(const ResolutionGoal& goal, double used_s, ModalModel& model) {
   std::ranges::move(OverrunWarnings(goal, used_s, PeakBytes()), std::back_inserter(model.warnings));
 }
@@ -390,7 +354,8 @@ absl::StatusOr<ModalModel> Decompose(std::string mesh_bytes, const v1::WorkerReq
   ASSIGN_OR_RETURN(ModalModel model, SolveInput(input, request, observer));
   RETURN_IF_ERROR(CheckBand(model, UseOf(request)));
   WarnOfAccuracy(GoalOf(request), model);
-  RETURN_IF_ERROR(LeaveOutInaccurate(request, model));
+  RETURN_IF_ERROR(
+      LeaveOutInaccurate(request.settings().max_frequency_error(), UseOf(request), model));
   WarnOfGreatErrors(model);
   WarnOfOverruns(GoalOf(request), PhaseClock::Now().cpu_seconds - begun_cpu_s, model);
   observer.OnModes(model.eigenvalues.size());

@@ -34,7 +34,7 @@ constexpr int kBisections = 50;
 /// plates, whose errors are alike everywhere, gain nothing.
 constexpr double kMostNodes = 0.75;
 
-/// What lies at a node.
+/// The sum and the number of values that lie at a node.
 struct Sum {
   double value = 0;
   double count = 0;

@@ -228,8 +228,8 @@ class Estimator {
         std::max(kFewestModesAtATime, most / static_cast<size_t>(thread_count)));
   }
 
-  /// Returns sum_b w_b r_b^T a(b, b)^-1 r_b for some modes, and adds the weighted parts of each edge
-  /// and face to `shares`. `shapes` is #U by #modes.
+  /// Returns sum_b w_b r_b^T a(b, b)^-1 r_b for some modes, and adds the weighted parts of each
+  /// edge and face to `shares`. `shapes` is #U by #modes.
   Eigen::VectorXd Corrections(const Eigen::VectorXd& eigenvalues, const RowMatrix& shapes,
                               Eigen::VectorXd& shares) const {
     RowMatrix residuals =

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include "absl/status/status.h"
+#include "precompute/intended_use.h"
+#include "precompute/modes/modal_model.h"
+
+namespace carillon::precompute {
+
+/// Returns OK if a mode lies in the band of `use`.
+/// Errors: NO_MODE_IN_BAND with the figure first_mode_hz.
+absl::Status CheckBand(const ModalModel& model, const IntendedUse& use);
+
+/// Leaves out the modes whose estimated error is above `limit`, and adds a warning that says so. A
+/// limit of zero leaves out none.
+/// Errors: ACCURACY_NOT_REACHED, if no mode remains.
+absl::Status LeaveOutInaccurate(double limit, const IntendedUse& use, ModalModel& model);
+
+}  // namespace carillon::precompute
