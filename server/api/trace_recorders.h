@@ -75,7 +75,7 @@ class TraceRecorders {
   std::vector<std::weak_ptr<TraceRecorder>> waiting_ ABSL_GUARDED_BY(mutex_);
 };
 
-/// Writes one contact stream to its recorders. One thread at a time.
+/// Writes one contact stream to its recorders. Only one thread at a time may use an object.
 class StreamRecording {
  public:
   StreamRecording() = default;

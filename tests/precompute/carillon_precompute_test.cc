@@ -17,6 +17,7 @@
 #include <string>
 #include <vector>
 
+#include "absl/strings/str_cat.h"
 #include "carillon/v1/decomposition.pb.h"
 #include "carillon/v1/modal_model.pb.h"
 #include "tests/precompute/carillon_precompute_run.h"
@@ -259,8 +260,8 @@ TEST_F(CarillonPrecomputeTest, BodyWithoutAModeInTheBandIsToldItsFirst) {
     const std::string value = remedy.at("value");
     EXPECT_FALSE(value.empty()) << option;
     if (option == "--unit") continue;  // RunBar states the unit
-    const std::string band = option == "--band" ? "" : " --band 20:1000";
-    EXPECT_EQ(RunBar(kSteel + band + " " + option + " " + value).exit_status, 0) << option;
+    const char* const band = option == "--band" ? "" : " --band 20:1000";
+    EXPECT_EQ(RunBar(absl::StrCat(kSteel, band, " ", option, " ", value)).exit_status, 0) << option;
     std::filesystem::remove(model);
   }
   const std::string first_hz = error.at("figures").at("first_mode_hz");

@@ -18,8 +18,10 @@ namespace carillon {
 ///
 /// Several owners share the table. With more than one, an owner may have at most
 /// kFreeMultiple times as many events in it as there are free places (Choudhury and Hahne,
-/// Dynamic queue length thresholds, IEEE/ACM Trans. Networking 6, 1998). So one owner alone can
-/// use four fifths of the table, and whatever n owners do, a 4n + 1st part remains for the next.
+/// Dynamic queue length thresholds, IEEE/ACM Trans. Networking 6, 1998). One owner alone can use
+/// four fifths of the table, and if n owners fill it, 1/(4n + 1) of it stays free for the next one.
+///
+/// The mixer makes a DueEvent, with its frame in the block, of each event that is collected.
 class PendingEvents {
  public:
   static constexpr size_t kFreeMultiple = 4;
