@@ -29,7 +29,8 @@ std::string FindFlood(const ConnectionCalls& before, const ConnectionCalls& now,
 
 /// A thread that closes connections whose clients begin calls without end, because gRPC 1.51 bounds
 /// neither calls that are cancelled at once nor calls that never send their message. The guard also
-/// refuses further connections from the same process or address for ConnectionGate::kRefusal.
+/// refuses further connections from the same process (Unix) or address (TCP) for
+/// ConnectionGate::kRefusal.
 class FloodGuard {
  public:
   /// `gate` and `log` must outlive the guard.
