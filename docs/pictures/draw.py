@@ -20,9 +20,6 @@ GROWTH = {"tube": [(18816, 2.8), (60120, 9.6), (150048, 27.1), (300000, 60.3), (
 # Modes that one core renders in real time, relative to scsynth's Klank.
 MIXER = {"Klank": 1, "Carillon, struck in\nevery block, AVX2": 13.3,
          "Carillon, struck in\nevery block, AVX-512": 21.4, "Carillon,\nringing freely": 70.6}
-# Largest estimate and largest true error, percent.
-ERRORS = {"chime": (0.99, 0.73), "bowl": (0.69, 0.63), "plate": (0.94, 0.76),
-          "bunny": (0.75, 0.19), "bell": (0.91, 0.98)}
 
 
 def save(name):
@@ -63,18 +60,6 @@ def mixer():
     save("mixer")
 
 
-def errors():
-    _, axes = plt.subplots(figsize=(6.4, 2.6))
-    for i, what in enumerate(("largest estimate", "largest true error")):
-        axes.bar([body + 0.4 * (i - 0.5) for body in range(len(ERRORS))],
-                 [row[i] for row in ERRORS.values()], 0.38, label=what)
-    axes.axhline(1, color="grey", lw=0.8)
-    axes.set_xticks(range(len(ERRORS)), ERRORS)
-    axes.set_ylabel("percent")
-    axes.legend(fontsize=8)
-    save("errors")
-
-
 if __name__ == "__main__":
-    for draw in (solvers, growth, mixer, errors):
+    for draw in (solvers, growth, mixer):
         draw()

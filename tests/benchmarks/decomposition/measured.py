@@ -9,6 +9,8 @@ import tempfile
 import threading
 import time
 
+import numpy
+
 
 @dataclasses.dataclass
 class Run:
@@ -54,3 +56,8 @@ def read_report(text, code, late):
     if code != 0 and "error" not in report:
         return {"error": {"reason": "CRASH", "message": f"exit code {code} after the report"}}
     return report
+
+
+def column(report, name):
+    """The value of each mode."""
+    return numpy.array([mode[name] for mode in report["modes"]])
