@@ -181,16 +181,6 @@ TetGeometry GeometryOf(const TetMesh& mesh, const int32_t* element) {
   return MakeTetGeometry(corners);
 }
 
-/// Returns the weights of edges and faces by the reentrance of their corners (ReentrantNodes). At
-/// an edge from which the displacement grows as the power a of the distance, elements of order p +
-/// 1 in place of p lessen the error to (p / (p + 1))^(4 a) (Babuska and Suri, SIAM Review 36,
-/// 1994). With the exponents of elastic wedges the part that is left rises about as the square root
-/// of the reentrant angle.
-std::vector<double> Weights(std::vector<double> reentrance) {
-  for (double& value : reentrance) value = 1 + std::sqrt(value);
-  return reentrance;
-}
-
 /// Sums the contributions of the elements to each edge and face.
 class Estimator {
  public:
@@ -201,7 +191,7 @@ class Estimator {
         integrals_(mesh.nodes_per_element),
         places_(mesh),
         held_(places_.HeldWith(mesh)),
-        weights_(Weights(places_.LargestOf(ReentrantNodes(mesh)))),
+        weights_(places_.LargestOf(ReentrantWeights(mesh))),
         stiffness_(places_.count(), Eigen::Matrix3d::Zero()) {
     for (size_t e = 0; e < mesh_.element_count(); ++e) {
       if (IsCurved(mesh_, e)) {

@@ -15,6 +15,13 @@
 namespace carillon::precompute {
 namespace {
 
+/// The distance within which the boundary must turn to act like an edge, in lengths of an element's
+/// edge.
+constexpr double kReach = 2;
+/// The angle from which an edge counts by itself only and not as part of a fillet, in units of 90
+/// degrees.
+constexpr double kSharp = 0.5;
+
 Point At(const TetMesh& mesh, int32_t node) { return mesh.nodes[static_cast<size_t>(node)]; }
 
 /// The normal of a boundary face, which points out of the body, of any length.
@@ -35,10 +42,15 @@ double Reentrance(const TetMesh& mesh, const BoundaryFace& first, const Boundary
   return (rise > 0 ? angle : -angle) / (std::numbers::pi / 2);
 }
 
-}  // namespace
+/// An edge of the boundary, with the angle by which its faces enclose more than 180 degrees of the
+/// body, in units of 90 degrees. The angle of a convex edge is negative.
+struct BentEdge {
+  int32_t first = 0, second = 0;
+  double angle = 0;
+};
 
-std::vector<double> ReentrantNodes(const TetMesh& mesh) {
-  std::vector<double> reentrance(mesh.nodes.size());
+std::vector<BentEdge> BentEdges(const TetMesh& mesh) {
+  std::vector<BentEdge> edges;
   absl::flat_hash_map<std::pair<int32_t, int32_t>, const BoundaryFace*> first_face;
   for (const BoundaryFace& face : mesh.boundary) {
     for (size_t i = 0; i < 3; ++i) {
@@ -46,14 +58,98 @@ std::vector<double> ReentrantNodes(const TetMesh& mesh) {
       const int32_t b = face.nodes[(i + 1) % 3];
       const auto [found, is_first] = first_face.try_emplace(std::minmax(a, b), &face);
       if (is_first) continue;
-      const double here = Reentrance(mesh, *found->second, face, face.nodes[(i + 2) % 3]);
-      for (const int32_t node : {a, b}) {
-        double& largest = reentrance[static_cast<size_t>(node)];
-        largest = std::max(largest, std::min(here, 1.0));
+      edges.push_back({a, b, Reentrance(mesh, *found->second, face, face.nodes[(i + 2) % 3])});
+    }
+  }
+  return edges;
+}
+
+/// Returns the mean length of the elements' edges at each node, and zero for mid-side nodes.
+std::vector<double> MeanEdgeLengths(const TetMesh& mesh) {
+  std::vector<double> sums(mesh.nodes.size()), counts(mesh.nodes.size());
+  for (size_t e = 0; e < mesh.element_count(); ++e) {
+    const int32_t* corners = &mesh.elements[e * static_cast<size_t>(mesh.nodes_per_element)];
+    for (size_t i = 0; i < 4; ++i) {
+      for (size_t j = 0; j < i; ++j) {
+        const double length = Norm(Difference(At(mesh, corners[i]), At(mesh, corners[j])));
+        for (const int32_t node : {corners[i], corners[j]}) {
+          sums[static_cast<size_t>(node)] += length;
+          counts[static_cast<size_t>(node)] += 1;
+        }
       }
     }
   }
-  return reentrance;
+  for (size_t n = 0; n < sums.size(); ++n) sums[n] /= std::max(counts[n], 1.0);
+  return sums;
+}
+
+/// Sums the angles of the boundary's edges near a node.
+class Turning {
+ public:
+  Turning(const TetMesh& mesh, const std::vector<BentEdge>& edges)
+      : mesh_(mesh), edges_(edges), at_node_(mesh.nodes.size()), seen_from_(mesh.nodes.size(), -1) {
+    for (size_t i = 0; i < edges.size(); ++i) {
+      at_node_[static_cast<size_t>(edges[i].first)].push_back(i);
+      at_node_[static_cast<size_t>(edges[i].second)].push_back(i);
+    }
+  }
+
+  /// Returns the angle by which a strip of the boundary, of twice the radius in length and width,
+  /// turns towards its outside at edges that are not sharp, in units of 90 degrees. It is the mean
+  /// over the strip's width.
+  double Around(int32_t node, double radius) {
+    double sum = 0;
+    std::vector<int32_t> open = {node};
+    seen_from_[static_cast<size_t>(node)] = node;
+    while (!open.empty()) {
+      const int32_t here = open.back();
+      open.pop_back();
+      for (const size_t i : at_node_[static_cast<size_t>(here)]) {
+        const BentEdge& edge = edges_[i];
+        const int32_t there = edge.first == here ? edge.second : edge.first;
+        // Each end of an edge within the radius adds half of the edge.
+        const double length = std::min(Distance(here, there) / 2, radius);
+        if (std::abs(edge.angle) < kSharp) sum += edge.angle * length;
+        int32_t& seen_from = seen_from_[static_cast<size_t>(there)];
+        if (seen_from == node || Distance(node, there) > radius) continue;
+        seen_from = node;
+        open.push_back(there);
+      }
+    }
+    return sum / (2 * radius);
+  }
+
+ private:
+  double Distance(int32_t a, int32_t b) const {
+    return Norm(Difference(At(mesh_, a), At(mesh_, b)));
+  }
+
+  const TetMesh& mesh_;
+  const std::vector<BentEdge>& edges_;
+  std::vector<std::vector<size_t>> at_node_;  ///< indices of the edges at each node
+  std::vector<int32_t> seen_from_;            ///< the last node from which each node was reached
+};
+
+}  // namespace
+
+std::vector<double> ReentrantWeights(const TetMesh& mesh) {
+  const std::vector<BentEdge> edges = BentEdges(mesh);
+  std::vector<double> sharpest(mesh.nodes.size());
+  for (const BentEdge& edge : edges) {
+    for (const int32_t node : {edge.first, edge.second}) {
+      double& angle = sharpest[static_cast<size_t>(node)];
+      angle = std::max(angle, edge.angle);
+    }
+  }
+  const std::vector<double> lengths = MeanEdgeLengths(mesh);
+  Turning turning(mesh, edges);
+  std::vector<double> weights(mesh.nodes.size(), 1);
+  for (size_t n = 0; n < weights.size(); ++n) {
+    if (lengths[n] == 0) continue;  // a mid-side node
+    const double around = turning.Around(static_cast<int32_t>(n), kReach * lengths[n]);
+    weights[n] += std::min(std::max(std::sqrt(sharpest[n]), around), 1.0);
+  }
+  return weights;
 }
 
 }  // namespace carillon::precompute

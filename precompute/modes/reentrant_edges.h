@@ -7,11 +7,20 @@
 
 namespace carillon::precompute {
 
-/// Returns for each node of the mesh how far the boundary is re-entrant there: the largest angle by
-/// which two boundary faces that share an edge of the node enclose more than 180 degrees of the
-/// body, in units of 90 degrees and at most 1. It is zero inside the body, on plane and convex
-/// parts of the boundary, and at mid-side nodes. At a re-entrant edge the stress is singular
-/// (Grisvard, Elliptic Problems in Nonsmooth Domains, 1985).
-std::vector<double> ReentrantNodes(const TetMesh& mesh);
+/// Returns for each node of the mesh, from 1 to 2, how much more of the error remains there with
+/// elements one order higher than where the displacement is smooth.
+///
+/// At a re-entrant edge, whose faces enclose more than 180 degrees of the body, the stress is
+/// singular (Grisvard, Elliptic Problems in Nonsmooth Domains, 1985). If the displacement grows as
+/// the power a of the distance from the edge, elements of order p + 1 in place of p lessen the
+/// error to (p / (p + 1))^(4 a) (Babuska and Suri, SIAM Review 36, 1994). With the exponents of
+/// elastic wedges the remaining part rises about as the square root of the re-entrant angle, to 2
+/// where the body encloses 270 degrees.
+///
+/// A fillet that turns by a right angle within a few elements acts like an edge. Its part rises
+/// with the angle by which the boundary turns within two elements' edges; this was fitted to an
+/// angle with a fillet. The weight is the larger of the two, and 1 inside the body, on plane and
+/// convex parts of the boundary, and at mid-side nodes.
+std::vector<double> ReentrantWeights(const TetMesh& mesh);
 
 }  // namespace carillon::precompute

@@ -3,8 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <numbers>
+#include <utility>
 
+#include "precompute/mesh/point_math.h"
 #include "precompute/modes/deformation_modes.h"
 #include "precompute/modes/error_estimate.h"
 #include "tests/precompute/test_meshes.h"
@@ -25,25 +29,63 @@ bool IsOnInnerEdge(const Point& p) {
   return std::abs(p[0] - kWallM) < 1e-9 && std::abs(p[1] - kWallM) < 1e-9;
 }
 
-TEST(ReentrantNodes, AreNoneOfAConvexBody) {
-  for (const double value : ReentrantNodes(MakeTetBox({1, 2, 3}, {2, 3, 4}, 4))) {
-    EXPECT_EQ(value, 0);
+TEST(ReentrantWeights, AreNoneOfAConvexBody) {
+  for (const double value : ReentrantWeights(MakeTetBox({1, 2, 3}, {2, 3, 4}, 4))) {
+    EXPECT_EQ(value, 1);
   }
 }
 
-TEST(ReentrantNodes, AreThoseOfTheInnerEdgeOfAnAngle) {
+TEST(ReentrantWeights, AreThoseOfTheInnerEdgeOfAnAngle) {
   const TetMesh mesh = Angle(2);
-  const std::vector<double> values = ReentrantNodes(mesh);
+  const std::vector<double> values = ReentrantWeights(mesh);
   ASSERT_EQ(values.size(), mesh.nodes.size());
   int count = 0;
   for (size_t e = 0; e < mesh.element_count(); ++e) {
     for (size_t i = 0; i < 4; ++i) {
       const auto node = static_cast<size_t>(mesh.elements[10 * e + i]);
-      EXPECT_NEAR(values[node], IsOnInnerEdge(mesh.nodes[node]) ? 1 : 0, 1e-9);
-      count += values[node] > 0 ? 1 : 0;
+      EXPECT_NEAR(values[node], IsOnInnerEdge(mesh.nodes[node]) ? 2 : 1, 1e-9);
+      count += values[node] > 1 ? 1 : 0;
     }
   }
   EXPECT_GT(count, 0);
+}
+
+/// A plate of 12 elements that is bent by a right angle to an arc with this inner radius.
+TetMesh BentPlate(double inner_radius_m) {
+  constexpr double kThicknessM = 0.004, kWidthM = 0.02;
+  TetMesh mesh = MakeTetBox({1, kThicknessM, kWidthM}, {12, 2, 10}, 4);
+  for (Point& p : mesh.nodes) {
+    const double angle = p[0] * std::numbers::pi / 2;
+    const double radius = inner_radius_m + kThicknessM - p[1];
+    p = {radius * std::sin(angle), -radius * std::cos(angle), p[2]};
+  }
+  return mesh;
+}
+
+/// The weights in the middle of the inner side and of the outer side of BentPlate().
+std::pair<double, double> InnerAndOuterWeight(double inner_radius_m) {
+  const TetMesh mesh = BentPlate(inner_radius_m);
+  const std::vector<double> weights = ReentrantWeights(mesh);
+  const auto at = [&](double radius) {
+    const Point sought = {radius * std::sqrt(0.5), -radius * std::sqrt(0.5), 0.01};
+    const auto near = [&](const Point& p) { return Norm(Difference(p, sought)); };
+    const auto found = std::ranges::min_element(mesh.nodes, {}, near);
+    EXPECT_LT(near(*found), 1e-9);
+    return weights[static_cast<size_t>(found - mesh.nodes.begin())];
+  };
+  return {at(inner_radius_m), at(inner_radius_m + 0.004)};
+}
+
+TEST(ReentrantWeights, OfAFilletRiseWithWhatItTurnsWithinTwoElements) {
+  const auto [narrow, outside] = InnerAndOuterWeight(0.001);
+  EXPECT_GT(narrow, 1.6);
+  EXPECT_EQ(outside, 1);
+  const double middle = InnerAndOuterWeight(0.01).first;
+  const double wide = InnerAndOuterWeight(0.1).first;
+  EXPECT_LT(middle, narrow);
+  EXPECT_LT(wide, middle);
+  // Each edge turns by a twelfth of a right angle.
+  EXPECT_GE(wide, 1 + std::sqrt(1.0 / 12) - 1e-9);
 }
 
 TEST(ErrorEstimate, CoversTheErrorsOfABodyWithAReentrantEdge) {
