@@ -113,7 +113,7 @@ absl::StatusOr<Principal> AccessControl::Identify(const grpc::CallbackServerCont
 }
 
 std::string AccessControl::ClientOf(const Principal& caller) const {
-  if (caller.name == kLocalCaller) return ProcessOfPeer(caller.connection);
+  if (absl::StartsWith(caller.connection, "unix:")) return ProcessOfPeer(caller.connection);
   if (caller.name == table()->anybody().name) return AddressOfPeer(caller.connection);
   return caller.name;
 }

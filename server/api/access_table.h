@@ -27,8 +27,8 @@ struct Principal {
   unsigned roles = 0;        ///< bits of Role
   std::string connection{};  ///< connection of this call, as gRPC names its peer
   /// The client whose share of scenes, streams and jobs the call uses. It is the caller, if the
-  /// caller has shown a credential. Otherwise it is the process behind a Unix socket, a connection
-  /// over TCP or, if the network reaches the daemon, the caller's address.
+  /// caller has shown a credential. Otherwise it is the process behind a Unix socket, or the
+  /// caller's address over TCP (AddressOfPeer).
   std::string client{};
 
   bool has(Role role) const {

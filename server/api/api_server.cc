@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/api/api_server.h"
 
-#include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/grpcpp.h>
-#include <grpcpp/health_check_service_interface.h>
 
 #include <algorithm>
 #include <atomic>
@@ -28,6 +26,7 @@
 #include "server/api/fair_pool.h"
 #include "server/api/flood_guard.h"
 #include "server/api/grpc_log.h"
+#include "server/api/grpc_servers.h"
 #include "server/api/idle_calls.h"
 #include "server/api/job_run_service.h"
 #include "server/api/limited_log.h"
@@ -50,23 +49,6 @@ constexpr int kWriteThreadCount = 2;
 /// Offline rendering has a lower priority than live sound.
 constexpr int kRenderThreadCount = 2;
 constexpr int kRenderNiceness = 10;
-constexpr std::chrono::milliseconds kGracePeriod(500);
-/// Time within which a new connection must send its HTTP/2 settings and, with TLS, complete its
-/// handshake.
-constexpr int kHandshakeLimit_ms = 5'000;
-/// A connection without traffic gets a ping after kKeepalive_ms, and is closed if no answer comes
-/// within kKeepaliveAnswer_ms.
-constexpr int kKeepalive_ms = 30'000;
-constexpr int kKeepaliveAnswer_ms = 10'000;
-/// With 0, any number of pings is answered. With a limit, gRPC 1.51 closes the connection only
-/// after all its data is sent, and keeps 1 kB for each ping that comes meanwhile.
-constexpr int kNoPingStrikes = 0;
-/// Bytes of a connection that are parsed before other connections have their turn. With gRPC's
-/// default of 4 MiB, a few connections that begin and cancel calls keep all threads busy for
-/// seconds.
-constexpr int kReadBytes = 16 << 10;
-/// Memory of all connections, beyond which gRPC refuses calls and connections.
-constexpr size_t kClientMemoryBytes = size_t{512} << 20U;
 
 std::chrono::nanoseconds Duration(double seconds) {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(
@@ -106,37 +88,6 @@ absl::StatusOr<std::deque<ListenAddress>> ParseAddresses(const ApiSettings& sett
     addresses.push_back(std::move(address));
   }
   return addresses;
-}
-
-/// Hands connections to gRPC.
-class GrpcTaker final : public ConnectionTaker {
- public:
-  using Acceptor = grpc::experimental::ExternalConnectionAcceptor;
-  explicit GrpcTaker(std::unique_ptr<Acceptor> acceptor) : acceptor_(std::move(acceptor)) {}
-
-  void Take(int connection) override {
-    Acceptor::NewConnectionParameters parameters;
-    parameters.fd = connection;
-    acceptor_->HandleNewConnection(&parameters);
-  }
-
- private:
-  const std::unique_ptr<Acceptor> acceptor_;
-};
-
-/// Bounds the resources of each connection, and of all connections together.
-void LimitClients(grpc::ServerBuilder& builder) {
-  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, kMaxCallsOfConnection);
-  builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, kHandshakeLimit_ms);
-  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepalive_ms);
-  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveAnswer_ms);
-  builder.AddChannelArgument(GRPC_ARG_HTTP2_MAX_PING_STRIKES, kNoPingStrikes);
-  builder.AddChannelArgument(GRPC_ARG_TCP_READ_CHUNK_SIZE, kReadBytes);
-  builder.AddChannelArgument(GRPC_ARG_TCP_MAX_READ_CHUNK_SIZE, kReadBytes);
-  grpc::ResourceQuota quota("clients");
-  quota.Resize(kClientMemoryBytes);
-  builder.SetResourceQuota(quota);
-  builder.SetMaxReceiveMessageSize(static_cast<int>(kMaxMessageBytes));
 }
 
 }  // namespace
@@ -192,8 +143,7 @@ struct ApiServer::State {
   /// impossible.
   void ShowWorkers(bool can) {
     if (can_decompose.exchange(can) == can) return;
-    server->GetHealthCheckService()->SetServingStatus(v1::DecompositionService::service_full_name(),
-                                                      stores && can);
+    servers->SetHealth(v1::DecompositionService::service_full_name(), stores && can);
     if (!can) client_log.Warn("decompositions cannot run: their program is missing");
   }
 
@@ -223,7 +173,7 @@ struct ApiServer::State {
   LiveOutput& output;
   /// The credentials of each TCP address.
   std::vector<std::shared_ptr<TlsCredentials>> tls;
-  std::unique_ptr<grpc::Server> server;
+  std::optional<GrpcServers> servers;
   std::optional<ConnectionGate> gate;
   std::optional<ClientKeeper> keeper;
   std::optional<FloodGuard> flood_guard;
@@ -245,22 +195,15 @@ absl::StatusOr<std::shared_ptr<grpc::ServerCredentials>> ApiServer::State::Crede
 
 absl::Status ApiServer::State::Listen(const ApiSettings& settings) {
   ASSIGN_OR_RETURN(std::deque<ListenAddress> parsed, ParseAddresses(settings));
-  grpc::ServerBuilder builder;
-  LimitClients(builder);
+  servers.emplace();
   gate.emplace(RaiseConnectionLimit(), settings.client_share, &client_log);
   for (ListenAddress& address : parsed) {
     ASSIGN_OR_RETURN(const std::shared_ptr<grpc::ServerCredentials> credentials,
                      Credentials(address, settings));
-    auto acceptor = builder.experimental().AddExternalConnectionAcceptor(
-        grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD, credentials);
-    RETURN_IF_ERROR(gate->Listen(address, std::make_unique<GrpcTaker>(std::move(acceptor))));
+    RETURN_IF_ERROR(gate->Listen(address, servers->AddTaker(credentials)));
   }
-  for (grpc::Service* service : std::initializer_list<grpc::Service*>{
-           &admin, &models, &decompositions, &job_runs, &scenes, &contacts, &audio, &server_info}) {
-    builder.RegisterService(service);
-  }
-  server = builder.BuildAndStart();
-  if (!server) {
+  if (!servers->Start({&admin, &models, &decompositions, &job_runs, &scenes, &contacts, &audio,
+                       &server_info})) {
     return Unready("LISTEN_FAILED",
                    "cannot serve: gRPC does not take the TLS files; see the line before");
   }
@@ -272,8 +215,6 @@ absl::Status ApiServer::State::Listen(const ApiSettings& settings) {
 
 absl::StatusOr<std::unique_ptr<ApiServer>> ApiServer::Start(const ApiSettings& settings,
                                                             const ServedRooms& rooms) {
-  grpc::EnableDefaultHealthCheckService(true);
-  grpc::reflection::InitProtoReflectionServerBuilderPlugin();
   ASSIGN_OR_RETURN(AccessTable table, ReadAccess(settings));
   auto state = std::make_unique<State>(settings, rooms, std::move(table));
   if (!settings.head_file.empty()) {
@@ -294,8 +235,8 @@ absl::StatusOr<std::unique_ptr<ApiServer>> ApiServer::Start(const ApiSettings& s
               state->client_log.Warn(*warning);
             }
           }});
-  rooms.output.ObserveDevice([health = state->server->GetHealthCheckService()](bool plays) {
-    health->SetServingStatus(v1::AudioService::service_full_name(), plays);
+  rooms.output.ObserveDevice([&servers = *state->servers](bool plays) {
+    servers.SetHealth(v1::AudioService::service_full_name(), plays);
   });
   return std::unique_ptr<ApiServer>(new ApiServer(std::move(state)));
 }
@@ -313,11 +254,10 @@ absl::Status ApiServer::Reload(const ApiSettings& settings) {
 }
 
 void ApiServer::ShowDatabaseHealth(bool stores) {
-  grpc::HealthCheckServiceInterface& health = *state_->server->GetHealthCheckService();
-  health.SetServingStatus(v1::ModalModelService::service_full_name(), stores);
+  GrpcServers& servers = *state_->servers;
+  servers.SetHealth(v1::ModalModelService::service_full_name(), stores);
   state_->stores = stores;
-  health.SetServingStatus(v1::DecompositionService::service_full_name(),
-                          stores && state_->can_decompose);
+  servers.SetHealth(v1::DecompositionService::service_full_name(), stores && state_->can_decompose);
 }
 
 ApiServer::ApiServer(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -327,8 +267,7 @@ ApiServer::~ApiServer() {
   state_->gate->Close();
   state_->keeper.reset();
   state_->output.ObserveDevice(nullptr);
-  state_->server->Shutdown(std::chrono::system_clock::now() + kGracePeriod);
-  state_->server->Wait();
+  state_->servers.reset();
 }
 
 ClientCounts ApiServer::clients() const {

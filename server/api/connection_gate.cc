@@ -25,6 +25,7 @@
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 #include "server/api/client_limits.h"
+#include "server/api/guess_limiter.h"
 #include "server/api/peer_name.h"
 
 namespace carillon {
@@ -80,17 +81,6 @@ int PortOf(int bound) {
   return ntohs(reinterpret_cast<const sockaddr_in*>(&address)->sin_port);
 }
 
-/// Returns the process or the address from which the connection with this name came.
-std::string SourceOf(const std::string& peer) {
-  return absl::StartsWith(peer, "unix:") ? ProcessOfPeer(peer) : peer.substr(0, peer.rfind(':'));
-}
-
-/// Returns the beginning that the names of all connections of one process or address have, and no
-/// others. Processes that the system does not know share it.
-std::string SharerOf(const std::string& peer) {
-  return peer.substr(0, 1 + peer.rfind(absl::StartsWith(peer, "unix:") ? '/' : ':'));
-}
-
 std::chrono::steady_clock::time_point Now() { return std::chrono::steady_clock::now(); }
 
 /// Returns the inode of a descriptor, or 0 if the descriptor is closed.
@@ -101,10 +91,16 @@ ino_t InodeOf(int descriptor) {
 
 }  // namespace
 
-ConnectionGate::ConnectionGate(size_t max_connection_count, double client_share, LimitedLog* log)
+std::string SourceOfPeer(const std::string& peer) {
+  return absl::StartsWith(peer, "unix:") ? peer.substr(0, peer.rfind('/')) : AddressOfPeer(peer);
+}
+
+ConnectionGate::ConnectionGate(size_t max_connection_count, double client_share, LimitedLog* log,
+                               SourceFunction& source_of)
     : max_connection_count_(max_connection_count),
       client_share_(client_share),
       log_(log),
+      source_of_(source_of),
       stop_(eventfd(0, EFD_CLOEXEC)) {}
 
 ConnectionGate::~ConnectionGate() {
@@ -208,23 +204,23 @@ void ConnectionGate::Accept(const Door& door) {
     return;
   }
   const NamedPeer named(peer);
-  door.taker->Take(connection);
+  door.taker->Take(connection, source_of_(peer));
 }
 
 bool ConnectionGate::Connection::is_open() const { return InodeOf(descriptor) == inode; }
 
 bool ConnectionGate::Admit(const std::string& peer, const Connection& connection) {
-  const std::string sharer = SharerOf(peer);
+  const std::string source = source_of_(peer);
   std::string reason;
   {
     const MutexLock lock(&mutex_);
-    const auto refused = refused_.find(SourceOf(peer));
+    const auto refused = refused_.find(source);
     if (refused != refused_.end() && Now() < refused->second) return false;
-    reason = WhyNoPlace(sharer);
-    if (!reason.empty() && ForgetClosed()) reason = WhyNoPlace(sharer);
-    if (reason.empty()) connections_.insert_or_assign(peer, connection);
+    reason = WhyNoPlace(source);
+    if (!reason.empty() && ForgetClosed()) reason = WhyNoPlace(source);
+    if (reason.empty() && connections_.insert_or_assign(peer, connection).second) ++counts_[source];
   }
-  if (!reason.empty()) Tell(sharer, reason);
+  if (!reason.empty()) Tell(source, reason);
   return reason.empty();
 }
 
@@ -232,15 +228,18 @@ bool ConnectionGate::ForgetClosed() {
   const auto began = Now();
   if (began < next_forgetting_) return false;
   std::erase_if(connections_, [](const auto& each) { return !each.second.is_open(); });
+  counts_.clear();
+  for (const auto& [peer, connection] : connections_) ++counts_[source_of_(peer)];
   const auto ended = Now();
   next_forgetting_ = ended + kForgettingPauses * (ended - began);
   return true;
 }
 
-std::string ConnectionGate::WhyNoPlace(const std::string& sharer) const {
+std::string ConnectionGate::WhyNoPlace(const std::string& source) const {
   const size_t all = connections_.size();
   if (all >= max_connection_count_) return absl::StrCat("all ", all, " places are taken");
-  const size_t count = CountOf(sharer);
+  const auto counted = counts_.find(source);
+  const size_t count = counted == counts_.end() ? 0 : counted->second;
   const size_t most = ClientLimits::ShareOf(max_connection_count_, client_share_);
   if (client_share_ < 1 && count >= most) {
     return absl::StrCat("it has ", count, " already, its share (--client-share) of ",
@@ -253,22 +252,12 @@ std::string ConnectionGate::WhyNoPlace(const std::string& sharer) const {
                       kFewConnections);
 }
 
-size_t ConnectionGate::CountOf(const std::string& sharer) const {
-  size_t count = 0;
-  for (auto at = connections_.lower_bound(sharer);
-       at != connections_.end() && absl::StartsWith(at->first, sharer); ++at) {
-    ++count;
-  }
-  return count;
-}
-
-void ConnectionGate::Tell(const std::string& sharer, const std::string& reason) {
+void ConnectionGate::Tell(const std::string& source, const std::string& reason) {
   if (log_ == nullptr) return;
   const auto now = Now();
   std::erase_if(told_, [now](const auto& each) { return each.second <= now; });
-  if (!told_.emplace(sharer, now + kRefusal).second) return;
-  log_->Warn(absl::StrCat("closed a new connection from ", sharer.substr(0, sharer.size() - 1),
-                          ": ", reason,
+  if (!told_.emplace(source, now + kRefusal).second) return;
+  log_->Warn(absl::StrCat("closed a new connection from ", source, ": ", reason,
                           "; for 30 s further ones that reach a limit are closed without a line"));
 }
 
@@ -289,7 +278,9 @@ bool ConnectionGate::Refuse(const std::string& peer) {
   // gRPC, which owns the descriptor, then sees the end of the connection and closes the descriptor.
   shutdown(found->second.descriptor, SHUT_RDWR);
   std::erase_if(refused_, [now](const auto& each) { return each.second <= now; });
-  refused_.insert_or_assign(SourceOf(peer), now + kRefusal);
+  std::string source = source_of_(peer);
+  const auto duration = source == kLoopback ? kLoopbackRefusal : kRefusal;
+  refused_.insert_or_assign(std::move(source), now + duration);
   return true;
 }
 

@@ -24,17 +24,27 @@ namespace carillon {
 class ConnectionTaker {
  public:
   virtual ~ConnectionTaker() = default;
-  virtual void Take(int connection) = 0;
+  /// `source` is SourceOfPeer of the connection.
+  virtual void Take(int connection, const std::string& source) = 0;
 };
+
+/// Returns the process (Unix) or the address (TCP, AddressOfPeer) from which the connection with
+/// this name came. Processes that the system does not know are one.
+std::string SourceOfPeer(const std::string& peer);
 
 /// Accepts connections in place of gRPC, whose own listener stops for ever when no descriptor is
 /// left (CVE-2023-4785). A limit leaves descriptors for the daemon's other work. Connections beyond
 /// the limit, and beyond the share of one process or address, are closed at once.
 class ConnectionGate {
  public:
+  using SourceFunction = std::string(const std::string& peer);
+
   /// The time for which the gate closes new connections from the process or address of a refused
   /// connection.
   static constexpr std::chrono::seconds kRefusal{30};
+  /// The same for connections over loopback, which come from one address whatever process begins
+  /// them.
+  static constexpr std::chrono::seconds kLoopbackRefusal{1};
 
   /// The last sixteenth of the places is for processes and addresses with fewer connections than
   /// this, so that one that comes new finds a place.
@@ -44,7 +54,7 @@ class ConnectionGate {
   /// of `max_connection_count`. `log`, which may be null, takes a line about the first connection
   /// that is closed for a limit, and again after kRefusal. It must outlive the gate.
   explicit ConnectionGate(size_t max_connection_count, double client_share = 1,
-                          LimitedLog* log = nullptr);
+                          LimitedLog* log = nullptr, SourceFunction& source_of = SourceOfPeer);
 
   ~ConnectionGate();
   ConnectionGate(const ConnectionGate&) = delete;
@@ -65,9 +75,9 @@ class ConnectionGate {
   /// Returns whether the connection with this name (ServerContext::peer) is open. Any thread.
   bool IsOpen(const std::string& peer) const;
 
-  /// Ends the connection with this name. Until kRefusal has passed, other connections of the same
-  /// process (Unix) or address (TCP) are closed at once. Returns false if the connection is not
-  /// open or is ending already. Any thread.
+  /// Ends the connection with this name. Until kRefusal (or kLoopbackRefusal) has passed, other
+  /// connections of the same process (Unix) or address (TCP) are closed at once. Returns false if
+  /// the connection is not open or is ending already. Any thread.
   bool Refuse(const std::string& peer);
 
   /// Number of connections that are open. Any thread.
@@ -104,16 +114,14 @@ class ConnectionGate {
   /// Removes closed connections from the table, and returns true. Soon after the last time it
   /// returns false.
   bool ForgetClosed() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  /// Returns why a process or address gets no place, or an empty string if it gets one. `sharer` is
-  /// the beginning of the names of its connections.
-  std::string WhyNoPlace(const std::string& sharer) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  /// Returns the number of connections of a process or address, some of which may have been closed.
-  size_t CountOf(const std::string& sharer) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  void Tell(const std::string& sharer, const std::string& reason);
+  /// Returns why a process or address gets no place, or an empty string if it gets one.
+  std::string WhyNoPlace(const std::string& source) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void Tell(const std::string& source, const std::string& reason);
 
   const size_t max_connection_count_;
   const double client_share_;
   LimitedLog* const log_;
+  SourceFunction& source_of_;
   std::vector<std::unique_ptr<ConnectionTaker>> takers_;
   std::vector<Door> doors_;
   std::vector<SocketFile> socket_files_;
@@ -121,6 +129,8 @@ class ConnectionGate {
   mutable Mutex mutex_;
   /// Connections by peer. Some of them may have been closed.
   std::map<std::string, Connection> connections_ ABSL_GUARDED_BY(mutex_);
+  /// Number of these connections of each process or address.
+  std::map<std::string, size_t> counts_ ABSL_GUARDED_BY(mutex_);
   std::chrono::steady_clock::time_point next_forgetting_ ABSL_GUARDED_BY(mutex_);
   /// For each refused process or address, the time until which its connections are closed at once.
   std::map<std::string, std::chrono::steady_clock::time_point> refused_ ABSL_GUARDED_BY(mutex_);

@@ -21,12 +21,14 @@ constexpr size_t kPrefixBytes = 8;
 
 std::string AddressOfPeer(absl::string_view peer) {
   absl::string_view host = peer.substr(0, peer.rfind(':'));
+  if (absl::StartsWith(host, "ipv4:127.")) return kLoopback;
   if (!absl::ConsumePrefix(&host, "ipv6:")) return std::string(host);
   std::string text = absl::StrReplaceAll(host, {{"%5B", ""}, {"%5D", ""}, {"[", ""}, {"]", ""}});
   text = text.substr(0, text.find('%'));
   in6_addr address{};
   if (inet_pton(AF_INET6, text.c_str(), &address) != 1) return std::string(host);
   if (IN6_IS_ADDR_V4MAPPED(&address)) return text;
+  if (IN6_IS_ADDR_LOOPBACK(&address)) return kLoopback;
   return absl::BytesToHexString({reinterpret_cast<const char*>(address.s6_addr), kPrefixBytes});
 }
 

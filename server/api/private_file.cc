@@ -63,12 +63,17 @@ absl::Status CheckPrivate(int file, const std::string& path, absl::string_view r
 
 absl::StatusOr<std::string> ReadFile(const std::string& path, absl::string_view reason,
                                      bool is_private) {
-  const int file = open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  // Without O_NONBLOCK a named pipe would wait for a writer.
+  const int file = open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
   if (file < 0) {
     return Unusable(path, reason,
                     absl::StrCat("cannot be opened: ", std::generic_category().message(errno)));
   }
   const absl::Cleanup close_file = [file] { close(file); };
+  struct stat status {};
+  if (fstat(file, &status) != 0 || !S_ISREG(status.st_mode)) {
+    return Unusable(path, reason, "is not a regular file: name another file");
+  }
   if (is_private) RETURN_IF_ERROR(CheckPrivate(file, path, reason));
   return ReadAll(file, path, reason);
 }

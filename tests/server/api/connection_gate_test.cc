@@ -29,7 +29,7 @@ namespace {
 class Keeper final : public ConnectionTaker {
  public:
   explicit Keeper(std::counting_semaphore<>& taken) : taken_(taken) {}
-  void Take(int connection) override {
+  void Take(int connection, const std::string& /*source*/) override {
     newest = connection;
     taken_.release();
   }
@@ -39,12 +39,15 @@ class Keeper final : public ConnectionTaker {
   std::counting_semaphore<>& taken_;
 };
 
+/// Takes each address of this machine for an address of its own.
+std::string AddressWithoutPort(const std::string& peer) { return peer.substr(0, peer.rfind(':')); }
+
 class ConnectionGateTest : public testing::Test {
  protected:
   /// Listens on a free port, and lets `count` connections in at a time, of which one address may
   /// have the share `client_share`.
   void Open(size_t count, double client_share = 1) {
-    gate_.emplace(count, client_share, &log_);
+    gate_.emplace(count, client_share, &log_, AddressWithoutPort);
     auto keeper = std::make_unique<Keeper>(taken_);
     keeper_ = keeper.get();
     address_ = *ParseListenAddress("127.0.0.1:0");
@@ -149,6 +152,13 @@ TEST_F(ConnectionGateTest, EndsAConnectionAndRefusesOthersFromTheSameAddress) {
   EXPECT_TRUE(IsClosed(second));
   EXPECT_TRUE(IsClosed(Connect()));
   EXPECT_TRUE(gate_->IsOpen(NameOf(first)));
+}
+
+TEST(SourceOfPeer, IsOneForAllConnectionsOfAProcessOrAddress) {
+  EXPECT_EQ(SourceOfPeer("unix:pid-7/1"), SourceOfPeer("unix:pid-7/2"));
+  EXPECT_NE(SourceOfPeer("unix:pid-7/1"), SourceOfPeer("unix:pid-71/1"));
+  EXPECT_EQ(SourceOfPeer("ipv4:127.0.0.1:1"), SourceOfPeer("ipv4:127.0.0.2:2"));
+  EXPECT_NE(SourceOfPeer("ipv4:192.0.2.1:1"), SourceOfPeer("ipv4:192.0.2.2:1"));
 }
 
 TEST_F(ConnectionGateTest, RefusesAPortThatIsInUse) {

@@ -56,6 +56,9 @@ TEST(GuessLimiter, ManyAddressesDoNotGrowItForEver) {
 
 TEST(GuessLimiter, AnAddressIsThatOfTheMachine) {
   EXPECT_EQ(AddressOfPeer("ipv4:192.0.2.1:4711"), "ipv4:192.0.2.1");
+  EXPECT_EQ(AddressOfPeer("ipv4:127.0.0.1:1"), AddressOfPeer("ipv4:127.8.9.10:2"));
+  EXPECT_EQ(AddressOfPeer("ipv4:127.0.0.1:1"), AddressOfPeer("ipv6:%5B::1%5D:2"));
+  EXPECT_NE(AddressOfPeer("ipv4:127.0.0.1:1"), AddressOfPeer("ipv4:128.0.0.1:1"));
   EXPECT_EQ(AddressOfPeer("ipv6:%5B2001:db8::1%5D:1"), AddressOfPeer("ipv6:[2001:db8::2]:9"));
   EXPECT_NE(AddressOfPeer("ipv6:%5B2001:db8::1%5D:1"), AddressOfPeer("ipv6:[2001:db9::1]:1"));
   EXPECT_NE(AddressOfPeer("ipv6:[::ffff:192.0.2.1]:1"), AddressOfPeer("ipv6:[::ffff:192.0.2.2]:1"));

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/api/grpc_servers.h"
+
+#include <grpcpp/ext/proto_server_reflection_plugin.h>
+#include <grpcpp/health_check_service_interface.h>
+
+#include <array>
+#include <functional>
+#include <thread>
+#include <utility>
+
+#include "server/api/flood_guard.h"
+#include "server/api/server_service.h"
+
+namespace carillon {
+namespace {
+
+using Acceptor = grpc::experimental::ExternalConnectionAcceptor;
+
+/// Time within which a new connection must send its HTTP/2 settings and, with TLS, complete its
+/// handshake.
+constexpr int kHandshakeLimit_ms = 5'000;
+/// A connection without traffic gets a ping after kKeepalive_ms, and is closed if no answer comes
+/// within kKeepaliveAnswer_ms.
+constexpr int kKeepalive_ms = 30'000;
+constexpr int kKeepaliveAnswer_ms = 10'000;
+/// With 0, any number of pings is answered. With a limit, gRPC 1.51 closes the connection only
+/// after all its data is sent, and keeps 1 kB for each ping that comes meanwhile.
+constexpr int kNoPingStrikes = 0;
+/// Bytes of a connection that are parsed before other connections have their turn. With gRPC's
+/// default of 4 MiB, a few connections that begin and cancel calls keep all threads busy for
+/// seconds.
+constexpr int kReadBytes = 16 << 10;
+
+/// Hands each connection to the server of its process or address.
+class GrpcTaker final : public ConnectionTaker {
+ public:
+  using Acceptors = std::array<std::unique_ptr<Acceptor>, GrpcServers::kCount>;
+  explicit GrpcTaker(Acceptors acceptors) : acceptors_(std::move(acceptors)) {}
+
+  void Take(int connection, const std::string& source) override {
+    Acceptor::NewConnectionParameters parameters;
+    parameters.fd = connection;
+    acceptors_[std::hash<std::string>()(source) % acceptors_.size()]->HandleNewConnection(
+        &parameters);
+  }
+
+ private:
+  const Acceptors acceptors_;
+};
+
+/// Bounds the resources of each connection, and of all connections of the server together.
+void LimitClients(grpc::ServerBuilder& builder) {
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, kMaxCallsOfConnection);
+  builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, kHandshakeLimit_ms);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepalive_ms);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveAnswer_ms);
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_MAX_PING_STRIKES, kNoPingStrikes);
+  builder.AddChannelArgument(GRPC_ARG_TCP_READ_CHUNK_SIZE, kReadBytes);
+  builder.AddChannelArgument(GRPC_ARG_TCP_MAX_READ_CHUNK_SIZE, kReadBytes);
+  grpc::ResourceQuota quota;
+  quota.Resize(GrpcServers::kMemoryBytes);
+  builder.SetResourceQuota(quota);
+  builder.SetMaxReceiveMessageSize(static_cast<int>(kMaxMessageBytes));
+}
+
+}  // namespace
+
+GrpcServers::GrpcServers() {
+  // Builders that are made later add health and reflection to their servers.
+  grpc::EnableDefaultHealthCheckService(true);
+  grpc::reflection::InitProtoReflectionServerBuilderPlugin();
+  for (size_t i = 0; i < kCount; ++i) {
+    builders_.push_back(std::make_unique<grpc::ServerBuilder>());
+    LimitClients(*builders_.back());
+  }
+}
+
+GrpcServers::~GrpcServers() {
+  const auto end = std::chrono::system_clock::now() + kGracePeriod;
+  std::vector<std::jthread> ending;
+  for (const auto& server : servers_) {
+    ending.emplace_back([&server, end] {
+      server->Shutdown(end);
+      server->Wait();
+    });
+  }
+}
+
+std::unique_ptr<ConnectionTaker> GrpcServers::AddTaker(
+    const std::shared_ptr<grpc::ServerCredentials>& credentials) {
+  GrpcTaker::Acceptors acceptors;
+  for (size_t i = 0; i < kCount; ++i) {
+    acceptors[i] = builders_[i]->experimental().AddExternalConnectionAcceptor(
+        grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD, credentials);
+  }
+  return std::make_unique<GrpcTaker>(std::move(acceptors));
+}
+
+bool GrpcServers::Start(absl::Span<grpc::Service* const> services) {
+  for (const auto& builder : builders_) {
+    for (grpc::Service* const service : services) builder->RegisterService(service);
+    std::unique_ptr<grpc::Server> server = builder->BuildAndStart();
+    if (!server) return false;
+    servers_.push_back(std::move(server));
+  }
+  return true;
+}
+
+void GrpcServers::SetHealth(const std::string& service, bool serves) {
+  for (const auto& server : servers_) {
+    server->GetHealthCheckService()->SetServingStatus(service, serves);
+  }
+}
+
+}  // namespace carillon

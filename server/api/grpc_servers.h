@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <grpcpp/grpcpp.h>
+
+#include <chrono>
+#include <cstddef>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/types/span.h"
+#include "server/api/connection_gate.h"
+
+namespace carillon {
+
+/// Several gRPC servers with the same services. Each process (Unix) or address (TCP) uses one of
+/// them.
+///
+/// gRPC bounds the memory of a server. Beyond the bound it ends calls of any connection of this
+/// server, also of connections that take little memory. One client with unfinished messages would
+/// therefore end the streams of all others, if there were only one server.
+class GrpcServers {
+ public:
+  static constexpr size_t kCount = 8;
+
+  /// Memory that gRPC may take for the connections of each server.
+  static constexpr size_t kMemoryBytes = size_t{128} << 20U;
+
+  GrpcServers();
+
+  /// Cancels the calls that have not ended kGracePeriod later, and waits until all have ended.
+  ~GrpcServers();
+  GrpcServers(const GrpcServers&) = delete;
+  GrpcServers& operator=(const GrpcServers&) = delete;
+
+  /// Returns what hands connections to the servers. It must not be used after them. Call this
+  /// before Start.
+  std::unique_ptr<ConnectionTaker> AddTaker(
+      const std::shared_ptr<grpc::ServerCredentials>& credentials);
+
+  /// Returns whether gRPC takes the credentials. The services must outlive the servers.
+  bool Start(absl::Span<grpc::Service* const> services);
+
+  /// Sets the health of a service. Any thread, after Start.
+  void SetHealth(const std::string& service, bool serves);
+
+ private:
+  static constexpr std::chrono::milliseconds kGracePeriod{500};
+
+  std::vector<std::unique_ptr<grpc::ServerBuilder>> builders_;
+  std::vector<std::unique_ptr<grpc::Server>> servers_;
+};
+
+}  // namespace carillon
