@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/api/admin_service.h"
 
+#include <chrono>
 #include <filesystem>
 #include <system_error>
 #include <utility>
@@ -36,7 +37,8 @@ v1::GetDatabaseStatsResponse ToProto(const DatabaseStats& stats) {
 /// Copies the database to a file in its folder, and sends the file piece by piece.
 class BackupCall final : public ServerStream<v1::BackUpDatabaseResponse> {
  public:
-  BackupCall(ModeDatabase& database, ThreadPool& pool) : StreamWriter(&pool), database_(database) {
+  BackupCall(ModeDatabase& database, ThreadPool& pool, ClientPlace place)
+      : StreamWriter(&pool), database_(database), place_(std::move(place)) {
     StartWriting();
   }
 
@@ -52,13 +54,14 @@ class BackupCall final : public ServerStream<v1::BackUpDatabaseResponse> {
       std::error_code ignored;
       std::filesystem::remove(copy, ignored);  // an open file stays readable
     };
-    RETURN_IF_ERROR(BackUp(database_.database(), copy));
+    RETURN_IF_ERROR(BackUp(database_.database(), copy, [this] { return !is_cancelled(); }));
     response.set_byte_count(std::filesystem::file_size(copy));
     pieces_.Open(copy);
     return absl::OkStatus();
   }
 
   ModeDatabase& database_;
+  const ClientPlace place_;
   bool begun_ = false;
   FilePieces pieces_;
 };
@@ -77,9 +80,10 @@ grpc::ServerUnaryReactor* AdminService::GetDatabaseStats(grpc::CallbackServerCon
 
 grpc::ServerWriteReactor<v1::BackUpDatabaseResponse>* AdminService::BackUpDatabase(
     grpc::CallbackServerContext* context, const v1::BackUpDatabaseRequest*) {
-  return Open(*context, reception_, Role::kAdminister,
-              [this]() -> grpc::ServerWriteReactor<v1::BackUpDatabaseResponse>* {
-                return new BackupCall(database_, reception_.pool);
+  return Open(*context, reception_, Role::kAdminister, Holding::kBackup,
+              [this](const Principal&,
+                     ClientPlace place) -> grpc::ServerWriteReactor<v1::BackUpDatabaseResponse>* {
+                return new BackupCall(database_, reception_.pool, std::move(place));
               });
 }
 
@@ -97,7 +101,10 @@ grpc::ServerUnaryReactor* AdminService::CollectGarbage(grpc::CallbackServerConte
         database_.models().Collect(request->budget_bytes(), {.dry_run = request->dry_run()}));
     response->set_deleted_count(models.model_count);
     response->set_deleted_bytes(models.bytes);
-    ASSIGN_OR_RETURN(const CollectedMeshes meshes, database_.meshes().Collect(request->dry_run()));
+    const std::chrono::milliseconds life =
+        request->delete_unpinned() ? MeshStore::kUnusedLifeOnRequest : MeshStore::kUnusedLife;
+    ASSIGN_OR_RETURN(const CollectedMeshes meshes,
+                     database_.meshes().Collect(life, request->dry_run()));
     response->set_deleted_mesh_count(meshes.mesh_count);
     response->set_deleted_mesh_bytes(meshes.bytes);
     return absl::OkStatus();

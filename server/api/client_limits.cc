@@ -16,6 +16,9 @@ namespace {
 struct Bound {
   const char* name;
   size_t whole;  ///< limit of all clients together
+  const char* reason =
+      nullptr;  ///< of a refusal at this limit, unless the caller counts the things
+  const char* all_taken = "";
 };
 
 Bound BoundOf(Holding holding) {
@@ -27,7 +30,9 @@ Bound BoundOf(Holding holding) {
     case Holding::kListener:
       return {"listeners", BlockBroadcast::kMaxListenerCount};
     case Holding::kUpload:
-      return {"uploads", kMaxUploadCount};
+      return {"uploads", kMaxUploadCount, "TOO_MANY_UPLOADS", "uploads and imports run"};
+    case Holding::kBackup:
+      return {"backups", kMaxBackupCount, "TOO_MANY_BACKUPS", "backups are being made"};
     case Holding::kRendering:
       break;
   }
@@ -48,10 +53,9 @@ absl::StatusOr<ClientPlace> ClientLimits::Take(Holding holding, const std::strin
   const Bound bound = BoundOf(holding);
   const MutexLock lock(&mutex_);
   auto& held = held_[static_cast<size_t>(holding)];
-  if (holding == Holding::kUpload && CountAll(holding) >= bound.whole) {
-    return Refusal(
-        absl::StatusCode::kResourceExhausted, "TOO_MANY_UPLOADS",
-        absl::StrCat(bound.whole, " uploads and imports run: try again when one is done"));
+  if (bound.reason != nullptr && CountAll(holding) >= bound.whole) {
+    return Refusal(absl::StatusCode::kResourceExhausted, bound.reason,
+                   absl::StrCat(bound.whole, " ", bound.all_taken, ": try again when one is done"));
   }
   const auto found = held.find(client);
   RETURN_IF_ERROR(Check(bound.name, bound.whole, found == held.end() ? 0 : found->second, 1));

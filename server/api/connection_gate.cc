@@ -37,6 +37,8 @@ constexpr size_t kOwnDescriptorCount = 256;
 constexpr int kBacklog = 1024;
 /// This part of the places is for processes and addresses with few connections.
 constexpr size_t kKeptPart = 16;
+/// This part of the places is for the Unix sockets.
+constexpr size_t kUnixPart = 64;
 /// After the gate has looked which connections are closed, it pauses this many times as long, so
 /// that a flood of connections beyond a limit takes a small part of its time.
 constexpr int kForgettingPauses = 8;
@@ -244,6 +246,11 @@ std::string ConnectionGate::WhyNoPlace(const std::string& source) const {
   if (client_share_ < 1 && count >= most) {
     return absl::StrCat("it has ", count, " already, its share (--client-share) of ",
                         max_connection_count_);
+  }
+  const size_t kept_for_unix = max_connection_count_ / kUnixPart;
+  if (!absl::StartsWith(source, "unix:") && all >= max_connection_count_ - kept_for_unix) {
+    return absl::StrCat("the last ", kept_for_unix, " of ", max_connection_count_,
+                        " places are for the Unix socket");
   }
   const size_t kept = max_connection_count_ / kKeptPart;
   if (all < max_connection_count_ - kept || count < kFewConnections) return "";

@@ -47,7 +47,8 @@ class ConnectionGate {
   static constexpr std::chrono::seconds kLoopbackRefusal{1};
 
   /// The last sixteenth of the places is for processes and addresses with fewer connections than
-  /// this, so that one that comes new finds a place.
+  /// this, so that one that comes new finds a place. The last sixty-fourth is for Unix sockets,
+  /// because many addresses may have few connections each.
   static constexpr size_t kFewConnections = 8;
 
   /// A process (Unix) or address (TCP) may have the share `client_share`, as ClientLimits has it,

@@ -6,9 +6,9 @@
 
 #include <array>
 #include <functional>
-#include <thread>
 #include <utility>
 
+#include "absl/strings/match.h"
 #include "server/api/flood_guard.h"
 #include "server/api/server_service.h"
 
@@ -32,17 +32,25 @@ constexpr int kNoPingStrikes = 0;
 /// seconds.
 constexpr int kReadBytes = 16 << 10;
 
+constexpr size_t kCount = GrpcServers::kUnixCount + GrpcServers::kTcpCount;
+
+/// Returns which server a process or address uses.
+size_t ServerOf(const std::string& source) {
+  const size_t hash = std::hash<std::string>()(source);
+  if (absl::StartsWith(source, "unix:")) return hash % GrpcServers::kUnixCount;
+  return GrpcServers::kUnixCount + hash % GrpcServers::kTcpCount;
+}
+
 /// Hands each connection to the server of its process or address.
 class GrpcTaker final : public ConnectionTaker {
  public:
-  using Acceptors = std::array<std::unique_ptr<Acceptor>, GrpcServers::kCount>;
+  using Acceptors = std::array<std::unique_ptr<Acceptor>, kCount>;
   explicit GrpcTaker(Acceptors acceptors) : acceptors_(std::move(acceptors)) {}
 
   void Take(int connection, const std::string& source) override {
     Acceptor::NewConnectionParameters parameters;
     parameters.fd = connection;
-    acceptors_[std::hash<std::string>()(source) % acceptors_.size()]->HandleNewConnection(
-        &parameters);
+    acceptors_[ServerOf(source)]->HandleNewConnection(&parameters);
   }
 
  private:
@@ -78,13 +86,8 @@ GrpcServers::GrpcServers() {
 
 GrpcServers::~GrpcServers() {
   const auto end = std::chrono::system_clock::now() + kGracePeriod;
-  std::vector<std::jthread> ending;
-  for (const auto& server : servers_) {
-    ending.emplace_back([&server, end] {
-      server->Shutdown(end);
-      server->Wait();
-    });
-  }
+  for (const auto& server : servers_) server->Shutdown(end);
+  for (const auto& server : servers_) server->Wait();
 }
 
 std::unique_ptr<ConnectionTaker> GrpcServers::AddTaker(

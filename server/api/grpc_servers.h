@@ -15,17 +15,18 @@
 namespace carillon {
 
 /// Several gRPC servers with the same services. Each process (Unix) or address (TCP) uses one of
-/// them.
+/// them; no server has connections of both kinds.
 ///
 /// gRPC bounds the memory of a server. Beyond the bound it ends calls of any connection of this
 /// server, also of connections that take little memory. One client with unfinished messages would
 /// therefore end the streams of all others, if there were only one server.
 class GrpcServers {
  public:
-  static constexpr size_t kCount = 8;
+  static constexpr size_t kUnixCount = 4;
+  static constexpr size_t kTcpCount = 8;
 
   /// Memory that gRPC may take for the connections of each server.
-  static constexpr size_t kMemoryBytes = size_t{128} << 20U;
+  static constexpr size_t kMemoryBytes = size_t{96} << 20U;
 
   GrpcServers();
 

@@ -172,13 +172,19 @@ class StreamWriter : public Reactor {
     this->Run([this] { WriteNext(); });
   }
 
+  /// Returns whether the call was cancelled. A long Fill may then return any error.
+  bool is_cancelled() {
+    const MutexLock lock(&mutex_);
+    return cancelled_;
+  }
+
  private:
   static absl::Status Cancelled() { return absl::CancelledError("the client has gone"); }
 
   void WriteNext() {
     absl::StatusOr<Supply> supply = Supply::kLater;
     do {
-      if (IsCancelled()) return this->End(Cancelled());
+      if (BeginTurn()) return this->End(Cancelled());
       supply = WithoutExceptions([this] { return Fill(response_); });
     } while (supply.ok() && *supply == Supply::kLater && !GiveBackTurn());
     if (!supply.ok()) return this->End(supply.status());
@@ -186,7 +192,8 @@ class StreamWriter : public Reactor {
     if (*supply == Supply::kMessage) this->StartWrite(&response_);
   }
 
-  bool IsCancelled() {
+  /// Returns whether the call was cancelled, and takes note of all that has woken it.
+  bool BeginTurn() {
     const MutexLock lock(&mutex_);
     woken_ = false;
     return cancelled_;

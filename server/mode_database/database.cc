@@ -167,13 +167,6 @@ absl::Status Database::Read(absl::FunctionRef<absl::Status(SqliteConnection&)> b
   return status;
 }
 
-absl::Status Database::ReadOutsideTransaction(
-    absl::FunctionRef<absl::Status(SqliteConnection&)> body) {
-  RETURN_IF_ERROR(files_.Check());  // SQLite would make a new file
-  auto connection = Connect(file_);
-  return connection.ok() ? body(**connection) : connection.status();
-}
-
 absl::StatusOr<std::unique_ptr<SqliteConnection>> Database::TakeReader() {
   {
     MutexLock lock(&readers_mutex_);

@@ -47,9 +47,6 @@ class Database {
   /// Runs `body` on one snapshot of the database.
   absl::Status Read(absl::FunctionRef<absl::Status(SqliteConnection&)> body);
 
-  /// Runs `body` on a separate connection, for statements that SQLite refuses in a transaction.
-  absl::Status ReadOutsideTransaction(absl::FunctionRef<absl::Status(SqliteConnection&)> body);
-
   /// The folder, on the same disk, for files that wait for a transaction.
   std::filesystem::path folder() const { return file_.parent_path(); }
   const std::filesystem::path& file() const { return file_; }

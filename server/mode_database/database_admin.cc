@@ -142,9 +142,10 @@ absl::StatusOr<DatabaseStats> ReadStats(Database& database) {
   return stats;
 }
 
-absl::Status BackUp(Database& database, const std::filesystem::path& copy) {
-  return database.ReadOutsideTransaction(
-      [&](SqliteConnection& connection) { return connection.BackUpTo(copy); });
+absl::Status BackUp(Database& database, const std::filesystem::path& copy,
+                    absl::FunctionRef<bool()> goes_on) {
+  return database.Read(
+      [&](SqliteConnection& connection) { return connection.BackUpTo(copy, goes_on); });
 }
 
 absl::Status CheckDatabase(const std::filesystem::path& file, const OnFinding& on_finding) {

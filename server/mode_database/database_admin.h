@@ -30,8 +30,10 @@ struct DatabaseStats {
 absl::StatusOr<DatabaseStats> ReadStats(Database& database);
 
 /// Copies one snapshot of the database into a new file (SQLite's online backup) while writers go
-/// on. Errors: ResourceExhausted (DATABASE_FULL), FailedPrecondition (DATABASE_UNUSABLE).
-absl::Status BackUp(Database& database, const std::filesystem::path& copy);
+/// on. Stops soon after `goes_on` has returned false. Errors: Cancelled (stopped),
+/// ResourceExhausted (DATABASE_FULL), FailedPrecondition (DATABASE_UNUSABLE).
+absl::Status BackUp(Database& database, const std::filesystem::path& copy,
+                    absl::FunctionRef<bool()> goes_on);
 
 /// Takes the faults that a check finds, one line for each.
 using OnFinding = std::function<void(const std::string& line)>;

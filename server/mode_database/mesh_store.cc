@@ -135,15 +135,23 @@ absl::StatusOr<StoredMesh> MeshUpload::Finish() {
                    "the mesh file has no bytes: send its content");
   }
   const StoredMesh mesh{digest_.Finish(), byte_count_};
-  RETURN_IF_ERROR(database_->Write([&](SqliteConnection& connection) {
-    return Insert(connection, mesh, clock_->UnixMs(), file_);
-  }));
+  const auto insert = [&] {
+    return meshes_->database_->Write([&](SqliteConnection& connection) {
+      return Insert(connection, mesh, meshes_->clock_->UnixMs(), file_);
+    });
+  };
+  absl::Status status = insert();
+  if (absl::IsResourceExhausted(status)) {
+    const auto collected = meshes_->Collect(MeshStore::kUnusedLifeOnFullDisk);
+    if (collected.ok() && collected->mesh_count > 0) status = insert();
+  }
+  if (!status.ok()) return status;
   return mesh;
 }
 
 absl::StatusOr<MeshUpload> MeshStore::Begin() {
   ASSIGN_OR_RETURN(SpoolFile file, SpoolFile::Make(database_->folder()));
-  return MeshUpload(*database_, *clock_, std::move(file));
+  return MeshUpload(*this, std::move(file));
 }
 
 absl::StatusOr<StoredMesh> MeshStore::Put(std::string_view bytes) {
@@ -187,9 +195,8 @@ absl::Status MeshStore::WriteFile(const std::string& digest, const std::filesyst
                               " has changed on the disk: upload it again, and check the disk"));
 }
 
-absl::StatusOr<CollectedMeshes> MeshStore::Collect(bool dry_run) {
-  const int64_t before =
-      clock_->UnixMs() - std::chrono::milliseconds(MeshStore::kUnusedLife).count();
+absl::StatusOr<CollectedMeshes> MeshStore::Collect(std::chrono::milliseconds life, bool dry_run) {
+  const int64_t before = clock_->UnixMs() - life.count();
   CollectedMeshes collected;
   RETURN_IF_ERROR(database_->WriteToFree([&](SqliteConnection& connection) {
     collected = {};

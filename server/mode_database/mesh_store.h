@@ -17,6 +17,7 @@
 namespace carillon {
 
 class Database;
+class MeshStore;
 
 struct StoredMesh {
   std::string digest;  ///< SHA-256 of the bytes
@@ -31,17 +32,16 @@ class MeshUpload {
   /// Appends the next bytes. Errors: ResourceExhausted (MESH_TOO_LARGE: over 256 MiB in all).
   absl::Status Append(std::string_view bytes);
 
-  /// Stores the mesh durably, unless it is stored already. Must be the last call. Errors:
-  /// InvalidArgument (MESH_EMPTY).
+  /// Stores the mesh durably, unless it is stored already. If the disk is full, meshes that nobody
+  /// uses make room (MeshStore::kUnusedLifeOnFullDisk). Must be the last call. Errors:
+  /// InvalidArgument (MESH_EMPTY), ResourceExhausted (DATABASE_FULL).
   absl::StatusOr<StoredMesh> Finish();
 
  private:
   friend class MeshStore;
-  MeshUpload(Database& database, const Clock& clock, SpoolFile file)
-      : database_(&database), clock_(&clock), file_(std::move(file)) {}
+  MeshUpload(MeshStore& meshes, SpoolFile file) : meshes_(&meshes), file_(std::move(file)) {}
 
-  Database* database_;
-  const Clock* clock_;
+  MeshStore* meshes_;
   SpoolFile file_;
   Sha256 digest_;
   uint64_t byte_count_ = 0;
@@ -61,6 +61,10 @@ class MeshStore {
   /// The time for which a mesh that no model and no job refers to is kept after its last upload. A
   /// request for its model may follow.
   static constexpr std::chrono::hours kUnusedLife{24};
+  /// The same where the disk is full.
+  static constexpr std::chrono::minutes kUnusedLifeOnFullDisk{10};
+  /// The same where somebody asks for the space.
+  static constexpr std::chrono::minutes kUnusedLifeOnRequest{1};
 
   MeshStore(Database& database, const Clock& clock) : database_(&database), clock_(&clock) {}
 
@@ -77,11 +81,14 @@ class MeshStore {
   /// it can be stored again).
   absl::Status WriteFile(const std::string& digest, const std::filesystem::path& file);
 
-  /// Deletes meshes that no model and no job refers to, kUnusedLife after their last upload. A dry
-  /// run only counts these meshes.
-  absl::StatusOr<CollectedMeshes> Collect(bool dry_run = false);
+  /// Deletes meshes that no model and no job refers to and that were not uploaded in the last
+  /// `life`. A dry run only counts these meshes.
+  absl::StatusOr<CollectedMeshes> Collect(std::chrono::milliseconds life = kUnusedLife,
+                                          bool dry_run = false);
 
  private:
+  friend class MeshUpload;
+
   Database* database_;
   const Clock* clock_;
 };

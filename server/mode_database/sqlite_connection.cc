@@ -140,12 +140,19 @@ absl::Status SqliteConnection::Query(const char* sql,
   });
 }
 
-absl::Status SqliteConnection::BackUpTo(const std::filesystem::path& copy) {
-  return Guarded([&] {
+absl::Status SqliteConnection::BackUpTo(const std::filesystem::path& copy,
+                                        absl::FunctionRef<bool()> goes_on) {
+  // 1 MiB at a time. Within a transaction SQLite does not start again when others write.
+  constexpr int kPages = 256;
+  return Guarded([&]() -> absl::Status {
     SQLite::Database target(copy.string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE,
                             kBusyTimeoutMs);
-    // One step copies one snapshot, while writers append to the log.
-    SQLite::Backup(target, state_->database).executeStep(-1);
+    SQLite::Backup backup(target, state_->database);
+    int result = SQLITE_OK;
+    while (result != SQLITE_DONE) {
+      if (!goes_on()) return absl::CancelledError("nobody waits for the copy any more");
+      result = backup.executeStep(kPages);
+    }
     return absl::OkStatus();
   });
 }

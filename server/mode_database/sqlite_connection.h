@@ -53,8 +53,9 @@ class SqliteConnection {
   absl::Status Query(const char* sql, std::initializer_list<SqlParameter> parameters,
                      absl::FunctionRef<absl::Status(const SqlRow&)> on_row);
 
-  /// Copies one snapshot of the database into a new file. Must be called outside a transaction.
-  absl::Status BackUpTo(const std::filesystem::path& copy);
+  /// Copies the snapshot of the present transaction into a new file, piece by piece, while
+  /// `goes_on` returns true. Errors: Cancelled if it does not.
+  absl::Status BackUpTo(const std::filesystem::path& copy, absl::FunctionRef<bool()> goes_on);
 
   /// Number of rows that the last statement changed.
   int64_t changed_row_count() const;

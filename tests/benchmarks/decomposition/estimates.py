@@ -144,28 +144,17 @@ def errors(ours, finer):
 
 def row(body, goal, ours, finer):
     stated, true = errors(ours, finer)
-    ratios = stated / true
     report, _, cpu_seconds = ours
-    print(f"| {body.name} | {goal} | {report['nodes']} | {finer[0]['nodes']} | {len(true)} of {len(report['modes'])} "
-          f"| {cpu_seconds:.1f} | {100 * stated.max():.2f} % | {100 * true.max():.2f} % "
+    beginning = (f"| {body.name} | {goal} | {report['nodes']} | {finer[0]['nodes']} "
+                 f"| {len(true)} of {len(report['modes'])} | {cpu_seconds:.1f} ")
+    if not len(true):
+        print(beginning + "| | | | |", flush=True)
+        return stated, true
+    ratios = stated / true
+    print(f"{beginning}| {100 * stated.max():.2f} % | {100 * true.max():.2f} % "
           f"| {ratios.min():.2f}, {numpy.median(ratios):.2f}, {ratios.max():.2f} | {numpy.sum(ratios >= 1)} |",
           flush=True)
     return stated, true
-
-
-def draw(found, path):
-    import matplotlib
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-    figure, axes = pyplot.subplots(figsize=(6.4, 4.5))
-    for goal, rows in found.items():
-        stated, true = (100 * numpy.concatenate(values) for values in zip(*rows))
-        axes.loglog(true, stated, ".", markersize=3, label=goal)
-    axes.plot([.05, 10], [.05, 10], "k-", linewidth=.5)
-    axes.set(xlabel="true error, %", ylabel="stated error, %")
-    axes.grid(alpha=.3, which="both")
-    axes.legend()
-    figure.savefig(path, dpi=90, bbox_inches="tight")
 
 
 def estimates(options, folder, environment):
@@ -191,5 +180,3 @@ def estimates(options, folder, environment):
         every = stated / true
         print(f"\n{goal}: {100 * numpy.mean(every >= 1):.1f} % of {len(every)} modes are within their bar, which is "
               f"{numpy.median(every):.2f} times the true error in the median.")
-    if options.picture:
-        draw(found, options.picture)

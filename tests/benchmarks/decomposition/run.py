@@ -77,7 +77,6 @@ def main():
                         help=f"some of {','.join(PARTS)}; all but {','.join(HOURS)} unless named")
     parser.add_argument("--only", type=names, default=[], help="bodies, by name")
     parser.add_argument("--peers", type=names, default=[], help="other programs, by name")
-    parser.add_argument("--picture", type=pathlib.Path, help="where to draw the errors that `estimates` finds")
     parser.add_argument("--results", type=pathlib.Path,
                         help="where `packages` keeps each outcome, to go on from there (one JSON object a line)")
     options = parser.parse_args()

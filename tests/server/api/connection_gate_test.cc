@@ -7,9 +7,11 @@
 #include <netinet/in.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/un.h>
 #include <unistd.h>
 
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <semaphore>
@@ -40,19 +42,26 @@ class Keeper final : public ConnectionTaker {
 };
 
 /// Takes each address of this machine for an address of its own.
-std::string AddressWithoutPort(const std::string& peer) { return peer.substr(0, peer.rfind(':')); }
+std::string AddressWithoutPort(const std::string& peer) {
+  return peer.starts_with("unix:") ? SourceOfPeer(peer) : peer.substr(0, peer.rfind(':'));
+}
 
 class ConnectionGateTest : public testing::Test {
  protected:
   /// Listens on a free port, and lets `count` connections in at a time, of which one address may
   /// have the share `client_share`.
-  void Open(size_t count, double client_share = 1) {
+  void Open(
+      size_t count, double client_share = 1,
+      const std::function<absl::Status(ConnectionGate&)>& listen = [](ConnectionGate&) {
+        return absl::OkStatus();
+      }) {
     gate_.emplace(count, client_share, &log_, AddressWithoutPort);
     auto keeper = std::make_unique<Keeper>(taken_);
     keeper_ = keeper.get();
     address_ = *ParseListenAddress("127.0.0.1:0");
     ASSERT_TRUE(gate_->Listen(address_, std::move(keeper)).ok());
     ASSERT_NE(address_.port, 0);
+    ASSERT_TRUE(listen(*gate_).ok());
     gate_->Open();
   }
 
@@ -152,6 +161,25 @@ TEST_F(ConnectionGateTest, EndsAConnectionAndRefusesOthersFromTheSameAddress) {
   EXPECT_TRUE(IsClosed(second));
   EXPECT_TRUE(IsClosed(Connect()));
   EXPECT_TRUE(gate_->IsOpen(NameOf(first)));
+}
+
+TEST_F(ConnectionGateTest, TheVeryLastPlacesAreForUnixSockets) {
+  const TemporaryFolder folder;
+  ListenAddress address{.socket_path = folder / "socket", .host = ""};
+  Open(64, 1, [&](ConnectionGate& gate) {
+    return gate.Listen(address, std::make_unique<Keeper>(taken_));
+  });
+  for (uint32_t i = 0; i < 63; ++i) {
+    Connect(1 + i % 16);
+    taken_.acquire();
+  }
+  EXPECT_TRUE(IsClosed(Connect(17)));
+  sockaddr_un name{};
+  name.sun_family = AF_UNIX;
+  address.socket_path.copy(name.sun_path, sizeof(name.sun_path) - 1);
+  const int made = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  ASSERT_EQ(connect(made, reinterpret_cast<const sockaddr*>(&name), sizeof name), 0);
+  taken_.acquire();
 }
 
 TEST(SourceOfPeer, IsOneForAllConnectionsOfAProcessOrAddress) {
