@@ -38,8 +38,7 @@ struct ErrorEstimate {
 ///
 /// The estimate detects the locking of thin walls, which estimates by averaged stresses do not. C
 /// is fitted to a bar, a block, a plate and a tube so that the estimate is rarely too small for
-/// errors of a few percent or less. At fillets that are narrower than the elements it was down to
-/// 0.68 times the true error, and for walls of linear elements with errors of half or more it is
+/// errors of a few percent or less. For walls of linear elements with errors of half or more it is
 /// too small. The estimate refers to the body as meshed, including curved elements. It
 /// does not include the difference between the mesh and the shape of the original object.
 ///

@@ -66,8 +66,10 @@ absl::Status MissingRole(const Principal& principal, Role role, bool is_anybody)
 std::string BearerToken(const grpc::CallbackServerContext& context) {
   const auto shown = context.client_metadata().find("authorization");
   if (shown == context.client_metadata().end()) return "";
-  absl::string_view token(shown->second.data(), shown->second.size());
-  return absl::ConsumePrefix(&token, "Bearer ") ? std::string(token) : "";
+  const absl::string_view value(shown->second.data(), shown->second.size());
+  constexpr absl::string_view kScheme = "Bearer ";  // RFC 9110, 11.1: in letters of either case
+  if (!absl::StartsWithIgnoreCase(value, kScheme)) return "";
+  return std::string(value.substr(kScheme.size()));
 }
 
 AccessControl::AccessControl(AccessTable table, const Clock& clock, LimitedLog::Sink log)

@@ -12,6 +12,7 @@
 #include "proto/cpp/status_macros.h"
 #include "server/base/sha256.h"
 #include "server/mode_database/model_store.h"
+#include "server/mode_database/utf8_prefix.h"
 
 namespace carillon {
 namespace {
@@ -72,10 +73,6 @@ absl::Status CheckHints(const v1::CreateModalModelRequest& request) {
                                 kLeastTransferDb, " to ", kMostTransferDb,
                                 " dB and zero seconds or more"));
   }
-  if (request.label().size() > kMaxLabelBytes) {
-    return Invalid(absl::StrCat("label has ", request.label().size(), " bytes; at most ",
-                                kMaxLabelBytes, " are kept"));
-  }
   return absl::OkStatus();
 }
 
@@ -93,6 +90,7 @@ absl::StatusOr<v1::CreateModalModelRequest> ResolveRequest(
     const v1::CreateModalModelRequest& request) {
   RETURN_IF_ERROR(CheckMesh(request));
   v1::CreateModalModelRequest resolved = request;
+  resolved.set_label(Utf8Prefix(request.label(), kMaxLabelBytes));
   RETURN_IF_ERROR(ResolveUse(resolved));
   FillIn(*resolved.mutable_settings(), resolved.material());
   RETURN_IF_ERROR(CheckSettings(resolved.settings()));
