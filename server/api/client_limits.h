@@ -25,7 +25,7 @@ inline constexpr size_t kMaxRenderingCount = 8;
 /// Greatest number of uploads of meshes and imports of models at a time.
 inline constexpr size_t kMaxUploadCount = 64;
 
-/// Greatest number of backups at a time. Each takes as much of the disk as the database, until it
+/// Greatest number of backups at a time. Each is a copy of the database on the same disk until it
 /// is sent.
 inline constexpr size_t kMaxBackupCount = 4;
 

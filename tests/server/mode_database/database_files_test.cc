@@ -64,9 +64,7 @@ class DatabaseFilesTest : public ::testing::Test {
 
 TEST_F(DatabaseFilesTest, AfterTheFileWasRemovedNothingIsAcknowledgedAndNoOtherIsMade) {
   ExpectLost([&] { std::filesystem::remove(file_); });
-  EXPECT_FALSE(database_->database()
-                   .Read([](SqliteConnection&) { return absl::OkStatus(); })
-                   .ok());
+  EXPECT_FALSE(database_->database().Read([](SqliteConnection&) { return absl::OkStatus(); }).ok());
   EXPECT_FALSE(std::filesystem::exists(file_));
 }
 
