@@ -92,8 +92,8 @@ class ClipRenderer {
     settings.set_tell_blows(true);
     RETURN_IF_ERROR(RenderFile(trace, settings, form, record));
     RETURN_IF_ERROR(CheckHasContacts(trace, record.summary));
-    if (const auto finer = FinerFullScale(options_, record.summary)) {
-      settings.set_full_scale_pa(*finer);
+    if (const auto better = BetterFullScale(options_, record.summary)) {
+      settings.set_full_scale_pa(*better);
       RETURN_IF_ERROR(RenderFile(trace, settings, form, record));
     }
     ASSIGN_OR_RETURN(record.sound.digest, FileDigest(form.path));

@@ -189,11 +189,12 @@ absl::Status Render(const client::Client& daemon, const RenderOptions& options, 
 /// (NO_TRACES), Internal (OUTPUT_NOT_WRITABLE), FailedPrecondition (CLIPS_FAILED).
 absl::Status RenderClips(const client::Client& daemon, const RenderOptions& options, bool json);
 v1::RenderSettings SettingsOf(const RenderOptions& options);
-/// Returns the full scale, Pa, with which a sound should be rendered again before it is normalised:
-/// tails end at -80 dB and modes at -140 dB of full scale, so that a soft sound would be cut.
-/// Absent: the rendering was loud enough, is silent, or has the full scale that was asked for.
-std::optional<double> FinerFullScale(const RenderOptions& options,
-                                     const v1::RenderSummary& summary);
+/// Returns the full scale, Pa, with which a sound should be rendered again before it is normalised.
+/// Tails end at -80 dB and modes at -140 dB of full scale, so that a soft sound would be cut, and
+/// the limiter changes a loud one. Absent: the rendering is neither soft nor limited, is silent, or
+/// has the full scale that was asked for.
+std::optional<double> BetterFullScale(const RenderOptions& options,
+                                      const v1::RenderSummary& summary);
 /// Errors: InvalidArgument (TRACE_EMPTY: the rendered trace has no contact, and its sound is
 /// silent).
 absl::Status CheckHasContacts(const std::string& path, const v1::RenderSummary& summary);

@@ -49,9 +49,10 @@ void PrintSummary(const RenderOptions& options, const v1::RenderSummary& summary
   const auto loudness = [is_short](bool present, double lufs) {
     return is_short ? "too short to measure" : Loudness(present, lufs);
   };
-  absl::FPrintF(out, "%s: %.2f s, %s, peak %s\n", options.out,
+  absl::FPrintF(out, "%s: %.2f s, %s, peak %s%s\n", options.out,
                 static_cast<double>(summary.frame_count()) / sample_rate_hz,
-                Counted(summary.accepted_count(), "impulse"), Decibels(summary.peak()));
+                Counted(summary.accepted_count(), "impulse"), Decibels(summary.peak()),
+                summary.limited_frame_count() > 0 ? " before the limiter" : "");
   absl::FPrintF(out,
                 "%.3g Pa (full scale is %.4g Pa), true peak %s, whole sound %s, loudest 0.4 s %s\n",
                 summary.peak_pa(), summary.full_scale_pa(), Decibels(summary.true_peak()),
@@ -104,10 +105,11 @@ v1::RenderSettings SettingsOf(const RenderOptions& options) {
   return settings;
 }
 
-std::optional<double> FinerFullScale(const RenderOptions& options,
-                                     const v1::RenderSummary& summary) {
+std::optional<double> BetterFullScale(const RenderOptions& options,
+                                      const v1::RenderSummary& summary) {
   const bool soft = summary.peak() > 0 && summary.peak() < kSoft;
-  if (!options.normalize || options.full_scale_pa || !soft) return std::nullopt;
+  const bool good = !soft && summary.limited_frame_count() == 0;
+  if (!options.normalize || options.full_scale_pa || good) return std::nullopt;
   constexpr double kAbovePeak = 1.5;  // the limiter must not work
   return std::max(summary.peak_pa() * kAbovePeak, kLeastFullScale_pa);
 }
@@ -141,10 +143,10 @@ absl::Status Render(const client::Client& daemon, const RenderOptions& options, 
   auto summary = render(settings);
   // A trace that comes through a pipe cannot be read twice.
   const bool rereadable = std::filesystem::is_regular_file(options.trace);
-  if (const auto finer =
-          summary.ok() && rereadable ? FinerFullScale(options, *summary) : std::nullopt) {
+  if (const auto better =
+          summary.ok() && rereadable ? BetterFullScale(options, *summary) : std::nullopt) {
     file.Restart();
-    settings.set_full_scale_pa(*finer);
+    settings.set_full_scale_pa(*better);
     summary = render(settings);
   }
   RETURN_IF_ERROR(file.status());

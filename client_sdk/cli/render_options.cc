@@ -32,14 +32,16 @@ std::optional<Shard> ParseShard(const std::string& text) {
 }
 
 void AddSound(CLI::App& render, RenderOptions& options) {
-  ReadGain(*render.add_option("--gain", options.gain,
-                              absl::StrCat("The gain of every sample: ", kGainForm)));
+  ReadGain(*render.add_option(
+      "--gain", options.gain,
+      absl::StrCat("The gain of every sample of the file, after the limiter: ", kGainForm)));
   render.add_option("--full-scale-pa", options.full_scale_pa,
                     "The pressure of a sample of full scale, Pa [200]");
   render.add_flag(
       "--normalize", options.normalize,
-      "Scale the sound to a peak of 0.9 of full scale; a sound below -40 dBFS is rendered "
-      "again, with a full scale a little above its peak");
+      "Scale the sound to a peak of 0.9 of full scale; a sound that is below -40 dBFS or that the "
+      "limiter changed is rendered again, with a full scale a little above its peak. Then --gain "
+      "applies");
   render
       .add_option("--bits", options.bits, "The size of a sample: 16, 24, or 32 for floating point")
       ->check(CLI::IsMember({16, 24, 32}))
@@ -51,8 +53,10 @@ void AddSound(CLI::App& render, RenderOptions& options) {
                   "The number of channels: 1 for mono, 2 for stereo")
       ->check(CLI::Range(1, 2))
       ->capture_default_str();
-  render.add_option("--tail", options.tail_s,
-                    "The time to render after the last contact, s [until the sound has died away]");
+  render.add_option(
+      "--tail", options.tail_s,
+      "The time to render after the last contact, s; 0 renders until the sound has died "
+      "away [0]");
 }
 
 void AddFolder(CLI::App& render, RenderOptions& options) {

@@ -256,6 +256,15 @@ class RenderTest(CommandLineTest):
         # Without the second rendering, the modes would end at a hundredth of the peak.
         numpy.testing.assert_allclose(soft, plain, atol=1e-4)
 
+    def test_a_loud_sound_is_normalised_without_the_limiter(self):
+        plain = sound.read_wave(self.render("--normalize"))
+        impulse = sound.impulse((0, 0.008, 0.010), (0, 0, -20), duration_s=1e-4)
+        item = contact_trace_pb2.ContactTraceObject(handle=1, modal_model=self.model, material=MATERIAL)
+        sound.write_trace(self.trace, [item], [contact_pb2.ContactStep(time_s=0, impulses=[impulse])])
+        shown = self.run_command("render", self.trace, "--out", self.folder / "loud.wav", "--tail", 0.3)
+        self.assertIn("before the limiter", shown)
+        numpy.testing.assert_allclose(sound.read_wave(self.render("--normalize")), plain, atol=1e-4)
+
     def test_an_object_without_a_transfer_is_reported(self):
         shown = self.run_command("render", self.trace, "--out", self.folder / "paper.wav", "--tail", 0.3)
         self.assertIn("1 object sounding by the paper's coupling", shown)
