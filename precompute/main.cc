@@ -21,7 +21,6 @@
 #include "precompute/json_report.h"
 #include "precompute/mesh/read/read_mesh.h"
 #include "precompute/modal_model_codec.h"
-#include "precompute/phase_clock.h"
 #include "precompute/progress_bar.h"
 #include "precompute/progress_reporter.h"
 #include "precompute/radiate.h"
@@ -59,14 +58,11 @@ absl::StatusOr<StoredModel> DecomposeAndWrite(const CommandLine& asked,
 /// it is wanted.
 absl::StatusOr<Result> Compute(const CommandLine& asked, ProgressReporter& reporter) {
   const bool stored = asked.request.radiate_stored_model();
-  const double begun_cpu_s = PhaseClock::Now().cpu_seconds;
   Result result;
   ASSIGN_OR_RETURN(result.stored,
                    stored ? ReadModalModel(asked.input) : DecomposeAndWrite(asked, reporter));
   if (asked.request.has_transfer()) {
-    const double modes_cpu_s = stored ? 0 : PhaseClock::Now().cpu_seconds - begun_cpu_s;
-    ASSIGN_OR_RETURN(result.transfer,
-                     Radiate(result.stored.model, asked.request, modes_cpu_s, reporter));
+    ASSIGN_OR_RETURN(result.transfer, Radiate(result.stored.model, asked.request, reporter));
     RETURN_IF_ERROR(WriteTransfer(asked.transfer_output, *result.transfer, result.stored));
   }
   reporter.OnProgress(v1::PHASE_WRITE, 1);

@@ -11,8 +11,15 @@
 
 namespace carillon::precompute {
 
+double DefaultRadiationBudget(const ModalModel& model) {
+  constexpr double kSecondsPerNodeAndMode = 3e-6;
+  const double modes_s = kSecondsPerNodeAndMode * static_cast<double>(model.node_count) *
+                         static_cast<double>(model.eigenvalues.size());
+  return std::clamp(modes_s, 20.0, 600.0);
+}
+
 absl::StatusOr<Transfer> Radiate(const ModalModel& model, const v1::WorkerRequest& request,
-                                 double modes_cpu_s, DecompositionObserver& observer) {
+                                 DecompositionObserver& observer) {
   const IntendedUse use = UseOf(request);
   const Air air;
   const auto wavenumber = [&](double frequency_hz) {
@@ -25,7 +32,7 @@ absl::StatusOr<Transfer> Radiate(const ModalModel& model, const v1::WorkerReques
       .least_wavenumber = wavenumber(use.low_hz),
       .greatest_wavenumber = wavenumber(use.high_hz),
       .goal_db = request.transfer().accuracy_db(),
-      .budget_cpu_s = budget_s > 0 ? budget_s : std::max(kLeastRadiationBudgetS, modes_cpu_s),
+      .budget_cpu_s = budget_s > 0 ? budget_s : DefaultRadiationBudget(model),
       .thread_count = ThreadCount()};
   const SurfaceModes modes{.vertices = model.vertices,
                            .triangles = model.triangles,

@@ -9,14 +9,14 @@
 
 namespace carillon::precompute {
 
-/// Processor time, seconds, that the radiation may take if the request sets no limit and the modes
-/// took less than this.
-inline constexpr double kLeastRadiationBudgetS = 20;
+/// Returns the processor time, seconds, that the radiation of the model may take if the request sets
+/// no limit: about the time that the modes take, from 20 to 600. It depends on the model only.
+double DefaultRadiationBudget(const ModalModel& model);
 
 /// Computes the radiation of the model's modes in the band of the completed `request`, for the
-/// speed ratio of the request's material and with the settings in request.transfer(). `modes_cpu_s`
-/// is the processor time that the modes took. Errors: those of ComputeTransfer.
+/// speed ratio of the request's material and with the settings in request.transfer(). Errors: those
+/// of ComputeTransfer.
 absl::StatusOr<Transfer> Radiate(const ModalModel& model, const v1::WorkerRequest& request,
-                                 double modes_cpu_s, DecompositionObserver& observer);
+                                 DecompositionObserver& observer);
 
 }  // namespace carillon::precompute

@@ -19,10 +19,4 @@ double CpuSeconds() {
   return seconds;
 }
 
-void SolveTime::TakeSolution(double seconds, double pairs) {
-  measured_s_ += seconds;
-  measured_pairs_ += pairs;
-  seconds_per_pair_ = measured_s_ / measured_pairs_;
-}
-
 }  // namespace carillon::precompute

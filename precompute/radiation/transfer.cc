@@ -113,7 +113,7 @@ class TransferSolver {
     for (const ModeGroup& group : groups_) {
       for (size_t s = 0; s < group.fields.size(); ++s) KeepField(group, s);
     }
-    transfer_.cpu_s = time_.Used();
+    transfer_.cpu_s = CpuSeconds() - begun_s_;
     return std::move(transfer_);
   }
 
@@ -154,9 +154,9 @@ class TransferSolver {
     if (!(settings_.budget_cpu_s > 0)) return true;
     double sweeps = kUsualSweeps;
     for (const ModeField& field : group.fields) sweeps = std::max<double>(sweeps, field.iterations);
-    double needed_s = time_.PredictSolution(sweeps * PairsOf(group, level));
-    if (!levels_.IsMade(level)) needed_s += time_.PredictSurface();
-    return time_.Used() + needed_s <= settings_.budget_cpu_s;
+    double needed_s = SolveTime::OfSolution(sweeps * PairsOf(group, level));
+    if (!levels_.IsMade(level)) needed_s += SolveTime::OfSurface(levels_.VertexCountOf(level));
+    return time_.used_s() + needed_s <= settings_.budget_cpu_s;
   }
 
   bool NeedsMore(const ModeGroup& group) const {
@@ -166,16 +166,15 @@ class TransferSolver {
 
   absl::StatusOr<const SurfaceLevels::Made*> LevelAt(int level) {
     if (levels_.IsMade(level)) return levels_.At(level);
-    const double begun_s = CpuSeconds();
     ASSIGN_OR_RETURN(const SurfaceLevels::Made* made, levels_.At(level));
-    time_.TakeSurface(CpuSeconds() - begun_s);
+    time_.Add(SolveTime::OfSurface(levels_.VertexCountOf(level)));
     return made;
   }
 
   absl::Status SolveRigid() {
     const double n = levels_.VertexCountOf(0);
     const double pairs = n * n * kUsualSweeps * kRigidMotionCount * kRigidWavenumberCount;
-    const double needed_s = time_.PredictSolution(pairs) + time_.PredictSurface();
+    const double needed_s = SolveTime::OfSolution(pairs) + SolveTime::OfSurface(n);
     if (settings_.budget_cpu_s > 0 && needed_s > settings_.budget_cpu_s / 4) {
       return absl::OkStatus();
     }
@@ -183,12 +182,12 @@ class TransferSolver {
     transfer_.rigid =
         SolveRigidMotions(transfer_.rigid.mass, made->level, body_,
                           RigidWavenumbers(made->level, settings_.greatest_wavenumber), workers_);
+    time_.Add(SolveTime::OfSolution(pairs));
     return absl::OkStatus();
   }
 
   absl::Status SolveNext(ModeGroup& group) {
     ASSIGN_OR_RETURN(const SurfaceLevels::Made* made, LevelAt(group.next_level()));
-    const double begun_s = CpuSeconds();
     const SphereGrid grid(PatternOrder(group.wavenumber, body_.radius_m));
     std::vector<ModeField> fields =
         SolveRadiation(ProblemOf(group, *made), made->level, body_, grid, workers_);
@@ -196,7 +195,7 @@ class TransferSolver {
     double sweeps = 2;
     for (const ModeField& field : fields) sweeps = std::max(sweeps, field.iterations + 2.0);
     const double pairs = PairsOf(group, group.next_level());
-    time_.TakeSolution(CpuSeconds() - begun_s, pairs * sweeps);
+    time_.Add(SolveTime::OfSolution(pairs * sweeps));
     Compare(fields, grid, group);
     group.fields = std::move(fields);
     ++group.solved_count;
@@ -283,13 +282,14 @@ class TransferSolver {
 
   void Report() const {
     double done = whole_pairs_ > 0 ? done_pairs_ / whole_pairs_ : 1;
-    if (settings_.budget_cpu_s > 0) done = std::max(done, time_.Used() / settings_.budget_cpu_s);
+    if (settings_.budget_cpu_s > 0) done = std::max(done, time_.used_s() / settings_.budget_cpu_s);
     on_progress_(std::min(done, 1.0));
   }
 
   const SurfaceModes& modes_;
   RadiationSettings settings_;
   const RadiationProgress& on_progress_;
+  const double begun_s_ = CpuSeconds();
   SolveTime time_;
   Workers workers_;
   RadiatingSurface body_;

@@ -23,7 +23,8 @@ struct RadiationSettings {
   /// The goal for the estimated error of a mode's power. Surfaces are made finer until it is met,
   /// and until the root mean square error of the directions is below three times the goal.
   double goal_db = 2;
-  /// No solution is started that would exceed this processor time. Zero means no limit.
+  /// No solution is started that would exceed this processor time, as SolveTime counts it. Zero
+  /// means no limit.
   double budget_cpu_s = 0;
   int thread_count = 1;
 };
