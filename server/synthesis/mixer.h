@@ -66,7 +66,7 @@ struct MixerSettings {
   size_t most_streams = 2048;
   /// Events that wait for their block. Buses share these places: see PendingEvents.
   size_t most_pending_events = 262144;
-  size_t most_events_per_block = 32768;  ///< taken from the streams; the rest wait there
+  size_t most_events_per_block = 16384;  ///< taken from the streams; the rest wait there
   /// With a clock, the work of a block is bounded so that its deadline is kept. Events beyond
   /// kMostImpulsesPerFrame and kMostOthersPerBlock are dropped when they are taken. Beyond the
   /// bound the quietest impulses are merged, then shed, then the quietest banks are silenced.
@@ -247,6 +247,8 @@ class Mixer {
   void ExecuteCommands() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void Execute(const Command& command) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void TakeEvents(size_t block_count) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  size_t TakeSome(EventQueue& queue, size_t most) noexcept
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   /// Takes an event from a queue. A late event is moved to the beginning of the block.
   void Take(MixerEvent& event, EventQueue& queue) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);

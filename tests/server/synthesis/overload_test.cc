@@ -256,6 +256,22 @@ TEST(Overload, ImpulsesOnBanksOfFewModesAreMergedToo) {
   EXPECT_GT(mixer.statistics().merged_count + mixer.statistics().shed_count, 0U);
 }
 
+TEST(Overload, AFloodInOneStreamDoesNotHoldUpAnother) {
+  Mixer mixer({.most_events_per_block = 1000});
+  const BankId bank = mixer.Add(MakeBank()).value();
+  const std::unique_ptr<EventStream> streams[] = {mixer.OpenStream(4096).value(),
+                                                  mixer.OpenStream(4096).value()};
+  for (int i = 0; i < 4000; ++i) streams[0]->TryPush({.bank = bank, .action = MakeUnitImpulse()});
+  std::vector<float> block(128);
+  // Each block begins with the other stream.
+  for (uint64_t taken = 100; taken <= 200; taken += 100) {
+    for (int i = 0; i < 100; ++i) streams[1]->TryPush({.bank = bank, .action = MakeUnitImpulse()});
+    mixer.Render(block);
+    EXPECT_EQ(streams[1]->accepted_count() + streams[1]->late_count(), taken);
+    EXPECT_EQ(streams[0]->accepted_count() + streams[0]->late_count(), 9 * taken);
+  }
+}
+
 TEST(Overload, TheQuietestBanksAreShedUntilTheRestCanRing) {
   TestClock clock;
   clock.set_step(std::chrono::microseconds(30));  // about what a unit of work is to take
