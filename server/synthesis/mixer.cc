@@ -157,7 +157,7 @@ void Mixer::Take(MixerEvent& event, EventQueue& queue) noexcept {
 }
 
 /// Keeps an event until its block, and the start of its contact if the bank sounds from then on.
-/// False: there are too many, or too many on its bus.
+/// False: there are too many, in all or in its block, or too many on its bus.
 bool Mixer::Await(MixerEvent& event, BankSlot& slot) noexcept {
   const SurfaceImpulse* impulse = event.impulse();
   const double lead = impulse != nullptr ? slot.bank->ContactLeadFrames(impulse->pulse) : 0;
@@ -174,7 +174,9 @@ bool Mixer::Await(MixerEvent& event, BankSlot& slot) noexcept {
   MixerEvent begin = event;
   begin.action = ContactBegin{*impulse};
   begin.SetTime(std::max(event.Time() - lead, now));
-  return push(begin);
+  // The impulse sounds without its beginning if there is no place for that.
+  if (!push(begin)) Count(statistics_.dropped_count);
+  return true;
 }
 
 void Mixer::CollectDueEvents(size_t block_count) noexcept {
