@@ -97,20 +97,15 @@ BankSlot* Mixer::FindSlot(BankId id) noexcept {
 }
 
 void Mixer::TakeEvents(size_t block_count) noexcept {
-  // Each block begins with another stream, so that a flood in one stream does not starve the rest.
+  // Each stream may first hand over an equal share, so that a flood in one stream does not hold up
+  // the rest, and each block begins with another stream.
   const size_t count = open_queues_.size();
   const size_t first = count == 0 ? 0 : block_start_ / settings_.block_frame_count % count;
   size_t budget = settings_.most_events_per_block * block_count;
   all_events_taken_ = true;
-  for (size_t i = 0; i < count; ++i) {
-    EventQueue& queue = *open_queues_[(first + i) % count];
-    while (budget > 0) {
-      const size_t most = std::min(budget, taken_.size());
-      const size_t popped = queue.events.PopSome(taken_.data(), most);
-      for (size_t k = 0; k < popped; ++k) Take(taken_[k], queue);
-      taken_count_ += popped;
-      budget -= popped;
-      if (popped < most) break;
+  for (const size_t share : {budget / std::max<size_t>(count, 1), budget}) {
+    for (size_t i = 0; i < count; ++i) {
+      budget -= TakeSome(*open_queues_[(first + i) % count], std::min(share, budget));
     }
   }
   if (budget == 0) all_events_taken_ = false;
@@ -120,6 +115,20 @@ void Mixer::TakeEvents(size_t block_count) noexcept {
     if (done) SendBack({.queue = queue});
     return done;
   });
+}
+
+/// Takes up to `most` events from a queue, and returns their number.
+size_t Mixer::TakeSome(EventQueue& queue, size_t most) noexcept {
+  size_t count = 0;
+  while (count < most) {
+    const size_t wanted = std::min(most - count, taken_.size());
+    const size_t popped = queue.events.PopSome(taken_.data(), wanted);
+    for (size_t k = 0; k < popped; ++k) Take(taken_[k], queue);
+    count += popped;
+    if (popped < wanted) break;
+  }
+  taken_count_ += count;
+  return count;
 }
 
 void Mixer::Take(MixerEvent& event, EventQueue& queue) noexcept {
@@ -148,7 +157,7 @@ void Mixer::Take(MixerEvent& event, EventQueue& queue) noexcept {
 }
 
 /// Keeps an event until its block, and the start of its contact if the bank sounds from then on.
-/// False: there are too many, or too many on its bus.
+/// False: there are too many, in all or in its block, or too many on its bus.
 bool Mixer::Await(MixerEvent& event, BankSlot& slot) noexcept {
   const SurfaceImpulse* impulse = event.impulse();
   const double lead = impulse != nullptr ? slot.bank->ContactLeadFrames(impulse->pulse) : 0;
@@ -165,7 +174,9 @@ bool Mixer::Await(MixerEvent& event, BankSlot& slot) noexcept {
   MixerEvent begin = event;
   begin.action = ContactBegin{*impulse};
   begin.SetTime(std::max(event.Time() - lead, now));
-  return push(begin);
+  // The impulse sounds without its beginning if there is no place for that.
+  if (!push(begin)) Count(statistics_.dropped_count);
+  return true;
 }
 
 void Mixer::CollectDueEvents(size_t block_count) noexcept {

@@ -16,6 +16,12 @@ constexpr double kFadeS = 0.01;
 /// Spreading this number of modes costs about as much as the transforms of a section.
 constexpr size_t kModesPerSection = 4000;
 
+PendingEvents::BlockLimits LimitsOf(const MixerSettings& settings) {
+  if (settings.clock == nullptr) return {};
+  return {.impulses = kMostImpulsesPerFrame * settings.block_frame_count,
+          .others = kMostOthersPerBlock};
+}
+
 std::vector<std::unique_ptr<Bus>> MakeBuses(const MixerSettings& settings) {
   std::vector<std::unique_ptr<Bus>> buses;
   for (size_t i = 0; i < settings.most_buses; ++i) {
@@ -41,7 +47,8 @@ Mixer::Mixer(const MixerSettings& settings)
       slots_of_sections_(slots_),
       leaving_(settings.most_banks),
       open_queues_(settings.most_streams),
-      pending_(settings.most_pending_events, settings.block_frame_count, settings.most_buses),
+      pending_(settings.most_pending_events, settings.block_frame_count, settings.most_buses,
+               LimitsOf(settings)),
       due_(settings.most_pending_events),
       due_order_(settings.most_pending_events),
       due_events_(settings.most_pending_events),

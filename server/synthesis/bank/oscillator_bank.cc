@@ -196,11 +196,11 @@ double OscillatorBank::ringing_work() const noexcept {
 }
 
 double OscillatorBank::strike_work() const noexcept {
-  return work::kStrikeLane * static_cast<double>(lane_count_);
+  return work::kStrike + work::kStrikeLane * static_cast<double>(lane_count_);
 }
 
 double OscillatorBank::merged_strike_work() const noexcept {
-  return work::kMergedLane * static_cast<double>(lane_count_);
+  return work::kMergedStrike + work::kMergedLane * static_cast<double>(lane_count_);
 }
 
 double OscillatorBank::awakening_work() const noexcept {

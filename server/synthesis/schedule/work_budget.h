@@ -13,6 +13,8 @@ namespace work {
 inline constexpr double kTimeLane = 6.5;      ///< a lane in the time domain, for 128 frames
 inline constexpr double kSpectralLane = 6.5;  ///< a lane in a long block
 inline constexpr double kStrikeLane = 2;      ///< an exact impulse, for each lane of its bank
+inline constexpr double kStrike = 120;        ///< an exact impulse, apart from its lanes
+inline constexpr double kMergedStrike = 60;   ///< a merged impulse, apart from its lanes
 inline constexpr double kMergedLane = 0.8;    ///< a merged impulse, for each lane of its bank
 inline constexpr double kDirectedTerm = 1;    ///< a term of the gains of directed modes
 inline constexpr double kVoice = 3000;        ///< a voice, for 128 frames

@@ -228,9 +228,10 @@ TEST_F(OfflineRendererTest, CountsWhatSoundedAndWhatCouldNotBeUsed) {
 
 TEST_F(OfflineRendererTest, TakesMoreImpulsesAtOnceThanTheLiveMixer) {
   const auto renderer = Make();
-  for (int i = 0; i < 5000; ++i) StrikeAt(*renderer, 0.001, SmallImpulse(1, 1e-4));
+  constexpr uint64_t kCount = 3 * kMostImpulsesPerFrame * OfflineRenderer::kBlockFrameCount;
+  for (uint64_t i = 0; i < kCount; ++i) StrikeAt(*renderer, 0.001, SmallImpulse(1, 1e-4));
   RenderAll(*renderer, 8);
-  EXPECT_EQ(renderer->summary().accepted_count, 5000U);
+  EXPECT_EQ(renderer->summary().accepted_count, kCount);
   EXPECT_EQ(renderer->summary().rejected_count, 0U);
 }
 

@@ -174,5 +174,14 @@ TEST(AcceleratedBanks, AStopSilencesContactsThatHaveNotBegun) {
   EXPECT_EQ(std::ranges::count(after, 0.0F), static_cast<ptrdiff_t>(after.size()));
 }
 
+TEST(AcceleratedBanks, AnImpulseWhoseBeginningFindsNoPlaceSoundsAndIsAccepted) {
+  Scene scene(true, {.most_buses = 1, .most_pending_events = 1});
+  scene.Strike(1030, 1e-3);
+  const auto sound = scene.Render(16);
+  EXPECT_EQ(std::ranges::find_if(sound, [](float x) { return x != 0; }) - sound.begin(), 1030);
+  EXPECT_EQ(scene.mixer().statistics().accepted_count, 1U);
+  EXPECT_EQ(scene.mixer().statistics().dropped_count, 1U);  // the beginning
+}
+
 }  // namespace
 }  // namespace carillon

@@ -152,6 +152,126 @@ TEST(Overload, MovesHoweverManyLeaveWorkForAStrike) {
   EXPECT_GT(Rms(sound), 0);
 }
 
+/// Pushes `count` impulses at `frame` in pieces that the queue of the stream can hold, each of
+/// which the mixer takes in a block of its own before `frame`.
+void Flood(Mixer& mixer, EventStream& stream, BankId bank, uint64_t frame, size_t count) {
+  std::vector<float> block(128);
+  for (size_t i = 0; i < count; ++i) {
+    if (stream.room() == 0) mixer.Render(block);
+    stream.TryPush({.bank = bank, .frame = frame, .action = MakeUnitImpulse()});
+  }
+  while (mixer.frame() < frame) mixer.Render(block);
+  mixer.Render(block);
+}
+
+TEST(Overload, TheImpulsesOfABlockAreBoundedAndTheirStreamCountsTheRestAsDropped) {
+  const TestClock clock;
+  constexpr size_t kMost = kMostImpulsesPerFrame * 128, kCount = 20'000;
+  Mixer mixer(Bounded(clock, 0.7));
+  const BankId bank = mixer.Add(MakeBank()).value();
+  const auto stream = mixer.OpenStream(4096).value();
+  Flood(mixer, *stream, bank, 128 * 10, kCount);
+  EXPECT_GE(stream->accepted_count(), kMost * 4 / 5);
+  EXPECT_LE(stream->accepted_count(), kMost * 4 / 5 + 1);
+  EXPECT_EQ(stream->dropped_count(), kCount - stream->accepted_count());
+  EXPECT_EQ(mixer.statistics().dropped_count, stream->dropped_count());
+  // The places are free again.
+  Flood(mixer, *stream, bank, mixer.frame() + 128 * 10, 4000);
+  EXPECT_EQ(stream->dropped_count() + stream->accepted_count(), kCount + 4000);
+  EXPECT_GE(stream->accepted_count(), kMost * 4 / 5 + 4000);
+}
+
+TEST(Overload, LateImpulsesAreBoundedInTheBlockInWhichTheySound) {
+  const TestClock clock;
+  Mixer mixer(Bounded(clock, 0.7));
+  const BankId bank = mixer.Add(MakeBank()).value();
+  const auto stream = mixer.OpenStream(16384).value();
+  std::vector<float> block(128);
+  mixer.Render(block);
+  for (size_t i = 0; i < 16384; ++i) stream->TryPush({.bank = bank, .action = MakeUnitImpulse()});
+  mixer.Render(block);
+  EXPECT_LE(stream->late_count(), kMostImpulsesPerFrame * 128);
+  EXPECT_EQ(stream->late_count() + stream->dropped_count(), 16384U);
+}
+
+TEST(Overload, ABlockThatASceneFloodsHasPlacesForTheImpulsesOfAnother) {
+  const TestClock clock;
+  Mixer mixer(Bounded(clock, 0.7));
+  const BusId flooding = mixer.OpenBus().value(), other = mixer.OpenBus().value();
+  const BankId flooded = mixer.Add(MakeBank(), nullptr, flooding).value();
+  const BankId bank = mixer.Add(MakeBank(), nullptr, other).value();
+  const auto flood = mixer.OpenStream(16384).value();
+  const auto stream = mixer.OpenStream(1024).value();
+  for (size_t i = 0; i < 10'000; ++i) {
+    flood->TryPush({.bank = flooded, .frame = 1280, .action = MakeUnitImpulse()});
+  }
+  std::vector<float> block(128);
+  mixer.Render(block);
+  EXPECT_GT(flood->dropped_count(), 0U);
+  for (size_t i = 0; i < 1000; ++i) {
+    stream->TryPush({.bank = bank, .frame = 1280, .action = MakeUnitImpulse()});
+  }
+  mixer.Render(block);
+  EXPECT_EQ(stream->accepted_count(), 1000U);
+  EXPECT_EQ(stream->dropped_count(), 0U);
+}
+
+TEST(Overload, ThreeHundredThousandImpulsesASecondAllSoundExactly) {
+  const TestClock clock;
+  Mixer mixer(Bounded(clock, 0.7));
+  const BankId bank = mixer.Add(MakeBank()).value();
+  const auto stream = mixer.OpenStream(16384).value();
+  std::vector<float> block(128);
+  for (uint64_t frame = 0; frame < 128 * 50; frame += 128) {
+    for (uint64_t i = 0; i < 800; ++i) {
+      stream->TryPush({.bank = bank, .frame = frame + i % 128, .action = MakeUnitImpulse()});
+    }
+    mixer.Render(block);
+  }
+  EXPECT_EQ(stream->accepted_count(), 40'000U);
+  EXPECT_EQ(stream->dropped_count(), 0U);
+  EXPECT_EQ(mixer.statistics().merged_count + mixer.statistics().shed_count, 0U);
+}
+
+TEST(Overload, WithoutAClockABlockTakesAnyNumberOfImpulses) {
+  Mixer mixer;
+  const BankId bank = mixer.Add(MakeBank()).value();
+  const auto stream = mixer.OpenStream(4096).value();
+  Flood(mixer, *stream, bank, 128 * 20, 60'000);
+  EXPECT_EQ(stream->accepted_count(), 60'000U);
+}
+
+TEST(Overload, ImpulsesOnBanksOfFewModesAreMergedToo) {
+  // 6000 impulses of 120 units and more each, of the 533,000 that a block may take.
+  const TestClock clock;
+  Mixer mixer(Bounded(clock, 0.2));
+  const SoundingModes sounding{.modes = {MakeMode(0, 440, -3)}};
+  const BankId bank = mixer
+                          .Add(std::make_unique<OscillatorBank>(sounding, MakeUniformShapes(1),
+                                                                OscillatorBankSettings{}))
+                          .value();
+  const auto stream = mixer.OpenStream(4096).value();
+  Flood(mixer, *stream, bank, 128 * 10, 6000);
+  EXPECT_EQ(stream->accepted_count(), 6000U);
+  EXPECT_GT(mixer.statistics().merged_count + mixer.statistics().shed_count, 0U);
+}
+
+TEST(Overload, AFloodInOneStreamDoesNotHoldUpAnother) {
+  Mixer mixer({.most_events_per_block = 1000});
+  const BankId bank = mixer.Add(MakeBank()).value();
+  const std::unique_ptr<EventStream> streams[] = {mixer.OpenStream(4096).value(),
+                                                  mixer.OpenStream(4096).value()};
+  for (int i = 0; i < 4000; ++i) streams[0]->TryPush({.bank = bank, .action = MakeUnitImpulse()});
+  std::vector<float> block(128);
+  // Each block begins with the other stream.
+  for (uint64_t taken = 100; taken <= 200; taken += 100) {
+    for (int i = 0; i < 100; ++i) streams[1]->TryPush({.bank = bank, .action = MakeUnitImpulse()});
+    mixer.Render(block);
+    EXPECT_EQ(streams[1]->accepted_count() + streams[1]->late_count(), taken);
+    EXPECT_EQ(streams[0]->accepted_count() + streams[0]->late_count(), 9 * taken);
+  }
+}
+
 TEST(Overload, TheQuietestBanksAreShedUntilTheRestCanRing) {
   TestClock clock;
   clock.set_step(std::chrono::microseconds(30));  // about what a unit of work is to take
