@@ -3,14 +3,18 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <string>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/string_view.h"
+#include "absl/strings/strip.h"
 #include "client_sdk/cli/output.h"
+#include "proto/cpp/escaped_text.h"
 
 namespace carillon::cli {
 namespace {
@@ -40,10 +44,35 @@ absl::string_view PhaseName(v1::Phase phase) {
   }
 }
 
-absl::string_view Activity(const v1::Job& job) {
+/// Returns the words for the running jobs that a job waits for.
+std::string Running(const v1::JobWait& wait, absl::string_view before_several) {
+  if (wait.running_job_count() != 1) {
+    return absl::StrCat(before_several, Counted(wait.running_job_count(), "job"));
+  }
+  return wait.running_job_label().empty() ? "a job" : EscapedText(wait.running_job_label());
+}
+
+std::string WaitText(const v1::JobWait& wait) {
+  if (wait.earlier_job_count() > 0) {
+    return absl::StrCat("waiting: ", Counted(wait.earlier_job_count(), "job"),
+                        wait.earlier_job_count() == 1 ? " is" : " are", " before it");
+  }
+  switch (wait.cause()) {
+    case v1::WAIT_CAUSE_WORKER:
+      return absl::StrCat("waiting for ", Running(wait, "one of "));
+    case v1::WAIT_CAUSE_MEMORY:
+      return absl::StrCat("waiting for the memory of ", Running(wait, ""));
+    case v1::WAIT_CAUSE_COARSE_MODEL:
+      return "waiting for its coarse model";
+    default:
+      return "waiting";
+  }
+}
+
+std::string Activity(const v1::Job& job) {
   switch (job.state()) {
     case v1::JOB_STATE_QUEUED:
-      return "waiting";
+      return WaitText(job.wait());
     case v1::JOB_STATE_SUCCEEDED:
       return "done";
     case v1::JOB_STATE_FAILED:
@@ -51,7 +80,7 @@ absl::string_view Activity(const v1::Job& job) {
     case v1::JOB_STATE_CANCELLED:
       return "cancelled";
     default:
-      return PhaseName(job.progress().phase());
+      return std::string(PhaseName(job.progress().phase()));
   }
 }
 
@@ -59,17 +88,24 @@ double Fraction(const v1::Job& job) {
   return job.state() == v1::JOB_STATE_SUCCEEDED ? 1.0 : job.progress().fraction();
 }
 
-std::string RoughTime(double seconds) {
-  if (seconds < 100) return absl::StrFormat("%.0f s", seconds);
-  return seconds < 6000 ? absl::StrFormat("%.0f min", seconds / 60)
-                        : absl::StrFormat("%.1f h", seconds / 3600);
+/// Returns how long a job has been running, or the time since it was requested; empty if the daemon
+/// does not report it.
+std::string AgeText(const v1::Job& job, absl::Time now) {
+  const bool runs = job.started_unix_ms() > 0;
+  const int64_t since_unix_ms = runs ? job.started_unix_ms() : job.created_unix_ms();
+  if (since_unix_ms == 0) return "";
+  // The clock of this machine may be behind the daemon's.
+  const double age_s =
+      std::max(0.0, absl::ToDoubleSeconds(now - absl::FromUnixMillis(since_unix_ms)));
+  return runs ? absl::StrCat(", running for ", RoughTime(age_s))
+              : absl::StrCat(", requested ", RoughTime(age_s), " ago");
 }
 
 /// Redraws the line of the bar, which begins with the label of the job.
 void DrawProgressBar(const v1::Job& job) {
   const int filled = static_cast<int>(std::lround(Fraction(job) * kBarWidth));
-  absl::FPrintF(stderr, "\r\033[K%s  [%s%s]  %s", job.label(), std::string(filled, '#'),
-                std::string(kBarWidth - filled, '.'), ProgressText(job));
+  absl::FPrintF(stderr, "\r\033[K%s  [%s%s]  %s", EscapedText(job.label()),
+                std::string(filled, '#'), std::string(kBarWidth - filled, '.'), ProgressText(job));
 }
 
 }  // namespace
@@ -89,15 +125,28 @@ std::string ProgressText(const v1::Job& job) {
   return text;
 }
 
+std::string JobLine(const v1::Job& job, absl::Time now) {
+  const std::string reason = job.has_error() ? absl::StrCat(": ", job.error().reason()) : "";
+  return absl::StrCat(absl::StripPrefix(job.name(), "jobs/").substr(0, 12), "  ", ProgressText(job),
+                      reason, AgeText(job, now), "  ", EscapedText(job.label()));
+}
+
+std::string RoughTime(double seconds) {
+  if (seconds < 100) return absl::StrFormat("%.0f s", seconds);
+  if (seconds < 6000) return absl::StrFormat("%.0f min", seconds / 60);
+  return seconds < 360'000 ? absl::StrFormat("%.1f h", seconds / 3600)
+                           : absl::StrFormat("%.0f days", seconds / 86'400);
+}
+
 absl::StatusOr<v1::Job> WatchWithProgress(const client::Client& daemon, const std::string& name) {
   const bool terminal = isatty(STDERR_FILENO) != 0;
-  absl::string_view shown;
+  std::string shown;
   auto job = daemon.WatchJob(name, [&](const v1::Job& state) {
     if (terminal) {
       DrawProgressBar(state);
     } else if (Activity(state) != shown) {
       shown = Activity(state);
-      absl::FPrintF(stderr, "%s  %s\n", state.label(), ProgressText(state));
+      absl::FPrintF(stderr, "%s  %s\n", EscapedText(state.label()), ProgressText(state));
     }
   });
   if (terminal) absl::FPrintF(stderr, "\n");

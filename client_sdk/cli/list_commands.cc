@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // The commands that show and end jobs, materials and scenes, and that write the examples.
+#include <algorithm>
 #include <cerrno>
+#include <cstdint>
 #include <cstdio>
 #include <cstring>
 #include <fstream>
@@ -10,6 +12,8 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/strip.h"
+#include "absl/time/clock.h"
+#include "absl/time/time.h"
 #include "client_sdk/cli/command_words.h"
 #include "client_sdk/cli/commands.h"
 #include "client_sdk/cli/example_bodies.h"
@@ -17,6 +21,7 @@
 #include "client_sdk/cli/job_progress.h"
 #include "client_sdk/cli/output.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/escaped_text.h"
 #include "proto/cpp/material_catalogue.h"
 #include "proto/cpp/status_macros.h"
 
@@ -36,10 +41,15 @@ std::string LeaseText(const v1::Scene& scene) {
   return Counted(scene.connection_count(), "connection");
 }
 
-void PrintJobLine(const v1::Job& job) {
-  const std::string reason = job.has_error() ? absl::StrCat(": ", job.error().reason()) : "";
-  absl::PrintF("%s  %s%s  %s\n", absl::StripPrefix(job.name(), "jobs/").substr(0, 12),
-               ProgressText(job), reason, job.label());
+void PrintJobLine(const v1::Job& job) { absl::PrintF("%s\n", JobLine(job, absl::Now())); }
+
+/// Prints a time and how long ago it was; nothing if the time is unknown.
+void PrintTime(const char* what, int64_t unix_ms) {
+  if (unix_ms == 0) return;
+  const absl::Time time = absl::FromUnixMillis(unix_ms);
+  absl::PrintF("%-10s %s, %s ago\n", what,
+               absl::FormatTime("%Y-%m-%d %H:%M:%S", time, absl::LocalTimeZone()),
+               RoughTime(std::max(0.0, absl::ToDoubleSeconds(absl::Now() - time))));
 }
 
 }  // namespace
@@ -80,8 +90,10 @@ absl::Status ShowJob(const client::Client& daemon, const std::string& text, bool
   }
   absl::PrintF(
       "%s\nlabel      %s\nstate      %s\nmodel      %s\npriority   %d\nmemory     %.1f MiB\n",
-      job.name(), job.label(), ProgressText(job), job.modal_model(), job.priority(),
+      job.name(), EscapedText(job.label()), ProgressText(job), job.modal_model(), job.priority(),
       static_cast<double>(job.memory_bytes()) / (1 << 20));
+  PrintTime("requested", job.created_unix_ms());
+  PrintTime("started", job.started_unix_ms());
   if (job.has_error()) {
     absl::PrintF("error      %s: %s\n", job.error().reason(),
                  InCommandWords(job.error().message(), HasEveryOption));
@@ -91,7 +103,13 @@ absl::Status ShowJob(const client::Client& daemon, const std::string& text, bool
 
 absl::Status CancelJob(const client::Client& daemon, const std::string& text) {
   ASSIGN_OR_RETURN(const std::string name, FindJob(daemon, text));
-  return daemon.CancelJob(name).status();
+  ASSIGN_OR_RETURN(const v1::Job job, daemon.CancelJob(name));
+  const bool failed = job.state() == v1::JOB_STATE_FAILED;
+  if (failed || job.state() == v1::JOB_STATE_SUCCEEDED) {
+    absl::FPrintF(stderr, "carillon: %s is not cancelled, because it has already %s\n", job.name(),
+                  failed ? absl::StrCat("failed (", job.error().reason(), ")") : "succeeded");
+  }
+  return absl::OkStatus();
 }
 
 absl::Status ListMaterials(const client::Client& daemon, bool json) {

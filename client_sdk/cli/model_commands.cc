@@ -15,6 +15,7 @@
 #include "client_sdk/cli/job_progress.h"
 #include "client_sdk/cli/output.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/escaped_text.h"
 #include "proto/cpp/fixture_text.h"
 #include "proto/cpp/material_catalogue.h"
 #include "proto/cpp/mesh_file.h"
@@ -53,14 +54,21 @@ const char* ElementName(v1::Element element) {
   return element == v1::ELEMENT_LINEAR ? "linear" : "quadratic";
 }
 
+void PrintWarningLines(const google::protobuf::RepeatedPtrField<std::string>& warnings) {
+  for (const std::string& warning : warnings) {
+    absl::PrintF("warning    %s\n", EscapedText(warning));
+  }
+}
+
 void PrintTransfer(const v1::TransferSummary& transfer) {
   const v1::TransferHeader& header = transfer.header();
-  absl::PrintF("transfer   for %.0f m/s in the material: %d of %s, power to %.1f dB, %s\n",
-               header.speed_ratio() * header.sound_speed_m_per_s(), header.computed_mode_count(),
-               Counted(header.wanted_mode_count(), "mode"),
-               header.verification().max_power_error_db(),
-               Counted(transfer.stored_bytes(), "byte"));
-  for (const std::string& warning : header.warnings()) absl::PrintF("warning    %s\n", warning);
+  absl::PrintF(
+      "transfer   for materials with a speed of sound near %.0f m/s: %d of %s, "
+      "the worst within %.1f dB, %s\n",
+      header.speed_ratio() * header.sound_speed_m_per_s(), header.computed_mode_count(),
+      Counted(header.wanted_mode_count(), "mode"), header.verification().max_power_error_db(),
+      Counted(transfer.stored_bytes(), "byte"));
+  PrintWarningLines(header.warnings());
 }
 
 /// Returns the name of a material, or its figures where it has none.
@@ -69,14 +77,15 @@ std::string MaterialText(const v1::Material& material) {
   figures.clear_preset();
   std::string text = figures.ShortDebugString();
   if (material.preset().empty()) return text;
-  return text.empty() ? material.preset() : absl::StrCat(material.preset(), " with ", text);
+  const std::string preset = EscapedText(material.preset());
+  return text.empty() ? preset : absl::StrCat(preset, " with ", text);
 }
 
 void PrintSummary(const v1::ModalModelSummary& model) {
   const v1::ModalModelHeader& header = model.header();
   const v1::Verification& proof = header.verification();
   absl::PrintF("%s\n", model.name());
-  absl::PrintF("label      %s\n", model.label());
+  absl::PrintF("label      %s\n", EscapedText(model.label()));
   absl::PrintF("modes      %d, with %d rigid; Sturm count %d\n", header.mode_count(),
                proof.rigid_mode_count(), proof.sturm_count());
   absl::PrintF("mesh       %s, %d %s tetrahedra, volume %.6g m^3\n",
@@ -95,7 +104,7 @@ void PrintSummary(const v1::ModalModelSummary& model) {
                  100 * *std::ranges::max_element(header.estimated_errors()));
   }
   for (const v1::TransferSummary& transfer : model.transfers()) PrintTransfer(transfer);
-  for (const std::string& warning : header.warnings()) absl::PrintF("warning    %s\n", warning);
+  PrintWarningLines(header.warnings());
 }
 
 void PrintRow(const v1::ModalModelSummary& model) {
@@ -107,7 +116,7 @@ void PrintRow(const v1::ModalModelSummary& model) {
                static_cast<double>(model.stored_bytes()) / (1 << 20),
                absl::FormatTime("%Y-%m-%d %H:%M", absl::FromUnixMillis(model.created_unix_ms()),
                                 absl::LocalTimeZone()),
-               model.label());
+               EscapedText(model.label()));
 }
 
 /// Returns the transfer with which an object of `material` sounds, or null if none fits.
@@ -224,7 +233,7 @@ void PrintWarnings(const client::Client& daemon, const std::string& name) {
   const auto model = daemon.GetModalModel(name);
   if (!model.ok()) return;
   for (const std::string& warning : model->header().warnings()) {
-    absl::FPrintF(stderr, "warning: %s\n", warning);
+    absl::FPrintF(stderr, "warning: %s\n", EscapedText(warning));
   }
 }
 

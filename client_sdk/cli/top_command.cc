@@ -9,7 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
-#include "absl/strings/strip.h"
+#include "absl/time/clock.h"
 #include "client_sdk/cli/commands.h"
 #include "client_sdk/cli/job_progress.h"
 #include "client_sdk/cli/message_json.h"
@@ -74,10 +74,7 @@ std::string Text(const View& view, const std::string& server) {
   for (const v1::Scene& scene : view.scenes) text += SceneLine(scene);
   absl::StrAppendFormat(&text, "\n%s waiting or running\n", Counted(view.jobs.size(), "job"));
   for (size_t i = 0; i < std::min(view.jobs.size(), kMostJobs); ++i) {
-    const v1::Job& job = view.jobs[i];
-    absl::StrAppendFormat(&text, "%s  %s  %s\n",
-                          absl::StripPrefix(job.name(), "jobs/").substr(0, 12), ProgressText(job),
-                          job.label());
+    absl::StrAppend(&text, JobLine(view.jobs[i], absl::Now()), "\n");
   }
   return text;
 }

@@ -25,7 +25,6 @@
 namespace carillon {
 namespace {
 
-constexpr int kNice = 10;
 constexpr size_t kEventDescriptor = 3;
 constexpr int kFirstSpareDescriptor = 10;
 constexpr int kNotExecuted = 127;  // the exit status that a shell gives
@@ -57,6 +56,7 @@ struct Preparation {
   const char* folder = nullptr;
   std::array<int, 4> descriptors{};  // of this process, by their number in the child
   bool is_worker = false;
+  int nice = 0;
   cpu_set_t processors{};
   pid_t parent = 0;
   int failure = -1;  // the write end of the pipe that tells why exec failed
@@ -103,6 +103,7 @@ Preparation Prepare(const ChildCommand& command, int failure) {
   if (!command.folder.empty()) child.folder = command.folder.c_str();
   child.descriptors = {command.input, command.output, command.errors, command.events};
   child.is_worker = command.worker_processor_count > 0;
+  child.nice = command.worker_nice;
   child.environment = EnvironmentFor(child.is_worker);
   child.processors = LastProcessors(command.worker_processor_count);
   child.parent = getpid();
@@ -123,7 +124,7 @@ void BecomeWorker(const Preparation& child) {
   setpgid(0, 0);
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (getppid() != child.parent) _exit(kNotExecuted);  // the parent died before the line above
-  setpriority(PRIO_PROCESS, 0, kNice);
+  setpriority(PRIO_PROCESS, 0, child.nice);
   sched_setaffinity(0, sizeof child.processors, &child.processors);
   const rlimit no_core{0, 0};
   setrlimit(RLIMIT_CORE, &no_core);

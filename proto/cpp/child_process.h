@@ -59,11 +59,12 @@ struct ChildCommand {
   std::string folder{};  ///< working directory; if empty, that of this process
   /// If above zero, the child is a worker that yields to everything else. It leads a process group,
   /// which Kill ends as a whole. The kernel kills it when the thread that started it ends. It has
-  /// nice 10, is the first process killed when memory runs out, and leaves no core file. It runs on
-  /// this number of processors at most, the last ones that this process may use. It gains no
-  /// privileges by programs that it executes. From the environment it gets only the paths, the
-  /// locale, and the settings of OpenBLAS, OpenMP and the sanitizers.
+  /// the niceness `worker_nice`, is the first process killed when memory runs out, and leaves no
+  /// core file. It runs on this number of processors at most, the last ones that this process may
+  /// use. It gains no privileges by programs that it executes. From the environment it gets only
+  /// the paths, the locale, and the settings of OpenBLAS, OpenMP and the sanitizers.
   int worker_processor_count = 0;
+  int worker_nice = 10;
 };
 
 /// A child process, which is killed and waited for when the object is destroyed.

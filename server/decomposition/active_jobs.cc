@@ -8,6 +8,11 @@
 
 namespace carillon {
 
+void ActiveJobs::SetCapacity(const JobCapacity& capacity) {
+  MutexLock lock(&mutex_);
+  places_.SetCapacity(capacity);
+}
+
 std::optional<ActiveJob> ActiveJobs::Find(const std::string& digest) {
   MutexLock lock(&mutex_);
   const auto job = jobs_.find(digest);
@@ -22,12 +27,12 @@ bool ActiveJobs::Contains(const std::string& digest) {
 
 size_t ActiveJobs::queued_count() {
   MutexLock lock(&mutex_);
-  return queue_.size();
+  return decompositions_.size() + transfers_.size();
 }
 
 size_t ActiveJobs::queued_count(const std::string& client) {
   MutexLock lock(&mutex_);
-  return queue_.size(client);
+  return decompositions_.size(client) + transfers_.size(client);
 }
 
 ActiveJobs::Counts ActiveJobs::CountStates() {
@@ -74,7 +79,12 @@ std::optional<v1::Job> ActiveJobs::View(const std::string& digest) {
 std::map<std::string, v1::Job> ActiveJobs::ViewAll() {
   MutexLock lock(&mutex_);
   std::map<std::string, v1::Job> views;
-  for (const auto& [digest, job] : jobs_) views.emplace(digest, ViewOf(job));
+  ForEachWaiting([&](const ActiveJob& job, size_t earlier_count) {
+    views.emplace(job.record.digest, ViewOf(job, earlier_count));
+  });
+  for (const auto& [digest, job] : jobs_) {
+    if (!views.contains(digest)) views.emplace(digest, ViewOf(job, 0));
+  }
   return views;
 }
 
@@ -86,22 +96,22 @@ void ActiveJobs::Add(ActiveJob job) {
   const std::string digest = job.record.digest;
   ActiveJob& added = jobs_.emplace(digest, std::move(job)).first->second;
   Enqueue(added);
-  TellSinks(ViewOf(added));
+  if (!sinks_.empty()) TellSinks(ViewOf(added));
 }
 
 Notice ActiveJobs::Change(const std::string& digest, absl::FunctionRef<void(ActiveJob&)> change) {
   MutexLock lock(&mutex_);
   ActiveJob& job = jobs_.at(digest);
-  queue_.Remove(EntryOf(job));
+  QueueOf(job).Remove(EntryOf(job));
   change(job);
-  if (!job.running.has_value() && job.waits_for.empty()) queue_.Add(EntryOf(job));
+  if (!job.running.has_value() && job.waits_for.empty()) QueueOf(job).Add(EntryOf(job));
   return Announce(job);
 }
 
 Notice ActiveJobs::Remove(const std::string& digest, const v1::Job& last) {
   MutexLock lock(&mutex_);
   const auto job = jobs_.find(digest);
-  queue_.Remove(EntryOf(job->second));
+  QueueOf(job->second).Remove(EntryOf(job->second));
   jobs_.erase(job);
   TellSinks(last);
   Notice notice{{}, last, ++version_};
@@ -109,23 +119,33 @@ Notice ActiveJobs::Remove(const std::string& digest, const v1::Job& last) {
   return notice;
 }
 
-std::optional<ActiveJob> ActiveJobs::BeginRun(const Capacity& capacity,
-                                              std::chrono::nanoseconds now) {
+std::optional<ActiveJob> ActiveJobs::BeginRun(const Clock& clock) {
   MutexLock lock(&mutex_);
-  const std::optional<std::string> next = queue_.Next();
-  if (!next.has_value() || running_count_ >= capacity.worker_count) return std::nullopt;
-  ActiveJob& job = jobs_.at(*next);
-  const bool fits = reserved_bytes_ + job.estimate_bytes <= capacity.memory_bytes;
-  if (!fits && running_count_ > 0) return std::nullopt;
-  queue_.Remove(EntryOf(job));
-  queue_.NoteStart(job.client);
-  ++running_count_;
-  Reserve(job, job.estimate_bytes);
-  job.running = job.request;
-  job.started = now;
-  job.progress.Clear();
-  ++job.record.start_count;
-  return job;
+  for (FairQueue* queue : {&decompositions_, &transfers_}) {
+    const std::optional<std::string> next = queue->Next();
+    if (!next.has_value()) continue;
+    ActiveJob& job = jobs_.at(*next);
+    if (WaitCauseOf(KindOf(job.record)) != v1::WAIT_CAUSE_UNSPECIFIED) continue;
+    queue->Remove(EntryOf(job));
+    queue->NoteStart(job.client);
+    places_.Take(*next, KindOf(job.record), job.estimate_bytes);
+    job.running = job.request;
+    job.started = clock.Monotonic();
+    job.started_unix_ms = clock.UnixMs();
+    job.progress.Clear();
+    ++job.record.start_count;
+    return job;
+  }
+  return std::nullopt;
+}
+
+std::vector<std::string> ActiveJobs::BeginYielding() {
+  MutexLock lock(&mutex_);
+  if (WaitCauseOf(v1::JOB_KIND_DECOMPOSITION) != v1::WAIT_CAUSE_MEMORY) return {};
+  const uint64_t bytes = jobs_.at(*decompositions_.Next()).estimate_bytes;
+  std::vector<std::string> digests = places_.ChooseToEnd(bytes);
+  for (const std::string& digest : digests) jobs_.at(digest).yields = true;
+  return digests;
 }
 
 Notice ActiveJobs::Report(const std::string& digest, const v1::Progress& progress) {
@@ -134,7 +154,7 @@ Notice ActiveJobs::Report(const std::string& digest, const v1::Progress& progres
   if (job.progress.node_count() == 0 && progress.node_count() > 0) {
     job.guess_bytes = MemoryOfNodes(progress.node_count());
     job.estimate_bytes = experience_.Corrected(job.guess_bytes);
-    Reserve(job, job.estimate_bytes);
+    places_.Resize(digest, job.estimate_bytes);
   }
   job.progress = progress;
   return Announce(job);
@@ -142,10 +162,20 @@ Notice ActiveJobs::Report(const std::string& digest, const v1::Progress& progres
 
 ActiveJob ActiveJobs::EndRun(const std::string& digest) {
   MutexLock lock(&mutex_);
-  ActiveJob& job = jobs_.at(digest);
-  --running_count_;
-  Reserve(job, 0);
-  return job;
+  places_.Free(digest);
+  return jobs_.at(digest);
+}
+
+std::vector<Notice> ActiveJobs::NewsOfWaiting() {
+  MutexLock lock(&mutex_);
+  std::vector<Notice> news;
+  if (watchers_.empty()) return news;
+  ForEachWaiting([&](const ActiveJob& job, size_t earlier_count) {
+    const auto watchers = watchers_.find(job.record.digest);
+    if (watchers == watchers_.end()) return;
+    news.push_back({watchers->second, ViewOf(job, earlier_count), ++version_});
+  });
+  return news;
 }
 
 Notice ActiveJobs::QueueAgain(ActiveJob job) {
@@ -215,13 +245,67 @@ FairQueue::Entry ActiveJobs::EntryOf(const ActiveJob& job) {
           .digest = job.record.digest};
 }
 
-v1::Job ActiveJobs::ViewOf(const ActiveJob& job) {
+FairQueue& ActiveJobs::QueueOf(const ActiveJob& job) {
+  return job.record.transfer_of.empty() ? decompositions_ : transfers_;
+}
+
+// The number of jobs of the queue that start before a job.
+size_t ActiveJobs::EarlierCount(const ActiveJob& job) {
+  if (job.running.has_value() || !job.waits_for.empty()) return 0;
+  const std::vector<absl::string_view> order = QueueOf(job).Order();
+  return static_cast<size_t>(std::ranges::find(order, job.record.digest) - order.begin());
+}
+
+// Why the first waiting job of a kind cannot start.
+v1::WaitCause ActiveJobs::WaitCauseOf(v1::JobKind kind) {
+  const bool radiates = kind == v1::JOB_KIND_TRANSFER;
+  // The memory that becomes free is the decomposition's that waits for it.
+  if (radiates && WaitCauseOf(v1::JOB_KIND_DECOMPOSITION) == v1::WAIT_CAUSE_MEMORY) {
+    return v1::WAIT_CAUSE_MEMORY;
+  }
+  const std::optional<std::string> next = (radiates ? transfers_ : decompositions_).Next();
+  if (!next.has_value()) return v1::WAIT_CAUSE_UNSPECIFIED;
+  return places_.Obstacle(kind, jobs_.at(*next).estimate_bytes);
+}
+
+std::optional<v1::JobWait> ActiveJobs::WaitOf(const ActiveJob& job, size_t earlier_count) {
+  if (job.running.has_value()) return std::nullopt;
+  v1::JobWait wait;
+  if (!job.waits_for.empty()) {
+    wait.set_cause(v1::WAIT_CAUSE_COARSE_MODEL);
+    return wait;
+  }
+  const v1::JobKind kind = KindOf(job.record);
+  wait.set_cause(WaitCauseOf(kind));
+  if (wait.cause() == v1::WAIT_CAUSE_UNSPECIFIED) return std::nullopt;  // it starts now
+  wait.set_earlier_job_count(static_cast<uint32_t>(earlier_count));
+  const std::vector<std::string> occupants = places_.Occupants(kind, wait.cause());
+  wait.set_running_job_count(static_cast<uint32_t>(occupants.size()));
+  if (occupants.size() == 1) wait.set_running_job_label(jobs_.at(occupants[0]).record.label);
+  return wait;
+}
+
+v1::Job ActiveJobs::ViewOf(const ActiveJob& job) { return ViewOf(job, EarlierCount(job)); }
+
+v1::Job ActiveJobs::ViewOf(const ActiveJob& job, size_t earlier_count) {
   v1::Job view = ToJob(job.record);
   view.set_state(job.running.has_value() ? v1::JOB_STATE_RUNNING : v1::JOB_STATE_QUEUED);
   view.set_memory_bytes(std::max(job.record.peak_bytes, job.estimate_bytes));
   view.set_coarse_ready(job.coarse_ready);
   if (job.running.has_value()) *view.mutable_progress() = job.progress;
+  if (job.running.has_value()) view.set_started_unix_ms(job.started_unix_ms);
+  if (auto wait = WaitOf(job, earlier_count)) *view.mutable_wait() = *std::move(wait);
   return view;
+}
+
+void ActiveJobs::ForEachWaiting(
+    absl::FunctionRef<void(const ActiveJob&, size_t earlier_count)> use) {
+  for (const FairQueue* queue : {&decompositions_, &transfers_}) {
+    size_t earlier_count = 0;
+    for (const absl::string_view digest : queue->Order()) {
+      use(jobs_.at(std::string(digest)), earlier_count++);
+    }
+  }
 }
 
 Notice ActiveJobs::Announce(const ActiveJob& job) {
@@ -238,12 +322,7 @@ void ActiveJobs::TellSinks(const v1::Job& job) {
 
 void ActiveJobs::Enqueue(ActiveJob& job) {
   job.number = ++last_number_;
-  if (job.waits_for.empty()) queue_.Add(EntryOf(job));
-}
-
-void ActiveJobs::Reserve(ActiveJob& job, uint64_t bytes) {
-  reserved_bytes_ += bytes - job.reserved_bytes;
-  job.reserved_bytes = bytes;
+  if (job.waits_for.empty()) QueueOf(job).Add(EntryOf(job));
 }
 
 void ActiveJobs::EraseWatcher(const std::string& digest, const std::shared_ptr<Watcher>& watcher) {

@@ -15,8 +15,10 @@
 #include "absl/functional/function_ref.h"
 #include "carillon/v1/decomposition.pb.h"
 #include "carillon/v1/modal_model_service.pb.h"
+#include "server/base/clock.h"
 #include "server/base/mutex.h"
 #include "server/decomposition/fair_queue.h"
+#include "server/decomposition/job_places.h"
 #include "server/decomposition/job_sink.h"
 #include "server/decomposition/memory_estimate.h"
 #include "server/decomposition/watcher.h"
@@ -34,13 +36,14 @@ struct ActiveJob {
   std::string client{};
   std::string waits_for{};      ///< digest of the coarse model's job, until that has ended
   bool coarse_ready = false;    ///< a coarse model is stored under the job's digest
+  bool yields = false;          ///< its run is ended to make room, and repeated
   bool again = false;           ///< submitted after a cancel: it runs once more after this run
   bool deleted = false;         ///< its model was deleted: the result is not stored
   uint64_t number = 0;          ///< order in which jobs of one priority start
   uint64_t guess_bytes = 0;     ///< predicted memory, before the correction by experience
   uint64_t estimate_bytes = 0;  ///< predicted memory
-  uint64_t reserved_bytes = 0;  ///< share of the memory budget while it runs
   std::chrono::nanoseconds started{};  ///< monotonic clock at the start of the run
+  int64_t started_unix_ms = 0;         ///< at the start of the run
 };
 
 /// The jobs that wait or run, and everybody who watches a job: all in memory. No call waits for a
@@ -49,11 +52,8 @@ struct ActiveJob {
 /// not called the watchers: the caller sends the notice after it has released its locks.
 class ActiveJobs {
  public:
-  /// What may run at a time.
-  struct Capacity {
-    int worker_count = 0;
-    uint64_t memory_bytes = 0;
-  };
+  /// To be called before BeginRun.
+  void SetCapacity(const JobCapacity& capacity);
 
   std::optional<ActiveJob> Find(const std::string& digest);
   bool Contains(const std::string& digest);
@@ -88,10 +88,14 @@ class ActiveJobs {
   /// Removes a job. Its watchers get `last`.
   Notice Remove(const std::string& digest, const v1::Job& last);
 
-  /// Marks the next job of the fair queue as running if a worker and the memory for it are free. No
-  /// other job overtakes it, because small jobs could delay a large one for ever. A job that does
-  /// not fit into the budget at all runs alone.
-  std::optional<ActiveJob> BeginRun(const Capacity& capacity, std::chrono::nanoseconds now);
+  /// Marks the next decomposition, or else the next transfer, as running if a worker and the memory
+  /// for it are free (JobPlaces). No other job overtakes a job that waits for memory, because small
+  /// jobs could delay a large one for ever.
+  std::optional<ActiveJob> BeginRun(const Clock& clock);
+
+  /// Returns the digests of running transfers to cancel, so that the next decomposition gets their
+  /// memory. They are marked as yielding.
+  std::vector<std::string> BeginYielding();
 
   /// Records the progress of a run. The node count of the mesh, once it is known, predicts the
   /// memory better than the size of the file.
@@ -100,6 +104,9 @@ class ActiveJobs {
   /// Frees the worker and the memory of a run that has ended. The job still counts as running for
   /// readers, until it is removed or queued again.
   ActiveJob EndRun(const std::string& digest);
+
+  /// Returns the news for the watchers of waiting jobs after other jobs have started or ended.
+  std::vector<Notice> NewsOfWaiting();
 
   /// Queues a job again whose run has ended, behind those of its priority.
   Notice QueueAgain(ActiveJob job);
@@ -125,23 +132,30 @@ class ActiveJobs {
 
  private:
   static FairQueue::Entry EntryOf(const ActiveJob& job);
-  static v1::Job ViewOf(const ActiveJob& job);
+  FairQueue& QueueOf(const ActiveJob& job) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  size_t EarlierCount(const ActiveJob& job) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  v1::WaitCause WaitCauseOf(v1::JobKind kind) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  std::optional<v1::JobWait> WaitOf(const ActiveJob& job, size_t earlier_count)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  v1::Job ViewOf(const ActiveJob& job) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  v1::Job ViewOf(const ActiveJob& job, size_t earlier_count) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void ForEachWaiting(absl::FunctionRef<void(const ActiveJob&, size_t earlier_count)> use)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void TellSinks(const v1::Job& job) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   Notice Announce(const ActiveJob& job) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void Enqueue(ActiveJob& job) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  void Reserve(ActiveJob& job, uint64_t bytes) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void EraseWatcher(const std::string& digest, const std::shared_ptr<Watcher>& watcher)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   Mutex mutex_;
   std::map<std::string, ActiveJob> jobs_ ABSL_GUARDED_BY(mutex_);
-  FairQueue queue_ ABSL_GUARDED_BY(mutex_);
+  FairQueue decompositions_ ABSL_GUARDED_BY(mutex_);  ///< that wait
+  FairQueue transfers_ ABSL_GUARDED_BY(mutex_);       ///< that wait
+  JobPlaces places_ ABSL_GUARDED_BY(mutex_);
   std::map<std::string, std::vector<std::shared_ptr<Watcher>>> watchers_ ABSL_GUARDED_BY(mutex_);
   std::set<JobSink*> sinks_ ABSL_GUARDED_BY(mutex_);
   uint64_t last_number_ ABSL_GUARDED_BY(mutex_) = 0;
   uint64_t version_ ABSL_GUARDED_BY(mutex_) = 0;
-  int running_count_ ABSL_GUARDED_BY(mutex_) = 0;
-  uint64_t reserved_bytes_ ABSL_GUARDED_BY(mutex_) = 0;
   MemoryExperience experience_ ABSL_GUARDED_BY(mutex_);
 };
 

@@ -55,8 +55,12 @@ class Executor {
  public:
   virtual ~Executor() = default;
 
-  /// Returns the number of tasks that may run at a time.
+  /// Returns the number of tasks that may run at a time, besides transfers that yield.
   virtual int worker_count() const = 0;
+
+  /// Returns whether transfers leave the processors to decompositions, so that a decomposition may
+  /// run in addition to as many transfers as there are workers.
+  virtual bool transfers_yield() const = 0;
 
   /// Returns the memory for all running tasks together, bytes. The caller starts further tasks only
   /// if the estimates of all running tasks fit into this budget.

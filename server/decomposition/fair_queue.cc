@@ -32,12 +32,33 @@ size_t FairQueue::size(const std::string& client) const {
 
 std::optional<std::string> FairQueue::Next() const {
   if (queues_.empty()) return std::nullopt;
-  const auto newest_start = [this](const auto& queue) {
-    const auto start = starts_.find(queue.first);
-    return start == starts_.end() ? 0 : start->second;
-  };
+  const auto newest_start = [this](const auto& queue) { return NewestStart(queue.first); };
   const std::set<Place>& queue = std::ranges::min_element(queues_, {}, newest_start)->second;
   return std::get<std::string>(*queue.begin());
+}
+
+std::vector<absl::string_view> FairQueue::Order() const {
+  struct Turn {
+    uint64_t newest_start;
+    std::set<Place>::const_iterator next, end;
+  };
+  std::vector<Turn> turns;
+  for (const auto& [client, queue] : queues_) {
+    turns.push_back({NewestStart(client), queue.begin(), queue.end()});
+  }
+  std::ranges::stable_sort(turns, {}, &Turn::newest_start);
+  std::vector<absl::string_view> order;
+  // Each client has one turn a round, because a start puts it behind all others.
+  while (!turns.empty()) {
+    for (Turn& turn : turns) order.emplace_back(std::get<std::string>(*turn.next++));
+    std::erase_if(turns, [](const Turn& turn) { return turn.next == turn.end; });
+  }
+  return order;
+}
+
+uint64_t FairQueue::NewestStart(const std::string& client) const {
+  const auto start = starts_.find(client);
+  return start == starts_.end() ? 0 : start->second;
 }
 
 void FairQueue::NoteStart(const std::string& client) {

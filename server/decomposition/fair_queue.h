@@ -8,6 +8,9 @@
 #include <set>
 #include <string>
 #include <tuple>
+#include <vector>
+
+#include "absl/strings/string_view.h"
 
 namespace carillon {
 
@@ -35,6 +38,10 @@ class FairQueue {
   /// Returns the digest of the job that is to start next, or nothing if no job waits.
   std::optional<std::string> Next() const;
 
+  /// Returns the digests of all jobs in the order in which they start unless others are added. They
+  /// are valid until the next call that adds or removes an entry.
+  std::vector<absl::string_view> Order() const;
+
   /// Records that a job of the client starts, so that the turn passes to the others.
   void NoteStart(const std::string& client);
 
@@ -42,6 +49,7 @@ class FairQueue {
   using Place = std::tuple<int32_t, uint64_t, std::string>;
 
   static Place PlaceOf(const Entry& entry);
+  uint64_t NewestStart(const std::string& client) const;
 
   std::map<std::string, std::set<Place>> queues_;  ///< by client; none is empty
   /// Number of each client's newest start. The clients that started longest ago are forgotten.

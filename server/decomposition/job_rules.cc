@@ -20,18 +20,23 @@ bool IsOneOf(const std::string& reason, const std::array<const char*, N>& reason
 
 }  // namespace
 
+v1::JobKind KindOf(const JobRecord& record) {
+  return record.transfer_of.empty() ? v1::JOB_KIND_DECOMPOSITION : v1::JOB_KIND_TRANSFER;
+}
+
 v1::Job ToJob(const JobRecord& record) {
   v1::Job job;
   job.set_name(absl::StrCat("jobs/", record.digest));
   const bool radiates = !record.transfer_of.empty();
   job.set_modal_model(absl::StrCat("modalModels/", radiates ? record.transfer_of : record.digest));
-  job.set_kind(radiates ? v1::JOB_KIND_TRANSFER : v1::JOB_KIND_DECOMPOSITION);
+  job.set_kind(KindOf(record));
   job.set_state(record.state);
   if (record.state == v1::JOB_STATE_FAILED) *job.mutable_error() = record.error;
   job.set_label(record.label);
   job.set_priority(record.priority);
   job.set_way(record.way);
   job.set_memory_bytes(record.peak_bytes);
+  job.set_created_unix_ms(record.created_unix_ms);
   return job;
 }
 

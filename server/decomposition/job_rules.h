@@ -16,6 +16,8 @@ namespace carillon {
 // The functions in this file decide what the queue does with a job: whether it computes, retries or
 // repeats the job, and how clients see it. They keep no state.
 
+v1::JobKind KindOf(const JobRecord& record);
+
 v1::Job ToJob(const JobRecord& record);
 
 /// Returns the record of a job that waits to run for the first time.

@@ -47,7 +47,11 @@ JobRuns::JobRuns(ModeDatabase& database, std::unique_ptr<Executor> executor, con
       jobs_(jobs),
       settings_(std::move(settings)),
       executor_(std::move(executor)),
-      capacity_{executor_->worker_count(), executor_->memory_budget_bytes()} {}
+      worker_count_(executor_->worker_count()) {
+  jobs_.SetCapacity({.worker_count = worker_count_,
+                     .memory_budget_bytes = executor_->memory_budget_bytes(),
+                     .transfers_yield = executor_->transfers_yield()});
+}
 
 void JobRuns::RecallExperience() {
   const auto correction = database_.jobs().Fact(kCorrectionFact);
@@ -108,13 +112,15 @@ void JobRuns::FollowByTransfer(const ActiveJob& model, double run_s) {
 
 void JobRuns::StartWhatFits(Notices& notices) {
   while (!stopping_) {
-    const std::optional<ActiveJob> job = jobs_.BeginRun(capacity_, clock_.Monotonic());
-    if (!job.has_value()) return;
+    const std::optional<ActiveJob> job = jobs_.BeginRun(clock_);
+    if (!job.has_value()) break;
     // If the start cannot be stored, a daemon that is killed under the job counts one start less.
     database_.jobs().Put(job->record).IgnoreError();
     executor_->Start(MakeTask(*job));
     notices.push_back(jobs_.Change(job->record.digest, [](ActiveJob&) {}));
   }
+  if (stopping_) return;
+  for (const std::string& digest : jobs_.BeginYielding()) executor_->Cancel(digest);
 }
 
 void JobRuns::Cancel(const std::string& digest) {
@@ -170,7 +176,7 @@ void JobRuns::OnEnd(const std::string& digest, const Outcome& outcome) {
     if (job.deleted) database_.models().Delete(digest).IgnoreError();
     job.record.start_count = 0;
     if (RunsAgain(job, result)) {
-      job.again = job.deleted = false;
+      job.again = job.deleted = job.yields = false;
       notices.push_back(jobs_.QueueAgain(std::move(job)));
     } else {
       if (result.verdict == Verdict::kOk && !job.deleted) FollowByTransfer(job, run_s);
@@ -178,6 +184,7 @@ void JobRuns::OnEnd(const std::string& digest, const Outcome& outcome) {
       ReleaseWaiting(digest, notices);
     }
     StartWhatFits(notices);
+    for (Notice& news : jobs_.NewsOfWaiting()) notices.push_back(std::move(news));
   }
   for (const Notice& notice : notices) notice.Tell();
 }
@@ -199,7 +206,8 @@ Outcome JobRuns::Store(const std::string& digest, const Outcome& outcome) {
 bool JobRuns::RunsAgain(ActiveJob& job, const Outcome& result) const {
   if (job.again) return true;
   const bool cancelled = job.record.state == v1::JOB_STATE_CANCELLED;
-  if (cancelled || job.deleted || result.verdict == Verdict::kCancelled) return false;
+  if (cancelled || job.deleted) return false;
+  if (result.verdict == Verdict::kCancelled) return job.yields;
   if (result.crowded) {
     job.estimate_bytes = std::max(2 * job.estimate_bytes, result.peak_bytes * 3 / 2);
     return true;

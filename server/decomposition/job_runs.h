@@ -46,7 +46,8 @@ class JobRuns {
   void Enqueue(JobRecord record, v1::CreateModalModelRequest request, JobOrigin origin = {})
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
 
-  /// Starts jobs while workers and memory are free.
+  /// Starts jobs while workers and memory are free. Ends transfers whose memory the next
+  /// decomposition needs; they are computed later.
   void StartWhatFits(Notices& notices) ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
 
   /// Ends the worker of a running job. The job ends, or is queued again, when the worker has ended.
@@ -62,7 +63,7 @@ class JobRuns {
 
   /// Returns the mean time until a place in a full queue becomes free, in seconds.
   double retry_after_s() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_) {
-    return mean_run_s_ / capacity_.worker_count;
+    return mean_run_s_ / worker_count_;
   }
 
  private:
@@ -89,7 +90,7 @@ class JobRuns {
   DecompositionQueue::Counts ended_ ABSL_GUARDED_BY(ended_mutex_);
   PhaseUsage phases_;
   std::unique_ptr<Executor> executor_;
-  const ActiveJobs::Capacity capacity_;
+  const int worker_count_;
 };
 
 }  // namespace carillon

@@ -101,6 +101,7 @@ class LocalExecutor final : public Executor {
   }
 
   int worker_count() const override { return options_.worker_count; }
+  bool transfers_yield() const override { return true; }
   uint64_t memory_budget_bytes() const override { return options_.memory_budget_bytes; }
 
   void Start(DecompositionTask task) override {
@@ -199,12 +200,17 @@ class LocalExecutor final : public Executor {
     }
   }
 
-  // If all workers together exceed the budget, the youngest is ended, because it loses least work.
+  // If all workers together exceed the budget, the youngest is ended, because it loses least work;
+  // if transfers run, the youngest transfer, because decompositions do not wait for transfers.
   void Enforce() {
     uint64_t total_bytes = 0;
     for (LocalWorker& worker : workers_) total_bytes += worker.Enforce(clock_.Monotonic());
     if (workers_.size() > 1 && total_bytes > options_.memory_budget_bytes) {
-      workers_.back().MakeRoom(options_.memory_budget_bytes);
+      const auto transfer =
+          std::find_if(workers_.rbegin(), workers_.rend(),
+                       [](const LocalWorker& worker) { return worker.task().radiates; });
+      LocalWorker& ended = transfer == workers_.rend() ? workers_.back() : *transfer;
+      ended.MakeRoom(options_.memory_budget_bytes);
     }
   }
 

@@ -20,6 +20,11 @@ namespace {
 
 using std::chrono::nanoseconds;
 
+// The niceness of decompositions and of transfers. A processor that both use gives seven eighths of
+// its time to the decomposition.
+constexpr int kDecompositionNice = 10;
+constexpr int kTransferNice = 19;
+
 constexpr size_t kReadBytes =
     256 << 10;  // at a time, so that one flooding worker does not hold all
 constexpr size_t kLogBytes = 4 << 10;
@@ -105,11 +110,14 @@ absl::StatusOr<LocalWorker> LocalWorker::Start(PreparedTask prepared,
   const WorkerLimits own = limits.For(prepared.task.request);
   ASSIGN_OR_RETURN(Pipe events, MakePipe());
   ASSIGN_OR_RETURN(Pipe errors, MakePipe());
-  ASSIGN_OR_RETURN(ChildProcess process,
-                   ChildProcess::Start({.words = WorkerCommand(place),
-                                        .errors = errors.write_end(),
-                                        .events = events.write_end(),
-                                        .worker_processor_count = share.processor_count}));
+  ASSIGN_OR_RETURN(
+      ChildProcess process,
+      ChildProcess::Start(
+          {.words = WorkerCommand(place),
+           .errors = errors.write_end(),
+           .events = events.write_end(),
+           .worker_processor_count = share.processor_count,
+           .worker_nice = prepared.task.radiates ? kTransferNice : kDecompositionNice}));
   events.CloseWriteEnd();
   errors.CloseWriteEnd();
   return LocalWorker(std::move(prepared), std::move(events), std::move(errors), std::move(process),

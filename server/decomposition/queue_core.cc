@@ -359,6 +359,7 @@ void QueueCore::EndQueued(const JobRecord& record, Notices& notices) {
   notices.push_back(jobs_.Remove(record.digest, ToJob(record)));
   runs_.ReleaseWaiting(record.digest, notices);
   runs_.StartWhatFits(notices);
+  for (Notice& news : jobs_.NewsOfWaiting()) notices.push_back(std::move(news));
 }
 
 absl::Status QueueCore::Watch(const std::string& digest, const std::shared_ptr<Watcher>& watcher) {

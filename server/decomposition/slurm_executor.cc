@@ -46,6 +46,9 @@ class SlurmExecutor final : public Executor {
 
   int worker_count() const override { return options_.job_count; }
 
+  // Slurm decides which of its jobs run.
+  bool transfers_yield() const override { return false; }
+
   // Slurm reserves the memory.
   uint64_t memory_budget_bytes() const override { return std::numeric_limits<uint64_t>::max() / 2; }
 

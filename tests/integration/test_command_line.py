@@ -59,12 +59,15 @@ class ListsTest(CommandLineTest):
 
     def test_jobs_are_listed_shown_and_cancelled(self):
         self.assertIn("bar", [job["label"] for job in self.json_of("job", "list")["jobs"]])
-        self.assertIn("done", self.run_command("job", "show", "bar"))
+        self.assertRegex(self.run_command("job", "show", "bar"), "done\n(.*\n)*requested  20.* ago")
         self.run_command("model", "create", self.folder / "bar.obj", "--material", meshes.MATERIAL, "--nodes", 60000,
-                         "--label", "long", "--no-wait")
-        self.run_command("job", "cancel", "long")
-        ended = self.daemon.command("job", "watch", "long", check=False)
+                         "--label", "long\u202e", "--no-wait")
+        self.assertRegex(self.run_command("job", "list"), r"(requested|running for) [0-9]+ s.*  long\\xe2\\x80\\xae")
+        self.run_command("job", "cancel", "long\u202e")
+        ended = self.daemon.command("job", "watch", "long\u202e", check=False)
         self.assertIn("JOB_CANCELLED", ended.stderr)
+        self.assertEqual(self.daemon.command("job", "cancel", "long\u202e").stderr, "")
+        self.assertIn("already succeeded", self.daemon.command("job", "cancel", "bar").stderr)
 
     def test_jobs_are_listed_and_watched_by_state_and_label(self):
         labels = [job["label"] for job in self.json_of("job", "list", "--state", "succeeded", "--label", "BAR")["jobs"]]

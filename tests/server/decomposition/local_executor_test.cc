@@ -46,10 +46,24 @@ class LocalExecutorTest : public ::testing::Test {
     executor_ = *std::move(executor);
   }
 
+  /// Makes an executor for two workers, each of which takes over half of the memory.
+  void MakeCrowdedExecutor() {
+    options_.worker_count = 2;
+    options_.memory_budget_bytes = 40 << 20;
+    options_.memory_limit_bytes = 1 << 30;
+    WriteEvents(ProgressBytes(0.5));
+    // 34 MB of text each, and what the shell takes for it.
+    MakeExecutor(
+        "x=0123456789abcdef; for i in 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21; do "
+        "x=$x$x; "
+        "done; cat \"$here/events\" >&3; sleep 1000");
+  }
+
   void Start(TaskRun& run) { Start(run, digest_); }
 
   void Start(TaskRun& run, const std::string& digest) {
     executor_->Start({.digest = digest,
+                      .radiates = radiates_,
                       .request = request_,
                       .way = 0,
                       .write_input =
@@ -82,6 +96,7 @@ class LocalExecutorTest : public ::testing::Test {
 
   TemporaryFolder folder_;
   SystemClock clock_;
+  bool radiates_ = false;  // of the tasks that start
   LocalExecutorOptions options_;
   const std::string digest_ = Sha256Hex("task");
   v1::CreateModalModelRequest request_ = *ResolveRequest(SampleRequest(Sha256Hex("solid")));
@@ -100,6 +115,12 @@ TEST_F(LocalExecutorTest, RunsTheWorkerNicedAndNoisyStreamsHarmless) {
       RunScript("nice >\"$out\"; cat; head -c 1000000 /dev/zero; head -c 1000000 /dev/zero >&2");
   EXPECT_EQ(outcome.verdict, Verdict::kOk) << outcome.error.message();
   EXPECT_EQ(run_.model, "10\n");
+}
+
+TEST_F(LocalExecutorTest, RunsATransferAtALowerPriorityThanADecomposition) {
+  radiates_ = true;
+  EXPECT_EQ(RunScript("nice >\"$out\"").verdict, Verdict::kOk);
+  EXPECT_EQ(run_.model, "19\n");
 }
 
 TEST_F(LocalExecutorTest, KeepsAndRevealsNothingOfAMesh) {
@@ -184,15 +205,7 @@ TEST_F(LocalExecutorTest, ALackOfMemoryTellsHowMuchTheMeshWouldNeed) {
 }
 
 TEST_F(LocalExecutorTest, WhereAllTogetherTakeTooMuchTheYoungestMakesRoom) {
-  options_.worker_count = 2;
-  options_.memory_budget_bytes = 40 << 20;
-  options_.memory_limit_bytes = 1 << 30;
-  WriteEvents(ProgressBytes(0.5));
-  // 34 MB of text each, and what the shell takes for it.
-  MakeExecutor(
-      "x=0123456789abcdef; for i in 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21; do "
-      "x=$x$x; "
-      "done; cat \"$here/events\" >&3; sleep 1000");
+  MakeCrowdedExecutor();
   Start(run_);
   ASSERT_TRUE(Happens(run_.progressed));
   TaskRun second;
@@ -203,6 +216,22 @@ TEST_F(LocalExecutorTest, WhereAllTogetherTakeTooMuchTheYoungestMakesRoom) {
   executor_->Cancel(digest_);
   ASSERT_TRUE(Happens(run_.ended));
   EXPECT_EQ(run_.outcome.verdict, Verdict::kCancelled);
+}
+
+TEST_F(LocalExecutorTest, WhereAllTogetherTakeTooMuchATransferMakesRoomForAYoungerDecomposition) {
+  MakeCrowdedExecutor();
+  radiates_ = true;
+  Start(run_);
+  ASSERT_TRUE(Happens(run_.progressed));
+  radiates_ = false;
+  TaskRun model;
+  Start(model, Sha256Hex("model"));
+  ASSERT_TRUE(Happens(run_.ended));
+  EXPECT_TRUE(run_.outcome.crowded);
+  ASSERT_TRUE(Happens(model.progressed));
+  executor_->Cancel(Sha256Hex("model"));
+  ASSERT_TRUE(Happens(model.ended));
+  EXPECT_EQ(model.outcome.verdict, Verdict::kCancelled);
 }
 
 TEST_F(LocalExecutorTest, WorkersKeepToTheirShareOfTheProcessors) {

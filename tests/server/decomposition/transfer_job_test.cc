@@ -101,6 +101,14 @@ class TransferJobTest : public ::testing::Test {
     ASSERT_TRUE(job.ok()) << job.status();
   }
 
+  /// Asks for the model of another mesh, without a transfer, and returns its digest.
+  std::string SubmitOther() {
+    v1::CreateModalModelRequest other = SampleRequest(database_->meshes().Put("other")->digest);
+    other.set_without_transfer(true);
+    EXPECT_TRUE(queue_->Submit(other).ok());
+    return RequestDigest(*ResolveRequest(other));
+  }
+
   v1::Job AwaitEnd(const std::string& digest) { return Ending(*queue_, digest).Await(); }
 
   size_t TransferCount() {
@@ -237,6 +245,27 @@ TEST_F(TransferJobTest, CanBeCancelledAndAskedForAgain) {
   EXPECT_EQ(TransferCount(), 0U);
   gate.Open();
   Submit();
+  EXPECT_EQ(AwaitEnd(transfer_).state(), v1::JOB_STATE_SUCCEEDED);
+}
+
+TEST_F(TransferJobTest, DoesNotHoldUpAModel) {
+  const Gate gate(folder_ / "gate");
+  MakeQueue(absl::StrCat(kTransferWaits, kSucceed));
+  Submit();
+  AwaitRuns("model\ntransfer\n");
+  EXPECT_EQ(AwaitEnd(SubmitOther()).state(), v1::JOB_STATE_SUCCEEDED);
+  EXPECT_EQ(queue_->Get(transfer_)->state(), v1::JOB_STATE_RUNNING);
+}
+
+TEST_F(TransferJobTest, YieldsTheMemoryToAModelAndRunsAgain) {
+  const Gate gate(folder_ / "gate");
+  options_.memory_budget_bytes = 300 << 20;  // a transfer is estimated to take 256 MiB
+  MakeQueue(absl::StrCat(kTransferWaits, kSucceed));
+  Submit();
+  AwaitRuns("model\ntransfer\n");
+  EXPECT_EQ(AwaitEnd(SubmitOther()).state(), v1::JOB_STATE_SUCCEEDED);
+  AwaitRuns("model\ntransfer\nmodel\ntransfer\n");
+  gate.Open();
   EXPECT_EQ(AwaitEnd(transfer_).state(), v1::JOB_STATE_SUCCEEDED);
 }
 
