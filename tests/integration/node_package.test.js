@@ -222,6 +222,13 @@ test('refusals have the reason of the contract', async () => {
   await assert.rejects(carillon.connect(`unix:${FOLDER}/nobody`).status(), carillon.ServerUnavailable);
 });
 
+test('a stream that was closed refuses further steps', async () => withScene(async (scene) => {
+  const stream = scene.stream({ step: 0.01 });
+  await stream.close();
+  assert.throws(() => stream.step(1), (error) => error.reason === 'CONTACT_STREAM_ENDED'
+    && error.message.includes('open another one'));
+}));
+
 test('a trace is written and read, and a damaged one is refused', async () => {
   const trace = new carillon.Trace({ step: 1 / 60, simulator: 'test' });
   trace.add(model);

@@ -156,6 +156,24 @@ class CallsTest(DaemonTest):
         self.assertEqual(len(told.warnings), 1)
         self.assertEqual((stream.late_count, stream.remap_count), (1, 0))
 
+    def test_a_stream_that_was_closed_refuses_further_steps(self):
+        with self.c.scene() as scene:
+            with scene.stream(step=0.01) as closed:
+                pass
+            left = scene.stream(step=0.01)
+            with self.assertRaises(KeyError), left:
+                raise KeyError
+            for stream in closed, left:
+                with self.assertRaisesRegex(carillon.CarillonError, "CONTACT_STREAM_ENDED: .* open another one"):
+                    stream.step(1.0)
+
+    def test_a_scene_that_is_gone_hides_no_exception_of_its_block(self):
+        with self.c.scene() as scene:
+            scene.delete()
+        with self.assertRaises(KeyError), self.c.scene() as scene:
+            scene.delete()
+            raise KeyError
+
     def test_models_jobs_and_objects_of_asyncio_are_awaited(self):
         async def use():
             async with carillon.aio.connect(self.daemon.server) as c, await c.scene() as scene:

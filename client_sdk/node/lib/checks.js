@@ -48,6 +48,13 @@ function refuse(value, name, wanted) {
 }
 
 const NUMBERS = new Set(['TYPE_DOUBLE', 'TYPE_FLOAT', 'TYPE_UINT32', 'TYPE_INT32']);
+const MOST_OF_32_BITS = 2 ** 32 - 1;
+
+/** Throws a TypeError unless a value is a whole number of 32 bits, as handles and partners are. Returns it. */
+function whole(value, name, wanted) {
+  if (!Number.isInteger(value) || value < 0 || value > MOST_OF_32_BITS) refuse(value, name, wanted);
+  return value;
+}
 
 /** Throws a TypeError if an object is no message of the contract: by an unknown field, word or kind of value. */
 function refuseNoMessage(given, type, where, more = []) {
@@ -65,6 +72,7 @@ function refuseNoMessage(given, type, where, more = []) {
 function refuseWrongField(value, field, where) {
   const name = `${field.name} of ${where}`;
   if (NUMBERS.has(field.type) && typeof value !== 'number') refuse(value, name, 'a number');
+  if (field.type === 'TYPE_UINT32') whole(value, name, 'a whole number, zero or more');
   if (field.type === 'TYPE_STRING' && typeof value !== 'string') refuse(value, name, 'text');
   if (field.type === 'TYPE_ENUM' && typeof value === 'string') {
     const words = message(field.typeName.split('.').at(-1)).type.value.map((item) => item.name);
@@ -91,4 +99,4 @@ function tuple(values, count, name, meaning) {
   return values;
 }
 
-module.exports = { choice, counted, refuse, refuseNoMessage, refuseUnknown, tuple };
+module.exports = { choice, counted, refuse, refuseNoMessage, refuseUnknown, tuple, whole };

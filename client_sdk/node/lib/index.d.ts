@@ -60,7 +60,7 @@ export interface ImpulseRow extends Strike {
 
 /** One contact as an engine reports it: the impulse over the whole step, also at rest. */
 export interface ContactRow extends ImpulseRow {
-  /** Any number that names the other body. */
+  /** A whole number from 0 to 4294967295 that names the other body. */
   partner?: number;
   roughness?: Roughness;
 }
@@ -80,7 +80,7 @@ export interface ImpulseColumns {
   objects: ObjectLike | ArrayLike<ObjectLike>;
   points: Table;
   impulses: Table;
-  /** Seconds; NaN leaves one to the daemon. */
+  /** Seconds, zero or more; NaN leaves one to the daemon. */
   durations?: number | ArrayLike<number>;
   timeOffsets?: number | ArrayLike<number>;
   secondObjects?: ObjectLike | ArrayLike<ObjectLike>;
@@ -91,6 +91,7 @@ export interface ImpulseColumns {
 
 /** An engine's contacts as columns. */
 export interface ContactColumns extends ImpulseColumns {
+  /** Whole numbers from 0 to 4294967295 that name the other bodies. */
   partners?: number | ArrayLike<number>;
   travelSpeeds?: number | ArrayLike<number>;
   roughnessDepth?: number;
@@ -231,7 +232,10 @@ export class ContactStream {
   readonly findings?: ContactFindings__Output;
   /** Why the newest rejected contact was rejected. */
   readonly rejection?: CarillonError;
-  /** Sends a step. The promise gives the network a turn. */
+  /**
+   * Sends a step. The promise gives the network a turn. Throws CarillonError if the stream has failed, or has been
+   * closed (CONTACT_STREAM_ENDED).
+   */
   step(time: number, content?: StepContent): Promise<void>;
   /**
    * Waits until the daemon has taken all steps. Returns the last report. Unless `warn` is false, the process warns of

@@ -106,6 +106,37 @@ test('contacts are refused by their names, with unit and frame', async () => {
     /point is \[ 0, 0 \]; it must be \[x, y, z\]: metres in the object's own frame/);
 });
 
+test('handles and partners that are no whole numbers of 32 bits are refused', () => {
+  for (const wrong of ['floor', '5', 1.7, -1, 1 + 2 ** 32, NaN]) {
+    const shown = inspect(wrong);
+    const row = { object: 1, point: POINT, impulse: IMPULSE };
+    const object = 'it must be an object that scene.add or trace.add returned, or its handle, a whole number';
+    const partner = 'it must be a whole number from 0 to 4294967295 that names the other body';
+    refused(`object of impulses[0] is ${shown}; ${object}`, { impulses: [{ ...row, object: wrong }] });
+    refused(`partner of contacts[0] is ${shown}; ${partner}`, { contacts: [{ ...row, partner: wrong }] });
+    const columns = { objects: 1, points: POINT, impulses: IMPULSE };
+    refused(`an entry of objects is ${shown}; ${object}`, { impulses: { ...columns, objects: [wrong] } });
+    for (const partners of [wrong, [wrong]]) {
+      refused(`an entry of partners is ${shown}; ${partner}`, { contacts: { ...columns, partners } });
+    }
+    assert.throws(() => new carillon.Trace().add('modalModels/1', { handle: wrong }), /handle of add is .* whole number/);
+  }
+});
+
+test('a negative duration is refused, and an undefined one is left to the daemon', async () => {
+  const wanted = 'it must be zero seconds or more, or NaN, which leaves it to the daemon';
+  const columns = { objects: 1, points: POINT, impulses: IMPULSE };
+  refused(`an entry of durations is -5; ${wanted}`, { impulses: { ...columns, durations: -5 } });
+  refused(`duration of impulses[0] is -5; ${wanted}`, { impulses: [{ object: 1, point: POINT, impulse: IMPULSE,
+    duration: -5 }] });
+  await assert.rejects(bell.strike({ point: POINT, impulse: IMPULSE, duration: -5 }), /duration is -5; it must be zero/);
+  const trace = new carillon.Trace();
+  trace.step(0, { impulses: { ...columns, durations: NaN } });
+  trace.step(0, { impulses: [{ object: 1, point: POINT, impulse: IMPULSE, duration: NaN }] });
+  assert.deepEqual(trace.steps[0].columns.duration_s, [-1]);
+  assert.equal('duration_s' in trace.steps[1].impulses[0], false);
+});
+
 test('a trace of contacts needs the length of its steps, as a stream does', () => {
   const contacts = [{ object: 1, point: POINT, impulse: IMPULSE }];
   assert.throws(() => new carillon.Trace().step(0, { contacts }), /new Trace\(\{ step: 1 \/ 240 \}\)/);

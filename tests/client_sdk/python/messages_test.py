@@ -117,11 +117,34 @@ class RefusalsTest(MessagesTest):
                 ("partners has the shape (3,)", contacts(1, [POINT] * 2, [IMPULSE] * 2, partners=[1, 2, 3])),
                 ("second_points has 1 row; it must have 2", contacts(1, [POINT] * 2, [IMPULSE] * 2, second_objects=2,
                                                                      second_points=POINT)),
-                ("objects has an entry of type NoneType; give the objects", contacts(None, POINT, IMPULSE)),
+                ("an entry of objects is None; it must be an object that Scene.add or Trace.add returned, or its "
+                 "handle, a whole number", contacts(None, POINT, IMPULSE)),
                 ("contacts is of type list; it must be a carillon.Contacts", [POINT])):
             self.refused(expected, made, contacts=given)
         self.refused("orientations has the shape (3,)", made, poses=carillon.Poses(1, POINT, (0, 0, 1)))
         self.refused("listener is (1, 2); it must be a position x, y, z in metres", made, listener=(1, 2))
+
+    def test_handles_and_partners_that_are_no_whole_numbers_of_32_bits_are_refused(self):
+        for wrong, shown in ((1.7, "1.7"), (-1, "-1"), ("bar", "'bar'"), ("5", "'5'"), (1 + 2**32, "4294967297"),
+                             (2**70, str(2**70)), (numpy.array([1.7]), "1.7"), (numpy.array([-1]), "-1"),
+                             (numpy.nan, "nan"), ([1, 2**40], str(2**40))):
+            points = [POINT] * numpy.size(wrong)
+            self.refused(f"an entry of objects is {shown}; it must be an object that Scene.add or Trace.add returned", made,
+                         impulses=carillon.Impulses(wrong, points, points))
+            self.refused(f"an entry of partners is {shown}; it must be a whole number from 0 to 4294967295 that names",
+                         made, contacts=carillon.Contacts(1, points, points, partners=wrong))
+        step = made(contacts=carillon.Contacts(numpy.array([3.0]), POINT, IMPULSE, partners=2**32 - 1))
+        self.assertEqual(list(step.contact_columns.impulses.object), [3])
+        self.assertEqual(list(step.contact_columns.partner), [2**32 - 1])
+        self.refused("handle of add is -1; it must be a whole number", carillon.Trace().add, "modalModels/1", handle=-1)
+
+    def test_a_negative_duration_is_refused_and_an_undefined_one_is_left_to_the_daemon(self):
+        self.refused("an entry of durations is -5.0; it must be zero seconds or more, or NaN, which leaves it to the "
+                     "daemon", made, impulses=carillon.Impulses(1, POINT, IMPULSE, durations=[-5]))
+        bell = carillon.SoundingObject(carillon.Scene(self.c, "scenes/1"), scene_service_pb2.SoundingObject(handle=1))
+        self.refused("duration is -5; it must be zero seconds or more", bell.strike, POINT, IMPULSE, -5)
+        step = made(impulses=carillon.Impulses(1, [POINT] * 2, [IMPULSE] * 2, durations=[numpy.nan, 0]))
+        self.assertEqual(list(step.columns.duration_s), [-1, 0])
 
     def test_a_strike_is_refused_by_its_own_names(self):
         scene = carillon.Scene(self.c, "scenes/1")

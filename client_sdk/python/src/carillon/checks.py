@@ -9,6 +9,8 @@ from typing import Any, NoReturn, Optional
 
 import numpy
 
+MOST_OF_32_BITS = 2**32 - 1
+
 
 def counted(count: int, noun: str) -> str:
     """Returns a number with its noun: "1 contact", "2 contacts"."""
@@ -96,7 +98,16 @@ def three(values: Any, name: str, meaning: str) -> numpy.ndarray:
     return array.reshape(3)
 
 
-def refuse(given: Any, name: str, wanted: str) -> NoReturn:
-    """Raises ValueError that shows the value, cut if it is long."""
+def whole_numbers(values: numpy.ndarray, name: str, wanted: str) -> numpy.ndarray:
+    """Converts to 32 bits. Raises ValueError that shows the first number that is not whole, negative or too large."""
+    with numpy.errstate(invalid="ignore"):  # of infinite and undefined numbers, which are refused
+        is_right = (values >= 0) & (values <= MOST_OF_32_BITS) & (values % 1 == 0)
+    if not is_right.all():
+        refuse(values[~is_right].tolist()[0], f"an entry of {name}", wanted)
+    return values.astype(numpy.uint32)
+
+
+def refuse(given: Any, name: str, wanted: str, kind: type[Exception] = ValueError) -> NoReturn:
+    """Raises an error that shows the value, cut if it is long."""
     shown = " ".join(repr(given).split())
-    raise ValueError(f"{name} is {shown if len(shown) <= 80 else shown[:77] + '...'}; it must be {wanted}")
+    raise kind(f"{name} is {shown if len(shown) <= 80 else shown[:77] + '...'}; it must be {wanted}")
