@@ -229,6 +229,18 @@ test('a stream that was closed refuses further steps', async () => withScene(asy
     && error.message.includes('open another one'));
 }));
 
+test('a trace without contacts is refused', async () => {
+  const trace = new carillon.Trace({ step: 1 / 60 });
+  trace.add(model);
+  trace.step(0);
+  await assert.rejects(c.render(trace), { reason: 'TRACE_EMPTY' });
+});
+
+test('more renderings than a client may have wait', async () => {
+  const sounds = await Promise.all(Array.from({ length: 16 }, () => model.renderStrike({ ...STRIKE, seconds: 0.1 })));
+  assert.equal(new Set(sounds.map((sound) => sound.peak)).size, 1);
+});
+
 test('a trace is written and read, and a damaged one is refused', async () => {
   const trace = new carillon.Trace({ step: 1 / 60, simulator: 'test' });
   trace.add(model);

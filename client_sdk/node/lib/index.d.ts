@@ -157,7 +157,16 @@ export class Model {
   readonly name: string;
   readonly label: string;
   readonly modeCount: number;
-  /** Renders one strike, the same samples each time. `seconds` zero means until the sound has died away. */
+  /**
+   * Waits until the daemon has computed how the model radiates; before, objects sound by the paper's coupling. Returns at
+   * once if no transfer is being computed. Throws CarillonError if the computation failed, or if it has not ended after
+   * `timeout` seconds (DEADLINE_EXCEEDED).
+   */
+  waitForTransfer(options?: { timeout?: number; onProgress?: (job: Job__Output) => void }): Promise<void>;
+  /**
+   * Renders one strike. The samples are the same each time once the transfer is computed. `seconds` zero means until the
+   * sound has died away. The process warns by a TransferWarning if the transfer is still being computed.
+   */
   renderStrike(strike: Strike & {
     material?: Material; size?: number; gain?: number; seconds?: number; sampleRateHz?: number;
   }): Promise<Sound>;

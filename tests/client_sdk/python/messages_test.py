@@ -129,8 +129,8 @@ class RefusalsTest(MessagesTest):
                              (2**70, str(2**70)), (numpy.array([1.7]), "1.7"), (numpy.array([-1]), "-1"),
                              (numpy.nan, "nan"), ([1, 2**40], str(2**40))):
             points = [POINT] * numpy.size(wrong)
-            self.refused(f"an entry of objects is {shown}; it must be an object that Scene.add or Trace.add returned", made,
-                         impulses=carillon.Impulses(wrong, points, points))
+            self.refused(f"an entry of objects is {shown}; it must be an object that Scene.add or Trace.add returned",
+                         made, impulses=carillon.Impulses(wrong, points, points))
             self.refused(f"an entry of partners is {shown}; it must be a whole number from 0 to 4294967295 that names",
                          made, contacts=carillon.Contacts(1, points, points, partners=wrong))
         step = made(contacts=carillon.Contacts(numpy.array([3.0]), POINT, IMPULSE, partners=2**32 - 1))
@@ -204,6 +204,13 @@ class AioTest(unittest.TestCase):
             await asyncio.gather(*(carillon.aio.in_thread(barrier.wait, 60) for _ in range(count)))
 
         asyncio.run(together())
+
+    def test_every_call_has_its_like_in_asyncio(self):
+        aio = carillon.aio
+        for kind, plain in ((aio.AsyncClient, carillon.Client), (aio.AsyncScene, carillon.Scene),
+                            (aio.AsyncContactStream, carillon.ContactStream)):
+            names = {name for name in vars(plain) if not name.startswith("_") and name != "cancellable"}
+            self.assertEqual(names - set(dir(kind)), set(), kind.__name__)
 
     def test_all_that_asks_the_daemon_is_a_coroutine(self):
         aio = carillon.aio

@@ -15,7 +15,7 @@ from typing import Any, Optional
 import grpc
 import numpy
 
-from carillon import checks, contacts, errors, meshes, progress
+from carillon import checks, contacts, errors, meshes, progress, summaries
 from carillon.address import default_server
 from carillon.authorization import authorized
 from carillon.contacts import PoseLike, to_pose
@@ -201,7 +201,7 @@ class Client:
         sample_rate_hz, channel_count, tail_s, gain, full_scale_pa and tell_blows. `normalize` gives the sound a peak of
         0.9. A sound that peaks below -40 dB of full scale is then rendered again with a full scale a little above its
         peak, unless `full_scale_pa` is given, because tails end at -80 dB of full scale. Raises CarillonError if a
-        contact is rejected."""
+        contact is rejected, or if there is none (TRACE_EMPTY)."""
         whole = trace if isinstance(trace, Trace) else Trace.read(trace)
         sound = self._render(whole, settings)
         if not normalize:
@@ -282,9 +282,21 @@ class Client:
                         summary = answer.summary
         if summary.rejected_count:
             raise errors.from_info(summary.last_rejection)
+        summaries.refuse_without_contacts(summary)
         errors.warn_of_contacts(summary.findings, contacts.frame_in_words(trace.header.frame))
+        if summary.paper_coupling_object_count:
+            self._warn_of_transfers({item.modal_model for item in trace.objects})
         samples = numpy.frombuffer(b"".join(blocks), "<f4").reshape(-1, channels)
         return Sound(samples, rate_hz, summary=summary, blows=tuple(blows))
+
+    def _warn_of_transfers(self, models: set[str]) -> None:
+        """Warns if transfers of the models are being computed. A caller who may not list jobs gets no warning."""
+        labels = []
+        with contextlib.suppress(errors.CarillonError):
+            labels = [job.message.label or job.name for job in self.jobs(["queued", "running"])
+                      if job.is_transfer and job.message.modal_model in models]
+        if labels:
+            errors.warn_of_transfers(labels)
 
     def __enter__(self) -> Client:
         return self
@@ -326,8 +338,12 @@ class Recording:
         return Sound(heard.samples[:wanted], heard.sample_rate_hz, heard.lost_frame_count)
 
     def stop(self) -> None:
-        self._answers.cancel()
+        self.cancel()
         self._reader.join()
+
+    def cancel(self) -> None:
+        """Ends the recording and does not wait for it."""
+        self._answers.cancel()
 
     def _read(self) -> None:
         try:

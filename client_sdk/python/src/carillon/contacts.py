@@ -53,8 +53,8 @@ class Impulses:
     `objects` has the struck objects or their handles; one object stands for all rows. `points` (N x 3, metres) and
     `impulses` (N x 3, newton seconds) are in the frame of the stream, by default each object's own. `durations` are
     seconds, zero or more; NaN leaves one to the daemon, which computes it from the object and from `striker`.
-    `time_offsets` are seconds from the step's time to the strike. `second_objects` has the objects that struck, zero for none;
-    `second_rotations` (N x 4, quaternions w, x, y, z) rotate from the first object's frame into the second's.
+    `time_offsets` are seconds from the step's time to the strike. `second_objects` has the objects that struck, zero
+    for none; `second_rotations` (N x 4, quaternions w, x, y, z) rotate from the first object's frame into the second's.
     """
 
     objects: Any

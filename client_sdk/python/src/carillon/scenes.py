@@ -204,6 +204,10 @@ class TraceRecording:
         """Waits until the stream has ended. Returns its trace."""
         return Trace.of(answer.record for answer in self._answers)
 
+    def cancel(self) -> None:
+        """Ends the recording."""
+        self._answers.cancel()
+
 
 class ContactStream:
     """Sends the contacts of each step without waiting for the daemon: a thread sends them, and another reads the
