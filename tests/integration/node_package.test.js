@@ -71,6 +71,16 @@ test('a mesh of arrays is a model of the same modes as its file', async () => {
   assert.deepEqual(found, same.name === model.name ? found : [same.name]);
 });
 
+test('a mesh has the unit and the accuracy that are asked for', async () => {
+  const text = (await fs.readFile(BAR, 'utf8')).split('\n').map((line) => line.split(' '))
+    .map(([kind, ...words]) => (kind === 'v' ? ['v', ...words.map((word) => 1000 * word)] : [kind, ...words]).join(' '));
+  const file = path.join(FOLDER, 'bar_mm.obj');
+  await fs.writeFile(file, text.join('\n'));
+  const { settings, volume_m3: volume } = (await c.createModel(file, { material, unit: 'mm', accuracy: 0.05 })).summary.header;
+  assert.deepEqual([settings.metres_per_unit, settings.mesh.accuracy], [0.001, 0.05]);
+  assert.ok(Math.abs(volume / model.summary.header.volume_m3 - 1) < 1e-6);
+});
+
 test('a glTF brings the file with its data', async () => {
   const file = process.env.CARILLON_TEST_GLTF;
   assert.equal((await c.createModel(file, { material })).modeCount, model.modeCount);

@@ -194,6 +194,13 @@ class CallsTest(DaemonTest):
         numpy.testing.assert_array_equal(frequencies, self.model.frequencies())
         self.assertEqual(*peaks)
 
+    def test_a_mesh_has_the_unit_and_the_accuracy_that_are_asked_for(self):
+        vertices, triangles = BAR
+        model = self.c.create_model((1000 * numpy.array(vertices), triangles), meshes.MATERIAL, unit="mm",
+                                    accuracy=0.05)
+        self.assertAlmostEqual(model.frequencies()[0] / self.model.frequencies()[0], 1, delta=0.05)
+        self.assertEqual(model.summary.header.settings.mesh.accuracy, 0.05)
+
     def test_a_trace_without_contacts_is_refused(self):
         trace = carillon.Trace(1 / 60)
         trace.add(self.model)

@@ -31,10 +31,30 @@ function hint(name, known) {
     : `it has ${names.sort().join(', ')}`;
 }
 
-/** Throws a TypeError with the nearest known name if an object has a key that is unknown. */
-function refuseUnknown(given, known, where) {
+/** How a caller gives a field of the messages within a message, such as "settings: { poisson_ratio: ... }". */
+function places(type, name) {
+  const found = [];
+  for (const field of message(type).type.field) {
+    if (field.type === 'TYPE_MESSAGE' && field.label !== 'LABEL_REPEATED') {
+      const inner = field.typeName.split('.').at(-1);
+      const own = message(inner).type.field.some((other) => other.name === name) ? [`${name}: ...`] : [];
+      found.push(...[...own, ...places(inner, name)].map((place) => `${field.name}: { ${place} }`));
+    }
+  }
+  return found;
+}
+
+/**
+ * Throws a TypeError with the nearest known name if an object has a key that is unknown. If it is known within a message
+ * of the contract that the object stands for, of the name `type`, the error says where.
+ */
+function refuseUnknown(given, known, where, type = undefined) {
   for (const name in given) {
-    if (!known.includes(name)) throw new TypeError(`${where} has no "${name}"; ${hint(name, known)}`);
+    if (!known.includes(name)) {
+      const right = type === undefined ? [] : places(type, name);
+      const repair = right.length ? `give it as ${right.join(' or ')}` : hint(name, known);
+      throw new TypeError(`${where} has no "${name}"; ${repair}`);
+    }
   }
 }
 
@@ -61,7 +81,7 @@ function refuseNoMessage(given, type, where, more = []) {
   const { field: fields, oneofDecl: choices } = message(type).type;
   // The messages that come from the daemon also tell which field of a choice they have.
   const names = [...fields, ...choices].map((item) => item.name);
-  refuseUnknown(given, [...names, ...fields.map((field) => `_${field.name}`), ...more], where);
+  refuseUnknown(given, [...names, ...fields.map((field) => `_${field.name}`), ...more], where, type);
   for (const field of fields) {
     const value = given[field.name];
     const isAbsent = value === undefined || value === null;

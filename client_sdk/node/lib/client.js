@@ -13,6 +13,7 @@ const { toMeshFile } = require('./meshes');
 const { Model, isTransfer } = require('./models');
 const { Places, mostRenderings } = require('./places');
 const { Scene } = require('./scenes');
+const { toSettings } = require('./settings');
 const { Sound, samplesOf, samplesOfIntegers } = require('./sound');
 const { Trace } = require('./traces');
 const { warnOfContacts, warnOfTransfers } = require('./warnings');
@@ -117,12 +118,14 @@ class Client {
   }
 
   /**
-   * Returns the model of a mesh, which is computed if the daemon does not have it. `request` has other fields of
-   * CreateModalModelRequest, such as size, settings, max_frequency_hz or priority.
+   * Returns the model of a mesh, which is computed if the daemon does not have it. `unit` is that of its coordinates:
+   * 'm', 'cm', 'mm', 'in', or a number of metres. `accuracy` is the largest estimated error of a frequency, such as 0.01
+   * for 1 %. `request` has other fields of CreateModalModelRequest, such as size, settings, max_frequency_hz or priority.
    */
-  async createModel(mesh, { material, label, onProgress = () => {}, ...request } = {}) {
+  async createModel(mesh, { material, label, onProgress = () => {}, unit, accuracy, ...request } = {}) {
     const own = { ...request, material: toMaterial(material) };
-    refuseNoMessage(own, 'CreateModalModelRequest', 'createModel', ['label', 'onProgress']);
+    refuseNoMessage(own, 'CreateModalModelRequest', 'createModel', ['label', 'onProgress', 'unit', 'accuracy']);
+    Object.assign(own, given('settings', toSettings(request.settings, unit, accuracy)));
     const file = await toMeshFile(mesh);
     const { job } = await this.call('ModalModelService', 'CreateModalModel', { ...own,
       mesh_digest: await this.uploadFile(file), mesh_format: file.format, label: label ?? file.label });
@@ -206,7 +209,7 @@ class Client {
    * you made before with this id and the same settings is returned as it is, and its `existing` is true.
    */
   async createScene(settings = {}) {
-    refuseUnknown(settings, ['hearing', 'listener', 'gain', 'keep', 'id'], 'createScene');
+    refuseUnknown(settings, ['hearing', 'listener', 'gain', 'keep', 'id'], 'createScene', 'CreateSceneRequest');
     const { hearing, listener, gain, keep = false, id } = settings;
     if (hearing) refuseNoMessage(hearing, 'Hearing', 'hearing');
     const request = { ...given('hearing', hearing), ...given('listener', toPose(listener, 'listener')),

@@ -273,9 +273,13 @@ export class Client {
   status(): Promise<GetMixerResponse__Output>;
   /** Stores a mesh. Returns its digest. */
   upload(mesh: Mesh): Promise<string>;
-  /** Returns the model of a mesh, which is computed if the daemon does not have it. */
+  /**
+   * Returns the model of a mesh, which is computed if the daemon does not have it. `unit` is that of its coordinates, by
+   * name or in metres; `accuracy` the largest estimated error of a frequency, such as 0.01 for 1 %.
+   */
   createModel(mesh: Mesh, request: Omit<CreateModalModelRequest, 'material' | 'mesh_digest' | 'mesh_format'> & {
-    material: Material; onProgress?: (job: Job__Output) => void;
+    material: Material; unit?: 'm' | 'cm' | 'mm' | 'in' | number; accuracy?: number;
+    onProgress?: (job: Job__Output) => void;
   }): Promise<Model>;
   model(name: string, material?: Material): Promise<Model>;
   models(filters?: ListModalModelsRequest): AsyncGenerator<Model>;

@@ -7,6 +7,7 @@ const { test } = require('node:test');
 const { inspect } = require('node:util');
 const carillon = require('carillon');
 const { fromInfo } = require('carillon/lib/errors');
+const { toSettings } = require('carillon/lib/settings');
 const { warnOfContacts, warnOfStream } = require('carillon/lib/warnings');
 
 const POINT = [0, 0, 0];
@@ -77,6 +78,32 @@ test('a misspelt key is refused with the nearest name', async () => {
     { contacts: [{ object: 1, point: POINT, impluse: IMPULSE }] });
   refused('contacts has no "point"; did you mean "points"?', { contacts: { objects: 1, point: POINT } });
   refused('step has no "contact"; did you mean "contacts"?', { contact: [] });
+});
+
+test('a setting at the wrong level is refused with the right one', async () => {
+  for (const [wrong, right] of [['poisson_ratio', 'settings: { poisson_ratio: ... } or material: { poisson_ratio: ... }'],
+    ['budget_s', 'settings: { mesh: { budget_s: ... } } or transfer: { budget_s: ... }']]) {
+    await assert.rejects(c.createModel(mesh, { material: 'oak', [wrong]: 1 }),
+      (error) => error.message.includes(`createModel has no "${wrong}"; give it as ${right}`) || assert.fail(error.message));
+  }
+  await assert.rejects(c.createModel(mesh, { material: 'oak', accuracys: 0.1 }), /did you mean "accuracy"\?/);
+  await assert.rejects(c.createScene({ panning: true }), /"panning"; give it as hearing: \{ panning: ... \}/);
+});
+
+test('the unit and the accuracy become settings', async () => {
+  const made = toSettings({ poisson_ratio: 0.3 }, 'mm', 0.01);
+  assert.deepEqual(made, { poisson_ratio: 0.3, metres_per_unit: 0.001, mesh: { accuracy: 0.01 } });
+  assert.deepEqual(toSettings(undefined, 2), { metres_per_unit: 2 });
+  for (const [expected, wrong] of [
+    ["unit is 'km'; it must be \"m\", \"cm\", \"mm\", \"in\", or a number of metres above zero", { unit: 'km' }],
+    ['unit is 0; it must be', { unit: 0 }],
+    ['accuracy is 1; it must be a number above 0 and below 1, such as 0.01 for 1 %', { accuracy: 1 }],
+    ['unit and settings.metres_per_unit are both given; leave one of them out',
+      { unit: 'mm', settings: { metres_per_unit: 1 } }],
+  ]) {
+    await assert.rejects(c.createModel(mesh, { material: 'oak', ...wrong }),
+      (error) => error.message.includes(expected) || assert.fail(error.message));
+  }
 });
 
 test('a wrong word or kind of value is refused by its name', async () => {

@@ -14,6 +14,7 @@ from carillon.v1 import (
     audio_service_pb2, contact_pb2, contact_service_pb2, error_pb2, modal_model_service_pb2, scene_service_pb2)
 
 POINT, IMPULSE = (0, 0, 0), (0, 0, 1)
+MESH = ([(0, 0, 0)], [(0, 0, 0)])
 
 
 def warnings_of(function, *arguments):
@@ -77,20 +78,40 @@ class WarningsTest(unittest.TestCase):
 
 class RefusalsTest(MessagesTest):
     def test_a_misspelt_argument_is_refused_with_the_nearest_name(self):
-        mesh = ([(0, 0, 0)], [(0, 0, 0)])
         for function, arguments, wrong, right in (
-                (self.c.create_model, (mesh, "oak"), "max_frequency", "max_frequency_hz"),
+                (self.c.create_model, (MESH, "oak"), "max_frequency", "max_frequency_hz"),
                 (self.c.render, (carillon.Trace(),), "tail", "tail_s"),
                 (carillon.striker, ("wood",), "mass", "mass_kg"),
                 (carillon.material, ("oak",), "young", "young_pa"),
                 (carillon.connect, (), "tls_root", "tls_roots")):
             self.refused(f'has no "{wrong}"; did you mean "{right}"?', function, *arguments, **{wrong: 1})
         self.refused('models has no "colour"; it has created_before_unix_ms', next, self.c.models(colour="x"))
-        self.refused('settings has no "meters_per_unit"; did you mean "metres_per_unit"?', self.c.create_model, mesh,
+        self.refused('settings has no "meters_per_unit"; did you mean "metres_per_unit"?', self.c.create_model, MESH,
                      "oak", settings={"meters_per_unit": 1})
         scene = carillon.Scene(self.c, "scenes/1")
         self.refused('object 1 of add_all has no "gian"; did you mean "gain"?', scene.add_all,
                      ["modalModels/1", {"model": "modalModels/1", "gian": 1}])
+
+    def test_a_setting_at_the_wrong_level_is_refused_with_the_right_one(self):
+        for wrong, right in (("poisson_ratio", "settings=dict(poisson_ratio=...)"),
+                             ("budget_s", "settings=dict(mesh=dict(budget_s=...)) or transfer=dict(budget_s=...)"),
+                             ("young_pa", "material=carillon.material(young_pa=...)")):
+            self.refused(f'create_model has no "{wrong}"; give it as {right}', self.c.create_model, MESH, "oak",
+                         **{wrong: 1})
+        self.refused('create_model has no "accuracys"; did you mean "accuracy"?', self.c.create_model, MESH, "oak",
+                     accuracys=0.1)
+
+    def test_the_unit_and_the_accuracy_become_settings(self):
+        made = carillon.settings.to_settings({"poisson_ratio": 0.3}, "mm", 0.01)
+        self.assertEqual((made.poisson_ratio, made.metres_per_unit, made.mesh.accuracy), (0.3, 0.001, 0.01))
+        self.assertEqual(carillon.settings.to_settings(None, 2, None).metres_per_unit, 2)
+        for expected, wrong in (('unit is \'km\'; it must be "m", "cm", "mm", "in", or a number of metres above zero',
+                                 {"unit": "km"}), ("unit is 0; it must be", {"unit": 0}),
+                                ("accuracy is 1; it must be a number above 0 and below 1, such as 0.01 for 1 %",
+                                 {"accuracy": 1}), ("accuracy is '1%'; it must be", {"accuracy": "1%"}),
+                                ("unit and settings.metres_per_unit are both given; leave one of them out",
+                                 {"unit": "mm", "settings": {"metres_per_unit": 1}})):
+            self.refused(expected, self.c.create_model, MESH, "oak", **wrong)
 
     def test_a_wrong_word_is_refused_with_the_right_ones(self):
         for wrong, expected in (({"frame": "world"}, 'frame is \'world\'; it must be one of "object", "scene"'),

@@ -26,11 +26,11 @@ def refuse_unknown(given: Iterable[str], known: Collection[str], where: str) -> 
             raise TypeError(f'{where} has no "{name}"; {hint}')
 
 
-def message(kind: Any, where: str, given: Mapping[str, Any]) -> Any:
+def message(kind: Any, where: str, given: Mapping[str, Any], more: Collection[str] = ()) -> Any:
     """Makes a message of arguments that have the names of its fields. Raises TypeError that names the argument which
-    is unknown or of the wrong type."""
+    is unknown or of the wrong type. The caller may know `more` arguments."""
     fields = kind.DESCRIPTOR.fields_by_name
-    _refuse_unknown_fields(kind.DESCRIPTOR, where, given)
+    _refuse_unknown_fields(kind.DESCRIPTOR, where, given, more)
     try:
         return kind(**given)
     except (TypeError, ValueError) as error:
@@ -39,9 +39,25 @@ def message(kind: Any, where: str, given: Mapping[str, Any]) -> Any:
         raise
 
 
-def _refuse_unknown_fields(descriptor: Any, where: str, given: Mapping[str, Any]) -> None:
+def _places(descriptor: Any, name: str) -> list[str]:
+    """How a caller gives a field of the messages within a message, such as "settings=dict(poisson_ratio=...)"."""
+    found = []
+    for field in descriptor.fields:
+        if field.message_type is not None and field.label != field.LABEL_REPEATED:
+            call = "carillon.material" if field.message_type.name == "Material" else "dict"
+            inner = [f"{name}=..."] if name in field.message_type.fields_by_name else []
+            found += [f"{field.name}={call}({place})" for place in inner + _places(field.message_type, name)]
+    return found
+
+
+def _refuse_unknown_fields(descriptor: Any, where: str, given: Mapping[str, Any], more: Collection[str] = ()) -> None:
     """Raises TypeError for an unknown name in the arguments, or in a dictionary that stands for a message."""
-    refuse_unknown(given, descriptor.fields_by_name, where)
+    known = [*descriptor.fields_by_name, *more]
+    for name in given:
+        places = [] if name in known else _places(descriptor, name)
+        if places:
+            raise TypeError(f'{where} has no "{name}"; give it as {" or ".join(places)}')
+    refuse_unknown(given, known, where)
     for name, value in given.items():
         inner = descriptor.fields_by_name[name].message_type
         if isinstance(value, Mapping) and inner is not None and not inner.GetOptions().map_entry:

@@ -23,12 +23,13 @@ from carillon.jobs import Job, to_states
 from carillon.materials import Material, resolved, to_message
 from carillon.models import Model
 from carillon.scenes import Scene
+from carillon.settings import Settings, Unit, to_settings
 from carillon.sound import Sound
 from carillon.traces import Trace
 from carillon.v1 import (
     admin_service_pb2_grpc, audio_service_pb2, audio_service_pb2_grpc, contact_service_pb2_grpc,
-    decomposition_service_pb2, decomposition_service_pb2_grpc, hearing_pb2, material_pb2, modal_model_pb2,
-    modal_model_service_pb2, modal_model_service_pb2_grpc, scene_service_pb2, scene_service_pb2_grpc,
+    decomposition_service_pb2, decomposition_service_pb2_grpc, hearing_pb2, material_pb2, modal_model_service_pb2,
+    modal_model_service_pb2_grpc, scene_service_pb2, scene_service_pb2_grpc,
     server_service_pb2, server_service_pb2_grpc)
 
 PIECE_BYTES = 1 << 20
@@ -90,14 +91,16 @@ class Client:
         with errors.translated(self.server):
             return self.models_stub.UploadMesh(pieces).mesh_digest
 
-    def create_job(self, mesh: Any, material: Material, *, label: Optional[str] = None,
-                   settings: Optional[modal_model_pb2.DecompositionSettings] = None, **request: Any) -> Job:
-        """Asks for the model of a mesh and does not wait for it. `request` has other fields of
-        CreateModalModelRequest, such as size, max_frequency_hz, priority or coarse_first."""
+    def create_job(self, mesh: Any, material: Material, *, label: Optional[str] = None, unit: Optional[Unit] = None,
+                   accuracy: Optional[float] = None, settings: Settings = None, **request: Any) -> Job:
+        """Asks for the model of a mesh and does not wait for it. `unit` is that of its coordinates: "m", "cm", "mm",
+        "in", or a number of metres. `accuracy` is the largest estimated error of a frequency, such as 0.01 for 1 %.
+        `settings` has other fields of DecompositionSettings, and `request` those of CreateModalModelRequest, such as
+        size, max_frequency_hz, priority or coarse_first."""
         file = meshes.to_mesh_file(mesh)
         message = checks.message(modal_model_service_pb2.CreateModalModelRequest, "create_model", dict(
             mesh_format=file.format, material=to_message(material), label=file.label if label is None else label,
-            settings=settings, **request))
+            settings=to_settings(settings, unit, accuracy), **request), more=("unit", "accuracy", "progress_bar"))
         message.mesh_digest = self.upload(file)
         with errors.translated(self.server):
             return Job(self, self.models_stub.CreateModalModel(message).job, material)
