@@ -174,7 +174,8 @@ test('a trace of contacts needs the length of its steps, as a stream does', () =
 test('refusals of the daemon have the names of the caller', () => {
   for (const [said, expected] of [['step_s is 0; say', 'step is 0 s; say'],
     ['scheduling_delay_s is 20; it must be 0 to 10', 'delay is 20 s; it must be 0 to 10 s'],
-    ['glide_s is -1; it must be 0 to 10', 'glide is -1 s; it must be 0 to 10 s']]) {
+    ['glide_s is -1; it must be 0 to 10', 'glide is -1 s; it must be 0 to 10 s'],
+    ['make one with SceneService.CreateScene', 'make one with Client.createScene()']]) {
     assert.equal(fromInfo({ reason: 'INVALID', message: said }).message, `INVALID: ${expected}`);
   }
 });

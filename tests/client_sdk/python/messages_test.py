@@ -184,7 +184,8 @@ class RefusalsTest(MessagesTest):
     def test_refusals_of_the_daemon_have_the_names_of_the_caller(self):
         for said, expected in (("step_s is 0; say the simulator's step", "step is 0 s; say the simulator's step"),
                                ("scheduling_delay_s is 20; it must be 0 to 10", "delay is 20 s; it must be 0 to 10 s"),
-                               ("glide_s is -1; it must be 0 to 10", "glide is -1 s; it must be 0 to 10 s")):
+                               ("glide_s is -1; it must be 0 to 10", "glide is -1 s; it must be 0 to 10 s"),
+                               ("make one with SceneService.CreateScene", "make one with Client.scene()")):
             info = error_pb2.ErrorInfo(reason="INVALID", message=said)
             self.assertEqual(carillon.errors.from_info(info).message, expected)
 
