@@ -116,6 +116,8 @@ def three(values: Any, name: str, meaning: str) -> numpy.ndarray:
 
 def whole_numbers(values: numpy.ndarray, name: str, wanted: str) -> numpy.ndarray:
     """Converts to 32 bits. Raises ValueError that shows the first number that is not whole, negative or too large."""
+    if values.dtype.kind in "iu" and (not values.size or (values.min() >= 0 and values.max() <= MOST_OF_32_BITS)):
+        return values.astype(numpy.uint32)
     with numpy.errstate(invalid="ignore"):  # of infinite and undefined numbers, which are refused
         is_right = (values >= 0) & (values <= MOST_OF_32_BITS) & (values % 1 == 0)
     if not is_right.all():

@@ -182,15 +182,15 @@ def handles_of(objects: Any, count: int, name: str = "objects", wanted: str = OB
     else:
         items = numpy.atleast_1d(numpy.asarray(objects, dtype=object))
         handles = numpy.array([_handle_of(item, name, wanted) for item in items])
-    return checks.whole_numbers(_column(handles, count, name), name, wanted)
+    return _column(checks.whole_numbers(handles, name, wanted), count, name)
 
 
 def _handle_of(item: Any, name: str, wanted: str) -> Any:
-    if isinstance(item, numbers.Real):
-        return item
     try:
         return operator.index(item)
     except TypeError:
+        if isinstance(item, numbers.Real):
+            return item
         checks.refuse(item, f"an entry of {name}", wanted, TypeError)
 
 
