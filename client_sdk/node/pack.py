@@ -15,6 +15,7 @@ import shutil
 import subprocess
 import sys
 import tarfile
+import tempfile
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
@@ -42,7 +43,7 @@ def check(modules, package):
 
 def make_folder(modules, package):
     """Copies what package.json calls the files of the package, and generates the types."""
-    package.mkdir(parents=True)
+    package.mkdir()
     shutil.copytree(HERE / "lib", package / "lib")
     for file in (HERE / "package.json", HERE / "README.md", ROOT / "LICENSE"):
         shutil.copy(file, package)
@@ -73,8 +74,14 @@ def main():
     check(modules, folder / "carillon")
     version = json.loads((HERE / "package.json").read_text())["version"]
     try:
-        make_folder(modules, folder / "carillon")
-        archive(folder / "carillon", folder / f"carillon-{version}.tgz")
+        folder.mkdir(parents=True, exist_ok=True)
+        # What fails half-way leaves nothing, so that the command can be given again.
+        with tempfile.TemporaryDirectory(prefix=".carillon-", dir=folder) as scratch:
+            made = pathlib.Path(scratch)
+            make_folder(modules, made / "carillon")
+            archive(made / "carillon", made / "archive")
+            (made / "archive").rename(folder / f"carillon-{version}.tgz")
+            (made / "carillon").rename(folder / "carillon")
     except OSError as error:
         refuse(error)
 

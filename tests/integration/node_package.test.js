@@ -71,6 +71,16 @@ test('a mesh of arrays is a model of the same modes as its file', async () => {
   assert.deepEqual(found, same.name === model.name ? found : [same.name]);
 });
 
+test('a mesh has the unit and the accuracy that are asked for', async () => {
+  const text = (await fs.readFile(BAR, 'utf8')).split('\n').map((line) => line.split(' '))
+    .map(([kind, ...words]) => (kind === 'v' ? ['v', ...words.map((word) => 1000 * word)] : [kind, ...words]).join(' '));
+  const file = path.join(FOLDER, 'bar_mm.obj');
+  await fs.writeFile(file, text.join('\n'));
+  const { settings, volume_m3: volume } = (await c.createModel(file, { material, unit: 'mm', accuracy: 0.05 })).summary.header;
+  assert.deepEqual([settings.metres_per_unit, settings.mesh.accuracy], [0.001, 0.05]);
+  assert.ok(Math.abs(volume / model.summary.header.volume_m3 - 1) < 1e-6);
+});
+
 test('a glTF brings the file with its data', async () => {
   const file = process.env.CARILLON_TEST_GLTF;
   assert.equal((await c.createModel(file, { material })).modeCount, model.modeCount);
@@ -220,6 +230,25 @@ test('refusals have the reason of the contract', async () => {
   await gone.delete();
   await assert.rejects(gone.stream({ step: 0.01 }).close(), { reason: 'SCENE_NOT_FOUND' });
   await assert.rejects(carillon.connect(`unix:${FOLDER}/nobody`).status(), carillon.ServerUnavailable);
+});
+
+test('a stream that was closed refuses further steps', async () => withScene(async (scene) => {
+  const stream = scene.stream({ step: 0.01 });
+  await stream.close();
+  assert.throws(() => stream.step(1), (error) => error.reason === 'CONTACT_STREAM_ENDED'
+    && error.message.includes('open another one'));
+}));
+
+test('a trace without contacts is refused', async () => {
+  const trace = new carillon.Trace({ step: 1 / 60 });
+  trace.add(model);
+  trace.step(0);
+  await assert.rejects(c.render(trace), { reason: 'TRACE_EMPTY' });
+});
+
+test('more renderings than a client may have wait', async () => {
+  const sounds = await Promise.all(Array.from({ length: 16 }, () => model.renderStrike({ ...STRIKE, seconds: 0.1 })));
+  assert.equal(new Set(sounds.map((sound) => sound.peak)).size, 1);
 });
 
 test('a trace is written and read, and a damaged one is refused', async () => {

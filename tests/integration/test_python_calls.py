@@ -156,6 +156,24 @@ class CallsTest(DaemonTest):
         self.assertEqual(len(told.warnings), 1)
         self.assertEqual((stream.late_count, stream.remap_count), (1, 0))
 
+    def test_a_stream_that_was_closed_refuses_further_steps(self):
+        with self.c.scene() as scene:
+            with scene.stream(step=0.01) as closed:
+                pass
+            left = scene.stream(step=0.01)
+            with self.assertRaises(KeyError), left:
+                raise KeyError
+            for stream in closed, left:
+                with self.assertRaisesRegex(carillon.CarillonError, "CONTACT_STREAM_ENDED: .* open another one"):
+                    stream.step(1.0)
+
+    def test_a_scene_that_is_gone_hides_no_exception_of_its_block(self):
+        with self.c.scene() as scene:
+            scene.delete()
+        with self.assertRaises(KeyError), self.c.scene() as scene:
+            scene.delete()
+            raise KeyError
+
     def test_models_jobs_and_objects_of_asyncio_are_awaited(self):
         async def use():
             async with carillon.aio.connect(self.daemon.server) as c, await c.scene() as scene:
@@ -175,6 +193,56 @@ class CallsTest(DaemonTest):
         self.assertEqual((state, handles), ("succeeded", [1]))
         numpy.testing.assert_array_equal(frequencies, self.model.frequencies())
         self.assertEqual(*peaks)
+
+    def test_a_mesh_has_the_unit_and_the_accuracy_that_are_asked_for(self):
+        vertices, triangles = BAR
+        model = self.c.create_model((1000 * numpy.array(vertices), triangles), meshes.MATERIAL, unit="mm",
+                                    accuracy=0.05)
+        self.assertAlmostEqual(model.frequencies()[0] / self.model.frequencies()[0], 1, delta=0.05)
+        self.assertEqual(model.summary.header.settings.mesh.accuracy, 0.05)
+
+    def test_a_trace_without_contacts_is_refused(self):
+        trace = carillon.Trace(1 / 60)
+        trace.add(self.model)
+        trace.step(0.0)
+        with self.assertRaisesRegex(carillon.CarillonError, "TRACE_EMPTY: the trace holds no contact"):
+            self.c.render(trace)
+
+    def test_more_renderings_than_a_client_may_have_wait_in_asyncio(self):
+        async def render():
+            async with carillon.aio.connect(self.daemon.server) as c:
+                model = await c.model("bar")
+                trace = carillon.Trace()
+                trace.step(0.0, impulses=carillon.Impulses(trace.add(model), POINT, IMPULSE, durations=DURATION_S))
+                share = carillon.aio_threads.most_renderings(c.sync)
+                sounds = await asyncio.gather(
+                    *(model.render_strike(POINT, IMPULSE, duration=DURATION_S, seconds=0.1) for _ in range(8)),
+                    *(c.render(trace, tail_s=0.1) for _ in range(8)))
+                return share, {sound.peak for sound in sounds}
+
+        share, peaks = asyncio.run(render())
+        self.assertEqual((share, len(peaks)), (4, 1))
+
+    def test_streams_and_recordings_of_asyncio_are_awaited(self):
+        async def use():
+            async with carillon.aio.connect(self.daemon.server) as c, await c.scene() as scene:
+                bar = await scene.add(await c.model("bar"))
+                self.assertEqual((await scene.update(gain=0.5)).gain, 0.5)
+                async with c.recording() as record, scene.recording_contacts() as contacts:
+                    stream = scene.stream(step=1 / 240)
+                    await stream.step(0.0, impulses=carillon.Impulses(bar, POINT, IMPULSE, durations=DURATION_S))
+                    report = await stream.close()
+                    with self.assertRaisesRegex(carillon.CarillonError, "CONTACT_STREAM_ENDED"):
+                        await stream.step(1.0)
+                    heard, trace = await record.take(0.3), await contacts.take()
+                    with self.assertRaises(asyncio.TimeoutError):
+                        await asyncio.wait_for(record.take(3600), 0.1)
+                self.assertEqual((stream.waiting_step_count, stream.dropped_step_count), (0, 0))
+                return report.accepted_count, heard.peak, len(trace.steps)
+
+        accepted, peak, step_count = asyncio.run(use())
+        self.assertEqual((accepted, step_count), (1, 1))
+        self.assertGreater(peak, 1e-5)
 
     def test_no_transfer_means_no_decay_by_radiation(self):
         numpy.testing.assert_array_equal(self.model.radiation_decays(), numpy.zeros(self.model.mode_count))

@@ -31,10 +31,30 @@ function hint(name, known) {
     : `it has ${names.sort().join(', ')}`;
 }
 
-/** Throws a TypeError with the nearest known name if an object has a key that is unknown. */
-function refuseUnknown(given, known, where) {
+/** How a caller gives a field of the messages within a message, such as "settings: { poisson_ratio: ... }". */
+function places(type, name) {
+  const found = [];
+  for (const field of message(type).type.field) {
+    if (field.type === 'TYPE_MESSAGE' && field.label !== 'LABEL_REPEATED') {
+      const inner = field.typeName.split('.').at(-1);
+      const own = message(inner).type.field.some((other) => other.name === name) ? [`${name}: ...`] : [];
+      found.push(...[...own, ...places(inner, name)].map((place) => `${field.name}: { ${place} }`));
+    }
+  }
+  return found;
+}
+
+/**
+ * Throws a TypeError with the nearest known name if an object has a key that is unknown. If it is known within a message
+ * of the contract that the object stands for, of the name `type`, the error says where.
+ */
+function refuseUnknown(given, known, where, type = undefined) {
   for (const name in given) {
-    if (!known.includes(name)) throw new TypeError(`${where} has no "${name}"; ${hint(name, known)}`);
+    if (!known.includes(name)) {
+      const right = type === undefined ? [] : places(type, name);
+      const repair = right.length ? `give it as ${right.join(' or ')}` : hint(name, known);
+      throw new TypeError(`${where} has no "${name}"; ${repair}`);
+    }
   }
 }
 
@@ -48,13 +68,20 @@ function refuse(value, name, wanted) {
 }
 
 const NUMBERS = new Set(['TYPE_DOUBLE', 'TYPE_FLOAT', 'TYPE_UINT32', 'TYPE_INT32']);
+const MOST_OF_32_BITS = 2 ** 32 - 1;
+
+/** Throws a TypeError unless a value is a whole number of 32 bits, as handles and partners are. Returns it. */
+function whole(value, name, wanted) {
+  if (!Number.isInteger(value) || value < 0 || value > MOST_OF_32_BITS) refuse(value, name, wanted);
+  return value;
+}
 
 /** Throws a TypeError if an object is no message of the contract: by an unknown field, word or kind of value. */
 function refuseNoMessage(given, type, where, more = []) {
   const { field: fields, oneofDecl: choices } = message(type).type;
   // The messages that come from the daemon also tell which field of a choice they have.
   const names = [...fields, ...choices].map((item) => item.name);
-  refuseUnknown(given, [...names, ...fields.map((field) => `_${field.name}`), ...more], where);
+  refuseUnknown(given, [...names, ...fields.map((field) => `_${field.name}`), ...more], where, type);
   for (const field of fields) {
     const value = given[field.name];
     const isAbsent = value === undefined || value === null;
@@ -65,6 +92,7 @@ function refuseNoMessage(given, type, where, more = []) {
 function refuseWrongField(value, field, where) {
   const name = `${field.name} of ${where}`;
   if (NUMBERS.has(field.type) && typeof value !== 'number') refuse(value, name, 'a number');
+  if (field.type === 'TYPE_UINT32') whole(value, name, 'a whole number, zero or more');
   if (field.type === 'TYPE_STRING' && typeof value !== 'string') refuse(value, name, 'text');
   if (field.type === 'TYPE_ENUM' && typeof value === 'string') {
     const words = message(field.typeName.split('.').at(-1)).type.value.map((item) => item.name);
@@ -91,4 +119,4 @@ function tuple(values, count, name, meaning) {
   return values;
 }
 
-module.exports = { choice, counted, refuse, refuseNoMessage, refuseUnknown, tuple };
+module.exports = { choice, counted, refuse, refuseNoMessage, refuseUnknown, tuple, whole };

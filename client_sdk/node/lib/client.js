@@ -10,11 +10,13 @@ const { channelCredentials, tokenInterceptors } = require('./credentials');
 const { CarillonError, fromCall, fromInfo } = require('./errors');
 const { toMaterial } = require('./materials');
 const { toMeshFile } = require('./meshes');
-const { Model } = require('./models');
+const { Model, isTransfer } = require('./models');
+const { Places, mostRenderings } = require('./places');
 const { Scene } = require('./scenes');
+const { toSettings } = require('./settings');
 const { Sound, samplesOf, samplesOfIntegers } = require('./sound');
 const { Trace } = require('./traces');
-const { warnOfContacts } = require('./warnings');
+const { warnOfContacts, warnOfTransfers } = require('./warnings');
 
 const JOB_STATES = ['queued', 'running', 'succeeded', 'failed', 'cancelled'];
 
@@ -23,6 +25,10 @@ function jobFilter(filters) {
   refuseUnknown(filters, ['states', 'label_contains'], 'jobs');
   const { states = [], label_contains = '' } = filters;
   return { states: states.map((state) => choice(state, JOB_STATES, 'JOB_STATE_', 'an entry of states')), label_contains };
+}
+
+function stateOf(job) {
+  return job.state.replace('JOB_STATE_', '').toLowerCase();
 }
 
 const PIECE_BYTES = 1 << 20;
@@ -35,6 +41,13 @@ const PIECE_BYTES = 1 << 20;
 function connect(server, options = {}) {
   refuseUnknown(options, ['tlsRoots', 'token', 'tlsCertificate', 'tlsKey'], 'connect');
   return new Client(server ?? defaultServer(), options);
+}
+
+/** Throws CarillonError if nothing was struck in a rendering. Sustained forces are not counted, but heard. */
+function refuseWithoutContacts({ accepted_count: accepted, peak, findings }) {
+  if (accepted || peak || findings?.load_count || findings?.zero_impulse_count) return;
+  throw new CarillonError('TRACE_EMPTY', 'the trace holds no contact, so there is nothing to hear; record a simulation ' +
+    'in which something is struck');
 }
 
 /** A connection. Its process can end when it is closed. */
@@ -105,24 +118,36 @@ class Client {
   }
 
   /**
-   * Returns the model of a mesh, which is computed if the daemon does not have it. `request` has other fields of
-   * CreateModalModelRequest, such as size, settings, max_frequency_hz or priority.
+   * Returns the model of a mesh, which is computed if the daemon does not have it. `unit` is that of its coordinates:
+   * 'm', 'cm', 'mm', 'in', or a number of metres. `accuracy` is the largest estimated error of a frequency, such as 0.01
+   * for 1 %. `request` has other fields of CreateModalModelRequest, such as size, settings, max_frequency_hz or priority.
    */
-  async createModel(mesh, { material, label, onProgress = () => {}, ...request } = {}) {
+  async createModel(mesh, { material, label, onProgress = () => {}, unit, accuracy, ...request } = {}) {
     const own = { ...request, material: toMaterial(material) };
-    refuseNoMessage(own, 'CreateModalModelRequest', 'createModel', ['label', 'onProgress']);
+    refuseNoMessage(own, 'CreateModalModelRequest', 'createModel', ['label', 'onProgress', 'unit', 'accuracy']);
+    Object.assign(own, given('settings', toSettings(request.settings, unit, accuracy)));
     const file = await toMeshFile(mesh);
     const { job } = await this.call('ModalModelService', 'CreateModalModel', { ...own,
       mesh_digest: await this.uploadFile(file), mesh_format: file.format, label: label ?? file.label });
     return this.model((await this.watch(job, onProgress)).modal_model, material);
   }
 
-  /** Follows a job to its end and returns its last state. Throws CarillonError if it fails. */
-  async watch(job, onProgress = () => {}) {
+  /**
+   * Follows a job to its end and returns its last state. Throws CarillonError if it fails, or if it has not ended after
+   * `timeout` seconds (DEADLINE_EXCEEDED).
+   */
+  async watch(job, onProgress = () => {}, timeout = undefined) {
     let newest = job;
-    for await (const answer of this.answers(this.stub('DecompositionService').WatchJob({ name: job.name }))) {
-      newest = answer.job;
-      onProgress(newest);
+    const deadline = timeout === undefined ? {} : { deadline: Date.now() + 1000 * timeout };
+    try {
+      for await (const answer of this.answers(this.stub('DecompositionService').WatchJob({ name: job.name }, deadline))) {
+        newest = answer.job;
+        onProgress(newest);
+      }
+    } catch (error) {
+      if (error.reason !== 'DEADLINE_EXCEEDED') throw error;
+      throw new CarillonError(error.reason, `${newest.label || newest.name} is ${stateOf(newest)} and has not ended ` +
+        `after ${Number(timeout.toPrecision(3))} s; wait longer, or cancel the job`);
     }
     if (newest.state === 'JOB_STATE_CANCELLED') {
       throw new CarillonError('JOB_CANCELLED', `${newest.name} was cancelled; create the model again`);
@@ -184,7 +209,7 @@ class Client {
    * you made before with this id and the same settings is returned as it is, and its `existing` is true.
    */
   async createScene(settings = {}) {
-    refuseUnknown(settings, ['hearing', 'listener', 'gain', 'keep', 'id'], 'createScene');
+    refuseUnknown(settings, ['hearing', 'listener', 'gain', 'keep', 'id'], 'createScene', 'CreateSceneRequest');
     const { hearing, listener, gain, keep = false, id } = settings;
     if (hearing) refuseNoMessage(hearing, 'Hearing', 'hearing');
     const request = { ...given('hearing', hearing), ...given('listener', toPose(listener, 'listener')),
@@ -200,11 +225,21 @@ class Client {
 
   /**
    * Renders a trace, or a .contacts file, faster than real time. `settings` are fields of RenderSettings. Throws
-   * CarillonError if a contact is rejected.
+   * CarillonError if a contact is rejected, or if there is none (TRACE_EMPTY). Renderings wait for each other where the
+   * daemon would refuse so many of one client.
    */
   async render(trace, settings = {}) {
     refuseNoMessage(settings, 'RenderSettings', 'render');
     const whole = trace instanceof Trace ? trace : await Trace.read(trace);
+    this.renderings ??= mostRenderings(this).then((count) => new Places(count));
+    const places = await this.renderings.catch((error) => {
+      this.renderings = undefined; // A later rendering asks again.
+      throw error;
+    });
+    return places.use(() => this.renderTrace(whole, settings));
+  }
+
+  async renderTrace(whole, settings) {
     const stream = this.stub('AudioService').Render();
     stream.write({ settings });
     for (const record of whole.records()) stream.write({ record });
@@ -220,8 +255,23 @@ class Client {
       else summary = answer.summary;
     }
     if (summary.rejected_count) throw fromInfo(summary.last_rejection);
+    refuseWithoutContacts(summary);
     warnOfContacts(summary.findings, frameInWords(whole.header.frame));
+    if (summary.paper_coupling_object_count) await this.warnOfTransfers(whole.objects.map((object) => object.modal_model));
     return new Sound(samplesOf(pieces), format.sample_rate_hz, format.channel_count, summary, blows);
+  }
+
+  /** Warns if transfers of the models are being computed. A caller who may not list jobs gets no warning. */
+  async warnOfTransfers(models) {
+    const labels = [];
+    try {
+      for await (const job of this.jobs({ states: ['queued', 'running'] })) {
+        if (isTransfer(job) && models.includes(job.modal_model)) labels.push(job.label || job.name);
+      }
+    } catch (error) {
+      if (!(error instanceof CarillonError)) throw error;
+    }
+    if (labels.length) warnOfTransfers(labels);
   }
 
   /**

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 'use strict';
 
-const { counted, refuse, refuseNoMessage, refuseUnknown, tuple } = require('./checks');
+const { counted, refuse, refuseNoMessage, refuseUnknown, tuple, whole } = require('./checks');
 
 // What the arguments mean, for messages.
 const STREAM_FRAME = "in the stream's frame, which is each object's own unless it was opened with frame: 'scene'";
@@ -15,6 +15,11 @@ const MEANINGS = {
   orientations: `${ROTATION} from the object's frame into the scene's`,
 };
 const POSE = "[x, y, z] in metres, or { position, orientation } with a quaternion [w, x, y, z], in the scene's frame";
+// Handles and partners have 32 bits in the contract.
+const OBJECT = 'an object that scene.add or trace.add returned, or its handle, a whole number from 0 to 4294967295';
+const PARTNER = 'a whole number from 0 to 4294967295 that names the other body, such as its place in your list of ' +
+  'bodies';
+const DURATION = 'zero seconds or more, or NaN, which leaves it to the daemon';
 const STEP_KEYS = ['contacts', 'impulses', 'forces', 'poses', 'listener'];
 const FORCE_ROW_KEYS = ['object', 'point', 'force', 'roughness', 'second'];
 const IMPULSE_ROW_KEYS = ['object', 'point', 'impulse', 'duration', 'timeOffset', 'striker', 'second'];
@@ -67,10 +72,26 @@ function toStriker(striker) {
 
 function handleOf(object, name = 'object') {
   const handle = typeof object === 'number' ? object : object?.handle;
-  if (typeof handle !== 'number') {
-    refuse(object, name, 'an object that scene.add or trace.add returned, or its handle');
-  }
-  return handle;
+  if (typeof handle !== 'number') refuse(object, name, OBJECT);
+  return whole(handle, name, OBJECT);
+}
+
+/** The number that names the other body of a contact; undefined if there is none. */
+function partnerOf(partner, name) {
+  return partner === undefined || partner === null ? undefined : whole(partner, name, PARTNER);
+}
+
+/** A duration in seconds; undefined where the daemon determines it. */
+function durationOf(duration, name) {
+  if (duration === undefined || duration === null || Number.isNaN(duration)) return undefined;
+  if (typeof duration !== 'number' || duration < 0) refuse(duration, name, DURATION);
+  return duration;
+}
+
+/** The handle that a new object is to have; undefined if the caller leaves it open. */
+function toHandle(handle) {
+  return handle === undefined || handle === null ? undefined
+    : whole(handle, 'handle of add', 'a whole number from 0 to 4294967295');
 }
 
 /** Handles as a column; one object stands for all rows. */
@@ -96,9 +117,16 @@ function table(values, name, width = 3) {
   return flat;
 }
 
-/** One number a row, or one for all. */
-function numbers(values, count, name) {
-  const list = typeof values === 'number' ? new Array(count).fill(values) : Array.from(values);
+function number(value, name) {
+  if (typeof value !== 'number') refuse(value, name, 'a number');
+  return value;
+}
+
+/** One number a row, or one for all, each as `read` returns it. */
+function numbers(values, count, name, read = number) {
+  const isList = values !== null && typeof values === 'object' && 'length' in values;
+  const list = (isList ? Array.from(values) : new Array(count).fill(values))
+    .map((value) => read(value, `an entry of ${name}`));
   if (list.length !== count) throw new RangeError(`${name} has the length ${list.length}; it must have ${count}`);
   return list;
 }
@@ -115,7 +143,7 @@ function impulseColumns(columns, keys = IMPULSE_KEYS, where = 'impulses') {
   const made = { object: handles(columns.objects, count), point_m, impulse_newton_seconds };
   // A duration below zero is absent.
   if (columns.durations !== undefined) {
-    made.duration_s = numbers(columns.durations, count, 'durations').map((value) => (Number.isNaN(value) ? -1 : value));
+    made.duration_s = numbers(columns.durations, count, 'durations', (value, name) => durationOf(value, name) ?? -1);
   }
   if (columns.timeOffsets !== undefined) made.time_offset_s = numbers(columns.timeOffsets, count, 'timeOffsets');
   if (columns.secondObjects !== undefined) {
@@ -130,7 +158,9 @@ function contactColumns(columns) {
   const impulses = impulseColumns(columns, CONTACT_KEYS, 'contacts');
   const count = impulses.object.length;
   const made = { impulses };
-  if (columns.partners !== undefined) made.partner = numbers(columns.partners, count, 'partners');
+  if (columns.partners !== undefined) {
+    made.partner = numbers(columns.partners, count, 'partners', (value, name) => whole(value, name, PARTNER));
+  }
   if (columns.travelSpeeds !== undefined) {
     made.travel_speed_m_per_s = numbers(columns.travelSpeeds, count, 'travelSpeeds');
   }
@@ -157,12 +187,13 @@ function impulseRow(row, where, keys = IMPULSE_ROW_KEYS) {
   return { ...present({ object: handleOf(row.object, `object of ${where}`), time_offset_s: row.timeOffset }),
     point_m: vector(row.point, `point of ${where}`, MEANINGS.points),
     impulse_newton_seconds: vector(row.impulse, `impulse of ${where}`, MEANINGS.impulses),
-    ...given('duration_s', row.duration), ...given('hertz', toStriker(row.striker)),
+    ...given('duration_s', durationOf(row.duration, `duration of ${where}`)), ...given('hertz', toStriker(row.striker)),
     ...given('second', secondObject(row.second, where)) };
 }
 
 function contactRow(row, where) {
-  return { ...impulseRow(row, where, CONTACT_ROW_KEYS), ...present({ partner: row.partner }),
+  return { ...impulseRow(row, where, CONTACT_ROW_KEYS),
+    ...present({ partner: partnerOf(row.partner, `partner of ${where}`) }),
     ...given('roughness', toRoughness(row.roughness, where)) };
 }
 
@@ -205,11 +236,11 @@ function makeStep(time, content = {}) {
 function strikeOf(object, { point, impulse, duration, striker } = {}) {
   tuple(point, 3, 'point', "[x, y, z]: metres in the object's own frame");
   tuple(impulse, 3, 'impulse', "[x, y, z]: newton seconds in the object's own frame");
-  return [{ object, point, impulse, duration, striker }];
+  return [{ object, point, impulse, duration: durationOf(duration, 'duration'), striker }];
 }
 
 function frameInWords(frame) {
   return frame === 'FRAME_SCENE' ? "the scene's frame" : "each object's own frame";
 }
 
-module.exports = { frameInWords, given, makeStep, present, strikeOf, toPose };
+module.exports = { frameInWords, given, makeStep, present, strikeOf, toHandle, toPose };

@@ -60,7 +60,7 @@ export interface ImpulseRow extends Strike {
 
 /** One contact as an engine reports it: the impulse over the whole step, also at rest. */
 export interface ContactRow extends ImpulseRow {
-  /** Any number that names the other body. */
+  /** A whole number from 0 to 4294967295 that names the other body. */
   partner?: number;
   roughness?: Roughness;
 }
@@ -80,7 +80,7 @@ export interface ImpulseColumns {
   objects: ObjectLike | ArrayLike<ObjectLike>;
   points: Table;
   impulses: Table;
-  /** Seconds; NaN leaves one to the daemon. */
+  /** Seconds, zero or more; NaN leaves one to the daemon. */
   durations?: number | ArrayLike<number>;
   timeOffsets?: number | ArrayLike<number>;
   secondObjects?: ObjectLike | ArrayLike<ObjectLike>;
@@ -91,6 +91,7 @@ export interface ImpulseColumns {
 
 /** An engine's contacts as columns. */
 export interface ContactColumns extends ImpulseColumns {
+  /** Whole numbers from 0 to 4294967295 that name the other bodies. */
   partners?: number | ArrayLike<number>;
   travelSpeeds?: number | ArrayLike<number>;
   roughnessDepth?: number;
@@ -156,7 +157,16 @@ export class Model {
   readonly name: string;
   readonly label: string;
   readonly modeCount: number;
-  /** Renders one strike, the same samples each time. `seconds` zero means until the sound has died away. */
+  /**
+   * Waits until the daemon has computed how the model radiates; before, objects sound by the paper's coupling. Returns at
+   * once if no transfer is being computed. Throws CarillonError if the computation failed, or if it has not ended after
+   * `timeout` seconds (DEADLINE_EXCEEDED).
+   */
+  waitForTransfer(options?: { timeout?: number; onProgress?: (job: Job__Output) => void }): Promise<void>;
+  /**
+   * Renders one strike. The samples are the same each time once the transfer is computed. `seconds` zero means until the
+   * sound has died away. The process warns by a TransferWarning if the transfer is still being computed.
+   */
   renderStrike(strike: Strike & {
     material?: Material; size?: number; gain?: number; seconds?: number; sampleRateHz?: number;
   }): Promise<Sound>;
@@ -231,7 +241,10 @@ export class ContactStream {
   readonly findings?: ContactFindings__Output;
   /** Why the newest rejected contact was rejected. */
   readonly rejection?: CarillonError;
-  /** Sends a step. The promise gives the network a turn. */
+  /**
+   * Sends a step. The promise gives the network a turn. Throws CarillonError if the stream has failed, or has been
+   * closed (CONTACT_STREAM_ENDED).
+   */
   step(time: number, content?: StepContent): Promise<void>;
   /**
    * Waits until the daemon has taken all steps. Returns the last report. Unless `warn` is false, the process warns of
@@ -260,9 +273,13 @@ export class Client {
   status(): Promise<GetMixerResponse__Output>;
   /** Stores a mesh. Returns its digest. */
   upload(mesh: Mesh): Promise<string>;
-  /** Returns the model of a mesh, which is computed if the daemon does not have it. */
+  /**
+   * Returns the model of a mesh, which is computed if the daemon does not have it. `unit` is that of its coordinates, by
+   * name or in metres; `accuracy` the largest estimated error of a frequency, such as 0.01 for 1 %.
+   */
   createModel(mesh: Mesh, request: Omit<CreateModalModelRequest, 'material' | 'mesh_digest' | 'mesh_format'> & {
-    material: Material; onProgress?: (job: Job__Output) => void;
+    material: Material; unit?: 'm' | 'cm' | 'mm' | 'in' | number; accuracy?: number;
+    onProgress?: (job: Job__Output) => void;
   }): Promise<Model>;
   model(name: string, material?: Material): Promise<Model>;
   models(filters?: ListModalModelsRequest): AsyncGenerator<Model>;

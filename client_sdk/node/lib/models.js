@@ -31,8 +31,39 @@ class Model {
   }
 
   /**
-   * Renders one strike without a scene and faster than real time, the same samples each time. `seconds` zero means
-   * until the sound has died away.
+   * Waits until the daemon has computed how the model radiates, which it begins when the model is stored. Before that,
+   * objects sound by the paper's coupling, at other levels and without damping by radiation. Returns at once if no
+   * transfer of the model is being computed. Throws CarillonError if the computation failed, or if it has not ended after
+   * `timeout` seconds (DEADLINE_EXCEEDED).
+   */
+  async waitForTransfer(options = {}) {
+    refuseUnknown(options, ['timeout', 'onProgress'], 'waitForTransfer');
+    const { timeout, onProgress } = options;
+    const end = timeout === undefined ? undefined : Date.now() + 1000 * timeout;
+    for (const job of await this.transferJobs()) {
+      const rest = end === undefined ? undefined : Math.max(0, end - Date.now()) / 1000;
+      await this.client.watch(job, onProgress, rest);
+    }
+    this.summary = (await this.client.model(this.name)).summary;
+  }
+
+  /**
+   * The jobs whose end decides whether the model has a transfer: those that wait or run, or else the newest one that did
+   * not succeed, if no transfer is stored.
+   */
+  async transferJobs() {
+    const found = [];
+    for await (const job of this.client.jobs({ states: ['queued', 'running', 'failed', 'cancelled'] })) {
+      if (isTransfer(job) && job.modal_model === this.name) found.push(job);
+    }
+    const awaited = found.filter((job) => ['JOB_STATE_QUEUED', 'JOB_STATE_RUNNING'].includes(job.state));
+    if (awaited.length) return awaited;
+    return (await this.client.model(this.name)).summary.transfers.length ? [] : found.slice(0, 1);
+  }
+
+  /**
+   * Renders one strike without a scene and faster than real time. The samples are the same each time once the transfer of
+   * the model is computed (waitForTransfer). `seconds` zero means until the sound has died away.
    */
   async renderStrike(strike = {}) {
     refuseUnknown(strike, ['point', 'impulse', 'duration', 'striker', 'material', 'size', 'gain', 'seconds',
@@ -50,4 +81,9 @@ class Model {
   }
 }
 
-module.exports = { Model };
+/** Whether a job computes how a stored model radiates, and not a model. */
+function isTransfer(job) {
+  return job.kind === 'JOB_KIND_TRANSFER';
+}
+
+module.exports = { Model, isTransfer };

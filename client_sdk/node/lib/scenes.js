@@ -3,8 +3,8 @@
 
 const util = require('util');
 const { counted, refuseUnknown } = require('./checks');
-const { frameInWords, given, makeStep, present, strikeOf, toPose } = require('./contacts');
-const { fromCall, fromInfo } = require('./errors');
+const { frameInWords, given, makeStep, present, strikeOf, toHandle, toPose } = require('./contacts');
+const { CarillonError, fromCall, fromInfo } = require('./errors');
 const { named, toMaterial, toRadiation } = require('./materials');
 const { streamSettings } = require('./traces');
 const { warnOfStream } = require('./warnings');
@@ -86,8 +86,8 @@ class Scene {
   request(object, where) {
     refuseUnknown(object, ['model', ...OBJECT_KEYS, 'handle'], where);
     const { model, material, size, gain, pose, handle, radiation } = object;
-    return { scene: this.name, ...named(model, material), ...present({ size, handle }), ...given('gain', gain),
-      ...given('pose', toPose(pose)), ...present({ radiation: toRadiation(radiation) }) };
+    return { scene: this.name, ...named(model, material), ...present({ size, handle: toHandle(handle) }),
+      ...given('gain', gain), ...given('pose', toPose(pose)), ...present({ radiation: toRadiation(radiation) }) };
   }
 
   /** Adds an object, ready to be struck. Without a material it gets the one that the model was asked for with. */
@@ -211,10 +211,15 @@ class ContactStream {
   }
 
   /**
-   * Sends a step at a simulation time, seconds. Throws CarillonError if the stream has failed. The promise gives the
-   * network a turn: a loop that never awaits anything sends nothing before it ends.
+   * Sends a step at a simulation time, seconds. Throws CarillonError if the stream has failed, or has been closed
+   * (CONTACT_STREAM_ENDED). The promise gives the network a turn: a loop that never awaits anything sends nothing before
+   * it ends.
    */
   step(time, content) {
+    if (this.isClosing) {
+      throw new CarillonError('CONTACT_STREAM_ENDED', 'this stream has been closed, so that the step would not ' +
+        'sound; open another one by scene.stream');
+    }
     if (this.error) throw this.error;
     if (this.waiting.length >= MOST_WAITING) {
       this.waiting.shift();

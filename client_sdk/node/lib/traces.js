@@ -4,7 +4,7 @@
 const fs = require('fs/promises');
 const util = require('util');
 const { choice, counted, refuseNoMessage, refuseUnknown } = require('./checks');
-const { given, makeStep, present, toPose } = require('./contacts');
+const { given, makeStep, present, toHandle, toPose } = require('./contacts');
 const { message } = require('./contract');
 const { CarillonError } = require('./errors');
 const { named, toRadiation } = require('./materials');
@@ -37,7 +37,7 @@ class Trace {
   add(model, settings = {}) {
     refuseUnknown(settings, ['material', 'size', 'gain', 'pose', 'label', 'handle', 'radiation'], 'add');
     const { material, size = 1, gain = 1, pose, label, handle, radiation } = settings;
-    const own = handle ?? 1 + this.objects.reduce((most, object) => Math.max(most, object.handle), 0);
+    const own = toHandle(handle) || 1 + this.objects.reduce((most, object) => Math.max(most, object.handle), 0);
     this.objects.push({ handle: own, ...named(model, material), size, gain, ...present({ label }),
       ...given('pose', toPose(pose)), ...present({ radiation: toRadiation(radiation) }) });
     return own;

@@ -7,8 +7,15 @@ function were(count, noun) {
   return `${counted(count, noun)} ${Number(count) === 1 ? 'was' : 'were'}`;
 }
 
-function warn(text) {
-  process.emitWarning(text, 'ContactWarning');
+function warn(text, name = 'ContactWarning') {
+  process.emitWarning(text, name);
+}
+
+/** Warns of the jobs with these labels, whose transfers a rendering would have used. */
+function warnOfTransfers(labels) {
+  warn(`${labels.join(', ')} ${labels.length === 1 ? 'is' : 'are'} still being computed, so that the sound is by the ` +
+    "paper's coupling, and the same rendering will sound different later; await waitForTransfer() of the model first",
+  'TransferWarning');
 }
 
 /** Warns of contacts that are probably a mistake of the caller. `frame` is that of their points. */
@@ -47,4 +54,4 @@ function warnOfStream(report, frame, droppedStepCount) {
   warnOfContacts(report.findings, frame);
 }
 
-module.exports = { warnOfContacts, warnOfStream };
+module.exports = { warnOfContacts, warnOfStream, warnOfTransfers };

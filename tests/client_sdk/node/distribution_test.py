@@ -6,6 +6,7 @@ import json
 import os
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
 import tarfile
@@ -68,6 +69,20 @@ class DistributionTest(unittest.TestCase):
             self.assertEqual(code, 1)
             self.assertIn(expected, said)
             self.assertNotIn("Traceback", said)
+
+    def test_a_package_that_fails_half_way_leaves_nothing(self):
+        tree, folder = self.folder / "tree", self.folder / "half"
+        (tree / "client_sdk").mkdir(parents=True)
+        shutil.copytree(ROOT / "proto", tree / "proto")
+        shutil.copytree(ROOT / "client_sdk/node", tree / "client_sdk/node",
+                        ignore=shutil.ignore_patterns("node_modules"))
+        command = [sys.executable, tree / "client_sdk/node/pack.py", MODULES, folder]
+        code, said = run(*command)  # without the licence
+        self.assertEqual((code, list(folder.iterdir())), (1, []), said)
+        shutil.copy(ROOT / "LICENSE", tree)
+        code, said = run(*command)
+        self.assertEqual(code, 0, said)
+        self.assertEqual(sorted(item.name for item in folder.iterdir()), ["carillon", f"carillon-{VERSION}.tgz"])
 
     def test_npm_packs_the_package_and_refuses_its_source(self):
         code, said = run("npm", "pack", "--dry-run", cwd=ROOT / "client_sdk/node")

@@ -7,6 +7,7 @@ const { test } = require('node:test');
 const { inspect } = require('node:util');
 const carillon = require('carillon');
 const { fromInfo } = require('carillon/lib/errors');
+const { toSettings } = require('carillon/lib/settings');
 const { warnOfContacts, warnOfStream } = require('carillon/lib/warnings');
 
 const POINT = [0, 0, 0];
@@ -79,6 +80,32 @@ test('a misspelt key is refused with the nearest name', async () => {
   refused('step has no "contact"; did you mean "contacts"?', { contact: [] });
 });
 
+test('a setting at the wrong level is refused with the right one', async () => {
+  for (const [wrong, right] of [['poisson_ratio', 'settings: { poisson_ratio: ... } or material: { poisson_ratio: ... }'],
+    ['budget_s', 'settings: { mesh: { budget_s: ... } } or transfer: { budget_s: ... }']]) {
+    await assert.rejects(c.createModel(mesh, { material: 'oak', [wrong]: 1 }),
+      (error) => error.message.includes(`createModel has no "${wrong}"; give it as ${right}`) || assert.fail(error.message));
+  }
+  await assert.rejects(c.createModel(mesh, { material: 'oak', accuracys: 0.1 }), /did you mean "accuracy"\?/);
+  await assert.rejects(c.createScene({ panning: true }), /"panning"; give it as hearing: \{ panning: ... \}/);
+});
+
+test('the unit and the accuracy become settings', async () => {
+  const made = toSettings({ poisson_ratio: 0.3 }, 'mm', 0.01);
+  assert.deepEqual(made, { poisson_ratio: 0.3, metres_per_unit: 0.001, mesh: { accuracy: 0.01 } });
+  assert.deepEqual(toSettings(undefined, 2), { metres_per_unit: 2 });
+  for (const [expected, wrong] of [
+    ["unit is 'km'; it must be \"m\", \"cm\", \"mm\", \"in\", or a number of metres above zero", { unit: 'km' }],
+    ['unit is 0; it must be', { unit: 0 }],
+    ['accuracy is 1; it must be a number above 0 and below 1, such as 0.01 for 1 %', { accuracy: 1 }],
+    ['unit and settings.metres_per_unit are both given; leave one of them out',
+      { unit: 'mm', settings: { metres_per_unit: 1 } }],
+  ]) {
+    await assert.rejects(c.createModel(mesh, { material: 'oak', ...wrong }),
+      (error) => error.message.includes(expected) || assert.fail(error.message));
+  }
+});
+
 test('a wrong word or kind of value is refused by its name', async () => {
   assert.throws(() => new carillon.Trace({ frame: 'world' }), /frame is 'world'; it must be one of "object", "scene"/);
   assert.throws(() => new carillon.Trace({ pulseShape: 'box' }), /"raised_cosine", "gaussian"/);
@@ -106,6 +133,37 @@ test('contacts are refused by their names, with unit and frame', async () => {
     /point is \[ 0, 0 \]; it must be \[x, y, z\]: metres in the object's own frame/);
 });
 
+test('handles and partners that are no whole numbers of 32 bits are refused', () => {
+  for (const wrong of ['floor', '5', 1.7, -1, 1 + 2 ** 32, NaN]) {
+    const shown = inspect(wrong);
+    const row = { object: 1, point: POINT, impulse: IMPULSE };
+    const object = 'it must be an object that scene.add or trace.add returned, or its handle, a whole number';
+    const partner = 'it must be a whole number from 0 to 4294967295 that names the other body';
+    refused(`object of impulses[0] is ${shown}; ${object}`, { impulses: [{ ...row, object: wrong }] });
+    refused(`partner of contacts[0] is ${shown}; ${partner}`, { contacts: [{ ...row, partner: wrong }] });
+    const columns = { objects: 1, points: POINT, impulses: IMPULSE };
+    refused(`an entry of objects is ${shown}; ${object}`, { impulses: { ...columns, objects: [wrong] } });
+    for (const partners of [wrong, [wrong]]) {
+      refused(`an entry of partners is ${shown}; ${partner}`, { contacts: { ...columns, partners } });
+    }
+    assert.throws(() => new carillon.Trace().add('modalModels/1', { handle: wrong }), /handle of add is .* whole number/);
+  }
+});
+
+test('a negative duration is refused, and an undefined one is left to the daemon', async () => {
+  const wanted = 'it must be zero seconds or more, or NaN, which leaves it to the daemon';
+  const columns = { objects: 1, points: POINT, impulses: IMPULSE };
+  refused(`an entry of durations is -5; ${wanted}`, { impulses: { ...columns, durations: -5 } });
+  refused(`duration of impulses[0] is -5; ${wanted}`, { impulses: [{ object: 1, point: POINT, impulse: IMPULSE,
+    duration: -5 }] });
+  await assert.rejects(bell.strike({ point: POINT, impulse: IMPULSE, duration: -5 }), /duration is -5; it must be zero/);
+  const trace = new carillon.Trace();
+  trace.step(0, { impulses: { ...columns, durations: NaN } });
+  trace.step(0, { impulses: [{ object: 1, point: POINT, impulse: IMPULSE, duration: NaN }] });
+  assert.deepEqual(trace.steps[0].columns.duration_s, [-1]);
+  assert.equal('duration_s' in trace.steps[1].impulses[0], false);
+});
+
 test('a trace of contacts needs the length of its steps, as a stream does', () => {
   const contacts = [{ object: 1, point: POINT, impulse: IMPULSE }];
   assert.throws(() => new carillon.Trace().step(0, { contacts }), /new Trace\(\{ step: 1 \/ 240 \}\)/);
@@ -116,7 +174,8 @@ test('a trace of contacts needs the length of its steps, as a stream does', () =
 test('refusals of the daemon have the names of the caller', () => {
   for (const [said, expected] of [['step_s is 0; say', 'step is 0 s; say'],
     ['scheduling_delay_s is 20; it must be 0 to 10', 'delay is 20 s; it must be 0 to 10 s'],
-    ['glide_s is -1; it must be 0 to 10', 'glide is -1 s; it must be 0 to 10 s']]) {
+    ['glide_s is -1; it must be 0 to 10', 'glide is -1 s; it must be 0 to 10 s'],
+    ['make one with SceneService.CreateScene', 'make one with Client.createScene()']]) {
     assert.equal(fromInfo({ reason: 'INVALID', message: said }).message, `INVALID: ${expected}`);
   }
 });

@@ -10,9 +10,10 @@ async function main(): Promise<void> {
   const transfers: boolean = features.includes('transfers');
   const mesh = { vertices: new Float64Array(12), triangles: [[0, 1, 2], [0, 2, 3]] };
   const model = await c.createModel(mesh, {
-    material: { preset: 'steel', alpha1_s: 1e-7 }, size: 2, settings: { metres_per_unit: 0.001 },
+    material: { preset: 'steel', alpha1_s: 1e-7 }, size: 2, settings: { poisson_ratio: 0.3 }, unit: 'mm', accuracy: 0.01,
     onProgress: (job) => console.log(job.state, job.progress?.fraction),
   });
+  await model.waitForTransfer({ timeout: 60, onProgress: (job) => console.log(job.label) });
   const scene = await c.createScene({ hearing: { panning: true }, listener: [0, 0, 1] });
   const bell = await scene.add(model, { pose: { position: [0, 0, 0], orientation: [1, 0, 0, 0] }, handle: 3 });
   const shared = await c.createScene({ id: 'lathe-1' });

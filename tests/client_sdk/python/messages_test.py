@@ -14,6 +14,7 @@ from carillon.v1 import (
     audio_service_pb2, contact_pb2, contact_service_pb2, error_pb2, modal_model_service_pb2, scene_service_pb2)
 
 POINT, IMPULSE = (0, 0, 0), (0, 0, 1)
+MESH = ([(0, 0, 0)], [(0, 0, 0)])
 
 
 def warnings_of(function, *arguments):
@@ -77,20 +78,40 @@ class WarningsTest(unittest.TestCase):
 
 class RefusalsTest(MessagesTest):
     def test_a_misspelt_argument_is_refused_with_the_nearest_name(self):
-        mesh = ([(0, 0, 0)], [(0, 0, 0)])
         for function, arguments, wrong, right in (
-                (self.c.create_model, (mesh, "oak"), "max_frequency", "max_frequency_hz"),
+                (self.c.create_model, (MESH, "oak"), "max_frequency", "max_frequency_hz"),
                 (self.c.render, (carillon.Trace(),), "tail", "tail_s"),
                 (carillon.striker, ("wood",), "mass", "mass_kg"),
                 (carillon.material, ("oak",), "young", "young_pa"),
                 (carillon.connect, (), "tls_root", "tls_roots")):
             self.refused(f'has no "{wrong}"; did you mean "{right}"?', function, *arguments, **{wrong: 1})
         self.refused('models has no "colour"; it has created_before_unix_ms', next, self.c.models(colour="x"))
-        self.refused('settings has no "meters_per_unit"; did you mean "metres_per_unit"?', self.c.create_model, mesh,
+        self.refused('settings has no "meters_per_unit"; did you mean "metres_per_unit"?', self.c.create_model, MESH,
                      "oak", settings={"meters_per_unit": 1})
         scene = carillon.Scene(self.c, "scenes/1")
         self.refused('object 1 of add_all has no "gian"; did you mean "gain"?', scene.add_all,
                      ["modalModels/1", {"model": "modalModels/1", "gian": 1}])
+
+    def test_a_setting_at_the_wrong_level_is_refused_with_the_right_one(self):
+        for wrong, right in (("poisson_ratio", "settings=dict(poisson_ratio=...)"),
+                             ("budget_s", "settings=dict(mesh=dict(budget_s=...)) or transfer=dict(budget_s=...)"),
+                             ("young_pa", "material=carillon.material(young_pa=...)")):
+            self.refused(f'create_model has no "{wrong}"; give it as {right}', self.c.create_model, MESH, "oak",
+                         **{wrong: 1})
+        self.refused('create_model has no "accuracys"; did you mean "accuracy"?', self.c.create_model, MESH, "oak",
+                     accuracys=0.1)
+
+    def test_the_unit_and_the_accuracy_become_settings(self):
+        made = carillon.settings.to_settings({"poisson_ratio": 0.3}, "mm", 0.01)
+        self.assertEqual((made.poisson_ratio, made.metres_per_unit, made.mesh.accuracy), (0.3, 0.001, 0.01))
+        self.assertEqual(carillon.settings.to_settings(None, 2, None).metres_per_unit, 2)
+        for expected, wrong in (('unit is \'km\'; it must be "m", "cm", "mm", "in", or a number of metres above zero',
+                                 {"unit": "km"}), ("unit is 0; it must be", {"unit": 0}),
+                                ("accuracy is 1; it must be a number above 0 and below 1, such as 0.01 for 1 %",
+                                 {"accuracy": 1}), ("accuracy is '1%'; it must be", {"accuracy": "1%"}),
+                                ("unit and settings.metres_per_unit are both given; leave one of them out",
+                                 {"unit": "mm", "settings": {"metres_per_unit": 1}})):
+            self.refused(expected, self.c.create_model, MESH, "oak", **wrong)
 
     def test_a_wrong_word_is_refused_with_the_right_ones(self):
         for wrong, expected in (({"frame": "world"}, 'frame is \'world\'; it must be one of "object", "scene"'),
@@ -117,11 +138,34 @@ class RefusalsTest(MessagesTest):
                 ("partners has the shape (3,)", contacts(1, [POINT] * 2, [IMPULSE] * 2, partners=[1, 2, 3])),
                 ("second_points has 1 row; it must have 2", contacts(1, [POINT] * 2, [IMPULSE] * 2, second_objects=2,
                                                                      second_points=POINT)),
-                ("objects has an entry of type NoneType; give the objects", contacts(None, POINT, IMPULSE)),
+                ("an entry of objects is None; it must be an object that Scene.add or Trace.add returned, or its "
+                 "handle, a whole number", contacts(None, POINT, IMPULSE)),
                 ("contacts is of type list; it must be a carillon.Contacts", [POINT])):
             self.refused(expected, made, contacts=given)
         self.refused("orientations has the shape (3,)", made, poses=carillon.Poses(1, POINT, (0, 0, 1)))
         self.refused("listener is (1, 2); it must be a position x, y, z in metres", made, listener=(1, 2))
+
+    def test_handles_and_partners_that_are_no_whole_numbers_of_32_bits_are_refused(self):
+        for wrong, shown in ((1.7, "1.7"), (-1, "-1"), ("bar", "'bar'"), ("5", "'5'"), (1 + 2**32, "4294967297"),
+                             (2**70, str(2**70)), (numpy.array([1.7]), "1.7"), (numpy.array([-1]), "-1"),
+                             (numpy.nan, "nan"), ([1, 2**40], str(2**40))):
+            points = [POINT] * numpy.size(wrong)
+            self.refused(f"an entry of objects is {shown}; it must be an object that Scene.add or Trace.add returned",
+                         made, impulses=carillon.Impulses(wrong, points, points))
+            self.refused(f"an entry of partners is {shown}; it must be a whole number from 0 to 4294967295 that names",
+                         made, contacts=carillon.Contacts(1, points, points, partners=wrong))
+        step = made(contacts=carillon.Contacts(numpy.array([3.0]), POINT, IMPULSE, partners=2**32 - 1))
+        self.assertEqual(list(step.contact_columns.impulses.object), [3])
+        self.assertEqual(list(step.contact_columns.partner), [2**32 - 1])
+        self.refused("handle of add is -1; it must be a whole number", carillon.Trace().add, "modalModels/1", handle=-1)
+
+    def test_a_negative_duration_is_refused_and_an_undefined_one_is_left_to_the_daemon(self):
+        self.refused("an entry of durations is -5.0; it must be zero seconds or more, or NaN, which leaves it to the "
+                     "daemon", made, impulses=carillon.Impulses(1, POINT, IMPULSE, durations=[-5]))
+        bell = carillon.SoundingObject(carillon.Scene(self.c, "scenes/1"), scene_service_pb2.SoundingObject(handle=1))
+        self.refused("duration is -5; it must be zero seconds or more", bell.strike, POINT, IMPULSE, -5)
+        step = made(impulses=carillon.Impulses(1, [POINT] * 2, [IMPULSE] * 2, durations=[numpy.nan, 0]))
+        self.assertEqual(list(step.columns.duration_s), [-1, 0])
 
     def test_a_strike_is_refused_by_its_own_names(self):
         scene = carillon.Scene(self.c, "scenes/1")
@@ -140,7 +184,8 @@ class RefusalsTest(MessagesTest):
     def test_refusals_of_the_daemon_have_the_names_of_the_caller(self):
         for said, expected in (("step_s is 0; say the simulator's step", "step is 0 s; say the simulator's step"),
                                ("scheduling_delay_s is 20; it must be 0 to 10", "delay is 20 s; it must be 0 to 10 s"),
-                               ("glide_s is -1; it must be 0 to 10", "glide is -1 s; it must be 0 to 10 s")):
+                               ("glide_s is -1; it must be 0 to 10", "glide is -1 s; it must be 0 to 10 s"),
+                               ("make one with SceneService.CreateScene", "make one with Client.scene()")):
             info = error_pb2.ErrorInfo(reason="INVALID", message=said)
             self.assertEqual(carillon.errors.from_info(info).message, expected)
 
@@ -181,6 +226,13 @@ class AioTest(unittest.TestCase):
             await asyncio.gather(*(carillon.aio.in_thread(barrier.wait, 60) for _ in range(count)))
 
         asyncio.run(together())
+
+    def test_every_call_has_its_like_in_asyncio(self):
+        aio = carillon.aio
+        for kind, plain in ((aio.AsyncClient, carillon.Client), (aio.AsyncScene, carillon.Scene),
+                            (aio.AsyncContactStream, carillon.ContactStream)):
+            names = {name for name in vars(plain) if not name.startswith("_") and name != "cancellable"}
+            self.assertEqual(names - set(dir(kind)), set(), kind.__name__)
 
     def test_all_that_asks_the_daemon_is_a_coroutine(self):
         aio = carillon.aio

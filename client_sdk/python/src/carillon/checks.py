@@ -9,6 +9,8 @@ from typing import Any, NoReturn, Optional
 
 import numpy
 
+MOST_OF_32_BITS = 2**32 - 1
+
 
 def counted(count: int, noun: str) -> str:
     """Returns a number with its noun: "1 contact", "2 contacts"."""
@@ -24,11 +26,11 @@ def refuse_unknown(given: Iterable[str], known: Collection[str], where: str) -> 
             raise TypeError(f'{where} has no "{name}"; {hint}')
 
 
-def message(kind: Any, where: str, given: Mapping[str, Any]) -> Any:
+def message(kind: Any, where: str, given: Mapping[str, Any], more: Collection[str] = ()) -> Any:
     """Makes a message of arguments that have the names of its fields. Raises TypeError that names the argument which
-    is unknown or of the wrong type."""
+    is unknown or of the wrong type. The caller may know `more` arguments."""
     fields = kind.DESCRIPTOR.fields_by_name
-    _refuse_unknown_fields(kind.DESCRIPTOR, where, given)
+    _refuse_unknown_fields(kind.DESCRIPTOR, where, given, more)
     try:
         return kind(**given)
     except (TypeError, ValueError) as error:
@@ -37,9 +39,25 @@ def message(kind: Any, where: str, given: Mapping[str, Any]) -> Any:
         raise
 
 
-def _refuse_unknown_fields(descriptor: Any, where: str, given: Mapping[str, Any]) -> None:
+def _places(descriptor: Any, name: str) -> list[str]:
+    """How a caller gives a field of the messages within a message, such as "settings=dict(poisson_ratio=...)"."""
+    found = []
+    for field in descriptor.fields:
+        if field.message_type is not None and field.label != field.LABEL_REPEATED:
+            call = "carillon.material" if field.message_type.name == "Material" else "dict"
+            inner = [f"{name}=..."] if name in field.message_type.fields_by_name else []
+            found += [f"{field.name}={call}({place})" for place in inner + _places(field.message_type, name)]
+    return found
+
+
+def _refuse_unknown_fields(descriptor: Any, where: str, given: Mapping[str, Any], more: Collection[str] = ()) -> None:
     """Raises TypeError for an unknown name in the arguments, or in a dictionary that stands for a message."""
-    refuse_unknown(given, descriptor.fields_by_name, where)
+    known = [*descriptor.fields_by_name, *more]
+    for name in given:
+        places = [] if name in known else _places(descriptor, name)
+        if places:
+            raise TypeError(f'{where} has no "{name}"; give it as {" or ".join(places)}')
+    refuse_unknown(given, known, where)
     for name, value in given.items():
         inner = descriptor.fields_by_name[name].message_type
         if isinstance(value, Mapping) and inner is not None and not inner.GetOptions().map_entry:
@@ -96,7 +114,18 @@ def three(values: Any, name: str, meaning: str) -> numpy.ndarray:
     return array.reshape(3)
 
 
-def refuse(given: Any, name: str, wanted: str) -> NoReturn:
-    """Raises ValueError that shows the value, cut if it is long."""
+def whole_numbers(values: numpy.ndarray, name: str, wanted: str) -> numpy.ndarray:
+    """Converts to 32 bits. Raises ValueError that shows the first number that is not whole, negative or too large."""
+    if values.dtype.kind in "iu" and (not values.size or (values.min() >= 0 and values.max() <= MOST_OF_32_BITS)):
+        return values.astype(numpy.uint32)
+    with numpy.errstate(invalid="ignore"):  # of infinite and undefined numbers, which are refused
+        is_right = (values >= 0) & (values <= MOST_OF_32_BITS) & (values % 1 == 0)
+    if not is_right.all():
+        refuse(values[~is_right].tolist()[0], f"an entry of {name}", wanted)
+    return values.astype(numpy.uint32)
+
+
+def refuse(given: Any, name: str, wanted: str, kind: type[Exception] = ValueError) -> NoReturn:
+    """Raises an error that shows the value, cut if it is long."""
     shown = " ".join(repr(given).split())
-    raise ValueError(f"{name} is {shown if len(shown) <= 80 else shown[:77] + '...'}; it must be {wanted}")
+    raise kind(f"{name} is {shown if len(shown) <= 80 else shown[:77] + '...'}; it must be {wanted}")

@@ -15,7 +15,7 @@ from typing import Any, Optional
 import grpc
 import numpy
 
-from carillon import checks, contacts, errors, meshes, progress
+from carillon import checks, contacts, errors, meshes, progress, summaries
 from carillon.address import default_server
 from carillon.authorization import authorized
 from carillon.contacts import PoseLike, to_pose
@@ -23,12 +23,13 @@ from carillon.jobs import Job, to_states
 from carillon.materials import Material, resolved, to_message
 from carillon.models import Model
 from carillon.scenes import Scene
+from carillon.settings import Settings, Unit, to_settings
 from carillon.sound import Sound
 from carillon.traces import Trace
 from carillon.v1 import (
     admin_service_pb2_grpc, audio_service_pb2, audio_service_pb2_grpc, contact_service_pb2_grpc,
-    decomposition_service_pb2, decomposition_service_pb2_grpc, hearing_pb2, material_pb2, modal_model_pb2,
-    modal_model_service_pb2, modal_model_service_pb2_grpc, scene_service_pb2, scene_service_pb2_grpc,
+    decomposition_service_pb2, decomposition_service_pb2_grpc, hearing_pb2, material_pb2, modal_model_service_pb2,
+    modal_model_service_pb2_grpc, scene_service_pb2, scene_service_pb2_grpc,
     server_service_pb2, server_service_pb2_grpc)
 
 PIECE_BYTES = 1 << 20
@@ -90,14 +91,16 @@ class Client:
         with errors.translated(self.server):
             return self.models_stub.UploadMesh(pieces).mesh_digest
 
-    def create_job(self, mesh: Any, material: Material, *, label: Optional[str] = None,
-                   settings: Optional[modal_model_pb2.DecompositionSettings] = None, **request: Any) -> Job:
-        """Asks for the model of a mesh and does not wait for it. `request` has other fields of
-        CreateModalModelRequest, such as size, max_frequency_hz, priority or coarse_first."""
+    def create_job(self, mesh: Any, material: Material, *, label: Optional[str] = None, unit: Optional[Unit] = None,
+                   accuracy: Optional[float] = None, settings: Settings = None, **request: Any) -> Job:
+        """Asks for the model of a mesh and does not wait for it. `unit` is that of its coordinates: "m", "cm", "mm",
+        "in", or a number of metres. `accuracy` is the largest estimated error of a frequency, such as 0.01 for 1 %.
+        `settings` has other fields of DecompositionSettings, and `request` those of CreateModalModelRequest, such as
+        size, max_frequency_hz, priority or coarse_first."""
         file = meshes.to_mesh_file(mesh)
         message = checks.message(modal_model_service_pb2.CreateModalModelRequest, "create_model", dict(
             mesh_format=file.format, material=to_message(material), label=file.label if label is None else label,
-            settings=settings, **request))
+            settings=to_settings(settings, unit, accuracy), **request), more=("unit", "accuracy", "progress_bar"))
         message.mesh_digest = self.upload(file)
         with errors.translated(self.server):
             return Job(self, self.models_stub.CreateModalModel(message).job, material)
@@ -201,7 +204,7 @@ class Client:
         sample_rate_hz, channel_count, tail_s, gain, full_scale_pa and tell_blows. `normalize` gives the sound a peak of
         0.9. A sound that peaks below -40 dB of full scale is then rendered again with a full scale a little above its
         peak, unless `full_scale_pa` is given, because tails end at -80 dB of full scale. Raises CarillonError if a
-        contact is rejected."""
+        contact is rejected, or if there is none (TRACE_EMPTY)."""
         whole = trace if isinstance(trace, Trace) else Trace.read(trace)
         sound = self._render(whole, settings)
         if not normalize:
@@ -282,9 +285,21 @@ class Client:
                         summary = answer.summary
         if summary.rejected_count:
             raise errors.from_info(summary.last_rejection)
+        summaries.refuse_without_contacts(summary)
         errors.warn_of_contacts(summary.findings, contacts.frame_in_words(trace.header.frame))
+        if summary.paper_coupling_object_count:
+            self._warn_of_transfers({item.modal_model for item in trace.objects})
         samples = numpy.frombuffer(b"".join(blocks), "<f4").reshape(-1, channels)
         return Sound(samples, rate_hz, summary=summary, blows=tuple(blows))
+
+    def _warn_of_transfers(self, models: set[str]) -> None:
+        """Warns if transfers of the models are being computed. A caller who may not list jobs gets no warning."""
+        labels = []
+        with contextlib.suppress(errors.CarillonError):
+            labels = [job.message.label or job.name for job in self.jobs(["queued", "running"])
+                      if job.is_transfer and job.message.modal_model in models]
+        if labels:
+            errors.warn_of_transfers(labels)
 
     def __enter__(self) -> Client:
         return self
@@ -326,8 +341,12 @@ class Recording:
         return Sound(heard.samples[:wanted], heard.sample_rate_hz, heard.lost_frame_count)
 
     def stop(self) -> None:
-        self._answers.cancel()
+        self.cancel()
         self._reader.join()
+
+    def cancel(self) -> None:
+        """Ends the recording and does not wait for it."""
+        self._answers.cancel()
 
     def _read(self) -> None:
         try:

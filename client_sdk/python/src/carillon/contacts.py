@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import dataclasses
+import numbers
+import operator
 from typing import Any, Literal, Optional, Union
 
 import numpy
@@ -35,6 +37,12 @@ MEANINGS = {
 OBJECT_POINT, OBJECT_IMPULSE = "metres in the object's own frame", "newton seconds in the object's own frame"
 POSE = ("a position x, y, z in metres, a pair (position, quaternion w, x, y, z), or a 4 x 4 matrix, all in the scene's "
         "frame")
+# Handles and partners have 32 bits in the contract.
+OBJECT = ("an object that Scene.add or Trace.add returned, or its handle, a whole number from 0 to "
+          f"{checks.MOST_OF_32_BITS}")
+PARTNER = (f"a whole number from 0 to {checks.MOST_OF_32_BITS} that names the other body, such as its place in your "
+           "list of bodies")
+DURATION = "zero seconds or more, or NaN, which leaves it to the daemon"
 STRIKER_FIGURES = ("mass_kg", "radius_m", "young_pa", "poisson_ratio")
 
 
@@ -44,9 +52,9 @@ class Impulses:
 
     `objects` has the struck objects or their handles; one object stands for all rows. `points` (N x 3, metres) and
     `impulses` (N x 3, newton seconds) are in the frame of the stream, by default each object's own. `durations` are
-    seconds; NaN leaves one to the daemon, which computes it from the object and from `striker`. `time_offsets` are
-    seconds from the step's time to the strike. `second_objects` has the objects that struck, zero for none;
-    `second_rotations` (N x 4, quaternions w, x, y, z) rotate from the first object's frame into the second's.
+    seconds, zero or more; NaN leaves one to the daemon, which computes it from the object and from `striker`.
+    `time_offsets` are seconds from the step's time to the strike. `second_objects` has the objects that struck, zero
+    for none; `second_rotations` (N x 4, quaternions w, x, y, z) rotate from the first object's frame into the second's.
     """
 
     objects: Any
@@ -63,9 +71,9 @@ class Impulses:
 @dataclasses.dataclass
 class Contacts(Impulses):
     """Contacts as an engine reports them, all of one step: `impulses` are over the whole step, also at rest. The
-    daemon separates impacts from loads for each pair of object and partner; `partners` are any numbers that name the
-    other bodies. `travel_speeds` (m/s) with which a contact slides or rolls make it sound rough, by `roughness_depth`
-    and `irregularity_length` (metres), as Roughness in contact.proto says."""
+    daemon separates impacts from loads for each pair of object and partner; `partners` are whole numbers from 0 to
+    4294967295 that name the other bodies. `travel_speeds` (m/s) with which a contact slides or rolls make it sound
+    rough, by `roughness_depth` and `irregularity_length` (metres), as Roughness in contact.proto says."""
 
     partners: Any = None
     travel_speeds: Optional[Array] = None
@@ -166,22 +174,24 @@ def quaternion_of(rotation: numpy.ndarray) -> numpy.ndarray:
     return quaternion if quaternion[0] >= 0 else -quaternion
 
 
-def handles_of(objects: Any, count: int, name: str = "objects") -> numpy.ndarray:
-    """Handles as a column; one object stands for all rows."""
-    if isinstance(objects, numpy.ndarray):
+def handles_of(objects: Any, count: int, name: str = "objects", wanted: str = OBJECT) -> numpy.ndarray:
+    """Handles, or partners, as a column of 32 bits; one object stands for all rows. Raises TypeError or ValueError that
+    shows the entry which is no such number."""
+    if isinstance(objects, numpy.ndarray) and objects.dtype.kind in "iuf":
         handles = objects
     else:
         items = numpy.atleast_1d(numpy.asarray(objects, dtype=object))
-        handles = numpy.array([_handle_of(item, name) for item in items])
-    return _column(handles, count, name).astype(numpy.uint32)
+        handles = numpy.array([_handle_of(item, name, wanted) for item in items])
+    return _column(checks.whole_numbers(handles, name, wanted), count, name)
 
 
-def _handle_of(item: Any, name: str) -> int:
+def _handle_of(item: Any, name: str, wanted: str) -> Any:
     try:
-        return int(item)
-    except (TypeError, ValueError):
-        raise TypeError(f"{name} has an entry of type {type(item).__name__}; give the objects that Scene.add or "
-                        "Trace.add returned, or their handles") from None
+        return operator.index(item)
+    except TypeError:
+        if isinstance(item, numbers.Real):
+            return item
+        checks.refuse(item, f"an entry of {name}", wanted, TypeError)
 
 
 def _rows(values: Array, name: str, width: int = 3, count: Optional[int] = None) -> numpy.ndarray:
@@ -223,6 +233,8 @@ def fill_impulse_columns(columns: contact_pb2.ImpulseColumns, given: Impulses) -
     append(columns, object=handles_of(given.objects, count), point_m=points, impulse_newton_seconds=impulses)
     if given.durations is not None:
         durations = _numbers(given.durations, count, "durations")
+        if (durations < 0).any():
+            checks.refuse(durations[durations < 0].tolist()[0], "an entry of durations", DURATION)
         append(columns, duration_s=numpy.where(numpy.isnan(durations), ABSENT, durations))
     if given.time_offsets is not None:
         append(columns, time_offset_s=_numbers(given.time_offsets, count, "time_offsets"))
@@ -243,7 +255,9 @@ def _fill_second_columns(columns: contact_pb2.ImpulseColumns, given: Union[Impul
 
 
 def strike_of(item: Any, point: Array, impulse: Array, duration: Optional[float], struck_by: Striker) -> Impulses:
-    """One strike. Raises ValueError if it has not one point and one impulse."""
+    """One strike. Raises ValueError if it has not one point and one impulse, or if its duration is negative."""
+    if duration is not None and checks.numbers(duration, "duration", DURATION) < 0:
+        checks.refuse(duration, "duration", DURATION)
     return Impulses(item, checks.three(point, "point", OBJECT_POINT),
                     checks.three(impulse, "impulse", OBJECT_IMPULSE), durations=duration, striker=struck_by)
 
@@ -253,7 +267,7 @@ def add_contacts(step: contact_pb2.ContactStep, given: Contacts) -> int:
     columns = step.contact_columns
     count = fill_impulse_columns(columns.impulses, given)
     if given.partners is not None:
-        append(columns, partner=handles_of(given.partners, count, "partners"))
+        append(columns, partner=handles_of(given.partners, count, "partners", PARTNER))
     if given.travel_speeds is not None:
         append(columns, travel_speed_m_per_s=_numbers(given.travel_speeds, count, "travel_speeds"))
     columns.depth = given.roughness_depth

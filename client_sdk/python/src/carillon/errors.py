@@ -7,7 +7,7 @@ import contextlib
 import inspect
 import re
 import warnings
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import grpc
 
@@ -15,8 +15,9 @@ from carillon.checks import counted
 from carillon.v1 import contact_pb2, contact_service_pb2, error_pb2
 
 DETAILS_KEY = "grpc-status-details-bin"
-# The caller's names of fields of the contract that messages of the daemon mention.
-CALLER_NAMES = {"step_s": "step", "scheduling_delay_s": "delay", "glide_s": "glide"}
+# The caller's names of fields and calls of the contract that messages of the daemon mention.
+CALLER_NAMES = {"step_s": "step", "scheduling_delay_s": "delay", "glide_s": "glide",
+                "SceneService.CreateScene": "Client.scene()"}
 
 
 class CarillonError(Exception):
@@ -40,6 +41,18 @@ class ServerUnavailable(CarillonError):
 
 class ContactWarning(UserWarning):
     """Contacts were late, lost or rejected, or lie far from the surfaces of their objects."""
+
+
+class TransferWarning(UserWarning):
+    """An object sounded before it was computed how it radiates, so that the same request will sound different."""
+
+
+def warn_of_transfers(labels: Sequence[str]) -> None:
+    """Warns of the jobs with these labels, whose transfers a rendering would have used."""
+    jobs = ", ".join(labels)
+    _warn(f"{jobs} {'is' if len(labels) == 1 else 'are'} still being computed, so that the sound is by the paper's "
+          "coupling, and the same rendering will sound different later; call wait_for_transfer() of the model first",
+          TransferWarning)
 
 
 def warn_of_contacts(findings: contact_pb2.ContactFindings, frame: str) -> None:
@@ -74,12 +87,12 @@ def warn_of_stream(report: contact_service_pb2.StreamContactsResponse, frame: st
     warn_of_contacts(report.findings, frame)
 
 
-def _warn(text: str) -> None:
+def _warn(text: str, category: type[Warning] = ContactWarning) -> None:
     """Warns as of the line outside this package that has called it."""
     frame, level = inspect.currentframe(), 1
     while frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] == "carillon":
         frame, level = frame.f_back, level + 1
-    warnings.warn(text, ContactWarning, stacklevel=level)
+    warnings.warn(text, category, stacklevel=level)
 
 
 def _were(count: int, noun: str) -> str:

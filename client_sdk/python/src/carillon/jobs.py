@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Optional
 
 from carillon import checks, errors, progress
 from carillon.materials import Material
@@ -38,18 +38,30 @@ class Job:
         """"queued", "running", "succeeded", "failed" or "cancelled"."""
         return decomposition_pb2.JobState.Name(self.message.state).removeprefix("JOB_STATE_").lower()
 
-    def wait(self, progress_bar: progress.Progress = None) -> Model:
-        """Follows the job to its end and returns its model. Raises CarillonError if it fails."""
+    @property
+    def is_transfer(self) -> bool:
+        """Whether the job computes how a stored model radiates, and not a model."""
+        return bool(self.message.kind == decomposition_pb2.JOB_KIND_TRANSFER)
+
+    def wait(self, progress_bar: progress.Progress = None, timeout: Optional[float] = None) -> Model:
+        """Follows the job to its end and returns its model. Raises CarillonError if it fails, or if it has not ended
+        after `timeout` seconds (DEADLINE_EXCEEDED)."""
         on_progress, close = progress.observer(progress_bar)
-        with errors.translated(self._client.server):
-            watch = self._client.jobs_stub.WatchJob(decomposition_service_pb2.WatchJobRequest(name=self.name))
-            try:
+        request = decomposition_service_pb2.WatchJobRequest(name=self.name)
+        try:
+            with errors.translated(self._client.server):
+                watch = self._client.jobs_stub.WatchJob(request, timeout=timeout)
                 with self._client.cancellable(watch):
                     for answer in watch:
                         self.message = answer.job
                         on_progress(answer.job)
-            finally:
-                close()
+        except errors.CarillonError as error:
+            if error.reason != "DEADLINE_EXCEEDED":
+                raise
+            raise errors.CarillonError(error.reason, f"{self.message.label or self.name} is {self.state} and has not "
+                                       f"ended after {timeout:.3g} s; wait longer, or cancel the job") from error
+        finally:
+            close()
         if self.message.state == decomposition_pb2.JOB_STATE_CANCELLED:
             raise errors.CarillonError("JOB_CANCELLED", f"{self.name} was cancelled; create the model again")
         if self.message.state != decomposition_pb2.JOB_STATE_SUCCEEDED:

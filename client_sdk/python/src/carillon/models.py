@@ -5,11 +5,12 @@ from __future__ import annotations
 
 import functools
 import html
+import time
 from typing import TYPE_CHECKING, Any, Optional
 
 import numpy
 
-from carillon import checks, errors, materials
+from carillon import checks, errors, jobs, materials, progress
 from carillon.contacts import Array, Striker, strike_of
 from carillon.sound import Sound
 from carillon.traces import Trace
@@ -28,7 +29,7 @@ class Model:
 
     def __init__(self, client: Client, summary: modal_model_service_pb2.ModalModelSummary,
                  material: Optional[materials.Material] = None):
-        self._client = client
+        self.client = client
         self.summary = summary
         self.material = summary.material if material is None and summary.HasField("material") else material
 
@@ -53,7 +54,7 @@ class Model:
     def eigenvalues(self) -> numpy.ndarray:
         """Lambda of each mode for unit material, ascending."""
         if not self.summary.eigenvalues and self.mode_count:
-            self.summary = self._client.model(self.name).summary
+            self.summary = self.client.model(self.name).summary
         return numpy.array(self.summary.eigenvalues)
 
     def modes(self, material: Optional[materials.Material] = None,
@@ -64,7 +65,7 @@ class Model:
         if message is None:
             raise errors.CarillonError("INVALID_MATERIAL", f"{self.name} was not made with a material here; give one, "
                                        "such as material=\"bell_bronze\"")
-        return materials.modes_of(self.eigenvalues, self._client.resolve(message), size)
+        return materials.modes_of(self.eigenvalues, self.client.resolve(message), size)
 
     def radiation_decays(self, material: Optional[materials.Material] = None, size: float = 1) -> numpy.ndarray:
         """Returns the decay rates of the modes by radiation, 1/s, which add to those of `modes`. They are zero if no
@@ -73,8 +74,8 @@ class Model:
         if message is None:
             raise errors.CarillonError("INVALID_MATERIAL", f"{self.name} was not made with a material here; give one, "
                                        "such as material=\"bell_bronze\"")
-        transfers = self._client.model(self.name).summary.transfers  # newer ones, too
-        return materials.radiation_decays_of(self.eigenvalues, self._client.resolve(message), size, transfers)
+        transfers = self.client.model(self.name).summary.transfers  # newer ones, too
+        return materials.radiation_decays_of(self.eigenvalues, self.client.resolve(message), size, transfers)
 
     def frequencies(self, material: Optional[materials.Material] = None, size: float = 1) -> numpy.ndarray:
         """Returns the damped frequencies, Hz."""
@@ -86,9 +87,9 @@ class Model:
         (V x 3 x modes); docs/model_format.md lists them."""
         request = modal_model_service_pb2.ExportModalModelRequest(name=self.name)
         header, pieces = modal_model_pb2.ModalModelHeader(), {}
-        with errors.translated(self._client.server):
-            answers = self._client.models_stub.ExportModalModel(request)
-            with self._client.cancellable(answers):
+        with errors.translated(self.client.server):
+            answers = self.client.models_stub.ExportModalModel(request)
+            with self.client.cancellable(answers):
                 for answer in answers:
                     if answer.record.HasField("header"):
                         header = answer.record.header
@@ -101,14 +102,32 @@ class Model:
     def render_strike(self, point: Array, impulse: Array, material: Optional[materials.Material] = None, *,
                       duration: Optional[float] = None, striker: Striker = None, size: float = 1, gain: float = 1,
                       seconds: float = 0, sample_rate_hz: int = 48000) -> Sound:
-        """Renders one strike without a scene and faster than real time, the same samples each time. `duration` is that
-        of the contact, in seconds; without it the `striker`, such as "wood", determines it. `seconds` zero means until
-        the sound has died away."""
+        """Renders one strike without a scene and faster than real time. The samples are the same each time once the
+        transfer of the model is computed (wait_for_transfer). `duration` is that of the contact, in seconds; without it
+        the `striker`, such as "wood", determines it. `seconds` zero means until the sound has died away."""
         trace = Trace(simulator="carillon (Python)")
         body = trace.add(self, material, size=size, gain=gain)
         trace.step(0.0, impulses=strike_of(body, point, impulse, duration, striker))
         with errors.in_names(tail_s="seconds"):
-            return self._client.render(trace, tail_s=seconds, sample_rate_hz=sample_rate_hz)
+            return self.client.render(trace, tail_s=seconds, sample_rate_hz=sample_rate_hz)
+
+    def wait_for_transfer(self, timeout: Optional[float] = None, *, progress_bar: progress.Progress = None) -> None:
+        """Waits until the daemon has computed how the model radiates, which it begins when the model is stored. Before
+        that, objects sound by the paper's coupling, at other levels and without damping by radiation. Returns at once
+        if no transfer of the model is being computed. Raises CarillonError if the computation failed, or if it has not
+        ended after `timeout` seconds (DEADLINE_EXCEEDED)."""
+        end_s = None if timeout is None else time.monotonic() + timeout
+        for job in self._transfer_jobs():
+            job.wait(progress_bar, None if end_s is None else max(0, end_s - time.monotonic()))
+        self.summary = self.client.model(self.name).summary
+
+    def _transfer_jobs(self) -> list[jobs.Job]:
+        """The jobs whose end decides whether the model has a transfer: those that wait or run, or else the newest one
+        that did not succeed, if no transfer is stored."""
+        found = [job for job in self.client.jobs(["queued", "running", "failed", "cancelled"])
+                 if job.is_transfer and job.message.modal_model == self.name]
+        awaited = [job for job in found if job.state in ("queued", "running")]
+        return awaited or ([] if self.client.model(self.name).summary.transfers else found[:1])
 
     def update(self, *, label: Optional[str] = None, add_tags: tuple[str, ...] = (),
                remove_tags: tuple[str, ...] = (), pinned: Optional[bool] = None) -> None:
@@ -117,13 +136,13 @@ class Model:
             name=self.name, label=label, add_tags=add_tags, remove_tags=remove_tags)
         if pinned is not None:
             request.pinned = pinned
-        with errors.translated(self._client.server):
-            self.summary = self._client.models_stub.UpdateModalModel(request).modal_model
+        with errors.translated(self.client.server):
+            self.summary = self.client.models_stub.UpdateModalModel(request).modal_model
 
     def delete(self) -> None:
         """Deletes the model; objects that sound with it go on sounding."""
-        with errors.translated(self._client.server):
-            self._client.models_stub.DeleteModalModel(modal_model_service_pb2.DeleteModalModelRequest(name=self.name))
+        with errors.translated(self.client.server):
+            self.client.models_stub.DeleteModalModel(modal_model_service_pb2.DeleteModalModelRequest(name=self.name))
 
     def plot_modes(self, material: Optional[materials.Material] = None, axes: Any = None) -> Any:
         """Draws the frequencies of the modes and their couplings to the air; needs matplotlib. Returns its axes."""

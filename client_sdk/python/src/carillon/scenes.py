@@ -185,8 +185,13 @@ class Scene:
     def __enter__(self) -> Scene:
         return self
 
-    def __exit__(self, *_: Any) -> None:
-        self.delete()
+    def __exit__(self, kind: Any, *_: Any) -> None:
+        try:
+            self.delete()
+        except errors.CarillonError as error:
+            # The scene is gone already, or an exception of the caller is on its way, which says more.
+            if error.reason != "SCENE_NOT_FOUND" and kind is None:
+                raise
 
 
 class TraceRecording:
@@ -198,6 +203,10 @@ class TraceRecording:
     def take(self) -> Trace:
         """Waits until the stream has ended. Returns its trace."""
         return Trace.of(answer.record for answer in self._answers)
+
+    def cancel(self) -> None:
+        """Ends the recording."""
+        self._answers.cancel()
 
 
 class ContactStream:
@@ -212,6 +221,7 @@ class ContactStream:
         self._start = start
         self._requests: queue.SimpleQueue[Optional[contact_service_pb2.StreamContactsRequest]] = queue.SimpleQueue()
         self._error: Optional[grpc.RpcError] = None
+        self._is_closed = False
         self.report: contact_service_pb2.StreamContactsResponse = contact_service_pb2.StreamContactsResponse()
         self.dropped_step_count = 0
         self._answers = scene.client.contacts_stub.StreamContacts(self._sent(start))
@@ -251,7 +261,11 @@ class ContactStream:
         self.send(make_step(time, contacts=contacts, impulses=impulses, forces=forces, poses=poses, listener=listener))
 
     def send(self, step: contact_pb2.ContactStep) -> None:
-        """Sends a message of contact.proto. Raises CarillonError if the stream has failed."""
+        """Sends a message of contact.proto. Raises CarillonError if the stream has failed, or has been closed
+        (CONTACT_STREAM_ENDED)."""
+        if self._is_closed:
+            raise errors.CarillonError("CONTACT_STREAM_ENDED", "this stream has been closed, so that the step would "
+                                       "not sound; open another one by Scene.stream")
         if self._error:
             raise errors.from_rpc(self._error, self._server)
         if self._requests.qsize() >= MOST_WAITING:
@@ -262,6 +276,7 @@ class ContactStream:
 
     def close(self, warn: bool = True) -> contact_service_pb2.StreamContactsResponse:
         """Waits until the daemon has taken all steps. Returns the last report."""
+        self._is_closed = True
         self._requests.put(None)
         self._reader.join()
         if self._error:
@@ -295,6 +310,7 @@ class ContactStream:
 
     def __exit__(self, kind: Any, *_: Any) -> None:
         if kind is not None:
+            self._is_closed = True
             self._answers.cancel()
             self._reader.join()
         else:

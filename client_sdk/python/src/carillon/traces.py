@@ -39,9 +39,9 @@ class Trace:
         """Adds an object, which is there from the beginning. Returns its handle."""
         handle = handle or 1 + max((item.handle for item in self.objects), default=0)
         name, message = materials.named(model, material)
-        self.objects.append(contact_trace_pb2.ContactTraceObject(
+        self.objects.append(checks.message(contact_trace_pb2.ContactTraceObject, "add", dict(
             handle=handle, modal_model=name, material=message, size=size, gain=gain, label=label,
-            pose=None if pose is None else contacts.to_pose(pose), radiation=materials.to_radiation(radiation)))
+            pose=None if pose is None else contacts.to_pose(pose), radiation=materials.to_radiation(radiation))))
         return handle
 
     def step(self, time: float, *, contacts: Optional[Contacts] = None, impulses: Optional[Impulses] = None,

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The clients in Python and Node wait for a model's transfer, and warn of a sound that comes before it."""
+
+import asyncio
+import pathlib
+import subprocess
+import tempfile
+import unittest
+import warnings
+
+import numpy
+
+import carillon
+import meshes
+import scripted
+from daemon import BIN, Daemon
+from node import node_environment
+
+BAR = meshes.box(meshes.BAR_SIZE)
+STRIKE = {"point": (0.0, 0.008, 0.010), "impulse": (0, 0, -0.002), "duration": 1e-4, "seconds": 0.2}
+# A transfer waits until it may be computed, and fails if it must not succeed.
+WORKER = """
+if grep -q radiate_stored_model "$request"; then
+  while [ ! -e "$here/enough" ]; do printf '\\002\\012\\000' >&3; sleep 0.05; done
+  [ ! -e "$here/fail" ] || exit 1
+fi
+exec BIN/carillon-precompute "$@"
+""".replace("BIN", str(BIN))
+
+
+class TransfersTest(unittest.TestCase):
+    def setUp(self):
+        scratch = tempfile.TemporaryDirectory(prefix="carillon-")
+        self.addCleanup(scratch.cleanup)
+        self.folder = pathlib.Path(scratch.name)
+        self.daemon = Daemon(self.folder, "--transfers", "--precompute", scripted.worker(self.folder, WORKER))
+        self.addCleanup(self.daemon.stop)
+        self.c = carillon.connect(self.daemon.server)
+        self.addCleanup(self.c.close)
+
+    def make(self, **request):
+        return self.c.create_model(BAR, meshes.MATERIAL, label="bar", max_frequency_hz=3000,
+                                   transfer={"accuracy_db": 6}, **request)
+
+    def allow(self):
+        (self.folder / "enough").touch()
+
+    def assert_refused(self, reason, words, function, *arguments):
+        with self.assertRaises(carillon.CarillonError) as refused:
+            function(*arguments)
+        self.assertEqual(refused.exception.reason, reason)
+        self.assertIn(words, refused.exception.message)
+
+    def test_a_rendering_before_the_transfer_warns_and_one_after_it_does_not(self):
+        bar = self.make()
+        with self.assertWarnsRegex(carillon.TransferWarning, r"^bar \(transfer\) is still being computed") as told:
+            before = bar.render_strike(**STRIKE)
+        self.assertEqual(told.filename, __file__)
+        self.assert_refused("DEADLINE_EXCEEDED", "bar (transfer) is running and has not ended after",
+                            bar.wait_for_transfer, 0.2)
+        states = []
+        self.allow()
+        bar.wait_for_transfer(60, progress_bar=lambda job: states.append(job.label))
+        self.assertEqual(set(states), {"bar (transfer)"})
+        self.assertEqual(len(bar.summary.transfers), 1)
+        bar.wait_for_transfer(0)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            after = bar.render_strike(**STRIKE)
+            numpy.testing.assert_array_equal(bar.render_strike(**STRIKE).samples, after.samples)
+        self.assertGreater(abs(after.peak / before.peak - 1), 0.1)
+
+    def test_a_model_without_a_transfer_keeps_nobody_waiting(self):
+        bar = self.make(without_transfer=True)
+        bar.wait_for_transfer(0)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            self.assertEqual(bar.render_strike(**STRIKE).summary.paper_coupling_object_count, 1)
+
+    def test_a_transfer_that_was_cancelled_is_told(self):
+        bar = self.make()
+        next(job for job in self.c.jobs() if job.is_transfer).cancel()
+        self.assert_refused("JOB_CANCELLED", "was cancelled", bar.wait_for_transfer, 60)
+
+    def test_a_transfer_that_fails_is_told(self):
+        (self.folder / "fail").touch()
+        bar = self.make()
+        self.allow()
+        for _ in range(2):  # While it is computed, and after.
+            with self.assertRaises(carillon.CarillonError) as refused:
+                bar.wait_for_transfer(60)
+            self.assertNotEqual(refused.exception.reason, "DEADLINE_EXCEEDED")
+
+    def test_a_task_of_asyncio_waits_and_may_be_cancelled(self):
+        self.make()
+
+        async def wait():
+            async with carillon.aio.connect(self.daemon.server) as c:
+                bar = await c.model("bar")
+                with self.assertRaises(asyncio.TimeoutError):
+                    await asyncio.wait_for(bar.wait_for_transfer(), 0.3)
+                self.allow()
+                await bar.wait_for_transfer(60)
+                return bar.summary.transfers
+
+        self.assertEqual(len(asyncio.run(wait())), 1)
+
+    def test_a_program_in_node_waits_and_is_warned(self):
+        name = self.make().name
+        done = subprocess.run(
+            ["node", pathlib.Path(__file__).with_name("wait_for_transfer.js"), name, self.folder / "enough"],
+            env={**node_environment(self.folder), "CARILLON_SERVER": self.daemon.server}, check=False,
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        self.assertEqual(done.returncode, 0, done.stdout)
+
+
+if __name__ == "__main__":
+    unittest.main()
