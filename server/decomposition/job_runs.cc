@@ -20,9 +20,6 @@ namespace {
 
 constexpr char kCorrectionFact[] = "memory_correction";
 constexpr double kWeightOfNewestRun = 0.1;
-// Processor time that a transfer may take: as long as its model took, within these bounds.
-constexpr double kLeastTransferBudgetS = 20;
-constexpr double kMostTransferBudgetS = 600;
 // A transfer holds the model's shapes as double numbers, and the fields on surfaces of some ten
 // thousand vertices.
 constexpr uint64_t kTransferBytes = uint64_t{256} << 20U;
@@ -89,16 +86,12 @@ void JobRuns::Enqueue(JobRecord record, v1::CreateModalModelRequest request, Job
 
 // The transfer's job is stored before the end of the model's, so that a daemon that is killed in
 // between finds it.
-void JobRuns::FollowByTransfer(const ActiveJob& model, double run_s) {
+void JobRuns::FollowByTransfer(const ActiveJob& model) {
   if (!settings_.transfers || !model.record.transfer_of.empty() ||
       model.running->without_transfer()) {
     return;
   }
   WantedJob wanted = WantedTransfer(model.record.digest, *model.running);
-  v1::TransferSettings& transfer = *wanted.request.mutable_transfer();
-  if (transfer.budget_s() == 0) {
-    transfer.set_budget_s(std::clamp(run_s, kLeastTransferBudgetS, kMostTransferBudgetS));
-  }
   if (jobs_.Contains(wanted.digest)) {
     // It runs on an older revision of the model.
     jobs_.Change(wanted.digest, [](ActiveJob& job) { job.again = job.running.has_value(); });
@@ -171,7 +164,7 @@ void JobRuns::OnEnd(const std::string& digest, const Outcome& outcome) {
   {
     MutexLock lock(&writer_);
     ActiveJob job = jobs_.EndRun(digest);
-    const double run_s = LearnFrom(job, result);
+    LearnFrom(job, result);
     // Fails if the model was deleted before it was stored: then there is none.
     if (job.deleted) database_.models().Delete(digest).IgnoreError();
     job.record.start_count = 0;
@@ -179,7 +172,7 @@ void JobRuns::OnEnd(const std::string& digest, const Outcome& outcome) {
       job.again = job.deleted = job.yields = false;
       notices.push_back(jobs_.QueueAgain(std::move(job)));
     } else {
-      if (result.verdict == Verdict::kOk && !job.deleted) FollowByTransfer(job, run_s);
+      if (result.verdict == Verdict::kOk && !job.deleted) FollowByTransfer(job);
       notices.push_back(Finish(std::move(job.record), result, job.deleted));
       ReleaseWaiting(digest, notices);
     }
@@ -249,15 +242,14 @@ Notice JobRuns::Finish(JobRecord record, const Outcome& result, bool deleted) {
   return jobs_.Remove(record.digest, ToJob(record));
 }
 
-double JobRuns::LearnFrom(ActiveJob& job, const Outcome& result) {
+void JobRuns::LearnFrom(ActiveJob& job, const Outcome& result) {
   job.record.peak_bytes = std::max(job.record.peak_bytes, result.peak_bytes);
   const double run_s = std::chrono::duration<double>(clock_.Monotonic() - job.started).count();
   mean_run_s_ += kWeightOfNewestRun * (run_s - mean_run_s_);
   const bool tells = result.verdict == Verdict::kOk && result.peak_bytes > 0;
-  if (!tells || !job.record.transfer_of.empty()) return run_s;
+  if (!tells || !job.record.transfer_of.empty()) return;
   const double correction = jobs_.Learn(job.guess_bytes, result.peak_bytes);
   database_.jobs().PutFact(kCorrectionFact, absl::StrCat(correction)).IgnoreError();
-  return run_s;
 }
 
 }  // namespace carillon

@@ -71,13 +71,12 @@ class JobRuns {
   DecompositionTask MakeTask(const ActiveJob& job);
   void OnEnd(const std::string& digest, const Outcome& outcome);
   Outcome Store(const std::string& digest, const Outcome& outcome);
-  void FollowByTransfer(const ActiveJob& model, double run_s)
-      ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
+  void FollowByTransfer(const ActiveJob& model) ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
   bool RunsAgain(ActiveJob& job, const Outcome& result) const;
   void CountEnd(v1::JobState state);
   Notice Finish(JobRecord record, const Outcome& result, bool deleted)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
-  double LearnFrom(ActiveJob& job, const Outcome& result) ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
+  void LearnFrom(ActiveJob& job, const Outcome& result) ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
 
   ModeDatabase& database_;
   const Clock& clock_;

@@ -148,7 +148,7 @@ TEST_F(TransferJobTest, FollowsTheModelAndReadsItsStoredForm) {
   EXPECT_EQ(TransferCount(), 1U);
   EXPECT_EQ(Runs(), "model\ntransfer\n");
   EXPECT_EQ(ReadBytes(folder_ / "input.transfer"), ReadBytes(folder_ / "model"));
-  EXPECT_THAT(ReadBytes(folder_ / "request.transfer"), HasSubstr("budget_s: 20"));
+  EXPECT_THAT(ReadBytes(folder_ / "request.transfer"), Not(HasSubstr("budget_s")));
   EXPECT_THAT(ReadBytes(folder_ / "request.model"), Not(HasSubstr("transfer")));
 }
 
