@@ -202,15 +202,17 @@ class Client:
     def render(self, trace: Trace | str | os.PathLike[str], *, normalize: bool = False, **settings: Any) -> Sound:
         """Renders a trace, or a .contacts file, faster than real time. `settings` are fields of RenderSettings:
         sample_rate_hz, channel_count, tail_s, gain, full_scale_pa and tell_blows. `normalize` gives the sound a peak of
-        0.9. A sound that peaks below -40 dB of full scale is then rendered again with a full scale a little above its
-        peak, unless `full_scale_pa` is given, because tails end at -80 dB of full scale. Raises CarillonError if a
-        contact is rejected, or if there is none (TRACE_EMPTY)."""
+        0.9. A sound that peaks below -40 dB of full scale, or that the limiter changed, is then rendered again with a
+        full scale a little above its peak, unless `full_scale_pa` is given, because tails end at -80 dB of full scale.
+        Raises CarillonError if a contact is rejected, or if there is none (TRACE_EMPTY)."""
         whole = trace if isinstance(trace, Trace) else Trace.read(trace)
         sound = self._render(whole, settings)
         if not normalize:
             return sound
-        if sound.summary and 0 < sound.summary.peak < 0.01 and "full_scale_pa" not in settings:
-            settings["full_scale_pa"] = max(1.5 * sound.summary.peak_pa, LEAST_FULL_SCALE_PA)
+        summary = sound.summary
+        bad = summary and (0 < summary.peak < 0.01 or summary.limited_frame_count > 0)
+        if bad and "full_scale_pa" not in settings:
+            settings["full_scale_pa"] = max(1.5 * summary.peak_pa, LEAST_FULL_SCALE_PA)
             sound = self._render(whole, settings)
         return sound.normalized()
 
