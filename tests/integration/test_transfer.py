@@ -146,7 +146,7 @@ class TransferTest(unittest.TestCase):
         taken_over = self.client.scenes.UpdateObject(scene_service_pb2.UpdateObjectRequest(name=name)).object
         self.assertEqual(taken_over.radiation, radiation_pb2.RADIATION_MODEL_RADIATED_POWER)
         shown = self.daemon.command("model", "show", model).stdout
-        self.assertIn("transfer   for 503", shown)
+        self.assertIn("speed of sound near 503", shown)
         self.assert_shows_both_decays(shown)
 
         after = self.render(model, radiation_pb2.RADIATION_MODEL_UNSPECIFIED)
