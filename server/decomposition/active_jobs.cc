@@ -79,9 +79,9 @@ std::optional<v1::Job> ActiveJobs::View(const std::string& digest) {
 std::map<std::string, v1::Job> ActiveJobs::ViewAll() {
   MutexLock lock(&mutex_);
   std::map<std::string, v1::Job> views;
-  ForEachWaiting([&](const ActiveJob& job, size_t earlier_count) {
-    views.emplace(job.record.digest, ViewOf(job, earlier_count));
-  });
+  for (const auto& [job, earlier_count] : WaitingJobs()) {
+    views.emplace(job->record.digest, ViewOf(*job, earlier_count));
+  }
   for (const auto& [digest, job] : jobs_) {
     if (!views.contains(digest)) views.emplace(digest, ViewOf(job, 0));
   }
@@ -170,11 +170,11 @@ std::vector<Notice> ActiveJobs::NewsOfWaiting() {
   MutexLock lock(&mutex_);
   std::vector<Notice> news;
   if (watchers_.empty()) return news;
-  ForEachWaiting([&](const ActiveJob& job, size_t earlier_count) {
-    const auto watchers = watchers_.find(job.record.digest);
-    if (watchers == watchers_.end()) return;
-    news.push_back({watchers->second, ViewOf(job, earlier_count), ++version_});
-  });
+  for (const auto& [job, earlier_count] : WaitingJobs()) {
+    const auto watchers = watchers_.find(job->record.digest);
+    if (watchers == watchers_.end()) continue;
+    news.push_back({watchers->second, ViewOf(*job, earlier_count), ++version_});
+  }
   return news;
 }
 
@@ -298,14 +298,15 @@ v1::Job ActiveJobs::ViewOf(const ActiveJob& job, size_t earlier_count) {
   return view;
 }
 
-void ActiveJobs::ForEachWaiting(
-    absl::FunctionRef<void(const ActiveJob&, size_t earlier_count)> use) {
+std::vector<ActiveJobs::Waiting> ActiveJobs::WaitingJobs() {
+  std::vector<Waiting> waiting;
   for (const FairQueue* queue : {&decompositions_, &transfers_}) {
     size_t earlier_count = 0;
     for (const absl::string_view digest : queue->Order()) {
-      use(jobs_.at(std::string(digest)), earlier_count++);
+      waiting.push_back({&jobs_.at(std::string(digest)), earlier_count++});
     }
   }
+  return waiting;
 }
 
 Notice ActiveJobs::Announce(const ActiveJob& job) {
