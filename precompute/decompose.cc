@@ -29,6 +29,7 @@
 #include "precompute/modes/deformation_modes.h"
 #include "precompute/modes/solver_comparison.h"
 #include "precompute/phase_clock.h"
+#include "precompute/refined_check.h"
 #include "precompute/resolution.h"
 #include "precompute/worker_request.h"
 #include "proto/cpp/error_reason.h"
@@ -222,6 +223,36 @@ absl::StatusOr<Solved> Solve(const Body& body, const v1::WorkerRequest& request,
   return Solved{std::move(model), solution.predicted_cpu_s};
 }
 
+/// Whether the request leaves the fineness of the mesh to the program. Linear elements are left as
+/// they are, because they serve comparisons.
+bool IsFinenessFree(const v1::WorkerRequest& request) {
+  const v1::MeshSettings& mesh = request.settings().mesh();
+  return !GoalOf(request).given() && mesh.target_node_count() == 0 && !mesh.keep_surface() &&
+         MeshingOf(request).nodes_per_element == 10;
+}
+
+/// Number of corner nodes of the mesh with which a mesh of few elements is compared.
+constexpr int kReferenceCornerCount = 800;
+/// Largest number of nodes of a mesh whose elements are divided for a comparison.
+constexpr size_t kMostDividedNodes = 3000;
+
+/// Compares the modes of a mesh of few elements with those of a mesh of ordinary elements: of the
+/// surface, if the body has one that can be filled, or of the mesh's divided elements.
+void CheckFewElements(const Body& body, const Fillable* surface, const v1::WorkerRequest& request,
+                      ModalModel& model) {
+  const bool can_compare =
+      surface == nullptr ? body.mesh.nodes.size() <= kMostDividedNodes : !IsFinenessFree(request);
+  if (!can_compare || !HasFewElements(body.mesh) || model.left_out_mode_count > 0) return;
+  absl::StatusOr<Body> finer = absl::UnknownError("");
+  if (surface != nullptr) {
+    finer = FillSurface(*surface, {.target_node_count = kReferenceCornerCount}, request);
+  }
+  const ElasticConstants elastic{.young_pa = 1,
+                                 .poisson_ratio = request.settings().poisson_ratio()};
+  CompareWith(finer.ok() ? finer->mesh : Refined(body.mesh), elastic, MassSharingOf(request),
+              model);
+}
+
 double PeakBytes() {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
@@ -241,17 +272,9 @@ Round Describe(const TetMesh& mesh, const ModalModel& model, double cpu_s) {
           .node_count = count,
           .uniform_node_count = count,
           .thin = nodes_per_corner * corners_on_boundary > kThin * count,
-          .worst_error = model.WorstError(),
+          .worst_error = model.eigenvalues.empty() ? model.lowest_error : model.WorstError(),
           .cpu_s = cpu_s,
           .peak_bytes = PeakBytes()};
-}
-
-/// Whether the request leaves the fineness of the mesh to the program. Linear elements are left as
-/// they are, because they serve comparisons.
-bool IsFinenessFree(const v1::WorkerRequest& request) {
-  const v1::MeshSettings& mesh = request.settings().mesh();
-  return !GoalOf(request).given() && mesh.target_node_count() == 0 && !mesh.keep_surface() &&
-         MeshingOf(request).nodes_per_element == 10;
 }
 
 /// Returns the element sizes of the mesh after `last`, with which it has the error of a uniform
@@ -313,6 +336,8 @@ absl::StatusOr<ModalModel> SolveToGoal(const Fillable& surface, const v1::Worker
     absl::StatusOr<Solved> solved = Solve(*body, request, observer);
     if (!solved.ok() && best.ok()) return best;
     if (!solved.ok()) return solved.status();
+    CheckFewElements(*body, &surface, request, solved->model);
+    if (IsSurelyAboveBand(solved->model, UseOf(request))) return std::move(solved->model);
     const PhaseClock::Times ended = PhaseClock::Now();
     rounds.push_back(
         Describe(body->mesh, solved->model,
@@ -337,7 +362,9 @@ absl::StatusOr<ModalModel> SolveInput(const Input& input, const v1::WorkerReques
                                       DecompositionObserver& observer) {
   const auto* surface = std::get_if<Fillable>(&input);
   if (surface != nullptr) return SolveToGoal(*surface, request, observer);
-  ASSIGN_OR_RETURN(Solved solved, Solve(std::get<Body>(input), request, observer));
+  const Body& body = std::get<Body>(input);
+  ASSIGN_OR_RETURN(Solved solved, Solve(body, request, observer));
+  CheckFewElements(body, nullptr, request, solved.model);
   return std::move(solved.model);
 }
 
@@ -353,6 +380,8 @@ absl::StatusOr<ModalModel> Decompose(std::string mesh_bytes, const v1::WorkerReq
   ASSIGN_OR_RETURN(const Input input, ReadInput(std::exchange(mesh_bytes, {}), request, observer));
   ASSIGN_OR_RETURN(ModalModel model, SolveInput(input, request, observer));
   RETURN_IF_ERROR(CheckBand(model, UseOf(request)));
+  WarnOfNodesBesideGoal(static_cast<int>(request.settings().mesh().target_node_count()),
+                        GoalOf(request), model);
   WarnOfAccuracy(GoalOf(request), model);
   RETURN_IF_ERROR(
       LeaveOutInaccurate(request.settings().max_frequency_error(), UseOf(request), model));

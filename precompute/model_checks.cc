@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <string>
 #include <vector>
 
 #include "absl/strings/str_format.h"
@@ -12,18 +13,28 @@
 
 namespace carillon::precompute {
 
+bool IsSurelyAboveBand(const ModalModel& model, const IntendedUse& use) {
+  if (!model.eigenvalues.empty()) return false;
+  const double first_hz = use.FrequencyHz(model.lowest_eigenvalue);
+  return first_hz > use.high_hz * (1 + 2 * model.lowest_error);
+}
+
 absl::Status CheckBand(const ModalModel& model, const IntendedUse& use) {
   const double lowest = use.UnitEigenvalue(use.low_hz);
   if (std::ranges::any_of(model.eigenvalues, [&](double x) { return x >= lowest; })) {
     return absl::OkStatus();
   }
   const double first_hz = use.FrequencyHz(model.lowest_eigenvalue);
+  const std::string below = model.eigenvalues.empty()
+                                ? ""
+                                : absl::StrFormat(" and the last below the band is %.5g Hz",
+                                                  use.FrequencyHz(model.eigenvalues.back()));
   absl::Status status =
       Refusal(absl::StatusCode::kFailedPrecondition, "NO_MODE_IN_BAND",
               absl::StrFormat(
                   "no natural frequency of the body lies between %g and %g Hz, its first is "
-                  "%.5g Hz; check the unit of the file, or choose another size, material or band",
-                  use.low_hz, use.high_hz, first_hz));
+                  "%.5g Hz%s; check the unit of the file, or choose another size, material or band",
+                  use.low_hz, use.high_hz, first_hz, below));
   AddFigure(status, "first_mode_hz", absl::StrFormat("%.6g", first_hz));
   return status;
 }

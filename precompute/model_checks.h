@@ -7,6 +7,11 @@
 
 namespace carillon::precompute {
 
+/// Returns whether no finer mesh can have a mode in the band: the lowest mode lies above the band
+/// by more than twice its estimated error. A coarse mesh tells this as well as a fine one, because
+/// its frequencies are too high by little.
+bool IsSurelyAboveBand(const ModalModel& model, const IntendedUse& use);
+
 /// Returns OK if a mode lies in the band of `use`.
 /// Errors: NO_MODE_IN_BAND with the figure first_mode_hz.
 absl::Status CheckBand(const ModalModel& model, const IntendedUse& use);
