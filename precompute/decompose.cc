@@ -31,6 +31,7 @@
 #include "precompute/phase_clock.h"
 #include "precompute/refined_check.h"
 #include "precompute/resolution.h"
+#include "precompute/solve_steps.h"
 #include "precompute/worker_request.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
@@ -130,31 +131,10 @@ absl::Status SaveMatrices(const SystemMatrices& system, const v1::WorkerRequest&
                            request.material().density_kg_per_m3());
 }
 
-v1::Phase PhaseOf(SolveStage stage) {
-  switch (stage) {
-    case SolveStage::kFactor:
-      return v1::PHASE_FACTOR;
-    case SolveStage::kSolve:
-      return v1::PHASE_SOLVE;
-    case SolveStage::kVerify:
-      return v1::PHASE_VERIFY;
-  }
-  return v1::PHASE_SOLVE;
-}
-
 /// The goal for a surface if nobody asked for another. Its processor time is the predicted one, so
 /// that each machine makes the same model. The prediction for thin plates is about half the time
 /// that they take.
 constexpr ResolutionGoal kUsualGoal{.accuracy = kGreatError, .budget_s = kUsualMeans.cpu_s / 2};
-
-/// Returns the steps after the assembly of the matrices, with their predicted times.
-std::vector<PlannedStep> PlanOf(const SolveCost& cost) {
-  return {{.phase = v1::PHASE_VERIFY, .predicted_s = cost.count_s},
-          {.phase = v1::PHASE_FACTOR, .predicted_s = cost.factor_s},
-          {.phase = v1::PHASE_SOLVE, .predicted_s = cost.solve_s},
-          {.phase = v1::PHASE_VERIFY, .predicted_s = cost.verify_s},
-          {.phase = v1::PHASE_WRITE, .predicted_s = cost.model_s}};
-}
 
 SolveOptions OptionsOf(v1::Solver solver, const v1::WorkerRequest& request,
                        DecompositionObserver& observer) {
@@ -315,6 +295,25 @@ MeshingSettings FirstMeshing(const v1::WorkerRequest& request) {
   return meshing;
 }
 
+/// Number of corner nodes of the mesh that shows whether a body is too small.
+constexpr int kCoarseCornerCount = 300;
+
+/// Returns a model without modes if a coarse mesh shows that the body is too small for the band, as
+/// in a wrong unit.
+std::optional<ModalModel> TooSmall(const Fillable& surface, const v1::WorkerRequest& request,
+                                   DecompositionObserver& observer) {
+  const IntendedUse use = UseOf(request);
+  if (!IsFinenessFree(request) || !MayBeTooSmall(surface.prepared.surface, use)) {
+    return std::nullopt;
+  }
+  const absl::StatusOr<Body> body =
+      FillSurface(surface, {.target_node_count = kCoarseCornerCount}, request);
+  if (!body.ok()) return std::nullopt;
+  absl::StatusOr<Solved> solved = Solve(*body, request, observer);
+  if (!solved.ok() || !IsSurelyAboveBand(solved->model, use)) return std::nullopt;
+  return std::move(solved->model);
+}
+
 /// Fills and solves a surface finer and finer until the goal is met.
 absl::StatusOr<ModalModel> SolveToGoal(const Fillable& surface, const v1::WorkerRequest& request,
                                        DecompositionObserver& observer) {
@@ -325,6 +324,7 @@ absl::StatusOr<ModalModel> SolveToGoal(const Fillable& surface, const v1::Worker
   std::vector<Round> rounds;
   RoundForecast forecast{.later_rounds = asked.given() ? kLaterRoundsAfterFirst : 0};
   absl::StatusOr<ModalModel> best = absl::UnknownError("");
+  if (auto too_small = TooSmall(surface, request, observer)) return *std::move(too_small);
   while (true) {
     const PhaseClock::Times begun = PhaseClock::Now();
     observer.OnRound(forecast);
@@ -380,13 +380,13 @@ absl::StatusOr<ModalModel> Decompose(std::string mesh_bytes, const v1::WorkerReq
   ASSIGN_OR_RETURN(const Input input, ReadInput(std::exchange(mesh_bytes, {}), request, observer));
   ASSIGN_OR_RETURN(ModalModel model, SolveInput(input, request, observer));
   RETURN_IF_ERROR(CheckBand(model, UseOf(request)));
-  WarnOfNodesBesideGoal(static_cast<int>(request.settings().mesh().target_node_count()),
-                        GoalOf(request), model);
   WarnOfAccuracy(GoalOf(request), model);
   RETURN_IF_ERROR(
       LeaveOutInaccurate(request.settings().max_frequency_error(), UseOf(request), model));
   WarnOfGreatErrors(model);
   WarnOfOverruns(GoalOf(request), PhaseClock::Now().cpu_seconds - begun_cpu_s, model);
+  WarnOfNodesBesideGoal(static_cast<int>(request.settings().mesh().target_node_count()),
+                        GoalOf(request), model);
   observer.OnModes(model.eigenvalues.size());
   return model;
 }

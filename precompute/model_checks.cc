@@ -4,14 +4,34 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <numbers>
 #include <string>
 #include <vector>
 
 #include "absl/strings/str_format.h"
+#include "precompute/mesh/point_math.h"
+#include "precompute/mesh/surface/surface_shells.h"
 #include "precompute/modes/audible_modes.h"
 #include "proto/cpp/error_reason.h"
 
 namespace carillon::precompute {
+namespace {
+
+/// A body is compact if its volume is above this part of its diagonal cubed; a cube has 0.19. For
+/// unit speed of sound and diagonal, the first mode of a compact body lies below this frequency.
+constexpr double kCompactVolume = 0.02;
+constexpr double kFirstOfCompactHz = 1;
+
+}  // namespace
+
+bool MayBeTooSmall(const SurfaceMesh& surface, const IntendedUse& use) {
+  const double diagonal_m = Diagonal(surface.vertices);
+  double volume_m3 = 0;
+  for (const Shell& shell : FindShells(surface)) volume_m3 += shell.volume_m3;
+  const double high_hz = std::sqrt(use.UnitEigenvalue(use.high_hz)) / (2 * std::numbers::pi);
+  return std::abs(volume_m3) > kCompactVolume * std::pow(diagonal_m, 3) &&
+         kFirstOfCompactHz / diagonal_m > high_hz;
+}
 
 bool IsSurelyAboveBand(const ModalModel& model, const IntendedUse& use) {
   if (!model.eigenvalues.empty()) return false;

@@ -18,6 +18,7 @@
 #include "precompute/mesh/point_math.h"
 #include "precompute/modes/lower_limit.h"
 #include "precompute/modes/rigid_body.h"
+#include "precompute/modes/shape_signs.h"
 #include "precompute/modes/solution_refusals.h"
 #include "precompute/sparse/dense_blas.h"
 #include "precompute/sparse/multifrontal_cholesky.h"
@@ -53,19 +54,6 @@ void Keep(const std::vector<Eigen::Index>& which, Modes& modes) {
   const auto count = static_cast<Eigen::Index>(which.size());
   modes.eigenvalues.conservativeResize(count);
   modes.shapes.conservativeResize(Eigen::NoChange, count);
-}
-
-/// Makes the first of the large components of each shape positive, so that the sign of a shape is
-/// unique. The largest component would not do, because several components of a symmetric body are
-/// largest within rounding.
-void FixSigns(Eigen::MatrixXd& shapes) {
-  for (Eigen::Index m = 0; m < shapes.cols(); ++m) {
-    auto shape = shapes.col(m);
-    const double large = 0.99 * shape.cwiseAbs().maxCoeff();
-    const auto first =
-        std::ranges::find_if(shape, [large](double x) { return std::abs(x) >= large; });
-    if (*first < 0) shape *= -1;
-  }
 }
 
 int GuessModeCount(const SystemMatrices& system, double limit) {
@@ -165,6 +153,9 @@ class Solution {
                                                   .stiffest = StiffestNode(ordered_.matrix),
                                                   .extent_m = Diagonal(nodes_)});
   }
+
+  /// Returns a bound above which few or none of the eigenvalues lie.
+  double BoundOfHighest() const { return 4 * StiffestNode(ordered_.matrix); }
 
   /// Returns an upper bound near the lowest deformation eigenvalue.
   double BoundOfLowest() const { return LowestEigenvalueBound(nodes_, system_, options_.held); }
@@ -303,6 +294,7 @@ absl::StatusOr<Counted> CountAffordable(const Solution& solution, double limit) 
   absl::Status status = solution.CheckCount(counted.count);
   if (status.ok()) return counted;
   const int most = solution.MostModes();
+  counted.limit = std::min(counted.limit, solution.BoundOfHighest());
   const absl::StatusOr<Counted> fewer =
       LowerLimit(counted, most, [&](double lower) { return solution.CountBelow(lower); });
   return WithLowerLimit(std::move(status), solution.unknown_count(), fewer, most);

@@ -152,7 +152,7 @@ TEST_F(CarillonPrecomputeTest, SaysInWordsThatABudgetWasOverrun) {
   ASSERT_EQ(result.exit_status, 0) << result.output;
   const Json report = Json::parse(result.output);
   const std::vector<std::string> warnings = report.at("warnings");
-  ASSERT_EQ(warnings.size(), 3U);
+  ASSERT_EQ(warnings.size(), 4U);
   EXPECT_THAT(warnings[0], StartsWith("very inaccurate: "));
   EXPECT_THAT(warnings[1], StartsWith("the budget of 0.001 s of processor time was overrun: "));
   EXPECT_THAT(warnings[2], StartsWith("the budget of 0.001 GiB of memory was overrun: "));

@@ -57,7 +57,8 @@ TEST_F(ProgramFindingsTest, ABodyWithoutAModeInTheBandIsRefusedAfterOneMesh) {
 TEST_F(ProgramFindingsTest, SizePutsTheFirstModeIntoANarrowBand) {
   const Result result = RunBar(std::string(kSteel) + " --band 20:30");
   EXPECT_EQ(ReasonOf(result), "NO_MODE_IN_BAND");
-  for (const Json& remedy : Json::parse(result.output).at("error").at("remedies")) {
+  const Json error = Json::parse(result.output).at("error");
+  for (const Json& remedy : error.at("remedies")) {
     if (remedy.at("option") != "--size") continue;
     const std::string size = remedy.at("value");
     EXPECT_EQ(RunBar(std::string(kSteel) + " --band 20:30 --size " + size).exit_status, 0);
@@ -115,7 +116,8 @@ TEST_F(ProgramFindingsTest, OnlyRemediesThatHelpAnOpenSurfaceAreOffered) {
     const Result result = RunBar(kSteel);
     EXPECT_EQ(ReasonOf(result), "MESH_NOT_CLOSED");
     std::vector<std::string> options;
-    for (const Json& remedy : Json::parse(result.output).at("error").at("remedies")) {
+    const Json error = Json::parse(result.output).at("error");
+    for (const Json& remedy : error.at("remedies")) {
       options.push_back(remedy.at("option"));
     }
     return options;

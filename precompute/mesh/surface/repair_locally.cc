@@ -107,8 +107,13 @@ bool IsInFlatFace(const HalfedgeMesh& mesh, Halfedge rim, double flat_m) {
   bool continues = false;
   for (const Halfedge h : CGAL::halfedges_around_face(rim, mesh)) {
     if (plane.DistanceOf(At(mesh, mesh.target(h))) > flat_m) return false;
+    const Point from = At(mesh, mesh.source(h));
     const Point beside = At(mesh, mesh.target(mesh.next(mesh.opposite(h))));
-    continues |= plane.DistanceOf(beside) <= flat_m;
+    if (plane.DistanceOf(beside) > flat_m) continue;
+    // The rim of a flat sheet surrounds the triangles beside it; a hole does not.
+    const Point inward = Cross(plane.normal, Difference(At(mesh, mesh.target(h)), from));
+    if (Dot(inward, Difference(beside, from)) > 0) return false;
+    continues = true;
   }
   return continues;
 }
