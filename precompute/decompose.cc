@@ -331,8 +331,7 @@ absl::StatusOr<ModalModel> SolveToGoal(const Fillable& surface, const v1::Worker
     observer.OnProgress(v1::PHASE_MESH, 0);
     const absl::StatusOr<Body> body = FillGraded(surface, most_node_count, meshing, request);
     // A finer mesh that cannot be made takes nothing from the coarser one.
-    if (!body.ok() && best.ok()) return best;
-    if (!body.ok()) return body.status();
+    if (!body.ok()) return best.ok() ? std::move(best) : body.status();
     absl::StatusOr<Solved> solved = Solve(*body, request, observer);
     if (!solved.ok() && best.ok()) return best;
     if (!solved.ok()) return solved.status();
