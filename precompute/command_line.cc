@@ -2,13 +2,17 @@
 #include "precompute/command_line.h"
 
 #include <CLI/CLI.hpp>
+#include <array>
 #include <cmath>
+#include <limits>
 #include <utility>
 #include <vector>
 
 #include "absl/strings/ascii.h"
+#include "absl/strings/match.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "absl/strings/str_split.h"
 #include "precompute/fem/material.h"
 #include "precompute/worker_request.h"
@@ -34,6 +38,20 @@ struct Options {
 constexpr char kMaterialGroup[] = "Material";
 constexpr char kUseGroup[] = "Intended use";
 constexpr char kRadiationGroup[] = "Radiation";
+constexpr int kMostThreads = 4096;
+
+/// CLI11's own check states the largest double as the limit.
+const CLI::Validator& AboveZero() {
+  static const CLI::Validator validator(
+      [](const std::string& text) {
+        double value = 0;
+        const bool is_above = absl::SimpleAtod(text, &value) && value > 0 && std::isfinite(value);
+        return is_above ? std::string()
+                        : absl::StrCat("\"", text, "\" must be a number above zero");
+      },
+      "NUMBER");
+  return validator;
+}
 
 absl::Status InvalidOption(absl::string_view message) {
   return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS", message);
@@ -75,10 +93,11 @@ void AddUseOptions(CLI::App& app, Options& options, v1::WorkerRequest& request) 
          "--size", [&](double size) { SetSize(size, request); },
          "Size that the body will have, relative to the mesh [1]")
       ->group(kUseGroup);
-  app.add_option("--band", options.band,
-                 "LO:HI or HI in Hz: all modes up to natural HI are computed, one must lie in the "
-                 "band "
-                 "[20:20000; fewer modes where those are too many for 7 GiB or a minute]")
+  app.add_option(
+         "--band", options.band,
+         "LO:HI or HI in Hz: all modes up to HI (natural frequency) are computed; at least one "
+         "must lie between LO and HI "
+         "[20:20000; fewer modes where those are too many for 7 GiB or a minute]")
       ->group(kUseGroup);
   app.add_flag_function(
          "--cautious", [&](int64_t) { request.set_cautious(true); },
@@ -112,7 +131,7 @@ void AddRadiationOptions(CLI::App& app, v1::WorkerRequest& request) {
          [&](double budget_s) { request.mutable_transfer()->set_budget_s(budget_s); },
          "Seconds of processor time after which no further mode is begun; low modes come first, "
          "then the loudest [as long as the modes took, 20 at least]")
-      ->check(CLI::PositiveNumber)
+      ->check(AboveZero())
       ->group(kRadiationGroup);
 }
 
@@ -146,10 +165,10 @@ void AddOptions(CLI::App& app, Options& options, CommandLine& result) {
   AddRequestFile(app, options);
   app.add_flag("--json", result.json, "Print one JSON object");
   app.add_option("--threads", result.thread_count, "Threads (default: one a processor)")
-      ->check(CLI::NonNegativeNumber);
+      ->check(CLI::Range(0, kMostThreads));
   app.add_option("--events-fd", result.event_descriptor,
                  "Open descriptor for carillon.v1.WorkerEvent messages")
-      ->check(CLI::NonNegativeNumber);
+      ->check(CLI::Range(0, std::numeric_limits<int>::max()));
 }
 
 /// Young's modulus and Poisson's ratio, from either pair of constants.
@@ -172,6 +191,49 @@ absl::Status SetElasticity(const Options& options, v1::Material& material) {
   return absl::OkStatus();
 }
 
+/// Checks that a material without a preset has all figures without a default.
+absl::Status CheckComplete(const v1::Material& material) {
+  if (!material.preset().empty()) return absl::OkStatus();
+  std::vector<std::string> missing;
+  if (!material.has_young_pa()) missing.emplace_back("--young");
+  if (!material.has_poisson_ratio()) missing.emplace_back("--poisson");
+  if (!material.has_density_kg_per_m3()) missing.emplace_back("--density");
+  if (missing.empty()) return absl::OkStatus();
+  constexpr size_t kAll = 3;
+  return InvalidOption(absl::StrCat(
+      missing.size() == kAll ? "no material" : "the material is not complete", ": give ",
+      absl::StrJoin(missing, ", "),
+      missing.front() == "--density" ? "" : " (or --lame-lambda and --lame-mu for the elasticity)",
+      ", or --material NAME"));
+}
+
+/// A field of a material, and the option that sets it.
+struct MaterialOption {
+  const char* field;
+  const char* option;
+};
+constexpr std::array<MaterialOption, 7> kMaterialOptions = {
+    {{"young_pa", "--young"},
+     {"poisson_ratio", "--poisson"},
+     {"density_kg_per_m3", "--density"},
+     {"alpha1_s", "--alpha1"},
+     {"alpha2_per_s", "--alpha2"},
+     {"loss_factor.frequency_hz", "a frequency of --loss-factor"},
+     {"loss_factor.loss_factor", "a value of --loss-factor"}}};
+
+/// Returns the refusal of a material with the option in place of the field that it begins with.
+absl::Status NamingOptions(const absl::Status& refusal) {
+  const v1::ErrorInfo error = ToErrorInfo(refusal);
+  if (error.reason() != "INVALID_MATERIAL") return refusal;
+  for (const auto& [field, option] : kMaterialOptions) {
+    const std::string begin = absl::StrCat(field, " ");
+    if (!absl::StartsWith(error.message(), begin)) continue;
+    return Refusal(refusal.code(), error.reason(),
+                   absl::StrCat(option, " ", error.message().substr(begin.size())));
+  }
+  return refusal;
+}
+
 /// The material with every figure present; damping that nobody gave is none.
 absl::StatusOr<v1::Material> MakeMaterial(const Options& options) {
   v1::Material material;
@@ -189,13 +251,10 @@ absl::StatusOr<v1::Material> MakeMaterial(const Options& options) {
                      ReadLossFactor(options.loss_factor));
     SetLossFactor(points, material);
   }
-  if (options.material.empty() && !(material.has_young_pa() && material.has_poisson_ratio() &&
-                                    material.has_density_kg_per_m3())) {
-    return InvalidOption(
-        "no material: give --material NAME, or --young, --poisson (or --lame-lambda, "
-        "--lame-mu) and --density");
-  }
-  return ResolveMaterial(material);
+  RETURN_IF_ERROR(CheckComplete(material));
+  absl::StatusOr<v1::Material> resolved = ResolveMaterial(material);
+  if (!resolved.ok()) return NamingOptions(resolved.status());
+  return resolved;
 }
 
 /// Lower end of the band where nobody asks for one. An upper end of zero is the default.

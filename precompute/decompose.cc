@@ -29,7 +29,9 @@
 #include "precompute/modes/deformation_modes.h"
 #include "precompute/modes/solver_comparison.h"
 #include "precompute/phase_clock.h"
+#include "precompute/refined_check.h"
 #include "precompute/resolution.h"
+#include "precompute/solve_steps.h"
 #include "precompute/worker_request.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
@@ -129,31 +131,10 @@ absl::Status SaveMatrices(const SystemMatrices& system, const v1::WorkerRequest&
                            request.material().density_kg_per_m3());
 }
 
-v1::Phase PhaseOf(SolveStage stage) {
-  switch (stage) {
-    case SolveStage::kFactor:
-      return v1::PHASE_FACTOR;
-    case SolveStage::kSolve:
-      return v1::PHASE_SOLVE;
-    case SolveStage::kVerify:
-      return v1::PHASE_VERIFY;
-  }
-  return v1::PHASE_SOLVE;
-}
-
 /// The goal for a surface if nobody asked for another. Its processor time is the predicted one, so
 /// that each machine makes the same model. The prediction for thin plates is about half the time
 /// that they take.
 constexpr ResolutionGoal kUsualGoal{.accuracy = kGreatError, .budget_s = kUsualMeans.cpu_s / 2};
-
-/// Returns the steps after the assembly of the matrices, with their predicted times.
-std::vector<PlannedStep> PlanOf(const SolveCost& cost) {
-  return {{.phase = v1::PHASE_VERIFY, .predicted_s = cost.count_s},
-          {.phase = v1::PHASE_FACTOR, .predicted_s = cost.factor_s},
-          {.phase = v1::PHASE_SOLVE, .predicted_s = cost.solve_s},
-          {.phase = v1::PHASE_VERIFY, .predicted_s = cost.verify_s},
-          {.phase = v1::PHASE_WRITE, .predicted_s = cost.model_s}};
-}
 
 SolveOptions OptionsOf(v1::Solver solver, const v1::WorkerRequest& request,
                        DecompositionObserver& observer) {
@@ -222,6 +203,36 @@ absl::StatusOr<Solved> Solve(const Body& body, const v1::WorkerRequest& request,
   return Solved{std::move(model), solution.predicted_cpu_s};
 }
 
+/// Whether the request leaves the fineness of the mesh to the program. Linear elements are left as
+/// they are, because they serve comparisons.
+bool IsFinenessFree(const v1::WorkerRequest& request) {
+  const v1::MeshSettings& mesh = request.settings().mesh();
+  return !GoalOf(request).given() && mesh.target_node_count() == 0 && !mesh.keep_surface() &&
+         MeshingOf(request).nodes_per_element == 10;
+}
+
+/// Number of corner nodes of the mesh with which a mesh of few elements is compared.
+constexpr int kReferenceCornerCount = 800;
+/// Largest number of nodes of a mesh whose elements are divided for a comparison.
+constexpr size_t kMostDividedNodes = 3000;
+
+/// Compares the modes of a mesh of few elements with those of a mesh of ordinary elements: of the
+/// surface, if the body has one that can be filled, or of the mesh's divided elements.
+void CheckFewElements(const Body& body, const Fillable* surface, const v1::WorkerRequest& request,
+                      ModalModel& model) {
+  const bool can_compare =
+      surface == nullptr ? body.mesh.nodes.size() <= kMostDividedNodes : !IsFinenessFree(request);
+  if (!can_compare || !HasFewElements(body.mesh) || model.left_out_mode_count > 0) return;
+  absl::StatusOr<Body> finer = absl::UnknownError("");
+  if (surface != nullptr) {
+    finer = FillSurface(*surface, {.target_node_count = kReferenceCornerCount}, request);
+  }
+  const ElasticConstants elastic{.young_pa = 1,
+                                 .poisson_ratio = request.settings().poisson_ratio()};
+  CompareWith(finer.ok() ? finer->mesh : Refined(body.mesh), elastic, MassSharingOf(request),
+              model);
+}
+
 double PeakBytes() {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
@@ -241,17 +252,9 @@ Round Describe(const TetMesh& mesh, const ModalModel& model, double cpu_s) {
           .node_count = count,
           .uniform_node_count = count,
           .thin = nodes_per_corner * corners_on_boundary > kThin * count,
-          .worst_error = model.WorstError(),
+          .worst_error = model.eigenvalues.empty() ? model.lowest_error : model.WorstError(),
           .cpu_s = cpu_s,
           .peak_bytes = PeakBytes()};
-}
-
-/// Whether the request leaves the fineness of the mesh to the program. Linear elements are left as
-/// they are, because they serve comparisons.
-bool IsFinenessFree(const v1::WorkerRequest& request) {
-  const v1::MeshSettings& mesh = request.settings().mesh();
-  return !GoalOf(request).given() && mesh.target_node_count() == 0 && !mesh.keep_surface() &&
-         MeshingOf(request).nodes_per_element == 10;
 }
 
 /// Returns the element sizes of the mesh after `last`, with which it has the error of a uniform
@@ -292,6 +295,25 @@ MeshingSettings FirstMeshing(const v1::WorkerRequest& request) {
   return meshing;
 }
 
+/// Number of corner nodes of the mesh that shows whether a body is too small.
+constexpr int kCoarseCornerCount = 300;
+
+/// Returns a model without modes if a coarse mesh shows that the body is too small for the band, as
+/// in a wrong unit.
+std::optional<ModalModel> TooSmall(const Fillable& surface, const v1::WorkerRequest& request,
+                                   DecompositionObserver& observer) {
+  const IntendedUse use = UseOf(request);
+  if (!IsFinenessFree(request) || !MayBeTooSmall(surface.prepared.surface, use)) {
+    return std::nullopt;
+  }
+  const absl::StatusOr<Body> body =
+      FillSurface(surface, {.target_node_count = kCoarseCornerCount}, request);
+  if (!body.ok()) return std::nullopt;
+  absl::StatusOr<Solved> solved = Solve(*body, request, observer);
+  if (!solved.ok() || !IsSurelyAboveBand(solved->model, use)) return std::nullopt;
+  return std::move(solved->model);
+}
+
 /// Fills and solves a surface finer and finer until the goal is met.
 absl::StatusOr<ModalModel> SolveToGoal(const Fillable& surface, const v1::WorkerRequest& request,
                                        DecompositionObserver& observer) {
@@ -302,17 +324,19 @@ absl::StatusOr<ModalModel> SolveToGoal(const Fillable& surface, const v1::Worker
   std::vector<Round> rounds;
   RoundForecast forecast{.later_rounds = asked.given() ? kLaterRoundsAfterFirst : 0};
   absl::StatusOr<ModalModel> best = absl::UnknownError("");
+  if (auto too_small = TooSmall(surface, request, observer)) return *std::move(too_small);
   while (true) {
     const PhaseClock::Times begun = PhaseClock::Now();
     observer.OnRound(forecast);
     observer.OnProgress(v1::PHASE_MESH, 0);
     const absl::StatusOr<Body> body = FillGraded(surface, most_node_count, meshing, request);
     // A finer mesh that cannot be made takes nothing from the coarser one.
-    if (!body.ok() && best.ok()) return best;
-    if (!body.ok()) return body.status();
+    if (!body.ok()) return best.ok() ? std::move(best) : body.status();
     absl::StatusOr<Solved> solved = Solve(*body, request, observer);
     if (!solved.ok() && best.ok()) return best;
     if (!solved.ok()) return solved.status();
+    CheckFewElements(*body, &surface, request, solved->model);
+    if (IsSurelyAboveBand(solved->model, UseOf(request))) return std::move(solved->model);
     const PhaseClock::Times ended = PhaseClock::Now();
     rounds.push_back(
         Describe(body->mesh, solved->model,
@@ -337,7 +361,9 @@ absl::StatusOr<ModalModel> SolveInput(const Input& input, const v1::WorkerReques
                                       DecompositionObserver& observer) {
   const auto* surface = std::get_if<Fillable>(&input);
   if (surface != nullptr) return SolveToGoal(*surface, request, observer);
-  ASSIGN_OR_RETURN(Solved solved, Solve(std::get<Body>(input), request, observer));
+  const Body& body = std::get<Body>(input);
+  ASSIGN_OR_RETURN(Solved solved, Solve(body, request, observer));
+  CheckFewElements(body, nullptr, request, solved.model);
   return std::move(solved.model);
 }
 
@@ -358,6 +384,8 @@ absl::StatusOr<ModalModel> Decompose(std::string mesh_bytes, const v1::WorkerReq
       LeaveOutInaccurate(request.settings().max_frequency_error(), UseOf(request), model));
   WarnOfGreatErrors(model);
   WarnOfOverruns(GoalOf(request), PhaseClock::Now().cpu_seconds - begun_cpu_s, model);
+  WarnOfNodesBesideGoal(static_cast<int>(request.settings().mesh().target_node_count()),
+                        GoalOf(request), model);
   observer.OnModes(model.eigenvalues.size());
   return model;
 }

@@ -4,6 +4,7 @@
 #include <sys/resource.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -104,6 +105,32 @@ Json ModesInBand(const ModalModel& model, const Transfer* transfer, const Intend
   return modes;
 }
 
+/// The body that sounds, from which a wrong unit can be seen at once.
+Json BodyOf(const ModalModel& model, const IntendedUse& use) {
+  std::array<float, 3> low = model.vertices.front(), high = low;
+  for (const auto& vertex : model.vertices) {
+    for (size_t i = 0; i < 3; ++i) {
+      low[i] = std::min(low[i], vertex[i]);
+      high[i] = std::max(high[i], vertex[i]);
+    }
+  }
+  Json extent_m = Json::array();
+  for (size_t i = 0; i < 3; ++i) extent_m.push_back(use.size * (double{high[i]} - double{low[i]}));
+  const double volume_m3 = model.volume_m3 * std::pow(use.size, 3);
+  return {{"mass_kg", use.density_kg_per_m3 * volume_m3},
+          {"volume_m3", volume_m3},
+          {"extent_m", extent_m}};
+}
+
+/// The results of the checks that every model has passed.
+Json Verified(const Verification& verification, const IntendedUse& use) {
+  return {{"largest_residual", verification.max_residual},
+          {"largest_orthogonality_error", verification.max_orthogonality_error},
+          {"rigid_body_modes", verification.rigid_mode_count},
+          {"counted_eigenvalues", verification.sturm_count},
+          {"counted_below_hz", use.FrequencyHz(verification.sturm_eigenvalue)}};
+}
+
 Json Check(const SolverComparison& comparison) {
   if (!comparison.failure.empty()) {
     return {{"solver", comparison.solver}, {"failure", comparison.failure}};
@@ -127,6 +154,8 @@ std::string JsonReport(const ModalModel& model, const Transfer* transfer, const 
                  {"complete_to_hz", use.FrequencyHz(model.complete_to_eigenvalue)},
                  {"lowered_from_modes", model.lowered_from_mode_count},
                  {"accuracy", model.WorstError()},
+                 {"body", BodyOf(model, use)},
+                 {"verification", Verified(model.verification, use)},
                  {"warnings", model.warnings},
                  {"modes", ModesInBand(model, transfer, use)}};
   if (model.comparison) report["check"] = Check(*model.comparison);

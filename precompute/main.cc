@@ -78,9 +78,12 @@ void PrintRadiation(const Transfer& transfer, const std::string& output) {
 
 void PrintModes(const ModalModel& model, const CommandLine& asked) {
   const IntendedUse use = UseOf(asked.request);
-  std::printf("%zu modes from %.2f to %.2f Hz, %d nodes, written to %s\n", model.eigenvalues.size(),
-              use.FrequencyHz(model.eigenvalues.front()), use.FrequencyHz(model.eigenvalues.back()),
-              model.node_count, asked.output.c_str());
+  std::printf(
+      "%zu modes from %.2f to %.2f Hz, %d nodes, estimated to be off by at most %.2g %%, "
+      "written to %s\n",
+      model.eigenvalues.size(), use.FrequencyHz(model.eigenvalues.front()),
+      use.FrequencyHz(model.eigenvalues.back()), model.node_count, 100 * model.WorstError(),
+      asked.output.c_str());
   for (const std::string& warning : model.warnings) {
     std::fprintf(stderr, "warning: %s\n", warning.c_str());
   }

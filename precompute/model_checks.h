@@ -3,9 +3,19 @@
 
 #include "absl/status/status.h"
 #include "precompute/intended_use.h"
+#include "precompute/mesh/surface_mesh.h"
 #include "precompute/modes/modal_model.h"
 
 namespace carillon::precompute {
+
+/// Returns whether a body may be too small for the band, and has a default mesh that takes long
+/// because the body is compact.
+bool MayBeTooSmall(const SurfaceMesh& surface, const IntendedUse& use);
+
+/// Returns whether no finer mesh can have a mode in the band: the lowest mode lies above the band
+/// by more than twice its estimated error. A coarse mesh tells this as well as a fine one, because
+/// its frequencies are too high by little.
+bool IsSurelyAboveBand(const ModalModel& model, const IntendedUse& use);
 
 /// Returns OK if a mode lies in the band of `use`.
 /// Errors: NO_MODE_IN_BAND with the figure first_mode_hz.

@@ -18,11 +18,14 @@ void WarnOfLowerBand(const DeformationModes& solution, const IntendedUse& use, d
           ? absl::StrFormat("ask for that band (--band %g:%g) to have them all", use.low_hz,
                             use.high_hz)
           : absl::StrFormat("a higher band (--band) may have at most %d modes", kMaxModeCount);
+  // A larger expected number is not stored.
+  const char* const about =
+      solution.mode_count_below_asked > 0.99 * kMostExpectedModes ? "more than" : "some";
   model.warnings.push_back(absl::StrFormat(
-      "only the %d modes below %.5g Hz were computed, because all of some %d below %g Hz would "
+      "only the %d modes below %.5g Hz were computed, because all of %s %d below %g Hz would "
       "need more than %d GiB or %g s of processor time; if the body is not %.3g m long, state the "
       "unit of its file (--unit); %s, or keep the most audible of them (--keep)",
-      model.eigenvalues.size(), complete_hz, solution.mode_count_below_asked, use.high_hz,
+      model.eigenvalues.size(), complete_hz, about, solution.mode_count_below_asked, use.high_hz,
       kUsualMeans.bytes >> 30U, kUsualMeans.cpu_s, use.size * extent_m, more));
 }
 
@@ -35,6 +38,14 @@ void WarnOfGreatErrors(ModalModel& model) {
       "%g %%, the worst by %.3g %%; ask for a finer mesh (--accuracy, --budget or --nodes), or "
       "leave these modes out (--max-frequency-error)",
       many, model.eigenvalues.size(), 100 * kGreatError, 100 * model.WorstError()));
+}
+
+void WarnOfNodesBesideGoal(int asked_corner_count, const ResolutionGoal& goal, ModalModel& model) {
+  if (asked_corner_count == 0 || !goal.given()) return;
+  model.warnings.push_back(absl::StrFormat(
+      "the %d nodes asked for (--nodes, target_node_count) are those of the first mesh only; the "
+      "accuracy or the budget decides how fine the last one is",
+      asked_corner_count));
 }
 
 void WarnOfAccuracy(const ResolutionGoal& goal, ModalModel& model) {

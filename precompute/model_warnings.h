@@ -8,6 +8,10 @@
 
 namespace carillon::precompute {
 
+/// Warns that the number of nodes asked for is that of the first mesh, if the request also has a
+/// goal, which decides the last one.
+void WarnOfNodesBesideGoal(int asked_corner_count, const ResolutionGoal& goal, ModalModel& model);
+
 /// The cost of a body above which modes of a band that nobody asked for are left out.
 inline constexpr Means kUsualMeans{.bytes = size_t{7} << 30U, .cpu_s = 60};
 /// Largest estimated error of a frequency that goes without a warning: nearly two semitones.

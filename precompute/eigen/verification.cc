@@ -90,8 +90,7 @@ BlockRow RelativeResiduals(const NodeMatrix& A, const VectorBlock& elastic,
 double ResidualOfRounding(double stiffest, double eigenvalue) {
   // Measured on slender rods, fixed and free: 2 to 5 times the spacing of doubles.
   constexpr double kDigits = 16 * std::numeric_limits<double>::epsilon();
-  constexpr double kMost = 1e-3;
-  return std::min(kMost, kDigits * stiffest / std::abs(eigenvalue));
+  return std::min(kMostRounding, kDigits * stiffest / std::abs(eigenvalue));
 }
 
 double StiffestNode(const NodeMatrix& A) {

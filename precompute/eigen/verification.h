@@ -26,9 +26,12 @@ struct Verification {
 inline constexpr double kMaxResidual = 1e-5;
 inline constexpr double kMaxOrthogonalityError = 1e-7;
 
+/// Largest value of ResidualOfRounding().
+inline constexpr double kMostRounding = 1e-3;
+
 /// Returns the residual that an exact mode has because of rounding. The product with K has an error
 /// relative to its stiffest node, which on a slender body is 1e12 times as stiff as the lowest
-/// mode. The result is at most a thousandth.
+/// mode. The result is at most kMostRounding.
 double ResidualOfRounding(double stiffest, double eigenvalue);
 
 /// Returns the largest ratio K_ii / M_ii of the diagonal entries.

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "precompute/eigen/block_lanczos_eigensolver.h"
@@ -14,8 +15,11 @@
 #include "precompute/eigen/solve_cost.h"
 #include "precompute/eigen/sparse_eigensolver.h"
 #include "precompute/fem/held_nodes.h"
+#include "precompute/mesh/point_math.h"
 #include "precompute/modes/lower_limit.h"
 #include "precompute/modes/rigid_body.h"
+#include "precompute/modes/shape_signs.h"
+#include "precompute/modes/solution_refusals.h"
 #include "precompute/sparse/dense_blas.h"
 #include "precompute/sparse/multifrontal_cholesky.h"
 #include "precompute/sparse/multifrontal_inertia.h"
@@ -39,11 +43,6 @@ constexpr double kRounding = 1e-12;
 /// Time of the dense solver divided by the cube of the number of unknowns; see PrefersDense.
 constexpr double kDenseSeconds = 1.4e-10;
 
-absl::Status VerificationFailed(const std::string& what) {
-  return Refusal(absl::StatusCode::kInternal, "VERIFICATION_FAILED",
-                 absl::StrCat(what, "; no model was made; another number of nodes may do"));
-}
-
 /// Keeps the modes with these indices (ascending). Works in place, because shapes fill gigabytes.
 void Keep(const std::vector<Eigen::Index>& which, Modes& modes) {
   for (size_t k = 0; k < which.size(); ++k) {
@@ -55,31 +54,6 @@ void Keep(const std::vector<Eigen::Index>& which, Modes& modes) {
   const auto count = static_cast<Eigen::Index>(which.size());
   modes.eigenvalues.conservativeResize(count);
   modes.shapes.conservativeResize(Eigen::NoChange, count);
-}
-
-/// Makes the first of the large components of each shape positive, so that the sign of a shape is
-/// unique. The largest component would not do, because several components of a symmetric body are
-/// largest within rounding.
-void FixSigns(Eigen::MatrixXd& shapes) {
-  for (Eigen::Index m = 0; m < shapes.cols(); ++m) {
-    auto shape = shapes.col(m);
-    const double large = 0.99 * shape.cwiseAbs().maxCoeff();
-    const auto first =
-        std::ranges::find_if(shape, [large](double x) { return std::abs(x) >= large; });
-    if (*first < 0) shape *= -1;
-  }
-}
-
-absl::Status TooManyModes(int count, int limit) {
-  const std::string keep =
-      limit < kMaxFoundModeCount
-          ? absl::StrCat(
-                ", or keep only the most audible (--keep, keep_mode_count), which may be of ",
-                kMaxFoundModeCount)
-          : "";
-  return Refusal(absl::StatusCode::kInvalidArgument, "TOO_MANY_MODES",
-                 absl::StrCat(count, " modes lie below the top of the band; the limit is ", limit,
-                              "; lower the band's upper frequency", keep));
 }
 
 int GuessModeCount(const SystemMatrices& system, double limit) {
@@ -132,8 +106,8 @@ class Solution {
   /// Returns the number of modes that is expected below the limit, independent of the mesh. It is
   /// rarely too high.
   int ExpectedCount(double limit) const {
-    constexpr double kMost = 1e9;
-    return rigid_mode_count() + static_cast<int>(std::min(WeylModeCount(system_, limit), kMost));
+    return rigid_mode_count() +
+           static_cast<int>(std::min(WeylModeCount(system_, limit), kMostExpectedModes));
   }
 
   int unknown_count() const { return static_cast<int>(system_.unknown_count()); }
@@ -150,10 +124,12 @@ class Solution {
     return absl::OkStatus();
   }
 
+  /// Returns the largest number of modes, rigid-body ones included, that the options allow.
+  int MostModes() const { return rigid_mode_count() + options_.max_mode_count; }
+
   /// Returns the largest number of modes, rigid-body ones included, that the means allow.
   int MostAffordable() const {
-    return LargestThat(rigid_mode_count() + kAlwaysAffordable,
-                       rigid_mode_count() + options_.max_mode_count,
+    return LargestThat(rigid_mode_count() + kAlwaysAffordable, MostModes(),
                        [this](int count) { return IsAffordable(count); });
   }
 
@@ -169,6 +145,17 @@ class Solution {
       watch_(SolveStage::kSolve, done);
     });
   }
+
+  /// Returns the refusal, or one that names the slenderness of the body if that is the cause.
+  absl::Status Explained(absl::Status refusal) const {
+    if (refusal.ok()) return refusal;
+    return NamingSlenderness(std::move(refusal), {.lowest_eigenvalue = BoundOfLowest(),
+                                                  .stiffest = StiffestNode(ordered_.matrix),
+                                                  .extent_m = Diagonal(nodes_)});
+  }
+
+  /// Returns a bound above which few or none of the eigenvalues lie.
+  double BoundOfHighest() const { return 4 * StiffestNode(ordered_.matrix); }
 
   /// Returns an upper bound near the lowest deformation eigenvalue.
   double BoundOfLowest() const { return LowestEigenvalueBound(nodes_, system_, options_.held); }
@@ -192,7 +179,10 @@ class Solution {
     result.verification.rigid_mode_count =
         static_cast<int>(all.shapes.cols()) - static_cast<int>(kept.size());
     const Eigen::Index free_motions = (all.eigenvalues.array() < FreeMotionBound(limit)).count();
-    if (free_motions > rigid_mode_count()) return SeveralPieces(free_motions);
+    if (free_motions > rigid_mode_count()) {
+      return SeveralPieces(static_cast<int>(free_motions), rigid_mode_count(),
+                           !options_.held.empty());
+    }
     Keep(kept, all);
     result.modes = std::move(all);
     FixSigns(result.modes.shapes);
@@ -264,18 +254,6 @@ class Solution {
     return absl::OkStatus();
   }
 
-  absl::Status SeveralPieces(Eigen::Index free_motions) const {
-    return Refusal(absl::StatusCode::kInvalidArgument, "BODY_IN_SEVERAL_PIECES",
-                   absl::StrCat("the body can move in ", free_motions,
-                                " ways without bending, a body "
-                                "in one piece",
-                                options_.held.empty()
-                                    ? " in six"
-                                    : absl::StrCat(" fixed as this one in ", rigid_mode_count()),
-                                ": parts of it are separate, or hang together by an "
-                                "edge or a point only; join them, or make each a body of its own"));
-  }
-
   absl::Status Check(const Verification& proof) const {
     if (proof.rigid_mode_count != rigid_mode_count()) {
       return VerificationFailed(absl::StrCat(
@@ -313,8 +291,13 @@ absl::StatusOr<Counted> CountAffordable(const Solution& solution, double limit) 
     ASSIGN_OR_RETURN(counted, LowerLimit(counted, solution.MostAffordable(),
                                          [&](double lower) { return solution.CountBelow(lower); }));
   }
-  RETURN_IF_ERROR(solution.CheckCount(counted.count));
-  return counted;
+  absl::Status status = solution.CheckCount(counted.count);
+  if (status.ok()) return counted;
+  const int most = solution.MostModes();
+  counted.limit = std::min(counted.limit, solution.BoundOfHighest());
+  const absl::StatusOr<Counted> fewer =
+      LowerLimit(counted, most, [&](double lower) { return solution.CountBelow(lower); });
+  return WithLowerLimit(std::move(status), solution.unknown_count(), fewer, most);
 }
 
 /// Handles a body without a mode below the limit: finds its lowest mode with one more
@@ -323,22 +306,14 @@ absl::StatusOr<DeformationModes> FindLowest(const Solution& solution, double lim
   const double above = solution.BoundOfLowest();
   ASSIGN_OR_RETURN(Modes lowest, solution.SolveLowest(solution.rigid_mode_count() + 1, above));
   ASSIGN_OR_RETURN(DeformationModes result, solution.Verify(std::move(lowest), above));
-  result.modes = {};
+  result.above = std::exchange(result.modes, {});
   result.residuals.resize(0);
   result.complete_to_eigenvalue = limit;
   return result;
 }
 
-}  // namespace
-
-absl::StatusOr<DeformationModes> SolveDeformationModes(const SystemMatrices& system,
-                                                       const std::vector<Point>& nodes,
-                                                       double eigenvalue_limit,
-                                                       const SolveWatch& watch,
-                                                       const SolveOptions& options) {
-  ASSIGN_OR_RETURN(OrderedSystem ordered, OrderedSystem::Make(system));
-  RETURN_IF_ERROR(CheckMemory(PredictSolveCost(ordered, 1, ThreadCount())));
-  const Solution solution(system, std::move(ordered), nodes, watch, options);
+/// Counts, finds and verifies the modes, several times if necessary.
+absl::StatusOr<DeformationModes> Solve(const Solution& solution, double eigenvalue_limit) {
   absl::Status failure;
   for (int attempt = 0; attempt < kMaxAttempts; ++attempt) {
     const absl::StatusOr<Counted> counted =
@@ -371,6 +346,21 @@ absl::StatusOr<DeformationModes> SolveDeformationModes(const SystemMatrices& sys
   return failure;
 }
 
+}  // namespace
+
+absl::StatusOr<DeformationModes> SolveDeformationModes(const SystemMatrices& system,
+                                                       const std::vector<Point>& nodes,
+                                                       double eigenvalue_limit,
+                                                       const SolveWatch& watch,
+                                                       const SolveOptions& options) {
+  ASSIGN_OR_RETURN(OrderedSystem ordered, OrderedSystem::Make(system));
+  RETURN_IF_ERROR(CheckMemory(PredictSolveCost(ordered, 1, ThreadCount())));
+  const Solution solution(system, std::move(ordered), nodes, watch, options);
+  absl::StatusOr<DeformationModes> result = Solve(solution, eigenvalue_limit);
+  if (!result.ok()) return solution.Explained(result.status());
+  return result;
+}
+
 absl::StatusOr<DeformationModes> SolveDeformationModes(const SystemMatrices& system,
                                                        const TetMesh& mesh, double eigenvalue_limit,
                                                        const SolveWatch& watch,
@@ -383,7 +373,9 @@ absl::StatusOr<DeformationModes> SolveDeformationModes(const SystemMatrices& sys
   ASSIGN_OR_RETURN(
       DeformationModes result,
       SolveDeformationModes(system, PlacesOf(moving, mesh), eigenvalue_limit, watch, options));
-  result.modes.shapes = Extended(result.modes.shapes, moving, mesh.nodes.size());
+  for (Modes* modes : {&result.modes, &result.above}) {
+    modes->shapes = Extended(modes->shapes, moving, mesh.nodes.size());
+  }
   return result;
 }
 

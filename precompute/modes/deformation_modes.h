@@ -35,6 +35,8 @@ struct DeformationModes {
   int mode_count_below_asked = 0;
   /// The eigenvalue of the lowest deformation mode, even if it lies above the limit.
   double lowest_eigenvalue = 0;
+  /// The lowest deformation mode of a body that has no mode below the limit, otherwise nothing.
+  Modes above;
   /// Processor time, s, that PredictSolveCost() predicts for the modes found.
   double predicted_cpu_s = 0;
   SolveWork work;
@@ -45,6 +47,9 @@ struct DeformationModes {
 inline constexpr int kMaxModeCount = 5000;
 /// Largest number of modes that may be found if only the most audible ones are kept.
 inline constexpr int kMaxFoundModeCount = 20'000;
+
+/// Largest expected number of modes that is told; more are told as this many.
+inline constexpr double kMostExpectedModes = 1e9;
 
 /// The stages of a solution. Counting the modes comes first and belongs to kVerify.
 enum class SolveStage { kFactor, kSolve, kVerify };

@@ -38,6 +38,11 @@ std::vector<float> ShapesOnSurface(const SoundingSurface& surface, const Eigen::
   return result;
 }
 
+double ErrorOfLowest(const TetMesh& mesh, const ElasticConstants& elastic, const Modes& above) {
+  if (above.eigenvalues.size() == 0) return 0;
+  return EstimateFrequencyErrors(mesh, elastic, above).errors[0];
+}
+
 }  // namespace
 
 ModalModel MakeModalModel(const TetMesh& mesh, const SurfaceMesh& given,
@@ -50,6 +55,7 @@ ModalModel MakeModalModel(const TetMesh& mesh, const SurfaceMesh& given,
                    .complete_to_eigenvalue = solution.complete_to_eigenvalue,
                    .lowered_from_mode_count = solution.mode_count_below_asked,
                    .lowest_eigenvalue = solution.lowest_eigenvalue,
+                   .lowest_error = ErrorOfLowest(mesh, elastic, solution.above),
                    .verification = solution.verification,
                    .comparison = {},
                    .left_out_mode_count = 0,

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "proto/cpp/decomposition_settings.h"
+#include "proto/cpp/error_reason.h"
 #include "proto/cpp/fixture_text.h"
 #include "proto/cpp/parsed_option.h"
 #include "proto/cpp/quantity.h"
@@ -29,6 +30,11 @@ void AddChoice(CLI::App& app, const std::string& name, const std::map<std::strin
       ->group(kSettingsGroup);
 }
 
+/// Zero stands for a body without a wall.
+std::optional<double> ParseWallM(const std::string& text) {
+  return text == "0" ? std::optional(0.0) : ParseLengthM(text);
+}
+
 void AddBody(CLI::App& app, Settings& settings) {
   AddParsed(app, "--unit", ParseUnitM, "m, mm, cm, in, or a number of metres above zero",
             "unit of the file's coordinates: m, mm, cm, in, or a number of metres [m]",
@@ -39,7 +45,7 @@ void AddBody(CLI::App& app, Settings& settings) {
          "repair a surface that does not bound one body: gently first, else by wrapping it; the "
          "model's warnings say what was done and how far the surface moved")
       ->group(kSettingsGroup);
-  AddParsed(app, "--wall", ParseLengthM, "a length above zero, such as 3mm or 0.003",
+  AddParsed(app, "--wall", ParseWallM, "a length, such as 3mm or 0.003, or 0 for no wall",
             "hollow the body out to a wall of this thickness, or thicken an open sheet: a number "
             "with m, mm, cm or in, or of metres",
             [&](double metres) { settings.mutable_mesh()->set_wall_m(metres); })
@@ -49,7 +55,7 @@ void AddBody(CLI::App& app, Settings& settings) {
          [&](const std::string& text) {
            const absl::StatusOr<v1::Fixture> fixture = ParseFixture(text);
            if (!fixture.ok()) {
-             throw CLI::ValidationError("--fix", std::string(fixture.status().message()));
+             throw CLI::ValidationError("--fix", ToErrorInfo(fixture.status()).message());
            }
            *settings.add_fixtures() = *fixture;
          },

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
 #include "precompute/mesh/fill/element_size.h"
 #include "precompute/mesh/fill/fill_with_tetgen.h"
 #include "precompute/mesh/fill/midside_nodes.h"
@@ -108,6 +109,24 @@ double AutomaticEdge(const Extent& extent) {
   const double edge = std::min(1 / kEdgesAlongBody, kEdgesPerThickness * thickness);
   return std::clamp(edge, EdgeForElements(extent, kMaxElements),
                     EdgeForElements(extent, kMinElements));
+}
+
+/// Triangles that are this many times as long as wide make the mesher fail.
+constexpr double kVeryNarrow = 500;
+
+/// The largest ratio of a triangle's longest edge to its height above that edge.
+double NarrownessOf(const SurfaceMesh& surface) {
+  double narrowest = 0;
+  for (size_t t = 0; t < surface.triangles.size(); ++t) {
+    const auto corners = CornersOf(surface, t);
+    double longest = 0;
+    for (size_t i = 0; i < 3; ++i) {
+      longest = std::max(longest, Distance(corners[i], corners[(i + 1) % 3]));
+    }
+    const double double_area = Norm(AreaNormal(corners));
+    if (double_area > 0) narrowest = std::max(narrowest, longest * longest / double_area);
+  }
+  return narrowest;
 }
 
 absl::Status CheckVolumes(const TetMesh& mesh, double surface_volume) {
@@ -307,7 +326,24 @@ class Filler {
     if (!keep_surface) try_another(false, settings_.cautious);
     if (!settings_.cautious) try_another(true, true);
     if (!settings_.cautious && !keep_surface) try_another(false, true);
+    if (!first.ok()) return Explained(first.status());
     return first;
+  }
+
+  /// Returns the refusal, with the cause if the surface has very narrow triangles.
+  absl::Status Explained(const absl::Status& refusal) const {
+    const double narrowest = NarrownessOf(surface_);
+    const v1::ErrorInfo error = ToErrorInfo(refusal);
+    if (error.reason() != "MESH_TETRAHEDRALIZATION_FAILED" || narrowest < kVeryNarrow) {
+      return refusal;
+    }
+    absl::Status explained = Refusal(
+        refusal.code(), error.reason(),
+        absl::StrFormat("the mesher failed on triangles up to %.0f times as long as wide: divide "
+                        "them, or make a slender body thicker or shorter",
+                        narrowest));
+    AddFigure(explained, "narrowness", absl::StrFormat("%.0f", narrowest));
+    return explained;
   }
 
   absl::StatusOr<TetMesh> FillAndCheck(const FillRequest& request) const {

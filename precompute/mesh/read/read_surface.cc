@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "precompute/mesh/read/read_surface.h"
 
+#include <assimp/MemoryIOWrapper.h>
 #include <assimp/mesh.h>
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
@@ -20,6 +21,8 @@
 #include "absl/status/status.h"
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_replace.h"
+#include "absl/strings/strip.h"
 #include "precompute/mesh/read/clean_surface_file.h"
 #include "precompute/mesh/read/merge_vertices.h"
 #include "precompute/mesh/read/obj_groups.h"
@@ -52,8 +55,14 @@ absl::Status RefuseSurface(absl::string_view reason, absl::string_view message) 
 }
 
 absl::Status Unreadable(absl::string_view format, absl::string_view what) {
+  // assimp names a file of its own for bytes in memory, and ends some messages with a full stop.
+  const std::string all =
+      absl::StrReplaceAll(what, {{absl::StrCat(AI_MEMORYIO_MAGIC_FILENAME, ".", format), "it"}});
+  absl::string_view reason = all;
+  while (absl::ConsumeSuffix(&reason, ".")) {
+  }
   return RefuseSurface("MESH_UNREADABLE",
-                       absl::StrCat("the file cannot be read as ", format, ": ", what,
+                       absl::StrCat("the file cannot be read as ", format, ": ", reason,
                                     ". Name its right format, or export it again"));
 }
 

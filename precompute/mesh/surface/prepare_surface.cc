@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "absl/status/status.h"
-#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
 #include "precompute/mesh/point_math.h"
 #include "precompute/mesh/surface/check_surface.h"
 #include "precompute/mesh/surface/coarsen_surface.h"
@@ -74,6 +74,46 @@ absl::StatusOr<Warnings> RepairWithoutWrapping(RepairedSurface& repaired) {
   return sound;
 }
 
+/// Part of the diagonal above which the width of a hole, as WidestHole measures it, is too great
+/// for a wrap: twice the width that the wrap closes, because a slit has twice its width.
+constexpr double kWideHolePart = 2 * kWrappedHolePart;
+
+absl::Status WideHole(double width_m, double diagonal_m) {
+  return Refusal(
+      absl::StatusCode::kInvalidArgument, "MESH_NOT_CLOSED",
+      absl::StrFormat(
+          "the surface has a hole about %.3g m wide, which repair does not close: it fills holes "
+          "in "
+          "flat faces, other holes whose rim is shorter than %.3g m if all of them have at most a "
+          "twentieth of the area, and by wrapping those narrower than %.3g m; close the hole, or, "
+          "if "
+          "the surface is a thin wall, give it a thickness (--wall)",
+          width_m, diagonal_m, kWrappedHolePart * diagonal_m));
+}
+
+/// Returns a refusal if the surface, repaired but for wrapping, has a hole that a wrap would enter.
+absl::Status CheckHoles(const absl::Status& sound, const SurfaceMesh& surface) {
+  if (!Is(sound, "MESH_NOT_CLOSED")) return absl::OkStatus();
+  const double width_m = WidestHole(surface), diagonal_m = Diagonal(surface.vertices);
+  if (width_m <= kWideHolePart * diagonal_m) return absl::OkStatus();
+  return WideHole(width_m, diagonal_m);
+}
+
+/// Adds figures to the refusal of an open surface, from which remedies follow: whether repair can
+/// close it, and whether it is a solid body that lacks parts of flat faces rather than a thin wall.
+absl::Status WithRemediesOfHoles(absl::Status refusal, const SurfaceMesh& given) {
+  if (!Is(refusal, "MESH_NOT_CLOSED")) return refusal;
+  RepairedSurface repaired = RepairSoup(given);
+  const auto flat = CloseFlatFaces(repaired.surface);
+  const bool lacks_flat_parts = flat && CheckSurface(flat->surface).ok();
+  const bool repair_helps =
+      lacks_flat_parts ||
+      CheckHoles(RepairWithoutWrapping(repaired).status(), repaired.surface).ok();
+  AddFigure(refusal, "repair_helps", repair_helps ? "1" : "0");
+  AddFigure(refusal, "wall_helps", lacks_flat_parts ? "0" : "1");
+  return refusal;
+}
+
 /// Repairs the surface until it passes the checks, and describes the repairs in `warnings`.
 absl::StatusOr<SurfaceMesh> Repair(const SurfaceMesh& given, Warnings& warnings) {
   RepairedSurface repaired = RepairSoup(given);
@@ -84,6 +124,7 @@ absl::StatusOr<SurfaceMesh> Repair(const SurfaceMesh& given, Warnings& warnings)
     return std::move(repaired.surface);
   }
   if (BeyondRepair(sound.status())) return sound.status();
+  RETURN_IF_ERROR(CheckHoles(sound.status(), repaired.surface));
   ASSIGN_OR_RETURN(RepairedSurface wrapped, WrapSurface(repaired.surface));
   AddTo(warnings, repaired.remarks);
   AddTo(warnings, wrapped.remarks);
@@ -92,7 +133,12 @@ absl::StatusOr<SurfaceMesh> Repair(const SurfaceMesh& given, Warnings& warnings)
 
 absl::StatusOr<RepairedSurface> WithWall(const SurfaceMesh& surface, const absl::Status& sound,
                                          double wall_m) {
-  return sound.ok() ? HollowOut(surface, wall_m) : Thicken(surface, wall_m);
+  if (sound.ok()) return HollowOut(surface, wall_m);
+  absl::StatusOr<RepairedSurface> thickened = Thicken(surface, wall_m);
+  if (thickened.ok()) return thickened;
+  absl::Status refusal = thickened.status();
+  AddFigure(refusal, "open", "1");  // so that no remedy leaves out the wall
+  return refusal;
 }
 
 }  // namespace
@@ -108,10 +154,17 @@ absl::StatusOr<PreparedSurface> PrepareSurface(const SurfaceMesh& given,
   if (!sound.ok() && settings.repair && !(settings.wall_m > 0 && Is(sound, "MESH_NOT_CLOSED"))) {
     absl::StatusOr<SurfaceMesh> repaired = Repair(given, prepared.warnings);
     sound = repaired.status();
-    if (repaired.ok()) prepared.surface = *std::move(repaired);
+    if (repaired.ok()) {
+      prepared.surface = *std::move(repaired);
+      prepared.warnings.emplace_back(
+          "the stated errors are those of the repaired body; the difference between its shape and "
+          "that of the real body adds to them");
+    }
   }
   const bool thickens = settings.wall_m > 0 && Is(sound, "MESH_NOT_CLOSED");
-  if (!sound.ok() && !thickens) return sound;
+  if (!sound.ok() && !thickens) {
+    return settings.repair ? sound : WithRemediesOfHoles(sound, given);
+  }
   if (settings.wall_m > 0) {
     ASSIGN_OR_RETURN(RepairedSurface walled, WithWall(prepared.surface, sound, settings.wall_m));
     prepared.surface = std::move(walled.surface);

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <iterator>
@@ -42,6 +43,10 @@ constexpr double kUntangledPart = 1e-3;
 /// Greatest distance of a hole's rim from a plane in which the hole is filled, as a part of the
 /// diagonal.
 constexpr double kFlatPart = 1e-6;
+/// A hole in a flat face has at most this many edges.
+constexpr int kMostFlatEdges = 8;
+/// Distance from a plane within which a hole lies in a flat face, as a part of the diagonal.
+constexpr double kFlatFacePart = 1e-5;
 /// Rings of triangles about overlapping ones that are replaced, too, where fewer do not suffice.
 constexpr int kMostRings = 3;
 constexpr std::chrono::seconds kMostRepairCpu(60);
@@ -61,20 +66,92 @@ std::optional<HalfedgeMesh> ToHalfedges(const SurfaceMesh& surface) {
   return mesh;
 }
 
+Point At(const HalfedgeMesh& mesh, HalfedgeMesh::Vertex_index vertex) {
+  const auto& p = mesh.point(vertex);
+  return {p.x(), p.y(), p.z()};
+}
+
+/// The plane of a closed polygon by Newell's method; the normal has twice the polygon's area.
+struct Rim {
+  Point middle{0, 0, 0};
+  Point normal{0, 0, 0};
+  int edge_count = 0;
+
+  double DistanceOf(const Point& p) const {
+    return std::abs(Dot(Difference(p, middle), normal)) / Norm(normal);
+  }
+};
+
+Rim MeasureRim(const HalfedgeMesh& mesh, Halfedge rim) {
+  Rim result;
+  const Point origin = At(mesh, mesh.target(rim));
+  for (const Halfedge h : CGAL::halfedges_around_face(rim, mesh)) {
+    const Point a = Difference(At(mesh, mesh.source(h)), origin);
+    const Point b = Difference(At(mesh, mesh.target(h)), origin);
+    const Point turn = Cross(a, b);
+    for (size_t i = 0; i < 3; ++i) {
+      result.normal[i] += turn[i];
+      result.middle[i] += a[i];
+    }
+    ++result.edge_count;
+  }
+  for (size_t i = 0; i < 3; ++i)
+    result.middle[i] = origin[i] + result.middle[i] / result.edge_count;
+  return result;
+}
+
+/// Whether the hole is a part of a flat face, see CloseFlatFaces.
+bool IsInFlatFace(const HalfedgeMesh& mesh, Halfedge rim, double flat_m) {
+  const Rim plane = MeasureRim(mesh, rim);
+  if (plane.edge_count > kMostFlatEdges || !(Norm(plane.normal) > 0)) return false;
+  bool continues = false;
+  for (const Halfedge h : CGAL::halfedges_around_face(rim, mesh)) {
+    if (plane.DistanceOf(At(mesh, mesh.target(h))) > flat_m) return false;
+    const Point from = At(mesh, mesh.source(h));
+    const Point beside = At(mesh, mesh.target(mesh.next(mesh.opposite(h))));
+    if (plane.DistanceOf(beside) > flat_m) continue;
+    // The rim of a flat sheet surrounds the triangles beside it; a hole does not.
+    const Point inward = Cross(plane.normal, Difference(At(mesh, mesh.target(h)), from));
+    if (Dot(inward, Difference(beside, from)) > 0) return false;
+    continues = true;
+  }
+  return continues;
+}
+
+bool CloseInPlane(HalfedgeMesh& mesh, Halfedge rim, double flat_m) {
+  std::vector<HalfedgeMesh::Face_index> faces;
+  pmp::triangulate_hole(
+      mesh, rim, std::back_inserter(faces),
+      CGAL::parameters::use_2d_constrained_delaunay_triangulation(true).threshold_distance(flat_m));
+  return !faces.empty();
+}
+
+/// Limits of the holes that FillAll fills.
+struct HoleLimits {
+  double longest_rim_m;  ///< of holes that are not in flat faces
+  double flat_m;         ///< distance from a plane within which points count as lying in it
+};
+
 /// Fills every hole. Returns nothing where a rim is too long, or a hole cannot be filled.
-std::string FillAll(HalfedgeMesh mesh, double longest_rim) {
+std::string FillAll(HalfedgeMesh mesh, const HoleLimits& limits) {
   const double area = pmp::area(mesh);
+  double patch_area = 0;
   std::vector<Halfedge> rims;
   pmp::extract_boundary_cycles(mesh, std::back_inserter(rims));
   for (const Halfedge rim : rims) {
-    if (pmp::face_border_length(rim, mesh) > longest_rim) return "";
+    if (IsInFlatFace(mesh, rim, limits.flat_m)) {
+      if (!CloseInPlane(mesh, rim, limits.flat_m)) return "";
+      continue;
+    }
+    if (pmp::face_border_length(rim, mesh) > limits.longest_rim_m) return "";
     std::vector<HalfedgeMesh::Face_index> faces;
     std::vector<HalfedgeMesh::Vertex_index> vertices;
     pmp::triangulate_refine_and_fair_hole(mesh, rim, std::back_inserter(faces),
                                           std::back_inserter(vertices));
     if (faces.empty()) return "";
+    patch_area += pmp::area(faces, mesh);
   }
-  if (pmp::area(mesh) > area * (1 + kPatchPart)) return "";
+  if (patch_area > area * kPatchPart) return "";
   return ToBytes(std::move(mesh));
 }
 
@@ -84,12 +161,7 @@ std::string CloseAll(HalfedgeMesh mesh, double flat_m) {
   std::vector<Halfedge> rims;
   pmp::extract_boundary_cycles(mesh, std::back_inserter(rims));
   for (const Halfedge rim : rims) {
-    std::vector<HalfedgeMesh::Face_index> faces;
-    pmp::triangulate_hole(
-        mesh, rim, std::back_inserter(faces),
-        CGAL::parameters::use_2d_constrained_delaunay_triangulation(true).threshold_distance(
-            flat_m));
-    if (faces.empty()) return "";
+    if (!CloseInPlane(mesh, rim, flat_m)) return "";
   }
   pmp::remove_isolated_vertices(mesh);
   return ToBytes(std::move(mesh));
@@ -181,17 +253,44 @@ std::optional<RepairedSurface> IfNear(const SurfaceMesh& surface, SurfaceMesh re
 
 }  // namespace
 
+std::optional<RepairedSurface> CloseFlatFaces(const SurfaceMesh& surface) {
+  const HoleLimits limits{.longest_rim_m = 0, .flat_m = kFlatFacePart * Diagonal(surface.vertices)};
+  std::optional<SurfaceMesh> closed =
+      InChild(surface, [&](HalfedgeMesh mesh) { return FillAll(std::move(mesh), limits); });
+  if (!closed) return std::nullopt;
+  return RepairedSurface{*std::move(closed),
+                         {"repaired: holes in flat faces closed in the plane of the face"}};
+}
+
 std::optional<RepairedSurface> FillHoles(const SurfaceMesh& surface) {
-  const double longest_rim = kPatchRim * Diagonal(surface.vertices);
+  if (auto closed = CloseFlatFaces(surface)) return closed;
+  const double diagonal = Diagonal(surface.vertices);
+  const HoleLimits limits{.longest_rim_m = kPatchRim * diagonal,
+                          .flat_m = kFlatFacePart * diagonal};
   std::optional<SurfaceMesh> filled =
-      InChild(surface, [=](HalfedgeMesh mesh) { return FillAll(std::move(mesh), longest_rim); });
+      InChild(surface, [&](HalfedgeMesh mesh) { return FillAll(std::move(mesh), limits); });
   if (!filled) return std::nullopt;
   const double distance = GreatestDistance(*filled, NearestTriangle(surface));
   return RepairedSurface{
       *std::move(filled),
-      {absl::StrFormat("repaired: holes filled with smooth patches, at most %.3g m from the given "
-                       "surface; if the body is open there, give it a wall instead (--wall)",
+      {absl::StrFormat("repaired: holes filled with smooth patches; the widest reaches %.3g m from "
+                       "the given surface, which is about half its width, and the true shape there "
+                       "is unknown; if the body is open there, give it a wall instead (--wall)",
                        distance)}};
+}
+
+double WidestHole(const SurfaceMesh& surface) {
+  if (FindShells(surface).size() != 1) return 0;
+  const std::optional<HalfedgeMesh> mesh = ToHalfedges(surface);
+  if (!mesh) return 0;
+  std::vector<Halfedge> rims;
+  pmp::extract_boundary_cycles(*mesh, std::back_inserter(rims));
+  double widest = 0;
+  for (const Halfedge rim : rims) {
+    const double area = Norm(MeasureRim(*mesh, rim).normal) / 2;
+    widest = std::max(widest, 4 * area / pmp::face_border_length(rim, *mesh));
+  }
+  return widest;
 }
 
 std::optional<RepairedSurface> Unfold(const SurfaceMesh& surface) {

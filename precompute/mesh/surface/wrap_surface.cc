@@ -25,7 +25,7 @@ namespace {
 
 /// Parts of the diagonal: holes wider than alpha are entered; the wrap lies an offset outside, and
 /// is then drawn back onto the surface.
-constexpr double kAlphaPart = 1.0 / 100;
+constexpr double kAlphaPart = kWrappedHolePart;
 constexpr double kOffsetPart = 1.0 / 2000;
 constexpr std::chrono::seconds kMostCpu(300);
 
@@ -151,8 +151,9 @@ absl::StatusOr<RepairedSurface> WrapSurface(const SurfaceMesh& given) {
   if (SheetPart(given, wrap, offset) > kMostSheet) {
     return Refusal(
         absl::StatusCode::kInvalidArgument, "MESH_NOT_CLOSED",
-        absl::StrFormat("the surface is a sheet that encloses nothing, or has a hole wider "
-                        "than %.3g m: close it, or give the sheet a thickness (--wall)",
+        absl::StrFormat("the surface encloses nothing, or has a hole wider than %.3g m, the widest "
+                        "that wrapping closes: close the hole, or, if the surface is a thin wall, "
+                        "give it a thickness (--wall)",
                         kAlphaPart * diagonal));
   }
   const NearestTriangle index(given);

@@ -7,6 +7,9 @@
 
 namespace carillon::precompute {
 
+/// Holes narrower than this part of the diagonal are closed by a wrap.
+inline constexpr double kWrappedHolePart = 1.0 / 100;
+
 /// Wraps a soup of triangles with a closed surface (Portaneri, Rouxel-Labbe, Hemmer, Cohen-Steiner
 /// and Alliez, Alpha wrapping with an offset, SIGGRAPH 2022). This closes gaps and holes narrower
 /// than a hundredth of the diagonal, unites parts that overlap, and drops enclosed triangles. The

@@ -130,7 +130,7 @@ TEST(DeformationModes, MoreThanTheStatedLimitAreRefused) {
   EXPECT_THAT(
       Solve(MakeTetBox({1, 1, 1}, {12, 12, 12}, 4), 1e9).status().ToString(),
       HasSubstr("TOO_MANY_MODES: 6585 modes lie below the top of the band; the limit is 5000; "
-                "lower the band's upper frequency, or keep only the most audible (--keep"));
+                "lower the band's upper frequency, or keep only the most audible modes (--keep"));
 }
 
 TEST(DeformationModes, LimitIsLoweredUntilTheMeansAllowAllModesBelowIt) {

@@ -119,7 +119,7 @@ TEST(PrepareSurface, BodiesThatCrossAreUnitedByAWrap) {
   ASSERT_TRUE(united.ok()) << united.status();
   const double volume = 0.05 * 0.05 * (0.2 + 0.2 - 0.05);
   EXPECT_NEAR(EnclosedVolume(united->surface), volume, 0.01 * volume);
-  ASSERT_EQ(united->warnings.size(), 1U);
+  ASSERT_EQ(united->warnings.size(), 2U);
   EXPECT_THAT(united->warnings[0], HasSubstr("wrapped"));
 }
 
@@ -157,6 +157,29 @@ TEST(PrepareSurface, AVesselIsNotFilledThroughItsMouth) {
   });
   EXPECT_THAT(PrepareSurface(cup, {.repair = true}).status().ToString(),
               HasSubstr("MESH_NOT_CLOSED"));
+}
+
+TEST(PrepareSurface, AHoleInAFlatFaceIsClosedWhateverItsSize) {
+  const SurfaceMesh box = MakeBoxSurface({0.1, 0.08, 0.06});
+  for (size_t lacking = 0; lacking < box.triangles.size(); ++lacking) {
+    SurfaceMesh open = box;
+    open.triangles.erase(open.triangles.begin() + static_cast<std::ptrdiff_t>(lacking));
+    const auto closed = PrepareSurface(open, {.repair = true});
+    ASSERT_TRUE(closed.ok()) << closed.status();
+    EXPECT_NEAR(EnclosedVolume(closed->surface), 0.1 * 0.08 * 0.06, 1e-10);
+    EXPECT_THAT(closed->warnings[0], HasSubstr("in the plane of the face"));
+    EXPECT_THAT(closed->warnings[1], HasSubstr("errors are those of the repaired body"));
+  }
+}
+
+TEST(PrepareSurface, AWideHoleIsNamedWithWhatRepairCloses) {
+  SurfaceMesh cup = MakeBoxSurface({0.1, 0.1, 0.2});
+  std::erase_if(cup.triangles, [&](const auto& triangle) {
+    return std::ranges::all_of(
+        triangle, [&](int32_t v) { return cup.vertices[static_cast<size_t>(v)][2] > 0.19; });
+  });
+  EXPECT_THAT(PrepareSurface(cup, {.repair = true}).status().ToString(),
+              HasSubstr("the surface has a hole about 0.1 m wide"));
 }
 
 TEST(PrepareSurface, AFoldIsUntangledWhereItIs) {

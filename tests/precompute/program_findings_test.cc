@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+//
+// What the program warns of, refuses and advises, as users see it.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "tests/precompute/carillon_precompute_run.h"
+
+namespace carillon::precompute {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+using ProgramFindingsTest = CarillonPrecomputeTest;
+
+// A bar of 12 triangles has elements as long as itself, whose first modes are off by 20 %.
+TEST_F(ProgramFindingsTest, AMeshOfFewElementsIsComparedWithAFinerOne) {
+  WriteBox(bar, {500, 20, 10});
+  const std::string options = bar + " --out " + model + " --unit mm --json" + kSteel;
+  const Json fine = Json::parse(Run(options).output).at("modes");
+  for (const char* few : {" --keep-surface", " --nodes 3", " --nodes 60"}) {
+    const Json report = Json::parse(Run(options + few).output);
+    EXPECT_THAT(report.at("warnings").at(0).get<std::string>(), HasSubstr("too few elements"));
+    const Json& modes = report.at("modes");
+    ASSERT_LT(modes.size(), fine.size());
+    for (size_t m = 0; m < modes.size(); ++m) {
+      const double truth = fine[m].at("frequency_hz");
+      const double error = modes[m].at("frequency_hz").get<double>() / truth - 1;
+      // The finer mesh of the comparison is not the finest.
+      EXPECT_GT(1.05 * modes[m].at("estimated_error").get<double>() + 0.002, error) << few << m;
+    }
+  }
+}
+
+TEST_F(ProgramFindingsTest, OrdinaryMeshesAreNotCompared) {
+  ASSERT_EQ(Run(bar + " --out " + model + " --unit mm --nodes 300" + kSteel).exit_status, 0);
+  EXPECT_EQ(OnStandardError(), "");
+}
+
+// One millimetre: its first mode, far above the band, is found on the first mesh.
+TEST_F(ProgramFindingsTest, ABodyWithoutAModeInTheBandIsRefusedAfterOneMesh) {
+  WriteBox(bar, {1, 1, 1});
+  ReasonOf(Run(bar + " --out " + model + " --unit mm --json" + kSteel));
+  rusage children{};
+  getrusage(RUSAGE_CHILDREN, &children);
+  EXPECT_LT(children.ru_maxrss, 300 << 10);  // KiB; finer meshes took 2 GiB
+}
+
+TEST_F(ProgramFindingsTest, SizePutsTheFirstModeIntoANarrowBand) {
+  const Result result = RunBar(std::string(kSteel) + " --band 20:30");
+  EXPECT_EQ(ReasonOf(result), "NO_MODE_IN_BAND");
+  const Json error = Json::parse(result.output).at("error");
+  for (const Json& remedy : error.at("remedies")) {
+    if (remedy.at("option") != "--size") continue;
+    const std::string size = remedy.at("value");
+    EXPECT_EQ(RunBar(std::string(kSteel) + " --band 20:30 --size " + size).exit_status, 0);
+    return;
+  }
+  FAIL() << "no size";
+}
+
+TEST_F(ProgramFindingsTest, TheRemediesOfTooManyModesWork) {
+  const std::string options = bar + " --out " + model +
+                              " --unit mm --json --element linear --nodes 1700 --size 300" + kSteel;
+  const Result result = Run(options + " --band 20:1e9");
+  EXPECT_EQ(ReasonOf(result), "TOO_MANY_MODES");
+  const Json remedies = Json::parse(result.output).at("error").at("remedies");
+  EXPECT_EQ(remedies.size(), 2U);  // most of the modes are those of the mesh, so that none are kept
+  const std::string band = remedies.at(1).at("value");
+  const double high_hz = std::stod(band);
+  EXPECT_GT(high_hz, 20);
+  EXPECT_LT(high_hz, 1e6);
+}
+
+TEST_F(ProgramFindingsTest, ASlenderBodyIsRefusedAsSlender) {
+  WriteBox(bar, {1000, 1, 1});
+  for (const char* solver : {"block-lanczos", "spectra"}) {
+    const Result result =
+        Run(bar + " --out " + model + " --unit mm --json --band 2000 --solver " + solver + kSteel);
+    EXPECT_EQ(ReasonOf(result), "BODY_TOO_SLENDER");
+  }
+}
+
+TEST_F(ProgramFindingsTest, AWallOfZeroIsNone) {
+  EXPECT_EQ(RunBar(std::string(kSteel) + " --wall 0").exit_status, 0);
+}
+
+TEST_F(ProgramFindingsTest, RefusalsNameOptionsAndWhatIsMissing) {
+  EXPECT_EQ(ReasonOf(RunBar("--young 2e11 --poisson 0.3")), "INVALID_SETTINGS");
+  EXPECT_THAT(OnStandardError(), HasSubstr("give --density, or"));
+  EXPECT_EQ(ReasonOf(RunBar("--material brass --young -1")), "INVALID_MATERIAL");
+  EXPECT_THAT(OnStandardError(), HasSubstr("--young is -1"));
+  EXPECT_EQ(ReasonOf(RunBar("--material brass --fix plane:0,0,0")), "INVALID_SETTINGS");
+  EXPECT_THAT(OnStandardError(), HasSubstr("--fix: \"plane:0,0,0\" does not"));
+  EXPECT_EQ(ReasonOf(RunBar("--material brass --transfer-budget -1")), "INVALID_SETTINGS");
+  EXPECT_LT(OnStandardError().size(), 200U);
+}
+
+TEST_F(ProgramFindingsTest, NodesBesideAnAccuracyAreToldToBeThoseOfTheFirstMesh) {
+  ASSERT_EQ(
+      Run(bar + " --out " + model + " --unit mm --nodes 300 --accuracy 10%" + kSteel).exit_status,
+      0);
+  EXPECT_THAT(OnStandardError(), HasSubstr("the 300 nodes asked for"));
+}
+
+TEST_F(ProgramFindingsTest, OnlyRemediesThatHelpAnOpenSurfaceAreOffered) {
+  const auto options_of = [&] {
+    const Result result = RunBar(kSteel);
+    EXPECT_EQ(ReasonOf(result), "MESH_NOT_CLOSED");
+    std::vector<std::string> options;
+    const Json error = Json::parse(result.output).at("error");
+    for (const Json& remedy : error.at("remedies")) {
+      options.push_back(remedy.at("option"));
+    }
+    return options;
+  };
+  std::string box = (std::stringstream() << std::ifstream(bar).rdbuf()).str();
+  box.resize(box.rfind("f "));
+  std::ofstream(bar, std::ios::trunc) << box;
+  EXPECT_THAT(options_of(), ElementsAre("--repair"));
+  std::ofstream(bar, std::ios::trunc) << "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\n";
+  EXPECT_THAT(options_of(), ElementsAre("--wall"));
+}
+
+}  // namespace
+}  // namespace carillon::precompute
