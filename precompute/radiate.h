@@ -9,8 +9,8 @@
 
 namespace carillon::precompute {
 
-/// Returns the processor time, seconds, that the radiation of the model may take if the request sets
-/// no limit: about the time that the modes take, from 20 to 600. It depends on the model only.
+/// Returns the processor time, seconds, that the radiation of the model may take if the request
+/// sets no limit: about the time that the modes take, from 20 to 600. It depends on the model only.
 double DefaultRadiationBudget(const ModalModel& model);
 
 /// Computes the radiation of the model's modes in the band of the completed `request`, for the
