@@ -19,11 +19,11 @@ bool HasFewElements(const TetMesh& mesh);
 TetMesh Refined(const TetMesh& mesh);
 
 /// Compares a model whose mesh has few elements with the modes of a finer mesh of the same body,
-/// `reference`. The modes are compared in ascending order. The errors of the model become those of
+/// `finer`. The modes are compared in ascending order. The errors of the model become those of
 /// the comparison where these are larger, and a warning states the number of missing modes.
 /// `elastic` and `sharing` are those of the model's matrices. All modes of the model's mesh below
 /// its limit must be in the model.
-void CompareWith(const TetMesh& reference, const ElasticConstants& elastic, MassSharing sharing,
+void CompareWith(const TetMesh& finer, const ElasticConstants& elastic, MassSharing sharing,
                  ModalModel& model);
 
 }  // namespace carillon::precompute

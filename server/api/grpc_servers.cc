@@ -32,13 +32,13 @@ constexpr int kNoPingStrikes = 0;
 /// seconds.
 constexpr int kReadBytes = 16 << 10;
 
-constexpr size_t kCount = GrpcServers::kUnixCount + GrpcServers::kTcpCount;
+constexpr size_t kCount = 1 + GrpcServers::kTcpCount;
+constexpr size_t kUnixServer = 0;
 
 /// Returns which server a process or address uses.
 size_t ServerOf(const std::string& source) {
-  const size_t hash = std::hash<std::string>()(source);
-  if (absl::StartsWith(source, "unix:")) return hash % GrpcServers::kUnixCount;
-  return GrpcServers::kUnixCount + hash % GrpcServers::kTcpCount;
+  if (absl::StartsWith(source, "unix:")) return kUnixServer;
+  return 1 + std::hash<std::string>()(source) % GrpcServers::kTcpCount;
 }
 
 /// Hands each connection to the server of its process or address.
@@ -58,7 +58,7 @@ class GrpcTaker final : public ConnectionTaker {
 };
 
 /// Bounds the resources of each connection, and of all connections of the server together.
-void LimitClients(grpc::ServerBuilder& builder) {
+void LimitClients(size_t memory_bytes, grpc::ServerBuilder& builder) {
   builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, kMaxCallsOfConnection);
   builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, kHandshakeLimit_ms);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepalive_ms);
@@ -67,7 +67,7 @@ void LimitClients(grpc::ServerBuilder& builder) {
   builder.AddChannelArgument(GRPC_ARG_TCP_READ_CHUNK_SIZE, kReadBytes);
   builder.AddChannelArgument(GRPC_ARG_TCP_MAX_READ_CHUNK_SIZE, kReadBytes);
   grpc::ResourceQuota quota;
-  quota.Resize(GrpcServers::kMemoryBytes);
+  quota.Resize(memory_bytes);
   builder.SetResourceQuota(quota);
   builder.SetMaxReceiveMessageSize(static_cast<int>(kMaxMessageBytes));
 }
@@ -80,7 +80,7 @@ GrpcServers::GrpcServers() {
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();
   for (size_t i = 0; i < kCount; ++i) {
     builders_.push_back(std::make_unique<grpc::ServerBuilder>());
-    LimitClients(*builders_.back());
+    LimitClients(i == kUnixServer ? kUnixMemoryBytes : kTcpMemoryBytes, *builders_.back());
   }
 }
 

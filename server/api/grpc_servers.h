@@ -14,19 +14,21 @@
 
 namespace carillon {
 
-/// Several gRPC servers with the same services. Each process (Unix) or address (TCP) uses one of
-/// them; no server has connections of both kinds.
+/// Several gRPC servers with the same services: one for Unix sockets, and one for each group of
+/// addresses over TCP.
 ///
 /// gRPC bounds the memory of a server. Beyond the bound it ends calls of any connection of this
 /// server, also of connections that take little memory. One client with unfinished messages would
 /// therefore end the streams of all others, if there were only one server.
 class GrpcServers {
  public:
-  static constexpr size_t kUnixCount = 4;
-  static constexpr size_t kTcpCount = 8;
+  /// Number of groups of addresses. Each server has a thread of its own, for reflection.
+  static constexpr size_t kTcpCount = 3;
 
-  /// Memory that gRPC may take for the connections of each server.
-  static constexpr size_t kMemoryBytes = size_t{96} << 20U;
+  /// Memory that gRPC may take for the connections over Unix sockets.
+  static constexpr size_t kUnixMemoryBytes = size_t{256} << 20U;
+  /// Memory that gRPC may take for the connections of one group of addresses.
+  static constexpr size_t kTcpMemoryBytes = size_t{96} << 20U;
 
   GrpcServers();
 

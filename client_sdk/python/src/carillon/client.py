@@ -210,8 +210,8 @@ class Client:
         if not normalize:
             return sound
         summary = sound.summary
-        bad = summary and (0 < summary.peak < 0.01 or summary.limited_frame_count > 0)
-        if bad and "full_scale_pa" not in settings:
+        if (summary and "full_scale_pa" not in settings
+                and (0 < summary.peak < 0.01 or summary.limited_frame_count > 0)):
             settings["full_scale_pa"] = max(1.5 * summary.peak_pa, LEAST_FULL_SCALE_PA)
             sound = self._render(whole, settings)
         return sound.normalized()
