@@ -71,7 +71,7 @@ std::string SizeInBand(const Refused& refused) {
   const double wanted_hz = usual_hz > low_hz ? usual_hz : std::sqrt(low_hz * high_hz);
   const double at_size_one = SizeOf(refused.request) * refused.Figure("first_mode_hz");
   for (const int digits : {2, 4}) {
-    const std::string text = absl::StrFormat("%.*g", digits, at_size_one / wanted_hz);
+    std::string text = absl::StrFormat("%.*g", digits, at_size_one / wanted_hz);
     double size = 0;
     if (!absl::SimpleAtod(text, &size) || !(size > 0)) return "";
     if (at_size_one / size > low_hz && at_size_one / size < high_hz) return text;

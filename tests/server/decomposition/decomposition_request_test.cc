@@ -210,8 +210,14 @@ TEST(DecompositionRequest, RefusesWhatCannotBeComputed) {
   EXPECT_THAT(refusal([](Request& r) { r.set_size(-1); }), HasSubstr("INVALID_SETTINGS"));
   EXPECT_THAT(refusal([](Request& r) { r.set_max_frequency_hz(10); }),
               HasSubstr("INVALID_SETTINGS"));
-  EXPECT_THAT(refusal([](Request& r) { r.set_label(std::string(201, 'x')); }),
-              HasSubstr("INVALID_SETTINGS"));
+}
+
+TEST(DecompositionRequest, ALongLabelIsCutAfterAWholeCharacter) {
+  Request request = Aluminum();
+  request.set_label(std::string(199, 'x') + "\u00e4");
+  const auto resolved = ResolveRequest(request);
+  ASSERT_TRUE(resolved.ok()) << resolved.status();
+  EXPECT_EQ(resolved->label(), std::string(199, 'x'));
 }
 
 }  // namespace
