@@ -10,6 +10,7 @@
 #include <numbers>
 #include <set>
 
+#include "absl/strings/str_cat.h"
 #include "server/base/sha256.h"
 
 namespace carillon {
@@ -214,7 +215,7 @@ TEST(DecompositionRequest, RefusesWhatCannotBeComputed) {
 
 TEST(DecompositionRequest, ALongLabelIsCutAfterAWholeCharacter) {
   Request request = Aluminum();
-  request.set_label(std::string(199, 'x') + "\u00e4");
+  request.set_label(absl::StrCat(std::string(199, 'x'), "\u00e4"));
   const auto resolved = ResolveRequest(request);
   ASSERT_TRUE(resolved.ok()) << resolved.status();
   EXPECT_EQ(resolved->label(), std::string(199, 'x'));
