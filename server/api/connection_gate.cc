@@ -285,10 +285,12 @@ bool ConnectionGate::Refuse(const std::string& peer) {
   // gRPC, which owns the descriptor, then sees the end of the connection and closes the descriptor.
   shutdown(found->second.descriptor, SHUT_RDWR);
   std::erase_if(refused_, [now](const auto& each) { return each.second <= now; });
-  std::string source = source_of_(peer);
-  const auto duration = source == kLoopback ? kLoopbackRefusal : kRefusal;
-  refused_.insert_or_assign(std::move(source), now + duration);
+  refused_.insert_or_assign(source_of_(peer), now + RefusalTimeOf(peer));
   return true;
+}
+
+std::chrono::seconds ConnectionGate::RefusalTimeOf(const std::string& peer) const {
+  return source_of_(peer) == kLoopback ? kLoopbackRefusal : kRefusal;
 }
 
 size_t ConnectionGate::open_count() const {

@@ -81,6 +81,9 @@ class ConnectionGate {
   /// the connection is not open or is ending already. Any thread.
   bool Refuse(const std::string& peer);
 
+  /// Returns the time for which Refuse keeps out the process or address of this connection.
+  std::chrono::seconds RefusalTimeOf(const std::string& peer) const;
+
   /// Number of connections that are open. Any thread.
   size_t open_count() const;
 

@@ -102,7 +102,7 @@ void FloodGuard::LookAt(WatchedById::iterator at, Clock::time_point now) {
   if (!flood.empty() && gate_.Refuse(watched.peer)) {
     log_.Warn(absl::StrCat("closed the connection ", watched.peer, ": ", flood,
                            "; connections from there are refused for ",
-                           ConnectionGate::kRefusal.count(), " s"));
+                           gate_.RefusalTimeOf(watched.peer).count(), " s"));
   }
   if (seconds < kWindowS) return;
   watched.calls = *calls;

@@ -30,7 +30,7 @@ std::string FindFlood(const ConnectionCalls& before, const ConnectionCalls& now,
 /// A thread that closes connections whose clients begin calls without end, because gRPC 1.51 bounds
 /// neither calls that are cancelled at once nor calls that never send their message. The guard also
 /// refuses further connections from the same process (Unix) or address (TCP) for
-/// ConnectionGate::kRefusal.
+/// ConnectionGate::RefusalTimeOf().
 class FloodGuard {
  public:
   /// `gate` and `log` must outlive the guard.

@@ -46,9 +46,8 @@ absl::StatusOr<std::string> ReadAll(int file, const std::string& path, absl::str
   return content;
 }
 
-absl::Status CheckPrivate(int file, const std::string& path, absl::string_view reason) {
-  struct stat status {};
-  fstat(file, &status);
+absl::Status CheckPrivate(const struct stat& status, const std::string& path,
+                          absl::string_view reason) {
   if (status.st_uid != geteuid() && status.st_uid != 0) {
     return Unusable(path, reason,
                     "belongs to another user, who could change it: give it to the daemon's user "
@@ -74,7 +73,7 @@ absl::StatusOr<std::string> ReadFile(const std::string& path, absl::string_view 
   if (fstat(file, &status) != 0 || !S_ISREG(status.st_mode)) {
     return Unusable(path, reason, "is not a regular file: name another file");
   }
-  if (is_private) RETURN_IF_ERROR(CheckPrivate(file, path, reason));
+  if (is_private) RETURN_IF_ERROR(CheckPrivate(status, path, reason));
   return ReadAll(file, path, reason);
 }
 
