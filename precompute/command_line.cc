@@ -130,7 +130,7 @@ void AddRadiationOptions(CLI::App& app, v1::WorkerRequest& request) {
          "--transfer-budget",
          [&](double budget_s) { request.mutable_transfer()->set_budget_s(budget_s); },
          "Seconds of processor time after which no further mode is begun; low modes come first, "
-         "then the loudest [as long as the modes took, 20 at least]")
+         "then the loudest [about as long as the modes take, from 20 to 600]")
       ->check(AboveZero())
       ->group(kRadiationGroup);
 }

@@ -14,8 +14,8 @@ namespace carillon::precompute {
 double DefaultRadiationBudget(const ModalModel& model);
 
 /// Computes the radiation of the model's modes in the band of the completed `request`, for the
-/// speed ratio of the request's material and with the settings in request.transfer(). Errors: those
-/// of ComputeTransfer.
+/// speed ratio of the request's material and with the settings in request.transfer(). Fails with
+/// the errors of ComputeTransfer.
 absl::StatusOr<Transfer> Radiate(const ModalModel& model, const v1::WorkerRequest& request,
                                  DecompositionObserver& observer);
 

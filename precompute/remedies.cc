@@ -89,7 +89,8 @@ std::string LowerBand(const Refused& refused) {
   return is_band ? band : "";
 }
 
-/// Whether so many modes can be found, and are those of the body rather than of its mesh.
+/// Whether the solver can find all the modes that were counted, and they are modes of the body and
+/// not of its mesh.
 bool CanFindAll(const Refused& refused) {
   constexpr double kMostOfUnknowns = 0.25;
   const double count = refused.Figure("mode_count");

@@ -33,8 +33,8 @@ struct ErrorEstimate {
 ///     r_b = a(b, phi) - Lambda m(b, phi),   delta Lambda ~ C sum_b w_b r_b^T a(b, b)^-1 r_b
 ///
 /// At a re-entrant edge of the body the stress is singular, and functions of a higher order take up
-/// a smaller part of the error than elsewhere. The weight w_b makes up for this: it is the largest
-/// of ReentrantWeights() at the corners of b.
+/// a smaller part of the error than elsewhere. The weight w_b makes up for this: each corner of b
+/// has a weight by ReentrantWeights(), and w_b is the largest of these.
 ///
 /// The estimate detects the locking of thin walls, which estimates by averaged stresses do not. C
 /// is fitted to a bar, a block, a plate and a tube so that the estimate is rarely too small for

@@ -14,8 +14,8 @@ class SolveTime {
   /// Returns the time of a solution. `pairs` is the number of pairs of vertices to which the
   /// operator is applied.
   static double OfSolution(double pairs) { return pairs * kSecondsPerPair; }
-  /// Returns the time of making a surface with so many vertices.
-  static double OfSurface(double vertices) { return vertices * kSecondsPerVertex; }
+  /// Returns the time of making a surface that has `vertex_count` vertices.
+  static double OfSurface(double vertex_count) { return vertex_count * kSecondsPerVertex; }
 
   void Add(double seconds) { used_s_ += seconds; }
 

@@ -96,7 +96,7 @@ class LocalExecutorTest : public ::testing::Test {
 
   TemporaryFolder folder_;
   SystemClock clock_;
-  bool radiates_ = false;  // of the tasks that start
+  bool radiates_ = false;  // whether the tasks that start are transfers
   LocalExecutorOptions options_;
   const std::string digest_ = Sha256Hex("task");
   v1::CreateModalModelRequest request_ = *ResolveRequest(SampleRequest(Sha256Hex("solid")));
