@@ -51,7 +51,7 @@ class MeshSink {
 class ModelSink {
  public:
   explicit ModelSink(ModeDatabase& database)
-      : database_(&database), transfers_(database.database().folder()) {}
+      : database_(&database), transfers_(database.database()) {}
 
   absl::Status Append(const v1::ImportModalModelRequest& request) {
     RETURN_IF_ERROR(Begin(request));

@@ -18,7 +18,7 @@ absl::Status TransferSpool::Append(const std::string& serialized) {
   const std::string bytes = Delimited(record);
   RETURN_IF_ERROR(Count(record.has_header(), bytes.size()));
   if (!file_) {
-    ASSIGN_OR_RETURN(file_, SpoolFile::Make(folder_));
+    ASSIGN_OR_RETURN(file_, database_->MakeSpool());
   }
   return file_->Append(bytes);
 }

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstddef>
-#include <filesystem>
 #include <optional>
 #include <string>
 #include <utility>
@@ -10,6 +9,7 @@
 
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
+#include "server/mode_database/database.h"
 #include "server/mode_database/spool_file.h"
 #include "server/mode_database/transfer_codec.h"
 
@@ -24,8 +24,8 @@ class TransferSpool {
   static constexpr size_t kMostBytes = size_t{1} << 30U;        ///< of all transfers
   static constexpr size_t kMostHeaderBytes = size_t{1} << 20U;  ///< of the headers of all transfers
 
-  /// The file is made in `folder`.
-  explicit TransferSpool(std::filesystem::path folder) : folder_(std::move(folder)) {}
+  /// The file is made in the folder of `database`.
+  explicit TransferSpool(Database& database) : database_(&database) {}
 
   /// Appends a record of a transfer. A header begins the next transfer. Errors: InvalidArgument
   /// (TRANSFER_MALFORMED), ResourceExhausted (TRANSFER_TOO_LARGE), and those of SpoolFile.
@@ -38,7 +38,7 @@ class TransferSpool {
  private:
   absl::Status Count(bool begins, size_t byte_count);
 
-  std::filesystem::path folder_;
+  Database* database_;
   std::optional<SpoolFile> file_;
   std::vector<size_t> byte_counts_;  ///< size of each transfer
   size_t byte_count_ = 0;

@@ -159,6 +159,21 @@ absl::Status Database::Tidy() {
   });
 }
 
+bool Database::MakeSpace() {
+  std::error_code error;
+  const uintmax_t before = std::filesystem::file_size(file_, error);
+  MutexLock lock(&writer_mutex_);
+  const auto shrink = [&writer = *writer_] {
+    // The first checkpoint empties the log, in which the second line needs room.
+    Figure(writer, "PRAGMA wal_checkpoint(RESTART)").status().IgnoreError();
+    RETURN_IF_ERROR(writer.RunScript("PRAGMA incremental_vacuum(1024)"));
+    return Figure(writer, "PRAGMA wal_checkpoint(PASSIVE)").status();
+  };
+  if (!files_.Change(shrink).ok()) return false;
+  const uintmax_t after = std::filesystem::file_size(file_, error);
+  return !error && after < before;
+}
+
 absl::Status Database::Read(absl::FunctionRef<absl::Status(SqliteConnection&)> body) {
   ASSIGN_OR_RETURN(auto reader, TakeReader());
   absl::Status status = InTransaction(*reader, "BEGIN DEFERRED", body);

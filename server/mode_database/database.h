@@ -12,6 +12,7 @@
 #include "absl/status/statusor.h"
 #include "server/base/mutex.h"
 #include "server/mode_database/database_files.h"
+#include "server/mode_database/spool_file.h"
 #include "server/mode_database/sqlite_connection.h"
 
 namespace carillon {
@@ -38,6 +39,16 @@ class Database {
   /// Gives some free pages back to the disk if at least a quarter of the file is free, and renews
   /// the reserve for a full disk. A file that an older program made shrinks only after `db repair`.
   absl::Status Tidy();
+
+  /// Makes a temporary file in the folder of the database. If the disk becomes full, the file takes
+  /// the space of free pages. Errors: those of SpoolFile::Make.
+  absl::StatusOr<SpoolFile> MakeSpool() {
+    return SpoolFile::Make(folder(), [this] { return MakeSpace(); });
+  }
+
+  /// Gives free pages, at most 64 MiB, back to a disk that is full. Returns whether the file
+  /// shrank.
+  bool MakeSpace();
 
   /// Returns a text with the number of changes that were acknowledged once but are missing from the
   /// opened file, because its write-ahead log was removed or the file is an older copy. Empty if no

@@ -150,7 +150,7 @@ absl::StatusOr<StoredMesh> MeshUpload::Finish() {
 }
 
 absl::StatusOr<MeshUpload> MeshStore::Begin() {
-  ASSIGN_OR_RETURN(SpoolFile file, SpoolFile::Make(database_->folder()));
+  ASSIGN_OR_RETURN(SpoolFile file, database_->MakeSpool());
   return MeshUpload(*this, std::move(file));
 }
 

@@ -96,11 +96,16 @@ absl::Status ModelImport::Append(const v1::ModalModelRecord& record) {
 }
 
 absl::StatusOr<ModelSummary> ModelImport::Finish() {
-  absl::Status status = state_->checker.Finish();
-  if (status.ok()) status = state_->file.Rewind();
-  if (!status.ok()) return status;
+  RETURN_IF_ERROR(state_->checker.Finish());
   if (state_->summary.digest.empty()) state_->summary.digest = state_->sha.Finish();
-  return state_->store.Store(ModelFileReader(state_->file.descriptor()), state_->summary);
+  const auto store = [state = state_.get()]() -> absl::StatusOr<ModelSummary> {
+    RETURN_IF_ERROR(state->file.Rewind());
+    return state->store.Store(ModelFileReader(state->file.descriptor()), state->summary);
+  };
+  absl::StatusOr<ModelSummary> stored = store();
+  const bool is_full = absl::IsResourceExhausted(stored.status());
+  if (is_full && state_->store.database_->MakeSpace()) stored = store();
+  return stored;
 }
 
 absl::StatusOr<std::optional<v1::ModalModelRecord>> ModelExport::Next() {
@@ -191,7 +196,7 @@ absl::Status ModelStore::CopyIfAbsent(const std::string& from, const std::string
 absl::StatusOr<ModelImport> ModelStore::Import(const std::string& digest,
                                                const std::string& label) {
   if (const absl::Status status = CheckName(digest); !digest.empty() && !status.ok()) return status;
-  ASSIGN_OR_RETURN(SpoolFile file, SpoolFile::Make(database_->folder()));
+  ASSIGN_OR_RETURN(SpoolFile file, database_->MakeSpool());
   return ModelImport(std::make_unique<ModelImport::State>(
       ModelImport::State{*this, std::move(file), Named(digest, label), {}, {}}));
 }

@@ -29,12 +29,13 @@ absl::Status Failed(absl::string_view what) {
 
 }  // namespace
 
-absl::StatusOr<SpoolFile> SpoolFile::Make(const std::filesystem::path& folder) {
+absl::StatusOr<SpoolFile> SpoolFile::Make(const std::filesystem::path& folder,
+                                          MakeSpace make_space) {
   std::string name = folder / "spool-XXXXXX";
   const int descriptor = mkostemp(name.data(), O_CLOEXEC);
   if (descriptor < 0) return Failed("made");
   unlink(name.c_str());
-  return SpoolFile(descriptor);
+  return SpoolFile(descriptor, std::move(make_space));
 }
 
 SpoolFile::~SpoolFile() {
@@ -45,7 +46,11 @@ absl::Status SpoolFile::Append(std::string_view bytes) {
   while (!bytes.empty()) {
     const ssize_t written = write(descriptor_, bytes.data(), bytes.size());
     if (written < 0 && errno == EINTR) continue;
-    if (written < 0) return Failed("written");
+    if (written < 0) {
+      absl::Status failed = Failed("written");
+      if (absl::IsResourceExhausted(failed) && make_space_()) continue;
+      return failed;
+    }
     bytes.remove_prefix(static_cast<size_t>(written));
   }
   return absl::OkStatus();

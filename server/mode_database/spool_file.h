@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -16,17 +17,25 @@ namespace carillon {
 /// The system deletes the file when the object or the process ends. One thread at a time.
 class SpoolFile {
  public:
-  /// Makes a file in `folder`. Errors: FailedPrecondition (DATABASE_UNUSABLE: the folder cannot be
-  /// written).
-  static absl::StatusOr<SpoolFile> Make(const std::filesystem::path& folder);
-  SpoolFile(SpoolFile&& other) noexcept : descriptor_(std::exchange(other.descriptor_, -1)) {}
+  /// Frees space on the disk. Returns whether it freed any.
+  using MakeSpace = std::function<bool()>;
+
+  /// Makes a file in `folder`. The file calls `make_space` whenever the disk is full. Errors:
+  /// FailedPrecondition (DATABASE_UNUSABLE: the folder cannot be written).
+  static absl::StatusOr<SpoolFile> Make(
+      const std::filesystem::path& folder, MakeSpace make_space = [] { return false; });
+  SpoolFile(SpoolFile&& other) noexcept
+      : descriptor_(std::exchange(other.descriptor_, -1)),
+        make_space_(std::move(other.make_space_)) {}
   SpoolFile& operator=(SpoolFile&& other) noexcept {
     std::swap(descriptor_, other.descriptor_);
+    std::swap(make_space_, other.make_space_);
     return *this;
   }
   ~SpoolFile();
 
-  /// Appends bytes. Errors: ResourceExhausted (DATABASE_FULL: no space left).
+  /// Appends bytes. Errors: ResourceExhausted (DATABASE_FULL: no space is left, and none can be
+  /// made).
   absl::Status Append(std::string_view bytes);
 
   /// Goes back to the first byte.
@@ -38,9 +47,11 @@ class SpoolFile {
   int descriptor() const { return descriptor_; }
 
  private:
-  explicit SpoolFile(int descriptor) : descriptor_(descriptor) {}
+  SpoolFile(int descriptor, MakeSpace make_space)
+      : descriptor_(descriptor), make_space_(std::move(make_space)) {}
 
   int descriptor_;
+  MakeSpace make_space_;
 };
 
 }  // namespace carillon
