@@ -45,6 +45,21 @@ absl::StatusOr<int64_t> Figure(SqliteConnection& connection, const char* sql) {
   return figure;
 }
 
+/// Whether at least a quarter of the pages, and 4 MiB, are free and can be given back to the disk.
+absl::StatusOr<bool> ShouldShrink(SqliteConnection& writer) {
+  constexpr int64_t kLeastFreePages = 64;
+  ASSIGN_OR_RETURN(const int64_t can_shrink, Figure(writer, "PRAGMA auto_vacuum"));
+  ASSIGN_OR_RETURN(const int64_t free_count, Figure(writer, "PRAGMA freelist_count"));
+  ASSIGN_OR_RETURN(const int64_t page_count, Figure(writer, "PRAGMA page_count"));
+  return can_shrink != 0 && free_count >= kLeastFreePages && free_count * 4 >= page_count;
+}
+
+/// Copies the log into the file, and truncates the log. Returns whether it could.
+bool EmptyLog(SqliteConnection& writer) {
+  const absl::StatusOr<int64_t> busy = Figure(writer, "PRAGMA wal_checkpoint(TRUNCATE)");
+  return busy.ok() && *busy == 0;
+}
+
 absl::Status Unusable(const std::filesystem::path& file, absl::string_view why) {
   return Refusal(absl::StatusCode::kFailedPrecondition, "DATABASE_UNUSABLE",
                  absl::StrCat("the database ", file.string(), " cannot be opened (", why,
@@ -100,7 +115,9 @@ std::string Database::MissingChanges() const {
 
 absl::Status Database::Write(absl::FunctionRef<absl::Status(SqliteConnection&)> body) {
   MutexLock lock(&writer_mutex_);
-  return WriteLocked(body);
+  const absl::Status status = WriteLocked(body);
+  const bool is_full = ToErrorInfo(status).reason() == "DATABASE_FULL";
+  return is_full && MakeSpaceLocked() ? WriteLocked(body) : status;
 }
 
 absl::Status Database::WriteToFree(absl::FunctionRef<absl::Status(SqliteConnection&)> body) {
@@ -143,16 +160,11 @@ absl::Status Database::WriteLocked(absl::FunctionRef<absl::Status(SqliteConnecti
 }
 
 absl::Status Database::Tidy() {
-  constexpr int64_t kLeastFreePages = 64;
   MutexLock lock(&writer_mutex_);
   RETURN_IF_ERROR(files_.Check());
   reserve_.Take();
-  ASSIGN_OR_RETURN(const int64_t can_shrink, Figure(*writer_, "PRAGMA auto_vacuum"));
-  ASSIGN_OR_RETURN(const int64_t free_count, Figure(*writer_, "PRAGMA freelist_count"));
-  ASSIGN_OR_RETURN(const int64_t page_count, Figure(*writer_, "PRAGMA page_count"));
-  if (can_shrink == 0 || free_count < kLeastFreePages || free_count * 4 < page_count) {
-    return absl::OkStatus();
-  }
+  ASSIGN_OR_RETURN(const bool should_shrink, ShouldShrink(*writer_));
+  if (!should_shrink) return absl::OkStatus();
   return files_.Change([&writer = *writer_] {
     RETURN_IF_ERROR(writer.RunScript("PRAGMA incremental_vacuum(256)"));
     return Figure(writer, "PRAGMA wal_checkpoint(PASSIVE)").status();
@@ -160,18 +172,35 @@ absl::Status Database::Tidy() {
 }
 
 bool Database::MakeSpace() {
-  std::error_code error;
-  const uintmax_t before = std::filesystem::file_size(file_, error);
   MutexLock lock(&writer_mutex_);
-  const auto shrink = [&writer = *writer_] {
-    // The first checkpoint empties the log, in which the second line needs room.
-    Figure(writer, "PRAGMA wal_checkpoint(RESTART)").status().IgnoreError();
-    RETURN_IF_ERROR(writer.RunScript("PRAGMA incremental_vacuum(1024)"));
-    return Figure(writer, "PRAGMA wal_checkpoint(PASSIVE)").status();
-  };
-  if (!files_.Change(shrink).ok()) return false;
-  const uintmax_t after = std::filesystem::file_size(file_, error);
-  return !error && after < before;
+  return MakeSpaceLocked();
+}
+
+bool Database::MakeSpaceLocked() {
+  // The log has to hold the pages of a portion, for which a full disk may have little room.
+  constexpr int kMostPortions = 16;
+  SqliteConnection& writer = *writer_;
+  const int64_t before = files_.byte_count();
+  for (int portion = 0; portion < kMostPortions; ++portion) {
+    const absl::StatusOr<bool> should_shrink = ShouldShrink(writer);
+    if (!should_shrink.ok() || !*should_shrink) break;
+    const auto shrink = [&] {
+      // Without the reserve, the log of a full disk cannot be emptied if the file has to grow.
+      if (!EmptyLog(writer)) {
+        reserve_.Release();
+        EmptyLog(writer);
+      }
+      RETURN_IF_ERROR(writer.RunScript("PRAGMA incremental_vacuum(64)"));
+      EmptyLog(writer);
+      return absl::OkStatus();
+    };
+    if (!files_.Change(shrink).ok()) break;
+  }
+  return files_.byte_count() < before;
+}
+
+absl::StatusOr<SpoolFile> Database::MakeSpool() {
+  return SpoolFile::Make(folder(), [this] { return MakeSpace(); });
 }
 
 absl::Status Database::Read(absl::FunctionRef<absl::Status(SqliteConnection&)> body) {

@@ -25,7 +25,8 @@ class Database {
   static absl::StatusOr<std::unique_ptr<Database>> Open(const std::filesystem::path& file);
 
   /// Runs `body` in one transaction. The transaction is committed and on the disk when Write
-  /// returns OK, and rolled back if `body` fails.
+  /// returns OK, and rolled back if `body` fails. If the disk is full and MakeSpace frees some
+  /// space, runs `body` again from its beginning.
   absl::Status Write(absl::FunctionRef<absl::Status(SqliteConnection&)> body);
 
   /// Runs `body`, which frees space, as Write does. If the disk is full, makes room for the change
@@ -40,15 +41,14 @@ class Database {
   /// the reserve for a full disk. A file that an older program made shrinks only after `db repair`.
   absl::Status Tidy();
 
-  /// Makes a temporary file in the folder of the database. If the disk becomes full, the file takes
-  /// the space of free pages. Errors: those of SpoolFile::Make.
-  absl::StatusOr<SpoolFile> MakeSpool() {
-    return SpoolFile::Make(folder(), [this] { return MakeSpace(); });
-  }
-
-  /// Gives free pages, at most 64 MiB, back to a disk that is full. Returns whether the file
-  /// shrank.
+  /// Does at once, for a disk that is full, what Tidy does little by little: gives free pages, at
+  /// most 64 MiB, and the space of the log back if at least a quarter of the file is free. Takes
+  /// the reserve if the log cannot be emptied without it. Returns whether the files shrank.
   bool MakeSpace();
+
+  /// Makes a temporary file in the folder of the database. The file calls MakeSpace when the disk
+  /// is full. Errors: those of SpoolFile::Make.
+  absl::StatusOr<SpoolFile> MakeSpool();
 
   /// Returns a text with the number of changes that were acknowledged once but are missing from the
   /// opened file, because its write-ahead log was removed or the file is an older copy. Empty if no
@@ -73,6 +73,7 @@ class Database {
   absl::Status ReadChangeCount();
   absl::Status WriteLocked(absl::FunctionRef<absl::Status(SqliteConnection&)> body)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_mutex_);
+  bool MakeSpaceLocked() ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_mutex_);
   absl::StatusOr<std::unique_ptr<SqliteConnection>> TakeReader();
 
   const std::filesystem::path file_;

@@ -73,6 +73,11 @@ absl::Status DatabaseFiles::Change(absl::FunctionRef<absl::Status()> work) {
   return worked.ok() ? remembered : worked;
 }
 
+int64_t DatabaseFiles::byte_count() const {
+  const MutexLock lock(&mutex_);
+  return (database_ ? database_->byte_count : 0) + (log_ ? log_->byte_count : 0);
+}
+
 absl::Status DatabaseFiles::BeginChange() {
   const MutexLock lock(&mutex_);
   RETURN_IF_ERROR(CheckLocked());

@@ -33,6 +33,9 @@ class DatabaseFiles {
   /// Check before the work; otherwise the work's error, or that of Remember.
   absl::Status Change(absl::FunctionRef<absl::Status()> work);
 
+  /// Returns the size of both files at the last Remember.
+  int64_t byte_count() const;
+
  private:
   struct Seen {
     dev_t device = 0;
@@ -47,7 +50,7 @@ class DatabaseFiles {
   absl::Status Judge() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   const std::filesystem::path file_;
-  Mutex mutex_;
+  mutable Mutex mutex_;
   std::optional<Seen> database_ ABSL_GUARDED_BY(mutex_);
   std::optional<Seen> log_ ABSL_GUARDED_BY(mutex_);
   bool changing_ ABSL_GUARDED_BY(mutex_) = false;

@@ -98,14 +98,11 @@ absl::Status ModelImport::Append(const v1::ModalModelRecord& record) {
 absl::StatusOr<ModelSummary> ModelImport::Finish() {
   RETURN_IF_ERROR(state_->checker.Finish());
   if (state_->summary.digest.empty()) state_->summary.digest = state_->sha.Finish();
-  const auto store = [state = state_.get()]() -> absl::StatusOr<ModelSummary> {
-    RETURN_IF_ERROR(state->file.Rewind());
-    return state->store.Store(ModelFileReader(state->file.descriptor()), state->summary);
+  const auto open = [&file = state_->file]() -> absl::StatusOr<ModelFileReader> {
+    RETURN_IF_ERROR(file.Rewind());
+    return ModelFileReader(file.descriptor());
   };
-  absl::StatusOr<ModelSummary> stored = store();
-  const bool is_full = absl::IsResourceExhausted(stored.status());
-  if (is_full && state_->store.database_->MakeSpace()) stored = store();
-  return stored;
+  return state_->store.Store(open, state_->summary);
 }
 
 absl::StatusOr<std::optional<v1::ModalModelRecord>> ModelExport::Next() {
@@ -157,11 +154,15 @@ absl::Status ModelStore::Quarantine(const std::string& digest, const absl::Statu
   return why;
 }
 
-absl::StatusOr<ModelSummary> ModelStore::Store(ModelFileReader records, ModelSummary summary) {
-  summary.created_unix_ms = clock_->UnixMs();
-  const absl::Status status = database_->Write(
-      [&](SqliteConnection& connection) { return InsertModel(connection, records, summary); });
-  if (!status.ok()) return status;
+absl::StatusOr<ModelSummary> ModelStore::Store(
+    absl::FunctionRef<absl::StatusOr<ModelFileReader>()> open, ModelSummary named) {
+  named.created_unix_ms = clock_->UnixMs();
+  ModelSummary summary;
+  RETURN_IF_ERROR(database_->Write([&](SqliteConnection& connection) {
+    ASSIGN_OR_RETURN(ModelFileReader records, open());
+    summary = named;
+    return InsertModel(connection, records, summary);
+  }));
   if (budget_.bytes == 0) return summary;
   const absl::StatusOr<Collected> collected = Collect(budget_.bytes, {.spared = summary.digest});
   if (!collected.ok()) {
@@ -176,8 +177,7 @@ absl::StatusOr<ModelSummary> ModelStore::PutFile(const std::string& digest,
                                                  const std::string& label,
                                                  const std::filesystem::path& file) {
   RETURN_IF_ERROR(CheckName(digest));
-  ASSIGN_OR_RETURN(ModelFileReader records, ModelFileReader::Open(file));
-  return Store(std::move(records), Named(digest, label));
+  return Store([&] { return ModelFileReader::Open(file); }, Named(digest, label));
 }
 
 absl::Status ModelStore::CopyIfAbsent(const std::string& from, const std::string& to,

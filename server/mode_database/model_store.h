@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "absl/base/thread_annotations.h"
+#include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "carillon/v1/material.pb.h"
@@ -227,7 +228,8 @@ class ModelStore {
   };
 
   absl::StatusOr<std::shared_ptr<const ModalModel>> Load(const std::string& digest);
-  absl::StatusOr<ModelSummary> Store(ModelFileReader records, ModelSummary summary);
+  absl::StatusOr<ModelSummary> Store(absl::FunctionRef<absl::StatusOr<ModelFileReader>()> open,
+                                     ModelSummary named);
   absl::Status Quarantine(const std::string& digest, const absl::Status& why);
   bool InMemory(const std::string& digest) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(cache_mutex_);
   absl::Status WriteSounded(SqliteConnection& connection)

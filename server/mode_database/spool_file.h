@@ -22,8 +22,7 @@ class SpoolFile {
 
   /// Makes a file in `folder`. The file calls `make_space` whenever the disk is full. Errors:
   /// FailedPrecondition (DATABASE_UNUSABLE: the folder cannot be written).
-  static absl::StatusOr<SpoolFile> Make(
-      const std::filesystem::path& folder, MakeSpace make_space = [] { return false; });
+  static absl::StatusOr<SpoolFile> Make(const std::filesystem::path& folder, MakeSpace make_space);
   SpoolFile(SpoolFile&& other) noexcept
       : descriptor_(std::exchange(other.descriptor_, -1)),
         make_space_(std::move(other.make_space_)) {}
