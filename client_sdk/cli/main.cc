@@ -2,6 +2,7 @@
 //
 // The command line of `carillon`.
 #include <CLI/CLI.hpp>
+#include <array>
 #include <iostream>
 #include <memory>
 #include <string>
@@ -122,6 +123,13 @@ void AddStruckObject(CLI::App& strike, StrikeOptions& options) {
       ->excludes(paper);
 }
 
+/// Throws a CLI::ValidationError if the impulse is zero, because the strike would be silent.
+void CheckImpulse(const std::array<double, 3>& impulse) {
+  if (impulse != std::array<double, 3>{}) return;
+  throw CLI::ValidationError(
+      "--impulse", "a strike with an impulse of 0,0,0 is silent; give N s, such as 0,0,-0.01");
+}
+
 void AddStrike(CLI::App& app, Program& program) {
   auto options = std::make_shared<StrikeOptions>();
   CLI::App& strike = *app.add_subcommand("strike", "Strike a model once and let it ring");
@@ -152,6 +160,7 @@ void AddStrike(CLI::App& app, Program& program) {
                                  "The time to ring, s [until the sound has decayed by 60 dB]"));
   AddMaterial(strike, options->material);
   strike.callback([&program, options] {
+    CheckImpulse(options->impulse_newton_seconds);
     program.command = [&program, options] {
       const StopSignal stop;
       return Strike(*program.Daemon(), *options, stop, program.json);

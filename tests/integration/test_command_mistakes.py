@@ -100,7 +100,8 @@ class WrongValuesTest(unittest.TestCase):
     def test_values_that_would_be_taken_for_others_are_refused(self):
         strike = ("strike", "bar", "--point", "0,0,0", "--impulse", "0,0,1")
         create = ("model", "create", ROOT / "README.md")
-        for words, expected in (((*strike, "--size", "0"), '--size: "0" must be a number from 0.001 to 1000'),
+        for words, expected in (((*strike[:-1], "0,0,0"), "--impulse: a strike with an impulse of 0,0,0 is silent"),
+                                ((*strike, "--size", "0"), '--size: "0" must be a number from 0.001 to 1000'),
                                 ((*strike, "--seconds", "-3"), '--seconds: "-3" must be a number from 0'),
                                 ((*strike, "--seconds", "nan"), '--seconds: "nan" must be'),
                                 ((*strike, "--gain", "-6"), "or decibels, such as -6dB"),

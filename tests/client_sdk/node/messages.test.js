@@ -133,6 +133,12 @@ test('contacts are refused by their names, with unit and frame', async () => {
     /point is \[ 0, 0 \]; it must be \[x, y, z\]: metres in the object's own frame/);
 });
 
+test('a strike without an impulse is refused, because it would be silent', async () => {
+  await assert.rejects(bell.strike({ point: POINT, impulse: [0, 0, 0] }),
+    /impulse is \[ 0, 0, 0 \]; it must be other than zero, because the strike would be silent/);
+  new carillon.Trace().step(0, { impulses: { objects: 1, points: POINT, impulses: [0, 0, 0] } });
+});
+
 test('handles and partners that are no whole numbers of 32 bits are refused', () => {
   for (const wrong of ['floor', '5', 1.7, -1, 1 + 2 ** 32, NaN]) {
     const shown = inspect(wrong);
@@ -175,6 +181,7 @@ test('refusals of the daemon have the names of the caller', () => {
   for (const [said, expected] of [['step_s is 0; say', 'step is 0 s; say'],
     ['scheduling_delay_s is 20; it must be 0 to 10', 'delay is 20 s; it must be 0 to 10 s'],
     ['glide_s is -1; it must be 0 to 10', 'glide is -1 s; it must be 0 to 10 s'],
+    ['columns[17]: x', 'impulses[17]: x'], ['contact_columns[2]: x', 'contacts[2]: x'],
     ['make one with SceneService.CreateScene', 'make one with Client.createScene()']]) {
     assert.equal(fromInfo({ reason: 'INVALID', message: said }).message, `INVALID: ${expected}`);
   }

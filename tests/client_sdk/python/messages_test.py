@@ -175,6 +175,14 @@ class RefusalsTest(MessagesTest):
         self.refused("impulse is None; it must be three numbers: x, y, z, newton seconds in the object's own frame",
                      bell.strike, POINT, None)
 
+    def test_a_strike_without_an_impulse_is_refused_because_it_would_be_silent(self):
+        bell = carillon.SoundingObject(carillon.Scene(self.c, "scenes/1"), scene_service_pb2.SoundingObject(handle=1))
+        summary = modal_model_service_pb2.ModalModelSummary(name="modalModels/1")
+        for strike in (bell.strike, carillon.Model(self.c, summary, "oak").render_strike):
+            self.refused("impulse is (0, 0, 0); it must be other than zero, because the strike would be silent",
+                         strike, POINT, (0, 0, 0))
+        made(impulses=carillon.Impulses(1, POINT, (0, 0, 0)))
+
     def test_a_trace_of_contacts_needs_the_length_of_its_steps_as_a_stream_does(self):
         contacts, impulses = (kind(1, POINT, IMPULSE) for kind in (carillon.Contacts, carillon.Impulses))
         self.refused("Trace(step=1/240)", carillon.Trace().step, 0, contacts=contacts)
@@ -185,7 +193,8 @@ class RefusalsTest(MessagesTest):
         for said, expected in (("step_s is 0; say the simulator's step", "step is 0 s; say the simulator's step"),
                                ("scheduling_delay_s is 20; it must be 0 to 10", "delay is 20 s; it must be 0 to 10 s"),
                                ("glide_s is -1; it must be 0 to 10", "glide is -1 s; it must be 0 to 10 s"),
-                               ("make one with SceneService.CreateScene", "make one with Client.scene()")):
+                               ("columns[17]: x", "impulses[17]: x"), ("contact_columns[2]: x", "contacts[2]: x"),
+                               ("pose_columns[2]: x", "poses[2]: x"), ("make one with SceneService.CreateScene", "make one with Client.scene()")):
             info = error_pb2.ErrorInfo(reason="INVALID", message=said)
             self.assertEqual(carillon.errors.from_info(info).message, expected)
 
