@@ -7,6 +7,7 @@ const { test } = require('node:test');
 const { inspect } = require('node:util');
 const carillon = require('carillon');
 const { fromInfo } = require('carillon/lib/errors');
+const { stateOf } = require('carillon/lib/progress');
 const { toSettings } = require('carillon/lib/settings');
 const { warnOfContacts, warnOfStream } = require('carillon/lib/warnings');
 
@@ -137,6 +138,15 @@ test('a strike without an impulse is refused, because it would be silent', async
   await assert.rejects(bell.strike({ point: POINT, impulse: [0, 0, 0] }),
     /impulse is \[ 0, 0, 0 \]; it must be other than zero, because the strike would be silent/);
   new carillon.Trace().step(0, { impulses: { objects: 1, points: POINT, impulses: [0, 0, 0] } });
+});
+
+test('a message about a job that waits says why', () => {
+  const shown = (wait) => stateOf({ state: 'JOB_STATE_QUEUED', wait });
+  assert.equal(shown({ earlier_job_count: 3 }), 'queued (waiting: 3 jobs are before it)');
+  assert.equal(shown({ cause: 'WAIT_CAUSE_MEMORY', running_job_count: 1, running_job_label: 'bowl' }),
+    'queued (waiting for the memory of bowl)');
+  assert.equal(shown({ cause: 'WAIT_CAUSE_WORKER', running_job_count: 2 }), 'queued (waiting for one of 2 jobs)');
+  assert.equal(stateOf({ state: 'JOB_STATE_RUNNING' }), 'running');
 });
 
 test('handles and partners that are no whole numbers of 32 bits are refused', () => {

@@ -261,7 +261,8 @@ def strike_of(item: Any, point: Array, impulse: Array, duration: Optional[float]
         checks.refuse(duration, "duration", DURATION)
     vector_of_impulse = checks.three(impulse, "impulse", OBJECT_IMPULSE)
     if not vector_of_impulse.any():
-        checks.refuse(impulse, "impulse", f"other than zero, because the strike would be silent: x, y, z, {OBJECT_IMPULSE}")
+        checks.refuse(impulse, "impulse",
+                      f"other than zero, because the strike would be silent: x, y, z, {OBJECT_IMPULSE}")
     return Impulses(item, checks.three(point, "point", OBJECT_POINT), vector_of_impulse, durations=duration,
                     striker=struck_by)
 
