@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
 #include "client_sdk/cli/commands.h"
 #include "client_sdk/cli/completion_options.h"
 #include "client_sdk/cli/doctor_command.h"
@@ -93,9 +94,12 @@ void AddTransfer(CLI::App& app, Program& program) {
                   "The name, the label, or the first digits of the digest of a model")
       ->required();
   TakeSize(*create.add_option("--size", options->size, "The size relative to that of the model"));
-  create.add_option("--accuracy", options->accuracy_db,
-                    "The error of each mode's power that is small enough, dB [2]");
-  create.add_option("--budget", options->budget_s, "The processor time to spend, s [20]");
+  TakeWithin(*create.add_option("--accuracy", options->accuracy_db,
+                                "The error of each mode's power that is small enough, dB [2]"),
+             0.06, 20, "leave it out for 2 dB");
+  TakeWithin(*create.add_option("--budget", options->budget_s,
+                                "The processor time to spend, s [by the size of the model]"),
+             0.001, 1e9, "leave it out for a time by the size of the model, 20 to 600 s");
   create.add_flag("--wait,!--no-wait", options->wait, "Wait until it is stored [no]");
   AddMaterial(create, options->material);
   create.callback([&program, options] {
@@ -233,6 +237,18 @@ bool HasOptionFor(const CLI::App& app, const std::string& option) {
   return !chosen.empty() && HasOptionFor(*chosen.front(), option);
 }
 
+/// Adds the command `help`, for the list of commands; see WithHelpOption.
+void AddHelp(CLI::App& app, Program& program) {
+  CLI::App& help = *app.add_subcommand("help", "Show the help of the program or of a command");
+  help.add_option("command", "The command, such as model create");
+  help.callback([&app, &program] {
+    program.command = [&app] {
+      absl::PrintF("%s", app.help());
+      return absl::OkStatus();
+    };
+  });
+}
+
 void AddCommands(CLI::App& app, Program& program) {
   AddInfo(app, program);
   AddStatus(app, program);
@@ -251,6 +267,17 @@ void AddCommands(CLI::App& app, Program& program) {
   AddTop(app, program);
   AddExample(app, program);
   AddCompletion(app, program);
+  AddHelp(app, program);
+}
+
+/// Returns the words of the command line, with `carillon help COMMAND` as `carillon COMMAND
+/// --help`.
+std::vector<const char*> WithHelpOption(int argc, char** argv) {
+  std::vector<const char*> words(argv, argv + argc);
+  if (argc < 2 || absl::string_view(argv[1]) != "help") return words;
+  words.erase(words.begin() + 1);
+  words.push_back("--help");
+  return words;
 }
 
 /// Returns the exit code of a command that ended with `code`, once its output is written.
@@ -263,11 +290,14 @@ int Main(int argc, char** argv) {
                "carillon");
   AddProgramOptions(app, program);
   AddCommands(app, program);
+  const std::vector<const char*> words = WithHelpOption(argc, argv);
+  const auto count = static_cast<int>(words.size());
   try {
-    app.parse(argc, argv);
+    app.parse(count, words.data());
   } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return Finish(app.exit(error));
-    if (const std::string unknown = UnknownWord(app, argc, argv); !unknown.empty()) {
+    const std::string unknown = UnknownWord(app, count, words.data());
+    if (error.get_exit_code() == 0 && unknown.empty()) return Finish(app.exit(error));
+    if (!unknown.empty()) {
       std::cerr << "carillon: " << unknown << '\n';
     } else {
       app.exit(error);

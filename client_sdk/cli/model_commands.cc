@@ -322,9 +322,22 @@ absl::Status ShowModel(const client::Client& daemon, const std::string& text,
   return absl::OkStatus();
 }
 
-absl::Status DeleteModel(const client::Client& daemon, const std::string& text) {
-  ASSIGN_OR_RETURN(const auto name, FindModel(daemon, text));
-  return daemon.DeleteModalModel(name);
+absl::Status DeleteModels(const client::Client& daemon, const std::vector<std::string>& texts,
+                          bool json) {
+  absl::Status first_error;
+  for (const std::string& text : texts) {
+    const auto name = FindModel(daemon, text);
+    const absl::Status ended = name.ok() ? daemon.DeleteModalModel(*name) : name.status();
+    if (!ended.ok()) {
+      if (!first_error.ok()) (void)Report(first_error, HasEveryOption);
+      first_error = ended;
+    } else if (json) {
+      PrintJson({{"modal_model", *name}});
+    } else if (texts.size() > 1) {
+      absl::PrintF("%s deleted\n", *name);
+    }
+  }
+  return first_error;
 }
 
 absl::Status WatchJob(const client::Client& daemon, const std::string& text, bool json) {
