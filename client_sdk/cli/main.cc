@@ -16,6 +16,7 @@
 #include "client_sdk/cli/list_options.h"
 #include "client_sdk/cli/material_options.h"
 #include "client_sdk/cli/model_options.h"
+#include "client_sdk/cli/name_options.h"
 #include "client_sdk/cli/output.h"
 #include "client_sdk/cli/program.h"
 #include "client_sdk/cli/render_options.h"
@@ -267,6 +268,7 @@ void AddCommands(CLI::App& app, Program& program) {
   AddTop(app, program);
   AddExample(app, program);
   AddCompletion(app, program);
+  AddNames(app, program);
   AddHelp(app, program);
 }
 

@@ -315,15 +315,6 @@ class StrikeTest(CommandLineTest):
             struck = self.daemon.command("strike", "bar", *vectors, "--seconds", "0.01")
             self.assertRegex(struck.stdout, r"^\d+ modes: .* Hz, sounding by ")
 
-    def test_json_has_the_duration_and_the_peak_and_tells_of_the_limiter(self):
-        strike = ("strike", "bar", "--point", "0,0.008,0.01", "--duration", "0.002", "--seconds", "0.01", "--impulse")
-        shown, loud = (self.json_of(*strike, impulse) for impulse in ("0,0,-0.01", "0,0,-100"))
-        self.assertAlmostEqual(shown["contact_duration_s"], 0.002)
-        self.assertEqual((shown["seconds"], shown["limited_frame_count"]), (0.01, 0))
-        self.assertAlmostEqual(loud["peak_pa"], 1e4 * shown["peak_pa"], delta=10 * shown["peak_pa"])
-        self.assertGreater(loud["limited_frame_count"], 0)
-        self.assertIn("which the limiter lowers", self.run_command(*strike, "0,0,-100"))
-
     def test_it_prints_the_contact_and_the_peak_and_warns_of_a_distant_point(self):
         struck = self.daemon.command("strike", "bar", "--point", "0,0.008,0.01", "--impulse", "0,0,-0.01", "--duration",
                                      "0.002", "--seconds", "0.01")
