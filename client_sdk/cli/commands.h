@@ -49,7 +49,8 @@ struct ExportOptions {
   std::string model;
   std::string file;          ///< empty: the digest with the suffix of the format
   std::string format;        ///< empty: by the file's suffix
-  MaterialFigures material;  ///< for a glTF, which describes a body of one material
+  MaterialFigures material;  ///< for a glTF, which describes a body of one material; empty: that
+                             ///< which the model was made with
 };
 
 /// The options of `carillon model import`.
@@ -89,6 +90,14 @@ struct VolumeOptions {
   std::optional<double> gain;
   std::optional<bool> muted;
   std::optional<bool> solo;
+};
+
+/// The options of `carillon scene listener`.
+struct ListenerOptions {
+  std::string scene;
+  std::array<double, 3> position_m = {};
+  std::optional<std::array<double, 4>> orientation;  ///< w, x, y, z; absent: not rotated
+  double glide_s = 0;
 };
 
 /// The options of `carillon top`.
@@ -154,16 +163,21 @@ absl::Status CollectGarbage(const client::Client& daemon, const v1::CollectGarba
 /// name a material, shows the frequencies and decay rates of the modes too.
 absl::Status ShowModel(const client::Client& daemon, const std::string& text,
                        const MaterialFigures& figures, bool json);
-absl::Status DeleteModel(const client::Client& daemon, const std::string& text);
+/// Deletes models; one that cannot be deleted does not stop the others. Tells each outcome if there
+/// are several.
+absl::Status DeleteModels(const client::Client& daemon, const std::vector<std::string>& texts,
+                          bool json);
 absl::Status ListJobs(const client::Client& daemon, const v1::ListJobsRequest& filter, bool json);
 absl::Status ShowJob(const client::Client& daemon, const std::string& text, bool json);
-absl::Status CancelJob(const client::Client& daemon, const std::string& text);
+absl::Status CancelJob(const client::Client& daemon, const std::string& text, bool json);
 absl::Status ListMaterials(const client::Client& daemon, bool json);
 absl::Status ShowMaterial(const client::Client& daemon, const std::string& name, bool json);
 /// Lists the scenes and their objects.
 absl::Status ListScenes(const client::Client& daemon, bool json);
 /// Deletes a scene, which `text` names as "scenes/7" or "7".
-absl::Status DeleteScene(const client::Client& daemon, const std::string& text);
+absl::Status DeleteScene(const client::Client& daemon, const std::string& text, bool json);
+/// Moves the listener of a scene.
+absl::Status MoveListener(const client::Client& daemon, const ListenerOptions& options, bool json);
 /// Writes the OBJ file of an example; `path` may be empty for the name of the example. Errors:
 /// Internal (OUTPUT_NOT_WRITABLE).
 absl::Status WriteExample(const Example& example, const std::string& path, bool json);

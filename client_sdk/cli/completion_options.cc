@@ -13,6 +13,7 @@
 #include "absl/strings/str_replace.h"
 #include "absl/strings/str_split.h"
 #include "absl/strings/string_view.h"
+#include "client_sdk/cli/name_options.h"
 #include "proto/cpp/manual_page.h"
 #include "proto/cpp/near_names.h"
 
@@ -42,26 +43,56 @@ std::vector<std::string> CommandNames(const CLI::App& app) {
   return names;
 }
 
+/// Returns the commands of a shell that print the names which the command's own arguments take.
+std::vector<std::string> NamesOfArguments(const CLI::App& app) {
+  std::vector<std::string> calls;
+  for (const CLI::Option* option : app.get_options()) {
+    if (!option->get_positional()) continue;
+    const std::string kind = KindOfNames(option->get_single_name());
+    if (!kind.empty()) calls.push_back(absl::StrCat("$(_carillon_names ", kind, ")"));
+  }
+  return calls;
+}
+
+/// Returns the lines of a `case` by the word before, whose names take the place of all else.
+std::string CasesOfValues(absl::string_view list_form) {
+  std::string lines = "  case \"$before\" in\n";
+  for (const char* option : {"--material", "--striker", "--scene"}) {
+    const std::string names = absl::StrCat("$(_carillon_names ", KindOfNames(option), ")");
+    absl::StrAppend(&lines, "    ", option, ") ", absl::StrReplaceAll(list_form, {{"LIST", names}}),
+                    " ;;\n");
+  }
+  return absl::StrCat(lines, "  esac\n");
+}
+
 /// Returns the lines of a `case` that follow the words of a command line, and those that list what
-/// may come next, in the language that bash and zsh share.
+/// may come next, in the language that bash and zsh share. Their variable is not named `path`,
+/// because zsh would then find no program.
 std::string Cases(const CLI::App& app, absl::string_view list_form) {
   std::vector<std::string> paths;
   std::string lists;
   ForEachCommand(app, "", [&](const CLI::App& command, const std::string& path) {
     if (!path.empty()) paths.push_back(absl::StrCat("\"", path, "\""));
     std::vector<std::string> next = CommandNames(command);
+    for (const std::string& name : NamesOfArguments(command)) next.push_back(name);
     for (const std::string& name : LongNames(command)) next.push_back(name);
     absl::StrAppend(&lists, "    \"", path, "\") ",
                     absl::StrReplaceAll(list_form, {{"LIST", absl::StrJoin(next, " ")}}), " ;;\n");
   });
-  return absl::StrCat("    case \"$path $word\" in\n      ", absl::StrJoin(paths, " | "),
-                      ") path=\"$path $word\" ;;\n    esac\n  done\n  case \"$path\" in\n", lists,
-                      "  esac\n");
+  return absl::StrCat("    case \"$chain $word\" in\n      ", absl::StrJoin(paths, " | "),
+                      ") chain=\"$chain $word\" ;;\n    esac\n  done\n  case \"$chain\" in\n",
+                      lists, "  esac\n", CasesOfValues(list_form));
 }
+
+/// The function by which bash and zsh ask for names, unless an option is being typed.
+constexpr char kNamesFunction[] =
+    "_carillon_names() {\n  [[ $current == -* ]] || \"$program\" names \"$1\" 2>/dev/null\n}\n";
 
 std::string BashScript(const CLI::App& app) {
   return absl::StrCat(
-      "_carillon() {\n  local path=\"\" word choices\n"
+      kNamesFunction,
+      "_carillon() {\n  local chain=\"\" word choices program=\"${COMP_WORDS[0]}\"\n",
+      "  local current=\"${COMP_WORDS[COMP_CWORD]}\" before=\"${COMP_WORDS[COMP_CWORD-1]}\"\n"
       "  for word in \"${COMP_WORDS[@]:1:COMP_CWORD-1}\"; do\n",
       Cases(app, "choices=\"LIST\""),
       "  COMPREPLY=($(compgen -W \"$choices\" -- \"${COMP_WORDS[COMP_CWORD]}\"))\n"
@@ -69,7 +100,9 @@ std::string BashScript(const CLI::App& app) {
 }
 
 std::string ZshScript(const CLI::App& app) {
-  return absl::StrCat("#compdef carillon\n_carillon() {\n  local path=\"\" word\n",
+  return absl::StrCat("#compdef carillon\n", kNamesFunction,
+                      "_carillon() {\n  local chain=\"\" word program=\"${words[1]}\"\n",
+                      "  local current=\"${words[CURRENT]}\" before=\"${words[CURRENT-1]}\"\n",
                       "  local -a choices\n  for word in \"${(@)words[2,CURRENT-1]}\"; do\n",
                       Cases(app, "choices=(LIST)"),
                       "  compadd -a choices\n  [[ ${words[CURRENT]} == -* ]] || _files\n}\n"
@@ -81,6 +114,14 @@ std::string FishLine(const std::string& path, const std::string& what, const std
                          path, what, absl::StrReplaceAll(text, {{"\\", "\\\\"}, {"'", "\\'"}}));
 }
 
+/// Returns the part of a line for fish by which an argument takes names only; empty if it takes
+/// others.
+std::string FishNames(const std::string& argument) {
+  const std::string kind = KindOfNames(argument);
+  if (kind.empty()) return "";
+  return absl::StrCat(" -f -a '(carillon names ", kind, " 2>/dev/null)'");
+}
+
 std::string FishScript(const CLI::App& app) {
   std::string paths;
   std::string lines;
@@ -89,9 +130,15 @@ std::string FishScript(const CLI::App& app) {
     for (const CLI::App* next : ListedCommands(command)) {
       absl::StrAppend(&lines, FishLine(path, "-f -a " + next->get_name(), next->get_description()));
     }
+    for (const CLI::Option* option : command.get_options()) {
+      if (!option->get_positional()) continue;
+      const std::string names = FishNames(option->get_single_name());
+      if (!names.empty()) absl::StrAppend(&lines, FishLine(path, names, "name"));
+    }
     for (const CLI::Option* option : ListedOptions(command)) {
-      const char* value = option->get_items_expected_max() > 0 ? " -r" : "";
       for (const std::string& name : option->get_lnames()) {
+        const char* needed = option->get_items_expected_max() > 0 ? " -r" : "";
+        const std::string value = absl::StrCat(needed, FishNames(name));
         absl::StrAppend(
             &lines, FishLine(path, absl::StrCat("-l ", name, value), option->get_description()));
       }

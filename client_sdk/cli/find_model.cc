@@ -7,9 +7,11 @@
 #include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "absl/strings/strip.h"
 #include "client_sdk/cli/job_progress.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/escaped_text.h"
 #include "proto/cpp/status_macros.h"
 
 namespace carillon::cli {
@@ -17,6 +19,7 @@ namespace {
 
 constexpr absl::string_view kModels = "modalModels/";
 constexpr absl::string_view kJobs = "jobs/";
+constexpr size_t kShortDigest = 12;
 
 /// The words for the kind of thing that is searched for.
 struct Wording {
@@ -27,6 +30,17 @@ template <class Item>
 bool Means(const std::string& text, const Item& item, absl::string_view prefix) {
   const absl::string_view digest = absl::StripPrefix(item.name(), prefix);
   return item.label() == text || (!text.empty() && absl::StartsWith(digest, text));
+}
+
+/// Returns the first digits of the digests of some of the names, and how many more there are.
+std::string ShortNames(const std::vector<std::string>& names, absl::string_view prefix) {
+  constexpr size_t kMost = 4;
+  std::vector<absl::string_view> digests;
+  for (size_t i = 0; i < std::min(names.size(), kMost); ++i) {
+    digests.push_back(absl::StripPrefix(names[i], prefix).substr(0, kShortDigest));
+  }
+  const std::string shown = absl::StrJoin(digests, ", ");
+  return names.size() > kMost ? absl::StrCat(shown, " and ", names.size() - kMost, " more") : shown;
 }
 
 /// Returns the name of the one of `items` that `text` means.
@@ -45,8 +59,8 @@ absl::StatusOr<std::string> Choose(const std::vector<Item>& items, const std::st
   }
   return Refusal(absl::StatusCode::kInvalidArgument, wording.ambiguous,
                  absl::StrCat("'", text, "' means ", found.size(), " of the ", wording.noun,
-                              "s, for instance ", found[0], " and ", found[1],
-                              "; give more digits of the digest"));
+                              "s: ", ShortNames(found, wording.prefix),
+                              "; give one of these digests instead"));
 }
 
 /// Says what has become of the job whose model is not there, and what to do.
@@ -101,6 +115,23 @@ absl::StatusOr<std::string> FindModel(const client::Client& daemon, const std::s
   auto found =
       Choose(models, text, {kModels, "MODAL_MODEL_NOT_FOUND", "MODAL_MODEL_AMBIGUOUS", "model"});
   return absl::IsNotFound(found.status()) ? WhyNotFound(daemon, text, found.status()) : found;
+}
+
+std::string SharedLabel(const client::Client& daemon, const v1::ModalModelSummary& model) {
+  if (model.label().empty()) return "";
+  v1::ListModalModelsRequest filter;
+  filter.set_label_contains(model.label());
+  const auto models = daemon.ListModalModels(filter);
+  if (!models.ok()) return "";
+  std::vector<std::string> others;
+  for (const v1::ModalModelSummary& item : *models) {
+    if (item.label() == model.label() && item.name() != model.name()) others.push_back(item.name());
+  }
+  if (others.empty()) return "";
+  return absl::StrCat("the label '", EscapedText(model.label()), "' now means ", others.size() + 1,
+                      " models: name this one ", ShortNames({model.name()}, kModels),
+                      " and the other", others.size() > 1 ? "s " : " ", ShortNames(others, kModels),
+                      ", or give this one another label by `carillon model tag --label`");
 }
 
 absl::StatusOr<std::string> FindJob(const client::Client& daemon, const std::string& text) {

@@ -14,6 +14,9 @@ namespace carillon::cli {
 /// and those of Client::ListModalModels.
 absl::StatusOr<std::string> FindModel(const client::Client& daemon, const std::string& text);
 
+/// Says that other models have the label of `model`, too, and how to name each; empty if none has.
+std::string SharedLabel(const client::Client& daemon, const v1::ModalModelSummary& model);
+
 /// Returns the name "jobs/{digest}" of the job that `text` means: its name, its label, or the first
 /// digits of its digest. Errors: NotFound (JOB_NOT_FOUND), InvalidArgument
 /// (JOB_AMBIGUOUS), and those of Client::ListJobs.

@@ -101,7 +101,7 @@ absl::Status ShowJob(const client::Client& daemon, const std::string& text, bool
   return absl::OkStatus();
 }
 
-absl::Status CancelJob(const client::Client& daemon, const std::string& text) {
+absl::Status CancelJob(const client::Client& daemon, const std::string& text, bool json) {
   ASSIGN_OR_RETURN(const std::string name, FindJob(daemon, text));
   ASSIGN_OR_RETURN(const v1::Job job, daemon.CancelJob(name));
   const bool failed = job.state() == v1::JOB_STATE_FAILED;
@@ -109,6 +109,7 @@ absl::Status CancelJob(const client::Client& daemon, const std::string& text) {
     absl::FPrintF(stderr, "carillon: %s is not cancelled, because it has already %s\n", job.name(),
                   failed ? absl::StrCat("failed (", job.error().reason(), ")") : "succeeded");
   }
+  if (json) PrintJson(job);
   return absl::OkStatus();
 }
 
@@ -172,8 +173,30 @@ absl::Status ListScenes(const client::Client& daemon, bool json) {
   return absl::OkStatus();
 }
 
-absl::Status DeleteScene(const client::Client& daemon, const std::string& text) {
-  return daemon.DeleteScene(SceneNamed(text));
+absl::Status DeleteScene(const client::Client& daemon, const std::string& text, bool json) {
+  RETURN_IF_ERROR(daemon.DeleteScene(SceneNamed(text)));
+  if (json) PrintJson({{"scene", SceneNamed(text)}});
+  return absl::OkStatus();
+}
+
+absl::Status MoveListener(const client::Client& daemon, const ListenerOptions& options, bool json) {
+  v1::UpdateListenerRequest request;
+  request.set_scene(SceneNamed(options.scene));
+  v1::Vec3& position = *request.mutable_pose()->mutable_position_m();
+  position.set_x(options.position_m[0]);
+  position.set_y(options.position_m[1]);
+  position.set_z(options.position_m[2]);
+  if (options.orientation) {
+    v1::Quaternion& orientation = *request.mutable_pose()->mutable_orientation();
+    orientation.set_w((*options.orientation)[0]);
+    orientation.set_x((*options.orientation)[1]);
+    orientation.set_y((*options.orientation)[2]);
+    orientation.set_z((*options.orientation)[3]);
+  }
+  request.set_glide_s(options.glide_s);
+  RETURN_IF_ERROR(daemon.UpdateListener(request));
+  if (json) PrintJson(request);
+  return absl::OkStatus();
 }
 
 absl::Status WriteExample(const Example& example, const std::string& path, bool json) {

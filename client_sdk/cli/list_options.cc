@@ -6,6 +6,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <memory>
 #include <string>
 #include <vector>
@@ -108,6 +109,32 @@ void AddJobWatch(CLI::App& job, const std::string& named, Program& program) {
   });
 }
 
+/// Adds the command that moves the listener of a scene.
+void AddSceneListener(CLI::App& scene, Program& program) {
+  auto options = std::make_shared<ListenerOptions>();
+  auto orientation = std::make_shared<std::array<double, 4>>();
+  CLI::App& listener = *scene.add_subcommand("listener", "Move the listener of a scene");
+  listener.add_option("scene", options->scene, "The name or the number of a scene")->required();
+  listener
+      .add_option("--position", options->position_m,
+                  "Where the listener is: X,Y,Z or X Y Z in the frame of the scene, m")
+      ->delimiter(',')
+      ->required();
+  CLI::Option* const turned =
+      listener
+          .add_option("--orientation", *orientation,
+                      "The quaternion W,X,Y,Z that turns the listener, who looks along -Z with Y "
+                      "upwards and X to the right without it")
+          ->delimiter(',');
+  TakeSeconds(*listener.add_option("--glide", options->glide_s, "The time the way takes, s [0]"));
+  listener.callback([&program, options, orientation, turned] {
+    if (turned->count() > 0) options->orientation = *orientation;
+    program.command = [&program, options] {
+      return MoveListener(*program.Daemon(), *options, program.json);
+    };
+  });
+}
+
 }  // namespace
 
 void AddJob(CLI::App& app, Program& program) {
@@ -121,7 +148,9 @@ void AddJob(CLI::App& app, Program& program) {
   AddJobWatch(job, named, program);
   AddAbout(job, "cancel", "Cancel a job that has not ended", named,
            [&program](const std::string& text) {
-             program.command = [&program, text] { return CancelJob(*program.Daemon(), text); };
+             program.command = [&program, text] {
+               return CancelJob(*program.Daemon(), text, program.json);
+             };
            });
   AddJobRun(job, program);
 }
@@ -142,14 +171,18 @@ void AddMaterials(CLI::App& app, Program& program) {
 
 void AddScenes(CLI::App& app, Program& program) {
   CLI::App& scene =
-      *app.add_subcommand("scene", "List, record and delete scenes")->require_subcommand(1);
+      *app.add_subcommand("scene", "List, record and delete scenes, and move their listeners")
+           ->require_subcommand(1);
   scene.add_subcommand("list", "List the scenes and their objects")->callback([&program] {
     program.command = [&program] { return ListScenes(*program.Daemon(), program.json); };
   });
   AddAbout(scene, "delete", "Fade out the objects of a scene and delete it",
            "The name or the number of a scene", [&program](const std::string& text) {
-             program.command = [&program, text] { return DeleteScene(*program.Daemon(), text); };
+             program.command = [&program, text] {
+               return DeleteScene(*program.Daemon(), text, program.json);
+             };
            });
+  AddSceneListener(scene, program);
   AddSceneRecord(scene, program);
 }
 

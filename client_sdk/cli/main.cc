@@ -2,18 +2,21 @@
 //
 // The command line of `carillon`.
 #include <CLI/CLI.hpp>
+#include <array>
 #include <iostream>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
 #include "client_sdk/cli/commands.h"
 #include "client_sdk/cli/completion_options.h"
 #include "client_sdk/cli/doctor_command.h"
 #include "client_sdk/cli/list_options.h"
 #include "client_sdk/cli/material_options.h"
 #include "client_sdk/cli/model_options.h"
+#include "client_sdk/cli/name_options.h"
 #include "client_sdk/cli/output.h"
 #include "client_sdk/cli/program.h"
 #include "client_sdk/cli/render_options.h"
@@ -92,9 +95,12 @@ void AddTransfer(CLI::App& app, Program& program) {
                   "The name, the label, or the first digits of the digest of a model")
       ->required();
   TakeSize(*create.add_option("--size", options->size, "The size relative to that of the model"));
-  create.add_option("--accuracy", options->accuracy_db,
-                    "The error of each mode's power that is small enough, dB [2]");
-  create.add_option("--budget", options->budget_s, "The processor time to spend, s [20]");
+  TakeWithin(*create.add_option("--accuracy", options->accuracy_db,
+                                "The error of each mode's power that is small enough, dB [2]"),
+             0.06, 20, "leave it out for 2 dB");
+  TakeWithin(*create.add_option("--budget", options->budget_s,
+                                "The processor time to spend, s [by the size of the model]"),
+             0.001, 1e9, "leave it out for a time by the size of the model, 20 to 600 s");
   create.add_flag("--wait,!--no-wait", options->wait, "Wait until it is stored [no]");
   AddMaterial(create, options->material);
   create.callback([&program, options] {
@@ -120,6 +126,13 @@ void AddStruckObject(CLI::App& strike, StrikeOptions& options) {
       .add_flag("--modes-only", options.modes_only,
                 "Sound by the stored transfer without the click of the body's acceleration")
       ->excludes(paper);
+}
+
+/// Throws a CLI::ValidationError if the impulse is zero, because the strike would be silent.
+void CheckImpulse(const std::array<double, 3>& impulse) {
+  if (impulse != std::array<double, 3>{}) return;
+  throw CLI::ValidationError(
+      "--impulse", "a strike with an impulse of 0,0,0 is silent; give N s, such as 0,0,-0.01");
 }
 
 void AddStrike(CLI::App& app, Program& program) {
@@ -152,6 +165,7 @@ void AddStrike(CLI::App& app, Program& program) {
                                  "The time to ring, s [until the sound has decayed by 60 dB]"));
   AddMaterial(strike, options->material);
   strike.callback([&program, options] {
+    CheckImpulse(options->impulse_newton_seconds);
     program.command = [&program, options] {
       const StopSignal stop;
       return Strike(*program.Daemon(), *options, stop, program.json);
@@ -224,6 +238,18 @@ bool HasOptionFor(const CLI::App& app, const std::string& option) {
   return !chosen.empty() && HasOptionFor(*chosen.front(), option);
 }
 
+/// Adds the command `help`, for the list of commands; see WithHelpOption.
+void AddHelp(CLI::App& app, Program& program) {
+  CLI::App& help = *app.add_subcommand("help", "Show the help of the program or of a command");
+  help.add_option("command", "The command, such as model create");
+  help.callback([&app, &program] {
+    program.command = [&app] {
+      absl::PrintF("%s", app.help());
+      return absl::OkStatus();
+    };
+  });
+}
+
 void AddCommands(CLI::App& app, Program& program) {
   AddInfo(app, program);
   AddStatus(app, program);
@@ -242,6 +268,18 @@ void AddCommands(CLI::App& app, Program& program) {
   AddTop(app, program);
   AddExample(app, program);
   AddCompletion(app, program);
+  AddNames(app, program);
+  AddHelp(app, program);
+}
+
+/// Returns the words of the command line, with `carillon help COMMAND` as `carillon COMMAND
+/// --help`.
+std::vector<const char*> WithHelpOption(int argc, char** argv) {
+  std::vector<const char*> words(argv, argv + argc);
+  if (argc < 2 || absl::string_view(argv[1]) != "help") return words;
+  words.erase(words.begin() + 1);
+  words.push_back("--help");
+  return words;
 }
 
 /// Returns the exit code of a command that ended with `code`, once its output is written.
@@ -254,11 +292,14 @@ int Main(int argc, char** argv) {
                "carillon");
   AddProgramOptions(app, program);
   AddCommands(app, program);
+  const std::vector<const char*> words = WithHelpOption(argc, argv);
+  const auto count = static_cast<int>(words.size());
   try {
-    app.parse(argc, argv);
+    app.parse(count, words.data());
   } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return Finish(app.exit(error));
-    if (const std::string unknown = UnknownWord(app, argc, argv); !unknown.empty()) {
+    const std::string unknown = UnknownWord(app, count, words.data());
+    if (error.get_exit_code() == 0 && unknown.empty()) return Finish(app.exit(error));
+    if (!unknown.empty()) {
       std::cerr << "carillon: " << unknown << '\n';
     } else {
       app.exit(error);

@@ -83,6 +83,10 @@ Json ToJson(const Message& message) {
   return object;
 }
 
+void Append(const JsonMember& member, Json& object) {
+  std::visit([&](const auto& value) { object[member.name] = value; }, member.value);
+}
+
 /// Text that is not UTF-8 gets a replacement character for each wrong byte.
 std::string JsonLine(const Json& json) {
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
@@ -92,9 +96,13 @@ std::string JsonLine(const Json& json) {
 
 std::string MembersJson(std::initializer_list<JsonMember> members) {
   Json object = Json::object();
-  for (const JsonMember& member : members) {
-    std::visit([&](const auto& value) { object[member.name] = value; }, member.value);
-  }
+  for (const JsonMember& member : members) Append(member, object);
+  return JsonLine(object);
+}
+
+std::string MessageJson(const Message& message, const std::vector<JsonMember>& members) {
+  Json object = ToJson(message);
+  for (const JsonMember& member : members) Append(member, object);
   return JsonLine(object);
 }
 

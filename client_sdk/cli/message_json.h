@@ -6,6 +6,7 @@
 #include <initializer_list>
 #include <string>
 #include <variant>
+#include <vector>
 
 namespace carillon::cli {
 
@@ -23,5 +24,9 @@ struct JsonMember {
 /// Returns an object with the members in their order, as JSON in one line. Text that is not UTF-8,
 /// as names of files may be, gets a replacement character for each wrong byte.
 std::string MembersJson(std::initializer_list<JsonMember> members);
+
+/// Returns a message as MessageJson does, followed by the members.
+std::string MessageJson(const google::protobuf::Message& message,
+                        const std::vector<JsonMember>& members);
 
 }  // namespace carillon::cli

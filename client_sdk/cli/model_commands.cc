@@ -24,6 +24,11 @@
 namespace carillon::cli {
 namespace {
 
+// As the daemon has them: how far the speed of sound of a material may be from that of a transfer,
+// and its Poisson's ratio from that of a model.
+constexpr double kSpeedTolerance = 0.05;
+constexpr double kPoissonTolerance = 1.0001e-4;
+
 std::string Format(const CreateModelOptions& options, const std::string& file) {
   return options.format.empty() ? MeshFormatOf(file) : options.format;
 }
@@ -122,10 +127,9 @@ void PrintRow(const v1::ModalModelSummary& model) {
 /// Returns the transfer with which an object of `material` sounds, or null if none fits.
 const v1::TransferSummary* FittingTransfer(const v1::ModalModelSummary& model,
                                            const v1::Material& material) {
-  constexpr double kTolerance = 0.05;  // of the speed of sound, as the daemon has it
   const double speed_m_per_s = std::sqrt(material.young_pa() / material.density_kg_per_m3());
   const v1::TransferSummary* nearest = nullptr;
-  double least = kTolerance;
+  double least = kSpeedTolerance;
   for (const v1::TransferSummary& transfer : model.transfers()) {
     const v1::TransferHeader& header = transfer.header();
     const double distance =
@@ -237,6 +241,36 @@ void PrintWarnings(const client::Client& daemon, const std::string& name) {
   }
 }
 
+double SoundSpeed(const v1::Material& resolved) {
+  return std::sqrt(resolved.young_pa() / resolved.density_kg_per_m3());
+}
+
+/// Warns if no object of `material` can have the model, which was made for another Poisson's ratio,
+/// and if objects of the model's own material will not sound by a transfer for this one.
+void WarnOfMaterial(const v1::ModalModelSummary& model, const v1::Material& material) {
+  const absl::StatusOr<v1::Material> wanted = ResolveMaterial(material);
+  if (!wanted.ok()) return;  // the daemon says why
+  const double poisson = model.header().settings().poisson_ratio();
+  if (wanted->has_poisson_ratio() &&
+      std::abs(wanted->poisson_ratio() - poisson) > kPoissonTolerance) {
+    absl::FPrintF(
+        stderr,
+        "warning: the material's Poisson's ratio is %.4g, and the model was made for %.4g: "
+        "no object of this material can have the model; give --poisson %.9g here and to "
+        "its objects, or create a model for the material\n",
+        wanted->poisson_ratio(), poisson, poisson);
+  }
+  const absl::StatusOr<v1::Material> own = ResolveMaterial(model.material());
+  if (!model.has_material() || !own.ok()) return;
+  if (std::abs(std::log(SoundSpeed(*own) / SoundSpeed(*wanted))) > kSpeedTolerance) {
+    absl::FPrintF(
+        stderr,
+        "warning: the model was made of %s, with another speed of sound: objects that name "
+        "no material of their own do not sound by this transfer\n",
+        MaterialText(model.material()));
+  }
+}
+
 /// Removes what a list of models need not tell; `carillon model show` tells it.
 void Shorten(v1::ModalModelSummary& model) {
   model.mutable_header()->clear_settings();
@@ -272,6 +306,9 @@ absl::Status CreateTransfer(const client::Client& daemon, const CreateTransferOp
                             bool json) {
   ASSIGN_OR_RETURN(const auto model, FindModel(daemon, options.model));
   ASSIGN_OR_RETURN(const auto material, ToMaterial(options.material));
+  if (const auto stored = daemon.GetModalModel(model); stored.ok()) {
+    WarnOfMaterial(*stored, material);
+  }
   v1::CreateTransferRequest request;
   request.set_modal_model(model);
   *request.mutable_material() = material;
@@ -322,9 +359,22 @@ absl::Status ShowModel(const client::Client& daemon, const std::string& text,
   return absl::OkStatus();
 }
 
-absl::Status DeleteModel(const client::Client& daemon, const std::string& text) {
-  ASSIGN_OR_RETURN(const auto name, FindModel(daemon, text));
-  return daemon.DeleteModalModel(name);
+absl::Status DeleteModels(const client::Client& daemon, const std::vector<std::string>& texts,
+                          bool json) {
+  absl::Status first_error;
+  for (const std::string& text : texts) {
+    const auto name = FindModel(daemon, text);
+    const absl::Status ended = name.ok() ? daemon.DeleteModalModel(*name) : name.status();
+    if (!ended.ok()) {
+      if (!first_error.ok()) (void)Report(first_error, HasEveryOption);
+      first_error = ended;
+    } else if (json) {
+      PrintJson({{"modal_model", *name}});
+    } else if (texts.size() > 1) {
+      absl::PrintF("%s deleted\n", *name);
+    }
+  }
+  return first_error;
 }
 
 absl::Status WatchJob(const client::Client& daemon, const std::string& text, bool json) {

@@ -67,18 +67,20 @@ absl::StatusOr<StoredModel> Fetch(const client::Client& daemon, const std::strin
 
 absl::Status WriteGltf(const client::Client& daemon, const std::string& name,
                        const std::string& file, const v1::Material& given, bool binary) {
-  if (!IsGiven(given)) {
-    return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
-                   "a glTF holds the frequencies and decay rates of one material; give --material");
-  }
-  ASSIGN_OR_RETURN(v1::Material material, ResolveMaterial(given));
   ASSIGN_OR_RETURN(const v1::ModalModelSummary summary, daemon.GetModalModel(name));
+  const v1::Material& chosen = IsGiven(given) ? given : summary.material();
+  if (!IsGiven(chosen)) {
+    return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
+                   "a glTF holds the frequencies and decay rates of one material, and this model "
+                   "was stored without one; give --material");
+  }
+  ASSIGN_OR_RETURN(v1::Material material, ResolveMaterial(chosen));
   ASSIGN_OR_RETURN(const StoredModel model, Fetch(daemon, name));
   if (!material.has_poisson_ratio()) {
     material.set_poisson_ratio(model.header.settings().poisson_ratio());
   }
-  return interchange::WriteGltfModel(file, model, material,
-                                     {.body = summary.label(), .material = given.preset()}, binary);
+  return interchange::WriteGltfModel(
+      file, model, material, {.body = summary.label(), .material = chosen.preset()}, binary);
 }
 
 absl::Status WriteNpz(const client::Client& daemon, const std::string& name,
@@ -177,6 +179,8 @@ absl::Status ImportModel(const client::Client& daemon, const ImportOptions& opti
     absl::FPrintF(stderr, "carillon: the model sounds as the file says with %s\n",
                   imported.sounds_with);
   }
+  const std::string shared = SharedLabel(daemon, imported.summary);
+  if (!shared.empty()) absl::FPrintF(stderr, "carillon: %s\n", shared);
   if (json) {
     PrintJson(imported.summary);
   } else {

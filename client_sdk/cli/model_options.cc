@@ -106,14 +106,16 @@ void AddModelShow(CLI::App& app, Program& program) {
 }
 
 void AddModelDelete(CLI::App& app, Program& program) {
-  auto model = std::make_shared<std::string>();
-  CLI::App& command = *app.add_subcommand("delete", "Delete a model");
+  auto models = std::make_shared<std::vector<std::string>>();
+  CLI::App& command = *app.add_subcommand("delete", "Delete models");
   command
-      .add_option("model", *model,
+      .add_option("model", *models,
                   "The name, the label, or the first digits of the digest of a model")
       ->required();
-  command.callback([&program, model] {
-    program.command = [&program, model] { return DeleteModel(*program.Daemon(), *model); };
+  command.callback([&program, models] {
+    program.command = [&program, models] {
+      return DeleteModels(*program.Daemon(), *models, program.json);
+    };
   });
 }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
@@ -94,7 +95,8 @@ absl::Status SendImpulse(const client::Client& daemon, const std::string& scene,
 /// The strike as a rendering measures it.
 struct MeasuredStrike {
   double peak_pa = 0;
-  double duration_s = 0;
+  double duration_s = 0;             ///< of the contact
+  uint64_t limited_frame_count = 0;  ///< as the limiter of an output at full volume counts them
 };
 
 /// Writes the strike as a trace to `file`.
@@ -137,7 +139,11 @@ std::optional<MeasuredStrike> Measure(const client::Client& daemon,
     const auto summary = daemon.Render(
         settings, *trace, [](const client::AudioBlock&) { return true; },
         [&](const v1::Blow& blow) { duration_s = blow.duration_s(); });
-    if (summary.ok()) measured = {.peak_pa = summary->peak_pa(), .duration_s = duration_s};
+    if (summary.ok()) {
+      measured = {.peak_pa = summary->peak_pa(),
+                  .duration_s = duration_s,
+                  .limited_frame_count = summary->limited_frame_count()};
+    }
   }
   close(memory);
   return measured;
@@ -154,9 +160,24 @@ void PrintStrike(const client::Client& daemon, const v1::SoundingObject& object,
                Counted(object.sounding_mode_count(), "mode"), object.lowest_frequency_hz(),
                object.highest_frequency_hz(), by);
   if (const auto measured = Measure(daemon, object, options)) {
-    absl::PrintF("contact of %.3g ms, peak %.3g Pa at 1 m\n", 1000 * measured->duration_s,
-                 measured->peak_pa);
+    absl::PrintF("contact of %.3g ms, peak %.3g Pa at 1 m%s\n", 1000 * measured->duration_s,
+                 measured->peak_pa,
+                 measured->limited_frame_count > 0 ? ", which the limiter lowers" : "");
   }
+}
+
+/// Prints the object, how long it is heard and, where the daemon could measure them, the contact's
+/// duration, the peak, and the frames that the limiter lowers.
+void PrintStrikeJson(const client::Client& daemon, const v1::SoundingObject& object,
+                     const StrikeOptions& options) {
+  std::vector<JsonMember> members = {
+      {"seconds", options.seconds.value_or(SoundingSeconds(object))}};
+  if (const auto measured = Measure(daemon, object, options)) {
+    members.push_back({"contact_duration_s", measured->duration_s});
+    members.push_back({"peak_pa", measured->peak_pa});
+    members.push_back({"limited_frame_count", measured->limited_frame_count});
+  }
+  absl::PrintF("%s\n", MessageJson(object, members));
 }
 
 absl::Status StrikeIn(const client::Client& daemon, const std::string& scene,
@@ -164,7 +185,7 @@ absl::Status StrikeIn(const client::Client& daemon, const std::string& scene,
   ASSIGN_OR_RETURN(const auto object, AddObject(daemon, scene, options));
   RETURN_IF_ERROR(SendImpulse(daemon, scene, object.handle(), options));
   if (json) {
-    PrintJson(object);
+    PrintStrikeJson(daemon, object, options);
   } else {
     PrintStrike(daemon, object, options);
   }

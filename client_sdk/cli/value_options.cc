@@ -26,11 +26,12 @@ void ReadGain(CLI::Option& option) {
   });
 }
 
-void TakeWithin(CLI::Option& option, double low, double high) {
-  option.check([low, high](const std::string& text) -> std::string {
+void TakeWithin(CLI::Option& option, double low, double high, const std::string& advice) {
+  option.check([low, high, advice](const std::string& text) -> std::string {
     double value = 0;
     if (absl::SimpleAtod(text, &value) && value >= low && value <= high) return "";
-    return absl::StrCat("\"", text, "\" must be a number from ", low, " to ", high);
+    return absl::StrCat("\"", text, "\" must be a number from ", low, " to ", high,
+                        advice.empty() ? "" : "; ", advice);
   });
 }
 

@@ -18,8 +18,9 @@ inline constexpr char kGainForm[] = "a factor such as 0.5, or decibels: --gain=-
 /// Lets an option for a number read a factor or decibels; see ParseGain.
 void ReadGain(CLI::Option& option);
 
-/// Lets an option take numbers from `low` to `high` only. Unlike CLI::Range it refuses "nan".
-void TakeWithin(CLI::Option& option, double low, double high);
+/// Lets an option take numbers from `low` to `high` only. Unlike CLI::Range it refuses "nan". The
+/// message about another number ends with `advice`.
+void TakeWithin(CLI::Option& option, double low, double high, const std::string& advice = "");
 
 /// Lets an option take the sizes that a sounding object may have.
 void TakeSize(CLI::Option& option);

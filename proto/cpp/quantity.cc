@@ -36,6 +36,7 @@ std::optional<Budget> ParseBudget(const std::string& text) {
   const bool numbers = parts.size() <= 2 && absl::SimpleAtod(parts[0], &budget.seconds) &&
                        (parts.size() == 1 || absl::SimpleAtod(parts[1], &budget.gib));
   if (!numbers || !(budget.seconds >= 0 && budget.gib >= 0)) return std::nullopt;
+  if (budget.seconds == 0 && budget.gib == 0) return std::nullopt;  // would be no budget
   if (!std::isfinite(budget.seconds + budget.gib)) return std::nullopt;
   return budget;
 }

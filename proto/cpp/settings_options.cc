@@ -87,12 +87,14 @@ void AddMesh(CLI::App& app, Settings& settings) {
             "mesh so finely that no mode is estimated to be off by more, such as 1% or 0.01",
             [&](double share) { settings.mutable_mesh()->set_accuracy(share); })
       ->group(kSettingsGroup);
-  AddParsed(app, "--budget", ParseBudget, "seconds, or seconds:GiB, such as 60 or 60:4",
-            "SECONDS[:GIB] of processor time and memory: mesh as finely as they allow",
-            [&](const Budget& budget) {
-              settings.mutable_mesh()->set_budget_s(budget.seconds);
-              settings.mutable_mesh()->set_budget_gib(budget.gib);
-            })
+  AddParsed(
+      app, "--budget", ParseBudget,
+      "seconds, or seconds:GiB, such as 60 or 60:4, not both zero; leave it out for the default",
+      "SECONDS[:GIB] of processor time and memory: mesh as finely as they allow",
+      [&](const Budget& budget) {
+        settings.mutable_mesh()->set_budget_s(budget.seconds);
+        settings.mutable_mesh()->set_budget_gib(budget.gib);
+      })
       ->group(kSettingsGroup);
   AddChoice<v1::Element>(app, "--element",
                          {{"linear", v1::ELEMENT_LINEAR}, {"quadratic", v1::ELEMENT_QUADRATIC}},

@@ -102,6 +102,11 @@ absl::Status ReadInto(const v1::EngineContact& row, ObjectTouch& touch) {
   return absl::OkStatus();
 }
 
+/// Returns the place of report `index` of a list of `count`.
+ReportPlace PlaceIn(const char* list, int count, int index) {
+  return {.list = count > 1 ? list : nullptr, .index = static_cast<uint32_t>(index)};
+}
+
 /// Collects contacts and hands them to `take`, one of the intake's methods, many at a time.
 template <typename Contact>
 class Batch {
@@ -131,26 +136,35 @@ class Batch {
   std::vector<Contact> contacts_;
 };
 
-/// Gives the rows to `take`, one of the intake's methods.
+/// Gives the rows of the field `list` to `take`, one of the intake's methods.
 template <typename Contact, typename Rows>
-void ReadRows(const Rows& rows, ContactIntake& intake,
+void ReadRows(const char* list, const Rows& rows, ContactIntake& intake,
               void (ContactIntake::*take)(std::span<const Contact>)) {
   Batch<Contact> batch(intake, take, rows.size());
-  for (const auto& row : rows) {
-    absl::Status status = ReadInto(row, batch.Next());
+  for (int i = 0; i < rows.size(); ++i) {
+    Contact& contact = batch.Next();
+    absl::Status status = ReadInto(rows[i], contact);
+    contact.contact.place = PlaceIn(list, rows.size(), i);
     if (status.ok()) continue;
+    if (contact.contact.place.list != nullptr) status = AtElement(status, list, i);
     batch.Drop();
     batch.Send();  // the contacts before it come first, so that the last rejection stays the newest
-    intake.Reject(row.has_second() ? 2 : 1, std::move(status));
+    intake.Reject(rows[i].has_second() ? 2 : 1, std::move(status));
   }
   batch.Send();
 }
 
-/// Gives the rows of columns to `take`, with the duration of an elastic collision where none is
-/// stated.
+const v1::ImpulseColumns& ImpulsesOf(const v1::ImpulseColumns& columns) { return columns; }
+const v1::ImpulseColumns& ImpulsesOf(const v1::EngineContactColumns& columns) {
+  return columns.impulses();
+}
+
+/// Gives the rows of the columns in the field `list` to `take`, with the duration of an elastic
+/// collision where none is stated.
 template <typename Contact, typename Columns>
-void ReadColumns(const Columns& columns, const v1::ImpulseColumns& impulses, ContactIntake& intake,
+void ReadColumns(const char* list, const Columns& columns, ContactIntake& intake,
                  void (ContactIntake::*take)(std::span<const Contact>)) {
+  const v1::ImpulseColumns& impulses = ImpulsesOf(columns);
   absl::Status status = Validate(columns);
   const absl::StatusOr<HertzContact> hertz = ToHertzContact(impulses.hertz());
   status.Update(hertz.status());
@@ -162,6 +176,7 @@ void ReadColumns(const Columns& columns, const v1::ImpulseColumns& impulses, Con
     Contact& contact = batch.Next();
     contact = ReadRow(columns, row);
     contact.contact.impulse.hertz = *hertz;
+    contact.contact.place = PlaceIn(list, impulses.object_size(), row);
   }
   batch.Send();
 }
@@ -172,7 +187,8 @@ void ReadColumns(const v1::PoseColumns& columns, ContactIntake& intake) {
     return intake.Reject(std::max<uint64_t>(1, count), std::move(status));
   }
   for (int row = 0; row < columns.object_size(); ++row) {
-    intake.Move(columns.object(row), ReadRow(columns, row));
+    intake.Move(columns.object(row), ReadRow(columns, row),
+                PlaceIn("pose_columns", columns.object_size(), row));
   }
 }
 
@@ -215,15 +231,17 @@ size_t CountRows(const v1::ContactStep& step) {
 
 absl::Status ReadStep(const v1::ContactStep& step, ContactIntake& intake) {
   RETURN_IF_ERROR(intake.BeginStep(step.time_s()));
-  for (const v1::ObjectPose& row : step.poses()) intake.Move(row.object(), FromProto(row.pose()));
+  for (int i = 0; i < step.poses_size(); ++i) {
+    intake.Move(step.poses(i).object(), FromProto(step.poses(i).pose()),
+                PlaceIn("poses", step.poses_size(), i));
+  }
   ReadColumns(step.pose_columns(), intake);
   if (step.has_listener()) intake.MoveListener(FromProto(step.listener()));
-  ReadRows(step.impulses(), intake, &ContactIntake::Strike);
-  ReadColumns(step.columns(), step.columns(), intake, &ContactIntake::Strike);
-  ReadRows(step.sustained(), intake, &ContactIntake::Hold);
-  ReadRows(step.contacts(), intake, &ContactIntake::Touch);
-  ReadColumns(step.contact_columns(), step.contact_columns().impulses(), intake,
-              &ContactIntake::Touch);
+  ReadRows("impulses", step.impulses(), intake, &ContactIntake::Strike);
+  ReadColumns("columns", step.columns(), intake, &ContactIntake::Strike);
+  ReadRows("sustained", step.sustained(), intake, &ContactIntake::Hold);
+  ReadRows("contacts", step.contacts(), intake, &ContactIntake::Touch);
+  ReadColumns("contact_columns", step.contact_columns(), intake, &ContactIntake::Touch);
   intake.EndStep();
   return absl::OkStatus();
 }

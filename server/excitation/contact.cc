@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <string>
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
@@ -15,6 +16,11 @@ namespace {
 /// Returns whether every component is a number and at most `most` in magnitude.
 bool Finite(const std::array<double, 3>& vector, double most = std::numeric_limits<double>::max()) {
   return std::ranges::all_of(vector, [most](double x) { return std::abs(x) <= most; });
+}
+
+/// Returns a vector as the user may have written it, such as "0, nan, 0.1".
+std::string Text(const std::array<double, 3>& vector) {
+  return absl::StrCat(vector[0], ", ", vector[1], ", ", vector[2]);
 }
 
 absl::Status Invalid(absl::string_view reason, absl::string_view message) {
@@ -44,8 +50,9 @@ absl::Status ValidatePoint(const Point& point) {
   if (Finite(point)) return absl::OkStatus();
   return Invalid(
       "POINT_NOT_FINITE",
-      "the point of contact has a coordinate that is not a finite number: send metres in "
-      "the object's frame");
+      absl::StrCat("the point of contact ", Text(point),
+                   " has a coordinate that is not a finite number: send metres in the object's "
+                   "frame"));
 }
 
 absl::Status ValidateWeights(const std::array<double, 3>& weights) {
@@ -54,8 +61,8 @@ absl::Status ValidateWeights(const std::array<double, 3>& weights) {
   const bool inside = std::ranges::all_of(weights, [](double w) { return w >= -kRounding; });
   if (inside && std::abs(sum - 1) <= kRounding) return absl::OkStatus();
   return Invalid("INVALID_WEIGHTS",
-                 absl::StrCat("barycentric weights ", weights[0], ", ", weights[1], ", ",
-                              weights[2], ": none may be below zero, and their sum must be 1"));
+                 absl::StrCat("barycentric weights ", Text(weights),
+                              ": none may be below zero, and their sum must be 1"));
 }
 
 absl::Status Validate(const ContactImpulse& contact) {
@@ -63,8 +70,9 @@ absl::Status Validate(const ContactImpulse& contact) {
   if (!Finite(contact.impulse_newton_seconds, std::numeric_limits<float>::max())) {
     return Invalid(
         "IMPULSE_NOT_FINITE",
-        "the impulse has a component that is not a finite number, or is beyond 3.4e38: send N s in "
-        "the object's frame");
+        absl::StrCat("the impulse ", Text(contact.impulse_newton_seconds),
+                     " has a component that is not a finite number, or is beyond 3.4e38: send N s "
+                     "in the object's frame"));
   }
   const double duration_s = contact.duration_s.value_or(0);
   if (!(duration_s >= 0 && duration_s <= kLongestContactS)) {

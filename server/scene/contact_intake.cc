@@ -58,7 +58,7 @@ absl::Status ContactIntake::BeginStep(double time_s) {
 void ContactIntake::Strike(std::span<const ObjectImpulse> impulses) {
   const MutexLock lock(&scene_.mutex());
   for (const ObjectImpulse& impulse : impulses) {
-    Note(impulse.contact.object_count(), TryStrike(impulse));
+    Note(impulse.contact, TryStrike(impulse));
   }
 }
 
@@ -82,7 +82,7 @@ absl::Status ContactIntake::TryStrike(const ObjectImpulse& impulse) {
 void ContactIntake::Hold(std::span<const ObjectForce> forces) {
   const MutexLock lock(&scene_.mutex());
   for (const ObjectForce& force : forces) {
-    Note(force.contact.object_count(), TryHold(force));
+    Note(force.contact, TryHold(force));
   }
 }
 
@@ -98,7 +98,7 @@ absl::Status ContactIntake::TryHold(const ObjectForce& force) {
 void ContactIntake::Touch(std::span<const ObjectTouch> touches) {
   const MutexLock lock(&scene_.mutex());
   for (const ObjectTouch& touch : touches) {
-    Note(touch.contact.object_count(), TryTouch(touch));
+    Note(touch.contact, TryTouch(touch));
   }
 }
 
@@ -114,7 +114,9 @@ absl::Status ContactIntake::TryTouch(const ObjectTouch& touch) {
   return absl::OkStatus();
 }
 
-void ContactIntake::Move(uint32_t handle, const Pose& pose) { Note(1, TryMove(handle, pose)); }
+void ContactIntake::Move(uint32_t handle, const Pose& pose, const ReportPlace& place) {
+  Note(1, place, TryMove(handle, pose));
+}
 
 absl::Status ContactIntake::TryMove(uint32_t handle, const Pose& pose) {
   RETURN_IF_ERROR(CheckAhead(FrameOf(time_s_)));
@@ -128,7 +130,7 @@ absl::Status ContactIntake::TryMove(uint32_t handle, const Pose& pose) {
   return absl::OkStatus();
 }
 
-void ContactIntake::MoveListener(const Pose& pose) { Note(1, TryMoveListener(pose)); }
+void ContactIntake::MoveListener(const Pose& pose) { Note(1, {}, TryMoveListener(pose)); }
 
 absl::Status ContactIntake::TryMoveListener(const Pose& pose) {
   RETURN_IF_ERROR(CheckAhead(FrameOf(time_s_)));
@@ -154,8 +156,9 @@ void ContactIntake::Reject(uint64_t count, absl::Status reason) {
   last_rejection_ = std::move(reason);
 }
 
-void ContactIntake::Note(uint64_t count, absl::Status verdict) {
-  if (!verdict.ok()) Reject(count, std::move(verdict));
+void ContactIntake::Note(uint64_t count, const ReportPlace& place, const absl::Status& verdict) {
+  if (verdict.ok()) return;
+  Reject(count, place.list == nullptr ? verdict : AtElement(verdict, place.list, place.index));
 }
 
 absl::Status ContactIntake::Locate(const ObjectContact& contact, double seconds,

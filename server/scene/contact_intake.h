@@ -103,7 +103,7 @@ class ContactIntake {
 
   /// Sets the pose of an object or of the listener at the time of the step. The object or listener
   /// moves there in a straight line from its previous pose.
-  void Move(uint32_t handle, const Pose& pose);
+  void Move(uint32_t handle, const Pose& pose, const ReportPlace& place = {});
   void MoveListener(const Pose& pose);
 
   /// Ends the step after all its forces have been reported.
@@ -112,7 +112,7 @@ class ContactIntake {
   /// Ends the simulation, and with it the blows that an engine spreads over steps.
   void Finish();
 
-  /// Counts `count` contacts that could not be used.
+  /// Counts `count` contacts that could not be used. Other rejections name the report's place.
   void Reject(uint64_t count, absl::Status reason);
 
   const TimeMapping& mapping() const { return mapper_.mapping(); }
@@ -133,7 +133,10 @@ class ContactIntake {
   absl::Status TryTouch(const ObjectTouch& touch) ABSL_EXCLUSIVE_LOCKS_REQUIRED(scene_.mutex());
   absl::Status TryMove(uint32_t handle, const Pose& pose);
   absl::Status TryMoveListener(const Pose& pose);
-  void Note(uint64_t count, absl::Status verdict);
+  void Note(uint64_t count, const ReportPlace& place, const absl::Status& verdict);
+  void Note(const ObjectContact& contact, const absl::Status& verdict) {
+    Note(contact.object_count(), contact.place, verdict);
+  }
   /// Finds the objects of a contact and the impulses that they feel. `seconds` is one for an
   /// impulse, and the step for a force.
   absl::Status Locate(const ObjectContact& contact, double seconds, FeltContact& felt)

@@ -19,6 +19,12 @@ struct SecondObject {
   std::optional<Quaternion> rotation = std::nullopt;
 };
 
+/// The place of a report among several of its step, which the message of a rejection names.
+struct ReportPlace {
+  const char* list = nullptr;  ///< a field of ContactStep; null: the report is the only one
+  uint32_t index = 0;
+};
+
 /// A contact of one or two objects of a scene.
 struct ObjectContact {
   uint32_t handle = 0;
@@ -26,6 +32,7 @@ struct ObjectContact {
   std::optional<SecondObject> second = std::nullopt;
   /// Whether points may lie inside the bodies, because engines let bodies overlap.
   bool found_by_engine = false;
+  ReportPlace place{};
 
   uint64_t object_count() const { return second ? 2 : 1; }
 };

@@ -52,6 +52,16 @@ class RenderMistakesTest(CommandLineTest):
             self.assertIn(expected, done.stderr)
 
 
+class HelpTest(unittest.TestCase):
+    def test_the_command_help_shows_what_the_option_help_does(self):
+        self.assertEqual(carillon("help").stdout, carillon("--help").stdout)
+        self.assertIn("  help ", carillon("help").stdout)
+        self.assertEqual(carillon("help", "model", "create").stdout, carillon("model", "create", "--help").stdout)
+        done = carillon("help", "modal")
+        self.assertEqual((done.returncode, done.stdout), (2, ""))
+        self.assertEqual(done.stderr, "carillon: there is no command 'modal'; did you mean 'model'?\n")
+
+
 class LostOutputTest(CommandLineTest):
     def run_command_to(self, stdout, *words):
         """The command with `stdout`, or with a closed one for None; returns (exit code, stderr)."""
@@ -100,12 +110,17 @@ class WrongValuesTest(unittest.TestCase):
     def test_values_that_would_be_taken_for_others_are_refused(self):
         strike = ("strike", "bar", "--point", "0,0,0", "--impulse", "0,0,1")
         create = ("model", "create", ROOT / "README.md")
-        for words, expected in (((*strike, "--size", "0"), '--size: "0" must be a number from 0.001 to 1000'),
+        for words, expected in (((*strike[:-1], "0,0,0"), "--impulse: a strike with an impulse of 0,0,0 is silent"),
+                                ((*strike, "--size", "0"), '--size: "0" must be a number from 0.001 to 1000'),
                                 ((*strike, "--seconds", "-3"), '--seconds: "-3" must be a number from 0'),
                                 ((*strike, "--seconds", "nan"), '--seconds: "nan" must be'),
                                 ((*strike, "--gain", "-6"), "or decibels, such as -6dB"),
                                 ((*create, "--size", "0"), "--size"),
                                 ((*create, "--accuracy", "1"), "1 is 100%"),
+                                ((*create, "--budget", "0"), "not both zero; leave it out for the default"),
+                                (("transfer", "create", "bar", "--accuracy", "0"),
+                                 '"0" must be a number from 0.06 to 20; leave it out for 2 dB'),
+                                (("transfer", "create", "bar", "--budget", "0"), "leave it out for a time by the size"),
                                 ((*create, "--memory-limit-mib", "-3"), "--memory-limit-mib"),
                                 (("transfer", "create", "bar", "--size", "0"), "--size"),
                                 (("listen", "--out", "x.ogg"), "must end with .wav"),

@@ -12,6 +12,7 @@ const { toMaterial } = require('./materials');
 const { toMeshFile } = require('./meshes');
 const { Model, isTransfer } = require('./models');
 const { Places, mostRenderings } = require('./places');
+const { stateOf } = require('./progress');
 const { Scene } = require('./scenes');
 const { toSettings } = require('./settings');
 const { Sound, samplesOf, samplesOfIntegers } = require('./sound');
@@ -25,10 +26,6 @@ function jobFilter(filters) {
   refuseUnknown(filters, ['states', 'label_contains'], 'jobs');
   const { states = [], label_contains = '' } = filters;
   return { states: states.map((state) => choice(state, JOB_STATES, 'JOB_STATE_', 'an entry of states')), label_contains };
-}
-
-function stateOf(job) {
-  return job.state.replace('JOB_STATE_', '').toLowerCase();
 }
 
 const PIECE_BYTES = 1 << 20;

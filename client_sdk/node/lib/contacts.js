@@ -232,10 +232,13 @@ function makeStep(time, content = {}) {
   return step;
 }
 
-/** The rows of one strike. Throws a TypeError if it has not one point and one impulse. */
+/** The rows of one strike. Throws a TypeError if it has not one point and one impulse, or if the impulse is zero. */
 function strikeOf(object, { point, impulse, duration, striker } = {}) {
   tuple(point, 3, 'point', "[x, y, z]: metres in the object's own frame");
-  tuple(impulse, 3, 'impulse', "[x, y, z]: newton seconds in the object's own frame");
+  const meaning = "[x, y, z]: newton seconds in the object's own frame";
+  if (tuple(impulse, 3, 'impulse', meaning).every((component) => component === 0)) {
+    refuse(impulse, 'impulse', `other than zero, because the strike would be silent: ${meaning}`);
+  }
   return [{ object, point, impulse, duration: durationOf(duration, 'duration'), striker }];
 }
 

@@ -24,7 +24,8 @@ class ServerUnavailable extends CarillonError {}
 
 // The caller's names of fields and calls of the contract that messages of the daemon mention.
 const CALLER_NAMES = { step_s: 'step', scheduling_delay_s: 'delay', glide_s: 'glide',
-  'SceneService.CreateScene': 'Client.createScene()' };
+  'columns(?=\\[)': 'impulses', 'contact_columns(?=\\[)': 'contacts', 'sustained(?=\\[)': 'forces',
+  'pose_columns(?=\\[)': 'poses', 'SceneService.CreateScene': 'Client.createScene()' };
 
 /** Replaces names of the contract by those of the caller, and adds the unit, seconds, that a name loses. */
 function inNamesOfCaller(text, names) {

@@ -83,6 +83,46 @@ TEST(FindModel, SaysNothingOfJobsThatDoNotMakeTheModel) {
   EXPECT_THAT(MessageOf(transfer, "bell"), Not(HasSubstr("job")));
 }
 
+/// A daemon with `count` models of the same label.
+class DaemonWithModels : public client::Client {
+ public:
+  explicit DaemonWithModels(int count) {
+    for (int i = 0; i < count; ++i) {
+      v1::ModalModelSummary& model = *list_.add_modal_models();
+      model.set_name("modalModels/" + std::string(64, static_cast<char>('a' + i)));
+      model.set_label("bell");
+    }
+  }
+  absl::StatusOr<v1::ListModalModelsResponse> ListModalModelsPage(
+      const v1::ListModalModelsRequest&) const override {
+    return list_;
+  }
+  const v1::ModalModelSummary& newest() const { return list_.modal_models(0); }
+
+ private:
+  v1::ListModalModelsResponse list_;
+};
+
+TEST(FindModel, SaysWhichModelsAnAmbiguousNameMeansInOneShortLine) {
+  const std::string two(FindModel(DaemonWithModels(2), "bell").status().message());
+  EXPECT_THAT(two, AllOf(HasSubstr("2 of the models: aaaaaaaaaaaa, bbbbbbbbbbbb;"),
+                         HasSubstr("MODAL_MODEL_AMBIGUOUS"), Not(HasSubstr("more"))));
+  const std::string six(FindModel(DaemonWithModels(6), "bell").status().message());
+  EXPECT_THAT(six, HasSubstr("dddddddddddd and 2 more;"));
+  EXPECT_LT(six.size(), 200U);
+}
+
+TEST(SharedLabel, SaysHowToNameEachModelOfALabel) {
+  const DaemonWithModels three(3);
+  EXPECT_THAT(
+      SharedLabel(three, three.newest()),
+      AllOf(HasSubstr("'bell' now means 3 models: name this one aaaaaaaaaaaa and the others "
+                      "bbbbbbbbbbbb, cccccccccccc"),
+            HasSubstr("`carillon model tag --label`")));
+  const DaemonWithModels one(1);
+  EXPECT_EQ(SharedLabel(one, one.newest()), "");
+}
+
 TEST(FindJob, NamesTheCommandThatListsJobs) {
   const auto found = FindJob(DaemonWithJob(v1::JOB_STATE_RUNNING), "bowl");
   EXPECT_THAT(std::string(found.status().message()), HasSubstr("`carillon job list`"));

@@ -7,6 +7,7 @@ const { test } = require('node:test');
 const { inspect } = require('node:util');
 const carillon = require('carillon');
 const { fromInfo } = require('carillon/lib/errors');
+const { stateOf } = require('carillon/lib/progress');
 const { toSettings } = require('carillon/lib/settings');
 const { warnOfContacts, warnOfStream } = require('carillon/lib/warnings');
 
@@ -133,6 +134,21 @@ test('contacts are refused by their names, with unit and frame', async () => {
     /point is \[ 0, 0 \]; it must be \[x, y, z\]: metres in the object's own frame/);
 });
 
+test('a strike without an impulse is refused, because it would be silent', async () => {
+  await assert.rejects(bell.strike({ point: POINT, impulse: [0, 0, 0] }),
+    /impulse is \[ 0, 0, 0 \]; it must be other than zero, because the strike would be silent/);
+  new carillon.Trace().step(0, { impulses: { objects: 1, points: POINT, impulses: [0, 0, 0] } });
+});
+
+test('a message about a job that waits says why', () => {
+  const shown = (wait) => stateOf({ state: 'JOB_STATE_QUEUED', wait });
+  assert.equal(shown({ earlier_job_count: 3 }), 'queued (waiting: 3 jobs are before it)');
+  assert.equal(shown({ cause: 'WAIT_CAUSE_MEMORY', running_job_count: 1, running_job_label: 'bowl' }),
+    'queued (waiting for the memory of bowl)');
+  assert.equal(shown({ cause: 'WAIT_CAUSE_WORKER', running_job_count: 2 }), 'queued (waiting for one of 2 jobs)');
+  assert.equal(stateOf({ state: 'JOB_STATE_RUNNING' }), 'running');
+});
+
 test('handles and partners that are no whole numbers of 32 bits are refused', () => {
   for (const wrong of ['floor', '5', 1.7, -1, 1 + 2 ** 32, NaN]) {
     const shown = inspect(wrong);
@@ -175,6 +191,7 @@ test('refusals of the daemon have the names of the caller', () => {
   for (const [said, expected] of [['step_s is 0; say', 'step is 0 s; say'],
     ['scheduling_delay_s is 20; it must be 0 to 10', 'delay is 20 s; it must be 0 to 10 s'],
     ['glide_s is -1; it must be 0 to 10', 'glide is -1 s; it must be 0 to 10 s'],
+    ['columns[17]: x', 'impulses[17]: x'], ['contact_columns[2]: x', 'contacts[2]: x'],
     ['make one with SceneService.CreateScene', 'make one with Client.createScene()']]) {
     assert.equal(fromInfo({ reason: 'INVALID', message: said }).message, `INVALID: ${expected}`);
   }

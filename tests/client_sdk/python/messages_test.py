@@ -7,11 +7,13 @@ import threading
 import unittest
 import warnings
 
+import grpc
 import numpy
 
 import carillon
 from carillon.v1 import (
-    audio_service_pb2, contact_pb2, contact_service_pb2, error_pb2, modal_model_service_pb2, scene_service_pb2)
+    audio_service_pb2, contact_pb2, contact_service_pb2, decomposition_pb2, error_pb2, modal_model_service_pb2,
+    scene_service_pb2)
 
 POINT, IMPULSE = (0, 0, 0), (0, 0, 1)
 MESH = ([(0, 0, 0)], [(0, 0, 0)])
@@ -120,6 +122,9 @@ class RefusalsTest(MessagesTest):
         self.refused('"modes_only"', carillon.Trace().add, "modalModels/1", radiation="none")
         self.refused('"failed"', next, self.c.jobs(["broken"]))
 
+    def test_an_effect_of_hearing_is_refused_with_the_place_where_it_belongs(self):
+        self.refused('scene has no "panning"; give it as hearing=dict(panning=True)', self.c.scene, panning=True)
+
     def test_a_value_of_the_wrong_type_is_refused_by_the_name_of_its_argument(self):
         self.refused("tail_s of render is 'long'; it must be a number", self.c.render, carillon.Trace(), tail_s="long")
         scene = carillon.Scene(self.c, "scenes/1")
@@ -175,6 +180,14 @@ class RefusalsTest(MessagesTest):
         self.refused("impulse is None; it must be three numbers: x, y, z, newton seconds in the object's own frame",
                      bell.strike, POINT, None)
 
+    def test_a_strike_without_an_impulse_is_refused_because_it_would_be_silent(self):
+        bell = carillon.SoundingObject(carillon.Scene(self.c, "scenes/1"), scene_service_pb2.SoundingObject(handle=1))
+        summary = modal_model_service_pb2.ModalModelSummary(name="modalModels/1")
+        for strike in (bell.strike, carillon.Model(self.c, summary, "oak").render_strike):
+            self.refused("impulse is (0, 0, 0); it must be other than zero, because the strike would be silent",
+                         strike, POINT, (0, 0, 0))
+        made(impulses=carillon.Impulses(1, POINT, (0, 0, 0)))
+
     def test_a_trace_of_contacts_needs_the_length_of_its_steps_as_a_stream_does(self):
         contacts, impulses = (kind(1, POINT, IMPULSE) for kind in (carillon.Contacts, carillon.Impulses))
         self.refused("Trace(step=1/240)", carillon.Trace().step, 0, contacts=contacts)
@@ -185,9 +198,43 @@ class RefusalsTest(MessagesTest):
         for said, expected in (("step_s is 0; say the simulator's step", "step is 0 s; say the simulator's step"),
                                ("scheduling_delay_s is 20; it must be 0 to 10", "delay is 20 s; it must be 0 to 10 s"),
                                ("glide_s is -1; it must be 0 to 10", "glide is -1 s; it must be 0 to 10 s"),
+                               ("columns[17]: x", "impulses[17]: x"),
+                               ("contact_columns[2]: x", "contacts[2]: x"),
+                               ("pose_columns[2]: x", "poses[2]: x"),
                                ("make one with SceneService.CreateScene", "make one with Client.scene()")):
             info = error_pb2.ErrorInfo(reason="INVALID", message=said)
             self.assertEqual(carillon.errors.from_info(info).message, expected)
+
+
+class WaitingTest(MessagesTest):
+    def test_progress_says_why_a_job_waits(self):
+        state, cause = decomposition_pb2.JOB_STATE_QUEUED, "WAIT_CAUSE_"
+        for wait, expected in (({"earlier_job_count": 1}, "waiting: 1 job is before it"),
+                               ({"earlier_job_count": 3}, "waiting: 3 jobs are before it"),
+                               ({"cause": cause + "WORKER", "running_job_count": 2}, "waiting for one of 2 jobs"),
+                               ({"cause": cause + "MEMORY", "running_job_count": 1, "running_job_label": "bowl"},
+                                "waiting for the memory of bowl"),
+                               ({"cause": cause + "COARSE_MODEL"}, "waiting for its coarse model"), ({}, "waiting")):
+            job = decomposition_pb2.Job(state=state, wait=wait)
+            self.assertEqual(carillon.progress.activity(job), expected)
+        running = decomposition_pb2.Job(state="JOB_STATE_RUNNING", progress={"phase": "PHASE_MESH"})
+        self.assertEqual(carillon.progress.activity(running), "mesh")
+
+    def test_a_recording_that_ends_early_raises_the_error_of_the_package(self):
+        class Lost(grpc.RpcError):
+            code = staticmethod(lambda: grpc.StatusCode.UNAVAILABLE)
+            details = staticmethod(lambda: "socket closed")
+            trailing_metadata = staticmethod(lambda: ())
+
+        def answers(*first):
+            yield from first
+            raise Lost
+
+        begin = audio_service_pb2.ListenResponse(format={"sample_rate_hz": 48000, "channel_count": 1})
+        for take in (lambda: carillon.client.Recording(answers(begin), "unix:/nowhere").take(1),
+                     carillon.scenes.TraceRecording(answers(), "unix:/nowhere").take):
+            with self.assertRaisesRegex(carillon.ServerUnavailable, "no daemon answers at unix:/nowhere"):
+                take()
 
 
 class ShortFormsTest(MessagesTest):

@@ -20,6 +20,8 @@ TEST(Quantity, ABudgetIsSecondsAndPerhapsGib) {
   EXPECT_EQ(ParseBudget("60")->seconds, 60);
   EXPECT_EQ(ParseBudget("60")->gib, 0);
   EXPECT_EQ(ParseBudget("0:1.5")->gib, 1.5);
+  EXPECT_FALSE(ParseBudget("0"));
+  EXPECT_FALSE(ParseBudget("0:0"));
   for (const char* text : {"", ":", "60:", ":4", "60:4:1", "-1", "60:-4", "nan", "1e999"}) {
     EXPECT_FALSE(ParseBudget(text)) << text;
   }

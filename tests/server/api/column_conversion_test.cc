@@ -155,6 +155,22 @@ TEST(Columns, AColumnOfPosesOfAnotherLengthRejectsAllAndIsNamed) {
   EXPECT_EQ(Read(step).rejected_count, 1U);
 }
 
+TEST(Columns, ARejectionNamesItsRowUnlessThereIsOneOnly) {
+  v1::ContactStep step = ThreeImpulses();
+  EXPECT_THAT(Read(step).rejection, HasSubstr("OBJECT_NOT_FOUND: columns[2]: an empty scene has "
+                                              "no object 1;"));
+  *step.mutable_contact_columns()->mutable_impulses() = step.columns();
+  step.clear_columns();
+  EXPECT_THAT(Read(step).rejection, HasSubstr("contact_columns[2]: an empty scene"));
+  EXPECT_THAT(Read(TwoPoses()).rejection, HasSubstr("pose_columns[1]: "));
+  v1::ContactStep rows;
+  rows.add_impulses()->set_object(1);
+  EXPECT_THAT(Read(rows).rejection, HasSubstr("LOCATION_MISSING: a contact"));
+  rows.add_impulses()->set_object(2);
+  EXPECT_THAT(Read(rows).rejection,
+              HasSubstr("LOCATION_MISSING: impulses[1]: a contact on object 2"));
+}
+
 TEST(ColumnConversion, EngineContactsHaveTheColumnsOfImpulsesAndTheirOwn) {
   v1::EngineContactColumns columns;
   *columns.mutable_impulses() = ThreeImpulses().columns();

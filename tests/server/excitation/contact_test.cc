@@ -7,6 +7,8 @@
 #include <cmath>
 #include <limits>
 
+#include "absl/strings/str_cat.h"
+
 namespace carillon {
 namespace {
 
@@ -32,13 +34,15 @@ TEST(Contact, AnImpulseMustBeFinite) {
     ContactImpulse contact = MakeContact();
     contact.impulse_newton_seconds[1] = bad;
     EXPECT_THAT(Validate(contact).ToString(), HasSubstr("IMPULSE_NOT_FINITE"));
+    EXPECT_THAT(Validate(contact).ToString(), HasSubstr(absl::StrCat(", ", bad, ", ")));
   }
 }
 
 TEST(Contact, ItsPointMustBeFinite) {
   ContactImpulse contact = MakeContact();
   contact.location = Point{0, kNan, 0};
-  EXPECT_THAT(Validate(contact).ToString(), HasSubstr("POINT_NOT_FINITE"));
+  EXPECT_THAT(Validate(contact).ToString(),
+              HasSubstr("POINT_NOT_FINITE: the point of contact 0, nan, 0 "));
 }
 
 TEST(Contact, ItsDurationLiesFromZeroToATenthOfASecond) {

@@ -45,7 +45,8 @@ def _places(descriptor: Any, name: str) -> list[str]:
     for field in descriptor.fields:
         if field.message_type is not None and field.label != field.LABEL_REPEATED:
             call = "carillon.material" if field.message_type.name == "Material" else "dict"
-            inner = [f"{name}=..."] if name in field.message_type.fields_by_name else []
+            known = field.message_type.fields_by_name.get(name)
+            inner = [] if known is None else [f"{name}={'True' if known.cpp_type == known.CPPTYPE_BOOL else '...'}"]
             found += [f"{field.name}={call}({place})" for place in inner + _places(field.message_type, name)]
     return found
 

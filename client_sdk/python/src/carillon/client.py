@@ -182,13 +182,13 @@ class Client:
             return self.scenes_stub.StopAll(scene_service_pb2.StopAllRequest()).scene_count
 
     def scene(self, *, hearing: Optional[hearing_pb2.Hearing] = None, listener: Optional[PoseLike] = None,
-              gain: Optional[float] = None, keep: bool = False, id: str = "") -> Scene:
+              gain: Optional[float] = None, keep: bool = False, id: str = "", **unknown: Any) -> Scene:
         """Makes an empty scene. It ends by itself a minute after its clients, unless `keep` is true. With an `id`, such
         as "lathe-1", it is "scenes/lathe-1"; a scene that you made before with this id and the same settings is
         returned as it is, and its `existing` is true."""
         request = checks.message(scene_service_pb2.CreateSceneRequest, "scene", dict(
             hearing=hearing, listener=None if listener is None else to_pose(listener, "listener"), gain=gain, keep=keep,
-            id=id))
+            id=id, **unknown))
         with errors.translated(self.server):
             made = self.scenes_stub.CreateScene(request)
         return Scene(self, made.name, made.existing)
@@ -228,7 +228,7 @@ class Client:
         with errors.translated(self.server):
             answers = self.audio_stub.Listen(checks.message(audio_service_pb2.ListenRequest, "recording", request))
             with self.cancellable(answers):
-                record = Recording(answers)
+                record = Recording(answers, self.server)
                 try:
                     yield record
                 finally:
@@ -313,8 +313,9 @@ class Client:
 class Recording:
     """What the daemon plays; a thread collects it. `sound` is what was heard so far."""
 
-    def __init__(self, answers: Any):
+    def __init__(self, answers: Any, server: str):
         self._answers = answers
+        self._server = server
         self._format = next(answers).format
         self._short = self._format.encoding == audio_service_pb2.AUDIO_ENCODING_INT16
         self._blocks: list[bytes] = []
@@ -333,12 +334,13 @@ class Recording:
         return Sound(samples.reshape(-1, self._format.channel_count), self._format.sample_rate_hz, self._lost)
 
     def take(self, seconds: float) -> Sound:
-        """Waits until this much of the sound since the beginning was heard, and returns it."""
+        """Waits until this much of the sound since the beginning was heard, and returns it. Raises CarillonError if the
+        recording ends before."""
         wanted = int(seconds * self._format.sample_rate_hz)
         with self._more:
             self._more.wait_for(lambda: self._frame_count >= wanted or self._error)
         if self._error:
-            raise self._error
+            raise errors.from_rpc(self._error, self._server)
         heard = self.sound
         return Sound(heard.samples[:wanted], heard.sample_rate_hz, heard.lost_frame_count)
 

@@ -255,11 +255,16 @@ def _fill_second_columns(columns: contact_pb2.ImpulseColumns, given: Union[Impul
 
 
 def strike_of(item: Any, point: Array, impulse: Array, duration: Optional[float], struck_by: Striker) -> Impulses:
-    """One strike. Raises ValueError if it has not one point and one impulse, or if its duration is negative."""
+    """One strike. Raises ValueError if it has not one point and one impulse, if the impulse is zero, or if the duration
+    is negative."""
     if duration is not None and checks.numbers(duration, "duration", DURATION) < 0:
         checks.refuse(duration, "duration", DURATION)
-    return Impulses(item, checks.three(point, "point", OBJECT_POINT),
-                    checks.three(impulse, "impulse", OBJECT_IMPULSE), durations=duration, striker=struck_by)
+    vector_of_impulse = checks.three(impulse, "impulse", OBJECT_IMPULSE)
+    if not vector_of_impulse.any():
+        checks.refuse(impulse, "impulse",
+                      f"other than zero, because the strike would be silent: x, y, z, {OBJECT_IMPULSE}")
+    return Impulses(item, checks.three(point, "point", OBJECT_POINT), vector_of_impulse, durations=duration,
+                    striker=struck_by)
 
 
 def add_contacts(step: contact_pb2.ContactStep, given: Contacts) -> int:

@@ -17,7 +17,8 @@ from carillon.v1 import contact_pb2, contact_service_pb2, error_pb2
 DETAILS_KEY = "grpc-status-details-bin"
 # The caller's names of fields and calls of the contract that messages of the daemon mention.
 CALLER_NAMES = {"step_s": "step", "scheduling_delay_s": "delay", "glide_s": "glide",
-                "SceneService.CreateScene": "Client.scene()"}
+                r"columns(?=\[)": "impulses", r"contact_columns(?=\[)": "contacts", r"sustained(?=\[)": "forces",
+                r"pose_columns(?=\[)": "poses", "SceneService.CreateScene": "Client.scene()"}
 
 
 class CarillonError(Exception):

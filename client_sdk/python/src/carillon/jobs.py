@@ -39,6 +39,11 @@ class Job:
         return decomposition_pb2.JobState.Name(self.message.state).removeprefix("JOB_STATE_").lower()
 
     @property
+    def _doing(self) -> str:
+        """The state and, of a job that waits, the reason."""
+        return f"{self.state} ({progress.activity(self.message)})" if self.state == "queued" else self.state
+
+    @property
     def is_transfer(self) -> bool:
         """Whether the job computes how a stored model radiates, and not a model."""
         return bool(self.message.kind == decomposition_pb2.JOB_KIND_TRANSFER)
@@ -58,7 +63,7 @@ class Job:
         except errors.CarillonError as error:
             if error.reason != "DEADLINE_EXCEEDED":
                 raise
-            raise errors.CarillonError(error.reason, f"{self.message.label or self.name} is {self.state} and has not "
+            raise errors.CarillonError(error.reason, f"{self.message.label or self.name} is {self._doing} and has not "
                                        f"ended after {timeout:.3g} s; wait longer, or cancel the job") from error
         finally:
             close()

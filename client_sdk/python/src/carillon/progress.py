@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable
 from typing import Any, Optional, Union
 
+from carillon.checks import counted
 from carillon.v1 import decomposition_pb2
 
 OnProgress = Callable[[decomposition_pb2.Job], None]
@@ -15,6 +16,29 @@ Progress = Union[None, bool, OnProgress]
 
 def phase_name(job: decomposition_pb2.Job) -> str:
     return decomposition_pb2.Phase.Name(job.progress.phase).removeprefix("PHASE_").lower()
+
+
+def activity(job: decomposition_pb2.Job) -> str:
+    """What a job does, such as "mesh", or why it waits, such as "waiting: 2 jobs are before it"."""
+    if job.state == decomposition_pb2.JOB_STATE_SUCCEEDED:
+        return "done"
+    return wait_text(job.wait) if job.state == decomposition_pb2.JOB_STATE_QUEUED else phase_name(job)
+
+
+def wait_text(wait: decomposition_pb2.JobWait) -> str:
+    """Why a job waits, in the words of the command line."""
+    if wait.earlier_job_count:
+        return (f"waiting: {counted(wait.earlier_job_count, 'job')} {'is' if wait.earlier_job_count == 1 else 'are'} "
+                "before it")
+    several = wait.running_job_count != 1
+    running = counted(wait.running_job_count, "job") if several else wait.running_job_label or "a job"
+    if wait.cause == decomposition_pb2.WAIT_CAUSE_WORKER:
+        return f"waiting for {'one of ' if several else ''}{running}"
+    if wait.cause == decomposition_pb2.WAIT_CAUSE_MEMORY:
+        return f"waiting for the memory of {running}"
+    if wait.cause == decomposition_pb2.WAIT_CAUSE_COARSE_MODEL:
+        return "waiting for its coarse model"
+    return "waiting"
 
 
 def _is_watched() -> bool:
@@ -37,7 +61,7 @@ class ProgressBar:
             return
         done = job.state == decomposition_pb2.JOB_STATE_SUCCEEDED
         self._bar.n = 100 if done else round(100 * job.progress.fraction)
-        self._bar.set_description(f"{job.label} {'done' if done else phase_name(job)}")
+        self._bar.set_description(f"{job.label} {activity(job)}")
 
     def close(self) -> None:
         if self._bar is not None:

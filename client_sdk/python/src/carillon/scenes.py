@@ -160,7 +160,7 @@ class Scene:
             answers = self.client.contacts_stub.RecordContacts(request)
             with self.client.cancellable(answers):
                 next(answers)  # it has begun
-                yield TraceRecording(answers)
+                yield TraceRecording(answers, self.client.server)
 
     def move_listener(self, pose: PoseLike, glide: float = 0) -> None:
         """Moves the listener, within `glide` seconds."""
@@ -197,12 +197,14 @@ class Scene:
 class TraceRecording:
     """A stream of contacts that the daemon records."""
 
-    def __init__(self, answers: Any):
+    def __init__(self, answers: Any, server: str):
         self._answers = answers
+        self._server = server
 
     def take(self) -> Trace:
         """Waits until the stream has ended. Returns its trace."""
-        return Trace.of(answer.record for answer in self._answers)
+        with errors.translated(self._server):
+            return Trace.of(answer.record for answer in self._answers)
 
     def cancel(self) -> None:
         """Ends the recording."""

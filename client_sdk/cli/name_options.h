@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+#include "client_sdk/cli/program.h"
+
+namespace CLI {  // NOLINT(readability-identifier-naming): as the library has it
+class App;
+}
+
+namespace carillon::cli {
+
+/// Returns the kind of names that an argument or the value of an option takes, such as "models" for
+/// "model" and "materials" for "--material"; empty if it takes others.
+std::string KindOfNames(const std::string& argument);
+
+/// Adds `carillon names KIND`, which --help does not list. The scripts of `carillon completion`
+/// call it for the names of materials and strikers, and for those of the daemon's models, jobs and
+/// scenes. Where no daemon answers within a second, it prints nothing.
+void AddNames(CLI::App& app, Program& program);
+
+}  // namespace carillon::cli
