@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/scene/scene_registry.h"
 
-#include <set>
 #include <utility>
 #include <vector>
 
@@ -14,41 +13,9 @@
 namespace carillon {
 namespace {
 
-absl::Status TooMany(absl::string_view reason, size_t limit, absl::string_view what) {
-  return Refusal(
-      absl::StatusCode::kResourceExhausted, reason,
-      absl::StrCat("the daemon holds ", limit, " ", what, " already; remove some first"));
-}
-
 absl::Status SceneNotFound(absl::string_view name) {
   return Refusal(absl::StatusCode::kNotFound, "SCENE_NOT_FOUND",
                  absl::StrCat("there is no ", name, "; make one with SceneService.CreateScene"));
-}
-
-/// Returns the handle of each object, which is the requested one or a handle that neither the scene
-/// nor another object uses.
-absl::StatusOr<std::vector<uint32_t>> ChooseHandles(const Scene& scene,
-                                                    const std::vector<NewObject>& objects) {
-  std::set<uint32_t> taken;
-  for (const auto& [handle, object] : scene.CopyAll()) taken.insert(handle);
-  for (size_t i = 0; i < objects.size(); ++i) {
-    const uint32_t handle = objects[i].handle;
-    if (handle == 0 || taken.insert(handle).second) continue;
-    const absl::Status in_scene = scene.CheckFree(handle);
-    if (!in_scene.ok()) return AtElement(in_scene, "objects", i);
-    return AtElement(Refusal(absl::StatusCode::kAlreadyExists, "OBJECT_EXISTS",
-                             absl::StrCat("an object before it has the handle ", handle,
-                                          ": give each its own, or 0")),
-                     "objects", i);
-  }
-  std::vector<uint32_t> handles;
-  uint32_t free = 0;
-  for (const NewObject& object : objects) {
-    while (object.handle == 0 && !taken.insert(++free).second) {
-    }
-    handles.push_back(object.handle == 0 ? free : object.handle);
-  }
-  return handles;
 }
 
 ObjectProperties Changed(ObjectProperties properties, const ObjectChange& change) {
@@ -84,7 +51,9 @@ absl::StatusOr<uint64_t> SceneRegistry::CreateScene(const SceneSpace& space, dou
                    absl::StrCat("there is a scenes/", id, " already: choose another id"));
   }
   if (scenes_.size() >= kMaxSceneCount) {
-    return TooMany("TOO_MANY_SCENES", kMaxSceneCount, "scenes");
+    return Refusal(
+        absl::StatusCode::kResourceExhausted, "TOO_MANY_SCENES",
+        absl::StrCat("the daemon holds ", kMaxSceneCount, " scenes already; remove some first"));
   }
   const uint64_t number = next_scene_++;
   ASSIGN_OR_RETURN(const BusId bus, volumes_.Open(number, owner, gain));
@@ -185,59 +154,6 @@ absl::StatusOr<std::vector<PlacedObject>> SceneRegistry::ListObjects(uint64_t sc
   return placed;
 }
 
-absl::StatusOr<PlacedObject> SceneRegistry::AddObject(uint64_t scene, uint32_t handle,
-                                                      std::shared_ptr<const ModalModel> model,
-                                                      const ObjectProperties& properties) {
-  const MutexLock change_lock(&change_mutex_);
-  ASSIGN_OR_RETURN(const std::shared_ptr<Scene> found, FindScene(scene));
-  RETURN_IF_ERROR(found->CheckFree(handle));
-  if (object_count() >= kMaxObjectCount) {
-    return TooMany("TOO_MANY_OBJECTS", kMaxObjectCount, "objects");
-  }
-  ASSIGN_OR_RETURN(
-      SoundingObject object,
-      MakeObject(*found, {.handle = handle, .model = std::move(model), .properties = properties}));
-  const uint32_t chosen = handle != 0 ? handle : found->FreeHandle();
-  // This cannot fail, because every change of the scene holds change_mutex_.
-  found->Insert(chosen, object).IgnoreError();
-  const MutexLock lock(&mutex_);
-  ++object_count_;
-  return PlacedObject{.handle = chosen, .object = std::move(object)};
-}
-
-absl::StatusOr<std::vector<PlacedObject>> SceneRegistry::AddObjects(
-    uint64_t scene, const std::vector<NewObject>& objects) {
-  const MutexLock change_lock(&change_mutex_);
-  ASSIGN_OR_RETURN(const std::shared_ptr<Scene> found, FindScene(scene));
-  const size_t room = kMaxObjectCount - object_count();
-  if (objects.size() > room) {
-    return AtElement(TooMany("TOO_MANY_OBJECTS", kMaxObjectCount, "objects"), "objects", room);
-  }
-  ASSIGN_OR_RETURN(const std::vector<uint32_t> handles, ChooseHandles(*found, objects));
-  std::vector<PlacedObject> placed;
-  for (size_t i = 0; i < objects.size(); ++i) {
-    absl::StatusOr<SoundingObject> object = MakeObject(*found, objects[i]);
-    if (!object.ok()) {
-      for (const PlacedObject& made : placed) mixer_.FadeOut(made.object.bank);
-      return AtElement(object.status(), "objects", i);
-    }
-    placed.push_back({.handle = handles[i], .object = *std::move(object)});
-  }
-  // This cannot fail, because every change of the scene holds change_mutex_.
-  for (const PlacedObject& made : placed) found->Insert(made.handle, made.object).IgnoreError();
-  const MutexLock lock(&mutex_);
-  object_count_ += placed.size();
-  return placed;
-}
-
-absl::StatusOr<SoundingObject> SceneRegistry::MakeObject(const Scene& scene,
-                                                         const NewObject& object) {
-  ASSIGN_OR_RETURN(std::shared_ptr<const SoundingBody> body, bodies_.Get(object.model));
-  auto voice = MakeVoice(scene.space(), object.properties.pose, mixer_.settings());
-  return MakeSoundingObject(std::move(body), object.properties, {mixer_, scene.bus()},
-                            std::move(voice), transfers_);
-}
-
 absl::StatusOr<PlacedObject> SceneRegistry::UpdateObject(uint64_t scene, uint32_t handle,
                                                          const ObjectChange& change) {
   const MutexLock change_lock(&change_mutex_);
@@ -258,34 +174,6 @@ absl::StatusOr<PlacedObject> SceneRegistry::UpdateObject(uint64_t scene, uint32_
   }
   ASSIGN_OR_RETURN(SoundingObject object, found->Copy(handle));
   return PlacedObject{.handle = handle, .object = std::move(object)};
-}
-
-void SceneRegistry::TakeOverTransfers(const std::string& model_digest) {
-  const MutexLock change_lock(&change_mutex_);
-  std::vector<std::shared_ptr<Scene>> scenes;
-  {
-    const MutexLock lock(&mutex_);
-    for (const auto& [id, scene] : scenes_) scenes.push_back(scene);
-  }
-  for (const std::shared_ptr<Scene>& scene : scenes) {
-    for (const auto& [handle, old] : scene->CopyAll()) {
-      const ModalModel& model = *old.body->model;
-      if (model.digest != model_digest) continue;
-      const auto transfer = ChooseTransfer(model, old.properties, transfers_);
-      if (!transfer.ok() || *transfer == old.transfer) continue;
-      // An object that cannot be made anew, for instance because the mixer is full, stays
-      // unchanged.
-      absl::StatusOr<SoundingObject> object = Remake(old, old.properties);
-      if (!object.ok()) continue;
-      scene->Replace(handle, *std::move(object)).IgnoreError();
-      mixer_.LetRingOut(old.bank);
-    }
-  }
-}
-
-absl::StatusOr<SoundingObject> SceneRegistry::Remake(const SoundingObject& old,
-                                                     const ObjectProperties& properties) {
-  return MakeSoundingObject(old.body, properties, {mixer_, old.bus}, old.voice, transfers_);
 }
 
 absl::Status SceneRegistry::UpdateListener(uint64_t scene, const Pose& pose, double glide_s) {

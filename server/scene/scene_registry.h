@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -10,6 +11,8 @@
 #include <vector>
 
 #include "absl/base/thread_annotations.h"
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "server/base/mutex.h"
 #include "server/scene/contact_stream.h"
@@ -154,11 +157,32 @@ class SceneRegistry {
  private:
   absl::StatusOr<std::shared_ptr<Scene>> FindScene(uint64_t scene) const;
   SceneEntry EntryOf(uint64_t id, const Scene& scene) const;
-  absl::StatusOr<SoundingObject> MakeObject(const Scene& scene, const NewObject& object)
-      ABSL_EXCLUSIVE_LOCKS_REQUIRED(change_mutex_);
+  /// Returns the refusal of an object as the caller is to see it. `index` is its place in the list.
+  using ElementError = absl::FunctionRef<absl::Status(const absl::Status&, size_t index)>;
+
+  /// Makes either all of the objects or none of them.
+  absl::StatusOr<std::vector<PlacedObject>> Add(uint64_t scene, std::span<const NewObject> objects,
+                                                ElementError at);
+  /// Counts objects that are about to be made. Errors: ResourceExhausted (TOO_MANY_OBJECTS).
+  absl::Status ReserveObjects(size_t count, ElementError at);
+  void GiveObjectsBack(size_t count);
+  /// Makes objects that are in no scene yet and have no handle.
+  absl::StatusOr<std::vector<PlacedObject>> MakeObjects(const Scene& scene,
+                                                        std::span<const NewObject> objects,
+                                                        ElementError at);
+  absl::StatusOr<SoundingObject> MakeObject(const Scene& scene, const NewObject& object);
+  void FadeOut(std::span<const PlacedObject> objects);
+  /// Puts the objects that were `made` into the scene, and sets their handles. Errors: NotFound
+  /// (SCENE_NOT_FOUND), AlreadyExists (OBJECT_EXISTS).
+  absl::Status Place(Scene& scene, std::span<const NewObject> objects, ElementError at,
+                     std::vector<PlacedObject>& made);
+  /// Moves the listener of objects that were made for a listener at `listener` to where the
+  /// scene's listener is now.
+  void CatchUp(Scene& scene, std::span<const PlacedObject> placed, const Pose& listener);
   absl::StatusOr<SoundingObject> Remake(const SoundingObject& old,
-                                        const ObjectProperties& properties)
-      ABSL_EXCLUSIVE_LOCKS_REQUIRED(change_mutex_);
+                                        const ObjectProperties& properties);
+  /// Makes `old`, a copy of an object of the scene, anew with the transfer that fits it best.
+  void TakeOverTransfer(Scene& scene, uint32_t handle, const SoundingObject& old);
   /// Waits until this number of moves can be sent. Errors: ResourceExhausted (TOO_MANY_MOVES,
   /// TOO_MANY_STREAMS).
   absl::Status AwaitRoomForMoves(size_t count) ABSL_EXCLUSIVE_LOCKS_REQUIRED(change_mutex_);
@@ -171,8 +195,11 @@ class SceneRegistry {
   BodyCache bodies_;
   RejectionCounts rejections_;
   SceneVolumes volumes_;
-  /// Held while objects are added, changed and removed, so that limits are exact and two changes of
-  /// one object do not undo each other. Contacts do not lock it.
+  /// The number of calls of TakeOverTransfers. Objects during whose making it grows may lack a
+  /// transfer.
+  std::atomic<uint64_t> transfer_round_{0};
+  /// Held while objects are put into a scene, changed and removed, so that two changes of one
+  /// object do not undo each other. Contacts do not lock it.
   Mutex change_mutex_;
   /// Carries moves that come by a call and not in a contact stream. The first such move opens it.
   std::unique_ptr<EventStream> moves_ ABSL_GUARDED_BY(change_mutex_);
@@ -181,6 +208,7 @@ class SceneRegistry {
   /// The number of each scene by its id.
   std::map<std::string, uint64_t> numbers_ ABSL_GUARDED_BY(mutex_);
   uint64_t next_scene_ ABSL_GUARDED_BY(mutex_) = 1;
+  /// Number of objects in all scenes, and of those that are being made.
   size_t object_count_ ABSL_GUARDED_BY(mutex_) = 0;
 };
 

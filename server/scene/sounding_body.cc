@@ -6,6 +6,7 @@
 #include <future>
 #include <utility>
 
+#include "absl/cleanup/cleanup.h"
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
@@ -74,14 +75,30 @@ absl::StatusOr<std::shared_ptr<const SoundingBody>> MakeBody(
 
 absl::StatusOr<std::shared_ptr<const SoundingBody>> BodyCache::Get(
     std::shared_ptr<const ModalModel> model) {
-  const MutexLock lock(&mutex_);
-  if (const auto found = bodies_.find(model.get()); found != bodies_.end()) {
-    if (std::shared_ptr<const SoundingBody> body = found->second.lock()) return body;
+  const ModalModel* const key = model.get();
+  std::promise<Made> promise;
+  std::shared_future<Made> other;
+  {
+    const MutexLock lock(&mutex_);
+    if (const auto found = bodies_.find(key); found != bodies_.end()) {
+      if (std::shared_ptr<const SoundingBody> body = found->second.lock()) return body;
+    }
+    const auto [making, is_new] = making_.try_emplace(key);
+    if (is_new) making->second = promise.get_future().share();
+    if (!is_new) other = making->second;
   }
-  std::erase_if(bodies_, [](const auto& entry) { return entry.second.expired(); });
-  const ModalModel* key = model.get();
-  absl::StatusOr<std::shared_ptr<const SoundingBody>> body = MakeBody(std::move(model));
-  if (body.ok()) bodies_[key] = *body;
+  if (other.valid()) return other.get();
+  const absl::Cleanup end = [&] {
+    const MutexLock lock(&mutex_);
+    making_.erase(key);
+  };
+  Made body = MakeBody(std::move(model));
+  {
+    const MutexLock lock(&mutex_);
+    std::erase_if(bodies_, [](const auto& entry) { return entry.second.expired(); });
+    if (body.ok()) bodies_[key] = *body;
+  }
+  promise.set_value(body);
   return body;
 }
 

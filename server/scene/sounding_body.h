@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <future>
 #include <map>
 #include <memory>
 
@@ -36,8 +37,12 @@ class BodyCache {
   absl::StatusOr<std::shared_ptr<const SoundingBody>> Get(std::shared_ptr<const ModalModel> model);
 
  private:
+  using Made = absl::StatusOr<std::shared_ptr<const SoundingBody>>;
+
   Mutex mutex_;
   std::map<const ModalModel*, std::weak_ptr<const SoundingBody>> bodies_ ABSL_GUARDED_BY(mutex_);
+  /// The bodies that are being made. Whoever asks for one of them meanwhile waits for it.
+  std::map<const ModalModel*, std::shared_future<Made>> making_ ABSL_GUARDED_BY(mutex_);
 };
 
 }  // namespace carillon

@@ -3,8 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <compare>
+#include <functional>
 #include <limits>
 #include <numbers>
+#include <optional>
+#include <queue>
 #include <span>
 
 #include "server/synthesis/bank/level.h"
@@ -89,21 +93,67 @@ RadiatingMode RadiationOf(const ModeTable& table, size_t m, double eigenvalue,
           .decay_per_s = displaced * integral / (2 * radiation.sound_speed_m_per_s)};
 }
 
-/// Pairs the closest neighbours first: an ovalling mode of a tube may lie between two pairs.
-void PairDegenerate(std::vector<SoundingMode>& modes, const SoundingBand& band) {
-  std::vector<SoundingMode*> single;
-  single.reserve(modes.size());
-  for (SoundingMode& mode : modes) single.push_back(&mode);
-  while (single.size() > 1) {
-    std::vector<double> splits;
-    for (size_t i = 0; i + 1 < single.size(); ++i) {
-      splits.push_back(Split(*single[i], *single[i + 1], band.pair_tolerance));
+/// Two modes between which no single mode lies.
+struct Neighbours {
+  double split = 0;
+  size_t first = 0;
+  size_t second = 0;
+  auto operator<=>(const Neighbours&) const = default;
+};
+
+/// The modes that have no partner yet, in ascending order of frequency, and their neighbours.
+class SingleModes {
+ public:
+  SingleModes(const std::vector<SoundingMode>& modes, double tolerance)
+      : modes_(modes),
+        tolerance_(tolerance),
+        before_(modes.size()),
+        after_(modes.size()),
+        taken_(modes.size()) {
+    for (size_t i = 0; i < modes.size(); ++i) {
+      before_[i] = i - 1;  // of the first mode the greatest number, which is no mode's
+      after_[i] = i + 1;
     }
-    const auto closest = std::ranges::min_element(splits);
-    if (std::isinf(*closest)) return;
-    const auto first = single.begin() + (closest - splits.begin());
-    MakePair(band.directed, **first, **(first + 1));
-    single.erase(first, first + 2);
+    for (size_t i = 1; i < modes.size(); ++i) Push(i - 1, i);
+  }
+
+  /// Removes the pair of closest neighbours, and returns it. Returns nothing if no pair is left.
+  std::optional<Neighbours> TakeClosest() {
+    while (!candidates_.empty()) {
+      const Neighbours closest = candidates_.top();
+      candidates_.pop();
+      if (taken_[closest.first] || taken_[closest.second]) continue;
+      taken_[closest.first] = taken_[closest.second] = true;
+      const size_t before = before_[closest.first];
+      const size_t after = after_[closest.second];
+      if (before < modes_.size()) after_[before] = after;
+      if (after < modes_.size()) before_[after] = before;
+      if (before < modes_.size() && after < modes_.size()) Push(before, after);
+      return closest;
+    }
+    return std::nullopt;
+  }
+
+ private:
+  void Push(size_t first, size_t second) {
+    const double split = Split(modes_[first], modes_[second], tolerance_);
+    if (std::isfinite(split)) candidates_.push({split, first, second});
+  }
+
+  const std::vector<SoundingMode>& modes_;
+  const double tolerance_;
+  std::vector<size_t> before_;
+  std::vector<size_t> after_;
+  std::vector<bool> taken_;
+  std::priority_queue<Neighbours, std::vector<Neighbours>, std::greater<>> candidates_;
+};
+
+/// Pairs the closest neighbours first: an ovalling mode of a tube may lie between two pairs. The
+/// time is O(n log n).
+void PairDegenerate(std::vector<SoundingMode>& modes, const SoundingBand& band) {
+  SingleModes single(modes, band.pair_tolerance);
+  while (const std::optional<Neighbours> pair = single.TakeClosest()) {
+    MakePair(band.directed, modes[pair->first], modes[pair->second]);
   }
 }
 

@@ -5,6 +5,8 @@
 
 #include <cmath>
 #include <numbers>
+#include <numeric>
+#include <random>
 #include <vector>
 
 #include "server/synthesis/bank/level.h"
@@ -182,6 +184,48 @@ TEST(SoundingModes, TheClosestNeighboursArePairedFirst) {
   EXPECT_NEAR(modes[2].output_phase_rad, kPi / 2, 1e-15);
   EXPECT_EQ(modes[0].damped_rad_per_s, modes[3].damped_rad_per_s);
   EXPECT_NEAR(modes[3].output_phase_rad, kPi / 2, 1e-15);
+}
+
+/// Returns the partner of each mode, or the mode itself, by the definition: the closest two of the
+/// modes without a partner become a pair, again and again. The time is quadratic.
+std::vector<size_t> PartnersByDefinition(const std::vector<double>& ascending_hz) {
+  std::vector<size_t> partners(ascending_hz.size());
+  std::iota(partners.begin(), partners.end(), 0);
+  std::vector<size_t> single = partners;
+  const double tolerance = SoundingBand().pair_tolerance;
+  while (single.size() > 1) {
+    const auto split = [&](size_t i) {
+      return ascending_hz[single[i + 1]] / ascending_hz[single[i]] - 1;
+    };
+    size_t closest = 0;
+    for (size_t i = 1; i + 1 < single.size(); ++i)
+      closest = split(i) < split(closest) ? i : closest;
+    if (split(closest) > tolerance) break;
+    partners[single[closest]] = single[closest + 1];
+    partners[single[closest + 1]] = single[closest];
+    single.erase(single.begin() + static_cast<ptrdiff_t>(closest),
+                 single.begin() + static_cast<ptrdiff_t>(closest) + 2);
+  }
+  return partners;
+}
+
+TEST(SoundingModes, ThePairsOfAThousandDenseModesAreThoseOfTheDefinition) {
+  std::mt19937 random(20261125);
+  std::uniform_real_distribution<double> ratio(1.0001, 1.004);
+  std::vector<double> frequencies_hz{100};
+  while (frequencies_hz.size() < 1000 && frequencies_hz.back() < 9000) {
+    frequencies_hz.push_back(frequencies_hz.back() * ratio(random));
+  }
+  const std::vector<size_t> partners = PartnersByDefinition(frequencies_hz);
+  const std::vector<double> couplings(frequencies_hz.size(), 1);
+  const auto modes = SelectSoundingModes({EigenvaluesFor(frequencies_hz, kChime), couplings},
+                                         kChime, 48000, {.most_modes = frequencies_hz.size()})
+                         .modes;
+  ASSERT_EQ(modes.size(), frequencies_hz.size());
+  for (size_t i = 0; i < modes.size(); ++i) {
+    const double mean_hz = (frequencies_hz[i] + frequencies_hz[partners[i]]) / 2;
+    EXPECT_NEAR(modes[i].natural_frequency_hz, mean_hz, 1e-9 * mean_hz) << i;
+  }
 }
 
 TEST(SoundingModes, NeighboursThatRadiateDifferentlyAreNoPair) {
