@@ -62,6 +62,14 @@ absl::Status CheckSize(uint64_t array_bytes) {
                               "surface"));
 }
 
+absl::Status CheckModeCount(uint32_t mode_count) {
+  if (mode_count <= kMaxImportedModeCount) return absl::OkStatus();
+  return Refusal(
+      absl::StatusCode::kResourceExhausted, "MODAL_MODEL_TOO_LARGE",
+      absl::StrCat("the model has ", mode_count, " modes; at most ", kMaxImportedModeCount,
+                   " are taken, of which an object sounds with 800: keep fewer"));
+}
+
 absl::Status CheckHeaderSize(size_t header_bytes) {
   if (header_bytes <= kMaxHeaderBytes) return absl::OkStatus();
   return Refusal(absl::StatusCode::kResourceExhausted, "MODAL_MODEL_TOO_LARGE",
@@ -89,6 +97,7 @@ absl::Status ModelImport::Append(const v1::ModalModelRecord& record) {
   RETURN_IF_ERROR(state_->checker.Check(record));
   if (record.has_header()) {
     RETURN_IF_ERROR(CheckSize(state_->checker.array_bytes()));
+    RETURN_IF_ERROR(CheckModeCount(record.header().mode_count()));
   }
   const std::string bytes = Delimited(record);
   state_->sha.Update(bytes);

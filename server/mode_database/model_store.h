@@ -39,6 +39,9 @@ inline constexpr size_t kMaxTagCount = 100;
 /// this size, so that every client can receive it.
 inline constexpr size_t kMaxHeaderBytes = size_t{1} << 20U;
 
+/// Greatest number of modes of an imported model. A decomposition finds no more.
+inline constexpr uint32_t kMaxImportedModeCount = 20'000;
+
 /// A modal model without its arrays.
 struct ModelSummary {
   std::string digest{};

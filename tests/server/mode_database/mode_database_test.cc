@@ -334,6 +334,27 @@ TEST_F(ModeDatabaseTest, AModelLargerThanTheMemoryIsRefusedByItsHeader) {
   EXPECT_THAT(import->Append(record).ToString(), HasSubstr("MODAL_MODEL_TOO_LARGE: "));
 }
 
+TEST_F(ModeDatabaseTest, AModelWithMoreModesThanADecompositionFindsIsRefusedByItsHeader) {
+  constexpr uint32_t kModeCount = 21;
+  for (const uint32_t count : {kMaxImportedModeCount, kMaxImportedModeCount + 1}) {
+    v1::ModalModelRecord record = SampleRecords(SampleModel(kModeCount, 7)).front();
+    record.mutable_header()->set_mode_count(count);
+    for (v1::ArrayDescriptor& array : *record.mutable_header()->mutable_arrays()) {
+      for (uint64_t& size : *array.mutable_shape()) {
+        if (size == kModeCount) size = count;
+      }
+    }
+    auto import = database_->models().Import(b_, "");
+    ASSERT_TRUE(import.ok());
+    const absl::Status status = import->Append(record);
+    if (count == kMaxImportedModeCount) {
+      EXPECT_TRUE(status.ok()) << status;
+    } else {
+      EXPECT_THAT(status.ToString(), HasSubstr("MODAL_MODEL_TOO_LARGE: the model has 20001 modes"));
+    }
+  }
+}
+
 TEST_F(ModeDatabaseTest, AModelJustStoredStaysUntilANewerOneNeedsTheRoom) {
   database_->models().KeepWithin({.bytes = 1});
   ASSERT_TRUE(Put(a_, SampleModel(10, 100)).ok());
