@@ -11,7 +11,7 @@
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 #include "server/api/file_pieces.h"
-#include "server/api/stream_call.h"
+#include "server/api/send_call.h"
 #include "server/api/unary_call.h"
 #include "server/mode_database/database.h"
 #include "server/mode_database/database_admin.h"
@@ -35,15 +35,16 @@ v1::GetDatabaseStatsResponse ToProto(const DatabaseStats& stats) {
 }
 
 /// Copies the database to a file in its folder, and sends the file piece by piece.
-class BackupCall final : public ServerStream<v1::BackUpDatabaseResponse> {
+class BackupCall final : public SendCall<v1::BackUpDatabaseResponse> {
  public:
-  BackupCall(ModeDatabase& database, ThreadPool& pool, ClientPlace place)
-      : StreamWriter(&pool), database_(database), place_(std::move(place)) {
+  BackupCall(grpc::CallbackServerContext& context, ModeDatabase& database, ThreadPool& pool,
+             CallBounds bounds)
+      : SendCall(context, std::move(bounds), pool), database_(database) {
     StartWriting();
   }
 
  private:
-  absl::StatusOr<Supply> Fill(v1::BackUpDatabaseResponse& response) override {
+  absl::StatusOr<Supply> FillNext(v1::BackUpDatabaseResponse& response) override {
     if (!std::exchange(begun_, true)) RETURN_IF_ERROR(Begin(response));
     return pieces_.Next(*response.mutable_data());
   }
@@ -61,7 +62,6 @@ class BackupCall final : public ServerStream<v1::BackUpDatabaseResponse> {
   }
 
   ModeDatabase& database_;
-  const ClientPlace place_;
   bool begun_ = false;
   FilePieces pieces_;
 };
@@ -80,10 +80,12 @@ grpc::ServerUnaryReactor* AdminService::GetDatabaseStats(grpc::CallbackServerCon
 
 grpc::ServerWriteReactor<v1::BackUpDatabaseResponse>* AdminService::BackUpDatabase(
     grpc::CallbackServerContext* context, const v1::BackUpDatabaseRequest*) {
+  using Reactor = grpc::ServerWriteReactor<v1::BackUpDatabaseResponse>;
   return Open(*context, reception_, Role::kAdminister, Holding::kBackup,
-              [this](const Principal&,
-                     ClientPlace place) -> grpc::ServerWriteReactor<v1::BackUpDatabaseResponse>* {
-                return new BackupCall(database_, reception_.pool, std::move(place));
+              [&](const Principal&, ClientPlace place) -> Reactor* {
+                return new BackupCall(
+                    *context, database_, reception_.pool,
+                    {.place = std::move(place), .idle_calls = idle_calls_, .clock = clock_});
               });
 }
 

@@ -2,7 +2,9 @@
 #pragma once
 
 #include "carillon/v1/admin_service.grpc.pb.h"
+#include "server/api/idle_calls.h"
 #include "server/api/reception.h"
+#include "server/base/clock.h"
 #include "server/mode_database/mode_database.h"
 
 namespace carillon {
@@ -11,8 +13,13 @@ namespace carillon {
 class AdminService final : public v1::AdminService::CallbackService {
  public:
   /// The pool of `writing` runs the calls that change the database.
-  AdminService(ModeDatabase& database, const Reception& reception, const Reception& writing)
-      : database_(database), reception_(reception), writing_(writing) {}
+  AdminService(ModeDatabase& database, const Reception& reception, const Reception& writing,
+               IdleCalls& idle_calls, const Clock& clock)
+      : database_(database),
+        reception_(reception),
+        writing_(writing),
+        idle_calls_(idle_calls),
+        clock_(clock) {}
 
   grpc::ServerUnaryReactor* GetDatabaseStats(grpc::CallbackServerContext* context,
                                              const v1::GetDatabaseStatsRequest* request,
@@ -27,6 +34,8 @@ class AdminService final : public v1::AdminService::CallbackService {
   ModeDatabase& database_;
   const Reception reception_;
   const Reception writing_;
+  IdleCalls& idle_calls_;
+  const Clock& clock_;
 };
 
 }  // namespace carillon

@@ -101,7 +101,7 @@ struct ApiServer::State {
         leases(rooms.clock, Duration(settings.scene_grace_s),
                [this](const std::string& connection) { return IsOpen(connection); }),
         owners(access, leases, rooms.scenes),
-        admin(rooms.database, reception, writing),
+        admin(rooms.database, reception, writing, idle_calls, rooms.clock),
         models({.database = rooms.database,
                 .queue = rooms.decompositions,
                 .reception = reception,

@@ -31,6 +31,8 @@ Bound BoundOf(Holding holding) {
       return {"listeners", BlockBroadcast::kMaxListenerCount};
     case Holding::kUpload:
       return {"uploads", kMaxUploadCount, "TOO_MANY_UPLOADS", "uploads and imports run"};
+    case Holding::kExport:
+      return {"exports", kMaxExportCount, "TOO_MANY_EXPORTS", "exports run"};
     case Holding::kBackup:
       return {"backups", kMaxBackupCount, "TOO_MANY_BACKUPS", "backups are being made"};
     case Holding::kRendering:

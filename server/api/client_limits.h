@@ -16,8 +16,8 @@
 namespace carillon {
 
 /// The kinds of places that clients hold for a while. The daemon has a bounded number of each kind.
-enum class Holding { kScene, kContactStream, kListener, kRendering, kUpload, kBackup };
-inline constexpr size_t kHoldingCount = 6;
+enum class Holding { kScene, kContactStream, kListener, kRendering, kUpload, kExport, kBackup };
+inline constexpr size_t kHoldingCount = 7;
 
 /// Greatest number of traces that are rendered at a time.
 inline constexpr size_t kMaxRenderingCount = 8;
@@ -25,14 +25,18 @@ inline constexpr size_t kMaxRenderingCount = 8;
 /// Greatest number of uploads of meshes and imports of models at a time.
 inline constexpr size_t kMaxUploadCount = 64;
 
+/// Greatest number of exports of models at a time. gRPC keeps some 2 MiB of each until its client
+/// reads.
+inline constexpr size_t kMaxExportCount = 64;
+
 /// Greatest number of backups at a time. Each is a copy of the database on the same disk until it
 /// is sent.
 inline constexpr size_t kMaxBackupCount = 4;
 
 class ClientLimits;
 
-/// One scene, stream, listener, rendering, upload or backup of a client. The destructor gives the
-/// place back.
+/// One scene, stream, listener, rendering, upload, export or backup of a client. The destructor
+/// gives the place back.
 class ClientPlace {
  public:
   ClientPlace() = default;
@@ -62,8 +66,8 @@ class ClientLimits {
   explicit ClientLimits(double share) : share_(share) {}
 
   /// Takes a place for a client. The place must not outlive this. Errors: ResourceExhausted
-  /// (CLIENT_LIMIT_REACHED; TOO_MANY_UPLOADS, TOO_MANY_BACKUPS: all clients together have as many
-  /// as there may be at a time).
+  /// (CLIENT_LIMIT_REACHED; TOO_MANY_UPLOADS, TOO_MANY_EXPORTS, TOO_MANY_BACKUPS: all clients
+  /// together have as many as there may be at a time).
   absl::StatusOr<ClientPlace> Take(Holding holding, const std::string& client);
 
   /// Checks that a client that holds `held` of `whole` things may have `more` of them. `name` names

@@ -27,6 +27,9 @@ constexpr int kKeepaliveAnswer_ms = 10'000;
 /// With 0, any number of pings is answered. With a limit, gRPC 1.51 closes the connection only
 /// after all its data is sent, and keeps 1 kB for each ping that comes meanwhile.
 constexpr int kNoPingStrikes = 0;
+/// The daemon takes no compressed messages, because gRPC 1.51 unpacks a message before it compares
+/// the size with a limit: 4 MiB that are packed well need 4 GiB.
+constexpr int kIdentityOnly = 1 << GRPC_COMPRESS_NONE;
 /// Bytes of a connection that are parsed before other connections have their turn. With gRPC's
 /// default of 4 MiB, a few connections that begin and cancel calls keep all threads busy for
 /// seconds.
@@ -64,6 +67,8 @@ void LimitClients(size_t memory_bytes, grpc::ServerBuilder& builder) {
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepalive_ms);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveAnswer_ms);
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MAX_PING_STRIKES, kNoPingStrikes);
+  builder.AddChannelArgument(GRPC_COMPRESSION_CHANNEL_ENABLED_ALGORITHMS_BITSET, kIdentityOnly);
+  builder.AddChannelArgument(GRPC_ARG_ENABLE_PER_MESSAGE_DECOMPRESSION, 0);
   builder.AddChannelArgument(GRPC_ARG_TCP_READ_CHUNK_SIZE, kReadBytes);
   builder.AddChannelArgument(GRPC_ARG_TCP_MAX_READ_CHUNK_SIZE, kReadBytes);
   grpc::ResourceQuota quota;

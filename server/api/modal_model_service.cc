@@ -106,8 +106,11 @@ grpc::ServerReadReactor<v1::ImportModalModelRequest>* ModalModelService::ImportM
 
 grpc::ServerWriteReactor<v1::ExportModalModelResponse>* ModalModelService::ExportModalModel(
     grpc::CallbackServerContext* context, const v1::ExportModalModelRequest* request) {
-  return Open(*context, daemon_.reception, Role::kSubmit,
-              [&] { return MakeExport(*request, database_, daemon_.reception.pool); });
+  return Open(*context, daemon_.reception, Role::kSubmit, Holding::kExport,
+              [&](const Principal&, ClientPlace place) {
+                return MakeExport(*context, *request, database_, daemon_.reception.pool,
+                                  BoundsOf(std::move(place)));
+              });
 }
 
 grpc::ServerUnaryReactor* ModalModelService::ListMaterials(grpc::CallbackServerContext* context,
@@ -119,7 +122,7 @@ grpc::ServerUnaryReactor* ModalModelService::ListMaterials(grpc::CallbackServerC
   });
 }
 
-UploadBounds ModalModelService::BoundsOf(ClientPlace place) const {
+CallBounds ModalModelService::BoundsOf(ClientPlace place) const {
   return {.place = std::move(place), .idle_calls = daemon_.idle_calls, .clock = daemon_.clock};
 }
 

@@ -2,8 +2,7 @@
 #pragma once
 
 #include "carillon/v1/modal_model_service.grpc.pb.h"
-#include "server/api/idle_calls.h"
-#include "server/api/read_call.h"
+#include "server/api/call_bounds.h"
 #include "server/api/reception.h"
 #include "server/base/clock.h"
 #include "server/decomposition/decomposition_queue.h"
@@ -62,7 +61,7 @@ class ModalModelService final : public v1::ModalModelService::CallbackService {
   absl::Status List(const v1::ListModalModelsRequest& request,
                     v1::ListModalModelsResponse& response);
 
-  UploadBounds BoundsOf(ClientPlace place) const;
+  CallBounds BoundsOf(ClientPlace place) const;
 
   const ModelContext daemon_;
   ModeDatabase& database_;

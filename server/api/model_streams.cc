@@ -2,6 +2,7 @@
 #include "server/api/model_streams.h"
 
 #include <deque>
+#include <iterator>
 #include <memory>
 #include <optional>
 #include <string>
@@ -13,7 +14,7 @@
 #include "proto/cpp/status_macros.h"
 #include "server/api/read_call.h"
 #include "server/api/resource_name.h"
-#include "server/api/stream_call.h"
+#include "server/api/send_call.h"
 #include "server/api/transfer_spool.h"
 #include "server/mode_database/database.h"
 
@@ -91,24 +92,25 @@ class ModelSink {
 };
 
 /// Sends a model, then its transfers, record by record.
-class ExportCall final : public ServerStream<v1::ExportModalModelResponse> {
+class ExportCall final : public SendCall<v1::ExportModalModelResponse> {
  public:
-  ExportCall(const v1::ExportModalModelRequest& request, ModeDatabase& database, ThreadPool& pool)
-      : StreamWriter(&pool), request_(request), database_(database) {
+  ExportCall(grpc::CallbackServerContext& context, const v1::ExportModalModelRequest& request,
+             ModeDatabase& database, ThreadPool& pool, CallBounds bounds)
+      : SendCall(context, std::move(bounds), pool), request_(request), database_(database) {
     StartWriting();
   }
 
  private:
-  absl::StatusOr<Supply> Fill(v1::ExportModalModelResponse& response) override {
+  absl::StatusOr<Supply> FillNext(v1::ExportModalModelResponse& response) override {
     if (!export_) RETURN_IF_ERROR(Begin());
     ASSIGN_OR_RETURN(std::optional<v1::ModalModelRecord> record, export_->Next());
     if (record) {
       *response.mutable_record() = *std::move(record);
       return Supply::kMessage;
     }
-    if (transfers_.empty()) return Supply::kEnd;
-    response.mutable_record()->set_transfer(transfers_.front().SerializeAsString());
-    transfers_.pop_front();
+    if (records_.empty() && !BeginTransfer()) return Supply::kEnd;
+    response.mutable_record()->set_transfer(records_.front().SerializeAsString());
+    records_.pop_front();
     return Supply::kMessage;
   }
 
@@ -116,19 +118,27 @@ class ExportCall final : public ServerStream<v1::ExportModalModelResponse> {
     ASSIGN_OR_RETURN(const std::string digest, ParseModelName(request_.name()));
     ASSIGN_OR_RETURN(export_, database_.models().Export(digest));
     if (!request_.transfers()) return absl::OkStatus();
-    ASSIGN_OR_RETURN(const auto transfers, database_.transfers().Read(digest));
-    for (const StoredTransfer& transfer : transfers) {
-      for (v1::TransferRecord& record : transfer.Records()) {
-        transfers_.push_back(std::move(record));
-      }
-    }
+    ASSIGN_OR_RETURN(std::vector<StoredTransfer> transfers, database_.transfers().Read(digest));
+    transfers_.assign(std::make_move_iterator(transfers.begin()),
+                      std::make_move_iterator(transfers.end()));
     return absl::OkStatus();
+  }
+
+  /// Makes the records of the next transfer. Returns false if there is none.
+  bool BeginTransfer() {
+    if (transfers_.empty()) return false;
+    for (v1::TransferRecord& record : transfers_.front().Records()) {
+      records_.push_back(std::move(record));
+    }
+    transfers_.pop_front();
+    return true;
   }
 
   const v1::ExportModalModelRequest request_;
   ModeDatabase& database_;
   std::optional<ModelExport> export_;
-  std::deque<v1::TransferRecord> transfers_;
+  std::deque<StoredTransfer> transfers_;
+  std::deque<v1::TransferRecord> records_;
 };
 
 }  // namespace
@@ -136,21 +146,22 @@ class ExportCall final : public ServerStream<v1::ExportModalModelResponse> {
 grpc::ServerReadReactor<v1::UploadMeshRequest>* MakeUpload(grpc::CallbackServerContext& context,
                                                            v1::UploadMeshResponse& response,
                                                            MeshStore& meshes, ThreadPool& pool,
-                                                           UploadBounds bounds) {
+                                                           CallBounds bounds) {
   return new ReadCall<v1::UploadMeshRequest, v1::UploadMeshResponse, MeshSink>(
       context, response, MeshSink(meshes), pool, std::move(bounds));
 }
 
 grpc::ServerReadReactor<v1::ImportModalModelRequest>* MakeImport(
     grpc::CallbackServerContext& context, v1::ImportModalModelResponse& response,
-    ModeDatabase& database, ThreadPool& pool, UploadBounds bounds) {
+    ModeDatabase& database, ThreadPool& pool, CallBounds bounds) {
   return new ReadCall<v1::ImportModalModelRequest, v1::ImportModalModelResponse, ModelSink>(
       context, response, ModelSink(database), pool, std::move(bounds));
 }
 
 grpc::ServerWriteReactor<v1::ExportModalModelResponse>* MakeExport(
-    const v1::ExportModalModelRequest& request, ModeDatabase& database, ThreadPool& pool) {
-  return new ExportCall(request, database, pool);
+    grpc::CallbackServerContext& context, const v1::ExportModalModelRequest& request,
+    ModeDatabase& database, ThreadPool& pool, CallBounds bounds) {
+  return new ExportCall(context, request, database, pool, std::move(bounds));
 }
 
 v1::ModalModelSummary ToProto(const ModelSummary& summary) {

@@ -5,7 +5,7 @@
 
 #include "absl/status/statusor.h"
 #include "carillon/v1/modal_model_service.pb.h"
-#include "server/api/read_call.h"
+#include "server/api/call_bounds.h"
 #include "server/api/thread_pool.h"
 #include "server/mode_database/mode_database.h"
 
@@ -17,14 +17,15 @@ namespace carillon {
 grpc::ServerReadReactor<v1::UploadMeshRequest>* MakeUpload(grpc::CallbackServerContext& context,
                                                            v1::UploadMeshResponse& response,
                                                            MeshStore& meshes, ThreadPool& pool,
-                                                           UploadBounds bounds);
+                                                           CallBounds bounds);
 
 grpc::ServerReadReactor<v1::ImportModalModelRequest>* MakeImport(
     grpc::CallbackServerContext& context, v1::ImportModalModelResponse& response,
-    ModeDatabase& database, ThreadPool& pool, UploadBounds bounds);
+    ModeDatabase& database, ThreadPool& pool, CallBounds bounds);
 
 grpc::ServerWriteReactor<v1::ExportModalModelResponse>* MakeExport(
-    const v1::ExportModalModelRequest& request, ModeDatabase& database, ThreadPool& pool);
+    grpc::CallbackServerContext& context, const v1::ExportModalModelRequest& request,
+    ModeDatabase& database, ThreadPool& pool, CallBounds bounds);
 
 v1::ModalModelSummary ToProto(const ModelSummary& summary);
 

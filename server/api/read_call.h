@@ -8,19 +8,10 @@
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
-#include "server/api/client_limits.h"
-#include "server/api/idle_calls.h"
+#include "server/api/call_bounds.h"
 #include "server/api/stream_call.h"
 
 namespace carillon {
-
-/// The place of an upload among those of its client, and the parts of the daemon that end an idle
-/// upload.
-struct UploadBounds {
-  ClientPlace place;
-  IdleCalls& idle_calls;
-  const Clock& clock;
-};
 
 /// Reads requests into a `Sink`, which has Status Append(const Request&) and Status
 /// Finish(Response&). Both functions run on a thread of the pool, because they write to the disk.
@@ -29,7 +20,7 @@ template <typename Request, typename Response, typename Sink>
 class ReadCall final : public ClientStream<Request>, public IdleCall {
  public:
   ReadCall(grpc::CallbackServerContext& context, Response& response, Sink sink, ThreadPool& pool,
-           std::optional<UploadBounds> bounds = std::nullopt)
+           std::optional<CallBounds> bounds = std::nullopt)
       : ClientStream<Request>(&pool),
         context_(context),
         response_(response),
@@ -71,7 +62,7 @@ class ReadCall final : public ClientStream<Request>, public IdleCall {
   grpc::CallbackServerContext& context_;
   Response& response_;
   Sink sink_;
-  std::optional<UploadBounds> bounds_;
+  std::optional<CallBounds> bounds_;
   std::optional<ClientWait> wait_;
 };
 

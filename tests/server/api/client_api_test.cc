@@ -37,6 +37,19 @@ class ClientApi : public ServedDaemon {
     return status.ok() ? response.name() : ErrorOf(status).reason();
   }
 
+  /// Exports a model over a connection of its own, and reads all of it. Returns the reason of a
+  /// refusal.
+  std::string ExportAll(const v1::ExportModalModelRequest& request) {
+    grpc::ClientContext context;
+    const auto stub = v1::ModalModelService::NewStub(Connect(address()));
+    const auto reader = stub->ExportModalModel(&context, request);
+    v1::ExportModalModelResponse response;
+    while (reader->Read(&response)) {
+    }
+    const grpc::Status status = reader->Finish();
+    return status.ok() ? "" : ErrorOf(status).reason();
+  }
+
   std::optional<v1::Scene> FindScene(const std::string& name) {
     v1::ListScenesResponse response;
     EXPECT_TRUE(Call(*scenes, &v1::SceneService::Stub::ListScenes, {}, response).ok());
@@ -149,6 +162,49 @@ TEST_F(ClientApi, OneClientHasAShareOfAllUploadsAndOthersHaveTheirs) {
   upload->Write(request);
   upload->WritesDone();
   EXPECT_TRUE(upload->Finish().ok());
+}
+
+TEST_F(ClientApi, ExportsThatNobodyReadAreBoundedAndEnd) {
+  // gRPC takes some of a model from the daemon before the client reads, but not megabytes.
+  const std::string model = ImportModel(SampleModel(300, 4000));
+  v1::ExportModalModelRequest request;
+  request.set_name(model);
+  std::vector<std::unique_ptr<grpc::ClientContext>> contexts;
+  std::vector<std::unique_ptr<grpc::ClientReader<v1::ExportModalModelResponse>>> exports;
+  for (size_t i = 0; i < kMaxExportCount / 4; ++i) {
+    // Exports that share a connection would share what gRPC takes ahead, and help one another on.
+    contexts.push_back(std::make_unique<grpc::ClientContext>());
+    const auto stub = v1::ModalModelService::NewStub(Connect(address()));
+    exports.push_back(stub->ExportModalModel(contexts.back().get(), request));
+    exports.back()->WaitForInitialMetadata();
+  }
+  EXPECT_EQ(ExportAll(request), "CLIENT_LIMIT_REACHED");
+  std::string reason;
+  do {
+    reason = ExportAll(request);
+  } while (reason == "CLIENT_LIMIT_REACHED");
+  EXPECT_EQ(reason, "");
+  // Only the export that has waited longest has surely ended by now.
+  v1::ExportModalModelResponse response;
+  int cancelled_count = 0;
+  for (const auto& unread : exports) {
+    while (unread->Read(&response)) {
+    }
+    cancelled_count += unread->Finish().error_code() == grpc::CANCELLED ? 1 : 0;
+  }
+  EXPECT_GT(cancelled_count, 0);
+}
+
+TEST_F(ClientApi, ACompressedMessageIsRefusedBeforeItIsUnpacked) {
+  grpc::ClientContext context;
+  context.set_compression_algorithm(GRPC_COMPRESS_GZIP);
+  v1::UploadMeshResponse response;
+  const auto upload = models->UploadMesh(&context, &response);
+  v1::UploadMeshRequest request;
+  request.set_data(std::string(size_t{1} << 20U, 'x'));
+  upload->Write(request);
+  upload->WritesDone();
+  EXPECT_EQ(upload->Finish().error_code(), grpc::UNIMPLEMENTED);
 }
 
 TEST_F(ClientApi, RenderingsThatSayNothingLeaveRoomForOthers) {

@@ -55,14 +55,17 @@ class ServedDaemon : public testing::Test {
   }
 
   /// Stores SmallModel and returns its name.
-  std::string ImportSmallModel() {
+  std::string ImportSmallModel() { return ImportModel(*SmallModel()); }
+
+  /// Stores a model under its digest, if it has one, and returns its name.
+  std::string ImportModel(const ModalModel& model) {
     grpc::ClientContext context;
     v1::ImportModalModelResponse response;
     const auto writer = models->ImportModalModel(&context, &response);
     v1::ImportModalModelRequest request;
-    request.set_name("modalModels/" + SmallModel()->digest);
+    if (!model.digest.empty()) request.set_name("modalModels/" + model.digest);
     request.set_label("small");
-    for (const v1::ModalModelRecord& record : SampleRecords(*SmallModel())) {
+    for (const v1::ModalModelRecord& record : SampleRecords(model)) {
       *request.mutable_record() = record;
       writer->Write(request);
     }
