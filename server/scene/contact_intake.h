@@ -9,7 +9,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "server/scene/contact_forces.h"
+#include "server/scene/blow_gatherer.h"
 #include "server/scene/found_blow.h"
 #include "server/scene/object_contact.h"
 #include "server/scene/rejection_counts.h"
@@ -144,7 +144,7 @@ class ContactIntake {
   /// Counts unusual properties of a contact. Errors: InvalidArgument (IMPULSE_TOO_LARGE).
   absl::Status Examine(const FeltContact& felt, double seconds);
   void NoteZero(const ObjectContact& contact);
-  void Push(const ContactForces::Events& events);
+  void Push(const BlowGatherer::Events& events);
   void Push(MixerEvent& event, double frame);
   /// Adds the blow of `event` to the settings' blows. `blow` has its object and partner.
   void AddBlow(const MixerEvent& event, FoundBlow blow, double frame)
@@ -159,7 +159,7 @@ class ContactIntake {
   const IntakeSettings settings_;
   TimeMapper mapper_;
   double time_s_ = 0;
-  ContactForces forces_;
+  BlowGatherer gatherer_;
   PoseTimes pose_times_;
   uint64_t step_count_ = 0;
   uint64_t impulse_count_ = 0;
