@@ -210,7 +210,7 @@ v1::ContactFindings ToProto(const IntakeFindings& findings) {
   return proto;
 }
 
-v1::Blow ToProto(const FoundBlow& blow) {
+v1::Blow ToProto(const BlowRecord& blow) {
   v1::Blow proto;
   proto.set_time_s(blow.time_s);
   proto.set_object(blow.handle);

@@ -14,7 +14,7 @@ namespace carillon {
 ContactReading ToContactReading(v1::Frame frame, v1::PulseShape pulse_shape);
 
 v1::ContactFindings ToProto(const IntakeFindings& findings);
-v1::Blow ToProto(const FoundBlow& blow);
+v1::Blow ToProto(const BlowRecord& blow);
 
 /// Returns the number of impulses, forces, contacts and poses in a step.
 size_t CountRows(const v1::ContactStep& step);

@@ -69,7 +69,7 @@ absl::Status ContactIntake::TryStrike(const ObjectImpulse& impulse) {
   NoteZero(impulse.contact);
   impulse_count_ += felt.count;
   for (size_t i = 0; i < felt.count; ++i) {
-    FoundBlow blow;
+    BlowRecord blow;
     blow.handle = felt.by[i].handle;
     blow.by_sounds = felt.count == felt.by.size();
     if (blow.by_sounds) blow.by = felt.by[1 - i].handle;
@@ -222,7 +222,7 @@ void ContactIntake::Push(const BlowGatherer::Events& events) {
     if (!CheckAhead(frame).ok()) continue;  // the end of a force, in a step that was rejected
     if (event.impulse() != nullptr) {
       ++impulse_count_;
-      FoundBlow blow;
+      BlowRecord blow;
       blow.handle = force.handle;
       blow.by = force.by;
       blow.by_sounds = force.by_sounds;
@@ -232,7 +232,7 @@ void ContactIntake::Push(const BlowGatherer::Events& events) {
   }
 }
 
-void ContactIntake::AddBlow(const MixerEvent& event, FoundBlow blow, double frame) {
+void ContactIntake::AddBlow(const MixerEvent& event, BlowRecord blow, double frame) {
   if (settings_.blows == nullptr) return;
   const absl::StatusOr<const SoundingObject*> object = scene_.Find(blow.handle);
   if (!object.ok()) return;

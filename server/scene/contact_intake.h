@@ -10,7 +10,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "server/scene/blow_gatherer.h"
-#include "server/scene/found_blow.h"
+#include "server/scene/blow_record.h"
 #include "server/scene/object_contact.h"
 #include "server/scene/rejection_counts.h"
 #include "server/scene/scene.h"
@@ -57,7 +57,7 @@ struct IntakeSettings {
   /// If not null, also counts rejected contacts by reason. It must outlive the intake.
   RejectionCounts* rejections = nullptr;
   /// If not null, gets each impulse that is handed on. It must outlive the intake.
-  std::vector<FoundBlow>* blows = nullptr;
+  std::vector<BlowRecord>* blows = nullptr;
 };
 
 /// The numbers of unusual contacts that a ContactIntake has found so far in a simulation.
@@ -147,7 +147,7 @@ class ContactIntake {
   void Push(const BlowGatherer::Events& events);
   void Push(MixerEvent& event, double frame);
   /// Adds the blow of `event` to the settings' blows. `blow` has its object and partner.
-  void AddBlow(const MixerEvent& event, FoundBlow blow, double frame)
+  void AddBlow(const MixerEvent& event, BlowRecord blow, double frame)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(scene_.mutex());
   absl::StatusOr<double> FrameOfImpulse(double time_offset_s) const;
   /// Errors: InvalidArgument (TIME_TOO_FAR_AHEAD).

@@ -87,7 +87,7 @@ class OfflineRenderer {
   size_t Render(std::span<float> samples);
 
   /// The impulses in the frames rendered so far, if the settings ask for them.
-  const std::vector<FoundBlow>& blows() const { return blows_; }
+  const std::vector<BlowRecord>& blows() const { return blows_; }
 
   /// The result of all frames rendered so far.
   const OfflineSummary& summary() const { return summary_; }
@@ -125,7 +125,7 @@ class OfflineRenderer {
   std::unique_ptr<EventStream> stream_;
   Scene scene_;
   Target target_;
-  std::vector<FoundBlow> blows_;
+  std::vector<BlowRecord> blows_;
   ContactIntake intake_;
   size_t pushed_count_ = 0;
   size_t contact_count_ = 0;  // number of events up to the last that is not a move
