@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include "precompute/fem/elastic_constants.h"
 #include "precompute/fem/element.h"
-#include "precompute/fem/material.h"
 #include "precompute/mesh/tet_mesh.h"
 #include "precompute/modes/modal_model.h"
 

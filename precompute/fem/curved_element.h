@@ -5,8 +5,8 @@
 #include <cstddef>
 
 #include "absl/status/status.h"
+#include "precompute/fem/elastic_constants.h"
 #include "precompute/fem/element.h"
-#include "precompute/fem/material.h"
 #include "precompute/mesh/tet_mesh.h"
 
 namespace carillon::precompute {

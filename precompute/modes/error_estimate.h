@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "precompute/eigen/eigensolver.h"
-#include "precompute/fem/material.h"
+#include "precompute/fem/elastic_constants.h"
 #include "precompute/mesh/tet_mesh.h"
 
 namespace carillon::precompute {
