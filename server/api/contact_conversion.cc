@@ -13,7 +13,7 @@
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 #include "server/api/column_conversion.h"
-#include "server/api/hertz_conversion.h"
+#include "server/api/hertz_contact_conversion.h"
 #include "server/api/pose_conversion.h"
 
 namespace carillon {
