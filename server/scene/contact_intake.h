@@ -11,11 +11,11 @@
 #include "absl/status/statusor.h"
 #include "server/scene/blow_gatherer.h"
 #include "server/scene/blow_record.h"
+#include "server/scene/due_frame.h"
 #include "server/scene/object_contact.h"
 #include "server/scene/rejection_counts.h"
 #include "server/scene/scene.h"
 #include "server/scene/scene_space.h"
-#include "server/scene/time_mapping.h"
 #include "server/synthesis/schedule/mixer_event.h"
 
 namespace carillon {
