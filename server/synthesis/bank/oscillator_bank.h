@@ -173,11 +173,13 @@ class OscillatorBank {
   /// of a current long block is heard as it is until that long block ends.
   bool BoundLoudness() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
-  /// Silences the bank. Its part of a current long block sounds until that long block ends.
+  /// Silences the bank and ends its sustained forces. Its part of a current long block sounds until
+  /// that long block ends.
   void Shed() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole) { Silence(); }
 
-  /// Silences the modes and the acceleration noise, between two blocks and together with
-  /// BlockMix::Silence. Sustained forces are kept, so that a resting load makes no new sound.
+  /// Silences the modes and the acceleration noise. The caller must call it between two blocks, and
+  /// must also call BlockMix::Silence, which silences the part of a current long block. Sustained
+  /// forces are kept, so that a resting load makes no new sound.
   void Hush() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole) { SilenceLanes(); }
 
   /// Columns of the shape table that impulses are projected onto, from the first mode's column on.
