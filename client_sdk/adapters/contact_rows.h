@@ -21,7 +21,7 @@ struct ContactSettings {
   /// The name in the catalogue of strikers, such as "wood", of bodies without a sound.
   /// Empty: steel.
   std::string striker{};
-  /// How long an impact lasts. Absent: as long as an elastic collision of the two bodies, which the
+  /// How long a blow lasts. Absent: as long as an elastic collision of the two bodies, which the
   /// daemon computes.
   std::optional<double> duration_s = std::nullopt;
 };
