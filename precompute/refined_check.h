@@ -15,14 +15,16 @@ namespace carillon::precompute {
 /// twice as many nodes, and elements at most 12 times as long as high on plates, bowls and tubes.
 bool HasFewElements(const TetMesh& mesh);
 
-/// Returns the mesh, which HasFewElements(), with its elements divided until it has more.
+/// Returns `mesh` with its elements divided until HasFewElements is false. HasFewElements must be
+/// true for `mesh`.
 TetMesh Refined(const TetMesh& mesh);
 
-/// Compares a model whose mesh has few elements with the modes of a finer mesh of the same body,
-/// `finer`. The modes are compared in ascending order. The errors of the model become those of
-/// the comparison where these are larger, and a warning states the number of missing modes.
-/// `elastic` and `sharing` are those of the model's matrices. All modes of the model's mesh below
-/// its limit must be in the model.
+/// Computes the modes of `finer`, a finer mesh of the same body, and compares them with the modes
+/// of `model`, whose mesh has few elements. The modes are compared in ascending order. If the
+/// difference of a mode is larger than the mode's estimated error, it becomes the estimated error.
+/// If modes are missing, or an estimated error was too small, the model gets a warning that says
+/// so. `elastic` and `sharing` are those of the model's matrices. All modes of the model's mesh
+/// below its limit must be in the model.
 void CompareWith(const TetMesh& finer, const ElasticConstants& elastic, MassSharing sharing,
                  ModalModel& model);
 

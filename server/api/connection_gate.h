@@ -24,12 +24,13 @@ namespace carillon {
 class ConnectionTaker {
  public:
   virtual ~ConnectionTaker() = default;
-  /// `source` is SourceOfPeer of the connection.
+  /// Takes the accepted socket `connection`. `source` is the process or address from which it came,
+  /// as SourceOfPeer names it.
   virtual void Take(int connection, const std::string& source) = 0;
 };
 
 /// Returns the process (Unix) or the address (TCP, AddressOfPeer) from which the connection with
-/// this name came. Processes that the system does not know are one.
+/// this name came. All processes that the system cannot name count as one process.
 std::string SourceOfPeer(const std::string& peer);
 
 /// Accepts connections in place of gRPC, whose own listener stops for ever when no descriptor is
@@ -42,8 +43,8 @@ class ConnectionGate {
   /// The time for which the gate closes new connections from the process or address of a refused
   /// connection.
   static constexpr std::chrono::seconds kRefusal{30};
-  /// The same for connections over loopback, which come from one address whatever process begins
-  /// them.
+  /// The shorter time for connections over loopback. All processes that connect over loopback have
+  /// the same address.
   static constexpr std::chrono::seconds kLoopbackRefusal{1};
 
   /// The last sixteenth of the places is for processes and addresses with fewer connections than

@@ -10,7 +10,8 @@
 
 namespace carillon {
 
-/// Returns the conventions of a stream or of a trace.
+/// Returns how the contacts of a stream or of a trace are to be read: in which frame their points
+/// are, and which shape their pulses have.
 ContactReading ToContactReading(v1::Frame frame, v1::PulseShape pulse_shape);
 
 v1::ContactFindings ToProto(const IntakeFindings& findings);

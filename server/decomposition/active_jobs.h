@@ -32,7 +32,8 @@ struct ActiveJob {
   v1::CreateModalModelRequest request;                   ///< the farthest reaching one so far
   std::optional<v1::CreateModalModelRequest> running{};  ///< the request that its run was given
   v1::Progress progress{};                               ///< of the run
-  /// The client that asked for it; empty: asked for before the daemon started.
+  /// The client that asked for the job. It is empty if the job was asked for before the daemon
+  /// started.
   std::string client{};
   std::string waits_for{};      ///< digest of the coarse model's job, until that has ended
   bool coarse_ready = false;    ///< a coarse model is stored under the job's digest

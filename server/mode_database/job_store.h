@@ -68,8 +68,8 @@ class JobStore {
   /// Deletes a job. It is not an error if the job does not exist.
   absl::Status Delete(const std::string& digest);
 
-  /// Returns a named value that the daemon learnt from jobs, or nothing before the value is first
-  /// stored.
+  /// Returns the value that PutFact stored under `name`, or nothing if there is none. The daemon
+  /// stores values here that it measures on finished jobs.
   absl::StatusOr<std::optional<std::string>> Fact(const std::string& name);
   absl::Status PutFact(const std::string& name, const std::string& value);
 

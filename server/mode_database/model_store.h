@@ -50,7 +50,7 @@ struct ModelSummary {
   bool pinned = false;   ///< garbage collection leaves it alone
   int64_t sounded_unix_ms = 0;
   std::vector<std::string> tags{};  ///< ascending
-  /// The material that it was last asked for with; absent: it was imported.
+  /// The material of the newest request for the model. It is absent if the model was imported.
   std::optional<v1::Material> material{};
 };
 
@@ -181,30 +181,31 @@ class ModelStore {
   /// Errors: NotFound (MODAL_MODEL_NOT_FOUND).
   absl::StatusOr<ModelExport> Export(const std::string& digest);
 
-  /// The whole model. All objects share one copy in memory.
-  /// Errors: NotFound (MODAL_MODEL_NOT_FOUND), DataLoss (MODAL_MODEL_CORRUPT: a hash is wrong, and
-  /// the model goes into quarantine).
+  /// Returns the whole model. All objects share one copy in memory. Errors: NotFound
+  /// (MODAL_MODEL_NOT_FOUND), DataLoss (MODAL_MODEL_CORRUPT: a hash is wrong, and the model goes
+  /// into quarantine).
   absl::StatusOr<std::shared_ptr<const ModalModel>> Find(const std::string& digest);
 
-  /// As Find; collections also count the model as having sounded now.
+  /// Does the same as Find. In addition, garbage collections count the model as having sounded now.
   absl::StatusOr<std::shared_ptr<const ModalModel>> FindToSound(const std::string& digest);
 
   /// Errors: NotFound (MODAL_MODEL_NOT_FOUND), DataLoss (MODAL_MODEL_CORRUPT).
   absl::StatusOr<ModelSummary> Summary(const std::string& digest);
 
-  /// Eigenvalues for a Young's modulus of 1 Pa and 1 kg/m^3, ascending. Errors: those of Find.
+  /// Returns the eigenvalues for a Young's modulus of 1 Pa and a density of 1 kg/m^3, ascending.
+  /// Errors: those of Find.
   absl::StatusOr<std::vector<double>> Eigenvalues(const std::string& digest);
 
-  /// Newest first. `page_size` 0: 100; at most 1000. A page also ends when its headers have
-  /// kMaxHeaderBytes. Errors: InvalidArgument (INVALID_PAGE).
+  /// Returns the models, newest first, at most 1000 a page. A `page_size` of 0 means 100. A page
+  /// also ends when its headers have kMaxHeaderBytes. Errors: InvalidArgument (INVALID_PAGE).
   absl::StatusOr<ModelPage> List(const ModelFilter& filter, int page_size,
                                  const std::string& page_token);
 
-  /// Keeps the material for the model of this digest, stored already or to be stored; it replaces
-  /// an older one. Durable on return.
+  /// Keeps the material for the model of this digest, which need not be stored yet. The material
+  /// replaces an older one. It is durable on return.
   absl::Status RememberMaterial(const std::string& digest, const v1::Material& material);
 
-  /// The remembered material; absent: there is none.
+  /// Returns the material that RememberMaterial stored, or nothing if there is none.
   absl::StatusOr<std::optional<v1::Material>> Material(const std::string& digest);
 
   /// Errors: NotFound (MODAL_MODEL_NOT_FOUND), InvalidArgument (INVALID_TAG), DataLoss

@@ -119,7 +119,7 @@ class BlowGatherer {
   using Bodies = std::pair<uint32_t, uint32_t>;  // handle of the object, number of the partner
 
   void End(Events& events);
-  /// Adds the impulse of `felt` times `per_second` as a force of this step.
+  /// Adds a force to this step: the impulse of `felt`, N s, times `per_second`, 1/s.
   void Add(const Felt& felt, double per_second, const Roughness& roughness);
   /// Sends the blows of two bodies as impulses, and their loads (see LoadTracker) as forces.
   void Divide(const Bodies& bodies, Pair& pair, Events& events);
