@@ -74,18 +74,19 @@ class ConnectionGate {
   /// stay open.
   void Close();
 
-  /// Returns whether the connection with this name (ServerContext::peer) is open. Any thread.
+  /// Returns whether the connection with this name (ServerContext::peer) is open. Any thread may
+  /// call it.
   bool IsOpen(const std::string& peer) const;
 
   /// Ends the connection with this name. Until kRefusal (or kLoopbackRefusal) has passed, other
   /// connections of the same process (Unix) or address (TCP) are closed at once. Returns false if
-  /// the connection is not open or is ending already. Any thread.
+  /// the connection is not open or is ending already. Any thread may call it.
   bool Refuse(const std::string& peer);
 
   /// Returns the time for which Refuse keeps out the process or address of this connection.
   std::chrono::seconds RefusalTimeOf(const std::string& peer) const;
 
-  /// Number of connections that are open. Any thread.
+  /// Number of connections that are open. Any thread may call it.
   size_t open_count() const;
 
  private:

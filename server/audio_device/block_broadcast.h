@@ -40,7 +40,7 @@ class BlockBroadcast {
     Listener(const Listener&) = delete;
     Listener& operator=(const Listener&) = delete;
 
-    /// Returns the next block, or null if no block waits. Any thread.
+    /// Returns the next block, or null if no block waits. Any thread may call it.
     std::shared_ptr<const RenderedBlock> TryTake();
 
     /// Returns whether the broadcast has ended. Blocks that were queued before may still wait.

@@ -25,7 +25,7 @@ namespace carillon {
 ///     log.R      its standard error       model.R    its result
 ///     end        "R STATUS": the first run to end; the others' links fail
 ///
-/// One thread at a time.
+/// Only one thread at a time may use an object.
 class SlurmTask {
  public:
   /// Makes the folder, or takes over a folder with the same request that an earlier daemon left.

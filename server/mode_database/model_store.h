@@ -100,7 +100,8 @@ struct ModelPage {
 
 class ModelStore;
 
-/// A model that arrives record by record; each is checked as it comes. One thread at a time.
+/// A model that arrives record by record; each is checked as it comes. Only one thread at a time
+/// may use an object.
 class ModelImport {
  public:
   ModelImport(ModelImport&&) noexcept;
@@ -124,7 +125,8 @@ class ModelImport {
 };
 
 /// Reads a stored model record by record, byte for byte. No transaction stays open between two
-/// records, so an export ends with an error if the model is replaced. One thread at a time.
+/// records, so an export ends with an error if the model is replaced. Only one thread at a time may
+/// use an object.
 class ModelExport {
  public:
   /// The next record; nullopt after the last. Errors: DataLoss (MODAL_MODEL_CORRUPT, and the model

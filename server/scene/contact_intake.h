@@ -79,7 +79,8 @@ struct IntakeFindings {
 /// loads, simulation time is mapped anew, as if the newest of these steps were the first.
 ///
 /// A report that cannot be used counts as rejected, once for each object of a contact, and
-/// last_rejection() has the reason. Other reports are still used. One thread at a time.
+/// last_rejection() has the reason. Other reports are still used. Only one thread at a time may use
+/// an object.
 class ContactIntake {
  public:
   /// `scene` and `target` must outlive the intake.
@@ -109,7 +110,7 @@ class ContactIntake {
   /// Ends the step after all its forces have been reported.
   void EndStep();
 
-  /// Ends the simulation, and with it the blows that an engine spreads over steps.
+  /// Ends the simulation, and hands on the blows that are not over yet.
   void Finish();
 
   /// Counts `count` contacts that could not be used. Other rejections name the report's place.

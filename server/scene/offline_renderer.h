@@ -60,7 +60,7 @@ struct OfflineSummary {
 /// Renders a recorded simulation with a mixer of its own, as fast as possible and bit for bit the
 /// same each time. Time is virtual: no contact is late, and frame 0 is simulation time zero unless
 /// the settings map time otherwise. A caller first adds objects, then gives all steps to the
-/// intake, then calls Render until it returns zero. One thread at a time.
+/// intake, then calls Render until it returns zero. Only one thread at a time may use an object.
 class OfflineRenderer {
  public:
   /// Number of frames in a block that Render makes.
