@@ -48,13 +48,14 @@ class ConnectionGate {
   static constexpr std::chrono::seconds kLoopbackRefusal{1};
 
   /// The last sixteenth of the places is for processes and addresses with fewer connections than
-  /// this, so that one that comes new finds a place. The last sixty-fourth is for Unix sockets,
-  /// because many addresses may have few connections each.
+  /// this number, so that a new process or address finds a place. The last sixty-fourth is for Unix
+  /// sockets, because many addresses may have few connections each.
   static constexpr size_t kFewConnections = 8;
 
   /// A process (Unix) or address (TCP) may have the share `client_share`, as ClientLimits has it,
   /// of `max_connection_count`. `log`, which may be null, takes a line about the first connection
-  /// that is closed for a limit, and again after kRefusal. It must outlive the gate.
+  /// that is closed for a limit, and a further line only after kRefusal has passed. `log` must
+  /// outlive the gate.
   explicit ConnectionGate(size_t max_connection_count, double client_share = 1,
                           LimitedLog* log = nullptr, SourceFunction& source_of = SourceOfPeer);
 
@@ -117,8 +118,8 @@ class ConnectionGate {
   void Accept(const Door& door);
   /// Returns whether another connection may be open. If so, stores this connection by its peer.
   bool Admit(const std::string& peer, const Connection& connection);
-  /// Removes closed connections from the table, and returns true. Soon after the last time it
-  /// returns false.
+  /// Removes closed connections from the table, and returns true. If the last removal was very
+  /// recent, does nothing and returns false.
   bool ForgetClosed() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   /// Returns why a process or address gets no place, or an empty string if it gets one.
   std::string WhyNoPlace(const std::string& source) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
