@@ -10,10 +10,10 @@ namespace carillon::precompute {
 
 /// Returns whether the estimated errors of the mesh's modes may be far too small: if it has few
 /// quadratic elements, or if most of its elements are more than 20 times as long as they are high.
-/// Where an element spans much of a wavelength, EstimateFrequencyErrors() is too small, by a factor
-/// of hundreds in the worst case, and modes are missing. Meshes whose fineness Carillon chooses
-/// have at least twice as many nodes, and on plates, bowls and tubes their elements are at most 12
-/// times as long as they are high.
+/// Where an element spans much of a wavelength, the result of EstimateFrequencyErrors() is too
+/// small, in the worst case by a factor of hundreds, and modes are missing. Meshes whose fineness
+/// Carillon chooses have at least twice as many nodes, and on plates, bowls and tubes their
+/// elements are at most 12 times as long as they are high.
 bool HasFewElements(const TetMesh& mesh);
 
 /// Returns `mesh` with its elements divided until HasFewElements is false. HasFewElements must be

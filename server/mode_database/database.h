@@ -52,8 +52,8 @@ class Database {
   absl::StatusOr<SpoolFile> MakeSpool();
 
   /// Returns a text with the number of changes that were acknowledged once but are missing from the
-  /// opened file, because its write-ahead log was removed or the file is an older copy. Empty if no
-  /// change is missing.
+  /// opened file, because its write-ahead log was removed or the file is an older copy. Returns an
+  /// empty text if no change is missing.
   std::string MissingChanges() const;
 
   /// Runs `body` on one snapshot of the database.

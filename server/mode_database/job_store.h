@@ -52,7 +52,7 @@ class JobStore {
  public:
   explicit JobStore(Database& database) : database_(&database) {}
 
-  /// Writes a job durably; replaces a job with the same digest.
+  /// Writes a job durably, and replaces a job with the same digest.
   absl::Status Put(const JobRecord& job);
 
   absl::StatusOr<std::optional<JobRecord>> Find(const std::string& digest);
