@@ -206,7 +206,8 @@ class ModelStore {
   absl::StatusOr<std::vector<double>> Eigenvalues(const std::string& digest);
 
   /// Returns the models, newest first, at most 1000 a page. A `page_size` of 0 means 100. A page
-  /// also ends when its headers have kMaxHeaderBytes. Errors: InvalidArgument (INVALID_PAGE).
+  /// also ends when its headers together have kMaxHeaderBytes. Errors: InvalidArgument
+  /// (INVALID_PAGE).
   absl::StatusOr<ModelPage> List(const ModelFilter& filter, int page_size,
                                  const std::string& page_token);
 
