@@ -14,7 +14,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "absl/strings/str_split.h"
-#include "precompute/fem/material.h"
+#include "precompute/fem/elastic_constants.h"
 #include "precompute/worker_request.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/manual_page.h"

@@ -8,8 +8,8 @@
 
 namespace carillon::precompute {
 
-/// A step that is still to be done. A step is repeated if a solution misses a mode, except the
-/// first step, which counts the modes.
+/// A step that is still to be done. If a solution misses a mode, all steps but the first, which
+/// counts the modes, are repeated.
 struct PlannedStep {
   v1::Phase phase;
   double predicted_s = 0;  ///< on the machine on which the cost model was measured
@@ -34,9 +34,10 @@ class DecompositionObserver {
   /// `steps` are the steps of this round, beginning with the counting of modes. The function is
   /// called again when the prediction becomes more precise.
   virtual void OnPlan(const std::vector<PlannedStep>& steps) = 0;
-  /// The mesh has `node_count` nodes, counting corners and mid-sides.
+  /// Called when the mesh has been made. It has `node_count` nodes, counting corners and mid-side
+  /// nodes.
   virtual void OnMesh(size_t node_count) = 0;
-  /// The solver has verified `mode_count` modes.
+  /// Called when the solver has verified `mode_count` modes.
   virtual void OnModes(size_t mode_count) = 0;
 };
 

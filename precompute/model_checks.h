@@ -8,13 +8,13 @@
 
 namespace carillon::precompute {
 
-/// Returns whether a body may be too small for the band, and has a default mesh that takes long
-/// because the body is compact.
+/// Returns whether a body may be too small to have a mode in the band, and is so compact that its
+/// default mesh takes long.
 bool MayBeTooSmall(const SurfaceMesh& surface, const IntendedUse& use);
 
 /// Returns whether no finer mesh can have a mode in the band: the lowest mode lies above the band
-/// by more than twice its estimated error. A coarse mesh tells this as well as a fine one, because
-/// its frequencies are too high by little.
+/// by more than twice its estimated error. A coarse mesh shows this as well as a fine mesh does,
+/// because its frequencies are only a little too high.
 bool IsSurelyAboveBand(const ModalModel& model, const IntendedUse& use);
 
 /// Returns OK if a mode lies in the band of `use`.

@@ -8,11 +8,11 @@
 
 namespace carillon::precompute {
 
-/// Warns that the number of nodes asked for is that of the first mesh, if the request also has a
-/// goal, which decides the last one.
+/// If a request has a number of nodes and also a goal, warns that the number applies to the first
+/// mesh only, because the goal decides the last mesh.
 void WarnOfNodesBesideGoal(int asked_corner_count, const ResolutionGoal& goal, ModalModel& model);
 
-/// The cost of a body above which modes of a band that nobody asked for are left out.
+/// The cost above which some modes of a body are left out, if the request does not state the band.
 inline constexpr Means kUsualMeans{.bytes = size_t{7} << 30U, .cpu_s = 60};
 /// Largest estimated error of a frequency that goes without a warning: nearly two semitones.
 inline constexpr double kGreatError = 0.1;

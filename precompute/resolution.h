@@ -32,10 +32,10 @@ struct Round {
 /// Number of corner nodes of the first mesh.
 inline constexpr int kFirstCornerNodeCount = 1500;
 
-/// Returns the element size, metres, of the next mesh to try, or nothing if the last mesh is good
-/// enough or the best that the goal allows. The last two rounds show with which power of the
-/// element size the errors fall. Time and memory grow with powers of the number of nodes, measured
-/// on solids.
+/// Returns the element size, metres, of the next mesh to try. Returns nothing if the last mesh is
+/// good enough, or is the best mesh that the goal allows. The power of the element size with which
+/// the errors fall is taken from the last two rounds. Time and memory grow with powers of the
+/// number of nodes, measured on solids.
 std::optional<double> NextElementSize(const ResolutionGoal& goal, const std::vector<Round>& rounds);
 
 /// Returns the number of dimensions in which smaller elements become more numerous.
@@ -57,9 +57,9 @@ double TimeGrowth(const Round& last, double element_size_m);
 std::vector<std::string> OverrunWarnings(const ResolutionGoal& goal, double used_s,
                                          double used_bytes);
 
-/// Predicted time of all later rounds, relative to the current round. The first number is for the
-/// first round, whose errors are not known yet. The second one is for a later round, which should
-/// be the last.
+/// Predicted time of all later rounds, relative to the current round. The first number applies
+/// while the first round runs, because its errors are not known yet. The second number applies
+/// while a later round runs, because that round should be the last.
 inline constexpr double kLaterRoundsAfterFirst = 6, kLaterRounds = 0.1;
 
 }  // namespace carillon::precompute

@@ -18,17 +18,17 @@ using Quaternion = std::array<double, 4>;  ///< w, x, y, z
 struct ContactSettings {
   double roughness_depth = 0.5;          ///< as in carillon.v1.Roughness
   double irregularity_length_m = 0.001;  ///< as in carillon.v1.Roughness
-  /// The name in the catalogue of strikers, such as "wood", of bodies without a sound.
-  /// Empty: steel.
+  /// The striker that bodies without a sound are: a name of the catalogue, such as "wood". If it is
+  /// empty, they are steel.
   std::string striker{};
-  /// How long an impact lasts. Absent: as long as an elastic collision of the two bodies, which the
-  /// daemon computes.
+  /// How long a blow lasts, seconds. If it is absent, a blow lasts as long as an elastic collision
+  /// of the two bodies, which the daemon computes.
   std::optional<double> duration_s = std::nullopt;
 };
 
 /// One body of a contact; a body that is not dynamic stands still.
 struct ContactSide {
-  const void* body = nullptr;           ///< the engine's body; null: the fixed world
+  const void* body = nullptr;           ///< the engine's body; null for the fixed world
   Vector point_m{};                     ///< of the contact, in the frame of the body
   Quaternion orientation{1, 0, 0, 0};   ///< from the frame of the body to that of the world
   Vector velocity_m_per_s{};            ///< of the body's material at the contact, in the world

@@ -23,8 +23,9 @@ class FileLock {
   FileLock& operator=(FileLock&& other) noexcept;
   ~FileLock();
 
-  /// Opens or creates the file and locks it; waits for another holder if `waits`. Returns a lock
-  /// that holds nothing if the file cannot be opened, or another process holds it.
+  /// Opens or creates the file and locks it. If another process has the lock, waits for it if
+  /// `waits` is true. Returns a lock that holds nothing if the file cannot be opened, or if another
+  /// process has the lock.
   static FileLock Take(const std::filesystem::path& path, bool waits);
 
   bool holds() const { return descriptor_ >= 0; }
@@ -46,8 +47,8 @@ class FileLock {
 /// that share the folder, may work at the same time.
 class ClipFolder {
  public:
-  /// Creates the folder if needed, and removes what processes left behind that are no more. Errors:
-  /// Internal (OUTPUT_NOT_WRITABLE).
+  /// Creates the folder if needed, and removes the unfinished files of processes that have ended.
+  /// Errors: Internal (OUTPUT_NOT_WRITABLE).
   static absl::StatusOr<ClipFolder> Open(const std::filesystem::path& path);
   ClipFolder(ClipFolder&&) noexcept = default;
   ClipFolder& operator=(ClipFolder&&) = delete;
@@ -55,7 +56,8 @@ class ClipFolder {
   ~ClipFolder();
 
   std::filesystem::path Final(const std::string& file) const { return path_ / file; }
-  /// The place of a file that is not finished. Names may hold a folder, which is created.
+  /// Returns the path of a file that is not finished. `name` may contain a folder, which is
+  /// created.
   std::filesystem::path Work(const std::string& file) const;
 
   /// Moves a finished file, or a folder of them, to its place. Errors: Internal
@@ -65,8 +67,8 @@ class ClipFolder {
   /// Writes a file at once and whole. Errors: Internal (OUTPUT_NOT_WRITABLE).
   absl::Status Write(const std::string& file, const std::string& text) const;
 
-  /// Writes the manifest: the records of those of `clips` that have one, in their order. Errors:
-  /// Internal (OUTPUT_NOT_WRITABLE).
+  /// Writes the manifest: the records of `clips`, in their order, without the clips that have no
+  /// record. Errors: Internal (OUTPUT_NOT_WRITABLE).
   absl::Status WriteManifest(std::span<const std::string> clips) const;
 
  private:

@@ -31,15 +31,16 @@ struct ClipRecord {
   std::vector<v1::Blow> blows;
 };
 
-/// All that the samples of a clip depend on beside its trace and the models, as JSON.
+/// Returns, as JSON, everything on which the samples of a clip depend in addition to its trace and
+/// the models.
 std::string SettingsText(const RenderOptions& options, const std::string& daemon_version);
 
-/// The line of a clip that was rendered, or of one that could not be.
+/// Return the line of a clip that was rendered, and that of a clip that could not be rendered.
 std::string RecordLine(const ClipRecord& record);
 std::string ErrorLine(const std::string& clip, const absl::Status& error);
 
-/// Returns whether the record `clip`.json in `folder` was made of this trace with these settings,
-/// and all its files are there with the digests that it names.
+/// Returns whether the record `clip`.json in `folder` was made from this trace with these settings,
+/// and whether all its files are there with the digests that the record states.
 bool IsRendered(const std::filesystem::path& folder, const ClipRecord& wanted);
 
 }  // namespace carillon::cli

@@ -30,7 +30,8 @@ struct CreateModelOptions {
   double time_limit_s = 0;
   uint64_t memory_limit_mib = 0;
   bool wait = false;  ///< end with the jobs, and show their progress
-  /// While waiting, ask again with repair for a surface that is refused and may be repaired.
+  /// Whether to ask again with repair, while waiting, if the surface is refused and may be
+  /// repaired.
   bool may_repair = true;
 };
 
@@ -163,8 +164,8 @@ absl::Status CollectGarbage(const client::Client& daemon, const v1::CollectGarba
 /// name a material, shows the frequencies and decay rates of the modes too.
 absl::Status ShowModel(const client::Client& daemon, const std::string& text,
                        const MaterialFigures& figures, bool json);
-/// Deletes models; one that cannot be deleted does not stop the others. Tells each outcome if there
-/// are several.
+/// Deletes models. If one model cannot be deleted, the others are deleted all the same. Prints each
+/// outcome if there are several models.
 absl::Status DeleteModels(const client::Client& daemon, const std::vector<std::string>& texts,
                           bool json);
 absl::Status ListJobs(const client::Client& daemon, const v1::ListJobsRequest& filter, bool json);
@@ -198,26 +199,27 @@ absl::Status Strike(const client::Client& daemon, const StrikeOptions& options,
 absl::Status Listen(const client::Client& daemon, const ListenOptions& options,
                     const StopSignal& stop, bool json);
 absl::Status Render(const client::Client& daemon, const RenderOptions& options, bool json);
-/// Renders the contact traces of a folder into another (see ClipFolder). Clips that are there
+/// Renders the contact traces of a folder into another folder (ClipFolder). Clips that are there
 /// already stay. A trace that cannot be rendered does not stop the others. Errors: NotFound
 /// (NO_TRACES), Internal (OUTPUT_NOT_WRITABLE), FailedPrecondition (CLIPS_FAILED).
 absl::Status RenderClips(const client::Client& daemon, const RenderOptions& options, bool json);
 v1::RenderSettings SettingsOf(const RenderOptions& options);
 /// Returns the full scale, Pa, with which a sound should be rendered again before it is normalised.
 /// Tails end at -80 dB and modes at -140 dB of full scale, so that a soft sound would be cut, and
-/// the limiter changes a loud one. Absent: the rendering is neither soft nor limited, is silent, or
-/// has the full scale that was asked for.
+/// the limiter changes a loud one. Returns nothing if the rendering is neither soft nor limited, is
+/// silent, or has the full scale that was asked for.
 std::optional<double> BetterFullScale(const RenderOptions& options,
                                       const v1::RenderSummary& summary);
 /// Errors: InvalidArgument (TRACE_EMPTY: the rendered trace has no contact, and its sound is
 /// silent).
 absl::Status CheckHasContacts(const std::string& path, const v1::RenderSummary& summary);
 
-/// Returns the name of a scene that `text` names as "scenes/7" or "7"; empty stays empty.
+/// Returns the name of a scene that `text` names as "scenes/7" or "7". Returns an empty string for
+/// an empty one.
 std::string SceneNamed(const std::string& text);
-/// Changes what the options have, and prints the volume.
+/// Changes the properties of the volume that the options have, and prints the volume.
 absl::Status ChangeVolume(const client::Client& daemon, const VolumeOptions& options, bool json);
-/// Silences a scene, or all of the caller if `scene` is empty.
+/// Silences a scene, or all scenes of the caller if `scene` is empty.
 absl::Status StopSound(const client::Client& daemon, const std::string& scene, bool json);
 /// Writes the next contact stream of a scene to the file `out`, until the stream ends.
 absl::Status RecordContacts(const client::Client& daemon, const std::string& scene,

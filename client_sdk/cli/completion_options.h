@@ -19,7 +19,8 @@ void AddCompletion(CLI::App& app, Program& program);
 std::string CompletionScript(const CLI::App& app, const std::string& shell);
 
 /// Returns a sentence about the first word of a command line that is no command or no option, such
-/// as "there is no command 'modal'; did you mean 'model'?". Empty: every word is known.
+/// as "there is no command 'modal'; did you mean 'model'?". Returns an empty string if every word
+/// is known.
 std::string UnknownWord(const CLI::App& app, int argc, const char* const* argv);
 
 }  // namespace carillon::cli

@@ -11,14 +11,16 @@
 
 namespace carillon::cli {
 
-/// The process that listens at a Unix socket. Errors: Unavailable (SERVER_UNAVAILABLE), if no
-/// process listens there or this user may not connect.
+/// Returns the process that listens at a Unix socket. Errors: Unavailable (SERVER_UNAVAILABLE), if
+/// no process listens there or this user may not connect.
 absl::StatusOr<pid_t> ProcessAt(const std::string& socket_path);
 
-/// Whether a thread of the process has real-time priority; absent: this user may not see that.
+/// Returns whether a thread of the process has real-time priority, or nothing if this user may not
+/// see that.
 std::optional<bool> HasRealtimeThread(pid_t process);
 
-/// How many descriptors the process may have open; absent: this user may not see that.
+/// Returns how many descriptors the process may have open, or nothing if this user may not see
+/// that.
 std::optional<uint64_t> DescriptorLimit(pid_t process);
 
 }  // namespace carillon::cli

@@ -6,9 +6,9 @@
 
 namespace carillon::cli {
 
-/// Looks at the daemon and at this machine, and prints a line for each thing that must be right:
-/// whether it is, and what to do if not; or all of that as JSON. Errors: FailedPrecondition
-/// (FAULTS_FOUND).
+/// Examines the daemon and this machine. For each property that must be right, prints a line that
+/// says whether it is right, and what to do if it is not. Prints the same as JSON if that is asked
+/// for. Errors: FailedPrecondition (FAULTS_FOUND).
 absl::Status Diagnose(const Program& program);
 
 }  // namespace carillon::cli

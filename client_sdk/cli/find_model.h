@@ -14,7 +14,8 @@ namespace carillon::cli {
 /// and those of Client::ListModalModels.
 absl::StatusOr<std::string> FindModel(const client::Client& daemon, const std::string& text);
 
-/// Says that other models have the label of `model`, too, and how to name each; empty if none has.
+/// Returns a sentence that says that other models have the label of `model`, too, and how to name
+/// each. Returns an empty string if no other model has the label.
 std::string SharedLabel(const client::Client& daemon, const v1::ModalModelSummary& model);
 
 /// Returns the name "jobs/{digest}" of the job that `text` means: its name, its label, or the first

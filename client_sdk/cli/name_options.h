@@ -12,7 +12,8 @@ class App;
 namespace carillon::cli {
 
 /// Returns the kind of names that an argument or the value of an option takes, such as "models" for
-/// "model" and "materials" for "--material"; empty if it takes others.
+/// "model" and "materials" for "--material". Returns an empty string if it takes no names of a
+/// known kind.
 std::string KindOfNames(const std::string& argument);
 
 /// Adds `carillon names KIND`, which --help does not list. The scripts of `carillon completion`

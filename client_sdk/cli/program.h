@@ -38,14 +38,14 @@ struct Program {
   }
 
  private:
-  /// Returns the content of the file; nothing for a Unix socket, which has no TLS.
+  /// Returns the content of the file. Returns nothing for a Unix socket, which has no TLS.
   std::string ForTls(const std::string& path) const {
     if (server.rfind("unix:", 0) == 0) return "";
     std::ifstream file(path, std::ios::binary);
     return {std::istreambuf_iterator<char>(file), {}};
   }
 
-  /// The first line of the token's file if one is named, else the token.
+  /// Returns the first line of the token's file if such a file is named, otherwise the token.
   std::string Token() const {
     if (token_file.empty()) return token;
     std::ifstream file(token_file);

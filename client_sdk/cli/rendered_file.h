@@ -18,8 +18,8 @@ struct RenderedForm {
   WaveFormat format;
   double factor = 1;       ///< of every sample
   bool normalize = false;  ///< scale the sound to a peak of 0.9 of full scale, before `factor`
-  /// The length of the file: a longer sound is cut, a shorter one is followed by silence. Absent:
-  /// that of the sound.
+  /// The length of the file. A longer sound is cut, and a shorter one is followed by silence. If
+  /// the length is absent, the file is as long as the sound.
   std::optional<uint64_t> frame_count = std::nullopt;
 };
 
@@ -39,7 +39,7 @@ class RenderedFile {
   absl::Status Finish();
 
   const absl::Status& status() const { return status_; }
-  /// The factor by which the samples were multiplied, once the file is complete.
+  /// Returns the factor by which the samples were multiplied. Call it when the file is complete.
   double factor() const { return factor_; }
   /// The largest magnitude of the samples in the file, before they are clipped.
   float peak() const { return peak_; }

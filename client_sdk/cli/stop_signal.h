@@ -17,7 +17,8 @@ class StopSignal {
     pthread_sigmask(SIG_BLOCK, &signals_, nullptr);
   }
 
-  /// Waits for one of the signals. Returns true as soon as it arrives, false after `seconds`.
+  /// Waits for one of the signals. Returns true as soon as it arrives, or false if none has arrived
+  /// after `seconds`.
   bool ArrivesWithin(double seconds) const {
     timespec timeout = {};
     timeout.tv_sec = static_cast<time_t>(seconds);

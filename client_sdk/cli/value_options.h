@@ -28,8 +28,9 @@ void TakeSize(CLI::Option& option);
 /// Lets an option take a time of zero or more.
 void TakeSeconds(CLI::Option& option);
 
-/// Says which formats are written if the suffix of `path` is not one of `suffixes` (".wav"), in
-/// small or capital letters; empty if it is, or if the path has no suffix.
+/// Returns a sentence that says which formats can be written if the suffix of `path` is not one of
+/// `suffixes`, such as ".wav". Small and capital letters are equal. Returns an empty string if the
+/// suffix is one of them, or if the path has no suffix.
 std::string WhyNotWritten(const std::string& path, const std::vector<std::string>& suffixes);
 
 /// Throws a CLI::ValidationError if JSON is asked for while stdout, "-" as `out`, has the sound.

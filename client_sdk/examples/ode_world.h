@@ -18,7 +18,7 @@ struct OdeSurface {
   double slowest_bounce_m_per_s = 0.05;  ///< a slower contact does not bounce
 };
 
-/// Returns the surface of a contact between two bodies, of which one may be null: the ground.
+/// Returns the surface of a contact between two bodies. A body that is null is the ground.
 using OdeSurfaceOf = std::function<OdeSurface(dBodyID, dBodyID)>;
 
 /// A world of ODE, whose gravity is 0, with one space for all geometries, and its contacts as

@@ -33,8 +33,8 @@ struct StoredModel {
   size_t triangle_count() const { return triangles.size() / 3; }
 };
 
-/// Calls `visit(name, numbers, dimensions)` for each of kModelArrays in its order. Each letter of
-/// `dimensions` is one of ModelSizes, or '3'.
+/// Calls `visit(name, numbers, dimensions)` for each of kModelArrays in its order. Each character
+/// of `dimensions` names one dimension of the array: a letter of ModelSizes, or '3'.
 template <class Model, class Visitor>
 void VisitArrays(Model& model, Visitor visit) {
   size_t index = 0;

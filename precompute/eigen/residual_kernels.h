@@ -15,7 +15,8 @@ void AddRayleighSums(const double* x, const double* elastic, const double* inert
                      double* energy, double* mass);
 
 /// Computes residual += |D^1/2 (elastic - inertial quotient)|^2 and scale += |D^1/2 inertial|^2.
-/// D^1/2 converts products to the user's unknowns; for `root_mass` see NodeMatrix.
+/// D^1/2 converts products from the scaled unknowns of NodeMatrix to those of K and M. `root_mass`
+/// is the diagonal of D^1/2 (NodeMatrix::root_mass).
 void AddResidualSums(const double* quotient, const double* root_mass, const double* elastic,
                      const double* inertial, int64_t nodes, double* residual, double* scale);
 

@@ -3,8 +3,8 @@
 
 #include <Eigen/SparseCore>
 
+#include "precompute/fem/elastic_constants.h"
 #include "precompute/fem/element.h"
-#include "precompute/fem/material.h"
 #include "precompute/mesh/tet_mesh.h"
 
 namespace carillon::precompute {

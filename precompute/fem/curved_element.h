@@ -5,8 +5,8 @@
 #include <cstddef>
 
 #include "absl/status/status.h"
+#include "precompute/fem/elastic_constants.h"
 #include "precompute/fem/element.h"
-#include "precompute/fem/material.h"
 #include "precompute/mesh/tet_mesh.h"
 
 namespace carillon::precompute {
@@ -24,12 +24,12 @@ Eigen::Matrix<double, 4, 3> ReferenceGradients();
 
 TenNodes NodesOf(const TetMesh& mesh, size_t element);
 
-/// Returns the stiffness, N/m, by the rule of degree five, which is exact if the element is
-/// straight.
+/// Returns the stiffness, N/m, by the quadrature rule of degree five (tet_rule.h). This rule is
+/// exact if the element is straight.
 QuadraticStiffness MakeCurvedStiffness(const TenNodes& nodes, const LameConstants& lame);
 
-/// Returns the exact mass, kg, which is the same for each component. It is lumped by diagonal
-/// scaling, like that of MakeQuadraticMass.
+/// Returns the exact mass, kg, which is the same for each component. If `sharing` asks for a lumped
+/// mass, the mass is lumped by diagonal scaling, as in MakeQuadraticMass.
 QuadraticMass MakeCurvedMass(const TenNodes& nodes, double density_kg_per_m3, MassSharing sharing);
 
 /// Returns the exact volume, m^3.

@@ -3,7 +3,7 @@
 
 #include <Eigen/Core>
 
-#include "precompute/fem/material.h"
+#include "precompute/fem/elastic_constants.h"
 
 namespace carillon::precompute {
 

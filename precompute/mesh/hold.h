@@ -19,7 +19,7 @@ struct FixedVertices {
   std::vector<int64_t> numbers;
 };
 
-/// All nodes in a plane or behind it, that is on the side opposite to its normal.
+/// A half space: all nodes in a plane or behind it, that is, on the side opposite to its normal.
 struct FixedPlane {
   Point point_m;
   Point normal;  ///< of any length above zero

@@ -14,8 +14,8 @@ namespace carillon::precompute {
 class SizeField {
  public:
   SizeField() = default;
-  /// `relative_sizes` has a positive number for each point. `slope`: how much the relative size
-  /// grows with the distance from a point, 1/m.
+  /// `relative_sizes` has a positive number for each point. The relative size grows with the
+  /// distance from a point by `slope`, 1/m.
   SizeField(std::vector<Point> points, std::vector<double> relative_sizes, double slope);
 
   /// Returns the smallest size that a point allows at `place`: the point's relative size plus slope

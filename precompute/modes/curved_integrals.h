@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "precompute/fem/curved_element.h"
-#include "precompute/fem/material.h"
+#include "precompute/fem/elastic_constants.h"
 
 namespace carillon::precompute {
 

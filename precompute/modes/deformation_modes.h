@@ -48,7 +48,8 @@ inline constexpr int kMaxModeCount = 5000;
 /// Largest number of modes that may be found if only the most audible ones are kept.
 inline constexpr int kMaxFoundModeCount = 20'000;
 
-/// Largest expected number of modes that is told; more are told as this many.
+/// Largest expected number of modes that is reported. A larger expected number is reported as this
+/// number.
 inline constexpr double kMostExpectedModes = 1e9;
 
 /// The stages of a solution. Counting the modes comes first and belongs to kVerify.

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "precompute/eigen/eigensolver.h"
-#include "precompute/fem/material.h"
+#include "precompute/fem/elastic_constants.h"
 #include "precompute/mesh/tet_mesh.h"
 
 namespace carillon::precompute {
@@ -33,14 +33,14 @@ struct ErrorEstimate {
 ///     r_b = a(b, phi) - Lambda m(b, phi),   delta Lambda ~ C sum_b w_b r_b^T a(b, b)^-1 r_b
 ///
 /// At a re-entrant edge of the body the stress is singular, and functions of a higher order take up
-/// a smaller part of the error than elsewhere. The weight w_b makes up for this: each corner of b
-/// has a weight by ReentrantWeights(), and w_b is the largest of these.
+/// a smaller part of the error than elsewhere. The weight w_b compensates for this. Each corner of
+/// b has a weight by ReentrantWeights(), and w_b is the largest of these weights.
 ///
 /// The estimate detects the locking of thin walls, which estimates by averaged stresses do not. C
 /// is fitted to a bar, a block, a plate and a tube so that the estimate is rarely too small for
-/// errors of a few percent or less. For walls of linear elements with errors of half or more it is
-/// too small. The estimate refers to the body as meshed, including curved elements. It
-/// does not include the difference between the mesh and the shape of the original object.
+/// errors of a few percent or less. The estimate is too small for walls of linear elements whose
+/// errors are a half or more. The estimate refers to the body as meshed, including curved elements.
+/// It does not include the difference between the mesh and the shape of the original object.
 ///
 /// `elastic` has the constants of the matrices from which the modes were computed, for unit
 /// density. A consistent mass is assumed. Shapes include all nodes; fixed edges and faces add

@@ -26,7 +26,8 @@ struct ModalModel {
   /// The lowest deformation eigenvalue of the body, even if it lies above the limit and is not in
   /// the model.
   double lowest_eigenvalue = 0;
-  /// The estimated error of that mode's frequency if there is no mode in the model. Not stored.
+  /// The estimated error of the frequency of that lowest mode, if the model has no mode. It is not
+  /// stored.
   double lowest_error = 0;
   Verification verification;
   /// The comparison with another solver, if one was requested.

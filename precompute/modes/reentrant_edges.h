@@ -7,8 +7,9 @@
 
 namespace carillon::precompute {
 
-/// Returns for each node of the mesh, from 1 to 2, how much more of the error remains there with
-/// elements one order higher than where the displacement is smooth.
+/// Returns a weight from 1 to 2 for each node of the mesh. The weight says how much more of the
+/// error remains near the node, if elements are one order higher, than remains where the
+/// displacement is smooth.
 ///
 /// At a re-entrant edge, whose faces enclose more than 180 degrees of the body, the stress is
 /// singular (Grisvard, Elliptic Problems in Nonsmooth Domains, 1985). If the displacement grows as

@@ -11,15 +11,17 @@ namespace carillon::precompute {
 
 absl::Status VerificationFailed(const std::string& what);
 
-/// `count` modes lie below the limit of the band, and at most `limit` may be found.
+/// Returns the refusal of a body that has `count` modes below the limit of the band, of which at
+/// most `limit` may be found.
 absl::Status TooManyModes(int count, int limit);
 
 /// Adds figures to the refusal of too many modes, from which remedies follow: the number of
-/// unknowns, and an eigenvalue below which at most `most` modes lie, if `lower` has one.
+/// unknowns and, if `lower` has one, an eigenvalue below which at most `most` modes lie.
 absl::Status WithLowerLimit(absl::Status refusal, int unknown_count,
                             const absl::StatusOr<Counted>& lower, int most);
 
-/// The body can move in `free_motions` ways without bending, more than the expected `rigid_count`.
+/// Returns the refusal of a body that can move in `free_motions` ways without bending, which are
+/// more than the expected `rigid_count`. `is_fixed` says whether a part of the body is fixed.
 absl::Status SeveralPieces(int free_motions, int rigid_count, bool is_fixed);
 
 /// Properties of a body, for unit material, from which its slenderness follows.

@@ -13,8 +13,8 @@ namespace carillon::precompute {
 
 using ComplexFloat = std::complex<float>;
 
-/// A closed surface with the weights of the vertex rule, which takes a third of a triangle's area
-/// times the sum of the values at its corners for the integral.
+/// A closed surface with the weights of the vertex rule. The vertex rule approximates the integral
+/// over a triangle by a third of its area times the sum of the values at its corners.
 struct AcousticSurface {
   SurfaceMesh mesh;
   std::vector<double> areas;        ///< #vertices, m^2: a third of the area of its triangles
@@ -27,8 +27,9 @@ struct AcousticSurface {
 
 AcousticSurface MakeAcousticSurface(SurfaceMesh mesh);
 
-/// Returns the surface curl of the hat function of corner `c` on triangle `t`, 1/m, up to a sign
-/// that is the same for all. It is the opposite edge divided by twice the area.
+/// Returns the surface curl of the hat function of corner `c` on triangle `t`, 1/m. It is the edge
+/// opposite the corner, divided by twice the triangle's area. Its sign is not specified, but is the
+/// same for all corners and triangles.
 Point CurlOfHat(const AcousticSurface& surface, size_t t, size_t c);
 
 /// Computes J_i, the integrals of the surface curl of the P1 function `p` by the vertex rule; three

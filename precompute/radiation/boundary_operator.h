@@ -27,7 +27,8 @@ using Displacement = std::vector<std::array<float, 3>>;
 /// pairs. No dense matrix is stored.
 class BoundaryOperator {
  public:
-  /// Keeps the references. `center` and `radius_m` describe a sphere around the surface.
+  /// Keeps references to the arguments, which must outlive the operator. `center` and `radius_m`
+  /// describe a sphere around the surface.
   BoundaryOperator(const AcousticSurface& surface, const NearCorrection& near, const Point& center,
                    double radius_m, double wavenumber);
 

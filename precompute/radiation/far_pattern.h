@@ -12,8 +12,8 @@
 namespace carillon::precompute {
 
 /// Returns the order of harmonics up to which a body within a sphere of this radius radiates at
-/// this wavenumber (Gumerov and Duraiswami's rule). Measurements showed that the directions are
-/// then correct to a decibel.
+/// this wavenumber (Gumerov and Duraiswami's rule). Measurements showed that with this order the
+/// level in each direction is correct to a decibel.
 int PatternOrder(double wavenumber, double radius_m);
 
 /// Returns P at the directions of the grid. Far away, at the distance r from `center`, the pressure

@@ -11,8 +11,8 @@
 
 namespace carillon::precompute {
 
-/// The modes of a body on its surface, in the layout of a modal model. The arrays are referred to,
-/// not copied.
+/// The modes of a body on its surface, in the layout of a modal model. The spans refer to arrays of
+/// the caller, which must outlive the struct.
 struct SurfaceModes {
   std::span<const std::array<float, 3>> vertices;  ///< metres
   std::span<const std::array<int32_t, 3>> triangles;

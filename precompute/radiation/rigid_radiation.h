@@ -42,8 +42,9 @@ struct RigidRadiation {
   std::array<Motion, kRigidMotionCount> motions;
 };
 
-/// Returns wavenumbers in equal ratios. The greatest is that of the shortest wave that the level
-/// resolves, or `greatest_wavenumber` if that is less. The least is a sixtieth of the greatest.
+/// Returns wavenumbers in equal ratios. The greatest wavenumber belongs to the shortest wave that
+/// the level resolves, but is at most `greatest_wavenumber`. The least wavenumber is a sixtieth of
+/// the greatest.
 std::vector<double> RigidWavenumbers(const RemeshedSurface& level, double greatest_wavenumber);
 
 /// Solves the six motions at these wavenumbers, and fits the equivalent spheres.

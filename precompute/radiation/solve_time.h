@@ -7,8 +7,9 @@ namespace carillon::precompute {
 double CpuSeconds();
 
 /// Counts the work of a transfer as the processor time that it takes on one core of 2.5 GHz with
-/// AVX-512. Measured times would depend on the machine and on what else it does, and with them the
-/// modes that a budget reaches: the same body would sound different from one day to the next.
+/// AVX-512. Measured times would depend on the machine and its load. The modes that a budget
+/// reaches would then depend on them, too, and the same body would sound different from one day to
+/// the next.
 class SolveTime {
  public:
   /// Returns the time of a solution. `pairs` is the number of pairs of vertices to which the

@@ -17,8 +17,8 @@ namespace carillon::precompute {
 /// times as long as those of the level before. A level is made when At() first returns it.
 class SurfaceLevels {
  public:
-  /// A level, and the places of its vertices on the level before, or no places if that level was
-  /// not made.
+  /// A level, and the places of its vertices on the level before. There are no places if the level
+  /// before was not made.
   struct Made {
     explicit Made(RemeshedSurface made) : level(std::move(made)), index(level.surface.mesh) {}
 
@@ -27,13 +27,13 @@ class SurfaceLevels {
     std::vector<SurfacePlace> places_before;
   };
 
-  /// Keeps the references.
+  /// Keeps references to the arguments, which must outlive the object.
   SurfaceLevels(const RadiatingSurface& body, Workers& workers);
 
   static constexpr int kFinest = 8;
 
-  /// Returns whether the level may be made, that is, has neither too fine edges nor too many
-  /// vertices.
+  /// Returns whether the level may be made. It may not be made if its edges would be too fine or
+  /// its vertices too many.
   bool Exists(int level) const;
   bool IsMade(int level) const { return levels_.contains(level); }
   /// Returns the requested length of the level's edges, metres.

@@ -7,8 +7,8 @@
 
 namespace carillon::precompute {
 
-/// Number of targets that a kernel processes at once. Arrays over targets are padded to multiples
-/// of this number.
+/// Number of targets (the vertices at which a kernel sums the fields of all sources) that a kernel
+/// processes at once. Arrays over targets are padded to multiples of this number.
 inline constexpr int64_t kSweepGrain = 32;
 /// Largest number of right-hand sides that one evaluation of the kernel serves.
 inline constexpr int kMaxSweepSides = 2;
@@ -22,8 +22,7 @@ inline constexpr int kSourceHead = 6;
 inline constexpr int kSourceSide = 8;
 
 /// Vertices as targets. Each array is padded to a multiple of kSweepGrain. Lengths are multiplied
-/// by k / pi, so
-/// that a unit of distance is half a turn of phase.
+/// by k / pi, so that the phase advances by half a turn in a unit of distance.
 struct SweepTargets {
   std::vector<float> x, y, z;
   std::vector<float> nx, ny, nz;  ///< normals, scaled as the operator needs them

@@ -12,8 +12,9 @@
 namespace carillon::precompute {
 
 struct RadiationSettings {
-  /// sqrt(E/rho) of the material over the speed of sound in air: a mode of unit eigenvalue Lambda
-  /// radiates at the wavenumber k = speed_ratio * sqrt(Lambda).
+  /// The speed ratio: sqrt(E/rho) of the material divided by the speed of sound in air. A mode
+  /// whose eigenvalue for unit E and rho is Lambda radiates at the wavenumber k = speed_ratio *
+  /// sqrt(Lambda).
   double speed_ratio = 0;
   Air air;
   /// Modes with wavenumbers between these bounds are computed, 1/m, for the body at the size of its

@@ -26,8 +26,9 @@ constexpr int LaneCount() {
   return std::min(kBlockWidth, static_cast<int>(HWY_MAX_BYTES / sizeof(Real)));
 }
 
-/// Returns how many of kWidth columns a kernel processes at once. That is two vectors, because the
-/// registers hold several rows, too.
+/// Returns how many of kWidth columns a kernel processes at once. These are at most two vectors for
+/// each row, because a kernel keeps the sums of several rows in registers, and more vectors would
+/// not fit.
 template <typename Real, int kWidth = kBlockWidth>
 constexpr int Chunk() {
   return std::min(kWidth, 2 * LaneCount<Real>());

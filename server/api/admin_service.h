@@ -9,7 +9,8 @@
 
 namespace carillon {
 
-/// carillon.v1.AdminService. The constructor's references must outlive the service.
+/// carillon.v1.AdminService. The objects that the constructor gets by reference must outlive the
+/// service.
 class AdminService final : public v1::AdminService::CallbackService {
  public:
   /// The pool of `writing` runs the calls that change the database.

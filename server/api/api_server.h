@@ -26,8 +26,9 @@ struct ApiSettings {
   /// PEM files for all TCP addresses. If they are empty, there is no TLS, and only addresses of
   /// this machine are allowed.
   TlsPaths tls{};
-  /// Path of the callers over TCP and their roles (AccessTable). If it is empty, only addresses of
-  /// this machine are allowed, and everybody may do everything except administer.
+  /// Path of the access file, which has the callers over TCP and their roles (AccessTable). If it
+  /// is empty, only addresses of this machine are allowed, and everybody may do everything except
+  /// administer.
   std::string access_file{};
   /// SOFA file with the head for binaural scenes. If it is empty, HeadStore's file is used.
   std::string head_file{};

@@ -18,7 +18,8 @@
 
 namespace carillon {
 
-/// carillon.v1.AudioService. The constructor's references must outlive the service.
+/// carillon.v1.AudioService. The objects that the constructor gets by reference must outlive the
+/// service.
 class AudioService final : public v1::AudioService::CallbackService {
  public:
   /// Offline rendering runs on the threads of `reception`'s pool.

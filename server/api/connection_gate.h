@@ -24,12 +24,13 @@ namespace carillon {
 class ConnectionTaker {
  public:
   virtual ~ConnectionTaker() = default;
-  /// `source` is SourceOfPeer of the connection.
+  /// Takes the accepted socket `connection`. `source` is the process or address from which it came,
+  /// as SourceOfPeer names it.
   virtual void Take(int connection, const std::string& source) = 0;
 };
 
 /// Returns the process (Unix) or the address (TCP, AddressOfPeer) from which the connection with
-/// this name came. Processes that the system does not know are one.
+/// this name came. All processes that the system cannot name count as one process.
 std::string SourceOfPeer(const std::string& peer);
 
 /// Accepts connections in place of gRPC, whose own listener stops for ever when no descriptor is
@@ -42,18 +43,19 @@ class ConnectionGate {
   /// The time for which the gate closes new connections from the process or address of a refused
   /// connection.
   static constexpr std::chrono::seconds kRefusal{30};
-  /// The same for connections over loopback, which come from one address whatever process begins
-  /// them.
+  /// The shorter time for connections over loopback. All processes that connect over loopback have
+  /// the same address.
   static constexpr std::chrono::seconds kLoopbackRefusal{1};
 
   /// The last sixteenth of the places is for processes and addresses with fewer connections than
-  /// this, so that one that comes new finds a place. The last sixty-fourth is for Unix sockets,
-  /// because many addresses may have few connections each.
+  /// this number, so that a new process or address finds a place. The last sixty-fourth is for Unix
+  /// sockets, because many addresses may have few connections each.
   static constexpr size_t kFewConnections = 8;
 
   /// A process (Unix) or address (TCP) may have the share `client_share`, as ClientLimits has it,
   /// of `max_connection_count`. `log`, which may be null, takes a line about the first connection
-  /// that is closed for a limit, and again after kRefusal. It must outlive the gate.
+  /// that is closed for a limit, and a further line only after kRefusal has passed. `log` must
+  /// outlive the gate.
   explicit ConnectionGate(size_t max_connection_count, double client_share = 1,
                           LimitedLog* log = nullptr, SourceFunction& source_of = SourceOfPeer);
 
@@ -73,18 +75,19 @@ class ConnectionGate {
   /// stay open.
   void Close();
 
-  /// Returns whether the connection with this name (ServerContext::peer) is open. Any thread.
+  /// Returns whether the connection with this name (ServerContext::peer) is open. Any thread may
+  /// call it.
   bool IsOpen(const std::string& peer) const;
 
   /// Ends the connection with this name. Until kRefusal (or kLoopbackRefusal) has passed, other
   /// connections of the same process (Unix) or address (TCP) are closed at once. Returns false if
-  /// the connection is not open or is ending already. Any thread.
+  /// the connection is not open or is ending already. Any thread may call it.
   bool Refuse(const std::string& peer);
 
   /// Returns the time for which Refuse keeps out the process or address of this connection.
   std::chrono::seconds RefusalTimeOf(const std::string& peer) const;
 
-  /// Number of connections that are open. Any thread.
+  /// Number of connections that are open. Any thread may call it.
   size_t open_count() const;
 
  private:
@@ -115,8 +118,8 @@ class ConnectionGate {
   void Accept(const Door& door);
   /// Returns whether another connection may be open. If so, stores this connection by its peer.
   bool Admit(const std::string& peer, const Connection& connection);
-  /// Removes closed connections from the table, and returns true. Soon after the last time it
-  /// returns false.
+  /// Removes closed connections from the table, and returns true. If the last removal was very
+  /// recent, does nothing and returns false.
   bool ForgetClosed() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   /// Returns why a process or address gets no place, or an empty string if it gets one.
   std::string WhyNoPlace(const std::string& source) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);

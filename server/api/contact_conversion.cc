@@ -13,7 +13,7 @@
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 #include "server/api/column_conversion.h"
-#include "server/api/hertz_conversion.h"
+#include "server/api/hertz_contact_conversion.h"
 #include "server/api/pose_conversion.h"
 
 namespace carillon {
@@ -210,7 +210,7 @@ v1::ContactFindings ToProto(const IntakeFindings& findings) {
   return proto;
 }
 
-v1::Blow ToProto(const FoundBlow& blow) {
+v1::Blow ToProto(const BlowRecord& blow) {
   v1::Blow proto;
   proto.set_time_s(blow.time_s);
   proto.set_object(blow.handle);

@@ -10,11 +10,12 @@
 
 namespace carillon {
 
-/// Returns the conventions of a stream or of a trace.
+/// Returns how the contacts of a stream or of a trace are to be read: in which frame their points
+/// are, and which shape their pulses have.
 ContactReading ToContactReading(v1::Frame frame, v1::PulseShape pulse_shape);
 
 v1::ContactFindings ToProto(const IntakeFindings& findings);
-v1::Blow ToProto(const FoundBlow& blow);
+v1::Blow ToProto(const BlowRecord& blow);
 
 /// Returns the number of impulses, forces, contacts and poses in a step.
 size_t CountRows(const v1::ContactStep& step);

@@ -29,7 +29,8 @@ struct ContactClients {
   StepBudgets budgets{};
 };
 
-/// carillon.v1.ContactService. The constructor's references must outlive the service.
+/// carillon.v1.ContactService. The objects that the constructor gets by reference must outlive the
+/// service.
 class ContactService final : public v1::ContactService::CallbackService {
  public:
   explicit ContactService(const ContactContext& daemon) : daemon_(daemon) {}

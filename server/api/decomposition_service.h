@@ -7,7 +7,8 @@
 
 namespace carillon {
 
-/// carillon.v1.DecompositionService. The constructor's references must outlive the service.
+/// carillon.v1.DecompositionService. The objects that the constructor gets by reference must
+/// outlive the service.
 class DecompositionService final : public v1::DecompositionService::CallbackService {
  public:
   /// The pool of `writing` runs the calls that change the database.

@@ -47,8 +47,8 @@ inline constexpr char kLoopback[] = "loopback";
 
 /// Returns the address of a peer such as "ipv4:192.0.2.1:4711" without its port. For an IPv6
 /// address, returns the first 64 bits, because one machine may have all addresses with the same
-/// first 64 bits. For a loopback address returns kLoopback, because any process of this machine may
-/// use all of them.
+/// first 64 bits. For each loopback address, returns kLoopback, because any process of this machine
+/// may use all loopback addresses.
 std::string AddressOfPeer(absl::string_view peer);
 
 }  // namespace carillon

@@ -8,7 +8,8 @@
 
 namespace carillon {
 
-/// carillon.v1.JobRunService. The constructor's references must outlive the service.
+/// carillon.v1.JobRunService. The objects that the constructor gets by reference must outlive the
+/// service.
 class JobRunService final : public v1::JobRunService::CallbackService {
  public:
   /// Wrong tokens are logged through `access`.

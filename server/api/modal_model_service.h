@@ -20,7 +20,8 @@ struct ModelContext {
   const Clock& clock;
 };
 
-/// carillon.v1.ModalModelService. The constructor's references must outlive the service.
+/// carillon.v1.ModalModelService. The objects that the constructor gets by reference must outlive
+/// the service.
 class ModalModelService final : public v1::ModalModelService::CallbackService {
  public:
   explicit ModalModelService(const ModelContext& daemon)

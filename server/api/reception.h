@@ -37,7 +37,8 @@ auto Open(const grpc::CallbackServerContext& context, const Reception& reception
   return new RefusedCall<std::remove_pointer_t<decltype(make())>>(admitted);
 }
 
-/// The same for a call that holds a place of its client. `make(caller, place)` takes the place.
+/// Returns the reactor of a streaming call that holds a place of its client (ClientLimits).
+/// `make(caller, place)` makes the reactor and takes the place.
 template <typename Make>
 auto Open(const grpc::CallbackServerContext& context, const Reception& reception, Role role,
           Holding holding, Make make) -> decltype(make(Principal(), ClientPlace())) {

@@ -114,7 +114,7 @@ class RenderCall final : public BidiStream<v1::RenderRequest, v1::RenderResponse
   void FillBlows(v1::RenderedBlows& message) {
     constexpr size_t kBlowsPerMessage = 1000;
     message.clear_blows();
-    const std::vector<FoundBlow>& blows = renderer_->blows();
+    const std::vector<BlowRecord>& blows = renderer_->blows();
     const size_t end = std::min(told_blow_count_ + kBlowsPerMessage, blows.size());
     for (; told_blow_count_ < end; ++told_blow_count_) {
       *message.add_blows() = ToProto(blows[told_blow_count_]);

@@ -16,7 +16,8 @@
 
 namespace carillon {
 
-/// carillon.v1.SceneService. The constructor's references must outlive the service.
+/// carillon.v1.SceneService. The objects that the constructor gets by reference must outlive the
+/// service.
 class SceneService final : public v1::SceneService::CallbackService {
  public:
   SceneService(SceneRegistry& scenes, SceneOwners& owners, ModeDatabase& database, HeadStore& heads,

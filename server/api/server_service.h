@@ -29,8 +29,9 @@ struct ServerFacts {
   std::function<bool()> can_decompose;  ///< called on any thread
 };
 
-/// carillon.v1.ServerService. The constructor's references must outlive the service, whose uptime
-/// counts from its construction.
+/// carillon.v1.ServerService. The objects that the constructor gets by reference must outlive the
+/// service. The daemon's uptime, which the service reports, counts from the construction of the
+/// service.
 class ServerService final : public v1::ServerService::CallbackService {
  public:
   ServerService(ServerFacts facts, const DecompositionQueue& decompositions,

@@ -83,7 +83,9 @@ class StreamReader : public Reactor {
   void StartReading() { ReadNext(); }
 
  private:
-  /// No field on the wire can have this number.
+  /// Number of an unknown field that ReadNext adds to `request_`. If the field is still there, gRPC
+  /// has not parsed a message into `request_`. No message from a client has this field, because
+  /// protobuf allows no field with the number 0.
   static constexpr int kUnread = 0;
 
   void ReadNext() {

@@ -16,7 +16,7 @@
 namespace carillon {
 
 /// The transfers of a model that is being imported. They wait on the disk, so that an import that
-/// is never finished takes no memory. One thread at a time.
+/// is never finished takes no memory. Only one thread at a time may use an object.
 class TransferSpool {
  public:
   static constexpr size_t kMostTransfers = 64;

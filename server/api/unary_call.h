@@ -25,7 +25,8 @@ grpc::ServerUnaryReactor* Answer(grpc::CallbackServerContext* context, ThreadPoo
   return reactor;
 }
 
-/// The same for a call that needs a role. The work may also be `work(const Principal&)`.
+/// Answers a call that needs a role, in the same way. If the work needs the caller, it may be
+/// `work(const Principal&)`.
 template <typename Work>
 grpc::ServerUnaryReactor* Answer(grpc::CallbackServerContext* context, const Reception& reception,
                                  Role role, Work work) {

@@ -40,7 +40,7 @@ class BlockBroadcast {
     Listener(const Listener&) = delete;
     Listener& operator=(const Listener&) = delete;
 
-    /// Returns the next block, or null if no block waits. Any thread.
+    /// Returns the next block, or null if no block waits. Any thread may call it.
     std::shared_ptr<const RenderedBlock> TryTake();
 
     /// Returns whether the broadcast has ended. Blocks that were queued before may still wait.
@@ -67,12 +67,12 @@ class BlockBroadcast {
   /// The ring buffer and each queue hold `queue_block_count` blocks of `format`.
   BlockBroadcast(const DeviceFormat& format, size_t queue_block_count);
 
-  /// Copies a block into the ring buffer, or drops it if Deliver has not kept up. Called by the
-  /// render thread.
+  /// Copies a block into the ring buffer, or drops it if Deliver has not kept up. The render thread
+  /// calls it.
   void Publish(uint64_t first_frame, std::span<const float> block) noexcept;
 
   /// Hands the newly published blocks to the listeners, and calls `observe` with each block.
-  /// `observe` must not use the broadcast. Called by the housekeeping thread.
+  /// `observe` must not use the broadcast. The housekeeping thread calls it.
   void Deliver(absl::FunctionRef<void(const RenderedBlock&)> observe = [](const RenderedBlock&) {});
 
   /// Adds a listener, which gets all blocks from the next one on. Deliver calls `wake` after it has

@@ -40,15 +40,17 @@ class OutputClock {
   /// Count, which is real-time safe.
   void Count(double cycle_s, double output_s, size_t frame_count, bool underflow) noexcept;
 
-  /// Number of cycles in which the device reported an underflow. Any thread.
+  /// Number of cycles in which the device reported an underflow. Any thread may call it.
   uint64_t xrun_count() const { return xrun_count_.load(std::memory_order_relaxed); }
 
-  /// Frames of the longest cycle so far; 0 before the first cycle is complete. Any thread.
+  /// Frames of the longest cycle so far; 0 before the first cycle is complete. Any thread may call
+  /// it.
   size_t longest_cycle_frames() const {
     return longest_cycle_frames_.load(std::memory_order_relaxed);
   }
 
-  /// Number of lost frames. The loss of an xrun is included a second after the xrun. Any thread.
+  /// Number of lost frames. The loss of an xrun is included a second after the xrun. Any thread may
+  /// call it.
   uint64_t lost_frame_count() const { return lost_frame_count_.load(std::memory_order_relaxed); }
 
  private:

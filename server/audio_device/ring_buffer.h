@@ -25,13 +25,13 @@ class RingView {
 
   size_t capacity() const { return values_.size(); }
 
-  /// Returns the number of values that may be pushed. Called by the producer.
+  /// Returns the number of values that may be pushed. Only the producer may call it.
   size_t free_count() const {
     return capacity() - (counts_->written.load(std::memory_order_relaxed) -
                          counts_->read.load(std::memory_order_acquire));
   }
 
-  /// Appends `values`, at most free_count() of them. Called by the producer.
+  /// Appends `values`, at most free_count() of them. Only the producer may call it.
   void Push(std::span<const T> values) noexcept {
     const size_t written = counts_->written.load(std::memory_order_relaxed);
     const size_t begin = written % capacity();

@@ -13,16 +13,19 @@ class SpscQueue {
  public:
   explicit SpscQueue(size_t capacity) : queue_(capacity) {}
 
-  /// Called by the producer. Returns false, without taking `value`, if the queue is full.
+  /// Appends a value. Returns false, without taking `value`, if the queue is full. Only the
+  /// producer may call it.
   bool TryPush(const T& value) noexcept { return queue_.push(value); }
 
-  /// Called by the producer. Returns the number of values for which there is room.
+  /// Returns the number of values for which there is room. Only the producer may call it.
   size_t room() const noexcept { return queue_.write_available(); }
 
-  /// Called by the consumer. Returns false, and leaves `value` unchanged, if the queue is empty.
+  /// Takes the next value. Returns false, and leaves `value` unchanged, if the queue is empty. Only
+  /// the consumer may call it.
   bool TryPop(T& value) noexcept { return queue_.pop(value); }
 
-  /// Called by the consumer. Moves up to `most` values to `values`; returns their number.
+  /// Moves up to `most` values to `values`, and returns their number. Only the consumer may call
+  /// it.
   size_t PopSome(T* values, size_t most) noexcept { return queue_.pop(values, most); }
 
   /// Called by the consumer.

@@ -32,7 +32,8 @@ struct ActiveJob {
   v1::CreateModalModelRequest request;                   ///< the farthest reaching one so far
   std::optional<v1::CreateModalModelRequest> running{};  ///< the request that its run was given
   v1::Progress progress{};                               ///< of the run
-  /// The client that asked for it; empty: asked for before the daemon started.
+  /// The client that asked for the job. It is empty if the job was asked for before the daemon
+  /// started.
   std::string client{};
   std::string waits_for{};      ///< digest of the coarse model's job, until that has ended
   bool coarse_ready = false;    ///< a coarse model is stored under the job's digest
@@ -46,35 +47,35 @@ struct ActiveJob {
   int64_t started_unix_ms = 0;         ///< at the start of the run
 };
 
-/// The jobs that wait or run, and everybody who watches a job: all in memory. No call waits for a
-/// disk, so readers and progress reports are served while the database is busy. Safe from every
-/// thread; one thread at a time adds, removes and changes jobs. A call that returns a Notice has
-/// not called the watchers: the caller sends the notice after it has released its locks.
+/// Has all jobs that wait or run, and all watchers of jobs, in memory. No call waits for a disk, so
+/// readers and progress reports are served while the database is busy. Safe from every thread; one
+/// thread at a time adds, removes and changes jobs. A call that returns a Notice has not called the
+/// watchers: the caller sends the notice after it has released its locks.
 class ActiveJobs {
  public:
-  /// To be called before BeginRun.
+  /// Sets the limits of running jobs. The caller must call it before BeginRun.
   void SetCapacity(const JobCapacity& capacity);
 
   std::optional<ActiveJob> Find(const std::string& digest);
   bool Contains(const std::string& digest);
   size_t queued_count();
-  /// Queued jobs of one client.
+  /// Returns the number of queued jobs of one client.
   size_t queued_count(const std::string& client);
-  /// Numbers of jobs that wait and that run.
+  /// The numbers of jobs that wait and that run.
   struct Counts {
     size_t queued = 0;
     size_t running = 0;
   };
   Counts CountStates();
   std::vector<ActiveJob> Running();
-  /// Digests of the jobs that compute transfers of the model.
+  /// Returns the digests of the jobs that compute transfers of the model.
   std::vector<std::string> TransfersOf(const std::string& model);
-  /// Digests of the jobs that wait for the coarse model's job `coarse`.
+  /// Returns the digests of the jobs that wait for the coarse model's job `coarse`.
   std::vector<std::string> WaitingFor(const std::string& coarse);
 
-  /// A job as clients see it; absent if it neither waits nor runs.
+  /// Returns a job as clients see it, or nothing if it neither waits nor runs.
   std::optional<v1::Job> View(const std::string& digest);
-  /// All jobs as clients see them at one moment, by digest.
+  /// Returns all jobs as clients see them at one moment, by digest.
   std::map<std::string, v1::Job> ViewAll();
 
   /// Appends a job to its client's queue, behind those of its priority. Its memory is predicted
@@ -111,17 +112,18 @@ class ActiveJobs {
   /// Queues a job again whose run has ended, behind those of its priority.
   Notice QueueAgain(ActiveJob job);
 
-  /// Registers a watcher of a digest, whether its job is active or not. If it is not, the notice
-  /// has a job without a name: complete it by CompleteWatch.
+  /// Registers a watcher of a digest, whether its job is active or not. If the job is not active,
+  /// the notice has a job without a name, and the caller must complete the notice by CompleteWatch.
   Notice Watch(const std::string& digest, const std::shared_ptr<Watcher>& watcher);
-  /// The first notice of a watch whose job was not active: `stored` is what the database said
-  /// afterwards. An ended job has no further news, so its watcher is forgotten.
+  /// Returns the first notice of a watch whose job was not active. `stored` is the job as the
+  /// database has it after the call of Watch. An ended job has no further news, so its watcher is
+  /// forgotten.
   Notice CompleteWatch(const std::string& digest, Notice watch, const v1::Job& stored);
   void Forget(const std::string& digest, const std::shared_ptr<Watcher>& watcher);
 
   /// Hands all jobs to `sink`, then every change until Forget.
   void WatchAll(JobSink& sink);
-  /// No call of `sink` runs when this returns, and none follows.
+  /// Ends WatchAll for `sink`. When Forget returns, no call of `sink` runs, and none follows.
   void Forget(JobSink& sink);
   /// Tells the sinks of a job that is new and has ended already.
   void TellEnded(const v1::Job& job);

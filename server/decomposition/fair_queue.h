@@ -16,7 +16,8 @@ namespace carillon {
 
 /// The order in which waiting jobs start. Clients take turns: the next job is the first of the
 /// client whose newest start is the longest ago, whatever the priorities of the others' jobs. A
-/// client's own jobs start by priority, highest first, then by number. Not thread-safe.
+/// client's own jobs start by priority, highest first, then by number. Only one thread at a time
+/// may use an object.
 class FairQueue {
  public:
   struct Entry {

@@ -23,7 +23,7 @@ struct JobCapacity {
 ///
 /// If transfers yield, a decomposition needs one of the workers that no other decomposition
 /// occupies. A transfer needs a worker that no job occupies, but one transfer runs even without it.
-/// If transfers do not yield, all jobs are equal here. One thread at a time.
+/// If transfers do not yield, all jobs are equal here. Only one thread at a time may use an object.
 class JobPlaces {
  public:
   void SetCapacity(const JobCapacity& capacity) { capacity_ = capacity; }

@@ -59,7 +59,7 @@ struct PreparedTask {
 };
 
 /// One running decomposition: its process, its events and the verdict on it. The destructor kills
-/// the process and removes the folder. One thread at a time.
+/// the process and removes the folder. Only one thread at a time may use an object.
 class LocalWorker {
  public:
   /// Starts the program. Errors: those of ChildProcess::Start.

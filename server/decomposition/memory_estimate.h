@@ -16,7 +16,8 @@ double GuessNodeCount(const v1::CreateModalModelRequest& resolved, uint64_t mesh
 /// 3000 to 75000 nodes, with errors below 25 %.
 uint64_t MemoryOfNodes(double node_count);
 
-/// Corrects memory estimates by the memory that earlier decompositions took. One thread at a time.
+/// Corrects memory estimates by the memory that earlier decompositions took. Only one thread at a
+/// time may use an object.
 class MemoryExperience {
  public:
   /// `correction` is the result of an earlier run of the daemon.

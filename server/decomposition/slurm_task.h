@@ -25,7 +25,7 @@ namespace carillon {
 ///     log.R      its standard error       model.R    its result
 ///     end        "R STATUS": the first run to end; the others' links fail
 ///
-/// One thread at a time.
+/// Only one thread at a time may use an object.
 class SlurmTask {
  public:
   /// Makes the folder, or takes over a folder with the same request that an earlier daemon left.
@@ -36,9 +36,9 @@ class SlurmTask {
   const DecompositionTask& task() const { return task_; }
   const SlurmJob& job() const { return job_; }
 
-  /// Returns the job to submit, with a new ticket. If its run is to upload, the job has a new
-  /// token, too, and the tokens of earlier submissions become invalid. Errors: FailedPrecondition
-  /// (DATABASE_UNUSABLE).
+  /// Returns the job to submit, with a new ticket. If the run of the job will upload its result,
+  /// the job also has a new token, and the tokens of earlier submissions become invalid. Errors:
+  /// FailedPrecondition (DATABASE_UNUSABLE).
   absl::StatusOr<SlurmJob> NextSubmission();
 
   /// Calls on_progress with the progress that runs have reported since the last call.
@@ -54,8 +54,8 @@ class SlurmTask {
   /// Refuses further uploads of the task's runs, and removes the folder.
   void Remove() const;
 
-  /// Admits the runs of jobs that an earlier daemon left in `directory`. Called before any task is
-  /// prepared.
+  /// Admits the runs of jobs that an earlier daemon left in `directory`. The caller must call it
+  /// before any task is prepared.
   static void AdmitLeft(const std::filesystem::path& directory, RemoteRuns& runs);
 
  private:

@@ -44,9 +44,10 @@ class SurfaceLocator {
   /// index. INVALID_ARGUMENT (POINT_NOT_FINITE, POINT_TOO_FAR).
   absl::StatusOr<LocatedPoint> Nearest(const Point& point) const;
 
-  /// Returns the point of the sounding surface at a point of a given triangle. Triangles that lie
-  /// on that given triangle are preferred. Errors: INVALID_ARGUMENT (TRIANGLE_OUT_OF_RANGE,
-  /// INVALID_WEIGHTS).
+  /// Returns the point of the sounding surface that is nearest to `at`, a point on a triangle of
+  /// the surface as given. Only the triangles of the sounding surface that lie on that given
+  /// triangle are searched. If there are none, because a repair has removed the given triangle, all
+  /// are. Errors: INVALID_ARGUMENT (TRIANGLE_OUT_OF_RANGE, INVALID_WEIGHTS).
   absl::StatusOr<LocatedPoint> OnGivenTriangle(const SurfacePoint& at) const;
 
  private:

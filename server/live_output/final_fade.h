@@ -15,10 +15,10 @@ class FinalFade {
  public:
   explicit FinalFade(const DeviceFormat& format);
 
-  /// Begins the fade. Any thread.
+  /// Begins the fade. Any thread may call it.
   void Begin() noexcept { begun_.store(true, std::memory_order_relaxed); }
 
-  /// Returns whether a silent block has been rendered. Any thread.
+  /// Returns whether a silent block has been rendered. Any thread may call it.
   bool ended() const noexcept { return ended_.load(std::memory_order_relaxed); }
 
   /// Applies the fade to a block. The render thread calls it with each block. Real-time safe.

@@ -29,21 +29,22 @@ class Database {
   /// space, runs `body` again from its beginning.
   absl::Status Write(absl::FunctionRef<absl::Status(SqliteConnection&)> body);
 
-  /// Runs `body`, which frees space, as Write does. If the disk is full, makes room for the change
-  /// and runs `body` again.
+  /// Runs `body` in one transaction, as Write does. `body` must be a change that frees space. If
+  /// the disk is full, makes room for the change and runs `body` again.
   absl::Status WriteToFree(absl::FunctionRef<absl::Status(SqliteConnection&)> body);
 
-  /// Checks that the files are in place. Errors: FailedPrecondition (DATABASE_LOST), after which
-  /// every Write fails with this error, too.
+  /// Checks that the files are in place. Errors: FailedPrecondition (DATABASE_LOST). After this
+  /// error every Write fails with DATABASE_LOST.
   absl::Status CheckFiles() { return files_.Check(); }
 
   /// Gives some free pages back to the disk if at least a quarter of the file is free, and renews
   /// the reserve for a full disk. A file that an older program made shrinks only after `db repair`.
   absl::Status Tidy();
 
-  /// Does at once, for a disk that is full, what Tidy does little by little: gives free pages, at
-  /// most 64 MiB, and the space of the log back if at least a quarter of the file is free. Takes
-  /// the reserve if the log cannot be emptied without it. Returns whether the files shrank.
+  /// Gives free pages, at most 64 MiB, and the space of the log back to the disk at once if at
+  /// least a quarter of the file is free. It is for a disk that is full; Tidy gives free pages back
+  /// little by little. Takes the reserve if the log cannot be emptied without it. Returns whether
+  /// the files shrank.
   bool MakeSpace();
 
   /// Makes a temporary file in the folder of the database. The file calls MakeSpace when the disk
@@ -51,8 +52,8 @@ class Database {
   absl::StatusOr<SpoolFile> MakeSpool();
 
   /// Returns a text with the number of changes that were acknowledged once but are missing from the
-  /// opened file, because its write-ahead log was removed or the file is an older copy. Empty if no
-  /// change is missing.
+  /// opened file, because its write-ahead log was removed or the file is an older copy. Returns an
+  /// empty text if no change is missing.
   std::string MissingChanges() const;
 
   /// Runs `body` on one snapshot of the database.

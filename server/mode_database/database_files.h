@@ -21,7 +21,8 @@ class DatabaseFiles {
   explicit DatabaseFiles(const std::filesystem::path& file) : file_(file) {}
 
   /// Remembers the present sizes as correct. Errors: FailedPrecondition (DATABASE_LOST: a file was
-  /// removed or replaced). All later calls return this error, too.
+  /// removed or replaced). Once a function of this object has returned DATABASE_LOST, all later
+  /// calls of Remember, Check and Change return it.
   absl::Status Remember();
 
   /// Checks both files. Errors: FailedPrecondition (DATABASE_LOST: a file was removed or replaced,

@@ -52,7 +52,7 @@ class JobStore {
  public:
   explicit JobStore(Database& database) : database_(&database) {}
 
-  /// Writes a job durably; replaces a job with the same digest.
+  /// Writes a job durably, and replaces a job with the same digest.
   absl::Status Put(const JobRecord& job);
 
   absl::StatusOr<std::optional<JobRecord>> Find(const std::string& digest);
@@ -68,8 +68,8 @@ class JobStore {
   /// Deletes a job. It is not an error if the job does not exist.
   absl::Status Delete(const std::string& digest);
 
-  /// Returns a named value that the daemon learnt from jobs, or nothing before the value is first
-  /// stored.
+  /// Returns the value that PutFact stored under `name`, or nothing if there is none. The daemon
+  /// stores values here that it measures on finished jobs.
   absl::StatusOr<std::optional<std::string>> Fact(const std::string& name);
   absl::Status PutFact(const std::string& name, const std::string& value);
 

@@ -61,9 +61,9 @@ class MeshStore {
   /// The time for which a mesh that no model and no job refers to is kept after its last upload. A
   /// request for its model may follow.
   static constexpr std::chrono::hours kUnusedLife{24};
-  /// The same where the disk is full.
+  /// The shorter time for which such a mesh is kept when the disk is full.
   static constexpr std::chrono::minutes kUnusedLifeOnFullDisk{10};
-  /// The same where somebody asks for the space.
+  /// The still shorter time for which such a mesh is kept when somebody asks for the space.
   static constexpr std::chrono::minutes kUnusedLifeOnRequest{1};
 
   MeshStore(Database& database, const Clock& clock) : database_(&database), clock_(&clock) {}

@@ -18,7 +18,8 @@ namespace carillon {
 
 /// Reads and writes the stored form of a modal model (proto/carillon/v1/modal_model.proto).
 
-/// Reads the records of a file in protobuf's delimited form, one by one. One thread at a time.
+/// Reads the records of a file in protobuf's delimited form, one by one. Only one thread at a time
+/// may use an object.
 class ModelFileReader {
  public:
   /// Opens a file. Errors: NotFound (FILE_NOT_FOUND).

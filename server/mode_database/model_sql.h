@@ -27,8 +27,8 @@ absl::Status ModelCorrupt(const std::string& digest, absl::string_view what);
 absl::StatusOr<ModelSummary> SelectModel(SqliteConnection& connection, const std::string& digest);
 
 /// Calls `on_model` for at most `limit` models below revision `below`, newest first, and
-/// `on_damaged` with the digest of each row that is damaged. Returns whether it ended before
-/// because the headers have kMaxHeaderBytes.
+/// `on_damaged` with the digest of each row that is damaged. Returns whether the call ended before
+/// `limit` because the headers have reached kMaxHeaderBytes.
 absl::StatusOr<bool> SelectModels(SqliteConnection& connection, const ModelFilter& filter,
                                   int64_t below, int64_t limit,
                                   absl::FunctionRef<void(ModelSummary)> on_model,
@@ -47,7 +47,7 @@ absl::Status SelectChunks(SqliteConnection& connection, int64_t revision, int64_
                           int64_t limit,
                           absl::FunctionRef<absl::Status(const ChunkView&)> on_chunk);
 
-/// The whole model, every hash checked.
+/// Returns the whole model after checking every hash.
 absl::StatusOr<ModalModel> ReadModel(SqliteConnection& connection, const ModelSummary& summary);
 
 /// Reads and checks every record and inserts the model as a new revision, which keeps the label and
@@ -64,7 +64,7 @@ absl::Status InsertCopy(SqliteConnection& connection, const std::string& digest,
 absl::Status UpdateModel(SqliteConnection& connection, const std::string& digest,
                          const ModelChange& change);
 
-/// Writes when the model sounded last.
+/// Writes the time at which the model sounded last.
 absl::Status StoreSounded(SqliteConnection& connection, const std::string& digest, int64_t unix_ms);
 
 /// Puts the model into quarantine. Returns false if it was there already.
@@ -78,8 +78,8 @@ struct ModelSize {
   bool pinned = false;
 };
 
-/// Calls `on_model` for all models; those that sounded (or, if they never sounded, were stored)
-/// longest ago come first.
+/// Calls `on_model` for all models. The models that sounded (or, if they never sounded, were
+/// stored) longest ago come first.
 absl::Status SelectSizes(SqliteConnection& connection,
                          absl::FunctionRef<void(const ModelSize&)> on_model);
 

@@ -28,11 +28,11 @@ class Database;
 class ModelFileReader;
 class SqliteConnection;
 
-/// A label is cut to this length.
+/// Greatest length of a label. A longer label is cut.
 inline constexpr size_t kMaxLabelBytes = 200;
 
-/// Greatest number of tags of a model. A model that an older version gave more tags is returned
-/// with the first of them.
+/// Greatest number of tags of a model. A model to which an older version of Carillon gave more tags
+/// is returned with the first kMaxTagCount of them.
 inline constexpr size_t kMaxTagCount = 100;
 
 /// Greatest size of the header of an imported model. A page of a list ends when its headers have
@@ -53,13 +53,13 @@ struct ModelSummary {
   bool pinned = false;   ///< garbage collection leaves it alone
   int64_t sounded_unix_ms = 0;
   std::vector<std::string> tags{};  ///< ascending
-  /// The material that it was last asked for with; absent: it was imported.
+  /// The material of the newest request for the model. It is absent if the model was imported.
   std::optional<v1::Material> material{};
 };
 
-/// Which models to list: those that match all of it.
+/// Selects the models of a list: those that match all of the fields.
 struct ModelFilter {
-  std::string label_contains{};  ///< in any case
+  std::string label_contains{};  ///< in upper or lower case
   std::string tag{};
   int64_t min_stored_bytes = 0;
   int64_t max_stored_bytes = std::numeric_limits<int64_t>::max();
@@ -67,7 +67,7 @@ struct ModelFilter {
   int64_t created_before_unix_ms = std::numeric_limits<int64_t>::max();
 };
 
-/// What to change of a model; what is absent stays.
+/// A change of a model. Absent properties stay as they are.
 struct ModelChange {
   std::optional<std::string> label{};
   std::vector<std::string> add_tags{};
@@ -76,45 +76,46 @@ struct ModelChange {
   std::optional<v1::Material> material{};
 };
 
-/// What garbage collection has done.
+/// The models that a garbage collection deleted.
 struct Collected {
   uint64_t model_count = 0;
   uint64_t bytes = 0;
 };
 
-/// How garbage is collected.
+/// Settings of a garbage collection.
 struct CollectSettings {
-  /// Digest of a model that was just stored: it stays until something newer needs the room.
+  /// Digest of a model that was just stored. It is kept until a newer model needs the space.
   std::string spared{};
   bool dry_run = false;  ///< only counts what would be deleted
 };
 
-/// Room for stored models.
+/// The largest size of all stored models together.
 struct ModelBudget {
-  uint64_t bytes = 0;  ///< of all their arrays; 0: no limit
-  /// Takes log lines about collections. Called on any thread.
+  uint64_t bytes = 0;  ///< of the arrays of all models; 0 means no limit
+  /// Takes log lines about garbage collections. Any thread may call it.
   std::function<void(const std::string& line)> log = [](const std::string&) {};
 };
 
 struct ModelPage {
   std::vector<ModelSummary> models;
-  std::string next_page_token;  ///< empty: this was the last page
+  std::string next_page_token;  ///< empty after the last page
 };
 
 class ModelStore;
 
-/// A model that arrives record by record; each is checked as it comes. One thread at a time.
+/// A model that arrives record by record. Each record is checked when it comes. Only one thread at
+/// a time may use an object.
 class ModelImport {
  public:
   ModelImport(ModelImport&&) noexcept;
   ModelImport& operator=(ModelImport&&) noexcept;
   ~ModelImport();
 
-  /// Errors: InvalidArgument (MODAL_MODEL_MALFORMED), DataLoss (MODAL_MODEL_CORRUPT: a hash is
-  /// wrong), ResourceExhausted (MODAL_MODEL_TOO_LARGE).
+  /// Takes the next record. Errors: InvalidArgument (MODAL_MODEL_MALFORMED), DataLoss
+  /// (MODAL_MODEL_CORRUPT: a hash is wrong), ResourceExhausted (MODAL_MODEL_TOO_LARGE).
   absl::Status Append(const v1::ModalModelRecord& record);
 
-  /// Stores the model, durably; replaces one of the same digest. Call once, last.
+  /// Stores the model durably, and replaces a model of the same digest. Must be the last call.
   /// Errors: InvalidArgument (MODAL_MODEL_MALFORMED: records are missing).
   absl::StatusOr<ModelSummary> Finish();
 
@@ -127,11 +128,13 @@ class ModelImport {
 };
 
 /// Reads a stored model record by record, byte for byte. No transaction stays open between two
-/// records, so an export ends with an error if the model is replaced. One thread at a time.
+/// records, so an export ends with an error if the model is replaced. Only one thread at a time may
+/// use an object.
 class ModelExport {
  public:
-  /// The next record; nullopt after the last. Errors: DataLoss (MODAL_MODEL_CORRUPT, and the model
-  /// goes into quarantine), Aborted (MODAL_MODEL_REPLACED: replaced or deleted meanwhile).
+  /// Returns the next record, or nullopt after the last one. Errors: DataLoss (MODAL_MODEL_CORRUPT,
+  /// and the model goes into quarantine), Aborted (MODAL_MODEL_REPLACED: replaced or deleted
+  /// meanwhile).
   absl::StatusOr<std::optional<v1::ModalModelRecord>> Next();
 
  private:
@@ -147,79 +150,88 @@ class ModelExport {
   int64_t chunk_count_ = 0;
 };
 
-/// Modal models by digest. Safe from every thread.
+/// Stores modal models by digest. Safe from every thread.
 ///
-/// A model found damaged goes into quarantine: its rows stay unchanged for an analysis of the
-/// damage, but every call answers MODAL_MODEL_CORRUPT until the model is stored again.
+/// A model that turns out to be damaged goes into quarantine. Its rows stay unchanged for an
+/// analysis of the damage, but every call for the model returns MODAL_MODEL_CORRUPT until the model
+/// is stored again.
 class ModelStore {
  public:
-  /// Called once for each model that goes into quarantine, with no lock of the store held.
+  /// Called once for each model that goes into quarantine. The store holds no lock during the call.
   using OnQuarantine = std::function<void(const std::string& digest, const absl::Status& why)>;
 
   ModelStore(Database& database, const Clock& clock) : database_(&database), clock_(&clock) {}
 
-  /// From now on a collection follows each model that is stored. Call before any other call.
+  /// Lets a garbage collection follow each model that is stored from now on. Must be the first
+  /// call.
   void KeepWithin(ModelBudget budget) { budget_ = std::move(budget); }
 
-  /// Replaces the listener. The old one is not running when this returns and is never called again.
+  /// Replaces the listener. When the call returns, the old listener is not running, and it is never
+  /// called again.
   void ListenToQuarantine(OnQuarantine on_quarantine);
 
-  /// Stores the model of a file in the stored form, in one transaction, durable on return. Replaces
-  /// an older revision of the same digest and keeps its label. The model is checked first: every
-  /// hash, complete arrays of consistent shape, indices in range, finite numbers.
-  /// Errors: InvalidArgument (MODAL_MODEL_MALFORMED), DataLoss (MODAL_MODEL_CORRUPT).
+  /// Stores the model of a file in the stored form, in one transaction. The model is durable when
+  /// the call returns. It replaces an older revision of the same digest, whose label is kept. First
+  /// the model is checked: every hash, the completeness and the shapes of the arrays, the range of
+  /// indices, and that numbers are finite. Errors: InvalidArgument (MODAL_MODEL_MALFORMED),
+  /// DataLoss (MODAL_MODEL_CORRUPT).
   absl::StatusOr<ModelSummary> PutFile(const std::string& digest, const std::string& label,
                                        const std::filesystem::path& file);
 
-  /// Stores a copy of the model `from` under `to`, with unchanged hashes, unless a model of that
-  /// digest is stored, damaged or not; one transaction, durable on return. Errors: NotFound
-  /// (MODAL_MODEL_NOT_FOUND), DataLoss (MODAL_MODEL_CORRUPT).
+  /// Stores a copy of the model `from` under the digest `to`, with unchanged hashes, in one
+  /// transaction. The copy is durable when the call returns. Does nothing if a model of the digest
+  /// `to` is stored, damaged or not. Errors: NotFound (MODAL_MODEL_NOT_FOUND), DataLoss
+  /// (MODAL_MODEL_CORRUPT).
   absl::Status CopyIfAbsent(const std::string& from, const std::string& to,
                             const std::string& label);
 
-  /// If `digest` is empty, the model is named by the SHA-256 of its file.
+  /// Begins an import. If `digest` is empty, the model is named by the SHA-256 of its file.
   /// Errors: InvalidArgument (INVALID_NAME: not a digest).
   absl::StatusOr<ModelImport> Import(const std::string& digest, const std::string& label);
 
-  /// Errors: NotFound (MODAL_MODEL_NOT_FOUND).
+  /// Begins an export. Errors: NotFound (MODAL_MODEL_NOT_FOUND).
   absl::StatusOr<ModelExport> Export(const std::string& digest);
 
-  /// The whole model. All objects share one copy in memory.
-  /// Errors: NotFound (MODAL_MODEL_NOT_FOUND), DataLoss (MODAL_MODEL_CORRUPT: a hash is wrong, and
-  /// the model goes into quarantine).
+  /// Returns the whole model. All objects share one copy in memory. Errors: NotFound
+  /// (MODAL_MODEL_NOT_FOUND), DataLoss (MODAL_MODEL_CORRUPT: a hash is wrong, and the model goes
+  /// into quarantine).
   absl::StatusOr<std::shared_ptr<const ModalModel>> Find(const std::string& digest);
 
-  /// As Find; collections also count the model as having sounded now.
+  /// Does the same as Find. In addition, garbage collections count the model as having sounded now.
   absl::StatusOr<std::shared_ptr<const ModalModel>> FindToSound(const std::string& digest);
 
-  /// Errors: NotFound (MODAL_MODEL_NOT_FOUND), DataLoss (MODAL_MODEL_CORRUPT).
+  /// Returns a model without its arrays. Errors: NotFound (MODAL_MODEL_NOT_FOUND), DataLoss
+  /// (MODAL_MODEL_CORRUPT).
   absl::StatusOr<ModelSummary> Summary(const std::string& digest);
 
-  /// Eigenvalues for a Young's modulus of 1 Pa and 1 kg/m^3, ascending. Errors: those of Find.
+  /// Returns the eigenvalues for a Young's modulus of 1 Pa and a density of 1 kg/m^3, ascending.
+  /// Errors: those of Find.
   absl::StatusOr<std::vector<double>> Eigenvalues(const std::string& digest);
 
-  /// Newest first. `page_size` 0: 100; at most 1000. A page also ends when its headers have
-  /// kMaxHeaderBytes. Errors: InvalidArgument (INVALID_PAGE).
+  /// Returns the models, newest first, at most 1000 a page. A `page_size` of 0 means 100. A page
+  /// also ends when its headers together have kMaxHeaderBytes. Errors: InvalidArgument
+  /// (INVALID_PAGE).
   absl::StatusOr<ModelPage> List(const ModelFilter& filter, int page_size,
                                  const std::string& page_token);
 
-  /// Keeps the material for the model of this digest, stored already or to be stored; it replaces
-  /// an older one. Durable on return.
+  /// Keeps the material for the model of this digest, which need not be stored yet. The material
+  /// replaces an older one. It is durable on return.
   absl::Status RememberMaterial(const std::string& digest, const v1::Material& material);
 
-  /// The remembered material; absent: there is none.
+  /// Returns the material that RememberMaterial stored, or nothing if there is none.
   absl::StatusOr<std::optional<v1::Material>> Material(const std::string& digest);
 
-  /// Errors: NotFound (MODAL_MODEL_NOT_FOUND), InvalidArgument (INVALID_TAG), DataLoss
-  /// (MODAL_MODEL_CORRUPT), ResourceExhausted (TOO_MANY_TAGS).
+  /// Changes a model, and returns it without its arrays. Errors: NotFound (MODAL_MODEL_NOT_FOUND),
+  /// InvalidArgument (INVALID_TAG), DataLoss (MODAL_MODEL_CORRUPT), ResourceExhausted
+  /// (TOO_MANY_TAGS).
   absl::StatusOr<ModelSummary> Update(const std::string& digest, const ModelChange& change);
 
   /// Deletes a model, its tags, its material and its job. Errors: NotFound (MODAL_MODEL_NOT_FOUND).
   absl::Status Delete(const std::string& digest);
 
-  /// Deletes models with their jobs, least recently sounded (or, never sounded, stored) first,
-  /// until the arrays of those left fit into `budget_bytes`. Pinned ones and those in memory stay,
-  /// and the spared one.
+  /// Deletes models with their jobs until the arrays of the remaining models fit into
+  /// `budget_bytes`. The model that sounded longest ago (or, if it never sounded, was stored
+  /// longest ago) is deleted first. Pinned models, models in memory and the spared model are kept.
   absl::StatusOr<Collected> Collect(uint64_t budget_bytes, const CollectSettings& settings = {});
 
  private:

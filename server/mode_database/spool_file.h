@@ -14,7 +14,8 @@
 namespace carillon {
 
 /// A nameless temporary file for data that arrives slowly and is then stored in one transaction.
-/// The system deletes the file when the object or the process ends. One thread at a time.
+/// The system deletes the file when the object or the process ends. Only one thread at a time may
+/// use an object.
 class SpoolFile {
  public:
   /// Frees space on the disk. Returns whether it freed any.

@@ -54,7 +54,8 @@ class TransferStore {
 
   TransferStore(Database& database, const Clock& clock) : database_(&database), clock_(&clock) {}
 
-  /// Replaces the listener. The old one is not running when this returns and is never called again.
+  /// Replaces the listener. When the call returns, the old listener is not running, and it is never
+  /// called again.
   void Listen(OnStored on_stored);
 
   /// Stores a transfer of the model durably; replaces a transfer with the same step of the speed

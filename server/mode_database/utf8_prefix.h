@@ -7,9 +7,9 @@
 
 namespace carillon {
 
-/// Returns the first characters of UTF-8 text that fit into `max_bytes`. A character that does not
-/// fit as a whole is left out, because protobuf refuses every message with half a character, such
-/// as a list of models.
+/// Returns the first characters of UTF-8 text that fit into `max_bytes`. A character of which only
+/// a part would fit is left out. Protobuf refuses a whole message, for example a list of models, if
+/// one of its texts ends in the middle of a character.
 std::string Utf8Prefix(std::string_view text, size_t max_bytes);
 
 }  // namespace carillon

@@ -31,7 +31,7 @@ ContactIntake::ContactIntake(Scene& scene, EventTarget& target, const IntakeSett
       mapper_(settings.sample_rate_hz,
               settings.mapping.value_or(TimeMapping{.delay_s = settings.delay_s})),
       time_s_(mapper_.mapping().first_time_s),
-      forces_(settings.step_s),
+      gatherer_(settings.step_s),
       pose_times_(settings.step_s) {}
 
 absl::Status ContactIntake::BeginStep(double time_s) {
@@ -49,7 +49,7 @@ absl::Status ContactIntake::BeginStep(double time_s) {
   } else if (!settings_.mapping) {
     mapper_.Note(time_s, target_.frame());
   }
-  Push(forces_.Begin(time_s));
+  Push(gatherer_.Begin(time_s));
   time_s_ = time_s;
   ++step_count_;
   return absl::OkStatus();
@@ -69,7 +69,7 @@ absl::Status ContactIntake::TryStrike(const ObjectImpulse& impulse) {
   NoteZero(impulse.contact);
   impulse_count_ += felt.count;
   for (size_t i = 0; i < felt.count; ++i) {
-    FoundBlow blow;
+    BlowRecord blow;
     blow.handle = felt.by[i].handle;
     blow.by_sounds = felt.count == felt.by.size();
     if (blow.by_sounds) blow.by = felt.by[1 - i].handle;
@@ -91,7 +91,7 @@ absl::Status ContactIntake::TryHold(const ObjectForce& force) {
   RETURN_IF_ERROR(CheckAhead(FrameOf(time_s_)));
   FeltContact felt;
   RETURN_IF_ERROR(Locate(force.contact, settings_.step_s, felt));
-  forces_.Add(felt, force.roughness);
+  gatherer_.Add(felt, force.roughness);
   return absl::OkStatus();
 }
 
@@ -110,7 +110,7 @@ absl::Status ContactIntake::TryTouch(const ObjectTouch& touch) {
   contact.found_by_engine = true;
   RETURN_IF_ERROR(Locate(contact, 1, felt));
   NoteZero(contact);
-  forces_.Touch(touch, felt);
+  gatherer_.Touch(touch, felt);
   return absl::OkStatus();
 }
 
@@ -146,9 +146,9 @@ absl::Status ContactIntake::TryMoveListener(const Pose& pose) {
   return absl::OkStatus();
 }
 
-void ContactIntake::EndStep() { Push(forces_.End()); }
+void ContactIntake::EndStep() { Push(gatherer_.End()); }
 
-void ContactIntake::Finish() { Push(forces_.Finish()); }
+void ContactIntake::Finish() { Push(gatherer_.Finish()); }
 
 void ContactIntake::Reject(uint64_t count, absl::Status reason) {
   rejected_count_ += count;
@@ -208,11 +208,11 @@ void ContactIntake::NoteZero(const ObjectContact& contact) {
 
 IntakeFindings ContactIntake::findings() const {
   IntakeFindings findings = findings_;
-  findings.engine = forces_.counts();
+  findings.engine = gatherer_.counts();
   return findings;
 }
 
-void ContactIntake::Push(const ContactForces::Events& events) {
+void ContactIntake::Push(const BlowGatherer::Events& events) {
   for (const ForceEvent& force : events) {
     const MutexLock lock(&scene_.mutex());
     const absl::StatusOr<const SoundingObject*> object = scene_.Find(force.handle);
@@ -222,7 +222,7 @@ void ContactIntake::Push(const ContactForces::Events& events) {
     if (!CheckAhead(frame).ok()) continue;  // the end of a force, in a step that was rejected
     if (event.impulse() != nullptr) {
       ++impulse_count_;
-      FoundBlow blow;
+      BlowRecord blow;
       blow.handle = force.handle;
       blow.by = force.by;
       blow.by_sounds = force.by_sounds;
@@ -232,7 +232,7 @@ void ContactIntake::Push(const ContactForces::Events& events) {
   }
 }
 
-void ContactIntake::AddBlow(const MixerEvent& event, FoundBlow blow, double frame) {
+void ContactIntake::AddBlow(const MixerEvent& event, BlowRecord blow, double frame) {
   if (settings_.blows == nullptr) return;
   const absl::StatusOr<const SoundingObject*> object = scene_.Find(blow.handle);
   if (!object.ok()) return;

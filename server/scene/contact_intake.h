@@ -9,13 +9,13 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "server/scene/contact_forces.h"
-#include "server/scene/found_blow.h"
+#include "server/scene/blow_gatherer.h"
+#include "server/scene/blow_record.h"
+#include "server/scene/due_frame.h"
 #include "server/scene/object_contact.h"
 #include "server/scene/rejection_counts.h"
 #include "server/scene/scene.h"
 #include "server/scene/scene_space.h"
-#include "server/scene/time_mapping.h"
 #include "server/synthesis/schedule/mixer_event.h"
 
 namespace carillon {
@@ -57,7 +57,7 @@ struct IntakeSettings {
   /// If not null, also counts rejected contacts by reason. It must outlive the intake.
   RejectionCounts* rejections = nullptr;
   /// If not null, gets each impulse that is handed on. It must outlive the intake.
-  std::vector<FoundBlow>* blows = nullptr;
+  std::vector<BlowRecord>* blows = nullptr;
 };
 
 /// The numbers of unusual contacts that a ContactIntake has found so far in a simulation.
@@ -79,7 +79,8 @@ struct IntakeFindings {
 /// loads, simulation time is mapped anew, as if the newest of these steps were the first.
 ///
 /// A report that cannot be used counts as rejected, once for each object of a contact, and
-/// last_rejection() has the reason. Other reports are still used. One thread at a time.
+/// last_rejection() has the reason. Other reports are still used. Only one thread at a time may use
+/// an object.
 class ContactIntake {
  public:
   /// `scene` and `target` must outlive the intake.
@@ -109,7 +110,7 @@ class ContactIntake {
   /// Ends the step after all its forces have been reported.
   void EndStep();
 
-  /// Ends the simulation, and with it the blows that an engine spreads over steps.
+  /// Ends the simulation, and hands on the blows that are not over yet.
   void Finish();
 
   /// Counts `count` contacts that could not be used. Other rejections name the report's place.
@@ -144,10 +145,10 @@ class ContactIntake {
   /// Counts unusual properties of a contact. Errors: InvalidArgument (IMPULSE_TOO_LARGE).
   absl::Status Examine(const FeltContact& felt, double seconds);
   void NoteZero(const ObjectContact& contact);
-  void Push(const ContactForces::Events& events);
+  void Push(const BlowGatherer::Events& events);
   void Push(MixerEvent& event, double frame);
   /// Adds the blow of `event` to the settings' blows. `blow` has its object and partner.
-  void AddBlow(const MixerEvent& event, FoundBlow blow, double frame)
+  void AddBlow(const MixerEvent& event, BlowRecord blow, double frame)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(scene_.mutex());
   absl::StatusOr<double> FrameOfImpulse(double time_offset_s) const;
   /// Errors: InvalidArgument (TIME_TOO_FAR_AHEAD).
@@ -159,7 +160,7 @@ class ContactIntake {
   const IntakeSettings settings_;
   TimeMapper mapper_;
   double time_s_ = 0;
-  ContactForces forces_;
+  BlowGatherer gatherer_;
   PoseTimes pose_times_;
   uint64_t step_count_ = 0;
   uint64_t impulse_count_ = 0;

@@ -35,7 +35,7 @@ struct ContactCounts {
 };
 
 /// The contacts of one running simulator. The events of the stream's intake go through a queue to
-/// the live mixer. One thread at a time.
+/// the live mixer. Only one thread at a time may use an object.
 class ContactStream {
  public:
   /// `mixer` must outlive the stream. Errors: InvalidArgument (INVALID_STREAM), ResourceExhausted

@@ -21,7 +21,7 @@ struct SecondObject {
 
 /// The place of a report among several of its step, which the message of a rejection names.
 struct ReportPlace {
-  const char* list = nullptr;  ///< a field of ContactStep; null: the report is the only one
+  const char* list = nullptr;  ///< a field of ContactStep; null if the report is the only one
   uint32_t index = 0;
 };
 

@@ -41,7 +41,7 @@ MixerSettings SettingsOf(const OfflineSettings& settings, SectionThreads& thread
           .threads = &threads};
 }
 
-IntakeSettings IntakeSettingsOf(const OfflineSettings& settings, std::vector<FoundBlow>& blows) {
+IntakeSettings IntakeSettingsOf(const OfflineSettings& settings, std::vector<BlowRecord>& blows) {
   return {.sample_rate_hz = static_cast<double>(settings.sample_rate_hz),
           .step_s = settings.step_s,
           .mapping = settings.mapping,

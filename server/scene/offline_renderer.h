@@ -11,10 +11,10 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "server/scene/contact_intake.h"
+#include "server/scene/due_frame.h"
 #include "server/scene/scene.h"
 #include "server/scene/sounding_body.h"
 #include "server/scene/sounding_object.h"
-#include "server/scene/time_mapping.h"
 #include "server/synthesis/bank/level.h"
 #include "server/synthesis/mixer.h"
 #include "server/synthesis/render_threads.h"
@@ -60,7 +60,7 @@ struct OfflineSummary {
 /// Renders a recorded simulation with a mixer of its own, as fast as possible and bit for bit the
 /// same each time. Time is virtual: no contact is late, and frame 0 is simulation time zero unless
 /// the settings map time otherwise. A caller first adds objects, then gives all steps to the
-/// intake, then calls Render until it returns zero. One thread at a time.
+/// intake, then calls Render until it returns zero. Only one thread at a time may use an object.
 class OfflineRenderer {
  public:
   /// Number of frames in a block that Render makes.
@@ -87,7 +87,7 @@ class OfflineRenderer {
   size_t Render(std::span<float> samples);
 
   /// The impulses in the frames rendered so far, if the settings ask for them.
-  const std::vector<FoundBlow>& blows() const { return blows_; }
+  const std::vector<BlowRecord>& blows() const { return blows_; }
 
   /// The result of all frames rendered so far.
   const OfflineSummary& summary() const { return summary_; }
@@ -125,7 +125,7 @@ class OfflineRenderer {
   std::unique_ptr<EventStream> stream_;
   Scene scene_;
   Target target_;
-  std::vector<FoundBlow> blows_;
+  std::vector<BlowRecord> blows_;
   ContactIntake intake_;
   size_t pushed_count_ = 0;
   size_t contact_count_ = 0;  // number of events up to the last that is not a move

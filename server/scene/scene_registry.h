@@ -91,8 +91,8 @@ class SceneRegistry {
   /// Returns a scene. Errors: NotFound (SCENE_NOT_FOUND).
   absl::StatusOr<SceneEntry> GetScene(uint64_t scene) const;
 
-  /// Changes the volume of a scene, which glides within 30 ms. Errors: NotFound (SCENE_NOT_FOUND),
-  /// InvalidArgument (INVALID_GAIN).
+  /// Changes the volume of a scene. The volume glides to its new value within 30 ms. Errors:
+  /// NotFound (SCENE_NOT_FOUND), InvalidArgument (INVALID_GAIN).
   absl::Status ChangeVolume(uint64_t scene, const SceneVolumeChange& change);
 
   /// Fades all sound of a scene out within 30 ms. Later contacts sound as usual. Errors: NotFound

@@ -77,8 +77,8 @@ struct MixerSettings {
   double gain = 1;         ///< of all buses together, before the limiter
   /// The pressure of a sample of 1. The banks of the mixer are made for it.
   double full_scale_pa = kFullScalePa;
-  /// Threads that render the sections; null: the caller's thread alone. The sound is the same bit
-  /// for bit. They must outlive the mixer.
+  /// Threads that render the sections in parallel. If it is null, the caller's thread renders them
+  /// all. The sound is the same bit for bit. The threads must outlive the mixer.
   SectionThreads* threads = nullptr;
 };
 
@@ -152,7 +152,8 @@ class Mixer {
   /// the end of the fade are not heard any more; later ones sound. Sustained forces stay.
   void Stop(BusId bus);
 
-  /// Lets `listener` hear a bus; null: nobody does. The listener must live as long as the mixer.
+  /// Lets `listener` hear a bus. If it is null, nobody hears the bus. The listener must live as
+  /// long as the mixer.
   void Tap(BusId bus, BusListener* listener);
 
   BusState State(BusId bus) const;
@@ -236,7 +237,7 @@ class Mixer {
 
   OwnedBank* Find(BankId id) ABSL_EXCLUSIVE_LOCKS_REQUIRED(control_mutex_);
   uint32_t ChooseSection(BusId bus) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(control_mutex_);
-  /// Makes a section if there is none of this number; null: it was made before.
+  /// Makes the section of this number and returns it, or returns null if it was made before.
   MixedSection* MakeSection(uint32_t section) ABSL_EXCLUSIVE_LOCKS_REQUIRED(control_mutex_);
   void Send(const Command& command) ABSL_EXCLUSIVE_LOCKS_REQUIRED(control_mutex_);
 

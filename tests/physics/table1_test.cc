@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "precompute/fem/material.h"
+#include "precompute/fem/elastic_constants.h"
 #include "precompute/intended_use.h"
 #include "tests/physics/natural_frequencies.h"
 #include "tests/precompute/test_meshes.h"

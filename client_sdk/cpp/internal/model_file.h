@@ -19,7 +19,7 @@ absl::Status NotWritable(const std::string& file);
 absl::Status ReadRecords(const std::string& file,
                          absl::FunctionRef<absl::Status(const v1::ModalModelRecord&)> sink);
 
-/// The same for a file of a transfer.
+/// Passes the records of a transfer's file to `sink`. The errors are those of ReadRecords.
 absl::Status ReadTransferRecords(const std::string& file,
                                  absl::FunctionRef<absl::Status(const v1::TransferRecord&)> sink);
 

@@ -65,7 +65,7 @@ export interface ContactRow extends ImpulseRow {
   roughness?: Roughness;
 }
 
-/** A sustained force of a simulator that separates loads from impacts itself. */
+/** A sustained force of a simulator that separates loads from blows itself. */
 export interface ForceRow {
   object: ObjectLike;
   point: Vector;

@@ -26,9 +26,9 @@ struct MeshingSettings {
   /// Number of nodes, mid-side nodes included, above which the mesh is of no use. Meshing may stop
   /// beyond it. Zero means no limit.
   double most_node_count = 0;
-  /// 4 or 10. Mid-side nodes lie on straight edges.
+  /// Number of nodes of an element, 4 or 10. Mid-side nodes lie on straight edges.
   int nodes_per_element = 10;
-  /// The same as FillRequest::cautious.
+  /// Whether the mesher tolerates larger defects of the surface and worse shapes of the tetrahedra.
   bool cautious = false;
 };
 

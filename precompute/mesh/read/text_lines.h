@@ -86,7 +86,8 @@ inline bool NextObjLine(TextLines& lines, std::string& joined) {
   return true;
 }
 
-/// Converts the whole word to a number ("1e-3", "-inf"); nullopt if it is not a number.
+/// Converts the whole word, such as "1e-3" or "-inf", to a number. Returns nullopt if the word is
+/// not a number.
 template <typename T>
 std::optional<T> ToNumber(std::string_view word) {
   if (word.starts_with('+')) word.remove_prefix(1);

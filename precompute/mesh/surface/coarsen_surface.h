@@ -20,9 +20,9 @@ struct CoarsenedSurface {
   double frequency_error = 0;
 };
 
-/// Gives a surface with more triangles than its modes need longer edges. The edges are half as long
-/// as those into which a surface of few triangles is divided, but the result has at most
-/// `most_triangles` triangles if that number is above zero. The edges become shorter until the
+/// Makes the edges of a surface longer if it has more triangles than its modes need. The edges are
+/// half as long as those into which a surface of few triangles is divided, but the result has at
+/// most `most_triangles` triangles if that number is above zero. The edges become shorter until the
 /// surface moves by at most a hundredth of the body's thickness at that place (root mean square),
 /// and at most by half of it anywhere. The result passes CheckSurface.
 ///

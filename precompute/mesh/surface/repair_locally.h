@@ -24,7 +24,7 @@ std::optional<RepairedSurface> FillHoles(const SurfaceMesh& surface);
 
 /// Returns the width of the widest hole of a surface in one shell, metres: four times the area of
 /// the rim's projection onto its plane, divided by the rim's length. A slit has twice its width.
-/// Returns zero for several shells, and if nothing is open.
+/// Returns zero if the surface has several shells, or no hole.
 double WidestHole(const SurfaceMesh& surface);
 
 /// Replaces the triangles where a closed surface lies folded on itself except for rounding, with

@@ -16,8 +16,8 @@ bool IsCollapsed(const std::array<int32_t, 3>& triangle);
 /// Triangles that are connected by their edges.
 struct Shell {
   std::vector<int32_t> triangles;
-  /// m^3; negative if the triangles are clockwise seen from outside. The volume of an open shell
-  /// has no meaning.
+  /// The signed volume, m^3, which is negative if the triangles are clockwise seen from outside.
+  /// The volume of an open shell has no meaning.
   double volume_m3;
 };
 

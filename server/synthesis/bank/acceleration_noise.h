@@ -44,12 +44,12 @@ struct MovedBody {
 ///
 ///   (sum of K exp(p t) - Re(H(i W) exp(i W t)))/T,   K = R W^2/(p (p^2 + W^2)),
 ///
-/// until T, and the sum of K (exp(p t) - exp(p (t - T)))/T afterwards. One recursion for each pole
-/// serves all pulses, and each pulse adds a sinusoid while it lasts. A pulse lasts at least two
-/// frames. A pulse of another shape is replaced by the raised cosine of the same variance. The
-/// middle of a pulse lies at the time of its impulse, as for modes, so Begin is called half of
-/// PulseFrames earlier. Neither this sound nor the modes include the time a/c that a wave takes
-/// between a body's surface and its centre.
+/// until T, and the sum of K (exp(p t) - exp(p (t - T)))/T afterwards. The terms K exp(p t) of all
+/// pulses with the same pole p are advanced as one number. In addition, each pulse has a sinusoid
+/// of its own while it lasts. A pulse lasts at least two frames. A pulse of another shape is
+/// replaced by the raised cosine of the same variance. The middle of a pulse lies at the time of
+/// its impulse, as for modes, so Begin is called half of PulseFrames earlier. Neither this sound
+/// nor the modes include the time a/c that a wave takes between a body's surface and its centre.
 ///
 /// Any thread may construct the object; then one thread at a time uses it. Only the constructor
 /// allocates; nothing locks.

@@ -138,7 +138,8 @@ class OscillatorBank {
   /// Whether the bank neither sounds in a current long block nor will in a later one.
   bool out_of_spectrum() const noexcept;
 
-  /// RenderAdd for a bank that is out_of_spectrum() and not struck in this block.
+  /// Does the same as RenderAdd. The bank must be out_of_spectrum() and must not be struck in this
+  /// block.
   bool RenderAddInTime(BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
   /// Returns the gains towards the listener, or null if the bank radiates equally in all
@@ -151,7 +152,7 @@ class OscillatorBank {
     return modes_silent() && (moved_ == nullptr || !moved_->active());
   }
 
-  /// Modes that still ring.
+  /// Number of modes that still ring.
   size_t active_mode_count() const noexcept { return struck() ? mode_count_ : active_mode_count_; }
 
   /// Return the units of work (work_budget.h) of a block without events, of an impulse, of a merged
@@ -173,14 +174,17 @@ class OscillatorBank {
   /// of a current long block is heard as it is until that long block ends.
   bool BoundLoudness() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
-  /// Silences the bank. Its part of a current long block sounds until that long block ends.
+  /// Silences the bank and ends its sustained forces. Its part of a current long block sounds until
+  /// that long block ends.
   void Shed() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole) { Silence(); }
 
-  /// Silences the modes and the acceleration noise, between two blocks and together with
-  /// BlockMix::Silence. Sustained forces are kept, so that a resting load makes no new sound.
+  /// Silences the modes and the acceleration noise. The caller must call it between two blocks, and
+  /// must also call BlockMix::Silence, which silences the part of a current long block. Sustained
+  /// forces are kept, so that a resting load makes no new sound.
   void Hush() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole) { SilenceLanes(); }
 
-  /// Columns of the shape table that impulses are projected onto, from the first mode's column on.
+  /// Number of columns of the shape table onto which impulses are projected, from the column of the
+  /// first mode on.
   size_t column_count() const noexcept { return column_count_; }
 
   /// Number of modes of the object.

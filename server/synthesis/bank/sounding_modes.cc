@@ -12,6 +12,7 @@
 #include <span>
 
 #include "server/synthesis/bank/level.h"
+#include "server/synthesis/bank/mode_damping.h"
 
 namespace carillon {
 namespace {
@@ -171,12 +172,9 @@ SoundingModes SelectSoundingModes(const ModeTable& table, const SoundingMaterial
   for (size_t m = 0; m < table.eigenvalues.size(); ++m) {
     const double natural_hz = NaturalFrequencyHz(table.eigenvalues[m], material);
     const double eigenvalue = std::pow(2 * kPi * natural_hz, 2);
-    const double eta = LossFactorAt(material.loss_factor, natural_hz);
     const RadiatingMode radiating = RadiationOf(table, m, eigenvalue, material);
     const double sigma =
-        -(material.alpha1_s * eigenvalue + material.alpha2_per_s + eta * std::sqrt(eigenvalue)) /
-            2 -
-        radiating.decay_per_s;
+        MaterialDecayRatePerS(eigenvalue, natural_hz, material) - radiating.decay_per_s;
     if (!Sounds(natural_hz, eigenvalue, sigma, sample_rate_hz / 2, band)) continue;
     sounding.modes.push_back({.column = static_cast<uint32_t>(m),
                               .natural_frequency_hz = natural_hz,

@@ -5,21 +5,10 @@
 #include <cstdint>
 #include <vector>
 
-#include "proto/cpp/loss_factor.h"
 #include "server/synthesis/bank/radiation.h"
+#include "server/synthesis/bank/sounding_material.h"
 
 namespace carillon {
-
-/// The material and size that turn a modal model of unit Young's modulus, density and size into a
-/// sounding object.
-struct SoundingMaterial {
-  double young_pa = 0;
-  double density_kg_per_m3 = 0;
-  double alpha1_s = 0;  ///< D = alpha1 K + alpha2 M
-  double alpha2_per_s = 0;
-  double size = 1;                                ///< relative to the model's size
-  std::vector<LossFactorPoint> loss_factor = {};  ///< ascending; damping added to D
-};
 
 /// Criteria for the modes that may sound.
 struct SoundingBand {
@@ -67,7 +56,8 @@ double NaturalFrequencyHz(double eigenvalue, const SoundingMaterial& material);
 ///   Lambda' = Lambda E/(rho s^2),  sigma = -(alpha1 Lambda' + alpha2 + eta Lambda'^(1/2))/2,
 ///   omega_d = sqrt(Lambda' - sigma^2),  c' = c E^(1/2) rho^(-1) s^(-1/2)
 ///
-/// with the loss factor eta at the natural frequency. If the radiation is known, with I' = I s/rho,
+/// with the loss factor eta at the natural frequency (MaterialDecayRatePerS in mode_damping.h). If
+/// the radiation is known, with I' = I s/rho,
 ///
 ///   sigma' = sigma - rho_air Lambda' I'/(2 c),  c' kPascalsPerVolumeVelocity = rho_air Lambda'
 ///   (I'/(4 pi))^(1/2)

@@ -77,8 +77,8 @@ struct DrivenOutput {
   ring_kernel::Gains second_gains{};
 };
 
-/// Adds the samples of all lanes to the output while driving them; advances the start and fresh
-/// states.
+/// Adds the samples of all lanes to the output while driving the lanes, and advances the start and
+/// fresh states (LaneArrays).
 void RingDriven(const ForceArrays& force, const Drive& drive, LaneArrays& lanes,
                 const DrivenOutput& output) noexcept;
 

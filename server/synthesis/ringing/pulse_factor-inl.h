@@ -78,8 +78,8 @@ HWY_INLINE void NearCosineFactor(V a, V y, V& factor_re, V& factor_im) {
   factor_im = hn::Mul(v, b);
 }
 
-/// The same for a from -2 to 0 and any y above zero. At x = i pi, where the factor is 1/2,
-/// numerator and denominator vanish together, so that pi - y is computed to the last bit.
+/// Computes the same factor for a from -2 to 0 and any y above zero. At x = i pi, where the factor
+/// is 1/2, numerator and denominator vanish together, so that pi - y is computed to the last bit.
 HWY_INLINE void CosineFactor(V a, V y, V& factor_re, V& factor_im) {
   const Floats d;
   const V t = hn::Mul(a, a);

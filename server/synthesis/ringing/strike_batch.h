@@ -20,9 +20,9 @@ class StrikeBatch {
   /// Most lanes, and most projected columns, of a bank.
   static constexpr size_t kMostBankLanes = 16384;
 
-  /// The vertices whose rows of the shape table the next impulse will read. They are prefetched bit
-  /// by bit while the present impulse is processed, because simultaneous requests would wait for
-  /// each other.
+  /// The vertices whose rows of the shape table the next impulse will read. They are prefetched
+  /// piece by piece while the present impulse is processed, because simultaneous requests would
+  /// wait for each other.
   struct RowsAhead {
     std::array<const int16_t*, 12> rows{};
     size_t count = 0;

@@ -30,15 +30,16 @@ void Project(const Projection& projection, float* modal_impulses) noexcept;
 /// The onset of modal impulses in time.
 struct Onset {
   float lead_frames = 0;        ///< from the impulse to its first audible sample
-  float gaussian_tau_s = 0;     ///< standard deviation of a Gaussian contact; zero: another one
-  float cosine_duration_s = 0;  ///< of a contact with the pulse of a raised cosine; zero: another
-  /// Frames from the start of the part's first tile (tile.h) to the onset. Zero: states are
-  /// computed at the onset's frame in longer tiles too.
+  float gaussian_tau_s = 0;     ///< standard deviation of a Gaussian pulse; zero for another pulse
+  float cosine_duration_s = 0;  ///< duration of a raised cosine; zero for another pulse
+  /// Number of frames from the start of the part's first tile (tile.h) to the onset. If it is zero,
+  /// the states of lanes in longer tiles, too, are computed at the onset's frame.
   size_t frames_into_tiles = 0;
 };
 
-/// Writes what modal impulses add to the states into added_re and added_im: at the onset's frame,
-/// or for lanes in longer tiles at the start of the onset's tile. False: not finite.
+/// Writes the changes of the states by modal impulses into added_re and added_im. The changes are
+/// those at the onset's frame or, for lanes in longer tiles, at the start of the onset's tile.
+/// Returns false if a change is not finite.
 bool Excite(const LaneArrays& lanes, size_t lane_count, const float* modal_impulses,
             const Onset& onset, const StrikeBatch::RowsAhead& ahead, float* added_re,
             float* added_im) noexcept;

@@ -106,7 +106,8 @@ class StruckVectors {
     for (; strike < part.batch.count; ++strike) Join(Struck(part, strike, lane), part.end);
   }
 
-  /// Renders a longer tile. If the part ends within it, the state advances by *shortened instead.
+  /// Renders a longer tile. If the part ends within the tile, `shortened` is not null, and the
+  /// state advances by *shortened instead of by the whole tile.
   HWY_INLINE void AddNodes(const Z* shortened, Z& z, float* nodes) const {
     const Z begin = z;
     oscillators_.AddClosedTile(z, nodes);

@@ -63,12 +63,12 @@ struct Motion {
   float glide_frames = 0;  ///< duration; below one, the motion is a jump
 };
 
-/// The object whose voice the bank sounds through moves.
+/// A movement of the object through whose voice the bank sounds.
 struct ObjectMove {
   Motion motion{};
 };
 
-/// The listener who hears the bank's voice moves.
+/// A movement of the listener who hears the bank's voice.
 struct ListenerMove {
   Motion motion{};
 };

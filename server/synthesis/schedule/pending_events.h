@@ -43,8 +43,8 @@ class PendingEvents {
                 const BlockLimits& limits);
 
   /// Returns false if the table or the event's block is full, or full for this owner. The event's
-  /// first sample must not lie before the end of the block that was collected last. tag() returns
-  /// `tag`, any number of the caller's.
+  /// first sample must not lie before the end of the block that was collected last. `tag` is any
+  /// number that the caller chooses; tag() returns it.
   bool TryPush(const MixerEvent& event, uint32_t tag = 0, uint32_t owner = 0) noexcept;
 
   /// Appends the indices of the events of the block that begins at `block_start`, in order of

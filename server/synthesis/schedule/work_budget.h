@@ -34,7 +34,7 @@ class WorkBudget {
 
   bool bounded() const noexcept { return clock_ != nullptr; }
 
-  /// Units of work that a block may take.
+  /// Returns the units of work that a block may take.
   double most_work() const noexcept { return most_ns_ / ns_per_unit_; }
 
   /// Begin and End enclose the rendering of `block_count` blocks, which took `units` of work in

@@ -74,7 +74,7 @@ class DelayCurve {
     square_ = -3 * delays[1] - 2 * slope_ + 3 * delays[2] - last_slope;
   }
 
-  /// Returns the delay at a part `u` of the block, from 0 to 1.
+  /// Returns the delay, in frames, after the fraction `u` (0 to 1) of the block.
   double At(double u) const noexcept {
     return ((cubic_ * u + square_) * u + slope_) * u + constant_;
   }

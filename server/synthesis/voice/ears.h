@@ -17,18 +17,19 @@ class Ears {
  public:
   Ears(const Head& head, size_t block_frame_count);
 
-  /// Begins a block that ends with the head's responses for a direction, and starts with those at
-  /// the end of the previous block. `head` must have the same tap count as the constructor's head.
+  /// Begins a block that starts with the responses at the end of the previous block, and ends with
+  /// the head's responses for `direction`. `head` must have the same tap count as the head that the
+  /// constructor got.
   void Turn(const Head& head, const Vector3& direction) noexcept;
 
-  /// Begins a block that has the responses for `direction` throughout, without a transition. The
-  /// caller must then set past().
+  /// Begins a block that has the responses for `direction` throughout, without a transition. Before
+  /// Filter, the caller must write the frames that past() returns.
   void Jump(const Head& head, const Vector3& direction) noexcept;
 
   /// Begins a block that keeps the responses at the end of the previous block.
   void Hold() noexcept;
 
-  /// Makes the signal before the block zero.
+  /// Sets the signals before the block to zero.
   void Silence() noexcept;
 
   /// Returns the frames of an ear's signal before the block that its response reaches. The caller

@@ -66,13 +66,14 @@ class Voice {
     double sample_rate_hz = 48000;
     size_t block_frame_count = 128;
     size_t channel_count = 1;
-    /// The listener's head, which `hearing.binaural` needs, as well as two channels.
+    /// The listener's head. If `hearing.binaural` is true, the head must not be null, and there
+    /// must be two channels.
     std::shared_ptr<const Head> head = nullptr;
   };
 
   Voice(const Settings& settings, const Place& object, const Place& listener);
 
-  /// Start a motion at sample `offset` of this block; the caller calls them before Render.
+  /// Start a motion at sample `offset` of this block. The caller must call them before Render.
   void Move(const Motion& motion, size_t offset) noexcept { object_.Move(motion, offset); }
   void MoveListener(const Motion& motion, size_t offset) noexcept {
     listener_.Move(motion, offset);
@@ -104,7 +105,7 @@ class Voice {
   /// Whether the voice renders for two ears.
   bool binaural() const noexcept { return !ears_.empty(); }
 
-  /// Ends the sound that is on its way to the listener. It is called between two blocks.
+  /// Ends the sound that is on its way to the listener. The caller must call it between two blocks.
   void Silence() noexcept;
 
   /// Whether the voice is silent and nothing moves, so that Render need not be called until the

@@ -249,7 +249,7 @@ TEST_F(OfflineRendererTest, TellsBlowsFromItsFirstFrameAndOnTheSurface) {
   StrikeAt(*renderer, 3.6, impulse);
   RenderAll(*renderer, 8);
   ASSERT_EQ(renderer->blows().size(), 1U);
-  const FoundBlow& blow = renderer->blows().front();
+  const BlowRecord& blow = renderer->blows().front();
   EXPECT_NEAR(blow.time_s, 0.625, 1e-9);
   EXPECT_EQ(blow.handle, 7U);
   EXPECT_FALSE(blow.by.has_value());

@@ -152,7 +152,8 @@ class Client {
   /// Creates a scene and returns its name, "scenes/{id}".
   virtual absl::StatusOr<std::string> CreateScene(const v1::CreateSceneRequest& request) const;
 
-  /// As CreateScene, and says whether the scene was there before, which only happens with an id.
+  /// Does the same as CreateScene, and also says whether the scene was there before. A request
+  /// without an id always makes a new scene.
   virtual absl::StatusOr<v1::CreateSceneResponse> CreateOrFindScene(
       const v1::CreateSceneRequest& request) const;
 
@@ -225,8 +226,8 @@ class Client {
                                                    ContactTraceReader& trace,
                                                    const AudioCallback& on_block) const;
 
-  /// As above, and passes each impulse that sounded to `on_blow` after the sound, if
-  /// `settings.tell_blows()`.
+  /// Renders as above. After the sound, passes each impulse that sounded to `on_blow`, if
+  /// `settings.tell_blows()` is true.
   virtual absl::StatusOr<v1::RenderSummary> Render(
       const v1::RenderSettings& settings, ContactTraceReader& trace, const AudioCallback& on_block,
       const std::function<void(const v1::Blow&)>& on_blow) const;

@@ -71,7 +71,7 @@ class Impulses:
 @dataclasses.dataclass
 class Contacts(Impulses):
     """Contacts as an engine reports them, all of one step: `impulses` are over the whole step, also at rest. The
-    daemon separates impacts from loads for each pair of object and partner; `partners` are whole numbers from 0 to
+    daemon separates blows from loads for each pair of object and partner; `partners` are whole numbers from 0 to
     4294967295 that name the other bodies. `travel_speeds` (m/s) with which a contact slides or rolls make it sound
     rough, by `roughness_depth` and `irregularity_length` (metres), as Roughness in contact.proto says."""
 
@@ -83,7 +83,7 @@ class Contacts(Impulses):
 
 @dataclasses.dataclass
 class Forces:
-    """Sustained forces, of a simulator that separates loads from impacts itself: `forces` (N x 3, newtons) at the
+    """Sustained forces, of a simulator that separates loads from blows itself: `forces` (N x 3, newtons) at the
     step's time. The other columns are those of Contacts."""
 
     objects: Any

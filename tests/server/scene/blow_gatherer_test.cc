@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "server/scene/contact_forces.h"
+#include "server/scene/blow_gatherer.h"
 
 #include <gtest/gtest.h>
 
@@ -35,30 +35,30 @@ struct Pushed : ForceEvent {
   }
 };
 
-class ContactForcesTest : public testing::Test {
+class BlowGathererTest : public testing::Test {
  protected:
   /// One step, in which `add` says what touches; what it pushed.
   template <typename Add>
   std::vector<Pushed> Step(double time_s, const Add& add) {
     std::vector<Pushed> pushed;
-    for (const ForceEvent& event : forces_.Begin(time_s)) pushed.push_back({event});
+    for (const ForceEvent& event : gatherer_.Begin(time_s)) pushed.push_back({event});
     add();
-    for (const ForceEvent& event : forces_.End()) pushed.push_back({event});
+    for (const ForceEvent& event : gatherer_.End()) pushed.push_back({event});
     return pushed;
   }
 
   std::vector<Pushed> Hold(double time_s, const Roughness& roughness = {}) {
-    return Step(time_s, [&] { forces_.Add(FeltBy(3, kTen), roughness); });
+    return Step(time_s, [&] { gatherer_.Add(FeltBy(3, kTen), roughness); });
   }
 
   std::vector<Pushed> Nothing(double time_s) {
     return Step(time_s, [] {});
   }
 
-  ContactForces forces_{kStepS};
+  BlowGatherer gatherer_{kStepS};
 };
 
-TEST_F(ContactForcesTest, GivesEachObjectItsForcesAndThenAKnot) {
+TEST_F(BlowGathererTest, GivesEachObjectItsForcesAndThenAKnot) {
   const auto pushed = Hold(0.5);
   ASSERT_EQ(pushed.size(), 2U);
   EXPECT_EQ(pushed[0].handle, 3U);
@@ -68,14 +68,14 @@ TEST_F(ContactForcesTest, GivesEachObjectItsForcesAndThenAKnot) {
   EXPECT_EQ(pushed[1].time_s, 0.5);
 }
 
-TEST_F(ContactForcesTest, WhatIsABlowToOneObjectOfAPairIsABlowToBoth) {
+TEST_F(BlowGathererTest, WhatIsABlowToOneObjectOfAPairIsABlowToBoth) {
   FeltContact impulse = FeltBy(3, kTen);
   SurfaceImpulse opposite = kTen;
   opposite.impulse_newton_seconds[2] = -10;
   impulse.by[1] = {.handle = 4, .event = {.action = opposite}};
   impulse.count = 2;
   const ObjectTouch touch{.contact = {.handle = 3}, .partner = 9};
-  const auto pushed = Step(0, [&] { forces_.Touch(touch, impulse); });
+  const auto pushed = Step(0, [&] { gatherer_.Touch(touch, impulse); });
   std::map<uint32_t, float> struck;
   for (const Pushed& push : pushed) {
     struck[push.handle] += push.Impulse().value_or(0);
@@ -84,7 +84,7 @@ TEST_F(ContactForcesTest, WhatIsABlowToOneObjectOfAPairIsABlowToBoth) {
   EXPECT_EQ(struck[4], -struck[3]);
 }
 
-TEST_F(ContactForcesTest, EndsAForceWithTwoKnotsAndThenIsStill) {
+TEST_F(BlowGathererTest, EndsAForceWithTwoKnotsAndThenIsStill) {
   Hold(0);
   for (const double time_s : {0.01, 0.02}) {
     const auto pushed = Nothing(time_s);
@@ -94,7 +94,7 @@ TEST_F(ContactForcesTest, EndsAForceWithTwoKnotsAndThenIsStill) {
   EXPECT_TRUE(Nothing(0.03).empty());
 }
 
-TEST_F(ContactForcesTest, EndsAForceWhereStepsWereLeftOut) {
+TEST_F(BlowGathererTest, EndsAForceWhereStepsWereLeftOut) {
   Hold(0);
   const auto pushed = Nothing(5);
   ASSERT_EQ(pushed.size(), 2U);
@@ -102,23 +102,23 @@ TEST_F(ContactForcesTest, EndsAForceWhereStepsWereLeftOut) {
   EXPECT_DOUBLE_EQ(pushed[1].time_s, 0.02);
 }
 
-TEST_F(ContactForcesTest, ARoughnessIsWeighedByItsForce) {
+TEST_F(BlowGathererTest, ARoughnessIsWeighedByItsForce) {
   const auto pushed = Step(0, [&] {
-    forces_.Add(FeltBy(3, kTen),
-                {.travel_speed_m_per_s = 2, .depth = 0.4, .irregularity_length_m = 0.001});
-    forces_.Add(FeltBy(3, kTen), {});  // rests
+    gatherer_.Add(FeltBy(3, kTen),
+                  {.travel_speed_m_per_s = 2, .depth = 0.4, .irregularity_length_m = 0.001});
+    gatherer_.Add(FeltBy(3, kTen), {});  // rests
   });
   const auto& knot = std::get<ForceKnot>(pushed.back().action);
   EXPECT_FLOAT_EQ(knot.roughness, 0.2F);
   EXPECT_FLOAT_EQ(knot.bandwidth_hz, 2000);
 }
 
-TEST_F(ContactForcesTest, OfATouchThePartThatIsABlowStrikesAndTheRestIsAForce) {
+TEST_F(BlowGathererTest, OfATouchThePartThatIsABlowStrikesAndTheRestIsAForce) {
   const auto touch = [&](double newton_seconds) {
     return [this, newton_seconds] {
       SurfaceImpulse impulse = kTen;
       impulse.impulse_newton_seconds[2] = static_cast<float>(newton_seconds);
-      forces_.Touch({.contact = {.handle = 3}, .partner = 9}, FeltBy(3, impulse));
+      gatherer_.Touch({.contact = {.handle = 3}, .partner = 9}, FeltBy(3, impulse));
     };
   };
   auto pushed = Step(0, touch(1));  // from flight
@@ -134,13 +134,13 @@ TEST_F(ContactForcesTest, OfATouchThePartThatIsABlowStrikesAndTheRestIsAForce) {
   EXPECT_FLOAT_EQ(pushed[0].Impulse().value_or(0), 2.7F);
   EXPECT_GE(pushed[0].time_s, 21 * kStepS);  // the load lasts, so the blow is within a step
   EXPECT_LT(pushed[0].time_s, 22 * kStepS);
-  EXPECT_EQ(forces_.counts().blow_count, 2U);
-  EXPECT_EQ(forces_.counts().load_count, 20U);
+  EXPECT_EQ(gatherer_.counts().blow_count, 2U);
+  EXPECT_EQ(gatherer_.counts().load_count, 20U);
 }
 
-TEST_F(ContactForcesTest, AnotherPartnerIsAnotherPair) {
+TEST_F(BlowGathererTest, AnotherPartnerIsAnotherPair) {
   const auto touch = [this](uint32_t partner) {
-    forces_.Touch({.contact = {.handle = 3}, .partner = partner}, FeltBy(3, kTen));
+    gatherer_.Touch({.contact = {.handle = 3}, .partner = partner}, FeltBy(3, kTen));
   };
   for (int i = 0; i < 20; ++i) Step(i * kStepS, [&] { touch(1); });
   const auto pushed = Step(20 * kStepS, [&] {
@@ -151,34 +151,34 @@ TEST_F(ContactForcesTest, AnotherPartnerIsAnotherPair) {
   EXPECT_TRUE(Nothing(21 * kStepS)[0].Impulse());
 }
 
-TEST_F(ContactForcesTest, ABlowThatIsNotOverIsSentAtTheEnd) {
+TEST_F(BlowGathererTest, ABlowThatIsNotOverIsSentAtTheEnd) {
   Nothing(0);
-  Step(kStepS, [&] { forces_.Touch({.contact = {.handle = 3}}, FeltBy(3, kTen)); });
-  const auto last = forces_.Finish();
+  Step(kStepS, [&] { gatherer_.Touch({.contact = {.handle = 3}}, FeltBy(3, kTen)); });
+  const auto last = gatherer_.Finish();
   ASSERT_EQ(last.size(), 1U);
   EXPECT_EQ(std::get<SurfaceImpulse>(last[0].action).impulse_newton_seconds[2], 10);
-  EXPECT_TRUE(forces_.Finish().empty());
+  EXPECT_TRUE(gatherer_.Finish().empty());
 }
 
 /// The times, in steps, at which a body strikes that hops `hop_count` times, each time after three
 /// steps of flight. Each contact has the time offset.
 std::vector<double> HopTimes(int hop_count, double time_offset_s, uint32_t partner = 1) {
-  ContactForces forces(kStepS);
+  BlowGatherer gatherer(kStepS);
   std::vector<double> times;
   for (int step = 0; step < 4 * hop_count; ++step) {
-    forces.Begin(step * kStepS);
+    gatherer.Begin(step * kStepS);
     if (step % 4 == 2) {
-      forces.Touch({.contact = {.handle = 3}, .partner = partner, .time_offset_s = time_offset_s},
-                   FeltBy(3, kTen));
+      gatherer.Touch({.contact = {.handle = 3}, .partner = partner, .time_offset_s = time_offset_s},
+                     FeltBy(3, kTen));
     }
-    for (const ForceEvent& event : forces.End()) {
+    for (const ForceEvent& event : gatherer.End()) {
       if (Pushed{event}.Impulse()) times.push_back(event.time_s / kStepS);
     }
   }
   return times;
 }
 
-TEST(ContactForces, BlowsOfALastingContactHaveNoLinesAtTheStepRate) {
+TEST(BlowGatherer, BlowsOfALastingContactHaveNoLinesAtTheStepRate) {
   const std::vector<double> times = HopTimes(4000, 0);
   ASSERT_EQ(times.size(), 4000U);
   EXPECT_DOUBLE_EQ(times[0], 3);  // after a flight the time is exact
@@ -198,37 +198,37 @@ TEST(ContactForces, BlowsOfALastingContactHaveNoLinesAtTheStepRate) {
   }
 }
 
-TEST(ContactForces, TheSameSimulationHasTheSameTimesAndOtherBodiesHaveOthers) {
+TEST(BlowGatherer, TheSameSimulationHasTheSameTimesAndOtherBodiesHaveOthers) {
   EXPECT_EQ(HopTimes(50, 0), HopTimes(50, 0));
   EXPECT_NE(HopTimes(50, 0), HopTimes(50, 0, 2));
 }
 
-TEST(ContactForces, AContactThatStatesItsTimeOffsetKeepsIt) {
+TEST(BlowGatherer, AContactThatStatesItsTimeOffsetKeepsIt) {
   const std::vector<double> times = HopTimes(50, 0.25 * kStepS);
   for (size_t hop = 0; hop < times.size(); ++hop) {
     EXPECT_NEAR(times[hop], 4 * static_cast<double>(hop) + 3.25, 1e-9);
   }
 }
 
-TEST(ContactForces, BlowsAfterAFlightOfATenthOfASecondHaveExactTimes) {
-  ContactForces forces(kStepS);
+TEST(BlowGatherer, BlowsAfterAFlightOfATenthOfASecondHaveExactTimes) {
+  BlowGatherer gatherer(kStepS);
   for (int step = 0; step < 240; ++step) {
-    forces.Begin(step * kStepS);
-    if (step % 12 == 0) forces.Touch({.contact = {.handle = 3}}, FeltBy(3, kTen));
-    for (const ForceEvent& event : forces.End()) {
+    gatherer.Begin(step * kStepS);
+    if (step % 12 == 0) gatherer.Touch({.contact = {.handle = 3}}, FeltBy(3, kTen));
+    for (const ForceEvent& event : gatherer.End()) {
       if (step > 0 && Pushed{event}.Impulse()) {
         EXPECT_EQ(event.time_s, step * kStepS);
       }
     }
   }
-  EXPECT_EQ(forces.counts().blow_count, 20U);
+  EXPECT_EQ(gatherer.counts().blow_count, 20U);
 }
 
 /// A body falls on another with an impulse of 1 N s, of which an engine with soft contacts reports
 /// half a sine of `length_s` that begins `phase` steps before a step, and then rests with 1 N.
 std::vector<Pushed> Fall(double rate_hz, double length_s, double phase) {
   constexpr double kPi = std::numbers::pi;
-  ContactForces forces(1 / rate_hz);
+  BlowGatherer gatherer(1 / rate_hz);
   std::vector<Pushed> pushed;
   const auto until = [&](double time_s) {  // the part of the impulse up to that time
     return (1 - std::cos(kPi * std::clamp(time_s / length_s, 0.0, 1.0))) / 2;
@@ -238,21 +238,21 @@ std::vector<Pushed> Fall(double rate_hz, double length_s, double phase) {
     const double rests = end_s > length_s ? 1 / rate_hz : 0;
     SurfaceImpulse impulse = kTen;
     impulse.impulse_newton_seconds[2] = static_cast<float>(until(end_s) - until(begin_s) + rests);
-    for (const ForceEvent& event : forces.Begin(step / rate_hz)) pushed.push_back({event});
+    for (const ForceEvent& event : gatherer.Begin(step / rate_hz)) pushed.push_back({event});
     if (end_s > 0) {
       FeltContact felt = FeltBy(3, impulse);
       felt.duration_follows_impulse = true;
       std::get<SurfaceImpulse>(felt.by[0].event.action).pulse =
           Pulse::RaisedCosine(static_cast<float>(
               1e-4 * std::pow(double{impulse.impulse_newton_seconds[2]}, kDurationPower)));
-      forces.Touch({.contact = {.handle = 3}}, felt);
+      gatherer.Touch({.contact = {.handle = 3}}, felt);
     }
-    for (const ForceEvent& event : forces.End()) pushed.push_back({event});
+    for (const ForceEvent& event : gatherer.End()) pushed.push_back({event});
   }
   return pushed;
 }
 
-TEST(ContactForces, AFallIsOneBlowOfItsImpulseAndLengthAtEveryStepOfTheEngine) {
+TEST(BlowGatherer, AFallIsOneBlowOfItsImpulseAndLengthAtEveryStepOfTheEngine) {
   for (const double rate_hz : {60.0, 240.0, 1000.0}) {
     for (const double length_s : {0.002, 0.008, 0.02, 0.03}) {
       for (const double phase : {0.0, 0.3, 0.7}) {
@@ -273,17 +273,17 @@ TEST(ContactForces, AFallIsOneBlowOfItsImpulseAndLengthAtEveryStepOfTheEngine) {
   }
 }
 
-TEST(ContactForces, ABodyThatIsPutDownGentlyDoesNotStrike) {
+TEST(BlowGatherer, ABodyThatIsPutDownGentlyDoesNotStrike) {
   for (const double rate_hz : {240.0, 1000.0}) {
-    ContactForces forces(1 / rate_hz);
+    BlowGatherer gatherer(1 / rate_hz);
     double struck = 0;
     for (int step = 0; step < 0.3 * rate_hz; ++step) {
       SurfaceImpulse impulse = kTen;
       const double newtons = std::clamp((step - 10) / rate_hz / 0.02, 0.0, 1.0);
       impulse.impulse_newton_seconds[2] = static_cast<float>(newtons / rate_hz);
-      forces.Begin(step / rate_hz);
-      if (newtons > 0) forces.Touch({.contact = {.handle = 3}}, FeltBy(3, impulse));
-      for (const ForceEvent& event : forces.End()) struck += Pushed{event}.Impulse().value_or(0);
+      gatherer.Begin(step / rate_hz);
+      if (newtons > 0) gatherer.Touch({.contact = {.handle = 3}}, FeltBy(3, impulse));
+      for (const ForceEvent& event : gatherer.End()) struck += Pushed{event}.Impulse().value_or(0);
     }
     EXPECT_LT(struck, 1e-3) << rate_hz;  // newton seconds; the first step alone would be 0.004
   }

@@ -30,9 +30,10 @@ struct ForceEvent {
   bool by_sounds = false;  ///< whether `by`, in a blow, is the handle of an object
 };
 
-/// Turns the lasting contacts of one simulation into events of the mixer. For each object under a
-/// force, each step produces the object's forces and then a knot. A contact that was a blow also
-/// produces an impulse. One thread at a time.
+/// Decides which of a simulation's engine contacts are blows and which are loads, and turns both,
+/// and the sustained forces, into events of the mixer. For each object under a force, each step
+/// produces the object's forces and then a knot. Each blow that is over produces an impulse. Only
+/// one thread at a time may use it.
 ///
 /// Engines with soft contacts spread a blow over several steps. As long as no step is missing, the
 /// steps of a blow are gathered into one impulse, which is sent at the step in which the blow turns
@@ -56,12 +57,12 @@ struct ForceEvent {
 /// the mean spectrum of such blows has no lines. The time is a function of the simulation time and
 /// of the two bodies, so that the same simulation gives the same events. The first blow after a
 /// flight, and contacts with a time offset of their own, have exact times.
-class ContactForces {
+class BlowGatherer {
  public:
   using Events = std::vector<ForceEvent>;
 
   /// `step_s` is the simulator's step, seconds.
-  explicit ContactForces(double step_s) : nominal_step_s_(step_s) {}
+  explicit BlowGatherer(double step_s) : nominal_step_s_(step_s) {}
 
   /// Begins the step at simulation time `time_s`, which must not be before the last step's. If
   /// steps were left out, the forces ended with the last step; returns the events that end these
@@ -118,7 +119,7 @@ class ContactForces {
   using Bodies = std::pair<uint32_t, uint32_t>;  // handle of the object, number of the partner
 
   void End(Events& events);
-  /// Adds the impulse of `felt` times `per_second` as a force of this step.
+  /// Adds a force to this step: the impulse of `felt`, N s, times `per_second`, 1/s.
   void Add(const Felt& felt, double per_second, const Roughness& roughness);
   /// Sends the blows of two bodies as impulses, and their loads (see LoadTracker) as forces.
   void Divide(const Bodies& bodies, Pair& pair, Events& events);

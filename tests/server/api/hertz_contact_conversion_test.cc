@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "server/api/hertz_conversion.h"
+#include "server/api/hertz_contact_conversion.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -23,7 +23,7 @@ double DurationS(const HertzContact& striker, double speed_m_per_s) {
   return HertzDurationS(wall, kSteelTip, told, 1);
 }
 
-TEST(HertzConversion, EveryStrikerHasFiguresASourceAndTheDurationThatItStates) {
+TEST(HertzContactConversion, EveryStrikerHasFiguresASourceAndTheDurationThatItStates) {
   std::set<std::string> names;
   for (const v1::CatalogueStriker& striker : Strikers().strikers()) {
     EXPECT_TRUE(names.insert(striker.name()).second);
@@ -40,7 +40,7 @@ TEST(HertzConversion, EveryStrikerHasFiguresASourceAndTheDurationThatItStates) {
   EXPECT_EQ(names, (std::set<std::string>{"felt", "fingertip", "rubber", "steel", "wood"}));
 }
 
-TEST(HertzConversion, TheStrikerOfContactsThatNameNoneIsTheCataloguesSteel) {
+TEST(HertzContactConversion, TheStrikerOfContactsThatNameNoneIsTheCataloguesSteel) {
   v1::HertzContact named;
   named.set_striker("steel");
   const HertzContact steel = *ToHertzContact(named);
@@ -50,7 +50,7 @@ TEST(HertzConversion, TheStrikerOfContactsThatNameNoneIsTheCataloguesSteel) {
   EXPECT_EQ(steel.striker_radius_m, 1 / kSteelTip.curvature_per_m);
 }
 
-TEST(HertzConversion, FiguresOverrideThoseOfTheStriker) {
+TEST(HertzContactConversion, FiguresOverrideThoseOfTheStriker) {
   v1::HertzContact named;
   named.set_striker("wood");
   named.set_striker_mass_kg(0.5);

@@ -7,8 +7,9 @@
 
 namespace carillon {
 
-/// An impulse on an object of a simulation, as it sounds.
-struct FoundBlow {
+/// The record of an impulse on an object of a simulation, as it sounds, for the reports of offline
+/// renderings.
+struct BlowRecord {
   double time_s = 0;  ///< time from the first frame to the middle of the contact as it sounds
   uint32_t handle = 0;
   std::optional<uint32_t> by;       ///< the other body, if the contact named it

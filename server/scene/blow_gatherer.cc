@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "server/scene/contact_forces.h"
+#include "server/scene/blow_gatherer.h"
 
 #include <algorithm>
 #include <array>
@@ -45,7 +45,7 @@ double Share(double time_s, uint32_t handle, uint32_t partner) {
 
 }  // namespace
 
-ContactForces::Events ContactForces::Begin(double time_s) {
+BlowGatherer::Events BlowGatherer::Begin(double time_s) {
   Events events;
   follows_ = time_s_ && time_s - *time_s_ <= kLongestStep * nominal_step_s_;
   for (int i = 0; i < kKnotsToEnd && time_s_ && (!objects_.empty() || gathers()); ++i) {
@@ -60,29 +60,29 @@ ContactForces::Events ContactForces::Begin(double time_s) {
   return events;
 }
 
-void ContactForces::Add(const FeltContact& force, const Roughness& roughness) {
+void BlowGatherer::Add(const FeltContact& force, const Roughness& roughness) {
   for (const Felt& felt : force.all()) Add(felt, 1, roughness);
 }
 
-void ContactForces::Add(const Felt& felt, double per_second, const Roughness& roughness) {
+void BlowGatherer::Add(const Felt& felt, double per_second, const Roughness& roughness) {
   const SurfaceImpulse& impulse = felt.impulse();
   const SurfaceForce force{.at = impulse.at,
                            .force_newtons = Scaled(impulse.impulse_newton_seconds, per_second)};
   objects_[felt.handle].forces.push_back({force, roughness});
 }
 
-void ContactForces::Touch(const ObjectTouch& touch, const FeltContact& impulse) {
+void BlowGatherer::Touch(const ObjectTouch& touch, const FeltContact& impulse) {
   pairs_[{touch.contact.handle, touch.partner}].touches.push_back(
       {impulse, touch.roughness, touch.time_offset_s, touch.partner});
 }
 
-ContactForces::Events ContactForces::End() {
+BlowGatherer::Events BlowGatherer::End() {
   Events events;
   End(events);
   return events;
 }
 
-void ContactForces::End(Events& events) {
+void BlowGatherer::End(Events& events) {
   for (auto& [bodies, pair] : pairs_) Divide(bodies, pair, events);
   std::erase_if(pairs_,
                 [](const auto& pair) { return pair.second.load.idle() && !pair.second.blow; });
@@ -96,7 +96,7 @@ void ContactForces::End(Events& events) {
                 [](const auto& object) { return object.second.steps_without >= kKnotsToEnd; });
 }
 
-ContactForces::Events ContactForces::Finish() {
+BlowGatherer::Events BlowGatherer::Finish() {
   Events events;
   for (auto& [bodies, pair] : pairs_) {
     if (pair.blow) SendBlow(bodies, *std::exchange(pair.blow, std::nullopt), 0, events);
@@ -104,11 +104,11 @@ ContactForces::Events ContactForces::Finish() {
   return events;
 }
 
-bool ContactForces::gathers() const {
+bool BlowGatherer::gathers() const {
   return std::ranges::any_of(pairs_, [](const auto& pair) { return pair.second.blow.has_value(); });
 }
 
-void ContactForces::Divide(const Bodies& bodies, Pair& pair, Events& events) {
+void BlowGatherer::Divide(const Bodies& bodies, Pair& pair, Events& events) {
   double impulse = 0;
   for (const PairTouch& touch : pair.touches) {
     impulse += Magnitude(touch.impulse.by[0].impulse().impulse_newton_seconds);
@@ -134,13 +134,13 @@ void ContactForces::Divide(const Bodies& bodies, Pair& pair, Events& events) {
   pair.touches.clear();
 }
 
-ContactForces::Blow ContactForces::BlowOf(const Pair& pair, double load_newtons) const {
+BlowGatherer::Blow BlowGatherer::BlowOf(const Pair& pair, double load_newtons) const {
   return {.load_newtons = load_newtons,
           .begin_s = *time_s_,
           .lasting = pair.touched_s && *time_s_ - *pair.touched_s <= kLastingS};
 }
 
-void ContactForces::Gather(Pair& pair, double force_newtons, double impulse) const {
+void BlowGatherer::Gather(Pair& pair, double force_newtons, double impulse) const {
   Blow& blow = *pair.blow;
   blow.impulses.push_back(impulse);
   blow.forces.push_back(force_newtons);
@@ -149,8 +149,8 @@ void ContactForces::Gather(Pair& pair, double force_newtons, double impulse) con
   blow.touches = pair.touches;
 }
 
-bool ContactForces::IsOver(const Blow& blow, double force_newtons, double impulse,
-                           double& remains) const {
+bool BlowGatherer::IsOver(const Blow& blow, double force_newtons, double impulse,
+                          double& remains) const {
   if (impulse <= blow.greatest / 4) return true;
   remains = force_newtons;
   if (*time_s_ - blow.begin_s >= kLongestBlowS) return true;
@@ -159,8 +159,8 @@ bool ContactForces::IsOver(const Blow& blow, double force_newtons, double impuls
   return force_newtons >= 0.75 * *(blow.forces.end() - static_cast<ptrdiff_t>(steps));
 }
 
-void ContactForces::SendBlow(const Bodies& bodies, const Blow& blow, double remains_newtons,
-                             Events& events) {
+void BlowGatherer::SendBlow(const Bodies& bodies, const Blow& blow, double remains_newtons,
+                            Events& events) {
   const double excess = std::max(remains_newtons - blow.load_newtons, 0.0) * step_s_;
   double impulse = 0;
   for (const double step : blow.impulses) impulse += std::max(step - excess, 0.0);
@@ -179,13 +179,13 @@ void ContactForces::SendBlow(const Bodies& bodies, const Blow& blow, double rema
   }
 }
 
-double ContactForces::TimeOf(const Bodies& bodies, const Blow& blow, const PairTouch& touch) const {
+double BlowGatherer::TimeOf(const Bodies& bodies, const Blow& blow, const PairTouch& touch) const {
   if (!blow.lasting || touch.time_offset_s > 0) return *time_s_ + touch.time_offset_s;
   return *time_s_ + Share(blow.begin_s, bodies.first, bodies.second) * step_s_;
 }
 
 /// Returns the impulse on the first or the second object of a touch, times `scale`.
-ForceEvent ContactForces::PartOfBlow(const PairTouch& touch, size_t which, double scale) {
+ForceEvent BlowGatherer::PartOfBlow(const PairTouch& touch, size_t which, double scale) {
   const FeltContact& contact = touch.impulse;
   const double longer = contact.duration_follows_impulse ? std::pow(scale, kDurationPower) : 1;
   SurfaceImpulse part = contact.by[which].impulse();
@@ -198,7 +198,7 @@ ForceEvent ContactForces::PartOfBlow(const PairTouch& touch, size_t which, doubl
           .by_sounds = of_two};
 }
 
-ForceKnot ContactForces::MakeKnot(const std::vector<Force>& forces, double step_s) {
+ForceKnot BlowGatherer::MakeKnot(const std::vector<Force>& forces, double step_s) {
   double load = 0, fluctuation = 0, bandwidth = 0;
   for (const auto& [force, roughness] : forces) {
     const double share = Magnitude(force.force_newtons);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "server/scene/time_mapping.h"
+#include "server/scene/due_frame.h"
 
 #include <cmath>
 

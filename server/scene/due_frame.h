@@ -6,13 +6,13 @@
 
 namespace carillon {
 
-/// Maps simulation time to the frames of a mixer.
+/// Maps simulation time to the frames of a mixer, and so decides in which frame a contact sounds.
 struct TimeMapping {
   uint64_t first_frame = 0;
   double first_time_s = 0;  ///< simulation time at `first_frame`
   double delay_s = 0;
 
-  /// Returns the frame in which a contact at this simulation time is due:
+  /// Returns the frame in which a contact at this simulation time is due, with its fraction:
   /// frame(t) = first frame + (t - first time + delay) rate
   double FrameOf(double time_s, double sample_rate_hz) const {
     return static_cast<double>(first_frame) + (time_s - first_time_s + delay_s) * sample_rate_hz;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "server/api/hertz_conversion.h"
+#include "server/api/hertz_contact_conversion.h"
 
 #include "proto/cpp/status_macros.h"
 #include "proto/cpp/striker_catalogue.h"

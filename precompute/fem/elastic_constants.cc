@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
-#include "precompute/fem/material.h"
+#include "precompute/fem/elastic_constants.h"
 
 namespace carillon::precompute {
 
