@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <chrono>
 #include <cstring>
@@ -81,6 +82,14 @@ int PortOf(int bound) {
   getsockname(bound, reinterpret_cast<sockaddr*>(&address), &size);
   // The port has the same place in the addresses of both families.
   return ntohs(reinterpret_cast<const sockaddr_in*>(&address)->sin_port);
+}
+
+/// Discards what a connection has received and nobody has read yet. TCP holds up to 6 MiB, in which
+/// gRPC would still find tens of thousands of calls.
+void DiscardReceived(int connection) {
+  std::array<char, size_t{64} << 10U> discarded;
+  while (recv(connection, discarded.data(), discarded.size(), MSG_DONTWAIT) > 0) {
+  }
 }
 
 std::chrono::steady_clock::time_point Now() { return std::chrono::steady_clock::now(); }
@@ -284,6 +293,7 @@ bool ConnectionGate::Refuse(const std::string& peer) {
   found->second.refused = true;
   // gRPC, which owns the descriptor, then sees the end of the connection and closes the descriptor.
   shutdown(found->second.descriptor, SHUT_RDWR);
+  DiscardReceived(found->second.descriptor);
   std::erase_if(refused_, [now](const auto& each) { return each.second <= now; });
   refused_.insert_or_assign(source_of_(peer), now + RefusalTimeOf(peer));
   return true;

@@ -269,8 +269,8 @@ absl::Status SceneService::CheckObjectCount(uint64_t scene, size_t more) const {
 
 absl::Status SceneService::Add(uint64_t scene, const v1::AddObjectRequest& request,
                                v1::AddObjectResponse& response) {
-  RETURN_IF_ERROR(CheckObjectCount(scene, 1));
   ASSIGN_OR_RETURN(ObjectOfModel object, ToObject(request, database_.models()));
+  RETURN_IF_ERROR(CheckObjectCount(scene, 1));
   ASSIGN_OR_RETURN(
       const PlacedObject placed,
       scenes_.AddObject(scene, request.handle(), std::move(object.model), object.properties));
@@ -296,6 +296,8 @@ absl::Status SceneService::AddAll(uint64_t scene, const v1::AddObjectsRequest& r
                        .model = std::move(object->model),
                        .properties = std::move(object->properties)});
   }
+  // The models may have been read from the disk meanwhile, and other calls may have added objects.
+  RETURN_IF_ERROR(CheckObjectCount(scene, objects.size()));
   ASSIGN_OR_RETURN(const std::vector<PlacedObject> placed, scenes_.AddObjects(scene, objects));
   const std::string name = scenes_.NameOf(scene);
   for (const PlacedObject& made : placed) *response.add_objects() = ToProto(name, made);

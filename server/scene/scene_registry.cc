@@ -107,6 +107,10 @@ size_t SceneRegistry::CountObjects(std::span<const uint64_t> scenes) const {
   for (const uint64_t scene : scenes) {
     const absl::StatusOr<std::shared_ptr<Scene>> found = FindScene(scene);
     if (found.ok()) count += (*found)->object_count();
+    const MutexLock lock(&mutex_);
+    if (const auto made = being_made_.find(scene); made != being_made_.end()) {
+      count += made->second;
+    }
   }
   return count;
 }

@@ -85,7 +85,8 @@ class SceneRegistry {
   /// Returns all scenes, the oldest first.
   std::vector<SceneEntry> ListScenes() const;
 
-  /// Returns the number of objects in these scenes. Scenes that do not exist have none.
+  /// Returns the number of objects in these scenes, and of those that are being made for them.
+  /// Scenes that do not exist have none.
   size_t CountObjects(std::span<const uint64_t> scenes) const;
 
   /// Returns a scene. Errors: NotFound (SCENE_NOT_FOUND).
@@ -163,9 +164,12 @@ class SceneRegistry {
   /// Makes either all of the objects or none of them.
   absl::StatusOr<std::vector<PlacedObject>> Add(uint64_t scene, std::span<const NewObject> objects,
                                                 ElementError at);
-  /// Counts objects that are about to be made. Errors: ResourceExhausted (TOO_MANY_OBJECTS).
-  absl::Status ReserveObjects(size_t count, ElementError at);
-  void GiveObjectsBack(size_t count);
+  /// Counts objects of a scene that are about to be made. Errors: ResourceExhausted
+  /// (TOO_MANY_OBJECTS).
+  absl::Status ReserveObjects(uint64_t scene, size_t count, ElementError at);
+  /// Ends the making of objects that ReserveObjects has counted. If they are not `placed`, they no
+  /// longer count.
+  void EndReservation(uint64_t scene, size_t count, bool placed);
   /// Makes objects that are in no scene yet and have no handle.
   absl::StatusOr<std::vector<PlacedObject>> MakeObjects(const Scene& scene,
                                                         std::span<const NewObject> objects,
@@ -210,6 +214,8 @@ class SceneRegistry {
   uint64_t next_scene_ ABSL_GUARDED_BY(mutex_) = 1;
   /// Number of objects in all scenes, and of those that are being made.
   size_t object_count_ ABSL_GUARDED_BY(mutex_) = 0;
+  /// Number of objects that are being made for each scene.
+  std::map<uint64_t, size_t> being_made_ ABSL_GUARDED_BY(mutex_);
 };
 
 }  // namespace carillon

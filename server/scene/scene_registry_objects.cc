@@ -69,8 +69,9 @@ absl::StatusOr<std::vector<PlacedObject>> SceneRegistry::Add(uint64_t scene,
                                                              std::span<const NewObject> objects,
                                                              ElementError at) {
   ASSIGN_OR_RETURN(const std::shared_ptr<Scene> found, FindScene(scene));
-  RETURN_IF_ERROR(ReserveObjects(objects.size(), at));
-  absl::Cleanup give_back = [&] { GiveObjectsBack(objects.size()); };
+  RETURN_IF_ERROR(ReserveObjects(scene, objects.size(), at));
+  bool is_placed = false;
+  const absl::Cleanup end = [&] { EndReservation(scene, objects.size(), is_placed); };
   RETURN_IF_ERROR(ChooseHandles(*found, objects, at).status());
   const uint64_t round = transfer_round_;
   const Pose listener = found->space().listener;
@@ -80,7 +81,7 @@ absl::StatusOr<std::vector<PlacedObject>> SceneRegistry::Add(uint64_t scene,
     FadeOut(placed);
     return status;
   }
-  std::move(give_back).Cancel();
+  is_placed = true;
   CatchUp(*found, placed, listener);
   if (round != transfer_round_) {
     for (const PlacedObject& made : placed) TakeOverTransfer(*found, made.handle, made.object);
@@ -88,11 +89,12 @@ absl::StatusOr<std::vector<PlacedObject>> SceneRegistry::Add(uint64_t scene,
   return placed;
 }
 
-absl::Status SceneRegistry::ReserveObjects(size_t count, ElementError at) {
+absl::Status SceneRegistry::ReserveObjects(uint64_t scene, size_t count, ElementError at) {
   const MutexLock lock(&mutex_);
   const size_t room = kMaxObjectCount - object_count_;
   if (count <= room) {
     object_count_ += count;
+    being_made_[scene] += count;
     return absl::OkStatus();
   }
   return at(Refusal(absl::StatusCode::kResourceExhausted, "TOO_MANY_OBJECTS",
@@ -101,9 +103,10 @@ absl::Status SceneRegistry::ReserveObjects(size_t count, ElementError at) {
             room);
 }
 
-void SceneRegistry::GiveObjectsBack(size_t count) {
+void SceneRegistry::EndReservation(uint64_t scene, size_t count, bool placed) {
   const MutexLock lock(&mutex_);
-  object_count_ -= count;
+  if (!placed) object_count_ -= count;
+  if ((being_made_[scene] -= count) == 0) being_made_.erase(scene);
 }
 
 absl::StatusOr<std::vector<PlacedObject>> SceneRegistry::MakeObjects(

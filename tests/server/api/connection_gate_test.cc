@@ -163,6 +163,19 @@ TEST_F(ConnectionGateTest, EndsAConnectionAndRefusesOthersFromTheSameAddress) {
   EXPECT_TRUE(gate_->IsOpen(NameOf(first)));
 }
 
+TEST_F(ConnectionGateTest, WhatARefusedConnectionHasSentIsNoLongerRead) {
+  Open(1);
+  const int made = Connect();
+  taken_.acquire();
+  const std::string sent(1000, 'x');
+  ASSERT_EQ(send(made, sent.data(), sent.size(), 0), static_cast<ssize_t>(sent.size()));
+  char received = 0;
+  // The data has come before the connection is refused.
+  ASSERT_EQ(recv(keeper_->newest, &received, 1, MSG_PEEK | MSG_WAITALL), 1);
+  EXPECT_TRUE(gate_->Refuse(NameOf(made)));
+  EXPECT_EQ(recv(keeper_->newest, &received, 1, 0), 0);
+}
+
 TEST_F(ConnectionGateTest, TheVeryLastPlacesAreForUnixSockets) {
   const TemporaryFolder folder;
   ListenAddress address{.socket_path = folder / "socket", .host = ""};
