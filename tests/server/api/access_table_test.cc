@@ -67,6 +67,32 @@ TEST_F(AccessTableFile, ALineThatIsWrongIsNamed) {
   }
 }
 
+TEST_F(AccessTableFile, TwoLinesWithTheSameNameOrCredentialAreNamed) {
+  const std::string first = "robot strike sha256:" + Sha256Hex("secret") + "\n";
+  const std::string console = "console listen certificate:console.example.org\n";
+  for (const std::string& second :
+       {"other administer sha256:" + Sha256Hex("secret"), "robot submit sha256:" + Sha256Hex("b"),
+        std::string("other strike certificate:console.example.org"),
+        std::string("anybody strike")}) {
+    EXPECT_THAT(Read(first + console + "anybody listen\n" + second + "\n").status().ToString(),
+                testing::AllOf(HasSubstr("ACCESS_FILE_UNUSABLE: "), HasSubstr("access line 4: "),
+                               testing::ContainsRegex("that of line [123], too")))
+        << second;
+  }
+  EXPECT_TRUE(Read(first + console + "anybody listen\n").ok());
+}
+
+TEST_F(AccessTableFile, AControlCharacterIsNamed) {
+  const std::string credential = " strike sha256:" + Sha256Hex("secret") + "\n";
+  for (const char wrong : {'\0', '\x1b', '\x7f', '\r'}) {
+    EXPECT_THAT(Read("#\n" + std::string("ro") + wrong + "bot" + credential).status().ToString(),
+                testing::AllOf(HasSubstr("ACCESS_FILE_UNUSABLE: "), HasSubstr("line 2: "),
+                               HasSubstr("control character, byte 0x")))
+        << static_cast<int>(wrong);
+  }
+  EXPECT_TRUE(Read("robot" + credential.substr(0, credential.size() - 1) + "\r\n").ok());
+}
+
 TEST(AccessTable, WithoutAFileAnybodyMayDoAllButAdminister) {
   const AccessTable table = AccessTable::ForThisMachine();
   for (const Role role : {Role::kAny, Role::kListen, Role::kStrike, Role::kSubmit}) {
