@@ -236,7 +236,7 @@ absl::Status Serve(const MeasuredRooms& rooms, Options& options, const ReadOptio
 absl::Status Run(Options options, const ReadOptions& read_options) {
   BlockSignals();
   StartGuard start(LogInfo);
-  RETURN_IF_ERROR(CheckThreadsAndMemory());
+  RETURN_IF_ERROR(CheckLimits());
   SystemClock clock;
   ASSIGN_OR_RETURN(const DataDirectory directory, DataDirectory::Open(options.data_directory));
   ASSIGN_OR_RETURN(const std::unique_ptr<ModeDatabase> database,

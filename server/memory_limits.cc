@@ -2,6 +2,7 @@
 #include "server/memory_limits.h"
 
 #include <sys/mman.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <cstddef>
@@ -17,6 +18,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon {
 namespace {
@@ -26,6 +28,10 @@ constexpr size_t kThreadCount = 40;
 /// Address space apart from stacks. A daemon that serves has 180 MiB, of which its program and
 /// libraries, which are there already, take 100 MiB.
 constexpr size_t kMemoryBytes = size_t{80} << 20U;
+
+/// A daemon that serves on a Unix socket and the null device has 22 descriptors. Sound cards,
+/// metrics, decompositions and connections need more.
+constexpr rlim_t kDescriptorCount = 64;
 
 absl::Status TooLittle(absl::string_view what) {
   return Refusal(absl::StatusCode::kResourceExhausted, "SERVER_OUT_OF_MEMORY",
@@ -76,9 +82,26 @@ void Say(absl::string_view text) {
   std::abort();
 }
 
+absl::Status CheckDescriptors() {
+  rlimit limit{};
+  if (getrlimit(RLIMIT_NOFILE, &limit) != 0 || limit.rlim_cur >= kDescriptorCount) {
+    return absl::OkStatus();
+  }
+  if (limit.rlim_max >= kDescriptorCount) {
+    limit.rlim_cur = kDescriptorCount;
+    if (setrlimit(RLIMIT_NOFILE, &limit) == 0) return absl::OkStatus();
+  }
+  return Refusal(absl::StatusCode::kResourceExhausted, "TOO_FEW_DESCRIPTORS",
+                 absl::StrCat("the daemon may open ", limit.rlim_max, " descriptors, and needs ",
+                              kDescriptorCount,
+                              ", and one more for each connection: raise the hard limit (ulimit "
+                              "-Hn; systemd's LimitNOFILE=)"));
+}
+
 }  // namespace
 
-absl::Status CheckThreadsAndMemory() {
+absl::Status CheckLimits() {
+  RETURN_IF_ERROR(CheckDescriptors());
   std::latch done(1);
   std::vector<std::thread> threads;
   threads.reserve(kThreadCount);

@@ -3,6 +3,7 @@
 
 #include <sys/types.h>
 
+#include <chrono>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -14,6 +15,10 @@ namespace carillon::cli {
 /// The process that listens at a Unix socket. Errors: Unavailable (SERVER_UNAVAILABLE), if no
 /// process listens there or this user may not connect.
 absl::StatusOr<pid_t> ProcessAt(const std::string& socket_path);
+
+/// Whether the process at a Unix socket takes no connection, or sends nothing on one within the
+/// time. A daemon sends its HTTP/2 settings at once. False if no process listens there.
+bool IsMute(const std::string& socket_path, std::chrono::milliseconds time);
 
 /// Whether a thread of the process has real-time priority; absent: this user may not see that.
 std::optional<bool> HasRealtimeThread(pid_t process);
