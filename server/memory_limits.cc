@@ -5,6 +5,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cstddef>
 #include <cstdlib>
 #include <exception>
@@ -15,6 +16,7 @@
 #include <vector>
 
 #include "absl/cleanup/cleanup.h"
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
 #include "proto/cpp/error_reason.h"
@@ -53,7 +55,15 @@ void Say(absl::string_view text) {
   [[maybe_unused]] const ssize_t written = write(STDERR_FILENO, text.data(), text.size());
 }
 
+/// Whether the process is stopping anyway.
+std::atomic<bool> expects_end{false};
+
 [[noreturn]] void EndWithoutMemory() {
+  if (expects_end) {
+    Say("warning: SERVER_OUT_OF_MEMORY: the stop is cut short, because no memory or threads are "
+        "left; nothing that was acknowledged is lost\n");
+    std::_Exit(EXIT_SUCCESS);
+  }
   Say("error: SERVER_OUT_OF_MEMORY: the daemon has no memory or threads left, and ends: raise its "
       "limits (ulimit -v, ulimit -u; systemd's LimitAS=, MemoryMax=, TasksMax=)\n");
   std::_Exit(EXIT_FAILURE);
@@ -73,6 +83,8 @@ void Say(absl::string_view text) {
     Say(error.what());
     Say("\n");
   } catch (const std::exception& error) {
+    // The library of tasks within Embree throws this for want of a thread.
+    if (absl::StartsWith(error.what(), "pthread_create has failed")) EndWithoutMemory();
     Say("error: the daemon ends on an exception: ");
     Say(error.what());
     Say("\n");
@@ -117,6 +129,8 @@ absl::Status CheckLimits() {
   }
   return HasAddressSpace() ? absl::OkStatus() : TooLittle("bytes of address space");
 }
+
+void ExpectEnd() { expects_end = true; }
 
 void ReportUncaughtExceptions() { std::set_terminate(EndOnException); }
 

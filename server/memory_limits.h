@@ -17,4 +17,8 @@ absl::Status CheckLimits();
 /// power.
 void ReportUncaughtExceptions();
 
+/// Lets lack of memory or threads end the process with status 0 from now on, because it is stopping
+/// anyway. A library may need a thread for its own stop.
+void ExpectEnd();
+
 }  // namespace carillon

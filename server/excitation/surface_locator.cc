@@ -242,10 +242,14 @@ absl::StatusOr<std::unique_ptr<SurfaceLocator>> SurfaceLocator::Make(
   RETURN_IF_ERROR(Check(surfaces));
   auto index = std::make_unique<Index>(surfaces);
   if (const RTCError error = rtcGetDeviceError(index->device); error != RTC_ERROR_NONE) {
-    return Refusal(
-        absl::StatusCode::kInternal, "INTERNAL",
-        absl::StrCat("the index of ", surfaces.triangles.size(),
-                     " triangles could not be built, Embree error ", static_cast<int>(error)));
+    const std::string what =
+        absl::StrCat("the index of ", surfaces.triangles.size(), " triangles could not be built");
+    if (error == RTC_ERROR_OUT_OF_MEMORY) {
+      return Refusal(absl::StatusCode::kResourceExhausted, "SERVER_OUT_OF_MEMORY",
+                     absl::StrCat(what, ": ask for less, or give the daemon more memory"));
+    }
+    return Refusal(absl::StatusCode::kInternal, "INTERNAL",
+                   absl::StrCat(what, ", Embree error ", static_cast<int>(error)));
   }
   return std::unique_ptr<SurfaceLocator>(new SurfaceLocator(std::move(index)));
 }
