@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <string>
 
+#include "absl/strings/str_cat.h"
 #include "server/base/sha256.h"
 #include "tests/server/mode_database/sample_model.h"
 
@@ -74,9 +75,10 @@ TEST_F(AccessTableFile, TwoLinesWithTheSameNameOrCredentialAreNamed) {
        {"other administer sha256:" + Sha256Hex("secret"), "robot submit sha256:" + Sha256Hex("b"),
         std::string("other strike certificate:console.example.org"),
         std::string("anybody strike")}) {
-    EXPECT_THAT(Read(first + console + "anybody listen\n" + second + "\n").status().ToString(),
-                testing::AllOf(HasSubstr("ACCESS_FILE_UNUSABLE: "), HasSubstr("access line 4: "),
-                               testing::ContainsRegex("that of line [123], too")))
+    EXPECT_THAT(
+        Read(absl::StrCat(first, console, "anybody listen\n", second, "\n")).status().ToString(),
+        testing::AllOf(HasSubstr("ACCESS_FILE_UNUSABLE: "), HasSubstr("access line 4: "),
+                       testing::ContainsRegex("that of line [123], too")))
         << second;
   }
   EXPECT_TRUE(Read(first + console + "anybody listen\n").ok());
