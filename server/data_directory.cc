@@ -25,9 +25,21 @@ absl::Status Unusable(const std::filesystem::path& path, int error) {
                               "; choose another with --data-dir"));
 }
 
-/// A worker that a killed daemon was just starting holds the lock until it runs its own program.
-bool LockWithinASecond(int lock) {
-  for (int tries = 20; flock(lock, LOCK_EX | LOCK_NB) != 0; --tries) {
+absl::Status InUse(const std::filesystem::path& path) {
+  return Refusal(absl::StatusCode::kFailedPrecondition, "DATA_DIRECTORY_IN_USE",
+                 absl::StrCat("another daemon uses \"", path.string(),
+                              "\"; stop it, or choose another folder with --data-dir"));
+}
+
+bool TryLock(int descriptor) { return flock(descriptor, LOCK_EX | LOCK_NB) == 0; }
+
+/// Returns whether nobody else has locked the folder. A file system that cannot lock folders leaves
+/// the protection to the file `lock`.
+bool TryLockFolder(int folder) { return TryLock(folder) || errno != EWOULDBLOCK; }
+
+/// A worker that a killed daemon was just starting holds the locks until it runs its own program.
+bool LockWithinASecond(int folder, int file) {
+  for (int tries = 20; !(TryLockFolder(folder) && TryLock(file)); --tries) {
     if (tries == 0) return false;
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
   }
@@ -40,23 +52,28 @@ absl::StatusOr<DataDirectory> DataDirectory::Open(const std::filesystem::path& p
   std::error_code error;
   std::filesystem::create_directories(std::filesystem::absolute(path).parent_path(), error);
   if (mkdir(path.c_str(), 0700) != 0 && errno != EEXIST) return Unusable(path, errno);
-  const int lock = open((path / "lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
-  if (lock < 0) return Unusable(path, errno);
-  if (LockWithinASecond(lock)) return DataDirectory(path, lock);
-  close(lock);
-  return Refusal(absl::StatusCode::kFailedPrecondition, "DATA_DIRECTORY_IN_USE",
-                 absl::StrCat("another daemon uses \"", path.string(),
-                              "\"; stop it, or choose another folder with --data-dir"));
+  const int folder = open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (folder < 0) return Unusable(path, errno);
+  const int file = open((path / "lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+  const int reason = errno;
+  DataDirectory directory(path, folder, file);
+  if (file < 0) return Unusable(path, reason);
+  if (!LockWithinASecond(folder, file)) return InUse(path);
+  return directory;
 }
 
-DataDirectory::DataDirectory(std::filesystem::path path, int lock)
-    : path_(std::move(path)), lock_(lock) {}
+DataDirectory::DataDirectory(std::filesystem::path path, int folder, int file)
+    : path_(std::move(path)), folder_(folder), file_(file) {}
 
 DataDirectory::DataDirectory(DataDirectory&& other) noexcept
-    : path_(std::move(other.path_)), lock_(std::exchange(other.lock_, -1)) {}
+    : path_(std::move(other.path_)),
+      folder_(std::exchange(other.folder_, -1)),
+      file_(std::exchange(other.file_, -1)) {}
 
 DataDirectory::~DataDirectory() {
-  if (lock_ >= 0) close(lock_);
+  for (const int descriptor : {folder_, file_}) {
+    if (descriptor >= 0) close(descriptor);
+  }
 }
 
 }  // namespace carillon

@@ -8,7 +8,10 @@
 namespace carillon {
 
 /// The daemon's folder, locked for the lifetime of this object, so that only one daemon at a time
-/// uses it. The kernel releases the lock however the process ends.
+/// uses it. Two locks are taken: on the file `lock`, which every version of the daemon respects,
+/// and on the folder itself, because somebody may remove that file. The kernel releases both
+/// however the process ends. File systems that cannot lock a folder, such as NFS, have the first
+/// only.
 class DataDirectory {
  public:
   /// Locks the folder, for which it waits up to a second. Creates it, readable by its owner only,
@@ -23,10 +26,11 @@ class DataDirectory {
   std::filesystem::path work_directory() const { return path_ / "work"; }
 
  private:
-  DataDirectory(std::filesystem::path path, int lock);
+  DataDirectory(std::filesystem::path path, int folder, int file);
 
   std::filesystem::path path_;
-  int lock_;
+  int folder_;  ///< a descriptor of the folder, locked
+  int file_;    ///< a descriptor of the file `lock`, locked
 };
 
 }  // namespace carillon

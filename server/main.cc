@@ -213,7 +213,7 @@ absl::StatusOr<std::unique_ptr<MetricsServer>> StartMetrics(const Options& optio
 
 /// Serves until a stop signal arrives, and lets the sound fade out.
 absl::Status Serve(const MeasuredRooms& rooms, Options& options, const ReadOptions& read_options,
-                   StartGuard& start) {
+                   const StopGuard& guard) {
   ASSIGN_OR_RETURN(const std::unique_ptr<MetricsServer> metrics, StartMetrics(options, rooms));
   const DatabaseKeeper keeper(rooms.database.database(), [&rooms](const absl::Status& files) {
     rooms.server.ShowDatabaseHealth(files.ok());
@@ -221,12 +221,13 @@ absl::Status Serve(const MeasuredRooms& rooms, Options& options, const ReadOptio
   });
   const HeapKeeper heap_keeper;
   LogOutput(rooms.output);
-  start.Complete();
+  guard.CompleteStart();
   AnnounceReady(rooms.server);
   const Watchdog watchdog(rooms.output);
   WaitForStop([&] { Reload(read_options, options, rooms.server); }, LogInfo);
+  ExpectEnd();
+  guard.BeginStop();
   sd_notify(0, "STOPPING=1");
-  LimitStop(LogWarning);
   rooms.output.FadeOut();
   return absl::OkStatus();
 }
@@ -235,8 +236,8 @@ absl::Status Serve(const MeasuredRooms& rooms, Options& options, const ReadOptio
 /// destroyed before them.
 absl::Status Run(Options options, const ReadOptions& read_options) {
   BlockSignals();
-  StartGuard start(LogInfo);
-  RETURN_IF_ERROR(CheckThreadsAndMemory());
+  const StopGuard guard(LogInfo);
+  RETURN_IF_ERROR(CheckLimits());
   SystemClock clock;
   ASSIGN_OR_RETURN(const DataDirectory directory, DataDirectory::Open(options.data_directory));
   ASSIGN_OR_RETURN(const std::unique_ptr<ModeDatabase> database,
@@ -271,7 +272,7 @@ absl::Status Run(Options options, const ReadOptions& read_options) {
                 .decompositions = *decompositions,
                 .database = *database,
                 .server = *server},
-               options, read_options, start);
+               options, read_options, guard);
 }
 
 /// Runs `carillond db check|repair|restore`.

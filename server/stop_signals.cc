@@ -7,9 +7,12 @@
 #include <sys/signalfd.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstdlib>
+#include <exception>
+#include <string>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -18,6 +21,7 @@ namespace carillon {
 namespace {
 
 constexpr std::chrono::milliseconds kStopLimit(4500);
+constexpr std::chrono::milliseconds kForever(-1);
 constexpr timespec kReloadPeriod{.tv_sec = 1, .tv_nsec = 0};
 
 sigset_t StopSignals() {
@@ -38,6 +42,18 @@ int OpenStopSignals() {
   return signalfd(-1, &signals, SFD_CLOEXEC);
 }
 
+/// Returns the first of two descriptors that is readable, or -1 if none is within the time. The
+/// second may be -1.
+int Await(int first, int second, std::chrono::milliseconds time) {
+  std::array<pollfd, 2> awaited{{{first, POLLIN, 0}, {second, POLLIN, 0}}};
+  int count = 0;
+  do {
+    count = poll(awaited.data(), awaited.size(), static_cast<int>(time.count()));
+  } while (count < 0);
+  if (count == 0) return -1;
+  return (awaited[0].revents & POLLIN) != 0 ? first : second;
+}
+
 }  // namespace
 
 void BlockSignals() {
@@ -48,30 +64,45 @@ void BlockSignals() {
   signal(SIGXFSZ, SIG_IGN);  // writing beyond a file-size limit then fails like a full disk
 }
 
-StartGuard::StartGuard(StopLog log)
-    : log_(std::move(log)), signals_(OpenStopSignals()), complete_(eventfd(0, EFD_CLOEXEC)) {
+StopGuard::StopGuard(StopLog log)
+    : log_(std::move(log)),
+      signals_(OpenStopSignals()),
+      complete_(eventfd(0, EFD_CLOEXEC)),
+      stopping_(eventfd(0, EFD_CLOEXEC)),
+      ended_(eventfd(0, EFD_CLOEXEC)) {
   // Without descriptors the start fails soon by itself.
-  if (signals_ >= 0 && complete_ >= 0) thread_ = std::thread([this] { Run(); });
+  if (std::min({signals_, complete_, stopping_, ended_}) < 0) return;
+  thread_ = std::thread([this] { Run(); });
 }
 
-StartGuard::~StartGuard() {
-  Complete();
-  close(signals_);
-  close(complete_);
-}
-
-void StartGuard::Complete() {
-  eventfd_write(complete_, 1);
+StopGuard::~StopGuard() {
+  CompleteStart();
+  eventfd_write(ended_, 1);
   if (thread_.joinable()) thread_.join();
+  for (const int descriptor : {signals_, complete_, stopping_, ended_}) close(descriptor);
 }
 
-void StartGuard::Run() const {
-  std::array<pollfd, 2> awaited{{{complete_, POLLIN, 0}, {signals_, POLLIN, 0}}};
-  while (poll(awaited.data(), awaited.size(), -1) < 0) {
+void StopGuard::CompleteStart() const { eventfd_write(complete_, 1); }
+
+void StopGuard::BeginStop() const { eventfd_write(stopping_, 1); }
+
+void StopGuard::Run() const {
+  // WaitForStop takes a signal that comes with the end of the start, which is not read here.
+  if (Await(complete_, signals_, kForever) == signals_) {
+    EndNow("stopping on a signal before the start was complete");
   }
-  // WaitForStop takes a signal that comes with the end of the start, which was not read here.
-  if ((awaited[0].revents & POLLIN) != 0) return;
-  log_("stopping on a signal before the start was complete");
+  if (Await(ended_, stopping_, kForever) == ended_) return;
+  if (Await(ended_, -1, kStopLimit) == ended_) return;
+  EndNow(absl::StrCat("calls still run ", kStopLimit.count(),
+                      " ms after the signal to stop, and are cut off"));
+}
+
+void StopGuard::EndNow(const std::string& line) const {
+  try {
+    log_(line);
+  } catch (const std::exception&) {
+    // The process ends well also without the memory for a line.
+  }
   std::_Exit(EXIT_SUCCESS);
 }
 
@@ -86,15 +117,6 @@ void WaitForStop(const std::function<void()>& reload, const StopLog& log) {
     received = sigtimedwait(&stops, nullptr, &kReloadPeriod);
   }
   log(absl::StrCat("stopping on ", received == SIGINT ? "SIGINT" : "SIGTERM"));
-}
-
-void LimitStop(StopLog log) {
-  std::thread([log = std::move(log)] {
-    std::this_thread::sleep_for(kStopLimit);
-    log(absl::StrCat("calls still run ", kStopLimit.count(),
-                     " ms after the signal to stop, and are cut off"));
-    std::_Exit(EXIT_SUCCESS);
-  }).detach();
 }
 
 }  // namespace carillon

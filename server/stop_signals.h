@@ -14,33 +14,39 @@ using StopLog = std::function<void(const std::string&)>;
 /// only StartGuard and WaitForStop see them. Ignores the signals that must not end the daemon.
 void BlockSignals();
 
-/// Ends the process on SIGINT and SIGTERM while the daemon starts, whatever the start waits for.
-/// Nothing that was acknowledged is lost: the database is written as for a loss of power.
-class StartGuard {
+/// Ends the process on SIGINT and SIGTERM while the daemon starts, whatever the start waits for,
+/// and if its stop takes longer than 4.5 s, for instance because a call computes. Nothing that was
+/// acknowledged is lost: the database is written as for a loss of power. The only thread is made
+/// here, so that a stop needs neither a new thread nor memory.
+class StopGuard {
  public:
-  explicit StartGuard(StopLog log);
-  ~StartGuard();
-  StartGuard(const StartGuard&) = delete;
-  StartGuard& operator=(const StartGuard&) = delete;
+  explicit StopGuard(StopLog log);
 
-  /// Ends the guard. From then on WaitForStop takes the signals.
-  void Complete();
+  /// Ends the guard.
+  ~StopGuard();
+  StopGuard(const StopGuard&) = delete;
+  StopGuard& operator=(const StopGuard&) = delete;
+
+  /// The start is complete. From then on WaitForStop takes the signals.
+  void CompleteStart() const;
+
+  /// The stop begins, which from then on has 4.5 s.
+  void BeginStop() const;
 
  private:
   void Run() const;
+  [[noreturn]] void EndNow(const std::string& line) const;
 
   const StopLog log_;
   const int signals_;   ///< readable once a signal to stop has come
   const int complete_;  ///< readable once the start is complete
+  const int stopping_;  ///< readable once the stop has begun
+  const int ended_;     ///< readable once the guard is to end
   std::thread thread_;
 };
 
 /// Returns on SIGINT and SIGTERM. SIGHUP calls `reload`, but at most once a second: signals that
 /// come sooner cause one call together.
 void WaitForStop(const std::function<void()>& reload, const StopLog& log);
-
-/// Ends the process if it has not stopped within 4.5 s, for instance because a call computes.
-/// Nothing that was acknowledged is lost, as for StartGuard.
-void LimitStop(StopLog log);
 
 }  // namespace carillon

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "client_sdk/cli/daemon_process.h"
 
+#include <poll.h>
 #include <sched.h>
 #include <sys/socket.h>
 #include <sys/un.h>
@@ -36,9 +37,26 @@ std::string WhatToDo(int error) {
       return "this user may not use the socket: for a daemon of the system, join the group "
              "carillon "
              "and log in again";
+    case EAGAIN:
+      return "it is stopped or hangs: end it, and start carillond again";
     default:
       return "see the address and its folder";
   }
+}
+
+/// Returns a socket that is connected to a Unix socket, or -1 with errno. EAGAIN: the process there
+/// does not take the connections that wait already.
+int Connected(const std::string& socket_path) {
+  sockaddr_un name{};
+  name.sun_family = AF_UNIX;
+  socket_path.copy(name.sun_path, sizeof(name.sun_path) - 1);
+  const int made = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+  if (made < 0) return -1;
+  if (connect(made, reinterpret_cast<const sockaddr*>(&name), sizeof name) == 0) return made;
+  const int error = errno;
+  close(made);
+  errno = error;
+  return -1;
 }
 
 std::string Read(const fs::path& path) {
@@ -59,21 +77,27 @@ std::optional<int> PolicyIn(const std::string& stat) {
 }  // namespace
 
 absl::StatusOr<pid_t> ProcessAt(const std::string& socket_path) {
-  sockaddr_un name{};
-  name.sun_family = AF_UNIX;
-  socket_path.copy(name.sun_path, sizeof(name.sun_path) - 1);
-  const int made = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  const int made = Connected(socket_path);
+  const int error = errno;
   const absl::Cleanup close_socket = [made] { close(made); };
   ucred credentials{};
   socklen_t size = sizeof credentials;
-  if (connect(made, reinterpret_cast<const sockaddr*>(&name), sizeof name) != 0 ||
-      getsockopt(made, SOL_SOCKET, SO_PEERCRED, &credentials, &size) != 0) {
-    const int error = errno;
-    return Refusal(absl::StatusCode::kUnavailable, "SERVER_UNAVAILABLE",
-                   absl::StrCat("nobody listens at ", socket_path, " (",
-                                std::generic_category().message(error), "): ", WhatToDo(error)));
+  if (made >= 0 && getsockopt(made, SOL_SOCKET, SO_PEERCRED, &credentials, &size) == 0) {
+    return credentials.pid;
   }
-  return credentials.pid;
+  return Refusal(
+      absl::StatusCode::kUnavailable, "SERVER_UNAVAILABLE",
+      absl::StrCat(error == EAGAIN ? "the process takes no connection at " : "nobody listens at ",
+                   socket_path, " (", std::generic_category().message(error),
+                   "): ", WhatToDo(error)));
+}
+
+bool IsMute(const std::string& socket_path, std::chrono::milliseconds time) {
+  const int made = Connected(socket_path);
+  if (made < 0) return errno == EAGAIN;
+  const absl::Cleanup close_socket = [made] { close(made); };
+  pollfd awaited{made, POLLIN, 0};
+  return poll(&awaited, 1, static_cast<int>(time.count())) == 0;
 }
 
 std::optional<bool> HasRealtimeThread(pid_t process) {

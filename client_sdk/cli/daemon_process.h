@@ -3,6 +3,7 @@
 
 #include <sys/types.h>
 
+#include <chrono>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -14,6 +15,11 @@ namespace carillon::cli {
 /// Returns the process that listens at a Unix socket. Errors: Unavailable (SERVER_UNAVAILABLE), if
 /// no process listens there or this user may not connect.
 absl::StatusOr<pid_t> ProcessAt(const std::string& socket_path);
+
+/// Returns whether the process at a Unix socket takes no connection, or sends nothing on one within
+/// the time. A daemon sends its HTTP/2 settings at once. If no process listens there, the result is
+/// false.
+bool IsMute(const std::string& socket_path, std::chrono::milliseconds time);
 
 /// Returns whether a thread of the process has real-time priority, or nothing if this user may not
 /// see that.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "client_sdk/cli/doctor_command.h"
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <iostream>
@@ -30,6 +31,8 @@ constexpr double kHighLoad = 0.7;
 constexpr absl::Duration kEnoughTime = absl::Hours(30 * 24);
 /// The doctor watches the sound for this time where frames were lost before.
 constexpr absl::Duration kWatchedTime = absl::Seconds(2);
+/// The time within which a daemon must have sent something, however busy it is.
+constexpr std::chrono::seconds kMuteTime(5);
 
 std::string Text(const absl::Status& status) { return std::string(status.message()); }
 
@@ -171,7 +174,20 @@ void CheckCertificates(const client::Client& daemon, Findings& findings) {
                             "reload the daemon (systemctl reload carillond)"));
 }
 
+/// Returns whether the process at the daemon's socket answers at all. A call would wait for 20 s.
+bool CheckAnswers(const Program& program, Findings& findings) {
+  absl::string_view path = program.server;
+  if (!absl::ConsumePrefix(&path, "unix:") || !IsMute(std::string(path), kMuteTime)) return true;
+  CheckProcess(program, findings);
+  findings.Bad("daemon",
+               absl::StrCat("the process at ", path, " has sent nothing for ", kMuteTime.count(),
+                            " s: it is stopped, hangs, or is not carillond: see which it "
+                            "is (ss -xlp), end it, and start carillond again"));
+  return false;
+}
+
 void CheckDaemon(const Program& program, Findings& findings) {
+  if (!CheckAnswers(program, findings)) return;
   const auto daemon = program.Daemon();
   const auto mixer = daemon->GetMixer();
   CheckProcess(program, findings);

@@ -19,19 +19,24 @@ namespace {
 
 constexpr unsigned kEveryRole = ~0U;
 
-/// Returns the alternative names of the client's certificate, or its common name if it has none.
-/// gRPC shows a certificate only if an authority of --tls-client-roots vouches for it.
-std::vector<std::string> CertificateNames(const grpc::CallbackServerContext& context) {
-  std::vector<std::string> names;
-  const auto identity = context.auth_context();
-  if (!identity) return names;
-  for (const char* property : {GRPC_X509_SAN_PROPERTY_NAME, GRPC_X509_CN_PROPERTY_NAME}) {
-    for (const grpc::string_ref& name : identity->FindPropertyValues(property)) {
-      names.emplace_back(name.data(), name.size());
-    }
-    if (!names.empty()) break;
+std::vector<std::string> Values(const grpc::AuthContext& identity, const char* property) {
+  std::vector<std::string> values;
+  for (const grpc::string_ref& value : identity.FindPropertyValues(property)) {
+    values.emplace_back(value.data(), value.size());
   }
-  return names;
+  return values;
+}
+
+/// Returns the DNS names of the client's certificate, or its common name if it has no alternative
+/// name of any kind. E-mail addresses, URIs and IP addresses are not names of callers, because an
+/// authority may let its users choose them. gRPC shows a certificate only if an authority of
+/// --tls-client-roots vouches for it.
+std::vector<std::string> CertificateNames(const grpc::CallbackServerContext& context) {
+  const auto identity = context.auth_context();
+  if (!identity) return {};
+  const bool has_alternative = !Values(*identity, GRPC_X509_SAN_PROPERTY_NAME).empty();
+  return Values(*identity,
+                has_alternative ? GRPC_PEER_DNS_PROPERTY_NAME : GRPC_X509_CN_PROPERTY_NAME);
 }
 
 absl::Status WrongToken() {

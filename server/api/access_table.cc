@@ -40,6 +40,25 @@ absl::StatusOr<unsigned> ParseRoles(absl::string_view text) {
   return roles;
 }
 
+absl::Status CheckCharacters(absl::string_view line) {
+  const auto* const wrong = std::find_if(line.begin(), line.end(), [](char c) {
+    return c != '\t' && absl::ascii_iscntrl(static_cast<unsigned char>(c));
+  });
+  if (wrong == line.end()) return absl::OkStatus();
+  return WrongLine(absl::StrCat("the line has a control character, byte 0x",
+                                absl::Hex(static_cast<unsigned char>(*wrong), absl::kZeroPad2),
+                                ": remove it"));
+}
+
+/// `what` is "name" or "credential".
+absl::Status CheckIsNew(absl::string_view what, const std::string& word, int number,
+                        std::map<std::string, int>& lines) {
+  const auto [known, is_new] = lines.emplace(word, number);
+  if (is_new) return absl::OkStatus();
+  return WrongLine(absl::StrCat("the ", what, " is that of line ", known->second,
+                                ", too: remove or correct one of the two lines"));
+}
+
 bool IsSameDigest(const std::string& a, const std::string& b) {
   return a.size() == b.size() && CRYPTO_memcmp(a.data(), b.data(), a.size()) == 0;
 }
@@ -73,10 +92,11 @@ AccessTable AccessTable::ForThisMachine() {
 absl::StatusOr<AccessTable> AccessTable::Read(const std::string& path) {
   ASSIGN_OR_RETURN(const std::string content, ReadPrivateFile(path, kReason));
   AccessTable table;
+  LinesByWord lines;
   int number = 0;
   for (const absl::string_view line : absl::StrSplit(content, '\n')) {
     ++number;
-    const absl::Status read = table.ReadLine(absl::StripAsciiWhitespace(line));
+    const absl::Status read = table.ReadLine(absl::StripAsciiWhitespace(line), number, lines);
     if (read.ok()) continue;
     return WrongLine(absl::StrCat(
         path, " line ", number, ": ", ToErrorInfo(read).message(),
@@ -85,12 +105,14 @@ absl::StatusOr<AccessTable> AccessTable::Read(const std::string& path) {
   return table;
 }
 
-absl::Status AccessTable::ReadLine(absl::string_view line) {
+absl::Status AccessTable::ReadLine(absl::string_view line, int number, LinesByWord& lines) {
   if (line.empty() || line.front() == '#') return absl::OkStatus();
+  RETURN_IF_ERROR(CheckCharacters(line));
   const std::vector<std::string> words =
       absl::StrSplit(line, absl::ByAnyChar(" \t"), absl::SkipEmpty());
   if (words.size() < 2) return WrongLine("the line has no roles");
   ASSIGN_OR_RETURN(const unsigned roles, ParseRoles(words[1]));
+  RETURN_IF_ERROR(CheckIsNew("name", words[0], number, lines));
   if (words[0] == anybody_.name && words.size() == 2) {
     anybody_.roles = roles;
     return absl::OkStatus();
@@ -109,6 +131,8 @@ absl::Status AccessTable::ReadLine(absl::string_view line) {
         "the third word is neither sha256: with 64 hexadecimal digits nor certificate:"
         " with a name");
   }
+  // No name has a blank, so that none is taken for a credential.
+  RETURN_IF_ERROR(CheckIsNew("credential", absl::StrCat(" ", words[2]), number, lines));
   entries_.push_back(std::move(entry));
   return absl::OkStatus();
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <map>
 #include <string>
 #include <vector>
 
@@ -51,9 +52,9 @@ class AccessTable {
   /// Reads lines of the form "NAME ROLES CREDENTIAL". ROLES are separated by commas; CREDENTIAL is
   /// "sha256:" with the digest of a token, or "certificate:" with a name in a client's certificate.
   /// The name "anybody", without a credential, stands for callers that show neither a token nor a
-  /// certificate. Lines that begin with # are ignored. Errors: FailedPrecondition
-  /// (ACCESS_FILE_UNUSABLE: the file cannot be read, others may read or change it, or a line is
-  /// wrong).
+  /// certificate. No two lines may have the same name or the same credential. Lines that begin with
+  /// # are ignored. Errors: FailedPrecondition (ACCESS_FILE_UNUSABLE: the file cannot be read,
+  /// others may read or change it, a line is wrong, or two lines contradict each other).
   static absl::StatusOr<AccessTable> Read(const std::string& path);
 
   /// Returns the caller with this token, or null.
@@ -72,7 +73,10 @@ class AccessTable {
     std::string certificate_name{};  ///< empty if it has no certificate
   };
 
-  absl::Status ReadLine(absl::string_view line);
+  /// For each name and credential, the number of its line.
+  using LinesByWord = std::map<std::string, int>;
+
+  absl::Status ReadLine(absl::string_view line, int number, LinesByWord& lines);
 
   std::vector<Entry> entries_;
   Principal anybody_{.name = "anybody"};

@@ -17,6 +17,7 @@
 #include <cerrno>
 #include <chrono>
 #include <cstring>
+#include <optional>
 #include <system_error>
 #include <utility>
 
@@ -45,6 +46,8 @@ constexpr size_t kUnixPart = 64;
 constexpr int kForgettingPauses = 8;
 /// Pause after an accept that failed for lack of descriptors or memory.
 constexpr std::chrono::milliseconds kPause(50);
+/// Time between two looks at the socket files.
+constexpr std::chrono::milliseconds kLookPeriod(1000);
 
 absl::Status Failed(const ListenAddress& address, int error) {
   const bool in_use = error == EADDRINUSE;
@@ -123,16 +126,10 @@ void ConnectionGate::Close() {
   eventfd_write(stop_, 1);
   if (thread_.joinable()) thread_.join();
   // Before the sockets are closed, their inodes belong to no other file.
-  for (const SocketFile& file : socket_files_) file.Remove();
+  for (const WatchedFile& watched : socket_files_) watched.file.Remove();
   for (const Door& door : doors_) close(door.socket);
   doors_.clear();
   socket_files_.clear();
-}
-
-void ConnectionGate::SocketFile::Remove() const {
-  struct stat now {};
-  if (lstat(path.c_str(), &now) != 0 || now.st_dev != device || now.st_ino != inode) return;
-  unlink(path.c_str());
 }
 
 absl::Status ConnectionGate::Listen(ListenAddress& address,
@@ -150,9 +147,9 @@ absl::Status ConnectionGate::ListenUnix(const ListenAddress& address, Connection
   const int bound = Bind(reinterpret_cast<const sockaddr*>(&name), sizeof name);
   if (bound < 0) return Failed(address, errno);
   doors_.push_back({bound, &taker});
-  struct stat status {};
-  if (lstat(address.socket_path.c_str(), &status) != 0) return Failed(address, errno);
-  socket_files_.push_back({address.socket_path, status.st_dev, status.st_ino});
+  std::optional<SocketFile> file = SocketFile::Remember(address.socket_path);
+  if (!file) return Failed(address, errno);
+  socket_files_.push_back({.file = *std::move(file)});
   if (chmod(address.socket_path.c_str(), mode) != 0) return Failed(address, errno);
   return absl::OkStatus();
 }
@@ -190,10 +187,25 @@ void ConnectionGate::Open() {
 void ConnectionGate::Run() {
   std::vector<pollfd> awaited{{stop_, POLLIN, 0}};
   for (const Door& door : doors_) awaited.push_back({door.socket, POLLIN, 0});
-  while (poll(awaited.data(), awaited.size(), -1) < 0 || (awaited[0].revents & POLLIN) == 0) {
+  const auto period = socket_files_.empty() ? -1 : static_cast<int>(kLookPeriod.count());
+  while (poll(awaited.data(), awaited.size(), period) < 0 || (awaited[0].revents & POLLIN) == 0) {
     for (size_t i = 0; i < doors_.size(); ++i) {
       if ((awaited[i + 1].revents & POLLIN) != 0) Accept(doors_[i]);
     }
+    LookAtSocketFiles();
+  }
+}
+
+void ConnectionGate::LookAtSocketFiles() {
+  const auto now = Now();
+  if (log_ == nullptr || now < next_look_) return;
+  next_look_ = now + kLookPeriod;
+  for (WatchedFile& watched : socket_files_) {
+    const bool was_in_place = std::exchange(watched.was_in_place, watched.file.IsInPlace());
+    if (!was_in_place || watched.was_in_place) continue;
+    log_->Warn(absl::StrCat("somebody removed or replaced the socket ", watched.file.path(),
+                            ", so that new clients do not find this daemon: put the file back, or "
+                            "restart the daemon; open connections go on"));
   }
 }
 
@@ -204,9 +216,12 @@ void ConnectionGate::Accept(const Door& door) {
   const int connection = accept4(door.socket, reinterpret_cast<sockaddr*>(&address), &size,
                                  SOCK_NONBLOCK | SOCK_CLOEXEC);
   if (connection < 0) {
-    if (errno != EAGAIN && errno != ECONNABORTED && errno != EINTR) {
-      std::this_thread::sleep_for(kPause);
-    }
+    const int error = errno;
+    if (error == EAGAIN || error == ECONNABORTED || error == EINTR) return;
+    WarnOnce("", absl::StrCat("cannot accept connections (", std::generic_category().message(error),
+                              "), and new clients wait: raise the daemon's limit of descriptors "
+                              "(ulimit -n; systemd's LimitNOFILE=), or end some of its clients"));
+    std::this_thread::sleep_for(kPause);
     return;
   }
   const std::string peer = PeerNameOf(connection, address, ++accepted_count_);
@@ -269,12 +284,16 @@ std::string ConnectionGate::WhyNoPlace(const std::string& source) const {
 }
 
 void ConnectionGate::Tell(const std::string& source, const std::string& reason) {
+  WarnOnce(source,
+           absl::StrCat("closed a new connection from ", source, ": ", reason,
+                        "; for 30 s further ones that reach a limit are closed without a line"));
+}
+
+void ConnectionGate::WarnOnce(const std::string& subject, const std::string& line) {
   if (log_ == nullptr) return;
   const auto now = Now();
   std::erase_if(told_, [now](const auto& each) { return each.second <= now; });
-  if (!told_.emplace(source, now + kRefusal).second) return;
-  log_->Warn(absl::StrCat("closed a new connection from ", source, ": ", reason,
-                          "; for 30 s further ones that reach a limit are closed without a line"));
+  if (told_.emplace(subject, now + kRefusal).second) log_->Warn(line);
 }
 
 bool ConnectionGate::IsOpen(const std::string& peer) const {

@@ -16,6 +16,7 @@
 #include "absl/status/statusor.h"
 #include "server/api/limited_log.h"
 #include "server/api/listen_address.h"
+#include "server/api/socket_file.h"
 #include "server/base/mutex.h"
 
 namespace carillon {
@@ -54,8 +55,9 @@ class ConnectionGate {
 
   /// A process (Unix) or address (TCP) may have the share `client_share`, as ClientLimits has it,
   /// of `max_connection_count`. `log`, which may be null, takes a line about the first connection
-  /// that is closed for a limit, and a further line only after kRefusal has passed. `log` must
-  /// outlive the gate.
+  /// that is closed for a limit, and a further line only after kRefusal has passed. It also takes a
+  /// line if no connection can be accepted, and if somebody removes or replaces a Unix socket. `log`
+  /// must outlive the gate.
   explicit ConnectionGate(size_t max_connection_count, double client_share = 1,
                           LimitedLog* log = nullptr, SourceFunction& source_of = SourceOfPeer);
 
@@ -96,12 +98,9 @@ class ConnectionGate {
     ConnectionTaker* taker;
   };
   /// A Unix socket that the gate has bound.
-  struct SocketFile {
-    std::string path;
-    dev_t device;
-    ino_t inode;
-    /// Removes the socket, unless another daemon has put its own in its place meanwhile.
-    void Remove() const;
+  struct WatchedFile {
+    SocketFile file;
+    bool was_in_place = true;  ///< at the last look; only the gate's thread uses it
   };
   /// An open connection. Once the taker has closed it, the descriptor has no inode or the inode of
   /// another file, by which the gate sees that the connection is closed.
@@ -124,6 +123,10 @@ class ConnectionGate {
   /// Returns why a process or address gets no place, or an empty string if it gets one.
   std::string WhyNoPlace(const std::string& source) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void Tell(const std::string& source, const std::string& reason);
+  /// Logs a line, unless a line about the same `subject` was logged within kRefusal.
+  void WarnOnce(const std::string& subject, const std::string& line);
+  /// Logs at most once a second which socket files somebody has removed or replaced meanwhile.
+  void LookAtSocketFiles();
 
   const size_t max_connection_count_;
   const double client_share_;
@@ -131,7 +134,7 @@ class ConnectionGate {
   SourceFunction& source_of_;
   std::vector<std::unique_ptr<ConnectionTaker>> takers_;
   std::vector<Door> doors_;
-  std::vector<SocketFile> socket_files_;
+  std::vector<WatchedFile> socket_files_;
   uint64_t accepted_count_ = 0;
   mutable Mutex mutex_;
   /// Connections by peer. Some of them may have been closed.
@@ -141,8 +144,10 @@ class ConnectionGate {
   std::chrono::steady_clock::time_point next_forgetting_ ABSL_GUARDED_BY(mutex_);
   /// For each refused process or address, the time until which its connections are closed at once.
   std::map<std::string, std::chrono::steady_clock::time_point> refused_ ABSL_GUARDED_BY(mutex_);
-  /// For each process or address that reached a limit, the time until which nothing is logged about
-  /// it. Only the gate's thread uses it.
+  /// The time of the next look at the socket files. Only the gate's thread uses it.
+  std::chrono::steady_clock::time_point next_look_;
+  /// For each process or address that reached a limit, and for the gate's own trouble, the time
+  /// until which nothing is logged about it. Only the gate's thread uses it.
   std::map<std::string, std::chrono::steady_clock::time_point> told_;
   int stop_;  ///< becomes readable when the gate is to end
   std::thread thread_;

@@ -17,6 +17,7 @@
 #include "server/api/send_call.h"
 #include "server/api/transfer_spool.h"
 #include "server/mode_database/database.h"
+#include "server/mode_database/imported_figures.h"
 
 namespace carillon {
 namespace {
@@ -59,6 +60,9 @@ class ModelSink {
     if (request.record().record_case() == v1::ModalModelRecord::kTransfer) {
       return transfers_.Append(request.record().transfer());
     }
+    if (request.record().has_header()) {
+      RETURN_IF_ERROR(CheckFigures(request.record().header()));
+    }
     return import_->Append(request.record());
   }
 
@@ -68,7 +72,8 @@ class ModelSink {
                      "no record was sent; send the header, then every chunk");
     }
     // All transfers are checked before anything is stored.
-    RETURN_IF_ERROR(transfers_.ForEach([](const StoredTransfer&) { return absl::OkStatus(); }));
+    RETURN_IF_ERROR(transfers_.ForEach(
+        [](const StoredTransfer& transfer) { return CheckFigures(transfer.header()); }));
     ASSIGN_OR_RETURN(const ModelSummary summary, import_->Finish());
     RETURN_IF_ERROR(transfers_.ForEach([&](const StoredTransfer& transfer) {
       return database_->transfers().Put(summary.digest, transfer).status();

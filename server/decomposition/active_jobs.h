@@ -40,6 +40,7 @@ struct ActiveJob {
   bool yields = false;          ///< its run is ended to make room, and repeated
   bool again = false;           ///< submitted after a cancel: it runs once more after this run
   bool deleted = false;         ///< its model was deleted: the result is not stored
+  bool was_killed = false;      ///< somebody else ended its worker once
   uint64_t number = 0;          ///< order in which jobs of one priority start
   uint64_t guess_bytes = 0;     ///< predicted memory, before the correction by experience
   uint64_t estimate_bytes = 0;  ///< predicted memory

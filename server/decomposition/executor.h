@@ -32,6 +32,9 @@ struct Outcome {
   /// Set with kOutOfMemory if the worker kept to its own limit, but all workers together exceeded
   /// the budget. The task may succeed if it runs alone.
   bool crowded = false;
+  /// Set with kOutOfMemory if somebody else killed the worker. That was the system for lack of
+  /// memory, or a person by mistake, which cannot be told apart.
+  bool killed = false;
 };
 
 /// One decomposition to run, or one transfer to compute. Threads of the executor call its

@@ -205,6 +205,12 @@ bool JobRuns::RunsAgain(ActiveJob& job, const Outcome& result) const {
     job.estimate_bytes = std::max(2 * job.estimate_bytes, result.peak_bytes * 3 / 2);
     return true;
   }
+  if (result.killed && !std::exchange(job.was_killed, true)) {
+    job.estimate_bytes = std::max(2 * job.estimate_bytes, result.peak_bytes * 3 / 2);
+    settings_.log(absl::StrCat("jobs/", job.record.digest,
+                               " is computed once more, because its process was killed"));
+    return true;
+  }
   const bool radiates = !job.record.transfer_of.empty();
   if (!radiates && DependsOnWay(result) && job.record.way + 1 < kWayCount) {
     ++job.record.way;

@@ -3,6 +3,7 @@
 
 #include <poll.h>
 #include <sys/eventfd.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -128,6 +129,8 @@ class LocalExecutor final : public Executor {
   // Runs on the thread for files. Each run has a folder of its own, because the folder of the run
   // before may still exist.
   void Prepare(const DecompositionTask& task) {
+    // Somebody may have removed the folder of all runs. Any other fault is found below.
+    mkdir(options_.directory.c_str(), 0700);
     const std::filesystem::path folder =
         options_.directory / absl::StrCat(task.digest, "-", ++folder_count_);
     absl::StatusOr<PreparedTask> prepared = PreparedTask::Make(task, folder);

@@ -217,10 +217,11 @@ Outcome LocalWorker::Judge(const ProcessEnd& end) const {
 
 Outcome LocalWorker::JudgeFailure(const ProcessEnd& end) const {
   if (!end.exited && end.status == SIGKILL) {
-    // This class did not kill it, so the kernel did, for lack of memory.
-    return {Verdict::kOutOfMemory,
-            OutOfMemory(absl::StrCat("was killed by the system", WouldNeed(node_count_))),
-            {}};
+    Outcome outcome{Verdict::kOutOfMemory,
+                    OutOfMemory(absl::StrCat("was killed by the system", WouldNeed(node_count_))),
+                    {}};
+    outcome.killed = true;
+    return outcome;
   }
   if (end.exited && reported_.has_value()) {
     return {VerdictOfReport(reported_->reason()), *reported_, {}};

@@ -6,9 +6,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <latch>
 #include <limits>
 #include <optional>
+#include <system_error>
+#include <thread>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
@@ -18,6 +22,9 @@
 
 namespace carillon {
 namespace {
+
+/// The number of threads for which there must be room before Embree is called.
+constexpr size_t kProbedThreadCount = 4;
 
 absl::Status Malformed(absl::string_view message) {
   return Refusal(absl::StatusCode::kInvalidArgument, "SURFACE_MALFORMED", message);
@@ -49,6 +56,31 @@ absl::Status Check(const LocatorSurfaces& surfaces) {
                                   " triangles of the sounding surface: compute the model again"));
   }
   return status;
+}
+
+absl::Status OutOfMemory(const LocatorSurfaces& surfaces) {
+  return Refusal(
+      absl::StatusCode::kResourceExhausted, "SERVER_OUT_OF_MEMORY",
+      absl::StrCat("there is too little memory, or there are too few threads, for the "
+                   "index of ",
+                   surfaces.triangles.size(), " triangles: ask for less, or give the daemon more"));
+}
+
+/// Returns whether the system gives this process a few threads. The library of tasks within Embree
+/// begins threads of its own now and then, and ends the process if it gets none.
+bool SystemGivesThreads() {
+  std::latch done(1);
+  std::vector<std::thread> threads;
+  bool given = true;
+  try {
+    threads.reserve(kProbedThreadCount);
+    while (threads.size() < kProbedThreadCount) threads.emplace_back([&done] { done.wait(); });
+  } catch (const std::system_error&) {
+    given = false;
+  }
+  done.count_down();
+  for (std::thread& thread : threads) thread.join();
+  return given;
 }
 
 Point ToPoint(const std::array<float, 3>& vertex) { return {vertex[0], vertex[1], vertex[2]}; }
@@ -240,8 +272,10 @@ SurfaceLocator::~SurfaceLocator() = default;
 absl::StatusOr<std::unique_ptr<SurfaceLocator>> SurfaceLocator::Make(
     const LocatorSurfaces& surfaces) {
   RETURN_IF_ERROR(Check(surfaces));
+  if (!SystemGivesThreads()) return OutOfMemory(surfaces);
   auto index = std::make_unique<Index>(surfaces);
   if (const RTCError error = rtcGetDeviceError(index->device); error != RTC_ERROR_NONE) {
+    if (error == RTC_ERROR_OUT_OF_MEMORY) return OutOfMemory(surfaces);
     return Refusal(
         absl::StatusCode::kInternal, "INTERNAL",
         absl::StrCat("the index of ", surfaces.triangles.size(),

@@ -35,7 +35,7 @@ struct LocatedPoint {
 class SurfaceLocator {
  public:
   /// Makes a locator. Errors: INVALID_ARGUMENT (SURFACE_MALFORMED: no triangle, or an index out of
-  /// range).
+  /// range), RESOURCE_EXHAUSTED (SERVER_OUT_OF_MEMORY).
   static absl::StatusOr<std::unique_ptr<SurfaceLocator>> Make(const LocatorSurfaces& surfaces);
   ~SurfaceLocator();
 

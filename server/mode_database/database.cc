@@ -136,7 +136,7 @@ absl::Status Database::WriteToFree(absl::FunctionRef<absl::Status(SqliteConnecti
   if (!has_no_room(status)) return status;
   reserve_.Release();
   status = WriteLocked(body);
-  if (!absl::IsResourceExhausted(status)) return status;
+  if (ToErrorInfo(status).reason() != "DATABASE_FULL") return status;
   return Refusal(
       absl::StatusCode::kResourceExhausted, "DATABASE_FULL",
       absl::StrCat("the disk of ", file_.string(),
@@ -200,6 +200,7 @@ bool Database::MakeSpaceLocked() {
 }
 
 absl::StatusOr<SpoolFile> Database::MakeSpool() {
+  RETURN_IF_ERROR(files_.Check());
   return SpoolFile::Make(folder(), [this] { return MakeSpace(); });
 }
 

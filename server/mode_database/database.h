@@ -48,7 +48,7 @@ class Database {
   bool MakeSpace();
 
   /// Makes a temporary file in the folder of the database. The file calls MakeSpace when the disk
-  /// is full. Errors: those of SpoolFile::Make.
+  /// is full. Errors: those of CheckFiles and of SpoolFile::Make.
   absl::StatusOr<SpoolFile> MakeSpool();
 
   /// Returns a text with the number of changes that were acknowledged once but are missing from the

@@ -182,15 +182,30 @@ absl::Status ModelChecker::CheckNumbers(const v1::ArrayDescriptor& array, std::s
              return ascends;
            });
   }
+  if (array.name() == "vertices") CompareVertices(data);
   if (good) return absl::OkStatus();
   return Malformed(
       absl::StrCat("array \"", array.name(),
                    "\" has a number that is not finite, out of range or out of order"));
 }
 
+// A chunk may begin within a vertex.
+void ModelChecker::CompareVertices(std::string_view data) {
+  for (size_t at = 0; at < data.size() && !vertices_differ_; at += sizeof(float)) {
+    float coordinate;
+    std::memcpy(&coordinate, data.data() + at, sizeof coordinate);
+    float& first = first_vertex_[coordinate_count_ % 3];
+    if (coordinate_count_ < 3) first = coordinate;
+    vertices_differ_ = coordinate != first;
+    ++coordinate_count_;
+  }
+}
+
 absl::Status ModelChecker::Finish() const {
   if (!has_header_) return Malformed("it is empty");
-  if (array_ == header_.arrays_size()) return absl::OkStatus();
+  if (array_ == header_.arrays_size()) {
+    return vertices_differ_ ? absl::OkStatus() : Malformed("all its vertices are one point");
+  }
   return Malformed(absl::StrCat("it ends at byte ", offset_, " of array \"",
                                 header_.arrays(array_).name(), "\""));
 }

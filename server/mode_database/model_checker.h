@@ -23,8 +23,8 @@ struct ChunkView {
 
 /// Checks a stored model record by record: the hashes, the order and completeness of the chunks,
 /// and the presence and shapes of the arrays of format version 1. Numbers must be finite,
-/// eigenvalues positive and ascending, and indices in range. A reader of a model that passes needs
-/// no further checks.
+/// eigenvalues positive and ascending, indices in range, and the sounding surface more than a
+/// point. A reader of a model that passes needs no further checks.
 class ModelChecker {
  public:
   /// Checks the next record. Errors: InvalidArgument (MODAL_MODEL_MALFORMED), DataLoss
@@ -47,6 +47,7 @@ class ModelChecker {
   absl::Status CheckArray(const v1::ArrayDescriptor& array);
   absl::Status CheckShape(const v1::ArrayDescriptor& array);
   absl::Status CheckNumbers(const v1::ArrayDescriptor& array, std::string_view data);
+  void CompareVertices(std::string_view data);
 
   bool has_header_ = false;
   v1::ModalModelHeader header_;
@@ -55,6 +56,9 @@ class ModelChecker {
   int array_ = 0;                        ///< the array whose chunks come next
   uint64_t offset_ = 0;                  ///< offset of the next chunk
   double last_eigenvalue_ = 0;
+  std::array<float, 3> first_vertex_{};
+  uint64_t coordinate_count_ = 0;  ///< coordinates of vertices so far
+  bool vertices_differ_ = false;
 };
 
 }  // namespace carillon

@@ -24,6 +24,10 @@ absl::Status ToStatus(const SQLite::Exception& error) {
       return Refusal(absl::StatusCode::kUnavailable, "DATABASE_BUSY",
                      absl::StrCat("another process holds the database (", what,
                                   "): end it, or give this daemon a folder of its own"));
+    case SQLITE_NOMEM:
+      return Refusal(absl::StatusCode::kResourceExhausted, "SERVER_OUT_OF_MEMORY",
+                     absl::StrCat("the daemon has not enough memory for its database (", what,
+                                  "): ask for less, or give the daemon more memory"));
     case SQLITE_FULL:
       return Refusal(absl::StatusCode::kResourceExhausted, "DATABASE_FULL",
                      absl::StrCat("no space is left for the database (", what,

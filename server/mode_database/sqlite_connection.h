@@ -33,8 +33,8 @@ class SqlRow {
 };
 
 /// One connection to a SQLite file; one thread at a time. Every call can fail with Unavailable
-/// (DATABASE_BUSY), ResourceExhausted (DATABASE_FULL: no space left), DataLoss (DATABASE_CORRUPT)
-/// or Internal (DATABASE_ERROR).
+/// (DATABASE_BUSY), ResourceExhausted (DATABASE_FULL: no space left; SERVER_OUT_OF_MEMORY),
+/// DataLoss (DATABASE_CORRUPT) or Internal (DATABASE_ERROR).
 class SqliteConnection {
  public:
   /// Opens the file, and creates it unless it exists. Waits up to 10 s for a lock of another

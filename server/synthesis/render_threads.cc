@@ -1,17 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/synthesis/render_threads.h"
 
+#include <exception>
+
 #include "server/synthesis/flush_denormals.h"
 
 namespace carillon {
 
 RenderThreads::RenderThreads(size_t thread_count) {
-  for (size_t thread = 1; thread < thread_count; ++thread) {
-    threads_.emplace_back([this, thread] { Run(thread); });
+  try {
+    for (size_t thread = 1; thread < thread_count; ++thread) {
+      threads_.emplace_back([this, thread] { Run(thread); });
+    }
+  } catch (const std::exception&) {
+    Stop();
+    throw;
   }
 }
 
-RenderThreads::~RenderThreads() {
+RenderThreads::~RenderThreads() { Stop(); }
+
+void RenderThreads::Stop() {
   stopping_ = true;
   ++round_;
   round_.notify_all();

@@ -28,6 +28,7 @@ class SectionThreads {
 /// because they wait in the kernel.
 class RenderThreads final : public SectionThreads {
  public:
+  /// Throws std::system_error if the system refuses a thread.
   explicit RenderThreads(size_t thread_count);
   ~RenderThreads() override;
   RenderThreads(const RenderThreads&) = delete;
@@ -38,6 +39,7 @@ class RenderThreads final : public SectionThreads {
 
  private:
   void Run(size_t thread);
+  void Stop();
   void RenderSome(size_t thread) noexcept;
 
   const absl::FunctionRef<void(size_t, size_t)>* render_ = nullptr;

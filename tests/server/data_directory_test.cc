@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/data_directory.h"
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/file.h>
+#include <unistd.h>
 
 #include <latch>
 #include <optional>
@@ -29,6 +32,27 @@ TEST(DataDirectory, IsHeldByOneAtATime) {
   EXPECT_THAT(second.ToString(), testing::HasSubstr("DATA_DIRECTORY_IN_USE: "));
   first.reset();
   EXPECT_TRUE(DataDirectory::Open(folder / "data").ok());
+}
+
+TEST(DataDirectory, IsHeldAlsoAfterItsLockFileWasRemovedOrReplaced) {
+  const TemporaryFolder folder;
+  const absl::StatusOr<DataDirectory> first = DataDirectory::Open(folder / "data");
+  ASSERT_TRUE(first.ok());
+  std::filesystem::remove(folder / "data/lock");
+  for (int time = 0; time < 2; ++time) {  // the first refused daemon makes the file anew
+    EXPECT_THAT(DataDirectory::Open(folder / "data").status().ToString(),
+                testing::HasSubstr("DATA_DIRECTORY_IN_USE: "));
+  }
+}
+
+TEST(DataDirectory, IsRefusedIfAnotherVersionHasLockedTheFileOnly) {
+  const TemporaryFolder folder;
+  ASSERT_TRUE(DataDirectory::Open(folder / "data").ok());
+  const int lock = open((folder / "data/lock").c_str(), O_RDWR | O_CLOEXEC);
+  ASSERT_EQ(flock(lock, LOCK_EX | LOCK_NB), 0);
+  EXPECT_THAT(DataDirectory::Open(folder / "data").status().ToString(),
+              testing::HasSubstr("DATA_DIRECTORY_IN_USE: "));
+  close(lock);
 }
 
 TEST(DataDirectory, WaitsForOneThatIsBeingGivenUp) {

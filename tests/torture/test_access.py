@@ -198,6 +198,9 @@ class AccessTest(unittest.TestCase):
         handshakes = self.attempts
         self.attack("a name that the file does not have", TIMES, lambda: listen_with(unknown))
         self.assertEqual(listen_with(good)[0], grpc.StatusCode.OK)
+        for kind in ("email:console.example.org", "URI:console.example.org", "DNS:other,email:console.example.org"):
+            other_kind = self.authority.issue("console.example.org", alternative=kind)
+            self.assertEqual(listen_with(other_kind)[1], "CREDENTIAL_MISSING", kind)
         common = self.authority.issue("common", alternative=None)
         self.assertEqual(listen_with(common)[0], grpc.StatusCode.OK)
         self.daemon.stop()

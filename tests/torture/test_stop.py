@@ -141,6 +141,29 @@ class StopTest(torture.ServedTest):
                 self.assertEqual(ended.returncode, 1, ended.stderr)
                 self.assertIn("SERVER_OUT_OF_MEMORY: ", ended.stderr)
 
+    def start_with_descriptors(self, soft, hard):
+        process = subprocess.Popen(
+            ["prlimit", f"--nofile={soft}:{hard}", BIN / "carillond", "--data-dir", self.folder / "data",
+             "--listen", f"unix:{self.folder}/s", "--audio-device", "null"],
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.addCleanup(process.kill)
+        self.addCleanup(process.stderr.close)
+        self.addCleanup(process.stdout.close)
+        return process
+
+    def test_a_start_with_too_few_descriptors_says_how_many_it_needs(self):
+        for count in (10, 20, 63):
+            with self.subTest(count=count):
+                process = self.start_with_descriptors(count, count)
+                self.assertEqual(process.wait(STOP_S), 1)
+                self.assertRegex(process.stderr.read(), f"TOO_FEW_DESCRIPTORS: .*{count} descriptors, and needs 64")
+        for limits in ((64, 64), (20, 4096)):
+            with self.subTest(limits=limits):
+                process = self.start_with_descriptors(*limits)
+                self.assertRegex(process.stdout.readline(), "listening on")
+                process.terminate()
+                self.assertEqual(process.wait(STOP_S), 0)
+
     def test_frames_missed_while_it_was_stopped_are_counted(self):
         self.serve("--audio-device", f"file:{self.folder}/sound.wav")
         before = self.client.audio.GetMixer(audio_service_pb2.GetMixerRequest())

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <string>
 
+#include "absl/strings/str_cat.h"
 #include "server/base/sha256.h"
 #include "tests/server/mode_database/sample_model.h"
 
@@ -65,6 +66,33 @@ TEST_F(AccessTableFile, ALineThatIsWrongIsNamed) {
                 testing::AllOf(HasSubstr("ACCESS_FILE_UNUSABLE: "), HasSubstr("line 2: ")))
         << line;
   }
+}
+
+TEST_F(AccessTableFile, TwoLinesWithTheSameNameOrCredentialAreNamed) {
+  const std::string first = "robot strike sha256:" + Sha256Hex("secret") + "\n";
+  const std::string console = "console listen certificate:console.example.org\n";
+  for (const std::string& second :
+       {"other administer sha256:" + Sha256Hex("secret"), "robot submit sha256:" + Sha256Hex("b"),
+        std::string("other strike certificate:console.example.org"),
+        std::string("anybody strike")}) {
+    EXPECT_THAT(
+        Read(absl::StrCat(first, console, "anybody listen\n", second, "\n")).status().ToString(),
+        testing::AllOf(HasSubstr("ACCESS_FILE_UNUSABLE: "), HasSubstr("access line 4: "),
+                       testing::ContainsRegex("that of line [123], too")))
+        << second;
+  }
+  EXPECT_TRUE(Read(first + console + "anybody listen\n").ok());
+}
+
+TEST_F(AccessTableFile, AControlCharacterIsNamed) {
+  const std::string credential = " strike sha256:" + Sha256Hex("secret") + "\n";
+  for (const char wrong : {'\0', '\x1b', '\x7f', '\r'}) {
+    EXPECT_THAT(Read("#\n" + std::string("ro") + wrong + "bot" + credential).status().ToString(),
+                testing::AllOf(HasSubstr("ACCESS_FILE_UNUSABLE: "), HasSubstr("line 2: "),
+                               HasSubstr("control character, byte 0x")))
+        << static_cast<int>(wrong);
+  }
+  EXPECT_TRUE(Read("robot" + credential.substr(0, credential.size() - 1) + "\r\n").ok());
 }
 
 TEST(AccessTable, WithoutAFileAnybodyMayDoAllButAdminister) {

@@ -5,11 +5,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <netinet/in.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -66,7 +68,9 @@ class ConnectionGateTest : public testing::Test {
   }
 
   /// Connects from an address of this machine, which is 127.0.0.`host`.
-  int Connect(uint32_t host = 1) const {
+  int Connect(uint32_t host = 1) const { return Connect(Socket(), host); }
+
+  int Connect(int made, uint32_t host) const {
     sockaddr_in from{};
     from.sin_family = AF_INET;
     from.sin_addr.s_addr = htonl(INADDR_LOOPBACK - 1 + host);
@@ -74,11 +78,12 @@ class ConnectionGateTest : public testing::Test {
     to.sin_family = AF_INET;
     to.sin_port = htons(static_cast<uint16_t>(address_.port));
     to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    const int made = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
     EXPECT_EQ(bind(made, reinterpret_cast<const sockaddr*>(&from), sizeof from), 0);
     EXPECT_EQ(connect(made, reinterpret_cast<const sockaddr*>(&to), sizeof to), 0);
     return made;
   }
+
+  static int Socket() { return socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0); }
 
   /// The name that the daemon has for a connection.
   static std::string NameOf(int connection) {
@@ -96,7 +101,11 @@ class ConnectionGateTest : public testing::Test {
 
   SystemClock clock_;
   std::vector<std::string> lines_;
-  LimitedLog log_{clock_, [this](const std::string& line) { lines_.push_back(line); }};
+  LimitedLog log_{clock_, [this](const std::string& line) {
+                    lines_.push_back(line);
+                    logged_.release();
+                  }};
+  std::counting_semaphore<> logged_{0};
   std::counting_semaphore<> taken_{0};
   Keeper* keeper_ = nullptr;
   ListenAddress address_;
@@ -133,6 +142,42 @@ TEST_F(ConnectionGateTest, AnAddressGetsNoMoreThanItsShareAndTheLogNamesItOnce) 
   EXPECT_THAT(lines_, testing::ElementsAre(testing::StartsWith(
                           "closed a new connection from ipv4:127.0.0.1: it has 2 already, its "
                           "share (--client-share) of 8; ")));
+}
+
+TEST_F(ConnectionGateTest, SaysOnceThatNoDescriptorIsLeftAndAcceptsAgainLater) {
+  Open(8);
+  rlimit before{};
+  ASSERT_EQ(getrlimit(RLIMIT_NOFILE, &before), 0);
+  // Standard input, output and error are in use.
+  const rlimit none{.rlim_cur = 3, .rlim_max = before.rlim_max};
+  const int client = Socket();
+  ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &none), 0);
+  Connect(client, 1);
+  ASSERT_TRUE(logged_.try_acquire_for(std::chrono::seconds(30)));
+  ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &before), 0);
+  taken_.acquire();
+  gate_.reset();
+  EXPECT_THAT(lines_, testing::ElementsAre(testing::AllOf(
+                          testing::StartsWith("cannot accept connections (Too many open files)"),
+                          testing::HasSubstr("LimitNOFILE="))));
+}
+
+TEST_F(ConnectionGateTest, SaysOnceThatItsSocketWasRemovedOrReplaced) {
+  const TemporaryFolder folder;
+  const std::string path = (folder / "socket").string();
+  Open(8, 1, [&path](ConnectionGate& gate) {
+    ListenAddress address = *ParseListenAddress("unix:" + path);
+    std::counting_semaphore<> taken{0};
+    return gate.Listen(address, std::make_unique<Keeper>(taken));
+  });
+  std::filesystem::remove(path);
+  WriteBytes(path, "");
+  ASSERT_TRUE(logged_.try_acquire_for(std::chrono::seconds(30)));
+  gate_.reset();
+  EXPECT_THAT(lines_, testing::ElementsAre(testing::AllOf(
+                          testing::StartsWith("somebody removed or replaced the socket " + path),
+                          testing::HasSubstr("restart the daemon"))));
+  EXPECT_TRUE(std::filesystem::exists(path)) << "the file of another must stay";
 }
 
 TEST_F(ConnectionGateTest, TheLastPlacesAreForAddressesWithFewConnections) {

@@ -269,6 +269,25 @@ TEST_F(ModelApi, ADamagedModelIsRefused) {
   ExpectRefused(Import(records), grpc::DATA_LOSS, "MODAL_MODEL_CORRUPT");
 }
 
+TEST_F(ModelApi, AModelOrTransferWithAnImpossibleFigureIsRefused) {
+  std::vector<v1::ModalModelRecord> records = SampleRecords(*SmallModel());
+  v1::ModalModelHeader& header = *records[0].mutable_header();
+  header.set_volume_m3(-1);
+  ExpectRefused(Import(records), grpc::INVALID_ARGUMENT, "MODAL_MODEL_MALFORMED");
+  header.set_volume_m3(1e-3);
+  const std::vector<v1::ModalModelRecord> alone = records;
+  const std::string bytes = SampleTransferBytes(
+      *SmallModel(), {.power_integrals = std::vector<float>(SmallModel()->mode_count(), 1)});
+  const absl::StatusOr<StoredTransfer> transfer = StoredTransfer::Parse(bytes);
+  ASSERT_TRUE(transfer.ok()) << transfer.status();
+  for (v1::TransferRecord record : transfer->Records()) {
+    if (record.has_header()) record.mutable_header()->set_air_density_kg_per_m3(1e300);
+    records.emplace_back().set_transfer(record.SerializeAsString());
+  }
+  ExpectRefused(Import(records), grpc::INVALID_ARGUMENT, "TRANSFER_MALFORMED");
+  EXPECT_TRUE(Import(alone).ok());
+}
+
 TEST_F(ModelApi, MaterialsAreListed) {
   grpc::ClientContext context;
   v1::ListMaterialsResponse response;

@@ -150,6 +150,21 @@ TEST_F(DecompositionQueueTest, ACrashIsTriedAnotherWay) {
   EXPECT_EQ(RunCount(), 2U);
 }
 
+TEST_F(DecompositionQueueTest, AWorkerThatIsKilledOnceRunsAgainInTheSameWay) {
+  MakeQueue(
+      absl::StrCat(kCount, "[ $(wc -l <\"$here/runs\") -gt 1 ] || kill -KILL $$\n", kSucceed));
+  const v1::Job job = SubmitAndAwaitEnd(Request(20'000));
+  EXPECT_EQ(job.state(), v1::JOB_STATE_SUCCEEDED) << job.error().message();
+  EXPECT_EQ(job.way(), 0U);
+  EXPECT_EQ(RunCount(), 2U);
+}
+
+TEST_F(DecompositionQueueTest, AWorkerThatIsKilledTwiceLacksMemory) {
+  MakeQueue(absl::StrCat(kCount, "kill -KILL $$"));
+  EXPECT_EQ(SubmitAndAwaitEnd(Request(20'000)).error().reason(), "OUT_OF_MEMORY");
+  EXPECT_EQ(RunCount(), 2U);
+}
+
 TEST_F(DecompositionQueueTest, ACrashInEveryWayIsRememberedAcrossARestart) {
   MakeQueue(absl::StrCat(kCount, "kill -SEGV $$"));
   EXPECT_EQ(SubmitAndAwaitEnd(Request(20'000)).error().reason(), "WORKER_CRASHED");

@@ -294,6 +294,16 @@ TEST_F(LocalExecutorTest, AMeshThatCannotBeBroughtEndsTheTask) {
   EXPECT_EQ(ended.get_future().get().error.reason(), "MESH_CORRUPT");
 }
 
+TEST_F(LocalExecutorTest, MakesItsFolderAnewIfSomebodyHasRemovedIt) {
+  MakeExecutor("echo 1 >\"$out\"");
+  std::filesystem::remove_all(options_.directory);
+  Start(run_);
+  ASSERT_TRUE(Happens(run_.ended));
+  EXPECT_EQ(run_.outcome.verdict, Verdict::kOk) << run_.outcome.error.message();
+  EXPECT_EQ(std::filesystem::status(options_.directory).permissions(),
+            std::filesystem::perms::owner_all);
+}
+
 TEST_F(LocalExecutorTest, ItsDestructionKillsWhatRunsWithoutAWord) {
   const NamedPipe life(folder_ / "life");
   WriteEvents(ProgressBytes(0.5));

@@ -84,6 +84,15 @@ TEST_F(DatabaseFilesTest, AfterTheLogWasRemovedOrTruncatedNothingIsAcknowledged)
   ExpectLost([&] { std::filesystem::remove(log_); });
 }
 
+TEST_F(DatabaseFilesTest, AnUploadAfterTheFolderWasRenamedIsToldThatTheDatabaseIsLost) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directory(folder / "data");
+  const std::unique_ptr<ModeDatabase> database =
+      *ModeDatabase::Open(folder / "data/carillon.db", clock_);
+  std::filesystem::rename(folder / "data", folder / "other");
+  EXPECT_THAT(database->meshes().Begin().status().ToString(), HasSubstr("DATABASE_LOST: "));
+}
+
 TEST_F(DatabaseFilesTest, ALogThatWasRemovedWhileNoDaemonRanIsNoticed) {
   for (int i = 0; i < 3; ++i) ASSERT_TRUE(Put(std::to_string(i)).ok());
   // As after a kill: the file and its log, without the checkpoint of a good end.

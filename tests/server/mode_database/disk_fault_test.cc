@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <functional>
+#include <memory>
 #include <string>
 
 #include "server/base/sha256.h"
@@ -174,6 +175,21 @@ TEST_P(ReadErrorTest, AModelThatCannotBeReadNowIsNotTakenForDamaged) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Disk, ReadErrorTest, ::testing::Values(DiskFault::kReadError));
+
+TEST(DatabaseMemory, ALackOfItIsSaid) {
+  const TemporaryFolder folder;
+  WriteRecords(folder / "model", SampleRecords(SampleModel(20, 100)));
+  const SystemClock clock;
+  const std::unique_ptr<ModeDatabase> database = *ModeDatabase::Open(folder / "carillon.db", clock);
+  const auto put = [&] {
+    return database->models().PutFile(Sha256Hex("a"), "a", folder / "model").status();
+  };
+  LimitDatabaseMemory(1);
+  const absl::Status status = put();
+  LimitDatabaseMemory(0);
+  EXPECT_THAT(status.ToString(), HasSubstr("SERVER_OUT_OF_MEMORY: "));
+  EXPECT_TRUE(put().ok());
+}
 
 }  // namespace
 }  // namespace carillon

@@ -165,4 +165,6 @@ bool FaultyDisk::AwaitHeldWrite() { return latch.AwaitHeld(); }
 
 void FaultyDisk::ReleaseWrites() { latch.Release(); }
 
+void LimitDatabaseMemory(int64_t byte_count) { sqlite3_hard_heap_limit64(byte_count); }
+
 }  // namespace carillon

@@ -38,4 +38,7 @@ class FaultyDisk {
   static void ReleaseWrites();
 };
 
+/// Lets SQLite have only so much memory; zero removes the limit.
+void LimitDatabaseMemory(int64_t byte_count);
+
 }  // namespace carillon

@@ -139,6 +139,10 @@ INSTANTIATE_TEST_SUITE_P(
         Damage{"ZeroEigenvalue", kMalformed, [](Records& r) { Poke(r[1], 0, 0.0); }},
         Damage{"InfiniteShape", kMalformed,
                [](Records& r) { Poke(r[9], 7, std::numeric_limits<float>::infinity()); }},
+        Damage{"AllVerticesEqual", kMalformed,
+               [](Records& r) {
+                 for (size_t i = 0; i < 12; ++i) Poke(r[4], i, 1.5F + static_cast<float>(i % 3));
+               }},
         Damage{"VertexOutOfRange", kMalformed, [](Records& r) { Poke(r[5], 3, uint32_t{4}); }},
         Damage{"GivenTriangleOutOfRange", kMalformed,
                [](Records& r) { Poke(r[6], 0, uint32_t{4}); }},

@@ -40,6 +40,7 @@ inline v1::TransferHeader SampleTransferHeader(uint32_t mode_count, double speed
   header.set_speed_ratio(speed_ratio);
   header.set_sound_speed_m_per_s(343);
   header.set_air_density_kg_per_m3(1.204);
+  header.set_radius_m(0.1);
   header.mutable_transfer_settings()->set_accuracy_db(2);
   header.mutable_transfer_settings()->set_budget_s(20);
   for (const ArraySpec& spec : kTransferArrays) {
