@@ -38,7 +38,8 @@ class JobPlaces {
   void Free(const std::string& digest) { runs_.erase(digest); }
 
   /// Chooses the transfers to end, youngest first, so that a decomposition that needs `bytes` can
-  /// start. Returns nothing if that does not suffice, or if enough transfers end already.
+  /// start. The list is empty if ending all transfers would not free enough memory, or if no more
+  /// transfers than those chosen earlier need to end.
   std::vector<std::string> ChooseToEnd(uint64_t bytes);
 
   /// Returns the running jobs that occupy what a waiting job of `kind` needs.

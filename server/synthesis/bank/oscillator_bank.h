@@ -62,11 +62,11 @@ struct OscillatorBankSettings {
 /// tau^2 / 2) replaces it). A raised cosine has another factor (strike_kernel::Onset).
 ///
 /// A struck mode rings in the time domain, SIMD across modes: in single precision within a block,
-/// in double between blocks, which keeps the error below -100 dB. At the next long block of its
-/// kind the mode's state is added to the state that already rings by spectrum; by linearity the sum
-/// is the same sound. Modes that decay too fast for any long block stay in the time domain, and so
-/// does a bank that is struck all the time. Modes below -140 dB of full scale are put to sleep, in
-/// groups of kMostLanes.
+/// in double between blocks, which keeps the error below -100 dB. At the start of the next long
+/// block of the mode's kind (the kinds differ in length, see LongBlock), its state is added to the
+/// state that already rings by spectrum; by linearity the sum is the same sound. Modes that decay
+/// too fast for any long block stay in the time domain, and so does a bank that is struck all the
+/// time. Modes below -140 dB of full scale are put to sleep, in groups of kMostLanes.
 ///
 /// The second mode of a degenerate pair is a cosine, which would begin with a jump and click under
 /// a soft mallet. Therefore it has a companion of the same frequency and opposite sign that decays
