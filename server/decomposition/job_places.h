@@ -11,7 +11,8 @@
 
 namespace carillon {
 
-/// What may run at a time; see the functions of Executor with the same names.
+/// The limits of the jobs that may run at a time; see the functions of Executor with the same
+/// names.
 struct JobCapacity {
   int worker_count = 0;
   uint64_t memory_budget_bytes = 0;
