@@ -85,9 +85,10 @@ class OscillatorBank {
   OscillatorBank(const SoundingModes& sounding, const ShapeTable& shapes,
                  const OscillatorBankSettings& settings);
 
-  /// Applies an impulse. It is first audible at sample `offset` of the block of `mix`, which lies
-  /// `lead_frames` (0 to 1) after its time. Offsets ascend within a block. Returns false, without
-  /// effect, if the impulse is not finite or names a vertex that the body lacks.
+  /// Applies an impulse. The impulse is first audible at sample `offset` of the block of `mix`.
+  /// This sample lies `lead_frames` (0 to 1) frames after the time of the impulse. Offsets ascend
+  /// within a block. Returns false, without effect, if the impulse is not finite or names a vertex
+  /// that the body lacks.
   bool Strike(const SurfaceImpulse& impulse, size_t offset, float lead_frames,
               BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
@@ -155,8 +156,8 @@ class OscillatorBank {
   /// Number of modes that still ring.
   size_t active_mode_count() const noexcept { return struck() ? mode_count_ : active_mode_count_; }
 
-  /// Return the units of work (work_budget.h) of a block without events, of an impulse, of a merged
-  /// impulse, and of the lanes that a first impulse awakens.
+  /// These four functions return the units of work (work_budget.h) of a block without events, of an
+  /// impulse, of a merged impulse, and of the lanes that a first impulse awakens.
   double ringing_work() const noexcept;
   double strike_work() const noexcept;
   double merged_strike_work() const noexcept;
