@@ -195,7 +195,8 @@ class StreamWriter : public Reactor {
     if (*supply == Supply::kMessage) this->StartWrite(&response_);
   }
 
-  /// Returns whether the call was cancelled, and takes note of all that has woken it.
+  /// Returns whether the call was cancelled, and forgets the calls of Wake so far, to which the
+  /// turn answers.
   bool BeginTurn() {
     const MutexLock lock(&mutex_);
     woken_ = false;
