@@ -18,8 +18,8 @@ using Quaternion = std::array<double, 4>;  ///< w, x, y, z
 struct ContactSettings {
   double roughness_depth = 0.5;          ///< as in carillon.v1.Roughness
   double irregularity_length_m = 0.001;  ///< as in carillon.v1.Roughness
-  /// The striker that bodies without a sound are: a name of the catalogue, such as "wood". If it is
-  /// empty, they are steel.
+  /// The striker as which a body without a sound counts: a name of the catalogue, such as "wood".
+  /// If it is empty, such a body counts as steel.
   std::string striker{};
   /// How long a blow lasts, seconds. If it is absent, a blow lasts as long as an elastic collision
   /// of the two bodies, which the daemon computes.

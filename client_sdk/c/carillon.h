@@ -3,14 +3,15 @@
  * The C interface of Carillon, for engines and for languages that load a shared library
  * (libcarillon.so): scenes, contacts of a running simulation, and offline rendering.
  *
- * Units are SI: metres, newton seconds, seconds. Points and impulses are in the frame of their
- * object or in that of the scene, as a carillon_frame says. Poses are in the frame of the scene.
- * Strings are UTF-8 and end with a zero.
+ * Units are SI: metres, newton seconds, seconds. Points and impulses are in the frame of
+ * their object or in the frame of the scene; a carillon_frame chooses. Poses are in the frame of
+ * the scene. Strings are UTF-8 and end with a zero.
  *
- * Every function that returns a carillon_code returns CARILLON_OK, or another code; then
- * carillon_error() and carillon_error_reason() say why. proto/README.md lists the reasons. Results
- * are written only on success. No function throws or ends the program. The functions of different
- * objects may be called by different threads; those of one object by one thread at a time.
+ * Every function that returns a carillon_code returns CARILLON_OK if it succeeds. After any other
+ * code, carillon_error() and carillon_error_reason() give the cause. proto/README.md lists the
+ * reasons. Results are written only on success. No function throws or ends the program. Different
+ * threads may call functions of different objects at the same time. Only one thread at a time may
+ * call functions of one object.
  */
 #ifndef CARILLON_H_
 #define CARILLON_H_
@@ -24,7 +25,7 @@ extern "C" {
 
 /* NOLINTBEGIN(readability-identifier-naming): names of C, all with one prefix */
 
-/** What became of a call: zero, or the code of gRPC. */
+/** The result of a call: zero for success, otherwise the code of gRPC. */
 typedef int32_t carillon_code;
 enum {
   CARILLON_OK = 0,
@@ -45,7 +46,7 @@ typedef struct carillon_vec3 {
   double x, y, z;
 } carillon_vec3;
 
-/** A rotation as a unit quaternion; all zeros: none. */
+/** A rotation as a unit quaternion. All zeros mean no rotation. */
 typedef struct carillon_quaternion {
   double w, x, y, z;
 } carillon_quaternion;
@@ -58,7 +59,7 @@ typedef struct carillon_mesh {
   size_t triangle_count;
 } carillon_mesh;
 
-/** An object that sounds. Zeros are defaults, but for the model and the material. */
+/** An object that sounds. A zero stands for a default value, except as model or material. */
 typedef struct carillon_object {
   const char* model;    /**< "modalModels/{digest}" */
   const char* material; /**< a name of the catalogue, such as "structural_steel" */
@@ -78,7 +79,7 @@ typedef struct carillon_contact {
   double roughness_depth;               /**< relative to the force */
 } carillon_contact;
 
-/** A blow that somebody means, such as a hammer's. */
+/** A blow that the caller intends, such as that of a hammer. */
 typedef struct carillon_impulse {
   uint32_t object;
   carillon_vec3 point_m;
@@ -93,8 +94,8 @@ typedef struct carillon_pose {
   carillon_quaternion orientation;
 } carillon_pose;
 
-/** The frame of the points and impulses of a stream or of a trace. The daemon converts those in the
- * frame of the scene by the newest pose of their object. */
+/** The frame of the points and impulses of a stream or of a trace. The daemon converts points and
+ * impulses in the frame of the scene by the newest pose of their object. */
 typedef int32_t carillon_frame;
 enum { CARILLON_FRAME_OBJECT = 0, CARILLON_FRAME_SCENE = 1 };
 
@@ -110,7 +111,7 @@ typedef struct carillon_hearing {
   int32_t binaural;            /**< for headphones, by a measured head, in place of panning */
   double reference_distance_m; /**< where distance_gain is 1, from 0.01 to 1000; zero: 1 */
   double sound_speed_m_per_s;  /**< from 10 to 10000; zero: 343 */
-  carillon_pose listener;      /**< at first; it looks along -z, with x to its right and y upward */
+  carillon_pose listener;      /**< its first pose; looks along -z, x to the right, y upward */
 } carillon_hearing;
 
 /** One step of a simulation. Times do not go back within a stream or a trace. */
@@ -122,12 +123,12 @@ typedef struct carillon_step {
   size_t impulse_count;
   const carillon_pose* poses;
   size_t pose_count;
-  const carillon_pose* listener; /**< where it is now; null: it stays */
+  const carillon_pose* listener; /**< its pose now; null: the listener stays */
 } carillon_step;
 
-/** What became of a stream's steps. */
+/** The numbers of a stream's steps, and of its impulses by outcome. */
 typedef struct carillon_report {
-  uint64_t step_count;         /**< that the daemon has read */
+  uint64_t step_count;         /**< steps that the daemon has read */
   uint64_t accepted_count;     /**< impulses that sound at their time */
   uint64_t late_count;         /**< impulses that came late and sounded at once */
   uint64_t rejected_count;     /**< impulses that could not be used */
@@ -159,27 +160,28 @@ typedef struct carillon_sound {
 
 /** The version of this library, such as "0.1.0". */
 const char* carillon_version(void);
-/** Why the last failed call of this thread failed: its reason, a colon and a text; empty at
- * first. */
+/** Returns the error of this thread's last failed call: the reason, a colon and a text. Returns an
+ * empty text if no call of this thread has failed. */
 const char* carillon_error(void);
-/** The reason alone, such as "SERVER_UNAVAILABLE", which is stable. */
+/** Returns the reason alone, such as "SERVER_UNAVAILABLE", which is stable. */
 const char* carillon_error_reason(void);
 
-/** Connects to "unix:PATH" or "HOST:PORT"; null: to the default daemon. It waits for its answer. */
+/** Connects to the daemon at "unix:PATH" or "HOST:PORT", or to the default daemon if `server` is
+ * null, and waits for its answer. */
 carillon_code carillon_connect(const char* server, carillon_client** client);
-/** Ends the connection, after its scenes, streams and traces. Null is ignored, as by each function
- * that ends something. */
+/** Ends the connection. The caller must delete the client's scenes and close its streams before.
+ * Null is ignored, as by each function that ends something. */
 void carillon_disconnect(carillon_client* client);
 
 /** Computes the model of a mesh file, unless it is stored already, and waits for it. `model` has
  * room for CARILLON_NAME_SIZE characters. */
 carillon_code carillon_create_model(carillon_client* client, const char* mesh_file,
                                     const char* material, char* model);
-/** The same of a mesh in memory. */
+/** Does the same for a mesh in memory. */
 carillon_code carillon_create_model_of_mesh(carillon_client* client, const carillon_mesh* mesh,
                                             const char* material, char* model);
 
-/** Makes a scene. If `hearing` is null, it has no places. */
+/** Makes a scene. If `hearing` is null, the scene has no places (see carillon_hearing). */
 carillon_code carillon_create_scene(carillon_client* client, const carillon_hearing* hearing,
                                     carillon_scene** scene);
 /** Makes a scene with an id and its objects. If the daemon has the scene already, its objects stay,
@@ -192,9 +194,10 @@ carillon_code carillon_register_scene(carillon_client* client,
 void carillon_delete_scene(carillon_scene* scene);
 /** Returns the name of the scene, "scenes/{id}". The text is valid until the scene is deleted. */
 const char* carillon_scene_name(const carillon_scene* scene);
-/** Adds an object, ready to be struck when the call returns. `handle` may be null. */
+/** Adds an object, which can be struck as soon as the call returns. `handle` may be null. */
 carillon_code carillon_add_object(carillon_scene* scene, const carillon_object* object,
                                   uint32_t* handle);
+/** Fades out an object and removes it from the scene. */
 carillon_code carillon_remove_object(carillon_scene* scene, uint32_t handle);
 /** Lets the linear gain of the scene glide to a value of 0 to 1000. */
 carillon_code carillon_set_gain(carillon_scene* scene, double gain);
@@ -209,18 +212,19 @@ carillon_code carillon_open_stream(carillon_scene* scene, double step_s, carillo
                                    carillon_stream** stream);
 /** Sends a step. It copies the step and never waits for the daemon. */
 carillon_code carillon_send(carillon_stream* stream, const carillon_step* step);
-/** Sends what waits, waits for the daemon's answer, and ends the stream. `report` may be null. Of a
- * stream that was opened again it counts the newest part, but for the dropped steps, which it
- * counts from the beginning. */
+/** Sends the steps that wait, waits for the daemon's answer, and ends the stream. `report` may be
+ * null. If the stream was opened again, the report counts its newest part only, except that it
+ * counts dropped steps from the beginning. */
 carillon_code carillon_close_stream(carillon_stream* stream, carillon_report* report);
 
 /** Begins a contact trace, which is written to a file (.contacts), to be rendered now or later. If
- * `hearing` is null, it has no places. */
+ * `hearing` is null, the trace has no places. */
 carillon_code carillon_create_trace(const char* file, double step_s, carillon_frame frame,
                                     const carillon_hearing* hearing, carillon_trace** trace);
 /** Adds an object, before the first step that names it. `handle` may be null. */
 carillon_code carillon_trace_object(carillon_trace* trace, const carillon_object* object,
                                     uint32_t* handle);
+/** Writes a step to the trace. */
 carillon_code carillon_trace_step(carillon_trace* trace, const carillon_step* step);
 /** Completes the file. */
 carillon_code carillon_close_trace(carillon_trace* trace);

@@ -35,7 +35,8 @@ struct ClipRecord {
 /// the models.
 std::string SettingsText(const RenderOptions& options, const std::string& daemon_version);
 
-/// Return the line of a clip that was rendered, and that of a clip that could not be rendered.
+/// These two functions return the line of a clip that was rendered, and the line of a clip that
+/// could not be rendered.
 std::string RecordLine(const ClipRecord& record);
 std::string ErrorLine(const std::string& clip, const absl::Status& error);
 

@@ -156,7 +156,7 @@ absl::Status UpdateModel(const client::Client& daemon, const std::string& text,
 absl::Status ExportModel(const client::Client& daemon, const ExportOptions& options, bool json);
 absl::Status ImportModel(const client::Client& daemon, const ImportOptions& options, bool json);
 absl::Status ShowDatabaseStats(const client::Client& daemon, bool json);
-/// Writes a copy of the database to a file; prints nothing but JSON.
+/// Writes a copy of the database to a file. Unless `json` is true, prints nothing.
 absl::Status BackUpDatabase(const client::Client& daemon, const std::string& file, bool json);
 absl::Status CollectGarbage(const client::Client& daemon, const v1::CollectGarbageRequest& request,
                             bool json);
@@ -214,8 +214,8 @@ std::optional<double> BetterFullScale(const RenderOptions& options,
 /// silent).
 absl::Status CheckHasContacts(const std::string& path, const v1::RenderSummary& summary);
 
-/// Returns the name of a scene that `text` names as "scenes/7" or "7". Returns an empty string for
-/// an empty one.
+/// Returns the name of a scene that `text` names as "scenes/7" or "7". Returns an empty string if
+/// `text` is empty.
 std::string SceneNamed(const std::string& text);
 /// Changes the properties of the volume that the options have, and prints the volume.
 absl::Status ChangeVolume(const client::Client& daemon, const VolumeOptions& options, bool json);

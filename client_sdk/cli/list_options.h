@@ -9,8 +9,8 @@ class App;
 
 namespace carillon::cli {
 
-/// Adds `carillon job`, `carillon material`, `carillon scene` and `carillon example` with their
-/// commands.
+/// These functions add `carillon job`, `carillon material`, `carillon scene` and `carillon example`
+/// with their commands.
 void AddJob(CLI::App& app, Program& program);
 void AddMaterials(CLI::App& app, Program& program);
 void AddScenes(CLI::App& app, Program& program);

@@ -9,7 +9,8 @@ class App;
 
 namespace carillon::cli {
 
-/// Add `carillon volume`, `carillon stop`, `carillon top`, and `carillon scene record`.
+/// These functions add `carillon volume`, `carillon stop`, `carillon top`, and `carillon scene
+/// record`.
 void AddVolume(CLI::App& app, Program& program);
 void AddStop(CLI::App& app, Program& program);
 void AddTop(CLI::App& app, Program& program);

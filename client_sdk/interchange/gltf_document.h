@@ -23,8 +23,8 @@ class GltfDocument {
   const nlohmann::json& root() const { return root_; }
 
   /// Returns the bytes of the buffer `index`, from the binary file, a data URI, or a file in the
-  /// folder of the asset or below it. They are valid as long as the document. Errors: those of
-  /// Read().
+  /// folder of the asset or below it. The bytes are valid as long as the document exists. Errors:
+  /// those of Read().
   absl::StatusOr<std::string_view> Buffer(uint64_t index);
 
  private:

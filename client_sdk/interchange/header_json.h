@@ -12,7 +12,8 @@ namespace carillon::interchange {
 /// the arrays.
 std::string ToJson(v1::ModalModelHeader header);
 
-/// Returns nullopt if the text is not such a header. Fields of a later version are left out.
+/// Returns the header that such a JSON text describes, or nullopt if the text describes none.
+/// Fields of a later version are left out.
 std::optional<v1::ModalModelHeader> HeaderFromJson(const std::string& json);
 
 }  // namespace carillon::interchange

@@ -1,8 +1,8 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
 """Finds locks that clang's thread-safety analysis or ThreadSanitizer does not see. The server takes those of
-server/base/mutex.h, the client absl::Mutex; precompute/ shares no code with either and keeps the standard's, and tests
-may take any."""
+server/base/mutex.h, the client absl::Mutex; precompute/, which shares only proto/ with them, keeps the standard's, and
+tests may take any."""
 
 import re
 

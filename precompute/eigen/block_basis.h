@@ -89,7 +89,7 @@ class BlockBasis {
     });
   }
 
-  /// Returns Q s in blocks. s is size() by a multiple of kBlockWidth.
+  /// Returns Q s in blocks. s has size() rows, and a multiple of kBlockWidth columns.
   std::vector<Block> Combine(const Eigen::MatrixXd& s) const {
     const size_t count = static_cast<size_t>(s.cols()) / kBlockWidth;
     std::vector<Block> result(count, Block::Zero(rows_, kBlockWidth));

@@ -52,7 +52,7 @@ class LanczosRecurrence {
     return (R_ * last).norm();
   }
 
-  /// Returns Q s in blocks. s is size() by a multiple of kBlockWidth.
+  /// Returns Q s in blocks. s has size() rows, and a multiple of kBlockWidth columns.
   std::vector<Block> Combine(const Eigen::MatrixXd& s) const { return basis_.Combine(s); }
 
  private:

@@ -14,8 +14,9 @@ namespace carillon::precompute {
 /// factor serves sixteen solves, and they find all modes of a degenerate group.
 class BlockLanczosEigensolver : public Eigensolver {
  public:
-  /// `ordered` is the system to be solved, in elimination order. `rigid` is the rigid-body modes,
-  /// #U by at most six, M-orthonormal. Both must outlive the solver.
+  /// `ordered` is the system to be solved, in elimination order. `rigid` has the rigid-body modes
+  /// as columns, at most six and M-orthonormal, with one row for each unknown. The solver refers to
+  /// `ordered` and `rigid`, which must outlive it.
   BlockLanczosEigensolver(const OrderedSystem& ordered, const Eigen::MatrixXd& rigid)
       : ordered_(ordered), rigid_(rigid) {}
 

@@ -12,7 +12,7 @@ namespace carillon::precompute {
 /// Solutions of K phi = Lambda M phi, ascending.
 struct Modes {
   Eigen::VectorXd eigenvalues;  ///< 1/s^2
-  Eigen::MatrixXd shapes;       ///< #U by #modes, phi^T M phi = 1
+  Eigen::MatrixXd shapes;       ///< one row for each unknown; phi^T M phi = 1
   int basis_size = 0;           ///< vectors that block Lanczos built; zero for other solvers
 };
 

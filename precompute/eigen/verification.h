@@ -59,7 +59,8 @@ using BlockRow = Eigen::Array<double, 1, kBlockWidth>;
 BlockRow RelativeResiduals(const NodeMatrix& A, const VectorBlock& elastic,
                            const VectorBlock& inertial, const BlockRow& eigenvalues);
 
-/// Compute residuals and the orthogonality error from the assembled matrices.
+/// These two functions compute the residuals and the orthogonality error from the assembled
+/// matrices.
 Eigen::VectorXd Residuals(const SystemMatrices& system, const Modes& modes);
 double OrthogonalityError(const SystemMatrices& system, const Eigen::MatrixXd& shapes);
 

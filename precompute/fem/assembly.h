@@ -9,15 +9,15 @@
 
 namespace carillon::precompute {
 
-/// The stiffness and mass matrices of a body. Unknown 3 i + a is component a of the displacement of
-/// the i-th node that is not fixed.
+/// The stiffness and mass matrices of a body. Unknown 3 i + a is component a (x, y or z) of the
+/// displacement of the i-th node that is not fixed. #U is the number of unknowns, unknown_count().
 struct SystemMatrices {
   using Sparse = Eigen::SparseMatrix<double>;
 
   /// #U by #U, N/m, symmetric: the lower triangle only.
   Sparse K;
-  /// #U by #U, kg, symmetric positive definite: the lower triangle only. M does not couple
-  /// different components.
+  /// #U by #U, kg, symmetric positive definite: the lower triangle only. M does not couple the x, y
+  /// and z components of the displacement with each other.
   Sparse M;
 
   Eigen::Index unknown_count() const { return K.rows(); }

@@ -219,7 +219,7 @@ class Estimator {
   }
 
   /// Returns sum_b w_b r_b^T a(b, b)^-1 r_b for some modes, and adds the weighted parts of each
-  /// edge and face to `shares`. `shapes` is #U by #modes.
+  /// edge and face to `shares`. `shapes` has a row for each unknown and a column for each mode.
   Eigen::VectorXd Corrections(const Eigen::VectorXd& eigenvalues, const RowMatrix& shapes,
                               Eigen::VectorXd& shares) const {
     RowMatrix residuals =

@@ -18,10 +18,11 @@ namespace carillon::precompute {
 /// elastic wedges the remaining part rises about as the square root of the re-entrant angle, to 2
 /// where the body encloses 270 degrees.
 ///
-/// A fillet that turns by a right angle within a few elements acts like an edge. Its part rises
-/// with the angle by which the boundary turns within two elements' edges; this was fitted to an
-/// angle with a fillet. The weight is the larger of the two, and 1 inside the body, on plane and
-/// convex parts of the boundary, and at mid-side nodes.
+/// A fillet that turns by a right angle within a few elements acts like an edge. Its remaining part
+/// rises with the angle by which the boundary turns within the length of two elements' edges. This
+/// dependence was fitted to an angle with a fillet. The weight of a node is the larger of its
+/// weights by edges and by fillets, and 1 inside the body, on plane and convex parts of the
+/// boundary, and at mid-side nodes.
 std::vector<double> ReentrantWeights(const TetMesh& mesh);
 
 }  // namespace carillon::precompute

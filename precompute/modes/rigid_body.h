@@ -10,11 +10,11 @@
 namespace carillon::precompute {
 
 /// Returns the rigid-body modes in closed form. They are the M-orthonormalized combinations of
-/// translations and infinitesimal rotations that do not move the fixed nodes. The result is #U by
-/// the number of these modes. That number is six minus the rank of the rigid motions of the fixed
-/// nodes: six for a free body, three if one point is fixed, one if a line is fixed, otherwise none.
-/// The motions are independent because all elements have volume. `nodes` are the positions of the
-/// moving nodes, and `held` those of the fixed nodes.
+/// translations and infinitesimal rotations that do not move the fixed nodes. The result has a row
+/// for each unknown and a column for each of these modes. The number of columns is six minus the
+/// rank of the rigid motions of the fixed nodes: six for a free body, three if one point is fixed,
+/// one if a line is fixed, otherwise none. The motions are independent because all elements have
+/// volume. `nodes` are the positions of the moving nodes, and `held` those of the fixed nodes.
 Eigen::MatrixXd RigidBodyModes(const std::vector<Point>& nodes, const SystemMatrices& system,
                                const std::vector<Point>& held = {});
 

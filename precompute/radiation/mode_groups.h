@@ -19,7 +19,7 @@ struct ModeGroup {
   bool silent = true;
   int first_level = 0;
   int solved_count = 0;           ///< levels, from the first on, on which the group was solved
-  std::vector<ModeField> fields;  ///< the sound fields on the finest of these levels, one a mode
+  std::vector<ModeField> fields;  ///< one sound field for each mode, on the finest of these levels
   double error_db = 0;            ///< of the worst mode; direction errors are divided by three
 
   int next_level() const { return first_level + solved_count; }

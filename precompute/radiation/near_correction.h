@@ -10,9 +10,9 @@
 
 namespace carillon::precompute {
 
-/// The correction of the vertex rule for a pair of vertices and the static kernel 1/(4 pi r). It is
-/// the exact Galerkin integrals over triangles that are near each other, minus the vertex rule for
-/// the same triangles. Rows are test functions.
+/// The correction of the vertex rule for a pair of vertices and the static kernel 1/(4 pi r). The
+/// correction is the difference between the exact Galerkin integrals over triangles that are near
+/// each other and the vertex rule for the same triangles. Rows are test functions.
 struct NearEntry {
   float double_layer = 0;             ///< K
   float single_layer = 0;             ///< V with n . n'

@@ -35,7 +35,7 @@ std::vector<ModeField> SolveRadiation(const ModeProblem& problem, const Remeshed
                                       const RadiatingSurface& body, const SphereGrid& grid,
                                       Workers& workers);
 
-/// Returns 10 log10 of the ratio of both power integrals.
+/// Returns 10 log10 of the ratio of the power integral of `a` to that of `b`.
 double PowerDifferenceDb(const ModeField& a, const ModeField& b);
 
 /// Returns the root mean square of the level difference of two patterns, dB, over the directions of

@@ -35,7 +35,7 @@ struct Transfer {
   Point center{};
   double radius_m = 0;
   std::vector<ModeRadiation> modes;
-  RigidRadiation rigid;  ///< without wavenumbers if the budget did not allow it
+  RigidRadiation rigid;  ///< has no wavenumbers if the budget did not allow it
   double cpu_s = 0;
 };
 

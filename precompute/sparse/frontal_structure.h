@@ -64,7 +64,7 @@ struct FrontalStructure {
 
 /// Orders the graph of nodes and finds the supernodes with CHOLMOD's symbolic analysis. The graph
 /// of nodes is used because it has a third of the size of the graph of unknowns, and because METIS
-/// finds better separators in it. Errors: RESOURCE_EXHAUSTED.
+/// finds better separators in it. Errors: OUT_OF_MEMORY.
 absl::StatusOr<FrontalStructure> AnalyzeFronts(const Eigen::SparseMatrix<double>& K);
 
 }  // namespace carillon::precompute

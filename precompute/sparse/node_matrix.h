@@ -12,7 +12,8 @@ namespace carillon::precompute {
 /// Number of vectors in a block of the solver: two AVX-512 registers of doubles for each row.
 inline constexpr int kBlockWidth = 16;
 
-/// A matrix m (x) I3, stored by rows with both triangles.
+/// The Kronecker product m (x) I3 of a matrix m of nodes by nodes and the 3 by 3 identity. m is
+/// stored by rows with both triangles.
 template <typename Real>
 struct MassRows {
   std::vector<int32_t> start;  ///< #nodes + 1
@@ -45,7 +46,7 @@ NodeMatrix MakeNodeMatrix(const Eigen::SparseMatrix<double>& K,
 template <typename Real>
 void MultiplyStiffness(const NodeMatrix& A, const Real* x, double* y);
 
-/// Returns the rows of the mass matrix; none if the mass matrix is the identity.
+/// Returns the rows of the mass matrix. The result is empty if the mass matrix is the identity.
 template <typename Real>
 MassRows<Real> MakeMassRows(const NodeMatrix& A);
 

@@ -71,7 +71,8 @@ class ApiServer {
  public:
   /// Starts to serve. Calls are answered as soon as Start has returned. Errors: InvalidArgument
   /// (INVALID_ADDRESS), FailedPrecondition (TLS_REQUIRED, ACCESS_FILE_REQUIRED: a network address
-  /// without either, TLS_UNUSABLE, ACCESS_FILE_UNUSABLE, ADDRESS_IN_USE, LISTEN_FAILED).
+  /// without TLS or without an access file, TLS_UNUSABLE, ACCESS_FILE_UNUSABLE, ADDRESS_IN_USE,
+  /// LISTEN_FAILED).
   static absl::StatusOr<std::unique_ptr<ApiServer>> Start(const ApiSettings& settings,
                                                           const ServedRooms& rooms);
 

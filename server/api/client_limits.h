@@ -65,9 +65,9 @@ class ClientLimits {
   /// no limit for a single client.
   explicit ClientLimits(double share) : share_(share) {}
 
-  /// Takes a place for a client. The place must not outlive this. Errors: ResourceExhausted
-  /// (CLIENT_LIMIT_REACHED; TOO_MANY_UPLOADS, TOO_MANY_EXPORTS, TOO_MANY_BACKUPS: all clients
-  /// together have reached the greatest number at a time).
+  /// Takes a place for a client. The place must not outlive the ClientLimits. Errors:
+  /// ResourceExhausted (CLIENT_LIMIT_REACHED; TOO_MANY_UPLOADS, TOO_MANY_EXPORTS, TOO_MANY_BACKUPS:
+  /// all clients together have reached the greatest number at a time).
   absl::StatusOr<ClientPlace> Take(Holding holding, const std::string& client);
 
   /// Checks that a client that holds `held` of `whole` things may have `more` of them. `name` names

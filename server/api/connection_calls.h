@@ -31,8 +31,9 @@ struct ConnectionCalls {
 /// Returns the open connections from this id on, in the order of their ids, from gRPC's channelz.
 std::vector<GrpcConnection> ListConnections(int64_t first_id);
 
-/// Returns the counts of a connection, or nothing if it is closed, within some 10 us. gRPC's
-/// channelz counts a call when its first frame has come, before any service learns of the call.
+/// Returns the counts of a connection, or nothing if the connection is closed. This takes some 10
+/// us. gRPC's channelz counts a call when its first frame has come, before any service learns of
+/// the call.
 std::optional<ConnectionCalls> ReadConnectionCalls(int64_t id);
 
 }  // namespace carillon

@@ -56,8 +56,8 @@ class ConnectionGate {
   /// A process (Unix) or address (TCP) may have the share `client_share`, as ClientLimits has it,
   /// of `max_connection_count`. `log`, which may be null, takes a line about the first connection
   /// that is closed for a limit, and a further line only after kRefusal has passed. It also takes a
-  /// line if no connection can be accepted, and if somebody removes or replaces a Unix socket. `log`
-  /// must outlive the gate.
+  /// line if no connection can be accepted, and if somebody removes or replaces a Unix socket.
+  /// `log` must outlive the gate.
   explicit ConnectionGate(size_t max_connection_count, double client_share = 1,
                           LimitedLog* log = nullptr, SourceFunction& source_of = SourceOfPeer);
 

@@ -37,15 +37,16 @@ class GrpcServers {
   GrpcServers(const GrpcServers&) = delete;
   GrpcServers& operator=(const GrpcServers&) = delete;
 
-  /// Returns what hands connections to the servers. It must not be used after them. Call this
-  /// before Start.
+  /// Returns a taker that hands connections to the servers. The taker must not be used after the
+  /// servers are destroyed. The caller must call AddTaker before Start.
   std::unique_ptr<ConnectionTaker> AddTaker(
       const std::shared_ptr<grpc::ServerCredentials>& credentials);
 
-  /// Returns whether gRPC takes the credentials. The services must outlive the servers.
+  /// Starts all servers. Returns false if gRPC does not take the credentials. The services must
+  /// outlive the servers.
   bool Start(absl::Span<grpc::Service* const> services);
 
-  /// Sets the health of a service. Any thread, after Start.
+  /// Sets the health of a service. Any thread may call it after Start.
   void SetHealth(const std::string& service, bool serves);
 
  private:

@@ -14,8 +14,8 @@
 namespace carillon {
 
 /// Makes the server's side of one call of AudioService.Listen. The returned reactor holds `place`,
-/// and deletes itself when the call ends. `bus` is that of the request's scene, or nothing for the
-/// output; the call ends with its error. `output` must outlive the reactor.
+/// and deletes itself when the call ends. `bus` is the bus of the request's scene, or nothing for
+/// the output. If `bus` is an error, the call ends with it. `output` must outlive the reactor.
 grpc::ServerWriteReactor<v1::ListenResponse>* MakeListenCall(
     LiveOutput& output, const absl::StatusOr<std::optional<BusId>>& bus,
     const v1::ListenRequest& request, ClientPlace place);

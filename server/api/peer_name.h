@@ -21,8 +21,8 @@ std::string ProcessOfPeer(const std::string& peer);
 /// While this object exists, gRPC on this thread learns that the other end of a Unix connection has
 /// the name that PeerNameOf made.
 ///
-/// Without it, all Unix connections would be one peer, because their other ends have no names. gRPC
-/// calls getpeername, which peer_name.cc replaces.
+/// Without this object, all Unix connections would be one peer, because their other ends have no
+/// names. gRPC calls getpeername, which peer_name.cc replaces.
 class NamedPeer {
  public:
   explicit NamedPeer(const std::string& peer);

@@ -24,8 +24,8 @@ struct LeaseState {
   std::optional<double> ends_in_s{};  ///< set while no such connection is open
 };
 
-/// Decides how long scenes last. A scene ends when every connection that has used it was closed,
-/// and a grace period in which a client may come back has passed. Safe from every thread.
+/// Decides how long scenes last. A scene ends when every connection that has used it is closed, and
+/// a grace period in which a client may come back has passed. Safe from every thread.
 class SceneLeases {
  public:
   /// Returns whether a connection is open.

@@ -48,7 +48,7 @@ class SceneOwners {
   std::optional<uint64_t> LongestAbandoned(const std::optional<std::string>& client);
 
   /// Returns OK if the caller is the owner of the scene or an administrator. Also returns OK if the
-  /// scene does not exist, so that the caller learns that from the next step. If the call uses the
+  /// scene does not exist, because the next step reports that to the caller. If the call uses the
   /// scene, the scene also lasts for the call's connection. Errors: PermissionDenied
   /// (SCENE_OF_ANOTHER).
   absl::Status Check(const grpc::CallbackServerContext& context, const Principal& caller,
@@ -66,7 +66,8 @@ class SceneOwners {
                                  const Principal& caller, absl::string_view name,
                                  SceneCall call = SceneCall::kUses) const;
 
-  /// Returns all scenes of the client that made this scene, or nothing if it does not exist.
+  /// Returns all scenes of the client that made this scene. The list is empty if this scene does
+  /// not exist.
   std::vector<uint64_t> ScenesOfItsClient(uint64_t scene) const;
 
   /// Returns whether the caller may use the scene.

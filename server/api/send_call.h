@@ -10,9 +10,9 @@
 
 namespace carillon {
 
-/// Sends something large, message by message. The next message is read from the disk, on a thread
-/// of the pool, when gRPC has taken the previous one. The call is cancelled if its client does not
-/// read for too long.
+/// A call that sends a large content in many messages. The next message is read from the disk, on a
+/// thread of the pool, when gRPC has taken the previous one. The call is cancelled if its client
+/// does not read for too long.
 template <typename Response>
 class SendCall : public ServerStream<Response>, public IdleCall {
  public:

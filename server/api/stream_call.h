@@ -28,8 +28,8 @@ class StreamCall : public Reactor {
   void OnDone() final { delete this; }
 
  protected:
-  /// A call whose steps may block needs a `pool`, which must outlive the call. `pool` may be null
-  /// for others.
+  /// A call whose steps may block needs a `pool`, which must outlive the call. For other calls
+  /// `pool` may be null.
   explicit StreamCall(ThreadPool* pool) : pool_(pool) {}
 
   void Run(std::function<void()> step) {
@@ -70,8 +70,9 @@ class StreamReader : public Reactor {
 
   virtual void Refuse(const absl::Status& status) { this->End(status); }
 
-  /// Runs the step that takes a request. A call may choose other threads for some requests. They
-  /// are still taken one at a time and in order, because the next one is read after the step.
+  /// Runs the step that takes a request. A call may choose other threads for some requests.
+  /// Requests are still taken one at a time and in order, because the next request is read after
+  /// the step.
   virtual void RunTaking(const Request&, std::function<void()> step) { this->Run(std::move(step)); }
 
   /// Returns false if the call was ended while it waited for a request. The call may then be
@@ -194,7 +195,8 @@ class StreamWriter : public Reactor {
     if (*supply == Supply::kMessage) this->StartWrite(&response_);
   }
 
-  /// Returns whether the call was cancelled, and takes note of all that has woken it.
+  /// Returns whether the call was cancelled, and forgets the calls of Wake so far, to which the
+  /// turn answers.
   bool BeginTurn() {
     const MutexLock lock(&mutex_);
     woken_ = false;

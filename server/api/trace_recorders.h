@@ -79,7 +79,8 @@ class TraceRecorders {
 class StreamRecording {
  public:
   StreamRecording() = default;
-  /// `start` is the start message of the stream. No step of the stream was read yet.
+  /// `start` is the start message of the stream. The recording must be made before the first step
+  /// of the stream is read.
   StreamRecording(const SceneRegistry& scenes, uint64_t scene, const v1::ContactStreamStart& start,
                   std::vector<std::shared_ptr<TraceRecorder>> recorders);
 

@@ -28,14 +28,14 @@ namespace carillon {
 
 /// A job that waits or runs.
 struct ActiveJob {
-  JobRecord record;                                      ///< as the database has it
-  v1::CreateModalModelRequest request;                   ///< the farthest reaching one so far
+  JobRecord record;                     ///< as the database has it
+  v1::CreateModalModelRequest request;  ///< the request so far that reaches farthest
   std::optional<v1::CreateModalModelRequest> running{};  ///< the request that its run was given
   v1::Progress progress{};                               ///< of the run
   /// The client that asked for the job. It is empty if the job was asked for before the daemon
   /// started.
   std::string client{};
-  std::string waits_for{};      ///< digest of the coarse model's job, until that has ended
+  std::string waits_for{};      ///< digest of the coarse model's job, until that job has ended
   bool coarse_ready = false;    ///< a coarse model is stored under the job's digest
   bool yields = false;          ///< its run is ended to make room, and repeated
   bool again = false;           ///< submitted after a cancel: it runs once more after this run
@@ -156,8 +156,8 @@ class ActiveJobs {
 
   Mutex mutex_;
   std::map<std::string, ActiveJob> jobs_ ABSL_GUARDED_BY(mutex_);
-  FairQueue decompositions_ ABSL_GUARDED_BY(mutex_);  ///< that wait
-  FairQueue transfers_ ABSL_GUARDED_BY(mutex_);       ///< that wait
+  FairQueue decompositions_ ABSL_GUARDED_BY(mutex_);  ///< the waiting decompositions
+  FairQueue transfers_ ABSL_GUARDED_BY(mutex_);       ///< the waiting transfers
   JobPlaces places_ ABSL_GUARDED_BY(mutex_);
   std::map<std::string, std::vector<std::shared_ptr<Watcher>>> watchers_ ABSL_GUARDED_BY(mutex_);
   std::set<JobSink*> sinks_ ABSL_GUARDED_BY(mutex_);

@@ -27,7 +27,7 @@ absl::Status ResolveUse(v1::CreateModalModelRequest& request);
 ///
 ///     carillon-decomposition 1
 ///     mesh <SHA-256 of the mesh file>
-///     format <obj|ply|stl|off|msh|mesh|node>
+///     format <a name in kMeshFormats>
 ///     ...      the lines of SettingsText
 std::string CanonicalText(const v1::CreateModalModelRequest& resolved);
 

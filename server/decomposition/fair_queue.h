@@ -39,8 +39,8 @@ class FairQueue {
   /// Returns the digest of the job that is to start next, or nothing if no job waits.
   std::optional<std::string> Next() const;
 
-  /// Returns the digests of all jobs in the order in which they start unless others are added. They
-  /// are valid until the next call that adds or removes an entry.
+  /// Returns the digests of all jobs in the order in which the jobs start if no other jobs are
+  /// added. The result is valid until the next call that adds or removes an entry.
   std::vector<absl::string_view> Order() const;
 
   /// Records that a job of the client starts, so that the turn passes to the others.

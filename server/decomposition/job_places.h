@@ -11,7 +11,8 @@
 
 namespace carillon {
 
-/// What may run at a time; see the functions of Executor with the same names.
+/// The limits of the jobs that may run at a time; see the functions of Executor with the same
+/// names.
 struct JobCapacity {
   int worker_count = 0;
   uint64_t memory_budget_bytes = 0;
@@ -38,7 +39,8 @@ class JobPlaces {
   void Free(const std::string& digest) { runs_.erase(digest); }
 
   /// Chooses the transfers to end, youngest first, so that a decomposition that needs `bytes` can
-  /// start. Returns nothing if that does not suffice, or if enough transfers end already.
+  /// start. The list is empty if ending all transfers would not free enough memory, or if no more
+  /// transfers than those chosen earlier need to end.
   std::vector<std::string> ChooseToEnd(uint64_t bytes);
 
   /// Returns the running jobs that occupy what a waiting job of `kind` needs.

@@ -14,7 +14,7 @@ namespace carillon {
 
 struct LocalExecutorOptions {
   std::filesystem::path program{};  ///< carillon-precompute
-  /// For the files of running tasks; MakeLocalExecutor empties it.
+  /// The folder for the files of running tasks; MakeLocalExecutor empties it.
   std::filesystem::path directory{};
   int worker_count = 0;  ///< 0 means half of the processors, at least 1
   int threads_per_worker = 1;

@@ -20,8 +20,8 @@ namespace carillon {
 
 class RemoteRuns;
 
-/// Receives the result of one run. A result that does not arrive completely is dropped. One thread
-/// at a time.
+/// Receives the result of one run. A result that does not arrive completely is dropped. Only one
+/// thread at a time may use an object.
 class RunUpload {
  public:
   RunUpload(RunUpload&&) noexcept;
@@ -36,9 +36,9 @@ class RunUpload {
   /// (DATABASE_FULL).
   absl::Status Append(const v1::TransferRecord& record);
 
-  /// Ends the run, after which its result is on the disk and accepted, and its token is invalid.
-  /// Must be the last call. Errors: those of Append and of RemoteRuns, InvalidArgument
-  /// (TRANSFER_MALFORMED), DataLoss (TRANSFER_CORRUPT).
+  /// Ends the run. When Finish returns, the result is on the disk and accepted, and the run's token
+  /// is invalid. Finish must be the last call. Errors: those of Append and of RemoteRuns,
+  /// InvalidArgument (TRANSFER_MALFORMED), DataLoss (TRANSFER_CORRUPT).
   absl::Status Finish(const v1::RunEnd& end);
 
  private:
@@ -51,11 +51,11 @@ class RunUpload {
   std::unique_ptr<State> state_;
 };
 
-/// Runs of jobs on machines that share no folder with this one. Each run shows a token; the daemon
-/// keeps only its hash. A token is valid for one submission of one job, until the job has ended or
-/// has a result. Results go into the job's folder, which slurm_task.h describes. Errors of every
-/// call with a token: PermissionDenied (JOB_TOKEN_WRONG), FailedPrecondition (JOB_TOKEN_EXPIRED,
-/// JOB_TOKEN_USED). Safe from every thread.
+/// Runs of jobs on machines that share no folder with this one. Each run shows a token, of which
+/// the daemon keeps only the hash. A token is valid for one submission of one job, until the job
+/// has ended or has a result. Results go into the job's folder, which slurm_task.h describes.
+/// Errors of every call with a token: PermissionDenied (JOB_TOKEN_WRONG), FailedPrecondition
+/// (JOB_TOKEN_EXPIRED, JOB_TOKEN_USED). Safe from every thread.
 class RemoteRuns {
  public:
   /// Returns a token that nobody can guess.

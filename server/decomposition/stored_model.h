@@ -19,14 +19,14 @@ namespace carillon {
 /// Returns whether the stored model satisfies the request. It does if it is complete up to the
 /// wanted eigenvalue, or if an earlier job (`record`) that wanted this eigenvalue or a higher one
 /// has succeeded. A model whose band was lowered satisfies every request that leaves the band open,
-/// and no other. A missing or damaged model satisfies no request. Errors: the others of
+/// and no other. A missing or damaged model satisfies no request. Errors: all other errors of
 /// ModelStore::Summary.
 absl::StatusOr<bool> IsSatisfied(ModelStore& models, const std::string& digest,
                                  const std::optional<JobRecord>& record,
                                  const v1::CreateModalModelRequest& request);
 
-/// Returns the same for any job. A stored transfer satisfies a job for its step of the speed ratio
-/// that wants neither more accuracy nor a higher eigenvalue.
+/// Does the same for any job, including the job of a transfer. A stored transfer satisfies a job
+/// with its step number that wants neither more accuracy nor a higher eigenvalue.
 absl::StatusOr<bool> IsSatisfied(ModeDatabase& database, const WantedJob& wanted,
                                  const std::optional<JobRecord>& record);
 

@@ -23,7 +23,7 @@ struct WantedJob {
 WantedJob WantedModel(const v1::CreateModalModelRequest& resolved);
 
 /// Returns the transfer to compute after the model of a resolved request, which is stored as
-/// `model`. The model's digest and the step of the speed ratio name the job.
+/// `model`. The model's digest and the step number of the speed ratio name the job.
 WantedJob WantedTransfer(const std::string& model, const v1::CreateModalModelRequest& resolved);
 
 /// Returns the transfer of the stored model `model` that a client asks for. Errors: those of
@@ -31,7 +31,7 @@ WantedJob WantedTransfer(const std::string& model, const v1::CreateModalModelReq
 absl::StatusOr<WantedJob> WantedTransfer(const std::string& model,
                                          const v1::CreateTransferRequest& request);
 
-/// Returns the step of the speed ratio for the material of a resolved request.
+/// Returns the step number (SpeedStep) of the speed ratio of the material of a resolved request.
 int64_t SpeedStepOf(const v1::CreateModalModelRequest& resolved);
 
 }  // namespace carillon

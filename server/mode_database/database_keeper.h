@@ -10,8 +10,8 @@
 
 namespace carillon {
 
-/// A thread that checks once a second that the files of a database are in place, and gives free
-/// pages back to the disk.
+/// A thread that calls Database::CheckFiles once a second, and gives free pages back to the disk.
+/// DatabaseFiles says which files are checked, and how.
 class DatabaseKeeper {
  public:
   /// Takes the first result of Database::CheckFiles, and each result that differs from the previous

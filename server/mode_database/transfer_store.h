@@ -34,8 +34,8 @@ struct TransferSummary {
 /// Speed of sound in air by which speed ratios are defined, m/s.
 inline constexpr double kSoundSpeedInAirMPerS = 343;
 
-/// Returns the number under which transfers with nearly the same speed ratio s are stored, which is
-/// ln s in steps of one percent.
+/// Returns the step number under which transfers with nearly the same speed ratio s are stored: 100
+/// ln s, rounded. Speed ratios of neighbouring steps differ by about one percent.
 int64_t SpeedStep(double speed_ratio);
 
 /// Stores the transfers of modal models by model and speed ratio. A transfer belongs to one
@@ -58,9 +58,9 @@ class TransferStore {
   /// called again.
   void Listen(OnStored on_stored);
 
-  /// Stores a transfer of the model durably; replaces a transfer with the same step of the speed
-  /// ratio. Errors: NotFound (MODAL_MODEL_NOT_FOUND), InvalidArgument (TRANSFER_MALFORMED: its
-  /// modes are not the model's).
+  /// Stores a transfer of the model durably; replaces a transfer with the same step number. Errors:
+  /// NotFound (MODAL_MODEL_NOT_FOUND), InvalidArgument (TRANSFER_MALFORMED: its modes are not the
+  /// model's).
   absl::StatusOr<TransferSummary> Put(const std::string& model_digest,
                                       const StoredTransfer& transfer);
 
@@ -80,7 +80,7 @@ class TransferStore {
   std::shared_ptr<const Transfer> Find(const ModalModel& model, double material_m_per_s);
 
  private:
-  using Key = std::pair<int64_t, int64_t>;  // revision, step of the speed ratio
+  using Key = std::pair<int64_t, int64_t>;  // revision, step number
 
   Database* database_;
   const Clock* clock_;

@@ -65,7 +65,7 @@ class BlowGatherer {
   explicit BlowGatherer(double step_s) : nominal_step_s_(step_s) {}
 
   /// Begins the step at simulation time `time_s`, which must not be before the last step's. If
-  /// steps were left out, the forces ended with the last step; returns the events that end these
+  /// steps were left out, the forces ended with the last step. Returns the events that end these
   /// forces.
   Events Begin(double time_s);
 

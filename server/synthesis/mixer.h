@@ -130,12 +130,12 @@ class Mixer {
   /// Puts a bank on the mixer; events may be sent to it when the call returns. With a `voice`,
   /// which serves one object, the bank is heard from the object's position and rings in the time
   /// domain; without one it is heard without a position. Bank and voice must have been made for
-  /// this mixer's sample rate, block and channels. RESOURCE_EXHAUSTED (TOO_MANY_OBJECTS).
+  /// this mixer's sample rate, block and channels. Errors: ResourceExhausted (TOO_MANY_OBJECTS).
   absl::StatusOr<BankId> Add(std::unique_ptr<OscillatorBank> bank,
                              std::shared_ptr<Voice> voice = nullptr, BusId bus = {})
       ABSL_LOCKS_EXCLUDED(kRenderRole);
 
-  /// Opens a bus. RESOURCE_EXHAUSTED (TOO_MANY_SCENES: it has most_buses).
+  /// Opens a bus. Errors: ResourceExhausted (TOO_MANY_SCENES: the mixer has most_buses).
   absl::StatusOr<BusId> OpenBus(double gain = 1) ABSL_LOCKS_EXCLUDED(kRenderRole);
 
   /// Gives up a bus. No bank may be added to it after this call; its banks sound until they are
@@ -158,8 +158,9 @@ class Mixer {
 
   BusState State(BusId bus) const;
 
-  /// The part of the order in which a bus begins its long blocks: 0 to kSectionCount - 1. Two buses
-  /// of the same stagger render the same events to the same bits.
+  /// Returns the stagger of a bus, 0 to kSectionCount - 1, by which the beginnings of its long
+  /// blocks are shifted against those of other buses. Two buses of the same stagger render the same
+  /// events to the same bits.
   static size_t Stagger(BusId bus);
 
   /// Removes a bank once it is silent. The caller must send it no further events; events already
@@ -171,8 +172,8 @@ class Mixer {
   void FadeOut(BankId bank) ABSL_LOCKS_EXCLUDED(kRenderRole);
 
   /// Opens a stream of events; `capacity` events may wait in it until the mixer takes them. Unless
-  /// it is `timely`, impulses whose frame has passed count as accepted, not as late.
-  /// RESOURCE_EXHAUSTED (TOO_MANY_STREAMS).
+  /// it is `timely`, impulses whose frame has passed count as accepted, not as late. Errors:
+  /// ResourceExhausted (TOO_MANY_STREAMS).
   absl::StatusOr<std::unique_ptr<EventStream>> OpenStream(size_t capacity = 4096,
                                                           bool timely = true)
       ABSL_LOCKS_EXCLUDED(kRenderRole);

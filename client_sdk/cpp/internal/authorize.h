@@ -13,7 +13,7 @@ inline bool IsSendable(const std::string& token) {
   return std::all_of(token.begin(), token.end(), [](char c) { return c > ' ' && c <= '~'; });
 }
 
-/// Adds the token to the call unless it is empty, or no token at all.
+/// Adds the token to the call. Adds nothing if the token is empty or is not sendable.
 inline void Authorize(grpc::ClientContext& context, const std::string& token) {
   if (!token.empty() && IsSendable(token)) context.AddMetadata("authorization", "Bearer " + token);
 }

@@ -21,7 +21,8 @@
 
 namespace carillon::client {
 
-/// Far above the time of any call with one answer; the slowest reads a large model from the disk.
+/// The time limit of a call with one answer. It is far above the time of any such call; the slowest
+/// call reads a large model from the disk.
 inline constexpr auto kCallTimeout = std::chrono::seconds(60);
 
 /// The client that talks to a daemon: one gRPC channel, and one stub for each service.

@@ -13,7 +13,7 @@ namespace carillon::falls {
 /// is the object i + 1.
 using Simulation = std::function<v1::ContactStep()>;
 
-/// Simulates the scene in an engine with steps of `step_s` seconds. Errors: InvalidArgument, where
+/// Simulates the scene in an engine with steps of `step_s` seconds. Errors: InvalidArgument, if
 /// MuJoCo refuses a body.
 Simulation FallInBullet(const FallScene& scene, double step_s);
 Simulation FallInOde(const FallScene& scene, double step_s);

@@ -33,7 +33,7 @@ inline constexpr double kSailMass_kg = 0.012;
 inline constexpr double kThreadMass_kg = 0.002;
 inline constexpr double kThreadRadius_m = 0.002;
 
-// The restitution of a contact is the product of those of both bodies.
+// The restitution of a contact is the product of the restitutions of both bodies.
 inline constexpr double kTubeRestitution = 0.9;
 inline constexpr double kClapperRestitution = 0.65;
 /// A contact that is slower does not bounce.

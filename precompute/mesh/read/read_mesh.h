@@ -20,6 +20,9 @@ namespace carillon::precompute {
 /// Errors: MESH_FORMAT_UNKNOWN, MESH_UNREADABLE, MESH_NOT_FINITE, MESH_INDEX_OUT_OF_RANGE,
 /// MESH_TOO_LARGE, MESH_ELEMENT_UNSUPPORTED, MESH_ZERO_VOLUME, MESH_MIDSIDE_NODE_MISPLACED,
 /// MESH_SEVERAL_PIECES, MESH_NOT_MANIFOLD.
+///
+/// A new format is added to kMeshFormats (proto/cpp/mesh_format.h) and, if its files have elements,
+/// to ParseElements in read_mesh.cc; CONTRIBUTING.md names all files.
 absl::StatusOr<NamedMesh> ParseMesh(const std::string& bytes, const std::string& format,
                                     double metres_per_unit);
 

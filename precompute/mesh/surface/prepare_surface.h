@@ -30,9 +30,11 @@ struct PreparedSurface {
   double frequency_error = 0;
 };
 
-/// Checks a surface. If the settings allow it, repairs a faulty surface, first without changing its
-/// shape and then by wrapping it. Then makes the wall, and coarsens the surface. Errors: those of
-/// CheckSurface, MESH_REPAIR_FAILED, MESH_WALL_IMPOSSIBLE.
+/// Checks a surface. If the settings allow it, repairs a faulty surface in three steps. RepairSoup
+/// comes first and keeps the shape. FillHoles, Unfold and Untangle (repair_locally.h) follow, each
+/// only for the fault that it repairs. WrapSurface comes last, if faults remain and no hole is too
+/// wide. Then makes the wall, and coarsens the surface. Errors: those of CheckSurface,
+/// MESH_REPAIR_FAILED, MESH_WALL_IMPOSSIBLE.
 absl::StatusOr<PreparedSurface> PrepareSurface(const SurfaceMesh& given,
                                                const PreparationSettings& settings);
 

@@ -19,7 +19,7 @@ struct RefinedSurface {
 /// Splits edges into equal parts until no edge is longer than `max_edge_m` times the relative size
 /// at the middle of the edge. The edges of the given triangles are split first, so that a long thin
 /// triangle is split across its length. The edges inside the given triangles follow, always the
-/// longest one first. Inside a given triangle edges are flipped until they are Delaunay (Lawson
+/// longest one first. Inside each given triangle, edges are flipped until they are Delaunay (Lawson
 /// 1977), which keeps angles large. Collapsed triangles are left out. The surface must be closed
 /// and manifold.
 RefinedSurface RefineSurface(const SurfaceMesh& surface, double max_edge_m,

@@ -31,7 +31,8 @@ struct MovedBody {
 ///
 ///   A = J w(t)/m along the axes,  A = I^(-1) (r - center) x J w(t) about them,
 ///
-/// where w(t) is the pulse of the contact. With s' = a s/c, each of them gives at 1 m the pressure
+/// where w(t) is the pulse of the contact. With s' = a s/c, each acceleration A gives at 1 m the
+/// pressure
 ///
 ///   rho0 a^2 A (S_1 s'/(2 + 2 s' + s'^2) + S_2 s'^2/(9 + 9 s' + 4 s'^2 + s'^3)),
 ///

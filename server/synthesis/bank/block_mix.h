@@ -34,13 +34,13 @@ class BlockMix {
   /// kStaggers.
   explicit BlockMix(size_t block_frame_count, size_t stagger = 0);
 
-  /// Begins the block of this number; Begin and Finish alternate.
+  /// Begins the block of this number. The caller calls Begin and Finish in turn.
   void Begin(uint64_t block_number, RenderWorkspace& workspace) noexcept;
 
   /// Writes the sum to `block`.
   void Finish(std::span<float> block) noexcept;
 
-  /// Ends the long blocks that are being played. Called between Finish and Begin.
+  /// Ends the long blocks that are being played. The caller must call it between Finish and Begin.
   void Silence() noexcept;
 
   /// The number that the last Begin was given.

@@ -14,7 +14,7 @@
 
 namespace carillon {
 
-/// How a bank's directions are heard.
+/// The way in which a listener hears the directions of a bank's modes.
 struct HeardDirectivity {
   Directivity directivity;
   double size = 1;  ///< relative to the model's size
@@ -56,7 +56,7 @@ class DirectedGains {
   };
   struct Size {
     size_t lane_count = 0;
-    size_t period_frame_count = 0;  ///< at least
+    size_t period_frame_count = 0;  ///< least length of a period
     size_t block_frame_count = 0;
   };
 

@@ -21,7 +21,7 @@ struct PlannedLane {
   std::complex<double> log_q;  ///< (sigma + i omega)/rate
   std::complex<double> start;  ///< the state after a modal impulse of one unit of the shape table
   std::complex<double> contact_s;  ///< sigma + i omega, 1/s, for the factor of a contact
-  SpreadMode spread;               ///< how it spreads in the long blocks of its part
+  SpreadMode spread;               ///< how the lane spreads in the long blocks of its part
   bool companion = false;
 };
 

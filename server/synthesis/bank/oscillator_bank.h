@@ -62,11 +62,11 @@ struct OscillatorBankSettings {
 /// tau^2 / 2) replaces it). A raised cosine has another factor (strike_kernel::Onset).
 ///
 /// A struck mode rings in the time domain, SIMD across modes: in single precision within a block,
-/// in double between blocks, which keeps the error below -100 dB. At the next long block of its
-/// kind the mode's state is added to the state that already rings by spectrum; by linearity the sum
-/// is the same sound. Modes that decay too fast for any long block stay in the time domain, and so
-/// does a bank that is struck all the time. Modes below -140 dB of full scale are put to sleep, in
-/// groups of kMostLanes.
+/// in double between blocks, which keeps the error below -100 dB. At the start of the next long
+/// block of the mode's kind (the kinds differ in length, see LongBlock), its state is added to the
+/// state that already rings by spectrum; by linearity the sum is the same sound. Modes that decay
+/// too fast for any long block stay in the time domain, and so does a bank that is struck all the
+/// time. Modes below -140 dB of full scale are put to sleep, in groups of kMostLanes.
 ///
 /// The second mode of a degenerate pair is a cosine, which would begin with a jump and click under
 /// a soft mallet. Therefore it has a companion of the same frequency and opposite sign that decays
@@ -85,9 +85,10 @@ class OscillatorBank {
   OscillatorBank(const SoundingModes& sounding, const ShapeTable& shapes,
                  const OscillatorBankSettings& settings);
 
-  /// Applies an impulse. It is first audible at sample `offset` of the block of `mix`, which lies
-  /// `lead_frames` (0 to 1) after its time. Offsets ascend within a block. Returns false, without
-  /// effect, if the impulse is not finite or names a vertex that the body lacks.
+  /// Applies an impulse. The impulse is first audible at sample `offset` of the block of `mix`.
+  /// This sample lies `lead_frames` (0 to 1) frames after the time of the impulse. Offsets ascend
+  /// within a block. Returns false, without effect, if the impulse is not finite or names a vertex
+  /// that the body lacks.
   bool Strike(const SurfaceImpulse& impulse, size_t offset, float lead_frames,
               BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
@@ -155,8 +156,8 @@ class OscillatorBank {
   /// Number of modes that still ring.
   size_t active_mode_count() const noexcept { return struck() ? mode_count_ : active_mode_count_; }
 
-  /// Return the units of work (work_budget.h) of a block without events, of an impulse, of a merged
-  /// impulse, and of the lanes that a first impulse awakens.
+  /// These four functions return the units of work (work_budget.h) of a block without events, of an
+  /// impulse, of a merged impulse, and of the lanes that a first impulse awakens.
   double ringing_work() const noexcept;
   double strike_work() const noexcept;
   double merged_strike_work() const noexcept;

@@ -32,7 +32,8 @@ struct Radiation {
   double sound_speed_m_per_s = 343;  ///< in air
 };
 
-/// The arrays of a modal model that decide how each of its modes sounds, all #m.
+/// The arrays of a modal model that decide how each of its modes sounds. Each array has #m numbers,
+/// one for each mode.
 struct ModeTable {
   std::span<const double> eigenvalues;  ///< ascending, unit material
   std::span<const double> couplings;    ///< the paper's c_m, unit material

@@ -19,7 +19,8 @@ class ShapeTable {
  public:
   ShapeTable() = default;
 
-  /// Copies `shapes`, #V by 3 by #m, row-major: shapes[(vertex * 3 + axis) * mode_count + mode].
+  /// Copies `shapes`, vertex_count by 3 by mode_count, row-major: shapes[(vertex * 3 + axis) *
+  /// mode_count + mode].
   ShapeTable(std::span<const float> shapes, size_t vertex_count, size_t mode_count);
 
   size_t vertex_count() const noexcept { return vertex_count_; }

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The factor by which the finite pulse of a contact changes what an impulse adds to each mode,
-// compiled for each target. That of a Gaussian pulse is exp(tau^2 s^2/2), which strike_kernel.cc
-// multiplies into the delay. Only kernels include this file, within foreach_target.
+// compiled for each target. The factor of a Gaussian pulse is exp(tau^2 s^2/2), which
+// strike_kernel.cc multiplies into the delay. Only kernels include this file, within
+// foreach_target.
 #if defined(CARILLON_SERVER_SYNTHESIS_PULSE_FACTOR_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef CARILLON_SERVER_SYNTHESIS_PULSE_FACTOR_INL_H_
 #undef CARILLON_SERVER_SYNTHESIS_PULSE_FACTOR_INL_H_
@@ -114,8 +115,8 @@ HWY_INLINE void CosineFactor(V a, V y, V& factor_re, V& factor_im) {
 HWY_INLINE void SpreadOverCosine(const LaneArrays& lanes, size_t lane, V half_duration, V& re,
                                  V& im) {
   const Floats d;
-  // A mode that decays further than that between the middle and the end of its contact is inaudible
-  // then, and the factor would make it loud before.
+  // A mode that decays further than this between the middle and the end of its contact is inaudible
+  // at the end, and the factor would make it loud before the end.
   constexpr float kMostDecay = 2;
   const V a = hn::Max(hn::Mul(half_duration, hn::Load(d, lanes.contact_re.data() + lane)),
                       hn::Set(d, -kMostDecay));

@@ -78,11 +78,13 @@ struct StruckPart {
   size_t lane_count = 0;
 };
 
-/// Initializes the start and fresh states of a block that is rendered in parts.
+/// Initializes the start and fresh states (see LaneArrays) before the first part of a block that is
+/// rendered in parts.
 void Start(LaneArrays& lanes, size_t lane_count) noexcept;
 
-/// Renders a part that was started and is not the block's last, with the impulses of its batch, and
-/// advances the start and fresh states to its end.
+/// Renders a part of a block, except the block's last part, with the impulses of the part's batch.
+/// Start() must have been called for the block. Advances the start and fresh states to the end of
+/// the part.
 void RingStruck(LaneArrays& lanes, const StruckPart& part) noexcept;
 
 /// Renders a part with its gains, and leaves all states as they are.

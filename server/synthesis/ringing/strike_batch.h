@@ -12,8 +12,8 @@
 namespace carillon {
 
 /// Onsets (impulses and knots) of one bank within a block, which are rendered in one pass over the
-/// lanes. The batch has the frame of each onset and the change that it makes to the states. Scratch
-/// memory of one rendering thread.
+/// lanes. The batch has the frame of each onset and the change that it makes to the states. A batch
+/// is scratch memory of one rendering thread.
 class StrikeBatch {
  public:
   static constexpr size_t kMostStrikes = 32;

@@ -46,9 +46,10 @@ class EventStream {
   /// Returns the number of events that can be pushed before the mixer takes some.
   size_t room() const noexcept { return queue_->events.room(); }
 
-  /// Impulses of this stream that the mixer took in time or late, and events that were lost because
-  /// the queue, the mixer or the event's block was full, or because the bank had gone. An event is
-  /// counted once the mixer has taken it, which happens at the next block or soon after.
+  /// These three functions return the numbers of impulses of this stream that the mixer took in
+  /// time, of those that it took late, and of events that were lost because the queue, the mixer or
+  /// the event's block was full, or because the bank had gone. An event is counted once the mixer
+  /// has taken it, which happens at the next block or soon after.
   uint64_t accepted_count() const noexcept { return queue_->accepted_count.load(); }
   uint64_t late_count() const noexcept { return queue_->late_count.load(); }
   uint64_t dropped_count() const noexcept { return queue_->dropped_count.load(); }

@@ -74,8 +74,8 @@ struct ListenerMove {
 };
 
 /// One instruction to one bank, with its time: frame + fraction, in frames since the mixer began.
-/// The first audible sample is the first at or after that time; its phase accounts for the part of
-/// a frame between that time and the sample.
+/// The first audible sample is the first sample at or after that time. The phase of the sound in it
+/// accounts for the part of a frame between that time and the sample.
 struct MixerEvent {
   using Action =
       std::variant<SurfaceImpulse, SurfaceForce, ForceKnot, ObjectMove, ListenerMove, ContactBegin>;

@@ -46,12 +46,12 @@ inline constexpr double kLongestPropagationS = 0.6;
 ///   delay  d = r/c, with r = |x(t - d) - l(t)|: from where the object was when it sounded
 ///   left, right   sqrt(2) cos(pi (1 + s)/4), sqrt(2) sin(pi (1 + s)/4), s = right . (x - l)/r
 ///
-/// These are evaluated at the ends of blocks. Between them, gains are interpolated linearly and the
-/// delay by a cubic with continuous slope, so that a moving object has the right Doppler shift and
-/// does not click. The voice is one block late. A jump, or a delay that grows by more than 0.9 or
-/// shrinks by more than 3 frames in a frame, is rendered as a cross-fade of 10 ms. Frequencies that
-/// are shifted above Nyquist alias. The delay is at least DelayLine::kLeastDelay samples, the delay
-/// of an object at 0.09 m (at 48 kHz).
+/// Gains and delay are evaluated at the ends of blocks. Between them, gains are interpolated
+/// linearly and the delay by a cubic with continuous slope, so that a moving object has the right
+/// Doppler shift and does not click. The voice is one block late. A jump, or a delay that grows by
+/// more than 0.9 or shrinks by more than 3 frames in a frame, is rendered as a cross-fade of 10 ms.
+/// Frequencies that are shifted above Nyquist alias. The delay is at least DelayLine::kLeastDelay
+/// samples, the delay of an object at 0.09 m (at 48 kHz).
 ///
 /// For two ears, the responses of a measured head for the direction of the sound replace the gains
 /// to left and right. The delays of these responses add to d, so that each ear has its own Doppler
@@ -73,7 +73,8 @@ class Voice {
 
   Voice(const Settings& settings, const Place& object, const Place& listener);
 
-  /// Start a motion at sample `offset` of this block. The caller must call them before Render.
+  /// These two functions start a motion of the object or of the listener at sample `offset` of this
+  /// block. The caller must call them before Render.
   void Move(const Motion& motion, size_t offset) noexcept { object_.Move(motion, offset); }
   void MoveListener(const Motion& motion, size_t offset) noexcept {
     listener_.Move(motion, offset);

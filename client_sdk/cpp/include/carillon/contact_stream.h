@@ -15,7 +15,7 @@ namespace carillon::client {
 /// The interface is abstract, so that tests can pass a fake.
 ///
 /// Threads: one thread at a time may call the methods. Send() never waits for the daemon: the
-/// threads of the network library do the sending. The destructor of a stream without Finish()
+/// threads of the network library do the sending. If Finish() was not called, the destructor
 /// cancels the stream and drops the steps that have not been sent.
 class ContactStream {
  public:
