@@ -50,15 +50,6 @@ absl::Status CheckCharacters(absl::string_view line) {
                                 ": remove it"));
 }
 
-/// `what` is "name" or "credential".
-absl::Status CheckIsNew(absl::string_view what, const std::string& word, int number,
-                        std::map<std::string, int>& lines) {
-  const auto [known, is_new] = lines.emplace(word, number);
-  if (is_new) return absl::OkStatus();
-  return WrongLine(absl::StrCat("the ", what, " is that of line ", known->second,
-                                ", too: remove or correct one of the two lines"));
-}
-
 bool IsSameDigest(const std::string& a, const std::string& b) {
   return a.size() == b.size() && CRYPTO_memcmp(a.data(), b.data(), a.size()) == 0;
 }
@@ -92,11 +83,11 @@ AccessTable AccessTable::ForThisMachine() {
 absl::StatusOr<AccessTable> AccessTable::Read(const std::string& path) {
   ASSIGN_OR_RETURN(const std::string content, ReadPrivateFile(path, kReason));
   AccessTable table;
-  LinesByWord lines;
+  EarlierLines earlier;
   int number = 0;
   for (const absl::string_view line : absl::StrSplit(content, '\n')) {
     ++number;
-    const absl::Status read = table.ReadLine(absl::StripAsciiWhitespace(line), number, lines);
+    const absl::Status read = table.ReadLine(absl::StripAsciiWhitespace(line), number, earlier);
     if (read.ok()) continue;
     return WrongLine(absl::StrCat(
         path, " line ", number, ": ", ToErrorInfo(read).message(),
@@ -105,14 +96,30 @@ absl::StatusOr<AccessTable> AccessTable::Read(const std::string& path) {
   return table;
 }
 
-absl::Status AccessTable::ReadLine(absl::string_view line, int number, LinesByWord& lines) {
+absl::Status AccessTable::EarlierLines::Check(const std::string& name, unsigned roles,
+                                              const std::string& credential, int number) {
+  const auto [same_credential, is_new] = by_credential.emplace(credential, number);
+  if (!is_new) {
+    return WrongLine(absl::StrCat("the credential is that of line ", same_credential->second,
+                                  ", too: remove one of the two lines"));
+  }
+  const auto same_name = by_name.emplace(name, std::pair(roles, number)).first;
+  const auto [first_roles, first_number] = same_name->second;
+  if (first_roles == roles) return absl::OkStatus();
+  return WrongLine(absl::StrCat("line ", first_number, " gives \"", name,
+                                "\" other roles: give both lines the same ones"));
+}
+
+absl::Status AccessTable::ReadLine(absl::string_view line, int number, EarlierLines& earlier) {
   if (line.empty() || line.front() == '#') return absl::OkStatus();
   RETURN_IF_ERROR(CheckCharacters(line));
   const std::vector<std::string> words =
       absl::StrSplit(line, absl::ByAnyChar(" \t"), absl::SkipEmpty());
   if (words.size() < 2) return WrongLine("the line has no roles");
   ASSIGN_OR_RETURN(const unsigned roles, ParseRoles(words[1]));
-  RETURN_IF_ERROR(CheckIsNew("name", words[0], number, lines));
+  // The line of anybody has no credential.
+  const std::string shown = words.size() > 2 ? words[2] : "";
+  RETURN_IF_ERROR(earlier.Check(words[0], roles, shown, number));
   if (words[0] == anybody_.name && words.size() == 2) {
     anybody_.roles = roles;
     return absl::OkStatus();
@@ -121,7 +128,7 @@ absl::Status AccessTable::ReadLine(absl::string_view line, int number, LinesByWo
     return WrongLine("the line has not three words");
   }
   Entry entry{.principal = {.name = words[0], .roles = roles}};
-  absl::string_view credential = words[2];
+  absl::string_view credential = shown;
   if (absl::ConsumePrefix(&credential, "sha256:") && IsSha256Hex(std::string(credential))) {
     entry.token_sha256 = std::string(credential);
   } else if (absl::ConsumePrefix(&credential, "certificate:") && !credential.empty()) {
@@ -131,8 +138,6 @@ absl::Status AccessTable::ReadLine(absl::string_view line, int number, LinesByWo
         "the third word is neither sha256: with 64 hexadecimal digits nor certificate:"
         " with a name");
   }
-  // No name has a blank, so that none is taken for a credential.
-  RETURN_IF_ERROR(CheckIsNew("credential", absl::StrCat(" ", words[2]), number, lines));
   entries_.push_back(std::move(entry));
   return absl::OkStatus();
 }

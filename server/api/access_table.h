@@ -3,6 +3,7 @@
 
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -52,9 +53,10 @@ class AccessTable {
   /// Reads lines of the form "NAME ROLES CREDENTIAL". ROLES are separated by commas; CREDENTIAL is
   /// "sha256:" with the digest of a token, or "certificate:" with a name in a client's certificate.
   /// The name "anybody", without a credential, stands for callers that show neither a token nor a
-  /// certificate. No two lines may have the same name or the same credential. Lines that begin with
-  /// # are ignored. Errors: FailedPrecondition (ACCESS_FILE_UNUSABLE: the file cannot be read,
-  /// others may read or change it, a line is wrong, or two lines contradict each other).
+  /// certificate. A name may have several lines, with the same roles and one credential each. No
+  /// two lines may have the same credential. Lines that begin with # are ignored. Errors:
+  /// FailedPrecondition (ACCESS_FILE_UNUSABLE: the file cannot be read, others may read or change
+  /// it, a line is wrong, or two lines contradict each other).
   static absl::StatusOr<AccessTable> Read(const std::string& path);
 
   /// Returns the caller with this token, or null.
@@ -73,10 +75,16 @@ class AccessTable {
     std::string certificate_name{};  ///< empty if it has no certificate
   };
 
-  /// For each name and credential, the number of its line.
-  using LinesByWord = std::map<std::string, int>;
+  /// The lines that were read before a line, which must not contradict them.
+  struct EarlierLines {
+    std::map<std::string, int> by_credential;                 ///< number of the line
+    std::map<std::string, std::pair<unsigned, int>> by_name;  ///< roles, number of the first line
+    /// Remembers a line. Returns an error if the line contradicts an earlier one.
+    absl::Status Check(const std::string& name, unsigned roles, const std::string& credential,
+                       int number);
+  };
 
-  absl::Status ReadLine(absl::string_view line, int number, LinesByWord& lines);
+  absl::Status ReadLine(absl::string_view line, int number, EarlierLines& earlier);
 
   std::vector<Entry> entries_;
   Principal anybody_{.name = "anybody"};
