@@ -99,7 +99,7 @@ absl::StatusOr<AccessTable> AccessTable::Read(const std::string& path) {
 absl::Status AccessTable::EarlierLines::Check(const std::string& name, unsigned roles,
                                               const std::string& credential, int number) {
   const auto [same_credential, is_new] = by_credential.emplace(credential, number);
-  if (!is_new) {
+  if (!is_new && !credential.empty()) {
     return WrongLine(absl::StrCat("the credential is that of line ", same_credential->second,
                                   ", too: remove one of the two lines"));
   }
