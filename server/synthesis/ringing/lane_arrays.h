@@ -92,7 +92,8 @@ struct LaneArrays {
   std::array<LaneRange, kTileKinds> by_tile;
   /// Powers of q, interleaved for groups of kMostLanes lanes: see PowerIndex.
   LaneArray<float> powers;
-  /// q, and its power that advances by a tile of the first kind.
+  /// q_re and q_im: q, the factor by which a mode's state advances in one frame. step_re and
+  /// step_im: q^8, by which the state advances in a tile of kind 0, which has 8 frames.
   LaneArray<float> q_re, q_im, step_re, step_im;
   /// q^N for a block of N frames.
   LaneArray<double> block_re, block_im;
