@@ -154,12 +154,12 @@ grpc::ServerUnaryReactor* SceneService::AddObject(grpc::CallbackServerContext* c
 grpc::ServerUnaryReactor* SceneService::AddObjects(grpc::CallbackServerContext* context,
                                                    const v1::AddObjectsRequest* request,
                                                    v1::AddObjectsResponse* response) {
-  return Answer(context, reception_, Role::kStrike,
-                [this, context, request, response](const Principal& caller) {
-                  ASSIGN_OR_RETURN(const uint64_t scene,
-                                   owners_.Parse(*context, caller, request->scene()));
-                  return AddAll(scene, *request, *response);
-                });
+  return AnswerFairly(context, reception_, Role::kStrike, adding_,
+                      [this, context, request, response](const Principal& caller) {
+                        ASSIGN_OR_RETURN(const uint64_t scene,
+                                         owners_.Parse(*context, caller, request->scene()));
+                        return AddAll(*context, scene, *request, *response);
+                      });
 }
 
 grpc::ServerUnaryReactor* SceneService::UpdateObject(grpc::CallbackServerContext* context,
@@ -278,11 +278,13 @@ absl::Status SceneService::Add(uint64_t scene, const v1::AddObjectRequest& reque
   return absl::OkStatus();
 }
 
-absl::Status SceneService::AddAll(uint64_t scene, const v1::AddObjectsRequest& request,
+absl::Status SceneService::AddAll(const grpc::CallbackServerContext& context, uint64_t scene,
+                                  const v1::AddObjectsRequest& request,
                                   v1::AddObjectsResponse& response) {
   RETURN_IF_ERROR(CheckObjectCount(scene, static_cast<size_t>(request.objects_size())));
   std::vector<NewObject> objects;
   for (const v1::AddObjectRequest& wanted : request.objects()) {
+    if (context.IsCancelled()) return absl::CancelledError("the caller has gone");
     const size_t index = objects.size();
     if (!wanted.scene().empty() && wanted.scene() != request.scene()) {
       return AtElement(Refusal(absl::StatusCode::kInvalidArgument, "INVALID_NAME",
@@ -298,7 +300,9 @@ absl::Status SceneService::AddAll(uint64_t scene, const v1::AddObjectsRequest& r
   }
   // The models may have been read from the disk meanwhile, and other calls may have added objects.
   RETURN_IF_ERROR(CheckObjectCount(scene, objects.size()));
-  ASSIGN_OR_RETURN(const std::vector<PlacedObject> placed, scenes_.AddObjects(scene, objects));
+  ASSIGN_OR_RETURN(
+      const std::vector<PlacedObject> placed,
+      scenes_.AddObjects(scene, objects, [&context] { return !context.IsCancelled(); }));
   const std::string name = scenes_.NameOf(scene);
   for (const PlacedObject& made : placed) *response.add_objects() = ToProto(name, made);
   return absl::OkStatus();

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "carillon/v1/scene_service.grpc.pb.h"
+#include "server/api/fair_pool.h"
 #include "server/api/reception.h"
 #include "server/api/resource_name.h"
 #include "server/api/scene_owners.h"
@@ -83,8 +84,8 @@ class SceneService final : public v1::SceneService::CallbackService {
   absl::Status CheckObjectCount(uint64_t scene, size_t more) const;
   absl::Status Add(uint64_t scene, const v1::AddObjectRequest& request,
                    v1::AddObjectResponse& response);
-  absl::Status AddAll(uint64_t scene, const v1::AddObjectsRequest& request,
-                      v1::AddObjectsResponse& response);
+  absl::Status AddAll(const grpc::CallbackServerContext& context, uint64_t scene,
+                      const v1::AddObjectsRequest& request, v1::AddObjectsResponse& response);
   absl::Status Update(uint64_t scene, uint32_t handle, const v1::UpdateObjectRequest& request,
                       v1::UpdateObjectResponse& response);
 
@@ -93,6 +94,9 @@ class SceneService final : public v1::SceneService::CallbackService {
   ModeDatabase& database_;
   HeadStore& heads_;
   const Reception reception_;
+  /// Makes the objects of AddObjects. A thousand objects take half a second, so that a few calls
+  /// would occupy all threads of the reception. One client has one of these threads.
+  FairPool adding_{2};
   /// Held while a scene with a client's id is made, so that two equal requests make one scene.
   Mutex create_mutex_;
 };

@@ -3,10 +3,12 @@
 
 #include <grpcpp/grpcpp.h>
 
+#include <string>
 #include <type_traits>
 #include <utility>
 
 #include "server/api/exception_barrier.h"
+#include "server/api/fair_pool.h"
 #include "server/api/reception.h"
 #include "server/api/status_conversion.h"
 
@@ -42,6 +44,25 @@ grpc::ServerUnaryReactor* Answer(grpc::CallbackServerContext* context, const Rec
   } else {
     return Answer(context, reception.pool, std::move(work));
   }
+}
+
+/// Answers a call that keeps a thread busy for long, `work(const Principal&)`, on threads that the
+/// clients share fairly.
+template <typename Work>
+grpc::ServerUnaryReactor* AnswerFairly(grpc::CallbackServerContext* context,
+                                       const Reception& reception, Role role, FairPool& pool,
+                                       Work work) {
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  absl::StatusOr<Principal> caller = reception.access.Admit(*context, role);
+  if (!caller.ok()) {
+    reactor->Finish(ToGrpcStatus(caller.status()));
+    return reactor;
+  }
+  const std::string client = caller->client;
+  pool.Run(client, [reactor, caller = *std::move(caller), work = std::move(work)] {
+    reactor->Finish(ToGrpcStatus(WithoutExceptions([&] { return work(caller); })));
+  });
+  return reactor;
 }
 
 }  // namespace carillon

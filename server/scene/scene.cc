@@ -10,7 +10,7 @@
 namespace carillon {
 
 absl::StatusOr<const SoundingObject*> Scene::Find(uint32_t handle) const {
-  RETURN_IF_ERROR(CheckOpen());
+  RETURN_IF_ERROR(CheckOpenLocked());
   const auto found = objects_.find(handle);
   if (found != objects_.end()) return &found->second;
   return Refusal(
@@ -27,7 +27,7 @@ absl::StatusOr<const SoundingObject*> Scene::Move(uint32_t handle, const Pose& p
 
 absl::StatusOr<const std::map<uint32_t, SoundingObject>*> Scene::MoveListener(const Pose& pose) {
   RETURN_IF_ERROR(Validate(pose));
-  RETURN_IF_ERROR(CheckOpen());
+  RETURN_IF_ERROR(CheckOpenLocked());
   space_.listener = pose;
   return &objects_;
 }
@@ -70,7 +70,7 @@ uint32_t Scene::FreeHandle() const {
 
 absl::Status Scene::Insert(uint32_t handle, SoundingObject object) {
   const MutexLock lock(&mutex_);
-  RETURN_IF_ERROR(CheckOpen());
+  RETURN_IF_ERROR(CheckOpenLocked());
   if (!objects_.emplace(handle, std::move(object)).second) return ObjectExists(handle);
   return absl::OkStatus();
 }
@@ -94,6 +94,11 @@ std::map<uint32_t, SoundingObject> Scene::Close() {
 }
 
 absl::Status Scene::CheckOpen() const {
+  const MutexLock lock(&mutex_);
+  return CheckOpenLocked();
+}
+
+absl::Status Scene::CheckOpenLocked() const {
   if (!closed_) return absl::OkStatus();
   return Refusal(absl::StatusCode::kNotFound, "SCENE_NOT_FOUND",
                  absl::StrCat(name_, " has been deleted; make another"));

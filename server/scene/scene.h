@@ -50,6 +50,9 @@ class Scene {
   /// Returns the spatial effects of the scene, with the newest pose of the listener.
   SceneSpace space() const;
 
+  /// Errors: NotFound (SCENE_NOT_FOUND: the scene was deleted meanwhile).
+  absl::Status CheckOpen() const;
+
   /// Returns a copy of an object. Errors: those of Find.
   absl::StatusOr<SoundingObject> Copy(uint32_t handle) const;
 
@@ -81,7 +84,7 @@ class Scene {
   std::map<uint32_t, SoundingObject> Close();
 
  private:
-  absl::Status CheckOpen() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  absl::Status CheckOpenLocked() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   absl::Status ObjectExists(uint32_t handle) const;
 
   const std::string name_;

@@ -118,9 +118,12 @@ class SceneRegistry {
                                          const ObjectProperties& properties);
 
   /// Makes either all of the objects or none of them. An object without a handle gets one that no
-  /// other of `objects` asks for. Errors: those of AddObject, by AtElement ("objects").
-  absl::StatusOr<std::vector<PlacedObject>> AddObjects(uint64_t scene,
-                                                       const std::vector<NewObject>& objects);
+  /// other of `objects` asks for. Nothing is added once `goes_on`, which is asked before each
+  /// object is made, returns false. Errors: those of AddObject, by AtElement ("objects"), and
+  /// Cancelled.
+  absl::StatusOr<std::vector<PlacedObject>> AddObjects(
+      uint64_t scene, const std::vector<NewObject>& objects,
+      absl::FunctionRef<bool()> goes_on = [] { return true; });
 
   /// Changes an object. If more than the pose changes, a new oscillator bank takes further
   /// impulses, and the old bank decays. Errors: NotFound (SCENE_NOT_FOUND, OBJECT_NOT_FOUND),
@@ -163,7 +166,7 @@ class SceneRegistry {
 
   /// Makes either all of the objects or none of them.
   absl::StatusOr<std::vector<PlacedObject>> Add(uint64_t scene, std::span<const NewObject> objects,
-                                                ElementError at);
+                                                ElementError at, absl::FunctionRef<bool()> goes_on);
   /// Counts objects of a scene that are about to be made. Errors: ResourceExhausted
   /// (TOO_MANY_OBJECTS).
   absl::Status ReserveObjects(uint64_t scene, size_t count, ElementError at);
@@ -173,7 +176,8 @@ class SceneRegistry {
   /// Makes objects that are in no scene yet and have no handle.
   absl::StatusOr<std::vector<PlacedObject>> MakeObjects(const Scene& scene,
                                                         std::span<const NewObject> objects,
-                                                        ElementError at);
+                                                        ElementError at,
+                                                        absl::FunctionRef<bool()> goes_on);
   absl::StatusOr<SoundingObject> MakeObject(const Scene& scene, const NewObject& object);
   void FadeOut(std::span<const PlacedObject> objects);
   /// Puts the objects that were `made` into the scene, and sets their handles. Errors: NotFound

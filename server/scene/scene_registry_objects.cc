@@ -56,18 +56,20 @@ absl::StatusOr<PlacedObject> SceneRegistry::AddObject(uint64_t scene, uint32_t h
                                                       std::shared_ptr<const ModalModel> model,
                                                       const ObjectProperties& properties) {
   const NewObject object{.handle = handle, .model = std::move(model), .properties = properties};
-  ASSIGN_OR_RETURN(std::vector<PlacedObject> placed, Add(scene, std::span(&object, 1), Alone));
+  ASSIGN_OR_RETURN(std::vector<PlacedObject> placed,
+                   Add(scene, std::span(&object, 1), Alone, [] { return true; }));
   return std::move(placed.front());
 }
 
 absl::StatusOr<std::vector<PlacedObject>> SceneRegistry::AddObjects(
-    uint64_t scene, const std::vector<NewObject>& objects) {
-  return Add(scene, objects, InList);
+    uint64_t scene, const std::vector<NewObject>& objects, absl::FunctionRef<bool()> goes_on) {
+  return Add(scene, objects, InList, goes_on);
 }
 
 absl::StatusOr<std::vector<PlacedObject>> SceneRegistry::Add(uint64_t scene,
                                                              std::span<const NewObject> objects,
-                                                             ElementError at) {
+                                                             ElementError at,
+                                                             absl::FunctionRef<bool()> goes_on) {
   ASSIGN_OR_RETURN(const std::shared_ptr<Scene> found, FindScene(scene));
   RETURN_IF_ERROR(ReserveObjects(scene, objects.size(), at));
   bool is_placed = false;
@@ -75,7 +77,7 @@ absl::StatusOr<std::vector<PlacedObject>> SceneRegistry::Add(uint64_t scene,
   RETURN_IF_ERROR(ChooseHandles(*found, objects, at).status());
   const uint64_t round = transfer_round_;
   const Pose listener = found->space().listener;
-  ASSIGN_OR_RETURN(std::vector<PlacedObject> placed, MakeObjects(*found, objects, at));
+  ASSIGN_OR_RETURN(std::vector<PlacedObject> placed, MakeObjects(*found, objects, at, goes_on));
   const absl::Status status = Place(*found, objects, at, placed);
   if (!status.ok()) {
     FadeOut(placed);
@@ -110,10 +112,13 @@ void SceneRegistry::EndReservation(uint64_t scene, size_t count, bool placed) {
 }
 
 absl::StatusOr<std::vector<PlacedObject>> SceneRegistry::MakeObjects(
-    const Scene& scene, std::span<const NewObject> objects, ElementError at) {
+    const Scene& scene, std::span<const NewObject> objects, ElementError at,
+    absl::FunctionRef<bool()> goes_on) {
   std::vector<PlacedObject> made;
   absl::Cleanup fade_out = [&] { FadeOut(made); };
   for (size_t i = 0; i < objects.size(); ++i) {
+    if (!goes_on()) return absl::CancelledError("the caller has gone");
+    RETURN_IF_ERROR(scene.CheckOpen());
     absl::StatusOr<SoundingObject> object = MakeObject(scene, objects[i]);
     if (!object.ok()) return at(object.status(), i);
     made.push_back({.object = *std::move(object)});

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "proto/cpp/error_reason.h"
@@ -139,6 +140,45 @@ TEST(SceneRegistry, HandlesAreTheClientsOrTheLowestThatIsFree) {
   EXPECT_THAT(taken.ToString(), HasSubstr("OBJECT_EXISTS: "));
   ASSERT_TRUE(stage.scenes.RemoveObject(stage.scene, 1).ok());
   EXPECT_EQ(stage.Add(), 1U);
+}
+
+TEST(SceneRegistry, AddsNothingForACallerThatHasGoneOrASceneThatIsDeletedMeanwhile) {
+  Stage stage;
+  const std::vector<NewObject> objects(3, {.model = SmallModel(), .properties = SmallProperties()});
+  int made_count = 0;
+  const auto gone = stage.scenes.AddObjects(stage.scene, objects, [&] { return ++made_count < 3; });
+  EXPECT_EQ(gone.status().code(), absl::StatusCode::kCancelled);
+  EXPECT_EQ(stage.scenes.object_count(), 0U);
+  const auto deleted = stage.scenes.AddObjects(stage.scene, objects, [&] {
+    EXPECT_EQ(stage.scenes.object_count(), 3U);  // they count while they are made
+    return stage.scenes.DeleteScene(stage.scene).ok();
+  });
+  EXPECT_THAT(deleted.status().ToString(), HasSubstr("SCENE_NOT_FOUND"));
+  EXPECT_EQ(stage.scenes.object_count(), 0U);
+}
+
+TEST(SceneRegistry, AnObjectIsHeardFromWhereTheListenerWentWhileItWasMade) {
+  Stage stage;
+  SceneSpace space;
+  space.hearing.distance_gain = true;
+  stage.scene = *stage.scenes.CreateScene(space);
+  const std::vector<NewObject> objects(2, {.model = SmallModel(), .properties = SmallProperties()});
+  bool one_is_made = false;
+  const auto placed = stage.scenes.AddObjects(stage.scene, objects, [&] {
+    // The listener goes away once the first object is made.
+    if (!std::exchange(one_is_made, true)) return true;
+    return stage.scenes.UpdateListener(stage.scene, {.position_m = {0, 0, 100}}, 0).ok();
+  });
+  ASSERT_TRUE(placed.ok()) << placed.status();
+  stage.Strike(placed->front().handle);
+  const double first_peak = Peak(stage.Render(20));
+  Stage other;
+  other.scene = *other.scenes.CreateScene(space);
+  ASSERT_TRUE(other.scenes.UpdateListener(other.scene, {.position_m = {0, 0, 100}}, 0).ok());
+  other.Strike(other.Add());
+  const double far_peak = Peak(other.Render(20));
+  EXPECT_GT(far_peak, 0);
+  EXPECT_NEAR(first_peak, far_peak, 0.01 * far_peak);
 }
 
 TEST(SceneRegistry, WhatIsNotThereIsNotFound) {
