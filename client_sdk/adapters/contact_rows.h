@@ -21,8 +21,8 @@ struct ContactSettings {
   /// The striker as which a body without a sound counts: a name of the catalogue, such as "wood".
   /// If it is empty, such a body counts as steel.
   std::string striker{};
-  /// How long a blow lasts, seconds. If it is absent, a blow lasts as long as an elastic collision
-  /// of the two bodies, which the daemon computes.
+  /// Duration of a blow, seconds. If it is absent, the daemon computes the duration of an elastic
+  /// collision of the two bodies.
   std::optional<double> duration_s = std::nullopt;
 };
 

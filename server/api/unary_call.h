@@ -3,7 +3,7 @@
 
 #include <grpcpp/grpcpp.h>
 
-#include <string>
+#include <functional>
 #include <type_traits>
 #include <utility>
 
@@ -27,42 +27,51 @@ grpc::ServerUnaryReactor* Answer(grpc::CallbackServerContext* context, ThreadPoo
   return reactor;
 }
 
-/// Answers a call that needs a role, in the same way. If the work needs the caller, it may be
-/// `work(const Principal&)`.
-template <typename Work>
-grpc::ServerUnaryReactor* Answer(grpc::CallbackServerContext* context, const Reception& reception,
-                                 Role role, Work work) {
-  absl::StatusOr<Principal> caller = reception.access.Admit(*context, role);
+/// Answers a call that needs a role. `run(const Principal&, step)` runs the step on a thread that
+/// may block.
+template <typename Run, typename Work>
+grpc::ServerUnaryReactor* AnswerAdmitted(grpc::CallbackServerContext* context,
+                                         const Reception& reception, Role role, Run run,
+                                         Work work) {
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  const absl::StatusOr<Principal> caller = reception.access.Admit(*context, role);
   if (!caller.ok()) {
-    grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
     reactor->Finish(ToGrpcStatus(caller.status()));
     return reactor;
   }
-  if constexpr (std::is_invocable_v<const Work&, const Principal&>) {
-    return Answer(context, reception.pool,
-                  [caller = *std::move(caller), work = std::move(work)] { return work(caller); });
-  } else {
-    return Answer(context, reception.pool, std::move(work));
-  }
+  run(*caller, [reactor, caller = *caller, work = std::move(work)] {
+    reactor->Finish(ToGrpcStatus(WithoutExceptions([&] {
+      if constexpr (std::is_invocable_v<const Work&, const Principal&>) {
+        return work(caller);
+      } else {
+        return work();
+      }
+    })));
+  });
+  return reactor;
 }
 
-/// Answers a call that keeps a thread busy for long, `work(const Principal&)`, on threads that the
-/// clients share fairly.
+/// Answers a call that needs a role on a thread of the reception's pool. If the work needs the
+/// caller, it may be `work(const Principal&)`.
+template <typename Work>
+grpc::ServerUnaryReactor* Answer(grpc::CallbackServerContext* context, const Reception& reception,
+                                 Role role, Work work) {
+  const auto run = [&](const Principal&, std::function<void()> step) {
+    reception.pool.Run(std::move(step));
+  };
+  return AnswerAdmitted(context, reception, role, run, std::move(work));
+}
+
+/// The same for a call that keeps a thread busy for long. It runs on threads that the clients share
+/// fairly.
 template <typename Work>
 grpc::ServerUnaryReactor* AnswerFairly(grpc::CallbackServerContext* context,
                                        const Reception& reception, Role role, FairPool& pool,
                                        Work work) {
-  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  absl::StatusOr<Principal> caller = reception.access.Admit(*context, role);
-  if (!caller.ok()) {
-    reactor->Finish(ToGrpcStatus(caller.status()));
-    return reactor;
-  }
-  const std::string client = caller->client;
-  pool.Run(client, [reactor, caller = *std::move(caller), work = std::move(work)] {
-    reactor->Finish(ToGrpcStatus(WithoutExceptions([&] { return work(caller); })));
-  });
-  return reactor;
+  const auto run = [&](const Principal& caller, std::function<void()> step) {
+    pool.Run(caller.client, std::move(step));
+  };
+  return AnswerAdmitted(context, reception, role, run, std::move(work));
 }
 
 }  // namespace carillon

@@ -112,7 +112,8 @@ class SingleModes {
         after_(modes.size()),
         taken_(modes.size()) {
     for (size_t i = 0; i < modes.size(); ++i) {
-      before_[i] = i - 1;  // of the first mode the greatest number, which is no mode's
+      // The first mode has none before it: i - 1 is then the greatest number, which is no index.
+      before_[i] = i - 1;
       after_[i] = i + 1;
     }
     for (size_t i = 1; i < modes.size(); ++i) Push(i - 1, i);
