@@ -99,6 +99,12 @@ absl::Status WithExtent(absl::Status refusal, const SurfaceMesh& surface) {
   return refusal;
 }
 
+/// Returns the diagonal of the box around a mesh, m.
+double ExtentOf(const Mesh& mesh) {
+  if (const auto* tetrahedra = std::get_if<TetMesh>(&mesh)) return Diagonal(tetrahedra->nodes);
+  return Diagonal(std::get<SurfaceMesh>(mesh).vertices);
+}
+
 /// A surface to be filled, or a mesh of tetrahedra as it is.
 using Input = std::variant<Fillable, Body>;
 
@@ -108,6 +114,7 @@ absl::StatusOr<Input> ReadInput(const std::string& bytes, const v1::WorkerReques
   const v1::DecompositionSettings& settings = request.settings();
   ASSIGN_OR_RETURN(NamedMesh read,
                    ParseMesh(bytes, request.mesh_format(), settings.metres_per_unit()));
+  observer.OnExtent(UseOf(request).size * ExtentOf(read.mesh));
   observer.OnProgress(v1::PHASE_MESH, 0);
   if (auto* tetrahedra = std::get_if<TetMesh>(&read.mesh)) {
     return TakeTetrahedra(std::move(*tetrahedra), read.names, request);

@@ -34,6 +34,9 @@ class DecompositionObserver {
   /// `steps` are the steps of this round, beginning with the counting of modes. The function is
   /// called again when the prediction becomes more precise.
   virtual void OnPlan(const std::vector<PlannedStep>& steps) = 0;
+  /// Called when the mesh file has been read. `extent_m` is the diagonal of the box around the
+  /// body.
+  virtual void OnExtent(double extent_m) = 0;
   /// Called when the mesh has been made. It has `node_count` nodes, counting corners and mid-side
   /// nodes.
   virtual void OnMesh(size_t node_count) = 0;

@@ -35,6 +35,7 @@ void ProgressBar::Draw(const v1::Progress& progress) const {
   const std::string bar = std::string(done, '#') + std::string(kWidth - done, '.');
   std::fprintf(stderr, "%s[%s] %3.0f %% %s", kEraseLine, bar.c_str(), 100 * progress.fraction(),
                std::string(PhaseName(progress.phase())).c_str());
+  if (progress.extent_m() > 0) std::fprintf(stderr, ", %.3g m across", progress.extent_m());
   if (progress.node_count() > 0) std::fprintf(stderr, ", %u nodes", progress.node_count());
   if (progress.converged_mode_count() > 0) {
     std::fprintf(stderr, ", %u modes", progress.converged_mode_count());

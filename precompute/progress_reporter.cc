@@ -64,6 +64,11 @@ void ProgressReporter::Estimate() {
 
 double ProgressReporter::Now() const { return PhaseClock::Now().seconds - begun_s_; }
 
+void ProgressReporter::OnExtent(double extent_m) {
+  const std::lock_guard lock(mutex_);
+  state_.set_extent_m(extent_m);
+}
+
 void ProgressReporter::OnMesh(size_t node_count) {
   const std::lock_guard lock(mutex_);
   state_.set_node_count(static_cast<uint32_t>(node_count));

@@ -26,6 +26,7 @@ class ProgressReporter : public DecompositionObserver {
   void OnProgress(v1::Phase phase, double fraction) override;
   void OnRound(const RoundForecast& forecast) override;
   void OnPlan(const std::vector<PlannedStep>& steps) override;
+  void OnExtent(double extent_m) override;
   void OnMesh(size_t node_count) override;
   void OnModes(size_t mode_count) override;
 

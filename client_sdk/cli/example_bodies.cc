@@ -135,13 +135,13 @@ ExampleBody DrawChime() {
 const std::vector<Example>& Examples() {
   static const auto* const examples = new std::vector<Example>{
       {"bell", "a bronze bell, 12 cm wide", "bell_bronze",
-       "--point 0.06,0,0.005 --impulse=-0.02,0,0", DrawBell},
+       "--point 0.06,0,0.005 --impulse -0.02,0,0", DrawBell},
       {"bowl", "a porcelain bowl, 16 cm wide", "porcelain",
-       "--point 0.08,0,-0.005 --impulse=-0.01,0,0", DrawBowl},
+       "--point 0.08,0,-0.005 --impulse -0.01,0,0", DrawBowl},
       {"bar", "a bar of a xylophone, 20 cm long", "maple",
        "--point 0.1,0.015,0.008 --impulse 0,0,-0.02", DrawBar},
       {"chime", "an aluminum tube of a wind chime, 40 cm long", "chime_aluminum",
-       "--point 0.0125,0,0 --impulse=-0.01,0,0", DrawChime}};
+       "--point 0.0125,0,0 --impulse -0.01,0,0", DrawChime}};
   return *examples;
 }
 

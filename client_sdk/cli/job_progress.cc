@@ -21,6 +21,9 @@ namespace {
 
 constexpr int kBarWidth = 30;
 
+// The contract (Progress.extent_m) says above which extent the unit is likely to be wrong.
+constexpr double kLikelyExtentM = 20;
+
 absl::string_view PhaseName(v1::Phase phase) {
   switch (phase) {
     case v1::PHASE_READ:
@@ -108,11 +111,19 @@ void DrawProgressBar(const v1::Job& job) {
                 std::string(filled, '#'), std::string(kBarWidth - filled, '.'), ProgressText(job));
 }
 
+void WarnOfUnit(double extent_m, bool terminal) {
+  absl::FPrintF(stderr,
+                "%swarning: the body is %.3g m across; if its file is in another unit than metres, "
+                "cancel the job (carillon job cancel) and state the unit, such as --unit mm\n",
+                terminal ? "\r\033[K" : "", extent_m);
+}
+
 }  // namespace
 
 std::string ProgressText(const v1::Job& job) {
   std::string text = absl::StrFormat("%3.0f %%  %s", Fraction(job) * 100, Activity(job));
   const v1::Progress& progress = job.progress();
+  if (progress.extent_m() > 0) absl::StrAppendFormat(&text, ", %.3g m across", progress.extent_m());
   if (progress.node_count() > 0)
     absl::StrAppend(&text, ", ", Counted(progress.node_count(), "node"));
   if (progress.converged_mode_count() > 0) {
@@ -141,7 +152,12 @@ std::string RoughTime(double seconds) {
 absl::StatusOr<v1::Job> WatchWithProgress(const client::Client& daemon, const std::string& name) {
   const bool terminal = isatty(STDERR_FILENO) != 0;
   std::string shown;
+  bool warned = false;
   auto job = daemon.WatchJob(name, [&](const v1::Job& state) {
+    if (!warned && state.progress().extent_m() > kLikelyExtentM) {
+      warned = true;
+      WarnOfUnit(state.progress().extent_m(), terminal);
+    }
     if (terminal) {
       DrawProgressBar(state);
     } else if (Activity(state) != shown) {

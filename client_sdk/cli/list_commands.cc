@@ -77,6 +77,7 @@ absl::Status ListJobs(const client::Client& daemon, const v1::ListJobsRequest& f
     PrintJson(list);
     return absl::OkStatus();
   }
+  if (jobs.empty()) PrintNothing("job");
   for (const v1::Job& job : jobs) PrintJobLine(job);
   return absl::OkStatus();
 }
@@ -161,6 +162,7 @@ absl::Status ListScenes(const client::Client& daemon, bool json) {
     PrintJson(list);
     return absl::OkStatus();
   }
+  if (scenes.empty()) PrintNothing("scene");
   for (const v1::Scene& scene : scenes) {
     absl::PrintF("%s  %s  gain %.4g%s%s  %s\n", scene.name(),
                  Counted(scene.object_count(), "object"), scene.gain(),

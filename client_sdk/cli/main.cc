@@ -10,6 +10,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "absl/strings/str_join.h"
 #include "client_sdk/cli/commands.h"
 #include "client_sdk/cli/completion_options.h"
 #include "client_sdk/cli/doctor_command.h"
@@ -282,6 +283,24 @@ std::vector<const char*> WithHelpOption(int argc, char** argv) {
   return words;
 }
 
+/// Adds the names of the required options that the chosen commands lack.
+void AddMissing(const CLI::App& app, std::vector<std::string>& names) {
+  for (const CLI::Option* option : app.get_options()) {
+    if (option->get_required() && option->count() == 0) names.push_back(option->get_name());
+  }
+  for (const CLI::App* command : app.get_subcommands()) AddMissing(*command, names);
+}
+
+/// Returns what is wrong with the command line, with all that it lacks.
+std::string MistakeText(const CLI::App& app, const CLI::ParseError& error) {
+  std::vector<std::string> missing;
+  if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr) AddMissing(app, missing);
+  const std::string what = missing.size() > 1
+                               ? absl::StrCat(absl::StrJoin(missing, ", "), " are required")
+                               : error.what();
+  return absl::StrCat(what, "\nRun with --help for more information.");
+}
+
 /// Returns the exit code of a command that ended with `code`, once its output is written.
 int Finish(int code) { return code == kDone ? Report(FlushOutput(), HasEveryOption) : code; }
 
@@ -299,11 +318,7 @@ int Main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     const std::string unknown = UnknownWord(app, count, words.data());
     if (error.get_exit_code() == 0 && unknown.empty()) return Finish(app.exit(error));
-    if (!unknown.empty()) {
-      std::cerr << "carillon: " << unknown << '\n';
-    } else {
-      app.exit(error);
-    }
+    std::cerr << "carillon: " << (unknown.empty() ? MistakeText(app, error) : unknown) << '\n';
     return kUsage;
   }
   if (!IsServerAddress(program.server)) {

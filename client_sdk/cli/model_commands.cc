@@ -232,6 +232,13 @@ absl::StatusOr<v1::Job> AwaitModel(const client::Client& daemon, const CreateMod
   return repaired.ok() ? repaired : ended;
 }
 
+/// Prints how a user sees whether a job that nobody waits for fails.
+void PrintHowToFollow(const v1::Job& job) {
+  const absl::string_view digest = absl::StripPrefix(job.name(), "jobs/").substr(0, 12);
+  absl::FPrintF(stderr, "carillon: %s is being computed; follow it with: carillon job watch %s\n",
+                EscapedText(job.label()), digest);
+}
+
 /// Prints what the user should know about a model that was just made.
 void PrintWarnings(const client::Client& daemon, const std::string& name) {
   const auto model = daemon.GetModalModel(name);
@@ -293,6 +300,7 @@ absl::Status CreateModel(const client::Client& daemon, const CreateModelOptions&
     absl::StatusOr<v1::Job> job = std::move(jobs[i]);
     if (job.ok() && options.wait) job = AwaitModel(daemon, options, options.files[i], job->name());
     if (job.ok() && options.wait) PrintWarnings(daemon, job->modal_model());
+    if (job.ok() && job->state() != v1::JOB_STATE_SUCCEEDED) PrintHowToFollow(*job);
     const absl::Status ended = Conclude(
         daemon, std::move(job), {.wait = false, .json = json, .name = &v1::Job::modal_model});
     if (ended.ok()) continue;
@@ -333,6 +341,7 @@ absl::Status ListModels(const client::Client& daemon, const v1::ListModalModelsR
     PrintJson(list);
     return absl::OkStatus();
   }
+  if (list.modal_models().empty()) PrintNothing("model");
   for (const auto& model : list.modal_models()) PrintRow(model);
   if (!list.next_page_token().empty()) {
     absl::PrintF("more with --page-token %s\n", list.next_page_token());

@@ -55,6 +55,8 @@ void PrintJson(std::initializer_list<JsonMember> members) {
   absl::PrintF("%s\n", MembersJson(members));
 }
 
+void PrintNothing(absl::string_view noun) { absl::FPrintF(stderr, "no %s to show\n", noun); }
+
 std::string Counted(uint64_t count, absl::string_view noun) {
   const char* const ending = count == 1 ? "" : absl::EndsWith(noun, "sh") ? "es" : "s";
   return absl::StrCat(count, " ", noun, ending);

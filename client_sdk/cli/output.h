@@ -34,6 +34,9 @@ void PrintJson(const google::protobuf::Message& message);
 /// Prints an object with the members to stdout as one line of JSON; see MembersJson.
 void PrintJson(std::initializer_list<JsonMember> members);
 
+/// Prints to stderr that a list has no entry of the kind `noun`, so that stdout stays empty.
+void PrintNothing(absl::string_view noun);
+
 /// Returns a number with its noun, such as "1 mode", "2 modes" or "0 meshes".
 std::string Counted(uint64_t count, absl::string_view noun);
 

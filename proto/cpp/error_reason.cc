@@ -76,6 +76,13 @@ absl::Status AtElement(const absl::Status& status, absl::string_view list, size_
   return FromErrorInfo(status.code(), error);
 }
 
+absl::Status AtTime(const absl::Status& status, double time_s) {
+  v1::ErrorInfo error = ToErrorInfo(status);
+  error.set_message(absl::StrCat("at ", time_s, " s: ", error.message()));
+  (*error.mutable_metadata())["time_s"] = absl::StrCat(time_s);
+  return FromErrorInfo(status.code(), error);
+}
+
 absl::Status FromErrorInfo(absl::StatusCode code, const v1::ErrorInfo& error) {
   absl::Status status = Refusal(code, error.reason(), error.message());
   for (const auto& [name, value] : error.metadata()) AddFigure(status, name, value);

@@ -21,6 +21,10 @@ void AddFigure(absl::Status& status, absl::string_view name, absl::string_view v
 /// figure "index".
 absl::Status AtElement(const absl::Status& status, absl::string_view list, size_t index);
 
+/// Returns the same refusal for the step at simulation time `time_s`, "REASON: at TIME s: message",
+/// with the figure "time_s".
+absl::Status AtTime(const absl::Status& status, double time_s);
+
 /// Adds a change to the request that may help.
 void AddRemedy(absl::Status& status, const v1::Remedy& remedy);
 

@@ -154,6 +154,12 @@ void ContactIntake::Reject(uint64_t count, absl::Status reason) {
   rejected_count_ += count;
   if (settings_.rejections != nullptr) settings_.rejections->Add(count, reason);
   last_rejection_ = std::move(reason);
+  last_rejected_time_s_ = time_s_;
+}
+
+absl::Status ContactIntake::last_rejection() const {
+  return last_rejection_.ok() || step_count_ <= 1 ? last_rejection_
+                                                  : AtTime(last_rejection_, last_rejected_time_s_);
 }
 
 void ContactIntake::Note(uint64_t count, const ReportPlace& place, const absl::Status& verdict) {

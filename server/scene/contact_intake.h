@@ -123,8 +123,9 @@ class ContactIntake {
   /// Number of impulses handed on.
   uint64_t impulse_count() const { return impulse_count_; }
   uint64_t rejected_count() const { return rejected_count_; }
-  /// Returns the reason of the newest rejection, or OK if no contact was rejected.
-  const absl::Status& last_rejection() const { return last_rejection_; }
+  /// Returns the reason of the newest rejection, with the time of its step if there are several, or
+  /// OK if no contact was rejected.
+  absl::Status last_rejection() const;
   IntakeFindings findings() const;
 
  private:
@@ -166,6 +167,7 @@ class ContactIntake {
   uint64_t impulse_count_ = 0;
   uint64_t rejected_count_ = 0;
   absl::Status last_rejection_;
+  double last_rejected_time_s_ = 0;
   IntakeFindings findings_;
 };
 

@@ -64,7 +64,7 @@ class ContactStream {
   bool settled() const;
 
   /// Returns the reason of the newest rejection, or OK if no contact was rejected.
-  const absl::Status& last_rejection() const { return intake_.last_rejection(); }
+  absl::Status last_rejection() const { return intake_.last_rejection(); }
 
  private:
   class Target final : public EventTarget {

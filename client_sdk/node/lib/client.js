@@ -17,7 +17,7 @@ const { Scene } = require('./scenes');
 const { toSettings } = require('./settings');
 const { Sound, samplesOf, samplesOfIntegers } = require('./sound');
 const { Trace } = require('./traces');
-const { warnOfContacts, warnOfTransfers } = require('./warnings');
+const { warnOfContacts, warnOfTransfers, warnOfUnit } = require('./warnings');
 
 const JOB_STATES = ['queued', 'running', 'succeeded', 'failed', 'cancelled'];
 
@@ -138,6 +138,7 @@ class Client {
     const deadline = timeout === undefined ? {} : { deadline: Date.now() + 1000 * timeout };
     try {
       for await (const answer of this.answers(this.stub('DecompositionService').WatchJob({ name: job.name }, deadline))) {
+        warnOfUnit(answer.job, newest);
         newest = answer.job;
         onProgress(newest);
       }

@@ -18,6 +18,17 @@ function warnOfTransfers(labels) {
   'TransferWarning');
 }
 
+// The contract (Progress.extent_m) says above which extent the unit is likely to be wrong.
+const LIKELY_EXTENT_M = 20;
+
+/** Warns if the state of a job, newer than `before`, is the first to say that the body is suspiciously large. */
+function warnOfUnit(job, before) {
+  const extent = job.progress?.extent_m ?? 0;
+  if (extent <= LIKELY_EXTENT_M || (before.progress?.extent_m ?? 0) > LIKELY_EXTENT_M) return;
+  warn(`the body is ${Number(extent.toPrecision(3))} m across; if its coordinates are in another unit than metres, ` +
+    "cancel and give the unit, such as unit: 'mm'", 'UnitWarning');
+}
+
 /** Warns of contacts that are probably a mistake of the caller. `frame` is that of their points. */
 function warnOfContacts(findings, frame) {
   const count = Number(findings?.distant_point_count ?? 0);
@@ -54,4 +65,4 @@ function warnOfStream(report, frame, droppedStepCount) {
   warnOfContacts(report.findings, frame);
 }
 
-module.exports = { warnOfContacts, warnOfStream, warnOfTransfers };
+module.exports = { warnOfContacts, warnOfStream, warnOfTransfers, warnOfUnit };

@@ -17,12 +17,17 @@ def counted(count: int, noun: str) -> str:
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
+def suggestion(name: str, known: Collection[str]) -> str:
+    """Returns 'did you mean "NEAREST"?', or nothing if no known name is near."""
+    nearest = difflib.get_close_matches(name, known, 1)
+    return f'did you mean "{nearest[0]}"?' if nearest else ""
+
+
 def refuse_unknown(given: Iterable[str], known: Collection[str], where: str) -> None:
     """Raises TypeError with the nearest known name if a given name is unknown."""
     for name in given:
         if name not in known:
-            nearest = difflib.get_close_matches(name, known, 1)
-            hint = f'did you mean "{nearest[0]}"?' if nearest else f"it has {', '.join(sorted(known))}"
+            hint = suggestion(name, known) or f"it has {', '.join(sorted(known))}"
             raise TypeError(f'{where} has no "{name}"; {hint}')
 
 

@@ -164,7 +164,8 @@ class Client:
         message = to_message(material)
         if message.preset and message.preset not in self.materials:
             raise errors.CarillonError("UNKNOWN_MATERIAL", f"there is no material \"{message.preset}\"; "
-                                       "Client.materials has all of them")
+                                       + (checks.suggestion(message.preset, self.materials)
+                                          or "Client.materials has all of them"))
         return resolved(message, self.materials)
 
     def set_volume(self, *, gain: Optional[float] = None,

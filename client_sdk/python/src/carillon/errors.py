@@ -48,6 +48,16 @@ class TransferWarning(UserWarning):
     """An object sounded before it was computed how it radiates, so that the same request will sound different."""
 
 
+class UnitWarning(UserWarning):
+    """A body is so large that its unit is likely to be wrong."""
+
+
+def warn_of_unit(extent_m: float) -> None:
+    """Warns of a body whose box has the diagonal `extent_m`, metres."""
+    _warn(f"the body is {extent_m:.3g} m across; if its coordinates are in another unit than metres, cancel and give "
+          'the unit, such as unit="mm"', UnitWarning)
+
+
 def warn_of_transfers(labels: Sequence[str]) -> None:
     """Warns of the jobs with these labels, whose transfers a rendering would have used."""
     jobs = ", ".join(labels)

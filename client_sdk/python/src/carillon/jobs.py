@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from carillon.client import Client
     from carillon.models import Model
 
+# The contract (Progress.extent_m) says above which extent the unit is likely to be wrong.
+LIKELY_EXTENT_M = 20
+
 
 def to_states(states: Iterable[str]) -> list[Any]:
     """The values of the contract for states such as "failed"."""
@@ -58,6 +61,7 @@ class Job:
                 watch = self._client.jobs_stub.WatchJob(request, timeout=timeout)
                 with self._client.cancellable(watch):
                     for answer in watch:
+                        self._warn_of_unit(answer.job.progress.extent_m)
                         self.message = answer.job
                         on_progress(answer.job)
         except errors.CarillonError as error:
@@ -72,6 +76,11 @@ class Job:
         if self.message.state != decomposition_pb2.JOB_STATE_SUCCEEDED:
             raise errors.from_info(self.message.error)
         return self._client.model(self.message.modal_model, material=self._material)
+
+    def _warn_of_unit(self, extent_m: float) -> None:
+        """Warns once of a body so large that its unit is likely to be wrong."""
+        if extent_m > LIKELY_EXTENT_M >= self.message.progress.extent_m:
+            errors.warn_of_unit(extent_m)
 
     def cancel(self) -> None:
         """Cancels the job; one that has ended stays as it is."""
