@@ -13,6 +13,7 @@
 #include <functional>
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -223,7 +224,8 @@ absl::Status Serve(const MeasuredRooms& rooms, Options& options, const ReadOptio
   LogOutput(rooms.output);
   guard.CompleteStart();
   AnnounceReady(rooms.server);
-  const Watchdog watchdog(rooms.output);
+  std::optional<Watchdog> watchdog;
+  if (std::getenv("NOTIFY_SOCKET") != nullptr) watchdog.emplace(rooms.output);  // systemd listens
   WaitForStop([&] { Reload(read_options, options, rooms.server); }, LogInfo);
   ExpectEnd();
   guard.BeginStop();

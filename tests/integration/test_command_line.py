@@ -331,6 +331,7 @@ class WithoutDaemonTest(unittest.TestCase):
     def test_a_command_or_an_option_that_is_not_there_names_the_nearest(self):
         for words, expected in ((("modal", "list"), "no command 'modal'; did you mean 'model'?"),
                                 (("model", "lst"), "no command 'lst'; did you mean 'list'?"),
+                                (("model", "lsit"), "no command 'lsit'; did you mean 'list'?"),
                                 (("model", "create", "a.obj", "--materal", "oak"),
                                  "no option '--materal'; did you mean '--material'?"),
                                 (("strike", "bell", "--point", "0,0,0", "--impulze", "0,0,1"),
@@ -339,6 +340,11 @@ class WithoutDaemonTest(unittest.TestCase):
             done = carillon(*words)
             self.assertEqual(done.returncode, 2)
             self.assertEqual(done.stderr, f"carillon: there is {expected}\n")
+
+    def test_all_that_a_command_lacks_is_named_at_once(self):
+        done = carillon("strike", "bell")
+        self.assertEqual(done.stderr, "carillon: --point, --impulse are required\nRun with --help for more "
+                                      "information.\n")
 
     def test_messages_about_numbers_are_short(self):
         for words in (("model", "create", "a.obj", "--nodes", "-3"), ("listen", "--seconds", "-3"),

@@ -358,6 +358,7 @@ TEST_F(WorkerEventsTest, ProgressNeverGoesBackAndEndsWithAll) {
   EXPECT_EQ(last, 1);
   EXPECT_EQ(events.back().progress().phase(), v1::PHASE_WRITE);
   EXPECT_GT(events.back().progress().node_count(), 0u);
+  EXPECT_NEAR(events.back().progress().extent_m(), std::hypot(0.1, 0.02, 0.012), 1e-9);
   EXPECT_GT(events.back().progress().converged_mode_count(), 0u);
 }
 

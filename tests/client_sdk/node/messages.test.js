@@ -9,7 +9,7 @@ const carillon = require('carillon');
 const { fromInfo } = require('carillon/lib/errors');
 const { stateOf } = require('carillon/lib/progress');
 const { toSettings } = require('carillon/lib/settings');
-const { warnOfContacts, warnOfStream } = require('carillon/lib/warnings');
+const { warnOfContacts, warnOfStream, warnOfUnit } = require('carillon/lib/warnings');
 
 const POINT = [0, 0, 0];
 const IMPULSE = [0, 0, 1];
@@ -53,6 +53,16 @@ test('a rejection and a distant point name the frame of the stream', async () =>
     ["ContactWarning: 1 contact was rejected, the last one with POINT_NOT_FINITE: send metres in the scene's frame"]);
   const [text] = await warningsOf(() => warnOfContacts({ distant_point_count: 1, largest_distance_m: 0.5 }, 'a frame'));
   assert.match(text, /1 contact lies up to 0\.5 m away .* sounds at .* in metres, in a frame$/);
+});
+
+test('a body of a likely wrong unit is told once', async () => {
+  const told = [];
+  for (const [before, extent_m] of [[0, 20], [20, 202], [202, 202]]) {
+    const state = (extent) => ({ progress: { extent_m: extent } });
+    told.push(await warningsOf(() => warnOfUnit(state(extent_m), state(before))));
+  }
+  assert.deepEqual([told[0], told[2]], [[], []]);
+  assert.match(told[1].join(), /^UnitWarning: the body is 202 m across; .*unit: 'mm'$/);
 });
 
 test('a misspelt key is refused with the nearest name', async () => {

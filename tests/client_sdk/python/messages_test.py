@@ -72,6 +72,14 @@ class WarningsTest(unittest.TestCase):
         self.assertEqual(text, "1 contact was rejected, the last one with POINT_NOT_FINITE: send metres in the scene's "
                                "frame")
 
+    def test_a_body_of_a_likely_wrong_unit_is_told_once(self):
+        job = carillon.Job(None, decomposition_pb2.Job())
+        texts = []
+        for extent_m in (0, 20, 202, 202):
+            texts.append(warnings_of(job.note, decomposition_pb2.Job(progress={"extent_m": extent_m})))
+        self.assertEqual([len(text) for text in texts], [0, 0, 1, 0])
+        self.assertRegex(texts[2][0], '^the body is 202 m across; .*unit="mm"$')
+
     def test_one_distant_point_is_one_contact(self):
         findings = contact_pb2.ContactFindings(distant_point_count=1, largest_distance_m=0.5)
         text, = warnings_of(carillon.errors.warn_of_contacts, findings, "the scene's frame")

@@ -61,8 +61,7 @@ class Job:
                 watch = self._client.jobs_stub.WatchJob(request, timeout=timeout)
                 with self._client.cancellable(watch):
                     for answer in watch:
-                        self._warn_of_unit(answer.job.progress.extent_m)
-                        self.message = answer.job
+                        self.note(answer.job)
                         on_progress(answer.job)
         except errors.CarillonError as error:
             if error.reason != "DEADLINE_EXCEEDED":
@@ -77,10 +76,12 @@ class Job:
             raise errors.from_info(self.message.error)
         return self._client.model(self.message.modal_model, material=self._material)
 
-    def _warn_of_unit(self, extent_m: float) -> None:
-        """Warns once of a body so large that its unit is likely to be wrong."""
+    def note(self, message: decomposition_pb2.Job) -> None:
+        """Takes a newer state, and warns once of a body so large that its unit is likely to be wrong."""
+        extent_m = message.progress.extent_m
         if extent_m > LIKELY_EXTENT_M >= self.message.progress.extent_m:
             errors.warn_of_unit(extent_m)
+        self.message = message
 
     def cancel(self) -> None:
         """Cancels the job; one that has ended stays as it is."""
