@@ -75,9 +75,6 @@ void LimitClients(size_t memory_bytes, grpc::ServerBuilder& builder) {
   quota.Resize(memory_bytes);
   builder.SetResourceQuota(quota);
   builder.SetMaxReceiveMessageSize(static_cast<int>(kMaxMessageBytes));
-  // Only reflection has methods that need threads of their own.
-  builder.SetSyncServerOption(grpc::ServerBuilder::NUM_CQS, 1);
-  builder.SetSyncServerOption(grpc::ServerBuilder::MAX_POLLERS, 1);
 }
 
 }  // namespace

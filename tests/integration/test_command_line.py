@@ -331,7 +331,7 @@ class WithoutDaemonTest(unittest.TestCase):
     def test_a_command_or_an_option_that_is_not_there_names_the_nearest(self):
         for words, expected in ((("modal", "list"), "no command 'modal'; did you mean 'model'?"),
                                 (("model", "lst"), "no command 'lst'; did you mean 'list'?"),
-                                (("model", "lsit"), "no command 'lsit'; did you mean 'list'?"),
+                                (("jbo", "list"), "no command 'jbo'; did you mean 'job'?"),
                                 (("model", "create", "a.obj", "--materal", "oak"),
                                  "no option '--materal'; did you mean '--material'?"),
                                 (("strike", "bell", "--point", "0,0,0", "--impulze", "0,0,1"),

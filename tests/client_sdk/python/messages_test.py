@@ -76,7 +76,7 @@ class WarningsTest(unittest.TestCase):
         job = carillon.Job(None, decomposition_pb2.Job())
         texts = []
         for extent_m in (0, 20, 202, 202):
-            texts.append(warnings_of(job.note, decomposition_pb2.Job(progress={"extent_m": extent_m})))
+            texts.append(warnings_of(job._note, decomposition_pb2.Job(progress={"extent_m": extent_m})))
         self.assertEqual([len(text) for text in texts], [0, 0, 1, 0])
         self.assertRegex(texts[2][0], '^the body is 202 m across; .*unit="mm"$')
 

@@ -61,7 +61,7 @@ class Job:
                 watch = self._client.jobs_stub.WatchJob(request, timeout=timeout)
                 with self._client.cancellable(watch):
                     for answer in watch:
-                        self.note(answer.job)
+                        self._note(answer.job)
                         on_progress(answer.job)
         except errors.CarillonError as error:
             if error.reason != "DEADLINE_EXCEEDED":
@@ -76,7 +76,7 @@ class Job:
             raise errors.from_info(self.message.error)
         return self._client.model(self.message.modal_model, material=self._material)
 
-    def note(self, message: decomposition_pb2.Job) -> None:
+    def _note(self, message: decomposition_pb2.Job) -> None:
         """Takes a newer state, and warns once of a body so large that its unit is likely to be wrong."""
         extent_m = message.progress.extent_m
         if extent_m > LIKELY_EXTENT_M >= self.message.progress.extent_m:
