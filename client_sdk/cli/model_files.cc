@@ -145,6 +145,19 @@ absl::StatusOr<Imported> ImportStored(const client::Client& daemon, const Import
   return Imported{.summary = std::move(summary), .sounds_with = ""};
 }
 
+/// Labels a model that has no label by the name of its file, unless that is a digest. A caller who
+/// may import but not label keeps a model without a label.
+void LabelByFile(const client::Client& daemon, const std::string& file,
+                 v1::ModalModelSummary& model) {
+  const std::string stem = std::filesystem::path(file).stem();
+  if (!model.label().empty() || IsDigest(stem)) return;
+  v1::UpdateModalModelRequest request;
+  request.set_name(model.name());
+  request.set_label(stem);
+  absl::StatusOr<v1::ModalModelSummary> labelled = daemon.UpdateModalModel(request);
+  if (labelled.ok()) model = *std::move(labelled);
+}
+
 }  // namespace
 
 absl::Status ExportModel(const client::Client& daemon, const ExportOptions& options, bool json) {
@@ -168,9 +181,10 @@ absl::Status ExportModel(const client::Client& daemon, const ExportOptions& opti
 absl::Status ImportModel(const client::Client& daemon, const ImportOptions& options, bool json) {
   const std::string format = FormatOf(options.file, options.format);
   ASSIGN_OR_RETURN(const auto material, MaterialFor(format, options.material));
-  ASSIGN_OR_RETURN(const auto imported, IsGltf(format)    ? ImportGltf(daemon, options, material)
-                                        : format == "npz" ? ImportNpz(daemon, options)
-                                                          : ImportStored(daemon, options));
+  ASSIGN_OR_RETURN(auto imported, IsGltf(format)    ? ImportGltf(daemon, options, material)
+                                  : format == "npz" ? ImportNpz(daemon, options)
+                                                    : ImportStored(daemon, options));
+  LabelByFile(daemon, options.file, imported.summary);
   // To stderr, so that stdout is the name alone.
   for (const std::string& warning : imported.summary.header().warnings()) {
     absl::FPrintF(stderr, "carillon: %s\n", warning);

@@ -240,7 +240,8 @@ void AddModelImport(CLI::App& app, Program& program) {
                   "A file of export or carillon-precompute, a glTF with modal models, or a .npz")
       ->required();
   AddFileFormat(command, options->format);
-  command.add_option("--label", options->label, "The label [the name in a glTF]");
+  command.add_option("--label", options->label,
+                     "The label [the name in a glTF, or that of the file]");
   command.add_option(
       "--pick", options->pick,
       "A model of a glTF that has several: its name or number, or the name of a node");

@@ -22,6 +22,8 @@ class ModelFilesTest(CommandLineTest):
 
     def test_an_import_says_that_its_label_is_shared_and_each_outcome_of_a_deletion_is_told(self):
         self.run_command("model", "export", "bar", "--out", self.folder / "shared.npz")
+        imported = self.run_command("model", "import", self.folder / "shared.npz").strip()
+        self.assertEqual(self.json_of("model", "show", "shared")["name"], imported)
         done = self.daemon.command("model", "import", self.folder / "shared.npz", "--label", "bar")
         other = done.stdout.strip()
         shown = other.removeprefix("modalModels/")[:12]
