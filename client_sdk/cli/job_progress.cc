@@ -111,11 +111,12 @@ void DrawProgressBar(const v1::Job& job) {
                 std::string(filled, '#'), std::string(kBarWidth - filled, '.'), ProgressText(job));
 }
 
-void WarnOfUnit(double extent_m, bool terminal) {
+void WarnOfUnit(const v1::Job& job, bool terminal) {
   absl::FPrintF(stderr,
                 "%swarning: the body is %.3g m across; if its file is in another unit than metres, "
-                "cancel the job (carillon job cancel) and state the unit, such as --unit mm\n",
-                terminal ? "\r\033[K" : "", extent_m);
+                "cancel the job (carillon job cancel %s) and state the unit, such as --unit mm\n",
+                terminal ? "\r\033[K" : "", job.progress().extent_m(),
+                absl::StripPrefix(job.name(), "jobs/").substr(0, 12));
 }
 
 }  // namespace
@@ -156,7 +157,7 @@ absl::StatusOr<v1::Job> WatchWithProgress(const client::Client& daemon, const st
   auto job = daemon.WatchJob(name, [&](const v1::Job& state) {
     if (!warned && state.progress().extent_m() > kLikelyExtentM) {
       warned = true;
-      WarnOfUnit(state.progress().extent_m(), terminal);
+      WarnOfUnit(state, terminal);
     }
     if (terminal) {
       DrawProgressBar(state);

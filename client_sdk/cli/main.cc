@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // The command line of `carillon`.
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
 #include <array>
 #include <iostream>
@@ -190,6 +192,11 @@ void AddListen(CLI::App& app, Program& program) {
   listen.add_flag("--quiet", options->quiet, "Show no level on the terminal");
   listen.callback([&program, options] {
     CheckJson(program, options->out.empty() ? "-" : options->out);
+    if (options->out.empty() && isatty(STDOUT_FILENO) != 0) {
+      throw CLI::ValidationError("--out",
+                                 "a terminal shows no raw samples: give a .wav file, or "
+                                 "pipe them to another program");
+    }
     program.command = [&program, options] {
       const StopSignal stop;
       return Listen(*program.Daemon(), *options, stop, program.json);

@@ -207,6 +207,7 @@ v1::ContactFindings ToProto(const IntakeFindings& findings) {
   proto.set_largest_distance_m(findings.largest_distance_m);
   proto.set_zero_impulse_count(findings.zero_impulse_count);
   proto.set_too_large_impulse_count(findings.too_large_impulse_count);
+  proto.set_regular_gap_s(findings.regular_gap_s);
   return proto;
 }
 

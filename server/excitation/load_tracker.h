@@ -17,6 +17,9 @@ namespace carillon {
 /// jitter does not strike.
 class LoadTracker {
  public:
+  /// Number of remembered steps. The usual force follows a change after half of them.
+  static constexpr size_t kStepCount = 8;
+
   /// Adds the next step, with an impulse of zero or more and a duration above zero. Returns the
   /// part of the impulse that is a blow, 0 to 1.
   double Next(double impulse_newton_seconds, double step_s);
@@ -26,9 +29,6 @@ class LoadTracker {
   bool idle() const;
 
  private:
-  /// Number of remembered steps. The usual force follows a change after half of them.
-  static constexpr size_t kStepCount = 8;
-
   double Usual() const;
 
   std::array<double, kStepCount> forces_newtons_{};

@@ -13,9 +13,7 @@ namespace {
 
 /// After the last force, one knot brings the force down to zero, and another ends the slope.
 constexpr int kKnotsToEnd = 2;
-/// Longest step, in nominal steps, that does not count as a gap. An engine's steps have nearly the
-/// same length.
-constexpr double kLongestStep = 1.5;
+constexpr double kLongestStep = StepIntervals::kLongestStep;
 constexpr double kLongestBlowS = 0.04;
 /// A force that hardly changes for this time is a load.
 constexpr double kLoadS = 0.01;
@@ -47,17 +45,24 @@ double Share(double time_s, uint32_t handle, uint32_t partner) {
 
 BlowGatherer::Events BlowGatherer::Begin(double time_s) {
   Events events;
-  follows_ = time_s_ && time_s - *time_s_ <= kLongestStep * nominal_step_s_;
-  for (int i = 0; i < kKnotsToEnd && time_s_ && (!objects_.empty() || gathers()); ++i) {
-    if (time_s - *time_s_ <= kLongestStep * nominal_step_s_) break;
-    step_s_ = nominal_step_s_;
+  const double since_s = time_s - time_s_.value_or(time_s);
+  follows_ = time_s_ && since_s <= kLongestStep * nominal_step_s_;
+  if (time_s_ && !follows_) EndBeforeGap(since_s / nominal_step_s_ - 1, events);
+  step_s_ = follows_ && since_s > 0 ? since_s : nominal_step_s_;
+  time_s_ = time_s;
+  return events;
+}
+
+void BlowGatherer::EndBeforeGap(double missing_count, Events& events) {
+  int steps = 0;
+  step_s_ = nominal_step_s_;
+  for (; steps < kKnotsToEnd && (!objects_.empty() || gathers()); ++steps) {
     *time_s_ += step_s_;
     End(events);
   }
-  const double since_s = time_s - time_s_.value_or(time_s);
-  step_s_ = since_s > 0 ? std::min(since_s, kLongestStep * nominal_step_s_) : nominal_step_s_;
-  time_s_ = time_s;
-  return events;
+  for (; steps < std::min<double>(missing_count, LoadTracker::kStepCount); ++steps) {
+    for (auto& [bodies, pair] : pairs_) pair.load.Next(0, step_s_);
+  }
 }
 
 void BlowGatherer::Add(const FeltContact& force, const Roughness& roughness) {

@@ -11,6 +11,7 @@
 #include "server/excitation/load_tracker.h"
 #include "server/scene/felt_contact.h"
 #include "server/scene/object_contact.h"
+#include "server/scene/step_intervals.h"
 #include "server/synthesis/schedule/mixer_event.h"
 
 namespace carillon {
@@ -47,8 +48,8 @@ struct ForceEvent {
 ///             +------------+------ t    In the last two cases the force that remains is a load,
 ///             begin        over         and counts for nothing in the blow.
 ///
-/// A client that sends only steps with contacts need not wait for its sound, because the first step
-/// after a gap is a blow by itself.
+/// A client may send only the steps with contacts. Steps that are missing count as steps without
+/// contact, and the first step after a gap is a blow by itself, which need not wait for more steps.
 ///
 /// An engine reports the step of a blow, not the time within the step. Blows of two bodies that
 /// slide, roll or hop would therefore sound on the grid of the steps, as tones at multiples of the
@@ -119,6 +120,8 @@ class BlowGatherer {
   using Bodies = std::pair<uint32_t, uint32_t>;  // handle of the object, number of the partner
 
   void End(Events& events);
+  /// Ends the forces, and lets `missing_count` steps without contact pass.
+  void EndBeforeGap(double missing_count, Events& events);
   /// Adds a force to this step: the impulse of `felt`, N s, times `per_second`, 1/s.
   void Add(const Felt& felt, double per_second, const Roughness& roughness);
   /// Sends the blows of two bodies as impulses, and their loads (see LoadTracker) as forces.

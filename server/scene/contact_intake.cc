@@ -50,6 +50,7 @@ absl::Status ContactIntake::BeginStep(double time_s) {
     mapper_.Note(time_s, target_.frame());
   }
   Push(gatherer_.Begin(time_s));
+  if (step_count_ > 0) intervals_.Add(time_s - time_s_);
   time_s_ = time_s;
   ++step_count_;
   return absl::OkStatus();
@@ -215,6 +216,7 @@ void ContactIntake::NoteZero(const ObjectContact& contact) {
 IntakeFindings ContactIntake::findings() const {
   IntakeFindings findings = findings_;
   findings.engine = gatherer_.counts();
+  findings.regular_gap_s = intervals_.RegularGapS(settings_.step_s);
   return findings;
 }
 

@@ -16,6 +16,7 @@
 #include "server/scene/rejection_counts.h"
 #include "server/scene/scene.h"
 #include "server/scene/scene_space.h"
+#include "server/scene/step_intervals.h"
 #include "server/synthesis/schedule/mixer_event.h"
 
 namespace carillon {
@@ -67,6 +68,7 @@ struct IntakeFindings {
   double largest_distance_m = 0;         ///< largest distance of a point from its object's surface
   uint64_t zero_impulse_count = 0;       ///< contacts without an impulse
   uint64_t too_large_impulse_count = 0;  ///< contacts rejected for their impulse
+  double regular_gap_s = 0;              ///< see StepIntervals::RegularGapS
 };
 
 /// Takes the reports of a client about one simulation, checks them, locates them on the objects of
@@ -161,6 +163,7 @@ class ContactIntake {
   const IntakeSettings settings_;
   TimeMapper mapper_;
   double time_s_ = 0;
+  StepIntervals intervals_;
   BlowGatherer gatherer_;
   PoseTimes pose_times_;
   uint64_t step_count_ = 0;

@@ -254,7 +254,7 @@ class Client {
     }
     if (summary.rejected_count) throw fromInfo(summary.last_rejection);
     refuseWithoutContacts(summary);
-    warnOfContacts(summary.findings, frameInWords(whole.header.frame));
+    warnOfContacts(summary.findings, frameInWords(whole.header.frame), Number(summary.accepted_count ?? 0));
     if (summary.paper_coupling_object_count) await this.warnOfTransfers(whole.objects.map((object) => object.modal_model));
     return new Sound(samplesOf(pieces), format.sample_rate_hz, format.channel_count, summary, blows);
   }

@@ -8,14 +8,16 @@ const DETAILS_KEY = 'grpc-status-details-bin';
 
 /**
  * A refusal. `reason` is stable and one of proto/README.md's; `message` says what was wrong, where, and how to repair
- * it; `metadata` has figures that belong to the reason.
+ * it; `metadata` has figures that belong to the reason, and `remedies` changes to the request that may help, as the
+ * message Remedy of error.proto.
  */
 class CarillonError extends Error {
-  constructor(reason, text, metadata = {}) {
+  constructor(reason, text, metadata = {}, remedies = []) {
     super(`${reason}: ${text}`);
     this.name = 'CarillonError';
     this.reason = reason;
     this.metadata = metadata;
+    this.remedies = remedies;
   }
 }
 
@@ -42,7 +44,7 @@ function inNamesOfCaller(text, names) {
 
 /** Makes the error that an ErrorInfo of the contract describes. */
 function fromInfo(info) {
-  return new CarillonError(info.reason, inNamesOfCaller(info.message, CALLER_NAMES), info.metadata);
+  return new CarillonError(info.reason, inNamesOfCaller(info.message, CALLER_NAMES), info.metadata, info.remedies);
 }
 
 /** Waits for a result. A refusal has the caller's names of fields of the contract. */
@@ -52,7 +54,7 @@ async function inNames(names, result) {
   } catch (error) {
     if (!(error instanceof CarillonError) || error instanceof ServerUnavailable) throw error;
     const text = error.message.slice(`${error.reason}: `.length);
-    throw new CarillonError(error.reason, inNamesOfCaller(text, names), error.metadata);
+    throw new CarillonError(error.reason, inNamesOfCaller(text, names), error.metadata, error.remedies);
   }
 }
 

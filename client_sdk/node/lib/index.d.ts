@@ -17,6 +17,7 @@ import type { ListModalModelsRequest } from '../types/carillon/v1/ListModalModel
 import type { Material as MaterialMessage } from '../types/carillon/v1/Material';
 import type { ModalModelSummary__Output } from '../types/carillon/v1/ModalModelSummary';
 import type { RenderSettings } from '../types/carillon/v1/RenderSettings';
+import type { Remedy__Output } from '../types/carillon/v1/Remedy';
 import type { Blow__Output } from '../types/carillon/v1/Blow';
 import type { RenderSummary__Output } from '../types/carillon/v1/RenderSummary';
 import type { Roughness } from '../types/carillon/v1/Roughness';
@@ -126,9 +127,11 @@ export interface ObjectSettings {
 
 /** A refusal. `reason` is stable and one of proto/README.md's; `metadata` has figures that belong to it. */
 export class CarillonError extends Error {
-  constructor(reason: string, text: string, metadata?: Record<string, string>);
+  constructor(reason: string, text: string, metadata?: Record<string, string>, remedies?: Remedy__Output[]);
   readonly reason: string;
   readonly metadata: Record<string, string>;
+  /** Changes to the request that may help, the most promising first. */
+  readonly remedies: Remedy__Output[];
 }
 
 /** No daemon answers at the address. */

@@ -29,8 +29,22 @@ function warnOfUnit(job, before) {
     "cancel and give the unit, such as unit: 'mm'", 'UnitWarning');
 }
 
-/** Warns of contacts that are probably a mistake of the caller. `frame` is that of their points. */
-function warnOfContacts(findings, frame) {
+/**
+ * Warns of contacts that are probably a mistake of the caller. `frame` is that of their points, and `acceptedCount` the
+ * number of impulses that sounded.
+ */
+function warnOfContacts(findings, frame, acceptedCount = 0) {
+  const gap = findings?.regular_gap_s ?? 0;
+  if (gap) {
+    warn(`all steps came ${Number(gap.toPrecision(3))} s apart, which is longer than the step that was stated, so that a ` +
+      'body at rest strikes in each of them; state the step of the simulator, in seconds');
+  }
+  const zeros = Number(findings?.zero_impulse_count ?? 0);
+  // Contacts of an engine without an impulse count as loads, impulses of zero as accepted for each of their objects.
+  if (zeros >= Math.max(1, Number(findings?.load_count ?? 0), acceptedCount / 2) && !Number(findings.blow_count ?? 0)) {
+    warn(`the impulse of ${counted(zeros, 'contact')} was zero, and no other sounded; read impulses after the engine has ` +
+      'solved its step, and give newton seconds');
+  }
   const count = Number(findings?.distant_point_count ?? 0);
   if (!count) return;
   const distance = Number(findings.largest_distance_m.toPrecision(3));
@@ -62,7 +76,7 @@ function warnOfStream(report, frame, droppedStepCount) {
       message.replaceAll("the object's frame", frame));
   }
   if (told.length) warn(told.join('; '));
-  warnOfContacts(report.findings, frame);
+  warnOfContacts(report.findings, frame, Number(report.accepted_count ?? 0) + Number(report.late_count ?? 0));
 }
 
 module.exports = { warnOfContacts, warnOfStream, warnOfTransfers, warnOfUnit };

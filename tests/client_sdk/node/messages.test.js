@@ -55,6 +55,18 @@ test('a rejection and a distant point name the frame of the stream', async () =>
   assert.match(text, /1 contact lies up to 0\.5 m away .* sounds at .* in metres, in a frame$/);
 });
 
+test('a step stated too short and impulses that are all zero are told', async () => {
+  assert.match((await told({ findings: { regular_gap_s: 1 / 120, blow_count: 9 } })).join(),
+    /all steps came 0\.00833 s apart/);
+  for (const counts of [{ load_count: 12 }, {}]) {
+    assert.match((await told({ accepted_count: 24, findings: { zero_impulse_count: 12, ...counts } })).join(),
+      /^ContactWarning: the impulse of 12 contacts was zero/);
+  }
+  for (const counts of [{ load_count: 13 }, { blow_count: 1 }]) {
+    assert.deepEqual(await told({ findings: { zero_impulse_count: 12, ...counts } }), []);
+  }
+});
+
 test('a body of a likely wrong unit is told once', async () => {
   const told = [];
   for (const [before, extent_m] of [[0, 20], [20, 202], [202, 202]]) {

@@ -85,6 +85,15 @@ class WarningsTest(unittest.TestCase):
         text, = warnings_of(carillon.errors.warn_of_contacts, findings, "the scene's frame")
         self.assertRegex(text, "^1 contact lies up to 0.5 m away .* in metres, in the scene's frame$")
 
+    def test_a_step_stated_too_short_and_impulses_that_are_all_zero_are_told(self):
+        text, = self.told(findings={"regular_gap_s": 1 / 120, "blow_count": 9})
+        self.assertIn("all steps came 0.00833 s apart", text)
+        for counts in ({"load_count": 12}, {}):
+            text, = self.told(accepted_count=24, findings={"zero_impulse_count": 12, **counts})
+            self.assertIn("the impulse of 12 contacts was zero", text)
+        for counts in ({"load_count": 13}, {"blow_count": 1}):
+            self.assertEqual(self.told(findings={"zero_impulse_count": 12, **counts}), [])
+
 
 class RefusalsTest(MessagesTest):
     def test_a_misspelt_argument_is_refused_with_the_nearest_name(self):

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/scene/blow_gatherer.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -100,6 +101,37 @@ TEST_F(BlowGathererTest, EndsAForceWhereStepsWereLeftOut) {
   ASSERT_EQ(pushed.size(), 2U);
   EXPECT_DOUBLE_EQ(pushed[0].time_s, 0.01);
   EXPECT_DOUBLE_EQ(pushed[1].time_s, 0.02);
+}
+
+TEST_F(BlowGathererTest, AfterAGapASmallerContactIsABlowAsIfTheStepsHadBeenSentEmpty) {
+  const auto touch = [&](float newton_seconds) {
+    return [this, newton_seconds] {
+      SurfaceImpulse impulse = kTen;
+      impulse.impulse_newton_seconds[2] = newton_seconds;
+      gatherer_.Touch({.contact = {.handle = 3}, .partner = 9}, FeltBy(3, impulse));
+    };
+  };
+  std::vector<float> blows;
+  for (const int i : {0, 1, 2}) {
+    for (const Pushed& push : Step(0.3 * i, touch(4.0F / static_cast<float>(1 << i)))) {
+      if (push.Impulse()) blows.push_back(*push.Impulse());
+    }
+  }
+  EXPECT_THAT(blows, testing::ElementsAre(4, 2, 1));
+  EXPECT_EQ(gatherer_.counts().blow_count, 3U);
+  EXPECT_EQ(gatherer_.counts().load_count, 0U);
+}
+
+TEST(StepIntervalsTest, TellsARegularGapAndNoOther) {
+  StepIntervals alike;
+  StepIntervals bounces;
+  for (int i = 0; i < 9; ++i) alike.Add(1.0 / 120);
+  EXPECT_EQ(alike.RegularGapS(1e-3), 0);
+  alike.Add(1.0 / 100);
+  EXPECT_EQ(alike.RegularGapS(1e-3), 1.0 / 120);
+  EXPECT_EQ(alike.RegularGapS(1.0 / 120), 0);
+  for (int i = 0; i < 12; ++i) bounces.Add(0.5 - 0.03 * i);
+  EXPECT_EQ(bounces.RegularGapS(1e-3), 0);
 }
 
 TEST_F(BlowGathererTest, ARoughnessIsWeighedByItsForce) {

@@ -305,6 +305,12 @@ TEST_F(ReadingTest, AContactWithoutADurationIsElasticAndHasTheStreamsPulse) {
   EXPECT_EQ(Newest().pulse, Newest(1).pulse);
 }
 
+TEST_F(ReadingTest, AStepThatIsStatedTooShortIsFound) {
+  ContactIntake intake = Open({});
+  for (int i = 0; i < 12; ++i) ASSERT_TRUE(intake.BeginStep(i * 8 * kStepS).ok());
+  EXPECT_NEAR(intake.findings().regular_gap_s, 8 * kStepS, 1e-12);
+}
+
 TEST_F(ReadingTest, WhatIsStrangeAboutContactsIsCountedAndWhatNoBodyBearsIsRefused) {
   ContactIntake intake = Open({});
   ObjectImpulse distant = SmallImpulse(1);

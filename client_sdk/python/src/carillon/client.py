@@ -289,7 +289,7 @@ class Client:
         if summary.rejected_count:
             raise errors.from_info(summary.last_rejection)
         summaries.refuse_without_contacts(summary)
-        errors.warn_of_contacts(summary.findings, contacts.frame_in_words(trace.header.frame))
+        errors.warn_of_contacts(summary.findings, contacts.frame_in_words(trace.header.frame), summary.accepted_count)
         if summary.paper_coupling_object_count:
             self._warn_of_transfers({item.modal_model for item in trace.objects})
         samples = numpy.frombuffer(b"".join(blocks), "<f4").reshape(-1, channels)

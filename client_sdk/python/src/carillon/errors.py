@@ -66,8 +66,16 @@ def warn_of_transfers(labels: Sequence[str]) -> None:
           TransferWarning)
 
 
-def warn_of_contacts(findings: contact_pb2.ContactFindings, frame: str) -> None:
-    """Warns of contacts that are probably a mistake of the caller. `frame` is that of their points."""
+def warn_of_contacts(findings: contact_pb2.ContactFindings, frame: str, accepted_count: int = 0) -> None:
+    """Warns of contacts that are probably a mistake of the caller. `frame` is that of their points, and
+    `accepted_count` the number of impulses that sounded."""
+    if findings.regular_gap_s:
+        _warn(f"all steps came {findings.regular_gap_s:.3g} s apart, which is longer than the step that was stated, so "
+              "that a body at rest strikes in each of them; state the step of the simulator, in seconds")
+    # Contacts of an engine without an impulse count as loads, impulses of zero as accepted for each of their objects.
+    if findings.zero_impulse_count >= max(1, findings.load_count, accepted_count / 2) and not findings.blow_count:
+        _warn(f"the impulse of {counted(findings.zero_impulse_count, 'contact')} was zero, and no other sounded; read "
+              "impulses after the engine has solved its step, and give newton seconds")
     if count := findings.distant_point_count:
         _warn(f"{counted(count, 'contact')} {'lies' if count == 1 else 'lie'} up to "
               f"{findings.largest_distance_m:.3g} m away from the surfaces of the objects, and sound"
@@ -95,7 +103,7 @@ def warn_of_stream(report: contact_service_pb2.StreamContactsResponse, frame: st
                     + report.last_rejection.message.replace("the object's frame", frame))
     if told:
         _warn("; ".join(told))
-    warn_of_contacts(report.findings, frame)
+    warn_of_contacts(report.findings, frame, report.accepted_count + report.late_count)
 
 
 def _warn(text: str, category: type[Warning] = ContactWarning) -> None:

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "carillon/v1/contact_service.pb.h"
+
+namespace carillon::client {
+
+/// Returns what a user should know about the contacts of a stream that did not sound as the program
+/// meant, and how to repair it, one sentence each: contacts that were late, lost or rejected, that
+/// lie far from their objects or had no impulse, and a step that was stated too short. Returns an
+/// empty list if all is well. `report` is what ContactStream::Finish() or Report() returned.
+std::vector<std::string> ContactWarnings(const v1::StreamContactsResponse& report);
+
+}  // namespace carillon::client

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "carillon/contact_warnings.h"
+
+#include <algorithm>
+#include <cstdint>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+
+namespace carillon::client {
+namespace {
+
+std::string Were(uint64_t count) {
+  return absl::StrCat(count, count == 1 ? " contact was" : " contacts were");
+}
+
+void AddFindings(const v1::ContactFindings& findings, uint64_t accepted_count,
+                 std::vector<std::string>& warnings) {
+  if (findings.regular_gap_s() > 0) {
+    warnings.push_back(absl::StrFormat(
+        "all steps came %.3g s apart, which is longer than the step_s that was stated, so that a "
+        "body at rest strikes in each of them; state the step of the simulator, in seconds",
+        findings.regular_gap_s()));
+  }
+  // Contacts of an engine without an impulse count as loads, impulses of zero as accepted for each
+  // of their objects.
+  const uint64_t zeros = findings.zero_impulse_count();
+  if (zeros > 0 && findings.blow_count() == 0 && zeros >= findings.load_count() &&
+      2 * zeros >= accepted_count) {
+    warnings.push_back(absl::StrCat(
+        "the impulse of ", zeros, zeros == 1 ? " contact" : " contacts",
+        " was zero, and no other sounded; read impulses after the engine has solved its step, and "
+        "give newton seconds"));
+  }
+  if (const uint64_t count = findings.distant_point_count(); count > 0) {
+    warnings.push_back(absl::StrFormat(
+        "%d contact%s up to %.3g m away from the surfaces of the objects, and sound%s at the "
+        "nearest points; give points in metres, in the frame of the stream",
+        count, count == 1 ? " lies" : "s lie", findings.largest_distance_m(),
+        count == 1 ? "s" : ""));
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> ContactWarnings(const v1::StreamContactsResponse& report) {
+  std::vector<std::string> warnings;
+  if (report.late_count() > 0) {
+    warnings.push_back(absl::StrFormat(
+        "%s late, and sounded at once instead of at the right time: send each step when it "
+        "happens, or open the stream with a longer scheduling_delay_s (it was %.3g s)",
+        Were(report.late_count()), report.scheduling_delay_s()));
+  }
+  if (report.remap_count() > 0) {
+    warnings.push_back(absl::StrCat(
+        "simulation time was mapped anew ", report.remap_count(),
+        report.remap_count() == 1 ? " time" : " times",
+        ", because every step of a quarter of a second was late: the simulator paused, is slower "
+        "than real time, or sets no time_s"));
+  }
+  if (report.dropped_count() > 0) {
+    warnings.push_back(
+        absl::StrCat(Were(report.dropped_count()), " lost, because too many waited for the mixer"));
+  }
+  if (report.rejected_count() > 0) {
+    warnings.push_back(absl::StrCat(Were(report.rejected_count()), " rejected, the last one with ",
+                                    report.last_rejection().reason(), ": ",
+                                    report.last_rejection().message()));
+  }
+  AddFindings(report.findings(), report.accepted_count() + report.late_count(), warnings);
+  return warnings;
+}
+
+}  // namespace carillon::client
