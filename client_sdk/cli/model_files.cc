@@ -145,15 +145,18 @@ absl::StatusOr<Imported> ImportStored(const client::Client& daemon, const Import
   return Imported{.summary = std::move(summary), .sounds_with = ""};
 }
 
-/// Labels a model that has no label by the name of its file, unless that is a digest. A caller who
-/// may import but not label keeps a model without a label.
-void LabelByFile(const client::Client& daemon, const std::string& file,
-                 v1::ModalModelSummary& model) {
-  const std::string stem = std::filesystem::path(file).stem();
-  if (!model.label().empty() || IsDigest(stem)) return;
+/// Gives an imported model the label that was asked for, also if it was stored before with another,
+/// or labels a model without a label by the name of its file, unless that is a digest. A caller who
+/// may import but not label keeps the model as it is.
+void Label(const client::Client& daemon, const ImportOptions& options,
+           v1::ModalModelSummary& model) {
+  std::string label = options.label;
+  if (label.empty()) label = model.label();
+  if (label.empty()) label = std::filesystem::path(options.file).stem();
+  if (label == model.label() || (options.label.empty() && IsDigest(label))) return;
   v1::UpdateModalModelRequest request;
   request.set_name(model.name());
-  request.set_label(stem);
+  request.set_label(label);
   absl::StatusOr<v1::ModalModelSummary> labelled = daemon.UpdateModalModel(request);
   if (labelled.ok()) model = *std::move(labelled);
 }
@@ -184,7 +187,7 @@ absl::Status ImportModel(const client::Client& daemon, const ImportOptions& opti
   ASSIGN_OR_RETURN(auto imported, IsGltf(format)    ? ImportGltf(daemon, options, material)
                                   : format == "npz" ? ImportNpz(daemon, options)
                                                     : ImportStored(daemon, options));
-  LabelByFile(daemon, options.file, imported.summary);
+  Label(daemon, options, imported.summary);
   // To stderr, so that stdout is the name alone.
   for (const std::string& warning : imported.summary.header().warnings()) {
     absl::FPrintF(stderr, "carillon: %s\n", warning);

@@ -106,7 +106,8 @@ absl::Status Scene::CheckOpenLocked() const {
 
 absl::Status Scene::ObjectExists(uint32_t handle) const {
   return Refusal(absl::StatusCode::kAlreadyExists, "OBJECT_EXISTS",
-                 absl::StrCat(name_, " has an object ", handle, " already; choose another handle, "
+                 absl::StrCat(name_, " has an object ", handle,
+                              " already; choose another handle, "
                               "or, if your program added it earlier, go on with it"));
 }
 
