@@ -47,7 +47,10 @@ BlowGatherer::Events BlowGatherer::Begin(double time_s) {
   Events events;
   const double since_s = time_s - time_s_.value_or(time_s);
   follows_ = time_s_ && since_s <= kLongestStep * nominal_step_s_;
-  if (time_s_ && !follows_) EndBeforeGap(since_s / nominal_step_s_ - 1, events);
+  if (time_s_ && !follows_) {
+    const double missing_count = std::ceil(since_s / nominal_step_s_ - kLongestStep);
+    EndBeforeGap(std::min<double>(missing_count, LoadTracker::kStepCount), events);
+  }
   step_s_ = follows_ && since_s > 0 ? since_s : nominal_step_s_;
   time_s_ = time_s;
   return events;
@@ -56,11 +59,12 @@ BlowGatherer::Events BlowGatherer::Begin(double time_s) {
 void BlowGatherer::EndBeforeGap(double missing_count, Events& events) {
   int steps = 0;
   step_s_ = nominal_step_s_;
-  for (; steps < kKnotsToEnd && (!objects_.empty() || gathers()); ++steps) {
+  for (; steps < std::min<double>(missing_count, kKnotsToEnd) && (!objects_.empty() || gathers());
+       ++steps) {
     *time_s_ += step_s_;
     End(events);
   }
-  for (; steps < std::min<double>(missing_count, LoadTracker::kStepCount); ++steps) {
+  for (; steps < missing_count; ++steps) {
     for (auto& [bodies, pair] : pairs_) pair.load.Next(0, step_s_);
   }
 }

@@ -122,6 +122,16 @@ TEST_F(BlowGathererTest, AfterAGapASmallerContactIsABlowAsIfTheStepsHadBeenSentE
   EXPECT_EQ(gatherer_.counts().load_count, 0U);
 }
 
+TEST_F(BlowGathererTest, WhatRestsIsALoadThoughEverySecondStepIsMissing) {
+  uint64_t before = 0;
+  for (int i = 0; i < 30; ++i) {
+    if (i == 8) before = gatherer_.counts().blow_count;
+    Step(2 * i * kStepS,
+         [&] { gatherer_.Touch({.contact = {.handle = 3}, .partner = 9}, FeltBy(3, kTen)); });
+  }
+  EXPECT_EQ(gatherer_.counts().blow_count, before);
+}
+
 TEST(StepIntervalsTest, TellsARegularGapAndNoOther) {
   StepIntervals alike;
   StepIntervals bounces;
