@@ -44,7 +44,9 @@ function inNamesOfCaller(text, names) {
 
 /** Makes the error that an ErrorInfo of the contract describes. */
 function fromInfo(info) {
-  return new CarillonError(info.reason, inNamesOfCaller(info.message, CALLER_NAMES), info.metadata, info.remedies);
+  const [remedy] = info.remedies ?? [];
+  const help = remedy?.value ? `; it may help to set ${remedy.field} to ${remedy.value}` : '';
+  return new CarillonError(info.reason, inNamesOfCaller(info.message, CALLER_NAMES) + help, info.metadata, info.remedies);
 }
 
 /** Waits for a result. A refusal has the caller's names of fields of the contract. */
@@ -69,8 +71,9 @@ function fromCall(error, server) {
     }
   }
   if (error.code === grpc.status.UNAVAILABLE) {
-    return new ServerUnavailable('SERVER_UNAVAILABLE', `no daemon answers at ${server}: ${error.details}; start ` +
-      'carillond, or give the address where it listens');
+    const details = error.details.replace(/\.? Resolution note: $/, '');
+    return new ServerUnavailable('SERVER_UNAVAILABLE', `no daemon answers at ${server}: ${details}; start carillond, ` +
+      'or give the address where it listens');
   }
   return new CarillonError(grpc.status[error.code], error.details);
 }

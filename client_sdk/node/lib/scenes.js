@@ -146,6 +146,17 @@ class Scene {
   }
 }
 
+/** Throws a TypeError for an object of another scene, where its handle may mean another object. */
+function refuseOtherScenes(content, scene) {
+  const rows = Array.isArray(content) ? content : [content];
+  const objects = rows.flatMap((row) => [row?.objects, row?.secondObjects, row?.object, row?.second?.object].flat());
+  const other = objects.find((object) => object instanceof SoundingObject && object.scene.name !== scene);
+  if (other) {
+    throw new TypeError(`a row has an object of ${other.scene.name}, and this is a stream of ${scene}; give objects of ` +
+      'that scene');
+  }
+}
+
 /**
  * Sends the contacts of each step. `report` is the daemon's newest answer, with the counts so far; `droppedStepCount`
  * steps were not sent: the oldest ones, when 4096 waited. When it is closed, one warning of the process, a
@@ -221,6 +232,9 @@ class ContactStream {
         'sound; open another one by scene.stream');
     }
     if (this.error) throw this.error;
+    for (const rows of [content?.contacts, content?.impulses, content?.forces, content?.poses]) {
+      refuseOtherScenes(rows, this.start.scene);
+    }
     if (this.waiting.length >= MOST_WAITING) {
       this.waiting.shift();
       this.droppedStepCount += 1;

@@ -67,6 +67,15 @@ test('a step stated too short and impulses that are all zero are told', async ()
   }
 });
 
+test('an object of another scene is refused', async () => {
+  const stream = new carillon.Scene(c, 'scenes/2').stream({ step: 1 / 240 });
+  for (const impulses of [[{ object: bell, point: POINT, impulse: IMPULSE }],
+    { objects: [1, bell], points: [0, 0, 0, 0, 0, 0], impulses: [0, 0, 1, 0, 0, 1] }]) {
+    assert.throws(() => stream.step(0, { impulses }), /object of scenes\/1, and this is a stream of scenes\/2/);
+  }
+  await assert.rejects(stream.close(), carillon.ServerUnavailable);
+});
+
 test('a body of a likely wrong unit is told once', async () => {
   const told = [];
   for (const [before, extent_m] of [[0, 20], [20, 202], [202, 202]]) {

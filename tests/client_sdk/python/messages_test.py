@@ -111,6 +111,16 @@ class RefusalsTest(MessagesTest):
         self.refused('object 1 of add_all has no "gian"; did you mean "gain"?', scene.add_all,
                      ["modalModels/1", {"model": "modalModels/1", "gian": 1}])
 
+    def test_an_object_of_another_scene_is_refused(self):
+        one, two = (carillon.SoundingObject(carillon.Scene(self.c, f"scenes/{i}"),
+                                            scene_service_pb2.SoundingObject(handle=1)) for i in (1, 2))
+        point, impulse = [[0, 0, 0]], [[0, 0, 1]]
+        check = carillon.scenes._refuse_other_scenes
+        check(carillon.Impulses([one], point, impulse, second_objects=[3]), "scenes/1")
+        for columns in (carillon.Impulses(two, point, impulse), carillon.Impulses([1], point, impulse,
+                                                                                  second_objects=[two])):
+            self.refused("an object of scenes/2, and this is a stream of scenes/1", check, columns, "scenes/1")
+
     def test_a_setting_at_the_wrong_level_is_refused_with_the_right_one(self):
         for wrong, right in (("poisson_ratio", "settings=dict(poisson_ratio=...)"),
                              ("budget_s", "settings=dict(mesh=dict(budget_s=...)) or transfer=dict(budget_s=...)"),

@@ -129,8 +129,10 @@ def in_names_of_caller(text: str, names: Mapping[str, str]) -> str:
 
 
 def from_info(info: error_pb2.ErrorInfo) -> CarillonError:
-    return CarillonError(info.reason, in_names_of_caller(info.message, CALLER_NAMES), dict(info.metadata),
-                         info.remedies)
+    text = in_names_of_caller(info.message, CALLER_NAMES)
+    if info.remedies and info.remedies[0].value:
+        text += f"; it may help to set {info.remedies[0].field} to {info.remedies[0].value}"
+    return CarillonError(info.reason, text, dict(info.metadata), info.remedies)
 
 
 def from_rpc(error: grpc.RpcError, server: str) -> CarillonError:

@@ -29,7 +29,7 @@ class SoundingObject:
     """An object of a scene. It stands for its handle wherever handles are wanted: int(object)."""
 
     def __init__(self, scene: Scene, message: scene_service_pb2.SoundingObject):
-        self._scene = scene
+        self.scene = scene
         self.message = message
 
     @property
@@ -48,7 +48,7 @@ class SoundingObject:
         frame; `duration` of the contact in seconds, or the `striker`, such as "wood". Raises CarillonError if the
         strike is refused."""
         impulses = contacts.strike_of(self, point, impulse, duration, striker)
-        stream = self._scene.stream(step=0.001, delay=0)
+        stream = self.scene.stream(step=0.001, delay=0)
         stream.step(0.0, impulses=impulses)
         stream.close(warn=False)
         if stream.rejection:
@@ -62,13 +62,13 @@ class SoundingObject:
             name=self.name, material=None if material is None else materials.to_message(material), size=size, gain=gain,
             pose=None if pose is None else contacts.to_pose(pose), glide_s=glide,
             radiation=materials.to_radiation(radiation))
-        client = self._scene.client
+        client = self.scene.client
         with errors.translated(client.server):
             self.message = client.scenes_stub.UpdateObject(request).object
 
     def remove(self) -> None:
         """Fades the object out and removes it."""
-        client = self._scene.client
+        client = self.scene.client
         with errors.translated(client.server):
             client.scenes_stub.RemoveObject(scene_service_pb2.RemoveObjectRequest(name=self.name))
 
@@ -211,6 +211,16 @@ class TraceRecording:
         self._answers.cancel()
 
 
+def _refuse_other_scenes(columns: Contacts | Impulses | Forces | Poses | None, scene: str) -> None:
+    """Raises ValueError for an object of another scene, where its handle may mean another object."""
+    for name in ("objects", "second_objects"):
+        given = getattr(columns, name, None)
+        for item in given if isinstance(given, (list, tuple)) else [given]:
+            if isinstance(item, SoundingObject) and item.scene.name != scene:
+                raise ValueError(f"{name} has an object of {item.scene.name}, and this is a stream of {scene}; give "
+                                 "objects of that scene")
+
+
 class ContactStream:
     """Sends the contacts of each step without waiting for the daemon: a thread sends them, and another reads the
     answers. `report` is the newest answer, with the counts so far; `dropped_step_count` steps were not sent: the
@@ -260,6 +270,8 @@ class ContactStream:
              listener: Optional[PoseLike] = None) -> None:
         """Sends a step at a simulation time, seconds: the contacts that an engine reports, in every step; strikes;
         loads of a simulator that knows them; poses of objects, and of the listener."""
+        for columns in (contacts, impulses, forces, poses):
+            _refuse_other_scenes(columns, self._start.scene)
         self.send(make_step(time, contacts=contacts, impulses=impulses, forces=forces, poses=poses, listener=listener))
 
     def send(self, step: contact_pb2.ContactStep) -> None:
