@@ -298,7 +298,7 @@ void AddMissing(const CLI::App& app, std::vector<std::string>& names) {
   for (const CLI::App* command : app.get_subcommands()) AddMissing(*command, names);
 }
 
-/// Returns what is wrong with the command line, with all that it lacks.
+/// Returns the text of a usage error. If required options are missing, the text names them all.
 std::string MistakeText(const CLI::App& app, const CLI::ParseError& error) {
   std::vector<std::string> missing;
   if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr) AddMissing(app, missing);

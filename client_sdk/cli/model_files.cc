@@ -145,9 +145,10 @@ absl::StatusOr<Imported> ImportStored(const client::Client& daemon, const Import
   return Imported{.summary = std::move(summary), .sounds_with = ""};
 }
 
-/// Gives an imported model the label that was asked for, also if it was stored before with another,
-/// or labels a model without a label by the name of its file, unless that is a digest. A caller who
-/// may import but not label keeps the model as it is.
+/// Sets the label of an imported model to that of the options, even if the daemon had stored the
+/// model before with another label. Without that option, a model without a label gets the name of
+/// its file, unless the name is a digest. The label stays as it is if the daemon does not let the
+/// caller change it.
 void Label(const client::Client& daemon, const ImportOptions& options,
            v1::ModalModelSummary& model) {
   std::string label = options.label;

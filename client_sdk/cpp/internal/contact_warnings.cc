@@ -22,8 +22,8 @@ void AddFindings(const v1::ContactFindings& findings, uint64_t accepted_count,
         "body at rest strikes in each of them; state the step of the simulator, in seconds",
         findings.regular_gap_s()));
   }
-  // Contacts of an engine without an impulse count as loads, impulses of zero as accepted for each
-  // of their objects.
+  // The daemon counts an engine's contact without an impulse as a load, and it counts a strike with
+  // an impulse of zero as accepted, once or twice for one or two objects.
   const uint64_t zeros = findings.zero_impulse_count();
   if (zeros > 0 && findings.blow_count() == 0 && zeros >= findings.load_count() &&
       2 * zeros >= accepted_count) {

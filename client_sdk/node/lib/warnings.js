@@ -40,7 +40,8 @@ function warnOfContacts(findings, frame, acceptedCount = 0) {
       'body at rest strikes in each of them; state the step of the simulator, in seconds');
   }
   const zeros = Number(findings?.zero_impulse_count ?? 0);
-  // Contacts of an engine without an impulse count as loads, impulses of zero as accepted for each of their objects.
+  // The daemon counts an engine's contact without an impulse as a load, and it counts a strike with an impulse of zero
+  // as accepted, once or twice for one or two objects.
   if (zeros >= Math.max(1, Number(findings?.load_count ?? 0), acceptedCount / 2) && !Number(findings.blow_count ?? 0)) {
     warn(`the impulse of ${counted(zeros, 'contact')} was zero, and no other sounded; read impulses after the engine has ` +
       'solved its step, and give newton seconds');

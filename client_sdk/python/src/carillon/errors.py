@@ -72,7 +72,8 @@ def warn_of_contacts(findings: contact_pb2.ContactFindings, frame: str, accepted
     if findings.regular_gap_s:
         _warn(f"all steps came {findings.regular_gap_s:.3g} s apart, which is longer than the step that was stated, so "
               "that a body at rest strikes in each of them; state the step of the simulator, in seconds")
-    # Contacts of an engine without an impulse count as loads, impulses of zero as accepted for each of their objects.
+    # The daemon counts an engine's contact without an impulse as a load, and it counts a strike with an impulse of zero
+    # as accepted, once or twice for one or two objects.
     if findings.zero_impulse_count >= max(1, findings.load_count, accepted_count / 2) and not findings.blow_count:
         _warn(f"the impulse of {counted(findings.zero_impulse_count, 'contact')} was zero, and no other sounded; read "
               "impulses after the engine has solved its step, and give newton seconds")
