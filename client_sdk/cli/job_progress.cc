@@ -115,11 +115,14 @@ void WarnOfUnit(const v1::Job& job, bool terminal) {
   absl::FPrintF(stderr,
                 "%swarning: the body is %.3g m across; if its file is in another unit than metres, "
                 "cancel the job (carillon job cancel %s) and state the unit, such as --unit mm\n",
-                terminal ? "\r\033[K" : "", job.progress().extent_m(),
-                absl::StripPrefix(job.name(), "jobs/").substr(0, 12));
+                terminal ? "\r\033[K" : "", job.progress().extent_m(), ShortName(job));
 }
 
 }  // namespace
+
+absl::string_view ShortName(const v1::Job& job) {
+  return absl::StripPrefix(job.name(), "jobs/").substr(0, 12);
+}
 
 std::string ProgressText(const v1::Job& job) {
   std::string text = absl::StrFormat("%3.0f %%  %s", Fraction(job) * 100, Activity(job));
@@ -139,8 +142,8 @@ std::string ProgressText(const v1::Job& job) {
 
 std::string JobLine(const v1::Job& job, absl::Time now) {
   const std::string reason = job.has_error() ? absl::StrCat(": ", job.error().reason()) : "";
-  return absl::StrCat(absl::StripPrefix(job.name(), "jobs/").substr(0, 12), "  ", ProgressText(job),
-                      reason, AgeText(job, now), "  ", EscapedText(job.label()));
+  return absl::StrCat(ShortName(job), "  ", ProgressText(job), reason, AgeText(job, now), "  ",
+                      EscapedText(job.label()));
 }
 
 std::string RoughTime(double seconds) {

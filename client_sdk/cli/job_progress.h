@@ -4,10 +4,15 @@
 #include <string>
 
 #include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
 #include "absl/time/time.h"
 #include "carillon/client.h"
 
 namespace carillon::cli {
+
+/// Returns the first digits of the digest in the name of a job, by which every command finds the
+/// job. `job` must outlive the result.
+absl::string_view ShortName(const v1::Job& job);
 
 /// Returns the progress of a job as text, such as "52 %  solving, 38120 nodes, 12 modes" or
 /// "0 %  waiting: 2 jobs are before it".

@@ -234,9 +234,8 @@ absl::StatusOr<v1::Job> AwaitModel(const client::Client& daemon, const CreateMod
 
 /// Prints how a user sees whether a job that nobody waits for fails.
 void PrintHowToFollow(const v1::Job& job) {
-  const absl::string_view digest = absl::StripPrefix(job.name(), "jobs/").substr(0, 12);
   absl::FPrintF(stderr, "carillon: %s is being computed; follow it with: carillon job watch %s\n",
-                EscapedText(job.label()), digest);
+                EscapedText(job.label()), ShortName(job));
 }
 
 /// Prints what the user should know about a model that was just made.
