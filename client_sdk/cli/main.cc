@@ -13,6 +13,9 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
+#include "absl/strings/str_split.h"
+#include "absl/strings/string_view.h"
+#include "absl/strings/strip.h"
 #include "client_sdk/cli/commands.h"
 #include "client_sdk/cli/completion_options.h"
 #include "client_sdk/cli/doctor_command.h"
@@ -298,8 +301,30 @@ void AddMissing(const CLI::App& app, std::vector<std::string>& names) {
   for (const CLI::App* command : app.get_subcommands()) AddMissing(*command, names);
 }
 
+/// Returns the option of this name of the commands that the command line chose, or null.
+const CLI::Option* FindOption(const CLI::App& app, const std::string& name) {
+  if (const CLI::Option* option = app.get_option_no_throw(name)) return option;
+  for (const CLI::App* command : app.get_subcommands()) {
+    if (const CLI::Option* option = FindOption(*command, name)) return option;
+  }
+  return nullptr;
+}
+
+/// Returns the text of a value that its option cannot read, and says what the option takes.
+std::string ConversionText(const CLI::App& app, const CLI::ParseError& error) {
+  absl::string_view text = error.what();
+  absl::ConsumePrefix(&text, "Could not convert: ");
+  const std::vector<std::string> parts = absl::StrSplit(text, absl::MaxSplits(" = ", 1));
+  const CLI::Option* option = parts.size() == 2 ? FindOption(app, parts[0]) : nullptr;
+  if (option == nullptr) return error.what();
+  return absl::StrCat(parts[0], " cannot be ", parts[1], ": ", option->get_description());
+}
+
 /// Returns the text of a usage error. If required options are missing, the text names them all.
 std::string MistakeText(const CLI::App& app, const CLI::ParseError& error) {
+  if (dynamic_cast<const CLI::ConversionError*>(&error) != nullptr) {
+    return absl::StrCat(ConversionText(app, error), "\nRun with --help for more information.");
+  }
   std::vector<std::string> missing;
   if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr) AddMissing(app, missing);
   const std::string what = missing.size() > 1

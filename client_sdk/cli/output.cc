@@ -63,7 +63,8 @@ std::string Counted(uint64_t count, absl::string_view noun) {
 }
 
 std::string Decibels(double amplitude) {
-  if (amplitude <= 0) return "silence";
+  constexpr double kSilence = 0x1p-24;  // half of the smallest step of 24 bits
+  if (amplitude < kSilence) return "silence";
   return absl::StrFormat("%.1f dBFS", 20 * std::log10(amplitude));
 }
 

@@ -32,7 +32,7 @@ absl::StatusOr<std::optional<BusId>> AudioService::HeardBus(
   return bus;
 }
 
-grpc::ServerBidiReactor<v1::RenderRequest, v1::RenderResponse>* AudioService::Render(
+grpc::ServerBidiReactor<grpc::ByteBuffer, v1::RenderResponse>* AudioService::RenderRaw(
     grpc::CallbackServerContext* context) {
   return Open(*context, reception_, Role::kStrike, Holding::kRendering,
               [this, context](const Principal&, ClientPlace place) {

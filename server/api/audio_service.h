@@ -7,6 +7,7 @@
 
 #include "carillon/v1/audio_service.grpc.pb.h"
 #include "server/api/idle_calls.h"
+#include "server/api/raw_service.h"
 #include "server/api/reception.h"
 #include "server/api/scene_owners.h"
 #include "server/base/clock.h"
@@ -20,7 +21,7 @@ namespace carillon {
 
 /// carillon.v1.AudioService. The objects that the constructor gets by reference must outlive the
 /// service.
-class AudioService final : public v1::AudioService::CallbackService {
+class AudioService final : public RawService<v1::AudioService> {
  public:
   /// Offline rendering runs on the threads of `reception`'s pool.
   AudioService(std::string version, LiveOutput& output, const SceneRegistry& scenes,
@@ -34,12 +35,12 @@ class AudioService final : public v1::AudioService::CallbackService {
         heads_(heads),
         clock_(clock),
         idle_calls_(idle_calls),
-        reception_(reception) {}
+        reception_(reception) {
+    ReadRaw("Render", &AudioService::RenderRaw);
+  }
 
   grpc::ServerWriteReactor<v1::ListenResponse>* Listen(grpc::CallbackServerContext* context,
                                                        const v1::ListenRequest* request) override;
-  grpc::ServerBidiReactor<v1::RenderRequest, v1::RenderResponse>* Render(
-      grpc::CallbackServerContext* context) override;
   grpc::ServerUnaryReactor* GetMixer(grpc::CallbackServerContext* context,
                                      const v1::GetMixerRequest* request,
                                      v1::GetMixerResponse* response) override;
@@ -48,6 +49,8 @@ class AudioService final : public v1::AudioService::CallbackService {
                                         v1::UpdateMixerResponse* response) override;
 
  private:
+  grpc::ServerBidiReactor<grpc::ByteBuffer, v1::RenderResponse>* RenderRaw(
+      grpc::CallbackServerContext* context);
   /// Returns the bus of a scene, or nothing for the output if the name is empty. Errors: those of
   /// SceneOwners::Parse.
   absl::StatusOr<std::optional<BusId>> HeardBus(const grpc::CallbackServerContext& context,

@@ -25,11 +25,14 @@ constexpr std::chrono::milliseconds kAnswerPeriod(500);
 /// ends after kMostSettlePeriods, in case the mixer does not render at all.
 constexpr std::chrono::milliseconds kSettlePeriod(2);
 constexpr int kMostSettlePeriods = 250;
-/// Greatest number of rows of a step that gRPC's thread takes at once. gRPC has few threads, and
-/// all calls wait while these are busy. A row takes up to 6 us.
+/// Greatest size of a message, and greatest number of rows of a step, that gRPC's thread takes at
+/// once. gRPC has few threads, and all calls wait while these are busy. Parsing a message takes up
+/// to 60 ns for each of its bytes, and a row takes up to 6 us.
+constexpr size_t kMostBytesAtOnce = size_t{24} << 10;
 constexpr size_t kMostRowsAtOnce = 256;
-/// Number of rows that it takes at once even from a client that has used up its time on gRPC's
-/// threads. They take no longer than gRPC's own work for the message.
+/// The same for a client that has used up its time on gRPC's threads. This message takes no longer
+/// than gRPC's own work for it.
+constexpr size_t kFewBytes = size_t{1} << 10;
 constexpr size_t kFewRows = 16;
 
 /// One contact stream. Requests are read one at a time, so only one thread at a time uses
@@ -63,17 +66,39 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
     }
   }
 
+  void RunReading(size_t byte_count, std::function<void()> step) override {
+    if (byte_count <= kFewBytes) {
+      turn_ = Turn::kFree;
+      return step();
+    }
+    if (byte_count <= kMostBytesAtOnce && budget_->Allows(daemon_.clock.Monotonic())) {
+      turn_ = Turn::kPaid;
+      return Pay(step);
+    }
+    RunInPool(std::move(step));
+  }
+
   void RunTaking(const v1::StreamContactsRequest& request, std::function<void()> step) override {
     const size_t row_count = CountRows(request.step());
-    if (row_count <= kFewRows) return step();
+    if (turn_ == Turn::kInPool || row_count <= kFewRows) return step();
+    if (row_count > kMostRowsAtOnce) return RunInPool(std::move(step));
+    if (turn_ == Turn::kPaid) return step();
+    if (!budget_->Allows(daemon_.clock.Monotonic())) return RunInPool(std::move(step));
+    Pay(step);
+  }
+
+  /// Runs the step on this thread, which is one of gRPC's, and spends the client's budget.
+  void Pay(const std::function<void()>& step) {
     Clock& clock = daemon_.clock;
-    const std::chrono::nanoseconds begin = clock.Monotonic();
-    if (row_count > kMostRowsAtOnce || !budget_->Allows(begin)) {
-      return daemon_.large_steps.Run(caller_.client, std::move(step));
-    }
     const std::shared_ptr<StepBudget> budget = budget_;  // the call may be deleted during the step
+    const std::chrono::nanoseconds begin = clock.Monotonic();
     step();
     budget->Spend(clock.Monotonic() - begin);
+  }
+
+  void RunInPool(std::function<void()> step) {
+    turn_ = Turn::kInPool;
+    daemon_.large_steps.Run(caller_.client, std::move(step));
   }
 
   void AllRead() override {
@@ -175,8 +200,16 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
     return answer;
   }
 
+  /// Where the request that was read last is taken.
+  enum class Turn {
+    kFree,    ///< on gRPC's thread, without spending the budget
+    kPaid,    ///< on gRPC's thread, by Pay
+    kInPool,  ///< on a thread of large_steps
+  };
+
   const ContactContext daemon_;
   TraceRecorders& recorders_;
+  Turn turn_ = Turn::kFree;
   StreamRecording recording_;
   const grpc::CallbackServerContext& context_;
   const Principal caller_;
@@ -238,9 +271,9 @@ grpc::ServerWriteReactor<v1::RecordContactsResponse>* ContactService::RecordCont
   return Open(*context, daemon_.reception, Role::kStrike, Holding::kListener, make);
 }
 
-grpc::ServerBidiReactor<v1::StreamContactsRequest, v1::StreamContactsResponse>*
-ContactService::StreamContacts(grpc::CallbackServerContext* context) {
-  using Reactor = grpc::ServerBidiReactor<v1::StreamContactsRequest, v1::StreamContactsResponse>;
+grpc::ServerBidiReactor<grpc::ByteBuffer, v1::StreamContactsResponse>*
+ContactService::StreamContactsRaw(grpc::CallbackServerContext* context) {
+  using Reactor = grpc::ServerBidiReactor<grpc::ByteBuffer, v1::StreamContactsResponse>;
   return Open(*context, daemon_.reception, Role::kStrike, Holding::kContactStream,
               [&](const Principal& caller, ClientPlace place) -> Reactor* {
                 return new ContactCall(daemon_, clients_, *context, caller, std::move(place));

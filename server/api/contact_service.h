@@ -3,6 +3,7 @@
 
 #include "carillon/v1/contact_service.grpc.pb.h"
 #include "server/api/fair_pool.h"
+#include "server/api/raw_service.h"
 #include "server/api/reception.h"
 #include "server/api/scene_owners.h"
 #include "server/api/step_budget.h"
@@ -31,16 +32,19 @@ struct ContactClients {
 
 /// carillon.v1.ContactService. The objects that the constructor gets by reference must outlive the
 /// service.
-class ContactService final : public v1::ContactService::CallbackService {
+class ContactService final : public RawService<v1::ContactService> {
  public:
-  explicit ContactService(const ContactContext& daemon) : daemon_(daemon) {}
+  explicit ContactService(const ContactContext& daemon) : daemon_(daemon) {
+    ReadRaw("StreamContacts", &ContactService::StreamContactsRaw);
+  }
 
-  grpc::ServerBidiReactor<v1::StreamContactsRequest, v1::StreamContactsResponse>* StreamContacts(
-      grpc::CallbackServerContext* context) override;
   grpc::ServerWriteReactor<v1::RecordContactsResponse>* RecordContacts(
       grpc::CallbackServerContext* context, const v1::RecordContactsRequest* request) override;
 
  private:
+  grpc::ServerBidiReactor<grpc::ByteBuffer, v1::StreamContactsResponse>* StreamContactsRaw(
+      grpc::CallbackServerContext* context);
+
   const ContactContext daemon_;
   ContactClients clients_;
 };

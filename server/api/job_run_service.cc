@@ -128,7 +128,7 @@ grpc::ServerUnaryReactor* JobRunService::ReportProgress(grpc::CallbackServerCont
   });
 }
 
-grpc::ServerReadReactor<v1::UploadResultRequest>* JobRunService::UploadResult(
+grpc::ServerReadReactor<grpc::ByteBuffer>* JobRunService::UploadResultRaw(
     grpc::CallbackServerContext* context, v1::UploadResultResponse* response) {
   return new ReadCall<v1::UploadResultRequest, v1::UploadResultResponse, ResultSink>(
       *context, *response, ResultSink(runs_, RunCaller(access_, *context)), pool_);

@@ -3,6 +3,7 @@
 
 #include "carillon/v1/job_run_service.grpc.pb.h"
 #include "server/api/access_control.h"
+#include "server/api/raw_service.h"
 #include "server/api/thread_pool.h"
 #include "server/decomposition/remote_runs.h"
 
@@ -10,21 +11,24 @@ namespace carillon {
 
 /// carillon.v1.JobRunService. The objects that the constructor gets by reference must outlive the
 /// service.
-class JobRunService final : public v1::JobRunService::CallbackService {
+class JobRunService final : public RawService<v1::JobRunService> {
  public:
   /// Wrong tokens are logged through `access`.
   JobRunService(RemoteRuns& runs, AccessControl& access, ThreadPool& pool)
-      : runs_(runs), access_(access), pool_(pool) {}
+      : runs_(runs), access_(access), pool_(pool) {
+    ReadRaw("UploadResult", &JobRunService::UploadResultRaw);
+  }
 
   grpc::ServerWriteReactor<v1::FetchMeshResponse>* FetchMesh(
       grpc::CallbackServerContext* context, const v1::FetchMeshRequest* request) override;
   grpc::ServerUnaryReactor* ReportProgress(grpc::CallbackServerContext* context,
                                            const v1::ReportProgressRequest* request,
                                            v1::ReportProgressResponse* response) override;
-  grpc::ServerReadReactor<v1::UploadResultRequest>* UploadResult(
-      grpc::CallbackServerContext* context, v1::UploadResultResponse* response) override;
 
  private:
+  grpc::ServerReadReactor<grpc::ByteBuffer>* UploadResultRaw(grpc::CallbackServerContext* context,
+                                                             v1::UploadResultResponse* response);
+
   RemoteRuns& runs_;
   AccessControl& access_;
   ThreadPool& pool_;

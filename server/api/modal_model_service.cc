@@ -31,7 +31,7 @@ ModelFilter FilterOf(const v1::ListModalModelsRequest& request) {
 
 }  // namespace
 
-grpc::ServerReadReactor<v1::UploadMeshRequest>* ModalModelService::UploadMesh(
+grpc::ServerReadReactor<grpc::ByteBuffer>* ModalModelService::UploadMeshRaw(
     grpc::CallbackServerContext* context, v1::UploadMeshResponse* response) {
   return Open(*context, daemon_.writing, Role::kSubmit, Holding::kUpload,
               [&](const Principal&, ClientPlace place) {
@@ -95,7 +95,7 @@ grpc::ServerUnaryReactor* ModalModelService::DeleteModalModel(
   });
 }
 
-grpc::ServerReadReactor<v1::ImportModalModelRequest>* ModalModelService::ImportModalModel(
+grpc::ServerReadReactor<grpc::ByteBuffer>* ModalModelService::ImportModalModelRaw(
     grpc::CallbackServerContext* context, v1::ImportModalModelResponse* response) {
   return Open(*context, daemon_.writing, Role::kSubmit, Holding::kUpload,
               [&](const Principal&, ClientPlace place) {

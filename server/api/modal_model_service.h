@@ -3,6 +3,7 @@
 
 #include "carillon/v1/modal_model_service.grpc.pb.h"
 #include "server/api/call_bounds.h"
+#include "server/api/raw_service.h"
 #include "server/api/reception.h"
 #include "server/base/clock.h"
 #include "server/decomposition/decomposition_queue.h"
@@ -22,13 +23,14 @@ struct ModelContext {
 
 /// carillon.v1.ModalModelService. The objects that the constructor gets by reference must outlive
 /// the service.
-class ModalModelService final : public v1::ModalModelService::CallbackService {
+class ModalModelService final : public RawService<v1::ModalModelService> {
  public:
   explicit ModalModelService(const ModelContext& daemon)
-      : daemon_(daemon), database_(daemon.database), queue_(daemon.queue) {}
+      : daemon_(daemon), database_(daemon.database), queue_(daemon.queue) {
+    ReadRaw("UploadMesh", &ModalModelService::UploadMeshRaw);
+    ReadRaw("ImportModalModel", &ModalModelService::ImportModalModelRaw);
+  }
 
-  grpc::ServerReadReactor<v1::UploadMeshRequest>* UploadMesh(
-      grpc::CallbackServerContext* context, v1::UploadMeshResponse* response) override;
   grpc::ServerUnaryReactor* CreateModalModel(grpc::CallbackServerContext* context,
                                              const v1::CreateModalModelRequest* request,
                                              v1::CreateModalModelResponse* response) override;
@@ -47,8 +49,6 @@ class ModalModelService final : public v1::ModalModelService::CallbackService {
   grpc::ServerUnaryReactor* DeleteModalModel(grpc::CallbackServerContext* context,
                                              const v1::DeleteModalModelRequest* request,
                                              v1::DeleteModalModelResponse* response) override;
-  grpc::ServerReadReactor<v1::ImportModalModelRequest>* ImportModalModel(
-      grpc::CallbackServerContext* context, v1::ImportModalModelResponse* response) override;
   grpc::ServerWriteReactor<v1::ExportModalModelResponse>* ExportModalModel(
       grpc::CallbackServerContext* context, const v1::ExportModalModelRequest* request) override;
   grpc::ServerUnaryReactor* ListMaterials(grpc::CallbackServerContext* context,
@@ -56,6 +56,10 @@ class ModalModelService final : public v1::ModalModelService::CallbackService {
                                           v1::ListMaterialsResponse* response) override;
 
  private:
+  grpc::ServerReadReactor<grpc::ByteBuffer>* UploadMeshRaw(grpc::CallbackServerContext* context,
+                                                           v1::UploadMeshResponse* response);
+  grpc::ServerReadReactor<grpc::ByteBuffer>* ImportModalModelRaw(
+      grpc::CallbackServerContext* context, v1::ImportModalModelResponse* response);
   absl::Status Get(const v1::GetModalModelRequest& request, v1::GetModalModelResponse& response);
   absl::Status Update(const v1::UpdateModalModelRequest& request,
                       v1::UpdateModalModelResponse& response);

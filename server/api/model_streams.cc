@@ -148,17 +148,18 @@ class ExportCall final : public SendCall<v1::ExportModalModelResponse> {
 
 }  // namespace
 
-grpc::ServerReadReactor<v1::UploadMeshRequest>* MakeUpload(grpc::CallbackServerContext& context,
-                                                           v1::UploadMeshResponse& response,
-                                                           MeshStore& meshes, ThreadPool& pool,
-                                                           CallBounds bounds) {
+grpc::ServerReadReactor<grpc::ByteBuffer>* MakeUpload(grpc::CallbackServerContext& context,
+                                                      v1::UploadMeshResponse& response,
+                                                      MeshStore& meshes, ThreadPool& pool,
+                                                      CallBounds bounds) {
   return new ReadCall<v1::UploadMeshRequest, v1::UploadMeshResponse, MeshSink>(
       context, response, MeshSink(meshes), pool, std::move(bounds));
 }
 
-grpc::ServerReadReactor<v1::ImportModalModelRequest>* MakeImport(
-    grpc::CallbackServerContext& context, v1::ImportModalModelResponse& response,
-    ModeDatabase& database, ThreadPool& pool, CallBounds bounds) {
+grpc::ServerReadReactor<grpc::ByteBuffer>* MakeImport(grpc::CallbackServerContext& context,
+                                                      v1::ImportModalModelResponse& response,
+                                                      ModeDatabase& database, ThreadPool& pool,
+                                                      CallBounds bounds) {
   return new ReadCall<v1::ImportModalModelRequest, v1::ImportModalModelResponse, ModelSink>(
       context, response, ModelSink(database), pool, std::move(bounds));
 }

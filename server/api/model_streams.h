@@ -14,14 +14,15 @@ namespace carillon {
 /// The streams of ModalModelService. Each stream deletes itself when its call is done. The database
 /// and the pool must outlive the call.
 
-grpc::ServerReadReactor<v1::UploadMeshRequest>* MakeUpload(grpc::CallbackServerContext& context,
-                                                           v1::UploadMeshResponse& response,
-                                                           MeshStore& meshes, ThreadPool& pool,
-                                                           CallBounds bounds);
+grpc::ServerReadReactor<grpc::ByteBuffer>* MakeUpload(grpc::CallbackServerContext& context,
+                                                      v1::UploadMeshResponse& response,
+                                                      MeshStore& meshes, ThreadPool& pool,
+                                                      CallBounds bounds);
 
-grpc::ServerReadReactor<v1::ImportModalModelRequest>* MakeImport(
-    grpc::CallbackServerContext& context, v1::ImportModalModelResponse& response,
-    ModeDatabase& database, ThreadPool& pool, CallBounds bounds);
+grpc::ServerReadReactor<grpc::ByteBuffer>* MakeImport(grpc::CallbackServerContext& context,
+                                                      v1::ImportModalModelResponse& response,
+                                                      ModeDatabase& database, ThreadPool& pool,
+                                                      CallBounds bounds);
 
 grpc::ServerWriteReactor<v1::ExportModalModelResponse>* MakeExport(
     grpc::CallbackServerContext& context, const v1::ExportModalModelRequest& request,

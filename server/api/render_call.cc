@@ -157,7 +157,7 @@ class RenderCall final : public BidiStream<v1::RenderRequest, v1::RenderResponse
 
 }  // namespace
 
-grpc::ServerBidiReactor<v1::RenderRequest, v1::RenderResponse>* MakeRenderCall(
+grpc::ServerBidiReactor<grpc::ByteBuffer, v1::RenderResponse>* MakeRenderCall(
     const RenderContext& daemon, grpc::CallbackServerContext& context, ClientPlace place) {
   return new RenderCall(daemon, context, std::move(place));
 }

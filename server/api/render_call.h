@@ -30,7 +30,7 @@ struct RenderContext {
 
 /// Makes a call of AudioService.Render, which holds `place` and deletes itself when it is done. The
 /// call is added to the idle calls of `daemon`, whose parts must outlive the call.
-grpc::ServerBidiReactor<v1::RenderRequest, v1::RenderResponse>* MakeRenderCall(
+grpc::ServerBidiReactor<grpc::ByteBuffer, v1::RenderResponse>* MakeRenderCall(
     const RenderContext& daemon, grpc::CallbackServerContext& context, ClientPlace place);
 
 }  // namespace carillon

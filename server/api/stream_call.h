@@ -2,6 +2,7 @@
 #pragma once
 
 #include <grpcpp/grpcpp.h>
+#include <grpcpp/impl/codegen/proto_utils.h>
 
 #include <functional>
 #include <utility>
@@ -10,6 +11,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 #include "server/api/exception_barrier.h"
 #include "server/api/status_conversion.h"
 #include "server/api/thread_pool.h"
@@ -44,18 +46,21 @@ class StreamCall : public Reactor {
   ThreadPool* const pool_;
 };
 
-/// The reading half of a call, which takes one request after the other.
+/// The reading half of a call, which takes one request after the other. gRPC hands over the bytes
+/// of a request, because parsing a large request would keep one of gRPC's few threads busy for
+/// long.
 template <typename Reactor, typename Request>
 class StreamReader : public Reactor {
  public:
   void OnReadDone(bool ok) final {
     if (!GoesOn()) return;
-    auto step = [this, ok] {
-      const absl::Status status = WithoutExceptions([&] { return ok ? TakeRequest() : TakeEnd(); });
-      if (!status.ok()) Refuse(status);
-    };
-    if (ok) return RunTaking(request_, std::move(step));
-    this->Run(std::move(step));
+    if (ok) return RunReading(bytes_.Length(), [this] { ReadRequest(); });
+    this->Run([this] {
+      Continue([this] {
+        AllRead();
+        return absl::OkStatus();
+      });
+    });
   }
 
  protected:
@@ -70,10 +75,13 @@ class StreamReader : public Reactor {
 
   virtual void Refuse(const absl::Status& status) { this->End(status); }
 
-  /// Runs the step that takes a request. A call may choose other threads for some requests.
-  /// Requests are still taken one at a time and in order, because the next request is read after
-  /// the step.
-  virtual void RunTaking(const Request&, std::function<void()> step) { this->Run(std::move(step)); }
+  /// Runs the step that parses a request of this size and passes it to RunTaking. A call may choose
+  /// other threads for some requests. Requests are still taken one at a time and in order, because
+  /// the next request is read after the last step.
+  virtual void RunReading(size_t, std::function<void()> step) { this->Run(std::move(step)); }
+
+  /// Runs the step that takes the request, and is called by the step of RunReading.
+  virtual void RunTaking(const Request&, std::function<void()> step) { step(); }
 
   /// Returns false if the call was ended while it waited for a request. The call may then be
   /// deleted as soon as GoesOn returns, so no step may be left to the pool. Called on gRPC's
@@ -81,39 +89,48 @@ class StreamReader : public Reactor {
   virtual bool GoesOn() { return true; }
 
   /// Must be the last step of a call's constructor.
-  void StartReading() { ReadNext(); }
+  void StartReading() { this->StartRead(&bytes_); }
 
  private:
-  /// Number of an unknown field that ReadNext adds to `request_`. If the field is still there, gRPC
-  /// has not parsed a message into `request_`. No message from a client has this field, because
-  /// protobuf allows no field with the number 0.
-  static constexpr int kUnread = 0;
+  /// A call keeps the memory of its last request for the next one, up to about this size.
+  static constexpr size_t kMostKeptBytes = size_t{64} << 10;
 
-  void ReadNext() {
-    request_.GetReflection()->MutableUnknownFields(&request_)->AddVarint(kUnread, 0);
-    this->StartRead(&request_);
+  void ReadRequest() {
+    Continue([this] {
+      is_large_ = bytes_.Length() > kMostKeptBytes;
+      const grpc::Status parsed =
+          grpc::SerializationTraits<Request>::Deserialize(&bytes_, &request_);
+      if (!parsed.ok()) return Malformed();
+      RunTaking(request_, [this] { TakeRequest(); });
+      return absl::OkStatus();
+    });
   }
 
-  absl::Status TakeRequest() {
-    absl::Status status = Take(request_);
-    if (status.ok()) ReadNext();
-    return status;
+  void TakeRequest() {
+    Continue([this] {
+      RETURN_IF_ERROR(Take(request_));
+      if (is_large_) Request().Swap(&request_);
+      StartReading();
+      return absl::OkStatus();
+    });
   }
 
-  /// gRPC reports a message that it cannot parse as the end of the requests. Such a message is
-  /// detected because parsing first clears the request and the mark that ReadNext has set in it.
-  absl::Status TakeEnd() {
-    const auto& unknown = request_.GetReflection()->GetUnknownFields(request_);
-    if (unknown.empty() || unknown.field(unknown.field_count() - 1).number() != kUnread) {
-      return Refusal(absl::StatusCode::kInvalidArgument, "REQUEST_MALFORMED",
-                     "a message of the stream cannot be parsed: send messages of the type that the "
-                     "contract names");
-    }
-    AllRead();
-    return absl::OkStatus();
+  /// Calls `step()`, after which the call may be deleted, unless the step returns an error.
+  template <typename Step>
+  void Continue(Step step) {
+    const absl::Status status = WithoutExceptions(step);
+    if (!status.ok()) Refuse(status);
   }
 
+  static absl::Status Malformed() {
+    return Refusal(absl::StatusCode::kInvalidArgument, "REQUEST_MALFORMED",
+                   "a message of the stream cannot be parsed: send messages of the type that the "
+                   "contract names");
+  }
+
+  grpc::ByteBuffer bytes_;
   Request request_;
+  bool is_large_ = false;
 };
 
 /// Whether a call has a message to send.
@@ -218,14 +235,14 @@ class StreamWriter : public Reactor {
 };
 
 template <typename Request>
-using ClientStream = StreamReader<StreamCall<grpc::ServerReadReactor<Request>>, Request>;
+using ClientStream = StreamReader<StreamCall<grpc::ServerReadReactor<grpc::ByteBuffer>>, Request>;
 
 template <typename Response>
 using ServerStream = StreamWriter<StreamCall<grpc::ServerWriteReactor<Response>>, Response>;
 
 template <typename Request, typename Response>
-using BidiStream =
-    StreamWriter<StreamReader<StreamCall<grpc::ServerBidiReactor<Request, Response>>, Request>,
-                 Response>;
+using BidiStream = StreamWriter<
+    StreamReader<StreamCall<grpc::ServerBidiReactor<grpc::ByteBuffer, Response>>, Request>,
+    Response>;
 
 }  // namespace carillon

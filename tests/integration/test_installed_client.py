@@ -76,6 +76,15 @@ class InstalledClientTest(DaemonTest):
         run("c++", "-std=c++20", EXAMPLE / "main.cc", "-o", program, *shlex.split(flags.stdout))
         self.assert_strikes(program)
 
+    def test_the_falling_bar_of_the_page_is_heard_and_comes_to_rest(self):
+        page = (ROOT / "docs/ten_minutes_cpp.md").read_text()
+        (self.folder / "fall.cc").write_text(re.search(r"(?ms)`fall.cc`:\n\n```cpp\n(.*?)^```$", page)[1])
+        compiles, = re.findall(r"(?m)^c\+\+ .*\n", page)
+        said = self.bash(f"{FIND}{compiles}CARILLON_SERVER={self.daemon.server} ./fall {self.model}")
+        self.assertRegex(said.stdout, r"^blows: [3-9], loads: \d{2,}\n$")
+        none = self.bash("CARILLON_SERVER=unix:/nowhere ./fall modalModels/0 2>&1 || true").stdout
+        self.assertRegex(none, "^(?!terminate).*/nowhere")
+
     def test_a_program_in_c_strikes_a_running_daemon(self):
         page = (ROOT / "docs/ten_minutes_c.md").read_text()
         (self.folder / "strike.c").write_text(re.search(r"(?ms)^```c\n(.*?)^```$", page)[1])

@@ -26,21 +26,21 @@ class RecordingReactor {
   virtual void OnWriteDone(bool) {}
   virtual void OnCancel() {}
 
-  void StartRead(Number* request) {
+  void StartRead(grpc::ByteBuffer* bytes) {
     ++read_count;
-    reading = request;
+    reading = bytes;
   }
   void StartWrite(const std::string* response) { written.push_back(*response); }
   void Finish(const grpc::Status& status) { ends.push_back(status.error_code()); }
 
-  /// Parses the next message, as gRPC does before OnReadDone.
-  void Parse(bool well_formed) {
-    reading->Clear();
-    if (well_formed) reading->set_value(read_count);
+  void Receive(const std::string& message) {
+    const grpc::Slice slice(message);
+    *reading = grpc::ByteBuffer(&slice, 1);
+    OnReadDone(true);
   }
 
   int read_count = 0;
-  Number* reading = nullptr;
+  grpc::ByteBuffer* reading = nullptr;
   std::vector<std::string> written;
   std::vector<grpc::StatusCode> ends;
 };
@@ -155,9 +155,11 @@ class NumberCall final : public StreamReader<StreamCall<RecordingReactor>, Numbe
   bool all_read = false;
   bool throws = false;
 
-  void Receive() {
-    Parse(true);
-    OnReadDone(true);
+  /// Receives the number of requests that were read.
+  void ReceiveNext() {
+    Number number;
+    number.set_value(read_count);
+    Receive(number.SerializeAsString());
   }
 
  private:
@@ -172,8 +174,8 @@ class NumberCall final : public StreamReader<StreamCall<RecordingReactor>, Numbe
 
 TEST(StreamReader, TakesOneRequestAfterTheOther) {
   NumberCall call;
-  call.Receive();
-  call.Receive();
+  call.ReceiveNext();
+  call.ReceiveNext();
   call.OnReadDone(false);
   EXPECT_THAT(call.taken, ElementsAre(1, 2));
   EXPECT_TRUE(call.all_read);
@@ -181,7 +183,7 @@ TEST(StreamReader, TakesOneRequestAfterTheOther) {
 
 TEST(StreamReader, EndsWithTheErrorOfTakeAndReadsNoMore) {
   NumberCall call;
-  for (int i = 0; i < 3; ++i) call.Receive();
+  for (int i = 0; i < 3; ++i) call.ReceiveNext();
   EXPECT_THAT(call.ends, ElementsAre(grpc::OUT_OF_RANGE));
   EXPECT_EQ(call.read_count, 3);
   EXPECT_FALSE(call.all_read);
@@ -190,10 +192,10 @@ TEST(StreamReader, EndsWithTheErrorOfTakeAndReadsNoMore) {
 TEST(StreamReader, RefusesAMessageThatCannotBeParsedInsteadOfTakingItForTheEnd) {
   for (const int read_before : {0, 2}) {
     NumberCall call;
-    for (int i = 0; i < read_before; ++i) call.Receive();
-    call.Parse(false);
-    call.OnReadDone(false);
+    for (int i = 0; i < read_before; ++i) call.ReceiveNext();
+    call.Receive("\xff");
     EXPECT_THAT(call.ends, ElementsAre(grpc::INVALID_ARGUMENT));
+    EXPECT_EQ(call.read_count, 1 + read_before);
     EXPECT_FALSE(call.all_read);
   }
 }
@@ -201,8 +203,8 @@ TEST(StreamReader, RefusesAMessageThatCannotBeParsedInsteadOfTakingItForTheEnd) 
 TEST(StreamReader, EndsWithAnErrorWhereMemoryIsMissing) {
   NumberCall call;
   call.throws = true;
-  call.Receive();
-  call.Receive();
+  call.ReceiveNext();
+  call.ReceiveNext();
   EXPECT_THAT(call.ends, ElementsAre(grpc::RESOURCE_EXHAUSTED));
 }
 
