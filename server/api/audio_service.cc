@@ -15,9 +15,9 @@ namespace carillon {
 
 grpc::ServerWriteReactor<v1::ListenResponse>* AudioService::Listen(
     grpc::CallbackServerContext* context, const v1::ListenRequest* request) {
-  return Open(*context, reception_, Role::kListen, Holding::kListener,
+  return Open(*context, daemon_.reception, Role::kListen, Holding::kListener,
               [&](const Principal& caller, ClientPlace place) {
-                return MakeListenCall(output_, HeardBus(*context, caller, request->scene()),
+                return MakeListenCall(daemon_.output, HeardBus(*context, caller, request->scene()),
                                       *request, std::move(place));
               });
 }
@@ -27,22 +27,22 @@ absl::StatusOr<std::optional<BusId>> AudioService::HeardBus(
     const std::string& scene_name) const {
   if (scene_name.empty()) return std::nullopt;
   ASSIGN_OR_RETURN(const uint64_t scene,
-                   owners_.Parse(context, caller, scene_name, SceneCall::kLooks));
-  ASSIGN_OR_RETURN(const BusId bus, scenes_.BusOf(scene));
+                   daemon_.owners.Parse(context, caller, scene_name, SceneCall::kLooks));
+  ASSIGN_OR_RETURN(const BusId bus, daemon_.scenes.BusOf(scene));
   return bus;
 }
 
 grpc::ServerBidiReactor<grpc::ByteBuffer, v1::RenderResponse>* AudioService::RenderRaw(
     grpc::CallbackServerContext* context) {
-  return Open(*context, reception_, Role::kStrike, Holding::kRendering,
+  return Open(*context, daemon_.reception, Role::kStrike, Holding::kRendering,
               [this, context](const Principal&, ClientPlace place) {
-                return MakeRenderCall({.database = database_,
-                                       .heads = heads_,
+                return MakeRenderCall({.database = daemon_.database,
+                                       .heads = daemon_.heads,
                                        .bodies = render_bodies_,
-                                       .pool = reception_.pool,
+                                       .pool = daemon_.reception.pool,
                                        .call_count = rendering_count_,
-                                       .clock = clock_,
-                                       .idle_calls = idle_calls_},
+                                       .clock = daemon_.clock,
+                                       .idle_calls = daemon_.idle_calls},
                                       *context, std::move(place));
               });
 }
@@ -51,7 +51,7 @@ grpc::ServerUnaryReactor* AudioService::GetMixer(grpc::CallbackServerContext* co
                                                  const v1::GetMixerRequest*,
                                                  v1::GetMixerResponse* response) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  const absl::Status admitted = reception_.access.Admit(*context, Role::kAny).status();
+  const absl::Status admitted = daemon_.reception.access.Admit(*context, Role::kAny).status();
   if (admitted.ok()) Describe(*response);
   reactor->Finish(ToGrpcStatus(admitted));
   return reactor;
@@ -60,11 +60,11 @@ grpc::ServerUnaryReactor* AudioService::GetMixer(grpc::CallbackServerContext* co
 grpc::ServerUnaryReactor* AudioService::UpdateMixer(grpc::CallbackServerContext* context,
                                                     const v1::UpdateMixerRequest* request,
                                                     v1::UpdateMixerResponse* response) {
-  return Answer(context, reception_, Role::kAdminister, [this, request, response] {
+  return Answer(context, daemon_.reception, Role::kAdminister, [this, request, response] {
     if (request->has_gain()) RETURN_IF_ERROR(ValidateGain(request->gain()));
-    const OutputVolume volume =
-        output_.ChangeVolume(request->has_gain() ? std::optional(request->gain()) : std::nullopt,
-                             request->has_muted() ? std::optional(request->muted()) : std::nullopt);
+    const OutputVolume volume = daemon_.output.ChangeVolume(
+        request->has_gain() ? std::optional(request->gain()) : std::nullopt,
+        request->has_muted() ? std::optional(request->muted()) : std::nullopt);
     response->set_gain(volume.gain);
     response->set_muted(volume.muted);
     return absl::OkStatus();
@@ -72,23 +72,24 @@ grpc::ServerUnaryReactor* AudioService::UpdateMixer(grpc::CallbackServerContext*
 }
 
 void AudioService::Describe(v1::GetMixerResponse& mixer) const {
-  const OutputState state = output_.state();
-  mixer.set_version(version_);
+  const LiveOutput& output = daemon_.output;
+  const OutputState state = output.state();
+  mixer.set_version(daemon_.version);
   mixer.set_device(state.device);
-  mixer.mutable_format()->set_sample_rate_hz(output_.format().sample_rate_hz);
-  mixer.mutable_format()->set_channel_count(output_.format().channel_count);
-  mixer.set_block_frame_count(output_.format().block_frame_count);
+  mixer.mutable_format()->set_sample_rate_hz(output.format().sample_rate_hz);
+  mixer.mutable_format()->set_channel_count(output.format().channel_count);
+  mixer.set_block_frame_count(output.format().block_frame_count);
   mixer.set_output_latency_s(state.latency_s);
   mixer.set_frame_count(state.mixer.frame_count);
-  mixer.set_object_count(static_cast<uint32_t>(scenes_.object_count()));
+  mixer.set_object_count(static_cast<uint32_t>(daemon_.scenes.object_count()));
   mixer.set_active_mode_count(static_cast<uint32_t>(state.mixer.active_mode_count));
   mixer.set_load(state.load);
   mixer.set_xrun_count(state.xrun_count);
   mixer.set_lost_frame_count(state.lost_frame_count);
   mixer.set_limited_frame_count(state.mixer.limited_frame_count);
   mixer.set_peak(state.peak);
-  mixer.set_full_scale_pa(output_.full_scale_pa());
-  mixer.set_peak_pa(state.peak * output_.full_scale_pa());
+  mixer.set_full_scale_pa(output.full_scale_pa());
+  mixer.set_peak_pa(state.peak * output.full_scale_pa());
   if (state.momentary_lufs) mixer.set_momentary_lufs(*state.momentary_lufs);
   if (state.short_term_lufs) mixer.set_short_term_lufs(*state.short_term_lufs);
   mixer.set_device_message(state.device_message);
@@ -96,8 +97,8 @@ void AudioService::Describe(v1::GetMixerResponse& mixer) const {
   mixer.set_merged_impulse_count(state.mixer.merged_count);
   mixer.set_shed_impulse_count(state.mixer.shed_count);
   mixer.set_shed_object_count(state.mixer.shed_bank_count);
-  mixer.set_gain(output_.volume().gain);
-  mixer.set_muted(output_.volume().muted);
+  mixer.set_gain(output.volume().gain);
+  mixer.set_muted(output.volume().muted);
 }
 
 }  // namespace carillon

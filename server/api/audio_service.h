@@ -4,6 +4,7 @@
 #include <atomic>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "carillon/v1/audio_service.grpc.pb.h"
 #include "server/api/idle_calls.h"
@@ -19,23 +20,24 @@
 
 namespace carillon {
 
+/// The parts of the daemon that the calls about sound use.
+struct AudioContext {
+  std::string version;
+  LiveOutput& output;
+  const SceneRegistry& scenes;
+  const SceneOwners& owners;
+  ModeDatabase& database;
+  HeadStore& heads;
+  const Clock& clock;
+  IdleCalls& idle_calls;
+  Reception reception;  ///< its pool runs the offline renderings
+};
+
 /// carillon.v1.AudioService. The objects that the constructor gets by reference must outlive the
 /// service.
 class AudioService final : public RawService<v1::AudioService> {
  public:
-  /// Offline rendering runs on the threads of `reception`'s pool.
-  AudioService(std::string version, LiveOutput& output, const SceneRegistry& scenes,
-               const SceneOwners& owners, ModeDatabase& database, HeadStore& heads,
-               const Clock& clock, IdleCalls& idle_calls, const Reception& reception)
-      : version_(std::move(version)),
-        output_(output),
-        scenes_(scenes),
-        owners_(owners),
-        database_(database),
-        heads_(heads),
-        clock_(clock),
-        idle_calls_(idle_calls),
-        reception_(reception) {
+  explicit AudioService(AudioContext daemon) : daemon_(std::move(daemon)) {
     ReadRaw("Render", &AudioService::RenderRaw);
   }
 
@@ -58,15 +60,7 @@ class AudioService final : public RawService<v1::AudioService> {
                                                 const std::string& scene_name) const;
   void Describe(v1::GetMixerResponse& mixer) const;
 
-  const std::string version_;
-  LiveOutput& output_;
-  const SceneRegistry& scenes_;
-  const SceneOwners& owners_;
-  ModeDatabase& database_;
-  HeadStore& heads_;
-  const Clock& clock_;
-  IdleCalls& idle_calls_;
-  const Reception reception_;
+  const AudioContext daemon_;
   BodyCache render_bodies_;
   std::atomic<int> rendering_count_{0};
 };

@@ -208,6 +208,8 @@ v1::ContactFindings ToProto(const IntakeFindings& findings) {
   proto.set_zero_impulse_count(findings.zero_impulse_count);
   proto.set_too_large_impulse_count(findings.too_large_impulse_count);
   proto.set_regular_gap_s(findings.regular_gap_s);
+  proto.set_fast_impulse_count(findings.fast_impulse_count);
+  proto.set_largest_speed_change_m_per_s(findings.largest_speed_change_m_per_s);
   return proto;
 }
 

@@ -66,6 +66,8 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
     }
   }
 
+  bool gone() const override { return context_.IsCancelled(); }
+
   void RunReading(size_t byte_count, std::function<void()> step) override {
     if (byte_count <= kFewBytes) {
       turn_ = Turn::kFree;
@@ -75,16 +77,30 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
       turn_ = Turn::kPaid;
       return Pay(step);
     }
-    RunInPool(std::move(step));
+    if (!budget_->Hold(byte_count)) {
+      return Refuse(
+          Refusal(absl::StatusCode::kResourceExhausted, "CLIENT_LIMIT_REACHED",
+                  "large messages of this client, of more than 64 MiB together, wait to be "
+                  "taken: send steps with fewer contacts, or more slowly"));
+    }
+    RunInPool([budget = budget_, byte_count, step = std::move(step)] {
+      budget->Release(byte_count);
+      step();
+    });
   }
 
   void RunTaking(const v1::StreamContactsRequest& request, std::function<void()> step) override {
-    const size_t row_count = CountRows(request.step());
+    const size_t row_count = CountRows(request.step()) + CountListenerMoves(request.step());
     if (turn_ == Turn::kInPool || row_count <= kFewRows) return step();
     if (row_count > kMostRowsAtOnce) return RunInPool(std::move(step));
     if (turn_ == Turn::kPaid) return step();
     if (!budget_->Allows(daemon_.clock.Monotonic())) return RunInPool(std::move(step));
     Pay(step);
+  }
+
+  /// Returns the number of objects that hear a move of the listener in this step.
+  size_t CountListenerMoves(const v1::ContactStep& step) const {
+    return stream_ && step.has_listener() ? stream_->object_count() : 0;
   }
 
   /// Runs the step on this thread, which is one of gRPC's, and spends the client's budget.
@@ -192,6 +208,7 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
     answer.set_late_count(counts.late_count);
     answer.set_dropped_count(counts.dropped_count);
     answer.set_remap_count(counts.remap_count);
+    answer.set_ahead_s(stream_->ahead_s());
     answer.set_rejected_count(counts.rejected_count);
     if (!stream_->last_rejection().ok()) {
       *answer.mutable_last_rejection() = ToLegibleErrorInfo(stream_->last_rejection());

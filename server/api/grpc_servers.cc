@@ -28,7 +28,7 @@ constexpr int kKeepaliveAnswer_ms = 10'000;
 /// after all its data is sent, and keeps 1 kB for each ping that comes meanwhile.
 constexpr int kNoPingStrikes = 0;
 /// The daemon takes no compressed messages, because gRPC 1.51 unpacks a message before it compares
-/// the size with a limit: 4 MiB that are packed well need 4 GiB.
+/// the size with a limit: 2 MiB that are packed well need 2 GiB.
 constexpr int kIdentityOnly = 1 << GRPC_COMPRESS_NONE;
 /// Bytes of a connection that are parsed before other connections have their turn. With gRPC's
 /// default of 4 MiB, a few connections that begin and cancel calls keep all threads busy for

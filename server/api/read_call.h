@@ -45,8 +45,9 @@ class ReadCall final : public ClientStream<Request>, public IdleCall {
   }
 
  private:
+  bool gone() const override { return context_.IsCancelled(); }
+
   absl::Status Take(const Request& request) override {
-    if (context_.IsCancelled()) return absl::CancelledError("the client has gone");
     absl::Status status = sink_.Append(request);
     if (status.ok() && wait_) wait_->Begin();
     return status;

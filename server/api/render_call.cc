@@ -71,6 +71,8 @@ class RenderCall final : public BidiStream<v1::RenderRequest, v1::RenderResponse
 
   bool GoesOn() override { return wait_.Resume(); }
 
+  bool gone() const override { return context_.IsCancelled(); }
+
   void AllRead() override {
     writes_ = true;
     absl::StatusOr<std::unique_ptr<OfflineRenderer>> renderer = reader_.Finish();

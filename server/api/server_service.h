@@ -17,7 +17,7 @@
 namespace carillon {
 
 /// The largest message that gRPC accepts.
-inline constexpr size_t kMaxMessageBytes = size_t{4} << 20U;
+inline constexpr size_t kMaxMessageBytes = size_t{2} << 20U;
 
 /// The settings of the API that GetServerInfo returns.
 struct ServerFacts {

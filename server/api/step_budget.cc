@@ -17,6 +17,18 @@ void StepBudget::Spend(std::chrono::nanoseconds time) {
   left_ -= time;
 }
 
+bool StepBudget::Hold(size_t byte_count) {
+  const MutexLock lock(&mutex_);
+  if (waiting_bytes_ + byte_count > kMostWaitingBytes) return false;
+  waiting_bytes_ += byte_count;
+  return true;
+}
+
+void StepBudget::Release(size_t byte_count) {
+  const MutexLock lock(&mutex_);
+  waiting_bytes_ -= byte_count;
+}
+
 std::shared_ptr<StepBudget> StepBudgets::Of(const std::string& client) {
   const MutexLock lock(&mutex_);
   std::erase_if(budgets_, [](const auto& entry) { return entry.second.expired(); });

@@ -73,6 +73,10 @@ class StreamReader : public Reactor {
   /// Called when the client has sent all its requests or has cancelled the call.
   virtual void AllRead() = 0;
 
+  /// Returns whether the client has cancelled the call or died. A request that waited for a thread
+  /// is then not taken.
+  virtual bool gone() const { return false; }
+
   virtual void Refuse(const absl::Status& status) { this->End(status); }
 
   /// Runs the step that parses a request of this size and passes it to RunTaking. A call may choose
@@ -97,6 +101,7 @@ class StreamReader : public Reactor {
 
   void ReadRequest() {
     Continue([this] {
+      if (gone()) return absl::CancelledError("the client has gone");
       is_large_ = bytes_.Length() > kMostKeptBytes;
       const grpc::Status parsed =
           grpc::SerializationTraits<Request>::Deserialize(&bytes_, &request_);

@@ -80,7 +80,13 @@ void BlowGatherer::Add(const Felt& felt, double per_second, const Roughness& rou
   objects_[felt.handle].forces.push_back({force, roughness});
 }
 
+bool BlowGatherer::HasRoom(const ObjectTouch& touch) const {
+  return touch_count_ < kMostTouches &&
+         (pairs_.size() < kMostTouches || pairs_.contains({touch.contact.handle, touch.partner}));
+}
+
 void BlowGatherer::Touch(const ObjectTouch& touch, const FeltContact& impulse) {
+  ++touch_count_;
   pairs_[{touch.contact.handle, touch.partner}].touches.push_back(
       {impulse, touch.roughness, touch.time_offset_s, touch.partner});
 }
@@ -92,6 +98,7 @@ BlowGatherer::Events BlowGatherer::End() {
 }
 
 void BlowGatherer::End(Events& events) {
+  touch_count_ = 0;
   for (auto& [bodies, pair] : pairs_) Divide(bodies, pair, events);
   std::erase_if(pairs_,
                 [](const auto& pair) { return pair.second.load.idle() && !pair.second.blow; });

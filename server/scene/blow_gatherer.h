@@ -73,6 +73,13 @@ class BlowGatherer {
   /// Adds a force to this step. The impulses in `force` are newtons, not newton seconds.
   void Add(const FeltContact& force, const Roughness& roughness);
 
+  /// The greatest number of contacts of a step, and of pairs of bodies whose contacts are followed.
+  /// A pair and its contact take about 900 bytes.
+  static constexpr size_t kMostTouches = 16'384;
+
+  /// Returns whether Touch may be called with this contact.
+  bool HasRoom(const ObjectTouch& touch) const;
+
   /// Adds a contact that may be a blow or a load to this step. `impulse` has the impulses that the
   /// objects of `touch` feel.
   void Touch(const ObjectTouch& touch, const FeltContact& impulse);
@@ -144,7 +151,8 @@ class BlowGatherer {
   std::optional<double> time_s_;
   std::map<uint32_t, Object> objects_;
   std::map<Bodies, Pair> pairs_;
-  bool follows_ = false;  // whether no step is missing before this step
+  size_t touch_count_ = 0;  // of this step
+  bool follows_ = false;    // whether no step is missing before this step
   BlowCounts counts_;
 };
 

@@ -18,6 +18,9 @@
 namespace carillon {
 namespace {
 
+/// Change of an object's speed, m/s, beyond which an impulse is probably a mistake.
+constexpr double kFastSpeed = 100;
+
 absl::Status Invalid(absl::string_view reason, absl::string_view message) {
   return Refusal(absl::StatusCode::kInvalidArgument, reason, message);
 }
@@ -31,6 +34,7 @@ ContactIntake::ContactIntake(Scene& scene, EventTarget& target, const IntakeSett
       mapper_(settings.sample_rate_hz,
               settings.mapping.value_or(TimeMapping{.delay_s = settings.delay_s})),
       time_s_(mapper_.mapping().first_time_s),
+      intervals_(settings.step_s),
       gatherer_(settings.step_s),
       pose_times_(settings.step_s) {}
 
@@ -106,6 +110,12 @@ void ContactIntake::Touch(std::span<const ObjectTouch> touches) {
 absl::Status ContactIntake::TryTouch(const ObjectTouch& touch) {
   RETURN_IF_ERROR(Validate(touch.roughness));
   RETURN_IF_ERROR(FrameOfImpulse(touch.time_offset_s).status());
+  if (!gatherer_.HasRoom(touch)) {
+    return Refusal(absl::StatusCode::kResourceExhausted, "TOO_MANY_CONTACTS",
+                   absl::StrCat("a step has more than ", BlowGatherer::kMostTouches,
+                                " engine contacts, or more pairs of bodies have touched: report "
+                                "fewer points, and give a body the same partner in each step"));
+  }
   FeltContact felt;
   ObjectContact contact = touch.contact;
   contact.found_by_engine = true;
@@ -195,9 +205,13 @@ absl::Status ContactIntake::Examine(const FeltContact& felt, double seconds) {
   for (const Felt& one : felt.all()) {
     findings_.largest_distance_m = std::max(findings_.largest_distance_m, one.distance_m);
     if (one.distance_m > kDistantShare * one.extent_m) ++findings_.distant_point_count;
-    if (bound <= one.largest_newton_seconds) continue;
+    const double noted_speed = std::min(kFastSpeed, findings_.largest_speed_change_m_per_s);
+    if (bound <= noted_speed * one.mass_kg) continue;
     const double impulse = std::hypot(double{x}, double{y}, double{z}) * seconds;
-    if (impulse <= one.largest_newton_seconds) continue;
+    if (impulse <= one.largest_newton_seconds) {
+      NoteSpeedChange(impulse / one.mass_kg);
+      continue;
+    }
     ++findings_.too_large_impulse_count;
     return Invalid("IMPULSE_TOO_LARGE",
                    absl::StrCat("an impulse of ", impulse, " N s on object ", one.handle,
@@ -208,6 +222,17 @@ absl::Status ContactIntake::Examine(const FeltContact& felt, double seconds) {
   return absl::OkStatus();
 }
 
+void ContactIntake::NoteSpeedChange(double speed_m_per_s) {
+  findings_.largest_speed_change_m_per_s =
+      std::max(findings_.largest_speed_change_m_per_s, speed_m_per_s);
+  if (speed_m_per_s > kFastSpeed) ++findings_.fast_impulse_count;
+}
+
+double ContactIntake::ahead_s() const {
+  if (step_count_ == 0) return 0;
+  return (FrameOf(time_s_) - static_cast<double>(target_.frame())) / settings_.sample_rate_hz;
+}
+
 void ContactIntake::NoteZero(const ObjectContact& contact) {
   const auto& [x, y, z] = contact.impulse.impulse_newton_seconds;
   if (x == 0 && y == 0 && z == 0) ++findings_.zero_impulse_count;
@@ -216,7 +241,7 @@ void ContactIntake::NoteZero(const ObjectContact& contact) {
 IntakeFindings ContactIntake::findings() const {
   IntakeFindings findings = findings_;
   findings.engine = gatherer_.counts();
-  findings.regular_gap_s = intervals_.RegularGapS(settings_.step_s);
+  findings.regular_gap_s = intervals_.RegularGapS();
   return findings;
 }
 

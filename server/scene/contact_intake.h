@@ -69,6 +69,8 @@ struct IntakeFindings {
   uint64_t zero_impulse_count = 0;       ///< contacts without an impulse
   uint64_t too_large_impulse_count = 0;  ///< contacts rejected for their impulse
   double regular_gap_s = 0;              ///< see StepIntervals::RegularGapS
+  uint64_t fast_impulse_count = 0;       ///< impulses that change a speed by over 100 m/s
+  double largest_speed_change_m_per_s = 0;
 };
 
 /// Takes the reports of a client about one simulation, checks them, locates them on the objects of
@@ -122,6 +124,9 @@ class ContactIntake {
   /// Number of times that simulation time was mapped anew.
   uint64_t remap_count() const { return mapper_.remap_count(); }
   uint64_t step_count() const { return step_count_; }
+  /// Returns the time from the target's frame to the newest step's, seconds, or zero before the
+  /// first step.
+  double ahead_s() const;
   /// Number of impulses handed on.
   uint64_t impulse_count() const { return impulse_count_; }
   uint64_t rejected_count() const { return rejected_count_; }
@@ -145,6 +150,7 @@ class ContactIntake {
   /// impulse, and the step for a force.
   absl::Status Locate(const ObjectContact& contact, double seconds, FeltContact& felt)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(scene_.mutex());
+  void NoteSpeedChange(double speed_m_per_s);
   /// Counts unusual properties of a contact. Errors: InvalidArgument (IMPULSE_TOO_LARGE).
   absl::Status Examine(const FeltContact& felt, double seconds);
   void NoteZero(const ObjectContact& contact);

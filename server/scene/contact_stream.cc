@@ -10,6 +10,7 @@
 namespace carillon {
 namespace {
 
+constexpr double kShortestStepS = 1e-6;
 constexpr double kNetworkJitterS = 0.005;
 constexpr double kLongestDelayS = 10;
 /// Greatest number of events that wait for the mixer, which takes them at each block.
@@ -20,9 +21,9 @@ absl::Status InvalidStream(absl::string_view message) {
 }
 
 absl::StatusOr<double> SchedulingDelay(const ContactStreamSettings& settings, const Mixer& mixer) {
-  if (!(settings.step_s > 0 && settings.step_s <= 1)) {
+  if (!(settings.step_s >= kShortestStepS && settings.step_s <= 1)) {
     return InvalidStream(absl::StrCat("step_s is ", settings.step_s,
-                                      "; say the simulator's step, above 0 and at most 1 s"));
+                                      "; say the simulator's step, from 1e-6 to 1 s"));
   }
   const double block_s =
       static_cast<double>(mixer.settings().block_frame_count) / mixer.settings().sample_rate_hz;

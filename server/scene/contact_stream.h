@@ -15,7 +15,7 @@ namespace carillon {
 
 /// Settings by which a contact stream maps simulation time to audio time.
 struct ContactStreamSettings {
-  double step_s = 0;  ///< the simulator's step, above 0 and at most 1
+  double step_s = 0;  ///< the simulator's step, from 1e-6 to 1
   /// 0 to 10. If it is absent, the delay is one step, one block and 5 ms for the network.
   std::optional<double> scheduling_delay_s = std::nullopt;
   /// Whether each contact sounds at its arrival, delayed only by its own time offset.
@@ -56,6 +56,12 @@ class ContactStream {
   std::optional<uint64_t> first_frame() const {
     return intake_.step_count() > 0 ? std::optional(intake_.mapping().first_frame) : std::nullopt;
   }
+
+  /// Returns the number of the scene's objects.
+  size_t object_count() const { return scene_->object_count(); }
+
+  /// Returns the time from the mixer's frame to the newest step's, seconds.
+  double ahead_s() const { return intake_.ahead_s(); }
 
   /// Returns the counts. No count includes impulses that the mixer has not taken yet.
   ContactCounts counts() const;

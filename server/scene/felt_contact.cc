@@ -82,8 +82,9 @@ void FillIn(const SoundingObject& object, const LocatedPoint& located, const Vec
   const SoundingMaterial& material = object.properties.material;
   felt.distance_m = located.distance_m * material.size;
   felt.extent_m = object.body->extent_m * material.size;
+  felt.mass_kg = MassKg(object);
   felt.largest_newton_seconds =
-      10 * MassKg(object) * std::sqrt(material.young_pa / material.density_kg_per_m3);
+      10 * felt.mass_kg * std::sqrt(material.young_pa / material.density_kg_per_m3);
 }
 
 void SetDuration(double duration_s, FeltContact& felt) {

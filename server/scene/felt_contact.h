@@ -21,6 +21,7 @@ struct Felt {
   MixerEvent event{};     ///< a SurfaceImpulse; gets its time when it is sent
   double distance_m = 0;  ///< distance from the point of the contact to the surface
   double extent_m = 0;    ///< extent of the object
+  double mass_kg = 1;     ///< mass of the object
   /// The impulse that gives the whole object ten times the speed of sound in its material. No body
   /// withstands even a tenth of this impulse.
   double largest_newton_seconds = std::numeric_limits<double>::infinity();

@@ -16,7 +16,7 @@ import torture
 from carillon.v1 import audio_service_pb2, contact_pb2, contact_service_pb2, contact_trace_pb2, scene_service_pb2
 
 CONNECTIONS = 12
-MESSAGE_BYTES = torture.rounds(500_000, 4_000_000)
+MESSAGE_BYTES = torture.rounds(500_000, 2_000_000)
 RUN_S = torture.rounds(3.0, 30.0)
 # The bound on a machine that does nothing else. Otherwise a test must only end.
 P99_S = 0.05 if torture.LONG else 10.0

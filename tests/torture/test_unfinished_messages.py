@@ -17,7 +17,7 @@ import h2.events
 import torture
 
 CALLS = 200
-MESSAGE_BYTES = 4 << 20
+MESSAGE_BYTES = 2 << 20
 PIECE_BYTES = 1 << 14
 RUN_S = torture.rounds(4.0, 30.0)
 # What gRPC may keep for one address, and the daemon's other needs.

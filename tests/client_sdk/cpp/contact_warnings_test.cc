@@ -32,14 +32,27 @@ TEST(ContactWarningsTest, EachCountThatMeansAMistakeGivesASentence) {
   report.mutable_last_rejection()->set_reason("POINT_NOT_FINITE");
   report.mutable_last_rejection()->set_message("send metres");
   report.mutable_findings()->set_regular_gap_s(1.0 / 120);
+  report.mutable_findings()->set_fast_impulse_count(2);
+  report.mutable_findings()->set_largest_speed_change_m_per_s(480);
   report.mutable_findings()->set_distant_point_count(1);
   report.mutable_findings()->set_largest_distance_m(0.5);
   EXPECT_THAT(ContactWarnings(report),
               ElementsAre(AllOf(StartsWith("1 contact was late"), HasSubstr("it was 0.02 s")),
                           HasSubstr("mapped anew 2 times"), StartsWith("3 contacts were lost"),
                           "1 contact was rejected, the last one with POINT_NOT_FINITE: send metres",
-                          StartsWith("all steps came 0.00833 s apart"),
+                          StartsWith("most steps came 0.00833 s apart"),
+                          StartsWith("2 contacts changed the speed of an object by up to 480 m/s"),
                           StartsWith("1 contact lies up to 0.5 m away")));
+}
+
+TEST(ContactWarningsTest, ASimulationThatRanAheadOfItsSoundIsTold) {
+  v1::StreamContactsResponse report;
+  report.set_scheduling_delay_s(0.1);
+  report.set_ahead_s(0.3);
+  EXPECT_TRUE(ContactWarnings(report).empty());
+  report.set_ahead_s(4);
+  EXPECT_THAT(ContactWarnings(report),
+              ElementsAre(StartsWith("the newest step sounds only in 4 s")));
 }
 
 TEST(ContactWarningsTest, ImpulsesThatAreAllZeroAreToldHoweverTheyWereSent) {

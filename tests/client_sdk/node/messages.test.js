@@ -55,9 +55,16 @@ test('a rejection and a distant point name the frame of the stream', async () =>
   assert.match(text, /1 contact lies up to 0\.5 m away .* sounds at .* in metres, in a frame$/);
 });
 
+test('forces in place of impulses and a simulation ahead of its sound are told', async () => {
+  assert.match((await told({ findings: { fast_impulse_count: 1, largest_speed_change_m_per_s: 480 } })).join(),
+    /1 contact changed the speed of an object by up to 480 m\/s; give impulses in newton seconds/);
+  assert.deepEqual(await told({ scheduling_delay_s: 0.1, ahead_s: 0.3 }), []);
+  assert.match((await told({ scheduling_delay_s: 0.1, ahead_s: 4 })).join(), /the newest step sounds only in 4 s/);
+});
+
 test('a step stated too short and impulses that are all zero are told', async () => {
   assert.match((await told({ findings: { regular_gap_s: 1 / 120, blow_count: 9 } })).join(),
-    /all steps came 0\.00833 s apart/);
+    /most steps came 0\.00833 s apart/);
   for (const counts of [{ load_count: 12 }, {}]) {
     assert.match((await told({ accepted_count: 24, findings: { zero_impulse_count: 12, ...counts } })).join(),
       /^ContactWarning: the impulse of 12 contacts was zero/);

@@ -83,11 +83,18 @@ class WarningsTest(unittest.TestCase):
     def test_one_distant_point_is_one_contact(self):
         findings = contact_pb2.ContactFindings(distant_point_count=1, largest_distance_m=0.5)
         text, = warnings_of(carillon.errors.warn_of_contacts, findings, "the scene's frame")
-        self.assertRegex(text, "^1 contact lies up to 0.5 m away .* in metres, in the scene's frame$")
+        self.assertRegex(text, "^1 contact lies up to 0.5 m .* in the scene's frame, and the pose of each object$")
+
+    def test_forces_in_place_of_impulses_and_a_simulation_ahead_of_its_sound_are_told(self):
+        text, = self.told(findings={"fast_impulse_count": 1, "largest_speed_change_m_per_s": 480, "blow_count": 1})
+        self.assertRegex(text, "^1 contact changed the speed of an object by up to 480 m/s; give impulses in newton")
+        self.assertEqual(self.told(scheduling_delay_s=0.1, ahead_s=0.3), [])
+        text, = self.told(scheduling_delay_s=0.1, ahead_s=4)
+        self.assertRegex(text, "^the newest step sounds only in 4 s, .* render a carillon.Trace$")
 
     def test_a_step_stated_too_short_and_impulses_that_are_all_zero_are_told(self):
         text, = self.told(findings={"regular_gap_s": 1 / 120, "blow_count": 9})
-        self.assertIn("all steps came 0.00833 s apart", text)
+        self.assertIn("most steps came 0.00833 s apart", text)
         for counts in ({"load_count": 12}, {}):
             text, = self.told(accepted_count=24, findings={"zero_impulse_count": 12, **counts})
             self.assertIn("the impulse of 12 contacts was zero", text)

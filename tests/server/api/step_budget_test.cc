@@ -26,6 +26,15 @@ TEST(StepBudget, DoesNotGrowBeyondItsMost) {
   EXPECT_FALSE(budget.Allows(seconds(1000)));
 }
 
+TEST(StepBudget, HoldsNoMoreThanItsMostBytes) {
+  StepBudget budget;
+  EXPECT_TRUE(budget.Hold(StepBudget::kMostWaitingBytes - 1));
+  EXPECT_FALSE(budget.Hold(2));
+  EXPECT_TRUE(budget.Hold(1));
+  budget.Release(2);
+  EXPECT_TRUE(budget.Hold(2));
+}
+
 TEST(StepBudgets, AllStreamsOfAClientShareOne) {
   StepBudgets budgets;
   const auto first = budgets.Of("a");

@@ -154,6 +154,7 @@ class NumberCall final : public StreamReader<StreamCall<RecordingReactor>, Numbe
   std::vector<int> taken;
   bool all_read = false;
   bool throws = false;
+  bool is_gone = false;
 
   /// Receives the number of requests that were read.
   void ReceiveNext() {
@@ -163,6 +164,7 @@ class NumberCall final : public StreamReader<StreamCall<RecordingReactor>, Numbe
   }
 
  private:
+  bool gone() const override { return is_gone; }
   absl::Status Take(const Number& request) override {
     if (request.value() > 2) return absl::OutOfRangeError("too large");
     if (request.value() == 2 && throws) throw std::bad_alloc();
@@ -198,6 +200,15 @@ TEST(StreamReader, RefusesAMessageThatCannotBeParsedInsteadOfTakingItForTheEnd) 
     EXPECT_EQ(call.read_count, 1 + read_before);
     EXPECT_FALSE(call.all_read);
   }
+}
+
+TEST(StreamReader, TakesNothingMoreFromAClientThatHasGone) {
+  NumberCall call;
+  call.ReceiveNext();
+  call.is_gone = true;
+  call.ReceiveNext();
+  EXPECT_THAT(call.taken, ElementsAre(1));
+  EXPECT_THAT(call.ends, ElementsAre(grpc::CANCELLED));
 }
 
 TEST(StreamReader, EndsWithAnErrorWhereMemoryIsMissing) {

@@ -132,16 +132,42 @@ TEST_F(BlowGathererTest, WhatRestsIsALoadThoughEverySecondStepIsMissing) {
   EXPECT_EQ(gatherer_.counts().blow_count, before);
 }
 
+TEST_F(BlowGathererTest, HasRoomForSoManyContactsOfAStepAndSoManyPairs) {
+  const auto touch = [](uint32_t partner) {
+    return ObjectTouch{.contact = {.handle = 3}, .partner = partner};
+  };
+  Step(0, [] {});
+  for (uint32_t step = 1; step < 3; ++step) {
+    gatherer_.Begin(0);
+    for (uint32_t i = 0; i < BlowGatherer::kMostTouches; ++i) {
+      ASSERT_TRUE(gatherer_.HasRoom(touch(i)));
+      gatherer_.Touch(touch(i), FeltBy(3, kTen));
+    }
+    EXPECT_FALSE(gatherer_.HasRoom(touch(0)));
+    gatherer_.End();
+    EXPECT_TRUE(gatherer_.HasRoom(touch(0)));
+    EXPECT_FALSE(gatherer_.HasRoom(touch(BlowGatherer::kMostTouches)));
+  }
+}
+
 TEST(StepIntervalsTest, TellsARegularGapAndNoOther) {
-  StepIntervals alike;
-  StepIntervals bounces;
-  for (int i = 0; i < 9; ++i) alike.Add(1.0 / 120);
-  EXPECT_EQ(alike.RegularGapS(1e-3), 0);
-  alike.Add(1.0 / 100);
-  EXPECT_EQ(alike.RegularGapS(1e-3), 1.0 / 120);
-  EXPECT_EQ(alike.RegularGapS(1.0 / 120), 0);
+  constexpr double kRealS = 1.0 / 120;
+  StepIntervals alike(1e-3), bounces(1e-3), right(kRealS);
+  for (int i = 0; i < 9; ++i) alike.Add(kRealS);
+  EXPECT_EQ(alike.RegularGapS(), 0);
+  for (int i = 0; i < 10; ++i) alike.Add(1.1 * kRealS);
+  EXPECT_NEAR(alike.RegularGapS(), 1.05 * kRealS, 0.01 * kRealS);
+  for (int i = 0; i < 4; ++i) alike.Add(2 * kRealS);  // steps that the simulator missed
+  EXPECT_NEAR(alike.RegularGapS(), 1.05 * kRealS, 0.01 * kRealS);
+  for (int i = 0; i < 4; ++i) alike.Add(3 * kRealS);
+  EXPECT_EQ(alike.RegularGapS(), 0);
+  for (int i = 0; i < 40; ++i) right.Add(i % 4 == 0 ? 2 * kRealS : kRealS);
+  EXPECT_EQ(right.RegularGapS(), 0);
   for (int i = 0; i < 12; ++i) bounces.Add(0.5 - 0.03 * i);
-  EXPECT_EQ(bounces.RegularGapS(1e-3), 0);
+  EXPECT_EQ(bounces.RegularGapS(), 0);
+  StepIntervals unbounded(1e-300);
+  for (int i = 0; i < 12; ++i) unbounded.Add(1e300);
+  EXPECT_NEAR(unbounded.RegularGapS(), 1e300, 1e290);
 }
 
 TEST_F(BlowGathererTest, ARoughnessIsWeighedByItsForce) {

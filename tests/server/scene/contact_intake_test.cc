@@ -311,6 +311,24 @@ TEST_F(ReadingTest, AStepThatIsStatedTooShortIsFound) {
   EXPECT_NEAR(intake.findings().regular_gap_s, 8 * kStepS, 1e-12);
 }
 
+TEST_F(ReadingTest, ImpulsesThatAreProbablyForcesAreCounted) {
+  ContactIntake intake = Open({});
+  for (const double impulse : {0.45, 44.0, 46.0, 0.45, 60.0, 50.0}) {
+    intake.Strike(SmallImpulse(1, impulse));
+  }
+  EXPECT_EQ(intake.findings().fast_impulse_count, 3U);
+  EXPECT_NEAR(intake.findings().largest_speed_change_m_per_s, 60 / 0.45, 3);
+}
+
+TEST_F(ReadingTest, HowFarASimulationRunsAheadOfTheSoundIsKnown) {
+  ContactIntake intake = Open({});
+  EXPECT_EQ(intake.ahead_s(), 0);
+  ASSERT_TRUE(intake.BeginStep(1).ok());
+  const double delay_s = intake.ahead_s();
+  ASSERT_TRUE(intake.BeginStep(4).ok());
+  EXPECT_NEAR(intake.ahead_s(), delay_s + 3, 1e-9);
+}
+
 TEST_F(ReadingTest, WhatIsStrangeAboutContactsIsCountedAndWhatNoBodyBearsIsRefused) {
   ContactIntake intake = Open({});
   ObjectImpulse distant = SmallImpulse(1);
@@ -334,6 +352,8 @@ TEST_F(ReadingTest, WhatIsStrangeAboutContactsIsCountedAndWhatNoBodyBearsIsRefus
   EXPECT_NEAR(findings.largest_distance_m, 0.3, 1e-6);
   EXPECT_EQ(findings.zero_impulse_count, 1U);
   EXPECT_EQ(findings.too_large_impulse_count, 3U);
+  EXPECT_EQ(findings.fast_impulse_count, 1U);
+  EXPECT_NEAR(findings.largest_speed_change_m_per_s, 2.2e4 / 0.45, 2e3);
   EXPECT_EQ(findings.engine.blow_count, 1U);
   EXPECT_EQ(intake.rejected_count(), 4U);
   bool offset = false;
