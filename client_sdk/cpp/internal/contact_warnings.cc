@@ -10,6 +10,9 @@
 namespace carillon::client {
 namespace {
 
+/// Time by which a simulation in real time may run ahead.
+constexpr double kUsualLeadS = 0.25;
+
 std::string Were(uint64_t count) {
   return absl::StrCat(count, count == 1 ? " contact was" : " contacts were");
 }
@@ -18,9 +21,15 @@ void AddFindings(const v1::ContactFindings& findings, uint64_t accepted_count,
                  std::vector<std::string>& warnings) {
   if (findings.regular_gap_s() > 0) {
     warnings.push_back(absl::StrFormat(
-        "all steps came %.3g s apart, which is longer than the step_s that was stated, so that a "
+        "most steps came %.3g s apart, which is longer than the step_s that was stated, so that a "
         "body at rest strikes in each of them; state the step of the simulator, in seconds",
         findings.regular_gap_s()));
+  }
+  if (const uint64_t count = findings.fast_impulse_count(); count > 0) {
+    warnings.push_back(absl::StrFormat(
+        "%d contact%s changed the speed of an object by up to %.3g m/s; give impulses in newton "
+        "seconds, which are forces times the step, and no forces",
+        count, count == 1 ? "" : "s", findings.largest_speed_change_m_per_s()));
   }
   // The daemon counts an engine's contact without an impulse as a load, and it counts a strike with
   // an impulse of zero as accepted, once or twice for one or two objects.
@@ -35,7 +44,8 @@ void AddFindings(const v1::ContactFindings& findings, uint64_t accepted_count,
   if (const uint64_t count = findings.distant_point_count(); count > 0) {
     warnings.push_back(absl::StrFormat(
         "%d contact%s up to %.3g m away from the surfaces of the objects, and sound%s at the "
-        "nearest points; give points in metres, in the frame of the stream",
+        "nearest points; give points in metres, in the frame of the "
+        "stream, and if that is the scene's frame, give also the pose of each object",
         count, count == 1 ? " lies" : "s lie", findings.largest_distance_m(),
         count == 1 ? "s" : ""));
   }
@@ -55,8 +65,8 @@ std::vector<std::string> ContactWarnings(const v1::StreamContactsResponse& repor
     warnings.push_back(absl::StrCat(
         "simulation time was mapped anew ", report.remap_count(),
         report.remap_count() == 1 ? " time" : " times",
-        ", because every step of a quarter of a second was late: the simulator paused, is slower "
-        "than real time, or sets no time_s"));
+        ", because every step of a quarter of a second was late: the simulator paused, sets no "
+        "time_s, or is slower than real time, for which Client::Render and a trace suit"));
   }
   if (report.dropped_count() > 0) {
     warnings.push_back(
@@ -66,6 +76,13 @@ std::vector<std::string> ContactWarnings(const v1::StreamContactsResponse& repor
     warnings.push_back(absl::StrCat(Were(report.rejected_count()), " rejected, the last one with ",
                                     report.last_rejection().reason(), ": ",
                                     report.last_rejection().message()));
+  }
+  if (report.ahead_s() > report.scheduling_delay_s() + kUsualLeadS) {
+    warnings.push_back(absl::StrFormat(
+        "the newest step sounds only in %.3g s, because the simulation ran faster than real time: "
+        "send each step when it happens, keep the scene until then, or render a trace by "
+        "Client::Render",
+        report.ahead_s()));
   }
   AddFindings(report.findings(), report.accepted_count() + report.late_count(), warnings);
   return warnings;

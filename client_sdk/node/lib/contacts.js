@@ -2,6 +2,7 @@
 'use strict';
 
 const { counted, refuse, refuseNoMessage, refuseUnknown, tuple, whole } = require('./checks');
+const { SCENE_FRAME } = require('./warnings');
 
 // What the arguments mean, for messages.
 const STREAM_FRAME = "in the stream's frame, which is each object's own unless it was opened with frame: 'scene'";
@@ -243,7 +244,7 @@ function strikeOf(object, { point, impulse, duration, striker } = {}) {
 }
 
 function frameInWords(frame) {
-  return frame === 'FRAME_SCENE' ? "the scene's frame" : "each object's own frame";
+  return frame === 'FRAME_SCENE' ? SCENE_FRAME : "each object's own frame";
 }
 
 module.exports = { frameInWords, given, makeStep, present, strikeOf, toHandle, toPose };

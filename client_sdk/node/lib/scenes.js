@@ -7,7 +7,7 @@ const { frameInWords, given, makeStep, present, strikeOf, toHandle, toPose } = r
 const { CarillonError, fromCall, fromInfo } = require('./errors');
 const { named, toMaterial, toRadiation } = require('./materials');
 const { streamSettings } = require('./traces');
-const { warnOfStream } = require('./warnings');
+const { warnOfContacts, warnOfStream } = require('./warnings');
 
 // Steps that may wait for the network before the oldest is dropped.
 const MOST_WAITING = 4096;
@@ -28,7 +28,7 @@ class SoundingObject {
     return this.message.handle;
   }
 
-  /** Strikes the object now. Throws CarillonError if the strike is refused. */
+  /** Strikes the object now. Throws CarillonError if the strike is refused, and warns of a point far from the object. */
   async strike(strike) {
     refuseUnknown(strike, ['point', 'impulse', 'duration', 'striker'], 'strike');
     const impulses = strikeOf(this, strike);
@@ -36,6 +36,7 @@ class SoundingObject {
     stream.step(0, { impulses });
     await stream.close(false);
     if (stream.rejection) throw stream.rejection;
+    warnOfContacts(stream.findings, "the object's own frame");
   }
 
   /** Changes what is given; a pose is reached after `glide` seconds. */

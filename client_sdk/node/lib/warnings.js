@@ -3,6 +3,10 @@
 
 const { counted } = require('./checks');
 
+const SCENE_FRAME = "the scene's frame";
+/** Time by which a simulation in real time may run ahead. */
+const USUAL_LEAD_S = 0.25;
+
 function were(count, noun) {
   return `${counted(count, noun)} ${Number(count) === 1 ? 'was' : 'were'}`;
 }
@@ -36,8 +40,14 @@ function warnOfUnit(job, before) {
 function warnOfContacts(findings, frame, acceptedCount = 0) {
   const gap = findings?.regular_gap_s ?? 0;
   if (gap) {
-    warn(`all steps came ${Number(gap.toPrecision(3))} s apart, which is longer than the step that was stated, so that a ` +
+    warn(`most steps came ${Number(gap.toPrecision(3))} s apart, which is longer than the step that was stated, so that a ` +
       'body at rest strikes in each of them; state the step of the simulator, in seconds');
+  }
+  const fast = Number(findings?.fast_impulse_count ?? 0);
+  if (fast) {
+    const speed = Number(findings.largest_speed_change_m_per_s.toPrecision(3));
+    warn(`${counted(fast, 'contact')} changed the speed of an object by up to ${speed} m/s; give impulses in newton ` +
+      'seconds, which are forces times the step, and no forces');
   }
   const zeros = Number(findings?.zero_impulse_count ?? 0);
   // The daemon counts an engine's contact without an impulse as a load, and it counts a strike with an impulse of zero
@@ -50,7 +60,8 @@ function warnOfContacts(findings, frame, acceptedCount = 0) {
   if (!count) return;
   const distance = Number(findings.largest_distance_m.toPrecision(3));
   warn(`${counted(count, 'contact')} ${count === 1 ? 'lies' : 'lie'} up to ${distance} m away from the surfaces of the ` +
-    `objects, and sound${count === 1 ? 's' : ''} at the nearest points; give points in metres, in ${frame}`);
+    `objects, and sound${count === 1 ? 's' : ''} at the nearest points; give points in metres, in ${frame}` +
+    (frame === SCENE_FRAME ? ', and the pose of each object' : ''));
 }
 
 /** Warns, once and at the end of a stream, of the contacts that did not sound as the caller meant. */
@@ -64,6 +75,10 @@ function warnOfStream(report, frame, droppedStepCount) {
   if (report.remap_count) {
     told.push(`simulation time was mapped anew ${counted(report.remap_count, 'time')}, because every step of a quarter ` +
       'of a second was late: the simulator paused, or is slower than real time, for which carillon.Trace suits');
+  }
+  if (report.ahead_s > report.scheduling_delay_s + USUAL_LEAD_S) {
+    told.push(`the newest step sounds only in ${Number(report.ahead_s.toPrecision(3))} s, because the simulation ran ` +
+      'faster than real time: send each step when it happens, keep the scene until then, or render a carillon.Trace');
   }
   if (report.dropped_count) {
     told.push(`${were(report.dropped_count, 'contact')} lost, because too many waited for the mixer`);
@@ -80,4 +95,4 @@ function warnOfStream(report, frame, droppedStepCount) {
   warnOfContacts(report.findings, frame, Number(report.accepted_count ?? 0) + Number(report.late_count ?? 0));
 }
 
-module.exports = { warnOfContacts, warnOfStream, warnOfTransfers, warnOfUnit };
+module.exports = { SCENE_FRAME, warnOfContacts, warnOfStream, warnOfTransfers, warnOfUnit };

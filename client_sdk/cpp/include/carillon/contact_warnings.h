@@ -10,8 +10,9 @@ namespace carillon::client {
 
 /// Returns what a user should know about the contacts of a stream that did not sound as the program
 /// meant, and how to repair it, one sentence each: contacts that were late, lost or rejected, that
-/// lie far from their objects or had no impulse, and a step that was stated too short. Returns an
-/// empty list if all is well. `report` is what ContactStream::Finish() or Report() returned.
+/// lie far from their objects, had no impulse or one that no blow has, a step that was stated too
+/// short, and a simulation that ran ahead of its sound. Returns an empty list if all is well.
+/// `report` is what ContactStream::Finish() or Report() returned.
 std::vector<std::string> ContactWarnings(const v1::StreamContactsResponse& report);
 
 }  // namespace carillon::client

@@ -11,7 +11,7 @@ from typing import Any, Literal, Optional, Union
 import numpy
 import numpy.typing
 
-from carillon import checks
+from carillon import checks, errors
 from carillon.columns import append
 from carillon.v1 import contact_pb2
 
@@ -130,7 +130,7 @@ def to_frame(name: Optional[Frame]) -> contact_pb2.Frame:
 
 
 def frame_in_words(frame: contact_pb2.Frame) -> str:
-    return "the scene's frame" if frame == contact_pb2.FRAME_SCENE else "each object's own frame"
+    return errors.SCENE_FRAME if frame == contact_pb2.FRAME_SCENE else "each object's own frame"
 
 
 def to_pulse_shape(name: Optional[PulseShape]) -> contact_pb2.PulseShape:

@@ -14,6 +14,9 @@ import grpc
 from carillon.checks import counted
 from carillon.v1 import contact_pb2, contact_service_pb2, error_pb2
 
+SCENE_FRAME = "the scene's frame"
+# Time by which a simulation in real time may run ahead.
+USUAL_LEAD_S = 0.25
 DETAILS_KEY = "grpc-status-details-bin"
 # The caller's names of fields and calls of the contract that messages of the daemon mention.
 CALLER_NAMES = {"step_s": "step", "scheduling_delay_s": "delay", "glide_s": "glide",
@@ -70,8 +73,12 @@ def warn_of_contacts(findings: contact_pb2.ContactFindings, frame: str, accepted
     """Warns of contacts that are probably a mistake of the caller. `frame` is that of their points, and
     `accepted_count` the number of impulses that sounded."""
     if findings.regular_gap_s:
-        _warn(f"all steps came {findings.regular_gap_s:.3g} s apart, which is longer than the step that was stated, so "
-              "that a body at rest strikes in each of them; state the step of the simulator, in seconds")
+        _warn(f"most steps came {findings.regular_gap_s:.3g} s apart, which is longer than the step that was stated, "
+              "so that a body at rest strikes in each of them; state the step of the simulator, in seconds")
+    if count := findings.fast_impulse_count:
+        _warn(f"{counted(count, 'contact')} changed the speed of an object by up to "
+              f"{findings.largest_speed_change_m_per_s:.3g} m/s; give impulses in newton seconds, which are forces "
+              "times the step, and no forces")
     # The daemon counts an engine's contact without an impulse as a load, and it counts a strike with an impulse of zero
     # as accepted, once or twice for one or two objects.
     if findings.zero_impulse_count >= max(1, findings.load_count, accepted_count / 2) and not findings.blow_count:
@@ -80,7 +87,8 @@ def warn_of_contacts(findings: contact_pb2.ContactFindings, frame: str, accepted
     if count := findings.distant_point_count:
         _warn(f"{counted(count, 'contact')} {'lies' if count == 1 else 'lie'} up to "
               f"{findings.largest_distance_m:.3g} m away from the surfaces of the objects, and sound"
-              f"{'s' if count == 1 else ''} at the nearest points; give points in metres, in {frame}")
+              f"{'s' if count == 1 else ''} at the nearest points; give points in metres, in {frame}"
+              + (", and the pose of each object" if frame == SCENE_FRAME else ""))
 
 
 def warn_of_stream(report: contact_service_pb2.StreamContactsResponse, frame: str, dropped_step_count: int = 0) -> None:
@@ -94,6 +102,9 @@ def warn_of_stream(report: contact_service_pb2.StreamContactsResponse, frame: st
         told.append(f"simulation time was mapped anew {counted(report.remap_count, 'time')}, because every step of a "
                     "quarter of a second was late: the simulator paused, or is slower than real time, for which "
                     "carillon.Trace suits")
+    if report.ahead_s > report.scheduling_delay_s + USUAL_LEAD_S:
+        told.append(f"the newest step sounds only in {report.ahead_s:.3g} s, because the simulation ran faster than "
+                    "real time: send each step when it happens, keep the scene until then, or render a carillon.Trace")
     if report.dropped_count:
         told.append(f"{_were(report.dropped_count, 'contact')} lost, because too many waited for the mixer")
     if dropped_step_count:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import contextlib
+import numbers
 import queue
 import threading
 from collections.abc import Iterable, Iterator, Mapping
@@ -46,13 +47,14 @@ class SoundingObject:
                striker: contacts.Striker = None) -> None:
         """Strikes the object now: the point in metres and the impulse in newton seconds, both in the object's own
         frame; `duration` of the contact in seconds, or the `striker`, such as "wood". Raises CarillonError if the
-        strike is refused."""
+        strike is refused; a ContactWarning tells of a point that lies far from the object, and the like."""
         impulses = contacts.strike_of(self, point, impulse, duration, striker)
         stream = self.scene.stream(step=0.001, delay=0)
         stream.step(0.0, impulses=impulses)
         stream.close(warn=False)
         if stream.rejection:
             raise stream.rejection
+        errors.warn_of_contacts(stream.findings, "the object's own frame")
 
     def update(self, *, material: Optional[materials.Material] = None, size: Optional[float] = None,
                gain: Optional[float] = None, pose: Optional[PoseLike] = None, glide: float = 0,
@@ -173,6 +175,8 @@ class Scene:
         """Opens a stream for the contacts of a simulation whose steps last `step` seconds. They sound `delay` seconds
         later, by default as soon as the network allows without jitter. `frame` "scene" means that points and impulses
         are in the scene's frame: the daemon turns them into the objects' by their poses, which the steps send."""
+        if not (isinstance(step, numbers.Real) and 1e-6 <= step <= 1):
+            checks.refuse(step, "step", "the step of the simulator, from 1e-6 to 1 s")
         return ContactStream(self, contact_service_pb2.ContactStreamStart(
             scene=self.name, step_s=step, scheduling_delay_s=delay, frame=contacts.to_frame(frame),
             pulse_shape=contacts.to_pulse_shape(pulse_shape)))
