@@ -60,8 +60,8 @@ TEST_F(ServerInfoApi, AMessageOfTheLargestSizeIsReadAndOneByteMoreIsNot) {
   v1::CreateModalModelRequest request;
   request.set_label("x");
   const size_t rest = InfoFrom(*info).limits().message_bytes() - request.ByteSizeLong();
-  // The length of a label takes three bytes more when it is longer.
-  for (const auto& [size, read] : {std::pair(rest - 2, true), std::pair(rest - 1, false)}) {
+  // The length of a label takes two bytes more when it is longer.
+  for (const auto& [size, read] : {std::pair(rest - 1, true), std::pair(rest, false)}) {
     request.set_label(std::string(size, 'x'));
     v1::CreateModalModelResponse response;
     const grpc::Status status =
