@@ -18,7 +18,7 @@ namespace {
 class ClientApi : public ServedDaemon {
  protected:
   ClientApi()
-      : ServedDaemon({.scene_grace_s = 0.2, .client_share = 0.25, .rendering_idle_s = 0.5},
+      : ServedDaemon({.scene_grace_s = 0.2, .client_share = 0.25, .rendering_idle_s = 2},
                      {"127.0.0.1:0", "[::1]:0"}) {}
 
   /// A connection of its own to one of the daemon's addresses.

@@ -59,13 +59,15 @@ class ServedDaemon : public testing::Test {
 
   /// Stores a model under its digest, if it has one, and returns its name.
   std::string ImportModel(const ModalModel& model) {
+    // Under a sanitizer this takes longer than a client may be silent.
+    const auto records = SampleRecords(model);
     grpc::ClientContext context;
     v1::ImportModalModelResponse response;
     const auto writer = models->ImportModalModel(&context, &response);
     v1::ImportModalModelRequest request;
     if (!model.digest.empty()) request.set_name("modalModels/" + model.digest);
     request.set_label("small");
-    for (const v1::ModalModelRecord& record : SampleRecords(model)) {
+    for (const v1::ModalModelRecord& record : records) {
       *request.mutable_record() = record;
       writer->Write(request);
     }
