@@ -89,12 +89,13 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
     });
   }
 
-  void RunTaking(const v1::StreamContactsRequest& request, std::function<void()> step) override {
+  void RunTaking(const v1::StreamContactsRequest& request,
+                 const std::function<void()>& step) override {
     const size_t row_count = CountRows(request.step()) + CountListenerMoves(request.step());
     if (turn_ == Turn::kInPool || row_count <= kFewRows) return step();
-    if (row_count > kMostRowsAtOnce) return RunInPool(std::move(step));
+    if (row_count > kMostRowsAtOnce) return RunInPool(step);
     if (turn_ == Turn::kPaid) return step();
-    if (!budget_->Allows(daemon_.clock.Monotonic())) return RunInPool(std::move(step));
+    if (!budget_->Allows(daemon_.clock.Monotonic())) return RunInPool(step);
     Pay(step);
   }
 

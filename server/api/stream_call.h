@@ -85,7 +85,7 @@ class StreamReader : public Reactor {
   virtual void RunReading(size_t, std::function<void()> step) { this->Run(std::move(step)); }
 
   /// Runs the step that takes the request, and is called by the step of RunReading.
-  virtual void RunTaking(const Request&, std::function<void()> step) { step(); }
+  virtual void RunTaking(const Request&, const std::function<void()>& step) { step(); }
 
   /// Returns false if the call was ended while it waited for a request. The call may then be
   /// deleted as soon as GoesOn returns, so no step may be left to the pool. Called on gRPC's
