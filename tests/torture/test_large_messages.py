@@ -7,7 +7,6 @@ A good client goes on meanwhile, and the daemon's memory comes back.
 import contextlib
 import statistics
 import threading
-import time
 import unittest
 
 import grpc
@@ -73,23 +72,12 @@ class LargeMessageTest(torture.ServedTest):
         super().setUp()
         self.serve()
 
-    def calls(self, seconds):
-        """The durations of good calls, fifty a second at most, and the daemon's largest memory meanwhile."""
-        times, most_mib = [], 0.0
-        end_s = time.monotonic() + seconds
-        while time.monotonic() < end_s:
-            begin_s = time.monotonic()
-            self.client.audio.GetMixer(audio_service_pb2.GetMixerRequest(), timeout=30)
-            times.append(time.monotonic() - begin_s)
-            most_mib = max(most_mib, torture.resident_mib(self.daemon.process))
-            time.sleep(0.02)
-        return times, most_mib
-
     def attack(self, method, first, large):
-        quiet, before_mib = self.calls(1.0)
+        good = self.client.audio.GetMixer
+        quiet, before_mib = self.calls(good, 1.0)
         flood = Flood(self.daemon.server, method, first.SerializeToString(), repeated(large))
         try:
-            amid, most_mib = self.calls(RUN_S)
+            amid, most_mib = self.calls(good, RUN_S)
         finally:
             flood.stop()
         rest_s = torture.wait_until(lambda: torture.resident_mib(self.daemon.process) < before_mib + LEFT_MIB, REST_S)

@@ -122,24 +122,12 @@ class RapidResetTest(torture.ServedTest):
         self.call = channel.unary_unary(METHOD.decode(), audio_service_pb2.GetMixerRequest.SerializeToString,
                                         audio_service_pb2.GetMixerResponse.FromString)
 
-    def calls(self, seconds):
-        """The durations of good calls, fifty a second at most, and the daemon's largest memory meanwhile."""
-        times, most_mib = [], 0.0
-        end_s = time.monotonic() + seconds
-        while time.monotonic() < end_s:
-            begin_s = time.monotonic()
-            self.call(audio_service_pb2.GetMixerRequest(), timeout=30)
-            times.append(time.monotonic() - begin_s)
-            most_mib = max(most_mib, torture.resident_mib(self.daemon.process))
-            time.sleep(0.02)
-        return times, most_mib
-
     def attack(self, make, reads=True):
-        quiet, _ = self.calls(1.0)
+        quiet, _ = self.calls(self.call, 1.0)
         before_mib = torture.resident_mib(self.daemon.process)
         flood = Flood(str(self.folder / "socket"), make, reads)
         try:
-            amid, most_mib = self.calls(RUN_S)
+            amid, most_mib = self.calls(self.call, RUN_S)
         finally:
             flood.stop()
         rest_s = torture.wait_until(lambda: torture.resident_mib(self.daemon.process) < before_mib + LEFT_MIB, REST_S)

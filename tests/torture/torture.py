@@ -54,6 +54,18 @@ class ServedTest(ScratchTest):
         self.addCleanup(self.daemon.kill)
         self.client = self.daemon.client()
 
+    def calls(self, call, seconds):
+        """The durations of `call`, a GetMixer, fifty a second at most, and the daemon's largest memory meanwhile."""
+        times, most_mib = [], 0.0
+        end_s = time.monotonic() + seconds
+        while time.monotonic() < end_s:
+            begin_s = time.monotonic()
+            call(audio_service_pb2.GetMixerRequest(), timeout=30)
+            times.append(time.monotonic() - begin_s)
+            most_mib = max(most_mib, resident_mib(self.daemon.process))
+            time.sleep(0.02)
+        return times, most_mib
+
 
 class SoundingScene:
     """A bar that is struck twenty times a second, by one stream of contacts, and one listener, until `stop`."""
