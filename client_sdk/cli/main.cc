@@ -241,12 +241,17 @@ void AddProgramOptions(CLI::App& app, Program& program) {
       "command line is wrong; 3 if no daemon answers.");
 }
 
-/// Whether the command that the command line chose, or the program, has the option.
-bool HasOptionFor(const CLI::App& app, const std::string& option) {
-  if (app.get_option_no_throw(option) != nullptr) return true;
+/// Returns the option of this name that the program has, or the command that the command line
+/// chose. Returns null if neither has it.
+const CLI::Option* FindOption(const CLI::App& app, const std::string& name) {
+  if (const CLI::Option* option = app.get_option_no_throw(name)) return option;
   const std::vector<const CLI::App*> chosen =
       app.get_subcommands([](const CLI::App* command) { return command->count() > 0; });
-  return !chosen.empty() && HasOptionFor(*chosen.front(), option);
+  return chosen.empty() ? nullptr : FindOption(*chosen.front(), name);
+}
+
+bool HasOptionFor(const CLI::App& app, const std::string& option) {
+  return FindOption(app, option) != nullptr;
 }
 
 /// Adds the command `help`, for the list of commands; see WithHelpOption.
@@ -299,15 +304,6 @@ void AddMissing(const CLI::App& app, std::vector<std::string>& names) {
     if (option->get_required() && option->count() == 0) names.push_back(option->get_name());
   }
   for (const CLI::App* command : app.get_subcommands()) AddMissing(*command, names);
-}
-
-/// Returns the option of this name of the commands that the command line chose, or null.
-const CLI::Option* FindOption(const CLI::App& app, const std::string& name) {
-  if (const CLI::Option* option = app.get_option_no_throw(name)) return option;
-  for (const CLI::App* command : app.get_subcommands()) {
-    if (const CLI::Option* option = FindOption(*command, name)) return option;
-  }
-  return nullptr;
 }
 
 /// Returns the text of a value that its option cannot read, and says what the option takes.

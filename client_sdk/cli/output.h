@@ -40,8 +40,8 @@ void PrintNothing(absl::string_view noun);
 /// Returns a number with its noun, such as "1 mode", "2 modes" or "0 meshes".
 std::string Counted(uint64_t count, absl::string_view noun);
 
-/// Returns a linear amplitude (full scale is 1) as text, such as "-6.0 dBFS". What 24 bits cannot
-/// hold is "silence".
+/// Returns a linear amplitude (full scale is 1) as text, such as "-6.0 dBFS". An amplitude
+/// below half of the smallest step of 24 bits is "silence".
 std::string Decibels(double amplitude);
 
 /// Returns a loudness as text, such as "-23.0 LUFS", or "below -70 LUFS" if it is absent. The

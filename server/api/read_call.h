@@ -56,7 +56,7 @@ class ReadCall final : public ClientStream<Request>, public IdleCall {
   bool GoesOn() override { return !wait_ || wait_->Resume(); }
 
   void AllRead() override {
-    if (context_.IsCancelled()) return this->End(absl::CancelledError("the client has gone"));
+    if (gone()) return this->End(absl::CancelledError("the client has gone"));
     this->End(sink_.Finish(response_));
   }
 

@@ -46,9 +46,9 @@ class StreamCall : public Reactor {
   ThreadPool* const pool_;
 };
 
-/// The reading half of a call, which takes one request after the other. gRPC hands over the bytes
-/// of a request, because parsing a large request would keep one of gRPC's few threads busy for
-/// long.
+/// The reading half of a call, which takes one request after the other. gRPC hands over
+/// unparsed bytes, because one of gRPC's few threads would be busy for long if it parsed a large
+/// request.
 template <typename Reactor, typename Request>
 class StreamReader : public Reactor {
  public:

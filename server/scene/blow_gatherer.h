@@ -151,7 +151,7 @@ class BlowGatherer {
   std::optional<double> time_s_;
   std::map<uint32_t, Object> objects_;
   std::map<Bodies, Pair> pairs_;
-  size_t touch_count_ = 0;  // of this step
+  size_t touch_count_ = 0;  // number of contacts in this step
   bool follows_ = false;    // whether no step is missing before this step
   BlowCounts counts_;
 };

@@ -132,7 +132,7 @@ TEST_F(BlowGathererTest, WhatRestsIsALoadThoughEverySecondStepIsMissing) {
   EXPECT_EQ(gatherer_.counts().blow_count, before);
 }
 
-TEST_F(BlowGathererTest, HasRoomForSoManyContactsOfAStepAndSoManyPairs) {
+TEST_F(BlowGathererTest, HasRoomForTheGreatestNumberOfContactsAndOfPairs) {
   const auto touch = [](uint32_t partner) {
     return ObjectTouch{.contact = {.handle = 3}, .partner = partner};
   };
