@@ -206,7 +206,7 @@ void AddCompletion(CLI::App& app, Program& program) {
       *app.add_subcommand("completion", "Print a script that completes commands in a shell");
   command.add_option("shell", *shell, "bash, zsh or fish")
       ->required()
-      ->check(CLI::IsMember({"bash", "zsh", "fish"}));
+      ->check(CLI::IsMember(std::vector<std::string>(kShells.begin(), kShells.end())));
   command.callback([&app, &program, shell] {
     program.command = [&app, shell] {
       absl::PrintF("%s", CompletionScript(app, *shell));

@@ -2,6 +2,8 @@
 #include "client_sdk/cli/find_model.h"
 
 #include <algorithm>
+#include <set>
+#include <string>
 #include <vector>
 
 #include "absl/strings/ascii.h"
@@ -12,6 +14,7 @@
 #include "client_sdk/cli/job_progress.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/escaped_text.h"
+#include "proto/cpp/near_names.h"
 #include "proto/cpp/status_macros.h"
 
 namespace carillon::cli {
@@ -20,6 +23,7 @@ namespace {
 constexpr absl::string_view kModels = "modalModels/";
 constexpr absl::string_view kJobs = "jobs/";
 constexpr size_t kShortDigest = 12;
+constexpr size_t kMostNamed = 4;
 
 /// The words for the kind of thing that is searched for.
 struct Wording {
@@ -34,13 +38,29 @@ bool Means(const std::string& text, const Item& item, absl::string_view prefix) 
 
 /// Returns the first digits of the digests of some of the names, and how many more there are.
 std::string ShortNames(const std::vector<std::string>& names, absl::string_view prefix) {
-  constexpr size_t kMost = 4;
   std::vector<absl::string_view> digests;
-  for (size_t i = 0; i < std::min(names.size(), kMost); ++i) {
+  for (size_t i = 0; i < std::min(names.size(), kMostNamed); ++i) {
     digests.push_back(absl::StripPrefix(names[i], prefix).substr(0, kShortDigest));
   }
   const std::string shown = absl::StrJoin(digests, ", ");
-  return names.size() > kMost ? absl::StrCat(shown, " and ", names.size() - kMost, " more") : shown;
+  return names.size() > kMostNamed
+             ? absl::StrCat(shown, " and ", names.size() - kMostNamed, " more")
+             : shown;
+}
+
+/// Returns "did you mean 'bell'? " if labels are near to the text, and nothing otherwise.
+template <class Item>
+std::string NearLabels(const std::vector<Item>& items, const std::string& text) {
+  std::set<std::string> labels;
+  for (const Item& item : items) {
+    if (!item.label().empty()) labels.insert(item.label());
+  }
+  std::vector<std::string> near =
+      NearNames(text, std::vector<std::string>(labels.begin(), labels.end()));
+  if (near.empty()) return "";
+  if (near.size() > kMostNamed) near.resize(kMostNamed);
+  for (std::string& label : near) label = EscapedText(label);
+  return absl::StrCat("did you mean '", absl::StrJoin(near, "' or '"), "'? ");
 }
 
 /// Returns the name of the one of `items` that `text` means.
@@ -55,7 +75,8 @@ absl::StatusOr<std::string> Choose(const std::vector<Item>& items, const std::st
   if (found.empty()) {
     return Refusal(absl::StatusCode::kNotFound, wording.not_found,
                    absl::StrCat("no ", wording.noun, " has the label or begins with the digits '",
-                                text, "'; `carillon ", wording.noun, " list` shows what there is"));
+                                text, "'; ", NearLabels(items, text), "`carillon ", wording.noun,
+                                " list` shows what there is"));
   }
   return Refusal(absl::StatusCode::kInvalidArgument, wording.ambiguous,
                  absl::StrCat("'", text, "' means ", found.size(), " of the ", wording.noun,

@@ -192,7 +192,7 @@ void AddExample(CLI::App& app, Program& program) {
   std::vector<std::string> names;
   for (const Example& example : Examples()) names.push_back(example.name);
   CLI::App& command = *app.add_subcommand("example", "Write the mesh file of a body to try");
-  command.add_option("name", *name, "bell, bowl, bar or chime")
+  command.add_option("example", *name, "bell, bowl, bar or chime")
       ->required()
       ->check(CLI::IsMember(names));
   command.add_option("--out", *out, "The OBJ file to write [NAME.obj]")

@@ -6,6 +6,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <map>
 #include <memory>
 #include <string>
@@ -15,7 +16,9 @@
 #include "absl/strings/str_format.h"
 #include "absl/strings/string_view.h"
 #include "absl/strings/strip.h"
+#include "client_sdk/cli/example_bodies.h"
 #include "client_sdk/cli/output.h"
+#include "proto/cpp/manual_page.h"
 #include "proto/cpp/material_catalogue.h"
 #include "proto/cpp/striker_catalogue.h"
 
@@ -23,6 +26,8 @@ namespace carillon::cli {
 namespace {
 
 constexpr unsigned kPatienceS = 1;
+constexpr std::array kKinds = {"materials", "strikers", "models",   "jobs",
+                               "scenes",    "examples", "commands", "shells"};
 constexpr size_t kShortDigest = 12;
 
 /// Ends the program without a word when the daemon lets a shell wait.
@@ -65,11 +70,17 @@ void PrintNamesOfDaemon(const client::Client& daemon, const std::string& kind) {
   }
 }
 
-absl::Status PrintNames(const Program& program, const std::string& kind) {
+absl::Status PrintNames(const CLI::App& app, const Program& program, const std::string& kind) {
   if (kind == "materials") {
     for (const auto& item : Materials().materials()) absl::PrintF("%s\n", item.name());
   } else if (kind == "strikers") {
     for (const auto& item : Strikers().strikers()) absl::PrintF("%s\n", item.name());
+  } else if (kind == "examples") {
+    for (const Example& item : Examples()) absl::PrintF("%s\n", item.name);
+  } else if (kind == "commands") {
+    for (const CLI::App* item : ListedCommands(app)) absl::PrintF("%s\n", item->get_name());
+  } else if (kind == "shells") {
+    for (const char* shell : kShells) absl::PrintF("%s\n", shell);
   } else {
     EndInTime();
     PrintNamesOfDaemon(*program.Daemon(), kind);
@@ -81,7 +92,7 @@ absl::Status PrintNames(const Program& program, const std::string& kind) {
 
 std::string KindOfNames(const std::string& argument) {
   const absl::string_view name = absl::StripPrefix(argument, "--");
-  for (const absl::string_view kind : {"materials", "strikers", "models", "jobs", "scenes"}) {
+  for (const absl::string_view kind : kKinds) {
     if (name == kind.substr(0, kind.size() - 1)) return std::string(kind);
   }
   return "";
@@ -91,11 +102,11 @@ void AddNames(CLI::App& app, Program& program) {
   auto kind = std::make_shared<std::string>();
   CLI::App& names = *app.add_subcommand("names", "Print names for the completion of a shell");
   names.group("");
-  names.add_option("kind", *kind, "materials, strikers, models, jobs or scenes")
+  names.add_option("kind", *kind, "What the names stand for")
       ->required()
-      ->check(CLI::IsMember({"materials", "strikers", "models", "jobs", "scenes"}));
-  names.callback([&program, kind] {
-    program.command = [&program, kind] { return PrintNames(program, *kind); };
+      ->check(CLI::IsMember(std::vector<std::string>(kKinds.begin(), kKinds.end())));
+  names.callback([&app, &program, kind] {
+    program.command = [&app, &program, kind] { return PrintNames(app, program, *kind); };
   });
 }
 

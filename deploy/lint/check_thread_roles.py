@@ -24,9 +24,9 @@ KERNELS = ("server/synthesis/ringing/force_kernel.cc", "server/synthesis/ringing
 KEPT = ("-I", "-D", "-std")
 
 
-def flags_of(source):
-    words = source.arguments
-    for word, following in zip(words, words[1:] + ("",)):
+def flags_of(batch):
+    words = compilation.arguments(batch)
+    for word, following in zip(words, [*words[1:], ""]):
         if word == "-isystem":
             yield from (word, following)
         elif word.startswith(KEPT):
@@ -35,7 +35,7 @@ def flags_of(source):
 
 def analyse(batch):
     run = subprocess.run(
-        ["clang++", "-fsyntax-only", "-Wno-everything", "-Werror=thread-safety", *flags_of(batch[0]), "-x", "c++", "-"],
+        ["clang++", "-fsyntax-only", "-Wno-everything", "-Werror=thread-safety", *flags_of(batch), "-x", "c++", "-"],
         input=compilation.text_of(project.ROOT, batch), capture_output=True, text=True)
     return run.stderr if run.returncode else ""
 

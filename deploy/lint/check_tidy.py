@@ -4,7 +4,7 @@
 
 A file has changed if its text, that of a header of ours that it includes, directly or not, its compile
 command or .clang-tidy has. What passed is remembered in $CARILLON_CACHE, for all checkouts alike. Changed files are
-checked a dozen at a time, so that the headers of libraries are read once for all of them.
+checked many at a time, so that the headers of libraries are read once for all of them.
 
 Usage: check_tidy.py BUILD_FOLDER [ROOT]
 """
@@ -71,9 +71,10 @@ def tidy(root, batch):
             file.write_text(compilation.text_of(root, batch))
         result = subprocess.run(
             ["clang-tidy", "--quiet", f"--config-file={root}/.clang-tidy", f"--header-filter=^{re.escape(str(root))}/"
-             f"({'|'.join(project.TOP_FOLDERS)})/", file, "--", *batch[0].arguments,
-             # The build compiles with g++, some of whose warnings clang does not know.
-             "-Wno-unknown-warning-option"],
+             f"({'|'.join(project.TOP_FOLDERS)})/", file, "--", *compilation.arguments(batch),
+             # The build compiles with g++, some of whose warnings clang does not know. A name of one file may shadow that
+             # of another. Of Highway's instruction sets, one shows what all do.
+             "-Wno-unknown-warning-option", "-Wno-shadow", "-DHWY_COMPILE_ONLY_STATIC"],
             cwd=root, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, check=False)
     if result.returncode == 0:
         return None

@@ -12,14 +12,18 @@ import shlex
 import typing
 
 # Few enough that a batch with a finding, which is checked again in halves, costs little.
-MOST_IN_BATCH = 12
+MOST_IN_BATCH = 16
 # Namespaces without a name, and in them a line that begins in the first column and defines something.
 ANONYMOUS = re.compile(r"^namespace \{$.*?^\}  // namespace$", re.M | re.S)
 DEFINED = re.compile(r"^(?!namespace\b|using namespace\b|TEST|INSTANTIATE)\w[\w:<>,&*\[\] ]*?(?<!:)\b(\w+)"
                      r"(?:\(|\[| =| final| :|\{| \{)", re.M)
+# Functions of which each program has its own.
+OF_A_PROGRAM = re.compile(r'^(?:extern "C" )?int (main|LLVMFuzzer\w+)\(|^BENCHMARK_(MAIN)\(', re.M)
 INCLUDED = re.compile(r'^#include "(/[^"]+\.cc)"$', re.M)
 # Options that name files of the build, each with its argument.
 OF_THE_BUILD = ("-o", "-c", "-include")
+# Options that change the code that the compiler generates, and nothing that a checker sees.
+OF_THE_CODE = re.compile(r"-O\w*|-g\d?|-pthread|-f(?:PIC|PIE|no-omit-frame-pointer|(?:no-)?sanitize.*)|-Wno-subobject-linkage")
 
 
 class Source(typing.NamedTuple):
@@ -33,8 +37,47 @@ def arguments_of(entry):
     for word in words:
         if word in OF_THE_BUILD:
             next(words)
-        else:
+        elif not OF_THE_CODE.fullmatch(word):
             yield word
+
+
+class Arguments:
+    """The arguments of a compiler in three kinds: the folders of headers, the macros, and the others."""
+
+    def __init__(self, words):
+        self.folders, self.macros, self.others = {}, {}, []
+        words = iter(words)
+        for word in words:
+            if word == "-isystem":
+                self.folders[word, next(words)] = True
+            elif word.startswith("-I"):
+                self.folders[word,] = True
+            elif word.startswith("-D"):
+                name, _, value = word.partition("=")
+                self.macros[name] = "=" + value if value else ""
+            else:
+                self.others.append(word)
+
+    def fits(self, other):
+        """Whether the files of both may be compiled together. Macros whose value is a text may differ."""
+        return self.others == other.others and all(
+            other.macros.get(name, value) == value or value.startswith('="') for name, value in self.macros.items())
+
+    def add(self, other):
+        self.folders = {**self.folders, **other.folders}
+        self.macros = {**other.macros, **self.macros}
+
+    def words(self):
+        return [*self.others, *(name + value for name, value in self.macros.items()),
+                *(word for folder in self.folders for word in folder)]
+
+
+def arguments(batch):
+    """The arguments with which all files of a batch compile: the folders of headers and the macros of all of them."""
+    common = Arguments(batch[0].arguments)
+    for source in batch[1:]:
+        common.add(Arguments(source.arguments))
+    return common.words()
 
 
 def compiled_by(entry, build):
@@ -60,27 +103,29 @@ def sources(root, build):
 
 
 def names_in(text):
-    """The names that a file defines for itself alone, which may clash with those of another file."""
-    return {name for part in ANONYMOUS.findall(text) for name in DEFINED.findall(part)}
+    """The names that a file defines for itself alone, or for its program, which may clash with those of another file."""
+    own = {name for part in ANONYMOUS.findall(text) for name in DEFINED.findall(part)}
+    return own | {"".join(found).lower() for found in OF_A_PROGRAM.findall(text)}
 
 
 def batches(root, given):
-    """Lists of sources of one top-level folder that are compiled with the same arguments and define no name twice.
-    Files of Highway, which include themselves, are each alone."""
+    """Lists of sources of one top-level folder that may be compiled together: their arguments fit, and they define no
+    name twice. Files of Highway, which include themselves, are each alone."""
     found = []
     for source in given:
-        key = (source.name.partition("/")[0], source.arguments)
+        folder, own = source.name.partition("/")[0], Arguments(source.arguments)
         names = names_in((root / source.name).read_text())
         alone = source.name.endswith(("_kernel.cc", "_kernels.cc"))
-        for other_key, batch, taken in [] if alone else found:
-            if other_key == key and len(batch) < MOST_IN_BATCH and not names & taken:
+        for other_folder, common, batch, taken in [] if alone else found:
+            if other_folder == folder and len(batch) < MOST_IN_BATCH and common.fits(own) and not names & taken:
                 # The build compiles them in ascending order; another order finds more of the missing includes.
                 batch.insert(0, source)
+                common.add(own)
                 taken |= names
                 break
         else:
-            found.append((None if alone else key, [source], names))
-    return [batch for _, batch, _ in found]
+            found.append((None if alone else folder, own, [source], names))
+    return [batch for _, _, batch, _ in found]
 
 
 def text_of(root, batch):

@@ -92,6 +92,23 @@ class Batches(TreeTest):
         own = "namespace {\nconstexpr double kStep = 1;\n}  // namespace\n"
         self.assertEqual(self.batches(a=own, b="int F();\n", c=own), [["b", "a"], ["c"]])
 
+    def test_files_of_two_programs_are_apart(self):
+        self.assertEqual(self.batches(a="int main() {}\n", b="int main(int, char**) {}\n"), [["a"], ["b"]])
+
+    def test_files_with_other_folders_and_macros_are_together_unless_a_macro_has_two_values(self):
+        def compiled(*words):
+            return compilation.Source(f"server/{words[-1][-1]}.cc", ("-std=c++20", *words[:-1]))
+
+        given = [compiled("-I/x", "-DTEXT=\"x\"", "a"), compiled("-isystem", "/y", "-DTEXT=\"y\"", "-DN=1", "b"),
+                 compiled("-DN=2", "c")]
+        for source in given:
+            self.write(source.name, "")
+        found = compilation.batches(self.root, given)
+        self.assertEqual([[source.name for source in batch] for batch in found],
+                         [["server/b.cc", "server/a.cc"], ["server/c.cc"]])
+        self.assertEqual(compilation.arguments(found[0]),
+                         ["-std=c++20", "-DTEXT=\"y\"", "-DN=1", "-isystem", "/y", "-I/x"])
+
     def test_a_file_that_includes_itself_is_alone(self):
         self.assertEqual(self.batches(a="", ring_kernel="", z=""), [["z", "a"], ["ring_kernel"]])
 

@@ -71,6 +71,16 @@ test('a mesh of arrays is a model of the same modes as its file', async () => {
   assert.deepEqual(found, same.name === model.name ? found : [same.name]);
 });
 
+test('a model is found by its label and by the first digits of its digest', async () => {
+  for (const text of [model.label, model.name.slice('modalModels/'.length, -50)]) {
+    assert.equal((await c.model(text)).name, model.name);
+  }
+  const misspelt = `${model.label.slice(0, -1)}z`;
+  await assert.rejects(c.model(misspelt), { reason: 'MODAL_MODEL_NOT_FOUND',
+    message: new RegExp(`'${misspelt}'.*did you mean '${model.label}'\\?`) });
+  await assert.rejects(c.model(5), /^TypeError: the model is 5; it must be its label/);
+});
+
 test('a mesh has the unit and the accuracy that are asked for', async () => {
   const text = (await fs.readFile(BAR, 'utf8')).split('\n').map((line) => line.split(' '))
     .map(([kind, ...words]) => (kind === 'v' ? ['v', ...words.map((word) => 1000 * word)] : [kind, ...words]).join(' '));

@@ -377,7 +377,7 @@ class WithoutDaemonTest(unittest.TestCase):
 
     def test_bash_completes_commands_and_options(self):
         def complete(line):
-            words = line.split(" ")
+            words = line.replace("carillon", str(BIN / "carillon"), 1).split(" ")
             script = carillon("completion", "bash").stdout + (
                 f"COMP_WORDS=({' '.join(repr(word) for word in words)}); COMP_CWORD={len(words) - 1}\n"
                 '_carillon; printf "%s\\n" "${COMPREPLY[@]}"\n')
@@ -387,6 +387,9 @@ class WithoutDaemonTest(unittest.TestCase):
         self.assertEqual(complete("carillon model cr"), ["create"])
         self.assertEqual(complete("carillon --json model create bell.obj --mat"), ["--material"])
         self.assertIn("scene", complete("carillon "))
+        self.assertEqual(complete("carillon example bo"), ["bowl"])
+        self.assertEqual(complete("carillon completion z"), ["zsh"])
+        self.assertEqual(complete("carillon help rend"), ["render"])
 
     def test_the_scripts_of_other_shells_are_correct(self):
         for shell, check in (("zsh", "-n"), ("fish", "--no-execute")):

@@ -30,7 +30,7 @@ class ExamplesTest(DaemonTest):
         cls.carillon = carillon.connect(cls.daemon.server)
         cls.addClassCleanup(cls.carillon.close)
 
-    def run_example(self, name, engine, seconds, rate=240, max_frequency=None):
+    def run_example(self, name, engine, seconds, rate=240, max_frequency=3000):
         options = argparse.Namespace(name=name, engine=engine, rate=rate, seconds=seconds, build=BUILD, video=False,
                                      max_frequency=max_frequency)
         sound = run.run(self.carillon, options, self.folder)

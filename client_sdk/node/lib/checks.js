@@ -23,12 +23,17 @@ function distance(one, other) {
   return row[other.length];
 }
 
+/** The one of the names that is most like the word; undefined if none is much like it. */
+function nearest(word, names) {
+  const found = names.map((right) => ({ right, far: right.startsWith(word) ? 1 : distance(word, right) }))
+    .sort((one, other) => one.far - other.far)[0];
+  return found && found.far <= Math.max(2, word.length / 3) ? found.right : undefined;
+}
+
 function hint(name, known) {
   const names = known.filter((right) => !right.startsWith('_')); // without those that only the daemon uses
-  const nearest = names.map((right) => ({ right, far: right.startsWith(name) ? 1 : distance(name, right) }))
-    .sort((one, other) => one.far - other.far)[0];
-  return nearest && nearest.far <= Math.max(2, name.length / 3) ? `did you mean "${nearest.right}"?`
-    : `it has ${names.sort().join(', ')}`;
+  const near = nearest(name, names);
+  return near === undefined ? `it has ${names.sort().join(', ')}` : `did you mean "${near}"?`;
 }
 
 /** How a caller gives a field of the messages within a message, such as "settings: { poisson_ratio: ... }". */
@@ -119,4 +124,4 @@ function tuple(values, count, name, meaning) {
   return values;
 }
 
-module.exports = { choice, counted, refuse, refuseNoMessage, refuseUnknown, tuple, whole };
+module.exports = { choice, counted, nearest, refuse, refuseNoMessage, refuseUnknown, tuple, whole };

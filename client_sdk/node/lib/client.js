@@ -3,7 +3,7 @@
 
 const util = require('util');
 const { defaultServer } = require('./address');
-const { choice, refuseNoMessage, refuseUnknown } = require('./checks');
+const { choice, nearest, refuse, refuseNoMessage, refuseUnknown } = require('./checks');
 const { frameInWords, given, toPose } = require('./contacts');
 const { services } = require('./contract');
 const { channelCredentials, tokenInterceptors } = require('./credentials');
@@ -28,6 +28,7 @@ function jobFilter(filters) {
   return { states: states.map((state) => choice(state, JOB_STATES, 'JOB_STATE_', 'an entry of states')), label_contains };
 }
 
+const MODELS = 'modalModels/';
 const PIECE_BYTES = 1 << 20;
 
 /**
@@ -173,8 +174,10 @@ class Client {
     for await (const answer of this.answers(stream)) yield answer.job ?? null;
   }
 
-  /** Returns the model of a name, "modalModels/{digest}". */
-  async model(name, material) {
+  /** Returns the model that the text means: a name, a label, or the first digits of a digest. */
+  async model(text, material) {
+    if (typeof text !== 'string') refuse(text, 'the model', 'its label, its name, or the first digits of its digest');
+    const name = text.startsWith(MODELS) ? text : await this.find(text);
     const answer = await this.call('ModalModelService', 'GetModalModel', { name });
     return new Model(this, answer.modal_model, material ?? answer.modal_model.material ?? undefined);
   }
@@ -188,6 +191,24 @@ class Client {
       page_token = page.next_page_token;
       if (!page_token) return;
     }
+  }
+
+  /** Returns the name of the one model with this label, or whose digest begins with these digits. */
+  async find(text) {
+    const names = [];
+    const labels = [];
+    for await (const { name, label } of this.models()) {
+      if (label === text || (text && name.slice(MODELS.length).startsWith(text))) names.push(name);
+      if (label) labels.push(label);
+    }
+    if (names.length === 1) return names[0];
+    if (names.length) {
+      throw new CarillonError('MODAL_MODEL_AMBIGUOUS', `'${text}' means ${names.length} of the models, for instance ` +
+        `${names[0]} and ${names[1]}; give more digits of the digest`);
+    }
+    const near = nearest(text, labels);
+    throw new CarillonError('MODAL_MODEL_NOT_FOUND', `no model has the label '${text}' or begins with these digits` +
+      (near === undefined ? '' : `; did you mean '${near}'?`));
   }
 
   /** Changes the linear gain of the daemon's output, or mutes it, without a click. Returns both. */

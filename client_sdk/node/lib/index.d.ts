@@ -284,7 +284,8 @@ export class Client {
     material: Material; unit?: 'm' | 'cm' | 'mm' | 'in' | number; accuracy?: number;
     onProgress?: (job: Job__Output) => void;
   }): Promise<Model>;
-  model(name: string, material?: Material): Promise<Model>;
+  /** Returns the model that the text means: a name, a label, or the first digits of a digest. */
+  model(text: string, material?: Material): Promise<Model>;
   models(filters?: ListModalModelsRequest): AsyncGenerator<Model>;
   /** Makes an empty scene, or returns the one that you made before with the same `id` and settings. */
   createScene(settings?: {

@@ -3,7 +3,12 @@
 
 const fs = require('fs/promises');
 const path = require('path');
+const { refuse } = require('./checks');
 const { CarillonError } = require('./errors');
+
+function isList(values) {
+  return values !== null && typeof values === 'object' && 'length' in values;
+}
 
 function rows(values) {
   if (values.length && typeof values[0] !== 'number') return Array.from(values);
@@ -72,6 +77,8 @@ async function withBuffers(file, data) {
 
 /** Reads a mesh file, or makes one of { vertices, triangles }. Returns its bytes, its format and a label. */
 async function toMeshFile(mesh) {
+  const isArrays = mesh !== null && typeof mesh === 'object' && isList(mesh.vertices) && isList(mesh.triangles);
+  if (typeof mesh !== 'string' && !isArrays) refuse(mesh, 'the mesh', 'the path of a file, or { vertices, triangles }');
   if (typeof mesh !== 'string') return { data: makeObj(mesh), format: 'obj', label: '' };
   const { ext, name } = path.parse(mesh);
   const format = ext.slice(1).toLowerCase();

@@ -93,6 +93,13 @@ test('a body of a likely wrong unit is told once', async () => {
   assert.match(told[1].join(), /^UnitWarning: the body is 202 m across; .*unit: 'mm'$/);
 });
 
+test('what is no mesh is refused', async () => {
+  for (const wrong of [5, null, {}, { vertices: [[0, 0, 0]] }]) {
+    await assert.rejects(c.createModel(wrong, { material: 'oak' }),
+      /^TypeError: the mesh is .*; it must be the path of a file, or { vertices, triangles }/);
+  }
+});
+
 test('a misspelt key is refused with the nearest name', async () => {
   const refusals = [
     [() => c.createModel(mesh, { material: 'oak', max_frequency: 1 }), 'max_frequency', 'max_frequency_hz'],

@@ -253,15 +253,17 @@ class Client:
         self._channel.close()
 
     def _find(self, text: str) -> Model:
-        found = [model for model in self.models()
-                 if model.label == text or model.name.removeprefix("modalModels/").startswith(text)]
+        models = list(self.models())
+        found = [model for model in models
+                 if model.label == text or (text and model.name.removeprefix("modalModels/").startswith(text))]
         if len(found) == 1:
             return found[0]
         if found:
             raise errors.CarillonError("MODAL_MODEL_AMBIGUOUS", f"'{text}' means {len(found)} of the models, for "
                                        f"instance {found[0].name} and {found[1].name}; give more digits of the digest")
+        hint = checks.suggestion(text, {model.label for model in models if model.label})
         raise errors.CarillonError("MODAL_MODEL_NOT_FOUND", f"no model has the label '{text}' or begins with these "
-                                   "digits")
+                                   "digits" + (f"; {hint}" if hint else ""))
 
     def _render(self, trace: Trace, given: dict[str, Any]) -> Sound:
         request = audio_service_pb2.RenderRequest
