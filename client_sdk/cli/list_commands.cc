@@ -220,7 +220,8 @@ absl::Status WriteExample(const Example& example, const std::string& path, bool 
   absl::PrintF("%s\n", file);
   // To stderr, so that stdout is the name alone.
   absl::FPrintF(stderr, "%s is %s. It sounds with:\n", file, example.description);
-  absl::FPrintF(stderr, "  carillon model create %s --material %s\n", file, example.material);
+  absl::FPrintF(stderr, "  carillon model create %s --material %s --wait\n", file,
+                example.material);
   absl::FPrintF(stderr, "  carillon strike %s %s\n", example.name, example.strike);
   return absl::OkStatus();
 }

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "client_sdk/cli/material_figures.h"
 
+#include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/escaped_text.h"
 #include "proto/cpp/loss_factor.h"
 #include "proto/cpp/material_catalogue.h"
 #include "proto/cpp/status_macros.h"
@@ -29,6 +31,15 @@ absl::StatusOr<v1::Material> ToMaterial(const MaterialFigures& figures) {
   material.set_young_pa(mu * (3 * lambda + 2 * mu) / (lambda + mu));
   material.set_poisson_ratio(lambda / (2 * (lambda + mu)));
   return material;
+}
+
+std::string MaterialText(const v1::Material& material) {
+  v1::Material figures = material;
+  figures.clear_preset();
+  std::string text = figures.ShortDebugString();
+  if (material.preset().empty()) return text;
+  const std::string preset = EscapedText(material.preset());
+  return text.empty() ? preset : absl::StrCat(preset, " with ", text);
 }
 
 }  // namespace carillon::cli

@@ -29,4 +29,7 @@ struct MaterialFigures {
 /// given together with Young's modulus or Poisson's ratio.
 absl::StatusOr<v1::Material> ToMaterial(const MaterialFigures& figures);
 
+/// Returns the name of a material, with the figures that override its own, or the figures alone.
+std::string MaterialText(const v1::Material& material);
+
 }  // namespace carillon::cli

@@ -33,6 +33,10 @@ std::string Format(const CreateModelOptions& options, const std::string& file) {
   return options.format.empty() ? MeshFormatOf(file) : options.format;
 }
 
+std::string LabelOf(const CreateModelOptions& options, const std::string& file) {
+  return options.label.empty() ? std::filesystem::path(file).stem().string() : options.label;
+}
+
 absl::StatusOr<v1::CreateModalModelRequest> MakeRequest(const CreateModelOptions& options,
                                                         const std::string& file,
                                                         std::string mesh_digest) {
@@ -50,8 +54,7 @@ absl::StatusOr<v1::CreateModalModelRequest> MakeRequest(const CreateModelOptions
   request.set_priority(options.priority);
   request.set_time_limit_s(options.time_limit_s);
   request.set_memory_limit_bytes(options.memory_limit_mib << 20U);
-  request.set_label(options.label.empty() ? std::filesystem::path(file).stem().string()
-                                          : options.label);
+  request.set_label(LabelOf(options, file));
   return request;
 }
 
@@ -74,16 +77,6 @@ void PrintTransfer(const v1::TransferSummary& transfer) {
       Counted(header.wanted_mode_count(), "mode"), header.verification().max_power_error_db(),
       Counted(transfer.stored_bytes(), "byte"));
   PrintWarningLines(header.warnings());
-}
-
-/// Returns the name of a material, or its figures where it has none.
-std::string MaterialText(const v1::Material& material) {
-  v1::Material figures = material;
-  figures.clear_preset();
-  std::string text = figures.ShortDebugString();
-  if (material.preset().empty()) return text;
-  const std::string preset = EscapedText(material.preset());
-  return text.empty() ? preset : absl::StrCat(preset, " with ", text);
 }
 
 void PrintSummary(const v1::ModalModelSummary& model) {
@@ -238,13 +231,16 @@ void PrintHowToFollow(const v1::Job& job) {
                 EscapedText(job.label()), ShortName(job));
 }
 
-/// Prints what the user should know about a model that was just made.
-void PrintWarnings(const client::Client& daemon, const std::string& name) {
+/// Prints what the user should know about a model that was just made, or was there before.
+void PrintWarnings(const client::Client& daemon, const std::string& name,
+                   const std::string& wanted_label) {
   const auto model = daemon.GetModalModel(name);
   if (!model.ok()) return;
   for (const std::string& warning : model->header().warnings()) {
     absl::FPrintF(stderr, "warning: %s\n", EscapedText(warning));
   }
+  const std::string other = OtherLabel(*model, wanted_label);
+  if (!other.empty()) absl::FPrintF(stderr, "warning: %s\n", EscapedText(other));
 }
 
 double SoundSpeed(const v1::Material& resolved) {
@@ -298,7 +294,9 @@ absl::Status CreateModel(const client::Client& daemon, const CreateModelOptions&
   for (size_t i = 0; i < jobs.size(); ++i) {
     absl::StatusOr<v1::Job> job = std::move(jobs[i]);
     if (job.ok() && options.wait) job = AwaitModel(daemon, options, options.files[i], job->name());
-    if (job.ok() && options.wait) PrintWarnings(daemon, job->modal_model());
+    if (job.ok() && job->state() == v1::JOB_STATE_SUCCEEDED) {
+      PrintWarnings(daemon, job->modal_model(), LabelOf(options, options.files[i]));
+    }
     if (job.ok() && job->state() != v1::JOB_STATE_SUCCEEDED) PrintHowToFollow(*job);
     const absl::Status ended = Conclude(
         daemon, std::move(job), {.wait = false, .json = json, .name = &v1::Job::modal_model});

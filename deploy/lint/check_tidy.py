@@ -72,8 +72,8 @@ def tidy(root, batch):
         result = subprocess.run(
             ["clang-tidy", "--quiet", f"--config-file={root}/.clang-tidy", f"--header-filter=^{re.escape(str(root))}/"
              f"({'|'.join(project.TOP_FOLDERS)})/", file, "--", *compilation.arguments(batch),
-             # The build compiles with g++, some of whose warnings clang does not know. A name of one file may shadow that
-             # of another. Of Highway's instruction sets, one shows what all do.
+             # The build compiles with g++, some of whose warnings clang does not know. A name of one file may shadow
+             # one of another file. Of Highway's instruction sets, one shows what all do.
              "-Wno-unknown-warning-option", "-Wno-shadow", "-DHWY_COMPILE_ONLY_STATIC"],
             cwd=root, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, check=False)
     if result.returncode == 0:

@@ -23,7 +23,8 @@ INCLUDED = re.compile(r'^#include "(/[^"]+\.cc)"$', re.M)
 # Options that name files of the build, each with its argument.
 OF_THE_BUILD = ("-o", "-c", "-include")
 # Options that change the code that the compiler generates, and nothing that a checker sees.
-OF_THE_CODE = re.compile(r"-O\w*|-g\d?|-pthread|-f(?:PIC|PIE|no-omit-frame-pointer|(?:no-)?sanitize.*)|-Wno-subobject-linkage")
+OF_THE_CODE = re.compile(r"-O\w*|-g\d?|-pthread|-f(PIC|PIE|no-omit-frame-pointer|(no-)?sanitize.*)|"
+                         r"-Wno-subobject-linkage")
 
 
 class Source(typing.NamedTuple):
@@ -103,7 +104,7 @@ def sources(root, build):
 
 
 def names_in(text):
-    """The names that a file defines for itself alone, or for its program, which may clash with those of another file."""
+    """The names that a file defines for itself or for its program, which may clash with those of another file."""
     own = {name for part in ANONYMOUS.findall(text) for name in DEFINED.findall(part)}
     return own | {"".join(found).lower() for found in OF_A_PROGRAM.findall(text)}
 

@@ -24,6 +24,16 @@ before(async () => {
 
 after(() => c.close());
 
+async function warningsOf(use) {
+  const told = [];
+  const listener = (warning) => told.push(`${warning.name}: ${warning.message}`);
+  process.on('warning', listener);
+  await use();
+  await new Promise(setImmediate);
+  process.off('warning', listener);
+  return told;
+}
+
 async function withScene(use) {
   const scene = await c.createScene();
   try {
@@ -71,13 +81,24 @@ test('a mesh of arrays is a model of the same modes as its file', async () => {
   assert.deepEqual(found, same.name === model.name ? found : [same.name]);
 });
 
-test('a model is found by its label and by the first digits of its digest', async () => {
+test('mistakes with models and files are told, and a model is found by its label and by the first digits of its digest', async () => {
   for (const text of [model.label, model.name.slice('modalModels/'.length, -50)]) {
     assert.equal((await c.model(text)).name, model.name);
   }
   const misspelt = `${model.label.slice(0, -1)}z`;
   await assert.rejects(c.model(misspelt), { reason: 'MODAL_MODEL_NOT_FOUND',
     message: new RegExp(`'${misspelt}'.*did you mean '${model.label}'\\?`) });
+  assert.match((await warningsOf(() => c.createModel(BAR, { material, label: 'beam' }))).join(),
+    /LabelWarning: .*keeps this label, so that 'beam' names no model/);
+  assert.deepEqual(await warningsOf(() => c.createModel(BAR, { material, label: model.label })), []);
+  const trace = new carillon.Trace();
+  trace.add(model);
+  await withScene(async (scene) => {
+    const bar = await scene.add(model);
+    assert.throws(() => trace.step(0, { impulses: [{ object: bar, ...STRIKE }] }), /which is not in the trace/);
+  });
+  await assert.rejects(new carillon.Sound(new Float32Array(1), 48000, 1).save('x.mp3'), /must end with .wav/);
+  assert.throws(() => carillon.connect('/run/carillond.sock'), /"unix:PATH" or "HOST:PORT"/);
   await assert.rejects(c.model(5), /^TypeError: the model is 5; it must be its label/);
 });
 

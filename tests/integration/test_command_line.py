@@ -377,19 +377,17 @@ class WithoutDaemonTest(unittest.TestCase):
 
     def test_bash_completes_commands_and_options(self):
         def complete(line):
-            words = line.replace("carillon", str(BIN / "carillon"), 1).split(" ")
+            words = [str(BIN / "carillon"), *line.split(" ")[1:]]
             script = carillon("completion", "bash").stdout + (
                 f"COMP_WORDS=({' '.join(repr(word) for word in words)}); COMP_CWORD={len(words) - 1}\n"
                 '_carillon; printf "%s\\n" "${COMPREPLY[@]}"\n')
             return subprocess.run(["bash", "-c", script], capture_output=True, text=True, check=True).stdout.split()
 
-        self.assertEqual(complete("carillon mo"), ["model"])
-        self.assertEqual(complete("carillon model cr"), ["create"])
         self.assertEqual(complete("carillon --json model create bell.obj --mat"), ["--material"])
         self.assertIn("scene", complete("carillon "))
-        self.assertEqual(complete("carillon example bo"), ["bowl"])
-        self.assertEqual(complete("carillon completion z"), ["zsh"])
-        self.assertEqual(complete("carillon help rend"), ["render"])
+        for words, word in (("mo", "model"), ("model cr", "create"), ("example bo", "bowl"), ("completion z", "zsh"),
+                            ("help rend", "render")):
+            self.assertEqual(complete(f"carillon {words}"), [word])
 
     def test_the_scripts_of_other_shells_are_correct(self):
         for shell, check in (("zsh", "-n"), ("fish", "--no-execute")):

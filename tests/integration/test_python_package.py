@@ -70,6 +70,8 @@ class ModelsTest(PackageTest):
         with self.assertRaises(carillon.CarillonError) as refused:
             self.c.model("bell")
         self.assertEqual(refused.exception.reason, "MODAL_MODEL_NOT_FOUND")
+        with self.assertRaisesRegex(carillon.CarillonError, 'did you mean "bar"'):
+            self.c.model("barr")
 
     def test_progress_is_told_to_a_function(self):
         states = []

@@ -17,7 +17,7 @@ const { Scene } = require('./scenes');
 const { toSettings } = require('./settings');
 const { Sound, samplesOf, samplesOfIntegers } = require('./sound');
 const { Trace } = require('./traces');
-const { warnOfContacts, warnOfTransfers, warnOfUnit } = require('./warnings');
+const { warnOfContacts, warnOfLabel, warnOfTransfers, warnOfUnit } = require('./warnings');
 
 const JOB_STATES = ['queued', 'running', 'succeeded', 'failed', 'cancelled'];
 
@@ -38,7 +38,9 @@ const PIECE_BYTES = 1 << 20;
  */
 function connect(server, options = {}) {
   refuseUnknown(options, ['tlsRoots', 'token', 'tlsCertificate', 'tlsKey'], 'connect');
-  return new Client(server ?? defaultServer(), options);
+  const address = server ?? defaultServer();
+  if (/^(\/|https?:\/\/)/i.test(address)) refuse(address, 'server', '"unix:PATH" or "HOST:PORT"');
+  return new Client(address, options);
 }
 
 /** Throws CarillonError if nothing was struck in a rendering. Sustained forces are not counted, but heard. */
@@ -127,7 +129,9 @@ class Client {
     const file = await toMeshFile(mesh);
     const { job } = await this.call('ModalModelService', 'CreateModalModel', { ...own,
       mesh_digest: await this.uploadFile(file), mesh_format: file.format, label: label ?? file.label });
-    return this.model((await this.watch(job, onProgress)).modal_model, material);
+    const model = await this.model((await this.watch(job, onProgress)).modal_model, material);
+    warnOfLabel(model.label, label);
+    return model;
   }
 
   /**

@@ -243,8 +243,14 @@ function strikeOf(object, { point, impulse, duration, striker } = {}) {
   return [{ object, point, impulse, duration: durationOf(duration, 'duration'), striker }];
 }
 
+/** Returns the objects of rows, or of columns, as the caller gave them. */
+function objectsOf(content) {
+  const rows = Array.isArray(content) ? content : [content];
+  return rows.flatMap((row) => [row?.objects, row?.secondObjects, row?.object, row?.second?.object].flat());
+}
+
 function frameInWords(frame) {
   return frame === 'FRAME_SCENE' ? SCENE_FRAME : "each object's own frame";
 }
 
-module.exports = { frameInWords, given, makeStep, present, strikeOf, toHandle, toPose };
+module.exports = { frameInWords, given, makeStep, objectsOf, present, strikeOf, toHandle, toPose };

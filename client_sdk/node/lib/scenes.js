@@ -3,7 +3,7 @@
 
 const util = require('util');
 const { counted, refuseUnknown } = require('./checks');
-const { frameInWords, given, makeStep, present, strikeOf, toHandle, toPose } = require('./contacts');
+const { frameInWords, given, makeStep, objectsOf, present, strikeOf, toHandle, toPose } = require('./contacts');
 const { CarillonError, fromCall, fromInfo } = require('./errors');
 const { named, toMaterial, toRadiation } = require('./materials');
 const { streamSettings } = require('./traces');
@@ -149,9 +149,7 @@ class Scene {
 
 /** Throws a TypeError for an object of another scene, where its handle may mean another object. */
 function refuseOtherScenes(content, scene) {
-  const rows = Array.isArray(content) ? content : [content];
-  const objects = rows.flatMap((row) => [row?.objects, row?.secondObjects, row?.object, row?.second?.object].flat());
-  const other = objects.find((object) => object instanceof SoundingObject && object.scene.name !== scene);
+  const other = objectsOf(content).find((object) => object instanceof SoundingObject && object.scene.name !== scene);
   if (other) {
     throw new TypeError(`a row has an object of ${other.scene.name}, and this is a stream of ${scene}; give objects of ` +
       'that scene');

@@ -35,6 +35,7 @@ class Sound {
 
   /** Writes a WAV file of 24-bit samples; samples beyond full scale are clipped. */
   async save(path) {
+    if (!/(^|\/)[^./]*$|\.wave?$/i.test(path)) throw new TypeError(`${path} must end with .wav, because the file is a WAV file`);
     await fs.writeFile(path, this.waveBytes());
   }
 

@@ -4,7 +4,7 @@
 const fs = require('fs/promises');
 const util = require('util');
 const { choice, counted, refuseNoMessage, refuseUnknown } = require('./checks');
-const { given, makeStep, present, toHandle, toPose } = require('./contacts');
+const { given, makeStep, objectsOf, present, toHandle, toPose } = require('./contacts');
 const { message } = require('./contract');
 const { CarillonError } = require('./errors');
 const { named, toRadiation } = require('./materials');
@@ -52,6 +52,13 @@ class Trace {
     if (!this.header.step_s && (content?.contacts || content?.forces || content?.poses)) {
       throw new TypeError("contacts, forces and poses need the length of the simulator's steps in seconds, as in a " +
         'stream: new Trace({ step: 1 / 240 })');
+    }
+    for (const rows of [content?.contacts, content?.impulses, content?.forces, content?.poses]) {
+      const other = objectsOf(rows).find((object) => object?.scene);
+      if (other) {
+        throw new TypeError(`a row has an object of ${other.scene.name}, which is not in the trace; give what trace.add ` +
+          'returned');
+      }
     }
     this.steps.push(makeStep(time, content));
   }

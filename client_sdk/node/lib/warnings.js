@@ -22,6 +22,17 @@ function warnOfTransfers(labels) {
   'TransferWarning');
 }
 
+// The daemon cuts longer labels.
+const MOST_LABEL_BYTES = 200;
+
+/** Warns of a model that was stored before, with the label `label` instead of the one that the caller wanted, if any. */
+function warnOfLabel(label, wanted) {
+  if (!wanted || wanted === label || Buffer.byteLength(wanted) > MOST_LABEL_BYTES) return;
+  warn(`the model of this body was stored before as '${label}' and keeps this label, so that '${wanted}' names no model; ` +
+    'an object that names no material now gets the material of this request, so name one where you add the object',
+  'LabelWarning');
+}
+
 // The contract (Progress.extent_m) says above which extent the unit is likely to be wrong.
 const LIKELY_EXTENT_M = 20;
 
@@ -95,4 +106,4 @@ function warnOfStream(report, frame, droppedStepCount) {
   warnOfContacts(report.findings, frame, Number(report.accepted_count ?? 0) + Number(report.late_count ?? 0));
 }
 
-module.exports = { SCENE_FRAME, warnOfContacts, warnOfStream, warnOfTransfers, warnOfUnit };
+module.exports = { SCENE_FRAME, warnOfContacts, warnOfLabel, warnOfStream, warnOfTransfers, warnOfUnit };

@@ -112,6 +112,22 @@ TEST(FindModel, SaysWhichModelsAnAmbiguousNameMeansInOneShortLine) {
   EXPECT_LT(six.size(), 200U);
 }
 
+TEST(FindModel, NamesTheNearestLabel) {
+  EXPECT_THAT(std::string(FindModel(DaemonWithModels(2), "bel").status().message()),
+              HasSubstr("did you mean 'bell'? `carillon model list`"));
+  EXPECT_THAT(std::string(FindModel(DaemonWithModels(2), "chime").status().message()),
+              Not(HasSubstr("did you mean")));
+}
+
+TEST(OtherLabel, SaysThatAModelKeepsItsLabel) {
+  v1::ModalModelSummary model;
+  model.set_label("key_maple");
+  EXPECT_THAT(OtherLabel(model, "key_oak"),
+              HasSubstr("as 'key_maple' and keeps this label, so that 'key_oak' names"));
+  EXPECT_EQ(OtherLabel(model, "key_maple"), "");
+  EXPECT_EQ(OtherLabel(model, std::string(201, 'x')), "");
+}
+
 TEST(SharedLabel, SaysHowToNameEachModelOfALabel) {
   const DaemonWithModels three(3);
   EXPECT_THAT(

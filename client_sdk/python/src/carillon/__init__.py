@@ -16,7 +16,8 @@ from carillon import aio, summaries
 from carillon.address import default_server
 from carillon.client import Client, connect
 from carillon.contacts import Contacts, Forces, Impulses, Poses, striker
-from carillon.errors import CarillonError, ContactWarning, ServerUnavailable, TransferWarning, UnitWarning
+from carillon.errors import (
+    CarillonError, ContactWarning, LabelWarning, ServerUnavailable, TransferWarning, UnitWarning)
 from carillon.jobs import Job
 from carillon.materials import material
 from carillon.meshes import MeshFile
@@ -29,5 +30,6 @@ from carillon.version import __version__
 summaries.shorten()
 
 __all__ = ["CarillonError", "Client", "ContactStream", "ContactWarning", "Contacts", "Forces", "Impulses", "Job",
-           "MeshFile", "Model", "Poses", "Scene", "ServerUnavailable", "Sound", "SoundingObject", "Trace",
-           "TransferWarning", "UnitWarning", "__version__", "aio", "connect", "default_server", "material", "striker"]
+           "LabelWarning", "MeshFile", "Model", "Poses", "Scene", "ServerUnavailable", "Sound", "SoundingObject",
+           "Trace", "TransferWarning", "UnitWarning", "__version__", "aio", "connect", "default_server", "material",
+           "striker"]

@@ -45,7 +45,10 @@ def connect(server: Optional[str] = None, *, tls_roots: str | os.PathLike[str] |
     PEM file with the certificates that vouch for a daemon with TLS. Over TCP the daemon may want to know the caller, by
     `token` (default: $CARILLON_TOKEN), or by the PEM files `tls_certificate` and `tls_key`."""
     checks.refuse_unknown(credentials, ("tls_roots", "token", "tls_certificate", "tls_key"), "connect")
-    return Client(server or default_server(), tls_roots, **credentials)
+    address = server or default_server()
+    if address.startswith("/") or address.lower().startswith(("http://", "https://")):
+        checks.refuse(address, "server", '"unix:PATH" or "HOST:PORT"')
+    return Client(address, tls_roots, **credentials)
 
 
 class Client:
@@ -103,7 +106,7 @@ class Client:
             settings=to_settings(settings, unit, accuracy), **request), more=("unit", "accuracy", "progress_bar"))
         message.mesh_digest = self.upload(file)
         with errors.translated(self.server):
-            return Job(self, self.models_stub.CreateModalModel(message).job, material)
+            return Job(self, self.models_stub.CreateModalModel(message).job, material, label or "")
 
     def create_model(self, mesh: Any, material: Material, *, progress_bar: progress.Progress = None,
                      **request: Any) -> Model:
@@ -339,6 +342,8 @@ class Recording:
     def take(self, seconds: float) -> Sound:
         """Waits until this much of the sound since the beginning was heard, and returns it. Raises CarillonError if the
         recording ends before."""
+        if not seconds > 0:
+            checks.refuse(seconds, "seconds", "more than 0")
         wanted = int(seconds * self._format.sample_rate_hz)
         with self._more:
             self._more.wait_for(lambda: self._frame_count >= wanted or self._error)

@@ -55,6 +55,23 @@ class UnitWarning(UserWarning):
     """A body is so large that its unit is likely to be wrong."""
 
 
+class LabelWarning(UserWarning):
+    """A model was there already, and has another label than the one that was asked for."""
+
+
+def warn_of_label(label: str, wanted: str) -> None:
+    """Warns of a model that was stored before, with the label `label` instead of `wanted`."""
+    _warn(f"the model of this body was stored before as '{label}' and keeps this label, so that '{wanted}' names no "
+          "model; an object that names no material now gets the material of this request, so name one where you add "
+          "the object", LabelWarning)
+
+
+def warn_of_open_stream(scene: str) -> None:
+    """Warns of a stream that was not closed before the program ended."""
+    _warn(f"a stream of {scene} was not closed, so that its last contacts may not have sounded; close it, or use it as "
+          "a context manager")
+
+
 def warn_of_unit(extent_m: float) -> None:
     """Warns of a body whose box has the diagonal `extent_m`, metres."""
     _warn(f"the body is {extent_m:.3g} m across; if its coordinates are in another unit than metres, cancel and give "

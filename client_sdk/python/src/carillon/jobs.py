@@ -18,6 +18,10 @@ if TYPE_CHECKING:
 LIKELY_EXTENT_M = 20
 
 
+# The daemon cuts longer labels.
+MOST_LABEL_BYTES = 200
+
+
 def to_states(states: Iterable[str]) -> list[Any]:
     """The values of the contract for states such as "failed"."""
     listed = [states] if isinstance(states, str) else states
@@ -27,9 +31,11 @@ def to_states(states: Iterable[str]) -> list[Any]:
 class Job:
     """A decomposition that waits, runs or has ended. `message` is its newest known state."""
 
-    def __init__(self, client: Client, message: decomposition_pb2.Job, material: Material | None = None):
+    def __init__(self, client: Client, message: decomposition_pb2.Job, material: Material | None = None,
+                 label: str = ""):
         self._client = client
         self._material = material
+        self._label = label  # that the caller wanted, if any
         self.message = message
 
     @property
@@ -74,7 +80,11 @@ class Job:
             raise errors.CarillonError("JOB_CANCELLED", f"{self.name} was cancelled; create the model again")
         if self.message.state != decomposition_pb2.JOB_STATE_SUCCEEDED:
             raise errors.from_info(self.message.error)
-        return self._client.model(self.message.modal_model, material=self._material)
+        model = self._client.model(self.message.modal_model, material=self._material)
+        if self._label != model.label and 0 < len(self._label.encode()) <= MOST_LABEL_BYTES:
+            errors.warn_of_label(model.label, self._label)
+            self._label = ""
+        return model
 
     def _note(self, message: decomposition_pb2.Job) -> None:
         """Takes a newer state, and warns once of a body so large that its unit is likely to be wrong."""

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import numbers
 import queue
@@ -225,6 +226,21 @@ def _refuse_other_scenes(columns: Contacts | Impulses | Forces | Poses | None, s
                                  "objects of that scene")
 
 
+class _OpenStreams:
+    """The streams that are not closed. When the program ends, it warns as at the end of each of them."""
+
+    def __init__(self) -> None:
+        self.streams: set[ContactStream] = set()
+        atexit.register(self.warn)
+
+    def warn(self) -> None:
+        for stream in self.streams:
+            stream._warn_of_end()
+
+
+_open_streams = _OpenStreams()
+
+
 class ContactStream:
     """Sends the contacts of each step without waiting for the daemon: a thread sends them, and another reads the
     answers. `report` is the newest answer, with the counts so far; `dropped_step_count` steps were not sent: the
@@ -243,6 +259,7 @@ class ContactStream:
         self._answers = scene.client.contacts_stub.StreamContacts(self._sent(start))
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
+        _open_streams.streams.add(self)
 
     @property
     def findings(self) -> contact_pb2.ContactFindings:
@@ -294,7 +311,7 @@ class ContactStream:
 
     def close(self, warn: bool = True) -> contact_service_pb2.StreamContactsResponse:
         """Waits until the daemon has taken all steps. Returns the last report."""
-        self._is_closed = True
+        self._end()
         self._requests.put(None)
         self._reader.join()
         if self._error:
@@ -302,6 +319,15 @@ class ContactStream:
         if warn:
             errors.warn_of_stream(self.report, contacts.frame_in_words(self._start.frame), self.dropped_step_count)
         return self.report
+
+    def _warn_of_end(self) -> None:
+        """Warns that the stream was not closed, and of its contacts that did not sound as the caller meant."""
+        errors.warn_of_open_stream(self._start.scene)
+        errors.warn_of_stream(self.report, contacts.frame_in_words(self._start.frame), self.dropped_step_count)
+
+    def _end(self) -> None:
+        self._is_closed = True
+        _open_streams.streams.discard(self)
 
     def _sent(self, start: contact_service_pb2.ContactStreamStart
               ) -> Iterator[contact_service_pb2.StreamContactsRequest]:
@@ -328,7 +354,7 @@ class ContactStream:
 
     def __exit__(self, kind: Any, *_: Any) -> None:
         if kind is not None:
-            self._is_closed = True
+            self._end()
             self._answers.cancel()
             self._reader.join()
         else:

@@ -7,6 +7,7 @@ import base64
 import dataclasses
 import io
 import os
+import pathlib
 import wave
 from typing import Any, Optional
 
@@ -52,7 +53,11 @@ class Sound:
         return dataclasses.replace(self, samples=self.samples * (peak / self.peak if self.peak else 1))
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes a WAV file of 24-bit samples; samples beyond full scale are clipped."""
+        """Writes a WAV file of 24-bit samples; samples beyond full scale are clipped. Raises ValueError if the name of
+        the file is that of another format."""
+        suffix = pathlib.PurePath(path).suffix.lower()
+        if suffix not in ("", ".wav", ".wave"):
+            raise ValueError(f"{os.fspath(path)} must end with .wav, because the file is a WAV file")
         with open(path, "wb") as file:
             file.write(self.wave_bytes())
 

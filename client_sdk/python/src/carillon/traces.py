@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator
-from typing import BinaryIO, Optional
+from typing import Any, BinaryIO, Optional
 
 from google.protobuf.message import DecodeError
 
@@ -53,6 +53,8 @@ class Trace:
         if not self.header.step_s and any(item is not None for item in (contacts, forces, poses)):
             raise ValueError("contacts, forces and poses need the length of the simulator's steps in seconds, as in a "
                              "stream: Trace(step=1/240)")
+        for columns in (contacts, impulses, forces, poses):
+            _refuse_objects_of_scenes(columns)
         self.steps.append(make_step(time, contacts=contacts, impulses=impulses, forces=forces, poses=poses,
                                     listener=listener))
 
@@ -108,6 +110,16 @@ class Trace:
         if version > FORMAT_VERSION:
             raise CarillonError("TRACE_TOO_NEW", f"{source} has format version {version}, this program reads "
                                 f"{FORMAT_VERSION}; update it")
+
+
+def _refuse_objects_of_scenes(columns: Any) -> None:
+    """Raises ValueError for an object of a scene, whose handle may mean another object in the trace."""
+    for name in ("objects", "second_objects"):
+        given = getattr(columns, name, None)
+        for item in given if isinstance(given, (list, tuple)) else [given]:
+            if hasattr(item, "scene"):
+                raise ValueError(f"{name} has an object of {item.scene.name}, which is not in the trace; give what "
+                                 "Trace.add returned")
 
 
 def _read_varint(file: BinaryIO) -> Optional[int]:

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Mistakes of a caller of the Python package that would otherwise stay silent."""
+
+import subprocess
+import sys
+import unittest
+import warnings
+
+import numpy
+
+import carillon
+import meshes
+from test_python_package import BAR, PackageTest
+
+
+class MistakesTest(PackageTest):
+    def test_a_model_that_keeps_its_label_is_told(self):
+        with self.assertWarnsRegex(carillon.LabelWarning, "before as 'bar' and keeps this label, so that 'beam' names"):
+            self.assertEqual(self.c.create_model(BAR, meshes.MATERIAL, label="beam").label, "bar")
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", carillon.LabelWarning)
+            self.c.create_model(BAR, meshes.MATERIAL, label="bar")
+            self.c.create_model(BAR, meshes.MATERIAL)
+
+    def test_a_stream_that_is_not_closed_is_told_at_the_end_of_the_program(self):
+        script = ("import carillon, time\n"
+                  f"c = carillon.connect({self.c.server!r})\n"
+                  "scene = c.scene()\n"
+                  f"bar = scene.add({self.model.name!r})\n"
+                  "stream = scene.stream(step=1 / 240)\n"
+                  "for i in range(160):\n"
+                  "    stream.step(i / 240, contacts=carillon.Contacts(bar, [(90, 0, 0)], [(0, 0, -1e-3)]))\n"
+                  "    time.sleep(1 / 240)\n")
+        done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, timeout=60)
+        self.assertRegex(done.stderr, "a stream of scenes/.* was not closed")
+        self.assertRegex(done.stderr, r"lie up to [89]\d\S* m away")
+
+    def test_mistakes_that_were_silent_are_refused(self):
+        trace = carillon.Trace(step=1 / 240)
+        trace.add(self.model)
+        with self.c.scene() as scene:
+            bar = scene.add(self.model)
+            for objects in (bar, [bar]):
+                with self.assertRaisesRegex(ValueError, "which is not in the trace; give what Trace.add returned"):
+                    trace.step(0, impulses=carillon.Impulses(objects, [(0, 0, 0)], [(0, 0, -1e-3)]))
+        with self.assertRaisesRegex(ValueError, r"must end with \.wav"):
+            carillon.Sound(numpy.zeros((1, 1)), 48000, 0).save(self.folder / "x.mp3")
+        with self.assertRaisesRegex(ValueError, "seconds is -1; it must be more than 0"):
+            self.c.listen(-1)
+        for address in ("/run/carillond.sock", "http://localhost:1"):
+            with self.assertRaisesRegex(ValueError, '"unix:PATH" or "HOST:PORT"'):
+                carillon.connect(address)
+
+
+if __name__ == "__main__":
+    unittest.main()
