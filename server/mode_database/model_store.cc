@@ -260,7 +260,14 @@ absl::StatusOr<ModelSummary> ModelStore::Summary(const std::string& digest) {
     summary = SelectModel(connection, digest);
     return summary.status();
   }));
+  AddSounded(*summary);
   return summary;
+}
+
+void ModelStore::AddSounded(ModelSummary& summary) {
+  const MutexLock lock(&cache_mutex_);
+  const auto sounded = sounded_.find(summary.digest);
+  if (sounded != sounded_.end()) summary.sounded_unix_ms = sounded->second;
 }
 
 absl::StatusOr<std::vector<double>> ModelStore::Eigenvalues(const std::string& digest) {
@@ -285,6 +292,7 @@ absl::StatusOr<ModelPage> ModelStore::List(const ModelFilter& filter, int page_s
     return absl::OkStatus();
   }));
   for (const auto& [digest, why] : damaged) Quarantine(digest, why).IgnoreError();
+  for (ModelSummary& model : page.models) AddSounded(model);
   // Damaged models are left out of the page, which makes it shorter but not the last one.
   is_full |= std::ssize(page.models) + std::ssize(damaged) == range.size;
   if (is_full && !page.models.empty()) {

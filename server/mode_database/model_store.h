@@ -247,6 +247,8 @@ class ModelStore {
                                      ModelSummary named);
   absl::Status Quarantine(const std::string& digest, const absl::Status& why);
   bool InMemory(const std::string& digest) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(cache_mutex_);
+  /// Sets the time at which the model sounded last, if that is not stored yet.
+  void AddSounded(ModelSummary& summary);
   absl::Status WriteSounded(SqliteConnection& connection)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(cache_mutex_);
 

@@ -309,6 +309,9 @@ TEST_F(ModeDatabaseTest, CollectionTakesTheLeastRecentlySoundedAndNeverThePinned
   const uint64_t size = database_->models().Summary(a_)->stored_bytes;
   ASSERT_TRUE(database_->models().Update(a_, {.pinned = true}).ok());
   ASSERT_TRUE(database_->models().FindToSound(b_).ok());
+  EXPECT_EQ(database_->models().Summary(a_)->sounded_unix_ms, 0);
+  EXPECT_GT(database_->models().Summary(b_)->sounded_unix_ms, 0);
+  EXPECT_GT(database_->models().List({}, 10, "")->models[2].sounded_unix_ms, 0);
   const auto sounds = database_->models().Find(c);
   EXPECT_EQ(database_->models().Collect(4 * size)->model_count, 0U);
   const auto first = database_->models().Collect(3 * size);
