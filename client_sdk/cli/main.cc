@@ -313,7 +313,20 @@ std::string ConversionText(const CLI::App& app, const CLI::ParseError& error) {
   const std::vector<std::string> parts = absl::StrSplit(text, absl::MaxSplits(" = ", 1));
   const CLI::Option* option = parts.size() == 2 ? FindOption(app, parts[0]) : nullptr;
   if (option == nullptr) return error.what();
-  return absl::StrCat(parts[0], " cannot be ", parts[1], ": ", option->get_description());
+  // A vector with too few numbers takes the next option for one.
+  const std::string given = parts[1].substr(0, parts[1].find(",--"));
+  return absl::StrCat(parts[0], " cannot be ", given, ": ", option->get_description());
+}
+
+/// Returns the names of the commands one of which must follow the chosen ones.
+std::string NextCommands(const CLI::App& app) {
+  const CLI::App* last = &app;
+  while (!last->get_subcommands().empty()) last = last->get_subcommands().back();
+  const std::vector<const CLI::App*> commands = ListedCommands(*last);
+  const auto name = [](std::string* text, const CLI::App* command) {
+    absl::StrAppend(text, command->get_name());
+  };
+  return absl::StrJoin(commands, ", ", name);
 }
 
 /// Returns the text of a usage error. If required options are missing, the text names them all.
@@ -323,9 +336,12 @@ std::string MistakeText(const CLI::App& app, const CLI::ParseError& error) {
   }
   std::vector<std::string> missing;
   if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr) AddMissing(app, missing);
-  const std::string what = missing.size() > 1
-                               ? absl::StrCat(absl::StrJoin(missing, ", "), " are required")
-                               : error.what();
+  std::string what = missing.size() > 1
+                         ? absl::StrCat(absl::StrJoin(missing, ", "), " are required")
+                         : error.what();
+  if (what == "A subcommand is required") {
+    what = absl::StrCat("a command is missing, one of ", NextCommands(app));
+  }
   return absl::StrCat(what, "\nRun with --help for more information.");
 }
 

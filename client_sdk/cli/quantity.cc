@@ -3,8 +3,8 @@
 
 #include <cmath>
 
+#include "absl/strings/match.h"
 #include "absl/strings/numbers.h"
-#include "absl/strings/strip.h"
 #include "absl/time/time.h"
 
 namespace carillon::cli {
@@ -23,7 +23,8 @@ std::optional<int64_t> ParseTimeUnixMs(const std::string& text) {
 std::optional<double> ParseGain(const std::string& text) {
   absl::string_view number = text;
   constexpr double kMostGain = 1e6;
-  const bool decibels = absl::ConsumeSuffix(&number, "dB");
+  const bool decibels = absl::EndsWithIgnoreCase(number, "dB");
+  if (decibels) number.remove_suffix(2);
   double value = 0;
   if (!absl::SimpleAtod(number, &value) || !std::isfinite(value)) return std::nullopt;
   const double gain = decibels ? std::pow(10, value / 20) : value;

@@ -14,12 +14,16 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
+#include "absl/strings/strip.h"
 #include "proto/cpp/error_reason.h"
 
 namespace carillon::cli {
 namespace {
 
-absl::Status NotWritable(const std::string& path, const char* why) {
+absl::Status NotWritable(const std::string& path, absl::string_view why) {
+  absl::ConsumePrefix(&why, "System error : ");
+  absl::ConsumeSuffix(&why, ".");
   return Refusal(absl::StatusCode::kInternal, "OUTPUT_NOT_WRITABLE",
                  absl::StrCat(path, ": ", why, "; choose another file"));
 }

@@ -112,7 +112,8 @@ class WrongValuesTest(unittest.TestCase):
         create = ("model", "create", ROOT / "README.md")
         for words, expected in (((*strike[:-1], "0,0,0"), "--impulse: a strike with an impulse of 0,0,0 is silent"),
                                 (("strike", "bar", "--point", "0,0", "--impulse", "0,0,1"),
-                                 "--point cannot be 0,0,--impulse: The struck point: X,Y,Z or X Y Z"),
+                                 "--point cannot be 0,0: The struck point: X,Y,Z or X Y Z"),
+                                (("job",), "a command is missing, one of list, "),
                                 ((*strike, "--size", "0"), '--size: "0" must be a number from 0.001 to 1000'),
                                 ((*strike, "--seconds", "-3"), '--seconds: "-3" must be a number from 0'),
                                 ((*strike, "--seconds", "nan"), '--seconds: "nan" must be'),

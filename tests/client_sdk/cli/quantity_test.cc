@@ -30,7 +30,8 @@ TEST(Quantity, AGainIsAFactorOrDecibels) {
   EXPECT_EQ(ParseGain("0"), 0);
   EXPECT_EQ(ParseGain("0dB"), 1);
   EXPECT_DOUBLE_EQ(*ParseGain("-20dB"), 0.1);
-  for (const char* text : {"", "dB", "-1", "-6", "loud", "nan", "inf", "1e9", "400dB", "6 db"}) {
+  EXPECT_DOUBLE_EQ(*ParseGain("20db"), 10);
+  for (const char* text : {"", "dB", "-1", "-6", "loud", "nan", "inf", "1e9", "400dB", "6 d"}) {
     EXPECT_FALSE(ParseGain(text)) << text;
   }
 }
