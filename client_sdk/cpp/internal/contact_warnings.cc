@@ -22,7 +22,8 @@ void AddFindings(const v1::ContactFindings& findings, uint64_t accepted_count,
   if (findings.regular_gap_s() > 0) {
     warnings.push_back(absl::StrFormat(
         "most steps came %.3g s apart, which is longer than the step_s that was stated, so that a "
-        "body at rest strikes in each of them; state the step of the simulator, in seconds",
+        "body at rest strikes in each of them; state the step of the simulator and the times of "
+        "steps in seconds",
         findings.regular_gap_s()));
   }
   if (const uint64_t count = findings.fast_impulse_count(); count > 0) {

@@ -52,7 +52,7 @@ function warnOfContacts(findings, frame, acceptedCount = 0) {
   const gap = findings?.regular_gap_s ?? 0;
   if (gap) {
     warn(`most steps came ${Number(gap.toPrecision(3))} s apart, which is longer than the step that was stated, so that a ` +
-      'body at rest strikes in each of them; state the step of the simulator, in seconds');
+      'body at rest strikes in each of them; state the step of the simulator and the times of steps in seconds');
   }
   const fast = Number(findings?.fast_impulse_count ?? 0);
   if (fast) {
