@@ -91,8 +91,8 @@ def warn_of_contacts(findings: contact_pb2.ContactFindings, frame: str, accepted
     `accepted_count` the number of impulses that sounded."""
     if findings.regular_gap_s:
         _warn(f"most steps came {findings.regular_gap_s:.3g} s apart, which is longer than the step that was stated, "
-              "so that a body at rest strikes in each of them; state the step of the simulator and the times of steps in "
-              "seconds")
+              "so that a body at rest strikes in each of them; state the step of the simulator and the times of steps "
+              "in seconds")
     if count := findings.fast_impulse_count:
         _warn(f"{counted(count, 'contact')} changed the speed of an object by up to "
               f"{findings.largest_speed_change_m_per_s:.3g} m/s; give impulses in newton seconds, which are forces "
