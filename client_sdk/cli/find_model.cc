@@ -158,10 +158,11 @@ std::string SharedLabel(const client::Client& daemon, const v1::ModalModelSummar
 std::string OtherLabel(const v1::ModalModelSummary& model, const std::string& wanted) {
   constexpr size_t kMostBytes = 200;  // the daemon cuts longer labels
   if (model.label() == wanted || wanted.size() > kMostBytes) return "";
-  return absl::StrCat("the model of this body was stored before as '", model.label(),
-                      "' and keeps this label, so that '", wanted,
-                      "' names no model; an object that names no material now gets the material of "
-                      "this request: give --material to strike and the like");
+  return absl::StrCat(
+      "the model of this body is known as '", model.label(), "' and keeps this label, so that '",
+      wanted,
+      "' does not name it; an object that names no material now gets the material of "
+      "this request: give --material to strike and the like");
 }
 
 absl::StatusOr<std::string> FindJob(const client::Client& daemon, const std::string& text) {

@@ -89,7 +89,7 @@ test('mistakes with models and files are told, and a model is found by its label
   await assert.rejects(c.model(misspelt), { reason: 'MODAL_MODEL_NOT_FOUND',
     message: new RegExp(`'${misspelt}'.*did you mean '${model.label}'\\?`) });
   assert.match((await warningsOf(() => c.createModel(BAR, { material, label: 'beam' }))).join(),
-    /LabelWarning: .*keeps this label, so that 'beam' names no model/);
+    /LabelWarning: .*keeps this label, so that 'beam' does not name it/);
   assert.deepEqual(await warningsOf(() => c.createModel(BAR, { material, label: model.label })), []);
   const trace = new carillon.Trace();
   trace.add(model);

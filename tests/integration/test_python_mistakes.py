@@ -15,7 +15,7 @@ from test_python_package import BAR, PackageTest
 
 class MistakesTest(PackageTest):
     def test_a_model_that_keeps_its_label_is_told(self):
-        with self.assertWarnsRegex(carillon.LabelWarning, "before as 'bar' and keeps this label, so that 'beam' names"):
+        with self.assertWarnsRegex(carillon.LabelWarning, "known as 'bar' and keeps this label, so that 'beam'"):
             self.assertEqual(self.c.create_model(BAR, meshes.MATERIAL, label="beam").label, "bar")
         with warnings.catch_warnings():
             warnings.simplefilter("error", carillon.LabelWarning)

@@ -123,6 +123,7 @@ class Client {
    * for 1 %. `request` has other fields of CreateModalModelRequest, such as size, settings, max_frequency_hz or priority.
    */
   async createModel(mesh, { material, label, onProgress = () => {}, unit, accuracy, ...request } = {}) {
+    if (label !== undefined && label !== null && typeof label !== 'string') refuse(label, 'label of createModel', 'text');
     const own = { ...request, material: toMaterial(material) };
     refuseNoMessage(own, 'CreateModalModelRequest', 'createModel', ['label', 'onProgress', 'unit', 'accuracy']);
     Object.assign(own, given('settings', toSettings(request.settings, unit, accuracy)));

@@ -28,7 +28,7 @@ const MOST_LABEL_BYTES = 200;
 /** Warns of a model that was stored before, with the label `label` instead of the one that the caller wanted, if any. */
 function warnOfLabel(label, wanted) {
   if (!wanted || wanted === label || Buffer.byteLength(wanted) > MOST_LABEL_BYTES) return;
-  warn(`the model of this body was stored before as '${label}' and keeps this label, so that '${wanted}' names no model; ` +
+  warn(`the model of this body is known as '${label}' and keeps this label, so that '${wanted}' does not name it; ` +
     'an object that names no material now gets the material of this request, so name one where you add the object',
   'LabelWarning');
 }

@@ -123,7 +123,7 @@ TEST(OtherLabel, SaysThatAModelKeepsItsLabel) {
   v1::ModalModelSummary model;
   model.set_label("key_maple");
   EXPECT_THAT(OtherLabel(model, "key_oak"),
-              HasSubstr("as 'key_maple' and keeps this label, so that 'key_oak' names"));
+              HasSubstr("as 'key_maple' and keeps this label, so that 'key_oak' does not name"));
   EXPECT_EQ(OtherLabel(model, "key_maple"), "");
   EXPECT_EQ(OtherLabel(model, std::string(201, 'x')), "");
 }

@@ -61,8 +61,8 @@ class LabelWarning(UserWarning):
 
 def warn_of_label(label: str, wanted: str) -> None:
     """Warns of a model that was stored before, with the label `label` instead of `wanted`."""
-    _warn(f"the model of this body was stored before as '{label}' and keeps this label, so that '{wanted}' names no "
-          "model; an object that names no material now gets the material of this request, so name one where you add "
+    _warn(f"the model of this body is known as '{label}' and keeps this label, so that '{wanted}' does not name it; "
+          "an object that names no material now gets the material of this request, so name one where you add "
           "the object", LabelWarning)
 
 

@@ -83,7 +83,7 @@ class Job:
         model = self._client.model(self.message.modal_model, material=self._material)
         if self._label != model.label and 0 < len(self._label.encode()) <= MOST_LABEL_BYTES:
             errors.warn_of_label(model.label, self._label)
-            self._label = ""
+        self._label = ""
         return model
 
     def _note(self, message: decomposition_pb2.Job) -> None:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import atexit
 import contextlib
 import numbers
+import os
 import queue
 import threading
 from collections.abc import Iterable, Iterator, Mapping
@@ -232,9 +233,10 @@ class _OpenStreams:
     def __init__(self) -> None:
         self.streams: set[ContactStream] = set()
         atexit.register(self.warn)
+        os.register_at_fork(after_in_child=self.streams.clear)
 
     def warn(self) -> None:
-        for stream in self.streams:
+        for stream in list(self.streams):
             stream._warn_of_end()
 
 
@@ -302,6 +304,7 @@ class ContactStream:
             raise errors.CarillonError("CONTACT_STREAM_ENDED", "this stream has been closed, so that the step would "
                                        "not sound; open another one by Scene.stream")
         if self._error:
+            _open_streams.streams.discard(self)
             raise errors.from_rpc(self._error, self._server)
         if self._requests.qsize() >= MOST_WAITING:
             with contextlib.suppress(queue.Empty):  # the thread that sends may have taken it meanwhile

@@ -117,8 +117,9 @@ def _refuse_objects_of_scenes(columns: Any) -> None:
     for name in ("objects", "second_objects"):
         given = getattr(columns, name, None)
         for item in given if isinstance(given, (list, tuple)) else [given]:
-            if hasattr(item, "scene"):
-                raise ValueError(f"{name} has an object of {item.scene.name}, which is not in the trace; give what "
+            scene = getattr(getattr(item, "sync", item), "scene", None)
+            if scene is not None:
+                raise ValueError(f"{name} has an object of {scene.name}, which is not in the trace; give what "
                                  "Trace.add returned")
 
 
