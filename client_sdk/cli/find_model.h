@@ -18,8 +18,8 @@ absl::StatusOr<std::string> FindModel(const client::Client& daemon, const std::s
 /// each. Returns an empty string if no other model has the label.
 std::string SharedLabel(const client::Client& daemon, const v1::ModalModelSummary& model);
 
-/// Returns a sentence that says that a requested model was stored before with another label than
-/// the wanted one, and what follows from that. Returns an empty string if it has the wanted label.
+/// Returns a sentence that says that a requested model has another label than the wanted one, and
+/// what follows from that. Returns an empty string if it has the wanted label.
 std::string OtherLabel(const v1::ModalModelSummary& model, const std::string& wanted);
 
 /// Returns the name "jobs/{digest}" of the job that `text` means: its name, its label, or the first

@@ -6,6 +6,7 @@ from __future__ import annotations
 import dataclasses
 import numbers
 import operator
+from collections.abc import Iterator
 from typing import Any, Literal, Optional, Union
 
 import numpy
@@ -315,6 +316,17 @@ def add_poses(step: contact_pb2.ContactStep, given: Poses) -> None:
     append(step.pose_columns, object=handles_of(given.objects, len(positions)), position_m=positions)
     if given.orientations is not None:
         append(step.pose_columns, orientation=_rows(given.orientations, "orientations", 4, len(positions)))
+
+
+def scenes_of_objects(columns: Any) -> Iterator[tuple[str, str]]:
+    """Yields, for each object of a scene among the columns, the name of its column and that of the scene."""
+    for name in ("objects", "second_objects"):
+        given = getattr(columns, name, None)
+        for item in given if isinstance(given, (list, tuple)) else [given]:
+            # An object of asyncio stands for a synchronous one.
+            scene = getattr(getattr(item, "sync", item), "scene", None)
+            if scene is not None:
+                yield name, scene.name
 
 
 def make_step(time: float, *, contacts: Optional[Contacts] = None, impulses: Optional[Impulses] = None,

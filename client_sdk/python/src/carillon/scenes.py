@@ -219,12 +219,10 @@ class TraceRecording:
 
 def _refuse_other_scenes(columns: Contacts | Impulses | Forces | Poses | None, scene: str) -> None:
     """Raises ValueError for an object of another scene, where its handle may mean another object."""
-    for name in ("objects", "second_objects"):
-        given = getattr(columns, name, None)
-        for item in given if isinstance(given, (list, tuple)) else [given]:
-            if isinstance(item, SoundingObject) and item.scene.name != scene:
-                raise ValueError(f"{name} has an object of {item.scene.name}, and this is a stream of {scene}; give "
-                                 "objects of that scene")
+    for name, other in contacts.scenes_of_objects(columns):
+        if other != scene:
+            raise ValueError(f"{name} has an object of {other}, and this is a stream of {scene}; give objects of that "
+                             "scene")
 
 
 class _OpenStreams:

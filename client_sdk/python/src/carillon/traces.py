@@ -11,7 +11,7 @@ from google.protobuf.message import DecodeError
 
 from carillon import checks, contacts, materials
 from carillon.columns import varint
-from carillon.contacts import Contacts, Forces, Impulses, PoseLike, Poses, make_step
+from carillon.contacts import Contacts, Forces, Impulses, PoseLike, Poses, make_step, scenes_of_objects
 from carillon.errors import CarillonError
 from carillon.v1 import contact_pb2, contact_trace_pb2, hearing_pb2
 
@@ -114,13 +114,8 @@ class Trace:
 
 def _refuse_objects_of_scenes(columns: Any) -> None:
     """Raises ValueError for an object of a scene, whose handle may mean another object in the trace."""
-    for name in ("objects", "second_objects"):
-        given = getattr(columns, name, None)
-        for item in given if isinstance(given, (list, tuple)) else [given]:
-            scene = getattr(getattr(item, "sync", item), "scene", None)
-            if scene is not None:
-                raise ValueError(f"{name} has an object of {scene.name}, which is not in the trace; give what "
-                                 "Trace.add returned")
+    for name, scene in scenes_of_objects(columns):
+        raise ValueError(f"{name} has an object of {scene}, which is not in the trace; give what Trace.add returned")
 
 
 def _read_varint(file: BinaryIO) -> Optional[int]:
