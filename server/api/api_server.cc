@@ -209,8 +209,14 @@ absl::Status ApiServer::State::Listen(const ApiSettings& settings) {
                      Credentials(address, settings));
     RETURN_IF_ERROR(gate->Listen(address, servers->AddTaker(credentials)));
   }
-  if (!servers->Start({&admin, &models, &decompositions, &job_runs, &scenes, &contacts, &audio,
-                       &server_info})) {
+  if (!servers->Start({{admin, v1::AdminService::service_full_name()},
+                       {models, v1::ModalModelService::service_full_name()},
+                       {decompositions, v1::DecompositionService::service_full_name()},
+                       {job_runs, v1::JobRunService::service_full_name()},
+                       {scenes, v1::SceneService::service_full_name()},
+                       {contacts, v1::ContactService::service_full_name()},
+                       {audio, v1::AudioService::service_full_name()},
+                       {server_info, v1::ServerService::service_full_name()}})) {
     return Unready("LISTEN_FAILED",
                    "cannot serve: gRPC does not take the TLS files; see the line before");
   }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/api/grpc_servers.h"
 
-#include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/health_check_service_interface.h>
 
 #include <array>
@@ -10,6 +9,7 @@
 
 #include "absl/strings/match.h"
 #include "server/api/flood_guard.h"
+#include "server/api/reflection_service.h"
 #include "server/api/server_service.h"
 
 namespace carillon {
@@ -34,6 +34,8 @@ constexpr int kIdentityOnly = 1 << GRPC_COMPRESS_NONE;
 /// default of 4 MiB, a few connections that begin and cancel calls keep all threads busy for
 /// seconds.
 constexpr int kReadBytes = 16 << 10;
+
+constexpr char kHealthService[] = "grpc.health.v1.Health";
 
 constexpr size_t kCount = 1 + GrpcServers::kTcpCount;
 constexpr size_t kUnixServer = 0;
@@ -80,9 +82,8 @@ void LimitClients(size_t memory_bytes, grpc::ServerBuilder& builder) {
 }  // namespace
 
 GrpcServers::GrpcServers() {
-  // Builders that are made later add health and reflection to their servers.
+  // Builders that are made later add health to their servers.
   grpc::EnableDefaultHealthCheckService(true);
-  grpc::reflection::InitProtoReflectionServerBuilderPlugin();
   for (size_t i = 0; i < kCount; ++i) {
     builders_.push_back(std::make_unique<grpc::ServerBuilder>());
     LimitClients(i == kUnixServer ? kUnixMemoryBytes : kTcpMemoryBytes, *builders_.back());
@@ -105,9 +106,13 @@ std::unique_ptr<ConnectionTaker> GrpcServers::AddTaker(
   return std::make_unique<GrpcTaker>(std::move(acceptors));
 }
 
-bool GrpcServers::Start(absl::Span<grpc::Service* const> services) {
+bool GrpcServers::Start(absl::Span<const ServedService> services) {
+  std::vector<std::string> names = {kHealthService};
+  for (const ServedService& served : services) names.emplace_back(served.name);
+  reflection_ = MakeReflectionServices(std::move(names));
   for (const auto& builder : builders_) {
-    for (grpc::Service* const service : services) builder->RegisterService(service);
+    for (const ServedService& served : services) builder->RegisterService(&served.service);
+    for (const auto& service : reflection_) builder->RegisterService(service.get());
     std::unique_ptr<grpc::Server> server = builder->BuildAndStart();
     if (!server) return false;
     servers_.push_back(std::move(server));

@@ -14,6 +14,12 @@
 
 namespace carillon {
 
+/// A service and its full name.
+struct ServedService {
+  grpc::Service& service;
+  const char* name;
+};
+
 /// Several gRPC servers with the same services: one for Unix sockets, and one for each group of
 /// addresses over TCP.
 ///
@@ -22,7 +28,7 @@ namespace carillon {
 /// therefore end the streams of all others, if there were only one server.
 class GrpcServers {
  public:
-  /// Number of groups of addresses. Each server has a thread of its own, for reflection.
+  /// Number of groups of addresses.
   static constexpr size_t kTcpCount = 3;
 
   /// Memory that gRPC may take for the connections over Unix sockets.
@@ -42,9 +48,9 @@ class GrpcServers {
   std::unique_ptr<ConnectionTaker> AddTaker(
       const std::shared_ptr<grpc::ServerCredentials>& credentials);
 
-  /// Starts all servers. Returns false if gRPC does not take the credentials. The services must
-  /// outlive the servers.
-  bool Start(absl::Span<grpc::Service* const> services);
+  /// Starts all servers with these services, health and reflection. Returns false if gRPC does not
+  /// take the credentials. The services must outlive the servers.
+  bool Start(absl::Span<const ServedService> services);
 
   /// Sets the health of a service. Any thread may call it after Start.
   void SetHealth(const std::string& service, bool serves);
@@ -52,6 +58,7 @@ class GrpcServers {
  private:
   static constexpr std::chrono::milliseconds kGracePeriod{500};
 
+  std::vector<std::unique_ptr<grpc::Service>> reflection_;
   std::vector<std::unique_ptr<grpc::ServerBuilder>> builders_;
   std::vector<std::unique_ptr<grpc::Server>> servers_;
 };

@@ -33,7 +33,7 @@ DELAY_S = 0.05
 ATTACKERS_NICENESS = 19
 MOST_LATE = 0.05
 # gRPC keeps some threads of its own, whose number varies.
-MOST_THREADS = 46
+MOST_THREADS = 42
 # The first bytes of a TLS handshake: a record that says it is 512 bytes long.
 HALF_HANDSHAKE = bytes([22, 3, 1, 2, 0, 1])
 REST_S = torture.rounds(1, 60)
