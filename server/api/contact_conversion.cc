@@ -210,6 +210,8 @@ v1::ContactFindings ToProto(const IntakeFindings& findings) {
   proto.set_regular_gap_s(findings.regular_gap_s);
   proto.set_fast_impulse_count(findings.fast_impulse_count);
   proto.set_largest_speed_change_m_per_s(findings.largest_speed_change_m_per_s);
+  proto.set_changed_partner_count(findings.engine.changed_partner_count);
+  proto.set_standing_step_count(findings.standing_step_count);
   return proto;
 }
 

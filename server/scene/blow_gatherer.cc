@@ -19,6 +19,9 @@ constexpr double kLongestBlowS = 0.04;
 constexpr double kLoadS = 0.01;
 /// Blows that are farther apart than this are heard one by one, not as a tone.
 constexpr double kLastingS = 0.1;
+/// So many steps without a common partner, and this share of the steps in contact, are a mistake.
+constexpr uint64_t kManyChanges = 10;
+constexpr double kMostChanges = 0.8;
 
 std::array<float, 3> Scaled(std::array<float, 3> vector, double factor) {
   for (float& component : vector) component *= static_cast<float>(factor);
@@ -52,7 +55,7 @@ BlowGatherer::Events BlowGatherer::Begin(double time_s) {
     EndBeforeGap(std::min<double>(missing_count, LoadTracker::kStepCount), events);
   }
   step_s_ = follows_ && since_s > 0 ? since_s : nominal_step_s_;
-  time_s_ = time_s;
+  previous_time_s_ = std::exchange(time_s_, time_s);
   return events;
 }
 
@@ -99,6 +102,7 @@ BlowGatherer::Events BlowGatherer::End() {
 
 void BlowGatherer::End(Events& events) {
   touch_count_ = 0;
+  if (follows_) CountPartners();
   for (auto& [bodies, pair] : pairs_) Divide(bodies, pair, events);
   std::erase_if(pairs_,
                 [](const auto& pair) { return pair.second.load.idle() && !pair.second.blow; });
@@ -110,6 +114,33 @@ void BlowGatherer::End(Events& events) {
   }
   std::erase_if(objects_,
                 [](const auto& object) { return object.second.steps_without >= kKnotsToEnd; });
+}
+
+void BlowGatherer::CountPartners() {
+  for (auto pair = pairs_.begin(); pair != pairs_.end();) {
+    const uint32_t handle = pair->first.first;
+    bool touches = false, touched = false, stays = false;
+    for (; pair != pairs_.end() && pair->first.first == handle; ++pair) {
+      const bool now = !pair->second.touches.empty();
+      const bool before = pair->second.touched_s && pair->second.touched_s == previous_time_s_;
+      touches = touches || now;
+      touched = touched || before;
+      stays = stays || (now && before);
+    }
+    if (!touches || !touched) continue;
+    ++stays_in_contact_count_;
+    if (!stays) ++counts_.changed_partner_count;
+  }
+}
+
+BlowCounts BlowGatherer::counts() const {
+  BlowCounts counts = counts_;
+  const auto most = kMostChanges * static_cast<double>(stays_in_contact_count_);
+  if (counts.changed_partner_count < kManyChanges ||
+      static_cast<double>(counts.changed_partner_count) < most) {
+    counts.changed_partner_count = 0;
+  }
+  return counts;
 }
 
 BlowGatherer::Events BlowGatherer::Finish() {

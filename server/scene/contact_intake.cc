@@ -55,6 +55,7 @@ absl::Status ContactIntake::BeginStep(double time_s) {
   }
   Push(gatherer_.Begin(time_s));
   if (step_count_ > 0) intervals_.Add(time_s - time_s_);
+  stands_ = step_count_ > 0 && time_s == time_s_;
   time_s_ = time_s;
   ++step_count_;
   return absl::OkStatus();
@@ -85,6 +86,7 @@ absl::Status ContactIntake::TryStrike(const ObjectImpulse& impulse) {
 }
 
 void ContactIntake::Hold(std::span<const ObjectForce> forces) {
+  findings_.standing_step_count += std::exchange(stands_, false) ? 1 : 0;
   const MutexLock lock(&scene_.mutex());
   for (const ObjectForce& force : forces) {
     Note(force.contact, TryHold(force));
@@ -101,6 +103,7 @@ absl::Status ContactIntake::TryHold(const ObjectForce& force) {
 }
 
 void ContactIntake::Touch(std::span<const ObjectTouch> touches) {
+  findings_.standing_step_count += std::exchange(stands_, false) ? 1 : 0;
   const MutexLock lock(&scene_.mutex());
   for (const ObjectTouch& touch : touches) {
     Note(touch.contact, TryTouch(touch));

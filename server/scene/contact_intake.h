@@ -71,6 +71,7 @@ struct IntakeFindings {
   double regular_gap_s = 0;              ///< see StepIntervals::RegularGapS
   uint64_t fast_impulse_count = 0;       ///< impulses that change a speed by over 100 m/s
   double largest_speed_change_m_per_s = 0;
+  uint64_t standing_step_count = 0;  ///< steps of touches or forces at the time of the step before
 };
 
 /// Takes the reports of a client about one simulation, checks them, locates them on the objects of
@@ -169,6 +170,8 @@ class ContactIntake {
   const IntakeSettings settings_;
   TimeMapper mapper_;
   double time_s_ = 0;
+  bool stands_ =
+      false;  // whether this step, of which no force is known yet, has the last one's time
   StepIntervals intervals_;
   BlowGatherer gatherer_;
   PoseTimes pose_times_;

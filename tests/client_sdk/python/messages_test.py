@@ -92,6 +92,13 @@ class WarningsTest(unittest.TestCase):
         text, = self.told(ahead_s=4)
         self.assertRegex(text, "^the newest step sounds only in 4 s, .* render a carillon.Trace$")
 
+    def test_time_that_stands_still_and_partners_that_change_are_told(self):
+        self.assertEqual(self.told(findings={"standing_step_count": 9}), [])
+        text, = self.told(findings={"standing_step_count": 10})
+        self.assertRegex(text, "^10 steps with contacts had the time of the step before; give each step")
+        text, = self.told(findings={"changed_partner_count": 11})
+        self.assertRegex(text, "^in 11 steps an object in contact touched none of its partners .* number of that body$")
+
     def test_a_step_stated_too_short_and_impulses_that_are_all_zero_are_told(self):
         text, = self.told(findings={"regular_gap_s": 1 / 120, "blow_count": 9})
         self.assertIn("most steps came 0.00833 s apart", text)

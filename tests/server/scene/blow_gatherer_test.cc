@@ -122,6 +122,26 @@ TEST_F(BlowGathererTest, AfterAGapASmallerContactIsABlowAsIfTheStepsHadBeenSentE
   EXPECT_EQ(gatherer_.counts().load_count, 0U);
 }
 
+TEST_F(BlowGathererTest, PartnersThatChangeInEachStepAreCounted) {
+  const auto touch = [&](int i, std::initializer_list<uint32_t> partners) {
+    Step(i * kStepS, [&] {
+      for (const uint32_t partner : partners) {
+        gatherer_.Touch({.contact = {.handle = 3}, .partner = partner}, FeltBy(3, kTen));
+      }
+    });
+    return gatherer_.counts().changed_partner_count;
+  };
+  // A partner comes and goes beside one that stays.
+  int step = 0;
+  for (; step < 20; ++step) EXPECT_EQ(touch(step, {1, 100 + static_cast<uint32_t>(step)}), 0U);
+  // It counts from the tenth change on, once four fifths of the steps in contact are changes.
+  for (; step < 95; ++step) EXPECT_EQ(touch(step, {100 + static_cast<uint32_t>(step)}), 0U);
+  EXPECT_EQ(touch(step, {7}), 76U);
+  // A flight between two partners is no change.
+  Nothing(++step * kStepS);
+  EXPECT_EQ(touch(++step, {8}), 76U);
+}
+
 TEST_F(BlowGathererTest, WhatRestsIsALoadThoughEverySecondStepIsMissing) {
   uint64_t before = 0;
   for (int i = 0; i < 30; ++i) {

@@ -311,6 +311,25 @@ TEST_F(ReadingTest, AStepThatIsStatedTooShortIsFound) {
   EXPECT_NEAR(intake.findings().regular_gap_s, 8 * kStepS, 1e-12);
 }
 
+TEST_F(ReadingTest, StepsWithTouchesAtTheTimeOfTheStepBeforeAreCounted) {
+  ContactIntake intake = Open({});
+  ObjectTouch touch{.contact = SmallImpulse(1, 0.1).contact, .partner = 9};
+  // Open has begun a step at zero.
+  for (const double time_s : {0.0, 0.0, kStepS, kStepS}) {
+    ASSERT_TRUE(intake.BeginStep(time_s).ok());
+    intake.Touch(touch);
+    intake.Touch(touch);
+    intake.EndStep();
+  }
+  EXPECT_EQ(intake.findings().standing_step_count, 3U);
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_TRUE(intake.BeginStep(kStepS).ok());
+    intake.Strike(SmallImpulse(1, 0.1));
+    intake.EndStep();
+  }
+  EXPECT_EQ(intake.findings().standing_step_count, 3U);
+}
+
 TEST_F(ReadingTest, ImpulsesThatAreProbablyForcesAreCounted) {
   ContactIntake intake = Open({});
   for (const double impulse : {0.45, 44.0, 46.0, 0.45, 60.0, 50.0}) {

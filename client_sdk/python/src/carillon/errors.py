@@ -17,6 +17,8 @@ from carillon.v1 import contact_pb2, contact_service_pb2, error_pb2
 SCENE_FRAME = "the scene's frame"
 # Time by which a simulation in real time may run ahead.
 USUAL_LEAD_S = 0.25
+# Steps with one time that are no chance.
+MANY_STANDING_STEPS = 10
 DETAILS_KEY = "grpc-status-details-bin"
 # The caller's names of fields and calls of the contract that messages of the daemon mention.
 CALLER_NAMES = {"step_s": "step", "scheduling_delay_s": "delay", "glide_s": "glide",
@@ -93,6 +95,13 @@ def warn_of_contacts(findings: contact_pb2.ContactFindings, frame: str, accepted
         _warn(f"most steps came {findings.regular_gap_s:.3g} s apart, which is longer than the step that was stated, "
               "so that a body at rest strikes in each of them; state the step of the simulator and the times of steps "
               "in seconds")
+    if (count := findings.standing_step_count) >= MANY_STANDING_STEPS:
+        _warn(f"{count} steps with contacts had the time of the step before; give each step the simulation's time, in "
+              "seconds")
+    if count := findings.changed_partner_count:
+        _warn(f"in {count} steps an object in contact touched none of its partners of the step before, so that a body "
+              "at rest strikes in each of them; give a body the same partner in each step, such as the engine's number "
+              "of that body")
     if count := findings.fast_impulse_count:
         _warn(f"{counted(count, 'contact')} changed the speed of an object by up to "
               f"{findings.largest_speed_change_m_per_s:.3g} m/s; give impulses in newton seconds, which are forces "
