@@ -80,7 +80,8 @@ std::optional<ConnectionCalls> ReadConnectionCalls(int64_t id) {
   const json& data = (*socket)["data"];
   return ConnectionCalls{.begun_count = Number(data, "streamsStarted"),
                          .answered_count = Number(data, "streamsSucceeded"),
-                         .failed_count = Number(data, "streamsFailed")};
+                         .failed_count = Number(data, "streamsFailed"),
+                         .message_count = Number(data, "messagesReceived")};
 }
 
 }  // namespace carillon

@@ -18,7 +18,11 @@ struct GrpcConnection {
 struct ConnectionCalls {
   uint64_t begun_count = 0;
   uint64_t answered_count = 0;
-  uint64_t failed_count = 0;  ///< calls that ended without an answer, as cancelled calls do
+  uint64_t failed_count = 0;   ///< calls that ended without an answer, as cancelled calls do
+  uint64_t message_count = 0;  ///< whole messages that the client has sent
+
+  /// Returns a number that grows with each call and message of the client.
+  uint64_t progress() const noexcept { return begun_count + message_count; }
 
   /// Returns the number of open calls. gRPC reads its counts one after another while calls go on,
   /// so the count of ended calls may exceed the count of begun calls.

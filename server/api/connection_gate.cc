@@ -29,6 +29,7 @@
 #include "server/api/client_limits.h"
 #include "server/api/guess_limiter.h"
 #include "server/api/peer_name.h"
+#include "server/api/received_bytes.h"
 
 namespace carillon {
 namespace {
@@ -303,7 +304,6 @@ bool ConnectionGate::IsOpen(const std::string& peer) const {
 }
 
 bool ConnectionGate::Refuse(const std::string& peer) {
-  const auto now = Now();
   const MutexLock lock(&mutex_);
   const auto found = connections_.find(peer);
   if (found == connections_.end() || found->second.refused || !found->second.is_open()) {
@@ -313,9 +313,26 @@ bool ConnectionGate::Refuse(const std::string& peer) {
   // gRPC, which owns the descriptor, then sees the end of the connection and closes the descriptor.
   shutdown(found->second.descriptor, SHUT_RDWR);
   DiscardReceived(found->second.descriptor);
-  std::erase_if(refused_, [now](const auto& each) { return each.second <= now; });
-  refused_.insert_or_assign(source_of_(peer), now + RefusalTimeOf(peer));
+  RefuseSourceLocked(peer);
   return true;
+}
+
+bool ConnectionGate::RefuseSource(const std::string& peer) {
+  const MutexLock lock(&mutex_);
+  return RefuseSourceLocked(peer);
+}
+
+bool ConnectionGate::RefuseSourceLocked(const std::string& peer) {
+  const auto now = Now();
+  std::erase_if(refused_, [now](const auto& each) { return each.second <= now; });
+  return refused_.insert_or_assign(source_of_(peer), now + RefusalTimeOf(peer)).second;
+}
+
+std::optional<uint64_t> ConnectionGate::ReceivedBytes(const std::string& peer) const {
+  const MutexLock lock(&mutex_);
+  const auto found = connections_.find(peer);
+  if (found == connections_.end() || !found->second.is_open()) return std::nullopt;
+  return carillon::ReceivedBytes(found->second.descriptor);
 }
 
 std::chrono::seconds ConnectionGate::RefusalTimeOf(const std::string& peer) const {

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -86,6 +87,14 @@ class ConnectionGate {
   /// the connection is not open or is ending already. Any thread may call it.
   bool Refuse(const std::string& peer);
 
+  /// Closes new connections of the process or address of this peer at once, as Refuse does, and
+  /// leaves the open ones alone. Returns false if it does so already. Any thread may call it.
+  bool RefuseSource(const std::string& peer);
+
+  /// Returns how many bytes have come over the open TCP connection with this name. Returns nothing
+  /// for a Unix socket, of which the system does not count them. Any thread may call it.
+  std::optional<uint64_t> ReceivedBytes(const std::string& peer) const;
+
   /// Returns the time for which Refuse keeps out the process or address of this connection.
   std::chrono::seconds RefusalTimeOf(const std::string& peer) const;
 
@@ -123,6 +132,8 @@ class ConnectionGate {
   /// Returns why a process or address gets no place, or an empty string if it gets one.
   std::string WhyNoPlace(const std::string& source) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void Tell(const std::string& source, const std::string& reason);
+  /// Returns false if the source of `peer` is refused already.
+  bool RefuseSourceLocked(const std::string& peer) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   /// Logs a line, unless a line about the same `subject` was logged within kRefusal.
   void WarnOnce(const std::string& subject, const std::string& line);
   /// Logs at most once a second which socket files somebody has removed or replaced meanwhile.

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "server/api/server_service.h"
 
 namespace carillon {
 namespace {
@@ -21,8 +22,14 @@ constexpr double kMostLoad = 0.05;
 /// Number of newest connections that are examined each time, in addition to the busy ones.
 constexpr size_t kNewest = 64;
 constexpr size_t kInTurn = 64;
+/// Period after which the bytes that came without progress are forgotten. A client that only
+/// receives sends some bytes for that, too.
+constexpr std::chrono::minutes kForgiving(1);
 /// Time over which the rate of failed calls is averaged.
 constexpr double kWindowS = 0.5;
+constexpr double kWindowOfSourceS = 1;
+/// Sources without connections are remembered for this time.
+constexpr std::chrono::seconds kSweepPeriod(2);
 
 /// Returns the processor time that this thread has taken.
 double ProcessorTimeS() {
@@ -73,13 +80,22 @@ void FloodGuard::Run() {
 
 void FloodGuard::Look(Clock::time_point now) {
   WatchNewConnections(now);
+  if (now >= next_sweep_) {
+    next_sweep_ = now + kSweepPeriod;
+    std::erase_if(sources_, [now](const auto& each) {
+      return each.second.connection_count == 0 && now - each.second.since > kSweepPeriod;
+    });
+  }
   for (const int64_t id : ChooseConnections()) LookAt(watched_.find(id), now);
 }
 
 void FloodGuard::WatchNewConnections(Clock::time_point now) {
   const int64_t first_id = watched_.empty() ? 0 : watched_.rbegin()->first + 1;
   for (GrpcConnection& connection : ListConnections(first_id)) {
-    watched_[connection.id] = {.peer = std::move(connection.peer), .calls = {}, .since = now};
+    std::string source = SourceOfPeer(connection.peer);
+    ++sources_[source].connection_count;
+    watched_[connection.id] = {
+        .peer = std::move(connection.peer), .source = std::move(source), .calls = {}, .since = now};
   }
 }
 
@@ -99,17 +115,71 @@ std::vector<int64_t> FloodGuard::ChooseConnections() {
   return chosen;
 }
 
+void FloodGuard::CountForSource(Watched& watched, const ConnectionCalls* now) {
+  Source& source = sources_[watched.source];
+  const ConnectionCalls before = std::exchange(watched.newest, now ? *now : ConnectionCalls());
+  source.open_count -= before.open_count();
+  if (now == nullptr) {
+    --source.connection_count;
+    source.failed_count += before.open_count();
+    return;
+  }
+  watched.busy = now->begun_count != before.begun_count;
+  source.open_count += now->open_count();
+  source.failed_count += now->failed_count - before.failed_count;
+}
+
+std::string FloodGuard::FindFloodOfSource(Source& source, Clock::time_point now) {
+  if (source.open_count > kMaxCallsOfSource) {
+    return absl::StrCat("it has ", source.open_count, " open calls on ", source.connection_count,
+                        " connections, and at most ", kMaxCallsOfSource, " are allowed");
+  }
+  const double seconds = std::max(SecondsOf(now - source.since), kWindowOfSourceS);
+  const auto failed = static_cast<double>(source.failed_count);
+  if (SecondsOf(now - source.since) > kWindowOfSourceS) {
+    source.failed_count = 0;
+    source.since = now;
+  }
+  if (failed <= kMaxFailedCallsOfSource * seconds) return "";
+  return absl::StrCat("it has begun and left ", failed, " calls within ",
+                      std::ceil(10 * seconds) / 10, " s, and at most ", kMaxFailedCallsOfSource,
+                      " a second are allowed");
+}
+
+std::string FloodGuard::FindIdleBytes(Watched& watched, const ConnectionCalls& calls,
+                                      Clock::time_point now) {
+  const std::optional<uint64_t> received = gate_.ReceivedBytes(watched.peer);
+  if (!received) return "";
+  if (calls.progress() != watched.progress || now - watched.forgiven > kForgiving) {
+    watched.progress = calls.progress();
+    watched.counted_bytes = *received;
+    watched.forgiven = now;
+  }
+  const uint64_t idle = *received - watched.counted_bytes;
+  if (idle <= kMostIdleBytes + calls.open_count() * kMaxMessageBytes) return "";
+  return absl::StrCat("it has sent ", idle >> 20U,
+                      " MiB that are neither calls nor whole messages, such as headers without an "
+                      "end");
+}
+
 void FloodGuard::LookAt(WatchedById::iterator at, Clock::time_point now) {
   const std::optional<ConnectionCalls> calls = ReadConnectionCalls(at->first);
+  Watched& watched = at->second;
+  CountForSource(watched, calls ? &*calls : nullptr);
+  const auto source = sources_.find(watched.source);
+  const std::string flood_of_source = FindFloodOfSource(source->second, now);
+  if (!flood_of_source.empty() && gate_.RefuseSource(watched.peer)) {
+    log_.Warn(absl::StrCat("refuses connections of ", watched.source, " for ",
+                           gate_.RefusalTimeOf(watched.peer).count(), " s: ", flood_of_source));
+  }
   if (!calls) {
     watched_.erase(at);
     return;
   }
-  Watched& watched = at->second;
-  watched.busy = calls->begun_count != watched.begun_count;
-  watched.begun_count = calls->begun_count;
   const double seconds = SecondsOf(now - watched.since);
-  const std::string flood = FindFlood(watched.calls, *calls, seconds);
+  std::string flood = FindFlood(watched.calls, *calls, seconds);
+  if (flood.empty()) flood = FindIdleBytes(watched, *calls, now);
+  if (flood.empty() && source->second.open_count > kMaxCallsOfSource) flood = flood_of_source;
   if (!flood.empty() && gate_.Refuse(watched.peer)) {
     log_.Warn(absl::StrCat("closed the connection ", watched.peer, ": ", flood,
                            "; connections from there are refused for ",

@@ -23,12 +23,25 @@ inline constexpr int kMaxCallsOfConnection = 256;
 /// second.
 inline constexpr double kMaxFailedCallsPerSecond = 2000;
 
+/// Greatest number of open calls on all connections of one process (Unix) or address (TCP).
+inline constexpr uint64_t kMaxCallsOfSource = 16'384;
+
+/// Greatest number of calls that may fail in a second on all connections of one process or address,
+/// averaged over a second. Calls fail that are open when their connection ends.
+inline constexpr double kMaxFailedCallsOfSource = 5000;
+
+/// Greatest number of bytes that may come over a TCP connection in a minute without a new call or a
+/// whole message, in addition to a message of the greatest size for each open call.
+inline constexpr uint64_t kMostIdleBytes = uint64_t{4} << 20U;
+
 /// Returns the reason to close a connection with these counts, as a text for an operator, or an
 /// empty string if the connection may stay. `before` was counted `seconds` before `now`.
 std::string FindFlood(const ConnectionCalls& before, const ConnectionCalls& now, double seconds);
 
 /// A thread that closes connections whose clients begin calls without end, because gRPC 1.51 bounds
-/// neither calls that are cancelled at once nor calls that never send their message. The guard also
+/// neither calls that are cancelled at once nor calls that never send their message, and keeps the
+/// headers of a call that never end. It also counts the calls of each process and address, so that
+/// a client that makes a new connection for each flood is found. The guard also
 /// refuses further connections from the same process (Unix) or address (TCP) for
 /// ConnectionGate::RefusalTimeOf().
 class FloodGuard {
@@ -45,12 +58,24 @@ class FloodGuard {
   using Clock = std::chrono::steady_clock;
   struct Watched {
     std::string peer;
+    std::string source;        ///< SourceOfPeer
+    ConnectionCalls newest{};  ///< counts at the last look
     ConnectionCalls calls;     ///< counts at the start of the span over which calls are counted
     Clock::time_point since;   ///< start of that span
-    uint64_t begun_count = 0;  ///< calls begun by the last look at the connection
-    bool busy = false;         ///< whether calls had begun between the last two looks
+    uint64_t progress = 0;     ///< ConnectionCalls::progress() when it changed last
+    /// Bytes that had come when the progress changed last, or when bytes were last forgiven.
+    uint64_t counted_bytes = 0;
+    Clock::time_point forgiven{};
+    bool busy = false;  ///< whether calls had begun between the last two looks
   };
   using WatchedById = std::map<int64_t, Watched>;
+  /// The calls on all connections of a process or address.
+  struct Source {
+    size_t connection_count = 0;
+    uint64_t open_count = 0;
+    uint64_t failed_count = 0;  ///< since the start of the span over which they are counted
+    Clock::time_point since{};
+  };
 
   void Run();
   /// Examines the connections that most likely flood, which are the newest and the busy ones, and
@@ -59,10 +84,20 @@ class FloodGuard {
   void WatchNewConnections(Clock::time_point now);
   std::vector<int64_t> ChooseConnections();
   void LookAt(WatchedById::iterator at, Clock::time_point now);
+  /// Counts what has happened on a connection since the last look for its source. `now` is null if
+  /// the connection has ended.
+  void CountForSource(Watched& watched, const ConnectionCalls* now);
+  /// Returns the reason to refuse a source, or an empty string.
+  std::string FindFloodOfSource(Source& source, Clock::time_point now);
+  /// Returns the reason to close a connection whose client sends bytes that are neither calls nor
+  /// whole messages, or an empty string.
+  std::string FindIdleBytes(Watched& watched, const ConnectionCalls& calls, Clock::time_point now);
 
   ConnectionGate& gate_;
   LimitedLog& log_;
   WatchedById watched_;
+  std::map<std::string, Source> sources_;
+  Clock::time_point next_sweep_{};
   int64_t next_in_turn_ = 0;
   std::binary_semaphore stop_{0};
   std::thread thread_;

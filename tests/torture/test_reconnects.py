@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A client that begins calls on ever new connections, or on many at once. The daemon refuses its process, and goes on
+for the others."""
+
+import contextlib
+import multiprocessing
+import socket
+import time
+import unittest
+
+import torture
+from carillon.v1 import audio_service_pb2
+from http2_frames import END_HEADERS, HEADERS, PREFACE, SETTINGS, field, frame
+
+CALLS = 250
+SECONDS = torture.rounds(4, 20)
+HOLDERS = 100
+FIELDS = b"".join(field(name, value) for name, value in (
+    (b":method", b"POST"), (b":scheme", b"http"), (b":path", b"/carillon.v1.AudioService/GetMixer"),
+    (b":authority", b"localhost"), (b"te", b"trailers"), (b"content-type", b"application/grpc")))
+BYTES = PREFACE + frame(SETTINGS, 0, b"") + b"".join(
+    frame(HEADERS, 1 + 2 * i, FIELDS, END_HEADERS) for i in range(CALLS))
+
+
+def connect(path):
+    connection = socket.socket(socket.AF_UNIX)
+    connection.settimeout(1)
+    connection.connect(path)
+    connection.sendall(BYTES)
+    return connection
+
+
+def begin_and_leave(path, seconds):
+    """Connections that begin CALLS calls and are closed at once."""
+    end_s = time.monotonic() + seconds
+    while time.monotonic() < end_s:
+        with contextlib.suppress(OSError):
+            connect(path).close()
+
+
+def begin_and_stay(path, seconds):
+    """HOLDERS connections whose calls stay open."""
+    held = []
+    for _ in range(HOLDERS):
+        with contextlib.suppress(OSError):
+            held.append(connect(path))
+    time.sleep(seconds)
+
+
+class ReconnectsTest(torture.ServedTest):
+    def attacked(self, attack):
+        """The daemon's log, and the longest call of another process after the attack was noticed."""
+        self.serve()
+        attacker = multiprocessing.get_context("spawn").Process(
+            target=attack, args=(str(self.folder / "socket"), SECONDS), daemon=True)
+        attacker.start()
+        self.addCleanup(attacker.kill)
+        log = self.folder / "log"
+        noticed_s = torture.wait_until(lambda: "refuses connections of unix:pid-" in log.read_text(), 60)
+        begin_s = time.monotonic()
+        # The kernel may refuse a first connection, because the attacker's fill the queue.
+        self.client.audio.GetMixer(audio_service_pb2.GetMixerRequest(), timeout=60, wait_for_ready=True)
+        backlog_s = time.monotonic() - begin_s
+        times, most_mib = self.calls(self.client.audio.GetMixer, SECONDS / 2)
+        print(f"{attack.__name__}: noticed after {noticed_s:.1f} s, a backlog of {backlog_s:.1f} s, then at most "
+              f"{max(times):.2f} s a call, {most_mib:.0f} MiB", flush=True)
+        attacker.join()
+        return log.read_text(), max(times)
+
+    def test_calls_that_are_left_on_ever_new_connections(self):
+        log, longest_s = self.attacked(begin_and_leave)
+        self.assertRegex(log, r"it has begun and left \d+ calls within \S+ s, and at most 5000 a second are allowed")
+        self.assertLess(longest_s, 2)
+
+    def test_calls_that_are_held_on_many_connections(self):
+        log, longest_s = self.attacked(begin_and_stay)
+        self.assertRegex(log, r"it has \d+ open calls on \d+ connections, and at most 16384 are allowed")
+        self.assertLess(longest_s, 2)
+
+
+if __name__ == "__main__":
+    unittest.main()
