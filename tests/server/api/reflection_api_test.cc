@@ -75,6 +75,30 @@ TEST_F(ReflectionTest, ListsEveryService) {
   EXPECT_TRUE(reflected.End().ok());
 }
 
+TEST_F(ReflectionTest, HasTheFileOfEveryServiceThatItLists) {
+  Reflected reflected(channel());
+  reflection::ServerReflectionRequest request;
+  request.set_list_services("");
+  const auto answer = reflected.Ask(request);
+  for (const auto& service : answer.list_services_response().service()) {
+    EXPECT_TRUE(reflected.AskForSymbol(service.name()).has_file_descriptor_response())
+        << service.name();
+  }
+}
+
+TEST_F(ReflectionTest, EndsACallThatAsksWithoutEnd) {
+  grpc::ClientContext context;
+  const auto stub = reflection::ServerReflection::NewStub(channel());
+  const auto stream = stub->ServerReflectionInfo(&context);
+  reflection::ServerReflectionRequest request;
+  request.set_list_services("");
+  reflection::ServerReflectionResponse response;
+  int count = 0;
+  while (stream->Write(request) && stream->Read(&response)) ++count;
+  EXPECT_EQ(count, 1000);
+  ExpectRefused(stream->Finish(), grpc::StatusCode::RESOURCE_EXHAUSTED, "CLIENT_LIMIT_REACHED");
+}
+
 TEST_F(ReflectionTest, SendsEachFileWithAllThatItImports) {
   Reflected reflected(channel());
   const auto answer = reflected.AskForSymbol("carillon.v1.SceneService.AddObject");
