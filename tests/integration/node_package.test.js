@@ -4,6 +4,7 @@
 const assert = require('node:assert/strict');
 const fs = require('node:fs/promises');
 const path = require('node:path');
+const { spawnSync } = require('node:child_process');
 const { after, before, test } = require('node:test');
 const carillon = require('carillon');
 
@@ -320,6 +321,46 @@ test('a scene is turned down, muted and stopped', async () => {
   }
   assert.equal((await c.setVolume({ gain: 0.25 })).gain, 0.25);
   await c.setVolume({ gain: 1 });
+});
+
+test('a process ends though its streams and recordings are open', () => {
+  const script = `const carillon = require('carillon');
+    (async () => {
+      const c = carillon.connect();
+      try {
+        const record = await c.listen();
+        const scene = await c.createScene();
+        await scene.stream({ step: 1 / 60 }).step(0, {});
+        await new Promise((resolve) => setTimeout(resolve, 200));
+        throw new Error('a bug');
+      } finally {
+        c.close();
+      }
+    })().catch((error) => console.log(error.message));`;
+  const done = spawnSync(process.execPath, ['-e', script], { encoding: 'utf8', timeout: 30000 });
+  assert.deepEqual([done.status, done.stdout], [0, 'a bug\n']);
+  assert.match(done.stderr, /ContactWarning: a stream of scenes\/\S+ was not closed before its client/);
+});
+
+test('a forgotten await and numbers that make no rows are refused', async () => withScene(async (scene) => {
+  for (const wrong of [undefined, c.model('bar')]) {
+    await assert.rejects(async () => scene.add(wrong), /the model is .*; it must be a Model, such as await createModel/);
+  }
+  for (const [vertices, triangles] of [[new Float64Array(11), [0, 1, 2]], [new Float64Array(9), [0, 1, 2, 0]]]) {
+    await assert.rejects(c.createModel({ vertices, triangles }, { material }), /has (11|4) numbers; it must have three/);
+  }
+  const other = carillon.connect();
+  other.close();
+  await assert.rejects(async () => other.info(), /has been closed; connect again/);
+}));
+
+test('a recording is taken once, for a time above zero', async () => {
+  const record = await c.listen();
+  for (const seconds of [NaN, undefined, 0, -1]) {
+    await assert.rejects(record.take(seconds), /seconds is \S+; it must be a number above 0/);
+  }
+  assert.ok((await record.take(0.1)).samples.length > 0);
+  await assert.rejects(record.take(0.1), /has been taken; begin another one by listen/);
 });
 
 test('a stream that is too fast drops the oldest steps', async () => withScene(async (scene) => {

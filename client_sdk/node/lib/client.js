@@ -39,7 +39,7 @@ const PIECE_BYTES = 1 << 20;
 function connect(server, options = {}) {
   refuseUnknown(options, ['tlsRoots', 'token', 'tlsCertificate', 'tlsKey'], 'connect');
   const address = server ?? defaultServer();
-  if (/^(\/|https?:\/\/)/i.test(address)) refuse(address, 'server', '"unix:PATH" or "HOST:PORT"');
+  if (typeof address !== 'string' || /^(\/|https?:\/\/)/i.test(address)) refuse(address, 'server', '"unix:PATH" or "HOST:PORT"');
   return new Client(address, options);
 }
 
@@ -57,10 +57,12 @@ class Client {
     this.credentials = channelCredentials(tlsFiles);
     this.interceptors = tokenInterceptors(token);
     this.stubs = new Map();
+    this.openCalls = new Set();
   }
 
   /** The client of a service of the contract that grpc-js makes, for calls that have no method here. */
   stub(service) {
+    if (this.isClosed) throw new Error('this client has been closed; connect again');
     if (!this.stubs.has(service)) {
       const options = { 'grpc.max_receive_message_length': -1, interceptors: this.interceptors };
       this.stubs.set(service, new services[service](this.server, this.credentials, options));
@@ -80,11 +82,13 @@ class Client {
 
   /** Yields the answers of a stream. Its errors are those of this package. */
   async* answers(stream) {
+    this.openCalls.add(stream);
     try {
       yield* stream;
     } catch (error) {
       throw fromCall(error, this.server);
     } finally {
+      this.openCalls.delete(stream);
       stream.cancel();
     }
   }
@@ -313,7 +317,10 @@ class Client {
     return `<Client of ${this.server}>`;
   }
 
+  /** Cancels the calls that are open, such as recordings and streams that were not closed, and ends the connection. */
   close() {
+    this.isClosed = true;
+    for (const call of this.openCalls) call.cancel();
     for (const stub of this.stubs.values()) stub.close();
   }
 }
@@ -327,6 +334,11 @@ class Recording {
 
   /** Waits until this much of the sound since the beginning was heard, ends the recording, and returns the sound. */
   async take(seconds) {
+    if (!(seconds > 0 && seconds < Infinity)) refuse(seconds, 'seconds', 'a number above 0');
+    if (this.isTaken) {
+      throw new Error('this recording has been taken; begin another one by listen');
+    }
+    this.isTaken = true;
     const { sample_rate_hz: rateHz, channel_count: channelCount } = this.format;
     const wanted = Math.floor(seconds * rateHz) * channelCount;
     const isShort = this.format.encoding === 'AUDIO_ENCODING_INT16';

@@ -218,7 +218,8 @@ function poseColumns(columns) {
  * Makes the message of the step at a simulation time, seconds. Contacts and impulses are rows if they are an array, and
  * columns otherwise.
  */
-function makeStep(time, content = {}) {
+function makeStep(time, own) {
+  const content = own ?? {};
   if (typeof time !== 'number') refuse(time, 'time', 'the simulation time in seconds');
   refuseUnknown(content, STEP_KEYS, 'step');
   const { contacts, impulses, forces, poses, listener } = content;

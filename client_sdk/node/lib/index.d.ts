@@ -306,6 +306,7 @@ export class Client {
   stopAll(): Promise<number>;
   /** Calls a method of the contract that takes one message and answers one, such as "SceneService", "ListScenes". */
   call(service: string, method: string, request: object): Promise<any>;
+  /** Cancels the calls that are open, such as recordings and streams that were not closed, and ends the connection. */
   close(): void;
 }
 

@@ -10,7 +10,10 @@ function isList(values) {
   return values !== null && typeof values === 'object' && 'length' in values;
 }
 
-function rows(values) {
+function rows(values, name) {
+  if (typeof values[0] === 'number' && values.length % 3) {
+    throw new TypeError(`${name} has ${values.length} numbers; it must have three a row, or be a list of rows`);
+  }
   if (values.length && typeof values[0] !== 'number') return Array.from(values);
   return Array.from({ length: values.length / 3 }, (_, i) => [values[3 * i], values[3 * i + 1], values[3 * i + 2]]);
 }
@@ -25,8 +28,8 @@ function digits(value) {
 
 /** Makes an OBJ file of vertices (metres) and triangles, whose indices count from zero. */
 function makeObj({ vertices, triangles }) {
-  const points = rows(vertices);
-  const corners = rows(triangles);
+  const points = rows(vertices, 'vertices');
+  const corners = rows(triangles, 'triangles');
   if (corners.some((corner) => Array.from(corner).some((i) => !(i >= 0 && i < points.length)))) {
     throw new CarillonError('MESH_INDEX_OUT_OF_RANGE', `a triangle names a vertex outside 0 to ${points.length - 1}; ` +
       'indices count from zero');

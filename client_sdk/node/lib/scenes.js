@@ -2,12 +2,13 @@
 'use strict';
 
 const util = require('util');
+const { status } = require('@grpc/grpc-js');
 const { counted, refuseUnknown } = require('./checks');
 const { frameInWords, given, makeStep, objectsOf, present, strikeOf, toHandle, toPose } = require('./contacts');
 const { CarillonError, fromCall, fromInfo } = require('./errors');
 const { named, toMaterial, toRadiation } = require('./materials');
 const { streamSettings } = require('./traces');
-const { warnOfContacts, warnOfStream } = require('./warnings');
+const { warnOfContacts, warnOfOpenStream, warnOfStream } = require('./warnings');
 
 // Steps that may wait for the network before the oldest is dropped.
 const MOST_WAITING = 4096;
@@ -170,10 +171,17 @@ class ContactStream {
     this.start = start;
     const { client } = scene;
     this.call = client.stub('ContactService').StreamContacts();
+    client.openCalls.add(this.call);
     this.ended = new Promise((resolve) => {
       this.call.on('data', (answer) => { this.report = answer; });
-      this.call.on('error', (error) => { this.error = fromCall(error, client.server); });
-      this.call.on('close', resolve);
+      this.call.on('error', (error) => {
+        this.error = fromCall(error, client.server);
+        if (error.code === status.CANCELLED && !this.isClosing) warnOfOpenStream(start.scene);
+      });
+      this.call.on('close', () => {
+        client.openCalls.delete(this.call);
+        resolve();
+      });
     });
     this.waiting = [];
     this.isFull = !this.call.write({ start });

@@ -6,6 +6,8 @@ const { counted } = require('./checks');
 const SCENE_FRAME = "the scene's frame";
 /** Time by which a simulation in real time may run ahead. */
 const USUAL_LEAD_S = 0.25;
+/** Steps with one time that are no chance. */
+const MANY_STANDING_STEPS = 10;
 
 function were(count, noun) {
   return `${counted(count, noun)} ${Number(count) === 1 ? 'was' : 'were'}`;
@@ -54,6 +56,17 @@ function warnOfContacts(findings, frame, acceptedCount = 0) {
     warn(`most steps came ${Number(gap.toPrecision(3))} s apart, which is longer than the step that was stated, so that a ` +
       'body at rest strikes in each of them; state the step of the simulator and the times of steps in seconds');
   }
+  const standing = Number(findings?.standing_step_count ?? 0);
+  if (standing >= MANY_STANDING_STEPS) {
+    warn(`${standing} steps with contacts had the time of the step before; give each step the simulation's time, in ` +
+      'seconds');
+  }
+  const changed = Number(findings?.changed_partner_count ?? 0);
+  if (changed) {
+    warn(`in ${changed} steps an object in contact touched none of its partners of the step before, so that a body at ` +
+      "rest strikes in each of them; give a body the same partner in each step, such as the engine's number of that " +
+      'body');
+  }
   const fast = Number(findings?.fast_impulse_count ?? 0);
   if (fast) {
     const speed = Number(findings.largest_speed_change_m_per_s.toPrecision(3));
@@ -73,6 +86,12 @@ function warnOfContacts(findings, frame, acceptedCount = 0) {
   warn(`${counted(count, 'contact')} ${count === 1 ? 'lies' : 'lie'} up to ${distance} m away from the surfaces of the ` +
     `objects, and sound${count === 1 ? 's' : ''} at the nearest points; give points in metres, in ${frame}` +
     (frame === SCENE_FRAME ? ', and the pose of each object' : ''));
+}
+
+/** Warns of a stream that was open when its client was closed. */
+function warnOfOpenStream(scene) {
+  warn(`a stream of ${scene} was not closed before its client, so that its last contacts may not have sounded; await ` +
+    'its close()');
 }
 
 /** Warns, once and at the end of a stream, of the contacts that did not sound as the caller meant. */
@@ -106,4 +125,4 @@ function warnOfStream(report, frame, droppedStepCount) {
   warnOfContacts(report.findings, frame, Number(report.accepted_count ?? 0) + Number(report.late_count ?? 0));
 }
 
-module.exports = { SCENE_FRAME, warnOfContacts, warnOfLabel, warnOfStream, warnOfTransfers, warnOfUnit };
+module.exports = { SCENE_FRAME, warnOfContacts, warnOfLabel, warnOfOpenStream, warnOfStream, warnOfTransfers, warnOfUnit };

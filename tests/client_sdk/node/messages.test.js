@@ -62,6 +62,14 @@ test('forces in place of impulses and a simulation ahead of its sound are told',
   assert.match((await told({ scheduling_delay_s: 0.1, ahead_s: 4 })).join(), /the newest step sounds only in 4 s/);
 });
 
+test('time that stands still and partners that change are told', async () => {
+  assert.deepEqual(await told({ findings: { standing_step_count: 9 } }), []);
+  assert.match((await told({ findings: { standing_step_count: 10 } })).join(),
+    /^ContactWarning: 10 steps with contacts had the time of the step before; give each step/);
+  assert.match((await told({ findings: { changed_partner_count: 11 } })).join(),
+    /in 11 steps an object in contact touched none of its partners .* number of that body$/);
+});
+
 test('a step stated too short and impulses that are all zero are told', async () => {
   assert.match((await told({ findings: { regular_gap_s: 1 / 120, blow_count: 9 } })).join(),
     /most steps came 0\.00833 s apart/);
