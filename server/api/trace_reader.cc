@@ -18,6 +18,7 @@ namespace carillon {
 namespace {
 
 constexpr uint32_t kFormatVersion = 1;
+constexpr double kShortestStepS = 1e-6;
 constexpr uint64_t kMostFirstFrame = uint64_t{1} << 48;
 
 absl::Status Malformed(absl::string_view message) {
@@ -71,7 +72,11 @@ absl::Status TraceReader::TakeHeader(const v1::ContactTraceHeader& header) {
     return Malformed(absl::StrCat("the trace is of format version ", header.format_version(),
                                   "; this daemon reads ", kFormatVersion));
   }
-  if (header.step_s() > 0 && header.step_s() <= 1) settings_->step_s = header.step_s();
+  if (header.step_s() != 0) settings_->step_s = header.step_s();
+  if (!(settings_->step_s >= kShortestStepS && settings_->step_s <= 1)) {
+    return Malformed(absl::StrCat("the header's step_s is ", header.step_s(),
+                                  "; say the simulator's step, from 1e-6 to 1 s"));
+  }
   settings_->space = ToSceneSpace(header.hearing(), header.listener());
   RETURN_IF_ERROR(
       heads_.Complete(settings_->space, settings_->sample_rate_hz, settings_->channel_count));

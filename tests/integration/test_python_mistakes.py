@@ -35,6 +35,25 @@ class MistakesTest(PackageTest):
         self.assertRegex(done.stderr, "a stream of scenes/.* was not closed")
         self.assertRegex(done.stderr, r"lie up to [89]\d\S* m away")
 
+    def test_partners_that_change_and_time_that_stands_still_are_told(self):
+        def told(partner, time_s):
+            trace = carillon.Trace(step=1 / 240)
+            bar = trace.add(self.model)
+            for i in range(60):
+                trace.step(time_s(i), contacts=carillon.Contacts(bar, [(0, 0, 0)], [(0, 0, 0.01)], partners=partner(i)))
+            with warnings.catch_warnings(record=True) as caught:
+                warnings.simplefilter("always")
+                sound = self.c.render(trace)
+            return sound.summary.findings.blow_count, [str(one.message) for one in caught]
+
+        blow_count, texts = told(lambda i: 1, lambda i: i / 240)
+        self.assertEqual(texts, [])
+        strikes, (text,) = told(lambda i: i, lambda i: i / 240)
+        self.assertRegex(text, "^in 59 steps an object in contact touched none of its partners")
+        self.assertGreater(strikes, 10 * blow_count)
+        _, (text,) = told(lambda i: 1, lambda i: 0)
+        self.assertRegex(text, "^59 steps with contacts had the time of the step before")
+
     def test_mistakes_that_were_silent_are_refused(self):
         trace = carillon.Trace(step=1 / 240)
         trace.add(self.model)
@@ -43,6 +62,11 @@ class MistakesTest(PackageTest):
             for objects in (bar, [bar]):
                 with self.assertRaisesRegex(ValueError, "which is not in the trace; give what Trace.add returned"):
                     trace.step(0, impulses=carillon.Impulses(objects, [(0, 0, 0)], [(0, 0, -1e-3)]))
+        for step_s in (-1, 4.17, 1e-9, float("nan")):
+            wrong = carillon.Trace(step=step_s)
+            wrong.step(0, impulses=carillon.Impulses(wrong.add(self.model), [(0, 0, 0)], [(0, 0, -1e-3)]))
+            with self.assertRaisesRegex(carillon.CarillonError, "step is .* s; say the simulator's step, from 1e-6"):
+                self.c.render(wrong)
         with self.assertRaisesRegex(ValueError, r"must end with \.wav"):
             carillon.Sound(numpy.zeros((1, 1)), 48000, 0).save(self.folder / "x.mp3")
         with self.assertRaisesRegex(ValueError, "seconds is -1; it must be more than 0"):
